@@ -1,0 +1,63 @@
+#include "core/execution.h"
+
+#include <sched.h>
+
+#include <algorithm>
+#include <atomic>
+#include <exception>
+#include <mutex>
+
+#ifdef STRATA_USE_TBB
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+#else
+#include <thread>
+#include <vector>
+#endif
+
+namespace strata {
+
+int Execution::thread_count() const {
+  if (threads > 0) return threads;
+  cpu_set_t allowed;
+  CPU_ZERO(&allowed);
+  if (sched_getaffinity(0, sizeof allowed, &allowed) != 0) return 1;
+  return std::max(1, CPU_COUNT(&allowed));
+}
+
+void parallel_for(const Execution& execution, std::size_t count,
+                  const std::function<void(std::size_t, int)>& body) {
+  const int workers = static_cast<int>(std::min<std::size_t>(
+      static_cast<std::size_t>(execution.thread_count()), std::max<std::size_t>(count, 1)));
+  std::atomic<std::size_t> next{0};
+  std::exception_ptr failure;
+  std::mutex failure_mutex;
+  const auto run = [&](int worker) {
+    try {
+      while (!execution.stop.stop_requested()) {
+        const std::size_t index = next.fetch_add(1, std::memory_order_relaxed);
+        if (index >= count) return;
+        body(index, worker);
+      }
+    } catch (...) {
+      next.store(count, std::memory_order_relaxed);  // the others need not begin anything new
+      const std::lock_guard lock(failure_mutex);
+      if (!failure) failure = std::current_exception();
+    }
+  };
+  if (workers == 1) {
+    run(0);
+  } else {
+#ifdef STRATA_USE_TBB
+    tbb::task_arena arena(workers);
+    arena.execute([&] { tbb::parallel_for(0, workers, run, tbb::simple_partitioner()); });
+#else
+    std::vector<std::jthread> pool;
+    for (int worker = 1; worker < workers; ++worker) pool.emplace_back(run, worker);
+    run(0);
+#endif
+  }
+  if (failure) std::rethrow_exception(failure);
+}
+
+}  // namespace strata

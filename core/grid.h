@@ -1,0 +1,32 @@
+#pragma once
+
+#include <glm/vec3.hpp>
+
+namespace strata {
+
+/// The axis that rays run along: depth lists, intervals.
+enum class Axis : int { kX = 0, kY = 1, kZ = 2 };
+
+/// Names the two screen axes of rays along `w`: pixel (u, v) with u before v in x, y, z order. For
+/// kY the frame (u, v, w) = (x, z, y) is left-handed.
+struct AxisFrame {
+  int u = 0, v = 1, w = 2;
+
+  explicit constexpr AxisFrame(Axis axis)
+      : u(axis == Axis::kX ? 1 : 0), v(axis == Axis::kZ ? 1 : 2), w(static_cast<int>(axis)) {}
+};
+
+/// Largest number of voxels along one side of a grid: 2^24 lattice steps.
+inline constexpr int kMaxGridSide = 65536;
+
+/// A box of voxels in world space. Voxel (i, j, k) covers origin + (i..i+1, j..j+1, k..k+1) *
+/// voxel_size; its centre, which decides whether it is solid, is half a voxel further in.
+struct VoxelGrid {
+  glm::ivec3 dims{0};          ///< voxels along x, y, z; each in [1, kMaxGridSide]
+  glm::dvec3 origin{0.0};      ///< world position of the lower corner of voxel (0, 0, 0)
+  glm::dvec3 voxel_size{1.0};  ///< world length of a voxel along x, y, z; each finite and > 0
+
+  friend bool operator==(const VoxelGrid&, const VoxelGrid&) = default;
+};
+
+}  // namespace strata

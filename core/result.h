@@ -1,0 +1,42 @@
+#pragma once
+
+#include <fmt/format.h>
+
+#include <string>
+#include <tl/expected.hpp>
+#include <utility>
+
+namespace strata {
+
+/// What went wrong, by the party that can mend it. The value is the exit code of the command-line
+/// tool.
+enum class ErrorCode : int {
+  kInternal = 1,  ///< our own fault
+  kUsage = 2,     ///< options that contradict each other or are out of range
+  kInput = 3,     ///< a file that cannot be read or is malformed
+  kOutput = 4,    ///< a file that cannot be written
+  kGeometry = 5,  ///< geometry that is refused (open mesh under --strict, coordinates too large)
+  kLimit = 6,     ///< a memory or size limit
+  kVerification = 7,  ///< two results that should agree do not
+  kCancelled = 130,   ///< stopped on request
+};
+
+/// One sentence that names the culprit and the number: `bunny.obj:1204: face refers to vertex
+/// 98213, the file has 34817`.
+struct Error {
+  ErrorCode code = ErrorCode::kInternal;
+  std::string message;
+};
+
+/// A value, or the error that prevented it. Functions of the library neither throw nor print.
+template <class T>
+using Result = tl::expected<T, Error>;
+
+/// Builds the failed side of a Result: `return fail(ErrorCode::kInput, "{}: empty file", name);`
+template <class... Args>
+[[nodiscard]] tl::unexpected<Error> fail(ErrorCode code, fmt::format_string<Args...> text,
+                                         Args&&... args) {
+  return tl::unexpected<Error>(Error{code, fmt::format(text, std::forward<Args>(args)...)});
+}
+
+}  // namespace strata

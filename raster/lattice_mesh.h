@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <span>
+#include <vector>
+
+#include "core/execution.h"
+#include "core/grid.h"
+#include "core/result.h"
+#include "mesh/triangle_soup.h"
+
+namespace strata {
+
+/// Lattice steps along a voxel or pixel: positions are 24.8 fixed point.
+inline constexpr int kLatticeBits = 8;
+inline constexpr int kLatticeSteps = 1 << kLatticeBits;
+/// Coordinates beyond this many lattice steps (2^20 voxels) are refused.
+inline constexpr std::int32_t kMaxLatticeCoordinate = 1 << 28;
+
+/// A mesh whose vertices were snapped, once and in 3D, to the lattice of a grid: the only geometry
+/// that the rasterizer, the surface voxelizer and the oracles see (law 3). Lattice point (x, y, z)
+/// lies at world grid.origin + (x, y, z) / 256 * grid.voxel_size; voxel centres are at 256 i + 128.
+struct LatticeMesh {
+  std::vector<glm::ivec3> vertices;       ///< |coordinate| <= kMaxLatticeCoordinate
+  std::span<const glm::uvec3> triangles;  ///< borrowed from the soup it was made of
+};
+
+/// Snaps to nearest, ties up: floor((p - origin) / voxel_size * 256 + 0.5).
+/// @return kGeometry naming the vertex and its coordinate when it is not finite or farther than
+/// kMaxLatticeCoordinate.
+Result<LatticeMesh> snap_to_lattice(const TriangleSoup& mesh, const VoxelGrid& grid,
+                                    const Execution& execution = {});
+
+}  // namespace strata

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/execution.h"
+#include "core/result.h"
+#include "voxelize/intervals.h"
+
+namespace strata {
+
+/// One output format of `strata voxelize`.
+struct VoxelFormat {
+  std::string
+      name;  ///< what --format takes: "vdb", "npy", "nrrd", "vti", "binvox", "vox", "png", "zarr"
+  std::string extension;    ///< with the dot; a folder format has a trailing slash instead of one
+  std::string description;  ///< one line for --list-formats
+  Axis axis = Axis::kZ;  ///< the rays whose intervals this format is written from at the least cost
+};
+
+/// The formats this build can write.
+[[nodiscard]] const std::vector<VoxelFormat>& voxel_formats();
+
+struct VoxelWriterOptions {
+  bool fog = false;  ///< .vdb: a float fog volume (1 inside) instead of a mask of active voxels
+  std::string name = "solid";  ///< .vdb, .vti, .nrrd: name of the grid
+};
+
+/// Writes a voxel set slab by slab: every slab of one axis, in increasing v, then finish(). Nothing
+/// stands under the final name until finish() succeeds; a writer destroyed before leaves nothing
+/// behind. Memory: one slab, and what the format itself must hold.
+class VoxelWriter {
+ public:
+  virtual ~VoxelWriter() = default;
+  /// Adds the voxels of one slab. Uses the threads of `execution`; same bytes for any number.
+  virtual Result<void> add(const VoxelIntervals& slab, const Execution& execution) = 0;
+  virtual Result<void> finish(const Execution& execution) = 0;
+};
+
+/// Opens a writer for `path` ("-": standard output). The format is `format`, or if that is empty
+/// the path's extension. @return kUsage: no such format, none for the extension, a folder format on
+/// standard output, a grid the format cannot hold; kOutput: the file or folder cannot be made.
+Result<std::unique_ptr<VoxelWriter>> open_voxel_writer(const std::string& path,
+                                                       const std::string& format,
+                                                       const VoxelGrid& grid,
+                                                       const VoxelWriterOptions& options = {});
+
+/// The format that open_voxel_writer would take. @return kUsage as there
+Result<VoxelFormat> voxel_format_for(const std::string& path, const std::string& format);
+
+}  // namespace strata

@@ -1,0 +1,80 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "core/execution.h"
+#include "core/grid.h"
+#include "core/result.h"
+#include "mesh/triangle_soup.h"
+#include "voxelize/intervals.h"
+
+namespace strata {
+
+/// Which winding numbers are inside.
+enum class InsideRule { kWinding, kNonzero, kParity };  // > 0, != 0, odd
+/// Where crossings are kept until sorted. kAuto: the faster one measured for the scene.
+enum class StoreKind { kAuto, kHaBuffer, kCountScan };
+/// Probe offsets of the HA-buffer.
+enum class OffsetKind { kPlaneFirst, kRandom, kFarthestPoint };
+/// What to do with a mesh that is not closed.
+enum class OpenMode {
+  kVote,     ///< the lists of all three axes decide each voxel by majority
+  kSurface,  ///< keep only the voxels that the surface touches
+  kFail      ///< ErrorCode::kGeometry
+};
+/// Which voxels a surface fills.
+enum class SurfaceKind {
+  kConservative,  ///< every voxel that the surface touches (closed boxes), exactly
+  k26,            ///< 26-separating: no path of 26-neighbours crosses it
+  k6              ///< 6-separating: no path of face neighbours crosses it; the thinnest
+};
+
+struct VoxelizeOptions {
+  InsideRule rule = InsideRule::kWinding;
+  Axis axis = Axis::kZ;  ///< of the rays and of the intervals returned
+  bool solid = true;     ///< voxels whose centre is inside
+  bool surface = false;  ///< voxels of the surface; with solid: the union
+  SurfaceKind surface_kind = SurfaceKind::kConservative;
+  OpenMode open = OpenMode::kVote;
+  bool closed = true;  ///< the mesh is known to be closed; false: `open` applies
+  StoreKind store = StoreKind::kAuto;
+  OffsetKind offsets = OffsetKind::kPlaneFirst;
+  bool statistics = false;  ///< fill the histogram and the checksum of the report
+};
+
+/// What voxelizing found out.
+struct VoxelizeReport {
+  std::uint64_t solid_voxels = 0;
+  std::uint64_t intervals = 0;
+  std::uint64_t crossings = 0;  ///< fragments stored, along the axis asked for
+  std::uint64_t max_depth_complexity = 0;
+  /// Columns with n crossings, n = 0..; the last entry counts the rest. With `statistics`.
+  std::array<std::uint64_t, 65> depth_histogram{};
+  std::uint64_t unbalanced_columns = 0;  ///< columns entered and left unequally often: holes
+  std::uint64_t negative_columns = 0;    ///< columns where the winding number falls below 0
+  std::uint64_t rebuilt_tiles = 0;       ///< tiles built again with a larger table
+  std::uint64_t checksum = 0;  ///< see set_checksum in voxelize/checksum.h; with `statistics`
+  double lists_ms = 0, intervals_ms = 0;  ///< CPU-thread-independent wall times of the two phases
+};
+
+/// Receives the slabs in increasing v.
+using SlabSink = std::function<Result<void>(const VoxelIntervals&)>;
+
+/// Voxelizes `mesh` on `grid`, slab by slab of bounded memory. Voxel centres decide (law 7): same
+/// set for every axis, store, thread count and order of triangles.
+/// @return kGeometry (coordinates too large, open mesh with OpenMode::kFail), kLimit, kCancelled,
+/// or the sink's error.
+Result<VoxelizeReport> voxelize_slabs(const TriangleSoup& mesh, const VoxelGrid& grid,
+                                      const VoxelizeOptions& options, const Execution& execution,
+                                      const SlabSink& sink);
+
+/// The same in one piece.
+Result<VoxelIntervals> voxelize(const TriangleSoup& mesh, const VoxelGrid& grid,
+                                const VoxelizeOptions& options = {},
+                                const Execution& execution = {}, VoxelizeReport* report = nullptr);
+
+}  // namespace strata
