@@ -2,6 +2,10 @@
 #   makes strata_NAME, alias strata::NAME, headers found as "NAME/file.h" from the project's root.
 function(strata_set_flags target)
   target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wshadow -Wconversion -ffp-contract=off)
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
+    # GCC bug 105651: `"text" + std::to_string(i)` is reported as an overlapping copy.
+    target_compile_options(${target} PRIVATE -Wno-restrict)
+  endif()
   if(STRATA_WARNINGS_AS_ERRORS)
     target_compile_options(${target} PRIVATE -Werror)
   endif()

@@ -1,8 +1,8 @@
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
-#include <span>
 #include <string>
 
 #include "core/result.h"
@@ -11,10 +11,12 @@ namespace strata {
 
 /// A file that appears under its name only when complete: bytes go to a temporary file beside it,
 /// which commit() renames. Destroyed uncommitted, or on SIGINT/SIGTERM (remove_temporary_files), it
-/// leaves nothing. The path "-" is standard output, written directly. Move-only.
+/// leaves nothing. Two kinds of target are written directly, since nothing can be renamed onto
+/// them: "-", which is standard output, and devices and pipes (/dev/null). A symbolic link is
+/// followed. Move-only.
 class AtomicFile {
  public:
-  /// @return kOutput naming the path and the system's reason.
+  /// @return kOutput naming the path and the system's reason; kLimit when kMaxTemporaries are live.
   static Result<AtomicFile> create(const std::string& path);
   AtomicFile(AtomicFile&& other) noexcept;
   AtomicFile& operator=(AtomicFile&& other) noexcept;
@@ -22,9 +24,11 @@ class AtomicFile {
 
   /// Appends bytes; short writes are continued. @return kOutput (full disk, ...)
   Result<void> write(const void* data, std::size_t bytes);
-  /// Writes at a position; not for standard output. Several threads may call it at once.
+  /// Writes at a position in bytes; not for standard output, and not to be mixed with write().
+  /// Several threads may call it at once.
   Result<void> write_at(std::uint64_t offset, const void* data, std::size_t bytes);
-  /// Flushes and renames to the final name.
+  /// Closes and renames to the final name. @return kOutput; also when an earlier write failed.
+  /// There is no fsync: a power cut may lose the file, an interrupted program cannot.
   Result<void> commit();
 
   /// Where the bytes are until commit(), for libraries that open files by name; "-" for standard
@@ -35,14 +39,22 @@ class AtomicFile {
  private:
   AtomicFile() = default;
   void discard() noexcept;
-  std::string path_, temporary_;
+  tl::unexpected<Error> write_failure(std::size_t bytes, std::uint64_t offset, int reason);
+
+  std::string path_;       // as the caller wrote it
+  std::string target_;     // what commit() renames to; links resolved; empty: written directly
+  std::string temporary_;  // beside target_
   int descriptor_ = -1;
+  int slot_ = -1;              // in the table of remove_temporary_files
+  std::uint64_t written_ = 0;  // bytes appended by write()
+  std::atomic<bool> failed_{false};
 };
 
 /// The same for a folder of files: made beside its final name, renamed by commit(). An existing
 /// empty folder is replaced; an existing folder with content is kOutput.
 class AtomicFolder {
  public:
+  /// A trailing slash is allowed. @return kOutput, kLimit as AtomicFile::create
   static Result<AtomicFolder> create(const std::string& path);
   AtomicFolder(AtomicFolder&& other) noexcept;
   AtomicFolder& operator=(AtomicFolder&& other) noexcept;
@@ -54,12 +66,16 @@ class AtomicFolder {
  private:
   AtomicFolder() = default;
   void discard() noexcept;
-  std::string path_, temporary_;
+  std::string path_, target_, temporary_;
+  int slot_ = -1;
 };
 
-/// Removes the temporary files and folders of all live AtomicFile and AtomicFolder objects; files
-/// by unlink only, so that a signal handler may call it for files (folders are removed by their
-/// owners).
+/// Most AtomicFile and AtomicFolder objects that may live at once in a process.
+inline constexpr int kMaxTemporaries = 256;
+
+/// Removes the temporary files and folders of all live AtomicFile and AtomicFolder objects. Safe in
+/// a signal handler: it uses a fixed table and system calls only. Meant for the way out: a commit()
+/// after it fails.
 void remove_temporary_files() noexcept;
 
 }  // namespace strata

@@ -1,0 +1,396 @@
+#include "core/atomic_file.h"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/stat.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <climits>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <system_error>
+#include <utility>
+
+namespace strata {
+namespace {
+
+// --- the table of temporary names ---------------------------------------------------------------
+
+// free -> filling -> live -> free by the owner; live -> removing -> removed by a signal handler. A
+// handler owns a slot while it reads the name, so it never unlinks a name that is half overwritten.
+enum class SlotState : int { kFree, kFilling, kLive, kRemoving, kRemoved };
+
+struct Slot {
+  std::atomic<SlotState> state{SlotState::kFree};
+  bool folder = false;
+  pid_t owner = 0;  // a forked child must not remove what its parent is writing
+  std::array<char, PATH_MAX> name{};
+};
+static_assert(std::atomic<SlotState>::is_always_lock_free, "used in signal handlers");
+
+std::array<Slot, kMaxTemporaries> temporaries;  // zero pages until used
+
+// Index of a slot that holds `name`, or -1 when all are taken.
+int enter_temporary(const std::string& name, bool folder) noexcept {
+  if (name.size() >= PATH_MAX) return -1;
+  for (int i = 0; i < kMaxTemporaries; ++i) {
+    Slot& slot = temporaries[static_cast<std::size_t>(i)];
+    SlotState expected = SlotState::kFree;
+    if (!slot.state.compare_exchange_strong(expected, SlotState::kFilling)) continue;
+    slot.folder = folder;
+    slot.owner = getpid();
+    std::memcpy(slot.name.data(), name.c_str(), name.size() + 1);
+    slot.state.store(SlotState::kLive);
+    return i;
+  }
+  return -1;
+}
+
+void leave_temporary(int& index) noexcept {
+  if (index < 0) return;
+  Slot& slot = temporaries[static_cast<std::size_t>(std::exchange(index, -1))];
+  // Only a handler on another thread can hold the slot, and it never waits for us.
+  SlotState expected = SlotState::kLive;
+  while (!slot.state.compare_exchange_weak(expected, SlotState::kFree)) {
+    if (expected != SlotState::kRemoved) expected = SlotState::kLive;
+  }
+}
+
+// Removes what a folder holds with system calls alone; opendir would allocate.
+void remove_content(int folder, int depth) noexcept {
+  constexpr int kDeepest = 8;  // our folder formats have two levels
+  struct Entry {               // linux_dirent64
+    ino64_t inode;
+    off64_t next;
+    unsigned short length;
+    unsigned char type;
+    char name[1];
+  };
+  alignas(Entry) std::array<char, 2048> buffer;
+  for (;;) {
+    const long got = syscall(SYS_getdents64, folder, buffer.data(), buffer.size());
+    if (got <= 0) return;
+    for (long at = 0; at < got;) {
+      const auto* entry = reinterpret_cast<const Entry*>(buffer.data() + at);
+      const char* name = buffer.data() + at + offsetof(Entry, name);
+      at += entry->length;
+      if (std::strcmp(name, ".") == 0 || std::strcmp(name, "..") == 0) continue;
+      if (unlinkat(folder, name, 0) == 0 || depth >= kDeepest) continue;
+      const int child = openat(folder, name, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+      if (child < 0) continue;
+      remove_content(child, depth + 1);
+      close(child);
+      unlinkat(folder, name, AT_REMOVEDIR);
+    }
+  }
+}
+
+void remove_folder(const char* name) noexcept {
+  constexpr int kAttempts = 16;  // other threads may still add files while we empty the folder
+  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+    const int folder = open(name, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+    if (folder < 0) return;
+    remove_content(folder, 0);
+    close(folder);
+    if (rmdir(name) == 0) return;
+  }
+}
+
+// --- names --------------------------------------------------------------------------------------
+
+std::string reason_text(int reason) { return std::generic_category().message(reason); }
+
+tl::unexpected<Error> cannot_create(const std::string& path, int reason) {
+  return fail(ErrorCode::kOutput, "{}: cannot create: {}", path, reason_text(reason));
+}
+
+tl::unexpected<Error> too_many(const std::string& path) {
+  return fail(ErrorCode::kLimit, "{}: more than {} output files are open at once", path,
+              kMaxTemporaries);
+}
+
+// The next candidate for a temporary name beside `target`: ".name.tmp.PID-N".
+std::string temporary_name(const std::string& target) {
+  static std::atomic<unsigned> counter{0};
+  constexpr std::size_t kLongestName = 200;  // NAME_MAX is 255, and ours is longer than the target
+  const std::size_t slash = target.rfind('/');
+  const std::size_t start = slash == std::string::npos ? 0 : slash + 1;
+  return fmt::format("{}.{}.tmp.{}-{}", target.substr(0, start), target.substr(start, kLongestName),
+                     getpid(), counter.fetch_add(1));
+}
+
+constexpr int kNameAttempts = 1000;  // names can be left over from a killed process of our number
+
+void remove_tree(const std::string& name) noexcept {
+  std::error_code ignored;
+  std::filesystem::remove_all(name, ignored);
+}
+
+}  // namespace
+
+void remove_temporary_files() noexcept {
+  const int saved = errno;  // a handler must not disturb the code it interrupts
+  const pid_t self = getpid();
+  for (Slot& slot : temporaries) {
+    SlotState expected = SlotState::kLive;
+    if (!slot.state.compare_exchange_strong(expected, SlotState::kRemoving)) continue;
+    if (slot.owner != self) {
+      slot.state.store(SlotState::kLive);
+      continue;
+    }
+    if (slot.folder) {
+      remove_folder(slot.name.data());
+    } else {
+      unlink(slot.name.data());
+    }
+    slot.state.store(SlotState::kRemoved);
+  }
+  errno = saved;
+}
+
+// --- AtomicFile ---------------------------------------------------------------------------------
+
+Result<AtomicFile> AtomicFile::create(const std::string& path) {
+  AtomicFile file;
+  file.path_ = path;
+  if (path == "-") {
+    file.temporary_ = path;
+    file.descriptor_ = STDOUT_FILENO;
+    return file;
+  }
+  if (path.empty()) return fail(ErrorCode::kOutput, "the output has no name");
+
+  struct stat status {};
+  const bool exists = stat(path.c_str(), &status) == 0;
+  if (exists && S_ISDIR(status.st_mode)) return cannot_create(path, EISDIR);
+  if (exists && access(path.c_str(), W_OK) != 0) return cannot_create(path, errno);
+  if (exists && !S_ISREG(status.st_mode)) {
+    file.temporary_ = path;
+    file.descriptor_ = open(path.c_str(), O_WRONLY | O_CLOEXEC);
+    if (file.descriptor_ < 0) return cannot_create(path, errno);
+    return file;
+  }
+
+  file.target_ = path;
+  std::error_code ignored;
+  if (exists && std::filesystem::is_symlink(path, ignored)) {
+    const std::filesystem::path resolved = std::filesystem::canonical(path, ignored);
+    if (!ignored) file.target_ = resolved.string();
+  }
+  for (int attempt = 0; attempt < kNameAttempts; ++attempt) {
+    file.temporary_ = temporary_name(file.target_);
+    // Entered before it exists: a signal between the two finds nothing, rather than forgets it.
+    file.slot_ = enter_temporary(file.temporary_, false);
+    if (file.slot_ < 0) {
+      return file.temporary_.size() >= PATH_MAX ? cannot_create(path, ENAMETOOLONG)
+                                                : too_many(path);
+    }
+    file.descriptor_ = open(file.temporary_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC,
+                            S_IRUSR | S_IWUSR | S_IRGRP | S_IWGRP | S_IROTH | S_IWOTH);
+    if (file.descriptor_ >= 0) break;
+    const int reason = errno;
+    leave_temporary(file.slot_);
+    if (reason != EEXIST && reason != EINTR) return cannot_create(path, reason);
+  }
+  if (file.descriptor_ < 0) return cannot_create(path, EEXIST);
+  if (file.descriptor_ <= STDERR_FILENO) {
+    // A caller with a closed standard stream must not print into this file.
+    const int higher = fcntl(file.descriptor_, F_DUPFD_CLOEXEC, STDERR_FILENO + 1);
+    const int reason = errno;
+    close(std::exchange(file.descriptor_, higher));
+    if (higher < 0) return cannot_create(path, reason);
+  }
+  // Best effort: a file that is replaced keeps its permissions.
+  if (exists) (void)!fchmod(file.descriptor_, status.st_mode & 07777);
+  return file;
+}
+
+AtomicFile::AtomicFile(AtomicFile&& other) noexcept
+    : path_(std::move(other.path_)),
+      target_(std::move(other.target_)),
+      temporary_(std::move(other.temporary_)),
+      descriptor_(std::exchange(other.descriptor_, -1)),
+      slot_(std::exchange(other.slot_, -1)),
+      written_(other.written_),
+      failed_(other.failed_.load()) {}
+
+AtomicFile& AtomicFile::operator=(AtomicFile&& other) noexcept {
+  if (this == &other) return *this;
+  discard();
+  path_ = std::move(other.path_);
+  target_ = std::move(other.target_);
+  temporary_ = std::move(other.temporary_);
+  descriptor_ = std::exchange(other.descriptor_, -1);
+  slot_ = std::exchange(other.slot_, -1);
+  written_ = other.written_;
+  failed_ = other.failed_.load();
+  return *this;
+}
+
+AtomicFile::~AtomicFile() { discard(); }
+
+void AtomicFile::discard() noexcept {
+  if (descriptor_ > STDERR_FILENO) close(descriptor_);
+  descriptor_ = -1;
+  if (slot_ >= 0) unlink(temporary_.c_str());
+  leave_temporary(slot_);
+}
+
+tl::unexpected<Error> AtomicFile::write_failure(std::size_t bytes, std::uint64_t offset,
+                                                int reason) {
+  failed_ = true;
+  return fail(ErrorCode::kOutput, "{}: cannot write {} bytes at position {}: {}",
+              path_ == "-" ? "standard output" : path_, bytes, offset, reason_text(reason));
+}
+
+Result<void> AtomicFile::write(const void* data, std::size_t bytes) {
+  const char* from = static_cast<const char*>(data);
+  while (bytes > 0) {
+    const ssize_t done = ::write(descriptor_, from, bytes);
+    if (done > 0) {
+      from += done;
+      bytes -= static_cast<std::size_t>(done);
+      written_ += static_cast<std::uint64_t>(done);
+      continue;
+    }
+    const int reason = done == 0 ? ENOSPC : errno;
+    if (reason == EINTR) continue;
+    if (reason == EAGAIN) {  // a pipe that its other end made non-blocking
+      pollfd ready{descriptor_, POLLOUT, 0};
+      (void)!poll(&ready, 1, -1);
+      continue;
+    }
+    return write_failure(bytes, written_, reason);
+  }
+  return {};
+}
+
+Result<void> AtomicFile::write_at(std::uint64_t offset, const void* data, std::size_t bytes) {
+  const char* from = static_cast<const char*>(data);
+  while (bytes > 0) {
+    const ssize_t done = pwrite(descriptor_, from, bytes, static_cast<off_t>(offset));
+    if (done > 0) {
+      from += done;
+      bytes -= static_cast<std::size_t>(done);
+      offset += static_cast<std::uint64_t>(done);
+      continue;
+    }
+    const int reason = done == 0 ? ENOSPC : errno;
+    if (reason == EINTR) continue;
+    return write_failure(bytes, offset, reason);
+  }
+  return {};
+}
+
+Result<void> AtomicFile::commit() {
+  if (descriptor_ < 0) return fail(ErrorCode::kInternal, "{}: committed twice", path_);
+  if (failed_) {
+    discard();
+    return fail(ErrorCode::kOutput, "{}: not written, since a part of it failed", path_);
+  }
+  if (descriptor_ <= STDERR_FILENO) {
+    descriptor_ = -1;
+    return {};
+  }
+  // Not repeated after EINTR: Linux has released the descriptor by then.
+  if (close(std::exchange(descriptor_, -1)) != 0 && errno != EINTR) {
+    const int reason = errno;  // network file systems report a full disk here
+    discard();
+    return fail(ErrorCode::kOutput, "{}: cannot finish: {}", path_, reason_text(reason));
+  }
+  if (target_.empty()) return {};
+  if (std::rename(temporary_.c_str(), target_.c_str()) != 0) {
+    const int reason = errno;
+    discard();
+    return fail(ErrorCode::kOutput, "{}: cannot rename {} to it: {}", path_, temporary_,
+                reason_text(reason));
+  }
+  leave_temporary(slot_);
+  return {};
+}
+
+// --- AtomicFolder -------------------------------------------------------------------------------
+
+Result<AtomicFolder> AtomicFolder::create(const std::string& path) {
+  AtomicFolder folder;
+  folder.path_ = path;
+  folder.target_ = path;
+  while (folder.target_.size() > 1 && folder.target_.back() == '/') folder.target_.pop_back();
+  if (path.empty()) return fail(ErrorCode::kOutput, "the output folder has no name");
+  if (path == "-") {
+    return fail(ErrorCode::kOutput, "a folder cannot be written to standard output");
+  }
+  const std::filesystem::path name(folder.target_);
+  if (!name.has_filename() || name.filename() == "." || name.filename() == "..") {
+    return cannot_create(path, EEXIST);
+  }
+
+  std::error_code reason;
+  const std::filesystem::file_status status = std::filesystem::status(name, reason);
+  if (std::filesystem::exists(status)) {
+    if (!std::filesystem::is_directory(status)) return cannot_create(path, ENOTDIR);
+    const bool empty = std::filesystem::is_empty(name, reason);
+    if (reason) return cannot_create(path, reason.value());
+    if (!empty) return cannot_create(path, ENOTEMPTY);
+    if (std::filesystem::is_symlink(name, reason)) {
+      const std::filesystem::path resolved = std::filesystem::canonical(name, reason);
+      if (!reason) folder.target_ = resolved.string();
+    }
+  }
+  for (int attempt = 0; attempt < kNameAttempts; ++attempt) {
+    folder.temporary_ = temporary_name(folder.target_);
+    folder.slot_ = enter_temporary(folder.temporary_, true);
+    if (folder.slot_ < 0) {
+      return folder.temporary_.size() >= PATH_MAX ? cannot_create(path, ENAMETOOLONG)
+                                                  : too_many(path);
+    }
+    if (mkdir(folder.temporary_.c_str(), 0777) == 0) return folder;
+    const int error = errno;
+    leave_temporary(folder.slot_);
+    if (error != EEXIST) return cannot_create(path, error);
+  }
+  return cannot_create(path, EEXIST);
+}
+
+AtomicFolder::AtomicFolder(AtomicFolder&& other) noexcept
+    : path_(std::move(other.path_)),
+      target_(std::move(other.target_)),
+      temporary_(std::move(other.temporary_)),
+      slot_(std::exchange(other.slot_, -1)) {}
+
+AtomicFolder& AtomicFolder::operator=(AtomicFolder&& other) noexcept {
+  if (this == &other) return *this;
+  discard();
+  path_ = std::move(other.path_);
+  target_ = std::move(other.target_);
+  temporary_ = std::move(other.temporary_);
+  slot_ = std::exchange(other.slot_, -1);
+  return *this;
+}
+
+AtomicFolder::~AtomicFolder() { discard(); }
+
+void AtomicFolder::discard() noexcept {
+  if (slot_ >= 0) remove_tree(temporary_);
+  leave_temporary(slot_);
+}
+
+Result<void> AtomicFolder::commit() {
+  if (slot_ < 0) return fail(ErrorCode::kInternal, "{}: committed twice", path_);
+  // Takes the place of an empty folder in one step; the system refuses one with content.
+  if (std::rename(temporary_.c_str(), target_.c_str()) != 0) {
+    const int reason = errno;
+    discard();
+    return fail(ErrorCode::kOutput, "{}: cannot rename {} to it: {}", path_, temporary_,
+                reason_text(reason));
+  }
+  leave_temporary(slot_);
+  return {};
+}
+
+}  // namespace strata
