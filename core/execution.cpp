@@ -6,24 +6,33 @@
 #include <atomic>
 #include <exception>
 #include <mutex>
+#include <thread>
 
 #ifdef STRATA_USE_TBB
+#include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
+
+#include <optional>
 #else
-#include <thread>
+#include <system_error>
 #include <vector>
 #endif
 
 namespace strata {
+namespace {
 
-int Execution::thread_count() const {
-  if (threads > 0) return threads;
+int allowed_processors() {
   cpu_set_t allowed;
   CPU_ZERO(&allowed);
-  if (sched_getaffinity(0, sizeof allowed, &allowed) != 0) return 1;
-  return std::max(1, CPU_COUNT(&allowed));
+  if (sched_getaffinity(0, sizeof allowed, &allowed) == 0) return std::max(1, CPU_COUNT(&allowed));
+  // More processors than a cpu_set_t holds.
+  return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
 }
+
+}  // namespace
+
+int Execution::thread_count() const { return threads > 0 ? threads : allowed_processors(); }
 
 void parallel_for(const Execution& execution, std::size_t count,
                   const std::function<void(std::size_t, int)>& body) {
@@ -49,12 +58,24 @@ void parallel_for(const Execution& execution, std::size_t count,
     run(0);
   } else {
 #ifdef STRATA_USE_TBB
+    // Left alone, oneTBB never runs more threads than there are processors; who asks for more, to
+    // test what schedules do, gets them.
+    std::optional<tbb::global_control> more;
+    if (workers > allowed_processors()) {
+      more.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(workers));
+    }
     tbb::task_arena arena(workers);
     arena.execute([&] { tbb::parallel_for(0, workers, run, tbb::simple_partitioner()); });
 #else
     std::vector<std::jthread> pool;
-    for (int worker = 1; worker < workers; ++worker) pool.emplace_back(run, worker);
+    pool.reserve(static_cast<std::size_t>(workers));
+    try {
+      for (int worker = 1; worker < workers; ++worker) pool.emplace_back(run, worker);
+    } catch (const std::system_error&) {
+      // The system gives no more threads; those there are do the work.
+    }
     run(0);
+    pool.clear();  // joins
 #endif
   }
   if (failure) std::rethrow_exception(failure);
