@@ -41,9 +41,11 @@ InterruptGuard::InterruptGuard() {
   signals_seen = 0;
   event_descriptor = eventfd(0, EFD_CLOEXEC);
   watcher_ = std::jthread([this](const std::stop_token& done) {
-    std::uint64_t count = 0;
-    while (read(event_descriptor.load(), &count, sizeof count) < 0 && errno == EINTR) continue;
-    if (!done.stop_requested()) source_.request_stop();
+    while (!done.stop_requested()) {
+      std::uint64_t count = 0;
+      if (read(event_descriptor.load(), &count, sizeof count) < 0) continue;  // EINTR
+      if (!done.stop_requested()) source_.request_stop();
+    }
   });
 
   struct sigaction action {};

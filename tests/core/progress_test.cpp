@@ -71,7 +71,7 @@ class Progress : public testing::Test {
 };
 
 TEST(ProgressLine, ShowsTheFractionAndTheRest) {
-  EXPECT_EQ(progress_line("lists", 0.5, 12.0, 32, false), "lists [##    ]  50 %  12 s left");
+  EXPECT_EQ(progress_line("lists", 0.5, 12.0, 32, false), "lists [###   ]  50 %  12 s left");
 }
 
 TEST(ProgressLine, NeverFillsTheLastColumn) {
