@@ -63,19 +63,19 @@ class CountScanStore {
   /// Pass 1: counts. @pre 0 <= x < width, 0 <= y < height
   class Counter {
    public:
+    explicit Counter(CountScanStore& store) : store_(&store) {}
     void insert(int x, int y, std::uint32_t, std::uint32_t) noexcept {
       Concurrency::fetch_increment(store_->ends_[store_->pixel_of(x, y) + 1]);
     }
 
    private:
-    friend class CountScanStore;
-    explicit Counter(CountScanStore& store) : store_(&store) {}
     CountScanStore* store_;
   };
 
   /// Pass 2: stores. @pre as for Counter, and Record::payload_fits(payload)
   class Writer {
    public:
+    explicit Writer(CountScanStore& store) : store_(&store) {}
     void insert(int x, int y, std::uint32_t depth, std::uint32_t payload) noexcept {
       assert(Record::payload_fits(payload));
       const std::uint64_t slot =
@@ -85,8 +85,6 @@ class CountScanStore {
     }
 
    private:
-    friend class CountScanStore;
-    explicit Writer(CountScanStore& store) : store_(&store) {}
     CountScanStore* store_;
   };
 
