@@ -9,6 +9,7 @@
 #include "core/execution.h"
 #include "core/grid.h"
 #include "core/result.h"
+#include "hashbuffer/tile_builder.h"
 #include "mesh/triangle_soup.h"
 #include "voxelize/intervals.h"
 
@@ -16,10 +17,6 @@ namespace strata {
 
 /// Which winding numbers are inside.
 enum class InsideRule { kWinding, kNonzero, kParity };  // > 0, != 0, odd
-/// Where crossings are kept until sorted. kAuto: the faster one measured for the scene.
-enum class StoreKind { kAuto, kHaBuffer, kCountScan };
-/// Probe offsets of the HA-buffer.
-enum class OffsetKind { kPlaneFirst, kRandom, kFarthestPoint };
 /// What to do with a mesh that is not closed.
 enum class OpenMode {
   kVote,     ///< the lists of all three axes decide each voxel by majority
@@ -43,14 +40,14 @@ struct VoxelizeOptions {
   bool closed = true;  ///< the mesh is known to be closed; false: `open` applies
   StoreKind store = StoreKind::kAuto;
   OffsetKind offsets = OffsetKind::kPlaneFirst;
-  bool statistics = false;  ///< fill the histogram and the checksum of the report
+  bool statistics = false;  ///< count and hash what comes out
 };
 
 /// What voxelizing found out.
 struct VoxelizeReport {
-  std::uint64_t solid_voxels = 0;
-  std::uint64_t intervals = 0;
-  std::uint64_t crossings = 0;  ///< fragments stored, along the axis asked for
+  std::uint64_t solid_voxels = 0;  ///< with `statistics`
+  std::uint64_t intervals = 0;     ///< with `statistics`
+  std::uint64_t crossings = 0;     ///< fragments stored, along the axis asked for
   std::uint64_t max_depth_complexity = 0;
   /// Columns with n crossings, n = 0..; the last entry counts the rest. With `statistics`.
   std::array<std::uint64_t, 65> depth_histogram{};

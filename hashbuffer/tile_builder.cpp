@@ -1,0 +1,221 @@
+#include "hashbuffer/tile_builder.h"
+
+#include <algorithm>
+#include <cstring>
+#include <new>
+#include <utility>
+
+#include "hashbuffer/tile_store.h"
+
+namespace strata {
+namespace {
+
+/// Sorts a short list in place: insertion sort, which few and nearly sorted fragments like best.
+template <class Key>
+void sort_list(Key* begin, Key* end) {
+  if (end - begin > 32) {
+    std::sort(begin, end);
+    return;
+  }
+  for (Key* next = begin + 1; next < end; ++next) {
+    const Key key = *next;
+    Key* hole = next;
+    for (; hole > begin && key < hole[-1]; --hole) *hole = hole[-1];
+    *hole = key;
+  }
+}
+
+}  // namespace
+
+template <class Record>
+struct TileBuilder<Record>::Impl {
+  using Bits = typename Record::Bits;
+  /// At most this many planes are laid out side by side: deeper pixels are rare enough to scatter.
+  static constexpr int kMaxPlanes = 64;
+  static constexpr int kFirstPlanes = 8;
+  static constexpr double kGrowLoad = 0.8;
+
+  TileStoreOptions options;
+  TileTable<Record> table;
+  TileLog<Record> log;
+  std::vector<std::uint32_t> offsets;  ///< compressed rows
+  std::vector<Key> keys;
+  std::uint64_t rebuilt = 0;
+  int dirty_begin = 0, dirty_end = 0;  ///< rows of the table that hold records
+
+  void resize_table(int planes) {
+    table.cells.assign(static_cast<std::size_t>(planes) * kTilePixels + table.kPadding, 0);
+    table.size = static_cast<std::size_t>(planes) * kTilePixels;
+    table.planes = options.offsets == OffsetKind::kPlaneFirst ? std::min(planes, kMaxPlanes) : 0;
+    table.oldest = 0;
+    table.mixed = false;
+    dirty_begin = dirty_end = 0;
+    table.offsets = probe_offsets(table.size);
+  }
+
+  std::vector<std::uint32_t> probe_offsets(std::size_t size) const {
+    const auto offsets64 = make_offsets(options.offsets, {.pixels = kTilePixels,
+                                                          .cells = size,
+                                                          .width = kTileSide,
+                                                          .ages = Record::kMaxAge,
+                                                          .seed = options.seed});
+    return {offsets64.begin(), offsets64.end()};
+  }
+
+  void clear_table() {
+    if (table.mixed) {
+      std::fill(table.cells.begin(), table.cells.end(), Bits{0});
+    } else {
+      const std::size_t begin = static_cast<std::size_t>(dirty_begin) * kTileSide;
+      const std::size_t length =
+          static_cast<std::size_t>(std::max(0, dirty_end - dirty_begin)) * kTileSide;
+      for (int age = 0; age < table.oldest; ++age) {
+        std::fill_n(table.cells.begin() + static_cast<std::ptrdiff_t>(
+                                              static_cast<std::size_t>(age) * kTilePixels + begin),
+                    length, Bits{0});
+      }
+    }
+    table.oldest = 0;
+    table.mixed = false;
+    table.failures = 0;
+  }
+
+  int planes() const { return static_cast<int>(table.size / kTilePixels); }
+
+  /// Collects the lists of a table in which fragments of different pixels are mixed.
+  void compact_table() {
+    offsets.resize(kTilePixels + 1);
+    keys.clear();
+    for (std::size_t pixel = 0; pixel < kTilePixels; ++pixel) {
+      offsets[pixel] = static_cast<std::uint32_t>(keys.size());
+      for (int age = 1; age <= table.oldest; ++age) {
+        std::size_t cell = pixel + table.offset(age);
+        if (cell >= table.size) cell -= table.size;
+        const Bits record = table.cells[cell];
+        const int found = static_cast<int>(record >> Record::kAgeShift);
+        if (found == age) keys.push_back(Record::key(record));
+        if (found < age) break;  // a younger record here would have been displaced
+      }
+    }
+    offsets[kTilePixels] = static_cast<std::uint32_t>(keys.size());
+  }
+
+  void sort_log() {
+    offsets.assign(kTilePixels + 1, 0);
+    for (std::size_t i = 0; i < log.count; ++i) ++offsets[log.pixels[i]];
+    std::uint32_t sum = 0;
+    for (auto& offset : offsets) sum += std::exchange(offset, sum);
+    keys.resize(log.count);
+    for (std::size_t i = 0; i < log.count; ++i) keys[offsets[log.pixels[i]]++] = log.keys[i];
+    // Each offset has moved to the end of its list, which is the start of the next.
+    for (std::size_t pixel = kTilePixels; pixel > 0; --pixel) offsets[pixel] = offsets[pixel - 1];
+    offsets[0] = 0;
+    for (std::size_t pixel = 0; pixel < kTilePixels; ++pixel) {
+      sort_list(keys.data() + offsets[pixel], keys.data() + offsets[pixel + 1]);
+    }
+  }
+
+  TileLists<Key> scan(const TileInput& input) {
+    log.count = 0;
+    const TileRasterResult raster = raster_into(input, log);
+    sort_log();
+    return csr(raster);
+  }
+
+  TileLists<Key> csr(const TileRasterResult& raster) const {
+    TileLists<Key> lists;
+    lists.row_begin = std::min(raster.row_begin, raster.row_end);
+    lists.row_end = raster.row_end;
+    lists.fragments = raster.fragments;
+    lists.offsets = offsets.data();
+    lists.keys = keys.data();
+    return lists;
+  }
+
+  TileLists<Key> build(const TileInput& input) {
+    if (options.store == StoreKind::kCountScan) return scan(input);
+    if (table.size == 0) resize_table(kFirstPlanes);
+    for (;;) {
+      clear_table();
+      const TileRasterResult raster = raster_into(input, table);
+      dirty_begin = raster.row_begin;
+      dirty_end = raster.row_end;
+      if (table.failures > 0) {
+        // Nothing is lost: the tile is built again with more room. A pixel with more layers than
+        // the age can count would fail in any table; the other store has no such limit.
+        ++rebuilt;
+        const double load = static_cast<double>(raster.fragments) / static_cast<double>(table.size);
+        table.mixed = true;
+        if (load < 0.5) return scan(input);
+        resize_table(std::max(planes() + 1, static_cast<int>(load / 0.5 * planes()) + 1));
+        continue;
+      }
+      if (table.mixed) {
+        compact_table();
+        const double load = static_cast<double>(raster.fragments) / static_cast<double>(table.size);
+        const TileLists<Key> lists = csr(raster);
+        // More room for the next tile: one that is nearly full, or deeper than its planes.
+        if (load >= kGrowLoad) {
+          resize_table(planes() * 25 / 16 + 1);
+        } else if (table.planes > 0 && table.planes < kMaxPlanes) {
+          resize_table(std::min(kMaxPlanes, std::max(planes() * 25 / 16 + 1, table.oldest)));
+        }
+        return lists;
+      }
+      TileLists<Key> lists;
+      lists.row_begin = std::min(raster.row_begin, raster.row_end);
+      lists.row_end = raster.row_end;
+      lists.fragments = raster.fragments;
+      if constexpr (sizeof(Bits) == 4) {
+        lists.planes32 = table.cells.data();
+      } else {
+        lists.planes64 = table.cells.data();
+      }
+      lists.ages = table.oldest;
+      return lists;
+    }
+  }
+};
+
+template <class Record>
+TileBuilder<Record>::TileBuilder(const TileStoreOptions& options)
+    : impl_(std::make_unique<Impl>()) {
+  impl_->options = options;
+}
+template <class Record>
+TileBuilder<Record>::TileBuilder(TileBuilder&&) noexcept = default;
+template <class Record>
+TileBuilder<Record>& TileBuilder<Record>::operator=(TileBuilder&&) noexcept = default;
+template <class Record>
+TileBuilder<Record>::~TileBuilder() = default;
+
+template <class Record>
+Result<TileLists<typename TileBuilder<Record>::Key>> TileBuilder<Record>::build(
+    const LatticeMesh& mesh, const RasterTarget& target, std::span<const std::uint32_t> triangles,
+    int tu, int tv) {
+  const PixelRect clip{tu * kTileSide, tv * kTileSide, std::min(target.width, (tu + 1) * kTileSide),
+                       std::min(target.height, (tv + 1) * kTileSide)};
+  try {
+    return impl_->build(TileInput{mesh, target, triangles, clip});
+  } catch (const std::bad_alloc&) {
+    return fail(ErrorCode::kLimit, "out of memory for the lists of tile ({}, {}), {} triangles", tu,
+                tv, triangles.size());
+  }
+}
+
+template <class Record>
+std::uint64_t TileBuilder<Record>::rebuilt_tiles() const {
+  return impl_->rebuilt;
+}
+
+template <class Record>
+std::uint64_t TileBuilder<Record>::memory_bytes() const {
+  return impl_->table.cells.capacity() * sizeof(typename Record::Bits) +
+         impl_->log.keys.capacity() * (sizeof(Key) + sizeof(std::uint32_t)) +
+         impl_->keys.capacity() * sizeof(Key) + impl_->offsets.capacity() * sizeof(std::uint32_t);
+}
+
+template class TileBuilder<KeyRecord>;
+template class TileBuilder<ItemRecord>;
+
+}  // namespace strata

@@ -1,0 +1,101 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "core/depth_list.h"
+#include "core/result.h"
+#include "hashbuffer/offsets.h"
+#include "raster/tile_bins.h"
+
+namespace strata {
+
+/// Where crossings are kept until sorted. kAuto: the faster one measured for the scene.
+enum class StoreKind { kAuto, kHaBuffer, kCountScan };
+
+/// A crossing without its triangle: depth << 1 | exit, 24 bits, which orders like DepthItem as far
+/// as it goes. Serves depth limits up to 2^23, grids up to 32768 voxels deep.
+using DepthKey = std::uint32_t;
+inline constexpr std::uint32_t kMaxDepthKeyLimit = std::uint32_t{1} << 23;
+
+/// The sorted depth lists of one tile, in one of two forms. `Key` is DepthKey or DepthItem. Memory
+/// is the builder's, valid until its next tile.
+template <class Key>
+struct TileLists {
+  /// Rows of the tile that may hold fragments; all other lists are empty.
+  int row_begin = 0, row_end = 0;
+  std::uint64_t fragments = 0;
+
+  /// Planar form (when `planes` is set): the fragment of age a = 1..ages of pixel p is the record
+  /// planes[(a - 1) * kTilePixels + p], present when its age field says a, absent when it is 0.
+  /// Rows outside [row_begin, row_end) hold rubbish. Record: see TileRecord<Key>.
+  const std::uint32_t* planes32 = nullptr;
+  const std::uint64_t* planes64 = nullptr;
+  int ages = 0;
+
+  /// Compressed rows (when `offsets` is set): kTilePixels + 1 offsets into `keys`.
+  const std::uint32_t* offsets = nullptr;
+  const Key* keys = nullptr;
+};
+
+/// [age:8 | nearness:24], nearness = 2^24 - 1 - DepthKey: larger is older, then nearer.
+struct KeyRecord {
+  using Bits = std::uint32_t;
+  using Key = DepthKey;
+  static constexpr int kAgeShift = 24;
+  static constexpr Bits kValueMask = 0xffffff;
+  static constexpr int kMaxAge = 255;
+  static Key key(Bits record) { return ~record & kValueMask; }
+};
+/// [age:8 | nearness:24 | ~payload:32].
+struct ItemRecord {
+  using Bits = std::uint64_t;
+  using Key = DepthItem;
+  static constexpr int kAgeShift = 56;
+  static constexpr Bits kValueMask = 0xffffffffffffff;
+  static constexpr int kMaxAge = 255;
+  static Key key(Bits record) { return DepthItem(~record & kValueMask); }
+};
+
+struct TileStoreOptions {
+  StoreKind store = StoreKind::kAuto;
+  OffsetKind offsets = OffsetKind::kPlaneFirst;
+  std::uint64_t seed = 1;
+};
+
+/// Rasterizes the triangles of one tile after another into a tile-private store and hands out the
+/// sorted lists. One builder serves one thread and keeps its memory from tile to tile.
+///
+/// The default store is the HA-buffer (S. Lefebvre, S. Hornus, A. Lasram: HA-Buffer: Coherent
+/// Hashing for single-pass A-buffer, 2013) with plain stores. With plane-first offsets the cells of
+/// age a of all pixels are a plane of the table while planes last, so neighbouring pixels insert
+/// side by side, a vector at a time, and meet only fragments of their own list; beyond the planes
+/// offsets are random and fragments of different pixels compete as in the paper.
+template <class Record>
+class TileBuilder {
+ public:
+  using Key = typename Record::Key;
+
+  explicit TileBuilder(const TileStoreOptions& options = {});
+  TileBuilder(TileBuilder&&) noexcept;
+  TileBuilder& operator=(TileBuilder&&) noexcept;
+  ~TileBuilder();
+
+  /// The lists of tile (tu, tv). @return kLimit when memory is exhausted.
+  Result<TileLists<Key>> build(const LatticeMesh& mesh, const RasterTarget& target,
+                               std::span<const std::uint32_t> triangles, int tu, int tv);
+
+  [[nodiscard]] std::uint64_t rebuilt_tiles() const;  ///< tiles that did not fit at first
+  [[nodiscard]] std::uint64_t memory_bytes() const;   ///< held now
+
+  struct Impl;
+
+ private:
+  std::unique_ptr<Impl> impl_;
+};
+
+using KeyTileBuilder = TileBuilder<KeyRecord>;
+using ItemTileBuilder = TileBuilder<ItemRecord>;
+
+}  // namespace strata

@@ -1,0 +1,102 @@
+#pragma once
+
+// The memory of a TileBuilder, shared by its SIMD part and its policy. Private to hashbuffer/.
+
+#include <algorithm>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "hashbuffer/tile_builder.h"
+
+namespace strata {
+
+/// The HA-buffer of one tile, with plain stores; see hashbuffer/hash_buffer.h for the law of the
+/// table.
+template <class Record>
+struct TileTable {
+  using Bits = typename Record::Bits;
+  static constexpr Bits kAgeStep = Bits{1} << Record::kAgeShift;
+  /// Cells behind the table that vectors may touch, without changing them.
+  static constexpr std::size_t kPadding = 64;
+
+  std::vector<Bits> cells;
+  std::size_t size = 0;                ///< cells of the table
+  int planes = 0;                      ///< ages 1..planes have the offsets (age - 1) * kTilePixels
+  std::vector<std::uint32_t> offsets;  ///< by age, for ages beyond the planes
+  int oldest = 0;                      ///< largest age stored since the last clear
+  bool mixed = false;                  ///< a record went beyond the planes
+  std::uint64_t failures = 0;          ///< records that found no cell: age field or table exhausted
+
+  [[nodiscard]] std::size_t offset(int age) const {
+    return age <= planes ? static_cast<std::size_t>(age - 1) * kTilePixels
+                         : offsets[static_cast<std::size_t>(age)];
+  }
+
+  /// Inserts a record, whose age is the first to be tried, into the list of `pixel`.
+  void insert(std::size_t pixel, Bits record) {
+    for (;;) {
+      int age = static_cast<int>(record >> Record::kAgeShift);
+      mixed = mixed || age > planes;
+      std::size_t cell = pixel + offset(age);
+      if (cell >= size) cell -= size;
+      const Bits old = cells[cell];
+      if (old < record) {  // equality falls through: equal fragments are two fragments
+        cells[cell] = record;
+        oldest = std::max(oldest, age);
+        if (old == 0) return;
+        record = old;
+        age = static_cast<int>(old >> Record::kAgeShift);
+        const std::size_t shift = offset(age);
+        pixel = cell >= shift ? cell - shift : cell + size - shift;
+      }
+      if (age == Record::kMaxAge) {
+        ++failures;
+        return;
+      }
+      record += kAgeStep;
+    }
+  }
+};
+
+/// The count/scan store of one tile: fragments in order of arrival, sorted when all are known.
+template <class Record>
+struct TileLog {
+  using Key = typename Record::Key;
+  static constexpr std::size_t kPadding = 64;
+
+  std::vector<Key> keys;
+  std::vector<std::uint32_t> pixels;
+  std::size_t count = 0;
+
+  void reserve(std::size_t more) {
+    if (count + more + kPadding > keys.size()) {
+      keys.resize((count + more + kPadding) * 2);
+      pixels.resize(keys.size());
+    }
+  }
+};
+
+/// What the SIMD part reports of a tile.
+struct TileRasterResult {
+  std::uint64_t fragments = 0;
+  int row_begin = kTileSide, row_end = 0;
+  void add_rows(int begin, int end) {
+    row_begin = std::min(row_begin, begin);
+    row_end = std::max(row_end, end);
+  }
+};
+
+struct TileInput {
+  const LatticeMesh& mesh;
+  const RasterTarget& target;
+  std::span<const std::uint32_t> triangles;
+  PixelRect clip;  ///< the tile's pixels within the target
+};
+
+TileRasterResult raster_into(const TileInput& input, TileTable<KeyRecord>& table);
+TileRasterResult raster_into(const TileInput& input, TileTable<ItemRecord>& table);
+TileRasterResult raster_into(const TileInput& input, TileLog<KeyRecord>& log);
+TileRasterResult raster_into(const TileInput& input, TileLog<ItemRecord>& log);
+
+}  // namespace strata

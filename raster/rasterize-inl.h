@@ -1,0 +1,342 @@
+// Covered pixels and exact depths of triangles in one tile: set-up of a vector of triangles at a
+// time, then coverage and depth of a vector of pixels at a time. Compiled once for each SIMD target
+// (Highway's dynamic dispatch); every target, the scalar one included, gives the bits of
+// rasterize_exact() in raster/triangle_setup.h.
+//
+// This work is based on: J. Pineda, A Parallel Algorithm for Polygon Rasterization, 1988.
+// We differ: depth is the exact floor of the plane, floor(n / a) for whole n and a. It is taken as
+// floor((n + 1/2) * (1 / a)) in double precision: (n + 1/2) / a keeps a distance of at least 1 / 2a
+// from every whole number, and the two roundings move it by at most 2^-52 n / a, which is less for
+// n < 2^51.
+
+#if defined(STRATA_RASTERIZE_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef STRATA_RASTERIZE_INL_H
+#undef STRATA_RASTERIZE_INL_H
+#else
+#define STRATA_RASTERIZE_INL_H
+#endif
+
+#include <hwy/highway.h>
+
+#include "raster/triangle_setup.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace strata {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using LaneF64 = hn::ScalableTag<double>;
+using LaneI32 = hn::Rebind<std::int32_t, LaneF64>;
+using LaneU32 = hn::Rebind<std::uint32_t, LaneF64>;
+using VecF64 = hn::Vec<LaneF64>;
+using VecI32 = hn::Vec<LaneI32>;
+using VecU32 = hn::Vec<LaneU32>;
+using MaskU32 = hn::Mask<LaneU32>;
+inline constexpr std::size_t kMaxLanes = HWY_MAX_BYTES / sizeof(double);
+
+/// Extents (lattice steps) up to which all numerators stay below 2^51 as they are, and up to which
+/// they do once base and slopes are split into quotient and remainder.
+inline constexpr std::int32_t kDirectExtent = std::int32_t{1} << 16;
+inline constexpr std::int64_t kSplitExtent = std::int64_t{1} << 21;
+
+/// The equations of a triangle at the first pixel of a box in a tile, and their steps by a pixel.
+struct TileEquations {
+  std::int32_t edge[3], edge_u[3], edge_v[3];
+  /// depth = quotient + floor(remainder * inverse), and remainder > 0 wherever it counts.
+  double remainder, remainder_u, remainder_v, inverse;
+  std::int32_t quotient;
+  bool split;  ///< the quotient has steps, too (large triangles)
+  double split_quotient, quotient_u, quotient_v;
+};
+
+HWY_INLINE void split_fraction(Int128 numerator, std::int64_t area, double& quotient,
+                               double& remainder) {
+  const Int128 q = floor_div(numerator, area);
+  quotient = static_cast<double>(q);
+  remainder = static_cast<double>(numerator - q * area);
+}
+
+/// The equations of a triangle of any size that fits. @return false when the numbers do not fit:
+/// then rasterize_exact() serves.
+HWY_NOINLINE bool make_split_equations(const TriangleSetup& t, const PixelRect& box,
+                                       TileEquations& q) {
+  const auto [u_low, u_high] = std::minmax({t.u[0], t.u[1], t.u[2]});
+  const auto [v_low, v_high] = std::minmax({t.v[0], t.v[1], t.v[2]});
+  if (std::max(u_high - u_low, v_high - v_low) > kSplitExtent) return false;
+  const std::int64_t pu = std::int64_t{box.u0} * kLatticeSteps + kLatticeSteps / 2;
+  const std::int64_t pv = std::int64_t{box.v0} * kLatticeSteps + kLatticeSteps / 2;
+  for (int i = 0; i < 3; ++i) {
+    const TriangleSetup::Edge e = t.edge(i);
+    // Edge values at pixel centres differ by multiples of 256: the low bits decide nothing. Far
+    // edges are clamped beyond what 64 steps can bring back.
+    constexpr std::int64_t kFar = std::int64_t{1} << 30;
+    const std::int64_t at = (e.a * pu + e.b * pv + e.c) >> kLatticeBits;
+    q.edge[i] = static_cast<std::int32_t>(std::clamp(at, -kFar, kFar));
+    q.edge_u[i] = static_cast<std::int32_t>(e.a);
+    q.edge_v[i] = static_cast<std::int32_t>(e.b);
+  }
+  const std::int64_t du = pu - t.u[0], dv = pv - t.v[0];
+  q.split = true;
+  q.quotient = 0;
+  q.inverse = 1.0 / static_cast<double>(t.area);
+  split_fraction(Int128{t.slope_u} * du + Int128{t.slope_v} * dv - t.tie_down, t.area,
+                 q.split_quotient, q.remainder);
+  split_fraction(Int128{t.slope_u} * kLatticeSteps, t.area, q.quotient_u, q.remainder_u);
+  split_fraction(Int128{t.slope_v} * kLatticeSteps, t.area, q.quotient_v, q.remainder_v);
+  constexpr double kLargest = 1099511627776.0;  // 2^40: times 128 steps, sums stay exact
+  if (std::abs(q.split_quotient) > kLargest * 128 || std::abs(q.quotient_u) > kLargest ||
+      std::abs(q.quotient_v) > kLargest) {
+    return false;
+  }
+  q.remainder += 0.5;
+  q.split_quotient += static_cast<double>(t.w0);
+  return true;
+}
+
+/// Set-up of a vector of triangles. Lanes are read out with at().
+class SetupBatch {
+ public:
+  enum class Kind : std::int32_t { kNothing = 0, kDirect = 1, kLarge = 2 };
+
+  /// Sets up the triangles `ids`, at most one a lane, of `mesh` in the pixels of `clip`.
+  HWY_INLINE void load(const LatticeMesh& mesh, std::span<const std::uint32_t> ids,
+                       const AxisFrame& frame, const PixelRect& clip) {
+    const LaneF64 df;
+    const LaneI32 di;
+    const std::size_t count = ids.size();
+    alignas(64) std::int32_t corner[3][3][kMaxLanes];  // [vertex][u, v, w][lane]
+    for (std::size_t lane = 0; lane < count; ++lane) {
+      const glm::uvec3& triangle = mesh.triangles[ids[lane]];
+      for (int i = 0; i < 3; ++i) {
+        const glm::ivec3& p = mesh.vertices[triangle[i]];
+        corner[i][0][lane] = p[frame.u];
+        corner[i][1][lane] = p[frame.v];
+        corner[i][2][lane] = p[frame.w];
+      }
+    }
+    const auto get = [&](int i, int axis) { return hn::Load(di, corner[i][axis]); };
+    const VecI32 u0 = get(0, 0), v0 = get(0, 1), w0 = get(0, 2);
+    VecI32 iu1 = hn::Sub(get(1, 0), u0), iv1 = hn::Sub(get(1, 1), v0), iw1 = hn::Sub(get(1, 2), w0);
+    VecI32 iu2 = hn::Sub(get(2, 0), u0), iv2 = hn::Sub(get(2, 1), v0), iw2 = hn::Sub(get(2, 2), w0);
+
+    // The box, relative to vertex 0.
+    const VecI32 zero = hn::Zero(di);
+    const VecI32 u_low = hn::Min(zero, hn::Min(iu1, iu2)),
+                 u_high = hn::Max(zero, hn::Max(iu1, iu2));
+    const VecI32 v_low = hn::Min(zero, hn::Min(iv1, iv2)),
+                 v_high = hn::Max(zero, hn::Max(iv1, iv2));
+    const VecI32 w_low = hn::Min(zero, hn::Min(iw1, iw2)),
+                 w_high = hn::Max(zero, hn::Max(iw1, iw2));
+    const VecI32 half = hn::Set(di, kLatticeSteps / 2), one = hn::Set(di, 1);
+    const auto first = [&](VecI32 at) {
+      return hn::ShiftRight<kLatticeBits>(hn::Add(at, hn::Sub(half, one)));
+    };
+    const auto end = [&](VecI32 at) {
+      return hn::Add(hn::ShiftRight<kLatticeBits>(hn::Sub(at, half)), one);
+    };
+    const VecI32 box_u0 = hn::Max(hn::Set(di, clip.u0), first(hn::Add(u0, u_low)));
+    const VecI32 box_u1 = hn::Min(hn::Set(di, clip.u1), end(hn::Add(u0, u_high)));
+    const VecI32 box_v0 = hn::Max(hn::Set(di, clip.v0), first(hn::Add(v0, v_low)));
+    const VecI32 box_v1 = hn::Min(hn::Set(di, clip.v1), end(hn::Add(v0, v_high)));
+    const auto covers = hn::And(hn::Lt(box_u0, box_u1), hn::Lt(box_v0, box_v1));
+    const VecI32 extent =
+        hn::Max(hn::Sub(u_high, u_low), hn::Max(hn::Sub(v_high, v_low), hn::Sub(w_high, w_low)));
+    const auto direct = hn::Lt(extent, hn::Set(di, kDirectExtent + 1));
+
+    // All below is exact in double precision for direct triangles.
+    VecF64 u1 = hn::PromoteTo(df, iu1), v1 = hn::PromoteTo(df, iv1), w1 = hn::PromoteTo(df, iw1);
+    VecF64 u2 = hn::PromoteTo(df, iu2), v2 = hn::PromoteTo(df, iv2), w2 = hn::PromoteTo(df, iw2);
+    VecF64 area = hn::Sub(hn::Mul(u1, v2), hn::Mul(u2, v1));
+    const VecF64 zero_f = hn::Zero(df), one_f = hn::Set(df, 1.0);
+    const auto clockwise = hn::Lt(area, zero_f);
+    const auto swap = [&](VecF64& a, VecF64& b) {
+      const VecF64 old = a;
+      a = hn::IfThenElse(clockwise, b, a);
+      b = hn::IfThenElse(clockwise, old, b);
+    };
+    swap(u1, u2), swap(v1, v2), swap(w1, w2);
+    area = hn::Abs(area);
+    const VecF64 slope_u = hn::Sub(hn::Mul(w1, v2), hn::Mul(w2, v1));
+    const VecF64 slope_v = hn::Sub(hn::Mul(u1, w2), hn::Mul(u2, w1));
+    VecF64 tie_down = one_f;  // see setup_triangle()
+    if (frame.w == 1) tie_down = hn::IfThenElseZero(hn::Le(slope_u, zero_f), one_f);
+    if (frame.w == 2) {
+      const auto level = hn::And(hn::Eq(slope_u, zero_f), hn::Le(slope_v, zero_f));
+      tie_down = hn::IfThenElseZero(hn::Or(hn::Lt(slope_u, zero_f), level), one_f);
+    }
+    const VecF64 steps = hn::Set(df, static_cast<double>(kLatticeSteps));
+    const auto centre = [&](VecI32 pixel) {
+      return hn::Add(hn::ShiftLeft<kLatticeBits>(pixel), half);
+    };
+    const VecF64 du = hn::PromoteTo(df, hn::Sub(centre(box_u0), u0));
+    const VecF64 dv = hn::PromoteTo(df, hn::Sub(centre(box_v0), v0));
+    // Depth counts from just below the lowest vertex, so that no numerator is negative.
+    const VecI32 base = hn::Sub(w_low, one);
+    const VecF64 numerator = hn::Sub(hn::Add(hn::Mul(slope_u, du), hn::Mul(slope_v, dv)), tie_down);
+    const VecF64 lifted = hn::Sub(numerator, hn::Mul(hn::PromoteTo(df, base), area));
+    hn::Store(hn::Add(lifted, hn::Set(df, 0.5)), df, remainder_);
+    hn::Store(hn::Mul(slope_u, steps), df, remainder_u_);
+    hn::Store(hn::Mul(slope_v, steps), df, remainder_v_);
+    hn::Store(hn::Div(one_f, area), df, inverse_);
+    hn::Store(hn::Add(w0, base), di, quotient_);
+
+    const VecF64 per_step = hn::Set(df, 1.0 / kLatticeSteps);
+    const auto store_edge = [&](int i, VecF64 a, VecF64 b, VecF64 at_u, VecF64 at_v) {
+      const auto tie_inside =
+          hn::Or(hn::Gt(a, zero_f), hn::And(hn::Eq(a, zero_f), hn::Gt(b, zero_f)));
+      const VecF64 value = hn::Sub(hn::Add(hn::Mul(a, at_u), hn::Mul(b, at_v)),
+                                   hn::IfThenElse(tie_inside, zero_f, one_f));
+      // Whole multiples of 256 lie between pixel centres: the low bits decide nothing.
+      hn::Store(hn::DemoteTo(di, hn::Floor(hn::Mul(value, per_step))), di, edge_[i]);
+      hn::Store(hn::DemoteTo(di, a), di, edge_u_[i]);
+      hn::Store(hn::DemoteTo(di, b), di, edge_v_[i]);
+    };
+    store_edge(0, hn::Neg(v1), u1, du, dv);
+    store_edge(1, hn::Sub(v1, v2), hn::Sub(u2, u1), hn::Sub(du, u1), hn::Sub(dv, v1));
+    store_edge(2, v2, hn::Neg(u2), du, dv);
+
+    hn::Store(box_u0, di, box_u0_);
+    hn::Store(box_u1, di, box_u1_);
+    hn::Store(box_v0, di, box_v0_);
+    hn::Store(box_v1, di, box_v1_);
+    const VecI32 flat =
+        hn::DemoteTo(di, hn::IfThenElseZero(hn::Eq(area, zero_f), one_f));  // exact if direct
+    const VecI32 kind = hn::IfThenElse(direct, hn::Sub(one, flat), hn::Set(di, 2));
+    hn::Store(hn::IfThenElseZero(covers, kind), di, kind_);
+    const VecI32 turned = hn::DemoteTo(di, hn::IfThenElseZero(clockwise, one_f));
+    hn::Store(frame.w == 1 ? turned : hn::Sub(one, turned), di, exit_);
+  }
+
+  [[nodiscard]] HWY_INLINE Kind kind(std::size_t lane) const {
+    return static_cast<Kind>(kind_[lane]);
+  }
+  [[nodiscard]] HWY_INLINE bool exit(std::size_t lane) const { return exit_[lane] != 0; }
+  [[nodiscard]] HWY_INLINE PixelRect box(std::size_t lane) const {
+    return {box_u0_[lane], box_v0_[lane], box_u1_[lane], box_v1_[lane]};
+  }
+  HWY_INLINE void equations(std::size_t lane, TileEquations& q) const {
+    for (int i = 0; i < 3; ++i) {
+      q.edge[i] = edge_[i][lane];
+      q.edge_u[i] = edge_u_[i][lane];
+      q.edge_v[i] = edge_v_[i][lane];
+    }
+    q.remainder = remainder_[lane];
+    q.remainder_u = remainder_u_[lane];
+    q.remainder_v = remainder_v_[lane];
+    q.inverse = inverse_[lane];
+    q.quotient = quotient_[lane];
+  }
+
+ private:
+  template <class T>
+  using Lanes = T[kMaxLanes];
+  alignas(64) Lanes<double> remainder_, remainder_u_, remainder_v_, inverse_;
+  alignas(64) Lanes<std::int32_t> edge_[3], edge_u_[3], edge_v_[3], quotient_, kind_, exit_;
+  alignas(64) Lanes<std::int32_t> box_u0_, box_u1_, box_v0_, box_v1_;
+};
+
+/// Calls sink.put(u, v, mask, depth) with u, v from `box` on: lane i is pixel (u + i, v), covered
+/// where `mask` is set; depth is clamped to [0, depth_limit). `box` lies within one tile (at most
+/// 64 pixels a side). Pixels u .. u + lanes - 1 may reach beyond the box (masked off).
+template <bool split, class Sink>
+HWY_INLINE void rasterize_box(const TileEquations& q, const PixelRect& box,
+                              std::uint32_t depth_limit, Sink& sink) {
+  const LaneF64 df;
+  const LaneI32 di;
+  const LaneU32 du;
+  const int lanes = static_cast<int>(hn::Lanes(df));
+  const auto iota_i = hn::Iota(di, 0);
+  const auto iota_f = hn::Iota(df, 0.0);
+  const auto zero_i = hn::Zero(di);
+  const auto inverse = hn::Set(df, q.inverse);
+  const auto deepest = hn::Set(di, static_cast<std::int32_t>(depth_limit - 1));
+  const auto deepest_f = hn::Set(df, static_cast<double>(depth_limit - 1));
+  const auto base = hn::Set(di, q.quotient);
+  const auto edge_v0 = hn::Set(di, q.edge_v[0]);
+  const auto edge_v1 = hn::Set(di, q.edge_v[1]);
+  const auto edge_v2 = hn::Set(di, q.edge_v[2]);
+  const auto remainder_v = hn::Set(df, q.remainder_v);
+
+  for (int u = box.u0; u < box.u1; u += lanes) {
+    const int step = u - box.u0;
+    const auto in_box = hn::FirstN(di, static_cast<std::size_t>(box.u1 - u));
+    const auto edge_at = [&](int i) {
+      return hn::Add(hn::Set(di, q.edge[i] + q.edge_u[i] * step),
+                     hn::Mul(iota_i, hn::Set(di, q.edge_u[i])));
+    };
+    auto edge0 = edge_at(0), edge1 = edge_at(1), edge2 = edge_at(2);
+    auto remainder = hn::Add(hn::Set(df, q.remainder + q.remainder_u * step),
+                             hn::Mul(iota_f, hn::Set(df, q.remainder_u)));
+    VecF64 quotient = hn::Zero(df), quotient_v = hn::Zero(df);
+    if constexpr (split) {
+      quotient = hn::Add(hn::Set(df, q.split_quotient + q.quotient_u * step),
+                         hn::Mul(iota_f, hn::Set(df, q.quotient_u)));
+      quotient_v = hn::Set(df, q.quotient_v);
+    }
+    for (int v = box.v0; v < box.v1; ++v) {
+      const auto covered = hn::AndNot(hn::Lt(hn::Or3(edge0, edge1, edge2), zero_i), in_box);
+      if (!hn::AllFalse(di, covered)) {
+        VecI32 depth;
+        if constexpr (split) {
+          const auto exact = hn::Add(quotient, hn::Floor(hn::Mul(remainder, inverse)));
+          depth = hn::DemoteTo(di, hn::Min(hn::Max(exact, hn::Zero(df)), deepest_f));
+        } else {
+          const auto floor = hn::DemoteTo(di, hn::Mul(remainder, inverse));  // >= 0: truncates down
+          depth = hn::Min(hn::Max(hn::Add(base, floor), zero_i), deepest);
+        }
+        sink.put(u, v, hn::RebindMask(du, covered), hn::BitCast(du, depth));
+      }
+      edge0 = hn::Add(edge0, edge_v0);
+      edge1 = hn::Add(edge1, edge_v1);
+      edge2 = hn::Add(edge2, edge_v2);
+      remainder = hn::Add(remainder, remainder_v);
+      if constexpr (split) quotient = hn::Add(quotient, quotient_v);
+    }
+  }
+}
+
+/// Rasterizes the triangles `ids` of `mesh` into `sink`: begin(exit, triangle, box), then put() and
+/// put_one(u, v, depth) for its pixels. Calls rows(v0, v1) of the sink with the rows of each box.
+template <class Sink>
+HWY_INLINE void rasterize_triangles(const LatticeMesh& mesh, const RasterTarget& target,
+                                    std::span<const std::uint32_t> ids, const PixelRect& clip,
+                                    Sink& sink) {
+  const AxisFrame frame(target.axis);
+  const std::size_t lanes = hn::Lanes(LaneF64());
+  SetupBatch batch;
+  TileEquations equations;
+  for (std::size_t begin = 0; begin < ids.size(); begin += lanes) {
+    const auto part = ids.subspan(begin, std::min(lanes, ids.size() - begin));
+    batch.load(mesh, part, frame, clip);
+    for (std::size_t lane = 0; lane < part.size(); ++lane) {
+      const auto kind = batch.kind(lane);
+      if (kind == SetupBatch::Kind::kNothing) continue;
+      const PixelRect box = batch.box(lane);
+      if (kind == SetupBatch::Kind::kDirect) {
+        sink.begin(batch.exit(lane), part[lane], box);
+        batch.equations(lane, equations);
+        rasterize_box<false>(equations, box, target.depth_limit, sink);
+        continue;
+      }
+      TriangleSetup t;
+      const glm::uvec3& triangle = mesh.triangles[part[lane]];
+      if (!setup_triangle(mesh.vertices[triangle.x], mesh.vertices[triangle.y],
+                          mesh.vertices[triangle.z], frame, t)) {
+        continue;
+      }
+      sink.begin(t.exit, part[lane], box);
+      if (make_split_equations(t, box, equations)) {
+        rasterize_box<true>(equations, box, target.depth_limit, sink);
+      } else {
+        rasterize_exact(t, box, target.depth_limit,
+                        [&](int u, int v, std::uint32_t depth) { sink.put_one(u, v, depth); });
+      }
+    }
+  }
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace strata
+HWY_AFTER_NAMESPACE();
+
+#endif  // include guard

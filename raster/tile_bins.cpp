@@ -1,0 +1,81 @@
+#include "raster/tile_bins.h"
+
+#include <algorithm>
+#include <limits>
+
+namespace strata {
+namespace {
+
+/// The tiles that a triangle's box of pixel centres meets, as a half-open box of tiles.
+PixelRect tile_rect(const LatticeMesh& mesh, const glm::uvec3& triangle, const AxisFrame& frame,
+                    const RasterTarget& target) {
+  const glm::ivec3 &a = mesh.vertices[triangle.x], &b = mesh.vertices[triangle.y],
+                   &c = mesh.vertices[triangle.z];
+  const int u0 = std::max(0, first_pixel(std::min({a[frame.u], b[frame.u], c[frame.u]})));
+  const int u1 = std::min(target.width, end_pixel(std::max({a[frame.u], b[frame.u], c[frame.u]})));
+  const int v0 = std::max(0, first_pixel(std::min({a[frame.v], b[frame.v], c[frame.v]})));
+  const int v1 = std::min(target.height, end_pixel(std::max({a[frame.v], b[frame.v], c[frame.v]})));
+  if (u0 >= u1 || v0 >= v1) return {};
+  return {u0 / kTileSide, v0 / kTileSide, (u1 - 1) / kTileSide + 1, (v1 - 1) / kTileSide + 1};
+}
+
+}  // namespace
+
+Result<TileBins> bin_triangles(const LatticeMesh& mesh, const RasterTarget& target,
+                               const Execution& execution) {
+  TileBins bins;
+  bins.tiles_u = (target.width + kTileSide - 1) / kTileSide;
+  bins.tiles_v = (target.height + kTileSide - 1) / kTileSide;
+  const std::size_t tiles =
+      static_cast<std::size_t>(bins.tiles_u) * static_cast<std::size_t>(bins.tiles_v);
+  const AxisFrame frame(target.axis);
+  const std::size_t count = mesh.triangles.size();
+
+  // Counting sort: each part of the triangles counts by tile, the counts become cursors, each part
+  // writes at its own cursors. A second look at the box is cheaper than remembering it.
+  const std::size_t parts = std::max<std::size_t>(
+      1, std::min<std::size_t>(static_cast<std::size_t>(execution.thread_count()), count / 4096));
+  std::vector<std::uint64_t> cursors(parts * tiles, 0);
+  const auto for_part = [&](std::size_t part, auto&& body) {
+    for (std::size_t i = count * part / parts; i < count * (part + 1) / parts; ++i) {
+      const PixelRect rect = tile_rect(mesh, mesh.triangles[i], frame, target);
+      for (int tv = rect.v0; tv < rect.v1; ++tv) {
+        for (int tu = rect.u0; tu < rect.u1; ++tu) {
+          body(i, static_cast<std::size_t>(tv) * static_cast<std::size_t>(bins.tiles_u) +
+                      static_cast<std::size_t>(tu));
+        }
+      }
+    }
+  };
+  parallel_for(execution, parts, [&](std::size_t part, int) {
+    std::uint64_t* counts = cursors.data() + part * tiles;
+    for_part(part, [counts](std::size_t, std::size_t tile) { ++counts[tile]; });
+  });
+  bins.offsets.resize(tiles + 1);
+  std::uint64_t sum = 0;
+  for (std::size_t tile = 0; tile < tiles; ++tile) {
+    bins.offsets[tile] = static_cast<std::uint32_t>(sum);
+    for (std::size_t part = 0; part < parts; ++part) {
+      sum += std::exchange(cursors[part * tiles + tile], sum);
+    }
+  }
+  if (sum > std::numeric_limits<std::uint32_t>::max()) {
+    return fail(
+        ErrorCode::kLimit,
+        "{} triangles meet {} tiles of {} pixels in {} places, more than 2^32 - 1: split the "
+        "grid or the mesh",
+        count, tiles, kTilePixels, sum);
+  }
+  bins.offsets[tiles] = static_cast<std::uint32_t>(sum);
+  bins.triangles.resize(sum);
+  parallel_for(execution, parts, [&](std::size_t part, int) {
+    std::uint64_t* cursor = cursors.data() + part * tiles;
+    for_part(part, [&](std::size_t i, std::size_t tile) {
+      bins.triangles[cursor[tile]++] = static_cast<std::uint32_t>(i);
+    });
+  });
+  if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+  return bins;
+}
+
+}  // namespace strata

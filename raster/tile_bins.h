@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/execution.h"
+#include "raster/lattice_mesh.h"
+#include "raster/triangle_setup.h"
+
+namespace strata {
+
+/// Pixels along a side of a tile: bulk work is done tile by tile, each one thread's alone.
+inline constexpr int kTileSide = 64;
+inline constexpr int kTilePixels = kTileSide * kTileSide;
+
+/// Which triangles may cover a pixel of which tile, by their boxes. Triangles that cover no pixel
+/// centre are in no tile.
+struct TileBins {
+  int tiles_u = 0, tiles_v = 0;
+  std::vector<std::uint32_t> offsets;    ///< tiles_u * tiles_v + 1
+  std::vector<std::uint32_t> triangles;  ///< indices into LatticeMesh::triangles, in no fixed order
+
+  [[nodiscard]] std::span<const std::uint32_t> tile(int tu, int tv) const {
+    const std::size_t i = static_cast<std::size_t>(tv) * static_cast<std::size_t>(tiles_u) +
+                          static_cast<std::size_t>(tu);
+    return std::span(triangles).subspan(offsets[i], offsets[i + 1] - offsets[i]);
+  }
+};
+
+/// Sorts the triangles of `mesh` into the tiles of `target`.
+/// @return kLimit when more than 2^32 - 1 references would be needed.
+Result<TileBins> bin_triangles(const LatticeMesh& mesh, const RasterTarget& target,
+                               const Execution& execution = {});
+
+}  // namespace strata

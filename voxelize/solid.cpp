@@ -1,0 +1,125 @@
+#include "voxelize/solid.h"
+
+#include <algorithm>
+#include <chrono>
+#include <mutex>
+#include <utility>
+
+namespace strata {
+namespace {
+
+double milliseconds_between(std::chrono::steady_clock::time_point from,
+                            std::chrono::steady_clock::time_point to) {
+  return std::chrono::duration<double, std::milli>(to - from).count();
+}
+
+}  // namespace
+
+struct SolidVoxelizer::Worker {
+  explicit Worker(const VoxelizeOptions& options)
+      : keys({.store = options.store, .offsets = options.offsets}),
+        items({.store = options.store, .offsets = options.offsets}) {}
+  KeyTileBuilder keys;
+  ItemTileBuilder items;
+  TileIntervals intervals;
+  VoxelizeReport report;
+};
+
+Result<SolidVoxelizer> SolidVoxelizer::create(const LatticeMesh& mesh, const VoxelGrid& grid,
+                                              Axis axis, const VoxelizeOptions& options,
+                                              const Execution& execution) {
+  SolidVoxelizer result;
+  result.mesh_ = &mesh;
+  result.grid_ = &grid;
+  result.options_ = options;
+  const AxisFrame frame(axis);
+  result.target_ = {axis, grid.dims[frame.u], grid.dims[frame.v],
+                    static_cast<std::uint32_t>(grid.dims[frame.w]) * kLatticeSteps};
+  auto bins = bin_triangles(mesh, result.target_, execution);
+  if (!bins) return tl::unexpected(bins.error());
+  result.bins_ = std::move(*bins);
+  for (int i = 0; i < execution.thread_count(); ++i) {
+    result.workers_.push_back(std::make_shared<Worker>(options));
+  }
+  return result;
+}
+
+template <class Builder>
+Result<void> SolidVoxelizer::run_tile(Builder& builder, Worker& worker, int tu, int tv, int v_begin,
+                                      VoxelIntervals& out, ColumnMarks* marks) const {
+  const auto triangles = bins_.tile(tu, tv);
+  if (triangles.empty()) return {};
+  const auto start = std::chrono::steady_clock::now();
+  const auto lists = builder.build(*mesh_, target_, triangles, tu, tv);
+  if (!lists) return tl::unexpected(lists.error());
+  const auto built = std::chrono::steady_clock::now();
+  worker.report.lists_ms += milliseconds_between(start, built);
+  if (lists->fragments == 0) return {};
+  TileIntervals& tile = worker.intervals;
+  walk_tile(*lists, options_.rule, options_.statistics, tile);
+  if (tile.offsets.back() > 0) {
+    out.set_tile(tu, tv - v_begin / kTileSide, tile.offsets,
+                 std::span<const Interval>(tile.items).first(tile.offsets.back()));
+  }
+  VoxelizeReport& report = worker.report;
+  report.crossings += lists->fragments;
+  report.unbalanced_columns += tile.unbalanced;
+  report.negative_columns += tile.negative;
+  report.max_depth_complexity = std::max(report.max_depth_complexity, tile.max_depth);
+  for (std::size_t i = 0; i < report.depth_histogram.size(); ++i) {
+    report.depth_histogram[i] += tile.histogram[i];
+  }
+  if (marks != nullptr && tile.unbalanced > 0) {
+    const int rows = std::min(kTileSide, target_.height - tv * kTileSide);
+    for (int row = 0; row < rows; ++row) {
+      marks->word(tu, tv * kTileSide + row) = tile.unbalanced_rows[row];
+    }
+  }
+  report.intervals_ms += milliseconds_between(built, std::chrono::steady_clock::now());
+  return {};
+}
+
+Result<VoxelIntervals> SolidVoxelizer::slab(int v_begin, int v_end, const Execution& execution,
+                                            VoxelizeReport& report, ColumnMarks* marks) {
+  VoxelIntervals result(*grid_, target_.axis, v_begin, v_end);
+  const int first_tile_row = v_begin / kTileSide;
+  const auto tiles =
+      static_cast<std::size_t>(result.tiles_u()) * static_cast<std::size_t>(result.tiles_v());
+  std::mutex failure_mutex;
+  Result<void> status;
+  for (auto& worker : workers_) worker->report = {};
+  parallel_for(execution, tiles, [&](std::size_t index, int worker_index) {
+    Worker& worker = *workers_[static_cast<std::size_t>(worker_index)];
+    const int tu = static_cast<int>(index) % result.tiles_u();
+    const int tv = static_cast<int>(index) / result.tiles_u() + first_tile_row;
+    const auto done = target_.depth_limit <= kMaxDepthKeyLimit
+                          ? run_tile(worker.keys, worker, tu, tv, v_begin, result, marks)
+                          : run_tile(worker.items, worker, tu, tv, v_begin, result, marks);
+    if (!done) {
+      const std::lock_guard lock(failure_mutex);
+      if (status) status = done;
+    }
+  });
+  if (!status) return tl::unexpected(status.error());
+  if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+  const auto used = static_cast<double>(workers_.size());
+  for (const auto& worker : workers_) {
+    const VoxelizeReport& part = worker->report;
+    report.crossings += part.crossings;
+    report.unbalanced_columns += part.unbalanced_columns;
+    report.negative_columns += part.negative_columns;
+    report.max_depth_complexity = std::max(report.max_depth_complexity, part.max_depth_complexity);
+    for (std::size_t i = 0; i < report.depth_histogram.size(); ++i) {
+      report.depth_histogram[i] += part.depth_histogram[i];
+    }
+    report.lists_ms += part.lists_ms / used;
+    report.intervals_ms += part.intervals_ms / used;
+  }
+  report.rebuilt_tiles = 0;
+  for (const auto& worker : workers_) {
+    report.rebuilt_tiles += worker->keys.rebuilt_tiles() + worker->items.rebuilt_tiles();
+  }
+  return result;
+}
+
+}  // namespace strata

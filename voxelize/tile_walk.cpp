@@ -1,0 +1,285 @@
+#include "voxelize/tile_walk.h"
+
+#include <algorithm>
+#include <cstring>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "voxelize/tile_walk.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include "raster/lattice_mesh.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace strata {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using Lane = hn::ScalableTag<std::uint32_t>;
+using LaneInt = hn::RebindToSigned<Lane>;
+using Vec = hn::Vec<Lane>;
+using VecInt = hn::Vec<LaneInt>;
+using Mask = hn::Mask<Lane>;
+constexpr std::size_t kMaxLanes = HWY_MAX_BYTES / 4;
+
+template <InsideRule rule>
+HWY_INLINE hn::Mask<LaneInt> inside(VecInt winding) {
+  const LaneInt di;
+  if constexpr (rule == InsideRule::kWinding) return hn::Gt(winding, hn::Zero(di));
+  if constexpr (rule == InsideRule::kNonzero) return hn::Ne(winding, hn::Zero(di));
+  return hn::TestBit(winding, hn::Set(di, 1));
+}
+
+/// Finished intervals of a vector of columns, in the order in which the walk meets them.
+struct Finished {
+  std::uint32_t packed[64][kMaxLanes];  // [last:16 | first:16], an Interval's bytes
+  std::uint32_t marks[64][kMaxLanes];   // 1 where packed holds an interval
+  std::size_t rounds = 0;
+
+  HWY_INLINE void add(Mask where, Vec begin, Vec end) {
+    const Lane d;
+    hn::StoreU(hn::Or(begin, hn::ShiftLeft<16>(hn::Sub(end, hn::Set(d, 1)))), d, packed[rounds]);
+    hn::StoreU(hn::IfThenElseZero(where, hn::Set(d, 1)), d, marks[rounds]);
+    ++rounds;
+  }
+};
+
+template <InsideRule rule>
+void walk_planes(const TileLists<DepthKey>& lists, bool histogram, TileIntervals& out) {
+  const Lane d;
+  const LaneInt di;
+  const std::size_t lanes = hn::Lanes(d);
+  std::uint32_t count = 0;
+  Finished finished;
+  std::uint32_t counts[kMaxLanes];
+  std::uint32_t depths[kMaxLanes];
+
+  for (int row = lists.row_begin; row < lists.row_end; ++row) {
+    for (std::size_t u = 0; u < kTileSide; u += lanes) {
+      const std::size_t pixel = static_cast<std::size_t>(row) * kTileSide + u;
+      const std::uint32_t* cell = lists.planes32 + pixel;
+      VecInt winding = hn::Zero(di);
+      VecInt lowest = hn::Zero(di);
+      Vec begin = hn::Zero(d);  // of the interval being walked
+      Vec pending_begin = hn::Zero(d),
+          pending_end = hn::Zero(d);  // the last one, not yet handed out
+      Vec list_length = hn::Zero(d);
+      finished.rounds = 0;
+      int age = 0;
+      for (; age < lists.ages; ++age, cell += kTilePixels) {
+        const Vec record = hn::LoadU(d, cell);
+        const Mask present = hn::Ne(record, hn::Zero(d));
+        if (hn::AllFalse(d, present)) break;
+        const Vec key = hn::AndNot(record, hn::Set(d, 0xffffffu));
+        const Vec exit = hn::And(key, hn::Set(d, 1u));
+        const Vec voxel = hn::ShiftRight<kLatticeBits>(
+            hn::Add(hn::ShiftRight<1>(key), hn::Set(d, std::uint32_t{kLatticeSteps / 2})));
+        // +1 on entering, -1 on leaving, 0 where the list has ended.
+        const VecInt change = hn::BitCast(
+            di, hn::IfThenElseZero(present, hn::Sub(hn::Set(d, 1u), hn::Add(exit, exit))));
+        const auto was = inside<rule>(winding);
+        winding = hn::Add(winding, change);
+        lowest = hn::Min(lowest, winding);
+        const auto now = inside<rule>(winding);
+        const Mask starts = hn::RebindMask(d, hn::AndNot(was, now));
+        const Mask ends = hn::RebindMask(d, hn::AndNot(now, was));
+        if (histogram) list_length = hn::Sub(list_length, hn::VecFromMask(d, present));
+        if (!hn::AllFalse(d, starts)) {
+          // A start on the end of the last interval carries that one on.
+          const Mask has_pending = hn::Gt(pending_end, pending_begin);
+          const Mask joins = hn::And(has_pending, hn::Eq(voxel, pending_end));
+          const Mask hand_out = hn::And(starts, hn::AndNot(joins, has_pending));
+          if (!hn::AllFalse(d, hand_out)) finished.add(hand_out, pending_begin, pending_end);
+          begin = hn::IfThenElse(starts, hn::IfThenElse(joins, pending_begin, voxel), begin);
+          pending_end = hn::IfThenElse(hand_out, pending_begin, pending_end);
+        }
+        const Mask closes = hn::And(ends, hn::Gt(voxel, begin));
+        pending_begin = hn::IfThenElse(closes, begin, pending_begin);
+        pending_end = hn::IfThenElse(closes, voxel, pending_end);
+      }
+      if (age == 0) {
+        for (std::size_t lane = 0; lane < lanes; ++lane) out.offsets[pixel + lane] = count;
+        continue;
+      }
+      const Mask has_pending = hn::Gt(pending_end, pending_begin);
+      if (!hn::AllFalse(d, has_pending)) finished.add(has_pending, pending_begin, pending_end);
+
+      // Columns whose winding number is not 0 again, or was negative, are rare.
+      const auto unbalanced = hn::Ne(winding, hn::Zero(di));
+      const auto negative = hn::Lt(lowest, hn::Zero(di));
+      if (!hn::AllFalse(di, hn::Or(unbalanced, negative))) {
+        std::int32_t windings[kMaxLanes];
+        hn::StoreU(winding, di, windings);
+        for (std::size_t lane = 0; lane < lanes; ++lane) {
+          if (windings[lane] == 0) continue;
+          ++out.unbalanced;
+          out.unbalanced_rows[row] |= std::uint64_t{1} << (u + lane);
+        }
+        out.negative += hn::CountTrue(di, negative);
+      }
+      if (histogram) {
+        hn::StoreU(list_length, d, depths);
+        for (std::size_t lane = 0; lane < lanes; ++lane) {
+          if (depths[lane] > 0) ++out.histogram[std::min<std::uint32_t>(depths[lane], 64)];
+        }
+      }
+
+      // Hand the intervals out column by column.
+      if (out.items.size() < count + (finished.rounds + 1) * lanes) {
+        out.items.resize((count + (finished.rounds + 1) * lanes) * 2);
+      }
+      auto* items = reinterpret_cast<std::uint32_t*>(out.items.data());
+      if (finished.rounds == 1) {
+        const Vec marks = hn::LoadU(d, finished.marks[0]);
+        hn::CompressStore(hn::LoadU(d, finished.packed[0]), hn::Ne(marks, hn::Zero(d)), d,
+                          items + count);
+        for (std::size_t lane = 0; lane < lanes; ++lane) {
+          out.offsets[pixel + lane] = count;
+          count += finished.marks[0][lane];
+        }
+        continue;
+      }
+      Vec sum = hn::Zero(d);
+      for (std::size_t round = 0; round < finished.rounds; ++round) {
+        sum = hn::Add(sum, hn::LoadU(d, finished.marks[round]));
+      }
+      hn::StoreU(sum, d, counts);
+      for (std::size_t lane = 0; lane < lanes; ++lane) {
+        out.offsets[pixel + lane] = count;
+        if (counts[lane] == 0) continue;
+        for (std::size_t round = 0; round < finished.rounds; ++round) {
+          items[count] = finished.packed[round][lane];
+          count += finished.marks[round][lane];
+        }
+      }
+    }
+  }
+  const std::size_t end = static_cast<std::size_t>(lists.row_end) * kTileSide;
+  std::fill(out.offsets.begin() + static_cast<std::ptrdiff_t>(end), out.offsets.end(), count);
+}
+
+void walk_key_planes(const TileLists<DepthKey>& lists, InsideRule rule, bool histogram,
+                     TileIntervals& out) {
+  switch (rule) {
+    case InsideRule::kWinding:
+      return walk_planes<InsideRule::kWinding>(lists, histogram, out);
+    case InsideRule::kNonzero:
+      return walk_planes<InsideRule::kNonzero>(lists, histogram, out);
+    case InsideRule::kParity:
+      return walk_planes<InsideRule::kParity>(lists, histogram, out);
+  }
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace strata
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace strata {
+namespace {
+
+HWY_EXPORT(walk_key_planes);
+
+std::uint32_t depth_of(DepthKey key) { return key >> 1; }
+std::uint32_t depth_of(DepthItem item) { return item.depth(); }
+bool exit_of(DepthKey key) { return (key & 1) != 0; }
+bool exit_of(DepthItem item) { return item.exit(); }
+
+bool is_inside(InsideRule rule, int winding) {
+  switch (rule) {
+    case InsideRule::kWinding:
+      return winding > 0;
+    case InsideRule::kNonzero:
+      return winding != 0;
+    case InsideRule::kParity:
+      break;
+  }
+  return (winding & 1) != 0;
+}
+
+/// The walk written plainly, one column at a time: for the form of lists that is not planar, and
+/// the yardstick of the other.
+template <class Key>
+void walk_column(std::span<const Key> list, InsideRule rule, std::size_t pixel, bool histogram,
+                 TileIntervals& out) {
+  const std::size_t first = out.items.size();
+  int winding = 0, lowest = 0;
+  std::uint32_t begin = 0;
+  for (const Key key : list) {
+    const bool was = is_inside(rule, winding);
+    winding += exit_of(key) ? -1 : 1;
+    lowest = std::min(lowest, winding);
+    const bool now = is_inside(rule, winding);
+    const std::uint32_t voxel = (depth_of(key) + kLatticeSteps / 2) >> kLatticeBits;
+    if (now && !was) begin = voxel;
+    if (was && !now && voxel > begin) {
+      if (out.items.size() > first && static_cast<std::uint32_t>(out.items.back().end()) == begin) {
+        out.items.back().last = static_cast<std::uint16_t>(voxel - 1);
+      } else {
+        out.items.push_back(
+            {static_cast<std::uint16_t>(begin), static_cast<std::uint16_t>(voxel - 1)});
+      }
+    }
+  }
+  if (winding != 0) {
+    ++out.unbalanced;
+    out.unbalanced_rows[pixel / kTileSide] |= std::uint64_t{1} << (pixel % kTileSide);
+  }
+  if (lowest < 0) ++out.negative;
+  out.max_depth = std::max<std::uint64_t>(out.max_depth, list.size());
+  if (histogram && !list.empty()) ++out.histogram[std::min<std::size_t>(list.size(), 64)];
+}
+
+template <class Key>
+void walk_rows(const TileLists<Key>& lists, InsideRule rule, bool histogram, TileIntervals& out) {
+  out.items.clear();
+  std::vector<Key> list;
+  for (std::size_t pixel = 0; pixel < kTilePixels; ++pixel) {
+    out.offsets[pixel] = static_cast<std::uint32_t>(out.items.size());
+    if constexpr (std::is_same_v<Key, DepthItem>) {
+      if (lists.planes64 != nullptr) {
+        const int row = static_cast<int>(pixel / kTileSide);
+        if (row < lists.row_begin || row >= lists.row_end) continue;
+        list.clear();
+        for (std::size_t age = 0; age < static_cast<std::size_t>(lists.ages); ++age) {
+          const std::uint64_t record = lists.planes64[age * kTilePixels + pixel];
+          if (record == 0) break;
+          list.push_back(ItemRecord::key(record));
+        }
+        walk_column(std::span<const Key>(list), rule, pixel, histogram, out);
+        continue;
+      }
+    }
+    walk_column(std::span<const Key>(lists.keys + lists.offsets[pixel],
+                                     lists.keys + lists.offsets[pixel + 1]),
+                rule, pixel, histogram, out);
+  }
+  out.offsets[kTilePixels] = static_cast<std::uint32_t>(out.items.size());
+}
+
+void begin_walk(TileIntervals& out) {
+  out.offsets.resize(kTilePixels + 1);
+  std::fill(std::begin(out.unbalanced_rows), std::end(out.unbalanced_rows), 0);
+  std::fill(std::begin(out.histogram), std::end(out.histogram), 0);
+  out.unbalanced = out.negative = out.max_depth = 0;
+}
+
+}  // namespace
+
+void walk_tile(const TileLists<DepthKey>& lists, InsideRule rule, bool histogram,
+               TileIntervals& out) {
+  begin_walk(out);
+  if (lists.planes32 == nullptr) return walk_rows(lists, rule, histogram, out);
+  std::fill_n(out.offsets.begin(), static_cast<std::ptrdiff_t>(lists.row_begin) * kTileSide, 0u);
+  out.max_depth = static_cast<std::uint64_t>(lists.ages);
+  HWY_DYNAMIC_DISPATCH(walk_key_planes)(lists, rule, histogram, out);
+}
+
+void walk_tile(const TileLists<DepthItem>& lists, InsideRule rule, bool histogram,
+               TileIntervals& out) {
+  begin_walk(out);
+  walk_rows(lists, rule, histogram, out);
+}
+
+}  // namespace strata
+#endif  // HWY_ONCE

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "hashbuffer/tile_builder.h"
+#include "voxelize/voxelize.h"
+
+// Depth lists of a tile -> runs of solid voxels. Private to voxelize/.
+
+namespace strata {
+
+/// The intervals of one tile, as VoxelIntervals::set_tile() takes them, and what the walk saw.
+struct TileIntervals {
+  std::vector<std::uint32_t> offsets;  ///< kTilePixels + 1
+  std::vector<Interval> items;         ///< the first offsets.back() are valid
+  /// Bit u of row v is set where the column's winding number does not return to 0.
+  std::uint64_t unbalanced_rows[kTileSide];
+  std::uint64_t unbalanced = 0;  ///< columns so marked
+  std::uint64_t negative = 0;    ///< columns whose winding number falls below 0
+  std::uint64_t max_depth = 0;
+  /// Columns with n = 1..63 fragments at [n], the deeper ones at [64]; filled when asked for.
+  std::uint64_t histogram[65];
+};
+
+/// Walks the lists of a tile along the ray. A voxel k lies beyond a crossing when its centre, at
+/// 256 k + 128 lattice steps, is above the floor of the crossing. An interval that is entered and
+/// never left (open mesh) is left out.
+void walk_tile(const TileLists<DepthKey>& lists, InsideRule rule, bool histogram,
+               TileIntervals& out);
+void walk_tile(const TileLists<DepthItem>& lists, InsideRule rule, bool histogram,
+               TileIntervals& out);
+
+}  // namespace strata

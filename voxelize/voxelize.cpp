@@ -1,0 +1,134 @@
+#include "voxelize/voxelize.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "raster/lattice_mesh.h"
+#include "voxelize/checksum.h"
+#include "voxelize/solid.h"
+#include "voxelize/surface.h"
+#include "voxelize/vote.h"
+
+namespace strata {
+namespace {
+
+Result<void> check_grid(const VoxelGrid& grid) {
+  for (int axis = 0; axis < 3; ++axis) {
+    if (grid.dims[axis] < 1 || grid.dims[axis] > kMaxGridSide) {
+      return fail(ErrorCode::kUsage, "the grid has {} voxels along {}; 1 to {} can be had",
+                  grid.dims[axis], "xyz"[axis], kMaxGridSide);
+    }
+    if (!(grid.voxel_size[axis] > 0) || !std::isfinite(grid.voxel_size[axis]) ||
+        !std::isfinite(grid.origin[axis])) {
+      return fail(ErrorCode::kUsage,
+                  "voxel size {} and origin {} along {} must be finite, the size > 0",
+                  grid.voxel_size[axis], grid.origin[axis], "xyz"[axis]);
+    }
+  }
+  return {};
+}
+
+/// Rows of a slab whose intervals are expected to stay within an eighth of the memory limit.
+int slab_rows(const VoxelGrid& grid, Axis axis, const Execution& execution) {
+  const AxisFrame frame(axis);
+  constexpr std::uint64_t kBytesPerColumn = 16;  // offset, and two intervals with their copies
+  constexpr std::uint64_t kDefaultSlabBytes = std::uint64_t{512} << 20;
+  const std::uint64_t budget = execution.memory_limit > 0
+                                   ? std::min(kDefaultSlabBytes, execution.memory_limit / 8)
+                                   : kDefaultSlabBytes;
+  const std::uint64_t rows =
+      budget / (kBytesPerColumn * static_cast<std::uint64_t>(grid.dims[frame.u]));
+  const std::uint64_t tile_rows = std::max<std::uint64_t>(1, rows / kTileSide);
+  return static_cast<int>(std::min<std::uint64_t>(tile_rows * kTileSide, kMaxGridSide));
+}
+
+/// Takes a finished slab over.
+using OwningSink = std::function<Result<void>(VoxelIntervals&&)>;
+
+/// The work of both entry points: slabs of `step` rows, which go to `sink` in increasing v.
+Result<VoxelizeReport> run(const TriangleSoup& mesh, const VoxelGrid& grid,
+                           const VoxelizeOptions& options, const Execution& execution, int step,
+                           const OwningSink& sink) {
+  if (auto valid = check_grid(grid); !valid) return tl::unexpected(valid.error());
+  if (!options.solid && !options.surface) {
+    return fail(ErrorCode::kUsage, "neither the solid nor the surface is asked for");
+  }
+  if (!options.closed && options.open == OpenMode::kFail) {
+    return fail(ErrorCode::kGeometry, "the mesh is not closed");
+  }
+  const auto snapped = snap_to_lattice(mesh, grid, execution);
+  if (!snapped) return tl::unexpected(snapped.error());
+  const LatticeMesh& lattice = *snapped;
+
+  VoxelizeReport report;
+  SetChecksum checksum(grid);
+  Execution quiet = execution;  // inner phases do not report progress of their own
+  quiet.progress = {};
+  const bool open_surface = !options.closed && options.open == OpenMode::kSurface;
+  const bool solid = options.solid && !open_surface;
+  const bool surface = options.surface || open_surface;
+
+  const auto pass_on = [&](VoxelIntervals&& slab) -> Result<void> {
+    if (surface) {
+      auto skin = voxelize_surface(lattice, grid, options.surface_kind, options.axis,
+                                   slab.v_begin(), slab.v_end(), quiet);
+      if (skin && solid) skin = union_intervals(slab, *skin, quiet);
+      if (!skin) return tl::unexpected(skin.error());
+      slab = std::move(*skin);
+    }
+    if (options.statistics) {
+      report.solid_voxels += slab.solid_voxels();
+      report.intervals += slab.interval_count();
+      checksum.add(slab, quiet);
+    }
+    return sink(std::move(slab));
+  };
+
+  if (solid && !options.closed) {
+    const auto done = vote_slabs(lattice, grid, options, execution, step, report, pass_on);
+    if (!done) return tl::unexpected(done.error());
+  } else {
+    Result<SolidVoxelizer> voxelizer =
+        solid ? SolidVoxelizer::create(lattice, grid, options.axis, options, quiet)
+              : SolidVoxelizer();
+    if (!voxelizer) return tl::unexpected(voxelizer.error());
+    const int rows = grid.dims[AxisFrame(options.axis).v];
+    for (int v = 0; v < rows; v += step) {
+      const int end = std::min(rows, v + step);
+      Result<VoxelIntervals> slab = solid ? voxelizer->slab(v, end, quiet, report)
+                                          : VoxelIntervals(grid, options.axis, v, end);
+      if (!slab) return tl::unexpected(slab.error());
+      if (auto done = pass_on(std::move(*slab)); !done) return tl::unexpected(done.error());
+      if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+      if (execution.progress) execution.progress(static_cast<double>(end) / rows);
+    }
+  }
+  if (options.statistics) report.checksum = checksum.value();
+  return report;
+}
+
+}  // namespace
+
+Result<VoxelizeReport> voxelize_slabs(const TriangleSoup& mesh, const VoxelGrid& grid,
+                                      const VoxelizeOptions& options, const Execution& execution,
+                                      const SlabSink& sink) {
+  return run(mesh, grid, options, execution, slab_rows(grid, options.axis, execution),
+             [&](VoxelIntervals&& slab) { return sink(slab); });
+}
+
+Result<VoxelIntervals> voxelize(const TriangleSoup& mesh, const VoxelGrid& grid,
+                                const VoxelizeOptions& options, const Execution& execution,
+                                VoxelizeReport* report) {
+  VoxelIntervals result;
+  const auto done =
+      run(mesh, grid, options, execution, kMaxGridSide, [&](VoxelIntervals&& slab) -> Result<void> {
+        result = std::move(slab);
+        return {};
+      });
+  if (!done) return tl::unexpected(done.error());
+  if (report != nullptr) *report = *done;
+  return result;
+}
+
+}  // namespace strata
