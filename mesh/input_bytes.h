@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "core/result.h"
+
+namespace strata::detail {
+
+/// All bytes of a file, mapped where the system can, else read. One byte past the end is readable
+/// and zero, so that text scanners need no bounds check: it ends every token.
+class InputBytes {
+ public:
+  /// @param path  a file; "-" is standard input @param limit  most bytes to hold from a pipe, 0:
+  /// any
+  /// @return kInput naming path and reason; kLimit
+  static Result<InputBytes> open(const std::string& path, std::uint64_t limit);
+
+  InputBytes(InputBytes&& other) noexcept;
+  InputBytes& operator=(InputBytes&& other) noexcept;
+  ~InputBytes();
+
+  [[nodiscard]] std::string_view view() const { return {data_, size_}; }
+  /// True when the file behind a mapping has another size than when it was opened.
+  [[nodiscard]] bool changed() const;
+
+ private:
+  InputBytes() = default;
+  static Result<InputBytes> read_all(int descriptor, const std::string& name, std::uint64_t limit);
+  const char* data_ = "";
+  std::size_t size_ = 0;
+  std::size_t mapped_ = 0;  ///< bytes of the mapping, 0 if none
+  int descriptor_ = -1;     ///< kept to ask for the size again
+  std::string owned_;
+};
+
+}  // namespace strata::detail

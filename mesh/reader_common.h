@@ -1,0 +1,105 @@
+#pragma once
+
+#include <sys/mman.h>
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "mesh/read_mesh.h"
+
+/// What the readers of this folder share; not for others.
+namespace strata::detail {
+
+/// A vertex index that names no vertex, whatever the file holds.
+inline constexpr std::uint32_t kNoVertex = 0xffffffffu;
+/// Most vertices a soup may have, so that kNoVertex stays free.
+inline constexpr std::uint64_t kMaxVertices = 0xfffffffeu;
+
+/// The arguments of a reader. The text ends in a readable zero byte.
+struct ReaderInput {
+  std::string_view text;
+  const std::string& name;
+  const MeshReadOptions& options;
+  const Execution& execution;
+};
+
+/// Everything a file says, unchecked: indices may be out of range, coordinates not finite.
+/// `stats.faces` and the counts a reader alone can know (too_few_vertices, ignored) are set.
+struct RawMesh {
+  TriangleSoup soup;
+  MeshReadStats stats;
+  std::uint64_t first_short_face = 0;  ///< element of the first face with too few vertices
+};
+
+/// Where a face element stands in the file, for messages: "bunny.obj:1204", and as the file writes
+/// it the vertex it should not name (empty: index + 0).
+struct FacePlace {
+  std::string place;
+  std::string vertex;
+};
+using LocateFace = std::function<FacePlace(std::uint32_t element)>;
+
+/// Drops and counts what cannot stay in a soup, gathers warnings, and judges the whole: the last
+/// step of every reader. @return kInput when nothing is left, or with `strict` something was lost
+Result<MeshFile> finish_mesh(const ReaderInput& input, RawMesh&& raw, const LocateFace& locate);
+
+Result<MeshFile> read_obj(const ReaderInput& input);
+Result<MeshFile> read_stl(const ReaderInput& input);
+Result<MeshFile> read_ply(const ReaderInput& input);
+Result<MeshFile> read_off(const ReaderInput& input);
+
+/// Appends polygons as fans and keeps count of their elements, for readers that go face by face.
+class FanBuilder {
+ public:
+  explicit FanBuilder(RawMesh& mesh) : mesh_(mesh) {}
+  /// Adds the next face element. @pre indices beyond 32 bits were replaced by kNoVertex
+  void add(const std::uint32_t* corners, std::size_t count) {
+    const std::uint64_t element = mesh_.stats.faces++;
+    TriangleSoup& soup = mesh_.soup;
+    if (count < 3) {
+      if (mesh_.stats.too_few_vertices++ == 0) mesh_.first_short_face = element;
+      return;
+    }
+    if (identity_ && (count > 3 || soup.triangles.size() != element)) {
+      identity_ = false;
+      soup.face_elements.resize(soup.triangles.size());
+      for (std::size_t i = 0; i < soup.face_elements.size(); ++i) {
+        soup.face_elements[i] = static_cast<std::uint32_t>(i);
+      }
+    }
+    for (std::size_t i = 2; i < count; ++i) {
+      soup.triangles.emplace_back(corners[0], corners[i - 1], corners[i]);
+      if (!identity_) soup.face_elements.push_back(static_cast<std::uint32_t>(element));
+    }
+  }
+
+ private:
+  RawMesh& mesh_;
+  bool identity_ = true;
+};
+
+/// Reserves room and asks for large pages, since the first touch of small ones costs more than
+/// filling them.
+template <class T>
+void reserve_large(std::vector<T>& values, std::size_t count) {
+  values.reserve(count);
+  constexpr std::uintptr_t kPage = 4096;
+  const auto begin = (reinterpret_cast<std::uintptr_t>(values.data()) + kPage - 1) / kPage * kPage;
+  const auto end =
+      reinterpret_cast<std::uintptr_t>(values.data() + values.capacity()) / kPage * kPage;
+  if (end > begin && end - begin >= (std::uintptr_t{4} << 20)) {
+    ::madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE);
+  }
+}
+
+/// True when the memory limit of the execution forbids a soup of this size.
+[[nodiscard]] inline bool exceeds_limit(const Execution& execution, std::uint64_t vertices,
+                                        std::uint64_t triangles) {
+  return execution.memory_limit != 0 &&
+         vertices * sizeof(glm::dvec3) + triangles * sizeof(glm::uvec3) > execution.memory_limit;
+}
+
+}  // namespace strata::detail

@@ -1,0 +1,71 @@
+#include "mesh/soup_tools.h"
+
+#include <algorithm>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <utility>
+#include <vector>
+
+#include "mesh/block_sum.h"
+
+namespace strata {
+
+Bounds bounds(const TriangleSoup& mesh, const Execution& execution) {
+  return detail::fold_blocks<Bounds>(
+      execution, mesh.triangles.size(),
+      [&](Bounds& box, std::size_t i) {
+        for (int k = 0; k < 3; ++k) {
+          const glm::dvec3 p = mesh.positions[mesh.triangles[i][k]];
+          box.low = glm::min(box.low, p);
+          box.high = glm::max(box.high, p);
+        }
+      },
+      [](Bounds& box, const Bounds& part) {
+        box.low = glm::min(box.low, part.low);
+        box.high = glm::max(box.high, part.high);
+      });
+}
+
+double signed_volume(const TriangleSoup& mesh, const Execution& execution) {
+  if (mesh.triangles.empty()) return 0.0;
+  // Near the mesh, or far meshes lose all digits.
+  const glm::dvec3 origin = mesh.positions[mesh.triangles.front().x];
+  const double six = detail::fold_blocks<double>(
+      execution, mesh.triangles.size(),
+      [&](double& sum, std::size_t i) {
+        const glm::uvec3 t = mesh.triangles[i];
+        sum += glm::dot(mesh.positions[t.x] - origin,
+                        glm::cross(mesh.positions[t.y] - origin, mesh.positions[t.z] - origin));
+      },
+      [](double& sum, double part) { sum += part; });
+  return six / 6.0;
+}
+
+void reverse_orientation(TriangleSoup& mesh) {
+  for (glm::uvec3& t : mesh.triangles) std::swap(t.y, t.z);
+}
+
+void append(TriangleSoup& mesh, const TriangleSoup& other) {
+  const auto base = static_cast<std::uint32_t>(mesh.positions.size());
+  const auto first_triangle = static_cast<std::uint32_t>(mesh.triangles.size());
+  if (!mesh.face_elements.empty() || !other.face_elements.empty()) {
+    std::uint32_t first = first_triangle;
+    if (!mesh.face_elements.empty()) {
+      first = *std::max_element(mesh.face_elements.begin(), mesh.face_elements.end()) + 1;
+    }
+    for (std::uint32_t t = static_cast<std::uint32_t>(mesh.face_elements.size());
+         t < first_triangle; ++t) {
+      mesh.face_elements.push_back(t);
+    }
+    for (std::size_t t = 0; t < other.triangles.size(); ++t) {
+      const std::uint32_t element =
+          other.face_elements.empty() ? static_cast<std::uint32_t>(t) : other.face_elements[t];
+      mesh.face_elements.push_back(first + element);
+    }
+  }
+  mesh.positions.insert(mesh.positions.end(), other.positions.begin(), other.positions.end());
+  mesh.triangles.reserve(mesh.triangles.size() + other.triangles.size());
+  for (const glm::uvec3& t : other.triangles) mesh.triangles.push_back(t + base);
+}
+
+}  // namespace strata

@@ -1,0 +1,119 @@
+#pragma once
+
+#include <charconv>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+#include <string_view>
+
+/// Scanners for text that ends in a readable zero byte (InputBytes): no bounds are checked, since
+/// zero is neither a digit, nor a letter, nor a blank.
+namespace strata::detail {
+
+[[nodiscard]] constexpr bool is_digit(char c) { return static_cast<unsigned char>(c - '0') < 10; }
+/// Blank inside a line. A carriage return is one, so CRLF needs no other care.
+[[nodiscard]] constexpr bool is_blank(char c) {
+  return c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f';
+}
+[[nodiscard]] constexpr bool is_space(char c) { return is_blank(c) || c == '\n'; }
+/// What may follow a token: white space or the end.
+[[nodiscard]] constexpr bool ends_token(char c) { return is_space(c) || c == '\0'; }
+
+namespace scanner {
+// Powers of ten that a double holds exactly.
+inline constexpr double kPowers[23] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
+                                       1e8,  1e9,  1e10, 1e11, 1e12, 1e13, 1e14, 1e15,
+                                       1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
+
+/// What the short way cannot do: long mantissas, large exponents, nan, inf, 1.#IND.
+const char* parse_double_slowly(const char* text, double& value);
+}  // namespace scanner
+
+/// Reads a decimal number at `text`, correctly rounded and free of locales. Numbers beyond the
+/// range of double become infinite or zero; nan, inf and Microsoft's 1.#INF are read.
+/// @return past the number, or null when there is none
+inline const char* parse_double(const char* text, double& value) {
+  const char* p = text;
+  const bool negative = *p == '-';
+  p += negative || *p == '+';
+  std::uint64_t mantissa = 0;
+  const char* const digits = p;
+  for (; is_digit(*p); ++p) mantissa = mantissa * 10 + static_cast<std::uint64_t>(*p - '0');
+  std::ptrdiff_t count = p - digits, exponent = 0;
+  if (*p == '.') {
+    const char* const fraction = ++p;
+    for (; is_digit(*p); ++p) mantissa = mantissa * 10 + static_cast<std::uint64_t>(*p - '0');
+    exponent = fraction - p;
+    count += p - fraction;
+  }
+  // Clinger's fast path (How to Read Floating Point Numbers Accurately, PLDI 1990): mantissa and
+  // power are exact doubles, so the one rounding of the product or quotient is the right one.
+  if (count == 0 || count > 19 || *p == '#') return scanner::parse_double_slowly(text, value);
+  if ((*p | 0x20) == 'e') {
+    const char* q = p + 1;
+    const bool down = *q == '-';
+    q += down || *q == '+';
+    if (is_digit(*q)) {
+      std::ptrdiff_t power = 0;
+      for (; is_digit(*q); ++q) power = power < 100000 ? power * 10 + (*q - '0') : power;
+      exponent += down ? -power : power;
+      p = q;
+    }
+  }
+  if (mantissa > (std::uint64_t{1} << 53) || exponent < -22 || exponent > 22) {
+    return scanner::parse_double_slowly(text, value);
+  }
+  const auto whole = static_cast<double>(mantissa);
+  const double size =
+      exponent < 0 ? whole / scanner::kPowers[-exponent] : whole * scanner::kPowers[exponent];
+  value = negative ? -size : size;
+  return p;
+}
+
+/// Reads a decimal integer with optional sign; values beyond +-2^62 stay there.
+/// @return past the number, or null when there is none
+inline const char* parse_integer(const char* text, std::int64_t& value) {
+  const char* p = text;
+  const bool negative = *p == '-';
+  p += negative || *p == '+';
+  if (!is_digit(*p)) return nullptr;
+  constexpr std::int64_t kMost = std::int64_t{1} << 62;
+  std::int64_t size = 0;
+  for (; is_digit(*p); ++p) size = size < kMost / 16 ? size * 10 + (*p - '0') : kMost;
+  value = negative ? -size : size;
+  return p;
+}
+
+/// Past blanks of this line.
+inline const char* skip_blanks(const char* p) {
+  while (is_blank(*p)) ++p;
+  return p;
+}
+
+/// To the white space or end after a token.
+inline const char* skip_token(const char* p) {
+  while (!ends_token(*p)) ++p;
+  return p;
+}
+
+/// The token at p, at most 40 characters of it, for messages; unprintable characters end it.
+[[nodiscard]] inline std::string_view token_at(const char* p) {
+  const char* q = p;
+  while (!ends_token(*q) && q - p < 40 && *q > ' ' && *q < 127) ++q;
+  return {p, static_cast<std::size_t>(q - p)};
+}
+
+/// The 1-based line of a position: lines end with \n, \r\n or \r.
+[[nodiscard]] std::uint64_t line_of(std::string_view text, const char* position);
+
+/// Case-insensitive comparison of ascii. @pre `word` is in lower case
+[[nodiscard]] inline bool equals_no_case(std::string_view text, std::string_view word) {
+  if (text.size() != word.size()) return false;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if ((c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c) != word[i]) return false;
+  }
+  return true;
+}
+
+}  // namespace strata::detail
