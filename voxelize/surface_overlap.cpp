@@ -18,21 +18,15 @@ void edge_ranges(std::int64_t a0, std::int64_t b0, std::int64_t a1, std::int64_t
   if (first > last) return;
   const std::int64_t da = a1 - a0, db = b1 - b0, divisor = da << bits;
   const std::int64_t numerator = b0 * da + ((first << bits) - a0) * db;  // < 2^59
-  std::int64_t quotient = floor_div(numerator, divisor);
-  std::int64_t remainder = numerator - quotient * divisor;
-  const std::int64_t quotient_step = floor_div(db, da);
-  const std::int64_t remainder_step = (db - quotient_step * da) << bits;
+  Division at = divide(numerator, divisor);
+  Division step = divide(db, da);
+  step.remainder <<= bits;
   for (std::int64_t line = first; line <= last; ++line) {
     // A crossing on the border of two cells touches both.
-    const std::int64_t low = quotient - (remainder == 0 ? 1 : 0);
-    if (line > begin) out[line - 1 - begin].include(low, quotient);
-    if (line < end) out[line - begin].include(low, quotient);
-    quotient += quotient_step;
-    remainder += remainder_step;
-    if (remainder >= divisor) {
-      remainder -= divisor;
-      ++quotient;
-    }
+    const std::int64_t low = at.quotient - (at.remainder == 0 ? 1 : 0);
+    if (line > begin) out[line - 1 - begin].include(low, at.quotient);
+    if (line < end) out[line - begin].include(low, at.quotient);
+    at.advance(step, divisor);
   }
 }
 
@@ -142,7 +136,9 @@ bool SegmentTest::meets() const {
     if (height > Wide{std::abs(direction.slope)} * kHalf) return false;  // nor do flatter ones
     const Vector& d = direction.d;
     if (direction.slope != 0) {
-      if (same_sign(dot(edges_[0], d), dot(edges_[1], d), dot(edges_[2], d))) return true;
+      const std::int64_t e0 = dot(edges_[0], d), e1 = dot(edges_[1], d);
+      if ((e0 > 0 && e1 < 0) || (e0 < 0 && e1 > 0)) continue;
+      if (same_sign(e0, e1, dot(edges_[2], d))) return true;
     } else if (meets_in_plane(d)) {
       return true;
     }

@@ -17,6 +17,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <cstdlib>
 #include <glm/vec3.hpp>
 #include <limits>
 
@@ -47,15 +48,33 @@ struct Range {
   }
 };
 
-/// Largest integer <= a / b. @pre b > 0
-[[nodiscard]] inline std::int64_t floor_div(std::int64_t a, std::int64_t b) {
-  return a / b - (a % b < 0 ? 1 : 0);
+/// a = quotient b + remainder, 0 <= remainder < b.
+struct Division {
+  std::int64_t quotient = 0, remainder = 0;
+
+  /// Moves from a to a + by.quotient b + by.remainder: one carry, no division.
+  void advance(const Division& by, std::int64_t b) {
+    quotient += by.quotient;
+    remainder += by.remainder;
+    if (remainder >= b) {
+      remainder -= b;
+      ++quotient;
+    }
+  }
+};
+
+/// @pre b > 0
+[[nodiscard]] inline Division divide(std::int64_t a, std::int64_t b) {
+  const std::int64_t q = a / b, r = a % b;
+  return r < 0 ? Division{q - 1, r + b} : Division{q, r};
 }
 /// The same; the quotient must fit in 64 bits.
-[[nodiscard]] inline std::int64_t floor_div(Wide a, std::int64_t b) {
-  if (a == static_cast<std::int64_t>(a)) return floor_div(static_cast<std::int64_t>(a), b);
+[[nodiscard]] inline Division divide(Wide a, std::int64_t b) {
+  if (a == static_cast<std::int64_t>(a)) return divide(static_cast<std::int64_t>(a), b);
   const Wide q = a / b;
-  return static_cast<std::int64_t>(q - (a % b < 0 ? 1 : 0));
+  const auto r = static_cast<std::int64_t>(a - q * b);
+  const auto narrow = static_cast<std::int64_t>(q);
+  return r < 0 ? Division{narrow - 1, r + b} : Division{narrow, r};
 }
 
 /// Range of cells (closed, 2^bits lattice steps a side) that the closed triangle touches along axis
@@ -81,33 +100,6 @@ void strip_ranges(const Triangle& triangle, int a, int b, int bits, int begin, i
   return {static_cast<std::int32_t>((low - 1) >> bits), static_cast<std::int32_t>(high >> bits)};
 }
 
-/// Steps floor(x / d) along a row: the plane's height over the corners of columns u, u + 1, ...
-class RowStepper {
- public:
-  /// @pre divisor > 0
-  RowStepper(std::int64_t step, std::int64_t divisor)
-      : divisor_(divisor),
-        quotient_step_(floor_div(step, divisor)),
-        remainder_step_(step - quotient_step_ * divisor) {}
-  void start(Wide numerator) {
-    quotient_ = floor_div(numerator, divisor_);
-    remainder_ = static_cast<std::int64_t>(numerator - Wide{quotient_} * divisor_);
-  }
-  void advance() {
-    quotient_ += quotient_step_;
-    remainder_ += remainder_step_;
-    if (remainder_ >= divisor_) {
-      remainder_ -= divisor_;
-      ++quotient_;
-    }
-  }
-  [[nodiscard]] std::int64_t quotient() const { return quotient_; }
-
- private:
-  std::int64_t divisor_, quotient_step_, remainder_step_;
-  std::int64_t quotient_ = 0, remainder_ = 0;
-};
-
 /// Calls run(u, v, first, last) once for every column of the window in which the closed triangle
 /// touches a voxel; first..last are all the voxels it touches there.
 template <class Run>
@@ -132,12 +124,14 @@ void conservative_runs(const Triangle& triangle, const Window& window, Run&& run
   const Wide d =
       Wide{n[0]} * triangle[0][0] + Wide{n[1]} * triangle[0][1] + Wide{n[2]} * triangle[0][2];
   // The lowest corner of voxel k must not lie above the plane, the highest not below it:
-  //   n_w k <= floor(d / 256) - n_u u - n_v v - min(n_u, 0) - min(n_v, 0)
-  //   n_w (k + 1) >= ceil(d / 256) - n_u u - n_v v - max(n_u, 0) - max(n_v, 0)
+  //   n_w k <= floor(d / 256) - n_u u - n_v v - min(n_u, 0) - min(n_v, 0) = last
+  //   n_w (k + 1) >= ceil(d / 256) - n_u u - n_v v - max(n_u, 0) - max(n_v, 0) = last - gap
   const std::int64_t zero = 0;
   const Wide upper = (d >> kLatticeBits) - std::min(n[0], zero) - std::min(n[1], zero);
-  const Wide lower = -(-d >> kLatticeBits) - std::max(n[0], zero) - std::max(n[1], zero);
-  RowStepper last(-n[0], divisor), first(-n[0], divisor);
+  const std::int64_t gap = std::abs(n[0]) + std::abs(n[1]) - (d % kLatticeSteps == 0 ? 0 : 1);
+  const Division step = divide(-n[0], divisor);
+  const Division to_first = divide(-gap - 1, divisor);  // ceil(x / n) - 1 = floor((x - 1) / n)
+  Division last;
 
   for (int v = v_begin; v < v_end; ++v) {
     const Range& row = row_u[static_cast<std::size_t>(v - v_begin)];
@@ -146,20 +140,17 @@ void conservative_runs(const Triangle& triangle, const Window& window, Run&& run
     if (from > to) continue;
     const std::int64_t row_first = std::max(row_depth.first, 0);
     const std::int64_t row_last = std::min(row_depth.last, window.w_end - 1);
-    if (tilted) {
-      const Wide base = Wide{n[0]} * from + Wide{n[1]} * v;
-      last.start(upper - base);
-      first.start(lower - base - 1);  // ceil(x / n) - 1 = floor((x - 1) / n)
-    }
+    if (tilted) last = divide(upper - Wide{n[0]} * from - Wide{n[1]} * v, divisor);
     for (int u = from; u <= to; ++u) {
       const Range& column = column_w[static_cast<std::size_t>(u - u_begin)];
       std::int64_t low = std::max<std::int64_t>(row_first, column.first);
       std::int64_t high = std::min<std::int64_t>(row_last, column.last);
       if (tilted) {
-        low = std::max(low, first.quotient());
-        high = std::min(high, last.quotient());
-        first.advance();
-        last.advance();
+        Division first = last;
+        first.advance(to_first, divisor);
+        low = std::max(low, first.quotient);
+        high = std::min(high, last.quotient);
+        last.advance(step, divisor);
       }
       if (low <= high) run(u, v, static_cast<int>(low), static_cast<int>(high));
     }
