@@ -5,6 +5,8 @@
 #include <mutex>
 #include <utility>
 
+#include "hashbuffer/build_ldi.h"
+
 namespace strata {
 namespace {
 
@@ -32,9 +34,7 @@ Result<SolidVoxelizer> SolidVoxelizer::create(const LatticeMesh& mesh, const Vox
   result.mesh_ = &mesh;
   result.grid_ = &grid;
   result.options_ = options;
-  const AxisFrame frame(axis);
-  result.target_ = {axis, grid.dims[frame.u], grid.dims[frame.v],
-                    static_cast<std::uint32_t>(grid.dims[frame.w]) * kLatticeSteps};
+  result.target_ = raster_target(grid, axis);
   auto bins = bin_triangles(mesh, result.target_, execution);
   if (!bins) return tl::unexpected(bins.error());
   result.bins_ = std::move(*bins);

@@ -1,0 +1,137 @@
+#include "hashbuffer/build_ldi.h"
+
+#include <algorithm>
+#include <atomic>
+#include <mutex>
+#include <new>
+#include <utility>
+#include <vector>
+
+namespace strata {
+namespace {
+
+/// The lists of one tile, packed: a length for each pixel, and the items in pixel order.
+struct PackedTile {
+  std::vector<std::uint32_t> lengths;
+  std::vector<DepthItem> items;
+};
+
+PackedTile pack(const TileLists<DepthItem>& lists) {
+  PackedTile tile;
+  tile.lengths.resize(kTilePixels);
+  tile.items.reserve(lists.fragments);
+  for (std::size_t pixel = 0; pixel < kTilePixels; ++pixel) {
+    const std::size_t before = tile.items.size();
+    if (lists.planes64 == nullptr) {
+      tile.items.insert(tile.items.end(), lists.keys + lists.offsets[pixel],
+                        lists.keys + lists.offsets[pixel + 1]);
+    } else if (const int row = static_cast<int>(pixel / kTileSide);
+               row >= lists.row_begin && row < lists.row_end) {
+      for (std::size_t age = 0; age < static_cast<std::size_t>(lists.ages); ++age) {
+        const std::uint64_t record = lists.planes64[age * kTilePixels + pixel];
+        if (record == 0) break;
+        tile.items.push_back(ItemRecord::key(record));
+      }
+    }
+    tile.lengths[pixel] = static_cast<std::uint32_t>(tile.items.size() - before);
+  }
+  return tile;
+}
+
+}  // namespace
+
+Result<LayeredDepthImage> build_ldi(const LatticeMesh& mesh, const RasterTarget& target,
+                                    const TileStoreOptions& options, const Execution& execution) {
+  const auto bins = bin_triangles(mesh, target, execution);
+  if (!bins) return tl::unexpected(bins.error());
+  const auto tiles_u = static_cast<std::size_t>(bins->tiles_u);
+  std::vector<PackedTile> tiles(tiles_u * static_cast<std::size_t>(bins->tiles_v));
+  std::vector<ItemTileBuilder> builders;
+  for (int i = 0; i < execution.thread_count(); ++i) builders.emplace_back(options);
+
+  std::mutex failure_mutex;
+  Result<void> status;
+  std::atomic<std::uint64_t> bytes{0};
+  std::atomic<std::size_t> finished{0};
+  const auto refuse = [&](Error error) {
+    const std::lock_guard lock(failure_mutex);
+    if (status) status = tl::unexpected(std::move(error));
+  };
+  try {
+    parallel_for(execution, tiles.size(), [&](std::size_t index, int worker) {
+      const auto tu = static_cast<int>(index % tiles_u), tv = static_cast<int>(index / tiles_u);
+      const auto triangles = bins->tile(tu, tv);
+      ++finished;
+      if (triangles.empty()) return;
+      auto lists =
+          builders[static_cast<std::size_t>(worker)].build(mesh, target, triangles, tu, tv);
+      if (!lists) return refuse(lists.error());
+      // Packed once by tile and once as an image.
+      const std::uint64_t held = bytes += 2 * lists->fragments * sizeof(DepthItem);
+      if (execution.memory_limit > 0 && held > execution.memory_limit) {
+        return refuse(
+            {ErrorCode::kLimit,
+             fmt::format("the depth lists of {} x {} pixels need more than the memory limit "
+                         "of {} bytes; {} bytes were reached",
+                         target.width, target.height, execution.memory_limit, held)});
+      }
+      tiles[index] = pack(*lists);
+      if (execution.progress && worker == 0) {
+        execution.progress(static_cast<double>(finished) / static_cast<double>(tiles.size()));
+      }
+    });
+    if (!status) return tl::unexpected(status.error());
+    if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+
+    LayeredDepthImage image;
+    image.width = target.width;
+    image.height = target.height;
+    image.depth_limit = target.depth_limit;
+    image.offsets.reserve(
+        static_cast<std::size_t>(target.width) * static_cast<std::size_t>(target.height) + 1);
+    image.offsets.push_back(0);
+    std::uint64_t fragments = 0;
+    for (const PackedTile& tile : tiles) fragments += tile.items.size();
+    image.items.reserve(fragments);
+    std::vector<std::size_t> cursor(tiles.size(), 0);
+    for (int v = 0; v < target.height; ++v) {
+      for (int u = 0; u < target.width; u += kTileSide) {
+        const std::size_t index = static_cast<std::size_t>(v / kTileSide) * tiles_u +
+                                  static_cast<std::size_t>(u / kTileSide);
+        const PackedTile& tile = tiles[index];
+        const auto row = static_cast<std::size_t>(v % kTileSide) * kTileSide;
+        std::size_t length = 0;
+        for (std::size_t i = 0; i < static_cast<std::size_t>(std::min(kTileSide, target.width - u));
+             ++i) {
+          length += tile.lengths.empty() ? 0 : tile.lengths[row + i];
+          image.offsets.push_back(image.items.size() + length);
+        }
+        const auto first = tile.items.begin() + static_cast<std::ptrdiff_t>(cursor[index]);
+        image.items.insert(image.items.end(), first, first + static_cast<std::ptrdiff_t>(length));
+        cursor[index] += length;
+      }
+    }
+    return image;
+  } catch (const std::bad_alloc&) {
+    return fail(ErrorCode::kLimit, "out of memory for the depth lists of {} x {} pixels",
+                target.width, target.height);
+  }
+}
+
+RasterTarget raster_target(const VoxelGrid& grid, Axis axis) {
+  const AxisFrame frame(axis);
+  return {axis, grid.dims[frame.u], grid.dims[frame.v],
+          static_cast<std::uint32_t>(grid.dims[frame.w]) * kLatticeSteps};
+}
+
+glm::dmat4 world_from_image(const VoxelGrid& grid, Axis axis) {
+  const AxisFrame frame(axis);
+  glm::dmat4 m(0.0);  // m[column][row]
+  m[0][frame.u] = grid.voxel_size[frame.u];
+  m[1][frame.v] = grid.voxel_size[frame.v];
+  m[2][frame.w] = grid.voxel_size[frame.w] / kLatticeSteps;
+  m[3] = glm::dvec4(grid.origin, 1.0);
+  return m;
+}
+
+}  // namespace strata
