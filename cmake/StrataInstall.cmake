@@ -1,0 +1,92 @@
+# The umbrella target strata::strata, the target `product` (all that is installed), and install(): headers, libraries,
+# tools, the CMake package and strata.pc. It takes what strata_add_library and strata_add_tool have listed.
+get_property(strata_libraries GLOBAL PROPERTY STRATA_LIBRARIES)
+get_property(strata_tools GLOBAL PROPERTY STRATA_TOOLS)
+if(TARGET strata AND NOT "strata" IN_LIST strata_tools)
+  list(APPEND strata_tools strata)
+endif()
+
+add_library(strata_all INTERFACE)
+add_library(strata::strata ALIAS strata_all)
+set_target_properties(strata_all PROPERTIES EXPORT_NAME strata)
+target_link_libraries(strata_all INTERFACE ${strata_libraries})
+add_custom_target(product)
+add_dependencies(product ${strata_libraries} ${strata_tools})
+
+if(NOT STRATA_INSTALL)
+  return()
+endif()
+include(GNUInstallDirs)
+include(CMakePackageConfigHelpers)
+set(strata_package_dir "${CMAKE_INSTALL_LIBDIR}/cmake/strata")
+set(strata_include_dir "${CMAKE_INSTALL_INCLUDEDIR}/strata")
+
+install(TARGETS strata_all ${strata_libraries} EXPORT strata)
+if(strata_tools)
+  install(TARGETS ${strata_tools})
+endif()
+install(EXPORT strata NAMESPACE strata:: FILE strataTargets.cmake DESTINATION "${strata_package_dir}")
+
+# Headers keep their folder, and only those of libraries that are built: a header without its library, or without the
+# package it includes, is a trap.
+set(strata_folders "")
+foreach(library IN LISTS strata_libraries)
+  get_target_property(folder ${library} SOURCE_DIR)
+  cmake_path(RELATIVE_PATH folder BASE_DIRECTORY "${PROJECT_SOURCE_DIR}")
+  list(APPEND strata_folders "${folder}")
+endforeach()
+list(REMOVE_DUPLICATES strata_folders)
+foreach(folder IN LISTS strata_folders)
+  file(GLOB headers CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/${folder}/*.h")
+  if(NOT STRATA_HAVE_OPENMESH)
+    list(FILTER headers EXCLUDE REGEX "/openmesh_bridge\\.h$")
+  endif()
+  install(FILES ${headers} DESTINATION "${strata_include_dir}/${folder}")
+endforeach()
+
+# --- the CMake package: whoever links the static libraries needs what they were built with -------------------------------
+set(strata_find_dependencies "")
+set(strata_pc_requires "fmt libhwy libpng zlib")
+set(strata_pc_libraries "-pthread")
+if(STRATA_USE_TBB)
+  string(APPEND strata_find_dependencies "find_dependency(TBB)\n")
+  string(APPEND strata_pc_requires " tbb")
+endif()
+if(STRATA_HAVE_OPENVDB)
+  string(APPEND strata_find_dependencies "include(\"\${CMAKE_CURRENT_LIST_DIR}/StrataFindOpenVDB.cmake\")
+if(NOT STRATA_OPENVDB_FOUND)
+  set(strata_FOUND FALSE)
+  set(strata_NOT_FOUND_MESSAGE \"strata was built with OpenVDB, which is not here (Debian: libopenvdb-dev)\")
+  return()
+endif()\n")
+  install(FILES "${PROJECT_SOURCE_DIR}/cmake/StrataFindOpenVDB.cmake" DESTINATION "${strata_package_dir}")
+  string(APPEND strata_pc_requires " Imath")
+  string(APPEND strata_pc_libraries " -lopenvdb")
+endif()
+if(STRATA_HAVE_OPENEXR)
+  string(APPEND strata_find_dependencies "find_dependency(OpenEXR CONFIG)\n")
+  string(APPEND strata_pc_requires " OpenEXR")
+endif()
+if(STRATA_HAVE_OPENMESH)
+  string(APPEND strata_find_dependencies "find_dependency(OpenMesh CONFIG)\n")
+  string(APPEND strata_pc_libraries " -lOpenMeshTools -lOpenMeshCore")  # Debian has no openmesh.pc on the default path
+endif()
+configure_package_config_file("${PROJECT_SOURCE_DIR}/cmake/strataConfig.cmake.in" "${PROJECT_BINARY_DIR}/strataConfig.cmake"
+  INSTALL_DESTINATION "${strata_package_dir}" NO_SET_AND_CHECK_MACRO)
+write_basic_package_version_file("${PROJECT_BINARY_DIR}/strataConfigVersion.cmake" COMPATIBILITY SameMinorVersion)
+install(FILES "${PROJECT_BINARY_DIR}/strataConfig.cmake" "${PROJECT_BINARY_DIR}/strataConfigVersion.cmake"
+  DESTINATION "${strata_package_dir}")
+
+# --- pkg-config ---------------------------------------------------------------------------------------------------------
+# Libraries are listed in the order they were made, foundations first; a linker wants them last.
+set(strata_pc_archives "")
+foreach(library IN LISTS strata_libraries)
+  string(PREPEND strata_pc_archives "-l${library} ")
+endforeach()
+# The prefix is found from where strata.pc lies, so that an installed tree may be moved.
+cmake_path(SET strata_pc_dir "/${CMAKE_INSTALL_LIBDIR}/pkgconfig")
+cmake_path(RELATIVE_PATH strata_pc_dir BASE_DIRECTORY "/" OUTPUT_VARIABLE strata_pc_up)
+string(REGEX REPLACE "[^/]+" ".." strata_pc_up "${strata_pc_up}")
+configure_file("${PROJECT_SOURCE_DIR}/cmake/strata.pc.in" "${PROJECT_BINARY_DIR}/strata.pc" @ONLY)
+install(FILES "${PROJECT_BINARY_DIR}/strata.pc" DESTINATION "${CMAKE_INSTALL_LIBDIR}/pkgconfig")
+install(FILES "${PROJECT_SOURCE_DIR}/LICENSE" DESTINATION "${CMAKE_INSTALL_DOCDIR}")

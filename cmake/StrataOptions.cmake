@@ -2,6 +2,7 @@
 option(STRATA_BUILD_TESTS "Build the tests" ${PROJECT_IS_TOP_LEVEL})
 option(STRATA_BUILD_BENCH "Build the benchmarks" OFF)
 option(STRATA_BUILD_FUZZ "Build the fuzz targets (clang only)" OFF)
+option(STRATA_INSTALL "Make install() rules" ${PROJECT_IS_TOP_LEVEL})
 option(STRATA_WARNINGS_AS_ERRORS "Treat compiler warnings as errors" OFF)
 option(STRATA_USE_TBB "Run parallel work on oneTBB; off: std::thread (for ThreadSanitizer)" ON)
 option(STRATA_WITH_OPENVDB "Write .vdb files" ON)
@@ -16,9 +17,14 @@ set(CMAKE_CXX_STANDARD 20)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)
 set(CMAKE_CXX_EXTENSIONS OFF)
 set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)  # for clang-tidy and clangd
 set(CMAKE_RUNTIME_OUTPUT_DIRECTORY "${CMAKE_BINARY_DIR}/bin")
 
 find_program(STRATA_CCACHE ccache)
+mark_as_advanced(STRATA_CCACHE)
 if(STRATA_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
   set(CMAKE_CXX_COMPILER_LAUNCHER "${STRATA_CCACHE}")
 endif()
+
+# Compiling CGAL or OpenVDB takes up to 2 GB: targets with JOB_POOL_COMPILE heavy do it one at a time.
+set_property(GLOBAL APPEND PROPERTY JOB_POOLS heavy=1)

@@ -1,7 +1,10 @@
-# strata_add_library(NAME SOURCES... [PUBLIC targets...] [PRIVATE targets...])
-#   makes strata_NAME, alias strata::NAME, headers found as "NAME/file.h" from the project's root.
+# The shapes of Strata's targets. All that a folder's CMakeLists.txt needs is here.
+
+# Warnings, sanitizers and the arithmetic that results may depend on.
 function(strata_set_flags target)
-  target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wshadow -Wconversion -ffp-contract=off)
+  # Depth must not depend on the compiler: no fused multiply-add that the source does not ask for.
+  target_compile_options(${target} PRIVATE
+    -Wall -Wextra -Wpedantic -Wshadow -Wconversion -ffp-contract=off)
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
     # GCC bug 105651: `"text" + std::to_string(i)` is reported as an overlapping copy.
     target_compile_options(${target} PRIVATE -Wno-restrict)
@@ -10,11 +13,18 @@ function(strata_set_flags target)
     target_compile_options(${target} PRIVATE -Werror)
   endif()
   if(STRATA_SANITIZE)
-    target_compile_options(${target} PRIVATE -fsanitize=${STRATA_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+    target_compile_options(${target} PRIVATE
+      -fsanitize=${STRATA_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
     target_link_options(${target} PRIVATE -fsanitize=${STRATA_SANITIZE})
+  endif()
+  if(STRATA_BUILD_FUZZ)
+    target_compile_options(${target} PRIVATE -fsanitize=fuzzer-no-link)
   endif()
 endfunction()
 
+# strata_add_library(NAME SOURCES... [PUBLIC targets...] [PRIVATE targets...])
+#   makes strata_NAME, alias strata::NAME, headers found as "NAME/file.h" from the project's root. It is installed, and
+#   part of the umbrella strata::strata.
 function(strata_add_library name)
   cmake_parse_arguments(arg "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
   add_library(strata_${name} STATIC ${arg_SOURCES})
@@ -28,6 +38,16 @@ function(strata_add_library name)
   set_property(GLOBAL APPEND PROPERTY STRATA_LIBRARIES strata_${name})
 endfunction()
 
+# strata_add_tool(NAME SOURCES... [LIBRARIES targets...]): an executable for users, at bin/NAME, installed.
+function(strata_add_tool name)
+  cmake_parse_arguments(arg "" "" "SOURCES;LIBRARIES" ${ARGN})
+  add_executable(${name} ${arg_SOURCES})
+  target_link_libraries(${name} PRIVATE ${arg_LIBRARIES})
+  target_compile_definitions(${name} PRIVATE STRATA_VERSION="${PROJECT_VERSION}")
+  strata_set_flags(${name})
+  set_property(GLOBAL APPEND PROPERTY STRATA_TOOLS ${name})
+endfunction()
+
 # strata_add_test(NAME SOURCES... [LIBRARIES targets...]): a Google Test executable, one ctest entry a case.
 function(strata_add_test name)
   cmake_parse_arguments(arg "" "" "SOURCES;LIBRARIES" ${ARGN})
@@ -37,4 +57,22 @@ function(strata_add_test name)
   strata_set_flags(${name})
   include(GoogleTest)
   gtest_discover_tests(${name} DISCOVERY_TIMEOUT 120 PROPERTIES TIMEOUT 600)
+endfunction()
+
+# strata_add_fuzz(NAME SOURCES... CORPUS folder [LIBRARIES targets...])
+#   SOURCES define LLVMFuzzerTestOneInput. With STRATA_BUILD_FUZZ this is a libFuzzer executable, NAME; in a build with
+#   tests it is one that replays the saved corpus, with a ctest entry of the same name.
+function(strata_add_fuzz name)
+  cmake_parse_arguments(arg "" "CORPUS" "SOURCES;LIBRARIES" ${ARGN})
+  if(STRATA_BUILD_FUZZ)
+    add_executable(${name} ${arg_SOURCES})
+    target_link_options(${name} PRIVATE -fsanitize=fuzzer)
+    set_property(GLOBAL APPEND PROPERTY STRATA_FUZZ_TARGETS "${name} ${arg_CORPUS}")
+  else()
+    add_executable(${name} ${arg_SOURCES} "${PROJECT_SOURCE_DIR}/tests/fuzz/replay_main.cpp")
+    add_test(NAME fuzz.${name} COMMAND ${name} "${arg_CORPUS}")
+    set_tests_properties(fuzz.${name} PROPERTIES TIMEOUT 600)
+  endif()
+  target_link_libraries(${name} PRIVATE ${arg_LIBRARIES})
+  strata_set_flags(${name})
 endfunction()
