@@ -28,7 +28,7 @@ namespace strata {
 /// kept, so that lists equal those of a HashBuffer with the same policy; `Concurrency` is
 /// Concurrent (the generator may insert from any thread) or Exclusive.
 ///
-/// Memory: 8 bytes a fragment and 8 a pixel, plus 8.
+/// Memory: 8 bytes a fragment (of the largest frame so far) and 8 a pixel, plus 8.
 template <RecordPolicy RecordType, class Concurrency>
 class CountScanStore {
  public:
@@ -54,8 +54,8 @@ class CountScanStore {
   [[nodiscard]] int width() const { return width_; }
   [[nodiscard]] int height() const { return height_; }
   [[nodiscard]] std::uint64_t stored() const { return items_.size(); }
-  /// Bytes held: 8 a fragment, 8 a pixel, and 8.
-  [[nodiscard]] std::uint64_t memory_bytes() const { return bytes_of(items_.size()); }
+  /// Bytes held: 8 a fragment of the largest frame so far, 8 a pixel, and 8.
+  [[nodiscard]] std::uint64_t memory_bytes() const { return bytes_of(items_.capacity()); }
   [[nodiscard]] std::uint64_t bytes_of(std::uint64_t fragments) const {
     return fragments * sizeof(DepthItem) + (pixels() + 1) * sizeof(std::uint64_t);
   }
@@ -140,6 +140,10 @@ class CountScanStore {
                   fragments - room, fragments, store.bytes_of(fragments), limit);
     }
     try {
+      // The old array goes before the new one comes; one that is large enough is used again.
+      if (store.items_.capacity() < fragments || (limit > 0 && store.memory_bytes() > limit)) {
+        store.items_ = {};
+      }
       store.items_.resize(fragments);
     } catch (const std::exception&) {
       store.clear();

@@ -321,10 +321,10 @@ class HashBuffer {
     cells = std::max(cells, pixels_);
     const std::uint64_t old_cells = table_.size();
     try {
-      max_ages_.resize(block_count());
       if (cells != old_cells) {
         table_ = {};
         table_.resize(cells);
+        max_ages_.resize(block_count());
         clear_counters();
       } else {
         clear();

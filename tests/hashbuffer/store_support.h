@@ -12,6 +12,18 @@
 
 namespace strata::test {
 
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+inline constexpr bool kSanitized = true;
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
+inline constexpr bool kSanitized = true;
+#else
+inline constexpr bool kSanitized = false;
+#endif
+#else
+inline constexpr bool kSanitized = false;
+#endif
+
 struct Fragment {
   int x = 0, y = 0;
   std::uint32_t depth = 0;
@@ -114,5 +126,11 @@ class Submission {
   const std::vector<Fragment>* fragments_;
   std::size_t threads_;
 };
+
+template <class Sink>
+void submit(Sink& sink, const std::vector<Fragment>& fragments, int threads = 1) {
+  const Submission submission(fragments, threads);
+  submission(sink);
+}
 
 }  // namespace strata::test
