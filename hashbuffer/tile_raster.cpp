@@ -55,12 +55,17 @@ class TableSink {
   using Bits = typename Record::Bits;
   using Lanes = LanesOf<Record>;
 
-  TableSink(TileTable<Record>& table, const PixelRect& clip) : table_(table), clip_(clip) {}
+  TableSink(TileTable<Record>& table, const PixelRect& clip)
+      : table_(&table),
+        cells_(table.cells.data()),
+        planes_(std::min(table.planes, Record::kMaxAge)),
+        u0_(clip.u0),
+        v0_(clip.v0) {}
   HWY_INLINE void begin(bool exit, std::uint32_t triangle, const PixelRect& box) {
     exit_ = exit;
     triangle_ = triangle;
     lanes_.begin(exit, triangle);
-    result.add_rows(box.v0 - clip_.v0, box.v1 - clip_.v0);
+    result_.add_rows(box.v0 - v0_, box.v1 - v0_);
   }
   HWY_INLINE void put(int u, int v, MaskU32 covered, VecU32 depth) {
     using D = typename Lanes::D;
@@ -69,59 +74,65 @@ class TableSink {
     const auto step = hn::Set(d, TileTable<Record>::kAgeStep);
     const auto value = hn::AndNot(lanes_.keys(depth), hn::Set(d, Record::kValueMask));
     auto carry = hn::IfThenElseZero(mask, hn::Or(value, step));
-    result.fragments += hn::CountTrue(d, mask);
+    result_.fragments += hn::CountTrue(d, mask);
 
-    const std::size_t pixel =
-        static_cast<std::size_t>(v - clip_.v0) * kTileSide + static_cast<std::size_t>(u - clip_.u0);
-    Bits* HWY_RESTRICT cell = table_.cells.data() + pixel;
-    const int last = std::min(table_.planes, Record::kMaxAge);
-    for (int age = 1; age <= last; ++age, cell += kTilePixels) {
+    const std::size_t pixel = pixel_at(u, v);
+    Bits* HWY_RESTRICT cell = cells_ + pixel;
+    for (int age = 1; age <= planes_; ++age, cell += kTilePixels) {
       // Only records of the same pixel and age can be smaller here, so no lane evicts a stranger.
       const auto old = hn::LoadU(d, cell);
       hn::StoreU(hn::Max(old, carry), d, cell);
       const auto less = hn::Min(old, carry);
       const auto left = hn::Ne(less, hn::Zero(d));
       if (hn::AllFalse(d, left)) {
-        table_.oldest = std::max(table_.oldest, age);
+        oldest_ = std::max(oldest_, age);
         return;
       }
       carry = hn::Add(less, hn::IfThenElseZero(left, step));
     }
-    overflow(pixel, carry);
+    oldest_ = planes_;
+    overflow(*table_, pixel, carry);
   }
   void put_one(int u, int v, std::uint32_t depth) {
-    ++result.fragments;
+    ++result_.fragments;
     const Bits key = Lanes::key(depth, exit_, triangle_);
-    table_.insert(
-        static_cast<std::size_t>(v - clip_.v0) * kTileSide + static_cast<std::size_t>(u - clip_.u0),
-        (~key & Record::kValueMask) | TileTable<Record>::kAgeStep);
+    table_->insert(pixel_at(u, v), (~key & Record::kValueMask) | TileTable<Record>::kAgeStep);
+  }
+  TileRasterResult finish() {
+    table_->oldest = std::max(table_->oldest, oldest_);
+    return result_;
   }
 
-  TileRasterResult result;
-
  private:
-  /// The planes are exhausted: each lane goes on by itself.
-  HWY_NOINLINE void overflow(std::size_t pixel, typename Lanes::V carry) {
+  [[nodiscard]] HWY_INLINE std::size_t pixel_at(int u, int v) const {
+    return static_cast<std::size_t>((v - v0_) * kTileSide + (u - u0_));
+  }
+  /// The planes are exhausted: each lane goes on by itself. Static, so that the sink's members may
+  /// stay in registers.
+  static HWY_NOINLINE void overflow(TileTable<Record>& table, std::size_t pixel,
+                                    typename Lanes::V carry) {
     const typename Lanes::D d;
     alignas(64) Bits records[HWY_MAX_BYTES / sizeof(Bits)];
     hn::Store(carry, d, records);
-    if (table_.planes > 0) table_.oldest = std::max(table_.oldest, table_.planes);
     for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
       if (records[i] == 0) continue;
       // After plane 255 the age field has wrapped into nothing: such a record is lost and counted.
-      if (table_.planes >= Record::kMaxAge) {
-        ++table_.failures;
+      if (table.planes >= Record::kMaxAge) {
+        ++table.failures;
       } else {
-        table_.insert(pixel + i, records[i]);
+        table.insert(pixel + i, records[i]);
       }
     }
   }
 
-  TileTable<Record>& table_;
-  PixelRect clip_;
+  TileTable<Record>* table_;
+  Bits* cells_;
+  int planes_, oldest_ = 0;
+  int u0_, v0_;
   Lanes lanes_;
   std::uint32_t triangle_ = 0;
   bool exit_ = false;
+  TileRasterResult result_;
 };
 
 /// Appends covered pixels to the tile's log.
@@ -130,35 +141,39 @@ class LogSink {
  public:
   using Lanes = LanesOf<Record>;
 
-  LogSink(TileLog<Record>& log, const PixelRect& clip) : log_(log), clip_(clip) {}
+  LogSink(TileLog<Record>& log, const PixelRect& clip) : log_(&log), clip_(clip) {}
   HWY_INLINE void begin(bool exit, std::uint32_t triangle, const PixelRect& box) {
     exit_ = exit;
     triangle_ = triangle;
     lanes_.begin(exit, triangle);
-    result.add_rows(box.v0 - clip_.v0, box.v1 - clip_.v0);
-    log_.reserve(static_cast<std::size_t>(box.u1 - box.u0) *
-                 static_cast<std::size_t>(box.v1 - box.v0));
+    result_.add_rows(box.v0 - clip_.v0, box.v1 - clip_.v0);
+    log_->reserve(static_cast<std::size_t>(box.u1 - box.u0) *
+                  static_cast<std::size_t>(box.v1 - box.v0));
   }
   HWY_INLINE void put(int u, int v, MaskU32 covered, VecU32 depth) {
     const LaneU32 d32;
     const int pixel = (v - clip_.v0) * kTileSide + (u - clip_.u0);
     const auto pixels = hn::Iota(d32, static_cast<std::uint32_t>(pixel));
-    hn::CompressStore(pixels, covered, d32, log_.pixels.data() + log_.count);
+    hn::CompressStore(pixels, covered, d32, log_->pixels.data() + log_->count);
     const typename Lanes::D d;
-    log_.count +=
-        hn::CompressStore(lanes_.keys(depth), Lanes::mask(covered), d,
-                          reinterpret_cast<typename Record::Bits*>(log_.keys.data()) + log_.count);
+    log_->count += hn::CompressStore(
+        lanes_.keys(depth), Lanes::mask(covered), d,
+        reinterpret_cast<typename Record::Bits*>(log_->keys.data()) + log_->count);
   }
   void put_one(int u, int v, std::uint32_t depth) {
-    log_.pixels[log_.count] =
+    log_->pixels[log_->count] =
         static_cast<std::uint32_t>((v - clip_.v0) * kTileSide + (u - clip_.u0));
-    log_.keys[log_.count++] = typename Record::Key(Lanes::key(depth, exit_, triangle_));
+    log_->keys[log_->count++] = typename Record::Key(Lanes::key(depth, exit_, triangle_));
   }
 
-  TileRasterResult result;
+  TileRasterResult finish() {
+    result_.fragments = log_->count;
+    return result_;
+  }
 
  private:
-  TileLog<Record>& log_;
+  TileLog<Record>* log_;
+  TileRasterResult result_;
   PixelRect clip_;
   Lanes lanes_;
   std::uint32_t triangle_ = 0;
@@ -169,15 +184,14 @@ template <class Record>
 TileRasterResult raster_table(const TileInput& input, TileTable<Record>& table) {
   TableSink<Record> sink(table, input.clip);
   rasterize_triangles(input.mesh, input.target, input.triangles, input.clip, sink);
-  return sink.result;
+  return sink.finish();
 }
 
 template <class Record>
 TileRasterResult raster_log(const TileInput& input, TileLog<Record>& log) {
   LogSink<Record> sink(log, input.clip);
   rasterize_triangles(input.mesh, input.target, input.triangles, input.clip, sink);
-  sink.result.fragments = log.count;
-  return sink.result;
+  return sink.finish();
 }
 
 TileRasterResult raster_key_table(const TileInput& input, TileTable<KeyRecord>& table) {

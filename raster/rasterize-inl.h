@@ -325,11 +325,14 @@ HWY_INLINE void rasterize_triangles(const LatticeMesh& mesh, const RasterTarget&
         continue;
       }
       sink.begin(t.exit, part[lane], box);
-      if (make_split_equations(t, box, equations)) {
-        rasterize_box<true>(equations, box, target.depth_limit, sink);
+      TileEquations large;
+      if (make_split_equations(t, box, large)) {
+        rasterize_box<true>(large, box, target.depth_limit, sink);
       } else {
+        Sink copy = sink;  // its address is taken here; the sink itself may stay in registers
         rasterize_exact(t, box, target.depth_limit,
-                        [&](int u, int v, std::uint32_t depth) { sink.put_one(u, v, depth); });
+                        [&copy](int u, int v, std::uint32_t depth) { copy.put_one(u, v, depth); });
+        sink = copy;
       }
     }
   }

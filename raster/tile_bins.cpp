@@ -2,21 +2,32 @@
 
 #include <algorithm>
 #include <limits>
+#include <memory>
+#include <utility>
 
 namespace strata {
 namespace {
 
-/// The tiles that a triangle's box of pixel centres meets, as a half-open box of tiles.
-PixelRect tile_rect(const LatticeMesh& mesh, const glm::uvec3& triangle, const AxisFrame& frame,
-                    const RasterTarget& target) {
+/// The tiles that a triangle's box of pixel centres meets, as a half-open box of tiles; u0 = u1 = 0
+/// where it meets none.
+struct TileRect {
+  std::uint16_t u0, v0, u1, v1;
+};
+
+TileRect tile_rect(const LatticeMesh& mesh, const glm::uvec3& triangle, const AxisFrame& frame,
+                   const RasterTarget& target) {
   const glm::ivec3 &a = mesh.vertices[triangle.x], &b = mesh.vertices[triangle.y],
                    &c = mesh.vertices[triangle.z];
-  const int u0 = std::max(0, first_pixel(std::min({a[frame.u], b[frame.u], c[frame.u]})));
-  const int u1 = std::min(target.width, end_pixel(std::max({a[frame.u], b[frame.u], c[frame.u]})));
-  const int v0 = std::max(0, first_pixel(std::min({a[frame.v], b[frame.v], c[frame.v]})));
-  const int v1 = std::min(target.height, end_pixel(std::max({a[frame.v], b[frame.v], c[frame.v]})));
+  const auto low = [&](int axis) { return std::min(std::min(a[axis], b[axis]), c[axis]); };
+  const auto high = [&](int axis) { return std::max(std::max(a[axis], b[axis]), c[axis]); };
+  const int u0 = std::max(0, first_pixel(low(frame.u)));
+  const int u1 = std::min(target.width, end_pixel(high(frame.u)));
+  const int v0 = std::max(0, first_pixel(low(frame.v)));
+  const int v1 = std::min(target.height, end_pixel(high(frame.v)));
   if (u0 >= u1 || v0 >= v1) return {};
-  return {u0 / kTileSide, v0 / kTileSide, (u1 - 1) / kTileSide + 1, (v1 - 1) / kTileSide + 1};
+  const auto tile = [](int pixel) { return static_cast<std::uint16_t>(pixel / kTileSide); };
+  return {tile(u0), tile(v0), static_cast<std::uint16_t>(tile(u1 - 1) + 1),
+          static_cast<std::uint16_t>(tile(v1 - 1) + 1)};
 }
 
 }  // namespace
@@ -32,24 +43,24 @@ Result<TileBins> bin_triangles(const LatticeMesh& mesh, const RasterTarget& targ
   const std::size_t count = mesh.triangles.size();
 
   // Counting sort: each part of the triangles counts by tile, the counts become cursors, each part
-  // writes at its own cursors. A second look at the box is cheaper than remembering it.
+  // writes at its own cursors.
   const std::size_t parts = std::max<std::size_t>(
       1, std::min<std::size_t>(static_cast<std::size_t>(execution.thread_count()), count / 4096));
   std::vector<std::uint64_t> cursors(parts * tiles, 0);
-  const auto for_part = [&](std::size_t part, auto&& body) {
-    for (std::size_t i = count * part / parts; i < count * (part + 1) / parts; ++i) {
-      const PixelRect rect = tile_rect(mesh, mesh.triangles[i], frame, target);
-      for (int tv = rect.v0; tv < rect.v1; ++tv) {
-        for (int tu = rect.u0; tu < rect.u1; ++tu) {
-          body(i, static_cast<std::size_t>(tv) * static_cast<std::size_t>(bins.tiles_u) +
-                      static_cast<std::size_t>(tu));
-        }
+  const auto rects = std::make_unique_for_overwrite<TileRect[]>(count);
+  const auto for_each_tile = [&](const TileRect& rect, auto&& body) {
+    for (std::size_t tv = rect.v0; tv < rect.v1; ++tv) {
+      for (std::size_t tu = rect.u0; tu < rect.u1; ++tu) {
+        body(tv * static_cast<std::size_t>(bins.tiles_u) + tu);
       }
     }
   };
   parallel_for(execution, parts, [&](std::size_t part, int) {
     std::uint64_t* counts = cursors.data() + part * tiles;
-    for_part(part, [counts](std::size_t, std::size_t tile) { ++counts[tile]; });
+    for (std::size_t i = count * part / parts; i < count * (part + 1) / parts; ++i) {
+      rects[i] = tile_rect(mesh, mesh.triangles[i], frame, target);
+      for_each_tile(rects[i], [counts](std::size_t tile) { ++counts[tile]; });
+    }
   });
   bins.offsets.resize(tiles + 1);
   std::uint64_t sum = 0;
@@ -70,9 +81,11 @@ Result<TileBins> bin_triangles(const LatticeMesh& mesh, const RasterTarget& targ
   bins.triangles.resize(sum);
   parallel_for(execution, parts, [&](std::size_t part, int) {
     std::uint64_t* cursor = cursors.data() + part * tiles;
-    for_part(part, [&](std::size_t i, std::size_t tile) {
-      bins.triangles[cursor[tile]++] = static_cast<std::uint32_t>(i);
-    });
+    for (std::size_t i = count * part / parts; i < count * (part + 1) / parts; ++i) {
+      for_each_tile(rects[i], [&](std::size_t tile) {
+        bins.triangles[cursor[tile]++] = static_cast<std::uint32_t>(i);
+      });
+    }
   });
   if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
   return bins;
