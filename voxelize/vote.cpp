@@ -9,11 +9,78 @@ namespace {
 
 using Words = std::array<std::uint64_t, 64>;
 
-/// One axis' solid with its unbalanced columns.
+/// One axis' solid with its unbalanced columns, and how much of each block of 64^3 voxels it fills.
 struct Ballot {
   VoxelIntervals intervals;
   ColumnMarks unbalanced;
+  std::vector<std::uint32_t> filled;  ///< voxels, by block in x, y, z order, x fastest
+
+  void count_filled(const Execution& execution);
 };
+
+/// Blocks of 64 voxels along each axis of a grid, the last ones cut.
+struct BlockGrid {
+  explicit BlockGrid(const VoxelGrid& grid) : voxels(grid.dims), blocks((grid.dims + 63) / 64) {}
+  [[nodiscard]] std::size_t index(const glm::ivec3& block) const {
+    return (static_cast<std::size_t>(block.z) * static_cast<std::size_t>(blocks.y) +
+            static_cast<std::size_t>(block.y)) *
+               static_cast<std::size_t>(blocks.x) +
+           static_cast<std::size_t>(block.x);
+  }
+  [[nodiscard]] std::size_t count() const {
+    return static_cast<std::size_t>(blocks.x) * static_cast<std::size_t>(blocks.y) *
+           static_cast<std::size_t>(blocks.z);
+  }
+  /// Voxels of a block that lie in the grid.
+  [[nodiscard]] std::uint32_t volume(const glm::ivec3& block) const {
+    std::uint32_t product = 1;
+    for (int axis = 0; axis < 3; ++axis) {
+      product *= static_cast<std::uint32_t>(std::min(64, voxels[axis] - 64 * block[axis]));
+    }
+    return product;
+  }
+  glm::ivec3 voxels, blocks;
+};
+
+void Ballot::count_filled(const Execution& execution) {
+  const BlockGrid grid(intervals.grid());
+  const AxisFrame frame(intervals.axis());
+  filled.assign(grid.count(), 0);
+  const auto depth = static_cast<std::size_t>(grid.blocks[frame.w]);
+  const auto tiles = static_cast<std::size_t>(intervals.tiles_u() * intervals.tiles_v());
+  parallel_for(execution, tiles, [&](std::size_t tile, int) {
+    glm::ivec3 block{0};
+    block[frame.u] = static_cast<int>(tile) % intervals.tiles_u();
+    block[frame.v] = static_cast<int>(tile) / intervals.tiles_u();
+    if (intervals.tile_empty(block[frame.u], block[frame.v])) return;
+    // Ends of intervals count at once; whole blocks between them by a running number of columns.
+    std::vector<std::uint32_t> part(depth, 0);
+    std::vector<std::int32_t> whole(depth + 1, 0);
+    const int u0 = block[frame.u] * 64, v0 = block[frame.v] * 64;
+    for (int v = v0; v < std::min(v0 + 64, grid.voxels[frame.v]); ++v) {
+      for (int u = u0; u < std::min(u0 + 64, grid.voxels[frame.u]); ++u) {
+        for (const Interval& interval : intervals.column(u, v)) {
+          const auto first = static_cast<std::size_t>(interval.first / 64);
+          const auto last = static_cast<std::size_t>(interval.last / 64);
+          if (first == last) {
+            part[first] += static_cast<std::uint32_t>(interval.length());
+            continue;
+          }
+          part[first] += static_cast<std::uint32_t>(64 - interval.first % 64);
+          part[last] += static_cast<std::uint32_t>(interval.last % 64 + 1);
+          ++whole[first + 1];
+          --whole[last];
+        }
+      }
+    }
+    std::int32_t columns = 0;
+    for (std::size_t k = 0; k < depth; ++k) {
+      columns += whole[k];
+      block[frame.w] = static_cast<int>(k);
+      filled[grid.index(block)] = part[k] + static_cast<std::uint32_t>(columns) * 64;
+    }
+  });
+}
 
 /// Voxels [low, low + 64) of a column as bits.
 std::uint64_t column_bits(std::span<const Interval> column, int low) {
@@ -103,7 +170,8 @@ class Booth {
         }
       }
       transpose(bits);
-      transpose(good);
+      const bool all_good = std::all_of(good.begin(), good.end(), [](auto g) { return ~g == 0; });
+      if (!all_good) transpose(good);
       for (std::size_t j = 0; j < 64; ++j) {
         const std::size_t v = along_u ? static_cast<std::size_t>(i) : j;
         const std::size_t u = along_u ? j : static_cast<std::size_t>(i);
@@ -133,16 +201,18 @@ class RunGatherer {
           const int begin = __builtin_ctzll(bits);
           const std::uint64_t gaps = ~(bits >> begin);
           const int length = gaps == 0 ? 64 : __builtin_ctzll(gaps);
-          const auto first = static_cast<std::uint16_t>(w0 + begin);
-          const auto last = static_cast<std::uint16_t>(w0 + begin + length - 1);
-          if (!column.empty() && column.back().end() == first) {
-            column.back().last = last;
-          } else {
-            column.push_back({first, last});
-          }
+          append(column, w0 + begin, length);
           if (begin + length >= 64) break;
           bits &= ~std::uint64_t{0} << (begin + length);
         }
+      }
+    }
+  }
+  /// Voxels [w0, w0 + length) of the first `width` x `height` columns of the tile.
+  void add_full(int w0, int length, int width, int height) {
+    for (int v = 0; v < std::min(64, height); ++v) {
+      for (int u = 0; u < std::min(64, width); ++u) {
+        append(columns_[static_cast<std::size_t>(v * 64 + u)], w0, length);
       }
     }
   }
@@ -159,6 +229,14 @@ class RunGatherer {
   }
 
  private:
+  static void append(std::vector<Interval>& column, int begin, int length) {
+    const auto last = static_cast<std::uint16_t>(begin + length - 1);
+    if (!column.empty() && column.back().end() == begin) {
+      column.back().last = last;
+    } else {
+      column.push_back({static_cast<std::uint16_t>(begin), last});
+    }
+  }
   std::vector<std::vector<Interval>> columns_;
   std::vector<std::uint32_t> offsets_;
   std::vector<Interval> items_;
@@ -185,6 +263,7 @@ Result<void> vote_slabs(const LatticeMesh& mesh, const VoxelGrid& grid,
         voxelizer->slab(0, rows, quiet, axis == options.axis ? report : unused, &ballot.unbalanced);
     if (!slab) return tl::unexpected(slab.error());
     ballot.intervals = std::move(*slab);
+    ballot.count_filled(quiet);
     if (execution.progress) execution.progress(++axes_done / 6.0);
   }
 
@@ -205,6 +284,7 @@ Result<void> vote_slabs(const LatticeMesh& mesh, const VoxelGrid& grid,
   for (int i = 0; i < execution.thread_count(); ++i) {
     workers.push_back(std::make_unique<Worker>(grid, frame, ballots));
   }
+  const BlockGrid blocks(grid);
   const int rows = grid.dims[frame.v];
   for (int v_begin = 0; v_begin < rows; v_begin += slab_rows) {
     VoxelIntervals slab(grid, options.axis, v_begin, std::min(rows, v_begin + slab_rows));
@@ -213,7 +293,22 @@ Result<void> vote_slabs(const LatticeMesh& mesh, const VoxelGrid& grid,
                    Worker& worker = *workers[static_cast<std::size_t>(index)];
                    const int tu = static_cast<int>(tile) % slab.tiles_u();
                    const int tv = static_cast<int>(tile) / slab.tiles_u();
+                   glm::ivec3 block{0};
+                   block[frame.u] = tu;
+                   block[frame.v] = v_begin / 64 + tv;
                    for (int w = w_begin; w < w_end; w += 64) {
+                     block[frame.w] = w / 64;
+                     const std::size_t at = blocks.index(block);
+                     const std::uint32_t filled = ballots[0].filled[at];
+                     const bool unanimous =
+                         ballots[1].filled[at] == filled && ballots[2].filled[at] == filled;
+                     if (unanimous && filled == 0) continue;
+                     if (unanimous && filled == blocks.volume(block)) {
+                       worker.runs.add_full(w, std::min(64, grid.dims[frame.w] - w),
+                                            grid.dims[frame.u] - tu * 64,
+                                            grid.dims[frame.v] - block[frame.v] * 64);
+                       continue;
+                     }
                      worker.booth.count(tu * 64, v_begin + tv * 64, w);
                      worker.runs.add(worker.booth.result(), w);
                    }
