@@ -121,7 +121,7 @@ Result<MeshFile> read_mesh(const std::string& path, const MeshReadOptions& optio
   }
   if (known.reader == MeshReader::kOpenMesh) {
 #ifdef STRATA_HAVE_OPENMESH
-    return read_with_openmesh(path, known);
+    return read_with_openmesh(path, known, execution);
 #else
     return fail(ErrorCode::kUsage, "{}: this build has no OpenMesh", path);
 #endif

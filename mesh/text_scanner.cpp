@@ -32,7 +32,8 @@ const char* scanner::parse_double_slowly(const char* text, double& value) {
     value = magnitude > 0 ? std::numeric_limits<double>::infinity() : 0.0;
     if (negative) value = -value;
   }
-  if (*stop == '#') {  // 1.#INF, -1.#IND, 1.#QNAN of old Microsoft run-time libraries
+  if (*stop == '#' &&
+      stop[-1] == '.') {  // 1.#INF, -1.#IND, 1.#QNAN of old Microsoft run-time libraries
     value = std::numeric_limits<double>::quiet_NaN();
     return skip_token(stop);
   }

@@ -48,7 +48,8 @@ inline const char* parse_double(const char* text, double& value) {
   }
   // Clinger's fast path (How to Read Floating Point Numbers Accurately, PLDI 1990): mantissa and
   // power are exact doubles, so the one rounding of the product or quotient is the right one.
-  if (count == 0 || count > 19 || *p == '#') return scanner::parse_double_slowly(text, value);
+  if (count == 0 || count > 19 || (*p == '#' && p[-1] == '.'))
+    return scanner::parse_double_slowly(text, value);
   if ((*p | 0x20) == 'e') {
     const char* q = p + 1;
     const bool down = *q == '-';
