@@ -142,7 +142,7 @@ class CountScanStore {
     try {
       // The old array goes before the new one comes; one that is large enough is used again.
       if (store.items_.capacity() < fragments || (limit > 0 && store.memory_bytes() > limit)) {
-        store.items_ = {};
+        std::vector<DepthItem>().swap(store.items_);
       }
       store.items_.resize(fragments);
     } catch (const std::exception&) {

@@ -322,7 +322,7 @@ class HashBuffer {
     const std::uint64_t old_cells = table_.size();
     try {
       if (cells != old_cells) {
-        table_ = {};
+        std::vector<Word>().swap(table_);
         table_.resize(cells);
         max_ages_.resize(block_count());
         clear_counters();
@@ -455,11 +455,11 @@ class HashBuffer {
   void restore(std::uint64_t cells) noexcept {
     try {
       if (table_.size() != cells) {
-        table_ = {};
+        std::vector<Word>().swap(table_);
         table_.resize(cells);
       }
     } catch (...) {
-      table_ = {};
+      std::vector<Word>().swap(table_);
     }
     clear();
   }

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cstdlib>
 #include <new>
@@ -12,7 +13,8 @@
 
 namespace {
 std::atomic<std::int64_t> g_held{0};  // bytes asked for and not given back
-}
+std::atomic<std::int64_t> g_peak{0};  // the most that were held
+}  // namespace
 
 // The size is kept in front of each block.
 void* operator new(std::size_t size) {
@@ -20,6 +22,7 @@ void* operator new(std::size_t size) {
   if (block == nullptr) throw std::bad_alloc();
   *block = size;
   g_held += static_cast<std::int64_t>(size);
+  g_peak = std::max<std::int64_t>(g_peak, g_held);
   return block + 16 / sizeof(std::size_t);
 }
 void operator delete(void* pointer) noexcept {
@@ -66,6 +69,19 @@ TYPED_TEST(MemoryFormula, OfTheHashBufferEqualsItsAllocatedBytes) {
       EXPECT_NEAR(static_cast<double>(cells), static_cast<double>(fragments.size()) / buffer.load(),
                   1e-6 * static_cast<double>(cells));
     }
+  }
+}
+
+TYPED_TEST(MemoryFormula, HoldsWhenTheTableGrowsAndShrinksWithoutTwoTablesAtOnce) {
+  const std::int64_t before = g_held;
+  auto buffer = HashBuffer<TypeParam, Exclusive>::create(64, 64).value();
+  for (const std::uint64_t cells : {50000u, 100000u, 100001u, 60000u, 4096u}) {
+    g_peak = before;
+    ASSERT_TRUE(buffer.resize(cells));
+    EXPECT_EQ(static_cast<std::uint64_t>(g_held - before), buffer.bytes_of(cells));
+    // The new offsets are drawn while the old ones last; drawing takes a few of their size.
+    EXPECT_LT(static_cast<std::uint64_t>(g_peak - before),
+              buffer.bytes_of(cells) + 64 * TypeParam::kAgeMax);
   }
 }
 
