@@ -56,33 +56,33 @@ Lists<Key> concatenate(std::vector<std::vector<Key>>& pixels) {
 }
 
 /// Planar or compressed rows -> the list of each pixel of the tile.
-template <class Record>
-std::vector<typename Record::Key> read_list(const TileLists<typename Record::Key>& lists,
-                                            std::size_t pixel) {
-  using Bits = typename Record::Bits;
-  const int row = static_cast<int>(pixel / kTileSide);
-  const Bits* planes = nullptr;
-  if constexpr (sizeof(Bits) == 4) {
-    planes = lists.planes32;
-  } else {
-    planes = lists.planes64;
-  }
-  std::vector<typename Record::Key> list;
+template <class Key>
+std::vector<Key> read_list(const TileLists<Key>& lists, std::size_t pixel) {
+  constexpr int kValueBits = std::is_same_v<Key, DepthKey> ? 24 : 56;  // the age is above them
+  const auto* planes = [&] {
+    if constexpr (std::is_same_v<Key, DepthKey>) {
+      return lists.planes32;
+    } else {
+      return lists.planes64;
+    }
+  }();
+  std::vector<Key> list;
   if (planes == nullptr) {
     list.assign(lists.keys + lists.offsets[pixel], lists.keys + lists.offsets[pixel + 1]);
     return list;
   }
+  const int row = static_cast<int>(pixel / kTileSide);
   if (row < lists.row_begin || row >= lists.row_end) return list;
   bool ended = false;
   for (int age = 1; age <= lists.ages; ++age) {
-    const Bits record = planes[static_cast<std::size_t>(age - 1) * kTilePixels + pixel];
+    const auto record = planes[static_cast<std::size_t>(age - 1) * kTilePixels + pixel];
     if (record == 0) {
       ended = true;
       continue;
     }
     EXPECT_FALSE(ended) << "a gap in the planes of pixel " << pixel;
-    EXPECT_EQ(static_cast<int>(record >> Record::kAgeShift), age);
-    list.push_back(Record::key(record));
+    EXPECT_EQ(static_cast<int>(record >> kValueBits), age);
+    list.push_back(Key(~record & ((std::remove_const_t<decltype(record)>{1} << kValueBits) - 1)));
   }
   return list;
 }
@@ -135,15 +135,14 @@ Lists<Key> reference_lists(const LatticeMesh& mesh, const RasterTarget& target) 
   return concatenate(pixels);
 }
 
-template <class Record>
-Lists<typename Record::Key> built_lists(const LatticeMesh& mesh, const RasterTarget& target,
-                                        const TileStoreOptions& options) {
-  using Key = typename Record::Key;
+template <class Key>
+Lists<Key> built_lists(const LatticeMesh& mesh, const RasterTarget& target,
+                       const TileStoreOptions& options) {
   std::vector<std::vector<Key>> pixels(pixel_count(target));
   const auto bins = bin_triangles(mesh, target);
   EXPECT_TRUE(bins.has_value());
   if (!bins) return {};
-  TileBuilder<Record> builder(options);
+  BuilderOf<Key> builder(options);
   for (int tv = 0; tv < bins->tiles_v; ++tv) {
     for (int tu = 0; tu < bins->tiles_u; ++tu) {
       const auto lists = builder.build(mesh, target, bins->tile(tu, tv), tu, tv);
@@ -151,7 +150,7 @@ Lists<typename Record::Key> built_lists(const LatticeMesh& mesh, const RasterTar
       if (!lists) return {};
       std::uint64_t found = 0;
       for (std::size_t local = 0; local < kTilePixels; ++local) {
-        auto list = read_list<Record>(*lists, local);
+        auto list = read_list<Key>(*lists, local);
         found += list.size();
         const int u = tu * kTileSide + static_cast<int>(local % kTileSide);
         const int v = tv * kTileSide + static_cast<int>(local / kTileSide);
@@ -220,9 +219,9 @@ std::size_t negative_lists(const Lists<DepthItem>& lists) {
 
 template Lists<DepthItem> reference_lists<DepthItem>(const LatticeMesh&, const RasterTarget&);
 template Lists<DepthKey> reference_lists<DepthKey>(const LatticeMesh&, const RasterTarget&);
-template Lists<DepthKey> built_lists<KeyRecord>(const LatticeMesh&, const RasterTarget&,
-                                                const TileStoreOptions&);
-template Lists<DepthItem> built_lists<ItemRecord>(const LatticeMesh&, const RasterTarget&,
-                                                  const TileStoreOptions&);
+template Lists<DepthKey> built_lists<DepthKey>(const LatticeMesh&, const RasterTarget&,
+                                               const TileStoreOptions&);
+template Lists<DepthItem> built_lists<DepthItem>(const LatticeMesh&, const RasterTarget&,
+                                                 const TileStoreOptions&);
 
 }  // namespace strata::testkit

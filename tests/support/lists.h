@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
+#include <type_traits>
 #include <vector>
 
 #include "core/depth_list.h"
@@ -10,6 +12,11 @@
 #include "tests/support/voxel_set.h"
 
 namespace strata::testkit {
+
+/// The builder that makes lists of `Key`, DepthKey or DepthItem.
+template <class Key>
+using BuilderOf =
+    std::conditional_t<std::is_same_v<Key, DepthKey>, KeyTileBuilder, ItemTileBuilder>;
 
 /// The sorted lists of an image, row by row: offsets has width * height + 1 entries.
 template <class Key>
@@ -34,11 +41,10 @@ struct Lists {
 template <class Key>
 [[nodiscard]] Lists<Key> reference_lists(const LatticeMesh& mesh, const RasterTarget& target);
 
-/// Through bin_triangles() and a TileBuilder<Record>, tile by tile.
-template <class Record>
-[[nodiscard]] Lists<typename Record::Key> built_lists(const LatticeMesh& mesh,
-                                                      const RasterTarget& target,
-                                                      const TileStoreOptions& options = {});
+/// Through bin_triangles() and the TileBuilder of `Key`, tile by tile.
+template <class Key>
+[[nodiscard]] Lists<Key> built_lists(const LatticeMesh& mesh, const RasterTarget& target,
+                                     const TileStoreOptions& options = {});
 
 /// The winding number of each voxel centre from the crossings of rays along `axis`, by the
 /// reference rasterizer. Depths are not sorted or merged: sums of signs.

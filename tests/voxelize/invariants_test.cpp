@@ -105,7 +105,7 @@ TEST(ClosedMesh, EveryRayEntersAsOftenAsItLeaves) {
       const auto exact = reference_lists<DepthItem>(lattice, target);
       EXPECT_EQ(unbalanced_lists(exact), 0u);
       EXPECT_EQ(odd_lists(exact), 0u);
-      EXPECT_EQ(built_lists<ItemRecord>(lattice, target), exact);
+      EXPECT_EQ(built_lists<DepthItem>(lattice, target), exact);
     }
   }
 }
@@ -191,7 +191,7 @@ TEST(ThreeAxes, GiveTheSameWindingNumberAtEveryVoxelCentre) {
     EXPECT_EQ(along_x, reference_winding(lattice, scene.grid, Axis::kY));
     EXPECT_EQ(along_x, reference_winding(lattice, scene.grid, Axis::kZ));
     for (const Axis axis : kAllAxes) {
-      const auto lists = built_lists<ItemRecord>(lattice, target_of(scene.grid, axis));
+      const auto lists = built_lists<DepthItem>(lattice, target_of(scene.grid, axis));
       EXPECT_EQ(along_x, winding_of(lists, scene.grid, axis));
     }
     for (const InsideRule rule : kAllRules) {
