@@ -17,10 +17,15 @@ constexpr std::uint64_t add_modulo(std::uint64_t a, std::uint64_t b) {
   const std::uint64_t sum = a + b;
   return sum >= kPrime ? sum - kPrime : sum;
 }
-constexpr std::uint64_t multiply_modulo(std::uint64_t a, std::uint64_t b) {
-  const Wide product = Wide{a} * b;
-  return add_modulo(static_cast<std::uint64_t>(product & kPrime),
-                    static_cast<std::uint64_t>(product >> 61));
+constexpr std::uint64_t subtract_modulo(std::uint64_t a, std::uint64_t b) {
+  return a >= b ? a - b : a + kPrime - b;
+}
+// 2^61 is 1 here: groups of 61 bits are added.
+constexpr std::uint64_t reduce(Wide value) {
+  const std::uint64_t sum = (static_cast<std::uint64_t>(value) & kPrime) +
+                            (static_cast<std::uint64_t>(value >> 61) & kPrime) +
+                            static_cast<std::uint64_t>(value >> 122);
+  return add_modulo(sum & kPrime, sum >> 61);
 }
 
 // splitmix64 (Steele, Lea, Flood, 2014)
@@ -34,17 +39,6 @@ constexpr std::uint64_t mix(std::uint64_t value) {
 // Never 0, so that no layer of voxels is overlooked.
 std::uint64_t factor(std::size_t axis, std::size_t index) {
   return mix(mix(axis + 1) ^ index) % (kPrime - 1) + 1;
-}
-
-std::uint64_t column_sum(std::span<const Interval> column,
-                         const std::vector<std::uint64_t>& prefix) {
-  std::uint64_t sum = 0;
-  for (const Interval& interval : column) {
-    const std::uint64_t begin = prefix[static_cast<std::size_t>(interval.begin())];
-    const std::uint64_t end = prefix[static_cast<std::size_t>(interval.end())];
-    sum = add_modulo(sum, end >= begin ? end - begin : end + kPrime - begin);
-  }
-  return sum;
 }
 
 }  // namespace
@@ -71,20 +65,25 @@ void SetChecksum::add(const VoxelIntervals& slab, const Execution& execution) {
     const int tv = static_cast<int>(index) / slab.tiles_u();
     const VoxelIntervals::TileView tile = slab.tile(tu, tv);
     if (tile.items.empty()) return;
+    std::array<std::uint64_t, kSide> factor_u;
+    for (std::size_t i = 0; i < kSide; ++i) {
+      factor_u[i] = factor(axis_u, static_cast<std::size_t>(tu) * kSide + i);
+    }
     std::uint64_t tile_sum = 0;
     for (int row = 0; row < kSide; ++row) {
       const std::uint32_t* offsets = tile.offsets.data() + row * kSide;
       if (offsets[0] == offsets[kSide]) continue;
-      std::uint64_t row_sum = 0;
-      for (int column = 0; column < kSide; ++column) {
-        if (offsets[column] == offsets[column + 1]) continue;
-        const std::uint64_t sum = column_sum(
-            tile.items.subspan(offsets[column], offsets[column + 1] - offsets[column]), prefix);
-        const auto u = static_cast<std::size_t>(tu * kSide + column);
-        row_sum = add_modulo(row_sum, multiply_modulo(sum, factor(axis_u, u)));
+      Wide row_sum = 0;  // 64 products of less than 2^122
+      for (std::size_t column = 0; column < kSide; ++column) {
+        std::uint64_t sum = 0;
+        for (std::uint32_t i = offsets[column]; i < offsets[column + 1]; ++i) {
+          sum = add_modulo(sum, subtract_modulo(prefix[std::size_t{tile.items[i].last} + 1],
+                                                prefix[tile.items[i].first]));
+        }
+        row_sum += Wide{sum} * factor_u[column];
       }
       const auto v = static_cast<std::size_t>(slab.v_begin() + tv * kSide + row);
-      tile_sum = add_modulo(tile_sum, multiply_modulo(row_sum, factor(axis_v, v)));
+      tile_sum = add_modulo(tile_sum, reduce(Wide{reduce(row_sum)} * factor(axis_v, v)));
     }
     tile_sums[index] = tile_sum;
   });

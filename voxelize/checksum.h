@@ -15,8 +15,8 @@ namespace strata {
 /// different sets but for one chance in about 2^60.
 ///
 /// The sum over the solid voxels of f(x) g(y) h(z), modulo the prime 2^61 - 1, with f, g, h
-/// pseudo-random: a polynomial that vanishes only by chance (Schwartz, 1980; Zippel, 1979), and whose
-/// sum along an interval is a difference of two prefix sums. Not for adversaries.
+/// pseudo-random: a polynomial that vanishes only by chance (Schwartz, 1980; Zippel, 1979), and
+/// whose sum along an interval is a difference of two prefix sums. Not for adversaries.
 class SetChecksum {
  public:
   explicit SetChecksum(const VoxelGrid& grid);

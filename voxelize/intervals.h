@@ -63,6 +63,20 @@ class VoxelIntervals {
                 .offsets;
   }
 
+  /// The whole of tile (tu, tv) at once, for loops that column() would slow down: offsets as given
+  /// to set_tile (kTileColumns + 1 of them, or none for an empty tile) and the intervals.
+  struct TileView {
+    std::span<const std::uint32_t> offsets;
+    std::span<const Interval> items;
+  };
+  [[nodiscard]] TileView tile(int tu, int tv) const {
+    const Tile& stored = tiles_[static_cast<std::size_t>(tv) * static_cast<std::size_t>(tiles_u_) +
+                                static_cast<std::size_t>(tu)];
+    if (!stored.offsets) return {};
+    return {{stored.offsets.get(), kTileColumns + 1},
+            {stored.items.get(), stored.offsets[kTileColumns]}};
+  }
+
   /// Stores tile (tu, tv): `offsets` has kTileColumns + 1 entries, row by row (columns outside the
   /// grid are empty), `items` is offsets.back() long. Different tiles may be set by different
   /// threads at once.

@@ -1,0 +1,253 @@
+// Everything is read back with OpenVDB itself; the one place of the tests that includes it.
+
+#include <gtest/gtest.h>
+#include <openvdb/io/Stream.h>
+#include <openvdb/openvdb.h>
+
+#include <sstream>
+
+#include "voxel_samples.h"
+#include "voxelize/voxel_writer.h"
+
+namespace strata::testing {
+namespace {
+
+class WriteVdb : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() { openvdb::initialize(); }
+
+  std::string write(const VoxelIntervals& set, const VoxelWriterOptions& options = {},
+                    int threads = 2, int slab_tiles = 1000) {
+    const std::string path = folder_.file(std::to_string(files_++) + ".vdb");
+    Execution execution;
+    execution.threads = threads;
+    auto writer = open_voxel_writer(path, "", set.grid(), options);
+    if (!writer) throw std::runtime_error(writer.error().message);
+    for (const VoxelIntervals& slab : cut(set, slab_tiles)) {
+      if (auto added = (*writer)->add(slab, execution); !added) {
+        throw std::runtime_error(added.error().message);
+      }
+    }
+    if (auto done = (*writer)->finish(execution); !done) {
+      throw std::runtime_error(done.error().message);
+    }
+    return path;
+  }
+
+  template <class GridType>
+  static typename GridType::Ptr read(const std::string& path) {
+    openvdb::io::File file(path);
+    file.open();
+    EXPECT_TRUE(file.hasGrid("solid"));
+    auto grid = openvdb::gridPtrCast<GridType>(file.readGrid("solid"));
+    EXPECT_TRUE(grid);
+    return grid;
+  }
+
+  /// The tree that OpenVDB makes of the same set.
+  static openvdb::MaskGrid::Ptr reference(const VoxelIntervals& set) {
+    auto grid = openvdb::MaskGrid::create();
+    for (int y = 0; y < set.grid().dims.y; ++y) {
+      for (int x = 0; x < set.grid().dims.x; ++x) {
+        for (const Interval& interval : set.column(x, y)) {
+          grid->tree().fill({{x, y, interval.first}, {x, y, interval.last}}, true, true);
+        }
+      }
+    }
+    grid->tree().prune();
+    return grid;
+  }
+
+  TemporaryFolder folder_;
+  int files_ = 0;
+};
+
+std::string tree_bytes(const openvdb::GridBase& grid) {
+  std::ostringstream stream(std::ios::binary);
+  openvdb::io::setDataCompression(stream, openvdb::io::COMPRESS_ACTIVE_MASK);
+  grid.writeTopology(stream);
+  grid.writeBuffers(stream);
+  return stream.str();
+}
+
+TEST_F(WriteVdb, MaskHoldsExactlyTheSet) {
+  for (const Sample& sample : small_samples()) {
+    SCOPED_TRACE(sample.name);
+    const VoxelIntervals set = intervals_of(sample, Axis::kZ);
+    const auto grid = read<openvdb::MaskGrid>(write(set));
+    ASSERT_EQ(grid->activeVoxelCount(), set.solid_voxels());
+    auto accessor = grid->getConstAccessor();
+    int wrong = 0;
+    for (int i = 0; i < sample.grid.dims.x; ++i) {
+      for (int j = 0; j < sample.grid.dims.y; ++j) {
+        for (int k = 0; k < sample.grid.dims.z; ++k) {
+          wrong += accessor.isValueOn({i, j, k}) != sample.solid(i, j, k) ? 1 : 0;
+        }
+      }
+    }
+    EXPECT_EQ(wrong, 0);
+  }
+}
+
+TEST_F(WriteVdb, TreeIsByteForByteTheOneOpenVdbWrites) {
+  for (const Sample& sample : small_samples()) {
+    SCOPED_TRACE(sample.name);
+    const VoxelIntervals set = intervals_of(sample, Axis::kZ);
+    const std::string expected = tree_bytes(*reference(set));
+    const std::string bytes = file_bytes(write(set));
+    ASSERT_GT(bytes.size(), expected.size());
+    EXPECT_TRUE(bytes.ends_with(expected));
+  }
+}
+
+TEST_F(WriteVdb, InsideIsTiles) {
+  const VoxelGrid grid = make_grid({300, 290, 280});
+  const VoxelIntervals set =
+      intervals_from_predicate(grid, Axis::kZ, [](int, int, int) { return true; });
+  const auto read_back = read<openvdb::MaskGrid>(write(set));
+  // 2 x 2 x 2 whole nodes of 128^3 become tiles of the node above.
+  std::vector<openvdb::Index32> nodes = read_back->tree().nodeCount();
+  EXPECT_EQ(nodes.at(1), 27u - 8u);
+  EXPECT_EQ(read_back->activeVoxelCount(), set.solid_voxels());
+  EXPECT_TRUE(file_bytes(write(set)).ends_with(tree_bytes(*reference(set))));
+}
+
+TEST_F(WriteVdb, GridsBeyondOneRootNodeKeepTheirOrder) {
+  for (const glm::ivec3 dims :
+       {glm::ivec3(8300, 5, 12), glm::ivec3(6, 8300, 9), glm::ivec3(9, 10, 8300)}) {
+    const Sample sample{"long", make_grid(dims), [](int i, int j, int k) {
+                          return random_voxel(i / 90, j / 90, k / 90, 600) &&
+                                 random_voxel(i, j, k, 999);
+                        }};
+    const VoxelIntervals set = intervals_of(sample, Axis::kZ);
+    const std::string path = write(set);
+    EXPECT_EQ(read<openvdb::MaskGrid>(path)->activeVoxelCount(), set.solid_voxels());
+    EXPECT_TRUE(file_bytes(path).ends_with(tree_bytes(*reference(set)))) << dims.x << " " << dims.y;
+  }
+}
+
+TEST_F(WriteVdb, SolidRootNodeIsOneTile) {
+  const VoxelGrid grid = make_grid(glm::ivec3(4096));
+  VoxelIntervals set(grid, Axis::kZ);
+  std::vector<std::uint32_t> offsets(VoxelIntervals::kTileColumns + 1);
+  for (std::uint32_t i = 0; i < offsets.size(); ++i) offsets[i] = i;
+  const std::vector<Interval> items(VoxelIntervals::kTileColumns, Interval{0, 4095});
+  for (int tv = 0; tv < set.tiles_v(); ++tv) {
+    for (int tu = 0; tu < set.tiles_u(); ++tu) set.set_tile(tu, tv, offsets, items);
+  }
+  for (const bool fog : {false, true}) {
+    const std::string path = write(set, {.fog = fog});
+    EXPECT_LT(file_bytes(path).size(), 2000u);
+    openvdb::io::File file(path);
+    file.open();
+    const auto read_back = file.readGrid("solid");
+    EXPECT_EQ(read_back->activeVoxelCount(), std::uint64_t{1} << 36);
+    EXPECT_EQ(read_back->baseTree().nonLeafCount(), 1u);  // the root alone
+  }
+}
+
+TEST_F(WriteVdb, FogIsOneInsideAndZeroOutside) {
+  for (const Sample& sample : small_samples()) {
+    SCOPED_TRACE(sample.name);
+    const VoxelIntervals set = intervals_of(sample, Axis::kZ);
+    const auto grid = read<openvdb::FloatGrid>(write(set, {.fog = true}));
+    EXPECT_EQ(grid->getGridClass(), openvdb::GRID_FOG_VOLUME);
+    EXPECT_EQ(grid->background(), 0.0f);
+    EXPECT_TRUE(grid->tree().hasSameTopology(reference(set)->tree()));
+    auto accessor = grid->getConstAccessor();
+    int wrong = 0;
+    for (int i = -1; i <= sample.grid.dims.x; ++i) {
+      for (int j = -1; j <= sample.grid.dims.y; ++j) {
+        for (int k = -1; k <= sample.grid.dims.z; ++k) {
+          const bool in_grid = i >= 0 && j >= 0 && k >= 0 && i < sample.grid.dims.x &&
+                               j < sample.grid.dims.y && k < sample.grid.dims.z;
+          const float expected = in_grid && sample.solid(i, j, k) ? 1.0f : 0.0f;
+          wrong += accessor.getValue({i, j, k}) != expected ? 1 : 0;
+        }
+      }
+    }
+    EXPECT_EQ(wrong, 0);
+  }
+}
+
+TEST_F(WriteVdb, IndexCoordinatesAreVoxelCentres) {
+  for (const glm::dvec3 size : {glm::dvec3(0.3), glm::dvec3(0.1, 0.25, 7.0)}) {
+    for (const bool fog : {false, true}) {
+      const VoxelGrid grid = make_grid({20, 30, 40}, {1.0 / 3, -1e6, 0.7}, size);
+      const VoxelIntervals set =
+          intervals_from_predicate(grid, Axis::kZ, [](int i, int j, int) { return i == j; });
+      openvdb::io::File file(write(set, {.fog = fog}));
+      file.open();
+      const auto read_back = file.readGrid("solid");
+      const openvdb::math::Transform& transform = read_back->transform();
+      EXPECT_TRUE(transform.isLinear());
+      EXPECT_EQ(transform.hasUniformScale(), size.x == size.y);
+      EXPECT_EQ(read_back->voxelSize(), openvdb::Vec3d(size.x, size.y, size.z));
+      for (const glm::ivec3 index : {glm::ivec3(0), glm::ivec3(19, 3, 39)}) {
+        const openvdb::Vec3d world =
+            transform.indexToWorld(openvdb::Coord(index.x, index.y, index.z));
+        const glm::dvec3 centre = grid.origin + (glm::dvec3(index) + 0.5) * size;
+        EXPECT_NEAR(world.x(), centre.x, 1e-12);
+        EXPECT_NEAR(world.y(), centre.y, 1e-9);
+        EXPECT_NEAR(world.z(), centre.z, 1e-12);
+        const openvdb::Vec3d back = transform.worldToIndex(world);
+        EXPECT_NEAR(back.x(), index.x, 1e-9);
+        EXPECT_NEAR(back.y(), index.y, 1e-8);
+        EXPECT_NEAR(back.z(), index.z, 1e-9);
+      }
+    }
+  }
+}
+
+TEST_F(WriteVdb, MetadataTellsCountAndBounds) {
+  const VoxelGrid grid = make_grid({100, 200, 300});
+  const VoxelIntervals set = intervals_from_predicate(grid, Axis::kZ, [](int i, int j, int k) {
+    return i >= 7 && i <= 90 && j >= 66 && j <= 190 && k >= 5 && k <= 280;
+  });
+  const auto read_back = read<openvdb::MaskGrid>(write(set));
+  EXPECT_EQ(read_back->metaValue<openvdb::Int64>("file_voxel_count"),
+            static_cast<openvdb::Int64>(set.solid_voxels()));
+  EXPECT_EQ(read_back->metaValue<openvdb::Vec3i>("file_bbox_min"), openvdb::Vec3i(7, 66, 5));
+  EXPECT_EQ(read_back->metaValue<openvdb::Vec3i>("file_bbox_max"), openvdb::Vec3i(90, 190, 280));
+  EXPECT_EQ(read_back->getCreator(), "strata");
+  EXPECT_EQ(read_back->getName(), "solid");
+}
+
+TEST_F(WriteVdb, NameOfTheGridIsKept) {
+  const VoxelIntervals set = intervals_of(small_samples().front(), Axis::kZ);
+  VoxelWriterOptions options;
+  options.name = "left hand";
+  openvdb::io::File file(write(set, options));
+  file.open();
+  EXPECT_TRUE(file.hasGrid("left hand"));
+}
+
+TEST_F(WriteVdb, BytesDoNotDependOnThreadsOrSlabs) {
+  for (const Sample& sample : small_samples()) {
+    SCOPED_TRACE(sample.name);
+    const VoxelIntervals set = intervals_of(sample, Axis::kZ);
+    for (const bool fog : {false, true}) {
+      const std::string expected = file_bytes(write(set, {.fog = fog}, 1));
+      EXPECT_EQ(file_bytes(write(set, {.fog = fog}, 1)), expected);
+      EXPECT_EQ(file_bytes(write(set, {.fog = fog}, 2, 1)), expected);
+      EXPECT_EQ(file_bytes(write(set, {.fog = fog}, 5, 2)), expected);
+    }
+  }
+}
+
+TEST_F(WriteVdb, UniqueTagFollowsTheContent) {
+  const auto tag = [&](int last) {
+    const VoxelIntervals set =
+        intervals_from_predicate(make_grid({40, 40, 40}), Axis::kZ,
+                                 [=](int i, int j, int k) { return i < 20 && j < 20 && k < last; });
+    openvdb::io::File file(write(set));
+    file.open();
+    return file.getUniqueTag();
+  };
+  EXPECT_EQ(tag(16), tag(16));
+  EXPECT_NE(tag(16), tag(17));
+  EXPECT_NE(tag(16), tag(24));
+}
+
+}  // namespace
+}  // namespace strata::testing

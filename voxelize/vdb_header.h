@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <string>
+
+#include "core/grid.h"
+
+namespace strata {
+
+/// What stands in an OpenVDB file before the tree (internal to voxelize/).
+struct VdbHeader {
+  std::string name;
+  VoxelGrid grid;
+  bool fog = false;               ///< FloatGrid of class fog volume; else MaskGrid
+  bool zip = false;               ///< value lists are compressed by zlib
+  std::uint64_t voxels = 0;       ///< active ones
+  glm::ivec3 lower{0}, upper{0};  ///< bounds of the active voxels, inclusive, if there are any
+  std::uint64_t hash = 0;         ///< of the content; becomes the file's UUID
+  std::uint64_t topology_bytes = 0, buffers_bytes = 0;  ///< sizes of the two parts of the tree
+};
+
+/// The bytes of the header, the metadata and the transform, which take index coordinates (voxel
+/// centres) to world space; the topology follows at once.
+[[nodiscard]] std::string vdb_header_bytes(const VdbHeader& header);
+
+}  // namespace strata

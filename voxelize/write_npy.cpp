@@ -1,0 +1,60 @@
+// NumPy's .npy, version 1.0 (numpy/lib/format.py). Shape (nx, ny, nz), so that a[i, j, k] is voxel
+// (i, j, k); fortran_order, so that x is fastest and the slabs follow one another: C order would
+// need the whole array, or seeking, which pipes cannot. numpy.load treats both alike. The format
+// has no place for the world transform.
+
+#include <fmt/format.h>
+
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "voxelize/block_output.h"
+#include "voxelize/dense_rows.h"
+#include "voxelize/slab_writer.h"
+#include "voxelize/writers.h"
+
+namespace strata {
+namespace {
+
+class NpyWriter final : public SlabWriter {
+ public:
+  NpyWriter(const std::string& path, const VoxelGrid& grid, BlockOutput output)
+      : SlabWriter(path, grid, Axis::kX), output_(std::move(output)) {}
+
+  Result<void> begin() {
+    constexpr std::size_t kAlignment = 64, kPreamble = 10;
+    std::string header =
+        fmt::format("{{'descr': '|b1', 'fortran_order': True, 'shape': ({}, {}, {}), }}", dims().x,
+                    dims().y, dims().z);
+    header.append(kAlignment - (kPreamble + header.size() + 1) % kAlignment, ' ');
+    header += '\n';
+    std::string preamble("\x93NUMPY\x01\x00", 8);
+    preamble += static_cast<char>(header.size() & 0xff);
+    preamble += static_cast<char>(header.size() >> 8);
+    return output_.append(preamble + header);
+  }
+
+ private:
+  Result<void> add_slab(const VoxelIntervals& slab, const Execution& execution) override {
+    const RowBlocks blocks(slab);
+    return output_.append_blocks(
+        execution, blocks.count(),
+        [&](std::size_t index, Bytes& out, int) { blocks.make(index, out); });
+  }
+  Result<void> finish_output(const Execution&) override { return output_.commit(); }
+
+  BlockOutput output_;
+};
+
+}  // namespace
+
+VoxelWriterResult open_npy_writer(const std::string& path, const VoxelGrid& grid) {
+  Result<BlockOutput> output = BlockOutput::create(path);
+  if (!output) return tl::unexpected(output.error());
+  auto writer = std::make_unique<NpyWriter>(path, grid, std::move(*output));
+  if (Result<void> begun = writer->begin(); !begun) return tl::unexpected(begun.error());
+  return writer;
+}
+
+}  // namespace strata

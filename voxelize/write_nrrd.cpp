@@ -1,0 +1,125 @@
+// NRRD, version 4 (Kindlmann, teem.sourceforge.net/nrrd/format.html): attached header, uint8, x
+// fastest, gzip. Voxels are cells; "space origin" is the centre of the first one, as the format
+// has it. The gzip stream is one member, made of pieces that threads deflate apart, a layer each.
+
+#include <fmt/format.h>
+#include <zlib.h>
+
+#include <array>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "voxelize/block_output.h"
+#include "voxelize/dense_rows.h"
+#include "voxelize/run_deflate.h"
+#include "voxelize/slab_writer.h"
+#include "voxelize/writers.h"
+
+namespace strata {
+namespace {
+
+/// CRC-32 of runs of 0 and 1, of which each is at most a row long.
+class RunCrc {
+ public:
+  explicit RunCrc(int longest)
+      : shift_(static_cast<std::size_t>(longest) + 1), crc_(shift_.size()) {
+    const std::array<Bytef, 2> bytes = {0, 1};
+    for (std::size_t length = 1; length < shift_.size(); ++length) {
+      shift_[length] = crc32_combine_gen(static_cast<z_off_t>(length));
+      for (std::size_t value = 0; value < 2; ++value) {
+        crc_[length][value] = crc32(crc_[length - 1][value], &bytes[value], 1);
+      }
+    }
+  }
+  [[nodiscard]] uLong add(uLong crc, int value, int length) const {
+    const auto n = static_cast<std::size_t>(length);
+    return crc32_combine_op(crc, crc_[n][static_cast<std::size_t>(value)], shift_[n]);
+  }
+
+ private:
+  std::vector<uLong> shift_;               // operators that append so many bytes
+  std::vector<std::array<uLong, 2>> crc_;  // of runs
+};
+
+std::string one_line(std::string text) {
+  for (char& letter : text) {
+    if (static_cast<unsigned char>(letter) < ' ') letter = ' ';
+  }
+  return text;
+}
+
+class NrrdWriter final : public SlabWriter {
+ public:
+  NrrdWriter(const std::string& path, const VoxelGrid& grid, BlockOutput output)
+      : SlabWriter(path, grid, Axis::kX), output_(std::move(output)), run_crc_(grid.dims.x) {}
+
+  Result<void> begin(const std::string& name) {
+    const VoxelGrid& g = grid();
+    const glm::dvec3 centre = g.origin + 0.5 * g.voxel_size;
+    std::string header = fmt::format(
+        "NRRD0004\n# Complete NRRD file format specification at:\n"
+        "# http://teem.sourceforge.net/nrrd/format.html\n"
+        "content: {}\ntype: uint8\ndimension: 3\nspace dimension: 3\nsizes: {} {} {}\n"
+        "space directions: ({},0,0) (0,{},0) (0,0,{})\nspace origin: ({},{},{})\n"
+        "centers: cell cell cell\nkinds: domain domain domain\nencoding: gzip\n\n",
+        one_line(name), g.dims.x, g.dims.y, g.dims.z, g.voxel_size.x, g.voxel_size.y,
+        g.voxel_size.z, centre.x, centre.y, centre.z);
+    // Magic, deflate, no flags, no time stamp, fastest, Unix (RFC 1952).
+    header.append("\x1f\x8b\x08\x00\x00\x00\x00\x00\x04\x03", 10);
+    return output_.append(header);
+  }
+
+ private:
+  Result<void> add_slab(const VoxelIntervals& slab, const Execution& execution) override {
+    std::vector<uLong> crcs(static_cast<std::size_t>(slab.v_end() - slab.v_begin()));
+    Result<void> written =
+        output_.append_blocks(execution, crcs.size(), [&](std::size_t index, Bytes& out, int) {
+          out.clear();
+          uLong crc = crc32(0, nullptr, 0);
+          RunDeflater deflater(RunBytes::kFlags);
+          deflater.begin(out, false);
+          emit_layer(slab, slab.v_begin() + static_cast<int>(index), [&](int value, int length) {
+            deflater.run(static_cast<std::uint8_t>(value), static_cast<std::uint64_t>(length));
+            crc = run_crc_.add(crc, value, length);
+          });
+          deflater.end();
+          crcs[index] = crc;
+        });
+    const auto layer = static_cast<z_off_t>(dims().x) * dims().y;
+    for (const uLong crc : crcs) crc_ = crc32_combine(crc_, crc, layer);
+    return written;
+  }
+
+  Result<void> finish_output(const Execution&) override {
+    std::string end("\x03\x00", 2);  // an empty block of fixed codes, marked as the last
+    const std::uint64_t bytes = static_cast<std::uint64_t>(dims().x) *
+                                static_cast<std::uint64_t>(dims().y) *
+                                static_cast<std::uint64_t>(dims().z);
+    for (const std::uint64_t value : {static_cast<std::uint64_t>(crc_), bytes}) {
+      for (int i = 0; i < 4; ++i) end += static_cast<char>(value >> (8 * i) & 0xff);
+    }
+    if (Result<void> written = output_.append(end); !written) return written;
+    return output_.commit();
+  }
+
+  BlockOutput output_;
+  RunCrc run_crc_;
+  uLong crc_ = 0;
+};
+
+}  // namespace
+
+VoxelWriterResult open_nrrd_writer(const std::string& path, const VoxelGrid& grid,
+                                   const VoxelWriterOptions& options) {
+  Result<BlockOutput> output = BlockOutput::create(path);
+  if (!output) return tl::unexpected(output.error());
+  auto writer = std::make_unique<NrrdWriter>(path, grid, std::move(*output));
+  if (Result<void> begun = writer->begin(options.name); !begun) {
+    return tl::unexpected(begun.error());
+  }
+  return writer;
+}
+
+}  // namespace strata

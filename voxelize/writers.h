@@ -1,0 +1,25 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "voxelize/voxel_writer.h"
+
+namespace strata {
+
+/// The writers behind open_voxel_writer, one a format (internal to voxelize/). The grid is valid.
+using VoxelWriterResult = Result<std::unique_ptr<VoxelWriter>>;
+
+VoxelWriterResult open_vdb_writer(const std::string& path, const VoxelGrid& grid,
+                                  const VoxelWriterOptions& options);
+VoxelWriterResult open_png_writer(const std::string& path, const VoxelGrid& grid);
+VoxelWriterResult open_npy_writer(const std::string& path, const VoxelGrid& grid);
+VoxelWriterResult open_nrrd_writer(const std::string& path, const VoxelGrid& grid,
+                                   const VoxelWriterOptions& options);
+VoxelWriterResult open_vti_writer(const std::string& path, const VoxelGrid& grid,
+                                  const VoxelWriterOptions& options);
+VoxelWriterResult open_binvox_writer(const std::string& path, const VoxelGrid& grid);
+VoxelWriterResult open_vox_writer(const std::string& path, const VoxelGrid& grid);
+VoxelWriterResult open_zarr_writer(const std::string& path, const VoxelGrid& grid);
+
+}  // namespace strata
