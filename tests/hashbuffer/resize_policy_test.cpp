@@ -31,7 +31,9 @@ TEST(ResizePolicy, ConstantFragmentsChangeTheTableOnceAtMost) {
       const std::uint64_t once = next_frame_cells(cells, 3, fragments);
       EXPECT_EQ(next_frame_cells(once, 3, fragments), once) << cells << " " << fragments;
       EXPECT_LT(fragments * 10, once * 8);
-      if (once > 3) EXPECT_GE(fragments * 10, once * 3) << cells << " " << fragments;
+      if (once > 3) {
+        EXPECT_GE(fragments * 10, once * 3) << cells << " " << fragments;
+      }
     }
   }
 }

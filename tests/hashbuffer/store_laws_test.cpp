@@ -108,7 +108,7 @@ TYPED_TEST(StoreLaws, ListsEqualTheSortOfEverything) {
 
 TYPED_TEST(StoreLaws, ListsOfAThousandSmallScenesAreExact) {
   Random random(12);
-  for (int scene = 0; scene < 1000; ++scene) {
+  for (int scene = 0; scene < (test::kSanitized ? 100 : 1000); ++scene) {
     const int width = 1 + static_cast<int>(random.below(5));
     const int height = 1 + static_cast<int>(random.below(4));
     auto store = TestFixture::make(width, height);
