@@ -30,7 +30,7 @@ PackedTile pack(const TileLists<DepthItem>& lists) {
       for (std::size_t age = 0; age < static_cast<std::size_t>(lists.ages); ++age) {
         const std::uint64_t record = lists.planes64[age * kTilePixels + pixel];
         if (record == 0) break;
-        tile.items.push_back(ItemRecord::key(record));
+        tile.items.push_back(tile_key<Record64>(record));
       }
     }
     tile.lengths[pixel] = static_cast<std::uint32_t>(tile.items.size() - before);

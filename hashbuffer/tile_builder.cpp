@@ -29,7 +29,7 @@ void sort_list(Key* begin, Key* end) {
 
 template <class Record>
 struct TileBuilder<Record>::Impl {
-  using Bits = typename Record::Bits;
+  using Bits = typename Record::Word;
   /// At most this many planes are laid out side by side: deeper pixels are rare enough to scatter.
   static constexpr int kMaxPlanes = 64;
   static constexpr int kFirstPlanes = 8;
@@ -57,7 +57,7 @@ struct TileBuilder<Record>::Impl {
     const auto offsets64 = make_offsets(options.offsets, {.pixels = kTilePixels,
                                                           .cells = size,
                                                           .width = kTileSide,
-                                                          .ages = Record::kMaxAge,
+                                                          .ages = Record::kAgeMax,
                                                           .seed = options.seed});
     return {offsets64.begin(), offsets64.end()};
   }
@@ -92,8 +92,8 @@ struct TileBuilder<Record>::Impl {
         std::size_t cell = pixel + table.offset(age);
         if (cell >= table.size) cell -= table.size;
         const Bits record = table.cells[cell];
-        const int found = static_cast<int>(record >> Record::kAgeShift);
-        if (found == age) keys.push_back(Record::key(record));
+        const int found = static_cast<int>(Record::age(record));
+        if (found == age) keys.push_back(tile_key<Record>(record));
         if (found < age) break;  // a younger record here would have been displaced
       }
     }
@@ -190,7 +190,7 @@ template <class Record>
 TileBuilder<Record>::~TileBuilder() = default;
 
 template <class Record>
-Result<TileLists<typename TileBuilder<Record>::Key>> TileBuilder<Record>::build(
+Result<TileLists<TileKey<Record>>> TileBuilder<Record>::build(
     const LatticeMesh& mesh, const RasterTarget& target, std::span<const std::uint32_t> triangles,
     int tu, int tv) {
   const PixelRect clip{tu * kTileSide, tv * kTileSide, std::min(target.width, (tu + 1) * kTileSide),
@@ -210,12 +210,12 @@ std::uint64_t TileBuilder<Record>::rebuilt_tiles() const {
 
 template <class Record>
 std::uint64_t TileBuilder<Record>::memory_bytes() const {
-  return impl_->table.cells.capacity() * sizeof(typename Record::Bits) +
+  return impl_->table.cells.capacity() * sizeof(typename Record::Word) +
          impl_->log.keys.capacity() * (sizeof(Key) + sizeof(std::uint32_t)) +
          impl_->keys.capacity() * sizeof(Key) + impl_->offsets.capacity() * sizeof(std::uint32_t);
 }
 
-template class TileBuilder<KeyRecord>;
-template class TileBuilder<ItemRecord>;
+template class TileBuilder<Record32>;
+template class TileBuilder<Record64>;
 
 }  // namespace strata

@@ -3,10 +3,12 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <type_traits>
 
 #include "core/depth_list.h"
 #include "core/result.h"
 #include "hashbuffer/offsets.h"
+#include "hashbuffer/record.h"
 #include "raster/tile_bins.h"
 
 namespace strata {
@@ -39,24 +41,16 @@ struct TileLists {
   const Key* keys = nullptr;
 };
 
-/// [age:8 | nearness:24], nearness = 2^24 - 1 - DepthKey: larger is older, then nearer.
-struct KeyRecord {
-  using Bits = std::uint32_t;
-  using Key = DepthKey;
-  static constexpr int kAgeShift = 24;
-  static constexpr Bits kValueMask = 0xffffff;
-  static constexpr int kMaxAge = 255;
-  static Key key(Bits record) { return ~record & kValueMask; }
-};
-/// [age:8 | nearness:24 | ~payload:32].
-struct ItemRecord {
-  using Bits = std::uint64_t;
-  using Key = DepthItem;
-  static constexpr int kAgeShift = 56;
-  static constexpr Bits kValueMask = 0xffffffffffffff;
-  static constexpr int kMaxAge = 255;
-  static Key key(Bits record) { return DepthItem(~record & kValueMask); }
-};
+/// What a record says in a tile's lists: Record32 stores DepthKeys in the place of depths, Record64
+/// DepthItems.
+template <class Record>
+using TileKey = std::conditional_t<Record::kPayloadBits == 0, DepthKey, DepthItem>;
+
+/// The key in a record: nearness and payload are stored inverted, so that larger is nearer.
+template <class Record>
+[[nodiscard]] constexpr TileKey<Record> tile_key(typename Record::Word record) {
+  return TileKey<Record>(Record::rank(static_cast<typename Record::Word>(~record)));
+}
 
 struct TileStoreOptions {
   StoreKind store = StoreKind::kAuto;
@@ -75,7 +69,7 @@ struct TileStoreOptions {
 template <class Record>
 class TileBuilder {
  public:
-  using Key = typename Record::Key;
+  using Key = TileKey<Record>;
 
   explicit TileBuilder(const TileStoreOptions& options = {});
   TileBuilder(TileBuilder&&) noexcept;
@@ -95,7 +89,7 @@ class TileBuilder {
   std::unique_ptr<Impl> impl_;
 };
 
-using KeyTileBuilder = TileBuilder<KeyRecord>;
-using ItemTileBuilder = TileBuilder<ItemRecord>;
+using KeyTileBuilder = TileBuilder<Record32>;
+using ItemTileBuilder = TileBuilder<Record64>;
 
 }  // namespace strata

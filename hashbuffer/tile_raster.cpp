@@ -46,19 +46,23 @@ struct ItemLanes {
 };
 
 template <class Record>
-using LanesOf = std::conditional_t<std::is_same_v<Record, KeyRecord>, KeyLanes, ItemLanes>;
+using LanesOf = std::conditional_t<std::is_same_v<Record, Record32>, KeyLanes, ItemLanes>;
+
+/// All of a record but its age.
+template <class Record>
+inline constexpr typename Record::Word kValueMask = Record::kAgeUnit - 1;
 
 /// Inserts covered pixels into the tile's HA-buffer.
 template <class Record>
 class TableSink {
  public:
-  using Bits = typename Record::Bits;
+  using Bits = typename Record::Word;
   using Lanes = LanesOf<Record>;
 
   TableSink(TileTable<Record>& table, const PixelRect& clip)
       : table_(&table),
         cells_(table.cells.data()),
-        planes_(std::min(table.planes, Record::kMaxAge)),
+        planes_(std::min(table.planes, static_cast<int>(Record::kAgeMax))),
         u0_(clip.u0),
         v0_(clip.v0) {}
   HWY_INLINE void begin(bool exit, std::uint32_t triangle, const PixelRect& box) {
@@ -71,8 +75,8 @@ class TableSink {
     using D = typename Lanes::D;
     const D d;
     const auto mask = Lanes::mask(covered);
-    const auto step = hn::Set(d, TileTable<Record>::kAgeStep);
-    const auto value = hn::AndNot(lanes_.keys(depth), hn::Set(d, Record::kValueMask));
+    const auto step = hn::Set(d, Record::kAgeUnit);
+    const auto value = hn::AndNot(lanes_.keys(depth), hn::Set(d, kValueMask<Record>));
     auto carry = hn::IfThenElseZero(mask, hn::Or(value, step));
     result_.fragments += hn::CountTrue(d, mask);
 
@@ -96,7 +100,7 @@ class TableSink {
   void put_one(int u, int v, std::uint32_t depth) {
     ++result_.fragments;
     const Bits key = Lanes::key(depth, exit_, triangle_);
-    table_->insert(pixel_at(u, v), (~key & Record::kValueMask) | TileTable<Record>::kAgeStep);
+    table_->insert(pixel_at(u, v), (~key & kValueMask<Record>) | Record::kAgeUnit);
   }
   TileRasterResult finish() {
     table_->oldest = std::max(table_->oldest, oldest_);
@@ -117,7 +121,7 @@ class TableSink {
     for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
       if (records[i] == 0) continue;
       // After plane 255 the age field has wrapped into nothing: such a record is lost and counted.
-      if (table.planes >= Record::kMaxAge) {
+      if (table.planes >= static_cast<int>(Record::kAgeMax)) {
         ++table.failures;
       } else {
         table.insert(pixel + i, records[i]);
@@ -158,12 +162,12 @@ class LogSink {
     const typename Lanes::D d;
     log_->count += hn::CompressStore(
         lanes_.keys(depth), Lanes::mask(covered), d,
-        reinterpret_cast<typename Record::Bits*>(log_->keys.data()) + log_->count);
+        reinterpret_cast<typename Record::Word*>(log_->keys.data()) + log_->count);
   }
   void put_one(int u, int v, std::uint32_t depth) {
     log_->pixels[log_->count] =
         static_cast<std::uint32_t>((v - clip_.v0) * kTileSide + (u - clip_.u0));
-    log_->keys[log_->count++] = typename Record::Key(Lanes::key(depth, exit_, triangle_));
+    log_->keys[log_->count++] = TileKey<Record>(Lanes::key(depth, exit_, triangle_));
   }
 
   TileRasterResult finish() {
@@ -194,16 +198,16 @@ TileRasterResult raster_log(const TileInput& input, TileLog<Record>& log) {
   return sink.finish();
 }
 
-TileRasterResult raster_key_table(const TileInput& input, TileTable<KeyRecord>& table) {
+TileRasterResult raster_key_table(const TileInput& input, TileTable<Record32>& table) {
   return raster_table(input, table);
 }
-TileRasterResult raster_item_table(const TileInput& input, TileTable<ItemRecord>& table) {
+TileRasterResult raster_item_table(const TileInput& input, TileTable<Record64>& table) {
   return raster_table(input, table);
 }
-TileRasterResult raster_key_log(const TileInput& input, TileLog<KeyRecord>& log) {
+TileRasterResult raster_key_log(const TileInput& input, TileLog<Record32>& log) {
   return raster_log(input, log);
 }
-TileRasterResult raster_item_log(const TileInput& input, TileLog<ItemRecord>& log) {
+TileRasterResult raster_item_log(const TileInput& input, TileLog<Record64>& log) {
   return raster_log(input, log);
 }
 
@@ -219,16 +223,16 @@ HWY_EXPORT(raster_item_table);
 HWY_EXPORT(raster_key_log);
 HWY_EXPORT(raster_item_log);
 
-TileRasterResult raster_into(const TileInput& input, TileTable<KeyRecord>& table) {
+TileRasterResult raster_into(const TileInput& input, TileTable<Record32>& table) {
   return HWY_DYNAMIC_DISPATCH(raster_key_table)(input, table);
 }
-TileRasterResult raster_into(const TileInput& input, TileTable<ItemRecord>& table) {
+TileRasterResult raster_into(const TileInput& input, TileTable<Record64>& table) {
   return HWY_DYNAMIC_DISPATCH(raster_item_table)(input, table);
 }
-TileRasterResult raster_into(const TileInput& input, TileLog<KeyRecord>& log) {
+TileRasterResult raster_into(const TileInput& input, TileLog<Record32>& log) {
   return HWY_DYNAMIC_DISPATCH(raster_key_log)(input, log);
 }
-TileRasterResult raster_into(const TileInput& input, TileLog<ItemRecord>& log) {
+TileRasterResult raster_into(const TileInput& input, TileLog<Record64>& log) {
   return HWY_DYNAMIC_DISPATCH(raster_item_log)(input, log);
 }
 

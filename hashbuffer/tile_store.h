@@ -15,8 +15,7 @@ namespace strata {
 /// table.
 template <class Record>
 struct TileTable {
-  using Bits = typename Record::Bits;
-  static constexpr Bits kAgeStep = Bits{1} << Record::kAgeShift;
+  using Bits = typename Record::Word;
   /// Cells behind the table that vectors may touch, without changing them.
   static constexpr std::size_t kPadding = 64;
 
@@ -36,7 +35,7 @@ struct TileTable {
   /// Inserts a record, whose age is the first to be tried, into the list of `pixel`.
   void insert(std::size_t pixel, Bits record) {
     for (;;) {
-      int age = static_cast<int>(record >> Record::kAgeShift);
+      int age = static_cast<int>(Record::age(record));
       mixed = mixed || age > planes;
       std::size_t cell = pixel + offset(age);
       if (cell >= size) cell -= size;
@@ -46,15 +45,15 @@ struct TileTable {
         oldest = std::max(oldest, age);
         if (old == 0) return;
         record = old;
-        age = static_cast<int>(old >> Record::kAgeShift);
+        age = static_cast<int>(Record::age(old));
         const std::size_t shift = offset(age);
         pixel = cell >= shift ? cell - shift : cell + size - shift;
       }
-      if (age == Record::kMaxAge) {
+      if (age == static_cast<int>(Record::kAgeMax)) {
         ++failures;
         return;
       }
-      record += kAgeStep;
+      record = Record::with_next_age(record);
     }
   }
 };
@@ -62,7 +61,7 @@ struct TileTable {
 /// The count/scan store of one tile: fragments in order of arrival, sorted when all are known.
 template <class Record>
 struct TileLog {
-  using Key = typename Record::Key;
+  using Key = TileKey<Record>;
   static constexpr std::size_t kPadding = 64;
 
   std::vector<Key> keys;
@@ -94,9 +93,9 @@ struct TileInput {
   PixelRect clip;  ///< the tile's pixels within the target
 };
 
-TileRasterResult raster_into(const TileInput& input, TileTable<KeyRecord>& table);
-TileRasterResult raster_into(const TileInput& input, TileTable<ItemRecord>& table);
-TileRasterResult raster_into(const TileInput& input, TileLog<KeyRecord>& log);
-TileRasterResult raster_into(const TileInput& input, TileLog<ItemRecord>& log);
+TileRasterResult raster_into(const TileInput& input, TileTable<Record32>& table);
+TileRasterResult raster_into(const TileInput& input, TileTable<Record64>& table);
+TileRasterResult raster_into(const TileInput& input, TileLog<Record32>& log);
+TileRasterResult raster_into(const TileInput& input, TileLog<Record64>& log);
 
 }  // namespace strata

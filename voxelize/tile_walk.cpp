@@ -244,7 +244,7 @@ void walk_rows(const TileLists<Key>& lists, InsideRule rule, bool histogram, Til
         for (std::size_t age = 0; age < static_cast<std::size_t>(lists.ages); ++age) {
           const std::uint64_t record = lists.planes64[age * kTilePixels + pixel];
           if (record == 0) break;
-          list.push_back(ItemRecord::key(record));
+          list.push_back(tile_key<Record64>(record));
         }
         walk_column(std::span<const Key>(list), rule, pixel, histogram, out);
         continue;
