@@ -138,7 +138,7 @@ const char* ObjReader::parse_vertex(const char* p, Chunk& chunk) const {
     if (next == nullptr || !(ends_token(*next) || *next == '\\')) {
       return fail_at(p, chunk,
                      ends_token(*p) ? fmt::format("vertex has {} of 3 coordinates", i)
-                                    : fmt::format("'{}' is not a number", token_at(p)));
+                                    : describe(p, end_) + " is not a number");
     }
     p = next;
   }
@@ -157,7 +157,7 @@ const char* ObjReader::parse_face(const char* p, Chunk& chunk) const {
     std::int64_t index = 0;
     const char* next = parse_integer(p, index);
     if (next == nullptr || !(ends_token(*next) || *next == '/' || *next == '\\')) {
-      return fail_at(p, chunk, fmt::format("'{}' is not a vertex of a face", token_at(p)));
+      return fail_at(p, chunk, describe(p, end_) + " is not a vertex of a face");
     }
     while (!ends_token(*next) && *next != '\\') ++next;  // texture and normal
     if (*next == '\\' && next[1] != '\n' && next[1] != '\r') next = skip_token(next);

@@ -41,7 +41,7 @@ class OffReader {
     return fail(ErrorCode::kInput, "{}:{}: {}", input_.name, line_of(input_.text, p_), message);
   }
   [[nodiscard]] std::string found() const {
-    return at_end() ? "the file ends" : fmt::format("found '{}'", token_at(p_));
+    return at_end() ? "the file ends" : "found " + describe(p_, end_);
   }
   /// An integer that ends its token; false leaves p_ at what stands there.
   bool next_integer(std::int64_t& value) {

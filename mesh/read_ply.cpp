@@ -254,7 +254,9 @@ Result<void> PlyReader::read_header() {
       if (!has_format) return header_error("no 'format' line in the header");
       return {};
     } else if (word != "comment" && word != "obj_info" && !word.empty()) {
-      return header_error(fmt::format("unknown header line '{}'", word.substr(0, 40)));
+      // Some exporters forget the word "comment".
+      mesh_.stats.warnings.push_back(fmt::format("{}:{}: header line '{}' is ignored", input_.name,
+                                                 line_, word.substr(0, 40)));
     }
   }
   return header_error("the file ends inside the header");
@@ -272,11 +274,12 @@ std::string PlyReader::place(const Source& source) const {
 template <class Source>
 tl::unexpected<Error> PlyReader::cut_short(const Source& source, const Element& element,
                                            std::uint64_t index) const {
-  const bool ends = Source::kBinary || source.left() == 0;
-  return fail(
-      ErrorCode::kInput, "{}: {} in element {} {} of {}", place(source),
-      ends ? "the file ends" : fmt::format("'{}' is not a value", token_at(source.position())),
-      element.name, index, element.count);
+  const char* at = source.position();
+  while (!Source::kBinary && is_space(*at)) ++at;
+  const bool ends = Source::kBinary || at >= end_;
+  return fail(ErrorCode::kInput, "{}: {} in element {} {} of {}", place(Source(at, end_)),
+              ends ? "the file ends" : describe(at, end_) + " is not a value", element.name, index,
+              element.count);
 }
 
 template <class Source>

@@ -158,8 +158,8 @@ const char* AsciiReader::parse_vertex(const char* p, Chunk& chunk) const {
     const char* next = parse_double(p, corner[i]);
     if (next == nullptr || !ends_token(*next)) {
       chunk.error_offset = static_cast<std::size_t>(p - begin_);
-      chunk.error = *p == '\0' ? "the file ends inside a vertex"
-                               : fmt::format("'{}' is not a number", token_at(p));
+      chunk.error =
+          p >= end_ ? "the file ends inside a vertex" : describe(p, end_) + " is not a number";
       return nullptr;
     }
     p = next;
@@ -208,7 +208,7 @@ void AsciiReader::parse(const char* p, const char* end, Chunk& chunk) const {
       chunk.ended = word.size() == 8;
       p = skip_line(stop);  // the rest is a name
     } else {
-      return broken(p, fmt::format("'{}' is no word of an ascii STL file", token_at(p)));
+      return broken(p, describe(p, end_) + " is no word of an ascii STL file");
     }
   }
   if (in_loop) broken(p, "the file ends inside a facet");

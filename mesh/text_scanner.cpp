@@ -1,5 +1,7 @@
 #include "mesh/text_scanner.h"
 
+#include <fmt/format.h>
+
 namespace strata::detail {
 
 const char* scanner::parse_double_slowly(const char* text, double& value) {
@@ -38,6 +40,15 @@ const char* scanner::parse_double_slowly(const char* text, double& value) {
     return skip_token(stop);
   }
   return stop;
+}
+
+std::string describe(const char* p, const char* end) {
+  while (p < end && is_blank(*p)) ++p;
+  if (p >= end) return "the end of the file";
+  if (*p == '\n') return "the end of the line";
+  const std::string_view token = token_at(p);
+  if (!token.empty()) return fmt::format("'{}'", token);
+  return fmt::format("byte {:#04x}", static_cast<unsigned>(static_cast<unsigned char>(*p)));
 }
 
 std::uint64_t line_of(std::string_view text, const char* position) {

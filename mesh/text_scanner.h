@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <cstring>
 #include <limits>
+#include <string>
 #include <string_view>
 
 /// Scanners for text that ends in a readable zero byte (InputBytes): no bounds are checked, since
@@ -97,12 +98,16 @@ inline const char* skip_token(const char* p) {
   return p;
 }
 
-/// The token at p, at most 40 characters of it, for messages; unprintable characters end it.
+/// The token at p, at most 40 characters of it; unprintable characters end it.
 [[nodiscard]] inline std::string_view token_at(const char* p) {
   const char* q = p;
   while (!ends_token(*q) && q - p < 40 && *q > ' ' && *q < 127) ++q;
   return {p, static_cast<std::size_t>(q - p)};
 }
+
+/// What stands at p, for messages: "'x1'", "byte 0x10", "the end of the line", "the end of the
+/// file".
+[[nodiscard]] std::string describe(const char* p, const char* end);
 
 /// The 1-based line of a position: lines end with \n, \r\n or \r.
 [[nodiscard]] std::uint64_t line_of(std::string_view text, const char* position);

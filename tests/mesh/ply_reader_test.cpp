@@ -174,13 +174,18 @@ TEST(PlyReader, HeaderErrorsNameTheLine) {
             "file:4: unknown type 'quad'");
   EXPECT_EQ(refusal(kPly, "ply\nformat ascii 1.0\n"), "file:2: the file ends inside the header");
   EXPECT_EQ(refusal(kPly, "ply\nend_header\n"), "file:2: no 'format' line in the header");
-  EXPECT_EQ(refusal(kPly, "ply\nformat ascii 1.0\nwhat\n"), "file:3: unknown header line 'what'");
   std::string text = kAsciiSquare;
   text.replace(text.find("property float y\n"), 17, "");
   EXPECT_EQ(refusal(kPly, text), "file: element vertex has no property y");
   text = kAsciiSquare;
   text.replace(text.find("vertex_indices"), 14, "corners");
   EXPECT_EQ(refusal(kPly, text), "file: element face has no list vertex_indices");
+}
+
+TEST(PlyReader, UnknownHeaderLinesAreReportedAndSkipped) {
+  std::string text = kAsciiSquare;
+  text.replace(text.find("comment made"), 7, "Created");
+  EXPECT_EQ(only_warning(parsed(kPly, text)), "file:3: header line 'Created' is ignored");
 }
 
 TEST(PlyReader, PointCloudHasNoFaces) {
