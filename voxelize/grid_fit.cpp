@@ -1,0 +1,189 @@
+#include "voxelize/grid_fit.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "raster/lattice_mesh.h"
+
+namespace strata {
+namespace {
+
+constexpr const char* kAxisNames[3] = {"x", "y", "z"};
+
+// Vertices are snapped to the nearest lattice point, so what is less than half a step beyond a
+// border comes to lie on it. This also absorbs the rounding of the divisions here, which is below
+// 2^-30 voxels for any grid that can be had.
+constexpr double kHalfStep = 0.5 / kLatticeSteps;
+
+bool finite(const glm::dvec3& p) {
+  return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
+}
+
+Result<void> check_request(const GridRequest& request) {
+  const int sizes = int{request.resolution.has_value()} + int{request.voxel_size.has_value()} +
+                    int{request.dims.has_value()};
+  if (sizes != 1) {
+    return fail(ErrorCode::kUsage,
+                "{} of resolution, voxel size and grid are given; exactly one is needed", sizes);
+  }
+  if (request.resolution && *request.resolution < 1) {
+    return fail(ErrorCode::kUsage, "a resolution of {} voxels; at least 1 is needed",
+                *request.resolution);
+  }
+  if (request.padding < 0) {
+    return fail(ErrorCode::kUsage, "a padding of {} voxels; at least 0 is needed", request.padding);
+  }
+  if (request.padding >= kMaxGridSide / 2) {
+    return fail(ErrorCode::kLimit, "a padding of {} voxels; a grid has at most {} along a side",
+                request.padding, kMaxGridSide);
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    if (request.voxel_size && !((*request.voxel_size)[axis] > 0.0)) {
+      return fail(ErrorCode::kUsage, "a voxel size of {} along {}; it must be above 0",
+                  (*request.voxel_size)[axis], kAxisNames[axis]);
+    }
+    if (request.voxel_size && !std::isfinite((*request.voxel_size)[axis])) {
+      return fail(ErrorCode::kUsage, "a voxel size of {} along {}; it must be finite",
+                  (*request.voxel_size)[axis], kAxisNames[axis]);
+    }
+    if (!request.dims) continue;
+    const std::int64_t count = (*request.dims)[static_cast<std::size_t>(axis)];
+    if (count < 1) {
+      return fail(ErrorCode::kUsage, "a grid of {} voxels along {}; at least 1 is needed", count,
+                  kAxisNames[axis]);
+    }
+    if (count <= 2 * request.padding) {
+      return fail(ErrorCode::kUsage, "a grid of {} voxels along {}, all of which are padding",
+                  count, kAxisNames[axis]);
+    }
+    if (count > kMaxGridSide) {
+      return fail(ErrorCode::kLimit, "a grid of {} voxels along {}; at most {} can be had", count,
+                  kAxisNames[axis], kMaxGridSide);
+    }
+  }
+  if (request.align && request.dims) {
+    return fail(ErrorCode::kUsage, "a grid of fixed size cannot be aligned; give the voxel size");
+  }
+  if (request.align && request.origin) {
+    return fail(ErrorCode::kUsage, "an origin is given, so it cannot be aligned");
+  }
+  if (request.origin && !finite(*request.origin)) {
+    return fail(ErrorCode::kUsage, "the origin ({}, {}, {}) must be finite", request.origin->x,
+                request.origin->y, request.origin->z);
+  }
+  return {};
+}
+
+/// The box that the grid shall cover.
+Result<Bounds> covered_box(const Bounds& mesh_bounds, const GridRequest& request) {
+  const bool given = request.bounds.has_value();
+  Bounds box = given ? *request.bounds : mesh_bounds;
+  if (!given && box.empty())
+    return fail(ErrorCode::kGeometry, "the mesh has no triangles to fit a grid to");
+  if (given && request.origin) {
+    return fail(ErrorCode::kUsage, "bounds and an origin are given; one decides the lower corner");
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!std::isfinite(box.low[axis]) || !std::isfinite(box.high[axis]) ||
+        !std::isfinite(box.high[axis] - box.low[axis])) {
+      return fail(ErrorCode::kGeometry, "the {} from {} to {} along {}: too large a range",
+                  given ? "bounds run" : "mesh runs", box.low[axis], box.high[axis],
+                  kAxisNames[axis]);
+    }
+    if (!(box.low[axis] <= box.high[axis])) {
+      return fail(ErrorCode::kUsage, "the bounds end at {} = {}, before they begin at {}",
+                  kAxisNames[axis], box.high[axis], box.low[axis]);
+    }
+    if (!request.origin) continue;
+    if (box.high[axis] < (*request.origin)[axis]) {
+      return fail(ErrorCode::kGeometry, "the mesh ends at {} = {}, below the origin {}",
+                  kAxisNames[axis], box.high[axis], (*request.origin)[axis]);
+    }
+    box.low[axis] = (*request.origin)[axis];
+  }
+  return box;
+}
+
+/// World length of a voxel. @pre the request has passed its check
+Result<glm::dvec3> voxel_size_for(const Bounds& box, const GridRequest& request) {
+  const glm::dvec3 extent = box.high - box.low;
+  const double longest = std::max({extent.x, extent.y, extent.z});
+  if (!(longest > 0.0)) {
+    return fail(ErrorCode::kGeometry, "the mesh has no extent: all of it lies at ({}, {}, {})",
+                box.low.x, box.low.y, box.low.z);
+  }
+  if (request.voxel_size) return *request.voxel_size;
+  if (!(longest > 1e-300)) {
+    return fail(ErrorCode::kGeometry, "the mesh is {} long, too small to be divided", longest);
+  }
+  if (request.resolution) {
+    if (*request.resolution + 2 * request.padding > kMaxGridSide) {
+      return fail(ErrorCode::kLimit,
+                  "a resolution of {} voxels with a padding of {}; at most {} along a side can be "
+                  "had",
+                  *request.resolution, request.padding, kMaxGridSide);
+    }
+    return glm::dvec3(longest / static_cast<double>(*request.resolution));
+  }
+  glm::dvec3 size;
+  double least = longest;  // of the sides that have a length: for those that have none
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::int64_t inner =
+        (*request.dims)[static_cast<std::size_t>(axis)] - 2 * request.padding;
+    size[axis] = extent[axis] / static_cast<double>(inner);
+    if (extent[axis] > 0.0) least = std::min(least, size[axis]);
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!(extent[axis] > 0.0)) size[axis] = least;
+  }
+  return size;
+}
+
+}  // namespace
+
+Result<VoxelGrid> fit_grid(const Bounds& mesh_bounds, const GridRequest& request) {
+  if (auto valid = check_request(request); !valid) return tl::unexpected(valid.error());
+  const auto box = covered_box(mesh_bounds, request);
+  if (!box) return tl::unexpected(box.error());
+  const auto size = voxel_size_for(*box, request);
+  if (!size) return tl::unexpected(size.error());
+
+  VoxelGrid grid;
+  grid.voxel_size = *size;
+  const auto padding = static_cast<double>(request.padding);
+  for (int axis = 0; axis < 3; ++axis) {
+    const double s = grid.voxel_size[axis];
+    const double low = box->low[axis], high = box->high[axis];
+    // The lower corner in voxels from the world's origin; only multiples need it.
+    const double first = request.align ? std::floor(low / s + kHalfStep) : 0.0;
+    const double begin = request.align ? first * s : low;
+    const double reach = request.align ? high / s - first : (high - low) / s;
+    double count = std::max(1.0, std::ceil(reach - kHalfStep));
+    if (request.dims) {
+      count = static_cast<double>((*request.dims)[static_cast<std::size_t>(axis)]) - 2 * padding;
+    }
+    const double total = count + 2 * padding;
+    if (!(total <= kMaxGridSide)) {
+      return fail(ErrorCode::kLimit,
+                  "voxels of {} make a grid of {:.0f} along {}; at most {} can be had", s, total,
+                  kAxisNames[axis], kMaxGridSide);
+    }
+    grid.dims[axis] = static_cast<int>(total);
+    grid.origin[axis] = request.align ? (first - padding) * s : begin - padding * s;
+    // A flat side would lie on the border of its voxels, where no centre is near it.
+    if (!(high > low) && !request.align && !request.origin) grid.origin[axis] -= 0.5 * count * s;
+    // The lattice must still tell its points apart where the grid lies.
+    const double step = s / kLatticeSteps;
+    const double far =
+        std::max(std::abs(grid.origin[axis]), std::abs(grid.origin[axis] + total * s));
+    if (!std::isfinite(far) || !(step > 0.0) || !(far + step > far)) {
+      return fail(ErrorCode::kGeometry,
+                  "voxels of {} are too small for coordinates of {} along {}: double precision "
+                  "cannot tell their parts apart",
+                  s, far, kAxisNames[axis]);
+    }
+  }
+  return grid;
+}
+
+}  // namespace strata
