@@ -1,0 +1,93 @@
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "core/progress.h"
+#include "hashbuffer/offsets.h"
+#include "hashbuffer/tile_builder.h"
+#include "mesh/read_mesh.h"
+#include "voxelize/grid_fit.h"
+#include "voxelize/voxelize.h"
+
+namespace strata::apps {
+
+/// What every sub-command takes.
+struct CommonOptions {
+  int threads = 0;                 ///< 0: all processors
+  std::uint64_t memory_limit = 0;  ///< bytes; 0: three quarters of what this process may use
+  bool quiet = false;              ///< errors only
+  bool verbose = false;            ///< also say what is done
+  ProgressMode progress = ProgressMode::kAuto;
+  bool strict = false;  ///< warnings are errors
+};
+
+/// Where meshes come from.
+struct InputOptions {
+  std::vector<std::string> files;
+  MeshReader reader = MeshReader::kOwn;
+  MeshFormat format = MeshFormat::kAuto;
+};
+
+/// `strata voxelize`
+struct VoxelizeCommand {
+  CommonOptions common;
+  InputOptions input;
+  std::string output;  ///< empty: none, "-": standard output
+  std::string format;  ///< empty: by extension
+  bool fog = false;
+  GridRequest grid;
+  bool solid = true, surface = false;
+  SurfaceKind surface_kind = SurfaceKind::kConservative;
+  InsideRule rule = InsideRule::kWinding;
+  OpenMode open = OpenMode::kVote;
+  bool keep_orientation = false;
+  std::optional<Axis> axis;  ///< empty: auto
+  StoreKind store = StoreKind::kAuto;
+  OffsetKind offsets = OffsetKind::kPlaneFirst;
+  bool stats = false, checksum = false, dry_run = false, list_formats = false;
+  std::optional<std::string> json;  ///< "-": standard output
+};
+
+/// `strata info`
+struct InfoCommand {
+  CommonOptions common;
+  InputOptions input;
+  std::optional<std::string> json;
+};
+
+/// `strata ldi`
+struct LdiCommand {
+  CommonOptions common;
+  InputOptions input;
+  std::string output;
+  GridRequest grid;
+  bool samples = false;
+  Axis axis = Axis::kZ;
+  StoreKind store = StoreKind::kAuto;
+  OffsetKind offsets = OffsetKind::kPlaneFirst;
+  bool keep_orientation = false;
+};
+
+/// Text to print and an exit code: help, version, mistakes in the command line.
+struct ParseOutcome {
+  std::string text;
+  bool to_stderr = false;
+  int exit_code = 0;
+};
+
+using Command = std::variant<ParseOutcome, VoxelizeCommand, InfoCommand, LdiCommand>;
+
+/// Reads the command line.
+Command parse_command_line(int argc, const char* const* argv);
+
+class Session;
+Result<void> run_voxelize(const VoxelizeCommand& command, Session& session);
+Result<void> run_info(const InfoCommand& command, Session& session);
+Result<void> run_ldi(const LdiCommand& command, Session& session);
+
+}  // namespace strata::apps

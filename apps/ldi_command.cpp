@@ -1,0 +1,48 @@
+#include <glm/vec3.hpp>
+#include <utility>
+
+#include "apps/commands.h"
+#include "apps/mesh_input.h"
+#include "apps/session.h"
+#include "hashbuffer/build_ldi.h"
+#include "raster/lattice_mesh.h"
+#include "voxelize/ldi_io.h"
+
+namespace strata::apps {
+
+Result<void> run_ldi(const LdiCommand& command, Session& session) {
+  const bool exr = command.output.ends_with(".exr"), npz = command.output.ends_with(".npz");
+  if (!exr && !npz) {
+    return fail(ErrorCode::kUsage, "{}: layered depth images are written as .exr or .npz",
+                command.output);
+  }
+  if (npz && command.samples) {
+    return fail(ErrorCode::kUsage, "{}: an .npz holds every crossing; --samples is for .exr",
+                command.output);
+  }
+  auto input = load_meshes(
+      command.input, {.keep_orientation = command.keep_orientation, .rule = InsideRule::kWinding},
+      session);
+  if (!input) return tl::unexpected(input.error());
+  if (auto strict = session.check_strict(); !strict) return strict;
+  const auto grid = fit_grid(input->bounds, command.grid);
+  if (!grid) {
+    return fail(grid.error().code, "{}: {}", command.input.files.front(), grid.error().message);
+  }
+
+  const Execution execution = session.execution("depth lists");
+  const auto lattice = snap_to_lattice(input->soup, *grid, execution);
+  if (!lattice) return tl::unexpected(lattice.error());
+  auto image = build_ldi(*lattice, raster_target(*grid, command.axis),
+                         {.store = command.store, .offsets = command.offsets}, execution);
+  if (!image) return tl::unexpected(image.error());
+  image->world_from_image = world_from_image(*grid, command.axis);
+  session.note(fmt::format("{} x {} pixels, {}", image->width, image->height,
+                           counted(image->items.size(), "crossing")));
+
+  const Execution writing = session.execution("writing");
+  return exr ? write_ldi_exr(command.output, *image, {.samples = command.samples}, writing)
+             : write_ldi_npz(command.output, *image, {}, writing);
+}
+
+}  // namespace strata::apps

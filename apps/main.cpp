@@ -1,0 +1,120 @@
+// strata: the command-line tool. Results go to standard output, talk to standard error; the exit
+// codes are those of ErrorCode.
+
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <new>
+#include <system_error>
+#include <variant>
+
+#include <unistd.h>
+
+#include "apps/commands.h"
+#include "apps/session.h"
+#include "core/atomic_file.h"
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define STRATA_ORDERLY_EXIT 1  // so that leaks and races are reported
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
+#define STRATA_ORDERLY_EXIT 1
+#endif
+#endif
+
+namespace strata::apps {
+namespace {
+
+constexpr const char* kNoMemory =
+    "out of memory: the limit (--memory-limit) or what the system grants is used up";
+
+/// Where no catch clause can reach, such as in another library's thread: a sentence and a code all
+/// the same.
+[[noreturn]] void on_terminate() {
+  int code = static_cast<int>(ErrorCode::kInternal);
+  const char* what = "an unknown exception";
+  try {
+    if (const auto failure = std::current_exception()) std::rethrow_exception(failure);
+  } catch (const std::bad_alloc&) {
+    code = static_cast<int>(ErrorCode::kLimit);
+    what = kNoMemory;
+  } catch (const std::exception& failure) {
+    what = failure.what();
+  } catch (...) {
+  }
+  std::fprintf(stderr, "strata: error: %s\n", what);
+  remove_temporary_files();
+  std::_Exit(code);
+}
+
+int exit_code(const Result<void>& result, Session& session) {
+  if (result) return 0;
+  // Whatever an interrupted job ran into, the interrupt is why.
+  const ErrorCode code = session.interrupted() ? ErrorCode::kCancelled : result.error().code;
+  session.complain({code, result.error().message});
+  return static_cast<int>(code);
+}
+
+template <class AnyCommand>
+Result<void> run(const AnyCommand& command, Session& session) {
+  try {
+    session.configure(command.common);
+    if constexpr (std::is_same_v<AnyCommand, VoxelizeCommand>)
+      return run_voxelize(command, session);
+    if constexpr (std::is_same_v<AnyCommand, InfoCommand>) return run_info(command, session);
+#ifdef STRATA_HAVE_LDI
+    if constexpr (std::is_same_v<AnyCommand, LdiCommand>) return run_ldi(command, session);
+#endif
+    return fail(ErrorCode::kUsage, "this build has no such command");
+  } catch (const std::bad_alloc&) {
+    return fail(ErrorCode::kLimit, "{}", kNoMemory);
+  } catch (const std::system_error& failure) {
+    // Threads that cannot be started, above all.
+    return fail(ErrorCode::kLimit, "the system refuses: {}", failure.what());
+  } catch (const std::exception& failure) {
+    return fail(ErrorCode::kInternal, "internal error: {}", failure.what());
+  }
+}
+
+int strata_main(int argc, char** argv) {
+  const auto start = Session::Clock::now();
+  std::set_terminate(on_terminate);
+  const Command command = parse_command_line(argc, argv);
+  if (const auto* outcome = std::get_if<ParseOutcome>(&command)) {
+    const bool shown = write_text(outcome->to_stderr ? STDERR_FILENO : STDOUT_FILENO, outcome->text,
+                                  "standard output")
+                           .has_value();
+    return shown || outcome->exit_code != 0 ? outcome->exit_code
+                                            : static_cast<int>(ErrorCode::kOutput);
+  }
+  Session session(start);
+  Result<void> result;
+  if (const auto* voxelize = std::get_if<VoxelizeCommand>(&command)) {
+    result = run(*voxelize, session);
+  } else if (const auto* info = std::get_if<InfoCommand>(&command)) {
+    result = run(*info, session);
+  } else if (const auto* ldi = std::get_if<LdiCommand>(&command)) {
+    result = run(*ldi, session);
+  }
+  const int code = exit_code(result, session);
+#ifndef STRATA_ORDERLY_EXIT
+  // All files are committed. Giving memory and threads back one by one would only take time.
+  std::_Exit(code);
+#endif
+  return code;
+}
+
+}  // namespace
+}  // namespace strata::apps
+
+int main(int argc, char** argv) {
+  try {
+    return strata::apps::strata_main(argc, argv);
+  } catch (const std::bad_alloc&) {
+    std::fprintf(stderr, "strata: error: out of memory\n");
+    return static_cast<int>(strata::ErrorCode::kLimit);
+  } catch (const std::exception& failure) {
+    std::fprintf(stderr, "strata: error: %s\n", failure.what());
+    return static_cast<int>(strata::ErrorCode::kInternal);
+  }
+}

@@ -1,0 +1,72 @@
+#include "apps/memory_estimate.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "raster/tile_bins.h"
+
+namespace strata::apps {
+namespace {
+
+double columns(const VoxelGrid& grid, Axis axis) {
+  const AxisFrame frame(axis);
+  return static_cast<double>(grid.dims[frame.u]) * static_cast<double>(grid.dims[frame.v]);
+}
+
+std::uint64_t rounded(double bytes) {
+  return bytes < 1e19 ? static_cast<std::uint64_t>(bytes)
+                      : std::uint64_t{10'000'000'000'000'000'000u};
+}
+
+}  // namespace
+
+MemoryEstimate estimate_memory(const MeshInput& input, const VoxelGrid& grid, Axis axis,
+                               const VoxelizeCommand& command, std::string_view format, int threads,
+                               std::uint64_t limit) {
+  MemoryEstimate estimate;
+  const auto vertices = static_cast<double>(input.soup.positions.size());
+  const auto triangles = static_cast<double>(input.soup.triangles.size());
+  const double elements = static_cast<double>(input.soup.face_elements.size());
+  estimate.mesh = rounded(vertices * (24 + 12) + triangles * 12 + elements * 4);
+
+  // Area in voxel faces; a triangle of side d voxels meets about (1 + d / 64)^2 tiles.
+  const glm::dvec3 s = grid.voxel_size;
+  const double face = std::cbrt(s.x * s.y * s.z);
+  const double area = input.area / (face * face);
+  const double side = triangles > 0 ? std::sqrt(2 * area / triangles) : 0;
+  const double tiles = columns(grid, axis) / kTilePixels + 1;
+  const double across = 1 + side / kTileSide;
+  const double references = triangles * std::min(across * across, tiles);
+  estimate.bins = rounded(triangles * 8 + references * 4 + tiles * (4.0 + 8.0 * threads));
+
+  // Offsets and two intervals a column, with their copies; slabs keep to an eighth of the limit,
+  // but hold 64 rows at least (see voxelize_slabs).
+  constexpr double kColumnBytes = 16, kDefaultSlab = 512.0 * 1024 * 1024;
+  const AxisFrame frame(axis);
+  const double least = 64.0 * grid.dims[frame.u] * kColumnBytes;
+  const double budget =
+      limit > 0 ? std::min(kDefaultSlab, static_cast<double>(limit) / 8) : kDefaultSlab;
+  double slab = std::min(columns(grid, axis) * kColumnBytes, std::max(least, budget));
+  if (!input.closed && command.solid && command.open == OpenMode::kVote) {
+    // The vote holds the intervals of all three axes.
+    slab = 0;
+    for (const Axis each : {Axis::kX, Axis::kY, Axis::kZ})
+      slab += columns(grid, each) * kColumnBytes;
+  }
+  if (command.surface && command.solid) slab *= 2;
+  constexpr double kWorkerBytes = 6e6;
+  estimate.slabs = rounded(slab + kWorkerBytes * threads);
+
+  if (format == "vdb") {
+    // A surface of area A meets about 1.5 A / 64 leaves, of 64 bytes and their share of nodes.
+    estimate.output = rounded(area * 1.5 / 64 * 72);
+  } else if (format == "binvox") {
+    estimate.output = rounded(columns(grid, axis) * 8);
+  } else if (!format.empty()) {
+    // Formats written piece by piece: a few layers of packed or compressed voxels.
+    estimate.output = rounded(16e6 + columns(grid, axis));
+  }
+  return estimate;
+}
+
+}  // namespace strata::apps

@@ -1,0 +1,173 @@
+#include "apps/mesh_input.h"
+
+#include <glm/geometric.hpp>
+#include <utility>
+
+#include "apps/session.h"
+#include "mesh/block_sum.h"
+#include "mesh/soup_tools.h"
+
+namespace strata::apps {
+namespace {
+
+/// Sums over the triangles of a mesh.
+struct Measures {
+  double area = 0.0;
+  double volume = 0.0;  // about the point given
+  std::uint64_t zero_area = 0;
+};
+
+Measures measure(const TriangleSoup& soup, const glm::dvec3& about, const Execution& execution) {
+  Measures total = detail::fold_blocks<Measures>(
+      execution, soup.triangles.size(),
+      [&](Measures& sum, std::size_t i) {
+        const glm::uvec3 t = soup.triangles[i];
+        const glm::dvec3 a = soup.positions[t.x] - about, b = soup.positions[t.y] - about,
+                         c = soup.positions[t.z] - about;
+        const double twice = glm::length(glm::cross(b - a, c - a));
+        sum.area += twice;
+        sum.volume += glm::dot(a, glm::cross(b, c));
+        if (!(twice > 0.0)) ++sum.zero_area;
+      },
+      [](Measures& sum, const Measures& part) {
+        sum.area += part.area;
+        sum.volume += part.volume;
+        sum.zero_area += part.zero_area;
+      });
+  total.area /= 2;
+  total.volume /= 6;
+  return total;
+}
+
+/// Whether the mesh is closed in the sense of the rule, with numbers when it is not.
+void check_closed(const TriangleSoup& soup, InsideRule rule, InputFacts& facts, Session& session) {
+  Execution execution = session.execution("checking");
+  execution.progress = {};
+  facts.closed = is_closed(soup, execution);
+  if (facts.closed) return;
+  facts.diagnosis = diagnose(soup, execution);
+  if (rule == InsideRule::kParity && facts.diagnosis->even) {
+    facts.closed = true;  // wrongly oriented, perhaps, but parity does not look at that
+    return;
+  }
+  const MeshDiagnosis& found = *facts.diagnosis;
+  std::string text = fmt::format("{}: the mesh is not closed: {} of {} edges are unbalanced",
+                                 facts.path, found.unbalanced_edges, found.edges);
+  if (found.boundary_edges > 0) text += fmt::format(", {} border a hole", found.boundary_edges);
+  if (found.misoriented_edges > 0) {
+    text += fmt::format(", {} join faces that look opposite ways", found.misoriented_edges);
+  }
+  if (!found.examples.empty()) text += fmt::format("; {}", describe(found.examples.front()));
+  if (found.even) text += "; --rule parity takes it as closed";
+  session.warn("open", std::move(text));
+}
+
+void check_orientation(TriangleSoup& soup, const MeshInputRules& rules, InputFacts& facts,
+                       Session& session) {
+  if (!(facts.volume < 0.0)) return;
+  const char* what = facts.closed ? "the mesh is inside out (its volume is {:.6g})"
+                                  : "the open mesh seems to be inside out (its volume, with holes "
+                                    "closed towards the middle, is {:.6g})";
+  const std::string text =
+      fmt::format("{}: {}", facts.path, fmt::format(fmt::runtime(what), facts.volume));
+  if (rules.keep_orientation) {
+    session.warn("inverted", text + "; kept as it is");
+    return;
+  }
+  reverse_orientation(soup);
+  facts.volume = -facts.volume;
+  facts.turned_around = true;
+  session.warn("inverted", text + "; it was turned around");
+}
+
+Result<InputFacts> inspect(TriangleSoup& soup, MeshReadStats stats, const std::string& path,
+                           const MeshInputRules& rules, Session& session) {
+  InputFacts facts;
+  facts.path = path;
+  facts.stats = std::move(stats);
+  warn_of_reading(path, facts.stats, session);
+  Execution execution = session.execution("checking");
+  execution.progress = {};
+  facts.bounds = bounds(soup, execution);
+  const Measures measures =
+      measure(soup, 0.5 * facts.bounds.low + 0.5 * facts.bounds.high, execution);
+  facts.area = measures.area;
+  facts.volume = measures.volume;
+  facts.zero_area_faces = measures.zero_area;
+  check_closed(soup, rules.rule, facts, session);
+  check_orientation(soup, rules, facts, session);
+  if (session.interrupted()) return fail(ErrorCode::kCancelled, "stopped");
+  return facts;
+}
+
+}  // namespace
+
+std::string describe(const UnbalancedEdge& edge) {
+  return fmt::format(
+      "the edge from ({:.9g}, {:.9g}, {:.9g}) to ({:.9g}, {:.9g}, {:.9g}) of face {} "
+      "is used {} times this way and {} times back",
+      edge.from.x, edge.from.y, edge.from.z, edge.to.x, edge.to.y, edge.to.z, edge.element,
+      edge.forward, edge.backward);
+}
+
+void warn_of_reading(const std::string& path, const MeshReadStats& stats, Session& session) {
+  if (stats.dropped_faces() > 0) {
+    std::string causes;
+    const auto add = [&](std::uint64_t count, const char* cause) {
+      if (count > 0) causes += fmt::format("{}{} {}", causes.empty() ? "" : ", ", count, cause);
+    };
+    add(stats.out_of_range, "with an index that names no vertex");
+    add(stats.non_finite, "with a coordinate that is not finite");
+    add(stats.too_few_vertices, "with fewer than three vertices");
+    session.warn("dropped-faces", fmt::format("{}: {} of {} faces dropped: {}", path,
+                                              stats.dropped_faces(), stats.faces, causes));
+  }
+  if (stats.non_planar > 0) {
+    session.warn("non-planar", fmt::format("{}: {} not flat; cut into fans from the first corner",
+                                           path, counted(stats.non_planar, "polygon")));
+  }
+  for (const std::string& text : stats.warnings) session.warn("reader", text);
+}
+
+Result<MeshFile> read_input(const std::string& path, const InputOptions& input, Session& session) {
+  MeshReadOptions options;
+  options.format = input.format;
+  options.reader = input.reader;
+  const Execution execution = session.execution("reading");
+  return read_mesh(path, options, execution);
+}
+
+Result<MeshInput> load_meshes(const InputOptions& input, const MeshInputRules& rules,
+                              Session& session) {
+  MeshInput all;
+  for (const std::string& path : input.files) {
+    const double start = session.milliseconds();
+    auto file = read_input(path, input, session);
+    if (!file) return tl::unexpected(file.error());
+    const double read = session.milliseconds();
+    all.read_ms += read - start;
+    auto facts = inspect(file->soup, std::move(file->stats), path, rules, session);
+    if (!facts) return tl::unexpected(facts.error());
+    session.note(fmt::format("{}: {}, {}", path, counted(facts->stats.triangles, "triangle"),
+                             facts->closed ? "closed" : "open"));
+    all.closed = all.closed && facts->closed;
+    all.area += facts->area;
+    all.volume += facts->volume;
+    all.bounds.low = glm::min(all.bounds.low, facts->bounds.low);
+    all.bounds.high = glm::max(all.bounds.high, facts->bounds.high);
+    all.files.push_back(*std::move(facts));
+    if (all.files.size() == 1) {
+      all.soup = std::move(file->soup);
+    } else {
+      if (all.soup.positions.size() + file->soup.positions.size() > 0xfffffffeu) {
+        return fail(ErrorCode::kLimit, "{}: with it the inputs have more than 2^32 - 2 vertices",
+                    path);
+      }
+      append(all.soup, file->soup);
+    }
+    all.diagnose_ms += session.milliseconds() - read;
+  }
+  return all;
+}
+
+}  // namespace strata::apps

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/commands.h"
+#include "core/result.h"
+#include "mesh/diagnose.h"
+#include "mesh/read_mesh.h"
+#include "mesh/triangle_soup.h"
+#include "voxelize/voxelize.h"
+
+namespace strata::apps {
+
+/// What is known about one input file after it was read and turned.
+struct InputFacts {
+  std::string path;
+  MeshReadStats stats;
+  bool closed = false;         ///< under the inside rule: every ray enters as often as it leaves
+  bool turned_around = false;  ///< it was inside out and has been turned
+  double area = 0.0;           ///< square world units
+  double volume = 0.0;  ///< signed, after turning; of an open mesh about the middle of its bounds
+  Bounds bounds;
+  std::uint64_t zero_area_faces = 0;
+  std::optional<MeshDiagnosis> diagnosis;  ///< of open meshes
+};
+
+/// All inputs as one soup.
+struct MeshInput {
+  TriangleSoup soup;
+  std::vector<InputFacts> files;
+  Bounds bounds;
+  bool closed = true;  ///< all of them
+  double area = 0.0, volume = 0.0;
+  double read_ms = 0.0, diagnose_ms = 0.0;
+};
+
+struct MeshInputRules {
+  bool keep_orientation = false;
+  InsideRule rule = InsideRule::kWinding;
+};
+
+/// Reads the files, looks whether each is closed and the right way around, turns around those that
+/// are not, and warns of what users should know. @return kInput, kUsage, kLimit, kCancelled
+Result<MeshInput> load_meshes(const InputOptions& input, const MeshInputRules& rules,
+                              Session& session);
+
+/// One file, read as the options say.
+Result<MeshFile> read_input(const std::string& path, const InputOptions& input, Session& session);
+
+/// Warnings of the reader about a file.
+void warn_of_reading(const std::string& path, const MeshReadStats& stats, Session& session);
+
+/// "edge (0, 0, 1) - (0, 1, 1) of face 17 is used once" and the like.
+[[nodiscard]] std::string describe(const UnbalancedEdge& edge);
+
+}  // namespace strata::apps

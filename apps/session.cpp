@@ -1,0 +1,149 @@
+#include "apps/session.h"
+
+#include <fcntl.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <utility>
+
+#include "core/atomic_file.h"
+#include "core/memory.h"
+
+namespace strata::apps {
+namespace {
+
+/// Bytes of writable private memory this process has mapped.
+std::uint64_t data_bytes() {
+  const int descriptor = open("/proc/self/statm", O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) return 0;
+  char text[256] = {};
+  const ssize_t length = read(descriptor, text, sizeof text - 1);
+  close(descriptor);
+  unsigned long long pages = 0;  // the sixth number is data + stack
+  if (length <= 0 || std::sscanf(text, "%*u %*u %*u %*u %*u %llu", &pages) != 1) return 0;
+  return static_cast<std::uint64_t>(pages) * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
+}
+
+/// The last wall: allocations beyond it fail instead of taking the machine down. The limit is
+/// obeyed by estimates and slabs long before; this catches what they did not foresee. RLIMIT_DATA
+/// counts private writable memory, not files read through mmap nor reserved address space.
+void set_memory_wall(std::uint64_t limit, int threads) {
+  rlimit now{};
+  if (getrlimit(RLIMIT_DATA, &now) != 0) return;
+  // Each thread has a stack of 8 MB that it does not fill, and the allocator's own slack.
+  const std::uint64_t slack = (std::uint64_t{64} << 20) +
+                              static_cast<std::uint64_t>(threads + 2) * (std::uint64_t{9} << 20);
+  const std::uint64_t wall = data_bytes() + limit + slack;
+  if (wall < limit || (now.rlim_cur != RLIM_INFINITY && now.rlim_cur <= wall)) return;
+  now.rlim_cur = wall;
+  setrlimit(RLIMIT_DATA, &now);
+}
+
+}  // namespace
+
+void Session::configure(const CommonOptions& options) {
+  options_ = options;
+  memory_limit_ = options.memory_limit > 0 ? options.memory_limit : usable_memory_bytes() / 4 * 3;
+  if (memory_limit_ > 0) set_memory_wall(memory_limit_, threads());
+}
+
+int Session::threads() const {
+  Execution execution;
+  execution.threads = options_.threads;
+  return execution.thread_count();
+}
+
+Execution Session::execution(std::string label) {
+  Execution result;
+  result.threads = options_.threads;
+  result.stop = interrupts_.token();
+  result.memory_limit = memory_limit_;
+  const ProgressMode mode = options_.quiet ? ProgressMode::kNone : options_.progress;
+  if (mode == ProgressMode::kNone) return result;
+  if (bar_) {
+    bar_->begin(std::move(label));
+  } else {
+    bar_.emplace(std::move(label), mode);
+  }
+  result.progress = bar_->callback();
+  return result;
+}
+
+void Session::say(std::string_view kind, std::string_view message) {
+  if (bar_) bar_->clear();
+  const std::string line = fmt::format("strata: {}{}\n", kind, message);
+  // Nobody is left to tell when standard error is closed.
+  (void)write_text(STDERR_FILENO, line, "standard error");
+}
+
+void Session::warn(std::string code, std::string message) {
+  // Under --strict the first one becomes the error, and is printed as that.
+  if (!options_.quiet && !options_.strict) say("warning: ", message);
+  warnings_.push_back({std::move(code), std::move(message)});
+}
+
+void Session::note(std::string_view message) {
+  if (options_.verbose) say("", message);
+}
+
+Result<void> Session::check_strict() const {
+  if (!options_.strict || warnings_.empty()) return {};
+  return fail(ErrorCode::kGeometry, "{} (refused by --strict{})", warnings_.front().message,
+              warnings_.size() > 1
+                  ? fmt::format("; {}", counted(warnings_.size() - 1, "further warning"))
+                  : "");
+}
+
+void Session::complain(const Error& error) {
+  if (error.code == ErrorCode::kCancelled) return say("", "interrupted; no output was written");
+  say("error: ", error.message);
+}
+
+double Session::milliseconds() const {
+  return std::chrono::duration<double, std::milli>(Clock::now() - start_).count();
+}
+
+Result<void> write_text(int descriptor, std::string_view text, const std::string& name) {
+  while (!text.empty()) {
+    const ssize_t written = write(descriptor, text.data(), text.size());
+    if (written < 0) {
+      if (errno == EINTR) continue;
+      return fail(ErrorCode::kOutput, "{}: {}", name, std::strerror(errno));
+    }
+    text.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return {};
+}
+
+Result<void> print_report(std::string_view text, const std::string& where, bool stdout_is_taken) {
+  if (where != "-") {
+    auto file = AtomicFile::create(where);
+    if (!file) return tl::unexpected(file.error());
+    if (auto done = file->write(text.data(), text.size()); !done) return done;
+    return file->commit();
+  }
+  if (stdout_is_taken) return write_text(STDERR_FILENO, text, "standard error");
+  return write_text(STDOUT_FILENO, text, "standard output");
+}
+
+std::string readable_bytes(std::uint64_t bytes) {
+  constexpr const char* kUnits[] = {"kB", "MB", "GB", "TB", "PB", "EB"};
+  if (bytes < 1000) return fmt::format("{} bytes", bytes);
+  double value = static_cast<double>(bytes) / 1000;
+  std::size_t unit = 0;
+  while (value >= 999.5 && unit + 1 < std::size(kUnits)) {
+    value /= 1000;
+    ++unit;
+  }
+  return fmt::format("{:.3g} {}", value, kUnits[unit]);
+}
+
+std::string counted(std::uint64_t count, std::string_view noun) {
+  return fmt::format("{} {}{}", count, noun, count == 1 ? "" : "s");
+}
+
+}  // namespace strata::apps

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <chrono>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "apps/commands.h"
+#include "core/execution.h"
+#include "core/interrupt.h"
+#include "core/progress.h"
+#include "core/result.h"
+
+namespace strata::apps {
+
+/// Something the user should know of that did not stop the run.
+struct Warning {
+  std::string code;  ///< for machines, see docs/json.md
+  std::string message;
+};
+
+/// One run of a command: its clock, its talk on standard error, interrupts and limits.
+class Session {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  explicit Session(Clock::time_point start) : start_(start) {}
+
+  /// Takes the options every command has. Sets a wall against memory beyond the limit.
+  void configure(const CommonOptions& options);
+
+  /// For the next phase of the job; `label` is what the progress bar says.
+  [[nodiscard]] Execution execution(std::string label);
+  [[nodiscard]] int threads() const;
+  [[nodiscard]] std::uint64_t memory_limit() const { return memory_limit_; }
+  [[nodiscard]] bool interrupted() const { return interrupts_.interrupted(); }
+
+  /// Prints and keeps a warning. Under --strict the job ends at the next check_strict().
+  void warn(std::string code, std::string message);
+  /// Something for --verbose.
+  void note(std::string_view message);
+  /// @return kGeometry with the first warning's text under --strict
+  [[nodiscard]] Result<void> check_strict() const;
+  [[nodiscard]] const std::vector<Warning>& warnings() const { return warnings_; }
+  void complain(const Error& error);  ///< prints `strata: error: ...`
+
+  [[nodiscard]] double milliseconds() const;  ///< since the program began
+
+ private:
+  void say(std::string_view kind, std::string_view message);
+
+  Clock::time_point start_;
+  InterruptGuard interrupts_;
+  CommonOptions options_;
+  std::uint64_t memory_limit_ = 0;
+  std::optional<ProgressBar> bar_;
+  std::vector<Warning> warnings_;
+};
+
+/// Writes all of `text` to a descriptor. @return kOutput naming `name`
+Result<void> write_text(int descriptor, std::string_view text, const std::string& name);
+
+/// Prints a report where the user asked for it: "-" is standard output, or standard error when that
+/// carries the output file; else a file. @return kOutput
+Result<void> print_report(std::string_view text, const std::string& where, bool stdout_is_taken);
+
+/// "12.3 MB", powers of 1000 with three digits.
+[[nodiscard]] std::string readable_bytes(std::uint64_t bytes);
+
+/// "1 face", "2 faces".
+[[nodiscard]] std::string counted(std::uint64_t count, std::string_view noun);
+
+}  // namespace strata::apps

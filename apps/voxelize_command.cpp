@@ -1,0 +1,255 @@
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <utility>
+
+#include "apps/commands.h"
+#include "apps/memory_estimate.h"
+#include "apps/mesh_input.h"
+#include "apps/session.h"
+#include "apps/voxelize_report.h"
+#include "voxelize/voxel_writer.h"
+
+namespace strata::apps {
+namespace {
+
+std::string format_list() {
+  std::string text;
+  for (const VoxelFormat& format : voxel_formats()) {
+    text += fmt::format("{:<8} {:<8} {}\n", format.name, format.extension, format.description);
+  }
+  return text;
+}
+
+/// Refuses what would be found out only after the work.
+Result<void> check_output(const VoxelizeCommand& command) {
+  if (command.output.empty()) return {};
+  if (command.output == "-" && isatty(STDOUT_FILENO) != 0) {
+    return fail(ErrorCode::kUsage, "standard output is a terminal; a voxel file is no text");
+  }
+  if (auto format = voxel_format_for(command.output, command.format); !format) {
+    return tl::unexpected(format.error());
+  }
+  struct stat out {};
+  if (command.output == "-" || stat(command.output.c_str(), &out) != 0 || !S_ISREG(out.st_mode)) {
+    return {};
+  }
+  for (const std::string& path : command.input.files) {
+    struct stat in {};
+    if (stat(path.c_str(), &in) == 0 && in.st_dev == out.st_dev && in.st_ino == out.st_ino) {
+      return fail(ErrorCode::kUsage, "{} is an input; it would be overwritten", command.output);
+    }
+  }
+  return {};
+}
+
+/// The axis the format is written from, or the one with the fewest columns.
+Axis choose_axis(const VoxelizeCommand& command, const VoxelFormat* format, const VoxelGrid& grid) {
+  if (command.axis) return *command.axis;
+  if (format != nullptr) return format->axis;
+  // The longest side has the smallest cross-section.
+  if (grid.dims.z >= grid.dims.x && grid.dims.z >= grid.dims.y) return Axis::kZ;
+  return grid.dims.y >= grid.dims.x ? Axis::kY : Axis::kX;
+}
+
+bool covers(const VoxelGrid& grid, const Bounds& box) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const double s = grid.voxel_size[axis];
+    if (box.low[axis] < grid.origin[axis] - s / 2 ||
+        box.high[axis] > grid.origin[axis] + (grid.dims[axis] + 0.5) * s) {
+      return false;
+    }
+  }
+  return true;
+}
+
+/// Tells when parts of the mesh are too thin for voxel centres to hit them.
+void check_thin(const VoxelizeCommand& command, const MeshInput& input, const VoxelGrid& grid,
+                std::uint64_t solid_voxels, Session& session) {
+  const glm::dvec3 s = grid.voxel_size;
+  const double volume = input.volume / (s.x * s.y * s.z);
+  std::string holds = fmt::format("the solid holds {} voxels", solid_voxels);
+  if (input.closed) holds += fmt::format(" where the mesh's volume is {:.1f} voxels", volume);
+  const char* remedy = command.surface ? "" : "; --surface holds all of it";
+  for (int axis = 0; axis < 3; ++axis) {
+    const double extent = (input.bounds.high[axis] - input.bounds.low[axis]) / s[axis];
+    if (extent >= 1.0) continue;
+    return session.warn("thin", fmt::format("{}: the mesh is {:.3g} voxels thick along {}{}", holds,
+                                            extent, name_of(static_cast<Axis>(axis)), remedy));
+  }
+  if (!input.closed) {
+    if (solid_voxels == 0) session.warn("empty", fmt::format("no voxel is solid{}", remedy));
+    return;
+  }
+  // Twice the volume over the area is the mean thickness: exact for plates and shells.
+  const double thickness =
+      input.area > 0 ? 2 * input.volume / input.area / std::cbrt(s.x * s.y * s.z) : 0.0;
+  // Centres miss or hit a body of some voxels' thickness about as often; several percent of its
+  // volume are lost or won only where it is thin. Overlaps count twice in the mesh's volume, so a
+  // loss alone proves nothing.
+  const double off = std::abs(static_cast<double>(solid_voxels) - volume);
+  if (thickness < 1.0 || (thickness < 4.0 && off > 0.1 * volume + 1.0)) {
+    session.warn("thin", fmt::format("{}: parts are thinner than a voxel ({:.3g} voxels on average)"
+                                     "{}",
+                                     holds, thickness, remedy));
+  } else if (solid_voxels == 0) {
+    session.warn("empty", fmt::format("no voxel is solid{}", remedy));
+  }
+}
+
+void check_columns(const VoxelizeCommand& command, const VoxelizeOutcome& outcome,
+                   Session& session) {
+  const VoxelizeReport& report = outcome.report;
+  if (!command.solid) return;
+  if (report.unbalanced_columns > 0) {
+    session.warn(
+        "unbalanced-columns",
+        fmt::format("{} entered and left unequally often; {}",
+                    counted(report.unbalanced_columns, "column is") == "1 column is"
+                        ? std::string("1 column is")
+                        : fmt::format("{} columns are", report.unbalanced_columns),
+                    command.open == OpenMode::kVote ? "the vote of three axes decided their voxels"
+                                                    : "their voxels are not to be trusted"));
+  }
+  if (report.negative_columns > 0 && outcome.input.closed && command.rule == InsideRule::kWinding) {
+    session.warn("negative-winding",
+                 fmt::format("{} columns run through parts that are inside out, which are not "
+                             "solid; --rule nonzero fills them",
+                             report.negative_columns));
+  }
+}
+
+std::optional<std::uint64_t> size_of_file(const std::string& path) {
+  struct stat status {};
+  if (path == "-" || stat(path.c_str(), &status) != 0 || !S_ISREG(status.st_mode)) {
+    return std::nullopt;
+  }
+  return static_cast<std::uint64_t>(status.st_size);
+}
+
+Result<void> print_reports(const VoxelizeCommand& command, const VoxelizeOutcome& outcome,
+                           const Session& session) {
+  const bool json_on_stdout = command.json == "-";
+  const bool file_on_stdout = command.output == "-" && !command.dry_run;
+  if (command.stats || ((command.dry_run || command.checksum) && !command.json)) {
+    const std::string text = voxelize_text(command, outcome, session);
+    if (auto done = print_report(text, "-", file_on_stdout || json_on_stdout); !done) return done;
+  }
+  if (!command.json) return {};
+  return print_report(voxelize_json(command, outcome, session), *command.json, file_on_stdout);
+}
+
+/// The work itself: lists, intervals, file.
+Result<void> voxelize_and_write(const VoxelizeCommand& command, VoxelizeOutcome& outcome,
+                                Session& session) {
+  std::unique_ptr<VoxelWriter> writer;
+  if (!command.output.empty()) {
+    VoxelWriterOptions options;
+    options.fog = command.fog;
+    options.name = command.solid ? "solid" : "surface";
+    auto opened = open_voxel_writer(command.output, command.format, outcome.grid, options);
+    if (!opened) return tl::unexpected(opened.error());
+    writer = *std::move(opened);
+  }
+  VoxelizeOptions options;
+  options.rule = command.rule;
+  options.axis = outcome.axis;
+  options.solid = command.solid;
+  options.surface = command.surface;
+  options.surface_kind = command.surface_kind;
+  options.open = command.open;
+  options.closed = outcome.input.closed;
+  options.store = command.store;
+  options.offsets = command.offsets;
+  options.statistics = command.stats || command.json || command.checksum;
+
+  Execution execution = session.execution("voxelizing");
+  // The mesh is there already; what the format holds is not the voxelizer's.
+  const std::uint64_t taken = outcome.estimate.mesh + outcome.estimate.output;
+  execution.memory_limit = std::max<std::uint64_t>(
+      session.memory_limit() > taken ? session.memory_limit() - taken : 0, 1);
+  Execution quiet = execution;
+  quiet.progress = {};
+  std::uint64_t solid_voxels = 0;
+  double write_ms = 0;
+  const auto sink = [&](const VoxelIntervals& slab) -> Result<void> {
+    if (!options.statistics) solid_voxels += slab.solid_voxels();
+    if (!writer) return {};
+    const double start = session.milliseconds();
+    auto done = writer->add(slab, quiet);
+    write_ms += session.milliseconds() - start;
+    return done;
+  };
+  auto report = voxelize_slabs(outcome.input.soup, outcome.grid, options, execution, sink);
+  if (!report) return tl::unexpected(report.error());
+  if (session.interrupted()) return fail(ErrorCode::kCancelled, "stopped");
+  outcome.report = *report;
+  outcome.measured = true;
+  if (!options.statistics) outcome.report.solid_voxels = solid_voxels;
+
+  check_columns(command, outcome, session);
+  if (command.solid && !command.surface && covers(outcome.grid, outcome.input.bounds)) {
+    check_thin(command, outcome.input, outcome.grid, outcome.report.solid_voxels, session);
+  } else if (outcome.report.solid_voxels == 0) {
+    session.warn("empty", "no voxel is solid; does the grid hold the mesh?");
+  }
+  if (auto strict = session.check_strict(); !strict) return strict;
+  if (!writer) return {};
+  const double start = session.milliseconds();
+  if (auto done = writer->finish(quiet); !done) return done;
+  writer.reset();
+  outcome.write_ms = write_ms + session.milliseconds() - start;
+  if (session.interrupted()) session.note("the interrupt came too late: the output is complete");
+  outcome.output_bytes = size_of_file(command.output);
+  return {};
+}
+
+}  // namespace
+
+Result<void> run_voxelize(const VoxelizeCommand& command, Session& session) {
+  if (command.list_formats) return print_report(format_list(), "-", false);
+  if (auto valid = check_output(command); !valid) return valid;
+
+  VoxelizeOutcome outcome;
+  auto input = load_meshes(
+      command.input, {.keep_orientation = command.keep_orientation, .rule = command.rule}, session);
+  if (!input) return tl::unexpected(input.error());
+  outcome.input = *std::move(input);
+  if (auto strict = session.check_strict(); !strict) return strict;
+  if (!outcome.input.closed && command.solid && command.open == OpenMode::kFail) {
+    return fail(ErrorCode::kGeometry, "{} (--open fail)", session.warnings().back().message);
+  }
+
+  auto grid = fit_grid(outcome.input.bounds, command.grid);
+  if (!grid) {
+    return fail(grid.error().code, "{}: {}", command.input.files.front(), grid.error().message);
+  }
+  outcome.grid = *grid;
+  Result<VoxelFormat> format;
+  if (!command.output.empty()) {
+    format = voxel_format_for(command.output, command.format);
+    outcome.format = format->name;
+  }
+  outcome.axis = choose_axis(command, command.output.empty() ? nullptr : &*format, outcome.grid);
+  outcome.estimate = estimate_memory(outcome.input, outcome.grid, outcome.axis, command,
+                                     outcome.format, session.threads(), session.memory_limit());
+  session.note(fmt::format("grid {} x {} x {}, about {} to hold", grid->dims.x, grid->dims.y,
+                           grid->dims.z, readable_bytes(outcome.estimate.total())));
+  if (session.memory_limit() > 0 && outcome.estimate.total() > session.memory_limit() &&
+      !command.dry_run) {
+    return fail(ErrorCode::kLimit,
+                "a grid of {} x {} x {} voxels of this mesh takes about {}, the limit is {} "
+                "(--memory-limit)",
+                grid->dims.x, grid->dims.y, grid->dims.z, readable_bytes(outcome.estimate.total()),
+                readable_bytes(session.memory_limit()));
+  }
+  if (!command.dry_run) {
+    if (auto done = voxelize_and_write(command, outcome, session); !done) return done;
+  }
+  return print_reports(command, outcome, session);
+}
+
+}  // namespace strata::apps

@@ -1,0 +1,317 @@
+#include "apps/voxelize_report.h"
+
+#include <algorithm>
+#include <array>
+#include <numeric>
+
+#include "apps/json_writer.h"
+#include "core/memory.h"
+
+namespace strata::apps {
+namespace {
+
+std::uint64_t column_count(const VoxelizeOutcome& outcome) {
+  const AxisFrame frame(outcome.axis);
+  return static_cast<std::uint64_t>(outcome.grid.dims[frame.u]) *
+         static_cast<std::uint64_t>(outcome.grid.dims[frame.v]);
+}
+
+double voxel_volume(const VoxelGrid& grid) {
+  return grid.voxel_size.x * grid.voxel_size.y * grid.voxel_size.z;
+}
+
+/// Columns with n crossings, n = 0 .. 64, the last one 64 and more; without trailing zeros.
+std::vector<std::uint64_t> depth_histogram(const VoxelizeOutcome& outcome) {
+  const auto& counts = outcome.report.depth_histogram;
+  std::vector<std::uint64_t> result(counts.begin(), counts.end());
+  const std::uint64_t covered = std::accumulate(result.begin() + 1, result.end(), std::uint64_t{0});
+  const std::uint64_t columns = column_count(outcome);
+  result[0] = columns > covered ? columns - covered : 0;
+  while (result.size() > 1 && result.back() == 0) result.pop_back();
+  return result;
+}
+
+std::string triple(const glm::dvec3& v) {
+  return fmt::format("({:.6g}, {:.6g}, {:.6g})", v.x, v.y, v.z);
+}
+
+/// 1234567 as 1 234 567.
+std::string grouped(std::uint64_t number) {
+  std::string text = std::to_string(number);
+  for (std::size_t place = text.size(); place > 3;) {
+    place -= 3;
+    text.insert(place, " ");
+  }
+  return text;
+}
+
+void write_input(JsonWriter& json, const MeshInput& input) {
+  json.key("input").begin_object();
+  std::uint64_t triangles = 0, vertices = 0;
+  for (const InputFacts& file : input.files) {
+    triangles += file.stats.triangles;
+    vertices += file.stats.vertices;
+  }
+  json.member("triangles", triangles);
+  json.member("vertices", vertices);
+  json.member("closed", input.closed);
+  json.member("area", input.area);
+  json.member("volume", input.volume);
+  json.key("bounds").begin_object();
+  json.member("low", input.bounds.low);
+  json.member("high", input.bounds.high);
+  json.end_object();
+  json.key("files").begin_array();
+  for (const InputFacts& file : input.files) {
+    json.begin_object();
+    json.member("path", file.path);
+    json.member("format", file.stats.format);
+    json.member("bytes", file.stats.bytes);
+    json.member("vertices", file.stats.vertices);
+    json.member("faces", file.stats.faces);
+    json.member("triangles", file.stats.triangles);
+    json.member("dropped_faces", file.stats.dropped_faces());
+    json.member("zero_area_faces", file.zero_area_faces);
+    json.member("closed", file.closed);
+    json.member("turned_around", file.turned_around);
+    json.member("unbalanced_edges", file.diagnosis ? file.diagnosis->unbalanced_edges : 0);
+    json.member("area", file.area);
+    json.member("volume", file.volume);
+    json.end_object();
+  }
+  json.end_array();
+  json.end_object();
+}
+
+void write_results(JsonWriter& json, const VoxelizeCommand& command,
+                   const VoxelizeOutcome& outcome) {
+  const VoxelizeReport& report = outcome.report;
+  if (!outcome.measured) return;
+  json.key("voxels").begin_object();
+  json.member("solid", report.solid_voxels);
+  json.member("volume", static_cast<double>(report.solid_voxels) * voxel_volume(outcome.grid));
+  json.member("intervals", report.intervals);
+  if (command.checksum) json.member("checksum", fmt::format("{:016x}", report.checksum));
+  json.end_object();
+
+  json.key("lists").begin_object();
+  json.member("crossings", report.crossings);
+  json.member("columns", column_count(outcome));
+  json.member("max_depth", report.max_depth_complexity);
+  json.member("unbalanced_columns", report.unbalanced_columns);
+  json.member("negative_columns", report.negative_columns);
+  json.member("rebuilt_tiles", report.rebuilt_tiles);
+  json.key("depth_histogram").begin_array();
+  for (const std::uint64_t count : depth_histogram(outcome)) json.value(count);
+  json.end_array();
+  json.end_object();
+}
+
+}  // namespace
+
+std::string voxelize_text(const VoxelizeCommand& command, const VoxelizeOutcome& outcome,
+                          const Session& session) {
+  std::string text;
+  const auto line = [&](std::string_view topic, const std::string& rest) {
+    text += fmt::format("{:<9} {}\n", topic, rest);
+  };
+  for (const InputFacts& file : outcome.input.files) {
+    line("input",
+         fmt::format("{}: {} triangles, {} vertices, {}{}", file.path,
+                     grouped(file.stats.triangles), grouped(file.stats.vertices),
+                     file.closed ? "closed" : "open", file.turned_around ? ", turned around" : ""));
+  }
+  line("mesh",
+       fmt::format("{} to {}, area {:.6g}, volume {:.6g}", triple(outcome.input.bounds.low),
+                   triple(outcome.input.bounds.high), outcome.input.area, outcome.input.volume));
+  const VoxelGrid& grid = outcome.grid;
+  const glm::dvec3 s = grid.voxel_size;
+  line("grid",
+       fmt::format("{} x {} x {} voxels of {}, origin {}, rays along {}", grid.dims.x, grid.dims.y,
+                   grid.dims.z, s.x == s.y && s.y == s.z ? fmt::format("{:.6g}", s.x) : triple(s),
+                   triple(grid.origin), name_of(outcome.axis)));
+  if (outcome.measured) {
+    const VoxelizeReport& report = outcome.report;
+    const double cells =
+        static_cast<double>(column_count(outcome)) * grid.dims[AxisFrame(outcome.axis).w];
+    const auto solid = static_cast<double>(report.solid_voxels);
+    line(!command.surface ? "solid"
+         : command.solid  ? "both"
+                          : "surface",
+         fmt::format("{} voxels ({:.4g} %), volume {:.6g}, in {} intervals",
+                     grouped(report.solid_voxels), 100 * solid / cells, solid * voxel_volume(grid),
+                     grouped(report.intervals)));
+    if (command.checksum) line("checksum", fmt::format("{:016x}", report.checksum));
+    line("lists", fmt::format("{} crossings, at most {} in a column", grouped(report.crossings),
+                              report.max_depth_complexity));
+    std::string depths;
+    const auto histogram = depth_histogram(outcome);
+    for (std::size_t n = 0; n < histogram.size(); ++n) {
+      if (histogram[n] == 0) continue;
+      depths += fmt::format("{}{}{}: {}", depths.empty() ? "" : ", ", n, n == 64 ? "+" : "",
+                            grouped(histogram[n]));
+    }
+    line("depth", "columns by crossings " + depths);
+    if (report.unbalanced_columns > 0) {
+      line("holes", fmt::format("{} columns are entered and left unequally often",
+                                grouped(report.unbalanced_columns)));
+    }
+    line("time",
+         fmt::format("{:.1f} ms: read {:.1f}, check {:.1f}, lists {:.1f}, intervals {:.1f}, "
+                     "write {:.1f}",
+                     session.milliseconds(), outcome.input.read_ms, outcome.input.diagnose_ms,
+                     report.lists_ms, report.intervals_ms, outcome.write_ms));
+    line("memory", fmt::format("{} at most", readable_bytes(peak_memory_bytes())));
+  } else {
+    line("memory", fmt::format("about {} would be held, the limit is {}",
+                               readable_bytes(outcome.estimate.total()),
+                               readable_bytes(session.memory_limit())));
+  }
+  if (outcome.output_bytes) {
+    line("output", fmt::format("{}: {}, {} bytes", command.output, outcome.format,
+                               grouped(*outcome.output_bytes)));
+  }
+  return text;
+}
+
+std::string voxelize_json(const VoxelizeCommand& command, const VoxelizeOutcome& outcome,
+                          const Session& session) {
+  JsonWriter json;
+  json.begin_object();
+  json.member("strata", STRATA_VERSION);
+  json.member("command", "voxelize");
+  write_input(json, outcome.input);
+
+  json.key("grid").begin_object();
+  json.member("dims", outcome.grid.dims);
+  json.member("origin", outcome.grid.origin);
+  json.member("voxel_size", outcome.grid.voxel_size);
+  json.end_object();
+
+  json.key("options").begin_object();
+  json.member("solid", command.solid);
+  json.key("surface");
+  if (command.surface) {
+    json.value(name_of(command.surface_kind));
+  } else {
+    json.null();
+  }
+  json.member("rule", name_of(command.rule));
+  json.member("open", name_of(command.open));
+  json.member("axis", name_of(outcome.axis));
+  json.member("store", name_of(command.store));
+  json.member("offsets", name_of(command.offsets));
+  json.member("threads", session.threads());
+  json.end_object();
+
+  write_results(json, command, outcome);
+
+  json.key("output");
+  if (command.output.empty() || command.dry_run) {
+    json.null();
+  } else {
+    json.begin_object();
+    json.member("path", command.output);
+    json.member("format", outcome.format);
+    json.key("bytes");
+    if (outcome.output_bytes) {
+      json.value(*outcome.output_bytes);
+    } else {
+      json.null();
+    }
+    json.end_object();
+  }
+
+  json.key("timings_ms").begin_object();
+  json.member("read", outcome.input.read_ms);
+  json.member("check", outcome.input.diagnose_ms);
+  json.member("lists", outcome.report.lists_ms);
+  json.member("intervals", outcome.report.intervals_ms);
+  json.member("write", outcome.write_ms);
+  json.member("total", session.milliseconds());
+  json.end_object();
+
+  json.key("memory").begin_object();
+  json.member("peak_bytes", peak_memory_bytes());
+  json.member("estimated_bytes", outcome.estimate.total());
+  json.member("limit_bytes", session.memory_limit());
+  json.end_object();
+
+  json.key("warnings").begin_array();
+  for (const Warning& warning : session.warnings()) {
+    json.begin_object();
+    json.member("code", warning.code);
+    json.member("message", warning.message);
+    json.end_object();
+  }
+  json.end_array();
+  json.end_object();
+  return json.take();
+}
+
+const char* name_of(InsideRule rule) {
+  switch (rule) {
+    case InsideRule::kWinding:
+      return "winding";
+    case InsideRule::kNonzero:
+      return "nonzero";
+    case InsideRule::kParity:
+      break;
+  }
+  return "parity";
+}
+
+const char* name_of(OpenMode mode) {
+  switch (mode) {
+    case OpenMode::kVote:
+      return "vote";
+    case OpenMode::kSurface:
+      return "surface";
+    case OpenMode::kFail:
+      break;
+  }
+  return "fail";
+}
+
+const char* name_of(SurfaceKind kind) {
+  switch (kind) {
+    case SurfaceKind::kConservative:
+      return "conservative";
+    case SurfaceKind::k26:
+      return "26";
+    case SurfaceKind::k6:
+      break;
+  }
+  return "6";
+}
+
+const char* name_of(StoreKind store) {
+  switch (store) {
+    case StoreKind::kAuto:
+      return "auto";
+    case StoreKind::kHaBuffer:
+      return "ha";
+    case StoreKind::kCountScan:
+      break;
+  }
+  return "scan";
+}
+
+const char* name_of(OffsetKind offsets) {
+  switch (offsets) {
+    case OffsetKind::kPlaneFirst:
+      return "plane-first";
+    case OffsetKind::kRandom:
+      return "random";
+    case OffsetKind::kFarthestPoint:
+      break;
+  }
+  return "farthest";
+}
+
+const char* name_of(Axis axis) {
+  constexpr std::array kNames = {"x", "y", "z"};
+  return kNames[static_cast<std::size_t>(axis)];
+}
+
+}  // namespace strata::apps

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "apps/commands.h"
+#include "apps/memory_estimate.h"
+#include "apps/mesh_input.h"
+#include "apps/session.h"
+#include "core/grid.h"
+#include "voxelize/voxelize.h"
+
+namespace strata::apps {
+
+/// All that `strata voxelize` can tell of a run.
+struct VoxelizeOutcome {
+  MeshInput input;
+  VoxelGrid grid;
+  Axis axis = Axis::kZ;
+  MemoryEstimate estimate;
+  VoxelizeReport report;
+  bool measured = false;  ///< the report's statistics are filled
+  std::string format;     ///< of the output; empty: none
+  std::optional<std::uint64_t> output_bytes;
+  double write_ms = 0.0;
+};
+
+/// For people: a line a topic.
+[[nodiscard]] std::string voxelize_text(const VoxelizeCommand& command,
+                                        const VoxelizeOutcome& outcome, const Session& session);
+
+/// For programs, as docs/json.md says.
+[[nodiscard]] std::string voxelize_json(const VoxelizeCommand& command,
+                                        const VoxelizeOutcome& outcome, const Session& session);
+
+/// Names of choices, as the command line has them.
+[[nodiscard]] const char* name_of(InsideRule rule);
+[[nodiscard]] const char* name_of(OpenMode mode);
+[[nodiscard]] const char* name_of(SurfaceKind kind);
+[[nodiscard]] const char* name_of(StoreKind store);
+[[nodiscard]] const char* name_of(OffsetKind offsets);
+[[nodiscard]] const char* name_of(Axis axis);
+
+}  // namespace strata::apps
