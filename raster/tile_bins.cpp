@@ -8,8 +8,8 @@
 namespace strata {
 namespace {
 
-/// The tiles that a triangle's box of pixel centres meets, as a half-open box of tiles; u0 = u1 = 0
-/// where it meets none.
+/// The tiles that a triangle's box of pixel centres meets, as a half-open box of tiles; empty where
+/// it meets none.
 struct TileRect {
   std::uint16_t u0, v0, u1, v1;
 };
@@ -24,10 +24,13 @@ TileRect tile_rect(const LatticeMesh& mesh, const glm::uvec3& triangle, const Ax
   const int u1 = std::min(target.width, end_pixel(high(frame.u)));
   const int v0 = std::max(0, first_pixel(low(frame.v)));
   const int v1 = std::min(target.height, end_pixel(high(frame.v)));
-  if (u0 >= u1 || v0 >= v1) return {};
-  const auto tile = [](int pixel) { return static_cast<std::uint16_t>(pixel / kTileSide); };
-  return {tile(u0), tile(v0), static_cast<std::uint16_t>(tile(u1 - 1) + 1),
-          static_cast<std::uint16_t>(tile(v1 - 1) + 1)};
+  // No branch: small triangles miss all pixel centres too often and too irregularly to predict.
+  const int covers = u0 < u1 && v0 < v1 ? 1 : 0;
+  const auto tile = [covers](int pixel) {
+    return static_cast<std::uint16_t>(static_cast<unsigned>(pixel * covers) / kTileSide);
+  };
+  return {tile(u0), tile(v0), static_cast<std::uint16_t>(tile(u1 - 1) + covers),
+          static_cast<std::uint16_t>(tile(v1 - 1) + covers)};
 }
 
 }  // namespace
@@ -46,17 +49,20 @@ Result<TileBins> bin_triangles(const LatticeMesh& mesh, const RasterTarget& targ
   // writes at its own cursors.
   const std::size_t parts = std::max<std::size_t>(
       1, std::min<std::size_t>(static_cast<std::size_t>(execution.thread_count()), count / 4096));
-  std::vector<std::uint64_t> cursors(parts * tiles, 0);
+  // The last cursor of a part is for triangles in no tile, so that they need no branch.
+  const std::size_t stride = tiles + 1;
+  std::vector<std::uint64_t> cursors(parts * stride, 0);
   const auto rects = std::make_unique_for_overwrite<TileRect[]>(count);
+  const auto row = static_cast<std::size_t>(bins.tiles_u);
   const auto for_each_tile = [&](const TileRect& rect, auto&& body) {
+    const int width = rect.u1 - rect.u0, height = rect.v1 - rect.v0;
+    if (width * height <= 1) return body(width > 0 ? rect.v0 * row + rect.u0 : tiles);
     for (std::size_t tv = rect.v0; tv < rect.v1; ++tv) {
-      for (std::size_t tu = rect.u0; tu < rect.u1; ++tu) {
-        body(tv * static_cast<std::size_t>(bins.tiles_u) + tu);
-      }
+      for (std::size_t tu = rect.u0; tu < rect.u1; ++tu) body(tv * row + tu);
     }
   };
   parallel_for(execution, parts, [&](std::size_t part, int) {
-    std::uint64_t* counts = cursors.data() + part * tiles;
+    std::uint64_t* counts = cursors.data() + part * stride;
     for (std::size_t i = count * part / parts; i < count * (part + 1) / parts; ++i) {
       rects[i] = tile_rect(mesh, mesh.triangles[i], frame, target);
       for_each_tile(rects[i], [counts](std::size_t tile) { ++counts[tile]; });
@@ -67,7 +73,7 @@ Result<TileBins> bin_triangles(const LatticeMesh& mesh, const RasterTarget& targ
   for (std::size_t tile = 0; tile < tiles; ++tile) {
     bins.offsets[tile] = static_cast<std::uint32_t>(sum);
     for (std::size_t part = 0; part < parts; ++part) {
-      sum += std::exchange(cursors[part * tiles + tile], sum);
+      sum += std::exchange(cursors[part * stride + tile], sum);
     }
   }
   if (sum > std::numeric_limits<std::uint32_t>::max()) {
@@ -78,15 +84,18 @@ Result<TileBins> bin_triangles(const LatticeMesh& mesh, const RasterTarget& targ
         count, tiles, kTilePixels, sum);
   }
   bins.offsets[tiles] = static_cast<std::uint32_t>(sum);
-  bins.triangles.resize(sum);
+  bins.triangles.resize(sum + parts);  // each part's place for triangles in no tile, cut off below
   parallel_for(execution, parts, [&](std::size_t part, int) {
-    std::uint64_t* cursor = cursors.data() + part * tiles;
+    std::uint64_t* cursor = cursors.data() + part * stride;
+    cursor[tiles] = sum + part;
     for (std::size_t i = count * part / parts; i < count * (part + 1) / parts; ++i) {
       for_each_tile(rects[i], [&](std::size_t tile) {
-        bins.triangles[cursor[tile]++] = static_cast<std::uint32_t>(i);
+        bins.triangles[cursor[tile]] = static_cast<std::uint32_t>(i);
+        cursor[tile] += tile < tiles ? 1 : 0;
       });
     }
   });
+  bins.triangles.resize(sum);
   if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
   return bins;
 }
