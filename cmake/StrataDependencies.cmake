@@ -2,6 +2,7 @@
 # what is optional goes off, and the summary says so. The last part of each strata_feature() is the hint printed there.
 set(STRATA_FEATURES "" CACHE INTERNAL "Lines of the summary")
 function(strata_feature name state detail)
+  string(REPLACE ";" "," detail "${detail}")
   set(STRATA_FEATURES "${STRATA_FEATURES};${name}|${state}|${detail}" CACHE INTERNAL "Lines of the summary")
 endfunction()
 
@@ -72,6 +73,15 @@ if(STRATA_WITH_OPENEXR)
   endif()
 else()
   strata_feature(OpenEXR OFF "STRATA_WITH_OPENEXR is off")
+endif()
+
+pkg_check_modules(minizip QUIET IMPORTED_TARGET minizip)
+if(minizip_FOUND)
+  set(STRATA_HAVE_MINIZIP ON)
+  strata_feature(minizip ON "${minizip_VERSION}, depth lists as .npz")
+else()
+  set(STRATA_HAVE_MINIZIP OFF)
+  strata_feature(minizip OFF "libminizip-dev is missing")
 endif()
 
 set(STRATA_HAVE_OPENMESH OFF)
