@@ -11,53 +11,26 @@ HWY_BEFORE_NAMESPACE();
 namespace strata {
 namespace HWY_NAMESPACE {
 
-/// Values of a vector of fragments in the record's order: larger is nearer.
-struct KeyLanes {
-  using D = LaneU32;
-  using V = hn::Vec<D>;
-  V exit_bits;
-  HWY_INLINE void begin(bool exit, std::uint32_t) { exit_bits = hn::Set(D(), exit ? 1u : 0u); }
-  /// Keys of the covered lanes; the others hold rubbish.
-  HWY_INLINE V keys(VecU32 depth) const { return hn::Or(hn::ShiftLeft<1>(depth), exit_bits); }
-  HWY_INLINE static hn::Mask<D> mask(MaskU32 covered) { return covered; }
-  static std::uint32_t key(std::uint32_t depth, bool exit, std::uint32_t) {
-    return depth << 1 | (exit ? 1u : 0u);
-  }
-};
-
-struct ItemLanes {
-  using D = hn::ScalableTag<std::uint64_t>;
-  using V = hn::Vec<D>;
-  V payload;
-  HWY_INLINE void begin(bool exit, std::uint32_t triangle) {
-    payload = hn::Set(D(), DepthItem(0, exit, triangle).bits);
-  }
-  HWY_INLINE V keys(VecU32 depth) const {
-    return hn::Or(hn::ShiftLeft<32>(hn::PromoteTo(D(), depth)), payload);
-  }
-  HWY_INLINE static hn::Mask<D> mask(MaskU32 covered) {
-    // Through a vector: masks of different lane widths do not convert.
-    const auto ones = hn::IfThenElseZero(covered, hn::Set(LaneU32(), 1u));
-    return hn::Ne(hn::PromoteTo(D(), ones), hn::Zero(D()));
-  }
-  static std::uint64_t key(std::uint32_t depth, bool exit, std::uint32_t triangle) {
-    return DepthItem(depth, exit, triangle).bits;
-  }
-};
-
-template <class Record>
-using LanesOf = std::conditional_t<std::is_same_v<Record, Record32>, KeyLanes, ItemLanes>;
-
 /// All of a record but its age.
 template <class Record>
 inline constexpr typename Record::Word kValueMask = Record::kAgeUnit - 1;
+
+/// The key of one fragment.
+template <class Record>
+TileKey<Record> make_key(std::uint32_t depth, bool exit, std::uint32_t triangle) {
+  if constexpr (std::is_same_v<TileKey<Record>, DepthKey>) {
+    return depth << 1 | (exit ? 1u : 0u);
+  } else {
+    return DepthItem(depth, exit, triangle);
+  }
+}
 
 /// Inserts covered pixels into the tile's HA-buffer.
 template <class Record>
 class TableSink {
  public:
   using Bits = typename Record::Word;
-  using Lanes = LanesOf<Record>;
+  static constexpr bool kKeys = Record::kPayloadBits == 0;
 
   TableSink(TileTable<Record>& table, const PixelRect& clip)
       : table_(&table),
@@ -68,19 +41,62 @@ class TableSink {
   HWY_INLINE void begin(bool exit, std::uint32_t triangle, const PixelRect& box) {
     exit_ = exit;
     triangle_ = triangle;
-    lanes_.begin(exit, triangle);
+    // A record of age 1 at depth 0, from which depths are subtracted.
+    if constexpr (kKeys) {
+      nearest_ = Record::kAgeUnit + kValueMask<Record> - (exit ? 1 : 0);
+    } else {
+      nearest_ = Record::kAgeUnit + kValueMask<Record> - DepthItem(0, exit, triangle).bits;
+    }
     result_.add_rows(box.v0 - v0_, box.v1 - v0_);
   }
-  HWY_INLINE void put(int u, int v, MaskU32 covered, VecU32 depth) {
-    using D = typename Lanes::D;
-    const D d;
-    const auto mask = Lanes::mask(covered);
-    const auto step = hn::Set(d, Record::kAgeUnit);
-    const auto value = hn::AndNot(lanes_.keys(depth), hn::Set(d, kValueMask<Record>));
-    auto carry = hn::IfThenElseZero(mask, hn::Or(value, step));
-    result_.fragments += hn::CountTrue(d, mask);
-
+  /// Keys: whole records. Items: depth + 1, since a record needs a wider lane.
+  template <class D, class V = hn::Vec<D>>
+  HWY_INLINE V encode(D d, V depth, hn::Mask<D> covered) {
+    result_.fragments += hn::CountTrue(d, covered);
+    if constexpr (kKeys) {
+      return hn::IfThenElseZero(covered, hn::Sub(hn::Set(d, static_cast<std::uint32_t>(nearest_)),
+                                                 hn::ShiftLeft<1>(depth)));
+    } else {
+      return hn::IfThenElseZero(covered, hn::Add(depth, hn::Set(d, 1u)));
+    }
+  }
+  template <int columns>
+  HWY_INLINE void put_row(int u, int v, const std::uint32_t* words) {
+    const hn::CappedTag<Bits, columns> d;
     const std::size_t pixel = pixel_at(u, v);
+    for (std::size_t i = 0; i < columns; i += hn::Lanes(d)) {
+      if constexpr (kKeys) {
+        insert(d, pixel + i, hn::Load(d, words + i));
+      } else {
+        const auto lifted =
+            hn::PromoteTo(d, hn::LoadU(hn::Rebind<std::uint32_t, decltype(d)>(), words + i));
+        const auto depth = hn::ShiftLeft<32>(hn::Sub(lifted, hn::Set(d, Bits{1})));
+        insert(
+            d, pixel + i,
+            hn::IfThenElseZero(hn::Ne(lifted, hn::Zero(d)), hn::Sub(hn::Set(d, nearest_), depth)));
+      }
+    }
+  }
+  void put_one(int u, int v, std::uint32_t depth) {
+    ++result_.fragments;
+    const Bits key = bits_of(make_key<Record>(depth, exit_, triangle_));
+    table_->insert(pixel_at(u, v), (~key & kValueMask<Record>) | Record::kAgeUnit);
+  }
+  TileRasterResult finish() {
+    table_->oldest = std::max(table_->oldest, oldest_);
+    return result_;
+  }
+
+ private:
+  static std::uint32_t bits_of(DepthKey key) { return key; }
+  static std::uint64_t bits_of(DepthItem item) { return item.bits; }
+  [[nodiscard]] HWY_INLINE std::size_t pixel_at(int u, int v) const {
+    return static_cast<std::size_t>((v - v0_) * kTileSide + (u - u0_));
+  }
+
+  template <class D>
+  HWY_INLINE void insert(D d, std::size_t pixel, hn::Vec<D> carry) {
+    const auto step = hn::Set(d, Record::kAgeUnit);
     Bits* HWY_RESTRICT cell = cells_ + pixel;
     for (int age = 1; age <= planes_; ++age, cell += kTilePixels) {
       // Only records of the same pixel and age can be smaller here, so no lane evicts a stranger.
@@ -95,27 +111,13 @@ class TableSink {
       carry = hn::Add(less, hn::IfThenElseZero(left, step));
     }
     oldest_ = planes_;
-    overflow(*table_, pixel, carry);
-  }
-  void put_one(int u, int v, std::uint32_t depth) {
-    ++result_.fragments;
-    const Bits key = Lanes::key(depth, exit_, triangle_);
-    table_->insert(pixel_at(u, v), (~key & kValueMask<Record>) | Record::kAgeUnit);
-  }
-  TileRasterResult finish() {
-    table_->oldest = std::max(table_->oldest, oldest_);
-    return result_;
-  }
-
- private:
-  [[nodiscard]] HWY_INLINE std::size_t pixel_at(int u, int v) const {
-    return static_cast<std::size_t>((v - v0_) * kTileSide + (u - u0_));
+    overflow(*table_, d, pixel, carry);
   }
   /// The planes are exhausted: each lane goes on by itself. Static, so that the sink's members may
   /// stay in registers.
-  static HWY_NOINLINE void overflow(TileTable<Record>& table, std::size_t pixel,
-                                    typename Lanes::V carry) {
-    const typename Lanes::D d;
+  template <class D>
+  static HWY_NOINLINE void overflow(TileTable<Record>& table, D d, std::size_t pixel,
+                                    hn::Vec<D> carry) {
     alignas(64) Bits records[HWY_MAX_BYTES / sizeof(Bits)];
     hn::Store(carry, d, records);
     for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
@@ -133,7 +135,7 @@ class TableSink {
   Bits* cells_;
   int planes_, oldest_ = 0;
   int u0_, v0_;
-  Lanes lanes_;
+  Bits nearest_ = 0;
   std::uint32_t triangle_ = 0;
   bool exit_ = false;
   TileRasterResult result_;
@@ -143,33 +145,45 @@ class TableSink {
 template <class Record>
 class LogSink {
  public:
-  using Lanes = LanesOf<Record>;
-
   LogSink(TileLog<Record>& log, const PixelRect& clip) : log_(&log), clip_(clip) {}
   HWY_INLINE void begin(bool exit, std::uint32_t triangle, const PixelRect& box) {
     exit_ = exit;
     triangle_ = triangle;
-    lanes_.begin(exit, triangle);
     result_.add_rows(box.v0 - clip_.v0, box.v1 - clip_.v0);
     log_->reserve(static_cast<std::size_t>(box.u1 - box.u0) *
                   static_cast<std::size_t>(box.v1 - box.v0));
   }
-  HWY_INLINE void put(int u, int v, MaskU32 covered, VecU32 depth) {
-    const LaneU32 d32;
-    const int pixel = (v - clip_.v0) * kTileSide + (u - clip_.u0);
-    const auto pixels = hn::Iota(d32, static_cast<std::uint32_t>(pixel));
-    hn::CompressStore(pixels, covered, d32, log_->pixels.data() + log_->count);
-    const typename Lanes::D d;
-    log_->count += hn::CompressStore(
-        lanes_.keys(depth), Lanes::mask(covered), d,
-        reinterpret_cast<typename Record::Word*>(log_->keys.data()) + log_->count);
+  template <class D, class V = hn::Vec<D>>
+  HWY_INLINE V encode(D d, V depth, hn::Mask<D> covered) const {
+    return hn::IfThenElseZero(covered, hn::Add(depth, hn::Set(d, 1u)));
+  }
+  template <int columns>
+  HWY_INLINE void put_row(int u, int v, const std::uint32_t* words) {
+    const hn::CappedTag<std::uint32_t, columns> d;
+    const auto pixel = static_cast<std::uint32_t>((v - clip_.v0) * kTileSide + (u - clip_.u0));
+    for (std::size_t i = 0; i < columns; i += hn::Lanes(d)) {
+      const auto lifted = hn::Load(d, words + i);
+      const auto covered = hn::Ne(lifted, hn::Zero(d));
+      hn::CompressStore(hn::Iota(d, pixel + static_cast<std::uint32_t>(i)), covered, d,
+                        log_->pixels.data() + log_->count);
+      const auto depth = hn::Sub(lifted, hn::Set(d, 1u));
+      if constexpr (Record::kPayloadBits == 0) {
+        const auto key = hn::Or(hn::ShiftLeft<1>(depth), hn::Set(d, exit_ ? 1u : 0u));
+        log_->count += hn::CompressStore(key, covered, d, log_->keys.data() + log_->count);
+      } else {
+        alignas(64) std::uint32_t depths[HWY_MAX_BYTES / 4];
+        const std::size_t found = hn::CompressStore(depth, covered, d, depths);
+        for (std::size_t k = 0; k < found; ++k) {
+          log_->keys[log_->count++] = make_key<Record>(depths[k], exit_, triangle_);
+        }
+      }
+    }
   }
   void put_one(int u, int v, std::uint32_t depth) {
     log_->pixels[log_->count] =
         static_cast<std::uint32_t>((v - clip_.v0) * kTileSide + (u - clip_.u0));
-    log_->keys[log_->count++] = TileKey<Record>(Lanes::key(depth, exit_, triangle_));
+    log_->keys[log_->count++] = make_key<Record>(depth, exit_, triangle_);
   }
-
   TileRasterResult finish() {
     result_.fragments = log_->count;
     return result_;
@@ -179,7 +193,6 @@ class LogSink {
   TileLog<Record>* log_;
   TileRasterResult result_;
   PixelRect clip_;
-  Lanes lanes_;
   std::uint32_t triangle_ = 0;
   bool exit_ = false;
 };

@@ -27,11 +27,8 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 using LaneF64 = hn::ScalableTag<double>;
 using LaneI32 = hn::Rebind<std::int32_t, LaneF64>;
-using LaneU32 = hn::Rebind<std::uint32_t, LaneF64>;
 using VecF64 = hn::Vec<LaneF64>;
 using VecI32 = hn::Vec<LaneI32>;
-using VecU32 = hn::Vec<LaneU32>;
-using MaskU32 = hn::Mask<LaneU32>;
 inline constexpr std::size_t kMaxLanes = HWY_MAX_BYTES / sizeof(double);
 
 /// Extents (lattice steps) up to which all numerators stay below 2^51 as they are, and up to which
@@ -235,68 +232,136 @@ class SetupBatch {
   alignas(64) Lanes<std::int32_t> box_u0_, box_u1_, box_v0_, box_v1_;
 };
 
-/// Calls sink.put(u, v, mask, depth) with u, v from `box` on: lane i is pixel (u + i, v), covered
-/// where `mask` is set; depth is clamped to [0, depth_limit). `box` lies within one tile (at most
-/// 64 pixels a side). Pixels u .. u + lanes - 1 may reach beyond the box (masked off).
-template <bool split, class Sink>
+/// The lane layout of a block of pixels: as many 32-bit lanes as a vector holds, `columns` a row (a
+/// power of two, at most the lanes), rows below each other.
+template <int columns>
+struct PixelBlock {
+#if HWY_TARGET == HWY_SCALAR
+  using I32 = LaneI32;
+#else
+  using I32 = hn::ScalableTag<std::int32_t>;
+#endif
+  using U32 = hn::RebindToUnsigned<I32>;
+  static constexpr int kColumns = columns;
+
+  /// Narrow triangles fill a vector better with several short rows.
+  static int lanes() { return static_cast<int>(hn::Lanes(I32())); }
+  static int rows() { return lanes() / columns; }
+};
+
+/// Two vectors of doubles become one of integers, rounded towards zero.
+template <class Block>
+HWY_INLINE hn::Vec<typename Block::I32> to_integers(const VecF64 (&parts)[2]) {
+#if HWY_TARGET == HWY_SCALAR
+  return hn::DemoteTo(LaneI32(), parts[0]);
+#else
+  return hn::Combine(typename Block::I32(), hn::DemoteTo(LaneI32(), parts[1]),
+                     hn::DemoteTo(LaneI32(), parts[0]));
+#endif
+}
+
+/// Hands the pixels of `box`, which lies within one tile (at most 64 pixels a side), to `sink`: for
+/// each block sink.encode(depth, mask) gives a vector of 32-bit words, 0 where `mask` is not set,
+/// and sink.put_row<columns>(u, v, words) takes those of one row, of pixels (u, v) .. (u + columns
+/// - 1, v). Depth is clamped to [0, depth_limit). Rows may reach beyond the box on the right (words
+/// 0).
+template <bool split, int columns, class Sink>
 HWY_INLINE void rasterize_box(const TileEquations& q, const PixelRect& box,
                               std::uint32_t depth_limit, Sink& sink) {
+  using Block = PixelBlock<columns>;
+  const typename Block::I32 di;
+  const typename Block::U32 du;
   const LaneF64 df;
-  const LaneI32 di;
-  const LaneU32 du;
-  const int lanes = static_cast<int>(hn::Lanes(df));
-  const auto iota_i = hn::Iota(di, 0);
-  const auto iota_f = hn::Iota(df, 0.0);
-  const auto zero_i = hn::Zero(di);
-  const auto inverse = hn::Set(df, q.inverse);
+  constexpr int kParts = HWY_TARGET == HWY_SCALAR ? 1 : 2;
+  const int part_lanes = static_cast<int>(hn::Lanes(df));
+  const int rows = Block::rows();
+  const auto iota = hn::Iota(di, 0);
+  const auto column = hn::And(iota, hn::Set(di, columns - 1));
+  const auto row = hn::ShiftRight<hwy::CeilLog2(columns)>(iota);
+  const auto zero = hn::Zero(di);
   const auto deepest = hn::Set(di, static_cast<std::int32_t>(depth_limit - 1));
-  const auto deepest_f = hn::Set(df, static_cast<double>(depth_limit - 1));
   const auto base = hn::Set(di, q.quotient);
-  const auto edge_v0 = hn::Set(di, q.edge_v[0]);
-  const auto edge_v1 = hn::Set(di, q.edge_v[1]);
-  const auto edge_v2 = hn::Set(di, q.edge_v[2]);
-  const auto remainder_v = hn::Set(df, q.remainder_v);
+  const VecF64 inverse = hn::Set(df, q.inverse);
 
-  for (int u = box.u0; u < box.u1; u += lanes) {
+  const auto edge_step = [&](int i) { return hn::Set(di, q.edge_v[i] * rows); };
+  const auto edge_v0 = edge_step(0), edge_v1 = edge_step(1), edge_v2 = edge_step(2);
+  const VecF64 remainder_v = hn::Set(df, q.remainder_v * rows);
+  const VecF64 quotient_v = hn::Set(df, split ? q.quotient_v * rows : 0.0);
+
+  for (int u = box.u0; u < box.u1; u += columns) {
     const int step = u - box.u0;
-    const auto in_box = hn::FirstN(di, static_cast<std::size_t>(box.u1 - u));
+    const auto in_box = hn::Lt(column, hn::Set(di, box.u1 - u));
     const auto edge_at = [&](int i) {
-      return hn::Add(hn::Set(di, q.edge[i] + q.edge_u[i] * step),
-                     hn::Mul(iota_i, hn::Set(di, q.edge_u[i])));
+      const auto along_u = hn::Mul(column, hn::Set(di, q.edge_u[i]));
+      const auto along_v = hn::Mul(row, hn::Set(di, q.edge_v[i]));
+      return hn::Add(hn::Set(di, q.edge[i] + q.edge_u[i] * step), hn::Add(along_u, along_v));
     };
     auto edge0 = edge_at(0), edge1 = edge_at(1), edge2 = edge_at(2);
-    auto remainder = hn::Add(hn::Set(df, q.remainder + q.remainder_u * step),
-                             hn::Mul(iota_f, hn::Set(df, q.remainder_u)));
-    VecF64 quotient = hn::Zero(df), quotient_v = hn::Zero(df);
-    if constexpr (split) {
-      quotient = hn::Add(hn::Set(df, q.split_quotient + q.quotient_u * step),
-                         hn::Mul(iota_f, hn::Set(df, q.quotient_u)));
-      quotient_v = hn::Set(df, q.quotient_v);
+    VecF64 remainder[2], quotient[2];
+    for (int part = 0; part < kParts; ++part) {
+      const auto lane = hn::Iota(df, static_cast<double>(part * part_lanes));
+      const auto part_row = hn::Floor(hn::Mul(lane, hn::Set(df, 1.0 / columns)));
+      const auto part_column = hn::Sub(lane, hn::Mul(part_row, hn::Set(df, columns)));
+      const auto plane = [&](double at, double along_u, double along_v) {
+        return hn::Add(hn::Set(df, at + along_u * step),
+                       hn::Add(hn::Mul(part_column, hn::Set(df, along_u)),
+                               hn::Mul(part_row, hn::Set(df, along_v))));
+      };
+      remainder[part] = plane(q.remainder, q.remainder_u, q.remainder_v);
+      if constexpr (split) quotient[part] = plane(q.split_quotient, q.quotient_u, q.quotient_v);
     }
-    for (int v = box.v0; v < box.v1; ++v) {
-      const auto covered = hn::AndNot(hn::Lt(hn::Or3(edge0, edge1, edge2), zero_i), in_box);
+    for (int v = box.v0; v < box.v1; v += rows) {
+      const auto inside = hn::And(in_box, hn::Lt(row, hn::Set(di, box.v1 - v)));
+      const auto covered = hn::AndNot(hn::Lt(hn::Or3(edge0, edge1, edge2), zero), inside);
       if (!hn::AllFalse(di, covered)) {
-        VecI32 depth;
-        if constexpr (split) {
-          const auto exact = hn::Add(quotient, hn::Floor(hn::Mul(remainder, inverse)));
-          depth = hn::DemoteTo(di, hn::Min(hn::Max(exact, hn::Zero(df)), deepest_f));
-        } else {
-          const auto floor = hn::DemoteTo(di, hn::Mul(remainder, inverse));  // >= 0: truncates down
-          depth = hn::Min(hn::Max(hn::Add(base, floor), zero_i), deepest);
+        VecF64 depth_f[2];
+        for (int part = 0; part < kParts; ++part) {
+          depth_f[part] = hn::Mul(remainder[part], inverse);
+          if constexpr (split) {
+            const auto exact = hn::Add(quotient[part], hn::Floor(depth_f[part]));
+            const auto far = hn::Set(df, static_cast<double>(depth_limit - 1));
+            depth_f[part] = hn::Min(hn::Max(exact, hn::Zero(df)), far);
+          }
         }
-        sink.put(u, v, hn::RebindMask(du, covered), hn::BitCast(du, depth));
+        // Numerators are positive wherever it counts, so that truncation is the floor.
+        auto depth = to_integers<Block>(depth_f);
+        if constexpr (!split) depth = hn::Min(hn::Max(hn::Add(base, depth), zero), deepest);
+        alignas(64) std::uint32_t words[HWY_MAX_BYTES / 4];
+        hn::Store(sink.encode(du, hn::BitCast(du, depth), hn::RebindMask(du, covered)), du, words);
+        const int last = std::min(rows, box.v1 - v);
+        for (int i = 0; i < last; ++i)
+          sink.template put_row<columns>(u, v + i, words + i * columns);
       }
       edge0 = hn::Add(edge0, edge_v0);
       edge1 = hn::Add(edge1, edge_v1);
       edge2 = hn::Add(edge2, edge_v2);
-      remainder = hn::Add(remainder, remainder_v);
-      if constexpr (split) quotient = hn::Add(quotient, quotient_v);
+      for (int part = 0; part < kParts; ++part) {
+        remainder[part] = hn::Add(remainder[part], remainder_v);
+        if constexpr (split) quotient[part] = hn::Add(quotient[part], quotient_v);
+      }
     }
   }
 }
 
-/// Rasterizes the triangles `ids` of `mesh` into `sink`: begin(exit, triangle, box), then put() and
-/// put_one(u, v, depth) for its pixels. Calls rows(v0, v1) of the sink with the rows of each box.
+/// The widest block that a box needs, within what the target has.
+template <bool split, class Sink>
+HWY_INLINE void rasterize_any_box(const TileEquations& q, const PixelRect& box,
+                                  std::uint32_t depth_limit, Sink& sink) {
+#if HWY_TARGET == HWY_SCALAR
+  rasterize_box<split, 1>(q, box, depth_limit, sink);
+#else
+  constexpr int kLanes = static_cast<int>(hn::MaxLanes(hn::ScalableTag<std::int32_t>()));
+  const int width = box.u1 - box.u0;
+  if (kLanes <= 4 || width <= 4) return rasterize_box<split, 4>(q, box, depth_limit, sink);
+  constexpr int kWide = std::max(4, std::min(8, kLanes));
+  if (kLanes <= 8 || width <= 8) return rasterize_box<split, kWide>(q, box, depth_limit, sink);
+  constexpr int kWidest = std::max(4, std::min(16, kLanes));
+  rasterize_box<split, kWidest>(q, box, depth_limit, sink);
+#endif
+}
+
+/// Rasterizes the triangles `ids` of `mesh` into `sink`: begin(exit, triangle, box), then encode()
+/// and put_row(), or put_one(u, v, depth), for its pixels.
 template <class Sink>
 HWY_INLINE void rasterize_triangles(const LatticeMesh& mesh, const RasterTarget& target,
                                     std::span<const std::uint32_t> ids, const PixelRect& clip,
@@ -315,7 +380,7 @@ HWY_INLINE void rasterize_triangles(const LatticeMesh& mesh, const RasterTarget&
       if (kind == SetupBatch::Kind::kDirect) {
         sink.begin(batch.exit(lane), part[lane], box);
         batch.equations(lane, equations);
-        rasterize_box<false>(equations, box, target.depth_limit, sink);
+        rasterize_any_box<false>(equations, box, target.depth_limit, sink);
         continue;
       }
       TriangleSetup t;
@@ -327,7 +392,7 @@ HWY_INLINE void rasterize_triangles(const LatticeMesh& mesh, const RasterTarget&
       sink.begin(t.exit, part[lane], box);
       TileEquations large;
       if (make_split_equations(t, box, large)) {
-        rasterize_box<true>(large, box, target.depth_limit, sink);
+        rasterize_any_box<true>(large, box, target.depth_limit, sink);
       } else {
         Sink copy = sink;  // its address is taken here; the sink itself may stay in registers
         rasterize_exact(t, box, target.depth_limit,
