@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -33,6 +34,9 @@ struct MeshReadOptions {
   /// A face that would be dropped and counted (vertex out of range, not finite, fewer than three
   /// vertices) is ErrorCode::kInput instead.
   bool strict = false;
+  /// Text of OBJ and ascii STL is parsed in pieces of about this many bytes, on all threads. The
+  /// mesh does not depend on it; tests make it small.
+  std::size_t chunk_bytes = std::size_t{1} << 19;
 };
 
 /// What the reader met. Faces that were dropped are counted by cause, one cause a face, in the

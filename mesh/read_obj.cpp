@@ -14,8 +14,6 @@
 namespace strata::detail {
 namespace {
 
-constexpr std::size_t kChunkBytes = std::size_t{1} << 19;
-
 /// Past blanks and continued line ends.
 const char* skip_blanks_obj(const char* p) {
   for (;;) {
@@ -110,8 +108,8 @@ class ObjReader {
 void ObjReader::cut() {
   cuts_.push_back(begin_);
   const char* p = begin_;
-  while (static_cast<std::size_t>(end_ - p) > kChunkBytes) {
-    p += kChunkBytes;
+  while (static_cast<std::size_t>(end_ - p) > input_.options.chunk_bytes) {
+    p += input_.options.chunk_bytes;
     for (;;) {
       const char* stop = find_line_end(p, end_);
       p = stop == end_ ? end_ : stop + 1;
@@ -255,6 +253,11 @@ void ObjReader::reserve() {
 void ObjReader::append(Chunk& chunk) {
   TriangleSoup& soup = mesh_.soup;
   MeshReadStats& stats = mesh_.stats;
+  if (chunk.error_offset != std::numeric_limits<std::size_t>::max()) {
+    error_offset_ = chunk.error_offset;  // the chunk ends in the middle of a statement
+    error_ = std::move(chunk.error);
+    return;
+  }
   const std::uint64_t base = soup.positions.size();
   over_limit_ = over_limit_ || base + chunk.positions.size() > kMaxVertices ||
                 exceeds_limit(input_.execution, base + chunk.positions.size(),
@@ -290,10 +293,6 @@ void ObjReader::append(Chunk& chunk) {
   stats.faces += chunk.faces;
   stats.too_few_vertices += chunk.short_faces;
   stats.ignored += chunk.ignored;
-  if (chunk.error_offset != std::numeric_limits<std::size_t>::max()) {
-    error_offset_ = chunk.error_offset;
-    error_ = std::move(chunk.error);
-  }
 }
 
 Result<MeshFile> ObjReader::read() {

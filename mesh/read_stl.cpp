@@ -129,24 +129,24 @@ const char* skip_line(const char* p) {
   return p;
 }
 
-/// Chunks end behind an "endfacet", where the grammar starts afresh.
+/// Chunks end behind an "endfacet" that begins a line, where the grammar starts afresh. (Further to
+/// the right it may be part of a solid's name.)
 void AsciiReader::cut() {
-  constexpr std::size_t kChunkBytes = std::size_t{1} << 20;
   constexpr std::string_view kWord = "endfacet";
   cuts_.push_back(begin_);
   const char* p = begin_;
-  while (static_cast<std::size_t>(end_ - p) > kChunkBytes) {
-    p += kChunkBytes;
-    while (p < end_) {
-      p = skip_token(p);
-      while (p < end_ && ends_token(*p)) ++p;
+  while (static_cast<std::size_t>(end_ - p) > input_.options.chunk_bytes) {
+    p += input_.options.chunk_bytes;
+    bool found = false;
+    while (p < end_ && !found) {
+      while (p < end_ && *p != '\n' && *p != '\r') ++p;
+      p = skip_spaces(p);
       const std::string_view token(p, std::min(kWord.size(), static_cast<std::size_t>(end_ - p)));
-      if (equals_no_case(token, kWord) && ends_token(p[kWord.size()])) {
-        p += kWord.size();
-        break;
-      }
+      found = equals_no_case(token, kWord) && ends_token(p[kWord.size()]);
     }
-    if (p < end_) cuts_.push_back(p);
+    if (!found) break;
+    p += kWord.size();
+    cuts_.push_back(p);
   }
   cuts_.push_back(end_);
 }
@@ -188,10 +188,11 @@ void AsciiReader::parse(const char* p, const char* end, Chunk& chunk) const {
       p = stop;
     } else if (equals_no_case(word, "normal")) {
       p = stop;
-      for (int i = 0; i < 3; ++i) {  // not used, so any three words will do
-        const char* const value = skip_spaces(p);
-        if (equals_no_case(token_at(value), "outer")) break;
-        p = skip_token(value);
+      double unused = 0.0;
+      for (const char* q = p; q != nullptr;) {  // not used, so any number of numbers will do
+        p = q;
+        q = parse_double(skip_spaces(p), unused);
+        if (q != nullptr && !ends_token(*q)) q = nullptr;
       }
     } else if (equals_no_case(word, "outer") || equals_no_case(word, "loop")) {
       if (in_loop && word.size() == 5) return broken(p, "a loop inside a loop");

@@ -134,6 +134,8 @@ TEST(ObjReader, MalformedLinesAreNamed) {
   EXPECT_EQ(refusal(kObj, "v 1 2\nf 1 2 3"), "file:1: vertex has 2 of 3 coordinates");
   EXPECT_EQ(refusal(kObj, "v 1 2 3\nv 1,5 2 3\n"), "file:2: '1,5' is not a number");
   EXPECT_EQ(refusal(kObj, "v 1 2 3\n\nf 1 a 3\n"), "file:3: 'a' is not a vertex of a face");
+  EXPECT_EQ(refusal(kObj, kSquare + "f 1 2 3 4\nf 1 2 3 4 x\n"),
+            "file:6: 'x' is not a vertex of a face");
   EXPECT_EQ(refusal(kObj, "v 1 2 3x\n"), "file:1: '3x' is not a number");
 }
 

@@ -1,0 +1,5 @@
+#include "tests/fuzz/mesh_fuzzing.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  return strata::fuzz_reader(strata::MeshFormat::kOff, data, size);
+}
