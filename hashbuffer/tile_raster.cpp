@@ -61,20 +61,11 @@ class TableSink {
     }
   }
   template <int columns>
-  HWY_INLINE void put_row(int u, int v, const std::uint32_t* words) {
+  HWY_INLINE void put_block(int u, int v, const std::uint32_t* words, int rows) {
     const hn::CappedTag<Bits, columns> d;
-    const std::size_t pixel = pixel_at(u, v);
-    for (std::size_t i = 0; i < columns; i += hn::Lanes(d)) {
-      if constexpr (kKeys) {
-        insert(d, pixel + i, hn::Load(d, words + i));
-      } else {
-        const auto lifted =
-            hn::PromoteTo(d, hn::LoadU(hn::Rebind<std::uint32_t, decltype(d)>(), words + i));
-        const auto depth = hn::ShiftLeft<32>(hn::Sub(lifted, hn::Set(d, Bits{1})));
-        insert(
-            d, pixel + i,
-            hn::IfThenElseZero(hn::Ne(lifted, hn::Zero(d)), hn::Sub(hn::Set(d, nearest_), depth)));
-      }
+    for (int row = 0; row < rows; ++row, words += columns) {
+      const std::size_t pixel = pixel_at(u, v + row);
+      for (std::size_t i = 0; i < columns; i += hn::Lanes(d)) insert(d, pixel + i, words + i);
     }
   }
   void put_one(int u, int v, std::uint32_t depth) {
@@ -83,7 +74,9 @@ class TableSink {
     table_->insert(pixel_at(u, v), (~key & kValueMask<Record>) | Record::kAgeUnit);
   }
   TileRasterResult finish() {
-    table_->oldest = std::max(table_->oldest, oldest_);
+    // The first two planes are not watched: the bound may be 2 where the tile is one layer deep.
+    const int first = result_.fragments > 0 ? std::min(planes_, 2) : 0;
+    table_->oldest = std::max({table_->oldest, oldest_, first});
     return result_;
   }
 
@@ -94,21 +87,48 @@ class TableSink {
     return static_cast<std::size_t>((v - v0_) * kTileSide + (u - u0_));
   }
 
+  /// Records of age 1 from encoded words.
   template <class D>
-  HWY_INLINE void insert(D d, std::size_t pixel, hn::Vec<D> carry) {
+  HWY_INLINE hn::Vec<D> decode(D d, const std::uint32_t* words) const {
+    if constexpr (kKeys) {
+      return hn::Load(d, words);
+    } else {
+      const auto lifted =
+          hn::PromoteTo(d, hn::LoadU(hn::Rebind<std::uint32_t, decltype(d)>(), words));
+      const auto depth = hn::ShiftLeft<32>(hn::Sub(lifted, hn::Set(d, Bits{1})));
+      return hn::IfThenElseZero(hn::Ne(lifted, hn::Zero(d)), hn::Sub(hn::Set(d, nearest_), depth));
+    }
+  }
+
+  /// Inserts a vector of neighbours. Only records of the same pixel and age can be smaller than
+  /// what comes to a plane, so that no lane evicts a stranger.
+  template <class D>
+  HWY_INLINE void insert(D d, std::size_t pixel, const std::uint32_t* words) {
+    auto carry = decode(d, words);
     const auto step = hn::Set(d, Record::kAgeUnit);
     Bits* HWY_RESTRICT cell = cells_ + pixel;
-    for (int age = 1; age <= planes_; ++age, cell += kTilePixels) {
-      // Only records of the same pixel and age can be smaller here, so no lane evicts a stranger.
+    const auto exchange = [&] {  // the larger stays, the smaller is one older
       const auto old = hn::LoadU(d, cell);
       hn::StoreU(hn::Max(old, carry), d, cell);
       const auto less = hn::Min(old, carry);
       const auto left = hn::Ne(less, hn::Zero(d));
-      if (hn::AllFalse(d, left)) {
+      carry = hn::Add(less, hn::IfThenElseZero(left, step));
+      cell += kTilePixels;
+      return left;
+    };
+    int age = 0;
+    if (planes_ >= 2) {
+      // Which of the first two planes a row ends in cannot be predicted: both are always done.
+      exchange();
+      if (hn::AllFalse(d, exchange())) return;
+      age = 2;
+    }
+    while (age < planes_) {
+      ++age;
+      if (hn::AllFalse(d, exchange())) {
         oldest_ = std::max(oldest_, age);
         return;
       }
-      carry = hn::Add(less, hn::IfThenElseZero(left, step));
     }
     oldest_ = planes_;
     overflow(*table_, d, pixel, carry);
@@ -158,6 +178,21 @@ class LogSink {
     return hn::IfThenElseZero(covered, hn::Add(depth, hn::Set(d, 1u)));
   }
   template <int columns>
+  HWY_INLINE void put_block(int u, int v, const std::uint32_t* words, int rows) {
+    for (int row = 0; row < rows; ++row) put_row<columns>(u, v + row, words + row * columns);
+  }
+  void put_one(int u, int v, std::uint32_t depth) {
+    log_->pixels[log_->count] =
+        static_cast<std::uint32_t>((v - clip_.v0) * kTileSide + (u - clip_.u0));
+    log_->keys[log_->count++] = make_key<Record>(depth, exit_, triangle_);
+  }
+  TileRasterResult finish() {
+    result_.fragments = log_->count;
+    return result_;
+  }
+
+ private:
+  template <int columns>
   HWY_INLINE void put_row(int u, int v, const std::uint32_t* words) {
     const hn::CappedTag<std::uint32_t, columns> d;
     const auto pixel = static_cast<std::uint32_t>((v - clip_.v0) * kTileSide + (u - clip_.u0));
@@ -179,17 +214,7 @@ class LogSink {
       }
     }
   }
-  void put_one(int u, int v, std::uint32_t depth) {
-    log_->pixels[log_->count] =
-        static_cast<std::uint32_t>((v - clip_.v0) * kTileSide + (u - clip_.u0));
-    log_->keys[log_->count++] = make_key<Record>(depth, exit_, triangle_);
-  }
-  TileRasterResult finish() {
-    result_.fragments = log_->count;
-    return result_;
-  }
 
- private:
   TileLog<Record>* log_;
   TileRasterResult result_;
   PixelRect clip_;

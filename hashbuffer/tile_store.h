@@ -16,8 +16,8 @@ namespace strata {
 template <class Record>
 struct TileTable {
   using Bits = typename Record::Word;
-  /// Cells behind the table that vectors may touch, without changing them.
-  static constexpr std::size_t kPadding = 64;
+  /// Cells behind the table that blocks of pixels may touch, without changing them.
+  static constexpr std::size_t kPadding = 8 * kTileSide;
 
   std::vector<Bits> cells;
   std::size_t size = 0;                ///< cells of the table

@@ -262,9 +262,8 @@ HWY_INLINE hn::Vec<typename Block::I32> to_integers(const VecF64 (&parts)[2]) {
 
 /// Hands the pixels of `box`, which lies within one tile (at most 64 pixels a side), to `sink`: for
 /// each block sink.encode(depth, mask) gives a vector of 32-bit words, 0 where `mask` is not set,
-/// and sink.put_row<columns>(u, v, words) takes those of one row, of pixels (u, v) .. (u + columns
-/// - 1, v). Depth is clamped to [0, depth_limit). Rows may reach beyond the box on the right (words
-/// 0).
+/// and sink.put_block<columns>(u, v, words, rows) takes them, row by row from pixel (u, v) on.
+/// Depth is clamped to [0, depth_limit). Blocks may reach beyond the box (words 0).
 template <bool split, int columns, class Sink>
 HWY_INLINE void rasterize_box(const TileEquations& q, const PixelRect& box,
                               std::uint32_t depth_limit, Sink& sink) {
@@ -313,7 +312,8 @@ HWY_INLINE void rasterize_box(const TileEquations& q, const PixelRect& box,
     for (int v = box.v0; v < box.v1; v += rows) {
       const auto inside = hn::And(in_box, hn::Lt(row, hn::Set(di, box.v1 - v)));
       const auto covered = hn::AndNot(hn::Lt(hn::Or3(edge0, edge1, edge2), zero), inside);
-      if (!hn::AllFalse(di, covered)) {
+      // Blocks of a narrow triangle are seldom empty, and a wrong guess costs more than the work.
+      if (columns < Block::lanes() || !hn::AllFalse(di, covered)) {
         VecF64 depth_f[2];
         for (int part = 0; part < kParts; ++part) {
           depth_f[part] = hn::Mul(remainder[part], inverse);
@@ -328,9 +328,7 @@ HWY_INLINE void rasterize_box(const TileEquations& q, const PixelRect& box,
         if constexpr (!split) depth = hn::Min(hn::Max(hn::Add(base, depth), zero), deepest);
         alignas(64) std::uint32_t words[HWY_MAX_BYTES / 4];
         hn::Store(sink.encode(du, hn::BitCast(du, depth), hn::RebindMask(du, covered)), du, words);
-        const int last = std::min(rows, box.v1 - v);
-        for (int i = 0; i < last; ++i)
-          sink.template put_row<columns>(u, v + i, words + i * columns);
+        sink.template put_block<columns>(u, v, words, rows);
       }
       edge0 = hn::Add(edge0, edge_v0);
       edge1 = hn::Add(edge1, edge_v1);
@@ -361,7 +359,7 @@ HWY_INLINE void rasterize_any_box(const TileEquations& q, const PixelRect& box,
 }
 
 /// Rasterizes the triangles `ids` of `mesh` into `sink`: begin(exit, triangle, box), then encode()
-/// and put_row(), or put_one(u, v, depth), for its pixels.
+/// and put_block(), or put_one(u, v, depth), for its pixels.
 template <class Sink>
 HWY_INLINE void rasterize_triangles(const LatticeMesh& mesh, const RasterTarget& target,
                                     std::span<const std::uint32_t> ids, const PixelRect& clip,

@@ -97,6 +97,7 @@ void walk_planes(const TileLists<DepthKey>& lists, bool histogram, TileIntervals
         pending_begin = hn::IfThenElse(closes, begin, pending_begin);
         pending_end = hn::IfThenElse(closes, voxel, pending_end);
       }
+      out.max_depth = std::max<std::uint64_t>(out.max_depth, static_cast<std::uint64_t>(age));
       if (age == 0) {
         for (std::size_t lane = 0; lane < lanes; ++lane) out.offsets[pixel + lane] = count;
         continue;
@@ -271,7 +272,6 @@ void walk_tile(const TileLists<DepthKey>& lists, InsideRule rule, bool histogram
   begin_walk(out);
   if (lists.planes32 == nullptr) return walk_rows(lists, rule, histogram, out);
   std::fill_n(out.offsets.begin(), static_cast<std::ptrdiff_t>(lists.row_begin) * kTileSide, 0u);
-  out.max_depth = static_cast<std::uint64_t>(lists.ages);
   HWY_DYNAMIC_DISPATCH(walk_key_planes)(lists, rule, histogram, out);
 }
 
