@@ -7,18 +7,19 @@
 #include "hashbuffer/build_ldi.h"
 #include "raster/lattice_mesh.h"
 #include "voxelize/ldi_io.h"
+#include "voxelize/xray.h"
 
 namespace strata::apps {
 
 Result<void> run_ldi(const LdiCommand& command, Session& session) {
   const bool exr = command.output.ends_with(".exr"), npz = command.output.ends_with(".npz");
-  if (!exr && !npz) {
-    return fail(ErrorCode::kUsage, "{}: layered depth images are written as .exr or .npz",
+  const bool png = command.output.ends_with(".png");
+  if (!exr && !npz && !png) {
+    return fail(ErrorCode::kUsage, "{}: layered depth images are written as .exr, .npz or .png",
                 command.output);
   }
-  if (npz && command.samples) {
-    return fail(ErrorCode::kUsage, "{}: an .npz holds every crossing; --samples is for .exr",
-                command.output);
+  if (!exr && command.samples) {
+    return fail(ErrorCode::kUsage, "{}: --samples is for .exr", command.output);
   }
   auto input = load_meshes(
       command.input, {.keep_orientation = command.keep_orientation, .rule = InsideRule::kWinding},
@@ -41,6 +42,7 @@ Result<void> run_ldi(const LdiCommand& command, Session& session) {
                            counted(image->items.size(), "crossing")));
 
   const Execution writing = session.execution("writing");
+  if (png) return write_xray_png(command.output, *image);
   return exr ? write_ldi_exr(command.output, *image, {.samples = command.samples}, writing)
              : write_ldi_npz(command.output, *image, {}, writing);
 }

@@ -16,18 +16,14 @@ struct LdiExrOptions {
 /// Writes sorted depth lists as a deep scanline OpenEXR file (ZIPS, pixel (u, v) at x = u, y = v).
 /// A compositor sees tidy deep pixels; reading back gives exactly the same lists.
 ///
-/// | channel             | type  | intervals (default)               | samples |
-/// |---------------------|-------|-----------------------------------|-----------------------------|
-/// | A                   | FLOAT | 1: solid behind it; 0: only a mark| 1 | | Z                   |
-/// FLOAT | depth of the front crossing       | depth of the crossing       | | ZBack | FLOAT |
-/// depth where this piece ends       | -                           | | id                  | UINT
-/// | triangle of the front crossing    | triangle of the crossing    | | facing              | UINT
-/// | -                                 | 0 entering, 1 leaving       | | strata.depth        | UINT
-/// | exact depth of the front crossing | exact depth                 | | strata.payload      | UINT
-/// | [exit:1 | triangle:31] of it      | [exit:1 | triangle:31]      | | strata.depthBack    | UINT
-/// | exact depth of the back crossing, | -                           | |                     | | or
-/// 4294967295: there is none      |                             | | strata.payloadBack  | UINT  |
-/// [exit:1 | triangle:31] of it      | -                           |
+/// - A (FLOAT): 1 where solid lies behind it, 0 for a mark; with samples always 1.
+/// - Z (FLOAT): depth of the front crossing, or of the crossing.
+/// - ZBack (FLOAT; intervals only): depth where this piece ends.
+/// - id (UINT): triangle of that crossing.
+/// - facing (UINT; samples only): 0 entering, 1 leaving.
+/// - strata.depth, strata.payload (UINT): exact depth and [exit:1 | triangle:31] of that crossing.
+/// - strata.depthBack, strata.payloadBack (UINT; intervals only): the same of the back crossing;
+///   a depthBack of 4294967295 says that there is none.
 ///
 /// Intervals: a walk along the list counts the winding number, +1 on entering, -1 on leaving. Each
 /// crossing begins a sample, except the one that brings the winding number from 1 to 0: it is the
@@ -41,14 +37,10 @@ struct LdiExrOptions {
 /// are tidy without exception (sorted, no overlap: deepImageState = TIDY), equal depths of one list
 /// are pushed one floating-point step apart. The exact depths are those of the strata channels.
 ///
-/// | attribute                | type   | meaning |
-/// |--------------------------|--------|-----------------------------------------------------------|
-/// | strata.version           | int    | 1 | | strata.mode              | string | "intervals" or
-/// "samples"                                  | | strata.depth_limit       | int    | depths are
-/// below it                                       | | strata.depth_scale       | double | Z = depth
-/// in lattice steps times this                     | | strata.world_from_image  | m44d   | for row
-/// vectors, as EXR has it: world = (u + 0.5, v + 0.5,| |                          |        | depth,
-/// 1) * M                                             |
+/// Attributes: strata.version (int, 1), strata.mode (string, "intervals" or "samples"),
+/// strata.depth_limit (int, depths are below it), strata.depth_scale (double, Z = depth in lattice
+/// steps times this), strata.world_from_image (m44d for row vectors, as EXR has it: world =
+/// (u + 0.5, v + 0.5, depth, 1) * M).
 ///
 /// Memory: a few rows of samples; for standard output, pipes and devices the whole file.
 /// @return kUsage when `image` is not valid (check_layered_depth_image) or this build has no
