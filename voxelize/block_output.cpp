@@ -70,6 +70,7 @@ Result<void> BlockOutput::append_blocks(const Execution& execution, std::size_t 
       if (outcome) outcome = std::move(written);
     }
   });
+  if (outcome && turn < count) return fail(ErrorCode::kCancelled, "cancelled");
   return outcome;
 }
 

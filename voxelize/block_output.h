@@ -49,6 +49,7 @@ class BlockOutput {
   using MakeBlock = std::function<void(std::size_t index, Bytes& out, int worker)>;
 
   /// Appends blocks 0 .. count-1 in this order; they may be of any size. Holds one block a worker.
+  /// @return kOutput; kCancelled when stopped before the last block
   Result<void> append_blocks(const Execution& execution, std::size_t count, const MakeBlock& make);
   Result<void> append(const void* data, std::size_t bytes);
   Result<void> append(std::string_view text) { return append(text.data(), text.size()); }

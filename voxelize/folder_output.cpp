@@ -64,14 +64,17 @@ Result<void> FolderOutput::for_each(
     const std::function<Result<void>(std::size_t, int worker)>& body) {
   std::mutex mutex;
   std::atomic<bool> failed{false};
+  std::atomic<std::size_t> begun{0};
   Result<void> outcome;
   parallel_for(execution, count, [&](std::size_t index, int worker) {
+    begun.fetch_add(1, std::memory_order_relaxed);
     if (failed.load(std::memory_order_relaxed)) return;
     Result<void> result = body(index, worker);
     if (result) return;
     const std::lock_guard lock(mutex);
     if (!failed.exchange(true)) outcome = std::move(result);
   });
+  if (outcome && begun < count) return fail(ErrorCode::kCancelled, "cancelled");
   return outcome;
 }
 

@@ -23,7 +23,7 @@ class FolderOutput {
   /// Writes one file of the folder. Several threads may call it. @return kOutput naming the file
   Result<void> write(const std::string& name, const void* data, std::size_t bytes) const;
   /// Calls body for every index of [0, count) on several threads. @return the first failure met;
-  /// after one, the remaining indices are skipped.
+  /// after one, the remaining indices are skipped; kCancelled when stopped before the last index.
   static Result<void> for_each(const Execution& execution, std::size_t count,
                                const std::function<Result<void>(std::size_t, int worker)>& body);
   Result<void> commit() { return folder_.commit(); }

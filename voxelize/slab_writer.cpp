@@ -10,13 +10,11 @@ SlabWriter::SlabWriter(std::string path, const VoxelGrid& grid, Axis axis)
     : path_(std::move(path)), grid_(grid), axis_(axis), rows_(grid.dims[AxisFrame(axis).v]) {}
 
 template <class Step>
-Result<void> SlabWriter::guarded(const Execution& execution, Step&& step) {
+Result<void> SlabWriter::guarded(Step&& step) {
   if (done_) return fail(ErrorCode::kInternal, "{}: written to after its end or an error", path_);
   done_ = true;  // until the step has succeeded
   try {
     Result<void> result = step();
-    // Skipped work leaves holes, whatever the step believes.
-    if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "cancelled");
     if (result) done_ = false;
     return result;
   } catch (const std::bad_alloc&) {
@@ -27,7 +25,7 @@ Result<void> SlabWriter::guarded(const Execution& execution, Step&& step) {
 }
 
 Result<void> SlabWriter::add(const VoxelIntervals& slab, const Execution& execution) {
-  return guarded(execution, [&]() -> Result<void> {
+  return guarded([&]() -> Result<void> {
     if (slab.axis() != axis_) {
       return fail(ErrorCode::kInternal, "{}: slab of axis {}, the format is written from axis {}",
                   path_, "xyz"[static_cast<int>(slab.axis())], "xyz"[static_cast<int>(axis_)]);
@@ -38,16 +36,19 @@ Result<void> SlabWriter::add(const VoxelIntervals& slab, const Execution& execut
                   slab.v_begin(), next_row_);
     }
     next_row_ = slab.v_end();
-    return add_slab(slab, execution);
+    Result<void> result = add_slab(slab, execution);
+    // Skipped work leaves holes, whatever the format believes.
+    if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "cancelled");
+    return result;
   });
 }
 
 Result<void> SlabWriter::finish(const Execution& execution) {
-  return guarded(execution, [&]() -> Result<void> {
+  return guarded([&]() -> Result<void> {
     if (next_row_ != rows_) {
       return fail(ErrorCode::kInternal, "{}: {} of {} rows were written", path_, next_row_, rows_);
     }
-    // Asked before the commit, so that a cancelled job leaves no file.
+    // Not asked after the commit: a file that stands is a success.
     if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "cancelled");
     Result<void> result = finish_output(execution);
     next_row_ = -1;  // nothing may follow

@@ -20,7 +20,7 @@ class SlabWriter : public VoxelWriter {
   SlabWriter(std::string path, const VoxelGrid& grid, Axis axis);
 
   virtual Result<void> add_slab(const VoxelIntervals& slab, const Execution& execution) = 0;
-  /// Completes and commits the output.
+  /// Completes and commits the output; kCancelled, without committing, if work was skipped.
   virtual Result<void> finish_output(const Execution& execution) = 0;
 
   [[nodiscard]] const std::string& path() const { return path_; }
@@ -29,7 +29,7 @@ class SlabWriter : public VoxelWriter {
 
  private:
   template <class Step>
-  Result<void> guarded(const Execution& execution, Step&& step);
+  Result<void> guarded(Step&& step);
 
   std::string path_;
   VoxelGrid grid_;

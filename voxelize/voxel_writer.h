@@ -14,7 +14,7 @@ namespace strata {
 struct VoxelFormat {
   std::string
       name;  ///< what --format takes: "vdb", "npy", "nrrd", "vti", "binvox", "vox", "png", "zarr"
-  std::string extension;    ///< with the dot; a folder format has a trailing slash instead of one
+  std::string extension;    ///< with the dot; that of a folder format ends with a slash
   std::string description;  ///< one line for --list-formats
   Axis axis = Axis::kZ;  ///< the rays whose intervals this format is written from at the least cost
 };

@@ -475,6 +475,8 @@ Result<void> VdbWriter::finish_output(const Execution& execution) {
   count(execution);
   lay_out();
   values_.make(execution);
+  // What was skipped would be missing in the sizes below.
+  if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "cancelled");
 
   const std::string tree_head = root();
   std::uint64_t topology_bytes = tree_head.size();
@@ -495,7 +497,6 @@ Result<void> VdbWriter::finish_output(const Execution& execution) {
         if (block.kind == Block::kBuffers) make_buffers(block, out);
       });
   if (!written) return written;
-  if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "cancelled");
   if (output_.position() - tree_begin != topology_bytes + head.buffers_bytes) {
     return fail(ErrorCode::kInternal, "{}: the tree has {} bytes, {} were announced", path(),
                 output_.position() - tree_begin, topology_bytes + head.buffers_bytes);
