@@ -20,27 +20,49 @@
 namespace strata {
 namespace {
 
-/// CRC-32 of runs of 0 and 1, of which each is at most a row long.
-class RunCrc {
+/// CRC-32 of a layer whose rows are given as runs of ones among zeros. But for a constant that only
+/// the length tells, a CRC is linear over XOR: a row's is the XOR of what the ends of its runs
+/// give, and one table look-up a byte of the CRC moves it on by a row.
+class LayerCrc {
  public:
-  explicit RunCrc(int longest)
-      : shift_(static_cast<std::size_t>(longest) + 1), crc_(shift_.size()) {
-    const std::array<Bytef, 2> bytes = {0, 1};
-    for (std::size_t length = 1; length < shift_.size(); ++length) {
-      shift_[length] = crc32_combine_gen(static_cast<z_off_t>(length));
-      for (std::size_t value = 0; value < 2; ++value) {
-        crc_[length][value] = crc32(crc_[length - 1][value], &bytes[value], 1);
+  LayerCrc(int row_bytes, int rows) : tail_(static_cast<std::size_t>(row_bytes) + 1) {
+    const Bytef zero = 0, one = 1;
+    uLong zeros = crc32(0, nullptr, 0), ones = zeros;
+    for (std::size_t length = 1; length < tail_.size(); ++length) {
+      zeros = crc32(zeros, &zero, 1);
+      ones = crc32(ones, &one, 1);
+      tail_[length] = static_cast<std::uint32_t>(ones ^ zeros);
+    }
+    const uLong row = crc32_combine_gen(row_bytes);
+    for (std::size_t byte = 0; byte < 4; ++byte) {
+      for (std::size_t value = 0; value < 256; ++value) {
+        next_row_[byte][value] =
+            static_cast<std::uint32_t>(crc32_combine_op(value << (8 * byte), 0, row));
       }
     }
+    uLong constant = crc32(0, nullptr, 0);
+    for (int i = 0; i < rows; ++i) constant = crc32_combine_op(constant, zeros, row);
+    constant_ = static_cast<std::uint32_t>(constant);
   }
-  [[nodiscard]] uLong add(uLong crc, int value, int length) const {
-    const auto n = static_cast<std::size_t>(length);
-    return crc32_combine_op(crc, crc_[n][static_cast<std::size_t>(value)], shift_[n]);
+
+  [[nodiscard]] uLong of(const VoxelIntervals& slab, int z) const {
+    const std::size_t length = tail_.size() - 1;
+    std::uint32_t sum = 0;
+    for (int y = 0; y < slab.columns(); ++y) {
+      sum = next_row_[0][sum & 0xff] ^ next_row_[1][sum >> 8 & 0xff] ^
+            next_row_[2][sum >> 16 & 0xff] ^ next_row_[3][sum >> 24];
+      for (const Interval& interval : slab.column(y, z)) {
+        sum ^= tail_[length - static_cast<std::size_t>(interval.begin())] ^
+               tail_[length - static_cast<std::size_t>(interval.end())];
+      }
+    }
+    return sum ^ constant_;
   }
 
  private:
-  std::vector<uLong> shift_;               // operators that append so many bytes
-  std::vector<std::array<uLong, 2>> crc_;  // of runs
+  std::vector<std::uint32_t> tail_;  // of so many ones at the end of a row
+  std::array<std::array<std::uint32_t, 256>, 4> next_row_;
+  std::uint32_t constant_ = 0;  // the CRC of zeros
 };
 
 std::string one_line(std::string text) {
@@ -53,7 +75,9 @@ std::string one_line(std::string text) {
 class NrrdWriter final : public SlabWriter {
  public:
   NrrdWriter(const std::string& path, const VoxelGrid& grid, BlockOutput output)
-      : SlabWriter(path, grid, Axis::kX), output_(std::move(output)), run_crc_(grid.dims.x) {}
+      : SlabWriter(path, grid, Axis::kX),
+        output_(std::move(output)),
+        layer_crc_(grid.dims.x, grid.dims.y) {}
 
   Result<void> begin(const std::string& name) {
     const VoxelGrid& g = grid();
@@ -76,16 +100,15 @@ class NrrdWriter final : public SlabWriter {
     std::vector<uLong> crcs(static_cast<std::size_t>(slab.v_end() - slab.v_begin()));
     Result<void> written =
         output_.append_blocks(execution, crcs.size(), [&](std::size_t index, Bytes& out, int) {
+          const int z = slab.v_begin() + static_cast<int>(index);
           out.clear();
-          uLong crc = crc32(0, nullptr, 0);
           RunDeflater deflater(RunBytes::kFlags);
           deflater.begin(out, false);
-          emit_layer(slab, slab.v_begin() + static_cast<int>(index), [&](int value, int length) {
+          emit_layer(slab, z, [&](int value, int length) {
             deflater.run(static_cast<std::uint8_t>(value), static_cast<std::uint64_t>(length));
-            crc = run_crc_.add(crc, value, length);
           });
           deflater.end();
-          crcs[index] = crc;
+          crcs[index] = layer_crc_.of(slab, z);
         });
     const auto layer = static_cast<z_off_t>(dims().x) * dims().y;
     for (const uLong crc : crcs) crc_ = crc32_combine(crc_, crc, layer);
@@ -105,7 +128,7 @@ class NrrdWriter final : public SlabWriter {
   }
 
   BlockOutput output_;
-  RunCrc run_crc_;
+  LayerCrc layer_crc_;
   uLong crc_ = 0;
 };
 
