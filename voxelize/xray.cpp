@@ -48,7 +48,8 @@ Result<void> write_xray_png(const std::string& path, const LayeredDepthImage& im
         std::max<std::uint64_t>(1, *std::max_element(lengths.begin(), lengths.end())));
     std::vector<std::uint8_t> grey(lengths.size());
     std::transform(lengths.begin(), lengths.end(), grey.begin(), [&](std::uint64_t length) {
-      const double film = 1.0 - std::exp(-4.0 * static_cast<double>(length) / longest);
+      const double film =
+          std::expm1(-2.0 * static_cast<double>(length) / longest) / std::expm1(-2.0);
       return static_cast<std::uint8_t>(std::lround(255.0 * film));
     });
 
