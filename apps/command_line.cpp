@@ -226,7 +226,8 @@ void define_info(CLI::App& app, Words& words) {
 void define_ldi(CLI::App& app, Words& words) {
   app.description(kLdiExamples);
   add_inputs(app, words, false);
-  app.add_option("-o,--output", words.output, "File to write: .exr, .npz, or .png (an X-ray picture)")
+  app.add_option("-o,--output", words.output,
+                 "File to write: .exr, .npz, or .png (an X-ray picture)")
       ->type_name("FILE")
       ->group("Output");
   app.add_flag("--samples", words.samples, "A sample for each surface, not solid intervals")
@@ -399,7 +400,8 @@ LdiCommand ldi_command(const Words& words, Reader& reader) {
   reader.take(parse_choice("--store", words.store, kStores), command.store);
   reader.take(parse_choice("--offsets", words.offsets, kOffsets), command.offsets);
   if (command.input.files.empty()) reader.fail_with("no mesh file is given");
-  if (command.output.empty()) reader.fail_with("no output is given: -o FILE.exr, FILE.npz or FILE.png");
+  if (command.output.empty())
+    reader.fail_with("no output is given: -o FILE.exr, FILE.npz or FILE.png");
   command.grid = grid_request(words, reader);
   return command;
 }

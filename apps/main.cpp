@@ -5,6 +5,8 @@
 #include <cstdlib>
 #include <exception>
 #include <new>
+#include <stdexcept>
+#include <string_view>
 #include <system_error>
 #include <variant>
 
@@ -59,18 +61,24 @@ template <class AnyCommand>
 Result<void> run(const AnyCommand& command, Session& session) {
   try {
     session.configure(command.common);
-    if constexpr (std::is_same_v<AnyCommand, VoxelizeCommand>)
+    if constexpr (std::is_same_v<AnyCommand, VoxelizeCommand>) {
       return run_voxelize(command, session);
-    if constexpr (std::is_same_v<AnyCommand, InfoCommand>) return run_info(command, session);
-#ifdef STRATA_HAVE_LDI
-    if constexpr (std::is_same_v<AnyCommand, LdiCommand>) return run_ldi(command, session);
-#endif
-    return fail(ErrorCode::kUsage, "this build has no such command");
+    } else if constexpr (std::is_same_v<AnyCommand, InfoCommand>) {
+      return run_info(command, session);
+    } else {
+      return run_ldi(command, session);
+    }
   } catch (const std::bad_alloc&) {
     return fail(ErrorCode::kLimit, "{}", kNoMemory);
   } catch (const std::system_error& failure) {
     // Threads that cannot be started, above all.
     return fail(ErrorCode::kLimit, "the system refuses: {}", failure.what());
+  } catch (const std::runtime_error& failure) {
+    // oneTBB reports threads that cannot be started like this, in words only.
+    if (std::string_view(failure.what()).find("pthread_create") != std::string_view::npos) {
+      return fail(ErrorCode::kLimit, "no thread can be started: {}", failure.what());
+    }
+    return fail(ErrorCode::kInternal, "internal error: {}", failure.what());
   } catch (const std::exception& failure) {
     return fail(ErrorCode::kInternal, "internal error: {}", failure.what());
   }

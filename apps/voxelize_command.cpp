@@ -6,6 +6,7 @@
 #include <memory>
 #include <utility>
 
+#include "apps/boundary_area.h"
 #include "apps/commands.h"
 #include "apps/memory_estimate.h"
 #include "apps/mesh_input.h"
@@ -108,7 +109,7 @@ void check_columns(const VoxelizeCommand& command, const VoxelizeOutcome& outcom
     session.warn(
         "unbalanced-columns",
         fmt::format("{} entered and left unequally often; {}",
-                    counted(report.unbalanced_columns, "column is") == "1 column is"
+                    report.unbalanced_columns == 1
                         ? std::string("1 column is")
                         : fmt::format("{} columns are", report.unbalanced_columns),
                     command.open == OpenMode::kVote ? "the vote of three axes decided their voxels"
@@ -134,7 +135,11 @@ Result<void> print_reports(const VoxelizeCommand& command, const VoxelizeOutcome
                            const Session& session) {
   const bool json_on_stdout = command.json == "-";
   const bool file_on_stdout = command.output == "-" && !command.dry_run;
-  if (command.stats || ((command.dry_run || command.checksum) && !command.json)) {
+  if (command.checksum && !command.stats && !command.json && !command.dry_run) {
+    const std::string line = fmt::format("{:016x}\n", outcome.report.checksum);
+    if (auto done = print_report(line, "-", file_on_stdout); !done) return done;
+  }
+  if (command.stats || (command.dry_run && !command.json)) {
     const std::string text = voxelize_text(command, outcome, session);
     if (auto done = print_report(text, "-", file_on_stdout || json_on_stdout); !done) return done;
   }
@@ -174,9 +179,12 @@ Result<void> voxelize_and_write(const VoxelizeCommand& command, VoxelizeOutcome&
   Execution quiet = execution;
   quiet.progress = {};
   std::uint64_t solid_voxels = 0;
+  std::optional<BoundaryArea> boundary;
+  if (command.stats || command.json) boundary.emplace(outcome.grid, outcome.axis);
   double write_ms = 0;
   const auto sink = [&](const VoxelIntervals& slab) -> Result<void> {
     if (!options.statistics) solid_voxels += slab.solid_voxels();
+    if (boundary) boundary->add(slab, quiet);
     if (!writer) return {};
     const double start = session.milliseconds();
     auto done = writer->add(slab, quiet);
@@ -189,6 +197,7 @@ Result<void> voxelize_and_write(const VoxelizeCommand& command, VoxelizeOutcome&
   outcome.report = *report;
   outcome.measured = true;
   if (!options.statistics) outcome.report.solid_voxels = solid_voxels;
+  if (boundary) outcome.area_estimate = boundary->estimate();
 
   check_columns(command, outcome, session);
   if (command.solid && !command.surface && covers(outcome.grid, outcome.input.bounds)) {

@@ -90,6 +90,7 @@ void write_results(JsonWriter& json, const VoxelizeCommand& command,
   json.key("voxels").begin_object();
   json.member("solid", report.solid_voxels);
   json.member("volume", static_cast<double>(report.solid_voxels) * voxel_volume(outcome.grid));
+  json.member("area_estimate", outcome.area_estimate);
   json.member("intervals", report.intervals);
   if (command.checksum) json.member("checksum", fmt::format("{:016x}", report.checksum));
   json.end_object();
@@ -138,9 +139,9 @@ std::string voxelize_text(const VoxelizeCommand& command, const VoxelizeOutcome&
     line(!command.surface ? "solid"
          : command.solid  ? "both"
                           : "surface",
-         fmt::format("{} voxels ({:.4g} %), volume {:.6g}, in {} intervals",
+         fmt::format("{} voxels ({:.4g} %), volume {:.6g}, area about {:.3g}, in {} intervals",
                      grouped(report.solid_voxels), 100 * solid / cells, solid * voxel_volume(grid),
-                     grouped(report.intervals)));
+                     outcome.area_estimate, grouped(report.intervals)));
     if (command.checksum) line("checksum", fmt::format("{:016x}", report.checksum));
     line("lists", fmt::format("{} crossings, at most {} in a column", grouped(report.crossings),
                               report.max_depth_complexity));

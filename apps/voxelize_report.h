@@ -20,8 +20,9 @@ struct VoxelizeOutcome {
   Axis axis = Axis::kZ;
   MemoryEstimate estimate;
   VoxelizeReport report;
-  bool measured = false;  ///< the report's statistics are filled
-  std::string format;     ///< of the output; empty: none
+  bool measured = false;       ///< the report's statistics are filled
+  double area_estimate = 0.0;  ///< of the set's boundary, square world units
+  std::string format;          ///< of the output; empty: none
   std::optional<std::uint64_t> output_bytes;
   double write_ms = 0.0;
 };

@@ -1,0 +1,275 @@
+// What `strata voxelize` makes.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <glm/gtc/matrix_transform.hpp>
+#include <nlohmann/json.hpp>
+
+#include "mesh/shapes.h"
+#include "mesh/soup_tools.h"
+#include "mesh/write_mesh.h"
+#include "tests/apps/run_tool.h"
+
+namespace strata {
+namespace {
+
+using nlohmann::json;
+using testkit::RunResult;
+using testkit::Workplace;
+
+class Voxelize : public testing::Test {
+ protected:
+  void put(const std::string& name, const TriangleSoup& mesh) const {
+    const auto written = write_mesh(place.path(name), mesh);
+    ASSERT_TRUE(written.has_value()) << written.error().message;
+  }
+
+  /// The report of a run that is expected to succeed.
+  json report(std::vector<std::string> arguments) const {
+    arguments.insert(arguments.begin(), "voxelize");
+    arguments.push_back("--json");
+    const RunResult run = place.run(arguments);
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    last_error = run.err;
+    return json::parse(run.out, nullptr, false);
+  }
+
+  static std::vector<std::string> codes(const json& report) {
+    std::vector<std::string> result;
+    for (const json& warning : report["warnings"]) result.push_back(warning["code"]);
+    return result;
+  }
+
+  Workplace place;
+  mutable std::string last_error;
+};
+
+TEST_F(Voxelize, ABoxThatFillsTheGridHasEveryVoxel) {
+  put("box.obj", make_box({-1, 2, 3}, {3, 4, 4}));
+  const json found = report({"box.obj", "-r", "32"});
+  EXPECT_EQ(found["grid"]["dims"], (json{32, 16, 8}));
+  EXPECT_EQ(found["grid"]["origin"], (json{-1.0, 2.0, 3.0}));
+  EXPECT_EQ(found["voxels"]["solid"], 32 * 16 * 8);
+  EXPECT_EQ(found["voxels"]["volume"], 8.0);
+  EXPECT_EQ(found["input"]["closed"], true);
+  EXPECT_EQ(found["input"]["triangles"], 12);
+  EXPECT_EQ(found["lists"]["depth_histogram"][2], found["lists"]["columns"]);
+  EXPECT_TRUE(found["warnings"].empty());
+}
+
+TEST_F(Voxelize, TheChecksumDoesNotDependOnHowTheWorkIsDone) {
+  put("knot.obj", make_torus_knot(2, 3, 0.4, 96, 16));
+  const json first = report({"knot.obj", "-r", "100", "--checksum"});
+  const std::string checksum = first["voxels"]["checksum"];
+  EXPECT_EQ(checksum.size(), 16u);
+  for (const std::vector<std::string>& way :
+       std::vector<std::vector<std::string>>{{"--axis", "x"},
+                                             {"--axis", "y"},
+                                             {"--axis", "z", "--store", "ha"},
+                                             {"--store", "scan"},
+                                             {"--offsets", "random", "--store", "ha"},
+                                             {"--offsets", "farthest", "--store", "ha"},
+                                             {"-j", "1"},
+                                             {"-j", "3"},
+                                             {"--memory-limit", "100M"}}) {
+    std::vector<std::string> arguments = {"knot.obj", "-r", "100", "--checksum"};
+    arguments.insert(arguments.end(), way.begin(), way.end());
+    EXPECT_EQ(report(arguments)["voxels"]["checksum"], checksum) << way.front() << " " << way[1];
+  }
+  // And alone it is one word.
+  const RunResult alone = place.run({"voxelize", "knot.obj", "-r", "100", "--checksum"});
+  EXPECT_EQ(alone.out, checksum + "\n");
+}
+
+TEST_F(Voxelize, SeveralInputsBecomeTheirUnionOnOneGrid) {
+  const TriangleSoup sphere = make_icosphere(1.0, 4);
+  const glm::dmat4 shift = glm::translate(glm::dmat4(1.0), glm::dvec3(1, 0, 0));
+  TriangleSoup both = sphere;
+  append(both, transform(sphere, shift));
+  put("a.obj", sphere);
+  put("b.ply", transform(sphere, shift));
+  put("both.off", both);
+  const json two = report({"a.obj", "b.ply", "-r", "96", "--checksum"});
+  const json one = report({"both.off", "-r", "96", "--checksum"});
+  EXPECT_EQ(two["voxels"]["checksum"], one["voxels"]["checksum"]);
+  EXPECT_EQ(two["input"]["files"].size(), 2u);
+  // Two unit spheres at distance 1: 27/12 pi.
+  EXPECT_NEAR(two["voxels"]["volume"], 27.0 / 12.0 * M_PI, 0.05);
+}
+
+TEST_F(Voxelize, AMeshInsideOutIsTurnedAroundAndReported) {
+  TriangleSoup sphere = make_icosphere(1.0, 4);
+  put("good.obj", sphere);
+  reverse_orientation(sphere);
+  put("bad.obj", sphere);
+  const json good = report({"good.obj", "-r", "64", "--checksum"});
+  const json bad = report({"bad.obj", "-r", "64", "--checksum"});
+  EXPECT_EQ(bad["voxels"]["checksum"], good["voxels"]["checksum"]);
+  EXPECT_EQ(codes(bad), std::vector<std::string>{"inverted"});
+  EXPECT_EQ(bad["input"]["files"][0]["turned_around"], true);
+  EXPECT_NE(last_error.find("bad.obj: the mesh is inside out"), std::string::npos) << last_error;
+  const json kept = report({"bad.obj", "-r", "64", "--keep-orientation"});
+  EXPECT_EQ(kept["voxels"]["solid"], 0);
+  const json nonzero =
+      report({"bad.obj", "-r", "64", "--keep-orientation", "--rule", "nonzero", "--checksum"});
+  EXPECT_EQ(nonzero["voxels"]["checksum"], good["voxels"]["checksum"]);
+}
+
+TEST_F(Voxelize, AnOpenMeshIsReportedWithNumbersAndVotedOn) {
+  TriangleSoup sphere = make_icosphere(1.0, 5);
+  put("whole.obj", sphere);
+  sphere.triangles.resize(sphere.triangles.size() - 40);
+  put("open.obj", sphere);
+  const json whole = report({"whole.obj", "-r", "128"});
+  const json open = report({"open.obj", "-r", "128"});
+  EXPECT_EQ(open["input"]["closed"], false);
+  EXPECT_GT(open["input"]["files"][0]["unbalanced_edges"], 0);
+  EXPECT_GT(open["lists"]["unbalanced_columns"], 0);
+  const auto found = codes(open);
+  EXPECT_NE(std::find(found.begin(), found.end(), "open"), found.end());
+  const double solid = open["voxels"]["solid"];
+  EXPECT_NEAR(solid / whole["voxels"]["solid"].get<double>(), 1.0, 0.01);
+  EXPECT_NE(last_error.find("open.obj: the mesh is not closed"), std::string::npos) << last_error;
+
+  EXPECT_EQ(place.run({"voxelize", "open.obj", "-r", "64", "--stats", "--open", "fail"}).exit_code,
+            5);
+  EXPECT_EQ(place.run({"voxelize", "open.obj", "-r", "64", "--stats", "--strict"}).exit_code, 5);
+  const json surface = report({"open.obj", "-r", "128", "--open", "surface"});
+  EXPECT_LT(surface["voxels"]["solid"].get<double>(), 0.2 * solid);
+}
+
+TEST_F(Voxelize, APlateThinnerThanAVoxelIsReportedAndItsSurfaceHeld) {
+  put("plate.obj", make_box({0, 0, 0}, {128, 128, 0.1}));
+  const json solid = report({"plate.obj", "-r", "128"});
+  EXPECT_EQ(codes(solid), std::vector<std::string>{"thin"});
+  EXPECT_NE(last_error.find("1638.4"), std::string::npos) << last_error;
+  EXPECT_NE(last_error.find("0.1 voxels thick along z"), std::string::npos) << last_error;
+  const json surface = report({"plate.obj", "-r", "128", "--surface"});
+  EXPECT_EQ(surface["voxels"]["solid"], 128 * 128);
+  EXPECT_TRUE(surface["warnings"].empty());
+  // A shell, thin everywhere but large.
+  TriangleSoup shell = make_icosphere(1.0, 5);
+  TriangleSoup inner = make_icosphere(0.995, 5);
+  reverse_orientation(inner);
+  append(shell, inner);
+  put("shell.obj", shell);
+  EXPECT_EQ(codes(report({"shell.obj", "-r", "64"})), std::vector<std::string>{"thin"});
+  // And nothing of the kind for what is thick.
+  put("ball.obj", make_icosphere(1.0, 5));
+  EXPECT_TRUE(codes(report({"ball.obj", "-r", "16"})).empty()) << last_error;
+}
+
+TEST_F(Voxelize, SolidAndSurfaceTogetherAreTheUnion) {
+  put("ball.obj", make_icosphere(1.0, 4));
+  const auto count = [&](std::vector<std::string> kind) {
+    kind.insert(kind.begin(), {"ball.obj", "-r", "48"});
+    return report(kind)["voxels"]["solid"].get<std::uint64_t>();
+  };
+  const auto solid = count({"--solid"}), surface = count({"--surface"}),
+             both = count({"--solid", "--surface"});
+  EXPECT_EQ(count({}), solid);
+  EXPECT_GT(both, solid);
+  EXPECT_GT(both, surface);
+  EXPECT_LT(both, solid + surface);
+  EXPECT_LT(count({"--surface=6"}), count({"--surface=26"}));
+  EXPECT_LE(count({"--surface=26"}), surface);
+}
+
+TEST_F(Voxelize, TheAreaEstimateIsRightForASphere) {
+  put("ball.obj", make_icosphere(1.0, 5));
+  for (const char* axis : {"x", "y", "z"}) {
+    const json found = report({"ball.obj", "-r", "100", "--axis", axis});
+    EXPECT_NEAR(found["voxels"]["area_estimate"].get<double>(), 4 * M_PI, 0.02 * 4 * M_PI);
+  }
+}
+
+TEST_F(Voxelize, TheAreaEstimateDoesNotDependOnSlabs) {
+  put("ball.obj", make_icosphere(1.0, 4));
+  const json whole = report({"ball.obj", "-r", "700", "-j", "1"});
+  const json slabs = report({"ball.obj", "-r", "700", "-j", "1", "--memory-limit", "32M"});
+  EXPECT_EQ(slabs["voxels"]["area_estimate"], whole["voxels"]["area_estimate"]);
+  EXPECT_EQ(slabs["voxels"]["solid"], whole["voxels"]["solid"]);
+}
+
+TEST_F(Voxelize, FilesOfEveryFormatAppearAndAreReported) {
+  put("box.obj", make_box({0, 0, 0}, {2, 1, 1}));
+  for (const char* name : {"a.vdb", "a.npy", "a.nrrd", "a.vti", "a.binvox", "a.vox"}) {
+    const json found = report({"box.obj", "-r", "16", "-o", name});
+    EXPECT_EQ(found["output"]["path"], name);
+    EXPECT_EQ(found["output"]["bytes"], place.read(name).size()) << name;
+    EXPECT_GT(place.read(name).size(), 100u) << name;
+  }
+  const json slices = report({"box.obj", "-r", "16", "-o", "slices/"});
+  EXPECT_EQ(slices["output"]["format"], "png");
+  EXPECT_TRUE(slices["output"]["bytes"].is_null());
+  EXPECT_TRUE(place.has("slices"));
+  (void)report({"box.obj", "-r", "16", "-o", "a.zarr"});
+  EXPECT_TRUE(place.has("a.zarr/.zarray"));
+}
+
+TEST_F(Voxelize, AFileOnStandardOutputIsTheSameFileAndNothingElse) {
+  put("box.obj", make_box({0, 0, 0}, {2, 1, 1}));
+  ASSERT_EQ(place.run({"voxelize", "box.obj", "-r", "16", "-o", "a.npy"}).exit_code, 0);
+  const RunResult piped = place.run(
+      {"voxelize", "box.obj", "-r", "16", "-o", "-", "--format", "npy", "--stats", "--json"});
+  EXPECT_EQ(piped.exit_code, 0) << piped.err;
+  EXPECT_EQ(piped.out, place.read("a.npy"));
+  EXPECT_NE(piped.err.find("\"dims\": [16, 8, 8]"), std::string::npos) << piped.err;
+}
+
+TEST_F(Voxelize, SuccessIsSilent) {
+  put("box.obj", make_box({0, 0, 0}, {1, 1, 1}));
+  const RunResult run = place.run({"voxelize", "box.obj", "-r", "8", "-o", "a.vdb"});
+  EXPECT_EQ(run.exit_code, 0);
+  EXPECT_EQ(run.out, "");
+  EXPECT_EQ(run.err, "");
+}
+
+TEST_F(Voxelize, QuietHidesWarningsAndVerboseSaysMore) {
+  put("plate.obj", make_box({0, 0, 0}, {8, 8, 0.1}));
+  const std::vector<std::string> base = {"voxelize", "plate.obj", "-r", "8", "-o", "a.vdb"};
+  const auto with = [&](const char* option) {
+    std::vector<std::string> arguments = base;
+    arguments.emplace_back(option);
+    return place.run(arguments).err;
+  };
+  EXPECT_EQ(with("-q"), "");
+  EXPECT_NE(place.run(base).err.find("strata: warning: "), std::string::npos);
+  EXPECT_GT(with("-v").size(), place.run(base).err.size());
+}
+
+TEST_F(Voxelize, MeshesComeThroughAPipe) {
+  put("box.stl", make_box({0, 0, 0}, {1, 1, 1}));
+  const RunResult run = place.run({"voxelize", "-", "--input-format", "stl", "-r", "8", "--stats"},
+                                  {.input = place.read("box.stl")});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_NE(run.out.find("512 voxels"), std::string::npos) << run.out;
+  EXPECT_NE(place.run({"voxelize", "-", "-r", "8", "--stats"}).exit_code, 0);
+}
+
+TEST_F(Voxelize, ADryRunWritesNothing) {
+  put("box.obj", make_box({0, 0, 0}, {1, 1, 1}));
+  const RunResult run =
+      place.run({"voxelize", "box.obj", "-r", "4000", "-o", "a.npy", "--dry-run"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_NE(run.out.find("4000 x 4000 x 4000"), std::string::npos) << run.out;
+  EXPECT_EQ(place.names(), std::vector<std::string>{"box.obj"});
+}
+
+TEST_F(Voxelize, StrictTurnsAWarningIntoExitCode5WithoutAFile) {
+  put("plate.obj", make_box({0, 0, 0}, {8, 8, 0.1}));
+  const RunResult run = place.run({"voxelize", "plate.obj", "-r", "8", "-o", "a.vdb", "--strict"});
+  EXPECT_EQ(run.exit_code, 5);
+  EXPECT_NE(run.err.find("--strict"), std::string::npos) << run.err;
+  EXPECT_EQ(place.names(), std::vector<std::string>{"plate.obj"});
+}
+
+TEST_F(Voxelize, AGridThatMissesTheMeshIsReported) {
+  put("box.obj", make_box({0, 0, 0}, {1, 1, 1}));
+  EXPECT_EQ(codes(report({"box.obj", "-r", "8", "--bounds", "5,5,5,6,6,6"})),
+            std::vector<std::string>{"empty"});
+}
+
+}  // namespace
+}  // namespace strata
