@@ -111,7 +111,7 @@ std::vector<EdgeSum> unbalanced_by_index(std::span<const glm::uvec3> triangles,
                                          std::size_t vertex_count, const Execution& execution) {
   if (vertex_count >= std::size_t{1} << 31) return unbalanced_by_sorting(triangles);
   const std::size_t parts =
-      triangles.size() < 20000 ? 1 : static_cast<std::size_t>(execution.thread_count());
+      triangles.size() < 50000 ? 1 : static_cast<std::size_t>(execution.thread_count());
   std::vector<std::vector<EdgeSum>> found(parts);
   Execution all = execution;
   all.stop = {};

@@ -35,7 +35,7 @@ struct RawMesh {
 };
 
 /// Where a face element stands in the file, for messages: "bunny.obj:1204", and as the file writes
-/// it the vertex it should not name (empty: index + 0).
+/// it the vertex it should not name (empty: its 0-based index).
 struct FacePlace {
   std::string place;
   std::string vertex;

@@ -72,7 +72,7 @@ inline const char* parse_double(const char* text, double& value) {
   return p;
 }
 
-/// Reads a decimal integer with optional sign; values beyond +-2^62 stay there.
+/// Reads a decimal integer with optional sign; values of more than 2^58 may become 2^62.
 /// @return past the number, or null when there is none
 inline const char* parse_integer(const char* text, std::int64_t& value) {
   const char* p = text;
