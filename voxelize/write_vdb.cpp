@@ -38,7 +38,6 @@ constexpr int kUpperVoxels = kLowerVoxels * kUpperSide;
 constexpr std::size_t kLowerSlots = 4096;
 constexpr std::size_t kUpperSlots = 32768;
 constexpr std::size_t kLeafVoxels = 512;
-constexpr int kTilesPerLower = kLowerVoxels / kTileSide;
 constexpr std::size_t kLeafColumns = std::size_t{kLowerSide} * kLowerSide;  // of a lower node
 // Origin, two masks of the slots, and how the values are stored; the values follow.
 constexpr std::size_t kHeadBytes = sizeof(glm::ivec3) + 2 * kUpperSlots / 8 + 1;
