@@ -5,12 +5,14 @@
 #include <algorithm>
 #include <array>
 #include <cstdlib>
+#include <glm/common.hpp>
 #include <random>
 #include <stop_token>
 #include <string>
 #include <vector>
 
 #include "tests/voxelize/surface_testing.h"
+#include "voxelize/surface_overlap.h"
 
 namespace strata {
 namespace {
@@ -54,19 +56,20 @@ struct OracleTriangle {
 };
 
 bool oracle_box(const OracleTriangle& t, glm::ivec3 voxel) {
-  std::vector<WideVector> box;
+  std::array<WideVector, 8> box;
   for (int i = 0; i < 8; ++i) {
-    box.push_back(wide(256 * (voxel + glm::ivec3(i & 1, i >> 1 & 1, i >> 2))));
+    box[static_cast<std::size_t>(i)] = wide(256 * (voxel + glm::ivec3(i & 1, i >> 1 & 1, i >> 2)));
   }
-  std::vector<WideVector> axes = {t.n};
-  for (std::size_t i = 0; i < 3; ++i) {
-    WideVector unit{};
-    unit[i] = 1;
-    axes.push_back(unit);
-    for (const WideVector& e : t.e) axes.push_back(cross(unit, e));
+  constexpr std::array<WideVector, 3> kUnits = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+  for (const WideVector& unit : kUnits) {
+    if (separated(unit, t.p, box)) return false;
   }
-  return std::none_of(axes.begin(), axes.end(),
-                      [&](const WideVector& axis) { return separated(axis, t.p, box); });
+  for (const WideVector& unit : kUnits) {
+    for (const WideVector& e : t.e) {
+      if (separated(cross(unit, e), t.p, box)) return false;
+    }
+  }
+  return !separated(t.n, t.p, box);
 }
 
 // A triangle and a segment. More axes than one needs; none can be wrong, since a gap is a gap.
@@ -87,6 +90,7 @@ bool oracle_segment(const OracleTriangle& t, const WideVector& centre, const Wid
 }
 
 bool oracle_thin(const OracleTriangle& t, glm::ivec3 voxel, int most_nonzero) {
+  if (!oracle_box(t, voxel)) return false;  // the segments lie within the box
   const WideVector centre = wide(256 * voxel + 128);
   for (int x = -1; x <= 1; ++x) {
     for (int y = -1; y <= 1; ++y) {
@@ -251,6 +255,48 @@ TEST(Surface, HugeTrianglesAreClippedExactlyByTheGrid) {
     touched += surface_set(mesh, grid, SurfaceKind::k6).count() > 0;
   }
   EXPECT_GT(touched, 60);
+}
+
+// By the kernels themselves: a whole slab of the largest grid would take seconds.
+TEST(SurfaceOverlap, HugeTrianglesAreExactAtTheFarCornerOfTheLargestGrid) {
+  std::mt19937_64 random(9);
+  const int side = kMaxGridSide;
+  const glm::ivec3 corner(side - 5, side - 4, side - 6);
+  const surface::Window window{corner.x, side, corner.y, side, side};
+  std::uniform_int_distribution<int> far(-kMaxLatticeCoordinate, kMaxLatticeCoordinate);
+  int touched = 0;
+  for (int round = 0; round < 400; ++round) {
+    const glm::ivec3 near = 256 * corner + random_point(random, {5, 4, 6}, 1, 0);
+    glm::ivec3 p(far(random), far(random), far(random));
+    // 2 near - p must stay within the limits.
+    p = glm::max(p, 2 * near - kMaxLatticeCoordinate);
+    const std::array<glm::ivec3, 3> corners = {p, glm::ivec3(far(random), far(random), far(random)),
+                                               2 * near - p};
+    const OracleTriangle expected(corners[0], corners[1], corners[2]);
+    surface::Triangle triangle;
+    for (std::size_t i = 0; i < 3; ++i) triangle[i] = {corners[i].x, corners[i].y, corners[i].z};
+    for (const SurfaceKind kind : kAllKinds) {
+      VoxelSet found({5, 4, 6});
+      surface::SegmentTest thin(triangle, kind == SurfaceKind::k26);
+      const auto add = [&](int u, int v, int first, int last) {
+        for (int w = std::max(first, corner.z); w <= last; ++w) {
+          found.at(glm::ivec3(u, v, w) - corner) = true;
+        }
+      };
+      surface::conservative_runs(triangle, window, [&](int u, int v, int first, int last) {
+        if (kind == SurfaceKind::kConservative) return add(u, v, first, last);
+        first = std::max(first, corner.z);
+        if (first <= last) {
+          thin.runs(u, v, first, last, [&](int begin, int end) { add(u, v, begin, end); });
+        }
+      });
+      found.for_each([&](glm::ivec3 voxel) {
+        ASSERT_EQ(found.at(voxel), oracle(expected, voxel + corner, kind)) << "round " << round;
+        touched += found.at(voxel);
+      });
+    }
+  }
+  EXPECT_GT(touched, 5000);
 }
 
 TEST(Surface, ASegmentOfALongThinTriangleFarAwayIsExact) {
