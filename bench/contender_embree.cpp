@@ -8,6 +8,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <glm/vec2.hpp>
 #include <utility>
 #include <vector>
 
@@ -126,30 +127,43 @@ class Embree : public Contender {
   std::shared_ptr<VoxelSet> voxelize_here(const TriangleSoup& mesh, const VoxelGrid& grid) const {
     RTCScene scene = build(mesh, grid);
     auto result = std::make_shared<RowSet>(static_cast<std::size_t>(grid.dims.y));
-    const auto rows = [&](const tbb::blocked_range<int>& range) {
+    const auto shoot_bands = [&](const tbb::blocked_range<int>& range) {
       Hits hits;
       rtcInitIntersectContext(&hits);
       hits.filter = collect;
       hits.flags = options_.coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT
                                      : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
-      Row scratch;
-      for (int y = range.begin(); y < range.end(); ++y) {
-        scratch.offsets.assign(1, 0);
-        scratch.items.clear();
-        for (int x = 0; x < grid.dims.x; x += options_.packet) {
-          const int lanes = std::min(options_.packet, grid.dims.x - x);
-          shoot(scene, hits, x, y, lanes, static_cast<float>(grid.dims.z) + 2 * kBehind);
-          for (int lane = 0; lane < lanes; ++lane) {
-            auto& list = hits.lists[static_cast<std::size_t>(lane)];
-            if (!list.empty()) append_intervals(list, grid.dims.z, scratch.items);
-            list.clear();
-            scratch.offsets.push_back(static_cast<std::uint32_t>(scratch.items.size()));
+      const glm::ivec2 size = packet_size();
+      std::vector<Row> scratch(static_cast<std::size_t>(size.y));
+      for (int band = range.begin(); band < range.end(); ++band) {
+        const int y = band * size.y;
+        const int rows = std::min(size.y, grid.dims.y - y);
+        for (Row& row : scratch) {
+          row.offsets.assign(1, 0);
+          row.items.clear();
+        }
+        for (int x = 0; x < grid.dims.x; x += size.x) {
+          const int columns = std::min(size.x, grid.dims.x - x);
+          shoot(scene, hits, {x, y}, {columns, rows},
+                static_cast<float>(grid.dims.z) + 2 * kBehind);
+          for (int row = 0; row < rows; ++row) {
+            Row& out = scratch[static_cast<std::size_t>(row)];
+            for (int column = 0; column < columns; ++column) {
+              auto& list = hits.lists[static_cast<std::size_t>(row * size.x + column)];
+              if (!list.empty()) append_intervals(list, grid.dims.z, out.items);
+              list.clear();
+              out.offsets.push_back(static_cast<std::uint32_t>(out.items.size()));
+            }
           }
         }
-        if (!scratch.items.empty()) result->rows[static_cast<std::size_t>(y)] = scratch;
+        for (int row = 0; row < rows; ++row) {
+          const Row& done = scratch[static_cast<std::size_t>(row)];
+          if (!done.items.empty()) result->rows[static_cast<std::size_t>(y + row)] = done;
+        }
       }
     };
-    tbb::parallel_for(tbb::blocked_range<int>(0, grid.dims.y, 16), rows);
+    const int bands = (grid.dims.y + packet_size().y - 1) / packet_size().y;
+    tbb::parallel_for(tbb::blocked_range<int>(0, bands, 4), shoot_bands);
     rtcReleaseScene(scene);
     return result;
   }
@@ -186,16 +200,33 @@ class Embree : public Contender {
     return scene;
   }
 
+  /// Columns and rows of a packet: compact ones meet fewer triangles.
+  [[nodiscard]] glm::ivec2 packet_size() const {
+    switch (options_.packet) {
+      case 16:
+        return {4, 4};
+      case 8:
+        return {4, 2};
+      case 4:
+        return {2, 2};
+      default:
+        return {1, 1};
+    }
+  }
+
+  /// Shoots the rays of `used` columns and rows from column and row `first`.
   template <class RayHits, class Intersect, class Occluded>
-  void shoot_packet(RTCScene scene, Hits& hits, int x, int y, int lanes, float far,
+  void shoot_packet(RTCScene scene, Hits& hits, glm::ivec2 first, glm::ivec2 used, float far,
                     Intersect intersect, Occluded occluded) const {
     RayHits packet;
     constexpr int kWidth = static_cast<int>(sizeof(packet.ray.id) / sizeof(unsigned));
     alignas(64) std::array<int, static_cast<std::size_t>(kWidth)> valid{};
+    const int columns = packet_size().x;
     for (int lane = 0; lane < kWidth; ++lane) {
-      valid[static_cast<std::size_t>(lane)] = lane < lanes ? -1 : 0;
-      aim(packet.ray, static_cast<unsigned>(lane), static_cast<float>(x + lane),
-          static_cast<float>(y), far);
+      const glm::ivec2 at(lane % columns, lane / columns);
+      valid[static_cast<std::size_t>(lane)] = at.x < used.x && at.y < used.y ? -1 : 0;
+      aim(packet.ray, static_cast<unsigned>(lane), static_cast<float>(first.x + at.x),
+          static_cast<float>(first.y + at.y), far);
     }
     if (options_.occluded) {
       occluded(valid.data(), scene, &hits, &packet.ray);
@@ -205,19 +236,19 @@ class Embree : public Contender {
     }
   }
 
-  void shoot(RTCScene scene, Hits& hits, int x, int y, int lanes, float far) const {
+  void shoot(RTCScene scene, Hits& hits, glm::ivec2 first, glm::ivec2 used, float far) const {
     switch (options_.packet) {
       case 16:
-        return shoot_packet<RTCRayHit16>(scene, hits, x, y, lanes, far, rtcIntersect16,
+        return shoot_packet<RTCRayHit16>(scene, hits, first, used, far, rtcIntersect16,
                                          rtcOccluded16);
       case 8:
-        return shoot_packet<RTCRayHit8>(scene, hits, x, y, lanes, far, rtcIntersect8, rtcOccluded8);
+        return shoot_packet<RTCRayHit8>(scene, hits, first, used, far, rtcIntersect8, rtcOccluded8);
       case 4:
-        return shoot_packet<RTCRayHit4>(scene, hits, x, y, lanes, far, rtcIntersect4, rtcOccluded4);
+        return shoot_packet<RTCRayHit4>(scene, hits, first, used, far, rtcIntersect4, rtcOccluded4);
       default:
         RTCRayHit one{};
-        one.ray.org_x = static_cast<float>(x);
-        one.ray.org_y = static_cast<float>(y);
+        one.ray.org_x = static_cast<float>(first.x);
+        one.ray.org_y = static_cast<float>(first.y);
         one.ray.org_z = -kBehind;
         one.ray.dir_z = 1;
         one.ray.tfar = far;

@@ -32,10 +32,8 @@ inline openvdb::BoolGrid::Ptr openvdb_solid(const TriangleSoup& mesh, const Voxe
       points, triangles);
   const openvdb::math::Transform::Ptr transform =
       openvdb::math::Transform::createLinearTransform(1.0);
-  // A second pass smooths distances and a third trims the band; the mask needs neither.
-  constexpr int kFlags = openvdb::tools::DISABLE_RENORMALIZATION;
   const auto field =
-      openvdb::tools::meshToVolume<openvdb::FloatGrid>(adapter, *transform, 1.0F, 1.0F, kFlags);
+      openvdb::tools::meshToVolume<openvdb::FloatGrid>(adapter, *transform, 1.0F, 1.0F);
   return openvdb::tools::sdfInteriorMask(*field);
 }
 

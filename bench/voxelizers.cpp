@@ -5,7 +5,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <cmath>
+#include <algorithm>
 #include <memory>
 #include <sstream>
 #include <string>
@@ -14,6 +14,7 @@
 
 #include "bench/contenders.h"
 #include "bench/support.h"
+#include "mesh/write_mesh.h"
 
 namespace strata::bench {
 namespace {
@@ -26,7 +27,9 @@ struct Settings {
   int rounds = 9;
   double budget_s = 10;
   bool memory = true;
+  std::vector<std::string> skip;  // NAME/THREADS
   std::string csv;
+  std::string write;
   std::string only;  // measure this one in this process and print what it took
 };
 
@@ -42,7 +45,9 @@ std::vector<Entry> make_contenders(const Settings& settings, bool closed) {
     const bool named = settings.contenders.empty() ||
                        std::find(settings.contenders.begin(), settings.contenders.end(),
                                  contender->name()) != settings.contenders.end();
-    if (named && (settings.only.empty() || id == settings.only)) {
+    const bool skipped =
+        std::find(settings.skip.begin(), settings.skip.end(), id) != settings.skip.end();
+    if (named && !skipped && (settings.only.empty() || id == settings.only)) {
       all.push_back({std::move(id), std::move(contender)});
     }
   };
@@ -194,6 +199,14 @@ class Comparison {
                 "voxels", "voxels - strata", "rounds"}};
 };
 
+int write_first_mesh(const Settings& settings) {
+  const auto mesh = bench_mesh(settings.meshes.front());
+  if (!mesh) return 1;
+  const auto done = write_mesh(settings.write, mesh->soup);
+  if (!done) fmt::print(stderr, "bench_voxelizers: {}\n", done.error().message);
+  return done ? 0 : 4;
+}
+
 }  // namespace
 }  // namespace strata::bench
 
@@ -207,14 +220,17 @@ int main(int argc, char** argv) {
       ->delimiter(',');
   app.add_option("--contenders", settings.contenders, "names as in the table; all by default")
       ->delimiter(';');
+  app.add_option("--skip", settings.skip, "leave out, as NAME/THREADS: OpenVDB/1");
   app.add_option("--threads", settings.threads, "thread counts")->delimiter(',');
   app.add_option("--rounds", settings.rounds, "interleaved rounds");
   app.add_option("--budget", settings.budget_s, "seconds that a contender may use per grid");
   app.add_flag("--memory,!--no-memory", settings.memory, "measure peak memory and first runs");
   app.add_option("--csv", settings.csv, "write the table to this file");
+  app.add_option("--write", settings.write, "write the first mesh to this file, and end");
   app.add_option("--only", settings.only)->group("");
   CLI11_PARSE(app, argc, argv);
   if (!settings.only.empty()) return measure_first_run(settings);
+  if (!settings.write.empty()) return write_first_mesh(settings);
 
   Comparison comparison(settings);
   for (const std::string& mesh : settings.meshes) {

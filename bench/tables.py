@@ -1,0 +1,186 @@
+#!/usr/bin/env python3
+"""Markdown tables from the csv files of bench/run, and what of the goals they reach.
+
+  tables.py RESULTS                    prints all sections
+  tables.py RESULTS --into FILE.md     puts each between its lines <!-- begin NAME --> and <!-- end NAME -->
+"""
+
+import argparse
+import csv
+import os
+import re
+
+
+def load(folder, name):
+    path = os.path.join(folder, name + ".csv")
+    if not os.path.exists(path):
+        return []
+    with open(path, newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def table(rows, columns):
+    """columns: {heading: key of the row, or a function of it}"""
+    lines = ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
+    for row in rows:
+        cells = [str(key(row) if callable(key) else row[key]) for key in columns.values()]
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+def number(text):
+    try:
+        return float(text)
+    except ValueError:
+        return float("nan")
+
+
+def short(value):
+    if value != value:
+        return "-"
+    return f"{value:.0f}" if value >= 100 else f"{value:.1f}" if value >= 10 else f"{value:.2f}"
+
+
+def pick(rows, **wanted):
+    return [row for row in rows if all(row[key.replace("_", " ")] == str(value) for key, value in wanted.items())]
+
+
+def voxelizers_section(rows):
+    parts = []
+    for mesh, triangles in dict.fromkeys((row["mesh"], row["triangles"]) for row in rows):
+        parts.append(f"**{mesh}**, {int(triangles):,} triangles\n\n" + table(
+            pick(rows, mesh=mesh),
+            {"side": "side", "voxelizer": "contender", "threads": "threads", "wall ms": "wall ms",
+             "CPU ms": "cpu ms", "wall / strata": "wall / strata", "CPU / strata": "cpu / strata",
+             "first run ms": "first run ms", "peak MiB": "peak MiB", "peak / strata": "peak / strata",
+             "voxels": lambda row: f"{int(row['voxels']):,}",
+             "difference": lambda row: f"{int(number(row['voxels - strata'])):+,}"
+             if row["voxels - strata"] not in ("-", "0") else "0"}))
+    return "\n\n".join(parts)
+
+
+def all_columns(rows):
+    return table(rows, {key: key for key in rows[0]}) if rows else ""
+
+
+class Goals:
+    """Each goal of the project's table: by wall time and by CPU time. For goals over several meshes the
+    worst mesh counts."""
+
+    def __init__(self, folder):
+        self.voxelizers = load(folder, "voxelizers")
+        self.growth = load(folder, "growth")
+        self.reading = load(folder, "reading")
+        self.processes = load(folder, "whole_process")
+        self.rows = []
+
+    def add(self, what, bound, wall, cpu, at_most=False):
+        """wall, cpu: lists of values, the worst counts; cpu may be None."""
+        def worst(values):
+            return (max(values) if at_most else min(values)) if values else float("nan")
+
+        value = worst(wall)
+        reached = value <= bound if at_most else value >= bound
+        self.rows.append({
+            "what": what, "goal": ("at most " if at_most else "at least ") + f"{bound:g}",
+            "by wall time": short(value), "by CPU time": short(worst(cpu)) if cpu is not None else "",
+            "reached": "-" if value != value else "yes" if reached else "**no**"})
+
+    def ratio(self, contender, side, threads, key):
+        """Values of a ratio column, over the generated meshes."""
+        return [number(row[key]) for row in pick(self.voxelizers, contender=contender, side=side, threads=threads)
+                if row["mesh"].startswith("bumps")]
+
+    def collect(self):
+        for side, bound in ((1024, 100), (2048, 150)):
+            self.add(f"OpenVDB / Strata, {side} a side, 2 threads", bound,
+                     self.ratio("OpenVDB", side, 2, "wall / strata"), self.ratio("OpenVDB", side, 2, "cpu / strata"))
+        self.add("OpenVDB / Strata, peak memory, 1024 a side", 10,
+                 self.ratio("OpenVDB", 1024, 2, "peak / strata"), None)
+        self.add("Embree / Strata, 1024 a side, 1 thread", 10,
+                 self.ratio("Embree", 1024, 1, "wall / strata"), self.ratio("Embree", 1024, 1, "cpu / strata"))
+        for side, bound in ((1024, 4), (2048, 8)):
+            for name in ("bit grid XOR", "bit grid XOR, slabs"):
+                self.add(f"{name} / Strata, {side} a side, 1 thread", bound,
+                         self.ratio(name, side, 1, "wall / strata"), self.ratio(name, side, 1, "cpu / strata"))
+        store = {key: [a / b for a, b in zip(
+            (number(row[key]) for row in pick(self.voxelizers, contender="strata ha", threads=1)),
+            (number(row[key]) for row in pick(self.voxelizers, contender="strata scan", threads=1)))]
+            for key in ("wall ms", "cpu ms")}
+        self.add("HA-buffer / count/scan, end to end, all rows", 1.25, store["wall ms"], store["cpu ms"], True)
+        self.process_goals()
+        self.reading_goals()
+        self.growth_goals()
+        return table(self.rows, {key: key for key in self.rows[0]})
+
+    def process_goals(self):
+        rows = pick(self.processes, program="OpenVDB")
+        self.add("whole process, OBJ to .vdb mask, 1024 a side, OpenVDB / Strata", 25,
+                 [number(row["wall / strata"]) for row in rows], [number(row["cpu / strata"]) for row in rows])
+        layers = [row for row in self.processes if row["layers / s"] != "-"]
+        self.add("PNG slices a second, whole process", 1000, [number(row["layers / s"]) for row in layers], None)
+
+    def reading_goals(self):
+        for file in ("OBJ", "binary STL"):
+            rows = pick(self.reading, file=file, reader="OpenMesh")
+            self.add(f"reading {file}, OpenMesh / Strata", 10,
+                     [number(row["wall / strata, 2 threads"]) for row in rows],
+                     [number(row["cpu / strata, 1 thread"]) for row in rows])
+
+    def growth_goals(self):
+        def times(side, threads, key):
+            return {row["mesh"]: number(row[key]) for row in pick(self.growth, side=side, threads=threads)}
+
+        for threads in (1, 2):
+            values = {}
+            for key in ("wall ms", "cpu ms"):
+                low, high = times(1024, threads, key), times(4096, threads, key)
+                values[key] = [high[mesh] / low[mesh] for mesh in high if mesh in low]
+            self.add(f"time(4096) / time(1024), {threads} thread{'s' if threads > 1 else ''}", 20,
+                     values["wall ms"], values["cpu ms"], True)
+        self.add("speed-up from 1 to 2 threads at 2048", 1.7,
+                 [number(row["speed-up"]) for row in pick(self.growth, side=2048, threads=2)], None)
+        self.add("statistics at 16384 a side, peak MiB", 2048,
+                 [number(row["peak MiB"]) for row in pick(self.growth, side=16384)], None, True)
+
+
+def sections(folder):
+    result = {}
+    for name in ("machine", "stores"):
+        path = os.path.join(folder, name + ".md")
+        if os.path.exists(path):
+            with open(path) as file:
+                result[name] = file.read().strip()
+    voxelizers = load(folder, "voxelizers")
+    if voxelizers:
+        result["goals"] = Goals(folder).collect()
+        result["voxelizers"] = voxelizers_section(voxelizers)
+    for name in ("growth", "reading", "whole_process"):
+        rows = load(folder, name)
+        if rows:
+            result[name] = all_columns(rows)
+    return result
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("results", help="folder of the csv files")
+    parser.add_argument("--into", help="a document with the lines that mark the sections")
+    options = parser.parse_args()
+    found = sections(options.results)
+    if not options.into:
+        for name, text in found.items():
+            print(f"## {name}\n\n{text}\n")
+        return
+    with open(options.into) as file:
+        document = file.read()
+    for name, text in found.items():
+        begin, end = f"<!-- begin {name} -->", f"<!-- end {name} -->"
+        document = re.sub(re.escape(begin) + ".*?" + re.escape(end),
+                          lambda _, text=text: f"{begin}\n{text}\n{end}", document, flags=re.S)
+    with open(options.into, "w") as file:
+        file.write(document)
+
+
+if __name__ == "__main__":
+    main()
