@@ -5,7 +5,7 @@
 #include <map>
 #include <set>
 
-#include "voxel_samples.h"
+#include "tests/voxelize/voxel_samples.h"
 
 namespace strata::testing {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <random>
 
-#include "voxel_readers.h"
+#include "tests/voxelize/voxel_readers.h"
 
 namespace strata::testing {
 namespace {

@@ -1,4 +1,4 @@
-#include "voxel_readers.h"
+#include "tests/voxelize/voxel_readers.h"
 
 #include <png.h>
 #include <zlib.h>
@@ -13,7 +13,7 @@
 #include <stdexcept>
 #include <string_view>
 
-#include "voxel_samples.h"
+#include "tests/voxelize/voxel_samples.h"
 
 namespace strata::testing {
 namespace {

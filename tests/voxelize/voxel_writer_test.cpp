@@ -9,8 +9,8 @@
 #include <atomic>
 #include <thread>
 
-#include "voxel_readers.h"
-#include "voxel_samples.h"
+#include "tests/voxelize/voxel_readers.h"
+#include "tests/voxelize/voxel_samples.h"
 
 namespace strata::testing {
 namespace {

@@ -6,7 +6,7 @@
 
 #include <sstream>
 
-#include "voxel_samples.h"
+#include "tests/voxelize/voxel_samples.h"
 #include "voxelize/voxel_writer.h"
 
 namespace strata::testing {
