@@ -351,8 +351,8 @@ TEST(Surface, AFaceOnAVoxelBoundaryFillsBothSides) {
 }
 
 TEST(Surface, DoesNotDependOnThreadsAxisOrOrderOfTriangles) {
-  const VoxelGrid grid = grid_of(130, 140, 150);
-  Mesh mesh = wavy_sphere({65, 70, 75}, 60, 0.05, 9, 40);
+  const VoxelGrid grid = grid_of(70, 80, 90);
+  Mesh mesh = wavy_sphere({35, 40, 45}, 33, 0.05, 9, 24);
   Mesh shuffled = mesh;
   std::mt19937_64 random(7);
   std::shuffle(shuffled.triangles.begin(), shuffled.triangles.end(), random);
@@ -362,7 +362,7 @@ TEST(Surface, DoesNotDependOnThreadsAxisOrOrderOfTriangles) {
   }
   for (const SurfaceKind kind : kAllKinds) {
     const VoxelSet expected = surface_set(mesh, grid, kind, Axis::kZ, 1);
-    EXPECT_GT(expected.count(), 20000);
+    EXPECT_GT(expected.count(), 7000);
     for (const Axis axis : kAllAxes) {
       for (const int threads : {1, 2, 5}) {
         EXPECT_TRUE(surface_set(mesh, grid, kind, axis, threads) == expected);
