@@ -64,8 +64,8 @@ void append(TriangleSoup& mesh, const TriangleSoup& other) {
     }
   }
   mesh.positions.insert(mesh.positions.end(), other.positions.begin(), other.positions.end());
-  mesh.triangles.reserve(mesh.triangles.size() + other.triangles.size());
-  for (const glm::uvec3& t : other.triangles) mesh.triangles.push_back(t + base);
+  mesh.triangles.insert(mesh.triangles.end(), other.triangles.begin(), other.triangles.end());
+  for (std::size_t t = first_triangle; t < mesh.triangles.size(); ++t) mesh.triangles[t] += base;
 }
 
 }  // namespace strata
