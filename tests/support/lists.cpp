@@ -138,11 +138,18 @@ Lists<Key> reference_lists(const LatticeMesh& mesh, const RasterTarget& target) 
 template <class Key>
 Lists<Key> built_lists(const LatticeMesh& mesh, const RasterTarget& target,
                        const TileStoreOptions& options) {
+  BuilderOf<Key> builder(options);
+  return built_lists(builder, mesh, target);
+}
+
+template <class Builder>
+Lists<typename Builder::Key> built_lists(Builder& builder, const LatticeMesh& mesh,
+                                         const RasterTarget& target) {
+  using Key = typename Builder::Key;
   std::vector<std::vector<Key>> pixels(pixel_count(target));
   const auto bins = bin_triangles(mesh, target);
   EXPECT_TRUE(bins.has_value());
   if (!bins) return {};
-  BuilderOf<Key> builder(options);
   for (int tv = 0; tv < bins->tiles_v; ++tv) {
     for (int tu = 0; tu < bins->tiles_u; ++tu) {
       const auto lists = builder.build(mesh, target, bins->tile(tu, tv), tu, tv);
@@ -223,5 +230,10 @@ template Lists<DepthKey> built_lists<DepthKey>(const LatticeMesh&, const RasterT
                                                const TileStoreOptions&);
 template Lists<DepthItem> built_lists<DepthItem>(const LatticeMesh&, const RasterTarget&,
                                                  const TileStoreOptions&);
+
+template Lists<DepthKey> built_lists<KeyTileBuilder>(KeyTileBuilder&, const LatticeMesh&,
+                                                     const RasterTarget&);
+template Lists<DepthItem> built_lists<ItemTileBuilder>(ItemTileBuilder&, const LatticeMesh&,
+                                                       const RasterTarget&);
 
 }  // namespace strata::testkit

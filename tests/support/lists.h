@@ -46,6 +46,11 @@ template <class Key>
 [[nodiscard]] Lists<Key> built_lists(const LatticeMesh& mesh, const RasterTarget& target,
                                      const TileStoreOptions& options = {});
 
+/// The same through a builder that has seen other tiles.
+template <class Builder>
+[[nodiscard]] Lists<typename Builder::Key> built_lists(Builder& builder, const LatticeMesh& mesh,
+                                                       const RasterTarget& target);
+
 /// The winding number of each voxel centre from the crossings of rays along `axis`, by the
 /// reference rasterizer. Depths are not sorted or merged: sums of signs.
 using Winding = VoxelArray<std::int32_t>;

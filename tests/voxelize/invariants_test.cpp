@@ -13,41 +13,20 @@
 #include "tests/support/corpus.h"
 #include "tests/support/lists.h"
 #include "tests/support/trouble.h"
+#include "tests/support/voxelized.h"
 #include "voxelize/checksum.h"
-#include "voxelize/voxelize.h"
 
 namespace strata {
 namespace {
 
 using namespace testkit;  // NOLINT: the tests' own vocabulary
 
-constexpr InsideRule kAllRules[] = {InsideRule::kWinding, InsideRule::kNonzero,
-                                    InsideRule::kParity};
 const VoxelGrid kTroubleGrid = unit_grid({25, 24, 27});
 
 LatticeMesh snapped(const TriangleSoup& mesh, const VoxelGrid& grid) {
   auto result = snap_to_lattice(mesh, grid);
   EXPECT_TRUE(result.has_value()) << result.error().message;
   return result ? std::move(*result) : LatticeMesh{};
-}
-
-VoxelIntervals voxelized(const TriangleSoup& mesh, const VoxelGrid& grid,
-                         const VoxelizeOptions& options = {}, const Execution& execution = {},
-                         VoxelizeReport* report = nullptr) {
-  auto result = voxelize(mesh, grid, options, execution, report);
-  EXPECT_TRUE(result.has_value()) << result.error().message;
-  return result ? std::move(*result) : VoxelIntervals(grid, options.axis);
-}
-
-bool same_intervals(const VoxelIntervals& a, const VoxelIntervals& b) {
-  if (a.axis() != b.axis() || a.grid() != b.grid()) return false;
-  for (int v = a.v_begin(); v < a.v_end(); ++v) {
-    for (int u = 0; u < a.columns(); ++u) {
-      const auto left = a.column(u, v), right = b.column(u, v);
-      if (!std::equal(left.begin(), left.end(), right.begin(), right.end())) return false;
-    }
-  }
-  return true;
 }
 
 /// Closed meshes with a grid each: the trouble, simple solids, and real ones.
