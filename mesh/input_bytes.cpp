@@ -1,6 +1,7 @@
 #include "mesh/input_bytes.h"
 
 #include <fcntl.h>
+#include <poll.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -38,8 +39,9 @@ InputBytes::~InputBytes() {
   if (descriptor_ >= 0) ::close(descriptor_);
 }
 
-Result<InputBytes> InputBytes::open(const std::string& path, std::uint64_t limit) {
-  if (path == "-") return read_all(STDIN_FILENO, "standard input", limit);
+Result<InputBytes> InputBytes::open(const std::string& path, std::uint64_t limit,
+                                    const std::stop_token& stop) {
+  if (path == "-") return read_all(STDIN_FILENO, "standard input", limit, stop);
   InputBytes file;
   file.descriptor_ = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
   if (file.descriptor_ < 0) return fail(ErrorCode::kInput, "{}: {}", path, reason(errno));
@@ -48,7 +50,7 @@ Result<InputBytes> InputBytes::open(const std::string& path, std::uint64_t limit
     return fail(ErrorCode::kInput, "{}: {}", path, reason(errno));
   }
   if (!S_ISREG(status.st_mode) || status.st_size == 0) {
-    return read_all(file.descriptor_, path, limit);  // pipes, and /proc files that say 0
+    return read_all(file.descriptor_, path, limit, stop);  // pipes, and /proc files that say 0
   }
   const auto size = static_cast<std::size_t>(status.st_size);
   const auto page = static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
@@ -61,7 +63,7 @@ Result<InputBytes> InputBytes::open(const std::string& path, std::uint64_t limit
   if (::mmap(room, size, PROT_READ, MAP_PRIVATE | MAP_FIXED | populate, file.descriptor_, 0) ==
       MAP_FAILED) {
     ::munmap(room, span);
-    return read_all(file.descriptor_, path, limit);
+    return read_all(file.descriptor_, path, limit, stop);
   }
   file.data_ = static_cast<const char*>(room);
   file.size_ = size;
@@ -70,10 +72,19 @@ Result<InputBytes> InputBytes::open(const std::string& path, std::uint64_t limit
 }
 
 Result<InputBytes> InputBytes::read_all(int descriptor, const std::string& name,
-                                        std::uint64_t limit) {
+                                        std::uint64_t limit, const std::stop_token& stop) {
   InputBytes file;
   std::size_t filled = 0;
   for (;;) {
+    // Whoever should write may never do so: look for a stop request meanwhile. It may come a moment
+    // after the signal that interrupts the wait.
+    constexpr int kLookMilliseconds = 50;
+    pollfd waiting = {.fd = descriptor, .events = POLLIN, .revents = 0};
+    int ready = 0;
+    while (!stop.stop_requested() && (ready == 0 || (ready < 0 && errno == EINTR))) {
+      ready = ::poll(&waiting, 1, kLookMilliseconds);
+    }
+    if (stop.stop_requested()) return fail(ErrorCode::kCancelled, "{}: stopped", name);
     if (filled == file.owned_.size()) {
       if (limit != 0 && filled >= limit) {
         return fail(ErrorCode::kLimit, "{}: more than the {} bytes of the memory limit", name,

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <stop_token>
 #include <string>
 #include <string_view>
 
@@ -15,8 +16,10 @@ class InputBytes {
  public:
   /// @param path  a file; "-" is standard input @param limit  most bytes to hold from a pipe, 0:
   /// any
-  /// @return kInput naming path and reason; kLimit
-  static Result<InputBytes> open(const std::string& path, std::uint64_t limit);
+  /// @param stop  ends the waiting for a pipe
+  /// @return kInput naming path and reason; kLimit; kCancelled
+  static Result<InputBytes> open(const std::string& path, std::uint64_t limit,
+                                 const std::stop_token& stop = {});
 
   InputBytes(InputBytes&& other) noexcept;
   InputBytes& operator=(InputBytes&& other) noexcept;
@@ -28,7 +31,8 @@ class InputBytes {
 
  private:
   InputBytes() = default;
-  static Result<InputBytes> read_all(int descriptor, const std::string& name, std::uint64_t limit);
+  static Result<InputBytes> read_all(int descriptor, const std::string& name, std::uint64_t limit,
+                                     const std::stop_token& stop);
   const char* data_ = "";
   std::size_t size_ = 0;
   std::size_t mapped_ = 0;  ///< bytes of the mapping, 0 if none

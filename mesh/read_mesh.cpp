@@ -127,7 +127,7 @@ Result<MeshFile> read_mesh(const std::string& path, const MeshReadOptions& optio
 #endif
   }
   try {
-    const auto file = detail::InputBytes::open(path, execution.memory_limit);
+    const auto file = detail::InputBytes::open(path, execution.memory_limit, execution.stop);
     if (!file) return tl::unexpected(file.error());
     Result<MeshFile> result =
         read_text(file->view(), path == "-" ? "standard input" : path, known, execution);

@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <csignal>
+#include <fstream>
 #include <limits>
 #include <thread>
 
@@ -152,6 +153,26 @@ TEST_F(Faults, AnInterruptIsCode130AndLeavesNothing) {
     fails({"voxelize", "ball.obj", "-r", "30000", "-o", "out.vdb", "-j", "1"}, 130, "interrupted",
           options);
   }
+}
+
+TEST_F(Faults, AnInterruptEndsTheWaitForAPipe) {
+  RunOptions options;
+  options.silent_stdin_pipe = true;
+  options.while_running = [](int pid) {
+    // Wait until the handler is there: bit 1 of the signals that are caught.
+    const auto catches_interrupts = [pid] {
+      std::ifstream in("/proc/" + std::to_string(pid) + "/status");
+      for (std::string line; std::getline(in, line);) {
+        if (line.starts_with("SigCgt:")) return (std::stoull(line.substr(7), nullptr, 16) & 2) != 0;
+      }
+      return false;
+    };
+    for (int i = 0; i < 20000 && !catches_interrupts(); ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    kill(pid, SIGINT);
+  };
+  fails({"info", "-", "--input-format", "obj"}, 130, "interrupted", options);
 }
 
 TEST_F(Faults, TooLittleAddressSpaceIsCode6AndLeavesNothing) {

@@ -80,7 +80,13 @@ RunResult Workplace::run(const std::vector<std::string>& arguments,
   const pid_t child = fork();
   if (child == 0) {
     if (chdir(folder_.c_str()) != 0) _exit(125);
-    redirect(in.c_str(), O_RDONLY, STDIN_FILENO);
+    if (options.silent_stdin_pipe) {
+      // The writing end stays open in the tool itself.
+      int ends[2];
+      if (pipe(ends) != 0 || dup2(ends[0], STDIN_FILENO) < 0) _exit(125);
+    } else {
+      redirect(in.c_str(), O_RDONLY, STDIN_FILENO);
+    }
     redirect(err.c_str(), O_WRONLY | O_CREAT | O_TRUNC, STDERR_FILENO);
     if (options.closed_stdout_pipe) {
       int ends[2];
