@@ -148,8 +148,9 @@ class Reading {
 
  private:
   const Settings& settings_;
-  Table table_{{"file", "MiB", "reader", "wall ms", "cpu ms", "MiB / s", "cpu / strata, 1 thread",
-                "wall / strata, 2 threads", "triangles", "vertices"}};
+  Table table_{{"file", "MiB", "reader", "wall ms", "cpu ms", "MiB / s",
+                "cpu / strata with 1 thread", "wall / strata with 2 threads", "triangles",
+                "vertices"}};
 };
 
 int run(const Settings& settings) {

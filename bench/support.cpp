@@ -183,7 +183,10 @@ std::string Table::markdown() const {
 std::string Table::csv() const {
   const auto line = [](const std::vector<std::string>& cells) {
     std::string text;
-    for (const std::string& cell : cells) text += (text.empty() ? "" : ",") + cell;
+    for (const std::string& cell : cells) {
+      const bool quote = cell.find(',') != std::string::npos;
+      text += (text.empty() ? "" : ",") + (quote ? '"' + cell + '"' : cell);
+    }
     return text + "\n";
   };
   std::string text = line(columns_);

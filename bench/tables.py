@@ -124,8 +124,8 @@ class Goals:
         for file in ("OBJ", "binary STL"):
             rows = pick(self.reading, file=file, reader="OpenMesh")
             self.add(f"reading {file}, OpenMesh / Strata", 10,
-                     [number(row["wall / strata, 2 threads"]) for row in rows],
-                     [number(row["cpu / strata, 1 thread"]) for row in rows])
+                     [number(row["wall / strata with 2 threads"]) for row in rows],
+                     [number(row["cpu / strata with 1 thread"]) for row in rows])
 
     def growth_goals(self):
         def times(side, threads, key):
@@ -150,7 +150,7 @@ def sections(folder):
         path = os.path.join(folder, name + ".md")
         if os.path.exists(path):
             with open(path) as file:
-                result[name] = file.read().strip()
+                result[name] = re.sub("^## ", "### ", file.read().strip(), flags=re.M)
     voxelizers = load(folder, "voxelizers")
     if voxelizers:
         result["goals"] = Goals(folder).collect()
