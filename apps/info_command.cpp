@@ -173,6 +173,7 @@ Result<void> run_info(const InfoCommand& command, Session& session) {
   }
   json.end_array();
   json.end_object();
+  session.end_progress();
   const auto printed = command.json ? print_report(json.take(), *command.json, false)
                                     : print_report(text, "-", false);
   if (!printed) return printed;

@@ -104,6 +104,7 @@ int strata_main(int argc, char** argv) {
   } else if (const auto* ldi = std::get_if<LdiCommand>(&command)) {
     result = run(*ldi, session);
   }
+  session.end_progress();
   const int code = exit_code(result, session);
 #ifndef STRATA_ORDERLY_EXIT
   // All files are committed. Giving memory and threads back one by one would only take time.

@@ -32,6 +32,8 @@ class Session {
 
   /// For the next phase of the job; `label` is what the progress bar says.
   [[nodiscard]] Execution execution(std::string label);
+  /// Takes the progress bar away, before a report is printed.
+  void end_progress() { bar_.reset(); }
   [[nodiscard]] int threads() const;
   [[nodiscard]] std::uint64_t memory_limit() const { return memory_limit_; }
   [[nodiscard]] bool interrupted() const { return interrupts_.interrupted(); }

@@ -258,6 +258,7 @@ Result<void> run_voxelize(const VoxelizeCommand& command, Session& session) {
   if (!command.dry_run) {
     if (auto done = voxelize_and_write(command, outcome, session); !done) return done;
   }
+  session.end_progress();
   return print_reports(command, outcome, session);
 }
 

@@ -226,6 +226,15 @@ TEST_F(Voxelize, SuccessIsSilent) {
   EXPECT_EQ(run.err, "");
 }
 
+TEST_F(Voxelize, AProgressBarTakesItselfAway) {
+  put("ball.obj", make_icosphere(1.0, 4));
+  const RunResult run =
+      place.run({"voxelize", "ball.obj", "-r", "64", "-o", "a.vdb", "--progress", "bar"});
+  EXPECT_NE(run.err.find("voxelizing"), std::string::npos);
+  EXPECT_TRUE(run.err.ends_with("\r\x1b[K")) << run.err;
+  EXPECT_EQ(place.run({"voxelize", "ball.obj", "-r", "64", "-o", "b.vdb"}).err, "");
+}
+
 TEST_F(Voxelize, QuietHidesWarningsAndVerboseSaysMore) {
   put("plate.obj", make_box({0, 0, 0}, {8, 8, 0.1}));
   const std::vector<std::string> base = {"voxelize", "plate.obj", "-r", "8", "-o", "a.vdb"};
