@@ -83,7 +83,7 @@ TEST_P(LdiFile, ReadsBackExactlyWhatWasWritten) {
     expect_round_trip(random_image(seed, 1 + static_cast<int>(seed * 7 % 23),
                                    1 + static_cast<int>(seed * 5 % 17)));
   }
-  expect_round_trip(random_image(41, 700, 150));  // several batches of rows
+  expect_round_trip(random_image(41, 1000, 70));  // several batches of rows
 }
 
 TEST_P(LdiFile, KeepsEmptyImagesAndDeepLists) {
