@@ -123,10 +123,10 @@ TEST(TileLists, ScalarAndEveryVectorTargetAreTested) {
 TEST(TileLists, AreExactForTrianglesOfEverySize) {
   Maker maker(1);
   // Around the limits of the rasterizer's arithmetic, 2^16 and 2^21 steps, and both ends.
-  constexpr std::int64_t kExtents[] = {1,       5,         100,       255,           256,
-                                       257,     3000,      40'000,    65'535,        65'536,
-                                       65'537,  65'538,    1'000'000, (1 << 21) - 1, 1 << 21,
-                                       2097153, 5'000'000, 1 << 25,   1 << 28};
+  constexpr std::int64_t kExtents[] = {1,       5,       100,       255,       256,
+                                       257,     3000,    40'000,    65'535,    65'536,
+                                       65'537,  200'000, 262'144,   1'000'000, (1 << 21) - 1,
+                                       1 << 21, 2097153, 5'000'000, 1 << 25,   1 << 28};
   constexpr glm::ivec2 kSizes[] = {{1, 1}, {7, 3}, {65, 67}};
   std::size_t crossings = 0;
   for (const auto& size : kSizes) {
@@ -150,6 +150,35 @@ TEST(TileLists, AreExactForTrianglesOfEverySize) {
     }
   }
   EXPECT_GT(crossings, 200'000u) << "the triangles miss the image";
+}
+
+TEST(TileLists, AreExactWherePlanesMeetTheLattice) {
+  // Slopes p / q with odd q, through a pixel's centre: the depth is a whole number at each q-th
+  // pixel, where a quotient that is a little too small would show.
+  Maker maker(9);
+  for (const Axis axis : kAllAxes) {
+    const AxisFrame frame(axis);
+    const RasterTarget target{axis, 100, 66, 1 << 22};
+    for (const int extent : {10'000, 65'000, 300'000, 2'000'000, 20'000'000}) {
+      Scene scene;
+      for (int i = 0; i < 40; ++i) {
+        constexpr int kDivisors[] = {3, 5, 7, 9, 11, 13, 49, 61};
+        const int q = kDivisors[i % 8];
+        const int slope_u = maker.pick(-9, 9), slope_v = i % 3 == 0 ? 0 : maker.pick(-9, 9);
+        glm::ivec3 p[3];
+        for (auto& corner : p) {
+          const int a = maker.pick(-extent, extent) / q, b = maker.pick(-extent, extent) / q;
+          corner[frame.u] = 50 * 256 + 128 + a * q;
+          corner[frame.v] = 33 * 256 + 128 + b * q;
+          corner[frame.w] = (1 << 21) + a * slope_u + b * slope_v;
+        }
+        scene.add(p[0], p[1], p[2]);
+      }
+      expect_exact<DepthKey>(scene, target, false);
+      expect_exact<DepthItem>(scene, target, false);
+      ASSERT_FALSE(HasFailure()) << "extent " << extent << ", axis " << static_cast<int>(axis);
+    }
+  }
 }
 
 TEST(TileLists, AreExactForSliversAndNeedles) {
@@ -180,14 +209,14 @@ TEST(TileLists, AreExactForSliversAndNeedles) {
 
 TEST(TileLists, AreExactForMeshesThatCauseTrouble) {
   const VoxelGrid grid = unit_grid({70, 26, 66});
-  for (const auto& [name, mesh] : closed_trouble()) {
-    const auto lattice = snap_to_lattice(mesh, grid);
+  for (const NamedMesh& named : closed_trouble()) {
+    const auto lattice = snap_to_lattice(named.mesh, grid);
     ASSERT_TRUE(lattice.has_value());
     for (const Axis axis : kAllAxes) {
       const RasterTarget target = target_of(grid, axis);
       const auto expected = reference_lists<DepthKey>(*lattice, target);
       for_each_simd_target([&](const std::string& simd) {
-        EXPECT_EQ(built_lists<DepthKey>(*lattice, target), expected) << name << ", " << simd;
+        EXPECT_EQ(built_lists<DepthKey>(*lattice, target), expected) << named.name << ", " << simd;
       });
     }
   }

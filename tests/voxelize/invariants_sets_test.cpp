@@ -40,6 +40,25 @@ TriangleSoup ball(const glm::dvec3& centre, double radius) {
   return mesh;
 }
 
+struct Scene {
+  std::string name;
+  TriangleSoup mesh;
+  VoxelGrid grid;
+};
+
+/// The trouble on its grid, and simple solids of `longest` voxels.
+std::vector<Scene> scenes_at(int longest) {
+  std::vector<Scene> scenes;
+  for (auto& [name, mesh] : closed_trouble()) {
+    scenes.push_back({name, std::move(mesh), kTroubleGrid});
+  }
+  for (auto& [name, mesh] : simple_solids()) {
+    const VoxelGrid grid = grid_around(mesh, longest, 1);
+    scenes.push_back({name, std::move(mesh), grid});
+  }
+  return scenes;
+}
+
 /// Voxel by voxel: keep(in_a, in_b).
 template <class Keep>
 VoxelSet combined(const VoxelSet& a, const VoxelSet& b, Keep&& keep) {
@@ -269,17 +288,11 @@ TEST(Monotone, SmallerSolidsHaveFewerVoxels) {
 }
 
 TEST(Monotone, SolidAndSurfaceNestAsTheyShould) {
-  std::vector<std::pair<std::string, std::pair<TriangleSoup, VoxelGrid>>> scenes;
-  for (auto& [name, mesh] : closed_trouble()) {
-    if (name != "huge tetrahedra") scenes.push_back({name, {std::move(mesh), kTroubleGrid}});
-  }
-  for (auto& [name, mesh] : simple_solids()) {
-    const VoxelGrid grid = grid_around(mesh, 40, 1);
-    scenes.push_back({name, {std::move(mesh), grid}});
-  }
-  for (const auto& [name, scene] : scenes) {
-    SCOPED_TRACE(name);
-    const auto& [mesh, grid] = scene;
+  for (const Scene& scene : scenes_at(40)) {
+    if (scene.name == "huge tetrahedra") continue;  // its surface is most of the grid, many times
+    SCOPED_TRACE(scene.name);
+    const TriangleSoup& mesh = scene.mesh;
+    const VoxelGrid& grid = scene.grid;
     const VoxelSet solid = voxel_set(mesh, grid);
     const auto skin = [&](SurfaceKind kind) {
       return voxel_set(mesh, grid, {.solid = false, .surface = true, .surface_kind = kind});
@@ -407,29 +420,23 @@ TEST(NestedShells, FollowTheInsideRule) {
 
 // I5, the part of it that is the processor's
 TEST(SameBits, OnEverySimdTarget) {
-  std::vector<std::pair<NamedMesh, VoxelGrid>> scenes;
-  for (auto& mesh : closed_trouble()) scenes.push_back({std::move(mesh), kTroubleGrid});
-  for (auto& mesh : simple_solids()) {
-    const VoxelGrid grid = grid_around(mesh.mesh, 130, 1);
-    scenes.push_back({std::move(mesh), grid});
-  }
   Execution one_thread;
   one_thread.threads = 1;
-  for (const auto& [named, grid] : scenes) {
+  for (const Scene& scene : scenes_at(130)) {
     for (const InsideRule rule : kAllRules) {
-      const Axis axis = kAllAxes[named.name.size() % 3];
+      const Axis axis = kAllAxes[scene.name.size() % 3];
       // The count/scan store's lists are walked plainly, one column at a time.
       VoxelizeReport plain;
       const auto expected = voxelized(
-          named.mesh, grid,
+          scene.mesh, scene.grid,
           {.rule = rule, .axis = axis, .store = StoreKind::kCountScan, .statistics = true},
           one_thread, &plain);
       for_each_simd_target([&](const std::string& target) {
-        SCOPED_TRACE(named.name + ", " + target + ", rule " +
+        SCOPED_TRACE(scene.name + ", " + target + ", rule " +
                      std::to_string(static_cast<int>(rule)));
         VoxelizeReport report;
         const auto found = voxelized(
-            named.mesh, grid,
+            scene.mesh, scene.grid,
             {.rule = rule, .axis = axis, .store = StoreKind::kHaBuffer, .statistics = true},
             one_thread, &report);
         EXPECT_TRUE(same_intervals(found, expected));

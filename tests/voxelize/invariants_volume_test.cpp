@@ -42,15 +42,15 @@ double list_volume(const TriangleSoup& mesh, const VoxelGrid& grid, Axis axis) {
 
 // I19
 TEST(AlignedBox, HasExactlyItsVoxels) {
-  for (const int n : {1, 2, 3, 7, 8, 63, 64, 65, 128}) {
+  for (const unsigned n : {1u, 2u, 3u, 7u, 8u, 63u, 64u, 65u, 128u}) {
     // A cube that fills the grid, on every side at the grid's border.
-    const VoxelGrid grid = unit_grid({n, n, n});
+    const VoxelGrid grid = unit_grid(glm::ivec3(static_cast<int>(n)));
     const TriangleSoup cube = make_box(glm::dvec3(0), glm::dvec3(n));
     for (const Axis axis : kAllAxes) {
       for (const bool closed : {true, false}) {
         const auto voxels = voxelized(cube, grid, {.axis = axis, .closed = closed});
-        EXPECT_EQ(voxels.solid_voxels(), static_cast<std::uint64_t>(n) * n * n) << n;
-        EXPECT_EQ(voxels.interval_count(), static_cast<std::uint64_t>(n) * n) << n;
+        EXPECT_EQ(voxels.solid_voxels(), std::uint64_t{n} * n * n) << n;
+        EXPECT_EQ(voxels.interval_count(), std::uint64_t{n} * n) << n;
       }
     }
   }
