@@ -8,6 +8,7 @@
 
 #include "core/execution.h"
 #include "core/grid.h"
+#include "core/inside_rule.h"
 #include "core/result.h"
 #include "hashbuffer/tile_builder.h"
 #include "mesh/triangle_soup.h"
@@ -15,8 +16,6 @@
 
 namespace strata {
 
-/// Which winding numbers are inside.
-enum class InsideRule { kWinding, kNonzero, kParity };  // > 0, != 0, odd
 /// What to do with a mesh that is not closed.
 enum class OpenMode {
   kVote,     ///< the lists of all three axes decide each voxel by majority

@@ -1,0 +1,119 @@
+#pragma once
+
+#include <glm/mat3x3.hpp>
+#include <glm/vec2.hpp>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/result.h"
+#include "csg/scene/segments.h"
+#include "mesh/triangle_soup.h"
+
+namespace strata::csg {
+
+/// A flat region: contours in the plane. Clean regions have counter-clockwise outer contours and
+/// clockwise holes, do not cross themselves and are filled by the nonzero rule.
+struct Outline {
+  std::vector<std::vector<glm::dvec2>> contours;  ///< closed; the last point is not the first again
+  [[nodiscard]] bool empty() const { return contours.empty(); }
+};
+
+enum class Fill { kEvenOdd, kNonzero };
+
+// --- shapes ------------------------------------------------------------------------------------
+
+[[nodiscard]] Outline make_square(const glm::dvec2& size, bool centre);
+[[nodiscard]] Outline make_circle(double radius, const Segments& segments);
+/// `polygon`: one path for each contour (empty: all points in order), cleaned by even-odd.
+/// @return kInput naming the index that is out of range
+Result<Outline> make_polygon(std::span<const glm::dvec2> points,
+                             std::span<const std::vector<std::uint32_t>> paths);
+
+// --- operations (Clipper; coordinates on a fine integer grid) ----------------------------------
+
+[[nodiscard]] Outline clean(const Outline& outline, Fill fill);
+[[nodiscard]] Outline unite(std::span<const Outline> operands);
+[[nodiscard]] Outline intersect(std::span<const Outline> operands);
+/// The first minus all others.
+[[nodiscard]] Outline subtract(std::span<const Outline> operands);
+[[nodiscard]] Outline convex_hull(std::span<const Outline> operands);
+[[nodiscard]] Outline minkowski_sum(std::span<const Outline> operands);
+/// `fill`: without holes.
+[[nodiscard]] Outline without_holes(const Outline& outline);
+/// Rounded joins with `segments` for a circle of the radius; negative shrinks.
+[[nodiscard]] Outline offset_round(const Outline& outline, double radius, const Segments& segments);
+/// Mitered or chamfered joins.
+[[nodiscard]] Outline offset_delta(const Outline& outline, double delta, bool chamfer);
+/// p' = m * (p, 1); contours are turned when m mirrors.
+[[nodiscard]] Outline transform(const Outline& outline, const glm::dmat3& m);
+/// `resize` in the plane: see csg_format; 0 keeps an axis, or follows the largest given one.
+[[nodiscard]] Outline resize(const Outline& outline, const glm::dvec2& size,
+                             const bool (&follow)[2]);
+
+// --- flat to solid ------------------------------------------------------------------------------
+
+struct LinearExtrude {
+  glm::dvec3 direction{0, 0, 1};  ///< unit vector
+  double height = 100;
+  bool centre = false;
+  double twist = 0;  ///< degrees, clockwise looking down
+  glm::dvec2 scale{1};
+  int slices = 0;               ///< 0: from `segments`
+  int outline_segments = 0;     ///< newer dialect: divides edges; 0: not
+  bool divide_outline = false;  ///< newer dialect: divide edges of twisted outlines
+  Segments segments;
+};
+/// A closed mesh with shared vertices; empty for an empty outline or height <= 0.
+[[nodiscard]] TriangleSoup linear_extrude(const Outline& outline, const LinearExtrude& options);
+
+struct RotateExtrude {
+  double angle = 360;     ///< degrees
+  double start = 0;       ///< degrees; full turns of the older dialect start at 180
+  bool round_up = false;  ///< newer dialect: number of steps is rounded up
+  Segments segments;
+};
+/// A closed mesh. @return kGeometry when the outline crosses the axis
+Result<TriangleSoup> rotate_extrude(const Outline& outline, const RotateExtrude& options);
+
+/// A closed slab between z = low and z = high: flat scenes, 1 mm thick.
+[[nodiscard]] TriangleSoup make_slab(const Outline& outline, double low, double high);
+
+/// `roof`: straight skeleton or Voronoi roof over the outline. @return kGeometry if it cannot be
+/// done
+Result<TriangleSoup> make_roof(const Outline& outline, const std::string& method,
+                               const Segments& segments);
+
+/// Triangles of the outline, indices into all contours' points one after another.
+[[nodiscard]] std::vector<glm::uvec3> triangulate(const Outline& outline);
+
+// --- solid to flat ------------------------------------------------------------------------------
+
+/// The shadow of triangles on the xy plane.
+[[nodiscard]] Outline shadow(const TriangleSoup& mesh);
+/// The cross-section at z = 0 of a closed mesh.
+[[nodiscard]] Outline cross_section(const TriangleSoup& mesh);
+
+// --- files and text -----------------------------------------------------------------------------
+
+struct OutlineImport {
+  std::string layer;  ///< DXF: only this layer; SVG: the id of a group; empty: all
+  glm::dvec2 origin{0};
+  double scale = 1;
+  double dpi = 72;  ///< SVG: pixels an inch where the file gives no unit
+  bool centre = false;
+  Segments segments;
+};
+/// An SVG or DXF file, by its extension. @return kInput naming file and line
+Result<Outline> read_outline(const std::string& path, const OutlineImport& options);
+
+struct TextOptions {
+  std::string text, font, direction, language, script, halign = "left", valign = "baseline";
+  double size = 10, spacing = 1;
+  Segments segments;
+};
+/// Text as OpenSCAD sets it (FreeType, HarfBuzz, fontconfig). `missing` gets the name of a font
+/// that is not installed and was replaced. @return kInput when no font at all is found
+Result<Outline> make_text(const TextOptions& options, std::string& missing);
+
+}  // namespace strata::csg

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/execution.h"
+#include "core/result.h"
+#include "csg/tree.h"
+
+namespace strata::csg {
+
+/// Something in a scene that was done otherwise than written, or not at all.
+struct SceneWarning {
+  /// For machines: "not-done" (a node that cannot be done), "missing-file", "missing-font",
+  /// "approximate", "ignored", "geometry".
+  std::string code;
+  std::string message;  ///< begins with `file:line:column: `
+};
+
+/// A scene: its tree, and what modifiers ask to be shown beside it.
+struct Scene {
+  Tree tree;  ///< the root is the union of the top level
+  /// Subtrees with `%`: shown as grey ghosts, part of nothing.
+  std::vector<Tree::NodeId> backgrounds;
+  /// Subtrees with `#`: part of the tree, and shown again as red ghosts (nodes of their own).
+  std::vector<Tree::NodeId> highlights;
+  std::vector<SceneWarning> warnings;
+  /// The top level is flat: its outlines are slabs of thickness 1, z from -0.5 to 0.5.
+  bool flat = false;
+  /// How far numbers in the file may be off, relative to their size: 5e-6 for six printed digits.
+  double relative_precision = 0.0;
+};
+
+struct ReadSceneOptions {
+  /// Where relative names of imported files are looked for; empty: the folder of the scene.
+  std::string asset_folder;
+  double scad_timeout_s = 300.0;  ///< for the `openscad` program that turns .scad into .csg
+};
+
+/// Reads `.csg` (the whole language of both OpenSCAD 2021.01 and later) or, with the help of an
+/// installed `openscad`, `.scad`. @return kInput naming file:line:column, kLimit, kCancelled
+Result<Scene> read_scene(const std::string& path, const ReadSceneOptions& options = {},
+                         const Execution& execution = {});
+
+/// The same from text; `name` is what messages call it.
+Result<Scene> parse_scene(std::string_view text, const std::string& name,
+                          const ReadSceneOptions& options = {}, const Execution& execution = {});
+
+}  // namespace strata::csg

@@ -1,0 +1,68 @@
+#include "csg/tree.h"
+
+#include <glm/vec3.hpp>
+
+namespace strata::csg {
+
+Tree::NodeId Tree::add_solid(Solid solid) {
+  nodes_.push_back({Operation::kSolid, static_cast<std::uint32_t>(solids_.size()), 0});
+  solids_.push_back(std::move(solid));
+  return static_cast<NodeId>(nodes_.size() - 1);
+}
+
+Tree::NodeId Tree::add(Operation operation, std::span<const NodeId> operands) {
+  nodes_.push_back({operation, static_cast<std::uint32_t>(operands_.size()),
+                    static_cast<std::uint32_t>(operands.size())});
+  operands_.insert(operands_.end(), operands.begin(), operands.end());
+  return static_cast<NodeId>(nodes_.size() - 1);
+}
+
+Tree::NodeId Tree::add(Operation operation, std::initializer_list<NodeId> operands) {
+  return add(operation, std::span(operands.begin(), operands.size()));
+}
+
+Bounds bounds(const Solid& solid) {
+  Bounds box;
+  if (!solid.mesh) return box;
+  const std::vector<glm::dvec3>& positions = solid.mesh->positions;
+  for (const glm::uvec3& triangle : solid.mesh->triangles) {
+    for (int i = 0; i < 3; ++i) {
+      const glm::dvec3 p(solid.world_from_mesh * glm::dvec4(positions[triangle[i]], 1.0));
+      box.low = glm::min(box.low, p);
+      box.high = glm::max(box.high, p);
+    }
+  }
+  return box;
+}
+
+Bounds bounds(const Tree& tree, Tree::NodeId node) {
+  if (node == Tree::kNone) return {};
+  std::vector<Bounds> boxes(node + 1);  // operands stand before the nodes that take them
+  for (Tree::NodeId id = 0; id <= node; ++id) {
+    const Tree::Node& at = tree.nodes()[id];
+    if (at.operation == Operation::kSolid) {
+      boxes[id] = bounds(tree.solids()[at.first]);
+      continue;
+    }
+    const auto operands = tree.operands(id);
+    for (std::size_t i = 0; i < operands.size(); ++i) {
+      const Bounds& box = boxes[operands[i]];
+      if (i == 0) {
+        boxes[id] = box;
+      } else if (at.operation == Operation::kUnion) {
+        boxes[id].low = glm::min(boxes[id].low, box.low);
+        boxes[id].high = glm::max(boxes[id].high, box.high);
+      } else if (at.operation == Operation::kIntersection) {
+        boxes[id].low = glm::max(boxes[id].low, box.low);
+        boxes[id].high = glm::min(boxes[id].high, box.high);
+      }
+    }
+    if (boxes[id].empty() || boxes[id].low.y > boxes[id].high.y ||
+        boxes[id].low.z > boxes[id].high.z) {
+      boxes[id] = {};
+    }
+  }
+  return boxes[node];
+}
+
+}  // namespace strata::csg

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <cstdint>
+#include <glm/mat4x4.hpp>
+#include <glm/vec4.hpp>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/inside_rule.h"
+#include "mesh/soup_tools.h"
+#include "mesh/triangle_soup.h"
+
+namespace strata::csg {
+
+enum class Operation : std::uint8_t { kSolid, kUnion, kIntersection, kDifference };
+
+/// A leaf of a tree: a mesh at its place. Many solids may share one mesh.
+struct Solid {
+  /// May overlap itself, may be open or inside out; null is the empty solid.
+  std::shared_ptr<const TriangleSoup> mesh;
+  glm::dmat4 world_from_mesh{1.0};  ///< affine; one that mirrors turns the triangles around
+  std::optional<glm::vec4> colour;  ///< red, green, blue, alpha in [0, 1]; empty: the scheme's
+  InsideRule rule = InsideRule::kWinding;  ///< which winding numbers are inside
+  std::string name;                        ///< for messages and pick: `cube at plate.csg:12:3`
+};
+
+/// A Boolean tree of solids, as a value. No limit on solids, depth or shape; nothing is required of
+/// the solids (convexity, closedness, disjointness). Built bottom up: operands exist before the
+/// node that takes them, and each node is an operand once at most.
+class Tree {
+ public:
+  using NodeId = std::uint32_t;
+  static constexpr NodeId kNone = 0xffffffffu;
+
+  /// A node [kind | range of operands]; of a solid, `first` is its index into solids().
+  struct Node {
+    Operation operation = Operation::kUnion;
+    std::uint32_t first = 0;  ///< into operands(), or the solid
+    std::uint32_t count = 0;
+  };
+
+  NodeId add_solid(Solid solid);
+  /// A node over `operands`: union (none: empty), intersection (none: empty), difference (the first
+  /// minus all others; none: empty).
+  NodeId add(Operation operation, std::span<const NodeId> operands);
+  NodeId add(Operation operation, std::initializer_list<NodeId> operands);
+
+  /// The node that is pictured, measured, voxelized; kNone: the empty set.
+  void set_root(NodeId root) { root_ = root; }
+  [[nodiscard]] NodeId root() const { return root_; }
+
+  [[nodiscard]] std::span<const Solid> solids() const { return solids_; }
+  [[nodiscard]] std::span<Solid> solids() { return solids_; }
+  [[nodiscard]] std::span<const Node> nodes() const { return nodes_; }
+  [[nodiscard]] std::span<const NodeId> operands(NodeId node) const {
+    return std::span(operands_).subspan(nodes_[node].first, nodes_[node].count);
+  }
+
+ private:
+  std::vector<Solid> solids_;
+  std::vector<Node> nodes_;  ///< operands before the nodes that take them
+  std::vector<NodeId> operands_;
+  NodeId root_ = kNone;
+};
+
+/// The least box around a solid in world space.
+[[nodiscard]] Bounds bounds(const Solid& solid);
+
+/// A box that the result of `node` lies in: union of the operands' for a union, intersection for an
+/// intersection, the first operand's for a difference.
+[[nodiscard]] Bounds bounds(const Tree& tree, Tree::NodeId node);
+
+}  // namespace strata::csg
