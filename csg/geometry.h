@@ -1,0 +1,71 @@
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <span>
+#include <vector>
+
+#include "core/execution.h"
+#include "core/result.h"
+#include "csg/tree.h"
+#include "csg/view.h"
+#include "raster/tile_bins.h"
+
+namespace strata::csg {
+
+/// The solids of a tree in world space, made once and seen by many views and grids.
+class Geometry {
+ public:
+  struct Part {
+    std::vector<glm::dvec3> positions;      ///< world space
+    std::vector<glm::uvec3> turned;         ///< own triangles of a mirrored solid
+    std::span<const glm::uvec3> triangles;  ///< counter-clockwise from outside
+    Bounds box;
+    InsideRule rule = InsideRule::kWinding;
+  };
+
+  /// Keeps the meshes of `tree` alive.
+  explicit Geometry(const Tree& tree, const Execution& execution = {});
+  Geometry(const Geometry&) = delete;
+  Geometry& operator=(const Geometry&) = delete;
+  Geometry(Geometry&&) = default;
+  Geometry& operator=(Geometry&&) = default;
+
+  /// Puts a solid somewhere else.
+  void move_solid(std::uint32_t solid, const glm::dmat4& world_from_mesh);
+
+  [[nodiscard]] const std::vector<Part>& parts() const { return parts_; }
+  [[nodiscard]] const Bounds& box() const { return box_; }  ///< around all parts
+
+ private:
+  void place(std::uint32_t solid, const glm::dmat4& world_from_mesh);
+  void measure();
+
+  std::vector<std::shared_ptr<const TriangleSoup>> meshes_;
+  std::vector<Part> parts_;
+  Bounds box_;
+};
+
+/// A solid as a view sees it: vertices snapped to the image lattice, cut at the near plane where
+/// that is needed, triangles sorted into tiles where they are many.
+struct ViewPart {
+  std::vector<glm::ivec3> vertices;
+  std::vector<glm::uvec3> cut_triangles;    ///< instead of the part's, when it was cut
+  std::vector<std::uint32_t> cut_sources;   ///< the part's triangle of each of those
+  LatticeMesh mesh;                         ///< its vertices are moved out of `vertices`
+  PixelRect rect;                           ///< pixels it may cover
+  std::uint32_t nearest = 0, farthest = 0;  ///< bounds of its depths
+  bool cut = false;                         ///< the near plane may cut it
+  bool binned = false;
+  TileBins bins;
+
+  /// The part's triangle behind triangle `t` of `mesh`.
+  [[nodiscard]] std::uint32_t source(std::uint32_t t) const { return cut ? cut_sources[t] : t; }
+};
+
+/// Snaps a part into the image lattice of `view` (law 3). @return kGeometry when coordinates do not
+/// fit.
+Result<ViewPart> view_part(const Geometry::Part& part, const View& view,
+                           const Execution& execution = {});
+
+}  // namespace strata::csg

@@ -1,0 +1,112 @@
+#include "csg/program.h"
+
+#include <utility>
+
+namespace strata::csg {
+namespace {
+
+/// Of a tree node: the edge that leads to it when it stands alone.
+struct Link {
+  Program::Edge edge;
+  bool empty = false;  ///< the node is the empty set
+};
+
+}  // namespace
+
+Program compile(const Tree& tree, Tree::NodeId root) {
+  Program program;
+  program.leaves.resize(tree.solids().size());
+  if (root == Tree::kNone) return program;
+
+  // Which nodes the root reaches, and how each is seen by its parent: a node is `merged` when it is
+  // a union in the eyes of the parent's union, so that its edges go to the parent.
+  struct Visit {
+    Tree::NodeId node;
+    std::uint32_t target;  // the program node that takes its edges
+    bool inverted;         // how the target sees it
+  };
+  // Edges of each program node in the order of the tree; nodes are numbered from the root down,
+  // then turned around.
+  std::vector<std::vector<Program::Edge>> lists(1);
+  std::vector<Visit> stack{{root, 0, false}};
+  const auto is_union = [](Operation operation, bool inverted) {
+    // not(A - B) = not A or B and not(A and B) = not A or not B are unions of inverted edges.
+    return inverted ? operation != Operation::kUnion : operation == Operation::kUnion;
+  };
+  while (!stack.empty()) {
+    const Visit visit = stack.back();
+    stack.pop_back();
+    const Tree::Node& node = tree.nodes()[visit.node];
+    if (node.operation == Operation::kSolid) {
+      lists[visit.target].emplace_back(node.first, true, visit.inverted);
+      continue;
+    }
+    const auto operands = tree.operands(visit.node);
+    std::uint32_t target = visit.target;
+    bool inverted = visit.inverted;  // of `target`'s union over this node
+    // No operands: the empty set; an inverted empty set is everything, a node of its own.
+    const bool melts = is_union(node.operation, inverted) && !(operands.empty() && inverted);
+    if (!melts) {
+      target = static_cast<std::uint32_t>(lists.size());
+      lists[visit.target].emplace_back(target, false, true);
+      lists.emplace_back();
+      inverted = !inverted;
+      if (operands.empty()) {
+        // inverted was true: not(empty); the new node is empty, and its edge is inverted. A node
+        // that is not inverted and no union is an empty difference: the new node must say true.
+        if (inverted) {
+          lists.emplace_back();
+          lists[target].emplace_back(static_cast<std::uint32_t>(lists.size() - 1), false, true);
+        }
+        continue;
+      }
+    }
+    // In `target`'s union, an operand that counts positively in this node has the node's inversion.
+    for (std::size_t i = operands.size(); i-- > 0;) {
+      const bool negative = node.operation == Operation::kDifference && i > 0;
+      stack.push_back({operands[i], target, inverted != negative});
+    }
+  }
+
+  // Numbered from the root down, parents come first; the other way around children do.
+  const auto count = static_cast<std::uint32_t>(lists.size());
+  const auto renumbered = [count](std::uint32_t node) { return count - 1 - node; };
+  program.nodes.resize(count);
+  for (std::uint32_t id = 0; id < count; ++id) {
+    const std::vector<Program::Edge>& list = lists[renumbered(id)];
+    Program::Node& node = program.nodes[id];
+    node.first = static_cast<std::uint32_t>(program.edges.size());
+    node.count = static_cast<std::uint32_t>(list.size());
+    for (const Program::Edge& edge : list) {
+      const std::uint32_t child = edge.leaf() ? edge.child() : renumbered(edge.child());
+      program.edges.emplace_back(child, edge.leaf(), edge.inverted());
+      const Program::Up up{id, edge.inverted()};
+      (edge.leaf() ? program.leaves[child] : program.nodes[child].up) = up;
+      const bool idle = edge.leaf() ? false : program.idle(child);
+      node.idle_true += idle != edge.inverted() ? 1 : 0;
+    }
+  }
+  return program;
+}
+
+ProgramState::ProgramState(const Program& program)
+    : program_(&program),
+      counts_(program.nodes.size()),
+      inside_(program.leaves.size(), 0),
+      value_(program.idle_value()) {
+  for (std::size_t i = 0; i < counts_.size(); ++i) counts_[i] = program.nodes[i].idle_true;
+}
+
+bool ProgramState::supports(std::uint32_t solid) const {
+  Program::Up up = program_->leaves[solid];
+  bool value = inside(solid);
+  while (up.parent != Program::kNone) {
+    const bool node = counts_[up.parent] > 0;
+    if (node && value == up.inverted) return false;
+    value = node;
+    up = program_->nodes[up.parent].up;
+  }
+  return true;
+}
+
+}  // namespace strata::csg

@@ -1,0 +1,92 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "csg/tree.h"
+
+namespace strata::csg {
+
+/// A tree compiled for evaluation. Every node is a union of edges, and an edge may turn its child
+/// around: A - B is not(not A or B), A and B is not(not A or not B). So one kind of node serves all
+/// of them, and unions below unions melt into one node.
+///
+/// A solid appears once as a leaf. Leaves are solids by their index; a solid that the root does not
+/// reach has no parent.
+struct Program {
+  static constexpr std::uint32_t kNone = 0xffffffffu;
+
+  /// [child:30 | leaf:1 | inverted:1]
+  struct Edge {
+    std::uint32_t bits = 0;
+    Edge() = default;
+    Edge(std::uint32_t child, bool leaf, bool inverted)
+        : bits(child << 2 | (leaf ? 2u : 0u) | (inverted ? 1u : 0u)) {}
+    [[nodiscard]] std::uint32_t child() const { return bits >> 2; }  ///< a solid or a node
+    [[nodiscard]] bool leaf() const { return (bits & 2) != 0; }
+    [[nodiscard]] bool inverted() const { return (bits & 1) != 0; }
+  };
+  /// Above a leaf or node: the node whose edge it hangs from, and whether that edge is inverted.
+  struct Up {
+    std::uint32_t parent = kNone;
+    bool inverted = false;
+  };
+  struct Node {
+    std::uint32_t first = 0, count = 0;  ///< edges
+    std::uint32_t idle_true = 0;         ///< edges that say true while every solid is outside
+    Up up;
+  };
+
+  std::vector<Edge> edges;
+  std::vector<Node> nodes;     ///< children before parents; the last one is the root
+  std::vector<Up> leaves;      ///< of each solid of the tree
+  bool root_inverted = false;  ///< the tree says not(root node)
+
+  [[nodiscard]] bool idle(std::uint32_t node) const { return nodes[node].idle_true > 0; }
+  /// The tree's value with every solid outside.
+  [[nodiscard]] bool idle_value() const {
+    return (!nodes.empty() && idle(static_cast<std::uint32_t>(nodes.size() - 1))) != root_inverted;
+  }
+};
+
+/// Compiles the tree below `root`; kNone gives the empty set. O(nodes), without recursion.
+[[nodiscard]] Program compile(const Tree& tree, Tree::NodeId root);
+
+/// The state of a program along one ray: for each solid whether the ray is inside, for each node
+/// how many of its edges say true. A flip climbs only while nodes change.
+class ProgramState {
+ public:
+  explicit ProgramState(const Program& program);
+
+  /// Turns a solid's bit around.
+  void flip(std::uint32_t solid) {
+    inside_[solid] ^= 1;
+    Program::Up up = program_->leaves[solid];
+    if (up.parent == Program::kNone) return;
+    bool value = inside_[solid] != 0;
+    while (up.parent != Program::kNone) {
+      std::uint32_t& count = counts_[up.parent];
+      const bool before = count > 0;
+      count += value != up.inverted ? 1u : ~0u;
+      const bool after = count > 0;
+      if (before == after) return;
+      value = after;
+      up = program_->nodes[up.parent].up;
+    }
+    value_ = !value_;
+  }
+  [[nodiscard]] bool inside(std::uint32_t solid) const { return inside_[solid] != 0; }
+  [[nodiscard]] bool value() const { return value_; }  ///< of the whole tree
+  /// Whether the tree has its value also because of this solid's: on the way up, no node that is
+  /// true stands on other edges alone.
+  [[nodiscard]] bool supports(std::uint32_t solid) const;
+
+ private:
+  const Program* program_;
+  std::vector<std::uint32_t> counts_;
+  std::vector<std::uint8_t> inside_;
+  bool value_;
+};
+
+}  // namespace strata::csg

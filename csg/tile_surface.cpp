@@ -1,0 +1,423 @@
+#include "csg/tile_surface.h"
+
+#include <algorithm>
+#include <new>
+#include <numeric>
+
+namespace strata::csg {
+
+// --- Arena --------------------------------------------------------------------------------------
+
+std::uint32_t* Arena::words(std::size_t count) {
+  const std::size_t rounded = (count + 15) / 16 * 16;
+  while (block_ < blocks_.size() && used_ + rounded > blocks_[block_].size) {
+    ++block_;
+    used_ = 0;
+  }
+  if (block_ == blocks_.size()) {
+    const std::size_t size = std::max(rounded, kBlockWords);
+    auto* words = static_cast<std::uint32_t*>(std::aligned_alloc(64, size * 4));
+    if (words == nullptr) throw std::bad_alloc();
+    blocks_.push_back({std::unique_ptr<std::uint32_t, Free>(words), size});
+    used_ = 0;
+  }
+  std::uint32_t* result = blocks_[block_].words.get() + used_;
+  used_ += rounded;
+  return result;
+}
+
+void LeafLayers::add_layer(Arena& arena) {
+  const std::size_t count = words();
+  keys.push_back(arena.words(count));
+  std::fill_n(keys.back(), count, kEmpty);
+  triangles.push_back(arena.words(count));
+  std::fill_n(triangles.back(), count, kEmpty);
+}
+
+// --- Simplifier ---------------------------------------------------------------------------------
+
+Simplifier::Simplifier(const Program& program) : program_(&program), seen_(program.nodes.size()) {}
+
+void Simplifier::simplify(std::span<const LeafLayers> leaves,
+                          std::span<const std::uint32_t> present, TileProgram& out) {
+  out.edges.clear();
+  out.nearest.clear();
+  out.nodes.clear();
+  out.leaves.clear();
+  out_idle_.clear();
+  out_depth_.clear();
+  out.constant = true;
+  out.value = program_->idle_value();
+  out.depth = 0;
+  if (program_->nodes.empty()) return;
+
+  // Marks what is above the leaves present, and lists the marked children of each node.
+  ++stamp_;
+  marked_.clear();
+  children_.clear();
+  for (const std::uint32_t slot : present) {
+    Program::Up up = program_->leaves[leaves[slot].solid];
+    std::uint32_t id = slot;
+    bool leaf = true;
+    while (up.parent != Program::kNone) {
+      Seen& seen = seen_[up.parent];
+      const bool known = seen.stamp == stamp_;
+      if (!known) {
+        seen.stamp = stamp_;
+        seen.first_child = Program::kNone;
+        marked_.push_back(up.parent);
+      }
+      children_.push_back({id, leaf, up.inverted, seen.first_child});
+      seen.first_child = static_cast<std::uint32_t>(children_.size() - 1);
+      if (known) break;
+      id = up.parent;
+      leaf = false;
+      up = program_->nodes[id].up;
+    }
+  }
+  const auto root = static_cast<std::uint32_t>(program_->nodes.size() - 1);
+  if (marked_.empty() || seen_[root].stamp != stamp_) return;
+  std::sort(marked_.begin(), marked_.end());
+
+  for (const std::uint32_t id : marked_) {
+    Seen& seen = seen_[id];
+    seen.inverted = false;
+    std::uint32_t absent_true = program_->nodes[id].idle_true;
+    gathered_.clear();
+    bool is_true = false;
+    for (std::uint32_t c = seen.first_child; c != Program::kNone; c = children_[c].next) {
+      const Child& child = children_[c];
+      const bool idle = !child.leaf && program_->idle(child.id);
+      absent_true -= idle != child.inverted ? 1 : 0;
+      if (child.leaf) {
+        const std::uint32_t nearest = child.inverted ? 0 : leaves[child.id].nearest;
+        gathered_.push_back({Program::Edge(child.id, true, child.inverted), nearest});
+        continue;
+      }
+      const Seen& below = seen_[child.id];
+      const bool inverted = child.inverted != below.inverted;
+      switch (below.kind) {
+        case Seen::Kind::kTrue:
+          is_true = is_true || !inverted;
+          break;
+        case Seen::Kind::kFalse:
+          is_true = is_true || inverted;
+          break;
+        case Seen::Kind::kLeaf: {
+          const std::uint32_t nearest = inverted ? 0 : leaves[below.leaf].nearest;
+          gathered_.push_back({Program::Edge(below.leaf, true, inverted), nearest});
+          break;
+        }
+        case Seen::Kind::kNode: {
+          const TileProgram::Node& node = out.nodes[below.out];
+          if (inverted) {
+            const std::uint32_t nearest = out_idle_[below.out] != 0 ? node.nearest : 0;
+            gathered_.push_back({Program::Edge(below.out, false, true), nearest});
+          } else {  // a union in a union
+            for (std::uint32_t e = node.first; e < node.first + node.count; ++e) {
+              gathered_.push_back({out.edges[e], out.nearest[e]});
+            }
+          }
+        }
+      }
+    }
+    if (is_true || absent_true > 0) {
+      seen.kind = Seen::Kind::kTrue;
+    } else if (gathered_.empty()) {
+      seen.kind = Seen::Kind::kFalse;
+    } else if (gathered_.size() == 1) {
+      const Program::Edge edge = gathered_.front().edge;
+      seen.inverted = edge.inverted();
+      seen.kind = edge.leaf() ? Seen::Kind::kLeaf : Seen::Kind::kNode;
+      (edge.leaf() ? seen.leaf : seen.out) = edge.child();
+    } else {
+      std::sort(gathered_.begin(), gathered_.end(), [](const Sorted& a, const Sorted& b) {
+        return a.nearest != b.nearest ? a.nearest < b.nearest : a.edge.bits < b.edge.bits;
+      });
+      seen.kind = Seen::Kind::kNode;
+      seen.out = static_cast<std::uint32_t>(out.nodes.size());
+      TileProgram::Node node{static_cast<std::uint32_t>(out.edges.size()),
+                             static_cast<std::uint32_t>(gathered_.size()), 0xffffffffu};
+      bool idle = false;
+      int depth = 0;
+      for (const Sorted& sorted : gathered_) {
+        out.edges.push_back(sorted.edge);
+        out.nearest.push_back(sorted.nearest);
+        const std::uint32_t child = sorted.edge.child();
+        node.nearest = std::min(
+            node.nearest, sorted.edge.leaf() ? leaves[child].nearest : out.nodes[child].nearest);
+        if (sorted.edge.leaf()) {
+          idle = idle || sorted.edge.inverted();
+        } else {
+          idle = idle || (out_idle_[child] != 0) != sorted.edge.inverted();
+          depth = std::max<int>(depth, out_depth_[child]);
+        }
+      }
+      out.nodes.push_back(node);
+      out_idle_.push_back(idle ? 1 : 0);
+      out_depth_.push_back(static_cast<std::uint8_t>(std::min(255, depth + 1)));
+    }
+  }
+
+  const Seen& top = seen_[root];
+  const bool inverted = program_->root_inverted != top.inverted;
+  if (top.kind == Seen::Kind::kTrue || top.kind == Seen::Kind::kFalse) {
+    out.value = (top.kind == Seen::Kind::kTrue) != inverted;
+    return;
+  }
+  out.constant = false;
+  out.root_inverted = inverted;
+  if (top.kind == Seen::Kind::kLeaf) {
+    out.root = static_cast<std::uint32_t>(out.nodes.size());
+    out.nodes.push_back(
+        {static_cast<std::uint32_t>(out.edges.size()), 1, leaves[top.leaf].nearest});
+    out.edges.emplace_back(top.leaf, true, false);
+    out.nearest.push_back(leaves[top.leaf].nearest);
+    out.leaves.push_back(top.leaf);
+    out.depth = 1;
+    return;
+  }
+  out.root = top.out;
+  out.depth = out_depth_[top.out];
+  stack_.assign(1, top.out);
+  while (!stack_.empty()) {
+    const TileProgram::Node& node = out.nodes[stack_.back()];
+    stack_.pop_back();
+    for (std::uint32_t e = node.first; e < node.first + node.count; ++e) {
+      const Program::Edge edge = out.edges[e];
+      (edge.leaf() ? out.leaves : stack_).push_back(edge.child());
+    }
+  }
+}
+
+// --- flips --------------------------------------------------------------------------------------
+
+void flips_of(std::span<const DepthItem> crossings, std::uint32_t solid, InsideRule rule, bool cut,
+              std::vector<Flip>& flips) {
+  const auto is_inside = [rule](int winding) {
+    switch (rule) {
+      case InsideRule::kWinding:
+        return winding > 0;
+      case InsideRule::kNonzero:
+        return winding != 0;
+      case InsideRule::kParity:
+        break;
+    }
+    return winding % 2 != 0;
+  };
+  int sum = 0;
+  for (const DepthItem item : crossings) sum += item.exit() ? -1 : 1;
+  const bool unbalanced = rule == InsideRule::kParity ? sum % 2 != 0 : sum != 0;
+  if (unbalanced && !cut) {
+    // Partners from the front, the last entry with the next exit; what is left becomes a sheet.
+    struct Span {
+      std::uint32_t begin, end, first, last;
+    };
+    std::vector<Span> spans;
+    std::vector<DepthItem> open;
+    for (const DepthItem item : crossings) {
+      const bool closes = rule == InsideRule::kParity ? !open.empty() : item.exit();
+      if (!closes) {
+        open.push_back(item);
+      } else if (open.empty()) {
+        spans.push_back({item.depth(), item.depth() + 1, item.triangle(), item.triangle()});
+      } else {
+        spans.push_back(
+            {open.back().depth(), item.depth(), open.back().triangle(), item.triangle()});
+        open.pop_back();
+      }
+    }
+    for (const DepthItem item : open) {
+      spans.push_back({item.depth(), item.depth() + 1, item.triangle(), item.triangle()});
+    }
+    std::sort(spans.begin(), spans.end(), [](const Span& a, const Span& b) {
+      if (a.begin != b.begin) return a.begin < b.begin;
+      return a.end != b.end ? a.end < b.end : a.first < b.first;
+    });
+    for (std::size_t i = 0; i < spans.size();) {
+      Span all = spans[i];
+      for (++i; i < spans.size() && spans[i].begin <= all.end; ++i) {
+        if (spans[i].end > all.end) all.end = spans[i].end, all.last = spans[i].last;
+      }
+      if (all.begin == all.end) continue;
+      flips.push_back({all.begin, solid, all.first, false});
+      flips.push_back({all.end, solid, all.last, true});
+    }
+    return;
+  }
+  int winding = cut ? -sum : 0;
+  bool inside = is_inside(winding);
+  if (inside) flips.push_back({0, solid, Surface::kNone, false});
+  for (std::size_t i = 0; i < crossings.size();) {
+    const std::size_t begin = i;
+    const std::uint32_t depth = crossings[begin].depth();
+    for (; i < crossings.size() && crossings[i].depth() == depth; ++i) {
+      winding += crossings[i].exit() ? -1 : 1;
+    }
+    if (is_inside(winding) == inside) continue;
+    std::size_t turns = begin;  // the first that faces the right way
+    while (turns < i && crossings[turns].exit() != inside) ++turns;
+    if (turns == i) turns = begin;
+    flips.push_back({depth, solid, crossings[turns].triangle(), inside});
+    inside = !inside;
+  }
+}
+
+// --- TileFinder ---------------------------------------------------------------------------------
+
+namespace {
+
+/// Deeper nesting is walked pixel by pixel: asking nodes again for each answer would multiply.
+constexpr int kMaxSearchDepth = 3;
+constexpr int kAreaSide = LeafLayers::kLanes;
+
+}  // namespace
+
+TileFinder::TileFinder(const Program& program, std::span<const ViewPart> view_parts,
+                       std::span<const Geometry::Part> parts, const View& view,
+                       const Coincidence& coincidence)
+    : program_(&program),
+      view_parts_(view_parts),
+      parts_(parts),
+      view_(&view),
+      coincidence_(&coincidence),
+      target_{Axis::kZ, view.size.x, view.size.y, kPictureDepthLimit},
+      simplifier_(program),
+      finder_(program) {}
+
+TileFinder::~TileFinder() = default;
+
+void TileFinder::make(LeafLayers& leaf) {
+  leaf.made = true;
+  const ViewPart& part = view_parts_[leaf.solid];
+  const PixelRect clip{std::max(tile_.u0, part.rect.u0), std::max(tile_.v0, part.rect.v0),
+                       std::min(tile_.u1, part.rect.u1), std::min(tile_.v1, part.rect.v1)};
+  std::span<const std::uint32_t> triangles;
+  if (part.binned) {
+    triangles = part.bins.tile(tile_.u0 / kTileSide, tile_.v0 / kTileSide);
+  } else {
+    while (all_triangles_.size() < part.mesh.triangles.size()) {
+      all_triangles_.push_back(static_cast<std::uint32_t>(all_triangles_.size()));
+    }
+    triangles = std::span(all_triangles_).first(part.mesh.triangles.size());
+  }
+  fragments_ += raster_layers(part.mesh, target_, triangles, clip, leaf, arena_);
+  if (!leaf.keys.empty()) normalize_layers(leaf, part.cut, *this);
+}
+
+void TileFinder::normalize_pixel(LeafLayers& leaf, std::size_t at) {
+  crossings_.clear();
+  for (std::size_t k = 0; k < leaf.keys.size() && leaf.keys[k][at] != LeafLayers::kEmpty; ++k) {
+    const std::uint32_t key = leaf.keys[k][at];
+    crossings_.emplace_back(key >> 1, (key & 1) != 0, leaf.triangles[k][at]);
+    leaf.keys[k][at] = leaf.triangles[k][at] = LeafLayers::kEmpty;
+  }
+  std::vector<Flip> flips;
+  flips_of(crossings_, leaf.solid, parts_[leaf.solid].rule, view_parts_[leaf.solid].cut, flips);
+  while (leaf.keys.size() < flips.size()) leaf.add_layer(arena_);
+  for (std::size_t k = 0; k < flips.size(); ++k) {
+    leaf.keys[k][at] = flips[k].depth;
+    leaf.triangles[k][at] = flips[k].triangle;
+  }
+}
+
+Surface TileFinder::resolve(const TileProgram& program, int u, int v) {
+  ++resolved_;
+  flips_.clear();
+  for (const std::uint32_t slot : program.leaves) {
+    LeafLayers& leaf = leaves_[slot];
+    if (v < leaf.rect.v0 || v >= leaf.rect.v1 || u < leaf.rect.u0 || u >= leaf.rect.u1) continue;
+    if (!leaf.made) make(leaf);
+    const auto at = static_cast<std::size_t>((v - leaf.rect.v0) * leaf.stride + (u - leaf.rect.u0));
+    for (std::size_t k = 0; k < leaf.keys.size(); ++k) {
+      if (leaf.keys[k][at] == LeafLayers::kEmpty) break;
+      flips_.push_back({leaf.keys[k][at], leaf.solid, leaf.triangles[k][at], (k & 1) != 0});
+    }
+  }
+  return finder_.find(flips_, *coincidence_, [&](const Flip& flip) {
+    if (flip.triangle == Surface::kNone) return 0.0;
+    const LatticeMesh& mesh = view_parts_[flip.solid].mesh;
+    const glm::uvec3& t = mesh.triangles[flip.triangle];
+    TriangleSetup setup;
+    setup_triangle(mesh.vertices[t.x], mesh.vertices[t.y], mesh.vertices[t.z], AxisFrame(Axis::kZ),
+                   setup);
+    return coincidence_->error(setup, flip.depth);
+  });
+}
+
+void TileFinder::find(int tile_u, int tile_v, std::span<const std::uint32_t> solids,
+                      SurfaceImage& image) {
+  tile_ = {tile_u * kTileSide, tile_v * kTileSide,
+           std::min(view_->size.x, (tile_u + 1) * kTileSide),
+           std::min(view_->size.y, (tile_v + 1) * kTileSide)};
+  for (int v = tile_.v0; v < tile_.v1; ++v) {
+    const auto row = image.depth.begin() + static_cast<std::ptrdiff_t>(v) * image.width;
+    std::fill(row + tile_.u0, row + tile_.u1, Surface::kNone);
+  }
+  arena_.clear();
+  if (leaves_.size() < solids.size()) leaves_.resize(solids.size());
+  std::size_t count = 0;
+  bool cut = false;
+  for (const std::uint32_t solid : solids) {
+    const ViewPart& part = view_parts_[solid];
+    if (part.binned && part.bins.tile(tile_u, tile_v).empty()) continue;
+    LeafLayers& leaf = leaves_[count++];
+    leaf.made = false;
+    leaf.solid = solid;
+    leaf.nearest = part.cut ? 0 : part.nearest;
+    leaf.farthest = part.farthest;
+    leaf.keys.clear();
+    leaf.triangles.clear();
+    const auto down = [&](int u) { return tile_.u0 + (u - tile_.u0) / kAreaSide * kAreaSide; };
+    leaf.rect = {down(std::max(tile_.u0, part.rect.u0)), std::max(tile_.v0, part.rect.v0),
+                 down(std::min(tile_.u1, part.rect.u1) + kAreaSide - 1),
+                 std::min(tile_.v1, part.rect.v1)};
+    leaf.stride = leaf.rect.u1 - leaf.rect.u0;
+    if (leaf.rect.empty()) --count;
+    cut = cut || part.cut;
+  }
+  if (count == 0) return;
+  SearchArea area;
+  area.leaves = std::span(leaves_).first(count);
+  area.program = &tile_program_;
+  area.width = view_->size.x;
+  area.range = coincidence_->range();
+  area.image = &image;
+  area.doubtful = &doubtful_;
+  for (int v = tile_.v0; v < tile_.v1; v += kAreaSide) {
+    for (int u = tile_.u0; u < tile_.u1; u += kAreaSide) {
+      area.rect = {u, v, u + kAreaSide, std::min(tile_.v1, v + kAreaSide)};
+      present_.clear();
+      for (std::uint32_t slot = 0; slot < count; ++slot) {
+        const PixelRect& rect = leaves_[slot].rect;
+        if (rect.u0 <= u && u < rect.u1 && rect.v0 < area.rect.v1 && area.rect.v0 < rect.v1) {
+          present_.push_back(slot);
+        }
+      }
+      simplifier_.simplify(area.leaves, present_, tile_program_);
+      if (tile_program_.constant) continue;
+      doubtful_.clear();
+      if (cut || tile_program_.depth > kMaxSearchDepth) {
+        for (int y = area.rect.v0; y < area.rect.v1; ++y) {
+          for (int x = u; x < std::min(tile_.u1, u + kAreaSide); ++x) {
+            doubtful_.push_back(static_cast<std::uint64_t>(y) *
+                                    static_cast<std::uint64_t>(image.width) +
+                                static_cast<std::uint64_t>(x));
+          }
+        }
+      } else {
+        search_surface(area, *this);
+      }
+      for (const std::uint64_t pixel : doubtful_) {
+        const auto width = static_cast<std::uint64_t>(image.width);
+        const Surface surface = resolve(tile_program_, static_cast<int>(pixel % width),
+                                        static_cast<int>(pixel / width));
+        image.depth[pixel] = surface.depth;
+        image.solid[pixel] = surface.solid;
+        image.triangle[pixel] = surface.triangle | (surface.exit ? SurfaceImage::kExit : 0u);
+      }
+    }
+  }
+}
+
+}  // namespace strata::csg

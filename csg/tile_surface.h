@@ -1,0 +1,184 @@
+#pragma once
+
+#include <cstdint>
+#include <cstdlib>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "core/depth_list.h"
+#include "csg/geometry.h"
+#include "csg/picture.h"
+#include "csg/surface.h"
+
+// The visible surface of a Boolean tree in one tile of a picture. Private to csg/.
+
+namespace strata::csg {
+
+/// 64-byte aligned blocks that are given back all at once.
+class Arena {
+ public:
+  std::uint32_t* words(std::size_t count);
+  void clear() { block_ = used_ = 0; }
+
+ private:
+  static constexpr std::size_t kBlockWords = std::size_t{1} << 18;
+  struct Free {
+    void operator()(std::uint32_t* p) const { std::free(p); }
+  };
+  struct Block {
+    std::unique_ptr<std::uint32_t, Free> words;
+    std::size_t size = 0;
+  };
+  std::vector<Block> blocks_;
+  std::size_t block_ = 0, used_ = 0;
+};
+
+/// The depths where rays enter and leave one solid in a tile, in layers: layer k holds the k-th
+/// crossing of each pixel, and after normalizing the k-th flip (even: enters, odd: leaves).
+struct LeafLayers {
+  static constexpr std::uint32_t kEmpty = 0xffffffffu;
+  static constexpr int kLanes = 16;  ///< columns begin and end at multiples of this
+
+  PixelRect rect;     ///< of the picture; u0 is a multiple of kLanes away from the tile's edge
+  int stride = 0;     ///< words a row
+  bool made = false;  ///< rasterized and normalized
+  std::uint32_t solid = 0;
+  std::uint32_t nearest = 0, farthest = 0;  ///< bounds of its depths
+  /// While rasterizing depth << 1 | exit, then depths of flips. kEmpty where there is none.
+  std::vector<std::uint32_t*> keys;
+  std::vector<std::uint32_t*> triangles;
+
+  [[nodiscard]] std::size_t words() const {  // vectors may reach beyond the last row
+    return static_cast<std::size_t>((rect.v1 - rect.v0 + 4) * stride + 2 * kLanes);
+  }
+  void add_layer(Arena& arena);
+};
+
+/// What remains of a program in a part of a tile, where all other solids are absent. Leaves are
+/// indices into the tile's leaves.
+struct TileProgram {
+  struct Node {
+    std::uint32_t first = 0, count = 0;  ///< edges
+    std::uint32_t nearest = 0;           ///< no flip lies before
+  };
+  std::vector<Program::Edge> edges;    ///< of a node: true while idle first, then nearest first
+  std::vector<std::uint32_t> nearest;  ///< of each edge: no flip lies before; 0 for true while idle
+  std::vector<Node> nodes;             ///< children before parents
+  std::vector<std::uint32_t> leaves;   ///< that occur
+  std::uint32_t root = 0;
+  bool root_inverted = false;
+  bool constant = false;  ///< no leaf matters; then `value` is the tree's value
+  bool value = false;
+  int depth = 0;  ///< nodes on the longest way from the root to a leaf, 255 at most
+};
+
+/// Simplifies a program for the leaves at hand.
+class Simplifier {
+ public:
+  explicit Simplifier(const Program& program);
+  /// @param present indices into `leaves` of those that may be met here
+  void simplify(std::span<const LeafLayers> leaves, std::span<const std::uint32_t> present,
+                TileProgram& out);
+
+ private:
+  struct Seen {
+    std::uint32_t stamp = 0;
+    std::uint32_t first_child = Program::kNone;  ///< into children_
+    std::uint32_t out = 0;                       ///< node of the output
+    std::uint32_t leaf = 0;                      ///< where the node is just a leaf
+    enum class Kind : std::uint8_t { kNode, kLeaf, kTrue, kFalse } kind = Kind::kNode;
+    bool inverted = false;  ///< kLeaf, kNode: it is the opposite of that
+  };
+  struct Child {
+    std::uint32_t id;
+    bool leaf, inverted;
+    std::uint32_t next;
+  };
+  struct Sorted {
+    Program::Edge edge;
+    std::uint32_t nearest;
+  };
+  const Program* program_;
+  std::vector<Seen> seen_;
+  std::vector<Child> children_;
+  std::vector<std::uint32_t> marked_, stack_;
+  std::vector<Sorted> gathered_;
+  std::vector<std::uint8_t> out_idle_;  ///< of the output's nodes
+  std::vector<std::uint8_t> out_depth_;
+  std::uint32_t stamp_ = 0;
+};
+
+/// Scratch of one thread.
+class TileFinder {
+ public:
+  TileFinder(const Program& program, std::span<const ViewPart> view_parts,
+             std::span<const Geometry::Part> parts, const View& view,
+             const Coincidence& coincidence);
+  ~TileFinder();
+
+  /// Fills the tile's pixels of `image` (rows of view.size.x). `solids`: those that may be met in
+  /// the tile.
+  void find(int tile_u, int tile_v, std::span<const std::uint32_t> solids, SurfaceImage& image);
+
+  [[nodiscard]] std::uint64_t fragments() const { return fragments_; }
+  [[nodiscard]] std::uint64_t resolved() const { return resolved_; }
+
+  /// Rasterizes and normalizes a leaf that is needed after all.
+  void make(LeafLayers& leaf);
+  /// Flips of one pixel in place of crossings, for pixels that are not plain.
+  void normalize_pixel(LeafLayers& leaf, std::size_t at);
+
+ private:
+  [[nodiscard]] Surface resolve(const TileProgram& program, int u, int v);
+
+  const Program* program_;
+  std::span<const ViewPart> view_parts_;
+  std::span<const Geometry::Part> parts_;
+  const View* view_;
+  const Coincidence* coincidence_;
+  RasterTarget target_;
+  Arena arena_;
+  std::vector<LeafLayers> leaves_;
+  Simplifier simplifier_;
+  TileProgram tile_program_;
+  SurfaceFinder finder_;
+  std::vector<std::uint32_t> present_, all_triangles_;
+  std::vector<std::uint64_t> doubtful_;
+  std::vector<Flip> flips_;
+  std::vector<DepthItem> crossings_;
+  PixelRect tile_;
+  std::uint64_t fragments_ = 0, resolved_ = 0;
+};
+
+// The kernels, compiled once for each SIMD target (csg/tile_surface_simd.cpp).
+
+/// Inserts the crossings of `triangles` of `mesh` within `clip` into the layers of `leaf`. Gives
+/// their number.
+std::uint64_t raster_layers(const LatticeMesh& mesh, const RasterTarget& target,
+                            std::span<const std::uint32_t> triangles, const PixelRect& clip,
+                            LeafLayers& leaf, Arena& arena);
+/// Turns crossings into flips; pixels that are not plain pairs go through finder.normalize_pixel().
+void normalize_layers(LeafLayers& leaf, bool all_pixels_special, TileFinder& finder);
+
+/// A part of a tile, LeafLayers::kLanes columns wide.
+struct SearchArea {
+  std::span<LeafLayers> leaves;
+  const TileProgram* program = nullptr;
+  PixelRect rect;  ///< of the picture; u1 may lie beyond its right edge
+  int width = 0;   ///< of the picture
+  Coincidence::Range range;
+  SurfaceImage* image = nullptr;
+  std::vector<std::uint64_t>* doubtful = nullptr;  ///< gets pixels (indices into the image) where
+                                                   ///< crossings of several solids are close
+};
+/// Finds the visible surface of each pixel.
+void search_surface(const SearchArea& area, TileFinder& finder);
+
+/// Turns the sorted crossings of one ray with one solid into flips under an inside rule, appended
+/// to `flips`. With `cut` the ray may begin inside, which the crossings tell from the far end.
+/// Crossings of an open solid that have no partner become sheets one step thick.
+void flips_of(std::span<const DepthItem> crossings, std::uint32_t solid, InsideRule rule, bool cut,
+              std::vector<Flip>& flips);
+
+}  // namespace strata::csg

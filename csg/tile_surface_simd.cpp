@@ -1,0 +1,363 @@
+#include "csg/tile_surface.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "csg/tile_surface_simd.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include "raster/rasterize-inl.h"
+
+// Visible surfaces without lists: each solid keeps its own sorted layers, and a vector of pixels
+// asks the tree where it is met first. A node answers with its value at a depth and the next depth
+// where that changes, from the same answers of its children; a node that is true asks on from the
+// farthest of them until none is true. Solids behind what is found are not even rasterized.
+//
+// This work is related to: C. Zanni, F. Claux, S. Lefebvre, HCSG: Hashing for real-time CSG
+// modeling, 2018, which walks depth slabs front to back. We differ: the window is per vector of
+// pixels and closes by itself, and solids are sorted apart, so that no list mixes them.
+
+HWY_BEFORE_NAMESPACE();
+namespace strata::csg {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+namespace simd = strata::HWY_NAMESPACE;
+
+using D = hn::CappedTag<std::uint32_t, LeafLayers::kLanes>;
+using V = hn::Vec<D>;
+using M = hn::Mask<D>;
+
+HWY_INLINE M no_lane(D d) { return hn::Ne(hn::Zero(d), hn::Zero(d)); }
+
+/// Inserts crossings into a leaf's layers, sorted by key, then triangle.
+class LayerSink {
+ public:
+  LayerSink(LeafLayers& leaf, Arena& arena) : leaf_(&leaf), arena_(&arena) {}
+  HWY_INLINE void begin(bool exit, std::uint32_t triangle, const PixelRect&) {
+    exit_ = exit ? 1 : 0;
+    triangle_ = triangle;
+  }
+  /// key + 1, so that 0 is no crossing.
+  template <class D2, class V2 = hn::Vec<D2>>
+  HWY_INLINE V2 encode(D2 d, V2 depth, hn::Mask<D2> covered) {
+    fragments_ += hn::CountTrue(d, covered);
+    const V2 key = hn::Or(hn::ShiftLeft<1>(depth), hn::Set(d, exit_));
+    return hn::IfThenElseZero(covered, hn::Add(key, hn::Set(d, 1u)));
+  }
+  template <int columns>
+  HWY_INLINE void put_block(int u, int v, const std::uint32_t* words, int rows) {
+    const hn::CappedTag<std::uint32_t, columns> d;
+    for (int row = 0; row < rows; ++row, words += columns) {
+      const std::size_t at = pixel_at(u, v + row);
+      for (std::size_t i = 0; i < columns; i += hn::Lanes(d)) insert(d, at + i, words + i);
+    }
+  }
+  void put_one(int u, int v, std::uint32_t depth) {
+    ++fragments_;
+    const hn::CappedTag<std::uint32_t, 1> d;
+    const std::uint32_t word[1] = {(depth << 1 | exit_) + 1};
+    insert(d, pixel_at(u, v), word);
+  }
+  [[nodiscard]] std::uint64_t fragments() const { return fragments_; }
+
+ private:
+  [[nodiscard]] HWY_INLINE std::size_t pixel_at(int u, int v) const {
+    return static_cast<std::size_t>((v - leaf_->rect.v0) * leaf_->stride + (u - leaf_->rect.u0));
+  }
+  template <class D2>
+  HWY_INLINE void insert(D2 d, std::size_t at, const std::uint32_t* words) {
+    const auto empty = hn::Set(d, LeafLayers::kEmpty);
+    auto key = hn::Sub(hn::LoadU(d, words), hn::Set(d, 1u));
+    auto triangle = hn::Set(d, triangle_);
+    if (hn::AllTrue(d, hn::Eq(key, empty))) return;
+    for (std::size_t k = 0;; ++k) {
+      if (k == leaf_->keys.size()) leaf_->add_layer(*arena_);
+      std::uint32_t* HWY_RESTRICT keys = leaf_->keys[k] + at;
+      std::uint32_t* HWY_RESTRICT triangles = leaf_->triangles[k] + at;
+      const auto old_key = hn::LoadU(d, keys), old_triangle = hn::LoadU(d, triangles);
+      const auto less = hn::Or(hn::Lt(key, old_key),
+                               hn::And(hn::Eq(key, old_key), hn::Lt(triangle, old_triangle)));
+      hn::StoreU(hn::IfThenElse(less, key, old_key), d, keys);
+      hn::StoreU(hn::IfThenElse(less, triangle, old_triangle), d, triangles);
+      key = hn::IfThenElse(less, old_key, key);
+      triangle = hn::IfThenElse(less, old_triangle, triangle);
+      if (hn::AllTrue(d, hn::Eq(key, empty))) return;
+    }
+  }
+
+  LeafLayers* leaf_;
+  Arena* arena_;
+  std::uint32_t exit_ = 0, triangle_ = 0;
+  std::uint64_t fragments_ = 0;
+};
+
+std::uint64_t RasterLayers(const LatticeMesh& mesh, const RasterTarget& target,
+                           std::span<const std::uint32_t> triangles, const PixelRect& clip,
+                           LeafLayers& leaf, Arena& arena) {
+  LayerSink sink(leaf, arena);
+  simd::rasterize_triangles(mesh, target, triangles, clip, sink);
+  return sink.fragments();
+}
+
+void NormalizeLayers(LeafLayers& leaf, bool all_special, TileFinder& finder) {
+  const D d;
+  const V empty = hn::Set(d, LeafLayers::kEmpty), one = hn::Set(d, 1u), zero = hn::Zero(d);
+  const std::size_t layers = leaf.keys.size();
+  const auto cells = static_cast<std::size_t>((leaf.rect.v1 - leaf.rect.v0) * leaf.stride);
+  const std::size_t lanes = hn::Lanes(d);
+  alignas(64) std::uint32_t special_lanes[LeafLayers::kLanes];
+  for (std::size_t at = 0; at < cells; at += lanes) {
+    M special = no_lane(d);
+    V before = zero;  // depth of the last exit, plus 1
+    for (std::size_t k = 0; k < layers; k += 2) {
+      const V enter = hn::Load(d, leaf.keys[k] + at);
+      const V leave = k + 1 < layers ? hn::Load(d, leaf.keys[k + 1] + at) : empty;
+      const M none = hn::Eq(enter, empty);
+      const V enter_depth = hn::ShiftRight<1>(enter), leave_depth = hn::ShiftRight<1>(leave);
+      const M facing =
+          hn::And(hn::Eq(hn::And(enter, one), zero), hn::Ne(hn::And(leave, one), zero));
+      const M ordered =
+          hn::And(hn::Lt(enter_depth, leave_depth), hn::Not(hn::Lt(enter_depth, before)));
+      const M plain = hn::And(hn::And(facing, ordered), hn::Ne(leave, empty));
+      special = hn::Or(special, hn::Not(hn::Or(none, plain)));
+      before = hn::Add(leave_depth, one);
+    }
+    if (all_special) special = hn::Ne(hn::Load(d, leaf.keys[0] + at), empty);
+    for (std::size_t k = 0; k < layers; ++k) {
+      const V key = hn::Load(d, leaf.keys[k] + at);
+      const V depth = hn::IfThenElse(hn::Eq(key, empty), empty, hn::ShiftRight<1>(key));
+      hn::Store(hn::IfThenElse(special, key, depth), d, leaf.keys[k] + at);
+    }
+    if (hn::AllFalse(d, special)) continue;
+    hn::Store(hn::IfThenElseZero(special, one), d, special_lanes);
+    for (std::size_t i = 0; i < lanes; ++i) {
+      if (special_lanes[i] != 0) finder.normalize_pixel(leaf, at + i);
+    }
+  }
+}
+
+/// The search in one vector of pixels.
+class Search {
+ public:
+  Search(const SearchArea& area, TileFinder& finder) : area_(area), finder_(finder) {}
+
+  void set_pixels(int u, int v) {
+    u_ = u;
+    v_ = v;
+  }
+
+  /// Depths where the tree becomes true first, kEmpty for never, and the leaf that turns it.
+  HWY_INLINE void find(V& depth, V& who) {
+    const D d;
+    M value;
+    const bool inverted = area_.program->root_inverted;
+    // not(node) becomes true where the node, true at first, becomes false.
+    probe(area_.program->root, hn::Zero(d), hn::Not(no_lane(d)), inverted, !inverted, value, depth,
+          who);
+    const M waits = inverted ? value : hn::Not(value);
+    depth = hn::IfThenElse(waits, depth, hn::Set(d, LeafLayers::kEmpty));
+  }
+
+  /// Whether another leaf has a flip near `depth`, and the triangle of the flip at `depth`.
+  HWY_INLINE M judge(V depth, V who, V& triangle) {
+    const D d;
+    const hn::RebindToSigned<D> di;
+    const hn::RebindToFloat<D> df;
+    const M hit = hn::Ne(depth, hn::Set(d, LeafLayers::kEmpty));
+    const auto& r = area_.range;
+    const V safe = hn::IfThenElseZero(hit, depth);
+    const auto at = hn::ConvertTo(df, hn::BitCast(di, safe));
+    const auto nearness = hn::Sub(hn::Set(df, r.a), hn::Mul(hn::Set(df, r.b), at));
+    const auto slope = hn::Add(hn::Set(df, r.linear), hn::Mul(nearness, hn::Set(df, r.square)));
+    const auto reach_f = hn::Add(hn::Set(df, r.offset), hn::Mul(nearness, slope));
+    const auto most = hn::Set(df, static_cast<float>(kPictureDepthLimit));
+    const V reach = hn::BitCast(d, hn::ConvertTo(di, hn::Min(reach_f, most)));
+    const V last = hn::IfThenElseZero(hit, hn::Add(depth, reach));
+    M doubt = no_lane(d);
+    M exits = no_lane(d);
+    triangle = hn::Zero(d);
+    for (const std::uint32_t slot : area_.program->leaves) {
+      LeafLayers& leaf = area_.leaves[slot];
+      if (!holds(leaf)) continue;
+      if (hn::AllTrue(d, hn::Lt(last, hn::Set(d, leaf.nearest)))) continue;
+      const std::size_t offset = offset_in(leaf);
+      const M own = hn::Eq(who, hn::Set(d, slot));
+      for (std::size_t k = 0; k < leaf.keys.size(); ++k) {
+        const V flip = hn::Load(d, leaf.keys[k] + offset);
+        const V gap = hn::Sub(hn::Max(flip, depth), hn::Min(flip, depth));
+        doubt = hn::Or(doubt, hn::AndNot(own, hn::Not(hn::Gt(gap, reach))));
+        const M same = hn::And(own, hn::Eq(flip, depth));
+        triangle = hn::IfThenElse(same, hn::Load(d, leaf.triangles[k] + offset), triangle);
+        if ((k & 1) != 0) exits = hn::Or(exits, same);
+      }
+    }
+    triangle = hn::Or(triangle, hn::IfThenElseZero(exits, hn::Set(d, 0x80000000u)));
+    return hn::And(hit, doubt);
+  }
+
+ private:
+  /// Whether the pixels lie in the leaf's rectangle; then its layers are there.
+  HWY_INLINE bool holds(LeafLayers& leaf) {
+    if (v_ < leaf.rect.v0 || v_ >= leaf.rect.v1 || u_ < leaf.rect.u0 || u_ >= leaf.rect.u1) {
+      return false;
+    }
+    if (!leaf.made) finder_.make(leaf);
+    return true;
+  }
+  HWY_INLINE std::size_t offset_in(const LeafLayers& leaf) const {
+    return static_cast<std::size_t>((v_ - leaf.rect.v0) * leaf.stride + (u_ - leaf.rect.u0));
+  }
+
+  /// Whether a ray is inside a leaf after all flips before `from`, and its next flip.
+  HWY_INLINE void probe_leaf(std::uint32_t slot, V from, M& inside, V& next) {
+    const D d;
+    inside = no_lane(d);
+    next = hn::Set(d, LeafLayers::kEmpty);
+    LeafLayers& leaf = area_.leaves[slot];
+    if (!holds(leaf)) return;
+    const std::size_t offset = offset_in(leaf);
+    for (std::size_t k = 0; k < leaf.keys.size(); ++k) {
+      const V flip = hn::Load(d, leaf.keys[k] + offset);
+      const M past = hn::Lt(flip, from);
+      inside = hn::Xor(inside, past);
+      next = hn::Min(next, hn::Or(flip, hn::VecFromMask(d, past)));
+    }
+  }
+
+  /// The same for an edge, as its node sees it.
+  HWY_INLINE void probe_edge(Program::Edge edge, V from, M active, bool need_true, bool need_false,
+                             M& value, V& next, V& who) {
+    const D d;
+    if (edge.leaf()) {
+      probe_leaf(edge.child(), from, value, next);
+      who = hn::Set(d, edge.child());
+    } else {
+      probe(edge.child(), from, active, edge.inverted() ? need_false : need_true,
+            edge.inverted() ? need_true : need_false, value, next, who);
+    }
+    if (edge.inverted()) value = hn::Not(value);
+  }
+
+  /// The value of a node after all flips before `from`, in the lanes `active`; and the next depth
+  /// where it changes, where it is true and `need_true`, or false and `need_false`.
+  HWY_NOINLINE void probe(std::uint32_t index, V from, M active, bool need_true, bool need_false,
+                          M& value, V& next, V& who) {
+    const D d;
+    const TileProgram::Node& node = area_.program->nodes[index];
+    const Program::Edge* edges = area_.program->edges.data() + node.first;
+    const std::uint32_t* nearest = area_.program->nearest.data() + node.first;
+    const V none = hn::Set(d, LeafLayers::kEmpty), zero = hn::Zero(d);
+    V near = hn::IfThenElse(active, none, zero), near_who = zero, far = zero, far_who = zero;
+    M any = no_lane(d);
+    for (std::uint32_t i = 0; i < node.count; ++i) {
+      if (!need_true &&
+          hn::AllTrue(d, hn::Or(any, hn::Not(hn::Gt(near, hn::Set(d, nearest[i])))))) {
+        break;  // what comes is false here and changes later
+      }
+      M edge_value;
+      V edge_next, edge_who;
+      probe_edge(edges[i], from, active, need_true, need_false, edge_value, edge_next, edge_who);
+      any = hn::Or(any, edge_value);
+      const M nearer = hn::AndNot(edge_value, hn::Lt(edge_next, near));
+      near = hn::IfThenElse(nearer, edge_next, near);
+      near_who = hn::IfThenElse(nearer, edge_who, near_who);
+      const M farther = hn::And(edge_value, hn::Gt(edge_next, far));
+      far = hn::IfThenElse(farther, edge_next, far);
+      far_who = hn::IfThenElse(farther, edge_who, far_who);
+    }
+    value = any;
+    next = near;
+    who = near_who;
+    if (!need_true) return;
+    M open = hn::And(hn::And(any, active), hn::Lt(far, none));
+    while (!hn::AllFalse(d, open)) {
+      const V beyond = hn::Add(far, hn::Set(d, 1u));
+      M still = no_lane(d);
+      V farther = zero, farther_who = zero;
+      for (std::uint32_t i = 0; i < node.count; ++i) {
+        M edge_value;
+        V edge_next, edge_who;
+        probe_edge(edges[i], beyond, open, true, false, edge_value, edge_next, edge_who);
+        still = hn::Or(still, edge_value);
+        const M more = hn::And(edge_value, hn::Gt(edge_next, farther));
+        farther = hn::IfThenElse(more, edge_next, farther);
+        farther_who = hn::IfThenElse(more, edge_who, farther_who);
+      }
+      open = hn::And(open, still);
+      far = hn::IfThenElse(open, farther, far);
+      far_who = hn::IfThenElse(open, farther_who, far_who);
+      open = hn::And(open, hn::Lt(far, none));
+    }
+    next = hn::IfThenElse(any, far, near);
+    who = hn::IfThenElse(any, far_who, near_who);
+  }
+
+  const SearchArea& area_;
+  TileFinder& finder_;
+  int u_ = 0, v_ = 0;
+};
+
+void SearchSurface(const SearchArea& area, TileFinder& finder) {
+  const D d;
+  const auto lanes = static_cast<int>(hn::Lanes(d));
+  Search search(area, finder);
+  alignas(64) std::uint32_t depths[LeafLayers::kLanes], slots[LeafLayers::kLanes],
+      triangles[LeafLayers::kLanes], doubts[LeafLayers::kLanes];
+  for (int v = area.rect.v0; v < area.rect.v1; ++v) {
+    for (int u = area.rect.u0; u < area.rect.u1; u += lanes) {
+      search.set_pixels(u, v);
+      V depth, who, triangle;
+      search.find(depth, who);
+      const std::size_t at = static_cast<std::size_t>(v) * static_cast<std::size_t>(area.width) +
+                             static_cast<std::size_t>(u);
+      const int count = std::min(lanes, area.width - u);
+      if (count <= 0) continue;
+      hn::Store(depth, d, depths);
+      if (hn::AllTrue(d, hn::Eq(depth, hn::Set(d, LeafLayers::kEmpty)))) {
+        std::copy(depths, depths + count, area.image->depth.begin() + static_cast<long>(at));
+        continue;
+      }
+      const M doubt = search.judge(depth, who, triangle);
+      hn::Store(who, d, slots);
+      hn::Store(triangle, d, triangles);
+      for (int i = 0; i < count; ++i) {
+        const std::size_t pixel = at + static_cast<std::size_t>(i);
+        area.image->depth[pixel] = depths[i];
+        area.image->solid[pixel] = area.leaves[slots[i]].solid;
+        area.image->triangle[pixel] = triangles[i];
+      }
+      if (hn::AllFalse(d, doubt)) continue;
+      hn::Store(hn::VecFromMask(d, doubt), d, doubts);
+      for (int i = 0; i < count; ++i) {
+        if (doubts[i] != 0) {
+          area.doubtful->push_back(at + static_cast<std::size_t>(i));
+        }
+      }
+    }
+  }
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace strata::csg
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace strata::csg {
+
+HWY_EXPORT(RasterLayers);
+HWY_EXPORT(NormalizeLayers);
+HWY_EXPORT(SearchSurface);
+
+std::uint64_t raster_layers(const LatticeMesh& mesh, const RasterTarget& target,
+                            std::span<const std::uint32_t> triangles, const PixelRect& clip,
+                            LeafLayers& leaf, Arena& arena) {
+  return HWY_DYNAMIC_DISPATCH(RasterLayers)(mesh, target, triangles, clip, leaf, arena);
+}
+void normalize_layers(LeafLayers& leaf, bool all_pixels_special, TileFinder& finder) {
+  HWY_DYNAMIC_DISPATCH(NormalizeLayers)(leaf, all_pixels_special, finder);
+}
+void search_surface(const SearchArea& area, TileFinder& finder) {
+  HWY_DYNAMIC_DISPATCH(SearchSurface)(area, finder);
+}
+
+}  // namespace strata::csg
+#endif  // HWY_ONCE
