@@ -76,6 +76,11 @@ strata_depends(ZLIB::ZLIB "find_dependency(ZLIB)" zlib "")
 strata_depends(PNG::PNG "find_dependency(PNG)" libpng "")
 strata_depends(PkgConfig::hwy "${pc_modules}(hwy REQUIRED QUIET IMPORTED_TARGET libhwy)" libhwy "")
 strata_depends(PkgConfig::minizip "${pc_modules}(minizip REQUIRED QUIET IMPORTED_TARGET minizip)" minizip "")
+strata_depends(PkgConfig::polyclipping
+  "${pc_modules}(polyclipping REQUIRED QUIET IMPORTED_TARGET polyclipping)" polyclipping "")
+strata_depends(PkgConfig::text "${pc_modules}(text REQUIRED QUIET IMPORTED_TARGET freetype2 harfbuzz fontconfig)"
+  "freetype2 harfbuzz fontconfig" "")
+strata_depends(pugixml::pugixml "find_dependency(pugixml CONFIG)" pugixml "")
 strata_depends(OpenEXR::OpenEXR "find_dependency(OpenEXR CONFIG)" OpenEXR "")
 strata_depends(OpenMeshCore "find_dependency(OpenMesh CONFIG)" "" "-lOpenMeshCore")  # Debian has no module of it
 strata_depends(strata_openvdb "include(\"\${CMAKE_CURRENT_LIST_DIR}/StrataFindOpenVDB.cmake\")" Imath "-lopenvdb")
