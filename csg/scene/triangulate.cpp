@@ -8,6 +8,10 @@
 #include <cstdint>
 #include <glm/common.hpp>
 #include <limits>
+#include <numeric>
+#include <span>
+#include <utility>
+#include <vector>
 
 #include "csg/scene/orient.h"
 #include "csg/scene/outline.h"
@@ -46,12 +50,11 @@ class Clipping {
         for (int t = 0; t < turns; ++t) p = {-p.y, p.x};
         nodes_.push_back({p, vertex++, first + (i + 1) % count, first + (i + count - 1) % count});
       }
-      const bool hole = signed_area(contour) < 0;
-      (hole ? holes_ : loops_).push_back(first);
-      hole_of_.resize(nodes_.size(), hole ? first : kNone);
     }
-    triangles_.reserve(total + 2 * holes_.size());
+    triangles_.reserve(nodes_.capacity());
     if (nodes_.empty()) return;
+    part_touching_points();
+    find_loops();
     low_ = high_ = nodes_[0].p;
     for (const Node& n : nodes_) low_ = glm::min(low_, n.p), high_ = glm::max(high_, n.p);
   }
@@ -71,6 +74,99 @@ class Clipping {
     return orient(nodes_[a].p, nodes_[b].p, nodes_[c].p);
   }
   bool convex(Index i) const { return turn(nodes_[i].prev, i, nodes_[i].next) > 0; }
+
+  // --- loops ------------------------------------------------------------------------------------
+
+  /// Where several nodes lie in one place, edges are joined anew, so that each node has a sector of
+  /// the region to itself: what touches there is parted or becomes one loop.
+  void part_touching_points() {
+    std::vector<Index> order(nodes_.size());
+    std::iota(order.begin(), order.end(), Index{0});
+    std::sort(order.begin(), order.end(), [&](Index a, Index b) {
+      const glm::dvec2 &p = nodes_[a].p, &q = nodes_[b].p;
+      return p.x != q.x ? p.x < q.x : p.y != q.y ? p.y < q.y : a < b;
+    });
+    for (std::size_t i = 0; i < order.size();) {
+      std::size_t j = i + 1;
+      while (j < order.size() && nodes_[order[j]].p == nodes_[order[i]].p) ++j;
+      if (j - i > 1) part(std::span(order).subspan(i, j - i));
+      i = j;
+    }
+  }
+
+  /// `group`: nodes in one place.
+  void part(std::span<const Index> group) {
+    struct Spoke {
+      glm::dvec2 to;
+      Index node;
+      bool out;
+    };
+    const glm::dvec2 hub = nodes_[group[0]].p;
+    std::vector<Spoke> spokes;
+    for (const Index i : group) {
+      const glm::dvec2 &before = nodes_[nodes_[i].prev].p, &after = nodes_[nodes_[i].next].p;
+      if (before == hub || after == hub) return;  // no direction; left to the ears
+      spokes.push_back({before, i, false});
+      spokes.push_back({after, i, true});
+    }
+    const auto upper = [&](const glm::dvec2& p) {
+      return p.y > hub.y || (p.y == hub.y && p.x > hub.x);
+    };
+    std::stable_sort(spokes.begin(), spokes.end(), [&](const Spoke& a, const Spoke& b) {
+      const bool first = upper(a.to), second = upper(b.to);
+      if (first != second) return first;
+      return orient(hub, a.to, b.to) > 0;
+    });
+    // Counter-clockwise, the region lies between an edge out and the next edge in. Where edges lie
+    // on each other or cross, they are matched like brackets; all of them find a partner.
+    std::size_t start = 0;
+    int depth = 0, lowest = 0;
+    for (std::size_t i = 0; i < spokes.size(); ++i) {
+      depth += spokes[i].out ? 1 : -1;
+      if (depth < lowest) lowest = depth, start = i + 1;
+    }
+    std::vector<Index> open;
+    std::vector<std::pair<Index, Index>> pairs;  // the node whose edge goes out, and whose comes in
+    for (std::size_t i = 0; i < spokes.size(); ++i) {
+      const Spoke& spoke = spokes[(start + i) % spokes.size()];
+      if (spoke.out) {
+        open.push_back(spoke.node);
+      } else {
+        pairs.emplace_back(open.back(), spoke.node);
+        open.pop_back();
+      }
+    }
+    // Each pair becomes the node whose edge comes in.
+    std::vector<Index> next(pairs.size());
+    for (std::size_t i = 0; i < pairs.size(); ++i) next[i] = nodes_[pairs[i].first].next;
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      nodes_[pairs[i].second].next = next[i];
+      nodes_[next[i]].prev = pairs[i].second;
+    }
+  }
+
+  void find_loops() {
+    hole_of_.assign(nodes_.size(), kNone);
+    std::vector<bool> seen(nodes_.size(), false);
+    std::vector<glm::dvec2> points;
+    for (Index first = 0; first < nodes_.size(); ++first) {
+      if (seen[first]) continue;
+      points.clear();
+      Index i = first;
+      do {
+        seen[i] = true;
+        points.push_back(nodes_[i].p);
+        i = nodes_[i].next;
+      } while (i != first);
+      const bool hole = signed_area(points) < 0;
+      (hole ? holes_ : loops_).push_back(first);
+      if (!hole) continue;
+      do {
+        hole_of_[i] = first;
+        i = nodes_[i].next;
+      } while (i != first);
+    }
+  }
 
   // --- holes ------------------------------------------------------------------------------------
 
@@ -105,10 +201,7 @@ class Clipping {
     std::sort(leftmost.begin(), leftmost.end(), [&](Index a, Index b) {
       const glm::dvec2 &p = nodes_[a].p, &q = nodes_[b].p;
       if (p.x != q.x) return p.x < q.x;
-      if (p.y != q.y) return p.y < q.y;
-      // Holes that touch at their leftmost points: the one below first, so that the bridge of the
-      // other does not cross it.
-      return orient(p, nodes_[nodes_[a].next].p, nodes_[nodes_[b].next].p) > 0;
+      return p.y != q.y ? p.y < q.y : a < b;
     });
     for (const Index hole : leftmost) {
       const Index bridge = find_bridge(hole);
@@ -145,15 +238,7 @@ class Clipping {
       const double x = std::min(p.x + (h.y - p.y) * (q.x - p.x) / (q.y - p.y), h.x);
       if (x > best_x) best_x = x, edge = i;
     }
-    // A point in the same place needs no ray, if the region opens there to the hole's.
-    Index twin = kNone;
-    for (const Index i : rows_[row(h.y)]) {
-      if (nodes_[i].p != h || !joined(i)) continue;
-      const glm::dvec2 &before = nodes_[nodes_[hole].prev].p, &after = nodes_[nodes_[hole].next].p;
-      if (opens_to(i, before) && opens_to(i, after)) return i;
-      twin = i;
-    }
-    if (edge == kNone) return twin;
+    if (edge == kNone) return kNone;
     // The end of the edge that is further left can be seen, unless something lies in the triangle
     // between: then the point there that the ray meets first when it is turned towards that end.
     const Index start = edge, end = nodes_[edge].next;
@@ -169,11 +254,11 @@ class Clipping {
     for (std::size_t r = row(low); r <= row(high); ++r) {
       for (const Index i : rows_[r]) {
         const glm::dvec2& p = nodes_[i].p;
-        if (p.x > h.x || p.y < low || p.y > high || p == h) continue;
+        if (p.x > h.x || p.y < low || p.y > high) continue;
         if (orient(a, b, p) < 0 || orient(b, m, p) < 0 || orient(m, a, p) < 0) continue;
         if (!joined(i) || !opens_to(i, h)) continue;
-        const double slope = std::abs(p.y - h.y) / (h.x - p.x);
         const double distance = h.x - p.x;
+        const double slope = p == h ? 0.0 : std::abs(p.y - h.y) / distance;
         if (slope < best_slope || (slope == best_slope && distance < best_distance)) {
           best_slope = slope, best_distance = distance, visible = i;
         }

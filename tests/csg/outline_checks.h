@@ -28,15 +28,22 @@ inline std::vector<glm::dvec2> points(const Outline& outline) {
 struct TriangulationReport {
   double positive = 0;  ///< area of counter-clockwise triangles
   double negative = 0;  ///< area of turned triangles
-  bool closed = true;   ///< its boundary is the outline, edge for edge, by index
+  bool closed = true;   ///< its boundary is the outline, edge for edge, by position
 };
 
 /// Compares the triangles with the outline.
 inline TriangulationReport check(const Outline& outline, const std::vector<glm::uvec3>& triangles) {
   TriangulationReport report;
   const auto p = points(outline);
+  std::map<std::pair<double, double>, unsigned> places;
+  std::vector<unsigned> place;
+  for (const glm::dvec2& q : p) {
+    place.push_back(
+        places.try_emplace({q.x, q.y}, static_cast<unsigned>(places.size())).first->second);
+  }
   std::map<std::pair<unsigned, unsigned>, int> edges;
-  const auto add = [&](unsigned a, unsigned b, int sign) {
+  const auto add = [&](unsigned from, unsigned to, int sign) {
+    const unsigned a = place[from], b = place[to];
     if (a < b)
       edges[{a, b}] += sign;
     else if (b < a)
