@@ -34,6 +34,12 @@ endif()
 if(NOT polyclipping_FOUND)
   list(APPEND strata_missing libpolyclipping-dev)
 endif()
+if(PkgConfig_FOUND)  # Debian's QhullConfig.cmake names a folder that does not exist
+  pkg_check_modules(qhull_r QUIET IMPORTED_TARGET qhull_r)
+endif()
+if(NOT qhull_r_FOUND)
+  list(APPEND strata_missing libqhull-dev)
+endif()
 if(strata_missing)
   list(JOIN strata_missing " " strata_missing)
   message(FATAL_ERROR "Strata needs these Debian packages: ${strata_missing}\n"

@@ -78,6 +78,7 @@ strata_depends(PkgConfig::hwy "${pc_modules}(hwy REQUIRED QUIET IMPORTED_TARGET 
 strata_depends(PkgConfig::minizip "${pc_modules}(minizip REQUIRED QUIET IMPORTED_TARGET minizip)" minizip "")
 strata_depends(PkgConfig::polyclipping
   "${pc_modules}(polyclipping REQUIRED QUIET IMPORTED_TARGET polyclipping)" polyclipping "")
+strata_depends(PkgConfig::qhull_r "${pc_modules}(qhull_r REQUIRED QUIET IMPORTED_TARGET qhull_r)" qhull_r "")
 strata_depends(PkgConfig::text "${pc_modules}(text REQUIRED QUIET IMPORTED_TARGET freetype2 harfbuzz fontconfig)"
   "freetype2 harfbuzz fontconfig" "")
 strata_depends(pugixml::pugixml "find_dependency(pugixml CONFIG)" pugixml "")

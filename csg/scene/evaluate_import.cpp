@@ -1,0 +1,126 @@
+#include <algorithm>
+#include <filesystem>
+#include <optional>
+
+#include "csg/scene/evaluator.h"
+#include "csg/scene/import_xml.h"
+#include "mesh/read_mesh.h"
+#include "mesh/soup_tools.h"
+
+namespace strata::csg {
+namespace {
+
+std::string extension_of(const std::string& path) {
+  std::string extension = std::filesystem::path(path).extension().string();
+  for (char& c : extension) c = static_cast<char>(c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c);
+  return extension;
+}
+
+Result<MeshFile> read_any_mesh(const std::string& path, const std::string& extension,
+                               const Execution& execution) {
+  if (extension == ".3mf" || extension == ".amf") {
+    auto soup = extension == ".3mf" ? read_3mf(path) : read_amf(path);
+    if (!soup) return tl::unexpected(soup.error());
+    MeshFile file;
+    file.soup = *std::move(soup);
+    return file;
+  }
+  return read_mesh(path, {}, execution);
+}
+
+void move_to_middle(TriangleSoup& mesh) {
+  const Bounds box = bounds(mesh);
+  if (box.empty()) return;
+  const glm::dvec3 middle = 0.5 * box.low + 0.5 * box.high;
+  for (glm::dvec3& p : mesh.positions) p -= middle;
+}
+
+}  // namespace
+
+/// Where a file of the scene is: in the folder of the scene, or in one around it, since scenes are
+/// often written to another folder than their source.
+std::optional<std::string> Evaluator::asset(std::uint32_t node, const std::string& file) {
+  namespace fs = std::filesystem;
+  std::error_code ignored;
+  const auto is_there = [&](const fs::path& path) { return fs::is_regular_file(path, ignored); };
+  const fs::path name(file);
+  if (name.is_absolute()) {
+    if (is_there(name)) return file;
+  } else {
+    constexpr int kMostLevels = 8;
+    fs::path folder(folder_);
+    for (int level = 0; level < kMostLevels; ++level) {
+      const fs::path path = folder / name;
+      if (is_there(path)) return path.string();
+      folder /= "..";
+    }
+  }
+  warn(node, "missing-file",
+       fmt::format("'{}' needs the file '{}', which is not there; it is left out", this->name(node),
+                   file));
+  return std::nullopt;
+}
+
+void Evaluator::import(std::uint32_t node, const Context& context) {
+  const NodeArguments given = arguments(node);
+  const std::string file = given.find("file", 0).string();
+  if (file.empty()) return;
+  const std::string extension = extension_of(file);
+  const bool flat = extension == ".svg" || extension == ".dxf";
+  const bool solid =
+      extension == ".3mf" || extension == ".amf" || mesh_format_of(file) != MeshFormat::kAuto;
+  const auto path = asset(node, file);
+  if (!path) return;
+  if (flat) return add_outline(node, context, import_outline(node, *path));
+  if (!solid) {
+    return warn(node, "not-done",
+                extension == ".nef3"
+                    ? fmt::format("'{}': Nef polyhedra are not read; it is left out", file)
+                    : fmt::format("'{}': a file of an unknown kind; it is left out", file));
+  }
+  const bool centre = given.truth("center", false);
+  Imported& imported = imports_[{*path, centre}];
+  if (!imported.mesh) {
+    Execution execution = execution_;
+    execution.progress = {};
+    auto mesh = read_any_mesh(*path, extension, execution);
+    if (!mesh) {
+      if (mesh.error().code == ErrorCode::kCancelled || mesh.error().code == ErrorCode::kLimit) {
+        return stop(mesh.error().code, node, mesh.error().message);
+      }
+      warn(node, "geometry", fmt::format("{}; it is left out", mesh.error().message));
+    } else {
+      if (mesh->stats.dropped_faces() > 0) {
+        warn(node, "geometry",
+             fmt::format("{}: {} of {} faces are broken and left out", *path,
+                         mesh->stats.dropped_faces(), mesh->stats.faces));
+      }
+      for (const std::string& text : mesh->stats.warnings) warn(node, "geometry", text);
+      if (centre) move_to_middle(mesh->soup);
+      if (!mesh->soup.triangles.empty()) imported.rule = inspect(node, mesh->soup);
+    }
+    imported.mesh =
+        std::make_shared<const TriangleSoup>(mesh ? std::move(mesh->soup) : TriangleSoup());
+  }
+  add_solid(node, context, imported.mesh, imported.rule);
+}
+
+Outline Evaluator::import_outline(std::uint32_t node, const std::string& path) {
+  const NodeArguments given = arguments(node);
+  OutlineImport options;
+  options.layer = given.find("layer").string();
+  if (const std::string id = given.find("id").string(); !id.empty()) options.layer = id;
+  double origin[2] = {0.0, 0.0};
+  given.find("origin").numbers(origin, 2);
+  options.origin = {origin[0], origin[1]};
+  options.scale = given.number("scale", options.scale);
+  options.dpi = given.number("dpi", options.dpi);
+  options.centre = given.truth("center", false);
+  options.segments = segments(node);
+  auto outline = read_outline(path, options);
+  if (outline) return *std::move(outline);
+  warn(node, "geometry", fmt::format("{}; it is left out", outline.error().message));
+  return {};
+}
+
+}  // namespace strata::csg

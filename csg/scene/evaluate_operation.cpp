@@ -1,0 +1,359 @@
+#include <algorithm>
+#include <cmath>
+#include <glm/gtc/matrix_transform.hpp>
+
+#include "csg/scene/boundary.h"
+#include "csg/scene/evaluator.h"
+#include "csg/scene/hull.h"
+#include "csg/scene/minkowski.h"
+#include "mesh/soup_tools.h"
+
+namespace strata::csg {
+namespace {
+
+const char* const kTooMuch = "not-done";
+
+}  // namespace
+
+/// Replaces the operands of a node that has a frame by what it makes of them, outside that frame.
+void Evaluator::operate(Frame& frame) {
+  leftovers_ = true;
+  const bool takes_flat = frame.kind == NodeKind::kLinearExtrude ||
+                          frame.kind == NodeKind::kRotateExtrude ||
+                          frame.kind == NodeKind::kOffset || frame.kind == NodeKind::kFill ||
+                          frame.kind == NodeKind::kRoof;
+  const bool takes_solid = frame.kind == NodeKind::kProjection;
+  if (operands_.size() == frame.base) {
+    // The deprecated form: a file in place of children.
+    const std::string file = arguments(frame.node).find("file").string();
+    if (file.empty() || !(takes_flat || takes_solid)) return;
+    import(frame.node, frame.inside);
+    if (operands_.size() == frame.base) return;
+    frame.dimension = operands_[frame.base].flat ? Dimension::kFlat : Dimension::kSolid;
+  }
+  const bool flat = frame.dimension == Dimension::kFlat;
+  if ((flat && takes_solid) || (!flat && takes_flat)) {
+    warn(frame.node, "ignored",
+         fmt::format("'{}' takes {} children; these are {} and are left out", name(frame.node),
+                     takes_flat ? "flat" : "solid", flat ? "flat" : "solid"));
+    operands_.resize(frame.base);
+    return;
+  }
+  switch (frame.kind) {
+    case NodeKind::kLinearExtrude:
+      return linear_extrude(frame);
+    case NodeKind::kRotateExtrude:
+      return rotate_extrude(frame);
+    case NodeKind::kProjection:
+      return projection(frame);
+    case NodeKind::kHull:
+      return flat ? flat_operation(frame) : hull(frame);
+    case NodeKind::kMinkowski:
+      return flat ? flat_operation(frame) : minkowski(frame);
+    case NodeKind::kResize:
+      return flat ? flat_operation(frame) : resize(frame);
+    default:
+      return flat_operation(frame);
+  }
+}
+
+Outline Evaluator::united(std::size_t base) {
+  std::vector<Outline> outlines;
+  for (std::size_t i = base; i < operands_.size(); ++i) {
+    outlines.push_back(std::move(operands_[i].outline));
+  }
+  operands_.resize(base);
+  return outlines.size() == 1 ? std::move(outlines[0]) : unite(outlines);
+}
+
+Tree::NodeId Evaluator::united_solid(std::size_t base) {
+  std::vector<Tree::NodeId> nodes;
+  for (std::size_t i = base; i < operands_.size(); ++i) nodes.push_back(operands_[i].solid);
+  operands_.resize(base);
+  return nodes.size() == 1 ? nodes[0] : scene_.tree.add(Operation::kUnion, nodes);
+}
+
+TriangleSoup Evaluator::boundary_mesh(std::uint32_t node, Tree::NodeId solid) {
+  auto mesh = boundary(scene_.tree, solid, execution_);
+  if (mesh) return *std::move(mesh);
+  if (mesh.error().code == ErrorCode::kCancelled) {
+    stop(mesh.error().code, node, mesh.error().message);
+    return {};
+  }
+  // What is subtracted or intersected is left out of account: the result is too large by no more
+  // than the box of the first operands.
+  TriangleSoup all;
+  std::vector<Tree::NodeId> waiting{solid};
+  while (!waiting.empty()) {
+    const Tree::NodeId at = waiting.back();
+    waiting.pop_back();
+    const Tree::Node& entry = scene_.tree.nodes()[at];
+    if (entry.operation == Operation::kSolid) {
+      append(all, world_mesh(scene_.tree.solids()[entry.first]));
+      continue;
+    }
+    const auto operands = scene_.tree.operands(at);
+    const std::size_t count = entry.operation == Operation::kUnion
+                                  ? operands.size()
+                                  : std::min<std::size_t>(operands.size(), 1);
+    waiting.insert(waiting.end(), operands.begin(),
+                   operands.begin() + static_cast<std::ptrdiff_t>(count));
+  }
+  const Bounds exact = bounds(scene_.tree, solid), taken = bounds(all);
+  const glm::dvec3 size = exact.empty() ? glm::dvec3(0.0) : exact.high - exact.low;
+  warn(
+      node, "approximate",
+      fmt::format("'{}': {}; only the first operands of differences and intersections are taken, "
+                  "in a box of {:.6g} x {:.6g} x {:.6g} where the result lies in {:.6g} x {:.6g} x "
+                  "{:.6g}",
+                  name(node), mesh.error().message, taken.high.x - taken.low.x,
+                  taken.high.y - taken.low.y, taken.high.z - taken.low.z, size.x, size.y, size.z));
+  return all;
+}
+
+void Evaluator::hull(Frame& frame) {
+  const TriangleSoup mesh = boundary_mesh(frame.node, united_solid(frame.base));
+  if (error_ || mesh.positions.empty()) return;
+  auto hull = convex_hull(mesh.positions);
+  if (!hull) {
+    return warn(frame.node, "geometry",
+                fmt::format("{}; the hull is left out", hull.error().message));
+  }
+  add_solid(frame.node, frame.outside, *std::move(hull));
+}
+
+void Evaluator::minkowski(Frame& frame) {
+  // One operand for each child that is not empty.
+  std::vector<std::vector<Tree::NodeId>> children;
+  for (std::size_t i = frame.base; i < operands_.size(); ++i) {
+    if (i == frame.base || operands_[i].child != operands_[i - 1].child) children.emplace_back();
+    children.back().push_back(operands_[i].solid);
+  }
+  operands_.resize(frame.base);
+  std::vector<Tree::NodeId> sources;  // of parts
+  std::vector<MinkowskiPart> sum;
+  bool approximate = false;
+  for (std::size_t child = 0; child < children.size(); ++child) {
+    std::vector<MinkowskiPart> parts;
+    for (const Tree::NodeId id : children[child]) {
+      for_each_operand(scene_.tree, id, [&](Tree::NodeId operand) {
+        if (error_) return;
+        parts.push_back(make_part(boundary_mesh(frame.node, operand),
+                                  static_cast<std::uint32_t>(sources.size())));
+        sources.push_back(operand);
+      });
+    }
+    if (error_) return;
+    std::erase_if(parts, [](const MinkowskiPart& p) { return p.convex() && p.hull.empty(); });
+    if (parts.empty()) continue;  // an empty operand is left out
+    if (sum.empty()) {
+      sum = std::move(parts);
+      continue;
+    }
+    auto next = minkowski_sum(sum, parts, approximate, execution_);
+    if (!next) {
+      if (next.error().code == ErrorCode::kCancelled) {
+        return stop(next.error().code, frame.node, next.error().message);
+      }
+      warn(frame.node, kTooMuch,
+           fmt::format("'minkowski': {}; it is shown without operand {} and those after it",
+                       next.error().message, child));
+      break;
+    }
+    sum = *std::move(next);
+  }
+  if (approximate) {
+    warn(frame.node, "approximate",
+         "'minkowski': of very fine convex operands only the vertices farthest along 3000 even "
+         "directions are taken; the sum is too small by less than 1/1000 of its size");
+  }
+  add_sum(frame, sum, sources);
+}
+
+/// The convex parts as one mesh that overlaps itself, the others as nodes.
+void Evaluator::add_sum(const Frame& frame, std::span<const MinkowskiPart> sum,
+                        std::span<const Tree::NodeId> sources) {
+  TriangleSoup all;
+  for (const MinkowskiPart& part : sum) {
+    if (part.convex()) {
+      if (auto hull = convex_hull(part.hull)) append(all, *hull);
+      continue;
+    }
+    const glm::dmat4 world = frame.outside.world * glm::translate(glm::dmat4(1.0), part.offset);
+    const Tree::NodeId source = sources[part.source];
+    Operand operand;
+    operand.node = frame.node;
+    const std::size_t first = scene_.tree.solids().size();
+    operand.solid = copy_nodes(std::span(&source, 1), world, scene_.tree, scene_.tree)[0];
+    for (Solid& solid : scene_.tree.solids().subspan(first)) {
+      solid.colour = frame.outside.colour;
+      solid.name = fmt::format("{} at {}", name(frame.node), place(frame.node));
+    }
+    operands_.push_back(std::move(operand));
+  }
+  all.face_elements.clear();
+  add_solid(frame.node, frame.outside, std::move(all));
+}
+
+void Evaluator::resize(Frame& frame) {
+  const NodeArguments given = arguments(frame.node);
+  double size[3] = {0.0, 0.0, 0.0};
+  given.find("newsize", 0).numbers(size, 3);
+  bool follow[3] = {false, false, false};
+  const ValueRef automatic = given.find("auto", 1);
+  if (automatic.is_list()) {
+    int axis = 0;
+    for (const ValueRef value : automatic) {
+      if (axis < 3) follow[axis++] = value.truth(false);
+    }
+  } else {
+    for (bool& axis : follow) axis = automatic.truth(false);
+  }
+  const Tree::NodeId child = united_solid(frame.base);
+  Operand operand;
+  operand.node = frame.node;
+  glm::dvec3 scale(1.0);
+  if (size[0] != 0.0 || size[1] != 0.0 || size[2] != 0.0) {
+    const Bounds box = bounds(boundary_mesh(frame.node, child));
+    if (error_ || box.empty()) return;
+    const glm::dvec3 old = box.high - box.low;
+    int largest = 0;
+    for (int i = 0; i < 3; ++i) {
+      if (size[i] == 0.0 || !std::isfinite(size[i])) continue;
+      scale[i] = size[i] / old[i];
+      if (size[i] > size[largest]) largest = i;
+    }
+    const double shared = size[largest] != 0.0 ? size[largest] / old[largest] : 1.0;
+    for (int i = 0; i < 3; ++i) {
+      if (follow[i] && size[i] == 0.0) scale[i] = shared;
+    }
+    if (!std::isfinite(scale.x) || !std::isfinite(scale.y) || !std::isfinite(scale.z)) {
+      warn(frame.node, "geometry", "'resize' of something flat; its size is kept");
+      scale = glm::dvec3(1.0);
+    }
+  }
+  const glm::dmat4 world = frame.outside.world * glm::scale(glm::dmat4(1.0), scale);
+  operand.solid = copy_nodes(std::span(&child, 1), world, scene_.tree, scene_.tree)[0];
+  operands_.push_back(std::move(operand));
+}
+
+void Evaluator::projection(Frame& frame) {
+  const Tree::NodeId child = united_solid(frame.base);
+  const NodeArguments given = arguments(frame.node);
+  if (given.find("cut", 0).truth(false)) {
+    add_outline(frame.node, frame.outside, cross_section(scene_.tree, child));
+  } else {
+    add_outline(frame.node, frame.outside, shadow(boundary_mesh(frame.node, child)));
+  }
+}
+
+void Evaluator::linear_extrude(Frame& frame) {
+  const Outline outline = united(frame.base);
+  const NodeArguments given = arguments(frame.node);
+  LinearExtrude options;
+  double direction[3] = {0.0, 0.0, 1.0};
+  const bool slanted = given.find("v").numbers(direction, 3) == 3;
+  const glm::dvec3 v(direction[0], direction[1], direction[2]);
+  const double length = std::sqrt(v.x * v.x + v.y * v.y + v.z * v.z);
+  if (slanted && length > 0.0 && std::isfinite(length)) options.direction = v / length;
+  options.height = given.find("height", 0).number(slanted ? length : options.height);
+  options.centre = given.truth("center", false);
+  options.twist = given.number("twist", 0.0);
+  const ValueRef scale = given.find("scale");
+  double both[2] = {scale.number(1.0), scale.number(1.0)};
+  scale.numbers(both, 2);
+  options.scale = {std::max(both[0], 0.0), std::max(both[1], 0.0)};
+  const auto whole = [](double value) {
+    return static_cast<int>(std::isfinite(value) ? std::clamp(value, 0.0, 1e6) : 0.0);
+  };
+  options.slices = whole(given.number("slices", 0.0));
+  options.outline_segments = whole(given.number("segments", 0.0));
+  options.divide_outline = newer_;
+  options.segments = segments(frame.node);
+  if (!std::isfinite(options.height) || !std::isfinite(options.twist) ||
+      !std::isfinite(options.scale.x) || !std::isfinite(options.scale.y)) {
+    return warn(frame.node, "geometry",
+                "'linear_extrude' with numbers that are not finite; it is left out");
+  }
+  add_solid(frame.node, frame.outside, csg::linear_extrude(outline, options));
+}
+
+void Evaluator::rotate_extrude(Frame& frame) {
+  const Outline outline = united(frame.base);
+  const NodeArguments given = arguments(frame.node);
+  RotateExtrude options;
+  options.angle = given.find("angle", 0).number(options.angle);
+  if (!std::isfinite(options.angle)) options.angle = 360.0;
+  const bool full = std::abs(options.angle) >= 360.0;
+  options.start = given.number("start", full ? 180.0 : 0.0);
+  options.round_up = newer_;
+  options.segments = segments(frame.node);
+  auto mesh = csg::rotate_extrude(outline, options);
+  if (!mesh) {
+    return warn(frame.node, "geometry",
+                fmt::format("{}; the 'rotate_extrude' is left out", mesh.error().message));
+  }
+  add_solid(frame.node, frame.outside, *std::move(mesh));
+}
+
+/// Nodes that make flat regions or roofs of flat regions.
+void Evaluator::flat_operation(Frame& frame) {
+  const NodeArguments given = arguments(frame.node);
+  if (frame.kind == NodeKind::kMinkowski) {
+    std::vector<Outline> operands;
+    while (operands_.size() > frame.base) {
+      std::size_t first = operands_.size() - 1;
+      while (first > frame.base && operands_[first - 1].child == operands_.back().child) --first;
+      operands.push_back(united(first));
+    }
+    std::reverse(operands.begin(), operands.end());
+    std::erase_if(operands, [](const Outline& outline) { return outline.empty(); });
+    if (operands.empty()) return;
+    add_outline(frame.node, frame.outside,
+                operands.size() == 1 ? std::move(operands[0]) : minkowski_sum(operands));
+    return;
+  }
+  Outline outline = united(frame.base);
+  switch (frame.kind) {
+    case NodeKind::kHull:
+      outline = convex_hull(std::span<const Outline>(&outline, 1));
+      break;
+    case NodeKind::kFill:
+      outline = without_holes(outline);
+      break;
+    case NodeKind::kResize: {
+      double size[2] = {0.0, 0.0};
+      given.find("newsize", 0).numbers(size, 2);
+      bool follow[2] = {false, false};
+      const ValueRef automatic = given.find("auto", 1);
+      follow[0] = follow[1] = automatic.truth(false);
+      int axis = 0;
+      for (const ValueRef value : automatic) {
+        if (axis < 2) follow[axis++] = value.truth(false);
+      }
+      outline = csg::resize(outline, {size[0], size[1]}, follow);
+      break;
+    }
+    case NodeKind::kOffset: {
+      const ValueRef delta = given.find("delta");
+      outline = delta.is_number()
+                    ? offset_delta(outline, delta.number(0.0), given.truth("chamfer", false))
+                    : offset_round(outline, given.find("r", 0).number(1.0), segments(frame.node));
+      break;
+    }
+    case NodeKind::kRoof: {
+      auto roof =
+          make_roof(outline, given.find("method", 0).string("voronoi"), segments(frame.node));
+      if (!roof) {
+        return warn(frame.node, "not-done",
+                    fmt::format("{}; the roof is left out", roof.error().message));
+      }
+      return add_solid(frame.node, frame.outside, *std::move(roof));
+    }
+    default:
+      break;
+  }
+  add_outline(frame.node, frame.outside, std::move(outline));
+}
+
+}  // namespace strata::csg

@@ -1,0 +1,154 @@
+#include <algorithm>
+#include <glm/gtc/matrix_inverse.hpp>
+#include <glm/matrix.hpp>
+
+#include "csg/scene/evaluator.h"
+#include "mesh/diagnose.h"
+#include "mesh/soup_tools.h"
+
+namespace strata::csg {
+namespace {
+
+constexpr std::size_t kMostWarnings = 1000;
+
+}  // namespace
+
+std::string Evaluator::place(std::uint32_t node) const {
+  return node < ast_.nodes.size() ? ast_.place(ast_.nodes[node].offset) : ast_.name;
+}
+
+std::string_view Evaluator::name(std::uint32_t node) const {
+  return node < ast_.nodes.size() ? ast_.nodes[node].name : "scene";
+}
+
+void Evaluator::warn(std::uint32_t node, std::string code, std::string_view text) {
+  if (scene_.warnings.size() >= kMostWarnings) {
+    ++warnings_left_out_;
+    return;
+  }
+  scene_.warnings.push_back({std::move(code), fmt::format("{}: {}", place(node), text)});
+}
+
+void Evaluator::stop(ErrorCode code, std::uint32_t node, std::string_view text) {
+  if (error_) return;
+  error_ = code == ErrorCode::kCancelled ? Error{code, std::string(text)}
+                                         : Error{code, fmt::format("{}: {}", place(node), text)};
+}
+
+void Evaluator::add_solid(std::uint32_t node, const Context& context, TriangleSoup mesh,
+                          InsideRule rule) {
+  if (mesh.triangles.empty()) return;
+  add_solid(node, context, std::make_shared<const TriangleSoup>(std::move(mesh)), rule);
+}
+
+void Evaluator::add_solid(std::uint32_t node, const Context& context,
+                          std::shared_ptr<const TriangleSoup> mesh, InsideRule rule) {
+  if (!mesh || mesh->triangles.empty()) return;
+  if (!context.keep_flattened && glm::determinant(glm::dmat3(context.world)) == 0.0) {
+    warn(node, "geometry",
+         fmt::format("'{}' is scaled by 0 and has no volume; it is left out", name(node)));
+    return;
+  }
+  Solid solid;
+  solid.mesh = std::move(mesh);
+  solid.world_from_mesh = context.world;
+  solid.colour = context.colour;
+  solid.rule = rule;
+  solid.name = fmt::format("{} at {}", name(node), place(node));
+  Operand operand;
+  operand.node = node;
+  operand.solid = scene_.tree.add_solid(std::move(solid));
+  operands_.push_back(std::move(operand));
+}
+
+void Evaluator::add_outline(std::uint32_t node, const Context& context, Outline outline) {
+  if (outline.empty()) return;
+  Operand operand;
+  if (context.plane == glm::dmat3(1.0)) {
+    operand.outline = std::move(outline);
+  } else {
+    if (glm::determinant(glm::dmat2(context.plane)) == 0.0) {
+      warn(node, "geometry",
+           fmt::format("'{}' is scaled by 0 and has no area; it is left out", name(node)));
+      return;
+    }
+    operand.outline = transform(outline, context.plane);
+  }
+  operand.flat = true;
+  operand.node = node;
+  operand.colour = context.colour;
+  operands_.push_back(std::move(operand));
+}
+
+InsideRule Evaluator::inspect(std::uint32_t node, TriangleSoup& mesh) {
+  Execution execution = execution_;
+  execution.progress = {};
+  InsideRule rule = InsideRule::kWinding;
+  if (!is_closed(mesh, execution)) {
+    const MeshDiagnosis found = diagnose(mesh, execution);
+    std::string text = fmt::format("'{}' is not closed: {} of {} edges are unbalanced", name(node),
+                                   found.unbalanced_edges, found.edges);
+    if (found.boundary_edges > 0) text += fmt::format(", {} border a hole", found.boundary_edges);
+    if (found.misoriented_edges > 0) {
+      text += fmt::format(", {} join faces that look opposite ways", found.misoriented_edges);
+    }
+    if (!found.examples.empty()) {
+      const UnbalancedEdge& edge = found.examples.front();
+      text += fmt::format("; the first from ({:.9g}, {:.9g}, {:.9g}) to ({:.9g}, {:.9g}, {:.9g})",
+                          edge.from.x, edge.from.y, edge.from.z, edge.to.x, edge.to.y, edge.to.z);
+    }
+    if (found.even) {
+      text += "; every edge is used an even number of times, so parity decides what is inside";
+      rule = InsideRule::kParity;
+    }
+    warn(node, "geometry", text);
+    if (!found.even) return rule;  // the volume of an open mesh says little
+    return rule;
+  }
+  const double volume = signed_volume(mesh, execution);
+  if (volume < 0.0) {
+    reverse_orientation(mesh);
+    warn(node, "geometry",
+         fmt::format("'{}' is inside out (its volume is {:.6g}); it was turned around", name(node),
+                     volume));
+  }
+  return rule;
+}
+
+/// Copies subtrees between trees, or within one. Every node is an operand once at most, so nothing
+/// is met twice.
+std::vector<Tree::NodeId> Evaluator::copy_nodes(std::span<const Tree::NodeId> roots,
+                                                const glm::dmat4& target_from_source,
+                                                const Tree& from, Tree& to) {
+  std::vector<Tree::NodeId> reached(roots.begin(), roots.end());
+  for (std::size_t i = 0; i < reached.size(); ++i) {
+    if (from.nodes()[reached[i]].operation == Operation::kSolid) continue;
+    const auto operands = from.operands(reached[i]);
+    reached.insert(reached.end(), operands.begin(), operands.end());
+  }
+  std::sort(reached.begin(), reached.end());  // operands stand before the nodes that take them
+  std::vector<Tree::NodeId> copies(reached.size());
+  const auto copy_of = [&](Tree::NodeId id) {
+    const auto at = std::lower_bound(reached.begin(), reached.end(), id);
+    return copies[static_cast<std::size_t>(at - reached.begin())];
+  };
+  const bool moves = target_from_source != glm::dmat4(1.0);
+  std::vector<Tree::NodeId> operands;
+  for (std::size_t i = 0; i < reached.size(); ++i) {
+    const Tree::Node node = from.nodes()[reached[i]];
+    if (node.operation == Operation::kSolid) {
+      Solid solid = from.solids()[node.first];
+      if (moves) solid.world_from_mesh = target_from_source * solid.world_from_mesh;
+      copies[i] = to.add_solid(std::move(solid));
+    } else {
+      operands.clear();
+      for (const Tree::NodeId id : from.operands(reached[i])) operands.push_back(copy_of(id));
+      copies[i] = to.add(node.operation, operands);
+    }
+  }
+  std::vector<Tree::NodeId> result;
+  for (const Tree::NodeId root : roots) result.push_back(copy_of(root));
+  return result;
+}
+
+}  // namespace strata::csg

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <string>
+
+#include "core/result.h"
+#include "mesh/triangle_soup.h"
+
+namespace strata::csg {
+
+/// OpenSCAD's `surface`: a closed solid under a height map, each cell with a vertex in its middle.
+/// A .png is read as grey levels 0 to 100, its last row at y = 0, floor one below the lowest; any
+/// other file as rows of numbers, the first at y = 0, comments after '#', floor at
+/// min(1, lowest) - 1. `centre` puts the middle at x = y = 0; `invert` turns grey levels around.
+/// @return kInput naming file and line; kLimit beyond 20 million cells. Maps of less than 2 x 2
+/// are kInput
+Result<TriangleSoup> read_surface(const std::string& path, bool centre, bool invert);
+
+}  // namespace strata::csg
