@@ -31,9 +31,12 @@ using VecF64 = hn::Vec<LaneF64>;
 using VecI32 = hn::Vec<LaneI32>;
 inline constexpr std::size_t kMaxLanes = HWY_MAX_BYTES / sizeof(double);
 
-/// Extents (lattice steps) up to which all numerators stay below 2^51 as they are, and up to which
-/// they do once base and slopes are split into quotient and remainder.
+/// Extents (lattice steps) up to which all numerators stay below 2^51 as they are: across the
+/// image, along the ray, and the product of all three, since no numerator exceeds six times that.
+/// Then the extent up to which they do once base and slopes are split into quotient and remainder.
 inline constexpr std::int32_t kDirectExtent = std::int32_t{1} << 16;
+inline constexpr std::int32_t kDirectDepthExtent = std::int32_t{1} << 24;
+inline constexpr double kDirectVolume = 0x1p48;
 inline constexpr std::int64_t kSplitExtent = std::int64_t{1} << 21;
 
 /// The equations of a triangle at the first pixel of a box in a tile, and their steps by a pixel.
@@ -136,9 +139,16 @@ class SetupBatch {
     const VecI32 box_v0 = hn::Max(hn::Set(di, clip.v0), first(hn::Add(v0, v_low)));
     const VecI32 box_v1 = hn::Min(hn::Set(di, clip.v1), end(hn::Add(v0, v_high)));
     const auto covers = hn::And(hn::Lt(box_u0, box_u1), hn::Lt(box_v0, box_v1));
-    const VecI32 extent =
-        hn::Max(hn::Sub(u_high, u_low), hn::Max(hn::Sub(v_high, v_low), hn::Sub(w_high, w_low)));
-    const auto direct = hn::Lt(extent, hn::Set(di, kDirectExtent + 1));
+    const VecI32 u_extent = hn::Sub(u_high, u_low), v_extent = hn::Sub(v_high, v_low),
+                 w_extent = hn::Sub(w_high, w_low);
+    const VecF64 volume = hn::Mul(hn::Mul(hn::PromoteTo(df, u_extent), hn::PromoteTo(df, v_extent)),
+                                  hn::PromoteTo(df, w_extent));
+    const VecI32 fits = hn::DemoteTo(
+        di, hn::IfThenElseZero(hn::Le(volume, hn::Set(df, kDirectVolume)), hn::Set(df, 1.0)));
+    const auto direct =
+        hn::And(hn::And(hn::Lt(hn::Max(u_extent, v_extent), hn::Set(di, kDirectExtent + 1)),
+                        hn::Lt(w_extent, hn::Set(di, kDirectDepthExtent + 1))),
+                hn::Eq(fits, one));
 
     // All below is exact in double precision for direct triangles.
     VecF64 u1 = hn::PromoteTo(df, iu1), v1 = hn::PromoteTo(df, iv1), w1 = hn::PromoteTo(df, iw1);
@@ -260,6 +270,36 @@ HWY_INLINE hn::Vec<typename Block::I32> to_integers(const VecF64 (&parts)[2]) {
 #endif
 }
 
+/// The rows of a box, counted from its first, where the columns [step, step + columns) may be
+/// covered: elsewhere one edge is negative in all of them.
+struct RowRange {
+  int begin, end;
+};
+HWY_INLINE RowRange rows_of_strip(const TileEquations& q, int step, int columns, int rows) {
+  RowRange range{0, rows};
+  for (int i = 0; i < 3; ++i) {
+    const std::int64_t along = q.edge_u[i];
+    const std::int64_t best =
+        q.edge[i] + along * step + std::max<std::int64_t>(0, along * (columns - 1));
+    const std::int64_t down = q.edge_v[i];
+    if (down == 0) {
+      if (best < 0) range.end = 0;
+    } else if (down > 0) {  // best + down * row >= 0 from some row on
+      if (best < 0) {
+        const std::int64_t from = (-best + down - 1) / down;
+        range.begin = std::max(range.begin, static_cast<int>(std::min<std::int64_t>(from, rows)));
+      }
+    } else {
+      const std::int64_t end = best < 0 ? 0 : best / -down + 1;
+      range.end = std::min(range.end, static_cast<int>(std::min<std::int64_t>(end, rows)));
+    }
+  }
+  return range;
+}
+
+/// Boxes with at least this many rows are searched for those that matter, strip by strip.
+inline constexpr int kTallBox = 12;
+
 /// Hands the pixels of `box`, which lies within one tile (at most 64 pixels a side), to `sink`: for
 /// each block sink.encode(depth, mask) gives a vector of 32-bit words, 0 where `mask` is not set,
 /// and sink.put_block<columns>(u, v, words, rows) takes them, row by row from pixel (u, v) on.
@@ -289,11 +329,17 @@ HWY_INLINE void rasterize_box(const TileEquations& q, const PixelRect& box,
 
   for (int u = box.u0; u < box.u1; u += columns) {
     const int step = u - box.u0;
+    RowRange range{0, box.v1 - box.v0};
+    if (range.end >= kTallBox) {
+      range = rows_of_strip(q, step, columns, range.end);
+      if (range.begin >= range.end) continue;
+    }
     const auto in_box = hn::Lt(column, hn::Set(di, box.u1 - u));
     const auto edge_at = [&](int i) {
       const auto along_u = hn::Mul(column, hn::Set(di, q.edge_u[i]));
       const auto along_v = hn::Mul(row, hn::Set(di, q.edge_v[i]));
-      return hn::Add(hn::Set(di, q.edge[i] + q.edge_u[i] * step), hn::Add(along_u, along_v));
+      const std::int32_t at = q.edge[i] + q.edge_u[i] * step + q.edge_v[i] * range.begin;
+      return hn::Add(hn::Set(di, at), hn::Add(along_u, along_v));
     };
     auto edge0 = edge_at(0), edge1 = edge_at(1), edge2 = edge_at(2);
     VecF64 remainder[2], quotient[2];
@@ -302,15 +348,16 @@ HWY_INLINE void rasterize_box(const TileEquations& q, const PixelRect& box,
       const auto part_row = hn::Floor(hn::Mul(lane, hn::Set(df, 1.0 / columns)));
       const auto part_column = hn::Sub(lane, hn::Mul(part_row, hn::Set(df, columns)));
       const auto plane = [&](double at, double along_u, double along_v) {
-        return hn::Add(hn::Set(df, at + along_u * step),
+        return hn::Add(hn::Set(df, at + along_u * step + along_v * range.begin),
                        hn::Add(hn::Mul(part_column, hn::Set(df, along_u)),
                                hn::Mul(part_row, hn::Set(df, along_v))));
       };
       remainder[part] = plane(q.remainder, q.remainder_u, q.remainder_v);
       if constexpr (split) quotient[part] = plane(q.split_quotient, q.quotient_u, q.quotient_v);
     }
-    for (int v = box.v0; v < box.v1; v += rows) {
-      const auto inside = hn::And(in_box, hn::Lt(row, hn::Set(di, box.v1 - v)));
+    const int v_end = box.v0 + range.end;
+    for (int v = box.v0 + range.begin; v < v_end; v += rows) {
+      const auto inside = hn::And(in_box, hn::Lt(row, hn::Set(di, v_end - v)));
       const auto covered = hn::AndNot(hn::Lt(hn::Or3(edge0, edge1, edge2), zero), inside);
       // Blocks of a narrow triangle are seldom empty, and a wrong guess costs more than the work.
       if (columns < Block::lanes() || !hn::AllFalse(di, covered)) {
