@@ -81,6 +81,7 @@ strata_depends(PkgConfig::polyclipping
 strata_depends(PkgConfig::qhull_r "${pc_modules}(qhull_r REQUIRED QUIET IMPORTED_TARGET qhull_r)" qhull_r "")
 strata_depends(PkgConfig::text "${pc_modules}(text REQUIRED QUIET IMPORTED_TARGET freetype2 harfbuzz fontconfig)"
   "freetype2 harfbuzz fontconfig" "")
+strata_depends(PkgConfig::libzip "${pc_modules}(libzip REQUIRED QUIET IMPORTED_TARGET libzip)" libzip "")
 strata_depends(pugixml::pugixml "find_dependency(pugixml CONFIG)" pugixml "")
 strata_depends(OpenEXR::OpenEXR "find_dependency(OpenEXR CONFIG)" OpenEXR "")
 strata_depends(OpenMeshCore "find_dependency(OpenMesh CONFIG)" "" "-lOpenMeshCore")  # Debian has no module of it

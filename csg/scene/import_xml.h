@@ -11,7 +11,7 @@ namespace strata::csg {
 /// included, as one soup; numbers are taken as they are, whatever their unit. Materials and other
 /// extensions are skipped. @return kInput naming file and line: no zip archive, no model, malformed
 /// XML, an index that names nothing, components within themselves; kLimit; kUsage: a build without
-/// minizip
+/// libzip
 Result<TriangleSoup> read_3mf(const std::string& path);
 
 /// The mesh of an AMF file (ISO/ASTM 52915), plain or zipped: all volumes of all objects as one
