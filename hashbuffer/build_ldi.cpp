@@ -22,17 +22,7 @@ PackedTile pack(const TileLists<DepthItem>& lists) {
   tile.items.reserve(lists.fragments);
   for (std::size_t pixel = 0; pixel < kTilePixels; ++pixel) {
     const std::size_t before = tile.items.size();
-    if (lists.planes64 == nullptr) {
-      tile.items.insert(tile.items.end(), lists.keys + lists.offsets[pixel],
-                        lists.keys + lists.offsets[pixel + 1]);
-    } else if (const int row = static_cast<int>(pixel / kTileSide);
-               row >= lists.row_begin && row < lists.row_end) {
-      for (std::size_t age = 0; age < static_cast<std::size_t>(lists.ages); ++age) {
-        const std::uint64_t record = lists.planes64[age * kTilePixels + pixel];
-        if (record == 0) break;
-        tile.items.push_back(tile_key<Record64>(record));
-      }
-    }
+    for_each_item(lists, pixel, [&](DepthItem item) { tile.items.push_back(item); });
     tile.lengths[pixel] = static_cast<std::uint32_t>(tile.items.size() - before);
   }
   return tile;
@@ -41,13 +31,18 @@ PackedTile pack(const TileLists<DepthItem>& lists) {
 }  // namespace
 
 Result<LayeredDepthImage> build_ldi(const LatticeMesh& mesh, const RasterTarget& target,
-                                    const TileStoreOptions& options, const Execution& execution) {
+                                    const TileStoreOptions& options, const Execution& execution,
+                                    const TileListFilter* filter) {
   const auto bins = bin_triangles(mesh, target, execution);
   if (!bins) return tl::unexpected(bins.error());
   const auto tiles_u = static_cast<std::size_t>(bins->tiles_u);
   std::vector<PackedTile> tiles(tiles_u * static_cast<std::size_t>(bins->tiles_v));
   std::vector<ItemTileBuilder> builders;
-  for (int i = 0; i < execution.thread_count(); ++i) builders.emplace_back(options);
+  std::vector<std::unique_ptr<TileListFilter::Worker>> filters;
+  for (int i = 0; i < execution.thread_count(); ++i) {
+    builders.emplace_back(options);
+    if (filter != nullptr) filters.push_back(filter->worker());
+  }
 
   std::mutex failure_mutex;
   Result<void> status;
@@ -66,6 +61,7 @@ Result<LayeredDepthImage> build_ldi(const LatticeMesh& mesh, const RasterTarget&
       auto lists =
           builders[static_cast<std::size_t>(worker)].build(mesh, target, triangles, tu, tv);
       if (!lists) return refuse(lists.error());
+      if (filter != nullptr) *lists = filters[static_cast<std::size_t>(worker)]->apply(*lists);
       // Packed once by tile and once as an image.
       const std::uint64_t held = bytes += 2 * lists->fragments * sizeof(DepthItem);
       if (execution.memory_limit > 0 && held > execution.memory_limit) {

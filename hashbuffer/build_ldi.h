@@ -4,17 +4,20 @@
 #include "core/execution.h"
 #include "core/grid.h"
 #include "core/result.h"
+#include "hashbuffer/list_filter.h"
 #include "hashbuffer/tile_builder.h"
 
 namespace strata {
 
 /// The sorted depth lists of a snapped mesh seen along an axis: every crossing of every pixel's
 /// ray, with its triangle. Same bits for any store, offsets, number of threads and order of
-/// triangles (up to the triangles' numbers). world_from_image is left as the identity.
+/// triangles (up to the triangles' numbers). world_from_image is left as the identity. `filter`, if
+/// given, makes other lists of them, tile by tile.
 /// @return kLimit when the lists outgrow execution.memory_limit or memory, kCancelled
 Result<LayeredDepthImage> build_ldi(const LatticeMesh& mesh, const RasterTarget& target,
                                     const TileStoreOptions& options = {},
-                                    const Execution& execution = {});
+                                    const Execution& execution = {},
+                                    const TileListFilter* filter = nullptr);
 
 /// What the rays of the voxel columns of a grid along `axis` see.
 [[nodiscard]] RasterTarget raster_target(const VoxelGrid& grid, Axis axis);

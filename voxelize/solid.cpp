@@ -20,9 +20,11 @@ double milliseconds_between(std::chrono::steady_clock::time_point from,
 struct SolidVoxelizer::Worker {
   explicit Worker(const VoxelizeOptions& options)
       : keys({.store = options.store, .offsets = options.offsets}),
-        items({.store = options.store, .offsets = options.offsets}) {}
+        items({.store = options.store, .offsets = options.offsets}),
+        filter(options.filter != nullptr ? options.filter->worker() : nullptr) {}
   KeyTileBuilder keys;
   ItemTileBuilder items;
+  std::unique_ptr<TileListFilter::Worker> filter;
   TileIntervals intervals;
   VoxelizeReport report;
 };
@@ -56,7 +58,15 @@ Result<void> SolidVoxelizer::run_tile(Builder& builder, Worker& worker, int tu, 
   worker.report.lists_ms += milliseconds_between(start, built);
   if (lists->fragments == 0) return {};
   TileIntervals& tile = worker.intervals;
-  walk_tile(*lists, options_.rule, options_.statistics, tile);
+  if constexpr (std::is_same_v<Builder, ItemTileBuilder>) {
+    if (worker.filter) {
+      walk_tile(worker.filter->apply(*lists), options_.rule, options_.statistics, tile);
+    } else {
+      walk_tile(*lists, options_.rule, options_.statistics, tile);
+    }
+  } else {
+    walk_tile(*lists, options_.rule, options_.statistics, tile);
+  }
   if (tile.offsets.back() > 0) {
     out.set_tile(tu, tv - v_begin / kTileSide, tile.offsets,
                  std::span<const Interval>(tile.items).first(tile.offsets.back()));
@@ -92,7 +102,7 @@ Result<VoxelIntervals> SolidVoxelizer::slab(int v_begin, int v_end, const Execut
     Worker& worker = *workers_[static_cast<std::size_t>(worker_index)];
     const int tu = static_cast<int>(index) % result.tiles_u();
     const int tv = static_cast<int>(index) / result.tiles_u() + first_tile_row;
-    const auto done = target_.depth_limit <= kMaxDepthKeyLimit
+    const auto done = target_.depth_limit <= kMaxDepthKeyLimit && options_.filter == nullptr
                           ? run_tile(worker.keys, worker, tu, tv, v_begin, result, marks)
                           : run_tile(worker.items, worker, tu, tv, v_begin, result, marks);
     if (!done) {

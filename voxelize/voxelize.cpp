@@ -54,6 +54,9 @@ Result<VoxelizeReport> run(const TriangleSoup& mesh, const VoxelGrid& grid,
   if (!options.solid && !options.surface) {
     return fail(ErrorCode::kUsage, "neither the solid nor the surface is asked for");
   }
+  if (options.filter != nullptr && (options.surface || !options.closed)) {
+    return fail(ErrorCode::kUsage, "of a Boolean tree only the solid can be voxelized");
+  }
   if (!options.closed && options.open == OpenMode::kFail) {
     return fail(ErrorCode::kGeometry, "the mesh is not closed");
   }

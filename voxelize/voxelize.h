@@ -10,6 +10,7 @@
 #include "core/grid.h"
 #include "core/inside_rule.h"
 #include "core/result.h"
+#include "hashbuffer/list_filter.h"
 #include "hashbuffer/tile_builder.h"
 #include "mesh/triangle_soup.h"
 #include "voxelize/intervals.h"
@@ -40,6 +41,9 @@ struct VoxelizeOptions {
   StoreKind store = StoreKind::kAuto;
   OffsetKind offsets = OffsetKind::kPlaneFirst;
   bool statistics = false;  ///< count and hash what comes out
+  /// Makes other lists of the mesh's before they are filled: a Boolean tree. Borrowed. Then the
+  /// rule applies to what it makes, and surfaces cannot be had.
+  const TileListFilter* filter = nullptr;
 };
 
 /// What voxelizing found out.
@@ -62,8 +66,8 @@ using SlabSink = std::function<Result<void>(const VoxelIntervals&)>;
 
 /// Voxelizes `mesh` on `grid`, slab by slab of bounded memory. Voxel centres decide (law 7): same
 /// set for every axis, store, thread count and order of triangles.
-/// @return kGeometry (coordinates too large, open mesh with OpenMode::kFail), kLimit, kCancelled,
-/// or the sink's error.
+/// @return kUsage (a surface of a filter's lists), kGeometry (coordinates too large, open mesh with
+/// OpenMode::kFail), kLimit, kCancelled, or the sink's error.
 Result<VoxelizeReport> voxelize_slabs(const TriangleSoup& mesh, const VoxelGrid& grid,
                                       const VoxelizeOptions& options, const Execution& execution,
                                       const SlabSink& sink);

@@ -1,0 +1,270 @@
+#include "csg/solid_lists.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "csg/geometry.h"
+#include "csg/program.h"
+#include "csg/surface.h"
+#include "csg/tile_surface.h"
+#include "hashbuffer/build_ldi.h"
+#include "raster/lattice_mesh.h"
+
+namespace strata::csg {
+namespace {
+
+/// What the filter's workers share.
+struct Shared {
+  Program program;
+  std::vector<InsideRule> rules;        ///< of each solid of the tree
+  std::vector<std::uint32_t> solid_of;  ///< of each triangle of the soup
+};
+
+bool is_inside(InsideRule rule, int winding) {
+  switch (rule) {
+    case InsideRule::kWinding:
+      return winding > 0;
+    case InsideRule::kNonzero:
+      return winding != 0;
+    case InsideRule::kParity:
+      break;
+  }
+  return winding % 2 != 0;
+}
+
+class BooleanWorker final : public TileListFilter::Worker {
+ public:
+  explicit BooleanWorker(const Shared& shared)
+      : shared_(&shared),
+        state_(shared.program),
+        windings_(shared.rules.size(), 0),
+        offsets_(kTilePixels + 1) {}
+
+  TileLists<DepthItem> apply(const TileLists<DepthItem>& lists) override {
+    keys_.clear();
+    int first_row = kTileSide, last_row = 0;
+    for (std::size_t pixel = 0; pixel < kTilePixels; ++pixel) {
+      offsets_[pixel] = static_cast<std::uint32_t>(keys_.size());
+      items_.clear();
+      for_each_item(lists, pixel, [this](DepthItem item) { items_.push_back(item); });
+      if (items_.empty()) continue;
+      if (!walk()) walk_open();
+      if (keys_.size() > offsets_[pixel]) {
+        const int row = static_cast<int>(pixel) / kTileSide;
+        first_row = std::min(first_row, row);
+        last_row = row + 1;
+      }
+    }
+    offsets_[kTilePixels] = static_cast<std::uint32_t>(keys_.size());
+    TileLists<DepthItem> result;
+    result.row_begin = std::min(first_row, last_row);
+    result.row_end = last_row;
+    result.fragments = keys_.size();
+    result.offsets = offsets_.data();
+    result.keys = keys_.data();
+    return result;
+  }
+
+ private:
+  [[nodiscard]] std::uint32_t solid_of(DepthItem item) const {
+    return shared_->solid_of[item.triangle()];
+  }
+
+  /// The lists of a ray that leaves every solid as often as it enters it; false, without effect,
+  /// for any other.
+  bool walk() {
+    bool balanced = true;
+    const std::size_t before = keys_.size();
+    bool value = state_.value();
+    for (std::size_t i = 0; i < items_.size();) {
+      const std::size_t begin = i;
+      const std::uint32_t depth = items_[begin].depth();
+      DepthItem shown = items_[begin];
+      for (; i < items_.size() && items_[i].depth() == depth; ++i) {
+        const std::uint32_t solid = solid_of(items_[i]);
+        const InsideRule rule = shared_->rules[solid];
+        int& winding = windings_[solid];
+        const bool was = is_inside(rule, winding);
+        winding += items_[i].exit() ? -1 : 1;
+        if (is_inside(rule, winding) != was) {
+          state_.flip(solid);
+          if (state_.value() != value) shown = items_[i];
+        }
+      }
+      if (state_.value() == value) continue;
+      value = !value;
+      keys_.emplace_back(depth, !value, shown.triangle());
+    }
+    for (const DepthItem item : items_) {
+      const std::uint32_t solid = solid_of(item);
+      const int winding = std::exchange(windings_[solid], 0);
+      if (winding == 0) continue;
+      if (is_inside(shared_->rules[solid], winding)) state_.flip(solid);
+      balanced = balanced && shared_->rules[solid] == InsideRule::kParity && winding % 2 == 0;
+    }
+    if (!balanced) keys_.resize(before);
+    return balanced;
+  }
+
+  /// The same where a solid is open: partners are found solid by solid.
+  void walk_open() {
+    std::stable_sort(items_.begin(), items_.end(),
+                     [this](DepthItem a, DepthItem b) { return solid_of(a) < solid_of(b); });
+    flips_.clear();
+    for (std::size_t i = 0; i < items_.size();) {
+      const std::size_t begin = i;
+      const std::uint32_t solid = solid_of(items_[begin]);
+      while (i < items_.size() && solid_of(items_[i]) == solid) ++i;
+      flips_of(std::span(items_).subspan(begin, i - begin), solid, shared_->rules[solid], false,
+               flips_);
+    }
+    std::sort(flips_.begin(), flips_.end(), [](const Flip& a, const Flip& b) {
+      return a.depth != b.depth ? a.depth < b.depth : a.solid < b.solid;
+    });
+    bool value = state_.value();
+    for (std::size_t i = 0; i < flips_.size();) {
+      const std::size_t begin = i;
+      for (; i < flips_.size() && flips_[i].depth == flips_[begin].depth; ++i) {
+        state_.flip(flips_[i].solid);
+      }
+      if (state_.value() == value) continue;
+      value = !value;
+      keys_.emplace_back(flips_[begin].depth, !value, flips_[begin].triangle);
+    }
+  }
+
+  const Shared* shared_;
+  ProgramState state_;
+  std::vector<int> windings_;
+  std::vector<std::uint32_t> offsets_;
+  std::vector<DepthItem> keys_, items_;
+  std::vector<Flip> flips_;
+};
+
+class BooleanFilter final : public TileListFilter {
+ public:
+  explicit BooleanFilter(const Shared& shared) : shared_(&shared) {}
+  [[nodiscard]] std::unique_ptr<Worker> worker() const override {
+    return std::make_unique<BooleanWorker>(*shared_);
+  }
+
+ private:
+  const Shared* shared_;
+};
+
+}  // namespace
+
+struct SolidLists::Impl {
+  Shared shared;
+  TriangleSoup soup;
+  BooleanFilter filter{shared};
+};
+
+SolidLists::SolidLists(const Tree& tree, Tree::NodeId root) : impl_(std::make_unique<Impl>()) {
+  Shared& shared = impl_->shared;
+  TriangleSoup& soup = impl_->soup;
+  shared.program = compile(tree, root);
+  const Geometry geometry(tree);
+  for (std::uint32_t solid = 0; solid < tree.solids().size(); ++solid) {
+    shared.rules.push_back(tree.solids()[solid].rule);
+    if (shared.program.leaves[solid].parent == Program::kNone) continue;
+    const Geometry::Part& part = geometry.parts()[solid];
+    const auto first = static_cast<std::uint32_t>(soup.positions.size());
+    soup.positions.insert(soup.positions.end(), part.positions.begin(), part.positions.end());
+    for (const glm::uvec3& triangle : part.triangles) soup.triangles.push_back(triangle + first);
+    shared.solid_of.resize(soup.triangles.size(), solid);
+  }
+}
+SolidLists::~SolidLists() = default;
+SolidLists::SolidLists(SolidLists&&) noexcept = default;
+SolidLists& SolidLists::operator=(SolidLists&&) noexcept = default;
+
+const TriangleSoup& SolidLists::soup() const { return impl_->soup; }
+const TileListFilter& SolidLists::filter() const { return impl_->filter; }
+std::uint32_t SolidLists::solid_of(std::uint32_t triangle) const {
+  return impl_->shared.solid_of[triangle];
+}
+
+Result<Measures> measure(const Tree& tree, Tree::NodeId root, int resolution,
+                         const Execution& execution) {
+  if (resolution < 1 || resolution > kMaxGridSide / 2) {
+    return fail(ErrorCode::kUsage, "a resolution of {} voxels: 1 to {} can be had", resolution,
+                kMaxGridSide / 2);
+  }
+  Measures result;
+  const Bounds box = bounds(tree, root);
+  const SolidLists lists(tree, root);
+  if (box.empty()) return result;
+  const glm::dvec3 extent = box.high - box.low;
+  const double step = std::max({extent.x, extent.y, extent.z}) / resolution;
+  if (!(step > 0) || !std::isfinite(step)) return result;
+  VoxelGrid grid;
+  grid.voxel_size = glm::dvec3(step);
+  grid.dims = glm::max(glm::ivec3(glm::ceil(extent / step)), glm::ivec3(1));
+  // The result may be smaller than the solids, which reach out of the grid: depths are clamped,
+  // outside of the result's own box nothing is true.
+  grid.origin = (box.low + box.high) * 0.5 - glm::dvec3(grid.dims) * (step * 0.5);
+  auto snapped = snap_to_lattice(lists.soup(), grid, execution);
+  if (!snapped) return tl::unexpected(snapped.error());
+
+  glm::dvec3 low(std::numeric_limits<double>::infinity()), high(-low);
+  double volumes[3] = {}, half_areas[2] = {};
+  glm::dvec3 moment(0);
+  for (const Axis axis : {Axis::kX, Axis::kY, Axis::kZ}) {
+    const AxisFrame frame(axis);
+    auto image = build_ldi(*snapped, raster_target(grid, axis), {}, execution, &lists.filter());
+    if (!image) return tl::unexpected(image.error());
+    double column_sum = 0;
+    for (int v = 0; v < image->height; ++v) {
+      for (int u = 0; u < image->width; ++u) {
+        const auto list = image->list(u, v);
+        result.result_crossings += list.size();
+        result.max_depth_complexity =
+            std::max<std::uint64_t>(result.max_depth_complexity, list.size());
+        double first_moment = 0, length = 0;
+        for (std::size_t i = 0; i < list.size(); ++i) {
+          const double depth = (list[i].depth() + 0.5) / kLatticeSteps;
+          const double sign = list[i].exit() ? 1.0 : -1.0;
+          length += sign * depth;
+          first_moment += sign * depth * depth / 2;
+          // A crossing stands for an area of cell / |n_axis|; weighted by n_axis^2 the three axes
+          // add up to the area itself.
+          const glm::uvec3& t = lists.soup().triangles[list[i].triangle()];
+          const glm::dvec3& a = lists.soup().positions[t.x];
+          const glm::dvec3 across =
+              glm::cross(lists.soup().positions[t.y] - a, lists.soup().positions[t.z] - a);
+          const double size = glm::length(across);
+          if (size > 0) half_areas[(u + v) % 2] += std::abs(across[frame.w]) / size;
+          double& low_w = low[frame.w];
+          double& high_w = high[frame.w];
+          low_w = std::min(low_w, depth);
+          high_w = std::max(high_w, depth);
+        }
+        if (list.empty()) continue;
+        column_sum += length;
+        moment[frame.w] += first_moment;
+      }
+    }
+    volumes[frame.w] = column_sum;
+    if (execution.progress) execution.progress((frame.w + 1) / 3.0);
+  }
+  const double cell = step * step, cube = cell * step;
+  const double volume = (volumes[0] + volumes[1] + volumes[2]) / 3;
+  result.empty = !(volume > 0);
+  if (result.empty) return result;
+  result.volume = volume * cube;
+  result.area = (half_areas[0] + half_areas[1]) * cell;
+  result.area_error = 3 * std::abs(half_areas[0] - half_areas[1]) * cell;
+  const auto [least, most] = std::minmax({volumes[0], volumes[1], volumes[2]});
+  result.volume_error = std::max(result.area * step, (most - least) * cube);
+  for (int i = 0; i < 3; ++i) {
+    result.centre[i] = grid.origin[i] + moment[i] / volumes[i] * step;
+    result.low[i] = grid.origin[i] + low[i] * step;
+    result.high[i] = grid.origin[i] + high[i] * step;
+  }
+  result.bounds_error = step;
+  return result;
+}
+
+}  // namespace strata::csg

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <memory>
+
+#include "core/depth_list.h"
+#include "hashbuffer/tile_builder.h"
+
+namespace strata {
+
+/// Makes other lists of the sorted lists of a tile before they are used: a Boolean tree makes the
+/// lists of its result of the lists of its solids. What comes out must be sorted as well.
+class TileListFilter {
+ public:
+  virtual ~TileListFilter() = default;
+
+  /// The scratch memory of one thread.
+  class Worker {
+   public:
+    virtual ~Worker() = default;
+    /// The filtered lists, as compressed rows; valid until the next call.
+    virtual TileLists<DepthItem> apply(const TileLists<DepthItem>& lists) = 0;
+  };
+  /// Threads may ask at once.
+  [[nodiscard]] virtual std::unique_ptr<Worker> worker() const = 0;
+};
+
+/// Calls body(item) for each crossing of pixel `pixel` of a tile, in order.
+template <class Body>
+void for_each_item(const TileLists<DepthItem>& lists, std::size_t pixel, Body&& body) {
+  if (lists.planes64 == nullptr) {
+    for (std::uint32_t i = lists.offsets[pixel]; i < lists.offsets[pixel + 1]; ++i) {
+      body(lists.keys[i]);
+    }
+    return;
+  }
+  const int row = static_cast<int>(pixel) / kTileSide;
+  if (row < lists.row_begin || row >= lists.row_end) return;
+  for (std::size_t age = 0; age < static_cast<std::size_t>(lists.ages); ++age) {
+    const std::uint64_t record = lists.planes64[age * kTilePixels + pixel];
+    if (record == 0) break;
+    body(tile_key<Record64>(record));
+  }
+}
+
+}  // namespace strata
