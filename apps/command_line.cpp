@@ -5,6 +5,7 @@
 #include <CLI/Formatter.hpp>
 
 #include "apps/commands.h"
+#include "apps/csg_options.h"
 #include "apps/option_values.h"
 
 namespace strata::apps {
@@ -17,6 +18,7 @@ constexpr const char* kTopHelp = R"(strata: triangle meshes to voxels, exactly a
   strata voxelize scan.ply -r 1024 --stats --json      only statistics, for a program to read
   strata info scan.ply                                 size, volume, closed or not and where
   strata ldi knot.obj -r 512 -o knot.exr               depth lists as a deep image
+  strata csg plate.csg -o plate.png                    a picture of a Boolean tree
 
 usage: strata COMMAND [OPTIONS] FILE...
 
@@ -24,6 +26,7 @@ commands:
   voxelize    meshes to a voxel grid, a file of it, or statistics
   info        what a mesh file holds: counts, bounds, area, volume, holes
   ldi         a mesh to a layered depth image
+  csg         a scene (.csg, .scad) or an expression over meshes to a picture
 
   strata COMMAND --help lists the options of a command.
   -h, --help      this text
@@ -69,6 +72,18 @@ constexpr const char* kLdiExamples =
   strata ldi knot.obj -r 512 --axis x -o knot.npz     arrays for NumPy
 )";
 
+constexpr const char* kCsgExamples =
+    R"(A picture of a Boolean tree: of a scene, of meshes united, of an expression over files.
+
+  strata csg plate.csg -o plate.png                      the whole scene, from OpenSCAD's place
+  strata csg part.scad -o part.png --size 1920,1080 --samples 16
+  strata csg plate.stl holes.stl --expr 'plate - holes' -o part.png
+  strata csg a.stl b.stl c.stl --expr '(a + b) * c' -o part.png     a, b, c: by position
+  strata csg part.csg -o part.png --camera=0,0,5,60,0,30,140 --projection o --cut 'y>0'
+
+In --expr, + and | unite, - takes away, * and & intersect and bind first, ^ is in one of the two.
+)";
+
 constexpr std::pair<std::string_view, InsideRule> kRules[] = {{"winding", InsideRule::kWinding},
                                                               {"nonzero", InsideRule::kNonzero},
                                                               {"parity", InsideRule::kParity}};
@@ -105,6 +120,7 @@ struct Words {
   std::string surface, rule = "winding", open = "vote", axis = "auto", store = "auto",
                        offsets = "plane-first";
   bool stats = false, checksum = false, dry_run = false, list_formats = false;
+  CsgWords csg;
 };
 
 void add_inputs(CLI::App& app, Words& words, bool several) {
@@ -237,6 +253,58 @@ void define_ldi(CLI::App& app, Words& words) {
       ->group("Input");
   add_grid(app, words);
   add_engine(app, words, "Of the rays: x, y or z (default)");
+  add_common(app, words);
+}
+
+void define_csg(CLI::App& app, Words& words) {
+  app.description(kCsgExamples);
+  CsgWords& csg = words.csg;
+  app.add_option("INPUT", words.files,
+                 "Scenes (.csg .scad), meshes (.obj .stl .ply .off); - a pipe")
+      ->type_name("");
+  const char* input = "Input";
+  const auto option = [&app](const char* names, std::string& word, const char* what,
+                             const char* type, const char* group) {
+    app.add_option(names, word, what)->type_name(type)->group(group);
+  };
+  option("--expr", csg.expression, "What is pictured, such as 'a - b'; else all inputs united",
+         "EXPR", input);
+  option("--input-format", words.input_format, "csg, obj, stl, ply or off, whatever the name is",
+         "FORMAT", input);
+  option("--assets", csg.assets, "Where scenes look for files; else beside the scene", "FOLDER",
+         input);
+  option("--scad-timeout", csg.scad_timeout, "Seconds that openscad may take for a .scad; 300", "S",
+         input);
+  option("--rule", words.rule, "Inside of meshes: winding (> 0, default), nonzero, parity (odd)",
+         "RULE", input);
+  app.add_flag("--keep-orientation", words.keep_orientation,
+               "Do not turn meshes around that are inside out")
+      ->group(input);
+  const char* output = "Output";
+  option("-o,--output", words.output, "Picture to write, .png; - for standard output", "FILE",
+         output);
+  option("--ids", csg.ids, "Which solid each pixel shows, as colours, .png", "FILE", output);
+  option("--depth", csg.depth, "Distance along the view, .exr, channel Z", "FILE", output);
+  add_json(app, words, output);
+  const char* camera = "Camera (default: all in view from OpenSCAD's place)";
+  option("--size,--imgsize", csg.size, "width,height in pixels; 512,512", "W,H", camera);
+  option("--camera", csg.camera, "x,y,z,rx,ry,rz,distance or eye x,y,z, target x,y,z", "NUMBERS",
+         camera);
+  app.add_flag("--view-all,--viewall", csg.view_all, "From so far that all is seen")->group(camera);
+  app.add_flag("--auto-center,--autocenter", csg.auto_centre, "Look at the middle of it all")
+      ->group(camera);
+  option("--projection", csg.projection, "p(erspective, default) or o(rtho)", "P", camera);
+  const char* look = "Look";
+  option("--colorscheme", csg.scheme, "Cornfield (default) or another of OpenSCAD's", "NAME", look);
+  option("--samples", csg.samples, "Samples a pixel: 1 (default), 2, 4 ... 64", "N", look);
+  app.add_flag("--edges", csg.edges, "Dark lines along the edges of faces")->group(look);
+  app.add_flag("--transparent", csg.transparent, "Background without colour")->group(look);
+  app.add_option("--cut", csg.cuts,
+                 "Section: x=5 (cuts what is nearer), z<10 (what stays) or nx,ny,nz,d")
+      ->type_name("PLANE")
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
+      ->group(look);
   add_common(app, words);
 }
 
@@ -406,6 +474,23 @@ LdiCommand ldi_command(const Words& words, Reader& reader) {
   return command;
 }
 
+CsgCommand csg_command(Words words, Reader& reader) {
+  CsgCommand command;
+  command.common = common_options(words, reader);
+  command.scene_format = words.input_format == "csg";
+  if (command.scene_format) words.input_format = "auto";
+  command.input = input_options(words, reader);
+  reader.take(parse_choice("--rule", words.rule, kRules), command.rule);
+  command.keep_orientation = words.keep_orientation;
+  command.output = words.output;
+  if (!words.json.empty()) command.json = words.json;
+  if (reader.error()) return command;
+  if (auto read = read_csg_options(words.csg, command); !read) {
+    reader.fail_with(read.error().message);
+  }
+  return command;
+}
+
 ParseOutcome usage_error(std::string_view command, std::string_view message) {
   return {fmt::format("strata: error: {}\nstrata: see strata {}{}--help\n", message, command,
                       command.empty() ? "" : " "),
@@ -433,6 +518,8 @@ Command parse_command_line(int argc, const char* const* argv) {
     define_info(app, words);
   } else if (name == "ldi") {
     define_ldi(app, words);
+  } else if (name == "csg") {
+    define_csg(app, words);
   } else {
     return usage_error("", name.starts_with('-')
                                ? fmt::format("no such option: {}; the command comes first", name)
@@ -453,6 +540,7 @@ Command parse_command_line(int argc, const char* const* argv) {
   if (name == "voxelize") command = voxelize_command(words, reader);
   if (name == "info") command = info_command(words, reader);
   if (name == "ldi") command = ldi_command(words, reader);
+  if (name == "csg") command = csg_command(words, reader);
   if (reader.error()) return usage_error(name, reader.error()->message);
   return command;
 }

@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "core/progress.h"
+#include "csg/picture.h"
+#include "csg/scene/scene.h"
 #include "hashbuffer/offsets.h"
 #include "hashbuffer/tile_builder.h"
 #include "mesh/read_mesh.h"
@@ -73,6 +75,31 @@ struct LdiCommand {
   bool keep_orientation = false;
 };
 
+/// A section: points p with dot(normal, p) > offset are cut away.
+struct SectionPlane {
+  glm::dvec3 normal{0.0};  ///< of length 1
+  double offset = 0;
+  bool towards_eye = false;  ///< turned so that the side the eye is on is cut away
+};
+
+/// `strata csg`
+struct CsgCommand {
+  CommonOptions common;
+  InputOptions input;
+  bool scene_format = false;  ///< inputs are .csg, whatever their names are
+  InsideRule rule = InsideRule::kWinding;
+  bool keep_orientation = false;
+  csg::ReadSceneOptions scene;
+  std::string expression;          ///< over the inputs; empty: their union
+  std::string output, ids, depth;  ///< files; empty: none, output "-": standard output
+  glm::ivec2 size{512};
+  csg::Camera camera;
+  bool view_all = false, auto_centre = false;
+  csg::PictureOptions picture;
+  std::vector<SectionPlane> cuts;
+  std::optional<std::string> json;  ///< "-": standard output
+};
+
 /// Text to print and an exit code: help, version, mistakes in the command line.
 struct ParseOutcome {
   std::string text;
@@ -80,7 +107,7 @@ struct ParseOutcome {
   int exit_code = 0;
 };
 
-using Command = std::variant<ParseOutcome, VoxelizeCommand, InfoCommand, LdiCommand>;
+using Command = std::variant<ParseOutcome, VoxelizeCommand, InfoCommand, LdiCommand, CsgCommand>;
 
 /// Reads the command line.
 Command parse_command_line(int argc, const char* const* argv);
@@ -89,5 +116,6 @@ class Session;
 Result<void> run_voxelize(const VoxelizeCommand& command, Session& session);
 Result<void> run_info(const InfoCommand& command, Session& session);
 Result<void> run_ldi(const LdiCommand& command, Session& session);
+Result<void> run_csg(const CsgCommand& command, Session& session);
 
 }  // namespace strata::apps

@@ -65,6 +65,8 @@ Result<void> run(const AnyCommand& command, Session& session) {
       return run_voxelize(command, session);
     } else if constexpr (std::is_same_v<AnyCommand, InfoCommand>) {
       return run_info(command, session);
+    } else if constexpr (std::is_same_v<AnyCommand, CsgCommand>) {
+      return run_csg(command, session);
     } else {
       return run_ldi(command, session);
     }
@@ -103,6 +105,8 @@ int strata_main(int argc, char** argv) {
     result = run(*info, session);
   } else if (const auto* ldi = std::get_if<LdiCommand>(&command)) {
     result = run(*ldi, session);
+  } else if (const auto* csg = std::get_if<CsgCommand>(&command)) {
+    result = run(*csg, session);
   }
   session.end_progress();
   const int code = exit_code(result, session);

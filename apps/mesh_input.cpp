@@ -137,19 +137,31 @@ Result<MeshFile> read_input(const std::string& path, const InputOptions& input, 
   return read_mesh(path, options, execution);
 }
 
+Result<InputFacts> load_mesh(const std::string& path, const InputOptions& input,
+                             const MeshInputRules& rules, Session& session, TriangleSoup& soup,
+                             double* read_ms) {
+  const double start = session.milliseconds();
+  auto file = read_input(path, input, session);
+  if (!file) return tl::unexpected(file.error());
+  if (read_ms != nullptr) *read_ms += session.milliseconds() - start;
+  soup = std::move(file->soup);
+  auto facts = inspect(soup, std::move(file->stats), path, rules, session);
+  if (!facts) return facts;
+  session.note(fmt::format("{}: {}, {}", path, counted(facts->stats.triangles, "triangle"),
+                           facts->closed ? "closed" : "open"));
+  return facts;
+}
+
 Result<MeshInput> load_meshes(const InputOptions& input, const MeshInputRules& rules,
                               Session& session) {
   MeshInput all;
   for (const std::string& path : input.files) {
     const double start = session.milliseconds();
-    auto file = read_input(path, input, session);
-    if (!file) return tl::unexpected(file.error());
-    const double read = session.milliseconds();
-    all.read_ms += read - start;
-    auto facts = inspect(file->soup, std::move(file->stats), path, rules, session);
+    TriangleSoup soup;
+    double read_ms = 0;
+    auto facts = load_mesh(path, input, rules, session, soup, &read_ms);
     if (!facts) return tl::unexpected(facts.error());
-    session.note(fmt::format("{}: {}, {}", path, counted(facts->stats.triangles, "triangle"),
-                             facts->closed ? "closed" : "open"));
+    all.read_ms += read_ms;
     all.closed = all.closed && facts->closed;
     all.area += facts->area;
     all.volume += facts->volume;
@@ -157,15 +169,15 @@ Result<MeshInput> load_meshes(const InputOptions& input, const MeshInputRules& r
     all.bounds.high = glm::max(all.bounds.high, facts->bounds.high);
     all.files.push_back(*std::move(facts));
     if (all.files.size() == 1) {
-      all.soup = std::move(file->soup);
+      all.soup = std::move(soup);
     } else {
-      if (all.soup.positions.size() + file->soup.positions.size() > 0xfffffffeu) {
+      if (all.soup.positions.size() + soup.positions.size() > 0xfffffffeu) {
         return fail(ErrorCode::kLimit, "{}: with it the inputs have more than 2^32 - 2 vertices",
                     path);
       }
-      append(all.soup, file->soup);
+      append(all.soup, soup);
     }
-    all.diagnose_ms += session.milliseconds() - read;
+    all.diagnose_ms += session.milliseconds() - start - read_ms;
   }
   return all;
 }

@@ -46,6 +46,12 @@ struct MeshInputRules {
 Result<MeshInput> load_meshes(const InputOptions& input, const MeshInputRules& rules,
                               Session& session);
 
+/// One of those files by itself: its triangles go to `soup`. With `read_ms` the time it took to
+/// read is added there.
+Result<InputFacts> load_mesh(const std::string& path, const InputOptions& input,
+                             const MeshInputRules& rules, Session& session, TriangleSoup& soup,
+                             double* read_ms = nullptr);
+
 /// One file, read as the options say.
 Result<MeshFile> read_input(const std::string& path, const InputOptions& input, Session& session);
 

@@ -1,0 +1,163 @@
+#include "apps/csg_options.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "apps/option_values.h"
+
+namespace strata::apps {
+namespace {
+
+constexpr std::pair<std::string_view, csg::Projection> kProjections[] = {
+    {"p", csg::Projection::kPerspective},
+    {"perspective", csg::Projection::kPerspective},
+    {"o", csg::Projection::kOrthographic},
+    {"ortho", csg::Projection::kOrthographic},
+    {"orthogonal", csg::Projection::kOrthographic},
+    {"orthographic", csg::Projection::kOrthographic}};
+
+/// `512,512`, and `512x512` as people write it.
+Result<glm::ivec2> parse_size(std::string_view text) {
+  const std::size_t mark = text.find_first_of(",x");
+  if (mark == std::string_view::npos) {
+    return fail(ErrorCode::kUsage, "--size takes width,height, not '{}'", text);
+  }
+  const auto width = parse_integer("--size", text.substr(0, mark));
+  if (!width) return tl::unexpected(width.error());
+  const auto height = parse_integer("--size", text.substr(mark + 1));
+  if (!height) return tl::unexpected(height.error());
+  if (*width < 1 || *height < 1 || *width > csg::kMaxPictureSide ||
+      *height > csg::kMaxPictureSide) {
+    return fail(ErrorCode::kUsage, "--size {}: each side is 1 to {} pixels", text,
+                csg::kMaxPictureSide);
+  }
+  return glm::ivec2(*width, *height);
+}
+
+Result<const csg::ColourScheme*> parse_scheme(std::string_view text) {
+  const csg::ColourScheme* scheme = csg::find_colour_scheme(text);
+  if (scheme != nullptr) return scheme;
+  std::vector<std::string_view> names;
+  for (const csg::ColourScheme& one : csg::colour_schemes()) names.push_back(one.name);
+  return no_such_choice("--colorscheme", text, names);
+}
+
+Result<int> parse_samples(std::string_view text) {
+  const auto count = parse_integer("--samples", text);
+  if (!count) return tl::unexpected(count.error());
+  if (*count < 1 || *count > 64 || !std::has_single_bit(static_cast<std::uint64_t>(*count))) {
+    return fail(ErrorCode::kUsage, "--samples is 1, 2, 4, 8, 16, 32 or 64, not '{}'", text);
+  }
+  return static_cast<int>(*count);
+}
+
+}  // namespace
+
+Result<csg::Camera> parse_camera(std::string_view text) {
+  const auto numbers = parse_numbers("--camera", text, 6, 7);
+  if (!numbers) return tl::unexpected(numbers.error());
+  const auto& n = *numbers;
+  const glm::dvec3 first(n[0], n[1], n[2]), second(n[3], n[4], n[5]);
+  if (n.size() == 6) {
+    if (first == second) {
+      return fail(ErrorCode::kUsage, "--camera {}: the eye is where it looks at", text);
+    }
+    return csg::look_at(first, second);
+  }
+  csg::Camera camera;
+  camera.target = first;
+  camera.rotation = second;
+  camera.distance = n[6];
+  return camera;
+}
+
+Result<SectionPlane> parse_section(std::string_view text) {
+  SectionPlane plane;
+  const std::size_t axis =
+      text.empty() ? std::string_view::npos : std::string_view("xyz").find(text[0]);
+  if (axis != std::string_view::npos && text.size() > 2 &&
+      std::string_view("=<>").find(text[1]) != std::string_view::npos) {
+    const auto at = parse_numbers("--cut", text.substr(2), 1, 1);
+    if (!at) return tl::unexpected(at.error());
+    plane.normal[static_cast<int>(axis)] = text[1] == '>' ? -1.0 : 1.0;
+    plane.offset = text[1] == '>' ? -at->front() : at->front();
+    plane.towards_eye = text[1] == '=';
+    return plane;
+  }
+  if (text.find(',') == std::string_view::npos) {
+    return fail(ErrorCode::kUsage, "--cut takes a plane such as x=5, z<10 or nx,ny,nz,d, not '{}'",
+                text);
+  }
+  const auto numbers = parse_numbers("--cut", text, 4, 4);
+  if (!numbers) return tl::unexpected(numbers.error());
+  const auto& n = *numbers;
+  plane.normal = {n[0], n[1], n[2]};
+  const double length = glm::length(plane.normal);
+  if (!(length > 0) || !std::isfinite(length)) {
+    return fail(ErrorCode::kUsage, "--cut {}: the plane's normal has no direction", text);
+  }
+  plane.normal /= length;
+  plane.offset = n[3] / length;
+  return plane;
+}
+
+Result<void> read_csg_options(const CsgWords& words, CsgCommand& command) {
+  std::optional<Error> error;
+  const auto take = [&error](auto value, auto& target) {
+    if (value) {
+      target = *std::move(value);
+    } else if (!error) {
+      error = std::move(value.error());
+    }
+  };
+  command.expression = words.expression;
+  if (!words.size.empty()) take(parse_size(words.size), command.size);
+  command.view_all = words.view_all;
+  command.auto_centre = words.auto_centre;
+  if (words.camera.empty()) {
+    command.view_all = command.auto_centre = true;
+  } else {
+    take(parse_camera(words.camera), command.camera);
+  }
+  if (!words.projection.empty()) {
+    take(parse_choice("--projection", words.projection, kProjections), command.camera.projection);
+  }
+  if (!words.scheme.empty()) take(parse_scheme(words.scheme), command.picture.scheme);
+  if (!words.samples.empty()) take(parse_samples(words.samples), command.picture.samples);
+  command.picture.edges = words.edges;
+  command.picture.transparent_background = words.transparent;
+  for (const std::string& cut : words.cuts) {
+    take(parse_section(cut), command.cuts.emplace_back());
+  }
+  command.ids = words.ids;
+  command.depth = words.depth;
+  command.scene.asset_folder = words.assets;
+  if (!words.scad_timeout.empty()) {
+    std::vector<double> seconds{300};
+    take(parse_numbers("--scad-timeout", words.scad_timeout, 1, 1), seconds);
+    command.scene.scad_timeout_s = seconds.front();
+    if (!(seconds.front() > 0) && !error) {
+      error = Error{ErrorCode::kUsage, "--scad-timeout takes seconds above 0"};
+    }
+  }
+  if (error) return tl::unexpected(*error);
+  if (command.input.files.empty()) {
+    return fail(ErrorCode::kUsage, "no scene and no mesh file is given");
+  }
+  if (command.output.empty() && command.ids.empty() && command.depth.empty() && !command.json) {
+    return fail(ErrorCode::kUsage, "nothing to do: give -o FILE.png, --ids, --depth or --json");
+  }
+  if (!command.output.empty() && command.output != "-" && !command.output.ends_with(".png") &&
+      !command.output.ends_with(".PNG") && !command.output.starts_with("/dev/")) {
+    return fail(ErrorCode::kUsage, "{}: pictures are written as .png", command.output);
+  }
+  if (!(command.camera.distance > 0) && !command.view_all) {
+    return fail(ErrorCode::kUsage, "--camera {}: the distance must be above 0, or give --view-all",
+                words.camera);
+  }
+  return {};
+}
+
+}  // namespace strata::apps

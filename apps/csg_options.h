@@ -1,0 +1,31 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "apps/commands.h"
+#include "core/result.h"
+
+namespace strata::apps {
+
+/// The options of `strata csg` as words. Empty: not given.
+struct CsgWords {
+  std::string expression, size, camera, projection, scheme, samples, ids, depth, scad_timeout,
+      assets;
+  std::vector<std::string> cuts;
+  bool view_all = false, auto_centre = false, edges = false, transparent = false;
+};
+
+/// Reads the words into `command`, whose common part, inputs, output and report are set.
+/// @return kUsage
+Result<void> read_csg_options(const CsgWords& words, CsgCommand& command);
+
+/// A camera as OpenSCAD's --camera has it: seven numbers, target, rotation and distance, or six,
+/// eye and target. @return kUsage
+Result<csg::Camera> parse_camera(std::string_view text);
+
+/// A section plane: `x=5`, `z<10`, `y>0` or `nx,ny,nz,d`. @return kUsage
+Result<SectionPlane> parse_section(std::string_view text);
+
+}  // namespace strata::apps

@@ -1,0 +1,216 @@
+#include "apps/csg_scene.h"
+
+#include <algorithm>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <memory>
+#include <utility>
+
+#include "apps/expression.h"
+#include "apps/mesh_input.h"
+#include "mesh/shapes.h"
+
+namespace strata::apps {
+namespace {
+
+using csg::Operation;
+using csg::Tree;
+
+/// An input that is used more than once is copied, for a node stands in one place only.
+constexpr std::size_t kMaxNodes = std::size_t{1} << 24;
+
+bool is_scene(const std::string& path, const CsgCommand& command) {
+  if (command.scene_format) return true;
+  if (command.input.format != MeshFormat::kAuto) return false;
+  for (const char* end : {".csg", ".scad", ".CSG", ".SCAD"}) {
+    if (path.ends_with(end)) return true;
+  }
+  return false;
+}
+
+Result<csg::Scene> load_one(const std::string& path, const CsgCommand& command, Session& session) {
+  if (is_scene(path, command)) {
+    const Execution execution = session.execution("reading");
+    return csg::read_scene(path, command.scene, execution);
+  }
+  csg::Scene scene;
+  TriangleSoup soup;
+  auto facts = load_mesh(path, command.input,
+                         {.keep_orientation = command.keep_orientation, .rule = command.rule},
+                         session, soup);
+  if (!facts) return tl::unexpected(facts.error());
+  csg::Solid solid;
+  solid.mesh = std::make_shared<const TriangleSoup>(std::move(soup));
+  solid.rule = command.rule;
+  solid.name = path;
+  scene.tree.set_root(scene.tree.add_solid(std::move(solid)));
+  return scene;
+}
+
+/// Adds all of a scene to another one. Gives the root.
+Tree::NodeId add_scene(csg::Scene& all, const csg::Scene& part, bool with_ghosts) {
+  std::vector<Tree::NodeId> renumbered(part.tree.nodes().size());
+  std::vector<Tree::NodeId> operands;
+  for (Tree::NodeId id = 0; id < renumbered.size(); ++id) {
+    const Tree::Node& node = part.tree.nodes()[id];
+    if (node.operation == Operation::kSolid) {
+      renumbered[id] = all.tree.add_solid(part.tree.solids()[node.first]);
+      continue;
+    }
+    operands.clear();
+    for (const Tree::NodeId operand : part.tree.operands(id)) {
+      operands.push_back(renumbered[operand]);
+    }
+    renumbered[id] = all.tree.add(node.operation, operands);
+  }
+  if (with_ghosts) {
+    for (const Tree::NodeId ghost : part.backgrounds) all.backgrounds.push_back(renumbered[ghost]);
+    for (const Tree::NodeId ghost : part.highlights) all.highlights.push_back(renumbered[ghost]);
+  }
+  if (part.tree.root() == Tree::kNone) return all.tree.add(Operation::kUnion, {});
+  return renumbered[part.tree.root()];
+}
+
+/// Builds an expression over inputs.
+class Builder {
+ public:
+  Builder(const Expression& expression, const std::vector<csg::Scene>& inputs)
+      : expression_(expression), inputs_(inputs), used_(inputs.size(), false) {}
+
+  Result<csg::Scene> run() {
+    // Nodes of the tree that each node of the expression will take.
+    std::vector<double> sizes(expression_.nodes.size());
+    for (std::size_t i = 0; i < sizes.size(); ++i) {
+      const Expression::Node& node = expression_.nodes[i];
+      const double both = node.kind == Expression::Kind::kInput
+                              ? static_cast<double>(inputs_[node.input].tree.nodes().size()) + 1
+                              : sizes[node.first] + sizes[node.second] + 1;
+      sizes[i] = node.kind == Expression::Kind::kExclusive ? 2 * both : both;
+    }
+    if (sizes.back() > kMaxNodes) {
+      return fail(ErrorCode::kLimit, "--expr: the tree has {:.3g} nodes, {} can be had",
+                  sizes.back(), kMaxNodes);
+    }
+    for (const csg::Scene& input : inputs_) {
+      all_.relative_precision = std::max(all_.relative_precision, input.relative_precision);
+    }
+    all_.tree.set_root(build(expression_.nodes.size() - 1));
+    return std::move(all_);
+  }
+
+ private:
+  // As deep as the parser allows.
+  Tree::NodeId build(std::size_t at) {
+    const Expression::Node& node = expression_.nodes[at];
+    switch (node.kind) {
+      case Expression::Kind::kInput: {
+        const bool first = !used_[node.input];
+        used_[node.input] = true;
+        return add_scene(all_, inputs_[node.input], first);
+      }
+      case Expression::Kind::kExclusive: {
+        const Tree::NodeId left = build_pair(node, Operation::kDifference, false);
+        const Tree::NodeId right = build_pair(node, Operation::kDifference, true);
+        return all_.tree.add(Operation::kUnion, {left, right});
+      }
+      case Expression::Kind::kUnion:
+        return build_pair(node, Operation::kUnion, false);
+      case Expression::Kind::kIntersection:
+        return build_pair(node, Operation::kIntersection, false);
+      case Expression::Kind::kDifference:
+        break;
+    }
+    return build_pair(node, Operation::kDifference, false);
+  }
+  Tree::NodeId build_pair(const Expression::Node& node, Operation operation, bool swapped) {
+    const Tree::NodeId first = build(swapped ? node.second : node.first);
+    const Tree::NodeId second = build(swapped ? node.first : node.second);
+    return all_.tree.add(operation, {first, second});
+  }
+
+  const Expression& expression_;
+  const std::vector<csg::Scene>& inputs_;
+  std::vector<bool> used_;
+  csg::Scene all_;
+};
+
+/// The box [0, size] turned so that z points along `normal`, its bottom at the plane.
+std::shared_ptr<const TriangleSoup> half_space(const glm::dvec3& normal, double offset,
+                                               const glm::dvec3& centre, double radius) {
+  const glm::dvec3 other = std::abs(normal.z) > 0.9 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 0, 1);
+  const glm::dvec3 u = glm::normalize(glm::cross(other, normal)), v = glm::cross(normal, u);
+  const glm::dvec3 foot = centre + normal * (offset - glm::dot(normal, centre));
+  const glm::dmat4 place(glm::dvec4(u, 0), glm::dvec4(v, 0), glm::dvec4(normal, 0),
+                         glm::dvec4(foot, 1));
+  const TriangleSoup box =
+      make_box(glm::dvec3(-radius, -radius, 0), glm::dvec3(radius, radius, 2 * radius));
+  return std::make_shared<const TriangleSoup>(transform(box, place));
+}
+
+}  // namespace
+
+Result<csg::Scene> load_scene(const CsgCommand& command, Session& session) {
+  const std::vector<std::string>& files = command.input.files;
+  Expression expression;
+  if (!command.expression.empty()) {
+    auto parsed = parse_expression(command.expression, files);
+    if (!parsed) return tl::unexpected(parsed.error());
+    expression = *std::move(parsed);
+  }
+  std::vector<csg::Scene> inputs;
+  for (const std::string& path : files) {
+    auto scene = load_one(path, command, session);
+    if (!scene) return tl::unexpected(scene.error());
+    for (const csg::SceneWarning& warning : scene->warnings) {
+      session.warn(warning.code, warning.message);
+    }
+    inputs.push_back(*std::move(scene));
+  }
+  if (!command.expression.empty()) return Builder(expression, inputs).run();
+  if (inputs.size() == 1) return std::move(inputs.front());
+  csg::Scene all;
+  std::vector<Tree::NodeId> roots;
+  for (const csg::Scene& input : inputs) {
+    roots.push_back(add_scene(all, input, true));
+    all.relative_precision = std::max(all.relative_precision, input.relative_precision);
+  }
+  all.tree.set_root(all.tree.add(Operation::kUnion, roots));
+  return all;
+}
+
+void cut_scene(csg::Scene& scene, const std::vector<SectionPlane>& cuts,
+               const csg::Camera& camera) {
+  Bounds box;
+  for (const csg::Solid& solid : scene.tree.solids()) {
+    const Bounds one = csg::bounds(solid);
+    if (one.empty()) continue;
+    box.low = glm::min(box.low, one.low);
+    box.high = glm::max(box.high, one.high);
+  }
+  if (box.empty()) return;
+  const glm::dvec3 centre = 0.5 * box.low + 0.5 * box.high;
+  const glm::dvec3 to_eye =
+      glm::transpose(glm::dmat3(csg::eye_from_world(camera))) * glm::dvec3(0, 0, 1);
+  for (std::size_t i = 0; i < cuts.size(); ++i) {
+    glm::dvec3 normal = cuts[i].normal;
+    double offset = cuts[i].offset;
+    if (cuts[i].towards_eye && glm::dot(normal, to_eye) < 0) normal = -normal, offset = -offset;
+    // A little more than all solids reach, so that no other face of it touches them.
+    const double radius = glm::length(box.high - box.low) * 0.55 + 1e-9;
+    const double above = offset - glm::dot(normal, centre);
+    if (above > radius) continue;  // beyond all solids
+    const auto mesh = half_space(normal, offset, centre, radius + std::max(0.0, -above));
+    const auto cut = [&](Tree::NodeId node) {
+      csg::Solid solid;
+      solid.mesh = mesh;
+      solid.name = fmt::format("section {}", i + 1);
+      const Tree::NodeId half = scene.tree.add_solid(std::move(solid));
+      return scene.tree.add(Operation::kDifference, {node, half});
+    };
+    if (scene.tree.root() != Tree::kNone) scene.tree.set_root(cut(scene.tree.root()));
+    for (Tree::NodeId& ghost : scene.backgrounds) ghost = cut(ghost);
+    for (Tree::NodeId& ghost : scene.highlights) ghost = cut(ghost);
+  }
+}
+
+}  // namespace strata::apps
