@@ -8,34 +8,41 @@ namespace strata::csg {
 
 Coincidence::Coincidence(const View& view, double world_error) {
   constexpr double kPixelPart = 0.1;
-  // Length of a pixel in the world is 1 / scale, times the distance in a perspective view.
   const glm::dmat4 image_from_eye = view.image_from_world * glm::inverse(view.eye_from_world);
-  const double scale = std::abs(image_from_eye[1][1]);
+  const double scale = std::abs(image_from_eye[1][1]);  // pixels a world unit (at distance 1)
   if (view.perspective) {
     const double difference = 1.0 / view.near - 1.0 / view.far;
     a_ = 1.0 / view.near;
     b_ = difference / kPictureDepthLimit;
     const double steps = kPictureDepthLimit / difference;  // d(depth) = steps * d(1 / distance)
     flat_ = steps * world_error;
-    pixel_ = steps * kPixelPart / scale;
+    // A pixel is distance / scale wide: steps / (scale * distance) depth steps, least far away.
+    steep_from_ = 2.0 * kPixelPart * steps / (scale * view.far);
   } else {
     const double steps = kPictureDepthLimit / (view.far - view.near);
     flat_ = steps * world_error;
-    pixel_ = steps * kPixelPart / scale;
+    steep_from_ = 2.0 * kPixelPart * steps / scale;
   }
 }
 
-double Coincidence::error(const TriangleSetup& t, std::uint32_t depth) const {
-  const double nearness = a_ - b_ * depth;
-  const double slopes =
-      static_cast<double>(std::abs(t.slope_u) + std::abs(t.slope_v)) / static_cast<double>(t.area);
-  return std::min(1.5 + flat_ * nearness * nearness + 0.5 * slopes, largest(depth));
+Coincidence::Bound Coincidence::bound(const LatticeMesh& mesh, std::uint32_t triangle,
+                                      std::uint32_t depth) const {
+  const glm::uvec3& t = mesh.triangles[triangle];
+  const glm::ivec3 &p = mesh.vertices[t.x], &q = mesh.vertices[t.y], &r = mesh.vertices[t.z];
+  TriangleSetup setup;
+  if (!setup_triangle(p, q, r, AxisFrame(Axis::kZ), setup)) return {};
+  const double slopes = 0.5 * setup.steepness();
+  const auto [low, high] = std::minmax({p.z, q.z, r.z});
+  const double least = flat(depth), at = depth;
+  return {least + std::min(slopes, std::max(0.0, at - low)),
+          least + std::min(slopes, std::max(0.0, high - at))};
 }
 
 Coincidence::Range Coincidence::range() const {
   constexpr double kMore = 2.0 * 1.01;
-  return {static_cast<float>(a_), static_cast<float>(b_), static_cast<float>(kMore * 1.5 + 1.0),
-          static_cast<float>(kMore * pixel_), static_cast<float>(kMore * flat_)};
+  return {static_cast<float>(a_), static_cast<float>(b_),
+          static_cast<float>(kMore * (1.5 + 0.5 * steep_from_) + 1.0),
+          static_cast<float>(kMore * flat_)};
 }
 
 }  // namespace strata::csg

@@ -301,23 +301,29 @@ void TileFinder::make(LeafLayers& leaf) {
     }
     triangles = std::span(all_triangles_).first(part.mesh.triangles.size());
   }
-  fragments_ += raster_layers(part.mesh, target_, triangles, clip, leaf, arena_);
+  fragments_ +=
+      raster_layers(part.mesh, target_, triangles, clip, coincidence_->steep_from(), leaf, arena_);
   if (!leaf.keys.empty()) normalize_layers(leaf, part.cut, *this);
 }
 
 void TileFinder::normalize_pixel(LeafLayers& leaf, std::size_t at) {
   crossings_.clear();
+  bool steep = false;
   for (std::size_t k = 0; k < leaf.keys.size() && leaf.keys[k][at] != LeafLayers::kEmpty; ++k) {
-    const std::uint32_t key = leaf.keys[k][at];
-    crossings_.emplace_back(key >> 1, (key & 1) != 0, leaf.triangles[k][at]);
+    const std::uint32_t key = leaf.keys[k][at], triangle = leaf.triangles[k][at];
+    steep = steep || (triangle & LeafLayers::kSteep) != 0;
+    crossings_.emplace_back(key >> 1, (key & 1) != 0, triangle & ~LeafLayers::kSteep);
     leaf.keys[k][at] = leaf.triangles[k][at] = LeafLayers::kEmpty;
   }
-  std::vector<Flip> flips;
-  flips_of(crossings_, leaf.solid, parts_[leaf.solid].rule, view_parts_[leaf.solid].cut, flips);
-  while (leaf.keys.size() < flips.size()) leaf.add_layer(arena_);
-  for (std::size_t k = 0; k < flips.size(); ++k) {
-    leaf.keys[k][at] = flips[k].depth;
-    leaf.triangles[k][at] = flips[k].triangle;
+  // The keys' order is that of marked triangles.
+  std::sort(crossings_.begin(), crossings_.end());
+  leaf_flips_.clear();
+  flips_of(crossings_, leaf.solid, parts_[leaf.solid].rule, view_parts_[leaf.solid].cut,
+           leaf_flips_);
+  while (leaf.keys.size() < leaf_flips_.size()) leaf.add_layer(arena_);
+  for (std::size_t k = 0; k < leaf_flips_.size(); ++k) {
+    leaf.keys[k][at] = leaf_flips_[k].depth;
+    leaf.triangles[k][at] = leaf_flips_[k].triangle | (steep ? LeafLayers::kSteep : 0);
   }
 }
 
@@ -331,17 +337,14 @@ Surface TileFinder::resolve(const TileProgram& program, int u, int v) {
     const auto at = static_cast<std::size_t>((v - leaf.rect.v0) * leaf.stride + (u - leaf.rect.u0));
     for (std::size_t k = 0; k < leaf.keys.size(); ++k) {
       if (leaf.keys[k][at] == LeafLayers::kEmpty) break;
-      flips_.push_back({leaf.keys[k][at], leaf.solid, leaf.triangles[k][at], (k & 1) != 0});
+      std::uint32_t triangle = leaf.triangles[k][at];
+      if (triangle != Surface::kNone) triangle &= ~LeafLayers::kSteep;
+      flips_.push_back({leaf.keys[k][at], leaf.solid, triangle, (k & 1) != 0});
     }
   }
-  return finder_.find(flips_, *coincidence_, [&](const Flip& flip) {
-    if (flip.triangle == Surface::kNone) return 0.0;
-    const LatticeMesh& mesh = view_parts_[flip.solid].mesh;
-    const glm::uvec3& t = mesh.triangles[flip.triangle];
-    TriangleSetup setup;
-    setup_triangle(mesh.vertices[t.x], mesh.vertices[t.y], mesh.vertices[t.z], AxisFrame(Axis::kZ),
-                   setup);
-    return coincidence_->error(setup, flip.depth);
+  return finder_.find(flips_, [&](const Flip& flip) {
+    if (flip.triangle == Surface::kNone) return Coincidence::Bound{};
+    return coincidence_->bound(view_parts_[flip.solid].mesh, flip.triangle, flip.depth);
   });
 }
 

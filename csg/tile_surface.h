@@ -38,6 +38,8 @@ class Arena {
 /// crossing of each pixel, and after normalizing the k-th flip (even: enters, odd: leaves).
 struct LeafLayers {
   static constexpr std::uint32_t kEmpty = 0xffffffffu;
+  /// Marks triangles beyond Coincidence::steep_from().
+  static constexpr std::uint32_t kSteep = 0x80000000u;
   static constexpr int kLanes = 16;  ///< columns begin and end at multiples of this
 
   PixelRect rect;     ///< of the picture; u0 is a multiple of kLanes away from the tile's edge
@@ -47,7 +49,7 @@ struct LeafLayers {
   std::uint32_t nearest = 0, farthest = 0;  ///< bounds of its depths
   /// While rasterizing depth << 1 | exit, then depths of flips. kEmpty where there is none.
   std::vector<std::uint32_t*> keys;
-  std::vector<std::uint32_t*> triangles;
+  std::vector<std::uint32_t*> triangles;  ///< [steep:1 | triangle:31]
 
   [[nodiscard]] std::size_t words() const {  // vectors may reach beyond the last row
     return static_cast<std::size_t>((rect.v1 - rect.v0 + 4) * stride + 2 * kLanes);
@@ -145,7 +147,7 @@ class TileFinder {
   SurfaceFinder finder_;
   std::vector<std::uint32_t> present_, all_triangles_;
   std::vector<std::uint64_t> doubtful_;
-  std::vector<Flip> flips_;
+  std::vector<Flip> flips_, leaf_flips_;
   std::vector<DepthItem> crossings_;
   PixelRect tile_;
   std::uint64_t fragments_ = 0, resolved_ = 0;
@@ -157,7 +159,7 @@ class TileFinder {
 /// their number.
 std::uint64_t raster_layers(const LatticeMesh& mesh, const RasterTarget& target,
                             std::span<const std::uint32_t> triangles, const PixelRect& clip,
-                            LeafLayers& leaf, Arena& arena);
+                            double steep_from, LeafLayers& leaf, Arena& arena);
 /// Turns crossings into flips; pixels that are not plain pairs go through finder.normalize_pixel().
 void normalize_layers(LeafLayers& leaf, bool all_pixels_special, TileFinder& finder);
 

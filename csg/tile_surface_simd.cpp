@@ -31,10 +31,14 @@ HWY_INLINE M no_lane(D d) { return hn::Ne(hn::Zero(d), hn::Zero(d)); }
 /// Inserts crossings into a leaf's layers, sorted by key, then triangle.
 class LayerSink {
  public:
-  LayerSink(LeafLayers& leaf, Arena& arena) : leaf_(&leaf), arena_(&arena) {}
+  LayerSink(LeafLayers& leaf, Arena& arena, double steep_from)
+      : leaf_(&leaf), arena_(&arena), steep_from_(steep_from) {}
+  HWY_INLINE void steepness(double steepness) {
+    steep_ = steepness > steep_from_ ? LeafLayers::kSteep : 0;
+  }
   HWY_INLINE void begin(bool exit, std::uint32_t triangle, const PixelRect&) {
     exit_ = exit ? 1 : 0;
-    triangle_ = triangle;
+    triangle_ = triangle | steep_;
   }
   /// key + 1, so that 0 is no crossing.
   template <class D2, class V2 = hn::Vec<D2>>
@@ -86,14 +90,15 @@ class LayerSink {
 
   LeafLayers* leaf_;
   Arena* arena_;
-  std::uint32_t exit_ = 0, triangle_ = 0;
+  double steep_from_;
+  std::uint32_t exit_ = 0, triangle_ = 0, steep_ = 0;
   std::uint64_t fragments_ = 0;
 };
 
 std::uint64_t RasterLayers(const LatticeMesh& mesh, const RasterTarget& target,
                            std::span<const std::uint32_t> triangles, const PixelRect& clip,
-                           LeafLayers& leaf, Arena& arena) {
-  LayerSink sink(leaf, arena);
+                           double steep_from, LeafLayers& leaf, Arena& arena) {
+  LayerSink sink(leaf, arena, steep_from);
   simd::rasterize_triangles(mesh, target, triangles, clip, sink);
   return sink.fragments();
 }
@@ -157,7 +162,8 @@ class Search {
     depth = hn::IfThenElse(waits, depth, hn::Set(d, LeafLayers::kEmpty));
   }
 
-  /// Whether another leaf has a flip near `depth`, and the triangle of the flip at `depth`.
+  /// Whether there is another flip near `depth` or a steep one anywhere, and the triangle of the
+  /// flip at `depth`.
   HWY_INLINE M judge(V depth, V who, V& triangle) {
     const D d;
     const hn::RebindToSigned<D> di;
@@ -167,14 +173,15 @@ class Search {
     const V safe = hn::IfThenElseZero(hit, depth);
     const auto at = hn::ConvertTo(df, hn::BitCast(di, safe));
     const auto nearness = hn::Sub(hn::Set(df, r.a), hn::Mul(hn::Set(df, r.b), at));
-    const auto slope = hn::Add(hn::Set(df, r.linear), hn::Mul(nearness, hn::Set(df, r.square)));
-    const auto reach_f = hn::Add(hn::Set(df, r.offset), hn::Mul(nearness, slope));
+    const auto square = hn::Mul(nearness, hn::Mul(nearness, hn::Set(df, r.square)));
+    const auto reach_f = hn::Add(hn::Set(df, r.offset), square);
     const auto most = hn::Set(df, static_cast<float>(kPictureDepthLimit));
     const V reach = hn::BitCast(d, hn::ConvertTo(di, hn::Min(reach_f, most)));
     const V last = hn::IfThenElseZero(hit, hn::Add(depth, reach));
     M doubt = no_lane(d);
     M exits = no_lane(d);
-    triangle = hn::Zero(d);
+    const V zero = hn::Zero(d), empty = hn::Set(d, LeafLayers::kEmpty);
+    triangle = zero;
     for (const std::uint32_t slot : area_.program->leaves) {
       LeafLayers& leaf = area_.leaves[slot];
       if (!holds(leaf)) continue;
@@ -184,9 +191,14 @@ class Search {
       for (std::size_t k = 0; k < leaf.keys.size(); ++k) {
         const V flip = hn::Load(d, leaf.keys[k] + offset);
         const V gap = hn::Sub(hn::Max(flip, depth), hn::Min(flip, depth));
-        doubt = hn::Or(doubt, hn::AndNot(own, hn::Not(hn::Gt(gap, reach))));
         const M same = hn::And(own, hn::Eq(flip, depth));
-        triangle = hn::IfThenElse(same, hn::Load(d, leaf.triangles[k] + offset), triangle);
+        const V its_triangle = hn::Load(d, leaf.triangles[k] + offset);
+        doubt = hn::Or(doubt, hn::AndNot(same, hn::Not(hn::Gt(gap, reach))));
+        // Of no flip at all the triangle is kEmpty, steep as well: that is no doubt.
+        const M steep = hn::And(hn::Ne(hn::And(its_triangle, hn::Set(d, LeafLayers::kSteep)), zero),
+                                hn::Ne(flip, empty));
+        doubt = hn::Or(doubt, steep);
+        triangle = hn::IfThenElse(same, its_triangle, triangle);
         if ((k & 1) != 0) exits = hn::Or(exits, same);
       }
     }
@@ -349,8 +361,8 @@ HWY_EXPORT(SearchSurface);
 
 std::uint64_t raster_layers(const LatticeMesh& mesh, const RasterTarget& target,
                             std::span<const std::uint32_t> triangles, const PixelRect& clip,
-                            LeafLayers& leaf, Arena& arena) {
-  return HWY_DYNAMIC_DISPATCH(RasterLayers)(mesh, target, triangles, clip, leaf, arena);
+                            double steep_from, LeafLayers& leaf, Arena& arena) {
+  return HWY_DYNAMIC_DISPATCH(RasterLayers)(mesh, target, triangles, clip, steep_from, leaf, arena);
 }
 void normalize_layers(LeafLayers& leaf, bool all_pixels_special, TileFinder& finder) {
   HWY_DYNAMIC_DISPATCH(NormalizeLayers)(leaf, all_pixels_special, finder);

@@ -21,10 +21,10 @@ enum class Operation : std::uint8_t { kSolid, kUnion, kIntersection, kDifference
 struct Solid {
   /// May overlap itself, may be open or inside out; null is the empty solid.
   std::shared_ptr<const TriangleSoup> mesh;
-  glm::dmat4 world_from_mesh{1.0};  ///< affine; one that mirrors turns the triangles around
-  std::optional<glm::vec4> colour;  ///< red, green, blue, alpha in [0, 1]; empty: the scheme's
+  glm::dmat4 world_from_mesh{1.0};       ///< affine; one that mirrors turns the triangles around
+  std::optional<glm::vec4> colour = {};  ///< red, green, blue, alpha in [0, 1]; empty: the scheme's
   InsideRule rule = InsideRule::kWinding;  ///< which winding numbers are inside
-  std::string name;                        ///< for messages and pick: `cube at plate.csg:12:3`
+  std::string name = {};                   ///< for messages and pick: `cube at plate.csg:12:3`
 };
 
 /// A Boolean tree of solids, as a value. No limit on solids, depth or shape; nothing is required of

@@ -58,8 +58,8 @@ HWY_INLINE void split_fraction(Int128 numerator, std::int64_t area, double& quot
 
 /// The equations of a triangle of any size that fits. @return false when the numbers do not fit:
 /// then rasterize_exact() serves.
-HWY_NOINLINE bool make_split_equations(const TriangleSetup& t, const PixelRect& box,
-                                       TileEquations& q) {
+inline HWY_NOINLINE bool make_split_equations(const TriangleSetup& t, const PixelRect& box,
+                                              TileEquations& q) {
   const auto [u_low, u_high] = std::minmax({t.u[0], t.u[1], t.u[2]});
   const auto [v_low, v_high] = std::minmax({t.v[0], t.v[1], t.v[2]});
   if (std::max(u_high - u_low, v_high - v_low) > kSplitExtent) return false;
@@ -184,7 +184,9 @@ class SetupBatch {
     hn::Store(hn::Add(lifted, hn::Set(df, 0.5)), df, remainder_);
     hn::Store(hn::Mul(slope_u, steps), df, remainder_u_);
     hn::Store(hn::Mul(slope_v, steps), df, remainder_v_);
-    hn::Store(hn::Div(one_f, area), df, inverse_);
+    const VecF64 inverse = hn::Div(one_f, area);
+    hn::Store(inverse, df, inverse_);
+    hn::Store(hn::Mul(hn::Add(hn::Abs(slope_u), hn::Abs(slope_v)), inverse), df, steepness_);
     hn::Store(hn::Add(w0, base), di, quotient_);
 
     const VecF64 per_step = hn::Set(df, 1.0 / kLatticeSteps);
@@ -218,6 +220,8 @@ class SetupBatch {
     return static_cast<Kind>(kind_[lane]);
   }
   [[nodiscard]] HWY_INLINE bool exit(std::size_t lane) const { return exit_[lane] != 0; }
+  /// Depth steps that a lattice step along u and one along v make together, about.
+  [[nodiscard]] HWY_INLINE double steepness(std::size_t lane) const { return steepness_[lane]; }
   [[nodiscard]] HWY_INLINE PixelRect box(std::size_t lane) const {
     return {box_u0_[lane], box_v0_[lane], box_u1_[lane], box_v1_[lane]};
   }
@@ -237,7 +241,7 @@ class SetupBatch {
  private:
   template <class T>
   using Lanes = T[kMaxLanes];
-  alignas(64) Lanes<double> remainder_, remainder_u_, remainder_v_, inverse_;
+  alignas(64) Lanes<double> remainder_, remainder_u_, remainder_v_, inverse_, steepness_;
   alignas(64) Lanes<std::int32_t> edge_[3], edge_u_[3], edge_v_[3], quotient_, kind_, exit_;
   alignas(64) Lanes<std::int32_t> box_u0_, box_u1_, box_v0_, box_v1_;
 };
@@ -406,7 +410,8 @@ HWY_INLINE void rasterize_any_box(const TileEquations& q, const PixelRect& box,
 }
 
 /// Rasterizes the triangles `ids` of `mesh` into `sink`: begin(exit, triangle, box), then encode()
-/// and put_block(), or put_one(u, v, depth), for its pixels.
+/// and put_block(), or put_one(u, v, depth), for its pixels. A sink that has steepness() is told it
+/// before begin().
 template <class Sink>
 HWY_INLINE void rasterize_triangles(const LatticeMesh& mesh, const RasterTarget& target,
                                     std::span<const std::uint32_t> ids, const PixelRect& clip,
@@ -422,7 +427,9 @@ HWY_INLINE void rasterize_triangles(const LatticeMesh& mesh, const RasterTarget&
       const auto kind = batch.kind(lane);
       if (kind == SetupBatch::Kind::kNothing) continue;
       const PixelRect box = batch.box(lane);
+      constexpr bool kTellSteepness = requires { sink.steepness(0.0); };
       if (kind == SetupBatch::Kind::kDirect) {
+        if constexpr (kTellSteepness) sink.steepness(batch.steepness(lane));
         sink.begin(batch.exit(lane), part[lane], box);
         batch.equations(lane, equations);
         rasterize_any_box<false>(equations, box, target.depth_limit, sink);
@@ -434,6 +441,7 @@ HWY_INLINE void rasterize_triangles(const LatticeMesh& mesh, const RasterTarget&
                           mesh.vertices[triangle.z], frame, t)) {
         continue;
       }
+      if constexpr (kTellSteepness) sink.steepness(t.steepness());
       sink.begin(t.exit, part[lane], box);
       TileEquations large;
       if (make_split_equations(t, box, large)) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <cstdlib>
 #include <glm/vec3.hpp>
 #include <utility>
 
@@ -46,6 +47,10 @@ struct TriangleSetup {
   struct Edge {
     std::int64_t a, b, c;
   };
+  /// Depth steps that a lattice step along u and one along v make together, about.
+  [[nodiscard]] double steepness() const {
+    return static_cast<double>(std::abs(slope_u) + std::abs(slope_v)) / static_cast<double>(area);
+  }
   [[nodiscard]] Edge edge(int i) const {
     const int j = i == 2 ? 0 : i + 1;
     const std::int64_t a = v[i] - v[j];

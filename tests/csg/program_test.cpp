@@ -1,0 +1,103 @@
+#include "csg/program.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/csg/random_tree.h"
+
+namespace strata::csg {
+namespace {
+
+/// A tree of random shape whose solids have no meshes.
+Tree bare_tree(RandomTree& random, int solids, bool with_empty_nodes) {
+  Tree tree;
+  std::vector<Tree::NodeId> loose;
+  for (int i = 0; i < solids; ++i) loose.push_back(tree.add_solid({}));
+  constexpr Operation kOperations[] = {Operation::kUnion, Operation::kIntersection,
+                                       Operation::kDifference};
+  while (loose.size() > 1) {
+    const int count = std::min<int>(static_cast<int>(loose.size()), random.pick(1, 5));
+    std::vector<Tree::NodeId> operands;
+    for (int i = 0; i < count; ++i) {
+      const int at = random.pick(0, static_cast<int>(loose.size()) - 1);
+      operands.push_back(loose[static_cast<std::size_t>(at)]);
+      loose.erase(loose.begin() + at);
+    }
+    if (with_empty_nodes && random.pick(0, 9) == 0) {
+      operands.push_back(tree.add(kOperations[random.pick(0, 2)], {}));
+    }
+    loose.push_back(tree.add(kOperations[random.pick(0, 2)], operands));
+  }
+  tree.set_root(loose.front());
+  return tree;
+}
+
+TEST(Program, AgreesWithRecursionAfterEachFlip) {
+  for (int seed = 0; seed < 400; ++seed) {
+    RandomTree random(static_cast<std::uint64_t>(seed));
+    const int solids = seed % 10 == 0 ? 1000 : random.pick(1, 40);
+    const Tree tree = bare_tree(random, solids, true);
+    const Program program = compile(tree, tree.root());
+    ProgramState state(program);
+    std::vector<bool> inside(static_cast<std::size_t>(solids), false);
+    const auto expected = [&] {
+      return evaluate(tree, tree.root(), [&](std::uint32_t solid) { return inside[solid]; });
+    };
+    ASSERT_EQ(state.value(), expected()) << "seed " << seed;
+    for (int step = 0; step < (solids > 100 ? 200 : 300); ++step) {
+      const auto solid = static_cast<std::uint32_t>(random.pick(0, solids - 1));
+      state.flip(solid);
+      inside[solid] = !inside[solid];
+      ASSERT_EQ(state.value(), expected()) << "seed " << seed << ", step " << step;
+    }
+  }
+}
+
+TEST(Program, ASupportIsASolidThatTheValueRestsOn) {
+  // If no support is turned, turning all others together cannot change the value.
+  for (int seed = 0; seed < 300; ++seed) {
+    RandomTree random(static_cast<std::uint64_t>(seed) + 1000);
+    const int solids = random.pick(2, 12);
+    const Tree tree = bare_tree(random, solids, false);
+    const Program program = compile(tree, tree.root());
+    ProgramState state(program);
+    for (int step = 0; step < 20; ++step) {
+      state.flip(static_cast<std::uint32_t>(random.pick(0, solids - 1)));
+      const bool value = state.value();
+      std::vector<std::uint32_t> others;
+      for (std::uint32_t solid = 0; solid < static_cast<std::uint32_t>(solids); ++solid) {
+        if (!state.supports(solid)) others.push_back(solid);
+      }
+      for (const std::uint32_t solid : others) state.flip(solid);
+      ASSERT_EQ(state.value(), value) << "seed " << seed << ", step " << step;
+      for (const std::uint32_t solid : others) state.flip(solid);
+    }
+  }
+}
+
+TEST(Program, ADeepTreeNeedsNoStack) {
+  Tree tree;
+  Tree::NodeId node = tree.add_solid({});
+  constexpr int kDeep = 300'000;
+  for (int i = 0; i < kDeep; ++i) {
+    node = tree.add(Operation::kDifference, {tree.add_solid({}), node});
+  }
+  tree.set_root(node);
+  const Program program = compile(tree, node);
+  ProgramState state(program);
+  for (std::uint32_t solid = 0; solid <= kDeep; ++solid) state.flip(solid);
+  // A1 - (A2 - (A3 - ...)) with all inside: true for an odd number of solids.
+  EXPECT_EQ(state.value(), (kDeep + 1) % 2 == 1);
+}
+
+TEST(Program, NestedUnionsAndDifferencesMelt) {
+  Tree tree;
+  Tree::NodeId node = tree.add_solid({});
+  for (int i = 0; i < 100; ++i) {
+    node = tree.add(Operation::kDifference, {node, tree.add_solid({})});
+  }
+  tree.set_root(node);
+  EXPECT_LE(compile(tree, node).nodes.size(), 2u);
+}
+
+}  // namespace
+}  // namespace strata::csg

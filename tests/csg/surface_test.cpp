@@ -1,0 +1,348 @@
+#include <gtest/gtest.h>
+
+#include "csg/picture.h"
+#include "csg/surface.h"
+#include "csg/tile_surface.h"
+#include "hashbuffer/build_ldi.h"
+#include "tests/csg/random_tree.h"
+
+namespace strata::csg {
+namespace {
+
+struct Pixel {
+  std::uint32_t depth, solid, triangle;
+  friend bool operator==(const Pixel&, const Pixel&) = default;
+};
+
+/// The visible surfaces from the full lists of all solids in an HA-buffer.
+std::vector<Pixel> by_full_lists(const Tree& tree, const View& view, double relative_precision) {
+  const Geometry geometry(tree);
+  std::vector<ViewPart> parts;
+  LatticeMesh all;
+  std::vector<glm::uvec3> triangles;
+  std::vector<std::uint32_t> solid_of, first_of;
+  for (const Geometry::Part& part : geometry.parts()) {
+    auto seen = view_part(part, view);
+    EXPECT_TRUE(seen.has_value());
+    const auto first = static_cast<std::uint32_t>(all.vertices.size());
+    first_of.push_back(static_cast<std::uint32_t>(triangles.size()));
+    for (const glm::uvec3& t : seen->mesh.triangles) triangles.push_back(t + first);
+    all.vertices.insert(all.vertices.end(), seen->mesh.vertices.begin(), seen->mesh.vertices.end());
+    solid_of.resize(triangles.size(), static_cast<std::uint32_t>(parts.size()));
+    parts.push_back(std::move(*seen));
+  }
+  all.triangles = triangles;
+  const RasterTarget target{Axis::kZ, view.size.x, view.size.y, kPictureDepthLimit};
+  const auto lists = build_ldi(all, target);
+  EXPECT_TRUE(lists.has_value());
+
+  const Program program = compile(tree, tree.root());
+  SurfaceFinder finder(program);
+  const glm::dvec3 reach = glm::max(glm::abs(geometry.box().low), glm::abs(geometry.box().high));
+  const Coincidence coincidence(view, relative_precision * glm::length(reach));
+  std::vector<Pixel> result;
+  for (int v = 0; v < view.size.y; ++v) {
+    for (int u = 0; u < view.size.x; ++u) {
+      std::vector<Flip> flips;
+      std::vector<std::vector<DepthItem>> of_solid(parts.size());
+      for (const DepthItem item : lists->list(u, v)) {
+        const std::uint32_t solid = solid_of[item.triangle()];
+        of_solid[solid].emplace_back(item.depth(), item.exit(), item.triangle() - first_of[solid]);
+      }
+      for (std::uint32_t solid = 0; solid < parts.size(); ++solid) {
+        flips_of(of_solid[solid], solid, geometry.parts()[solid].rule, parts[solid].cut, flips);
+      }
+      const Surface surface = finder.find(flips, [&](const Flip& flip) {
+        if (flip.triangle == Surface::kNone) return Coincidence::Bound{};
+        return coincidence.bound(parts[flip.solid].mesh, flip.triangle, flip.depth);
+      });
+      result.push_back({surface.depth, surface.solid,
+                        surface.triangle | (surface.exit ? SurfaceImage::kExit : 0u)});
+    }
+  }
+  return result;
+}
+
+/// Compares a preview with the full lists, pixel by pixel.
+void expect_same(const Tree& tree, const Camera& camera, const glm::ivec2& size,
+                 const std::string& what) {
+  Preview preview(tree, {}, 0.0);
+  const auto view = make_view(camera, size, preview.box());
+  ASSERT_TRUE(view.has_value()) << what;
+  const auto image = preview.draw(*view);
+  ASSERT_TRUE(image.has_value()) << what << ": " << image.error().message;
+  const std::vector<Pixel> expected = by_full_lists(tree, *view, 0.0);
+  std::size_t different = 0, covered = 0;
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    const SurfaceImage& found = **image;
+    covered += expected[i].depth != Surface::kNone ? 1 : 0;
+    if (found.depth[i] == Surface::kNone && expected[i].depth == Surface::kNone) continue;
+    const Pixel pixel{found.depth[i], found.solid[i], found.triangle[i]};
+    if (pixel == expected[i]) continue;
+    if (++different <= 3) {
+      ADD_FAILURE() << what << ": pixel " << i % static_cast<std::size_t>(size.x) << ", "
+                    << i / static_cast<std::size_t>(size.x) << " shows depth " << pixel.depth
+                    << " solid " << pixel.solid << " triangle " << pixel.triangle
+                    << ", the lists say " << expected[i].depth << " " << expected[i].solid << " "
+                    << expected[i].triangle;
+    }
+  }
+  EXPECT_EQ(different, 0u) << what << ", of " << covered << " covered";
+}
+
+Camera random_camera(RandomTree& random, const Bounds& box) {
+  Camera camera;
+  camera.projection = random.pick(0, 1) == 0 ? Projection::kPerspective : Projection::kOrthographic;
+  centre_camera(camera, box);
+  fit_camera(camera, box);
+  camera.rotation = {random.real(0, 180), random.real(0, 360), random.real(0, 360)};
+  return camera;
+}
+
+// The law: a picture culls, a measurement does not, and both see the same.
+TEST(VisibleSurface, IsTheOneOfTheFullListsForAnyTree) {
+  for (int seed = 0; seed < 250; ++seed) {
+    RandomTree random(static_cast<std::uint64_t>(seed));
+    Tree tree;
+    tree.set_root(random.grow(tree, random.pick(1, seed % 8 == 0 ? 60 : 12), seed % 3 == 0));
+    Preview preview(tree, {}, 0.0);
+    const Camera camera = random_camera(random, preview.box());
+    expect_same(tree, camera, {random.pick(1, 150), random.pick(1, 150)},
+                "seed " + std::to_string(seed));
+    if (HasFailure()) return;
+  }
+}
+
+TEST(VisibleSurface, IsTheOneOfTheFullListsWithTheEyeInTheScene) {
+  for (int seed = 0; seed < 60; ++seed) {
+    RandomTree random(static_cast<std::uint64_t>(seed) + 500);
+    Tree tree;
+    tree.set_root(random.grow(tree, random.pick(1, 12), seed % 3 == 0));
+    Camera camera = look_at({random.real(-6, 6), random.real(-6, 6), random.real(-6, 6)},
+                            {random.real(-6, 6), random.real(-6, 6), random.real(-6, 6)});
+    camera.field_of_view = 60;
+    expect_same(tree, camera, {90, 70}, "seed " + std::to_string(seed));
+    if (HasFailure()) return;
+  }
+}
+
+TEST(VisibleSurface, AMovedSolidGivesTheSameAsAFreshPicture) {
+  for (int seed = 0; seed < 40; ++seed) {
+    RandomTree random(static_cast<std::uint64_t>(seed) + 900);
+    Tree tree;
+    tree.set_root(random.grow(tree, random.pick(2, 20), false));
+    Preview preview(tree, {}, 0.0);
+    const auto view = make_view(random_camera(random, preview.box()), {200, 180}, preview.box());
+    ASSERT_TRUE(view.has_value());
+    ASSERT_TRUE(preview.draw(*view).has_value());
+    const auto solid =
+        static_cast<std::uint32_t>(random.pick(0, static_cast<int>(tree.solids().size()) - 1));
+    const glm::dmat4 moved =
+        glm::translate(glm::dmat4(1), glm::dvec3(random.real(-1, 1), random.real(-1, 1), 0)) *
+        tree.solids()[solid].world_from_mesh;
+    const auto after = preview.move_solid(solid, moved);
+    ASSERT_TRUE(after.has_value());
+    Tree other = tree;
+    other.solids()[solid].world_from_mesh = moved;
+    Preview fresh(other, {}, 0.0);
+    const auto expected = fresh.draw(*view);
+    ASSERT_TRUE(expected.has_value());
+    EXPECT_EQ((*after)->depth, (*expected)->depth) << "seed " << seed;
+  }
+}
+
+TEST(VisibleSurface, OpenSolidsShowTheirSheets) {
+  // Half of a box: the far wall is seen through the missing front.
+  TriangleSoup mesh = make_box(glm::dvec3(-1), glm::dvec3(1));
+  mesh.triangles.resize(6);
+  Tree tree;
+  tree.set_root(tree.add_solid({std::make_shared<TriangleSoup>(mesh)}));
+  for (int i = 0; i < 20; ++i) {
+    RandomTree random(static_cast<std::uint64_t>(i));
+    Camera camera = random_camera(random, bounds(tree, tree.root()));
+    expect_same(tree, camera, {64, 64}, "view " + std::to_string(i));
+  }
+}
+
+// Law 5: faces that coincide leave nothing that is not there, at any camera angle.
+
+Tree::NodeId box_node(Tree& tree, const glm::dvec3& low, const glm::dvec3& high) {
+  return tree.add_solid({std::make_shared<TriangleSoup>(make_box(low, high))});
+}
+
+/// World position of a pixel's surface.
+glm::dvec3 position(const View& view, int u, int v, std::uint32_t depth) {
+  const double distance = view.distance(depth);
+  const glm::dmat4 image_from_eye = view.image_from_world * glm::inverse(view.eye_from_world);
+  const double w = view.perspective ? distance : 1.0;
+  const double x = ((u + 0.5) - view.size.x / 2.0) * w / image_from_eye[0][0];
+  const double y = ((v + 0.5) - view.size.y / 2.0) * w / image_from_eye[1][1];
+  return glm::dvec3(glm::inverse(view.eye_from_world) * glm::dvec4(x, y, -distance, 1.0));
+}
+
+/// Counts pixels whose surface lies where `is_wrong` says nothing is, from 100 cameras.
+std::size_t wrong_pixels(const Tree& tree, const std::function<bool(const glm::dvec3&)>& is_wrong,
+                         std::size_t& covered) {
+  Preview preview(tree, {}, 0.0);
+  std::size_t wrong = 0;
+  for (int i = 0; i < 100; ++i) {
+    RandomTree random(static_cast<std::uint64_t>(i) + 77);
+    const Camera camera = random_camera(random, preview.box());
+    const auto view = make_view(camera, {160, 160}, preview.box());
+    const auto image = preview.draw(*view);
+    EXPECT_TRUE(image.has_value());
+    for (int v = 0; v < 160; ++v) {
+      for (int u = 0; u < 160; ++u) {
+        const std::uint32_t depth = (*image)->depth[static_cast<std::size_t>(v * 160 + u)];
+        if (depth == SurfaceImage::kNone) continue;
+        ++covered;
+        wrong += is_wrong(position(*view, u, v, depth)) ? 1 : 0;
+      }
+    }
+  }
+  return wrong;
+}
+
+/// Whether p is farther than a margin from the surface of [low, high].
+bool off_box(const glm::dvec3& p, const glm::dvec3& low, const glm::dvec3& high) {
+  constexpr double kMargin = 0.05;
+  const glm::dvec3 out = glm::max(low - p, p - high);
+  return std::abs(std::max({out.x, out.y, out.z})) > kMargin;
+}
+
+TEST(CoincidentFaces, ACubeMinusACubeThatSharesFacesShowsOnlyWhatIsLeft) {
+  // The second cube takes the first's half x > 5, and shares 3, then 4, then 5 of its faces.
+  struct Case {
+    glm::dvec3 low, high;
+  };
+  const Case cases[] = {{{5, 0, 0}, {10, 10, 10}},
+                        {{5, 0, 0}, {12, 10, 10}},
+                        {{5, -1, 0}, {10, 10, 10}},
+                        {{5, -1, -2}, {10, 11, 10}}};
+  for (const Case& c : cases) {
+    Tree tree;
+    const auto a = box_node(tree, {0, 0, 0}, {10, 10, 10});
+    const auto b = box_node(tree, c.low, c.high);
+    tree.set_root(tree.add(Operation::kDifference, {a, b}));
+    std::size_t covered = 0;
+    const std::size_t wrong = wrong_pixels(
+        tree,
+        [](const glm::dvec3& p) {
+          return off_box(p, {0, 0, 0}, {5, 10, 10});
+        },
+        covered);
+    EXPECT_EQ(wrong, 0u) << "of " << covered;
+    EXPECT_GT(covered, 100'000u);
+  }
+}
+
+TEST(CoincidentFaces, ACubeMinusItselfIsEmpty) {
+  Tree tree;
+  const auto a = box_node(tree, {0, 0, 0}, {10, 10, 10});
+  const auto b = box_node(tree, {0, 0, 0}, {10, 10, 10});
+  tree.set_root(tree.add(Operation::kDifference, {a, b}));
+  std::size_t covered = 0;
+  wrong_pixels(
+      tree, [](const glm::dvec3&) { return true; }, covered);
+  EXPECT_EQ(covered, 0u);
+}
+
+TEST(CoincidentFaces, APlateMinusACylinderOfEqualHeightHasAHole) {
+  Tree tree;
+  const auto plate = box_node(tree, {-10, -10, 0}, {10, 10, 4});
+  const auto drill = tree.add_solid({std::make_shared<TriangleSoup>(make_cylinder(6, 4, 48))});
+  tree.set_root(tree.add(Operation::kDifference, {plate, drill}));
+  std::size_t covered = 0;
+  const std::size_t wrong = wrong_pixels(
+      tree, [](const glm::dvec3& p) { return std::hypot(p.x, p.y) < 5.9; }, covered);
+  EXPECT_EQ(wrong, 0u) << "of " << covered;
+}
+
+TEST(CoincidentFaces, StackedCubesShowNoSeamAndNothingBetween) {
+  Tree tree;
+  std::vector<Tree::NodeId> cubes;
+  for (int i = 0; i < 8; ++i) {
+    const glm::dvec3 low((i & 1) * 5, (i >> 1 & 1) * 5, (i >> 2) * 5);
+    cubes.push_back(box_node(tree, low, low + glm::dvec3(5)));
+  }
+  tree.set_root(tree.add(Operation::kUnion, cubes));
+  std::size_t covered = 0;
+  const std::size_t wrong = wrong_pixels(
+      tree, [](const glm::dvec3& p) { return off_box(p, glm::dvec3(0), glm::dvec3(10)); }, covered);
+  EXPECT_EQ(wrong, 0u) << "of " << covered;
+}
+
+TEST(CoincidentFaces, TouchingIntersectionIsEmpty) {
+  Tree tree;
+  const auto a = box_node(tree, {0, 0, 0}, {5, 10, 10});
+  const auto b = box_node(tree, {5, 0, 0}, {10, 10, 10});
+  tree.set_root(tree.add(Operation::kIntersection, {a, b}));
+  std::size_t covered = 0;
+  wrong_pixels(
+      tree, [](const glm::dvec3&) { return true; }, covered);
+  EXPECT_EQ(covered, 0u);
+}
+
+TEST(CoincidentFaces, TheSameFaceTwiceIsShownInOneColour) {
+  // Two solids with a common face: everywhere the first of the tree is shown.
+  Tree tree;
+  const auto a = box_node(tree, {0, 0, 0}, {10, 10, 10});
+  const auto b = box_node(tree, {0, 0, 0}, {10, 10, 5});
+  tree.set_root(tree.add(Operation::kUnion, {a, b}));
+  Preview preview(tree, {}, 0.0);
+  for (int i = 0; i < 50; ++i) {
+    RandomTree random(static_cast<std::uint64_t>(i) + 7);
+    const auto view = make_view(random_camera(random, preview.box()), {120, 120}, preview.box());
+    const auto image = preview.draw(*view);
+    std::size_t second = 0, all = 0;
+    for (std::size_t p = 0; p < (*image)->depth.size(); ++p) {
+      if ((*image)->depth[p] == SurfaceImage::kNone) continue;
+      ++all;
+      second += (*image)->solid[p] == 1 ? 1 : 0;
+    }
+    // The faces' outlines are snapped alike, for their corners are the same; only the side walls
+    // have corners of their own.
+    EXPECT_LE(second, all / 500) << "camera " << i;
+  }
+}
+
+TEST(NestedDifferences, TwentyAndTwoHundredDeepAreRight) {
+  for (const int deep : {20, 200}) {
+    // Boxes one in another, each taken from the next larger one: shells.
+    Tree tree;
+    Tree::NodeId node = Tree::kNone;
+    for (int i = 0; i < deep; ++i) {
+      const double half = i + 1;
+      const auto box =
+          box_node(tree, {-half, -half, -half}, {half, half, i == deep - 1 ? 0.3 : half});
+      node = node == Tree::kNone ? box : tree.add(Operation::kDifference, {box, node});
+    }
+    tree.set_root(node);
+    RandomTree random(3);
+    Camera camera;
+    centre_camera(camera, bounds(tree, tree.root()));
+    camera.rotation = {10, 0, 20};
+    fit_camera(camera, bounds(tree, tree.root()));
+    expect_same(tree, camera, {128, 128}, std::to_string(deep) + " deep");
+  }
+}
+
+TEST(VisibleSurface, AThousandLayersInOnePixelAreRight) {
+  Tree tree;
+  std::vector<Tree::NodeId> plates{box_node(tree, {-10, -10, 0}, {10, 10, 1001})};
+  for (int i = 0; i < 500; ++i) {
+    plates.push_back(box_node(tree, {-9, -9, 2.0 * i - 0.5}, {9, 9, 2.0 * i + 0.5}));
+  }
+  tree.set_root(tree.add(Operation::kDifference, plates));
+  Camera camera;
+  camera.projection = Projection::kOrthographic;
+  camera.rotation = {0, 0, 0};
+  centre_camera(camera, bounds(tree, tree.root()));
+  fit_camera(camera, bounds(tree, tree.root()));
+  camera.distance /= 40;
+  camera.rotation = {1.5, 0, 30};
+  expect_same(tree, camera, {64, 64}, "from above");
+}
+
+}  // namespace
+}  // namespace strata::csg
