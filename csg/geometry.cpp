@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
+#include <unordered_map>
 
 namespace strata::csg {
 namespace {
@@ -23,6 +25,25 @@ Bounds bounds_of(const Geometry::Part& part, std::size_t mesh_vertices) {
   (void)mesh_vertices;
   for (const glm::dvec3& p : part.positions) add(p);
   return box;
+}
+
+/// Whether no vertex lies outside of any face; meshes too large to try are taken for not convex.
+bool is_convex(const TriangleSoup& mesh) {
+  constexpr std::size_t kMostTests = std::size_t{1} << 21;
+  if (mesh.triangles.empty() || mesh.triangles.size() * mesh.positions.size() > kMostTests) {
+    return false;
+  }
+  const Bounds box = bounds(mesh);
+  const double size = glm::length(box.high - box.low);
+  for (const glm::uvec3& t : mesh.triangles) {
+    const glm::dvec3& a = mesh.positions[t.x];
+    const glm::dvec3 across = glm::cross(mesh.positions[t.y] - a, mesh.positions[t.z] - a);
+    const double limit = glm::dot(across, a) + 1e-9 * size * glm::length(across);
+    for (const glm::dvec3& p : mesh.positions) {
+      if (glm::dot(across, p) > limit) return false;
+    }
+  }
+  return true;
 }
 
 /// A vertex before the perspective division.
@@ -112,10 +133,21 @@ Geometry::Geometry(const Tree& tree, const Execution& execution) {
   parts_.resize(solids.size());
   meshes_.reserve(solids.size());
   for (const Solid& solid : solids) meshes_.push_back(solid.mesh);
+  std::unordered_map<const TriangleSoup*, std::size_t> firsts;
+  std::vector<std::size_t> first_with;
+  for (std::size_t i = 0; i < solids.size(); ++i) {
+    first_with.push_back(firsts.try_emplace(solids[i].mesh.get(), i).first->second);
+  }
+  std::vector<std::uint8_t> convex(solids.size(), 0);  // of the first solid with a mesh
   parallel_for(execution, solids.size(), [&](std::size_t i, int) {
     parts_[i].rule = solids[i].rule;
+    const TriangleSoup* mesh = solids[i].mesh.get();
+    if (mesh != nullptr) {
+      if (first_with[i] == i) convex[i] = is_convex(*mesh) ? 1 : 0;
+    }
     place(static_cast<std::uint32_t>(i), solids[i].world_from_mesh);
   });
+  for (std::size_t i = 0; i < parts_.size(); ++i) parts_[i].convex = convex[first_with[i]] != 0;
   measure();
 }
 

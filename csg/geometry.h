@@ -22,6 +22,7 @@ class Geometry {
     std::span<const glm::uvec3> triangles;  ///< counter-clockwise from outside
     Bounds box;
     InsideRule rule = InsideRule::kWinding;
+    bool convex = false;  ///< known to be; a hint that only speed depends on
   };
 
   /// Keeps the meshes of `tree` alive.

@@ -30,8 +30,7 @@ void LeafLayers::add_layer(Arena& arena) {
   const std::size_t count = words();
   keys.push_back(arena.words(count));
   std::fill_n(keys.back(), count, kEmpty);
-  triangles.push_back(arena.words(count));
-  std::fill_n(triangles.back(), count, kEmpty);
+  triangles.push_back(arena.words(count));  // means nothing where there is no key
 }
 
 // --- Simplifier ---------------------------------------------------------------------------------
@@ -309,13 +308,14 @@ void TileFinder::make(LeafLayers& leaf) {
 void TileFinder::normalize_pixel(LeafLayers& leaf, std::size_t at) {
   crossings_.clear();
   bool steep = false;
-  for (std::size_t k = 0; k < leaf.keys.size() && leaf.keys[k][at] != LeafLayers::kEmpty; ++k) {
+  for (std::size_t k = 0; k < leaf.keys.size(); ++k) {
+    if (leaf.keys[k][at] == LeafLayers::kEmpty) continue;
     const std::uint32_t key = leaf.keys[k][at], triangle = leaf.triangles[k][at];
     steep = steep || (triangle & LeafLayers::kSteep) != 0;
     crossings_.emplace_back(key >> 1, (key & 1) != 0, triangle & ~LeafLayers::kSteep);
-    leaf.keys[k][at] = leaf.triangles[k][at] = LeafLayers::kEmpty;
+    leaf.keys[k][at] = LeafLayers::kEmpty;
   }
-  // The keys' order is that of marked triangles.
+  // Layers of convex solids are not sorted, and others by marked triangles.
   std::sort(crossings_.begin(), crossings_.end());
   leaf_flips_.clear();
   flips_of(crossings_, leaf.solid, parts_[leaf.solid].rule, view_parts_[leaf.solid].cut,
@@ -324,6 +324,11 @@ void TileFinder::normalize_pixel(LeafLayers& leaf, std::size_t at) {
   for (std::size_t k = 0; k < leaf_flips_.size(); ++k) {
     leaf.keys[k][at] = leaf_flips_[k].depth;
     leaf.triangles[k][at] = leaf_flips_[k].triangle | (steep ? LeafLayers::kSteep : 0);
+  }
+  leaf.steep = leaf.steep || steep;
+  if (!leaf_flips_.empty()) {
+    leaf.nearest = std::min(leaf.nearest, leaf_flips_.front().depth);
+    leaf.farthest = std::max(leaf.farthest, leaf_flips_.back().depth);
   }
 }
 
@@ -366,6 +371,8 @@ void TileFinder::find(int tile_u, int tile_v, std::span<const std::uint32_t> sol
     if (part.binned && part.bins.tile(tile_u, tile_v).empty()) continue;
     LeafLayers& leaf = leaves_[count++];
     leaf.made = false;
+    leaf.steep = false;
+    leaf.convex = parts_[solid].convex;
     leaf.solid = solid;
     leaf.nearest = part.cut ? 0 : part.nearest;
     leaf.farthest = part.farthest;
@@ -387,6 +394,9 @@ void TileFinder::find(int tile_u, int tile_v, std::span<const std::uint32_t> sol
   area.range = coincidence_->range();
   area.image = &image;
   area.doubtful = &doubtful_;
+  slot_solids_.clear();
+  for (std::size_t i = 0; i < count; ++i) slot_solids_.push_back(leaves_[i].solid);
+  area.solids = slot_solids_.data();
   for (int v = tile_.v0; v < tile_.v1; v += kAreaSide) {
     for (int u = tile_.u0; u < tile_.u1; u += kAreaSide) {
       area.rect = {u, v, u + kAreaSide, std::min(tile_.v1, v + kAreaSide)};

@@ -42,11 +42,16 @@ struct LeafLayers {
   static constexpr std::uint32_t kSteep = 0x80000000u;
   static constexpr int kLanes = 16;  ///< columns begin and end at multiples of this
 
-  PixelRect rect;     ///< of the picture; u0 is a multiple of kLanes away from the tile's edge
-  int stride = 0;     ///< words a row
-  bool made = false;  ///< rasterized and normalized
+  PixelRect rect;      ///< of the picture; u0 is a multiple of kLanes away from the tile's edge
+  int stride = 0;      ///< words a row
+  bool made = false;   ///< rasterized and normalized
+  bool steep = false;  ///< some triangle is marked
+  /// A ray should enter and leave once: layer 0 takes entries, layer 1 exits, further ones what
+  /// happens all the same.
+  bool convex = false;
   std::uint32_t solid = 0;
-  std::uint32_t nearest = 0, farthest = 0;  ///< bounds of its depths
+  /// Bounds of its depths; those of the tile once it is made.
+  std::uint32_t nearest = 0, farthest = 0;
   /// While rasterizing depth << 1 | exit, then depths of flips. kEmpty where there is none.
   std::vector<std::uint32_t*> keys;
   std::vector<std::uint32_t*> triangles;  ///< [steep:1 | triangle:31]
@@ -147,6 +152,7 @@ class TileFinder {
   SurfaceFinder finder_;
   std::vector<std::uint32_t> present_, all_triangles_;
   std::vector<std::uint64_t> doubtful_;
+  std::vector<std::uint32_t> slot_solids_;
   std::vector<Flip> flips_, leaf_flips_;
   std::vector<DepthItem> crossings_;
   PixelRect tile_;
@@ -166,6 +172,7 @@ void normalize_layers(LeafLayers& leaf, bool all_pixels_special, TileFinder& fin
 /// A part of a tile, LeafLayers::kLanes columns wide.
 struct SearchArea {
   std::span<LeafLayers> leaves;
+  const std::uint32_t* solids = nullptr;  ///< of the leaves
   const TileProgram* program = nullptr;
   PixelRect rect;  ///< of the picture; u1 may lie beyond its right edge
   int width = 0;   ///< of the picture

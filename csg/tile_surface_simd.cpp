@@ -35,6 +35,7 @@ class LayerSink {
       : leaf_(&leaf), arena_(&arena), steep_from_(steep_from) {}
   HWY_INLINE void steepness(double steepness) {
     steep_ = steepness > steep_from_ ? LeafLayers::kSteep : 0;
+    leaf_->steep = leaf_->steep || steep_ != 0;
   }
   HWY_INLINE void begin(bool exit, std::uint32_t triangle, const PixelRect&) {
     exit_ = exit ? 1 : 0;
@@ -73,6 +74,7 @@ class LayerSink {
     auto key = hn::Sub(hn::LoadU(d, words), hn::Set(d, 1u));
     auto triangle = hn::Set(d, triangle_);
     if (hn::AllTrue(d, hn::Eq(key, empty))) return;
+    if (leaf_->convex) return place(d, at, key, triangle);
     for (std::size_t k = 0;; ++k) {
       if (k == leaf_->keys.size()) leaf_->add_layer(*arena_);
       std::uint32_t* HWY_RESTRICT keys = leaf_->keys[k] + at;
@@ -84,6 +86,23 @@ class LayerSink {
       hn::StoreU(hn::IfThenElse(less, triangle, old_triangle), d, triangles);
       key = hn::IfThenElse(less, old_key, key);
       triangle = hn::IfThenElse(less, old_triangle, triangle);
+      if (hn::AllTrue(d, hn::Eq(key, empty))) return;
+    }
+  }
+
+  /// Entries go to layer 0, exits to layer 1, unsorted.
+  template <class D2>
+  HWY_INLINE void place(D2 d, std::size_t at, hn::Vec<D2> key, hn::Vec<D2> triangle) {
+    const auto empty = hn::Set(d, LeafLayers::kEmpty);
+    for (std::size_t k = exit_;; k = k < 2 ? 2 : k + 1) {
+      while (k >= leaf_->keys.size()) leaf_->add_layer(*arena_);
+      std::uint32_t* HWY_RESTRICT keys = leaf_->keys[k] + at;
+      std::uint32_t* HWY_RESTRICT triangles = leaf_->triangles[k] + at;
+      const auto old_key = hn::LoadU(d, keys);
+      const auto take = hn::And(hn::Ne(key, empty), hn::Eq(old_key, empty));
+      hn::StoreU(hn::IfThenElse(take, key, old_key), d, keys);
+      hn::StoreU(hn::IfThenElse(take, triangle, hn::LoadU(d, triangles)), d, triangles);
+      key = hn::IfThenElse(take, empty, key);
       if (hn::AllTrue(d, hn::Eq(key, empty))) return;
     }
   }
@@ -110,13 +129,16 @@ void NormalizeLayers(LeafLayers& leaf, bool all_special, TileFinder& finder) {
   const auto cells = static_cast<std::size_t>((leaf.rect.v1 - leaf.rect.v0) * leaf.stride);
   const std::size_t lanes = hn::Lanes(d);
   alignas(64) std::uint32_t special_lanes[LeafLayers::kLanes];
+  V nearest = empty, farthest = zero;
+  leaf.nearest = LeafLayers::kEmpty;
+  leaf.farthest = 0;
   for (std::size_t at = 0; at < cells; at += lanes) {
     M special = no_lane(d);
     V before = zero;  // depth of the last exit, plus 1
     for (std::size_t k = 0; k < layers; k += 2) {
       const V enter = hn::Load(d, leaf.keys[k] + at);
       const V leave = k + 1 < layers ? hn::Load(d, leaf.keys[k + 1] + at) : empty;
-      const M none = hn::Eq(enter, empty);
+      const M none = hn::And(hn::Eq(enter, empty), hn::Eq(leave, empty));
       const V enter_depth = hn::ShiftRight<1>(enter), leave_depth = hn::ShiftRight<1>(leave);
       const M facing =
           hn::And(hn::Eq(hn::And(enter, one), zero), hn::Ne(hn::And(leave, one), zero));
@@ -129,7 +151,10 @@ void NormalizeLayers(LeafLayers& leaf, bool all_special, TileFinder& finder) {
     if (all_special) special = hn::Ne(hn::Load(d, leaf.keys[0] + at), empty);
     for (std::size_t k = 0; k < layers; ++k) {
       const V key = hn::Load(d, leaf.keys[k] + at);
-      const V depth = hn::IfThenElse(hn::Eq(key, empty), empty, hn::ShiftRight<1>(key));
+      const M present = hn::AndNot(special, hn::Ne(key, empty));
+      const V depth = hn::IfThenElse(present, hn::ShiftRight<1>(key), empty);
+      nearest = hn::Min(nearest, depth);
+      farthest = hn::Max(farthest, hn::IfThenElseZero(present, depth));
       hn::Store(hn::IfThenElse(special, key, depth), d, leaf.keys[k] + at);
     }
     if (hn::AllFalse(d, special)) continue;
@@ -138,6 +163,8 @@ void NormalizeLayers(LeafLayers& leaf, bool all_special, TileFinder& finder) {
       if (special_lanes[i] != 0) finder.normalize_pixel(leaf, at + i);
     }
   }
+  leaf.nearest = std::min(leaf.nearest, hn::GetLane(hn::MinOfLanes(d, nearest)));
+  leaf.farthest = std::max(leaf.farthest, hn::GetLane(hn::MaxOfLanes(d, farthest)));
 }
 
 /// The search in one vector of pixels.
@@ -182,22 +209,21 @@ class Search {
     M exits = no_lane(d);
     const V zero = hn::Zero(d), empty = hn::Set(d, LeafLayers::kEmpty);
     triangle = zero;
+    const std::uint32_t latest = hn::GetLane(hn::MaxOfLanes(d, last));
     for (const std::uint32_t slot : area_.program->leaves) {
       LeafLayers& leaf = area_.leaves[slot];
-      if (!holds(leaf)) continue;
-      if (hn::AllTrue(d, hn::Lt(last, hn::Set(d, leaf.nearest)))) continue;
+      if (leaf.nearest > latest || !holds(leaf) || leaf.nearest > latest) continue;
       const std::size_t offset = offset_in(leaf);
       const M own = hn::Eq(who, hn::Set(d, slot));
       for (std::size_t k = 0; k < leaf.keys.size(); ++k) {
         const V flip = hn::Load(d, leaf.keys[k] + offset);
         const V gap = hn::Sub(hn::Max(flip, depth), hn::Min(flip, depth));
         const M same = hn::And(own, hn::Eq(flip, depth));
-        const V its_triangle = hn::Load(d, leaf.triangles[k] + offset);
         doubt = hn::Or(doubt, hn::AndNot(same, hn::Not(hn::Gt(gap, reach))));
-        // Of no flip at all the triangle is kEmpty, steep as well: that is no doubt.
-        const M steep = hn::And(hn::Ne(hn::And(its_triangle, hn::Set(d, LeafLayers::kSteep)), zero),
-                                hn::Ne(flip, empty));
-        doubt = hn::Or(doubt, steep);
+        if (!leaf.steep && hn::AllFalse(d, same)) continue;
+        const V its_triangle = hn::Load(d, leaf.triangles[k] + offset);
+        const V marked = hn::And(its_triangle, hn::Set(d, LeafLayers::kSteep));
+        doubt = hn::Or(doubt, hn::And(hn::Ne(marked, zero), hn::Ne(flip, empty)));
         triangle = hn::IfThenElse(same, its_triangle, triangle);
         if ((k & 1) != 0) exits = hn::Or(exits, same);
       }
@@ -285,7 +311,14 @@ class Search {
       const V beyond = hn::Add(far, hn::Set(d, 1u));
       M still = no_lane(d);
       V farther = zero, farther_who = zero;
+      const std::uint32_t first =
+          hn::GetLane(hn::MinOfLanes(d, hn::IfThenElse(open, beyond, none)));
+      const std::uint32_t last = hn::GetLane(hn::MaxOfLanes(d, hn::IfThenElseZero(open, beyond)));
       for (std::uint32_t i = 0; i < node.count; ++i) {
+        if (edges[i].leaf() && !edges[i].inverted()) {  // a ray is outside there
+          const LeafLayers& leaf = area_.leaves[edges[i].child()];
+          if (leaf.nearest >= last || (leaf.made && leaf.farthest < first)) continue;
+        }
         M edge_value;
         V edge_next, edge_who;
         probe_edge(edges[i], beyond, open, true, false, edge_value, edge_next, edge_who);
@@ -329,13 +362,20 @@ void SearchSurface(const SearchArea& area, TileFinder& finder) {
         continue;
       }
       const M doubt = search.judge(depth, who, triangle);
-      hn::Store(who, d, slots);
-      hn::Store(triangle, d, triangles);
-      for (int i = 0; i < count; ++i) {
-        const std::size_t pixel = at + static_cast<std::size_t>(i);
-        area.image->depth[pixel] = depths[i];
-        area.image->solid[pixel] = area.leaves[slots[i]].solid;
-        area.image->triangle[pixel] = triangles[i];
+      const V solid = hn::GatherIndex(d, area.solids, hn::BitCast(hn::RebindToSigned<D>(), who));
+      if (count == lanes) {
+        hn::StoreU(depth, d, area.image->depth.data() + at);
+        hn::StoreU(solid, d, area.image->solid.data() + at);
+        hn::StoreU(triangle, d, area.image->triangle.data() + at);
+      } else {
+        hn::Store(solid, d, slots);
+        hn::Store(triangle, d, triangles);
+        for (int i = 0; i < count; ++i) {
+          const std::size_t pixel = at + static_cast<std::size_t>(i);
+          area.image->depth[pixel] = depths[i];
+          area.image->solid[pixel] = slots[i];
+          area.image->triangle[pixel] = triangles[i];
+        }
       }
       if (hn::AllFalse(d, doubt)) continue;
       hn::Store(hn::VecFromMask(d, doubt), d, doubts);
