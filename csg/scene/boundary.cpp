@@ -93,9 +93,12 @@ class LeafSection {
     for (std::size_t first = 0; first < segments_.size(); ++first) {
       if (segments_[first].used) continue;
       std::vector<glm::dvec2> contour;
-      for (std::size_t at = first; at != kNone; at = following(segments_[at].end)) {
-        segments_[at].used = true;
-        contour.push_back(crossing(segments_[at].end));
+      Edge at = segments_[first].from;
+      for (std::size_t next = first; next != kNone; next = following(at)) {
+        Segment& segment = segments_[next];
+        segment.used = true;
+        at = at == segment.from ? segment.to : segment.from;
+        contour.push_back(crossing(at));
       }
       if (contour.size() >= 3) outline.contours.push_back(std::move(contour));
     }
@@ -106,8 +109,7 @@ class LeafSection {
   using Edge = std::uint64_t;  // [lower vertex:32 | higher vertex:32]
   static constexpr std::size_t kNone = ~std::size_t{0};
   struct Segment {
-    Edge end;
-    std::size_t next;  // another that starts at the same edge
+    Edge from, to;
     bool used;
   };
 
@@ -122,18 +124,25 @@ class LeafSection {
     while (above_[t[odd]] != (count == 1)) ++odd;
     const Edge from = edge(t[odd], t[(odd + 1) % 3]), to = edge(t[(odd + 2) % 3], t[odd]);
     // The region is to the left, seen from above.
-    const Edge start = count == 1 ? from : to, end = count == 1 ? to : from;
-    const auto [at, is_new] = starts_.try_emplace(start, segments_.size());
-    segments_.push_back({end, is_new ? kNone : at->second, false});
-    at->second = segments_.size() - 1;
+    segments_.push_back(count == 1 ? Segment{from, to, false} : Segment{to, from, false});
+    link(segments_.back().from);
+    // Faces that look opposite ways may meet: parity asks for closed lines, not for their sense.
+    if (leaf_.fill == Fill::kEvenOdd) link(segments_.back().to);
   }
 
-  std::size_t following(Edge start) {
-    const auto found = starts_.find(start);
-    if (found == starts_.end()) return kNone;
+  /// The last segment can be gone on with from `edge`.
+  void link(Edge edge) {
+    const auto [at, is_new] = last_link_.try_emplace(edge, links_.size());
+    links_.push_back({segments_.size() - 1, is_new ? kNone : at->second});
+    at->second = links_.size() - 1;
+  }
+
+  std::size_t following(Edge edge) {
+    const auto found = last_link_.find(edge);
+    if (found == last_link_.end()) return kNone;
     std::size_t& at = found->second;
-    while (at != kNone && segments_[at].used) at = segments_[at].next;
-    return at;
+    while (at != kNone && segments_[links_[at].segment].used) at = links_[at].before;
+    return at == kNone ? kNone : links_[at].segment;
   }
 
   glm::dvec2 crossing(Edge edge) const {
@@ -151,7 +160,11 @@ class LeafSection {
   std::vector<double> distances_;
   std::vector<bool> above_;
   std::vector<Segment> segments_;
-  std::unordered_map<Edge, std::size_t> starts_;  // an edge, the last segment that starts at it
+  struct Link {
+    std::size_t segment, before;  // the link before it at the same edge
+  };
+  std::vector<Link> links_;
+  std::unordered_map<Edge, std::size_t> last_link_;
 };
 
 /// The part of a tree below one node, ready to be cut.
@@ -179,8 +192,10 @@ class Cutter {
 
   [[nodiscard]] std::span<const Leaf> leaves() const { return leaves_; }
   [[nodiscard]] double scale() const { return scale_; }
-  /// Vertices nearer to a plane lie in it: planes agree to 1e-9 where they are taken as one.
-  [[nodiscard]] double tolerance() const { return 1e-8 * scale_; }
+  /// Vertices nearer to a plane lie in it. Corners of one polygon are off by some 1e-15 of the
+  /// scale, and by more, seen from the plane of a small triangle; corners that were stored as float
+  /// or with six digits are off by more than 1e-8, and their planes differ.
+  [[nodiscard]] double tolerance() const { return 1e-10 * scale_; }
 
   [[nodiscard]] Outline section(const Plane& plane, Side side) const {
     std::vector<Outline> results(reached_.size());
@@ -232,16 +247,60 @@ class Cutter {
   double scale_ = 0.0;
 };
 
-using PlaneKey = std::array<std::int64_t, 4>;
-struct HashPlane {
-  std::size_t operator()(const PlaneKey& key) const {
-    std::uint64_t hash = 0;
-    for (const std::int64_t part : key) {
-      hash = (hash ^ static_cast<std::uint64_t>(part)) * 0x9e3779b97f4a7c15u;
-      hash ^= hash >> 29;
+/// Planes, each once. They are found again by their numbers, rounded to a grid much coarser than
+/// the tolerance: a plane near the border of a cell is looked for in the next cell too.
+class Planes {
+ public:
+  explicit Planes(const Cutter& cutter)
+      : tolerance_(cutter.tolerance()), grain_{1e-6, 1e-6, 1e-6, 1e-6 * cutter.scale()} {}
+
+  /// Adds the plane of a triangle unless the triangle lies in one that is here.
+  void add(const std::array<glm::dvec3, 3>& corners, const glm::dvec3& normal) {
+    Cell low{}, step{};
+    const std::array<double, 4> numbers{normal.x, normal.y, normal.z, glm::dot(normal, corners[0])};
+    for (std::size_t i = 0; i < 4; ++i) {
+      const double at = numbers[i] / grain_[i];
+      low[i] = static_cast<std::int64_t>(std::floor(at));
+      step[i] = at - std::floor(at) < 0.5 ? -1 : 1;
     }
-    return hash;
+    for (unsigned choice = 0; choice < 16; ++choice) {
+      Cell cell = low;
+      for (std::size_t i = 0; i < 4; ++i) cell[i] += choice >> i & 1u ? step[i] : 0;
+      const auto found = cells_.find(cell);
+      if (found == cells_.end()) continue;
+      for (const std::size_t index : found->second) {
+        if (holds(planes_[index], corners)) return;
+      }
+    }
+    cells_[low].push_back(planes_.size());
+    planes_.push_back(make_plane(corners[0], normal));
   }
+
+  std::vector<Plane> take() { return std::move(planes_); }
+
+ private:
+  using Cell = std::array<std::int64_t, 4>;
+  struct HashCell {
+    std::size_t operator()(const Cell& cell) const {
+      std::uint64_t hash = 0;
+      for (const std::int64_t part : cell) {
+        hash = (hash ^ static_cast<std::uint64_t>(part)) * 0x9e3779b97f4a7c15u;
+        hash ^= hash >> 29;
+      }
+      return hash;
+    }
+  };
+
+  [[nodiscard]] bool holds(const Plane& plane, const std::array<glm::dvec3, 3>& corners) const {
+    return std::all_of(corners.begin(), corners.end(), [&](const glm::dvec3& p) {
+      return std::abs(glm::dot(p - plane.origin, plane.normal)) <= tolerance_;
+    });
+  }
+
+  double tolerance_;
+  std::array<double, 4> grain_;
+  std::vector<Plane> planes_;
+  std::unordered_map<Cell, std::vector<std::size_t>, HashCell> cells_;
 };
 
 bool meet(const Bounds& box, const glm::dvec3& low, const glm::dvec3& high, double margin) {
@@ -251,34 +310,27 @@ bool meet(const Bounds& box, const glm::dvec3& low, const glm::dvec3& high, doub
   return true;
 }
 
-/// The planes of all triangles that may be boundary, each once or, by rounding, twice.
+/// The planes of all triangles that may be boundary.
 std::vector<Plane> planes_of(const Cutter& cutter, const Bounds& box) {
-  std::unordered_map<PlaneKey, bool, HashPlane> seen;
-  std::vector<Plane> planes;
-  const double grain = 1e-9;
+  Planes planes(cutter);
   for (const Leaf& leaf : cutter.leaves()) {
     for (const glm::uvec3& t : leaf.triangles) {
-      const glm::dvec3 &a = leaf.positions[t.x], &b = leaf.positions[t.y], &c = leaf.positions[t.z];
-      if (!meet(box, glm::min(a, glm::min(b, c)), glm::max(a, glm::max(b, c)),
+      const std::array<glm::dvec3, 3> p{leaf.positions[t.x], leaf.positions[t.y],
+                                        leaf.positions[t.z]};
+      if (!meet(box, glm::min(p[0], glm::min(p[1], p[2])), glm::max(p[0], glm::max(p[1], p[2])),
                 cutter.tolerance())) {
         continue;
       }
-      glm::dvec3 normal = glm::cross(b - a, c - a);
+      glm::dvec3 normal = glm::cross(p[1] - p[0], p[2] - p[0]);
       const double length = glm::length(normal);
       // Without a direction that means something a triangle has no inside to bound.
       if (!(length > 1e-24 * cutter.scale() * cutter.scale())) continue;
       normal /= length;
       const int first = std::abs(normal.x) > 0.5 ? 0 : std::abs(normal.y) > 0.5 ? 1 : 2;
-      if (normal[first] < 0.0) normal = -normal;
-      PlaneKey key;
-      for (int i = 0; i < 3; ++i) {
-        key[static_cast<std::size_t>(i)] = std::llround(normal[i] / grain);
-      }
-      key[3] = std::llround(glm::dot(normal, a) / (grain * cutter.scale()));
-      if (seen.try_emplace(key, true).second) planes.push_back(make_plane(a, normal));
+      planes.add(p, normal[first] < 0.0 ? -normal : normal);
     }
   }
-  return planes;
+  return planes.take();
 }
 
 void add_pieces(TriangleSoup& mesh, const Plane& plane, const Outline& region, bool up) {

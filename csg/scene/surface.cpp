@@ -78,8 +78,8 @@ Result<HeightMap> read_numbers(const std::string& path) {
               map.heights.begin() + static_cast<std::ptrdiff_t>(row * columns));
     from = row_ends[row];
   }
-  double least = 1.0;
-  for (const double height : map.heights) least = std::min(least, height);
+  double least = 1.0;  // of the numbers that are there
+  for (const double number : numbers) least = std::min(least, number);
   map.floor = least - 1.0;
   return map;
 }

@@ -1,0 +1,358 @@
+#include <unistd.h>
+
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "csg/scene/import_xml.h"
+#include "csg/scene/scad.h"
+#include "csg/scene/surface.h"
+#include "mesh/diagnose.h"
+#include "mesh/shapes.h"
+#include "mesh/write_mesh.h"
+#include "tests/csg/scene_checks.h"
+
+namespace strata::csg {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A folder that goes with the test.
+class SceneFiles : public testing::Test {
+ protected:
+  SceneFiles() {
+    std::string name = (fs::temp_directory_path() / "strata-scene-XXXXXX").string();
+    if (::mkdtemp(name.data())) folder_ = name;
+  }
+  ~SceneFiles() override {
+    std::error_code ignored;
+    fs::remove_all(folder_, ignored);
+  }
+  std::string write(const std::string& name, std::string_view text) {
+    const fs::path path = folder_ / name;
+    fs::create_directories(path.parent_path());
+    std::ofstream(path, std::ios::binary) << text;
+    return path.string();
+  }
+  std::string write_box(const std::string& name, double size = 2.0) {
+    const std::string path = write(name, "");
+    EXPECT_TRUE(write_mesh(path, make_box(glm::dvec3(0), glm::dvec3(size))).has_value());
+    return path;
+  }
+  Scene read(const std::string& path, const ReadSceneOptions& options = {}) {
+    auto scene = read_scene(path, options);
+    EXPECT_TRUE(scene.has_value()) << scene.error().message;
+    return scene ? *std::move(scene) : Scene{};
+  }
+  fs::path folder_;
+};
+
+// --- files of a scene
+// -------------------------------------------------------------------------------
+
+TEST_F(SceneFiles, MeshesOfAllKindsAreImportedBesideTheScene) {
+  for (const char* name : {"a.stl", "b.off", "c.obj", "d.ply"}) {
+    write_box(name);
+    const Scene scene =
+        read(write("scene.csg", fmt::format("import(file = \"{}\", scale = 1);", name)));
+    EXPECT_EQ(codes_of(scene), "") << name;
+    EXPECT_NEAR(volume_of(scene), 8.0, 1e-6) << name;
+  }
+}
+
+TEST_F(SceneFiles, NamesAreRelativeToTheSceneOrAFolderAroundIt) {
+  write_box("meshes/a.stl");
+  write_box("up.stl");
+  const std::string text = "import(file = \"{}\");";
+  const auto solids = [&](const std::string& scene, const std::string& name) {
+    return read(write(scene, fmt::format(fmt::runtime(text), name))).tree.solids().size();
+  };
+  EXPECT_EQ(solids("scene.csg", "meshes/a.stl"), 1u);
+  EXPECT_EQ(solids("sub/scene.csg", "../meshes/a.stl"), 1u);
+  EXPECT_EQ(solids("sub/deep/scene.csg", "meshes/a.stl"), 1u);
+  EXPECT_EQ(solids("sub/deep/scene.csg", "up.stl"), 1u);
+  EXPECT_EQ(solids("other.csg", (folder_ / "up.stl").string()), 1u);
+  ReadSceneOptions options;
+  options.asset_folder = (folder_ / "meshes").string();
+  EXPECT_EQ(read(write("scene.csg", "import(file = \"a.stl\");"), options).tree.solids().size(),
+            1u);
+}
+
+TEST_F(SceneFiles, MissingFilesAreNamedAndLeftOut) {
+  const Scene scene = read(write("s.csg",
+                                 "cube();\n import(file = \"no.stl\"); surface(file = \"no.dat\");"
+                                 "import(file = \"no.svg\"); import(file = \"\");"));
+  EXPECT_EQ(codes_of(scene), "missing-file missing-file missing-file ");
+  EXPECT_NE(scene.warnings[0].message.find("s.csg:2:2: "), std::string::npos);
+  EXPECT_NE(scene.warnings[0].message.find("'no.stl'"), std::string::npos);
+  EXPECT_EQ(scene.tree.solids().size(), 1u);
+}
+
+TEST_F(SceneFiles, BrokenAndUnknownFilesAreNamedAndLeftOut) {
+  write("bad.stl", "solid x\nfacet normal 0 0 0\nouter loop\nvertex 1 2 blah\n");
+  write("bad.3mf", "no archive");
+  write("bad.amf", "<amf><object><mesh><vertices><vertex/></vertices></mesh></object></amf>");
+  write("x.nef3", "");
+  write("x.blend", "");
+  const Scene scene =
+      read(write("s.csg",
+                 "import(file=\"bad.stl\");import(file=\"bad.3mf\");import(file=\"bad.amf\");"
+                 "import(file=\"x.nef3\");import(file=\"x.blend\");"));
+  EXPECT_EQ(codes_of(scene), "geometry geometry geometry not-done not-done ");
+  EXPECT_NE(scene.warnings[3].message.find("Nef"), std::string::npos);
+  EXPECT_TRUE(scene.tree.solids().empty());
+}
+
+TEST_F(SceneFiles, ImportsAreReadOnceAndInspected) {
+  TriangleSoup box = make_box(glm::dvec3(0), glm::dvec3(2));
+  reverse_orientation(box);
+  ASSERT_TRUE(write_mesh(write("inside_out.off", ""), box).has_value());
+  box.triangles.pop_back();
+  ASSERT_TRUE(write_mesh(write("open.off", ""), box).has_value());
+  const Scene scene = read(write("s.csg",
+                                 "import(file=\"inside_out.off\"); import(file=\"inside_out.off\");"
+                                 "import(file=\"open.off\");"));
+  EXPECT_EQ(codes_of(scene), "geometry geometry ");
+  const auto solids = scene.tree.solids();
+  ASSERT_EQ(solids.size(), 3u);
+  EXPECT_EQ(solids[0].mesh, solids[1].mesh);
+  EXPECT_NEAR(signed_volume(*solids[0].mesh), 8.0, 1e-12);
+}
+
+TEST_F(SceneFiles, CentredImportsStandAboutTheOrigin) {
+  write_box("a.stl");
+  const Scene scene = read(write("s.csg", "import(file = \"a.stl\", center = true);"));
+  expect_box(box_of(scene), {-1, -1, -1}, {1, 1, 1}, 1e-6);
+}
+
+TEST_F(SceneFiles, TheDeprecatedFormsTakeAFileInPlaceOfChildren) {
+  write_box("a.stl");
+  const Scene scene = read(write("s.csg", "projection(file = \"a.stl\", cut = false);"));
+  EXPECT_TRUE(scene.flat);
+  EXPECT_NEAR(volume_of(scene), 4.0, 1e-5);
+  EXPECT_EQ(codes_of(read(write("t.csg",
+                                "linear_extrude(file = \"no.dxf\", layer = \"a\");"
+                                "rotate_extrude(file = \"no.dxf\");"))),
+            "missing-file missing-file ");
+}
+
+TEST_F(SceneFiles, UnreadableScenesAreErrors) {
+  for (const std::string& path : {(folder_ / "no.csg").string(), folder_.string()}) {
+    const auto scene = read_scene(path);
+    ASSERT_FALSE(scene.has_value());
+    EXPECT_EQ(scene.error().code, ErrorCode::kInput);
+    EXPECT_NE(scene.error().message.find(path), std::string::npos);
+  }
+}
+
+// --- 3MF and AMF
+// --------------------------------------------------------------------------------------
+
+constexpr std::string_view kTetra =
+    "<mesh><vertices><vertex><coordinates><x>0</x><y>0</y><z>0</z></coordinates></vertex>"
+    "<vertex><coordinates><x> 1 </x><y>0</y><z>0</z></coordinates></vertex>"
+    "<vertex><coordinates><x>0</x><y>1</y><z>0</z></coordinates></vertex>"
+    "<vertex><coordinates><x>0</x><y>0</y><z>1</z></coordinates></vertex></vertices>"
+    "<volume><triangle><v1>0</v1><v2>2</v2><v3>1</v3></triangle>"
+    "<triangle><v1>0</v1><v2>1</v2><v3>3</v3></triangle>"
+    "<triangle><v1>0</v1><v2>3</v2><v3>2</v3></triangle>"
+    "<triangle><v1>1</v1><v2>2</v2><v3>3</v3></triangle></volume></mesh>";
+
+TEST_F(SceneFiles, AmfVolumesAreOneSoup) {
+  const std::string object = "<object>" + std::string(kTetra) + "</object>";
+  auto mesh =
+      read_amf(write("a.amf", "<?xml version=\"1.0\"?>\n<amf>" + object + object + "</amf>"));
+  if (!mesh && mesh.error().code == ErrorCode::kUsage) GTEST_SKIP() << mesh.error().message;
+  ASSERT_TRUE(mesh.has_value()) << mesh.error().message;
+  EXPECT_EQ(mesh->triangles.size(), 8u);
+  EXPECT_TRUE(is_closed(*mesh));
+  EXPECT_NEAR(signed_volume(*mesh), 2.0 / 6, 1e-12);
+}
+
+TEST_F(SceneFiles, BrokenAmfNamesTheLine) {
+  const auto message = [&](std::string from, const std::string& to) {
+    std::string text = "<amf>\n<object>\n" + std::string(kTetra) + "</object></amf>";
+    text.replace(text.find(from), from.size(), to);
+    const auto mesh = read_amf(write("a.amf", text));
+    EXPECT_FALSE(mesh.has_value());
+    return mesh ? std::string() : mesh.error().message;
+  };
+  if (message("<v3>3</v3>", "<v3>4</v3>").find("libpugixml") != std::string::npos) {
+    GTEST_SKIP() << "no pugixml";
+  }
+  EXPECT_NE(message("<v3>3</v3>", "<v3>4</v3>")
+                .find("a.amf:3: a triangle refers to vertex 4, the mesh has 4"),
+            std::string::npos);
+  EXPECT_NE(message("<v3>3</v3>", "<v3>-1</v3>").find("a.amf:3: '-1' is no index"),
+            std::string::npos);
+  EXPECT_NE(message("<x> 1 </x>", "<x>one</x>").find("a.amf:3: a vertex without a usable x"),
+            std::string::npos);
+  EXPECT_NE(message("</object>", "</objekt>").find("a.amf:3: "), std::string::npos);
+}
+
+std::string asset(const std::string& name) {
+  return std::string(STRATA_SOURCE_DIR) + "/../shared/csg/tests/" + name;
+}
+
+TEST(SceneAssets, ThreeMfOfLib3mfIsRead) {
+  const std::string path = asset("3mf/far-out-ring.3mf");
+  if (!fs::exists(path)) GTEST_SKIP() << path << " is not there";
+  const auto mesh = read_3mf(path);
+  if (!mesh && mesh.error().code == ErrorCode::kUsage) GTEST_SKIP() << mesh.error().message;
+  ASSERT_TRUE(mesh.has_value()) << mesh.error().message;
+  EXPECT_TRUE(is_closed(*mesh));
+  EXPECT_EQ(mesh->triangles.size(), 3072u);
+}
+
+TEST(SceneAssets, ZippedAmfIsRead) {
+  const std::string path = asset("amf/split_pyramid.amf");
+  if (!fs::exists(path)) GTEST_SKIP() << path << " is not there";
+  const auto mesh = read_amf(path);
+  if (!mesh && mesh.error().code == ErrorCode::kUsage) GTEST_SKIP() << mesh.error().message;
+  ASSERT_TRUE(mesh.has_value()) << mesh.error().message;
+  EXPECT_NEAR(signed_volume(*mesh), 1.0 / 3, 1e-9);
+}
+
+// --- surface
+// -------------------------------------------------------------------------------------------
+
+TEST_F(SceneFiles, SurfacesStandOnAFloorBelowTheLowestPoint) {
+  const auto mesh =
+      read_surface(write("a.dat", "# a comment\n1 2 3\n\n 4 5 6 # more\n"), false, false);
+  ASSERT_TRUE(mesh.has_value()) << mesh.error().message;
+  EXPECT_TRUE(is_closed(*mesh));
+  const Bounds box = bounds(*mesh);
+  expect_box(box, {0, 0, 0}, {2, 1, 6});
+  // Two cells of four triangles each, whose middle is the mean: the volume is that of the means.
+  EXPECT_NEAR(signed_volume(*mesh), (1 + 2 + 4 + 5) / 4.0 + (2 + 3 + 5 + 6) / 4.0, 1e-12);
+  EXPECT_EQ(mesh->positions[0], glm::dvec3(0, 0, 1));
+  EXPECT_EQ(mesh->positions[5], glm::dvec3(2, 1, 6));
+}
+
+TEST_F(SceneFiles, FloorsGoDownWithNegativeHeights) {
+  const auto mesh = read_surface(write("a.dat", "-5 2\n3 4\n"), true, false);
+  ASSERT_TRUE(mesh.has_value());
+  expect_box(bounds(*mesh), {-0.5, -0.5, -6}, {0.5, 0.5, 4});
+  const auto high = read_surface(write("b.dat", "5 7\n8 9\n"), false, false);
+  ASSERT_TRUE(high.has_value());
+  EXPECT_EQ(bounds(*high).low.z, 0.0);
+  const auto uneven = read_surface(write("c.dat", "5 7\n8\n"), false, false);
+  ASSERT_TRUE(uneven.has_value());
+  EXPECT_TRUE(is_closed(*uneven));
+  expect_box(bounds(*uneven), {0, 0, 0}, {1, 1, 8});
+}
+
+TEST_F(SceneFiles, BadSurfacesAreRefused) {
+  for (const char* text : {"", "1\n", "1 2 3\n", "1 x\n2 3\n", "1 2\nnan 3\n", "1 2\n3 4e\n"}) {
+    const auto mesh = read_surface(write("a.dat", text), false, false);
+    ASSERT_FALSE(mesh.has_value()) << text;
+    EXPECT_EQ(mesh.error().code, ErrorCode::kInput);
+  }
+  EXPECT_FALSE(read_surface(write("a.png", "no picture"), false, false).has_value());
+}
+
+/// 3 x 2 pixels: red, green, blue above grey 51, grey 102, white.
+constexpr char kPicture[] =
+    "\211\120\116\107\015\012\032\012\000\000\000\015\111\110\104\122\000\000\000\003\000"
+    "\000\000\002\010\002\000\000\000\022\026\361\115\000\000\000\030\111\104\101\124\170"
+    "\332\143\370\317\300\300\000\301\306\306\306\151\151\151\377\377\377\007\000\075\243"
+    "\007\306\141\155\026\116\000\000\000\000\111\105\116\104\256\102\140\202";
+
+TEST_F(SceneFiles, PicturesAreHeightMapsWithTheLastRowInFront) {
+  const std::string path = write("a.png", {kPicture, sizeof kPicture - 1});
+  const auto mesh = read_surface(path, false, false), turned = read_surface(path, false, true);
+  ASSERT_TRUE(mesh.has_value()) << mesh.error().message;
+  ASSERT_TRUE(turned.has_value());
+  EXPECT_TRUE(is_closed(*mesh));
+  const double heights[] = {20, 40, 100, 21.26, 71.52, 7.22};
+  for (std::size_t i = 0; i < 6; ++i) {
+    EXPECT_NEAR(mesh->positions[i].z, heights[i], 1e-9) << i;
+    EXPECT_NEAR(turned->positions[i].z, 100 - heights[i], 1e-9) << i;
+  }
+  expect_box(bounds(*mesh), {0, 0, 6.22}, {2, 1, 100});
+}
+
+// --- programs
+// -----------------------------------------------------------------------------------------
+
+/// Puts a folder before all others that programs are looked for in, or instead of them.
+class ProgramPath {
+ public:
+  explicit ProgramPath(const std::string& path) : old_(std::getenv("PATH")) {
+    ::setenv("PATH", path.c_str(), 1);
+  }
+  ~ProgramPath() { ::setenv("PATH", old_.c_str(), 1); }
+  [[nodiscard]] const std::string& old() const { return old_; }
+
+ private:
+  std::string old_;
+};
+
+TEST_F(SceneFiles, WithoutOpenscadAProgramSaysWhatToDo) {
+  const std::string path = write("a.scad", "cube();");
+  const ProgramPath nothing(folder_.string());
+  const auto scene = read_scene(path);
+  ASSERT_FALSE(scene.has_value());
+  EXPECT_EQ(scene.error().code, ErrorCode::kInput);
+  EXPECT_NE(scene.error().message.find("install the package openscad"), std::string::npos);
+  EXPECT_NE(scene.error().message.find("openscad -o scene.csg"), std::string::npos);
+}
+
+TEST_F(SceneFiles, TheOutputOfOpenscadIsRead) {
+  const std::string path = write("a.scad", "anything");
+  const std::string fake = write("openscad", "#!/bin/sh\necho 'cube([2,1,1]);' > \"$2\"\n");
+  fs::permissions(fake, fs::perms::owner_all);
+  const ProgramPath first(folder_.string() + ":" + std::getenv("PATH"));
+  EXPECT_NEAR(volume_of(read(path)), 2.0, 1e-9);
+}
+
+TEST_F(SceneFiles, WhatOpenscadSaysIsReported) {
+  const std::string path = write("a.scad", "anything");
+  const std::string fake =
+      write("openscad", "#!/bin/sh\necho 'ERROR: Parser error in line 3' >&2\nexit 1\n");
+  fs::permissions(fake, fs::perms::owner_all);
+  const ProgramPath first(folder_.string() + ":" + std::getenv("PATH"));
+  const auto scene = read_scene(path);
+  ASSERT_FALSE(scene.has_value());
+  EXPECT_NE(scene.error().message.find("Parser error in line 3"), std::string::npos)
+      << scene.error().message;
+}
+
+TEST_F(SceneFiles, OpenscadIsEndedInTimeOrOnAStop) {
+  const std::string path = write("a.scad", "anything");
+  const std::string fake = write("openscad", "#!/bin/sh\nsleep 600\n");
+  fs::permissions(fake, fs::perms::owner_all);
+  const ProgramPath first(folder_.string() + ":" + std::getenv("PATH"));
+  ReadSceneOptions options;
+  options.scad_timeout_s = 0.2;
+  const auto late = read_scene(path, options);
+  ASSERT_FALSE(late.has_value());
+  EXPECT_NE(late.error().message.find("more than 0.2 s"), std::string::npos);
+  std::stop_source source;
+  source.request_stop();
+  Execution execution;
+  execution.stop = source.get_token();
+  const auto stopped = run_openscad(path, 600, execution);
+  ASSERT_FALSE(stopped.has_value());
+  EXPECT_EQ(stopped.error().code, ErrorCode::kCancelled);
+}
+
+TEST_F(SceneFiles, RealProgramsAreRunWhereOpenscadIsInstalled) {
+  if (std::system("openscad --version > /dev/null 2>&1") != 0) {
+    GTEST_SKIP() << "openscad is not installed";
+  }
+  write_box("box.stl", 3.0);
+  const Scene scene =
+      read(write("a.scad", "for (i = [0:2]) translate([10 * i, 0, 0]) import(\"box.stl\");"));
+  EXPECT_EQ(codes_of(scene), "");
+  EXPECT_NEAR(volume_of(scene), 81.0, 1e-5);
+  const auto broken = read_scene(write("b.scad", "cube(;"));
+  ASSERT_FALSE(broken.has_value());
+  EXPECT_NE(broken.error().message.find("openscad failed"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace strata::csg
