@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 /// Lines a file may make, through blocks in blocks.
-constexpr std::size_t kMostLines = 20'000'000;
+constexpr std::size_t kMostLines = 5'000'000;
 constexpr int kDeepest = 64;
 
 /// Numbers of an entity by group code.
