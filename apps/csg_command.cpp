@@ -1,9 +1,13 @@
+#include <algorithm>
 #include <utility>
 
 #include "apps/commands.h"
+#include "apps/csg_report.h"
 #include "apps/csg_scene.h"
 #include "apps/session.h"
 #include "csg/picture.h"
+#include "csg/result_bounds.h"
+#include "csg/write_depth.h"
 
 namespace strata::apps {
 namespace {
@@ -15,10 +19,11 @@ void add(Bounds& box, const Bounds& other) {
 }
 
 /// What the camera should see.
-Bounds visible_box(const csg::Scene& scene) {
-  Bounds box = csg::bounds(scene.tree, scene.tree.root());
+Result<Bounds> visible_box(const csg::Scene& scene, const Execution& execution) {
+  auto box = csg::result_bounds(scene.tree, scene.tree.root(), scene.relative_precision, execution);
+  if (!box) return box;
   for (const auto* ghosts : {&scene.backgrounds, &scene.highlights}) {
-    for (const csg::Tree::NodeId ghost : *ghosts) add(box, csg::bounds(scene.tree, ghost));
+    for (const csg::Tree::NodeId ghost : *ghosts) add(*box, csg::bounds(scene.tree, ghost));
   }
   return box;
 }
@@ -34,32 +39,130 @@ std::vector<csg::Ghost> ghosts_of(const csg::Scene& scene) {
   return ghosts;
 }
 
+std::uint64_t triangles_of(const csg::Tree& tree) {
+  std::uint64_t count = 0;
+  for (const csg::Solid& solid : tree.solids()) {
+    if (solid.mesh) count += solid.mesh->triangles.size();
+  }
+  return count;
+}
+
+/// Why nothing is seen.
+std::string why_empty(const CsgCommand& command, const csg::Preview& preview, const Bounds& box,
+                      const Session& session) {
+  const std::string& name = command.input.files.front();
+  const std::string more = command.input.files.size() > 1
+                               ? fmt::format(" and {} more", command.input.files.size() - 1)
+                               : std::string();
+  const auto because = [&](std::string_view why) {
+    return fmt::format("{}{}: the picture is empty: {}", name, more, why);
+  };
+  if (triangles_of(preview.tree()) == 0) {
+    return because(session.warnings().empty()
+                       ? "there is no solid in the scene"
+                       : "what the warnings name is all that there is in the scene");
+  }
+  if (box.empty()) {
+    return because(fmt::format("of {} its operations leave nothing",
+                               counted(preview.tree().solids().size(), "solid")));
+  }
+  return because(fmt::format(
+      "nothing is in the camera's view; what there is lies between ({:.6g}, {:.6g}, {:.6g}) and "
+      "({:.6g}, {:.6g}, {:.6g}){}",
+      box.low.x, box.low.y, box.low.z, box.high.x, box.high.y, box.high.z,
+      command.cuts.empty() ? "" : ", before --cut"));
+}
+
+/// The pictures of numbers: solids and distances, one sample a pixel.
+Result<void> write_numbers(const CsgCommand& command, const csg::Camera& camera,
+                           csg::Preview& preview, CsgOutcome& outcome, Session& session) {
+  const auto view = csg::make_view(camera, command.size, preview.box());
+  if (!view) return tl::unexpected(view.error());
+  const auto image = preview.draw(*view, session.execution("drawing"));
+  if (!image) return tl::unexpected(image.error());
+  const csg::SurfaceImage& surfaces = **image;
+  if (!command.depth.empty()) {
+    if (auto done = csg::write_depth_exr(surfaces, *view, command.depth); !done) return done;
+  }
+  if (command.ids.empty()) return {};
+  csg::Picture ids{surfaces.width, surfaces.height, {}};
+  ids.pixels.resize(surfaces.depth.size(), csg::Rgba(0, 0, 0, 255));
+  std::vector<bool> seen(preview.tree().solids().size(), false);
+  for (std::size_t i = 0; i < ids.pixels.size(); ++i) {
+    if (surfaces.depth[i] == csg::SurfaceImage::kNone) continue;
+    ids.pixels[i] = colour_of_solid(surfaces.solid[i]);
+    seen[surfaces.solid[i]] = true;
+  }
+  for (std::uint32_t solid = 0; solid < seen.size(); ++solid) {
+    if (!seen[solid]) continue;
+    outcome.seen.push_back(solid);
+    outcome.names.push_back(preview.tree().solids()[solid].name);
+  }
+  return csg::write_png(ids, command.ids);
+}
+
 }  // namespace
 
 Result<void> run_csg(const CsgCommand& command, Session& session) {
+  CsgOutcome outcome;
   auto scene = load_scene(command, session);
   if (!scene) return tl::unexpected(scene.error());
   if (auto strict = session.check_strict(); !strict) return strict;
+  outcome.read_ms = session.milliseconds();
+  outcome.flat = scene->flat;
+  outcome.solids = scene->tree.solids().size();
+  outcome.nodes = scene->tree.nodes().size();
+  outcome.triangles = triangles_of(scene->tree);
 
-  csg::Camera camera = command.camera;
-  const Bounds box = visible_box(*scene);
+  csg::Camera& camera = outcome.camera;
+  camera = command.camera;
+  Bounds box;
+  if (command.auto_centre || command.view_all) {
+    auto visible = visible_box(*scene, session.execution("measuring"));
+    if (!visible) return tl::unexpected(visible.error());
+    box = *visible;
+  }
   if (command.auto_centre) csg::centre_camera(camera, box);
-  if (command.view_all) csg::fit_camera(camera, box);
+  if (command.view_all) {
+    csg::fit_camera(camera, box, static_cast<double>(command.size.x) / command.size.y);
+    if (!(camera.distance > 0)) camera.distance = csg::Camera{}.distance;  // nothing to fit
+  }
   cut_scene(*scene, command.cuts, camera);
-
   const Execution execution = session.execution("drawing");
   std::vector<csg::Ghost> ghosts = ghosts_of(*scene);
   csg::Preview preview(std::move(scene->tree), std::move(ghosts), scene->relative_precision,
                        execution);
+  outcome.prepare_ms = session.milliseconds() - outcome.read_ms;
+
+  double begin = session.milliseconds();
   auto picture = preview.picture(camera, command.size, command.picture, execution);
   if (!picture) return tl::unexpected(picture.error());
-  session.note(
-      fmt::format("{}, {}, {} pixels covered", counted(preview.tree().solids().size(), "solid"),
-                  counted(preview.report().fragments, "crossing"), preview.report().covered));
+  outcome.drawn = preview.report();
+  outcome.draw_ms = session.milliseconds() - begin;
+  if (outcome.drawn.covered == 0) {
+    if (box.empty()) {
+      const csg::Tree& tree = preview.tree();
+      auto bounds = csg::result_bounds(tree, tree.root(), 0, session.execution("measuring"));
+      if (bounds) box = *bounds;
+    }
+    session.warn("empty", why_empty(command, preview, box, session));
+    if (auto strict = session.check_strict(); !strict) return strict;
+  }
+  session.note(fmt::format("{}, {}, {} of {} covered", counted(outcome.solids, "solid"),
+                           counted(outcome.drawn.fragments, "crossing"), outcome.drawn.covered,
+                           counted(picture->pixels.size(), "pixel")));
+
+  begin = session.milliseconds();
   if (!command.output.empty()) {
     if (auto done = csg::write_png(*picture, command.output); !done) return done;
   }
-  return {};
+  if (!command.ids.empty() || !command.depth.empty()) {
+    if (auto done = write_numbers(command, camera, preview, outcome, session); !done) return done;
+  }
+  outcome.write_ms = session.milliseconds() - begin;
+  session.end_progress();
+  if (!command.json) return {};
+  return print_report(csg_json(command, outcome, session), *command.json, command.output == "-");
 }
 
 }  // namespace strata::apps

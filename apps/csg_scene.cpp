@@ -147,6 +147,22 @@ std::shared_ptr<const TriangleSoup> half_space(const glm::dvec3& normal, double 
   return std::make_shared<const TriangleSoup>(transform(box, place));
 }
 
+/// What the unions at the top of the tree unite.
+std::vector<Tree::NodeId> united(const Tree& tree) {
+  std::vector<Tree::NodeId> stack{tree.root()}, parts;
+  while (!stack.empty()) {
+    const Tree::NodeId id = stack.back();
+    stack.pop_back();
+    if (tree.nodes()[id].operation != Operation::kUnion) {
+      parts.push_back(id);
+      continue;
+    }
+    const auto operands = tree.operands(id);
+    stack.insert(stack.end(), operands.rbegin(), operands.rend());
+  }
+  return parts;
+}
+
 }  // namespace
 
 Result<csg::Scene> load_scene(const CsgCommand& command, Session& session) {
@@ -191,6 +207,10 @@ void cut_scene(csg::Scene& scene, const std::vector<SectionPlane>& cuts,
   const glm::dvec3 centre = 0.5 * box.low + 0.5 * box.high;
   const glm::dvec3 to_eye =
       glm::transpose(glm::dmat3(csg::eye_from_world(camera))) * glm::dvec3(0, 0, 1);
+  const auto solids = scene.tree.solids();
+  const bool has_translucent = std::any_of(solids.begin(), solids.end(), [](const auto& solid) {
+    return solid.colour && solid.colour->a < 1.0f;
+  });
   for (std::size_t i = 0; i < cuts.size(); ++i) {
     glm::dvec3 normal = cuts[i].normal;
     double offset = cuts[i].offset;
@@ -207,7 +227,16 @@ void cut_scene(csg::Scene& scene, const std::vector<SectionPlane>& cuts,
       const Tree::NodeId half = scene.tree.add_solid(std::move(solid));
       return scene.tree.add(Operation::kDifference, {node, half});
     };
-    if (scene.tree.root() != Tree::kNone) scene.tree.set_root(cut(scene.tree.root()));
+    if (scene.tree.root() != Tree::kNone) {
+      // Translucent solids stay children of the root's union.
+      std::vector<Tree::NodeId> parts;
+      if (has_translucent) {
+        parts = united(scene.tree);
+        for (Tree::NodeId& part : parts) part = cut(part);
+      }
+      scene.tree.set_root(has_translucent ? scene.tree.add(Operation::kUnion, parts)
+                                          : cut(scene.tree.root()));
+    }
     for (Tree::NodeId& ghost : scene.backgrounds) ghost = cut(ghost);
     for (Tree::NodeId& ghost : scene.highlights) ghost = cut(ghost);
   }

@@ -1,11 +1,13 @@
 #include <algorithm>
-#include <cmath>
+#include <bit>
 #include <glm/geometric.hpp>
-#include <glm/matrix.hpp>
+#include <new>
 #include <numeric>
 
+#include "csg/ghosts.h"
 #include "csg/picture.h"
 #include "csg/program.h"
+#include "csg/shade.h"
 #include "csg/tile_surface.h"
 
 namespace strata::csg {
@@ -88,7 +90,6 @@ class Frame {
     const std::size_t pixels =
         static_cast<std::size_t>(view.size.x) * static_cast<std::size_t>(view.size.y);
     for (auto* plane : {&image_.depth, &image_.solid, &image_.triangle}) plane->resize(pixels);
-    finders_.clear();
     report_ = {};
     solids_.build(view_parts_, tiles_u_, tiles_v_);
     std::vector<std::uint32_t> tiles(static_cast<std::size_t>(tiles_u_ * tiles_v_));
@@ -130,6 +131,7 @@ class Frame {
       finders_.push_back(std::make_unique<TileFinder>(*program_, view_parts_, geometry_->parts(),
                                                       view_, coincidence_));
     }
+    for (const auto& finder : finders_) finder->reset_counts();
     parallel_for(execution, tiles.size(), [&](std::size_t i, int worker) {
       const auto tile = static_cast<int>(tiles[i]);
       finders_[static_cast<std::size_t>(worker)]->find(
@@ -157,111 +159,182 @@ class Frame {
   DrawReport report_;
 };
 
-constexpr ColourScheme kSchemes[] = {
-    {"Cornfield", {0xff, 0xff, 0xe5}, {0xf9, 0xd7, 0x2c}, {0x9d, 0xcb, 0x51}},
-    {"Metallic", {0xaa, 0xaa, 0xff}, {0xdd, 0xdd, 0xff}, {0xdd, 0x22, 0xdd}},
-    {"Sunset", {0xaa, 0x44, 0x44}, {0xff, 0xaa, 0xaa}, {0x88, 0x22, 0x33}},
-    {"Starnight", {0x00, 0x00, 0x00}, {0xff, 0xff, 0xe0}, {0x00, 0xff, 0xff}},
-    {"BeforeDawn", {0x33, 0x33, 0x33}, {0xcc, 0xcc, 0xcc}, {0x55, 0x63, 0xdd}},
-    {"Nature", {0xfa, 0xfa, 0xfa}, {0x16, 0xa0, 0x85}, {0xdb, 0xf4, 0xda}},
-    {"DeepOcean", {0x33, 0x33, 0x33}, {0xee, 0xee, 0xee}, {0x0b, 0xab, 0xc8}},
-    {"Solarized", {0xfd, 0xf6, 0xe3}, {0xb5, 0x88, 0x00}, {0x88, 0x22, 0x33}},
-    {"Tomorrow", {0xf8, 0xf8, 0xf8}, {0x42, 0x71, 0xae}, {0xf5, 0x87, 0x1f}},
-    {"Tomorrow Night", {0x1d, 0x1f, 0x21}, {0x81, 0xa2, 0xbe}, {0xde, 0x93, 0x5f}},
-    {"Monotone", {0xff, 0xff, 0xe5}, {0xf9, 0xd7, 0x2c}, {0xf9, 0xd7, 0x2c}},
-};
+/// Samples of a picture that are drawn at once: memory stays bounded.
+constexpr std::int64_t kSamplesAtOnce = std::int64_t{1} << 22;
 
-/// Light on a flat face: two directional lights of the eye, and what comes from everywhere.
-class Shader {
- public:
-  Shader(const Tree& tree, const Geometry& geometry, const View& view, const ColourScheme& scheme)
-      : tree_(&tree), geometry_(&geometry), eye_from_world_(glm::dmat3(view.eye_from_world)) {
-    face_ = glm::vec4(glm::vec3(scheme.face) / 255.0f, 1.0f);
-    cut_ = glm::vec4(glm::vec3(scheme.cut) / 255.0f, 1.0f);
+/// The part of a view that begins at row `first` of the picture and has `rows` rows, each pixel
+/// `across` x `down` samples.
+View band_of(const View& view, int first, int rows, int across, int down) {
+  View band = view;
+  band.size = {view.size.x * across, rows * down};
+  // Rows of the matrix: u w, v w, depth w, w.
+  for (int column = 0; column < 4; ++column) {
+    glm::dvec4& m = band.image_from_world[column];
+    m.x *= across;
+    m.y = (m.y - first * m.w) * down;
   }
-
-  /// How bright the face is; it is seen from its other side at an exit.
-  [[nodiscard]] float light(std::uint32_t solid, std::uint32_t triangle, bool exit) const {
-    const Geometry::Part& part = geometry_->parts()[solid];
-    const glm::uvec3& t = part.triangles[triangle];
-    const glm::dvec3& a = part.positions[t.x];
-    const glm::dvec3 across =
-        eye_from_world_ * glm::cross(part.positions[t.y] - a, part.positions[t.z] - a);
-    const double length = glm::length(across);
-    if (!(length > 0)) return 1.0f;
-    const glm::dvec3 normal = across / (exit ? -length : length);
-    const double third = 1.0 / std::sqrt(3.0);
-    const double one = std::max(0.0, glm::dot(normal, glm::dvec3(-third, third, third)));
-    const double other = std::max(0.0, glm::dot(normal, glm::dvec3(third, -third, -third)));
-    return static_cast<float>(std::min(1.0, 0.2 + one + other));
-  }
-  [[nodiscard]] glm::vec4 base(std::uint32_t solid, bool exit) const {
-    const auto& colour = tree_->solids()[solid].colour;
-    return colour ? *colour : exit ? cut_ : face_;
-  }
-
- private:
-  const Tree* tree_;
-  const Geometry* geometry_;
-  glm::dmat3 eye_from_world_;
-  glm::vec4 face_, cut_;
-};
-
-Rgba to_bytes(const glm::vec4& colour) {
-  return Rgba(glm::clamp(colour, 0.0f, 1.0f) * 255.0f + 0.5f);
+  return band;
 }
 
 }  // namespace
 
-std::span<const ColourScheme> colour_schemes() { return kSchemes; }
-
-const ColourScheme* find_colour_scheme(std::string_view name) {
-  const auto same = [](char a, char b) { return std::tolower(a) == std::tolower(b); };
-  for (const ColourScheme& scheme : kSchemes) {
-    if (std::equal(scheme.name.begin(), scheme.name.end(), name.begin(), name.end(), same)) {
-      return &scheme;
-    }
-  }
-  return nullptr;
-}
-
 struct Preview::Impl {
-  Impl(Tree t, std::vector<Ghost> g, double relative_precision, const Execution& execution)
+  Impl(Tree t, std::span<const Ghost> given, double relative_precision, const Execution& execution)
       : tree(std::move(t)),
-        ghosts(std::move(g)),
+        opaque_root(take_translucent(tree, translucent)),
         geometry(tree, execution),
-        program(compile(tree, tree.root())),
-        frame(program, geometry, world_error(relative_precision)) {}
-  [[nodiscard]] double world_error(double relative_precision) const {
+        program(compile(tree, opaque_root)),
+        error(world_error(geometry, relative_precision)),
+        frame(program, geometry, error),
+        painter(tree, with_ghosts(given), geometry, error) {}
+
+  static double world_error(const Geometry& geometry, double relative_precision) {
     const Bounds& box = geometry.box();
     if (box.empty()) return 0;
     const glm::dvec3 reach = glm::max(glm::abs(box.low), glm::abs(box.high));
     return relative_precision * glm::length(reach);
   }
+  std::span<const Translucent> with_ghosts(std::span<const Ghost> given) {
+    for (const Ghost& ghost : given) translucent.push_back({ghost.node, ghost.colour});
+    return translucent;
+  }
+
+  Result<const SurfaceImage*> draw(const View& view, const Execution& execution) {
+    if (auto done = frame.draw(view, execution); !done) return tl::unexpected(done.error());
+    return surfaces();
+  }
+
+  /// The frame's image with triangles of the meshes: those of a solid that the near plane cuts are
+  /// numbered otherwise.
+  const SurfaceImage* surfaces() {
+    const auto& parts = frame.view_parts();
+    report = frame.report();
+    report_covers = false;
+    if (std::none_of(parts.begin(), parts.end(), [](const ViewPart& p) { return p.cut; })) {
+      return &frame.image();
+    }
+    with_sources = frame.image();
+    for (std::size_t i = 0; i < with_sources.depth.size(); ++i) {
+      if (with_sources.depth[i] == SurfaceImage::kNone) continue;
+      std::uint32_t& face = with_sources.triangle[i];
+      const std::uint32_t exit = face & SurfaceImage::kExit;
+      face = parts[with_sources.solid[i]].source(face & ~SurfaceImage::kExit) | exit;
+    }
+    return &with_sources;
+  }
+
+  Result<Picture> picture(const Camera& camera, const glm::ivec2& size,
+                          const PictureOptions& options, const Execution& execution);
 
   Tree tree;
-  std::vector<Ghost> ghosts;
+  std::vector<Translucent> translucent;
+  Tree::NodeId opaque_root;
   Geometry geometry;
   Program program;
+  double error;
   Frame frame;
+  GhostPainter painter;
   SurfaceImage with_sources;
+  DrawReport report;
+  bool report_covers = false;  ///< report.covered is known
 };
+
+Result<Picture> Preview::Impl::picture(const Camera& camera, const glm::ivec2& size,
+                                       const PictureOptions& options, const Execution& execution) {
+  if (options.samples < 1 || options.samples > 64 ||
+      !std::has_single_bit(static_cast<unsigned>(options.samples))) {
+    return fail(ErrorCode::kUsage, "{} samples a pixel: 1, 2, 4, 8, 16, 32 or 64 can be had",
+                options.samples);
+  }
+  // As square a grid as can be.
+  const int bits = std::countr_zero(static_cast<unsigned>(options.samples));
+  const int across = 1 << ((bits + 1) / 2), down = 1 << (bits / 2);
+  const auto whole = make_view(camera, size, geometry.box());
+  if (!whole) return tl::unexpected(whole.error());
+  if (size.x > kMaxPictureSide / across) {
+    return fail(ErrorCode::kUsage, "{} pixels of {} samples in a row: {} samples can be had",
+                size.x, across, kMaxPictureSide);
+  }
+  const ColourScheme& scheme =
+      options.scheme != nullptr ? *options.scheme : colour_schemes().front();
+  const Shader shader(tree, geometry, *whole, scheme);
+  const Rgba background = options.transparent_background ? Rgba(0) : Rgba(scheme.background, 255);
+  Picture result{size.x, size.y, {}};
+  const auto width = static_cast<std::size_t>(size.x);
+  result.pixels.resize(width * static_cast<std::size_t>(size.y));
+  // One row of tiles at least.
+  const std::int64_t samples_a_row = std::int64_t{size.x} * across * down;
+  const int rows_at_once = static_cast<int>(std::clamp<std::int64_t>(
+      kSamplesAtOnce / samples_a_row, std::max(1, kTileSide / down), size.y));
+  const bool direct = options.samples == 1 && painter.empty();
+  std::vector<Rgba> samples;
+  DrawReport total;
+  for (int first = 0; first < size.y; first += rows_at_once) {
+    const int rows = std::min(rows_at_once, size.y - first);
+    // Edges look one row down.
+    const int drawn = options.edges ? std::min(rows + 1, size.y - first) : rows;
+    Execution part = execution;
+    if (execution.progress) {
+      part.progress = [&](double done) {
+        execution.progress((first + done * rows) / static_cast<double>(size.y));
+      };
+    }
+    const View view = band_of(*whole, first, drawn, across, down);
+    const auto image = draw(view, part);
+    if (!image) return tl::unexpected(image.error());
+    total.fragments += report.fragments;
+    total.resolved += report.resolved;
+    part.progress = {};
+    const auto pixels = std::span(result.pixels)
+                            .subspan(static_cast<std::size_t>(first) * width,
+                                     static_cast<std::size_t>(rows) * width);
+    if (direct && !options.edges) {
+      total.covered += shade(**image, shader, background, part, pixels);
+      continue;
+    }
+    samples.resize((*image)->depth.size());
+    shade(**image, shader, Rgba(0), part, samples);
+    if (options.edges) draw_edges(**image, shader, across, down, part, samples);
+    if (!painter.empty()) {
+      if (auto done = painter.paint(view, **image, shader, part, samples); !done) {
+        return tl::unexpected(done.error());
+      }
+      total.fragments += painter.fragments();
+    }
+    total.covered += average(samples, across, down, background, part, size.x, pixels);
+  }
+  if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+  report = total;
+  report_covers = true;
+  return result;
+}
 
 Preview::Preview(Tree tree, std::vector<Ghost> ghosts, double relative_precision,
                  const Execution& execution)
-    : impl_(std::make_unique<Impl>(std::move(tree), std::move(ghosts), relative_precision,
-                                   execution)) {}
+    : impl_(std::make_unique<Impl>(std::move(tree), ghosts, relative_precision, execution)) {}
 Preview::~Preview() = default;
 Preview::Preview(Preview&&) noexcept = default;
 Preview& Preview::operator=(Preview&&) noexcept = default;
 
 Bounds Preview::box() const { return impl_->geometry.box(); }
 const Tree& Preview::tree() const { return impl_->tree; }
-const DrawReport& Preview::report() const { return impl_->frame.report(); }
 
-Result<const SurfaceImage*> Preview::draw(const View& view, const Execution& execution) {
-  if (auto done = impl_->frame.draw(view, execution); !done) return tl::unexpected(done.error());
-  return &impl_->frame.image();
+const DrawReport& Preview::report() const {
+  if (!impl_->report_covers) {
+    const auto& depth = impl_->frame.image().depth;
+    impl_->report.covered =
+        static_cast<std::uint64_t>(depth.size()) -
+        static_cast<std::uint64_t>(std::count(depth.begin(), depth.end(), SurfaceImage::kNone));
+    impl_->report_covers = true;
+  }
+  return impl_->report;
+}
+
+Result<const SurfaceImage*> Preview::draw(const View& view, const Execution& execution) try {
+  return impl_->draw(view, execution);
+} catch (const std::bad_alloc&) {
+  return fail(ErrorCode::kLimit, "out of memory for a picture of {} x {} pixels", view.size.x,
+              view.size.y);
 }
 
 Result<const SurfaceImage*> Preview::move_solid(std::uint32_t solid,
@@ -269,46 +342,14 @@ Result<const SurfaceImage*> Preview::move_solid(std::uint32_t solid,
                                                 const Execution& execution) {
   impl_->geometry.move_solid(solid, world_from_mesh);
   if (auto done = impl_->frame.moved(solid, execution); !done) return tl::unexpected(done.error());
-  return &impl_->frame.image();
+  return impl_->surfaces();
 }
 
 Result<Picture> Preview::picture(const Camera& camera, const glm::ivec2& size,
-                                 const PictureOptions& options, const Execution& execution) {
-  const ColourScheme& scheme = options.scheme != nullptr ? *options.scheme : kSchemes[0];
-  auto view = make_view(camera, size, box());
-  if (!view) return tl::unexpected(view.error());
-  auto drawn = draw(*view, execution);
-  if (!drawn) return tl::unexpected(drawn.error());
-  const SurfaceImage& image = **drawn;
-  const Shader shader(impl_->tree, impl_->geometry, *view, scheme);
-  Picture picture{image.width, image.height, {}};
-  picture.pixels.resize(image.depth.size());
-  const Rgba background(scheme.background, options.transparent_background ? 0 : 255);
-  const auto width = static_cast<std::size_t>(image.width);
-  parallel_for(
-      execution, static_cast<std::size_t>(image.height + 15) / 16, [&](std::size_t band, int) {
-        const std::size_t end = std::min(static_cast<std::size_t>(image.height), (band + 1) * 16);
-        std::uint32_t last_solid = SurfaceImage::kNone, last_triangle = 0;
-        Rgba colour(0);
-        for (std::size_t i = band * 16 * width; i < end * width; ++i) {
-          if (image.depth[i] == SurfaceImage::kNone) {
-            picture.pixels[i] = background;
-            continue;
-          }
-          if (image.solid[i] != last_solid || image.triangle[i] != last_triangle) {
-            last_solid = image.solid[i];
-            last_triangle = image.triangle[i];
-            const bool exit = (last_triangle & SurfaceImage::kExit) != 0;
-            const ViewPart& part = impl_->frame.view_parts()[last_solid];
-            const std::uint32_t source = part.source(last_triangle & ~SurfaceImage::kExit);
-            const glm::vec4 base = shader.base(last_solid, exit);
-            colour =
-                to_bytes(glm::vec4(glm::vec3(base) * shader.light(last_solid, source, exit), 1.0f));
-          }
-          picture.pixels[i] = colour;
-        }
-      });
-  return picture;
+                                 const PictureOptions& options, const Execution& execution) try {
+  return impl_->picture(camera, size, options, execution);
+} catch (const std::bad_alloc&) {
+  return fail(ErrorCode::kLimit, "out of memory for a picture of {} x {} pixels", size.x, size.y);
 }
 
 }  // namespace strata::csg

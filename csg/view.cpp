@@ -41,11 +41,18 @@ void centre_camera(Camera& camera, const Bounds& box) {
   camera.target = box.empty() ? glm::dvec3(0.0) : (box.low + box.high) * 0.5;
 }
 
-void fit_camera(Camera& camera, const Bounds& box) {
-  const double radius = box.empty() ? 0.0 : glm::length(box.high - box.low) * 0.5;
-  if (radius > 0) {
-    camera.distance = radius / std::sin(glm::radians(camera.field_of_view) / 2.0);
-  }
+void fit_camera(Camera& camera, const Bounds& box, double aspect) {
+  if (box.empty()) return;
+  // The ball around the box, and around the target where that is elsewhere.
+  const double radius = glm::length(box.high - box.low) * 0.5 +
+                        glm::length((box.low + box.high) * 0.5 - camera.target);
+  if (!(radius > 0)) return;
+  double half_angle = glm::radians(camera.field_of_view) / 2.0;
+  const double scale = std::tan(half_angle);
+  if (aspect < 1) half_angle = std::atan(scale * aspect);
+  camera.distance = camera.projection == Projection::kPerspective || aspect >= 1
+                        ? radius / std::sin(half_angle)
+                        : radius / std::sin(glm::radians(camera.field_of_view) / 2.0) / aspect;
 }
 
 glm::dmat4 eye_from_world(const Camera& camera) {

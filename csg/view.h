@@ -25,8 +25,10 @@ struct Camera {
 
 /// Moves the target to the middle of `box` (--auto-center).
 void centre_camera(Camera& camera, const Bounds& box);
-/// Sets the distance so that the ball around `box` just fits (--view-all).
-void fit_camera(Camera& camera, const Bounds& box);
+/// Sets the distance so that the ball around `box` and the target just fits (--view-all).
+/// @param aspect the picture's width / height; OpenSCAD looks at the height alone, so that narrow
+/// pictures lose the sides there
+void fit_camera(Camera& camera, const Bounds& box, double aspect = 1.0);
 
 /// Eye space: x right, y up, the camera looks along -z.
 [[nodiscard]] glm::dmat4 eye_from_world(const Camera& camera);
