@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <utility>
 
 #include "csg/geometry.h"
 #include "csg/program.h"
@@ -181,6 +182,7 @@ SolidLists::SolidLists(SolidLists&&) noexcept = default;
 SolidLists& SolidLists::operator=(SolidLists&&) noexcept = default;
 
 const TriangleSoup& SolidLists::soup() const { return impl_->soup; }
+TriangleSoup SolidLists::take_soup() { return std::exchange(impl_->soup, {}); }
 const TileListFilter& SolidLists::filter() const { return impl_->filter; }
 std::uint32_t SolidLists::solid_of(std::uint32_t triangle) const {
   return impl_->shared.solid_of[triangle];

@@ -28,6 +28,8 @@ class SolidLists {
   SolidLists& operator=(SolidLists&&) noexcept;
 
   [[nodiscard]] const TriangleSoup& soup() const;
+  /// Takes the soup away; the filter stays good.
+  [[nodiscard]] TriangleSoup take_soup();
   [[nodiscard]] const TileListFilter& filter() const;
   /// Index into Tree::solids().
   [[nodiscard]] std::uint32_t solid_of(std::uint32_t triangle) const;
@@ -42,9 +44,9 @@ struct Measures {
   double volume = 0;        ///< cubic world units
   double volume_error = 0;  ///< bound: area * length of a voxel (invariant I18), or the spread of
                             ///< the three axes if that is more
-  double area = 0;        ///< square world units
-  double area_error = 0;  ///< estimate: three times the spread between interleaved half grids
-  glm::dvec3 centre{0};   ///< centre of mass, world space
+  double area = 0;          ///< square world units
+  double area_error = 0;    ///< estimate: three times the spread between interleaved half grids
+  glm::dvec3 centre{0};     ///< centre of mass, world space
   glm::dvec3 low{0},
       high{0};              ///< bounds of the crossings, world space; within a voxel of the truth
   double bounds_error = 0;  ///< length of a voxel

@@ -131,18 +131,15 @@ Surface SurfaceFinder::find(std::vector<Flip>& flips, Bound&& bound) {
     const Coincidence::Bound own = group_bound(begin, at);
     const bool embedded = depth == 0 && flips[begin].triangle == Surface::kNone;
 
-    // On to where the interval ends. What lies within the bounds from its beginning on, without a
-    // break, is settled with it.
+    // On to where the interval ends. What lies within the bound of its beginning is settled with
+    // it; that must not depend on flips that do not matter.
+    const double settles = depth + 2.0 * own.farther;
     std::size_t settled = at, end_begin = at, end = at;
-    bool breaks = false;
     while (end < flips.size()) {
       end_begin = end;
       end = apply(flips, end);
       if (!state_.value()) break;
-      for (std::size_t i = end_begin; i < end && !breaks; ++i) {
-        breaks = flips[i].depth - depth > own.farther + bound(flips[i]).nearer;
-      }
-      if (!breaks) settled = end;
+      if (flips[end_begin].depth <= settles) settled = end;
     }
     if (!state_.value()) {
       if (embedded) {

@@ -272,15 +272,14 @@ constexpr int kAreaSide = LeafLayers::kLanes;
 
 }  // namespace
 
-TileFinder::TileFinder(const Program& program, std::span<const ViewPart> view_parts,
-                       std::span<const Geometry::Part> parts, const View& view,
+TileFinder::TileFinder(const Program& program, const std::vector<ViewPart>& view_parts,
+                       const std::vector<Geometry::Part>& parts, const View& view,
                        const Coincidence& coincidence)
     : program_(&program),
       view_parts_(view_parts),
       parts_(parts),
       view_(&view),
       coincidence_(&coincidence),
-      target_{Axis::kZ, view.size.x, view.size.y, kPictureDepthLimit},
       simplifier_(program),
       finder_(program) {}
 
@@ -288,9 +287,11 @@ TileFinder::~TileFinder() = default;
 
 void TileFinder::make(LeafLayers& leaf) {
   leaf.made = true;
+  leaf.areas = 0;
   const ViewPart& part = view_parts_[leaf.solid];
   const PixelRect clip{std::max(tile_.u0, part.rect.u0), std::max(tile_.v0, part.rect.v0),
                        std::min(tile_.u1, part.rect.u1), std::min(tile_.v1, part.rect.v1)};
+  const RasterTarget target{Axis::kZ, view_->size.x, view_->size.y, kPictureDepthLimit};
   std::span<const std::uint32_t> triangles;
   if (part.binned) {
     triangles = part.bins.tile(tile_.u0 / kTileSide, tile_.v0 / kTileSide);
@@ -301,7 +302,7 @@ void TileFinder::make(LeafLayers& leaf) {
     triangles = std::span(all_triangles_).first(part.mesh.triangles.size());
   }
   fragments_ +=
-      raster_layers(part.mesh, target_, triangles, clip, coincidence_->steep_from(), leaf, arena_);
+      raster_layers(part.mesh, target, triangles, clip, coincidence_->steep_from(), leaf, arena_);
   if (!leaf.keys.empty()) normalize_layers(leaf, part.cut, *this);
 }
 
@@ -399,10 +400,14 @@ void TileFinder::find(int tile_u, int tile_v, std::span<const std::uint32_t> sol
   area.solids = slot_solids_.data();
   for (int v = tile_.v0; v < tile_.v1; v += kAreaSide) {
     for (int u = tile_.u0; u < tile_.u1; u += kAreaSide) {
+      const int area_index =
+          (v - tile_.v0) / kAreaSide * (kTileSide / kAreaSide) + (u - tile_.u0) / kAreaSide;
       area.rect = {u, v, u + kAreaSide, std::min(tile_.v1, v + kAreaSide)};
       present_.clear();
       for (std::uint32_t slot = 0; slot < count; ++slot) {
-        const PixelRect& rect = leaves_[slot].rect;
+        const LeafLayers& leaf = leaves_[slot];
+        if (leaf.made && (leaf.areas >> area_index & 1) == 0) continue;
+        const PixelRect& rect = leaf.rect;
         if (rect.u0 <= u && u < rect.u1 && rect.v0 < area.rect.v1 && area.rect.v0 < rect.v1) {
           present_.push_back(slot);
         }

@@ -50,6 +50,8 @@ struct LeafLayers {
   /// happens all the same.
   bool convex = false;
   std::uint32_t solid = 0;
+  /// Once made: which areas of kLanes x kLanes pixels of the tile it meets, row by row.
+  std::uint16_t areas = 0;
   /// Bounds of its depths; those of the tile once it is made.
   std::uint32_t nearest = 0, farthest = 0;
   /// While rasterizing depth << 1 | exit, then depths of flips. kEmpty where there is none.
@@ -119,8 +121,9 @@ class Simplifier {
 /// Scratch of one thread.
 class TileFinder {
  public:
-  TileFinder(const Program& program, std::span<const ViewPart> view_parts,
-             std::span<const Geometry::Part> parts, const View& view,
+  /// Keeps references to all of them, whatever view they are of.
+  TileFinder(const Program& program, const std::vector<ViewPart>& view_parts,
+             const std::vector<Geometry::Part>& parts, const View& view,
              const Coincidence& coincidence);
   ~TileFinder();
 
@@ -128,6 +131,7 @@ class TileFinder {
   /// the tile.
   void find(int tile_u, int tile_v, std::span<const std::uint32_t> solids, SurfaceImage& image);
 
+  void reset_counts() { fragments_ = resolved_ = 0; }
   [[nodiscard]] std::uint64_t fragments() const { return fragments_; }
   [[nodiscard]] std::uint64_t resolved() const { return resolved_; }
 
@@ -140,11 +144,10 @@ class TileFinder {
   [[nodiscard]] Surface resolve(const TileProgram& program, int u, int v);
 
   const Program* program_;
-  std::span<const ViewPart> view_parts_;
-  std::span<const Geometry::Part> parts_;
+  const std::vector<ViewPart>& view_parts_;
+  const std::vector<Geometry::Part>& parts_;
   const View* view_;
   const Coincidence* coincidence_;
-  RasterTarget target_;
   Arena arena_;
   std::vector<LeafLayers> leaves_;
   Simplifier simplifier_;

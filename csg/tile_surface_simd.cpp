@@ -126,13 +126,25 @@ void NormalizeLayers(LeafLayers& leaf, bool all_special, TileFinder& finder) {
   const D d;
   const V empty = hn::Set(d, LeafLayers::kEmpty), one = hn::Set(d, 1u), zero = hn::Zero(d);
   const std::size_t layers = leaf.keys.size();
-  const auto cells = static_cast<std::size_t>((leaf.rect.v1 - leaf.rect.v0) * leaf.stride);
+  const auto columns = static_cast<std::size_t>(leaf.stride);
+  const std::size_t cells = static_cast<std::size_t>(leaf.rect.v1 - leaf.rect.v0) * columns;
   const std::size_t lanes = hn::Lanes(d);
+  // Where in the tile the leaf begins, in areas.
+  constexpr std::size_t kSide = LeafLayers::kLanes;
+  const std::size_t first_column = static_cast<std::size_t>(leaf.rect.u0 % kTileSide) / kSide;
+  const std::size_t first_row = static_cast<std::size_t>(leaf.rect.v0 % kTileSide);
+  leaf.areas = 0;
   alignas(64) std::uint32_t special_lanes[LeafLayers::kLanes];
   V nearest = empty, farthest = zero;
   leaf.nearest = LeafLayers::kEmpty;
   leaf.farthest = 0;
-  for (std::size_t at = 0; at < cells; at += lanes) {
+  std::size_t row = first_row, column = 0;
+  unsigned area_row = 1u << (row / kSide * (kTileSide / kSide));
+  for (std::size_t at = 0; at < cells; at += lanes, column += lanes) {
+    if (column == columns) {
+      column = 0;
+      area_row = 1u << (++row / kSide * (kTileSide / kSide));
+    }
     M special = no_lane(d);
     V before = zero;  // depth of the last exit, plus 1
     for (std::size_t k = 0; k < layers; k += 2) {
@@ -149,13 +161,18 @@ void NormalizeLayers(LeafLayers& leaf, bool all_special, TileFinder& finder) {
       before = hn::Add(leave_depth, one);
     }
     if (all_special) special = hn::Ne(hn::Load(d, leaf.keys[0] + at), empty);
+    M any = no_lane(d);
     for (std::size_t k = 0; k < layers; ++k) {
       const V key = hn::Load(d, leaf.keys[k] + at);
       const M present = hn::AndNot(special, hn::Ne(key, empty));
       const V depth = hn::IfThenElse(present, hn::ShiftRight<1>(key), empty);
       nearest = hn::Min(nearest, depth);
       farthest = hn::Max(farthest, hn::IfThenElseZero(present, depth));
+      any = hn::Or(any, hn::Ne(key, empty));
       hn::Store(hn::IfThenElse(special, key, depth), d, leaf.keys[k] + at);
+    }
+    if (!hn::AllFalse(d, any)) {
+      leaf.areas |= static_cast<std::uint16_t>(area_row << (first_column + column / kSide));
     }
     if (hn::AllFalse(d, special)) continue;
     hn::Store(hn::IfThenElseZero(special, one), d, special_lanes);

@@ -56,8 +56,10 @@ std::vector<Pixel> by_full_lists(const Tree& tree, const View& view, double rela
         if (flip.triangle == Surface::kNone) return Coincidence::Bound{};
         return coincidence.bound(parts[flip.solid].mesh, flip.triangle, flip.depth);
       });
-      result.push_back({surface.depth, surface.solid,
-                        surface.triangle | (surface.exit ? SurfaceImage::kExit : 0u)});
+      const bool seen = surface.depth != Surface::kNone;
+      const std::uint32_t triangle = seen ? parts[surface.solid].source(surface.triangle) : 0;
+      result.push_back(
+          {surface.depth, surface.solid, triangle | (surface.exit ? SurfaceImage::kExit : 0u)});
     }
   }
   return result;
