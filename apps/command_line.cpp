@@ -297,6 +297,9 @@ void define_csg(CLI::App& app, Words& words) {
   const char* look = "Look";
   option("--colorscheme", csg.scheme, "Cornfield (default) or another of OpenSCAD's", "NAME", look);
   option("--samples", csg.samples, "Samples a pixel: 1 (default), 2, 4 ... 64", "N", look);
+  app.add_flag("--render", csg.render,
+               "The result alone: no ghosts, no colours, flat scenes from above")
+      ->group(look);
   app.add_flag("--edges", csg.edges, "Dark lines along the edges of faces")->group(look);
   app.add_flag("--transparent", csg.transparent, "Background without colour")->group(look);
   app.add_option("--cut", csg.cuts,

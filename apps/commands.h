@@ -95,6 +95,8 @@ struct CsgCommand {
   glm::ivec2 size{512};
   csg::Camera camera;
   bool view_all = false, auto_centre = false;
+  bool default_camera = false;  ///< none was given
+  bool render = false;          ///< the result alone: no ghosts, no colours, flat scenes from above
   csg::PictureOptions picture;
   std::vector<SectionPlane> cuts;
   std::optional<std::string> json;  ///< "-": standard output

@@ -39,6 +39,16 @@ std::vector<csg::Ghost> ghosts_of(const csg::Scene& scene) {
   return ghosts;
 }
 
+/// OpenSCAD draws rendered outlines in this colour without light; ours has the light taken out.
+constexpr glm::u8vec3 kFlatFace{0, 247, 199};
+
+/// What a rendered result does not have: ghosts and colours.
+void forget_looks(csg::Scene& scene) {
+  scene.backgrounds.clear();
+  scene.highlights.clear();
+  for (csg::Solid& solid : scene.tree.solids()) solid.colour.reset();
+}
+
 std::uint64_t triangles_of(const csg::Tree& tree) {
   std::uint64_t count = 0;
   for (const csg::Solid& solid : tree.solids()) {
@@ -116,11 +126,25 @@ Result<void> run_csg(const CsgCommand& command, Session& session) {
 
   csg::Camera& camera = outcome.camera;
   camera = command.camera;
+  csg::PictureOptions look = command.picture;
+  csg::ColourScheme flat_scheme;
+  const bool from_above = command.render && scene->flat;
+  if (command.render) forget_looks(*scene);
+  if (from_above) {
+    flat_scheme = look.scheme != nullptr ? *look.scheme : csg::colour_schemes().front();
+    flat_scheme.face = kFlatFace;
+    look.scheme = &flat_scheme;
+    if (command.default_camera) {
+      camera.rotation = glm::dvec3(0.0);
+      camera.projection = csg::Projection::kOrthographic;
+    }
+  }
   Bounds box;
   if (command.auto_centre || command.view_all) {
     auto visible = visible_box(*scene, session.execution("measuring"));
     if (!visible) return tl::unexpected(visible.error());
     box = *visible;
+    if (from_above && !box.empty()) box.low.z = box.high.z = 0.0;  // an outline has no thickness
   }
   if (command.auto_centre) csg::centre_camera(camera, box);
   if (command.view_all) {
@@ -135,7 +159,7 @@ Result<void> run_csg(const CsgCommand& command, Session& session) {
   outcome.prepare_ms = session.milliseconds() - outcome.read_ms;
 
   double begin = session.milliseconds();
-  auto picture = preview.picture(camera, command.size, command.picture, execution);
+  auto picture = preview.picture(camera, command.size, look, execution);
   if (!picture) return tl::unexpected(picture.error());
   outcome.drawn = preview.report();
   outcome.draw_ms = session.milliseconds() - begin;

@@ -117,7 +117,7 @@ Result<void> read_csg_options(const CsgWords& words, CsgCommand& command) {
   command.view_all = words.view_all;
   command.auto_centre = words.auto_centre;
   if (words.camera.empty()) {
-    command.view_all = command.auto_centre = true;
+    command.view_all = command.auto_centre = command.default_camera = true;
   } else {
     take(parse_camera(words.camera), command.camera);
   }
@@ -126,6 +126,7 @@ Result<void> read_csg_options(const CsgWords& words, CsgCommand& command) {
   }
   if (!words.scheme.empty()) take(parse_scheme(words.scheme), command.picture.scheme);
   if (!words.samples.empty()) take(parse_samples(words.samples), command.picture.samples);
+  command.render = words.render;
   command.picture.edges = words.edges;
   command.picture.transparent_background = words.transparent;
   for (const std::string& cut : words.cuts) {

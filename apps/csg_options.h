@@ -14,7 +14,7 @@ struct CsgWords {
   std::string expression, size, camera, projection, scheme, samples, ids, depth, scad_timeout,
       assets;
   std::vector<std::string> cuts;
-  bool view_all = false, auto_centre = false, edges = false, transparent = false;
+  bool view_all = false, auto_centre = false, edges = false, transparent = false, render = false;
 };
 
 /// Reads the words into `command`, whose common part, inputs, output and report are set.
