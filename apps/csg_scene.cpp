@@ -21,11 +21,7 @@ constexpr std::size_t kMaxNodes = std::size_t{1} << 24;
 
 bool is_scene(const std::string& path, const CsgCommand& command) {
   if (command.scene_format) return true;
-  if (command.input.format != MeshFormat::kAuto) return false;
-  for (const char* end : {".csg", ".scad", ".CSG", ".SCAD"}) {
-    if (path.ends_with(end)) return true;
-  }
-  return false;
+  return command.input.format == MeshFormat::kAuto && is_scene_name(path);
 }
 
 Result<csg::Scene> load_one(const std::string& path, const CsgCommand& command, Session& session) {
@@ -164,6 +160,13 @@ std::vector<Tree::NodeId> united(const Tree& tree) {
 }
 
 }  // namespace
+
+bool is_scene_name(const std::string& path) {
+  for (const char* end : {".csg", ".scad", ".CSG", ".SCAD"}) {
+    if (path.ends_with(end)) return true;
+  }
+  return false;
+}
 
 Result<csg::Scene> load_scene(const CsgCommand& command, Session& session) {
   const std::vector<std::string>& files = command.input.files;

@@ -7,6 +7,9 @@
 
 namespace strata::apps {
 
+/// Whether a file is a scene by its name: .csg or .scad.
+[[nodiscard]] bool is_scene_name(const std::string& path);
+
 /// The inputs of `strata csg` as one scene: a single scene as it is, else all inputs united or what
 /// --expr makes of them. Warnings go to the session. @return as read_scene() and load_mesh();
 /// kUsage for the expression; kLimit when it becomes too large

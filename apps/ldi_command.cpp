@@ -21,7 +21,7 @@ Result<void> run_ldi(const LdiCommand& command, Session& session) {
   if (!exr && command.samples) {
     return fail(ErrorCode::kUsage, "{}: --samples is for .exr", command.output);
   }
-  auto input = load_meshes(
+  auto input = load_solids(
       command.input, {.keep_orientation = command.keep_orientation, .rule = InsideRule::kWinding},
       session);
   if (!input) return tl::unexpected(input.error());
@@ -35,7 +35,8 @@ Result<void> run_ldi(const LdiCommand& command, Session& session) {
   const auto lattice = snap_to_lattice(input->soup, *grid, execution);
   if (!lattice) return tl::unexpected(lattice.error());
   auto image = build_ldi(*lattice, raster_target(*grid, command.axis),
-                         {.store = command.store, .offsets = command.offsets}, execution);
+                         {.store = command.store, .offsets = command.offsets}, execution,
+                         input->tree ? &input->tree->filter() : nullptr);
   if (!image) return tl::unexpected(image.error());
   image->world_from_image = world_from_image(*grid, command.axis);
   session.note(fmt::format("{} x {} pixels, {}", image->width, image->height,

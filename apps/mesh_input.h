@@ -1,11 +1,13 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "apps/commands.h"
 #include "core/result.h"
+#include "csg/solid_lists.h"
 #include "mesh/diagnose.h"
 #include "mesh/read_mesh.h"
 #include "mesh/triangle_soup.h"
@@ -29,6 +31,9 @@ struct InputFacts {
 /// All inputs as one soup.
 struct MeshInput {
   TriangleSoup soup;
+  /// Of scenes: what makes the lists of the result of the lists of the soup, all solids'. Then
+  /// area and volume are not known, and the bounds may be larger than the result.
+  std::shared_ptr<const csg::SolidLists> tree;
   std::vector<InputFacts> files;
   Bounds bounds;
   bool closed = true;  ///< all of them
@@ -44,6 +49,10 @@ struct MeshInputRules {
 /// Reads the files, looks whether each is closed and the right way around, turns around those that
 /// are not, and warns of what users should know. @return kInput, kUsage, kLimit, kCancelled
 Result<MeshInput> load_meshes(const InputOptions& input, const MeshInputRules& rules,
+                              Session& session);
+
+/// The same where some of the files may be scenes (.csg, .scad): then all are united into one tree.
+Result<MeshInput> load_solids(const InputOptions& input, const MeshInputRules& rules,
                               Session& session);
 
 /// One of those files by itself: its triangles go to `soup`. With `read_ms` the time it took to

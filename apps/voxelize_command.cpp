@@ -169,6 +169,10 @@ Result<void> voxelize_and_write(const VoxelizeCommand& command, VoxelizeOutcome&
   options.closed = outcome.input.closed;
   options.store = command.store;
   options.offsets = command.offsets;
+  if (outcome.input.tree) {
+    options.filter = &outcome.input.tree->filter();
+    options.rule = InsideRule::kWinding;  // the solids' rules are the filter's
+  }
   options.statistics = command.stats || command.json || command.checksum;
 
   Execution execution = session.execution("voxelizing");
@@ -200,7 +204,7 @@ Result<void> voxelize_and_write(const VoxelizeCommand& command, VoxelizeOutcome&
   if (boundary) outcome.area_estimate = boundary->estimate();
 
   check_columns(command, outcome, session);
-  if (command.solid && !command.surface && covers(outcome.grid, outcome.input.bounds)) {
+  if (command.solid && !command.surface && !outcome.input.tree && covers(outcome.grid, outcome.input.bounds)) {
     check_thin(command, outcome.input, outcome.grid, outcome.report.solid_voxels, session);
   } else if (outcome.report.solid_voxels == 0) {
     session.warn("empty", "no voxel is solid; does the grid hold the mesh?");
@@ -223,7 +227,7 @@ Result<void> run_voxelize(const VoxelizeCommand& command, Session& session) {
   if (auto valid = check_output(command); !valid) return valid;
 
   VoxelizeOutcome outcome;
-  auto input = load_meshes(
+  auto input = load_solids(
       command.input, {.keep_orientation = command.keep_orientation, .rule = command.rule}, session);
   if (!input) return tl::unexpected(input.error());
   outcome.input = *std::move(input);
