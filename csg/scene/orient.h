@@ -12,11 +12,19 @@ namespace strata::csg {
 /// (J. R. Shewchuk, "Adaptive precision floating-point arithmetic and fast robust geometric
 /// predicates", 1997). @pre finite, no product overflows
 [[nodiscard]] inline int orient(const glm::dvec2& a, const glm::dvec2& b, const glm::dvec2& c) {
-  const double left = (a.x - c.x) * (b.y - c.y), right = (a.y - c.y) * (b.x - c.x);
+  const double acx = a.x - c.x, bcy = b.y - c.y, acy = a.y - c.y, bcx = b.x - c.x;
+  const double left = acx * bcy, right = acy * bcx;
   const double det = left - right;
   const double bound = 3.3306690738754716e-16 * (std::abs(left) + std::abs(right));
   if (det > bound) return 1;
   if (-det > bound) return -1;
+  // Points on a line along an axis are common, and differences without rounding too.
+  if ((acx == 0 || bcy == 0) && (acy == 0 || bcx == 0)) return 0;
+  if (det == 0 && acx + c.x == a.x && bcy + c.y == b.y && acy + c.y == a.y && bcx + c.x == b.x &&
+      a.x - acx == c.x && b.y - bcy == c.y && a.y - acy == c.y && b.x - bcx == c.x) {
+    const double left_rest = std::fma(acx, bcy, -left), right_rest = std::fma(acy, bcx, -right);
+    return left_rest > right_rest ? 1 : left_rest < right_rest ? -1 : 0;
+  }
   // The six products of the determinant as an expansion: parts that do not overlap, smallest first.
   const std::array<std::array<double, 2>, 6> factors{
       {{a.x, b.y}, {-a.x, c.y}, {-c.x, b.y}, {-a.y, b.x}, {a.y, c.x}, {c.y, b.x}}};

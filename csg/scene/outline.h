@@ -84,7 +84,9 @@ Result<TriangleSoup> rotate_extrude(const Outline& outline, const RotateExtrude&
 Result<TriangleSoup> make_roof(const Outline& outline, const std::string& method,
                                const Segments& segments);
 
-/// Triangles of the outline, indices into all contours' points one after another.
+/// Triangles of the outline, indices into all contours' points one after another. Every point is a
+/// corner and none is added: by position, the boundary of the triangles is the outline, edge for
+/// edge, even where the outline is not clean. Contours of fewer than 3 points are left out.
 [[nodiscard]] std::vector<glm::uvec3> triangulate(const Outline& outline);
 
 // --- solid to flat ------------------------------------------------------------------------------
@@ -112,7 +114,8 @@ struct TextOptions {
   double size = 10, spacing = 1;
   Segments segments;
 };
-/// Text as OpenSCAD sets it (FreeType, HarfBuzz, fontconfig). `missing` gets the name of a font
+/// Text as OpenSCAD sets it (FreeType, HarfBuzz, fontconfig); letters are as far apart as in
+/// versions after 2021.01, which set them 2.3 % closer. `missing` gets the name of a font
 /// that is not installed and was replaced. @return kInput when no font at all is found
 Result<Outline> make_text(const TextOptions& options, std::string& missing);
 

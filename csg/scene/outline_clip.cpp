@@ -129,7 +129,7 @@ Paths execute(ClipperLib::ClipType type, const Paths& subject, const Paths& clip
 /// Union of counter-clockwise paths, halved until it is small: Clipper's sweep is quadratic in the
 /// edges that are active at once, and most edges vanish early.
 Paths unite_in_halves(std::span<const Paths> parts) {
-  constexpr std::size_t kAtOnce = 2000;
+  constexpr std::size_t kAtOnce = 8000;
   std::size_t points = 0;
   for (const Paths& part : parts) {
     for (const Path& path : part) points += path.size();

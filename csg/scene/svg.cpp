@@ -24,7 +24,7 @@ namespace {
 
 constexpr double kInch = 25.4;
 constexpr double kPixelsPerInch = 96;
-constexpr int kDeepest = 1000;
+constexpr int kDeepest = 200;
 constexpr std::size_t kMostElements = 2'000'000;
 
 std::string_view trimmed(std::string_view text) {

@@ -50,19 +50,20 @@ class Fonts {
  public:
   Fonts() {
     if (FT_Init_FreeType(&library_) != 0) library_ = nullptr;
-    ready_ = library_ != nullptr && FcInit() == FcTrue;
+    if (library_ != nullptr) config_ = FcInitLoadConfigAndFonts();
   }
   ~Fonts() {
     for (auto& [name, match] : matches_) {
       if (match.face != nullptr) FT_Done_Face(match.face);
     }
     if (library_ != nullptr) FT_Done_FreeType(library_);
+    if (config_ != nullptr) FcConfigDestroy(config_);
   }
   Fonts(const Fonts&) = delete;
   Fonts& operator=(const Fonts&) = delete;
 
   Match find(const std::string& name) {
-    if (!ready_) return {};
+    if (config_ == nullptr) return {};
     const auto [at, made] = matches_.try_emplace(name);
     if (made) at->second = look_up(name);
     return at->second;
@@ -82,10 +83,10 @@ class Fonts {
     if (FcPatternGetString(wanted.get(), FC_FAMILY, 0, &family) == FcResultMatch) {
       asked = reinterpret_cast<const char*>(family);
     }
-    FcConfigSubstitute(nullptr, wanted.get(), FcMatchPattern);
+    FcConfigSubstitute(config_, wanted.get(), FcMatchPattern);
     FcDefaultSubstitute(wanted.get());
     FcResult status = FcResultNoMatch;
-    const Pattern found(FcFontMatch(nullptr, wanted.get(), &status));
+    const Pattern found(FcFontMatch(config_, wanted.get(), &status));
     FcChar8* file = nullptr;
     if (!found || FcPatternGetString(found.get(), FC_FILE, 0, &file) != FcResultMatch) return {};
     int index = 0;
@@ -117,7 +118,7 @@ class Fonts {
                                              "monospace", "mono",       "cursive"};
 
   FT_Library library_ = nullptr;
-  bool ready_ = false;
+  FcConfig* config_ = nullptr;  ///< our own: the process's may be in other hands
   std::map<std::string, Match> matches_;
 };
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <deque>
 #include <glm/common.hpp>
 #include <limits>
 #include <numeric>
@@ -27,6 +28,8 @@ struct Node {
   Index vertex = 0;  ///< into all contours' points
   Index next = 0, prev = 0;
   bool alive = true;
+  bool waits = false;    ///< in line to be cut
+  bool touched = false;  ///< a neighbour was cut since it came into line
 };
 
 /// Loops of nodes, bridged and clipped.
@@ -422,21 +425,48 @@ class Clipping {
       i = nodes_[i].next;
     } while (i != start);
     reflex_.build(nodes_, reflex);
+    // Nodes wait in line. One whose neighbour was cut goes back to the end, once: cutting
+    // neighbours one after another makes a fan of slivers.
+    std::deque<Index> line;
     int level = kClear;
-    std::size_t tried = 0;
+    std::size_t cuts = 1;
     while (left > 3) {
-      if (!is_ear(i, static_cast<Level>(level))) {
-        i = nodes_[i].next;
-        if (++tried >= left) ++level, tried = 0;
+      if (line.empty()) {
+        if (cuts == 0) ++level;
+        cuts = 0;
+        i = start;
+        while (!nodes_[i].alive) i = nodes_[i].next;
+        start = i;
+        do {
+          line.push_back(i);
+          nodes_[i].waits = true;
+          nodes_[i].touched = false;
+          i = nodes_[i].next;
+        } while (i != start);
+      }
+      i = line.front();
+      line.pop_front();
+      Node& node = nodes_[i];
+      if (!node.alive) continue;
+      if (node.touched) {
+        node.touched = false;
+        line.push_back(i);
         continue;
       }
+      node.waits = false;
+      if (!is_ear(i, static_cast<Level>(level))) continue;
       cut(i);
       --left;
-      tried = 0;
+      ++cuts;
       level = kClear;
-      // The next but one: cutting neighbours after another makes a fan of slivers.
-      i = nodes_[nodes_[i].next].next;
+      for (const Index k : {node.prev, node.next}) {
+        nodes_[k].touched = true;
+        if (!nodes_[k].waits) line.push_back(k);
+        nodes_[k].waits = true;
+      }
     }
+    i = start;
+    while (!nodes_[i].alive) i = nodes_[i].next;
     cut(i);
   }
 
