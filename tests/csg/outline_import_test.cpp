@@ -7,7 +7,7 @@
 
 #include "csg/scene/outline.h"
 #include "csg/scene/outline_import.h"
-#include "outline_checks.h"
+#include "tests/csg/outline_checks.h"
 
 namespace strata::csg {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "csg/scene/outline.h"
 #include "mesh/diagnose.h"
-#include "outline_checks.h"
+#include "tests/csg/outline_checks.h"
 
 namespace strata::csg {
 namespace {

@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "csg/scene/orient.h"
-#include "outline_checks.h"
+#include "tests/csg/outline_checks.h"
 
 namespace strata::csg {
 namespace {

@@ -4,7 +4,7 @@
 #include <limits>
 
 #include "csg/scene/outline.h"
-#include "outline_checks.h"
+#include "tests/csg/outline_checks.h"
 
 namespace strata::csg {
 namespace {

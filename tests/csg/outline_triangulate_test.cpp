@@ -4,7 +4,7 @@
 #include <numbers>
 #include <random>
 
-#include "outline_checks.h"
+#include "tests/csg/outline_checks.h"
 
 namespace strata::csg {
 namespace {
