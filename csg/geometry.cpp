@@ -7,6 +7,8 @@
 #include <glm/matrix.hpp>
 #include <unordered_map>
 
+#include "mesh/diagnose.h"
+
 namespace strata::csg {
 namespace {
 
@@ -27,7 +29,8 @@ Bounds bounds_of(const Geometry::Part& part, std::size_t mesh_vertices) {
   return box;
 }
 
-/// Whether no vertex lies outside of any face; meshes too large to try are taken for not convex.
+/// Whether the mesh is closed and no vertex lies outside of any face; meshes too large to try are
+/// taken for not convex.
 bool is_convex(const TriangleSoup& mesh) {
   constexpr std::size_t kMostTests = std::size_t{1} << 21;
   if (mesh.triangles.empty() || mesh.triangles.size() * mesh.positions.size() > kMostTests) {
@@ -43,7 +46,7 @@ bool is_convex(const TriangleSoup& mesh) {
       if (glm::dot(across, p) > limit) return false;
     }
   }
-  return true;
+  return is_closed(mesh);
 }
 
 /// A vertex before the perspective division.

@@ -43,6 +43,11 @@ struct Program {
   std::vector<Up> leaves;      ///< of each solid of the tree
   bool root_inverted = false;  ///< the tree says not(root node)
 
+  /// Whether a solid is united with all the rest: inside it is inside the tree.
+  [[nodiscard]] bool plain(std::uint32_t solid) const {
+    const Up& up = leaves[solid];
+    return up.parent + 1 == nodes.size() && !up.inverted && !root_inverted;
+  }
   [[nodiscard]] bool idle(std::uint32_t node) const { return nodes[node].idle_true > 0; }
   /// The tree's value with every solid outside.
   [[nodiscard]] bool idle_value() const {
@@ -78,6 +83,7 @@ class ProgramState {
   }
   [[nodiscard]] bool inside(std::uint32_t solid) const { return inside_[solid] != 0; }
   [[nodiscard]] bool value() const { return value_; }  ///< of the whole tree
+  [[nodiscard]] const Program& program() const { return *program_; }
   /// Whether the tree has its value also because of this solid's: on the way up, no node that is
   /// true stands on other edges alone.
   [[nodiscard]] bool supports(std::uint32_t solid) const;

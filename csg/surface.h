@@ -76,7 +76,8 @@ class Coincidence {
 /// depth. Then coincidence (law 5):
 /// - an interval inside the tree that is no longer than the bounds of its two ends together is
 ///   nothing: two faces that coincide, or the outermost 1/256 of a pixel of an outline, where the
-///   snap may have moved the outline of another solid to the other side;
+///   snap may have moved the outline of another solid to the other side. A solid that is just
+///   united with the rest has no such other side, and stays;
 /// - of several solids whose faces coincide with the surface and contribute to it, the one shown is
 ///   one that the ray enters rather than one that it leaves, then the first of the tree.
 /// A ray that begins inside the tree (the eye is in the material) shows where it leaves it.
@@ -100,6 +101,10 @@ class SurfaceFinder {
   }
   void undo(const std::vector<Flip>& flips, std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) state_.flip(flips[i].solid);
+  }
+
+  [[nodiscard]] bool is_plain_entry(const Flip& flip) const {
+    return !flip.exit && state_.program().plain(flip.solid);
   }
 
   ProgramState state_;
@@ -135,11 +140,14 @@ Surface SurfaceFinder::find(std::vector<Flip>& flips, Bound&& bound) {
     // it; that must not depend on flips that do not matter.
     const double settles = depth + 2.0 * own.farther;
     std::size_t settled = at, end_begin = at, end = at;
+    bool plain = false;
+    for (std::size_t i = begin; i < at; ++i) plain = plain || is_plain_entry(flips[i]);
     while (end < flips.size()) {
       end_begin = end;
       end = apply(flips, end);
       if (!state_.value()) break;
       if (flips[end_begin].depth <= settles) settled = end;
+      for (std::size_t i = end_begin; i < end; ++i) plain = plain || is_plain_entry(flips[i]);
     }
     if (!state_.value()) {
       if (embedded) {
@@ -151,7 +159,8 @@ Surface SurfaceFinder::find(std::vector<Flip>& flips, Bound&& bound) {
         at = end;
         break;
       }
-      if (flips[end_begin].depth - depth <= own.farther + group_bound(end_begin, end).nearer) {
+      if (!plain &&
+          flips[end_begin].depth - depth <= own.farther + group_bound(end_begin, end).nearer) {
         at = end;
         continue;
       }

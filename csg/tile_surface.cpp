@@ -262,6 +262,20 @@ void flips_of(std::span<const DepthItem> crossings, std::uint32_t solid, InsideR
   }
 }
 
+LeafLayers::Kind kind_of(const Program& program, std::uint32_t solid, const Geometry::Part& part,
+                         const ViewPart& view_part) {
+  if (!part.convex) return LeafLayers::Kind::kSorted;
+  return program.plain(solid) && !view_part.cut ? LeafLayers::Kind::kFirst
+                                                : LeafLayers::Kind::kConvex;
+}
+
+void first_entry_of(std::span<const DepthItem> crossings, std::uint32_t solid,
+                    std::vector<Flip>& flips) {
+  const auto entry =
+      std::find_if(crossings.begin(), crossings.end(), [](DepthItem item) { return !item.exit(); });
+  if (entry != crossings.end()) flips.push_back({entry->depth(), solid, entry->triangle(), false});
+}
+
 // --- TileFinder ---------------------------------------------------------------------------------
 
 namespace {
@@ -373,7 +387,7 @@ void TileFinder::find(int tile_u, int tile_v, std::span<const std::uint32_t> sol
     LeafLayers& leaf = leaves_[count++];
     leaf.made = false;
     leaf.steep = false;
-    leaf.convex = parts_[solid].convex;
+    leaf.kind = kind_of(*program_, solid, parts_[solid], part);
     leaf.solid = solid;
     leaf.nearest = part.cut ? 0 : part.nearest;
     leaf.farthest = part.farthest;

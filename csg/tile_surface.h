@@ -46,9 +46,13 @@ struct LeafLayers {
   int stride = 0;      ///< words a row
   bool made = false;   ///< rasterized and normalized
   bool steep = false;  ///< some triangle is marked
-  /// A ray should enter and leave once: layer 0 takes entries, layer 1 exits, further ones what
-  /// happens all the same.
-  bool convex = false;
+  /// How crossings are kept.
+  enum class Kind : std::uint8_t {
+    kSorted,
+    kConvex,  ///< a ray should enter and leave once: layer 0 takes entries, layer 1 exits, further
+              ///< ones what happens all the same
+    kFirst    ///< only the nearest entry, as a depth: of convex solids united with all the rest
+  } kind = Kind::kSorted;
   std::uint32_t solid = 0;
   /// Once made: which areas of kLanes x kLanes pixels of the tile it meets, row by row.
   std::uint16_t areas = 0;
@@ -192,5 +196,13 @@ void search_surface(const SearchArea& area, TileFinder& finder);
 /// Crossings of an open solid that have no partner become sheets one step thick.
 void flips_of(std::span<const DepthItem> crossings, std::uint32_t solid, InsideRule rule, bool cut,
               std::vector<Flip>& flips);
+
+/// How the crossings of a part are kept: what lies behind the first entry of a convex solid that is
+/// united with all the rest is not asked for.
+[[nodiscard]] LeafLayers::Kind kind_of(const Program& program, std::uint32_t solid,
+                                       const Geometry::Part& part, const ViewPart& view_part);
+/// The only flip of a LeafLayers::Kind::kFirst, if there is one.
+void first_entry_of(std::span<const DepthItem> crossings, std::uint32_t solid,
+                    std::vector<Flip>& flips);
 
 }  // namespace strata::csg

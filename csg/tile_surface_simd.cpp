@@ -37,6 +37,9 @@ class LayerSink {
     steep_ = steepness > steep_from_ ? LeafLayers::kSteep : 0;
     leaf_->steep = leaf_->steep || steep_ != 0;
   }
+  [[nodiscard]] HWY_INLINE bool wants(bool exit) const {
+    return !exit || leaf_->kind != LeafLayers::Kind::kFirst;
+  }
   HWY_INLINE void begin(bool exit, std::uint32_t triangle, const PixelRect&) {
     exit_ = exit ? 1 : 0;
     triangle_ = triangle | steep_;
@@ -74,7 +77,8 @@ class LayerSink {
     auto key = hn::Sub(hn::LoadU(d, words), hn::Set(d, 1u));
     auto triangle = hn::Set(d, triangle_);
     if (hn::AllTrue(d, hn::Eq(key, empty))) return;
-    if (leaf_->convex) return place(d, at, key, triangle);
+    if (leaf_->kind == LeafLayers::Kind::kFirst) return keep_first(d, at, key, triangle);
+    if (leaf_->kind == LeafLayers::Kind::kConvex) return place(d, at, key, triangle);
     for (std::size_t k = 0;; ++k) {
       if (k == leaf_->keys.size()) leaf_->add_layer(*arena_);
       std::uint32_t* HWY_RESTRICT keys = leaf_->keys[k] + at;
@@ -90,6 +94,18 @@ class LayerSink {
     }
   }
 
+  template <class D2>
+  HWY_INLINE void keep_first(D2 d, std::size_t at, hn::Vec<D2> key, hn::Vec<D2> triangle) {
+    if (leaf_->keys.empty()) leaf_->add_layer(*arena_);
+    std::uint32_t* HWY_RESTRICT keys = leaf_->keys[0] + at;
+    std::uint32_t* HWY_RESTRICT triangles = leaf_->triangles[0] + at;
+    const auto old_key = hn::LoadU(d, keys), old_triangle = hn::LoadU(d, triangles);
+    const auto unmarked = hn::Set(d, ~LeafLayers::kSteep);
+    const auto lower = hn::Lt(hn::And(triangle, unmarked), hn::And(old_triangle, unmarked));
+    const auto less = hn::Or(hn::Lt(key, old_key), hn::And(hn::Eq(key, old_key), lower));
+    hn::StoreU(hn::Min(key, old_key), d, keys);
+    hn::StoreU(hn::IfThenElse(less, triangle, old_triangle), d, triangles);
+  }
   /// Entries go to layer 0, exits to layer 1, unsorted.
   template <class D2>
   HWY_INLINE void place(D2 d, std::size_t at, hn::Vec<D2> key, hn::Vec<D2> triangle) {
@@ -157,7 +173,9 @@ void NormalizeLayers(LeafLayers& leaf, bool all_special, TileFinder& finder) {
       const M ordered =
           hn::And(hn::Lt(enter_depth, leave_depth), hn::Not(hn::Lt(enter_depth, before)));
       const M plain = hn::And(hn::And(facing, ordered), hn::Ne(leave, empty));
-      special = hn::Or(special, hn::Not(hn::Or(none, plain)));
+      if (leaf.kind != LeafLayers::Kind::kFirst) {
+        special = hn::Or(special, hn::Not(hn::Or(none, plain)));
+      }
       before = hn::Add(leave_depth, one);
     }
     if (all_special) special = hn::Ne(hn::Load(d, leaf.keys[0] + at), empty);

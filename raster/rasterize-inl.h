@@ -411,7 +411,7 @@ HWY_INLINE void rasterize_any_box(const TileEquations& q, const PixelRect& box,
 
 /// Rasterizes the triangles `ids` of `mesh` into `sink`: begin(exit, triangle, box), then encode()
 /// and put_block(), or put_one(u, v, depth), for its pixels. A sink that has steepness() is told it
-/// before begin().
+/// before begin(); one that has wants(exit) gets only the triangles it wants.
 template <class Sink>
 HWY_INLINE void rasterize_triangles(const LatticeMesh& mesh, const RasterTarget& target,
                                     std::span<const std::uint32_t> ids, const PixelRect& clip,
@@ -428,7 +428,11 @@ HWY_INLINE void rasterize_triangles(const LatticeMesh& mesh, const RasterTarget&
       if (kind == SetupBatch::Kind::kNothing) continue;
       const PixelRect box = batch.box(lane);
       constexpr bool kTellSteepness = requires { sink.steepness(0.0); };
+      constexpr bool kChooses = requires { sink.wants(true); };
       if (kind == SetupBatch::Kind::kDirect) {
+        if constexpr (kChooses) {
+          if (!sink.wants(batch.exit(lane))) continue;
+        }
         if constexpr (kTellSteepness) sink.steepness(batch.steepness(lane));
         sink.begin(batch.exit(lane), part[lane], box);
         batch.equations(lane, equations);
@@ -440,6 +444,9 @@ HWY_INLINE void rasterize_triangles(const LatticeMesh& mesh, const RasterTarget&
       if (!setup_triangle(mesh.vertices[triangle.x], mesh.vertices[triangle.y],
                           mesh.vertices[triangle.z], frame, t)) {
         continue;
+      }
+      if constexpr (kChooses) {
+        if (!sink.wants(t.exit)) continue;
       }
       if constexpr (kTellSteepness) sink.steepness(t.steepness());
       sink.begin(t.exit, part[lane], box);

@@ -50,7 +50,12 @@ std::vector<Pixel> by_full_lists(const Tree& tree, const View& view, double rela
         of_solid[solid].emplace_back(item.depth(), item.exit(), item.triangle() - first_of[solid]);
       }
       for (std::uint32_t solid = 0; solid < parts.size(); ++solid) {
-        flips_of(of_solid[solid], solid, geometry.parts()[solid].rule, parts[solid].cut, flips);
+        const Geometry::Part& part = geometry.parts()[solid];
+        if (kind_of(program, solid, part, parts[solid]) == LeafLayers::Kind::kFirst) {
+          first_entry_of(of_solid[solid], solid, flips);
+        } else {
+          flips_of(of_solid[solid], solid, part.rule, parts[solid].cut, flips);
+        }
       }
       const Surface surface = finder.find(flips, [&](const Flip& flip) {
         if (flip.triangle == Surface::kNone) return Coincidence::Bound{};
