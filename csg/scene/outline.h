@@ -38,6 +38,7 @@ Result<Outline> make_polygon(std::span<const glm::dvec2> points,
 /// The first minus all others.
 [[nodiscard]] Outline subtract(std::span<const Outline> operands);
 [[nodiscard]] Outline convex_hull(std::span<const Outline> operands);
+/// Empty if an operand is.
 [[nodiscard]] Outline minkowski_sum(std::span<const Outline> operands);
 /// `fill`: without holes.
 [[nodiscard]] Outline without_holes(const Outline& outline);

@@ -271,8 +271,8 @@ Outline subtract(std::span<const Outline> operands) {
 Outline minkowski_sum(std::span<const Outline> operands) {
   Outline sum;
   for (const Outline& operand : operands) {
-    if (operand.empty()) continue;
-    if (sum.empty()) {
+    if (operand.empty()) return {};  // no point to move anything to
+    if (&operand == operands.data()) {
       sum = operand;
       continue;
     }

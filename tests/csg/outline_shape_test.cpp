@@ -162,6 +162,8 @@ TEST(Outline, MinkowskiSumOfConvexShapesHasTheMixedArea) {
   const std::array operands{box, circle};
   // area(A + B) = area(A) + area(B) + the box's edges moved out by the circle's reach.
   EXPECT_NEAR(area(minkowski_sum(operands)), 60 + area(circle) + 2 * (10 + 6), 1e-9);
+  const std::array none{box, Outline{}};
+  EXPECT_TRUE(minkowski_sum(none).empty());
   const std::array swapped{circle, box};
   EXPECT_NEAR(area(minkowski_sum(swapped)), area(minkowski_sum(operands)), 1e-9);
 }
