@@ -2,170 +2,20 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
+#include <limits>
+#include <optional>
 #include <unordered_map>
 
+#include "csg/scene/plane_section.h"
 #include "mesh/shapes.h"
 #include "mesh/soup_tools.h"
 
 namespace strata::csg {
 namespace {
-
-/// How many signed distances may be computed: some ten seconds.
-constexpr double kMostDistances = 4e9;
-
-struct Plane {
-  glm::dvec3 origin{0.0}, normal{0.0, 0.0, 1.0}, u{1.0, 0.0, 0.0}, v{0.0, 1.0, 0.0};
-};
-
-Plane make_plane(const glm::dvec3& origin, const glm::dvec3& normal) {
-  Plane plane;
-  plane.origin = origin;
-  plane.normal = normal;
-  const glm::dvec3 size = glm::abs(normal);
-  const glm::dvec3 axis = size.x <= size.y && size.x <= size.z ? glm::dvec3(1, 0, 0)
-                          : size.y <= size.z                   ? glm::dvec3(0, 1, 0)
-                                                               : glm::dvec3(0, 0, 1);
-  plane.u = glm::normalize(glm::cross(axis, normal));
-  plane.v = glm::cross(normal, plane.u);
-  return plane;
-}
-
-/// A leaf in the space of the tree, its vertices welded by position.
-struct Leaf {
-  std::vector<glm::dvec3> positions;
-  std::vector<glm::uvec3> triangles;
-  Bounds box;
-  Fill fill = Fill::kNonzero;
-};
-
-struct HashPoint {
-  std::size_t operator()(const glm::dvec3& p) const {
-    const std::hash<double> hash;
-    return hash(p.x) * 0x9e3779b97f4a7c15u ^ hash(p.y) * 0xc2b2ae3d27d4eb4fu ^ hash(p.z);
-  }
-};
-
-Leaf make_leaf(const Solid& solid) {
-  Leaf leaf;
-  const TriangleSoup mesh = world_mesh(solid);
-  std::unordered_map<glm::dvec3, std::uint32_t, HashPoint> index_of;
-  std::vector<std::uint32_t> index(mesh.positions.size());
-  for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
-    const glm::dvec3 p = mesh.positions[i] + 0.0;  // -0 equals +0
-    const auto [at, is_new] =
-        index_of.try_emplace(p, static_cast<std::uint32_t>(leaf.positions.size()));
-    if (is_new) leaf.positions.push_back(p);
-    index[i] = at->second;
-  }
-  for (const glm::uvec3& t : mesh.triangles) {
-    const glm::uvec3 welded(index[t.x], index[t.y], index[t.z]);
-    if (welded.x == welded.y || welded.y == welded.z || welded.z == welded.x) continue;
-    leaf.triangles.push_back(welded);
-  }
-  leaf.box = bounds(mesh);
-  leaf.fill = solid.rule == InsideRule::kParity ? Fill::kEvenOdd : Fill::kNonzero;
-  return leaf;
-}
-
-enum class Side { kBelow, kAbove };  // just below the plane, just above it
-
-/// Where the surface of a leaf goes through a plane, moved off it by less than any distance.
-class LeafSection {
- public:
-  LeafSection(const Leaf& leaf, const Plane& plane, double tolerance, Side side)
-      : leaf_(leaf), plane_(plane) {
-    distances_.reserve(leaf.positions.size());
-    for (const glm::dvec3& p : leaf.positions) {
-      const double distance = glm::dot(p - plane.origin, plane.normal);
-      // A vertex in the plane is above a plane that is moved down, and the other way around.
-      const bool in_plane = std::abs(distance) <= tolerance;
-      distances_.push_back(in_plane ? 0.0 : distance);
-      above_.push_back(in_plane ? side == Side::kBelow : distance > 0.0);
-    }
-  }
-
-  Outline run() {
-    for (const glm::uvec3& t : leaf_.triangles) add_triangle(t);
-    Outline outline;
-    for (std::size_t first = 0; first < segments_.size(); ++first) {
-      if (segments_[first].used) continue;
-      std::vector<glm::dvec2> contour;
-      Edge at = segments_[first].from;
-      for (std::size_t next = first; next != kNone; next = following(at)) {
-        Segment& segment = segments_[next];
-        segment.used = true;
-        at = at == segment.from ? segment.to : segment.from;
-        contour.push_back(crossing(at));
-      }
-      if (contour.size() >= 3) outline.contours.push_back(std::move(contour));
-    }
-    return outline.empty() ? outline : clean(outline, leaf_.fill);
-  }
-
- private:
-  using Edge = std::uint64_t;  // [lower vertex:32 | higher vertex:32]
-  static constexpr std::size_t kNone = ~std::size_t{0};
-  struct Segment {
-    Edge from, to;
-    bool used;
-  };
-
-  static Edge edge(std::uint32_t a, std::uint32_t b) {
-    return Edge{std::min(a, b)} << 32 | std::max(a, b);
-  }
-
-  void add_triangle(const glm::uvec3& t) {
-    const int count = above_[t.x] + above_[t.y] + above_[t.z];
-    if (count == 0 || count == 3) return;
-    int odd = 0;  // the corner that is alone on its side
-    while (above_[t[odd]] != (count == 1)) ++odd;
-    const Edge from = edge(t[odd], t[(odd + 1) % 3]), to = edge(t[(odd + 2) % 3], t[odd]);
-    // The region is to the left, seen from above.
-    segments_.push_back(count == 1 ? Segment{from, to, false} : Segment{to, from, false});
-    link(segments_.back().from);
-    // Faces that look opposite ways may meet: parity asks for closed lines, not for their sense.
-    if (leaf_.fill == Fill::kEvenOdd) link(segments_.back().to);
-  }
-
-  /// The last segment can be gone on with from `edge`.
-  void link(Edge edge) {
-    const auto [at, is_new] = last_link_.try_emplace(edge, links_.size());
-    links_.push_back({segments_.size() - 1, is_new ? kNone : at->second});
-    at->second = links_.size() - 1;
-  }
-
-  std::size_t following(Edge edge) {
-    const auto found = last_link_.find(edge);
-    if (found == last_link_.end()) return kNone;
-    std::size_t& at = found->second;
-    while (at != kNone && segments_[links_[at].segment].used) at = links_[at].before;
-    return at == kNone ? kNone : links_[at].segment;
-  }
-
-  glm::dvec2 crossing(Edge edge) const {
-    const auto a = static_cast<std::uint32_t>(edge >> 32), b = static_cast<std::uint32_t>(edge);
-    const glm::dvec3 p = leaf_.positions[a] - plane_.origin, q = leaf_.positions[b] - plane_.origin;
-    const double along = distances_[a] - distances_[b];
-    // Both may lie in the plane; then they are on different sides by rounding alone.
-    const double t = along == 0.0 ? 0.5 : distances_[a] / along;
-    const glm::dvec3 at = t <= 0.0 ? p : t >= 1.0 ? q : p + t * (q - p);
-    return {glm::dot(at, plane_.u), glm::dot(at, plane_.v)};
-  }
-
-  const Leaf& leaf_;
-  const Plane& plane_;
-  std::vector<double> distances_;
-  std::vector<bool> above_;
-  std::vector<Segment> segments_;
-  struct Link {
-    std::size_t segment, before;  // the link before it at the same edge
-  };
-  std::vector<Link> links_;
-  std::unordered_map<Edge, std::size_t> last_link_;
-};
 
 /// The part of a tree below one node, ready to be cut.
 class Cutter {
@@ -197,13 +47,15 @@ class Cutter {
   /// or with six digits are off by more than 1e-8, and their planes differ.
   [[nodiscard]] double tolerance() const { return 1e-10 * scale_; }
 
-  [[nodiscard]] Outline section(const Plane& plane, Side side) const {
+  /// @param steps  grows by the work that was done
+  [[nodiscard]] Outline section(const Plane& plane, Side side, std::uint64_t& steps) const {
     std::vector<Outline> results(reached_.size());
+    steps += reached_.size();
     std::vector<Outline> operands;
     for (std::size_t i = 0; i < reached_.size(); ++i) {
       const Tree::Node& node = tree_.nodes()[reached_[i]];
       if (node.operation == Operation::kSolid) {
-        results[i] = section(leaves_[leaf_of_[i]], plane, side);
+        results[i] = csg::section(leaves_[leaf_of_[i]], plane, tolerance(), side, steps);
         continue;
       }
       operands.clear();
@@ -231,15 +83,6 @@ class Cutter {
   }
 
  private:
-  [[nodiscard]] Outline section(const Leaf& leaf, const Plane& plane, Side side) const {
-    if (leaf.box.empty()) return {};
-    const glm::dvec3 half = 0.5 * (leaf.box.high - leaf.box.low);
-    const double reach = glm::dot(half, glm::abs(plane.normal));
-    const double distance = glm::dot(leaf.box.low + half - plane.origin, plane.normal);
-    if (std::abs(distance) > reach + tolerance()) return {};
-    return LeafSection(leaf, plane, tolerance(), side).run();
-  }
-
   const Tree& tree_;
   std::vector<Tree::NodeId> reached_;  // sorted
   std::vector<std::size_t> leaf_of_;
@@ -254,7 +97,7 @@ class Planes {
   explicit Planes(const Cutter& cutter)
       : tolerance_(cutter.tolerance()), grain_{1e-6, 1e-6, 1e-6, 1e-6 * cutter.scale()} {}
 
-  /// Adds the plane of a triangle unless the triangle lies in one that is here.
+  /// Adds the plane of a triangle, or the triangle to a plane that it lies in.
   void add(const std::array<glm::dvec3, 3>& corners, const glm::dvec3& normal) {
     Cell low{}, step{};
     const std::array<double, 4> numbers{normal.x, normal.y, normal.z, glm::dot(normal, corners[0])};
@@ -269,11 +112,12 @@ class Planes {
       const auto found = cells_.find(cell);
       if (found == cells_.end()) continue;
       for (const std::size_t index : found->second) {
-        if (holds(planes_[index], corners)) return;
+        if (holds(planes_[index], corners)) return widen(planes_[index], corners);
       }
     }
     cells_[low].push_back(planes_.size());
     planes_.push_back(make_plane(corners[0], normal));
+    widen(planes_.back(), corners);
   }
 
   std::vector<Plane> take() { return std::move(planes_); }
@@ -297,18 +141,18 @@ class Planes {
     });
   }
 
+  static void widen(Plane& plane, const std::array<glm::dvec3, 3>& corners) {
+    for (const glm::dvec3& p : corners) {
+      plane.window.low = glm::min(plane.window.low, p);
+      plane.window.high = glm::max(plane.window.high, p);
+    }
+  }
+
   double tolerance_;
   std::array<double, 4> grain_;
   std::vector<Plane> planes_;
   std::unordered_map<Cell, std::vector<std::size_t>, HashCell> cells_;
 };
-
-bool meet(const Bounds& box, const glm::dvec3& low, const glm::dvec3& high, double margin) {
-  for (int i = 0; i < 3; ++i) {
-    if (low[i] > box.high[i] + margin || high[i] < box.low[i] - margin) return false;
-  }
-  return true;
-}
 
 /// The planes of all triangles that may be boundary.
 std::vector<Plane> planes_of(const Cutter& cutter, const Bounds& box) {
@@ -317,10 +161,9 @@ std::vector<Plane> planes_of(const Cutter& cutter, const Bounds& box) {
     for (const glm::uvec3& t : leaf.triangles) {
       const std::array<glm::dvec3, 3> p{leaf.positions[t.x], leaf.positions[t.y],
                                         leaf.positions[t.z]};
-      if (!meet(box, glm::min(p[0], glm::min(p[1], p[2])), glm::max(p[0], glm::max(p[1], p[2])),
-                cutter.tolerance())) {
-        continue;
-      }
+      const Bounds around{glm::min(p[0], glm::min(p[1], p[2])),
+                          glm::max(p[0], glm::max(p[1], p[2]))};
+      if (!meet(box, around, cutter.tolerance())) continue;
       glm::dvec3 normal = glm::cross(p[1] - p[0], p[2] - p[0]);
       const double length = glm::length(normal);
       // Without a direction that means something a triangle has no inside to bound.
@@ -347,29 +190,40 @@ void add_pieces(TriangleSoup& mesh, const Plane& plane, const Outline& region, b
   }
 }
 
-Result<TriangleSoup> cut_boundary(const Tree& tree, Tree::NodeId node, const Execution& execution) {
+Result<TriangleSoup> cut_boundary(const Tree& tree, Tree::NodeId node, std::uint64_t most_steps,
+                                  const Execution& execution) {
   const Cutter cutter(tree, node);
   const Bounds box = bounds(tree, node);
   if (box.empty()) return TriangleSoup();
   const std::vector<Plane> planes = planes_of(cutter, box);
-  double triangles = 0;
-  for (const Leaf& leaf : cutter.leaves()) triangles += static_cast<double>(leaf.triangles.size());
-  const double work = 2.0 * static_cast<double>(planes.size()) * triangles;
-  if (work > kMostDistances) {
-    return fail(ErrorCode::kLimit, "{} planes would have to be cut with {:.0f} triangles",
-                planes.size(), triangles);
-  }
   std::vector<TriangleSoup> pieces(planes.size());
   Execution quiet = execution;
   quiet.progress = {};
+  std::atomic<std::uint64_t> steps{0};
   parallel_for(quiet, planes.size(), [&](std::size_t i, int) {
-    std::vector<Outline> sides{cutter.section(planes[i], Side::kBelow),
-                               cutter.section(planes[i], Side::kAbove)};
+    if (steps > most_steps) return;
+    std::uint64_t here = 0;
+    std::vector<Outline> sides{cutter.section(planes[i], Side::kBelow, here),
+                               cutter.section(planes[i], Side::kAbove, here)};
+    steps += here;
     if (sides[0].empty() && sides[1].empty()) return;
-    add_pieces(pieces[i], planes[i], subtract(sides), true);
-    std::swap(sides[0], sides[1]);
-    add_pieces(pieces[i], planes[i], subtract(sides), false);
+    // Outside the window the sections are not what they seem.
+    const Rectangle window = rectangle_of(planes[i]);
+    Outline frame;
+    frame.contours.push_back(
+        {window.low, {window.high.x, window.low.y}, window.high, {window.low.x, window.high.y}});
+    for (const bool up : {true, false}) {
+      const std::vector<Outline> seen{subtract(sides), frame};
+      if (!seen[0].empty()) add_pieces(pieces[i], planes[i], intersect(seen), up);
+      std::swap(sides[0], sides[1]);
+    }
   });
+  if (steps > most_steps) {
+    std::size_t triangles = 0;
+    for (const Leaf& leaf : cutter.leaves()) triangles += leaf.triangles.size();
+    return fail(ErrorCode::kLimit, "{} triangles would have to be cut by {} planes", triangles,
+                planes.size());
+  }
   if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
   TriangleSoup mesh;
   for (const TriangleSoup& piece : pieces) append(mesh, piece);
@@ -401,12 +255,14 @@ void for_each_operand(const Tree& tree, Tree::NodeId node,
 Outline cross_section(const Tree& tree, Tree::NodeId node) {
   const Cutter cutter(tree, node);
   const Plane plane;
-  std::vector<Outline> sides{cutter.section(plane, Side::kBelow),
-                             cutter.section(plane, Side::kAbove)};
+  std::uint64_t steps = 0;
+  std::vector<Outline> sides{cutter.section(plane, Side::kBelow, steps),
+                             cutter.section(plane, Side::kAbove, steps)};
   return unite(sides);
 }
 
-Result<TriangleSoup> boundary(const Tree& tree, Tree::NodeId node, const Execution& execution) {
+Result<TriangleSoup> boundary(const Tree& tree, Tree::NodeId node, const Execution& execution,
+                              std::uint64_t most_steps) {
   TriangleSoup mesh;
   std::optional<Error> error;
   for_each_operand(tree, node, [&](Tree::NodeId operand) {
@@ -416,7 +272,7 @@ Result<TriangleSoup> boundary(const Tree& tree, Tree::NodeId node, const Executi
       append(mesh, world_mesh(tree.solids()[at.first]));
       return;
     }
-    auto pieces = cut_boundary(tree, operand, execution);
+    auto pieces = cut_boundary(tree, operand, most_steps, execution);
     if (pieces) {
       append(mesh, *pieces);
     } else {

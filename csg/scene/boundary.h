@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <glm/vec3.hpp>
 
@@ -20,8 +21,10 @@ namespace strata::csg {
 /// Triangles that together are the boundary of `node`, outward; neighbours in different planes
 /// share no vertices, and agree to the grid of the flat operations. For unions of leaves alone the
 /// leaves' triangles are given as they are, which may lie inside other leaves.
+/// @param most_steps  of work, of some 10 ns each, before it is given up
 /// @return kLimit when too much would have to be cut; kCancelled
-Result<TriangleSoup> boundary(const Tree& tree, Tree::NodeId node, const Execution& execution = {});
+Result<TriangleSoup> boundary(const Tree& tree, Tree::NodeId node, const Execution& execution = {},
+                              std::uint64_t most_steps = 3'000'000'000);
 
 /// Calls body(operand) for every operand of the union that `node` is, through nested unions; for
 /// `node` itself if it is none.

@@ -83,7 +83,6 @@ void Evaluator::add_outline(std::uint32_t node, const Context& context, Outline 
 InsideRule Evaluator::inspect(std::uint32_t node, TriangleSoup& mesh) {
   Execution execution = execution_;
   execution.progress = {};
-  InsideRule rule = InsideRule::kWinding;
   if (!is_closed(mesh, execution)) {
     const MeshDiagnosis found = diagnose(mesh, execution);
     std::string text = fmt::format("'{}' is not closed: {} of {} edges are unbalanced", name(node),
@@ -97,13 +96,11 @@ InsideRule Evaluator::inspect(std::uint32_t node, TriangleSoup& mesh) {
       text += fmt::format("; the first from ({:.9g}, {:.9g}, {:.9g}) to ({:.9g}, {:.9g}, {:.9g})",
                           edge.from.x, edge.from.y, edge.from.z, edge.to.x, edge.to.y, edge.to.z);
     }
-    if (found.even) {
-      text += "; every edge is used an even number of times, so parity decides what is inside";
-      rule = InsideRule::kParity;
-    }
+    text += found.even
+                ? "; every edge is used an even number of times, so parity decides what is inside"
+                : "; parity decides what is inside, and a face without a partner is a sheet";
     warn(node, "geometry", text);
-    if (!found.even) return rule;  // the volume of an open mesh says little
-    return rule;
+    return InsideRule::kParity;
   }
   const double volume = signed_volume(mesh, execution);
   if (volume < 0.0) {
@@ -112,7 +109,7 @@ InsideRule Evaluator::inspect(std::uint32_t node, TriangleSoup& mesh) {
          fmt::format("'{}' is inside out (its volume is {:.6g}); it was turned around", name(node),
                      volume));
   }
-  return rule;
+  return InsideRule::kWinding;
 }
 
 /// Copies subtrees between trees, or within one. Every node is an operand once at most, so nothing

@@ -309,11 +309,15 @@ TEST(Boundary, CoincidentFacesLeaveNothingBetween) {
 TEST(Boundary, TooMuchWorkIsALimit) {
   Tree tree;
   Solid solid;
-  solid.mesh = std::make_shared<TriangleSoup>(make_icosphere(1, 7));
-  const Tree::NodeId a = tree.add_solid(solid), b = tree.add_solid(solid);
-  const auto mesh = boundary(tree, tree.add(Operation::kDifference, {a, b}));
+  solid.mesh = std::make_shared<TriangleSoup>(make_torus(2, 1, 30, 20));
+  const Tree::NodeId a = tree.add_solid(solid);
+  solid.world_from_mesh[3].x = 0.5;
+  const Tree::NodeId difference = tree.add(Operation::kDifference, {a, tree.add_solid(solid)});
+  EXPECT_TRUE(boundary(tree, difference).has_value());
+  const auto mesh = boundary(tree, difference, {}, 1000);
   ASSERT_FALSE(mesh.has_value());
   EXPECT_EQ(mesh.error().code, ErrorCode::kLimit);
+  EXPECT_EQ(mesh.error().message, "2400 triangles would have to be cut by 1140 planes");
 }
 
 // --- extrusions and other nodes: that arguments reach them

@@ -178,7 +178,7 @@ TEST(Primitives, PolyhedraInsideOutAreTurnedAndOpenOnesReported) {
       << mixed.warnings[0].message;
   const Scene open = scene_of(points + "[[0,1,2],[0,3,1],[0,2,3]]);");
   ASSERT_EQ(codes_of(open), "geometry ");
-  EXPECT_EQ(open.tree.solids()[0].rule, InsideRule::kWinding);
+  EXPECT_EQ(open.tree.solids()[0].rule, InsideRule::kParity);
   EXPECT_NE(open.warnings[0].message.find("3 border a hole"), std::string::npos);
 }
 
