@@ -42,6 +42,27 @@ std::vector<csg::Ghost> ghosts_of(const csg::Scene& scene) {
 /// OpenSCAD draws rendered outlines in this colour without light; ours has the light taken out.
 constexpr glm::u8vec3 kFlatFace{0, 247, 199};
 
+/// Red lines where the picture's outlines are, one pixel to each side, as OpenSCAD draws them.
+void draw_outlines(csg::Picture& picture, const csg::Rgba& background) {
+  const csg::Picture drawn = picture;
+  const auto at = [&](int u, int v) -> const csg::Rgba& {
+    return drawn.pixels[static_cast<std::size_t>(v) * static_cast<std::size_t>(drawn.width) +
+                        static_cast<std::size_t>(u)];
+  };
+  for (int v = 0; v < drawn.height; ++v) {
+    for (int u = 0; u < drawn.width; ++u) {
+      const bool inside = at(u, v) != background;
+      const bool border = (u > 0 && (at(u - 1, v) != background) != inside) ||
+                          (v > 0 && (at(u, v - 1) != background) != inside);
+      // The line runs on the last pixel before the change and lies on both sides in turn.
+      if (border) {
+        picture.pixels[static_cast<std::size_t>(v) * static_cast<std::size_t>(drawn.width) +
+                       static_cast<std::size_t>(u)] = {255, 0, 0, 255};
+      }
+    }
+  }
+}
+
 /// What a rendered result does not have: ghosts and colours.
 void forget_looks(csg::Scene& scene) {
   scene.backgrounds.clear();
@@ -161,6 +182,10 @@ Result<void> run_csg(const CsgCommand& command, Session& session) {
   double begin = session.milliseconds();
   auto picture = preview.picture(camera, command.size, look, execution);
   if (!picture) return tl::unexpected(picture.error());
+  if (from_above) {
+    const glm::u8vec3 ground = look.scheme->background;
+    draw_outlines(*picture, {ground, look.transparent_background ? 0 : 255});
+  }
   outcome.drawn = preview.report();
   outcome.draw_ms = session.milliseconds() - begin;
   if (outcome.drawn.covered == 0) {

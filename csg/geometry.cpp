@@ -88,8 +88,8 @@ bool snap(const glm::dvec3& p, glm::ivec3& out) {
   return true;
 }
 
-/// The triangles of a part that reaches before the near plane, cut there, and cut far outside the
-/// picture so that coordinates stay small.
+/// The triangles of a part that reaches before the near plane or far out of the picture, cut there,
+/// so that coordinates stay small.
 Result<void> cut_part(const Geometry::Part& part, const View& view, ViewPart& out) {
   const double margin = 2.0 * std::max(view.size.x, view.size.y);
   std::vector<Homogeneous> points(part.positions.size());
@@ -107,7 +107,7 @@ Result<void> cut_part(const Geometry::Part& part, const View& view, ViewPart& ou
   for (std::uint32_t t = 0; t < part.triangles.size(); ++t) {
     const glm::uvec3& triangle = part.triangles[t];
     polygon = {points[triangle.x], points[triangle.y], points[triangle.z]};
-    cut_polygon(polygon, before_near);
+    if (view.perspective) cut_polygon(polygon, before_near);
     cut_polygon(polygon, left);
     cut_polygon(polygon, right);
     cut_polygon(polygon, above);
@@ -203,10 +203,7 @@ Result<ViewPart> view_part(const Geometry::Part& part, const View& view,
     }
     out.cut = nearest < view.near;
   }
-  if (out.cut) {
-    if (auto done = cut_part(part, view, out); !done) return tl::unexpected(done.error());
-    out.mesh.triangles = out.cut_triangles;
-  } else {
+  if (!out.cut) {
     out.vertices.resize(part.positions.size());
     const std::size_t chunks = (out.vertices.size() + kVerticesAtOnce - 1) / kVerticesAtOnce;
     std::vector<std::uint8_t> bad(chunks, 0);
@@ -217,10 +214,14 @@ Result<ViewPart> view_part(const Geometry::Part& part, const View& view,
         if (!snap(glm::dvec3(p) / p.w, out.vertices[i])) bad[chunk] = 1;
       }
     });
-    if (std::find(bad.begin(), bad.end(), 1) != bad.end()) {
-      return fail(ErrorCode::kGeometry, "a vertex does not fit into the picture's lattice");
-    }
+    // A strong zoom: what lies far beside the picture is cut off.
+    out.cut = std::find(bad.begin(), bad.end(), 1) != bad.end();
     out.mesh.triangles = part.triangles;
+  }
+  if (out.cut) {
+    out.vertices.clear();
+    if (auto done = cut_part(part, view, out); !done) return tl::unexpected(done.error());
+    out.mesh.triangles = out.cut_triangles;
   }
   glm::ivec3 low(std::numeric_limits<int>::max()), high(std::numeric_limits<int>::min());
   for (const glm::ivec3& p : out.vertices) {

@@ -307,7 +307,6 @@ void Evaluator::flat_operation(Frame& frame) {
       operands.push_back(united(first));
     }
     std::reverse(operands.begin(), operands.end());
-    std::erase_if(operands, [](const Outline& outline) { return outline.empty(); });
     if (operands.empty()) return;
     add_outline(frame.node, frame.outside,
                 operands.size() == 1 ? std::move(operands[0]) : minkowski_sum(operands));

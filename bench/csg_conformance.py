@@ -1,0 +1,146 @@
+#!/usr/bin/python3
+"""Compares our pictures with the ones that OpenSCAD's own tests expect; writes docs/csg_conformance.md.
+
+usage: csg_conformance.py STRATA SHARED_CSG OUTPUT.md [--sheet SHEET.png]
+
+Two measures for each scene that has an expected picture: the intersection over union of the silhouettes,
+and OpenSCAD's own rule (tests/image_compare.py): a picture fails if in some 3 x 3 block all nine pixels
+differ by 8 levels or more, with the same sign, in one channel. Needs python3-pil and python3-numpy.
+"""
+import argparse
+import concurrent.futures
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+import numpy as np
+from PIL import Image, ImageDraw
+
+BACKGROUND = np.array([255, 255, 229])
+
+# Scenes below 0.97, and why. "Newer": the expected picture was made by a later OpenSCAD than the scene file.
+REASONS = {
+    "dxf-import-centered": "Newer: the file does not say `center`, which 2021.01 did not know.",
+    "roof": "Newer: the file, dumped by 2021.01, holds no roof.",
+    "rotate_extrude-angle": "Newer: `rotate_extrude(45)` was dumped as a file name.",
+    "linear_extrude_invisible-tests": "Newer: the file says a height of 100; the picture shows less.",
+    "text-metrics": "Newer: `textmetrics()` was dumped as nothing.",
+    "issue1529": "Newer: one of the two `%` is missing in the file, dumped by 2021.01.",
+    "issue5555": "Newer: `rotate_extrude` starts elsewhere.",
+    "primitive-inf-tests": "Infinite sizes: a polygon with an infinite point is dropped here, with a warning.",
+    "import-single-triangle": "An open face is shown as a sheet; OpenSCAD shows nothing.",
+    "fill-rule": "We follow the SVG's fill rule; OpenSCAD fills everything by even-odd.",
+    "minkowski2-tests": "A sum with an empty operand is empty in the picture; 2021.01 and we leave that operand out.",
+    "text-font-symbol": "The font is not installed.",
+    "text-font-overlap": "The font is not installed.",
+    "text-font-ttb-alignment-tests": "Newer: 2021.01 dumps `halign=\"left\"` where vertical text was centred.",
+    "text-font-direction-tests": "Newer: 2021.01 dumps `halign=\"left\"` where vertical text was centred.",
+    "text-font-features": "The font (Amiri) is not installed, and font features are not applied.",
+}
+
+
+THIN = "Flat and a few pixels wide: OpenSCAD's red outlines lie up to a pixel elsewhere."
+
+
+def reason(row):
+    return REASONS.get(row[0], THIN if row[3] and row[1] > 0.75 else "Not looked into yet.")
+
+
+def load(path):
+    picture = Image.open(path).convert("RGBA")
+    ground = Image.new("RGBA", picture.size, (*BACKGROUND, 255))
+    ground.alpha_composite(picture)
+    return np.asarray(ground.convert("RGB")).astype(int)
+
+
+def passes_openscad_rule(ours, expected):
+    difference = ours - expected
+    for channel in range(3):
+        for sign in (1, -1):
+            over = (difference[:, :, channel] * sign >= 8).astype(int)
+            rows, columns = over.shape[0] - 2, over.shape[1] - 2
+            count = sum(over[i:i + rows, j:j + columns] for i in range(3) for j in range(3))
+            if (count == 9).any():
+                return False
+    return True
+
+
+def compare(strata, scene, expected, output):
+    run = subprocess.run([strata, "csg", scene, "-o", output, "--size", "512,512", "-j", "1", "--render"],
+                         capture_output=True, text=True, timeout=600)
+    target = load(expected)
+    ours = load(output) if run.returncode == 0 else np.broadcast_to(BACKGROUND, target.shape)
+    mine = np.abs(ours - BACKGROUND).max(axis=2) > 3
+    theirs = np.abs(target - BACKGROUND).max(axis=2) > 3
+    either = (mine | theirs).sum()
+    overlap = 1.0 if either == 0 else float((mine & theirs).sum() / either)
+    flat = bool((np.abs(target - np.array([255, 0, 0])).max(axis=2) < 12).sum() > 20)  # has red outlines
+    return overlap, passes_openscad_rule(ours, target), flat
+
+
+def write_sheet(path, rows, folder, expected_folder):
+    side, columns = 128, 12
+    lines = (len(rows) + columns - 1) // columns
+    sheet = Image.new("RGB", (columns * (2 * side + 8), lines * (side + 14)), "white")
+    draw = ImageDraw.Draw(sheet)
+    for i, row in enumerate(rows):
+        x, y = i % columns * (2 * side + 8), i // columns * (side + 14)
+        for k, picture in enumerate((expected_folder / f"{row[0]}-expected.png", folder / f"{row[0]}.png")):
+            if picture.exists():
+                sheet.paste(Image.open(picture).convert("RGB").resize((side, side)), (x + k * side, y + 12))
+        draw.text((x, y), f"{row[1]:.3f} {row[0]}".encode("ascii", "replace").decode()[:38], fill="black" if row[1] >= 0.97 else "red")
+    sheet.save(path)
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("strata"), parser.add_argument("shared_csg"), parser.add_argument("output")
+    parser.add_argument("--sheet")
+    arguments = parser.parse_args()
+    shared = pathlib.Path(arguments.shared_csg)
+    scenes = {}
+    for part in ("tests", "examples"):
+        for path in (shared / part).rglob("*.csg"):
+            scenes[path.stem] = path
+    expected_folder = shared / "expected" / "render"
+    names = sorted(path.name.removesuffix("-expected.png") for path in expected_folder.glob("*.png"))
+    without_scene = [name for name in names if name not in scenes]
+    names = [name for name in names if name in scenes]
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = pathlib.Path(temporary)
+
+        def one(name):
+            return (name, *compare(arguments.strata, scenes[name], expected_folder / f"{name}-expected.png",
+                                   folder / f"{name}.png"))
+
+        with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
+            rows = list(pool.map(one, names))
+        rows.sort(key=lambda row: (row[1], row[0]))
+        if arguments.sheet:
+            write_sheet(arguments.sheet, rows, folder, expected_folder)
+
+    overlaps = [row[1] for row in rows]
+    low = [row for row in rows if row[1] < 0.97]
+    lines = [
+        "# Our pictures beside OpenSCAD's", "",
+        "Made by `bench/csg_conformance.py` with `strata csg --render` at 512 x 512. IoU: intersection over union of the",
+        "silhouettes. Rule: OpenSCAD's own comparison, which also looks at colours. The scenes were dumped by OpenSCAD",
+        "2021.01, most of the pictures were made by later versions.", "",
+        f"- {len(rows)} scenes with an expected picture; median IoU {np.median(overlaps):.5f}",
+        f"- {sum(row[2] for row in rows)} pass OpenSCAD's rule",
+        f"- {len(low)} below 0.97, listed with the reason", "",
+        "## Below 0.97", "", "| scene | IoU | why |", "|---|---|---|"]
+    lines += [f"| {row[0]} | {row[1]:.4f} | {reason(row)} |" for row in low]
+    lines += ["", "## All others", "", "| scene | IoU | rule |", "|---|---|---|"]
+    lines += [f"| {row[0]} | {row[1]:.4f} | {'passes' if row[2] else 'differs'} |" for row in rows if row[1] >= 0.97]
+    if without_scene:
+        lines += ["", f"No scene file for: {', '.join(without_scene)}."]
+    pathlib.Path(arguments.output).write_text("\n".join(lines) + "\n")
+    print("\n".join(lines[6:9]))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
