@@ -209,6 +209,15 @@ Result<void> run_csg(const CsgCommand& command, Session& session) {
     if (auto done = write_numbers(command, camera, preview, outcome, session); !done) return done;
   }
   outcome.write_ms = session.milliseconds() - begin;
+  if (command.json) {
+    begin = session.milliseconds();
+    const csg::Tree& tree = preview.tree();
+    auto measures =
+        csg::measure(tree, tree.root(), kMeasureResolution, session.execution("measuring"));
+    if (!measures) return tl::unexpected(measures.error());
+    outcome.measures = *measures;
+    outcome.measure_ms = session.milliseconds() - begin;
+  }
   session.end_progress();
   if (!command.json) return {};
   return print_report(csg_json(command, outcome, session), *command.json, command.output == "-");

@@ -39,7 +39,23 @@ std::string csg_json(const CsgCommand& command, const CsgOutcome& outcome, const
   json.member("fragments", outcome.drawn.fragments);
   json.member("resolved", outcome.drawn.resolved);
   json.end_object();
-  // Measures of the result (volume, area, bounds, centre of mass) belong here: "result".
+  if (outcome.measures) {
+    const csg::Measures& m = *outcome.measures;
+    json.key("result").begin_object();
+    json.member("empty", m.empty);
+    json.member("resolution", kMeasureResolution);
+    json.member("volume", m.volume);
+    json.member("volume_error", m.volume_error);
+    json.member("area", m.area);
+    json.member("area_error", m.area_error);
+    json.member("centre_of_mass", m.centre);
+    json.member("low", m.low);
+    json.member("high", m.high);
+    json.member("bounds_error", m.bounds_error);
+    json.member("crossings", m.result_crossings);
+    json.member("max_depth_complexity", m.max_depth_complexity);
+    json.end_object();
+  }
   if (!command.ids.empty()) {
     json.key("ids").begin_array();
     for (std::size_t i = 0; i < outcome.seen.size(); ++i) {
@@ -56,6 +72,7 @@ std::string csg_json(const CsgCommand& command, const CsgOutcome& outcome, const
   json.member("read", outcome.read_ms);
   json.member("prepare", outcome.prepare_ms);
   json.member("draw", outcome.draw_ms);
+  json.member("measure", outcome.measure_ms);
   json.member("write", outcome.write_ms);
   json.member("total", session.milliseconds());
   json.end_object();

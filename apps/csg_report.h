@@ -8,6 +8,7 @@
 #include "apps/commands.h"
 #include "apps/session.h"
 #include "csg/picture.h"
+#include "csg/solid_lists.h"
 
 namespace strata::apps {
 
@@ -17,10 +18,14 @@ struct CsgOutcome {
   bool flat = false;
   csg::Camera camera;
   csg::DrawReport drawn;
-  std::vector<std::uint32_t> seen;  ///< solids in the picture of --ids, increasing
-  std::vector<std::string> names;   ///< of those
-  double read_ms = 0, prepare_ms = 0, draw_ms = 0, write_ms = 0;
+  std::optional<csg::Measures> measures;  ///< with --json
+  std::vector<std::uint32_t> seen;        ///< solids in the picture of --ids, increasing
+  std::vector<std::string> names;         ///< of those
+  double read_ms = 0, prepare_ms = 0, draw_ms = 0, write_ms = 0, measure_ms = 0;
 };
+
+/// Voxels along the longest side of the grid that a result is measured on.
+inline constexpr int kMeasureResolution = 256;
 
 /// The colour that stands for a solid in the picture of --ids: never black, no two alike.
 [[nodiscard]] csg::Rgba colour_of_solid(std::uint32_t solid);

@@ -40,6 +40,9 @@ constexpr const char* kNoMemory =
   } catch (const std::bad_alloc&) {
     code = static_cast<int>(ErrorCode::kLimit);
     what = kNoMemory;
+  } catch (const std::system_error& failure) {  // threads that cannot be started, above all
+    code = static_cast<int>(ErrorCode::kLimit);
+    what = failure.what();
   } catch (const std::exception& failure) {
     what = failure.what();
   } catch (...) {

@@ -204,7 +204,8 @@ Result<void> voxelize_and_write(const VoxelizeCommand& command, VoxelizeOutcome&
   if (boundary) outcome.area_estimate = boundary->estimate();
 
   check_columns(command, outcome, session);
-  if (command.solid && !command.surface && !outcome.input.tree && covers(outcome.grid, outcome.input.bounds)) {
+  if (command.solid && !command.surface && !outcome.input.tree &&
+      covers(outcome.grid, outcome.input.bounds)) {
     check_thin(command, outcome.input, outcome.grid, outcome.report.solid_voxels, session);
   } else if (outcome.report.solid_voxels == 0) {
     session.warn("empty", "no voxel is solid; does the grid hold the mesh?");
