@@ -129,6 +129,9 @@ int main(int argc, char** argv) {
   } catch (const std::bad_alloc&) {
     std::fprintf(stderr, "strata: error: out of memory\n");
     return static_cast<int>(strata::ErrorCode::kLimit);
+  } catch (const std::system_error& failure) {  // threads that cannot be started, above all
+    std::fprintf(stderr, "strata: error: the system refuses: %s\n", failure.what());
+    return static_cast<int>(strata::ErrorCode::kLimit);
   } catch (const std::exception& failure) {
     std::fprintf(stderr, "strata: error: %s\n", failure.what());
     return static_cast<int>(strata::ErrorCode::kInternal);

@@ -203,9 +203,9 @@ Result<Measures> measure(const Tree& tree, Tree::NodeId root, int resolution,
   if (!(step > 0) || !std::isfinite(step)) return result;
   VoxelGrid grid;
   grid.voxel_size = glm::dvec3(step);
-  grid.dims = glm::max(glm::ivec3(glm::ceil(extent / step)), glm::ivec3(1));
-  // The result may be smaller than the solids, which reach out of the grid: depths are clamped,
-  // outside of the result's own box nothing is true.
+  // A voxel of room all around, so that no depth of the result is clamped. The solids may reach out:
+  // there nothing of the result is.
+  grid.dims = glm::max(glm::ivec3(glm::ceil(extent / step)), glm::ivec3(1)) + 2;
   grid.origin = (box.low + box.high) * 0.5 - glm::dvec3(grid.dims) * (step * 0.5);
   auto snapped = snap_to_lattice(lists.soup(), grid, execution);
   if (!snapped) return tl::unexpected(snapped.error());

@@ -6,6 +6,7 @@
 #include <mutex>
 #include <new>
 #include <span>
+#include <string_view>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -60,7 +61,10 @@ Result<void> for_each_tile(const Execution& execution, std::size_t count, std::u
   } catch (const std::bad_alloc&) {
     return fail(ErrorCode::kLimit, "surface voxels: out of memory");
   } catch (const std::exception& error) {
-    return fail(ErrorCode::kInternal, "surface voxels: {}", error.what());
+    // Threads that cannot be started are a limit; oneTBB reports them in words only.
+    const bool threads = std::string_view(error.what()).find("pthread_create") != std::string::npos;
+    return fail(threads ? ErrorCode::kLimit : ErrorCode::kInternal, "surface voxels: {}",
+                error.what());
   }
   if (over) {
     return fail(ErrorCode::kLimit, "surface voxels: more than the memory limit of {} bytes", limit);

@@ -1,0 +1,241 @@
+#include "csg/solid_lists.h"
+
+#include <gtest/gtest.h>
+
+#include "csg/geometry.h"
+#include "hashbuffer/build_ldi.h"
+#include "mesh/shapes.h"
+#include "tests/csg/random_tree.h"
+#include "voxelize/voxelize.h"
+
+namespace strata::csg {
+namespace {
+
+const VoxelGrid kGrid{glm::ivec3(28), glm::dvec3(-10.5), glm::dvec3(0.75)};
+
+/// The depths where rays enter and leave a set, pixel by pixel: its canonical form.
+using Lists = std::vector<std::vector<std::uint32_t>>;
+
+Lists lists_of(const Tree& tree, Tree::NodeId node, Axis axis = Axis::kZ) {
+  const SolidLists solids(tree, node);
+  const auto snapped = snap_to_lattice(solids.soup(), kGrid);
+  EXPECT_TRUE(snapped.has_value());
+  const auto image = build_ldi(*snapped, raster_target(kGrid, axis), {}, {}, &solids.filter());
+  EXPECT_TRUE(image.has_value());
+  Lists lists;
+  for (int v = 0; v < image->height; ++v) {
+    for (int u = 0; u < image->width; ++u) {
+      lists.emplace_back();
+      bool inside = false;
+      for (const DepthItem item : image->list(u, v)) {
+        EXPECT_EQ(item.exit(), inside);  // entries and exits alternate
+        inside = !inside;
+        EXPECT_TRUE(lists.back().empty() || lists.back().back() < item.depth());
+        lists.back().push_back(item.depth());
+      }
+      EXPECT_FALSE(inside);
+    }
+  }
+  return lists;
+}
+
+std::uint64_t length(const Lists& lists) {
+  std::uint64_t sum = 0;
+  for (const auto& list : lists) {
+    for (std::size_t i = 0; i + 1 < list.size(); i += 2) sum += list[i + 1] - list[i];
+  }
+  return sum;
+}
+
+/// Two sets and a tree that can be built over them any number of times: operands are copied.
+class Pair {
+ public:
+  Pair(std::uint64_t seed, int solids, bool on_grid) {
+    RandomTree random(seed);
+    a_root_ = random.grow(a_, solids, on_grid);
+    b_root_ = random.grow(b_, solids, on_grid);
+  }
+  static Tree::NodeId copy(Tree& to, const Tree& from, Tree::NodeId root) {
+    std::vector<Tree::NodeId> renumbered(root + 1);
+    for (Tree::NodeId id = 0; id <= root; ++id) {
+      const Tree::Node& node = from.nodes()[id];
+      if (node.operation == Operation::kSolid) {
+        renumbered[id] = to.add_solid(from.solids()[node.first]);
+        continue;
+      }
+      std::vector<Tree::NodeId> operands;
+      for (const Tree::NodeId operand : from.operands(id)) operands.push_back(renumbered[operand]);
+      renumbered[id] = to.add(node.operation, operands);
+    }
+    return renumbered[root];
+  }
+  Tree::NodeId a(Tree& to) const { return copy(to, a_, a_root_); }
+  Tree::NodeId b(Tree& to) const { return copy(to, b_, b_root_); }
+
+ private:
+  Tree a_, b_;
+  Tree::NodeId a_root_, b_root_;
+};
+
+/// Lists of an expression: build(tree) adds its nodes.
+template <class Build>
+Lists lists_of(const Build& build) {
+  Tree tree;
+  const Tree::NodeId root = build(tree);
+  return lists_of(tree, root);
+}
+
+// I11 to I14, in integers.
+TEST(SetAlgebra, HoldsOnTheListsOfRandomTrees) {
+  for (std::uint64_t seed = 0; seed < 120; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Pair p(seed, 1 + static_cast<int>(seed % 6), seed % 2 == 0);
+    const auto node = [](Tree& t, Operation o, Tree::NodeId x, Tree::NodeId y) {
+      return t.add(o, {x, y});
+    };
+    using enum Operation;
+    const Lists a = lists_of([&](Tree& t) { return p.a(t); });
+    const Lists b = lists_of([&](Tree& t) { return p.b(t); });
+    const Lists both = lists_of([&](Tree& t) { return node(t, kIntersection, p.a(t), p.b(t)); });
+    const Lists either = lists_of([&](Tree& t) { return node(t, kUnion, p.a(t), p.b(t)); });
+    const Lists rest = lists_of([&](Tree& t) { return node(t, kDifference, p.a(t), p.b(t)); });
+    const Lists other = lists_of([&](Tree& t) { return node(t, kDifference, p.b(t), p.a(t)); });
+
+    EXPECT_EQ(lists_of([&](Tree& t) { return node(t, kUnion, p.a(t), p.a(t)); }), a);
+    EXPECT_EQ(lists_of([&](Tree& t) { return node(t, kIntersection, p.a(t), p.a(t)); }), a);
+    EXPECT_EQ(length(lists_of([&](Tree& t) { return node(t, kDifference, p.a(t), p.a(t)); })), 0u);
+    EXPECT_EQ(lists_of([&](Tree& t) { return node(t, kUnion, p.a(t), t.add(kUnion, {})); }), a);
+    EXPECT_EQ(length(lists_of(
+                  [&](Tree& t) { return node(t, kIntersection, p.a(t), t.add(kUnion, {})); })),
+              0u);
+    // commutative
+    EXPECT_EQ(lists_of([&](Tree& t) { return node(t, kUnion, p.b(t), p.a(t)); }), either);
+    EXPECT_EQ(lists_of([&](Tree& t) { return node(t, kIntersection, p.b(t), p.a(t)); }), both);
+    // absorption
+    EXPECT_EQ(lists_of([&](Tree& t) {
+                return node(t, kUnion, p.a(t), node(t, kIntersection, p.a(t), p.b(t)));
+              }),
+              a);
+    // (A - B) or (A and B) = A; A - (A - B) = A and B
+    EXPECT_EQ(lists_of([&](Tree& t) {
+                return node(t, kUnion, node(t, kDifference, p.a(t), p.b(t)),
+                            node(t, kIntersection, p.a(t), p.b(t)));
+              }),
+              a);
+    EXPECT_EQ(lists_of([&](Tree& t) {
+                return node(t, kDifference, p.a(t), node(t, kDifference, p.a(t), p.b(t)));
+              }),
+              both);
+    // De Morgan below a universe: U - (A or B) = (U - A) and (U - B)
+    const auto universe = [](Tree& t) {
+      return t.add_solid(
+          {std::make_shared<TriangleSoup>(make_box(glm::dvec3(-10.3), glm::dvec3(10.3)))});
+    };
+    EXPECT_EQ(lists_of([&](Tree& t) {
+                return node(t, kDifference, universe(t), node(t, kUnion, p.a(t), p.b(t)));
+              }),
+              lists_of([&](Tree& t) {
+                return node(t, kIntersection, node(t, kDifference, universe(t), p.a(t)),
+                            node(t, kDifference, universe(t), p.b(t)));
+              }));
+    // inclusion and exclusion, exactly
+    EXPECT_EQ(length(a) + length(b), length(either) + length(both));
+    EXPECT_EQ(length(rest) + length(both), length(a));
+    EXPECT_EQ(length(rest) + length(other) + length(both), length(either));
+    if (HasFailure()) return;
+  }
+}
+
+// The tree against brute force at the centres of voxels, along all axes.
+TEST(SolidLists, AgreeWithRecursionAtVoxelCentres) {
+  for (std::uint64_t seed = 0; seed < 60; ++seed) {
+    RandomTree random(seed + 300);
+    Tree tree;
+    tree.set_root(random.grow(tree, random.pick(1, 10), seed % 2 == 0));
+    std::vector<VoxelIntervals> of_solid;
+    for (std::uint32_t solid = 0; solid < tree.solids().size(); ++solid) {
+      Tree alone;
+      alone.set_root(alone.add_solid(tree.solids()[solid]));
+      const SolidLists lists(alone, alone.root());
+      auto voxels = voxelize(lists.soup(), kGrid);
+      ASSERT_TRUE(voxels.has_value());
+      of_solid.push_back(std::move(*voxels));
+    }
+    const auto holds = [](const VoxelIntervals& voxels, int i, int j, int k) {
+      for (const Interval run : voxels.column(i, j)) {
+        if (run.first <= k && k <= run.last) return true;
+      }
+      return false;
+    };
+    const VoxelIntervals expected =
+        intervals_from_predicate(kGrid, Axis::kZ, [&](int i, int j, int k) {
+          return evaluate(tree, tree.root(),
+                          [&](std::uint32_t solid) { return holds(of_solid[solid], i, j, k); });
+        });
+    VoxelizeReport along_z, reports[3];
+    const SolidLists lists(tree, tree.root());
+    for (const Axis axis : {Axis::kX, Axis::kY, Axis::kZ}) {
+      const VoxelizeOptions options{.axis = axis, .statistics = true, .filter = &lists.filter()};
+      const auto found =
+          voxelize(lists.soup(), kGrid, options, {}, &reports[static_cast<int>(axis)]);
+      ASSERT_TRUE(found.has_value());
+      EXPECT_EQ(found->solid_voxels(), expected.solid_voxels()) << "seed " << seed;
+      if (axis != Axis::kZ) continue;
+      for (int j = 0; j < kGrid.dims.y; ++j) {
+        for (int i = 0; i < kGrid.dims.x; ++i) {
+          const auto a = found->column(i, j), b = expected.column(i, j);
+          ASSERT_TRUE(std::equal(a.begin(), a.end(), b.begin(), b.end())) << "seed " << seed;
+        }
+      }
+    }
+    EXPECT_EQ(reports[0].checksum, reports[2].checksum) << "seed " << seed;
+    EXPECT_EQ(reports[1].checksum, reports[2].checksum) << "seed " << seed;
+  }
+}
+
+TEST(SolidLists, SurfacesOfTreesAreRefused) {
+  Tree tree;
+  tree.set_root(
+      tree.add_solid({std::make_shared<TriangleSoup>(make_box(glm::dvec3(-1), glm::dvec3(1)))}));
+  const SolidLists lists(tree, tree.root());
+  const auto refused = voxelize(lists.soup(), kGrid, {.surface = true, .filter = &lists.filter()});
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_EQ(refused.error().code, ErrorCode::kUsage);
+}
+
+TEST(Measures, OfABoxMinusABoxAreTheClosedForm) {
+  Tree tree;
+  const auto box = [&](const glm::dvec3& low, const glm::dvec3& high) {
+    return tree.add_solid({std::make_shared<TriangleSoup>(make_box(low, high))});
+  };
+  tree.set_root(tree.add(Operation::kDifference, {box(glm::dvec3(0), glm::dvec3(8)),
+                                                  box(glm::dvec3(2, 2, 2), glm::dvec3(6, 6, 10))}));
+  const auto m = measure(tree, tree.root(), 64);
+  ASSERT_TRUE(m.has_value());
+  EXPECT_NEAR(m->volume, 512 - 96, 1e-6);
+  EXPECT_LE(std::abs(m->volume - (512 - 96)), m->volume_error);
+  EXPECT_NEAR(m->area, 6 * 64 + 4 * 24, 1e-6);
+  EXPECT_NEAR(m->centre.x, 4.0, 1e-3);
+  EXPECT_NEAR(m->centre.z, (512 * 4.0 - 96 * 5.0) / (512 - 96), 1e-3);
+  for (int axis = 0; axis < 3; ++axis) {
+    EXPECT_NEAR(m->low[axis], 0.0, m->bounds_error);
+    EXPECT_NEAR(m->high[axis], 8.0, m->bounds_error);
+  }
+}
+
+TEST(Measures, StayWithinTheirBoundsForBallsAndTori) {
+  Tree tree;
+  tree.set_root(tree.add_solid({std::make_shared<TriangleSoup>(make_torus(3, 1, 64, 32))}));
+  const double exact = signed_volume(*tree.solids()[0].mesh);
+  for (const int resolution : {16, 64, 200}) {
+    const auto m = measure(tree, tree.root(), resolution);
+    ASSERT_TRUE(m.has_value());
+    EXPECT_LE(std::abs(m->volume - exact), m->volume_error) << resolution;
+  }
+  const Tree empty;
+  EXPECT_TRUE(measure(empty, empty.root(), 64)->empty);
+  EXPECT_FALSE(measure(tree, tree.root(), 0).has_value());
+}
+
+}  // namespace
+}  // namespace strata::csg
