@@ -203,8 +203,8 @@ Result<Measures> measure(const Tree& tree, Tree::NodeId root, int resolution,
   if (!(step > 0) || !std::isfinite(step)) return result;
   VoxelGrid grid;
   grid.voxel_size = glm::dvec3(step);
-  // A voxel of room all around, so that no depth of the result is clamped. The solids may reach out:
-  // there nothing of the result is.
+  // A voxel of room all around, so that no depth of the result is clamped. The solids may reach
+  // out: there nothing of the result is.
   grid.dims = glm::max(glm::ivec3(glm::ceil(extent / step)), glm::ivec3(1)) + 2;
   grid.origin = (box.low + box.high) * 0.5 - glm::dvec3(grid.dims) * (step * 0.5);
   auto snapped = snap_to_lattice(lists.soup(), grid, execution);
