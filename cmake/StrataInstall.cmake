@@ -41,6 +41,7 @@ foreach(folder IN LISTS strata_folders)
   if(NOT STRATA_HAVE_OPENMESH)
     list(FILTER headers EXCLUDE REGEX "/openmesh_bridge\\.h$")
   endif()
+  list(FILTER headers EXCLUDE REGEX "/gl/window\\.h$")  # of strata-view alone
   install(FILES ${headers} DESTINATION "${strata_include_dir}/${folder}")
 endforeach()
 
@@ -82,6 +83,7 @@ strata_depends(PkgConfig::qhull_r "${pc_modules}(qhull_r REQUIRED QUIET IMPORTED
 strata_depends(PkgConfig::text "${pc_modules}(text REQUIRED QUIET IMPORTED_TARGET freetype2 harfbuzz fontconfig)"
   "freetype2 harfbuzz fontconfig" "")
 strata_depends(PkgConfig::libzip "${pc_modules}(libzip REQUIRED QUIET IMPORTED_TARGET libzip)" libzip "")
+strata_depends(PkgConfig::epoxy "${pc_modules}(epoxy REQUIRED QUIET IMPORTED_TARGET epoxy)" epoxy "")
 strata_depends(pugixml::pugixml "find_dependency(pugixml CONFIG)" pugixml "")
 strata_depends(OpenEXR::OpenEXR "find_dependency(OpenEXR CONFIG)" OpenEXR "")
 strata_depends(OpenMeshCore "find_dependency(OpenMesh CONFIG)" "" "-lOpenMeshCore")  # Debian has no module of it

@@ -8,6 +8,7 @@ option(STRATA_USE_TBB "Run parallel work on oneTBB; off: std::thread (for Thread
 option(STRATA_WITH_OPENVDB "Compare with OpenVDB in tests and benchmarks; .vdb files are written without it" ON)
 option(STRATA_WITH_OPENEXR "Read and write deep .exr files" ON)
 option(STRATA_WITH_OPENMESH "Build the OpenMesh bridge" ON)
+option(STRATA_WITH_GL "Build the OpenGL part: libepoxy, EGL; the window: GLFW, Dear ImGui" ON)
 set(STRATA_SANITIZE "" CACHE STRING "Sanitizers, as for -fsanitize=")
 
 if(NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)

@@ -24,9 +24,9 @@ endfunction()
 
 # strata_add_library(NAME SOURCES... [PUBLIC targets...] [PRIVATE targets...])
 #   makes strata_NAME, alias strata::NAME, headers found as "NAME/file.h" from the project's root. It is installed, and
-#   part of the umbrella strata::strata.
+#   part of the umbrella strata::strata, unless it is INTERNAL.
 function(strata_add_library name)
-  cmake_parse_arguments(arg "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  cmake_parse_arguments(arg "INTERNAL" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
   add_library(strata_${name} STATIC ${arg_SOURCES})
   add_library(strata::${name} ALIAS strata_${name})
   set_target_properties(strata_${name} PROPERTIES EXPORT_NAME ${name})
@@ -35,7 +35,27 @@ function(strata_add_library name)
   target_compile_features(strata_${name} PUBLIC cxx_std_20)
   target_link_libraries(strata_${name} PUBLIC ${arg_PUBLIC} PRIVATE ${arg_PRIVATE})
   strata_set_flags(strata_${name})
-  set_property(GLOBAL APPEND PROPERTY STRATA_LIBRARIES strata_${name})
+  if(NOT arg_INTERNAL)
+    set_property(GLOBAL APPEND PROPERTY STRATA_LIBRARIES strata_${name})
+  endif()
+endfunction()
+
+# strata_embed_glsl(TARGET FILES...): compiles shader text into the target, so that nothing is looked for at run time.
+#   `raster/gl/cover.comp.glsl` becomes `extern const gl::GlslPiece raster_gl_cover_comp;` in namespace strata::glsl:
+#   declare it where it is used (gl/program.h has the type). `name.glsl.h` becomes ..._name_h.
+function(strata_embed_glsl target)
+  foreach(file IN LISTS ARGN)
+    cmake_path(ABSOLUTE_PATH file OUTPUT_VARIABLE input)
+    cmake_path(RELATIVE_PATH input BASE_DIRECTORY "${PROJECT_SOURCE_DIR}" OUTPUT_VARIABLE path)
+    string(REPLACE ".glsl" "" symbol "${path}")
+    string(REGEX REPLACE "[^A-Za-z0-9]" "_" symbol "${symbol}")
+    set(output "${CMAKE_CURRENT_BINARY_DIR}/glsl/${symbol}.cpp")
+    add_custom_command(OUTPUT "${output}"
+      COMMAND "${CMAKE_COMMAND}" "-DINPUT=${input}" "-DOUTPUT=${output}" "-DPATH=${path}" "-DSYMBOL=${symbol}"
+              -P "${PROJECT_SOURCE_DIR}/cmake/StrataEmbedGlsl.cmake"
+      DEPENDS "${input}" "${PROJECT_SOURCE_DIR}/cmake/StrataEmbedGlsl.cmake" VERBATIM)
+    target_sources(${target} PRIVATE "${output}")
+  endforeach()
 endfunction()
 
 # strata_add_tool(NAME SOURCES... [LIBRARIES targets...]): an executable for users, at bin/NAME, installed.
