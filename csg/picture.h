@@ -65,6 +65,11 @@ struct SurfaceImage {
   std::vector<std::uint32_t> solid;     ///< index into the tree; meaningless where nothing is seen
   std::vector<std::uint32_t> triangle;  ///< [exit:1 | triangle:31] of the solid's mesh; exit: a cut
                                         ///< face, the surface is left there
+  void resize(int columns, int rows) {
+    width = columns, height = rows;
+    const std::size_t pixels = static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
+    for (auto* plane : {&depth, &solid, &triangle}) plane->resize(pixels);
+  }
 };
 
 /// Draws a tree, again and again: what does not change from frame to frame is kept.

@@ -1,5 +1,7 @@
 #include <algorithm>
+#include <atomic>
 #include <bit>
+#include <functional>
 #include <glm/geometric.hpp>
 #include <new>
 #include <numeric>
@@ -52,7 +54,12 @@ class Frame {
   Frame(const Program& program, const Geometry& geometry, double world_error)
       : program_(&program), geometry_(&geometry), world_error_(world_error) {}
 
-  Result<void> draw(const View& view, const Execution& execution) {
+  /// What is to be done with a tile's surfaces: pixels `rect` of the picture.
+  using OnTile = std::function<void(const SurfaceImage& tile, const PixelRect& rect)>;
+
+  /// Finds all surfaces. With `on_tile` they are handed to it, from any thread, and image() is not
+  /// kept: memory is slower than the search.
+  Result<void> draw(const View& view, const Execution& execution, const OnTile& on_tile = {}) {
     view_ = view;
     coincidence_ = Coincidence(view, world_error_);
     tiles_u_ = (view.size.x + kTileSide - 1) / kTileSide;
@@ -86,15 +93,10 @@ class Frame {
       if (!failure) return failure;
     }
     if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
-    image_.width = view.size.x, image_.height = view.size.y;
-    const std::size_t pixels =
-        static_cast<std::size_t>(view.size.x) * static_cast<std::size_t>(view.size.y);
-    for (auto* plane : {&image_.depth, &image_.solid, &image_.triangle}) plane->resize(pixels);
     report_ = {};
     solids_.build(view_parts_, tiles_u_, tiles_v_);
-    std::vector<std::uint32_t> tiles(static_cast<std::size_t>(tiles_u_ * tiles_v_));
-    std::iota(tiles.begin(), tiles.end(), 0u);
-    return find(tiles, execution);
+    whole_ = false;
+    return find_all(execution, on_tile);
   }
 
   Result<void> moved(std::uint32_t solid, const Execution& execution) {
@@ -104,6 +106,7 @@ class Frame {
     view_parts_[solid] = std::move(*part);
     const PixelRect after = view_parts_[solid].rect;
     solids_.build(view_parts_, tiles_u_, tiles_v_);
+    if (!whole_) return find_all(execution, {});
     std::vector<std::uint32_t> tiles;
     for (int tv = 0; tv < tiles_v_; ++tv) {
       for (int tu = 0; tu < tiles_u_; ++tu) {
@@ -116,26 +119,43 @@ class Frame {
         }
       }
     }
-    return find(tiles, execution);
+    return find(tiles, execution, {});
   }
 
   [[nodiscard]] const SurfaceImage& image() const { return image_; }
   [[nodiscard]] const View& view() const { return view_; }
-  [[nodiscard]] const std::vector<ViewPart>& view_parts() const { return view_parts_; }
   [[nodiscard]] const DrawReport& report() const { return report_; }
 
  private:
-  Result<void> find(std::span<const std::uint32_t> tiles, const Execution& execution) {
+  Result<void> find_all(const Execution& execution, const OnTile& on_tile) {
+    std::vector<std::uint32_t> tiles(static_cast<std::size_t>(tiles_u_ * tiles_v_));
+    std::iota(tiles.begin(), tiles.end(), 0u);
+    if (!on_tile) image_.resize(view_.size.x, view_.size.y);
+    auto done = find(tiles, execution, on_tile);
+    whole_ = done.has_value() && !on_tile;
+    return done;
+  }
+
+  Result<void> find(std::span<const std::uint32_t> tiles, const Execution& execution,
+                    const OnTile& on_tile) {
     const auto workers = static_cast<std::size_t>(execution.thread_count());
     while (finders_.size() < workers) {
       finders_.push_back(std::make_unique<TileFinder>(*program_, view_parts_, geometry_->parts(),
                                                       view_, coincidence_));
+      tile_images_.emplace_back().resize(kTileSide, kTileSide);
     }
     for (const auto& finder : finders_) finder->reset_counts();
     parallel_for(execution, tiles.size(), [&](std::size_t i, int worker) {
       const auto tile = static_cast<int>(tiles[i]);
+      const int tile_u = tile % tiles_u_, tile_v = tile / tiles_u_;
+      const PixelRect rect{tile_u * kTileSide, tile_v * kTileSide,
+                           std::min(view_.size.x, (tile_u + 1) * kTileSide),
+                           std::min(view_.size.y, (tile_v + 1) * kTileSide)};
+      SurfacePart part{&image_};
+      if (on_tile) part = {&tile_images_[static_cast<std::size_t>(worker)], rect.u0, rect.v0};
       finders_[static_cast<std::size_t>(worker)]->find(
-          tile % tiles_u_, tile / tiles_u_, solids_.at(static_cast<std::size_t>(tile)), image_);
+          tile_u, tile_v, solids_.at(static_cast<std::size_t>(tile)), part);
+      if (on_tile) on_tile(*part.image, rect);
     });
     report_.fragments = report_.resolved = 0;
     for (const auto& finder : finders_) {
@@ -155,6 +175,8 @@ class Frame {
   std::vector<ViewPart> view_parts_;
   TileSolids solids_;
   std::vector<std::unique_ptr<TileFinder>> finders_;
+  std::vector<SurfaceImage> tile_images_;  ///< of each worker
+  bool whole_ = false;                     ///< image_ shows all of view_
   SurfaceImage image_;
   DrawReport report_;
 };
@@ -203,24 +225,10 @@ struct Preview::Impl {
     if (auto done = frame.draw(view, execution); !done) return tl::unexpected(done.error());
     return surfaces();
   }
-
-  /// The frame's image with triangles of the meshes: those of a solid that the near plane cuts are
-  /// numbered otherwise.
   const SurfaceImage* surfaces() {
-    const auto& parts = frame.view_parts();
     report = frame.report();
     report_covers = false;
-    if (std::none_of(parts.begin(), parts.end(), [](const ViewPart& p) { return p.cut; })) {
-      return &frame.image();
-    }
-    with_sources = frame.image();
-    for (std::size_t i = 0; i < with_sources.depth.size(); ++i) {
-      if (with_sources.depth[i] == SurfaceImage::kNone) continue;
-      std::uint32_t& face = with_sources.triangle[i];
-      const std::uint32_t exit = face & SurfaceImage::kExit;
-      face = parts[with_sources.solid[i]].source(face & ~SurfaceImage::kExit) | exit;
-    }
-    return &with_sources;
+    return &frame.image();
   }
 
   Result<Picture> picture(const Camera& camera, const glm::ivec2& size,
@@ -234,7 +242,6 @@ struct Preview::Impl {
   double error;
   Frame frame;
   GhostPainter painter;
-  SurfaceImage with_sources;
   DrawReport report;
   bool report_covers = false;  ///< report.covered is known
 };
@@ -266,7 +273,7 @@ Result<Picture> Preview::Impl::picture(const Camera& camera, const glm::ivec2& s
   const std::int64_t samples_a_row = std::int64_t{size.x} * across * down;
   const int rows_at_once = static_cast<int>(std::clamp<std::int64_t>(
       kSamplesAtOnce / samples_a_row, std::max(1, kTileSide / down), size.y));
-  const bool direct = options.samples == 1 && painter.empty();
+  const bool direct = options.samples == 1 && painter.empty() && !options.edges;
   std::vector<Rgba> samples;
   DrawReport total;
   for (int first = 0; first < size.y; first += rows_at_once) {
@@ -280,18 +287,25 @@ Result<Picture> Preview::Impl::picture(const Camera& camera, const glm::ivec2& s
       };
     }
     const View view = band_of(*whole, first, drawn, across, down);
+    const auto pixels = std::span(result.pixels)
+                            .subspan(static_cast<std::size_t>(first) * width,
+                                     static_cast<std::size_t>(rows) * width);
+    if (direct) {
+      std::atomic<std::uint64_t> covered{0};
+      const auto on_tile = [&](const SurfaceImage& tile, const PixelRect& rect) {
+        covered += shade_tile(tile, rect, shader, background, size.x, pixels);
+      };
+      if (auto done = frame.draw(view, part, on_tile); !done) return tl::unexpected(done.error());
+      total.fragments += frame.report().fragments;
+      total.resolved += frame.report().resolved;
+      total.covered += covered;
+      continue;
+    }
     const auto image = draw(view, part);
     if (!image) return tl::unexpected(image.error());
     total.fragments += report.fragments;
     total.resolved += report.resolved;
     part.progress = {};
-    const auto pixels = std::span(result.pixels)
-                            .subspan(static_cast<std::size_t>(first) * width,
-                                     static_cast<std::size_t>(rows) * width);
-    if (direct && !options.edges) {
-      total.covered += shade(**image, shader, background, part, pixels);
-      continue;
-    }
     samples.resize((*image)->depth.size());
     shade(**image, shader, Rgba(0), part, samples);
     if (options.edges) draw_edges(**image, shader, across, down, part, samples);

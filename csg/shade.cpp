@@ -107,33 +107,72 @@ bool Shader::same_plane(std::uint32_t solid_a, std::uint32_t face_a, std::uint32
          kSamePlace * size_;
 }
 
+namespace {
+
+/// Colours rows of surfaces one after another.
+class RowShader {
+ public:
+  RowShader(const SurfaceImage& image, const Shader& shader, Rgba background)
+      : image_(&image), shader_(&shader), background_(background) {}
+
+  /// Colours `count` pixels from `begin` on.
+  void shade(std::size_t begin, std::size_t count, Rgba* colours) {
+    const std::uint32_t* depths = image_->depth.data() + begin;
+    const std::uint32_t* solids = image_->solid.data() + begin;
+    const std::uint32_t* faces = image_->triangle.data() + begin;
+    for (std::size_t i = 0; i < count; ++i) {
+      if (depths[i] == SurfaceImage::kNone) {
+        colours[i] = background_;
+        continue;
+      }
+      ++covered_;
+      if (solids[i] != solid_ || faces[i] != face_) meet(solids[i], faces[i]);
+      colours[i] = colour_;
+    }
+  }
+  [[nodiscard]] std::uint64_t covered() const { return covered_; }
+
+ private:
+  void meet(std::uint32_t solid, std::uint32_t face) {
+    solid_ = solid;
+    face_ = face;
+    const bool exit = (face & SurfaceImage::kExit) != 0;
+    const float light = shader_->light(solid, face & ~SurfaceImage::kExit, exit);
+    colour_ = to_bytes(glm::vec4(glm::vec3(shader_->base(solid, exit)) * light, 1.0f));
+  }
+
+  const SurfaceImage* image_;
+  const Shader* shader_;
+  Rgba background_, colour_{0};
+  std::uint32_t solid_ = SurfaceImage::kNone, face_ = 0;
+  std::uint64_t covered_ = 0;
+};
+
+}  // namespace
+
 std::uint64_t shade(const SurfaceImage& image, const Shader& shader, Rgba background,
                     const Execution& execution, std::span<Rgba> colours) {
   const auto width = static_cast<std::size_t>(image.width);
   std::atomic<std::uint64_t> covered{0};
   for_each_band(image.height, execution, [&](int first, int end) {
-    std::uint64_t seen = 0;
-    std::uint32_t last_solid = SurfaceImage::kNone, last_face = 0;
-    Rgba colour(0);
-    for (std::size_t i = static_cast<std::size_t>(first) * width;
-         i < static_cast<std::size_t>(end) * width; ++i) {
-      if (image.depth[i] == SurfaceImage::kNone) {
-        colours[i] = background;
-        continue;
-      }
-      ++seen;
-      if (image.solid[i] != last_solid || image.triangle[i] != last_face) {
-        last_solid = image.solid[i];
-        last_face = image.triangle[i];
-        const bool exit = (last_face & SurfaceImage::kExit) != 0;
-        const float light = shader.light(last_solid, last_face & ~SurfaceImage::kExit, exit);
-        colour = to_bytes(glm::vec4(glm::vec3(shader.base(last_solid, exit)) * light, 1.0f));
-      }
-      colours[i] = colour;
-    }
-    covered += seen;
+    RowShader rows(image, shader, background);
+    const std::size_t begin = static_cast<std::size_t>(first) * width;
+    rows.shade(begin, static_cast<std::size_t>(end - first) * width, colours.data() + begin);
+    covered += rows.covered();
   });
   return covered;
+}
+
+std::uint64_t shade_tile(const SurfaceImage& tile, const PixelRect& rect, const Shader& shader,
+                         Rgba background, int width, std::span<Rgba> colours) {
+  RowShader rows(tile, shader, background);
+  for (int v = rect.v0; v < rect.v1; ++v) {
+    const std::size_t at = static_cast<std::size_t>(v) * static_cast<std::size_t>(width) +
+                           static_cast<std::size_t>(rect.u0);
+    rows.shade(static_cast<std::size_t>(v - rect.v0) * static_cast<std::size_t>(tile.width),
+               static_cast<std::size_t>(rect.u1 - rect.u0), colours.data() + at);
+  }
+  return rows.covered();
 }
 
 void draw_edges(const SurfaceImage& image, const Shader& shader, int step_u, int step_v,

@@ -50,6 +50,10 @@ class Shader {
 std::uint64_t shade(const SurfaceImage& image, const Shader& shader, Rgba background,
                     const Execution& execution, std::span<Rgba> colours);
 
+/// The same for the pixels `rect` of an image `width` pixels wide; `tile` begins there.
+std::uint64_t shade_tile(const SurfaceImage& tile, const PixelRect& rect, const Shader& shader,
+                         Rgba background, int width, std::span<Rgba> colours);
+
 /// Darkens the colours where the faces of neighbours, `step_u` and `step_v` samples apart, differ.
 void draw_edges(const SurfaceImage& image, const Shader& shader, int step_u, int step_v,
                 const Execution& execution, std::span<Rgba> colours);

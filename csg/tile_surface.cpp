@@ -33,6 +33,38 @@ void LeafLayers::add_layer(Arena& arena) {
   triangles.push_back(arena.words(count));  // means nothing where there is no key
 }
 
+void UnitedLayers::clear(Arena& arena, const PixelRect& tile) {
+  // Blocks of pixels may reach beyond the tile.
+  constexpr std::size_t kWords = static_cast<std::size_t>(kTilePixels + 4 * kTileSide);
+  u0 = tile.u0, v0 = tile.v0;
+  for (std::uint32_t*& words : depths) {
+    words = arena.words(kWords);
+    std::fill_n(words, kWords, kEmpty);
+  }
+  for (std::uint32_t*& words : faces) words = arena.words(kWords);
+  rest = arena.words(kWords);
+  std::fill_n(rest, kWords, kEmpty);
+  face_solids.clear();
+  face_triangles.clear();
+  more.clear();
+}
+
+std::uint32_t UnitedLayers::add_face(const LatticeMesh& mesh, std::uint32_t solid,
+                                     std::uint32_t triangle, bool steep) {
+  const auto face = static_cast<std::uint32_t>(face_solids.size());
+  face_solids.push_back(solid);
+  face_triangles.push_back(triangle);
+  more.push_back(0);
+  if (!steep) return face;
+  // No bound is more than the triangle is deep.
+  const glm::uvec3& t = mesh.triangles[triangle];
+  const auto [low, high] =
+      std::minmax({mesh.vertices[t.x].z, mesh.vertices[t.y].z, mesh.vertices[t.z].z});
+  constexpr auto kLimit = static_cast<std::int32_t>(kPictureDepthLimit);
+  more.back() = static_cast<std::uint32_t>(std::clamp(high, 0, kLimit) - std::min(low, kLimit)) + 1;
+  return face | kSteep;
+}
+
 // --- Simplifier ---------------------------------------------------------------------------------
 
 Simplifier::Simplifier(const Program& program) : program_(&program), seen_(program.nodes.size()) {}
@@ -299,24 +331,30 @@ TileFinder::TileFinder(const Program& program, const std::vector<ViewPart>& view
 
 TileFinder::~TileFinder() = default;
 
-void TileFinder::make(LeafLayers& leaf) {
-  leaf.made = true;
-  leaf.areas = 0;
-  const ViewPart& part = view_parts_[leaf.solid];
-  const PixelRect clip{std::max(tile_.u0, part.rect.u0), std::max(tile_.v0, part.rect.v0),
-                       std::min(tile_.u1, part.rect.u1), std::min(tile_.v1, part.rect.v1)};
-  const RasterTarget target{Axis::kZ, view_->size.x, view_->size.y, kPictureDepthLimit};
-  std::span<const std::uint32_t> triangles;
+TileFinder::Input TileFinder::input_of(std::uint32_t solid) {
+  const ViewPart& part = view_parts_[solid];
+  Input input;
+  input.clip = {std::max(tile_.u0, part.rect.u0), std::max(tile_.v0, part.rect.v0),
+                std::min(tile_.u1, part.rect.u1), std::min(tile_.v1, part.rect.v1)};
   if (part.binned) {
-    triangles = part.bins.tile(tile_.u0 / kTileSide, tile_.v0 / kTileSide);
+    input.triangles = part.bins.tile(tile_.u0 / kTileSide, tile_.v0 / kTileSide);
   } else {
     while (all_triangles_.size() < part.mesh.triangles.size()) {
       all_triangles_.push_back(static_cast<std::uint32_t>(all_triangles_.size()));
     }
-    triangles = std::span(all_triangles_).first(part.mesh.triangles.size());
+    input.triangles = std::span(all_triangles_).first(part.mesh.triangles.size());
   }
-  fragments_ +=
-      raster_layers(part.mesh, target, triangles, clip, coincidence_->steep_from(), leaf, arena_);
+  return input;
+}
+
+void TileFinder::make(LeafLayers& leaf) {
+  leaf.made = true;
+  leaf.areas = 0;
+  const ViewPart& part = view_parts_[leaf.solid];
+  const RasterTarget target{Axis::kZ, view_->size.x, view_->size.y, kPictureDepthLimit};
+  const Input input = input_of(leaf.solid);
+  fragments_ += raster_layers(part.mesh, target, input.triangles, input.clip,
+                              coincidence_->steep_from(), leaf, arena_);
   if (!leaf.keys.empty()) normalize_layers(leaf, part.cut, *this);
 }
 
@@ -347,8 +385,21 @@ void TileFinder::normalize_pixel(LeafLayers& leaf, std::size_t at) {
   }
 }
 
-Surface TileFinder::resolve(const TileProgram& program, int u, int v) {
+void TileFinder::show(std::uint64_t pixel) {
   ++resolved_;
+  const Surface surface = finder_.find(flips_, [&](const Flip& flip) {
+    if (flip.triangle == Surface::kNone) return Coincidence::Bound{};
+    return coincidence_->bound(view_parts_[flip.solid].mesh, flip.triangle, flip.depth);
+  });
+  part_.image->depth[pixel] = surface.depth;
+  part_.image->solid[pixel] = surface.solid;
+  part_.image->triangle[pixel] = surface.triangle | (surface.exit ? SurfaceImage::kExit : 0u);
+}
+
+void TileFinder::resolve(const TileProgram& program, std::uint64_t pixel) {
+  const auto width = static_cast<std::uint64_t>(part_.image->width);
+  const int u = part_.u0 + static_cast<int>(pixel % width);
+  const int v = part_.v0 + static_cast<int>(pixel / width);
   flips_.clear();
   for (const std::uint32_t slot : program.leaves) {
     LeafLayers& leaf = leaves_[slot];
@@ -362,52 +413,109 @@ Surface TileFinder::resolve(const TileProgram& program, int u, int v) {
       flips_.push_back({leaf.keys[k][at], leaf.solid, triangle, (k & 1) != 0});
     }
   }
-  return finder_.find(flips_, [&](const Flip& flip) {
-    if (flip.triangle == Surface::kNone) return Coincidence::Bound{};
-    return coincidence_->bound(view_parts_[flip.solid].mesh, flip.triangle, flip.depth);
-  });
+  show(pixel);
+}
+
+bool TileFinder::show_united(std::uint64_t pixel) {
+  const auto width = static_cast<std::uint64_t>(part_.image->width);
+  const std::size_t at = united_.index(part_.u0 + static_cast<int>(pixel % width),
+                                       part_.v0 + static_cast<int>(pixel / width));
+  const double first = united_.depths[0][at];
+  const Coincidence::Range range = coincidence_->range();
+  const double nearness = range.a - static_cast<double>(range.b) * first;
+  flips_.clear();
+  double last = first + range.offset + range.square * nearness * nearness + 1;
+  for (int k = 0; k < UnitedLayers::kKept; ++k) {
+    const std::uint32_t depth = united_.depths[k][at];
+    if (depth == UnitedLayers::kEmpty) break;
+    const std::uint32_t face = united_.faces[k][at] & ~UnitedLayers::kSteep;
+    const double more = united_.more[face];
+    if (k == 0) {
+      last += 2 * more;
+    } else if (depth - more > last) {
+      continue;
+    }
+    const std::uint32_t solid = united_.face_solids[face];
+    // A ray enters a convex solid once, or nearly so.
+    for (const Flip& flip : flips_) {
+      if (flip.solid == solid) return false;
+    }
+    flips_.push_back({depth, solid, united_.face_triangles[face], false});
+  }
+  if (united_.rest[at] <= last) return false;
+  if (flips_.size() > 1) show(pixel);
+  return true;
+}
+
+void TileFinder::find_united(std::span<LeafLayers> leaves) {
+  const RasterTarget target{Axis::kZ, view_->size.x, view_->size.y, kPictureDepthLimit};
+  united_.clear(arena_, tile_);
+  for (const LeafLayers& leaf : leaves) {
+    const Input input = input_of(leaf.solid);
+    fragments_ += raster_united(view_parts_[leaf.solid].mesh, target, input.triangles, input.clip,
+                                coincidence_->steep_from(), leaf.solid, united_);
+  }
+  doubtful_.clear();
+  csg::find_united(united_, tile_, coincidence_->range(), part_, doubtful_);
+  bool simplified = false;
+  for (const std::uint64_t pixel : doubtful_) {
+    if (show_united(pixel)) continue;
+    if (!simplified) {
+      present_.resize(leaves.size());
+      std::iota(present_.begin(), present_.end(), 0u);
+      simplifier_.simplify(leaves, present_, tile_program_);
+      simplified = true;
+    }
+    resolve(tile_program_, pixel);
+  }
 }
 
 void TileFinder::find(int tile_u, int tile_v, std::span<const std::uint32_t> solids,
-                      SurfaceImage& image) {
+                      const SurfacePart& part) {
+  part_ = part;
   tile_ = {tile_u * kTileSide, tile_v * kTileSide,
            std::min(view_->size.x, (tile_u + 1) * kTileSide),
            std::min(view_->size.y, (tile_v + 1) * kTileSide)};
-  for (int v = tile_.v0; v < tile_.v1; ++v) {
-    const auto row = image.depth.begin() + static_cast<std::ptrdiff_t>(v) * image.width;
-    std::fill(row + tile_.u0, row + tile_.u1, Surface::kNone);
-  }
   arena_.clear();
   if (leaves_.size() < solids.size()) leaves_.resize(solids.size());
   std::size_t count = 0;
-  bool cut = false;
+  bool cut = false, united = true;
   for (const std::uint32_t solid : solids) {
-    const ViewPart& part = view_parts_[solid];
-    if (part.binned && part.bins.tile(tile_u, tile_v).empty()) continue;
+    const ViewPart& view_part = view_parts_[solid];
+    if (view_part.binned && view_part.bins.tile(tile_u, tile_v).empty()) continue;
     LeafLayers& leaf = leaves_[count++];
     leaf.made = false;
     leaf.steep = false;
-    leaf.kind = kind_of(*program_, solid, parts_[solid], part);
+    leaf.kind = kind_of(*program_, solid, parts_[solid], view_part);
     leaf.solid = solid;
-    leaf.nearest = part.cut ? 0 : part.nearest;
-    leaf.farthest = part.farthest;
+    leaf.nearest = view_part.cut ? 0 : view_part.nearest;
+    leaf.farthest = view_part.farthest;
     leaf.keys.clear();
     leaf.triangles.clear();
     const auto down = [&](int u) { return tile_.u0 + (u - tile_.u0) / kAreaSide * kAreaSide; };
-    leaf.rect = {down(std::max(tile_.u0, part.rect.u0)), std::max(tile_.v0, part.rect.v0),
-                 down(std::min(tile_.u1, part.rect.u1) + kAreaSide - 1),
-                 std::min(tile_.v1, part.rect.v1)};
+    leaf.rect = {down(std::max(tile_.u0, view_part.rect.u0)), std::max(tile_.v0, view_part.rect.v0),
+                 down(std::min(tile_.u1, view_part.rect.u1) + kAreaSide - 1),
+                 std::min(tile_.v1, view_part.rect.v1)};
     leaf.stride = leaf.rect.u1 - leaf.rect.u0;
-    if (leaf.rect.empty()) --count;
-    cut = cut || part.cut;
+    if (leaf.rect.empty()) {
+      --count;
+      continue;
+    }
+    cut = cut || view_part.cut;
+    united = united && leaf.kind == LeafLayers::Kind::kFirst;
+  }
+  if (count > 0 && united) return find_united(std::span(leaves_).first(count));
+  for (int v = tile_.v0; v < tile_.v1; ++v) {
+    const std::size_t row = part.index(tile_.u0, v);
+    std::fill_n(part.image->depth.data() + row, tile_.u1 - tile_.u0, Surface::kNone);
   }
   if (count == 0) return;
   SearchArea area;
   area.leaves = std::span(leaves_).first(count);
   area.program = &tile_program_;
-  area.width = view_->size.x;
+  area.end = view_->size.x;
   area.range = coincidence_->range();
-  area.image = &image;
+  area.part = part;
   area.doubtful = &doubtful_;
   slot_solids_.clear();
   for (std::size_t i = 0; i < count; ++i) slot_solids_.push_back(leaves_[i].solid);
@@ -432,22 +540,27 @@ void TileFinder::find(int tile_u, int tile_v, std::span<const std::uint32_t> sol
       if (cut || tile_program_.depth > kMaxSearchDepth) {
         for (int y = area.rect.v0; y < area.rect.v1; ++y) {
           for (int x = u; x < std::min(tile_.u1, u + kAreaSide); ++x) {
-            doubtful_.push_back(static_cast<std::uint64_t>(y) *
-                                    static_cast<std::uint64_t>(image.width) +
-                                static_cast<std::uint64_t>(x));
+            doubtful_.push_back(part.index(x, y));
           }
         }
       } else {
         search_surface(area, *this);
       }
-      for (const std::uint64_t pixel : doubtful_) {
-        const auto width = static_cast<std::uint64_t>(image.width);
-        const Surface surface = resolve(tile_program_, static_cast<int>(pixel % width),
-                                        static_cast<int>(pixel / width));
-        image.depth[pixel] = surface.depth;
-        image.solid[pixel] = surface.solid;
-        image.triangle[pixel] = surface.triangle | (surface.exit ? SurfaceImage::kExit : 0u);
-      }
+      for (const std::uint64_t pixel : doubtful_) resolve(tile_program_, pixel);
+    }
+  }
+  if (cut) number_sources();
+}
+
+void TileFinder::number_sources() {
+  for (int v = tile_.v0; v < tile_.v1; ++v) {
+    for (int u = tile_.u0; u < tile_.u1; ++u) {
+      const std::size_t pixel = part_.index(u, v);
+      if (part_.image->depth[pixel] == SurfaceImage::kNone) continue;
+      std::uint32_t& face = part_.image->triangle[pixel];
+      const std::uint32_t exit = face & SurfaceImage::kExit;
+      const ViewPart& view_part = view_parts_[part_.image->solid[pixel]];
+      face = view_part.source(face & ~SurfaceImage::kExit) | exit;
     }
   }
 }

@@ -68,6 +68,37 @@ struct LeafLayers {
   void add_layer(Arena& arena);
 };
 
+/// The nearest entries of each pixel of a tile whose solids are all of LeafLayers::Kind::kFirst.
+struct UnitedLayers {
+  static constexpr std::uint32_t kEmpty = LeafLayers::kEmpty, kSteep = LeafLayers::kSteep;
+  static constexpr int kKept = 3;
+  int u0 = 0, v0 = 0;                 ///< of the tile
+  std::uint32_t* depths[kKept] = {};  ///< sorted
+  std::uint32_t* faces[kKept] = {};   ///< [steep:1 | index:31]; nothing where there is no entry
+  std::uint32_t* rest = nullptr;      ///< how near those behind may be: a depth, of steep ones less
+                                      ///< their `more`
+  /// Of each face that was rasterized: its solid, triangle, and how many depth steps more than
+  /// Coincidence::range() it may be off, 0 unless it is steep.
+  std::vector<std::uint32_t> face_solids, face_triangles, more;
+
+  void clear(Arena& arena, const PixelRect& tile);
+  std::uint32_t add_face(const LatticeMesh& mesh, std::uint32_t solid, std::uint32_t triangle,
+                         bool steep);
+  [[nodiscard]] std::size_t index(int u, int v) const {
+    return static_cast<std::size_t>((v - v0) * kTileSide + (u - u0));
+  }
+};
+
+/// An image of a part of the picture that begins at its pixel (u0, v0).
+struct SurfacePart {
+  SurfaceImage* image = nullptr;
+  int u0 = 0, v0 = 0;
+  [[nodiscard]] std::size_t index(int u, int v) const {
+    return static_cast<std::size_t>(v - v0) * static_cast<std::size_t>(image->width) +
+           static_cast<std::size_t>(u - u0);
+  }
+};
+
 /// What remains of a program in a part of a tile, where all other solids are absent. Leaves are
 /// indices into the tile's leaves.
 struct TileProgram {
@@ -131,9 +162,8 @@ class TileFinder {
              const Coincidence& coincidence);
   ~TileFinder();
 
-  /// Fills the tile's pixels of `image` (rows of view.size.x). `solids`: those that may be met in
-  /// the tile.
-  void find(int tile_u, int tile_v, std::span<const std::uint32_t> solids, SurfaceImage& image);
+  /// Fills the tile's pixels of `part`. `solids`: those that may be met in the tile.
+  void find(int tile_u, int tile_v, std::span<const std::uint32_t> solids, const SurfacePart& part);
 
   void reset_counts() { fragments_ = resolved_ = 0; }
   [[nodiscard]] std::uint64_t fragments() const { return fragments_; }
@@ -145,7 +175,23 @@ class TileFinder {
   void normalize_pixel(LeafLayers& leaf, std::size_t at);
 
  private:
-  [[nodiscard]] Surface resolve(const TileProgram& program, int u, int v);
+  /// Finds what a pixel shows from all flips of the program's leaves.
+  void resolve(const TileProgram& program, std::uint64_t pixel);
+  /// The same from flips_.
+  void show(std::uint64_t pixel);
+  /// Fills the tile where all solids are convex and just united.
+  void find_united(std::span<LeafLayers> leaves);
+  /// Decides a doubtful pixel of united_ by the entries kept. @return false: more of them matter
+  bool show_united(std::uint64_t pixel);
+  /// Triangles of the tile's pixels become those of the meshes: those of a solid that the near
+  /// plane cuts are numbered otherwise.
+  void number_sources();
+  /// What a part shows in the tile: its pixels, and the triangles to look at.
+  struct Input {
+    PixelRect clip;
+    std::span<const std::uint32_t> triangles;
+  };
+  [[nodiscard]] Input input_of(std::uint32_t solid);
 
   const Program* program_;
   const std::vector<ViewPart>& view_parts_;
@@ -156,6 +202,7 @@ class TileFinder {
   std::vector<LeafLayers> leaves_;
   Simplifier simplifier_;
   TileProgram tile_program_;
+  UnitedLayers united_;
   SurfaceFinder finder_;
   std::vector<std::uint32_t> present_, all_triangles_;
   std::vector<std::uint64_t> doubtful_;
@@ -163,6 +210,7 @@ class TileFinder {
   std::vector<Flip> flips_, leaf_flips_;
   std::vector<DepthItem> crossings_;
   PixelRect tile_;
+  SurfacePart part_;
   std::uint64_t fragments_ = 0, resolved_ = 0;
 };
 
@@ -182,14 +230,22 @@ struct SearchArea {
   const std::uint32_t* solids = nullptr;  ///< of the leaves
   const TileProgram* program = nullptr;
   PixelRect rect;  ///< of the picture; u1 may lie beyond its right edge
-  int width = 0;   ///< of the picture
+  int end = 0;     ///< columns of the picture
   Coincidence::Range range;
-  SurfaceImage* image = nullptr;
-  std::vector<std::uint64_t>* doubtful = nullptr;  ///< gets pixels (indices into the image) where
+  SurfacePart part;
+  std::vector<std::uint64_t>* doubtful = nullptr;  ///< gets pixels (indices into the part) where
                                                    ///< crossings of several solids are close
 };
 /// Finds the visible surface of each pixel.
 void search_surface(const SearchArea& area, TileFinder& finder);
+
+/// Inserts the entries of `triangles` of `mesh` within `clip`. Gives their number.
+std::uint64_t raster_united(const LatticeMesh& mesh, const RasterTarget& target,
+                            std::span<const std::uint32_t> triangles, const PixelRect& clip,
+                            double steep_from, std::uint32_t solid, UnitedLayers& layers);
+/// Shows the nearest entry of each pixel of `tile`. `doubtful` gets pixels where another is close.
+void find_united(const UnitedLayers& layers, const PixelRect& tile, const Coincidence::Range& range,
+                 const SurfacePart& part, std::vector<std::uint64_t>& doubtful);
 
 /// Turns the sorted crossings of one ray with one solid into flips under an inside rule, appended
 /// to `flips`. With `cut` the ray may begin inside, which the crossings tell from the far end.

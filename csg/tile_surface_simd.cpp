@@ -5,6 +5,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include "csg/coincidence_reach-inl.h"
 #include "raster/rasterize-inl.h"
 
 // Visible surfaces without lists: each solid keeps its own sorted layers, and a vector of pixels
@@ -228,17 +229,8 @@ class Search {
   /// flip at `depth`.
   HWY_INLINE M judge(V depth, V who, V& triangle) {
     const D d;
-    const hn::RebindToSigned<D> di;
-    const hn::RebindToFloat<D> df;
     const M hit = hn::Ne(depth, hn::Set(d, LeafLayers::kEmpty));
-    const auto& r = area_.range;
-    const V safe = hn::IfThenElseZero(hit, depth);
-    const auto at = hn::ConvertTo(df, hn::BitCast(di, safe));
-    const auto nearness = hn::Sub(hn::Set(df, r.a), hn::Mul(hn::Set(df, r.b), at));
-    const auto square = hn::Mul(nearness, hn::Mul(nearness, hn::Set(df, r.square)));
-    const auto reach_f = hn::Add(hn::Set(df, r.offset), square);
-    const auto most = hn::Set(df, static_cast<float>(kPictureDepthLimit));
-    const V reach = hn::BitCast(d, hn::ConvertTo(di, hn::Min(reach_f, most)));
+    const V reach = coincidence_reach(d, area_.range, hn::IfThenElseZero(hit, depth));
     const V last = hn::IfThenElseZero(hit, hn::Add(depth, reach));
     M doubt = no_lane(d);
     M exits = no_lane(d);
@@ -380,6 +372,7 @@ void SearchSurface(const SearchArea& area, TileFinder& finder) {
   const D d;
   const auto lanes = static_cast<int>(hn::Lanes(d));
   Search search(area, finder);
+  SurfaceImage& image = *area.part.image;
   alignas(64) std::uint32_t depths[LeafLayers::kLanes], slots[LeafLayers::kLanes],
       triangles[LeafLayers::kLanes], doubts[LeafLayers::kLanes];
   for (int v = area.rect.v0; v < area.rect.v1; ++v) {
@@ -387,29 +380,28 @@ void SearchSurface(const SearchArea& area, TileFinder& finder) {
       search.set_pixels(u, v);
       V depth, who, triangle;
       search.find(depth, who);
-      const std::size_t at = static_cast<std::size_t>(v) * static_cast<std::size_t>(area.width) +
-                             static_cast<std::size_t>(u);
-      const int count = std::min(lanes, area.width - u);
+      const std::size_t at = area.part.index(u, v);
+      const int count = std::min(lanes, area.end - u);
       if (count <= 0) continue;
       hn::Store(depth, d, depths);
       if (hn::AllTrue(d, hn::Eq(depth, hn::Set(d, LeafLayers::kEmpty)))) {
-        std::copy(depths, depths + count, area.image->depth.begin() + static_cast<long>(at));
+        std::copy(depths, depths + count, image.depth.begin() + static_cast<long>(at));
         continue;
       }
       const M doubt = search.judge(depth, who, triangle);
       const V solid = hn::GatherIndex(d, area.solids, hn::BitCast(hn::RebindToSigned<D>(), who));
       if (count == lanes) {
-        hn::StoreU(depth, d, area.image->depth.data() + at);
-        hn::StoreU(solid, d, area.image->solid.data() + at);
-        hn::StoreU(triangle, d, area.image->triangle.data() + at);
+        hn::StoreU(depth, d, image.depth.data() + at);
+        hn::StoreU(solid, d, image.solid.data() + at);
+        hn::StoreU(triangle, d, image.triangle.data() + at);
       } else {
         hn::Store(solid, d, slots);
         hn::Store(triangle, d, triangles);
         for (int i = 0; i < count; ++i) {
           const std::size_t pixel = at + static_cast<std::size_t>(i);
-          area.image->depth[pixel] = depths[i];
-          area.image->solid[pixel] = slots[i];
-          area.image->triangle[pixel] = triangles[i];
+          image.depth[pixel] = depths[i];
+          image.solid[pixel] = slots[i];
+          image.triangle[pixel] = triangles[i];
         }
       }
       if (hn::AllFalse(d, doubt)) continue;
