@@ -1,0 +1,59 @@
+// Blocks of large triangles, one group each. The group's threads lie side by side in rows of 8, 16
+// or 32 pixels, as the block is wide, and go down together.
+
+layout(std430, binding = 3) readonly buffer RasterLargeList { RasterLarge raster_large[]; };
+layout(std430, binding = 4) readonly buffer RasterBlocks { uvec2 raster_blocks[]; };
+uniform uint raster_block_count;
+
+void main() {
+  uint index = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+  if (index >= raster_block_count) return;
+  uvec2 block = raster_blocks[index];
+  uint slot = block.x;
+  ivec4 box = raster_large[slot].box;
+  int first_u = int(block.y & 0xffffu), first_v = int(block.y >> 16);
+  int width = min(kRasterBlockSide, box.z - box.x - first_u);
+  int height = min(kRasterBlockSide, box.w - box.y - first_v);
+  int shift = width <= 8 ? 3 : width <= 16 ? 4 : 5;
+  int lane = int(gl_LocalInvocationID.x);
+  int lane_u = lane & ((1 << shift) - 1), lane_v = lane >> shift, rows = 64 >> shift;
+  if (lane_u >= width || lane_v >= height) return;
+  int u = first_u + lane_u, v = first_v + lane_v;  // from the first pixel of the box
+
+  ivec4 along_u = raster_large[slot].edge_along_u, along_v = raster_large[slot].edge_along_v;
+  int64_t step_u = int64_t(u), step_v = int64_t(v);
+  int64_t edge0 = int64_t(packUint2x32(raster_large[slot].edge0)) + int64_t(along_u.x) * step_u +
+                  int64_t(along_v.x) * step_v;
+  int64_t edge1 = int64_t(packUint2x32(raster_large[slot].edge1)) + int64_t(along_u.y) * step_u +
+                  int64_t(along_v.y) * step_v;
+  int64_t edge2 = int64_t(packUint2x32(raster_large[slot].edge2)) + int64_t(along_u.z) * step_u +
+                  int64_t(along_v.z) * step_v;
+  int64_t down0 = int64_t(along_v.x) * int64_t(rows), down1 = int64_t(along_v.y) * int64_t(rows),
+          down2 = int64_t(along_v.z) * int64_t(rows);
+
+  uint64_t area = packUint2x32(raster_large[slot].area);
+  RasterFraction base, by_u, by_v, none;
+  base.quotient = raster_large[slot].quotient;
+  base.remainder = packUint2x32(raster_large[slot].remainder);
+  by_u.quotient = raster_large[slot].quotient_u;
+  by_u.remainder = packUint2x32(raster_large[slot].remainder_u);
+  by_v.quotient = raster_large[slot].quotient_v;
+  by_v.remainder = packUint2x32(raster_large[slot].remainder_v);
+  none.quotient = 0u;
+  none.remainder = uint64_t(0u);
+  RasterFraction at = raster_stride(base, by_u, u, by_v, v, area);
+  RasterFraction down = raster_stride(none, by_u, 0, by_v, rows, area);
+  uint payload = raster_large[slot].payload;
+  uint pixel = raster_pixel(box.x + u, box.y + v);
+  uint pixel_step = uint(rows) * uint(raster_width);
+  for (int row = lane_v; row < height; row += rows) {
+    if ((edge0 | edge1 | edge2) >= 0) {
+      strata_insert(pixel, raster_depth(0, at.quotient, raster_depth_limit), payload);
+    }
+    edge0 += down0;
+    edge1 += down1;
+    edge2 += down2;
+    pixel += pixel_step;
+    raster_step(at, down, area);
+  }
+}
