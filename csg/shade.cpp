@@ -1,6 +1,7 @@
 #include "csg/shade.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <bit>
 #include <cctype>
@@ -120,25 +121,60 @@ class RowShader {
     const std::uint32_t* depths = image_->depth.data() + begin;
     const std::uint32_t* solids = image_->solid.data() + begin;
     const std::uint32_t* faces = image_->triangle.data() + begin;
-    for (std::size_t i = 0; i < count; ++i) {
-      if (depths[i] == SurfaceImage::kNone) {
-        colours[i] = background_;
-        continue;
+    std::size_t i = 0;
+    for (; i + kAtOnce <= count; i += kAtOnce) {
+      // Most blocks show one face, or nothing.
+      std::uint32_t other = 0, present = 0, absent = 0;
+      for (std::size_t j = i; j < i + kAtOnce; ++j) {
+        other |= (solids[j] ^ solids[i]) | (faces[j] ^ faces[i]);
+        const std::uint32_t inverse = ~depths[j];  // 0: nothing
+        present |= inverse;
+        absent |= inverse == 0 ? 1u : 0u;
       }
-      ++covered_;
-      if (solids[i] != solid_ || faces[i] != face_) meet(solids[i], faces[i]);
-      colours[i] = colour_;
+      if (present == 0) {
+        std::fill_n(colours + i, kAtOnce, background_);
+      } else if ((other | absent) == 0) {
+        if (solids[i] != solid_ || faces[i] != face_) meet(solids[i], faces[i]);
+        std::fill_n(colours + i, kAtOnce, colour_);
+        covered_ += kAtOnce;
+      } else {
+        for (std::size_t j = i; j < i + kAtOnce; ++j)
+          one(depths[j], solids[j], faces[j], colours[j]);
+      }
     }
+    for (; i < count; ++i) one(depths[i], solids[i], faces[i], colours[i]);
   }
   [[nodiscard]] std::uint64_t covered() const { return covered_; }
 
  private:
+  static constexpr std::size_t kAtOnce = 16;
+  /// Faces met before whose colours are kept.
+  static constexpr std::size_t kKept = 32;
+  struct Kept {
+    std::uint32_t solid = SurfaceImage::kNone, face = 0;
+    Rgba colour{0};
+  };
+
+  void one(std::uint32_t depth, std::uint32_t solid, std::uint32_t face, Rgba& colour) {
+    if (depth == SurfaceImage::kNone) {
+      colour = background_;
+      return;
+    }
+    ++covered_;
+    if (solid != solid_ || face != face_) meet(solid, face);
+    colour = colour_;
+  }
   void meet(std::uint32_t solid, std::uint32_t face) {
     solid_ = solid;
     face_ = face;
+    Kept& kept = kept_[(solid * 5 + face) % kKept];
+    if (kept.solid != solid || kept.face != face) kept = {solid, face, colour_of(solid, face)};
+    colour_ = kept.colour;
+  }
+  [[nodiscard]] Rgba colour_of(std::uint32_t solid, std::uint32_t face) const {
     const bool exit = (face & SurfaceImage::kExit) != 0;
     const float light = shader_->light(solid, face & ~SurfaceImage::kExit, exit);
-    colour_ = to_bytes(glm::vec4(glm::vec3(shader_->base(solid, exit)) * light, 1.0f));
+    return to_bytes(glm::vec4(glm::vec3(shader_->base(solid, exit)) * light, 1.0f));
   }
 
   const SurfaceImage* image_;
@@ -146,6 +182,7 @@ class RowShader {
   Rgba background_, colour_{0};
   std::uint32_t solid_ = SurfaceImage::kNone, face_ = 0;
   std::uint64_t covered_ = 0;
+  std::array<Kept, kKept> kept_;
 };
 
 }  // namespace

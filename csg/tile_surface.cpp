@@ -44,9 +44,19 @@ void UnitedLayers::clear(Arena& arena, const PixelRect& tile) {
   for (std::uint32_t*& words : faces) words = arena.words(kWords);
   rest = arena.words(kWords);
   std::fill_n(rest, kWords, kEmpty);
+  std::fill(std::begin(far), std::end(far), kEmpty);
+  std::fill(std::begin(hidden), std::end(hidden), kEmpty);
   face_solids.clear();
   face_triangles.clear();
   more.clear();
+}
+
+bool UnitedLayers::hides(const PixelRect& clip, std::uint32_t nearest) {
+  bool all = true;
+  for_each_area(clip, [&](std::size_t area) { all = all && far[area] < nearest; });
+  if (!all) return false;
+  for_each_area(clip, [&](std::size_t area) { hidden[area] = std::min(hidden[area], nearest); });
+  return true;
 }
 
 std::uint32_t UnitedLayers::add_face(const LatticeMesh& mesh, std::uint32_t solid,
@@ -442,7 +452,10 @@ bool TileFinder::show_united(std::uint64_t pixel) {
     }
     flips_.push_back({depth, solid, united_.face_triangles[face], false});
   }
-  if (united_.rest[at] <= last) return false;
+  const auto area = static_cast<std::size_t>(
+      static_cast<int>(pixel / width) % kTileSide / kAreaSide * UnitedLayers::kAreasAcross +
+      static_cast<int>(pixel % width) % kTileSide / kAreaSide);
+  if (std::min(united_.rest[at], united_.hidden[area]) <= last) return false;
   if (flips_.size() > 1) show(pixel);
   return true;
 }
@@ -450,10 +463,18 @@ bool TileFinder::show_united(std::uint64_t pixel) {
 void TileFinder::find_united(std::span<LeafLayers> leaves) {
   const RasterTarget target{Axis::kZ, view_->size.x, view_->size.y, kPictureDepthLimit};
   united_.clear(arena_, tile_);
-  for (const LeafLayers& leaf : leaves) {
+  present_.resize(leaves.size());
+  std::iota(present_.begin(), present_.end(), 0u);
+  std::sort(present_.begin(), present_.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return leaves[a].nearest != leaves[b].nearest ? leaves[a].nearest < leaves[b].nearest : a < b;
+  });
+  for (const std::uint32_t slot : present_) {
+    const LeafLayers& leaf = leaves[slot];
     const Input input = input_of(leaf.solid);
+    if (united_.hides(input.clip, leaf.nearest)) continue;
     fragments_ += raster_united(view_parts_[leaf.solid].mesh, target, input.triangles, input.clip,
                                 coincidence_->steep_from(), leaf.solid, united_);
+    find_hidden(input.clip, coincidence_->range(), united_);
   }
   doubtful_.clear();
   csg::find_united(united_, tile_, coincidence_->range(), part_, doubtful_);
@@ -461,8 +482,6 @@ void TileFinder::find_united(std::span<LeafLayers> leaves) {
   for (const std::uint64_t pixel : doubtful_) {
     if (show_united(pixel)) continue;
     if (!simplified) {
-      present_.resize(leaves.size());
-      std::iota(present_.begin(), present_.end(), 0u);
       simplifier_.simplify(leaves, present_, tile_program_);
       simplified = true;
     }

@@ -77,6 +77,10 @@ struct UnitedLayers {
   std::uint32_t* faces[kKept] = {};   ///< [steep:1 | index:31]; nothing where there is no entry
   std::uint32_t* rest = nullptr;      ///< how near those behind may be: a depth, of steep ones less
                                       ///< their `more`
+  /// Of each area of LeafLayers::kLanes x kLanes pixels, row by row: what lies farther is hidden
+  /// there and coincides with nothing seen; how near what was left out for that may be.
+  static constexpr int kAreasAcross = kTileSide / LeafLayers::kLanes;
+  std::uint32_t far[kAreasAcross * kAreasAcross], hidden[kAreasAcross * kAreasAcross];
   /// Of each face that was rasterized: its solid, triangle, and how many depth steps more than
   /// Coincidence::range() it may be off, 0 unless it is steep.
   std::vector<std::uint32_t> face_solids, face_triangles, more;
@@ -84,6 +88,18 @@ struct UnitedLayers {
   void clear(Arena& arena, const PixelRect& tile);
   std::uint32_t add_face(const LatticeMesh& mesh, std::uint32_t solid, std::uint32_t triangle,
                          bool steep);
+  /// Whether all of a solid that begins at depth `nearest` is hidden in `clip`, and notes it.
+  bool hides(const PixelRect& clip, std::uint32_t nearest);
+  /// Calls body(area) for the areas that `clip` meets.
+  template <class Body>
+  void for_each_area(const PixelRect& clip, Body&& body) const {
+    constexpr int kSide = LeafLayers::kLanes;
+    for (int v = (clip.v0 - v0) / kSide; v <= (clip.v1 - 1 - v0) / kSide; ++v) {
+      for (int u = (clip.u0 - u0) / kSide; u <= (clip.u1 - 1 - u0) / kSide; ++u) {
+        body(static_cast<std::size_t>(v * kAreasAcross + u));
+      }
+    }
+  }
   [[nodiscard]] std::size_t index(int u, int v) const {
     return static_cast<std::size_t>((v - v0) * kTileSide + (u - u0));
   }
@@ -243,6 +259,8 @@ void search_surface(const SearchArea& area, TileFinder& finder);
 std::uint64_t raster_united(const LatticeMesh& mesh, const RasterTarget& target,
                             std::span<const std::uint32_t> triangles, const PixelRect& clip,
                             double steep_from, std::uint32_t solid, UnitedLayers& layers);
+/// Brings layers.far up to date in `clip`.
+void find_hidden(const PixelRect& clip, const Coincidence::Range& range, UnitedLayers& layers);
 /// Shows the nearest entry of each pixel of `tile`. `doubtful` gets pixels where another is close.
 void find_united(const UnitedLayers& layers, const PixelRect& tile, const Coincidence::Range& range,
                  const SurfacePart& part, std::vector<std::uint64_t>& doubtful);

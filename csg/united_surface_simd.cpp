@@ -56,9 +56,10 @@ class UnitedSink {
     auto depth = hn::Sub(hn::LoadU(d, words), hn::Set(d, 1u));  // kEmpty where not covered
     std::uint32_t* HWY_RESTRICT rest = layers_->rest + at;
     const auto old_rest = hn::LoadU(d, rest);
+    const auto empty = hn::Set(d, UnitedLayers::kEmpty);
     auto face = hn::Set(d, face_);
     if (steep_) {
-      if (hn::AllTrue(d, hn::Eq(depth, hn::Set(d, UnitedLayers::kEmpty)))) return;
+      if (hn::AllTrue(d, hn::Eq(depth, empty))) return;
     } else if (hn::AllFalse(d, hn::Lt(depth, old_rest))) {
       return;
     }
@@ -71,9 +72,9 @@ class UnitedSink {
       hn::StoreU(hn::IfThenElse(nearer, face, old_face), d, faces);
       depth = hn::Max(depth, old_depth);
       face = hn::IfThenElse(nearer, old_face, face);
+      if (hn::AllTrue(d, hn::Eq(depth, empty))) return;
     }
-    const auto left = hn::Ne(depth, hn::Set(d, UnitedLayers::kEmpty));
-    if (hn::AllFalse(d, left)) return;
+    const auto left = hn::Ne(depth, empty);
     hn::StoreU(hn::Min(depth, old_rest), d, rest);
     const auto steep = hn::Ne(hn::And(face, hn::Set(d, UnitedLayers::kSteep)), hn::Zero(d));
     if (hn::AllFalse(d, hn::And(left, steep))) return;
@@ -102,6 +103,31 @@ std::uint64_t RasterUnited(const LatticeMesh& mesh, const RasterTarget& target,
   UnitedSink sink(layers, mesh, solid, steep_from);
   simd::rasterize_triangles(mesh, target, triangles, clip, sink);
   return sink.fragments();
+}
+
+void FindHidden(const PixelRect& clip, const Coincidence::Range& range, UnitedLayers& layers) {
+  using D = hn::CappedTag<std::uint32_t, LeafLayers::kLanes>;
+  const D d;
+  constexpr int kSide = LeafLayers::kLanes;
+  const auto steep = hn::Set(d, UnitedLayers::kSteep), empty = hn::Set(d, UnitedLayers::kEmpty);
+  const auto lanes = static_cast<int>(hn::Lanes(d));
+  layers.for_each_area(clip, [&](std::size_t area) {
+    const int area_u = static_cast<int>(area) % UnitedLayers::kAreasAcross * kSide;
+    const int area_v = static_cast<int>(area) / UnitedLayers::kAreasAcross * kSide;
+    auto farthest = hn::Zero(d);
+    for (int v = area_v; v < area_v + kSide; ++v) {
+      for (int u = area_u; u < area_u + kSide; u += lanes) {
+        const std::size_t at = layers.index(layers.u0 + u, layers.v0 + v);
+        const auto depth = hn::Load(d, layers.depths[0] + at);
+        const auto face = hn::Load(d, layers.faces[0] + at);
+        const auto open = hn::Or(hn::Eq(depth, empty), hn::Ne(hn::And(face, steep), hn::Zero(d)));
+        farthest = hn::Max(farthest, hn::IfThenElse(open, empty, depth));
+      }
+      if (hn::GetLane(hn::MaxOfLanes(d, farthest)) == UnitedLayers::kEmpty) return;
+    }
+    const auto last = hn::MaxOfLanes(d, farthest);
+    layers.far[area] = hn::GetLane(hn::Add(last, coincidence_reach(d, range, last))) + 1;
+  });
 }
 
 void FindUnited(const UnitedLayers& layers, const PixelRect& tile, const Coincidence::Range& range,
@@ -176,6 +202,7 @@ HWY_AFTER_NAMESPACE();
 namespace strata::csg {
 
 HWY_EXPORT(RasterUnited);
+HWY_EXPORT(FindHidden);
 HWY_EXPORT(FindUnited);
 
 std::uint64_t raster_united(const LatticeMesh& mesh, const RasterTarget& target,
@@ -183,6 +210,9 @@ std::uint64_t raster_united(const LatticeMesh& mesh, const RasterTarget& target,
                             double steep_from, std::uint32_t solid, UnitedLayers& layers) {
   return HWY_DYNAMIC_DISPATCH(RasterUnited)(mesh, target, triangles, clip, steep_from, solid,
                                             layers);
+}
+void find_hidden(const PixelRect& clip, const Coincidence::Range& range, UnitedLayers& layers) {
+  HWY_DYNAMIC_DISPATCH(FindHidden)(clip, range, layers);
 }
 void find_united(const UnitedLayers& layers, const PixelRect& tile, const Coincidence::Range& range,
                  const SurfacePart& part, std::vector<std::uint64_t>& doubtful) {
