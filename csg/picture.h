@@ -72,6 +72,8 @@ struct SurfaceImage {
   }
 };
 
+class SurfaceSource;
+
 /// Draws a tree, again and again: what does not change from frame to frame is kept.
 class Preview {
  public:
@@ -87,6 +89,10 @@ class Preview {
   /// Around all solids that are drawn: what a camera should see.
   [[nodiscard]] Bounds box() const;
   [[nodiscard]] const Tree& tree() const;
+
+  /// Has surfaces found elsewhere from now on, by a GPU say: the same, bit for bit. Borrowed, used
+  /// by the thread that draws; null is this process's threads. Ghosts and light are always theirs.
+  void set_source(SurfaceSource* source);
 
   /// The visible surfaces. Valid until the next call.
   /// @return kUsage, kGeometry (coordinates too large), kCancelled

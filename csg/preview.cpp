@@ -10,6 +10,7 @@
 #include "csg/picture.h"
 #include "csg/program.h"
 #include "csg/shade.h"
+#include "csg/surface_source.h"
 #include "csg/tile_surface.h"
 
 namespace strata::csg {
@@ -106,7 +107,7 @@ class Frame {
     view_parts_[solid] = std::move(*part);
     const PixelRect after = view_parts_[solid].rect;
     solids_.build(view_parts_, tiles_u_, tiles_v_);
-    if (!whole_) return find_all(execution, {});
+    if (!whole_ || source_ != nullptr) return find_all(execution, {});
     std::vector<std::uint32_t> tiles;
     for (int tv = 0; tv < tiles_v_; ++tv) {
       for (int tu = 0; tu < tiles_u_; ++tu) {
@@ -122,6 +123,10 @@ class Frame {
     return find(tiles, execution, {});
   }
 
+  /// Null: the surfaces are found here.
+  void set_source(SurfaceSource* source) { source_ = source; }
+  [[nodiscard]] bool has_source() const { return source_ != nullptr; }
+
   [[nodiscard]] const SurfaceImage& image() const { return image_; }
   [[nodiscard]] const View& view() const { return view_; }
   [[nodiscard]] const DrawReport& report() const { return report_; }
@@ -131,6 +136,19 @@ class Frame {
     std::vector<std::uint32_t> tiles(static_cast<std::size_t>(tiles_u_ * tiles_v_));
     std::iota(tiles.begin(), tiles.end(), 0u);
     if (!on_tile) image_.resize(view_.size.x, view_.size.y);
+    if (source_ != nullptr && !on_tile) {
+      DrawReport elsewhere;
+      tiles.clear();
+      const FrameInput input{*program_, geometry_->parts(), view_parts_,
+                             view_,     coincidence_,       tiles_u_,
+                             tiles_v_,  solids_.offsets,    solids_.solids};
+      auto found = source_->find(input, image_, elsewhere, tiles, execution);
+      if (found) found = find(tiles, execution, {});
+      report_.fragments += elsewhere.fragments;
+      report_.resolved += elsewhere.resolved;
+      whole_ = found.has_value();
+      return found;
+    }
     auto done = find(tiles, execution, on_tile);
     whole_ = done.has_value() && !on_tile;
     return done;
@@ -177,6 +195,7 @@ class Frame {
   std::vector<std::unique_ptr<TileFinder>> finders_;
   std::vector<SurfaceImage> tile_images_;  ///< of each worker
   bool whole_ = false;                     ///< image_ shows all of view_
+  SurfaceSource* source_ = nullptr;
   SurfaceImage image_;
   DrawReport report_;
 };
@@ -273,7 +292,8 @@ Result<Picture> Preview::Impl::picture(const Camera& camera, const glm::ivec2& s
   const std::int64_t samples_a_row = std::int64_t{size.x} * across * down;
   const int rows_at_once = static_cast<int>(std::clamp<std::int64_t>(
       kSamplesAtOnce / samples_a_row, std::max(1, kTileSide / down), size.y));
-  const bool direct = options.samples == 1 && painter.empty() && !options.edges;
+  const bool direct =
+      options.samples == 1 && painter.empty() && !options.edges && !frame.has_source();
   std::vector<Rgba> samples;
   DrawReport total;
   for (int first = 0; first < size.y; first += rows_at_once) {
@@ -332,6 +352,7 @@ Preview& Preview::operator=(Preview&&) noexcept = default;
 
 Bounds Preview::box() const { return impl_->geometry.box(); }
 const Tree& Preview::tree() const { return impl_->tree; }
+void Preview::set_source(SurfaceSource* source) { impl_->frame.set_source(source); }
 
 const DrawReport& Preview::report() const {
   if (!impl_->report_covers) {
