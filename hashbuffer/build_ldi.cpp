@@ -28,6 +28,51 @@ PackedTile pack(const TileLists<DepthItem>& lists) {
   return tile;
 }
 
+/// Appends `rows` rows, of which `tiles` are the tiles row by row, to an image.
+void append(std::span<const PackedTile> tiles, int rows, LayeredDepthImage& image) {
+  const auto tiles_u = static_cast<std::size_t>((image.width + kTileSide - 1) / kTileSide);
+  std::uint64_t fragments = 0;
+  for (const PackedTile& tile : tiles) fragments += tile.items.size();
+  image.items.reserve(image.items.size() + fragments);
+  std::vector<std::size_t> cursor(tiles.size(), 0);
+  for (int v = 0; v < rows; ++v) {
+    for (int u = 0; u < image.width; u += kTileSide) {
+      const std::size_t index = static_cast<std::size_t>(v / kTileSide) * tiles_u +
+                                static_cast<std::size_t>(u / kTileSide);
+      const PackedTile& tile = tiles[index];
+      const auto row = static_cast<std::size_t>(v % kTileSide) * kTileSide;
+      std::size_t length = 0;
+      for (std::size_t i = 0; i < static_cast<std::size_t>(std::min(kTileSide, image.width - u));
+           ++i) {
+        length += tile.lengths.empty() ? 0 : tile.lengths[row + i];
+        image.offsets.push_back(image.items.size() + length);
+      }
+      const auto first = tile.items.begin() + static_cast<std::ptrdiff_t>(cursor[index]);
+      image.items.insert(image.items.end(), first, first + static_cast<std::ptrdiff_t>(length));
+      cursor[index] += length;
+    }
+  }
+}
+
+/// An image without rows, and room for all of them.
+LayeredDepthImage empty_image(const RasterTarget& target) {
+  LayeredDepthImage image;
+  image.width = target.width;
+  image.height = target.height;
+  image.depth_limit = target.depth_limit;
+  image.offsets.reserve(
+      static_cast<std::size_t>(target.width) * static_cast<std::size_t>(target.height) + 1);
+  image.offsets.push_back(0);
+  return image;
+}
+
+Error too_much(const RasterTarget& target, std::uint64_t limit, std::uint64_t held) {
+  return {ErrorCode::kLimit,
+          fmt::format("the depth lists of {} x {} pixels need more than the memory limit of {} "
+                      "bytes; {} bytes were reached",
+                      target.width, target.height, limit, held)};
+}
+
 }  // namespace
 
 Result<LayeredDepthImage> build_ldi(const LatticeMesh& mesh, const RasterTarget& target,
@@ -65,11 +110,7 @@ Result<LayeredDepthImage> build_ldi(const LatticeMesh& mesh, const RasterTarget&
       // Packed once by tile and once as an image.
       const std::uint64_t held = bytes += 2 * lists->fragments * sizeof(DepthItem);
       if (execution.memory_limit > 0 && held > execution.memory_limit) {
-        return refuse(
-            {ErrorCode::kLimit,
-             fmt::format("the depth lists of {} x {} pixels need more than the memory limit "
-                         "of {} bytes; {} bytes were reached",
-                         target.width, target.height, execution.memory_limit, held)});
+        return refuse(too_much(target, execution.memory_limit, held));
       }
       tiles[index] = pack(*lists);
       if (execution.progress && worker == 0) {
@@ -79,33 +120,55 @@ Result<LayeredDepthImage> build_ldi(const LatticeMesh& mesh, const RasterTarget&
     if (!status) return tl::unexpected(status.error());
     if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
 
-    LayeredDepthImage image;
-    image.width = target.width;
-    image.height = target.height;
-    image.depth_limit = target.depth_limit;
-    image.offsets.reserve(
-        static_cast<std::size_t>(target.width) * static_cast<std::size_t>(target.height) + 1);
-    image.offsets.push_back(0);
-    std::uint64_t fragments = 0;
-    for (const PackedTile& tile : tiles) fragments += tile.items.size();
-    image.items.reserve(fragments);
-    std::vector<std::size_t> cursor(tiles.size(), 0);
-    for (int v = 0; v < target.height; ++v) {
-      for (int u = 0; u < target.width; u += kTileSide) {
-        const std::size_t index = static_cast<std::size_t>(v / kTileSide) * tiles_u +
-                                  static_cast<std::size_t>(u / kTileSide);
-        const PackedTile& tile = tiles[index];
-        const auto row = static_cast<std::size_t>(v % kTileSide) * kTileSide;
-        std::size_t length = 0;
-        for (std::size_t i = 0; i < static_cast<std::size_t>(std::min(kTileSide, target.width - u));
-             ++i) {
-          length += tile.lengths.empty() ? 0 : tile.lengths[row + i];
-          image.offsets.push_back(image.items.size() + length);
-        }
-        const auto first = tile.items.begin() + static_cast<std::ptrdiff_t>(cursor[index]);
-        image.items.insert(image.items.end(), first, first + static_cast<std::ptrdiff_t>(length));
-        cursor[index] += length;
+    LayeredDepthImage image = empty_image(target);
+    append(tiles, target.height, image);
+    return image;
+  } catch (const std::bad_alloc&) {
+    return fail(ErrorCode::kLimit, "out of memory for the depth lists of {} x {} pixels",
+                target.width, target.height);
+  }
+}
+
+Result<LayeredDepthImage> build_ldi(ListSource& source, const LatticeMesh& mesh,
+                                    const RasterTarget& target, const Execution& execution,
+                                    const TileListFilter* filter) {
+  if (auto set = source.set_mesh(mesh); !set) return tl::unexpected(set.error());
+  try {
+    std::vector<std::unique_ptr<TileListFilter::Worker>> filters;
+    std::vector<TileCutter> cutters(static_cast<std::size_t>(execution.thread_count()));
+    for (std::size_t i = 0; filter != nullptr && i < cutters.size(); ++i) {
+      filters.push_back(filter->worker());
+    }
+    LayeredDepthImage image = empty_image(target);
+    const int step = source.rows_at_once(target);
+    for (int v = 0; v < target.height; v += step) {
+      const int end = std::min(target.height, v + step);
+      const auto rows = source.lists(target, v, end);
+      if (!rows) return tl::unexpected(rows.error());
+      if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+      const std::uint64_t held = (image.items.size() + 2 * rows->items.size()) * sizeof(DepthItem);
+      if (execution.memory_limit > 0 && held > execution.memory_limit) {
+        return tl::unexpected(too_much(target, execution.memory_limit, held));
       }
+      if (filter == nullptr) {
+        for (std::size_t i = 1; i < rows->offsets.size(); ++i) {
+          image.offsets.push_back(image.items.size() + rows->offsets[i]);
+        }
+        image.items.insert(image.items.end(), rows->items.begin(), rows->items.end());
+      } else {
+        const auto tiles_u = static_cast<std::size_t>((target.width + kTileSide - 1) / kTileSide);
+        const auto tiles_v = static_cast<std::size_t>((end - v + kTileSide - 1) / kTileSide);
+        std::vector<PackedTile> tiles(tiles_u * tiles_v);
+        parallel_for(execution, tiles.size(), [&](std::size_t index, int worker) {
+          const auto lists = cutters[static_cast<std::size_t>(worker)].cut(
+              *rows, v, static_cast<int>(index % tiles_u),
+              v / kTileSide + static_cast<int>(index / tiles_u));
+          if (lists.fragments == 0) return;
+          tiles[index] = pack(filters[static_cast<std::size_t>(worker)]->apply(lists));
+        });
+        append(tiles, end - v, image);
+      }
+      if (execution.progress) execution.progress(static_cast<double>(end) / target.height);
     }
     return image;
   } catch (const std::bad_alloc&) {

@@ -5,6 +5,7 @@
 #include "core/grid.h"
 #include "core/result.h"
 #include "hashbuffer/list_filter.h"
+#include "hashbuffer/list_source.h"
 #include "hashbuffer/tile_builder.h"
 
 namespace strata {
@@ -17,6 +18,11 @@ namespace strata {
 Result<LayeredDepthImage> build_ldi(const LatticeMesh& mesh, const RasterTarget& target,
                                     const TileStoreOptions& options = {},
                                     const Execution& execution = {},
+                                    const TileListFilter* filter = nullptr);
+
+/// The same lists from a source of its own.
+Result<LayeredDepthImage> build_ldi(ListSource& source, const LatticeMesh& mesh,
+                                    const RasterTarget& target, const Execution& execution = {},
                                     const TileListFilter* filter = nullptr);
 
 /// What the rays of the voxel columns of a grid along `axis` see.

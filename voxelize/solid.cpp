@@ -25,6 +25,7 @@ struct SolidVoxelizer::Worker {
   KeyTileBuilder keys;
   ItemTileBuilder items;
   std::unique_ptr<TileListFilter::Worker> filter;
+  TileCutter cutter;
   TileIntervals intervals;
   VoxelizeReport report;
 };
@@ -37,9 +38,13 @@ Result<SolidVoxelizer> SolidVoxelizer::create(const LatticeMesh& mesh, const Vox
   result.grid_ = &grid;
   result.options_ = options;
   result.target_ = raster_target(grid, axis);
-  auto bins = bin_triangles(mesh, result.target_, execution);
-  if (!bins) return tl::unexpected(bins.error());
-  result.bins_ = std::move(*bins);
+  if (options.source != nullptr) {
+    if (auto set = options.source->set_mesh(mesh); !set) return tl::unexpected(set.error());
+  } else {
+    auto bins = bin_triangles(mesh, result.target_, execution);
+    if (!bins) return tl::unexpected(bins.error());
+    result.bins_ = std::move(*bins);
+  }
   for (int i = 0; i < execution.thread_count(); ++i) {
     result.workers_.push_back(std::make_shared<Worker>(options));
   }
@@ -57,22 +62,31 @@ Result<void> SolidVoxelizer::run_tile(Builder& builder, Worker& worker, int tu, 
   const auto built = std::chrono::steady_clock::now();
   worker.report.lists_ms += milliseconds_between(start, built);
   if (lists->fragments == 0) return {};
+  walk(*lists, worker, tu, tv, v_begin, out, marks);
+  worker.report.intervals_ms += milliseconds_between(built, std::chrono::steady_clock::now());
+  return {};
+}
+
+/// Lists to intervals.
+template <class Key>
+void SolidVoxelizer::walk(const TileLists<Key>& lists, Worker& worker, int tu, int tv, int v_begin,
+                          VoxelIntervals& out, ColumnMarks* marks) const {
   TileIntervals& tile = worker.intervals;
-  if constexpr (std::is_same_v<Builder, ItemTileBuilder>) {
+  if constexpr (std::is_same_v<Key, DepthItem>) {
     if (worker.filter) {
-      walk_tile(worker.filter->apply(*lists), options_.rule, options_.statistics, tile);
+      walk_tile(worker.filter->apply(lists), options_.rule, options_.statistics, tile);
     } else {
-      walk_tile(*lists, options_.rule, options_.statistics, tile);
+      walk_tile(lists, options_.rule, options_.statistics, tile);
     }
   } else {
-    walk_tile(*lists, options_.rule, options_.statistics, tile);
+    walk_tile(lists, options_.rule, options_.statistics, tile);
   }
   if (tile.offsets.back() > 0) {
     out.set_tile(tu, tv - v_begin / kTileSide, tile.offsets,
                  std::span<const Interval>(tile.items).first(tile.offsets.back()));
   }
   VoxelizeReport& report = worker.report;
-  report.crossings += lists->fragments;
+  report.crossings += lists.fragments;
   report.unbalanced_columns += tile.unbalanced;
   report.negative_columns += tile.negative;
   report.max_depth_complexity = std::max(report.max_depth_complexity, tile.max_depth);
@@ -85,7 +99,36 @@ Result<void> SolidVoxelizer::run_tile(Builder& builder, Worker& worker, int tu, 
       marks->word(tu, tv * kTileSide + row) = tile.unbalanced_rows[row];
     }
   }
-  report.intervals_ms += milliseconds_between(built, std::chrono::steady_clock::now());
+}
+
+/// All tiles of a slab from the lists of a source, some rows of tiles after another.
+Result<void> SolidVoxelizer::run_source(int v_begin, const Execution& execution,
+                                        VoxelIntervals& out, ColumnMarks* marks) const {
+  const int v_end = out.v_end(), step = options_.source->rows_at_once(target_);
+  for (int v = v_begin; v < v_end; v += step) {
+    const auto start = std::chrono::steady_clock::now();
+    const int end = std::min(v_end, v + step);
+    const auto rows = options_.source->lists(target_, v, end);
+    if (!rows) return tl::unexpected(rows.error());
+    // Time of this thread alone, where the others' is divided by their number.
+    workers_.front()->report.lists_ms +=
+        milliseconds_between(start, std::chrono::steady_clock::now()) *
+        static_cast<double>(workers_.size());
+    const int tiles_v = (end - v + kTileSide - 1) / kTileSide;
+    parallel_for(execution, static_cast<std::size_t>(out.tiles_u() * tiles_v),
+                 [&](std::size_t index, int worker_index) {
+                   Worker& worker = *workers_[static_cast<std::size_t>(worker_index)];
+                   const int tu = static_cast<int>(index) % out.tiles_u();
+                   const int tv = v / kTileSide + static_cast<int>(index) / out.tiles_u();
+                   const auto begin = std::chrono::steady_clock::now();
+                   const auto lists = worker.cutter.cut(*rows, v, tu, tv);
+                   if (lists.fragments == 0) return;
+                   walk(lists, worker, tu, tv, v_begin, out, marks);
+                   worker.report.intervals_ms +=
+                       milliseconds_between(begin, std::chrono::steady_clock::now());
+                 });
+    if (execution.stop.stop_requested()) break;
+  }
   return {};
 }
 
@@ -98,7 +141,9 @@ Result<VoxelIntervals> SolidVoxelizer::slab(int v_begin, int v_end, const Execut
   std::mutex failure_mutex;
   Result<void> status;
   for (auto& worker : workers_) worker->report = {};
-  parallel_for(execution, tiles, [&](std::size_t index, int worker_index) {
+  if (options_.source != nullptr) status = run_source(v_begin, execution, result, marks);
+  const std::size_t own_tiles = options_.source != nullptr ? 0 : tiles;
+  parallel_for(execution, own_tiles, [&](std::size_t index, int worker_index) {
     Worker& worker = *workers_[static_cast<std::size_t>(worker_index)];
     const int tu = static_cast<int>(index) % result.tiles_u();
     const int tv = static_cast<int>(index) / result.tiles_u() + first_tile_row;

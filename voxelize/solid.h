@@ -53,6 +53,11 @@ class SolidVoxelizer {
   template <class Builder>
   Result<void> run_tile(Builder& builder, Worker& worker, int tu, int tv, int v_begin,
                         VoxelIntervals& out, ColumnMarks* marks) const;
+  template <class Key>
+  void walk(const TileLists<Key>& lists, Worker& worker, int tu, int tv, int v_begin,
+            VoxelIntervals& out, ColumnMarks* marks) const;
+  Result<void> run_source(int v_begin, const Execution& execution, VoxelIntervals& out,
+                          ColumnMarks* marks) const;
 
   const LatticeMesh* mesh_ = nullptr;
   const VoxelGrid* grid_ = nullptr;

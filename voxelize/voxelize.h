@@ -11,6 +11,7 @@
 #include "core/inside_rule.h"
 #include "core/result.h"
 #include "hashbuffer/list_filter.h"
+#include "hashbuffer/list_source.h"
 #include "hashbuffer/tile_builder.h"
 #include "mesh/triangle_soup.h"
 #include "voxelize/intervals.h"
@@ -44,6 +45,9 @@ struct VoxelizeOptions {
   /// Makes other lists of the mesh's before they are filled: a Boolean tree. Borrowed. Then the
   /// rule applies to what it makes, and surfaces cannot be had.
   const TileListFilter* filter = nullptr;
+  /// Makes the lists in place of this process's threads: a GPU. Borrowed; used by the calling
+  /// thread alone. `store` and `offsets` are its own then, and surfaces are not its work.
+  ListSource* source = nullptr;
 };
 
 /// What voxelizing found out.

@@ -1,0 +1,44 @@
+#include "hashbuffer/list_source.h"
+
+#include <algorithm>
+
+namespace strata {
+
+TileLists<DepthItem> TileCutter::cut(const LayeredDepthImage& rows, int v_begin, int tu, int tv) {
+  offsets_.assign(kTilePixels + 1, 0);
+  keys_.clear();
+  TileLists<DepthItem> lists;
+  const int first = tv * kTileSide - v_begin, u0 = tu * kTileSide;
+  const int height = std::min(kTileSide, rows.height - first);
+  const auto width = static_cast<std::size_t>(std::min(kTileSide, rows.width - u0));
+  lists.row_begin = kTileSide;
+  std::size_t pixel = 0;
+  for (int row = 0; row < kTileSide; ++row) {
+    const std::size_t before = keys_.size();
+    const std::size_t end = pixel + kTileSide;
+    if (row < height) {
+      const std::size_t at =
+          static_cast<std::size_t>(first + row) * static_cast<std::size_t>(rows.width) +
+          static_cast<std::size_t>(u0);
+      const std::uint64_t begin = rows.offsets[at];
+      keys_.insert(keys_.end(), rows.items.begin() + static_cast<std::ptrdiff_t>(begin),
+                   rows.items.begin() + static_cast<std::ptrdiff_t>(rows.offsets[at + width]));
+      for (std::size_t u = 0; u < width; ++u) {
+        offsets_[pixel++] = static_cast<std::uint32_t>(before + (rows.offsets[at + u] - begin));
+      }
+    }
+    for (; pixel < end; ++pixel) offsets_[pixel] = static_cast<std::uint32_t>(keys_.size());
+    if (keys_.size() > before) {
+      lists.row_begin = std::min(lists.row_begin, row);
+      lists.row_end = row + 1;
+    }
+  }
+  offsets_[kTilePixels] = static_cast<std::uint32_t>(keys_.size());
+  lists.row_begin = std::min(lists.row_begin, lists.row_end);
+  lists.fragments = keys_.size();
+  lists.offsets = offsets_.data();
+  lists.keys = keys_.data();
+  return lists;
+}
+
+}  // namespace strata

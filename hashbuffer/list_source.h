@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/depth_list.h"
+#include "core/result.h"
+#include "hashbuffer/tile_builder.h"
+
+namespace strata {
+
+/// Makes the lists of a mesh elsewhere than in the tiles of this process's threads: on a GPU. What
+/// takes one (build_ldi(), VoxelizeOptions) gets the same lists, bit for bit (law 2).
+///
+/// One thread calls at a time, the one that gave it away.
+class ListSource {
+ public:
+  virtual ~ListSource() = default;
+
+  /// The mesh of the calls that follow; borrowed until the next one.
+  /// @return kLimit without the memory
+  virtual Result<void> set_mesh(const LatticeMesh& mesh) = 0;
+  /// The sorted lists of rows [v_begin, v_end) of `target`, as an image of those rows;
+  /// world_from_image is left as the identity. @return kLimit without the memory
+  virtual Result<LayeredDepthImage> lists(const RasterTarget& target, int v_begin, int v_end) = 0;
+  /// How many rows of `target` are best asked for at once: a multiple of kTileSide, at least that.
+  [[nodiscard]] virtual int rows_at_once(const RasterTarget& target) const = 0;
+};
+
+/// Cuts rows of lists into tiles. Scratch of one thread.
+class TileCutter {
+ public:
+  /// The lists of tile (tu, tv) of an image of which `rows` is a part: its row 0 is the image's
+  /// `v_begin`, a multiple of kTileSide. Valid until the next call.
+  TileLists<DepthItem> cut(const LayeredDepthImage& rows, int v_begin, int tu, int tv);
+
+ private:
+  std::vector<std::uint32_t> offsets_;
+  std::vector<DepthItem> keys_;
+};
+
+}  // namespace strata

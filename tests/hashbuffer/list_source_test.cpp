@@ -1,0 +1,128 @@
+// Lists that come from elsewhere are taken as the tiles' own are.
+
+#include "hashbuffer/list_source.h"
+
+#include <gtest/gtest.h>
+
+#include "hashbuffer/build_ldi.h"
+#include "mesh/shapes.h"
+#include "tests/support/lists.h"
+#include "tests/support/trouble.h"
+#include "voxelize/voxelize.h"
+
+namespace strata {
+namespace {
+
+/// The CPU's lists, some rows at a time.
+class RowsOfTheCpu final : public ListSource {
+ public:
+  explicit RowsOfTheCpu(int rows) : rows_(rows) {}
+  Result<void> set_mesh(const LatticeMesh& mesh) override {
+    mesh_ = &mesh;
+    return {};
+  }
+  Result<LayeredDepthImage> lists(const RasterTarget& target, int v_begin, int v_end) override {
+    asked += v_end - v_begin;
+    const auto whole = build_ldi(*mesh_, target);
+    if (!whole) return whole;
+    LayeredDepthImage part;
+    part.width = target.width;
+    part.height = v_end - v_begin;
+    part.depth_limit = target.depth_limit;
+    part.offsets.assign(1, 0);
+    for (int v = v_begin; v < v_end; ++v) {
+      for (int u = 0; u < target.width; ++u) {
+        const auto list = whole->list(u, v);
+        part.items.insert(part.items.end(), list.begin(), list.end());
+        part.offsets.push_back(part.items.size());
+      }
+    }
+    return part;
+  }
+  int rows_at_once(const RasterTarget&) const override { return rows_; }
+
+  int asked = 0;
+
+ private:
+  const LatticeMesh* mesh_ = nullptr;
+  int rows_;
+};
+
+/// Keeps the crossings of even triangles.
+class EvenTriangles final : public TileListFilter {
+ public:
+  class Even final : public Worker {
+   public:
+    TileLists<DepthItem> apply(const TileLists<DepthItem>& lists) override {
+      offsets_.assign(1, 0);
+      keys_.clear();
+      for (std::size_t pixel = 0; pixel < kTilePixels; ++pixel) {
+        for_each_item(lists, pixel, [this](DepthItem item) {
+          if (item.triangle() % 2 == 0) keys_.push_back(item);
+        });
+        offsets_.push_back(static_cast<std::uint32_t>(keys_.size()));
+      }
+      TileLists<DepthItem> result;
+      result.row_end = kTileSide;
+      result.fragments = keys_.size();
+      result.offsets = offsets_.data();
+      result.keys = keys_.data();
+      return result;
+    }
+
+   private:
+    std::vector<std::uint32_t> offsets_;
+    std::vector<DepthItem> keys_;
+  };
+  std::unique_ptr<Worker> worker() const override { return std::make_unique<Even>(); }
+};
+
+TEST(ListSource, GivesTheImageThatTheTilesGive) {
+  const TriangleSoup soup = make_torus_knot(2, 3, 0.4, 40, 10);
+  const EvenTriangles filter;
+  for (const int resolution : {1, 63, 64, 150}) {
+    const VoxelGrid grid = testkit::grid_around(soup, resolution);
+    const auto mesh = snap_to_lattice(soup, grid);
+    ASSERT_TRUE(mesh);
+    for (const Axis axis : {Axis::kX, Axis::kY, Axis::kZ}) {
+      const RasterTarget target = raster_target(grid, axis);
+      for (const TileListFilter* chosen : {static_cast<const TileListFilter*>(nullptr),
+                                           static_cast<const TileListFilter*>(&filter)}) {
+        RowsOfTheCpu source(64);
+        const auto expected = build_ldi(*mesh, target, {}, {}, chosen);
+        const auto found = build_ldi(source, *mesh, target, {}, chosen);
+        ASSERT_TRUE(expected && found);
+        EXPECT_TRUE(*found == *expected) << resolution;
+        EXPECT_EQ(source.asked, target.height);
+      }
+    }
+  }
+}
+
+TEST(ListSource, GivesTheVoxelsThatTheTilesGive) {
+  TriangleSoup open = make_icosphere(1.0, 3);
+  open.triangles.resize(open.triangles.size() - 40);
+  for (const bool closed : {true, false}) {
+    const TriangleSoup soup = closed ? make_torus(1.0, 0.4, 30, 20) : open;
+    const VoxelGrid grid = testkit::grid_around(soup, 140, 2);
+    for (const Axis axis : {Axis::kX, Axis::kY, Axis::kZ}) {
+      VoxelizeOptions options;
+      options.axis = axis;
+      options.closed = closed;
+      options.statistics = true;
+      VoxelizeReport expected, found;
+      ASSERT_TRUE(voxelize(soup, grid, options, {}, &expected));
+      RowsOfTheCpu source(64);
+      options.source = &source;
+      ASSERT_TRUE(voxelize(soup, grid, options, {}, &found));
+      EXPECT_GT(found.solid_voxels, 0u);
+      EXPECT_EQ(found.checksum, expected.checksum);
+      EXPECT_EQ(found.crossings, expected.crossings);
+      EXPECT_EQ(found.depth_histogram, expected.depth_histogram);
+      EXPECT_EQ(found.unbalanced_columns, expected.unbalanced_columns);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace strata
