@@ -42,7 +42,7 @@ class UnitedSink {
       for (std::size_t i = 0; i < columns; i += hn::Lanes(d)) insert(d, at + i, words + i);
     }
   }
-  void put_one(int u, int v, std::uint32_t depth) {
+  HWY_INLINE void put_one(int u, int v, std::uint32_t depth) {
     ++fragments_;
     const hn::CappedTag<std::uint32_t, 1> d;
     const std::uint32_t word[1] = {depth + 1};

@@ -68,7 +68,7 @@ class TableSink {
       for (std::size_t i = 0; i < columns; i += hn::Lanes(d)) insert(d, pixel + i, words + i);
     }
   }
-  void put_one(int u, int v, std::uint32_t depth) {
+  HWY_INLINE void put_one(int u, int v, std::uint32_t depth) {
     ++result_.fragments;
     const Bits key = bits_of(make_key<Record>(depth, exit_, triangle_));
     table_->insert(pixel_at(u, v), (~key & kValueMask<Record>) | Record::kAgeUnit);
@@ -181,7 +181,7 @@ class LogSink {
   HWY_INLINE void put_block(int u, int v, const std::uint32_t* words, int rows) {
     for (int row = 0; row < rows; ++row) put_row<columns>(u, v + row, words + row * columns);
   }
-  void put_one(int u, int v, std::uint32_t depth) {
+  HWY_INLINE void put_one(int u, int v, std::uint32_t depth) {
     log_->pixels[log_->count] =
         static_cast<std::uint32_t>((v - clip_.v0) * kTileSide + (u - clip_.u0));
     log_->keys[log_->count++] = make_key<Record>(depth, exit_, triangle_);

@@ -17,6 +17,7 @@
 #endif
 
 #include <hwy/highway.h>
+#include <bit>
 
 #include "raster/triangle_setup.h"
 
@@ -100,7 +101,7 @@ class SetupBatch {
 
   /// Sets up the triangles `ids`, at most one a lane, of `mesh` in the pixels of `clip`.
   HWY_INLINE void load(const LatticeMesh& mesh, std::span<const std::uint32_t> ids,
-                       const AxisFrame& frame, const PixelRect& clip) {
+                       const AxisFrame& frame, const PixelRect& clip, std::uint32_t depth_limit) {
     const LaneF64 df;
     const LaneI32 di;
     const std::size_t count = ids.size();
@@ -139,6 +140,9 @@ class SetupBatch {
     const VecI32 box_v0 = hn::Max(hn::Set(di, clip.v0), first(hn::Add(v0, v_low)));
     const VecI32 box_v1 = hn::Min(hn::Set(di, clip.v1), end(hn::Add(v0, v_high)));
     const auto covers = hn::And(hn::Lt(box_u0, box_u1), hn::Lt(box_v0, box_v1));
+    const VecI32 most = hn::Set(di, kSmallSide + 1);
+    const auto small =
+        hn::And(hn::Lt(hn::Sub(box_u1, box_u0), most), hn::Lt(hn::Sub(box_v1, box_v0), most));
     const VecI32 u_extent = hn::Sub(u_high, u_low), v_extent = hn::Sub(v_high, v_low),
                  w_extent = hn::Sub(w_high, w_low);
     const VecF64 volume = hn::Mul(hn::Mul(hn::PromoteTo(df, u_extent), hn::PromoteTo(df, v_extent)),
@@ -212,12 +216,27 @@ class SetupBatch {
         hn::DemoteTo(di, hn::IfThenElseZero(hn::Eq(area, zero_f), one_f));  // exact if direct
     const VecI32 kind = hn::IfThenElse(direct, hn::Sub(one, flat), hn::Set(di, 2));
     hn::Store(hn::IfThenElseZero(covers, kind), di, kind_);
+    if (hn::AllFalse(di, hn::And(small, direct))) {
+      hn::Store(zero, di, small_);
+    } else {
+      cover_small(hn::And(hn::And(small, direct), covers), box_u1, box_v1, depth_limit);
+    }
     const VecI32 turned = hn::DemoteTo(di, hn::IfThenElseZero(clockwise, one_f));
     hn::Store(frame.w == 1 ? turned : hn::Sub(one, turned), di, exit_);
   }
 
   [[nodiscard]] HWY_INLINE Kind kind(std::size_t lane) const {
     return static_cast<Kind>(kind_[lane]);
+  }
+  /// Boxes up to this side are covered here, a pixel of each lane at a time.
+  static constexpr int kSmallSide = 2;
+  /// Not 0 if the triangle is small: then kSmall and the covered pixels, a bit each.
+  [[nodiscard]] HWY_INLINE std::uint32_t small(std::size_t lane) const {
+    return static_cast<std::uint32_t>(small_[lane]);
+  }
+  static constexpr std::uint32_t kSmall = 1u << (kSmallSide * kSmallSide);
+  [[nodiscard]] HWY_INLINE std::uint32_t small_depth(std::size_t lane, int pixel) const {
+    return static_cast<std::uint32_t>(small_depth_[pixel][lane]);
   }
   [[nodiscard]] HWY_INLINE bool exit(std::size_t lane) const { return exit_[lane] != 0; }
   /// Depth steps that a lattice step along u and one along v make together, about.
@@ -239,10 +258,47 @@ class SetupBatch {
   }
 
  private:
+  HWY_INLINE void cover_small(hn::Mask<LaneI32> chosen, VecI32 box_u1, VecI32 box_v1,
+                              std::uint32_t depth_limit) {
+    const LaneF64 df;
+    const LaneI32 di;
+    const VecI32 zero = hn::Zero(di);
+    const VecI32 deepest = hn::Set(di, static_cast<std::int32_t>(depth_limit - 1));
+    const VecI32 width = hn::Sub(box_u1, hn::Load(di, box_u0_));
+    const VecI32 height = hn::Sub(box_v1, hn::Load(di, box_v0_));
+    const VecI32 base = hn::Load(di, quotient_);
+    const VecF64 inverse = hn::Load(df, inverse_);
+    VecI32 bits = hn::Set(di, static_cast<std::int32_t>(kSmall));
+    for (int y = 0; y < kSmallSide; ++y) {
+      for (int x = 0; x < kSmallSide; ++x) {
+        const int pixel = y * kSmallSide + x;
+        VecI32 edges = zero;
+        for (int i = 0; i < 3; ++i) {
+          VecI32 at = hn::Load(di, edge_[i]);
+          if (x > 0) at = hn::Add(at, hn::Mul(hn::Set(di, x), hn::Load(di, edge_u_[i])));
+          if (y > 0) at = hn::Add(at, hn::Mul(hn::Set(di, y), hn::Load(di, edge_v_[i])));
+          edges = hn::Or(edges, at);
+        }
+        const auto in_box = hn::And(hn::Lt(hn::Set(di, x), width), hn::Lt(hn::Set(di, y), height));
+        const auto covered = hn::AndNot(hn::Lt(edges, zero), in_box);
+        bits = hn::Or(bits, hn::IfThenElseZero(covered, hn::Set(di, 1 << pixel)));
+        VecF64 remainder = hn::Load(df, remainder_);
+        if (x > 0)
+          remainder = hn::Add(remainder, hn::Mul(hn::Set(df, x), hn::Load(df, remainder_u_)));
+        if (y > 0)
+          remainder = hn::Add(remainder, hn::Mul(hn::Set(df, y), hn::Load(df, remainder_v_)));
+        const VecI32 depth = hn::Add(base, hn::DemoteTo(di, hn::Mul(remainder, inverse)));
+        hn::Store(hn::Min(hn::Max(depth, zero), deepest), di, small_depth_[pixel]);
+      }
+    }
+    hn::Store(hn::IfThenElseZero(chosen, bits), di, small_);
+  }
+
   template <class T>
   using Lanes = T[kMaxLanes];
   alignas(64) Lanes<double> remainder_, remainder_u_, remainder_v_, inverse_, steepness_;
   alignas(64) Lanes<std::int32_t> edge_[3], edge_u_[3], edge_v_[3], quotient_, kind_, exit_;
+  alignas(64) Lanes<std::int32_t> small_, small_depth_[kSmallSide * kSmallSide];
   alignas(64) Lanes<std::int32_t> box_u0_, box_u1_, box_v0_, box_v1_;
 };
 
@@ -422,7 +478,7 @@ HWY_INLINE void rasterize_triangles(const LatticeMesh& mesh, const RasterTarget&
   TileEquations equations;
   for (std::size_t begin = 0; begin < ids.size(); begin += lanes) {
     const auto part = ids.subspan(begin, std::min(lanes, ids.size() - begin));
-    batch.load(mesh, part, frame, clip);
+    batch.load(mesh, part, frame, clip, target.depth_limit);
     for (std::size_t lane = 0; lane < part.size(); ++lane) {
       const auto kind = batch.kind(lane);
       if (kind == SetupBatch::Kind::kNothing) continue;
@@ -433,8 +489,18 @@ HWY_INLINE void rasterize_triangles(const LatticeMesh& mesh, const RasterTarget&
         if constexpr (kChooses) {
           if (!sink.wants(batch.exit(lane))) continue;
         }
+        const std::uint32_t small = batch.small(lane);
+        if (small == SetupBatch::kSmall) continue;  // between the pixel centres
         if constexpr (kTellSteepness) sink.steepness(batch.steepness(lane));
         sink.begin(batch.exit(lane), part[lane], box);
+        if (small != 0) {
+          for (std::uint32_t bits = small & (SetupBatch::kSmall - 1); bits != 0; bits &= bits - 1) {
+            const int pixel = std::countr_zero(bits);
+            sink.put_one(box.u0 + pixel % SetupBatch::kSmallSide,
+                         box.v0 + pixel / SetupBatch::kSmallSide, batch.small_depth(lane, pixel));
+          }
+          continue;
+        }
         batch.equations(lane, equations);
         rasterize_any_box<false>(equations, box, target.depth_limit, sink);
         continue;
