@@ -1,0 +1,161 @@
+// Walks the lists of a tree's solids, a thread a pixel: a crossing flips the bit of its solid, and
+// after all crossings of a depth the tree's nodes are asked. The first depth where the tree is true
+// is what is seen there, if nothing else is near (law 5) and every solid is entered and left in
+// turn. All other pixels are doubtful: their lists are handed over.
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+// A tile's program. Bits [0, slot_count) are solids, node n is bit slot_count + n; children come
+// before parents. Of each node WALK_WORDS pairs of words: bits that make it true, and bits that
+// make it true by being 0.
+struct WalkTile {
+  uint slot_count;  // 0: nothing is to be found in the tile
+  uint node_count;
+  uint nodes;  // first word in walk_nodes
+  uint slots;  // where the tile's solids begin in walk_slots: solid s is at slots + s - first
+  uint first_solid;
+  uint solid_count;
+  uint root;      // a bit
+  uint inverted;  // 1: the tree says not(root)
+};
+
+const uint kWalkNone = 0xffffffffu;
+const uint kWalkDoubtful = 0xfffffffeu;
+const uint kWalkLongest = 255u;  // doubtful lists that are longer are not handed over
+
+layout(std430, binding = 0) readonly buffer WalkTriangles {
+  uvec2 walk_triangles[];
+};  // solid, more
+layout(std430, binding = 1) readonly buffer WalkTiles { WalkTile walk_tiles[]; };
+layout(std430, binding = 2) readonly buffer WalkSlots { uint walk_slots[]; };
+layout(std430, binding = 3) readonly buffer WalkNodes { uint walk_nodes[]; };
+layout(std430, binding = 4) writeonly buffer WalkSurfaces { uvec2 walk_surfaces[]; };
+// Of each doubtful pixel: its number, its list's length n (kWalkNone: too long), n depths and
+// payloads.
+layout(std430, binding = 5) buffer WalkDoubts {
+  uint walk_doubt_words;
+  uint walk_doubt_unused[3];
+  uint walk_doubts[];
+};
+uniform uint walk_width;      // pixels of a row
+uniform uint walk_row_begin;  // of the screen
+uniform uint walk_row_end;
+uniform uint walk_first_row;  // of the picture, where the screen begins
+uniform uint walk_tiles_u;
+uniform uint walk_doubt_capacity;
+uniform float walk_range_a, walk_range_b, walk_range_offset, walk_range_square;
+uniform float walk_depth_limit;
+
+uint walk_bits[WALK_WORDS];
+
+bool walk_value(WalkTile tile) {
+  uint at = tile.nodes;
+  for (uint node = 0u; node < tile.node_count; ++node) {
+    uint any = 0u;
+    for (int word = 0; word < WALK_WORDS; ++word) {
+      any |= (walk_bits[word] & walk_nodes[at]) | (~walk_bits[word] & walk_nodes[at + 1u]);
+      at += 2u;
+    }
+    uint bit = tile.slot_count + node;
+    uint mask = 1u << (bit & 31u);
+    uint others = walk_bits[bit >> 5] & ~mask;
+    walk_bits[bit >> 5] = any != 0u ? others | mask : others;
+  }
+  return (walk_bits[tile.root >> 5] >> (tile.root & 31u) & 1u) != tile.inverted;
+}
+
+// A little more than the bounds of two faces near a depth, if neither is steep.
+int walk_reach(uint depth) {
+  float nearness = walk_range_a - walk_range_b * float(depth);
+  float reach = walk_range_offset + walk_range_square * nearness * nearness;
+  return int(min(reach, walk_depth_limit)) + 1;
+}
+
+void main() {
+  uint u = gl_GlobalInvocationID.x, v = gl_GlobalInvocationID.y + walk_row_begin;
+  if (u >= walk_width || v >= walk_row_end) return;
+  uint pixel = v * walk_width + u;
+  WalkTile tile = walk_tiles[((v + walk_first_row) >> 6) * walk_tiles_u + (u >> 6)];
+  if (tile.slot_count == 0u) {
+    walk_surfaces[pixel] = uvec2(kWalkNone, 0u);
+    return;
+  }
+  for (int word = 0; word < WALK_WORDS; ++word) walk_bits[word] = 0u;
+
+  bool doubt = false, found = false;
+  uvec2 surface = uvec2(kWalkNone, 0u);
+  int far = 0;     // what begins there or before is near to what is seen
+  int front = -1;  // how far back crossings before the group may be
+  uint group_count = 0u, group_depth = 0u, group_payload = 0u;
+  int group_more = 0;
+  uint count = 0u;
+  StrataCursor cursor = strata_list(pixel);
+  for (;;) {
+    uint depth, payload;
+    bool present = strata_next(cursor, depth, payload);
+    uint slot = kWalkNone;
+    int more = 0;
+    if (present) {
+      ++count;
+      uvec2 triangle = walk_triangles[payload & 0x7fffffffu];
+      uint solid = triangle.x - tile.first_solid;
+      if (solid < tile.solid_count) slot = walk_slots[tile.slots + solid];
+      if (slot == kWalkNone) continue;
+      more = int(triangle.y);
+    }
+    if (!found && group_count > 0u && (!present || depth != group_depth)) {
+      if (walk_value(tile)) {
+        found = true;
+        surface = uvec2(group_depth, group_payload);
+        int reach = walk_reach(group_depth) + 2 * group_more;
+        far = int(group_depth) + reach;
+        doubt = doubt || group_count > 1u || front >= int(group_depth) - reach;
+      } else {
+        front = max(front, int(group_depth) + group_more);
+      }
+      group_count = 0u;
+      group_more = 0;
+    }
+    if (!present) break;
+    uint mask = 1u << (slot & 31u);
+    bool inside = (walk_bits[slot >> 5] & mask) != 0u;
+    doubt = doubt || inside != (payload >> 31 != 0u);
+    walk_bits[slot >> 5] ^= mask;
+    if (found) {
+      doubt = doubt || int(depth) - more <= far;
+    } else {
+      ++group_count;
+      group_depth = depth;
+      group_payload = payload;
+      group_more = max(group_more, more);
+    }
+  }
+  for (uint word = 0u; word < uint(WALK_WORDS); ++word) {
+    uint first = word * 32u;
+    if (first >= tile.slot_count) break;
+    uint solids =
+        tile.slot_count - first >= 32u ? 0xffffffffu : (1u << (tile.slot_count - first)) - 1u;
+    doubt = doubt || (walk_bits[word] & solids) != 0u;
+  }
+  if (!doubt) {
+    walk_surfaces[pixel] = surface;
+    return;
+  }
+  walk_surfaces[pixel] = uvec2(kWalkDoubtful, 0u);
+  bool too_long = count > kWalkLongest;
+  uint words = too_long ? 2u : 2u + 2u * count;
+  uint at = atomicAdd(walk_doubt_words, words);
+  if (at + words > walk_doubt_capacity) return;
+  walk_doubts[at] = pixel;
+  walk_doubts[at + 1u] = too_long ? kWalkNone : count;
+  if (too_long) return;
+  cursor = strata_list(pixel);
+  at += 2u;
+  for (uint i = 0u; i < count; ++i) {
+    uint depth, payload;
+    if (!strata_next(cursor, depth, payload)) break;
+    walk_doubts[at] = depth;
+    walk_doubts[at + 1u] = payload;
+    at += 2u;
+  }
+}
