@@ -19,6 +19,7 @@ constexpr const char* kTopHelp = R"(strata: triangle meshes to voxels, exactly a
   strata info scan.ply                                 size, volume, closed or not and where
   strata ldi knot.obj -r 512 -o knot.exr               depth lists as a deep image
   strata csg plate.csg -o plate.png                    a picture of a Boolean tree
+  strata view plate.scad --watch                       a window on it
 
 usage: strata COMMAND [OPTIONS] FILE...
 
@@ -27,6 +28,7 @@ commands:
   info        what a mesh file holds: counts, bounds, area, volume, holes
   ldi         a mesh to a layered depth image
   csg         a scene (.csg, .scad) or an expression over meshes to a picture
+  view        the same in a window: turn, cut, pick, measure, reload
 
   strata COMMAND --help lists the options of a command.
   -h, --help      this text

@@ -120,4 +120,9 @@ Result<void> run_info(const InfoCommand& command, Session& session);
 Result<void> run_ldi(const LdiCommand& command, Session& session);
 Result<void> run_csg(const CsgCommand& command, Session& session);
 
+/// `strata view`: becomes the program strata-view that lies beside this one, with these arguments.
+/// Returns an exit code when that cannot be, after a sentence on standard error. So this program
+/// needs none of the libraries of a window.
+int run_view_program(char** arguments);
+
 }  // namespace strata::apps

@@ -92,6 +92,7 @@ Result<void> run(const AnyCommand& command, Session& session) {
 int strata_main(int argc, char** argv) {
   const auto start = Session::Clock::now();
   std::set_terminate(on_terminate);
+  if (argc > 1 && std::string_view(argv[1]) == "view") return run_view_program(argv + 2);
   const Command command = parse_command_line(argc, argv);
   if (const auto* outcome = std::get_if<ParseOutcome>(&command)) {
     const bool shown = write_text(outcome->to_stderr ? STDERR_FILENO : STDOUT_FILENO, outcome->text,

@@ -52,15 +52,17 @@ void Session::configure(const CommonOptions& options) {
 }
 
 int Session::threads() const {
+  if (given_) return given_->thread_count();
   Execution execution;
   execution.threads = options_.threads;
   return execution.thread_count();
 }
 
 Execution Session::execution(std::string label) {
+  if (given_) return *given_;
   Execution result;
   result.threads = options_.threads;
-  result.stop = interrupts_.token();
+  result.stop = interrupts_->token();
   result.memory_limit = memory_limit_;
   const ProgressMode mode = options_.quiet ? ProgressMode::kNone : options_.progress;
   if (mode == ProgressMode::kNone) return result;

@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "apps/commands.h"
@@ -25,7 +26,13 @@ class Session {
  public:
   using Clock = std::chrono::steady_clock;
 
-  explicit Session(Clock::time_point start) : start_(start) {}
+  explicit Session(Clock::time_point start) : start_(start) { interrupts_.emplace(); }
+  /// For a program that has its own ways to talk and to stop, such as a window: nothing is printed,
+  /// signals are left alone, and every phase runs as `execution`.
+  Session(Clock::time_point start, Execution execution)
+      : start_(start), given_(std::move(execution)) {
+    options_.quiet = true;
+  }
 
   /// Takes the options every command has. Sets a wall against memory beyond the limit.
   void configure(const CommonOptions& options);
@@ -36,7 +43,7 @@ class Session {
   void end_progress() { bar_.reset(); }
   [[nodiscard]] int threads() const;
   [[nodiscard]] std::uint64_t memory_limit() const { return memory_limit_; }
-  [[nodiscard]] bool interrupted() const { return interrupts_.interrupted(); }
+  [[nodiscard]] bool interrupted() const { return interrupts_ && interrupts_->interrupted(); }
 
   /// Prints and keeps a warning. Under --strict the job ends at the next check_strict().
   void warn(std::string code, std::string message);
@@ -53,7 +60,8 @@ class Session {
   void say(std::string_view kind, std::string_view message);
 
   Clock::time_point start_;
-  InterruptGuard interrupts_;
+  std::optional<InterruptGuard> interrupts_;
+  std::optional<Execution> given_;
   CommonOptions options_;
   std::uint64_t memory_limit_ = 0;
   std::optional<ProgressBar> bar_;

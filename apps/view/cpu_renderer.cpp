@@ -1,0 +1,167 @@
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <utility>
+
+#include "apps/view/camera_control.h"
+#include "apps/view/renderer.h"
+#include "csg/ray_image.h"
+
+namespace strata::view {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+double ms_since(Clock::time_point begin) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
+}
+
+/// Samples of the colour map viridis (S. van der Walt, N. Smith, 2015): as even to the eye as to
+/// the colour-blind eye.
+constexpr glm::vec3 kHeat[] = {{68, 1, 84},    {72, 40, 120},  {62, 74, 137},  {49, 104, 142},
+                               {38, 130, 142}, {31, 158, 137}, {53, 183, 121}, {109, 205, 89},
+                               {180, 222, 44}, {253, 231, 37}};
+
+class CpuRenderer final : public Renderer {
+ public:
+  Result<Frame> draw(const FrameRequest& request, const Execution& execution) override {
+    Frame frame;
+    frame.number = request.number;
+    frame.camera = request.camera;
+    frame.wanted = request.size;
+    const auto begin = Clock::now();
+    adopt(request.what, execution);
+    if (request.heat == Heat::kOff) {
+      if (!preview_) {
+        preview_.emplace(what_->tree, what_->ghosts, what_->relative_precision, execution);
+        frame.prepare_ms = ms_since(begin);
+      }
+      const auto drawn = Clock::now();
+      auto picture = preview_->picture(request.camera, request.size, request.look, execution);
+      if (!picture) return tl::unexpected(picture.error());
+      frame.picture = *std::move(picture);
+      frame.report = preview_->report();
+      frame.draw_ms = ms_since(drawn);
+      return frame;
+    }
+    if (!meter_) {
+      meter_.emplace(what_->tree, what_->tree.root(), what_->relative_precision, execution);
+      frame.prepare_ms = ms_since(begin);
+    }
+    if (auto done = draw_heat(request, execution, frame); !done)
+      return tl::unexpected(done.error());
+    return frame;
+  }
+
+  Result<Picked> pick(const FrameRequest& request, const glm::ivec2& pixel,
+                      const Execution& execution) override {
+    Picked picked;
+    picked.pixel = pixel;
+    adopt(request.what, execution);
+    if (!preview_) {
+      preview_.emplace(what_->tree, what_->ghosts, what_->relative_precision, execution);
+    }
+    const auto whole = csg::make_view(request.camera, request.size, preview_->box());
+    if (!whole) return tl::unexpected(whole.error());
+    // The picture's lattice, moved by whole pixels: the same bits.
+    csg::View view = *whole;
+    view.size = {1, 1};
+    for (int column = 0; column < 4; ++column) {
+      glm::dvec4& m = view.image_from_world[column];
+      m.x -= pixel.x * m.w;
+      m.y -= pixel.y * m.w;
+    }
+    const auto image = preview_->draw(view, execution);
+    if (!image) return tl::unexpected(image.error());
+    const csg::SurfaceImage& surface = **image;
+    const std::uint32_t depth = surface.depth.front();
+    if (depth == csg::SurfaceImage::kNone) return picked;
+    picked.hit = true;
+    picked.solid = surface.solid.front();
+    picked.triangle = surface.triangle.front() & ~csg::SurfaceImage::kExit;
+    picked.cut = (surface.triangle.front() & csg::SurfaceImage::kExit) != 0;
+    picked.where = world_of(*whole, glm::dvec2(pixel) + 0.5, depth + 0.5);
+    picked.distance = whole->distance(depth + 0.5);
+    return picked;
+  }
+
+  [[nodiscard]] std::string name() const override { return "CPU"; }
+
+ private:
+  void adopt(const std::shared_ptr<const Arrangement>& what, const Execution& /*execution*/) {
+    if (what == what_) return;
+    preview_.reset();
+    meter_.reset();
+    what_ = what;
+  }
+
+  Result<void> draw_heat(const FrameRequest& request, const Execution& execution, Frame& frame) {
+    const auto begin = Clock::now();
+    Bounds box;
+    for (const csg::Solid& solid : what_->tree.solids()) {
+      const Bounds one = csg::bounds(solid);
+      if (one.empty()) continue;
+      box.low = glm::min(box.low, one.low);
+      box.high = glm::max(box.high, one.high);
+    }
+    const auto view = csg::make_view(request.camera, request.size, box);
+    if (!view) return tl::unexpected(view.error());
+    const auto rays = meter_->measure(*view, execution);
+    if (!rays) return tl::unexpected(rays.error());
+    const bool thickness = request.heat == Heat::kThickness;
+    const double diagonal = box.empty() ? 1.0 : glm::length(box.high - box.low);
+    const auto value_at = [&](std::size_t i) {
+      return thickness ? static_cast<double>(rays->thickness[i])
+                       : static_cast<double>(rays->crossings[i]);
+    };
+    double high = 0;
+    for (std::size_t i = 0; i < rays->crossings.size(); ++i) {
+      frame.longest_list = std::max<std::uint64_t>(frame.longest_list, rays->crossings[i]);
+      const double value = value_at(i);
+      if (std::isfinite(value)) high = std::max(high, value);
+    }
+    frame.scale = {request.heat, 0, thickness ? round_up(std::min(high, diagonal)) : high};
+    const csg::ColourScheme& scheme =
+        request.look.scheme != nullptr ? *request.look.scheme : csg::colour_schemes().front();
+    const csg::Rgba background(scheme.background, 255);
+    frame.picture = {rays->width, rays->height, {}};
+    frame.picture.pixels.resize(rays->crossings.size(), background);
+    for (std::size_t i = 0; i < rays->crossings.size(); ++i) {
+      const double value = value_at(i);
+      if (!(value > 0)) continue;
+      ++frame.report.covered;
+      frame.picture.pixels[i] = heat_colour(frame.scale.high > 0 ? value / frame.scale.high : 0);
+    }
+    frame.report.fragments = rays->fragments;
+    frame.draw_ms = ms_since(begin);
+    return {};
+  }
+
+  /// To 1, 1.5, 2, 3, 5 or 7 times a power of ten: scales that do not flicker.
+  static double round_up(double value) {
+    if (!(value > 0)) return 0;
+    const double power = std::pow(10.0, std::floor(std::log10(value)));
+    for (const double step : {1.0, 1.5, 2.0, 3.0, 5.0, 7.0}) {
+      if (value <= step * power * (1 + 1e-9)) return step * power;
+    }
+    return 10 * power;
+  }
+
+  std::shared_ptr<const Arrangement> what_;
+  std::optional<csg::Preview> preview_;
+  std::optional<csg::RayMeter> meter_;
+};
+
+}  // namespace
+
+std::unique_ptr<Renderer> make_cpu_renderer() { return std::make_unique<CpuRenderer>(); }
+
+csg::Rgba heat_colour(double part) {
+  constexpr int kLast = static_cast<int>(std::size(kHeat)) - 1;
+  const double at = std::clamp(part, 0.0, 1.0) * kLast;
+  const int below = std::min(static_cast<int>(at), kLast - 1);
+  const auto rest = static_cast<float>(at - below);
+  const glm::vec3 colour = kHeat[below] * (1 - rest) + kHeat[below + 1] * rest;
+  return csg::Rgba(glm::u8vec3(colour + 0.5f), 255);
+}
+
+}  // namespace strata::view

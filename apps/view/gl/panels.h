@@ -1,0 +1,48 @@
+#pragma once
+
+#include <array>
+#include <string>
+
+#include "apps/view/gl/canvas.h"
+#include "apps/view/viewer.h"
+
+namespace strata::view {
+
+/// All that lies beside and on the picture, drawn with Dear ImGui.
+class Panels {
+ public:
+  /// Fonts and colours. @pre ImGui has a context. @param scale of the screen: 2 for twice the dots
+  Panels(float scale, std::string gl_renderer);
+
+  /// Where the picture goes in a window of that size.
+  [[nodiscard]] Area picture_area(const glm::ivec2& window, bool with_panels) const;
+
+  /// @pre ImGui::NewFrame() was called
+  void draw(Viewer& viewer, const glm::ivec2& window, const Area& area);
+
+  /// A line that is shown for some seconds.
+  void tell(std::string text);
+
+ private:
+  void side(Viewer& viewer, const glm::ivec2& window);
+  void camera(Viewer& viewer);
+  void section(Viewer& viewer);
+  void look(Viewer& viewer);
+  void picked(Viewer& viewer);
+  void solids(Viewer& viewer);
+  void statistics(const Viewer& viewer);
+  void status(const Viewer& viewer, const glm::ivec2& window);
+  void messages(Viewer& viewer, const Area& area);
+  void axes(const Viewer& viewer, const Area& area);
+  void handle(const Viewer& viewer, const Area& area);
+  void mark(const Viewer& viewer, const Area& area);
+  void legend(const Viewer& viewer, const Area& area);
+
+  float scale_;
+  std::string gl_renderer_;
+  std::array<char, 128> filter_{};
+  std::string told_;
+  Viewer::Clock::time_point told_at_{};
+};
+
+}  // namespace strata::view

@@ -1,0 +1,96 @@
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <thread>
+
+#include "apps/view/renderer.h"
+
+namespace strata::view {
+
+/// Chooses how coarse a picture must be to be there in time. Times of former pictures of the same
+/// kind decide.
+class CoarsePolicy {
+ public:
+  static constexpr double kTargetMs = 45;  ///< two of them, one just begun, fit into 100 ms
+  static constexpr int kDivisors[] = {1, 2, 3, 4, 6, 8, 12, 16};
+
+  /// The finest divisor whose picture is expected within kTargetMs.
+  [[nodiscard]] int divisor(const glm::ivec2& size) const;
+  /// A picture of `size` / divisor pixels took `ms`.
+  void learn(const glm::ivec2& size, int divisor, double ms);
+  /// The scene has changed: nothing is known.
+  void forget() { *this = {}; }
+
+ private:
+  // ms = fixed_ + per_pixel_ * pixels, from the last two kinds of pictures seen.
+  [[nodiscard]] double expected(double pixels) const { return fixed_ + per_pixel_ * pixels; }
+  double fixed_ = 0, per_pixel_ = 0;
+  bool known_ = false;
+};
+
+/// The size of a picture that is `divisor` times as coarse.
+[[nodiscard]] glm::ivec2 coarse_size(const glm::ivec2& size, int divisor);
+
+/// Draws what is asked for last, on a thread of its own: a coarse picture at once, then, when no
+/// other has been asked for in the meantime, the whole one.
+class RenderThread {
+ public:
+  /// @param wake called from the drawing thread when there is something to take
+  /// @param threads that draw; 0: one a processor
+  RenderThread(std::unique_ptr<Renderer> renderer, int threads, std::function<void()> wake);
+  RenderThread(const RenderThread&) = delete;
+  RenderThread& operator=(const RenderThread&) = delete;
+  ~RenderThread();
+
+  /// Replaces what was asked for before. Gives its number. With `whole`, no coarse picture.
+  std::uint64_t submit(FrameRequest request, bool whole = false);
+  /// Asks for a pick in the request given last. Replaces one that waits.
+  void pick(const glm::ivec2& pixel);
+
+  /// The newest picture since the last call.
+  std::optional<Frame> take_frame();
+  std::optional<Result<Picked>> take_pick();
+  /// Why the last request could not be drawn; once.
+  std::optional<Error> take_error();
+  /// Nothing is under way: the last request is drawn, whole, or has failed; picks are answered.
+  [[nodiscard]] bool resting() const;
+  [[nodiscard]] std::string renderer_name() const { return name_; }
+
+ private:
+  void run(const std::stop_token& stop);
+  void draw_coarse(const FrameRequest& request, int divisor, bool last);
+  [[nodiscard]] Execution execution(const std::stop_token& stop) const;
+
+  /// No new request for so long, and the hand rests.
+  static constexpr int kRestMs = 60;
+
+  std::unique_ptr<Renderer> renderer_;
+  std::string name_;
+  int threads_;
+  std::function<void()> wake_;
+  CoarsePolicy policy_, heat_policy_;
+  std::size_t drawn_solids_ = 0;
+
+  mutable std::mutex mutex_;
+  std::condition_variable_any changed_;
+  std::uint64_t last_number_ = 0;
+  std::optional<FrameRequest> wanted_;  ///< not yet begun
+  bool wanted_whole_ = false;
+  std::optional<FrameRequest> current_;  ///< given last
+  std::optional<glm::ivec2> wanted_pick_;
+  bool working_ = false;
+  std::stop_source whole_stop_;  ///< of the whole picture that is being drawn
+  std::optional<Frame> frame_;
+  std::optional<Result<Picked>> picked_;
+  std::optional<Error> error_;
+  std::jthread thread_;
+};
+
+}  // namespace strata::view

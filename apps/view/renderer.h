@@ -1,0 +1,84 @@
+#pragma once
+
+#include <cstdint>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/view/document.h"
+#include "core/execution.h"
+#include "core/result.h"
+#include "csg/picture.h"
+
+// The seam between the window and what draws its pictures.
+
+namespace strata::view {
+
+enum class Heat : std::uint8_t {
+  kOff,
+  kThickness,  ///< of the material behind the visible surface, along the ray
+  kDepth       ///< depth complexity: how many crossings the ray has with all solids
+};
+
+/// One picture that is wanted.
+struct FrameRequest {
+  std::uint64_t number = 0;  ///< counts up
+  std::shared_ptr<const Arrangement> what;
+  csg::Camera camera;
+  glm::ivec2 size{1};
+  csg::PictureOptions look;
+  Heat heat = Heat::kOff;
+};
+
+/// What the colours of a heat map stand for.
+struct HeatScale {
+  Heat heat = Heat::kOff;
+  double low = 0, high = 0;  ///< values of the first and the last colour
+};
+
+/// One picture that was drawn.
+struct Frame {
+  std::uint64_t number = 0;  ///< of the request
+  csg::Picture picture;
+  csg::Camera camera;
+  glm::ivec2 wanted{1};  ///< the size that was asked for
+  int divisor = 1;       ///< 1: whole; n: a pixel stands for n x n
+  csg::DrawReport report;
+  HeatScale scale;
+  std::uint64_t longest_list = 0;  ///< heat maps only
+  double prepare_ms = 0;           ///< of the tree, when it changed
+  double draw_ms = 0;
+};
+
+/// What lies below a pixel.
+struct Picked {
+  glm::ivec2 pixel{0};
+  bool hit = false;
+  std::uint32_t solid = 0, triangle = 0;  ///< of the arrangement's tree; of the solid's mesh
+  bool cut = false;                       ///< a face that a subtracted solid or a section leaves
+  glm::dvec3 where{0};                    ///< world space
+  double distance = 0;                    ///< from the eye, along the view axis
+};
+
+/// Draws pictures. One thread at a time.
+class Renderer {
+ public:
+  virtual ~Renderer() = default;
+  /// @return as csg::Preview::picture()
+  virtual Result<Frame> draw(const FrameRequest& request, const Execution& execution) = 0;
+  /// The opaque surface below a pixel.
+  virtual Result<Picked> pick(const FrameRequest& request, const glm::ivec2& pixel,
+                              const Execution& execution) = 0;
+  [[nodiscard]] virtual std::string name() const = 0;
+};
+
+/// Draws with csg::Preview; its pictures are those of `strata csg`.
+[[nodiscard]] std::unique_ptr<Renderer> make_cpu_renderer();
+
+/// The colour of a part of a heat map's range, in [0, 1]: dark blue, green, yellow.
+[[nodiscard]] csg::Rgba heat_colour(double part);
+
+}  // namespace strata::view

@@ -1,0 +1,294 @@
+#include "apps/view/script.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <iostream>
+#include <iterator>
+#include <optional>
+
+#include "apps/csg_options.h"
+#include "apps/option_values.h"
+#include "apps/view/camera_control.h"
+#include "csg/picture.h"
+
+namespace strata::view {
+namespace {
+
+enum class Form {
+  kNone,
+  kTwoNumbers,
+  kZoom,
+  kDrag,
+  kOnOff,
+  kWord,
+  kSection,
+  kColour,
+  kWait,
+  kText
+};
+
+struct Rule {
+  std::string_view name;
+  Action action;
+  Form form;
+  std::string_view usage, what;
+};
+
+constexpr Rule kRules[] = {
+    {"orbit", Action::kOrbit, Form::kTwoNumbers, "DX DY", "turn, as the mouse by so many pixels"},
+    {"pan", Action::kPan, Form::kTwoNumbers, "DX DY", "move, in pixels"},
+    {"zoom", Action::kZoom, Form::kZoom, "STEPS [X Y]", "nearer by a tenth each step"},
+    {"drag", Action::kDrag, Form::kDrag, "BUTTON X Y X Y [MOVES]",
+     "the mouse, with left, right or middle"},
+    {"click", Action::kClick, Form::kTwoNumbers, "X Y", "the left button"},
+    {"key", Action::kKey, Form::kWord, "KEY", "such as ctrl+4, p or escape"},
+    {"view", Action::kView, Form::kWord, "NAME",
+     "top bottom left right front back diagonal centre all reset"},
+    {"camera", Action::kCamera, Form::kWord, "NUMBERS", "as --camera"},
+    {"projection", Action::kProjection, Form::kWord, "P", "perspective or orthographic"},
+    {"section", Action::kSection, Form::kSection, "PLANE",
+     "z=3.5 or z 3.5, y>0, nx,ny,nz,d; off; flip"},
+    {"ghosts", Action::kGhosts, Form::kOnOff, "on|off", "of what is subtracted"},
+    {"edges", Action::kEdges, Form::kOnOff, "on|off", "dark lines along edges"},
+    {"axes", Action::kAxes, Form::kOnOff, "on|off", "the cross of axes in the corner"},
+    {"panels", Action::kPanels, Form::kOnOff, "on|off", "all that is not the picture"},
+    {"heat", Action::kHeat, Form::kWord, "MAP", "off, thickness or depth"},
+    {"scheme", Action::kScheme, Form::kWord, "NAME", "a colour scheme"},
+    {"hide", Action::kHide, Form::kWord, "SOLID", "by a part of its name, @index, or all"},
+    {"show", Action::kShow, Form::kWord, "SOLID", "the same"},
+    {"colour", Action::kColour, Form::kColour, "SOLID COLOUR", "#rrggbb, #rrggbbaa or none"},
+    {"pick", Action::kPick, Form::kTwoNumbers, "X Y", "print which solid, triangle, where"},
+    {"reload", Action::kReload, Form::kNone, "", "read the files again, and wait"},
+    {"cancel", Action::kCancel, Form::kNone, "", "stop the load that is under way"},
+    {"resize", Action::kResize, Form::kTwoNumbers, "WIDTH HEIGHT", "the window"},
+    {"wait", Action::kWait, Form::kWait, "[SECONDS|reload]",
+     "until the picture is whole, or until a changed file is loaded (--watch)"},
+    {"screenshot", Action::kScreenshot, Form::kWord, "FILE.png", "of the whole window"},
+    {"picture", Action::kPicture, Form::kWord, "FILE.png",
+     "of the picture, without what lies on it"},
+    {"print", Action::kPrint, Form::kText, "TEXT", "to standard output"},
+    {"stats", Action::kStats, Form::kNone, "", "print times and list statistics as JSON"},
+    {"reset-stats", Action::kResetStats, Form::kNone, "", "forget the largest times"},
+    {"quit", Action::kQuit, Form::kNone, "", "close the window"},
+};
+
+bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
+
+/// The words of a line. Empty optional: a quote is not closed.
+std::optional<std::vector<std::string>> words_of(std::string_view line) {
+  std::vector<std::string> words;
+  std::size_t i = 0;
+  while (true) {
+    while (i < line.size() && is_blank(line[i])) ++i;
+    if (i == line.size()) return words;
+    const bool alone = i + 1 == line.size() || is_blank(line[i + 1]);
+    if (line[i] == '#' && (words.empty() || alone)) return words;
+    std::string word;
+    while (i < line.size() && !is_blank(line[i])) {
+      if (line[i] != '"') {
+        word += line[i++];
+        continue;
+      }
+      const std::size_t end = line.find('"', i + 1);
+      if (end == std::string_view::npos) return {};
+      word += line.substr(i + 1, end - i - 1);
+      i = end + 1;
+    }
+    words.push_back(std::move(word));
+  }
+}
+
+std::optional<double> number_of(std::string_view word) {
+  double value = 0;
+  if (word.starts_with('+')) word.remove_prefix(1);
+  const auto [end, code] = std::from_chars(word.data(), word.data() + word.size(), value);
+  if (code != std::errc() || end != word.data() + word.size() || !std::isfinite(value)) return {};
+  return value;
+}
+
+/// Reads one line.
+class Line {
+ public:
+  Line(const Rule& rule, const std::string& where, std::vector<std::string> words)
+      : rule_(rule), where_(where), words_(std::move(words)) {}
+
+  Result<void> read(ScriptCommand& command) {
+    switch (rule_.form) {
+      case Form::kNone:
+        return expect(1, 1);
+      case Form::kTwoNumbers:
+        return numbers(1, 2, 2, command);
+      case Form::kZoom:
+        if (words_.size() == 3) return usage();
+        return numbers(1, 1, 3, command);
+      case Form::kDrag:
+        return drag(command);
+      case Form::kOnOff: {
+        if (auto counted = expect(2, 2); !counted) return counted;
+        if (words_[1] != "on" && words_[1] != "off") return usage();
+        command.on = words_[1] == "on";
+        return {};
+      }
+      case Form::kWord:
+        if (auto counted = expect(2, 2); !counted) return counted;
+        command.word = words_[1];
+        return check_word(command);
+      case Form::kSection:
+        return section(command);
+      case Form::kColour:
+        if (auto counted = expect(3, 3); !counted) return counted;
+        command.word = words_[1];
+        command.value = words_[2];
+        return check_colour(command.value);
+      case Form::kWait:
+        if (auto counted = expect(1, 2); !counted) return counted;
+        if (words_.size() == 1) return {};
+        if (words_[1] == "reload") {
+          command.word = words_[1];
+          return {};
+        }
+        return numbers(1, 1, 1, command);
+      case Form::kText:
+        for (std::size_t i = 1; i < words_.size(); ++i) {
+          command.word += (i > 1 ? " " : "") + words_[i];
+        }
+        return {};
+    }
+    return {};
+  }
+
+ private:
+  [[nodiscard]] tl::unexpected<Error> usage() const {
+    return fail(ErrorCode::kUsage, "{}: write {} {}", where_, rule_.name, rule_.usage);
+  }
+  [[nodiscard]] Result<void> expect(std::size_t least, std::size_t most) const {
+    if (words_.size() >= least && words_.size() <= most) return {};
+    return usage();
+  }
+  Result<void> numbers(std::size_t first, std::size_t least, std::size_t most,
+                       ScriptCommand& command) const {
+    if (auto counted = expect(first + least, first + most); !counted) return counted;
+    for (std::size_t i = first; i < words_.size(); ++i) {
+      const auto value = number_of(words_[i]);
+      if (!value) {
+        return fail(ErrorCode::kUsage, "{}: '{}' is not a number; write {} {}", where_, words_[i],
+                    rule_.name, rule_.usage);
+      }
+      command.numbers.push_back(*value);
+    }
+    if (command.action == Action::kResize &&
+        (command.numbers[0] < 1 || command.numbers[1] < 1 || command.numbers[0] > 16384 ||
+         command.numbers[1] > 16384)) {
+      return fail(ErrorCode::kUsage, "{}: a window of {} x {} pixels", where_, command.numbers[0],
+                  command.numbers[1]);
+    }
+    return {};
+  }
+  Result<void> drag(ScriptCommand& command) const {
+    if (words_.size() < 2) return usage();
+    if (words_[1] != "left" && words_[1] != "right" && words_[1] != "middle") return usage();
+    command.word = words_[1];
+    return numbers(2, 4, 5, command);
+  }
+  Result<void> section(ScriptCommand& command) const {
+    if (auto counted = expect(2, 3); !counted) return counted;
+    command.word = words_.size() == 3 ? words_[1] + "=" + words_[2] : words_[1];
+    if (command.word == "off" || command.word == "flip") return {};
+    const auto plane = apps::parse_section(command.word);
+    if (!plane) return fail(ErrorCode::kUsage, "{}: {}", where_, plane.error().message);
+    return {};
+  }
+  Result<void> check_word(const ScriptCommand& command) const {
+    const auto one_of = [&](std::initializer_list<std::string_view> names) -> Result<void> {
+      if (std::find(names.begin(), names.end(), command.word) != names.end()) return {};
+      return fail(ErrorCode::kUsage, "{}: no such {}: '{}'; there are {}", where_, rule_.name,
+                  command.word, fmt::join(names, ", "));
+    };
+    switch (command.action) {
+      case Action::kView:
+        return one_of({"top", "bottom", "left", "right", "front", "back", "diagonal", "centre",
+                       "all", "reset"});
+      case Action::kProjection:
+        return one_of({"perspective", "orthographic"});
+      case Action::kHeat:
+        return one_of({"off", "thickness", "depth"});
+      case Action::kCamera: {
+        const auto camera = apps::parse_camera(command.word);
+        if (!camera) return fail(ErrorCode::kUsage, "{}: {}", where_, camera.error().message);
+        return {};
+      }
+      case Action::kScheme:
+        if (csg::find_colour_scheme(command.word) != nullptr) return {};
+        return fail(ErrorCode::kUsage, "{}: no such colour scheme: '{}'", where_, command.word);
+      default:
+        return {};
+    }
+  }
+  Result<void> check_colour(const std::string& word) const {
+    if (word == "none") return {};
+    const bool hex = (word.size() == 7 || word.size() == 9) && word[0] == '#' &&
+                     word.find_first_not_of("0123456789abcdefABCDEF", 1) == std::string::npos;
+    if (hex) return {};
+    return fail(ErrorCode::kUsage, "{}: a colour is #rrggbb, #rrggbbaa or none, not '{}'", where_,
+                word);
+  }
+
+  const Rule& rule_;
+  const std::string& where_;
+  std::vector<std::string> words_;
+};
+
+}  // namespace
+
+Result<std::vector<ScriptCommand>> parse_script(std::string_view text, const std::string& name) {
+  std::vector<ScriptCommand> commands;
+  int number = 0;
+  while (!text.empty()) {
+    ++number;
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    const auto words = words_of(text.substr(0, end));
+    text.remove_prefix(std::min(end + 1, text.size()));
+    const std::string where = fmt::format("{}:{}", name, number);
+    if (!words) return fail(ErrorCode::kUsage, "{}: a quote is not closed", where);
+    if (words->empty()) continue;
+    const auto* rule = std::find_if(std::begin(kRules), std::end(kRules),
+                                    [&](const Rule& one) { return one.name == words->front(); });
+    if (rule == std::end(kRules)) {
+      return fail(ErrorCode::kUsage, "{}: no such command: '{}'", where, words->front());
+    }
+    ScriptCommand command;
+    command.line = number;
+    command.action = rule->action;
+    if (auto read = Line(*rule, where, *words).read(command); !read) {
+      return tl::unexpected(read.error());
+    }
+    commands.push_back(std::move(command));
+  }
+  return commands;
+}
+
+Result<std::vector<ScriptCommand>> read_script(const std::string& path) {
+  std::string text;
+  if (path == "-") {
+    text.assign(std::istreambuf_iterator<char>(std::cin), {});
+    return parse_script(text, "standard input");
+  }
+  std::ifstream in(path, std::ios::binary);
+  if (!in) return fail(ErrorCode::kInput, "{}: the script cannot be read", path);
+  text.assign(std::istreambuf_iterator<char>(in), {});
+  return parse_script(text, path);
+}
+
+std::string script_help() {
+  std::string text;
+  for (const Rule& rule : kRules) {
+    text += fmt::format("  {:<34}{}\n", fmt::format("{} {}", rule.name, rule.usage), rule.what);
+  }
+  return text;
+}
+
+}  // namespace strata::view

@@ -1,0 +1,66 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/result.h"
+
+// What drives the window without a person: a command a line.
+
+namespace strata::view {
+
+enum class Action {
+  kOrbit,       ///< dx dy: numbers, pixels
+  kPan,         ///< dx dy
+  kZoom,        ///< steps [x y]
+  kDrag,        ///< word: left, right or middle; x0 y0 x1 y1 [moves]
+  kClick,       ///< x y: as the left button
+  kKey,         ///< word: a key with its modifiers, such as ctrl+4
+  kView,        ///< word: a named view, centre, all or reset
+  kCamera,      ///< word: as --camera
+  kProjection,  ///< word: perspective or orthographic
+  kSection,     ///< word: off, flip, or a plane as --cut
+  kGhosts,      ///< on
+  kEdges,
+  kAxes,
+  kPanels,
+  kHeat,    ///< word: off, thickness or depth
+  kScheme,  ///< word: a colour scheme
+  kHide,    ///< word: which solids
+  kShow,
+  kColour,  ///< word: which solids; value: #rrggbb, #rrggbbaa or none
+  kPick,    ///< x y: prints what is there
+  kReload,
+  kCancel,  ///< the load that is under way
+  kResize,  ///< width height
+  kWait,    ///< until the picture is whole; numbers: seconds at least. word "reload": until a file
+            ///< has changed and is loaded
+  kScreenshot,  ///< word: the file; of the whole window
+  kPicture,     ///< word: the file; of the picture alone
+  kPrint,       ///< word: to standard output
+  kStats,       ///< a line of JSON to standard output
+  kResetStats,
+  kQuit
+};
+
+struct ScriptCommand {
+  int line = 0;
+  Action action = Action::kWait;
+  std::vector<double> numbers;
+  std::string word, value;
+  bool on = false;
+};
+
+/// Reads a script. Words are separated by blanks; one that holds blanks is put in double quotes. A
+/// line that begins with #, and what follows a # that stands alone, is a comment.
+/// @return kUsage naming file:line
+Result<std::vector<ScriptCommand>> parse_script(std::string_view text, const std::string& name);
+
+/// The same from a file, or from standard input for "-". @return kInput, kUsage
+Result<std::vector<ScriptCommand>> read_script(const std::string& path);
+
+/// The commands with a line of explanation each, for --help.
+[[nodiscard]] std::string script_help();
+
+}  // namespace strata::view

@@ -1,0 +1,299 @@
+#include "apps/view/script_runner.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "apps/csg_options.h"
+
+namespace strata::view {
+namespace {
+
+/// Moves of a drag: as often as a mouse reports them, more or less.
+constexpr std::chrono::milliseconds kMoveEvery{16};
+constexpr int kMoves = 12;
+
+/// Whether a command looks at what is on the screen.
+bool looks_at_screen(Action action) {
+  switch (action) {
+    case Action::kPick:
+    case Action::kClick:
+    case Action::kScreenshot:
+    case Action::kPicture:
+    case Action::kStats:
+      return true;
+    default:
+      return false;
+  }
+}
+
+/// Whether a command may come while files are read.
+bool runs_while_loading(Action action) {
+  return action == Action::kCancel || action == Action::kPrint || action == Action::kQuit ||
+         action == Action::kResize || action == Action::kWait;
+}
+
+MouseButton button_of(const std::string& word) {
+  return word == "left"    ? MouseButton::kLeft
+         : word == "right" ? MouseButton::kRight
+                           : MouseButton::kMiddle;
+}
+
+std::string json_text(std::string_view text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') {
+      out += '\\';
+      out += c;
+    } else if (static_cast<unsigned char>(c) < 0x20) {
+      out += fmt::format("\\u{:04x}", static_cast<unsigned>(c));
+    } else {
+      out += c;
+    }
+  }
+  return out + '"';
+}
+
+}  // namespace
+
+Result<void> ScriptRunner::step(Viewer& viewer, Stage& stage) {
+  // What commands change is seen by the viewer's next tick.
+  acted_ = false;
+  while (!ended() && !quit_) {
+    const ScriptCommand& command = commands_[next_];
+    if (!runs_while_loading(command.action) && !viewer.loaded()) return {};
+    if (looks_at_screen(command.action) && !begun_ && (acted_ || !viewer.settled())) return {};
+    auto done = run(command, viewer, stage);
+    if (!done) {
+      Error error = std::move(done.error());
+      error.message = fmt::format("{}:{}: {}", name_, command.line, error.message);
+      return tl::unexpected(std::move(error));
+    }
+    begun_ = !*done;
+    if (!*done) return {};
+    acted_ = true;
+    ++next_;
+  }
+  return {};
+}
+
+Result<bool> ScriptRunner::run(const ScriptCommand& command, Viewer& viewer, Stage& stage) {
+  const auto& n = command.numbers;
+  const auto done = [](const Result<void>& result) -> Result<bool> {
+    if (!result) return tl::unexpected(result.error());
+    return true;
+  };
+  switch (command.action) {
+    case Action::kOrbit:
+      viewer.orbit_by({n[0], n[1]});
+      return true;
+    case Action::kPan:
+      viewer.pan_by({n[0], n[1]});
+      return true;
+    case Action::kZoom:
+      viewer.zoom_by(n[0], n.size() == 3 ? std::optional(glm::dvec2(n[1], n[2])) : std::nullopt);
+      return true;
+    case Action::kDrag:
+      return drag(command, viewer);
+    case Action::kClick:
+      if (!begun_) {
+        viewer.mouse_button(MouseButton::kLeft, true, {n[0], n[1]}, false, false);
+        viewer.mouse_button(MouseButton::kLeft, false, {n[0], n[1]}, false, false);
+        return false;
+      }
+      return !viewer.picking();
+    case Action::kKey:
+      if (!viewer.key(command.word)) {
+        return fail(ErrorCode::kUsage, "no key does anything by the name '{}'", command.word);
+      }
+      return true;
+    case Action::kView:
+      viewer.look(command.word);
+      return true;
+    case Action::kCamera: {
+      auto camera = apps::parse_camera(command.word);
+      if (!camera) return tl::unexpected(camera.error());
+      camera->projection = viewer.camera().projection;
+      viewer.set_camera(*camera);
+      return true;
+    }
+    case Action::kProjection: {
+      csg::Camera camera = viewer.camera();
+      camera.projection = command.word == "perspective" ? csg::Projection::kPerspective
+                                                        : csg::Projection::kOrthographic;
+      viewer.set_camera(camera);
+      return true;
+    }
+    case Action::kSection:
+      return done(section(command, viewer));
+    case Action::kGhosts: {
+      Looks looks = viewer.looks();
+      looks.ghosts = command.on;
+      viewer.set_looks(std::move(looks));
+      return true;
+    }
+    case Action::kEdges:
+      viewer.set_edges(command.on);
+      return true;
+    case Action::kAxes:
+      viewer.show_axes = command.on;
+      return true;
+    case Action::kPanels:
+      viewer.show_panels = command.on;
+      // The window lays itself out anew, and the picture gets another size.
+      if (!begun_) return false;
+      return true;
+    case Action::kHeat:
+      viewer.set_heat(command.word == "off"         ? Heat::kOff
+                      : command.word == "thickness" ? Heat::kThickness
+                                                    : Heat::kDepth);
+      return true;
+    case Action::kScheme:
+      viewer.set_scheme(csg::find_colour_scheme(command.word));
+      return true;
+    case Action::kHide:
+    case Action::kShow:
+    case Action::kColour:
+      return done(solids(command, viewer));
+    case Action::kPick:
+      if (!begun_) {
+        viewer.pick(glm::ivec2(static_cast<int>(n[0]), static_cast<int>(n[1])));
+        return false;
+      }
+      if (viewer.picking()) return false;
+      stage.print(fmt::format("pick {:.0f} {:.0f}: {}", n[0], n[1],
+                              viewer.picked() ? viewer.describe(*viewer.picked()) : "nothing"));
+      return true;
+    case Action::kReload:
+      if (!begun_) {
+        viewer.reload();
+        return false;
+      }
+      if (!viewer.loaded()) return false;
+      loads_seen_ = viewer.loads();
+      return true;
+    case Action::kCancel:
+      viewer.cancel_load();
+      return true;
+    case Action::kResize:
+      if (!begun_) {
+        stage.resize({static_cast<int>(n[0]), static_cast<int>(n[1])});
+        since_ = Clock::now();
+        return false;
+      }
+      // Window managers take their time.
+      return Clock::now() - since_ > std::chrono::milliseconds(100);
+    case Action::kWait:
+      return wait(command, viewer);
+    case Action::kScreenshot:
+      return done(stage.screenshot(command.word, false));
+    case Action::kPicture:
+      return done(stage.screenshot(command.word, true));
+    case Action::kPrint:
+      stage.print(command.word);
+      return true;
+    case Action::kStats:
+      stage.print(statistics_json(viewer));
+      return true;
+    case Action::kResetStats:
+      viewer.reset_statistics();
+      return true;
+    case Action::kQuit:
+      quit_ = true;
+      return true;
+  }
+  return true;
+}
+
+bool ScriptRunner::drag(const ScriptCommand& command, Viewer& viewer) {
+  const auto& n = command.numbers;
+  const glm::dvec2 from(n[0], n[1]), to(n[2], n[3]);
+  const MouseButton button = button_of(command.word);
+  const int moves = n.size() == 5 ? std::max(1, static_cast<int>(n[4])) : kMoves;
+  const auto now = Clock::now();
+  if (!begun_) {
+    viewer.mouse_button(button, true, from, false, false);
+    moves_ = 0;
+    since_ = now;
+    return false;
+  }
+  if (now - since_ < kMoveEvery) return false;
+  since_ = now;
+  if (moves_ < moves) {
+    ++moves_;
+    viewer.mouse_move(from + (to - from) * (static_cast<double>(moves_) / moves));
+    return false;
+  }
+  viewer.mouse_button(button, false, to, false, false);
+  return true;
+}
+
+bool ScriptRunner::wait(const ScriptCommand& command, const Viewer& viewer) {
+  if (!begun_) {
+    since_ = Clock::now();
+    return false;
+  }
+  if (!viewer.settled()) return false;
+  if (command.word == "reload" && viewer.loads() <= loads_seen_) return false;
+  if (!command.numbers.empty()) {
+    const std::chrono::duration<double> waited = Clock::now() - since_;
+    if (waited.count() < command.numbers.front()) return false;
+  }
+  // A file that changes before a script comes to wait for it is not missed.
+  if (command.word == "reload") loads_seen_ = viewer.loads();
+  return true;
+}
+
+Result<void> ScriptRunner::section(const ScriptCommand& command, Viewer& viewer) {
+  if (command.word == "off") {
+    viewer.set_section({});
+    return {};
+  }
+  if (command.word == "flip") {
+    viewer.flip_section();
+    return {};
+  }
+  const auto plane = apps::parse_section(command.word);
+  if (!plane) return tl::unexpected(plane.error());
+  viewer.set_section(*plane);
+  return {};
+}
+
+Result<void> ScriptRunner::solids(const ScriptCommand& command, Viewer& viewer) {
+  if (viewer.model() == nullptr) return fail(ErrorCode::kUsage, "nothing is loaded");
+  const auto found = find_solids(*viewer.model(), command.word);
+  if (!found) return tl::unexpected(found.error());
+  Looks looks = viewer.looks();
+  looks.hidden.resize(viewer.model()->scene.tree.solids().size(), 0);
+  for (const std::uint32_t solid : *found) {
+    if (command.action != Action::kColour) {
+      looks.hidden[solid] = command.action == Action::kHide ? 1 : 0;
+    } else if (const auto colour = parse_colour(command.value)) {
+      looks.colours[solid] = *colour;
+    } else {
+      looks.colours.erase(solid);
+    }
+  }
+  viewer.set_looks(std::move(looks));
+  return {};
+}
+
+std::string statistics_json(const Viewer& viewer) {
+  const Statistics& s = viewer.statistics();
+  const Model* model = viewer.model();
+  std::string error = viewer.load_error().empty() ? viewer.draw_error() : viewer.load_error();
+  return fmt::format(
+      "{{\"renderer\": {}, \"width\": {}, \"height\": {}, \"solids\": {}, \"triangles\": {}, "
+      "\"load_ms\": {:.1f}, \"prepare_ms\": {:.2f}, \"coarse_ms\": {:.2f}, \"divisor\": {}, "
+      "\"whole_ms\": {:.2f}, \"whole_latency_ms\": {:.1f}, \"reaction_ms\": {:.1f}, "
+      "\"largest_reaction_ms\": {:.1f}, \"reactions\": {}, \"present_ms\": {:.2f}, \"frames\": {}, "
+      "\"crossings\": {}, \"resolved\": {}, \"covered\": {}, \"longest_list\": {}, \"loads\": {}, "
+      "\"error\": {}}}",
+      json_text(viewer.renderer_name()), viewer.viewport().x, viewer.viewport().y,
+      model != nullptr ? model->scene.tree.solids().size() : 0,
+      model != nullptr ? model->triangles : 0, model != nullptr ? model->load_ms : 0.0,
+      s.prepare_ms, s.coarse_ms, s.divisor, s.whole_ms, s.whole_latency_ms, s.reaction_ms,
+      s.largest_reaction_ms, s.reactions, s.present_ms, s.frames, s.report.fragments,
+      s.report.resolved, s.report.covered, s.longest_list, viewer.loads(), json_text(error));
+}
+
+}  // namespace strata::view

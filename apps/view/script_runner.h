@@ -1,0 +1,61 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "apps/view/script.h"
+#include "apps/view/viewer.h"
+
+namespace strata::view {
+
+/// What a script needs of a window beside the viewer.
+class Stage {
+ public:
+  virtual ~Stage() = default;
+  virtual void resize(const glm::ivec2& size) = 0;
+  /// Of what is on the screen, all of it or the picture alone.
+  virtual Result<void> screenshot(const std::string& path, bool picture_only) = 0;
+  /// A line to standard output.
+  virtual void print(const std::string& line) = 0;
+};
+
+/// Runs the commands of a script, some of them over many turns of the window's loop. A command
+/// begins when no load is under way; those that look at the picture when it is whole.
+class ScriptRunner {
+ public:
+  /// @param name of the script, for messages
+  ScriptRunner(std::vector<ScriptCommand> commands, std::string name)
+      : commands_(std::move(commands)), name_(std::move(name)) {}
+
+  /// Goes on as far as can be now. To be called once a turn, after what was on the screen has been
+  /// presented. @return what the command failed with, naming file:line
+  Result<void> step(Viewer& viewer, Stage& stage);
+  /// All commands are done.
+  [[nodiscard]] bool ended() const { return next_ == commands_.size(); }
+  [[nodiscard]] bool quit() const { return quit_; }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  /// True when the command is done, false when it wants another turn.
+  Result<bool> run(const ScriptCommand& command, Viewer& viewer, Stage& stage);
+  bool drag(const ScriptCommand& command, Viewer& viewer);
+  bool wait(const ScriptCommand& command, const Viewer& viewer);
+  static Result<void> section(const ScriptCommand& command, Viewer& viewer);
+  static Result<void> solids(const ScriptCommand& command, Viewer& viewer);
+
+  std::vector<ScriptCommand> commands_;
+  std::string name_;
+  std::size_t next_ = 0;
+  bool begun_ = false;  ///< the command has had its first turn
+  bool acted_ = false;  ///< something may have changed that a tick has not seen
+  bool quit_ = false;
+  int moves_ = 0;
+  Clock::time_point since_{};
+  std::uint64_t loads_seen_ = 1;  ///< loads that were waited for; the first one always is
+};
+
+/// The statistics as one line of JSON.
+[[nodiscard]] std::string statistics_json(const Viewer& viewer);
+
+}  // namespace strata::view

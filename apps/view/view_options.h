@@ -1,0 +1,30 @@
+#pragma once
+
+#include <glm/vec2.hpp>
+#include <optional>
+#include <string>
+#include <variant>
+
+#include "apps/commands.h"
+#include "apps/view/renderer.h"
+
+namespace strata::view {
+
+/// The command line of strata-view.
+struct ViewOptions {
+  /// Inputs, camera, colours, edges, as `strata csg` has them; `size` is the window's.
+  apps::CsgCommand command;
+  bool watch = false;
+  bool ghosts = false;
+  bool panels = true;
+  Heat heat = Heat::kOff;
+  std::string script;  ///< a file, "-": standard input; empty: none
+  std::string
+      screenshot;  ///< taken when all is drawn and the script is done; then the window closes
+};
+
+/// Reads the command line. A ParseOutcome is to be printed, and the program to end.
+[[nodiscard]] std::variant<apps::ParseOutcome, ViewOptions> parse_view_options(
+    int argc, const char* const* argv);
+
+}  // namespace strata::view

@@ -1,0 +1,326 @@
+#include "apps/view/viewer.h"
+
+#include <algorithm>
+#include <glm/geometric.hpp>
+#include <utility>
+
+#include "apps/session.h"
+
+namespace strata::view {
+namespace {
+
+/// How often files are looked at.
+constexpr std::chrono::milliseconds kLookAtFiles{200};
+
+double ms_between(Viewer::Clock::time_point begin, Viewer::Clock::time_point end) {
+  return std::chrono::duration<double, std::milli>(end - begin).count();
+}
+
+}  // namespace
+
+Viewer::Viewer(const ViewOptions& options, std::unique_ptr<Renderer> renderer,
+               const std::function<void()>& wake)
+    : show_panels(options.panels),
+      options_(options),
+      camera_(options.command.camera),
+      picture_(options.command.picture),
+      heat_(options.heat),
+      loader_(wake),
+      thread_(std::move(renderer), options.command.common.threads, wake) {
+  looks_.ghosts = options.ghosts;
+  reload();
+}
+
+// --- what is under way --------------------------------------------------------------------------
+
+void Viewer::reload() { loader_.start(options_.command, options_.command.common.threads); }
+
+void Viewer::cancel_load() { loader_.cancel(); }
+
+void Viewer::change(bool looks) {
+  due_ = true;
+  arrange_due_ = arrange_due_ || looks;
+  if (!changed_at_) changed_at_ = Clock::now();
+}
+
+void Viewer::set_viewport(const glm::ivec2& size) {
+  if (size == viewport_) return;
+  viewport_ = size;
+  change(false);
+}
+
+void Viewer::first_camera() {
+  const apps::CsgCommand& command = options_.command;
+  if (command.auto_centre) csg::centre_camera(camera_, model_->box);
+  if (command.view_all) {
+    csg::fit_camera(camera_, model_->box, static_cast<double>(viewport_.x) / viewport_.y);
+    if (!(camera_.distance > 0)) camera_.distance = csg::Camera{}.distance;  // nothing to fit
+  }
+  start_camera_ = camera_;
+  camera_set_ = true;
+  if (!command.cuts.empty()) looks_.section = face(command.cuts.front(), camera_);
+}
+
+void Viewer::take_model(std::shared_ptr<const Model> model) {
+  if (model_) {
+    looks_ = carry_over(looks_, *model_, *model);
+  }
+  model_ = std::move(model);
+  picked_.reset();
+  change(true);
+}
+
+void Viewer::take_frame(Frame frame) {
+  ++statistics_.frames;
+  if (frame.prepare_ms > 0) statistics_.prepare_ms = frame.prepare_ms;
+  if (frame.divisor > 1) {
+    statistics_.coarse_ms = frame.draw_ms;
+    statistics_.divisor = frame.divisor;
+  } else {
+    statistics_.whole_ms = frame.draw_ms;
+    statistics_.report = frame.report;
+    statistics_.longest_list = frame.longest_list;
+  }
+  draw_error_.clear();
+  frame_ = std::move(frame);
+  ++frame_serial_;
+  frame_presented_ = false;
+}
+
+void Viewer::tick() {
+  if (auto loaded = loader_.take()) {
+    ++loads_;
+    if (*loaded) {
+      load_error_.clear();
+      take_model(**std::move(loaded));
+    } else {
+      load_error_code_ = loaded->error().code;
+      load_error_ = load_error_code_ == ErrorCode::kCancelled ? "loading was cancelled"
+                                                              : loaded->error().message;
+    }
+    if (watch_) watch_->refresh();
+  }
+  if (options_.watch) {
+    if (!watch_) {
+      watch_ = std::make_unique<FileWatch>(options_.command.input.files,
+                                           options_.command.scene.asset_folder);
+    }
+    const auto now = Clock::now();
+    if (now - looked_ >= kLookAtFiles) {
+      looked_ = now;
+      if (watch_->changed()) reload();
+    }
+  }
+  if (auto frame = thread_.take_frame()) take_frame(*std::move(frame));
+  if (auto error = thread_.take_error()) {
+    draw_error_ = error->message;
+    asked_.clear();
+    whole_asked_.reset();
+  }
+  if (auto picked = thread_.take_pick()) {
+    picking_ = false;
+    if (*picked) {
+      picked_ = **picked;
+      if (picked_->hit && std::exchange(centre_on_pick_, false)) {
+        camera_.target = picked_->where;
+        change(false);
+      }
+      const bool own =
+          picked_->hit && model_ && picked_->solid < model_->scene.tree.solids().size();
+      select(own ? std::optional(picked_->solid) : std::nullopt, true);
+    } else {
+      draw_error_ = picked->error().message;
+    }
+  }
+  if (!due_ || !model_ || viewport_.x < 1 || viewport_.y < 1) return;
+  if (!camera_set_) first_camera();
+  if (arrange_due_ || !arrangement_) arrangement_ = arrange(*model_, looks_);
+  arrange_due_ = due_ = false;
+  FrameRequest request;
+  request.what = arrangement_;
+  request.camera = camera_;
+  request.size = viewport_;
+  request.look = picture_;
+  request.heat = heat_;
+  last_asked_ = thread_.submit(std::move(request));
+  asked_.push_back({last_asked_, *std::exchange(changed_at_, {})});
+  whole_asked_ = asked_.back();
+}
+
+void Viewer::presented(double present_ms) {
+  statistics_.present_ms = present_ms;
+  if (frame_presented_ || !frame_) return;
+  frame_presented_ = true;
+  const auto now = Clock::now();
+  std::optional<Clock::time_point> oldest;
+  while (!asked_.empty() && asked_.front().number <= frame_->number) {
+    if (!oldest) oldest = asked_.front().at;
+    asked_.pop_front();
+  }
+  if (oldest) {
+    statistics_.reaction_ms = ms_between(*oldest, now);
+    statistics_.largest_reaction_ms =
+        std::max(statistics_.largest_reaction_ms, statistics_.reaction_ms);
+    ++statistics_.reactions;
+  }
+  if (frame_->divisor == 1 && whole_asked_ && whole_asked_->number == frame_->number) {
+    statistics_.whole_latency_ms = ms_between(whole_asked_->at, now);
+    whole_asked_.reset();
+  }
+}
+
+bool Viewer::settled() const {
+  if (!loaded() || picking_ || !thread_.resting()) return false;
+  if (!model_) return true;  // there is nothing to show
+  if (viewport_.x < 1 || viewport_.y < 1) return true;
+  return !due_ && frame_presented_ &&
+         (!draw_error_.empty() ||
+          (frame_ && frame_->number == last_asked_ && frame_->divisor == 1));
+}
+
+void Viewer::reset_statistics() {
+  statistics_.frames = statistics_.reactions = 0;
+  statistics_.largest_reaction_ms = 0;
+}
+
+// --- what is shown ------------------------------------------------------------------------------
+
+void Viewer::set_camera(const csg::Camera& camera) {
+  camera_ = camera;
+  change(false);
+}
+
+void Viewer::look(std::string_view name) {
+  if (const auto named = find_named_view(name)) {
+    look_from(camera_, *named);
+  } else if (name == "centre") {
+    camera_.target = glm::dvec3(0.0);
+  } else if (name == "all" && model_) {
+    view_all(camera_, model_->box, glm::max(viewport_, glm::ivec2(1)));
+  } else if (name == "reset" && camera_set_) {
+    const csg::Projection projection = camera_.projection;
+    camera_ = start_camera_;
+    camera_.projection = projection;
+  }
+  change(false);
+}
+
+void Viewer::orbit_by(const glm::dvec2& pixels) {
+  orbit(camera_, pixels);
+  change(false);
+}
+
+void Viewer::pan_by(const glm::dvec2& pixels) {
+  pan(camera_, pixels, viewport_);
+  change(false);
+}
+
+void Viewer::zoom_by(double steps, std::optional<glm::dvec2> at) {
+  zoom(camera_, steps, at ? *at : glm::dvec2(viewport_) * 0.5, viewport_);
+  change(false);
+}
+
+void Viewer::set_looks(Looks looks) {
+  if (looks == looks_) return;
+  looks_ = std::move(looks);
+  change(true);
+}
+
+void Viewer::set_hidden(std::uint32_t solid, bool hidden) {
+  if (!model_ || solid >= model_->scene.tree.solids().size()) return;
+  looks_.hidden.resize(model_->scene.tree.solids().size(), 0);
+  looks_.hidden[solid] = hidden ? 1 : 0;
+  change(true);
+}
+
+void Viewer::set_section(std::optional<apps::SectionPlane> plane) {
+  if (looks_.section) last_section_ = looks_.section;
+  if (plane) plane = face(*plane, camera_);
+  looks_.section = plane;
+  change(true);
+}
+
+void Viewer::flip_section() {
+  if (!looks_.section) return;
+  looks_.section->normal = -looks_.section->normal;
+  looks_.section->offset = -looks_.section->offset;
+  change(true);
+}
+
+void Viewer::toggle_section() {
+  if (looks_.section) return set_section({});
+  if (last_section_) return set_section(last_section_);
+  if (!model_ || model_->box.empty()) return;
+  const glm::dvec3 middle = (model_->box.low + model_->box.high) * 0.5;
+  set_section(apps::SectionPlane{{0, 1, 0}, middle.y, true});
+}
+
+glm::dvec2 Viewer::section_range() const {
+  if (!model_ || model_->box.empty() || !looks_.section) return {-1, 1};
+  const glm::dvec3& n = looks_.section->normal;
+  const glm::dvec3 centre = (model_->box.low + model_->box.high) * 0.5;
+  const glm::dvec3 half = (model_->box.high - model_->box.low) * 0.5;
+  const double reach = glm::dot(glm::abs(n), half), middle = glm::dot(n, centre);
+  return {middle - reach, middle + reach};
+}
+
+std::optional<Viewer::Handle> Viewer::section_handle() const {
+  if (!looks_.section || !model_ || model_->box.empty() || heat_ != Heat::kOff) return {};
+  const glm::dvec3& n = looks_.section->normal;
+  const glm::dvec3 centre = (model_->box.low + model_->box.high) * 0.5;
+  const glm::dvec3 foot = centre + n * (looks_.section->offset - glm::dot(n, centre));
+  const double length = 60 * world_per_pixel(camera_, viewport_);
+  const auto at = project(camera_, viewport_, foot);
+  const auto tip = project(camera_, viewport_, foot + n * length);
+  if (!at || !tip) return {};
+  return Handle{*at, *tip};
+}
+
+void Viewer::set_edges(bool on) {
+  picture_.edges = on;
+  change(false);
+}
+
+void Viewer::set_scheme(const csg::ColourScheme* scheme) {
+  picture_.scheme = scheme;
+  change(false);
+}
+
+void Viewer::set_heat(Heat heat) {
+  heat_ = heat;
+  change(false);
+}
+
+void Viewer::pick(const glm::ivec2& pixel) {
+  if (!arrangement_ || pixel.x < 0 || pixel.y < 0 || pixel.x >= viewport_.x ||
+      pixel.y >= viewport_.y) {
+    picked_ = Picked{};
+    picked_->pixel = pixel;
+    return;
+  }
+  picked_.reset();
+  picking_ = true;
+  thread_.pick(pixel);
+}
+
+void Viewer::select(std::optional<std::uint32_t> solid, bool keep_pick) {
+  if (!keep_pick) picked_.reset();
+  if (solid == looks_.selected) return;
+  looks_.selected = solid;
+  change(true);
+}
+
+std::string Viewer::solid_name(std::uint32_t solid) const {
+  if (!arrangement_ || solid >= arrangement_->tree.solids().size()) return "?";
+  const std::string& name = arrangement_->tree.solids()[solid].name;
+  return name.empty() ? fmt::format("solid {}", solid) : name;
+}
+
+std::string Viewer::describe(const Picked& picked) const {
+  if (!picked.hit) return "nothing";
+  return fmt::format("{}, triangle {}{}, at {:.6g} {:.6g} {:.6g}", solid_name(picked.solid),
+                     picked.triangle, picked.cut ? " from within" : "", picked.where.x,
+                     picked.where.y, picked.where.z);
+}
+
+}  // namespace strata::view

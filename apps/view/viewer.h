@@ -1,0 +1,185 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <glm/vec2.hpp>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "apps/view/camera_control.h"
+#include "apps/view/document.h"
+#include "apps/view/file_watch.h"
+#include "apps/view/loader.h"
+#include "apps/view/render_thread.h"
+#include "apps/view/view_options.h"
+
+// All of the window that is not pixels: what is shown, what the mouse and keys do, what is under
+// way. Knows no window system and no GL.
+
+namespace strata::view {
+
+enum class MouseButton : std::uint8_t { kLeft, kRight, kMiddle };
+
+/// Times and numbers for the statistics panel, and for who measures.
+struct Statistics {
+  std::uint64_t frames = 0;  ///< pictures shown
+  double coarse_ms = 0;      ///< of the last coarse picture
+  int divisor = 1;           ///< how coarse it was
+  double whole_ms = 0;       ///< of the last whole picture
+  double prepare_ms = 0;     ///< of the last time the tree changed
+  double reaction_ms = 0;    ///< from the last input to its (coarse) picture on the screen
+  double largest_reaction_ms = 0;
+  std::uint64_t reactions = 0;
+  double whole_latency_ms = 0;  ///< from the last input to the whole picture on the screen
+  double present_ms = 0;        ///< of drawing panels and handing the window over
+  csg::DrawReport report;       ///< of the last whole picture
+  std::uint64_t longest_list = 0;
+};
+
+class Viewer {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  /// Begins to load. @param wake called from other threads when tick() has something to do
+  Viewer(const ViewOptions& options, std::unique_ptr<Renderer> renderer,
+         const std::function<void()>& wake);
+
+  /// The size of the picture in pixels. (0, 0): nothing is shown.
+  void set_viewport(const glm::ivec2& size);
+  [[nodiscard]] const glm::ivec2& viewport() const { return viewport_; }
+
+  /// Takes what threads have made, looks at files, and asks for a picture when one is due.
+  void tick();
+  /// What was taken by tick() is on the screen now. @param present_ms of drawing the window
+  void presented(double present_ms);
+  /// Nothing is loading.
+  [[nodiscard]] bool loaded() const { return !loader_.busy() && !load_due_; }
+  /// Nothing is under way at all, and the screen shows the whole picture.
+  [[nodiscard]] bool settled() const;
+
+  /// The picture to show; null before the first one. `serial` changes with it.
+  [[nodiscard]] const Frame* frame() const { return frame_ ? &*frame_ : nullptr; }
+  [[nodiscard]] std::uint64_t frame_serial() const { return frame_serial_; }
+
+  // Input. Pixels of the picture.
+  void mouse_button(MouseButton button, bool down, const glm::dvec2& at, bool shift, bool control);
+  void mouse_move(const glm::dvec2& at);
+  void wheel(double steps, const glm::dvec2& at);
+  /// A key by its name, `ctrl+shift+v`, `p`, `escape`. False: it means nothing here.
+  bool key(std::string_view name);
+  [[nodiscard]] bool dragging() const { return drag_ != Drag::kNone; }
+
+  // What panels and scripts set. Each asks for a new picture.
+  [[nodiscard]] const csg::Camera& camera() const { return camera_; }
+  void set_camera(const csg::Camera& camera);
+  void look(std::string_view name);  ///< a named view, `centre`, `all`, `reset`
+  void orbit_by(const glm::dvec2& pixels);
+  void pan_by(const glm::dvec2& pixels);
+  void zoom_by(double steps, std::optional<glm::dvec2> at = {});
+  [[nodiscard]] const Looks& looks() const { return looks_; }
+  void set_looks(Looks looks);
+  void set_hidden(std::uint32_t solid, bool hidden);
+  void set_section(std::optional<apps::SectionPlane> plane);
+  void flip_section();
+  void toggle_section();
+  /// The least and largest offset at which the section cuts anything.
+  [[nodiscard]] glm::dvec2 section_range() const;
+  /// Where the section can be taken hold of, and where its arrow ends, in pixels.
+  struct Handle {
+    glm::dvec2 at, tip;
+  };
+  [[nodiscard]] std::optional<Handle> section_handle() const;
+  [[nodiscard]] const csg::PictureOptions& picture_options() const { return picture_; }
+  void set_edges(bool on);
+  void set_scheme(const csg::ColourScheme* scheme);
+  [[nodiscard]] Heat heat() const { return heat_; }
+  void set_heat(Heat heat);
+  void reload();
+  void cancel_load();
+  void pick(const glm::ivec2& pixel);
+  /// Tints a solid, or none; the last pick is forgotten unless it is to be kept.
+  void select(std::optional<std::uint32_t> solid, bool keep_pick = false);
+
+  // What panels show.
+  bool show_axes = true, show_panels = true;
+  bool wants_quit = false, wants_screenshot = false;  ///< by keys
+  [[nodiscard]] const Model* model() const { return model_.get(); }
+  [[nodiscard]] const ViewOptions& options() const { return options_; }
+  [[nodiscard]] const Statistics& statistics() const { return statistics_; }
+  void reset_statistics();
+  [[nodiscard]] bool loading() const { return loader_.busy(); }
+  [[nodiscard]] double load_progress() const { return loader_.progress(); }
+  [[nodiscard]] double load_seconds() const { return loader_.seconds(); }
+  [[nodiscard]] const std::string& load_error() const { return load_error_; }
+  [[nodiscard]] ErrorCode load_error_code() const { return load_error_code_; }
+  [[nodiscard]] const std::string& draw_error() const { return draw_error_; }
+  [[nodiscard]] std::uint64_t loads() const { return loads_; }  ///< that ended, well or not
+  /// The last pick, until the next one or a reload; empty while one is under way.
+  [[nodiscard]] const std::optional<Picked>& picked() const { return picked_; }
+  [[nodiscard]] bool picking() const { return picking_; }
+  [[nodiscard]] std::string describe(const Picked& picked) const;
+  [[nodiscard]] std::string solid_name(std::uint32_t solid) const;
+  [[nodiscard]] std::string renderer_name() const { return thread_.renderer_name(); }
+  /// Anything between the mouse and the screen: the window should look often.
+  [[nodiscard]] bool busy() const { return !settled() || loading(); }
+
+ private:
+  enum class Drag : std::uint8_t { kNone, kOrbit, kPan, kZoom, kSection };
+
+  void change(bool looks);  ///< a new picture is due
+  void take_model(std::shared_ptr<const Model> model);
+  void take_frame(Frame frame);
+  void first_camera();
+
+  ViewOptions options_;
+  csg::Camera camera_, start_camera_;
+  bool camera_set_ = false;
+  csg::PictureOptions picture_;
+  Heat heat_ = Heat::kOff;
+  Looks looks_;
+  std::optional<apps::SectionPlane> last_section_;
+  std::shared_ptr<const Model> model_;
+  std::shared_ptr<const Arrangement> arrangement_;
+  glm::ivec2 viewport_{0};
+
+  bool load_due_ = false, due_ = false, arrange_due_ = false;
+  std::optional<Clock::time_point> changed_at_;  ///< the first change not yet asked for
+  struct Asked {
+    std::uint64_t number;
+    Clock::time_point at;
+  };
+  std::deque<Asked> asked_;  ///< whose (coarse) picture has not been shown
+  std::optional<Asked> whole_asked_;
+  std::uint64_t last_asked_ = 0;
+  bool frame_presented_ = true;
+
+  std::optional<Frame> frame_;
+  std::uint64_t frame_serial_ = 0;
+  Statistics statistics_;
+  std::string load_error_, draw_error_;
+  ErrorCode load_error_code_ = ErrorCode::kInternal;
+  std::uint64_t loads_ = 0;
+  std::optional<Picked> picked_;
+  bool picking_ = false, centre_on_pick_ = false;
+
+  Drag drag_ = Drag::kNone;
+  glm::dvec2 mouse_{0}, pressed_at_{0};
+  bool moved_ = false;
+  MouseButton button_ = MouseButton::kLeft;
+  Clock::time_point last_click_{};
+  glm::dvec2 last_click_at_{-1000};
+
+  std::unique_ptr<FileWatch> watch_;
+  Clock::time_point looked_{};
+  Loader loader_;
+  RenderThread thread_;
+};
+
+/// Keys and mouse, a line each, for --help.
+[[nodiscard]] std::string key_help();
+
+}  // namespace strata::view

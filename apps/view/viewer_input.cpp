@@ -1,0 +1,242 @@
+#include <algorithm>
+#include <glm/geometric.hpp>
+#include <utility>
+
+#include "apps/view/viewer.h"
+
+// What the mouse and the keys do.
+
+namespace strata::view {
+namespace {
+
+/// A press that moves less is a click.
+constexpr double kClickPixels = 3.0;
+constexpr std::chrono::milliseconds kDoubleClick{400};
+/// How near the section's handle must be taken.
+constexpr double kHandlePixels = 14.0;
+/// What a key turns and moves.
+constexpr double kKeyPixels = 20.0;
+
+struct Key {
+  std::string_view name;
+  void (*act)(Viewer&);
+  std::string_view what;
+};
+
+void toggle_heat(Viewer& viewer, Heat heat) {
+  viewer.set_heat(viewer.heat() == heat ? Heat::kOff : heat);
+}
+
+void section_across(Viewer& viewer, int axis) {
+  const Model* model = viewer.model();
+  if (model == nullptr || model->box.empty()) return;
+  apps::SectionPlane plane;
+  plane.normal[axis] = 1.0;
+  plane.offset = (model->box.low[axis] + model->box.high[axis]) * 0.5;
+  plane.towards_eye = true;
+  viewer.set_section(plane);
+}
+
+constexpr Key kKeys[] = {
+    {"ctrl+4", [](Viewer& v) { v.look("top"); }, "from the top"},
+    {"ctrl+5", [](Viewer& v) { v.look("bottom"); }, "from below"},
+    {"ctrl+6", [](Viewer& v) { v.look("left"); }, "from the left"},
+    {"ctrl+7", [](Viewer& v) { v.look("right"); }, "from the right"},
+    {"ctrl+8", [](Viewer& v) { v.look("front"); }, "from the front"},
+    {"ctrl+9", [](Viewer& v) { v.look("back"); }, "from behind"},
+    {"ctrl+0", [](Viewer& v) { v.look("diagonal"); }, "diagonally"},
+    {"ctrl+shift+0", [](Viewer& v) { v.look("centre"); }, "the origin in the middle"},
+    {"ctrl+alt+0", [](Viewer& v) { v.look("reset"); }, "as at the beginning"},
+    {"ctrl+shift+v", [](Viewer& v) { v.look("all"); }, "all in view; also f and home"},
+    {"f", [](Viewer& v) { v.look("all"); }, ""},
+    {"home", [](Viewer& v) { v.look("all"); }, ""},
+    {"ctrl+]", [](Viewer& v) { v.zoom_by(1); }, "nearer; also +"},
+    {"ctrl+[", [](Viewer& v) { v.zoom_by(-1); }, "farther; also -"},
+    {"+", [](Viewer& v) { v.zoom_by(1); }, ""},
+    {"=", [](Viewer& v) { v.zoom_by(1); }, ""},
+    {"shift+=", [](Viewer& v) { v.zoom_by(1); }, ""},
+    {"-", [](Viewer& v) { v.zoom_by(-1); }, ""},
+    {"left",
+     [](Viewer& v) {
+       v.orbit_by({-kKeyPixels, 0});
+     },
+     "turn; so do right, up, down"},
+    {"right",
+     [](Viewer& v) {
+       v.orbit_by({kKeyPixels, 0});
+     },
+     ""},
+    {"up",
+     [](Viewer& v) {
+       v.orbit_by({0, -kKeyPixels});
+     },
+     ""},
+    {"down",
+     [](Viewer& v) {
+       v.orbit_by({0, kKeyPixels});
+     },
+     ""},
+    {"shift+left",
+     [](Viewer& v) {
+       v.pan_by({-kKeyPixels, 0});
+     },
+     "move; the same"},
+    {"shift+right",
+     [](Viewer& v) {
+       v.pan_by({kKeyPixels, 0});
+     },
+     ""},
+    {"shift+up",
+     [](Viewer& v) {
+       v.pan_by({0, -kKeyPixels});
+     },
+     ""},
+    {"shift+down",
+     [](Viewer& v) {
+       v.pan_by({0, kKeyPixels});
+     },
+     ""},
+    {"p",
+     [](Viewer& v) {
+       csg::Camera camera = v.camera();
+       camera.projection = camera.projection == csg::Projection::kPerspective
+                               ? csg::Projection::kOrthographic
+                               : csg::Projection::kPerspective;
+       v.set_camera(camera);
+     },
+     "perspective or orthographic"},
+    {"ctrl+1", [](Viewer& v) { v.set_edges(!v.picture_options().edges); }, "edges; also e"},
+    {"e", [](Viewer& v) { v.set_edges(!v.picture_options().edges); }, ""},
+    {"ctrl+2", [](Viewer& v) { v.show_axes = !v.show_axes; }, "axes"},
+    {"g",
+     [](Viewer& v) {
+       Looks looks = v.looks();
+       looks.ghosts = !looks.ghosts;
+       v.set_looks(std::move(looks));
+     },
+     "ghosts of what is subtracted"},
+    {"s", [](Viewer& v) { v.toggle_section(); }, "section on or off"},
+    {"x", [](Viewer& v) { section_across(v, 0); }, "section across x; so do y and z"},
+    {"y", [](Viewer& v) { section_across(v, 1); }, ""},
+    {"z", [](Viewer& v) { section_across(v, 2); }, ""},
+    {"i", [](Viewer& v) { v.flip_section(); }, "the section's other side"},
+    {"t", [](Viewer& v) { toggle_heat(v, Heat::kThickness); }, "heat map of the thickness"},
+    {"d", [](Viewer& v) { toggle_heat(v, Heat::kDepth); }, "heat map of the depth complexity"},
+    {"h",
+     [](Viewer& v) {
+       if (v.looks().selected) v.set_hidden(*v.looks().selected, true);
+     },
+     "hide the solid that was picked"},
+    {"shift+h",
+     [](Viewer& v) {
+       Looks looks = v.looks();
+       looks.hidden.clear();
+       v.set_looks(std::move(looks));
+     },
+     "show all solids"},
+    {"f5", [](Viewer& v) { v.reload(); }, "read the files again; also F4"},
+    {"f4", [](Viewer& v) { v.reload(); }, ""},
+    {"tab", [](Viewer& v) { v.show_panels = !v.show_panels; }, "panels on or off"},
+    {"ctrl+s", [](Viewer& v) { v.wants_screenshot = true; }, "screenshot, strata-view-N.png"},
+    {"escape",
+     [](Viewer& v) {
+       if (v.loading()) return v.cancel_load();
+       v.select({});
+     },
+     "stop loading; forget what was picked"},
+    {"ctrl+q", [](Viewer& v) { v.wants_quit = true; }, "close the window"},
+};
+
+struct Gesture {
+  std::string_view name, what;
+};
+constexpr Gesture kGestures[] = {
+    {"left drag", "turn; on the section's arrow: move the section"},
+    {"right or middle drag", "move; also shift + left"},
+    {"wheel, ctrl + drag", "nearer and farther"},
+    {"click", "pick: which solid, which triangle, where"},
+    {"double click", "pick, and turn about that point"},
+};
+
+}  // namespace
+
+void Viewer::mouse_button(MouseButton button, bool down, const glm::dvec2& at, bool shift,
+                          bool control) {
+  if (!down) {
+    if (drag_ == Drag::kNone || button != button_) return;
+    const Drag was = std::exchange(drag_, Drag::kNone);
+    if (moved_ || button != MouseButton::kLeft || was == Drag::kSection) return;
+    const auto now = Clock::now();
+    centre_on_pick_ =
+        now - last_click_ < kDoubleClick && glm::distance(at, last_click_at_) < 2 * kClickPixels;
+    last_click_ = now;
+    last_click_at_ = at;
+    pick(glm::ivec2(glm::floor(at)));
+    return;
+  }
+  if (drag_ != Drag::kNone) return;
+  button_ = button;
+  mouse_ = pressed_at_ = at;
+  moved_ = false;
+  const auto handle = section_handle();
+  const bool on_handle = handle && (glm::distance(at, handle->at) < kHandlePixels ||
+                                    glm::distance(at, handle->tip) < kHandlePixels);
+  if (control) {
+    drag_ = Drag::kZoom;
+  } else if (button != MouseButton::kLeft || shift) {
+    drag_ = Drag::kPan;
+  } else {
+    drag_ = on_handle ? Drag::kSection : Drag::kOrbit;
+  }
+}
+
+void Viewer::mouse_move(const glm::dvec2& at) {
+  const glm::dvec2 by = at - mouse_;
+  if (drag_ == Drag::kNone || by == glm::dvec2(0.0)) return;
+  if (!moved_ && glm::distance(at, pressed_at_) < kClickPixels) return;
+  moved_ = true;
+  mouse_ = at;
+  switch (drag_) {
+    case Drag::kOrbit:
+      return orbit_by(by);
+    case Drag::kPan:
+      return pan_by(by);
+    case Drag::kZoom:
+      return zoom_by(-by.y / 10.0, pressed_at_);
+    case Drag::kSection: {
+      if (!looks_.section || !model_) return;
+      apps::SectionPlane& plane = *looks_.section;
+      const glm::dvec3 centre = (model_->box.low + model_->box.high) * 0.5;
+      const glm::dvec3 foot =
+          centre + plane.normal * (plane.offset - glm::dot(plane.normal, centre));
+      const glm::dvec2 range = section_range();
+      plane.offset = std::clamp(plane.offset + slide(camera_, viewport_, foot, plane.normal, by),
+                                range.x, range.y);
+      return change(true);
+    }
+    case Drag::kNone:
+      return;
+  }
+}
+
+void Viewer::wheel(double steps, const glm::dvec2& at) { zoom_by(steps, at); }
+
+bool Viewer::key(std::string_view name) {
+  for (const Key& key : kKeys) {
+    if (key.name != name) continue;
+    key.act(*this);
+    return true;
+  }
+  return false;
+}
+
+std::string key_help() {
+  std::string text;
+  for (const Gesture& one : kGestures) text += fmt::format("  {:<24}{}\n", one.name, one.what);
+  for (const Key& key : kKeys) {
+    if (!key.what.empty()) text += fmt::format("  {:<24}{}\n", key.name, key.what);
+  }
+  return text;
+}
+
+}  // namespace strata::view

@@ -1,0 +1,314 @@
+#include "apps/view/render_thread.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <future>
+#include <mutex>
+#include <vector>
+
+#include "csg/picture.h"
+
+namespace strata::view {
+namespace {
+
+/// Draws nothing, and not before it is let.
+class SlowRenderer final : public Renderer {
+ public:
+  struct Log {
+    std::mutex mutex;
+    std::condition_variable changed;
+    std::vector<glm::ivec2> begun;
+    int allowed = 0;
+    int cancelled = 0;
+  };
+  explicit SlowRenderer(Log& log) : log_(log) {}
+
+  Result<Frame> draw(const FrameRequest& request, const Execution& execution) override {
+    std::unique_lock lock(log_.mutex);
+    log_.begun.push_back(request.size);
+    log_.changed.notify_all();
+    const std::stop_callback wake(execution.stop, [this] { log_.changed.notify_all(); });
+    while (log_.allowed == 0 && !execution.stop.stop_requested()) {
+      log_.changed.wait_for(lock, std::chrono::milliseconds(1));
+    }
+    if (execution.stop.stop_requested()) {
+      ++log_.cancelled;
+      return fail(ErrorCode::kCancelled, "stopped");
+    }
+    --log_.allowed;
+    if (request.size.x == 13) return fail(ErrorCode::kGeometry, "thirteen");
+    Frame frame;
+    frame.number = request.number;
+    frame.wanted = request.size;
+    frame.picture.width = request.size.x, frame.picture.height = request.size.y;
+    return frame;
+  }
+  Result<Picked> pick(const FrameRequest&, const glm::ivec2& pixel, const Execution&) override {
+    Picked picked;
+    picked.pixel = pixel;
+    picked.hit = true;
+    return picked;
+  }
+  [[nodiscard]] std::string name() const override { return "slow"; }
+
+ private:
+  Log& log_;
+};
+
+class RenderThreadTest : public testing::Test {
+ protected:
+  RenderThreadTest() {
+    thread_.emplace(std::make_unique<SlowRenderer>(log_), 1, [] {});
+  }
+  ~RenderThreadTest() override {
+    allow(1000);
+    thread_.reset();
+  }
+  void allow(int count) {
+    const std::lock_guard lock(log_.mutex);
+    log_.allowed += count;
+    log_.changed.notify_all();
+  }
+  /// Waits until `count` pictures have been begun.
+  void await_begun(std::size_t count) {
+    std::unique_lock lock(log_.mutex);
+    log_.changed.wait(lock, [&] { return log_.begun.size() >= count; });
+  }
+  void await_rest() {
+    while (!thread_->resting()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  static FrameRequest request(int width = 800) {
+    FrameRequest result;
+    result.what = std::make_shared<Arrangement>();
+    result.size = {width, 600};
+    return result;
+  }
+  SlowRenderer::Log log_;
+  std::optional<RenderThread> thread_;
+};
+
+TEST_F(RenderThreadTest, ACoarsePictureComesBeforeTheWholeOne) {
+  thread_->submit(request());
+  await_begun(1);
+  EXPECT_EQ(log_.begun[0], glm::ivec2(200, 150));
+  allow(1);
+  await_begun(2);
+  const auto coarse = thread_->take_frame();
+  ASSERT_TRUE(coarse);
+  EXPECT_EQ(coarse->divisor, 4);
+  EXPECT_EQ(coarse->wanted, glm::ivec2(800, 600));
+  EXPECT_EQ(coarse->picture.width, 200);
+  EXPECT_FALSE(thread_->resting());
+  EXPECT_EQ(log_.begun[1], glm::ivec2(800, 600));
+  allow(1);
+  await_rest();
+  const auto whole = thread_->take_frame();
+  ASSERT_TRUE(whole);
+  EXPECT_EQ(whole->divisor, 1);
+  EXPECT_EQ(whole->picture.width, 800);
+  EXPECT_FALSE(thread_->take_frame());
+}
+
+TEST_F(RenderThreadTest, ANewRequestStopsAWholePictureAtOnce) {
+  thread_->submit(request());
+  allow(1);
+  await_begun(2);  // the whole one hangs
+  const std::uint64_t number = thread_->submit(request());
+  await_begun(3);  // it was stopped, though nothing let it go on
+  EXPECT_EQ(log_.cancelled, 1);
+  allow(2);
+  await_rest();
+  const auto frame = thread_->take_frame();
+  ASSERT_TRUE(frame);
+  EXPECT_EQ(frame->number, number);
+  EXPECT_FALSE(thread_->take_error());
+}
+
+TEST_F(RenderThreadTest, OfManyRequestsOnlyTheLastIsDrawn) {
+  thread_->submit(request());
+  await_begun(1);  // a coarse one is not stopped
+  std::uint64_t last = 0;
+  for (int i = 0; i < 20; ++i) last = thread_->submit(request());
+  allow(3);
+  await_rest();
+  EXPECT_EQ(thread_->take_frame()->number, last);
+  EXPECT_LE(log_.begun.size(), 3u);
+}
+
+TEST_F(RenderThreadTest, AFailureIsToldAndTheThreadGoesOn) {
+  allow(3);
+  thread_->submit(request(13), true);
+  await_rest();
+  const auto error = thread_->take_error();
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->message, "thirteen");
+  EXPECT_FALSE(thread_->take_error());
+  thread_->submit(request(), true);
+  await_rest();
+  EXPECT_EQ(thread_->take_frame()->divisor, 1);
+}
+
+TEST_F(RenderThreadTest, PicksAreAnswered) {
+  thread_->pick({1, 1});  // nothing is shown yet
+  EXPECT_TRUE(thread_->resting());
+  allow(2);
+  thread_->submit(request());
+  thread_->pick({5, 6});
+  await_rest();
+  const auto picked = thread_->take_pick();
+  ASSERT_TRUE(picked && *picked);
+  EXPECT_EQ((*picked)->pixel, glm::ivec2(5, 6));
+}
+
+TEST_F(RenderThreadTest, EndsWhileAPictureIsUnderWay) {
+  thread_->submit(request());
+  allow(1);
+  await_begun(2);
+  thread_.reset();
+  EXPECT_EQ(log_.cancelled, 1);
+}
+
+TEST(CoarsePolicy, SlowScenesAreDrawnCoarser) {
+  const glm::ivec2 size(1024, 768);
+  CoarsePolicy policy;
+  EXPECT_EQ(policy.divisor(size), 4);
+  policy.learn(size, 4, 20);
+  policy.learn(size, 1, 200);
+  const int slow = policy.divisor(size);
+  EXPECT_GE(slow, 2);
+  EXPECT_LE(slow, 4);
+  CoarsePolicy fast;
+  fast.learn(size, 4, 3);
+  fast.learn(size, 1, 12);
+  EXPECT_EQ(fast.divisor(size), 1);
+  CoarsePolicy hopeless;
+  hopeless.learn(size, 4, 4000);
+  hopeless.learn(size, 1, 9000);
+  EXPECT_EQ(hopeless.divisor(size), 16);
+}
+
+TEST(CoarsePolicy, AScenesFixedCostDoesNotMakeItCoarserForEver) {
+  const glm::ivec2 size(1024, 768);
+  CoarsePolicy policy;
+  policy.learn(size, 4, 500);  // the first picture paid for what is made once
+  for (int i = 0; i < 12; ++i) {
+    policy.learn(size, policy.divisor(size), 8);
+    policy.learn(size, 1, 30);
+  }
+  EXPECT_EQ(policy.divisor(size), 1);
+}
+
+TEST(CoarseSize, CoversTheWholePicture) {
+  EXPECT_EQ(coarse_size({800, 600}, 4), glm::ivec2(200, 150));
+  EXPECT_EQ(coarse_size({7, 3}, 4), glm::ivec2(2, 1));
+  EXPECT_EQ(coarse_size({1, 1}, 16), glm::ivec2(1, 1));
+}
+
+csg::Tree ball_and_box() {
+  csg::Tree tree;
+  const auto mesh = [](const glm::dvec3& low, const glm::dvec3& high) {
+    auto soup = std::make_shared<TriangleSoup>();
+    for (int i = 0; i < 8; ++i) {
+      soup->positions.emplace_back((i & 1) != 0 ? high.x : low.x, (i & 2) != 0 ? high.y : low.y,
+                                   (i & 4) != 0 ? high.z : low.z);
+    }
+    soup->triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                       {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+    return soup;
+  };
+  csg::Solid body, hole;
+  body.mesh = mesh(glm::dvec3(-5), glm::dvec3(5));
+  body.name = "body";
+  hole.mesh = mesh(glm::dvec3(-2, -2, 1), glm::dvec3(2, 2, 9));
+  hole.name = "hole";
+  const auto a = tree.add_solid(body), b = tree.add_solid(hole);
+  tree.set_root(tree.add(csg::Operation::kDifference, {a, b}));
+  return tree;
+}
+
+TEST(CpuRenderer, PicturesAreThoseOfPreview) {
+  auto what = std::make_shared<Arrangement>();
+  what->tree = ball_and_box();
+  FrameRequest request;
+  request.what = what;
+  request.size = {160, 120};
+  request.camera.distance = 40;
+  request.look.edges = true;
+  const auto renderer = make_cpu_renderer();
+  const auto frame = renderer->draw(request, {});
+  ASSERT_TRUE(frame);
+  csg::Preview preview(ball_and_box(), {}, 0);
+  const auto expected = preview.picture(request.camera, request.size, request.look);
+  ASSERT_TRUE(expected);
+  EXPECT_EQ(frame->picture.pixels, expected->pixels);
+  EXPECT_GT(frame->report.covered, 100u);
+}
+
+TEST(CpuRenderer, PicksAreThePixelsOfThePicture) {
+  auto what = std::make_shared<Arrangement>();
+  what->tree = ball_and_box();
+  FrameRequest request;
+  request.what = what;
+  request.size = {97, 61};
+  request.camera.distance = 40;
+  const auto renderer = make_cpu_renderer();
+  for (const auto projection : {csg::Projection::kPerspective, csg::Projection::kOrthographic}) {
+    request.camera.projection = projection;
+    csg::Preview preview(ball_and_box(), {}, 0);
+    const auto view = csg::make_view(request.camera, request.size, preview.box());
+    ASSERT_TRUE(view);
+    const auto image = preview.draw(*view);
+    ASSERT_TRUE(image);
+    int hits = 0;
+    for (int v = 0; v < 61; v += 3) {
+      for (int u = 0; u < 97; u += 3) {
+        const auto picked = renderer->pick(request, {u, v}, {});
+        ASSERT_TRUE(picked);
+        const auto at = static_cast<std::size_t>(v * 97 + u);
+        ASSERT_EQ(picked->hit, (*image)->depth[at] != csg::SurfaceImage::kNone);
+        if (!picked->hit) continue;
+        ++hits;
+        EXPECT_EQ(picked->solid, (*image)->solid[at]);
+        EXPECT_EQ(picked->triangle, (*image)->triangle[at] & ~csg::SurfaceImage::kExit);
+        // On the box or in the hole, whose floor is at z = 1.
+        const glm::dvec3 p = glm::abs(picked->where);
+        const double outside = std::max({p.x, p.y, p.z});
+        if (!picked->cut) {
+          EXPECT_NEAR(outside, 5, 1e-3);
+        } else {
+          EXPECT_TRUE(std::abs(p.x - 2) < 1e-3 || std::abs(p.y - 2) < 1e-3 ||
+                      std::abs(p.z - 1) < 1e-3);
+        }
+      }
+    }
+    EXPECT_GT(hits, 50);
+  }
+}
+
+TEST(CpuRenderer, HeatMapsSayWhatTheirColoursMean) {
+  auto what = std::make_shared<Arrangement>();
+  what->tree = ball_and_box();
+  FrameRequest request;
+  request.what = what;
+  request.size = {64, 64};
+  request.camera.projection = csg::Projection::kOrthographic;
+  request.camera.rotation = {0, 0, 0};
+  request.camera.distance = 40;
+  const auto renderer = make_cpu_renderer();
+  request.heat = Heat::kDepth;
+  auto frame = renderer->draw(request, {});
+  ASSERT_TRUE(frame);
+  EXPECT_EQ(frame->scale.high, 4);
+  EXPECT_EQ(frame->longest_list, 4u);
+  EXPECT_EQ(frame->picture.pixels[32 * 64 + 32], heat_colour(1.0));
+  request.heat = Heat::kThickness;
+  frame = renderer->draw(request, {});
+  ASSERT_TRUE(frame);
+  EXPECT_EQ(frame->scale.high, 10);
+  // Below the hole there are 6 of 10 left.
+  EXPECT_EQ(frame->picture.pixels[32 * 64 + 32], heat_colour(0.6));
+}
+
+}  // namespace
+}  // namespace strata::view

@@ -1,0 +1,109 @@
+#include <gtest/gtest.h>
+
+#include <sstream>
+
+#include "apps/view/script.h"
+
+namespace strata::view {
+namespace {
+
+std::string error_of(const std::string& text) {
+  const auto script = parse_script(text, "drive.txt");
+  if (script) return "none";
+  EXPECT_EQ(script.error().code, ErrorCode::kUsage);
+  return script.error().message;
+}
+
+TEST(Script, ReadsCommandsWithTheirLines) {
+  const auto script = parse_script(
+      "# a tour\n"
+      "orbit 30 -12.5   # to the right\n"
+      "\n"
+      "hide \"cube at plate one.csg:12:3\"\r\n"
+      "colour @7 #ff8000\n"
+      "section z 3.5\n"
+      "section 0,0,1,2\n"
+      "zoom 2\n"
+      "zoom 2 10 20\n"
+      "drag left 10 20 30 40\n"
+      "edges on\n"
+      "wait reload\n"
+      "wait 0.5\n"
+      "quit",
+      "drive.txt");
+  ASSERT_TRUE(script) << script.error().message;
+  ASSERT_EQ(script->size(), 12u);
+  const auto& c = *script;
+  EXPECT_EQ(c[0].line, 2);
+  EXPECT_EQ(c[0].action, Action::kOrbit);
+  EXPECT_EQ(c[0].numbers, (std::vector<double>{30, -12.5}));
+  EXPECT_EQ(c[1].line, 4);
+  EXPECT_EQ(c[1].word, "cube at plate one.csg:12:3");
+  EXPECT_EQ(c[2].word, "@7");
+  EXPECT_EQ(c[2].value, "#ff8000");
+  EXPECT_EQ(c[3].word, "z=3.5");
+  EXPECT_EQ(c[4].word, "0,0,1,2");
+  EXPECT_EQ(c[5].numbers.size(), 1u);
+  EXPECT_EQ(c[6].numbers.size(), 3u);
+  EXPECT_EQ(c[7].word, "left");
+  EXPECT_EQ(c[7].numbers.size(), 4u);
+  EXPECT_TRUE(c[8].on);
+  EXPECT_EQ(c[9].word, "reload");
+  EXPECT_EQ(c[10].numbers.front(), 0.5);
+  EXPECT_EQ(c[11].action, Action::kQuit);
+  EXPECT_EQ(c.back().line, 14);
+}
+
+TEST(Script, MistakesNameFileAndLine) {
+  EXPECT_EQ(error_of("wait\norbitt 1 2\n"), "drive.txt:2: no such command: 'orbitt'");
+  EXPECT_EQ(error_of("orbit 1\n"), "drive.txt:1: write orbit DX DY");
+  EXPECT_EQ(error_of("orbit 1 x\n"), "drive.txt:1: 'x' is not a number; write orbit DX DY");
+  EXPECT_EQ(error_of("orbit 1 nan\n"), "drive.txt:1: 'nan' is not a number; write orbit DX DY");
+  EXPECT_EQ(error_of("\n\nhide \"cube\n"), "drive.txt:3: a quote is not closed");
+  EXPECT_EQ(error_of("edges maybe"), "drive.txt:1: write edges on|off");
+  EXPECT_EQ(error_of("zoom 1 2"), "drive.txt:1: write zoom STEPS [X Y]");
+  EXPECT_EQ(error_of("resize 0 5"), "drive.txt:1: a window of 0 x 5 pixels");
+  EXPECT_EQ(error_of("colour @1 red"),
+            "drive.txt:1: a colour is #rrggbb, #rrggbbaa or none, not 'red'");
+  EXPECT_NE(error_of("view sideways").find("drive.txt:1: no such view: 'sideways'"),
+            std::string::npos);
+  EXPECT_NE(error_of("section q=1").find("drive.txt:1: "), std::string::npos);
+  EXPECT_NE(error_of("camera 1,2").find("drive.txt:1: "), std::string::npos);
+  EXPECT_NE(error_of("scheme Mud").find("'Mud'"), std::string::npos);
+  EXPECT_NE(error_of("heat wave").find("off, thickness, depth"), std::string::npos);
+}
+
+TEST(Script, NothingIsAScript) {
+  const auto script = parse_script("\n  \n# only talk\n#more", "x");
+  ASSERT_TRUE(script);
+  EXPECT_TRUE(script->empty());
+}
+
+TEST(Script, AMissingFileIsAnInputError) {
+  const auto script = read_script("no/such/script.txt");
+  ASSERT_FALSE(script);
+  EXPECT_EQ(script.error().code, ErrorCode::kInput);
+  EXPECT_NE(script.error().message.find("no/such/script.txt"), std::string::npos);
+}
+
+TEST(Script, TheHelpNamesEveryCommand) {
+  const std::string help = script_help();
+  std::istringstream lines(help);
+  std::string line;
+  int count = 0;
+  while (std::getline(lines, line)) {
+    ++count;
+    std::istringstream words(line);
+    std::string name;
+    words >> name;
+    // Without arguments each is known, whether or not it needs some.
+    const auto script = parse_script(name, "x");
+    if (!script) {
+      EXPECT_EQ(script.error().message.find("no such command"), std::string::npos) << name;
+    }
+  }
+  EXPECT_GT(count, 25);
+}
+
+}  // namespace
+}  // namespace strata::view
