@@ -13,9 +13,9 @@ struct Known {
 };
 
 constexpr std::array kKnown{
-    Known{"small-dispatches",
-          "llvmpipe runs a dispatch to its end on all threads before anything else, so a window "
-          "would stand still: long dispatches are cut into bands of rows",
+    Known{"loop-rounds",
+          "llvmpipe ends the loops of an invocation after 65535 rounds in all, without a word: "
+          "lists of more than 1024 items are sorted in stages, by many invocations",
           is_llvmpipe},
 };
 

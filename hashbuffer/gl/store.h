@@ -6,7 +6,11 @@
 #include "core/depth_list.h"
 #include "core/execution.h"
 #include "core/result.h"
+#include "gl/buffer.h"
+#include "gl/context.h"
+#include "gl/program.h"
 #include "hashbuffer/depth_list_store.h"
+#include "hashbuffer/gl/prefix_sum.h"
 #include "raster/gl/producer.h"
 
 namespace strata::gl {
@@ -21,7 +25,7 @@ class Store {
  public:
   virtual ~Store() = default;
 
-  /// Empties the store for a frame of that size, in pixels, each side at least 1.
+  /// Empties the store for a frame of that size, in pixels, each side at least 1 (kUsage).
   [[nodiscard]] virtual Result<void> begin(std::uint32_t width, std::uint32_t height) = 0;
   /// Passes over the geometry. May change in begin(), begin_pass() and end().
   [[nodiscard]] virtual int passes() const = 0;
@@ -38,6 +42,8 @@ class Store {
   /// Screen of the last begin().
   [[nodiscard]] std::uint32_t width() const { return width_; }
   [[nodiscard]] std::uint32_t height() const { return height_; }
+  /// Bytes on the GPU that the lists may take, 0: no limit. From the next begin() on.
+  void limit_memory(std::uint64_t bytes) { memory_limit_ = bytes; }
   /// Bytes on the GPU.
   [[nodiscard]] virtual std::uint64_t memory_bytes() const = 0;
   /// Bits of a payload that come back; 0 where a store keeps depth alone.
@@ -60,14 +66,25 @@ class Store {
 
   /// All lists (depth_limit 2^24, world_from_image left at identity). ErrorCode::kLimit without the
   /// memory.
-  [[nodiscard]] Result<LayeredDepthImage> download() const;
+  [[nodiscard]] Result<LayeredDepthImage> download();
 
  protected:
+  explicit Store(const Limits& limits) : binding_bytes_(limits.storage_block_bytes) {}
+
   std::uint32_t width_ = 0, height_ = 0;
+  std::uint64_t memory_limit_ = 0;
+  std::uint64_t binding_bytes_;  ///< what a shader sees at one binding at most
+
+ private:
+  [[nodiscard]] Result<void> download_band(int band, LayeredDepthImage& image);
+
+  Program lengths_, items_;  ///< of download(), made when it is first called
+  PrefixSum prefix_sum_;
+  Buffer lengths_buffer_, items_buffer_;
 };
 
 /// Builds a frame: draws the producer once a pass, and again where something did not fit.
-/// `execution` is asked for its stop only.
+/// `execution` is asked for its stop and its memory limit.
 /// @return how it was built; `fragments` is 0 where the store did not need to count them.
 /// ErrorCode::kLimit as Store::end(), kCancelled on request, and what the producer fails with.
 [[nodiscard]] Result<BuildReport> build(Store& store, Producer& producer,

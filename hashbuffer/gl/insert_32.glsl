@@ -1,0 +1,50 @@
+// The table law of hashbuffer/hash_buffer.h for 32-bit words [age:8 | nearness:24], after Lefebvre, Hornus, Lasram,
+// "HA-Buffer", 2013. With STORE_PAYLOADS only the keys of a 64-bit table: its payloads follow in a second pass
+// (insert_payload.glsl), which can find each key again since the table is unique.
+layout(std430, binding = 8) STORE_COHERENT buffer store_table_block { uint store_table[]; };
+layout(std430, binding = 9) readonly buffer store_offsets_block { uint store_offsets[]; };
+layout(std430, binding = 10) buffer store_counts_block { uint store_counts[]; };
+layout(std140, binding = 8) uniform store_block {
+  uint store_first_pixel;  // of the band
+  uint store_pixels;
+  uint store_cells;
+  uint store_age_limit;
+  uint store_band;
+};
+
+void strata_insert(uint pixel, uint depth, uint payload) {
+#ifdef STRATA_FRAGMENT_STAGE
+  if (gl_HelperInvocation) return;  // its atomics return nonsense
+#endif
+  pixel -= store_first_pixel;
+  if (pixel >= store_pixels) return;  // of another band
+  uint age = 1u;
+  uint record = 0x1ffffffu - min(depth, 0xffffffu);
+  // The chain of evictions ends by itself, since cells only grow; a driver's fault must not hang the machine.
+  for (uint step = 0u; step < 0x100000u; ++step) {
+    uint cell = pixel + store_offsets[age];
+    if (cell >= store_cells) cell -= store_cells;
+#ifdef STORE_READ_FIRST
+    // Cells only grow: what is not larger than an old value is not larger than the new one.
+    uint found = store_table[cell];
+    if (found < record) found = atomicMax(store_table[cell], record);
+#else
+    uint found = atomicMax(store_table[cell], record);
+#endif
+    // Equality falls through to the next age: two equal records are two fragments.
+    if (found < record) {
+      if (found == 0u) return;
+      record = found;
+      uint found_age = found >> 24;
+      if (found_age != age) {  // evicted from another pixel
+        age = found_age;
+        uint back = store_offsets[age];
+        pixel = cell >= back ? cell - back : cell + (store_cells - back);
+      }
+    }
+    if (age >= store_age_limit) break;
+    ++age;
+    record += 0x1000000u;
+  }
+  atomicAdd(store_counts[4u * store_band], 1u);
+}

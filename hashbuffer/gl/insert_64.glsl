@@ -1,0 +1,55 @@
+// The table law of hashbuffer/hash_buffer.h for 64-bit words [age:8 | nearness:24 | ~payload:32]; see insert_32.glsl.
+layout(std430, binding = 8) STORE_COHERENT buffer store_table_block { uint64_t store_table[]; };
+layout(std430, binding = 9) readonly buffer store_offsets_block { uint store_offsets[]; };
+layout(std430, binding = 10) buffer store_counts_block { uint store_counts[]; };
+layout(std140, binding = 8) uniform store_block {
+  uint store_first_pixel;
+  uint store_pixels;
+  uint store_cells;
+  uint store_age_limit;
+  uint store_band;
+};
+
+#ifdef STORE_SERIAL
+uint64_t store_max(inout uint64_t cell, uint64_t value) {
+  uint64_t found = cell;
+  cell = max(found, value);
+  return found;
+}
+#else
+#define store_max atomicMax
+#endif
+
+void strata_insert(uint pixel, uint depth, uint payload) {
+#ifdef STRATA_FRAGMENT_STAGE
+  if (gl_HelperInvocation) return;
+#endif
+  pixel -= store_first_pixel;
+  if (pixel >= store_pixels) return;
+  uint age = 1u;
+  uint64_t record = packUint2x32(uvec2(~payload, 0x1ffffffu - min(depth, 0xffffffu)));
+  for (uint step = 0u; step < 0x100000u; ++step) {
+    uint cell = pixel + store_offsets[age];
+    if (cell >= store_cells) cell -= store_cells;
+#ifdef STORE_READ_FIRST
+    uint64_t found = store_table[cell];
+    if (found < record) found = store_max(store_table[cell], record);
+#else
+    uint64_t found = store_max(store_table[cell], record);
+#endif
+    if (found < record) {
+      if (found == 0ul) return;
+      record = found;
+      uint found_age = unpackUint2x32(found).y >> 24;
+      if (found_age != age) {
+        age = found_age;
+        uint back = store_offsets[age];
+        pixel = cell >= back ? cell - back : cell + (store_cells - back);
+      }
+    }
+    if (age >= store_age_limit) break;
+    ++age;
+    record += packUint2x32(uvec2(0u, 0x1000000u));
+  }
+  atomicAdd(store_counts[4u * store_band], 1u);
+}
