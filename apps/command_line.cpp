@@ -99,6 +99,8 @@ constexpr std::pair<std::string_view, OffsetKind> kOffsets[] = {
     {"plane-first", OffsetKind::kPlaneFirst},
     {"random", OffsetKind::kRandom},
     {"farthest", OffsetKind::kFarthestPoint}};
+constexpr std::pair<std::string_view, Backend> kBackends[] = {
+    {"auto", Backend::kAuto}, {"cpu", Backend::kCpu}, {"gl", Backend::kGl}};
 constexpr std::pair<std::string_view, ProgressMode> kProgressModes[] = {
     {"auto", ProgressMode::kAuto}, {"bar", ProgressMode::kBar}, {"none", ProgressMode::kNone}};
 constexpr std::pair<std::string_view, MeshReader> kReaders[] = {
@@ -120,7 +122,7 @@ struct Words {
   std::string resolution, voxel_size, grid, bounds, origin, padding;
   bool align = false, solid = false, fog = false, keep_orientation = false, samples = false;
   std::string surface, rule = "winding", open = "vote", axis = "auto", store = "auto",
-                       offsets = "plane-first";
+                       offsets = "plane-first", backend = "auto";
   bool stats = false, checksum = false, dry_run = false, list_formats = false;
   CsgWords csg;
 };
@@ -185,8 +187,15 @@ void add_grid(CLI::App& app, Words& words) {
       ->group(group);
 }
 
+void add_backend(CLI::App& app, Words& words, const char* group) {
+  app.add_option("--backend", words.backend, "cpu, gl (OpenGL 4.5) or auto: a GPU if there is one")
+      ->type_name("B")
+      ->group(group);
+}
+
 void add_engine(CLI::App& app, Words& words, const char* axes) {
   const char* group = "Engine (same result whatever is chosen)";
+  add_backend(app, words, group);
   app.add_option("--axis", words.axis, axes)->type_name("A")->group(group);
   app.add_option("--store", words.store, "Of the depth lists: ha (HA-buffer), scan or auto")
       ->type_name("S")
@@ -304,6 +313,7 @@ void define_csg(CLI::App& app, Words& words) {
       ->group(look);
   app.add_flag("--edges", csg.edges, "Dark lines along the edges of faces")->group(look);
   app.add_flag("--transparent", csg.transparent, "Background without colour")->group(look);
+  add_backend(app, words, look);
   app.add_option("--cut", csg.cuts,
                  "Section: x=5 (cuts what is nearer), z<10 (what stays) or nx,ny,nz,d")
       ->type_name("PLANE")
@@ -434,6 +444,7 @@ VoxelizeCommand voxelize_command(const Words& words, Reader& reader) {
   reader.take(parse_choice("--axis", words.axis, kAxes), command.axis);
   reader.take(parse_choice("--store", words.store, kStores), command.store);
   reader.take(parse_choice("--offsets", words.offsets, kOffsets), command.offsets);
+  reader.take(parse_choice("--backend", words.backend, kBackends), command.backend);
   command.keep_orientation = words.keep_orientation;
   command.stats = words.stats;
   command.checksum = words.checksum;
@@ -472,6 +483,7 @@ LdiCommand ldi_command(const Words& words, Reader& reader) {
   command.axis = axis.value_or(Axis::kZ);
   reader.take(parse_choice("--store", words.store, kStores), command.store);
   reader.take(parse_choice("--offsets", words.offsets, kOffsets), command.offsets);
+  reader.take(parse_choice("--backend", words.backend, kBackends), command.backend);
   if (command.input.files.empty()) reader.fail_with("no mesh file is given");
   if (command.output.empty())
     reader.fail_with("no output is given: -o FILE.exr, FILE.npz or FILE.png");
@@ -486,6 +498,7 @@ CsgCommand csg_command(Words words, Reader& reader) {
   if (command.scene_format) words.input_format = "auto";
   command.input = input_options(words, reader);
   reader.take(parse_choice("--rule", words.rule, kRules), command.rule);
+  reader.take(parse_choice("--backend", words.backend, kBackends), command.backend);
   command.keep_orientation = words.keep_orientation;
   command.output = words.output;
   if (!words.json.empty()) command.json = words.json;

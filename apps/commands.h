@@ -28,6 +28,13 @@ struct CommonOptions {
   bool strict = false;  ///< warnings are errors
 };
 
+/// Who makes depth lists and finds surfaces; the results are the same.
+enum class Backend {
+  kAuto,  ///< a hardware GPU if there is one, else the CPU
+  kCpu,
+  kGl  ///< OpenGL 4.5, a software renderer too
+};
+
 /// Where meshes come from.
 struct InputOptions {
   std::vector<std::string> files;
@@ -51,6 +58,7 @@ struct VoxelizeCommand {
   std::optional<Axis> axis;  ///< empty: auto
   StoreKind store = StoreKind::kAuto;
   OffsetKind offsets = OffsetKind::kPlaneFirst;
+  Backend backend = Backend::kAuto;
   bool stats = false, checksum = false, dry_run = false, list_formats = false;
   std::optional<std::string> json;  ///< "-": standard output
 };
@@ -72,6 +80,7 @@ struct LdiCommand {
   Axis axis = Axis::kZ;
   StoreKind store = StoreKind::kAuto;
   OffsetKind offsets = OffsetKind::kPlaneFirst;
+  Backend backend = Backend::kAuto;
   bool keep_orientation = false;
 };
 
@@ -97,6 +106,7 @@ struct CsgCommand {
   bool view_all = false, auto_centre = false;
   bool default_camera = false;  ///< none was given
   bool render = false;          ///< the result alone: no ghosts, no colours, flat scenes from above
+  Backend backend = Backend::kAuto;
   csg::PictureOptions picture;
   std::vector<SectionPlane> cuts;
   std::optional<std::string> json;  ///< "-": standard output

@@ -4,6 +4,7 @@
 #include "apps/commands.h"
 #include "apps/csg_report.h"
 #include "apps/csg_scene.h"
+#include "apps/gpu.h"
 #include "apps/session.h"
 #include "csg/picture.h"
 #include "csg/result_bounds.h"
@@ -173,14 +174,29 @@ Result<void> run_csg(const CsgCommand& command, Session& session) {
     if (!(camera.distance > 0)) camera.distance = csg::Camera{}.distance;  // nothing to fit
   }
   cut_scene(*scene, command.cuts, camera);
+  const auto gpu = Gpu::open(command.backend, session);
+  if (!gpu) return tl::unexpected(gpu.error());
   const Execution execution = session.execution("drawing");
   std::vector<csg::Ghost> ghosts = ghosts_of(*scene);
   csg::Preview preview(std::move(scene->tree), std::move(ghosts), scene->relative_precision,
                        execution);
+  if (*gpu) {
+    const auto surfaces = (*gpu)->surfaces();
+    if (!surfaces) return tl::unexpected(surfaces.error());
+    preview.set_source(*surfaces);
+  }
   outcome.prepare_ms = session.milliseconds() - outcome.read_ms;
 
   double begin = session.milliseconds();
   auto picture = preview.picture(camera, command.size, look, execution);
+  if (!picture && *gpu && command.backend == Backend::kAuto && !session.interrupted()) {
+    preview.set_source(nullptr);
+    const std::string failure = picture.error().message;
+    picture = preview.picture(camera, command.size, look, execution);
+    if (picture) {
+      session.warn("backend", fmt::format("the GPU failed, the CPU did the work: {}", failure));
+    }
+  }
   if (!picture) return tl::unexpected(picture.error());
   if (from_above) {
     const glm::u8vec3 ground = look.scheme->background;

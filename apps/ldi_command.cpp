@@ -2,6 +2,7 @@
 #include <utility>
 
 #include "apps/commands.h"
+#include "apps/gpu.h"
 #include "apps/mesh_input.h"
 #include "apps/session.h"
 #include "hashbuffer/build_ldi.h"
@@ -34,9 +35,20 @@ Result<void> run_ldi(const LdiCommand& command, Session& session) {
   const Execution execution = session.execution("depth lists");
   const auto lattice = snap_to_lattice(input->soup, *grid, execution);
   if (!lattice) return tl::unexpected(lattice.error());
-  auto image = build_ldi(*lattice, raster_target(*grid, command.axis),
-                         {.store = command.store, .offsets = command.offsets}, execution,
-                         input->tree ? &input->tree->filter() : nullptr);
+  const auto gpu = Gpu::open(command.backend, session);
+  if (!gpu) return tl::unexpected(gpu.error());
+  ListSource* source = nullptr;
+  if (*gpu) {
+    const auto lists = (*gpu)->lists(command.store);
+    if (!lists) return tl::unexpected(lists.error());
+    source = *lists;
+  }
+  const RasterTarget target = raster_target(*grid, command.axis);
+  const TileListFilter* filter = input->tree ? &input->tree->filter() : nullptr;
+  auto image = source != nullptr ? build_ldi(*source, *lattice, target, execution, filter)
+                                 : build_ldi(*lattice, target,
+                                             {.store = command.store, .offsets = command.offsets},
+                                             execution, filter);
   if (!image) return tl::unexpected(image.error());
   image->world_from_image = world_from_image(*grid, command.axis);
   session.note(fmt::format("{} x {} pixels, {}", image->width, image->height,

@@ -8,6 +8,7 @@
 
 #include "apps/boundary_area.h"
 #include "apps/commands.h"
+#include "apps/gpu.h"
 #include "apps/memory_estimate.h"
 #include "apps/mesh_input.h"
 #include "apps/session.h"
@@ -174,6 +175,17 @@ Result<void> voxelize_and_write(const VoxelizeCommand& command, VoxelizeOutcome&
     options.rule = InsideRule::kWinding;  // the solids' rules are the filter's
   }
   options.statistics = command.stats || command.json || command.checksum;
+  std::unique_ptr<Gpu> gpu;
+  if (command.solid) {
+    auto opened = Gpu::open(command.backend, session);
+    if (!opened) return tl::unexpected(opened.error());
+    gpu = *std::move(opened);
+  }
+  if (gpu) {
+    const auto source = gpu->lists(command.store);
+    if (!source) return tl::unexpected(source.error());
+    options.source = *source;
+  }
 
   Execution execution = session.execution("voxelizing");
   // The mesh is there already; what the format holds is not the voxelizer's.

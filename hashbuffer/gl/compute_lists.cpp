@@ -1,0 +1,49 @@
+#include "hashbuffer/gl/compute_lists.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace strata::gl {
+namespace {
+
+/// Pixels that are drawn at once: lists and blocks of large triangles stay bounded.
+constexpr std::int64_t kPixelsAtOnce = std::int64_t{1} << 22;
+
+}  // namespace
+
+Result<std::unique_ptr<ComputeListSource>> ComputeListSource::create(const Context& context,
+                                                                     std::unique_ptr<Store> store,
+                                                                     std::unique_ptr<Store> spare) {
+  std::unique_ptr<ComputeListSource> result(new ComputeListSource());
+  auto rasterizer = ComputeRasterizer::create(context);
+  if (!rasterizer) return tl::unexpected(rasterizer.error());
+  result->rasterizer_ = *std::move(rasterizer);
+  result->store_ = std::move(store);
+  result->spare_ = std::move(spare);
+  return result;
+}
+
+Result<void> ComputeListSource::set_mesh(const LatticeMesh& mesh) {
+  return rasterizer_->set_mesh(mesh);
+}
+
+int ComputeListSource::rows_at_once(const RasterTarget& target) const {
+  const std::int64_t rows = kPixelsAtOnce / std::max(1, target.width) / kTileSide * kTileSide;
+  return static_cast<int>(std::max<std::int64_t>(kTileSide, rows));
+}
+
+Result<LayeredDepthImage> ComputeListSource::lists(const RasterTarget& target, int v_begin,
+                                                   int v_end) {
+  rasterizer_->set_target(target, v_begin, v_end);
+  auto built = build(*store_, *rasterizer_);
+  if (!built && built.error().code == ErrorCode::kLimit && spare_) {
+    store_ = std::exchange(spare_, nullptr);
+    built = build(*store_, *rasterizer_);
+  }
+  if (!built) return tl::unexpected(built.error());
+  auto image = store_->download();
+  if (image) image->depth_limit = target.depth_limit;
+  return image;
+}
+
+}  // namespace strata::gl

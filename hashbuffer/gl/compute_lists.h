@@ -1,0 +1,31 @@
+#pragma once
+
+#include <memory>
+
+#include "gl/context.h"
+#include "hashbuffer/gl/store.h"
+#include "hashbuffer/list_source.h"
+#include "raster/gl/compute.h"
+
+namespace strata::gl {
+
+/// Lists by the compute rasterizer in a store of the GPU: the CPU's, bit for bit.
+class ComputeListSource final : public ListSource {
+ public:
+  /// `context` stays current while this is used. @param store keeps whole payloads
+  /// @param spare takes over for good where `store` fails with kLimit (lists beyond its ages); may
+  /// be null @return kUsage where the driver cannot
+  [[nodiscard]] static Result<std::unique_ptr<ComputeListSource>> create(
+      const Context& context, std::unique_ptr<Store> store, std::unique_ptr<Store> spare = nullptr);
+
+  Result<void> set_mesh(const LatticeMesh& mesh) override;
+  Result<LayeredDepthImage> lists(const RasterTarget& target, int v_begin, int v_end) override;
+  [[nodiscard]] int rows_at_once(const RasterTarget& target) const override;
+
+ private:
+  ComputeListSource() = default;
+  std::unique_ptr<ComputeRasterizer> rasterizer_;
+  std::unique_ptr<Store> store_, spare_;
+};
+
+}  // namespace strata::gl

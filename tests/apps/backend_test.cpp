@@ -1,0 +1,143 @@
+// --backend: the same files, byte for byte, whoever makes the lists and finds the surfaces.
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+
+#include "mesh/shapes.h"
+#include "mesh/write_mesh.h"
+#include "tests/apps/run_tool.h"
+
+namespace strata {
+namespace {
+
+using testkit::RunResult;
+using testkit::Workplace;
+
+const char* const kKnot = STRATA_SOURCE_DIR "/data/knot.obj";
+const char* const kOpen = STRATA_SOURCE_DIR "/data/open_sphere.off";
+
+constexpr const char* kScene = R"(difference() {
+  union() {
+    cube(size = [20, 20, 5], center = false);
+    multmatrix([[1, 0, 0, 10], [0, 1, 0, 10], [0, 0, 1, 5], [0, 0, 0, 1]])
+      sphere($fn = 30, $fa = 12, $fs = 2, r = 6);
+  }
+  multmatrix([[1, 0, 0, 10], [0, 1, 0, 10], [0, 0, 1, -1], [0, 0, 0, 1]])
+    cylinder($fn = 24, $fa = 12, $fs = 2, h = 20, r1 = 3, r2 = 3, center = false);
+  cube(size = [5, 5, 5], center = false);
+}
+)";
+
+/// Tests that need --backend gl.
+class Backends : public testing::Test {
+ protected:
+  void SetUp() override {
+    const RunResult run =
+        place_.run({"voxelize", kKnot, "-r", "8", "--checksum", "--backend", "gl"});
+    if (run.exit_code == 0) return;
+    ASSERT_EQ(run.exit_code, 2) << run.err;
+    EXPECT_NE(run.err.find("--backend gl: "), std::string::npos) << run.err;
+    const bool built = run.err.find("without OpenGL") == std::string::npos;
+    if (built && std::getenv("CI") != nullptr) FAIL() << run.err;
+    GTEST_SKIP() << run.err;
+  }
+
+  /// Runs a command with both backends; `output` must be the same.
+  void expect_same(const std::vector<std::string>& arguments, const std::string& extension) {
+    std::string bytes[2];
+    for (const bool gl : {false, true}) {
+      const std::string name = (gl ? "gl" : "cpu") + extension;
+      std::vector<std::string> all = arguments;
+      all.insert(all.end(), {"-o", name, "--backend", gl ? "gl" : "cpu"});
+      const RunResult run = place_.run(all);
+      ASSERT_EQ(run.exit_code, 0) << run.err;
+      bytes[gl ? 1 : 0] = place_.read(name);
+    }
+    EXPECT_FALSE(bytes[0].empty());
+    EXPECT_TRUE(bytes[0] == bytes[1]) << arguments[0] << " " << arguments[1] << extension;
+  }
+
+  Workplace place_;
+};
+
+TEST_F(Backends, WriteTheSameVoxels) {
+  for (const char* extension : {".npy", ".vdb", ".nrrd"}) {
+    expect_same({"voxelize", kKnot, "-r", "150"}, extension);
+  }
+  for (const char* axis : {"x", "y", "z"}) {
+    for (const char* grid : {"70,64,65", "7,3,100", "1,1,1"}) {
+      std::string sums[2];
+      for (const bool gl : {false, true}) {
+        const RunResult run = place_.run({"voxelize", kKnot, "--grid", grid, "--axis", axis,
+                                          "--checksum", "-q", "--backend", gl ? "gl" : "cpu"});
+        ASSERT_EQ(run.exit_code, 0) << run.err;
+        sums[gl ? 1 : 0] = run.out;
+      }
+      EXPECT_EQ(sums[0], sums[1]) << grid << " along " << axis;
+    }
+  }
+  expect_same({"voxelize", kOpen, "-r", "90"}, ".npy");  // a vote of three axes
+  expect_same({"voxelize", kKnot, "-r", "60", "--solid", "--surface"}, ".npy");
+  for (const char* store : {"ha", "scan"}) {
+    expect_same({"voxelize", kKnot, "-r", "100", "--store", store}, ".npy");
+  }
+}
+
+TEST_F(Backends, WriteTheSameLists) {
+  for (const char* axis : {"x", "y", "z"}) {
+    expect_same({"ldi", kKnot, "-r", "130", "--axis", axis}, ".npz");
+  }
+  expect_same({"ldi", kOpen, "-r", "40"}, ".npz");
+}
+
+TEST_F(Backends, ListsOfHundredsOfLayersAreTheSame) {
+  // 600 walls across the rays: more than a record's age counts.
+  TriangleSoup walls;
+  for (int i = 0; i < 300; ++i) {
+    const TriangleSoup wall = make_box({2.0 * i, 0, 0}, {2.0 * i + 1, 10, 10});
+    const auto first = static_cast<unsigned>(walls.positions.size());
+    walls.positions.insert(walls.positions.end(), wall.positions.begin(), wall.positions.end());
+    for (const auto& t : wall.triangles) walls.triangles.push_back(t + first);
+  }
+  ASSERT_TRUE(write_mesh(place_.path("walls.obj"), walls));
+  for (const char* store : {"ha", "scan"}) {
+    expect_same({"voxelize", "walls.obj", "-r", "1200", "--axis", "x", "--store", store}, ".npy");
+    expect_same({"ldi", "walls.obj", "-r", "1200", "--axis", "x", "--store", store}, ".npz");
+  }
+}
+
+TEST_F(Backends, WriteTheSamePicturesAndVoxelsOfScenes) {
+  place_.write("scene.csg", kScene);
+  expect_same({"csg", "scene.csg", "--size", "200,150"}, ".png");
+  expect_same({"csg", "scene.csg", "--size", "80,60", "--samples", "4", "--edges"}, ".png");
+  expect_same({"csg", "scene.csg", "--size", "90,90", "--cut", "x=10", "--transparent"}, ".png");
+  expect_same({"csg", "scene.csg", "--size", "90,70", "--projection", "o"}, ".png");
+  expect_same({"voxelize", "scene.csg", "-r", "90"}, ".npy");
+  expect_same({"ldi", "scene.csg", "-r", "60"}, ".npz");
+}
+
+TEST(Backend, IsAutoCpuOrGl) {
+  const Workplace place;
+  const RunResult wrong =
+      place.run({"voxelize", kKnot, "-r", "8", "--checksum", "--backend", "cuda"});
+  EXPECT_EQ(wrong.exit_code, 2);
+  EXPECT_NE(wrong.err.find("--backend is auto, cpu or gl, not 'cuda'"), std::string::npos)
+      << wrong.err;
+}
+
+TEST(Backend, ThatCannotBeHadIsASentenceAndNothingToAuto) {
+  const Workplace place;
+  const testkit::RunOptions options{.environment = {"STRATA_GL_DEVICE=device:99"}};
+  const RunResult gl =
+      place.run({"voxelize", kKnot, "-r", "8", "--checksum", "--backend", "gl"}, options);
+  EXPECT_EQ(gl.exit_code, 2);
+  EXPECT_NE(gl.err.find("strata: error: --backend gl: "), std::string::npos) << gl.err;
+  const RunResult automatic =
+      place.run({"voxelize", kKnot, "-r", "100", "--checksum", "--backend", "auto"}, options);
+  EXPECT_EQ(automatic.exit_code, 0) << automatic.err;
+  EXPECT_EQ(automatic.err, "");
+}
+
+}  // namespace
+}  // namespace strata
