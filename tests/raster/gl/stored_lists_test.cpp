@@ -1,0 +1,145 @@
+// Meshes through the compute rasterizer into every store of the GPU: the lists of build_ldi(), bit
+// for bit.
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <map>
+
+#include "hashbuffer/build_ldi.h"
+#include "hashbuffer/gl/compute_lists.h"
+#include "hashbuffer/gl/hash_store.h"
+#include "hashbuffer/gl/scan_store.h"
+#include "mesh/read_mesh.h"
+#include "mesh/shapes.h"
+#include "tests/gl/gl_testing.h"
+#include "tests/support/corpus.h"
+#include "tests/support/lists.h"
+#include "tests/support/trouble.h"
+
+namespace strata {
+namespace {
+
+constexpr Axis kAxes[] = {Axis::kX, Axis::kY, Axis::kZ};
+
+class StoredLists : public test::GlTest {
+ protected:
+  void TearDown() override {
+    sources_.clear();
+    GlTest::TearDown();
+  }
+
+  /// `name`: a store, made at its first use.
+  void with(const std::string& name, Result<std::unique_ptr<gl::Store>> store) {
+    ASSERT_TRUE(store) << name << ": " << store.error().message;
+    auto source = gl::ComputeListSource::create(*context_, *std::move(store));
+    ASSERT_TRUE(source) << source.error().message;
+    sources_[name] = *std::move(source);
+  }
+  void with_hash(const std::string& name, const gl::HashStoreOptions& options) {
+    with(name, gl::HashStore::create(context_->info(), options));
+  }
+  void with_all() {
+    with("scan", gl::ScanStore::create(context_->info()));
+    with("scan in bands", gl::ScanStore::create(context_->info(), {.binding_bytes = 1 << 16}));
+    with_hash("hash", {});
+    with_hash("hash in two passes", {.path = gl::WordPath::kTwoPass});
+    with_hash("hash, random offsets", {.offsets = OffsetKind::kRandom});
+    with_hash("full hash in bands", {.cells = 1, .binding_bytes = 1 << 17});
+  }
+
+  void expect_same(const LatticeMesh& mesh, const RasterTarget& target, const std::string& what) {
+    const auto expected = build_ldi(mesh, target);
+    ASSERT_TRUE(expected) << what;
+    for (const auto& [name, source] : sources_) {
+      const auto found = build_ldi(*source, mesh, target);
+      ASSERT_TRUE(found) << what << ", " << name << ": " << found.error().message;
+      EXPECT_TRUE(*found == *expected) << what << ", " << name << ": " << found->items.size()
+                                       << " fragments, " << expected->items.size() << " expected";
+    }
+  }
+  void expect_same(const TriangleSoup& soup, const VoxelGrid& grid, const std::string& what) {
+    const auto mesh = snap_to_lattice(soup, grid);
+    ASSERT_TRUE(mesh) << what;
+    for (const Axis axis : kAxes) {
+      expect_same(*mesh, testkit::target_of(grid, axis),
+                  what + " along " + "xyz"[static_cast<int>(axis)]);
+    }
+  }
+
+  std::map<std::string, std::unique_ptr<gl::ComputeListSource>> sources_;
+};
+
+TEST_F(StoredLists, AreTheCpusOnScreensOfEveryShape) {
+  with_all();
+  const TriangleSoup soup = make_torus_knot(2, 3, 0.4, 60, 12);
+  for (const auto& [width, height] : {std::pair{1, 1}, {7, 3}, {130, 2}, {2, 130}, {97, 129}}) {
+    VoxelGrid grid;
+    grid.dims = {width, height, 50};
+    grid.origin = glm::dvec3(-3.6, -3.6, -1.6);
+    grid.voxel_size = {7.2 / width, 7.2 / height, 3.2 / 50};
+    expect_same(soup, grid, std::to_string(width) + " x " + std::to_string(height));
+  }
+}
+
+TEST_F(StoredLists, AreTheCpusForTrouble) {
+  with_all();
+  for (const auto& [name, soup] : testkit::closed_trouble()) {
+    expect_same(soup, testkit::unit_grid({40, 40, 40}), name);
+  }
+}
+
+/// `count` walls across z, each `times` times.
+TriangleSoup walls(int count, int times) {
+  TriangleSoup all;
+  for (int i = 0; i < count; ++i) {
+    const TriangleSoup wall = make_box({0.3, 0.3, 2.0 * i + 0.2}, {20.7, 12.7, 2.0 * i + 1.2});
+    for (int k = 0; k < times; ++k) {
+      const auto first = static_cast<unsigned>(all.positions.size());
+      all.positions.insert(all.positions.end(), wall.positions.begin(), wall.positions.end());
+      for (const auto& t : wall.triangles) all.triangles.push_back(t + first);
+    }
+  }
+  return all;
+}
+
+TEST_F(StoredLists, KeepEveryOneOfHundredsOfLayersAndOfTwins) {
+  with_all();
+  expect_same(walls(50, 2), testkit::unit_grid({22, 14, 100}), "200 layers, each twice");
+  expect_same(walls(10, 10), testkit::unit_grid({22, 14, 20}), "20 layers, ten times");
+  sources_.clear();  // 255 layers are all that a record's age counts
+  with("scan", gl::ScanStore::create(context_->info()));
+  for (const int count : {150, 300}) {
+    expect_same(walls(count, 1), testkit::unit_grid({22, 14, 2 * count}),
+                std::to_string(2 * count) + " layers");
+  }
+}
+
+TEST_F(StoredLists, ASpareStoreTakesWhatIsTooDeepForTheHash) {
+  auto hash = gl::HashStore::create(context_->info());
+  auto scan = gl::ScanStore::create(context_->info());
+  ASSERT_TRUE(hash && scan);
+  auto source = gl::ComputeListSource::create(*context_, *std::move(hash), *std::move(scan));
+  ASSERT_TRUE(source);
+  sources_["hash, then scan"] = *std::move(source);
+  expect_same(walls(150, 1), testkit::unit_grid({22, 14, 300}), "300 layers");
+}
+
+TEST_F(StoredLists, OfRealMeshesAreTheCpus) {
+  with("scan", gl::ScanStore::create(context_->info()));
+  with_hash("hash", {});
+  const std::string data = STRATA_SOURCE_DIR "/data/";
+  for (const char* name : {"knot.obj", "link.ply", "two_spheres.stl", "open_sphere.off"}) {
+    const auto soup = read_mesh(data + name);
+    ASSERT_TRUE(soup) << name << ": " << soup.error().message;
+    expect_same(soup->soup, testkit::grid_around(soup->soup, 150), name);
+  }
+  for (const char* name : {"stanford-bunny", "rocker-arm"}) {
+    if (const auto soup = testkit::shared_model(name)) {
+      expect_same(*soup, testkit::grid_around(*soup, 256), name);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace strata
