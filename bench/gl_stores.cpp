@@ -469,11 +469,12 @@ int main(int argc, char** argv) {
     } else if (word == "--small") {
       small_only = true;
     } else {
-      std::fprintf(stderr,
+      const bool asked = word == "--help";
+      std::fprintf(asked ? stdout : stderr,
                    "usage: bench_gl_stores [--quick] [--small]\n"
                    "  --quick  0.3 instead of 2 seconds a row\n"
                    "  --small  only the scene of half a million fragments\n");
-      return 2;
+      return asked ? 0 : 2;
     }
   }
   return strata::bench::run(budget, small_only);
