@@ -64,6 +64,7 @@ constexpr const char* kInfoExamples =
 
   strata info scan.ply
   strata info --json *.stl
+  strata info --gl                                     what OpenGL there is, and how it is used
 )";
 
 constexpr const char* kLdiExamples =
@@ -123,7 +124,7 @@ struct Words {
   bool align = false, solid = false, fog = false, keep_orientation = false, samples = false;
   std::string surface, rule = "winding", open = "vote", axis = "auto", store = "auto",
                        offsets = "plane-first", backend = "auto";
-  bool stats = false, checksum = false, dry_run = false, list_formats = false;
+  bool stats = false, checksum = false, dry_run = false, list_formats = false, gl = false;
   CsgWords csg;
 };
 
@@ -246,6 +247,8 @@ void define_voxelize(CLI::App& app, Words& words) {
 void define_info(CLI::App& app, Words& words) {
   app.description(kInfoExamples);
   add_inputs(app, words, true);
+  app.add_flag("--gl", words.gl, "What OpenGL there is, and how it is used; files are not needed")
+      ->group("Output");
   add_json(app, words, "Output");
   add_common(app, words);
 }
@@ -466,8 +469,9 @@ InfoCommand info_command(const Words& words, Reader& reader) {
   InfoCommand command;
   command.common = common_options(words, reader);
   command.input = input_options(words, reader);
+  command.gl = words.gl;
   if (!words.json.empty()) command.json = words.json;
-  if (command.input.files.empty()) reader.fail_with("no mesh file is given");
+  if (command.input.files.empty() && !command.gl) reader.fail_with("no mesh file is given");
   return command;
 }
 

@@ -67,6 +67,7 @@ struct VoxelizeCommand {
 struct InfoCommand {
   CommonOptions common;
   InputOptions input;
+  bool gl = false;  ///< also what OpenGL there is
   std::optional<std::string> json;
 };
 

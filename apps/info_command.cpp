@@ -1,6 +1,7 @@
 #include <utility>
 
 #include "apps/commands.h"
+#include "apps/gl_info.h"
 #include "apps/json_writer.h"
 #include "apps/mesh_input.h"
 #include "apps/session.h"
@@ -158,6 +159,12 @@ Result<void> run_info(const InfoCommand& command, Session& session) {
     text += info_text(*info);
   }
   json.end_array();
+  if (command.gl) {
+    if (const auto told = tell_gl(json, text); !told) {
+      if (first_error) session.complain(*first_error);
+      first_error = told.error();
+    }
+  }
   json.key("memory").begin_object();
   json.member("peak_bytes", peak_memory_bytes());
   json.end_object();

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdlib>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -81,6 +82,39 @@ TEST(Info, LooksAtTheOtherFilesWhenOneCannotBeRead) {
   EXPECT_EQ(json::parse(place.read("report.json"))["files"].size(), 1u);
 }
 
+TEST(Info, TellsWhatOpenGlThereIsOrSaysWhyNot) {
+  const Workplace place;
+  const RunResult run = place.run({"info", "--gl"});
+  if (run.exit_code != 0) {
+    EXPECT_EQ(run.exit_code, 2);
+    EXPECT_NE(run.err.find("OpenGL"), std::string::npos) << run.err;
+    const bool built_without = run.err.find("built without") != std::string::npos;
+    ASSERT_TRUE(built_without || !std::getenv("CI")) << run.err;
+    GTEST_SKIP() << run.err;
+  }
+  EXPECT_EQ(run.err, "");
+  for (const char* word : {"renderer", "GL_NV_shader_atomic_int64", "storage_block_bytes",
+                           "ha32: ", "ha64: ", "workarounds"}) {
+    EXPECT_NE(run.out.find(word), std::string::npos) << word << " in\n" << run.out;
+  }
+}
+
+TEST(Info, WithoutAContextIsASentenceAndAnExitCode) {
+  const Workplace place;
+  const RunResult run =
+      place.run({"info", "--gl"}, {.environment = {"STRATA_GL_DEVICE=device:4711"}});
+  EXPECT_EQ(run.exit_code, 2);
+  EXPECT_EQ(run.signal, 0);
+  EXPECT_NE(run.err.find("OpenGL"), std::string::npos) << run.err;
+  // Files are told of all the same.
+  put(place, "box.obj", make_box({0, 0, 0}, {1, 2, 3}));
+  const RunResult both = place.run({"info", "--gl", "--json", "box.obj"},
+                                   {.environment = {"STRATA_GL_DEVICE=device:4711"}});
+  EXPECT_EQ(both.exit_code, 2);
+  EXPECT_EQ(json::parse(both.out)["files"].size(), 1u);
+  EXPECT_FALSE(json::parse(both.out).contains("gl"));
+}
+
 /// The names of all plain values in a report, as docs/json.md writes them.
 void collect(const json& value, const std::string& name, std::set<std::string>& names) {
   if (value.is_object()) {
@@ -115,7 +149,18 @@ TEST(Json, TheDocumentationNamesExactlyWhatInfoPrints) {
   collect(json::parse(place.run({"info", "open.obj", "--json"}).out), "", names);
   names.erase("warnings");  // empty here
   names.insert({"warnings[].code", "warnings[].message"});
-  EXPECT_EQ(names, documented("`strata info`"));
+  std::set<std::string> told = documented("`strata info`"), of_gl;
+  for (const std::string& name : told) {
+    if (name.starts_with("gl.")) of_gl.insert(name);
+  }
+  for (const std::string& name : of_gl) told.erase(name);
+  EXPECT_EQ(names, told);
+
+  const RunResult with_gl = place.run({"info", "--gl", "--json"});
+  if (with_gl.exit_code != 0) GTEST_SKIP() << with_gl.err;
+  std::set<std::string> printed;
+  collect(json::parse(with_gl.out)["gl"], "gl", printed);
+  EXPECT_EQ(printed, of_gl);
 }
 
 TEST(Json, TheDocumentationNamesExactlyWhatVoxelizePrints) {
