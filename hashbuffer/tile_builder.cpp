@@ -34,6 +34,9 @@ struct TileBuilder<Record>::Impl {
   static constexpr int kMaxPlanes = 64;
   static constexpr int kFirstPlanes = 8;
   static constexpr double kGrowLoad = 0.8;
+  /// Layers of a tile, in the mean over its pixels, from which the count/scan store is faster: each
+  /// insertion passes the records before it.
+  static constexpr std::uint64_t kDeepLayers = 8;
 
   TileStoreOptions options;
   TileTable<Record> table;
@@ -41,6 +44,7 @@ struct TileBuilder<Record>::Impl {
   std::vector<std::uint32_t> offsets;  ///< compressed rows
   std::vector<Key> keys;
   std::uint64_t rebuilt = 0;
+  bool deep = true;                    ///< the last tile was; unknown at first
   int dirty_begin = 0, dirty_end = 0;  ///< rows of the table that hold records
 
   void resize_table(int planes) {
@@ -79,6 +83,8 @@ struct TileBuilder<Record>::Impl {
     table.mixed = false;
     table.failures = 0;
   }
+
+  static bool is_deep(std::uint64_t fragments) { return fragments > kDeepLayers * kTilePixels; }
 
   int planes() const { return static_cast<int>(table.size / kTilePixels); }
 
@@ -134,6 +140,13 @@ struct TileBuilder<Record>::Impl {
 
   TileLists<Key> build(const TileInput& input) {
     if (options.store == StoreKind::kCountScan) return scan(input);
+    // Neighbouring tiles are about equally deep.
+    const bool choose = options.store == StoreKind::kAuto;
+    if (deep && choose) {
+      const TileLists<Key> lists = scan(input);
+      deep = is_deep(lists.fragments);
+      return lists;
+    }
     if (table.size == 0) resize_table(kFirstPlanes);
     for (;;) {
       clear_table();
@@ -148,8 +161,11 @@ struct TileBuilder<Record>::Impl {
         table.mixed = true;
         if (load < 0.5) return scan(input);
         resize_table(std::max(planes() + 1, static_cast<int>(load / 0.5 * planes()) + 1));
+        deep = is_deep(raster.fragments);
+        if (deep && choose) return scan(input);
         continue;
       }
+      deep = is_deep(raster.fragments);
       if (table.mixed) {
         compact_table();
         const double load = static_cast<double>(raster.fragments) / static_cast<double>(table.size);

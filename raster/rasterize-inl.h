@@ -216,7 +216,8 @@ class SetupBatch {
         hn::DemoteTo(di, hn::IfThenElseZero(hn::Eq(area, zero_f), one_f));  // exact if direct
     const VecI32 kind = hn::IfThenElse(direct, hn::Sub(one, flat), hn::Set(di, 2));
     hn::Store(hn::IfThenElseZero(covers, kind), di, kind_);
-    if (hn::AllFalse(di, hn::And(small, direct))) {
+    // It pays for a few of the lanes no more than one by one.
+    if (hn::CountTrue(di, hn::And(hn::And(small, direct), covers)) * 2 < hn::Lanes(di)) {
       hn::Store(zero, di, small_);
     } else {
       cover_small(hn::And(hn::And(small, direct), covers), box_u1, box_v1, depth_limit);

@@ -1,10 +1,13 @@
 // What pictures show: light, ghosts, translucent solids, samples, bands, edges, cameras.
 
 #include <gtest/gtest.h>
+#include <png.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstdio>
 #include <glm/ext/matrix_transform.hpp>
 #include <glm/geometric.hpp>
 #include <memory>
@@ -416,6 +419,51 @@ TEST(ColourScheme, IsFoundWhateverTheCase) {
   EXPECT_EQ(find_colour_scheme("TOMORROW night")->name, "Tomorrow Night");
   EXPECT_EQ(find_colour_scheme("Tomorrow Nigh"), nullptr);
   EXPECT_EQ(colour_schemes().front().name, "Cornfield");
+}
+
+// --- PNG ----------------------------------------------------------------------------------------
+
+/// Writes a picture and reads it back with libpng.
+std::vector<Rgba> written_and_read(const Picture& picture, unsigned& kind) {
+  const std::string path =
+      testing::TempDir() + "/strata_picture_" + std::to_string(getpid()) + ".png";
+  const auto written = write_png(picture, path);
+  EXPECT_TRUE(written.has_value());
+  png_image png{};
+  png.version = PNG_IMAGE_VERSION;
+  std::vector<Rgba> pixels;
+  if (png_image_begin_read_from_file(&png, path.c_str()) == 0) {
+    ADD_FAILURE() << png.message;
+    return pixels;
+  }
+  kind = png.format;
+  EXPECT_EQ(static_cast<int>(png.width), picture.width);
+  EXPECT_EQ(static_cast<int>(png.height), picture.height);
+  png.format = PNG_FORMAT_RGBA;
+  pixels.resize(static_cast<std::size_t>(png.width) * png.height);
+  EXPECT_NE(png_image_finish_read(&png, nullptr, pixels.data(), 0, nullptr), 0) << png.message;
+  std::remove(path.c_str());
+  return pixels;
+}
+
+TEST(WritePng, KeepsEveryColourInEveryForm) {
+  // 1, 2, 4 and 8 bits an index, then colours as they are; widths that do not fill bytes.
+  for (const unsigned colours : {1u, 2u, 3u, 4u, 5u, 16u, 17u, 256u, 257u, 5000u}) {
+    for (const int width : {1, 7, 64, 131}) {
+      for (const bool opaque : {true, false}) {
+        Picture picture{width, 61, {}};
+        for (unsigned i = 0; i < static_cast<unsigned>(width) * 61; ++i) {
+          const unsigned c = i * i / 3 % colours;
+          picture.pixels.emplace_back(c % 256, c / 256, 255 - c % 256,
+                                      opaque || c % 3 != 0 ? 255 : 100);
+        }
+        unsigned kind = 0;
+        EXPECT_EQ(written_and_read(picture, kind), picture.pixels)
+            << colours << " colours, width " << width << (opaque ? ", opaque" : "");
+        EXPECT_TRUE(colours > 256 || (kind & PNG_FORMAT_FLAG_COLORMAP) != 0);
+      }
+    }
+  }
 }
 
 }  // namespace
