@@ -31,10 +31,11 @@ glm::ivec2 coarse_size(const glm::ivec2& size, int divisor) {
   return glm::max(glm::ivec2(1), (size + divisor - 1) / divisor);
 }
 
-int CoarsePolicy::divisor(const glm::ivec2& size) const {
+int CoarsePolicy::divisor(const glm::ivec2& size, bool changed) const {
   if (!known_) return 4;
+  const double target = changed ? kTargetMs / 2 : kTargetMs;
   for (const int divisor : kDivisors) {
-    if (expected(pixels_of(coarse_size(size, divisor))) <= kTargetMs) return divisor;
+    if (expected(pixels_of(coarse_size(size, divisor))) <= target) return divisor;
   }
   return kDivisors[std::size(kDivisors) - 1];
 }
@@ -144,7 +145,8 @@ void RenderThread::run(const std::stop_token& stop) {
       drawn_solids_ = request.what->tree.solids().size();
     }
     CoarsePolicy& policy = request.heat == Heat::kOff ? policy_ : heat_policy_;
-    const int divisor = whole ? 1 : policy.divisor(request.size);
+    const int divisor = whole ? 1 : policy.divisor(request.size, request.what != drawn_);
+    drawn_ = request.what;
     // A coarse picture is finished even when a newer one is wanted, or a moving hand would never
     // see any.
     draw_coarse(request, divisor, divisor == 1);

@@ -21,8 +21,9 @@ class CoarsePolicy {
   static constexpr double kTargetMs = 45;  ///< two of them, one just begun, fit into 100 ms
   static constexpr int kDivisors[] = {1, 2, 3, 4, 6, 8, 12, 16};
 
-  /// The finest divisor whose picture is expected within kTargetMs.
-  [[nodiscard]] int divisor(const glm::ivec2& size) const;
+  /// The finest divisor whose picture is expected within kTargetMs; within half of it when what is
+  /// shown has `changed`, for nobody knows what that costs.
+  [[nodiscard]] int divisor(const glm::ivec2& size, bool changed = false) const;
   /// A picture of `size` / divisor pixels took `ms`.
   void learn(const glm::ivec2& size, int divisor, double ms);
   /// The scene has changed: nothing is known.
@@ -77,6 +78,7 @@ class RenderThread {
   std::function<void()> wake_;
   CoarsePolicy policy_, heat_policy_;
   std::size_t drawn_solids_ = 0;
+  std::shared_ptr<const Arrangement> drawn_;
 
   mutable std::mutex mutex_;
   std::condition_variable_any changed_;

@@ -33,6 +33,8 @@ class ScriptRunner {
   Result<void> step(Viewer& viewer, Stage& stage);
   /// All commands are done.
   [[nodiscard]] bool ended() const { return next_ == commands_.size(); }
+  /// Commands done so far.
+  [[nodiscard]] std::size_t position() const { return next_; }
   [[nodiscard]] bool quit() const { return quit_; }
 
  private:

@@ -7,6 +7,7 @@
 #include <imgui.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -106,16 +107,24 @@ class Program final : public Stage {
     });
     glfwSetCursorPosCallback(glfw, [](GLFWwindow* w, double, double) {
       Program& program = self(w);
-      if (program.viewer_->dragging()) program.viewer_->mouse_move(program.mouse());
+      // What a drag changes shows with the next picture.
+      if (!program.viewer_->dragging()) return program.touch();
+      program.viewer_->mouse_move(program.mouse());
     });
     glfwSetScrollCallback(glfw, [](GLFWwindow* w, double, double y) {
       Program& program = self(w);
+      program.touch();
       if (!ImGui::GetIO().WantCaptureMouse) program.viewer_->wheel(y, program.mouse());
     });
     glfwSetKeyCallback(glfw, [](GLFWwindow* w, int key, int, int action, int modifiers) {
+      self(w).touch();
       if (action == GLFW_RELEASE || ImGui::GetIO().WantTextInput) return;
       self(w).viewer_->key(key_name(key, modifiers));
     });
+    glfwSetCharCallback(glfw, [](GLFWwindow* w, unsigned) { self(w).touch(); });
+    glfwSetCursorEnterCallback(glfw, [](GLFWwindow* w, int) { self(w).touch(); });
+    glfwSetWindowRefreshCallback(glfw, [](GLFWwindow* w) { self(w).touch(); });
+    glfwSetFramebufferSizeCallback(glfw, [](GLFWwindow* w, int, int) { self(w).touch(); });
     IMGUI_CHECKVERSION();
     ImGui::CreateContext();
     float scale = 1, scale_y = 1;
@@ -131,20 +140,44 @@ class Program final : public Stage {
       glfwWaitEventsTimeout(hurried ? 0.008 : options_.watch ? 0.1 : 0.5);
       lay_out();
       viewer_->tick();
-      const auto begin = Clock::now();
-      draw(false);
-      window_->swap_buffers();
-      const std::chrono::duration<double, std::milli> took = Clock::now() - begin;
-      viewer_->presented(took.count());
-      if (auto checked = window_->check(); !checked) return checked;
+      if (draw_due()) {
+        const auto begin = Clock::now();
+        draw(false);
+        window_->swap_buffers();
+        drawn_at_ = Clock::now();
+        const std::chrono::duration<double, std::milli> took = drawn_at_ - begin;
+        viewer_->presented(took.count());
+        if (auto checked = window_->check(); !checked) return checked;
+      }
       if (std::exchange(viewer_->wants_screenshot, false)) keep_screenshot();
+      const std::size_t before = script_.position();
       if (auto done = script_.step(*viewer_, *this); !done) return done;
+      if (script_.position() != before) touch();
       if (script_.quit()) return {};
       if (finishing() && viewer_->settled() && ++settled_turns_ > 2) {
         return screenshot(options_.screenshot, false);
       }
     }
     return {};
+  }
+
+  /// Something that panels show may have changed. They take some turns to follow: what is below
+  /// the mouse is known in the next one.
+  void touch() { turns_to_draw_ = 3; }
+
+  /// Drawing the window costs a software renderer as much as a coarse picture: it is done when
+  /// there is something new.
+  [[nodiscard]] bool draw_due() {
+    const bool whole = viewer_->settled();
+    if (whole != was_settled_) turns_to_draw_ = std::max(turns_to_draw_, 1);
+    was_settled_ = whole;
+    constexpr std::chrono::milliseconds kProgress{100}, kAtLeast{1000};
+    const auto since = Clock::now() - drawn_at_;
+    if ((viewer_->loading() && since > kProgress) || since > kAtLeast) return true;
+    if (viewer_->frame_serial() != uploaded_) return true;
+    if (turns_to_draw_ == 0) return false;
+    --turns_to_draw_;
+    return true;
   }
 
   /// All commands are done, and only the last screenshot is left.
@@ -196,6 +229,7 @@ class Program final : public Stage {
   }
 
   void on_button(int button, int action, int modifiers) {
+    touch();
     if (button > GLFW_MOUSE_BUTTON_MIDDLE) return;
     const bool down = action == GLFW_PRESS;
     if (down && ImGui::GetIO().WantCaptureMouse) return;
@@ -231,7 +265,9 @@ class Program final : public Stage {
   glm::ivec2 window_size_{0};
   Area area_;
   std::uint64_t uploaded_ = 0;
-  int settled_turns_ = 0;
+  int settled_turns_ = 0, turns_to_draw_ = 3;
+  bool was_settled_ = false;
+  Clock::time_point drawn_at_{};
 };
 
 Result<void> run(ViewOptions options) {

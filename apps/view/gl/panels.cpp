@@ -60,9 +60,13 @@ Panels::Panels(float scale, std::string gl_renderer)
 
 Area Panels::picture_area(const glm::ivec2& window, bool with_panels) const {
   if (!with_panels) return {{0, 0}, window};
-  const auto side = static_cast<int>(kSideWidth * scale_);
+  const auto side = static_cast<int>(side_width(window));
   const auto status = static_cast<int>(kStatusHeight * scale_);
   return {{0, 0}, glm::max(window - glm::ivec2(side, status), glm::ivec2(1))};
+}
+
+float Panels::side_width(const glm::ivec2& window) const {
+  return std::min(kSideWidth * scale_, static_cast<float>(window.x / 2));
 }
 
 void Panels::tell(std::string words) {
@@ -87,7 +91,7 @@ void Panels::draw(Viewer& viewer, const glm::ivec2& window, const Area& area) {
 // --- the side panel -----------------------------------------------------------------------------
 
 void Panels::side(Viewer& viewer, const glm::ivec2& window) {
-  const float width = kSideWidth * scale_, height = kStatusHeight * scale_;
+  const float width = side_width(window), height = kStatusHeight * scale_;
   ImGui::SetNextWindowPos({static_cast<float>(window.x) - width, 0});
   ImGui::SetNextWindowSize({width, static_cast<float>(window.y) - height});
   ImGui::Begin("side", nullptr,
@@ -226,7 +230,7 @@ void Panels::solids(Viewer& viewer) {
   const Looks& looks = viewer.looks();
   const auto count = static_cast<int>(wanted.empty() ? all.size() : some.size());
   const float rest = ImGui::GetContentRegionAvail().y;
-  ImGui::BeginChild("solids", {0, std::max(rest, 120 * scale_)});
+  ImGui::BeginChild("solids", {0, std::max(rest, 90 * scale_)});
   ImGuiListClipper clipper;
   clipper.Begin(count);
   while (clipper.Step()) {
@@ -319,8 +323,11 @@ void Panels::status(const Viewer& viewer, const glm::ivec2& window) {
                   viewer.renderer_name(), gl_renderer_);
   const float width = ImGui::CalcTextSize(right.c_str()).x;
   const float left_end = ImGui::CalcTextSize(left.c_str()).x + 24 * scale_;
-  ImGui::SameLine(std::max(left_end, static_cast<float>(window.x) - width - 10 * scale_));
-  faint(right);
+  const float begin = static_cast<float>(window.x) - width - 10 * scale_;
+  if (begin > left_end) {
+    ImGui::SameLine(begin);
+    faint(right);
+  }
   ImGui::End();
   ImGui::PopStyleVar(2);
 }

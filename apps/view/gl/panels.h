@@ -24,6 +24,7 @@ class Panels {
   void tell(std::string text);
 
  private:
+  [[nodiscard]] float side_width(const glm::ivec2& window) const;
   void side(Viewer& viewer, const glm::ivec2& window);
   void camera(Viewer& viewer);
   void section(Viewer& viewer);
