@@ -95,47 +95,6 @@ Result<void> try_surfaces(csg::SurfaceSource& source) {
   return fail(ErrorCode::kInternal, "an example's picture is not the CPU's");
 }
 
-/// Rows of the GPU, or of the CPU from the first failure on.
-class ListsWithFallback final : public ListSource {
- public:
-  ListsWithFallback(ListSource& gpu, Session& session) : gpu_(&gpu), session_(&session) {}
-
-  Result<void> set_mesh(const LatticeMesh& mesh) override {
-    mesh_ = &mesh;
-    if (gpu_ == nullptr) return {};
-    if (auto done = gpu_->set_mesh(mesh); !done) give_up(done.error());
-    return {};
-  }
-  Result<LayeredDepthImage> lists(const RasterTarget& target, int v_begin, int v_end) override {
-    if (gpu_ != nullptr) {
-      auto rows = gpu_->lists(target, v_begin, v_end);
-      if (rows) return rows;
-      give_up(rows.error());
-    }
-    // A screen that begins at another row is the mesh, moved by whole pixels.
-    LatticeMesh moved{mesh_->vertices, mesh_->triangles};
-    const AxisFrame frame(target.axis);
-    for (glm::ivec3& p : moved.vertices) p[frame.v] -= v_begin * kLatticeSteps;
-    RasterTarget rows = target;
-    rows.height = v_end - v_begin;
-    Execution execution = session_->execution("depth lists");
-    execution.progress = {};
-    return build_ldi(moved, rows, {}, execution);
-  }
-  [[nodiscard]] int rows_at_once(const RasterTarget& target) const override {
-    return gpu_ != nullptr ? gpu_->rows_at_once(target) : target.height + kTileSide;
-  }
-
- private:
-  void give_up(const Error& error) {
-    session_->warn("backend", fmt::format("the GPU failed, the CPU goes on: {}", error.message));
-    gpu_ = nullptr;
-  }
-  ListSource* gpu_;
-  Session* session_;
-  const LatticeMesh* mesh_ = nullptr;
-};
-
 class GlGpu final : public Gpu {
  public:
   GlGpu(std::unique_ptr<gl::Context> context, Backend backend, Session& session)
@@ -149,7 +108,11 @@ class GlGpu final : public Gpu {
     if (!source) return refused<ListSource*>(source.error());
     lists_ = *std::move(source);
     if (backend_ == Backend::kGl) return lists_.get();
-    fallback_ = std::make_unique<ListsWithFallback>(*lists_, *session_);
+    fallback_ = std::make_unique<ListSourceOrCpu>(
+        *lists_, session_->execution("depth lists"), [this](const Error& error) {
+          session_->warn("backend",
+                         fmt::format("the GPU failed, the CPU goes on: {}", error.message));
+        });
     return fallback_.get();
   }
 
@@ -192,7 +155,7 @@ class GlGpu final : public Gpu {
   Backend backend_;
   Session* session_;
   std::unique_ptr<gl::ComputeListSource> lists_;
-  std::unique_ptr<ListsWithFallback> fallback_;
+  std::unique_ptr<ListSourceOrCpu> fallback_;
   std::unique_ptr<csg::GlSurfaceSource> surfaces_;
 };
 

@@ -1,8 +1,50 @@
 #include "hashbuffer/list_source.h"
 
 #include <algorithm>
+#include <utility>
+
+#include "hashbuffer/build_ldi.h"
 
 namespace strata {
+
+ListSourceOrCpu::ListSourceOrCpu(ListSource& source, Execution execution,
+                                 std::function<void(const Error&)> on_failure)
+    : source_(&source), execution_(std::move(execution)), on_failure_(std::move(on_failure)) {
+  execution_.progress = {};
+}
+
+void ListSourceOrCpu::give_up(const Error& error) {
+  source_ = nullptr;
+  on_failure_(error);
+}
+
+Result<void> ListSourceOrCpu::set_mesh(const LatticeMesh& mesh) {
+  mesh_ = &mesh;
+  if (source_ == nullptr) return {};
+  if (auto done = source_->set_mesh(mesh); !done) give_up(done.error());
+  return {};
+}
+
+int ListSourceOrCpu::rows_at_once(const RasterTarget& target) const {
+  constexpr int kRowsOfTheCpu = 16 * kTileSide;
+  return source_ != nullptr ? source_->rows_at_once(target) : kRowsOfTheCpu;
+}
+
+Result<LayeredDepthImage> ListSourceOrCpu::lists(const RasterTarget& target, int v_begin,
+                                                 int v_end) {
+  if (source_ != nullptr) {
+    auto rows = source_->lists(target, v_begin, v_end);
+    if (rows) return rows;
+    give_up(rows.error());
+  }
+  // A screen that begins at another row sees the mesh moved by whole pixels.
+  LatticeMesh moved{mesh_->vertices, mesh_->triangles};
+  const AxisFrame frame(target.axis);
+  for (glm::ivec3& p : moved.vertices) p[frame.v] -= v_begin * kLatticeSteps;
+  RasterTarget rows = target;
+  rows.height = v_end - v_begin;
+  return build_ldi(moved, rows, {}, execution_);
+}
 
 TileLists<DepthItem> TileCutter::cut(const LayeredDepthImage& rows, int v_begin, int tu, int tv) {
   offsets_.assign(kTilePixels + 1, 0);

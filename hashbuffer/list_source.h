@@ -1,9 +1,11 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "core/depth_list.h"
+#include "core/execution.h"
 #include "core/result.h"
 #include "hashbuffer/tile_builder.h"
 
@@ -25,6 +27,25 @@ class ListSource {
   virtual Result<LayeredDepthImage> lists(const RasterTarget& target, int v_begin, int v_end) = 0;
   /// How many rows of `target` are best asked for at once: a multiple of kTileSide, at least that.
   [[nodiscard]] virtual int rows_at_once(const RasterTarget& target) const = 0;
+};
+
+/// A source, and this process's threads from its first failure on.
+class ListSourceOrCpu final : public ListSource {
+ public:
+  /// Borrows `source`. @param on_failure told the failure, once
+  ListSourceOrCpu(ListSource& source, Execution execution,
+                  std::function<void(const Error&)> on_failure);
+
+  Result<void> set_mesh(const LatticeMesh& mesh) override;
+  Result<LayeredDepthImage> lists(const RasterTarget& target, int v_begin, int v_end) override;
+  [[nodiscard]] int rows_at_once(const RasterTarget& target) const override;
+
+ private:
+  void give_up(const Error& error);
+  ListSource* source_;  ///< null: it has failed
+  Execution execution_;
+  std::function<void(const Error&)> on_failure_;
+  const LatticeMesh* mesh_ = nullptr;
 };
 
 /// Cuts rows of lists into tiles. Scratch of one thread.

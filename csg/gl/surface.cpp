@@ -19,7 +19,6 @@ namespace strata::csg {
 namespace {
 
 constexpr std::uint32_t kDoubtful = 0xfffffffeu;  // of walk.comp.glsl
-constexpr std::uint64_t kPixelsAtOnce = std::uint64_t{1} << 22;
 constexpr std::uint32_t kGroupSide = 8;
 constexpr std::uint64_t kDoubtHeader = 16;  // bytes
 
@@ -142,7 +141,7 @@ class PixelJudge {
 struct GlSurfaceSource::Impl {
   std::unique_ptr<gl::Store> store;
   std::unique_ptr<gl::ComputeRasterizer> rasterizer;
-  std::uint64_t binding_bytes = 0;
+  std::uint64_t binding_bytes = 0, pixels_at_once = 0;
   struct Walk {
     std::uint32_t words;
     gl::StoreGlsl read;
@@ -171,9 +170,11 @@ GlSurfaceSource::~GlSurfaceSource() = default;
 const GlSurfaceSource::Counts& GlSurfaceSource::counts() const { return impl_->counts; }
 
 Result<std::unique_ptr<GlSurfaceSource>> GlSurfaceSource::create(const gl::Context& context,
-                                                                 std::unique_ptr<gl::Store> store) {
+                                                                 std::unique_ptr<gl::Store> store,
+                                                                 std::uint64_t pixels_at_once) {
   auto impl = std::make_unique<Impl>();
   impl->store = std::move(store);
+  impl->pixels_at_once = pixels_at_once;
   impl->binding_bytes = context.info().limits.storage_block_bytes;
   auto rasterizer = gl::ComputeRasterizer::create(context);
   if (!rasterizer) return tl::unexpected(rasterizer.error());
@@ -229,7 +230,7 @@ Result<void> GlSurfaceSource::find(const FrameInput& frame, SurfaceImage& image,
   if (!set) return set;
   const int step = static_cast<int>(
       std::max<std::uint64_t>(
-          1, kPixelsAtOnce / static_cast<std::uint64_t>(frame.view.size.x) / kTileSide) *
+          1, impl.pixels_at_once / static_cast<std::uint64_t>(frame.view.size.x) / kTileSide) *
       kTileSide);
   for (int v = 0; v < frame.view.size.y; v += step) {
     const int end = std::min(frame.view.size.y, v + step);

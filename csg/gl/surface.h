@@ -25,9 +25,11 @@ namespace strata::csg {
 class GlSurfaceSource final : public SurfaceSource {
  public:
   /// @param store keeps whole payloads; its lists may be of any length
+  /// @param pixels_at_once of rows of tiles that are drawn at once, about
   /// @return kUsage where the driver cannot; kInternal where it refuses a shader
   [[nodiscard]] static Result<std::unique_ptr<GlSurfaceSource>> create(
-      const gl::Context& context, std::unique_ptr<gl::Store> store);
+      const gl::Context& context, std::unique_ptr<gl::Store> store,
+      std::uint64_t pixels_at_once = std::uint64_t{1} << 22);
   ~GlSurfaceSource() override;
 
   Result<void> find(const FrameInput& frame, SurfaceImage& image, DrawReport& report,

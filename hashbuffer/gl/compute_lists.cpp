@@ -4,22 +4,17 @@
 #include <utility>
 
 namespace strata::gl {
-namespace {
-
-/// Pixels that are drawn at once: lists and blocks of large triangles stay bounded.
-constexpr std::int64_t kPixelsAtOnce = std::int64_t{1} << 22;
-
-}  // namespace
-
 Result<std::unique_ptr<ComputeListSource>> ComputeListSource::create(const Context& context,
                                                                      std::unique_ptr<Store> store,
-                                                                     std::unique_ptr<Store> spare) {
+                                                                     std::unique_ptr<Store> spare,
+                                                                     std::int64_t pixels_at_once) {
   std::unique_ptr<ComputeListSource> result(new ComputeListSource());
   auto rasterizer = ComputeRasterizer::create(context);
   if (!rasterizer) return tl::unexpected(rasterizer.error());
   result->rasterizer_ = *std::move(rasterizer);
   result->store_ = std::move(store);
   result->spare_ = std::move(spare);
+  result->pixels_at_once_ = pixels_at_once;
   return result;
 }
 
@@ -28,7 +23,7 @@ Result<void> ComputeListSource::set_mesh(const LatticeMesh& mesh) {
 }
 
 int ComputeListSource::rows_at_once(const RasterTarget& target) const {
-  const std::int64_t rows = kPixelsAtOnce / std::max(1, target.width) / kTileSide * kTileSide;
+  const std::int64_t rows = pixels_at_once_ / std::max(1, target.width) / kTileSide * kTileSide;
   return static_cast<int>(std::max<std::int64_t>(kTileSide, rows));
 }
 

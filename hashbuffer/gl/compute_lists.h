@@ -14,9 +14,10 @@ class ComputeListSource final : public ListSource {
  public:
   /// `context` stays current while this is used. @param store keeps whole payloads
   /// @param spare takes over for good where `store` fails with kLimit (lists beyond its ages); may
-  /// be null @return kUsage where the driver cannot
+  /// be null @param pixels_at_once see rows_at_once(), about @return kUsage where the driver cannot
   [[nodiscard]] static Result<std::unique_ptr<ComputeListSource>> create(
-      const Context& context, std::unique_ptr<Store> store, std::unique_ptr<Store> spare = nullptr);
+      const Context& context, std::unique_ptr<Store> store, std::unique_ptr<Store> spare = nullptr,
+      std::int64_t pixels_at_once = std::int64_t{1} << 22);
 
   Result<void> set_mesh(const LatticeMesh& mesh) override;
   Result<LayeredDepthImage> lists(const RasterTarget& target, int v_begin, int v_end) override;
@@ -26,6 +27,7 @@ class ComputeListSource final : public ListSource {
   ComputeListSource() = default;
   std::unique_ptr<ComputeRasterizer> rasterizer_;
   std::unique_ptr<Store> store_, spare_;
+  std::int64_t pixels_at_once_ = 0;
 };
 
 }  // namespace strata::gl

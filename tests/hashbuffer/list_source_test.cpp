@@ -23,6 +23,7 @@ class RowsOfTheCpu final : public ListSource {
   }
   Result<LayeredDepthImage> lists(const RasterTarget& target, int v_begin, int v_end) override {
     asked += v_end - v_begin;
+    if (v_end > fails_from) return fail(ErrorCode::kLimit, "no more");
     const auto whole = build_ldi(*mesh_, target);
     if (!whole) return whole;
     LayeredDepthImage part;
@@ -42,6 +43,7 @@ class RowsOfTheCpu final : public ListSource {
   int rows_at_once(const RasterTarget&) const override { return rows_; }
 
   int asked = 0;
+  int fails_from = 1 << 30;  ///< row
 
  private:
   const LatticeMesh* mesh_ = nullptr;
@@ -120,6 +122,27 @@ TEST(ListSource, GivesTheVoxelsThatTheTilesGive) {
       EXPECT_EQ(found.crossings, expected.crossings);
       EXPECT_EQ(found.depth_histogram, expected.depth_histogram);
       EXPECT_EQ(found.unbalanced_columns, expected.unbalanced_columns);
+    }
+  }
+}
+
+TEST(ListSource, ThatFailsHalfWayIsFollowedByTheCpu) {
+  const TriangleSoup soup = make_torus_knot(2, 3, 0.4, 40, 10);
+  const VoxelGrid grid = testkit::grid_around(soup, 200);
+  const auto mesh = snap_to_lattice(soup, grid);
+  ASSERT_TRUE(mesh);
+  for (const Axis axis : {Axis::kX, Axis::kY, Axis::kZ}) {
+    const RasterTarget target = raster_target(grid, axis);
+    const auto expected = build_ldi(*mesh, target);
+    for (const int fails_from : {0, 64, 1 << 30}) {
+      RowsOfTheCpu source(64);
+      source.fails_from = fails_from;
+      int failures = 0;
+      ListSourceOrCpu both(source, {}, [&failures](const Error&) { ++failures; });
+      const auto found = build_ldi(both, *mesh, target);
+      ASSERT_TRUE(expected && found);
+      EXPECT_TRUE(*found == *expected);
+      EXPECT_EQ(failures, target.height > fails_from ? 1 : 0);
     }
   }
 }

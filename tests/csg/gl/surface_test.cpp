@@ -28,9 +28,9 @@ class GlSurface : public test::GlTest {
     source_.reset();
     GlTest::TearDown();
   }
-  void use(std::unique_ptr<gl::Store> store) {
+  void use(std::unique_ptr<gl::Store> store, std::uint64_t pixels_at_once = 1 << 22) {
     source_.reset();
-    auto source = GlSurfaceSource::create(*context_, std::move(store));
+    auto source = GlSurfaceSource::create(*context_, std::move(store), pixels_at_once);
     ASSERT_TRUE(source) << source.error().message;
     source_ = *std::move(source);
   }
@@ -225,6 +225,48 @@ TEST_F(GlSurface, EveryStoreCanBeWalked) {
       if (HasFailure()) return;
     }
   }
+}
+
+TEST_F(GlSurface, BandsOfAPictureAreParts) {
+  auto store = gl::ScanStore::create(context_->info());
+  ASSERT_TRUE(store);
+  use(*std::move(store), 1);  // a row of tiles at once
+  for (int seed = 0; seed < 10; ++seed) {
+    RandomTree random(static_cast<std::uint64_t>(seed) + 700);
+    Tree tree;
+    tree.set_root(random.grow(tree, 10, seed % 3 == 0));
+    expect_same(tree, random_camera(random, bounds(tree, tree.root())),
+                {random.pick(60, 150), random.pick(60, 260)}, "seed " + std::to_string(seed));
+    if (HasFailure()) return;
+  }
+  EXPECT_GT(walked_, 10000u);
+  EXPECT_EQ(left_, 0u);
+}
+
+TEST_F(GlSurface, ListsThatAreDoubtfulAndLongAreTheCpus) {
+  // 300 plates that overlap themselves and coincide in pairs, seen from their edges and their
+  // faces.
+  Tree tree;
+  std::vector<Tree::NodeId> operands;
+  TriangleSoup plates;
+  for (int i = 0; i < 150; ++i) {
+    for (int k = 0; k < 2; ++k) {
+      const TriangleSoup plate = make_box({0, 0, 0.1 * i}, {4, 4, 0.1 * i + 0.05});
+      const auto first = static_cast<unsigned>(plates.positions.size());
+      plates.positions.insert(plates.positions.end(), plate.positions.begin(),
+                              plate.positions.end());
+      for (const auto& t : plate.triangles) plates.triangles.push_back(t + first);
+    }
+  }
+  Solid solid;
+  solid.mesh = std::make_shared<TriangleSoup>(std::move(plates));
+  tree.set_root(tree.add_solid(std::move(solid)));
+  Camera camera;
+  centre_camera(camera, bounds(tree, tree.root()));
+  fit_camera(camera, bounds(tree, tree.root()));
+  camera.rotation = {10, 5, 0};
+  expect_same(tree, camera, {100, 100}, "plates");
+  EXPECT_GT(left_, 0u);
 }
 
 TEST_F(GlSurface, PicturesOfAllKindsAreTheCpus) {

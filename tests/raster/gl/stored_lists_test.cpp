@@ -30,9 +30,11 @@ class StoredLists : public test::GlTest {
   }
 
   /// `name`: a store, made at its first use.
-  void with(const std::string& name, Result<std::unique_ptr<gl::Store>> store) {
+  void with(const std::string& name, Result<std::unique_ptr<gl::Store>> store,
+            std::int64_t pixels_at_once = 1 << 22) {
     ASSERT_TRUE(store) << name << ": " << store.error().message;
-    auto source = gl::ComputeListSource::create(*context_, *std::move(store));
+    auto source =
+        gl::ComputeListSource::create(*context_, *std::move(store), nullptr, pixels_at_once);
     ASSERT_TRUE(source) << source.error().message;
     sources_[name] = *std::move(source);
   }
@@ -41,6 +43,7 @@ class StoredLists : public test::GlTest {
   }
   void with_all() {
     with("scan", gl::ScanStore::create(context_->info()));
+    with("scan, a row of tiles at once", gl::ScanStore::create(context_->info()), 1);
     with("scan in bands", gl::ScanStore::create(context_->info(), {.binding_bytes = 1 << 16}));
     with_hash("hash", {});
     with_hash("hash in two passes", {.path = gl::WordPath::kTwoPass});
