@@ -334,6 +334,62 @@ TEST(NestedDifferences, TwentyAndTwoHundredDeepAreRight) {
   }
 }
 
+// What is shown lies on the result's surface, by formulas that know no triangles: negative inside.
+
+double torus_formula(const glm::dvec3& p, double major, double minor) {
+  return std::hypot(std::hypot(p.x, p.y) - major, p.z) - minor;
+}
+
+TEST(ConcaveSolids, ShowNothingThatIsNotThere) {
+  // A pipe bent to a ring, cut open, with a bar through it that the ring takes its share of.
+  Tree tree;
+  const auto ring = [&](double minor) {
+    return tree.add_solid({std::make_shared<TriangleSoup>(make_torus(10, minor, 160, 80))});
+  };
+  const auto outer = ring(4), inner = ring(3), cutter = box_node(tree, {-20, 2, -20}, {20, 20, 20});
+  const auto bar = box_node(tree, {-16, -1, -1}, {16, 1, 1}), taken = ring(3.5);
+  const auto pipe = tree.add(Operation::kDifference, {outer, inner, cutter});
+  tree.set_root(
+      tree.add(Operation::kUnion, {pipe, tree.add(Operation::kDifference, {bar, taken})}));
+  std::size_t covered = 0;
+  const std::size_t wrong = wrong_pixels(
+      tree,
+      [](const glm::dvec3& p) {
+        const double pipe_at =
+            std::max({torus_formula(p, 10, 4), -torus_formula(p, 10, 3), p.y - 2});
+        const double bar_at = std::max(
+            {std::abs(p.x) - 16, std::abs(p.y) - 1, std::abs(p.z) - 1, -torus_formula(p, 10, 3.5)});
+        return std::abs(std::min(pipe_at, bar_at)) > 0.05;
+      },
+      covered);
+  EXPECT_EQ(wrong, 0u) << "of " << covered;
+  EXPECT_GT(covered, 100'000u);
+}
+
+TEST(NestedDifferences, ShowNothingThatIsNotThere) {
+  // Balls one in another, each taken from the next larger one, all cut open.
+  constexpr int kDeep = 20;
+  Tree tree;
+  Tree::NodeId node = Tree::kNone;
+  for (int i = 1; i <= kDeep; ++i) {
+    const auto ball = tree.add_solid({std::make_shared<TriangleSoup>(make_icosphere(i, 4))});
+    node = i == 1 ? ball : tree.add(Operation::kDifference, {ball, node});
+  }
+  const auto cutter = box_node(tree, {-30, -30, 0}, {30, 30, 30});
+  tree.set_root(tree.add(Operation::kDifference, {node, cutter}));
+  std::size_t covered = 0;
+  const std::size_t wrong = wrong_pixels(
+      tree,
+      [](const glm::dvec3& p) {
+        double at = 1e9;
+        for (int i = 1; i <= kDeep; ++i) at = std::max(glm::length(p) - i, -at);
+        return std::abs(std::max(at, p.z)) > 0.05;
+      },
+      covered);
+  EXPECT_EQ(wrong, 0u) << "of " << covered;
+  EXPECT_GT(covered, 100'000u);
+}
+
 TEST(VisibleSurface, AThousandLayersInOnePixelAreRight) {
   Tree tree;
   std::vector<Tree::NodeId> plates{box_node(tree, {-10, -10, 0}, {10, 10, 1001})};
