@@ -11,7 +11,6 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <cstring>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -292,19 +291,24 @@ struct Row {
   std::uint64_t atomics = 0;  ///< at least
 };
 
-Row hash_row(const gl::Info& info, const Scene& scene, int bits, gl::WordPath path, double load,
-             double published) {
+/// What the command line says.
+struct Settings {
+  double budget = 2.0;  ///< seconds a row
+  bool small_only = false;
+  OffsetKind offsets = OffsetKind::kRandom;
+  bool read_first = true;
+};
+
+Row hash_row(const gl::Info& info, const Scene& scene, const Settings& settings, int bits,
+             gl::WordPath path, double load, double published) {
   const std::uint64_t fragments = scene.lists.items.size();
   gl::HashStoreOptions options;
   options.record_bits = bits;
   options.path = path;
   options.cells = static_cast<std::uint64_t>(static_cast<double>(fragments) / load);
   options.resize = false;
-  options.offsets = OffsetKind::kRandom;
-  if (const char* kind = std::getenv("BENCH_OFFSETS"); kind && !std::strcmp(kind, "planes")) {
-    options.offsets = OffsetKind::kPlaneFirst;
-  }
-  if (std::getenv("BENCH_NO_READ_FIRST")) options.read_first = false;
+  options.offsets = settings.offsets;
+  options.read_first = settings.read_first;
   Row row;
   row.name = fmt::format("HA {}{}, load {:.1f}", bits,
                          bits == 32                      ? ""
@@ -415,7 +419,8 @@ void run_table(const gl::Context& context, const Scene& scene, const std::vector
   }
 }
 
-int run(double budget, bool small_only) {
+int run(const Settings& settings) {
+  const double budget = settings.budget;
   auto context = need(gl::Context::headless());
   const gl::Info& info = context->info();
   std::printf("%s, OpenGL %s, %s; %s\n", info.renderer.c_str(), info.version.c_str(),
@@ -430,24 +435,25 @@ int run(double budget, bool small_only) {
   {
     const auto scene =
         make_scene("half a million", make_torus_knot(2, 7, 0.25, 1200, 40), 1024, 500000);
-    run_table(
-        *context, *scene,
-        {no_row(info), hash_row(info, *scene, 32, WordPath::kAuto, 0.5, 0),
-         scan_row(info, *scene, false), hash_row(info, *scene, 64, WordPath::kTwoPass, 0.5, 0),
-         scan_row(info, *scene, true)},
-        machine, budget);
+    run_table(*context, *scene,
+              {no_row(info), hash_row(info, *scene, settings, 32, WordPath::kAuto, 0.5, 0),
+               scan_row(info, *scene, false),
+               hash_row(info, *scene, settings, 64, WordPath::kTwoPass, 0.5, 0),
+               scan_row(info, *scene, true)},
+              machine, budget);
   }
-  if (!small_only) {
+  if (!settings.small_only) {
     const auto scene = make_scene("dragon-like", dragon_like(), 1024, 938174);
-    std::vector<Row> rows{no_row(info), hash_row(info, *scene, 32, WordPath::kAuto, 0.5, 298),
-                          hash_row(info, *scene, 32, WordPath::kAuto, 0.8, 181)};
+    std::vector<Row> rows{no_row(info),
+                          hash_row(info, *scene, settings, 32, WordPath::kAuto, 0.5, 298),
+                          hash_row(info, *scene, settings, 32, WordPath::kAuto, 0.8, 181)};
     // 64-bit maxima were emulated for the published figures.
     if (info.has_int64_atomics) {
-      rows.push_back(hash_row(info, *scene, 64, WordPath::kAtomic, 0.5, 187));
-      rows.push_back(hash_row(info, *scene, 64, WordPath::kAtomic, 0.8, 83));
+      rows.push_back(hash_row(info, *scene, settings, 64, WordPath::kAtomic, 0.5, 187));
+      rows.push_back(hash_row(info, *scene, settings, 64, WordPath::kAtomic, 0.8, 83));
     }
-    rows.push_back(hash_row(info, *scene, 64, WordPath::kTwoPass, 0.5, 187));
-    rows.push_back(hash_row(info, *scene, 64, WordPath::kTwoPass, 0.8, 83));
+    rows.push_back(hash_row(info, *scene, settings, 64, WordPath::kTwoPass, 0.5, 187));
+    rows.push_back(hash_row(info, *scene, settings, 64, WordPath::kTwoPass, 0.8, 83));
     rows.push_back(scan_row(info, *scene, false));
     rows.push_back(scan_row(info, *scene, true));
     run_table(*context, *scene, rows, machine, budget);
@@ -460,22 +466,27 @@ int run(double budget, bool small_only) {
 }  // namespace strata::bench
 
 int main(int argc, char** argv) {
-  double budget = 2.0;
-  bool small_only = false;
+  strata::bench::Settings settings;
   for (int i = 1; i < argc; ++i) {
     const std::string word = argv[i];
     if (word == "--quick") {
-      budget = 0.3;
+      settings.budget = 0.3;
     } else if (word == "--small") {
-      small_only = true;
+      settings.small_only = true;
+    } else if (word == "--planes") {
+      settings.offsets = strata::OffsetKind::kPlaneFirst;
+    } else if (word == "--always-atomic") {
+      settings.read_first = false;
     } else {
       const bool asked = word == "--help";
       std::fprintf(asked ? stdout : stderr,
-                   "usage: bench_gl_stores [--quick] [--small]\n"
-                   "  --quick  0.3 instead of 2 seconds a row\n"
-                   "  --small  only the scene of half a million fragments\n");
+                   "usage: bench_gl_stores [--quick] [--small] [--planes] [--always-atomic]\n"
+                   "  --quick          0.3 instead of 2 seconds a row\n"
+                   "  --small          only the scene of half a million fragments\n"
+                   "  --planes         plane-first offsets instead of random ones\n"
+                   "  --always-atomic  no plain load before an atomic maximum\n");
       return asked ? 0 : 2;
     }
   }
-  return strata::bench::run(budget, small_only);
+  return strata::bench::run(settings);
 }
