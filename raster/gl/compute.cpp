@@ -56,10 +56,10 @@ GlslSettings with_int64(GlslSettings settings) {
 Result<std::unique_ptr<ComputeRasterizer>> ComputeRasterizer::create(const Context& context) {
   const Info& info = context.info();
   if (!info.has_int64) {
-    return fail(ErrorCode::kUsage,
-                "{} has no 64-bit integers in shaders (GL_ARB_gpu_shader_int64), which the exact "
-                "rasterizer needs",
-                info.renderer);
+    return fail(
+        ErrorCode::kUsage,
+        "no 64-bit integers in shaders (GL_ARB_gpu_shader_int64), which the exact rasterizer "
+        "needs");
   }
   std::unique_ptr<ComputeRasterizer> result(new ComputeRasterizer());
   result->binding_bytes_ = info.limits.storage_block_bytes;

@@ -19,9 +19,17 @@ void main() {
   ivec3 along_u = ivec3(edge0.along_u, edge1.along_u, edge2.along_u);
   ivec3 along_v = ivec3(edge0.along_v, edge1.along_v, edge2.along_v);
   RasterFraction base = raster_depth_at(t, box.x, box.y);
-  RasterFraction by_u = raster_depth_along_u(t), by_v = raster_depth_along_v(t);
-  uint area = uint(t.area), quotient_u = by_u.quotient, quotient_v = by_v.quotient;
-  uint remainder_u = uint(by_u.remainder), remainder_v = uint(by_v.remainder);
+  uint area = uint(t.area), quotient_u = 0u, quotient_v = 0u, remainder_u = 0u, remainder_v = 0u;
+  if (box.z - box.x > 1) {  // divisions are most of the work of the smallest
+    RasterFraction by_u = raster_depth_along_u(t);
+    quotient_u = by_u.quotient;
+    remainder_u = uint(by_u.remainder);
+  }
+  if (box.w - box.y > 1) {
+    RasterFraction by_v = raster_depth_along_v(t);
+    quotient_v = by_v.quotient;
+    remainder_v = uint(by_v.remainder);
+  }
   uint row_quotient = base.quotient, row_remainder = uint(base.remainder);
   uint payload = raster_payload(t, triangle);
   for (int v = box.y; v < box.w; ++v) {

@@ -117,6 +117,27 @@ TEST_F(Backends, WriteTheSamePicturesAndVoxelsOfScenes) {
   expect_same({"ldi", "scene.csg", "-r", "60"}, ".npz");
 }
 
+TEST_F(Backends, DriversThatLackSomethingAreNamed) {
+  // Mesa can be told to lack things; another driver does not listen, and does the work.
+  for (const char* lack :
+       {"MESA_EXTENSION_OVERRIDE=-GL_ARB_gpu_shader_int64", "MESA_GL_VERSION_OVERRIDE=3.3FC"}) {
+    place_.write("scene.csg", kScene);
+    const testkit::RunOptions options{.environment = {lack}};
+    for (const auto& command :
+         {std::vector<std::string>{"voxelize", kKnot, "-r", "50", "-o", "out.npy"},
+          {"ldi", kKnot, "-r", "50", "-o", "out.npz"},
+          {"csg", "scene.csg", "-o", "out.png"}}) {
+      std::vector<std::string> arguments = command;
+      arguments.insert(arguments.end(), {"--backend", "gl"});
+      const RunResult run = place_.run(arguments, options);
+      if (run.exit_code == 0) continue;
+      EXPECT_EQ(run.exit_code, 2) << lack << ": " << run.err;
+      EXPECT_NE(run.err.find("strata: error: --backend gl: "), std::string::npos) << run.err;
+      EXPECT_FALSE(place_.has(command.back())) << lack;
+    }
+  }
+}
+
 TEST(Backend, IsAutoCpuOrGl) {
   const Workplace place;
   const RunResult wrong =

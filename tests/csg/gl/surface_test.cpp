@@ -4,9 +4,12 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <functional>
+#include <set>
 
 #include "csg/picture.h"
+#include "csg/scene/scene.h"
 #include "hashbuffer/gl/hash_store.h"
 #include "hashbuffer/gl/scan_store.h"
 #include "tests/csg/random_tree.h"
@@ -298,6 +301,27 @@ TEST_F(GlSurface, PicturesOfAllKindsAreTheCpus) {
       }
     }
   }
+}
+
+TEST_F(GlSurface, ScenesLookAsTheyDoToTheCpu) {
+  const std::filesystem::path folder = STRATA_SOURCE_DIR "/../shared/csg/bench";
+  std::error_code absent;
+  std::set<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, absent)) {
+    if (entry.path().extension() == ".csg") files.insert(entry.path());
+  }
+  if (files.empty()) GTEST_SKIP() << "no scenes: they are looked for in shared/csg/bench";
+  for (const auto& file : files) {
+    const auto scene = read_scene(file.string());
+    ASSERT_TRUE(scene) << file << ": " << scene.error().message;
+    const Bounds box = bounds(scene->tree, scene->tree.root());
+    if (box.empty()) continue;
+    Camera camera;
+    centre_camera(camera, box);
+    fit_camera(camera, box);
+    expect_same(scene->tree, camera, {150, 110}, file.filename().string());
+  }
+  EXPECT_GT(walked_, 10000u);
 }
 
 TEST_F(GlSurface, AMovedSolidIsSeenWhereItIs) {
