@@ -62,7 +62,6 @@ void CoarsePolicy::learn(const glm::ivec2& size, int divisor, double ms) {
 RenderThread::RenderThread(std::unique_ptr<Renderer> renderer, int threads,
                            std::function<void()> wake)
     : renderer_(std::move(renderer)),
-      name_(renderer_->name()),
       threads_(threads),
       wake_(std::move(wake)),
       thread_([this](const std::stop_token& stop) { run(stop); }) {}

@@ -18,7 +18,7 @@ namespace strata::view {
 /// kind decide.
 class CoarsePolicy {
  public:
-  static constexpr double kTargetMs = 45;  ///< two of them, one just begun, fit into 100 ms
+  static constexpr double kTargetMs = 35;  ///< two of them and the panels fit into 100 ms
   static constexpr int kDivisors[] = {1, 2, 3, 4, 6, 8, 12, 16};
 
   /// The finest divisor whose picture is expected within kTargetMs; within half of it when what is
@@ -62,7 +62,6 @@ class RenderThread {
   std::optional<Error> take_error();
   /// Nothing is under way: the last request is drawn, whole, or has failed; picks are answered.
   [[nodiscard]] bool resting() const;
-  [[nodiscard]] std::string renderer_name() const { return name_; }
 
  private:
   void run(const std::stop_token& stop);
@@ -73,7 +72,6 @@ class RenderThread {
   static constexpr int kRestMs = 60;
 
   std::unique_ptr<Renderer> renderer_;
-  std::string name_;
   int threads_;
   std::function<void()> wake_;
   CoarsePolicy policy_, heat_policy_;

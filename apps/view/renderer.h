@@ -46,6 +46,7 @@ struct Frame {
   csg::Camera camera;
   glm::ivec2 wanted{1};  ///< the size that was asked for
   int divisor = 1;       ///< 1: whole; n: a pixel stands for n x n
+  std::string drawn_by;  ///< the CPU or a GPU, and why not something better
   csg::DrawReport report;
   HeatScale scale;
   std::uint64_t longest_list = 0;  ///< heat maps only
@@ -72,11 +73,12 @@ class Renderer {
   /// The opaque surface below a pixel.
   virtual Result<Picked> pick(const FrameRequest& request, const glm::ivec2& pixel,
                               const Execution& execution) = 0;
-  [[nodiscard]] virtual std::string name() const = 0;
 };
 
-/// Draws with csg::Preview; its pictures are those of `strata csg`.
-[[nodiscard]] std::unique_ptr<Renderer> make_cpu_renderer();
+/// Draws with csg::Preview; its pictures are those of `strata csg`. With a GPU (`backend`) surfaces
+/// are found there, in a context of the drawing thread's own; what the GPU cannot do or fails at is
+/// the CPU's work. Heat maps always are.
+[[nodiscard]] std::unique_ptr<Renderer> make_renderer(apps::Backend backend = apps::Backend::kCpu);
 
 /// The colour of a part of a heat map's range, in [0, 1]: dark blue, green, yellow.
 [[nodiscard]] csg::Rgba heat_colour(double part);

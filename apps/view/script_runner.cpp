@@ -288,7 +288,7 @@ std::string statistics_json(const Viewer& viewer) {
       "\"largest_reaction_ms\": {:.1f}, \"reactions\": {}, \"present_ms\": {:.2f}, \"frames\": {}, "
       "\"crossings\": {}, \"resolved\": {}, \"covered\": {}, \"longest_list\": {}, \"loads\": {}, "
       "\"error\": {}}}",
-      json_text(viewer.renderer_name()), viewer.viewport().x, viewer.viewport().y,
+      json_text(viewer.drawn_by()), viewer.viewport().x, viewer.viewport().y,
       model != nullptr ? model->scene.tree.solids().size() : 0,
       model != nullptr ? model->triangles : 0, model != nullptr ? model->load_ms : 0.0,
       s.prepare_ms, s.coarse_ms, s.divisor, s.whole_ms, s.whole_latency_ms, s.reaction_ms,

@@ -30,6 +30,8 @@ constexpr std::pair<std::string_view, InsideRule> kRules[] = {{"winding", Inside
                                                               {"parity", InsideRule::kParity}};
 constexpr std::pair<std::string_view, Heat> kHeats[] = {
     {"off", Heat::kOff}, {"thickness", Heat::kThickness}, {"depth", Heat::kDepth}};
+constexpr std::pair<std::string_view, apps::Backend> kBackends[] = {
+    {"auto", apps::Backend::kAuto}, {"cpu", apps::Backend::kCpu}, {"gl", apps::Backend::kGl}};
 constexpr std::pair<std::string_view, MeshFormat> kFormats[] = {{"auto", MeshFormat::kAuto},
                                                                 {"obj", MeshFormat::kObj},
                                                                 {"stl", MeshFormat::kStl},
@@ -38,7 +40,7 @@ constexpr std::pair<std::string_view, MeshFormat> kFormats[] = {{"auto", MeshFor
 
 struct Words {
   std::vector<std::string> files;
-  std::string rule = "winding", format = "auto", heat = "off", threads;
+  std::string rule = "winding", format = "auto", heat = "off", backend = "auto", threads;
   apps::CsgWords csg;
 };
 
@@ -86,6 +88,8 @@ void define(CLI::App& app, Words& words, ViewOptions& options) {
          "FILE.png", drive);
   option("--script", options.script, "Commands, one a line (below); - for standard input", "FILE",
          drive);
+  option("--backend", words.backend, "Who finds surfaces: cpu, gl (OpenGL 4.5) or auto", "B",
+         "Running");
   option("-j,--threads", words.threads, "Threads; 0 (default): one a processor", "N", "Running");
 }
 
@@ -108,6 +112,9 @@ Result<void> read(Words& words, ViewOptions& options) {
   auto heat = apps::parse_choice("--heat", words.heat, kHeats);
   if (!heat) return tl::unexpected(heat.error());
   options.heat = *heat;
+  auto backend = apps::parse_choice("--backend", words.backend, kBackends);
+  if (!backend) return tl::unexpected(backend.error());
+  options.command.backend = *backend;
   if (!words.threads.empty()) {
     auto threads = apps::parse_integer("--threads", words.threads);
     if (!threads) return tl::unexpected(threads.error());

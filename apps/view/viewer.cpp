@@ -37,16 +37,17 @@ void Viewer::reload() { loader_.start(options_.command, options_.command.common.
 
 void Viewer::cancel_load() { loader_.cancel(); }
 
-void Viewer::change(bool looks) {
+void Viewer::change(bool looks, bool input) {
   due_ = true;
   arrange_due_ = arrange_due_ || looks;
+  changed_by_input_ = changed_by_input_ || input;
   if (!changed_at_) changed_at_ = Clock::now();
 }
 
 void Viewer::set_viewport(const glm::ivec2& size) {
   if (size == viewport_) return;
   viewport_ = size;
-  change(false);
+  change(false, false);
 }
 
 void Viewer::first_camera() {
@@ -67,7 +68,7 @@ void Viewer::take_model(std::shared_ptr<const Model> model) {
   }
   model_ = std::move(model);
   picked_.reset();
-  change(true);
+  change(true, false);
 }
 
 void Viewer::take_frame(Frame frame) {
@@ -82,6 +83,7 @@ void Viewer::take_frame(Frame frame) {
     statistics_.longest_list = frame.longest_list;
   }
   draw_error_.clear();
+  drawn_by_ = frame.drawn_by;
   frame_ = std::move(frame);
   ++frame_serial_;
   frame_presented_ = false;
@@ -143,7 +145,8 @@ void Viewer::tick() {
   request.look = picture_;
   request.heat = heat_;
   last_asked_ = thread_.submit(std::move(request));
-  asked_.push_back({last_asked_, *std::exchange(changed_at_, {})});
+  asked_.push_back(
+      {last_asked_, *std::exchange(changed_at_, {}), std::exchange(changed_by_input_, false)});
   whole_asked_ = asked_.back();
 }
 
@@ -154,7 +157,7 @@ void Viewer::presented(double present_ms) {
   const auto now = Clock::now();
   std::optional<Clock::time_point> oldest;
   while (!asked_.empty() && asked_.front().number <= frame_->number) {
-    if (!oldest) oldest = asked_.front().at;
+    if (!oldest && asked_.front().input) oldest = asked_.front().at;
     asked_.pop_front();
   }
   if (oldest) {

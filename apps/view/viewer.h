@@ -123,14 +123,16 @@ class Viewer {
   [[nodiscard]] bool picking() const { return picking_; }
   [[nodiscard]] std::string describe(const Picked& picked) const;
   [[nodiscard]] std::string solid_name(std::uint32_t solid) const;
-  [[nodiscard]] std::string renderer_name() const { return thread_.renderer_name(); }
+  /// What drew the last picture, and why not something better.
+  [[nodiscard]] const std::string& drawn_by() const { return drawn_by_; }
   /// Anything between the mouse and the screen: the window should look often.
   [[nodiscard]] bool busy() const { return !settled() || loading(); }
 
  private:
   enum class Drag : std::uint8_t { kNone, kOrbit, kPan, kZoom, kSection };
 
-  void change(bool looks);  ///< a new picture is due
+  /// A new picture is due. @param input a hand asked for it, and waits
+  void change(bool looks, bool input = true);
   void take_model(std::shared_ptr<const Model> model);
   void take_frame(Frame frame);
   void first_camera();
@@ -148,9 +150,11 @@ class Viewer {
 
   bool load_due_ = false, due_ = false, arrange_due_ = false;
   std::optional<Clock::time_point> changed_at_;  ///< the first change not yet asked for
+  bool changed_by_input_ = false;
   struct Asked {
     std::uint64_t number;
     Clock::time_point at;
+    bool input = false;
   };
   std::deque<Asked> asked_;  ///< whose (coarse) picture has not been shown
   std::optional<Asked> whole_asked_;
@@ -160,7 +164,7 @@ class Viewer {
   std::optional<Frame> frame_;
   std::uint64_t frame_serial_ = 0;
   Statistics statistics_;
-  std::string load_error_, draw_error_;
+  std::string load_error_, draw_error_, drawn_by_;
   ErrorCode load_error_code_ = ErrorCode::kInternal;
   std::uint64_t loads_ = 0;
   std::optional<Picked> picked_;

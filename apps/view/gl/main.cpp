@@ -16,6 +16,7 @@
 #include <new>
 #include <optional>
 #include <string>
+#include <thread>
 #include <utility>
 
 #include "apps/session.h"
@@ -24,6 +25,7 @@
 #include "apps/view/script_runner.h"
 #include "apps/view/view_options.h"
 #include "apps/view/viewer.h"
+#include "core/atomic_file.h"
 #include "gl/window.h"
 
 namespace strata::view {
@@ -58,6 +60,10 @@ std::string key_name(int key, int modifiers) {
   return {};
 }
 
+void complain(const Error& error) {
+  std::fprintf(stderr, "strata view: error: %s\n", error.message.c_str());
+}
+
 /// The window, what is in it, and its loop.
 class Program final : public Stage {
  public:
@@ -71,6 +77,7 @@ class Program final : public Stage {
     ImGui_ImplGlfw_Shutdown();
     ImGui::DestroyContext();
     canvas_.reset();
+    leave_soon(result);
     if (auto checked = window_->check(); !checked && result) result = std::move(checked);
     if (!result) return result;
     // Nothing was ever shown: that is how the program ends, too.
@@ -78,6 +85,18 @@ class Program final : public Stage {
       return tl::unexpected(Error{viewer_->load_error_code(), viewer_->load_error()});
     }
     return {};
+  }
+
+  /// A load that does not stop in time is left to the system; it has nothing to put in order.
+  void leave_soon(const Result<void>& result) {
+    viewer_->cancel_load();
+    for (int i = 0; i < 50 && viewer_->loading(); ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    if (!viewer_->loading()) return;
+    if (!result) complain(result.error());
+    remove_temporary_files();
+    std::_Exit(result ? 0 : static_cast<int>(result.error().code));
   }
 
   // --- Stage
@@ -98,7 +117,8 @@ class Program final : public Stage {
 
  private:
   void start() {
-    viewer_.emplace(options_, make_cpu_renderer(), [] { glfwPostEmptyEvent(); });
+    viewer_.emplace(options_, make_renderer(options_.command.backend),
+                    [] { glfwPostEmptyEvent(); });
     canvas_.emplace();
     GLFWwindow* glfw = window_->glfw();
     glfwSetWindowUserPointer(glfw, this);
@@ -304,7 +324,7 @@ int view_main(int argc, char** argv) {
   }
   const Result<void> result = run(std::get<ViewOptions>(std::move(parsed)));
   if (result) return 0;
-  std::fprintf(stderr, "strata view: error: %s\n", result.error().message.c_str());
+  complain(result.error());
   return static_cast<int>(result.error().code);
 }
 

@@ -97,7 +97,7 @@ void Panels::legend(const Viewer& viewer, const Area& area) {
   constexpr int kSteps = 48;
   const float width = 18 * scale_,
               height = std::min(220 * scale_, static_cast<float>(area.size.y) * 0.5f);
-  const float left = static_cast<float>(area.at.x) + 18 * scale_;
+  const float left = static_cast<float>(area.at.x + area.size.x) - 142 * scale_;
   const float top = static_cast<float>(area.at.y) + 44 * scale_;
   ImDrawList* list = ImGui::GetBackgroundDrawList();
   list->AddRectFilled({left - 8 * scale_, top - 34 * scale_},

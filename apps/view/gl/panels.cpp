@@ -320,7 +320,7 @@ void Panels::status(const Viewer& viewer, const glm::ivec2& window) {
                                                 : "";
   const std::string right =
       fmt::format("{}{}drawn by {}, shown by {}", state, state.empty() ? "" : "   ",
-                  viewer.renderer_name(), gl_renderer_);
+                  viewer.drawn_by(), gl_renderer_);
   const float width = ImGui::CalcTextSize(right.c_str()).x;
   const float left_end = ImGui::CalcTextSize(left.c_str()).x + 24 * scale_;
   const float begin = static_cast<float>(window.x) - width - 10 * scale_;
@@ -330,6 +330,18 @@ void Panels::status(const Viewer& viewer, const glm::ivec2& window) {
   }
   ImGui::End();
   ImGui::PopStyleVar(2);
+}
+
+/// A bar for what cannot tell how far it is.
+void Panels::waiting(double seconds) const {
+  const ImVec2 at = ImGui::GetCursorScreenPos(), size(260 * scale_, ImGui::GetFrameHeight());
+  const auto part = static_cast<float>(0.5 - 0.5 * std::cos(seconds * 2.5));
+  const float width = size.x * 0.25f, left = at.x + part * (size.x - width);
+  ImDrawList* list = ImGui::GetWindowDrawList();
+  list->AddRectFilled(at, {at.x + size.x, at.y + size.y}, ImGui::GetColorU32(ImGuiCol_FrameBg), 3);
+  list->AddRectFilled({left, at.y}, {left + width, at.y + size.y},
+                      ImGui::GetColorU32(ImGuiCol_PlotHistogram), 3);
+  ImGui::Dummy(size);
 }
 
 void Panels::messages(Viewer& viewer, const Area& area) {
@@ -345,12 +357,14 @@ void Panels::messages(Viewer& viewer, const Area& area) {
   trouble += viewer.draw_error();
   const bool wrong = !trouble.empty();
   std::vector<std::string> lines;
-  if (viewer.model() != nullptr) lines = viewer.model()->warnings;
+  if (viewer.model() != nullptr && hidden_warnings_ != viewer.loads()) {
+    lines = viewer.model()->warnings;
+  }
   constexpr std::size_t kMostLines = 4;
   if (lines.size() > kMostLines) {
     const std::size_t more = lines.size() - (kMostLines - 1);
     lines.resize(kMostLines - 1);
-    lines.push_back(fmt::format("and {} more", apps::counted(more, "warning")));
+    lines.push_back(fmt::format("and {} like these", apps::counted(more, "warning")));
   }
   const float wrap = std::max(80 * scale_, width - 48 * scale_);
   if (wrong || (viewer.show_panels && !lines.empty())) {
@@ -363,7 +377,8 @@ void Panels::messages(Viewer& viewer, const Area& area) {
       text(trouble);
       if (viewer.model() != nullptr) faint("What is shown is from before.");
     } else {
-      for (const std::string& line : lines) text("warning: " + line);
+      for (const std::string& line : lines) text(line);
+      if (ImGui::SmallButton("Hide warnings")) hidden_warnings_ = viewer.loads();
     }
     ImGui::PopTextWrapPos();
     ImGui::End();
@@ -374,7 +389,12 @@ void Panels::messages(Viewer& viewer, const Area& area) {
     ImGui::Begin("loading", nullptr, kBox);
     text(fmt::format("Reading {} ... {:.0f} s", viewer.options().command.input.files.front(),
                      viewer.load_seconds()));
-    ImGui::ProgressBar(static_cast<float>(viewer.load_progress()), {260 * scale_, 0});
+    const double progress = viewer.load_progress();
+    if (progress > 0) {
+      ImGui::ProgressBar(static_cast<float>(progress), {260 * scale_, 0});
+    } else {
+      waiting(viewer.load_seconds());
+    }
     ImGui::SameLine();
     if (ImGui::Button("Cancel")) viewer.cancel_load();
     ImGui::End();

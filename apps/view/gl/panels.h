@@ -33,6 +33,7 @@ class Panels {
   void solids(Viewer& viewer);
   void statistics(const Viewer& viewer);
   void status(const Viewer& viewer, const glm::ivec2& window);
+  void waiting(double seconds) const;
   void messages(Viewer& viewer, const Area& area);
   void axes(const Viewer& viewer, const Area& area);
   void handle(const Viewer& viewer, const Area& area);
@@ -44,6 +45,7 @@ class Panels {
   std::array<char, 128> filter_{};
   std::string told_;
   Viewer::Clock::time_point told_at_{};
+  std::uint64_t hidden_warnings_ = 0;  ///< of the load of that number
 };
 
 }  // namespace strata::view

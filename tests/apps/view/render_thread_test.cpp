@@ -50,7 +50,6 @@ class SlowRenderer final : public Renderer {
     picked.hit = true;
     return picked;
   }
-  [[nodiscard]] std::string name() const override { return "slow"; }
 
  private:
   Log& log_;
@@ -235,7 +234,7 @@ TEST(CpuRenderer, PicturesAreThoseOfPreview) {
   request.size = {160, 120};
   request.camera.distance = 40;
   request.look.edges = true;
-  const auto renderer = make_cpu_renderer();
+  const auto renderer = make_renderer();
   const auto frame = renderer->draw(request, {});
   ASSERT_TRUE(frame);
   csg::Preview preview(ball_and_box(), {}, 0);
@@ -252,7 +251,7 @@ TEST(CpuRenderer, PicksAreThePixelsOfThePicture) {
   request.what = what;
   request.size = {97, 61};
   request.camera.distance = 40;
-  const auto renderer = make_cpu_renderer();
+  const auto renderer = make_renderer();
   for (const auto projection : {csg::Projection::kPerspective, csg::Projection::kOrthographic}) {
     request.camera.projection = projection;
     csg::Preview preview(ball_and_box(), {}, 0);
@@ -295,7 +294,7 @@ TEST(CpuRenderer, HeatMapsSayWhatTheirColoursMean) {
   request.camera.projection = csg::Projection::kOrthographic;
   request.camera.rotation = {0, 0, 0};
   request.camera.distance = 40;
-  const auto renderer = make_cpu_renderer();
+  const auto renderer = make_renderer();
   request.heat = Heat::kDepth;
   auto frame = renderer->draw(request, {});
   ASSERT_TRUE(frame);

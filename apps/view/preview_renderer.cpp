@@ -3,6 +3,8 @@
 #include <cmath>
 #include <utility>
 
+#include "apps/gpu.h"
+#include "apps/session.h"
 #include "apps/view/camera_control.h"
 #include "apps/view/renderer.h"
 #include "csg/ray_image.h"
@@ -21,28 +23,37 @@ constexpr glm::vec3 kHeat[] = {{68, 1, 84},    {72, 40, 120},  {62, 74, 137},  {
                                {38, 130, 142}, {31, 158, 137}, {53, 183, 121}, {109, 205, 89},
                                {180, 222, 44}, {253, 231, 37}};
 
-class CpuRenderer final : public Renderer {
+class PreviewRenderer final : public Renderer {
  public:
+  explicit PreviewRenderer(apps::Backend backend) : backend_(backend) {}
+
   Result<Frame> draw(const FrameRequest& request, const Execution& execution) override {
     Frame frame;
     frame.number = request.number;
     frame.camera = request.camera;
     frame.wanted = request.size;
     const auto begin = Clock::now();
-    adopt(request.what, execution);
+    adopt(request.what);
     if (request.heat == Heat::kOff) {
+      open_gpu(execution);
       if (!preview_) {
-        preview_.emplace(what_->tree, what_->ghosts, what_->relative_precision, execution);
+        prepare(execution);
         frame.prepare_ms = ms_since(begin);
       }
       const auto drawn = Clock::now();
       auto picture = preview_->picture(request.camera, request.size, request.look, execution);
+      if (!picture && surfaces_ != nullptr && picture.error().code != ErrorCode::kCancelled) {
+        give_up_gpu(picture.error());
+        picture = preview_->picture(request.camera, request.size, request.look, execution);
+      }
       if (!picture) return tl::unexpected(picture.error());
       frame.picture = *std::move(picture);
+      frame.drawn_by = drawn_by_;
       frame.report = preview_->report();
       frame.draw_ms = ms_since(drawn);
       return frame;
     }
+    frame.drawn_by = "CPU";
     if (!meter_) {
       meter_.emplace(what_->tree, what_->tree.root(), what_->relative_precision, execution);
       frame.prepare_ms = ms_since(begin);
@@ -56,10 +67,8 @@ class CpuRenderer final : public Renderer {
                       const Execution& execution) override {
     Picked picked;
     picked.pixel = pixel;
-    adopt(request.what, execution);
-    if (!preview_) {
-      preview_.emplace(what_->tree, what_->ghosts, what_->relative_precision, execution);
-    }
+    adopt(request.what);
+    if (!preview_) prepare(execution);
     const auto whole = csg::make_view(request.camera, request.size, preview_->box());
     if (!whole) return tl::unexpected(whole.error());
     // The picture's lattice, moved by whole pixels: the same bits.
@@ -84,15 +93,48 @@ class CpuRenderer final : public Renderer {
     return picked;
   }
 
-  [[nodiscard]] std::string name() const override { return "CPU"; }
-
  private:
-  void adopt(const std::shared_ptr<const Arrangement>& what, const Execution& /*execution*/) {
+  void adopt(const std::shared_ptr<const Arrangement>& what) {
     if (what == what_) return;
     preview_.reset();
     meter_.reset();
     what_ = what;
   }
+
+  void prepare(const Execution& execution) {
+    preview_.emplace(what_->tree, what_->ghosts, what_->relative_precision, execution);
+    preview_->set_source(surfaces_);
+  }
+
+  /// Once, on the thread that draws: a context belongs to a thread.
+  void open_gpu(const Execution& execution) {
+    if (std::exchange(looked_for_gpu_, true) || backend_ == apps::Backend::kCpu) return;
+    Execution own = execution;
+    own.stop = {};
+    own.progress = {};
+    session_.emplace(Clock::now(), own);
+    auto gpu = apps::Gpu::open(backend_, *session_);
+    if (!gpu) return say_why(gpu.error());
+    if (*gpu == nullptr) return;  // auto, and there is none
+    auto surfaces = (*gpu)->surfaces();
+    if (!surfaces) return say_why(surfaces.error());
+    if (*surfaces == nullptr) {
+      const auto& warnings = session_->warnings();
+      drawn_by_ = "CPU";
+      if (!warnings.empty()) drawn_by_ += " (" + warnings.back().message + ")";
+      return;
+    }
+    gpu_ = *std::move(gpu);
+    surfaces_ = *surfaces;
+    drawn_by_ = "GPU";
+    if (preview_) preview_->set_source(surfaces_);
+  }
+  void give_up_gpu(const Error& error) {
+    preview_->set_source(nullptr);
+    surfaces_ = nullptr;
+    say_why(error);
+  }
+  void say_why(const Error& error) { drawn_by_ = "CPU (" + error.message + ")"; }
 
   Result<void> draw_heat(const FrameRequest& request, const Execution& execution, Frame& frame) {
     const auto begin = Clock::now();
@@ -146,6 +188,12 @@ class CpuRenderer final : public Renderer {
     return 10 * power;
   }
 
+  apps::Backend backend_;
+  bool looked_for_gpu_ = false;
+  std::string drawn_by_ = "CPU";
+  std::optional<apps::Session> session_;
+  std::unique_ptr<apps::Gpu> gpu_;
+  csg::SurfaceSource* surfaces_ = nullptr;
   std::shared_ptr<const Arrangement> what_;
   std::optional<csg::Preview> preview_;
   std::optional<csg::RayMeter> meter_;
@@ -153,7 +201,9 @@ class CpuRenderer final : public Renderer {
 
 }  // namespace
 
-std::unique_ptr<Renderer> make_cpu_renderer() { return std::make_unique<CpuRenderer>(); }
+std::unique_ptr<Renderer> make_renderer(apps::Backend backend) {
+  return std::make_unique<PreviewRenderer>(backend);
+}
 
 csg::Rgba heat_colour(double part) {
   constexpr int kLast = static_cast<int>(std::size(kHeat)) - 1;
