@@ -248,11 +248,11 @@ Machine measure_machine(double budget) {
       "atomics",
       "layout(local_size_x = 64) in;\n"
       "layout(std430, binding = 0) buffer table_block { uint table[]; };\n"
-      "uniform uint cells, round;\n"
+      "uniform uint cells, turn;\n"
       "void main() {\n"
       "  uint i = (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * 64u + "
       "gl_LocalInvocationID.x;\n"
-      "  atomicMax(table[(i * 2654435761u) & (cells - 1u)], i + round);\n"
+      "  atomicMax(table[(i * 2654435761u) & (cells - 1u)], i + turn);\n"
       "}\n"};
   const auto program = need(gl::Program::compute({&piece, 1}));
   const gl::Groups groups = gl::groups_for(cells, 64);
@@ -274,7 +274,7 @@ Machine measure_machine(double budget) {
   machine.atomic_rate = rate(static_cast<double>(cells), [&](std::uint32_t i) {
     table.bind(0);
     program.set("cells", cells);
-    program.set("round", i);
+    program.set("turn", i);
     program.dispatch(groups.x, groups.y);
     gl::storage_barrier();
   });

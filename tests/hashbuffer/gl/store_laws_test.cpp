@@ -351,6 +351,48 @@ TEST_F(GlHashTable, ALargeFrameIsTheCpusToo) {
   EXPECT_EQ((*store)->checksum(0), cpu->checksum());
 }
 
+TEST_F(GlHashTable, ABandIsTheTableOfItsRows) {
+  const int width = 23, height = 41;
+  Random random(6);
+  const auto fragments = random_fragments(random, width, height, 4000, 90, 4);
+  for (const int bits : {32, 64}) {
+    auto made = HashStore::create(context_->info(), {.record_bits = bits,
+                                                     .path = WordPath::kAuto,
+                                                     .offsets = OffsetKind::kRandom,
+                                                     .binding_bytes = 5000});
+    ASSERT_TRUE(made);
+    HashStore& store = **made;
+    GlSubmission submission(width, height, fragments);
+    const auto report = build(store, submission);
+    ASSERT_TRUE(report) << report.error().message;
+    ASSERT_GT(store.bands(), 3);
+    for (int band = 0; band < store.bands(); ++band) {
+      const PixelRows rows = store.band_rows(band);
+      std::vector<Fragment> own;
+      for (Fragment f : fragments) {
+        if (f.y < static_cast<int>(rows.begin) || f.y >= static_cast<int>(rows.end)) continue;
+        f.y -= static_cast<int>(rows.begin);
+        own.push_back(f);
+      }
+      const auto words = store.table(band);
+      const auto expect_equal = [&](auto cpu) {
+        ASSERT_TRUE(cpu);
+        ASSERT_TRUE(build(*cpu, Submission(own)));
+        EXPECT_TRUE(
+            std::equal(words.begin(), words.end(), cpu->cells().begin(), cpu->cells().end()))
+            << "band " << band << ", " << bits << " bits";
+      };
+      const HashBufferOptions options{.cells = words.size(), .offsets = OffsetKind::kRandom};
+      const auto own_rows = static_cast<int>(rows.end - rows.begin);
+      if (bits == 32) {
+        expect_equal(HashBuffer<Record32, Exclusive>::create(width, own_rows, options));
+      } else {
+        expect_equal(HashBuffer<Record64, Exclusive>::create(width, own_rows, options));
+      }
+    }
+  }
+}
+
 TEST_F(GlHashTable, TheSecondPassCountsStrangers) {
   /// Gives one fragment more in its second pass.
   class Fickle : public GlSubmission {
