@@ -10,14 +10,14 @@
 namespace strata::gl {
 
 Result<Buffer> Buffer::allocate(std::uint64_t bytes) {
-  static_cast<void>(check_errors(""));  // so that what follows is ours
   Buffer buffer;
   glCreateBuffers(1, &buffer.id_);
   // A buffer of no bytes cannot be bound.
   glNamedBufferStorage(buffer.id_, static_cast<GLsizeiptr>(std::max<std::uint64_t>(bytes, 4)),
                        nullptr, GL_DYNAMIC_STORAGE_BIT);
+  // An error of an earlier call comes to light here too; it is not lost.
   if (auto checked = check_errors("allocation"); !checked) {
-    return fail(ErrorCode::kLimit, "OpenGL: no buffer of {} bytes: {}", bytes,
+    return fail(checked.error().code, "OpenGL: no buffer of {} bytes: {}", bytes,
                 checked.error().message);
   }
   buffer.bytes_ = bytes;

@@ -393,6 +393,23 @@ TEST_F(GlHashTable, ABandIsTheTableOfItsRows) {
   }
 }
 
+TEST_F(GlHashTable, AScreenLargerThanABindingIsCutIntoBands) {
+  const std::uint64_t limit = context_->info().limits.storage_block_bytes;
+  if (limit > 1u << 28) GTEST_SKIP() << "this driver binds " << limit << " bytes";
+  // One cell a pixel, and a row more than a binding holds.
+  const int width = 4096, height = static_cast<int>(limit / 4 / 4096) + 1;
+  auto store = HashStore::create(context_->info(), {.record_bits = 32});
+  ASSERT_TRUE(store);
+  const std::vector<Fragment> fragments{{5, 0, 9, 0}, {7, height - 1, 3, 0}, {7, height - 1, 2, 0}};
+  GlSubmission submission(width, height, fragments);
+  const auto report = build(**store, submission);
+  ASSERT_TRUE(report) << report.error().message;
+  EXPECT_EQ((*store)->bands(), 2);
+  EXPECT_EQ((*store)->cells(), static_cast<std::uint64_t>(width) * height);
+  const auto last = (*store)->table(1);
+  EXPECT_EQ(std::count(last.begin(), last.end(), 0u), static_cast<std::ptrdiff_t>(last.size()) - 2);
+}
+
 TEST_F(GlHashTable, TheSecondPassCountsStrangers) {
   /// Gives one fragment more in its second pass.
   class Fickle : public GlSubmission {
