@@ -9,10 +9,6 @@
 namespace strata::view {
 namespace {
 
-double pixels_of(const glm::ivec2& size) {
-  return static_cast<double>(size.x) * static_cast<double>(size.y);
-}
-
 /// A renderer's exceptions stop here.
 template <class Call>
 auto guarded(Call&& call) -> decltype(call()) {
@@ -31,32 +27,26 @@ glm::ivec2 coarse_size(const glm::ivec2& size, int divisor) {
   return glm::max(glm::ivec2(1), (size + divisor - 1) / divisor);
 }
 
-int CoarsePolicy::divisor(const glm::ivec2& size, bool changed) const {
-  if (!known_) return 4;
-  const double target = changed ? kTargetMs / 2 : kTargetMs;
-  for (const int divisor : kDivisors) {
-    if (expected(pixels_of(coarse_size(size, divisor))) <= target) return divisor;
-  }
-  return kDivisors[std::size(kDivisors) - 1];
+int CoarsePolicy::divisor(bool changed) const {
+  constexpr int kLast = static_cast<int>(std::size(kDivisors)) - 1;
+  return kDivisors[std::min(step_ + (changed ? 1 : 0), kLast)];
 }
 
-void CoarsePolicy::learn(const glm::ivec2& size, int divisor, double ms) {
-  const double pixels = pixels_of(coarse_size(size, divisor));
-  if (!known_) {
-    // Half of a first coarse picture's time is a guess at what no pixel is to blame for.
-    fixed_ = divisor > 1 ? ms / 2 : 0;
-    per_pixel_ = (ms - fixed_) / pixels;
-    known_ = true;
+void CoarsePolicy::learn(int divisor, double ms, bool hurried) {
+  constexpr int kLast = static_cast<int>(std::size(kDivisors)) - 1;
+  const int step = static_cast<int>(std::find(std::begin(kDivisors), std::end(kDivisors), divisor) -
+                                    std::begin(kDivisors));
+  const bool late = ms > kTargetMs;
+  const int coarser = std::min(step + (ms > 2 * kTargetMs ? 2 : 1), kLast);
+  if (!hurried) {
+    step_ = late ? std::max(step_, 1) : 0;
     return;
   }
-  // Large pictures tell what a pixel costs, small ones what is left.
-  if (divisor == 1) {
-    per_pixel_ = std::max(0.0, ms - fixed_) / pixels;
-  } else {
-    const double rest = std::max(0.0, ms - per_pixel_ * pixels);
-    fixed_ += 0.5 * (rest - fixed_);
-    if (rest == 0) per_pixel_ = 0.5 * (per_pixel_ + ms / pixels);
-  }
+  step_ = late ? coarser : std::min(step, kLast);
+  if (late || step == 0) return;
+  // All of the time is put down to pixels: the finer picture takes no longer than this.
+  const double more = static_cast<double>(divisor) / kDivisors[step - 1];
+  if (ms * more * more < kTargetMs) step_ = step - 1;
 }
 
 RenderThread::RenderThread(std::unique_ptr<Renderer> renderer, int threads,
@@ -144,7 +134,7 @@ void RenderThread::run(const std::stop_token& stop) {
       drawn_solids_ = request.what->tree.solids().size();
     }
     CoarsePolicy& policy = request.heat == Heat::kOff ? policy_ : heat_policy_;
-    const int divisor = whole ? 1 : policy.divisor(request.size, request.what != drawn_);
+    const int divisor = whole ? 1 : policy.divisor(drawn_ && request.what != drawn_);
     drawn_ = request.what;
     // A coarse picture is finished even when a newer one is wanted, or a moving hand would never
     // see any.
@@ -159,7 +149,7 @@ void RenderThread::run(const std::stop_token& stop) {
         auto frame = guarded([&] { return renderer_->draw(request, execution(newer)); });
         const std::chrono::duration<double, std::milli> took =
             std::chrono::steady_clock::now() - begin;
-        if (frame) policy.learn(request.size, 1, took.count() - frame->prepare_ms);
+        if (frame) policy.learn(1, took.count() - frame->prepare_ms, false);
         lock.lock();
         if (frame) {
           frame_ = *std::move(frame);
@@ -184,7 +174,7 @@ void RenderThread::draw_coarse(const FrameRequest& request, int divisor, bool la
   if (frame) {
     frame->wanted = request.size;
     frame->divisor = divisor;
-    policy.learn(request.size, divisor, took.count() - frame->prepare_ms);
+    policy.learn(divisor, took.count() - frame->prepare_ms, true);
     frame_ = *std::move(frame);
   } else {
     error_ = std::move(frame.error());

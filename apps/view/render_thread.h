@@ -14,26 +14,24 @@
 
 namespace strata::view {
 
-/// Chooses how coarse a picture must be to be there in time. Times of former pictures of the same
-/// kind decide.
+/// Chooses how coarse a picture must be to be there in time. The last picture decides: a step
+/// coarser when it took too long, a step finer when that would still be in time.
 class CoarsePolicy {
  public:
   static constexpr double kTargetMs = 35;  ///< two of them and the panels fit into 100 ms
   static constexpr int kDivisors[] = {1, 2, 3, 4, 6, 8, 12, 16};
 
-  /// The finest divisor whose picture is expected within kTargetMs; within half of it when what is
-  /// shown has `changed`, for nobody knows what that costs.
-  [[nodiscard]] int divisor(const glm::ivec2& size, bool changed = false) const;
-  /// A picture of `size` / divisor pixels took `ms`.
-  void learn(const glm::ivec2& size, int divisor, double ms);
+  /// What to try next; a step coarser when what is shown has `changed`, for nobody knows what that
+  /// costs.
+  [[nodiscard]] int divisor(bool changed = false) const;
+  /// A picture took `ms`. @param hurried it was the first answer to a request; else it was drawn at
+  /// leisure, and tells only whether whole pictures are in time.
+  void learn(int divisor, double ms, bool hurried);
   /// The scene has changed: nothing is known.
   void forget() { *this = {}; }
 
  private:
-  // ms = fixed_ + per_pixel_ * pixels, from the last two kinds of pictures seen.
-  [[nodiscard]] double expected(double pixels) const { return fixed_ + per_pixel_ * pixels; }
-  double fixed_ = 0, per_pixel_ = 0;
-  bool known_ = false;
+  int step_ = 3;  ///< into kDivisors
 };
 
 /// The size of a picture that is `divisor` times as coarse.

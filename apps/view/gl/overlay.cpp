@@ -111,9 +111,19 @@ void Panels::legend(const Viewer& viewer, const Area& area) {
     list->AddRectFilled({left, y}, {left + width, y + height / kSteps + 1},
                         IM_COL32(colour.r, colour.g, colour.b, 255));
   }
-  for (int i = 0; i <= 4; ++i) {
-    const double value = scale.low + (scale.high - scale.low) * (1.0 - i / 4.0);
-    const float y = top + height * static_cast<float>(i) / 4;
+  // Crossings are counted in whole numbers.
+  int marks = 4;
+  if (scale.heat == Heat::kDepth) {
+    const int high = static_cast<int>(scale.high);
+    marks = 1;
+    for (const int count : {5, 3, 4, 2}) {
+      if (high % count == 0 && marks == 1) marks = count;
+    }
+  }
+  for (int i = 0; i <= marks; ++i) {
+    const auto part = static_cast<float>(i) / static_cast<float>(marks);
+    const double value = scale.low + (scale.high - scale.low) * (1.0 - double{part});
+    const float y = top + height * part;
     list->AddLine({left + width, y}, {left + width + 4 * scale_, y}, IM_COL32(255, 255, 255, 255));
     list->AddText({left + width + 8 * scale_, y - ImGui::GetFontSize() / 2},
                   IM_COL32(255, 255, 255, 255), fmt::format("{:.4g}", value).c_str());

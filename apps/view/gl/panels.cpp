@@ -102,7 +102,11 @@ void Panels::side(Viewer& viewer, const glm::ivec2& window) {
   if (ImGui::CollapsingHeader("Look", ImGuiTreeNodeFlags_DefaultOpen)) look(viewer);
   if (ImGui::CollapsingHeader("Section", ImGuiTreeNodeFlags_DefaultOpen)) section(viewer);
   if (ImGui::CollapsingHeader("Picked", ImGuiTreeNodeFlags_DefaultOpen)) picked(viewer);
-  if (ImGui::CollapsingHeader("Statistics", ImGuiTreeNodeFlags_DefaultOpen)) statistics(viewer);
+  // In a low window the solids need the room.
+  constexpr int kHighEnough = 740;
+  ImGui::SetNextItemOpen(static_cast<float>(window.y) >= kHighEnough * scale_,
+                         ImGuiCond_FirstUseEver);
+  if (ImGui::CollapsingHeader("Statistics")) statistics(viewer);
   if (ImGui::CollapsingHeader("Solids", ImGuiTreeNodeFlags_DefaultOpen)) solids(viewer);
   ImGui::End();
 }

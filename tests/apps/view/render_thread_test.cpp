@@ -168,34 +168,43 @@ TEST_F(RenderThreadTest, EndsWhileAPictureIsUnderWay) {
   EXPECT_EQ(log_.cancelled, 1);
 }
 
-TEST(CoarsePolicy, SlowScenesAreDrawnCoarser) {
-  const glm::ivec2 size(1024, 768);
-  CoarsePolicy policy;
-  EXPECT_EQ(policy.divisor(size), 4);
-  policy.learn(size, 4, 20);
-  policy.learn(size, 1, 200);
-  const int slow = policy.divisor(size);
-  EXPECT_GE(slow, 2);
-  EXPECT_LE(slow, 4);
-  CoarsePolicy fast;
-  fast.learn(size, 4, 3);
-  fast.learn(size, 1, 12);
-  EXPECT_EQ(fast.divisor(size), 1);
-  CoarsePolicy hopeless;
-  hopeless.learn(size, 4, 4000);
-  hopeless.learn(size, 1, 9000);
-  EXPECT_EQ(hopeless.divisor(size), 16);
+/// A scene whose pictures take `fixed` ms and `whole` ms more when they are whole.
+int settled_divisor(CoarsePolicy& policy, double fixed, double whole) {
+  for (int i = 0; i < 20; ++i) {
+    const int divisor = policy.divisor();
+    policy.learn(divisor, fixed + whole / (divisor * divisor), true);
+    if (divisor > 1) policy.learn(1, fixed + whole, false);
+  }
+  return policy.divisor();
 }
 
-TEST(CoarsePolicy, AScenesFixedCostDoesNotMakeItCoarserForEver) {
-  const glm::ivec2 size(1024, 768);
+TEST(CoarsePolicy, PicturesAreAsFineAsTimeAllows) {
   CoarsePolicy policy;
-  policy.learn(size, 4, 500);  // the first picture paid for what is made once
-  for (int i = 0; i < 12; ++i) {
-    policy.learn(size, policy.divisor(size), 8);
-    policy.learn(size, 1, 30);
-  }
-  EXPECT_EQ(policy.divisor(size), 1);
+  EXPECT_EQ(policy.divisor(), 4);
+  EXPECT_EQ(settled_divisor(policy, 1, 20), 1);
+  EXPECT_EQ(settled_divisor(policy, 2, 100), 2);
+  EXPECT_EQ(settled_divisor(policy, 3, 400), 4);
+  EXPECT_EQ(settled_divisor(policy, 500, 9000), 16);
+  EXPECT_EQ(settled_divisor(policy, 1, 20), 1);  // and back
+  policy.forget();
+  EXPECT_EQ(policy.divisor(), 4);
+}
+
+TEST(CoarsePolicy, OneSlowPictureDoesNotMakeTheNextOnesMuchCoarser) {
+  CoarsePolicy policy;
+  settled_divisor(policy, 2, 100);
+  policy.learn(2, 300, true);
+  EXPECT_LE(policy.divisor(), 4);
+  policy.learn(4, 8, true);
+  policy.learn(3, 13, true);
+  EXPECT_EQ(policy.divisor(), 2);
+}
+
+TEST(CoarsePolicy, WhatHasChangedIsTriedAStepCoarser) {
+  CoarsePolicy policy;
+  settled_divisor(policy, 1, 20);
+  EXPECT_EQ(policy.divisor(), 1);
+  EXPECT_EQ(policy.divisor(true), 2);
 }
 
 TEST(CoarseSize, CoversTheWholePicture) {
