@@ -17,11 +17,12 @@ extern const gl::GlslPiece raster_gl_compute_large_comp;
 namespace strata::gl {
 namespace {
 
-constexpr std::uint32_t kGroupSize = 64;      // local_size_x of the shaders
-constexpr std::uint64_t kLargeBytes = 128;    // struct RasterLarge
-constexpr std::uint64_t kBlockBytes = 8;      // uvec2
-constexpr std::uint64_t kTriangleBytes = 12;  // three indices
-constexpr std::uint64_t kVertexBytes = 12;    // three coordinates
+constexpr std::uint32_t kGroupSize = 64;       // threads that take a triangle each
+constexpr std::uint32_t kBlockGroupSize = 32;  // threads that take a block together
+constexpr std::uint64_t kLargeBytes = 128;     // struct RasterLarge
+constexpr std::uint64_t kBlockBytes = 8;       // uvec2
+constexpr std::uint64_t kTriangleBytes = 12;   // three indices
+constexpr std::uint64_t kVertexBytes = 12;     // three coordinates
 constexpr std::size_t kKeptPasses = 16;
 
 enum Binding : unsigned {
@@ -42,12 +43,13 @@ struct ViewBlock {
   std::uint32_t depth_limit, unused;
 };
 
-GlslSettings with_int64(GlslSettings settings) {
+GlslSettings settings_for(GlslSettings settings, std::uint32_t group_size) {
   const char* const kInt64 = "GL_ARB_gpu_shader_int64";
   if (std::find(settings.extensions.begin(), settings.extensions.end(), kInt64) ==
       settings.extensions.end()) {
     settings.extensions.emplace_back(kInt64);
   }
+  settings.defines.emplace_back("RASTER_GROUP", std::to_string(group_size));
   return settings;
 }
 
@@ -65,7 +67,7 @@ Result<std::unique_ptr<ComputeRasterizer>> ComputeRasterizer::create(const Conte
   result->binding_bytes_ = info.limits.storage_block_bytes;
   const GlslPiece pieces[] = {glsl::raster_gl_triangle_h, glsl::raster_gl_compute_common,
                               glsl::raster_gl_compute_bin_comp};
-  auto program = Program::compute(pieces, with_int64({}));
+  auto program = Program::compute(pieces, settings_for({}, kGroupSize));
   if (!program) return tl::unexpected(program.error());
   result->bin_program_ = *std::move(program);
   auto view = Buffer::allocate(sizeof(ViewBlock));
@@ -206,15 +208,14 @@ Result<const ComputeRasterizer::Pass*> ComputeRasterizer::pass_for(const StoreGl
   if (known != passes_.end()) return &*known;
   Pass pass;
   pass.store = store;
-  const GlslSettings settings = with_int64(store.settings);
-  const auto compile = [&](const GlslPiece& main) {
+  const auto compile = [&](const GlslPiece& main, std::uint32_t group_size) {
     const GlslPiece pieces[] = {glsl::raster_gl_triangle_h, glsl::raster_gl_compute_common,
                                 store.piece(), main};
-    return Program::compute(pieces, settings);
+    return Program::compute(pieces, settings_for(store.settings, group_size));
   };
-  auto small = compile(glsl::raster_gl_compute_small_comp);
+  auto small = compile(glsl::raster_gl_compute_small_comp, kGroupSize);
   if (!small) return tl::unexpected(small.error());
-  auto large = compile(glsl::raster_gl_compute_large_comp);
+  auto large = compile(glsl::raster_gl_compute_large_comp, kBlockGroupSize);
   if (!large) return tl::unexpected(large.error());
   pass.small = *std::move(small);
   pass.large = *std::move(large);

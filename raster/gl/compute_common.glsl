@@ -1,7 +1,7 @@
 // What the three shaders of the compute rasterizer share: the mesh, the target, and what the first
 // of them sorts out.
 
-layout(local_size_x = 64) in;
+layout(local_size_x = RASTER_GROUP) in;
 
 layout(std430, binding = 0) readonly buffer RasterVertices { int raster_vertices[]; };
 layout(std430, binding = 1) readonly buffer RasterTriangles { uint raster_triangles[]; };
@@ -32,7 +32,7 @@ struct RasterLarge {
 
 // One thread a triangle: number of this thread, whatever the shape of the dispatch.
 uint raster_thread() {
-  return (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * 64u +
+  return (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * uint(RASTER_GROUP) +
          gl_LocalInvocationID.x;
 }
 

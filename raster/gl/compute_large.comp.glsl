@@ -5,6 +5,20 @@ layout(std430, binding = 3) readonly buffer RasterLargeList { RasterLarge raster
 layout(std430, binding = 4) readonly buffer RasterBlocks { uvec2 raster_blocks[]; };
 uniform uint raster_block_count;
 
+// Narrows the steps [begin, end) to those where an edge that is `at` at step 0 may not be negative.
+// In single precision, with a step more on each side: each step is asked exactly afterwards.
+void raster_narrow(int64_t at, int64_t down, inout int begin, inout int end) {
+  if (at < 0) {
+    if (down <= 0) {
+      end = 0;
+    } else {
+      begin = max(begin, int(min(-float(at) / float(down), 64.0)) - 1);
+    }
+  } else if (down < 0) {
+    end = min(end, int(min(float(at) / -float(down), 64.0)) + 2);
+  }
+}
+
 void main() {
   uint index = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
   if (index >= raster_block_count) return;
@@ -16,7 +30,7 @@ void main() {
   int height = min(kRasterBlockSide, box.w - box.y - first_v);
   int shift = width <= 8 ? 3 : width <= 16 ? 4 : 5;
   int lane = int(gl_LocalInvocationID.x);
-  int lane_u = lane & ((1 << shift) - 1), lane_v = lane >> shift, rows = 64 >> shift;
+  int lane_u = lane & ((1 << shift) - 1), lane_v = lane >> shift, rows = RASTER_GROUP >> shift;
   if (lane_u >= width || lane_v >= height) return;
   int u = first_u + lane_u, v = first_v + lane_v;  // from the first pixel of the box
 
@@ -30,6 +44,17 @@ void main() {
                   int64_t(along_v.z) * step_v;
   int64_t down0 = int64_t(along_v.x) * int64_t(rows), down1 = int64_t(along_v.y) * int64_t(rows),
           down2 = int64_t(along_v.z) * int64_t(rows);
+
+  // The rows of this thread, counted from its first, that may be covered.
+  int begin = 0, end = (height - 1 - lane_v) / rows + 1;
+  raster_narrow(edge0, down0, begin, end);
+  raster_narrow(edge1, down1, begin, end);
+  raster_narrow(edge2, down2, begin, end);
+  if (begin >= end) return;
+  edge0 += down0 * int64_t(begin);
+  edge1 += down1 * int64_t(begin);
+  edge2 += down2 * int64_t(begin);
+  v += begin * rows;
 
   uint64_t area = packUint2x32(raster_large[slot].area);
   RasterFraction base, by_u, by_v, none;
@@ -46,7 +71,7 @@ void main() {
   uint payload = raster_large[slot].payload;
   uint pixel = raster_pixel(box.x + u, box.y + v);
   uint pixel_step = uint(rows) * uint(raster_width);
-  for (int row = lane_v; row < height; row += rows) {
+  for (int row = begin; row < end; ++row) {
     if ((edge0 | edge1 | edge2) >= 0) {
       strata_insert(pixel, raster_depth(0, at.quotient, raster_depth_limit), payload);
     }
