@@ -114,7 +114,7 @@ void RenderThread::run(const std::stop_token& stop) {
       const glm::ivec2 pixel = *std::exchange(wanted_pick_, {});
       const FrameRequest request = *current_;
       lock.unlock();
-      auto picked = guarded([&] { return renderer_->pick(request, pixel, execution({})); });
+      auto picked = guarded([&] { return renderer_->pick(request, pixel, execution(stop)); });
       lock.lock();
       picked_ = std::move(picked);
       working_ = false;
@@ -138,7 +138,7 @@ void RenderThread::run(const std::stop_token& stop) {
     drawn_ = request.what;
     // A coarse picture is finished even when a newer one is wanted, or a moving hand would never
     // see any.
-    draw_coarse(request, divisor, divisor == 1);
+    draw_coarse(request, divisor, divisor == 1, stop);
     lock.lock();
     if (divisor > 1 && !error_) {
       const auto superseded = [this] { return wanted_.has_value(); };
@@ -163,11 +163,12 @@ void RenderThread::run(const std::stop_token& stop) {
   }
 }
 
-void RenderThread::draw_coarse(const FrameRequest& request, int divisor, bool last) {
+void RenderThread::draw_coarse(const FrameRequest& request, int divisor, bool last,
+                               const std::stop_token& stop) {
   FrameRequest coarse = request;
   coarse.size = coarse_size(request.size, divisor);
   const auto begin = std::chrono::steady_clock::now();
-  auto frame = guarded([&] { return renderer_->draw(coarse, execution({})); });
+  auto frame = guarded([&] { return renderer_->draw(coarse, execution(stop)); });
   const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - begin;
   CoarsePolicy& policy = request.heat == Heat::kOff ? policy_ : heat_policy_;
   const std::lock_guard lock(mutex_);

@@ -63,7 +63,8 @@ class RenderThread {
 
  private:
   void run(const std::stop_token& stop);
-  void draw_coarse(const FrameRequest& request, int divisor, bool last);
+  void draw_coarse(const FrameRequest& request, int divisor, bool last,
+                   const std::stop_token& stop);
   [[nodiscard]] Execution execution(const std::stop_token& stop) const;
 
   /// No new request for so long, and the hand rests.

@@ -41,6 +41,7 @@ constexpr std::pair<std::string_view, MeshFormat> kFormats[] = {{"auto", MeshFor
 struct Words {
   std::vector<std::string> files;
   std::string rule = "winding", format = "auto", heat = "off", backend = "auto", threads;
+  bool no_panels = false;
   apps::CsgWords csg;
 };
 
@@ -82,7 +83,7 @@ void define(CLI::App& app, Words& words, ViewOptions& options) {
   app.add_flag("--ghosts", options.ghosts, "Show what is subtracted, transparent")->group(look);
   option("--heat", words.heat, "Colours: off (the scene's, default), thickness, depth (complexity)",
          "MAP", look);
-  app.add_flag("!--no-panels", options.panels, "The picture alone")->group(look);
+  app.add_flag("--no-panels", words.no_panels, "The picture alone")->group(look);
   const char* drive = "Without a person";
   option("--screenshot", options.screenshot, "When all is drawn, a picture of the window; then end",
          "FILE.png", drive);
@@ -112,6 +113,7 @@ Result<void> read(Words& words, ViewOptions& options) {
   auto heat = apps::parse_choice("--heat", words.heat, kHeats);
   if (!heat) return tl::unexpected(heat.error());
   options.heat = *heat;
+  options.panels = !words.no_panels;
   auto backend = apps::parse_choice("--backend", words.backend, kBackends);
   if (!backend) return tl::unexpected(backend.error());
   options.command.backend = *backend;

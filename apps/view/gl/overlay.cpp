@@ -93,7 +93,7 @@ void Panels::mark(const Viewer& viewer, const Area& area) {
 
 void Panels::legend(const Viewer& viewer, const Area& area) {
   const HeatScale& scale = viewer.frame()->scale;
-  if (scale.heat == Heat::kOff) return;
+  if (scale.heat == Heat::kOff || !(scale.high > 0)) return;
   constexpr int kSteps = 48;
   const float width = 18 * scale_,
               height = std::min(220 * scale_, static_cast<float>(area.size.y) * 0.5f);

@@ -322,9 +322,10 @@ void Panels::status(const Viewer& viewer, const glm::ivec2& window) {
   const std::string state = viewer.loading()    ? "loading"
                             : !viewer.settled() ? (whole ? "drawing" : "coarse")
                                                 : "";
+  const std::string drawn =
+      viewer.drawn_by().empty() ? std::string() : fmt::format("drawn by {}, ", viewer.drawn_by());
   const std::string right =
-      fmt::format("{}{}drawn by {}, shown by {}", state, state.empty() ? "" : "   ",
-                  viewer.drawn_by(), gl_renderer_);
+      fmt::format("{}{}{}shown by {}", state, state.empty() ? "" : "   ", drawn, gl_renderer_);
   const float width = ImGui::CalcTextSize(right.c_str()).x;
   const float left_end = ImGui::CalcTextSize(left.c_str()).x + 24 * scale_;
   const float begin = static_cast<float>(window.x) - width - 10 * scale_;
@@ -387,6 +388,15 @@ void Panels::messages(Viewer& viewer, const Area& area) {
     ImGui::PopTextWrapPos();
     ImGui::End();
     ImGui::PopStyleColor();
+  }
+  const bool whole = viewer.frame() != nullptr && viewer.frame()->divisor == 1;
+  if (whole && viewer.frame()->report.covered == 0 && !viewer.loading()) {
+    ImGui::SetNextWindowPos(at(width / 2, height / 2), 0, {0.5f, 0.5f});
+    ImGui::Begin("empty", nullptr, kBox | ImGuiWindowFlags_NoInputs);
+    text(viewer.model() != nullptr && viewer.model()->box.empty()
+             ? "There is nothing to see in this scene."
+             : "Nothing is in view. f shows all.");
+    ImGui::End();
   }
   if (viewer.loading() && viewer.load_seconds() > 0.25) {
     ImGui::SetNextWindowPos(at(width / 2, height / 2), 0, {0.5f, 0.5f});

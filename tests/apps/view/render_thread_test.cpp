@@ -207,6 +207,13 @@ TEST(CoarsePolicy, WhatHasChangedIsTriedAStepCoarser) {
   EXPECT_EQ(policy.divisor(true), 2);
 }
 
+TEST_F(RenderThreadTest, EndsWhileACoarsePictureIsUnderWay) {
+  thread_->submit(request());
+  await_begun(1);
+  thread_.reset();
+  EXPECT_EQ(log_.cancelled, 1);
+}
+
 TEST(CoarseSize, CoversTheWholePicture) {
   EXPECT_EQ(coarse_size({800, 600}, 4), glm::ivec2(200, 150));
   EXPECT_EQ(coarse_size({7, 3}, 4), glm::ivec2(2, 1));

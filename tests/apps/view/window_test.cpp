@@ -172,6 +172,21 @@ TEST_F(Window, ShowsThePicturesOfStrataCsg) {
             csg({"--size", size, camera, "--projection", "o", "--colorscheme", "Nature"}));
 }
 
+TEST_F(Window, WhoeverFindsTheSurfacesThePictureIsTheSame) {
+  const RunResult run = view("axes off\norbit 40 -20\npicture gl.png\nstats\nquit\n",
+                             {"--size", "203,151", "--no-panels", "--backend", "gl"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  // Or the CPU, and why.
+  EXPECT_TRUE(run.out.find("\"renderer\": \"GPU\"") != std::string::npos ||
+              run.out.find("\"renderer\": \"CPU (") != std::string::npos)
+      << run.out;
+  ASSERT_EQ(view("axes off\norbit 40 -20\npicture cpu.png\nquit\n",
+                 {"--size", "203,151", "--no-panels", "--backend", "cpu"})
+                .exit_code,
+            0);
+  EXPECT_EQ(image_of(place_, "gl.png"), image_of(place_, "cpu.png"));
+}
+
 TEST_F(Window, LeavesThePictureAloneWhereNothingLiesOnIt) {
   const RunResult run =
       view("screenshot window.png\npicture picture.png\nquit\n", {"--size", "1000,700"});
