@@ -3,6 +3,7 @@
 #include "apps/session.h"
 
 #ifdef STRATA_HAVE_GL
+#include <algorithm>
 #include <filesystem>
 #include <system_error>
 #include <utility>
@@ -131,11 +132,18 @@ class GlGpu final : public Gpu {
     auto scan = gl::ScanStore::create(context_->info());
     if (!scan) return tl::unexpected(scan.error());
     if (kind != StoreKind::kHaBuffer) {
-      return gl::ComputeListSource::create(*context_, *std::move(scan));
+      return gl::ComputeListSource::create(*context_, *std::move(scan), nullptr, pixels_at_once());
     }
     auto hash = gl::HashStore::create(context_->info());
     if (!hash) return tl::unexpected(hash.error());
-    return gl::ComputeListSource::create(*context_, *std::move(hash), *std::move(scan));
+    return gl::ComputeListSource::create(*context_, *std::move(hash), *std::move(scan),
+                                         pixels_at_once());
+  }
+  /// Lists of about 16 crossings, and their copies, within a quarter of the memory limit.
+  [[nodiscard]] std::int64_t pixels_at_once() const {
+    constexpr std::uint64_t kMost = std::uint64_t{1} << 22, kBytesAPixel = 300;
+    if (session_->memory_limit() == 0) return kMost;
+    return static_cast<std::int64_t>(std::min(kMost, session_->memory_limit() / 4 / kBytesAPixel));
   }
   Result<std::unique_ptr<csg::GlSurfaceSource>> make_surfaces() {
     auto scan = gl::ScanStore::create(context_->info());
