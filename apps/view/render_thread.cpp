@@ -134,8 +134,10 @@ void RenderThread::run(const std::stop_token& stop) {
       drawn_solids_ = request.what->tree.solids().size();
     }
     CoarsePolicy& policy = request.heat == Heat::kOff ? policy_ : heat_policy_;
-    const int divisor = whole ? 1 : policy.divisor(drawn_ && request.what != drawn_);
+    const bool changed = drawn_ && (request.what != drawn_ || request.look.edges != drawn_edges_);
+    const int divisor = whole ? 1 : policy.divisor(changed);
     drawn_ = request.what;
+    drawn_edges_ = request.look.edges;
     // A coarse picture is finished even when a newer one is wanted, or a moving hand would never
     // see any.
     draw_coarse(request, divisor, divisor == 1, stop);

@@ -76,6 +76,7 @@ class RenderThread {
   CoarsePolicy policy_, heat_policy_;
   std::size_t drawn_solids_ = 0;
   std::shared_ptr<const Arrangement> drawn_;
+  bool drawn_edges_ = false;
 
   mutable std::mutex mutex_;
   std::condition_variable_any changed_;

@@ -11,6 +11,11 @@ Canvas::~Canvas() {
   if (texture_ != 0) glDeleteTextures(1, &texture_);
 }
 
+void Canvas::warm_up() {
+  upload({2, 2, std::vector<csg::Rgba>(4, csg::Rgba(0, 0, 0, 255))});
+  for (const int side : {2, 5}) draw({{0, 0}, {side, side}}, {side, side}, {});
+}
+
 void Canvas::upload(const csg::Picture& picture) {
   const glm::ivec2 size(picture.width, picture.height);
   if (size != size_ || texture_ == 0) {

@@ -21,6 +21,10 @@ class Canvas {
   Canvas& operator=(const Canvas&) = delete;
   ~Canvas();
 
+  /// Draws something small in each way that draw() knows, so that software renderers compile their
+  /// code (a fifth of a second) before a hand waits for it.
+  void warm_up();
+
   /// Takes a picture over.
   void upload(const csg::Picture& picture);
   /// Clears the window and puts the picture into `area`. A picture of another size is scaled.

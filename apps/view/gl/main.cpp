@@ -120,6 +120,7 @@ class Program final : public Stage {
     viewer_.emplace(options_, make_renderer(options_.command.backend),
                     [] { glfwPostEmptyEvent(); });
     canvas_.emplace();
+    canvas_->warm_up();
     GLFWwindow* glfw = window_->glfw();
     glfwSetWindowUserPointer(glfw, this);
     glfwSetMouseButtonCallback(glfw, [](GLFWwindow* w, int button, int action, int modifiers) {
