@@ -59,7 +59,7 @@ def main():
             theirs = theirs[1:] if float("inf") not in theirs else [float("inf")]
             render = None
             if options.render_limit > 0:
-                render = seconds([*openscad, "--render", str(scene)], options.render_limit)
+                render = seconds([*openscad, "--render=1", str(scene)], options.render_limit)
             if None in ours:
                 mine = None
             else:

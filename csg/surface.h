@@ -171,7 +171,7 @@ Surface SurfaceFinder::find(std::vector<Flip>& flips, Bound&& bound) {
     for (std::size_t i = 0; i < settled; ++i) {
       const Flip& flip = flips[i];
       if (flip.triangle == Surface::kNone) continue;
-      if (state_.inside(flip.solid) == flip.exit || !state_.supports(flip.solid)) continue;
+      if (state_.inside(flip.solid) == flip.exit) continue;
       const bool in_group = i >= begin && i < at;
       if (!in_group) {
         const Coincidence::Bound its = bound(flip);
@@ -186,6 +186,7 @@ Surface SurfaceFinder::find(std::vector<Flip>& flips, Bound&& bound) {
         }
         if (superseded) continue;
       }
+      if (!state_.supports(flip.solid)) continue;  // last: it climbs the tree
       const bool better = best == nullptr || (best->exit && !flip.exit) ||
                           (best->exit == flip.exit && flip.solid < best->solid);
       if (better) best = &flip;
