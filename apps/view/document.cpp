@@ -172,12 +172,14 @@ std::shared_ptr<const Arrangement> arrange(const Model& model, const Looks& look
   };
   keep(scene.backgrounds, shown.backgrounds, csg::kBackgroundGhost);
   keep(scene.highlights, shown.highlights, csg::kHighlightGhost);
-  const auto add_ghost = [&](Tree::NodeId node, const glm::vec4& colour) {
-    shown.highlights.push_back(node);
-    colours.push_back(colour);
-  };
   if (looks.ghosts) {
-    for (const Tree::NodeId node : copier.subtracted()) add_ghost(copier.again(node), kSubtracted);
+    // As one ghost: a section cuts each ghost by a box of its own that covers the whole picture.
+    std::vector<Tree::NodeId> copies;
+    for (const Tree::NodeId node : copier.subtracted()) copies.push_back(copier.again(node));
+    if (!copies.empty()) {
+      shown.highlights.push_back(copier.tree().add(Operation::kUnion, copies));
+      colours.push_back(kSubtracted);
+    }
   }
   shown.tree = std::move(copier.tree());
   if (looks.section) apps::cut_scene(shown, {*looks.section}, csg::Camera{});

@@ -74,11 +74,14 @@ TEST(Arrange, GhostsAreWhatIsSubtracted) {
   Looks looks;
   looks.ghosts = true;
   const auto what = arrange(model, looks);
-  ASSERT_EQ(what->ghosts.size(), 2u);
+  ASSERT_EQ(what->ghosts.size(), 1u);
+  EXPECT_EQ(what->tree.operands(what->ghosts.front().node).size(), 2u);
   EXPECT_EQ(what->tree.solids().size(), 6u);
   EXPECT_EQ(volume_of(*what), volume_of(*arrange(model, {})));
   looks.hidden = {0, 1, 0, 0};
-  EXPECT_EQ(arrange(model, looks)->ghosts.size(), 1u);
+  EXPECT_EQ(arrange(model, looks)->tree.solids().size(), 5u);
+  looks.hidden = {0, 1, 1, 0};
+  EXPECT_TRUE(arrange(model, looks)->ghosts.empty());
 }
 
 TEST(Arrange, ASectionCutsTheResultAndTheGhosts) {
