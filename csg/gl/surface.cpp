@@ -9,7 +9,7 @@
 
 #include "csg/gl/tile_programs.h"
 #include "csg/tile_surface.h"
-#include "hashbuffer/gl/store.h"
+#include "hashbuffer/gl/compute_lists.h"
 
 namespace strata::glsl {
 extern const gl::GlslPiece csg_gl_walk_comp;
@@ -255,7 +255,7 @@ Result<bool> GlSurfaceSource::Impl::band(const FrameInput& frame, int v_begin, i
   }
   const RasterTarget target{Axis::kZ, frame.view.size.x, frame.view.size.y, kPictureDepthLimit};
   rasterizer->set_target(target, v_begin, v_end);
-  const auto built = gl::build(*store, *rasterizer, execution);
+  const auto built = gl::build_sized(*store, *rasterizer, execution);
   if (!built) return tl::unexpected(built.error());
   report.fragments += built->fragments;
   const auto program = walk_for(programs.bit_words);

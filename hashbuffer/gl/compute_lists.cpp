@@ -4,6 +4,16 @@
 #include <utility>
 
 namespace strata::gl {
+
+Result<BuildReport> build_sized(Store& store, ComputeRasterizer& rasterizer,
+                                const Execution& execution) {
+  if (store.gains_by_hint()) {
+    const auto fragments = rasterizer.count({0, rasterizer.height()});
+    if (!fragments) return tl::unexpected(fragments.error());
+    store.expect(*fragments);
+  }
+  return build(store, rasterizer, execution);
+}
 Result<std::unique_ptr<ComputeListSource>> ComputeListSource::create(const Context& context,
                                                                      std::unique_ptr<Store> store,
                                                                      std::unique_ptr<Store> spare,
@@ -30,10 +40,10 @@ int ComputeListSource::rows_at_once(const RasterTarget& target) const {
 Result<LayeredDepthImage> ComputeListSource::lists(const RasterTarget& target, int v_begin,
                                                    int v_end) {
   rasterizer_->set_target(target, v_begin, v_end);
-  auto built = build(*store_, *rasterizer_);
-  if (!built && built.error().code == ErrorCode::kLimit && spare_) {
+  auto built = build_sized(*store_, *rasterizer_);
+  if (!built && built.error().code != ErrorCode::kCancelled && spare_) {
     store_ = std::exchange(spare_, nullptr);
-    built = build(*store_, *rasterizer_);
+    built = build_sized(*store_, *rasterizer_);
   }
   if (!built) return tl::unexpected(built.error());
   auto image = store_->download();

@@ -9,11 +9,15 @@
 
 namespace strata::gl {
 
+/// build(store, rasterizer), after a pass that counts where the store gains by the hint.
+[[nodiscard]] Result<BuildReport> build_sized(Store& store, ComputeRasterizer& rasterizer,
+                                              const Execution& execution = {});
+
 /// Lists by the compute rasterizer in a store of the GPU: the CPU's, bit for bit.
 class ComputeListSource final : public ListSource {
  public:
   /// `context` stays current while this is used. @param store keeps whole payloads
-  /// @param spare takes over for good where `store` fails with kLimit (lists beyond its ages); may
+  /// @param spare takes over for good where `store` fails, as with lists beyond its ages; may
   /// be null @param pixels_at_once see rows_at_once(), about @return kUsage where the driver cannot
   [[nodiscard]] static Result<std::unique_ptr<ComputeListSource>> create(
       const Context& context, std::unique_ptr<Store> store, std::unique_ptr<Store> spare = nullptr,

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 #include "hashbuffer/record.h"
 #include "hashbuffer/resize_policy.h"
@@ -172,11 +173,14 @@ Result<void> HashStore::begin(std::uint32_t width, std::uint32_t height) {
     clear_ = std::move(*program);
   }
   mode_ = Mode::kInsert;
-  if (width != width_ || height != height_ || bands_.empty()) {
+  const std::uint64_t wanted = std::max(options_.cells, 2 * std::exchange(expected_, 0));
+  const bool too_small = wanted > options_.cells && wanted > cells();
+  if (width != width_ || height != height_ || bands_.empty() || too_small) {
     width_ = width;
     height_ = height;
-    if (auto done = lay_out(1, options_.cells); !done) return done;
-    return begin_bands();
+    const std::uint64_t bands =
+        std::max<std::uint64_t>(1, (wanted + most_cells() - 1) / most_cells());
+    if (auto done = lay_out(bands, wanted); !done) return done;
   }
   return begin_bands();
 }

@@ -53,6 +53,9 @@ class HashStore final : public Store {
   [[nodiscard]] static Result<std::unique_ptr<HashStore>> create(
       const Info& info, const HashStoreOptions& options = {});
 
+  /// The table of the next frame has room for twice that.
+  void expect(std::uint64_t fragments) override { expected_ = fragments; }
+  [[nodiscard]] bool gains_by_hint() const override { return true; }
   [[nodiscard]] Result<void> begin(std::uint32_t width, std::uint32_t height) override;
   [[nodiscard]] int passes() const override;
   [[nodiscard]] StoreGlsl glsl(int pass) const override;
@@ -124,6 +127,7 @@ class HashStore final : public Store {
   [[nodiscard]] Result<bool> look_at_failures(const std::vector<Counts>& counts);
   [[nodiscard]] Result<bool> look_at_layers();
 
+  std::uint64_t expected_ = 0;  ///< fragments of the next frame; 0: not known
   HashStoreOptions options_;
   WordPath path_;
   std::vector<Band> bands_;

@@ -25,6 +25,11 @@ class Store {
  public:
   virtual ~Store() = default;
 
+  /// A hint before begin(): how many fragments will come, about. Without effect where room is made
+  /// as it is needed.
+  virtual void expect(std::uint64_t fragments) { static_cast<void>(fragments); }
+  /// Whether expect() is worth a pass that counts: a table that is far too full is slow to tell.
+  [[nodiscard]] virtual bool gains_by_hint() const { return false; }
   /// Empties the store for a frame of that size, in pixels, each side at least 1 (kUsage).
   [[nodiscard]] virtual Result<void> begin(std::uint32_t width, std::uint32_t height) = 0;
   /// Passes over the geometry. May change in begin(), begin_pass() and end().

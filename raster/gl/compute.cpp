@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <numeric>
 #include <span>
 #include <utility>
 
@@ -253,6 +254,27 @@ Result<void> ComputeRasterizer::draw(const StoreGlsl& store, PixelRows rows) {
   }
   storage_barrier();
   return check_errors("rasterizing in a compute shader");
+}
+
+Result<std::uint64_t> ComputeRasterizer::count(PixelRows rows) {
+  constexpr std::size_t kSums = 1024;  // so that threads seldom wait for each other
+  static const StoreGlsl kCount{"count of fragments",
+                                {},
+                                R"(
+layout(std430, binding = 8) buffer StoreSums { uint store_sums[1024]; };
+void strata_insert(uint pixel, uint depth, uint payload) {
+  atomicAdd(store_sums[pixel & 1023u], 1u);
+}
+)"};
+  if (auto room = sums_.reserve(kSums * sizeof(std::uint32_t)); !room) {
+    return tl::unexpected(room.error());
+  }
+  sums_.clear(0);
+  sums_.bind(8);
+  if (auto drawn = draw(kCount, rows); !drawn) return tl::unexpected(drawn.error());
+  std::array<std::uint32_t, kSums> sums{};
+  sums_.download(std::span<std::uint32_t>(sums));
+  return std::accumulate(sums.begin(), sums.end(), std::uint64_t{0});
 }
 
 }  // namespace strata::gl

@@ -46,6 +46,9 @@ class ComputeRasterizer final : public Producer {
   /// triangles (fewer rows need less)
   [[nodiscard]] Result<void> draw(const StoreGlsl& store, PixelRows rows) override;
 
+  /// How many fragments draw() gives for `rows`: a pass without depths. @return as draw()
+  [[nodiscard]] Result<std::uint64_t> count(PixelRows rows);
+
   /// How the triangles were sorted out for the rows of the last draw().
   struct Counts {
     std::uint64_t small = 0;   ///< triangles of at most 64 pixels' box
@@ -76,7 +79,7 @@ class ComputeRasterizer final : public Producer {
   std::uint64_t binding_bytes_ = 0;
   Program bin_program_;
   std::vector<Pass> passes_;
-  Buffer vertices_, view_, counters_;
+  Buffer vertices_, view_, counters_, sums_;
   std::vector<Part> parts_;
   RasterTarget target_;
   int v_begin_ = 0, v_end_ = 0;

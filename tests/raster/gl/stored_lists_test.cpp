@@ -88,7 +88,7 @@ TEST_F(StoredLists, AreTheCpusOnScreensOfEveryShape) {
 TEST_F(StoredLists, AreTheCpusForTrouble) {
   with_all();
   for (const auto& [name, soup] : testkit::closed_trouble()) {
-    expect_same(soup, testkit::unit_grid({40, 40, 40}), name);
+    expect_same(soup, testkit::unit_grid({24, 24, 24}), name);
   }
 }
 
