@@ -12,6 +12,12 @@ layout(std140, binding = 8) uniform store_block {
   uint store_band;
 };
 
+// Steps of this invocation so far, and the most of them. Chains of evictions are that long only in tables that are far
+// too full: what is left over is counted as not stored, and the table grows. llvmpipe ends all loops of an invocation
+// after 65535 rounds, without a word, and counts those of the slowest of 8 neighbours.
+uint store_steps = 0u;
+const uint kStoreMostSteps = 4000u;
+
 void strata_insert(uint pixel, uint depth, uint payload) {
 #ifdef STRATA_FRAGMENT_STAGE
   if (gl_HelperInvocation) return;  // its atomics return nonsense
@@ -20,8 +26,7 @@ void strata_insert(uint pixel, uint depth, uint payload) {
   if (pixel >= store_pixels) return;  // of another band
   uint age = 1u;
   uint record = 0x1ffffffu - min(depth, 0xffffffu);
-  // The chain of evictions ends by itself, since cells only grow; a driver's fault must not hang the machine.
-  for (uint step = 0u; step < 0x100000u; ++step) {
+  for (; store_steps < kStoreMostSteps; ++store_steps) {
     uint cell = pixel + store_offsets[age];
     if (cell >= store_cells) cell -= store_cells;
 #ifdef STORE_READ_FIRST

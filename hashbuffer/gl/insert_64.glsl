@@ -20,6 +20,9 @@ uint64_t store_max(inout uint64_t cell, uint64_t value) {
 #define store_max atomicMax
 #endif
 
+uint store_steps = 0u;  // see insert_32.glsl
+const uint kStoreMostSteps = 4000u;
+
 void strata_insert(uint pixel, uint depth, uint payload) {
 #ifdef STRATA_FRAGMENT_STAGE
   if (gl_HelperInvocation) return;
@@ -28,7 +31,7 @@ void strata_insert(uint pixel, uint depth, uint payload) {
   if (pixel >= store_pixels) return;
   uint age = 1u;
   uint64_t record = packUint2x32(uvec2(~payload, 0x1ffffffu - min(depth, 0xffffffu)));
-  for (uint step = 0u; step < 0x100000u; ++step) {
+  for (; store_steps < kStoreMostSteps; ++store_steps) {
     uint cell = pixel + store_offsets[age];
     if (cell >= store_cells) cell -= store_cells;
 #ifdef STORE_READ_FIRST

@@ -128,6 +128,32 @@ TEST_F(StoredLists, ASpareStoreTakesWhatIsTooDeepForTheHash) {
   expect_same(walls(150, 1), testkit::unit_grid({22, 14, 300}), "300 layers");
 }
 
+TEST_F(StoredLists, ATableThatIsFarTooFullLosesNothing) {
+  // A cell a pixel, no hint, and threads that insert many fragments each.
+  auto rasterizer = gl::ComputeRasterizer::create(*context_);
+  ASSERT_TRUE(rasterizer);
+  const VoxelGrid grid = testkit::unit_grid({24, 24, 24});
+  const RasterTarget target = testkit::target_of(grid, Axis::kZ);
+  for (const int bits : {32, 64}) {
+    for (const auto& [name, soup] : testkit::closed_trouble()) {
+      const auto mesh = snap_to_lattice(soup, grid);
+      ASSERT_TRUE(mesh);
+      const auto expected = build_ldi(*mesh, target);
+      ASSERT_TRUE(expected);
+      auto store = gl::HashStore::create(context_->info(), {.record_bits = bits});
+      ASSERT_TRUE(store);
+      ASSERT_TRUE((*rasterizer)->set_mesh(*mesh));
+      (*rasterizer)->set_target(target, 0, target.height);
+      const auto built = gl::build(**store, **rasterizer);
+      ASSERT_TRUE(built) << name << ": " << built.error().message;
+      const auto found = (*store)->download();
+      ASSERT_TRUE(found);
+      EXPECT_TRUE(found->offsets == expected->offsets) << name << ", " << bits << " bits";
+      if (bits == 64) EXPECT_TRUE(found->items == expected->items) << name;
+    }
+  }
+}
+
 TEST_F(StoredLists, OfRealMeshesAreTheCpus) {
   with("scan", gl::ScanStore::create(context_->info()));
   with_hash("hash", {});
