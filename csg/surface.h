@@ -79,7 +79,8 @@ class Coincidence {
 ///   snap may have moved the outline of another solid to the other side. A solid that is just
 ///   united with the rest has no such other side, and stays;
 /// - of several solids whose faces coincide with the surface and contribute to it, the one shown is
-///   one that the ray enters rather than one that it leaves, then the first of the tree.
+///   one without which it would not be there (a hidden face that ends in it has no part in it),
+///   then one that the ray enters rather than one that it leaves, then the first of the tree.
 /// A ray that begins inside the tree (the eye is in the material) shows where it leaves it.
 class SurfaceFinder {
  public:
@@ -103,6 +104,14 @@ class SurfaceFinder {
     for (std::size_t i = begin; i < end; ++i) state_.flip(flips[i].solid);
   }
 
+  /// Whether the tree has its value because of this solid's alone.
+  [[nodiscard]] bool decides(std::uint32_t solid) {
+    const bool value = state_.value();
+    state_.flip(solid);
+    const bool other = state_.value();
+    state_.flip(solid);
+    return other != value;
+  }
   [[nodiscard]] bool is_plain_entry(const Flip& flip) const {
     return !flip.exit && state_.program().plain(flip.solid);
   }
@@ -168,6 +177,7 @@ Surface SurfaceFinder::find(std::vector<Flip>& flips, Bound&& bound) {
     undo(flips, settled, end);
 
     const Flip* best = nullptr;
+    bool best_alone = false;
     for (std::size_t i = 0; i < settled; ++i) {
       const Flip& flip = flips[i];
       if (flip.triangle == Surface::kNone) continue;
@@ -187,9 +197,14 @@ Surface SurfaceFinder::find(std::vector<Flip>& flips, Bound&& bound) {
         if (superseded) continue;
       }
       if (!state_.supports(flip.solid)) continue;  // last: it climbs the tree
-      const bool better = best == nullptr || (best->exit && !flip.exit) ||
-                          (best->exit == flip.exit && flip.solid < best->solid);
-      if (better) best = &flip;
+      const bool alone = decides(flip.solid);
+      const bool better =
+          best == nullptr || (alone && !best_alone) ||
+          (alone == best_alone &&
+           ((best->exit && !flip.exit) || (best->exit == flip.exit && flip.solid < best->solid)));
+      if (!better) continue;
+      best = &flip;
+      best_alone = alone;
     }
     if (best == nullptr) best = &flips[begin];
     found = surface_of(*best, depth);

@@ -313,6 +313,45 @@ TEST(CoincidentFaces, TheSameFaceTwiceIsShownInOneColour) {
   }
 }
 
+TEST(CoincidentFaces, ACutFaceShowsNothingOfTheFacesThatEndInIt) {
+  // Solids that overlap, all cut at y = 0: inside the cut face every pixel is the cutter's, also
+  // where hidden faces meet it.
+  Tree tree;
+  const auto plate = box_node(tree, {-10, -8, 0}, {10, 8, 3});
+  const auto rib = box_node(tree, {-8, -2, 1}, {8, 1, 9});
+  const auto ball = tree.add_solid({std::make_shared<TriangleSoup>(make_icosphere(4, 3)),
+                                    glm::translate(glm::dmat4(1), glm::dvec3(0.5, 0.3, 4))});
+  const auto cutter = box_node(tree, {-30, -30, -30}, {30, 0, 30});
+  const auto all = tree.add(Operation::kUnion, {plate, rib, ball});
+  tree.set_root(tree.add(Operation::kDifference, {all, cutter}));
+  Preview preview(tree, {}, 0.0);
+  std::size_t inside = 0, wrong = 0;
+  for (int i = 0; i < 100; ++i) {
+    RandomTree random(static_cast<std::uint64_t>(i) + 177);
+    const Camera camera = random_camera(random, Bounds{{-10, -8, 0}, {10, 8, 9}});
+    const auto view = make_view(camera, {200, 200}, preview.box());
+    const auto image = preview.draw(*view);
+    ASSERT_TRUE(image.has_value());
+    for (int v = 0; v < 200; ++v) {
+      for (int u = 0; u < 200; ++u) {
+        const auto at = static_cast<std::size_t>(v * 200 + u);
+        const std::uint32_t depth = (*image)->depth[at];
+        if (depth == SurfaceImage::kNone) continue;
+        const glm::dvec3 p = position(*view, u, v, depth);
+        // Faces that end in the cut face may be seen right at its outline.
+        const auto within = [&](double x0, double x1, double z0, double z1) {
+          return p.x > x0 + 0.2 && p.x < x1 - 0.2 && p.z > z0 + 0.2 && p.z < z1 - 0.2;
+        };
+        if (std::abs(p.y) > 0.02 || !(within(-10, 10, 0, 3) || within(-8, 8, 1, 9))) continue;
+        ++inside;
+        wrong += (*image)->solid[at] != 3 ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_EQ(wrong, 0u) << "of " << inside;
+  EXPECT_GT(inside, 100'000u);
+}
+
 TEST(NestedDifferences, TwentyAndTwoHundredDeepAreRight) {
   for (const int deep : {20, 200}) {
     // Boxes one in another, each taken from the next larger one: shells.
