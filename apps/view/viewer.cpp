@@ -314,7 +314,7 @@ void Viewer::select(std::optional<std::uint32_t> solid, bool keep_pick) {
 }
 
 std::string Viewer::solid_name(std::uint32_t solid) const {
-  if (!arrangement_ || solid >= arrangement_->tree.solids().size()) return "?";
+  if (!arrangement_ || solid >= arrangement_->tree.solids().size()) return "no longer shown";
   const std::string& name = arrangement_->tree.solids()[solid].name;
   return name.empty() ? fmt::format("solid {}", solid) : name;
 }
