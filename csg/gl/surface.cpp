@@ -142,6 +142,7 @@ struct GlSurfaceSource::Impl {
   std::unique_ptr<gl::Store> store;
   std::unique_ptr<gl::ComputeRasterizer> rasterizer;
   std::uint64_t binding_bytes = 0, pixels_at_once = 0;
+  bool few_rounds = false;  ///< loops of a shader end early
   struct Walk {
     std::uint32_t words;
     gl::StoreGlsl read;
@@ -175,6 +176,7 @@ Result<std::unique_ptr<GlSurfaceSource>> GlSurfaceSource::create(const gl::Conte
   auto impl = std::make_unique<Impl>();
   impl->store = std::move(store);
   impl->pixels_at_once = pixels_at_once;
+  impl->few_rounds = context.info().works_around("loop-rounds");
   impl->binding_bytes = context.info().limits.storage_block_bytes;
   auto rasterizer = gl::ComputeRasterizer::create(context);
   if (!rasterizer) return tl::unexpected(rasterizer.error());
@@ -189,6 +191,7 @@ Result<const gl::Program*> GlSurfaceSource::Impl::walk_for(std::uint32_t bit_wor
   }
   gl::GlslSettings settings = read.settings;
   settings.defines.emplace_back("WALK_WORDS", std::to_string(bit_words));
+  settings.defines.emplace_back("WALK_MOST_ROUNDS", few_rounds ? "6000u" : "1000000u");
   const gl::GlslPiece pieces[] = {read.piece(), glsl::csg_gl_walk_comp};
   auto program = gl::Program::compute(pieces, settings);
   if (!program) return tl::unexpected(program.error());

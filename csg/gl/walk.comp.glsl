@@ -88,7 +88,7 @@ void main() {
   int front = -1;  // how far back crossings before the group may be
   uint group_count = 0u, group_depth = 0u, group_payload = 0u;
   int group_more = 0;
-  uint count = 0u;
+  uint count = 0u, rounds = 0u;
   StrataCursor cursor = strata_list(pixel);
   for (;;) {
     uint depth, payload;
@@ -104,7 +104,11 @@ void main() {
       more = int(triangle.y);
     }
     if (!found && group_count > 0u && (!present || depth != group_depth)) {
-      if (walk_value(tile)) {
+      rounds += tile.node_count * uint(WALK_WORDS + 1);
+      if (rounds > WALK_MOST_ROUNDS) {  // a driver may not walk that long
+        found = true;
+        doubt = true;
+      } else if (walk_value(tile)) {
         found = true;
         surface = uvec2(group_depth, group_payload);
         int reach = walk_reach(group_depth) + 2 * group_more;

@@ -153,6 +153,31 @@ TEST_F(GlSurface, AnyNumberOfSolidsInATile) {
   EXPECT_EQ(left_, 0u);
 }
 
+TEST_F(GlSurface, TreesOfManyNodesAreTheCpus) {
+  RandomTree random(17);
+  Tree tree;
+  std::vector<Tree::NodeId> operands;
+  for (int i = 0; i < 70; ++i) {
+    const auto slab = [&](double low) {
+      Solid solid;
+      solid.mesh = std::make_shared<TriangleSoup>(
+          make_box({-5 + random.real(0, 1), -5, low}, {5, 5 - random.real(0, 1), low + 0.1}));
+      return tree.add_solid(std::move(solid));
+    };
+    // Slabs that hardly meet: the ray goes on and on.
+    const auto first = slab(0.3 * i), second = slab(0.3 * i + (i == 66 ? 0.05 : 0.15));
+    operands.push_back(tree.add(Operation::kIntersection, {first, second}));
+  }
+  tree.set_root(tree.add(Operation::kUnion, operands));
+  Camera camera;
+  centre_camera(camera, {{-5, -5, 0}, {5, 5, 21}});
+  fit_camera(camera, {{-5, -5, 0}, {5, 5, 21}});
+  for (const double tilt : {0.0, 20.0, 180.0}) {
+    camera.rotation = {tilt, 0, 0};
+    expect_same(tree, camera, {70, 70}, std::to_string(tilt));
+  }
+}
+
 TEST_F(GlSurface, MoreSolidsThanATileHasBitsForAreTheCpus) {
   RandomTree random(5);
   Tree tree;
