@@ -155,7 +155,7 @@ def sections(folder):
     if voxelizers:
         result["goals"] = Goals(folder).collect()
         result["voxelizers"] = voxelizers_section(voxelizers)
-    for name in ("growth", "reading", "whole_process", "csg_frames", "csg_laws"):
+    for name in ("growth", "reading", "whole_process", "csg_frames", "csg_laws", "csg_process"):
         rows = load(folder, name)
         if rows:
             result[name] = all_columns(rows)
