@@ -34,6 +34,7 @@ struct MeshInput {
   /// Of scenes: what makes the lists of the result of the lists of the soup, all solids'. Then
   /// area and volume are not known, and the bounds may be larger than the result.
   std::shared_ptr<const csg::SolidLists> tree;
+  std::shared_ptr<const csg::Tree> scene;  ///< what `tree` was made of
   std::vector<InputFacts> files;
   Bounds bounds;
   bool closed = true;  ///< all of them

@@ -29,6 +29,7 @@ Result<MeshInput> load_solids(const InputOptions& input, const MeshInputRules& r
   auto lists = std::make_shared<csg::SolidLists>(tree, tree.root());
   all.soup = lists->take_soup();
   all.tree = std::move(lists);
+  all.scene = std::make_shared<csg::Tree>(tree);
   for (const std::string& path : input.files) {
     InputFacts facts;
     facts.path = path;

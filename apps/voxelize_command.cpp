@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
 #include <memory>
 #include <utility>
 
@@ -13,6 +14,9 @@
 #include "apps/mesh_input.h"
 #include "apps/session.h"
 #include "apps/voxelize_report.h"
+#include "csg/colour_parts.h"
+#include "csg/picture.h"
+#include "csg/solid_lists.h"
 #include "voxelize/voxel_writer.h"
 
 namespace strata::apps {
@@ -148,6 +152,33 @@ Result<void> print_reports(const VoxelizeCommand& command, const VoxelizeOutcome
   return print_report(voxelize_json(command, outcome, session), *command.json, file_on_stdout);
 }
 
+/// Writes the voxels of a scene by colour. @return false: it has but one, or too many
+Result<bool> write_colours(const VoxelizeOutcome& outcome, std::size_t most,
+                           VoxelizeOptions options, const Execution& execution, VoxelWriter& writer,
+                           Session& session) {
+  if (most == 0 || !outcome.input.scene) return false;
+  const csg::Tree& scene = *outcome.input.scene;
+  const glm::vec4 none(glm::vec3(csg::colour_schemes().front().face) / 255.0f, 1.0f);
+  const auto parts = csg::colour_parts(scene, scene.root(), none);
+  if (parts.empty()) return false;
+  if (parts.size() > most) {
+    session.warn("colours", fmt::format("{} colours, a {} file holds {}: written without",
+                                        parts.size(), outcome.format, most));
+    return false;
+  }
+  options.statistics = false;
+  for (const csg::ColourPart& part : parts) {
+    const glm::u8vec4 colour(glm::clamp(part.colour, 0.0f, 1.0f) * 255.0f + 0.5f);
+    if (auto begun = writer.begin_colour(colour); !begun) return tl::unexpected(begun.error());
+    const csg::SolidLists lists(part.tree, part.tree.root());
+    options.filter = &lists.filter();
+    const auto add = [&](const VoxelIntervals& slab) { return writer.add(slab, execution); };
+    auto done = voxelize_slabs(lists.soup(), outcome.grid, options, execution, add);
+    if (!done) return tl::unexpected(done.error());
+  }
+  return true;
+}
+
 /// The work itself: lists, intervals, file.
 Result<void> voxelize_and_write(const VoxelizeCommand& command, VoxelizeOutcome& outcome,
                                 Session& session) {
@@ -198,10 +229,19 @@ Result<void> voxelize_and_write(const VoxelizeCommand& command, VoxelizeOutcome&
   std::optional<BoundaryArea> boundary;
   if (command.stats || command.json) boundary.emplace(outcome.grid, outcome.axis);
   double write_ms = 0;
+  bool coloured = false;
+  if (writer) {
+    const double start = session.milliseconds();
+    const auto format = voxel_format_for(command.output, command.format);
+    const auto done = write_colours(outcome, format->colours, options, execution, *writer, session);
+    if (!done) return tl::unexpected(done.error());
+    coloured = *done;
+    write_ms = session.milliseconds() - start;
+  }
   const auto sink = [&](const VoxelIntervals& slab) -> Result<void> {
     if (!options.statistics) solid_voxels += slab.solid_voxels();
     if (boundary) boundary->add(slab, quiet);
-    if (!writer) return {};
+    if (!writer || coloured) return {};
     const double start = session.milliseconds();
     auto done = writer->add(slab, quiet);
     write_ms += session.milliseconds() - start;

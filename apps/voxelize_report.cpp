@@ -55,8 +55,10 @@ void write_input(JsonWriter& json, const MeshInput& input) {
   json.member("triangles", triangles);
   json.member("vertices", vertices);
   json.member("closed", input.closed);
-  json.member("area", input.area);
-  json.member("volume", input.volume);
+  if (!input.tree) {  // of the result of a scene they are not known
+    json.member("area", input.area);
+    json.member("volume", input.volume);
+  }
   json.key("bounds").begin_object();
   json.member("low", input.bounds.low);
   json.member("high", input.bounds.high);
@@ -122,9 +124,14 @@ std::string voxelize_text(const VoxelizeCommand& command, const VoxelizeOutcome&
                      grouped(file.stats.triangles), grouped(file.stats.vertices),
                      file.closed ? "closed" : "open", file.turned_around ? ", turned around" : ""));
   }
-  line("mesh",
-       fmt::format("{} to {}, area {:.6g}, volume {:.6g}", triple(outcome.input.bounds.low),
-                   triple(outcome.input.bounds.high), outcome.input.area, outcome.input.volume));
+  const std::string bounds =
+      fmt::format("{} to {}", triple(outcome.input.bounds.low), triple(outcome.input.bounds.high));
+  if (outcome.input.tree) {
+    line("scene", bounds);
+  } else {
+    line("mesh", fmt::format("{}, area {:.6g}, volume {:.6g}", bounds, outcome.input.area,
+                             outcome.input.volume));
+  }
   const VoxelGrid& grid = outcome.grid;
   const glm::dvec3 s = grid.voxel_size;
   line("grid",

@@ -67,7 +67,8 @@ const std::vector<VoxelFormat>& voxel_formats() {
       {"nrrd", ".nrrd", "NRRD: uint8, gzip; world transform", Axis::kX},
       {"vti", ".vti", "VTK image data: uint8 cells, zlib; world transform", Axis::kX},
       {"binvox", ".binvox", "binvox: run lengths; cubic voxels, world transform", Axis::kY},
-      {"vox", ".vox", "MagicaVoxel: up to 2000 voxels a side", Axis::kZ},
+      {"vox", ".vox", "MagicaVoxel: up to 2000 voxels a side; colours of scenes", Axis::kZ,
+       kVoxColours},
       {"png", "/", "folder of 1-bit PNG slices, one a layer of z, and slices.json", Axis::kX},
       {"zarr", ".zarr/", "folder: Zarr 2 array, uint8, zlib; world transform", Axis::kZ},
   };

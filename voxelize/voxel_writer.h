@@ -1,5 +1,6 @@
 #pragma once
 
+#include <glm/vec4.hpp>
 #include <memory>
 #include <string>
 #include <vector>
@@ -17,6 +18,7 @@ struct VoxelFormat {
   std::string extension;    ///< with the dot; that of a folder format ends with a slash
   std::string description;  ///< one line for --list-formats
   Axis axis = Axis::kZ;  ///< the rays whose intervals this format is written from at the least cost
+  std::size_t colours = 0;  ///< that a file holds, one a voxel; 0: none
 };
 
 /// The formats this build can write.
@@ -36,6 +38,9 @@ class VoxelWriter {
   /// Adds the voxels of one slab. Uses the threads of `execution`; same bytes for any number.
   virtual Result<void> add(const VoxelIntervals& slab, const Execution& execution) = 0;
   virtual Result<void> finish(const Execution& execution) = 0;
+  /// The slabs that follow, again from the first on, have a colour of their own: red, green, blue,
+  /// alpha. @return kUsage: the format has no colours, or no more
+  virtual Result<void> begin_colour(const glm::u8vec4& colour) = 0;
 };
 
 /// Opens a writer for `path` ("-": standard output). The format is `format`, or if that is empty

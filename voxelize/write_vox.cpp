@@ -74,6 +74,7 @@ class VoxWriter final : public SlabWriter {
   /// A tile of a slab that is gone.
   struct Tile {
     int u = 0, v = 0;  // in tiles of the grid
+    std::uint8_t colour = kColour;
     std::vector<std::uint32_t> offsets;
     std::vector<Interval> items;
   };
@@ -91,6 +92,7 @@ class VoxWriter final : public SlabWriter {
         if (view.items.empty()) continue;
         Tile tile{tu,
                   slab.v_begin() / VoxelIntervals::kTileSide + tv,
+                  palette_.empty() ? kColour : static_cast<std::uint8_t>(palette_.size()),
                   {view.offsets.begin(), view.offsets.end()},
                   {view.items.begin(), view.items.end()}};
         for (const Interval& interval : view.items) {
@@ -120,7 +122,9 @@ class VoxWriter final : public SlabWriter {
     if (kept.empty()) kept.push_back(models_.front());  // a file has at least one
     const Bytes graph = one ? Bytes() : scene_graph(kept);
     constexpr std::uint64_t kModelHeads = 12 + 12 + 12 + 4;  // SIZE, XYZI and its count
-    const std::uint64_t children = kept.size() * kModelHeads + total_ * 4 + graph.size();
+    const Bytes colours = palette_.empty() ? Bytes() : palette();
+    const std::uint64_t children =
+        kept.size() * kModelHeads + total_ * 4 + graph.size() + colours.size();
     if (children > kLargestFile) {
       return fail(ErrorCode::kLimit, "{}: {} bytes, a .vox file holds {}", path(), children,
                   kLargestFile);
@@ -133,10 +137,29 @@ class VoxWriter final : public SlabWriter {
     for (const Model& model : kept) {
       if (Result<void> written = write_model(model, execution); !written) return written;
     }
-    if (Result<void> written = output_.append(graph.data(), graph.size()); !written) {
-      return written;
+    for (const Bytes* chunks : {&graph, &colours}) {
+      if (Result<void> written = output_.append(chunks->data(), chunks->size()); !written) {
+        return written;
+      }
     }
     return output_.commit();
+  }
+
+  bool add_colour(const glm::u8vec4& colour) override {
+    if (palette_.size() == kVoxColours) return false;
+    palette_.push_back(colour);
+    return true;
+  }
+
+  /// Colour i stands at i - 1.
+  [[nodiscard]] Bytes palette() const {
+    Bytes content, chunk;
+    for (std::size_t i = 0; i < 256; ++i) {
+      const glm::u8vec4 colour = i < palette_.size() ? palette_[i] : glm::u8vec4(255);
+      for (int c = 0; c < 4; ++c) content.push_back(static_cast<std::byte>(colour[c]));
+    }
+    put_chunk(chunk, "RGBA", content);
+    return chunk;
   }
 
   Result<void> write_model(const Model& model, const Execution& execution) {
@@ -170,7 +193,7 @@ class VoxWriter final : public SlabWriter {
         const int begin = std::max(tile.items[i].begin() - model.begin.z, 0);
         const int end = std::min(tile.items[i].end() - model.begin.z, kModelSide);
         for (int z = begin; z < end; ++z) {
-          for (const int byte : {x, y, z, int{kColour}})
+          for (const int byte : {x, y, z, int{tile.colour}})
             out.push_back(static_cast<std::byte>(byte));
         }
       }
@@ -215,6 +238,7 @@ class VoxWriter final : public SlabWriter {
   glm::ivec3 models_along_;
   std::vector<Model> models_;
   std::vector<Tile> tiles_;
+  std::vector<glm::u8vec4> palette_;  // the last one is that of the voxels that come
   std::uint64_t total_ = 0;
 };
 

@@ -10,6 +10,9 @@ namespace strata {
 /// The writers behind open_voxel_writer, one a format (internal to voxelize/). The grid is valid.
 using VoxelWriterResult = Result<std::unique_ptr<VoxelWriter>>;
 
+/// Colours of a .vox palette; index 0 means no voxel.
+inline constexpr std::size_t kVoxColours = 255;
+
 VoxelWriterResult open_vdb_writer(const std::string& path, const VoxelGrid& grid,
                                   const VoxelWriterOptions& options);
 VoxelWriterResult open_png_writer(const std::string& path, const VoxelGrid& grid);

@@ -274,6 +274,27 @@ TEST_F(Voxelize, StrictTurnsAWarningIntoExitCode5WithoutAFile) {
   EXPECT_EQ(place.names(), std::vector<std::string>{"plate.obj"});
 }
 
+TEST_F(Voxelize, AVoxFileKeepsTheColoursOfAScene) {
+  place.write("two.csg",
+              "color([1, 0, 0, 1]) { cube(size = [2, 2, 2], center = false); }\n"
+              "color([0, 0, 1, 1]) { multmatrix([[1, 0, 0, 1], [0, 1, 0, 0], [0, 0, 1, 0], "
+              "[0, 0, 0, 1]]) { cube(size = [3, 2, 2], center = false); } }\n");
+  const json found = report({"two.csg", "-r", "8", "-o", "two.vox"});
+  EXPECT_EQ(found["voxels"]["solid"], 8 * 4 * 4);
+  const std::string bytes = place.read("two.vox");
+  const std::size_t palette = bytes.find("RGBA"), voxels = bytes.find("XYZI");
+  ASSERT_NE(palette, std::string::npos);
+  ASSERT_NE(voxels, std::string::npos);
+  EXPECT_EQ(bytes.substr(palette + 12, 8), std::string("\xff\0\0\xff\0\0\xff\xff", 8));
+  std::size_t red = 0;  // the first of the tree where both are
+  for (std::size_t i = 0; i < 128; ++i) {
+    const std::string voxel = bytes.substr(voxels + 16 + 4 * i, 4);
+    EXPECT_EQ(voxel[3], voxel[0] < 4 ? 1 : 2);
+    red += voxel[3] == 1 ? 1 : 0;
+  }
+  EXPECT_EQ(red, 64u);
+}
+
 TEST_F(Voxelize, AGridThatMissesTheMeshIsReported) {
   put("box.obj", make_box({0, 0, 0}, {1, 1, 1}));
   EXPECT_EQ(codes(report({"box.obj", "-r", "8", "--bounds", "5,5,5,6,6,6"})),

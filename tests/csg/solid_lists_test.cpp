@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+#include <map>
+
+#include "csg/colour_parts.h"
 #include "csg/geometry.h"
 #include "hashbuffer/build_ldi.h"
 #include "mesh/shapes.h"
@@ -45,6 +49,28 @@ std::uint64_t length(const Lists& lists) {
     for (std::size_t i = 0; i + 1 < list.size(); i += 2) sum += list[i + 1] - list[i];
   }
   return sum;
+}
+
+/// The solid voxels of a tree.
+std::vector<std::array<int, 3>> voxelize_tree(const Tree& tree, Tree::NodeId root) {
+  const SolidLists lists(tree, root);
+  VoxelizeOptions options;
+  options.filter = &lists.filter();
+  const auto voxels = voxelize(lists.soup(), kGrid, options);
+  EXPECT_TRUE(voxels.has_value());
+  std::vector<std::array<int, 3>> solid;
+  for (int v = 0; v < kGrid.dims.y; ++v) {
+    for (int u = 0; u < kGrid.dims.x; ++u) {
+      for (const Interval run : voxels->column(u, v)) {
+        for (int w = run.begin(); w < run.end(); ++w) solid.push_back({u, v, w});
+      }
+    }
+  }
+  return solid;
+}
+
+double centre_x(const std::array<int, 3>& voxel) {
+  return kGrid.origin.x + (voxel[0] + 0.5) * kGrid.voxel_size.x;
 }
 
 /// Two sets and a tree that can be built over them any number of times: operands are copied.
@@ -190,6 +216,51 @@ TEST(SolidLists, AgreeWithRecursionAtVoxelCentres) {
     }
     EXPECT_EQ(reports[0].checksum, reports[2].checksum) << "seed " << seed;
     EXPECT_EQ(reports[1].checksum, reports[2].checksum) << "seed " << seed;
+  }
+}
+
+TEST(ColourParts, AreDisjointAndTogetherTheResult) {
+  for (std::uint64_t seed = 0; seed < 40; ++seed) {
+    RandomTree random(seed);
+    Tree tree;
+    const Tree::NodeId root = random.grow(tree, 3 + static_cast<int>(seed % 12), seed % 2 == 0);
+    for (Solid& solid : tree.solids()) {
+      const int pick = random.pick(0, 3);
+      if (pick > 0) solid.colour = glm::vec4(0.25f * static_cast<float>(pick), 0, 0, 1);
+    }
+    const auto whole = voxelize_tree(tree, root);
+    std::map<std::array<int, 3>, int> seen;
+    for (const ColourPart& part : colour_parts(tree, root, glm::vec4(1))) {
+      const auto voxels = voxelize_tree(part.tree, part.tree.root());
+      for (const auto& voxel : voxels) ++seen[voxel];
+    }
+    ASSERT_EQ(seen.size(), whole.size()) << "seed " << seed;
+    for (const auto& voxel : whole) ASSERT_EQ(seen[voxel], 1) << "seed " << seed;
+  }
+}
+
+TEST(ColourParts, TheFirstSolidThatIsNotTakenAwayGivesTheColour) {
+  const auto box = [](double x0, double x1, float red) {
+    Solid solid;
+    solid.mesh = std::make_shared<TriangleSoup>(make_box({x0, -5, -5}, {x1, 5, 5}));
+    solid.colour = glm::vec4(red, 0, 0, 1);
+    return solid;
+  };
+  Tree tree;
+  const auto a = tree.add_solid(box(-6, 0, 0.1f)), b = tree.add_solid(box(-3, 6, 0.2f));
+  const auto taken = tree.add_solid(box(4, 9, 0.3f));
+  const auto both = tree.add(Operation::kUnion, {a, b});
+  const auto root = tree.add(Operation::kDifference, {both, taken});
+  const auto parts = colour_parts(tree, root, glm::vec4(1));
+  ASSERT_EQ(parts.size(), 2u);
+  EXPECT_EQ(parts[0].colour.r, 0.1f);
+  EXPECT_EQ(parts[1].colour.r, 0.2f);
+  for (const auto& voxel : voxelize_tree(parts[0].tree, parts[0].tree.root())) {
+    EXPECT_LT(centre_x(voxel), 0);
+  }
+  for (const auto& voxel : voxelize_tree(parts[1].tree, parts[1].tree.root())) {
+    EXPECT_GT(centre_x(voxel), 0);
+    EXPECT_LT(centre_x(voxel), 4);
   }
 }
 
