@@ -31,6 +31,7 @@ REASONS = {
     "issue5555": "Newer: `rotate_extrude` starts elsewhere.",
     "primitive-inf-tests": "Infinite sizes: a polygon with an infinite point is dropped here, with a warning.",
     "import-single-triangle": "An open face is shown as a sheet; OpenSCAD shows nothing.",
+    "issue2220": "The expected picture shows this flat scene from the camera of bodies; flat scenes are shown from above.",
     "fill-rule": "We follow the SVG's fill rule; OpenSCAD fills everything by even-odd.",
     "minkowski2-tests": "A sum with an empty operand is empty in the picture; 2021.01 and we leave that operand out.",
     "text-font-symbol": "The font is not installed.",
