@@ -56,7 +56,7 @@ void BoundaryArea::add(const VoxelIntervals& slab, const Execution& execution) {
       for (int u = 0; u < columns; ++u) {
         const Column here = slab.column(u, v);
         const Column above = v > slab.v_begin() ? slab.column(u, v - 1) : before_slab(u);
-        sum.w += 2 * here.size();
+        sum.w += 2 * run_count(here);
         if (!here.empty() || !left.empty()) sum.u += difference(left, here);
         if (!here.empty() || !above.empty()) sum.v += difference(above, here);
         left = here;

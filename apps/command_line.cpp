@@ -55,6 +55,7 @@ constexpr const char* kVoxelizeExamples =
   strata voxelize a.stl b.stl --voxel-size 0.2 -o all.nrrd       the union, on one grid
   strata voxelize leaf.obj -r 256 --surface -o leaf.npy  every voxel that the surface touches
   strata voxelize part.stl --voxel-size 0.05,0.05,0.1 -o slices/ --format png
+  strata voxelize plate.csg -r 256 --ids -o plate.nrrd   which solid a voxel is of
   strata voxelize part.stl -r 300 -o - --format npy | program
   strata voxelize scan.ply -r 1024 --stats               only statistics
 )";
@@ -121,7 +122,8 @@ struct Words {
   bool quiet = false, verbose = false, strict = false;
   std::string output, format, json;
   std::string resolution, voxel_size, grid, bounds, origin, padding;
-  bool align = false, solid = false, fog = false, keep_orientation = false, samples = false;
+  bool align = false, solid = false, fog = false, ids = false, keep_orientation = false,
+       samples = false;
   std::string surface, rule = "winding", open = "vote", axis = "auto", store = "auto",
                        offsets = "plane-first", backend = "auto";
   bool stats = false, checksum = false, dry_run = false, list_formats = false, gl = false;
@@ -218,6 +220,9 @@ void define_voxelize(CLI::App& app, Words& words) {
       ->group(output);
   app.add_flag("--list-formats", words.list_formats, "List the formats and end")->group(output);
   app.add_flag("--fog", words.fog, ".vdb: a float fog volume, not a mask")->group(output);
+  app.add_flag("--ids", words.ids,
+               "Values say which solid or file: 1, 2, ...; --json has the names")
+      ->group(output);
   app.add_flag("--stats", words.stats, "Print statistics")->group(output);
   add_json(app, words, output);
   app.add_flag("--checksum", words.checksum, "A hash of the solid voxels and the grid")
@@ -437,6 +442,7 @@ VoxelizeCommand voxelize_command(const Words& words, Reader& reader) {
   command.output = words.output;
   command.format = words.format;
   command.fog = words.fog;
+  command.ids = words.ids;
   command.surface = !words.surface.empty();
   command.solid = words.solid || !command.surface;
   if (command.surface) {
@@ -455,6 +461,10 @@ VoxelizeCommand voxelize_command(const Words& words, Reader& reader) {
   if (!words.json.empty()) command.json = words.json;
   if (command.input.files.empty()) reader.fail_with("no mesh file is given");
   command.grid = grid_request(words, reader);
+  if (command.ids && (command.surface || command.fog)) {
+    reader.fail_with(
+        fmt::format("--ids are of solids; {} has none", command.surface ? "--surface" : "--fog"));
+  }
   if (command.output.empty() && !words.format.empty()) {
     reader.fail_with("--format needs -o");
   }

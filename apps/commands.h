@@ -49,6 +49,7 @@ struct VoxelizeCommand {
   std::string output;  ///< empty: none, "-": standard output
   std::string format;  ///< empty: by extension
   bool fog = false;
+  bool ids = false;  ///< values say which solid
   GridRequest grid;
   bool solid = true, surface = false;
   SurfaceKind surface_kind = SurfaceKind::kConservative;

@@ -31,9 +31,9 @@ struct InputFacts {
 /// All inputs as one soup.
 struct MeshInput {
   TriangleSoup soup;
-  /// Of scenes: what makes the lists of the result of the lists of the soup, all solids'. Then
+  /// Of trees: what makes the lists of the result of the lists of the soup, all solids'. Of scenes
   /// area and volume are not known, and the bounds may be larger than the result.
-  std::shared_ptr<const csg::SolidLists> tree;
+  std::shared_ptr<csg::SolidLists> tree;
   std::shared_ptr<const csg::Tree> scene;  ///< what `tree` was made of
   std::vector<InputFacts> files;
   Bounds bounds;
@@ -45,6 +45,7 @@ struct MeshInput {
 struct MeshInputRules {
   bool keep_orientation = false;
   InsideRule rule = InsideRule::kWinding;
+  bool as_tree = false;  ///< meshes become the solids of a tree, each by itself
 };
 
 /// Reads the files, looks whether each is closed and the right way around, turns around those that
@@ -52,7 +53,8 @@ struct MeshInputRules {
 Result<MeshInput> load_meshes(const InputOptions& input, const MeshInputRules& rules,
                               Session& session);
 
-/// The same where some of the files may be scenes (.csg, .scad): then all are united into one tree.
+/// The same where some of the files may be scenes (.csg, .scad), or the rules ask for a tree: then
+/// all are united into one.
 Result<MeshInput> load_solids(const InputOptions& input, const MeshInputRules& rules,
                               Session& session);
 

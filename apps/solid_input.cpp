@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <glm/common.hpp>
 #include <utility>
 
 #include "apps/csg_scene.h"
@@ -6,12 +7,52 @@
 #include "apps/session.h"
 
 namespace strata::apps {
+namespace {
+
+void set_tree(MeshInput& input, const csg::Tree& tree) {
+  input.tree = std::make_shared<csg::SolidLists>(tree, tree.root());
+  input.soup = input.tree->take_soup();
+  input.scene = std::make_shared<csg::Tree>(tree);
+}
+
+/// Meshes as the solids of a union, in their order.
+Result<MeshInput> load_united(const InputOptions& input, const MeshInputRules& rules,
+                              Session& session) {
+  MeshInput all;
+  csg::Tree tree;
+  std::vector<csg::Tree::NodeId> solids;
+  for (const std::string& path : input.files) {
+    const double start = session.milliseconds();
+    InputOptions one = input;
+    one.files = {path};
+    auto loaded = load_meshes(one, rules, session);
+    if (!loaded) return loaded;
+    csg::Solid solid;
+    solid.mesh = std::make_shared<const TriangleSoup>(std::move(loaded->soup));
+    solid.rule = rules.rule;
+    solid.name = path;
+    solids.push_back(tree.add_solid(std::move(solid)));
+    all.closed = all.closed && loaded->closed;
+    all.area += loaded->area;
+    all.volume += loaded->volume;
+    all.bounds.low = glm::min(all.bounds.low, loaded->bounds.low);
+    all.bounds.high = glm::max(all.bounds.high, loaded->bounds.high);
+    all.files.push_back(std::move(loaded->files.front()));
+    all.read_ms += loaded->read_ms;
+    all.diagnose_ms += session.milliseconds() - start - loaded->read_ms;
+  }
+  tree.set_root(tree.add(csg::Operation::kUnion, solids));
+  set_tree(all, tree);
+  return all;
+}
+
+}  // namespace
 
 Result<MeshInput> load_solids(const InputOptions& input, const MeshInputRules& rules,
                               Session& session) {
   if (std::none_of(input.files.begin(), input.files.end(),
                    [](const std::string& path) { return is_scene_name(path); })) {
-    return load_meshes(input, rules, session);
+    return rules.as_tree ? load_united(input, rules, session) : load_meshes(input, rules, session);
   }
   const double start = session.milliseconds();
   CsgCommand command;
@@ -26,10 +67,7 @@ Result<MeshInput> load_solids(const InputOptions& input, const MeshInputRules& r
   if (all.bounds.empty()) {
     return fail(ErrorCode::kGeometry, "{}: the scene is empty", input.files.front());
   }
-  auto lists = std::make_shared<csg::SolidLists>(tree, tree.root());
-  all.soup = lists->take_soup();
-  all.tree = std::move(lists);
-  all.scene = std::make_shared<csg::Tree>(tree);
+  set_tree(all, tree);
   for (const std::string& path : input.files) {
     InputFacts facts;
     facts.path = path;

@@ -14,8 +14,8 @@
 #include "apps/mesh_input.h"
 #include "apps/session.h"
 #include "apps/voxelize_report.h"
-#include "csg/colour_parts.h"
 #include "csg/picture.h"
+#include "csg/solid_labels.h"
 #include "csg/solid_lists.h"
 #include "voxelize/voxel_writer.h"
 
@@ -36,8 +36,10 @@ Result<void> check_output(const VoxelizeCommand& command) {
   if (command.output == "-" && isatty(STDOUT_FILENO) != 0) {
     return fail(ErrorCode::kUsage, "standard output is a terminal; a voxel file is no text");
   }
-  if (auto format = voxel_format_for(command.output, command.format); !format) {
-    return tl::unexpected(format.error());
+  const auto format = voxel_format_for(command.output, command.format);
+  if (!format) return tl::unexpected(format.error());
+  if (command.ids) {
+    if (auto held = check_ids(*format, 1); !held) return held;
   }
   struct stat out {};
   if (command.output == "-" || stat(command.output.c_str(), &out) != 0 || !S_ISREG(out.st_mode)) {
@@ -152,42 +154,52 @@ Result<void> print_reports(const VoxelizeCommand& command, const VoxelizeOutcome
   return print_report(voxelize_json(command, outcome, session), *command.json, file_on_stdout);
 }
 
-/// Writes the voxels of a scene by colour. @return false: it has but one, or too many
-Result<bool> write_colours(const VoxelizeOutcome& outcome, std::size_t most,
-                           VoxelizeOptions options, const Execution& execution, VoxelWriter& writer,
-                           Session& session) {
-  if (most == 0 || !outcome.input.scene) return false;
+/// Has the solids of a scene labelled, by number or by colour, when the format is to hold that.
+void label_solids(const VoxelizeCommand& command, VoxelizeOutcome& outcome,
+                  VoxelWriterOptions& options, Session& session) {
+  if (!outcome.input.tree) return;
   const csg::Tree& scene = *outcome.input.scene;
+  if (command.ids) {
+    options.ids = static_cast<std::uint32_t>(scene.solids().size());
+    outcome.id_voxels.resize(scene.solids().size(), 0);
+    return outcome.input.tree->set_labels(csg::id_labels(scene));
+  }
+  if (command.output.empty()) return;
+  const std::size_t most = voxel_format_for(command.output, command.format)->colours;
+  if (most == 0) return;
   const glm::vec4 none(glm::vec3(csg::colour_schemes().front().face) / 255.0f, 1.0f);
-  const auto parts = csg::colour_parts(scene, scene.root(), none);
-  if (parts.empty()) return false;
-  if (parts.size() > most) {
-    session.warn("colours", fmt::format("{} colours, a {} file holds {}: written without",
-                                        parts.size(), outcome.format, most));
-    return false;
+  const csg::ColourLabels parts = csg::colour_labels(scene, scene.root(), none);
+  if (parts.colours.size() > most) {
+    return session.warn("colours", fmt::format("{} colours, a {} file holds {}: written without",
+                                               parts.colours.size(), outcome.format, most));
   }
-  options.statistics = false;
-  for (const csg::ColourPart& part : parts) {
-    const glm::u8vec4 colour(glm::clamp(part.colour, 0.0f, 1.0f) * 255.0f + 0.5f);
-    if (auto begun = writer.begin_colour(colour); !begun) return tl::unexpected(begun.error());
-    const csg::SolidLists lists(part.tree, part.tree.root());
-    options.filter = &lists.filter();
-    const auto add = [&](const VoxelIntervals& slab) { return writer.add(slab, execution); };
-    auto done = voxelize_slabs(lists.soup(), outcome.grid, options, execution, add);
-    if (!done) return tl::unexpected(done.error());
+  for (const glm::vec4& colour : parts.colours) {
+    options.colours.emplace_back(glm::clamp(colour, 0.0f, 1.0f) * 255.0f + 0.5f);
   }
-  return true;
+  if (!parts.colours.empty()) outcome.input.tree->set_labels(parts.labels);
+}
+
+void count_ids(const VoxelIntervals& slab, std::vector<std::uint64_t>& voxels) {
+  for (int tv = 0; tv < slab.tiles_v(); ++tv) {
+    for (int tu = 0; tu < slab.tiles_u(); ++tu) {
+      const VoxelIntervals::TileView tile = slab.tile(tu, tv);
+      for (std::size_t i = 0; i < tile.labels.size(); ++i) {
+        voxels[tile.labels[i] - 1] += static_cast<std::uint64_t>(tile.items[i].length());
+      }
+    }
+  }
 }
 
 /// The work itself: lists, intervals, file.
 Result<void> voxelize_and_write(const VoxelizeCommand& command, VoxelizeOutcome& outcome,
                                 Session& session) {
   std::unique_ptr<VoxelWriter> writer;
+  VoxelWriterOptions file;
+  file.fog = command.fog;
+  file.name = command.ids ? "ids" : command.solid ? "solid" : "surface";
+  label_solids(command, outcome, file, session);
   if (!command.output.empty()) {
-    VoxelWriterOptions options;
-    options.fog = command.fog;
-    options.name = command.solid ? "solid" : "surface";
-    auto opened = open_voxel_writer(command.output, command.format, outcome.grid, options);
+    auto opened = open_voxel_writer(command.output, command.format, outcome.grid, file);
     if (!opened) return tl::unexpected(opened.error());
     writer = *std::move(opened);
   }
@@ -203,6 +215,7 @@ Result<void> voxelize_and_write(const VoxelizeCommand& command, VoxelizeOutcome&
   options.offsets = command.offsets;
   if (outcome.input.tree) {
     options.filter = &outcome.input.tree->filter();
+    options.closed = true;                // it makes closed lists of open ones
     options.rule = InsideRule::kWinding;  // the solids' rules are the filter's
   }
   options.statistics = command.stats || command.json || command.checksum;
@@ -229,19 +242,11 @@ Result<void> voxelize_and_write(const VoxelizeCommand& command, VoxelizeOutcome&
   std::optional<BoundaryArea> boundary;
   if (command.stats || command.json) boundary.emplace(outcome.grid, outcome.axis);
   double write_ms = 0;
-  bool coloured = false;
-  if (writer) {
-    const double start = session.milliseconds();
-    const auto format = voxel_format_for(command.output, command.format);
-    const auto done = write_colours(outcome, format->colours, options, execution, *writer, session);
-    if (!done) return tl::unexpected(done.error());
-    coloured = *done;
-    write_ms = session.milliseconds() - start;
-  }
   const auto sink = [&](const VoxelIntervals& slab) -> Result<void> {
     if (!options.statistics) solid_voxels += slab.solid_voxels();
     if (boundary) boundary->add(slab, quiet);
-    if (!writer || coloured) return {};
+    if (command.ids) count_ids(slab, outcome.id_voxels);
+    if (!writer) return {};
     const double start = session.milliseconds();
     auto done = writer->add(slab, quiet);
     write_ms += session.milliseconds() - start;
@@ -280,8 +285,8 @@ Result<void> run_voxelize(const VoxelizeCommand& command, Session& session) {
   if (auto valid = check_output(command); !valid) return valid;
 
   VoxelizeOutcome outcome;
-  auto input = load_solids(
-      command.input, {.keep_orientation = command.keep_orientation, .rule = command.rule}, session);
+  const MeshInputRules rules{command.keep_orientation, command.rule, command.ids};
+  auto input = load_solids(command.input, rules, session);
   if (!input) return tl::unexpected(input.error());
   outcome.input = *std::move(input);
   if (auto strict = session.check_strict(); !strict) return strict;

@@ -110,6 +110,21 @@ void write_results(JsonWriter& json, const VoxelizeCommand& command,
   json.end_object();
 }
 
+/// The solids that have voxels.
+void write_ids(JsonWriter& json, const VoxelizeOutcome& outcome) {
+  json.key("ids").begin_array();
+  for (std::size_t solid = 0; solid < outcome.id_voxels.size(); ++solid) {
+    if (outcome.id_voxels[solid] == 0) continue;
+    json.begin_object();
+    json.member("id", solid + 1);
+    json.member("solid", solid);
+    json.member("name", outcome.input.scene->solids()[solid].name);
+    json.member("voxels", outcome.id_voxels[solid]);
+    json.end_object();
+  }
+  json.end_array();
+}
+
 }  // namespace
 
 std::string voxelize_text(const VoxelizeCommand& command, const VoxelizeOutcome& outcome,
@@ -213,6 +228,7 @@ std::string voxelize_json(const VoxelizeCommand& command, const VoxelizeOutcome&
   json.end_object();
 
   write_results(json, command, outcome);
+  if (command.ids && outcome.measured) write_ids(json, outcome);
 
   json.key("output");
   if (command.output.empty() || command.dry_run) {

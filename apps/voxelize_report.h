@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "apps/commands.h"
 #include "apps/memory_estimate.h"
@@ -24,6 +25,7 @@ struct VoxelizeOutcome {
   double area_estimate = 0.0;  ///< of the set's boundary, square world units
   std::string format;          ///< of the output; empty: none
   std::optional<std::uint64_t> output_bytes;
+  std::vector<std::uint64_t> id_voxels;  ///< of solid n of the scene, with --ids
   double write_ms = 0.0;
 };
 

@@ -1,12 +1,14 @@
 #include "csg/solid_lists.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <utility>
 
 #include "csg/geometry.h"
 #include "csg/program.h"
+#include "csg/solid_labels.h"
 #include "csg/surface.h"
 #include "csg/tile_surface.h"
 #include "hashbuffer/build_ldi.h"
@@ -17,9 +19,39 @@ namespace {
 
 /// What the filter's workers share.
 struct Shared {
+  static constexpr std::uint32_t kNoRank = 0xffffffffu;
   Program program;
   std::vector<InsideRule> rules;        ///< of each solid of the tree
   std::vector<std::uint32_t> solid_of;  ///< of each triangle of the soup
+  std::vector<std::uint32_t> ranks;   ///< of each solid: its place among those that add, or kNoRank
+  std::vector<std::uint32_t> labels;  ///< of each rank; none: the lists are not labelled
+};
+
+/// A set of small numbers that tells its least one: words of bits, and words of which are not 0.
+class LeastOf {
+ public:
+  /// Of numbers below `count`.
+  explicit LeastOf(std::size_t count) : words_((count + 63) / 64), tops_((count + 4095) / 4096) {}
+
+  /// Puts a number in, or takes it out.
+  void flip(std::uint32_t number) {
+    std::uint64_t& word = words_[number / 64];
+    word ^= std::uint64_t{1} << (number % 64);
+    const std::uint64_t bit = std::uint64_t{1} << (number / 64 % 64);
+    std::uint64_t& top = tops_[number / 4096];
+    top = word != 0 ? top | bit : top & ~bit;
+  }
+  /// @pre there is one
+  [[nodiscard]] std::uint32_t least() const {
+    std::size_t top = 0;
+    while (tops_[top] == 0) ++top;
+    const std::size_t word = top * 64 + static_cast<std::size_t>(std::countr_zero(tops_[top]));
+    return static_cast<std::uint32_t>(word * 64 +
+                                      static_cast<std::size_t>(std::countr_zero(words_[word])));
+  }
+
+ private:
+  std::vector<std::uint64_t> words_, tops_;
 };
 
 bool is_inside(InsideRule rule, int winding) {
@@ -39,6 +71,7 @@ class BooleanWorker final : public TileListFilter::Worker {
   explicit BooleanWorker(const Shared& shared)
       : shared_(&shared),
         state_(shared.program),
+        added_(std::max<std::size_t>(shared.labels.size(), 1)),
         windings_(shared.rules.size(), 0),
         offsets_(kTilePixels + 1) {}
 
@@ -72,15 +105,32 @@ class BooleanWorker final : public TileListFilter::Worker {
     return shared_->solid_of[item.triangle()];
   }
 
+  void flip(std::uint32_t solid) {
+    state_.flip(solid);
+    if (labelled() && shared_->ranks[solid] != Shared::kNoRank) added_.flip(shared_->ranks[solid]);
+  }
+  [[nodiscard]] bool labelled() const { return !shared_->labels.empty(); }
+  /// What the ray is in: the label, 1 without labels; 0: not in the tree. Where the tree is true,
+  /// it is in a solid that adds: were all of them outside, more solids would not make it true.
+  [[nodiscard]] std::uint32_t label() const {
+    if (!state_.value()) return 0;
+    return labelled() ? shared_->labels[added_.least()] : 1;
+  }
+  /// A crossing at which the label becomes `label`; `triangle` is one that made it so.
+  void put(std::uint32_t depth, std::uint32_t label, std::uint32_t triangle) {
+    keys_.emplace_back(depth, label == 0, labelled() ? label : triangle);
+  }
+
   /// The lists of a ray that leaves every solid as often as it enters it; false, without effect,
   /// for any other.
   bool walk() {
     bool balanced = true;
     const std::size_t before = keys_.size();
-    bool value = state_.value();
+    std::uint32_t last = label();
     for (std::size_t i = 0; i < items_.size();) {
       const std::size_t begin = i;
       const std::uint32_t depth = items_[begin].depth();
+      const bool value = state_.value();
       DepthItem shown = items_[begin];
       for (; i < items_.size() && items_[i].depth() == depth; ++i) {
         const std::uint32_t solid = solid_of(items_[i]);
@@ -89,19 +139,19 @@ class BooleanWorker final : public TileListFilter::Worker {
         const bool was = is_inside(rule, winding);
         winding += items_[i].exit() ? -1 : 1;
         if (is_inside(rule, winding) != was) {
-          state_.flip(solid);
+          flip(solid);
           if (state_.value() != value) shown = items_[i];
         }
       }
-      if (state_.value() == value) continue;
-      value = !value;
-      keys_.emplace_back(depth, !value, shown.triangle());
+      if (label() == last) continue;
+      last = label();
+      put(depth, last, shown.triangle());
     }
     for (const DepthItem item : items_) {
       const std::uint32_t solid = solid_of(item);
       const int winding = std::exchange(windings_[solid], 0);
       if (winding == 0) continue;
-      if (is_inside(shared_->rules[solid], winding)) state_.flip(solid);
+      if (is_inside(shared_->rules[solid], winding)) flip(solid);
       balanced = balanced && shared_->rules[solid] == InsideRule::kParity && winding % 2 == 0;
     }
     if (!balanced) keys_.resize(before);
@@ -123,20 +173,21 @@ class BooleanWorker final : public TileListFilter::Worker {
     std::sort(flips_.begin(), flips_.end(), [](const Flip& a, const Flip& b) {
       return a.depth != b.depth ? a.depth < b.depth : a.solid < b.solid;
     });
-    bool value = state_.value();
+    std::uint32_t last = label();
     for (std::size_t i = 0; i < flips_.size();) {
       const std::size_t begin = i;
       for (; i < flips_.size() && flips_[i].depth == flips_[begin].depth; ++i) {
-        state_.flip(flips_[i].solid);
+        flip(flips_[i].solid);
       }
-      if (state_.value() == value) continue;
-      value = !value;
-      keys_.emplace_back(flips_[begin].depth, !value, flips_[begin].triangle);
+      if (label() == last) continue;
+      last = label();
+      put(flips_[begin].depth, last, flips_[begin].triangle);
     }
   }
 
   const Shared* shared_;
   ProgramState state_;
+  LeastOf added_;  ///< ranks of the solids that the ray is in
   std::vector<int> windings_;
   std::vector<std::uint32_t> offsets_;
   std::vector<DepthItem> keys_, items_;
@@ -149,6 +200,7 @@ class BooleanFilter final : public TileListFilter {
   [[nodiscard]] std::unique_ptr<Worker> worker() const override {
     return std::make_unique<BooleanWorker>(*shared_);
   }
+  [[nodiscard]] bool labelled() const override { return !shared_->labels.empty(); }
 
  private:
   const Shared* shared_;
@@ -159,6 +211,7 @@ class BooleanFilter final : public TileListFilter {
 struct SolidLists::Impl {
   Shared shared;
   TriangleSoup soup;
+  std::vector<std::uint32_t> added;  ///< solids by rank
   BooleanFilter filter{shared};
 };
 
@@ -176,6 +229,11 @@ SolidLists::SolidLists(const Tree& tree, Tree::NodeId root) : impl_(std::make_un
     for (const glm::uvec3& triangle : part.triangles) soup.triangles.push_back(triangle + first);
     shared.solid_of.resize(soup.triangles.size(), solid);
   }
+  shared.ranks.resize(tree.solids().size(), Shared::kNoRank);
+  impl_->added = added_solids(tree, root);
+  for (std::uint32_t rank = 0; rank < impl_->added.size(); ++rank) {
+    shared.ranks[impl_->added[rank]] = rank;
+  }
 }
 SolidLists::~SolidLists() = default;
 SolidLists::SolidLists(SolidLists&&) noexcept = default;
@@ -184,6 +242,12 @@ SolidLists& SolidLists::operator=(SolidLists&&) noexcept = default;
 const TriangleSoup& SolidLists::soup() const { return impl_->soup; }
 TriangleSoup SolidLists::take_soup() { return std::exchange(impl_->soup, {}); }
 const TileListFilter& SolidLists::filter() const { return impl_->filter; }
+void SolidLists::set_labels(const std::vector<std::uint32_t>& labels) {
+  impl_->shared.labels.clear();
+  for (const std::uint32_t solid : impl_->added) {
+    impl_->shared.labels.push_back(labels[solid]);
+  }
+}
 std::uint32_t SolidLists::solid_of(std::uint32_t triangle) const {
   return impl_->shared.solid_of[triangle];
 }

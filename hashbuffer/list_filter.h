@@ -22,6 +22,10 @@ class TileListFilter {
   };
   /// Threads may ask at once.
   [[nodiscard]] virtual std::unique_ptr<Worker> worker() const = 0;
+  /// What comes out is labelled: each crossing says what lies behind it, at exit() nothing, else
+  /// what the label triangle() stands for. A list has no two crossings of one depth then, and
+  /// labels follow one another without an exit between.
+  [[nodiscard]] virtual bool labelled() const { return false; }
 };
 
 /// Calls body(item) for each crossing of pixel `pixel` of a tile, in order.

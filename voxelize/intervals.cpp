@@ -19,18 +19,31 @@ VoxelIntervals::VoxelIntervals(const VoxelGrid& grid, Axis axis, int v_begin, in
       tiles_(static_cast<std::size_t>(tiles_u_) * static_cast<std::size_t>(tiles_v_)) {}
 
 void VoxelIntervals::set_tile(int tu, int tv, std::span<const std::uint32_t> offsets,
-                              std::span<const Interval> items) {
+                              std::span<const Interval> items,
+                              std::span<const std::uint32_t> labels) {
   Tile& tile = tiles_[static_cast<std::size_t>(tv) * static_cast<std::size_t>(tiles_u_) +
                       static_cast<std::size_t>(tu)];
   tile.offsets = std::make_unique_for_overwrite<std::uint32_t[]>(offsets.size());
   tile.items = std::make_unique_for_overwrite<Interval[]>(items.size());
   std::copy(offsets.begin(), offsets.end(), tile.offsets.get());
   std::copy(items.begin(), items.end(), tile.items.get());
+  tile.labels.reset();
+  if (labels.empty()) return;
+  tile.labels = std::make_unique_for_overwrite<std::uint32_t[]>(labels.size());
+  std::copy(labels.begin(), labels.end(), tile.labels.get());
 }
 
 std::uint64_t VoxelIntervals::interval_count() const {
   std::uint64_t count = 0;
-  for (const Tile& tile : tiles_) count += tile.offsets ? tile.offsets[kTileColumns] : 0;
+  for (const Tile& tile : tiles_) {
+    if (!tile.offsets) continue;
+    count += tile.offsets[kTileColumns];
+    if (!tile.labels) continue;
+    for (std::size_t local = 0; local < kTileColumns; ++local) {
+      const std::uint32_t begin = tile.offsets[local], size = tile.offsets[local + 1] - begin;
+      count -= size - run_count({tile.items.get() + begin, size});
+    }
+  }
   return count;
 }
 
@@ -50,7 +63,8 @@ std::uint64_t VoxelIntervals::memory_bytes() const {
   for (const Tile& tile : tiles_) {
     if (tile.offsets)
       bytes += (kTileColumns + 1) * sizeof(std::uint32_t) +
-               tile.offsets[kTileColumns] * sizeof(Interval);
+               tile.offsets[kTileColumns] *
+                   (sizeof(Interval) + (tile.labels ? sizeof(std::uint32_t) : 0));
   }
   return bytes;
 }

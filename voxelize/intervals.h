@@ -26,6 +26,9 @@ struct Interval {
 /// intervals along `axis`. A column is (u, v) with the axes of AxisFrame(axis). Memory grows with
 /// the surface, not with the volume. Storage is by tiles of kTileSide x kTileSide columns; a tile
 /// without solid voxels holds nothing.
+///
+/// Intervals may have labels, such as the number of a solid. Then those that touch differ in
+/// theirs.
 class VoxelIntervals {
  public:
   static constexpr int kTileSide = 64;
@@ -47,14 +50,17 @@ class VoxelIntervals {
 
   /// The intervals of column (u, v). @pre 0 <= u < columns(), v_begin() <= v < v_end()
   [[nodiscard]] std::span<const Interval> column(int u, int v) const {
-    const int row = v - v_begin_;
-    const Tile& tile =
-        tiles_[static_cast<std::size_t>(row / kTileSide) * static_cast<std::size_t>(tiles_u_) +
-               static_cast<std::size_t>(u / kTileSide)];
+    const Tile& tile = tile_of(u, v);
     if (!tile.offsets) return {};
-    const std::size_t local = static_cast<std::size_t>(row % kTileSide) * kTileSide +
-                              static_cast<std::size_t>(u % kTileSide);
+    const std::size_t local = local_of(u, v);
     return {tile.items.get() + tile.offsets[local], tile.offsets[local + 1] - tile.offsets[local]};
+  }
+  /// The labels of the intervals of column (u, v); none where they were not given.
+  [[nodiscard]] std::span<const std::uint32_t> column_labels(int u, int v) const {
+    const Tile& tile = tile_of(u, v);
+    if (!tile.labels) return {};
+    const std::size_t local = local_of(u, v);
+    return {tile.labels.get() + tile.offsets[local], tile.offsets[local + 1] - tile.offsets[local]};
   }
   /// True when no column of tile (tu, tv) of this slab is solid anywhere: lets writers skip it.
   [[nodiscard]] bool tile_empty(int tu, int tv) const {
@@ -68,22 +74,29 @@ class VoxelIntervals {
   struct TileView {
     std::span<const std::uint32_t> offsets;
     std::span<const Interval> items;
+    std::span<const std::uint32_t> labels;  ///< of the items, or none
+    [[nodiscard]] std::uint32_t label(std::size_t item) const {
+      return labels.empty() ? 1 : labels[item];
+    }
   };
   [[nodiscard]] TileView tile(int tu, int tv) const {
     const Tile& stored = tiles_[static_cast<std::size_t>(tv) * static_cast<std::size_t>(tiles_u_) +
                                 static_cast<std::size_t>(tu)];
     if (!stored.offsets) return {};
+    const std::size_t count = stored.offsets[kTileColumns];
     return {{stored.offsets.get(), kTileColumns + 1},
-            {stored.items.get(), stored.offsets[kTileColumns]}};
+            {stored.items.get(), count},
+            {stored.labels.get(), stored.labels ? count : 0}};
   }
 
   /// Stores tile (tu, tv): `offsets` has kTileColumns + 1 entries, row by row (columns outside the
-  /// grid are empty), `items` is offsets.back() long. Different tiles may be set by different
-  /// threads at once.
+  /// grid are empty), `items` is offsets.back() long, and so is `labels` unless it is empty.
+  /// Different tiles may be set by different threads at once.
   void set_tile(int tu, int tv, std::span<const std::uint32_t> offsets,
-                std::span<const Interval> items);
+                std::span<const Interval> items, std::span<const std::uint32_t> labels = {});
 
   [[nodiscard]] std::uint64_t solid_voxels() const;  ///< sum of the lengths; O(intervals)
+  /// Runs of solid voxels, whatever their labels are. O(intervals) where there are labels.
   [[nodiscard]] std::uint64_t interval_count() const;
   [[nodiscard]] std::uint64_t memory_bytes() const;  ///< bytes held by the tiles
 
@@ -91,12 +104,42 @@ class VoxelIntervals {
   struct Tile {
     std::unique_ptr<std::uint32_t[]> offsets;
     std::unique_ptr<Interval[]> items;
+    std::unique_ptr<std::uint32_t[]> labels;
   };
+  [[nodiscard]] const Tile& tile_of(int u, int v) const {
+    return tiles_[static_cast<std::size_t>((v - v_begin_) / kTileSide) *
+                      static_cast<std::size_t>(tiles_u_) +
+                  static_cast<std::size_t>(u / kTileSide)];
+  }
+  [[nodiscard]] std::size_t local_of(int u, int v) const {
+    return static_cast<std::size_t>((v - v_begin_) % kTileSide) * kTileSide +
+           static_cast<std::size_t>(u % kTileSide);
+  }
   VoxelGrid grid_;
   Axis axis_ = Axis::kZ;
   int columns_ = 0, v_begin_ = 0, v_end_ = 0, tiles_u_ = 0, tiles_v_ = 0;
   std::vector<Tile> tiles_;
 };
+
+/// Runs of solid voxels of a column: intervals that touch, of different labels, are one.
+[[nodiscard]] inline std::size_t run_count(std::span<const Interval> column) {
+  std::size_t count = column.size();
+  for (std::size_t i = 1; i < column.size(); ++i) {
+    if (column[i].begin() == column[i - 1].end()) --count;
+  }
+  return count;
+}
+
+/// Calls run(interval, label) for the intervals of column (u, v); the label is 1 where none is
+/// given.
+template <class Run>
+void for_each_labelled(const VoxelIntervals& set, int u, int v, Run&& run) {
+  const std::span<const Interval> column = set.column(u, v);
+  const std::span<const std::uint32_t> labels = set.column_labels(u, v);
+  for (std::size_t i = 0; i < column.size(); ++i) {
+    run(column[i], labels.empty() ? std::uint32_t{1} : labels[i]);
+  }
+}
 
 /// Builds intervals from a predicate solid(i, j, k), by brute force: for tests and small grids.
 template <class Predicate>

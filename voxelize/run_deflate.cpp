@@ -26,7 +26,7 @@ void set_lengths(CodeLengths& lengths, std::size_t first, std::size_t last, int 
   for (std::size_t i = first; i <= last; ++i) lengths[i] = static_cast<std::uint8_t>(length);
 }
 
-// The sum of 2^-length is 1 in both tables, as inflaters demand (a test holds it).
+// The sum of 2^-length is 1 in all tables, as inflaters demand (a test holds it).
 CodeLengths choose_lengths(RunBytes bytes) {
   CodeLengths lengths{};
   if (bytes == RunBytes::kFlags) {
@@ -40,6 +40,13 @@ CodeLengths choose_lengths(RunBytes bytes) {
     set_lengths(lengths, 277, 280, 5);   // .. 130
     set_lengths(lengths, 281, 284, 4);   // .. 257
     lengths[kLongest] = 2;
+  } else if (bytes == RunBytes::kIds) {
+    set_lengths(lengths, 1, kEndOfBlock, 10);
+    lengths[0] = 3;
+    set_lengths(lengths, 257, 264, 7);
+    set_lengths(lengths, 265, 276, 6);
+    set_lengths(lengths, 277, 284, 5);
+    lengths[kLongest] = 3;
   } else {
     set_lengths(lengths, 0, 255, 13);
     lengths[0x00] = lengths[0xff] = 3;
@@ -74,7 +81,8 @@ struct RunDeflater::Book {
   std::array<Code, kLongestCopy + 1> copies;  // by length: symbol, extra bits and the distance
   std::vector<Code> header;                   // of a block, after its first three bits
 
-  explicit Book(const CodeLengths& lengths) {
+  // Copies are at distance `element`: 1, 2 or 4, the last of so many distances of equal length.
+  Book(const CodeLengths& lengths, std::uint32_t element) {
     // Canonical codes (RFC 1951, 3.2.2): by length, then by symbol.
     std::uint32_t code = 0;
     for (int length = 1; length <= kLongestCode; ++length) {
@@ -85,24 +93,29 @@ struct RunDeflater::Book {
       }
       code <<= 1;
     }
-    // The only distance is 1: symbol 0, whose code is one bit, 0.
+    // Of one distance the code is one bit, 0; else all bits of the last one are set.
+    const std::uint32_t distance_length = element == 4 ? 2 : 1;
+    const std::uint32_t distance = element == 1 ? 0 : (1u << distance_length) - 1;
     std::size_t copy = kShortestCopy;
     for (std::size_t symbol = 257; symbol <= kLongest; ++symbol) {
       const int extra = extra_bits(symbol);
       if (symbol == kLongest) copy = kLongestCopy;  // the symbol before reaches it too, for more
       for (std::uint32_t offset = 0; offset < 1u << extra && copy < copies.size(); ++offset) {
-        copies[copy++] = {symbols[symbol].bits | offset << symbols[symbol].length,
-                          symbols[symbol].length + static_cast<std::uint32_t>(extra) + 1};
+        const std::uint32_t length = symbols[symbol].length + static_cast<std::uint32_t>(extra);
+        copies[copy++] = {
+            symbols[symbol].bits | offset << symbols[symbol].length | distance << length,
+            length + distance_length};
       }
     }
-    make_header(lengths);
+    make_header(lengths, element, distance_length);
   }
 
  private:
   // The code lengths themselves in a code: 4 bits for each of the symbols 1 .. 16 of that alphabet,
   // where 16 repeats the one before 3 to 6 times.
-  void make_header(const CodeLengths& lengths) {
-    header = {{kSymbols - 257, 5}, {0, 5}, {19 - 4, 4}};  // all symbols, one distance, 19 lengths
+  void make_header(const CodeLengths& lengths, std::uint32_t distances,
+                   std::uint32_t distance_length) {
+    header = {{kSymbols - 257, 5}, {distances - 1, 5}, {19 - 4, 4}};  // all symbols, 19 lengths
     for (const int symbol : {16, 17, 18, 0, 8, 7, 9, 6, 10, 5, 11, 4, 12, 3, 13, 2, 14, 1, 15}) {
       header.push_back({symbol >= 1 && symbol <= 16 ? 4u : 0u, 3});
     }
@@ -122,17 +135,23 @@ struct RunDeflater::Book {
       }
       for (; alike > 0; --alike) put_symbol(lengths[i - 1]);
     }
-    put_symbol(1);  // the distance
+    for (std::uint32_t i = 0; i < distances; ++i) put_symbol(distance_length);
   }
 };
 
-const RunDeflater::Book& RunDeflater::book(RunBytes bytes) {
-  static const Book kBits(choose_lengths(RunBytes::kBits));
-  static const Book kFlags(choose_lengths(RunBytes::kFlags));
-  return bytes == RunBytes::kBits ? kBits : kFlags;
+const RunDeflater::Book& RunDeflater::book(RunBytes bytes, std::size_t element) {
+  static const Book kBits(choose_lengths(RunBytes::kBits), 1);
+  static const Book kFlags(choose_lengths(RunBytes::kFlags), 1);
+  if (bytes == RunBytes::kBits) return kBits;
+  if (bytes == RunBytes::kFlags) return kFlags;
+  static const Book kIds1(choose_lengths(RunBytes::kIds), 1);
+  static const Book kIds2(choose_lengths(RunBytes::kIds), 2);
+  static const Book kIds4(choose_lengths(RunBytes::kIds), 4);
+  return element == 1 ? kIds1 : element == 2 ? kIds2 : kIds4;
 }
 
-RunDeflater::RunDeflater(RunBytes bytes) : book_(book(bytes)) {}
+RunDeflater::RunDeflater(RunBytes bytes, std::size_t element)
+    : book_(book(bytes, element)), element_(element) {}
 
 // @pre length <= 32
 void RunDeflater::put(std::uint64_t bits, std::uint32_t length) {
@@ -162,24 +181,46 @@ void RunDeflater::begin(Bytes& out, bool last) {
 
 void RunDeflater::flush_run() {
   if (length_ == 0) return;
-  // b grows by the sum of a after each byte: length * a + value * (1 + 2 + .. + length).
-  const std::uint64_t length = length_ % kAdlerBase;
-  const std::uint64_t triangle = length_ % 2 == 0
-                                     ? length_ / 2 % kAdlerBase * ((length_ + 1) % kAdlerBase)
-                                     : (length_ + 1) / 2 % kAdlerBase * length;
-  adler_b_ = static_cast<std::uint32_t>(
-      (adler_b_ + length * adler_a_ + triangle % kAdlerBase * value_) % kAdlerBase);
-  adler_a_ = static_cast<std::uint32_t>((adler_a_ + length * value_) % kAdlerBase);
+  const auto byte_at = [this](std::uint64_t k) { return value_ >> 8 * (k % element_) & 0xff; };
+  add_to_adler();
 
-  put(book_.symbols[value_]);
-  std::uint64_t rest = length_ - 1;
+  for (std::size_t k = 0; k < element_; ++k) put(book_.symbols[byte_at(k)]);
+  const std::uint64_t bytes = length_ * element_;
+  std::uint64_t rest = bytes - element_;
   const Code longest = book_.copies[kLongestCopy];
   for (; rest >= kLongestCopy; rest -= kLongestCopy) put(longest);
   if (rest >= kShortestCopy) {
     put(book_.copies[rest]);
   } else {
-    for (; rest > 0; --rest) put(book_.symbols[value_]);
+    for (; rest > 0; --rest) put(book_.symbols[byte_at(bytes - rest)]);
   }
+}
+
+// After N bytes x_0 .. the sum a has grown by all of them, and b, the sum of what a is after each,
+// by N a + sum of (N - k) x_k. Byte k of an element of m stands at k, k + m, .. of n elements,
+// which adds n (N - k) - m n (n - 1) / 2 times it.
+void RunDeflater::add_to_adler() {
+  const std::uint64_t bytes = length_ * element_, count = length_ % kAdlerBase;
+  const std::uint64_t pairs = (length_ % 2 == 0 ? length_ / 2 : length_) % kAdlerBase *
+                              ((length_ % 2 == 0 ? length_ - 1 : length_ / 2) % kAdlerBase) %
+                              kAdlerBase * element_ % kAdlerBase;
+  std::uint64_t a = adler_a_, b = adler_b_ + bytes % kAdlerBase * adler_a_ % kAdlerBase;
+  for (std::size_t k = 0; k < element_; ++k) {
+    const std::uint64_t value = value_ >> 8 * k & 0xff;
+    const std::uint64_t weight = count * ((bytes - k) % kAdlerBase) + kAdlerBase - pairs;
+    a += count * value;
+    b += weight % kAdlerBase * value;
+  }
+  adler_a_ = static_cast<std::uint32_t>(a % kAdlerBase);
+  adler_b_ = static_cast<std::uint32_t>(b % kAdlerBase);
+}
+
+void RunDeflater::byte(std::uint8_t value) {
+  flush_run();
+  length_ = 0;
+  put(book_.symbols[value]);
+  adler_a_ = (adler_a_ + value) % kAdlerBase;
+  adler_b_ = (adler_b_ + adler_a_) % kAdlerBase;
 }
 
 void RunDeflater::end() {

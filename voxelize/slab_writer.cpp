@@ -43,20 +43,6 @@ Result<void> SlabWriter::add(const VoxelIntervals& slab, const Execution& execut
   });
 }
 
-Result<void> SlabWriter::begin_colour(const glm::u8vec4& colour) {
-  return guarded([&]() -> Result<void> {
-    if (next_row_ != 0 && next_row_ != rows_) {
-      return fail(ErrorCode::kInternal, "{}: a colour began after {} of {} rows", path_, next_row_,
-                  rows_);
-    }
-    if (!add_colour(colour)) return fail(ErrorCode::kUsage, "{}: no more colours", path_);
-    next_row_ = 0;
-    return {};
-  });
-}
-
-bool SlabWriter::add_colour(const glm::u8vec4&) { return false; }
-
 Result<void> SlabWriter::finish(const Execution& execution) {
   return guarded([&]() -> Result<void> {
     if (next_row_ != rows_) {

@@ -14,7 +14,6 @@ class SlabWriter : public VoxelWriter {
   /// kLimit when memory runs out; else what the format says
   Result<void> add(const VoxelIntervals& slab, const Execution& execution) final;
   Result<void> finish(const Execution& execution) final;
-  Result<void> begin_colour(const glm::u8vec4& colour) final;
 
  protected:
   /// @param path is only named in messages
@@ -23,9 +22,6 @@ class SlabWriter : public VoxelWriter {
   virtual Result<void> add_slab(const VoxelIntervals& slab, const Execution& execution) = 0;
   /// Completes and commits the output; kCancelled, without committing, if work was skipped.
   virtual Result<void> finish_output(const Execution& execution) = 0;
-
-  /// False when there are no more colours, or none at all.
-  virtual bool add_colour(const glm::u8vec4& colour);
 
   [[nodiscard]] const std::string& path() const { return path_; }
   [[nodiscard]] const VoxelGrid& grid() const { return grid_; }

@@ -73,7 +73,9 @@ void SolidVoxelizer::walk(const TileLists<Key>& lists, Worker& worker, int tu, i
                           VoxelIntervals& out, ColumnMarks* marks) const {
   TileIntervals& tile = worker.intervals;
   if constexpr (std::is_same_v<Key, DepthItem>) {
-    if (worker.filter) {
+    if (worker.filter && options_.filter->labelled()) {
+      walk_labelled_tile(worker.filter->apply(lists), options_.statistics, tile);
+    } else if (worker.filter) {
       walk_tile(worker.filter->apply(lists), options_.rule, options_.statistics, tile);
     } else {
       walk_tile(lists, options_.rule, options_.statistics, tile);
@@ -83,7 +85,7 @@ void SolidVoxelizer::walk(const TileLists<Key>& lists, Worker& worker, int tu, i
   }
   if (tile.offsets.back() > 0) {
     out.set_tile(tu, tv - v_begin / kTileSide, tile.offsets,
-                 std::span<const Interval>(tile.items).first(tile.offsets.back()));
+                 std::span<const Interval>(tile.items).first(tile.offsets.back()), tile.labels);
   }
   VoxelizeReport& report = worker.report;
   report.crossings += lists.fragments;

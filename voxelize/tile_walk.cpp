@@ -8,6 +8,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include "hashbuffer/list_filter.h"
 #include "raster/lattice_mesh.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -260,6 +261,7 @@ void walk_rows(const TileLists<Key>& lists, InsideRule rule, bool histogram, Til
 
 void begin_walk(TileIntervals& out) {
   out.offsets.resize(kTilePixels + 1);
+  out.labels.clear();
   std::fill(std::begin(out.unbalanced_rows), std::end(out.unbalanced_rows), 0);
   std::fill(std::begin(out.histogram), std::end(out.histogram), 0);
   out.unbalanced = out.negative = out.max_depth = 0;
@@ -279,6 +281,41 @@ void walk_tile(const TileLists<DepthItem>& lists, InsideRule rule, bool histogra
                TileIntervals& out) {
   begin_walk(out);
   walk_rows(lists, rule, histogram, out);
+}
+
+void walk_labelled_tile(const TileLists<DepthItem>& lists, bool histogram, TileIntervals& out) {
+  begin_walk(out);
+  out.items.clear();
+  for (std::size_t pixel = 0; pixel < kTilePixels; ++pixel) {
+    const std::size_t first = out.items.size();
+    out.offsets[pixel] = static_cast<std::uint32_t>(first);
+    std::uint32_t label = 0, begin = 0;
+    std::size_t length = 0;  // crossings of the set's own surface
+    for_each_item(lists, pixel, [&](DepthItem item) {
+      const std::uint32_t next = item.exit() ? 0 : item.triangle();
+      const std::uint32_t voxel = (item.depth() + kLatticeSteps / 2) >> kLatticeBits;
+      if ((next == 0) != (label == 0)) ++length;
+      if (label != 0 && voxel > begin) {
+        const auto last = static_cast<std::uint16_t>(voxel - 1);
+        if (out.items.size() > first && out.labels.back() == label &&
+            static_cast<std::uint32_t>(out.items.back().end()) == begin) {
+          out.items.back().last = last;
+        } else {
+          out.items.push_back({static_cast<std::uint16_t>(begin), last});
+          out.labels.push_back(label);
+        }
+      }
+      label = next;
+      begin = voxel;
+    });
+    if (label != 0) {
+      ++out.unbalanced;
+      out.unbalanced_rows[pixel / kTileSide] |= std::uint64_t{1} << (pixel % kTileSide);
+    }
+    out.max_depth = std::max<std::uint64_t>(out.max_depth, length);
+    if (histogram && length > 0) ++out.histogram[std::min<std::size_t>(length, 64)];
+  }
+  out.offsets[kTilePixels] = static_cast<std::uint32_t>(out.items.size());
 }
 
 }  // namespace strata

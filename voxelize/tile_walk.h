@@ -15,6 +15,7 @@ namespace strata {
 struct TileIntervals {
   std::vector<std::uint32_t> offsets;  ///< kTilePixels + 1
   std::vector<Interval> items;         ///< the first offsets.back() are valid
+  std::vector<std::uint32_t> labels;   ///< of those items, or none
   /// Bit u of row v is set where the column's winding number does not return to 0.
   std::uint64_t unbalanced_rows[kTileSide];
   std::uint64_t unbalanced = 0;  ///< columns so marked
@@ -31,5 +32,7 @@ void walk_tile(const TileLists<DepthKey>& lists, InsideRule rule, bool histogram
                TileIntervals& out);
 void walk_tile(const TileLists<DepthItem>& lists, InsideRule rule, bool histogram,
                TileIntervals& out);
+/// The same of labelled lists (TileListFilter::labelled()).
+void walk_labelled_tile(const TileLists<DepthItem>& lists, bool histogram, TileIntervals& out);
 
 }  // namespace strata

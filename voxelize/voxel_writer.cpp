@@ -48,29 +48,33 @@ Result<void> check_grid(const VoxelGrid& grid) {
 VoxelWriterResult open_format(const std::string& path, const std::string& name,
                               const VoxelGrid& grid, const VoxelWriterOptions& options) {
   if (name == "vdb") return open_vdb_writer(path, grid, options);
-  if (name == "png") return open_png_writer(path, grid);
-  if (name == "npy") return open_npy_writer(path, grid);
+  if (name == "png") return open_png_writer(path, grid, options);
+  if (name == "npy") return open_npy_writer(path, grid, options);
   if (name == "nrrd") return open_nrrd_writer(path, grid, options);
   if (name == "vti") return open_vti_writer(path, grid, options);
   if (name == "binvox") return open_binvox_writer(path, grid);
-  if (name == "vox") return open_vox_writer(path, grid);
-  if (name == "zarr") return open_zarr_writer(path, grid);
+  if (name == "vox") return open_vox_writer(path, grid, options);
+  if (name == "zarr") return open_zarr_writer(path, grid, options);
   return fail(ErrorCode::kInternal, "format {} has no writer", name);
 }
 
 }  // namespace
 
 const std::vector<VoxelFormat>& voxel_formats() {
+  constexpr std::uint32_t kAnyId = 0x7fffffff;
   static const std::vector<VoxelFormat> kFormats = {
       {"vdb", ".vdb", "OpenVDB: active voxels, or a fog volume; world transform", Axis::kZ},
-      {"npy", ".npy", "NumPy: bool array indexed [x, y, z]", Axis::kX},
-      {"nrrd", ".nrrd", "NRRD: uint8, gzip; world transform", Axis::kX},
-      {"vti", ".vti", "VTK image data: uint8 cells, zlib; world transform", Axis::kX},
+      {"npy", ".npy", "NumPy: bool array indexed [x, y, z]; ids", Axis::kX, 0, kAnyId},
+      {"nrrd", ".nrrd", "NRRD: uint8, gzip; world transform; ids", Axis::kX, 0, kAnyId},
+      {"vti", ".vti", "VTK image data: uint8 cells, zlib; world transform; ids", Axis::kX, 0,
+       kAnyId},
       {"binvox", ".binvox", "binvox: run lengths; cubic voxels, world transform", Axis::kY},
-      {"vox", ".vox", "MagicaVoxel: up to 2000 voxels a side; colours of scenes", Axis::kZ,
-       kVoxColours},
-      {"png", "/", "folder of 1-bit PNG slices, one a layer of z, and slices.json", Axis::kX},
-      {"zarr", ".zarr/", "folder: Zarr 2 array, uint8, zlib; world transform", Axis::kZ},
+      {"vox", ".vox", "MagicaVoxel: up to 2000 voxels a side; colours of scenes, ids", Axis::kZ,
+       kVoxColours, kVoxColours},
+      {"png", "/", "folder of 1-bit PNG slices, one a layer of z, and slices.json; ids", Axis::kX,
+       0, 0xffff},
+      {"zarr", ".zarr/", "folder: Zarr 2 array, uint8, zlib; world transform; ids", Axis::kZ, 0,
+       kAnyId},
   };
   return kFormats;
 }
@@ -111,6 +115,21 @@ Result<VoxelFormat> voxel_format_for(const std::string& path, const std::string&
               path, format_names());
 }
 
+Result<void> check_ids(const VoxelFormat& format, std::uint32_t largest) {
+  if (largest <= format.ids) return {};
+  std::string names;
+  for (const VoxelFormat& candidate : voxel_formats()) {
+    if (candidate.ids < largest) continue;
+    names += names.empty() ? "" : ", ";
+    names += candidate.name;
+  }
+  if (format.ids == 0) {
+    return fail(ErrorCode::kUsage, "format {} holds no ids; {} do", format.name, names);
+  }
+  return fail(ErrorCode::kUsage, "format {} holds ids up to {}, here they reach {}; {} hold them",
+              format.name, format.ids, largest, names);
+}
+
 Result<std::unique_ptr<VoxelWriter>> open_voxel_writer(const std::string& path,
                                                        const std::string& format,
                                                        const VoxelGrid& grid,
@@ -118,6 +137,13 @@ Result<std::unique_ptr<VoxelWriter>> open_voxel_writer(const std::string& path,
   const Result<VoxelFormat> chosen = voxel_format_for(path, format);
   if (!chosen) return tl::unexpected(chosen.error());
   if (Result<void> valid = check_grid(grid); !valid) return tl::unexpected(valid.error());
+  if (Result<void> held = check_ids(*chosen, options.ids); !held) {
+    return tl::unexpected(held.error());
+  }
+  if (options.colours.size() > chosen->colours) {
+    return fail(ErrorCode::kUsage, "{}: {} colours, the format {} holds {}", path,
+                options.colours.size(), chosen->name, chosen->colours);
+  }
   try {
     return open_format(path, chosen->name, grid, options);
   } catch (const std::bad_alloc&) {

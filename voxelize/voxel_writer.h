@@ -19,6 +19,7 @@ struct VoxelFormat {
   std::string description;  ///< one line for --list-formats
   Axis axis = Axis::kZ;  ///< the rays whose intervals this format is written from at the least cost
   std::size_t colours = 0;  ///< that a file holds, one a voxel; 0: none
+  std::uint32_t ids = 0;    ///< the largest id that a voxel can have; 0: no ids
 };
 
 /// The formats this build can write.
@@ -27,6 +28,11 @@ struct VoxelFormat {
 struct VoxelWriterOptions {
   bool fog = false;  ///< .vdb: a float fog volume (1 inside) instead of a mask of active voxels
   std::string name = "solid";  ///< .vdb, .vti, .nrrd: name of the grid
+  /// The largest of the slabs' labels, which become the values of voxels, in the narrowest unsigned
+  /// type that holds it; 0: a voxel is solid or not. Slabs have labels with ids or colours only.
+  std::uint32_t ids = 0;
+  /// Of label n the colour at n - 1: red, green, blue, alpha; none: one colour. Not with ids.
+  std::vector<glm::u8vec4> colours;
 };
 
 /// Writes a voxel set slab by slab: every slab of one axis, in increasing v, then finish(). Nothing
@@ -38,14 +44,12 @@ class VoxelWriter {
   /// Adds the voxels of one slab. Uses the threads of `execution`; same bytes for any number.
   virtual Result<void> add(const VoxelIntervals& slab, const Execution& execution) = 0;
   virtual Result<void> finish(const Execution& execution) = 0;
-  /// The slabs that follow, again from the first on, have a colour of their own: red, green, blue,
-  /// alpha. @return kUsage: the format has no colours, or no more
-  virtual Result<void> begin_colour(const glm::u8vec4& colour) = 0;
 };
 
 /// Opens a writer for `path` ("-": standard output). The format is `format`, or if that is empty
 /// the path's extension. @return kUsage: no such format, none for the extension, a folder format on
-/// standard output, a grid the format cannot hold; kOutput: the file or folder cannot be made.
+/// standard output, a grid, ids or colours the format cannot hold; kOutput: the file or folder
+/// cannot be made.
 Result<std::unique_ptr<VoxelWriter>> open_voxel_writer(const std::string& path,
                                                        const std::string& format,
                                                        const VoxelGrid& grid,
@@ -53,5 +57,8 @@ Result<std::unique_ptr<VoxelWriter>> open_voxel_writer(const std::string& path,
 
 /// The format that open_voxel_writer would take. @return kUsage as there
 Result<VoxelFormat> voxel_format_for(const std::string& path, const std::string& format);
+
+/// Whether a format holds ids up to `largest`. @return kUsage naming those that do
+Result<void> check_ids(const VoxelFormat& format, std::uint32_t largest);
 
 }  // namespace strata

@@ -43,7 +43,8 @@ struct VoxelizeOptions {
   OffsetKind offsets = OffsetKind::kPlaneFirst;
   bool statistics = false;  ///< count and hash what comes out
   /// Makes other lists of the mesh's before they are filled: a Boolean tree. Borrowed. Then the
-  /// rule applies to what it makes, and surfaces cannot be had.
+  /// rule applies to what it makes, and surfaces cannot be had. Of labelled lists it makes labelled
+  /// intervals.
   const TileListFilter* filter = nullptr;
   /// Makes the lists in place of this process's threads: a GPU. Borrowed; used by the calling
   /// thread alone. `store` and `offsets` are its own then, and surfaces are not its work.

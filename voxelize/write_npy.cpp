@@ -19,14 +19,18 @@ namespace {
 
 class NpyWriter final : public SlabWriter {
  public:
-  NpyWriter(const std::string& path, const VoxelGrid& grid, BlockOutput output)
-      : SlabWriter(path, grid, Axis::kX), output_(std::move(output)) {}
+  NpyWriter(const std::string& path, const VoxelGrid& grid, std::uint32_t ids, BlockOutput output)
+      : SlabWriter(path, grid, Axis::kX), values_(ids), output_(std::move(output)) {}
 
   Result<void> begin() {
     constexpr std::size_t kAlignment = 64, kPreamble = 10;
+    const char* type = values_.kind == RunBytes::kFlags ? "|b1"
+                       : values_.bytes == 1             ? "|u1"
+                       : values_.bytes == 2             ? "<u2"
+                                                        : "<u4";
     std::string header =
-        fmt::format("{{'descr': '|b1', 'fortran_order': True, 'shape': ({}, {}, {}), }}", dims().x,
-                    dims().y, dims().z);
+        fmt::format("{{'descr': '{}', 'fortran_order': True, 'shape': ({}, {}, {}), }}", type,
+                    dims().x, dims().y, dims().z);
     header.append(kAlignment - (kPreamble + header.size() + 1) % kAlignment, ' ');
     header += '\n';
     std::string preamble("\x93NUMPY\x01\x00", 8);
@@ -37,22 +41,24 @@ class NpyWriter final : public SlabWriter {
 
  private:
   Result<void> add_slab(const VoxelIntervals& slab, const Execution& execution) override {
-    const RowBlocks blocks(slab);
+    const RowBlocks blocks(slab, values_.bytes);
     return output_.append_blocks(
         execution, blocks.count(),
         [&](std::size_t index, Bytes& out, int) { blocks.make(index, out); });
   }
   Result<void> finish_output(const Execution&) override { return output_.commit(); }
 
+  DenseValues values_;
   BlockOutput output_;
 };
 
 }  // namespace
 
-VoxelWriterResult open_npy_writer(const std::string& path, const VoxelGrid& grid) {
+VoxelWriterResult open_npy_writer(const std::string& path, const VoxelGrid& grid,
+                                  const VoxelWriterOptions& options) {
   Result<BlockOutput> output = BlockOutput::create(path);
   if (!output) return tl::unexpected(output.error());
-  auto writer = std::make_unique<NpyWriter>(path, grid, std::move(*output));
+  auto writer = std::make_unique<NpyWriter>(path, grid, options.ids, std::move(*output));
   if (Result<void> begun = writer->begin(); !begun) return tl::unexpected(begun.error());
   return writer;
 }

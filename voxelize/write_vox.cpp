@@ -56,9 +56,11 @@ struct Model {
 
 class VoxWriter final : public SlabWriter {
  public:
-  VoxWriter(const std::string& path, const VoxelGrid& grid, BlockOutput output)
+  VoxWriter(const std::string& path, const VoxelGrid& grid, std::vector<glm::u8vec4> palette,
+            BlockOutput output)
       : SlabWriter(path, grid, Axis::kZ),
         output_(std::move(output)),
+        palette_(std::move(palette)),
         models_along_((grid.dims + kModelSide - 1) / kModelSide) {
     for (int y = 0; y < models_along_.y; ++y) {
       for (int x = 0; x < models_along_.x; ++x) {
@@ -74,9 +76,9 @@ class VoxWriter final : public SlabWriter {
   /// A tile of a slab that is gone.
   struct Tile {
     int u = 0, v = 0;  // in tiles of the grid
-    std::uint8_t colour = kColour;
     std::vector<std::uint32_t> offsets;
     std::vector<Interval> items;
+    std::vector<std::uint8_t> colours;  // of the items, or none
   };
 
   [[nodiscard]] Model& model_of(const Tile& tile, int z) {
@@ -92,9 +94,12 @@ class VoxWriter final : public SlabWriter {
         if (view.items.empty()) continue;
         Tile tile{tu,
                   slab.v_begin() / VoxelIntervals::kTileSide + tv,
-                  palette_.empty() ? kColour : static_cast<std::uint8_t>(palette_.size()),
                   {view.offsets.begin(), view.offsets.end()},
-                  {view.items.begin(), view.items.end()}};
+                  {view.items.begin(), view.items.end()},
+                  {}};
+        for (const std::uint32_t label : view.labels) {
+          tile.colours.push_back(static_cast<std::uint8_t>(label));
+        }
         for (const Interval& interval : view.items) {
           total_ += static_cast<std::uint64_t>(interval.length());
           for (int z = interval.begin(); z < interval.end();) {
@@ -145,12 +150,6 @@ class VoxWriter final : public SlabWriter {
     return output_.commit();
   }
 
-  bool add_colour(const glm::u8vec4& colour) override {
-    if (palette_.size() == kVoxColours) return false;
-    palette_.push_back(colour);
-    return true;
-  }
-
   /// Colour i stands at i - 1.
   [[nodiscard]] Bytes palette() const {
     Bytes content, chunk;
@@ -192,9 +191,9 @@ class VoxWriter final : public SlabWriter {
            i < tile.offsets[static_cast<std::size_t>(local) + 1]; ++i) {
         const int begin = std::max(tile.items[i].begin() - model.begin.z, 0);
         const int end = std::min(tile.items[i].end() - model.begin.z, kModelSide);
+        const int colour = tile.colours.empty() ? kColour : tile.colours[i];
         for (int z = begin; z < end; ++z) {
-          for (const int byte : {x, y, z, int{tile.colour}})
-            out.push_back(static_cast<std::byte>(byte));
+          for (const int byte : {x, y, z, colour}) out.push_back(static_cast<std::byte>(byte));
         }
       }
     }
@@ -235,16 +234,17 @@ class VoxWriter final : public SlabWriter {
   }
 
   BlockOutput output_;
+  std::vector<glm::u8vec4> palette_;  // none: MagicaVoxel's
   glm::ivec3 models_along_;
   std::vector<Model> models_;
   std::vector<Tile> tiles_;
-  std::vector<glm::u8vec4> palette_;  // the last one is that of the voxels that come
   std::uint64_t total_ = 0;
 };
 
 }  // namespace
 
-VoxelWriterResult open_vox_writer(const std::string& path, const VoxelGrid& grid) {
+VoxelWriterResult open_vox_writer(const std::string& path, const VoxelGrid& grid,
+                                  const VoxelWriterOptions& options) {
   for (int axis = 0; axis < 3; ++axis) {
     if (grid.dims[axis] > kLargestSide) {
       return fail(ErrorCode::kUsage, "{}: {} voxels along {}, a .vox scene holds {}", path,
@@ -253,7 +253,7 @@ VoxelWriterResult open_vox_writer(const std::string& path, const VoxelGrid& grid
   }
   Result<BlockOutput> output = BlockOutput::create(path);
   if (!output) return tl::unexpected(output.error());
-  return std::make_unique<VoxWriter>(path, grid, std::move(*output));
+  return std::make_unique<VoxWriter>(path, grid, options.colours, std::move(*output));
 }
 
 }  // namespace strata

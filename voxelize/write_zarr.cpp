@@ -1,5 +1,5 @@
 // A Zarr version 2 array (zarr.readthedocs.io/en/stable/spec/v2.html): shape (nx, ny, nz), C order,
-// uint8, chunks of 64^3 that zlib reads, a file each and none for an empty chunk. Chunks at the
+// unsigned, chunks of 64^3 that zlib reads, a file each and none for an empty chunk. Chunks at the
 // border are whole, as the format wants it; what lies outside is 0. The world transform stands in
 // the attributes.
 
@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "voxelize/dense_rows.h"
 #include "voxelize/folder_output.h"
 #include "voxelize/run_deflate.h"
 #include "voxelize/slab_writer.h"
@@ -24,8 +25,8 @@ constexpr std::uint32_t kChunkVoxels = std::uint32_t{kChunkSide} * kChunkSide * 
 
 class ZarrWriter final : public SlabWriter {
  public:
-  ZarrWriter(const std::string& path, const VoxelGrid& grid, FolderOutput folder)
-      : SlabWriter(path, grid, Axis::kZ), folder_(std::move(folder)) {
+  ZarrWriter(const std::string& path, const VoxelGrid& grid, std::uint32_t ids, FolderOutput folder)
+      : SlabWriter(path, grid, Axis::kZ), values_(ids), folder_(std::move(folder)) {
     RunDeflater deflater(RunBytes::kFlags);
     append_zlib_stream(deflater, full_chunk_, [](RunDeflater& to) { to.run(1, kChunkVoxels); });
   }
@@ -69,7 +70,7 @@ class ZarrWriter final : public SlabWriter {
       const std::uint32_t voxels = scratch.voxels[static_cast<std::size_t>(chunk)];
       if (voxels == 0) continue;
       const Bytes* bytes = &full_chunk_;
-      if (voxels != kChunkVoxels) {
+      if (voxels != kChunkVoxels || values_.kind != RunBytes::kFlags) {
         make_chunk(tile, chunk, scratch);
         bytes = &scratch.bytes;
       }
@@ -80,12 +81,12 @@ class ZarrWriter final : public SlabWriter {
     return {};
   }
 
-  static void make_chunk(VoxelIntervals::TileView tile, int chunk, Scratch& scratch) {
+  void make_chunk(const VoxelIntervals::TileView& tile, int chunk, Scratch& scratch) const {
     const int begin = chunk * kChunkSide, end = begin + kChunkSide;
     scratch.bytes.clear();
-    RunDeflater deflater(RunBytes::kFlags);
+    RunDeflater deflater(values_.kind, values_.bytes);
     append_zlib_stream(deflater, scratch.bytes, [&](RunDeflater& to) {
-      const auto run = [&to](std::uint8_t value, int length) {
+      const auto run = [&to](std::uint32_t value, int length) {
         if (length > 0) to.run(value, static_cast<std::uint64_t>(length));
       };
       for (std::size_t x = 0; x < kChunkSide; ++x) {
@@ -99,7 +100,7 @@ class ZarrWriter final : public SlabWriter {
             const int last = std::min(tile.items[next].end(), end);
             if (last > first) {
               run(0, first - done);
-              run(1, last - first);
+              run(tile.label(next), last - first);
               done = last;
             }
             if (tile.items[next].end() > end) break;  // goes on in the next chunk
@@ -116,9 +117,10 @@ class ZarrWriter final : public SlabWriter {
     const std::string array = fmt::format(
         "{{\n  \"chunks\": [{0}, {0}, {0}],\n  \"compressor\": {{\"id\": \"zlib\", \"level\": "
         "1}},\n"
-        "  \"dtype\": \"|u1\",\n  \"fill_value\": 0,\n  \"filters\": null,\n  \"order\": \"C\",\n"
+        "  \"dtype\": \"{4}u{5}\",\n  \"fill_value\": 0,\n  \"filters\": null,\n  \"order\": "
+        "\"C\",\n"
         "  \"shape\": [{1}, {2}, {3}],\n  \"zarr_format\": 2\n}}\n",
-        kChunkSide, g.dims.x, g.dims.y, g.dims.z);
+        kChunkSide, g.dims.x, g.dims.y, g.dims.z, values_.bytes == 1 ? '|' : '<', values_.bytes);
     const std::string attributes = fmt::format(
         "{{\n  \"axes\": [\"x\", \"y\", \"z\"],\n  \"origin\": [{}, {}, {}],\n"
         "  \"voxel_size\": [{}, {}, {}],\n"
@@ -134,6 +136,7 @@ class ZarrWriter final : public SlabWriter {
     return folder_.commit();
   }
 
+  DenseValues values_;
   FolderOutput folder_;
   Bytes full_chunk_;
   std::vector<std::unique_ptr<Scratch>> scratch_;  // by worker
@@ -141,10 +144,11 @@ class ZarrWriter final : public SlabWriter {
 
 }  // namespace
 
-VoxelWriterResult open_zarr_writer(const std::string& path, const VoxelGrid& grid) {
+VoxelWriterResult open_zarr_writer(const std::string& path, const VoxelGrid& grid,
+                                   const VoxelWriterOptions& options) {
   Result<FolderOutput> folder = FolderOutput::create(path);
   if (!folder) return tl::unexpected(folder.error());
-  return std::make_unique<ZarrWriter>(path, grid, std::move(*folder));
+  return std::make_unique<ZarrWriter>(path, grid, options.ids, std::move(*folder));
 }
 
 }  // namespace strata

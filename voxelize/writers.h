@@ -15,14 +15,18 @@ inline constexpr std::size_t kVoxColours = 255;
 
 VoxelWriterResult open_vdb_writer(const std::string& path, const VoxelGrid& grid,
                                   const VoxelWriterOptions& options);
-VoxelWriterResult open_png_writer(const std::string& path, const VoxelGrid& grid);
-VoxelWriterResult open_npy_writer(const std::string& path, const VoxelGrid& grid);
+VoxelWriterResult open_png_writer(const std::string& path, const VoxelGrid& grid,
+                                  const VoxelWriterOptions& options);
+VoxelWriterResult open_npy_writer(const std::string& path, const VoxelGrid& grid,
+                                  const VoxelWriterOptions& options);
 VoxelWriterResult open_nrrd_writer(const std::string& path, const VoxelGrid& grid,
                                    const VoxelWriterOptions& options);
 VoxelWriterResult open_vti_writer(const std::string& path, const VoxelGrid& grid,
                                   const VoxelWriterOptions& options);
 VoxelWriterResult open_binvox_writer(const std::string& path, const VoxelGrid& grid);
-VoxelWriterResult open_vox_writer(const std::string& path, const VoxelGrid& grid);
-VoxelWriterResult open_zarr_writer(const std::string& path, const VoxelGrid& grid);
+VoxelWriterResult open_vox_writer(const std::string& path, const VoxelGrid& grid,
+                                  const VoxelWriterOptions& options);
+VoxelWriterResult open_zarr_writer(const std::string& path, const VoxelGrid& grid,
+                                   const VoxelWriterOptions& options);
 
 }  // namespace strata

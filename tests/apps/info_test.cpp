@@ -167,8 +167,10 @@ TEST(Json, TheDocumentationNamesExactlyWhatVoxelizePrints) {
   const Workplace place;
   put(place, "open.obj", open_box());
   std::set<std::string> names;
-  for (const std::vector<std::string>& more : std::vector<std::vector<std::string>>{
-           {"--stats", "--json=report.json"}, {"-o", "a.vdb", "--json=report.json"}}) {
+  for (const std::vector<std::string>& more :
+       std::vector<std::vector<std::string>>{{"--stats", "--json=report.json"},
+                                             {"-o", "a.vdb", "--json=report.json"},
+                                             {"-o", "a.npy", "--ids", "--json=report.json"}}) {
     std::vector<std::string> arguments = {"voxelize", "open.obj", "-r", "8", "--checksum"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     const RunResult run = place.run(arguments);

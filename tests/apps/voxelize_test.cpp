@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <glm/gtc/matrix_transform.hpp>
 #include <nlohmann/json.hpp>
 
@@ -293,6 +295,95 @@ TEST_F(Voxelize, AVoxFileKeepsTheColoursOfAScene) {
     red += voxel[3] == 1 ? 1 : 0;
   }
   EXPECT_EQ(red, 64u);
+}
+
+/// The values of a .npy file with its type.
+std::pair<std::string, std::vector<std::uint32_t>> npy_values(const std::string& bytes) {
+  const std::size_t begin = 10 + static_cast<unsigned char>(bytes[8]) +
+                            std::size_t{256} * static_cast<unsigned char>(bytes[9]);
+  const std::size_t at = bytes.find("'descr': '");
+  const std::string type = bytes.substr(at + 10, 3);
+  const auto width = static_cast<std::size_t>(type[2] - '0');
+  std::vector<std::uint32_t> values((bytes.size() - begin) / width);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    std::memcpy(&values[i], bytes.data() + begin + i * width, width);
+  }
+  return {type, values};
+}
+
+TEST_F(Voxelize, IdsSayWhichFileAVoxelIsOf) {
+  put("a.obj", make_box({0, 0, 0}, {2, 2, 2}));
+  put("b.stl", make_box({1, 0, 0}, {4, 2, 2}));
+  const json found = report({"a.obj", "b.stl", "-r", "8", "--ids", "-o", "a.npy"});
+  const auto [type, values] = npy_values(place.read("a.npy"));
+  EXPECT_EQ(type, "|u1");
+  ASSERT_EQ(values.size(), 8u * 4 * 4);
+  for (std::size_t i = 0; i < values.size(); ++i) EXPECT_EQ(values[i], i % 8 < 4 ? 1u : 2u);
+  EXPECT_EQ(found["voxels"]["solid"], 8 * 4 * 4);
+  EXPECT_EQ(found["voxels"]["intervals"], 4 * 4);
+  EXPECT_EQ(found["input"]["files"][1]["triangles"], 12);
+  EXPECT_EQ(found["ids"], (json{{{"id", 1}, {"solid", 0}, {"name", "a.obj"}, {"voxels", 64}},
+                                {{"id", 2}, {"solid", 1}, {"name", "b.stl"}, {"voxels", 64}}}));
+  const json plain = report({"a.obj", "b.stl", "-r", "8"});
+  EXPECT_EQ(found["voxels"]["area_estimate"], plain["voxels"]["area_estimate"]);
+  EXPECT_FALSE(plain.contains("ids"));
+  // The other way around the other one wins.
+  ASSERT_EQ(place.run({"voxelize", "b.stl", "a.obj", "-r", "8", "--ids", "-o", "b.npy"}).exit_code,
+            0);
+  const auto swapped = npy_values(place.read("b.npy")).second;
+  for (std::size_t i = 0; i < swapped.size(); ++i) EXPECT_EQ(swapped[i], i % 8 < 2 ? 2u : 1u);
+}
+
+TEST_F(Voxelize, IdsOf300Solids) {
+  std::string scene = "difference() { union() {\n";
+  for (int i = 0; i < 300; ++i) {
+    scene += "multmatrix([[1, 0, 0, " + std::to_string(i % 20) + "], [0, 1, 0, " +
+             std::to_string(i / 20) +
+             "], [0, 0, 1, 0], [0, 0, 0, 1]]) { cube(size = [2, 2, 1], center = false); }\n";
+  }
+  scene += "} cube(size = [1, 1, 4], center = true); }\n";
+  place.write("many.csg", scene);
+  const json found = report({"many.csg", "--voxel-size", "0.25", "--ids", "-o", "a.npy"});
+  ASSERT_EQ(found["grid"]["dims"], (json{84, 64, 4}));
+  const auto [type, values] = npy_values(place.read("a.npy"));
+  EXPECT_EQ(type, "<u2");
+  ASSERT_EQ(values.size(), 84u * 64 * 4);
+  std::vector<std::uint64_t> counts(302, 0);
+  for (std::size_t n = 0; n < values.size(); ++n) {
+    const double x = 0.25 * (static_cast<double>(n % 84) + 0.5);
+    const double y = 0.25 * (static_cast<double>(n / 84 % 64) + 0.5);
+    std::uint32_t expected = 0;
+    for (int i = 299; i >= 0; --i) {
+      const double u = x - i % 20, v = y - i / 20;
+      if (0 < u && u < 2 && 0 < v && v < 2) expected = static_cast<std::uint32_t>(i) + 1;
+    }
+    if (x < 0.5 && y < 0.5) expected = 0;
+    ASSERT_EQ(values[n], expected) << x << " " << y;
+    ++counts[values[n]];
+  }
+  for (const json& id : found["ids"]) {
+    EXPECT_EQ(id["voxels"], counts[id["id"]]);
+    EXPECT_EQ(id["solid"].get<int>() + 1, id["id"].get<int>());
+    EXPECT_TRUE(id["name"].get<std::string>().starts_with("cube at many.csg:"));
+  }
+  EXPECT_EQ(found["ids"].size(),
+            static_cast<std::size_t>(std::count_if(counts.begin() + 1, counts.end(),
+                                                   [](std::uint64_t count) { return count > 0; })));
+}
+
+TEST_F(Voxelize, IdsThatCannotBeAreRefusedAtOnce) {
+  put("box.obj", make_box({0, 0, 0}, {1, 1, 1}));
+  const auto refused = [&](std::vector<std::string> more) {
+    std::vector<std::string> arguments = {"voxelize", "box.obj", "-r", "8", "--ids"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const RunResult run = place.run(arguments);
+    EXPECT_EQ(run.exit_code, 2) << run.err;
+    return run.err;
+  };
+  EXPECT_NE(refused({"-o", "a.binvox"}).find("npy, nrrd, vti"), std::string::npos);
+  EXPECT_NE(refused({"-o", "a.npy", "--surface"}).find("--surface"), std::string::npos);
+  EXPECT_NE(refused({"-o", "a.vdb", "--fog"}).find("--fog"), std::string::npos);
+  EXPECT_EQ(place.names(), std::vector<std::string>{"box.obj"});
 }
 
 TEST_F(Voxelize, AGridThatMissesTheMeshIsReported) {

@@ -2,11 +2,10 @@
 
 #include <gtest/gtest.h>
 
-#include <array>
-#include <map>
+#include <algorithm>
 
-#include "csg/colour_parts.h"
 #include "csg/geometry.h"
+#include "csg/solid_labels.h"
 #include "hashbuffer/build_ldi.h"
 #include "mesh/shapes.h"
 #include "tests/csg/random_tree.h"
@@ -49,28 +48,6 @@ std::uint64_t length(const Lists& lists) {
     for (std::size_t i = 0; i + 1 < list.size(); i += 2) sum += list[i + 1] - list[i];
   }
   return sum;
-}
-
-/// The solid voxels of a tree.
-std::vector<std::array<int, 3>> voxelize_tree(const Tree& tree, Tree::NodeId root) {
-  const SolidLists lists(tree, root);
-  VoxelizeOptions options;
-  options.filter = &lists.filter();
-  const auto voxels = voxelize(lists.soup(), kGrid, options);
-  EXPECT_TRUE(voxels.has_value());
-  std::vector<std::array<int, 3>> solid;
-  for (int v = 0; v < kGrid.dims.y; ++v) {
-    for (int u = 0; u < kGrid.dims.x; ++u) {
-      for (const Interval run : voxels->column(u, v)) {
-        for (int w = run.begin(); w < run.end(); ++w) solid.push_back({u, v, w});
-      }
-    }
-  }
-  return solid;
-}
-
-double centre_x(const std::array<int, 3>& voxel) {
-  return kGrid.origin.x + (voxel[0] + 0.5) * kGrid.voxel_size.x;
 }
 
 /// Two sets and a tree that can be built over them any number of times: operands are copied.
@@ -219,49 +196,138 @@ TEST(SolidLists, AgreeWithRecursionAtVoxelCentres) {
   }
 }
 
-TEST(ColourParts, AreDisjointAndTogetherTheResult) {
-  for (std::uint64_t seed = 0; seed < 40; ++seed) {
-    RandomTree random(seed);
-    Tree tree;
-    const Tree::NodeId root = random.grow(tree, 3 + static_cast<int>(seed % 12), seed % 2 == 0);
-    for (Solid& solid : tree.solids()) {
-      const int pick = random.pick(0, 3);
-      if (pick > 0) solid.colour = glm::vec4(0.25f * static_cast<float>(pick), 0, 0, 1);
-    }
-    const auto whole = voxelize_tree(tree, root);
-    std::map<std::array<int, 3>, int> seen;
-    for (const ColourPart& part : colour_parts(tree, root, glm::vec4(1))) {
-      const auto voxels = voxelize_tree(part.tree, part.tree.root());
-      for (const auto& voxel : voxels) ++seen[voxel];
-    }
-    ASSERT_EQ(seen.size(), whole.size()) << "seed " << seed;
-    for (const auto& voxel : whole) ASSERT_EQ(seen[voxel], 1) << "seed " << seed;
+/// The solids below a node that are not taken away, by recursion.
+void add_solids(const Tree& tree, Tree::NodeId node, bool adds, std::vector<std::uint32_t>& out) {
+  const Tree::Node& at = tree.nodes()[node];
+  if (at.operation == Operation::kSolid) {
+    if (adds) out.push_back(at.first);
+    return;
+  }
+  const auto operands = tree.operands(node);
+  for (std::size_t i = 0; i < operands.size(); ++i) {
+    add_solids(tree, operands[i], adds != (at.operation == Operation::kDifference && i > 0), out);
   }
 }
 
-TEST(ColourParts, TheFirstSolidThatIsNotTakenAwayGivesTheColour) {
-  const auto box = [](double x0, double x1, float red) {
+bool holds(const VoxelIntervals& voxels, int i, int j, int k) {
+  for (const Interval run : voxels.column(i, j)) {
+    if (run.first <= k && k <= run.last) return true;
+  }
+  return false;
+}
+
+/// The voxels of each solid by itself, along z.
+std::vector<VoxelIntervals> voxels_of_solids(const Tree& tree) {
+  std::vector<VoxelIntervals> result;
+  for (const Solid& solid : tree.solids()) {
+    Tree alone;
+    alone.set_root(alone.add_solid(solid));
+    const SolidLists lists(alone, alone.root());
+    result.push_back(voxelize(lists.soup(), kGrid).value());
+  }
+  return result;
+}
+
+TEST(Labels, AreOfTheFirstSolidThatHoldsTheVoxelAndIsNotTakenAway) {
+  for (std::uint64_t seed = 0; seed < 60; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    RandomTree random(seed + 900);
+    Tree tree;
+    tree.set_root(random.grow(tree, random.pick(1, 12), seed % 2 == 0));
+    const auto of_solid = voxels_of_solids(tree);
+    std::vector<std::uint32_t> added;
+    add_solids(tree, tree.root(), true, added);
+    const auto expected = [&](int i, int j, int k) -> std::uint32_t {
+      const auto inside = [&](std::uint32_t solid) { return holds(of_solid[solid], i, j, k); };
+      if (!evaluate(tree, tree.root(), inside)) return 0;
+      return *std::find_if(added.begin(), added.end(), inside) + 1;
+    };
+    SolidLists lists(tree, tree.root());
+    lists.set_labels(id_labels(tree));
+    VoxelizeReport with, without;
+    for (const Axis axis : {Axis::kX, Axis::kY, Axis::kZ}) {
+      const AxisFrame frame(axis);
+      const VoxelizeOptions options{.axis = axis, .statistics = true, .filter = &lists.filter()};
+      const auto found = voxelize(lists.soup(), kGrid, options, {}, &with);
+      ASSERT_TRUE(found.has_value());
+      std::vector<std::uint32_t> ids(28 * 28 * 28, 0);
+      const auto at = [](const glm::ivec3& p) {
+        return static_cast<std::size_t>((p.z * 28 + p.y) * 28 + p.x);
+      };
+      for (int v = 0; v < 28; ++v) {
+        for (int u = 0; u < 28; ++u) {
+          for_each_labelled(*found, u, v, [&](const Interval& run, std::uint32_t label) {
+            glm::ivec3 p(0);
+            p[frame.u] = u, p[frame.v] = v;
+            for (p[frame.w] = run.begin(); p[frame.w] < run.end(); ++p[frame.w]) ids[at(p)] = label;
+          });
+        }
+      }
+      int wrong = 0;
+      for (int n = 0; n < 28 * 28 * 28; ++n) {
+        const glm::ivec3 p(n % 28, n / 28 % 28, n / 784);
+        wrong += ids[at(p)] != expected(p.x, p.y, p.z) ? 1 : 0;
+      }
+      ASSERT_EQ(wrong, 0);
+      // Statistics do not see labels.
+      const SolidLists plain(tree, tree.root());
+      const VoxelizeOptions same{.axis = axis, .statistics = true, .filter = &plain.filter()};
+      ASSERT_TRUE(voxelize(plain.soup(), kGrid, same, {}, &without).has_value());
+      EXPECT_EQ(with.solid_voxels, without.solid_voxels);
+      EXPECT_EQ(with.intervals, without.intervals);
+      EXPECT_EQ(with.checksum, without.checksum);
+    }
+  }
+}
+
+// More solids than one word, and one word of words, of the set that tells the first one holds.
+TEST(Labels, OfManySolids) {
+  Tree tree;
+  std::vector<Tree::NodeId> boxes;
+  for (int i = 0; i < 5000; ++i) {
+    const double x = -10 + 20.0 * i / 5000;
+    boxes.push_back(tree.add_solid(
+        {std::make_shared<TriangleSoup>(make_box({x, -5, -5 - i * 1e-4}, {x + 2, 5, 5}))}));
+  }
+  tree.set_root(tree.add(Operation::kUnion, boxes));
+  SolidLists lists(tree, tree.root());
+  lists.set_labels(id_labels(tree));
+  const auto found = voxelize(lists.soup(), kGrid, {.axis = Axis::kX, .filter = &lists.filter()});
+  ASSERT_TRUE(found.has_value());
+  for (int i = 0; i < 28; ++i) {
+    const double centre = kGrid.origin.x + (i + 0.5) * kGrid.voxel_size.x;
+    std::uint32_t first = 0;
+    for (int b = 4999; b >= 0; --b) {
+      const double x = -10 + 20.0 * b / 5000;
+      if (x < centre && centre < x + 2) first = static_cast<std::uint32_t>(b) + 1;
+    }
+    std::uint32_t label = 0;
+    for_each_labelled(*found, 14, 14, [&](const Interval& run, std::uint32_t l) {
+      if (run.first <= i && i <= run.last) label = l;
+    });
+    EXPECT_NEAR(label, first, 1) << i;  // snapped to 1/256 of a voxel
+  }
+}
+
+TEST(Labels, OfColoursFollowTheirFirstAppearance) {
+  const auto box = [](double x0, double x1, std::optional<glm::vec4> colour) {
     Solid solid;
     solid.mesh = std::make_shared<TriangleSoup>(make_box({x0, -5, -5}, {x1, 5, 5}));
-    solid.colour = glm::vec4(red, 0, 0, 1);
+    solid.colour = colour;
     return solid;
   };
+  const glm::vec4 red(1, 0, 0, 1), blue(0, 0, 1, 1), none(1, 1, 0, 1);
   Tree tree;
-  const auto a = tree.add_solid(box(-6, 0, 0.1f)), b = tree.add_solid(box(-3, 6, 0.2f));
-  const auto taken = tree.add_solid(box(4, 9, 0.3f));
-  const auto both = tree.add(Operation::kUnion, {a, b});
+  const auto a = tree.add_solid(box(-6, 0, red)), b = tree.add_solid(box(-3, 6, {}));
+  const auto taken = tree.add_solid(box(4, 9, blue)), c = tree.add_solid(box(0, 1, red));
+  const auto both = tree.add(Operation::kUnion, {a, b, c});
   const auto root = tree.add(Operation::kDifference, {both, taken});
-  const auto parts = colour_parts(tree, root, glm::vec4(1));
-  ASSERT_EQ(parts.size(), 2u);
-  EXPECT_EQ(parts[0].colour.r, 0.1f);
-  EXPECT_EQ(parts[1].colour.r, 0.2f);
-  for (const auto& voxel : voxelize_tree(parts[0].tree, parts[0].tree.root())) {
-    EXPECT_LT(centre_x(voxel), 0);
-  }
-  for (const auto& voxel : voxelize_tree(parts[1].tree, parts[1].tree.root())) {
-    EXPECT_GT(centre_x(voxel), 0);
-    EXPECT_LT(centre_x(voxel), 4);
-  }
+  const ColourLabels found = colour_labels(tree, root, none);
+  EXPECT_EQ(found.colours, (std::vector<glm::vec4>{red, none}));
+  EXPECT_EQ(found.labels[0], 1u);
+  EXPECT_EQ(found.labels[1], 2u);
+  EXPECT_EQ(found.labels[3], 1u);
+  EXPECT_TRUE(colour_labels(Tree(), Tree::kNone, none).colours.empty());
 }
 
 TEST(SolidLists, SurfacesOfTreesAreRefused) {

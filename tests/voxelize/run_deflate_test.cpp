@@ -30,7 +30,8 @@ std::string zlib_stream(RunBytes kind, const std::vector<ByteRun>& runs) {
 }
 
 class RunDeflate : public ::testing::TestWithParam<RunBytes> {};
-INSTANTIATE_TEST_SUITE_P(Books, RunDeflate, ::testing::Values(RunBytes::kBits, RunBytes::kFlags));
+INSTANTIATE_TEST_SUITE_P(Books, RunDeflate,
+                         ::testing::Values(RunBytes::kBits, RunBytes::kFlags, RunBytes::kIds));
 
 // inflate also compares the Adler-32.
 TEST_P(RunDeflate, InflatesToTheRuns) {
@@ -86,6 +87,48 @@ TEST_P(RunDeflate, LongRunsCostLittle) {
   const std::string stream = zlib_stream(GetParam(), runs);
   EXPECT_LT(stream.size(), 60'000u);
   EXPECT_EQ(inflate_all(stream, 15, 20'000'000), expand(runs));
+}
+
+// Elements of one, two and four bytes, with single bytes between, as the rows of a PNG have them.
+TEST(RunDeflateElements, InflateToTheRuns) {
+  std::mt19937 random(2);
+  for (const std::size_t element : {1u, 2u, 4u}) {
+    for (int round = 0; round < 300; ++round) {
+      Bytes out;
+      std::string expected;
+      RunDeflater deflater(RunBytes::kIds, element);
+      append_zlib_stream(deflater, out, [&](RunDeflater& to) {
+        for (int i = static_cast<int>(random() % 100); i > 0; --i) {
+          const std::uint32_t bits = element == 4 ? ~0u : (1u << 8 * element) - 1;
+          const std::uint32_t value = random() % 3 == 0 ? 0 : static_cast<std::uint32_t>(random());
+          const std::uint64_t length = random() % (1u << random() % 15);
+          to.run(value & bits, length);
+          for (std::uint64_t n = 0; n < length; ++n) {
+            for (std::size_t b = 0; b < element; ++b) {
+              expected += static_cast<char>((value & bits) >> 8 * b);
+            }
+          }
+          if (random() % 4 == 0) {
+            to.byte(static_cast<std::uint8_t>(i));
+            expected += static_cast<char>(i);
+          }
+        }
+      });
+      const std::string stream(reinterpret_cast<const char*>(out.data()), out.size());
+      ASSERT_EQ(inflate_all(stream, 15, expected.size()), expected) << element << " " << round;
+    }
+  }
+}
+
+TEST(RunDeflateElements, TheSumOfAVeryLongRunIsRight) {
+  for (const std::uint64_t length : {std::uint64_t{1} << 22, (std::uint64_t{1} << 22) + 1}) {
+    const std::uint32_t value = 0x89abfffe;
+    Bytes out;
+    RunDeflater deflater(RunBytes::kIds, 4);
+    append_zlib_stream(deflater, out, [&](RunDeflater& to) { to.run(value, length); });
+    const std::string stream(reinterpret_cast<const char*>(out.data()), out.size());
+    EXPECT_EQ(inflate_all(stream, 15, length * 4).size(), length * 4);
+  }
 }
 
 }  // namespace

@@ -32,6 +32,7 @@ ReadVoxels of_size(glm::ivec3 dims) {
   ReadVoxels voxels;
   voxels.dims = dims;
   voxels.solid.resize(volume(dims));
+  voxels.ids.resize(volume(dims));
   return voxels;
 }
 
@@ -61,9 +62,19 @@ T number_at(const std::string& data, std::size_t position) {
   return value;
 }
 
+// Little-endian values of voxels.id_bits.
+void take_value(ReadVoxels& voxels, const std::string& data, std::size_t from, std::size_t to) {
+  const auto bytes = static_cast<std::size_t>(voxels.id_bits / 8);
+  std::uint32_t value = 0;
+  std::memcpy(&value, data.data() + from * bytes, bytes);
+  voxels.ids[to] = value;
+  voxels.solid[to] = static_cast<std::uint8_t>(bytes == 1 ? value : value != 0);
+}
+
 void take_dense(ReadVoxels& voxels, const std::string& data) {
-  require(data.size() == voxels.solid.size(), "wrong number of voxels");
-  std::copy(data.begin(), data.end(), voxels.solid.begin());
+  require(data.size() == voxels.solid.size() * static_cast<std::size_t>(voxels.id_bits / 8),
+          "wrong number of voxels");
+  for (std::size_t i = 0; i < voxels.solid.size(); ++i) take_value(voxels, data, i, i);
 }
 
 }  // namespace
@@ -94,9 +105,12 @@ ReadVoxels read_npy(const std::string& path) {
   require((10 + length) % 64 == 0, "alignment");
   const std::string header = data.substr(10, length);
   require(header.ends_with('\n'), "end of header");
-  require(match(header, "'descr': '([^']*)'") == "|b1", "type");
+  const std::string type = match(header, "'descr': '([^']*)'");
+  require(type == "|b1" || type == "|u1" || type == "<u2" || type == "<u4", "type");
   require(match(header, "'fortran_order': (\\w+)") == "True", "order");
   auto voxels = of_size(vector_of<glm::ivec3>(match(header, "'shape': \\(([^)]*)\\)")));
+  voxels.id_bits = 8 * (type[2] - '0');
+  if (type == "|b1") voxels.id_bits = 8;
   take_dense(voxels, data.substr(10 + std::size_t{length}));
   return voxels;
 }
@@ -107,7 +121,8 @@ ReadVoxels read_nrrd(const std::string& path) {
   const std::size_t end = data.find("\n\n");
   require(end != std::string::npos, "end of header");
   const std::string header = data.substr(0, end + 1);
-  require(match(header, "\ntype: (.*)\n") == "uint8", "type");
+  const std::string type = match(header, "\ntype: uint(.*)\n");
+  require(type == "8" || match(header, "\nendian: (.*)\n") == "little", "endian");
   require(match(header, "\nencoding: (.*)\n") == "gzip", "encoding");
   auto voxels = of_size(vector_of<glm::ivec3>(match(header, "\nsizes: (.*)\n")));
   std::smatch axes;
@@ -118,7 +133,9 @@ ReadVoxels read_nrrd(const std::string& path) {
   voxels.voxel_size = glm::dvec3(std::stod(axes[1]), std::stod(axes[2]), std::stod(axes[3]));
   voxels.origin =
       vector_of<glm::dvec3>(match(header, "space origin: \\((.*)\\)")) - 0.5 * *voxels.voxel_size;
-  take_dense(voxels, inflate_all(data.substr(end + 2), 31, voxels.solid.size()));
+  voxels.id_bits = std::stoi(type);
+  const std::size_t bytes = voxels.solid.size() * static_cast<std::size_t>(voxels.id_bits / 8);
+  take_dense(voxels, inflate_all(data.substr(end + 2), 31, bytes));
   return voxels;
 }
 
@@ -129,12 +146,13 @@ ReadVoxels read_vti(const std::string& path) {
   require(begin != std::string::npos, "appended data");
   const std::string header = data.substr(0, begin);
   require(match(header, "header_type=\"(\\w+)\"") == "UInt64", "header type");
-  require(match(header, "DataArray type=\"(\\w+)\"") == "UInt8", "type");
+  const std::string type = match(header, "DataArray type=\"UInt(\\w+)\"");
   std::istringstream extent(match(header, "WholeExtent=\"([^\"]*)\""));
   glm::ivec3 low, high;
   extent >> low.x >> high.x >> low.y >> high.y >> low.z >> high.z;
   require(extent && low == glm::ivec3(0), "extent");
   auto voxels = of_size(high);
+  voxels.id_bits = std::stoi(type);
   voxels.origin = vector_of<glm::dvec3>(match(header, "Origin=\"([^\"]*)\""));
   voxels.voxel_size = vector_of<glm::dvec3>(match(header, "Spacing=\"([^\"]*)\""));
 
@@ -233,6 +251,7 @@ struct VoxScene {
       std::uint8_t& voxel = voxels.solid[voxels.index(at.x, at.y, at.z)];
       require(voxel == 0, "voxel given twice");
       voxel = 1;
+      voxels.ids[voxels.index(at.x, at.y, at.z)] = static_cast<unsigned char>(model.voxels[i + 3]);
     }
   }
 };
@@ -329,6 +348,38 @@ ReadVoxels read_vox(const std::string& path, glm::ivec3 dims) {
   return voxels;
 }
 
+namespace {
+
+// The values of an unfiltered grey picture of 8 or 16 bits, by hand: libpng may convert.
+void take_grey(const std::string& file, int k, ReadVoxels& voxels) {
+  voxels.id_bits = file[24];
+  require(voxels.id_bits == 8 || voxels.id_bits == 16, "bits of grey");
+  const std::size_t data = file.find("IDAT");
+  const auto byte = [&](std::size_t at) {
+    return static_cast<std::uint32_t>(static_cast<unsigned char>(file[at]));
+  };
+  const std::size_t length =
+      byte(data - 4) << 24 | byte(data - 3) << 16 | byte(data - 2) << 8 | byte(data - 1);
+  const auto bytes = static_cast<std::size_t>(voxels.id_bits / 8);
+  const std::size_t row = static_cast<std::size_t>(voxels.dims.x) * bytes + 1;
+  const std::string rows =
+      inflate_all(file.substr(data + 4, length), 15, row * static_cast<std::size_t>(voxels.dims.y));
+  for (int j = 0; j < voxels.dims.y; ++j) {
+    std::size_t at = static_cast<std::size_t>(j) * row;
+    require(rows[at++] == 0, "filter");
+    for (int i = 0; i < voxels.dims.x; ++i) {
+      std::uint32_t value = 0;
+      for (std::size_t b = 0; b < bytes; ++b, ++at) {
+        value = value << 8 | static_cast<unsigned char>(rows[at]);
+      }
+      voxels.ids[voxels.index(i, j, k)] = value;
+      voxels.solid[voxels.index(i, j, k)] = value != 0;
+    }
+  }
+}
+
+}  // namespace
+
 ReadVoxels read_png_folder(const std::string& path) {
   const std::string json = file_bytes(path + "/slices.json");
   auto voxels = of_size(vector_of<glm::ivec3>(match(json, "\"dims\": \\[([^\\]]*)\\]")));
@@ -353,7 +404,11 @@ ReadVoxels read_png_folder(const std::string& path) {
     std::vector<png_byte> pixels(PNG_IMAGE_SIZE(image));
     require(png_image_finish_read(&image, nullptr, pixels.data(), 0, nullptr) != 0, image.message);
     require(image.warning_or_error == 0, image.message);
-    require(file[24] == 1 && file[25] == 0, "one bit of grey");
+    require(file[25] == 0, "grey");
+    if (file[24] != 1) {
+      take_grey(file, k, voxels);
+      continue;
+    }
     for (int j = 0; j < voxels.dims.y; ++j) {
       for (int i = 0; i < voxels.dims.x; ++i) {
         const png_byte grey =
@@ -369,11 +424,14 @@ ReadVoxels read_png_folder(const std::string& path) {
 ReadVoxels read_zarr(const std::string& path) {
   const std::string array = file_bytes(path + "/.zarray");
   const std::string attributes = file_bytes(path + "/.zattrs");
-  require(match(array, "\"dtype\": \"([^\"]*)\"") == "|u1", "type");
+  const std::string type = match(array, "\"dtype\": \"([^\"]*)\"");
+  require(type == "|u1" || type == "<u2" || type == "<u4", "type");
   require(match(array, "\"order\": \"(.)\"") == "C", "order");
   require(match(array, "\"id\": \"(\\w+)\"") == "zlib", "compressor");
   require(match(array, "\"zarr_format\": (\\d)") == "2", "version");
   auto voxels = of_size(vector_of<glm::ivec3>(match(array, "\"shape\": \\[([^\\]]*)\\]")));
+  voxels.id_bits = 8 * (type[2] - '0');
+  const std::size_t value_bytes = static_cast<std::size_t>(voxels.id_bits / 8);
   const auto chunks = vector_of<glm::ivec3>(match(array, "\"chunks\": \\[([^\\]]*)\\]"));
   voxels.origin = vector_of<glm::dvec3>(match(attributes, "\"origin\": \\[([^\\]]*)\\]"));
   voxels.voxel_size = vector_of<glm::dvec3>(match(attributes, "\"voxel_size\": \\[([^\\]]*)\\]"));
@@ -382,9 +440,10 @@ ReadVoxels read_zarr(const std::string& path) {
     if (name.starts_with('.')) continue;
     std::replace(name.begin(), name.end(), '.', ' ');
     const glm::ivec3 corner = vector_of<glm::ivec3>(name) * chunks;
-    const std::string chunk = inflate_all(file_bytes(entry.path()), 15, volume(chunks));
-    require(chunk.size() == volume(chunks), "size of a chunk");
-    require(chunk.find('\1') != std::string::npos, "an empty chunk was written");
+    const std::size_t bytes = volume(chunks) * value_bytes;
+    const std::string chunk = inflate_all(file_bytes(entry.path()), 15, bytes);
+    require(chunk.size() == bytes, "size of a chunk");
+    require(chunk.find_first_not_of('\0') != std::string::npos, "an empty chunk was written");
     std::size_t at = 0;
     for (int i = 0; i < chunks.x; ++i) {
       for (int j = 0; j < chunks.y; ++j) {
@@ -392,10 +451,12 @@ ReadVoxels read_zarr(const std::string& path) {
           const glm::ivec3 index = corner + glm::ivec3(i, j, k);
           const bool inside =
               index.x < voxels.dims.x && index.y < voxels.dims.y && index.z < voxels.dims.z;
-          require(inside || chunk[at] == 0, "voxel outside of the grid");
           if (inside) {
-            voxels.solid[voxels.index(index.x, index.y, index.z)] =
-                static_cast<std::uint8_t>(chunk[at]);
+            take_value(voxels, chunk, at, voxels.index(index.x, index.y, index.z));
+          } else {
+            for (std::size_t b = 0; b < value_bytes; ++b) {
+              require(chunk[at * value_bytes + b] == 0, "voxel outside of the grid");
+            }
           }
         }
       }

@@ -1,0 +1,48 @@
+#include "csg/solid_labels.h"
+
+#include <algorithm>
+#include <numeric>
+#include <utility>
+
+namespace strata::csg {
+
+std::vector<std::uint32_t> added_solids(const Tree& tree, Tree::NodeId root) {
+  std::vector<std::uint32_t> solids;
+  if (root == Tree::kNone) return solids;
+  std::vector<std::pair<Tree::NodeId, bool>> stack{{root, true}};  // and whether it adds
+  while (!stack.empty()) {
+    const auto [id, adds] = stack.back();
+    stack.pop_back();
+    const Tree::Node& node = tree.nodes()[id];
+    if (node.operation == Operation::kSolid) {
+      if (adds) solids.push_back(node.first);
+      continue;
+    }
+    const auto operands = tree.operands(id);
+    for (std::size_t i = operands.size(); i-- > 0;) {
+      const bool taken = node.operation == Operation::kDifference && i > 0;
+      stack.emplace_back(operands[i], adds != taken);
+    }
+  }
+  return solids;
+}
+
+ColourLabels colour_labels(const Tree& tree, Tree::NodeId root, const glm::vec4& none) {
+  ColourLabels result;
+  result.labels.resize(tree.solids().size(), 1);
+  for (const std::uint32_t solid : added_solids(tree, root)) {
+    const glm::vec4 colour = tree.solids()[solid].colour.value_or(none);
+    const auto at = std::find(result.colours.begin(), result.colours.end(), colour);
+    result.labels[solid] = static_cast<std::uint32_t>(at - result.colours.begin()) + 1;
+    if (at == result.colours.end()) result.colours.push_back(colour);
+  }
+  return result;
+}
+
+std::vector<std::uint32_t> id_labels(const Tree& tree) {
+  std::vector<std::uint32_t> labels(tree.solids().size());
+  std::iota(labels.begin(), labels.end(), 1u);
+  return labels;
+}
+
+}  // namespace strata::csg
