@@ -8,10 +8,11 @@
 #include <system_error>
 #include <utility>
 
+#include "csg/gl/result_lists.h"
 #include "csg/gl/surface.h"
+#include "csg/solid_lists.h"
 #include "gl/context.h"
 #include "hashbuffer/build_ldi.h"
-#include "hashbuffer/gl/compute_lists.h"
 #include "hashbuffer/gl/hash_store.h"
 #include "hashbuffer/gl/scan_store.h"
 #include "mesh/shapes.h"
@@ -52,26 +53,8 @@ TriangleSoup example() {
   return soup;
 }
 
-/// Makes an example's lists on both. @return kInternal where they differ
-Result<void> try_lists(ListSource& source) {
-  const TriangleSoup soup = example();
-  VoxelGrid grid;
-  grid.dims = {70, 50, 40};
-  grid.origin = {-3.6, -3.6, -1.6};
-  grid.voxel_size = {7.2 / 70, 7.2 / 50, 3.2 / 40};
-  const auto mesh = snap_to_lattice(soup, grid);
-  if (!mesh) return tl::unexpected(mesh.error());
-  const RasterTarget target = raster_target(grid, Axis::kY);
-  const auto found = build_ldi(source, *mesh, target);
-  if (!found) return tl::unexpected(found.error());
-  const auto expected = build_ldi(*mesh, target);
-  if (!expected) return tl::unexpected(expected.error());
-  if (*found == *expected) return {};
-  return fail(ErrorCode::kInternal, "an example's lists are not the CPU's");
-}
-
-/// The same for the surfaces of a small tree.
-Result<void> try_surfaces(csg::SurfaceSource& source) {
+/// A tree of three solids.
+csg::Tree example_tree() {
   csg::Tree tree;
   const auto add = [&tree](TriangleSoup mesh) {
     csg::Solid solid;
@@ -83,6 +66,38 @@ Result<void> try_surfaces(csg::SurfaceSource& source) {
   const auto hole = add(make_cylinder(0.4, 3, 12));
   const auto both = tree.add(csg::Operation::kIntersection, {box, ball});
   tree.set_root(tree.add(csg::Operation::kDifference, {both, hole}));
+  return tree;
+}
+
+/// Makes an example's lists on both, within +-`half` of the origin. @return kInternal where they
+/// differ
+Result<void> try_lists(ListSource& source, const TriangleSoup& soup, const glm::dvec3& half,
+                       const TileListFilter* filter) {
+  VoxelGrid grid;
+  grid.dims = {70, 50, 40};
+  grid.origin = -half;
+  grid.voxel_size = 2.0 * half / glm::dvec3(grid.dims);
+  const auto mesh = snap_to_lattice(soup, grid);
+  if (!mesh) return tl::unexpected(mesh.error());
+  const RasterTarget target = raster_target(grid, Axis::kY);
+  const auto found = build_ldi(source, *mesh, target, {}, filter);
+  if (!found) return tl::unexpected(found.error());
+  const auto expected = build_ldi(*mesh, target, {}, {}, filter);
+  if (!expected) return tl::unexpected(expected.error());
+  if (*found == *expected) return {};
+  return fail(ErrorCode::kInternal, "an example's lists are not the CPU's");
+}
+
+Result<void> try_lists(ListSource& source) {
+  if (auto tried = try_lists(source, example(), {3.6, 3.6, 1.6}, nullptr); !tried) return tried;
+  const csg::Tree tree = example_tree();
+  const csg::SolidLists lists(tree, tree.root());
+  return try_lists(source, lists.soup(), {1.2, 1.1, 1.6}, &lists.filter());
+}
+
+/// The same for the surfaces of a small tree.
+Result<void> try_surfaces(csg::SurfaceSource& source) {
+  const csg::Tree tree = example_tree();
   csg::Preview own(tree, {}, 1e-6), other(tree, {}, 1e-6);
   other.set_source(&source);
   csg::Camera camera;
@@ -128,16 +143,17 @@ class GlGpu final : public Gpu {
   }
 
  private:
-  Result<std::unique_ptr<gl::ComputeListSource>> make_lists(StoreKind kind) {
+  Result<std::unique_ptr<csg::GlResultSource>> make_lists(StoreKind kind) {
     auto scan = gl::ScanStore::create(context_->info());
     if (!scan) return tl::unexpected(scan.error());
     if (kind != StoreKind::kHaBuffer) {
-      return gl::ComputeListSource::create(*context_, *std::move(scan), nullptr, pixels_at_once());
+      return csg::GlResultSource::create(*context_, *std::move(scan), nullptr, pixels_at_once(),
+                                         session_->execution("depth lists"));
     }
     auto hash = gl::HashStore::create(context_->info());
     if (!hash) return tl::unexpected(hash.error());
-    return gl::ComputeListSource::create(*context_, *std::move(hash), *std::move(scan),
-                                         pixels_at_once());
+    return csg::GlResultSource::create(*context_, *std::move(hash), *std::move(scan),
+                                       pixels_at_once(), session_->execution("depth lists"));
   }
   /// Lists of about 16 crossings, and their copies, within a quarter of the memory limit.
   [[nodiscard]] std::int64_t pixels_at_once() const {
@@ -162,7 +178,7 @@ class GlGpu final : public Gpu {
   std::unique_ptr<gl::Context> context_;  // goes last
   Backend backend_;
   Session* session_;
-  std::unique_ptr<gl::ComputeListSource> lists_;
+  std::unique_ptr<csg::GlResultSource> lists_;
   std::unique_ptr<ListSourceOrCpu> fallback_;
   std::unique_ptr<csg::GlSurfaceSource> surfaces_;
 };

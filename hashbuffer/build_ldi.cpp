@@ -129,45 +129,53 @@ Result<LayeredDepthImage> build_ldi(const LatticeMesh& mesh, const RasterTarget&
   }
 }
 
+Result<LayeredDepthImage> filter_lists(const LayeredDepthImage& rows, const TileListFilter& filter,
+                                       const Execution& execution) {
+  try {
+    std::vector<std::unique_ptr<TileListFilter::Worker>> filters;
+    std::vector<TileCutter> cutters(static_cast<std::size_t>(execution.thread_count()));
+    for (std::size_t i = 0; i < cutters.size(); ++i) filters.push_back(filter.worker());
+    const auto tiles_u = static_cast<std::size_t>((rows.width + kTileSide - 1) / kTileSide);
+    const auto tiles_v = static_cast<std::size_t>((rows.height + kTileSide - 1) / kTileSide);
+    std::vector<PackedTile> tiles(tiles_u * tiles_v);
+    parallel_for(execution, tiles.size(), [&](std::size_t index, int worker) {
+      const auto lists = cutters[static_cast<std::size_t>(worker)].cut(
+          rows, 0, static_cast<int>(index % tiles_u), static_cast<int>(index / tiles_u));
+      if (lists.fragments == 0) return;
+      tiles[index] = pack(filters[static_cast<std::size_t>(worker)]->apply(lists));
+    });
+    LayeredDepthImage image = empty_image({Axis::kZ, rows.width, rows.height, rows.depth_limit});
+    append(tiles, rows.height, image);
+    return image;
+  } catch (const std::bad_alloc&) {
+    return fail(ErrorCode::kLimit, "out of memory for the depth lists of {} x {} pixels",
+                rows.width, rows.height);
+  }
+}
+
 Result<LayeredDepthImage> build_ldi(ListSource& source, const LatticeMesh& mesh,
                                     const RasterTarget& target, const Execution& execution,
                                     const TileListFilter* filter) {
   if (auto set = source.set_mesh(mesh); !set) return tl::unexpected(set.error());
+  const bool left = filter != nullptr && !source.use_filter(*filter);
   try {
-    std::vector<std::unique_ptr<TileListFilter::Worker>> filters;
-    std::vector<TileCutter> cutters(static_cast<std::size_t>(execution.thread_count()));
-    for (std::size_t i = 0; filter != nullptr && i < cutters.size(); ++i) {
-      filters.push_back(filter->worker());
-    }
     LayeredDepthImage image = empty_image(target);
     const int step = source.rows_at_once(target);
     for (int v = 0; v < target.height; v += step) {
       const int end = std::min(target.height, v + step);
-      const auto rows = source.lists(target, v, end);
+      auto rows = source.lists(target, v, end);
       if (!rows) return tl::unexpected(rows.error());
       if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
       const std::uint64_t held = (image.items.size() + 2 * rows->items.size()) * sizeof(DepthItem);
       if (execution.memory_limit > 0 && held > execution.memory_limit) {
         return tl::unexpected(too_much(target, execution.memory_limit, held));
       }
-      if (filter == nullptr) {
-        for (std::size_t i = 1; i < rows->offsets.size(); ++i) {
-          image.offsets.push_back(image.items.size() + rows->offsets[i]);
-        }
-        image.items.insert(image.items.end(), rows->items.begin(), rows->items.end());
-      } else {
-        const auto tiles_u = static_cast<std::size_t>((target.width + kTileSide - 1) / kTileSide);
-        const auto tiles_v = static_cast<std::size_t>((end - v + kTileSide - 1) / kTileSide);
-        std::vector<PackedTile> tiles(tiles_u * tiles_v);
-        parallel_for(execution, tiles.size(), [&](std::size_t index, int worker) {
-          const auto lists = cutters[static_cast<std::size_t>(worker)].cut(
-              *rows, v, static_cast<int>(index % tiles_u),
-              v / kTileSide + static_cast<int>(index / tiles_u));
-          if (lists.fragments == 0) return;
-          tiles[index] = pack(filters[static_cast<std::size_t>(worker)]->apply(lists));
-        });
-        append(tiles, end - v, image);
+      if (left) rows = filter_lists(*rows, *filter, execution);
+      if (!rows) return tl::unexpected(rows.error());
+      for (std::size_t i = 1; i < rows->offsets.size(); ++i) {
+        image.offsets.push_back(image.items.size() + rows->offsets[i]);
       }
+      image.items.insert(image.items.end(), rows->items.begin(), rows->items.end());
       if (execution.progress) execution.progress(static_cast<double>(end) / target.height);
     }
     return image;

@@ -25,6 +25,10 @@ Result<LayeredDepthImage> build_ldi(ListSource& source, const LatticeMesh& mesh,
                                     const RasterTarget& target, const Execution& execution = {},
                                     const TileListFilter* filter = nullptr);
 
+/// What `filter` makes of the lists of an image of rows. @return kLimit without the memory
+Result<LayeredDepthImage> filter_lists(const LayeredDepthImage& rows, const TileListFilter& filter,
+                                       const Execution& execution = {});
+
 /// What the rays of the voxel columns of a grid along `axis` see.
 [[nodiscard]] RasterTarget raster_target(const VoxelGrid& grid, Axis axis);
 

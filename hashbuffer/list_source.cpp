@@ -20,9 +20,16 @@ void ListSourceOrCpu::give_up(const Error& error) {
 
 Result<void> ListSourceOrCpu::set_mesh(const LatticeMesh& mesh) {
   mesh_ = &mesh;
+  filter_ = nullptr;
   if (source_ == nullptr) return {};
   if (auto done = source_->set_mesh(mesh); !done) give_up(done.error());
   return {};
+}
+
+bool ListSourceOrCpu::use_filter(const TileListFilter& filter) {
+  if (source_ == nullptr || !source_->use_filter(filter)) return false;
+  filter_ = &filter;
+  return true;
 }
 
 int ListSourceOrCpu::rows_at_once(const RasterTarget& target) const {
@@ -34,6 +41,7 @@ Result<LayeredDepthImage> ListSourceOrCpu::lists(const RasterTarget& target, int
                                                  int v_end) {
   if (source_ != nullptr) {
     auto rows = source_->lists(target, v_begin, v_end);
+    crossings_ = source_->crossings();
     if (rows) return rows;
     give_up(rows.error());
   }
@@ -43,7 +51,10 @@ Result<LayeredDepthImage> ListSourceOrCpu::lists(const RasterTarget& target, int
   for (glm::ivec3& p : moved.vertices) p[frame.v] -= v_begin * kLatticeSteps;
   RasterTarget rows = target;
   rows.height = v_end - v_begin;
-  return build_ldi(moved, rows, {}, execution_);
+  auto made = build_ldi(moved, rows, {}, execution_);
+  if (!made) return made;
+  crossings_ = made->items.size();
+  return filter_ == nullptr ? std::move(made) : filter_lists(*made, *filter_, execution_);
 }
 
 TileLists<DepthItem> TileCutter::cut(const LayeredDepthImage& rows, int v_begin, int tu, int tv) {

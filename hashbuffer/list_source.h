@@ -7,6 +7,7 @@
 #include "core/depth_list.h"
 #include "core/execution.h"
 #include "core/result.h"
+#include "hashbuffer/list_filter.h"
 #include "hashbuffer/tile_builder.h"
 
 namespace strata {
@@ -19,12 +20,20 @@ class ListSource {
  public:
   virtual ~ListSource() = default;
 
-  /// The mesh of the calls that follow; borrowed until the next one.
+  /// The mesh of the calls that follow, without a filter; borrowed until the next one.
   /// @return kLimit without the memory
   virtual Result<void> set_mesh(const LatticeMesh& mesh) = 0;
+  /// True: lists() gives from now on what `filter` (borrowed) makes of the mesh's lists, bit for
+  /// bit. False, without effect, where this source leaves that to who takes its lists.
+  virtual bool use_filter(const TileListFilter& filter) {
+    static_cast<void>(filter);
+    return false;
+  }
   /// The sorted lists of rows [v_begin, v_end) of `target`, as an image of those rows;
   /// world_from_image is left as the identity. @return kLimit without the memory
   virtual Result<LayeredDepthImage> lists(const RasterTarget& target, int v_begin, int v_end) = 0;
+  /// Crossings of the mesh in the rows of the last lists(): those that came back, but for a filter.
+  [[nodiscard]] virtual std::uint64_t crossings() const = 0;
   /// How many rows of `target` are best asked for at once: a multiple of kTileSide, at least that.
   [[nodiscard]] virtual int rows_at_once(const RasterTarget& target) const = 0;
 };
@@ -37,7 +46,9 @@ class ListSourceOrCpu final : public ListSource {
                   std::function<void(const Error&)> on_failure);
 
   Result<void> set_mesh(const LatticeMesh& mesh) override;
+  bool use_filter(const TileListFilter& filter) override;
   Result<LayeredDepthImage> lists(const RasterTarget& target, int v_begin, int v_end) override;
+  [[nodiscard]] std::uint64_t crossings() const override { return crossings_; }
   [[nodiscard]] int rows_at_once(const RasterTarget& target) const override;
 
  private:
@@ -46,6 +57,8 @@ class ListSourceOrCpu final : public ListSource {
   Execution execution_;
   std::function<void(const Error&)> on_failure_;
   const LatticeMesh* mesh_ = nullptr;
+  const TileListFilter* filter_ = nullptr;  ///< that the lists have gone through
+  std::uint64_t crossings_ = 0;
 };
 
 /// Cuts rows of lists into tiles. Scratch of one thread.

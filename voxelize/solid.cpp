@@ -18,10 +18,10 @@ double milliseconds_between(std::chrono::steady_clock::time_point from,
 }  // namespace
 
 struct SolidVoxelizer::Worker {
-  explicit Worker(const VoxelizeOptions& options)
+  Worker(const VoxelizeOptions& options, const TileListFilter* filters)
       : keys({.store = options.store, .offsets = options.offsets}),
         items({.store = options.store, .offsets = options.offsets}),
-        filter(options.filter != nullptr ? options.filter->worker() : nullptr) {}
+        filter(filters != nullptr ? filters->worker() : nullptr) {}
   KeyTileBuilder keys;
   ItemTileBuilder items;
   std::unique_ptr<TileListFilter::Worker> filter;
@@ -38,15 +38,17 @@ Result<SolidVoxelizer> SolidVoxelizer::create(const LatticeMesh& mesh, const Vox
   result.grid_ = &grid;
   result.options_ = options;
   result.target_ = raster_target(grid, axis);
+  const TileListFilter* filter = options.filter;
   if (options.source != nullptr) {
     if (auto set = options.source->set_mesh(mesh); !set) return tl::unexpected(set.error());
+    if (filter != nullptr && options.source->use_filter(*filter)) filter = nullptr;
   } else {
     auto bins = bin_triangles(mesh, result.target_, execution);
     if (!bins) return tl::unexpected(bins.error());
     result.bins_ = std::move(*bins);
   }
   for (int i = 0; i < execution.thread_count(); ++i) {
-    result.workers_.push_back(std::make_shared<Worker>(options));
+    result.workers_.push_back(std::make_shared<Worker>(options, filter));
   }
   return result;
 }
@@ -88,7 +90,7 @@ void SolidVoxelizer::walk(const TileLists<Key>& lists, Worker& worker, int tu, i
                  std::span<const Interval>(tile.items).first(tile.offsets.back()), tile.labels);
   }
   VoxelizeReport& report = worker.report;
-  report.crossings += lists.fragments;
+  if (options_.source == nullptr) report.crossings += lists.fragments;
   report.unbalanced_columns += tile.unbalanced;
   report.negative_columns += tile.negative;
   report.max_depth_complexity = std::max(report.max_depth_complexity, tile.max_depth);
@@ -112,6 +114,7 @@ Result<void> SolidVoxelizer::run_source(int v_begin, const Execution& execution,
     const int end = std::min(v_end, v + step);
     const auto rows = options_.source->lists(target_, v, end);
     if (!rows) return tl::unexpected(rows.error());
+    workers_.front()->report.crossings += options_.source->crossings();
     // Time of this thread alone, where the others' is divided by their number.
     workers_.front()->report.lists_ms +=
         milliseconds_between(start, std::chrono::steady_clock::now()) *

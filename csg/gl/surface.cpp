@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "csg/gl/tile_programs.h"
+#include "csg/gl/walk_programs.h"
 #include "csg/tile_surface.h"
 #include "hashbuffer/gl/compute_lists.h"
 
@@ -22,14 +23,7 @@ constexpr std::uint32_t kDoubtful = 0xfffffffeu;  // of walk.comp.glsl
 constexpr std::uint32_t kGroupSide = 8;
 constexpr std::uint64_t kDoubtHeader = 16;  // bytes
 
-enum Binding : unsigned {
-  kTriangles = 0,
-  kTiles = 1,
-  kSlots = 2,
-  kNodes = 3,
-  kSurfaces = 4,
-  kDoubts = 5
-};
+enum Binding : unsigned { kTriangles = 0, kSurfaces = 4, kDoubts = 5 };
 
 /// All solids that the walk looks at, as one mesh.
 struct AllSolids {
@@ -139,24 +133,20 @@ class PixelJudge {
 }  // namespace
 
 struct GlSurfaceSource::Impl {
+  explicit Impl(const gl::Info& info) : walks(glsl::csg_gl_walk_comp, info, "6000u") {}
+
   std::unique_ptr<gl::Store> store;
   std::unique_ptr<gl::ComputeRasterizer> rasterizer;
   std::uint64_t binding_bytes = 0, pixels_at_once = 0;
-  bool few_rounds = false;  ///< loops of a shader end early
-  struct Walk {
-    std::uint32_t words;
-    gl::StoreGlsl read;
-    gl::Program program;
-  };
-  std::vector<Walk> walks;
-  gl::Buffer triangles, tiles, slots, nodes, surfaces, doubts;
+  WalkPrograms walks;
+  WalkTables tables;
+  gl::Buffer triangles, surfaces, doubts;
   TilePrograms programs;
   AllSolids all;
   std::vector<glm::uvec2> found;
   std::vector<std::uint32_t> words;
   Counts counts;
 
-  Result<const gl::Program*> walk_for(std::uint32_t bit_words);
   Result<void> upload();
   Result<bool> band(const FrameInput& frame, int v_begin, int v_end, SurfaceImage& image,
                     DrawReport& report, std::vector<std::uint32_t>& left,
@@ -173,10 +163,9 @@ const GlSurfaceSource::Counts& GlSurfaceSource::counts() const { return impl_->c
 Result<std::unique_ptr<GlSurfaceSource>> GlSurfaceSource::create(const gl::Context& context,
                                                                  std::unique_ptr<gl::Store> store,
                                                                  std::uint64_t pixels_at_once) {
-  auto impl = std::make_unique<Impl>();
+  auto impl = std::make_unique<Impl>(context.info());
   impl->store = std::move(store);
   impl->pixels_at_once = pixels_at_once;
-  impl->few_rounds = context.info().works_around("loop-rounds");
   impl->binding_bytes = context.info().limits.storage_block_bytes;
   auto rasterizer = gl::ComputeRasterizer::create(context);
   if (!rasterizer) return tl::unexpected(rasterizer.error());
@@ -184,31 +173,9 @@ Result<std::unique_ptr<GlSurfaceSource>> GlSurfaceSource::create(const gl::Conte
   return std::unique_ptr<GlSurfaceSource>(new GlSurfaceSource(std::move(impl)));
 }
 
-Result<const gl::Program*> GlSurfaceSource::Impl::walk_for(std::uint32_t bit_words) {
-  const gl::StoreGlsl read = store->glsl_read();
-  for (const Walk& walk : walks) {
-    if (walk.words == bit_words && walk.read == read) return &walk.program;
-  }
-  gl::GlslSettings settings = read.settings;
-  settings.defines.emplace_back("WALK_WORDS", std::to_string(bit_words));
-  settings.defines.emplace_back("WALK_MOST_ROUNDS", few_rounds ? "6000u" : "1000000u");
-  const gl::GlslPiece pieces[] = {read.piece(), glsl::csg_gl_walk_comp};
-  auto program = gl::Program::compute(pieces, settings);
-  if (!program) return tl::unexpected(program.error());
-  walks.push_back({bit_words, read, *std::move(program)});
-  return &walks.back().program;
-}
-
 Result<void> GlSurfaceSource::Impl::upload() {
-  const auto put = [](gl::Buffer& buffer, auto data) -> Result<void> {
-    if (auto room = buffer.reserve(data.size_bytes()); !room) return room;
-    buffer.upload(data);
-    return {};
-  };
-  if (auto done = put(triangles, std::span<const glm::uvec2>(all.facts)); !done) return done;
-  if (auto done = put(tiles, std::span<const WalkTile>(programs.tiles)); !done) return done;
-  if (auto done = put(slots, std::span<const std::uint32_t>(programs.slots)); !done) return done;
-  return put(nodes, std::span<const std::uint32_t>(programs.nodes));
+  auto done = upload_to(triangles, std::span<const glm::uvec2>(all.facts));
+  return done ? tables.upload(programs) : done;
 }
 
 Result<void> GlSurfaceSource::find(const FrameInput& frame, SurfaceImage& image, DrawReport& report,
@@ -261,7 +228,7 @@ Result<bool> GlSurfaceSource::Impl::band(const FrameInput& frame, int v_begin, i
   const auto built = gl::build_sized(*store, *rasterizer, execution);
   if (!built) return tl::unexpected(built.error());
   report.fragments += built->fragments;
-  const auto program = walk_for(programs.bit_words);
+  const auto program = walks.get(*store, programs);
   if (!program) return tl::unexpected(program.error());
   const std::size_t pixels =
       static_cast<std::size_t>(frame.view.size.x) * static_cast<std::size_t>(v_end - v_begin);
@@ -278,6 +245,9 @@ Result<bool> GlSurfaceSource::Impl::band(const FrameInput& frame, int v_begin, i
     if (auto done = walk(frame, **program, v_begin); !done) return tl::unexpected(done.error());
     std::array<std::uint32_t, 1> used{};
     doubts.download(std::span<std::uint32_t>(used));
+    if (auto done = gl::check_errors("walking lists of solids"); !done) {
+      return tl::unexpected(done.error());
+    }
     if (used[0] > capacity) {
       if (kDoubtHeader + std::uint64_t{used[0]} * 4 > binding_bytes) {
         for (int tile = first_tile; tile < end_tile; ++tile) {
@@ -322,9 +292,7 @@ Result<void> GlSurfaceSource::Impl::walk(const FrameInput& frame, const gl::Prog
     const gl::PixelRows rows = store->band_rows(band);
     store->bind_for_reading(band);
     triangles.bind(kTriangles);
-    tiles.bind(kTiles);
-    slots.bind(kSlots);
-    nodes.bind(kNodes);
+    tables.bind();
     surfaces.bind(kSurfaces);
     doubts.bind(kDoubts);
     program.set("walk_row_begin", rows.begin);

@@ -20,7 +20,7 @@ namespace strata::csg {
 /// decide (faces that coincide, solids that are open or overlap themselves) is decided by the CPU's
 /// code from its list, which is downloaded. So the surfaces are the CPU's, bit for bit.
 ///
-/// Tiles where the near plane cuts a solid, or that meet more than 1000 solids and nodes, are left
+/// Tiles where the near plane cuts a solid, or that meet more than 1024 solids or nodes, are left
 /// to the CPU.
 class GlSurfaceSource final : public SurfaceSource {
  public:

@@ -5,30 +5,12 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
-// A tile's program. Bits [0, slot_count) are solids, node n is bit slot_count + n; children come
-// before parents. Of each node WALK_WORDS pairs of words: bits that make it true, and bits that
-// make it true by being 0.
-struct WalkTile {
-  uint slot_count;  // 0: nothing is to be found in the tile
-  uint node_count;
-  uint nodes;  // first word in walk_nodes
-  uint slots;  // where the tile's solids begin in walk_slots: solid s is at slots + s - first
-  uint first_solid;
-  uint solid_count;
-  uint root;      // a bit
-  uint inverted;  // 1: the tree says not(root)
-};
-
-const uint kWalkNone = 0xffffffffu;
 const uint kWalkDoubtful = 0xfffffffeu;
 const uint kWalkLongest = 255u;  // doubtful lists that are longer are not handed over
 
 layout(std430, binding = 0) readonly buffer WalkTriangles {
   uvec2 walk_triangles[];
 };  // solid, more
-layout(std430, binding = 1) readonly buffer WalkTiles { WalkTile walk_tiles[]; };
-layout(std430, binding = 2) readonly buffer WalkSlots { uint walk_slots[]; };
-layout(std430, binding = 3) readonly buffer WalkNodes { uint walk_nodes[]; };
 layout(std430, binding = 4) writeonly buffer WalkSurfaces { uvec2 walk_surfaces[]; };
 // Of each doubtful pixel: its number, its list's length n (kWalkNone: too long), n depths and
 // payloads.
@@ -46,24 +28,6 @@ uniform uint walk_doubt_capacity;
 uniform float walk_range_a, walk_range_b, walk_range_offset, walk_range_square;
 uniform float walk_depth_limit;
 
-uint walk_bits[WALK_WORDS];
-
-bool walk_value(WalkTile tile) {
-  uint at = tile.nodes;
-  for (uint node = 0u; node < tile.node_count; ++node) {
-    uint any = 0u;
-    for (int word = 0; word < WALK_WORDS; ++word) {
-      any |= (walk_bits[word] & walk_nodes[at]) | (~walk_bits[word] & walk_nodes[at + 1u]);
-      at += 2u;
-    }
-    uint bit = tile.slot_count + node;
-    uint mask = 1u << (bit & 31u);
-    uint others = walk_bits[bit >> 5] & ~mask;
-    walk_bits[bit >> 5] = any != 0u ? others | mask : others;
-  }
-  return (walk_bits[tile.root >> 5] >> (tile.root & 31u) & 1u) != tile.inverted;
-}
-
 // A little more than the bounds of two faces near a depth, if neither is steep.
 int walk_reach(uint depth) {
   float nearness = walk_range_a - walk_range_b * float(depth);
@@ -80,7 +44,7 @@ void main() {
     walk_surfaces[pixel] = uvec2(kWalkNone, 0u);
     return;
   }
-  for (int word = 0; word < WALK_WORDS; ++word) walk_bits[word] = 0u;
+  walk_begin(tile);
 
   bool doubt = false, found = false;
   uvec2 surface = uvec2(kWalkNone, 0u);
@@ -88,7 +52,7 @@ void main() {
   int front = -1;  // how far back crossings before the group may be
   uint group_count = 0u, group_depth = 0u, group_payload = 0u;
   int group_more = 0;
-  uint count = 0u, rounds = 0u;
+  uint count = 0u;
   StrataCursor cursor = strata_list(pixel);
   for (;;) {
     uint depth, payload;
@@ -104,11 +68,10 @@ void main() {
       more = int(triangle.y);
     }
     if (!found && group_count > 0u && (!present || depth != group_depth)) {
-      rounds += tile.node_count * uint(WALK_WORDS + 1);
-      if (rounds > WALK_MOST_ROUNDS) {  // a driver may not walk that long
+      if (walk_rounds > WALK_MOST_ROUNDS) {  // a driver may not walk that long
         found = true;
         doubt = true;
-      } else if (walk_value(tile)) {
+      } else if (walk_value) {
         found = true;
         surface = uvec2(group_depth, group_payload);
         int reach = walk_reach(group_depth) + 2 * group_more;
@@ -121,10 +84,8 @@ void main() {
       group_more = 0;
     }
     if (!present) break;
-    uint mask = 1u << (slot & 31u);
-    bool inside = (walk_bits[slot >> 5] & mask) != 0u;
-    doubt = doubt || inside != (payload >> 31 != 0u);
-    walk_bits[slot >> 5] ^= mask;
+    doubt = doubt || walk_inside(slot) != (payload >> 31 != 0u);
+    if (walk_rounds <= WALK_MOST_ROUNDS) walk_flip(tile, slot);
     if (found) {
       doubt = doubt || int(depth) - more <= far;
     } else {
@@ -134,13 +95,7 @@ void main() {
       group_more = max(group_more, more);
     }
   }
-  for (uint word = 0u; word < uint(WALK_WORDS); ++word) {
-    uint first = word * 32u;
-    if (first >= tile.slot_count) break;
-    uint solids =
-        tile.slot_count - first >= 32u ? 0xffffffffu : (1u << (tile.slot_count - first)) - 1u;
-    doubt = doubt || (walk_bits[word] & solids) != 0u;
-  }
+  doubt = doubt || walk_inside_any(tile);
   if (!doubt) {
     walk_surfaces[pixel] = surface;
     return;

@@ -14,18 +14,26 @@ Result<BuildReport> build_sized(Store& store, ComputeRasterizer& rasterizer,
   }
   return build(store, rasterizer, execution);
 }
+
 Result<std::unique_ptr<ComputeListSource>> ComputeListSource::create(const Context& context,
                                                                      std::unique_ptr<Store> store,
                                                                      std::unique_ptr<Store> spare,
                                                                      std::int64_t pixels_at_once) {
   std::unique_ptr<ComputeListSource> result(new ComputeListSource());
+  auto opened = result->open(context, std::move(store), std::move(spare), pixels_at_once);
+  if (!opened) return tl::unexpected(opened.error());
+  return result;
+}
+
+Result<void> ComputeListSource::open(const Context& context, std::unique_ptr<Store> store,
+                                     std::unique_ptr<Store> spare, std::int64_t pixels_at_once) {
   auto rasterizer = ComputeRasterizer::create(context);
   if (!rasterizer) return tl::unexpected(rasterizer.error());
-  result->rasterizer_ = *std::move(rasterizer);
-  result->store_ = std::move(store);
-  result->spare_ = std::move(spare);
-  result->pixels_at_once_ = pixels_at_once;
-  return result;
+  rasterizer_ = *std::move(rasterizer);
+  store_ = std::move(store);
+  spare_ = std::move(spare);
+  pixels_at_once_ = pixels_at_once;
+  return {};
 }
 
 Result<void> ComputeListSource::set_mesh(const LatticeMesh& mesh) {
@@ -46,8 +54,14 @@ Result<LayeredDepthImage> ComputeListSource::lists(const RasterTarget& target, i
     built = build_sized(*store_, *rasterizer_);
   }
   if (!built) return tl::unexpected(built.error());
-  auto image = store_->download();
+  auto image = read(*store_, target, v_begin, v_end);
   if (image) image->depth_limit = target.depth_limit;
+  return image;
+}
+
+Result<LayeredDepthImage> ComputeListSource::read(Store& store, const RasterTarget&, int, int) {
+  auto image = store.download();
+  if (image) crossings_ = image->items.size();
   return image;
 }
 

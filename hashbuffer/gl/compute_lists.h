@@ -14,7 +14,7 @@ namespace strata::gl {
                                               const Execution& execution = {});
 
 /// Lists by the compute rasterizer in a store of the GPU: the CPU's, bit for bit.
-class ComputeListSource final : public ListSource {
+class ComputeListSource : public ListSource {
  public:
   /// `context` stays current while this is used. @param store keeps whole payloads
   /// @param spare takes over for good where `store` fails, as with lists beyond its ages; may
@@ -25,10 +25,19 @@ class ComputeListSource final : public ListSource {
 
   Result<void> set_mesh(const LatticeMesh& mesh) override;
   Result<LayeredDepthImage> lists(const RasterTarget& target, int v_begin, int v_end) override;
+  [[nodiscard]] std::uint64_t crossings() const override { return crossings_; }
   [[nodiscard]] int rows_at_once(const RasterTarget& target) const override;
 
- private:
+ protected:
   ComputeListSource() = default;
+  [[nodiscard]] Result<void> open(const Context& context, std::unique_ptr<Store> store,
+                                  std::unique_ptr<Store> spare, std::int64_t pixels_at_once);
+  /// The lists of rows [v_begin, v_end) of `target`, which `store` holds. Sets crossings_.
+  [[nodiscard]] virtual Result<LayeredDepthImage> read(Store& store, const RasterTarget& target,
+                                                       int v_begin, int v_end);
+  std::uint64_t crossings_ = 0;
+
+ private:
   std::unique_ptr<ComputeRasterizer> rasterizer_;
   std::unique_ptr<Store> store_, spare_;
   std::int64_t pixels_at_once_ = 0;

@@ -117,6 +117,29 @@ TEST_F(Backends, WriteTheSamePicturesAndVoxelsOfScenes) {
   expect_same({"ldi", "scene.csg", "-r", "60"}, ".npz");
 }
 
+TEST_F(Backends, MakeTheSameListsOfTrees) {
+  place_.write("scene.csg", kScene);
+  for (const char* axis : {"x", "y", "z"}) {
+    expect_same({"ldi", "scene.csg", "-r", "140", "--axis", axis}, ".npz");
+  }
+  expect_same({"voxelize", "scene.csg", "-r", "150"}, ".vdb");
+  for (const char* store : {"ha", "scan"}) {
+    expect_same({"voxelize", "scene.csg", "-r", "100", "--store", store}, ".nrrd");
+    expect_same({"ldi", "scene.csg", "-r", "65", "--store", store}, ".npz");
+  }
+  // What is said of them counts the solids' crossings, whoever makes the tree's of them.
+  std::string counts[2];
+  for (const bool gl : {false, true}) {
+    const RunResult run = place_.run(
+        {"voxelize", "scene.csg", "-r", "90", "--json=-", "-q", "--backend", gl ? "gl" : "cpu"});
+    ASSERT_EQ(run.exit_code, 0) << run.err;
+    const std::size_t at = run.out.find("\"crossings\"");
+    ASSERT_NE(at, std::string::npos) << run.out;
+    counts[gl ? 1 : 0] = run.out.substr(at, run.out.find('\n', at) - at);
+  }
+  EXPECT_EQ(counts[0], counts[1]);
+}
+
 TEST_F(Backends, DriversThatLackSomethingAreNamed) {
   // Mesa can be told to lack things; another driver does not listen, and does the work.
   for (const char* lack :

@@ -19,7 +19,12 @@ class RowsOfTheCpu final : public ListSource {
   explicit RowsOfTheCpu(int rows) : rows_(rows) {}
   Result<void> set_mesh(const LatticeMesh& mesh) override {
     mesh_ = &mesh;
+    filter_ = nullptr;
     return {};
+  }
+  bool use_filter(const TileListFilter& filter) override {
+    if (filters) filter_ = &filter;
+    return filters;
   }
   Result<LayeredDepthImage> lists(const RasterTarget& target, int v_begin, int v_end) override {
     asked += v_end - v_begin;
@@ -38,16 +43,22 @@ class RowsOfTheCpu final : public ListSource {
         part.offsets.push_back(part.items.size());
       }
     }
+    crossings_ = part.items.size();
+    if (filter_ != nullptr) return filter_lists(part, *filter_);
     return part;
   }
+  std::uint64_t crossings() const override { return crossings_; }
   int rows_at_once(const RasterTarget&) const override { return rows_; }
 
+  bool filters = false;
   int asked = 0;
   int fails_from = 1 << 30;  ///< row
 
  private:
   const LatticeMesh* mesh_ = nullptr;
+  const TileListFilter* filter_ = nullptr;
   int rows_;
+  std::uint64_t crossings_ = 0;
 };
 
 /// Keeps the crossings of even triangles.
@@ -90,12 +101,15 @@ TEST(ListSource, GivesTheImageThatTheTilesGive) {
       const RasterTarget target = raster_target(grid, axis);
       for (const TileListFilter* chosen : {static_cast<const TileListFilter*>(nullptr),
                                            static_cast<const TileListFilter*>(&filter)}) {
-        RowsOfTheCpu source(64);
         const auto expected = build_ldi(*mesh, target, {}, {}, chosen);
-        const auto found = build_ldi(source, *mesh, target, {}, chosen);
-        ASSERT_TRUE(expected && found);
-        EXPECT_TRUE(*found == *expected) << resolution;
-        EXPECT_EQ(source.asked, target.height);
+        for (const bool filters : {false, true}) {
+          RowsOfTheCpu source(64);
+          source.filters = filters;
+          const auto found = build_ldi(source, *mesh, target, {}, chosen);
+          ASSERT_TRUE(expected && found);
+          EXPECT_TRUE(*found == *expected) << resolution;
+          EXPECT_EQ(source.asked, target.height);
+        }
       }
     }
   }
@@ -122,6 +136,32 @@ TEST(ListSource, GivesTheVoxelsThatTheTilesGive) {
       EXPECT_EQ(found.crossings, expected.crossings);
       EXPECT_EQ(found.depth_histogram, expected.depth_histogram);
       EXPECT_EQ(found.unbalanced_columns, expected.unbalanced_columns);
+    }
+  }
+}
+
+TEST(ListSource, ThatFiltersGivesTheVoxelsAndTheReportOfTheTiles) {
+  const TriangleSoup soup = make_torus_knot(2, 3, 0.4, 40, 10);
+  const VoxelGrid grid = testkit::grid_around(soup, 140, 2);
+  const EvenTriangles filter;
+  VoxelizeOptions options;
+  options.rule = InsideRule::kParity;
+  options.statistics = true;
+  options.filter = &filter;
+  VoxelizeReport expected;
+  ASSERT_TRUE(voxelize(soup, grid, options, {}, &expected));
+  for (const bool filters : {false, true}) {
+    for (const int fails_from : {64, 1 << 30}) {
+      RowsOfTheCpu source(64);
+      source.filters = filters;
+      source.fails_from = fails_from;
+      ListSourceOrCpu both(source, {}, [](const Error&) {});
+      options.source = &both;
+      VoxelizeReport found;
+      ASSERT_TRUE(voxelize(soup, grid, options, {}, &found));
+      EXPECT_EQ(found.checksum, expected.checksum);
+      EXPECT_EQ(found.crossings, expected.crossings);
+      EXPECT_EQ(found.depth_histogram, expected.depth_histogram);
     }
   }
 }
