@@ -164,7 +164,7 @@ void label_solids(const VoxelizeCommand& command, VoxelizeOutcome& outcome,
     outcome.id_voxels.resize(scene.solids().size(), 0);
     return outcome.input.tree->set_labels(csg::id_labels(scene));
   }
-  if (command.output.empty()) return;
+  if (command.output.empty() || command.surface) return;
   const std::size_t most = voxel_format_for(command.output, command.format)->colours;
   if (most == 0) return;
   const glm::vec4 none(glm::vec3(csg::colour_schemes().front().face) / 255.0f, 1.0f);

@@ -4,8 +4,10 @@
 #include <bit>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <optional>
 #include <utility>
 
+#include "csg/column_surface.h"
 #include "csg/geometry.h"
 #include "csg/program.h"
 #include "csg/solid_labels.h"
@@ -101,6 +103,15 @@ class BooleanWorker final : public TileListFilter::Worker {
     return result;
   }
 
+  void surface(const TileLists<DepthItem>& lists, std::size_t pixel, std::span<const FaceRun> faces,
+               std::vector<VoxelRun>& kept) override {
+    items_.clear();
+    for_each_item(lists, pixel, [this](DepthItem item) { items_.push_back(item); });
+    find_flips();
+    if (!surface_) surface_.emplace(shared_->program);
+    surface_->find(flips_, faces, kept);
+  }
+
  private:
   [[nodiscard]] std::uint32_t solid_of(DepthItem item) const {
     return shared_->solid_of[item.triangle()];
@@ -161,6 +172,21 @@ class BooleanWorker final : public TileListFilter::Worker {
 
   /// The same where a solid is open: partners are found solid by solid.
   void walk_open() {
+    find_flips();
+    std::uint32_t last = label();
+    for (std::size_t i = 0; i < flips_.size();) {
+      const std::size_t begin = i;
+      for (; i < flips_.size() && flips_[i].depth == flips_[begin].depth; ++i) {
+        flip(flips_[i].solid);
+      }
+      if (label() == last) continue;
+      last = label();
+      put(flips_[begin].depth, last, flips_[begin].triangle);
+    }
+  }
+
+  /// Where the ray of items_ enters and leaves each solid, by depth.
+  void find_flips() {
     std::stable_sort(items_.begin(), items_.end(),
                      [this](DepthItem a, DepthItem b) { return solid_of(a) < solid_of(b); });
     flips_.clear();
@@ -174,16 +200,6 @@ class BooleanWorker final : public TileListFilter::Worker {
     std::sort(flips_.begin(), flips_.end(), [](const Flip& a, const Flip& b) {
       return a.depth != b.depth ? a.depth < b.depth : a.solid < b.solid;
     });
-    std::uint32_t last = label();
-    for (std::size_t i = 0; i < flips_.size();) {
-      const std::size_t begin = i;
-      for (; i < flips_.size() && flips_[i].depth == flips_[begin].depth; ++i) {
-        flip(flips_[i].solid);
-      }
-      if (label() == last) continue;
-      last = label();
-      put(flips_[begin].depth, last, flips_[begin].triangle);
-    }
   }
 
   const Shared* shared_;
@@ -193,6 +209,7 @@ class BooleanWorker final : public TileListFilter::Worker {
   std::vector<std::uint32_t> offsets_;
   std::vector<DepthItem> keys_, items_;
   std::vector<Flip> flips_;
+  std::optional<ColumnSurface> surface_;
 };
 
 class BooleanFilter final : public TreeFilter {
@@ -205,6 +222,9 @@ class BooleanFilter final : public TreeFilter {
     return {shared_->program, shared_->rules, shared_->solid_of};
   }
   [[nodiscard]] bool labelled() const override { return !shared_->labels.empty(); }
+  [[nodiscard]] std::uint32_t solid_of(std::uint32_t triangle) const override {
+    return shared_->solid_of[triangle];
+  }
 
  private:
   const Shared* shared_;

@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "raster/lattice_mesh.h"
 #include "voxelize/checksum.h"
 #include "voxelize/solid.h"
 #include "voxelize/surface.h"
+#include "voxelize/tree_surface.h"
 #include "voxelize/vote.h"
 
 namespace strata {
@@ -54,8 +56,11 @@ Result<VoxelizeReport> run(const TriangleSoup& mesh, const VoxelGrid& grid,
   if (!options.solid && !options.surface) {
     return fail(ErrorCode::kUsage, "neither the solid nor the surface is asked for");
   }
-  if (options.filter != nullptr && (options.surface || !options.closed)) {
-    return fail(ErrorCode::kUsage, "of a Boolean tree only the solid can be voxelized");
+  if (options.filter != nullptr && !options.closed) {
+    return fail(ErrorCode::kUsage, "the lists of a Boolean tree are closed; there is no vote");
+  }
+  if (options.filter != nullptr && options.surface && options.filter->labelled()) {
+    return fail(ErrorCode::kUsage, "labels are of solids, the surface has none");
   }
   if (!options.closed && options.open == OpenMode::kFail) {
     return fail(ErrorCode::kGeometry, "the mesh is not closed");
@@ -71,11 +76,18 @@ Result<VoxelizeReport> run(const TriangleSoup& mesh, const VoxelGrid& grid,
   const bool open_surface = !options.closed && options.open == OpenMode::kSurface;
   const bool solid = options.solid && !open_surface;
   const bool surface = options.surface || open_surface;
+  std::optional<TreeSurface> tree;
+  if (surface && options.filter != nullptr) {
+    auto made = TreeSurface::create(lattice, grid, options, quiet);
+    if (!made) return tl::unexpected(made.error());
+    tree = *std::move(made);
+  }
 
   const auto pass_on = [&](VoxelIntervals&& slab) -> Result<void> {
     if (surface) {
-      auto skin = voxelize_surface(lattice, grid, options.surface_kind, options.axis,
-                                   slab.v_begin(), slab.v_end(), quiet);
+      auto skin = tree ? tree->slab(slab.v_begin(), slab.v_end(), quiet)
+                       : voxelize_surface(lattice, grid, options.surface_kind, options.axis,
+                                          slab.v_begin(), slab.v_end(), quiet);
       if (skin && solid) skin = union_intervals(slab, *skin, quiet);
       if (!skin) return tl::unexpected(skin.error());
       slab = std::move(*skin);

@@ -43,8 +43,9 @@ struct VoxelizeOptions {
   OffsetKind offsets = OffsetKind::kPlaneFirst;
   bool statistics = false;  ///< count and hash what comes out
   /// Makes other lists of the mesh's before they are filled: a Boolean tree. Borrowed. Then the
-  /// rule applies to what it makes, and surfaces cannot be had. Of labelled lists it makes labelled
-  /// intervals.
+  /// rule applies to what it makes, and a voxel is of the surface when faces of solids pass through
+  /// it and the tree depends on those solids there (where they are several, that may be some voxels
+  /// more than the surface meets). Of labelled lists it makes labelled intervals.
   const TileListFilter* filter = nullptr;
   /// Makes the lists in place of this process's threads: a GPU. Borrowed; used by the calling
   /// thread alone. `store` and `offsets` are its own then, and surfaces are not its work.
@@ -71,7 +72,7 @@ using SlabSink = std::function<Result<void>(const VoxelIntervals&)>;
 
 /// Voxelizes `mesh` on `grid`, slab by slab of bounded memory. Voxel centres decide (law 7): same
 /// set for every axis, store, thread count and order of triangles.
-/// @return kUsage (a surface of a filter's lists), kGeometry (coordinates too large, open mesh with
+/// @return kUsage (a surface of labelled lists), kGeometry (coordinates too large, open mesh with
 /// OpenMode::kFail), kLimit, kCancelled, or the sink's error.
 Result<VoxelizeReport> voxelize_slabs(const TriangleSoup& mesh, const VoxelGrid& grid,
                                       const VoxelizeOptions& options, const Execution& execution,

@@ -297,6 +297,30 @@ TEST_F(Voxelize, AVoxFileKeepsTheColoursOfAScene) {
   EXPECT_EQ(red, 64u);
 }
 
+TEST_F(Voxelize, TheSurfaceOfASceneIsThatOfItsResult) {
+  place.write("hole.csg",
+              "difference() { cube(size = [8, 8, 8], center = true); "
+              "cylinder($fn = 32, h = 20, r1 = 2, r2 = 2, center = true); }\n");
+  place.write("box.csg", "cube(size = [8, 8, 8], center = true);\n");
+  put("box.obj", make_box({-4, -4, -4}, {4, 4, 4}));
+  const auto checksum = [&](const std::string& file, const char* kind) {
+    return report({file, "-r", "40", "--padding", "2", "--checksum", kind})["voxels"]["checksum"];
+  };
+  EXPECT_EQ(checksum("box.csg", "--surface"), checksum("box.obj", "--surface"));
+  EXPECT_EQ(checksum("box.csg", "--surface=6"), checksum("box.obj", "--surface=6"));
+  const auto count = [&](std::vector<std::string> kind) {
+    kind.insert(kind.begin(), {"hole.csg", "-r", "40"});
+    return report(kind)["voxels"]["solid"].get<std::uint64_t>();
+  };
+  const auto surface = count({"--surface"}), both = count({"--surface", "--solid"});
+  EXPECT_GT(surface, 5 * 40 * 40u);
+  EXPECT_LT(surface, both);
+  EXPECT_LT(both, count({"--solid"}) + surface);
+  // Colours are of solids.
+  EXPECT_EQ(place.run({"voxelize", "hole.csg", "-r", "20", "--surface", "-o", "a.vox"}).exit_code,
+            0);
+}
+
 /// The values of a .npy file with its type.
 std::pair<std::string, std::vector<std::uint32_t>> npy_values(const std::string& bytes) {
   const std::size_t begin = 10 + static_cast<unsigned char>(bytes[8]) +

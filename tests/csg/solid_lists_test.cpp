@@ -330,16 +330,6 @@ TEST(Labels, OfColoursFollowTheirFirstAppearance) {
   EXPECT_TRUE(colour_labels(Tree(), Tree::kNone, none).colours.empty());
 }
 
-TEST(SolidLists, SurfacesOfTreesAreRefused) {
-  Tree tree;
-  tree.set_root(
-      tree.add_solid({std::make_shared<TriangleSoup>(make_box(glm::dvec3(-1), glm::dvec3(1)))}));
-  const SolidLists lists(tree, tree.root());
-  const auto refused = voxelize(lists.soup(), kGrid, {.surface = true, .filter = &lists.filter()});
-  ASSERT_FALSE(refused.has_value());
-  EXPECT_EQ(refused.error().code, ErrorCode::kUsage);
-}
-
 TEST(Measures, OfABoxMinusABoxAreTheClosedForm) {
   Tree tree;
   const auto box = [&](const glm::dvec3& low, const glm::dvec3& high) {
