@@ -52,7 +52,8 @@ class Buffer {
     upload_bytes(data.data(), data.size_bytes(), offset);
   }
   /// Fills `data` from byte `offset`; waits for what was asked of the GPU before, and makes what
-  /// shaders wrote visible first. @pre it fits
+  /// shaders wrote visible first. Rubbish comes where the context was lost: ask check_errors()
+  /// before it is used. @pre it fits
   template <class T>
   void download(std::span<T> data, std::uint64_t offset = 0) const {
     static_assert(std::is_trivially_copyable_v<T>);

@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <iterator>
 
+#include "gl/faults.h"
 #include "gl/program.h"
 #include "gl/workarounds.h"
 
@@ -143,6 +144,12 @@ bool Info::works_around(std::string_view name) const {
 }
 
 Result<void> check_errors(std::string_view what) {
+  const GLenum reset = has_lost_context() ? static_cast<GLenum>(GL_UNKNOWN_CONTEXT_RESET)
+                                          : glGetGraphicsResetStatus();
+  if (reset != GL_NO_ERROR) {
+    return fail(ErrorCode::kInternal, "{}: the OpenGL context was lost, {}", what,
+                reset_text(reset));
+  }
   // A lost context may say so forever: this loop ends all the same.
   std::string said;
   bool out_of_memory = false;
@@ -159,11 +166,6 @@ Result<void> check_errors(std::string_view what) {
 }
 
 Result<void> Context::check() {
-  const GLenum reset = glGetGraphicsResetStatus();
-  if (reset != GL_NO_ERROR) {
-    return fail(ErrorCode::kInternal, "OpenGL ({}): the context was lost, {}", info_.renderer,
-                reset_text(reset));
-  }
   auto errors = check_errors("OpenGL (" + info_.renderer + ")");
   std::string said;
   for (const std::string& message : *messages_) said += "; " + message;
@@ -177,6 +179,7 @@ Result<void> Context::check() {
 }
 
 Result<void> Context::look_around(std::string window_system, bool debug) {
+  begin_faults();
   info_.window_system = std::move(window_system);
   info_.vendor = text_of(GL_VENDOR);
   info_.renderer = text_of(GL_RENDERER);
@@ -189,6 +192,7 @@ Result<void> Context::look_around(std::string window_system, bool debug) {
   for (const std::string_view name : {"llvmpipe", "softpipe", "swrast", "SwiftShader"}) {
     info_.is_software |= info_.renderer.find(name) != std::string::npos;
   }
+  if (pretends_hardware()) info_.is_software = false;
   const std::uint32_t count = number_of(GL_NUM_EXTENSIONS);
   for (std::uint32_t i = 0; i < count; ++i) {
     if (const GLubyte* name = glGetStringi(GL_EXTENSIONS, i)) {

@@ -105,8 +105,8 @@ class Context {
       std::make_unique<std::vector<std::string>>();
 };
 
-/// Errors of the current context since the last call, for code that has no Context at hand:
-/// `what` begins the message. Debug messages are left to Context::check().
+/// Errors of the current context since the last call, and its loss, for code that has no Context at
+/// hand: `what` begins the message. Debug messages are left to Context::check().
 [[nodiscard]] Result<void> check_errors(std::string_view what);
 
 }  // namespace strata::gl

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <charconv>
 
+#include "gl/faults.h"
+
 namespace strata::gl {
 namespace {
 
@@ -74,6 +76,12 @@ Result<void> compile(Shader& shader, GLenum stage, std::span<const GlslPiece> pi
     text += fmt::format("#line {} 0\n", i * kLinesOfPiece + 1);
     text += pieces[i].text;
     if (!text.ends_with('\n')) text += '\n';
+  }
+  if (refuses_shader(pieces)) {
+    // Without the driver: Mesa's cache of shaders let text with an #error pass.
+    return fail(ErrorCode::kInternal,
+                "the OpenGL driver refuses a shader:\n{}: refused by STRATA_GL_FAULTS",
+                pieces.back().name);
   }
   shader.id = glCreateShader(stage);
   const char* source = text.data();

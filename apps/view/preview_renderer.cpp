@@ -79,7 +79,11 @@ class PreviewRenderer final : public Renderer {
       m.x -= pixel.x * m.w;
       m.y -= pixel.y * m.w;
     }
-    const auto image = preview_->draw(view, execution);
+    auto image = preview_->draw(view, execution);
+    if (!image && surfaces_ != nullptr && image.error().code != ErrorCode::kCancelled) {
+      give_up_gpu(image.error());
+      image = preview_->draw(view, execution);
+    }
     if (!image) return tl::unexpected(image.error());
     const csg::SurfaceImage& surface = **image;
     const std::uint32_t depth = surface.depth.front();

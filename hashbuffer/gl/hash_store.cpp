@@ -332,6 +332,7 @@ Result<std::vector<HashStore::Counts>> HashStore::clear_and_count() {
   }
   if (!any) return counts;
   const auto words = held_.download_all<std::uint32_t>();
+  if (auto checked = check_errors("hash store"); !checked) return tl::unexpected(checked.error());
   for (std::size_t i = 0; i < bands_.size(); ++i) counts[i].held = words[64 * i];
   return counts;
 }

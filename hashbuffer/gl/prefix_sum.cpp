@@ -1,5 +1,7 @@
 #include "hashbuffer/gl/prefix_sum.h"
 
+#include "gl/context.h"
+
 namespace strata::glsl {
 extern const gl::GlslPiece hashbuffer_gl_prefix_sum_comp;
 }
@@ -28,6 +30,7 @@ Result<std::uint32_t> PrefixSum::run(const Buffer& values, std::uint64_t count) 
     n = (n + kValuesOfGroup - 1) / kValuesOfGroup;
   }
   levels_[top].download(std::span(&total, 1));
+  if (auto checked = check_errors("prefix sum"); !checked) return tl::unexpected(checked.error());
   return total;
 }
 

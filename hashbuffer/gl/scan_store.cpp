@@ -205,6 +205,7 @@ Result<void> ScanStore::sort(const Band& band) {
   if (most_long == 0) return {};
   std::uint32_t counters[2] = {};
   long_lists_.download(std::span<std::uint32_t>(counters));
+  if (auto checked = check_errors("count/scan store"); !checked) return checked;
   if (counters[0] > 0) sort_long(counters[0], counters[1]);
   return {};
 }
@@ -241,6 +242,9 @@ Result<bool> ScanStore::end() {
     if (band.items == 0) continue;
     std::uint32_t last = 0;
     band.ends.download(std::span(&last, 1), (std::uint64_t{band.pixels} - 1) * 4);
+    if (auto checked = check_errors("count/scan store"); !checked) {
+      return tl::unexpected(checked.error());
+    }
     if (last != band.items) {
       return fail(ErrorCode::kInternal,
                   "count/scan store: {} fragments were counted, not the same were stored",

@@ -101,6 +101,7 @@ Result<void> Store::download_band(int band, LayeredDepthImage& image) {
   }
   std::vector<std::uint32_t> begins(std::size_t{pixels} + 1, *total);
   lengths_buffer_.download(std::span(begins).first(pixels));
+  if (auto checked = check_errors("OpenGL store: reading"); !checked) return checked;
   const std::uint64_t before = image.items.size();
   for (std::uint32_t i = 0; i < pixels; ++i) {
     image.offsets[std::size_t{first} + i + 1] = before + begins[i + 1];

@@ -274,6 +274,7 @@ void strata_insert(uint pixel, uint depth, uint payload) {
   if (auto drawn = draw(kCount, rows); !drawn) return tl::unexpected(drawn.error());
   std::array<std::uint32_t, kSums> sums{};
   sums_.download(std::span<std::uint32_t>(sums));
+  if (auto done = check_errors("counting fragments"); !done) return tl::unexpected(done.error());
   return std::accumulate(sums.begin(), sums.end(), std::uint64_t{0});
 }
 

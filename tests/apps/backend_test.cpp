@@ -161,6 +161,110 @@ TEST_F(Backends, DriversThatLackSomethingAreNamed) {
   }
 }
 
+/// A context that is lost, a shader that is refused: llvmpipe shows neither, so they are provoked.
+class Faults : public Backends {
+ protected:
+  void SetUp() override {
+    Backends::SetUp();
+    place_.write("scene.csg", kScene);
+  }
+  /// Runs a command whose output is `name`, under a fault, on what --backend auto takes for a GPU.
+  RunResult run(std::vector<std::string> command, const std::string& name, const std::string& fault,
+                const char* backend = "auto") {
+    command.insert(command.end(), {"-o", name, "--backend", backend});
+    return place_.run(command, {.environment = {"STRATA_GL_FAULTS=hardware," + fault}});
+  }
+  static std::size_t count(const std::string& text, const std::string& word) {
+    std::size_t found = 0;
+    for (std::size_t at = 0; (at = text.find(word, at)) != std::string::npos; ++at) ++found;
+    return found;
+  }
+  /// The CPU's bytes, and one sentence that says `why`; nothing is said where nothing was provoked.
+  void expect_cpu(const std::vector<std::string>& command, const std::string& extension,
+                  const std::string& fault, const std::string& why, bool* quiet = nullptr) {
+    if (expected_.first != command) {
+      const RunResult cpu = run(command, "cpu" + extension, "", "cpu");
+      ASSERT_EQ(cpu.exit_code, 0) << cpu.err;
+      expected_ = {command, place_.read("cpu" + extension)};
+    }
+    const RunResult found = run(command, "found" + extension, fault);
+    ASSERT_EQ(found.exit_code, 0) << fault << ": " << found.err;
+    EXPECT_TRUE(place_.read("found" + extension) == expected_.second) << command[0] << " " << fault;
+    const std::size_t said = count(found.err, "warning: the ");
+    EXPECT_EQ(said, count(found.err, why)) << fault << ": " << found.err;
+    EXPECT_LE(said, 1u) << fault << ": " << found.err;
+    if (quiet == nullptr) {
+      EXPECT_EQ(said, 1u) << fault << ": " << found.err;
+    } else {
+      *quiet = said == 0;
+    }
+  }
+
+  std::pair<std::vector<std::string>, std::string> expected_;  ///< what a command writes
+  const std::vector<std::vector<std::string>> commands_ = {
+      {"voxelize", "scene.csg", "-r", "70"},
+      {"voxelize", kKnot, "-r", "70", "--store", "ha"},
+      {"voxelize", kOpen, "-r", "40"},
+      {"ldi", "scene.csg", "-r", "50"},
+      {"csg", "scene.csg", "--size", "90,70"}};
+  static std::string extension_of(const std::vector<std::string>& command) {
+    return command[0] == "voxelize" ? ".npy" : command[0] == "ldi" ? ".npz" : ".png";
+  }
+};
+
+TEST_F(Faults, ALostContextIsASentenceAndTheCpuGoesOn) {
+  for (const auto& command : commands_) {
+    // At every download, until there are no more.
+    bool quiet = false;
+    int lost = 0;
+    for (int at = 1; !quiet && at < 200; ++at) {
+      expect_cpu(command, extension_of(command), "lose-context=" + std::to_string(at),
+                 "context was lost, for a reason that the driver does not know", &quiet);
+      if (HasFailure()) return;
+      lost += quiet ? 0 : 1;
+    }
+    EXPECT_TRUE(quiet) << command[0];
+    EXPECT_GT(lost, 5) << command[0];
+  }
+}
+
+TEST_F(Faults, ALostContextIsAnErrorWhereTheGpuWasAskedFor) {
+  for (const auto& command : commands_) {
+    const std::string name = "out" + extension_of(command);
+    for (const int at : {2, 7}) {
+      const RunResult lost = run(command, name, "lose-context=" + std::to_string(at), "gl");
+      EXPECT_GT(lost.exit_code, 0) << lost.err;
+      EXPECT_EQ(count(lost.err, "strata: error: "), 1u) << lost.err;
+      EXPECT_NE(lost.err.find("context was lost"), std::string::npos) << lost.err;
+      EXPECT_FALSE(place_.has(name));
+    }
+  }
+}
+
+TEST_F(Faults, ARefusedShaderIsNamedAndTheCpuDoesTheWork) {
+  // Each with a command that needs it.
+  for (const auto& [shader, i] : {std::pair<std::string, std::size_t>{"compute_bin", 0},
+                                  {"compute_large", 1},
+                                  {"prefix_sum", 2},
+                                  {"sort_lists", 3},
+                                  {"result.comp", 0},
+                                  {"csg/gl/walk.comp", 4}}) {
+    const auto& command = commands_[i];
+    const std::string fault = "refuse-shader=" + shader, name = "out" + extension_of(command);
+    expect_cpu(command, extension_of(command), fault, "refuses a shader");
+    if (HasFailure()) return;
+    const RunResult asked = run(command, name, fault, "gl");
+    EXPECT_EQ(asked.exit_code, 2) << asked.err;
+    EXPECT_NE(asked.err.find("strata: error: --backend gl: "), std::string::npos) << asked.err;
+    EXPECT_NE(asked.err.find(shader), std::string::npos) << asked.err;
+    EXPECT_FALSE(place_.has(name));
+  }
+  // Where a store is refused, the other one takes over.
+  bool quiet = false;
+  expect_cpu(commands_[1], ".npy", "refuse-shader=hashbuffer/gl/insert_", "nothing", &quiet);
+  EXPECT_TRUE(quiet);
+}
+
 TEST(Backend, IsAutoCpuOrGl) {
   const Workplace place;
   const RunResult wrong =

@@ -1,6 +1,7 @@
 #include "gl/context.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <numeric>
 #include <thread>
 
@@ -132,6 +133,53 @@ TEST_F(GlProgram, ARefusedShaderNamesPieceAndLine) {
   ASSERT_FALSE(program);
   EXPECT_NE(program.error().message.find("second.glsl:3"), std::string::npos)
       << program.error().message;
+}
+
+/// STRATA_GL_FAULTS for the contexts that are made while it lives.
+struct Provoked {
+  explicit Provoked(const char* faults) { setenv("STRATA_GL_FAULTS", faults, 1); }
+  ~Provoked() { unsetenv("STRATA_GL_FAULTS"); }
+};
+
+TEST_F(GlContext, ThatIsLostSaysSoBeforeRubbishIsTrusted) {
+  const Provoked fault("lose-context=2");
+  auto lost = Context::headless({.debug = true, .device = ""});
+  ASSERT_TRUE(lost) << lost.error().message;
+  auto buffer = Buffer::allocate(8);
+  ASSERT_TRUE(buffer);
+  buffer->clear(7);
+  EXPECT_EQ(buffer->download_all<std::uint32_t>(), (std::vector<std::uint32_t>(2, 7)));
+  EXPECT_TRUE(check_errors("first"));
+  EXPECT_NE(buffer->download_all<std::uint32_t>(), (std::vector<std::uint32_t>(2, 7)));
+  for (int i = 0; i < 2; ++i) {  // for good
+    const auto checked = check_errors("second");
+    ASSERT_FALSE(checked);
+    EXPECT_EQ(checked.error().code, ErrorCode::kInternal);
+    EXPECT_EQ(checked.error().message.find("second: the OpenGL context was lost, "), 0u)
+        << checked.error().message;
+    EXPECT_FALSE((*lost)->check());
+  }
+  *buffer = Buffer();
+  lost->reset();
+  // Another one can be had.
+  const auto next = Context::headless({.debug = true, .device = ""});
+  ASSERT_TRUE(next);
+  EXPECT_TRUE((*next)->check());
+}
+
+TEST_F(GlProgram, CanBeRefusedByName) {
+  const Provoked fault("hardware,refuse-shader=second");
+  auto made = Context::headless({.debug = true, .device = ""});
+  ASSERT_TRUE(made) << made.error().message;
+  EXPECT_FALSE((*made)->info().is_software);
+  const GlslPiece first = {"first.glsl", "layout(local_size_x = 1) in;\nvoid main() {}\n"};
+  const GlslPiece second = {"second.glsl", first.text};
+  EXPECT_TRUE(Program::compute({&first, 1}));
+  const auto refused = Program::compute({&second, 1});
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message.find("refuses a shader"), std::string::npos);
+  EXPECT_NE(refused.error().message.find("second.glsl"), std::string::npos)
+      << refused.error().message;
 }
 
 TEST(GlWorkarounds, AreSwitchedByName) {

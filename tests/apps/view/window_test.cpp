@@ -121,7 +121,7 @@ class Window : public testing::Test {
   RunOptions options() const {
     RunOptions options;
     options.environment = {"DISPLAY=" + display->name(), "LP_NUM_THREADS=1", "STRATA_GL_DEBUG=1",
-                           "LIBGL_ALWAYS_SOFTWARE=1"};
+                           "LIBGL_ALWAYS_SOFTWARE=1", "STRATA_GL_FAULTS=" + fault_};
     return options;
   }
   RunResult view(const std::string& script, std::vector<std::string> arguments = {},
@@ -149,6 +149,7 @@ class Window : public testing::Test {
   }
 
   Workplace place_;
+  std::string fault_;  ///< that is provoked
 };
 
 TEST_F(Window, ShowsThePicturesOfStrataCsg) {
@@ -185,6 +186,38 @@ TEST_F(Window, WhoeverFindsTheSurfacesThePictureIsTheSame) {
                 .exit_code,
             0);
   EXPECT_EQ(image_of(place_, "gl.png"), image_of(place_, "cpu.png"));
+}
+
+TEST_F(Window, AContextThatIsLostIsTheCpusToReplace) {
+  const std::vector<std::string> size{"--size", "203,151", "--no-panels"};
+  const std::string script =
+      "axes off\npicture a.png\norbit 40 -20\npicture b.png\npick 100 70\nstats\nquit\n";
+  const auto run_with = [&](const char* backend) {
+    std::vector<std::string> arguments = size;
+    arguments.insert(arguments.end(), {"--backend", backend});
+    return view(script, arguments);
+  };
+  ASSERT_EQ(run_with("cpu").exit_code, 0);
+  const Image first = image_of(place_, "a.png"), second = image_of(place_, "b.png");
+  // While it is tried, in the first picture, in a later one, and in a pick.
+  int lost = 0;
+  for (const int at : {1, 6, 11, 14, 17, 20, 23, 26, 30, 35}) {
+    fault_ = "lose-context=" + std::to_string(at);
+    const RunResult run = run_with("gl");
+    ASSERT_EQ(run.exit_code, 0) << fault_ << ": " << run.err;
+    EXPECT_EQ(image_of(place_, "a.png"), first) << fault_;
+    EXPECT_EQ(image_of(place_, "b.png"), second) << fault_;
+    const std::size_t said = run.out.find("context was lost");
+    const bool by_gpu = run.out.find("\"renderer\": \"GPU\"") != std::string::npos;
+    EXPECT_EQ(said == std::string::npos, by_gpu) << fault_ << ": " << run.out;
+    lost += by_gpu ? 0 : 1;
+  }
+  EXPECT_GT(lost, 3);
+  fault_ = "refuse-shader=csg/gl/walk.comp";
+  const RunResult refused = run_with("gl");
+  ASSERT_EQ(refused.exit_code, 0) << refused.err;
+  EXPECT_EQ(image_of(place_, "b.png"), second);
+  EXPECT_NE(refused.out.find("refuses a shader"), std::string::npos) << refused.out;
 }
 
 TEST_F(Window, LeavesThePictureAloneWhereNothingLiesOnIt) {
