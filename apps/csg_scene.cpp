@@ -180,6 +180,7 @@ Result<csg::Scene> load_scene(const CsgCommand& command, Session& session) {
   for (const std::string& path : files) {
     auto scene = load_one(path, command, session);
     if (!scene) return tl::unexpected(scene.error());
+    for (const std::string& note : scene->notes) session.note(note);
     for (const csg::SceneWarning& warning : scene->warnings) {
       session.warn(warning.code, warning.message);
     }

@@ -1,7 +1,10 @@
 #include "csg/scene/scene.h"
 
 #include <filesystem>
+#include <iterator>
 #include <new>
+#include <utility>
+#include <vector>
 
 #include "csg/scene/csg_parser.h"
 #include "csg/scene/evaluator.h"
@@ -30,9 +33,16 @@ Result<Scene> read_scene(const std::string& path, const ReadSceneOptions& option
   const std::filesystem::path file(path);
   const std::string folder = file.parent_path().string();
   if (file.extension() == ".scad" || file.extension() == ".SCAD") {
-    auto text = run_openscad(path, options.scad_timeout_s, execution);
-    if (!text) return tl::unexpected(text.error());
-    return evaluate(*text, path + " (as .csg)", folder, options, execution);
+    auto run = run_openscad(path, options.scad_timeout_s, execution);
+    if (!run) return tl::unexpected(run.error());
+    auto scene = evaluate(run->text, path + " (as .csg)", folder, options, execution);
+    if (!scene) return scene;
+    std::vector<SceneWarning> warnings;
+    for (std::string& text : run->warnings) warnings.push_back({"openscad", std::move(text)});
+    scene->warnings.insert(scene->warnings.begin(), std::make_move_iterator(warnings.begin()),
+                           std::make_move_iterator(warnings.end()));
+    scene->notes = std::move(run->notes);
+    return scene;
   }
   auto bytes = detail::InputBytes::open(path, execution.memory_limit, execution.stop);
   if (!bytes) return tl::unexpected(bytes.error());

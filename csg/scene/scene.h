@@ -12,9 +12,9 @@ namespace strata::csg {
 /// Something in a scene that was done otherwise than written, or not at all.
 struct SceneWarning {
   /// For machines: "not-done" (a node that cannot be done), "missing-file", "missing-font",
-  /// "approximate", "ignored", "geometry".
+  /// "approximate", "ignored", "geometry", "openscad" (a warning of its own about a program).
   std::string code;
-  std::string message;  ///< begins with `file:line:column: `
+  std::string message;  ///< begins with `file:line:column: `, of openscad's with what it names
 };
 
 /// A scene: its tree, and what modifiers ask to be shown beside it.
@@ -25,6 +25,7 @@ struct Scene {
   /// Subtrees with `#`: part of the tree, and shown again as red ghosts (nodes of their own).
   std::vector<Tree::NodeId> highlights;
   std::vector<SceneWarning> warnings;
+  std::vector<std::string> notes;  ///< what a program printed with echo(), line by line, and such
   /// The top level is flat: its outlines are slabs of thickness 1, z from -0.5 to 0.5.
   bool flat = false;
   /// How far numbers in the file may be off, relative to their size: 5e-6 for six printed digits.

@@ -321,6 +321,42 @@ TEST_F(SceneFiles, WhatOpenscadSaysIsReported) {
       << scene.error().message;
 }
 
+/// openscad ends with 0 also where the program failed.
+TEST_F(SceneFiles, WarningsAndErrorsOfOpenscadAreOurs) {
+  const auto says = [&](const std::string& text) {
+    fs::permissions(
+        write("openscad",
+              "#!/bin/sh\necho 'cube([2,1,1]);' > \"$2\"\ncat >&2 <<'END'\n" + text + "\nEND\n"),
+        fs::perms::owner_all);
+  };
+  const std::string path = write("a.scad", "anything");
+  const ProgramPath first(folder_.string() + ":" + std::getenv("PATH"));
+  std::string chatter;  // much more than is kept of its last words
+  for (int i = 0; i < 20'000; ++i) chatter += fmt::format("ECHO: \"line {} of many\"\n", i);
+  says("WARNING: Ignoring unknown module 'foo' in file a.scad, line 7\n" + chatter +
+       "DEPRECATED: child() will be removed\nWARNING: Can't open include file 'b.scad'.\n"
+       "WARNING: odd in file lib/c.scad, line 2");
+  const Scene scene = read(path);
+  EXPECT_NEAR(volume_of(scene), 2.0, 1e-9);
+  ASSERT_EQ(codes_of(scene), "openscad openscad openscad ");
+  EXPECT_EQ(scene.warnings[0].message,
+            path + ":7: openscad: WARNING: Ignoring unknown module 'foo'");
+  EXPECT_EQ(scene.warnings[1].message,
+            path + ": openscad: WARNING: Can't open include file 'b.scad'.");
+  EXPECT_EQ(scene.warnings[2].message, "lib/c.scad:2: openscad: WARNING: odd");
+  ASSERT_EQ(scene.notes.size(), 1000u);
+  EXPECT_EQ(scene.notes[1], "ECHO: \"line 1 of many\"");
+  says(
+      "ERROR: Assertion 'false' failed: \"boo\" in file a.scad, line 1\n"
+      "TRACE: called by 'assert' in file a.scad, line 1\n" +
+      chatter);
+  const auto failed = read_scene(path);
+  ASSERT_FALSE(failed.has_value());
+  EXPECT_EQ(failed.error().code, ErrorCode::kInput);
+  EXPECT_EQ(failed.error().message,
+            path + ":1: openscad: ERROR: Assertion 'false' failed: \"boo\"");
+}
+
 TEST_F(SceneFiles, OpenscadIsEndedInTimeOrOnAStop) {
   const std::string path = write("a.scad", "anything");
   const std::string fake = write("openscad", "#!/bin/sh\nsleep 600\n");
@@ -352,6 +388,12 @@ TEST_F(SceneFiles, RealProgramsAreRunWhereOpenscadIsInstalled) {
   const auto broken = read_scene(write("b.scad", "cube(;"));
   ASSERT_FALSE(broken.has_value());
   EXPECT_NE(broken.error().message.find("openscad failed"), std::string::npos);
+  EXPECT_EQ(codes_of(read(write("c.scad", "foo(); cube();"))), "openscad ");
+  const std::string path = write("d.scad", "echo(\"hi\");\nassert(false, \"boo\"); cube(1);");
+  const auto asserted = read_scene(path);
+  ASSERT_FALSE(asserted.has_value());
+  EXPECT_EQ(asserted.error().message,
+            path + ":2: openscad: ERROR: Assertion 'false' failed: \"boo\"");
 }
 
 }  // namespace
