@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include "apps/commands.h"
+#include "apps/file_conflicts.h"
 #include "apps/session.h"
 #include "core/atomic_file.h"
 
@@ -64,6 +65,7 @@ template <class AnyCommand>
 Result<void> run(const AnyCommand& command, Session& session) {
   try {
     session.configure(command.common);
+    if (auto kept = check_files(command); !kept) return kept;
     if constexpr (std::is_same_v<AnyCommand, VoxelizeCommand>) {
       return run_voxelize(command, session);
     } else if constexpr (std::is_same_v<AnyCommand, InfoCommand>) {

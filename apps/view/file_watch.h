@@ -2,15 +2,11 @@
 
 #include <cstdint>
 #include <string>
-#include <string_view>
 #include <vector>
 
 // Whether files that a scene is made of have changed on the disk.
 
 namespace strata::view {
-
-/// Names in quotes or after include and use in a scene's text: `"part.stl"`, `<lib.scad>`.
-[[nodiscard]] std::vector<std::string> quoted_names(std::string_view text);
 
 /// Looks at files when asked. A change counts once the file has stayed the same from one look to
 /// the next, and only while it can be read: editors write in steps, or remove a file and put

@@ -7,8 +7,10 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <algorithm>
+#include <utility>
 
 #include "apps/csg_options.h"
+#include "apps/file_conflicts.h"
 #include "apps/option_values.h"
 #include "apps/view/script.h"
 #include "apps/view/viewer.h"
@@ -167,6 +169,24 @@ std::variant<apps::ParseOutcome, ViewOptions> parse_view_options(int argc,
   }
   if (auto done = read(words, options); !done) return mistake(done.error().message);
   return options;
+}
+
+Result<void> check_files(const ViewOptions& options, const std::vector<ScriptCommand>& commands) {
+  std::vector<apps::FileUse> written;
+  for (const ScriptCommand& command : commands) {
+    if (command.action != Action::kScreenshot && command.action != Action::kPicture) continue;
+    written.push_back(
+        {fmt::format("{}:{}: {}", options.script == "-" ? "standard input" : options.script,
+                     command.line, command.action == Action::kPicture ? "picture" : "screenshot"),
+         command.word});
+  }
+  if (!options.screenshot.empty()) written.push_back({"--screenshot", options.screenshot});
+  std::vector<apps::FileUse> read = apps::inputs_of(options.command.input);
+  if (!options.script.empty()) read.push_back({"--script", options.script});
+  for (apps::FileUse& use : apps::scene_files_of(options.command, written)) {
+    read.push_back(std::move(use));
+  }
+  return apps::check_files(read, written);
 }
 
 }  // namespace strata::view

@@ -4,9 +4,11 @@
 #include <optional>
 #include <string>
 #include <variant>
+#include <vector>
 
 #include "apps/commands.h"
 #include "apps/view/renderer.h"
+#include "apps/view/script.h"
 
 namespace strata::view {
 
@@ -26,5 +28,10 @@ struct ViewOptions {
 /// Reads the command line. A ParseOutcome is to be printed, and the program to end.
 [[nodiscard]] std::variant<apps::ParseOutcome, ViewOptions> parse_view_options(
     int argc, const char* const* argv);
+
+/// Looks whether the window would write a file that it reads, or one twice.
+/// @param commands of the script @return as apps::check_files()
+[[nodiscard]] Result<void> check_files(const ViewOptions& options,
+                                       const std::vector<ScriptCommand>& commands);
 
 }  // namespace strata::view

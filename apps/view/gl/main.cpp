@@ -298,6 +298,7 @@ Result<void> run(ViewOptions options) {
     if (!read) return tl::unexpected(read.error());
     commands = *std::move(read);
   }
+  if (auto kept = check_files(options, commands); !kept) return kept;
   gl::WindowOptions wish;
   const auto& files = options.command.input.files;
   wish.title = std::filesystem::path(files.front()).filename().string() +

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <thread>
 
+#include "apps/scene_files.h"
 #include "apps/view/file_watch.h"
 #include "apps/view/loader.h"
 #include "csg/ray_image.h"
@@ -219,11 +220,12 @@ class Files : public testing::Test {
 };
 
 TEST(QuotedNames, AreWhatASceneMayRead) {
-  EXPECT_EQ(quoted_names("use <lib.scad>\nimport(file = \"part.stl\"); echo(\"hello\"); a < b; "
+  EXPECT_EQ(
+      apps::quoted_names("use <lib.scad>\nimport(file = \"part.stl\"); echo(\"hello\"); a < b; "
                          "text(\"x.y\nz\")"),
-            (std::vector<std::string>{"lib.scad", "part.stl"}));
-  EXPECT_TRUE(quoted_names("\"").empty());
-  EXPECT_TRUE(quoted_names("").empty());
+      (std::vector<std::string>{"lib.scad", "part.stl"}));
+  EXPECT_TRUE(apps::quoted_names("\"").empty());
+  EXPECT_TRUE(apps::quoted_names("").empty());
 }
 
 TEST_F(Files, AChangeIsSeenOnceItIsWhole) {

@@ -1,0 +1,131 @@
+#include "apps/file_conflicts.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <iterator>
+#include <utility>
+
+#include "apps/scene_files.h"
+
+namespace strata::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Most links to links that are followed; the system follows as many.
+constexpr int kMaxLinks = 40;
+
+/// The file that a name would make, links followed even where nothing is there yet.
+fs::path resolved(const std::string& name) {
+  std::string bare = name;
+  while (bare.size() > 1 && bare.ends_with('/')) bare.pop_back();
+  std::error_code error;
+  fs::path path = fs::weakly_canonical(fs::absolute(bare, error), error);
+  for (int i = 0; i < kMaxLinks && fs::is_symlink(path, error); ++i) {
+    const fs::path target = fs::read_symlink(path, error);
+    if (error) break;
+    path = fs::weakly_canonical(path.parent_path() / target, error);
+  }
+  return path;
+}
+
+bool same_file(const std::string& a, const std::string& b) {
+  std::error_code error;
+  if (fs::equivalent(a, b, error) && !error) return true;  // hard links, too
+  return resolved(a) == resolved(b);
+}
+
+std::vector<FileUse> outputs(std::initializer_list<FileUse> uses) {
+  std::vector<FileUse> result;
+  std::copy_if(uses.begin(), uses.end(), std::back_inserter(result),
+               [](const FileUse& use) { return !use.path.empty(); });
+  return result;
+}
+
+/// A command whose inputs may be scenes, found by their names.
+Result<void> check(const InputOptions& input, const std::vector<FileUse>& written) {
+  CsgCommand command;
+  command.input = input;
+  std::vector<FileUse> read = inputs_of(input);
+  const auto more = scene_files_of(command, written);
+  read.insert(read.end(), more.begin(), more.end());
+  return check_files(read, written);
+}
+
+}  // namespace
+
+bool is_stream(const std::string& path) {
+  if (path == "-") return true;
+  for (const char* begin : {"/dev/std", "/dev/fd/", "/proc/"}) {
+    if (path.starts_with(begin)) return true;
+  }
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  return fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status);
+}
+
+std::vector<FileUse> inputs_of(const InputOptions& input) {
+  std::vector<FileUse> uses;
+  for (const std::string& path : input.files) uses.push_back({"the input", path});
+  return uses;
+}
+
+std::vector<FileUse> scene_files_of(const CsgCommand& command,
+                                    const std::vector<FileUse>& written) {
+  const bool endangered = std::any_of(written.begin(), written.end(), [](const FileUse& use) {
+    std::error_code error;
+    return fs::is_regular_file(use.path, error) && !is_stream(use.path);
+  });
+  if (!endangered) return {};
+  const auto& files = command.input.files;
+  const auto all = with_scene_files(files, command.scene.asset_folder, command.scene_format);
+  std::vector<FileUse> uses;
+  for (std::size_t i = files.size(); i < all.size(); ++i) {
+    uses.push_back({"a file of the scene,", all[i]});
+  }
+  return uses;
+}
+
+Result<void> check_files(const std::vector<FileUse>& read, const std::vector<FileUse>& written) {
+  for (std::size_t i = 0; i < written.size(); ++i) {
+    const FileUse& out = written[i];
+    if (is_stream(out.path)) continue;
+    for (const FileUse& in : read) {
+      if (is_stream(in.path) || !same_file(in.path, out.path)) continue;
+      return fail(ErrorCode::kUsage, "{} {} would overwrite {} {}", out.asked_by, out.path,
+                  in.asked_by, in.path);
+    }
+    for (std::size_t j = 0; j < i; ++j) {
+      if (is_stream(written[j].path) || !same_file(written[j].path, out.path)) continue;
+      return fail(ErrorCode::kUsage, "{} {} and {} {} would be written to one file",
+                  written[j].asked_by, written[j].path, out.asked_by, out.path);
+    }
+  }
+  return {};
+}
+
+Result<void> check_files(const VoxelizeCommand& command) {
+  return check(command.input,
+               outputs({{"-o", command.output}, {"--json", command.json.value_or("")}}));
+}
+
+Result<void> check_files(const InfoCommand& command) {
+  return check(command.input, outputs({{"--json", command.json.value_or("")}}));
+}
+
+Result<void> check_files(const LdiCommand& command) {
+  return check(command.input, outputs({{"-o", command.output}}));
+}
+
+Result<void> check_files(const CsgCommand& command) {
+  const auto written = outputs({{"-o", command.output},
+                                {"--ids", command.ids},
+                                {"--depth", command.depth},
+                                {"--json", command.json.value_or("")}});
+  std::vector<FileUse> read = inputs_of(command.input);
+  const auto more = scene_files_of(command, written);
+  read.insert(read.end(), more.begin(), more.end());
+  return check_files(read, written);
+}
+
+}  // namespace strata::apps

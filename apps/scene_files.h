@@ -1,0 +1,20 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace strata::apps {
+
+/// Names in quotes or after include and use in a scene's text: `"part.stl"`, `<lib.scad>`.
+[[nodiscard]] std::vector<std::string> quoted_names(std::string_view text);
+
+/// The files, and of those that are scenes what they name and what is there: meshes, outlines,
+/// pictures, included programs, and what those name.
+/// @param asset_folder where scenes look for files; empty: beside the scene
+/// @param all_scenes `files` are scenes, whatever their names are
+[[nodiscard]] std::vector<std::string> with_scene_files(std::vector<std::string> files,
+                                                        const std::string& asset_folder,
+                                                        bool all_scenes = false);
+
+}  // namespace strata::apps

@@ -1,0 +1,98 @@
+// No file is lost because it stands in two places of a command line.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "mesh/shapes.h"
+#include "mesh/write_mesh.h"
+#include "tests/apps/run_tool.h"
+
+namespace strata {
+namespace {
+
+using testkit::RunResult;
+using testkit::Workplace;
+
+class Files : public testing::Test {
+ protected:
+  Files() {
+    EXPECT_TRUE(write_mesh(place.path("part.stl"), make_box({0, 0, 0}, {1, 1, 1})));
+    place.write("scene.csg", "import(file = \"part.stl\");\ncube(size = [2, 2, 2]);\n");
+    place.write("old.png", "old");
+    std::filesystem::create_symlink("scene.csg", place.path("link.csg"));
+    std::filesystem::create_symlink("new.png", place.path("dangling.png"));
+    std::filesystem::create_hard_link(place.path("part.stl"), place.path("hard.stl"));
+  }
+
+  /// Expects a usage error that has the parts, and that no file has changed.
+  void refuses(const std::vector<std::string>& arguments,
+               const std::vector<std::string>& parts) const {
+    std::vector<std::string> before;
+    for (const std::string& name : place.names()) before.push_back(name + place.read(name));
+    const RunResult run = place.run(arguments);
+    EXPECT_EQ(run.exit_code, 2) << run.err;
+    for (const std::string& part : parts) {
+      EXPECT_NE(run.err.find(part), std::string::npos) << part << "\n" << run.err;
+    }
+    std::vector<std::string> after;
+    for (const std::string& name : place.names()) after.push_back(name + place.read(name));
+    EXPECT_EQ(before, after) << arguments.back();
+  }
+
+  Workplace place;
+};
+
+TEST_F(Files, InputsAreNotOverwritten) {
+  const auto csg = [&](const std::vector<std::string>& options, const std::string& part) {
+    std::vector<std::string> words{"csg", "scene.csg"};
+    words.insert(words.end(), options.begin(), options.end());
+    refuses(words, {part, options.back().substr(options.back().find('=') + 1)});
+  };
+  csg({"-o", "x.png", "--json=scene.csg"}, "--json scene.csg would overwrite the input scene.csg");
+  csg({"-o", "x.png", "--json=./link.csg"}, "would overwrite the input scene.csg");
+  csg({"-o", "x.png", "--json=part.stl"}, "would overwrite a file of the scene, part.stl");
+  csg({"-o", "x.png", "--json=hard.stl"}, "would overwrite a file of the scene, part.stl");
+  refuses({"csg", "old.png", "--input-format=csg", "--ids", "old.png"},
+          {"--ids old.png would overwrite the input old.png"});
+  refuses({"voxelize", "part.stl", "-r", "10", "--stats", "--json=part.stl"},
+          {"--json part.stl would overwrite the input part.stl"});
+  refuses({"voxelize", "part.stl", "-r", "10", "-o", "./part.stl", "--format", "npy"},
+          {"-o ./part.stl would overwrite the input part.stl"});
+  refuses({"voxelize", "scene.csg", "-r", "10", "-o", "part.stl", "--format", "npy"},
+          {"-o part.stl would overwrite a file of the scene, part.stl"});
+  refuses({"info", "part.stl", "--json=" + place.path("part.stl")}, {"the input part.stl"});
+  refuses({"ldi", "old.png", "--input-format", "stl", "-r", "8", "-o", "old.png"},
+          {"-o old.png would overwrite the input old.png"});
+}
+
+TEST_F(Files, OutputsDoNotOverwriteEachOther) {
+  refuses({"csg", "scene.csg", "-o", "same.png", "--ids", "same.png"},
+          {"-o same.png and --ids same.png would be written to one file"});
+  refuses({"csg", "scene.csg", "-o", "same.png", "--ids", "./same.png"},
+          {"-o same.png and --ids ./same.png would be written to one file"});
+  refuses({"csg", "scene.csg", "-o", "new.png", "--ids", "dangling.png"}, {"-o", "--ids"});
+  refuses({"csg", "scene.csg", "--depth", "s.exr", "--json=s.exr"}, {"--depth", "--json", "s.exr"});
+  refuses({"voxelize", "part.stl", "-r", "4", "-o", "both.npy", "--json=both.npy"},
+          {"-o both.npy and --json both.npy would be written to one file"});
+  refuses({"voxelize", "part.stl", "-r", "4", "-o", "slices/", "--format=png", "--json=slices"},
+          {"-o slices/ and --json slices"});
+}
+
+TEST_F(Files, StreamsAndFilesOfTheirOwnAreNoConflict) {
+  const auto runs = [&](const std::vector<std::string>& arguments) {
+    const RunResult run = place.run(arguments);
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+  };
+  runs({"csg", "scene.csg", "-o", "/dev/null", "--ids", "/dev/null", "--size=8,8"});
+  runs({"csg", "scene.csg", "-o", "-", "--json", "--size=8,8"});
+  runs({"csg", "scene.csg", "-o", "/dev/stdout", "--json=/dev/stdout", "--size=8,8"});
+  // What was written before is written again, and a name in a scene's text is no file elsewhere.
+  for (int i = 0; i < 2; ++i) {
+    runs({"csg", "scene.csg", "-o", "a.png", "--ids", "b.png", "--json=c.json", "--size=8,8"});
+  }
+}
+
+}  // namespace
+}  // namespace strata
