@@ -176,7 +176,8 @@ Result<void> run_csg(const CsgCommand& command, Session& session) {
   cut_scene(*scene, command.cuts, camera);
   const auto gpu = Gpu::open(command.backend, session);
   if (!gpu) return tl::unexpected(gpu.error());
-  const Execution execution = session.execution("drawing");
+  const bool more = command.json || !command.ids.empty() || !command.depth.empty();
+  const Execution execution = session.execution("drawing", more ? 0.6 : 1.0);
   std::vector<csg::Ghost> ghosts = ghosts_of(*scene);
   csg::Preview preview(std::move(scene->tree), std::move(ghosts), scene->relative_precision,
                        execution);

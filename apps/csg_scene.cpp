@@ -26,7 +26,8 @@ bool is_scene(const std::string& path, const CsgCommand& command) {
 
 Result<csg::Scene> load_one(const std::string& path, const CsgCommand& command, Session& session) {
   if (is_scene(path, command)) {
-    const Execution execution = session.execution("reading");
+    const double share = 0.5 / static_cast<double>(command.input.files.size());
+    const Execution execution = session.execution("reading", share);
     return csg::read_scene(path, command.scene, execution);
   }
   csg::Scene scene;

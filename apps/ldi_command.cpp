@@ -32,7 +32,7 @@ Result<void> run_ldi(const LdiCommand& command, Session& session) {
     return fail(grid.error().code, "{}: {}", command.input.files.front(), grid.error().message);
   }
 
-  const Execution execution = session.execution("depth lists");
+  const Execution execution = session.execution("depth lists", 0.8);
   const auto lattice = snap_to_lattice(input->soup, *grid, execution);
   if (!lattice) return tl::unexpected(lattice.error());
   const auto gpu = Gpu::open(command.backend, session);
@@ -54,7 +54,7 @@ Result<void> run_ldi(const LdiCommand& command, Session& session) {
   session.note(fmt::format("{} x {} pixels, {}", image->width, image->height,
                            counted(image->items.size(), "crossing")));
 
-  const Execution writing = session.execution("writing");
+  const Execution writing = session.execution("writing", 1.0);
   if (png) return write_xray_png(command.output, *image);
   return exr ? write_ldi_exr(command.output, *image, {.samples = command.samples}, writing)
              : write_ldi_npz(command.output, *image, {}, writing);

@@ -1,5 +1,6 @@
 #include "apps/mesh_input.h"
 
+#include <algorithm>
 #include <glm/geometric.hpp>
 #include <utility>
 
@@ -133,7 +134,8 @@ Result<MeshFile> read_input(const std::string& path, const InputOptions& input, 
   MeshReadOptions options;
   options.format = input.format;
   options.reader = input.reader;
-  const Execution execution = session.execution("reading");
+  const double share = 0.5 / static_cast<double>(std::max<std::size_t>(input.files.size(), 1));
+  const Execution execution = session.execution("reading", share);
   return read_mesh(path, options, execution);
 }
 

@@ -58,7 +58,7 @@ int Session::threads() const {
   return execution.thread_count();
 }
 
-Execution Session::execution(std::string label) {
+Execution Session::execution(std::string label, double share) {
   if (given_) return *given_;
   Execution result;
   result.threads = options_.threads;
@@ -66,12 +66,13 @@ Execution Session::execution(std::string label) {
   result.memory_limit = memory_limit_;
   const ProgressMode mode = options_.quiet ? ProgressMode::kNone : options_.progress;
   if (mode == ProgressMode::kNone) return result;
-  if (bar_) {
-    bar_->begin(std::move(label));
-  } else {
-    bar_.emplace(std::move(label), mode);
-  }
-  result.progress = bar_->callback();
+  if (!bar_) bar_.emplace(label, mode);
+  bar_->begin(std::move(label), start_);  // the time that is left is judged by all there was
+  if (!bar_->draws()) return result;
+  result.progress = [this, begin = shown_, length = share * (1 - shown_)](double done) {
+    shown_ = std::max(shown_, begin + length * std::clamp(done, 0.0, 1.0));
+    if (bar_) bar_->update(shown_);
+  };
   return result;
 }
 

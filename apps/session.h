@@ -37,8 +37,10 @@ class Session {
   /// Takes the options every command has. Sets a wall against memory beyond the limit.
   void configure(const CommonOptions& options);
 
-  /// For the next phase of the job; `label` is what the progress bar says.
-  [[nodiscard]] Execution execution(std::string label);
+  /// For the next phase of the job; `label` is what the progress bar says. All phases share one
+  /// bar, which never goes back: this one goes on from where the last one was seen, and takes
+  /// `share` of what is left.
+  [[nodiscard]] Execution execution(std::string label, double share = 0.5);
   /// Takes the progress bar away, before a report is printed.
   void end_progress() { bar_.reset(); }
   [[nodiscard]] int threads() const;
@@ -65,6 +67,7 @@ class Session {
   CommonOptions options_;
   std::uint64_t memory_limit_ = 0;
   std::optional<ProgressBar> bar_;
+  double shown_ = 0;  ///< of the bar
   std::vector<Warning> warnings_;
 };
 

@@ -23,23 +23,23 @@ Result<MeshInput> load_united(const InputOptions& input, const MeshInputRules& r
   std::vector<csg::Tree::NodeId> solids;
   for (const std::string& path : input.files) {
     const double start = session.milliseconds();
-    InputOptions one = input;
-    one.files = {path};
-    auto loaded = load_meshes(one, rules, session);
-    if (!loaded) return loaded;
+    TriangleSoup soup;
+    double read_ms = 0;
+    auto facts = load_mesh(path, input, rules, session, soup, &read_ms);
+    if (!facts) return tl::unexpected(facts.error());
     csg::Solid solid;
-    solid.mesh = std::make_shared<const TriangleSoup>(std::move(loaded->soup));
+    solid.mesh = std::make_shared<const TriangleSoup>(std::move(soup));
     solid.rule = rules.rule;
     solid.name = path;
     solids.push_back(tree.add_solid(std::move(solid)));
-    all.closed = all.closed && loaded->closed;
-    all.area += loaded->area;
-    all.volume += loaded->volume;
-    all.bounds.low = glm::min(all.bounds.low, loaded->bounds.low);
-    all.bounds.high = glm::max(all.bounds.high, loaded->bounds.high);
-    all.files.push_back(std::move(loaded->files.front()));
-    all.read_ms += loaded->read_ms;
-    all.diagnose_ms += session.milliseconds() - start - loaded->read_ms;
+    all.closed = all.closed && facts->closed;
+    all.area += facts->area;
+    all.volume += facts->volume;
+    all.bounds.low = glm::min(all.bounds.low, facts->bounds.low);
+    all.bounds.high = glm::max(all.bounds.high, facts->bounds.high);
+    all.files.push_back(*std::move(facts));
+    all.read_ms += read_ms;
+    all.diagnose_ms += session.milliseconds() - start - read_ms;
   }
   tree.set_root(tree.add(csg::Operation::kUnion, solids));
   set_tree(all, tree);

@@ -231,7 +231,7 @@ Result<void> voxelize_and_write(const VoxelizeCommand& command, VoxelizeOutcome&
     options.source = *source;
   }
 
-  Execution execution = session.execution("voxelizing");
+  Execution execution = session.execution("voxelizing", 1.0);
   // The mesh is there already; what the format holds is not the voxelizer's.
   const std::uint64_t taken = outcome.estimate.mesh + outcome.estimate.output;
   execution.memory_limit = std::max<std::uint64_t>(

@@ -302,6 +302,7 @@ Result<MeshFile> ObjReader::read() {
   std::atomic<bool> over = false;  // an appended chunk ended the reading; the rest is not needed
   std::vector<std::unique_ptr<Chunk>> spare, ready(cuts_.size() - 1);
   std::size_t next = 0;
+  ReadWatch watch(input_);
   parallel_for(input_.execution, ready.size(), [&](std::size_t index, int) {
     if (over.load(std::memory_order_relaxed)) return;
     std::unique_ptr<Chunk> chunk;
@@ -322,6 +323,7 @@ Result<MeshFile> ObjReader::read() {
       ready[next]->clear();
       spare.push_back(std::move(ready[next]));
     }
+    (void)watch.at(static_cast<double>(next) / static_cast<double>(ready.size()));
   });
   if (input_.execution.stop.stop_requested()) {
     return fail(ErrorCode::kCancelled, "{}: reading was stopped", input_.name);

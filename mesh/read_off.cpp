@@ -115,6 +115,7 @@ Result<void> OffReader::read_header() {
 
 Result<void> OffReader::read_vertices() {
   reserve_large(mesh_.soup.positions, vertex_count_);
+  ReadWatch watch(input_);
   for (std::uint64_t v = 0; v < vertex_count_; ++v) {
     double value[4] = {0.0, 0.0, 0.0, 1.0};
     for (int i = 0; i < (homogeneous_ ? 4 : 3); ++i) {
@@ -130,6 +131,7 @@ Result<void> OffReader::read_vertices() {
     if (homogeneous_) position /= value[3];
     mesh_.soup.positions.push_back(position);
     skip_line();
+    if (!watch.step(v, p_)) return {};
   }
   return {};
 }
@@ -191,11 +193,16 @@ Result<MeshFile> OffReader::read() {
   reserve_large(mesh_.soup.triangles, face_count_);
   faces_begin_ = p_;
   FanBuilder fans(mesh_);
-  auto faces = read_faces([&](const char*, const std::vector<std::uint32_t>& corners) {
+  ReadWatch watch(input_);
+  std::uint64_t face = 0;
+  auto faces = read_faces([&](const char* place, const std::vector<std::uint32_t>& corners) {
     fans.add(corners.data(), corners.size());
-    return true;
+    return watch.step(face++, place);
   });
   if (!faces) return tl::unexpected(faces.error());
+  if (input_.execution.stop.stop_requested()) {
+    return fail(ErrorCode::kCancelled, "{}: reading was stopped", input_.name);
+  }
   skip_gap();
   if (!at_end()) {
     mesh_.stats.warnings.push_back(fmt::format("{}:{}: what follows the last face is ignored",

@@ -337,6 +337,7 @@ Result<void> PlyReader::read_vertices(Source& source, const Element& element) {
       return {};
     }
   }
+  ReadWatch watch(input_);
   for (std::uint64_t v = 0; v < element.count; ++v) {
     glm::dvec3 position(0.0);
     for (std::size_t i = 0; i < element.properties.size(); ++i) {
@@ -355,6 +356,7 @@ Result<void> PlyReader::read_vertices(Source& source, const Element& element) {
       if (!good) return cut_short(source, element, v);
     }
     positions.push_back(position);
+    if (!watch.step(v, source.position())) return {};
   }
   return {};
 }
@@ -473,10 +475,13 @@ Result<MeshFile> PlyReader::read_body(Source source) {
       faces = &element;
       faces_source = source;
       reserve_large(mesh_.soup.triangles, element.count);
-      done = read_faces(source, element, [&](const char*, std::span<const std::uint32_t> corners) {
+      ReadWatch watch(input_);
+      std::uint64_t face = 0;
+      const auto add = [&](const char* place, std::span<const std::uint32_t> corners) {
         fans.add(corners.data(), corners.size());
-        return true;
-      });
+        return watch.step(face++, place);
+      };
+      done = read_faces(source, element, add);
     } else {
       mesh_.stats.ignored += element.count;
       done = skip_element(source, element);

@@ -65,8 +65,15 @@ Result<MeshFile> read_binary(const ReaderInput& input) {
   soup.triangles.resize(claimed);
   static_assert(sizeof(glm::uvec3) == 3 * sizeof(std::uint32_t));
   auto* const index = &soup.triangles.front().x;  // corner c is component c % 3 of triangle c / 3
+  ReadWatch watch(input);
   const std::size_t different = weld_first<float>(
-      input.execution, corners, [data](std::size_t c) { return binary_corner(data, c); }, index);
+      input.execution, corners, [data](std::size_t c) { return binary_corner(data, c); }, index,
+      [&](std::size_t c) {
+        return watch.at(static_cast<double>(c) / static_cast<double>(corners));
+      });
+  if (input.execution.stop.stop_requested()) {
+    return fail(ErrorCode::kCancelled, "{}: reading was stopped", input.name);
+  }
   reserve_large(soup.positions, different);
   // First occurrences become vertices in the order of the file; what follows looks back to them.
   for (std::size_t c = 0; c < corners; ++c) {
@@ -253,6 +260,7 @@ Result<MeshFile> AsciiReader::read() {
   std::atomic<bool> over = false;
   std::vector<std::unique_ptr<Chunk>> ready(cuts_.size() - 1);
   std::size_t next = 0;
+  ReadWatch watch(input_);
   parallel_for(input_.execution, ready.size(), [&](std::size_t index, int) {
     if (over.load(std::memory_order_relaxed)) return;
     auto chunk = std::make_unique<Chunk>();
@@ -264,6 +272,7 @@ Result<MeshFile> AsciiReader::read() {
       over = over_limit_ || error_offset_ != std::numeric_limits<std::size_t>::max();
       ready[next].reset();
     }
+    (void)watch.at(static_cast<double>(next) / static_cast<double>(ready.size()));
   });
   if (input_.execution.stop.stop_requested()) {
     return fail(ErrorCode::kCancelled, "{}: reading was stopped", input_.name);

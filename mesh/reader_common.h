@@ -6,6 +6,7 @@
 #include <functional>
 #include <string>
 #include <string_view>
+#include <thread>
 #include <vector>
 
 #include "mesh/read_mesh.h"
@@ -24,6 +25,35 @@ struct ReaderInput {
   const std::string& name;
   const MeshReadOptions& options;
   const Execution& execution;
+};
+
+/// Tells how far a reader is, and whether it shall go on. Of the thread that made it: others may
+/// ask, and are not told on.
+class ReadWatch {
+ public:
+  explicit ReadWatch(const ReaderInput& input)
+      : input_(input), thread_(std::this_thread::get_id()) {}
+
+  /// @param done  share of the file, in [0, 1]. @return false once a stop is requested
+  bool at(double done) {
+    constexpr double kOfAll = 0.9;  // the rest is finish_mesh()
+    if (input_.execution.progress && std::this_thread::get_id() == thread_ && done >= told_) {
+      told_ = done;
+      input_.execution.progress(kOfAll * done);
+    }
+    return !input_.execution.stop.stop_requested();
+  }
+  /// The same for loops: looks up every 2^14th time. @param place  in the text
+  bool step(std::uint64_t index, const char* place) {
+    constexpr std::uint64_t kRarely = (1 << 14) - 1;
+    return (index & kRarely) != kRarely || at(static_cast<double>(place - input_.text.data()) /
+                                              static_cast<double>(input_.text.size()));
+  }
+
+ private:
+  const ReaderInput& input_;
+  std::thread::id thread_;
+  double told_ = 0;  // of that thread
 };
 
 /// Everything a file says, unchecked: indices may be out of range, coordinates not finite.

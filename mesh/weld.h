@@ -97,12 +97,16 @@ class WeldTable {
 /// For every i in [0, count): first[i] = the least j whose position equals that of i. Each thread
 /// owns the positions whose hash falls to it, so the result does not depend on their number.
 /// @param load  load(i) -> glm::vec<3, Scalar> @pre count < 2^32 - 1
+/// @param go_on  asked by all threads now and then, with i; once it says false, `first` is not
+/// filled
 /// @return number of different positions
-template <class Scalar, class Load>
-std::size_t weld_first(const Execution& execution, std::size_t count, Load&& load,
-                       std::uint32_t* first) {
+template <class Scalar, class Load, class GoOn = bool (*)(std::size_t)>
+std::size_t weld_first(
+    const Execution& execution, std::size_t count, Load&& load, std::uint32_t* first,
+    GoOn&& go_on = [](std::size_t) { return true; }) {
   using Table = WeldTable<Scalar>;
   constexpr std::size_t kBatch = 32;  // look-ups in flight, to overlap their cache misses
+  constexpr std::size_t kLookUp = std::size_t{1} << 16;
   const std::size_t parts = count < 50000 ? 1 : static_cast<std::size_t>(execution.thread_count());
   std::vector<std::size_t> different(parts);
   Execution all = execution;
@@ -113,6 +117,7 @@ std::size_t weld_first(const Execution& execution, std::size_t count, Load&& loa
     std::uint64_t hashes[kBatch];
     std::uint32_t indices[kBatch];
     for (std::size_t begin = 0; begin < count; begin += kBatch) {
+      if (begin % kLookUp == 0 && !go_on(begin)) return;
       const std::size_t end = std::min(count, begin + kBatch);
       std::size_t held = 0;
       for (std::size_t i = begin; i < end; ++i) {

@@ -150,7 +150,7 @@ Result<void> run(const Words& words, Session& session) {
     other = *std::move(loaded);
   }
   if (auto strict = session.check_strict(); !strict) return strict;
-  const Execution execution = session.execution("verifying");
+  const Execution execution = session.execution("verifying", 1.0);
   const auto found =
       verify(scene->tree, other ? other->tree : scene->tree, words.options, execution);
   session.end_progress();

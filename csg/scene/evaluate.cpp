@@ -140,7 +140,7 @@ void Evaluator::walk(std::uint32_t first, std::uint32_t end) {
         error_ = {ErrorCode::kCancelled, "stopped"};
         break;
       }
-      if (execution_.progress && (node & 1023u) == 0) {
+      if (execution_.progress) {
         execution_.progress(static_cast<double>(node - first) / (end - first));
       }
     }

@@ -237,6 +237,30 @@ TEST_F(Voxelize, AProgressBarTakesItselfAway) {
   EXPECT_EQ(place.run({"voxelize", "ball.obj", "-r", "64", "-o", "b.vdb"}).err, "");
 }
 
+// Reading, drawing and all the rest are shares of one bar.
+TEST_F(Voxelize, TheProgressBarNeverGoesBack) {
+  put("a.obj", make_icosphere(1.0, 6));
+  put("b.obj", make_icosphere(0.9, 6));
+  std::string scene;
+  for (int i = 0; i < 400; ++i) scene += "sphere($fn = 16, r = " + std::to_string(i + 1) + ");\n";
+  place.write("many.csg", scene);
+  for (const std::vector<std::string>& files :
+       std::vector<std::vector<std::string>>{{"a.obj", "b.obj"}, {"many.csg"}}) {
+    std::vector<std::string> arguments = {"voxelize",   "-r",  "300", "-o", "a.vdb",
+                                          "--progress", "bar", "-j",  "1"};
+    arguments.insert(arguments.begin() + 1, files.begin(), files.end());
+    const RunResult run = place.run(arguments);
+    EXPECT_NE(run.err.find("reading"), std::string::npos);
+    EXPECT_NE(run.err.find("voxelizing"), std::string::npos);
+    std::vector<int> shown;
+    for (std::size_t at = 0; (at = run.err.find(" %", at)) != std::string::npos; ++at) {
+      shown.push_back(std::stoi(run.err.substr(at - 3, 3)));
+    }
+    EXPECT_GE(shown.size(), 2u) << run.err;
+    EXPECT_TRUE(std::is_sorted(shown.begin(), shown.end())) << run.err;
+  }
+}
+
 TEST_F(Voxelize, QuietHidesWarningsAndVerboseSaysMore) {
   put("plate.obj", make_box({0, 0, 0}, {8, 8, 0.1}));
   const std::vector<std::string> base = {"voxelize", "plate.obj", "-r", "8", "-o", "a.vdb"};
