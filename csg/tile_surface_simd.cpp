@@ -179,7 +179,11 @@ void NormalizeLayers(LeafLayers& leaf, bool all_special, TileFinder& finder) {
       }
       before = hn::Add(leave_depth, one);
     }
-    if (all_special) special = hn::Ne(hn::Load(d, leaf.keys[0] + at), empty);
+    if (all_special) {  // of a convex solid there may be an exit alone
+      for (std::size_t k = 0; k < std::min<std::size_t>(layers, 2); ++k) {
+        special = hn::Or(special, hn::Ne(hn::Load(d, leaf.keys[k] + at), empty));
+      }
+    }
     M any = no_lane(d);
     for (std::size_t k = 0; k < layers; ++k) {
       const V key = hn::Load(d, leaf.keys[k] + at);

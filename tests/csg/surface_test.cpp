@@ -133,6 +133,32 @@ TEST(VisibleSurface, IsTheOneOfTheFullListsWithTheEyeInTheScene) {
   }
 }
 
+TEST(VisibleSurface, OfSolidsAroundTheEyeIsTheirFarSides) {
+  for (int seed = 0; seed < 40; ++seed) {
+    RandomTree random(static_cast<std::uint64_t>(seed) + 700);
+    Tree tree;
+    const glm::dvec3 half(random.real(3, 6), random.real(3, 6), random.real(3, 6));
+    Tree::NodeId root = tree.add_solid({std::make_shared<TriangleSoup>(make_box(-half, half))});
+    if (seed % 2 == 1) {  // a room
+      const glm::dvec3 inner = half * random.real(0.5, 0.9);
+      root = tree.add(
+          Operation::kDifference,
+          {root, tree.add_solid({std::make_shared<TriangleSoup>(make_box(-inner, inner))})});
+    }
+    tree.set_root(root);
+    Camera camera = look_at({random.real(-1, 1), random.real(-1, 1), random.real(-1, 1)},
+                            {random.real(-6, 6), random.real(-6, 6), random.real(-6, 6)});
+    camera.field_of_view = 60;
+    const std::string what = "seed " + std::to_string(seed);
+    expect_same(tree, camera, {90, 70}, what);
+    Preview preview(tree, {}, 0.0);
+    const auto image = preview.draw(make_view(camera, {90, 70}, preview.box()).value());
+    ASSERT_TRUE(image.has_value());
+    const auto& depths = (*image)->depth;
+    EXPECT_EQ(std::count(depths.begin(), depths.end(), SurfaceImage::kNone), 0) << what;
+  }
+}
+
 TEST(VisibleSurface, AMovedSolidGivesTheSameAsAFreshPicture) {
   for (int seed = 0; seed < 40; ++seed) {
     RandomTree random(static_cast<std::uint64_t>(seed) + 900);
