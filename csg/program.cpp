@@ -90,11 +90,17 @@ Program compile(const Tree& tree, Tree::NodeId root) {
 }
 
 ProgramState::ProgramState(const Program& program)
-    : program_(&program),
-      counts_(program.nodes.size()),
-      inside_(program.leaves.size(), 0),
-      value_(program.idle_value()) {
-  for (std::size_t i = 0; i < counts_.size(); ++i) counts_[i] = program.nodes[i].idle_true;
+    : program_(&program), idle_counts_(program.nodes.size()), inside_(program.leaves.size()) {
+  for (std::size_t i = 0; i < idle_counts_.size(); ++i) {
+    idle_counts_[i] = program.nodes[i].idle_true;
+  }
+  reset();
+}
+
+void ProgramState::reset() {
+  counts_ = idle_counts_;
+  std::fill(inside_.begin(), inside_.end(), std::uint8_t{0});
+  value_ = program_->idle_value();
 }
 
 bool ProgramState::supports(std::uint32_t solid) const {

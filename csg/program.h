@@ -64,6 +64,8 @@ class ProgramState {
  public:
   explicit ProgramState(const Program& program);
 
+  /// Every solid outside again. O(nodes + solids), in words.
+  void reset();
   /// Turns a solid's bit around.
   void flip(std::uint32_t solid) {
     inside_[solid] ^= 1;
@@ -90,9 +92,9 @@ class ProgramState {
 
  private:
   const Program* program_;
-  std::vector<std::uint32_t> counts_;
+  std::vector<std::uint32_t> idle_counts_, counts_;
   std::vector<std::uint8_t> inside_;
-  bool value_;
+  bool value_ = false;
 };
 
 }  // namespace strata::csg

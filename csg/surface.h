@@ -94,6 +94,8 @@ class SurfaceFinder {
   [[nodiscard]] static Surface surface_of(const Flip& flip, std::uint32_t depth) {
     return {depth, flip.solid, flip.triangle, flip.exit};
   }
+  /// By depth, then solid.
+  void sort(std::vector<Flip>& flips);
   /// Applies all flips at the depth of flips[at]; gives the index after them.
   std::size_t apply(const std::vector<Flip>& flips, std::size_t at) {
     const std::uint32_t depth = flips[at].depth;
@@ -117,13 +119,13 @@ class SurfaceFinder {
   }
 
   ProgramState state_;
+  std::vector<std::uint64_t> order_, other_order_;  ///< [depth:32 | index:32]
+  std::vector<Flip> sorted_;
 };
 
 template <class Bound>
 Surface SurfaceFinder::find(std::vector<Flip>& flips, Bound&& bound) {
-  std::sort(flips.begin(), flips.end(), [](const Flip& a, const Flip& b) {
-    return a.depth != b.depth ? a.depth < b.depth : a.solid < b.solid;
-  });
+  sort(flips);
   Surface found;
   std::size_t at = 0;
   // Of the flips that the tree's value rests on.
@@ -211,7 +213,12 @@ Surface SurfaceFinder::find(std::vector<Flip>& flips, Bound&& bound) {
     at = settled;
     break;
   }
-  undo(flips, 0, at);
+  // Copying the state is a sixteenth of a flip's work for each solid and node.
+  if (at * 16 > state_.program().nodes.size() + state_.program().leaves.size()) {
+    state_.reset();
+  } else {
+    undo(flips, 0, at);
+  }
   return found;
 }
 
