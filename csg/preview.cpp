@@ -225,16 +225,10 @@ struct Preview::Impl {
         opaque_root(take_translucent(tree, translucent)),
         geometry(tree, execution),
         program(compile(tree, opaque_root)),
-        error(world_error(geometry, relative_precision)),
+        error(geometry.world_error(tree, relative_precision)),
         frame(program, geometry, error),
         painter(tree, with_ghosts(given), geometry, error) {}
 
-  static double world_error(const Geometry& geometry, double relative_precision) {
-    const Bounds& box = geometry.box();
-    if (box.empty()) return 0;
-    const glm::dvec3 reach = glm::max(glm::abs(box.low), glm::abs(box.high));
-    return relative_precision * glm::length(reach);
-  }
   std::span<const Translucent> with_ghosts(std::span<const Ghost> given) {
     for (const Ghost& ghost : given) translucent.push_back({ghost.node, ghost.colour});
     return translucent;

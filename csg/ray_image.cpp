@@ -115,11 +115,9 @@ class RayWalk {
 
 struct RayMeter::Impl {
   Impl(const Tree& tree, Tree::NodeId root, double relative_precision, const Execution& execution)
-      : geometry(tree, execution), program(compile(tree, root)) {
-    const Bounds& box = geometry.box();
-    if (box.empty()) return;
-    world_error = relative_precision * glm::length(glm::max(glm::abs(box.low), glm::abs(box.high)));
-  }
+      : geometry(tree, execution),
+        program(compile(tree, root)),
+        world_error(geometry.world_error(tree, relative_precision)) {}
 
   [[nodiscard]] Result<Lists> lists(const View& view, const Execution& execution) const {
     const auto& parts = geometry.parts();

@@ -36,12 +36,18 @@ Bounds bounds(const Solid& solid) {
 }
 
 Bounds bounds(const Tree& tree, Tree::NodeId node) {
+  std::vector<Bounds> solids;
+  for (const Solid& solid : tree.solids()) solids.push_back(bounds(solid));
+  return bounds(tree, node, solids);
+}
+
+Bounds bounds(const Tree& tree, Tree::NodeId node, std::span<const Bounds> solids) {
   if (node == Tree::kNone) return {};
   std::vector<Bounds> boxes(node + 1);  // operands stand before the nodes that take them
   for (Tree::NodeId id = 0; id <= node; ++id) {
     const Tree::Node& at = tree.nodes()[id];
     if (at.operation == Operation::kSolid) {
-      boxes[id] = bounds(tree.solids()[at.first]);
+      boxes[id] = solids[at.first];
       continue;
     }
     const auto operands = tree.operands(id);

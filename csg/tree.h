@@ -72,5 +72,7 @@ class Tree {
 /// A box that the result of `node` lies in: union of the operands' for a union, intersection for an
 /// intersection, the first operand's for a difference.
 [[nodiscard]] Bounds bounds(const Tree& tree, Tree::NodeId node);
+/// The same from the boxes of the tree's solids.
+[[nodiscard]] Bounds bounds(const Tree& tree, Tree::NodeId node, std::span<const Bounds> solids);
 
 }  // namespace strata::csg

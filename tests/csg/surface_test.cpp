@@ -38,8 +38,7 @@ std::vector<Pixel> by_full_lists(const Tree& tree, const View& view, double rela
 
   const Program program = compile(tree, tree.root());
   SurfaceFinder finder(program);
-  const glm::dvec3 reach = glm::max(glm::abs(geometry.box().low), glm::abs(geometry.box().high));
-  const Coincidence coincidence(view, relative_precision * glm::length(reach));
+  const Coincidence coincidence(view, geometry.world_error(tree, relative_precision));
   std::vector<Pixel> result;
   for (int v = 0; v < view.size.y; ++v) {
     for (int u = 0; u < view.size.x; ++u) {
