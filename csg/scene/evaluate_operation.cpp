@@ -170,13 +170,23 @@ void Evaluator::minkowski(Frame& frame) {
   add_sum(frame, sum, sources);
 }
 
-/// The convex parts as one mesh that overlaps itself, the others as nodes.
+/// The parts as solids that are united. Where there are very many convex ones, they are one mesh
+/// that overlaps itself; its pieces share edges, which readers of meshes take for faults.
 void Evaluator::add_sum(const Frame& frame, std::span<const MinkowskiPart> sum,
                         std::span<const Tree::NodeId> sources) {
+  constexpr std::ptrdiff_t kMostSolids = 4096;
+  const bool apart = std::count_if(sum.begin(), sum.end(),
+                                   [](const auto& part) { return part.convex(); }) <= kMostSolids;
   TriangleSoup all;
   for (const MinkowskiPart& part : sum) {
     if (part.convex()) {
-      if (auto hull = convex_hull(part.hull)) append(all, *hull);
+      auto hull = convex_hull(part.hull);
+      if (!hull) continue;
+      if (apart) {
+        add_solid(frame.node, frame.outside, *std::move(hull));
+      } else {
+        append(all, *hull);
+      }
       continue;
     }
     const glm::dmat4 world = frame.outside.world * glm::translate(glm::dmat4(1.0), part.offset);

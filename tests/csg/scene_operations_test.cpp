@@ -1,7 +1,12 @@
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <initializer_list>
+#include <map>
 #include <random>
 #include <string>
+#include <utility>
 
 #include "csg/scene/hull.h"
 #include "mesh/diagnose.h"
@@ -178,6 +183,37 @@ TEST(Minkowski, OfSeparatePiecesTakesEach) {
   EXPECT_NEAR(volume_of("minkowski() { group() { " + pair + " } cube([1,1,1]); }"), 16.0, 1e-6);
   const std::string far = "difference() { cube([11,1,1]); " + moved(1, -1, -1) + "cube([9,3,3]); }";
   EXPECT_NEAR(volume_of("minkowski() { " + far + far + " }"), 8.0 * 3, 1e-3);
+}
+
+/// Whether every edge has two faces, vertices being the same where their positions are.
+bool is_manifold(const TriangleSoup& mesh) {
+  using Point = std::array<double, 3>;
+  std::map<std::pair<Point, Point>, int> faces;
+  for (const glm::uvec3& t : mesh.triangles) {
+    for (int i = 0; i < 3; ++i) {
+      const glm::dvec3 p = mesh.positions[t[i]], q = mesh.positions[t[(i + 1) % 3]];
+      ++faces[std::minmax(Point{p.x, p.y, p.z}, Point{q.x, q.y, q.z})];
+    }
+  }
+  return std::all_of(faces.begin(), faces.end(), [](const auto& edge) { return edge.second == 2; });
+}
+
+TEST(Minkowski, OfConcaveOperandsIsAUnionOfClosedSolids) {
+  for (const std::string& text :
+       std::initializer_list<std::string>{"minkowski() { difference() { cube([6,6,6]); "
+                                          "cube([2,2,20],center=true); } cube([1,1,1]); }",
+                                          "minkowski() { difference() { cube(6); " +
+                                              moved(2, 2, 2) + "cube(6); } sphere(r=1,$fn=6); }"}) {
+    const Scene scene = scene_of(text);
+    EXPECT_GT(scene.tree.solids().size(), 2u);
+    for (const Solid& solid : scene.tree.solids()) {
+      EXPECT_TRUE(is_manifold(*solid.mesh)) << solid.mesh->triangles.size();
+    }
+  }
+  // As OpenSCAD has it.
+  EXPECT_NEAR(volume_of("minkowski() { difference() { cube(6); " + moved(2, 2, 2) +
+                        "cube(6); } sphere(r=1,$fn=6); }"),
+              393.5425, 1e-3);
 }
 
 TEST(Minkowski, ResultsAreMovedAndColouredAsWhole) {
