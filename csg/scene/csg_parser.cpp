@@ -423,6 +423,42 @@ std::string ValueRef::string(std::string_view otherwise) const {
   return std::string(is_string() ? std::string_view(ast_->strings[value().end]) : otherwise);
 }
 
+std::string ValueRef::shown() const {
+  constexpr std::size_t kMost = 60;
+  if (!ast_) return "undef";
+  std::string text;
+  std::vector<std::uint32_t> ends;  // of the lists that are open
+  const auto close = [&](std::uint32_t at) {
+    for (; !ends.empty() && ends.back() == at; ends.pop_back()) text += ']';
+  };
+  const std::uint32_t last = is_list() ? value().end : index_ + 1;
+  for (std::uint32_t at = index_; at < last; ++at) {
+    if (text.size() > kMost) return text + " ...";
+    if (at > index_ && text.back() != '[') text += ", ";
+    const AstValue& one = ast_->values[at];
+    switch (one.kind) {
+      case ValueKind::kUndef:
+        text += "undef";
+        break;
+      case ValueKind::kBool:
+        text += one.number != 0.0 ? "true" : "false";
+        break;
+      case ValueKind::kNumber:
+        text += std::isnan(one.number) ? "nan" : fmt::format("{:g}", one.number);
+        break;
+      case ValueKind::kString:
+        text += fmt::format("\"{}\"", std::string_view(ast_->strings[one.end]).substr(0, kMost));
+        break;
+      case ValueKind::kList:
+        text += '[';
+        ends.push_back(one.end);
+        break;
+    }
+    close(at + 1);
+  }
+  return text;
+}
+
 ValueRef::Iterator& ValueRef::Iterator::operator++() {
   const AstValue& value = ast_->values[index_];
   index_ = value.kind == ValueKind::kList ? value.end : index_ + 1;

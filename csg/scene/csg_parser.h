@@ -85,6 +85,9 @@ class ValueRef {
   [[nodiscard]] Iterator begin() const { return {ast_, is_list() ? index_ + 1 : 0}; }
   [[nodiscard]] Iterator end() const { return {ast_, is_list() ? value().end : 0}; }
 
+  /// How it is written, shortened to some 60 characters; for messages.
+  [[nodiscard]] std::string shown() const;
+
   /// Reads numbers into out[0..count) until the list ends or an element is no number.
   /// @return how many were read
   std::size_t numbers(double* out, std::size_t count) const;

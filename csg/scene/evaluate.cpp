@@ -63,23 +63,29 @@ bool is_newer_dialect(const Ast& ast) {
 }
 
 /// The argument of multmatrix; what is missing is the identity's.
-glm::dmat4 read_matrix(const ValueRef& value) {
+/// @param fault  becomes what is no number or not finite, if anything is
+glm::dmat4 read_matrix(const ValueRef& value, std::string& fault) {
   glm::dmat4 matrix(1.0);
   int row = 0;
+  if (value.given() && !value.is_list()) fault = value.shown();
   for (const ValueRef line : value) {
     if (row == 4) break;
-    double numbers[4];
-    const std::size_t count = line.numbers(numbers, 4);
-    for (std::size_t column = 0; column < count; ++column) {
-      matrix[static_cast<int>(column)][row] = numbers[column];
+    int column = 0;
+    for (const ValueRef element : line) {
+      if (column == 4) break;
+      double& entry = matrix[column++][row];
+      entry = element.number(entry);
+      if (fault.empty() && (!element.is_number() || !std::isfinite(entry))) {
+        fault = fmt::format("{} in row {}, column {}", element.shown(), row + 1, column);
+      }
     }
     ++row;
   }
   // Homogeneous coordinates are scaled back; perspective is left out, as in OpenSCAD.
   const double w = matrix[3][3];
-  if (w != 1.0 && w != 0.0) matrix *= 1.0 / w;
+  if (w != 1.0 && w != 0.0 && std::isfinite(w)) matrix *= 1.0 / w;
   matrix[0][3] = matrix[1][3] = matrix[2][3] = 0.0;
-  matrix[3][3] = 1.0;
+  if (std::isfinite(w)) matrix[3][3] = 1.0;
   return matrix;
 }
 
@@ -201,11 +207,15 @@ void Evaluator::enter(std::uint32_t node) {
 
 /// @return whether the subtree stays
 bool Evaluator::enter_transform(Frame& frame) {
-  const glm::dmat4 matrix = read_matrix(arguments(frame.node).find("m", 0));
-  if (!is_finite(matrix)) {
-    warn(frame.node, "geometry", "the matrix has numbers that are not finite; left out");
-    return false;
+  std::string fault;
+  const glm::dmat4 matrix = read_matrix(arguments(frame.node).find("m", 0), fault);
+  const bool stays = is_finite(matrix);
+  if (!fault.empty() || !stays) {
+    warn(frame.node, "geometry",
+         fmt::format("the matrix has {}; {}", fault.empty() ? "numbers beyond all limits" : fault,
+                     stays ? "the identity's is taken" : "what it moves is left out"));
   }
+  if (!stays) return false;
   Context& inside = frame.inside;
   inside.world = inside.world * matrix;
   const glm::dmat3 plane(matrix[0].x, matrix[0].y, 0.0, matrix[1].x, matrix[1].y, 0.0, matrix[3].x,

@@ -108,13 +108,13 @@ void Evaluator::import(std::uint32_t node, const Context& context) {
 Outline Evaluator::import_outline(std::uint32_t node, const std::string& path) {
   const NodeArguments given = arguments(node);
   OutlineImport options;
-  options.layer = given.find("layer").string();
+  options.layer = given.find("layer", 1).string();
   if (const std::string id = given.find("id").string(); !id.empty()) options.layer = id;
   double origin[2] = {0.0, 0.0};
-  given.find("origin").numbers(origin, 2);
+  given.find("origin", 3).numbers(origin, 2);
   options.origin = {origin[0], origin[1]};
-  options.scale = given.number("scale", options.scale);
-  options.dpi = given.number("dpi", options.dpi);
+  options.scale = number(node, "scale", given.find("scale", 4), options.scale);
+  options.dpi = number(node, "dpi", options.dpi);
   options.centre = given.truth("center", false);
   options.segments = segments(node);
   auto outline = read_outline(path, options);

@@ -12,34 +12,51 @@ namespace {
 /// More would be a typing mistake, and gigabytes.
 constexpr double kMostTriangles = 100e6;
 
-/// A number, or a list of them; one number stands for all.
-template <int N>
-glm::vec<N, double> read_vector(const ValueRef& value, double otherwise) {
-  glm::vec<N, double> result(value.number(otherwise));
-  if (value.is_list()) {
-    double numbers[N];
-    for (double& number : numbers) number = otherwise;
-    value.numbers(numbers, N);
-    for (int i = 0; i < N; ++i) result[i] = numbers[i];
-  }
-  return result;
-}
+/// No argument stands there.
+constexpr auto kNamedOnly = std::numeric_limits<std::uint32_t>::max();
 
-/// A radius by `r`, or half the diameter by `d`.
-double read_radius(const NodeArguments& given, std::string_view radius, std::string_view diameter,
-                   double otherwise) {
-  if (const ValueRef value = given.find(diameter); value.is_number()) {
-    return 0.5 * value.number(0.0);
-  }
-  return given.find(radius).number(otherwise);
-}
+/// Reads indices of points as OpenSCAD does, and says what is wrong with them.
+class IndexReader {
+ public:
+  /// @param list  what the indices make: "face"
+  IndexReader(std::string_view list, std::size_t points) : list_(list), points_(points) {}
 
-/// An index as OpenSCAD reads it; none if it is not one.
-std::optional<std::uint32_t> read_index(const ValueRef& value) {
-  const double number = value.number(-1.0);
-  if (!(number >= 0.0 && number < 4294967295.0)) return std::nullopt;
-  return static_cast<std::uint32_t>(number);
-}
+  /// @param at  which list it stands in
+  void read(const ValueRef& value, std::size_t at, std::vector<std::uint32_t>& indices) {
+    const double number = value.number(-1.0);
+    const bool there = number >= 0.0 && number < static_cast<double>(points_);
+    if (there) indices.push_back(static_cast<std::uint32_t>(number));
+    if (there && number == std::floor(number)) return;
+    Fault& fault = there ? broken_ : out_of_range_;
+    if (fault.count++ == 0) fault.first = fmt::format("{} in {} {}", value.shown(), list_, at);
+  }
+  /// A sentence for each kind of fault.
+  [[nodiscard]] std::vector<std::string> faults() const {
+    std::vector<std::string> texts;
+    if (out_of_range_.count > 0) {
+      texts.push_back(
+          fmt::format("{} corners of {}s are no indices of the {} points, the first is "
+                      "{}; they are left out",
+                      out_of_range_.count, list_, points_, out_of_range_.first));
+    }
+    if (broken_.count > 0) {
+      texts.push_back(
+          fmt::format("{} corners of {}s are no whole numbers, the first is {}; they "
+                      "are rounded down",
+                      broken_.count, list_, broken_.first));
+    }
+    return texts;
+  }
+
+ private:
+  struct Fault {
+    std::uint64_t count = 0;
+    std::string first;
+  };
+  std::string_view list_;
+  std::size_t points_;
+  Fault out_of_range_, broken_;
+};
 
 }  // namespace
 
@@ -67,17 +84,20 @@ std::shared_ptr<const TriangleSoup> Evaluator::primitive(std::uint32_t node,
 }
 
 void Evaluator::cube(std::uint32_t node, const Context& context) {
-  const NodeArguments given = arguments(node);
-  const glm::dvec3 size = read_vector<3>(given.find("size", 0), 1.0);
-  const bool centre = given.find("center", 1).truth(false);
+  glm::dvec3 size;
+  read_sizes(node, std::span(&size.x, 3));
+  for (int i = 0; i < 3; ++i) {
+    if (!is_length(node, "a size", size[i])) return;
+  }
+  const bool centre = arguments(node).find("center", 1).truth(false);
   add_solid(node, context, primitive(node, {size.x, size.y, size.z, double(centre)}, [&] {
               return make_cube(size, centre);
             }));
 }
 
 void Evaluator::sphere(std::uint32_t node, const Context& context) {
-  const NodeArguments given = arguments(node);
-  const double radius = read_radius(given, "r", "d", given.find("", 0).number(1.0));
+  const double radius = this->radius(node, "r", "d", 0, 1.0);
+  if (!is_length(node, "the radius", radius)) return;
   const Segments round = segments(node);
   if (sphere_triangle_count(radius, round) > kMostTriangles) {
     return stop(
@@ -92,11 +112,15 @@ void Evaluator::sphere(std::uint32_t node, const Context& context) {
 
 void Evaluator::cylinder(std::uint32_t node, const Context& context) {
   const NodeArguments given = arguments(node);
-  const double height = given.find("h", 0).number(1.0);
-  const double both = read_radius(given, "r", "d", 1.0);
-  const double radius1 = read_radius(given, "r1", "d1", both);
-  const double radius2 = read_radius(given, "r2", "d2", both);
-  const bool centre = given.truth("center", false);
+  const double height = number(node, "h", given.find("h", 0), 1.0);
+  const double both = radius(node, "r", "d", kNamedOnly, 1.0);
+  const double radius1 = radius(node, "r1", "d1", 1, both);
+  const double radius2 = radius(node, "r2", "d2", 2, both);
+  if (!is_length(node, "the height", height) || !is_length(node, "the radius r1", radius1) ||
+      !is_length(node, "the radius r2", radius2)) {
+    return;
+  }
+  const bool centre = given.find("center", 3).truth(false);
   const Segments round = segments(node);
   const int count = round.count(std::max(radius1, radius2));
   add_solid(node, context,
@@ -112,33 +136,22 @@ void Evaluator::polyhedron(std::uint32_t node, const Context& context) {
     if (point.numbers(p, 3) < 3 || !std::isfinite(p[0]) || !std::isfinite(p[1]) ||
         !std::isfinite(p[2])) {
       return warn(node, "geometry",
-                  fmt::format("point {} of the polyhedron is not three finite numbers; the "
+                  fmt::format("point {} of the polyhedron is {}, not three finite numbers; the "
                               "polyhedron is left out",
-                              points.size()));
+                              points.size(), point.shown()));
     }
     points.emplace_back(p[0], p[1], p[2]);
   }
   ValueRef list = given.find("faces", 1);
   if (!list.given()) list = given.find("triangles");
   std::vector<std::vector<std::uint32_t>> faces;
-  std::uint64_t out_of_range = 0;
+  IndexReader reader("face", points.size());
   for (const ValueRef face : list) {
     std::vector<std::uint32_t>& corners = faces.emplace_back();
-    for (const ValueRef corner : face) {
-      const auto index = read_index(corner);
-      if (index && *index < points.size()) {
-        corners.push_back(*index);
-      } else {
-        ++out_of_range;
-      }
-    }
+    for (const ValueRef corner : face) reader.read(corner, faces.size() - 1, corners);
     std::reverse(corners.begin(), corners.end());  // clockwise seen from outside in the file
   }
-  if (out_of_range > 0) {
-    warn(node, "geometry",
-         fmt::format("{} corners of faces are no indices of the {} points; they are left out",
-                     out_of_range, points.size()));
-  }
+  for (const std::string& text : reader.faults()) warn(node, "geometry", text);
   TriangleSoup mesh = make_faces(std::move(points), faces);
   if (mesh.triangles.empty()) return;
   const InsideRule rule = inspect(node, mesh);
@@ -146,16 +159,15 @@ void Evaluator::polyhedron(std::uint32_t node, const Context& context) {
 }
 
 void Evaluator::square(std::uint32_t node, const Context& context) {
-  const NodeArguments given = arguments(node);
-  const glm::dvec2 size = read_vector<2>(given.find("size", 0), 1.0);
-  if (!(size.x > 0.0 && size.y > 0.0) || !std::isfinite(size.x) || !std::isfinite(size.y)) return;
-  add_outline(node, context, make_square(size, given.find("center", 1).truth(false)));
+  glm::dvec2 size;
+  read_sizes(node, std::span(&size.x, 2));
+  if (!is_length(node, "a size", size.x) || !is_length(node, "a size", size.y)) return;
+  add_outline(node, context, make_square(size, arguments(node).find("center", 1).truth(false)));
 }
 
 void Evaluator::circle(std::uint32_t node, const Context& context) {
-  const NodeArguments given = arguments(node);
-  const double radius = read_radius(given, "r", "d", given.find("", 0).number(1.0));
-  if (!(radius > 0.0) || !std::isfinite(radius)) return;
+  const double radius = this->radius(node, "r", "d", 0, 1.0);
+  if (!is_length(node, "the radius", radius)) return;
   add_outline(node, context, make_circle(radius, segments(node)));
 }
 
@@ -166,37 +178,25 @@ void Evaluator::polygon(std::uint32_t node, const Context& context) {
     double p[2];
     if (point.numbers(p, 2) < 2 || !std::isfinite(p[0]) || !std::isfinite(p[1])) {
       return warn(node, "geometry",
-                  fmt::format("point {} of the polygon is not two finite numbers; the polygon is "
-                              "left out",
-                              points.size()));
+                  fmt::format("point {} of the polygon is {}, not two finite numbers; the polygon "
+                              "is left out",
+                              points.size(), point.shown()));
     }
     points.emplace_back(p[0], p[1]);
   }
   std::vector<std::vector<std::uint32_t>> paths;
-  std::uint64_t out_of_range = 0;
-  const auto add_corner = [&](std::vector<std::uint32_t>& path, const ValueRef& corner) {
-    const auto index = read_index(corner);
-    if (index && *index < points.size()) {
-      path.push_back(*index);
-    } else {
-      ++out_of_range;
-    }
-  };
+  IndexReader reader("path", points.size());
   std::vector<std::uint32_t> flat_path;  // `paths = [0, 1, 2]`: one path without its brackets
   for (const ValueRef path : given.find("paths", 1)) {
     if (!path.is_list()) {
-      add_corner(flat_path, path);
+      reader.read(path, 0, flat_path);
       continue;
     }
     std::vector<std::uint32_t>& corners = paths.emplace_back();
-    for (const ValueRef corner : path) add_corner(corners, corner);
+    for (const ValueRef corner : path) reader.read(corner, paths.size() - 1, corners);
   }
   if (!flat_path.empty()) paths.push_back(std::move(flat_path));
-  if (out_of_range > 0) {
-    warn(node, "geometry",
-         fmt::format("{} corners of paths are no indices of the {} points; they are left out",
-                     out_of_range, points.size()));
-  }
+  for (const std::string& text : reader.faults()) warn(node, "geometry", text);
   auto outline = make_polygon(points, paths);
   if (!outline) {
     return warn(node, "geometry",
@@ -210,9 +210,9 @@ void Evaluator::text(std::uint32_t node, const Context& context) {
   TextOptions options;
   options.text = given.find("text", 0).string();
   if (options.text.empty()) return;
-  options.size = given.find("size", 1).number(options.size);
+  options.size = number(node, "size", given.find("size", 1), options.size);
   options.font = given.find("font", 2).string();
-  options.spacing = given.number("spacing", options.spacing);
+  options.spacing = number(node, "spacing", options.spacing);
   options.direction = given.find("direction").string();
   options.language = given.find("language").string();
   options.script = given.find("script").string();
@@ -239,7 +239,8 @@ void Evaluator::surface(std::uint32_t node, const Context& context) {
   if (file.empty()) return;
   const auto path = asset(node, file);
   if (!path) return;
-  auto mesh = read_surface(*path, given.truth("center", false), given.truth("invert", false));
+  auto mesh =
+      read_surface(*path, given.find("center", 1).truth(false), given.truth("invert", false));
   if (!mesh) {
     return mesh.error().code == ErrorCode::kLimit
                ? stop(mesh.error().code, node, mesh.error().message)

@@ -208,7 +208,7 @@ void Evaluator::add_sum(const Frame& frame, std::span<const MinkowskiPart> sum,
 void Evaluator::resize(Frame& frame) {
   const NodeArguments given = arguments(frame.node);
   double size[3] = {0.0, 0.0, 0.0};
-  given.find("newsize", 0).numbers(size, 3);
+  read_new_size(frame.node, size);
   bool follow[3] = {false, false, false};
   const ValueRef automatic = given.find("auto", 1);
   if (automatic.is_list()) {
@@ -229,7 +229,7 @@ void Evaluator::resize(Frame& frame) {
     const glm::dvec3 old = box.high - box.low;
     int largest = 0;
     for (int i = 0; i < 3; ++i) {
-      if (size[i] == 0.0 || !std::isfinite(size[i])) continue;
+      if (size[i] == 0.0) continue;
       scale[i] = size[i] / old[i];
       if (size[i] > size[largest]) largest = i;
     }
@@ -266,9 +266,10 @@ void Evaluator::linear_extrude(Frame& frame) {
   const glm::dvec3 v(direction[0], direction[1], direction[2]);
   const double length = std::sqrt(v.x * v.x + v.y * v.y + v.z * v.z);
   if (slanted && length > 0.0 && std::isfinite(length)) options.direction = v / length;
-  options.height = given.find("height", 0).number(slanted ? length : options.height);
+  options.height =
+      number(frame.node, "height", given.find("height", 0), slanted ? length : options.height);
   options.centre = given.truth("center", false);
-  options.twist = given.number("twist", 0.0);
+  options.twist = number(frame.node, "twist", 0.0);
   const ValueRef scale = given.find("scale");
   double both[2] = {scale.number(1.0), scale.number(1.0)};
   scale.numbers(both, 2);
@@ -283,7 +284,9 @@ void Evaluator::linear_extrude(Frame& frame) {
   if (!std::isfinite(options.height) || !std::isfinite(options.twist) ||
       !std::isfinite(options.scale.x) || !std::isfinite(options.scale.y)) {
     return warn(frame.node, "geometry",
-                "'linear_extrude' with numbers that are not finite; it is left out");
+                fmt::format("'linear_extrude' with height {:g}, twist {:g}, scale [{:g}, {:g}], "
+                            "which must be finite; it is left out",
+                            options.height, options.twist, options.scale.x, options.scale.y));
   }
   add_solid(frame.node, frame.outside, csg::linear_extrude(outline, options));
 }
@@ -292,8 +295,12 @@ void Evaluator::rotate_extrude(Frame& frame) {
   const Outline outline = united(frame.base);
   const NodeArguments given = arguments(frame.node);
   RotateExtrude options;
-  options.angle = given.find("angle", 0).number(options.angle);
-  if (!std::isfinite(options.angle)) options.angle = 360.0;
+  options.angle = number(frame.node, "angle", given.find("angle", 0), options.angle);
+  if (!std::isfinite(options.angle)) {
+    warn(frame.node, "geometry",
+         fmt::format("'rotate_extrude': angle is {:g}, not finite; 360 is taken", options.angle));
+    options.angle = 360.0;
+  }
   const bool full = std::abs(options.angle) >= 360.0;
   options.start = given.number("start", full ? 180.0 : 0.0);
   options.round_up = newer_;
@@ -332,7 +339,7 @@ void Evaluator::flat_operation(Frame& frame) {
       break;
     case NodeKind::kResize: {
       double size[2] = {0.0, 0.0};
-      given.find("newsize", 0).numbers(size, 2);
+      read_new_size(frame.node, size);
       bool follow[2] = {false, false};
       const ValueRef automatic = given.find("auto", 1);
       follow[0] = follow[1] = automatic.truth(false);
@@ -345,9 +352,14 @@ void Evaluator::flat_operation(Frame& frame) {
     }
     case NodeKind::kOffset: {
       const ValueRef delta = given.find("delta");
-      outline = delta.is_number()
-                    ? offset_delta(outline, delta.number(0.0), given.truth("chamfer", false))
-                    : offset_round(outline, given.find("r", 0).number(1.0), segments(frame.node));
+      const double by = number(frame.node, delta.is_number() ? "delta" : "r",
+                               delta.is_number() ? delta : given.find("r", 0), 1.0);
+      if (!std::isfinite(by)) {
+        return warn(frame.node, "geometry",
+                    fmt::format("'offset' by {:g}, which must be finite; it is left out", by));
+      }
+      outline = delta.is_number() ? offset_delta(outline, by, given.truth("chamfer", false))
+                                  : offset_round(outline, by, segments(frame.node));
       break;
     }
     case NodeKind::kRoof: {

@@ -116,6 +116,23 @@ class Evaluator {
   [[nodiscard]] Outline import_outline(std::uint32_t node, const std::string& path);
   [[nodiscard]] std::optional<std::string> asset(std::uint32_t node, const std::string& file);
 
+  // evaluate_arguments.cpp: what is not as it should be is named in a warning
+  /// The number that is given, else `otherwise`.
+  [[nodiscard]] double number(std::uint32_t node, std::string_view argument, const ValueRef& value,
+                              double otherwise);
+  [[nodiscard]] double number(std::uint32_t node, std::string_view argument, double otherwise) {
+    return number(node, argument, arguments(node).find(argument), otherwise);
+  }
+  /// The argument `size`: one number for all, or as many as `sizes` has.
+  void read_sizes(std::uint32_t node, std::span<double> sizes);
+  /// The argument `newsize` of resize; 0 where a size is not given or none.
+  void read_new_size(std::uint32_t node, std::span<double> sizes);
+  /// A radius, or half the diameter that is given instead.
+  [[nodiscard]] double radius(std::uint32_t node, std::string_view radius,
+                              std::string_view diameter, std::uint32_t position, double otherwise);
+  /// Whether a length may be one: finite and not negative. 0 may, it makes nothing.
+  bool is_length(std::uint32_t node, std::string_view argument, double length);
+
   // evaluate_operation.cpp: nodes with a frame of their own; operands from `base` on are replaced
   void operate(Frame& frame);
   void hull(Frame& frame);

@@ -13,12 +13,14 @@ ValueRef NodeArguments::find(std::string_view name) const {
 }
 
 ValueRef NodeArguments::find(std::string_view name, std::uint32_t position) const {
-  if (const ValueRef named = find(name); named.given()) return named;
   const auto all = std::span(ast_->arguments).subspan(node_->first_argument, node_->argument_count);
+  ValueRef found;
   for (const AstArgument& argument : all) {
-    if (argument.name.empty() && position-- == 0) return {*ast_, argument.value};
+    const bool here = argument.name.empty() && position-- == 0;
+    if (!here && argument.name != name) continue;
+    if (const ValueRef value(*ast_, argument.value); value.given()) found = value;
   }
-  return {};
+  return found;
 }
 
 Segments NodeArguments::segments(bool round_up) const {

@@ -13,7 +13,7 @@ class NodeArguments {
   NodeArguments(const Ast& ast, const AstNode& node) : ast_(&ast), node_(&node) {}
 
   [[nodiscard]] ValueRef find(std::string_view name) const;
-  /// By name, else the argument without a name at `position` (counted among those, from 0).
+  /// By name, or the argument without a name at `position` (counted among those, from 0).
   [[nodiscard]] ValueRef find(std::string_view name, std::uint32_t position) const;
 
   [[nodiscard]] double number(std::string_view name, double otherwise) const {

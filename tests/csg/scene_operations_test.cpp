@@ -249,6 +249,24 @@ TEST(Resize, ScalesGivenAxesAndFollowsTheLargest) {
   expect_box(box("newsize = [4,0,0], auto = true"), {2, 2, 2}, {6, 10, 18});
 }
 
+/// As OpenSCAD 2021.01: less than 0 is as 0, and does not mirror.
+TEST(Resize, KeepsWhereNoSizeIsGiven) {
+  const auto box = [](const std::string& arguments) {
+    return box_of(scene_of("resize(" + arguments + ") cube([1,2,3]);"));
+  };
+  expect_box(box("[-5,0,0]"), {0, 0, 0}, {1, 2, 3});
+  expect_box(box("[-5,4,0], true"), {0, 0, 0}, {2, 4, 6});
+  expect_box(box("[0,-4,0], true"), {0, 0, 0}, {1, 2, 3});
+  expect_box(box_of(scene_of("resize([-5,4],true) square([1,2]);")), {0, 0, -0.5}, {2, 4, 0.5},
+             1e-6);
+  const Scene scene = scene_of("resize([nan,4,0]) cube([1,2,3]);");
+  expect_box(box_of(scene), {0, 0, 0}, {1, 4, 3});
+  ASSERT_EQ(codes_of(scene), "geometry ");
+  EXPECT_EQ(scene.warnings[0].message,
+            "test.csg:1:1: 'resize': newsize is [nan, 4, 0], not finite numbers; the size is kept "
+            "where it is none");
+}
+
 TEST(Resize, MeasuresWhatIsLeftOfADifference) {
   const Scene scene = scene_of("resize([10,10,10]) difference() { cube([4,2,2]); " +
                                moved(2, -1, -1) + "cube([9,9,9]); }");

@@ -1,0 +1,123 @@
+// Arguments by position, and arguments that are not what they should be.
+#include <cmath>
+#include <string>
+
+#include "tests/csg/scene_checks.h"
+
+namespace strata::csg {
+namespace {
+
+/// The warning that a scene has, one in all, without `test.csg:`.
+std::string warning_of(std::string_view text) {
+  const Scene scene = scene_of(text);
+  EXPECT_EQ(codes_of(scene), "geometry ") << text;
+  constexpr std::size_t kPlace = sizeof "test.csg:" - 1;
+  return scene.warnings.empty() ? "" : scene.warnings[0].message.substr(kPlace);
+}
+
+/// What OpenSCAD 2021.01 makes of each: the sizes are those of its dumps.
+TEST(Arguments, PositionsAreThoseOfOpenscad) {
+  EXPECT_NEAR(volume_of("cylinder(10,2,2,$fn=4);"), 80.0, 1e-9);
+  EXPECT_NEAR(volume_of("cylinder(10,2,$fn=4);"), 20.0 / 3.0 * (4 + 2 + 1), 1e-9);
+  EXPECT_NEAR(volume_of("cylinder(10,r=2,$fn=4);"), 80.0, 1e-9);
+  EXPECT_NEAR(volume_of("cylinder(10,2,r=2,$fn=4);"), 80.0, 1e-9);
+  EXPECT_NEAR(volume_of("cylinder(h=10,2,3,$fn=4);"), 4.0 / 3.0 * (9 + 3 + 1), 1e-9);
+  EXPECT_NEAR(volume_of("cylinder(2,3,h=10,$fn=4);"), 20.0 / 3.0 * (9 + 3 + 1), 1e-9);
+  expect_box(box_of(scene_of("cylinder(10,2,3,true,$fn=4);")), {-3, -3, -5}, {3, 3, 5});
+  expect_box(box_of(scene_of("cube(4,true);")), {-2, -2, -2}, {2, 2, 2});
+  expect_box(box_of(scene_of("square([2,3],true);")), {-1, -1.5, -0.5}, {1, 1.5, 0.5}, 1e-6);
+  expect_box(box_of(scene_of("circle(5,10,$fn=4);")), {-5, -5, -0.5}, {5, 5, 0.5}, 1e-6);
+  EXPECT_EQ(box_of(scene_of("sphere(5,10,$fn=4);")).high.x,
+            box_of(scene_of("sphere(5,$fn=4);")).high.x);
+  EXPECT_NEAR(volume_of("polyhedron([[0,0,0],[1,0,0],[0,1,0],[0,0,1]],"
+                        "[[0,1,2],[0,3,1],[1,3,2],[0,2,3]],7);"),
+              1.0 / 6.0, 1e-9);
+  EXPECT_NEAR(volume_of("polygon([[0,0],[2,0],[0,2],[9,9]],[[0,1,2]],3);"), 2.0, 1e-6);
+  EXPECT_NEAR(volume_of("linear_extrude(5) square(2);"), 20.0, 1e-9);
+}
+
+TEST(Arguments, WhatIsNoSizeIsNamed) {
+  EXPECT_EQ(warning_of("cube([1,1,1]);\n sphere(r=nan);"),
+            "2:2: 'sphere': the radius is nan, not finite; it is left out");
+  EXPECT_EQ(warning_of("sphere(d=-3);"),
+            "1:1: 'sphere': the radius is -1.5, less than 0; it is left out");
+  EXPECT_EQ(warning_of("cube([-nan,5,5]);"),
+            "1:1: 'cube': a size is nan, not finite; it is left out");
+  EXPECT_EQ(warning_of("cube([5,inf,5]);"),
+            "1:1: 'cube': a size is inf, not finite; it is left out");
+  EXPECT_EQ(warning_of("cylinder(h=-5,r=2);"),
+            "1:1: 'cylinder': the height is -5, less than 0; it is left out");
+  EXPECT_EQ(warning_of("cylinder(h=5,r1=2,r2=-0.5);"),
+            "1:1: 'cylinder': the radius r2 is -0.5, less than 0; it is left out");
+  EXPECT_EQ(warning_of("square([-1,1]);"),
+            "1:1: 'square': a size is -1, less than 0; it is left out");
+  EXPECT_EQ(warning_of("circle(-2);"),
+            "1:1: 'circle': the radius is -2, less than 0; it is left out");
+  EXPECT_EQ(
+      warning_of("linear_extrude(height=nan,scale=[1,1],center=false) square(1);"),
+      "1:1: 'linear_extrude' with height nan, twist 0, scale [1, 1], which must be finite; it "
+      "is left out");
+  EXPECT_EQ(warning_of("offset(r=inf) square(1);"),
+            "1:1: 'offset' by inf, which must be finite; it is left out");
+  // A wall of no thickness is nothing, and means it.
+  for (const char* nothing : {"cube([3,3,0]);", "sphere(0);", "cylinder(h=0,r=1);",
+                              "cylinder(h=1,r=0);", "square([0,1]);", "circle(r=0);", "cube(0);"}) {
+    const Scene scene = scene_of(nothing);
+    EXPECT_EQ(codes_of(scene), "") << nothing;
+    EXPECT_TRUE(scene.tree.solids().empty()) << nothing;
+  }
+}
+
+TEST(Arguments, WhatIsNoNumberIsNamed) {
+  EXPECT_EQ(warning_of("sphere(r=\"5\");"), "1:1: 'sphere': r is \"5\", not a number; 1 is taken");
+  EXPECT_EQ(warning_of("circle(d=true);"), "1:1: 'circle': d is true, not a number; 2 is taken");
+  EXPECT_EQ(warning_of("cylinder(\"5\",2);"),
+            "1:1: 'cylinder': h is \"5\", not a number; 1 is taken");
+  EXPECT_EQ(warning_of("cube(\"a\");"),
+            "1:1: 'cube': size is \"a\", not a number or 3 numbers; 1 is taken");
+  // OpenSCAD takes 1 for all of them too.
+  EXPECT_NEAR(volume_of("cube([2,3]);"), 1.0, 1e-9);
+  EXPECT_EQ(warning_of("cube([2,[\"b\",[]],false]);"),
+            "1:1: 'cube': size is [2, [\"b\", []], false], not a number or 3 numbers; 1 is taken");
+  EXPECT_EQ(warning_of("square([1,2,3]);"),
+            "1:1: 'square': size is [1, 2, 3], not a number or 2 numbers; 1 is taken");
+  EXPECT_EQ(warning_of("rotate_extrude(angle=\"x\") square(1);"),
+            "1:1: 'rotate_extrude': angle is \"x\", not a number; 360 is taken");
+  const std::string long_one = warning_of("sphere(\"" + std::string(5000, 'x') + "\");");
+  EXPECT_LT(long_one.size(), 160u);
+  EXPECT_EQ(codes_of(scene_of("sphere(r=undef); cube(undef); cylinder(h=undef);")), "");
+}
+
+TEST(Arguments, MatricesThatAreNoneAreNamed) {
+  EXPECT_EQ(warning_of("multmatrix([[1,0,0,0],[0,1,0,nan]]) cube();"),
+            "1:1: the matrix has nan in row 2, column 4; what it moves is left out");
+  EXPECT_EQ(warning_of("multmatrix([[1],[],[],[0,0,0,inf]]) cube();"),
+            "1:1: the matrix has inf in row 4, column 4; what it moves is left out");
+  const char* text = "multmatrix([[2,\"x\",0,1]]) cube();";
+  EXPECT_EQ(warning_of(text),
+            "1:1: the matrix has \"x\" in row 1, column 2; the identity's is taken");
+  expect_box(box_of(scene_of(text)), {1, 0, 0}, {3, 1, 1});
+}
+
+TEST(Arguments, IndicesThatAreNoneAreNamed) {
+  const std::string points = "points=[[0,0,0],[1,0,0],[0,1,0],[0,0,1]],";
+  const std::string text = "polyhedron(" + points + "faces=[[0,1.5,2],[0,3,1],[1,3,2],[0,2,3]]);";
+  EXPECT_EQ(warning_of(text),
+            "1:1: 1 corners of faces are no whole numbers, the first is 1.5 in face 0; they are "
+            "rounded down");
+  EXPECT_NEAR(volume_of(text), 1.0 / 6.0, 1e-9);
+  const Scene scene =
+      scene_of("polyhedron(" + points + "faces=[[0,1,2],[0,3,-1,1],[1,3,2,4],[0,2,3]]);");
+  EXPECT_EQ(scene.warnings.at(0).message,
+            "test.csg:1:1: 2 corners of faces are no indices of the 4 points, the first is -1 in "
+            "face 1; they are left out");
+  EXPECT_EQ(warning_of("polygon([[0,0],[1,0],[0,1]],[[0,1,2,\"a\"]]);"),
+            "1:1: 1 corners of paths are no indices of the 3 points, the first is \"a\" in path 0; "
+            "they are left out");
+  EXPECT_EQ(warning_of("polyhedron([[0,0,0],[1,0]],[[0,1,2]]);"),
+            "1:1: point 1 of the polyhedron is [1, 0], not three finite numbers; the polyhedron is "
+            "left out");
+}
+
+}  // namespace
+}  // namespace strata::csg
