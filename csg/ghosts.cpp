@@ -231,7 +231,9 @@ class GhostPainter::PixelPainter {
     const std::uint32_t triangle =
         painted_->parts[at].source(fragment.triangle - painted_->first_triangles[at]);
     const auto& colour = painter_->programs_[one.ghost].colour;
-    const glm::vec4 base = colour ? *colour : shader_->base(one.solid, fragment.exit);
+    // The far wall of a translucent solid is no cut.
+    const bool cut = fragment.exit && shader_->base(one.solid, false).a == 1.0f;
+    const glm::vec4 base = colour ? *colour : shader_->base(one.solid, cut);
     return {glm::vec3(base) * shader_->light(one.solid, triangle, fragment.exit), base.a};
   }
   [[nodiscard]] const Slot& slot(DepthItem item) const {

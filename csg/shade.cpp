@@ -84,8 +84,7 @@ float Shader::light(std::uint32_t solid, std::uint32_t triangle, bool exit) cons
 }
 
 glm::vec4 Shader::base(std::uint32_t solid, bool exit) const {
-  const auto& colour = tree_->solids()[solid].colour;
-  return colour ? *colour : exit ? cut_ : face_;
+  return colour_or(tree_->solids()[solid].colour, exit ? cut_ : face_);
 }
 
 bool Shader::same_plane(std::uint32_t solid_a, std::uint32_t face_a, std::uint32_t solid_b,

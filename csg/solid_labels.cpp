@@ -31,7 +31,7 @@ ColourLabels colour_labels(const Tree& tree, Tree::NodeId root, const glm::vec4&
   ColourLabels result;
   result.labels.resize(tree.solids().size(), 1);
   for (const std::uint32_t solid : added_solids(tree, root)) {
-    const glm::vec4 colour = tree.solids()[solid].colour.value_or(none);
+    const glm::vec4 colour = colour_or(tree.solids()[solid].colour, none);
     const auto at = std::find(result.colours.begin(), result.colours.end(), colour);
     result.labels[solid] = static_cast<std::uint32_t>(at - result.colours.begin()) + 1;
     if (at == result.colours.end()) result.colours.push_back(colour);

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <glm/mat4x4.hpp>
+#include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 #include <memory>
 #include <optional>
@@ -15,14 +16,25 @@
 
 namespace strata::csg {
 
+/// Red, green and blue of a colour that is the scheme's but for its alpha.
+inline constexpr glm::vec3 kSchemesOwn{-1.0f};
+
+/// The colour of a face. @param own  the scheme's
+[[nodiscard]] inline glm::vec4 colour_or(const std::optional<glm::vec4>& colour,
+                                         const glm::vec4& own) {
+  if (!colour) return own;
+  return colour->r < 0.0f ? glm::vec4(glm::vec3(own), colour->a) : *colour;
+}
+
 enum class Operation : std::uint8_t { kSolid, kUnion, kIntersection, kDifference };
 
 /// A leaf of a tree: a mesh at its place. Many solids may share one mesh.
 struct Solid {
   /// May overlap itself, may be open or inside out; null is the empty solid.
   std::shared_ptr<const TriangleSoup> mesh;
-  glm::dmat4 world_from_mesh{1.0};       ///< affine; one that mirrors turns the triangles around
-  std::optional<glm::vec4> colour = {};  ///< red, green, blue, alpha in [0, 1]; empty: the scheme's
+  glm::dmat4 world_from_mesh{1.0};  ///< affine; one that mirrors turns the triangles around
+  /// Red, green, blue (or kSchemesOwn), alpha in [0, 1]; empty: the scheme's.
+  std::optional<glm::vec4> colour = {};
   InsideRule rule = InsideRule::kWinding;  ///< which winding numbers are inside
   std::string name = {};                   ///< for messages and pick: `cube at plate.csg:12:3`
 };

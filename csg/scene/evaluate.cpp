@@ -230,12 +230,16 @@ void Evaluator::enter_colour(Frame& frame) {
   given.find("c", 0).numbers(numbers, 4);
   numbers[3] = given.find("alpha", 1).number(numbers[3]);
   const bool is_set = numbers[0] >= 0.0 && numbers[1] >= 0.0 && numbers[2] >= 0.0;
-  if (!is_set || frame.inside.colour) return;  // the outermost colour that is set wins
-  glm::vec4 colour;
+  std::optional<glm::vec4>& inside = frame.inside.colour;
+  if (inside && inside->r >= 0.0f) return;  // the outermost colour that is set wins
+  glm::vec4 colour(kSchemesOwn, 1.0f);
   for (int i = 0; i < 4; ++i) {
-    colour[i] = static_cast<float>(numbers[i] >= 0.0 ? std::min(numbers[i], 1.0) : i == 3);
+    if (numbers[i] >= 0.0 && (is_set || i == 3)) {
+      colour[i] = static_cast<float>(std::min(numbers[i], 1.0));
+    }
   }
-  frame.inside.colour = colour;
+  inside = colour;
+  if (!is_set && colour.a == 1.0f) inside.reset();
 }
 
 void Evaluator::leave() {

@@ -248,7 +248,7 @@ void Panels::solids(Viewer& viewer) {
       const csg::ColourScheme* scheme = viewer.picture_options().scheme;
       if (scheme == nullptr) scheme = csg::colour_schemes().data();
       glm::vec4 colour(glm::vec3(scheme->face) / 255.0f, 1.0f);
-      if (all[solid].colour) colour = *all[solid].colour;
+      colour = csg::colour_or(all[solid].colour, colour);
       if (const auto own = looks.colours.find(solid); own != looks.colours.end()) {
         colour = own->second;
       }
