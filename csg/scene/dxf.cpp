@@ -4,6 +4,8 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 #include <optional>
+#include <set>
+#include <string_view>
 
 #include "csg/scene/dxf_file.h"
 #include "csg/scene/line_joiner.h"
@@ -85,14 +87,34 @@ class Drawing {
   Result<Outline> run() {
     const Placement world{
         {options_.scale, 0}, {0, options_.scale}, -options_.origin * options_.scale};
+    bool found = options_.layer.empty() || file_.entities.empty();
     for (const DxfEntity& entity : file_.entities) {
       if (!options_.layer.empty() && entity.layer != options_.layer) continue;
+      found = true;
       if (auto done = draw(entity, world, 0); !done) return tl::unexpected(done.error());
+    }
+    if (!found) {
+      return fail(ErrorCode::kInput, "{}: nothing is in a layer '{}', there {}", name_,
+                  options_.layer, layers());
     }
     return clean({joiner_.paths()}, Fill::kEvenOdd);
   }
 
  private:
+  /// The layers with something in them, for a message: some of them, if there are many.
+  [[nodiscard]] std::string layers() const {
+    constexpr std::size_t kMost = 8;
+    std::set<std::string_view> names;
+    for (const DxfEntity& entity : file_.entities) names.insert(entity.layer);
+    std::string text = names.size() == 1 ? "is" : "are";
+    std::size_t count = 0;
+    for (const std::string_view name : names) {
+      if (count == kMost) return text + fmt::format(" and {} more", names.size() - kMost);
+      text += fmt::format("{} '{}'", count++ == 0 ? "" : ",", name);
+    }
+    return text;
+  }
+
   /// Ends of lines are joined within this distance, in units of the scene.
   static constexpr double kTolerance = 1e-5;
 

@@ -56,6 +56,15 @@ double Evaluator::radius(std::uint32_t node, std::string_view radius, std::strin
   return number(node, radius, given.find(radius, position), otherwise);
 }
 
+Segments Evaluator::segments(std::uint32_t node) {
+  const Segments segments = arguments(node).segments(newer_);
+  if (std::isfinite(segments.fn) && segments.fn > Segments::kMost) {
+    warn(node, "approximate",
+         fmt::format("'{}': $fn is {:g}; {:g} is taken", name(node), segments.fn, Segments::kMost));
+  }
+  return segments;
+}
+
 bool Evaluator::is_length(std::uint32_t node, std::string_view argument, double length) {
   if (std::isfinite(length) && length >= 0.0) return true;
   // A nan has a sign that means nothing.

@@ -44,20 +44,23 @@ std::optional<std::string> Evaluator::asset(std::uint32_t node, const std::strin
   std::error_code ignored;
   const auto is_there = [&](const fs::path& path) { return fs::is_regular_file(path, ignored); };
   const fs::path name(file);
+  bool folder_there = false;
   if (name.is_absolute()) {
     if (is_there(name)) return file;
+    folder_there = fs::is_directory(name, ignored);
   } else {
     constexpr int kMostLevels = 8;
     fs::path folder(folder_);
     for (int level = 0; level < kMostLevels; ++level) {
       const fs::path path = folder / name;
       if (is_there(path)) return path.string();
+      folder_there |= fs::is_directory(path, ignored);
       folder /= "..";
     }
   }
   warn(node, "missing-file",
-       fmt::format("'{}' needs the file '{}', which is not there; it is left out", this->name(node),
-                   file));
+       fmt::format("'{}' needs the file '{}', which is {}; it is left out", this->name(node), file,
+                   folder_there ? "a folder" : "not there"));
   return std::nullopt;
 }
 

@@ -239,8 +239,10 @@ void Evaluator::surface(std::uint32_t node, const Context& context) {
   if (file.empty()) return;
   const auto path = asset(node, file);
   if (!path) return;
-  auto mesh =
-      read_surface(*path, given.find("center", 1).truth(false), given.truth("invert", false));
+  std::string short_rows;
+  auto mesh = read_surface(*path, given.find("center", 1).truth(false),
+                           given.truth("invert", false), &short_rows);
+  if (!short_rows.empty()) warn(node, "geometry", short_rows);
   if (!mesh) {
     return mesh.error().code == ErrorCode::kLimit
                ? stop(mesh.error().code, node, mesh.error().message)

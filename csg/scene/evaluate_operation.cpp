@@ -274,11 +274,11 @@ void Evaluator::linear_extrude(Frame& frame) {
   double both[2] = {scale.number(1.0), scale.number(1.0)};
   scale.numbers(both, 2);
   options.scale = {std::max(both[0], 0.0), std::max(both[1], 0.0)};
-  const auto whole = [](double value) {
-    return static_cast<int>(std::isfinite(value) ? std::clamp(value, 0.0, 1e6) : 0.0);
+  const auto whole = [](double value, double most) {
+    return static_cast<int>(std::isfinite(value) ? std::clamp(value, 0.0, most) : 0.0);
   };
-  options.slices = whole(given.number("slices", 0.0));
-  options.outline_segments = whole(given.number("segments", 0.0));
+  options.slices = whole(number(frame.node, "slices", 0.0), 2e9);
+  options.outline_segments = whole(number(frame.node, "segments", 0.0), 1e6);
   options.divide_outline = newer_;
   options.segments = segments(frame.node);
   if (!std::isfinite(options.height) || !std::isfinite(options.twist) ||
@@ -288,7 +288,14 @@ void Evaluator::linear_extrude(Frame& frame) {
                             "which must be finite; it is left out",
                             options.height, options.twist, options.scale.x, options.scale.y));
   }
-  add_solid(frame.node, frame.outside, csg::linear_extrude(outline, options));
+  SliceCount slices;
+  add_solid(frame.node, frame.outside, csg::linear_extrude(outline, options, &slices));
+  if (static_cast<double>(slices.made) < slices.wanted) {
+    warn(frame.node, "approximate",
+         fmt::format("'linear_extrude': it would take {:g} slices (twist {:g}, $fn {:g}), {} are "
+                     "made",
+                     slices.wanted, options.twist, options.segments.fn, slices.made));
+  }
 }
 
 void Evaluator::rotate_extrude(Frame& frame) {

@@ -130,6 +130,8 @@ class Evaluator {
   /// A radius, or half the diameter that is given instead.
   [[nodiscard]] double radius(std::uint32_t node, std::string_view radius,
                               std::string_view diameter, std::uint32_t position, double otherwise);
+  /// $fn, $fa and $fs.
+  [[nodiscard]] Segments segments(std::uint32_t node);
   /// Whether a length may be one: finite and not negative. 0 may, it makes nothing.
   bool is_length(std::uint32_t node, std::string_view argument, double length);
 
@@ -168,9 +170,6 @@ class Evaluator {
   [[nodiscard]] std::string_view name(std::uint32_t node) const;
   [[nodiscard]] NodeArguments arguments(std::uint32_t node) const {
     return {ast_, ast_.nodes[node]};
-  }
-  [[nodiscard]] Segments segments(std::uint32_t node) const {
-    return arguments(node).segments(newer_);
   }
 
   const Ast& ast_;

@@ -63,7 +63,7 @@ double slices_for_scale(const LinearExtrude& options, double farthest) {
   return std::max(std::ceil(length / std::max(s.fs, 0.01)), 1.0);
 }
 
-std::size_t slice_count(const Outline& outline, const LinearExtrude& options) {
+double slice_count(const Outline& outline, const LinearExtrude& options) {
   double slices = options.slices;
   if (options.slices <= 0) {
     double radius = 0, farthest = 0;
@@ -79,7 +79,7 @@ std::size_t slice_count(const Outline& outline, const LinearExtrude& options) {
       slices = std::max(slices, slices_for_scale(options, farthest));
     }
   }
-  return static_cast<std::size_t>(std::clamp(slices, 1.0, 1e6));
+  return std::max(slices, 1.0);
 }
 
 /// The longest that each edge of the contour gets in any slice.
@@ -207,7 +207,7 @@ void close_at_point(const Outline& outline, std::size_t bottom, const glm::dvec3
 
 }  // namespace
 
-TriangleSoup linear_extrude(const Outline& raw, const LinearExtrude& given) {
+TriangleSoup linear_extrude(const Outline& raw, const LinearExtrude& given, SliceCount* count) {
   LinearExtrude options = given;
   options.scale = glm::max(options.scale, glm::dvec2(0));
   const glm::dvec3 way = options.direction * options.height;
@@ -217,12 +217,14 @@ TriangleSoup linear_extrude(const Outline& raw, const LinearExtrude& given) {
       !finite(options.scale.x) || !finite(options.scale.y)) {
     return {};
   }
-  std::size_t slices = slice_count(raw, options);
+  const double wanted = slice_count(raw, options);
+  auto slices = static_cast<std::size_t>(std::min(wanted, 1e6));
   const Outline outline = divide_edges(raw, options, slices);
   std::size_t stride = 0;
   for (const Contour& contour : outline.contours) stride += contour.size();
   if (stride == 0 || stride > kMostVertices) return {};
   slices = std::clamp<std::size_t>(slices, 1, std::max<std::size_t>(kMostVertices / stride, 2) - 1);
+  if (count) *count = {wanted, slices};
 
   const glm::dvec3 bottom = options.centre ? -way / 2.0 : glm::dvec3(0);
   const bool pointed = options.scale == glm::dvec2(0);

@@ -65,8 +65,13 @@ struct LinearExtrude {
   bool divide_outline = false;  ///< newer dialect: divide edges of twisted outlines
   Segments segments;
 };
+struct SliceCount {
+  double wanted = 0;
+  std::size_t made = 0;  ///< less where there would be more than a million, or too many vertices
+};
 /// A closed mesh with shared vertices; empty for an empty outline or height <= 0.
-[[nodiscard]] TriangleSoup linear_extrude(const Outline& outline, const LinearExtrude& options);
+[[nodiscard]] TriangleSoup linear_extrude(const Outline& outline, const LinearExtrude& options,
+                                          SliceCount* count = nullptr);
 
 struct RotateExtrude {
   double angle = 360;     ///< degrees

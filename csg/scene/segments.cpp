@@ -9,7 +9,6 @@ namespace strata::csg {
 int Segments::count(double radius) const {
   constexpr double kSmallest = 0x1p-20;
   if (!(radius >= kSmallest) || !std::isfinite(fn)) return 3;
-  constexpr double kMost = 1e6;
   if (fn > 0) {
     const double whole = round_up ? std::ceil(fn) : std::trunc(fn);
     return static_cast<int>(std::clamp(whole, 3.0, kMost));

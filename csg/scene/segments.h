@@ -4,6 +4,8 @@ namespace strata::csg {
 
 /// How finely round shapes are cut: OpenSCAD's $fn, $fa and $fs.
 struct Segments {
+  static constexpr double kMost = 1e6;  ///< of a full circle
+
   double fn = 0;          ///< segments of a full circle; 0: from fa and fs
   double fa = 12;         ///< smallest angle of a segment, degrees
   double fs = 2;          ///< smallest length of a segment

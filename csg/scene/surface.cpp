@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <limits>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -22,26 +23,29 @@ struct HeightMap {
   std::size_t columns = 0, rows = 0;
   std::vector<double> heights;  // row by row, the first at y = 0
   double floor = 0.0;
+  std::string short_rows;  // a sentence about them, if there are any
 
   double at(std::size_t column, std::size_t row) const { return heights[row * columns + column]; }
 };
 
-/// Reads the numbers of one line. @return whether all of it was numbers
-bool read_row(std::string_view line, std::vector<double>& numbers) {
+/// Reads the numbers of one line. @return what is no number, if anything
+std::string_view read_row(std::string_view line, std::vector<double>& numbers) {
+  constexpr std::string_view kEnds = " \t\r,#";
   const char* at = line.data();
   const char* const end = at + line.size();
   for (;;) {
     while (at < end && (*at == ' ' || *at == '\t' || *at == '\r' || *at == ',')) ++at;
-    if (at == end || *at == '#') return true;
+    if (at == end || *at == '#') return {};
+    const std::string_view rest(at, static_cast<std::size_t>(end - at));
+    const std::string_view token = rest.substr(0, rest.find_first_of(kEnds));
     if (*at == '+') ++at;
     double number = 0.0;
     const auto [stop, status] = std::from_chars(at, end, number);
-    if (status != std::errc() || !std::isfinite(number)) return false;
+    if (status != std::errc() || !std::isfinite(number) || stop != token.data() + token.size()) {
+      return token;
+    }
     numbers.push_back(number);
     at = stop;
-    if (at < end && *at != ' ' && *at != '\t' && *at != '\r' && *at != ',' && *at != '#') {
-      return false;
-    }
   }
 }
 
@@ -57,8 +61,11 @@ Result<HeightMap> read_numbers(const std::string& path) {
     rest = newline == std::string_view::npos ? std::string_view() : rest.substr(newline + 1);
     ++line_number;
     const std::size_t before = numbers.size();
-    if (!read_row(line, numbers)) {
-      return fail(ErrorCode::kInput, "{}:{}: not a row of numbers", path, line_number);
+    if (const std::string_view bad = read_row(line, numbers); !bad.empty()) {
+      std::string shown(bad.substr(0, 40));
+      for (char& c : shown) c = c < ' ' || c > '~' ? '?' : c;
+      return fail(ErrorCode::kInput, "{}:{}: '{}', number {} of row {}, is not a finite number",
+                  path, line_number, shown, numbers.size() - before + 1, row_ends.size() + 1);
     }
     if (numbers.size() == before) continue;
     columns = std::max(columns, numbers.size() - before);
@@ -71,13 +78,18 @@ Result<HeightMap> read_numbers(const std::string& path) {
   map.columns = columns;
   map.rows = row_ends.size();
   map.heights.resize(columns * map.rows, 0.0);  // rows may be short
-  std::size_t from = 0;
+  std::size_t from = 0, short_rows = 0;
   for (std::size_t row = 0; row < map.rows; ++row) {
     std::copy(numbers.begin() + static_cast<std::ptrdiff_t>(from),
               numbers.begin() + static_cast<std::ptrdiff_t>(row_ends[row]),
               map.heights.begin() + static_cast<std::ptrdiff_t>(row * columns));
+    if (row_ends[row] - from < columns && short_rows++ == 0) {
+      map.short_rows = fmt::format("row {} has {} numbers, the longest {}; what is missing is 0",
+                                   row + 1, row_ends[row] - from, columns);
+    }
     from = row_ends[row];
   }
+  if (short_rows > 1) map.short_rows += fmt::format(" ({} rows are short)", short_rows);
   double least = 1.0;  // of the numbers that are there
   for (const double number : numbers) least = std::min(least, number);
   map.floor = least - 1.0;
@@ -172,7 +184,8 @@ TriangleSoup make_solid(const HeightMap& map, bool centre) {
 
 }  // namespace
 
-Result<TriangleSoup> read_surface(const std::string& path, bool centre, bool invert) {
+Result<TriangleSoup> read_surface(const std::string& path, bool centre, bool invert,
+                                  std::string* short_rows) {
   std::string extension = std::filesystem::path(path).extension().string();
   for (char& c : extension) c = static_cast<char>(c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c);
   auto map = extension == ".png" ? read_picture(path, invert) : read_numbers(path);
@@ -180,6 +193,9 @@ Result<TriangleSoup> read_surface(const std::string& path, bool centre, bool inv
   if (map->columns < 2 || map->rows < 2) {
     return fail(ErrorCode::kInput, "{}: {} x {} heights; a surface needs 2 x 2", path, map->columns,
                 map->rows);
+  }
+  if (short_rows && !map->short_rows.empty()) {
+    *short_rows = fmt::format("{}: {}", path, map->short_rows);
   }
   return make_solid(*map, centre);
 }

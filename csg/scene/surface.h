@@ -13,6 +13,8 @@ namespace strata::csg {
 /// min(1, lowest) - 1. `centre` puts the middle at x = y = 0; `invert` turns grey levels around.
 /// @return kInput naming file and line; kLimit beyond 20 million cells. Maps of less than 2 x 2
 /// are kInput
-Result<TriangleSoup> read_surface(const std::string& path, bool centre, bool invert);
+/// @param short_rows  gets a sentence about rows with fewer numbers than others, which end in 0
+Result<TriangleSoup> read_surface(const std::string& path, bool centre, bool invert,
+                                  std::string* short_rows = nullptr);
 
 }  // namespace strata::csg

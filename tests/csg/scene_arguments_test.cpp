@@ -88,6 +88,25 @@ TEST(Arguments, WhatIsNoNumberIsNamed) {
   EXPECT_EQ(codes_of(scene_of("sphere(r=undef); cube(undef); cylinder(h=undef);")), "");
 }
 
+TEST(Arguments, AbsurdNumbersOfPiecesAreNamed) {
+  const auto warning = [](std::string_view text) {
+    const Scene scene = scene_of(text);
+    EXPECT_EQ(codes_of(scene), "approximate ") << text;
+    return scene.warnings.empty() ? "" : scene.warnings[0].message;
+  };
+  EXPECT_EQ(warning("cylinder(h=1,r1=1,r2=0,$fn=1e7);"),
+            "test.csg:1:1: 'cylinder': $fn is 1e+07; 1e+06 is taken");
+  const std::string triangle = " polygon([[0,0],[1,0],[0,1]]);";
+  EXPECT_EQ(
+      warning("linear_extrude(height=1,center=false,scale=[1,1],twist=9,slices=1e9)" + triangle),
+      "test.csg:1:1: 'linear_extrude': it would take 1e+09 slices (twist 9, $fn 0), 1000000 "
+      "are made");
+  EXPECT_EQ(
+      warning("linear_extrude(height=1,center=false,scale=[1,1],twist=1e9,$fn=8)" + triangle),
+      "test.csg:1:1: 'linear_extrude': it would take 2.22222e+07 slices (twist 1e+09, $fn 8), "
+      "1000000 are made");
+}
+
 TEST(Arguments, MatricesThatAreNoneAreNamed) {
   EXPECT_EQ(warning_of("multmatrix([[1,0,0,0],[0,1,0,nan]]) cube();"),
             "1:1: the matrix has nan in row 2, column 4; what it moves is left out");

@@ -254,6 +254,51 @@ TEST_F(SceneFiles, BadSurfacesAreRefused) {
   EXPECT_FALSE(read_surface(write("a.png", "no picture"), false, false).has_value());
 }
 
+TEST_F(SceneFiles, FaultsOfSurfacesAreQuoted) {
+  const auto warning_of = [&](std::string_view text) {
+    write("a.dat", text);
+    const Scene scene = read(write("scene.csg", "surface(file = \"a.dat\");"));
+    EXPECT_EQ(codes_of(scene), "geometry ");
+    return scene.warnings.empty() ? std::string() : scene.warnings[0].message;
+  };
+  const auto has = [](const std::string& text, const char* part) {
+    return text.find(part) != std::string::npos;
+  };
+  const std::string bad = warning_of("# heights\n1 2\n3 4x5 6\n");
+  EXPECT_TRUE(has(bad, "a.dat:3: '4x5', number 2 of row 2, is not a finite number; the surface"))
+      << bad;
+  EXPECT_TRUE(has(warning_of("1 \x01\n2 3\n"), "'?'"));
+  const std::string one = warning_of("1 2 3\n4 5\n6 7 8\n");
+  EXPECT_TRUE(has(one, "a.dat: row 2 has 2 numbers, the longest 3; what is missing is 0")) << one;
+  EXPECT_TRUE(has(warning_of("1 2\n4\n6\n"), "what is missing is 0 (2 rows are short)"));
+}
+
+TEST_F(SceneFiles, AFolderIsNoFile) {
+  write("parts.stl/readme", "");
+  const Scene scene = read(write("scene.csg", "import(file = \"parts.stl\"); cube();"));
+  ASSERT_EQ(codes_of(scene), "missing-file ");
+  EXPECT_NE(scene.warnings[0].message.find("'parts.stl', which is a folder; it is left out"),
+            std::string::npos);
+}
+
+TEST_F(SceneFiles, LayersThatAreNotThereAreNamed) {
+  write("a.dxf",
+        "0\nSECTION\n2\nENTITIES\n0\nCIRCLE\n8\nholes\n10\n0\n20\n0\n40\n1\n"
+        "0\nCIRCLE\n8\nrim\n10\n0\n20\n0\n40\n2\n0\nENDSEC\n0\nEOF\n");
+  const auto import = [&](const char* layer) {
+    return read(
+        write("scene.csg", fmt::format("import(file = \"a.dxf\", layer = \"{}\");", layer)));
+  };
+  EXPECT_EQ(codes_of(import("rim")), "");
+  const Scene scene = import("hole");
+  ASSERT_EQ(codes_of(scene), "geometry ");
+  EXPECT_NE(
+      scene.warnings[0].message.find("a.dxf: nothing is in a layer 'hole', there are 'holes', "
+                                     "'rim'; it is left out"),
+      std::string::npos)
+      << scene.warnings[0].message;
+}
+
 /// 3 x 2 pixels: red, green, blue above grey 51, grey 102, white.
 constexpr char kPicture[] =
     "\211\120\116\107\015\012\032\012\000\000\000\015\111\110\104\122\000\000\000\003\000"
