@@ -7,6 +7,7 @@
 #include <glm/matrix.hpp>
 #include <limits>
 #include <new>
+#include <numeric>
 #include <span>
 #include <utility>
 
@@ -40,9 +41,37 @@ class RayWalk {
     slack_per_distance_ = view.perspective ? tenth : 0.0;
   }
 
-  /// The first interval's length along the ray of pixel (u, v).
-  float thickness(std::span<const DepthItem> items, int u, int v) {
+  /// Takes the list of the next ray. @pre sorted by depth
+  void take(std::span<const DepthItem> items) {
+    items_ = items;
     gather(items);
+  }
+
+  /// Crossings with the first `counted` solids that lie in none of the others.
+  std::uint32_t crossings(std::size_t counted) {
+    if (counted >= lists_->parts.size()) return static_cast<std::uint32_t>(items_.size());
+    within_.assign(lists_->parts.size() - counted, 0);
+    std::uint32_t count = 0;
+    int around = 0;  // others that the ray is in
+    std::size_t next = 0;
+    for (const DepthItem item : items_) {
+      if (lists_->solid_of[item.triangle()] >= counted) continue;
+      for (; next < flips_.size() && flips_[next].depth <= item.depth(); ++next) {
+        const Flip& flip = flips_[next];
+        if (flip.solid < counted) continue;
+        std::uint8_t& within = within_[flip.solid - counted];
+        // A face where the section begins is still there.
+        if (within == 0 && flip.depth == item.depth()) break;
+        within ^= 1;
+        around += within != 0 ? 1 : -1;
+      }
+      count += around == 0 ? 1 : 0;
+    }
+    return count;
+  }
+
+  /// The first interval's length along the ray of pixel (u, v).
+  float thickness(int u, int v) {
     double begin = -1, end = -1;
     bool inside = state_.value();
     if (inside) begin = view_->near;
@@ -107,16 +136,20 @@ class RayWalk {
   const View* view_;
   ProgramState state_;
   double scale_ = 1, slack_ = 0, slack_per_distance_ = 0;
+  std::span<const DepthItem> items_;
   std::vector<DepthItem> sorted_;
   std::vector<Flip> flips_;
+  std::vector<std::uint8_t> within_;  ///< each solid that is not counted
 };
 
 }  // namespace
 
 struct RayMeter::Impl {
-  Impl(const Tree& tree, Tree::NodeId root, double relative_precision, const Execution& execution)
+  Impl(const Tree& tree, Tree::NodeId root, double relative_precision, const Execution& execution,
+       std::size_t counted_solids)
       : geometry(tree, execution),
         program(compile(tree, root)),
+        counted(counted_solids),
         world_error(geometry.world_error(tree, relative_precision)) {}
 
   [[nodiscard]] Result<Lists> lists(const View& view, const Execution& execution) const {
@@ -168,12 +201,13 @@ struct RayMeter::Impl {
 
   Geometry geometry;
   Program program;
+  std::size_t counted;
   double world_error = 0;
 };
 
 RayMeter::RayMeter(const Tree& tree, Tree::NodeId root, double relative_precision,
-                   const Execution& execution)
-    : impl_(std::make_unique<Impl>(tree, root, relative_precision, execution)) {}
+                   const Execution& execution, std::size_t counted)
+    : impl_(std::make_unique<Impl>(tree, root, relative_precision, execution, counted)) {}
 RayMeter::~RayMeter() = default;
 RayMeter::RayMeter(RayMeter&&) noexcept = default;
 RayMeter& RayMeter::operator=(RayMeter&&) noexcept = default;
@@ -188,7 +222,6 @@ Result<RayImage> RayMeter::measure(const View& view, const Execution& execution)
   result.thickness.resize(pixels);
   result.crossings.resize(pixels);
   const LayeredDepthImage& image = lists->image;
-  result.fragments = image.items.size();
   std::vector<std::unique_ptr<RayWalk>> walks(static_cast<std::size_t>(execution.thread_count()));
   parallel_for(execution, static_cast<std::size_t>(view.size.y), [&](std::size_t v, int worker) {
     auto& walk = walks[static_cast<std::size_t>(worker)];
@@ -199,13 +232,15 @@ Result<RayImage> RayMeter::measure(const View& view, const Execution& execution)
     for (std::size_t u = 0; u < width; ++u) {
       const std::size_t pixel = v * width + u;
       const auto items = image.list(static_cast<int>(u), static_cast<int>(v));
-      result.crossings[pixel] = static_cast<std::uint32_t>(items.size());
-      if (!items.empty()) {
-        result.thickness[pixel] = walk->thickness(items, static_cast<int>(u), static_cast<int>(v));
-      }
+      if (items.empty()) continue;
+      walk->take(items);
+      result.crossings[pixel] = walk->crossings(impl_->counted);
+      result.thickness[pixel] = walk->thickness(static_cast<int>(u), static_cast<int>(v));
     }
   });
   if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+  result.fragments =
+      std::accumulate(result.crossings.begin(), result.crossings.end(), std::uint64_t{0});
   return result;
 } catch (const std::bad_alloc&) {
   return fail(ErrorCode::kLimit, "out of memory for the lists of {} x {} rays", view.size.x,

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -17,7 +18,7 @@ struct RayImage {
   /// World length of the material behind the visible surface, along the ray: of the first interval
   /// that lies inside the tree. 0 where the ray misses; infinity where it does not come out again.
   std::vector<float> thickness;
-  /// Crossings with all solids of the tree, whether they show or not: depth complexity.
+  /// Crossings with the solids of the tree, whether they show or not: depth complexity.
   std::vector<std::uint32_t> crossings;
   std::uint64_t fragments = 0;  ///< sum of crossings
 };
@@ -27,8 +28,10 @@ struct RayImage {
 class RayMeter {
  public:
   /// Keeps the tree's meshes alive. @param relative_precision as Preview has it
+  /// @param counted crossings are counted with so many of the tree's first solids, and outside of
+  /// all others: those are sections, which take away and are nothing themselves
   RayMeter(const Tree& tree, Tree::NodeId root, double relative_precision,
-           const Execution& execution = {});
+           const Execution& execution = {}, std::size_t counted = SIZE_MAX);
   ~RayMeter();
   RayMeter(RayMeter&&) noexcept;
   RayMeter& operator=(RayMeter&&) noexcept;

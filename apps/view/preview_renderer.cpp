@@ -55,7 +55,8 @@ class PreviewRenderer final : public Renderer {
     }
     frame.drawn_by = "CPU";
     if (!meter_) {
-      meter_.emplace(what_->tree, what_->tree.root(), what_->relative_precision, execution);
+      meter_.emplace(what_->tree, what_->tree.root(), what_->relative_precision, execution,
+                     what_->model_solids);
       frame.prepare_ms = ms_since(begin);
     }
     if (auto done = draw_heat(request, execution, frame); !done)

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <future>
 #include <mutex>
+#include <tuple>
 #include <vector>
 
 #include "csg/picture.h"
@@ -304,6 +305,7 @@ TEST(CpuRenderer, PicksAreThePixelsOfThePicture) {
 TEST(CpuRenderer, HeatMapsSayWhatTheirColoursMean) {
   auto what = std::make_shared<Arrangement>();
   what->tree = ball_and_box();
+  what->model_solids = what->tree.solids().size();
   FrameRequest request;
   request.what = what;
   request.size = {64, 64};
@@ -323,6 +325,43 @@ TEST(CpuRenderer, HeatMapsSayWhatTheirColoursMean) {
   EXPECT_EQ(frame->scale.high, 10);
   // Below the hole there are 6 of 10 left.
   EXPECT_EQ(frame->picture.pixels[32 * 64 + 32], heat_colour(0.6));
+}
+
+TEST(CpuRenderer, HeatMapsCountTheScenesSolidsAloneAndWhereTheSectionLeavesThem) {
+  Model model;
+  model.scene.tree = ball_and_box();
+  Looks looks;
+  looks.section = apps::SectionPlane{{1, 0, 0}, 0, false};
+  looks.ghosts = true;
+  FrameRequest request;
+  request.what = arrange(model, looks);
+  ASSERT_GT(request.what->tree.solids().size(), request.what->model_solids);
+  request.size = {64, 64};
+  request.camera.projection = csg::Projection::kOrthographic;
+  request.camera.rotation = {0, 0, 0};
+  request.camera.distance = 40;
+  request.heat = Heat::kDepth;
+  const auto renderer = make_renderer();
+  for (const auto& [normal, empty, full] :
+       {std::tuple(glm::dvec3(1, 0, 0), 34, 29), std::tuple(glm::dvec3(-1, 0, 0), 29, 34)}) {
+    looks.section->normal = normal;
+    request.what = arrange(model, looks);
+    const auto frame = renderer->draw(request, {});
+    ASSERT_TRUE(frame);
+    EXPECT_EQ(frame->longest_list, 4u);
+    EXPECT_EQ(frame->scale.high, 4);
+    const auto at = [&, &pixels = frame->picture.pixels](int u, int v) {
+      return pixels[static_cast<std::size_t>(v * 64 + u)];
+    };
+    EXPECT_EQ(at(full, 32), heat_colour(1.0));
+    EXPECT_EQ(at(empty, 32), at(0, 0));  // cut away: the background
+  }
+  // Across the rays: what lies above the plane is cut away.
+  looks.section = apps::SectionPlane{{0, 0, 1}, 3, false};
+  request.what = arrange(model, looks);
+  const auto frame = renderer->draw(request, {});
+  ASSERT_TRUE(frame);
+  EXPECT_EQ(frame->longest_list, 2u);  // the hole's floor, the box's bottom
 }
 
 }  // namespace
