@@ -13,8 +13,10 @@ constexpr std::chrono::milliseconds kMoveEvery{16};
 constexpr int kMoves = 12;
 
 /// Whether a command looks at what is on the screen.
-bool looks_at_screen(Action action) {
-  switch (action) {
+bool looks_at_screen(const ScriptCommand& command) {
+  switch (command.action) {
+    case Action::kKey:
+      return command.word == "ctrl+s";
     case Action::kPick:
     case Action::kClick:
     case Action::kScreenshot:
@@ -61,7 +63,7 @@ Result<void> ScriptRunner::step(Viewer& viewer, Stage& stage) {
   while (!ended() && !quit_) {
     const ScriptCommand& command = commands_[next_];
     if (!runs_while_loading(command.action) && !viewer.loaded()) return {};
-    if (looks_at_screen(command.action) && !begun_ && (acted_ || !viewer.settled())) return {};
+    if (looks_at_screen(command) && !begun_ && (acted_ || !viewer.settled())) return {};
     auto done = run(command, viewer, stage);
     if (!done) {
       Error error = std::move(done.error());
@@ -102,10 +104,11 @@ Result<bool> ScriptRunner::run(const ScriptCommand& command, Viewer& viewer, Sta
       }
       return !viewer.picking();
     case Action::kKey:
+      if (begun_) return !viewer.wants_screenshot;
       if (!viewer.key(command.word)) {
         return fail(ErrorCode::kUsage, "no key does anything by the name '{}'", command.word);
       }
-      return true;
+      return !viewer.wants_screenshot;  // else the window's next turn takes it
     case Action::kView:
       viewer.look(command.word);
       return true;

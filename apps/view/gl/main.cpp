@@ -60,7 +60,11 @@ std::string key_name(int key, int modifiers) {
   return {};
 }
 
+/// Says it on standard error; what was said last is not said again.
 void complain(const Error& error) {
+  static std::string last;
+  if (error.message == last) return;
+  last = error.message;
   std::fprintf(stderr, "strata view: error: %s\n", error.message.c_str());
 }
 
@@ -161,6 +165,7 @@ class Program final : public Stage {
       glfwWaitEventsTimeout(hurried ? 0.008 : options_.watch ? 0.1 : 0.5);
       lay_out();
       viewer_->tick();
+      tell_load_error();
       if (draw_due()) {
         const auto begin = Clock::now();
         draw(false);
@@ -180,6 +185,15 @@ class Program final : public Stage {
       }
     }
     return {};
+  }
+
+  /// What the window says of a scene that cannot be read, for who does not look at it.
+  void tell_load_error() {
+    if (viewer_->loads() == loads_told_) return;
+    loads_told_ = viewer_->loads();
+    if (viewer_->load_error().empty() || viewer_->load_error_code() == ErrorCode::kCancelled)
+      return;
+    complain({viewer_->load_error_code(), viewer_->load_error()});
   }
 
   /// Something that panels show may have changed. They take some turns to follow: what is below
@@ -245,6 +259,7 @@ class Program final : public Stage {
       if (std::filesystem::exists(path, error)) continue;
       const auto done = screenshot(path, false);
       panels_->tell(done ? "written: " + path : done.error().message);
+      if (!done) complain(done.error());
       return;
     }
   }
@@ -285,7 +300,7 @@ class Program final : public Stage {
   std::optional<Viewer> viewer_;  ///< last: its threads wake the window
   glm::ivec2 window_size_{0};
   Area area_;
-  std::uint64_t uploaded_ = 0;
+  std::uint64_t uploaded_ = 0, loads_told_ = 0;
   int settled_turns_ = 0, turns_to_draw_ = 3;
   bool was_settled_ = false;
   Clock::time_point drawn_at_{};

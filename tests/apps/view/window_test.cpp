@@ -351,6 +351,22 @@ TEST_F(Window, ASceneThatCannotBeReadIsShownAndIsTheExitCode) {
   EXPECT_TRUE(place_.has("error.png"));
 }
 
+TEST_F(Window, TheKeyOfAScreenshotIsWaitedFor) {
+  const RunResult run = view("key ctrl+s\nquit\n", {"--size", "400,300"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(image_of(place_, "strata-view-1.png").width, 400);
+}
+
+TEST_F(Window, AMessageOfTheWindowIsOnStandardErrorWhileItIsOpen) {
+  place_.write("part.csg", "cube(size = [1, 1);\n");
+  const RunResult run = view("wait\nprint still here\nwait 0.2\nquit\n", {"--size", "400,300"});
+  EXPECT_EQ(run.exit_code, 3);
+  EXPECT_NE(run.out.find("still here"), std::string::npos);
+  const std::size_t first = run.err.find("part.csg:1:");
+  EXPECT_NE(first, std::string::npos) << run.err;
+  EXPECT_EQ(run.err.find("part.csg:1:", first + 1), std::string::npos) << run.err;  // once
+}
+
 TEST_F(Window, MistakesOfScriptsNameFileAndLine) {
   RunResult run = view("wait\nhide \"no such solid\"\n");
   EXPECT_EQ(run.exit_code, 2);
