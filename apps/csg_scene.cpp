@@ -4,6 +4,8 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <memory>
+#include <optional>
+#include <set>
 #include <utility>
 
 #include "apps/expression.h"
@@ -96,28 +98,53 @@ class Builder {
   }
 
  private:
-  // As deep as the parser allows.
+  /// Depth: as many parentheses as the parser allows. A chain without them is walked from the left:
+  /// a run of one operator becomes one node, in which an input is not repeated.
   Tree::NodeId build(std::size_t at) {
-    const Expression::Node& node = expression_.nodes[at];
-    switch (node.kind) {
-      case Expression::Kind::kInput: {
-        const bool first = !used_[node.input];
-        used_[node.input] = true;
-        return add_scene(all_, inputs_[node.input], first);
-      }
-      case Expression::Kind::kExclusive: {
-        const Tree::NodeId left = build_pair(node, Operation::kDifference, false);
-        const Tree::NodeId right = build_pair(node, Operation::kDifference, true);
-        return all_.tree.add(Operation::kUnion, {left, right});
-      }
-      case Expression::Kind::kUnion:
-        return build_pair(node, Operation::kUnion, false);
-      case Expression::Kind::kIntersection:
-        return build_pair(node, Operation::kIntersection, false);
-      case Expression::Kind::kDifference:
-        break;
+    std::vector<std::size_t> chain;  // from the right
+    while (expression_.nodes[at].kind != Expression::Kind::kInput &&
+           expression_.nodes[at].kind != Expression::Kind::kExclusive) {
+      chain.push_back(at);
+      at = expression_.nodes[at].first;
     }
-    return build_pair(node, Operation::kDifference, false);
+    Tree::NodeId left = build_one(expression_.nodes[at]);
+    // What stands first counts as repeated where that changes nothing: not in a - a.
+    std::optional<std::size_t> first = input_of(at);
+    while (!chain.empty()) {
+      const Expression::Kind kind = expression_.nodes[chain.back()].kind;
+      std::vector<Tree::NodeId> operands{left};
+      std::set<std::size_t> had;
+      if (first && kind != Expression::Kind::kDifference) had.insert(*first);
+      for (; !chain.empty() && expression_.nodes[chain.back()].kind == kind; chain.pop_back()) {
+        const std::size_t next = expression_.nodes[chain.back()].second;
+        const auto input = input_of(next);
+        if (!input || had.insert(*input).second) operands.push_back(build(next));
+      }
+      if (operands.size() == 1) continue;  // a * a
+      left = all_.tree.add(operation_of(kind), operands);
+      first.reset();
+    }
+    return left;
+  }
+  Tree::NodeId build_one(const Expression::Node& node) {
+    if (node.kind == Expression::Kind::kInput) {
+      const bool first = !used_[node.input];
+      used_[node.input] = true;
+      return add_scene(all_, inputs_[node.input], first);
+    }
+    const Tree::NodeId left = build_pair(node, Operation::kDifference, false);
+    const Tree::NodeId right = build_pair(node, Operation::kDifference, true);
+    return all_.tree.add(Operation::kUnion, {left, right});
+  }
+  [[nodiscard]] std::optional<std::size_t> input_of(std::size_t at) const {
+    const Expression::Node& node = expression_.nodes[at];
+    if (node.kind != Expression::Kind::kInput) return {};
+    return node.input;
+  }
+  static Operation operation_of(Expression::Kind kind) {
+    return kind == Expression::Kind::kUnion          ? Operation::kUnion
+           : kind == Expression::Kind::kIntersection ? Operation::kIntersection
+                                                     : Operation::kDifference;
   }
   Tree::NodeId build_pair(const Expression::Node& node, Operation operation, bool swapped) {
     const Tree::NodeId first = build(swapped ? node.second : node.first);
@@ -225,10 +252,11 @@ void cut_scene(csg::Scene& scene, const std::vector<SectionPlane>& cuts,
     const double above = offset - glm::dot(normal, centre);
     if (above > radius) continue;  // beyond all solids
     const auto mesh = half_space(normal, offset, centre, radius + std::max(0.0, -above));
-    const auto cut = [&](Tree::NodeId node) {
+    // Each has a box of its own, for a node stands in one place only.
+    const auto cut = [&](Tree::NodeId node, const std::string& of) {
       csg::Solid solid;
       solid.mesh = mesh;
-      solid.name = fmt::format("section {}", i + 1);
+      solid.name = fmt::format("section {}{}", i + 1, of);
       const Tree::NodeId half = scene.tree.add_solid(std::move(solid));
       return scene.tree.add(Operation::kDifference, {node, half});
     };
@@ -237,13 +265,17 @@ void cut_scene(csg::Scene& scene, const std::vector<SectionPlane>& cuts,
       std::vector<Tree::NodeId> parts;
       if (has_translucent) {
         parts = united(scene.tree);
-        for (Tree::NodeId& part : parts) part = cut(part);
+        for (std::size_t k = 0; k < parts.size(); ++k) {
+          parts[k] = cut(parts[k], parts.size() > 1 ? fmt::format(" of part {}", k + 1) : "");
+        }
       }
       scene.tree.set_root(has_translucent ? scene.tree.add(Operation::kUnion, parts)
-                                          : cut(scene.tree.root()));
+                                          : cut(scene.tree.root(), ""));
     }
-    for (Tree::NodeId& ghost : scene.backgrounds) ghost = cut(ghost);
-    for (Tree::NodeId& ghost : scene.highlights) ghost = cut(ghost);
+    std::size_t ghosts = 0;
+    for (auto* list : {&scene.backgrounds, &scene.highlights}) {
+      for (Tree::NodeId& ghost : *list) ghost = cut(ghost, fmt::format(" of ghost {}", ++ghosts));
+    }
   }
 }
 

@@ -14,7 +14,8 @@ bool is_name_character(char c) {
 
 class Parser {
  public:
-  Parser(std::string_view text, const std::vector<std::string>& files) : text_(text) {
+  Parser(std::string_view text, const std::vector<std::string>& files)
+      : text_(text), files_(files) {
     for (const std::string& file : files) {
       stems_.push_back(std::filesystem::path(file).stem().string());
     }
@@ -25,8 +26,8 @@ class Parser {
     if (!error_.empty()) return tl::unexpected(Error{ErrorCode::kUsage, error_});
     skip_blanks();
     if (whole && at_ < text_.size()) {
-      complain(text_[at_] == ')' ? "no parenthesis is open here"
-                                 : "an operator is expected here: + | & * - ^");
+      complain(text_[at_] == ')' ? std::string("no parenthesis is open here")
+                                 : "an operator is expected here: + | & * - ^" + by_position());
     }
     if (!error_.empty()) return tl::unexpected(Error{ErrorCode::kUsage, error_});
     return std::move(out_);
@@ -36,6 +37,17 @@ class Parser {
   using Kind = Expression::Kind;
   using Operand = std::optional<std::size_t>;  ///< a node; none after an error
 
+  /// What files whose names are no words here are called: "; a is my part.stl".
+  [[nodiscard]] std::string by_position() const {
+    std::string text;
+    for (std::size_t i = 0; i < std::min<std::size_t>(stems_.size(), 26); ++i) {
+      if (!stems_[i].empty() && std::all_of(stems_[i].begin(), stems_[i].end(), is_name_character))
+        continue;
+      text += fmt::format("{} {} is {}", text.empty() ? "; by position," : ",",
+                          static_cast<char>('a' + i), files_[i]);
+    }
+    return text;
+  }
   void complain(std::string_view what) {
     if (!error_.empty()) return;
     // The place in characters, not bytes.
@@ -101,8 +113,9 @@ class Parser {
       return inner;
     }
     if (is_name_character(c)) return name();
-    complain(c == '\0' ? "a name or an opening parenthesis is missing here"
-                       : "a name or an opening parenthesis is expected here");
+    complain(std::string(c == '\0' ? "a name or an opening parenthesis is missing here"
+                                   : "a name or an opening parenthesis is expected here") +
+             by_position());
     return {};
   }
   Operand name() {
@@ -126,12 +139,13 @@ class Parser {
       complain(fmt::format("{} would be file {}, but there {} only {}", word, word[0] - 'a' + 1,
                            stems_.size() == 1 ? "is" : "are", stems_.size()));
     } else {
-      complain(fmt::format("no file is called {}", word));
+      complain(fmt::format("no file is called {}{}", word, by_position()));
     }
     return {};
   }
 
   std::string_view text_;
+  const std::vector<std::string>& files_;
   std::vector<std::string> stems_;
   std::size_t at_ = 0;
   int depth_ = 0;
