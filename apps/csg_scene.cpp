@@ -26,11 +26,46 @@ bool is_scene(const std::string& path, const CsgCommand& command) {
   return command.input.format == MeshFormat::kAuto && is_scene_name(path);
 }
 
-Result<csg::Scene> load_one(const std::string& path, const CsgCommand& command, Session& session) {
+/// What the solids of a scene's result hold.
+InputFacts facts_of(const std::string& path, const csg::Scene& scene) {
+  InputFacts facts;
+  facts.path = path;
+  facts.closed = true;
+  const Tree& tree = scene.tree;
+  if (tree.root() == Tree::kNone) return facts;
+  facts.bounds = csg::bounds(tree, tree.root());
+  std::vector<Tree::NodeId> stack{tree.root()};
+  while (!stack.empty()) {
+    const Tree::NodeId id = stack.back();
+    stack.pop_back();
+    if (tree.nodes()[id].operation != Operation::kSolid) {
+      const auto operands = tree.operands(id);
+      stack.insert(stack.end(), operands.begin(), operands.end());
+      continue;
+    }
+    const auto& mesh = tree.solids()[tree.nodes()[id].first].mesh;
+    if (!mesh) continue;
+    facts.stats.triangles += mesh->triangles.size();
+    facts.stats.vertices += mesh->positions.size();
+  }
+  return facts;
+}
+
+Result<csg::Scene> load_one(const std::string& path, const CsgCommand& command, Session& session,
+                            std::vector<InputFacts>* told) {
   if (is_scene(path, command)) {
     const double share = 0.5 / static_cast<double>(command.input.files.size());
     const Execution execution = session.execution("reading", share);
-    return csg::read_scene(path, command.scene, execution);
+    auto scene = csg::read_scene(path, command.scene, execution);
+    if (scene && told != nullptr) told->push_back(facts_of(path, *scene));
+    return scene;
+  }
+  if (command.input.format == MeshFormat::kAuto && path == "-") {
+    return fail(ErrorCode::kUsage,
+                "standard input needs --input-format: csg, obj, stl, ply or off");
+  }
+  if (auto named = check_input_name(path, command.input, true); !named) {
+    return tl::unexpected(named.error());
   }
   csg::Scene scene;
   TriangleSoup soup;
@@ -43,6 +78,7 @@ Result<csg::Scene> load_one(const std::string& path, const CsgCommand& command, 
   solid.rule = command.rule;
   solid.name = path;
   scene.tree.set_root(scene.tree.add_solid(std::move(solid)));
+  if (told != nullptr) told->push_back(*std::move(facts));
   return scene;
 }
 
@@ -196,7 +232,8 @@ bool is_scene_name(const std::string& path) {
   return false;
 }
 
-Result<csg::Scene> load_scene(const CsgCommand& command, Session& session) {
+Result<csg::Scene> load_scene(const CsgCommand& command, Session& session,
+                              std::vector<InputFacts>* facts) {
   const std::vector<std::string>& files = command.input.files;
   Expression expression;
   if (!command.expression.empty()) {
@@ -206,7 +243,7 @@ Result<csg::Scene> load_scene(const CsgCommand& command, Session& session) {
   }
   std::vector<csg::Scene> inputs;
   for (const std::string& path : files) {
-    auto scene = load_one(path, command, session);
+    auto scene = load_one(path, command, session, facts);
     if (!scene) return tl::unexpected(scene.error());
     for (const std::string& note : scene->notes) session.note(note);
     for (const csg::SceneWarning& warning : scene->warnings) {

@@ -1,6 +1,10 @@
 #pragma once
 
+#include <string>
+#include <vector>
+
 #include "apps/commands.h"
+#include "apps/mesh_input.h"
 #include "apps/session.h"
 #include "core/result.h"
 #include "csg/scene/scene.h"
@@ -13,7 +17,9 @@ namespace strata::apps {
 /// The inputs of `strata csg` as one scene: a single scene as it is, else all inputs united or what
 /// --expr makes of them. Warnings go to the session. @return as read_scene() and load_mesh();
 /// kUsage for the expression; kLimit when it becomes too large
-Result<csg::Scene> load_scene(const CsgCommand& command, Session& session);
+/// @param facts gets what each file holds; a scene counts as closed
+Result<csg::Scene> load_scene(const CsgCommand& command, Session& session,
+                              std::vector<InputFacts>* facts = nullptr);
 
 /// Takes the sections away from the scene and its ghosts.
 void cut_scene(csg::Scene& scene, const std::vector<SectionPlane>& cuts, const csg::Camera& camera);

@@ -1,9 +1,11 @@
 #include "apps/mesh_input.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <glm/geometric.hpp>
 #include <utility>
 
+#include "apps/csg_scene.h"
 #include "apps/session.h"
 #include "mesh/block_sum.h"
 #include "mesh/soup_tools.h"
@@ -130,7 +132,33 @@ void warn_of_reading(const std::string& path, const MeshReadStats& stats, Sessio
   for (const std::string& text : stats.warnings) session.warn("reader", text);
 }
 
+Result<void> check_input_name(const std::string& path, const InputOptions& input, bool scenes) {
+  if (input.format != MeshFormat::kAuto || path == "-") return {};
+  std::error_code ignored;
+  if (std::filesystem::is_directory(path, ignored)) {
+    return fail(ErrorCode::kInput, "{}: it is a folder, not a file", path);
+  }
+  if (mesh_format_of(path) != MeshFormat::kAuto) return {};
+  if (scenes) {
+    return fail(ErrorCode::kInput,
+                "{}: its name ends in none of .csg, .scad, .obj, .stl, .ply, .off; name the format "
+                "(--input-format)",
+                path);
+  }
+  if (is_scene_name(path)) {
+    return fail(ErrorCode::kInput,
+                "{}: it is a scene, here meshes are read; strata csg --json measures scenes", path);
+  }
+  return fail(ErrorCode::kInput,
+              "{}: its name ends in none of .obj, .stl, .ply, .off; name the format "
+              "(--input-format)",
+              path);
+}
+
 Result<MeshFile> read_input(const std::string& path, const InputOptions& input, Session& session) {
+  if (auto named = check_input_name(path, input, false); !named) {
+    return tl::unexpected(named.error());
+  }
   MeshReadOptions options;
   options.format = input.format;
   options.reader = input.reader;

@@ -64,6 +64,10 @@ Result<InputFacts> load_mesh(const std::string& path, const InputOptions& input,
                              const MeshInputRules& rules, Session& session, TriangleSoup& soup,
                              double* read_ms = nullptr);
 
+/// Whether a file's name or the options say what format it has. @param scenes where scenes can be
+/// read, too @return kInput naming what there is, or who reads scenes
+Result<void> check_input_name(const std::string& path, const InputOptions& input, bool scenes);
+
 /// One file, read as the options say.
 Result<MeshFile> read_input(const std::string& path, const InputOptions& input, Session& session);
 

@@ -59,24 +59,16 @@ Result<MeshInput> load_solids(const InputOptions& input, const MeshInputRules& r
   command.input = input;
   command.rule = rules.rule;
   command.keep_orientation = rules.keep_orientation;
-  auto scene = load_scene(command, session);
+  MeshInput all;
+  auto scene = load_scene(command, session, &all.files);
   if (!scene) return tl::unexpected(scene.error());
   const csg::Tree& tree = scene->tree;
-  MeshInput all;
   all.bounds = csg::bounds(tree, tree.root());
   if (all.bounds.empty()) {
     return fail(ErrorCode::kGeometry, "{}: the scene is empty", input.files.front());
   }
   set_tree(all, tree);
-  for (const std::string& path : input.files) {
-    InputFacts facts;
-    facts.path = path;
-    facts.closed = true;
-    facts.bounds = all.bounds;
-    all.files.push_back(std::move(facts));
-  }
-  all.files.front().stats.triangles = all.soup.triangles.size();
-  all.files.front().stats.vertices = all.soup.positions.size();
+  for (const InputFacts& facts : all.files) all.closed = all.closed && facts.closed;
   all.read_ms = session.milliseconds() - start;
   session.note(fmt::format("{}: {}, {}", input.files.front(),
                            counted(tree.solids().size(), "solid"),

@@ -321,6 +321,35 @@ TEST_F(Voxelize, AVoxFileKeepsTheColoursOfAScene) {
   EXPECT_EQ(red, 64u);
 }
 
+TEST_F(Voxelize, AReportOfScenesAndMeshesSaysWhatEachFileHolds) {
+  place.write("cube.csg", "cube(size = [2, 2, 2], center = false);\n");
+  put("box.stl", make_box({1, 0, 0}, {3, 2, 2}));
+  TriangleSoup open = make_box({0, 0, 0}, {1, 1, 1});
+  open.triangles.pop_back();
+  put("open.obj", open);
+  const auto files = [&](const std::vector<std::string>& names) {
+    std::vector<std::string> words = names;
+    words.insert(words.end(), {"-r", "12"});
+    return report(words)["input"];
+  };
+  for (const std::vector<std::string>& names :
+       {std::vector<std::string>{"cube.csg", "box.stl"}, {"box.stl", "cube.csg"}}) {
+    const json input = files(names);
+    EXPECT_EQ(input["closed"], true);
+    for (std::size_t i = 0; i < 2; ++i) {
+      EXPECT_EQ(input["files"][i]["path"], names[i]);
+      EXPECT_EQ(input["files"][i]["triangles"], 12) << names[i];
+      EXPECT_EQ(input["files"][i]["vertices"], 8) << names[i];
+    }
+  }
+  const json input = files({"cube.csg", "open.obj"});
+  EXPECT_EQ(input["closed"], false);
+  EXPECT_EQ(input["files"][0]["closed"], true);
+  EXPECT_EQ(input["files"][1]["closed"], false);
+  EXPECT_EQ(input["files"][1]["triangles"], 11);
+  EXPECT_EQ(input["files"][1]["unbalanced_edges"], 3);
+}
+
 TEST_F(Voxelize, TheSurfaceOfASceneIsThatOfItsResult) {
   place.write("hole.csg",
               "difference() { cube(size = [8, 8, 8], center = true); "
