@@ -24,9 +24,9 @@ constexpr const char* kTopHelp = R"(strata: triangle meshes to voxels, exactly a
 usage: strata COMMAND [OPTIONS] FILE...
 
 commands:
-  voxelize    meshes to a voxel grid, a file of it, or statistics
+  voxelize    meshes or scenes to a voxel grid, a file of it, or statistics
   info        what a mesh file holds: counts, bounds, area, volume, holes
-  ldi         a mesh to a layered depth image
+  ldi         meshes or a scene to a layered depth image
   csg         a scene (.csg, .scad) or an expression over meshes to a picture
   view        the same in a window: turn, cut, pick, measure, reload
 
@@ -49,7 +49,7 @@ exit codes:
 )";
 
 constexpr const char* kVoxelizeExamples =
-    R"(Meshes to voxels. A voxel is solid when its centre is inside.
+    R"(Meshes and scenes to voxels. A voxel is solid when its centre is inside.
 
   strata voxelize knot.obj -r 512 -o knot.vdb            512 voxels along the longest side
   strata voxelize a.stl b.stl --voxel-size 0.2 -o all.nrrd       the union, on one grid
@@ -69,7 +69,7 @@ constexpr const char* kInfoExamples =
 )";
 
 constexpr const char* kLdiExamples =
-    R"(A mesh to a layered depth image: per pixel, the sorted depths where a ray meets it.
+    R"(Meshes or a scene to a layered depth image: per pixel, the sorted depths where a ray meets it.
 
   strata ldi knot.obj -r 512 -o knot.exr              solid intervals, deep scanline EXR
   strata ldi knot.obj -r 512 --samples -o knot.exr    a sample for each surface
@@ -130,11 +130,11 @@ struct Words {
   CsgWords csg;
 };
 
-void add_inputs(CLI::App& app, Words& words, bool several) {
-  auto* option =
-      app.add_option("INPUT", words.files, "Mesh files: .obj .stl .ply .off; - for standard input");
-  option->type_name("");
-  if (!several) option->expected(-1)->description("Mesh file: .obj .stl .ply .off; - for a pipe");
+void add_inputs(CLI::App& app, Words& words, bool scenes) {
+  app.add_option("INPUT", words.files,
+                 scenes ? "Meshes (.obj .stl .ply .off), scenes (.csg .scad); - a pipe of a mesh"
+                        : "Mesh files: .obj .stl .ply .off; - for standard input")
+      ->type_name("");
   app.add_option("--input-format", words.input_format, "obj, stl, ply or off, whatever the name is")
       ->type_name("FORMAT")
       ->group("Input");
@@ -251,7 +251,7 @@ void define_voxelize(CLI::App& app, Words& words) {
 
 void define_info(CLI::App& app, Words& words) {
   app.description(kInfoExamples);
-  add_inputs(app, words, true);
+  add_inputs(app, words, false);
   app.add_flag("--gl", words.gl, "What OpenGL there is, and how it is used; files are not needed")
       ->group("Output");
   add_json(app, words, "Output");
@@ -260,7 +260,7 @@ void define_info(CLI::App& app, Words& words) {
 
 void define_ldi(CLI::App& app, Words& words) {
   app.description(kLdiExamples);
-  add_inputs(app, words, false);
+  add_inputs(app, words, true);
   app.add_option("-o,--output", words.output,
                  "File to write: .exr, .npz, or .png (an X-ray picture)")
       ->type_name("FILE")
@@ -560,6 +560,9 @@ Command parse_command_line(int argc, const char* const* argv) {
   app.footer("strata --help lists the exit codes.");
   try {
     std::vector<std::string> arguments(argv + 2, argv + argc);
+    if (const auto mistake = empty_value(arguments); !mistake.empty()) {
+      return usage_error(name, mistake);
+    }
     std::reverse(arguments.begin(), arguments.end());  // CLI11 takes them from the back
     app.parse(std::move(arguments));
   } catch (const CLI::CallForHelp&) {

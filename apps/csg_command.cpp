@@ -105,13 +105,22 @@ std::string why_empty(const CsgCommand& command, const csg::Preview& preview, co
       command.cuts.empty() ? "" : ", before --cut"));
 }
 
+/// What ran out of memory does not know what the user can do about it.
+Error with_limit(Error error, const Session& session) {
+  if (error.code == ErrorCode::kLimit && error.message.find("out of memory") != std::string::npos) {
+    error.message +=
+        fmt::format("; the limit is {} (--memory-limit)", readable_bytes(session.memory_limit()));
+  }
+  return error;
+}
+
 /// The pictures of numbers: solids and distances, one sample a pixel.
 Result<void> write_numbers(const CsgCommand& command, const csg::Camera& camera,
                            csg::Preview& preview, CsgOutcome& outcome, Session& session) {
   const auto view = csg::make_view(camera, command.size, preview.box());
   if (!view) return tl::unexpected(view.error());
   const auto image = preview.draw(*view, session.execution("drawing"));
-  if (!image) return tl::unexpected(image.error());
+  if (!image) return tl::unexpected(with_limit(image.error(), session));
   const csg::SurfaceImage& surfaces = **image;
   if (!command.depth.empty()) {
     if (auto done = csg::write_depth_exr(surfaces, *view, command.depth); !done) return done;
@@ -198,7 +207,7 @@ Result<void> run_csg(const CsgCommand& command, Session& session) {
       session.warn("backend", fmt::format("the GPU failed, the CPU did the work: {}", failure));
     }
   }
-  if (!picture) return tl::unexpected(picture.error());
+  if (!picture) return tl::unexpected(with_limit(std::move(picture.error()), session));
   if (from_above) {
     const glm::u8vec3 ground = look.scheme->background;
     draw_outlines(*picture, {ground, look.transparent_background ? 0 : 255});

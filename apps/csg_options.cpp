@@ -4,7 +4,9 @@
 #include <bit>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <tuple>
 
+#include "apps/file_conflicts.h"
 #include "apps/option_values.h"
 
 namespace strata::apps {
@@ -25,9 +27,10 @@ Result<glm::ivec2> parse_size(std::string_view text) {
     return fail(ErrorCode::kUsage, "--size takes width,height, not '{}'", text);
   }
   const auto width = parse_integer("--size", text.substr(0, mark));
-  if (!width) return tl::unexpected(width.error());
   const auto height = parse_integer("--size", text.substr(mark + 1));
-  if (!height) return tl::unexpected(height.error());
+  if (!width || !height) {
+    return fail(ErrorCode::kUsage, "--size takes two whole numbers, width,height, not '{}'", text);
+  }
   if (*width < 1 || *height < 1 || *width > csg::kMaxPictureSide ||
       *height > csg::kMaxPictureSide) {
     return fail(ErrorCode::kUsage, "--size {}: each side is 1 to {} pixels", text,
@@ -55,6 +58,19 @@ Result<int> parse_samples(std::string_view text) {
 
 }  // namespace
 
+Result<void> check_picture_name(std::string_view asked_by, const std::string& path, bool depth) {
+  if (is_stream(path) || path.ends_with(depth ? ".exr" : ".png") ||
+      path.ends_with(depth ? ".EXR" : ".PNG")) {
+    return {};
+  }
+  return fail(ErrorCode::kUsage, "{}{}: {}", asked_by, path,
+              depth ? "distances are written as .exr" : "pictures are written as .png");
+}
+
+Result<csg::Projection> parse_projection(std::string_view text) {
+  return parse_choice("--projection", text, kProjections);
+}
+
 Result<csg::Camera> parse_camera(std::string_view text) {
   const auto numbers = parse_numbers("--camera", text, 6, 7);
   if (!numbers) return tl::unexpected(numbers.error());
@@ -75,21 +91,22 @@ Result<csg::Camera> parse_camera(std::string_view text) {
 
 Result<SectionPlane> parse_section(std::string_view text) {
   SectionPlane plane;
+  const auto no_plane = [text] {
+    return fail(ErrorCode::kUsage, "--cut takes a plane such as x=5, z<10 or nx,ny,nz,d, not '{}'",
+                text);
+  };
   const std::size_t axis =
       text.empty() ? std::string_view::npos : std::string_view("xyz").find(text[0]);
   if (axis != std::string_view::npos && text.size() > 2 &&
       std::string_view("=<>").find(text[1]) != std::string_view::npos) {
     const auto at = parse_numbers("--cut", text.substr(2), 1, 1);
-    if (!at) return tl::unexpected(at.error());
+    if (!at) return no_plane();
     plane.normal[static_cast<int>(axis)] = text[1] == '>' ? -1.0 : 1.0;
     plane.offset = text[1] == '>' ? -at->front() : at->front();
     plane.towards_eye = text[1] == '=';
     return plane;
   }
-  if (text.find(',') == std::string_view::npos) {
-    return fail(ErrorCode::kUsage, "--cut takes a plane such as x=5, z<10 or nx,ny,nz,d, not '{}'",
-                text);
-  }
+  if (text.find(',') == std::string_view::npos) return no_plane();
   const auto numbers = parse_numbers("--cut", text, 4, 4);
   if (!numbers) return tl::unexpected(numbers.error());
   const auto& n = *numbers;
@@ -122,7 +139,7 @@ Result<void> read_csg_options(const CsgWords& words, CsgCommand& command) {
     take(parse_camera(words.camera), command.camera);
   }
   if (!words.projection.empty()) {
-    take(parse_choice("--projection", words.projection, kProjections), command.camera.projection);
+    take(parse_projection(words.projection), command.camera.projection);
   }
   if (!words.scheme.empty()) take(parse_scheme(words.scheme), command.picture.scheme);
   if (!words.samples.empty()) take(parse_samples(words.samples), command.picture.samples);
@@ -150,9 +167,11 @@ Result<void> read_csg_options(const CsgWords& words, CsgCommand& command) {
   if (command.output.empty() && command.ids.empty() && command.depth.empty() && !command.json) {
     return fail(ErrorCode::kUsage, "nothing to do: give -o FILE.png, --ids, --depth or --json");
   }
-  if (!command.output.empty() && command.output != "-" && !command.output.ends_with(".png") &&
-      !command.output.ends_with(".PNG") && !command.output.starts_with("/dev/")) {
-    return fail(ErrorCode::kUsage, "{}: pictures are written as .png", command.output);
+  for (const auto& [asked_by, path, depth] :
+       {std::tuple("", &command.output, false), std::tuple("--ids ", &command.ids, false),
+        std::tuple("--depth ", &command.depth, true)}) {
+    if (path->empty()) continue;
+    if (auto named = check_picture_name(asked_by, *path, depth); !named) return named;
   }
   if (!(command.camera.distance > 0) && !command.view_all) {
     return fail(ErrorCode::kUsage, "--camera {}: the distance must be above 0, or give --view-all",

@@ -31,7 +31,7 @@ Result<std::vector<double>> parse_numbers(std::string_view option, std::string_v
     double value = 0;
     if (!read_all(rest.substr(0, comma), value) || !std::isfinite(value)) {
       return fail(ErrorCode::kUsage, "{} takes {} with commas between, not '{}'", option,
-                  least == most ? fmt::format("{} numbers", least)
+                  least == most ? fmt::format("{} number{}", least, least == 1 ? "" : "s")
                                 : fmt::format("{} or {} numbers", least, most),
                   text);
     }
@@ -40,8 +40,9 @@ Result<std::vector<double>> parse_numbers(std::string_view option, std::string_v
     rest.remove_prefix(comma + 1);
   }
   if (values.size() != least && values.size() != most) {
-    return fail(ErrorCode::kUsage, "{} takes {}{} numbers, not the {} of '{}'", option,
-                least == most ? "" : fmt::format("{} or ", least), most, values.size(), text);
+    return fail(ErrorCode::kUsage, "{} takes {}{} number{}, not the {} of '{}'", option,
+                least == most ? "" : fmt::format("{} or ", least), most, most == 1 ? "" : "s",
+                values.size(), text);
   }
   return values;
 }
@@ -67,6 +68,20 @@ Result<std::uint64_t> parse_bytes(std::string_view option, std::string_view text
                 "{} takes a number of bytes above 0, such as 512M or 2G, not '{}'", option, text);
   }
   return static_cast<std::uint64_t>(value * unit);
+}
+
+std::string empty_value(std::span<const std::string> arguments) {
+  for (std::size_t i = 0; i < arguments.size() && arguments[i] != "--"; ++i) {
+    const std::string& word = arguments[i];
+    if (word.starts_with("--") && word.find('=') + 1 == word.size()) {
+      return fmt::format("{} is given an empty value", word.substr(0, word.size() - 1));
+    }
+    const bool takes_next = word.size() > 1 && word[0] == '-' && word.find('=') == word.npos;
+    if (takes_next && i + 1 < arguments.size() && arguments[i + 1].empty()) {
+      return fmt::format("{} is given an empty value", word);
+    }
+  }
+  return {};
 }
 
 tl::unexpected<Error> no_such_choice(std::string_view option, std::string_view text,

@@ -24,6 +24,10 @@ Result<std::vector<double>> parse_numbers(std::string_view option, std::string_v
 /// A size in bytes: a number and K, M, G or T (powers of 1024), or none.
 Result<std::uint64_t> parse_bytes(std::string_view option, std::string_view text);
 
+/// The mistake of an option with an empty value, `--camera=` or `--expr ""`, which a parser would
+/// take for one that is not given, or whose value is the next word. Empty: there is none.
+[[nodiscard]] std::string empty_value(std::span<const std::string> arguments);
+
 /// The error for a word that is none of `names`.
 [[nodiscard]] tl::unexpected<Error> no_such_choice(std::string_view option, std::string_view text,
                                                    std::span<const std::string_view> names);

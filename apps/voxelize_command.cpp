@@ -41,16 +41,6 @@ Result<void> check_output(const VoxelizeCommand& command) {
   if (command.ids) {
     if (auto held = check_ids(*format, 1); !held) return held;
   }
-  struct stat out {};
-  if (command.output == "-" || stat(command.output.c_str(), &out) != 0 || !S_ISREG(out.st_mode)) {
-    return {};
-  }
-  for (const std::string& path : command.input.files) {
-    struct stat in {};
-    if (stat(path.c_str(), &in) == 0 && in.st_dev == out.st_dev && in.st_ino == out.st_ino) {
-      return fail(ErrorCode::kUsage, "{} is an input; it would be overwritten", command.output);
-    }
-  }
   return {};
 }
 

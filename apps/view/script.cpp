@@ -49,7 +49,7 @@ constexpr Rule kRules[] = {
     {"view", Action::kView, Form::kWord, "NAME",
      "top bottom left right front back diagonal centre all reset"},
     {"camera", Action::kCamera, Form::kWord, "NUMBERS", "as --camera"},
-    {"projection", Action::kProjection, Form::kWord, "P", "perspective or orthographic"},
+    {"projection", Action::kProjection, Form::kWord, "P", "as --projection"},
     {"section", Action::kSection, Form::kSection, "PLANE",
      "z=3.5 or z 3.5, y>0, nx,ny,nz,d; off; flip"},
     {"ghosts", Action::kGhosts, Form::kOnOff, "on|off", "of what is subtracted"},
@@ -212,8 +212,14 @@ class Line {
       case Action::kView:
         return one_of({"top", "bottom", "left", "right", "front", "back", "diagonal", "centre",
                        "all", "reset"});
-      case Action::kProjection:
-        return one_of({"perspective", "orthographic"});
+      case Action::kProjection: {
+        const auto projection = apps::parse_projection(command.word);
+        if (projection) return {};
+        return fail(ErrorCode::kUsage, "{}: {}", where_, projection.error().message);
+      }
+      case Action::kScreenshot:
+      case Action::kPicture:
+        return apps::check_picture_name(fmt::format("{}: ", where_), command.word);
       case Action::kHeat:
         return one_of({"off", "thickness", "depth"});
       case Action::kCamera: {

@@ -19,7 +19,7 @@ enum class Action {
   kKey,         ///< word: a key with its modifiers, such as ctrl+4
   kView,        ///< word: a named view, centre, all or reset
   kCamera,      ///< word: as --camera
-  kProjection,  ///< word: perspective or orthographic
+  kProjection,  ///< word: as --projection
   kSection,     ///< word: off, flip, or a plane as --cut
   kGhosts,      ///< on
   kEdges,

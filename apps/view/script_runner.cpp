@@ -121,8 +121,7 @@ Result<bool> ScriptRunner::run(const ScriptCommand& command, Viewer& viewer, Sta
     }
     case Action::kProjection: {
       csg::Camera camera = viewer.camera();
-      camera.projection = command.word == "perspective" ? csg::Projection::kPerspective
-                                                        : csg::Projection::kOrthographic;
+      camera.projection = apps::parse_projection(command.word).value_or(camera.projection);
       viewer.set_camera(camera);
       return true;
     }

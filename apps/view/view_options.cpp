@@ -136,11 +136,8 @@ Result<void> read(Words& words, ViewOptions& options) {
   command.output = "window.png";  // strata csg asks for some output
   if (auto done = apps::read_csg_options(words.csg, command); !done) return done;
   command.output.clear();
-  if (!options.screenshot.empty() && !options.screenshot.ends_with(".png") &&
-      !options.screenshot.ends_with(".PNG")) {
-    return fail(ErrorCode::kUsage, "{}: pictures are written as .png", options.screenshot);
-  }
-  return {};
+  if (options.screenshot.empty()) return {};
+  return apps::check_picture_name("--screenshot ", options.screenshot);
 }
 
 }  // namespace
@@ -159,6 +156,7 @@ std::variant<apps::ParseOutcome, ViewOptions> parse_view_options(int argc,
   };
   try {
     std::vector<std::string> arguments(argv + std::min(argc, 1), argv + argc);
+    if (const auto empty = apps::empty_value(arguments); !empty.empty()) return mistake(empty);
     std::reverse(arguments.begin(), arguments.end());  // CLI11 takes them from the back
     app.parse(std::move(arguments));
   } catch (const CLI::CallForHelp&) {

@@ -215,6 +215,84 @@ TEST_F(Csg, MistakesInOptionsAreNamed) {
   EXPECT_TRUE(has(refused({"scene.csg"}, 2), "nothing to do"));
   EXPECT_TRUE(has(refused({"-o", "out.png"}, 2), "no scene and no mesh file"));
   EXPECT_TRUE(has(refused({"scene.csg", "-o", "out.gif"}, 2), "written as .png"));
+  EXPECT_TRUE(has(refused({"scene.csg", "--ids", "ids.jpg"}, 2),
+                  "--ids ids.jpg: pictures are written as .png"));
+  EXPECT_TRUE(has(refused({"scene.csg", "--depth", "d.png"}, 2),
+                  "--depth d.png: distances are written as .exr"));
+  // The whole value is quoted, one number is one, and an empty value takes no other option's name.
+  EXPECT_TRUE(has(says("--cut=x>=5"), "not 'x>=5'"));
+  EXPECT_TRUE(has(says("--size=5,five"), "not '5,five'"));
+  EXPECT_TRUE(has(says("--scad-timeout=soon"), "takes 1 number with"));
+  EXPECT_TRUE(has(refused({"scene.csg", "-o", "out.png", "--camera=", "--progress", "none"}, 2),
+                  "--camera is given an empty value"));
+  EXPECT_TRUE(has(refused({"scene.csg", "-o", "out.png", "--expr", ""}, 2),
+                  "--expr is given an empty value"));
+}
+
+TEST_F(Csg, FilesThatAreNoScenesAreSaidToBeWhatTheyAre) {
+  place.write("scene.csg", kCube);
+  place.write("scene.txt", kCube);
+  EXPECT_TRUE(has(refused({".", "-o", "out.png"}, 3), ".: it is a folder"));
+  EXPECT_TRUE(has(refused({"scene.txt", "-o", "out.png"}, 3), "none of .csg, .scad, .obj"));
+  EXPECT_TRUE(has(refused({"-", "-o", "out.png"}, 2), "--input-format: csg, obj"));
+  const RunResult info = place.run({"info", "scene.csg"});
+  EXPECT_EQ(info.exit_code, 3);
+  EXPECT_TRUE(has(info.err, "strata csg --json measures scenes")) << info.err;
+  for (const char* command : {"voxelize", "ldi"}) {
+    EXPECT_TRUE(has(place.run({command, "--help"}).out, "scenes (.csg .scad)")) << command;
+  }
+}
+
+TEST_F(Csg, FilesWhoseNamesAreNoWordsAreUsedByPosition) {
+  put(place, "my part.stl", make_box({0, 0, 0}, {1, 1, 1}));
+  put(place, "hole.stl", make_box({0, 0, 0}, {1, 1, 1}));
+  const auto says = [&](const std::string& text) {
+    return refused({"my part.stl", "hole.stl", "-o", "out.png", "--expr=" + text}, 2);
+  };
+  EXPECT_TRUE(has(says("my part - hole"), "no file is called my; by position, a is my part.stl\n"));
+  EXPECT_TRUE(has(says("'my part' - hole"), "expected here; by position, a is my part.stl\n"));
+  EXPECT_TRUE(has(says("hole - nothing"), "by position, a is my part.stl"));
+  EXPECT_EQ(place.run({"csg", "my part.stl", "hole.stl", "--expr=a - b", "--json"}).exit_code, 0);
+}
+
+TEST_F(Csg, ChainsOfOneOperatorDoNotRepeatAnInput) {
+  put(place, "a.stl", make_box({-5, -5, -5}, {5, 5, 5}));
+  put(place, "b.stl", make_box({-2, -2, -10}, {2, 2, 10}));
+  const std::vector<std::string> camera{"--camera=0,0,0,55,0,25,60", "--size=100,100"};
+  const auto solids = [&](const std::string& text) {
+    const RunResult run = place.run({"csg", "a.stl", "b.stl", "--expr=" + text, "--json", "-o",
+                                     "out.png", camera[0], camera[1]});
+    EXPECT_EQ(run.exit_code, 0) << text << run.err;
+    return json::parse(run.out)["scene"]["solids"].get<int>();
+  };
+  std::string chain = "a";
+  for (int i = 0; i < 60000; ++i) chain += "*a";
+  EXPECT_EQ(solids(chain), 1);
+  const Image cube = decode(place.read("out.png"));
+  EXPECT_GT(covered(cube), 1000u);
+  EXPECT_EQ(solids("a + a * (a | a)"), 3);
+  EXPECT_EQ(decode(place.read("out.png")), cube);
+  EXPECT_EQ(solids("a - b - b - b"), 2);
+  const Image drilled = decode(place.read("out.png"));
+  EXPECT_NE(drilled, cube);
+  EXPECT_EQ(solids("(a + a - b) * a * a"), 3);
+  EXPECT_EQ(decode(place.read("out.png")), drilled);
+  EXPECT_EQ(solids("a - b + b - b"), 4);
+  EXPECT_EQ(decode(place.read("out.png")), drilled);
+  EXPECT_EQ(solids("a - a"), 2);  // what stands first is not what is taken away
+  EXPECT_EQ(covered(decode(place.read("out.png"))), 0u);
+}
+
+TEST_F(Csg, SolidsOfThePictureOfIdsHaveDifferentNames) {
+  draw(
+      "color([1, 0, 0, 0.5]) cube(size = [10, 10, 10], center = false);\n"
+      "multmatrix([[1, 0, 0, 20], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]) {\n"
+      "  cube(size = [10, 10, 10], center = false);\n}\n",
+      {"--cut=y>5", "--camera=15,5,5,90,0,0,100", "--ids=ids.png", "--json", "--size=100,100"});
+  std::set<std::string> names;
+  const json report = json::parse(last.out);
+  for (const json& entry : report["ids"]) names.insert(entry["name"].get<std::string>());
+  EXPECT_EQ(names.size(), report["ids"].size()) << report["ids"];
 }
 
 TEST_F(Csg, BadFilesHaveTheirCodes) {
