@@ -301,6 +301,9 @@ Result<Measures> measure(const Tree& tree, Tree::NodeId root, int resolution,
   glm::dvec3 low(std::numeric_limits<double>::infinity()), high(-low);
   double volumes[3] = {}, half_areas[2] = {};
   glm::dvec3 moment(0);
+  // Where the columns stand that hold some of the result, and its first moment about them: for an
+  // axis whose own rays pass a thin result by.
+  glm::dvec3 column_low(low), column_high(high), column_moment(0), column_weight(0);
   for (const Axis axis : {Axis::kX, Axis::kY, Axis::kZ}) {
     const AxisFrame frame(axis);
     auto image = build_ldi(*snapped, raster_target(grid, axis), {}, execution, &lists.filter());
@@ -334,6 +337,12 @@ Result<Measures> measure(const Tree& tree, Tree::NodeId root, int resolution,
         if (list.empty()) continue;
         column_sum += length;
         moment[frame.w] += first_moment;
+        for (const auto& [side, at] : {std::pair(frame.u, u + 0.5), std::pair(frame.v, v + 0.5)}) {
+          column_low[side] = std::min(column_low[side], at);
+          column_high[side] = std::max(column_high[side], at);
+          column_moment[side] += at * length;
+          column_weight[side] += length;
+        }
       }
     }
     volumes[frame.w] = column_sum;
@@ -349,6 +358,10 @@ Result<Measures> measure(const Tree& tree, Tree::NodeId root, int resolution,
   const auto [least, most] = std::minmax({volumes[0], volumes[1], volumes[2]});
   result.volume_error = std::max(result.area * step, (most - least) * cube);
   for (int i = 0; i < 3; ++i) {
+    if (!(volumes[i] > 0)) {
+      low[i] = column_low[i], high[i] = column_high[i];
+      moment[i] = column_moment[i], volumes[i] = column_weight[i];
+    }
     result.centre[i] = grid.origin[i] + moment[i] / volumes[i] * step;
     result.low[i] = grid.origin[i] + low[i] * step;
     result.high[i] = grid.origin[i] + high[i] * step;

@@ -350,6 +350,23 @@ TEST(Measures, OfABoxMinusABoxAreTheClosedForm) {
   }
 }
 
+TEST(Measures, AThinRestThatSomeRaysPassByHasBoundsAllTheSame) {
+  Tree tree;
+  const auto box = [&](const glm::dvec3& low, const glm::dvec3& high) {
+    return tree.add_solid({std::make_shared<TriangleSoup>(make_box(low, high))});
+  };
+  tree.set_root(tree.add(Operation::kDifference, {box(glm::dvec3(0), glm::dvec3(8)),
+                                                  box(glm::dvec3(0.01, -1, -1), glm::dvec3(9))}));
+  const auto m = measure(tree, tree.root(), 64);
+  ASSERT_TRUE(m.has_value());
+  EXPECT_FALSE(m->empty);
+  for (int axis = 0; axis < 3; ++axis) {
+    EXPECT_NEAR(m->low[axis], 0.0, m->bounds_error);
+    EXPECT_NEAR(m->high[axis], axis == 0 ? 0.01 : 8.0, m->bounds_error);
+    EXPECT_NEAR(m->centre[axis], axis == 0 ? 0.005 : 4.0, 1e-2);
+  }
+}
+
 TEST(Measures, StayWithinTheirBoundsForBallsAndTori) {
   Tree tree;
   tree.set_root(tree.add_solid({std::make_shared<TriangleSoup>(make_torus(3, 1, 64, 32))}));
