@@ -172,7 +172,7 @@ class Frame {
       SurfacePart part{&image_};
       if (on_tile) part = {&tile_images_[static_cast<std::size_t>(worker)], rect.u0, rect.v0};
       finders_[static_cast<std::size_t>(worker)]->find(
-          tile_u, tile_v, solids_.at(static_cast<std::size_t>(tile)), part);
+          tile_u, tile_v, solids_.at(static_cast<std::size_t>(tile)), part, execution.stop);
       if (on_tile) on_tile(*part.image, rect);
     });
     report_.fragments = report_.resolved = 0;

@@ -1,5 +1,7 @@
 #include "csg/program.h"
 
+#include <algorithm>
+#include <functional>
 #include <utility>
 
 namespace strata::csg {
@@ -90,7 +92,10 @@ Program compile(const Tree& tree, Tree::NodeId root) {
 }
 
 ProgramState::ProgramState(const Program& program)
-    : program_(&program), idle_counts_(program.nodes.size()), inside_(program.leaves.size()) {
+    : program_(&program),
+      idle_counts_(program.nodes.size()),
+      inside_(program.leaves.size()),
+      known_(program.nodes.size()) {
   for (std::size_t i = 0; i < idle_counts_.size(); ++i) {
     idle_counts_[i] = program.nodes[i].idle_true;
   }
@@ -98,21 +103,74 @@ ProgramState::ProgramState(const Program& program)
 }
 
 void ProgramState::reset() {
+  ++known_stamp_;
   counts_ = idle_counts_;
   std::fill(inside_.begin(), inside_.end(), std::uint8_t{0});
   value_ = program_->idle_value();
 }
 
-bool ProgramState::supports(std::uint32_t solid) const {
+void ProgramState::flip_all(std::span<const std::uint32_t> solids) {
+  ++known_stamp_;
+  const auto count = [&](const Program::Up& up, bool value) {
+    Known& known = known_[up.parent];
+    if (known.touched != known_stamp_) {
+      known.touched = known_stamp_;
+      known.before = counts_[up.parent] > 0;
+      touched_.push_back(up.parent);
+      std::push_heap(touched_.begin(), touched_.end(), std::greater<>());
+    }
+    counts_[up.parent] += value != up.inverted ? 1u : ~0u;
+  };
+  for (const std::uint32_t solid : solids) {
+    inside_[solid] ^= 1;
+    const Program::Up& up = program_->leaves[solid];
+    if (up.parent != Program::kNone) count(up, inside_[solid] != 0);
+  }
+  while (!touched_.empty()) {  // children before parents
+    std::pop_heap(touched_.begin(), touched_.end(), std::greater<>());
+    const std::uint32_t node = touched_.back();
+    touched_.pop_back();
+    const bool value = counts_[node] > 0;
+    if (value == known_[node].before) continue;
+    const Program::Up& up = program_->nodes[node].up;
+    if (up.parent == Program::kNone) {
+      value_ = !value_;
+    } else {
+      count(up, value);
+    }
+  }
+}
+
+ProgramState::Weight ProgramState::above(std::uint32_t solid) {
+  Weight weight;
   Program::Up up = program_->leaves[solid];
-  bool value = inside(solid);
+  if (up.parent == Program::kNone) return {true, false};
+  climbed_.clear();
   while (up.parent != Program::kNone) {
-    const bool node = counts_[up.parent] > 0;
-    if (node && value == up.inverted) return false;
-    value = node;
+    const Known& known = known_[up.parent];
+    if (known.stamp == known_stamp_) {
+      weight = known.weight;
+      break;
+    }
+    climbed_.push_back(up.parent);
     up = program_->nodes[up.parent].up;
   }
-  return true;
+  // What the tree's value rests on through an edge that says `edge`, given how it rests on its
+  // node.
+  const auto through = [&](Weight node, std::uint32_t index, bool edge) {
+    const std::uint32_t count = counts_[index];
+    return Weight{node.supports && (edge || count == 0), node.decides && count == (edge ? 1u : 0u)};
+  };
+  for (std::size_t i = climbed_.size(); i-- > 0;) {
+    const std::uint32_t node = climbed_[i];
+    const Program::Up& to = program_->nodes[node].up;
+    if (to.parent != Program::kNone) {
+      weight = through(weight, to.parent, (counts_[node] > 0) != to.inverted);
+    }
+    known_[node] = {known_stamp_, weight};
+  }
+  up = program_->leaves[solid];
+  return through(known_[up.parent].weight, up.parent, inside(solid) != up.inverted);
 }
 
 }  // namespace strata::csg

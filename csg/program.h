@@ -68,6 +68,7 @@ class ProgramState {
   void reset();
   /// Turns a solid's bit around.
   void flip(std::uint32_t solid) {
+    ++known_stamp_;
     inside_[solid] ^= 1;
     Program::Up up = program_->leaves[solid];
     if (up.parent == Program::kNone) return;
@@ -83,18 +84,39 @@ class ProgramState {
     }
     value_ = !value_;
   }
+  /// Turns the bits of all of them around at once: each node is asked once, however many of its
+  /// solids turn. In a chain of differences one after another would each climb to the root.
+  void flip_all(std::span<const std::uint32_t> solids);
   [[nodiscard]] bool inside(std::uint32_t solid) const { return inside_[solid] != 0; }
   [[nodiscard]] bool value() const { return value_; }  ///< of the whole tree
   [[nodiscard]] const Program& program() const { return *program_; }
   /// Whether the tree has its value also because of this solid's: on the way up, no node that is
-  /// true stands on other edges alone.
-  [[nodiscard]] bool supports(std::uint32_t solid) const;
+  /// true stands on other edges alone. Asked for all solids between two flips it is O(nodes).
+  [[nodiscard]] bool supports(std::uint32_t solid) { return above(solid).supports; }
+  /// Whether the tree has its value because of this solid's alone: a flip would turn it around. As
+  /// quick as supports().
+  [[nodiscard]] bool decides(std::uint32_t solid) { return above(solid).decides; }
 
  private:
+  /// How the tree's value rests on one of its nodes or solids.
+  struct Weight {
+    bool supports = true, decides = true;
+  };
+  struct Known {
+    std::uint64_t stamp = 0;
+    Weight weight;
+    std::uint64_t touched = 0;  ///< flip_all(): a stamp, and its value before
+    bool before = false;
+  };
+  [[nodiscard]] Weight above(std::uint32_t solid);
+
   const Program* program_;
   std::vector<std::uint32_t> idle_counts_, counts_;
   std::vector<std::uint8_t> inside_;
   bool value_ = false;
+  std::uint64_t known_stamp_ = 1;  ///< of the state as it is
+  std::vector<Known> known_;       ///< of nodes
+  std::vector<std::uint32_t> climbed_, touched_;
 };
 
 }  // namespace strata::csg

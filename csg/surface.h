@@ -84,7 +84,7 @@ class Coincidence {
 /// A ray that begins inside the tree (the eye is in the material) shows where it leaves it.
 class SurfaceFinder {
  public:
-  explicit SurfaceFinder(const Program& program) : state_(program) {}
+  explicit SurfaceFinder(const Program& program) : state_(program), last_(program.leaves.size()) {}
 
   /// `bound(flip)` gives a flip's bound. Sorts `flips`.
   template <class Bound>
@@ -98,22 +98,22 @@ class SurfaceFinder {
   void sort(std::vector<Flip>& flips);
   /// Applies all flips at the depth of flips[at]; gives the index after them.
   std::size_t apply(const std::vector<Flip>& flips, std::size_t at) {
-    const std::uint32_t depth = flips[at].depth;
-    for (; at < flips.size() && flips[at].depth == depth; ++at) state_.flip(flips[at].solid);
-    return at;
+    std::size_t end = at + 1;
+    while (end < flips.size() && flips[end].depth == flips[at].depth) ++end;
+    flip_all(flips, at, end);
+    return end;
   }
-  void undo(const std::vector<Flip>& flips, std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) state_.flip(flips[i].solid);
+  void flip_all(const std::vector<Flip>& flips, std::size_t begin, std::size_t end) {
+    constexpr std::size_t kFew = 4;
+    if (end - begin < kFew) {
+      for (std::size_t i = begin; i < end; ++i) state_.flip(flips[i].solid);
+      return;
+    }
+    turned_.clear();
+    for (std::size_t i = begin; i < end; ++i) turned_.push_back(flips[i].solid);
+    state_.flip_all(turned_);
   }
 
-  /// Whether the tree has its value because of this solid's alone.
-  [[nodiscard]] bool decides(std::uint32_t solid) {
-    const bool value = state_.value();
-    state_.flip(solid);
-    const bool other = state_.value();
-    state_.flip(solid);
-    return other != value;
-  }
   [[nodiscard]] bool is_plain_entry(const Flip& flip) const {
     return !flip.exit && state_.program().plain(flip.solid);
   }
@@ -121,6 +121,8 @@ class SurfaceFinder {
   ProgramState state_;
   std::vector<std::uint64_t> order_, other_order_;  ///< [depth:32 | index:32]
   std::vector<Flip> sorted_;
+  std::vector<std::uint32_t> turned_;
+  std::vector<std::size_t> last_;  ///< of each solid: one of its flips
 };
 
 template <class Bound>
@@ -176,8 +178,11 @@ Surface SurfaceFinder::find(std::vector<Flip>& flips, Bound&& bound) {
         continue;
       }
     }
-    undo(flips, settled, end);
+    flip_all(flips, settled, end);
 
+    // Of one solid only its last flip counts, unless it has one in the group.
+    for (std::size_t i = 0; i < settled; ++i) last_[flips[i].solid] = i;
+    for (std::size_t i = begin; i < at; ++i) last_[flips[i].solid] = i;
     const Flip* best = nullptr;
     bool best_alone = false;
     for (std::size_t i = 0; i < settled; ++i) {
@@ -191,15 +196,10 @@ Surface SurfaceFinder::find(std::vector<Flip>& flips, Bound&& bound) {
                                : flip.depth - depth > own.farther + its.nearer) {
           continue;
         }
-        // Of one solid only its last flip counts, unless it has one in the group.
-        bool superseded = false;
-        for (std::size_t j = 0; j < settled && !superseded; ++j) {
-          superseded = flips[j].solid == flip.solid && (j > i || (j >= begin && j < at)) && j != i;
-        }
-        if (superseded) continue;
+        if (last_[flip.solid] != i) continue;
       }
       if (!state_.supports(flip.solid)) continue;  // last: it climbs the tree
-      const bool alone = decides(flip.solid);
+      const bool alone = state_.decides(flip.solid);
       const bool better =
           best == nullptr || (alone && !best_alone) ||
           (alone == best_alone &&
@@ -217,7 +217,7 @@ Surface SurfaceFinder::find(std::vector<Flip>& flips, Bound&& bound) {
   if (at * 16 > state_.program().nodes.size() + state_.program().leaves.size()) {
     state_.reset();
   } else {
-    undo(flips, 0, at);
+    flip_all(flips, 0, at);
   }
   return found;
 }

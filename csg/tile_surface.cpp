@@ -229,7 +229,7 @@ void TileFinder::resolve(const TileProgram& program, std::uint64_t pixel) {
 }
 
 void TileFinder::find(int tile_u, int tile_v, std::span<const std::uint32_t> solids,
-                      const SurfacePart& part) {
+                      const SurfacePart& part, const std::stop_token& stop) {
   part_ = part;
   tile_ = {tile_u * kTileSide, tile_v * kTileSide,
            std::min(view_->size.x, (tile_u + 1) * kTileSide),
@@ -304,7 +304,10 @@ void TileFinder::find(int tile_u, int tile_v, std::span<const std::uint32_t> sol
       } else {
         search_surface(area, *this);
       }
-      for (const std::uint64_t pixel : doubtful_) resolve(tile_program_, pixel);
+      for (const std::uint64_t pixel : doubtful_) {
+        if (stop.stop_requested()) return;  // lists may be very long
+        resolve(tile_program_, pixel);
+      }
     }
   }
   if (cut) number_sources();

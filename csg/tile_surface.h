@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <memory>
 #include <span>
+#include <stop_token>
 #include <vector>
 
 #include "core/depth_list.h"
@@ -178,8 +179,10 @@ class TileFinder {
              const Coincidence& coincidence);
   ~TileFinder();
 
-  /// Fills the tile's pixels of `part`. `solids`: those that may be met in the tile.
-  void find(int tile_u, int tile_v, std::span<const std::uint32_t> solids, const SurfacePart& part);
+  /// Fills the tile's pixels of `part`, not all of them if it is stopped. `solids`: those that may
+  /// be met in the tile.
+  void find(int tile_u, int tile_v, std::span<const std::uint32_t> solids, const SurfacePart& part,
+            const std::stop_token& stop);
 
   void reset_counts() { fragments_ = resolved_ = 0; }
   [[nodiscard]] std::uint64_t fragments() const { return fragments_; }

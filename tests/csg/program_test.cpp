@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <numeric>
+
 #include "tests/csg/random_tree.h"
 
 namespace strata::csg {
@@ -74,6 +76,50 @@ TEST(Program, ASupportIsASolidThatTheValueRestsOn) {
   }
 }
 
+TEST(Program, ASolidThatDecidesTurnsTheValue) {
+  for (int seed = 0; seed < 200; ++seed) {
+    RandomTree random(static_cast<std::uint64_t>(seed) + 2000);
+    const int solids = random.pick(1, 20);
+    const Tree tree = bare_tree(random, solids, false);
+    const Program program = compile(tree, tree.root());
+    ProgramState state(program);
+    for (int step = 0; step < 20; ++step) {
+      state.flip(static_cast<std::uint32_t>(random.pick(0, solids - 1)));
+      const bool value = state.value();
+      for (std::uint32_t solid = 0; solid < static_cast<std::uint32_t>(solids); ++solid) {
+        const bool decides = state.decides(solid);
+        state.flip(solid);
+        ASSERT_EQ(decides, state.value() != value) << "seed " << seed << ", step " << step;
+        state.flip(solid);
+      }
+    }
+  }
+}
+
+TEST(Program, FlipsTogetherAreThoseOneAfterAnother) {
+  for (int seed = 0; seed < 200; ++seed) {
+    RandomTree random(static_cast<std::uint64_t>(seed) + 3000);
+    const int solids = random.pick(1, seed % 10 == 0 ? 500 : 20);
+    const Tree tree = bare_tree(random, solids, false);
+    const Program program = compile(tree, tree.root());
+    ProgramState together(program), single(program);
+    for (int step = 0; step < 20; ++step) {
+      std::vector<std::uint32_t> turned(static_cast<std::size_t>(random.pick(0, solids)));
+      for (std::uint32_t& solid : turned) {
+        solid = static_cast<std::uint32_t>(random.pick(0, solids - 1));
+        single.flip(solid);
+      }
+      together.flip_all(turned);
+      for (std::uint32_t solid = 0; solid < static_cast<std::uint32_t>(solids); ++solid) {
+        ASSERT_EQ(together.inside(solid), single.inside(solid));
+        ASSERT_EQ(together.supports(solid), single.supports(solid));
+      }
+      ASSERT_EQ(together.value(), single.value()) << "seed " << seed << ", step " << step;
+      if (step == 10) together.reset(), single.reset();
+    }
+  }
+}
+
 TEST(Program, ADeepTreeNeedsNoStack) {
   Tree tree;
   Tree::NodeId node = tree.add_solid({});
@@ -87,6 +133,10 @@ TEST(Program, ADeepTreeNeedsNoStack) {
   for (std::uint32_t solid = 0; solid <= kDeep; ++solid) state.flip(solid);
   // A1 - (A2 - (A3 - ...)) with all inside: true for an odd number of solids.
   EXPECT_EQ(state.value(), (kDeep + 1) % 2 == 1);
+  std::vector<std::uint32_t> all(kDeep + 1);
+  std::iota(all.begin(), all.end(), 0u);
+  state.flip_all(all);
+  EXPECT_FALSE(state.value());
 }
 
 TEST(Program, NestedUnionsAndDifferencesMelt) {
