@@ -69,6 +69,9 @@ bool is_inside(InsideRule rule, int winding) {
   return winding % 2 != 0;
 }
 
+/// Sides of a measured box are no less than this part of the longest.
+constexpr double kThinnest = 1e-9;
+
 class BooleanWorker final : public TileListFilter::Worker {
  public:
   explicit BooleanWorker(const Shared& shared)
@@ -287,19 +290,22 @@ Result<Measures> measure(const Tree& tree, Tree::NodeId root, int resolution,
   const SolidLists lists(tree, root);
   if (box.empty()) return result;
   const glm::dvec3 extent = box.high - box.low;
-  const double step = std::max({extent.x, extent.y, extent.z}) / resolution;
-  if (!(step > 0) || !std::isfinite(step)) return result;
+  const double longest = std::max({extent.x, extent.y, extent.z});
+  if (!(longest > 0) || !std::isfinite(longest)) return result;
+  // As many voxels along each side: thin plates and rods are measured as well as cubes. A voxel of
+  // room all around, so that no depth of the result is clamped. The solids may reach out: there
+  // nothing of the result is.
   VoxelGrid grid;
-  grid.voxel_size = glm::dvec3(step);
-  // A voxel of room all around, so that no depth of the result is clamped. The solids may reach
-  // out: there nothing of the result is.
-  grid.dims = glm::max(glm::ivec3(glm::ceil(extent / step)), glm::ivec3(1)) + 2;
-  grid.origin = (box.low + box.high) * 0.5 - glm::dvec3(grid.dims) * (step * 0.5);
+  grid.voxel_size = glm::max(extent, glm::dvec3(longest * kThinnest)) / double(resolution);
+  grid.dims = glm::ivec3(resolution + 2);
+  grid.origin = (box.low + box.high) * 0.5 - glm::dvec3(grid.dims) * grid.voxel_size * 0.5;
   auto snapped = snap_to_lattice(lists.soup(), grid, execution);
   if (!snapped) return tl::unexpected(snapped.error());
 
   glm::dvec3 low(std::numeric_limits<double>::infinity()), high(-low);
   double volumes[3] = {}, half_areas[2] = {};
+  glm::dvec3 projected(0);  // area of the surface as it is seen along an axis, all layers
+  double outlines = 0;      // area of cells where the number of layers changes
   glm::dvec3 moment(0);
   // Where the columns stand that hold some of the result, and its first moment about them: for an
   // axis whose own rays pass a thin result by.
@@ -308,11 +314,19 @@ Result<Measures> measure(const Tree& tree, Tree::NodeId root, int resolution,
     const AxisFrame frame(axis);
     auto image = build_ldi(*snapped, raster_target(grid, axis), {}, execution, &lists.filter());
     if (!image) return tl::unexpected(image.error());
+    const glm::dvec3& d = grid.voxel_size;
+    const double cell = d[frame.u] * d[frame.v];
     double column_sum = 0;
+    std::uint64_t crossings = 0, changes = 0;
     for (int v = 0; v < image->height; ++v) {
       for (int u = 0; u < image->width; ++u) {
         const auto list = image->list(u, v);
-        result.result_crossings += list.size();
+        crossings += list.size();
+        const auto change = [&](std::size_t other) {
+          changes += std::max(list.size(), other) - std::min(list.size(), other);
+        };
+        if (u > 0) change(image->list(u - 1, v).size());
+        if (v > 0) change(image->list(u, v - 1).size());
         result.max_depth_complexity =
             std::max<std::uint64_t>(result.max_depth_complexity, list.size());
         double first_moment = 0, length = 0;
@@ -328,7 +342,7 @@ Result<Measures> measure(const Tree& tree, Tree::NodeId root, int resolution,
           const glm::dvec3 across =
               glm::cross(lists.soup().positions[t.y] - a, lists.soup().positions[t.z] - a);
           const double size = glm::length(across);
-          if (size > 0) half_areas[(u + v) % 2] += std::abs(across[frame.w]) / size;
+          if (size > 0) half_areas[(u + v) % 2] += cell * std::abs(across[frame.w]) / size;
           double& low_w = low[frame.w];
           double& high_w = high[frame.w];
           low_w = std::min(low_w, depth);
@@ -345,28 +359,33 @@ Result<Measures> measure(const Tree& tree, Tree::NodeId root, int resolution,
         }
       }
     }
+    result.result_crossings += crossings;
+    projected[frame.w] = cell * static_cast<double>(crossings);
+    outlines += cell * static_cast<double>(changes) / 2;
     volumes[frame.w] = column_sum;
     if (execution.progress) execution.progress((frame.w + 1) / 3.0);
   }
-  const double cell = step * step, cube = cell * step;
+  const glm::dvec3& step = grid.voxel_size;
+  const double cube = step.x * step.y * step.z;
   const double volume = (volumes[0] + volumes[1] + volumes[2]) / 3;
   result.empty = !(volume > 0);
   if (result.empty) return result;
   result.volume = volume * cube;
-  result.area = (half_areas[0] + half_areas[1]) * cell;
-  result.area_error = 3 * std::abs(half_areas[0] - half_areas[1]) * cell;
+  result.area = half_areas[0] + half_areas[1];
+  result.area_error = std::max(3 * std::abs(half_areas[0] - half_areas[1]), outlines);
   const auto [least, most] = std::minmax({volumes[0], volumes[1], volumes[2]});
-  result.volume_error = std::max(result.area * step, (most - least) * cube);
+  // The length of a ray varies over a side by at most what is seen from there.
+  result.volume_error = std::max(2.0 / 3.0 * glm::dot(projected, step), (most - least) * cube);
   for (int i = 0; i < 3; ++i) {
     if (!(volumes[i] > 0)) {
       low[i] = column_low[i], high[i] = column_high[i];
       moment[i] = column_moment[i], volumes[i] = column_weight[i];
     }
-    result.centre[i] = grid.origin[i] + moment[i] / volumes[i] * step;
-    result.low[i] = grid.origin[i] + low[i] * step;
-    result.high[i] = grid.origin[i] + high[i] * step;
+    result.centre[i] = grid.origin[i] + moment[i] / volumes[i] * step[i];
+    result.low[i] = grid.origin[i] + low[i] * step[i];
+    result.high[i] = grid.origin[i] + high[i] * step[i];
   }
-  result.bounds_error = step;
+  result.bounds_error = std::max({step.x, step.y, step.z});
   return result;
 }
 

@@ -367,14 +367,37 @@ TEST(Measures, AThinRestThatSomeRaysPassByHasBoundsAllTheSame) {
   }
 }
 
+TEST(Measures, OfThinPlatesAndRodsAreAsGood) {
+  for (const glm::dvec3& size :
+       {glm::dvec3(100, 100, 0.1), glm::dvec3(100, 0.1, 0.1), glm::dvec3(1, 1, 1e7)}) {
+    Tree tree;
+    tree.set_root(tree.add_solid({std::make_shared<TriangleSoup>(make_box(glm::dvec3(0), size))}));
+    const auto m = measure(tree, tree.root(), 64);
+    ASSERT_TRUE(m.has_value());
+    const double volume = size.x * size.y * size.z;
+    EXPECT_NEAR(m->volume, volume, 1e-6 * volume);
+    EXPECT_LE(m->volume_error, 0.1 * volume);
+    EXPECT_NEAR(m->area, 2 * (size.x * size.y + size.y * size.z + size.z * size.x), 1e-6 * m->area);
+    for (int axis = 0; axis < 3; ++axis)
+      EXPECT_NEAR(m->centre[axis], size[axis] / 2, m->bounds_error);
+  }
+}
+
 TEST(Measures, StayWithinTheirBoundsForBallsAndTori) {
   Tree tree;
   tree.set_root(tree.add_solid({std::make_shared<TriangleSoup>(make_torus(3, 1, 64, 32))}));
-  const double exact = signed_volume(*tree.solids()[0].mesh);
+  const TriangleSoup& mesh = *tree.solids()[0].mesh;
+  const double exact = signed_volume(mesh);
+  double area = 0;
+  for (const glm::uvec3& t : mesh.triangles) {
+    const glm::dvec3& a = mesh.positions[t.x];
+    area += glm::length(glm::cross(mesh.positions[t.y] - a, mesh.positions[t.z] - a)) / 2;
+  }
   for (const int resolution : {16, 64, 200}) {
     const auto m = measure(tree, tree.root(), resolution);
     ASSERT_TRUE(m.has_value());
     EXPECT_LE(std::abs(m->volume - exact), m->volume_error) << resolution;
+    EXPECT_LE(std::abs(m->area - area), m->area_error) << resolution;
   }
   const Tree empty;
   EXPECT_TRUE(measure(empty, empty.root(), 64)->empty);
