@@ -103,7 +103,34 @@ Result<void> cut_part(const Geometry::Part& part, const View& view, ViewPart& ou
   const double right_end = margin + view.size.x, below_end = margin + view.size.y;
   const auto right = [right_end](const Homogeneous& p) { return right_end * p.w - p.x; };
   const auto below = [below_end](const Homogeneous& p) { return below_end * p.w - p.y; };
-  std::vector<Homogeneous> polygon;
+  // What lies far before or behind all that can be seen is flattened: it counts, but not how far.
+  constexpr double kFarBehind = 4.0 * kPictureDepthLimit;
+  const auto before_far = [](const Homogeneous& p) { return kFarBehind * p.w - p.z; };
+  const auto behind_front = [](const Homogeneous& p) { return p.z + kFarBehind * p.w; };
+  std::vector<Homogeneous> polygon, flat;
+  const auto add = [&](const std::vector<Homogeneous>& corners, std::uint32_t t) {
+    if (corners.size() < 3) return true;
+    const auto first = static_cast<std::uint32_t>(out.vertices.size());
+    for (const Homogeneous& p : corners) {
+      if (!snap(glm::dvec3(p) / p.w, out.vertices.emplace_back())) return false;
+    }
+    for (std::uint32_t i = 2; i < corners.size(); ++i) {
+      out.cut_triangles.emplace_back(first, first + i - 1, first + i);
+      out.cut_sources.push_back(t);
+    }
+    return true;
+  };
+  const auto flatten = [&](const auto& side, double z, std::uint32_t t) {
+    if (std::all_of(polygon.begin(), polygon.end(),
+                    [&](const Homogeneous& p) { return side(p) >= 0; })) {
+      return true;
+    }
+    flat = polygon;
+    cut_polygon(flat, [&](const Homogeneous& p) { return -side(p); });
+    for (Homogeneous& p : flat) p.z = z * p.w;
+    cut_polygon(polygon, side);
+    return add(flat, t);
+  };
   for (std::uint32_t t = 0; t < part.triangles.size(); ++t) {
     const glm::uvec3& triangle = part.triangles[t];
     polygon = {points[triangle.x], points[triangle.y], points[triangle.z]};
@@ -112,18 +139,9 @@ Result<void> cut_part(const Geometry::Part& part, const View& view, ViewPart& ou
     cut_polygon(polygon, right);
     cut_polygon(polygon, above);
     cut_polygon(polygon, below);
-    if (polygon.size() < 3) continue;
-    const auto first = static_cast<std::uint32_t>(out.vertices.size());
-    for (const Homogeneous& p : polygon) {
-      glm::ivec3 vertex;
-      if (!snap(glm::dvec3(p) / p.w, vertex)) {
-        return fail(ErrorCode::kGeometry, "a vertex does not fit into the picture's lattice");
-      }
-      out.vertices.push_back(vertex);
-    }
-    for (std::uint32_t i = 2; i < polygon.size(); ++i) {
-      out.cut_triangles.emplace_back(first, first + i - 1, first + i);
-      out.cut_sources.push_back(t);
+    if (!flatten(before_far, kFarBehind, t) || !flatten(behind_front, -kFarBehind, t) ||
+        !add(polygon, t)) {
+      return fail(ErrorCode::kGeometry, "a vertex does not fit into the picture's lattice");
     }
   }
   return {};
@@ -203,7 +221,7 @@ Result<ViewPart> view_part(const Geometry::Part& part, const View& view,
                            const Execution& execution) {
   ViewPart out;
   if (part.triangles.empty()) return out;
-  if (view.perspective && view.clips_near) {
+  if (view.perspective) {
     double nearest = 0;
     for (int i = 0; i < 8; ++i) {
       const glm::dvec3 corner((i & 1) != 0 ? part.box.high.x : part.box.low.x,

@@ -86,7 +86,8 @@ class Preview {
   Preview(Preview&&) noexcept;
   Preview& operator=(Preview&&) noexcept;
 
-  /// Around all solids that are drawn: what a camera should see.
+  /// Around all solids that are drawn: what a camera should see. Cutters more than a thousand times
+  /// larger than the result do not count.
   [[nodiscard]] Bounds box() const;
   [[nodiscard]] const Tree& tree() const;
 

@@ -229,6 +229,23 @@ struct Preview::Impl {
         frame(program, geometry, error),
         painter(tree, with_ghosts(given), geometry, error) {}
 
+  /// Around all solids; without cutters that are far larger than all that can be seen, which would
+  /// leave it no depth.
+  [[nodiscard]] Bounds box() const {
+    constexpr double kFarLarger = 1000.0;
+    std::vector<Bounds> boxes;
+    for (const Geometry::Part& part : geometry.parts()) boxes.push_back(part.box);
+    Bounds seen = bounds(tree, tree.root(), boxes);
+    for (const Translucent& part : translucent) {
+      const Bounds own = bounds(tree, part.node, boxes);
+      if (own.empty()) continue;
+      seen.low = glm::min(seen.low, own.low);
+      seen.high = glm::max(seen.high, own.high);
+    }
+    const Bounds& all = geometry.box();
+    const auto size = [](const Bounds& box) { return glm::length(box.high - box.low); };
+    return !seen.empty() && size(all) > kFarLarger * size(seen) ? seen : all;
+  }
   std::span<const Translucent> with_ghosts(std::span<const Ghost> given) {
     for (const Ghost& ghost : given) translucent.push_back({ghost.node, ghost.colour});
     return translucent;
@@ -269,7 +286,7 @@ Result<Picture> Preview::Impl::picture(const Camera& camera, const glm::ivec2& s
   // As square a grid as can be.
   const int bits = std::countr_zero(static_cast<unsigned>(options.samples));
   const int across = 1 << ((bits + 1) / 2), down = 1 << (bits / 2);
-  const auto whole = make_view(camera, size, geometry.box());
+  const auto whole = make_view(camera, size, box());
   if (!whole) return tl::unexpected(whole.error());
   if (size.x > kMaxPictureSide / across) {
     return fail(ErrorCode::kUsage, "{} pixels of {} samples in a row: {} samples can be had",
@@ -344,7 +361,7 @@ Preview::~Preview() = default;
 Preview::Preview(Preview&&) noexcept = default;
 Preview& Preview::operator=(Preview&&) noexcept = default;
 
-Bounds Preview::box() const { return impl_->geometry.box(); }
+Bounds Preview::box() const { return impl_->box(); }
 const Tree& Preview::tree() const { return impl_->tree; }
 void Preview::set_source(SurfaceSource* source) { impl_->frame.set_source(source); }
 

@@ -104,7 +104,6 @@ Result<View> make_view(const Camera& camera, const glm::ivec2& size, const Bound
   nearest -= room, farthest += room;
   if (view.perspective) {
     farthest = std::max(farthest, 1e-9 * camera.distance);
-    view.clips_near = nearest < farthest * kNearestPart;
     nearest = std::max(nearest, farthest * kNearestPart);
   }
   view.near = nearest, view.far = farthest;

@@ -44,9 +44,8 @@ struct View {
   bool perspective = true;
   /// Distances along the view axis at depth 0 and at the largest depth. Depth is linear in the
   /// distance for an orthographic view, in its reciprocal for a perspective one.
+  /// What lies before `near` is cut off there; the state of the ray at `near` is kept.
   double near = 1.0, far = 2.0;
-  bool clips_near = false;  ///< something lies before `near` and is cut off there; the state of the
-                            ///< ray at `near` is kept
 
   /// Distance along the view axis of a depth.
   [[nodiscard]] double distance(double depth) const;
@@ -57,8 +56,8 @@ inline constexpr std::uint32_t kPictureDepthLimit = std::uint32_t{1} << 24;
 /// Largest side of a picture, samples included.
 inline constexpr int kMaxPictureSide = 65536;
 
-/// The view of `camera` on what lies in `box`. @return kUsage when the size or camera is out of
-/// range
+/// The view of `camera` on what lies in `box`. Solids may be larger. @return kUsage when the size
+/// or camera is out of range
 Result<View> make_view(const Camera& camera, const glm::ivec2& size, const Bounds& box);
 
 }  // namespace strata::csg

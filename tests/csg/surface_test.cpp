@@ -158,6 +158,34 @@ TEST(VisibleSurface, OfSolidsAroundTheEyeIsTheirFarSides) {
   }
 }
 
+TEST(VisibleSurface, ACutterIsAsLargeAsItLikes) {
+  // Half of a cube, seen from where only it would be in the way.
+  for (const double size : {1e2, 1e4, 1e6, 1e9}) {
+    for (const Projection projection : {Projection::kPerspective, Projection::kOrthographic}) {
+      Tree tree;
+      const auto box = [&](const glm::dvec3& low, const glm::dvec3& high) {
+        return tree.add_solid({std::make_shared<TriangleSoup>(make_box(low, high))});
+      };
+      tree.set_root(tree.add(
+          Operation::kDifference,
+          {box(glm::dvec3(-1), glm::dvec3(1)), box({-size, -size, 0}, {size, size, 2 * size})}));
+      Camera camera;
+      camera.projection = projection;
+      camera.rotation = {55, 0, 25};
+      fit_camera(camera, Bounds{glm::dvec3(-1), glm::dvec3(1)});
+      Preview preview(tree, {}, 5e-6);
+      const auto view = make_view(camera, {101, 101}, preview.box());
+      ASSERT_TRUE(view.has_value());
+      const auto image = preview.draw(*view);
+      ASSERT_TRUE(image.has_value()) << size << ": " << image.error().message;
+      // The middle is the cut face, below it is a side of the cube.
+      EXPECT_EQ((*image)->solid[50 * 101 + 50], 1u) << size;
+      EXPECT_NEAR(view->distance((*image)->depth[50 * 101 + 50] + 0.5), camera.distance, 1e-2);
+      EXPECT_EQ((*image)->solid[82 * 101 + 50], 0u) << size;
+    }
+  }
+}
+
 TEST(VisibleSurface, AMovedSolidGivesTheSameAsAFreshPicture) {
   for (int seed = 0; seed < 40; ++seed) {
     RandomTree random(static_cast<std::uint64_t>(seed) + 900);
