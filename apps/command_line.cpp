@@ -245,7 +245,7 @@ void define_voxelize(CLI::App& app, Words& words) {
                  "Meshes with holes: vote of three axes (default), surface or fail")
       ->type_name("HOW")
       ->group(solid);
-  add_engine(app, words, "Of the rays: x, y, z or auto (what the format likes)");
+  add_engine(app, words, "Of the rays: x, y, z or auto (that of the format, or fewest rays)");
   add_common(app, words);
 }
 

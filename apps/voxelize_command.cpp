@@ -41,6 +41,13 @@ Result<void> check_output(const VoxelizeCommand& command) {
   if (command.ids) {
     if (auto held = check_ids(*format, 1); !held) return held;
   }
+  if (command.axis && *command.axis != format->axis) {
+    return fail(
+        ErrorCode::kUsage,
+        "--axis {}: {} is written from rays along {}; without --axis the voxels are the same",
+        "xyz"[static_cast<int>(*command.axis)], format -> name,
+        "xyz"[static_cast<int>(format->axis)]);
+  }
   return {};
 }
 

@@ -87,6 +87,7 @@ TEST_F(Usage, UnknownWordsAreNamed) {
   refuses({"voxelize", "box.obj", "-r", "4", "-o", "box"}, "box");
   refuses({"voxelize", "box.obj", "-r", "4", "-o", "box.x", "--format", "cube"}, "cube");
   refuses({"ldi", "box.obj", "-r", "4", "-o", "box.tif"}, "box.tif");
+  refuses({"voxelize", "box.obj", "-r", "4", "--axis", "x", "-o", "box.vdb"}, "along z");
 }
 
 TEST_F(Usage, ExactlyOneSizeIsNeeded) {
