@@ -15,13 +15,13 @@ constexpr std::size_t kFewFlips = 64;
 
 /// Sorts by the upper half, a byte at a time; what is equal stays in order.
 void sort_by_bytes(std::vector<std::uint64_t>& keys, std::vector<std::uint64_t>& scratch) {
-  constexpr int kBytes = 4;
+  constexpr std::size_t kBytes = 4;
   std::array<std::array<std::uint32_t, 256>, kBytes> begins{};
   for (const std::uint64_t key : keys) {
-    for (int i = 0; i < kBytes; ++i) ++begins[i][key >> (32 + 8 * i) & 0xff];
+    for (std::size_t i = 0; i < kBytes; ++i) ++begins[i][key >> (32 + 8 * i) & 0xff];
   }
   scratch.resize(keys.size());
-  for (int i = 0; i < kBytes; ++i) {
+  for (std::size_t i = 0; i < kBytes; ++i) {
     const auto first_byte = keys.front() >> (32 + 8 * i) & 0xff;
     if (begins[i][first_byte] == keys.size()) continue;  // the top byte, mostly
     std::exclusive_scan(begins[i].begin(), begins[i].end(), begins[i].begin(), 0u);

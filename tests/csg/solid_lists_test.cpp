@@ -175,7 +175,7 @@ TEST(SolidLists, AgreeWithRecursionAtVoxelCentres) {
           return evaluate(tree, tree.root(),
                           [&](std::uint32_t solid) { return holds(of_solid[solid], i, j, k); });
         });
-    VoxelizeReport along_z, reports[3];
+    VoxelizeReport reports[3];
     const SolidLists lists(tree, tree.root());
     for (const Axis axis : {Axis::kX, Axis::kY, Axis::kZ}) {
       const VoxelizeOptions options{.axis = axis, .statistics = true, .filter = &lists.filter()};
