@@ -42,14 +42,19 @@ std::vector<FileUse> outputs(std::initializer_list<FileUse> uses) {
   return result;
 }
 
-/// A command whose inputs may be scenes, found by their names.
-Result<void> check(const InputOptions& input, const std::vector<FileUse>& written) {
-  CsgCommand command;
-  command.input = input;
-  std::vector<FileUse> read = inputs_of(input);
+/// What a command reads, scenes' own files included, against what it writes.
+Result<void> check(const CsgCommand& command, const std::vector<FileUse>& written) {
+  std::vector<FileUse> read = inputs_of(command.input);
   const auto more = scene_files_of(command, written);
   read.insert(read.end(), more.begin(), more.end());
   return check_files(read, written);
+}
+
+/// The same of another command.
+Result<void> check(const InputOptions& input, const std::vector<FileUse>& written) {
+  CsgCommand command;
+  command.input = input;
+  return check(command, written);
 }
 
 }  // namespace
@@ -118,14 +123,10 @@ Result<void> check_files(const LdiCommand& command) {
 }
 
 Result<void> check_files(const CsgCommand& command) {
-  const auto written = outputs({{"-o", command.output},
-                                {"--ids", command.ids},
-                                {"--depth", command.depth},
-                                {"--json", command.json.value_or("")}});
-  std::vector<FileUse> read = inputs_of(command.input);
-  const auto more = scene_files_of(command, written);
-  read.insert(read.end(), more.begin(), more.end());
-  return check_files(read, written);
+  return check(command, outputs({{"-o", command.output},
+                                 {"--ids", command.ids},
+                                 {"--depth", command.depth},
+                                 {"--json", command.json.value_or("")}}));
 }
 
 }  // namespace strata::apps

@@ -182,6 +182,15 @@ Result<InputFacts> load_mesh(const std::string& path, const InputOptions& input,
   return facts;
 }
 
+void MeshInput::add(InputFacts facts) {
+  closed = closed && facts.closed;
+  area += facts.area;
+  volume += facts.volume;
+  bounds.low = glm::min(bounds.low, facts.bounds.low);
+  bounds.high = glm::max(bounds.high, facts.bounds.high);
+  files.push_back(std::move(facts));
+}
+
 Result<MeshInput> load_meshes(const InputOptions& input, const MeshInputRules& rules,
                               Session& session) {
   MeshInput all;
@@ -192,12 +201,7 @@ Result<MeshInput> load_meshes(const InputOptions& input, const MeshInputRules& r
     auto facts = load_mesh(path, input, rules, session, soup, &read_ms);
     if (!facts) return tl::unexpected(facts.error());
     all.read_ms += read_ms;
-    all.closed = all.closed && facts->closed;
-    all.area += facts->area;
-    all.volume += facts->volume;
-    all.bounds.low = glm::min(all.bounds.low, facts->bounds.low);
-    all.bounds.high = glm::max(all.bounds.high, facts->bounds.high);
-    all.files.push_back(*std::move(facts));
+    all.add(*std::move(facts));
     if (all.files.size() == 1) {
       all.soup = std::move(soup);
     } else {

@@ -40,6 +40,9 @@ struct MeshInput {
   bool closed = true;  ///< all of them
   double area = 0.0, volume = 0.0;
   double read_ms = 0.0, diagnose_ms = 0.0;
+
+  /// Counts one more mesh in, all but its triangles.
+  void add(InputFacts facts);
 };
 
 struct MeshInputRules {

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <glm/common.hpp>
 #include <utility>
 
 #include "apps/csg_scene.h"
@@ -32,12 +31,7 @@ Result<MeshInput> load_united(const InputOptions& input, const MeshInputRules& r
     solid.rule = rules.rule;
     solid.name = path;
     solids.push_back(tree.add_solid(std::move(solid)));
-    all.closed = all.closed && facts->closed;
-    all.area += facts->area;
-    all.volume += facts->volume;
-    all.bounds.low = glm::min(all.bounds.low, facts->bounds.low);
-    all.bounds.high = glm::max(all.bounds.high, facts->bounds.high);
-    all.files.push_back(*std::move(facts));
+    all.add(*std::move(facts));
     all.read_ms += read_ms;
     all.diagnose_ms += session.milliseconds() - start - read_ms;
   }

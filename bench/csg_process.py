@@ -6,7 +6,6 @@ usage: csg_process.py STRATA FOLDER... [--rounds N] [--render-limit SECONDS] [--
 """
 
 import argparse
-import csv
 import os
 import pathlib
 import statistics
@@ -15,6 +14,8 @@ import sys
 import tempfile
 import threading
 import time
+
+import tables
 
 
 def seconds(command, limit):
@@ -88,10 +89,7 @@ def main():
         summary += f"; render / strata at least {min(renders):.1f}, median {statistics.median(renders):.1f}"
     print(summary)
     if options.csv:
-        with open(options.csv, "w", newline="") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(columns)
-            writer.writerows(rows)
+        tables.save(options.csv, columns, rows)
 
 
 if __name__ == "__main__":

@@ -19,6 +19,13 @@ def load(folder, name):
         return list(csv.DictReader(file))
 
 
+def save(path, columns, rows):
+    with open(path, "w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(rows)
+
+
 def table(rows, columns):
     """columns: {heading: key of the row, or a function of it}"""
     lines = ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]

@@ -4,7 +4,6 @@ OpenVDB and Strata's reader, and PNG slices. Interleaved rounds; medians of wall
 system, all threads) and peak memory."""
 
 import argparse
-import csv
 import os
 import shutil
 import statistics
@@ -12,6 +11,8 @@ import subprocess
 import sys
 import tempfile
 import time
+
+import tables
 
 
 def measure(command, log):
@@ -121,10 +122,7 @@ def main():
     for row in rows:
         print("| " + " | ".join(str(cell) for cell in row) + " |")
     if options.csv:
-        with open(options.csv, "w", newline="") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(columns)
-            writer.writerows(rows)
+        tables.save(options.csv, columns, rows)
 
 
 if __name__ == "__main__":

@@ -206,12 +206,16 @@ void Geometry::measure() {
   }
 }
 
+Bounds Geometry::box(const Tree& tree, Tree::NodeId node) const {
+  std::vector<Bounds> boxes;
+  for (const Part& part : parts_) boxes.push_back(part.box);
+  return bounds(tree, node, boxes);
+}
+
 double Geometry::world_error(const Tree& tree, double relative_precision) const {
   constexpr double kMostSizes = 8.0;
   if (box_.empty()) return 0;
-  std::vector<Bounds> boxes;
-  for (const Part& part : parts_) boxes.push_back(part.box);
-  Bounds result = bounds(tree, tree.root(), boxes);
+  Bounds result = box(tree, tree.root());
   if (result.empty()) result = box_;
   const double reach = glm::length(glm::max(glm::abs(box_.low), glm::abs(box_.high)));
   return relative_precision * std::min(reach, kMostSizes * glm::length(result.high - result.low));

@@ -233,11 +233,9 @@ struct Preview::Impl {
   /// leave it no depth.
   [[nodiscard]] Bounds box() const {
     constexpr double kFarLarger = 1000.0;
-    std::vector<Bounds> boxes;
-    for (const Geometry::Part& part : geometry.parts()) boxes.push_back(part.box);
-    Bounds seen = bounds(tree, tree.root(), boxes);
+    Bounds seen = geometry.box(tree, tree.root());
     for (const Translucent& part : translucent) {
-      const Bounds own = bounds(tree, part.node, boxes);
+      const Bounds own = geometry.box(tree, part.node);
       if (own.empty()) continue;
       seen.low = glm::min(seen.low, own.low);
       seen.high = glm::max(seen.high, own.high);
