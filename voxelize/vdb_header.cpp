@@ -54,7 +54,7 @@ std::string metadata(const VdbHeader& header, const std::string& compression) {
     put_text(entries, value);
     ++count;
   };
-  if (header.fog) put_meta("class", "string", "fog volume");
+  if (header.values == VdbValues::kFog) put_meta("class", "string", "fog volume");
   put_meta("creator", "string", "strata");
   put_meta("file_bbox_max", "vec3i", raw(upper));
   put_meta("file_bbox_min", "vec3i", raw(lower));
@@ -92,11 +92,14 @@ std::string vdb_header_bytes(const VdbHeader& header) {
   put(bytes, std::uint32_t{1});  // grids
 
   put_text(bytes, header.name);
-  put_text(bytes, header.fog ? "Tree_float_5_4_3" : "Tree_mask_5_4_3");
+  put_text(bytes, header.values == VdbValues::kMask  ? "Tree_mask_5_4_3"
+                  : header.values == VdbValues::kFog ? "Tree_float_5_4_3"
+                                                     : "Tree_int32_5_4_3");
   put_text(bytes, "");  // not an instance of another grid
 
-  std::string grid = raw(kCompressActiveMask | (header.zip ? kCompressZip : 0));
-  grid += metadata(header, header.zip ? "zip + active values" : "active values");
+  const bool zip = header.values != VdbValues::kMask;
+  std::string grid = raw(kCompressActiveMask | (zip ? kCompressZip : 0));
+  grid += metadata(header, zip ? "zip + active values" : "active values");
   grid += transform(header.grid);
   const std::uint64_t grid_position = bytes.size() + 3 * sizeof(std::uint64_t);
   const std::uint64_t buffers_position = grid_position + grid.size() + header.topology_bytes;

@@ -8,12 +8,15 @@
 
 namespace strata {
 
+/// What the voxels of an OpenVDB file hold: they are active (MaskGrid), 1 in a FloatGrid of class
+/// fog volume, or ids in an Int32Grid. The values of the latter two are compressed by zlib.
+enum class VdbValues { kMask, kFog, kIds };
+
 /// What stands in an OpenVDB file before the tree (internal to voxelize/).
 struct VdbHeader {
   std::string name;
   VoxelGrid grid;
-  bool fog = false;               ///< FloatGrid of class fog volume; else MaskGrid
-  bool zip = false;               ///< value lists are compressed by zlib
+  VdbValues values = VdbValues::kMask;
   std::uint64_t voxels = 0;       ///< active ones
   glm::ivec3 lower{0}, upper{0};  ///< bounds of the active voxels, inclusive, if there are any
   std::uint64_t hash = 0;         ///< of the content; becomes the file's UUID

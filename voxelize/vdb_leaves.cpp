@@ -47,19 +47,23 @@ std::unique_ptr<T[]> exact_copy(const std::vector<T>& items) {
 
 }  // namespace
 
-VdbLeafBuilder::VdbLeafBuilder(int depth)
+VdbLeafBuilder::VdbLeafBuilder(int depth, bool ids)
     : leaves_z_((depth + 7) / 8),
+      ids_(ids),
       // One more than leaves: an interval may cease at the very end.
       events_(static_cast<std::size_t>(leaves_z_) + 1),
       has_event_((events_.size() + 7) / 8 * 8) {}
 
 std::unique_ptr<VdbLeafTile> VdbLeafBuilder::build(const VoxelIntervals& slab, int tile_u,
                                                    int tile_v) {
-  const VoxelIntervals::TileView view = slab.tile(tile_u, tile_v);
-  if (view.items.empty()) return nullptr;
+  view_ = slab.tile(tile_u, tile_v);
+  if (view_.items.empty()) return nullptr;
   leaves_.clear();
   leaf_z_.clear();
   runs_.clear();
+  run_ids_.clear();
+  first_value_.assign(1, 0);
+  values_.clear();
   hash_ = 0;
 
   auto tile = std::make_unique<VdbLeafTile>();
@@ -70,10 +74,11 @@ std::unique_ptr<VdbLeafTile> VdbLeafBuilder::build(const VoxelIntervals& slab, i
     const std::uint64_t place = static_cast<std::uint64_t>(first_x + x) << 32 |
                                 static_cast<std::uint64_t>(first_y + y) << 16;
     first_run_ = runs_.size();
-    collect_leaf_column(view, x, y);
+    collect_leaf_column(x, y);
     sweep_leaf_column(place);
     for (std::size_t i = first_run_; i < runs_.size(); ++i) {
       hash_ += mix(place + runs_[i].begin) * 3 + mix(place + runs_[i].end) * 5;
+      if (ids_) hash_ += mix(mix(place + runs_[i].begin) + run_ids_[i]) * 7;
     }
     const auto next = static_cast<std::size_t>(column) + 1;
     tile->first_leaf[next] = static_cast<std::uint32_t>(leaves_.size());
@@ -82,8 +87,13 @@ std::unique_ptr<VdbLeafTile> VdbLeafBuilder::build(const VoxelIntervals& slab, i
   tile->leaves = exact_copy(leaves_);
   tile->leaf_z = exact_copy(leaf_z_);
   tile->runs = exact_copy(runs_);
+  if (ids_) {
+    tile->run_ids = exact_copy(run_ids_);
+    tile->values.assign(values_.begin(), values_.end());
+    tile->first_value = exact_copy(first_value_);
+  }
   tile->hash = hash_;
-  set_bounds(view, *tile);
+  set_bounds(view_, *tile);
   tile->lower += glm::ivec3(first_x * 8, first_y * 8, 0);
   tile->upper += glm::ivec3(first_x * 8, first_y * 8, 0);
   return tile;
@@ -114,18 +124,19 @@ void VdbLeafBuilder::set_bounds(const VoxelIntervals::TileView& view, VdbLeafTil
 
 // Enters the interval ends of 8 x 8 columns: the bits of the byte where an interval begins and of
 // the one where it ends, and between them, where its bytes become whole and cease to be.
-void VdbLeafBuilder::collect_leaf_column(VoxelIntervals::TileView tile, int leaf_x, int leaf_y) {
+void VdbLeafBuilder::collect_leaf_column(int leaf_x, int leaf_y) {
   for (int y = 0; y < 8; ++y) {
-    const std::uint32_t* offsets = tile.offsets.data() + (leaf_y * 8 + y) * kSide + leaf_x * 8;
+    const std::uint32_t* offsets = view_.offsets.data() + (leaf_y * 8 + y) * kSide + leaf_x * 8;
     for (int x = 0; x < 8; ++x) {
       const int column = x * 8 + y;
+      columns_[static_cast<std::size_t>(column)] = {offsets[x], offsets[x + 1]};
       const std::uint64_t bit = std::uint64_t{1} << column;
       const auto partial = [&](std::size_t z) -> std::uint64_t& {
         return events_[z].partial.words[static_cast<std::size_t>(x)];
       };
       for (std::uint32_t i = offsets[x]; i < offsets[x + 1]; ++i) {
-        const auto begin = static_cast<std::size_t>(tile.items[i].begin());
-        const auto end = static_cast<std::size_t>(tile.items[i].end());
+        const auto begin = static_cast<std::size_t>(view_.items[i].begin());
+        const auto end = static_cast<std::size_t>(view_.items[i].end());
         const std::size_t first = begin / 8, last = end / 8;
         const std::uint64_t head = 0xffu << begin % 8 & 0xffu;
         const std::uint64_t tail = (1u << end % 8) - 1;
@@ -157,7 +168,7 @@ void VdbLeafBuilder::sweep_leaf_column(std::uint64_t place) {
     for (; marks != 0; marks &= marks - 1) {
       const int z = static_cast<int>(group) + std::countr_zero(marks) / 8;
       if (solid == kAllColumns) {
-        put_run(done, z);
+        put_whole(done, z, place);
       } else if (solid != 0) {
         const VdbLeaf between = spread(solid);
         for (; done < z; ++done) put_leaf(done, between, place);
@@ -173,7 +184,7 @@ void VdbLeafBuilder::sweep_leaf_column(std::uint64_t place) {
       }
       event = {};
       if (all == kAllColumns) {
-        put_run(z, z + 1);
+        put_whole(z, z + 1, place);
       } else if (any != 0) {
         put_leaf(z, leaf, place);
       }
@@ -182,13 +193,71 @@ void VdbLeafBuilder::sweep_leaf_column(std::uint64_t place) {
   }
 }
 
-void VdbLeafBuilder::put_run(int begin, int end) {
+// Leaves that are all solid, and alike: a run if they are of one id.
+void VdbLeafBuilder::put_whole(int begin, int end, std::uint64_t place) {
   if (begin >= end) return;
-  if (runs_.size() > first_run_ && runs_.back().end == begin) {
+  if (!ids_) return put_run(begin, end, 1);
+  std::uint32_t first = 0;
+  bool alike = true;
+  for_each_id(begin, [&](std::uint32_t id, int) {
+    if (first == 0) first = id;
+    alike = alike && id == first;
+  });
+  if (alike) return put_run(begin, end, first);
+  for (int z = begin; z < end; ++z) put_leaf(z, spread(kAllColumns), place);
+}
+
+void VdbLeafBuilder::put_run(int begin, int end, std::uint32_t id) {
+  const bool goes_on =
+      runs_.size() > first_run_ && runs_.back().end == begin && (!ids_ || run_ids_.back() == id);
+  if (goes_on) {
     runs_.back().end = static_cast<std::uint16_t>(end);
-  } else {
-    runs_.push_back({static_cast<std::uint16_t>(begin), static_cast<std::uint16_t>(end)});
+    return;
   }
+  runs_.push_back({static_cast<std::uint16_t>(begin), static_cast<std::uint16_t>(end)});
+  if (ids_) run_ids_.push_back(id);
+}
+
+// Calls run(id, length) for the solid voxels of leaf z of the leaf column, in OpenVDB's order. The
+// leaves have to be asked for from below, one of them as often as wanted.
+template <class Run>
+void VdbLeafBuilder::for_each_id(int z, Run&& run) {
+  const int begin = z * 8, end = begin + 8;
+  for (Column& column : columns_) {
+    while (column.item < column.end && view_.items[column.item].end() <= begin) ++column.item;
+    for (std::uint32_t i = column.item; i < column.end; ++i) {
+      const Interval& item = view_.items[i];
+      if (item.begin() >= end) break;
+      run(view_.label(i), std::min(end, item.end()) - std::max(begin, item.begin()));
+    }
+  }
+}
+
+// Appends the values of a leaf as OpenVDB has them, [bytes:64 | zlib stream], or minus the bytes
+// and the values themselves where that is shorter. @return a hash of them
+std::uint64_t VdbLeafBuilder::put_ids(int z, std::size_t voxels) {
+  const std::size_t begin = values_.size();
+  values_.resize(begin + sizeof(std::int64_t));
+  std::uint64_t hash = 0;
+  append_zlib_stream(deflater_, values_, [&](RunDeflater& to) {
+    for_each_id(z, [&](std::uint32_t id, int length) {
+      to.run(id, static_cast<std::uint64_t>(length));
+      hash = (hash ^ id) * 0x9e3779b97f4a7c15u + static_cast<std::uint64_t>(length);
+    });
+  });
+  const std::size_t plain = voxels * sizeof(std::uint32_t);
+  auto count = static_cast<std::int64_t>(values_.size() - begin - sizeof(std::int64_t));
+  if (static_cast<std::size_t>(count) >= plain) {
+    count = -static_cast<std::int64_t>(plain);
+    values_.resize(begin + sizeof count + plain);
+    std::byte* to = values_.data() + begin + sizeof count;
+    for_each_id(z, [&](std::uint32_t id, int length) {
+      for (int i = 0; i < length; ++i, to += sizeof id) std::memcpy(to, &id, sizeof id);
+    });
+  }
+  std::memcpy(values_.data() + begin, &count, sizeof count);
+  first_value_.push_back(static_cast<std::uint32_t>(values_.size()));
+  return hash;
 }
 
 void VdbLeafBuilder::put_leaf(int z, const VdbLeaf& leaf, std::uint64_t place) {
@@ -199,6 +268,7 @@ void VdbLeafBuilder::put_leaf(int z, const VdbLeaf& leaf, std::uint64_t place) {
     // Odd factors, one a word, so that swapped words differ.
     sum += (leaf.words[i] ^ leaf.words[i] >> 32) * (0x9e3779b97f4a7c15u + 2 * i);
   }
+  if (ids_) sum += put_ids(z, static_cast<std::size_t>(leaf.count()));
   hash_ += mix(sum ^ mix(place + static_cast<std::uint64_t>(z)));
 }
 

@@ -5,9 +5,11 @@
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "voxelize/intervals.h"
+#include "voxelize/run_deflate.h"
 
 namespace strata {
 
@@ -34,7 +36,8 @@ static_assert(sizeof(VdbLeaf) == 64);
 
 /// The leaves above one 64 x 64 tile of z columns. A leaf column is 8 x 8 columns of voxels and has
 /// the index (x / 8 % 8) * 8 + y / 8 % 8; along it, a leaf that is partly solid is stored, one that
-/// is all solid is a part of a run, and one that is empty is not there.
+/// is all solid is a part of a run, and one that is empty is not there. With ids, a leaf that is
+/// all solid but of several ids is stored too.
 struct VdbLeafTile {
   static constexpr int kLeafColumns = 64;
   struct Run {
@@ -46,6 +49,16 @@ struct VdbLeafTile {
   std::unique_ptr<VdbLeaf[]> leaves;
   std::unique_ptr<std::uint16_t[]> leaf_z;  ///< z / 8 of a leaf; increasing within a leaf column
   std::unique_ptr<Run[]> runs;              ///< increasing within a leaf column
+  // With ids only:
+  std::unique_ptr<std::uint32_t[]> run_ids;  ///< one a run
+  Bytes values;  ///< of the leaves, one after the other, the ids of the solid voxels: see put_ids()
+  std::unique_ptr<std::uint32_t[]> first_value;  ///< into values; one a leaf and the end
+
+  /// 1 without ids.
+  [[nodiscard]] std::uint32_t run_id(std::uint32_t run) const { return run_ids ? run_ids[run] : 1; }
+  [[nodiscard]] std::span<const std::byte> leaf_values(std::uint32_t leaf) const {
+    return std::span(values).subspan(first_value[leaf], first_value[leaf + 1] - first_value[leaf]);
+  }
 
   std::uint64_t voxels = 0;
   glm::ivec3 lower{0}, upper{0};  ///< bounds of the solid voxels, inclusive; unset if voxels == 0
@@ -57,7 +70,8 @@ struct VdbLeafTile {
 class VdbLeafBuilder {
  public:
   /// @param depth voxels along z
-  explicit VdbLeafBuilder(int depth);
+  /// @param ids labels become values of the voxels
+  VdbLeafBuilder(int depth, bool ids);
   /// @param slab intervals along z
   /// @return null for a tile without solid voxels
   std::unique_ptr<VdbLeafTile> build(const VoxelIntervals& slab, int tile_u, int tile_v);
@@ -69,13 +83,24 @@ class VdbLeafBuilder {
     std::uint64_t toggles = 0;  // bit c: from here on column c is solid, or empty again
   };
 
-  void collect_leaf_column(VoxelIntervals::TileView tile, int leaf_x, int leaf_y);
+  void collect_leaf_column(int leaf_x, int leaf_y);
   void sweep_leaf_column(std::uint64_t place);
-  void put_run(int begin, int end);
+  void put_whole(int begin, int end, std::uint64_t place);
+  void put_run(int begin, int end, std::uint32_t id);
   void put_leaf(int z, const VdbLeaf& leaf, std::uint64_t place);
+  template <class Run>
+  void for_each_id(int z, Run&& run);
+  [[nodiscard]] std::uint64_t put_ids(int z, std::size_t voxels);
   static void set_bounds(const VoxelIntervals::TileView& view, VdbLeafTile& tile);
 
+  /// A column of voxels of the leaf column in work: its items from the first that is not yet
+  /// passed.
+  struct Column {
+    std::uint32_t item = 0, end = 0;
+  };
+
   int leaves_z_;
+  bool ids_;
   // Of the leaf column in work, by z / 8. All zero between two leaf columns.
   std::vector<Event> events_;
   std::vector<std::uint8_t> has_event_;  // a multiple of 8 long
@@ -84,6 +109,11 @@ class VdbLeafBuilder {
   std::vector<std::uint16_t> leaf_z_;
   std::vector<VdbLeafTile::Run> runs_;
   std::size_t first_run_ = 0;  // of the leaf column
+  VoxelIntervals::TileView view_;
+  std::array<Column, 64> columns_;  // of the leaf column; with ids only, as all that follows
+  std::vector<std::uint32_t> run_ids_, first_value_;
+  Bytes values_;
+  RunDeflater deflater_{RunBytes::kIds, sizeof(std::uint32_t)};
   std::uint64_t hash_ = 0;
 };
 

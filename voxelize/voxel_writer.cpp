@@ -63,7 +63,8 @@ VoxelWriterResult open_format(const std::string& path, const std::string& name,
 const std::vector<VoxelFormat>& voxel_formats() {
   constexpr std::uint32_t kAnyId = 0x7fffffff;
   static const std::vector<VoxelFormat> kFormats = {
-      {"vdb", ".vdb", "OpenVDB: active voxels, or a fog volume; world transform", Axis::kZ},
+      {"vdb", ".vdb", "OpenVDB: active voxels, a fog volume, or ids; world transform", Axis::kZ, 0,
+       kAnyId},
       {"npy", ".npy", "NumPy: bool array indexed [x, y, z]; ids", Axis::kX, 0, kAnyId},
       {"nrrd", ".nrrd", "NRRD: uint8, gzip; world transform; ids", Axis::kX, 0, kAnyId},
       {"vti", ".vti", "VTK image data: uint8 cells, zlib; world transform; ids", Axis::kX, 0,
@@ -139,6 +140,9 @@ Result<std::unique_ptr<VoxelWriter>> open_voxel_writer(const std::string& path,
   if (Result<void> valid = check_grid(grid); !valid) return tl::unexpected(valid.error());
   if (Result<void> held = check_ids(*chosen, options.ids); !held) {
     return tl::unexpected(held.error());
+  }
+  if (options.ids != 0 && options.fog) {
+    return fail(ErrorCode::kUsage, "{}: a fog volume holds no ids", path);
   }
   if (options.colours.size() > chosen->colours) {
     return fail(ErrorCode::kUsage, "{}: {} colours, the format {} holds {}", path,

@@ -26,13 +26,15 @@ struct VoxelFormat {
 [[nodiscard]] const std::vector<VoxelFormat>& voxel_formats();
 
 struct VoxelWriterOptions {
-  bool fog = false;  ///< .vdb: a float fog volume (1 inside) instead of a mask of active voxels
+  bool fog = false;  ///< .vdb: a float fog volume (1 inside) instead of a mask of active voxels;
+                     ///< not with ids
   std::string name = "solid";  ///< .vdb, .vti, .nrrd: name of the grid
   /// The largest of the slabs' labels, which become the values of voxels, in the narrowest unsigned
-  /// type that holds it; 0: a voxel is solid or not. Slabs have labels with ids or colours only.
+  /// type that holds it (.vdb: always 32 bits, signed); 0: a voxel is solid or not. Slabs have
+  /// labels with ids or colours only.
   std::uint32_t ids = 0;
   /// Of label n the colour at n - 1: red, green, blue, alpha; none: one colour. Not with ids.
-  std::vector<glm::u8vec4> colours;
+  std::vector<glm::u8vec4> colours{};
 };
 
 /// Writes a voxel set slab by slab: every slab of one axis, in increasing v, then finish(). Nothing
@@ -48,8 +50,8 @@ class VoxelWriter {
 
 /// Opens a writer for `path` ("-": standard output). The format is `format`, or if that is empty
 /// the path's extension. @return kUsage: no such format, none for the extension, a folder format on
-/// standard output, a grid, ids or colours the format cannot hold; kOutput: the file or folder
-/// cannot be made.
+/// standard output, a grid, ids or colours the format cannot hold, a fog volume with ids; kOutput:
+/// the file or folder cannot be made.
 Result<std::unique_ptr<VoxelWriter>> open_voxel_writer(const std::string& path,
                                                        const std::string& format,
                                                        const VoxelGrid& grid,

@@ -3,7 +3,7 @@
 // The tree is OpenVDB's (tree/RootNode.h, InternalNode.h, LeafNodeMask.h, LeafNode.h and
 // io/Compression.h of OpenVDB 10.0), topology and then buffers, both depth first:
 //   topology  root, upper node (32^3 lower nodes), lower node (16^3 leaves), mask of a leaf
-//   buffers   mask of a leaf again and its origin, or its active values for a fog volume
+//   buffers   mask of a leaf again and its origin, or its active values for a fog volume or ids
 // Not with the library itself: loading libopenvdb takes 45 ms, several times what a whole 1024^3
 // solid takes here, and a lower node of its tree is 33 KB to be filled and freed. The tests read
 // the files back with OpenVDB and compare the bytes of the tree with those that OpenVDB writes.
@@ -17,6 +17,7 @@
 #include <glm/common.hpp>
 #include <memory>
 #include <mutex>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -48,12 +49,27 @@ constexpr std::uint8_t kActiveValuesOnly = 0;
 int parts(int voxels, int part) { return (voxels + part - 1) / part; }
 std::size_t size(int value) { return static_cast<std::size_t>(value); }
 
+/// The one id of several things, as they come; without ids all are 1.
+class OneId {
+ public:
+  void add(std::uint32_t id) { id_ = id_ == 0 || id_ == id ? id : kSeveral; }
+  [[nodiscard]] std::uint32_t get() const { return id_; }
+  [[nodiscard]] bool several() const { return id_ == kSeveral; }
+
+ private:
+  static constexpr std::uint32_t kSeveral = ~std::uint32_t{0};
+  std::uint32_t id_ = 0;
+};
+
 /// What is known of a lower node after counting.
 struct LowerNode {
   std::uint32_t leaves = 0;  // partly solid: stored
   std::uint32_t solid = 0;   // all solid: active tiles of the node
+  OneId id;                  // of those
 
-  [[nodiscard]] bool all_solid() const { return solid == kLowerSlots; }  // a tile of its parent
+  [[nodiscard]] bool all_solid() const {  // a tile of its parent
+    return solid == kLowerSlots && !id.several();
+  }
   [[nodiscard]] bool stored() const { return !all_solid() && (leaves != 0 || solid != 0); }
 };
 
@@ -61,6 +77,12 @@ struct LowerNode {
 struct Upper {
   glm::ivec3 index{0};    // in upper nodes of the whole grid
   std::size_t solid = 0;  // lower nodes that are all solid: active tiles of the node
+};
+
+/// An upper node that is all solid.
+struct RootTile {
+  glm::ivec3 index{0};
+  std::uint32_t id = 0;
 };
 
 /// A piece of the file that one thread makes: the head of an upper node, or the topology or the
@@ -71,15 +93,16 @@ struct Block {
   int x = 0, y = 0;       // in lower nodes of the whole grid
 };
 
-/// The active values of a node as they stand in a file. All are alike, so their number tells all.
+/// The active values of a node as they stand in a file. Their number tells how many bytes they
+/// take, and all but ids are alike.
 class ValueLists {
  public:
-  explicit ValueLists(bool fog) : fog_(fog) {
-    if (fog) lists_.resize(kUpperSlots + 1);
+  explicit ValueLists(VdbValues values) : values_(values) {
+    if (values == VdbValues::kFog) lists_.resize(kUpperSlots + 1);
   }
   /// Notes that a list of n values will be asked for. Not from several threads.
   void need(std::size_t n) {
-    if (fog_ && lists_[n].empty()) {
+    if (values_ == VdbValues::kFog && lists_[n].empty()) {
       lists_[n] = " ";
       needed_.push_back(n);
     }
@@ -89,12 +112,22 @@ class ValueLists {
                  [&](std::size_t i, int) { lists_[needed_[i]] = zipped_ones(needed_[i]); });
     needed_.clear();
   }
-  [[nodiscard]] std::size_t bytes(std::size_t n) const { return fog_ ? lists_[n].size() : n; }
-  std::byte* copy(std::size_t n, std::byte* to) const {
-    if (fog_) {
+  [[nodiscard]] std::size_t bytes(std::size_t n) const {
+    if (values_ == VdbValues::kMask) return n;
+    if (values_ == VdbValues::kFog) return lists_[n].size();
+    return sizeof(std::int64_t) + n * sizeof(std::uint32_t);
+  }
+  /// Writes the list of n values. `ids`, the values, count with ids only; tiles are few, so theirs
+  /// stand as they are.
+  std::byte* copy(std::size_t n, std::byte* to, std::span<const std::uint32_t> ids = {}) const {
+    if (values_ == VdbValues::kMask) {
+      std::memset(to, 1, n);
+    } else if (values_ == VdbValues::kFog) {
       std::memcpy(to, lists_[n].data(), lists_[n].size());
     } else {
-      std::memset(to, 1, n);
+      const std::int64_t count = -static_cast<std::int64_t>(ids.size_bytes());
+      std::memcpy(to, &count, sizeof count);
+      if (n != 0) std::memcpy(to + sizeof count, ids.data(), ids.size_bytes());
     }
     return to + bytes(n);
   }
@@ -116,7 +149,7 @@ class ValueLists {
     return list.append(reinterpret_cast<const char*>(ones.data()), plain);
   }
 
-  bool fog_;
+  VdbValues values_;
   std::vector<std::string> lists_;
   std::vector<std::size_t> needed_;
 };
@@ -126,7 +159,9 @@ class VdbWriter final : public SlabWriter {
   VdbWriter(const std::string& path, const VoxelGrid& grid, const VoxelWriterOptions& options,
             BlockOutput output)
       : SlabWriter(path, grid, Axis::kZ),
-        fog_(options.fog),
+        kind_(options.ids != 0 ? VdbValues::kIds
+                     : options.fog    ? VdbValues::kFog
+                                      : VdbValues::kMask),
         name_(options.name.empty() ? "solid" : options.name),
         output_(std::move(output)),
         tiles_x_(parts(grid.dims.x, kTileSide)),
@@ -134,7 +169,7 @@ class VdbWriter final : public SlabWriter {
         lowers_(parts(grid.dims.x, kLowerVoxels), parts(grid.dims.y, kLowerVoxels),
                 parts(grid.dims.z, kLowerVoxels)),
         tiles_(size(tiles_x_) * size(tiles_y_)),
-        values_(options.fog) {}
+        values_(kind_) {}
 
  private:
   Result<void> add_slab(const VoxelIntervals& slab, const Execution& execution) override;
@@ -165,7 +200,7 @@ class VdbWriter final : public SlabWriter {
   void make_topology(const Block& block, Bytes& out);
   void make_buffers(const Block& block, Bytes& out);
 
-  bool fog_;
+  VdbValues kind_;
   std::string name_;
   BlockOutput output_;
   int tiles_x_, tiles_y_;
@@ -174,7 +209,7 @@ class VdbWriter final : public SlabWriter {
   std::vector<std::unique_ptr<VdbLeafBuilder>> builders_;  // by worker
   std::vector<LowerNode> lower_nodes_;                     // z fastest, then y
   std::vector<Upper> uppers_;                              // stored nodes
-  std::vector<glm::ivec3> solid_uppers_;                   // tiles of the root
+  std::vector<RootTile> root_tiles_;
   std::vector<Block> blocks_;
   ValueLists values_;
   std::array<std::uint64_t, kLeafVoxels + 1> leaf_sizes_{};  // leaves by number of voxels; fog only
@@ -190,7 +225,8 @@ Result<void> VdbWriter::add_slab(const VoxelIntervals& slab, const Execution& ex
     const int tv = static_cast<int>(index) / slab.tiles_u();
     if (slab.tile_empty(tu, tv)) return;
     std::unique_ptr<VdbLeafBuilder>& builder = builders_[size(worker)];
-    if (!builder) builder = std::make_unique<VdbLeafBuilder>(dims().z);
+    if (!builder)
+      builder = std::make_unique<VdbLeafBuilder>(dims().z, kind_ == VdbValues::kIds);
     tiles_[first + index] = builder->build(slab, tu, tv);
   });
   return {};
@@ -228,18 +264,19 @@ void VdbWriter::count(const Execution& execution) {
     for (const LeafColumn& column : leaf_columns(x, y, 0)) {
       for (std::uint32_t i = column.leaf; i < column.leaf_end; ++i) {
         ++nodes[column.tile->leaf_z[i] / kLowerSide].leaves;
-        if (fog_) ++sizes[size(column.tile->leaves[i].count())];
+        if (kind_ == VdbValues::kFog) ++sizes[size(column.tile->leaves[i].count())];
       }
       for (std::uint32_t i = column.run; i < column.run_end; ++i) {
         const VdbLeafTile::Run run = column.tile->runs[i];
         for (int begin = run.begin; begin < run.end;) {
           const int end = std::min<int>(run.end, (begin / kLowerSide + 1) * kLowerSide);
           nodes[begin / kLowerSide].solid += static_cast<std::uint32_t>(end - begin);
+          nodes[begin / kLowerSide].id.add(column.tile->run_id(i));
           begin = end;
         }
       }
     }
-    if (!fog_) return;
+    if (kind_ != VdbValues::kFog) return;
     const std::lock_guard lock(mutex);
     for (std::size_t n = 0; n <= kLeafVoxels; ++n) leaf_sizes_[n] += sizes[n];
   });
@@ -269,6 +306,7 @@ void VdbWriter::lay_out() {
 void VdbWriter::lay_out_upper(const glm::ivec3& upper) {
   const glm::ivec3 first = first_lower(upper), last = last_lower(upper);
   std::size_t solid = 0;
+  OneId id;
   const std::size_t blocks_before = blocks_.size();
   blocks_.push_back({Block::kHead, uppers_.size(), 0, 0});
   for (int x = first.x; x < last.x; ++x) {
@@ -276,7 +314,10 @@ void VdbWriter::lay_out_upper(const glm::ivec3& upper) {
       bool stored = false;
       const LowerNode* nodes = lower_column(x, y);
       for (int z = first.z; z < last.z; ++z) {
-        solid += nodes[z].all_solid() ? 1u : 0u;
+        if (nodes[z].all_solid()) {
+          ++solid;
+          id.add(nodes[z].id.get());
+        }
         if (!nodes[z].stored()) continue;
         stored = true;
         values_.need(nodes[z].solid);
@@ -285,9 +326,10 @@ void VdbWriter::lay_out_upper(const glm::ivec3& upper) {
       if (stored) blocks_.push_back({Block::kTopology, uppers_.size(), x, y});
     }
   }
-  if (solid == kUpperSlots || (solid == 0 && blocks_.size() == blocks_before + 1)) {
+  const bool nothing = solid == 0 && blocks_.size() == blocks_before + 1;
+  if (nothing || (solid == kUpperSlots && !id.several())) {
     blocks_.pop_back();
-    if (solid != 0) solid_uppers_.push_back(upper);
+    if (!nothing) root_tiles_.push_back({upper, id.get()});
     return;
   }
   values_.need(solid);
@@ -301,20 +343,18 @@ std::string VdbWriter::root() const {
   const auto put = [&](const auto& value) {
     bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
   };
-  const auto put_value = [&](bool active) {
-    if (fog_) {
-      put(active ? 1.0f : 0.0f);
-    } else {
-      put(static_cast<std::uint8_t>(active));
-    }
+  const auto put_value = [&](std::uint32_t id) {
+    if (kind_ == VdbValues::kMask) put(static_cast<std::uint8_t>(id));
+    if (kind_ == VdbValues::kFog) put(static_cast<float>(id));
+    if (kind_ == VdbValues::kIds) put(id);
   };
   put(std::uint32_t{1});  // one buffer a leaf
-  put_value(false);       // background
-  put(static_cast<std::uint32_t>(solid_uppers_.size()));
+  put_value(0);           // background
+  put(static_cast<std::uint32_t>(root_tiles_.size()));
   put(static_cast<std::uint32_t>(uppers_.size()));
-  for (const glm::ivec3& upper : solid_uppers_) {
-    put(upper * kUpperVoxels);
-    put_value(true);
+  for (const RootTile& tile : root_tiles_) {
+    put(tile.index * kUpperVoxels);
+    put_value(tile.id);
     put(std::uint8_t{1});  // active
   }
   return bytes;
@@ -325,6 +365,7 @@ void VdbWriter::make_head(const Block& block, Bytes& out) {
   const glm::ivec3 upper = uppers_[block.upper].index;
   const glm::ivec3 first = first_lower(upper), last = last_lower(upper);
   std::array<std::uint32_t, kUpperSlots / 32> child{}, active{};  // a word is a column along z
+  std::vector<std::uint32_t> ids;
   for (int x = first.x; x < last.x; ++x) {
     for (int y = first.y; y < last.y; ++y) {
       const LowerNode* nodes = lower_column(x, y);
@@ -332,7 +373,9 @@ void VdbWriter::make_head(const Block& block, Bytes& out) {
       for (int z = first.z; z < last.z; ++z) {
         const std::uint32_t bit = std::uint32_t{1} << (z - first.z);
         if (nodes[z].stored()) child[word] |= bit;
-        if (nodes[z].all_solid()) active[word] |= bit;
+        if (!nodes[z].all_solid()) continue;
+        active[word] |= bit;
+        ids.push_back(nodes[z].id.get());
       }
     }
   }
@@ -344,7 +387,7 @@ void VdbWriter::make_head(const Block& block, Bytes& out) {
   std::memcpy(to += sizeof origin, child.data(), sizeof child);
   std::memcpy(to += sizeof child, active.data(), sizeof active);
   *(to += sizeof active) = std::byte{kActiveValuesOnly};
-  values_.copy(solid, to + 1);
+  values_.copy(solid, to + 1, ids);
 }
 
 void VdbWriter::make_topology(const Block& block, Bytes& out) {
@@ -360,16 +403,15 @@ void VdbWriter::make_topology(const Block& block, Bytes& out) {
   }
   out.resize(bytes);
   std::byte* to = out.data();
+  const bool with_ids = kind_ == VdbValues::kIds;
+  std::vector<std::uint32_t> ids;
   LeafColumnArray columns = leaf_columns(block.x, block.y, z_begin * kLowerSide);
   for (int z = z_begin; z < z_end; ++z) {
     const bool stored = nodes[z].stored();
     const int begin = z * kLowerSide, end = begin + kLowerSide;
     std::byte* head = to;
-    if (stored) {
-      to += sizeof child + sizeof active;
-      *to++ = std::byte{kActiveValuesOnly};
-      to = values_.copy(nodes[z].solid, to);
-    }
+    if (stored) to += kLowerBytes + values_.bytes(nodes[z].solid);
+    ids.clear();
     // Also where nothing is stored, since the columns have to move on.
     for (std::size_t c = 0; c < kLeafColumns; ++c) {
       LeafColumn& column = columns[c];
@@ -380,6 +422,7 @@ void VdbWriter::make_topology(const Block& block, Bytes& out) {
         const int from = std::max<int>(run.begin, begin) - begin;
         const int past = std::min<int>(run.end, end) - begin;
         active_bits |= (1u << past) - (1u << from);
+        if (with_ids) ids.insert(ids.end(), size(past - from), column.tile->run_ids[column.run]);
         if (run.end > end) break;  // goes on in the next node
       }
       const std::uint32_t first = column.leaf;
@@ -398,7 +441,9 @@ void VdbWriter::make_topology(const Block& block, Bytes& out) {
     }
     if (!stored) continue;
     std::memcpy(head, child.data(), sizeof child);
-    std::memcpy(head + sizeof child, active.data(), sizeof active);
+    std::memcpy(head += sizeof child, active.data(), sizeof active);
+    *(head += sizeof active) = std::byte{kActiveValuesOnly};
+    values_.copy(nodes[z].solid, head + 1, ids);
   }
 }
 
@@ -410,8 +455,9 @@ void VdbWriter::make_buffers(const Block& block, Bytes& out) {
   for (int z = z_begin; z < z_end; ++z) leaves += nodes[z].leaves;
   glm::ivec3 origin;
   const std::size_t largest =
-      sizeof(VdbLeaf) +
-      (fog_ ? 1 + sizeof(std::int64_t) + kLeafVoxels * sizeof(float) : sizeof origin);
+      sizeof(VdbLeaf) + (kind_ == VdbValues::kMask
+                             ? sizeof origin
+                             : 1 + sizeof(std::int64_t) + kLeafVoxels * sizeof(float));
   out.resize(leaves * largest);
   std::byte* to = out.data();
   LeafColumnArray columns = leaf_columns(block.x, block.y, z_begin * kLowerSide);
@@ -428,9 +474,13 @@ void VdbWriter::make_buffers(const Block& block, Bytes& out) {
         const VdbLeaf& leaf = column.tile->leaves[column.leaf];
         std::memcpy(to, &leaf, sizeof leaf);
         to += sizeof leaf;
-        if (fog_) {
-          *to++ = std::byte{kActiveValuesOnly};
+        if (kind_ != VdbValues::kMask) *to++ = std::byte{kActiveValuesOnly};
+        if (kind_ == VdbValues::kFog) {
           to = values_.copy(size(leaf.count()), to);
+        } else if (kind_ == VdbValues::kIds) {
+          const std::span<const std::byte> list = column.tile->leaf_values(column.leaf);
+          std::memcpy(to, list.data(), list.size());
+          to += list.size();
         } else {
           origin.z = leaf_z * 8;
           std::memcpy(to, &origin, sizeof origin);
@@ -446,18 +496,22 @@ VdbHeader VdbWriter::header(std::uint64_t topology_bytes) const {
   VdbHeader header;
   header.name = name_;
   header.grid = grid();
-  header.fog = header.zip = fog_;
+  header.values = kind_;
+  std::uint64_t value_bytes = 0;
   header.lower = glm::ivec3(INT_MAX);
   header.upper = glm::ivec3(INT_MIN);
   for (const std::unique_ptr<VdbLeafTile>& tile : tiles_) {
     if (!tile) continue;
     header.voxels += tile->voxels;
     header.hash += tile->hash;
+    value_bytes += tile->values.size();
     header.lower = glm::min(header.lower, tile->lower);
     header.upper = glm::max(header.upper, tile->upper);
   }
   header.topology_bytes = topology_bytes;
-  if (fog_) {
+  if (kind_ == VdbValues::kIds) {
+    header.buffers_bytes = leaves_ * (sizeof(VdbLeaf) + 1) + value_bytes;
+  } else if (kind_ == VdbValues::kFog) {
     for (std::size_t n = 0; n <= kLeafVoxels; ++n) {
       if (leaf_sizes_[n] != 0) {
         header.buffers_bytes += leaf_sizes_[n] * (sizeof(VdbLeaf) + 1 + values_.bytes(n));

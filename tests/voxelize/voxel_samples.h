@@ -73,6 +73,53 @@ inline VoxelIntervals intervals_of(const Sample& sample, Axis axis) {
   return intervals_from_predicate(sample.grid, axis, sample.solid);
 }
 
+using IdOf = std::function<std::uint32_t(int, int, int)>;
+
+/// Labelled intervals by brute force, of all rows.
+inline VoxelIntervals labelled(const VoxelGrid& grid, Axis axis, const IdOf& id) {
+  const AxisFrame frame(axis);
+  VoxelIntervals result(grid, axis);
+  constexpr int kSide = VoxelIntervals::kTileSide;
+  for (int tile = 0; tile < result.tiles_u() * result.tiles_v(); ++tile) {
+    const int tu = tile % result.tiles_u(), tv = tile / result.tiles_u();
+    std::vector<std::uint32_t> offsets(1, 0), labels;
+    std::vector<Interval> items;
+    for (int local = 0; local < kSide * kSide; ++local) {
+      glm::ivec3 at(0);
+      at[frame.u] = tu * kSide + local % kSide;
+      at[frame.v] = tv * kSide + local / kSide;
+      std::uint32_t last = 0;
+      for (int k = 0; k < grid.dims[frame.w]; ++k) {
+        if (at[frame.u] >= grid.dims[frame.u] || at[frame.v] >= grid.dims[frame.v]) break;
+        at[frame.w] = k;
+        const std::uint32_t now = id(at.x, at.y, at.z);
+        const auto place = static_cast<std::uint16_t>(k);
+        if (now != 0 && now != last) {
+          items.push_back({place, place});
+          labels.push_back(now);
+        }
+        if (now != 0) items.back().last = place;
+        last = now;
+      }
+      offsets.push_back(static_cast<std::uint32_t>(items.size()));
+    }
+    if (!items.empty()) result.set_tile(tu, tv, offsets, items, labels);
+  }
+  return result;
+}
+
+/// Blocks, and some voxels by themselves; ids up to `largest`, which is there.
+inline IdOf some_ids(std::uint32_t largest) {
+  return [largest](int i, int j, int k) -> std::uint32_t {
+    if (i + j + k == 0) return largest;
+    if (random_voxel(i, j, k, 20)) {
+      return 1 + static_cast<std::uint32_t>(i * 7919 + j * 104729 + k * 1299709) % largest;
+    }
+    if (!random_voxel(i / 9, j / 9, k / 9, 600)) return 0;
+    return 1 + static_cast<std::uint32_t>(i / 9 * 31 + j / 9 * 1009 + k / 9 * 65537) % largest;
+  };
+}
+
 /// Cuts a set into slabs of `tiles` rows of tiles.
 inline std::vector<VoxelIntervals> cut(const VoxelIntervals& set, int tiles) {
   std::vector<VoxelIntervals> slabs;
@@ -84,7 +131,8 @@ inline std::vector<VoxelIntervals> cut(const VoxelIntervals& set, int tiles) {
       for (int tu = 0; tu < slab.tiles_u(); ++tu) {
         const int from = (begin - set.v_begin()) / VoxelIntervals::kTileSide + tv;
         if (set.tile_empty(tu, from)) continue;
-        slab.set_tile(tu, tv, set.tile(tu, from).offsets, set.tile(tu, from).items);
+        const VoxelIntervals::TileView tile = set.tile(tu, from);
+        slab.set_tile(tu, tv, tile.offsets, tile.items, tile.labels);
       }
     }
   }

@@ -35,11 +35,11 @@ class WriteVdb : public ::testing::Test {
   }
 
   template <class GridType>
-  static typename GridType::Ptr read(const std::string& path) {
+  static typename GridType::Ptr read(const std::string& path, const std::string& name = "solid") {
     openvdb::io::File file(path);
     file.open();
-    EXPECT_TRUE(file.hasGrid("solid"));
-    auto grid = openvdb::gridPtrCast<GridType>(file.readGrid("solid"));
+    EXPECT_TRUE(file.hasGrid(name));
+    auto grid = openvdb::gridPtrCast<GridType>(file.readGrid(name));
     EXPECT_TRUE(grid);
     return grid;
   }
@@ -170,6 +170,103 @@ TEST_F(WriteVdb, FogIsOneInsideAndZeroOutside) {
   }
 }
 
+TEST_F(WriteVdb, IdsAreTheTreeThatOpenVdbMakes) {
+  struct IdSample {
+    std::string name;
+    VoxelGrid grid;
+    IdOf id;
+  };
+  const auto stripes = [](int along, int width) {
+    return [=](int i, int j, int k) -> std::uint32_t {
+      return 1 + static_cast<std::uint32_t>(glm::ivec3(i, j, k)[along] / width);
+    };
+  };
+  for (const IdSample& sample : std::vector<IdSample>{
+           {"some", make_grid({75, 70, 66}), some_ids(3)},
+           {"many", make_grid({75, 70, 66}), some_ids(3'000'000)},
+           {"one", make_grid({130, 140, 150}), stripes(0, 1000)},
+           {"leaves", make_grid({64, 64, 64}), stripes(2, 8)},
+           {"in leaves", make_grid({64, 64, 64}), stripes(2, 12)},
+           {"along x", make_grid({300, 129, 140}), stripes(0, 128)},
+           {"along y", make_grid({129, 300, 140}), stripes(1, 100)},
+           {"along z", make_grid({129, 140, 300}), stripes(2, 64)},
+           {"voxels", make_grid({20, 20, 40}),
+            [](int i, int j, int k) {
+              return 1 + static_cast<std::uint32_t>(i + j * 20 + k * 400);
+            }},
+           {"ragged", make_grid({129, 66, 131}), stripes(2, 50)},
+           {"nothing", make_grid({20, 70, 30}), [](int, int, int) { return 0u; }},
+       }) {
+    SCOPED_TRACE(sample.name);
+    const glm::ivec3 dims = sample.grid.dims;
+    const VoxelIntervals set = labelled(sample.grid, Axis::kZ, sample.id);
+    VoxelWriterOptions options;
+    options.ids = 3'000'000;
+    options.name = "ids";
+    const std::string path = write(set, options);
+    EXPECT_EQ(file_bytes(write(set, options, 5, 1)), file_bytes(path));
+    const auto grid = read<openvdb::Int32Grid>(path, "ids");
+    EXPECT_EQ(grid->background(), 0);
+    EXPECT_EQ(grid->activeVoxelCount(), set.solid_voxels());
+    auto expected = openvdb::Int32Grid::create();
+    auto to = expected->getAccessor();
+    auto from = grid->getConstAccessor();
+    int wrong = 0;
+    for (int i = 0; i < dims.x; ++i) {
+      for (int j = 0; j < dims.y; ++j) {
+        for (int k = 0; k < dims.z; ++k) {
+          const auto id = static_cast<int>(sample.id(i, j, k));
+          if (id != 0) to.setValueOn({i, j, k}, id);
+          wrong += from.getValue({i, j, k}) != id || from.isValueOn({i, j, k}) != (id != 0) ? 1 : 0;
+        }
+      }
+    }
+    EXPECT_EQ(wrong, 0);
+    expected->tree().prune();
+    EXPECT_TRUE(grid->tree().hasSameTopology(expected->tree()));
+  }
+}
+
+TEST_F(WriteVdb, IdsOfSolidRootNodesAreTiles) {
+  const VoxelGrid grid = make_grid(glm::ivec3(4096));
+  std::vector<std::uint32_t> offsets(VoxelIntervals::kTileColumns + 1);
+  for (const int pieces : {1, 2}) {
+    // One id, or one below and one above.
+    std::vector<Interval> items;
+    std::vector<std::uint32_t> labels;
+    for (std::size_t column = 0; column < VoxelIntervals::kTileColumns; ++column) {
+      for (int i = 0; i < pieces; ++i) {
+        items.push_back({static_cast<std::uint16_t>(4096 / pieces * i),
+                         static_cast<std::uint16_t>(4096 / pieces * (i + 1) - 1)});
+        labels.push_back(7 + static_cast<std::uint32_t>(i));
+      }
+      offsets[column + 1] = static_cast<std::uint32_t>(items.size());
+    }
+    VoxelIntervals set(grid, Axis::kZ);
+    for (int tv = 0; tv < set.tiles_v(); ++tv) {
+      for (int tu = 0; tu < set.tiles_u(); ++tu) set.set_tile(tu, tv, offsets, items, labels);
+    }
+    VoxelWriterOptions options;
+    options.ids = 8;
+    const auto read_back = read<openvdb::Int32Grid>(write(set, options));
+    EXPECT_EQ(read_back->activeVoxelCount(), std::uint64_t{1} << 36);
+    EXPECT_EQ(read_back->tree().leafCount(), 0u);
+    EXPECT_EQ(read_back->tree().nonLeafCount(), pieces == 1 ? 1u : 2u);
+    EXPECT_EQ(read_back->tree().getValue({5, 6, 100}), 7);
+    EXPECT_EQ(read_back->tree().getValue({4095, 0, 2047}), 7);
+    EXPECT_EQ(read_back->tree().getValue({4095, 0, 2048}), pieces == 1 ? 7 : 8);
+  }
+}
+
+TEST_F(WriteVdb, FogWithIdsIsRefused) {
+  VoxelWriterOptions options;
+  options.ids = 2;
+  options.fog = true;
+  const auto refused = open_voxel_writer(folder_.file("a.vdb"), "", make_grid({8, 8, 8}), options);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::kUsage);
+}
+
 TEST_F(WriteVdb, IndexCoordinatesAreVoxelCentres) {
   for (const glm::dvec3 size : {glm::dvec3(0.3), glm::dvec3(0.1, 0.25, 7.0)}) {
     for (const bool fog : {false, true}) {
@@ -247,6 +344,18 @@ TEST_F(WriteVdb, UniqueTagFollowsTheContent) {
   EXPECT_EQ(tag(16), tag(16));
   EXPECT_NE(tag(16), tag(17));
   EXPECT_NE(tag(16), tag(24));
+  const auto tag_of_ids = [&](std::uint32_t id) {
+    const VoxelIntervals set = labelled(make_grid({40, 40, 40}), Axis::kZ, [=](int i, int, int k) {
+      return k < 16 ? 1 : i < 20 ? id : 0;
+    });
+    VoxelWriterOptions options;
+    options.ids = 5;
+    openvdb::io::File file(write(set, options));
+    file.open();
+    return file.getUniqueTag();
+  };
+  EXPECT_EQ(tag_of_ids(4), tag_of_ids(4));
+  EXPECT_NE(tag_of_ids(4), tag_of_ids(5));
 }
 
 }  // namespace
