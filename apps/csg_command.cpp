@@ -13,18 +13,12 @@
 namespace strata::apps {
 namespace {
 
-void add(Bounds& box, const Bounds& other) {
-  if (other.empty()) return;
-  box.low = glm::min(box.low, other.low);
-  box.high = glm::max(box.high, other.high);
-}
-
 /// What the camera should see.
 Result<Bounds> visible_box(const csg::Scene& scene, const Execution& execution) {
   auto box = csg::result_bounds(scene.tree, scene.tree.root(), scene.relative_precision, execution);
   if (!box) return box;
   for (const auto* ghosts : {&scene.backgrounds, &scene.highlights}) {
-    for (const csg::Tree::NodeId ghost : *ghosts) add(*box, csg::bounds(scene.tree, ghost));
+    for (const csg::Tree::NodeId ghost : *ghosts) box->include(csg::bounds(scene.tree, ghost));
   }
   return box;
 }

@@ -266,12 +266,7 @@ Result<csg::Scene> load_scene(const CsgCommand& command, Session& session,
 void cut_scene(csg::Scene& scene, const std::vector<SectionPlane>& cuts,
                const csg::Camera& camera) {
   Bounds box;
-  for (const csg::Solid& solid : scene.tree.solids()) {
-    const Bounds one = csg::bounds(solid);
-    if (one.empty()) continue;
-    box.low = glm::min(box.low, one.low);
-    box.high = glm::max(box.high, one.high);
-  }
+  for (const csg::Solid& solid : scene.tree.solids()) box.include(csg::bounds(solid));
   if (box.empty()) return;
   const glm::dvec3 centre = 0.5 * box.low + 0.5 * box.high;
   const glm::dvec3 to_eye =

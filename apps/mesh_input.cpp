@@ -186,8 +186,7 @@ void MeshInput::add(InputFacts facts) {
   closed = closed && facts.closed;
   area += facts.area;
   volume += facts.volume;
-  bounds.low = glm::min(bounds.low, facts.bounds.low);
-  bounds.high = glm::max(bounds.high, facts.bounds.high);
+  bounds.include(facts.bounds);
   files.push_back(std::move(facts));
 }
 

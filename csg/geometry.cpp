@@ -17,15 +17,10 @@ namespace {
 constexpr std::size_t kBinnedFrom = 512;
 constexpr std::size_t kVerticesAtOnce = 16384;
 
-Bounds bounds_of(const Geometry::Part& part, std::size_t mesh_vertices) {
+/// Vertices that no triangle names count too: the box is only larger.
+Bounds bounds_of(const Geometry::Part& part) {
   Bounds box;
-  const auto add = [&box](const glm::dvec3& p) {
-    box.low = glm::min(box.low, p);
-    box.high = glm::max(box.high, p);
-  };
-  // Meshes name most of their vertices; those that do not still lie in a box that is only larger.
-  (void)mesh_vertices;
-  for (const glm::dvec3& p : part.positions) add(p);
+  for (const glm::dvec3& p : part.positions) box.include(p);
   return box;
 }
 
@@ -193,17 +188,13 @@ void Geometry::place(std::uint32_t solid, const glm::dmat4& world_from_mesh) {
   } else {
     part.triangles = mesh->triangles;
   }
-  part.box = bounds_of(part, part.positions.size());
+  part.box = bounds_of(part);
   if (part.triangles.empty()) part.box = {};
 }
 
 void Geometry::measure() {
   box_ = {};
-  for (const Part& part : parts_) {
-    if (part.box.empty()) continue;
-    box_.low = glm::min(box_.low, part.box.low);
-    box_.high = glm::max(box_.high, part.box.high);
-  }
+  for (const Part& part : parts_) box_.include(part.box);
 }
 
 Bounds Geometry::box(const Tree& tree, Tree::NodeId node) const {

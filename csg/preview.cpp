@@ -235,10 +235,7 @@ struct Preview::Impl {
     constexpr double kFarLarger = 1000.0;
     Bounds seen = geometry.box(tree, tree.root());
     for (const Translucent& part : translucent) {
-      const Bounds own = geometry.box(tree, part.node);
-      if (own.empty()) continue;
-      seen.low = glm::min(seen.low, own.low);
-      seen.high = glm::max(seen.high, own.high);
+      seen.include(geometry.box(tree, part.node));
     }
     const Bounds& all = geometry.box();
     const auto size = [](const Bounds& box) { return glm::length(box.high - box.low); };

@@ -76,8 +76,7 @@ void unite(Reach& reach, const Reach& one) {
       points.insert(points.end(), one.witnesses[i].begin(), one.witnesses[i].end());
     }
   }
-  reach.box.low = glm::min(reach.box.low, one.box.low);
-  reach.box.high = glm::max(reach.box.high, one.box.high);
+  reach.box.include(one.box);
 }
 
 Reach reach_of(const Tree& tree, Tree::NodeId root) {

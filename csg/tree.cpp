@@ -27,9 +27,7 @@ Bounds bounds(const Solid& solid) {
   const std::vector<glm::dvec3>& positions = solid.mesh->positions;
   for (const glm::uvec3& triangle : solid.mesh->triangles) {
     for (int i = 0; i < 3; ++i) {
-      const glm::dvec3 p(solid.world_from_mesh * glm::dvec4(positions[triangle[i]], 1.0));
-      box.low = glm::min(box.low, p);
-      box.high = glm::max(box.high, p);
+      box.include(glm::dvec3(solid.world_from_mesh * glm::dvec4(positions[triangle[i]], 1.0)));
     }
   }
   return box;
@@ -56,8 +54,7 @@ Bounds bounds(const Tree& tree, Tree::NodeId node, std::span<const Bounds> solid
       if (i == 0) {
         boxes[id] = box;
       } else if (at.operation == Operation::kUnion) {
-        boxes[id].low = glm::min(boxes[id].low, box.low);
-        boxes[id].high = glm::max(boxes[id].high, box.high);
+        boxes[id].include(box);
       } else if (at.operation == Operation::kIntersection) {
         boxes[id].low = glm::max(boxes[id].low, box.low);
         boxes[id].high = glm::min(boxes[id].high, box.high);

@@ -1,7 +1,6 @@
 #include "mesh/soup_tools.h"
 
 #include <algorithm>
-#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <utility>
 #include <vector>
@@ -15,15 +14,10 @@ Bounds bounds(const TriangleSoup& mesh, const Execution& execution) {
       execution, mesh.triangles.size(),
       [&](Bounds& box, std::size_t i) {
         for (int k = 0; k < 3; ++k) {
-          const glm::dvec3 p = mesh.positions[mesh.triangles[i][k]];
-          box.low = glm::min(box.low, p);
-          box.high = glm::max(box.high, p);
+          box.include(glm::dvec3(mesh.positions[mesh.triangles[i][k]]));
         }
       },
-      [](Bounds& box, const Bounds& part) {
-        box.low = glm::min(box.low, part.low);
-        box.high = glm::max(box.high, part.high);
-      });
+      [](Bounds& box, const Bounds& part) { box.include(part); });
 }
 
 double signed_volume(const TriangleSoup& mesh, const Execution& execution) {

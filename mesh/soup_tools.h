@@ -1,5 +1,6 @@
 #pragma once
 
+#include <glm/common.hpp>
 #include <glm/vec3.hpp>
 #include <limits>
 
@@ -14,6 +15,16 @@ struct Bounds {
   glm::dvec3 high{-std::numeric_limits<double>::infinity()};
 
   [[nodiscard]] bool empty() const { return !(low.x <= high.x); }
+  void include(const glm::dvec3& point) {
+    low = glm::min(low, point);
+    high = glm::max(high, point);
+  }
+  /// An empty box adds nothing.
+  void include(const Bounds& other) {
+    if (other.empty()) return;
+    low = glm::min(low, other.low);
+    high = glm::max(high, other.high);
+  }
   friend bool operator==(const Bounds&, const Bounds&) = default;
 };
 

@@ -113,12 +113,7 @@ class Comparer {
         exact_(exact),
         options_(options),
         execution_(execution) {
-    for (const csg::Tree* each : {&tree, &other}) {
-      const Bounds box = csg::bounds(*each, each->root());
-      if (box.empty()) continue;
-      box_.low = glm::min(box_.low, box.low);
-      box_.high = glm::max(box_.high, box.high);
-    }
+    for (const csg::Tree* each : {&tree, &other}) box_.include(csg::bounds(*each, each->root()));
   }
 
   [[nodiscard]] bool nothing() const { return box_.empty(); }

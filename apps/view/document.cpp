@@ -22,12 +22,6 @@ constexpr glm::vec4 kSubtracted{1.0f, 0.32f, 0.32f, 0.3f};
 /// The colour of what is selected. Only faces that show are tinted, and drawing costs no more.
 constexpr glm::vec3 kSelected{0.25f, 0.6f, 1.0f};
 
-void add(Bounds& box, const Bounds& other) {
-  if (other.empty()) return;
-  box.low = glm::min(box.low, other.low);
-  box.high = glm::max(box.high, other.high);
-}
-
 /// The model's tree without the hidden solids, which stay in the list, empty. Node ids change.
 class Copier {
  public:
@@ -131,7 +125,7 @@ Result<std::shared_ptr<const Model>> load_model(const apps::CsgCommand& command,
       csg::result_bounds(scene->tree, scene->tree.root(), scene->relative_precision, execution);
   if (!box) return tl::unexpected(box.error());
   for (const auto* ghosts : {&scene->backgrounds, &scene->highlights}) {
-    for (const Tree::NodeId ghost : *ghosts) add(*box, csg::bounds(scene->tree, ghost));
+    for (const Tree::NodeId ghost : *ghosts) box->include(csg::bounds(scene->tree, ghost));
   }
   model->box = *box;
   for (const csg::Solid& solid : scene->tree.solids()) {

@@ -144,12 +144,7 @@ class PreviewRenderer final : public Renderer {
   Result<void> draw_heat(const FrameRequest& request, const Execution& execution, Frame& frame) {
     const auto begin = Clock::now();
     Bounds box;
-    for (const csg::Solid& solid : what_->tree.solids()) {
-      const Bounds one = csg::bounds(solid);
-      if (one.empty()) continue;
-      box.low = glm::min(box.low, one.low);
-      box.high = glm::max(box.high, one.high);
-    }
+    for (const csg::Solid& solid : what_->tree.solids()) box.include(csg::bounds(solid));
     const auto view = csg::make_view(request.camera, request.size, box);
     if (!view) return tl::unexpected(view.error());
     const auto rays = meter_->measure(*view, execution);
