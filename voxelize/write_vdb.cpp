@@ -160,8 +160,8 @@ class VdbWriter final : public SlabWriter {
             BlockOutput output)
       : SlabWriter(path, grid, Axis::kZ),
         kind_(options.ids != 0 ? VdbValues::kIds
-                     : options.fog    ? VdbValues::kFog
-                                      : VdbValues::kMask),
+              : options.fog    ? VdbValues::kFog
+                               : VdbValues::kMask),
         name_(options.name.empty() ? "solid" : options.name),
         output_(std::move(output)),
         tiles_x_(parts(grid.dims.x, kTileSide)),
@@ -225,8 +225,7 @@ Result<void> VdbWriter::add_slab(const VoxelIntervals& slab, const Execution& ex
     const int tv = static_cast<int>(index) / slab.tiles_u();
     if (slab.tile_empty(tu, tv)) return;
     std::unique_ptr<VdbLeafBuilder>& builder = builders_[size(worker)];
-    if (!builder)
-      builder = std::make_unique<VdbLeafBuilder>(dims().z, kind_ == VdbValues::kIds);
+    if (!builder) builder = std::make_unique<VdbLeafBuilder>(dims().z, kind_ == VdbValues::kIds);
     tiles_[first + index] = builder->build(slab, tu, tv);
   });
   return {};
