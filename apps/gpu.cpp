@@ -12,7 +12,6 @@
 #include "csg/gl/surface.h"
 #include "csg/solid_lists.h"
 #include "gl/context.h"
-#include "gl/faults.h"
 #include "hashbuffer/build_ldi.h"
 #include "hashbuffer/gl/hash_store.h"
 #include "hashbuffer/gl/scan_store.h"
@@ -171,6 +170,7 @@ class GlGpu final : public Gpu {
   /// What is said, and what the CPU then does, where this driver cannot.
   template <class Source>
   Result<Source> refused(const Error& error) {
+    if (error.code == ErrorCode::kCancelled) return tl::unexpected(error);
     const std::string why = fmt::format("{}: {}", context_->info().renderer, error.message);
     if (backend_ == Backend::kGl) return fail(ErrorCode::kUsage, "--backend gl: {}", why);
     session_->warn("backend", fmt::format("the CPU does what the GPU cannot: {}", why));

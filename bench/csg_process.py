@@ -81,15 +81,16 @@ def main():
                 bound = min(render, options.render_limit)
                 renders.append(bound / mine)
                 least = f"{'> ' if render != bound else ''}{bound / mine:.0f}"
-            rows.append([scene.stem, cell(mine, options.limit), cell(preview, options.limit), cell(render, options.render_limit), ratio,
-                         least])
+            rendered = cell(render, options.render_limit) if options.render_limit > 0 else "-"
+            rows.append([scene.stem, cell(mine, options.limit), cell(preview, options.limit), rendered, ratio, least])
             print("| " + " | ".join(rows[-1]) + " |", flush=True)
-    summary = f"{len(previews)} scenes: preview / strata at least {min(previews):.1f}, median {statistics.median(previews):.1f}"
-    if renders:
-        summary += f"; render / strata at least {min(renders):.1f}, median {statistics.median(renders):.1f}"
-    print(summary)
     if options.csv:
         tables.save(options.csv, columns, rows)
+    summary = [f"{len(rows)} scenes"]
+    for name, ratios in [("preview", previews), ("render", renders)]:
+        if ratios:
+            summary.append(f"{name} / strata at least {min(ratios):.1f}, median {statistics.median(ratios):.1f}")
+    print("; ".join(summary))
 
 
 if __name__ == "__main__":

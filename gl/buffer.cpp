@@ -79,11 +79,7 @@ void Buffer::bind(unsigned index, std::uint64_t offset, std::uint64_t bytes) con
 
 void Buffer::bind_uniform(unsigned index) const { glBindBufferBase(GL_UNIFORM_BUFFER, index, id_); }
 
-void Buffer::bind_dispatch() const { glBindBuffer(GL_DISPATCH_INDIRECT_BUFFER, id_); }
-
-void storage_barrier() {
-  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_COMMAND_BARRIER_BIT | GL_UNIFORM_BARRIER_BIT);
-}
+void storage_barrier() { glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_UNIFORM_BARRIER_BIT); }
 
 void finish() { glFinish(); }
 

@@ -11,7 +11,7 @@
 
 namespace strata::gl {
 
-/// A buffer of the current context, for shaders (SSBO, UBO, indirect arguments). Move-only. Calls
+/// A buffer of the current context, for shaders (SSBO, UBO). Move-only. Calls
 /// need the context that it was made in; so does its end.
 class Buffer {
  public:
@@ -28,7 +28,8 @@ class Buffer {
     return *this;
   }
 
-  /// `bytes` of undefined content (at least 1 is held). ErrorCode::kLimit without the memory.
+  /// `bytes` of undefined content (at least 1 is held). ErrorCode::kLimit without the memory; what
+  /// check_errors() says of earlier calls, the context's loss among them.
   [[nodiscard]] static Result<Buffer> allocate(std::uint64_t bytes);
   /// A copy of `data`.
   template <class T>
@@ -45,6 +46,13 @@ class Buffer {
   /// Makes room for `bytes` if there is less; the content is lost then. The old buffer goes first.
   [[nodiscard]] Result<void> reserve(std::uint64_t bytes);
 
+  /// Makes room for `data` and copies it. @return as reserve()
+  template <class T>
+  [[nodiscard]] Result<void> assign(std::span<const T> data) {
+    if (auto room = reserve(data.size_bytes()); !room) return room;
+    upload(data);
+    return {};
+  }
   /// Copies `data` to byte `offset`. @pre it fits
   template <class T>
   void upload(std::span<const T> data, std::uint64_t offset = 0) {
@@ -76,8 +84,6 @@ class Buffer {
   void bind(unsigned index, std::uint64_t offset, std::uint64_t bytes) const;
   /// Binds the buffer as `layout(std140, binding = index) uniform`.
   void bind_uniform(unsigned index) const;
-  /// Binds the buffer as the source of dispatch_indirect().
-  void bind_dispatch() const;
 
  private:
   void reset() noexcept;
@@ -88,7 +94,7 @@ class Buffer {
   std::uint64_t bytes_ = 0;
 };
 
-/// What shaders wrote to buffers is seen by the shaders (and indirect commands) that follow.
+/// What shaders wrote to buffers is seen by the shaders that follow.
 void storage_barrier();
 /// Waits until all that was asked of the GPU is done. For clocks.
 void finish();

@@ -179,7 +179,7 @@ Result<void> Context::check() {
 }
 
 Result<void> Context::look_around(std::string window_system, bool debug) {
-  begin_faults();
+  if (auto begun = begin_faults(); !begun) return begun;
   info_.window_system = std::move(window_system);
   info_.vendor = text_of(GL_VENDOR);
   info_.renderer = text_of(GL_RENDERER);

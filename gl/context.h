@@ -105,6 +105,9 @@ class Context {
       std::make_unique<std::vector<std::string>>();
 };
 
+/// Whether contexts are to say that they are a GPU's (`hardware` in STRATA_GL_FAULTS): for tests.
+[[nodiscard]] bool pretends_hardware();
+
 /// Errors of the current context since the last call, and its loss, for code that has no Context at
 /// hand: `what` begins the message. Debug messages are left to Context::check().
 [[nodiscard]] Result<void> check_errors(std::string_view what);

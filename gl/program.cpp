@@ -169,11 +169,6 @@ void Program::dispatch(std::uint32_t x, std::uint32_t y, std::uint32_t z) const 
   glDispatchCompute(x, y, z);
 }
 
-void Program::dispatch_indirect(std::uint64_t offset) const {
-  use();
-  glDispatchComputeIndirect(static_cast<GLintptr>(offset));
-}
-
 Groups groups_for(std::uint64_t items, std::uint32_t group_size) {
   const std::uint64_t groups = std::max<std::uint64_t>(1, (items + group_size - 1) / group_size);
   if (groups <= kMostGroups) return {static_cast<std::uint32_t>(groups), 1};

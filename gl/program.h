@@ -57,8 +57,6 @@ class Program {
 
   /// Runs a compute program on that many work groups. @pre within Limits::compute_groups
   void dispatch(std::uint32_t x, std::uint32_t y = 1, std::uint32_t z = 1) const;
-  /// The same with the three counts at byte `offset` of the buffer bound by bind_dispatch().
-  void dispatch_indirect(std::uint64_t offset = 0) const;
 
  private:
   void reset() noexcept;

@@ -144,6 +144,7 @@ Result<LayeredDepthImage> filter_lists(const LayeredDepthImage& rows, const Tile
       if (lists.fragments == 0) return;
       tiles[index] = pack(filters[static_cast<std::size_t>(worker)]->apply(lists));
     });
+    if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
     LayeredDepthImage image = empty_image({Axis::kZ, rows.width, rows.height, rows.depth_limit});
     append(tiles, rows.height, image);
     return image;

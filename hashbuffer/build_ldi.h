@@ -25,7 +25,8 @@ Result<LayeredDepthImage> build_ldi(ListSource& source, const LatticeMesh& mesh,
                                     const RasterTarget& target, const Execution& execution = {},
                                     const TileListFilter* filter = nullptr);
 
-/// What `filter` makes of the lists of an image of rows. @return kLimit without the memory
+/// What `filter` makes of the lists of an image of rows. @return kLimit without the memory,
+/// kCancelled
 Result<LayeredDepthImage> filter_lists(const LayeredDepthImage& rows, const TileListFilter& filter,
                                        const Execution& execution = {});
 

@@ -33,9 +33,10 @@ class TileListFilter {
     virtual TileLists<DepthItem> apply(const TileLists<DepthItem>& lists) = 0;
     /// Appends those of the voxels of `faces` that the surface of the result may pass through:
     /// where it depends on the solids whose faces are in the voxel, all others being as they are at
-    /// its centre. Runs in increasing order that do not touch. @param lists the tile's, not
-    /// filtered;
-    /// @param faces of the column of pixel `pixel`, in any order
+    /// its centre. Runs in increasing order that do not touch. A filter that does not override
+    /// solid_of() may leave it at this: the faces of one solid come as such runs.
+    /// @param lists of the tile, as apply() takes them
+    /// @param faces of the column of pixel `pixel`, in any order of their solids
     virtual void surface(const TileLists<DepthItem>& lists, std::size_t pixel,
                          std::span<const FaceRun> faces, std::vector<VoxelRun>& kept) {
       (void)lists, (void)pixel;

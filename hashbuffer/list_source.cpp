@@ -27,9 +27,8 @@ Result<void> ListSourceOrCpu::set_mesh(const LatticeMesh& mesh) {
 }
 
 bool ListSourceOrCpu::use_filter(const TileListFilter& filter) {
-  if (source_ == nullptr || !source_->use_filter(filter)) return false;
-  filter_ = &filter;
-  return true;
+  filter_ = source_ != nullptr && source_->use_filter(filter) ? &filter : nullptr;
+  return filter_ != nullptr;
 }
 
 int ListSourceOrCpu::rows_at_once(const RasterTarget& target) const {
@@ -42,7 +41,7 @@ Result<LayeredDepthImage> ListSourceOrCpu::lists(const RasterTarget& target, int
   if (source_ != nullptr) {
     auto rows = source_->lists(target, v_begin, v_end);
     crossings_ = source_->crossings();
-    if (rows) return rows;
+    if (rows || rows.error().code == ErrorCode::kCancelled) return rows;
     give_up(rows.error());
   }
   // A screen that begins at another row sees the mesh moved by whole pixels.

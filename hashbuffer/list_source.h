@@ -24,13 +24,13 @@ class ListSource {
   /// @return kLimit without the memory
   virtual Result<void> set_mesh(const LatticeMesh& mesh) = 0;
   /// True: lists() gives from now on what `filter` (borrowed) makes of the mesh's lists, bit for
-  /// bit. False, without effect, where this source leaves that to who takes its lists.
+  /// bit. False where this source leaves that to who takes its lists, which are the mesh's then.
   virtual bool use_filter(const TileListFilter& filter) {
     static_cast<void>(filter);
     return false;
   }
   /// The sorted lists of rows [v_begin, v_end) of `target`, as an image of those rows;
-  /// world_from_image is left as the identity. @return kLimit without the memory
+  /// world_from_image is left as the identity. @return kLimit without the memory, kCancelled
   virtual Result<LayeredDepthImage> lists(const RasterTarget& target, int v_begin, int v_end) = 0;
   /// Crossings of the mesh in the rows of the last lists(): those that came back, but for a filter.
   [[nodiscard]] virtual std::uint64_t crossings() const = 0;
@@ -38,7 +38,7 @@ class ListSource {
   [[nodiscard]] virtual int rows_at_once(const RasterTarget& target) const = 0;
 };
 
-/// A source, and this process's threads from its first failure on.
+/// A source, and this process's threads from its first failure on; a stop is none.
 class ListSourceOrCpu final : public ListSource {
  public:
   /// Borrows `source`. @param on_failure told the failure, once

@@ -97,8 +97,8 @@ class WeldTable {
 /// For every i in [0, count): first[i] = the least j whose position equals that of i. Each thread
 /// owns the positions whose hash falls to it, so the result does not depend on their number.
 /// @param load  load(i) -> glm::vec<3, Scalar> @pre count < 2^32 - 1
-/// @param go_on  asked by all threads now and then, with i; once it says false, `first` is not
-/// filled
+/// @param go_on  asked by all threads now and then, with i; once it says false, `first` is left
+/// unfinished
 /// @return number of different positions
 template <class Scalar, class Load, class GoOn = bool (*)(std::size_t)>
 std::size_t weld_first(

@@ -75,12 +75,12 @@ void SolidVoxelizer::walk(const TileLists<Key>& lists, Worker& worker, int tu, i
                           VoxelIntervals& out, ColumnMarks* marks) const {
   TileIntervals& tile = worker.intervals;
   if constexpr (std::is_same_v<Key, DepthItem>) {
-    if (worker.filter && options_.filter->labelled()) {
-      walk_labelled_tile(worker.filter->apply(lists), options_.statistics, tile);
-    } else if (worker.filter) {
-      walk_tile(worker.filter->apply(lists), options_.rule, options_.statistics, tile);
+    // Without a worker the lists have gone through the filter already.
+    const auto& filtered = worker.filter ? worker.filter->apply(lists) : lists;
+    if (options_.filter != nullptr && options_.filter->labelled()) {
+      walk_labelled_tile(filtered, options_.statistics, tile);
     } else {
-      walk_tile(lists, options_.rule, options_.statistics, tile);
+      walk_tile(filtered, options_.rule, options_.statistics, tile);
     }
   } else {
     walk_tile(lists, options_.rule, options_.statistics, tile);

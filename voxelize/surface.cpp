@@ -1,14 +1,8 @@
 #include "voxelize/surface.h"
 
 #include <algorithm>
-#include <atomic>
-#include <exception>
-#include <mutex>
 #include <new>
 #include <span>
-#include <string_view>
-#include <thread>
-#include <utility>
 #include <vector>
 
 #include "voxelize/surface_tiles.h"
@@ -99,7 +93,7 @@ Result<VoxelIntervals> union_intervals(const VoxelIntervals& a, const VoxelInter
     std::vector<Scratch> scratch(static_cast<std::size_t>(execution.thread_count()));
     const std::size_t count =
         static_cast<std::size_t>(a.tiles_u()) * static_cast<std::size_t>(a.tiles_v());
-    const Result<void> done = for_each_tile(execution, count, 0, [&](std::size_t tile, int worker) {
+    const auto unite = [&](std::size_t tile, int worker) {
       const int tu = static_cast<int>(tile) % a.tiles_u();
       const int tv = static_cast<int>(tile) / a.tiles_u();
       if (a.tile_empty(tu, tv) && b.tile_empty(tu, tv)) return true;
@@ -120,7 +114,8 @@ Result<VoxelIntervals> union_intervals(const VoxelIntervals& a, const VoxelInter
       }
       result.set_tile(tu, tv, offsets, items);
       return true;
-    });
+    };
+    const Result<void> done = for_each_tile(execution, count, 0, unite, "union of voxel sets");
     if (!done) return tl::unexpected(done.error());
     return result;
   } catch (const std::bad_alloc&) {

@@ -38,10 +38,11 @@ class Budget {
   std::atomic<std::uint64_t> held_{0};
 };
 
-/// Runs a body over tiles: progress from the calling thread only, errors as values.
+/// Runs a body over tiles: progress from the calling thread only, errors as values. @param job
+/// begins their messages
 template <class Body>
 Result<void> for_each_tile(const Execution& execution, std::size_t count, std::uint64_t limit,
-                           Body&& body) {
+                           Body&& body, std::string_view job = "surface voxels") {
   const std::thread::id caller = std::this_thread::get_id();
   std::atomic<std::size_t> done{0};
   std::atomic<bool> over{false};
@@ -55,18 +56,17 @@ Result<void> for_each_tile(const Execution& execution, std::size_t count, std::u
       }
     });
   } catch (const std::bad_alloc&) {
-    return fail(ErrorCode::kLimit, "surface voxels: out of memory");
+    return fail(ErrorCode::kLimit, "{}: out of memory", job);
   } catch (const std::exception& error) {
     // Threads that cannot be started are a limit; oneTBB reports them in words only.
     const bool threads = std::string_view(error.what()).find("pthread_create") != std::string::npos;
-    return fail(threads ? ErrorCode::kLimit : ErrorCode::kInternal, "surface voxels: {}",
-                error.what());
+    return fail(threads ? ErrorCode::kLimit : ErrorCode::kInternal, "{}: {}", job, error.what());
   }
   if (over) {
-    return fail(ErrorCode::kLimit, "surface voxels: more than the memory limit of {} bytes", limit);
+    return fail(ErrorCode::kLimit, "{}: more than the memory limit of {} bytes", job, limit);
   }
   if (execution.stop.stop_requested()) {
-    return fail(ErrorCode::kCancelled, "surface voxels: cancelled");
+    return fail(ErrorCode::kCancelled, "{}: cancelled", job);
   }
   return {};
 }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "csg/gl/walk_programs.h"
+#include "csg/tree_filter.h"
 #include "hashbuffer/build_ldi.h"
 
 namespace strata::glsl {
@@ -52,7 +53,7 @@ struct GlResultSource::Impl {
   void make_programs(const RasterTarget& target, int v_begin, int v_end);
   Result<Walked> walk(const gl::Store& store, const gl::Program& program, int band,
                       gl::PixelRows rows);
-  void take(std::uint32_t width, gl::PixelRows rows, LayeredDepthImage& image);
+  Result<void> take(std::uint32_t width, gl::PixelRows rows, LayeredDepthImage& image);
   void filter_handed_over(const std::vector<std::uint32_t>& pixels);
 
   Execution execution;
@@ -80,7 +81,8 @@ struct GlResultSource::Impl {
   Counts counts;
 };
 
-GlResultSource::GlResultSource(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+GlResultSource::GlResultSource(std::unique_ptr<Impl> impl)
+    : ComputeListSource(impl->execution), impl_(std::move(impl)) {}
 GlResultSource::~GlResultSource() = default;
 const GlResultSource::Counts& GlResultSource::counts() const { return impl_->counts; }
 
@@ -110,6 +112,7 @@ Result<void> GlResultSource::set_mesh(const LatticeMesh& mesh) {
 
 bool GlResultSource::use_filter(const TileListFilter& filter) {
   Impl& impl = *impl_;
+  impl.filter = nullptr;
   const auto* tree = dynamic_cast<const TreeFilter*>(&filter);
   if (tree == nullptr || tree->labelled() || impl.mesh == nullptr) return false;
   const TreeFilter::Tables tables = tree->tables();
@@ -118,8 +121,13 @@ bool GlResultSource::use_filter(const TileListFilter& filter) {
       triangles.size() * sizeof(std::uint32_t) > impl.binding_bytes) {
     return false;
   }
-  impl.boxes.assign(tables.rules.size(), {});
-  std::vector<std::uint32_t> words(triangles.size());
+  std::vector<std::uint32_t> words;
+  try {
+    impl.boxes.assign(tables.rules.size(), {});
+    words.resize(triangles.size());
+  } catch (const std::bad_alloc&) {
+    return false;
+  }
   for (std::size_t t = 0; t < triangles.size(); ++t) {
     const std::uint32_t solid = tables.solid_of[t];
     words[t] = solid | (tables.rules[solid] == InsideRule::kParity ? kParity : 0u);
@@ -130,7 +138,7 @@ bool GlResultSource::use_filter(const TileListFilter& filter) {
       box.high = glm::max(box.high, p);
     }
   }
-  if (!upload_to(impl.triangles, std::span<const std::uint32_t>(words))) return false;
+  if (!impl.triangles.assign(std::span<const std::uint32_t>(words))) return false;
   impl.filter = tree;
   impl.counts = {};
   return true;
@@ -168,16 +176,16 @@ Result<LayeredDepthImage> GlResultSource::read(gl::Store& store, const RasterTar
                                                int v_begin, int v_end) {
   Impl& impl = *impl_;
   if (impl.filter == nullptr) return ComputeListSource::read(store, target, v_begin, v_end);
-  impl.make_programs(target, v_begin, v_end);
-  if (auto done = impl.tables.upload(impl.programs); !done) return tl::unexpected(done.error());
-  const auto program = impl.walks.get(store, impl.programs);
-  if (!program) return tl::unexpected(program.error());
-  LayeredDepthImage image;
-  image.width = target.width;
-  image.height = v_end - v_begin;
-  image.offsets.push_back(0);
-  impl.crossings = 0;
   try {
+    impl.make_programs(target, v_begin, v_end);
+    if (auto done = impl.tables.upload(impl.programs); !done) return tl::unexpected(done.error());
+    const auto program = impl.walks.get(store, impl.programs);
+    if (!program) return tl::unexpected(program.error());
+    LayeredDepthImage image;
+    image.width = target.width;
+    image.height = v_end - v_begin;
+    image.offsets.push_back(0);
+    impl.crossings = 0;
     Walked last = Walked::kAll;
     for (int band = 0; band < store.bands() && last == Walked::kAll; ++band) {
       gl::PixelRows rows = store.band_rows(band);
@@ -192,7 +200,9 @@ Result<LayeredDepthImage> GlResultSource::read(gl::Store& store, const RasterTar
           rows.end = rows.begin + height / 2;
           continue;
         }
-        impl.take(store.width(), rows, image);
+        if (auto taken = impl.take(store.width(), rows, image); !taken) {
+          return tl::unexpected(taken.error());
+        }
         rows = {rows.end, std::min(rows.end + height, end)};
       }
     }
@@ -202,7 +212,6 @@ Result<LayeredDepthImage> GlResultSource::read(gl::Store& store, const RasterTar
     return fail(ErrorCode::kLimit, "no memory for the lists of {} x {} pixels", target.width,
                 v_end - v_begin);
   }
-  image = {};
   auto all = ComputeListSource::read(store, target, v_begin, v_end);
   return all ? filter_lists(*all, *impl.filter, impl.execution) : std::move(all);
 }
@@ -301,7 +310,8 @@ void GlResultSource::Impl::filter_handed_over(const std::vector<std::uint32_t>& 
 }
 
 /// Appends the walked rows to the image.
-void GlResultSource::Impl::take(std::uint32_t width, gl::PixelRows rows, LayeredDepthImage& image) {
+Result<void> GlResultSource::Impl::take(std::uint32_t width, gl::PixelRows rows,
+                                        LayeredDepthImage& image) {
   std::vector<std::uint32_t> pixels;  // that were handed over
   for (std::uint32_t i = 0; i < places.size(); ++i) {
     crossings += places[i].crossings();
@@ -313,6 +323,8 @@ void GlResultSource::Impl::take(std::uint32_t width, gl::PixelRows rows, Layered
   }
   counts.handed_over += pixels.size();
   filter_handed_over(pixels);
+  // Batches that were skipped hold nothing, or another band's lists.
+  if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
   const std::size_t first_pixel = image.offsets.size() - 1;
   std::size_t next = 0;
   for (const Place& place : places) {
@@ -341,6 +353,8 @@ void GlResultSource::Impl::take(std::uint32_t width, gl::PixelRows rows, Layered
         batch.items.begin() + static_cast<std::ptrdiff_t>(batch.offsets[at + 1]),
         image.items.begin() + static_cast<std::ptrdiff_t>(image.offsets[first_pixel + pixels[i]]));
   }
+  if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+  return {};
 }
 
 }  // namespace strata::csg

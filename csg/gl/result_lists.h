@@ -4,19 +4,19 @@
 #include <memory>
 
 #include "core/execution.h"
-#include "csg/tree_filter.h"
 #include "hashbuffer/gl/compute_lists.h"
 
 namespace strata::csg {
 
 /// Lists of a mesh on the GPU and, where the mesh is the soup of SolidLists, those of the tree's
 /// result: the filter's, bit for bit. A walk of the solids' lists makes them where they are, with a
-/// bit a solid, the tree simplified tile by tile. Only what the walk does not decide (solids that
-/// are open or overlap themselves, tiles of more than 1024 solids or nodes, very long lists) is
-/// downloaded as it is, and goes through the filter here.
+/// bit a solid, the tree simplified tile by tile. Pixels that the walk does not decide (solids that
+/// are open or overlap themselves, tiles of more than 1024 solids or nodes) are downloaded as they
+/// are, and go through the filter here; so do all of the rows that are made at once where a list is
+/// longer than a thread may walk.
 class GlResultSource final : public gl::ComputeListSource {
  public:
-  /// As ComputeListSource::create(). @param execution threads of the filter
+  /// As ComputeListSource::create(). @param execution threads of the filter as well
   [[nodiscard]] static Result<std::unique_ptr<GlResultSource>> create(
       const gl::Context& context, std::unique_ptr<gl::Store> store,
       std::unique_ptr<gl::Store> spare = nullptr,
@@ -29,7 +29,8 @@ class GlResultSource final : public gl::ComputeListSource {
   /// Tables of at most that many bytes, 32 at least, where the driver takes larger ones: for tests.
   void limit_binding(std::uint64_t bytes);
 
-  /// Who made the lists since the filter was set.
+  /// Who made the lists since the filter was set; rows with a list that is too long to be walked
+  /// are not counted.
   struct Counts {
     std::uint64_t walked = 0;       ///< pixels with crossings that the walk decided
     std::uint64_t handed_over = 0;  ///< pixels that the filter decided

@@ -2,15 +2,16 @@
 
 #include <algorithm>
 #include <array>
-#include <mutex>
-#include <numeric>
 #include <span>
 #include <utility>
 
 #include "csg/gl/tile_programs.h"
 #include "csg/gl/walk_programs.h"
 #include "csg/tile_surface.h"
+#include "gl/buffer.h"
+#include "gl/program.h"
 #include "hashbuffer/gl/compute_lists.h"
+#include "raster/gl/compute.h"
 
 namespace strata::glsl {
 extern const gl::GlslPiece csg_gl_walk_comp;
@@ -174,7 +175,7 @@ Result<std::unique_ptr<GlSurfaceSource>> GlSurfaceSource::create(const gl::Conte
 }
 
 Result<void> GlSurfaceSource::Impl::upload() {
-  auto done = upload_to(triangles, std::span<const glm::uvec2>(all.facts));
+  auto done = triangles.assign(std::span<const glm::uvec2>(all.facts));
   return done ? tables.upload(programs) : done;
 }
 
@@ -187,6 +188,8 @@ Result<void> GlSurfaceSource::find(const FrameInput& frame, SurfaceImage& image,
   impl.counts.left = left.size();
   if (!impl.programs.any) return {};
   impl.all.gather(frame, impl.programs.used, execution);
+  // What was skipped is another frame's.
+  if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
   if (impl.all.facts.size() * sizeof(glm::uvec2) > impl.binding_bytes ||
       impl.all.facts.size() >= (std::size_t{1} << 31)) {
     impl.programs.leave_all(left);

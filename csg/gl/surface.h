@@ -5,11 +5,8 @@
 #include <vector>
 
 #include "csg/surface_source.h"
-#include "gl/buffer.h"
 #include "gl/context.h"
-#include "gl/program.h"
 #include "hashbuffer/gl/store.h"
-#include "raster/gl/compute.h"
 
 // Visible surfaces of a Boolean tree on the GPU. Private to csg/.
 

@@ -31,11 +31,11 @@ Result<const gl::Program*> WalkPrograms::get(const gl::Store& store, const TileP
 }
 
 Result<void> WalkTables::upload(const TilePrograms& programs) {
-  if (auto done = upload_to(tiles_, std::span<const WalkTile>(programs.tiles)); !done) return done;
-  if (auto done = upload_to(slots_, std::span<const std::uint32_t>(programs.slots)); !done) {
+  if (auto done = tiles_.assign(std::span<const WalkTile>(programs.tiles)); !done) return done;
+  if (auto done = slots_.assign(std::span<const std::uint32_t>(programs.slots)); !done) {
     return done;
   }
-  return upload_to(nodes_, std::span<const std::uint32_t>(programs.nodes));
+  return nodes_.assign(std::span<const std::uint32_t>(programs.nodes));
 }
 
 void WalkTables::bind() const {

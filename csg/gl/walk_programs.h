@@ -17,8 +17,9 @@ namespace strata::csg {
 /// Compiled walks: one for each kind of store and size of tiles that was asked for.
 class WalkPrograms {
  public:
-  /// @param main the shader behind walk_common.glsl @param rounds of loops that an invocation may
-  /// spend on climbing nodes, where the driver has few (workaround loop-rounds)
+  /// @param main the shader behind walk_common.glsl @param rounds of loops, one for each node of a
+  /// tile and each step of a climb, that an invocation may take where the driver has few
+  /// (workaround loop-rounds)
   WalkPrograms(const gl::GlslPiece& main, const gl::Info& info, const char* rounds)
       : main_(main), most_rounds_(info.works_around("loop-rounds") ? rounds : "1000000u") {}
 
@@ -46,13 +47,5 @@ class WalkTables {
  private:
   gl::Buffer tiles_, slots_, nodes_;
 };
-
-/// Makes room for `data` and uploads it.
-template <class T>
-[[nodiscard]] Result<void> upload_to(gl::Buffer& buffer, std::span<const T> data) {
-  if (auto room = buffer.reserve(data.size_bytes()); !room) return room;
-  buffer.upload(data);
-  return {};
-}
 
 }  // namespace strata::csg

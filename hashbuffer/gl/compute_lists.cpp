@@ -7,19 +7,27 @@ namespace strata::gl {
 
 Result<BuildReport> build_sized(Store& store, ComputeRasterizer& rasterizer,
                                 const Execution& execution) {
+  std::uint64_t fragments = 0;
   if (store.gains_by_hint()) {
-    const auto fragments = rasterizer.count({0, rasterizer.height()});
-    if (!fragments) return tl::unexpected(fragments.error());
-    store.expect(*fragments);
+    const auto counted = rasterizer.count({0, rasterizer.height()});
+    // Too much to be counted at once may be drawn in bands.
+    if (!counted && counted.error().code != ErrorCode::kLimit) {
+      return tl::unexpected(counted.error());
+    }
+    fragments = counted.value_or(0);
+    if (counted) store.expect(fragments);
   }
-  return build(store, rasterizer, execution);
+  auto report = build(store, rasterizer, execution);
+  if (report && report->fragments == 0) report->fragments = fragments;
+  return report;
 }
 
 Result<std::unique_ptr<ComputeListSource>> ComputeListSource::create(const Context& context,
                                                                      std::unique_ptr<Store> store,
                                                                      std::unique_ptr<Store> spare,
-                                                                     std::int64_t pixels_at_once) {
-  std::unique_ptr<ComputeListSource> result(new ComputeListSource());
+                                                                     std::int64_t pixels_at_once,
+                                                                     const Execution& execution) {
+  std::unique_ptr<ComputeListSource> result(new ComputeListSource(execution));
   auto opened = result->open(context, std::move(store), std::move(spare), pixels_at_once);
   if (!opened) return tl::unexpected(opened.error());
   return result;
@@ -48,10 +56,14 @@ int ComputeListSource::rows_at_once(const RasterTarget& target) const {
 Result<LayeredDepthImage> ComputeListSource::lists(const RasterTarget& target, int v_begin,
                                                    int v_end) {
   rasterizer_->set_target(target, v_begin, v_end);
-  auto built = build_sized(*store_, *rasterizer_);
+  auto built = build_sized(*store_, *rasterizer_, execution_);
   if (!built && built.error().code != ErrorCode::kCancelled && spare_) {
+    const Error first = built.error();
     store_ = std::exchange(spare_, nullptr);
-    built = build_sized(*store_, *rasterizer_);
+    built = build_sized(*store_, *rasterizer_, execution_);
+    if (!built && built.error().code != ErrorCode::kCancelled) {
+      built = fail(built.error().code, "{}; then {}", first.message, built.error().message);
+    }
   }
   if (!built) return tl::unexpected(built.error());
   auto image = read(*store_, target, v_begin, v_end);

@@ -2,6 +2,7 @@
 
 #include <memory>
 
+#include "core/execution.h"
 #include "gl/context.h"
 #include "hashbuffer/gl/store.h"
 #include "hashbuffer/list_source.h"
@@ -9,7 +10,8 @@
 
 namespace strata::gl {
 
-/// build(store, rasterizer), after a pass that counts where the store gains by the hint.
+/// build(store, rasterizer), after a pass that counts where the store gains by the hint; the
+/// report's fragments are told then too.
 [[nodiscard]] Result<BuildReport> build_sized(Store& store, ComputeRasterizer& rasterizer,
                                               const Execution& execution = {});
 
@@ -18,10 +20,11 @@ class ComputeListSource : public ListSource {
  public:
   /// `context` stays current while this is used. @param store keeps whole payloads
   /// @param spare takes over for good where `store` fails, as with lists beyond its ages; may
-  /// be null @param pixels_at_once see rows_at_once(), about @return kUsage where the driver cannot
+  /// be null @param pixels_at_once see rows_at_once(), about @param execution its stop and memory
+  /// limit (that of a store), asked by lists() @return kUsage where the driver cannot
   [[nodiscard]] static Result<std::unique_ptr<ComputeListSource>> create(
       const Context& context, std::unique_ptr<Store> store, std::unique_ptr<Store> spare = nullptr,
-      std::int64_t pixels_at_once = std::int64_t{1} << 22);
+      std::int64_t pixels_at_once = std::int64_t{1} << 22, const Execution& execution = {});
 
   Result<void> set_mesh(const LatticeMesh& mesh) override;
   Result<LayeredDepthImage> lists(const RasterTarget& target, int v_begin, int v_end) override;
@@ -29,7 +32,10 @@ class ComputeListSource : public ListSource {
   [[nodiscard]] int rows_at_once(const RasterTarget& target) const override;
 
  protected:
-  ComputeListSource() = default;
+  explicit ComputeListSource(const Execution& execution) : execution_(execution) {
+    execution_.progress = {};
+  }
+  [[nodiscard]] const Execution& execution() const { return execution_; }
   [[nodiscard]] Result<void> open(const Context& context, std::unique_ptr<Store> store,
                                   std::unique_ptr<Store> spare, std::int64_t pixels_at_once);
   /// The lists of rows [v_begin, v_end) of `target`, which `store` holds. Sets crossings_.
@@ -41,6 +47,7 @@ class ComputeListSource : public ListSource {
   std::unique_ptr<ComputeRasterizer> rasterizer_;
   std::unique_ptr<Store> store_, spare_;
   std::int64_t pixels_at_once_ = 0;
+  Execution execution_;
 };
 
 }  // namespace strata::gl

@@ -1,7 +1,9 @@
 #include "hashbuffer/gl/hash_store.h"
 
 #include <algorithm>
+#include <cstring>
 #include <limits>
+#include <string_view>
 #include <utility>
 
 #include "hashbuffer/record.h"
@@ -27,6 +29,14 @@ constexpr std::uint64_t kOffsetBytes = (Record32::kAgeMax + 1) * sizeof(std::uin
 struct Params {
   std::uint32_t first_pixel, pixels, cells, age_limit, band, unused[3];
 };
+
+/// llvmpipe ends all loops of an invocation after 65535 rounds, without a word, and counts those of
+/// the slowest of its neighbours in a vector.
+const char* most_steps(const Info& info) {
+  if (!info.works_around("loop-rounds")) return "1000000u";
+  const bool has_16_neighbours = info.renderer.find("512 bits") != std::string::npos;
+  return has_16_neighbours ? "4000u" : "8000u";
+}
 
 StoreGlsl glsl_of(const GlslPiece& piece, GlslSettings settings) {
   return {std::string(piece.name), std::move(settings), std::string(piece.text)};
@@ -54,7 +64,7 @@ Result<std::unique_ptr<HashStore>> HashStore::create(const Info& info,
 }
 
 HashStore::HashStore(const Info& info, const HashStoreOptions& options, WordPath path)
-    : Store(info.limits), options_(options), path_(path) {
+    : Store(info.limits), most_steps_(most_steps(info)), options_(options), path_(path) {
   if (options.binding_bytes > 0) binding_bytes_ = std::min(binding_bytes_, options.binding_bytes);
   // Cell numbers and their sums are 32-bit in the shaders.
   binding_bytes_ = std::min<std::uint64_t>(binding_bytes_, (std::uint64_t{1} << 31) * word_bytes());
@@ -122,7 +132,8 @@ StoreGlsl HashStore::glsl(int pass) const {
       break;
   }
   GlslSettings settings;
-  settings.defines = {{"STORE_COHERENT", options_.read_first ? "coherent" : ""}};
+  settings.defines = {{"STORE_COHERENT", options_.read_first ? "coherent" : ""},
+                      {"STORE_MOST_STEPS", most_steps_}};
   if (options_.read_first) settings.defines.emplace_back("STORE_READ_FIRST", "1");
   if (word_bytes() == 8) {
     settings.extensions = {"GL_ARB_gpu_shader_int64"};
@@ -298,17 +309,16 @@ Result<void> HashStore::draw_offsets(Band& band, OffsetKind kind) {
   std::transform(offsets.begin(), offsets.end(), words.begin(),
                  [](std::uint64_t offset) { return static_cast<std::uint32_t>(offset); });
   band.age_limit = static_cast<unsigned>(offsets.size()) - 1;
-  if (auto room = band.offsets.reserve(kOffsetBytes); !room) return room;
-  if (auto room = band.params.reserve(sizeof(Params)); !room) return room;
-  band.offsets.upload(std::span<const std::uint32_t>(words));
+  band.offset_kind = kind;
+  auto uploaded = band.offsets.assign(std::span<const std::uint32_t>(words));
+  if (!uploaded) return uploaded;
   const Params params{band.rows.begin * width_,
                       static_cast<std::uint32_t>(band.pixels),
                       static_cast<std::uint32_t>(band.cells),
                       band.age_limit,
                       static_cast<std::uint32_t>(&band - bands_.data()),
                       {}};
-  band.params.upload(std::span(&params, 1));
-  return {};
+  return band.params.assign(std::span(&params, 1));
 }
 
 /// Empties the tables; counts[i].held is what band i held, the other counts are those of the frame.
@@ -388,8 +398,12 @@ Result<bool> HashStore::look_at_layers() {
     if (mode_ == Mode::kCountLayers) {
       std::vector<std::uint32_t> layers(band.pixels);
       band.table.download(std::span(layers));
+      if (auto checked = check_errors("hash store"); !checked) {
+        return tl::unexpected(checked.error());
+      }
       const auto deepest = std::max_element(layers.begin(), layers.end());
       band.layers_counted = true;
+      band.deepest = *deepest;
       band.table.clear();
       if (*deepest > ages) {
         const auto pixel = static_cast<std::uint64_t>(deepest - layers.begin());
@@ -399,6 +413,21 @@ Result<bool> HashStore::look_at_layers() {
                     pixel % width_, band.rows.begin + pixel / width_, *deepest, name_of_words(),
                     ages);
       }
+    }
+    if (band.offset_kind == OffsetKind::kPlaneFirst && band.pixels * band.deepest <= band.cells) {
+      // There was a cell for every fragment: a thread took too many steps. Where bands have fewer
+      // rows than it inserts, it takes less.
+      constexpr std::uint32_t kFewRows = 128;
+      mode_ = Mode::kInsert;
+      if (band.rows.end - band.rows.begin <= kFewRows) {
+        const auto done = split(cells());
+        if (!done) return tl::unexpected(done.error());
+        if (*done) return false;
+      }
+      return fail(ErrorCode::kLimit,
+                  "hash store: lists of {} fragments take more than the {} steps of a thread; take "
+                  "the count/scan store",
+                  band.deepest, std::string_view(most_steps_, std::strlen(most_steps_) - 1));
     }
     // At least one step up, since a table that is not full fails by bad luck with its ages. Where
     // luck fails again and again, one plane a layer cannot.

@@ -45,8 +45,10 @@ struct HashStoreOptions {
 };
 
 /// The HA-buffer on the GPU: a hash table whose probe sequences are the sorted depth lists. Lists
-/// of 255 fragments at most; longer ones end in ErrorCode::kLimit that names the pixel (ScanStore
-/// takes them). A band of rows is a table of its own, the same as a HashBuffer of that many rows.
+/// of 255 fragments at most, where the driver has few rounds of loops (workaround loop-rounds) of
+/// some less under large triangles; longer ones end in ErrorCode::kLimit that names the pixel
+/// (ScanStore takes them). A band of rows is a table of its own, the same as a HashBuffer of that
+/// many rows.
 class HashStore final : public Store {
  public:
   /// ErrorCode::kUsage for a combination that this driver cannot do.
@@ -93,10 +95,12 @@ class HashStore final : public Store {
     std::uint64_t cells = 0;
     std::uint64_t frame = 0;
     unsigned age_limit = 0;
+    OffsetKind offset_kind = OffsetKind::kPlaneFirst;
     Buffer table, payloads, offsets, params;
     // Of a frame that did not fit.
     std::uint64_t stored = 0, missing = 0;
     bool layers_counted = false;
+    std::uint32_t deepest = 0;  ///< fragments of a pixel, once layers are counted
   };
   struct Counts {
     std::uint32_t failures, strangers, held, unused;
@@ -128,6 +132,7 @@ class HashStore final : public Store {
   [[nodiscard]] Result<bool> look_at_layers();
 
   std::uint64_t expected_ = 0;  ///< fragments of the next frame; 0: not known
+  const char* most_steps_;      ///< that an invocation may take
   HashStoreOptions options_;
   WordPath path_;
   std::vector<Band> bands_;

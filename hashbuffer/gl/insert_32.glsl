@@ -12,11 +12,11 @@ layout(std140, binding = 8) uniform store_block {
   uint store_band;
 };
 
-// Steps of this invocation so far, and the most of them. Chains of evictions are that long only in tables that are far
-// too full: what is left over is counted as not stored, and the table grows. llvmpipe ends all loops of an invocation
-// after 65535 rounds, without a word, and counts those of the slowest of 8 neighbours.
+// Steps of this invocation so far, and the most of them (HashStore chooses). Chains of evictions may be that long in
+// tables that are far too full, and so may the lists of all pixels of a thread together, where it inserts many: what is
+// left over is counted as not stored, and the table grows as long as that can help.
 uint store_steps = 0u;
-const uint kStoreMostSteps = 4000u;
+const uint kStoreMostSteps = STORE_MOST_STEPS;
 
 void strata_insert(uint pixel, uint depth, uint payload) {
 #ifdef STRATA_FRAGMENT_STAGE

@@ -21,7 +21,7 @@ uint64_t store_max(inout uint64_t cell, uint64_t value) {
 #endif
 
 uint store_steps = 0u;  // see insert_32.glsl
-const uint kStoreMostSteps = 4000u;
+const uint kStoreMostSteps = STORE_MOST_STEPS;
 
 void strata_insert(uint pixel, uint depth, uint payload) {
 #ifdef STRATA_FRAGMENT_STAGE

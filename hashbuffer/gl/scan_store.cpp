@@ -77,7 +77,7 @@ std::uint64_t ScanStore::memory_bytes() const {
   return bytes;
 }
 
-std::uint64_t ScanStore::stored() const {
+std::uint64_t ScanStore::fragments() const {
   std::uint64_t sum = 0;
   for (const Band& band : bands_) sum += band.items;
   return sum;

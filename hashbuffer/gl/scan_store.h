@@ -45,8 +45,7 @@ class ScanStore final : public Store {
   [[nodiscard]] StoreGlsl glsl_read() const override;
   void bind_for_reading(int band) const override;
 
-  /// Fragments of the frame.
-  [[nodiscard]] std::uint64_t stored() const;
+  [[nodiscard]] std::uint64_t fragments() const override;
 
  private:
   struct Band {

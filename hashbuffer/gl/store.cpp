@@ -46,6 +46,7 @@ Result<BuildReport> build(Store& store, Producer& producer, const Execution& exe
     if (!complete) return tl::unexpected(complete.error());
     if (*complete) {
       report.memory_bytes = store.memory_bytes();
+      report.fragments = store.fragments();
       return report;
     }
   }

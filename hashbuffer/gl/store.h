@@ -51,6 +51,8 @@ class Store {
   void limit_memory(std::uint64_t bytes) { memory_limit_ = bytes; }
   /// Bytes on the GPU.
   [[nodiscard]] virtual std::uint64_t memory_bytes() const = 0;
+  /// Fragments of the frame; 0 where the store does not need to count them.
+  [[nodiscard]] virtual std::uint64_t fragments() const { return 0; }
   /// Bits of a payload that come back; 0 where a store keeps depth alone.
   [[nodiscard]] virtual std::uint32_t payload_mask() const = 0;
 
@@ -90,7 +92,7 @@ class Store {
 
 /// Builds a frame: draws the producer once a pass, and again where something did not fit.
 /// `execution` is asked for its stop and its memory limit.
-/// @return how it was built; `fragments` is 0 where the store did not need to count them.
+/// @return how it was built; `fragments` as Store::fragments().
 /// ErrorCode::kLimit as Store::end(), kCancelled on request, and what the producer fails with.
 [[nodiscard]] Result<BuildReport> build(Store& store, Producer& producer,
                                         const Execution& execution = {});

@@ -89,8 +89,8 @@ Result<void> ComputeRasterizer::set_mesh(const LatticeMesh& mesh) {
     return fail(ErrorCode::kLimit, "{} triangles: 2^31 - 1 can be told apart", count);
   }
   if (shared) {
-    if (auto room = vertices_.reserve(mesh.vertices.size() * kVertexBytes); !room) return room;
-    vertices_.upload(std::span<const glm::ivec3>(mesh.vertices));
+    auto uploaded = vertices_.assign(std::span<const glm::ivec3>(mesh.vertices));
+    if (!uploaded) return uploaded;
   }
   parts_.resize((count + most - 1) / most);
   std::vector<glm::ivec3> corners;
@@ -100,10 +100,9 @@ Result<void> ComputeRasterizer::set_mesh(const LatticeMesh& mesh) {
     part.first = static_cast<std::uint32_t>(i * most);
     part.count = static_cast<std::uint32_t>(std::min<std::uint64_t>(most, count - part.first));
     const auto triangles = mesh.triangles.subspan(part.first, part.count);
-    if (auto room = part.triangles.reserve(part.count * kTriangleBytes); !room) return room;
     if (shared) {
       part.own_vertices = Buffer();
-      part.triangles.upload(triangles);
+      if (auto uploaded = part.triangles.assign(triangles); !uploaded) return uploaded;
       continue;
     }
     corners.clear();
@@ -114,9 +113,9 @@ Result<void> ComputeRasterizer::set_mesh(const LatticeMesh& mesh) {
         corners.push_back(mesh.vertices[triangle[corner]]);
       }
     }
-    part.triangles.upload(std::span<const std::uint32_t>(indices));
-    if (auto room = part.own_vertices.reserve(corners.size() * kVertexBytes); !room) return room;
-    part.own_vertices.upload(std::span<const glm::ivec3>(corners));
+    auto uploaded = part.triangles.assign(std::span<const std::uint32_t>(indices));
+    if (uploaded) uploaded = part.own_vertices.assign(std::span<const glm::ivec3>(corners));
+    if (!uploaded) return uploaded;
   }
   return check_errors("uploading a mesh");
 }

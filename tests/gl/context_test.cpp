@@ -182,6 +182,17 @@ TEST_F(GlProgram, CanBeRefusedByName) {
       << refused.error().message;
 }
 
+TEST(GlFaults, ThatAreNoneAreRefused) {
+  for (const char* words : {"lose-context=0", "lose-context=abc", "lose-context=3x",
+                            "losecontext=3", "refuse-shader", "hardware=yes"}) {
+    const Provoked fault(words);
+    const auto made = Context::headless();
+    ASSERT_FALSE(made) << words;
+    EXPECT_NE(made.error().message.find("STRATA_GL_FAULTS"), std::string::npos)
+        << made.error().message;
+  }
+}
+
 TEST(GlWorkarounds, AreSwitchedByName) {
   Info info;
   info.renderer = "llvmpipe (LLVM 15)";

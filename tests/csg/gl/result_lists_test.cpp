@@ -5,7 +5,10 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <functional>
+#include <stop_token>
+#include <thread>
 #include <utility>
 
 #include "csg/solid_labels.h"
@@ -117,6 +120,56 @@ TEST_F(GlResult, OfSolidsThatAreOpenOrOverlapThemselvesIsTheFilters) {
   }
   EXPECT_GT(walked_, 50000u);
   EXPECT_GT(handed_over_, 5000u);
+}
+
+TEST_F(GlResult, StopsAtAnyTime) {
+  // Balls that overlap themselves: many pixels are handed over.
+  Tree tree;
+  TriangleSoup balls;
+  for (int i = 0; i < 6; ++i) {
+    const auto first = static_cast<unsigned>(balls.positions.size());
+    for (const TriangleSoup ball = make_icosphere(4, 3); const auto& p : ball.positions) {
+      balls.positions.push_back(p + glm::dvec3(0.5 * i, 0, 0));
+    }
+    for (const auto& t : make_icosphere(4, 3).triangles) balls.triangles.push_back(t + first);
+  }
+  Solid solid;
+  solid.mesh = std::make_shared<TriangleSoup>(std::move(balls));
+  Solid other;
+  other.mesh = std::make_shared<TriangleSoup>(make_box({-9, -9, 0}, {9, 9, 9}));
+  const auto a = tree.add_solid(std::move(solid)), b = tree.add_solid(std::move(other));
+  tree.set_root(tree.add(Operation::kDifference, {a, b}));
+  const SolidLists lists(tree, tree.root());
+  VoxelGrid grid;
+  grid.dims = {250, 250, 100};
+  grid.origin = glm::dvec3(-9);
+  grid.voxel_size = glm::dvec3(18) / glm::dvec3(grid.dims);
+  const auto mesh = snap_to_lattice(lists.soup(), grid);
+  ASSERT_TRUE(mesh);
+  const RasterTarget target = raster_target(grid, Axis::kZ);
+  const auto expected = build_ldi(*mesh, target, {}, {}, &lists.filter());
+  ASSERT_TRUE(expected);
+  int stopped = 0;
+  for (int delay = 0; delay < 400; delay += delay < 20 ? 2 : 20) {
+    std::stop_source stop;
+    Execution execution;
+    execution.stop = stop.get_token();
+    auto source = GlResultSource::create(*context_, gl::ScanStore::create(context_->info()).value(),
+                                         nullptr, 1 << 12, execution);
+    ASSERT_TRUE(source) << source.error().message;
+    const std::jthread later([&] {
+      std::this_thread::sleep_for(std::chrono::milliseconds(delay));
+      stop.request_stop();
+    });
+    const auto found = build_ldi(**source, *mesh, target, execution, &lists.filter());
+    if (found) {
+      EXPECT_TRUE(found->items == expected->items);
+      continue;
+    }
+    EXPECT_EQ(found.error().code, ErrorCode::kCancelled) << found.error().message;
+    ++stopped;
+  }
+  EXPECT_GT(stopped, 0);
 }
 
 /// Boxes in a row of which every other one is taken from a slab: long lists, many solids.

@@ -118,6 +118,33 @@ TEST_F(StoredLists, KeepEveryOneOfHundredsOfLayersAndOfTwins) {
   }
 }
 
+TEST_F(StoredLists, HashTablesTakeDeepListsUnderLargeTriangles) {
+  // Threads insert 32 pixels each, so these take more than 5000 steps.
+  with_hash("hash", {});
+  with_hash("hash in two passes", {.path = gl::WordPath::kTwoPass});
+  const TriangleSoup soup = walls(80, 1);
+  VoxelGrid grid = testkit::unit_grid({64, 64, 160});
+  grid.voxel_size = {22.0 / 64, 14.0 / 64, 1.0};
+  const auto mesh = snap_to_lattice(soup, grid);
+  ASSERT_TRUE(mesh);
+  expect_same(*mesh, testkit::target_of(grid, Axis::kZ), "160 layers of 64 x 64 pixels");
+  // With more rows than can be cut into a few bands, a driver with few steps may refuse, at once.
+  const TriangleSoup deep_soup = walls(127, 1);
+  VoxelGrid deep_grid = testkit::unit_grid({24, 140, 254});
+  deep_grid.voxel_size = {22.0 / 24, 14.0 / 140, 1.0};
+  const auto deep = snap_to_lattice(deep_soup, deep_grid);
+  ASSERT_TRUE(deep);
+  const RasterTarget target = testkit::target_of(deep_grid, Axis::kZ);
+  const auto found = build_ldi(*sources_["hash"], *deep, target);
+  if (found) {
+    EXPECT_TRUE(*found == build_ldi(*deep, target).value());
+  } else {
+    EXPECT_EQ(found.error().code, ErrorCode::kLimit);
+    EXPECT_NE(found.error().message.find("steps of a thread"), std::string::npos)
+        << found.error().message;
+  }
+}
+
 TEST_F(StoredLists, ASpareStoreTakesWhatIsTooDeepForTheHash) {
   auto hash = gl::HashStore::create(context_->info());
   auto scan = gl::ScanStore::create(context_->info());
