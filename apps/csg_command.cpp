@@ -1,4 +1,6 @@
 #include <algorithm>
+#include <cmath>
+#include <optional>
 #include <utility>
 
 #include "apps/commands.h"
@@ -108,21 +110,29 @@ Error with_limit(Error error, const Session& session) {
   return error;
 }
 
-/// The pictures of numbers: solids and distances, one sample a pixel.
-Result<void> write_numbers(const CsgCommand& command, const csg::Camera& camera,
-                           csg::Preview& preview, CsgOutcome& outcome, Session& session) {
-  const auto view = csg::make_view(camera, command.size, preview.box());
-  if (!view) return tl::unexpected(view.error());
-  const auto image = preview.draw(*view, session.execution("drawing"));
-  if (!image) return tl::unexpected(with_limit(image.error(), session));
-  const csg::SurfaceImage& surfaces = **image;
-  if (!command.depth.empty()) {
-    if (auto done = csg::write_depth_exr(surfaces, *view, command.depth); !done) return done;
+/// Draws, and again by the CPU where the GPU fails half way and need not be the one.
+template <class Draw>
+auto drawn(csg::Preview& preview, bool may_fall_back, Session& session, Draw&& draw)
+    -> decltype(draw()) {
+  auto result = draw();
+  if (!result && may_fall_back && result.error().code != ErrorCode::kCancelled) {
+    preview.set_source(nullptr);
+    const std::string failure = result.error().message;
+    result = draw();
+    if (result) {
+      session.warn("backend", fmt::format("the GPU failed, the CPU did the work: {}", failure));
+    }
   }
-  if (command.ids.empty()) return {};
+  if (!result) return tl::unexpected(with_limit(std::move(result.error()), session));
+  return result;
+}
+
+/// Solids as colours; notes which are seen.
+csg::Picture picture_of_ids(const csg::SurfaceImage& surfaces, const csg::Tree& tree,
+                            CsgOutcome& outcome) {
   csg::Picture ids{surfaces.width, surfaces.height, {}};
   ids.pixels.resize(surfaces.depth.size(), csg::Rgba(0, 0, 0, 255));
-  std::vector<bool> seen(preview.tree().solids().size(), false);
+  std::vector<bool> seen(tree.solids().size(), false);
   for (std::size_t i = 0; i < ids.pixels.size(); ++i) {
     if (surfaces.depth[i] == csg::SurfaceImage::kNone) continue;
     ids.pixels[i] = colour_of_solid(surfaces.solid[i]);
@@ -131,9 +141,9 @@ Result<void> write_numbers(const CsgCommand& command, const csg::Camera& camera,
   for (std::uint32_t solid = 0; solid < seen.size(); ++solid) {
     if (!seen[solid]) continue;
     outcome.seen.push_back(solid);
-    outcome.names.push_back(preview.tree().solids()[solid].name);
+    outcome.names.push_back(tree.solids()[solid].name);
   }
-  return csg::write_png(ids, command.ids);
+  return ids;
 }
 
 }  // namespace
@@ -176,6 +186,12 @@ Result<void> run_csg(const CsgCommand& command, Session& session) {
     csg::fit_camera(camera, box, static_cast<double>(command.size.x) / command.size.y);
     if (!(camera.distance > 0)) camera.distance = csg::Camera{}.distance;  // nothing to fit
   }
+  if (!std::isfinite(camera.distance)) {
+    return fail(ErrorCode::kGeometry,
+                "what is in the scene reaches from ({:.6g}, {:.6g}, {:.6g}) to ({:.6g}, {:.6g}, "
+                "{:.6g}): these coordinates are too large for a picture",
+                box.low.x, box.low.y, box.low.z, box.high.x, box.high.y, box.high.z);
+  }
   cut_scene(*scene, command.cuts, camera);
   const auto gpu = Gpu::open(command.backend, session);
   if (!gpu) return tl::unexpected(gpu.error());
@@ -192,16 +208,10 @@ Result<void> run_csg(const CsgCommand& command, Session& session) {
   outcome.prepare_ms = session.milliseconds() - outcome.read_ms;
 
   double begin = session.milliseconds();
-  auto picture = preview.picture(camera, command.size, look, execution);
-  if (!picture && *gpu && command.backend == Backend::kAuto && !session.interrupted()) {
-    preview.set_source(nullptr);
-    const std::string failure = picture.error().message;
-    picture = preview.picture(camera, command.size, look, execution);
-    if (picture) {
-      session.warn("backend", fmt::format("the GPU failed, the CPU did the work: {}", failure));
-    }
-  }
-  if (!picture) return tl::unexpected(with_limit(std::move(picture.error()), session));
+  const bool may_fall_back = *gpu && command.backend == Backend::kAuto;
+  auto picture = drawn(preview, may_fall_back, session,
+                       [&] { return preview.picture(camera, command.size, look, execution); });
+  if (!picture) return tl::unexpected(picture.error());
   if (from_above) {
     const glm::u8vec3 ground = look.scheme->background;
     draw_outlines(*picture, {ground, look.transparent_background ? 0 : 255});
@@ -221,14 +231,20 @@ Result<void> run_csg(const CsgCommand& command, Session& session) {
                            counted(outcome.drawn.fragments, "crossing"), outcome.drawn.covered,
                            counted(picture->pixels.size(), "pixel")));
 
+  // The pictures of numbers have one sample a pixel.
+  const csg::SurfaceImage* surfaces = nullptr;
+  std::optional<csg::View> view;
   begin = session.milliseconds();
-  if (!command.output.empty()) {
-    if (auto done = csg::write_png(*picture, command.output); !done) return done;
-  }
   if (!command.ids.empty() || !command.depth.empty()) {
-    if (auto done = write_numbers(command, camera, preview, outcome, session); !done) return done;
+    const auto made = csg::make_view(camera, command.size, preview.box());
+    if (!made) return tl::unexpected(made.error());
+    view = *made;
+    const auto image = drawn(preview, may_fall_back, session,
+                             [&] { return preview.draw(*view, session.execution("drawing")); });
+    if (!image) return tl::unexpected(image.error());
+    surfaces = *image;
   }
-  outcome.write_ms = session.milliseconds() - begin;
+  const double numbers_ms = session.milliseconds() - begin;
   if (command.json) {
     begin = session.milliseconds();
     const csg::Tree& tree = preview.tree();
@@ -238,6 +254,19 @@ Result<void> run_csg(const CsgCommand& command, Session& session) {
     outcome.measures = *measures;
     outcome.measure_ms = session.milliseconds() - begin;
   }
+  // Nothing is written before all is known.
+  begin = session.milliseconds();
+  if (!command.output.empty()) {
+    if (auto done = csg::write_png(*picture, command.output); !done) return done;
+  }
+  if (!command.depth.empty()) {
+    if (auto done = csg::write_depth_exr(*surfaces, *view, command.depth); !done) return done;
+  }
+  if (!command.ids.empty()) {
+    const csg::Picture ids = picture_of_ids(*surfaces, preview.tree(), outcome);
+    if (auto done = csg::write_png(ids, command.ids); !done) return done;
+  }
+  outcome.write_ms = numbers_ms + session.milliseconds() - begin;
   session.end_progress();
   if (!command.json) return {};
   return print_report(csg_json(command, outcome, session), *command.json, command.output == "-");

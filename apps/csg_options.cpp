@@ -59,10 +59,7 @@ Result<int> parse_samples(std::string_view text) {
 }  // namespace
 
 Result<void> check_picture_name(std::string_view asked_by, const std::string& path, bool depth) {
-  if (is_stream(path) || path.ends_with(depth ? ".exr" : ".png") ||
-      path.ends_with(depth ? ".EXR" : ".PNG")) {
-    return {};
-  }
+  if (is_stream(path) || has_extension(path, depth ? ".exr" : ".png")) return {};
   return fail(ErrorCode::kUsage, "{}{}: {}", asked_by, path,
               depth ? "distances are written as .exr" : "pictures are written as .png");
 }

@@ -4,6 +4,7 @@
 #include "apps/commands.h"
 #include "apps/gpu.h"
 #include "apps/mesh_input.h"
+#include "apps/option_values.h"
 #include "apps/session.h"
 #include "hashbuffer/build_ldi.h"
 #include "raster/lattice_mesh.h"
@@ -13,8 +14,9 @@
 namespace strata::apps {
 
 Result<void> run_ldi(const LdiCommand& command, Session& session) {
-  const bool exr = command.output.ends_with(".exr"), npz = command.output.ends_with(".npz");
-  const bool png = command.output.ends_with(".png");
+  const bool exr = has_extension(command.output, ".exr");
+  const bool npz = has_extension(command.output, ".npz");
+  const bool png = has_extension(command.output, ".png");
   if (!exr && !npz && !png) {
     return fail(ErrorCode::kUsage, "{}: layered depth images are written as .exr, .npz or .png",
                 command.output);

@@ -1,5 +1,6 @@
 #include "apps/option_values.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 
@@ -30,9 +31,11 @@ Result<std::vector<double>> parse_numbers(std::string_view option, std::string_v
     const std::size_t comma = rest.find(',');
     double value = 0;
     if (!read_all(rest.substr(0, comma), value) || !std::isfinite(value)) {
-      return fail(ErrorCode::kUsage, "{} takes {} with commas between, not '{}'", option,
-                  least == most ? fmt::format("{} number{}", least, least == 1 ? "" : "s")
-                                : fmt::format("{} or {} numbers", least, most),
+      return fail(ErrorCode::kUsage, "{} takes {}, not '{}'", option,
+                  most == 1 ? std::string("a number")
+                  : least == most
+                      ? fmt::format("{} numbers with commas between", least)
+                      : fmt::format("{} or {} numbers with commas between", least, most),
                   text);
     }
     values.push_back(value);
@@ -92,6 +95,14 @@ tl::unexpected<Error> no_such_choice(std::string_view option, std::string_view t
     list += names[i];
   }
   return fail(ErrorCode::kUsage, "{} is {}, not '{}'", option, list, text);
+}
+
+bool has_extension(std::string_view path, std::string_view extension) {
+  if (path.size() < extension.size()) return false;
+  path.remove_prefix(path.size() - extension.size());
+  return std::equal(path.begin(), path.end(), extension.begin(), [](char a, char b) {
+    return (a >= 'A' && a <= 'Z' ? static_cast<char>(a - 'A' + 'a') : a) == b;
+  });
 }
 
 }  // namespace strata::apps

@@ -11,7 +11,7 @@ namespace strata::apps {
 
 /// The files, and of those that are scenes what they name and what is there: meshes, outlines,
 /// pictures, included programs, and what those name.
-/// @param asset_folder where scenes look for files; empty: beside the scene
+/// @param asset_folder where scenes look for files first; empty: beside the scene
 /// @param all_scenes `files` are scenes, whatever their names are
 [[nodiscard]] std::vector<std::string> with_scene_files(std::vector<std::string> files,
                                                         const std::string& asset_folder,

@@ -197,16 +197,17 @@ void Geometry::measure() {
   for (const Part& part : parts_) box_.include(part.box);
 }
 
-Bounds Geometry::box(const Tree& tree, Tree::NodeId node) const {
+std::vector<Bounds> Geometry::boxes() const {
   std::vector<Bounds> boxes;
+  boxes.reserve(parts_.size());
   for (const Part& part : parts_) boxes.push_back(part.box);
-  return bounds(tree, node, boxes);
+  return boxes;
 }
 
 double Geometry::world_error(const Tree& tree, double relative_precision) const {
   constexpr double kMostSizes = 8.0;
   if (box_.empty()) return 0;
-  Bounds result = box(tree, tree.root());
+  Bounds result = bounds(tree, tree.root(), boxes());
   if (result.empty()) result = box_;
   const double reach = glm::length(glm::max(glm::abs(box_.low), glm::abs(box_.high)));
   return relative_precision * std::min(reach, kMostSizes * glm::length(result.high - result.low));

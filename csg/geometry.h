@@ -37,8 +37,7 @@ class Geometry {
 
   [[nodiscard]] const std::vector<Part>& parts() const { return parts_; }
   [[nodiscard]] const Bounds& box() const { return box_; }  ///< around all parts
-  /// bounds() of a node of `tree`, whose solids these are.
-  [[nodiscard]] Bounds box(const Tree& tree, Tree::NodeId node) const;
+  [[nodiscard]] std::vector<Bounds> boxes() const;          ///< around each part
   /// How far faces of the result of `tree`, whose solids these are, may be from where they are
   /// meant when numbers are off by `relative_precision` of themselves. Solids far from the origin,
   /// or cutters that are far larger than what they cut, do not blur what there is: it is never

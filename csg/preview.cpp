@@ -229,17 +229,10 @@ struct Preview::Impl {
         frame(program, geometry, error),
         painter(tree, with_ghosts(given), geometry, error) {}
 
-  /// Around all solids; without cutters that are far larger than all that can be seen, which would
-  /// leave it no depth.
   [[nodiscard]] Bounds box() const {
-    constexpr double kFarLarger = 1000.0;
-    Bounds seen = geometry.box(tree, tree.root());
-    for (const Translucent& part : translucent) {
-      seen.include(geometry.box(tree, part.node));
-    }
-    const Bounds& all = geometry.box();
-    const auto size = [](const Bounds& box) { return glm::length(box.high - box.low); };
-    return !seen.empty() && size(all) > kFarLarger * size(seen) ? seen : all;
+    std::vector<Tree::NodeId> shown{tree.root()};
+    for (const Translucent& part : translucent) shown.push_back(part.node);
+    return picture_box(tree, geometry.boxes(), shown);
   }
   std::span<const Translucent> with_ghosts(std::span<const Ghost> given) {
     for (const Ghost& ghost : given) translucent.push_back({ghost.node, ghost.colour});

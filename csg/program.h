@@ -39,19 +39,18 @@ struct Program {
   };
 
   std::vector<Edge> edges;
-  std::vector<Node> nodes;     ///< children before parents; the last one is the root
-  std::vector<Up> leaves;      ///< of each solid of the tree
-  bool root_inverted = false;  ///< the tree says not(root node)
+  std::vector<Node> nodes;  ///< children before parents; the last one is the root
+  std::vector<Up> leaves;   ///< of each solid of the tree
 
   /// Whether a solid is united with all the rest: inside it is inside the tree.
   [[nodiscard]] bool plain(std::uint32_t solid) const {
     const Up& up = leaves[solid];
-    return up.parent + 1 == nodes.size() && !up.inverted && !root_inverted;
+    return up.parent + 1 == nodes.size() && !up.inverted;
   }
   [[nodiscard]] bool idle(std::uint32_t node) const { return nodes[node].idle_true > 0; }
   /// The tree's value with every solid outside.
   [[nodiscard]] bool idle_value() const {
-    return (!nodes.empty() && idle(static_cast<std::uint32_t>(nodes.size() - 1))) != root_inverted;
+    return !nodes.empty() && idle(static_cast<std::uint32_t>(nodes.size() - 1));
   }
 };
 

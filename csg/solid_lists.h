@@ -55,8 +55,7 @@ struct Measures {
   glm::dvec3 low{0},
       high{0};              ///< bounds of the crossings, world space; within a voxel of the truth
   double bounds_error = 0;  ///< longest side of a voxel
-  std::uint64_t crossings = 0;  ///< of the solids, all axes
-  std::uint64_t result_crossings = 0;
+  std::uint64_t result_crossings = 0;      ///< all axes
   std::uint64_t max_depth_complexity = 0;  ///< of the result
   bool empty = true;  ///< no ray met anything: the result is empty, or smaller than a voxel
 };

@@ -128,7 +128,7 @@ void Simplifier::simplify(std::span<const LeafLayers> leaves,
   }
 
   const Seen& top = seen_[root];
-  const bool inverted = program_->root_inverted != top.inverted;
+  const bool inverted = top.inverted;
   if (top.kind == Seen::Kind::kTrue || top.kind == Seen::Kind::kFalse) {
     out.value = (top.kind == Seen::Kind::kTrue) != inverted;
     return;

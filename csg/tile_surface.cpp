@@ -165,8 +165,14 @@ void TileFinder::make(LeafLayers& leaf) {
   const ViewPart& part = view_parts_[leaf.solid];
   const RasterTarget target{Axis::kZ, view_->size.x, view_->size.y, kPictureDepthLimit};
   const Input input = input_of(leaf.solid);
-  fragments_ += raster_layers(part.mesh, target, input.triangles, input.clip,
-                              coincidence_->steep_from(), leaf, arena_);
+  constexpr std::size_t kTrianglesAtOnce = 2048;  // lists may be very long
+  for (std::size_t i = 0; i < input.triangles.size() && !stop_.stop_requested();
+       i += kTrianglesAtOnce) {
+    const auto some =
+        input.triangles.subspan(i, std::min(kTrianglesAtOnce, input.triangles.size() - i));
+    fragments_ += raster_layers(part.mesh, target, some, input.clip, coincidence_->steep_from(),
+                                leaf, arena_);
+  }
   if (!leaf.keys.empty()) normalize_layers(leaf, part.cut, *this);
 }
 
@@ -231,6 +237,7 @@ void TileFinder::resolve(const TileProgram& program, std::uint64_t pixel) {
 void TileFinder::find(int tile_u, int tile_v, std::span<const std::uint32_t> solids,
                       const SurfacePart& part, const std::stop_token& stop) {
   part_ = part;
+  stop_ = stop;
   tile_ = {tile_u * kTileSide, tile_v * kTileSide,
            std::min(view_->size.x, (tile_u + 1) * kTileSide),
            std::min(view_->size.y, (tile_v + 1) * kTileSide)};

@@ -231,6 +231,7 @@ class TileFinder {
   PixelRect tile_;
   SurfacePart part_;
   std::uint64_t fragments_ = 0, resolved_ = 0;
+  std::stop_token stop_;
 };
 
 // The kernels, compiled once for each SIMD target (csg/tile_surface_simd.cpp).

@@ -1,5 +1,6 @@
 #include "csg/tree.h"
 
+#include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 
 namespace strata::csg {
@@ -39,10 +40,13 @@ Bounds bounds(const Tree& tree, Tree::NodeId node) {
   return bounds(tree, node, solids);
 }
 
-Bounds bounds(const Tree& tree, Tree::NodeId node, std::span<const Bounds> solids) {
-  if (node == Tree::kNone) return {};
-  std::vector<Bounds> boxes(node + 1);  // operands stand before the nodes that take them
-  for (Tree::NodeId id = 0; id <= node; ++id) {
+namespace {
+
+/// The boxes of the first `count` nodes.
+std::vector<Bounds> node_bounds(const Tree& tree, std::size_t count,
+                                std::span<const Bounds> solids) {
+  std::vector<Bounds> boxes(count);  // operands stand before the nodes that take them
+  for (Tree::NodeId id = 0; id < count; ++id) {
     const Tree::Node& at = tree.nodes()[id];
     if (at.operation == Operation::kSolid) {
       boxes[id] = solids[at.first];
@@ -65,7 +69,26 @@ Bounds bounds(const Tree& tree, Tree::NodeId node, std::span<const Bounds> solid
       boxes[id] = {};
     }
   }
-  return boxes[node];
+  return boxes;
+}
+
+}  // namespace
+
+Bounds bounds(const Tree& tree, Tree::NodeId node, std::span<const Bounds> solids) {
+  return node == Tree::kNone ? Bounds{} : node_bounds(tree, node + 1, solids).back();
+}
+
+Bounds picture_box(const Tree& tree, std::span<const Bounds> solids,
+                   std::span<const Tree::NodeId> shown) {
+  constexpr double kFarLarger = 1000.0;
+  Bounds all, seen;
+  for (const Bounds& solid : solids) all.include(solid);
+  const std::vector<Bounds> boxes = node_bounds(tree, tree.nodes().size(), solids);
+  for (const Tree::NodeId node : shown) {
+    if (node != Tree::kNone) seen.include(boxes[node]);
+  }
+  const auto size = [](const Bounds& box) { return glm::length(box.high - box.low); };
+  return !seen.empty() && size(all) > kFarLarger * size(seen) ? seen : all;
 }
 
 }  // namespace strata::csg

@@ -86,5 +86,10 @@ class Tree {
 [[nodiscard]] Bounds bounds(const Tree& tree, Tree::NodeId node);
 /// The same from the boxes of the tree's solids.
 [[nodiscard]] Bounds bounds(const Tree& tree, Tree::NodeId node, std::span<const Bounds> solids);
+/// The box that gives a picture its depths, from the boxes of the tree's solids: around all of
+/// them; without cutters that are far larger than `shown`, which are the nodes that can be seen:
+/// they would leave it no depth.
+[[nodiscard]] Bounds picture_box(const Tree& tree, std::span<const Bounds> solids,
+                                 std::span<const Tree::NodeId> shown);
 
 }  // namespace strata::csg

@@ -143,8 +143,10 @@ class PreviewRenderer final : public Renderer {
 
   Result<void> draw_heat(const FrameRequest& request, const Execution& execution, Frame& frame) {
     const auto begin = Clock::now();
-    Bounds box;
-    for (const csg::Solid& solid : what_->tree.solids()) box.include(csg::bounds(solid));
+    std::vector<Bounds> boxes;
+    for (const csg::Solid& solid : what_->tree.solids()) boxes.push_back(csg::bounds(solid));
+    const csg::Tree::NodeId root = what_->tree.root();
+    const Bounds box = csg::picture_box(what_->tree, boxes, std::span(&root, 1));
     const auto view = csg::make_view(request.camera, request.size, box);
     if (!view) return tl::unexpected(view.error());
     const auto rays = meter_->measure(*view, execution);

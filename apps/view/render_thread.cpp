@@ -54,7 +54,10 @@ RenderThread::RenderThread(std::unique_ptr<Renderer> renderer, int threads,
     : renderer_(std::move(renderer)),
       threads_(threads),
       wake_(std::move(wake)),
-      thread_([this](const std::stop_token& stop) { run(stop); }) {}
+      thread_([this](const std::stop_token& stop) {
+        run(stop);
+        renderer_.reset();  // what it has on the GPU is this thread's
+      }) {}
 
 RenderThread::~RenderThread() {
   thread_.request_stop();

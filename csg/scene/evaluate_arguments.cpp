@@ -57,7 +57,15 @@ double Evaluator::radius(std::uint32_t node, std::string_view radius, std::strin
 }
 
 Segments Evaluator::segments(std::uint32_t node) {
-  const Segments segments = arguments(node).segments(newer_);
+  const NodeArguments given = arguments(node);
+  for (const char* const name : {"$fn", "$fa", "$fs"}) {
+    const ValueRef value = given.find(name);
+    if (!value.given() || value.is_number()) continue;
+    warn(node, "geometry",
+         fmt::format("'{}': {} is {}, not a number; its default is taken", this->name(node), name,
+                     value.shown()));
+  }
+  const Segments segments = given.segments(newer_);
   if (std::isfinite(segments.fn) && segments.fn > Segments::kMost) {
     warn(node, "approximate",
          fmt::format("'{}': $fn is {:g}; {:g} is taken", name(node), segments.fn, Segments::kMost));

@@ -37,30 +37,30 @@ void move_to_middle(TriangleSoup& mesh) {
 
 }  // namespace
 
-/// Where a file of the scene is: in the folder of the scene, or in one around it, since scenes are
-/// often written to another folder than their source.
-std::optional<std::string> Evaluator::asset(std::uint32_t node, const std::string& file) {
+std::optional<std::string> find_asset(const std::string& folder, const std::string& name) {
   namespace fs = std::filesystem;
+  constexpr int kMostLevels = 8;
   std::error_code ignored;
-  const auto is_there = [&](const fs::path& path) { return fs::is_regular_file(path, ignored); };
-  const fs::path name(file);
-  bool folder_there = false;
-  if (name.is_absolute()) {
-    if (is_there(name)) return file;
-    folder_there = fs::is_directory(name, ignored);
-  } else {
-    constexpr int kMostLevels = 8;
-    fs::path folder(folder_);
-    for (int level = 0; level < kMostLevels; ++level) {
-      const fs::path path = folder / name;
-      if (is_there(path)) return path.string();
-      folder_there |= fs::is_directory(path, ignored);
-      folder /= "..";
-    }
+  if (fs::path(name).is_absolute()) {
+    return fs::is_regular_file(name, ignored) ? std::optional(name) : std::nullopt;
   }
+  fs::path around(folder);
+  for (int level = 0; level < kMostLevels; ++level, around /= "..") {
+    const fs::path path = around / name;
+    if (fs::is_regular_file(path, ignored)) return path.string();
+  }
+  return std::nullopt;
+}
+
+std::optional<std::string> Evaluator::asset(std::uint32_t node, const std::string& file) {
+  auto found = find_asset(folder_, file);
+  if (found) return found;
+  std::error_code ignored;
+  const bool is_folder = std::filesystem::is_directory(
+      std::filesystem::path(folder_) / file, ignored);  // an absolute one stays what it is
   warn(node, "missing-file",
-       fmt::format("'{}' needs the file '{}', which is {}; it is left out", this->name(node), file,
-                   folder_there ? "a folder" : "not there"));
+       fmt::format("'{}' needs the file '{}', which is {}; it is left out", name(node), file,
+                   is_folder ? "a folder" : "not there"));
   return std::nullopt;
 }
 

@@ -176,11 +176,12 @@ void Evaluator::polygon(std::uint32_t node, const Context& context) {
   std::vector<glm::dvec2> points;
   for (const ValueRef point : given.find("points", 0)) {
     double p[2];
-    if (point.numbers(p, 2) < 2 || !std::isfinite(p[0]) || !std::isfinite(p[1])) {
+    if (point.numbers(p, 2) < 2 || !(std::abs(p[0]) < kMostCoordinate) ||
+        !(std::abs(p[1]) < kMostCoordinate)) {
       return warn(node, "geometry",
-                  fmt::format("point {} of the polygon is {}, not two finite numbers; the polygon "
-                              "is left out",
-                              points.size(), point.shown()));
+                  fmt::format("point {} of the polygon is {}, not two numbers below {:g}; the "
+                              "polygon is left out",
+                              points.size(), point.shown(), kMostCoordinate));
     }
     points.emplace_back(p[0], p[1]);
   }

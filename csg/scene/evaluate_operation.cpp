@@ -271,8 +271,8 @@ void Evaluator::linear_extrude(Frame& frame) {
   options.centre = given.truth("center", false);
   options.twist = number(frame.node, "twist", 0.0);
   const ValueRef scale = given.find("scale");
-  double both[2] = {scale.number(1.0), scale.number(1.0)};
-  scale.numbers(both, 2);
+  double both[2];
+  if (scale.numbers(both, 2) < 2) both[0] = both[1] = number(frame.node, "scale", scale, 1.0);
   options.scale = {std::max(both[0], 0.0), std::max(both[1], 0.0)};
   const auto whole = [](double value, double most) {
     return static_cast<int>(std::isfinite(value) ? std::clamp(value, 0.0, most) : 0.0);
@@ -281,12 +281,13 @@ void Evaluator::linear_extrude(Frame& frame) {
   options.outline_segments = whole(number(frame.node, "segments", 0.0), 1e6);
   options.divide_outline = newer_;
   options.segments = segments(frame.node);
-  if (!std::isfinite(options.height) || !std::isfinite(options.twist) ||
-      !std::isfinite(options.scale.x) || !std::isfinite(options.scale.y)) {
+  if (!is_length(frame.node, "the height", options.height)) return;
+  if (!std::isfinite(options.twist) || !std::isfinite(options.scale.x) ||
+      !std::isfinite(options.scale.y)) {
     return warn(frame.node, "geometry",
-                fmt::format("'linear_extrude' with height {:g}, twist {:g}, scale [{:g}, {:g}], "
-                            "which must be finite; it is left out",
-                            options.height, options.twist, options.scale.x, options.scale.y));
+                fmt::format("'linear_extrude' with twist {:g}, scale [{:g}, {:g}], which must be "
+                            "finite; it is left out",
+                            options.twist, options.scale.x, options.scale.y));
   }
   SliceCount slices;
   add_solid(frame.node, frame.outside, csg::linear_extrude(outline, options, &slices));
@@ -361,9 +362,10 @@ void Evaluator::flat_operation(Frame& frame) {
       const ValueRef delta = given.find("delta");
       const double by = number(frame.node, delta.is_number() ? "delta" : "r",
                                delta.is_number() ? delta : given.find("r", 0), 1.0);
-      if (!std::isfinite(by)) {
+      if (!(std::abs(by) < kMostCoordinate)) {
         return warn(frame.node, "geometry",
-                    fmt::format("'offset' by {:g}, which must be finite; it is left out", by));
+                    fmt::format("'offset' by {:g}, which must be less than {:g}; it is left out",
+                                by, kMostCoordinate));
       }
       outline = delta.is_number() ? offset_delta(outline, by, given.truth("chamfer", false))
                                   : offset_round(outline, by, segments(frame.node));

@@ -12,6 +12,9 @@
 
 namespace strata::csg {
 
+/// Outlines have coordinates below this: larger ones could not be subtracted.
+inline constexpr double kMostCoordinate = 1e150;
+
 /// A flat region: contours in the plane. Clean regions have counter-clockwise outer contours and
 /// clockwise holes, do not cross themselves and are filled by the nonzero rule.
 struct Outline {

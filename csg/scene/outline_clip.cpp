@@ -100,10 +100,10 @@ class Grid {
   double length(double world) const { return std::ldexp(world, shift_); }
 
  private:
-  /// Contours with numbers that are not finite, or too large to subtract, are left out.
+  /// Contours with numbers that are not finite, or too large, are left out.
   static bool usable(const std::vector<glm::dvec2>& contour) {
     return contour.size() >= 3 && std::all_of(contour.begin(), contour.end(), [](const auto& p) {
-             return std::abs(p.x) < 1e150 && std::abs(p.y) < 1e150;
+             return std::abs(p.x) < kMostCoordinate && std::abs(p.y) < kMostCoordinate;
            });
   }
 

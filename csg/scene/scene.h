@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -37,6 +38,11 @@ struct ReadSceneOptions {
   std::string asset_folder;
   double scad_timeout_s = 300.0;  ///< for the `openscad` program that turns .scad into .csg
 };
+
+/// Where a scene in `folder` finds the file that it calls `name`: there, or in a folder around it,
+/// since scenes are often written to another folder than their source.
+[[nodiscard]] std::optional<std::string> find_asset(const std::string& folder,
+                                                    const std::string& name);
 
 /// Reads `.csg` (the whole language of both OpenSCAD 2021.01 and later) or, with the help of an
 /// installed `openscad`, `.scad`. @return kInput naming file:line:column, kLimit, kCancelled

@@ -222,11 +222,30 @@ TEST_F(Csg, MistakesInOptionsAreNamed) {
   // The whole value is quoted, one number is one, and an empty value takes no other option's name.
   EXPECT_TRUE(has(says("--cut=x>=5"), "not 'x>=5'"));
   EXPECT_TRUE(has(says("--size=5,five"), "not '5,five'"));
-  EXPECT_TRUE(has(says("--scad-timeout=soon"), "takes 1 number with"));
+  EXPECT_TRUE(has(says("--scad-timeout=soon"), "takes a number, not 'soon'"));
   EXPECT_TRUE(has(refused({"scene.csg", "-o", "out.png", "--camera=", "--progress", "none"}, 2),
                   "--camera is given an empty value"));
   EXPECT_TRUE(has(refused({"scene.csg", "-o", "out.png", "--expr", ""}, 2),
                   "--expr is given an empty value"));
+}
+
+TEST_F(Csg, NothingIsWrittenWhereTheMeasuresFail) {
+  // Voxels, and so measures, reach 2^20 of them; pictures take such a cutter.
+  place.write("far.csg",
+              "difference() { cube(size = [1, 1, 1]); multmatrix([[1,0,0,0.5],[0,1,0,-1e9],"
+              "[0,0,1,-1e9],[0,0,0,1]]) { cube(size = [2e9, 2e9, 2e9]); } }");
+  const auto drawn = place.run({"csg", "far.csg", "-o", "far.png", "--size=16,16"});
+  EXPECT_EQ(drawn.exit_code, 0) << drawn.err;
+  const auto before = place.names();
+  const auto failed = place.run({"csg", "far.csg", "-o", "new.png", "--ids", "ids.png", "--depth",
+                                 "d.exr", "--json=j.json", "--size=16,16"});
+  EXPECT_NE(failed.exit_code, 0);
+  EXPECT_EQ(place.names(), before) << failed.err;
+}
+
+TEST_F(Csg, CoordinatesThatNoCameraReachesAreTheScenesFault) {
+  place.write("huge.csg", "cube(size = [1e300, 1e300, 1e300]);");
+  EXPECT_TRUE(has(refused({"huge.csg", "-o", "out.png"}, 5), "too large for a picture"));
 }
 
 TEST_F(Csg, FilesThatAreNoScenesAreSaidToBeWhatTheyAre) {

@@ -67,6 +67,21 @@ TEST_F(Files, InputsAreNotOverwritten) {
           {"-o old.png would overwrite the input old.png"});
 }
 
+TEST_F(Files, WhatAScenesNamesMeanIsFoundAsTheSceneFindsIt) {
+  // In a folder around the scene; after a quote with a backslash; with a blank in its name.
+  std::filesystem::create_directories(place.path("a/b"));
+  place.write("a/heights.png", "no picture");
+  place.write("a/b/deep.csg", "surface(file = \"heights.png\"); cube();\n");
+  refuses({"csg", "a/b/deep.csg", "-o", "a/heights.png", "--size=8,8"},
+          {"would overwrite a file of the scene, ", "heights.png"});
+  place.write("quotes.csg", "text(text = \"5\\\" x\"); surface(file = \"old.png\"); cube();\n");
+  refuses({"csg", "quotes.csg", "-o", "old.png"}, {"would overwrite a file of the scene, old.png"});
+  place.write("my lib.scad", "module m() cube();\n");
+  place.write("uses.scad", "include <my lib.scad>\nm();\n");
+  refuses({"csg", "uses.scad", "-o", "x.png", "--json=my lib.scad"},
+          {"would overwrite a file of the scene, my lib.scad"});
+}
+
 TEST_F(Files, OutputsDoNotOverwriteEachOther) {
   refuses({"csg", "scene.csg", "-o", "same.png", "--ids", "same.png"},
           {"-o same.png and --ids same.png would be written to one file"});
@@ -92,6 +107,10 @@ TEST_F(Files, StreamsAndFilesOfTheirOwnAreNoConflict) {
   for (int i = 0; i < 2; ++i) {
     runs({"csg", "scene.csg", "-o", "a.png", "--ids", "b.png", "--json=c.json", "--size=8,8"});
   }
+  std::filesystem::create_directories(place.path("sub"));
+  place.write("sub/scene.csg", "import(file = \"own.png\"); cube();\n");
+  place.write("sub/own.png", "");
+  for (int i = 0; i < 2; ++i) runs({"csg", "sub/scene.csg", "-o", "own.png", "--size=8,8"});
 }
 
 }  // namespace

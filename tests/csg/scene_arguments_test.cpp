@@ -53,12 +53,20 @@ TEST(Arguments, WhatIsNoSizeIsNamed) {
             "1:1: 'square': a size is -1, less than 0; it is left out");
   EXPECT_EQ(warning_of("circle(-2);"),
             "1:1: 'circle': the radius is -2, less than 0; it is left out");
-  EXPECT_EQ(
-      warning_of("linear_extrude(height=nan,scale=[1,1],center=false) square(1);"),
-      "1:1: 'linear_extrude' with height nan, twist 0, scale [1, 1], which must be finite; it "
-      "is left out");
+  EXPECT_EQ(warning_of("linear_extrude(height=nan,scale=[1,1],center=false) square(1);"),
+            "1:1: 'linear_extrude': the height is nan, not finite; it is left out");
+  EXPECT_EQ(warning_of("linear_extrude(height=-5) square(2);"),
+            "1:1: 'linear_extrude': the height is -5, less than 0; it is left out");
+  EXPECT_EQ(warning_of("linear_extrude(height=1,twist=inf) square(1);"),
+            "1:1: 'linear_extrude' with twist inf, scale [1, 1], which must be finite; it is left "
+            "out");
   EXPECT_EQ(warning_of("offset(r=inf) square(1);"),
-            "1:1: 'offset' by inf, which must be finite; it is left out");
+            "1:1: 'offset' by inf, which must be less than 1e+150; it is left out");
+  EXPECT_EQ(warning_of("offset(delta=-1e300) square(1);"),
+            "1:1: 'offset' by -1e+300, which must be less than 1e+150; it is left out");
+  EXPECT_EQ(warning_of("polygon([[0,0],[1e300,0],[0,1]]);"),
+            "1:1: point 1 of the polygon is [1e+300, 0], not two numbers below 1e+150; the polygon "
+            "is left out");
   // A wall of no thickness is nothing, and means it.
   for (const char* nothing : {"cube([3,3,0]);", "sphere(0);", "cylinder(h=0,r=1);",
                               "cylinder(h=1,r=0);", "square([0,1]);", "circle(r=0);", "cube(0);"}) {
@@ -81,6 +89,10 @@ TEST(Arguments, WhatIsNoNumberIsNamed) {
             "1:1: 'cube': size is [2, [\"b\", []], false], not a number or 3 numbers; 1 is taken");
   EXPECT_EQ(warning_of("square([1,2,3]);"),
             "1:1: 'square': size is [1, 2, 3], not a number or 2 numbers; 1 is taken");
+  EXPECT_EQ(warning_of("linear_extrude(height=1,scale=\"x\") square(1);"),
+            "1:1: 'linear_extrude': scale is \"x\", not a number; 1 is taken");
+  EXPECT_EQ(warning_of("sphere(1,$fn=\"a\");"),
+            "1:1: 'sphere': $fn is \"a\", not a number; its default is taken");
   EXPECT_EQ(warning_of("rotate_extrude(angle=\"x\") square(1);"),
             "1:1: 'rotate_extrude': angle is \"x\", not a number; 360 is taken");
   const std::string long_one = warning_of("sphere(\"" + std::string(5000, 'x') + "\");");

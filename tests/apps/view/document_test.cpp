@@ -204,6 +204,27 @@ TEST(RayImage, WallsThatTouchAreOne) {
   EXPECT_NEAR(rays->thickness[32 * 64 + 32], 5, 1e-3);
 }
 
+TEST(RayImage, CuttersFarLargerThanTheResultLeaveItDepth) {
+  const Model model = model_of(
+      "difference() { cube(size = [10, 10, 10]); multmatrix([[1,0,0,5],[0,1,0,-1e7],[0,0,1,-1e7],"
+      "[0,0,0,1]]) { cube(size = [2e7, 2e7, 2e7]); } }");
+  const csg::Tree& tree = model.scene.tree;
+  std::vector<Bounds> solids;
+  for (const csg::Solid& solid : tree.solids()) solids.push_back(csg::bounds(solid));
+  const csg::Tree::NodeId root = tree.root();
+  const Bounds box = csg::picture_box(tree, solids, std::span(&root, 1));
+  EXPECT_EQ(box.high, glm::dvec3(10));
+  csg::Camera camera;
+  camera.projection = csg::Projection::kOrthographic;
+  camera.target = glm::dvec3(2.5, 5, 5);
+  camera.distance = 60;
+  const auto view = csg::make_view(camera, {64, 64}, box);
+  ASSERT_TRUE(view);
+  const auto rays = csg::RayMeter(tree, root, 5e-6).measure(*view);
+  ASSERT_TRUE(rays);
+  EXPECT_NEAR(rays->thickness[32 * 64 + 32], 10, 1e-2);
+}
+
 class Files : public testing::Test {
  protected:
   void SetUp() override {
@@ -224,6 +245,10 @@ TEST(QuotedNames, AreWhatASceneMayRead) {
       apps::quoted_names("use <lib.scad>\nimport(file = \"part.stl\"); echo(\"hello\"); a < b; "
                          "text(\"x.y\nz\")"),
       (std::vector<std::string>{"lib.scad", "part.stl"}));
+  EXPECT_EQ(apps::quoted_names("include < my lib.scad>\nif (a<b.c>d) use<x.y>;"),
+            (std::vector<std::string>{" my lib.scad", "x.y"}));
+  EXPECT_EQ(apps::quoted_names("// 5\" tube\ntext(\"5\\\" x\"); surface(\"a\\\\b.png\");"),
+            (std::vector<std::string>{"a\\b.png"}));
   EXPECT_TRUE(apps::quoted_names("\"").empty());
   EXPECT_TRUE(apps::quoted_names("").empty());
 }
