@@ -1,51 +1,22 @@
-// What `strata voxelize` makes.
+// What `strata voxelize` makes of meshes.
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <glm/gtc/matrix_transform.hpp>
-#include <nlohmann/json.hpp>
 
 #include "mesh/shapes.h"
 #include "mesh/soup_tools.h"
-#include "mesh/write_mesh.h"
-#include "tests/apps/run_tool.h"
+#include "tests/apps/voxelize_fixture.h"
 
 namespace strata {
 namespace {
 
 using nlohmann::json;
 using testkit::RunResult;
-using testkit::Workplace;
 
-class Voxelize : public testing::Test {
- protected:
-  void put(const std::string& name, const TriangleSoup& mesh) const {
-    const auto written = write_mesh(place.path(name), mesh);
-    ASSERT_TRUE(written.has_value()) << written.error().message;
-  }
-
-  /// The report of a run that is expected to succeed.
-  json report(std::vector<std::string> arguments) const {
-    arguments.insert(arguments.begin(), "voxelize");
-    arguments.push_back("--json");
-    const RunResult run = place.run(arguments);
-    EXPECT_EQ(run.exit_code, 0) << run.err;
-    last_error = run.err;
-    return json::parse(run.out, nullptr, false);
-  }
-
-  static std::vector<std::string> codes(const json& report) {
-    std::vector<std::string> result;
-    for (const json& warning : report["warnings"]) result.push_back(warning["code"]);
-    return result;
-  }
-
-  Workplace place;
-  mutable std::string last_error;
-};
+class Voxelize : public testkit::VoxelizeFixture {};
 
 TEST_F(Voxelize, ABoxThatFillsTheGridHasEveryVoxel) {
   put("box.obj", make_box({-1, 2, 3}, {3, 4, 4}));
@@ -237,7 +208,6 @@ TEST_F(Voxelize, AProgressBarTakesItselfAway) {
   EXPECT_EQ(place.run({"voxelize", "ball.obj", "-r", "64", "-o", "b.vdb"}).err, "");
 }
 
-// Reading, drawing and all the rest are shares of one bar.
 TEST_F(Voxelize, TheProgressBarNeverGoesBack) {
   put("a.obj", make_icosphere(1.0, 6));
   put("b.obj", make_icosphere(0.9, 6));
@@ -298,169 +268,6 @@ TEST_F(Voxelize, StrictTurnsAWarningIntoExitCode5WithoutAFile) {
   EXPECT_EQ(run.exit_code, 5);
   EXPECT_NE(run.err.find("--strict"), std::string::npos) << run.err;
   EXPECT_EQ(place.names(), std::vector<std::string>{"plate.obj"});
-}
-
-TEST_F(Voxelize, AVoxFileKeepsTheColoursOfAScene) {
-  place.write("two.csg",
-              "color([1, 0, 0, 1]) { cube(size = [2, 2, 2], center = false); }\n"
-              "color([0, 0, 1, 1]) { multmatrix([[1, 0, 0, 1], [0, 1, 0, 0], [0, 0, 1, 0], "
-              "[0, 0, 0, 1]]) { cube(size = [3, 2, 2], center = false); } }\n");
-  const json found = report({"two.csg", "-r", "8", "-o", "two.vox"});
-  EXPECT_EQ(found["voxels"]["solid"], 8 * 4 * 4);
-  const std::string bytes = place.read("two.vox");
-  const std::size_t palette = bytes.find("RGBA"), voxels = bytes.find("XYZI");
-  ASSERT_NE(palette, std::string::npos);
-  ASSERT_NE(voxels, std::string::npos);
-  EXPECT_EQ(bytes.substr(palette + 12, 8), std::string("\xff\0\0\xff\0\0\xff\xff", 8));
-  std::size_t red = 0;  // the first of the tree where both are
-  for (std::size_t i = 0; i < 128; ++i) {
-    const std::string voxel = bytes.substr(voxels + 16 + 4 * i, 4);
-    EXPECT_EQ(voxel[3], voxel[0] < 4 ? 1 : 2);
-    red += voxel[3] == 1 ? 1 : 0;
-  }
-  EXPECT_EQ(red, 64u);
-}
-
-TEST_F(Voxelize, AReportOfScenesAndMeshesSaysWhatEachFileHolds) {
-  place.write("cube.csg", "cube(size = [2, 2, 2], center = false);\n");
-  put("box.stl", make_box({1, 0, 0}, {3, 2, 2}));
-  TriangleSoup open = make_box({0, 0, 0}, {1, 1, 1});
-  open.triangles.pop_back();
-  put("open.obj", open);
-  const auto files = [&](const std::vector<std::string>& names) {
-    std::vector<std::string> words = names;
-    words.insert(words.end(), {"-r", "12"});
-    return report(words)["input"];
-  };
-  for (const std::vector<std::string>& names :
-       {std::vector<std::string>{"cube.csg", "box.stl"}, {"box.stl", "cube.csg"}}) {
-    const json input = files(names);
-    EXPECT_EQ(input["closed"], true);
-    for (std::size_t i = 0; i < 2; ++i) {
-      EXPECT_EQ(input["files"][i]["path"], names[i]);
-      EXPECT_EQ(input["files"][i]["triangles"], 12) << names[i];
-      EXPECT_EQ(input["files"][i]["vertices"], 8) << names[i];
-    }
-  }
-  const json input = files({"cube.csg", "open.obj"});
-  EXPECT_EQ(input["closed"], false);
-  EXPECT_EQ(input["files"][0]["closed"], true);
-  EXPECT_EQ(input["files"][1]["closed"], false);
-  EXPECT_EQ(input["files"][1]["triangles"], 11);
-  EXPECT_EQ(input["files"][1]["unbalanced_edges"], 3);
-}
-
-TEST_F(Voxelize, TheSurfaceOfASceneIsThatOfItsResult) {
-  place.write("hole.csg",
-              "difference() { cube(size = [8, 8, 8], center = true); "
-              "cylinder($fn = 32, h = 20, r1 = 2, r2 = 2, center = true); }\n");
-  place.write("box.csg", "cube(size = [8, 8, 8], center = true);\n");
-  put("box.obj", make_box({-4, -4, -4}, {4, 4, 4}));
-  const auto checksum = [&](const std::string& file, const char* kind) {
-    return report({file, "-r", "40", "--padding", "2", "--checksum", kind})["voxels"]["checksum"];
-  };
-  EXPECT_EQ(checksum("box.csg", "--surface"), checksum("box.obj", "--surface"));
-  EXPECT_EQ(checksum("box.csg", "--surface=6"), checksum("box.obj", "--surface=6"));
-  const auto count = [&](std::vector<std::string> kind) {
-    kind.insert(kind.begin(), {"hole.csg", "-r", "40"});
-    return report(kind)["voxels"]["solid"].get<std::uint64_t>();
-  };
-  const auto surface = count({"--surface"}), both = count({"--surface", "--solid"});
-  EXPECT_GT(surface, 5 * 40 * 40u);
-  EXPECT_LT(surface, both);
-  EXPECT_LT(both, count({"--solid"}) + surface);
-  // Colours are of solids.
-  EXPECT_EQ(place.run({"voxelize", "hole.csg", "-r", "20", "--surface", "-o", "a.vox"}).exit_code,
-            0);
-}
-
-/// The values of a .npy file with its type.
-std::pair<std::string, std::vector<std::uint32_t>> npy_values(const std::string& bytes) {
-  const std::size_t begin = 10 + static_cast<unsigned char>(bytes[8]) +
-                            std::size_t{256} * static_cast<unsigned char>(bytes[9]);
-  const std::size_t at = bytes.find("'descr': '");
-  const std::string type = bytes.substr(at + 10, 3);
-  const auto width = static_cast<std::size_t>(type[2] - '0');
-  std::vector<std::uint32_t> values((bytes.size() - begin) / width);
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    std::memcpy(&values[i], bytes.data() + begin + i * width, width);
-  }
-  return {type, values};
-}
-
-TEST_F(Voxelize, IdsSayWhichFileAVoxelIsOf) {
-  put("a.obj", make_box({0, 0, 0}, {2, 2, 2}));
-  put("b.stl", make_box({1, 0, 0}, {4, 2, 2}));
-  const json found = report({"a.obj", "b.stl", "-r", "8", "--ids", "-o", "a.npy"});
-  const auto [type, values] = npy_values(place.read("a.npy"));
-  EXPECT_EQ(type, "|u1");
-  ASSERT_EQ(values.size(), 8u * 4 * 4);
-  for (std::size_t i = 0; i < values.size(); ++i) EXPECT_EQ(values[i], i % 8 < 4 ? 1u : 2u);
-  EXPECT_EQ(found["voxels"]["solid"], 8 * 4 * 4);
-  EXPECT_EQ(found["voxels"]["intervals"], 4 * 4);
-  EXPECT_EQ(found["input"]["files"][1]["triangles"], 12);
-  EXPECT_EQ(found["ids"], (json{{{"id", 1}, {"solid", 0}, {"name", "a.obj"}, {"voxels", 64}},
-                                {{"id", 2}, {"solid", 1}, {"name", "b.stl"}, {"voxels", 64}}}));
-  const json plain = report({"a.obj", "b.stl", "-r", "8"});
-  EXPECT_EQ(found["voxels"]["area_estimate"], plain["voxels"]["area_estimate"]);
-  EXPECT_FALSE(plain.contains("ids"));
-  // The other way around the other one wins.
-  ASSERT_EQ(place.run({"voxelize", "b.stl", "a.obj", "-r", "8", "--ids", "-o", "b.npy"}).exit_code,
-            0);
-  const auto swapped = npy_values(place.read("b.npy")).second;
-  for (std::size_t i = 0; i < swapped.size(); ++i) EXPECT_EQ(swapped[i], i % 8 < 2 ? 2u : 1u);
-}
-
-TEST_F(Voxelize, IdsOf300Solids) {
-  std::string scene = "difference() { union() {\n";
-  for (int i = 0; i < 300; ++i) {
-    scene += "multmatrix([[1, 0, 0, " + std::to_string(i % 20) + "], [0, 1, 0, " +
-             std::to_string(i / 20) +
-             "], [0, 0, 1, 0], [0, 0, 0, 1]]) { cube(size = [2, 2, 1], center = false); }\n";
-  }
-  scene += "} cube(size = [1, 1, 4], center = true); }\n";
-  place.write("many.csg", scene);
-  const json found = report({"many.csg", "--voxel-size", "0.25", "--ids", "-o", "a.npy"});
-  ASSERT_EQ(found["grid"]["dims"], (json{84, 64, 4}));
-  const auto [type, values] = npy_values(place.read("a.npy"));
-  EXPECT_EQ(type, "<u2");
-  ASSERT_EQ(values.size(), 84u * 64 * 4);
-  std::vector<std::uint64_t> counts(302, 0);
-  for (std::size_t n = 0; n < values.size(); ++n) {
-    const double x = 0.25 * (static_cast<double>(n % 84) + 0.5);
-    const double y = 0.25 * (static_cast<double>(n / 84 % 64) + 0.5);
-    std::uint32_t expected = 0;
-    for (int i = 299; i >= 0; --i) {
-      const double u = x - i % 20, v = y - i / 20;
-      if (0 < u && u < 2 && 0 < v && v < 2) expected = static_cast<std::uint32_t>(i) + 1;
-    }
-    if (x < 0.5 && y < 0.5) expected = 0;
-    ASSERT_EQ(values[n], expected) << x << " " << y;
-    ++counts[values[n]];
-  }
-  for (const json& id : found["ids"]) {
-    EXPECT_EQ(id["voxels"], counts[id["id"]]);
-    EXPECT_EQ(id["solid"].get<int>() + 1, id["id"].get<int>());
-    EXPECT_TRUE(id["name"].get<std::string>().starts_with("cube at many.csg:"));
-  }
-  EXPECT_EQ(found["ids"].size(),
-            static_cast<std::size_t>(std::count_if(counts.begin() + 1, counts.end(),
-                                                   [](std::uint64_t count) { return count > 0; })));
-}
-
-TEST_F(Voxelize, IdsThatCannotBeAreRefusedAtOnce) {
-  put("box.obj", make_box({0, 0, 0}, {1, 1, 1}));
-  const auto refused = [&](std::vector<std::string> more) {
-    std::vector<std::string> arguments = {"voxelize", "box.obj", "-r", "8", "--ids"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    const RunResult run = place.run(arguments);
-    EXPECT_EQ(run.exit_code, 2) << run.err;
-    return run.err;
-  };
-  EXPECT_NE(refused({"-o", "a.binvox"}).find("npy, nrrd, vti"), std::string::npos);
-  EXPECT_NE(refused({"-o", "a.npy", "--surface"}).find("--surface"), std::string::npos);
-  EXPECT_NE(refused({"-o", "a.vdb", "--fog"}).find("--fog"), std::string::npos);
-  EXPECT_EQ(place.names(), std::vector<std::string>{"box.obj"});
 }
 
 TEST_F(Voxelize, AGridThatMissesTheMeshIsReported) {
