@@ -4,6 +4,7 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 
+#include "apps/choice_words.h"
 #include "apps/commands.h"
 #include "apps/csg_options.h"
 #include "apps/option_values.h"
@@ -87,33 +88,6 @@ constexpr const char* kCsgExamples =
 
 In --expr, + and | unite, - takes away, * and & intersect and bind first, ^ is in one of the two.
 )";
-
-constexpr std::pair<std::string_view, InsideRule> kRules[] = {{"winding", InsideRule::kWinding},
-                                                              {"nonzero", InsideRule::kNonzero},
-                                                              {"parity", InsideRule::kParity}};
-constexpr std::pair<std::string_view, OpenMode> kOpenModes[] = {
-    {"vote", OpenMode::kVote}, {"surface", OpenMode::kSurface}, {"fail", OpenMode::kFail}};
-constexpr std::pair<std::string_view, SurfaceKind> kSurfaceKinds[] = {
-    {"conservative", SurfaceKind::kConservative}, {"26", SurfaceKind::k26}, {"6", SurfaceKind::k6}};
-constexpr std::pair<std::string_view, StoreKind> kStores[] = {
-    {"ha", StoreKind::kHaBuffer}, {"scan", StoreKind::kCountScan}, {"auto", StoreKind::kAuto}};
-constexpr std::pair<std::string_view, OffsetKind> kOffsets[] = {
-    {"plane-first", OffsetKind::kPlaneFirst},
-    {"random", OffsetKind::kRandom},
-    {"farthest", OffsetKind::kFarthestPoint}};
-constexpr std::pair<std::string_view, Backend> kBackends[] = {
-    {"auto", Backend::kAuto}, {"cpu", Backend::kCpu}, {"gl", Backend::kGl}};
-constexpr std::pair<std::string_view, ProgressMode> kProgressModes[] = {
-    {"auto", ProgressMode::kAuto}, {"bar", ProgressMode::kBar}, {"none", ProgressMode::kNone}};
-constexpr std::pair<std::string_view, MeshReader> kReaders[] = {
-    {"own", MeshReader::kOwn}, {"openmesh", MeshReader::kOpenMesh}};
-constexpr std::pair<std::string_view, MeshFormat> kMeshFormats[] = {{"auto", MeshFormat::kAuto},
-                                                                    {"obj", MeshFormat::kObj},
-                                                                    {"stl", MeshFormat::kStl},
-                                                                    {"ply", MeshFormat::kPly},
-                                                                    {"off", MeshFormat::kOff}};
-constexpr std::pair<std::string_view, std::optional<Axis>> kAxes[] = {
-    {"x", Axis::kX}, {"y", Axis::kY}, {"z", Axis::kZ}, {"auto", std::nullopt}};
 
 /// The words of the command line before they are read as numbers and choices. Empty: not given.
 struct Words {
@@ -365,15 +339,15 @@ CommonOptions common_options(const Words& words, Reader& reader) {
   if (!words.memory_limit.empty()) {
     reader.take(parse_bytes("--memory-limit", words.memory_limit), common.memory_limit);
   }
-  reader.take(parse_choice("--progress", words.progress, kProgressModes), common.progress);
+  reader.take(parse_choice("--progress", words.progress, kProgressWords), common.progress);
   return common;
 }
 
 InputOptions input_options(const Words& words, Reader& reader) {
   InputOptions input;
   input.files = words.files;
-  reader.take(parse_choice("--reader", words.reader, kReaders), input.reader);
-  reader.take(parse_choice("--input-format", words.input_format, kMeshFormats), input.format);
+  reader.take(parse_choice("--reader", words.reader, kReaderWords), input.reader);
+  reader.take(parse_choice("--input-format", words.input_format, kMeshFormatWords), input.format);
   return input;
 }
 
@@ -446,14 +420,14 @@ VoxelizeCommand voxelize_command(const Words& words, Reader& reader) {
   command.surface = !words.surface.empty();
   command.solid = words.solid || !command.surface;
   if (command.surface) {
-    reader.take(parse_choice("--surface", words.surface, kSurfaceKinds), command.surface_kind);
+    reader.take(parse_choice("--surface", words.surface, kSurfaceKindWords), command.surface_kind);
   }
-  reader.take(parse_choice("--rule", words.rule, kRules), command.rule);
-  reader.take(parse_choice("--open", words.open, kOpenModes), command.open);
-  reader.take(parse_choice("--axis", words.axis, kAxes), command.axis);
-  reader.take(parse_choice("--store", words.store, kStores), command.store);
-  reader.take(parse_choice("--offsets", words.offsets, kOffsets), command.offsets);
-  reader.take(parse_choice("--backend", words.backend, kBackends), command.backend);
+  reader.take(parse_choice("--rule", words.rule, kRuleWords), command.rule);
+  reader.take(parse_choice("--open", words.open, kOpenModeWords), command.open);
+  reader.take(parse_choice("--axis", words.axis, kAxisWords), command.axis);
+  reader.take(parse_choice("--store", words.store, kStoreWords), command.store);
+  reader.take(parse_choice("--offsets", words.offsets, kOffsetWords), command.offsets);
+  reader.take(parse_choice("--backend", words.backend, kBackendWords), command.backend);
   command.keep_orientation = words.keep_orientation;
   command.stats = words.stats;
   command.checksum = words.checksum;
@@ -493,11 +467,11 @@ LdiCommand ldi_command(const Words& words, Reader& reader) {
   command.samples = words.samples;
   command.keep_orientation = words.keep_orientation;
   std::optional<Axis> axis;
-  reader.take(parse_choice("--axis", words.axis, kAxes), axis);
+  reader.take(parse_choice("--axis", words.axis, kAxisWords), axis);
   command.axis = axis.value_or(Axis::kZ);
-  reader.take(parse_choice("--store", words.store, kStores), command.store);
-  reader.take(parse_choice("--offsets", words.offsets, kOffsets), command.offsets);
-  reader.take(parse_choice("--backend", words.backend, kBackends), command.backend);
+  reader.take(parse_choice("--store", words.store, kStoreWords), command.store);
+  reader.take(parse_choice("--offsets", words.offsets, kOffsetWords), command.offsets);
+  reader.take(parse_choice("--backend", words.backend, kBackendWords), command.backend);
   if (command.input.files.empty()) reader.fail_with("no mesh file is given");
   if (command.output.empty())
     reader.fail_with("no output is given: -o FILE.exr, FILE.npz or FILE.png");
@@ -511,8 +485,8 @@ CsgCommand csg_command(Words words, Reader& reader) {
   command.scene_format = words.input_format == "csg";
   if (command.scene_format) words.input_format = "auto";
   command.input = input_options(words, reader);
-  reader.take(parse_choice("--rule", words.rule, kRules), command.rule);
-  reader.take(parse_choice("--backend", words.backend, kBackends), command.backend);
+  reader.take(parse_choice("--rule", words.rule, kRuleWords), command.rule);
+  reader.take(parse_choice("--backend", words.backend, kBackendWords), command.backend);
   command.keep_orientation = words.keep_orientation;
   command.output = words.output;
   if (!words.json.empty()) command.json = words.json;

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "apps/boundary_area.h"
+#include "apps/choice_words.h"
 #include "apps/commands.h"
 #include "apps/gpu.h"
 #include "apps/memory_estimate.h"
@@ -82,8 +83,9 @@ void check_thin(const VoxelizeCommand& command, const MeshInput& input, const Vo
   for (int axis = 0; axis < 3; ++axis) {
     const double extent = (input.bounds.high[axis] - input.bounds.low[axis]) / s[axis];
     if (extent >= 1.0) continue;
-    return session.warn("thin", fmt::format("{}: the mesh is {:.3g} voxels thick along {}{}", holds,
-                                            extent, name_of(static_cast<Axis>(axis)), remedy));
+    return session.warn("thin",
+                        fmt::format("{}: the mesh is {:.3g} voxels thick along {}{}", holds, extent,
+                                    word_of(kAxisWords, static_cast<Axis>(axis)), remedy));
   }
   if (!input.closed) {
     if (solid_voxels == 0) session.warn("empty", fmt::format("no voxel is solid{}", remedy));

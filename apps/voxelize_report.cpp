@@ -1,9 +1,9 @@
 #include "apps/voxelize_report.h"
 
 #include <algorithm>
-#include <array>
 #include <numeric>
 
+#include "apps/choice_words.h"
 #include "apps/json_writer.h"
 #include "core/memory.h"
 
@@ -152,7 +152,7 @@ std::string voxelize_text(const VoxelizeCommand& command, const VoxelizeOutcome&
   line("grid",
        fmt::format("{} x {} x {} voxels of {}, origin {}, rays along {}", grid.dims.x, grid.dims.y,
                    grid.dims.z, s.x == s.y && s.y == s.z ? fmt::format("{:.6g}", s.x) : triple(s),
-                   triple(grid.origin), name_of(outcome.axis)));
+                   triple(grid.origin), word_of(kAxisWords, outcome.axis)));
   if (outcome.measured) {
     const VoxelizeReport& report = outcome.report;
     const double cells =
@@ -215,15 +215,15 @@ std::string voxelize_json(const VoxelizeCommand& command, const VoxelizeOutcome&
   json.member("solid", command.solid);
   json.key("surface");
   if (command.surface) {
-    json.value(name_of(command.surface_kind));
+    json.value(word_of(kSurfaceKindWords, command.surface_kind));
   } else {
     json.null();
   }
-  json.member("rule", name_of(command.rule));
-  json.member("open", name_of(command.open));
-  json.member("axis", name_of(outcome.axis));
-  json.member("store", name_of(command.store));
-  json.member("offsets", name_of(command.offsets));
+  json.member("rule", word_of(kRuleWords, command.rule));
+  json.member("open", word_of(kOpenModeWords, command.open));
+  json.member("axis", word_of(kAxisWords, outcome.axis));
+  json.member("store", word_of(kStoreWords, command.store));
+  json.member("offsets", word_of(kOffsetWords, command.offsets));
   json.member("threads", session.threads());
   json.end_object();
 
@@ -271,71 +271,6 @@ std::string voxelize_json(const VoxelizeCommand& command, const VoxelizeOutcome&
   json.end_array();
   json.end_object();
   return json.take();
-}
-
-const char* name_of(InsideRule rule) {
-  switch (rule) {
-    case InsideRule::kWinding:
-      return "winding";
-    case InsideRule::kNonzero:
-      return "nonzero";
-    case InsideRule::kParity:
-      break;
-  }
-  return "parity";
-}
-
-const char* name_of(OpenMode mode) {
-  switch (mode) {
-    case OpenMode::kVote:
-      return "vote";
-    case OpenMode::kSurface:
-      return "surface";
-    case OpenMode::kFail:
-      break;
-  }
-  return "fail";
-}
-
-const char* name_of(SurfaceKind kind) {
-  switch (kind) {
-    case SurfaceKind::kConservative:
-      return "conservative";
-    case SurfaceKind::k26:
-      return "26";
-    case SurfaceKind::k6:
-      break;
-  }
-  return "6";
-}
-
-const char* name_of(StoreKind store) {
-  switch (store) {
-    case StoreKind::kAuto:
-      return "auto";
-    case StoreKind::kHaBuffer:
-      return "ha";
-    case StoreKind::kCountScan:
-      break;
-  }
-  return "scan";
-}
-
-const char* name_of(OffsetKind offsets) {
-  switch (offsets) {
-    case OffsetKind::kPlaneFirst:
-      return "plane-first";
-    case OffsetKind::kRandom:
-      return "random";
-    case OffsetKind::kFarthestPoint:
-      break;
-  }
-  return "farthest";
-}
-
-const char* name_of(Axis axis) {
-  constexpr std::array kNames = {"x", "y", "z"};
-  return kNames[static_cast<std::size_t>(axis)];
 }
 
 }  // namespace strata::apps

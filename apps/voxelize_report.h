@@ -37,12 +37,4 @@ struct VoxelizeOutcome {
 [[nodiscard]] std::string voxelize_json(const VoxelizeCommand& command,
                                         const VoxelizeOutcome& outcome, const Session& session);
 
-/// Names of choices, as the command line has them.
-[[nodiscard]] const char* name_of(InsideRule rule);
-[[nodiscard]] const char* name_of(OpenMode mode);
-[[nodiscard]] const char* name_of(SurfaceKind kind);
-[[nodiscard]] const char* name_of(StoreKind store);
-[[nodiscard]] const char* name_of(OffsetKind offsets);
-[[nodiscard]] const char* name_of(Axis axis);
-
 }  // namespace strata::apps
