@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
 
 #include "csg/geometry.h"
 #include "csg/solid_labels.h"
@@ -328,6 +329,28 @@ TEST(Labels, OfColoursFollowTheirFirstAppearance) {
   EXPECT_EQ(found.labels[1], 2u);
   EXPECT_EQ(found.labels[3], 1u);
   EXPECT_TRUE(colour_labels(Tree(), Tree::kNone, none).colours.empty());
+}
+
+// In time that does not grow with their square: that would be a minute here.
+TEST(Labels, OfColoursMayBeMany) {
+  constexpr std::uint32_t kCount = 250'000;
+  Tree tree;
+  std::vector<Tree::NodeId> solids;
+  for (std::uint32_t i = 0; i < kCount; ++i) {
+    Solid solid;
+    const std::uint32_t n = i % (kCount - 1000);  // the last 1000 have the first ones' again
+    solid.colour = glm::vec4(float(n % 512) / 512, float(n / 512) / 512, 0, 1);
+    solids.push_back(tree.add_solid(std::move(solid)));
+  }
+  const auto root = tree.add(Operation::kUnion, solids);
+  const auto start = std::chrono::steady_clock::now();
+  const ColourLabels found = colour_labels(tree, root, glm::vec4(1));
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(10));
+  ASSERT_EQ(found.colours.size(), kCount - 1000);
+  for (std::uint32_t i = 0; i < kCount; ++i) {
+    ASSERT_EQ(found.labels[i], i % (kCount - 1000) + 1);
+  }
+  EXPECT_EQ(found.colours[513], glm::vec4(1.0f / 512, 1.0f / 512, 0, 1));
 }
 
 TEST(Measures, OfABoxMinusABoxAreTheClosedForm) {
