@@ -159,7 +159,9 @@ void label_solids(const VoxelizeCommand& command, VoxelizeOutcome& outcome,
   if (!outcome.input.tree) return;
   const csg::Tree& scene = *outcome.input.scene;
   if (command.ids) {
-    options.ids = static_cast<std::uint32_t>(scene.solids().size());
+    // Solids that are taken away have numbers, too, but no voxel has them.
+    const std::vector<std::uint32_t> added = csg::added_solids(scene, scene.root());
+    options.ids = added.empty() ? 1 : *std::max_element(added.begin(), added.end()) + 1;
     outcome.id_voxels.resize(scene.solids().size(), 0);
     return outcome.input.tree->set_labels(csg::id_labels(scene));
   }

@@ -167,6 +167,23 @@ TEST_F(VoxelizeTrees, IdsOf300Solids) {
                                                    [](std::uint64_t count) { return count > 0; })));
 }
 
+TEST_F(VoxelizeTrees, IdsAreAsLargeAsThoseThatVoxelsCanHave) {
+  std::string scene = "difference() { cube(size = [40, 40, 2], center = false);\n";
+  for (int i = 0; i < 300; ++i) {
+    scene += "multmatrix([[1, 0, 0, " + std::to_string(2 * (i % 20)) + "], [0, 1, 0, " +
+             std::to_string(2 * (i / 20)) +
+             "], [0, 0, 1, -1], [0, 0, 0, 1]]) { cube(size = [1, 1, 4], center = false); }\n";
+  }
+  place.write("holes.csg", scene + "}\n");
+  const json found = report({"holes.csg", "--voxel-size", "1", "--ids", "-o", "a.npy"});
+  EXPECT_EQ(npy_values(place.read("a.npy")).first, "|u1");
+  ASSERT_EQ(found["ids"].size(), 1u);
+  EXPECT_EQ(found["ids"][0]["id"], 1);
+  EXPECT_EQ(found["ids"][0]["voxels"], 2 * (40 * 40 - 300));
+  (void)report({"holes.csg", "--voxel-size", "1", "--ids", "-o", "a.vox"});
+  EXPECT_TRUE(place.has("a.vox"));
+}
+
 TEST_F(VoxelizeTrees, IdsThatCannotBeAreRefusedAtOnce) {
   put("box.obj", make_box({0, 0, 0}, {1, 1, 1}));
   const auto refused = [&](std::vector<std::string> more) {
