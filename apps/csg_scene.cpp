@@ -1,15 +1,18 @@
 #include "apps/csg_scene.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <memory>
 #include <optional>
 #include <set>
+#include <system_error>
 #include <utility>
 
 #include "apps/expression.h"
 #include "apps/mesh_input.h"
+#include "mesh/diagnose.h"
 #include "mesh/shapes.h"
 
 namespace strata::apps {
@@ -26,27 +29,44 @@ bool is_scene(const std::string& path, const CsgCommand& command) {
   return command.input.format == MeshFormat::kAuto && is_scene_name(path);
 }
 
-/// What the solids of a scene's result hold.
-InputFacts facts_of(const std::string& path, const csg::Scene& scene) {
+/// What a scene's file is, and what the solids of its result hold.
+InputFacts facts_of(const std::string& path, const csg::Scene& scene, const CsgCommand& command,
+                    const Execution& execution) {
   InputFacts facts;
   facts.path = path;
+  facts.is_scene = true;
   facts.closed = true;
+  const bool program = path.ends_with(".scad") || path.ends_with(".SCAD");
+  facts.stats.format = program && !command.scene_format ? "scad" : "csg";
+  std::error_code unknown;
+  const auto bytes = std::filesystem::file_size(path, unknown);
+  if (!unknown) facts.stats.bytes = bytes;
   const Tree& tree = scene.tree;
   if (tree.root() == Tree::kNone) return facts;
   facts.bounds = csg::bounds(tree, tree.root());
   std::vector<Tree::NodeId> stack{tree.root()};
+  std::set<const TriangleSoup*> diagnosed;
   while (!stack.empty()) {
     const Tree::NodeId id = stack.back();
     stack.pop_back();
     if (tree.nodes()[id].operation != Operation::kSolid) {
       const auto operands = tree.operands(id);
-      stack.insert(stack.end(), operands.begin(), operands.end());
+      stack.insert(stack.end(), operands.rbegin(), operands.rend());
       continue;
     }
-    const auto& mesh = tree.solids()[tree.nodes()[id].first].mesh;
-    if (!mesh) continue;
-    facts.stats.triangles += mesh->triangles.size();
-    facts.stats.vertices += mesh->positions.size();
+    const csg::Solid& solid = tree.solids()[tree.nodes()[id].first];
+    if (!solid.mesh) continue;
+    facts.stats.triangles += solid.mesh->triangles.size();
+    facts.stats.vertices += solid.mesh->positions.size();
+    // Scenes take meshes by parity where their edges are not balanced, and only there.
+    if (solid.rule != InsideRule::kParity || !diagnosed.insert(solid.mesh.get()).second) continue;
+    const MeshDiagnosis found = diagnose(*solid.mesh, execution);
+    facts.unbalanced_edges += found.unbalanced_edges;
+    if (found.even) continue;
+    facts.closed = false;
+    if (!facts.open.empty()) continue;
+    facts.open = fmt::format("{} is not closed: {} of {} edges are unbalanced", solid.name,
+                             found.unbalanced_edges, found.edges);
   }
   return facts;
 }
@@ -55,9 +75,10 @@ Result<csg::Scene> load_one(const std::string& path, const CsgCommand& command, 
                             std::vector<InputFacts>* told) {
   if (is_scene(path, command)) {
     const double share = 0.5 / static_cast<double>(command.input.files.size());
-    const Execution execution = session.execution("reading", share);
+    Execution execution = session.execution("reading", share);
     auto scene = csg::read_scene(path, command.scene, execution);
-    if (scene && told != nullptr) told->push_back(facts_of(path, *scene));
+    execution.progress = {};
+    if (scene && told != nullptr) told->push_back(facts_of(path, *scene, command, execution));
     return scene;
   }
   if (command.input.format == MeshFormat::kAuto && path == "-") {

@@ -17,7 +17,7 @@ namespace strata::apps {
 /// The inputs of `strata csg` as one scene: a single scene as it is, else all inputs united or what
 /// --expr makes of them. Warnings go to the session. @return as read_scene() and load_mesh();
 /// kUsage for the expression; kLimit when it becomes too large
-/// @param facts gets what each file holds; a scene counts as closed
+/// @param facts gets what each file holds; a scene is closed when all solids of its result are
 Result<csg::Scene> load_scene(const CsgCommand& command, Session& session,
                               std::vector<InputFacts>* facts = nullptr);
 

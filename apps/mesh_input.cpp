@@ -48,12 +48,12 @@ void check_closed(const TriangleSoup& soup, InsideRule rule, InputFacts& facts, 
   execution.progress = {};
   facts.closed = is_closed(soup, execution);
   if (facts.closed) return;
-  facts.diagnosis = diagnose(soup, execution);
-  if (rule == InsideRule::kParity && facts.diagnosis->even) {
+  const MeshDiagnosis found = diagnose(soup, execution);
+  facts.unbalanced_edges = found.unbalanced_edges;
+  if (rule == InsideRule::kParity && found.even) {
     facts.closed = true;  // wrongly oriented, perhaps, but parity does not look at that
     return;
   }
-  const MeshDiagnosis& found = *facts.diagnosis;
   std::string text = fmt::format("{}: the mesh is not closed: {} of {} edges are unbalanced",
                                  facts.path, found.unbalanced_edges, found.edges);
   if (found.boundary_edges > 0) text += fmt::format(", {} border a hole", found.boundary_edges);
@@ -62,7 +62,8 @@ void check_closed(const TriangleSoup& soup, InsideRule rule, InputFacts& facts, 
   }
   if (!found.examples.empty()) text += fmt::format("; {}", describe(found.examples.front()));
   if (found.even) text += "; --rule parity takes it as closed";
-  session.warn("open", std::move(text));
+  session.warn("open", text);
+  facts.open = std::move(text);
 }
 
 void check_orientation(TriangleSoup& soup, const MeshInputRules& rules, InputFacts& facts,
@@ -188,6 +189,10 @@ void MeshInput::add(InputFacts facts) {
   volume += facts.volume;
   bounds.include(facts.bounds);
   files.push_back(std::move(facts));
+}
+
+bool MeshInput::has_scene() const {
+  return std::any_of(files.begin(), files.end(), [](const auto& file) { return file.is_scene; });
 }
 
 Result<MeshInput> load_meshes(const InputOptions& input, const MeshInputRules& rules,

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,14 +24,18 @@ struct InputFacts {
   double volume = 0.0;  ///< signed, after turning; of an open mesh about the middle of its bounds
   Bounds bounds;
   std::uint64_t zero_area_faces = 0;
-  std::optional<MeshDiagnosis> diagnosis;  ///< of open meshes
+  std::uint64_t unbalanced_edges = 0;
+  std::string open;  ///< a sentence that says what is not closed; empty where all is
+  /// A scene: of `stats` there are format, bytes, vertices and triangles; area, volume and
+  /// zero_area_faces are not known.
+  bool is_scene = false;
 };
 
 /// All inputs as one soup.
 struct MeshInput {
   TriangleSoup soup;
-  /// Of trees: what makes the lists of the result of the lists of the soup, all solids'. Of scenes
-  /// area and volume are not known, and the bounds may be larger than the result.
+  /// Of trees: what makes the lists of the result of the lists of the soup, all solids'. Where
+  /// has_scene(), area and volume are not known, and the bounds may be larger than the result.
   std::shared_ptr<csg::SolidLists> tree;
   std::shared_ptr<const csg::Tree> scene;  ///< what `tree` was made of
   std::vector<InputFacts> files;
@@ -43,6 +46,7 @@ struct MeshInput {
 
   /// Counts one more mesh in, all but its triangles.
   void add(InputFacts facts);
+  [[nodiscard]] bool has_scene() const;
 };
 
 struct MeshInputRules {

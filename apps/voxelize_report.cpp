@@ -70,15 +70,17 @@ void write_input(JsonWriter& json, const MeshInput& input) {
     json.member("format", file.stats.format);
     json.member("bytes", file.stats.bytes);
     json.member("vertices", file.stats.vertices);
-    json.member("faces", file.stats.faces);
     json.member("triangles", file.stats.triangles);
-    json.member("dropped_faces", file.stats.dropped_faces());
-    json.member("zero_area_faces", file.zero_area_faces);
     json.member("closed", file.closed);
-    json.member("turned_around", file.turned_around);
-    json.member("unbalanced_edges", file.diagnosis ? file.diagnosis->unbalanced_edges : 0);
-    json.member("area", file.area);
-    json.member("volume", file.volume);
+    json.member("unbalanced_edges", file.unbalanced_edges);
+    if (!file.is_scene) {
+      json.member("faces", file.stats.faces);
+      json.member("dropped_faces", file.stats.dropped_faces());
+      json.member("zero_area_faces", file.zero_area_faces);
+      json.member("turned_around", file.turned_around);
+      json.member("area", file.area);
+      json.member("volume", file.volume);
+    }
     json.end_object();
   }
   json.end_array();

@@ -83,6 +83,42 @@ TEST_F(VoxelizeTrees, AReportOfScenesAndMeshesSaysWhatEachFileHolds) {
   EXPECT_EQ(input["files"][1]["unbalanced_edges"], 3);
 }
 
+TEST_F(VoxelizeTrees, AReportOfASceneLeavesOutWhatIsNotKnown) {
+  TriangleSoup open = make_box({0, 0, 0}, {1, 1, 1});
+  open.triangles.pop_back();
+  put("open.obj", open);
+  place.write("cube.csg", "cube(size = [2, 2, 2], center = false);\n");
+  // Twice the same mesh, which is diagnosed once.
+  place.write("imports.csg",
+              "import(file = \"open.obj\"); cube(size = [2, 2, 2], center = false);\n"
+              "multmatrix([[1, 0, 0, 3], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]) "
+              "{ import(file = \"open.obj\"); }\n");
+  // Wrongly oriented, but every edge is used twice: parity decides, and no ray is in doubt.
+  place.write("turned.csg",
+              "polyhedron(points = [[0, 0, 0], [4, 0, 0], [0, 4, 0], [0, 0, 4]], "
+              "faces = [[0, 1, 2], [0, 1, 3], [1, 2, 3], [2, 0, 3]], convexity = 1);\n");
+  place.write("open.csg",
+              "difference() { cube(size = [4, 4, 4], center = true); "
+              "import(file = \"open.obj\"); }\n");
+  const std::vector<std::pair<std::string, std::uint64_t>> files = {
+      {"cube.csg", 0}, {"imports.csg", 3}, {"open.csg", 3}};
+  for (const auto& [name, unbalanced] : files) {
+    const json input = report({name, "-r", "12"})["input"];
+    EXPECT_EQ(input["closed"], unbalanced == 0) << name;
+    const json file = input["files"][0];
+    EXPECT_EQ(file["format"], "csg");
+    EXPECT_EQ(file["bytes"], place.read(name).size());
+    EXPECT_EQ(file["closed"], unbalanced == 0) << name;
+    EXPECT_EQ(file["unbalanced_edges"], unbalanced) << name;
+    for (const char* unknown : {"faces", "dropped_faces", "area", "volume", "turned_around"}) {
+      EXPECT_FALSE(file.contains(unknown)) << unknown;
+    }
+  }
+  const json turned = report({"turned.csg", "-r", "12"})["input"]["files"][0];
+  EXPECT_EQ(turned["closed"], true);
+  EXPECT_GT(turned["unbalanced_edges"], 0);
+}
+
 TEST_F(VoxelizeTrees, TheSurfaceOfASceneIsThatOfItsResult) {
   place.write("hole.csg",
               "difference() { cube(size = [8, 8, 8], center = true); "
