@@ -52,6 +52,34 @@ Result<void> check_output(const VoxelizeCommand& command) {
   return {};
 }
 
+/// What --open says of meshes that are not closed: refuses, or says who decides where no vote can.
+Result<void> check_open(const VoxelizeCommand& command, const MeshInput& input, Session& session) {
+  if (input.closed || !command.solid) return {};
+  const InputFacts& file =
+      *std::find_if(input.files.begin(), input.files.end(),
+                    [](const InputFacts& facts) { return !facts.open.empty(); });
+  if (command.open == OpenMode::kFail) {
+    return fail(ErrorCode::kGeometry, "{} (--open fail)", file.open);
+  }
+  if (command.ids && command.open == OpenMode::kSurface) {
+    return fail(ErrorCode::kUsage, "--ids are of solids; under --open surface there is none: {}",
+                file.open);
+  }
+  if (command.ids && !input.has_scene()) {
+    return fail(ErrorCode::kUsage,
+                "--ids are of closed meshes: for open ones the three axes vote on each voxel, and "
+                "no vote says of which solid it is; close {}, or do without --ids",
+                file.path);
+  }
+  if (input.has_scene() && command.open == OpenMode::kVote) {
+    session.warn("open",
+                 fmt::format("{}: with scenes the three axes do not vote: each ray by itself pairs "
+                             "the faces of an open mesh, and one without a partner is a sheet",
+                             file.path));
+  }
+  return {};
+}
+
 /// The axis the format is written from, or the one with the fewest columns.
 Axis choose_axis(const VoxelizeCommand& command, const VoxelFormat* format, const VoxelGrid& grid) {
   if (command.axis) return *command.axis;
@@ -153,6 +181,12 @@ Result<void> print_reports(const VoxelizeCommand& command, const VoxelizeOutcome
   return print_report(voxelize_json(command, outcome, session), *command.json, file_on_stdout);
 }
 
+/// Whether no voxel is asked for its inside: without --solid, or of an open mesh under --open
+/// surface.
+bool is_surface_alone(const VoxelizeCommand& command, const MeshInput& input) {
+  return !command.solid || (!input.closed && command.open == OpenMode::kSurface);
+}
+
 /// Has the solids of a scene labelled, by number or by colour, when the format is to hold that.
 void label_solids(const VoxelizeCommand& command, VoxelizeOutcome& outcome,
                   VoxelWriterOptions& options, Session& session) {
@@ -165,7 +199,8 @@ void label_solids(const VoxelizeCommand& command, VoxelizeOutcome& outcome,
     outcome.id_voxels.resize(scene.solids().size(), 0);
     return outcome.input.tree->set_labels(csg::id_labels(scene));
   }
-  if (command.output.empty() || command.surface) return;
+  const bool surface = command.surface || is_surface_alone(command, outcome.input);
+  if (command.output.empty() || surface) return;
   const std::size_t most = voxel_format_for(command.output, command.format)->colours;
   if (most == 0) return;
   const glm::vec4 none(glm::vec3(csg::colour_schemes().front().face) / 255.0f, 1.0f);
@@ -216,6 +251,7 @@ Result<void> voxelize_and_write(const VoxelizeCommand& command, VoxelizeOutcome&
   options.offsets = command.offsets;
   if (outcome.input.tree) {
     options.filter = &outcome.input.tree->filter();
+    if (is_surface_alone(command, outcome.input)) options.solid = false, options.surface = true;
     options.closed = true;                // it makes closed lists of open ones
     options.rule = InsideRule::kWinding;  // the solids' rules are the filter's
   }
@@ -290,10 +326,8 @@ Result<void> run_voxelize(const VoxelizeCommand& command, Session& session) {
   auto input = load_solids(command.input, rules, session);
   if (!input) return tl::unexpected(input.error());
   outcome.input = *std::move(input);
+  if (auto valid = check_open(command, outcome.input, session); !valid) return valid;
   if (auto strict = session.check_strict(); !strict) return strict;
-  if (!outcome.input.closed && command.solid && command.open == OpenMode::kFail) {
-    return fail(ErrorCode::kGeometry, "{} (--open fail)", session.warnings().back().message);
-  }
 
   auto grid = fit_grid(outcome.input.bounds, command.grid);
   if (!grid) {

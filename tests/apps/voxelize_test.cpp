@@ -112,6 +112,21 @@ TEST_F(Voxelize, AnOpenMeshIsReportedWithNumbersAndVotedOn) {
   EXPECT_LT(surface["voxels"]["solid"].get<double>(), 0.2 * solid);
 }
 
+TEST_F(Voxelize, OpenFailNamesTheOpenMeshWhateverElseIsSaid) {
+  TriangleSoup open = make_icosphere(1.0, 3);
+  open.triangles.resize(open.triangles.size() - 10);
+  reverse_orientation(open);
+  put("open.obj", open);
+  TriangleSoup turned = make_box({0, 0, 0}, {1, 1, 1});
+  reverse_orientation(turned);
+  put("turned.obj", turned);
+  const RunResult run = place.run(
+      {"voxelize", "open.obj", "turned.obj", "-r", "32", "--stats", "--open", "fail", "-q"});
+  EXPECT_EQ(run.exit_code, 5);
+  EXPECT_TRUE(run.err.starts_with("strata: error: open.obj: the mesh is not closed: ")) << run.err;
+  EXPECT_NE(run.err.find("(--open fail)"), std::string::npos) << run.err;
+}
+
 TEST_F(Voxelize, APlateThinnerThanAVoxelIsReportedAndItsSurfaceHeld) {
   put("plate.obj", make_box({0, 0, 0}, {128, 128, 0.1}));
   const json solid = report({"plate.obj", "-r", "128"});

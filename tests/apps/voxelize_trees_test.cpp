@@ -31,6 +31,88 @@ std::pair<std::string, std::vector<std::uint32_t>> npy_values(const std::string&
   return {type, values};
 }
 
+// Ids say of which solid a voxel is; they do not say which voxels are solid.
+
+TEST_F(VoxelizeTrees, IdsOfOpenMeshesAreRefused) {
+  TriangleSoup open = make_icosphere(1.0, 4);
+  open.triangles.resize(open.triangles.size() - 20);
+  put("open.obj", open);
+  put("ball.obj", make_icosphere(1.0, 4));
+  const auto run = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), {"voxelize", "-r", "32", "--checksum", "--ids"});
+    return place.run(more);
+  };
+  for (const std::vector<std::string>& files :
+       std::vector<std::vector<std::string>>{{"open.obj"}, {"ball.obj", "open.obj"}}) {
+    const RunResult refused = run(files);
+    EXPECT_EQ(refused.exit_code, 2) << refused.err;
+    EXPECT_EQ(refused.out, "");
+    EXPECT_NE(refused.err.find("vote"), std::string::npos) << refused.err;
+    EXPECT_NE(refused.err.find("close open.obj, or do without --ids"), std::string::npos)
+        << refused.err;
+  }
+  EXPECT_EQ(run({"open.obj", "--open", "fail"}).exit_code, 5);
+  const RunResult surface = run({"open.obj", "--open", "surface"});
+  EXPECT_EQ(surface.exit_code, 2);
+  EXPECT_NE(surface.err.find("--open surface"), std::string::npos) << surface.err;
+  // What parity takes as closed has ids, and the same voxels as without.
+  TriangleSoup turned = make_icosphere(1.0, 4);
+  std::swap(turned.triangles[7].x, turned.triangles[7].y);
+  put("turned.obj", turned);
+  EXPECT_EQ(run({"turned.obj"}).exit_code, 2);
+  const RunResult parity = run({"turned.obj", "--rule", "parity"});
+  EXPECT_EQ(parity.exit_code, 0) << parity.err;
+  EXPECT_EQ(
+      parity.out,
+      place.run({"voxelize", "-r", "32", "--checksum", "turned.obj", "--rule", "parity"}).out);
+}
+
+TEST_F(VoxelizeTrees, OpenMeshesInScenesAreReportedWithTheRuleThatDecides) {
+  TriangleSoup open = make_icosphere(1.0, 4);
+  open.triangles.resize(open.triangles.size() - 20);
+  put("open.obj", open);
+  put("ball.obj", make_icosphere(1.0, 4));
+  place.write("import.csg", "import(file = \"open.obj\");\n");
+  place.write("cube.csg",
+              "multmatrix([[1, 0, 0, 3], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]) "
+              "{ cube(size = [1, 1, 1], center = true); }\n");
+  const json ball = report({"ball.obj", "-r", "40"});
+  for (const std::vector<std::string>& files :
+       std::vector<std::vector<std::string>>{{"import.csg"}, {"cube.csg", "open.obj"}}) {
+    const auto with = [&](std::vector<std::string> more) {
+      more.insert(more.begin(), files.begin(), files.end());
+      more.insert(more.end(), {"--voxel-size", "0.05"});
+      return more;
+    };
+    const auto run = [&](const std::vector<std::string>& more) {
+      std::vector<std::string> words = with(more);
+      words.insert(words.begin(), "voxelize");
+      return place.run(words);
+    };
+    const json found = report(with({}));
+    const auto said = codes(found);
+    EXPECT_NE(std::find(said.begin(), said.end(), "open"), said.end()) << files.back();
+    EXPECT_NE(last_error.find(files.back() + ": with scenes the three axes do not vote"),
+              std::string::npos)
+        << last_error;
+    EXPECT_EQ(found["input"]["closed"], false);
+    const RunResult failed = run({"--checksum", "--open", "fail", "-q"});
+    EXPECT_EQ(failed.exit_code, 5) << failed.err;
+    EXPECT_NE(failed.err.find("is not closed: "), std::string::npos) << failed.err;
+    EXPECT_NE(failed.err.find("(--open fail)"), std::string::npos) << failed.err;
+    // Its surface alone, with colours asked for or not; the ids of nothing.
+    const json surface = report(with({"--open", "surface", "-o", "a.vox"}));
+    EXPECT_LT(surface["voxels"]["solid"].get<double>(),
+              0.4 * found["voxels"]["solid"].get<double>());
+    EXPECT_EQ(last_error.find("vote"), std::string::npos) << last_error;
+    EXPECT_EQ(run({"--checksum", "--open", "surface", "--ids"}).exit_code, 2);
+    // Ids change no voxel.
+    EXPECT_EQ(run({"--checksum", "-q", "--ids"}).out, run({"--checksum", "-q"}).out);
+  }
+  place.write("closed.csg", "import(file = \"ball.obj\");\n");
+  EXPECT_TRUE(report({"closed.csg", "-r", "40", "--open", "fail"})["warnings"].empty());
+}
+
 // Reading, drawing and all the rest are shares of one bar.
 
 TEST_F(VoxelizeTrees, AVoxFileKeepsTheColoursOfAScene) {
