@@ -100,25 +100,29 @@ bool covers(const VoxelGrid& grid, const Bounds& box) {
   return true;
 }
 
-/// Tells when parts of the mesh are too thin for voxel centres to hit them.
+/// Tells when parts of what is voxelized are too thin for voxel centres to hit them.
 void check_thin(const VoxelizeCommand& command, const MeshInput& input, const VoxelGrid& grid,
                 std::uint64_t solid_voxels, Session& session) {
   const glm::dvec3 s = grid.voxel_size;
+  const bool scene = input.has_scene();
+  const bool measured = input.closed && !scene;
   const double volume = input.volume / (s.x * s.y * s.z);
   std::string holds = fmt::format("the solid holds {} voxels", solid_voxels);
-  if (input.closed) holds += fmt::format(" where the mesh's volume is {:.1f} voxels", volume);
-  const char* remedy = command.surface ? "" : "; --surface holds all of it";
+  if (measured) holds += fmt::format(" where the mesh's volume is {:.1f} voxels", volume);
+  const char* remedy =
+      command.ids ? "; --surface, without --ids, holds all of it" : "; --surface holds all of it";
   for (int axis = 0; axis < 3; ++axis) {
     const double extent = (input.bounds.high[axis] - input.bounds.low[axis]) / s[axis];
     if (extent >= 1.0) continue;
-    return session.warn("thin",
-                        fmt::format("{}: the mesh is {:.3g} voxels thick along {}{}", holds, extent,
-                                    word_of(kAxisWords, static_cast<Axis>(axis)), remedy));
+    return session.warn("thin", fmt::format("{}: the {} is {:.3g} voxels thick along {}{}", holds,
+                                            scene ? "scene" : "mesh", extent,
+                                            word_of(kAxisWords, static_cast<Axis>(axis)), remedy));
   }
-  if (!input.closed) {
-    if (solid_voxels == 0) session.warn("empty", fmt::format("no voxel is solid{}", remedy));
-    return;
-  }
+  const auto warn_of_none = [&](const char* why) {
+    if (solid_voxels == 0) session.warn("empty", fmt::format("no voxel is solid{}{}", why, remedy));
+  };
+  if (scene) return warn_of_none(": the scene's result is empty, or thinner than a voxel");
+  if (!measured) return warn_of_none("");
   // Twice the volume over the area is the mean thickness: exact for plates and shells.
   const double thickness =
       input.area > 0 ? 2 * input.volume / input.area / std::cbrt(s.x * s.y * s.z) : 0.0;
@@ -127,12 +131,12 @@ void check_thin(const VoxelizeCommand& command, const MeshInput& input, const Vo
   // loss alone proves nothing.
   const double off = std::abs(static_cast<double>(solid_voxels) - volume);
   if (thickness < 1.0 || (thickness < 4.0 && off > 0.1 * volume + 1.0)) {
-    session.warn("thin", fmt::format("{}: parts are thinner than a voxel ({:.3g} voxels on average)"
-                                     "{}",
-                                     holds, thickness, remedy));
-  } else if (solid_voxels == 0) {
-    session.warn("empty", fmt::format("no voxel is solid{}", remedy));
+    return session.warn("thin",
+                        fmt::format("{}: parts are thinner than a voxel ({:.3g} voxels on average)"
+                                    "{}",
+                                    holds, thickness, remedy));
   }
+  warn_of_none("");
 }
 
 void check_columns(const VoxelizeCommand& command, const VoxelizeOutcome& outcome,
@@ -298,7 +302,7 @@ Result<void> voxelize_and_write(const VoxelizeCommand& command, VoxelizeOutcome&
   if (boundary) outcome.area_estimate = boundary->estimate();
 
   check_columns(command, outcome, session);
-  if (command.solid && !command.surface && !outcome.input.tree &&
+  if (!command.surface && !is_surface_alone(command, outcome.input) &&
       covers(outcome.grid, outcome.input.bounds)) {
     check_thin(command, outcome.input, outcome.grid, outcome.report.solid_voxels, session);
   } else if (outcome.report.solid_voxels == 0) {

@@ -113,6 +113,37 @@ TEST_F(VoxelizeTrees, OpenMeshesInScenesAreReportedWithTheRuleThatDecides) {
   EXPECT_TRUE(report({"closed.csg", "-r", "40", "--open", "fail"})["warnings"].empty());
 }
 
+TEST_F(VoxelizeTrees, ThinSolidsOfTreesAreReportedLikeMeshes) {
+  put("plate.obj", make_box({0, 0, 0}, {10, 10, 0.01}));
+  place.write("plate.csg", "cube(size = [10, 10, 0.01], center = false);\n");
+  const auto said = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.end(), {"-r", "16"});
+    return codes(report(arguments));
+  };
+  const std::vector<std::string> thin = {"thin"};
+  EXPECT_EQ(said({"plate.obj"}), thin);
+  const std::string of_mesh = last_error.substr(0, last_error.find(';'));
+  EXPECT_NE(of_mesh.find("where the mesh's volume is 4.1 voxels"), std::string::npos) << of_mesh;
+  EXPECT_EQ(said({"plate.obj", "--ids"}), thin);
+  EXPECT_TRUE(last_error.starts_with(of_mesh)) << last_error;
+  EXPECT_NE(last_error.find("--surface, without --ids, holds"), std::string::npos) << last_error;
+  EXPECT_EQ(said({"plate.csg"}), thin);
+  EXPECT_NE(last_error.find("the scene is 0.016 voxels thick along z; --surface holds"),
+            std::string::npos)
+      << last_error;
+  // Whose box is thick, and whose result is not.
+  place.write("slice.csg",
+              "difference() { cube(size = [10, 10, 10], center = false); "
+              "multmatrix([[1, 0, 0, -1], [0, 1, 0, -1], [0, 0, 1, 0.01], [0, 0, 0, 1]]) "
+              "{ cube(size = [12, 12, 12], center = false); } }\n");
+  EXPECT_EQ(said({"slice.csg"}), std::vector<std::string>{"empty"});
+  EXPECT_NE(last_error.find("the scene's result is empty, or thinner than a voxel; --surface"),
+            std::string::npos)
+      << last_error;
+  place.write("cube.csg", "cube(size = [10, 10, 10], center = false);\n");
+  EXPECT_TRUE(said({"cube.csg"}).empty()) << last_error;
+}
+
 // Reading, drawing and all the rest are shares of one bar.
 
 TEST_F(VoxelizeTrees, AVoxFileKeepsTheColoursOfAScene) {
