@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/geometric.hpp>
 
 #include "raster/tile_bins.h"
 
@@ -11,6 +12,16 @@ namespace {
 double columns(const VoxelGrid& grid, Axis axis) {
   const AxisFrame frame(axis);
   return static_cast<double>(grid.dims[frame.u]) * static_cast<double>(grid.dims[frame.v]);
+}
+
+/// Of all solids of a tree, those that are taken away included.
+double area_of(const TriangleSoup& soup) {
+  double twice = 0;
+  for (const glm::uvec3& t : soup.triangles) {
+    const glm::dvec3& a = soup.positions[t.x];
+    twice += glm::length(glm::cross(soup.positions[t.y] - a, soup.positions[t.z] - a));
+  }
+  return twice / 2;
 }
 
 std::uint64_t rounded(double bytes) {
@@ -27,12 +38,14 @@ MemoryEstimate estimate_memory(const MeshInput& input, const VoxelGrid& grid, Ax
   const auto vertices = static_cast<double>(input.soup.positions.size());
   const auto triangles = static_cast<double>(input.soup.triangles.size());
   const double elements = static_cast<double>(input.soup.face_elements.size());
-  estimate.mesh = rounded(vertices * (24 + 12) + triangles * 12 + elements * 4);
+  // Of a tree also whose each triangle is.
+  const double owners = input.tree ? triangles * 4 : 0.0;
+  estimate.mesh = rounded(vertices * (24 + 12) + triangles * 12 + elements * 4 + owners);
 
   // Area in voxel faces; a triangle of side d voxels meets about (1 + d / 64)^2 tiles.
   const glm::dvec3 s = grid.voxel_size;
   const double face = std::cbrt(s.x * s.y * s.z);
-  const double area = input.area / (face * face);
+  const double area = (input.tree ? area_of(input.soup) : input.area) / (face * face);
   const double side = triangles > 0 ? std::sqrt(2 * area / triangles) : 0;
   const double tiles = columns(grid, axis) / kTilePixels + 1;
   const double across = 1 + side / kTileSide;
@@ -47,7 +60,7 @@ MemoryEstimate estimate_memory(const MeshInput& input, const VoxelGrid& grid, Ax
   const double budget =
       limit > 0 ? std::min(kDefaultSlab, static_cast<double>(limit) / 8) : kDefaultSlab;
   double slab = std::min(columns(grid, axis) * kColumnBytes, std::max(least, budget));
-  if (!input.closed && command.solid && command.open == OpenMode::kVote) {
+  if (!input.closed && !input.tree && command.solid && command.open == OpenMode::kVote) {
     // The vote holds the intervals of all three axes.
     slab = 0;
     for (const Axis each : {Axis::kX, Axis::kY, Axis::kZ})

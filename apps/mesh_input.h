@@ -37,7 +37,7 @@ struct MeshInput {
   /// Of trees: what makes the lists of the result of the lists of the soup, all solids'. Where
   /// has_scene(), area and volume are not known, and the bounds may be larger than the result.
   std::shared_ptr<csg::SolidLists> tree;
-  std::shared_ptr<const csg::Tree> scene;  ///< what `tree` was made of
+  std::shared_ptr<const csg::Tree> scene;  ///< what `tree` was made of, without meshes
   std::vector<InputFacts> files;
   Bounds bounds;
   bool closed = true;  ///< all of them

@@ -8,10 +8,12 @@
 namespace strata::apps {
 namespace {
 
-void set_tree(MeshInput& input, const csg::Tree& tree) {
+void set_tree(MeshInput& input, csg::Tree tree) {
   input.tree = std::make_shared<csg::SolidLists>(tree, tree.root());
   input.soup = input.tree->take_soup();
-  input.scene = std::make_shared<csg::Tree>(tree);
+  // The soup has all triangles that are needed from here on.
+  for (csg::Solid& solid : tree.solids()) solid.mesh.reset();
+  input.scene = std::make_shared<csg::Tree>(std::move(tree));
 }
 
 /// Meshes as the solids of a union, in their order.
@@ -36,7 +38,7 @@ Result<MeshInput> load_united(const InputOptions& input, const MeshInputRules& r
     all.diagnose_ms += session.milliseconds() - start - read_ms;
   }
   tree.set_root(tree.add(csg::Operation::kUnion, solids));
-  set_tree(all, tree);
+  set_tree(all, std::move(tree));
   return all;
 }
 
@@ -56,16 +58,15 @@ Result<MeshInput> load_solids(const InputOptions& input, const MeshInputRules& r
   MeshInput all;
   auto scene = load_scene(command, session, &all.files);
   if (!scene) return tl::unexpected(scene.error());
-  const csg::Tree& tree = scene->tree;
-  all.bounds = csg::bounds(tree, tree.root());
+  all.bounds = csg::bounds(scene->tree, scene->tree.root());
   if (all.bounds.empty()) {
     return fail(ErrorCode::kGeometry, "{}: the scene is empty", input.files.front());
   }
-  set_tree(all, tree);
+  set_tree(all, std::move(scene->tree));
   for (const InputFacts& facts : all.files) all.closed = all.closed && facts.closed;
   all.read_ms = session.milliseconds() - start;
   session.note(fmt::format("{}: {}, {}", input.files.front(),
-                           counted(tree.solids().size(), "solid"),
+                           counted(all.scene->solids().size(), "solid"),
                            counted(all.soup.triangles.size(), "triangle")));
   return all;
 }

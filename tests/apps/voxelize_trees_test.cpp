@@ -146,6 +146,26 @@ TEST_F(VoxelizeTrees, ThinSolidsOfTreesAreReportedLikeMeshes) {
 
 // Reading, drawing and all the rest are shares of one bar.
 
+TEST_F(VoxelizeTrees, AScenesMemoryIsEstimatedLikeThatOfItsMesh) {
+  put("ball.obj", make_icosphere(10.0, 5));
+  place.write("ball.csg", "import(file = \"ball.obj\");\n");
+  const auto estimate = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.end(), {"-r", "2000", "-o", "a.vdb", "--dry-run", "-j", "2"});
+    return report(arguments)["memory"]["estimated_bytes"].get<double>();
+  };
+  const double mesh = estimate({"ball.obj"});
+  EXPECT_GT(mesh, 30e6);  // most of it the leaves of the file
+  EXPECT_NEAR(estimate({"ball.csg"}) / mesh, 1.0, 0.02);
+  EXPECT_NEAR(estimate({"ball.obj", "--ids"}) / mesh, 1.0, 0.02);
+  for (const char* name : {"ball.obj", "ball.csg"}) {
+    const RunResult run =
+        place.run({"voxelize", name, "-r", "2000", "-o", "a.vdb", "--memory-limit", "25M"});
+    EXPECT_EQ(run.exit_code, 6) << name << ": " << run.err;
+    EXPECT_NE(run.err.find("--memory-limit"), std::string::npos) << run.err;
+    EXPECT_FALSE(place.has("a.vdb"));
+  }
+}
+
 TEST_F(VoxelizeTrees, AVoxFileKeepsTheColoursOfAScene) {
   place.write("two.csg",
               "color([1, 0, 0, 1]) { cube(size = [2, 2, 2], center = false); }\n"
