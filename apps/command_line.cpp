@@ -439,8 +439,11 @@ VoxelizeCommand voxelize_command(const Words& words, Reader& reader) {
     reader.fail_with(
         fmt::format("--ids are of solids; {} has none", command.surface ? "--surface" : "--fog"));
   }
-  if (command.output.empty() && !words.format.empty()) {
-    reader.fail_with("--format needs -o");
+  if (command.backend == Backend::kGl && !command.solid) {
+    reader.fail_with("--backend gl makes depth lists; --surface alone has none and is the CPU's");
+  }
+  if (command.output.empty() && (command.fog || !words.format.empty())) {
+    reader.fail_with(fmt::format("{} needs -o", command.fog ? "--fog" : "--format"));
   }
   if (command.output.empty() && !command.stats && !command.json && !command.checksum &&
       !command.dry_run) {

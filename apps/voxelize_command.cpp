@@ -39,6 +39,10 @@ Result<void> check_output(const VoxelizeCommand& command) {
   }
   const auto format = voxel_format_for(command.output, command.format);
   if (!format) return tl::unexpected(format.error());
+  if (command.fog && format->name != "vdb") {
+    return fail(ErrorCode::kUsage, "--fog is for .vdb; format {} holds no fog volume",
+                format->name);
+  }
   if (command.ids) {
     if (auto held = check_ids(*format, 1); !held) return held;
   }

@@ -121,6 +121,20 @@ TEST_F(Usage, SizesOutOfRangeAreNamed) {
   refuses({"voxelize", "box.obj", "--stats", "-r", "4", "--bounds", "0,0,0,1,-1,1"}, "-1");
 }
 
+TEST_F(Usage, OptionsThatWouldHaveNoEffectAreRefused) {
+  refuses({"voxelize", "box.obj", "-r", "4", "--fog", "-o", "a.npy"}, "--fog is for .vdb");
+  refuses({"voxelize", "box.obj", "-r", "4", "--fog", "-o", "a.x", "--format", "nrrd"},
+          "format nrrd holds no fog");
+  refuses({"voxelize", "box.obj", "-r", "4", "--fog", "--stats"}, "--fog needs -o");
+  refuses({"voxelize", "box.obj", "-r", "4", "--stats", "--surface", "--backend", "gl"},
+          "--surface alone has none");
+  for (const char* backend : {"cpu", "auto"}) {
+    const RunResult run = place.run(
+        {"voxelize", "box.obj", "-r", "4", "--checksum", "--surface", "--backend", backend});
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+  }
+}
+
 TEST_F(Usage, SomethingMustComeOut) {
   refuses({"voxelize", "box.obj", "-r", "4"}, "-o FILE");
   refuses({"voxelize", "-r", "4", "--stats"}, "no mesh file");
