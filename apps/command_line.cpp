@@ -109,7 +109,8 @@ void add_inputs(CLI::App& app, Words& words, bool scenes) {
                  scenes ? "Meshes (.obj .stl .ply .off), scenes (.csg .scad); - a pipe of a mesh"
                         : "Mesh files: .obj .stl .ply .off; - for standard input")
       ->type_name("");
-  app.add_option("--input-format", words.input_format, "obj, stl, ply or off, whatever the name is")
+  app.add_option("--input-format", words.input_format,
+                 "obj, stl, ply or off: of -, else of all files whatever their names are")
       ->type_name("FORMAT")
       ->group("Input");
   app.add_option("--reader", words.reader, "own (default) or openmesh, to compare")
@@ -262,8 +263,9 @@ void define_csg(CLI::App& app, Words& words) {
   };
   option("--expr", csg.expression, "What is pictured, such as 'a - b'; else all inputs united",
          "EXPR", input);
-  option("--input-format", words.input_format, "csg, obj, stl, ply or off, whatever the name is",
-         "FORMAT", input);
+  option("--input-format", words.input_format,
+         "csg, obj, stl, ply or off: of -, else of all files whatever their names are", "FORMAT",
+         input);
   option("--assets", csg.assets, "Where scenes look for files; else beside the scene", "FOLDER",
          input);
   option("--scad-timeout", csg.scad_timeout, "Seconds that openscad may take for a .scad; 300", "S",

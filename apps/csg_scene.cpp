@@ -25,8 +25,13 @@ using csg::Tree;
 constexpr std::size_t kMaxNodes = std::size_t{1} << 24;
 
 bool is_scene(const std::string& path, const CsgCommand& command) {
-  if (command.scene_format) return true;
-  return command.input.format == MeshFormat::kAuto && is_scene_name(path);
+  if (command.scene_format) {
+    // As format_of(): beside standard input, meshes are known by their names.
+    const std::vector<std::string>& files = command.input.files;
+    const bool piped = std::find(files.begin(), files.end(), "-") != files.end();
+    return !piped || mesh_format_of(path) == MeshFormat::kAuto;
+  }
+  return format_of(path, command.input) == MeshFormat::kAuto && is_scene_name(path);
 }
 
 /// What a scene's file is, and what the solids of its result hold.

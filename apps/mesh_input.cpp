@@ -133,8 +133,14 @@ void warn_of_reading(const std::string& path, const MeshReadStats& stats, Sessio
   for (const std::string& text : stats.warnings) session.warn("reader", text);
 }
 
+MeshFormat format_of(const std::string& path, const InputOptions& input) {
+  const bool piped = std::find(input.files.begin(), input.files.end(), "-") != input.files.end();
+  const bool told = mesh_format_of(path) != MeshFormat::kAuto || is_scene_name(path);
+  return piped && told ? MeshFormat::kAuto : input.format;
+}
+
 Result<void> check_input_name(const std::string& path, const InputOptions& input, bool scenes) {
-  if (input.format != MeshFormat::kAuto || path == "-") return {};
+  if (format_of(path, input) != MeshFormat::kAuto || path == "-") return {};
   std::error_code ignored;
   if (std::filesystem::is_directory(path, ignored)) {
     return fail(ErrorCode::kInput, "{}: it is a folder, not a file", path);
@@ -161,7 +167,7 @@ Result<MeshFile> read_input(const std::string& path, const InputOptions& input, 
     return tl::unexpected(named.error());
   }
   MeshReadOptions options;
-  options.format = input.format;
+  options.format = format_of(path, input);
   options.reader = input.reader;
   const double share = 0.5 / static_cast<double>(std::max<std::size_t>(input.files.size(), 1));
   const Execution execution = session.execution("reading", share);

@@ -71,6 +71,10 @@ Result<InputFacts> load_mesh(const std::string& path, const InputOptions& input,
                              const MeshInputRules& rules, Session& session, TriangleSoup& soup,
                              double* read_ms = nullptr);
 
+/// The format that the options give a file, whatever its name is; kAuto: its name tells. With
+/// standard input among the files, they mean that, and files whose names tell nothing.
+[[nodiscard]] MeshFormat format_of(const std::string& path, const InputOptions& input);
+
 /// Whether a file's name or the options say what format it has. @param scenes where scenes can be
 /// read, too @return kInput naming what there is, or who reads scenes
 Result<void> check_input_name(const std::string& path, const InputOptions& input, bool scenes);

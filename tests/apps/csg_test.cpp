@@ -174,6 +174,12 @@ TEST_F(Csg, ASceneMayComeThroughAPipe) {
       place.run({"csg", "-", "--input-format=csg", "-o", "-", "--size=50,50"}, {.input = kCube});
   EXPECT_EQ(run.exit_code, 0) << run.err;
   EXPECT_EQ(decode(run.out), draw(kCube, {"--size=50,50"}));
+  // Beside a mesh, whose name tells what it is.
+  put(place, "box.stl", make_box({0, 0, 0}, {1, 1, 1}));
+  const RunResult both =
+      place.run({"csg", "box.stl", "-", "--input-format=csg", "--json"}, {.input = kCube});
+  EXPECT_EQ(both.exit_code, 0) << both.err;
+  EXPECT_NE(both.out.find("\"solids\": 2"), std::string::npos) << both.out;
 }
 
 TEST_F(Csg, MistakesInAnExpressionAreMarked) {

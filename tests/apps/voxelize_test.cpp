@@ -268,6 +268,34 @@ TEST_F(Voxelize, MeshesComeThroughAPipe) {
   EXPECT_NE(place.run({"voxelize", "-", "-r", "8", "--stats"}).exit_code, 0);
 }
 
+TEST_F(Voxelize, TheFormatOfAPipeIsNotThatOfFilesBesideIt) {
+  put("box.stl", make_box({4, 0, 0}, {5, 1, 1}));
+  put("other.obj", make_box({0, 0, 0}, {1, 1, 1}));
+  put("other.txt.stl", make_box({0, 0, 0}, {1, 1, 1}));
+  place.write("other.txt", place.read("other.txt.stl"));
+  place.write("cube.csg", "cube(size = [1, 1, 1], center = false);\n");
+  const auto run = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), "voxelize");
+    more.insert(more.end(), {"--voxel-size", "0.25", "--stats"});
+    return place.run(more, {.input = place.read("box.stl")});
+  };
+  for (const char* file : {"other.obj", "cube.csg", "other.txt"}) {
+    for (const bool first : {false, true}) {
+      const RunResult both = first ? run({file, "-", "--input-format", "stl"})
+                                   : run({"-", file, "--input-format=stl"});
+      EXPECT_EQ(both.exit_code, 0) << file << ": " << both.err;
+      EXPECT_NE(both.out.find("128 voxels"), std::string::npos) << both.out;
+    }
+    const RunResult untold = run({file, "-"});
+    EXPECT_EQ(untold.exit_code, 2) << untold.err;
+    EXPECT_NE(untold.err.find("needs --input-format: obj, stl, ply or off"), std::string::npos)
+        << untold.err;
+  }
+  // Without a pipe it is that of all files.
+  const RunResult wrong = run({"other.obj", "--input-format", "stl"});
+  EXPECT_EQ(wrong.exit_code, 3) << wrong.err;
+}
+
 TEST_F(Voxelize, ADryRunWritesNothing) {
   put("box.obj", make_box({0, 0, 0}, {1, 1, 1}));
   const RunResult run =
