@@ -4,8 +4,11 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <nlohmann/json.hpp>
+#include <regex>
 #include <set>
 
 #include "mesh/shapes.h"
@@ -180,6 +183,42 @@ TEST(Json, TheDocumentationNamesExactlyWhatVoxelizePrints) {
   }
   names.erase("warnings");  // empty of the box
   EXPECT_EQ(names, documented("`strata voxelize`"));
+}
+
+/// Codes of warnings in a source: in quotes as first or second argument of a function warn(), as
+/// value of a constant that stands there, or first in braces.
+void collect_codes(const std::string& text, std::set<std::string>& codes, int& unknown) {
+  const std::regex calls(
+      R"re(\bwarn\(\s*(?:[\w.>-]+,\s*)?(?:"([a-z-]+)"|(k\w+))|warnings\.push_back\(\s*\{"([a-z-]+)")re");
+  for (std::sregex_iterator at(text.begin(), text.end(), calls), end; at != end; ++at) {
+    if ((*at)[2].matched) {
+      std::smatch value;
+      const std::regex constant((*at)[2].str() + R"re( = "([a-z-]+)";)re");
+      if (!std::regex_search(text, value, constant)) {
+        ++unknown;
+        continue;
+      }
+      codes.insert(value[1]);
+    } else {
+      codes.insert((*at)[(*at)[1].matched ? 1 : 3]);
+    }
+  }
+}
+
+TEST(Json, TheDocumentationNamesExactlyTheCodesOfWarnings) {
+  std::set<std::string> codes;
+  int unknown = 0;
+  namespace fs = std::filesystem;
+  for (const char* folder : {"/apps", "/csg"}) {
+    for (const auto& entry :
+         fs::recursive_directory_iterator(std::string(STRATA_SOURCE_DIR) + folder)) {
+      if (entry.path().extension() != ".cpp") continue;
+      std::ifstream in(entry.path());
+      collect_codes({std::istreambuf_iterator<char>(in), {}}, codes, unknown);
+    }
+  }
+  EXPECT_EQ(unknown, 0);
+  EXPECT_EQ(codes, documented("Codes of warnings"));
 }
 
 TEST(Json, FileNamesOfAnyBytesGiveValidText) {
