@@ -71,8 +71,9 @@ MemoryEstimate estimate_memory(const MeshInput& input, const VoxelGrid& grid, Ax
   estimate.slabs = rounded(slab + kWorkerBytes * threads);
 
   if (format == "vdb") {
-    // A surface of area A meets about 1.5 A / 64 leaves, of 64 bytes and their share of nodes.
-    estimate.output = rounded(area * 1.5 / 64 * 72);
+    // A surface of area A meets about 1.5 A / 64 leaves, of 64 bytes and their share of nodes; ids
+    // are a zlib stream a leaf, which takes about as much.
+    estimate.output = rounded(area * 1.5 / 64 * (command.ids ? 144 : 72));
   } else if (format == "binvox") {
     estimate.output = rounded(columns(grid, axis) * 8);
   } else if (!format.empty()) {
