@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "apps/choice_words.h"
 #include "apps/csg_options.h"
 #include "apps/file_conflicts.h"
 #include "apps/option_values.h"
@@ -27,18 +28,8 @@ constexpr const char* kExamples =
   strata view part.csg --screenshot part.png --script tour.txt     without a person
 )";
 
-constexpr std::pair<std::string_view, InsideRule> kRules[] = {{"winding", InsideRule::kWinding},
-                                                              {"nonzero", InsideRule::kNonzero},
-                                                              {"parity", InsideRule::kParity}};
 constexpr std::pair<std::string_view, Heat> kHeats[] = {
     {"off", Heat::kOff}, {"thickness", Heat::kThickness}, {"depth", Heat::kDepth}};
-constexpr std::pair<std::string_view, apps::Backend> kBackends[] = {
-    {"auto", apps::Backend::kAuto}, {"cpu", apps::Backend::kCpu}, {"gl", apps::Backend::kGl}};
-constexpr std::pair<std::string_view, MeshFormat> kFormats[] = {{"auto", MeshFormat::kAuto},
-                                                                {"obj", MeshFormat::kObj},
-                                                                {"stl", MeshFormat::kStl},
-                                                                {"ply", MeshFormat::kPly},
-                                                                {"off", MeshFormat::kOff}};
 
 struct Words {
   std::vector<std::string> files;
@@ -106,17 +97,17 @@ Result<void> read(Words& words, ViewOptions& options) {
   command.scene_format = words.format == "csg";
   if (command.scene_format) words.format = "auto";
   command.input.files = words.files;
-  auto format = apps::parse_choice("--input-format", words.format, kFormats);
+  auto format = apps::parse_choice("--input-format", words.format, apps::kMeshFormatWords);
   if (!format) return tl::unexpected(format.error());
   command.input.format = *format;
-  auto rule = apps::parse_choice("--rule", words.rule, kRules);
+  auto rule = apps::parse_choice("--rule", words.rule, apps::kRuleWords);
   if (!rule) return tl::unexpected(rule.error());
   command.rule = *rule;
   auto heat = apps::parse_choice("--heat", words.heat, kHeats);
   if (!heat) return tl::unexpected(heat.error());
   options.heat = *heat;
   options.panels = !words.no_panels;
-  auto backend = apps::parse_choice("--backend", words.backend, kBackends);
+  auto backend = apps::parse_choice("--backend", words.backend, apps::kBackendWords);
   if (!backend) return tl::unexpected(backend.error());
   options.command.backend = *backend;
   if (!words.threads.empty()) {

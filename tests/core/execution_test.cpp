@@ -115,14 +115,16 @@ TEST_P(ParallelFor, NothingBeginsAfterAStop) {
   std::stop_source source;
   Execution stopped = execution();
   stopped.stop = source.get_token();
-  std::atomic<int> begun{0}, begun_after{0};
+  std::atomic<int> begun{0}, begun_at_stop{0}, begun_after{0};
   parallel_for(stopped, 100000, [&](std::size_t, int) {
     // Those that were taken before the request may still run, one a worker.
     if (source.stop_requested()) ++begun_after;
-    if (++begun == 50) source.request_stop();
+    if (++begun != 50) return;
+    source.request_stop();
+    begun_at_stop = begun.load();
   });
   EXPECT_GE(begun, 50);
-  EXPECT_LE(begun, 50 + GetParam());
+  EXPECT_LE(begun, begun_at_stop + GetParam());
   EXPECT_LT(begun_after, GetParam() + 1);
 
   begun = 0;

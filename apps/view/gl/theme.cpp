@@ -2,6 +2,7 @@
 
 #include <imgui.h>
 
+#include <memory>
 #include <string>
 
 #ifdef STRATA_HAVE_TEXT
@@ -15,19 +16,20 @@ namespace {
 std::string plain_font() {
   std::string file;
 #ifdef STRATA_HAVE_TEXT
-  FcPattern* wanted = FcNameParse(reinterpret_cast<const FcChar8*>("sans-serif"));
-  if (wanted == nullptr) return file;
-  FcConfigSubstitute(nullptr, wanted, FcMatchPattern);
-  FcDefaultSubstitute(wanted);
+  using Pattern = std::unique_ptr<FcPattern, decltype(&FcPatternDestroy)>;
+  const std::unique_ptr<FcConfig, decltype(&FcConfigDestroy)> config(FcInitLoadConfigAndFonts(),
+                                                                     FcConfigDestroy);
+  const Pattern wanted(FcNameParse(reinterpret_cast<const FcChar8*>("sans-serif")),
+                       FcPatternDestroy);
+  if (!config || !wanted) return file;
+  FcConfigSubstitute(config.get(), wanted.get(), FcMatchPattern);
+  FcDefaultSubstitute(wanted.get());
   FcResult result = FcResultNoMatch;
-  FcPattern* found = FcFontMatch(nullptr, wanted, &result);
-  FcPatternDestroy(wanted);
-  if (found == nullptr) return file;
+  const Pattern found(FcFontMatch(config.get(), wanted.get(), &result), FcPatternDestroy);
   FcChar8* name = nullptr;
-  if (FcPatternGetString(found, FC_FILE, 0, &name) == FcResultMatch) {
+  if (found && FcPatternGetString(found.get(), FC_FILE, 0, &name) == FcResultMatch) {
     file = reinterpret_cast<const char*>(name);
   }
-  FcPatternDestroy(found);
   // What the atlas reads.
   if (!file.ends_with(".ttf") && !file.ends_with(".otf") && !file.ends_with(".ttc")) file.clear();
 #endif

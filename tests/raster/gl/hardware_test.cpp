@@ -172,7 +172,8 @@ TEST_F(GlHardware, BothStoresAndBandsGiveTheSameLists) {
   auto rasterizer = HardwareRasterizer::create(*context_);
   ASSERT_TRUE(rasterizer) << rasterizer.error().message;
   const VoxelGrid grid = grid_of({100, 90, 80}, 0.025);
-  const auto lattice = snap_to_lattice(make_torus_knot(3, 5, 0.15, 200, 12), grid);
+  const TriangleSoup soup = make_torus_knot(3, 5, 0.15, 200, 12);
+  const auto lattice = snap_to_lattice(soup, grid);
   ASSERT_TRUE(lattice);
   ASSERT_TRUE((*rasterizer)->set_mesh(*lattice));
   (*rasterizer)->set_target(raster_target(grid, Axis::kY));
