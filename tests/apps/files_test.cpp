@@ -29,16 +29,23 @@ class Files : public testing::Test {
   /// Expects a usage error that has the parts, and that no file has changed.
   void refuses(const std::vector<std::string>& arguments,
                const std::vector<std::string>& parts) const {
-    std::vector<std::string> before;
-    for (const std::string& name : place.names()) before.push_back(name + place.read(name));
+    const auto before = contents();
     const RunResult run = place.run(arguments);
     EXPECT_EQ(run.exit_code, 2) << run.err;
     for (const std::string& part : parts) {
       EXPECT_NE(run.err.find(part), std::string::npos) << part << "\n" << run.err;
     }
-    std::vector<std::string> after;
-    for (const std::string& name : place.names()) after.push_back(name + place.read(name));
-    EXPECT_EQ(before, after) << arguments.back();
+    EXPECT_EQ(before, contents()) << arguments.back();
+  }
+
+  [[nodiscard]] std::vector<std::string> contents() const {
+    std::vector<std::string> all;
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(place.path(""))) {
+      const std::string name = entry.path().lexically_relative(place.path("")).string();
+      all.push_back(name + (entry.is_regular_file() ? place.read(name) : ""));
+    }
+    std::sort(all.begin(), all.end());
+    return all;
   }
 
   Workplace place;
