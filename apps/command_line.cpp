@@ -278,7 +278,7 @@ void define_csg(CLI::App& app, Words& words) {
   const char* output = "Output";
   option("-o,--output", words.output, "Picture to write, .png; - for standard output", "FILE",
          output);
-  option("--ids", csg.ids, "Which solid each pixel shows, as colours, .png", "FILE", output);
+  option("--ids", csg.ids, "Which opaque solid each pixel shows, as colours, .png", "FILE", output);
   option("--depth", csg.depth, "Distance along the view, .exr, channel Z", "FILE", output);
   add_json(app, words, output);
   const char* camera = "Camera (default: all in view from OpenSCAD's place)";

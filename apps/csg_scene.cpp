@@ -277,9 +277,16 @@ Result<csg::Scene> load_scene(const CsgCommand& command, Session& session,
     }
     inputs.push_back(*std::move(scene));
   }
-  if (!command.expression.empty()) return Builder(expression, inputs).run();
+  const bool flat =
+      std::all_of(inputs.begin(), inputs.end(), [](const csg::Scene& input) { return input.flat; });
+  if (!command.expression.empty()) {
+    auto built = Builder(expression, inputs).run();
+    if (built) built->flat = flat;
+    return built;
+  }
   if (inputs.size() == 1) return std::move(inputs.front());
   csg::Scene all;
+  all.flat = flat;
   std::vector<Tree::NodeId> roots;
   for (const csg::Scene& input : inputs) {
     roots.push_back(add_scene(all, input, true));

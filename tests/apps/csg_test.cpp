@@ -249,6 +249,26 @@ TEST_F(Csg, NothingIsWrittenWhereTheMeasuresFail) {
   EXPECT_EQ(place.names(), before) << failed.err;
 }
 
+TEST_F(Csg, FlatScenesTogetherAreRenderedFromAboveLikeOne) {
+  place.write("flat.csg", "square(size = [3, 2]);");
+  place.write("left.csg",
+              "multmatrix([[1,0,0,-1],[0,1,0,0],[0,0,1,0],[0,0,0,1]]) "
+              "{ square(size = [2, 2]); }");
+  place.write("both.csg",
+              "square(size = [3, 2]); multmatrix([[1,0,0,-1],[0,1,0,0],[0,0,1,0],"
+              "[0,0,0,1]]) { square(size = [2, 2]); }");
+  for (const std::vector<std::string>& inputs :
+       {std::vector<std::string>{"both.csg"}, {"flat.csg", "left.csg"}}) {
+    std::vector<std::string> words{"csg"};
+    words.insert(words.end(), inputs.begin(), inputs.end());
+    for (const char* word : {"--render", "--size=60,40", "-o"}) words.emplace_back(word);
+    words.push_back(std::to_string(inputs.size()) + ".png");
+    const auto run = place.run(words);
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+  }
+  EXPECT_EQ(place.read("1.png"), place.read("2.png"));
+}
+
 TEST_F(Csg, CoordinatesThatNoCameraReachesAreTheScenesFault) {
   place.write("huge.csg", "cube(size = [1e300, 1e300, 1e300]);");
   EXPECT_TRUE(has(refused({"huge.csg", "-o", "out.png"}, 5), "too large for a picture"));
