@@ -216,6 +216,7 @@ TEST(RayImage, CuttersFarLargerThanTheResultLeaveItDepth) {
   EXPECT_EQ(box.high, glm::dvec3(10));
   csg::Camera camera;
   camera.projection = csg::Projection::kOrthographic;
+  camera.rotation = glm::dvec3(0);
   camera.target = glm::dvec3(2.5, 5, 5);
   camera.distance = 60;
   const auto view = csg::make_view(camera, {64, 64}, box);
