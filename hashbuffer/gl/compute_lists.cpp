@@ -61,8 +61,9 @@ Result<LayeredDepthImage> ComputeListSource::lists(const RasterTarget& target, i
     const Error first = built.error();
     store_ = std::exchange(spare_, nullptr);
     built = build_sized(*store_, *rasterizer_, execution_);
-    if (!built && built.error().code != ErrorCode::kCancelled) {
-      built = fail(built.error().code, "{}; then {}", first.message, built.error().message);
+    // What is too much for one may be too much for both; all else failed at the first.
+    if (!built && built.error().code != ErrorCode::kCancelled && first.code != ErrorCode::kLimit) {
+      built = tl::unexpected(first);
     }
   }
   if (!built) return tl::unexpected(built.error());
