@@ -393,9 +393,10 @@ Result<bool> HashStore::look_at_failures(const std::vector<Counts>& counts) {
 Result<bool> HashStore::look_at_layers() {
   const unsigned ages =
       options_.age_limit == 0 ? Record32::kAgeMax : std::min(options_.age_limit, Record32::kAgeMax);
+  const bool counted = mode_ == Mode::kCountLayers;
   for (const std::size_t i : active_) {
     Band& band = bands_[i];
-    if (mode_ == Mode::kCountLayers) {
+    if (counted) {
       std::vector<std::uint32_t> layers(band.pixels);
       band.table.download(std::span(layers));
       if (auto checked = check_errors("hash store"); !checked) {
