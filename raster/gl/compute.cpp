@@ -22,7 +22,6 @@ constexpr std::uint32_t kGroupSize = 64;       // threads that take a triangle e
 constexpr std::uint32_t kBlockGroupSize = 32;  // threads that take a block together
 constexpr std::uint64_t kLargeBytes = 128;     // struct RasterLarge
 constexpr std::uint64_t kBlockBytes = 8;       // uvec2
-constexpr std::uint64_t kTriangleBytes = 12;   // three indices
 constexpr std::uint64_t kVertexBytes = 12;     // three coordinates
 constexpr std::size_t kKeptPasses = 16;
 
