@@ -32,22 +32,22 @@ class ComputeListSource : public ListSource {
   [[nodiscard]] int rows_at_once(const RasterTarget& target) const override;
 
  protected:
+  /// @param execution without its progress, of which lists() would tell a part only
   explicit ComputeListSource(const Execution& execution) : execution_(execution) {
     execution_.progress = {};
   }
-  [[nodiscard]] const Execution& execution() const { return execution_; }
   [[nodiscard]] Result<void> open(const Context& context, std::unique_ptr<Store> store,
                                   std::unique_ptr<Store> spare, std::int64_t pixels_at_once);
   /// The lists of rows [v_begin, v_end) of `target`, which `store` holds. Sets crossings_.
   [[nodiscard]] virtual Result<LayeredDepthImage> read(Store& store, const RasterTarget& target,
                                                        int v_begin, int v_end);
   std::uint64_t crossings_ = 0;
+  Execution execution_;
 
  private:
   std::unique_ptr<ComputeRasterizer> rasterizer_;
   std::unique_ptr<Store> store_, spare_;
   std::int64_t pixels_at_once_ = 0;
-  Execution execution_;
 };
 
 }  // namespace strata::gl

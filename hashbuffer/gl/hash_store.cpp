@@ -1,9 +1,8 @@
 #include "hashbuffer/gl/hash_store.h"
 
 #include <algorithm>
-#include <cstring>
 #include <limits>
-#include <string_view>
+#include <string>
 #include <utility>
 
 #include "hashbuffer/record.h"
@@ -32,10 +31,10 @@ struct Params {
 
 /// llvmpipe ends all loops of an invocation after 65535 rounds, without a word, and counts those of
 /// the slowest of its neighbours in a vector.
-const char* most_steps(const Info& info) {
-  if (!info.works_around("loop-rounds")) return "1000000u";
+std::uint32_t most_steps(const Info& info) {
+  if (!info.works_around("loop-rounds")) return 1000000;
   const bool has_16_neighbours = info.renderer.find("512 bits") != std::string::npos;
-  return has_16_neighbours ? "4000u" : "8000u";
+  return has_16_neighbours ? 4000 : 8000;
 }
 
 StoreGlsl glsl_of(const GlslPiece& piece, GlslSettings settings) {
@@ -133,7 +132,7 @@ StoreGlsl HashStore::glsl(int pass) const {
   }
   GlslSettings settings;
   settings.defines = {{"STORE_COHERENT", options_.read_first ? "coherent" : ""},
-                      {"STORE_MOST_STEPS", most_steps_}};
+                      {"STORE_MOST_STEPS", std::to_string(most_steps_) + "u"}};
   if (options_.read_first) settings.defines.emplace_back("STORE_READ_FIRST", "1");
   if (word_bytes() == 8) {
     settings.extensions = {"GL_ARB_gpu_shader_int64"};
@@ -428,7 +427,7 @@ Result<bool> HashStore::look_at_layers() {
       return fail(ErrorCode::kLimit,
                   "hash store: lists of {} fragments take more than the {} steps of a thread; take "
                   "the count/scan store",
-                  band.deepest, std::string_view(most_steps_, std::strlen(most_steps_) - 1));
+                  band.deepest, most_steps_);
     }
     // At least one step up, since a table that is not full fails by bad luck with its ages. Where
     // luck fails again and again, one plane a layer cannot.

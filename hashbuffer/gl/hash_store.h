@@ -132,7 +132,7 @@ class HashStore final : public Store {
   [[nodiscard]] Result<bool> look_at_layers();
 
   std::uint64_t expected_ = 0;  ///< fragments of the next frame; 0: not known
-  const char* most_steps_;      ///< that an invocation may take
+  std::uint32_t most_steps_;    ///< that an invocation may take
   HashStoreOptions options_;
   WordPath path_;
   std::vector<Band> bands_;

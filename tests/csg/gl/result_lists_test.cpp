@@ -16,6 +16,7 @@
 #include "hashbuffer/build_ldi.h"
 #include "hashbuffer/gl/hash_store.h"
 #include "hashbuffer/gl/scan_store.h"
+#include "mesh/soup_tools.h"
 #include "tests/csg/random_tree.h"
 #include "tests/gl/gl_testing.h"
 #include "voxelize/voxelize.h"
@@ -127,11 +128,9 @@ TEST_F(GlResult, StopsAtAnyTime) {
   Tree tree;
   TriangleSoup balls;
   for (int i = 0; i < 6; ++i) {
-    const auto first = static_cast<unsigned>(balls.positions.size());
-    for (const TriangleSoup ball = make_icosphere(4, 3); const auto& p : ball.positions) {
-      balls.positions.push_back(p + glm::dvec3(0.5 * i, 0, 0));
-    }
-    for (const auto& t : make_icosphere(4, 3).triangles) balls.triangles.push_back(t + first);
+    TriangleSoup ball = make_icosphere(4, 3);
+    for (glm::dvec3& p : ball.positions) p.x += 0.5 * i;
+    append(balls, ball);
   }
   Solid solid;
   solid.mesh = std::make_shared<TriangleSoup>(std::move(balls));
