@@ -35,32 +35,39 @@ void move_to_middle(TriangleSoup& mesh) {
   for (glm::dvec3& p : mesh.positions) p -= middle;
 }
 
-}  // namespace
-
-std::optional<std::string> find_asset(const std::string& folder, const std::string& name) {
+/// The first place of `name` in a folder or those around it that passes the test.
+template <class Test>
+std::optional<std::string> first_place(const std::string& folder, const std::string& name,
+                                       Test&& test) {
   namespace fs = std::filesystem;
+  if (fs::path(name).is_absolute()) return test(name) ? std::optional(name) : std::nullopt;
   constexpr int kMostLevels = 8;
-  std::error_code ignored;
-  if (fs::path(name).is_absolute()) {
-    return fs::is_regular_file(name, ignored) ? std::optional(name) : std::nullopt;
-  }
   fs::path around(folder);
   for (int level = 0; level < kMostLevels; ++level, around /= "..") {
     const fs::path path = around / name;
-    if (fs::is_regular_file(path, ignored)) return path.string();
+    if (test(path)) return path.string();
   }
   return std::nullopt;
 }
 
+}  // namespace
+
+std::optional<std::string> find_asset(const std::string& folder, const std::string& name) {
+  return first_place(folder, name, [](const std::filesystem::path& path) {
+    std::error_code ignored;
+    return std::filesystem::is_regular_file(path, ignored);
+  });
+}
+
 std::optional<std::string> Evaluator::asset(std::uint32_t node, const std::string& file) {
-  auto found = find_asset(folder_, file);
-  if (found) return found;
-  std::error_code ignored;
-  const bool is_folder = std::filesystem::is_directory(
-      std::filesystem::path(folder_) / file, ignored);  // an absolute one stays what it is
+  if (auto found = find_asset(folder_, file)) return found;
+  const auto folder = first_place(folder_, file, [](const std::filesystem::path& path) {
+    std::error_code ignored;
+    return std::filesystem::is_directory(path, ignored);
+  });
   warn(node, "missing-file",
        fmt::format("'{}' needs the file '{}', which is {}; it is left out", name(node), file,
-                   is_folder ? "a folder" : "not there"));
+                   folder ? "a folder" : "not there"));
   return std::nullopt;
 }
 
