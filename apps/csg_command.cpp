@@ -15,16 +15,6 @@
 namespace strata::apps {
 namespace {
 
-/// What the camera should see.
-Result<Bounds> visible_box(const csg::Scene& scene, const Execution& execution) {
-  auto box = csg::result_bounds(scene.tree, scene.tree.root(), scene.relative_precision, execution);
-  if (!box) return box;
-  for (const auto* ghosts : {&scene.backgrounds, &scene.highlights}) {
-    for (const csg::Tree::NodeId ghost : *ghosts) box->include(csg::bounds(scene.tree, ghost));
-  }
-  return box;
-}
-
 std::vector<csg::Ghost> ghosts_of(const csg::Scene& scene) {
   std::vector<csg::Ghost> ghosts;
   for (const csg::Tree::NodeId node : scene.backgrounds) {

@@ -12,6 +12,8 @@
 
 #include "apps/expression.h"
 #include "apps/mesh_input.h"
+#include "apps/option_values.h"
+#include "csg/result_bounds.h"
 #include "mesh/diagnose.h"
 #include "mesh/shapes.h"
 
@@ -27,9 +29,7 @@ constexpr std::size_t kMaxNodes = std::size_t{1} << 24;
 bool is_scene(const std::string& path, const CsgCommand& command) {
   if (command.scene_format) {
     // As format_of(): beside standard input, meshes are known by their names.
-    const std::vector<std::string>& files = command.input.files;
-    const bool piped = std::find(files.begin(), files.end(), "-") != files.end();
-    return !piped || mesh_format_of(path) == MeshFormat::kAuto;
+    return !reads_standard_input(command.input) || mesh_format_of(path) == MeshFormat::kAuto;
   }
   return format_of(path, command.input) == MeshFormat::kAuto && is_scene_name(path);
 }
@@ -41,7 +41,7 @@ InputFacts facts_of(const std::string& path, const csg::Scene& scene, const CsgC
   facts.path = path;
   facts.is_scene = true;
   facts.closed = true;
-  const bool program = path.ends_with(".scad") || path.ends_with(".SCAD");
+  const bool program = has_extension(path, ".scad");
   facts.stats.format = program && !command.scene_format ? "scad" : "csg";
   std::error_code unknown;
   const auto bytes = std::filesystem::file_size(path, unknown);
@@ -294,6 +294,15 @@ Result<csg::Scene> load_scene(const CsgCommand& command, Session& session,
   }
   all.tree.set_root(all.tree.add(Operation::kUnion, roots));
   return all;
+}
+
+Result<Bounds> visible_box(const csg::Scene& scene, const Execution& execution) {
+  auto box = csg::result_bounds(scene.tree, scene.tree.root(), scene.relative_precision, execution);
+  if (!box) return box;
+  for (const auto* ghosts : {&scene.backgrounds, &scene.highlights}) {
+    for (const Tree::NodeId ghost : *ghosts) box->include(csg::bounds(scene.tree, ghost));
+  }
+  return box;
 }
 
 void cut_scene(csg::Scene& scene, const std::vector<SectionPlane>& cuts,

@@ -21,6 +21,9 @@ namespace strata::apps {
 Result<csg::Scene> load_scene(const CsgCommand& command, Session& session,
                               std::vector<InputFacts>* facts = nullptr);
 
+/// What the camera should see: the result, and the ghosts.
+Result<Bounds> visible_box(const csg::Scene& scene, const Execution& execution);
+
 /// Takes the sections away from the scene and its ghosts.
 void cut_scene(csg::Scene& scene, const std::vector<SectionPlane>& cuts, const csg::Camera& camera);
 

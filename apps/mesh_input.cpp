@@ -133,10 +133,13 @@ void warn_of_reading(const std::string& path, const MeshReadStats& stats, Sessio
   for (const std::string& text : stats.warnings) session.warn("reader", text);
 }
 
+bool reads_standard_input(const InputOptions& input) {
+  return std::find(input.files.begin(), input.files.end(), "-") != input.files.end();
+}
+
 MeshFormat format_of(const std::string& path, const InputOptions& input) {
-  const bool piped = std::find(input.files.begin(), input.files.end(), "-") != input.files.end();
   const bool told = mesh_format_of(path) != MeshFormat::kAuto || is_scene_name(path);
-  return piped && told ? MeshFormat::kAuto : input.format;
+  return told && reads_standard_input(input) ? MeshFormat::kAuto : input.format;
 }
 
 Result<void> check_input_name(const std::string& path, const InputOptions& input, bool scenes) {

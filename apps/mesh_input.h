@@ -71,6 +71,9 @@ Result<InputFacts> load_mesh(const std::string& path, const InputOptions& input,
                              const MeshInputRules& rules, Session& session, TriangleSoup& soup,
                              double* read_ms = nullptr);
 
+/// Whether standard input is among the files.
+[[nodiscard]] bool reads_standard_input(const InputOptions& input);
+
 /// The format that the options give a file, whatever its name is; kAuto: its name tells. With
 /// standard input among the files, they mean that, and files whose names tell nothing.
 [[nodiscard]] MeshFormat format_of(const std::string& path, const InputOptions& input);

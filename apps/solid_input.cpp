@@ -46,13 +46,10 @@ Result<MeshInput> load_united(const InputOptions& input, const MeshInputRules& r
 
 Result<MeshInput> load_solids(const InputOptions& input, const MeshInputRules& rules,
                               Session& session) {
-  const auto has = [&input](auto&& test) {
-    return std::any_of(input.files.begin(), input.files.end(), test);
-  };
-  if (input.format == MeshFormat::kAuto && has([](const auto& path) { return path == "-"; })) {
+  if (input.format == MeshFormat::kAuto && reads_standard_input(input)) {
     return fail(ErrorCode::kUsage, "standard input needs --input-format: obj, stl, ply or off");
   }
-  if (!has([](const std::string& path) { return is_scene_name(path); })) {
+  if (std::none_of(input.files.begin(), input.files.end(), is_scene_name)) {
     return rules.as_tree ? load_united(input, rules, session) : load_meshes(input, rules, session);
   }
   const double start = session.milliseconds();

@@ -121,12 +121,8 @@ Result<std::shared_ptr<const Model>> load_model(const apps::CsgCommand& command,
   auto scene = apps::load_scene(command, session);
   if (!scene) return tl::unexpected(scene.error());
   auto model = std::make_shared<Model>();
-  auto box =
-      csg::result_bounds(scene->tree, scene->tree.root(), scene->relative_precision, execution);
+  const auto box = apps::visible_box(*scene, execution);
   if (!box) return tl::unexpected(box.error());
-  for (const auto* ghosts : {&scene->backgrounds, &scene->highlights}) {
-    for (const Tree::NodeId ghost : *ghosts) box->include(csg::bounds(scene->tree, ghost));
-  }
   model->box = *box;
   for (const csg::Solid& solid : scene->tree.solids()) {
     if (solid.mesh) model->triangles += solid.mesh->triangles.size();
