@@ -19,9 +19,9 @@ std::string extension_of(const std::string& path) {
 Result<MeshFile> read_any_mesh(const std::string& path, const std::string& extension,
                                const Execution& execution) {
   if (extension == ".3mf" || extension == ".amf") {
-    auto soup = extension == ".3mf" ? read_3mf(path) : read_amf(path);
-    if (!soup) return tl::unexpected(soup.error());
     MeshFile file;
+    auto soup = (extension == ".3mf" ? read_3mf : read_amf)(path, execution, &file.stats.warnings);
+    if (!soup) return tl::unexpected(soup.error());
     file.soup = *std::move(soup);
     return file;
   }

@@ -14,41 +14,12 @@
 #include "mesh/shapes.h"
 #include "mesh/write_mesh.h"
 #include "tests/csg/scene_checks.h"
+#include "tests/csg/scene_files.h"
 
 namespace strata::csg {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// A folder that goes with the test.
-class SceneFiles : public testing::Test {
- protected:
-  SceneFiles() {
-    std::string name = (fs::temp_directory_path() / "strata-scene-XXXXXX").string();
-    if (::mkdtemp(name.data())) folder_ = name;
-  }
-  ~SceneFiles() override {
-    std::error_code ignored;
-    fs::remove_all(folder_, ignored);
-  }
-  std::string write(const std::string& name, std::string_view text) {
-    const fs::path path = folder_ / name;
-    fs::create_directories(path.parent_path());
-    std::ofstream(path, std::ios::binary) << text;
-    return path.string();
-  }
-  std::string write_box(const std::string& name, double size = 2.0) {
-    const std::string path = write(name, "");
-    EXPECT_TRUE(write_mesh(path, make_box(glm::dvec3(0), glm::dvec3(size))).has_value());
-    return path;
-  }
-  Scene read(const std::string& path, const ReadSceneOptions& options = {}) {
-    auto scene = read_scene(path, options);
-    EXPECT_TRUE(scene.has_value()) << scene.error().message;
-    return scene ? *std::move(scene) : Scene{};
-  }
-  fs::path folder_;
-};
 
 // --- files of a scene
 // -------------------------------------------------------------------------------
