@@ -95,10 +95,8 @@ void Evaluator::import(std::uint32_t node, const Context& context) {
     execution.progress = {};
     auto mesh = read_any_mesh(*path, extension, execution);
     if (!mesh) {
-      if (mesh.error().code == ErrorCode::kCancelled || mesh.error().code == ErrorCode::kLimit) {
-        return stop(mesh.error().code, node, mesh.error().message);
-      }
-      warn(node, "geometry", fmt::format("{}; it is left out", mesh.error().message));
+      leave_out(node, "geometry", mesh.error(), "it is left out");
+      if (error_) return;
     } else {
       if (mesh->stats.dropped_faces() > 0) {
         warn(node, "geometry",
@@ -129,7 +127,7 @@ Outline Evaluator::import_outline(std::uint32_t node, const std::string& path) {
   options.segments = segments(node);
   auto outline = read_outline(path, options);
   if (outline) return *std::move(outline);
-  warn(node, "geometry", fmt::format("{}; it is left out", outline.error().message));
+  leave_out(node, "geometry", outline.error(), "it is left out");
   return {};
 }
 

@@ -200,8 +200,7 @@ void Evaluator::polygon(std::uint32_t node, const Context& context) {
   for (const std::string& text : reader.faults()) warn(node, "geometry", text);
   auto outline = make_polygon(points, paths);
   if (!outline) {
-    return warn(node, "geometry",
-                fmt::format("{}; the polygon is left out", outline.error().message));
+    return leave_out(node, "geometry", outline.error(), "the polygon is left out");
   }
   add_outline(node, context, *std::move(outline));
 }
@@ -223,9 +222,8 @@ void Evaluator::text(std::uint32_t node, const Context& context) {
   std::string missing;
   auto outline = make_text(options, missing);
   if (!outline) {
-    return warn(
-        node, "missing-font",
-        fmt::format("{}; the text '{}' is left out", outline.error().message, options.text));
+    return leave_out(node, "missing-font", outline.error(),
+                     fmt::format("the text '{}' is left out", options.text));
   }
   if (!missing.empty()) {
     warn(node, "missing-font",
@@ -244,12 +242,7 @@ void Evaluator::surface(std::uint32_t node, const Context& context) {
   auto mesh = read_surface(*path, given.find("center", 1).truth(false),
                            given.truth("invert", false), &short_rows);
   if (!short_rows.empty()) warn(node, "geometry", short_rows);
-  if (!mesh) {
-    return mesh.error().code == ErrorCode::kLimit
-               ? stop(mesh.error().code, node, mesh.error().message)
-               : warn(node, "geometry",
-                      fmt::format("{}; the surface is left out", mesh.error().message));
-  }
+  if (!mesh) return leave_out(node, "geometry", mesh.error(), "the surface is left out");
   add_solid(node, context, *std::move(mesh));
 }
 

@@ -115,10 +115,7 @@ void Evaluator::hull(Frame& frame) {
   const TriangleSoup mesh = boundary_mesh(frame.node, united_solid(frame.base));
   if (error_ || mesh.positions.empty()) return;
   auto hull = convex_hull(mesh.positions);
-  if (!hull) {
-    return warn(frame.node, "geometry",
-                fmt::format("{}; the hull is left out", hull.error().message));
-  }
+  if (!hull) return leave_out(frame.node, "geometry", hull.error(), "the hull is left out");
   add_solid(frame.node, frame.outside, *std::move(hull));
 }
 
@@ -315,8 +312,7 @@ void Evaluator::rotate_extrude(Frame& frame) {
   options.segments = segments(frame.node);
   auto mesh = csg::rotate_extrude(outline, options);
   if (!mesh) {
-    return warn(frame.node, "geometry",
-                fmt::format("{}; the 'rotate_extrude' is left out", mesh.error().message));
+    return leave_out(frame.node, "geometry", mesh.error(), "the 'rotate_extrude' is left out");
   }
   add_solid(frame.node, frame.outside, *std::move(mesh));
 }
@@ -374,10 +370,7 @@ void Evaluator::flat_operation(Frame& frame) {
     case NodeKind::kRoof: {
       auto roof =
           make_roof(outline, given.find("method", 0).string("voronoi"), segments(frame.node));
-      if (!roof) {
-        return warn(frame.node, "not-done",
-                    fmt::format("{}; the roof is left out", roof.error().message));
-      }
+      if (!roof) return leave_out(frame.node, "not-done", roof.error(), "the roof is left out");
       return add_solid(frame.node, frame.outside, *std::move(roof));
     }
     default:

@@ -35,6 +35,14 @@ void Evaluator::stop(ErrorCode code, std::uint32_t node, std::string_view text) 
                                          : Error{code, fmt::format("{}: {}", place(node), text)};
 }
 
+void Evaluator::leave_out(std::uint32_t node, std::string code, const Error& error,
+                          std::string_view what) {
+  if (error.code == ErrorCode::kLimit || error.code == ErrorCode::kCancelled) {
+    return stop(error.code, node, error.message);
+  }
+  warn(node, std::move(code), fmt::format("{}; {}", error.message, what));
+}
+
 void Evaluator::add_solid(std::uint32_t node, const Context& context, TriangleSoup mesh,
                           InsideRule rule) {
   if (mesh.triangles.empty()) return;

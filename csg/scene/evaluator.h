@@ -166,6 +166,9 @@ class Evaluator {
                                        Tree& to);
   void warn(std::uint32_t node, std::string code, std::string_view text);
   void stop(ErrorCode code, std::uint32_t node, std::string_view text);
+  /// Warns that the error leaves something out: `error; what`. What a limit, the memory's above
+  /// all, or the user has stopped ends the whole run: another picture would be wrong.
+  void leave_out(std::uint32_t node, std::string code, const Error& error, std::string_view what);
   [[nodiscard]] std::string place(std::uint32_t node) const;
   [[nodiscard]] std::string_view name(std::uint32_t node) const;
   [[nodiscard]] NodeArguments arguments(std::uint32_t node) const {

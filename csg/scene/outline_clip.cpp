@@ -6,6 +6,7 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <limits>
+#include <new>
 #include <numbers>
 #include <polyclipping/clipper.hpp>
 #include <unordered_map>
@@ -117,10 +118,12 @@ Paths execute(ClipperLib::ClipType type, const Paths& subject, const Paths& clip
   Paths result;
   try {
     ClipperLib::Clipper clipper;
-    clipper.AddPaths(subject, ClipperLib::ptSubject, true);
-    clipper.AddPaths(clip, ClipperLib::ptClip, true);
-    clipper.Execute(type, result, fill, fill);
-  } catch (const std::exception&) {
+    const bool has_subject = clipper.AddPaths(subject, ClipperLib::ptSubject, true);
+    const bool has_clip = clipper.AddPaths(clip, ClipperLib::ptClip, true);
+    if (!has_subject && !has_clip) return {};  // nothing has an area
+    // It catches what it throws inside, above all that memory has run out.
+    if (!clipper.Execute(type, result, fill, fill)) throw std::bad_alloc();
+  } catch (const ClipperLib::clipperException&) {
     return {};  // a coordinate out of range; the grid excludes it
   }
   return result;
@@ -159,7 +162,7 @@ Outline offset(const Outline& outline, double delta, ClipperLib::JoinType join, 
     ClipperLib::ClipperOffset work(join == ClipperLib::jtMiter ? kMitreLimit : 2.0, tolerance);
     work.AddPaths(grid.to_grid(outline, false), join, ClipperLib::etClosedPolygon);
     work.Execute(result, grid.length(delta));
-  } catch (const std::exception&) {
+  } catch (const ClipperLib::clipperException&) {
     return {};
   }
   return grid.from_grid(result);
@@ -346,7 +349,7 @@ Outline stroke(std::span<const glm::dvec2> line, bool closed, double width, Stro
         kMitreLimit, half * (1.0 - std::cos(std::numbers::pi / std::max(segments, 3))));
     work.AddPath(path, joins, ends);
     work.Execute(result, half);
-  } catch (const std::exception&) {
+  } catch (const ClipperLib::clipperException&) {
     return {};
   }
   return grid.from_grid(result);

@@ -192,6 +192,7 @@ class Reader {
     pugi::xml_document document;
     const auto parsed = document.load_buffer(text_.data(), text_.size());
     if (!parsed) {
+      if (parsed.status == pugi::status_out_of_memory) throw std::bad_alloc();
       return fail(ErrorCode::kInput, "{}:{}: {}", name_, line_at(parsed.offset),
                   parsed.description());
     }

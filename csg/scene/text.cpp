@@ -16,6 +16,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <new>
 
 #include FT_FREETYPE_H
 #include FT_GLYPH_H
@@ -40,6 +41,13 @@ using Pattern = std::unique_ptr<FcPattern, Freer<FcPattern, FcPatternDestroy>>;
 using Buffer = std::unique_ptr<hb_buffer_t, Freer<hb_buffer_t, hb_buffer_destroy>>;
 using Font = std::unique_ptr<hb_font_t, Freer<hb_font_t, hb_font_destroy>>;
 
+/// The libraries say by codes and empty objects that memory has run out: that ends the job, as it
+/// does everywhere. @return whether the call of FreeType succeeded
+bool succeeded(FT_Error error) {
+  if (FT_ERROR_BASE(error) == FT_Err_Out_Of_Memory) throw std::bad_alloc();
+  return error == 0;
+}
+
 struct Match {
   FT_Face face = nullptr;
   std::string missing;  ///< the family that was asked for, when this is another
@@ -49,24 +57,26 @@ struct Match {
 class Fonts {
  public:
   Fonts() {
-    if (FT_Init_FreeType(&library_) != 0) library_ = nullptr;
-    if (library_ != nullptr) config_ = FcInitLoadConfigAndFonts();
+    if (FT_Init_FreeType(&library_) != 0) throw std::bad_alloc();
+    config_ = FcInitLoadConfigAndFonts();  // without any file there is still a configuration
+    if (config_ == nullptr) {
+      FT_Done_FreeType(library_);
+      throw std::bad_alloc();
+    }
   }
   ~Fonts() {
     for (auto& [name, match] : matches_) {
       if (match.face != nullptr) FT_Done_Face(match.face);
     }
-    if (library_ != nullptr) FT_Done_FreeType(library_);
-    if (config_ != nullptr) FcConfigDestroy(config_);
+    FT_Done_FreeType(library_);
+    FcConfigDestroy(config_);
   }
   Fonts(const Fonts&) = delete;
   Fonts& operator=(const Fonts&) = delete;
 
   Match find(const std::string& name) {
-    if (config_ == nullptr) return {};
-    const auto [at, made] = matches_.try_emplace(name);
-    if (made) at->second = look_up(name);
-    return at->second;
+    if (const auto known = matches_.find(name); known != matches_.end()) return known->second;
+    return matches_.emplace(name, look_up(name)).first->second;
   }
 
   std::mutex lock;
@@ -87,12 +97,14 @@ class Fonts {
     FcDefaultSubstitute(wanted.get());
     FcResult status = FcResultNoMatch;
     const Pattern found(FcFontMatch(config_, wanted.get(), &status));
+    if (status == FcResultOutOfMemory) throw std::bad_alloc();
     FcChar8* file = nullptr;
     if (!found || FcPatternGetString(found.get(), FC_FILE, 0, &file) != FcResultMatch) return {};
     int index = 0;
     FcPatternGetInteger(found.get(), FC_INDEX, 0, &index);
     Match match;
-    if (FT_New_Face(library_, reinterpret_cast<const char*>(file), index, &match.face) != 0) {
+    if (!succeeded(
+            FT_New_Face(library_, reinterpret_cast<const char*>(file), index, &match.face))) {
       return {};
     }
     bool same = asked.empty() || is_generic(asked);
@@ -136,36 +148,46 @@ struct Pen {
   }
   static Pen& of(void* user) { return *static_cast<Pen*>(user); }
 
+  /// An exception must not pass through FreeType: it becomes its code.
+  template <class Body>
+  static int guarded(const Body& body) {
+    try {
+      body();
+      return 0;
+    } catch (const std::bad_alloc&) {
+      return FT_Err_Out_Of_Memory;
+    }
+  }
   static int move(const FT_Vector* to, void* user) {
-    Pen& pen = of(user);
-    pen.contours.emplace_back();
-    pen.add(pen.last = point(to));
-    return 0;
+    return guarded([&] {
+      of(user).contours.emplace_back();
+      of(user).add(of(user).last = point(to));
+    });
   }
   static int line(const FT_Vector* to, void* user) {
-    Pen& pen = of(user);
-    pen.add(pen.last = point(to));
-    return 0;
+    return guarded([&] { of(user).add(of(user).last = point(to)); });
   }
   static int conic(const FT_Vector* control, const FT_Vector* to, void* user) {
-    Pen& pen = of(user);
-    const glm::dvec2 a = pen.last, b = point(control), c = point(to);
-    for (int i = 1; i <= pen.steps; ++i) {
-      const double t = static_cast<double>(i) / pen.steps, s = 1 - t;
-      pen.add(s * s * a + 2 * s * t * b + t * t * c);
-    }
-    pen.last = c;
-    return 0;
+    return guarded([&] {
+      Pen& pen = of(user);
+      const glm::dvec2 a = pen.last, b = point(control), c = point(to);
+      for (int i = 1; i <= pen.steps; ++i) {
+        const double t = static_cast<double>(i) / pen.steps, s = 1 - t;
+        pen.add(s * s * a + 2 * s * t * b + t * t * c);
+      }
+      pen.last = c;
+    });
   }
   static int cubic(const FT_Vector* c1, const FT_Vector* c2, const FT_Vector* to, void* user) {
-    Pen& pen = of(user);
-    const glm::dvec2 a = pen.last, b = point(c1), c = point(c2), d = point(to);
-    for (int i = 1; i <= pen.steps; ++i) {
-      const double t = static_cast<double>(i) / pen.steps, s = 1 - t;
-      pen.add(s * s * s * a + 3 * s * s * t * b + 3 * s * t * t * c + t * t * t * d);
-    }
-    pen.last = d;
-    return 0;
+    return guarded([&] {
+      Pen& pen = of(user);
+      const glm::dvec2 a = pen.last, b = point(c1), c = point(c2), d = point(to);
+      for (int i = 1; i <= pen.steps; ++i) {
+        const double t = static_cast<double>(i) / pen.steps, s = 1 - t;
+        pen.add(s * s * s * a + 3 * s * s * t * b + 3 * s * t * t * c + t * t * t * d);
+      }
+      pen.last = d;
+    });
   }
 };
 
@@ -241,6 +263,9 @@ Outline set_text(const TextOptions& options, FT_Face face) {
     }
   }
   hb_shape(font.get(), buffer.get(), nullptr, 0);
+  if (font.get() == hb_font_get_empty() || !hb_buffer_allocation_successful(buffer.get())) {
+    throw std::bad_alloc();
+  }
 
   unsigned count = 0;
   const hb_glyph_info_t* infos = hb_buffer_get_glyph_infos(buffer.get(), &count);
@@ -251,7 +276,7 @@ Outline set_text(const TextOptions& options, FT_Face face) {
     const Glyph glyph{infos[i].codepoint,
                       glm::dvec2(places[i].x_offset, places[i].y_offset) / kScale,
                       glm::dvec2(places[i].x_advance, places[i].y_advance) / kScale};
-    if (FT_Load_Glyph(face, glyph.index, FT_LOAD_DEFAULT) != 0) continue;
+    if (!succeeded(FT_Load_Glyph(face, glyph.index, FT_LOAD_DEFAULT))) continue;
     if (face->glyph->format != FT_GLYPH_FORMAT_OUTLINE) continue;
     glyphs.push_back(glyph);
     FT_BBox box;
@@ -280,9 +305,9 @@ Outline set_text(const TextOptions& options, FT_Face face) {
   pen.steps = std::max(options.segments.count(options.size) / 8 + 1, 2);
   glm::dvec2 place = alignment(options, extent, HB_DIRECTION_IS_HORIZONTAL(direction));
   for (const Glyph& glyph : glyphs) {
-    if (FT_Load_Glyph(face, glyph.index, FT_LOAD_DEFAULT) == 0) {
+    if (succeeded(FT_Load_Glyph(face, glyph.index, FT_LOAD_DEFAULT))) {
       pen.origin = place + glyph.offset;
-      FT_Outline_Decompose(&face->glyph->outline, &funcs, &pen);
+      succeeded(FT_Outline_Decompose(&face->glyph->outline, &funcs, &pen));
     }
     place += glyph.advance * options.spacing;
   }
@@ -313,8 +338,8 @@ Result<Outline> make_text(const TextOptions& options, std::string& missing) {
                 options.font.empty() ? kDefaultFont : options.font);
   }
   missing = match.missing;
-  if (FT_Set_Char_Size(match.face, 0, static_cast<FT_F26Dot6>(kScale), kDotsPerInch,
-                       kDotsPerInch) != 0) {
+  if (!succeeded(FT_Set_Char_Size(match.face, 0, static_cast<FT_F26Dot6>(kScale), kDotsPerInch,
+                                  kDotsPerInch))) {
     return fail(ErrorCode::kInput, "text: font '{}' cannot be scaled", options.font);
   }
   return set_text(options, match.face);
