@@ -12,6 +12,7 @@
 
 #include <unistd.h>
 
+#include "apps/allocation_failures.h"
 #include "apps/commands.h"
 #include "apps/file_conflicts.h"
 #include "apps/session.h"
@@ -27,9 +28,6 @@
 
 namespace strata::apps {
 namespace {
-
-constexpr const char* kNoMemory =
-    "out of memory: the limit (--memory-limit) or what the system grants is used up";
 
 /// Where no catch clause can reach, such as in another library's thread: a sentence and a code all
 /// the same.

@@ -1,0 +1,13 @@
+#pragma once
+
+namespace strata::apps {
+
+/// Whether `operator new` has failed in this process. Whatever caught that exception, here or in a
+/// library, may have gone on without what it asked for: outputs must not appear any more.
+[[nodiscard]] bool allocation_has_failed() noexcept;
+
+/// The sentence for it.
+inline constexpr const char* kNoMemory =
+    "out of memory: the limit (--memory-limit) or what the system grants is used up";
+
+}  // namespace strata::apps
