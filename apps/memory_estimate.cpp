@@ -44,7 +44,7 @@ MemoryEstimate estimate_memory(const MeshInput& input, const VoxelGrid& grid, Ax
 
   // Area in voxel faces; a triangle of side d voxels meets about (1 + d / 64)^2 tiles.
   const glm::dvec3 s = grid.voxel_size;
-  const double face = std::cbrt(s.x * s.y * s.z);
+  const double face = std::cbrt(s.x) * std::cbrt(s.y) * std::cbrt(s.z);  // the product may be 0
   const double area = (input.tree ? area_of(input.soup) : input.area) / (face * face);
   const double side = triangles > 0 ? std::sqrt(2 * area / triangles) : 0;
   const double tiles = columns(grid, axis) / kTilePixels + 1;
@@ -75,7 +75,8 @@ MemoryEstimate estimate_memory(const MeshInput& input, const VoxelGrid& grid, Ax
     // are a zlib stream a leaf, which takes about as much.
     estimate.output = rounded(area * 1.5 / 64 * (command.ids ? 144 : 72));
   } else if (format == "binvox") {
-    estimate.output = rounded(columns(grid, axis) * 8);
+    const double longest = std::max({grid.dims.x, grid.dims.y, grid.dims.z});
+    estimate.output = rounded(columns(grid, axis) * 8 + longest * longest / 127 * threads);
   } else if (!format.empty()) {
     // Formats written piece by piece: a few layers of packed or compressed voxels.
     estimate.output = rounded(16e6 + columns(grid, axis));

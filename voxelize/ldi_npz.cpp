@@ -22,6 +22,7 @@
 
 #include "core/grid.h"
 #include "voxelize/ldi_io.h"
+#include "voxelize/npy_head.h"
 #include "voxelize/seekable_output.h"
 
 namespace strata {
@@ -59,20 +60,6 @@ zlib_filefunc64_def output_functions(SeekableOutput& output) {
   return f;
 }
 
-// The head of a .npy file, version 1.0: [magic:6 | version:2 | length:u16 | dictionary], padded so
-// that the data starts at a multiple of 64.
-std::string npy_head(std::string_view type, std::string_view shape) {
-  std::string text =
-      fmt::format("{{'descr': '{}', 'fortran_order': False, 'shape': {}, }}", type, shape);
-  constexpr std::size_t kFixed = 10;
-  text.append(63 - (kFixed + text.size()) % 64, ' ');
-  text += '\n';
-  std::string head("\x93NUMPY\x01\x00", 8);
-  head += static_cast<char>(text.size() & 0xff);
-  head += static_cast<char>(text.size() >> 8);
-  return head + text;
-}
-
 class NpzWriter {
  public:
   NpzWriter(SeekableOutput& output, const LdiNpzOptions& options, const Execution& execution,
@@ -98,7 +85,7 @@ class NpzWriter {
                               nullptr, 0, nullptr, method, Z_DEFAULT_COMPRESSION, 1) != ZIP_OK) {
       return false;
     }
-    const std::string head = npy_head(type, shape);
+    const std::string head = npy_head(type, false, shape);
     bool ok = write(std::as_bytes(std::span(head)));
     for (std::size_t begin = 0; ok && begin < count; begin += kPart) {
       if (execution_.stop.stop_requested()) return false;

@@ -50,6 +50,7 @@ VoxelWriterResult open_format(const std::string& path, const std::string& name,
   if (name == "vdb") return open_vdb_writer(path, grid, options);
   if (name == "png") return open_png_writer(path, grid, options);
   if (name == "npy") return open_npy_writer(path, grid, options);
+  if (name == "npz") return open_npz_writer(path, grid, options);
   if (name == "nrrd") return open_nrrd_writer(path, grid, options);
   if (name == "vti") return open_vti_writer(path, grid, options);
   if (name == "binvox") return open_binvox_writer(path, grid);
@@ -66,10 +67,13 @@ const std::vector<VoxelFormat>& voxel_formats() {
       {"vdb", ".vdb", "OpenVDB: active voxels, a fog volume, or ids; world transform", Axis::kZ, 0,
        kAnyId},
       {"npy", ".npy", "NumPy: bool array indexed [x, y, z]; ids", Axis::kX, 0, kAnyId},
+      {"npz", ".npz", "NumPy: arrays voxels (as .npy, deflated), origin, spacing; ids", Axis::kX, 0,
+       kAnyId},
       {"nrrd", ".nrrd", "NRRD: uint8, gzip; world transform; ids", Axis::kX, 0, kAnyId},
       {"vti", ".vti", "VTK image data: uint8 cells, zlib; world transform; ids", Axis::kX, 0,
        kAnyId},
-      {"binvox", ".binvox", "binvox: run lengths; cubic voxels, world transform", Axis::kY},
+      {"binvox", ".binvox", "binvox: run lengths; cubic voxels in a cube, world transform",
+       Axis::kY},
       {"vox", ".vox", "MagicaVoxel: up to 2000 voxels a side; colours of scenes, ids", Axis::kZ,
        kVoxColours, kVoxColours},
       {"png", "/", "folder of 1-bit PNG slices, one a layer of z, and slices.json; ids", Axis::kX,

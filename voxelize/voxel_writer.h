@@ -13,11 +13,13 @@ namespace strata {
 
 /// One output format of `strata voxelize`.
 struct VoxelFormat {
-  std::string
-      name;  ///< what --format takes: "vdb", "npy", "nrrd", "vti", "binvox", "vox", "png", "zarr"
+  std::string name;  ///< what --format takes: "vdb", "npy", "npz", "nrrd", "vti", "binvox", "vox",
+                     ///< "png", "zarr"
   std::string extension;    ///< with the dot; that of a folder format ends with a slash
   std::string description;  ///< one line for --list-formats
-  Axis axis = Axis::kZ;  ///< the rays whose intervals this format is written from at the least cost
+  /// The axis of the intervals that this format is written from as they come. Those of another axis
+  /// are turned first (voxelize/transposed.h).
+  Axis axis = Axis::kZ;
   std::size_t colours = 0;  ///< that a file holds, one a voxel; 0: none
   std::uint32_t ids = 0;    ///< the largest id that a voxel can have; 0: no ids
 };

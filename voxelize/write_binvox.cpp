@@ -1,7 +1,7 @@
 // binvox (Min, patrickmin.com/binvox/binvox.html): run lengths of bytes, y fastest, then z, then x.
-// "dim" therefore reads nx nz ny: the sizes from the slowest to the fastest axis. Sides may differ,
-// which binvox itself never writes but most readers take. A world position is
-// translate + scale * (index + 0.5) / largest side, so voxels must be cubes.
+// The grid is a cube, as binvox itself writes it: many readers refuse or misread other shapes. So
+// empty voxels are added beyond the greatest x, y and z. A world position is
+// translate + scale * (index + 0.5) / side, so voxels must be cubes.
 //
 // Slabs come by z, the file wants x slowest: the run lengths wait in memory until all are there.
 
@@ -48,7 +48,9 @@ class RunLengths {
 class BinvoxWriter final : public SlabWriter {
  public:
   BinvoxWriter(const std::string& path, const VoxelGrid& grid, BlockOutput output)
-      : SlabWriter(path, grid, Axis::kY), output_(std::move(output)) {}
+      : SlabWriter(path, grid, Axis::kY),
+        output_(std::move(output)),
+        side_(std::max({grid.dims.x, grid.dims.y, grid.dims.z})) {}
 
  private:
   Result<void> add_slab(const VoxelIntervals& slab, const Execution& execution) override {
@@ -76,7 +78,7 @@ class BinvoxWriter final : public SlabWriter {
           runs.run(1, interval.length());
           done = interval.end();
         }
-        runs.run(0, dims().y - done);
+        runs.run(0, side_ - done);
       }
       runs.flush();
       pieces_[first + tile][static_cast<std::size_t>(x)] = Bytes(bytes.begin(), bytes.end());
@@ -86,23 +88,34 @@ class BinvoxWriter final : public SlabWriter {
 
   Result<void> finish_output(const Execution& execution) override {
     const VoxelGrid& g = grid();
-    const double scale = std::max({g.dims.x, g.dims.y, g.dims.z}) * g.voxel_size.x;
     Result<void> written = output_.append(
-        fmt::format("#binvox 1\ndim {} {} {}\ntranslate {} {} {}\nscale {}\ndata\n", g.dims.x,
-                    g.dims.z, g.dims.y, g.origin.x, g.origin.y, g.origin.z, scale));
+        fmt::format("#binvox 1\ndim {0} {0} {0}\ntranslate {1} {2} {3}\nscale {4}\ndata\n", side_,
+                    g.origin.x, g.origin.y, g.origin.z, side_ * g.voxel_size.x));
     if (!written) return written;
-    written = output_.append_blocks(execution, static_cast<std::size_t>(g.dims.x),
+    const auto layers = static_cast<std::size_t>(g.dims.x);
+    written = output_.append_blocks(execution, static_cast<std::size_t>(side_),
                                     [&](std::size_t x, Bytes& out, int) {
                                       out.clear();
+                                      if (x >= layers) return put_empty_rows(out, side_);
                                       for (const std::vector<Bytes>& row : pieces_) {
                                         out.insert(out.end(), row[x].begin(), row[x].end());
                                       }
+                                      put_empty_rows(out, side_ - dims().z);
                                     });
     if (!written) return written;
     return output_.commit();
   }
 
+  void put_empty_rows(Bytes& out, int rows) const {
+    RunLengths runs(out);
+    for (int z = 0; z < rows; z += VoxelIntervals::kTileSide) {  // not more than a run counts
+      runs.run(0, side_ * std::min(rows - z, VoxelIntervals::kTileSide));
+      runs.flush();
+    }
+  }
+
   BlockOutput output_;
+  int side_;                                // of the cube, in voxels
   std::vector<std::vector<Bytes>> pieces_;  // by 64 rows of z, then by x
   std::vector<Bytes> scratch_;              // by worker
 };

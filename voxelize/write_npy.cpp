@@ -1,9 +1,7 @@
 // NumPy's .npy, version 1.0 (numpy/lib/format.py). Shape (nx, ny, nz), so that a[i, j, k] is voxel
 // (i, j, k); fortran_order, so that x is fastest and the slabs follow one another: C order would
 // need the whole array, or seeking, which pipes cannot. numpy.load treats both alike. The format
-// has no place for the world transform.
-
-#include <fmt/format.h>
+// has no place for the world transform; .npz has (write_npz.cpp).
 
 #include <memory>
 #include <string>
@@ -11,6 +9,7 @@
 
 #include "voxelize/block_output.h"
 #include "voxelize/dense_rows.h"
+#include "voxelize/npy_head.h"
 #include "voxelize/slab_writer.h"
 #include "voxelize/writers.h"
 
@@ -22,22 +21,7 @@ class NpyWriter final : public SlabWriter {
   NpyWriter(const std::string& path, const VoxelGrid& grid, std::uint32_t ids, BlockOutput output)
       : SlabWriter(path, grid, Axis::kX), values_(ids), output_(std::move(output)) {}
 
-  Result<void> begin() {
-    constexpr std::size_t kAlignment = 64, kPreamble = 10;
-    const char* type = values_.kind == RunBytes::kFlags ? "|b1"
-                       : values_.bytes == 1             ? "|u1"
-                       : values_.bytes == 2             ? "<u2"
-                                                        : "<u4";
-    std::string header =
-        fmt::format("{{'descr': '{}', 'fortran_order': True, 'shape': ({}, {}, {}), }}", type,
-                    dims().x, dims().y, dims().z);
-    header.append(kAlignment - (kPreamble + header.size() + 1) % kAlignment, ' ');
-    header += '\n';
-    std::string preamble("\x93NUMPY\x01\x00", 8);
-    preamble += static_cast<char>(header.size() & 0xff);
-    preamble += static_cast<char>(header.size() >> 8);
-    return output_.append(preamble + header);
-  }
+  Result<void> begin() { return output_.append(npy_head(values_, dims())); }
 
  private:
   Result<void> add_slab(const VoxelIntervals& slab, const Execution& execution) override {

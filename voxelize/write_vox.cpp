@@ -2,8 +2,9 @@
 // and -extension.txt). A model has at most 256 voxels a side; larger grids are several models,
 // put in their places by a scene graph:
 //   nTRN 0 - nGRP 1 - for each model m: nTRN 2 + 2m (its translation) - nSHP 3 + 2m
-// A model stands on its centre, floor(size / 2). The format lists voxels one by one, and has no
-// place for the world transform; z is up, as here.
+// A model stands on its centre, floor(size / 2). The grid's own centre is put at 0: the editor
+// shows places from -1000 to 999 and cuts off what lies beyond. The format lists voxels one by one,
+// and has no place for the world transform; z is up, as here.
 
 #include <array>
 #include <cstring>
@@ -125,7 +126,7 @@ class VoxWriter final : public SlabWriter {
       if (one || model.voxels != 0) kept.push_back(model);
     }
     if (kept.empty()) kept.push_back(models_.front());  // a file has at least one
-    const Bytes graph = one ? Bytes() : scene_graph(kept);
+    const Bytes graph = one ? Bytes() : scene_graph(kept, dims());
     constexpr std::uint64_t kModelHeads = 12 + 12 + 12 + 4;  // SIZE, XYZI and its count
     const Bytes colours = palette_.empty() ? Bytes() : palette();
     const std::uint64_t children =
@@ -199,7 +200,7 @@ class VoxWriter final : public SlabWriter {
     }
   }
 
-  static Bytes scene_graph(const std::vector<Model>& models) {
+  static Bytes scene_graph(const std::vector<Model>& models, const glm::ivec3& dims) {
     constexpr int kNoDictionary = 0, kReserved = -1, kNoLayer = -1, kFrames = 1;
     Bytes graph, content;
     const auto put_transform = [&](int id, int child, int layer, const std::string& translation) {
@@ -222,7 +223,7 @@ class VoxWriter final : public SlabWriter {
     put_chunk(graph, "nGRP", content);
     for (int m = 0; m < count; ++m) {
       const Model& model = models[static_cast<std::size_t>(m)];
-      const glm::ivec3 centre = model.begin + model.size / 2;
+      const glm::ivec3 centre = model.begin + model.size / 2 - dims / 2;
       put_transform(2 + 2 * m, 3 + 2 * m, 0, fmt::format("{} {} {}", centre.x, centre.y, centre.z));
       content.clear();
       for (const int value : {3 + 2 * m, kNoDictionary, 1, m, kNoDictionary}) {

@@ -19,6 +19,8 @@ VoxelWriterResult open_png_writer(const std::string& path, const VoxelGrid& grid
                                   const VoxelWriterOptions& options);
 VoxelWriterResult open_npy_writer(const std::string& path, const VoxelGrid& grid,
                                   const VoxelWriterOptions& options);
+VoxelWriterResult open_npz_writer(const std::string& path, const VoxelGrid& grid,
+                                  const VoxelWriterOptions& options);
 VoxelWriterResult open_nrrd_writer(const std::string& path, const VoxelGrid& grid,
                                    const VoxelWriterOptions& options);
 VoxelWriterResult open_vti_writer(const std::string& path, const VoxelGrid& grid,

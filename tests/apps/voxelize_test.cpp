@@ -182,7 +182,7 @@ TEST_F(Voxelize, TheAreaEstimateDoesNotDependOnSlabs) {
 
 TEST_F(Voxelize, FilesOfEveryFormatAppearAndAreReported) {
   put("box.obj", make_box({0, 0, 0}, {2, 1, 1}));
-  for (const char* name : {"a.vdb", "a.npy", "a.nrrd", "a.vti", "a.binvox", "a.vox"}) {
+  for (const char* name : {"a.vdb", "a.npy", "a.npz", "a.nrrd", "a.vti", "a.binvox", "a.vox"}) {
     const json found = report({"box.obj", "-r", "16", "-o", name});
     EXPECT_EQ(found["output"]["path"], name);
     EXPECT_EQ(found["output"]["bytes"], place.read(name).size()) << name;

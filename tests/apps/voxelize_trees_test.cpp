@@ -369,7 +369,7 @@ TEST_F(VoxelizeTrees, IdsThatCannotBeAreRefusedAtOnce) {
     EXPECT_EQ(run.exit_code, 2) << run.err;
     return run.err;
   };
-  EXPECT_NE(refused({"-o", "a.binvox"}).find("npy, nrrd, vti"), std::string::npos);
+  EXPECT_NE(refused({"-o", "a.binvox"}).find("npy, npz, nrrd, vti"), std::string::npos);
   EXPECT_NE(refused({"-o", "a.npy", "--surface"}).find("--surface"), std::string::npos);
   EXPECT_NE(refused({"-o", "a.vdb", "--fog"}).find("--fog"), std::string::npos);
   EXPECT_EQ(place.names(), std::vector<std::string>{"box.obj"});

@@ -11,6 +11,7 @@ namespace {
 
 ReadVoxels read(const std::string& path, const std::string& format, glm::ivec3 dims) {
   if (format == "npy") return read_npy(path);
+  if (format == "npz") return read_npz(path);
   if (format == "nrrd") return read_nrrd(path);
   if (format == "vti") return read_vti(path);
   if (format == "vox") return read_vox(path, dims);
@@ -122,7 +123,7 @@ TEST(IdsOfOtherFormats, AreRefusedWithTheNamesOfThoseThatHoldThem) {
       open_voxel_writer(folder.file("a.binvox"), "", make_grid({8, 8, 8}), options);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::kUsage);
-  EXPECT_NE(refused.error().message.find("npy, nrrd, vti"), std::string::npos)
+  EXPECT_NE(refused.error().message.find("npy, npz, nrrd, vti"), std::string::npos)
       << refused.error().message;
 }
 

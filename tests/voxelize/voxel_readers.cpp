@@ -98,8 +98,9 @@ std::string inflate_all(const std::string& data, int window_bits, std::size_t ex
   return out;
 }
 
-ReadVoxels read_npy(const std::string& path) {
-  const std::string data = file_bytes(path);
+namespace {
+
+ReadVoxels parse_npy(const std::string& data) {
   require(data.starts_with(std::string("\x93NUMPY\x01\x00", 8)), "magic");
   const auto length = number_at<std::uint16_t>(data, 8);
   require((10 + length) % 64 == 0, "alignment");
@@ -112,6 +113,79 @@ ReadVoxels read_npy(const std::string& path) {
   voxels.id_bits = 8 * (type[2] - '0');
   if (type == "|b1") voxels.id_bits = 8;
   take_dense(voxels, data.substr(10 + std::size_t{length}));
+  return voxels;
+}
+
+/// The entries of a ZIP by its directory, as Python's zipfile reads it. The local heads have to say
+/// the same, or that what they lack follows the data.
+std::map<std::string, std::string> read_zip(const std::string& data) {
+  const std::size_t end = data.rfind(std::string("PK\x05\x06", 4));
+  require(end != std::string::npos && end + 22 == data.size(), "end of the directory");
+  const auto size = number_at<std::uint32_t>(data, end + 12);
+  std::uint64_t at = number_at<std::uint32_t>(data, end + 16);
+  if (at == 0xffffffff) {
+    require(data.substr(end - 20, 4) == std::string("PK\x06\x07", 4), "locator");
+    const auto record = number_at<std::uint64_t>(data, end - 12);
+    require(data.substr(record, 4) == std::string("PK\x06\x06", 4), "64-bit end");
+    at = number_at<std::uint64_t>(data, record + 48);
+    require(at + size == record, "size of the directory");
+  } else {
+    require(at + size == end, "size of the directory");
+  }
+  std::map<std::string, std::string> entries;
+  for (int count = number_at<std::uint16_t>(data, end + 10); count > 0; --count) {
+    require(data.substr(at, 4) == std::string("PK\x01\x02", 4), "directory");
+    const auto flags = number_at<std::uint16_t>(data, at + 8);
+    const auto method = number_at<std::uint16_t>(data, at + 10);
+    const auto crc = number_at<std::uint32_t>(data, at + 16);
+    std::uint64_t packed = number_at<std::uint32_t>(data, at + 20);
+    std::uint64_t bytes = number_at<std::uint32_t>(data, at + 24);
+    const std::size_t name = number_at<std::uint16_t>(data, at + 28);
+    const std::size_t extra = number_at<std::uint16_t>(data, at + 30);
+    const std::size_t head = number_at<std::uint32_t>(data, at + 42);
+    if (bytes == 0xffffffff) {
+      require(extra == 20 && number_at<std::uint16_t>(data, at + 46 + name) == 1, "64-bit sizes");
+      bytes = number_at<std::uint64_t>(data, at + 50 + name);
+      packed = number_at<std::uint64_t>(data, at + 58 + name);
+    }
+    require(data.substr(head, 4) == std::string("PK\x03\x04", 4), "local head");
+    require(data.substr(head + 30, name) == data.substr(at + 46, name), "local name");
+    require((flags & 8) != 0 || data.substr(head + 14, 12) == data.substr(at + 16, 12), "sizes");
+    const std::size_t begin = head + 30 + name + number_at<std::uint16_t>(data, head + 28);
+    std::string content = data.substr(begin, packed);
+    if (method != 0) content = inflate_all(content, -15, bytes);
+    require(content.size() == bytes, "size of an entry");
+    require(
+        crc32(0, reinterpret_cast<const Bytef*>(content.data()), static_cast<uInt>(bytes)) == crc,
+        "checksum of an entry");
+    if ((flags & 8) != 0)
+      require(number_at<std::uint32_t>(data, begin + packed + 4) == crc, "after");
+    require(entries.emplace(data.substr(at + 46, name), content).second, "name given twice");
+    at += 46 + name + extra;
+  }
+  return entries;
+}
+
+glm::dvec3 three_doubles(const std::string& npy) {
+  const std::size_t length = number_at<std::uint16_t>(npy, 8);
+  require(
+      match(npy, "'descr': '([^']*)'") == "<f8" && match(npy, "'shape': (\\([^)]*\\))") == "(3,)",
+      "three doubles");
+  require(npy.size() == 10 + length + 24, "size");
+  return {number_at<double>(npy, 10 + length), number_at<double>(npy, 18 + length),
+          number_at<double>(npy, 26 + length)};
+}
+
+}  // namespace
+
+ReadVoxels read_npy(const std::string& path) { return parse_npy(file_bytes(path)); }
+
+ReadVoxels read_npz(const std::string& path) {
+  const auto arrays = read_zip(file_bytes(path));
+  require(arrays.size() == 3, "three arrays");
+  auto voxels = parse_npy(arrays.at("voxels.npy"));
+  voxels.origin = three_doubles(arrays.at("origin.npy"));
+  voxels.voxel_size = three_doubles(arrays.at("spacing.npy"));
   return voxels;
 }
 
@@ -184,13 +258,14 @@ ReadVoxels read_vti(const std::string& path) {
   return voxels;
 }
 
-ReadVoxels read_binvox(const std::string& path) {
+ReadVoxels read_binvox(const std::string& path, glm::ivec3 dims) {
   const std::string data = file_bytes(path);
   const std::size_t end = data.find("\ndata\n");
   require(data.starts_with("#binvox 1\n") && end != std::string::npos, "header");
   const std::string header = data.substr(0, end + 1);
   const auto sizes = vector_of<glm::ivec3>(match(header, "\ndim (.*)\n"));  // depth height width
-  auto voxels = of_size({sizes.x, sizes.z, sizes.y});
+  require(sizes == glm::ivec3(std::max({dims.x, dims.y, dims.z})), "a cube around the grid");
+  auto voxels = of_size(dims);
   voxels.origin = vector_of<glm::dvec3>(match(header, "\ntranslate (.*)\n"));
   voxels.voxel_size = glm::dvec3(std::stod(match(header, "\nscale (.*)\n")) /
                                  std::max({sizes.x, sizes.y, sizes.z}));
@@ -202,13 +277,15 @@ ReadVoxels read_binvox(const std::string& path) {
     const auto count = number_at<std::uint8_t>(data, at + 1);
     require(value <= 1 && count > 0, "run");
     for (int i = 0; i < count; ++i, ++index) {
-      require(index < voxels.solid.size(), "too many voxels");
-      voxels.solid[voxels.index(static_cast<int>(index / (width * height)),
-                                static_cast<int>(index % width),
-                                static_cast<int>(index / width % height))] = value;
+      const glm::ivec3 voxel(index / (width * height), index % width, index / width % height);
+      if (voxel.x < dims.x && voxel.y < dims.y && voxel.z < dims.z) {
+        voxels.solid[voxels.index(voxel.x, voxel.y, voxel.z)] = value;
+      } else {
+        require(value == 0, "voxel outside of the grid");
+      }
     }
   }
-  require(index == voxels.solid.size(), "too few voxels");
+  require(index == volume(sizes), "number of voxels");
   return voxels;
 }
 
@@ -234,7 +311,11 @@ struct VoxScene {
     }
     if (const auto found = shapes.find(node); found != shapes.end()) {
       const Model& model = models.at(static_cast<std::size_t>(found->second));
-      put(model, at - model.size / 2, voxels);
+      const glm::ivec3 corner = at - model.size / 2;  // the editor cuts off what lies beyond
+      for (int axis = 0; axis < 3; ++axis) {
+        require(corner[axis] >= -1000 && corner[axis] + model.size[axis] <= 1000, "editor's range");
+      }
+      put(model, corner + voxels.dims / 2, voxels);
     }
   }
   static void put(const Model& model, glm::ivec3 corner, ReadVoxels& voxels) {
@@ -365,7 +446,7 @@ void take_grey(const std::string& file, int k, ReadVoxels& voxels) {
   const std::string rows =
       inflate_all(file.substr(data + 4, length), 15, row * static_cast<std::size_t>(voxels.dims.y));
   for (int j = 0; j < voxels.dims.y; ++j) {
-    std::size_t at = static_cast<std::size_t>(j) * row;
+    std::size_t at = static_cast<std::size_t>(voxels.dims.y - 1 - j) * row;
     require(rows[at++] == 0, "filter");
     for (int i = 0; i < voxels.dims.x; ++i) {
       std::uint32_t value = 0;
@@ -385,6 +466,9 @@ ReadVoxels read_png_folder(const std::string& path) {
   auto voxels = of_size(vector_of<glm::ivec3>(match(json, "\"dims\": \\[([^\\]]*)\\]")));
   voxels.origin = vector_of<glm::dvec3>(match(json, "\"origin\": \\[([^\\]]*)\\]"));
   voxels.voxel_size = vector_of<glm::dvec3>(match(json, "\"voxel_size\": \\[([^\\]]*)\\]"));
+  require(match(json, "\"row_axis\": \"(.)\"") == "y" &&
+              match(json, "\"row_order\": \"(\\w+)\"") == "descending",
+          "rows");
   int files = 0;
   for (const auto& entry : std::filesystem::directory_iterator(path)) {
     files += entry.path().extension() == ".png" ? 1 : 0;
@@ -410,9 +494,9 @@ ReadVoxels read_png_folder(const std::string& path) {
       continue;
     }
     for (int j = 0; j < voxels.dims.y; ++j) {
+      const auto row = static_cast<std::size_t>(voxels.dims.y - 1 - j);  // from the greatest y down
       for (int i = 0; i < voxels.dims.x; ++i) {
-        const png_byte grey =
-            pixels[static_cast<std::size_t>(j) * image.width + static_cast<std::size_t>(i)];
+        const png_byte grey = pixels[row * image.width + static_cast<std::size_t>(i)];
         require(grey == 0 || grey == 255, "grey value");
         voxels.solid[voxels.index(i, j, k)] = grey == 255 ? 1 : 0;
       }

@@ -26,12 +26,13 @@ struct ReadVoxels {
   }
 };
 
-/// All of them throw std::runtime_error on anything unexpected. A .vox file of several models has
-/// no size of its own: the grid's is given.
+/// All of them throw std::runtime_error on anything unexpected. A .vox file of several models and a
+/// .binvox, whose grid is a cube, do not tell the size of the grid: it is given.
 ReadVoxels read_npy(const std::string& path);
+ReadVoxels read_npz(const std::string& path);
 ReadVoxels read_nrrd(const std::string& path);
 ReadVoxels read_vti(const std::string& path);
-ReadVoxels read_binvox(const std::string& path);
+ReadVoxels read_binvox(const std::string& path, glm::ivec3 dims);
 ReadVoxels read_vox(const std::string& path, glm::ivec3 dims);
 ReadVoxels read_png_folder(const std::string& path);
 ReadVoxels read_zarr(const std::string& path);

@@ -31,9 +31,10 @@ Result<void> write(const std::string& path, const std::string& format, const Vox
 
 ReadVoxels read(const std::string& path, const std::string& format, glm::ivec3 dims) {
   if (format == "npy") return read_npy(path);
+  if (format == "npz") return read_npz(path);
   if (format == "nrrd") return read_nrrd(path);
   if (format == "vti") return read_vti(path);
-  if (format == "binvox") return read_binvox(path);
+  if (format == "binvox") return read_binvox(path, dims);
   if (format == "vox") return read_vox(path, dims);
   if (format == "png") return read_png_folder(path);
   if (format == "zarr") return read_zarr(path);
@@ -339,9 +340,9 @@ TEST_P(OnPipes, StandardOutputGetsTheFile) {
     close(ends[0]);
     ASSERT_TRUE(written) << written.error().message;
     const std::string path = folder_.file(sample.name);
-    if (format().name == "vti") {  // not compressed on a pipe
+    if (format().name == "vti" || format().name == "npz") {  // not filled in later on a pipe
       std::ofstream(path, std::ios::binary) << piped;
-      const ReadVoxels voxels = read_vti(path);
+      const ReadVoxels voxels = read(path, format().name, set.grid().dims);
       std::uint64_t solid = 0;
       for (const std::uint8_t voxel : voxels.solid) solid += voxel;
       EXPECT_EQ(solid, set.solid_voxels());
@@ -371,6 +372,7 @@ TEST(VoxelFormats, FollowTheExtension) {
   EXPECT_EQ(name("a.vdb"), "vdb");
   EXPECT_EQ(name("dir.npy/a.VDB"), "vdb");
   EXPECT_EQ(name("a.npy"), "npy");
+  EXPECT_EQ(name("a.npz"), "npz");
   EXPECT_EQ(name("a.nrrd"), "nrrd");
   EXPECT_EQ(name("a.vti"), "vti");
   EXPECT_EQ(name("a.binvox"), "binvox");
@@ -396,7 +398,7 @@ TEST(VoxelFormats, AllAreListed) {
     names += format.name + " ";
     EXPECT_FALSE(format.description.empty());
   }
-  EXPECT_EQ(names, "vdb npy nrrd vti binvox vox png zarr ");
+  EXPECT_EQ(names, "vdb npy npz nrrd vti binvox vox png zarr ");
 }
 
 TEST(BinvoxWriter, RefusesVoxelsThatAreNotCubes) {
@@ -454,6 +456,35 @@ TEST(VoxWriter, ModelsOfALargeGridStandInTheirPlaces) {
   }
 }
 
+TEST(VoxWriter, TheLargestGridLiesInTheEditorsRange) {
+  const TemporaryFolder folder;
+  for (const glm::ivec3 dims : {glm::ivec3(2000, 1, 3), glm::ivec3(2, 1999, 257)}) {
+    const Sample sample{"corners", make_grid(dims), [dims](int i, int j, int k) {
+                          return (i == 0 || i == dims.x - 1) && (j == 0 || j == dims.y - 1) &&
+                                 (k == 0 || k == dims.z - 1);
+                        }};
+    const std::string path = folder.file("a.vox");
+    ASSERT_TRUE(write(path, "", intervals_of(sample, Axis::kZ)));
+    const ReadVoxels voxels = read_vox(path, dims);  // refuses what lies beyond
+    EXPECT_EQ(std::count(voxels.solid.begin(), voxels.solid.end(), 1),
+              intervals_of(sample, Axis::kZ).solid_voxels());
+  }
+}
+
+TEST(PngWriter, ALayerIsSeenUprightFromAbove) {
+  // An F: its stem on the left, the long bar on top.
+  const TemporaryFolder folder;
+  const Sample sample{"F", make_grid({8, 5, 1}), [](int i, int j, int) {
+                        return i == 0 || (j == 4 && i < 4) || (j == 2 && i < 3);
+                      }};
+  ASSERT_TRUE(write(folder.file("f/"), "", intervals_of(sample, Axis::kX)));
+  const std::string file = file_bytes(folder.file("f/slice_00000.png"));
+  const std::size_t data = file.find("IDAT") + 4;
+  const std::size_t end = file.find("IEND") - 8;
+  const std::string rows = inflate_all(file.substr(data, end - data), 15, 10);
+  EXPECT_EQ(rows, std::string("\0\xf0\0\x80\0\xe0\0\x80\0\x80", 10));
+}
+
 TEST(PngWriter, AFolderWithContentIsNotReplaced) {
   const TemporaryFolder folder;
   std::filesystem::create_directory(folder.file("slices"));
@@ -461,6 +492,36 @@ TEST(PngWriter, AFolderWithContentIsNotReplaced) {
   const auto writer = open_voxel_writer(folder.file("slices/"), "", make_grid({4, 4, 4}));
   EXPECT_FALSE(writer && (*writer)->finish({}));
   EXPECT_EQ(file_bytes(folder.file("slices/mine.txt")), "keep");
+}
+
+// Sizes of 32 bits end at 4 GiB; the file itself is small.
+TEST(NpzWriter, AnArrayOfTwoGibibytesHasSizesOf64Bits) {
+  const TemporaryFolder folder;
+  const VoxelGrid grid = make_grid({2048, 1024, 1024});
+  const VoxelIntervals set(grid, Axis::kX);
+  ASSERT_TRUE(write(folder.file("a.npz"), "", set));
+  const std::string file = file_bytes(folder.file("a.npz"));
+  const auto number = [&](std::size_t at) {
+    std::uint64_t value = 0;
+    std::memcpy(&value, file.data() + at, sizeof value);
+    return value;
+  };
+  const std::string name = "voxels.npy";
+  std::size_t at = 0;
+  for (int place = 0; place < 2; ++place) {  // the local head, the directory
+    at = file.find(name, at) + name.size();
+    ASSERT_LT(at, file.size());
+    EXPECT_EQ(file.substr(at, 4), std::string("\1\0\x10\0", 4));
+    EXPECT_EQ(number(at + 4), (std::uint64_t{1} << 31) + 128);
+    EXPECT_LT(number(at + 12), file.size());
+    EXPECT_GT(number(at + 12), file.size() - 1000);
+  }
+  const std::size_t end = file.rfind("PK\x05\x06");
+  EXPECT_EQ(file.substr(end - 20, 4), "PK\x06\x07");
+  const std::size_t record = number(end - 12);
+  ASSERT_LT(record, end);
+  EXPECT_EQ(file.substr(record, 4), "PK\x06\x06");
+  EXPECT_EQ(file.substr(number(record + 48), 4), "PK\x01\x02");
 }
 
 TEST(VtiWriter, NamesAreEscaped) {

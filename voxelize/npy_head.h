@@ -1,0 +1,36 @@
+#pragma once
+
+#include <fmt/format.h>
+
+#include <glm/vec3.hpp>
+#include <string>
+#include <string_view>
+
+#include "voxelize/dense_rows.h"
+
+namespace strata {
+
+/// The head of a .npy file, version 1.0: [magic:6 | version:2 | length:u16 | dictionary], padded so
+/// that the data starts at a multiple of 64. (Internal to voxelize/.)
+inline std::string npy_head(std::string_view type, bool fortran_order, std::string_view shape) {
+  std::string text = fmt::format("{{'descr': '{}', 'fortran_order': {}, 'shape': {}, }}", type,
+                                 fortran_order ? "True" : "False", shape);
+  constexpr std::size_t kFixed = 10;
+  text.append(63 - (kFixed + text.size()) % 64, ' ');
+  text += '\n';
+  std::string head("\x93NUMPY\x01\x00", 8);
+  head += static_cast<char>(text.size() & 0xff);
+  head += static_cast<char>(text.size() >> 8);
+  return head + text;
+}
+
+/// The same of voxels, x fastest.
+inline std::string npy_head(const DenseValues& values, const glm::ivec3& dims) {
+  const char* type = values.kind == RunBytes::kFlags ? "|b1"
+                     : values.bytes == 1             ? "|u1"
+                     : values.bytes == 2             ? "<u2"
+                                                     : "<u4";
+  return npy_head(type, true, fmt::format("({}, {}, {})", dims.x, dims.y, dims.z));
+}
+
+}  // namespace strata
