@@ -4,10 +4,12 @@
 #include <new>
 #include <utility>
 
+#include "voxelize/transposed.h"
+
 namespace strata {
 
 SlabWriter::SlabWriter(std::string path, const VoxelGrid& grid, Axis axis)
-    : path_(std::move(path)), grid_(grid), axis_(axis), rows_(grid.dims[AxisFrame(axis).v]) {}
+    : path_(std::move(path)), grid_(grid), axis_(axis), given_axis_(axis) {}
 
 template <class Step>
 Result<void> SlabWriter::guarded(Step&& step) {
@@ -26,9 +28,11 @@ Result<void> SlabWriter::guarded(Step&& step) {
 
 Result<void> SlabWriter::add(const VoxelIntervals& slab, const Execution& execution) {
   return guarded([&]() -> Result<void> {
-    if (slab.axis() != axis_) {
-      return fail(ErrorCode::kInternal, "{}: slab of axis {}, the format is written from axis {}",
-                  path_, "xyz"[static_cast<int>(slab.axis())], "xyz"[static_cast<int>(axis_)]);
+    if (next_row_ == 0) given_axis_ = slab.axis();
+    if (slab.axis() != given_axis_) {
+      return fail(ErrorCode::kInternal, "{}: slab of axis {}, the slabs before it are of axis {}",
+                  path_, "xyz"[static_cast<int>(slab.axis())],
+                  "xyz"[static_cast<int>(given_axis_)]);
     }
     if (slab.grid() != grid_) return fail(ErrorCode::kInternal, "{}: slab of another grid", path_);
     if (slab.v_begin() != next_row_) {
@@ -36,17 +40,37 @@ Result<void> SlabWriter::add(const VoxelIntervals& slab, const Execution& execut
                   slab.v_begin(), next_row_);
     }
     next_row_ = slab.v_end();
-    Result<void> result = add_slab(slab, execution);
+    Result<void> result =
+        given_axis_ == axis_ ? add_slab(slab, execution) : add_turned(slab, execution);
     // Skipped work leaves holes, whatever the format believes.
     if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "cancelled");
     return result;
   });
 }
 
+Result<void> SlabWriter::add_turned(const VoxelIntervals& slab, const Execution& execution) {
+  if (slab.v_begin() == 0 && slab.v_end() == rows()) {
+    return add_slab(transposed(slab, axis_, execution), execution);
+  }
+  if (slab.v_begin() == 0) kept_ = VoxelIntervals(grid_, given_axis_);
+  for (int tv = 0; tv < slab.tiles_v(); ++tv) {
+    for (int tu = 0; tu < slab.tiles_u(); ++tu) {
+      const VoxelIntervals::TileView tile = slab.tile(tu, tv);
+      if (tile.items.empty()) continue;
+      kept_.set_tile(tu, slab.v_begin() / VoxelIntervals::kTileSide + tv, tile.offsets, tile.items,
+                     tile.labels);
+    }
+  }
+  if (slab.v_end() < rows()) return {};
+  const VoxelIntervals turned = transposed(kept_, axis_, execution);
+  kept_ = {};
+  return add_slab(turned, execution);
+}
+
 Result<void> SlabWriter::finish(const Execution& execution) {
   return guarded([&]() -> Result<void> {
-    if (next_row_ != rows_) {
-      return fail(ErrorCode::kInternal, "{}: {} of {} rows were written", path_, next_row_, rows_);
+    if (next_row_ != rows()) {
+      return fail(ErrorCode::kInternal, "{}: {} of {} rows were written", path_, next_row_, rows());
     }
     // Not asked after the commit: a file that stands is a success.
     if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "cancelled");

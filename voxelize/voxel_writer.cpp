@@ -162,4 +162,12 @@ Result<std::unique_ptr<VoxelWriter>> open_voxel_writer(const std::string& path,
   }
 }
 
+Result<void> write_voxels(const VoxelIntervals& set, const std::string& path,
+                          const VoxelWriterOptions& options, const Execution& execution) {
+  auto writer = open_voxel_writer(path, "", set.grid(), options);
+  if (!writer) return tl::unexpected(writer.error());
+  if (auto added = (*writer)->add(set, execution); !added) return added;
+  return (*writer)->finish(execution);
+}
+
 }  // namespace strata

@@ -39,9 +39,11 @@ struct VoxelWriterOptions {
   std::vector<glm::u8vec4> colours{};
 };
 
-/// Writes a voxel set slab by slab: every slab of one axis, in increasing v, then finish(). Nothing
-/// stands under the final name until finish() succeeds; a writer destroyed before leaves nothing
-/// behind. Memory: one slab, and what the format itself must hold.
+/// Writes a voxel set slab by slab: every slab of one axis, in increasing v, then finish(). Any
+/// axis will do. Nothing stands under the final name until finish() succeeds; a writer destroyed
+/// before leaves nothing behind. Memory: one slab, and what the format itself must hold; with slabs
+/// of another axis than VoxelFormat::axis the intervals of the whole set, twice, which grow with
+/// its surface.
 class VoxelWriter {
  public:
   virtual ~VoxelWriter() = default;
@@ -58,6 +60,12 @@ Result<std::unique_ptr<VoxelWriter>> open_voxel_writer(const std::string& path,
                                                        const std::string& format,
                                                        const VoxelGrid& grid,
                                                        const VoxelWriterOptions& options = {});
+
+/// Writes a whole set, along any axis, as `strata voxelize -o path` would. @pre all rows of its
+/// grid
+/// @return as open_voxel_writer; kOutput, kLimit, kCancelled
+Result<void> write_voxels(const VoxelIntervals& set, const std::string& path,
+                          const VoxelWriterOptions& options = {}, const Execution& execution = {});
 
 /// The format that open_voxel_writer would take. @return kUsage as there
 Result<VoxelFormat> voxel_format_for(const std::string& path, const std::string& format);

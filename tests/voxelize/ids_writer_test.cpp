@@ -81,19 +81,23 @@ TEST_P(ReadIds, AreThoseWrittenInTheNarrowestType) {
   }
 }
 
-TEST_P(Ids, AreTheSameBytesForAnyThreadsAndSlabs) {
+TEST_P(Ids, AreTheSameBytesForAnyThreadsSlabsAndAxis) {
   const std::uint32_t largest = std::min(GetParam().ids, 1000u);
-  std::vector<VoxelIntervals> whole;
-  whole.push_back(labelled(make_grid({20, 70, 140}), GetParam().axis, some_ids(largest)));
-  ASSERT_TRUE(write("a", whole, largest, 1));
-  ASSERT_TRUE(write("b", cut(whole.front(), 1), largest, 5));
-  const std::string a = folder_.file("a"), b = folder_.file("b");
-  if (!std::filesystem::is_directory(a)) {
-    EXPECT_EQ(file_bytes(a), file_bytes(b));
-    return;
-  }
-  for (const auto& entry : std::filesystem::directory_iterator(a)) {
-    EXPECT_EQ(file_bytes(entry.path()), file_bytes(b / entry.path().filename()));
+  const auto of_axis = [&](Axis axis) {
+    return labelled(make_grid({20, 70, 140}), axis, some_ids(largest));
+  };
+  ASSERT_TRUE(write("a", cut(of_axis(GetParam().axis), 1000), largest, 1));
+  for (const Axis axis : {Axis::kX, Axis::kY, Axis::kZ}) {
+    const std::string name(1, "xyz"[static_cast<int>(axis)]);
+    ASSERT_TRUE(write(name, cut(of_axis(axis), 1), largest, 5));
+    const std::filesystem::path a = folder_.file("a"), b = folder_.file(name);
+    if (!std::filesystem::is_directory(a)) {
+      EXPECT_EQ(file_bytes(a), file_bytes(b));
+      continue;
+    }
+    for (const auto& entry : std::filesystem::directory_iterator(a)) {
+      EXPECT_EQ(file_bytes(entry.path()), file_bytes(b / entry.path().filename()));
+    }
   }
 }
 

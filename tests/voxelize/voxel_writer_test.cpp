@@ -130,6 +130,24 @@ TEST_P(Writer, BytesDoNotDependOnThreadsOrSlabs) {
   }
 }
 
+TEST_P(Writer, SlabsOfAnyAxisGiveTheSameBytes) {
+  for (const Sample& sample : small_samples()) {
+    SCOPED_TRACE(sample.name);
+    const std::string path = folder_.file(sample.name);
+    ASSERT_TRUE(write(path, format().name, intervals_of(sample, format().axis)));
+    const std::string expected = all_bytes(path);
+    int slab_tiles = 1;  // in pieces along one of the two other axes, as a whole along the other
+    for (const Axis axis : {Axis::kX, Axis::kY, Axis::kZ}) {
+      if (axis == format().axis) continue;
+      std::filesystem::remove_all(path);
+      const auto written = write(path, format().name, intervals_of(sample, axis), 2, slab_tiles);
+      ASSERT_TRUE(written) << written.error().message;
+      EXPECT_EQ(all_bytes(path), expected) << "xyz"[static_cast<int>(axis)];
+      slab_tiles = 1000;
+    }
+  }
+}
+
 TEST_P(Writer, NothingIsLeftWithoutFinish) {
   const VoxelIntervals set = intervals_of(small_samples().front(), format().axis);
   {
@@ -264,8 +282,12 @@ TEST_P(Writer, SlabsOutOfOrderAreRefused) {
   EXPECT_EQ(attempt({&slabs[0], &slabs[0]}), ErrorCode::kInternal);
   EXPECT_EQ(attempt({&slabs[0], &slabs[1]}), ErrorCode::kInternal);  // one is missing
   const Axis other = format().axis == Axis::kX ? Axis::kZ : Axis::kX;
-  const VoxelIntervals wrong_axis = intervals_of(sample, other);
-  EXPECT_EQ(attempt({&wrong_axis}), ErrorCode::kInternal);
+  const VoxelIntervals other_axis = intervals_of(sample, other);
+  const auto others = cut(other_axis, 1);
+  EXPECT_EQ(attempt({&slabs[0], &others[1]}), ErrorCode::kInternal);
+  EXPECT_EQ(attempt({&others[0], &slabs[1]}), ErrorCode::kInternal);
+  EXPECT_EQ(attempt({&others[0], &others[0]}), ErrorCode::kInternal);
+  EXPECT_EQ(attempt({&others[0]}), ErrorCode::kInternal);  // some are missing
   EXPECT_TRUE(folder_.is_empty());
 }
 
