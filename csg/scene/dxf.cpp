@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <initializer_list>
 #include <numbers>
 #include <optional>
 #include <set>
@@ -81,23 +82,34 @@ struct Placement {
 
 class Drawing {
  public:
-  Drawing(const DxfFile& file, const std::string& name, const OutlineImport& options)
-      : file_(file), name_(name), options_(options), joiner_(kTolerance) {}
+  Drawing(const DxfFile& file, const std::string& name, const OutlineImport& options,
+          const Execution& execution)
+      : file_(file), name_(name), options_(options), execution_(execution) {}
 
-  Result<Outline> run() {
-    const Placement world{
-        {options_.scale, 0}, {0, options_.scale}, -options_.origin * options_.scale};
+  Result<Outline> run(std::vector<std::string>* warnings) {
+    coordinate_unit_ = last_place({10, 11, 20, 21, 40});
+    angle_unit_ = last_place({50, 51});
+    parameter_unit_ = last_place({41, 42});
     bool found = options_.layer.empty() || file_.entities.empty();
     for (const DxfEntity& entity : file_.entities) {
       if (!options_.layer.empty() && entity.layer != options_.layer) continue;
       found = true;
-      if (auto done = draw(entity, world, 0); !done) return tl::unexpected(done.error());
+      outermost_ = static_cast<std::uint32_t>(&entity - file_.entities.data());
+      if (auto done = draw(entity, {}, 0); !done) return tl::unexpected(done.error());
     }
     if (!found) {
       return fail(ErrorCode::kInput, "{}: nothing is in a layer '{}', there {}", name_,
                   options_.layer, layers());
     }
-    return clean({joiner_.paths()}, Fill::kEvenOdd);
+    // OpenSCAD's grid, in units of the scene, takes in what lies up to 1.5 steps away.
+    constexpr double kOpenScad = 1.5e-5;
+    if (options_.scale == 0) return Outline{};
+    JoinedLines joined = joiner_.join(kOpenScad / std::abs(options_.scale));
+    if (warnings) note_open(joined.open, *warnings);
+    for (auto& path : joined.paths) {
+      for (glm::dvec2& p : path) p = (p - options_.origin) * options_.scale;
+    }
+    return clean({std::move(joined.paths)}, Fill::kEvenOdd);
   }
 
  private:
@@ -115,10 +127,78 @@ class Drawing {
     return text;
   }
 
-  /// Ends of lines are joined within this distance, in units of the scene.
-  static constexpr double kTolerance = 1e-5;
+  /// A unit of the last decimal place that the file writes in these groups; 0 if it writes less
+  /// than three places: then the numbers are meant as they are.
+  [[nodiscard]] double last_place(std::initializer_list<int> codes) const {
+    int most = 0;
+    const auto look = [&](const DxfEntity& entity) {
+      for (const DxfGroup& group : entity.groups) {
+        if (std::find(codes.begin(), codes.end(), group.code) == codes.end()) continue;
+        const std::size_t point = group.value.find('.');
+        if (point == std::string_view::npos) continue;
+        const std::size_t end = std::min(group.value.find_first_of("eE"), group.value.size());
+        if (end > point && end == group.value.size()) {
+          most = std::max(most, static_cast<int>(std::min<std::size_t>(end - point - 1, 100)));
+        }
+      }
+    };
+    const auto look_at_all = [&](const std::vector<DxfEntity>& entities) {
+      for (const DxfEntity& entity : entities) {
+        look(entity);
+        for (const DxfEntity& part : entity.parts) look(part);
+      }
+    };
+    look_at_all(file_.entities);
+    for (const auto& [name, block] : file_.blocks) look_at_all(block.entities);
+    constexpr int kFewest = 3;
+    return most < kFewest ? 0.0 : std::pow(10.0, -most);
+  }
+
+  /// How far an end of an entity may lie from where it is meant to be, in the drawing: numbers are
+  /// rounded to half a unit, along both axes, and a bit for the arithmetic.
+  [[nodiscard]] double reach_of(const DxfEntity& entity, Values& values,
+                                const Placement& place) const {
+    constexpr double kBoth = 0.75;
+    double reach = kBoth * coordinate_unit_;
+    if (entity.type == "ARC") {
+      reach +=
+          kBoth * (coordinate_unit_ + std::abs(values.number(40, 0)) * angle_unit_ * kPi / 180);
+    } else if (entity.type == "ELLIPSE") {
+      reach += kBoth * (2 * coordinate_unit_ + glm::length(values.point(11)) * parameter_unit_);
+    }
+    return reach * std::max(glm::length(place.x), glm::length(place.y));
+  }
+
+  /// Says where contours are open, and which lines are left out since they are in none.
+  void note_open(const std::vector<OpenPath>& open, std::vector<std::string>& warnings) const {
+    for (const bool lines : {false, true}) {
+      std::size_t count = 0;
+      const OpenPath* first = nullptr;
+      for (const OpenPath& path : open) {
+        if (path.is_line != lines) continue;
+        if (count++ == 0) first = &path;
+      }
+      if (!first) continue;
+      const DxfEntity& entity = file_.entities[first->tag];
+      const std::string place =
+          fmt::format("({:.9g}, {:.9g}) {} ({:.9g}, {:.9g}) in layer '{}', {:.3g} apart",
+                      first->from.x, first->from.y, lines ? "to" : "and", first->to.x, first->to.y,
+                      entity.layer.substr(0, 80), glm::distance(first->from, first->to));
+      const char* text =
+          count == 1
+              ? (lines ? "{}:{}: {} line is part of no contour and is left out; it leads from {}"
+                       : "{}:{}: {} contour does not close; it ends at {}; a straight line "
+                         "closes it")
+              : (lines ? "{}:{}: {} lines are part of no contour and are left out; the first "
+                         "leads from {}"
+                       : "{}:{}: {} contours do not close; the first ends at {}; a straight "
+                         "line closes each");
+      warnings.push_back(fmt::format(fmt::runtime(text), name_, entity.line, count, place));
+    }
+  }
 
   Result<void> draw(const DxfEntity& entity, const Placement& place, int depth) {
+    if (execution_.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
     if (joiner_.size() > kMostLines || ++drawn_ > kMostLines) {
       return fail(ErrorCode::kLimit, "{}:{}: more than {} lines or entities", name_, entity.line,
                   kMostLines);
@@ -156,15 +236,17 @@ class Drawing {
     }
     if (values.error) return tl::unexpected(*values.error);
     if (!done) return done;
-    for (std::size_t i = 0; i + 1 < path.size(); ++i)
-      joiner_.add(place(path[i]), place(path[i + 1]));
-    if (closed && path.size() > 2) joiner_.add(place(path.back()), place(path.front()));
+    if (closed && path.size() > 2) path.push_back(path.front());
+    const double reach = path.empty() ? 0.0 : reach_of(entity, values, place);
+    for (std::size_t i = 0; i + 1 < path.size(); ++i) {
+      joiner_.add(place(path[i]), place(path[i + 1]), reach, outermost_);
+    }
     return {};
   }
 
   /// Segments of a full circle of this radius at its place.
   double segments(double radius, const Placement& place) const {
-    return options_.segments.count(std::abs(radius) * glm::length(place.x));
+    return options_.segments.count(std::abs(radius * options_.scale) * glm::length(place.x));
   }
 
   std::vector<glm::dvec2> arc(const glm::dvec2& centre, double radius, double from, double to,
@@ -351,21 +433,25 @@ class Drawing {
   const DxfFile& file_;
   const std::string& name_;
   const OutlineImport& options_;
+  const Execution& execution_;
   LineJoiner joiner_;
-  std::size_t drawn_ = 0;  ///< entities, those of blocks as often as they are inserted
+  double coordinate_unit_ = 0, angle_unit_ = 0, parameter_unit_ = 0;  ///< of last decimal places
+  std::uint32_t outermost_ = 0;  ///< the entity of the file that is drawn, maybe through blocks
+  std::size_t drawn_ = 0;        ///< entities, those of blocks as often as they are inserted
 };
 
 }  // namespace
 
 Result<Outline> read_dxf(std::string_view text, const std::string& name,
-                         const OutlineImport& options) {
+                         const OutlineImport& options, const Execution& execution,
+                         std::vector<std::string>* warnings) {
   const auto file = parse_dxf(text, name);
   if (!file) return tl::unexpected(file.error());
   if (!std::isfinite(options.scale) || !std::isfinite(options.origin.x) ||
       !std::isfinite(options.origin.y)) {
     return fail(ErrorCode::kInput, "{}: the origin and the scale must be finite", name);
   }
-  return Drawing(*file, name, options).run();
+  return Drawing(*file, name, options, execution).run(warnings);
 }
 
 }  // namespace strata::csg

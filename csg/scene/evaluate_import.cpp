@@ -125,7 +125,9 @@ Outline Evaluator::import_outline(std::uint32_t node, const std::string& path) {
   options.dpi = number(node, "dpi", options.dpi);
   options.centre = given.truth("center", false);
   options.segments = segments(node);
-  auto outline = read_outline(path, options);
+  std::vector<std::string> warnings;
+  auto outline = read_outline(path, options, execution_, &warnings);
+  for (const std::string& text : warnings) warn(node, "geometry", text);
   if (outline) return *std::move(outline);
   leave_out(node, "geometry", outline.error(), "it is left out");
   return {};

@@ -2,39 +2,47 @@
 
 #include <cstdint>
 #include <glm/vec2.hpp>
-#include <unordered_map>
 #include <utility>
 #include <vector>
 
 namespace strata::csg {
 
-/// Joins lines at their ends to paths. Ends closer than the tolerance are one point.
+/// A path whose last line does not lead back to where the first begins.
+struct OpenPath {
+  glm::dvec2 from{0}, to{0};  ///< its two ends
+  std::uint32_t tag = 0;      ///< of the line at `from`
+  bool is_line = false;       ///< one line alone, which has no area
+};
+
+struct JoinedLines {
+  /// Paths of at least three points, all meant as closed.
+  std::vector<std::vector<glm::dvec2>> paths;
+  std::vector<OpenPath> open;
+};
+
+/// Joins lines at their ends to paths. Which ends are one point depends on the ends alone, not on
+/// the order of the lines, and what is near is so transitively.
 class LineJoiner {
  public:
-  explicit LineJoiner(double tolerance) : tolerance_(tolerance) {}
-
-  void add(const glm::dvec2& from, const glm::dvec2& to);
+  /// @param reach  how far each end may lie from where it is meant to be
+  /// @param tag  names the line in `OpenPath`
+  void add(const glm::dvec2& from, const glm::dvec2& to, double reach, std::uint32_t tag);
   [[nodiscard]] std::size_t size() const { return lines_.size(); }
-  /// Paths of at least three points, all meant as closed: those that begin where a line is alone
-  /// first, then those that close by themselves. Each line is used once, earlier ones first, as
-  /// OpenSCAD does: lines drawn twice cancel when the paths are filled by the even-odd rule.
-  [[nodiscard]] std::vector<std::vector<glm::dvec2>> paths() const;
+  /// Ends are one point when they are closer than `tolerance`. Then ends where an odd number of
+  /// lines ends, at which a path would be open, take in what lies within the reach of both. No
+  /// distance is above 1/1000 of the drawing, `tolerance` not above a millionth: a fine curve must
+  /// not shrink to a point. Paths that begin where a line is alone come first, then those that
+  /// close by themselves. Each line is used once, earlier ones first, as OpenSCAD does: lines drawn
+  /// twice cancel when the paths are filled by the even-odd rule.
+  [[nodiscard]] JoinedLines join(double tolerance) const;
 
  private:
-  std::uint32_t number(const glm::dvec2& p);
-
-  struct CellHash {
-    std::size_t operator()(const std::pair<std::int64_t, std::int64_t>& cell) const {
-      const auto x = static_cast<std::uint64_t>(cell.first),
-                 y = static_cast<std::uint64_t>(cell.second);
-      const std::uint64_t h = x * 0x9e3779b97f4a7c15u ^ (y + 0x165667b1u) * 0xc2b2ae3d27d4eb4fu;
-      return static_cast<std::size_t>(h ^ (h >> 31));
-    }
+  struct Line {
+    glm::dvec2 ends[2];
+    double reach = 0;
+    std::uint32_t tag = 0;
   };
-  double tolerance_;
-  std::vector<glm::dvec2> points_;
-  std::unordered_multimap<std::pair<std::int64_t, std::int64_t>, std::uint32_t, CellHash> cells_;
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> lines_;
+  std::vector<Line> lines_;
 };
 
 }  // namespace strata::csg

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/execution.h"
 #include "core/result.h"
 #include "csg/scene/segments.h"
 #include "mesh/triangle_soup.h"
@@ -115,8 +116,13 @@ struct OutlineImport {
   bool centre = false;
   Segments segments;
 };
-/// An SVG or DXF file, by its extension. @return kInput naming file and line
-Result<Outline> read_outline(const std::string& path, const OutlineImport& options);
+/// An SVG or DXF file, by its extension. Lines of a DXF file whose ends are no farther apart than
+/// its last decimal place, if it is the third or a later one, make contours; `warnings` gets a
+/// sentence about contours that do not close and lines that are in none. @return kInput naming file
+/// and line; kLimit; kCancelled
+Result<Outline> read_outline(const std::string& path, const OutlineImport& options,
+                             const Execution& execution = {},
+                             std::vector<std::string>* warnings = nullptr);
 
 struct TextOptions {
   std::string text, font, direction, language, script, halign = "left", valign = "baseline";

@@ -10,7 +10,8 @@
 
 namespace strata::csg {
 
-Result<Outline> read_outline(const std::string& path, const OutlineImport& options) {
+Result<Outline> read_outline(const std::string& path, const OutlineImport& options,
+                             const Execution& execution, std::vector<std::string>* warnings) {
   std::string extension = std::filesystem::path(path).extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
@@ -21,8 +22,8 @@ Result<Outline> read_outline(const std::string& path, const OutlineImport& optio
   constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 31;
   auto bytes = detail::InputBytes::open(path, kMostBytes);
   if (!bytes) return tl::unexpected(bytes.error());
-  auto outline = extension == ".svg" ? read_svg(bytes->view(), path, options)
-                                     : read_dxf(bytes->view(), path, options);
+  auto outline = extension == ".svg" ? read_svg(bytes->view(), path, options, execution)
+                                     : read_dxf(bytes->view(), path, options, execution, warnings);
   if (!outline || !options.centre || outline->empty()) return outline;
   glm::dvec2 low(std::numeric_limits<double>::infinity()), high = -low;
   for (const auto& contour : outline->contours) {

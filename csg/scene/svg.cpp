@@ -185,8 +185,13 @@ Style derived(const Style& outer, const pugi::xml_node& node) {
 
 class Reader {
  public:
-  Reader(std::string_view text, const std::string& name, const OutlineImport& options)
-      : text_(text), name_(name), options_(options), drawing_(options.layer.empty()) {}
+  Reader(std::string_view text, const std::string& name, const OutlineImport& options,
+         const Execution& execution)
+      : text_(text),
+        name_(name),
+        options_(options),
+        execution_(execution),
+        drawing_(options.layer.empty()) {}
 
   Result<Outline> run() {
     pugi::xml_document document;
@@ -250,6 +255,7 @@ class Reader {
   Result<void> element(const pugi::xml_node& node, const glm::dmat3& outer,
                        const Style& outer_style, int depth, bool root = false) {
     if (node.type() != pugi::node_element) return {};
+    if (execution_.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
     if (depth > kDeepest) return too_deep(node);
     if (++elements_ > kMostElements) {
       return fail(ErrorCode::kLimit, "{}: more than {} elements are drawn", name_, kMostElements);
@@ -385,6 +391,7 @@ class Reader {
   std::string_view text_;
   const std::string& name_;
   const OutlineImport& options_;
+  const Execution& execution_;
   std::map<std::string, pugi::xml_node, std::less<>> ids_;
   std::vector<Outline> shapes_;
   std::size_t elements_ = 0;
@@ -395,8 +402,8 @@ class Reader {
 }  // namespace
 
 Result<Outline> read_svg(std::string_view text, const std::string& name,
-                         const OutlineImport& options) {
-  return Reader(text, name, options).run();
+                         const OutlineImport& options, const Execution& execution) {
+  return Reader(text, name, options, execution).run();
 }
 
 }  // namespace strata::csg
@@ -405,7 +412,8 @@ Result<Outline> read_svg(std::string_view text, const std::string& name,
 
 namespace strata::csg {
 
-Result<Outline> read_svg(std::string_view, const std::string& name, const OutlineImport&) {
+Result<Outline> read_svg(std::string_view, const std::string& name, const OutlineImport&,
+                         const Execution&) {
   return fail(ErrorCode::kInput, "{}: this build has no pugixml to read SVG", name);
 }
 

@@ -1,10 +1,13 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <glm/common.hpp>
 #include <numbers>
 #include <random>
 
+#include "csg/scene/orient.h"
 #include "csg/scene/outline.h"
 #include "csg/scene/outline_import.h"
 #include "tests/csg/outline_checks.h"
@@ -112,6 +115,122 @@ TEST(DxfReader, BlocksAreInsertedTurnedAndScaled) {
                 blocks));
   EXPECT_NEAR(area(outline), 6 + 6, 1e-9);
   EXPECT_EQ(outline.contours.size(), 7u);
+}
+
+TEST(DxfReader, EndsWithinTheFilesPrecisionAreOnePointInAnyOrder) {
+  std::mt19937 random(5);
+  const auto between = [&](double low, double high) {
+    return std::uniform_real_distribution<>(low, high)(random);
+  };
+  for (int round = 0; round < 300; ++round) {
+    // A ring of 20 lines; every end is rounded by itself, on one side or the other.
+    const int decimals = 3 + round % 4;
+    const double unit = std::pow(10.0, -decimals);
+    std::vector<glm::dvec2> ring;
+    for (int i = 0; i < 20; ++i) {
+      const double a = (i + between(0.1, 0.9)) * std::numbers::pi / 10, r = between(20, 50);
+      // Odd multiples of half a unit among them, and of the grid that OpenSCAD has.
+      const double step = round % 2 == 0 ? unit / 2 : 5e-6;
+      ring.push_back(glm::round(r * glm::dvec2(std::cos(a), std::sin(a)) / step) * step);
+    }
+    const auto written = [&](const glm::dvec2& p) {
+      return glm::dvec2(p.x + between(-0.499, 0.499) * unit, p.y + between(-0.499, 0.499) * unit);
+    };
+    std::vector<std::string> lines;
+    for (std::size_t i = 0; i < ring.size(); ++i) {
+      glm::dvec2 from = written(ring[i]), to = written(ring[(i + 1) % ring.size()]);
+      if (random() % 2) std::swap(from, to);
+      lines.push_back(
+          fmt::format("0\nLINE\n8\n0\n10\n{:.{}f}\n20\n{:.{}f}\n11\n{:.{}f}\n21\n{:.{}f}\n", from.x,
+                      decimals, from.y, decimals, to.x, decimals, to.y, decimals));
+    }
+    double first = 0;
+    for (int order = 0; order < 3; ++order) {
+      std::shuffle(lines.begin(), lines.end(), random);
+      std::string text;
+      for (const std::string& line : lines) text += line;
+      std::vector<std::string> warnings;
+      const auto outline = read_dxf(dxf(text), "t.dxf", {}, {}, &warnings);
+      ASSERT_TRUE(outline);
+      ASSERT_TRUE(warnings.empty()) << warnings[0];
+      EXPECT_NEAR(area(*outline), signed_area(ring), 500 * unit) << round;
+      if (order == 0) first = area(*outline);
+      EXPECT_NEAR(area(*outline), first, 1e-9) << round;
+    }
+  }
+}
+
+TEST(DxfReader, EndsAtOddMultiplesOfTheToleranceMeetThemselves) {
+  // Whatever the size of a cell is, some of these lie in the middle or on the border of one.
+  for (const double step : {1e-5, 1.5e-5, 5e-6, 1e-6, 7.5e-6, 3e-5, 0.001, 0.0015}) {
+    std::string text;
+    for (int i = 0; i < 40; ++i) {
+      const double x = 1 + 3 * i + i * step, y = 2 + (2 * i + 1) * step;
+      text += line(x, y, x + 2, y) + line(x + 2, y, x + 2, y + 2) + line(x + 2, y + 2, x, y);
+    }
+    const Outline outline = drawn(dxf(text));
+    EXPECT_EQ(outline.contours.size(), 40u) << step;
+    EXPECT_NEAR(area(outline), 80, 1e-6) << step;
+  }
+}
+
+TEST(DxfReader, ArcsMeetLinesWithinThePrecisionOfTheirAngles) {
+  // A quarter of a disc of radius 300 from 20.123456 degrees: 4 decimals of a degree are 0.0003.
+  const double from = 20.123456, to = 110.123456, r = 300, degree = std::numbers::pi / 180;
+  std::string text =
+      fmt::format("0\nARC\n8\n0\n10\n5.0\n20\n7.0\n40\n{}\n50\n{:.4f}\n51\n{:.4f}\n", r, from, to);
+  for (const double a : {from, to}) {
+    text += fmt::format("0\nLINE\n8\n0\n10\n5.0\n20\n7.0\n11\n{:.6f}\n21\n{:.6f}\n",
+                        5 + r * std::cos(a * degree), 7 + r * std::sin(a * degree));
+  }
+  std::vector<std::string> warnings;
+  OutlineImport options;
+  options.segments.fn = 3600;
+  const auto outline = read_dxf(dxf(text), "t.dxf", options, {}, &warnings);
+  ASSERT_TRUE(outline);
+  EXPECT_TRUE(warnings.empty()) << warnings[0];
+  EXPECT_NEAR(area(*outline), std::numbers::pi * r * r / 4, 1);
+}
+
+TEST(DxfReader, FineCurvesStayWhole) {
+  // Steps far below the tolerance: 20,000 lines around a circle of 1/100, and around one of 10.
+  for (const double r : {0.01, 10.0}) {
+    std::string text;
+    constexpr int kSteps = 20000;
+    const auto at = [&](int i) {
+      const double a = 2 * std::numbers::pi * (i % kSteps) / kSteps;
+      return r * glm::dvec2(std::cos(a), std::sin(a));
+    };
+    for (int i = 0; i < kSteps; ++i) text += line(at(i).x, at(i).y, at(i + 1).x, at(i + 1).y);
+    EXPECT_NEAR(area(drawn(dxf(text))), std::numbers::pi * r * r, 1e-5 * r * r);
+  }
+}
+
+TEST(DxfReader, OpenContoursAndStrayLinesAreNamedWithTheirPlace) {
+  const auto warnings_of = [](const std::string& text, const OutlineImport& options = {}) {
+    std::vector<std::string> warnings;
+    EXPECT_TRUE(read_dxf(text, "t.dxf", options, {}, &warnings));
+    return warnings;
+  };
+  EXPECT_TRUE(warnings_of(dxf(square(0, 0, 3) + square(5, 0, 3))).empty());
+  const std::string open =
+      line(10, 2, 20, 2, "cut") + line(20, 2, 20, 12, "cut") + line(20, 12, 10, 2.25, "cut");
+  OutlineImport options;
+  options.scale = 3;
+  options.origin = {1, 1};
+  auto warnings = warnings_of(dxf(square(0, 0, 3) + open), options);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_EQ(warnings[0],
+            "t.dxf:60: 1 contour does not close; it ends at (10, 2) and (10, 2.25) in layer "
+            "'cut', 0.25 apart; a straight line closes it");
+  EXPECT_NEAR(area(drawn(dxf(open))), (10 * 9.75) / 2 + 0, 5);
+  warnings =
+      warnings_of(dxf(square(0, 0, 3) + line(1, 2, 4, 6, "axis") + line(1, 9, 2, 9, "axis")));
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_EQ(
+      warnings[0],
+      "t.dxf:60: 2 lines are part of no contour and are left out; the first leads from (1, 2) "
+      "to (4, 6) in layer 'axis', 5 apart");
 }
 
 TEST(DxfReader, BlocksThatHoldThemselvesEnd) {
