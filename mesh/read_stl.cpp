@@ -10,7 +10,9 @@
 
 // Binary: 80 bytes of anything, a count, and 50 bytes a facet: normal, three corners as float, two
 // bytes. Ascii: facet normal x y z, outer loop, vertex x y z ..., endloop, endfacet; numbers are
-// read as double. In both, corners become vertices where their positions are equal.
+// read as double. Exporters also write "end loop", a name glued to "endsolid", and lines of their
+// own between the loops, as of colours. In both, corners become vertices where their positions are
+// equal.
 
 namespace strata::detail {
 namespace {
@@ -38,31 +40,39 @@ Result<MeshFile> read_binary(const ReaderInput& input) {
   }
   const std::uint64_t claimed = little_endian_32(data + 80);
   const std::uint64_t held = (size - kHeaderBytes) / kFacetBytes;
-  if (claimed > held) {
+  if (held == 0) {
+    if (claimed == 0) return fail(ErrorCode::kInput, "{}: no triangles", input.name);
     return fail(ErrorCode::kInput,
                 "{}: byte 80 claims {} triangles, which end at byte {}, but the file has {} bytes",
                 input.name, claimed, kHeaderBytes + kFacetBytes * claimed, size);
   }
-  if (claimed == 0 && held != 0) {
-    return fail(ErrorCode::kInput, "{}: byte 80 claims 0 triangles, but {} more bytes follow",
-                input.name, size - kHeaderBytes);
-  }
-  if (claimed == 0) return fail(ErrorCode::kInput, "{}: no triangles", input.name);
-  const std::size_t corners = 3 * claimed;
-  if (corners > kMaxVertices || exceeds_limit(input.execution, claimed / 2, claimed)) {
+  // The size decides, unless the file ends in something that is no triangle: then what follows the
+  // claimed ones may all be that.
+  const std::size_t odd = (size - kHeaderBytes) % kFacetBytes;
+  const bool by_size = claimed == 0 || claimed > held || odd == 0;
+  const std::uint64_t count = by_size ? held : claimed;
+  const std::size_t corners = 3 * count;
+  if (corners > kMaxVertices || exceeds_limit(input.execution, count / 2, count)) {
     return fail(ErrorCode::kLimit, "{}: {} triangles are more than the memory limit or {} corners",
-                input.name, claimed, kMaxVertices);
+                input.name, count, kMaxVertices);
   }
   RawMesh mesh;
   mesh.stats.format = "stl binary";
-  mesh.stats.faces = claimed;
-  if (const std::size_t rest = size - kHeaderBytes - kFacetBytes * claimed; rest != 0) {
+  mesh.stats.faces = count;
+  if (count != claimed) {
     mesh.stats.warnings.push_back(
-        fmt::format("{}: {} bytes after the {} triangles are ignored", input.name, rest, claimed));
+        fmt::format("{}: byte 80 claims {} triangle{}, but the file has {} bytes, room for {}: all "
+                    "{} are read",
+                    input.name, claimed, claimed == 1 ? "" : "s", size, held, held));
+    if (input.options.strict) return fail(ErrorCode::kInput, "{}", mesh.stats.warnings.front());
+  }
+  if (const std::size_t rest = size - kHeaderBytes - kFacetBytes * count; rest != 0) {
+    mesh.stats.warnings.push_back(
+        fmt::format("{}: {} bytes after the {} triangles are ignored", input.name, rest, count));
   }
   TriangleSoup& soup = mesh.soup;
-  reserve_large(soup.triangles, claimed);
-  soup.triangles.resize(claimed);
+  reserve_large(soup.triangles, count);
+  soup.triangles.resize(count);
   static_assert(sizeof(glm::uvec3) == 3 * sizeof(std::uint32_t));
   auto* const index = &soup.triangles.front().x;  // corner c is component c % 3 of triangle c / 3
   ReadWatch watch(input);
@@ -98,6 +108,8 @@ struct Chunk {
   std::size_t error_offset = std::numeric_limits<std::size_t>::max();
   std::string error;
   bool ended = false;  ///< the last solid was closed by endsolid
+  std::uint64_t strange_lines = 0;
+  std::size_t first_strange = 0;  ///< offset of the first strange line
 };
 
 class AsciiReader {
@@ -110,6 +122,7 @@ class AsciiReader {
   void cut();
   void parse(const char* p, const char* end, Chunk& chunk) const;
   const char* parse_vertex(const char* p, Chunk& chunk) const;
+  const char* parse_strange(const char* p, Chunk& chunk) const;
   void append(const Chunk& chunk);
   FacePlace locate(std::uint32_t element) const;
 
@@ -124,6 +137,8 @@ class AsciiReader {
   bool ended_ = false, over_limit_ = false;
   std::size_t error_offset_ = std::numeric_limits<std::size_t>::max();
   std::string error_;
+  std::uint64_t strange_lines_ = 0;
+  std::size_t first_strange_ = 0;
 };
 
 const char* skip_spaces(const char* p) {
@@ -136,10 +151,65 @@ const char* skip_line(const char* p) {
   return p;
 }
 
+/// What a token means.
+enum class Word { kSolid, kEndSolid, kFacet, kEndFacet, kLoop, kEndLoop, kNormal, kVertex, kOther };
+
+bool starts_no_case(std::string_view text, std::string_view word) {
+  return equals_no_case(text.substr(0, word.size()), word);
+}
+
+/// The meaning of the token at p; `stop` is set behind it. "end" and its word may be parted by
+/// blanks, and the name of a solid may be glued to "solid" and "endsolid".
+Word word_at(const char* p, const char*& stop) {
+  stop = skip_token(p);
+  std::string_view token(p, static_cast<std::size_t>(stop - p));
+  const auto is = [token](std::string_view word, Word meaning) {
+    return equals_no_case(token, word) ? meaning : Word::kOther;
+  };
+  switch (*p | 0x20) {
+    case 'v':
+      return is("vertex", Word::kVertex);
+    case 'f':
+      return is("facet", Word::kFacet);
+    case 'n':
+      return is("normal", Word::kNormal);
+    case 'o':
+      return is("outer", Word::kLoop);
+    case 'l':
+      return is("loop", Word::kLoop);
+    case 's':
+      return starts_no_case(token, "solid") ? Word::kSolid : Word::kOther;
+    case 'e':
+      break;
+    default:
+      return Word::kOther;
+  }
+  if (!starts_no_case(token, "end")) return Word::kOther;
+  token.remove_prefix(3);
+  if (token.empty()) {
+    const char* const second = skip_blanks(stop);
+    const char* const second_stop = skip_token(second);
+    token = {second, static_cast<std::size_t>(second_stop - second)};
+    if (equals_no_case(token, "facet") || equals_no_case(token, "loop") ||
+        starts_no_case(token, "solid")) {
+      stop = second_stop;
+    }
+  }
+  if (equals_no_case(token, "loop")) return Word::kEndLoop;
+  if (equals_no_case(token, "facet")) return Word::kEndFacet;
+  return starts_no_case(token, "solid") ? Word::kEndSolid : Word::kOther;
+}
+
+/// Whether a line that begins so tells of looks, which any exporter may add to a facet or a vertex.
+bool tells_of_looks(std::string_view word) {
+  constexpr std::string_view kWords[] = {"color", "colour", "rgb", "material", "attribute"};
+  return std::any_of(std::begin(kWords), std::end(kWords),
+                     [&](std::string_view known) { return starts_no_case(word, known); });
+}
+
 /// Chunks end behind an "endfacet" that begins a line, where the grammar starts afresh. (Further to
 /// the right it may be part of a solid's name.)
 void AsciiReader::cut() {
-  constexpr std::string_view kWord = "endfacet";
   cuts_.push_back(begin_);
   const char* p = begin_;
   while (static_cast<std::size_t>(end_ - p) > input_.options.chunk_bytes) {
@@ -148,11 +218,11 @@ void AsciiReader::cut() {
     while (p < end_ && !found) {
       while (p < end_ && *p != '\n' && *p != '\r') ++p;
       p = skip_spaces(p);
-      const std::string_view token(p, std::min(kWord.size(), static_cast<std::size_t>(end_ - p)));
-      found = equals_no_case(token, kWord) && ends_token(p[kWord.size()]);
+      const char* stop = p;
+      found = p < end_ && word_at(p, stop) == Word::kEndFacet;
+      if (found) p = stop;
     }
     if (!found) break;
-    p += kWord.size();
     cuts_.push_back(p);
   }
   cuts_.push_back(end_);
@@ -183,17 +253,18 @@ void AsciiReader::parse(const char* p, const char* end, Chunk& chunk) const {
     chunk.error = std::move(message);
   };
   for (p = skip_spaces(p); p < end; p = skip_spaces(p)) {
-    const char* const stop = skip_token(p);
-    const std::string_view word(p, static_cast<std::size_t>(stop - p));
-    if (equals_no_case(word, "vertex")) {
+    const char* stop = p;
+    const Word word = word_at(p, stop);
+    const std::string_view text(p, static_cast<std::size_t>(stop - p));
+    if (word == Word::kVertex) {
       if (!in_loop) return broken(p, "vertex outside of a loop");
       p = parse_vertex(stop, chunk);
       if (p == nullptr) return;
-    } else if (equals_no_case(word, "facet") || equals_no_case(word, "endfacet")) {
-      if (in_loop) return broken(p, fmt::format("'{}' inside a loop", word));
+    } else if (word == Word::kFacet || word == Word::kEndFacet) {
+      if (in_loop) return broken(p, fmt::format("'{}' inside a loop", text));
       chunk.ended = false;
       p = stop;
-    } else if (equals_no_case(word, "normal")) {
+    } else if (word == Word::kNormal) {
       p = stop;
       double unused = 0.0;
       for (const char* q = p; q != nullptr;) {  // not used, so any number of numbers will do
@@ -201,25 +272,42 @@ void AsciiReader::parse(const char* p, const char* end, Chunk& chunk) const {
         q = parse_double(skip_spaces(p), unused);
         if (q != nullptr && !ends_token(*q)) q = nullptr;
       }
-    } else if (equals_no_case(word, "outer") || equals_no_case(word, "loop")) {
-      if (in_loop && word.size() == 5) return broken(p, "a loop inside a loop");
+    } else if (word == Word::kLoop) {
+      if (in_loop && text.size() == 5) return broken(p, "a loop inside a loop");
       if (!in_loop) loop_begin = chunk.corners.size();
       in_loop = true;
       p = stop;
-    } else if (equals_no_case(word, "endloop")) {
-      if (!in_loop) return broken(p, "'endloop' without a loop");
+    } else if (word == Word::kEndLoop) {
+      if (!in_loop) return broken(p, fmt::format("'{}' without a loop", text));
       in_loop = false;
       chunk.sizes.push_back(static_cast<std::uint32_t>(chunk.corners.size() - loop_begin));
       p = stop;
-    } else if (equals_no_case(word, "solid") || equals_no_case(word, "endsolid")) {
-      if (in_loop) return broken(p, fmt::format("'{}' inside a loop", word));
-      chunk.ended = word.size() == 8;
+    } else if (word == Word::kSolid || word == Word::kEndSolid) {
+      if (in_loop) return broken(p, fmt::format("'{}' inside a loop", text));
+      chunk.ended = word == Word::kEndSolid;
       p = skip_line(stop);  // the rest is a name
+    } else if (!in_loop || tells_of_looks(text)) {
+      p = parse_strange(p, chunk);
     } else {
-      return broken(p, describe(p, end_) + " is no word of an ascii STL file");
+      return broken(p, describe(p, end_) + " is no word of a loop of an ascii STL file");
     }
   }
   if (in_loop) broken(p, "the file ends inside a facet");
+}
+
+/// Past what no STL file should hold, to the end of the line or a known word.
+const char* AsciiReader::parse_strange(const char* p, Chunk& chunk) const {
+  const char* stop = skip_token(p);
+  if (!tells_of_looks({p, static_cast<std::size_t>(stop - p)}) && chunk.strange_lines++ == 0) {
+    chunk.first_strange = static_cast<std::size_t>(p - begin_);
+  }
+  for (p = stop; p < end_;) {
+    while (is_blank(*p) && *p != '\r') ++p;
+    if (*p == '\n' || *p == '\r' || p >= end_) break;
+    if (word_at(p, stop) != Word::kOther) break;
+    p = std::max(p + 1, skip_token(p));
+  }
+  return p;
 }
 
 void AsciiReader::append(const Chunk& chunk) {
@@ -241,13 +329,17 @@ void AsciiReader::append(const Chunk& chunk) {
   if (!chunk.sizes.empty() || chunk.ended) ended_ = chunk.ended;
   error_offset_ = chunk.error_offset;
   error_ = chunk.error;
+  if (strange_lines_ == 0) first_strange_ = chunk.first_strange;
+  strange_lines_ += chunk.strange_lines;
 }
 
 FacePlace AsciiReader::locate(std::uint32_t element) const {
   std::uint32_t loops = 0;
-  for (const char* p = begin_; p < end_; p = skip_token(p)) {
+  const char* stop = begin_;
+  for (const char* p = begin_; p < end_; p = stop) {
     while (p < end_ && ends_token(*p)) ++p;
-    if (equals_no_case(token_at(p), "endloop") && loops++ == element) {
+    if (p >= end_) break;
+    if (word_at(p, stop) == Word::kEndLoop && loops++ == element) {
       return {fmt::format("{}:{}", input_.name, line_of(input_.text, p)), {}};
     }
   }
@@ -284,6 +376,14 @@ Result<MeshFile> AsciiReader::read() {
     return fail(ErrorCode::kInput, "{}:{}: {}", input_.name,
                 line_of(input_.text, begin_ + error_offset_), error_);
   }
+  if (strange_lines_ != 0) {
+    const char* const first = begin_ + first_strange_;
+    const std::string what = fmt::format("{}:{}: {} is no word of an ascii STL file", input_.name,
+                                         line_of(input_.text, first), describe(first, end_));
+    if (mesh_.soup.positions.empty()) return fail(ErrorCode::kInput, "{}", what);
+    mesh_.stats.warnings.push_back(fmt::format("{}; {} such line{} skipped", what, strange_lines_,
+                                               strange_lines_ == 1 ? " was" : "s were"));
+  }
   if (!ended_) {
     mesh_.stats.warnings.push_back(fmt::format(
         "{}: no 'endsolid' after the last facet; the file may be cut short", input_.name));
@@ -297,17 +397,19 @@ Result<MeshFile> AsciiReader::read() {
 bool looks_ascii(std::string_view text) {
   if (text.substr(0, 512).find('\0') != std::string_view::npos) return false;
   const std::string_view word = token_at(skip_spaces(text.data()));
-  return equals_no_case(word, "solid") || equals_no_case(word, "facet");
+  return starts_no_case(word, "solid") || equals_no_case(word, "facet");
 }
 
 }  // namespace
 
+bool is_binary_stl(std::string_view bytes) {
+  return bytes.size() >= kHeaderBytes &&
+         bytes.size() ==
+             kHeaderBytes + kFacetBytes * std::size_t{little_endian_32(bytes.data() + 80)};
+}
+
 Result<MeshFile> read_stl(const ReaderInput& input) {
-  const std::size_t size = input.text.size();
-  const bool binary_size =
-      size >= kHeaderBytes &&
-      size == kHeaderBytes + kFacetBytes * std::size_t{little_endian_32(input.text.data() + 80)};
-  if (!binary_size && looks_ascii(input.text)) return AsciiReader(input).read();
+  if (!is_binary_stl(input.text) && looks_ascii(input.text)) return AsciiReader(input).read();
   return read_binary(input);
 }
 

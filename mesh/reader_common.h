@@ -25,6 +25,7 @@ struct ReaderInput {
   const std::string& name;
   const MeshReadOptions& options;
   const Execution& execution;
+  std::size_t skipped = 0;  ///< bytes of the file before the text: a byte order mark
 };
 
 /// Tells how far a reader is, and whether it shall go on. Of the thread that made it: others may
@@ -80,6 +81,9 @@ Result<MeshFile> read_obj(const ReaderInput& input);
 Result<MeshFile> read_stl(const ReaderInput& input);
 Result<MeshFile> read_ply(const ReaderInput& input);
 Result<MeshFile> read_off(const ReaderInput& input);
+
+/// Whether the size of a file is that of a binary STL file of as many triangles as it claims.
+[[nodiscard]] bool is_binary_stl(std::string_view bytes);
 
 /// Appends polygons as fans and keeps count of their elements, for readers that go face by face.
 class FanBuilder {

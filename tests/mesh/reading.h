@@ -42,6 +42,17 @@ inline std::string only_warning(const MeshFile& file) {
   return file.stats.warnings.empty() ? "" : file.stats.warnings.front();
 }
 
+/// 6 times the volume inside, which of whole coordinates is exact.
+inline double six_volumes(const TriangleSoup& mesh) {
+  double sum = 0.0;
+  for (const glm::uvec3& t : mesh.triangles) {
+    const glm::dvec3 &a = mesh.positions[t.x], &b = mesh.positions[t.y], &c = mesh.positions[t.z];
+    sum += a.x * (b.y * c.z - b.z * c.y) + a.y * (b.z * c.x - b.x * c.z) +
+           a.z * (b.x * c.y - b.y * c.x);
+  }
+  return sum;
+}
+
 inline bool contains(std::string_view text, std::string_view part) {
   return text.find(part) != std::string_view::npos;
 }

@@ -49,15 +49,33 @@ TEST(StlReader, MinusZeroWeldsWithZero) {
   for (const glm::dvec3& p : file.soup.positions) EXPECT_FALSE(std::signbit(p.x + p.y + p.z));
 }
 
-TEST(StlReader, BinaryHeaderThatLiesIsRefused) {
+TEST(StlReader, SizeDecidesWhereTheCountIsWrong) {
+  const std::string whole = cube_bytes();
+  std::string bytes = whole;
+  for (const std::uint32_t count : {0u, 1u, 11u, 13u, 4294967295u}) {
+    std::memcpy(&bytes[80], &count, 4);
+    const MeshFile file = parsed(kStl, bytes);
+    EXPECT_EQ(file.soup.triangles, parsed(kStl, whole).soup.triangles) << count;
+    EXPECT_EQ(
+        only_warning(file),
+        fmt::format("file: byte 80 claims {} triangle{}, but the file has 684 bytes, room for "
+                    "12: all 12 are read",
+                    count, count == 1 ? "" : "s"));
+    EXPECT_CONTAINS(refusal(kStl, bytes, true), "room for 12");
+  }
+  // A part of a triangle at the end is none.
+  const MeshFile cut = parsed(kStl, whole.substr(0, 650));
+  EXPECT_EQ(cut.soup.triangles.size(), 11u);
+  ASSERT_EQ(cut.stats.warnings.size(), 2u);
+  EXPECT_CONTAINS(cut.stats.warnings[0], "claims 12 triangles, but the file has 650 bytes");
+  EXPECT_CONTAINS(cut.stats.warnings[1], "16 bytes after the 11 triangles");
+}
+
+TEST(StlReader, BinaryFilesWithoutATriangleAreRefused) {
   std::string bytes = cube_bytes();
-  bytes[80] = 13;
-  EXPECT_EQ(refusal(kStl, bytes),
-            "file: byte 80 claims 13 triangles, which end at byte 734, but the file has 684 bytes");
-  bytes[80] = bytes[81] = bytes[82] = bytes[83] = static_cast<char>(0xff);
-  EXPECT_CONTAINS(refusal(kStl, bytes), "claims 4294967295 triangles");
-  bytes[80] = bytes[81] = bytes[82] = bytes[83] = 0;
-  EXPECT_CONTAINS(refusal(kStl, bytes), "claims 0 triangles, but 600 more bytes follow");
+  EXPECT_EQ(refusal(kStl, bytes.substr(0, 100)),
+            "file: byte 80 claims 12 triangles, which end at byte 684, but the file has 100 bytes");
+  bytes[80] = 0;
   EXPECT_EQ(refusal(kStl, bytes.substr(0, 84)), "file: no triangles");
   EXPECT_EQ(refusal(kStl, bytes.substr(0, 50)), "file: 50 bytes are too few for an STL file");
 }
@@ -135,6 +153,39 @@ TEST(StlReader, AsciiLoopOfFourIsAFan) {
              "vertex 0 1 0\nendloop\nendfacet\nendsolid\n");
   EXPECT_EQ(file.stats.faces, 1u);
   EXPECT_EQ(file.soup.face_elements, (std::vector<std::uint32_t>{0, 0}));
+}
+
+TEST(StlReader, SpellingsOfExportersAreRead) {
+  const MeshFile expected = parsed(kStl, "solid x\n" + kFacet + kFacet + "endsolid x\n");
+  const auto with = [](std::string_view from, std::string_view to) {
+    std::string text = "solid x\n" + kFacet + kFacet + "endsolid x\n";
+    for (std::size_t at = 0; (at = text.find(from, at)) != std::string::npos; at += to.size()) {
+      text.replace(at, from.size(), to);
+    }
+    return text;
+  };
+  for (const std::string& text :
+       {with("endsolid x", "end solid x"), with("endsolid x", "endsolidx"),
+        with("endsolid x", "EndSolid \"x y\""), with("endloop", "end loop"),
+        with("endfacet", "end facet"), with("endfacet", "End  Facet"),
+        with("outer loop", "outer  loop"), with("outer loop", "loop"),
+        with("outer loop", "OUTER LOOP"), with("solid x\n", "solidx\n"),
+        with("endloop\n", "endloop\n  color 0.2 0.3 0.4\n"),
+        with("endfacet\n", "endfacet\ncolor 1 0 0\n\n"),
+        with("solid x\n", "solid x\nCOLOUR 1 0 0\n"),
+        with("vertex 1 0 0\n", "vertex 1 0 0\n  rgb 1 2 3\n"),
+        with("endloop\n", "endloop\n  color 0.2 0.3 0.4 endfacet\n"),
+        with("endloop\n", "endloop\r\nmaterial steel\r\n")}) {
+    const MeshFile file = parsed(kStl, text);
+    EXPECT_EQ(file.soup.triangles, expected.soup.triangles) << text;
+    EXPECT_TRUE(file.stats.warnings.empty()) << text << file.stats.warnings.front();
+  }
+  const MeshFile strange = parsed(kStl, with("endloop\n", "endloop\nweight 3\n"));
+  EXPECT_EQ(strange.soup.triangles, expected.soup.triangles);
+  EXPECT_EQ(only_warning(strange),
+            "file:8: 'weight' is no word of an ascii STL file; 2 such lines were skipped");
+  EXPECT_CONTAINS(refusal(kStl, with("vertex 1 0 0", "vertx 1 0 0")),
+                  "file:5: 'vertx' is no word of a loop");
 }
 
 TEST(StlReader, AsciiErrorsNameTheLine) {
