@@ -55,8 +55,16 @@ Result<MeshFile> read_as(const detail::ReaderInput& input) {
 Result<MeshFile> read_text(std::string_view text, const std::string& name,
                            const MeshReadOptions& options, const Execution& execution) {
   if (text.empty()) return fail(ErrorCode::kInput, "{}: the file is empty", name);
+  // The 80 bytes before the triangles of a binary STL file may be anything.
+  const bool anything = options.format == MeshFormat::kStl && detail::is_binary_stl(text);
+  if (!anything && detail::is_wide_text(text)) {
+    return fail(ErrorCode::kInput, "{}: {}", name, detail::kWideText);
+  }
+  const std::size_t size = text.size();
+  if (!anything) text = detail::without_byte_order_mark(text);
   try {
-    Result<MeshFile> result = read_as({text, name, options, execution});
+    Result<MeshFile> result = read_as({text, name, options, execution, size - text.size()});
+    if (result) result->stats.bytes = size;
     const MeshFormat looks_like = format_by_content(text);
     if (!result && result.error().code == ErrorCode::kInput && looks_like != MeshFormat::kAuto &&
         looks_like != options.format) {

@@ -16,9 +16,9 @@ namespace strata {
 enum class MeshFormat {
   kAuto,  ///< by the extension of the path
   kObj,   ///< Wavefront OBJ: v and f statements; all else is skipped
-  kStl,   ///< STL, ascii or binary, told apart by size
-  kPly,   ///< PLY 1.0, ascii or binary of either byte order
-  kOff    ///< Object File Format, ascii, with the prefixes ST, C, N, 4
+  kStl,   ///< STL, ascii or binary, told apart by size; a wrong count gives way to the size
+  kPly,   ///< PLY 1.0, ascii or binary of either byte order: faces and triangle strips
+  kOff    ///< Object File Format, ascii, with the prefixes ST, C, N, 4 in any order
 };
 
 /// Who reads the file.
@@ -71,11 +71,12 @@ struct MeshFile {
 /// Reads the triangles of a mesh file. Polygons become fans from their first corner, whose
 /// triangles share the face element; for a flat polygon, even a concave one, the signed and the
 /// parity counts of such a fan are exact. STL corners are welded by exact position (-0 equals +0).
-/// Vertices keep the order of the file. Counts in headers are claims: nothing is allocated that the
+/// Vertices keep the order of the file. Text may begin with a
+/// UTF-8 byte order mark. Counts in headers are claims: nothing is allocated that the
 /// bytes of the file do not back. The result does not depend on the number of threads.
 /// @param path  a file, or "-" for standard input, which needs options.format
-/// @return kInput, with line or byte: no such file, unknown format, empty, malformed, truncated, no
-/// vertices, no usable face, or with `strict` a face that had to be dropped; kUsage: "-" without a
+/// @return kInput, with line or byte: no such file, unknown format, empty, malformed, truncated,
+/// UTF-16 text, no vertices, no usable face, or with `strict` a face that had to be dropped; kUsage: "-" without a
 /// format, OpenMesh not in this build; kLimit: more than 2^32 - 2 vertices, memory; kCancelled.
 /// The file must not be changed by others meanwhile.
 Result<MeshFile> read_mesh(const std::string& path, const MeshReadOptions& options = {},

@@ -51,6 +51,20 @@ std::string describe(const char* p, const char* end) {
   return fmt::format("byte {:#04x}", static_cast<unsigned>(static_cast<unsigned char>(*p)));
 }
 
+bool is_wide_text(std::string_view text) {
+  using namespace std::string_view_literals;
+  if (text.starts_with("\xff\xfe") || text.starts_with("\xfe\xff")) return true;
+  if (text.starts_with("\0\0\xfe\xff"sv)) return true;
+  constexpr std::size_t kLooks = 16;
+  if (text.size() < kLooks || (text[0] == '\0') == (text[1] == '\0')) return false;
+  const std::size_t zero = text[0] == '\0' ? 0 : 1;  // big endian, little endian
+  for (std::size_t i = 0; i < kLooks; ++i) {
+    const char c = text[i];
+    if (i % 2 == zero ? c != '\0' : !(is_space(c) || (c >= ' ' && c <= '~'))) return false;
+  }
+  return true;
+}
+
 std::uint64_t line_of(std::string_view text, const char* position) {
   std::uint64_t line = 1;
   for (const char* p = text.data(); p < position; ++p) {

@@ -112,6 +112,20 @@ inline const char* skip_token(const char* p) {
 /// The 1-based line of a position: lines end with \n, \r\n or \r.
 [[nodiscard]] std::uint64_t line_of(std::string_view text, const char* position);
 
+/// The text behind its UTF-8 byte order mark, which editors and exporters of Windows write.
+[[nodiscard]] inline std::string_view without_byte_order_mark(std::string_view text) {
+  if (text.starts_with("\xef\xbb\xbf")) text.remove_prefix(3);
+  return text;
+}
+
+/// Whether text is UTF-16 or UTF-32: by its byte order mark, or since ascii begins it and every
+/// second of its first bytes is zero.
+[[nodiscard]] bool is_wide_text(std::string_view text);
+
+/// What is said of such text, behind the name of the file.
+inline constexpr std::string_view kWideText =
+    "the file is UTF-16 text; save it as UTF-8 (iconv -f UTF-16 -t UTF-8)";
+
 /// Case-insensitive comparison of ascii. @pre `word` is in lower case
 [[nodiscard]] inline bool equals_no_case(std::string_view text, std::string_view word) {
   if (text.size() != word.size()) return false;

@@ -14,6 +14,7 @@
 #include "apps/option_values.h"
 #include "apps/view/camera_control.h"
 #include "csg/picture.h"
+#include "mesh/text_scanner.h"
 
 namespace strata::view {
 namespace {
@@ -252,6 +253,7 @@ class Line {
 
 Result<std::vector<ScriptCommand>> parse_script(std::string_view text, const std::string& name) {
   std::vector<ScriptCommand> commands;
+  text = strata::detail::without_byte_order_mark(text);
   int number = 0;
   while (!text.empty()) {
     ++number;

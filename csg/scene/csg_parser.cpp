@@ -6,6 +6,8 @@
 #include <cstring>
 #include <limits>
 
+#include "mesh/text_scanner.h"
+
 namespace strata::csg {
 namespace {
 
@@ -66,7 +68,10 @@ class Parser {
       return fail(ErrorCode::kLimit, "{}: {} bytes of text; the limit is 4 GiB", ast_.name,
                   ast_.text.size());
     }
-    if (ast_.text.starts_with("\xef\xbb\xbf")) at_ += 3;  // byte order mark
+    if (strata::detail::is_wide_text(ast_.text)) {
+      return fail(ErrorCode::kInput, "{}: {}", ast_.name, strata::detail::kWideText);
+    }
+    at_ += ast_.text.size() - strata::detail::without_byte_order_mark(ast_.text).size();
     if (!statements()) return tl::unexpected(error_);
     return std::move(ast_);
   }

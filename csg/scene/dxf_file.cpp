@@ -3,6 +3,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "mesh/text_scanner.h"
+
 namespace strata::csg {
 namespace {
 
@@ -163,7 +165,10 @@ Result<DxfFile> parse_dxf(std::string_view text, const std::string& name) {
   if (text.starts_with("AutoCAD Binary DXF")) {
     return fail(ErrorCode::kInput, "{}: binary DXF is not read; save it as text", name);
   }
-  return Parser(text, name).run();
+  if (detail::is_wide_text(text)) {
+    return fail(ErrorCode::kInput, "{}: {}", name, detail::kWideText);
+  }
+  return Parser(detail::without_byte_order_mark(text), name).run();
 }
 
 }  // namespace strata::csg

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "mesh/input_bytes.h"
+#include "mesh/text_scanner.h"
 
 namespace strata::csg {
 namespace {
@@ -55,7 +56,10 @@ Result<HeightMap> read_numbers(const std::string& path) {
   std::vector<double> numbers;
   std::vector<std::size_t> row_ends;
   std::size_t columns = 0, line_number = 0;
-  for (std::string_view rest = bytes->view(); !rest.empty();) {
+  if (detail::is_wide_text(bytes->view())) {
+    return fail(ErrorCode::kInput, "{}: {}", path, detail::kWideText);
+  }
+  for (std::string_view rest = detail::without_byte_order_mark(bytes->view()); !rest.empty();) {
     const std::size_t newline = rest.find('\n');
     const std::string_view line = rest.substr(0, newline);
     rest = newline == std::string_view::npos ? std::string_view() : rest.substr(newline + 1);

@@ -45,6 +45,15 @@ std::string dxf_error(const std::string& text) {
   return outline.error().message;
 }
 
+TEST(DxfReader, TextMayBeginWithAByteOrderMark) {
+  const std::string text = dxf(square(0, 0, 10));
+  EXPECT_EQ(drawn("\xef\xbb\xbf" + text).contours, drawn(text).contours);
+  EXPECT_EQ(drawn(text).contours.size(), 1u);
+  std::string wide = "\xff\xfe";
+  for (const char c : text) wide += {c, '\0'};
+  EXPECT_NE(dxf_error(wide).find("is UTF-16 text"), std::string::npos) << dxf_error(wide);
+}
+
 TEST(DxfReader, LinesInAnyOrderAndDirectionJoin) {
   EXPECT_DOUBLE_EQ(area(drawn(dxf(square(1, 2, 3)))), 9);
   // A hole is what lies in something else; ends may be off by rounding.

@@ -203,6 +203,19 @@ TEST_F(SceneFiles, SurfacesStandOnAFloorBelowTheLowestPoint) {
   EXPECT_EQ(mesh->positions[5], glm::dvec3(2, 1, 6));
 }
 
+TEST_F(SceneFiles, TextMayBeginWithAByteOrderMark) {
+  const std::string mark = "\xef\xbb\xbf";
+  const auto plain = read_surface(write("a.dat", "1 2 3\n4 5 6\n"), false, false);
+  const auto marked = read_surface(write("a.dat", mark + "1 2 3\n4 5 6\n"), false, false);
+  ASSERT_TRUE(plain.has_value() && marked.has_value());
+  EXPECT_EQ(plain->positions, marked->positions);
+  EXPECT_FALSE(plain->positions.empty());
+  write("b.obj", mark + "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n");
+  const Scene scene = read(write("scene.csg", mark + "import(file = \"b.obj\");"));
+  ASSERT_EQ(scene.tree.solids().size(), 1u);
+  EXPECT_NEAR(signed_volume(*scene.tree.solids()[0].mesh), 1.0 / 6.0, 1e-12);
+}
+
 TEST_F(SceneFiles, FloorsGoDownWithNegativeHeights) {
   const auto mesh = read_surface(write("a.dat", "-5 2\n3 4\n"), true, false);
   ASSERT_TRUE(mesh.has_value());

@@ -105,6 +105,18 @@ TEST(CsgParser, CommentsModifiersAndStraySemicolonsAreTaken) {
   EXPECT_EQ(ast.nodes[2].modifiers, 0);
 }
 
+TEST(CsgParser, WideTextIsNamed) {
+  for (const bool marked : {true, false}) {
+    std::string wide = marked ? "\xff\xfe" : "";
+    for (const char c : std::string("cube(size = [1, 1, 1]);\n")) wide += {c, '\0'};
+    const auto ast = parse_csg(wide, "t.csg");
+    ASSERT_FALSE(ast.has_value());
+    EXPECT_EQ(ast.error().code, ErrorCode::kInput);
+    EXPECT_NE(ast.error().message.find("t.csg: the file is UTF-16 text"), std::string::npos)
+        << ast.error().message;
+  }
+}
+
 TEST(CsgParser, AChildMayStandWithoutBraces) {
   const Ast ast = parsed("color([1,0,0]) multmatrix([]) cube(); sphere();");
   ASSERT_EQ(ast.nodes.size(), 4u);

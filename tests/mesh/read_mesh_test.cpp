@@ -57,6 +57,50 @@ TEST_F(ReadMesh, FormatFollowsTheExtensionInAnyLetterCase) {
   }
 }
 
+TEST_F(ReadMesh, TextMayBeginWithAByteOrderMark) {
+  const std::string mark = "\xef\xbb\xbf";
+  const std::string facet =
+      "facet normal 0 0 1 outer loop vertex 0 0 0 vertex 1 0 0 vertex 0 1 0 "
+      "endloop endfacet\n";
+  const std::pair<const char*, std::string> kFiles[] = {
+      {"a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"},
+      {"a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"},
+      {"a.ply", mesh_to_bytes(ball(), MeshFormat::kPly)},
+      {"a.stl", "solid\n" + facet + "endsolid\n"},
+      {"b.ply",
+       "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+       "property float z\nelement face 1\nproperty list uchar int vertex_indices\n"
+       "end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"}};
+  for (const auto& [name, text] : kFiles) {
+    const auto plain = read_mesh(write(name, text)), marked = read_mesh(write(name, mark + text));
+    ASSERT_TRUE(plain.has_value() && marked.has_value()) << name;
+    EXPECT_EQ(plain->soup.positions, marked->soup.positions) << name;
+    EXPECT_EQ(plain->soup.triangles, marked->soup.triangles) << name;
+    EXPECT_TRUE(marked->stats.warnings.empty()) << name;
+    EXPECT_EQ(marked->stats.bytes, text.size() + 3);
+  }
+}
+
+TEST_F(ReadMesh, WideTextIsNamed) {
+  const std::string text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+  for (const std::string mark : {"\xff\xfe", "\xfe\xff", ""}) {
+    for (const bool big : {false, true}) {
+      if (!mark.empty() && big != (mark[0] == '\xfe')) continue;
+      std::string wide = mark;
+      for (const char c : text) wide += big ? std::string{'\0', c} : std::string{c, '\0'};
+      for (const char* name : {"a.obj", "a.off", "a.ply", "a.stl"}) {
+        const auto file = read_mesh(write(name, wide));
+        ASSERT_FALSE(file.has_value()) << name;
+        EXPECT_CONTAINS(file.error().message, "is UTF-16 text");
+      }
+    }
+  }
+  // The header of a binary STL file may be anything.
+  std::string bytes = mesh_to_bytes(ball(), MeshFormat::kStl);
+  for (std::size_t i = 0; i < 80; ++i) bytes[i] = i % 2 == 0 ? 's' : '\0';
+  EXPECT_TRUE(read_mesh(write("wide.stl", bytes)).has_value());
+}
+
 TEST_F(ReadMesh, FormatMayBeNamed) {
   const std::string path = write("mesh.dat", mesh_to_bytes(ball(), MeshFormat::kOff));
   EXPECT_FALSE(read_mesh(path).has_value());
