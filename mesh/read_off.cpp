@@ -3,13 +3,33 @@
 #include "mesh/reader_common.h"
 #include "mesh/text_scanner.h"
 
-// [ST][C][N][4][n]OFF, then for nOFF the dimension, then the numbers of vertices, faces and edges;
-// a line for each vertex and each face. What a line says beyond coordinates or corners (normals,
-// colours, texture) is skipped, with or without a prefix that announces it. Comments and blank
-// lines may stand anywhere. (Geomview manual, "OFF Files".)
+// [ST][C][N][4][n]OFF, the prefixes in any order, then for nOFF the dimension, then the numbers of
+// vertices, faces and edges; then the vertices and the faces. (Geomview manual, "OFF Files".)
+//
+// Most files give a line to each vertex and each face, and what the line says beyond coordinates or
+// corners (normals, colours, texture) is skipped, with or without a prefix that announces it. But
+// the format is one of tokens: files in which an element does not fit its line, or that end too
+// early when they are read by lines, are read again token by token. Then a vertex has the values
+// that the prefixes announce, and nothing may be left over: a file that has two meanings is an
+// error. Comments and blank lines may stand anywhere.
 
 namespace strata::detail {
 namespace {
+
+/// How elements are told apart.
+enum class Layout {
+  kLines,    ///< one a line; the rest of its line is skipped
+  kWrapped,  ///< vertices by tokens; the rest of the line behind a face is skipped
+  kTokens    ///< all by tokens
+};
+
+/// One way to read a file.
+struct Attempt {
+  Layout layout = Layout::kLines;
+  bool edges_on_line =
+      true;               ///< the number of edges, if given, stands in the line of that of faces
+  int colour_values = 4;  ///< of a vertex in COFF
+};
 
 class OffReader {
  public:
@@ -18,6 +38,8 @@ class OffReader {
   Result<MeshFile> read();
 
  private:
+  Result<void> attempt(const Attempt& attempt);
+  Result<void> read_prefixes();
   Result<void> read_header();
   Result<void> read_vertices();
   /// Reads faces from p_ on; visit(start, corners) returns false to stop.
@@ -33,6 +55,11 @@ class OffReader {
       skip_line();
     }
   }
+  /// To a value inside an element.
+  void skip_inside() {
+    if (how_.layout != Layout::kLines) return skip_gap();
+    while (is_blank(*p_) && *p_ != '\r') ++p_;
+  }
   void skip_line() {
     while (*p_ != '\n' && *p_ != '\r' && !at_end()) ++p_;
   }
@@ -41,63 +68,93 @@ class OffReader {
     return fail(ErrorCode::kInput, "{}:{}: {}", input_.name, line_of(input_.text, p_), message);
   }
   [[nodiscard]] std::string found() const {
-    return at_end() ? "the file ends" : "found " + describe(p_, end_);
+    if (at_end()) return "the file ends";
+    return *p_ == '#' || *p_ == '\r' ? "found the end of the line" : "found " + describe(p_, end_);
   }
-  /// An integer that ends its token; false leaves p_ at what stands there.
-  bool next_integer(std::int64_t& value) {
-    skip_gap();
+  /// An integer at p_ that ends its token; false leaves p_ at what stands there.
+  bool take_integer(std::int64_t& value) {
     const char* stop = parse_integer(p_, value);
     if (stop == nullptr || !(ends_token(*stop) || *stop == '#')) return false;
     p_ = stop;
     return true;
+  }
+  bool next_integer(std::int64_t& value) {
+    skip_gap();
+    return take_integer(value);
   }
 
   const ReaderInput& input_;
   const char* begin_;
   const char* end_;
   const char* p_;
+  Attempt how_;
   bool homogeneous_ = false;  ///< four coordinates, the last divides
+  bool normals_ = false, colours_ = false, texture_ = false, with_dimension_ = false;
   std::uint64_t vertex_count_ = 0, face_count_ = 0;
   const char* faces_begin_ = nullptr;
   RawMesh mesh_;
 };
 
-Result<void> OffReader::read_header() {
-  if (input_.text.starts_with("\xef\xbb\xbf")) p_ += 3;
-  skip_gap();
+/// The word OFF and what it is told of; p_ is left behind it, where a count may follow at once, as
+/// in the files of ModelNet40 ("OFF8 6 0").
+Result<void> OffReader::read_prefixes() {
+  homogeneous_ = normals_ = colours_ = texture_ = with_dimension_ = false;
   std::string_view word = token_at(p_);
-  bool with_dimension = false;
-  if (word.ends_with("OFF")) {
-    p_ += word.size();
-    word.remove_suffix(3);
-    const auto prefix = [&word](std::string_view text) {
-      if (!word.starts_with(text)) return false;
-      word.remove_prefix(text.size());
-      return true;
-    };
-    prefix("ST");
-    prefix("C");
-    prefix("N");
-    homogeneous_ = prefix("4");
-    with_dimension = prefix("n");
-    if (!word.empty()) return error(fmt::format("'{}' is no prefix of OFF", word));
-    skip_gap();
-    if (token_at(p_) == "BINARY") return error("binary OFF files are not supported");
-  } else if (!is_digit(*p_)) {
+  const bool lower = word.find("off") < word.find("OFF");
+  const std::size_t size = word.find(lower ? "off" : "OFF");
+  const char behind =
+      size == std::string_view::npos || size + 3 >= word.size() ? '0' : word[size + 3];
+  if (size == std::string_view::npos || !is_digit(behind)) {
+    if (is_digit(*p_)) return {};  // counts at once
     return error(fmt::format("expected OFF, {}", found()));
   }
-  std::int64_t dimension = 3;
-  if (with_dimension && (!next_integer(dimension) || dimension != 3)) {
+  word = word.substr(0, size);
+  const struct {
+    std::string_view upper, lower;
+    bool& flag;
+  } kPrefixes[] = {{"ST", "st", texture_},
+                   {"C", "c", colours_},
+                   {"N", "N", normals_},
+                   {"4", "4", homogeneous_},
+                   {"n", "n", with_dimension_}};
+  while (!word.empty()) {
+    bool known = false;
+    for (const auto& prefix : kPrefixes) {
+      if (prefix.flag || !word.starts_with(lower ? prefix.lower : prefix.upper)) continue;
+      word.remove_prefix(prefix.upper.size());
+      known = prefix.flag = true;
+      break;
+    }
+    if (!known) return error(fmt::format("'{}' is no prefix of OFF", word));
+  }
+  p_ += size + 3;
+  skip_gap();
+  if (token_at(p_) == "BINARY") return error("binary OFF files are not supported");
+  return {};
+}
+
+Result<void> OffReader::read_header() {
+  p_ = begin_;
+  skip_gap();
+  if (auto prefixes = read_prefixes(); !prefixes) return prefixes;
+  std::int64_t dimension = 3, vertices = 0, faces = 0, edges = 0;
+  if (with_dimension_ && (!next_integer(dimension) || dimension != 3)) {
     return error(fmt::format("only 3 dimensions are supported, {}", found()));
   }
-  std::int64_t vertices = 0, faces = 0;
   if (!next_integer(vertices) || vertices < 0) {
     return error(fmt::format("expected the number of vertices, {}", found()));
   }
   if (!next_integer(faces) || faces < 0) {
     return error(fmt::format("expected the number of faces, {}", found()));
   }
-  skip_line();  // the number of edges, which nobody needs
+  if (how_.layout == Layout::kLines) {
+    skip_line();  // the number of edges, which nobody needs
+  } else if (how_.edges_on_line) {
+    while (is_blank(*p_) && *p_ != '\r') ++p_;
+    (void)take_integer(edges);
+  } else {
+    (void)next_integer(edges);
+  }
   vertex_count_ = static_cast<std::uint64_t>(vertices);
   face_count_ = static_cast<std::uint64_t>(faces);
   // A vertex is at least "0 0 0\n", a face "0\n".
@@ -116,21 +173,27 @@ Result<void> OffReader::read_header() {
 Result<void> OffReader::read_vertices() {
   reserve_large(mesh_.soup.positions, vertex_count_);
   ReadWatch watch(input_);
+  const bool by_lines = how_.layout == Layout::kLines;
+  const int coordinates = homogeneous_ ? 4 : 3;
+  const int more =
+      by_lines ? 0 : (normals_ ? 3 : 0) + (colours_ ? how_.colour_values : 0) + (texture_ ? 2 : 0);
   for (std::uint64_t v = 0; v < vertex_count_; ++v) {
     double value[4] = {0.0, 0.0, 0.0, 1.0};
-    for (int i = 0; i < (homogeneous_ ? 4 : 3); ++i) {
-      skip_gap();
-      const char* stop = parse_double(p_, value[i]);
+    for (int i = 0; i < coordinates + more; ++i) {
+      i == 0 ? skip_gap() : skip_inside();
+      double skipped = 0.0;
+      const char* stop = parse_double(p_, i < coordinates ? value[i] : skipped);
       if (stop == nullptr || !(ends_token(*stop) || *stop == '#')) {
-        return error(fmt::format("expected coordinate {} of vertex {} of {}, {}", i, v,
-                                 vertex_count_, found()));
+        return error(fmt::format("expected {} {} of vertex {} of {}, {}",
+                                 i < coordinates ? "coordinate" : "value", i, v, vertex_count_,
+                                 found()));
       }
       p_ = stop;
     }
     glm::dvec3 position(value[0], value[1], value[2]);
     if (homogeneous_) position /= value[3];
     mesh_.soup.positions.push_back(position);
-    skip_line();
+    if (by_lines) skip_line();
     if (!watch.step(v, p_)) return {};
   }
   return {};
@@ -139,16 +202,19 @@ Result<void> OffReader::read_vertices() {
 template <class Visit>
 Result<void> OffReader::read_faces(Visit&& visit) {
   std::vector<std::uint32_t> corners;
+  const bool by_lines = how_.layout == Layout::kLines;
   for (std::uint64_t f = 0; f < face_count_; ++f) {
     std::int64_t count = 0;
-    if (!next_integer(count) || count < 0) {
+    if (!next_integer(count) || count < (by_lines ? 0 : 1)) {
       return error(fmt::format("expected the size of face {} of {}, {}", f, face_count_, found()));
     }
     const char* const start = p_;
     corners.clear();
     for (std::int64_t i = 0; i < count; ++i) {
       std::int64_t index = 0;
-      if (!next_integer(index)) {
+      skip_inside();
+      if (!take_integer(index) ||
+          (!by_lines && (index < 0 || index >= static_cast<std::int64_t>(vertex_count_)))) {
         return error(
             fmt::format("expected corner {} of the {} of face {}, {}", i, count, f, found()));
       }
@@ -156,7 +222,7 @@ Result<void> OffReader::read_faces(Visit&& visit) {
                             ? static_cast<std::uint32_t>(index)
                             : kNoVertex);
     }
-    skip_line();
+    if (how_.layout != Layout::kTokens) skip_line();
     if (!visit(start, corners)) break;
   }
   return {};
@@ -184,7 +250,9 @@ FacePlace OffReader::locate(std::uint32_t element) {
   return result;
 }
 
-Result<MeshFile> OffReader::read() {
+Result<void> OffReader::attempt(const Attempt& attempt) {
+  how_ = attempt;
+  mesh_ = {};
   if (auto header = read_header(); !header) return tl::unexpected(header.error());
   if (auto vertices = read_vertices(); !vertices) return tl::unexpected(vertices.error());
   if (input_.execution.stop.stop_requested()) {
@@ -205,10 +273,38 @@ Result<MeshFile> OffReader::read() {
   }
   skip_gap();
   if (!at_end()) {
+    if (how_.layout != Layout::kLines) return error(fmt::format("expected the end, {}", found()));
     mesh_.stats.warnings.push_back(fmt::format("{}:{}: what follows the last face is ignored",
                                                input_.name, line_of(input_.text, p_)));
   }
   mesh_.stats.format = "off";
+  return {};
+}
+
+Result<MeshFile> OffReader::read() {
+  Error furthest;
+  const char* furthest_place = nullptr;
+  const auto good = [&](const Attempt& how) {
+    auto done = attempt(how);
+    if (done) return true;
+    // The way that read most of the file has the error that helps.
+    if (furthest_place == nullptr || p_ > furthest_place ||
+        done.error().code != ErrorCode::kInput) {
+      furthest = done.error();
+      furthest_place = p_;
+    }
+    return false;
+  };
+  bool read = good({});
+  for (const bool edges_on_line : {true, false}) {
+    for (const int colour_values : {4, 3}) {
+      for (const Layout layout : {Layout::kWrapped, Layout::kTokens}) {
+        if (read || furthest.code != ErrorCode::kInput || (colour_values == 3 && !colours_)) break;
+        read = good({layout, edges_on_line, colour_values});
+      }
+    }
+  }
+  if (!read) return tl::unexpected(std::move(furthest));
   return finish_mesh(input_, std::move(mesh_),
                      [this](std::uint32_t element) { return locate(element); });
 }

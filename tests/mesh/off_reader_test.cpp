@@ -36,6 +36,51 @@ TEST(OffReader, NormalsColoursAndTextureAreSkipped) {
   }
 }
 
+TEST(OffReader, CountsMayBeGluedToTheWord) {
+  for (const char* header : {"OFF4 2 0\n", "  OFF4 2 0\n", "COFF4 2 0\r\n", "\n\tOFF 4 2 0\n",
+                             "off\n4 2 0\n", "coff4 2 0\n"}) {
+    EXPECT_EQ(parsed(kOff, header + kBody).soup.triangles, kTwoTriangles) << header;
+  }
+}
+
+TEST(OffReader, PrefixesStandInAnyOrder) {
+  for (const char* prefix : {"NC", "CN", "NCST", "STCN", "STNC", "CSTN", "NSTC", "NST"}) {
+    const std::string text = prefix + std::string("OFF\n4 2 0\n") + kBody;
+    EXPECT_EQ(parsed(kOff, text).soup.triangles, kTwoTriangles) << prefix;
+  }
+  EXPECT_EQ(parsed(kOff, "N4OFF\n3 1 0\n0 0 0 1\n2 0 0 2\n0 2 0 2\n3 0 1 2\n").soup.positions[1],
+            glm::dvec3(1, 0, 0));
+  EXPECT_CONTAINS(refusal(kOff, "CCOFF\n4 2 0\n" + kBody), "'C' is no prefix of OFF");
+}
+
+TEST(OffReader, TokensMayStandInAnyLines) {
+  const MeshFile expected = parsed(kOff, "OFF\n4 2 0\n" + kBody);
+  for (const char* text :
+       {"OFF\n4 2 0\n0 0 0 1 0 0\n1 1 0 0 1 0\n3 0 1 2\n3 0 2 3\n",         // two vertices a line
+        "OFF\n4 2 0\n0 0 0\n1 0\n0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n",      // over two lines
+        "OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3\n0\n1\n2\n3\n0\n2 3\n",  // faces over lines
+        "OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2 3 0 2 3\n",        // two faces a line
+        "OFF 4 2 0 0 0 0 1 0 0 1 1 0 0 1 0 3 0 1 2 3 0 2 3",                // all in one
+        "OFF\n4 2\n0\n0 0 0 1 0 0 # two\n1 1 0 0 1 0\n3 0 1\n2 255 0 0\n3 0 2 3 0 255 0\n",
+        "NOFF\n4 2 0\n0 0 0 0 0 1 1 0 0 0 0 1\n1 1 0 0 0 1 0 1 0 0 0 1\n3 0 1 2\n3 0 2 3\n",
+        "COFF\n4 2 0\n0 0 0 1 2 3 4 1 0 0 1 2 3 4\n1 1 0 1 2 3 4 0 1 0 1 2 3 4\n3 0 1 2\n3 0 2 3",
+        "COFF\n4 2 0\n0 0 0 1 2 3 1 0 0 1 2 3\n1 1 0 1 2 3 0 1 0 1 2 3\n3 0 1 2\n3 0 2 3\n"}) {
+    const MeshFile file = parsed(kOff, text);
+    EXPECT_EQ(file.soup.positions, expected.soup.positions) << text;
+    EXPECT_EQ(file.soup.triangles, expected.soup.triangles) << text;
+    EXPECT_TRUE(file.stats.warnings.empty()) << text;
+  }
+}
+
+TEST(OffReader, TokensInLinesThatMakeNoWholeAreRefused) {
+  // One number too few, one too many: never another mesh.
+  for (const char* text : {"OFF\n4 2 0\n0 0 0 1 0 0\n1 1 0 0 1\n3 0 1 2\n3 0 2 3\n",
+                           "OFF\n4 2 0\n0 0 0 1 0 0\n1 1 0 0 1 0 7\n3 0 1 2\n3 0 2 3\n",
+                           "OFF\n4 2 0\n0 0 0 1 0 0\n1 1 0 0 1 0\n3 0 1 2\n3 0 2\n"}) {
+    EXPECT_CONTAINS(refusal(kOff, text), "file:") << text;
+  }
+}
+
 TEST(OffReader, FourthCoordinateDivides) {
   const MeshFile file =
       parsed(kOff, "4OFF\n4 2 0\n0 0 0 1\n2 0 0 2\n1 1 0 1\n0 4 0 4\n3 0 1 2\n3 0 2 3\n");
