@@ -3,137 +3,35 @@
 #include <cmath>
 #include <optional>
 #include <span>
+#include <utility>
 
+#include "mesh/ply_source.h"
 #include "mesh/reader_common.h"
 #include "mesh/text_scanner.h"
 
 // A text header lists elements, each with a count and properties: scalars, or lists with their own
 // count. Positions are x, y, z of element "vertex"; faces the list vertex_indices (or vertex_index)
-// of element "face". All else is stepped over by its declared type. (G. Turk, The PLY Polygon File
-// Format, 1994.)
+// of element "face", triangles that of element "tristrips", in which -1 begins a new strip. All
+// else is stepped over by its declared type. (G. Turk, The PLY Polygon File Format, 1994.)
+//
+// An ascii element is a line, and the line may hold more than the header declares. A file in which
+// an element does not fit its line is read again token by token; then nothing may be left over.
 
 namespace strata::detail {
 namespace {
 
-enum class Type { kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kFloat, kDouble };
-constexpr std::size_t kTypeBytes[] = {1, 1, 2, 2, 4, 4, 4, 8};
-constexpr std::size_t bytes_of(Type type) { return kTypeBytes[static_cast<int>(type)]; }
+using namespace ply;
 
-std::optional<Type> type_named(std::string_view name) {
-  constexpr std::pair<std::string_view, Type> kNames[] = {
-      {"char", Type::kInt8},     {"int8", Type::kInt8},     {"uchar", Type::kUint8},
-      {"uint8", Type::kUint8},   {"short", Type::kInt16},   {"int16", Type::kInt16},
-      {"ushort", Type::kUint16}, {"uint16", Type::kUint16}, {"int", Type::kInt32},
-      {"int32", Type::kInt32},   {"uint", Type::kUint32},   {"uint32", Type::kUint32},
-      {"float", Type::kFloat},   {"float32", Type::kFloat}, {"double", Type::kDouble},
-      {"float64", Type::kDouble}};
-  for (const auto& [known, type] : kNames) {
-    if (name == known) return type;
-  }
-  return std::nullopt;
-}
+/// What the corners of an element make.
+enum class FaceKind { kPolygon, kStrip };
 
-struct Property {
-  std::string name;
-  Type type = Type::kFloat;       ///< of the value, or of the items of a list
-  std::optional<Type> list_type;  ///< of the list's count; empty: a scalar
-};
-
-struct Element {
-  std::string name;
-  std::uint64_t count = 0;
-  std::vector<Property> properties;
-};
-
-enum class Encoding { kAscii, kLittle, kBig };
-
-/// Values of an ascii body, one after the other.
-class AsciiSource {
- public:
-  static constexpr bool kBinary = false;
-  AsciiSource(const char* p, const char* end) : p_(p), end_(end) {}
-  /// All that fits in a double is read as one: every PLY type does.
-  bool read(Type, double& value) {
-    while (is_space(*p_)) ++p_;
-    const char* stop = parse_double(p_, value);
-    if (stop == nullptr || !ends_token(*stop)) return false;
-    p_ = stop;
-    return true;
-  }
-  bool skip(Type, std::uint64_t count) {
-    for (; count != 0; --count) {
-      while (is_space(*p_)) ++p_;
-      if (p_ >= end_) return false;
-      p_ = std::max(p_ + 1, skip_token(p_));
-    }
-    return true;
-  }
-  static std::uint64_t least_bytes(const Property&) { return 2; }  // a digit and a blank
-  [[nodiscard]] const char* position() const { return p_; }
-  [[nodiscard]] std::uint64_t left() const { return static_cast<std::uint64_t>(end_ - p_); }
-
- private:
-  const char* p_;
-  const char* end_;
-};
-
-/// Values of a binary body.
-template <std::endian kOrder>
-class BinarySource {
- public:
-  static constexpr bool kBinary = true;
-  BinarySource(const char* p, const char* end) : p_(p), end_(end) {}
-  bool read(Type type, double& value) {
-    if (left() < bytes_of(type)) return false;
-    value = at(type, p_);
-    p_ += bytes_of(type);
-    return true;
-  }
-  bool skip(Type type, std::uint64_t count) {
-    if (count > left() / bytes_of(type)) return false;
-    p_ += count * bytes_of(type);
-    return true;
-  }
-  static std::uint64_t least_bytes(const Property& property) {
-    return bytes_of(property.list_type.value_or(property.type));
-  }
-  static double at(Type type, const char* p) {
-    switch (type) {
-      case Type::kInt8:
-        return load<std::int8_t>(p);
-      case Type::kUint8:
-        return load<std::uint8_t>(p);
-      case Type::kInt16:
-        return load<std::int16_t>(p);
-      case Type::kUint16:
-        return load<std::uint16_t>(p);
-      case Type::kInt32:
-        return load<std::int32_t>(p);
-      case Type::kUint32:
-        return load<std::uint32_t>(p);
-      case Type::kFloat:
-        return std::bit_cast<float>(load<std::uint32_t>(p));
-      case Type::kDouble:
-        return std::bit_cast<double>(load<std::uint64_t>(p));
-    }
-    return 0.0;
-  }
-  template <class T>
-  static T load(const char* p) {
-    char bytes[sizeof(T)];
-    std::memcpy(bytes, p, sizeof(T));
-    if constexpr (kOrder != std::endian::native) std::reverse(bytes, bytes + sizeof(T));
-    T value;
-    std::memcpy(&value, bytes, sizeof(T));
-    return value;
-  }
-  [[nodiscard]] const char* position() const { return p_; }
-  [[nodiscard]] std::uint64_t left() const { return static_cast<std::uint64_t>(end_ - p_); }
-  void advance(std::size_t bytes) { p_ += bytes; }
-
- private:
-  const char* p_;
-  const char* end_;
+/// An element that holds faces, for messages about one of them.
+template <class Source>
+struct FaceSource {
+  const Element* element;
+  Source source;
+  FaceKind kind;
+  std::uint64_t faces;  ///< how many it made
 };
 
 class PlyReader {
@@ -146,8 +44,12 @@ class PlyReader {
   Result<void> read_header();
   Result<void> read_element_line(std::string_view line);
   Result<void> read_property_line(std::string_view line);
+  Result<MeshFile> read_ascii();
   template <class Source>
   Result<MeshFile> read_body(Source source);
+  template <class Source>
+  Result<void> read_face_element(Source& source, const Element& element, FaceKind kind,
+                                 FanBuilder& fans);
   template <class Source>
   Result<void> read_vertices(Source& source, const Element& element);
   template <class Source, class Visit>
@@ -160,9 +62,9 @@ class PlyReader {
   std::string place(const Source& source) const;
   template <class Source>
   tl::unexpected<Error> cut_short(const Source& source, const Element& element,
-                                  std::uint64_t index) const;
+                                  std::uint64_t index);
   template <class Source>
-  FacePlace locate(Source source, const Element& element, std::uint32_t face);
+  FacePlace locate(std::span<const FaceSource<Source>> sources, std::uint64_t face);
   [[nodiscard]] tl::unexpected<Error> header_error(const std::string& message) const {
     return fail(ErrorCode::kInput, "{}:{}: {}", input_.name, line_, message);
   }
@@ -175,6 +77,7 @@ class PlyReader {
   Encoding encoding_ = Encoding::kAscii;
   std::vector<Element> elements_;
   RawMesh mesh_;
+  std::size_t failed_at_ = 0;  ///< where in the text a body ended too early
 };
 
 /// Takes the next word of a line.
@@ -265,7 +168,8 @@ Result<void> PlyReader::read_header() {
 template <class Source>
 std::string PlyReader::place(const Source& source) const {
   if constexpr (Source::kBinary) {
-    return fmt::format("{}: byte {}", input_.name, source.position() - begin_);
+    return fmt::format("{}: byte {}", input_.name,
+                       source.position() - begin_ + static_cast<std::ptrdiff_t>(input_.skipped));
   } else {
     return fmt::format("{}:{}", input_.name, line_of(input_.text, source.position()));
   }
@@ -273,9 +177,11 @@ std::string PlyReader::place(const Source& source) const {
 
 template <class Source>
 tl::unexpected<Error> PlyReader::cut_short(const Source& source, const Element& element,
-                                           std::uint64_t index) const {
+                                           std::uint64_t index) {
   const char* at = source.position();
-  while (!Source::kBinary && is_space(*at)) ++at;
+  failed_at_ = static_cast<std::size_t>(at - begin_);
+  while (!Source::kBinary && is_space(*at)) ++at;  // in lines, what is missing may be in the next
+  if (at < end_ && !Source::kBinary) at = source.position();
   const bool ends = Source::kBinary || at >= end_;
   return fail(ErrorCode::kInput, "{}: {} in element {} {} of {}", place(Source(at, end_)),
               ends ? "the file ends" : describe(at, end_) + " is not a value", element.name, index,
@@ -340,6 +246,7 @@ Result<void> PlyReader::read_vertices(Source& source, const Element& element) {
   ReadWatch watch(input_);
   for (std::uint64_t v = 0; v < element.count; ++v) {
     glm::dvec3 position(0.0);
+    source.begin_element();
     for (std::size_t i = 0; i < element.properties.size(); ++i) {
       const Property& property = element.properties[i];
       const int index = static_cast<int>(i);
@@ -355,6 +262,7 @@ Result<void> PlyReader::read_vertices(Source& source, const Element& element) {
       }
       if (!good) return cut_short(source, element, v);
     }
+    source.end_element();
     positions.push_back(position);
     if (!watch.step(v, source.position())) return {};
   }
@@ -365,6 +273,22 @@ std::uint32_t vertex_index(double value) {
   return value >= 0.0 && value <= static_cast<double>(kMaxVertices) && value == std::floor(value)
              ? static_cast<std::uint32_t>(value)
              : kNoVertex;
+}
+
+/// Calls visit(a, b, c) for the triangles of a strip, turned alike, until it returns false. Those
+/// that only lead on have two corners in one place.
+template <class Visit>
+bool each_strip_triangle(std::span<const std::uint32_t> strip, Visit&& visit) {
+  std::size_t begin = 0;
+  for (std::size_t i = 0; i < strip.size(); ++i) {
+    if (strip[i] == kNoVertex) begin = i + 1;
+    if (i < begin + 2) continue;
+    const std::uint32_t a = strip[i - 2], b = strip[i - 1], c = strip[i];
+    if (a == b || b == c || c == a) continue;
+    const bool odd = (i - begin) % 2 != 0;
+    if (!visit(odd ? b : a, odd ? a : b, c)) return false;
+  }
+  return true;
 }
 
 /// Calls visit(start, corners) for the faces from source on, until it returns false.
@@ -378,7 +302,8 @@ Result<void> PlyReader::read_faces(Source& source, const Element& element, Visit
     }
   }
   if (indices == nullptr) {
-    return fail(ErrorCode::kInput, "{}: element face has no list vertex_indices", input_.name);
+    return fail(ErrorCode::kInput, "{}: element {} has no list vertex_indices", input_.name,
+                element.name);
   }
   // Almost all binary files hold a byte and then 32-bit indices.
   const bool plain = Source::kBinary && element.properties.size() == 1 &&
@@ -386,6 +311,7 @@ Result<void> PlyReader::read_faces(Source& source, const Element& element, Visit
                      (indices->type == Type::kInt32 || indices->type == Type::kUint32);
   std::vector<std::uint32_t> corners;
   for (std::uint64_t f = 0; f < element.count; ++f) {
+    source.begin_element();
     const char* const start = source.position();
     if constexpr (Source::kBinary) {
       if (plain && source.left() >= 13 && *start == 3) {
@@ -413,6 +339,7 @@ Result<void> PlyReader::read_faces(Source& source, const Element& element, Visit
         corners.push_back(vertex_index(value));
       }
     }
+    source.end_element();
     if (!visit(start, std::span<const std::uint32_t>(corners))) return {};
   }
   return {};
@@ -421,34 +348,78 @@ Result<void> PlyReader::read_faces(Source& source, const Element& element, Visit
 template <class Source>
 Result<void> PlyReader::skip_element(Source& source, const Element& element) {
   for (std::uint64_t i = 0; i < element.count; ++i) {
+    source.begin_element();
     for (const Property& property : element.properties) {
       if (!skip_property(source, property)) return cut_short(source, element, i);
     }
+    source.end_element();
   }
   return {};
 }
 
 template <class Source>
-FacePlace PlyReader::locate(Source source, const Element& element, std::uint32_t face) {
+FacePlace PlyReader::locate(std::span<const FaceSource<Source>> sources, std::uint64_t face) {
   FacePlace result{input_.name, {}};
-  std::uint32_t seen = 0;
-  (void)read_faces(source, element, [&](const char* start, std::span<const std::uint32_t> corners) {
-    if (seen++ != face) return true;
-    while (!Source::kBinary && is_space(*start)) ++start;
-    result.place = place(Source(start, end_));
-    for (const std::uint32_t corner : corners) {
-      if (corner == kNoVertex) result.vertex = "with no valid number";
+  for (const FaceSource<Source>& one : sources) {
+    if (face >= one.faces) {
+      face -= one.faces;
+      continue;
     }
-    return false;
-  });
+    std::uint64_t seen = 0;
+    Source source = one.source;
+    (void)read_faces(
+        source, *one.element, [&](const char* start, std::span<const std::uint32_t> corners) {
+          std::uint64_t made = one.kind == FaceKind::kPolygon ? 1 : 0;
+          if (one.kind == FaceKind::kStrip) {
+            each_strip_triangle(corners, [&](auto, auto, auto) { return ++made != 0; });
+          }
+          seen += made;
+          if (seen <= face) return true;
+          result.place = place(Source(start, end_));
+          for (const std::uint32_t corner : corners) {
+            if (corner == kNoVertex && one.kind == FaceKind::kPolygon) {
+              result.vertex = "with no valid number";
+            }
+          }
+          return false;
+        });
+    break;
+  }
   return result;
+}
+
+template <class Source>
+Result<void> PlyReader::read_face_element(Source& source, const Element& element, FaceKind kind,
+                                          FanBuilder& fans) {
+  if (exceeds_limit(input_.execution, mesh_.soup.positions.size(), element.count)) {
+    return fail(ErrorCode::kLimit, "{}: {} faces are more than the memory limit", input_.name,
+                element.count);
+  }
+  ReadWatch watch(input_);
+  std::uint64_t face = 0;
+  if (kind == FaceKind::kStrip) {
+    return read_faces(source, element,
+                      [&](const char* place, std::span<const std::uint32_t> corners) {
+                        return each_strip_triangle(
+                            corners, [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
+                              const std::uint32_t triangle[] = {a, b, c};
+                              fans.add(triangle, 3);
+                              return watch.step(face++, place);
+                            });
+                      });
+  }
+  reserve_large(mesh_.soup.triangles, element.count);
+  return read_faces(source, element,
+                    [&](const char* place, std::span<const std::uint32_t> corners) {
+                      fans.add(corners.data(), corners.size());
+                      return watch.step(face++, place);
+                    });
 }
 
 template <class Source>
 Result<MeshFile> PlyReader::read_body(Source source) {
   FanBuilder fans(mesh_);
-  const Element* faces = nullptr;
-  Source faces_source = source;
+  std::vector<FaceSource<Source>> sources;
   for (const Element& element : elements_) {
     std::uint64_t least = 0;
     for (const Property& property : element.properties) least += Source::least_bytes(property);
@@ -467,21 +438,12 @@ Result<MeshFile> PlyReader::read_body(Source source) {
                     input_.name, element.count);
       }
       done = read_vertices(source, element);
-    } else if (element.name == "face" && faces == nullptr) {
-      if (exceeds_limit(input_.execution, mesh_.soup.positions.size(), element.count)) {
-        return fail(ErrorCode::kLimit, "{}: {} faces are more than the memory limit", input_.name,
-                    element.count);
-      }
-      faces = &element;
-      faces_source = source;
-      reserve_large(mesh_.soup.triangles, element.count);
-      ReadWatch watch(input_);
-      std::uint64_t face = 0;
-      const auto add = [&](const char* place, std::span<const std::uint32_t> corners) {
-        fans.add(corners.data(), corners.size());
-        return watch.step(face++, place);
-      };
-      done = read_faces(source, element, add);
+    } else if (element.name == "face" || element.name == "tristrips") {
+      const FaceKind kind = element.name == "face" ? FaceKind::kPolygon : FaceKind::kStrip;
+      const std::uint64_t before = mesh_.stats.faces;
+      const Source start = source;
+      done = read_face_element(source, element, kind, fans);
+      sources.push_back({&element, start, kind, mesh_.stats.faces - before});
     } else {
       mesh_.stats.ignored += element.count;
       done = skip_element(source, element);
@@ -491,8 +453,28 @@ Result<MeshFile> PlyReader::read_body(Source source) {
       return fail(ErrorCode::kCancelled, "{}: reading was stopped", input_.name);
     }
   }
-  return finish_mesh(input_, std::move(mesh_),
-                     [&](std::uint32_t face) { return locate(faces_source, *faces, face); });
+  if constexpr (!Source::kBinary) {
+    source.begin_element();
+    if (!source.by_lines() && source.left() != 0) {
+      return fail(ErrorCode::kInput, "{}: text follows the last element", place(source));
+    }
+  }
+  return finish_mesh(input_, std::move(mesh_), [&](std::uint32_t face) {
+    return locate(std::span<const FaceSource<Source>>(sources), face);
+  });
+}
+
+Result<MeshFile> PlyReader::read_ascii() {
+  const std::vector<std::string> warnings = mesh_.stats.warnings;
+  Result<MeshFile> by_lines = read_body(AsciiSource(p_, end_));
+  if (by_lines || by_lines.error().code != ErrorCode::kInput) return by_lines;
+  const std::size_t line_failed_at = std::exchange(failed_at_, 0);
+  mesh_ = {};
+  mesh_.stats.format = "ply ascii";
+  mesh_.stats.warnings = warnings;
+  Result<MeshFile> by_tokens = read_body(AsciiSource(p_, end_, false));
+  // The way that read most of the file has the error that helps.
+  return by_tokens || failed_at_ > line_failed_at ? by_tokens : by_lines;
 }
 
 Result<MeshFile> PlyReader::read() {
@@ -508,7 +490,7 @@ Result<MeshFile> PlyReader::read() {
       break;
   }
   mesh_.stats.format = "ply ascii";
-  return read_body(AsciiSource(p_, end_));
+  return read_ascii();
 }
 
 }  // namespace

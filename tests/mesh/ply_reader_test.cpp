@@ -1,6 +1,7 @@
 #include <bit>
 #include <cstring>
 
+#include "mesh/diagnose.h"
 #include "mesh/shapes.h"
 #include "mesh/write_mesh.h"
 #include "tests/mesh/reading.h"
@@ -160,6 +161,65 @@ TEST(PlyReader, ListLengthsThatLieAreRefused) {
   negative.replace(negative.find("int vertex_ind"), 3, "int");
   put(negative, std::int8_t{-3}, false);
   EXPECT_CONTAINS(refusal(kPly, negative), "claims -3 vertices");
+}
+
+TEST(PlyReader, AsciiElementsAreLinesWhateverElseStandsOnThem) {
+  std::string text = kAsciiSquare;
+  for (const char* line : {"1 1 0\n", "3 0 1 2\n", "3 0 2 3\n"}) {
+    text.replace(text.find(line), std::string(line).size() - 1,
+                 std::string(line, std::string(line).size() - 1) + " 9 1 0.5 x");
+  }
+  for (const std::string end : {"\n", "\r\n", "\r"}) {
+    std::string other;
+    for (const char c : text) c == '\n' ? other += end : other += c;
+    const MeshFile file = parsed(kPly, other);
+    EXPECT_EQ(file.soup.triangles, kTwoTriangles);
+    EXPECT_EQ(file.soup.positions, parsed(kPly, kAsciiSquare).soup.positions);
+    EXPECT_TRUE(file.stats.warnings.empty());
+  }
+}
+
+TEST(PlyReader, AsciiElementsThatDoNotFitTheirLinesAreReadByTokens) {
+  const std::string header = kAsciiSquare.substr(0, kAsciiSquare.find("0 0 0\n"));
+  for (const char* body : {"0 0 0 1 0 0\n1 1 0 0 1 0\n3 0 1 2 3 0 2 3\n",
+                           "0 0 0\n1 0\n0\n1 1 0 0 1 0\n3\n0\n1\n2 3\n0 2 3"}) {
+    EXPECT_EQ(parsed(kPly, header + body).soup.triangles, kTwoTriangles) << body;
+  }
+  EXPECT_CONTAINS(refusal(kPly, header + "0 0 0 1 0 0\n1 1 0 0 1 0\n3 0 1 2 3 0 2 3 7\n"), "file");
+}
+
+TEST(PlyReader, TriangleStripsTurnAlikeAndRestart) {
+  const std::string header =
+      "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\n"
+      "property float z\nelement tristrips 2\nproperty list int int vertex_indices\nend_header\n"
+      "0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n1 0 1\n1 1 1\n0 1 1\n";
+  // Four sides of a cube as one strip, then bottom and top; a corner is repeated to lead on.
+  const MeshFile file =
+      parsed(kPly, header + "10 4 0 5 1 6 2 7 3 4 0\n12 0 3 1 2 -1 -1 4 4 4 5 7 6\n");
+  EXPECT_EQ(file.soup.triangles.size(), 12u);
+  EXPECT_EQ(six_volumes(file.soup), 6.0);
+  EXPECT_TRUE(is_closed(file.soup));
+  EXPECT_TRUE(file.stats.warnings.empty());
+  const MeshFile bad = parsed(kPly, header + "4 0 1 2 3\n6 4 5 -1 5 6 8\n");
+  EXPECT_EQ(bad.soup.triangles, (std::vector<glm::uvec3>{{0, 1, 2}, {2, 1, 3}}));
+  EXPECT_EQ(only_warning(bad),
+            "file:19: face refers to vertex 8, the file has 8; 1 face was dropped");
+}
+
+TEST(PlyReader, BinaryTriangleStripsAreReadToo) {
+  for (const bool big : {false, true}) {
+    std::string text = std::string("ply\nformat binary_") + (big ? "big" : "little") +
+                       "_endian 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
+                       "property float z\nelement tristrips 1\n"
+                       "property list uchar int vertex_indices\nend_header\n";
+    for (const int value : {0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0}) {
+      put(text, static_cast<float>(value), big);
+    }
+    put(text, std::uint8_t{8}, big);
+    for (const int corner : {0, 1, 2, 3, -1, 3, 2, 1}) put(text, corner, big);
+    EXPECT_EQ(parsed(kPly, text).soup.triangles,
+              (std::vector<glm::uvec3>{{0, 1, 2}, {2, 1, 3}, {3, 2, 1}}));
+  }
 }
 
 TEST(PlyReader, HeaderErrorsNameTheLine) {
