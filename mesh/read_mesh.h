@@ -76,9 +76,9 @@ struct MeshFile {
 /// bytes of the file do not back. The result does not depend on the number of threads.
 /// @param path  a file, or "-" for standard input, which needs options.format
 /// @return kInput, with line or byte: no such file, unknown format, empty, malformed, truncated,
-/// UTF-16 text, no vertices, no usable face, or with `strict` a face that had to be dropped; kUsage: "-" without a
-/// format, OpenMesh not in this build; kLimit: more than 2^32 - 2 vertices, memory; kCancelled.
-/// The file must not be changed by others meanwhile.
+/// UTF-16 text, no vertices, no usable face, or with `strict` a face that had to be dropped;
+/// kUsage: "-" without a format, OpenMesh not in this build; kLimit: more than 2^32 - 2 vertices,
+/// memory; kCancelled. The file must not be changed by others meanwhile.
 Result<MeshFile> read_mesh(const std::string& path, const MeshReadOptions& options = {},
                            const Execution& execution = {});
 
