@@ -101,7 +101,7 @@ Result<csg::Scene> load_one(const std::string& path, const CsgCommand& command, 
   if (!facts) return tl::unexpected(facts.error());
   csg::Solid solid;
   solid.mesh = std::make_shared<const TriangleSoup>(std::move(soup));
-  solid.rule = command.rule;
+  solid.rule = facts->rule;
   solid.name = path;
   scene.tree.set_root(scene.tree.add_solid(std::move(solid)));
   if (told != nullptr) told->push_back(*std::move(facts));

@@ -7,6 +7,7 @@
 #include "apps/session.h"
 #include "core/memory.h"
 #include "mesh/diagnose.h"
+#include "mesh/orient.h"
 
 namespace strata::apps {
 namespace {
@@ -15,6 +16,7 @@ struct FileInfo {
   std::string path;
   MeshReadStats stats;
   MeshDiagnosis found;
+  Orientation orientation;
 };
 
 std::string info_text(const FileInfo& info) {
@@ -38,6 +40,7 @@ std::string info_text(const FileInfo& info) {
                       : found.inverted   ? "inside out"
                       : found.volume > 0 ? "outward"
                                          : "no volume");
+  for (const std::string& text_of : sentences(info.orientation, false)) line("", text_of);
   if (found.closed) {
     line("closed", fmt::format("yes, all {} edges are balanced", found.edges));
   } else {
@@ -99,6 +102,13 @@ void write_info(JsonWriter& json, const FileInfo& info) {
   json.member("closed", found.closed);
   json.member("even", found.even);
   json.member("inverted", found.inverted);
+  json.key("orientation").begin_object();
+  json.member("parts", info.orientation.parts);
+  json.member("parts_inside_out", info.orientation.turned_parts);
+  json.member("turned_triangles", info.orientation.turned_triangles);
+  json.member("double_faces", info.orientation.double_faces);
+  json.member("not_orientable", info.orientation.not_orientable);
+  json.end_object();
   json.key("edges").begin_object();
   json.member("total", found.edges);
   json.member("unbalanced", found.unbalanced_edges);
@@ -127,7 +137,8 @@ Result<FileInfo> look_at(const std::string& path, const InfoCommand& command, Se
   warn_of_reading(path, file->stats, session);
   Execution execution = session.execution("checking");
   execution.progress = {};
-  FileInfo info{path, std::move(file->stats), diagnose(file->soup, execution)};
+  FileInfo info{path, std::move(file->stats), diagnose(file->soup, execution),
+                orient_parts(file->soup, execution, {.change = false})};
   if (session.interrupted()) return fail(ErrorCode::kCancelled, "stopped");
   if (command.common.strict && !info.found.closed) {
     session.warn("open", fmt::format("{}: the mesh is not closed: {} of {} edges are unbalanced",

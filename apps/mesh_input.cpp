@@ -42,46 +42,69 @@ Measures measure(const TriangleSoup& soup, const glm::dvec3& about, const Execut
   return total;
 }
 
-/// Whether the mesh is closed in the sense of the rule, with numbers when it is not.
-void check_closed(const TriangleSoup& soup, InsideRule rule, InputFacts& facts, Session& session) {
-  Execution execution = session.execution("checking");
-  execution.progress = {};
-  facts.closed = is_closed(soup, execution);
-  if (facts.closed) return;
+/// Says what of a mesh that is not closed is open. @return whether parity takes it as closed
+bool describe_open(const TriangleSoup& soup, const Execution& execution, InputFacts& facts,
+                   std::string& text) {
   const MeshDiagnosis found = diagnose(soup, execution);
   facts.unbalanced_edges = found.unbalanced_edges;
-  if (rule == InsideRule::kParity && found.even) {
-    facts.closed = true;  // wrongly oriented, perhaps, but parity does not look at that
-    return;
-  }
-  std::string text = fmt::format("{}: the mesh is not closed: {} of {} edges are unbalanced",
-                                 facts.path, found.unbalanced_edges, found.edges);
+  text = fmt::format("{}: the mesh is not closed: {} of {} edges are unbalanced", facts.path,
+                     found.unbalanced_edges, found.edges);
   if (found.boundary_edges > 0) text += fmt::format(", {} border a hole", found.boundary_edges);
   if (found.misoriented_edges > 0) {
     text += fmt::format(", {} join faces that look opposite ways", found.misoriented_edges);
   }
   if (!found.examples.empty()) text += fmt::format("; {}", describe(found.examples.front()));
-  if (found.even) text += "; --rule parity takes it as closed";
+  return found.even;
+}
+
+/// Whether the mesh is closed in the sense of the rule, with numbers when it is not.
+void check_closed(const TriangleSoup& soup, const MeshInputRules& rules, const Execution& execution,
+                  InputFacts& facts, Session& session) {
+  facts.rule = rules.rule;
+  facts.closed = facts.orientation.closed;
+  if (facts.closed) return;
+  std::string text;
+  const bool even = describe_open(soup, execution, facts, text);
+  if (even && rules.rule == InsideRule::kParity) {
+    facts.closed = true;  // wrongly oriented, perhaps, but parity does not look at that
+    return;
+  }
+  if (even && rules.rule == InsideRule::kWinding && !rules.keep_orientation) {
+    facts.closed = true;
+    facts.rule = InsideRule::kParity;
+    session.warn("not-orientable",
+                 fmt::format("{}: no side of the mesh is its outside ({} of its parts cannot be "
+                             "oriented), but every edge has an even number of faces; parity "
+                             "decides what is inside",
+                             facts.path, facts.orientation.not_orientable));
+    return;
+  }
+  if (even) text += "; --rule parity takes it as closed";
   session.warn("open", text);
   facts.open = std::move(text);
 }
 
-void check_orientation(TriangleSoup& soup, const MeshInputRules& rules, InputFacts& facts,
-                       Session& session) {
-  if (!(facts.volume < 0.0)) return;
-  const char* what = facts.closed ? "the mesh is inside out (its volume is {:.6g})"
-                                  : "the open mesh seems to be inside out (its volume, with holes "
-                                    "closed towards the middle, is {:.6g})";
-  const std::string text =
-      fmt::format("{}: {}", facts.path, fmt::format(fmt::runtime(what), facts.volume));
-  if (rules.keep_orientation) {
-    session.warn("inverted", text + "; kept as it is");
-    return;
+/// Says what was turned.
+void tell_orientation(const MeshInputRules& rules, InputFacts& facts, double volume_before,
+                      Session& session) {
+  const Orientation& found = facts.orientation;
+  const bool kept = rules.keep_orientation;
+  const bool by_parity = !found.closed && facts.rule == InsideRule::kParity;
+  const bool all = found.all_turned && found.turned_parts > 0;
+  const std::string done = kept ? "kept as it is" : "it was turned around";
+  if (all || (facts.orientation.closed && found.turned_open_volume != 0.0)) {
+    session.warn("inverted", fmt::format("{}: the mesh is inside out (its volume is {:.6g}); {}",
+                                         facts.path, volume_before, done));
+  } else if (found.turned_open_volume != 0.0 && !by_parity) {
+    session.warn("inverted", fmt::format("{}: the open mesh seems to be inside out (its volume, "
+                                         "with holes closed towards the middle, is {:.6g}); {}",
+                                         facts.path, found.turned_open_volume, done));
   }
-  reverse_orientation(soup);
-  facts.volume = -facts.volume;
-  facts.turned_around = true;
-  session.warn("inverted", text + "; it was turned around");
+  facts.turned_around = !kept && !by_parity && (all || found.turned_open_volume != 0.0);
+  for (const std::string& text : sentences(found, !kept)) {
+    session.warn("inverted",
+                 fmt::format("{}: {}{}", facts.path, text, kept ? "; kept as it is" : ""));
+  }
 }
 
 Result<InputFacts> inspect(TriangleSoup& soup, MeshReadStats stats, const std::string& path,
@@ -93,13 +116,23 @@ Result<InputFacts> inspect(TriangleSoup& soup, MeshReadStats stats, const std::s
   Execution execution = session.execution("checking");
   execution.progress = {};
   facts.bounds = bounds(soup, execution);
-  const Measures measures =
-      measure(soup, 0.5 * facts.bounds.low + 0.5 * facts.bounds.high, execution);
-  facts.area = measures.area;
-  facts.volume = measures.volume;
-  facts.zero_area_faces = measures.zero_area;
-  check_closed(soup, rules.rule, facts, session);
-  check_orientation(soup, rules, facts, session);
+  const auto take_measures = [&] {
+    const Measures measures =
+        measure(soup, 0.5 * facts.bounds.low + 0.5 * facts.bounds.high, execution);
+    facts.area = measures.area;
+    facts.volume = measures.volume;
+    facts.zero_area_faces = measures.zero_area;
+  };
+  take_measures();
+  const double volume_before = facts.volume;
+  facts.orientation = orient_parts(
+      soup, execution,
+      {.change = !rules.keep_orientation,
+       .positive =
+           facts.volume > 1e-8 * facts.area * glm::length(facts.bounds.high - facts.bounds.low)});
+  if (facts.orientation.changed() && !rules.keep_orientation) take_measures();
+  check_closed(soup, rules, execution, facts, session);
+  tell_orientation(rules, facts, volume_before, session);
   if (session.interrupted()) return fail(ErrorCode::kCancelled, "stopped");
   return facts;
 }
@@ -200,6 +233,14 @@ void MeshInput::add(InputFacts facts) {
   files.push_back(std::move(facts));
 }
 
+void MeshInput::set_tree(csg::Tree made) {
+  tree = std::make_shared<csg::SolidLists>(made, made.root());
+  soup = tree->take_soup();
+  // The soup has all triangles that are needed from here on.
+  for (csg::Solid& solid : made.solids()) solid.mesh.reset();
+  scene = std::make_shared<csg::Tree>(std::move(made));
+}
+
 bool MeshInput::has_scene() const {
   return std::any_of(files.begin(), files.end(), [](const auto& file) { return file.is_scene; });
 }
@@ -207,6 +248,8 @@ bool MeshInput::has_scene() const {
 Result<MeshInput> load_meshes(const InputOptions& input, const MeshInputRules& rules,
                               Session& session) {
   MeshInput all;
+  all.rule = rules.rule;
+  std::vector<csg::Solid> apart;  // those with a rule of their own
   for (const std::string& path : input.files) {
     const double start = session.milliseconds();
     TriangleSoup soup;
@@ -214,8 +257,17 @@ Result<MeshInput> load_meshes(const InputOptions& input, const MeshInputRules& r
     auto facts = load_mesh(path, input, rules, session, soup, &read_ms);
     if (!facts) return tl::unexpected(facts.error());
     all.read_ms += read_ms;
+    const InsideRule rule = facts->rule;
     all.add(*std::move(facts));
-    if (all.files.size() == 1) {
+    if (input.files.size() == 1) {
+      all.soup = std::move(soup);
+      all.rule = rule;
+    } else if (rule != rules.rule) {
+      csg::Solid& solid = apart.emplace_back();
+      solid.mesh = std::make_shared<const TriangleSoup>(std::move(soup));
+      solid.rule = rule;
+      solid.name = path;
+    } else if (all.soup.triangles.empty()) {
       all.soup = std::move(soup);
     } else {
       if (all.soup.positions.size() + soup.positions.size() > 0xfffffffeu) {
@@ -226,6 +278,18 @@ Result<MeshInput> load_meshes(const InputOptions& input, const MeshInputRules& r
     }
     all.diagnose_ms += session.milliseconds() - start - read_ms;
   }
+  if (apart.empty()) return all;
+  csg::Tree tree;
+  std::vector<csg::Tree::NodeId> solids;
+  if (!all.soup.triangles.empty()) {
+    csg::Solid& solid = apart.emplace_back();
+    solid.mesh = std::make_shared<const TriangleSoup>(std::move(all.soup));
+    solid.rule = rules.rule;
+    solid.name = input.files.front();
+  }
+  for (csg::Solid& solid : apart) solids.push_back(tree.add_solid(std::move(solid)));
+  tree.set_root(tree.add(csg::Operation::kUnion, solids));
+  all.set_tree(std::move(tree));
   return all;
 }
 

@@ -8,6 +8,7 @@
 #include "core/result.h"
 #include "csg/solid_lists.h"
 #include "mesh/diagnose.h"
+#include "mesh/orient.h"
 #include "mesh/read_mesh.h"
 #include "mesh/triangle_soup.h"
 #include "voxelize/voxelize.h"
@@ -19,8 +20,11 @@ struct InputFacts {
   std::string path;
   MeshReadStats stats;
   bool closed = false;         ///< under the inside rule: every ray enters as often as it leaves
-  bool turned_around = false;  ///< it was inside out and has been turned
-  double area = 0.0;           ///< square world units
+  bool turned_around = false;  ///< all of it was inside out and has been turned
+  Orientation orientation;     ///< what was turned, part by part
+  /// What is inside: as asked for, but parity where faces have no common side.
+  InsideRule rule = InsideRule::kWinding;
+  double area = 0.0;    ///< square world units
   double volume = 0.0;  ///< signed, after turning; of an open mesh about the middle of its bounds
   Bounds bounds;
   std::uint64_t zero_area_faces = 0;
@@ -40,12 +44,15 @@ struct MeshInput {
   std::shared_ptr<const csg::Tree> scene;  ///< what `tree` was made of, without meshes
   std::vector<InputFacts> files;
   Bounds bounds;
-  bool closed = true;  ///< all of them
+  bool closed = true;                      ///< all of them
+  InsideRule rule = InsideRule::kWinding;  ///< of the soup; solids of a tree have their own
   double area = 0.0, volume = 0.0;
   double read_ms = 0.0, diagnose_ms = 0.0;
 
   /// Counts one more mesh in, all but its triangles.
   void add(InputFacts facts);
+  /// The lists of a tree take the place of the soup.
+  void set_tree(csg::Tree tree);
   [[nodiscard]] bool has_scene() const;
 };
 
@@ -55,8 +62,9 @@ struct MeshInputRules {
   bool as_tree = false;  ///< meshes become the solids of a tree, each by itself
 };
 
-/// Reads the files, looks whether each is closed and the right way around, turns around those that
-/// are not, and warns of what users should know. @return kInput, kUsage, kLimit, kCancelled
+/// Reads the files, looks whether each is closed and the right way around, turns what is not, and
+/// warns of what users should know. Of several files of which some take parity a tree is made.
+/// @return kInput, kUsage, kLimit, kCancelled
 Result<MeshInput> load_meshes(const InputOptions& input, const MeshInputRules& rules,
                               Session& session);
 

@@ -8,14 +8,6 @@
 namespace strata::apps {
 namespace {
 
-void set_tree(MeshInput& input, csg::Tree tree) {
-  input.tree = std::make_shared<csg::SolidLists>(tree, tree.root());
-  input.soup = input.tree->take_soup();
-  // The soup has all triangles that are needed from here on.
-  for (csg::Solid& solid : tree.solids()) solid.mesh.reset();
-  input.scene = std::make_shared<csg::Tree>(std::move(tree));
-}
-
 /// Meshes as the solids of a union, in their order.
 Result<MeshInput> load_united(const InputOptions& input, const MeshInputRules& rules,
                               Session& session) {
@@ -30,7 +22,7 @@ Result<MeshInput> load_united(const InputOptions& input, const MeshInputRules& r
     if (!facts) return tl::unexpected(facts.error());
     csg::Solid solid;
     solid.mesh = std::make_shared<const TriangleSoup>(std::move(soup));
-    solid.rule = rules.rule;
+    solid.rule = facts->rule;
     solid.name = path;
     solids.push_back(tree.add_solid(std::move(solid)));
     all.add(*std::move(facts));
@@ -38,7 +30,7 @@ Result<MeshInput> load_united(const InputOptions& input, const MeshInputRules& r
     all.diagnose_ms += session.milliseconds() - start - read_ms;
   }
   tree.set_root(tree.add(csg::Operation::kUnion, solids));
-  set_tree(all, std::move(tree));
+  all.set_tree(std::move(tree));
   return all;
 }
 
@@ -64,7 +56,7 @@ Result<MeshInput> load_solids(const InputOptions& input, const MeshInputRules& r
   if (all.bounds.empty()) {
     return fail(ErrorCode::kGeometry, "{}: the scene is empty", input.files.front());
   }
-  set_tree(all, std::move(scene->tree));
+  all.set_tree(std::move(scene->tree));
   for (const InputFacts& facts : all.files) all.closed = all.closed && facts.closed;
   all.read_ms = session.milliseconds() - start;
   session.note(fmt::format("{}: {}, {}", input.files.front(),

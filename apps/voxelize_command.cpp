@@ -147,7 +147,9 @@ void check_columns(const VoxelizeCommand& command, const VoxelizeOutcome& outcom
                    Session& session) {
   const VoxelizeReport& report = outcome.report;
   if (!command.solid) return;
-  if (report.unbalanced_columns > 0) {
+  // Parity does not ask which way a closed mesh is crossed.
+  const bool both_ways = outcome.input.closed && outcome.input.rule == InsideRule::kParity;
+  if (report.unbalanced_columns > 0 && !both_ways) {
     session.warn(
         "unbalanced-columns",
         fmt::format("{} entered and left unequally often; {}",
@@ -157,7 +159,8 @@ void check_columns(const VoxelizeCommand& command, const VoxelizeOutcome& outcom
                     command.open == OpenMode::kVote ? "the vote of three axes decided their voxels"
                                                     : "their voxels are not to be trusted"));
   }
-  if (report.negative_columns > 0 && outcome.input.closed && command.rule == InsideRule::kWinding) {
+  if (report.negative_columns > 0 && outcome.input.closed &&
+      outcome.input.rule == InsideRule::kWinding) {
     session.warn("negative-winding",
                  fmt::format("{} columns run through parts that are inside out, which are not "
                              "solid; --rule nonzero fills them",
@@ -248,7 +251,7 @@ Result<void> voxelize_and_write(const VoxelizeCommand& command, VoxelizeOutcome&
     writer = *std::move(opened);
   }
   VoxelizeOptions options;
-  options.rule = command.rule;
+  options.rule = outcome.input.rule;
   options.axis = outcome.axis;
   options.solid = command.solid;
   options.surface = command.surface;

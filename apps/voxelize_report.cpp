@@ -78,6 +78,10 @@ void write_input(JsonWriter& json, const MeshInput& input) {
       json.member("dropped_faces", file.stats.dropped_faces());
       json.member("zero_area_faces", file.zero_area_faces);
       json.member("turned_around", file.turned_around);
+      json.member("turned_parts", file.orientation.turned_parts);
+      json.member("turned_triangles", file.orientation.turned_triangles);
+      json.member("double_faces", file.orientation.double_faces);
+      json.member("rule", word_of(kRuleWords, file.rule));
       json.member("area", file.area);
       json.member("volume", file.volume);
     }

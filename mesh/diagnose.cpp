@@ -2,23 +2,17 @@
 
 #include <algorithm>
 #include <glm/geometric.hpp>
-#include <numeric>
 #include <tuple>
 
 #include "mesh/block_sum.h"
 #include "mesh/edge_balance.h"
+#include "mesh/edge_uses.h"
 #include "mesh/weld.h"
 
 namespace strata {
 namespace {
 
 constexpr std::size_t kExamples = 8;
-
-/// A use of an edge, kept at its lower vertex.
-struct EdgeUse {
-  std::uint32_t high = 0;
-  std::uint32_t triangle = 0;  ///< [triangle:31 | high -> low:1]
-};
 
 /// An unbalanced edge, to find those of the first triangles.
 struct Candidate {
@@ -50,58 +44,31 @@ struct EdgeCounts {
   }
 };
 
-/// Judges the uses of all edges at one lower vertex.
-void count_edges(std::uint32_t low, std::span<EdgeUse> uses, EdgeCounts& counts) {
-  std::sort(uses.begin(), uses.end(), [](const EdgeUse& a, const EdgeUse& b) {
-    return std::tie(a.high, a.triangle) < std::tie(b.high, b.triangle);
-  });
-  for (std::size_t i = 0; i < uses.size();) {
-    const EdgeUse front = uses[i];
-    std::uint32_t up = 0, down = 0;
-    for (; i < uses.size() && uses[i].high == front.high; ++i) {
-      ++((uses[i].triangle & 1u) == 0 ? up : down);
-    }
-    ++counts.edges;
-    counts.boundary += up + down == 1;
-    counts.non_manifold += up + down > 2;
-    counts.odd += (up + down) % 2;
-    if (up == down) continue;
-    ++counts.unbalanced;
-    counts.misoriented += (up + down) % 2 == 0;
-    counts.first.push_back(
-        {front.triangle >> 1, low, front.high, up, down, (front.triangle & 1u) == 0});
-    if (counts.first.size() > 64 * kExamples) counts.keep_first();
-  }
+/// Judges the uses of one edge.
+void count_edge(std::uint32_t low, std::span<const detail::EdgeUse> uses, EdgeCounts& counts) {
+  const detail::EdgeUse front = uses.front();
+  std::uint32_t up = 0, down = 0;
+  for (const detail::EdgeUse& use : uses) ++(use.down() ? down : up);
+  ++counts.edges;
+  counts.boundary += up + down == 1;
+  counts.non_manifold += up + down > 2;
+  counts.odd += (up + down) % 2;
+  if (up == down) return;
+  ++counts.unbalanced;
+  counts.misoriented += (up + down) % 2 == 0;
+  counts.first.push_back({front.of(), low, front.high, up, down, !front.down()});
+  if (counts.first.size() > 64 * kExamples) counts.keep_first();
 }
 
 /// The triangles' edges between welded vertices.
 EdgeCounts count_all_edges(const TriangleSoup& mesh, const std::vector<std::uint32_t>& welded,
                            const Execution& execution) {
-  const std::size_t vertices = mesh.positions.size();
-  const auto for_uses = [&](auto&& visit) {
-    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-      for (int k = 0; k < 3; ++k) {
-        const std::uint32_t a = welded[mesh.triangles[t][k]];
-        const std::uint32_t b = welded[mesh.triangles[t][(k + 1) % 3]];
-        if (a != b) visit(std::min(a, b), std::max(a, b), static_cast<std::uint32_t>(t), a > b);
-      }
-    }
-  };
-  // A counting sort by the lower vertex: begin[v + 1] runs from the start to the end of v's uses.
-  std::vector<std::size_t> begin(vertices + 2, 0);
-  for_uses([&](std::uint32_t low, std::uint32_t, std::uint32_t, bool) { ++begin[low + 2]; });
-  std::partial_sum(begin.begin(), begin.end(), begin.begin());
-  std::vector<EdgeUse> uses;
-  detail::reserve_large(uses, begin.back());
-  uses.resize(begin.back());
-  for_uses([&](std::uint32_t low, std::uint32_t high, std::uint32_t t, bool down) {
-    uses[begin[low + 1]++] = {high, t << 1 | static_cast<std::uint32_t>(down)};
-  });
+  detail::EdgeUses uses(mesh.triangles, welded, [](std::size_t) { return true; });
   return detail::fold_blocks<EdgeCounts>(
-      execution, vertices,
+      execution, mesh.positions.size(),
       [&](EdgeCounts& counts, std::size_t v) {
-        count_edges(static_cast<std::uint32_t>(v),
-                    std::span(uses).subspan(begin[v], begin[v + 1] - begin[v]), counts);
+        const auto low = static_cast<std::uint32_t>(v);
+        uses.for_edges(v, [&](auto edge) { count_edge(low, edge, counts); });
       },
       [](EdgeCounts& total, const EdgeCounts& part) { total.join(part); });
 }

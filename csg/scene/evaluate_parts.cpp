@@ -4,6 +4,7 @@
 
 #include "csg/scene/evaluator.h"
 #include "mesh/diagnose.h"
+#include "mesh/orient.h"
 #include "mesh/soup_tools.h"
 
 namespace strata::csg {
@@ -91,7 +92,12 @@ void Evaluator::add_outline(std::uint32_t node, const Context& context, Outline 
 InsideRule Evaluator::inspect(std::uint32_t node, TriangleSoup& mesh) {
   Execution execution = execution_;
   execution.progress = {};
-  if (!is_closed(mesh, execution)) {
+  const double volume = signed_volume(mesh, execution);
+  const Orientation turned = orient_parts(mesh, execution);
+  for (const std::string& text : sentences(turned, true)) {
+    warn(node, "geometry", fmt::format("'{}': {}", name(node), text));
+  }
+  if (!turned.closed) {
     const MeshDiagnosis found = diagnose(mesh, execution);
     std::string text = fmt::format("'{}' is not closed: {} of {} edges are unbalanced", name(node),
                                    found.unbalanced_edges, found.edges);
@@ -110,9 +116,7 @@ InsideRule Evaluator::inspect(std::uint32_t node, TriangleSoup& mesh) {
     warn(node, "geometry", text);
     return InsideRule::kParity;
   }
-  const double volume = signed_volume(mesh, execution);
-  if (volume < 0.0) {
-    reverse_orientation(mesh);
+  if (turned.all_turned && turned.turned_parts > 0) {
     warn(node, "geometry",
          fmt::format("'{}' is inside out (its volume is {:.6g}); it was turned around", name(node),
                      volume));

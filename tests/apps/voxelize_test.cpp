@@ -89,6 +89,99 @@ TEST_F(Voxelize, AMeshInsideOutIsTurnedAroundAndReported) {
   EXPECT_EQ(nonzero["voxels"]["checksum"], good["voxels"]["checksum"]);
 }
 
+TEST_F(Voxelize, PartsAndTrianglesThatAreInsideOutAreTurnedAndCounted) {
+  const TriangleSoup left = make_box({0, 0, 0}, {1, 1, 1}), right = make_box({2, 0, 0}, {3, 1, 1});
+  TriangleSoup part = right, sphere = make_icosphere(1.0, 3), both = left;
+  reverse_orientation(part);
+  append(part, left);
+  put("part.stl", part);
+  json found = report({"part.stl", "-r", "30"});
+  EXPECT_EQ(found["voxels"]["solid"], 2000);
+  EXPECT_EQ(found["input"]["files"][0]["turned_parts"], 1);
+  EXPECT_EQ(found["input"]["files"][0]["turned_around"], false);
+  EXPECT_EQ(found["input"]["volume"], 2.0);
+  EXPECT_EQ(codes(found), std::vector<std::string>{"inverted"});
+  EXPECT_NE(last_error.find("part.stl: 1 of 2 parts were inside out and are turned"),
+            std::string::npos)
+      << last_error;
+  EXPECT_EQ(report({"part.stl", "-r", "30", "--keep-orientation"})["voxels"]["solid"], 1000);
+  const RunResult told = place.run({"info", "part.stl"});
+  EXPECT_NE(told.out.find("1 of 2 parts are inside out"), std::string::npos) << told.out;
+
+  put("sphere.obj", sphere);
+  for (std::size_t t = 0; t < sphere.triangles.size(); t += 3) {
+    std::swap(sphere.triangles[t].x, sphere.triangles[t].y);
+  }
+  put("turned.obj", sphere);
+  found = report({"turned.obj", "-r", "64", "--checksum"});
+  EXPECT_EQ(found["voxels"]["checksum"],
+            report({"sphere.obj", "-r", "64", "--checksum"})["voxels"]["checksum"]);
+  EXPECT_EQ(found["input"]["closed"], true);
+  EXPECT_EQ(found["input"]["files"][0]["turned_triangles"], 427);
+  report({"turned.obj", "-r", "64"});
+  EXPECT_NE(last_error.find("427 triangles turned"), std::string::npos) << last_error;
+
+  reverse_orientation(both);
+  append(both, left);
+  put("both.stl", both);
+  found = report({"both.stl", "-r", "20"});
+  EXPECT_EQ(found["voxels"]["solid"], 8000);
+  EXPECT_EQ(found["input"]["files"][0]["double_faces"], 12);
+  EXPECT_NE(last_error.find("both.stl: double-sided: 12 triangles"), std::string::npos)
+      << last_error;
+}
+
+TEST_F(Voxelize, WhereNoSideIsOutsideParityDecides) {
+  // A bottle of Klein, as a tube whose section is an 8.
+  TriangleSoup bottle;
+  constexpr int kAround = 48, kAlong = 24;
+  for (int i = 0; i < kAround; ++i) {
+    const double u = 2 * M_PI * i / kAround;
+    for (int j = 0; j < kAlong; ++j) {
+      const double v = 2 * M_PI * j / kAlong, s = std::sin(v), d = std::sin(2 * v);
+      const double r = 3 + std::cos(u / 2) * s - std::sin(u / 2) * d;
+      bottle.positions.emplace_back(r * std::cos(u), r * std::sin(u),
+                                    std::sin(u / 2) * s + std::cos(u / 2) * d);
+    }
+  }
+  const auto vertex = [&](int i, int j) {
+    if (i == kAround) j = kAlong - j;
+    return static_cast<std::uint32_t>(i % kAround * kAlong + (j + kAlong) % kAlong);
+  };
+  for (int i = 0; i < kAround; ++i) {
+    for (int j = 0; j < kAlong; ++j) {
+      const auto a = vertex(i, j), b = vertex(i + 1, j), c = vertex(i + 1, j + 1),
+                 d = vertex(i, j + 1);
+      bottle.triangles.emplace_back(a, b, c);
+      bottle.triangles.emplace_back(a, c, d);
+    }
+  }
+  put("bottle.obj", bottle);
+  const json found = report({"bottle.obj", "-r", "64", "--checksum"});
+  const json parity = report({"bottle.obj", "-r", "64", "--checksum", "--rule", "parity"});
+  EXPECT_GT(found["voxels"]["solid"], 10000);
+  EXPECT_EQ(found["voxels"]["checksum"], parity["voxels"]["checksum"]);
+  EXPECT_EQ(found["input"]["files"][0]["rule"], "parity");
+  EXPECT_EQ(codes(found).front(), "not-orientable");
+  EXPECT_EQ(last_error.find("unequally"), std::string::npos) << last_error;
+  // Beside other meshes each keeps its rule: what overlaps is a union.
+  put("ball.obj", transform(make_icosphere(2.0, 3), glm::translate(glm::dmat4(1.0), {3, 0, 0})));
+  put("far.obj", transform(make_icosphere(2.0, 3), glm::translate(glm::dmat4(1.0), {30, 0, 0})));
+  const std::vector<std::string> grid = {"--voxel-size", "0.2", "--bounds=-6,-6,-6,36,6,6"};
+  const auto count = [&](std::vector<std::string> files) {
+    files.insert(files.end(), grid.begin(), grid.end());
+    return report(files)["voxels"]["solid"].get<int>();
+  };
+  const int bottle_alone = count({"bottle.obj"}), ball = count({"ball.obj"});
+  EXPECT_EQ(count({"bottle.obj", "far.obj"}), bottle_alone + count({"far.obj"}));
+  const int together = count({"bottle.obj", "ball.obj"});
+  EXPECT_EQ(together, count({"ball.obj", "bottle.obj"}));
+  EXPECT_GT(together, std::max(bottle_alone, ball));
+  EXPECT_LT(together, bottle_alone + ball);
+  // Parity of both at once would leave out what they share.
+  EXPECT_GT(together, count({"bottle.obj", "ball.obj", "--rule", "parity"}));
+}
+
 TEST_F(Voxelize, AnOpenMeshIsReportedWithNumbersAndVotedOn) {
   TriangleSoup sphere = make_icosphere(1.0, 5);
   put("whole.obj", sphere);

@@ -173,9 +173,20 @@ TEST(Primitives, PolyhedraInsideOutAreTurnedAndOpenOnesReported) {
   EXPECT_NEAR(volume_of(turned), 1.0 / 6, 1e-12);
   const Scene mixed = scene_of(points + "[[2,1,0],[0,3,1],[0,2,3],[1,3,2]]);");
   ASSERT_EQ(codes_of(mixed), "geometry ");
-  EXPECT_EQ(mixed.tree.solids()[0].rule, InsideRule::kParity);
-  EXPECT_NE(mixed.warnings[0].message.find("3 of 6 edges"), std::string::npos)
+  EXPECT_EQ(mixed.tree.solids()[0].rule, InsideRule::kWinding);
+  EXPECT_NEAR(volume_of(mixed), 1.0 / 6, 1e-12);
+  EXPECT_NE(mixed.warnings[0].message.find("1 triangle turned"), std::string::npos)
       << mixed.warnings[0].message;
+  // Two of them, one inside out.
+  const std::string two =
+      "polyhedron(points = [[0,0,0],[1,0,0],[0,1,0],[0,0,1],[5,0,0],[6,0,0],[5,1,0],[5,0,1]], "
+      "faces = [[0,1,2],[0,3,1],[0,2,3],[1,3,2],[6,5,4],[5,7,4],[7,6,4],[6,7,5]]);";
+  const Scene one_turned = scene_of(two);
+  ASSERT_EQ(codes_of(one_turned), "geometry ");
+  EXPECT_NEAR(volume_of(one_turned), 2.0 / 6, 1e-12);
+  EXPECT_NE(one_turned.warnings[0].message.find("1 of 2 parts were inside out and are turned"),
+            std::string::npos)
+      << one_turned.warnings[0].message;
   const Scene open = scene_of(points + "[[0,1,2],[0,3,1],[0,2,3]]);");
   ASSERT_EQ(codes_of(open), "geometry ");
   EXPECT_EQ(open.tree.solids()[0].rule, InsideRule::kParity);

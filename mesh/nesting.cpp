@@ -1,0 +1,133 @@
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/vec2.hpp>
+#include <glm/vector_relational.hpp>
+#include <numeric>
+#include <tuple>
+
+#include "mesh/orient.h"
+
+// Which part of a mesh lies within which: a ray upwards from a point of each part, all rays at
+// once. The points are sorted into a grid in x, y; each triangle asks those that it may lie above.
+
+namespace strata::detail {
+namespace {
+
+/// On which side of the edge a -> b, seen from above, p lies: 1 left, -1 right, 0 for no edge. Both
+/// triangles at an edge compute the same bits; points on it are moved by (e, e^2).
+int side(glm::dvec3 a, glm::dvec3 b, const glm::dvec3& p) {
+  const bool swapped = std::tie(b.x, b.y) < std::tie(a.x, a.y);
+  if (swapped) std::swap(a, b);
+  const double dx = b.x - a.x, dy = b.y - a.y;
+  const double cross = dx * (p.y - a.y) - dy * (p.x - a.x);
+  const int sign = cross != 0.0 ? (cross > 0.0 ? 1 : -1)
+                   : dy != 0.0  ? (dy < 0.0 ? 1 : -1)
+                                : (dx > 0.0 ? 1 : 0);
+  return swapped ? -sign : sign;
+}
+
+/// +1 where a triangle that looks up lies above p, -1 where it looks down, 0 where there is none.
+int crossing(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, const glm::dvec3& p) {
+  const int turn = side(a, b, p);
+  if (turn == 0 || side(b, c, p) != turn || side(c, a, p) != turn) return 0;
+  const double abx = b.x - a.x, aby = b.y - a.y, abz = b.z - a.z;
+  const double acx = c.x - a.x, acy = c.y - a.y, acz = c.z - a.z;
+  const double nx = aby * acz - abz * acy, ny = abz * acx - abx * acz, nz = abx * acy - aby * acx;
+  if (nz == 0.0) return 0;
+  const double z = a.z - (nx * (p.x - a.x) + ny * (p.y - a.y)) / nz;
+  return z > p.z ? turn : 0;
+}
+
+/// The samples by cells of a grid in x, y.
+class SampleGrid {
+ public:
+  explicit SampleGrid(const std::vector<PartSample>& samples) {
+    low_ = high_ = samples.front().point;
+    for (const PartSample& sample : samples) {
+      low_ = glm::min(low_, sample.point);
+      high_ = glm::max(high_, sample.point);
+    }
+    side_ = std::clamp(static_cast<int>(std::sqrt(static_cast<double>(samples.size()))), 1, 1024);
+    const auto count = static_cast<std::size_t>(side_) * static_cast<std::size_t>(side_);
+    begin_.assign(count + 2, 0);
+    for (const PartSample& sample : samples) ++begin_[index(cell(sample.point)) + 2];
+    std::partial_sum(begin_.begin(), begin_.end(), begin_.begin());
+    items_.resize(samples.size());
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      items_[begin_[index(cell(samples[i].point)) + 1]++] = static_cast<std::uint32_t>(i);
+    }
+  }
+
+  /// Calls visit(sample) for those in the cells of a box in x, y.
+  template <class Visit>
+  void within(const glm::dvec3& low, const glm::dvec3& high, Visit&& visit) const {
+    if (low.x > high_.x || high.x < low_.x || low.y > high_.y || high.y < low_.y) return;
+    const glm::ivec2 first = cell(low), last = cell(high);
+    for (int y = first.y; y <= last.y; ++y) {
+      const std::size_t end = begin_[index({last.x, y}) + 1];
+      for (std::size_t i = begin_[index({first.x, y})]; i < end; ++i) visit(items_[i]);
+    }
+  }
+
+ private:
+  [[nodiscard]] glm::ivec2 cell(const glm::dvec3& p) const {
+    const auto along = [&](int k) {
+      const double width = high_[k] - low_[k];
+      if (!(width > 0.0)) return 0;
+      return static_cast<int>(std::clamp((p[k] - low_[k]) / width * side_, 0.0, side_ - 1.0));
+    };
+    return {along(0), along(1)};
+  }
+  [[nodiscard]] std::size_t index(const glm::ivec2& at) const {
+    return static_cast<std::size_t>(at.y) * static_cast<std::size_t>(side_) +
+           static_cast<std::size_t>(at.x);
+  }
+  glm::dvec3 low_{0.0}, high_{0.0};
+  int side_ = 1;
+  std::vector<std::size_t> begin_;
+  std::vector<std::uint32_t> items_;
+};
+
+bool holds(const PartSample& outer, const PartSample& inner) {
+  return glm::all(glm::lessThanEqual(outer.low, inner.low)) &&
+         glm::all(glm::lessThanEqual(inner.high, outer.high));
+}
+
+}  // namespace
+
+std::vector<Winding> windings_around(const TriangleSoup& mesh,
+                                     const std::vector<std::uint32_t>& part_of,
+                                     const std::vector<char>& turned,
+                                     const std::vector<PartSample>& samples) {
+  std::vector<Winding> found;
+  if (samples.size() < 2) return found;
+  const SampleGrid grid(samples);
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const std::uint32_t part = part_of[t];
+    if (part >= samples.size()) continue;
+    const glm::dvec3 &a = mesh.positions[mesh.triangles[t].x],
+                     &b = mesh.positions[mesh.triangles[t].y],
+                     &c = mesh.positions[mesh.triangles[t].z];
+    grid.within(glm::min(a, glm::min(b, c)), glm::max(a, glm::max(b, c)), [&](std::uint32_t i) {
+      if (i == part || !holds(samples[part], samples[i])) return;
+      const int times = crossing(a, b, c, samples[i].point);
+      if (times != 0) found.push_back({i, part, turned[t] != 0 ? -times : times});
+    });
+  }
+  std::sort(found.begin(), found.end(), [](const Winding& a, const Winding& b) {
+    return std::tie(a.around, a.part) < std::tie(b.around, b.part);
+  });
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < found.size();) {
+    Winding sum = found[i];
+    for (++i; i < found.size() && found[i].around == sum.around && found[i].part == sum.part; ++i) {
+      sum.times += found[i].times;
+    }
+    if (sum.times != 0) found[kept++] = sum;
+  }
+  found.resize(kept);
+  return found;
+}
+
+}  // namespace strata::detail
