@@ -29,21 +29,21 @@ struct HeightMap {
   double at(std::size_t column, std::size_t row) const { return heights[row * columns + column]; }
 };
 
-/// Reads the numbers of one line. @return what is no number, if anything
-std::string_view read_row(std::string_view line, std::vector<double>& numbers) {
+/// Reads the numbers of one line. @return whether it has nothing else
+bool read_row(std::string_view line, std::vector<double>& numbers) {
   constexpr std::string_view kEnds = " \t\r,#";
   const char* at = line.data();
   const char* const end = at + line.size();
   for (;;) {
     while (at < end && (*at == ' ' || *at == '\t' || *at == '\r' || *at == ',')) ++at;
-    if (at == end || *at == '#') return {};
+    if (at == end || *at == '#') return true;
     const std::string_view rest(at, static_cast<std::size_t>(end - at));
     const std::string_view token = rest.substr(0, rest.find_first_of(kEnds));
     if (*at == '+') ++at;
     double number = 0.0;
     const auto [stop, status] = std::from_chars(at, end, number);
     if (status != std::errc() || !std::isfinite(number) || stop != token.data() + token.size()) {
-      return token;
+      return false;
     }
     numbers.push_back(number);
     at = stop;
@@ -65,11 +65,10 @@ Result<HeightMap> read_numbers(const std::string& path) {
     rest = newline == std::string_view::npos ? std::string_view() : rest.substr(newline + 1);
     ++line_number;
     const std::size_t before = numbers.size();
-    if (const std::string_view bad = read_row(line, numbers); !bad.empty()) {
-      std::string shown(bad.substr(0, 40));
-      for (char& c : shown) c = c < ' ' || c > '~' ? '?' : c;
-      return fail(ErrorCode::kInput, "{}:{}: '{}', number {} of row {}, is not a finite number",
-                  path, line_number, shown, numbers.size() - before + 1, row_ends.size() + 1);
+    if (!read_row(line, numbers)) {
+      // What stands there is not shown: a scene may name any file of the machine.
+      return fail(ErrorCode::kInput, "{}:{}: number {} of row {} is not a finite number", path,
+                  line_number, numbers.size() - before + 1, row_ends.size() + 1);
     }
     if (numbers.size() == before) continue;
     columns = std::max(columns, numbers.size() - before);

@@ -327,5 +327,25 @@ TEST(Evaluate, PrecisionIsThatOfSixDigits) {
   EXPECT_EQ(scene_of("cube();").relative_precision, 5e-6);
 }
 
+TEST(Scene, CoordinatesBeyondAllUseAreAnErrorThatNamesTheSolid) {
+  const auto error = [](const std::string& text) {
+    const auto scene = parse_scene(text, "s.csg");
+    EXPECT_FALSE(scene.has_value()) << text;
+    return scene ? Error() : scene.error();
+  };
+  const auto scaled = [](const std::string& inner) {
+    return "multmatrix([[1e200,0,0,0],[0,1e200,0,0],[0,0,1e200,0],[0,0,0,1]]) {" + inner + "}";
+  };
+  for (const std::string& text : {scaled(scaled("cube();")), scaled("sphere();"),
+                                  scaled("cube(1e120);"), std::string("\ncube(1e101);")}) {
+    EXPECT_EQ(error(text).code, ErrorCode::kGeometry) << text;
+    EXPECT_NE(error(text).message.find("has coordinates "), std::string::npos);
+  }
+  EXPECT_EQ(error("sphere(); cube(1e120);").message,
+            "s.csg:1:11: 'cube' has coordinates of about 1e+120; those of a scene must be below "
+            "1e+100");
+  EXPECT_EQ(scene_of("cube(1e90); multmatrix([[1,0,0,-1e90]]) cube();").tree.solids().size(), 2u);
+}
+
 }  // namespace
 }  // namespace strata::csg
