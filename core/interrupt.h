@@ -21,7 +21,9 @@ class InterruptGuard {
 
   /// For Execution::stop.
   [[nodiscard]] std::stop_token token() const { return source_.get_token(); }
-  /// Whether a signal has come. Any thread may ask.
+  /// Asks for a stop without a signal, as a time limit does. Any thread may.
+  void request_stop() { source_.request_stop(); }
+  /// Whether a stop was asked for. Any thread may ask.
   [[nodiscard]] bool interrupted() const { return source_.stop_requested(); }
 
  private:

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace strata {
+
+/// Which file a name meant when it was opened: names change hands, and links give one file several.
+struct FileIdentity {
+  std::string path;          ///< as it was opened
+  std::uint64_t device = 0;  ///< with the inode: the file, on this machine
+  std::uint64_t inode = 0;   ///< 0: nothing was there
+
+  [[nodiscard]] bool is_there() const { return inode != 0; }
+  [[nodiscard]] bool is_same_file(const FileIdentity& other) const {
+    return is_there() && device == other.device && inode == other.inode;
+  }
+};
+
+/// Of what lies under a name now, links followed.
+[[nodiscard]] FileIdentity identify_file(const std::string& path);
+
+}  // namespace strata
