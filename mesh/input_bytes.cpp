@@ -43,9 +43,11 @@ Result<InputBytes> InputBytes::open(const std::string& path, std::uint64_t limit
                                     const std::stop_token& stop) {
   if (path == "-") return read_all(STDIN_FILENO, "standard input", limit, stop);
   InputBytes file;
-  file.descriptor_ = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (file.descriptor_ < 0) return fail(ErrorCode::kInput, "{}: {}", path, reason(errno));
+  // A pipe that nobody writes to is waited for where a stop is heard, not in open().
   struct stat status = {};
+  const bool pipe = ::stat(path.c_str(), &status) == 0 && S_ISFIFO(status.st_mode);
+  file.descriptor_ = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | (pipe ? O_NONBLOCK : 0));
+  if (file.descriptor_ < 0) return fail(ErrorCode::kInput, "{}: {}", path, reason(errno));
   if (::fstat(file.descriptor_, &status) != 0) {
     return fail(ErrorCode::kInput, "{}: {}", path, reason(errno));
   }
@@ -94,7 +96,10 @@ Result<InputBytes> InputBytes::read_all(int descriptor, const std::string& name,
     }
     const ssize_t got =
         ::read(descriptor, file.owned_.data() + filled, file.owned_.size() - filled);
-    if (got < 0 && errno == EINTR) continue;
+    if (got < 0 && (errno == EINTR || errno == EAGAIN)) continue;
+    if (got < 0 && errno == EBADF && descriptor == STDIN_FILENO) {
+      return fail(ErrorCode::kInput, "{}: it is closed", name);
+    }
     if (got < 0) {
       return fail(ErrorCode::kInput, "{}: {} after {} bytes", name, reason(errno), filled);
     }
