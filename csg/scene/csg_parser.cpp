@@ -6,6 +6,7 @@
 #include <cstring>
 #include <limits>
 
+#include "core/printable.h"
 #include "mesh/text_scanner.h"
 
 namespace strata::csg {
@@ -82,9 +83,10 @@ class Parser {
     bool braces;  // else it takes one child: `multmatrix(...) cube();`
   };
 
-  bool refuse(const char* where, std::string text) {
+  bool refuse(const char* where, std::string_view text) {
+    constexpr std::size_t kMost = 600;  // a name in it may be as long as the file
     const auto offset = static_cast<std::uint32_t>(where - begin_);
-    error_ = {ErrorCode::kInput, fmt::format("{}: {}", ast_.place(offset), text)};
+    error_ = {ErrorCode::kInput, fmt::format("{}: {}", ast_.place(offset), printable(text, kMost))};
     return false;
   }
   std::string here() const { return shown({at_, static_cast<std::size_t>(end_ - at_)}); }

@@ -138,8 +138,9 @@ bool same_colour(const std::optional<glm::vec4>& a, const std::optional<glm::vec
 
 }  // namespace
 
-Evaluator::Evaluator(const Ast& ast, const Execution& execution, std::string folder)
-    : ast_(ast), execution_(execution), folder_(std::move(folder)) {}
+Evaluator::Evaluator(const Ast& ast, const Execution& execution, std::string folder,
+                     std::string root)
+    : ast_(ast), execution_(execution), folder_(std::move(folder)), root_(std::move(root)) {}
 
 Result<Scene> Evaluator::run() {
   newer_ = is_newer_dialect(ast_);

@@ -2,6 +2,7 @@
 #include <filesystem>
 #include <optional>
 
+#include "core/printable.h"
 #include "csg/scene/evaluator.h"
 #include "csg/scene/import_xml.h"
 #include "mesh/read_mesh.h"
@@ -10,8 +11,13 @@
 namespace strata::csg {
 namespace {
 
+namespace fs = std::filesystem;
+
+/// A file's name in a message.
+std::string shown(std::string_view name) { return printable(name, 120); }
+
 std::string extension_of(const std::string& path) {
-  std::string extension = std::filesystem::path(path).extension().string();
+  std::string extension = fs::path(path).extension().string();
   for (char& c : extension) c = static_cast<char>(c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c);
   return extension;
 }
@@ -39,7 +45,6 @@ void move_to_middle(TriangleSoup& mesh) {
 template <class Test>
 std::optional<std::string> first_place(const std::string& folder, const std::string& name,
                                        Test&& test) {
-  namespace fs = std::filesystem;
   if (fs::path(name).is_absolute()) return test(name) ? std::optional(name) : std::nullopt;
   constexpr int kMostLevels = 8;
   fs::path around(folder);
@@ -53,20 +58,40 @@ std::optional<std::string> first_place(const std::string& folder, const std::str
 }  // namespace
 
 std::optional<std::string> find_asset(const std::string& folder, const std::string& name) {
-  return first_place(folder, name, [](const std::filesystem::path& path) {
+  return first_place(folder, name, [](const fs::path& path) {
     std::error_code ignored;
-    return std::filesystem::is_regular_file(path, ignored);
+    return fs::is_regular_file(path, ignored);
   });
 }
 
+bool lies_below(const std::string& path, const std::string& root) {
+  std::error_code error;
+  const fs::path folder = fs::canonical(root, error);
+  if (error) return false;
+  const fs::path real = fs::weakly_canonical(path, error);
+  return !error && std::mismatch(folder.begin(), folder.end(), real.begin(), real.end()).first ==
+                       folder.end();
+}
+
 std::optional<std::string> Evaluator::asset(std::uint32_t node, const std::string& file) {
-  if (auto found = find_asset(folder_, file)) return found;
-  const auto folder = first_place(folder_, file, [](const std::filesystem::path& path) {
+  if (auto found = find_asset(folder_, file)) {
+    if (!root_.empty() && !lies_below(*found, root_)) {
+      stop(ErrorCode::kInput, node,
+           fmt::format("'{}' needs the file '{}', which lies outside of the root folder {}",
+                       name(node), shown(file), root_));
+      return std::nullopt;
+    }
+    if (asked_for_.insert(*found).second) scene_.files.push_back(identify_file(*found));
+    return found;
+  }
+  const std::string wanted = (fs::path(folder_) / file).string();
+  if (asked_for_.insert(wanted).second) scene_.files.push_back({wanted, 0, 0});
+  const auto folder = first_place(folder_, file, [](const fs::path& path) {
     std::error_code ignored;
-    return std::filesystem::is_directory(path, ignored);
+    return fs::is_directory(path, ignored);
   });
   warn(node, "missing-file",
-       fmt::format("'{}' needs the file '{}', which is {}; it is left out", name(node), file,
+       fmt::format("'{}' needs the file '{}', which is {}; it is left out", name(node), shown(file),
                    folder ? "a folder" : "not there"));
   return std::nullopt;
 }
@@ -85,8 +110,8 @@ void Evaluator::import(std::uint32_t node, const Context& context) {
   if (!solid) {
     return warn(node, "not-done",
                 extension == ".nef3"
-                    ? fmt::format("'{}': Nef polyhedra are not read; it is left out", file)
-                    : fmt::format("'{}': a file of an unknown kind; it is left out", file));
+                    ? fmt::format("'{}': Nef polyhedra are not read; it is left out", shown(file))
+                    : fmt::format("'{}': a file of an unknown kind; it is left out", shown(file)));
   }
   const bool centre = given.truth("center", false);
   Imported& imported = imports_[{*path, centre}];

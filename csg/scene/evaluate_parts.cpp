@@ -2,6 +2,7 @@
 #include <glm/gtc/matrix_inverse.hpp>
 #include <glm/matrix.hpp>
 
+#include "core/printable.h"
 #include "csg/scene/evaluator.h"
 #include "mesh/diagnose.h"
 #include "mesh/orient.h"
@@ -11,6 +12,9 @@ namespace strata::csg {
 namespace {
 
 constexpr std::size_t kMostWarnings = 1000;
+
+/// Of what a message says of a node, names and texts of the scene included.
+constexpr std::size_t kMostText = 600;
 
 }  // namespace
 
@@ -27,13 +31,15 @@ void Evaluator::warn(std::uint32_t node, std::string code, std::string_view text
     ++warnings_left_out_;
     return;
   }
-  scene_.warnings.push_back({std::move(code), fmt::format("{}: {}", place(node), text)});
+  scene_.warnings.push_back(
+      {std::move(code), fmt::format("{}: {}", place(node), printable(text, kMostText))});
 }
 
 void Evaluator::stop(ErrorCode code, std::uint32_t node, std::string_view text) {
   if (error_) return;
-  error_ = code == ErrorCode::kCancelled ? Error{code, std::string(text)}
-                                         : Error{code, fmt::format("{}: {}", place(node), text)};
+  const std::string shown = printable(text, kMostText);
+  error_ = {code,
+            code == ErrorCode::kCancelled ? shown : fmt::format("{}: {}", place(node), shown)};
 }
 
 void Evaluator::leave_out(std::uint32_t node, std::string code, const Error& error,

@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <string_view>
@@ -57,7 +58,8 @@ enum class Dimension : std::uint8_t { kNone, kFlat, kSolid };
 class Evaluator {
  public:
   /// @param folder  of relative file names; empty: where the process runs
-  Evaluator(const Ast& ast, const Execution& execution, std::string folder);
+  /// @param root  the scene may read files below it only; empty: everywhere
+  Evaluator(const Ast& ast, const Execution& execution, std::string folder, std::string root = {});
   Result<Scene> run();
 
  private:
@@ -114,6 +116,8 @@ class Evaluator {
   void surface(std::uint32_t node, const Context& context);
   void import(std::uint32_t node, const Context& context);
   [[nodiscard]] Outline import_outline(std::uint32_t node, const std::string& path);
+  /// Where the file is that a node asks for; kept among the files of the scene. Empty: left out, or
+  /// refused, as has been said.
   [[nodiscard]] std::optional<std::string> asset(std::uint32_t node, const std::string& file);
 
   // evaluate_arguments.cpp: what is not as it should be is named in a warning
@@ -177,9 +181,10 @@ class Evaluator {
 
   const Ast& ast_;
   const Execution& execution_;
-  std::string folder_;
-  bool leftovers_ = false;  ///< the tree has nodes that are part of nothing
-  bool newer_ = false;      ///< the dialect after 2021.01
+  std::string folder_, root_;
+  std::set<std::string> asked_for_;  ///< paths of files
+  bool leftovers_ = false;           ///< the tree has nodes that are part of nothing
+  bool newer_ = false;               ///< the dialect after 2021.01
   Scene scene_;
   std::vector<Frame> frames_;
   std::vector<Operand> operands_;

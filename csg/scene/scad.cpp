@@ -2,54 +2,63 @@
 
 #include <fcntl.h>
 #include <poll.h>
-#include <spawn.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
+#include <charconv>
 #include <chrono>
+#include <cmath>
 #include <csignal>
-#include <cstdlib>
 #include <filesystem>
+#include <initializer_list>
+#include <random>
 #include <string_view>
 #include <system_error>
 #include <utility>
 #include <vector>
 
+#include "core/printable.h"
 #include "mesh/input_bytes.h"
-
-extern char** environ;
 
 namespace strata::csg {
 namespace {
 
-/// A folder of our own for the output, removed with all in it.
-class Folder {
+/// Where openscad writes to: memory, which is gone with the last process that has it open.
+class Memory {
  public:
-  Folder() {
-    std::error_code status;
-    std::string name = (std::filesystem::temp_directory_path(status) / "strata-XXXXXX").string();
-    if (!status && ::mkdtemp(name.data())) path_ = name;
+  Memory() {
+    const int made = ::memfd_create("strata", MFD_CLOEXEC);
+    // Not among the standard streams, where they are closed.
+    descriptor_ = made < 0 ? made : ::fcntl(made, F_DUPFD_CLOEXEC, STDERR_FILENO + 1);
+    if (made >= 0) ::close(made);
   }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-  ~Folder() {
-    std::error_code ignored;
-    if (!path_.empty()) std::filesystem::remove_all(path_, ignored);
+  Memory(const Memory&) = delete;
+  Memory& operator=(const Memory&) = delete;
+  ~Memory() {
+    if (descriptor_ >= 0) ::close(descriptor_);
   }
-  [[nodiscard]] const std::string& path() const { return path_; }
+  [[nodiscard]] int descriptor() const { return descriptor_; }
+  [[nodiscard]] std::string path() const { return fmt::format("/proc/self/fd/{}", descriptor_); }
+  [[nodiscard]] Result<std::string> text() const {
+    auto bytes = detail::InputBytes::open(path(), 0);
+    if (!bytes) return tl::unexpected(bytes.error());
+    return std::string(bytes->view());
+  }
 
  private:
-  std::string path_;
+  int descriptor_ = -1;
 };
 
 /// What openscad says, line by line as it comes.
 class Speech {
  public:
   /// @param path  of the program, as messages name it
-  explicit Speech(const std::string& path) : path_(path) {}
+  /// @param mark  what the line begins with that says where the camera is
+  Speech(const std::string& path, std::string mark) : path_(path), mark_(std::move(mark)) {}
 
   void hear(std::string_view bytes) {
     constexpr std::size_t kMost = 1 << 16;  // its last words are the ones that count
@@ -76,7 +85,7 @@ class Speech {
     std::string_view said = said_;
     while (!said.empty() && said.back() == '\n') said.remove_suffix(1);
     const std::string text =
-        printable(said.size() > kMost ? said.substr(said.size() - kMost) : said);
+        plain_line(said.size() > kMost ? said.substr(said.size() - kMost) : said);
     return text.empty() ? "it said nothing" : text;
   }
   /// The first error; empty: there was none.
@@ -84,28 +93,39 @@ class Speech {
   [[nodiscard]] std::size_t further_errors() const { return errors_ > 0 ? errors_ - 1 : 0; }
   [[nodiscard]] std::vector<std::string>& warnings() { return warnings_; }
   [[nodiscard]] std::vector<std::string>& notes() { return notes_; }
+  /// Whether the program says something of the camera, and what lies behind the mark.
+  [[nodiscard]] bool has_view() const { return has_view_; }
+  [[nodiscard]] const std::string& view() const { return view_; }
 
  private:
   static constexpr std::size_t kMostLines = 1000;  // of each kind
+  static constexpr std::size_t kLongest = 4000;    // of a line
 
-  static std::string printable(std::string_view line) {
+  static std::string plain_line(std::string_view line) {
     std::string text(line);
-    for (char& c : text) {
-      if (static_cast<unsigned char>(c) < ' ') c = ' ';
-    }
-    return text;
+    std::replace_if(
+        text.begin(), text.end(), [](char c) { return c == '\n' || c == '\t'; }, ' ');
+    return printable(text, kLongest);
   }
 
   void take(std::string_view line) {
     if (line.empty()) return;
+    if (line.starts_with(mark_)) {
+      view_ = line.substr(mark_.size());
+      return;
+    }
+    if (line.starts_with("WARNING: Viewall and autocenter disabled in favor of $vp")) {
+      has_view_ = true;  // said of every picture, and not a fault of the program
+      return;
+    }
     // ERROR, PARSER-ERROR, WARNING, FONT-WARNING, ECHO, TRACE, ...
     const std::string_view kind = line.substr(0, line.find(": "));
     if (kind.ends_with("ERROR") && is_kind(kind)) {
-      if (errors_++ == 0) error_ = placed(printable(line));
+      if (errors_++ == 0) error_ = placed(plain_line(line));
     } else if (kind.ends_with("WARNING") && is_kind(kind)) {
-      if (warnings_.size() < kMostLines) warnings_.push_back(placed(printable(line)));
+      if (warnings_.size() < kMostLines) warnings_.push_back(placed(plain_line(line)));
     } else if (notes_.size() < kMostLines) {
-      notes_.push_back(printable(line));
+      notes_.push_back(plain_line(line));
     }
   }
 
@@ -131,35 +151,37 @@ class Speech {
   }
 
   const std::string& path_;
-  std::string said_, line_, error_;
+  const std::string mark_;
+  std::string said_, line_, error_, view_;
   std::vector<std::string> warnings_, notes_;
   std::size_t errors_ = 0;
+  bool has_view_ = false;
 };
 
-/// A child process in a group of its own; killed, if it still runs, with this.
+/// A child process in a group of its own; killed, if it still runs, with this and with the process.
 class Child {
  public:
-  /// @return 0, or the reason why it did not start
-  int start(const char* const* arguments) {
-    int ends[2];
+  /// @param kept  descriptors that it inherits @return 0, or the reason why it did not start
+  int start(const char* const* arguments, std::initializer_list<int> kept) {
+    int ends[2], reasons[2];
     if (::pipe2(ends, O_CLOEXEC) != 0) return errno;
     output_ = ends[0];
-    posix_spawn_file_actions_t actions;
-    posix_spawnattr_t attributes;
-    posix_spawn_file_actions_init(&actions);
-    posix_spawnattr_init(&attributes);
-    posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
-    posix_spawn_file_actions_adddup2(&actions, ends[1], 1);
-    posix_spawn_file_actions_adddup2(&actions, ends[1], 2);
-    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
-    posix_spawnattr_setpgroup(&attributes, 0);
-    const int status = ::posix_spawnp(&process_, arguments[0], &actions, &attributes,
-                                      const_cast<char* const*>(arguments), environ);
-    posix_spawn_file_actions_destroy(&actions);
-    posix_spawnattr_destroy(&attributes);
+    if (::pipe2(reasons, O_CLOEXEC) != 0) {
+      const int reason = errno;
+      ::close(ends[1]);
+      return reason;
+    }
+    const pid_t parent = ::getpid();
+    process_ = ::fork();
+    if (process_ == 0) become(arguments, kept, parent, ends[1], reasons[1]);
+    int reason = process_ < 0 ? errno : 0;
     ::close(ends[1]);
-    if (status != 0) process_ = -1;
-    return status;
+    ::close(reasons[1]);
+    // The pipe ends without a word when the program has begun.
+    while (reason == 0 && ::read(reasons[0], &reason, sizeof reason) < 0 && errno == EINTR) {
+    }
+    ::close(reasons[0]);
+    return reason;
   }
   Child() = default;
   Child(const Child&) = delete;
@@ -195,39 +217,89 @@ class Child {
   }
 
  private:
+  /// In the child: nothing but system calls, since other threads may have held any lock.
+  [[noreturn]] static void become(const char* const* arguments, std::initializer_list<int> kept,
+                                  pid_t parent, int speech, int reasons) {
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (::getppid() != parent) ::_exit(127);  // it died before that
+    ::setpgid(0, 0);
+    for (const int descriptor : kept) ::fcntl(descriptor, F_SETFD, 0);
+    const int nothing = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
+    if (::dup2(speech, STDOUT_FILENO) >= 0 && ::dup2(speech, STDERR_FILENO) >= 0 &&
+        ::dup2(nothing, STDIN_FILENO) >= 0) {
+      ::execvp(arguments[0], const_cast<char* const*>(arguments));
+    }
+    const int reason = errno;
+    (void)!::write(reasons, &reason, sizeof reason);
+    ::_exit(127);
+  }
+
   pid_t process_ = -1;
   int output_ = -1;
 };
 
-}  // namespace
+/// The values of an echo(): `[90, 0, 0], 60` are two.
+std::vector<std::vector<double>> read_values(std::string_view text) {
+  std::vector<std::vector<double>> values(1);
+  int depth = 0;
+  for (const char* at = text.data(); at != text.data() + text.size();) {
+    double number = 0.0;
+    const auto [end, status] = std::from_chars(at, text.data() + text.size(), number);
+    if (status == std::errc()) {
+      values.back().push_back(number);
+      at = end;
+      continue;
+    }
+    if (*at == '[') ++depth;
+    if (*at == ']') --depth;
+    if (*at == ',' && depth == 0) values.emplace_back();
+    if (*at == '"') return {};  // no such value is a text
+    ++at;
+  }
+  return values;
+}
 
-Result<OpenscadRun> run_openscad(const std::string& path, double timeout_s,
-                                 const Execution& execution) {
-  std::error_code status;
-  if (!std::filesystem::is_regular_file(path, status)) {
-    return fail(ErrorCode::kInput, "{}: no such file", path);
+bool all_finite(const std::vector<double>& numbers) {
+  return std::all_of(numbers.begin(), numbers.end(), [](double n) { return std::isfinite(n); });
+}
+
+/// What the program says of the camera. Its variables have values also where it does not set them.
+/// A value that is not one of those was set; else the text of the program tells.
+SceneView read_view(const std::string& echoed, const std::vector<FileIdentity>& files) {
+  SceneView view;
+  const auto values = read_values(echoed);
+  const auto sets = [&files](std::string_view variable) {
+    return std::any_of(files.begin(), files.end(), [variable](const FileIdentity& file) {
+      if (!file.path.ends_with(".scad")) return false;
+      const auto text = detail::InputBytes::open(file.path, 0);
+      return text && assigns(text->view(), variable);
+    });
+  };
+  const auto vector = [&values](std::size_t i) -> std::optional<glm::dvec3> {
+    if (i >= values.size() || values[i].size() < 2 || values[i].size() > 3) return {};
+    const auto& n = values[i];
+    if (!all_finite(n)) return {};
+    return glm::dvec3(n[0], n[1], n.size() > 2 ? n[2] : 0.0);
+  };
+  const auto number = [&values](std::size_t i) -> std::optional<double> {
+    if (i >= values.size() || values[i].size() != 1 || !all_finite(values[i])) return {};
+    return values[i].front();
+  };
+  constexpr double kUnsetDistance = 500.0;
+  if (const auto r = vector(0); r && (*r != glm::dvec3(0.0) || sets("$vpr"))) view.rotation = r;
+  if (const auto t = vector(1)) view.target = t;  // unset it is 0 in either way
+  if (const auto d = number(2); d && *d > 0 && (*d != kUnsetDistance || sets("$vpd"))) {
+    view.distance = d;
   }
-  const Folder folder;
-  if (folder.path().empty()) {
-    return fail(ErrorCode::kInput, "{}: no temporary folder can be made for openscad", path);
-  }
-  const std::string output = folder.path() + "/scene.csg";
-  // A name that begins with a dash would be an option.
-  const std::string input = path.starts_with('-') ? "./" + path : path;
-  const std::array<const char*, 5> arguments{"openscad", "-o", output.c_str(), input.c_str(),
-                                             nullptr};
-  Child child;
-  if (const int reason = child.start(arguments.data()); reason != 0) {
-    return fail(
-        ErrorCode::kInput,
-        "{}: a program needs `openscad` to be run, and that cannot be started ({}): install "
-        "the package openscad, or write `openscad -o scene.csg {}` where it is installed "
-        "and give the .csg file",
-        path, std::generic_category().message(reason), path);
-  }
+  if (const auto f = number(3); f && *f > 0 && *f < 180) view.field_of_view = f;
+  return view;
+}
+
+/// Listens until the child has ended. @return as run_openscad()
+Result<void> wait_for(Child& child, Speech& said, const std::string& path, double timeout_s,
+                      const Execution& execution) {
   using Clock = std::chrono::steady_clock;
   const auto begin = Clock::now();
-  Speech said(path);
   int ended = 0;
   bool talks = true;
   while (!child.ended(ended)) {
@@ -247,16 +319,121 @@ Result<OpenscadRun> run_openscad(const std::string& path, double timeout_s,
   if (!WIFEXITED(ended) || WEXITSTATUS(ended) != 0) {
     return fail(ErrorCode::kInput, "{}: openscad failed: {}", path, said.last_words());
   }
-  if (!said.error().empty()) {
-    return fail(
-        ErrorCode::kInput, "{}{}", said.error(),
-        said.further_errors() > 0 ? fmt::format(" ({} more errors)", said.further_errors()) : "");
+  if (said.error().empty()) return {};
+  return fail(
+      ErrorCode::kInput, "{}{}", said.error(),
+      said.further_errors() > 0 ? fmt::format(" ({} more errors)", said.further_errors()) : "");
+}
+
+std::string random_word() {
+  std::random_device device;
+  return fmt::format("strata_{:08x}{:08x}", device(), device());
+}
+
+}  // namespace
+
+std::vector<std::string> files_of_rule(std::string_view rule) {
+  std::vector<std::string> files;
+  std::string name;
+  const auto end_name = [&] {
+    if (!name.empty()) files.push_back(std::exchange(name, {}));
+  };
+  const std::size_t begin = rule.find(": ");
+  if (begin == std::string_view::npos) return files;
+  for (std::size_t i = begin + 2; i < rule.size(); ++i) {
+    const char c = rule[i];
+    if (c == '\\' && i + 1 < rule.size()) {
+      // Before the end of a line it goes on; before a blank, that is of the name.
+      if (rule[++i] == '\n') {
+        end_name();
+      } else {
+        if (rule[i] != ' ' && rule[i] != '\t') name += c;
+        name += rule[i];
+      }
+    } else if (c == ' ' || c == '\t' || c == '\n') {
+      end_name();
+    } else {
+      name += c;
+    }
   }
-  auto bytes = detail::InputBytes::open(output, 0);
-  if (!bytes)
-    return fail(ErrorCode::kInput, "{}: openscad wrote nothing: {}", path, said.last_words());
+  end_name();
+  return files;
+}
+
+bool assigns(std::string_view program, std::string_view variable) {
+  int depth = 0;
+  for (std::size_t i = 0; i < program.size(); ++i) {
+    const std::string_view rest = program.substr(i);
+    if (rest.starts_with("//")) {
+      i = std::min(program.find('\n', i), program.size());
+    } else if (rest.starts_with("/*")) {
+      const std::size_t end = program.find("*/", i + 2);
+      i = end == std::string_view::npos ? program.size() : end + 1;
+    } else if (rest[0] == '"') {
+      for (++i; i < program.size() && program[i] != '"'; ++i) {
+        if (program[i] == '\\') ++i;
+      }
+    } else if (rest[0] == '{' || rest[0] == '(') {
+      ++depth;
+    } else if (rest[0] == '}' || rest[0] == ')') {
+      --depth;
+    } else if (depth == 0 && rest.starts_with(variable)) {
+      const std::size_t next = rest.find_first_not_of(" \t\r\n", variable.size());
+      if (next != std::string_view::npos && rest[next] == '=' &&
+          rest.substr(next).find_first_not_of('=') == 1) {
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
+Result<OpenscadRun> run_openscad(const std::string& path, const OpenscadOptions& options,
+                                 const Execution& execution) {
+  std::error_code status;
+  if (!std::filesystem::is_regular_file(path, status)) {
+    return fail(ErrorCode::kInput, "{}: no such file", path);
+  }
   OpenscadRun run;
-  run.text = bytes->view();
+  run.files.push_back(identify_file(path));
+  const Memory output, rule;
+  if (output.descriptor() < 0 || rule.descriptor() < 0) {
+    return fail(ErrorCode::kLimit, "{}: no memory can be opened for what openscad writes", path);
+  }
+  const std::string mark = random_word();
+  std::vector<std::string> words{"openscad", "-o", output.path(), "--export-format",
+                                 "csg",      "-d", rule.path()};
+  words.insert(words.end(), options.options.begin(), options.options.end());
+  // Behind the program's own text, where its variables have their values.
+  words.insert(words.end(), {"-D", fmt::format("{0}=echo(\"{0}\",$vpr,$vpt,$vpd,$vpf)0", mark)});
+  // A name that begins with a dash would be an option.
+  words.push_back(path.starts_with('-') ? "./" + path : path);
+  std::vector<const char*> arguments;
+  for (const std::string& word : words) arguments.push_back(word.c_str());
+  arguments.push_back(nullptr);
+  Child child;
+  const int reason = child.start(arguments.data(), {output.descriptor(), rule.descriptor()});
+  if (reason != 0) {
+    return fail(
+        ErrorCode::kInput,
+        "{}: a program needs `openscad` to be run, and that cannot be started ({}): install "
+        "the package openscad, or write `openscad -o scene.csg {}` where it is installed "
+        "and give the .csg file",
+        path, std::generic_category().message(reason), path);
+  }
+  Speech said(path, fmt::format("ECHO: \"{}\", ", mark));
+  if (auto done = wait_for(child, said, path, options.timeout_s, execution); !done) {
+    return tl::unexpected(done.error());
+  }
+  auto text = output.text();
+  if (!text || text->empty()) {
+    return fail(ErrorCode::kInput, "{}: openscad wrote nothing: {}", path, said.last_words());
+  }
+  run.text = *std::move(text);
+  for (const std::string& file : files_of_rule(rule.text().value_or(""))) {
+    if (file != path) run.files.push_back(identify_file(file));
+  }
+  if (said.has_view()) run.view = read_view(said.view(), run.files);
   run.warnings = std::move(said.warnings());
   run.notes = std::move(said.notes());
   return run;

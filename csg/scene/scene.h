@@ -1,10 +1,12 @@
 #pragma once
 
+#include <glm/vec3.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "core/execution.h"
+#include "core/file_identity.h"
 #include "core/result.h"
 #include "csg/tree.h"
 
@@ -16,6 +18,14 @@ struct SceneWarning {
   /// "approximate", "ignored", "geometry", "openscad" (a warning of its own about a program).
   std::string code;
   std::string message;  ///< begins with `file:line:column: `, of openscad's with what it names
+};
+
+/// What a program says of the camera by `$vpt`, `$vpr`, `$vpd` and `$vpf`; empty: not said.
+struct SceneView {
+  std::optional<glm::dvec3> target;     ///< world
+  std::optional<glm::dvec3> rotation;   ///< degrees
+  std::optional<double> distance;       ///< of the eye from the target, above 0
+  std::optional<double> field_of_view;  ///< degrees, of the picture's height, in (0, 180)
 };
 
 /// A scene: its tree, and what modifiers ask to be shown beside it.
@@ -31,12 +41,20 @@ struct Scene {
   bool flat = false;
   /// How far numbers in the file may be off, relative to their size: 5e-6 for six printed digits.
   double relative_precision = 0.0;
+  std::optional<SceneView> view;  ///< of a program that says something of it
+  /// What was opened: the scene itself, what it imports, and all that openscad read for a program.
+  /// What was asked for and is not there has no identity.
+  std::vector<FileIdentity> files;
 };
 
 struct ReadSceneOptions {
   /// Where relative names of imported files are looked for; empty: the folder of the scene.
   std::string asset_folder;
   double scad_timeout_s = 300.0;  ///< for the `openscad` program that turns .scad into .csg
+  /// Options of `openscad` for programs, word by word, such as "-D", "x=40".
+  std::vector<std::string> openscad_options;
+  /// A scene may read files below this folder only, links followed; empty: any regular file.
+  std::string root_folder;
 };
 
 /// Where a scene in `folder` finds the file that it calls `name`: there, or in a folder around it,
@@ -44,8 +62,12 @@ struct ReadSceneOptions {
 [[nodiscard]] std::optional<std::string> find_asset(const std::string& folder,
                                                     const std::string& name);
 
+/// Whether a file lies in a folder or in those below it, links followed.
+[[nodiscard]] bool lies_below(const std::string& path, const std::string& folder);
+
 /// Reads `.csg` (the whole language of both OpenSCAD 2021.01 and later) or, with the help of an
-/// installed `openscad`, `.scad`. @return kInput naming file:line:column, kLimit, kCancelled
+/// installed `openscad`, `.scad`. @return kInput naming file:line:column, also for a file outside
+/// of the root folder; kLimit, kCancelled
 Result<Scene> read_scene(const std::string& path, const ReadSceneOptions& options = {},
                          const Execution& execution = {});
 

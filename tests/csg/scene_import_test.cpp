@@ -1,5 +1,6 @@
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
@@ -388,6 +389,44 @@ TEST_F(SceneFiles, WarningsAndErrorsOfOpenscadAreOurs) {
             path + ":1: openscad: ERROR: Assertion 'false' failed: \"boo\"");
 }
 
+TEST(OpenscadRule, NamesAreReadAsOpenscadWritesThem) {
+  EXPECT_EQ(
+      files_of_rule("/proc/self/fd/5: \\\n\t/a/b\\ c$d.stl \\\n\t/a/my\\ lib.scad \\\n\te.scad\n"),
+      (std::vector<std::string>{"/a/b c$d.stl", "/a/my lib.scad", "e.scad"}));
+  EXPECT_EQ(files_of_rule("a: b\\c: d"), (std::vector<std::string>{"b\\c:", "d"}));
+  EXPECT_TRUE(files_of_rule("").empty());
+  EXPECT_TRUE(files_of_rule("a:").empty());
+}
+
+TEST(OpenscadRule, AnAssignmentIsFoundInATextButNotInACommentOrABlock) {
+  for (const char* yes : {"$vpr=[0,0,0];", "a = 1; $vpr\n = 3;", "/* */$vpr=1;", "\"\\\"\";$vpr=1;",
+                          "module m() { } $vpr = 1;"}) {
+    EXPECT_TRUE(assigns(yes, "$vpr")) << yes;
+  }
+  for (const char* no :
+       {"// $vpr=1;", "/* $vpr = 1; */", "\"$vpr=1;\"", "module m() { $vpr = 1; }", "f($vpr = 1);",
+        "assert($vpr == 1);", "a = $vpr == 1;", "$vprx = 1;", ""}) {
+    EXPECT_FALSE(assigns(no, "$vpr")) << no;
+  }
+}
+
+TEST_F(SceneFiles, WhatWasOpenedIsKept) {
+  write_box("box.stl", 1.0);
+  const std::string path =
+      write("a.csg", "import(file = \"b\\x6fx.stl\"); import(file = \"box.stl\"); // \"no.stl\"\n");
+  const Scene scene = read(path);
+  ASSERT_EQ(scene.files.size(), 2u);
+  for (const std::string& name : {path, (folder_ / "box.stl").string()}) {
+    EXPECT_TRUE(std::any_of(scene.files.begin(), scene.files.end(), [&](const auto& file) {
+      return file.is_same_file(identify_file(name));
+    })) << name;
+  }
+  const Scene missing = read(write("b.csg", "import(file = \"none.stl\"); cube();"));
+  EXPECT_EQ(std::count_if(missing.files.begin(), missing.files.end(),
+                          [](const auto& file) { return file.is_there(); }),
+            1);
+}
+
 TEST_F(SceneFiles, OpenscadIsEndedInTimeOrOnAStop) {
   const std::string path = write("a.scad", "anything");
   const std::string fake = write("openscad", "#!/bin/sh\nsleep 600\n");
@@ -402,7 +441,7 @@ TEST_F(SceneFiles, OpenscadIsEndedInTimeOrOnAStop) {
   source.request_stop();
   Execution execution;
   execution.stop = source.get_token();
-  const auto stopped = run_openscad(path, 600, execution);
+  const auto stopped = run_openscad(path, {}, execution);
   ASSERT_FALSE(stopped.has_value());
   EXPECT_EQ(stopped.error().code, ErrorCode::kCancelled);
 }
@@ -420,6 +459,14 @@ TEST_F(SceneFiles, RealProgramsAreRunWhereOpenscadIsInstalled) {
   ASSERT_FALSE(broken.has_value());
   EXPECT_NE(broken.error().message.find("openscad failed"), std::string::npos);
   EXPECT_EQ(codes_of(read(write("c.scad", "foo(); cube();"))), "openscad ");
+  write("lib.scad", "module m() import(\"box.stl\");");
+  const Scene parts = read(write("e.scad", "use <lib.scad>\nm();"));
+  EXPECT_EQ(
+      std::count_if(parts.files.begin(), parts.files.end(),
+                    [&](const auto& file) {
+                      return file.is_same_file(identify_file((folder_ / "lib.scad").string()));
+                    }),
+      1);
   const std::string path = write("d.scad", "echo(\"hi\");\nassert(false, \"boo\"); cube(1);");
   const auto asserted = read_scene(path);
   ASSERT_FALSE(asserted.has_value());
