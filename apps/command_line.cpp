@@ -1,13 +1,18 @@
-// The only file that knows CLI11, which takes six seconds to compile.
+// The command line. CLI11 takes six seconds to compile: few files know it.
 
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <algorithm>
+#include <array>
+#include <filesystem>
 
 #include "apps/choice_words.h"
-#include "apps/commands.h"
-#include "apps/csg_options.h"
+#include "apps/command_words.h"
+#include "apps/csg_scene.h"
 #include "apps/option_values.h"
+#include "apps/scene_options.h"
+#include "core/printable.h"
 
 namespace strata::apps {
 namespace {
@@ -20,13 +25,14 @@ constexpr const char* kTopHelp = R"(strata: triangle meshes to voxels, exactly a
   strata info scan.ply                                 size, volume, closed or not and where
   strata ldi knot.obj -r 512 -o knot.exr               depth lists as a deep image
   strata csg plate.csg -o plate.png                    a picture of a Boolean tree
+  strata part.scad -o part.png                         the same: a file instead of a command
   strata view plate.scad --watch                       a window on it
 
 usage: strata COMMAND [OPTIONS] FILE...
 
 commands:
   voxelize    meshes or scenes to a voxel grid, a file of it, or statistics
-  info        what a mesh file holds: counts, bounds, area, volume, holes
+  info        what a mesh or a scene holds: counts, bounds, area, volume, holes
   ldi         meshes or a scene to a layered depth image
   csg         a scene (.csg, .scad) or an expression over meshes to a picture
   view        the same in a window: turn, cut, pick, measure, reload
@@ -44,7 +50,7 @@ exit codes:
   3    an input file that cannot be read or is malformed
   4    an output that cannot be written
   5    geometry that is refused (--strict, --open fail, no extent, coordinates too large)
-  6    a limit: memory, size of the grid
+  6    a limit: memory, size of the grid, --time-limit
   7    two results differ that should agree
   130  interrupted
 )";
@@ -62,10 +68,11 @@ constexpr const char* kVoxelizeExamples =
 )";
 
 constexpr const char* kInfoExamples =
-    R"(What mesh files hold: counts, bounds, area, volume, and where they are not closed.
+    R"(What meshes and scenes hold: counts, bounds, area, volume, and where they are not closed.
 
   strata info scan.ply
   strata info --json *.stl
+  strata info plate.csg                                measured by rays, with error bounds
   strata info --gl                                     what OpenGL there is, and how it is used
 )";
 
@@ -77,37 +84,9 @@ constexpr const char* kLdiExamples =
   strata ldi knot.obj -r 512 --axis x -o knot.npz     arrays for NumPy
 )";
 
-constexpr const char* kCsgExamples =
-    R"(A picture of a Boolean tree: of a scene, of meshes united, of an expression over files.
-
-  strata csg plate.csg -o plate.png                      the whole scene, from OpenSCAD's place
-  strata csg part.scad -o part.png --size 1920,1080 --samples 16
-  strata csg plate.stl holes.stl --expr 'plate - holes' -o part.png
-  strata csg a.stl b.stl c.stl --expr '(a + b) * c' -o part.png     a, b, c: by position
-  strata csg part.csg -o part.png --camera=0,0,5,60,0,30,140 --projection o --cut 'y>0'
-
-In --expr, + and | unite, - takes away, * and & intersect and bind first, ^ is in one of the two.
-)";
-
-/// The words of the command line before they are read as numbers and choices. Empty: not given.
-struct Words {
-  std::vector<std::string> files;
-  std::string reader = "own", input_format = "auto", threads, memory_limit, progress = "auto";
-  bool quiet = false, verbose = false, strict = false;
-  std::string output, format, json;
-  std::string resolution, voxel_size, grid, bounds, origin, padding;
-  bool align = false, solid = false, fog = false, ids = false, keep_orientation = false,
-       samples = false;
-  std::string surface, rule = "winding", open = "vote", axis = "auto", store = "auto",
-                       offsets = "plane-first", backend = "auto";
-  bool stats = false, checksum = false, dry_run = false, list_formats = false, gl = false;
-  CsgWords csg;
-};
-
-void add_inputs(CLI::App& app, Words& words, bool scenes) {
+void add_inputs(CLI::App& app, Words& words) {
   app.add_option("INPUT", words.files,
-                 scenes ? "Meshes (.obj .stl .ply .off), scenes (.csg .scad); - a pipe of a mesh"
-                        : "Mesh files: .obj .stl .ply .off; - for standard input")
+                 "Meshes (.obj .stl .ply .off), scenes (.csg .scad); - a pipe of a mesh")
       ->type_name("");
   app.add_option("--input-format", words.input_format,
                  "obj, stl, ply or off: of -, else of all files whatever their names are")
@@ -116,7 +95,10 @@ void add_inputs(CLI::App& app, Words& words, bool scenes) {
   app.add_option("--reader", words.reader, "own (default) or openmesh, to compare")
       ->type_name("NAME")
       ->group("Input");
+  define_scene_options(app, words.csg.scene);
 }
+
+}  // namespace
 
 void add_common(CLI::App& app, Words& words) {
   const char* group = "Running";
@@ -127,7 +109,12 @@ void add_common(CLI::App& app, Words& words) {
                  "Bytes, or with K, M, G; default: three quarters of the machine or container")
       ->type_name("SIZE")
       ->group(group);
-  app.add_flag("--strict", words.strict, "Warnings are errors (exit code 5)")->group(group);
+  app.add_option("--time-limit", words.time_limit,
+                 "Seconds after which the command ends without output (exit code 6)")
+      ->type_name("S")
+      ->group(group);
+  app.add_flag("--strict,--hardwarnings", words.strict, "Warnings are errors (exit code 5)")
+      ->group(group);
   app.add_flag("-q,--quiet", words.quiet, "Print errors only")->group(group);
   app.add_flag("-v,--verbose", words.verbose, "Say what is done")->group(group);
   app.add_option("--progress", words.progress, "auto (a bar on terminals), bar or none")
@@ -139,6 +126,8 @@ void add_json(CLI::App& app, Words& words, const char* group) {
   app.add_flag("--json{-}", words.json, "--json[=FILE]: a report for programs (docs/json.md)")
       ->group(group);
 }
+
+namespace {
 
 void add_grid(CLI::App& app, Words& words) {
   const char* group = "Grid (one of -r, --voxel-size, --grid)";
@@ -165,11 +154,15 @@ void add_grid(CLI::App& app, Words& words) {
       ->group(group);
 }
 
+}  // namespace
+
 void add_backend(CLI::App& app, Words& words, const char* group) {
   app.add_option("--backend", words.backend, "cpu, gl (OpenGL 4.5) or auto: a GPU if there is one")
       ->type_name("B")
       ->group(group);
 }
+
+namespace {
 
 void add_engine(CLI::App& app, Words& words, const char* axes) {
   const char* group = "Engine (same result whatever is chosen)";
@@ -185,7 +178,7 @@ void add_engine(CLI::App& app, Words& words, const char* axes) {
 
 void define_voxelize(CLI::App& app, Words& words) {
   app.description(kVoxelizeExamples);
-  add_inputs(app, words, true);
+  add_inputs(app, words);
   const char* output = "Output";
   app.add_option("-o,--output", words.output, "File or folder to write; - for standard output")
       ->type_name("FILE")
@@ -226,7 +219,7 @@ void define_voxelize(CLI::App& app, Words& words) {
 
 void define_info(CLI::App& app, Words& words) {
   app.description(kInfoExamples);
-  add_inputs(app, words, false);
+  add_inputs(app, words);
   app.add_flag("--gl", words.gl, "What OpenGL there is, and how it is used; files are not needed")
       ->group("Output");
   add_json(app, words, "Output");
@@ -235,7 +228,7 @@ void define_info(CLI::App& app, Words& words) {
 
 void define_ldi(CLI::App& app, Words& words) {
   app.description(kLdiExamples);
-  add_inputs(app, words, true);
+  add_inputs(app, words);
   app.add_option("-o,--output", words.output,
                  "File to write: .exr, .npz, or .png (an X-ray picture)")
       ->type_name("FILE")
@@ -250,88 +243,16 @@ void define_ldi(CLI::App& app, Words& words) {
   add_common(app, words);
 }
 
-void define_csg(CLI::App& app, Words& words) {
-  app.description(kCsgExamples);
-  CsgWords& csg = words.csg;
-  app.add_option("INPUT", words.files,
-                 "Scenes (.csg .scad), meshes (.obj .stl .ply .off); - a pipe")
-      ->type_name("");
-  const char* input = "Input";
-  const auto option = [&app](const char* names, std::string& word, const char* what,
-                             const char* type, const char* group) {
-    app.add_option(names, word, what)->type_name(type)->group(group);
-  };
-  option("--expr", csg.expression, "What is pictured, such as 'a - b'; else all inputs united",
-         "EXPR", input);
-  option("--input-format", words.input_format,
-         "csg, obj, stl, ply or off: of -, else of all files whatever their names are", "FORMAT",
-         input);
-  option("--assets", csg.assets, "Where scenes look for files; else beside the scene", "FOLDER",
-         input);
-  option("--scad-timeout", csg.scad_timeout, "Seconds that openscad may take for a .scad; 300", "S",
-         input);
-  option("--rule", words.rule, "Inside of meshes: winding (> 0, default), nonzero, parity (odd)",
-         "RULE", input);
-  app.add_flag("--keep-orientation", words.keep_orientation,
-               "Do not turn meshes around that are inside out")
-      ->group(input);
-  const char* output = "Output";
-  option("-o,--output", words.output, "Picture to write, .png; - for standard output", "FILE",
-         output);
-  option("--ids", csg.ids, "Which opaque solid each pixel shows, as colours, .png", "FILE", output);
-  option("--depth", csg.depth, "Distance along the view, .exr, channel Z", "FILE", output);
-  add_json(app, words, output);
-  const char* camera = "Camera (default: all in view from OpenSCAD's place)";
-  option("--size,--imgsize", csg.size, "width,height in pixels; 512,512", "W,H", camera);
-  option("--camera", csg.camera, "x,y,z,rx,ry,rz,distance or eye x,y,z, target x,y,z", "NUMBERS",
-         camera);
-  app.add_flag("--view-all,--viewall", csg.view_all, "From so far that all is seen")->group(camera);
-  app.add_flag("--auto-center,--autocenter", csg.auto_centre, "Look at the middle of it all")
-      ->group(camera);
-  option("--projection", csg.projection, "p(erspective, default) or o(rtho)", "P", camera);
-  const char* look = "Look";
-  option("--colorscheme", csg.scheme, "Cornfield (default) or another of OpenSCAD's", "NAME", look);
-  option("--samples", csg.samples, "Samples a pixel: 1 (default), 2, 4 ... 64", "N", look);
-  app.add_flag("--render", csg.render,
-               "The result alone: no ghosts, no colours, flat scenes from above")
-      ->group(look);
-  app.add_flag("--edges", csg.edges, "Dark lines along the edges of faces")->group(look);
-  app.add_flag("--transparent", csg.transparent, "Background without colour")->group(look);
-  add_backend(app, words, look);
-  app.add_option("--cut", csg.cuts,
-                 "Section: x=5 (cuts what is nearer), z<10 (what stays) or nx,ny,nz,d")
-      ->type_name("PLANE")
-      ->expected(1)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
-      ->group(look);
-  add_common(app, words);
-}
-
-/// Reads one option's value into `target`; keeps the first error.
-class Reader {
- public:
-  template <class T, class U>
-  void take(Result<T> value, U& target) {
-    if (value) {
-      target = *std::move(value);
-    } else if (!error_) {
-      error_ = std::move(value.error());
-    }
-  }
-  void fail_with(std::string message) {
-    if (!error_) error_ = Error{ErrorCode::kUsage, std::move(message)};
-  }
-  [[nodiscard]] const std::optional<Error>& error() const { return error_; }
-
- private:
-  std::optional<Error> error_;
-};
+}  // namespace
 
 CommonOptions common_options(const Words& words, Reader& reader) {
   CommonOptions common;
   common.quiet = words.quiet;
   common.verbose = words.verbose;
   common.strict = words.strict;
+  if (!words.time_limit.empty()) {
+    reader.take(parse_seconds("--time-limit", words.time_limit), common.time_limit_s);
+  }
   std::int64_t threads = 0;
   if (!words.threads.empty()) reader.take(parse_integer("--threads", words.threads), threads);
   if (threads < 0 || threads > 4096) {
@@ -350,8 +271,11 @@ InputOptions input_options(const Words& words, Reader& reader) {
   input.files = words.files;
   reader.take(parse_choice("--reader", words.reader, kReaderWords), input.reader);
   reader.take(parse_choice("--input-format", words.input_format, kMeshFormatWords), input.format);
+  reader.take(read_scene_options(words.csg.scene, input));
   return input;
 }
+
+namespace {
 
 GridRequest grid_request(const Words& words, Reader& reader) {
   GridRequest grid;
@@ -435,7 +359,7 @@ VoxelizeCommand voxelize_command(const Words& words, Reader& reader) {
   command.checksum = words.checksum;
   command.dry_run = words.dry_run;
   if (!words.json.empty()) command.json = words.json;
-  if (command.input.files.empty()) reader.fail_with("no mesh file is given");
+  if (command.input.files.empty()) reader.fail_with("no mesh file and no scene is given");
   command.grid = grid_request(words, reader);
   if (command.ids && (command.surface || command.fog)) {
     reader.fail_with(
@@ -460,7 +384,8 @@ InfoCommand info_command(const Words& words, Reader& reader) {
   command.input = input_options(words, reader);
   command.gl = words.gl;
   if (!words.json.empty()) command.json = words.json;
-  if (command.input.files.empty() && !command.gl) reader.fail_with("no mesh file is given");
+  if (command.input.files.empty() && !command.gl)
+    reader.fail_with("no mesh file and no scene is given");
   return command;
 }
 
@@ -477,47 +402,46 @@ LdiCommand ldi_command(const Words& words, Reader& reader) {
   reader.take(parse_choice("--store", words.store, kStoreWords), command.store);
   reader.take(parse_choice("--offsets", words.offsets, kOffsetWords), command.offsets);
   reader.take(parse_choice("--backend", words.backend, kBackendWords), command.backend);
-  if (command.input.files.empty()) reader.fail_with("no mesh file is given");
+  if (command.input.files.empty()) reader.fail_with("no mesh file and no scene is given");
   if (command.output.empty())
     reader.fail_with("no output is given: -o FILE.exr, FILE.npz or FILE.png");
   command.grid = grid_request(words, reader);
   return command;
 }
 
-CsgCommand csg_command(Words words, Reader& reader) {
-  CsgCommand command;
-  command.common = common_options(words, reader);
-  command.scene_format = words.input_format == "csg";
-  if (command.scene_format) words.input_format = "auto";
-  command.input = input_options(words, reader);
-  reader.take(parse_choice("--rule", words.rule, kRuleWords), command.rule);
-  reader.take(parse_choice("--backend", words.backend, kBackendWords), command.backend);
-  command.keep_orientation = words.keep_orientation;
-  command.output = words.output;
-  if (!words.json.empty()) command.json = words.json;
-  if (reader.error()) return command;
-  if (auto read = read_csg_options(words.csg, command); !read) {
-    reader.fail_with(read.error().message);
-  }
-  return command;
+ParseOutcome usage_error(std::string_view command, std::string_view message) {
+  return {fmt::format("strata: error: {}\nstrata: see strata {}{}--help\n",
+                      printable_lines(message), command, command.empty() ? "" : " "),
+          true, static_cast<int>(ErrorCode::kUsage)};
 }
 
-ParseOutcome usage_error(std::string_view command, std::string_view message) {
-  return {fmt::format("strata: error: {}\nstrata: see strata {}{}--help\n", message, command,
-                      command.empty() ? "" : " "),
-          true, static_cast<int>(ErrorCode::kUsage)};
+/// Whether a command line is one of openscad: no command, but a file, or options and a scene.
+bool begins_with_a_file(const std::vector<std::string>& words) {
+  const std::string& first = words.front();
+  for (const char* command : {"voxelize", "info", "ldi", "csg"}) {
+    if (first == command) return false;
+  }
+  if (first.starts_with('-')) return std::any_of(words.begin(), words.end(), is_scene_name);
+  std::error_code ignored;
+  return is_scene_name(first) || mesh_format_of(first) != MeshFormat::kAuto ||
+         std::filesystem::is_regular_file(first, ignored);
 }
 
 }  // namespace
 
 Command parse_command_line(int argc, const char* const* argv) {
   if (argc < 2) return ParseOutcome{kTopHelp, true, static_cast<int>(ErrorCode::kUsage)};
-  const std::string_view name = argv[1];
+  std::string_view name = argv[1];
+  int first = 2;
   if (name == "-h" || name == "--help" || name == "help") {
     return ParseOutcome{std::string(kTopHelp) + kExitCodes, false, 0};
   }
   if (name == "-V" || name == "--version") {
     return ParseOutcome{"strata " STRATA_VERSION "\n", false, 0};
+  }
+  if (begins_with_a_file({argv + 1, argv + argc})) {
+    name = "csg";
+    first = 1;
   }
   // Only the options of the command asked for are built: that is most of the time CLI11 takes.
   Words words;
@@ -538,7 +462,7 @@ Command parse_command_line(int argc, const char* const* argv) {
   }
   app.footer("strata --help lists the exit codes.");
   try {
-    std::vector<std::string> arguments(argv + 2, argv + argc);
+    std::vector<std::string> arguments(argv + first, argv + argc);
     if (const auto mistake = empty_value(arguments); !mistake.empty()) {
       return usage_error(name, mistake);
     }

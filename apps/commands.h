@@ -25,7 +25,8 @@ struct CommonOptions {
   bool quiet = false;              ///< errors only
   bool verbose = false;            ///< also say what is done
   ProgressMode progress = ProgressMode::kAuto;
-  bool strict = false;  ///< warnings are errors
+  bool strict = false;        ///< warnings are errors
+  double time_limit_s = 0.0;  ///< of the whole command; 0: none
 };
 
 /// Who makes depth lists and finds surfaces; the results are the same.
@@ -35,11 +36,12 @@ enum class Backend {
   kGl  ///< OpenGL 4.5, a software renderer too
 };
 
-/// Where meshes come from.
+/// Where meshes and scenes come from.
 struct InputOptions {
   std::vector<std::string> files;
   MeshReader reader = MeshReader::kOwn;
   MeshFormat format = MeshFormat::kAuto;
+  csg::ReadSceneOptions scene;  ///< for the scenes among them
 };
 
 /// `strata voxelize`
@@ -100,13 +102,15 @@ struct CsgCommand {
   bool scene_format = false;  ///< inputs are .csg, whatever their names are
   InsideRule rule = InsideRule::kWinding;
   bool keep_orientation = false;
-  csg::ReadSceneOptions scene;
   std::string expression;          ///< over the inputs; empty: their union
   std::string output, ids, depth;  ///< files; empty: none, output "-": standard output
   glm::ivec2 size{512};
   csg::Camera camera;
   bool view_all = false, auto_centre = false;
   bool default_camera = false;  ///< none was given
+  bool asked_view = false;      ///< --view-all or --auto-center was given
+  int frames = 0;               ///< pictures with $t = 0, 1/frames, ...; 0: one without
+  bool summary = false;         ///< the report as text
   bool render = false;          ///< the result alone: no ghosts, no colours, flat scenes from above
   Backend backend = Backend::kAuto;
   csg::PictureOptions picture;

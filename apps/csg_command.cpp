@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <optional>
 #include <utility>
 
@@ -136,9 +137,65 @@ csg::Picture picture_of_ids(const csg::SurfaceImage& surfaces, const csg::Tree& 
   return ids;
 }
 
+/// Where the camera stands before it is fitted: as the command says, else as the scene does.
+csg::Camera placed_camera(CsgCommand& command, const csg::Scene& scene, Session& session) {
+  csg::Camera camera = command.camera;
+  if (!command.default_camera || !scene.view) return camera;
+  const csg::SceneView& view = *scene.view;
+  camera.target = view.target.value_or(camera.target);
+  camera.rotation = view.rotation.value_or(camera.rotation);
+  camera.distance = view.distance.value_or(camera.distance);
+  camera.field_of_view = view.field_of_view.value_or(camera.field_of_view);
+  if (command.asked_view) {
+    session.warn("ignored", fmt::format("{}: it sets $vpr, $vpt, $vpd or $vpf; --view-all and "
+                                        "--auto-center have no effect beside them",
+                                        command.input.files.front()));
+  }
+  command.default_camera = command.view_all = command.auto_centre = false;
+  return camera;
+}
+
+/// The report of a run that makes no picture.
+Result<void> run_report(const CsgCommand& command, csg::Scene& scene, CsgOutcome& outcome,
+                        Session& session) {
+  cut_scene(scene, command.cuts, outcome.camera);
+  auto measures = csg::measure(scene.tree, scene.tree.root(), kMeasureResolution,
+                               session.execution("measuring", 1.0));
+  if (!measures) return tl::unexpected(with_limit(std::move(measures.error()), session));
+  outcome.measures = *measures;
+  session.end_progress();
+  return print_report(csg_text(command, outcome), "-", false);
+}
+
+/// `a.png` becomes `a00012.png`, as openscad numbers them.
+std::string numbered(const std::string& path, int frame) {
+  if (path.empty()) return path;
+  const std::filesystem::path name(path);
+  return (name.parent_path() /
+          fmt::format("{}{:05}{}", name.stem().string(), frame, name.extension().string()))
+      .string();
+}
+
+Result<void> run_one(CsgCommand command, Session& session);
+
 }  // namespace
 
 Result<void> run_csg(const CsgCommand& command, Session& session) {
+  if (command.frames == 0) return run_one(command, session);
+  for (int frame = 0; frame < command.frames; ++frame) {
+    CsgCommand one = command;
+    for (std::string* path : {&one.output, &one.ids, &one.depth}) *path = numbered(*path, frame);
+    one.input.scene.openscad_options.insert(
+        one.input.scene.openscad_options.end(),
+        {"-D", fmt::format("$t={}", static_cast<double>(frame) / command.frames)});
+    if (auto done = run_one(std::move(one), session); !done) return done;
+  }
+  return {};
+}
+
+namespace {
+
+Result<void> run_one(CsgCommand command, Session& session) {
   CsgOutcome outcome;
   auto scene = load_scene(command, session);
   if (!scene) return tl::unexpected(scene.error());
@@ -150,7 +207,8 @@ Result<void> run_csg(const CsgCommand& command, Session& session) {
   outcome.triangles = triangles_of(scene->tree);
 
   csg::Camera& camera = outcome.camera;
-  camera = command.camera;
+  camera = placed_camera(command, *scene, session);
+  if (auto strict = session.check_strict(); !strict) return strict;
   csg::PictureOptions look = command.picture;
   csg::ColourScheme flat_scheme;
   const bool from_above = command.render && scene->flat;
@@ -182,10 +240,13 @@ Result<void> run_csg(const CsgCommand& command, Session& session) {
                 "{:.6g}): these coordinates are too large for a picture",
                 box.low.x, box.low.y, box.low.z, box.high.x, box.high.y, box.high.z);
   }
+  const bool pictures = !command.output.empty() || !command.ids.empty() || !command.depth.empty();
+  if (!pictures && !command.json) return run_report(command, *scene, outcome, session);
   cut_scene(*scene, command.cuts, camera);
   const auto gpu = Gpu::open(command.backend, session);
   if (!gpu) return tl::unexpected(gpu.error());
-  const bool more = command.json || !command.ids.empty() || !command.depth.empty();
+  const bool measures = command.json || command.summary;
+  const bool more = measures || !command.ids.empty() || !command.depth.empty();
   const Execution execution = session.execution("drawing", more ? 0.6 : 1.0);
   std::vector<csg::Ghost> ghosts = ghosts_of(*scene);
   csg::Preview preview(std::move(scene->tree), std::move(ghosts), scene->relative_precision,
@@ -235,13 +296,13 @@ Result<void> run_csg(const CsgCommand& command, Session& session) {
     surfaces = *image;
   }
   const double numbers_ms = session.milliseconds() - begin;
-  if (command.json) {
+  if (measures) {
     begin = session.milliseconds();
     const csg::Tree& tree = preview.tree();
-    auto measures =
+    auto measured =
         csg::measure(tree, tree.root(), kMeasureResolution, session.execution("measuring"));
-    if (!measures) return tl::unexpected(measures.error());
-    outcome.measures = *measures;
+    if (!measured) return tl::unexpected(measured.error());
+    outcome.measures = *measured;
     outcome.measure_ms = session.milliseconds() - begin;
   }
   // Nothing is written before all is known.
@@ -258,8 +319,13 @@ Result<void> run_csg(const CsgCommand& command, Session& session) {
   }
   outcome.write_ms = numbers_ms + session.milliseconds() - begin;
   session.end_progress();
+  if (command.summary) {
+    const bool taken = command.output == "-" || command.json == "-";
+    if (auto done = print_report(csg_text(command, outcome), "-", taken); !done) return done;
+  }
   if (!command.json) return {};
   return print_report(csg_json(command, outcome, session), *command.json, command.output == "-");
 }
 
+}  // namespace
 }  // namespace strata::apps

@@ -56,6 +56,90 @@ Result<int> parse_samples(std::string_view text) {
   return static_cast<int>(*count);
 }
 
+/// `--view edges,axes`: what openscad shows beside the scene.
+Result<void> read_shown(std::string_view list, CsgCommand& command) {
+  while (!list.empty()) {
+    const std::string_view word = list.substr(0, list.find(','));
+    list.remove_prefix(std::min(word.size() + 1, list.size()));
+    if (word == "edges") {
+      command.picture.edges = true;
+    } else if (word == "axes" || word == "crosshairs" || word == "scales") {
+      return fail(ErrorCode::kUsage,
+                  "--view {}: strata draws none; openscad -o FILE.png --view {} does", word, word);
+    } else if (word == "wireframe") {
+      return fail(
+          ErrorCode::kUsage,
+          "--view wireframe: strata draws faces; --view edges adds lines along their edges");
+    } else {
+      return fail(ErrorCode::kUsage,
+                  "--view takes edges, not '{}' (nor axes, crosshairs, scales, wireframe)", word);
+    }
+  }
+  return {};
+}
+
+/// Of openscad's options those that are not handed on to it: done, or a sentence on what to use.
+Result<void> read_openscad_words(const CsgWords& words, CsgCommand& command) {
+  const std::string& render = words.render;
+  command.render = !render.empty();
+  if (command.render && render != "-" && render != "cgal" && render != "force" &&
+      render != "true") {
+    return fail(ErrorCode::kUsage, "--render takes nothing, cgal or force, not '{}'", render);
+  }
+  if (!words.preview.empty() && words.preview != "-") {
+    return fail(
+        ErrorCode::kUsage,
+        "--preview={}: strata has one preview; use --preview alone, or strata view --ghosts "
+        "to see what is subtracted",
+        words.preview);
+  }
+  if (!words.preview.empty() && command.render) {
+    return fail(ErrorCode::kUsage, "--preview and --render exclude each other");
+  }
+  if (auto read = read_shown(words.shown, command); !read) return read;
+  if (!words.export_format.empty() && words.export_format != "png") {
+    return fail(ErrorCode::kUsage,
+                "--export-format {}: strata csg writes png; openscad --export-format {} writes "
+                "geometry, strata voxelize voxels",
+                words.export_format, words.export_format);
+  }
+  if (!words.summary_file.empty()) {
+    return fail(ErrorCode::kUsage,
+                "--summary-file {}: use --json={}, which writes strata's own report",
+                words.summary_file, words.summary_file);
+  }
+  command.summary = !words.summary.empty();
+  if (!words.csg_limit.empty()) {
+    if (auto limit = parse_integer("--csglimit", words.csg_limit); !limit) {
+      return tl::unexpected(limit.error());
+    }
+  }
+  if (words.frames.empty()) return {};
+  constexpr std::int64_t kMostFrames = 99'999;  // five digits in the names
+  const auto frames = parse_integer("--animate", words.frames);
+  if (!frames) return tl::unexpected(frames.error());
+  if (*frames < 1 || *frames > kMostFrames) {
+    return fail(ErrorCode::kUsage, "--animate must be 1 to {}, got {}", kMostFrames, *frames);
+  }
+  command.frames = static_cast<int>(*frames);
+  const auto& files = command.input.files;
+  if (std::none_of(files.begin(), files.end(),
+                   [](const auto& file) { return has_extension(file, ".scad"); })) {
+    return fail(ErrorCode::kUsage, "--animate sets $t of programs: no input is a .scad file");
+  }
+  for (const auto* path : {&command.output, &command.ids, &command.depth}) {
+    if (!path->empty() && is_stream(*path)) {
+      return fail(ErrorCode::kUsage, "--animate writes several files; {} is a stream", *path);
+    }
+  }
+  if (command.output.empty() || command.json || command.summary) {
+    return fail(ErrorCode::kUsage,
+                "--animate makes pictures: it needs -o FILE.png, and goes "
+                "without --json and --summary");
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<void> check_picture_name(std::string_view asked_by, const std::string& path, bool depth) {
@@ -130,6 +214,7 @@ Result<void> read_csg_options(const CsgWords& words, CsgCommand& command) {
   if (!words.size.empty()) take(parse_size(words.size), command.size);
   command.view_all = words.view_all;
   command.auto_centre = words.auto_centre;
+  command.asked_view = words.view_all || words.auto_centre;
   if (words.camera.empty()) {
     command.view_all = command.auto_centre = command.default_camera = true;
   } else {
@@ -140,7 +225,6 @@ Result<void> read_csg_options(const CsgWords& words, CsgCommand& command) {
   }
   if (!words.scheme.empty()) take(parse_scheme(words.scheme), command.picture.scheme);
   if (!words.samples.empty()) take(parse_samples(words.samples), command.picture.samples);
-  command.render = words.render;
   command.picture.edges = words.edges;
   command.picture.transparent_background = words.transparent;
   for (const std::string& cut : words.cuts) {
@@ -148,21 +232,13 @@ Result<void> read_csg_options(const CsgWords& words, CsgCommand& command) {
   }
   command.ids = words.ids;
   command.depth = words.depth;
-  command.scene.asset_folder = words.assets;
-  if (!words.scad_timeout.empty()) {
-    std::vector<double> seconds{300};
-    take(parse_numbers("--scad-timeout", words.scad_timeout, 1, 1), seconds);
-    command.scene.scad_timeout_s = seconds.front();
-    if (!(seconds.front() > 0) && !error) {
-      error = Error{ErrorCode::kUsage, "--scad-timeout takes seconds above 0"};
-    }
-  }
   if (error) return tl::unexpected(*error);
+  if (auto read = read_openscad_words(words, command); !read) return read;
   if (command.input.files.empty()) {
     return fail(ErrorCode::kUsage, "no scene and no mesh file is given");
   }
   if (command.output.empty() && command.ids.empty() && command.depth.empty() && !command.json) {
-    return fail(ErrorCode::kUsage, "nothing to do: give -o FILE.png, --ids, --depth or --json");
+    command.summary = true;
   }
   for (const auto& [asked_by, path, depth] :
        {std::tuple("", &command.output, false), std::tuple("--ids ", &command.ids, false),

@@ -5,16 +5,18 @@
 #include <vector>
 
 #include "apps/commands.h"
+#include "apps/scene_options.h"
 #include "core/result.h"
 
 namespace strata::apps {
 
 /// The options of `strata csg` as words. Empty: not given.
 struct CsgWords {
-  std::string expression, size, camera, projection, scheme, samples, ids, depth, scad_timeout,
-      assets;
+  SceneWords scene;
+  std::string expression, size, camera, projection, scheme, samples, ids, depth;
+  std::string preview, render, shown, frames, export_format, summary, summary_file, csg_limit;
   std::vector<std::string> cuts;
-  bool view_all = false, auto_centre = false, edges = false, transparent = false, render = false;
+  bool view_all = false, auto_centre = false, edges = false, transparent = false;
 };
 
 /// Whether a picture, or with `depth` a file of distances, can be written under a name: .png, .exr

@@ -2,6 +2,7 @@
 
 #include "apps/json_writer.h"
 #include "core/memory.h"
+#include "core/printable.h"
 
 namespace strata::apps {
 
@@ -9,6 +10,31 @@ csg::Rgba colour_of_solid(std::uint32_t solid) {
   // An odd factor takes the numbers below 2^24 to each other, and neighbours far apart.
   const std::uint32_t code = ((solid + 1) * 0x9e3779u) & 0xffffffu;
   return {code >> 16, code >> 8 & 0xff, code & 0xff, 255};
+}
+
+std::string csg_text(const CsgCommand& command, const CsgOutcome& outcome) {
+  std::string text;
+  for (const std::string& path : command.input.files) text += printable(path) + '\n';
+  const auto line = [&](std::string_view topic, const std::string& rest) {
+    text += fmt::format("  {:<16} {}\n", topic, rest);
+  };
+  const auto triple = [](const glm::dvec3& v) {
+    return fmt::format("({:.6g}, {:.6g}, {:.6g})", v.x, v.y, v.z);
+  };
+  line("scene", fmt::format("{} in {}, {}{}", counted(outcome.solids, "solid"),
+                            counted(outcome.nodes, "node"), counted(outcome.triangles, "triangle"),
+                            outcome.flat ? "; flat, as slabs of thickness 1" : ""));
+  if (!outcome.measures || outcome.measures->empty) {
+    line("result", "empty, or smaller than a voxel of the grid that is measured on");
+    return text;
+  }
+  const csg::Measures& m = *outcome.measures;
+  line("bounds",
+       fmt::format("{} to {}, within {:.2g}", triple(m.low), triple(m.high), m.bounds_error));
+  line("volume", fmt::format("{:.6g}, within {:.2g}", m.volume, m.volume_error));
+  line("area", fmt::format("{:.6g}, about within {:.2g}", m.area, m.area_error));
+  line("centre of mass", triple(m.centre));
+  return text;
 }
 
 std::string csg_json(const CsgCommand& command, const CsgOutcome& outcome, const Session& session) {

@@ -30,6 +30,9 @@ inline constexpr int kMeasureResolution = 256;
 /// The colour that stands for a solid in the picture of --ids: never black, no two alike.
 [[nodiscard]] csg::Rgba colour_of_solid(std::uint32_t solid);
 
+/// For people: a line a topic.
+[[nodiscard]] std::string csg_text(const CsgCommand& command, const CsgOutcome& outcome);
+
 /// For programs, as docs/json.md says.
 [[nodiscard]] std::string csg_json(const CsgCommand& command, const CsgOutcome& outcome,
                                    const Session& session);

@@ -81,7 +81,7 @@ Result<csg::Scene> load_one(const std::string& path, const CsgCommand& command, 
   if (is_scene(path, command)) {
     const double share = 0.5 / static_cast<double>(command.input.files.size());
     Execution execution = session.execution("reading", share);
-    auto scene = csg::read_scene(path, command.scene, execution);
+    auto scene = csg::read_scene(path, command.input.scene, execution);
     execution.progress = {};
     if (scene && told != nullptr) told->push_back(facts_of(path, *scene, command, execution));
     return scene;
@@ -271,7 +271,9 @@ Result<csg::Scene> load_scene(const CsgCommand& command, Session& session,
   for (const std::string& path : files) {
     auto scene = load_one(path, command, session, facts);
     if (!scene) return tl::unexpected(scene.error());
-    for (const std::string& note : scene->notes) session.note(note);
+    for (const std::string& note : scene->notes) {
+      note.starts_with("ECHO: ") ? session.echo(note) : session.note(note);
+    }
     for (const csg::SceneWarning& warning : scene->warnings) {
       session.warn(warning.code, warning.message);
     }

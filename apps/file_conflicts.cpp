@@ -83,7 +83,7 @@ std::vector<FileUse> scene_files_of(const CsgCommand& command,
   });
   if (!endangered) return {};
   const auto& files = command.input.files;
-  const auto all = with_scene_files(files, command.scene.asset_folder, command.scene_format);
+  const auto all = with_scene_files(files, command.input.scene.asset_folder, command.scene_format);
   std::vector<FileUse> uses;
   for (std::size_t i = files.size(); i < all.size(); ++i) {
     uses.push_back({"a file of the scene,", all[i]});

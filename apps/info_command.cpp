@@ -1,11 +1,15 @@
 #include <utility>
 
 #include "apps/commands.h"
+#include "apps/csg_report.h"
+#include "apps/csg_scene.h"
 #include "apps/gl_info.h"
 #include "apps/json_writer.h"
 #include "apps/mesh_input.h"
 #include "apps/session.h"
 #include "core/memory.h"
+#include "core/printable.h"
+#include "csg/solid_lists.h"
 #include "mesh/diagnose.h"
 #include "mesh/orient.h"
 
@@ -21,7 +25,7 @@ struct FileInfo {
 
 std::string info_text(const FileInfo& info) {
   const MeshDiagnosis& found = info.found;
-  std::string text = info.path + "\n";
+  std::string text = printable(info.path) + "\n";
   const auto line = [&](std::string_view topic, const std::string& rest) {
     text += fmt::format("  {:<12} {}\n", topic, rest);
   };
@@ -131,6 +135,82 @@ void write_info(JsonWriter& json, const FileInfo& info) {
   json.end_object();
 }
 
+struct SceneInfo {
+  std::string path;
+  InputFacts facts;
+  std::uint64_t solids = 0, nodes = 0;
+  csg::Measures result;
+};
+
+std::string info_text(const SceneInfo& info) {
+  std::string text = printable(info.path) + "\n";
+  const auto line = [&](std::string_view topic, const std::string& rest) {
+    text += fmt::format("  {:<12} {}\n", topic, rest);
+  };
+  const auto triple = [](const glm::dvec3& v) {
+    return fmt::format("({:.9g}, {:.9g}, {:.9g})", v.x, v.y, v.z);
+  };
+  const csg::Measures& m = info.result;
+  line("format", fmt::format("{}, {} bytes", info.facts.stats.format, info.facts.stats.bytes));
+  line("solids", fmt::format("{} in {}", info.solids, counted(info.nodes, "node")));
+  line("triangles", fmt::format("{} of all solids", info.facts.stats.triangles));
+  if (m.empty) {
+    line("result", "empty, or smaller than a voxel of the grid that is measured on");
+    return text;
+  }
+  line("bounds",
+       fmt::format("{} to {}, within {:.2g}", triple(m.low), triple(m.high), m.bounds_error));
+  line("area", fmt::format("{:.6g}, about within {:.2g}", m.area, m.area_error));
+  line("volume", fmt::format("{:.6g}, within {:.2g}", m.volume, m.volume_error));
+  line("closed", info.facts.closed ? "yes, all meshes of the result"
+                                   : fmt::format("no, {}", printable(info.facts.open)));
+  return text;
+}
+
+void write_info(JsonWriter& json, const SceneInfo& info) {
+  const csg::Measures& m = info.result;
+  json.begin_object();
+  json.member("path", info.path);
+  json.member("format", info.facts.stats.format);
+  json.member("bytes", info.facts.stats.bytes);
+  json.member("solids", info.solids);
+  json.member("nodes", info.nodes);
+  json.member("triangles", info.facts.stats.triangles);
+  json.member("vertices", info.facts.stats.vertices);
+  json.member("empty", m.empty);
+  json.key("bounds").begin_object();
+  json.member("low", m.low);
+  json.member("high", m.high);
+  json.end_object();
+  json.member("bounds_error", m.bounds_error);
+  json.member("area", m.area);
+  json.member("area_error", m.area_error);
+  json.member("volume", m.volume);
+  json.member("volume_error", m.volume_error);
+  json.member("closed", info.facts.closed);
+  json.end_object();
+}
+
+Result<SceneInfo> look_at_scene(const std::string& path, const InfoCommand& command,
+                                Session& session) {
+  CsgCommand one;
+  one.input = command.input;
+  one.input.files = {path};
+  std::vector<InputFacts> facts;
+  const auto scene = load_scene(one, session, &facts);
+  if (!scene) return tl::unexpected(scene.error());
+  Execution execution = session.execution("measuring");
+  execution.progress = {};
+  auto measures = csg::measure(scene->tree, scene->tree.root(), kMeasureResolution, execution);
+  if (!measures) return tl::unexpected(measures.error());
+  SceneInfo info{path, std::move(facts.front()), scene->tree.solids().size(),
+                 scene->tree.nodes().size(), *measures};
+  if (command.common.strict && !info.facts.closed) {
+    session.warn("open", fmt::format("{}: {}", path, info.facts.open));
+  }
+  return info;
+}
+
 Result<FileInfo> look_at(const std::string& path, const InfoCommand& command, Session& session) {
   auto file = read_input(path, command.input, session);
   if (!file) return tl::unexpected(file.error());
@@ -158,16 +238,20 @@ Result<void> run_info(const InfoCommand& command, Session& session) {
   std::string text;
   std::optional<Error> first_error;  // the other files are still looked at
   for (const std::string& path : command.input.files) {
-    auto info = look_at(path, command, session);
-    if (!info) {
-      if (session.interrupted()) return tl::unexpected(info.error());
-      if (first_error) session.complain(*first_error);
-      first_error = info.error();
-      continue;
-    }
-    write_info(json, *info);
-    if (!text.empty()) text += '\n';
-    text += info_text(*info);
+    const auto tell = [&](const auto& info) -> Result<void> {
+      if (!info) return tl::unexpected(info.error());
+      write_info(json, *info);
+      if (!text.empty()) text += '\n';
+      text += info_text(*info);
+      return {};
+    };
+    const bool scene = is_scene_name(path) && format_of(path, command.input) == MeshFormat::kAuto;
+    const auto told =
+        scene ? tell(look_at_scene(path, command, session)) : tell(look_at(path, command, session));
+    if (told) continue;
+    if (session.interrupted()) return told;
+    if (first_error) session.complain(*first_error);
+    first_error = told.error();
   }
   json.end_array();
   if (command.gl) {

@@ -6,25 +6,17 @@
 #include <cstdint>
 #include <utility>
 
+#include "core/printable.h"
+
 namespace strata::apps {
 namespace {
 
-/// Length of the UTF-8 sequence that `text` begins with; 0 when it is none (overlong forms,
-/// surrogates and what lies beyond U+10FFFF included).
-std::size_t utf8_length(std::string_view text) {
-  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
-  const unsigned lead = byte(0);
-  if (lead < 0x80) return 1;
-  const std::size_t length = lead >= 0xf0 ? 4 : lead >= 0xe0 ? 3 : 2;
-  if (lead < 0xc2 || lead > 0xf4 || text.size() < length) return 0;
-  for (std::size_t i = 1; i < length; ++i) {
-    if ((byte(i) & 0xc0) != 0x80) return 0;
-  }
-  if ((lead == 0xe0 && byte(1) < 0xa0) || (lead == 0xed && byte(1) > 0x9f) ||
-      (lead == 0xf0 && byte(1) < 0x90) || (lead == 0xf4 && byte(1) > 0x8f)) {
-    return 0;
-  }
-  return length;
+/// Of a UTF-8 sequence of up to three bytes.
+unsigned code_point(std::string_view sequence) {
+  unsigned code = static_cast<unsigned char>(sequence[0]);
+  if (sequence.size() > 1) code &= sequence.size() == 2 ? 0x1fu : 0x0fu;
+  for (const char c : sequence.substr(1)) code = code << 6 | (static_cast<unsigned char>(c) & 0x3f);
+  return code;
 }
 
 }  // namespace
@@ -108,8 +100,8 @@ void JsonWriter::quote(std::string_view text) {
     } else if (c == '"' || c == '\\') {
       text_ += '\\';
       text_ += c;
-    } else if (static_cast<unsigned char>(c) < 0x20) {
-      text_ += fmt::format("\\u{:04x}", static_cast<unsigned>(c));
+    } else if (is_control(text.substr(0, length))) {
+      text_ += fmt::format("\\u{:04x}", code_point(text.substr(0, length)));
     } else {
       text_ += text.substr(0, length);
     }

@@ -1,6 +1,7 @@
 // strata: the command-line tool. Results go to standard output, talk to standard error; the exit
 // codes are those of ErrorCode.
 
+#include <cerrno>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
@@ -10,6 +11,7 @@
 #include <system_error>
 #include <variant>
 
+#include <fcntl.h>
 #include <unistd.h>
 
 #include "apps/allocation_failures.h"
@@ -54,7 +56,9 @@ namespace {
 int exit_code(const Result<void>& result, Session& session) {
   if (result) return 0;
   // Whatever an interrupted job ran into, the interrupt is why.
-  const ErrorCode code = session.interrupted() ? ErrorCode::kCancelled : result.error().code;
+  const ErrorCode code = session.timed_out()     ? ErrorCode::kLimit
+                         : session.interrupted() ? ErrorCode::kCancelled
+                                                 : result.error().code;
   session.complain({code, result.error().message});
   return static_cast<int>(code);
 }
@@ -89,9 +93,20 @@ Result<void> run(const AnyCommand& command, Session& session) {
   }
 }
 
+/// A standard stream that is closed would be the number of the next file that is opened. What
+/// stands there instead refuses to be read, or to be written.
+void hold_standard_streams() {
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (fcntl(stream, F_GETFD) >= 0 || errno != EBADF) continue;
+    const int held = open("/dev/null", stream == STDIN_FILENO ? O_WRONLY : O_RDONLY);
+    if (held >= 0 && held != stream) close(held);
+  }
+}
+
 int strata_main(int argc, char** argv) {
   const auto start = Session::Clock::now();
   std::set_terminate(on_terminate);
+  hold_standard_streams();
   if (argc > 1 && std::string_view(argv[1]) == "view") return run_view_program(argv + 2);
   const Command command = parse_command_line(argc, argv);
   if (const auto* outcome = std::get_if<ParseOutcome>(&command)) {

@@ -188,10 +188,6 @@ Result<void> check_input_name(const std::string& path, const InputOptions& input
                 "(--input-format)",
                 path);
   }
-  if (is_scene_name(path)) {
-    return fail(ErrorCode::kInput,
-                "{}: it is a scene, here meshes are read; strata csg --json measures scenes", path);
-  }
   return fail(ErrorCode::kInput,
               "{}: its name ends in none of .obj, .stl, .ply, .off; name the format "
               "(--input-format)",

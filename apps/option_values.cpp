@@ -50,6 +50,13 @@ Result<std::vector<double>> parse_numbers(std::string_view option, std::string_v
   return values;
 }
 
+Result<double> parse_seconds(std::string_view option, std::string_view text) {
+  const auto seconds = parse_numbers(option, text, 1, 1);
+  if (!seconds) return tl::unexpected(seconds.error());
+  if (seconds->front() > 0) return seconds->front();
+  return fail(ErrorCode::kUsage, "{} must be seconds above 0, got {}", option, text);
+}
+
 Result<std::uint64_t> parse_bytes(std::string_view option, std::string_view text) {
   std::string_view digits = text;
   // 512M, 512MB and 512MiB are the same here.

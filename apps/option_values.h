@@ -21,6 +21,9 @@ Result<std::int64_t> parse_integer(std::string_view option, std::string_view tex
 Result<std::vector<double>> parse_numbers(std::string_view option, std::string_view text,
                                           std::size_t least, std::size_t most);
 
+/// A time in seconds, above 0.
+Result<double> parse_seconds(std::string_view option, std::string_view text);
+
 /// A size in bytes: a number and K, M, G or T (powers of 1024), or none.
 Result<std::uint64_t> parse_bytes(std::string_view option, std::string_view text);
 

@@ -6,12 +6,16 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <condition_variable>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
+#include <mutex>
 #include <utility>
 
 #include "core/atomic_file.h"
 #include "core/memory.h"
+#include "core/printable.h"
 
 namespace strata::apps {
 namespace {
@@ -49,6 +53,29 @@ void Session::configure(const CommonOptions& options) {
   options_ = options;
   memory_limit_ = options.memory_limit > 0 ? options.memory_limit : usable_memory_bytes() / 4 * 3;
   if (memory_limit_ > 0) set_memory_wall(memory_limit_, threads());
+  if (options.time_limit_s > 0) watch_time(options.time_limit_s);
+}
+
+void Session::watch_time(double limit_s) {
+  constexpr double kLongest = 1e8;  // three years, which a clock can add to a time
+  const auto end = start_ + std::chrono::duration_cast<Clock::duration>(
+                                std::chrono::duration<double>(std::min(limit_s, kLongest)));
+  watch_ = std::jthread([this, end](const std::stop_token& done) {
+    std::mutex mutex;
+    std::condition_variable_any never;
+    std::unique_lock lock(mutex);
+    never.wait_until(lock, done, end, [] { return false; });
+    if (done.stop_requested()) return;
+    timed_out_ = true;
+    if (interrupts_) interrupts_->request_stop();
+    // Work hears a stop within a second; a library that does not is ended with the process.
+    constexpr std::chrono::seconds kPatience(3);
+    never.wait_for(lock, done, kPatience, [] { return false; });
+    if (done.stop_requested()) return;
+    complain({ErrorCode::kCancelled, {}});
+    remove_temporary_files();
+    std::_Exit(static_cast<int>(ErrorCode::kLimit));
+  });
 }
 
 int Session::threads() const {
@@ -77,13 +104,23 @@ Execution Session::execution(std::string label, double share) {
 }
 
 void Session::say(std::string_view kind, std::string_view message) {
+  print(fmt::format("strata: {}{}", kind, message));
+}
+
+void Session::echo(std::string_view line) {
+  if (!options_.quiet) print(line);
+}
+
+void Session::print(std::string_view text) {
   if (bar_) bar_->clear();
-  const std::string line = fmt::format("strata: {}{}\n", kind, message);
+  // Names in it may come from files, which are not to drive the terminal.
+  const std::string line = printable_lines(text) + '\n';
   // Nobody is left to tell when standard error is closed.
   (void)write_text(STDERR_FILENO, line, "standard error");
 }
 
 void Session::warn(std::string code, std::string message) {
+  if (!given_warnings_.insert(message).second) return;
   // Under --strict the first one becomes the error, and is printed as that.
   if (!options_.quiet && !options_.strict) say("warning: ", message);
   warnings_.push_back({std::move(code), std::move(message)});
@@ -102,6 +139,11 @@ Result<void> Session::check_strict() const {
 }
 
 void Session::complain(const Error& error) {
+  if (timed_out()) {
+    return say("error: ",
+               fmt::format("not done within {:g} s (--time-limit); no output was written",
+                           options_.time_limit_s));
+  }
   if (error.code == ErrorCode::kCancelled) return say("", "interrupted; no output was written");
   say("error: ", error.message);
 }

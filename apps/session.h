@@ -1,9 +1,12 @@
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -45,10 +48,15 @@ class Session {
   void end_progress() { bar_.reset(); }
   [[nodiscard]] int threads() const;
   [[nodiscard]] std::uint64_t memory_limit() const { return memory_limit_; }
+  /// Whether --time-limit is over; then interrupted() is true as well.
+  [[nodiscard]] bool timed_out() const { return timed_out_.load(); }
   [[nodiscard]] bool interrupted() const { return interrupts_ && interrupts_->interrupted(); }
 
-  /// Prints and keeps a warning. Under --strict the job ends at the next check_strict().
+  /// Prints and keeps a warning; one that was given already is not repeated. Under --strict the job
+  /// ends at the next check_strict().
   void warn(std::string code, std::string message);
+  /// A line that a scene's program prints itself.
+  void echo(std::string_view line);
   /// Something for --verbose.
   void note(std::string_view message);
   /// @return kGeometry with the first warning's text under --strict
@@ -60,6 +68,8 @@ class Session {
 
  private:
   void say(std::string_view kind, std::string_view message);
+  void print(std::string_view line);
+  void watch_time(double limit_s);
 
   Clock::time_point start_;
   std::optional<InterruptGuard> interrupts_;
@@ -69,6 +79,9 @@ class Session {
   std::optional<ProgressBar> bar_;
   double shown_ = 0;  ///< of the bar
   std::vector<Warning> warnings_;
+  std::set<std::string> given_warnings_;
+  std::atomic<bool> timed_out_{false};
+  std::jthread watch_;  ///< of --time-limit
 };
 
 /// Writes all of `text` to a descriptor. @return kOutput naming `name`

@@ -13,6 +13,7 @@
 #include "apps/csg_options.h"
 #include "apps/file_conflicts.h"
 #include "apps/option_values.h"
+#include "apps/scene_options.h"
 #include "apps/view/script.h"
 #include "apps/view/viewer.h"
 
@@ -51,10 +52,6 @@ void define(CLI::App& app, Words& words, ViewOptions& options) {
          input);
   option("--input-format", words.format, "csg, obj, stl, ply or off, whatever the name is",
          "FORMAT", input);
-  option("--assets", csg.assets, "Where scenes look for files; else beside the scene", "FOLDER",
-         input);
-  option("--scad-timeout", csg.scad_timeout, "Seconds that openscad may take for a .scad; 300", "S",
-         input);
   option("--rule", words.rule, "Inside of meshes: winding (> 0, default), nonzero, parity (odd)",
          "RULE", input);
   app.add_flag("--keep-orientation", options.command.keep_orientation,
@@ -76,6 +73,7 @@ void define(CLI::App& app, Words& words, ViewOptions& options) {
   app.add_flag("--ghosts", options.ghosts, "Show what is subtracted, transparent")->group(look);
   option("--heat", words.heat, "Colours: off (the scene's, default), thickness, depth (complexity)",
          "MAP", look);
+  apps::define_scene_options(app, csg.scene);
   app.add_flag("--no-panels", words.no_panels, "The picture alone")->group(look);
   const char* drive = "Without a person";
   option("--screenshot", options.screenshot, "When all is drawn, a picture of the window; then end",
@@ -125,6 +123,7 @@ Result<void> read(Words& words, ViewOptions& options) {
   }
   if (words.csg.size.empty()) words.csg.size = "1280,800";
   command.output = "window.png";  // strata csg asks for some output
+  if (auto done = apps::read_scene_options(words.csg.scene, command.input); !done) return done;
   if (auto done = apps::read_csg_options(words.csg, command); !done) return done;
   command.output.clear();
   if (options.screenshot.empty()) return {};

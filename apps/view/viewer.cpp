@@ -105,7 +105,7 @@ void Viewer::tick() {
   if (options_.watch) {
     if (!watch_) {
       watch_ = std::make_unique<FileWatch>(options_.command.input.files,
-                                           options_.command.scene.asset_folder);
+                                           options_.command.input.scene.asset_folder);
     }
     const auto now = Clock::now();
     if (now - looked_ >= kLookAtFiles) {

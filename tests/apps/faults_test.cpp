@@ -3,8 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include <sys/stat.h>
+#include <sys/wait.h>
+
+#include <algorithm>
 #include <chrono>
 #include <csignal>
+#include <filesystem>
 #include <fstream>
 #include <limits>
 #include <thread>
@@ -210,6 +215,96 @@ TEST_F(Faults, AnExistingFileSurvivesAFailedRun) {
   fails(to_vdb("missing.obj"), 3, "missing.obj");
   fails({"voxelize", "ball.obj", "-r", "200", "-o", "out.vdb"}, 4, "out.vdb", {.file_size = 4096});
   EXPECT_EQ(place.read("out.vdb"), "precious");
+}
+
+TEST_F(Faults, AClosedStandardInputIsNotAnotherFile) {
+  RunOptions closed;
+  closed.closed_stdin = true;
+  fails({"info", "-", "--input-format", "stl"}, 3, "standard input: it is closed", closed);
+  fails({"csg", "-", "--input-format", "csg", "-o", "a.png"}, 3, "it is closed", closed);
+  const RunResult run = place.run({"info", "ball.obj"}, closed);
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+}
+
+/// A pipe with a name and nobody who writes to it.
+TEST_F(Faults, APipeWithoutAWriterHearsAStop) {
+  ASSERT_EQ(mkfifo(place.path("pipe.stl").c_str(), 0600), 0);
+  before = place.names();
+  RunOptions options;
+  double seconds = 0.0;
+  options.while_running = [&seconds](int pid) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    kill(pid, SIGTERM);
+    const auto begin = std::chrono::steady_clock::now();
+    siginfo_t ended{};
+    waitid(P_PID, static_cast<id_t>(pid), &ended, WEXITED | WNOWAIT);
+    seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  };
+  fails({"voxelize", "pipe.stl", "-r", "8", "--stats"}, 130, "interrupted", options);
+  EXPECT_LT(seconds, 10.0);  // without end it was
+  options.while_running = [this](int) {
+    std::ofstream(place.path("pipe.stl")) << "solid a\nendsolid a\n";
+  };
+  fails({"info", "pipe.stl"}, 3, "pipe.stl", options);
+}
+
+TEST_F(Faults, ATimeLimitEndsTheCommand) {
+  ASSERT_EQ(mkfifo(place.path("pipe.csg").c_str(), 0600), 0);
+  before = place.names();
+  fails({"csg", "pipe.csg", "-o", "a.png", "--time-limit", "0.2"}, 6,
+        "not done within 0.2 s (--time-limit); no output was written");
+  fails({"info", "ball.obj", "--time-limit", "0"}, 2,
+        "--time-limit must be seconds above 0, got 0");
+  const RunResult run = place.run({"info", "ball.obj", "--time-limit", "1e300"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+}
+
+TEST_F(Faults, ARootFolderKeepsAScenesFilesInside) {
+  std::filesystem::create_directories(place.path("root/in"));
+  std::filesystem::copy_file(place.path("ball.obj"), place.path("root/ball.obj"));
+  std::filesystem::create_symlink("../ball.obj", place.path("root/link.obj"));
+  put("root/in/inside.csg", "cube();\nimport(file = \"../ball.obj\");\n");
+  put("root/in/outside.csg", "cube();\n  import(file = \"../../ball.obj\");\n");
+  put("root/linked.csg", "import(file = \"link.obj\");");
+  put("root/absolute.csg", "surface(file = \"" + place.path("ball.obj") + "\");");
+  put("root/around.csg", "group() { import(file = \"in/../../root/ball.obj\"); }");
+  fails({"csg", "root/in/outside.csg", "--root", "root"}, 3,
+        "root/in/outside.csg:2:3: 'import' needs the file '../../ball.obj', which lies outside of "
+        "the root folder root");
+  fails({"csg", "root/linked.csg", "--root", "root"}, 3, "root/linked.csg:1:1: 'import' needs");
+  fails({"voxelize", "root/absolute.csg", "--root", "root", "-r", "4", "--stats"}, 3,
+        "root/absolute.csg:1:1: 'surface' needs");
+  for (const char* scene : {"root/in/inside.csg", "root/around.csg"}) {
+    const RunResult run = place.run({"csg", scene, "--root", "root", "--strict"});
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+  }
+  fails({"csg", "root/in/inside.csg", "--root", "no"}, 2, "--root no: there is no such folder");
+}
+
+TEST_F(Faults, NamesInAFileDoNotDriveTheTerminal) {
+  const std::string escapes = "\\x1b[31mred\\x1b]0;title\\x07\\nstrata: error: forged\\u202e";
+  const std::string raw = "\x1b[2J\x7f\xc2\x9b\xff\r";
+  for (const std::string& text :
+       {"import(file = \"" + escapes + ".stl\"); cube();",
+        "surface(file = \"" + raw + "\"); cube();",
+        "text(text = \"" + escapes + "\", font = \"" + raw + "\"); cube();",
+        "import(file = \"" + raw + ".xyz\"); cube();",
+        "import(file = \"" + std::string(100'000, 'n') + ".stl\"); cube();",
+        std::string(100'000, 'm') + "(); cube();", "cube(size = \"" + raw + "\");",
+        std::string(100'000, 'm') + " cube();", "cube(" + raw + ");"}) {
+    put("scene.csg", text);
+    for (const RunResult& run :
+         {place.run({"csg", "scene.csg"}), place.run({"csg", "scene.csg", "--json", "-q"})}) {
+      const std::string all = run.out + run.err;
+      const bool controls = std::any_of(all.begin(), all.end(), [](char c) {
+        return (static_cast<unsigned char>(c) < 0x20 && c != '\n') || c == 0x7f;
+      });
+      EXPECT_FALSE(controls) << all;
+      EXPECT_EQ(all.find("\xc2\x9b"), std::string::npos) << all;
+      EXPECT_EQ(all.find("\nstrata: error: forged"), std::string::npos) << all;
+      EXPECT_LT(all.size(), 4000u);
+    }
+  }
 }
 
 }  // namespace

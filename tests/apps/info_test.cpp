@@ -147,8 +147,9 @@ std::set<std::string> documented(const std::string& heading) {
 TEST(Json, TheDocumentationNamesExactlyWhatInfoPrints) {
   const Workplace place;
   put(place, "open.obj", open_box());
-  const RunResult run = place.run({"info", "open.obj", "box.obj", "--json"});
+  place.write("scene.csg", "cube();\n");
   std::set<std::string> names;
+  collect(json::parse(place.run({"info", "scene.csg", "--json"}).out), "", names);
   collect(json::parse(place.run({"info", "open.obj", "--json"}).out), "", names);
   names.erase("warnings");  // empty here
   names.insert({"warnings[].code", "warnings[].message"});

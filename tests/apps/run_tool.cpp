@@ -80,7 +80,9 @@ RunResult Workplace::run(const std::vector<std::string>& arguments,
   const pid_t child = fork();
   if (child == 0) {
     if (chdir(folder_.c_str()) != 0) _exit(125);
-    if (options.silent_stdin_pipe) {
+    if (options.closed_stdin) {
+      close(STDIN_FILENO);
+    } else if (options.silent_stdin_pipe) {
       // The writing end stays open in the tool itself.
       int ends[2];
       if (pipe(ends) != 0 || dup2(ends[0], STDIN_FILENO) < 0) _exit(125);

@@ -21,6 +21,7 @@ struct RunResult {
 
 struct RunOptions {
   std::string input = {};          ///< standard input
+  bool closed_stdin = false;       ///< there is none
   bool silent_stdin_pipe = false;  ///< standard input is a pipe that nothing comes through
   std::optional<std::string> stdout_path = {};      ///< standard output goes there, not to `out`
   bool closed_stdout_pipe = false;                  ///< standard output is a pipe nobody reads
