@@ -112,6 +112,10 @@ void define_csg(CLI::App& app, Words& words) {
   option("--ids", csg.ids, "Which opaque solid each pixel shows, as colours, .png", "FILE", output);
   option("--depth", csg.depth, "Distance along the view, .exr, channel Z", "FILE", output);
   add_json(app, words, output);
+  option("--measure", csg.measure,
+         "Voxels along each side of the box that the report measures on; 256, more where the "
+         "volume's error asks for it",
+         "N", output);
   const Group camera = "Camera (default: all in view from OpenSCAD's place, or as a .scad says)";
   option("--size,--imgsize", csg.size, "width,height in pixels; 512,512", "W,H", camera);
   option("--camera", csg.camera, "x,y,z,rx,ry,rz,distance or eye x,y,z, target x,y,z", "NUMBERS",

@@ -115,7 +115,8 @@ struct CsgCommand {
   Backend backend = Backend::kAuto;
   csg::PictureOptions picture;
   std::vector<SectionPlane> cuts;
-  std::optional<std::string> json;  ///< "-": standard output
+  std::optional<std::string> json;        ///< "-": standard output
+  std::optional<int> measure_resolution;  ///< of the report's measures; none: csg::MeasureOptions'
 };
 
 /// Text to print and an exit code: help, version, mistakes in the command line.

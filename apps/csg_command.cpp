@@ -155,11 +155,15 @@ csg::Camera placed_camera(CsgCommand& command, const csg::Scene& scene, Session&
   return camera;
 }
 
+csg::MeasureOptions measure_options(const CsgCommand& command, const csg::Scene& scene) {
+  return {command.measure_resolution, scene.relative_precision};
+}
+
 /// The report of a run that makes no picture.
 Result<void> run_report(const CsgCommand& command, csg::Scene& scene, CsgOutcome& outcome,
                         Session& session) {
   cut_scene(scene, command.cuts, outcome.camera);
-  auto measures = csg::measure(scene.tree, scene.tree.root(), kMeasureResolution,
+  auto measures = csg::measure(scene.tree, scene.tree.root(), measure_options(command, scene),
                                session.execution("measuring", 1.0));
   if (!measures) return tl::unexpected(with_limit(std::move(measures.error()), session));
   outcome.measures = *measures;
@@ -299,8 +303,8 @@ Result<void> run_one(CsgCommand command, Session& session) {
   if (measures) {
     begin = session.milliseconds();
     const csg::Tree& tree = preview.tree();
-    auto measured =
-        csg::measure(tree, tree.root(), kMeasureResolution, session.execution("measuring"));
+    auto measured = csg::measure(tree, tree.root(), measure_options(command, *scene),
+                                 session.execution("measuring"));
     if (!measured) return tl::unexpected(measured.error());
     outcome.measures = *measured;
     outcome.measure_ms = session.milliseconds() - begin;

@@ -224,6 +224,15 @@ Result<void> read_csg_options(const CsgWords& words, CsgCommand& command) {
     take(parse_projection(words.projection), command.camera.projection);
   }
   if (!words.scheme.empty()) take(parse_scheme(words.scheme), command.picture.scheme);
+  if (!words.measure.empty()) {
+    std::int64_t resolution = 0;
+    take(parse_integer("--measure", words.measure), resolution);
+    if (!error && (resolution < 1 || resolution > kMaxGridSide / 2)) {
+      error = Error{ErrorCode::kUsage, fmt::format("--measure must be 1 to {}, got {}",
+                                                   kMaxGridSide / 2, words.measure)};
+    }
+    command.measure_resolution = static_cast<int>(resolution);
+  }
   if (!words.samples.empty()) take(parse_samples(words.samples), command.picture.samples);
   command.picture.edges = words.edges;
   command.picture.transparent_background = words.transparent;

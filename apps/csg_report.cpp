@@ -69,7 +69,7 @@ std::string csg_json(const CsgCommand& command, const CsgOutcome& outcome, const
     const csg::Measures& m = *outcome.measures;
     json.key("result").begin_object();
     json.member("empty", m.empty);
-    json.member("resolution", kMeasureResolution);
+    json.member("resolution", m.resolution);
     json.member("volume", m.volume);
     json.member("volume_error", m.volume_error);
     json.member("area", m.area);

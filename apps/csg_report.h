@@ -8,7 +8,7 @@
 #include "apps/commands.h"
 #include "apps/session.h"
 #include "csg/picture.h"
-#include "csg/solid_lists.h"
+#include "csg/measure.h"
 
 namespace strata::apps {
 
@@ -23,9 +23,6 @@ struct CsgOutcome {
   std::vector<std::string> names;         ///< of those
   double read_ms = 0, prepare_ms = 0, draw_ms = 0, write_ms = 0, measure_ms = 0;
 };
-
-/// Voxels along the longest side of the grid that a result is measured on.
-inline constexpr int kMeasureResolution = 256;
 
 /// The colour that stands for a solid in the picture of --ids: never black, no two alike.
 [[nodiscard]] csg::Rgba colour_of_solid(std::uint32_t solid);

@@ -201,7 +201,9 @@ Result<SceneInfo> look_at_scene(const std::string& path, const InfoCommand& comm
   if (!scene) return tl::unexpected(scene.error());
   Execution execution = session.execution("measuring");
   execution.progress = {};
-  auto measures = csg::measure(scene->tree, scene->tree.root(), kMeasureResolution, execution);
+  auto measures =
+      csg::measure(scene->tree, scene->tree.root(),
+                   {.resolution = {}, .relative_precision = scene->relative_precision}, execution);
   if (!measures) return tl::unexpected(measures.error());
   SceneInfo info{path, std::move(facts.front()), scene->tree.solids().size(),
                  scene->tree.nodes().size(), *measures};

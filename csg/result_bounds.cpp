@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <glm/geometric.hpp>
 #include <glm/vector_relational.hpp>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -112,7 +114,143 @@ Reach reach_of(const Tree& tree, Tree::NodeId root) {
   return std::move(all[root]);
 }
 
+enum class Side : std::uint8_t { kOutside, kInside, kUnknown };
+
+/// The square of the distance of `p` from a triangle.
+double distance_squared(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b,
+                        const glm::dvec3& c) {
+  const glm::dvec3 n = glm::cross(b - a, c - a);
+  const double area = glm::dot(n, n);
+  double nearest = std::numeric_limits<double>::infinity();
+  bool above = area > 0;
+  const glm::dvec3* const corners[] = {&a, &b, &c, &a};
+  for (int i = 0; i < 3; ++i) {
+    const glm::dvec3 &from = *corners[i], edge = *corners[i + 1] - from, to = p - from;
+    above = above && glm::dot(glm::cross(edge, to), n) >= 0;
+    const double length = glm::dot(edge, edge);
+    const double t = length > 0 ? std::clamp(glm::dot(to, edge) / length, 0.0, 1.0) : 0.0;
+    const glm::dvec3 off = to - t * edge;
+    nearest = std::min(nearest, glm::dot(off, off));
+  }
+  if (!above) return nearest;
+  const double height = glm::dot(p - a, n);
+  return height * height / area;
+}
+
+bool is_inside(InsideRule rule, int winding) {
+  return rule == InsideRule::kWinding   ? winding > 0
+         : rule == InsideRule::kNonzero ? winding != 0
+                                        : winding % 2 != 0;
+}
+
+/// Where a point is of a solid: by the winding along a ray in no special direction.
+Side side_of(const glm::dvec3& p, const Geometry::Part& part, double tolerance) {
+  const glm::dvec3 along(0.5321348901, 0.3178562391, 0.7847112345);
+  const glm::dvec3 room(tolerance);
+  if (!inside_closed(p, {part.box.low - room, part.box.high + room})) return Side::kOutside;
+  int winding = 0;
+  for (const glm::uvec3& t : part.triangles) {
+    const glm::dvec3 &a = part.positions[t.x], &b = part.positions[t.y], &c = part.positions[t.z];
+    const glm::dvec3 low = glm::min(glm::min(a, b), c), high = glm::max(glm::max(a, b), c);
+    if (glm::any(glm::lessThan(high + room, p))) continue;  // all behind the ray's beginning
+    if (glm::all(glm::lessThanEqual(low - room, p)) &&
+        distance_squared(p, a, b, c) <= tolerance * tolerance) {
+      return Side::kUnknown;
+    }
+    const glm::dvec3 q = glm::cross(along, c - a), n = glm::cross(b - a, c - a);
+    const double area = glm::dot(b - a, q);
+    if (area == 0) continue;
+    const glm::dvec3 to = p - a;
+    const double u = glm::dot(to, q) / area;
+    const double v = glm::dot(along, glm::cross(to, b - a)) / area;
+    if (u < 0 || v < 0 || u + v > 1) continue;
+    if (glm::dot(c - a, glm::cross(to, b - a)) / area <= 0) continue;  // behind
+    winding += glm::dot(n, along) > 0 ? 1 : -1;
+  }
+  return is_inside(part.rule, winding) ? Side::kInside : Side::kOutside;
+}
+
+/// The tree's value where some solids are not known. O(nodes), without recursion.
+Side value_of(const Tree& tree, Tree::NodeId root, const std::vector<Side>& solids) {
+  std::vector<Side> values(root + 1);
+  for (Tree::NodeId id = 0; id <= root; ++id) {
+    const Tree::Node& node = tree.nodes()[id];
+    if (node.operation == Operation::kSolid) {
+      values[id] = solids[node.first];
+      continue;
+    }
+    const auto operands = tree.operands(id);
+    const bool unites = node.operation == Operation::kUnion;
+    // What decides by itself; the others must all say the opposite.
+    const Side decisive = unites ? Side::kInside : Side::kOutside;
+    const Side otherwise = unites ? Side::kOutside : Side::kInside;
+    Side value = operands.empty() ? Side::kOutside : otherwise;
+    for (std::size_t i = 0; i < operands.size() && value != decisive; ++i) {
+      Side one = values[operands[i]];
+      if (node.operation == Operation::kDifference && i > 0 && one != Side::kUnknown) {
+        one = one == Side::kInside ? Side::kOutside : Side::kInside;
+      }
+      if (one == decisive || one == Side::kUnknown) value = one;
+    }
+    values[id] = value;
+  }
+  return values[root];
+}
+
 }  // namespace
+
+Bounds reached_vertices(const Tree& tree, Tree::NodeId root, const Geometry& geometry,
+                        const Bounds& known, double tolerance) {
+  constexpr std::size_t kMostVertices = 64;             // of a side
+  constexpr std::uint64_t kMostTriangles = 50'000'000;  // looked at in all
+  struct Candidate {
+    glm::dvec3 point;
+    std::uint32_t solid;
+  };
+  const auto& parts = geometry.parts();
+  Bounds reached;
+  if (root == Tree::kNone) return reached;
+  tolerance = std::max(tolerance, 1e-9 * glm::length(geometry.box().high - geometry.box().low));
+  const Bounds outer = bounds(tree, root);
+  std::uint64_t looked_at = 0;
+  std::vector<Side> sides(parts.size(), Side::kOutside);
+  std::vector<Candidate> candidates;
+  for (std::size_t i = 0; i < 6; ++i) {
+    const int axis = static_cast<int>(i) % 3;
+    const auto out = [&](const glm::dvec3& p) { return i < 3 ? -p[axis] : p[axis]; };
+    candidates.clear();
+    for (std::uint32_t solid = 0; solid < parts.size(); ++solid) {
+      for (const glm::dvec3& p : parts[solid].positions) {
+        if (-side(known, i) < out(p) && inside_closed(p, outer)) candidates.push_back({p, solid});
+      }
+    }
+    const auto first = [&](const Candidate& a, const Candidate& b) {
+      if (out(a.point) != out(b.point)) return out(a.point) > out(b.point);
+      if (a.solid != b.solid) return a.solid < b.solid;
+      for (int k = 0; k < 3; ++k) {
+        if (a.point[k] != b.point[k]) return a.point[k] < b.point[k];
+      }
+      return false;
+    };
+    const auto middle = candidates.begin() +
+                        static_cast<std::ptrdiff_t>(std::min(candidates.size(), kMostVertices));
+    std::partial_sort(candidates.begin(), middle, candidates.end(), first);
+    for (auto at = candidates.begin(); at != middle && looked_at < kMostTriangles; ++at) {
+      for (std::size_t solid = 0; solid < parts.size(); ++solid) {
+        if (solid == at->solid) {
+          sides[solid] = Side::kInside;  // the points of it that lie close to the vertex
+          continue;
+        }
+        sides[solid] = side_of(at->point, parts[solid], tolerance);
+        looked_at += parts[solid].triangles.size();
+      }
+      if (value_of(tree, root, sides) != Side::kInside) continue;
+      reached.include(at->point);
+      break;
+    }
+  }
+  return reached;
+}
 
 Result<Bounds> result_bounds(const Tree& tree, Tree::NodeId node, double relative_precision,
                              const Execution& execution) {

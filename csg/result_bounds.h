@@ -2,6 +2,7 @@
 
 #include "core/execution.h"
 #include "core/result.h"
+#include "csg/geometry.h"
 #include "csg/tree.h"
 
 namespace strata::csg {
@@ -13,5 +14,13 @@ namespace strata::csg {
 /// @return as Preview::draw()
 Result<Bounds> result_bounds(const Tree& tree, Tree::NodeId node, double relative_precision = 0,
                              const Execution& execution = {});
+
+/// A box around vertices of the solids that lie outside of `known` and that the result of `root`
+/// reaches: close to each there are points of the result. Of each side the outermost vertices are
+/// tried, until one is reached; one that lies within `tolerance` of another solid's surface is not
+/// known to be. Empty where there is none.
+/// @param geometry  of `tree`
+[[nodiscard]] Bounds reached_vertices(const Tree& tree, Tree::NodeId root, const Geometry& geometry,
+                                      const Bounds& known, double tolerance);
 
 }  // namespace strata::csg

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <cmath>
-#include <glm/geometric.hpp>
 #include <optional>
 #include <utility>
 
@@ -14,8 +12,6 @@
 #include "csg/surface.h"
 #include "csg/tile_surface.h"
 #include "csg/tree_filter.h"
-#include "hashbuffer/build_ldi.h"
-#include "raster/lattice_mesh.h"
 
 namespace strata::csg {
 namespace {
@@ -68,9 +64,6 @@ bool is_inside(InsideRule rule, int winding) {
   }
   return winding % 2 != 0;
 }
-
-/// Sides of a measured box are no less than this part of the longest.
-constexpr double kThinnest = 1e-9;
 
 class BooleanWorker final : public TileListFilter::Worker {
  public:
@@ -277,116 +270,6 @@ void SolidLists::set_labels(const std::vector<std::uint32_t>& labels) {
 }
 std::uint32_t SolidLists::solid_of(std::uint32_t triangle) const {
   return impl_->shared.solid_of[triangle];
-}
-
-Result<Measures> measure(const Tree& tree, Tree::NodeId root, int resolution,
-                         const Execution& execution) {
-  if (resolution < 1 || resolution > kMaxGridSide / 2) {
-    return fail(ErrorCode::kUsage, "a resolution of {} voxels: 1 to {} can be had", resolution,
-                kMaxGridSide / 2);
-  }
-  Measures result;
-  const Bounds box = bounds(tree, root);
-  const SolidLists lists(tree, root);
-  if (box.empty()) return result;
-  const glm::dvec3 extent = box.high - box.low;
-  const double longest = std::max({extent.x, extent.y, extent.z});
-  if (!(longest > 0) || !std::isfinite(longest)) return result;
-  // As many voxels along each side: thin plates and rods are measured as well as cubes. A voxel of
-  // room all around, so that no depth of the result is clamped. The solids may reach out: there
-  // nothing of the result is.
-  VoxelGrid grid;
-  grid.voxel_size = glm::max(extent, glm::dvec3(longest * kThinnest)) / double(resolution);
-  grid.dims = glm::ivec3(resolution + 2);
-  grid.origin = (box.low + box.high) * 0.5 - glm::dvec3(grid.dims) * grid.voxel_size * 0.5;
-  auto snapped = snap_to_lattice(lists.soup(), grid, execution);
-  if (!snapped) return tl::unexpected(snapped.error());
-
-  glm::dvec3 low(std::numeric_limits<double>::infinity()), high(-low);
-  double volumes[3] = {}, half_areas[2] = {};
-  glm::dvec3 projected(0);  // area of the surface as it is seen along an axis, all layers
-  double outlines = 0;      // area of cells where the number of layers changes
-  glm::dvec3 moment(0);
-  // Where the columns stand that hold some of the result, and its first moment about them: for an
-  // axis whose own rays pass a thin result by.
-  glm::dvec3 column_low(low), column_high(high), column_moment(0), column_weight(0);
-  for (const Axis axis : {Axis::kX, Axis::kY, Axis::kZ}) {
-    const AxisFrame frame(axis);
-    auto image = build_ldi(*snapped, raster_target(grid, axis), {}, execution, &lists.filter());
-    if (!image) return tl::unexpected(image.error());
-    const glm::dvec3& d = grid.voxel_size;
-    const double cell = d[frame.u] * d[frame.v];
-    double column_sum = 0;
-    std::uint64_t crossings = 0, changes = 0;
-    for (int v = 0; v < image->height; ++v) {
-      for (int u = 0; u < image->width; ++u) {
-        const auto list = image->list(u, v);
-        crossings += list.size();
-        const auto change = [&](std::size_t other) {
-          changes += std::max(list.size(), other) - std::min(list.size(), other);
-        };
-        if (u > 0) change(image->list(u - 1, v).size());
-        if (v > 0) change(image->list(u, v - 1).size());
-        result.max_depth_complexity =
-            std::max<std::uint64_t>(result.max_depth_complexity, list.size());
-        double first_moment = 0, length = 0;
-        for (std::size_t i = 0; i < list.size(); ++i) {
-          const double depth = (list[i].depth() + 0.5) / kLatticeSteps;
-          const double sign = list[i].exit() ? 1.0 : -1.0;
-          length += sign * depth;
-          first_moment += sign * depth * depth / 2;
-          // A crossing stands for an area of cell / |n_axis|; weighted by n_axis^2 the three axes
-          // add up to the area itself.
-          const glm::uvec3& t = lists.soup().triangles[list[i].triangle()];
-          const glm::dvec3& a = lists.soup().positions[t.x];
-          const glm::dvec3 across =
-              glm::cross(lists.soup().positions[t.y] - a, lists.soup().positions[t.z] - a);
-          const double size = glm::length(across);
-          if (size > 0) half_areas[(u + v) % 2] += cell * std::abs(across[frame.w]) / size;
-          double& low_w = low[frame.w];
-          double& high_w = high[frame.w];
-          low_w = std::min(low_w, depth);
-          high_w = std::max(high_w, depth);
-        }
-        if (list.empty()) continue;
-        column_sum += length;
-        moment[frame.w] += first_moment;
-        for (const auto& [side, at] : {std::pair(frame.u, u + 0.5), std::pair(frame.v, v + 0.5)}) {
-          column_low[side] = std::min(column_low[side], at);
-          column_high[side] = std::max(column_high[side], at);
-          column_moment[side] += at * length;
-          column_weight[side] += length;
-        }
-      }
-    }
-    result.result_crossings += crossings;
-    projected[frame.w] = cell * static_cast<double>(crossings);
-    outlines += cell * static_cast<double>(changes) / 2;
-    volumes[frame.w] = column_sum;
-    if (execution.progress) execution.progress((frame.w + 1) / 3.0);
-  }
-  const glm::dvec3& step = grid.voxel_size;
-  const double cube = step.x * step.y * step.z;
-  const double volume = (volumes[0] + volumes[1] + volumes[2]) / 3;
-  result.empty = !(volume > 0);
-  if (result.empty) return result;
-  result.volume = volume * cube;
-  result.area = half_areas[0] + half_areas[1];
-  result.area_error = std::max(3 * std::abs(half_areas[0] - half_areas[1]), outlines);
-  const auto [least, most] = std::minmax({volumes[0], volumes[1], volumes[2]});
-  // The length of a ray varies over a side by at most what is seen from there.
-  result.volume_error = std::max(2.0 / 3.0 * glm::dot(projected, step), (most - least) * cube);
-  for (int i = 0; i < 3; ++i) {
-    if (!(volumes[i] > 0)) {
-      low[i] = column_low[i], high[i] = column_high[i];
-      moment[i] = column_moment[i], volumes[i] = column_weight[i];
-    }
-    result.centre[i] = grid.origin[i] + moment[i] / volumes[i] * step[i];
-    result.low[i] = grid.origin[i] + low[i] * step[i];
-    result.high[i] = grid.origin[i] + high[i] * step[i];
-  }
-  result.bounds_error = std::max({step.x, step.y, step.z});
-  return result;
 }
 
 }  // namespace strata::csg

@@ -5,8 +5,6 @@
 #include <memory>
 #include <vector>
 
-#include "core/execution.h"
-#include "core/result.h"
 #include "csg/tree.h"
 #include "hashbuffer/list_filter.h"
 #include "mesh/triangle_soup.h"
@@ -42,27 +40,5 @@ class SolidLists {
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
-
-/// Sizes of a tree's result, from lists along three axes.
-struct Measures {
-  double volume = 0;        ///< cubic world units
-  double volume_error = 0;  ///< bound: what is seen of the surface along each axis, times the
-                            ///< voxel's side (invariant I18), or the spread of the three axes
-  double area = 0;          ///< square world units
-  double area_error = 0;    ///< estimate: cells at outlines, or three times the spread between
-                            ///< interleaved half grids
-  glm::dvec3 centre{0};     ///< centre of mass, world space
-  glm::dvec3 low{0},
-      high{0};              ///< bounds of the crossings, world space; within a voxel of the truth
-  double bounds_error = 0;  ///< longest side of a voxel
-  std::uint64_t result_crossings = 0;      ///< all axes
-  std::uint64_t max_depth_complexity = 0;  ///< of the result
-  bool empty = true;  ///< no ray met anything: the result is empty, or smaller than a voxel
-};
-
-/// Measures the result on a grid of `resolution` voxels along each side of its box.
-/// @return kUsage (resolution not in [1, 32768]), kGeometry, kLimit, kCancelled
-Result<Measures> measure(const Tree& tree, Tree::NodeId root, int resolution,
-                         const Execution& execution = {});
 
 }  // namespace strata::csg

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "csg/geometry.h"
+#include "csg/measure.h"
 #include "csg/solid_lists.h"
 #include "voxelize/grid_fit.h"
 #include "voxelize/voxelize.h"
@@ -216,7 +217,8 @@ Result<Verification> verify(const csg::Tree& tree, const csg::Tree& other,
   Comparer comparer(tree, other, *exact, options, execution);
   if (comparer.nothing()) return found;
 
-  const auto measures = csg::measure(tree, tree.root(), options.measure_resolution, execution);
+  const auto measures =
+      csg::measure(tree, tree.root(), {.resolution = options.measure_resolution}, execution);
   if (!measures) return tl::unexpected(measures.error());
   const double area = std::max(exact->area(), measures->area);
   const double step = comparer.step(options.measure_resolution);

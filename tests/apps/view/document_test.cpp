@@ -11,8 +11,8 @@
 #include "apps/scene_files.h"
 #include "apps/view/file_watch.h"
 #include "apps/view/loader.h"
+#include "csg/measure.h"
 #include "csg/ray_image.h"
-#include "csg/solid_lists.h"
 
 namespace strata::view {
 namespace {
@@ -36,7 +36,7 @@ Model model_of(const std::string& text) {
 }
 
 double volume_of(const Arrangement& what) {
-  const auto measured = csg::measure(what.tree, what.tree.root(), 500);
+  const auto measured = csg::measure(what.tree, what.tree.root(), {.resolution = 500});
   EXPECT_TRUE(measured);
   return measured ? measured->volume : -1;
 }
@@ -51,7 +51,7 @@ TEST(Arrange, WithoutWishesItIsTheScene) {
     EXPECT_EQ(what->tree.solids()[i].mesh, model.scene.tree.solids()[i].mesh);
     EXPECT_EQ(what->tree.solids()[i].name, model.scene.tree.solids()[i].name);
   }
-  const auto scene = csg::measure(model.scene.tree, model.scene.tree.root(), 500);
+  const auto scene = csg::measure(model.scene.tree, model.scene.tree.root(), {.resolution = 500});
   ASSERT_TRUE(scene);
   EXPECT_EQ(volume_of(*what), scene->volume);
 }
