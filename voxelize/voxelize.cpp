@@ -7,6 +7,7 @@
 
 #include "raster/lattice_mesh.h"
 #include "voxelize/checksum.h"
+#include "voxelize/samples.h"
 #include "voxelize/solid.h"
 #include "voxelize/surface.h"
 #include "voxelize/tree_surface.h"
@@ -32,7 +33,8 @@ Result<void> check_grid(const VoxelGrid& grid) {
 }
 
 /// Rows of a slab whose intervals are expected to stay within an eighth of the memory limit.
-int slab_rows(const VoxelGrid& grid, Axis axis, const Execution& execution) {
+/// With samples of voxels, whole tiles of those.
+int slab_rows(const VoxelGrid& grid, Axis axis, int samples, const Execution& execution) {
   const AxisFrame frame(axis);
   constexpr std::uint64_t kBytesPerColumn = 16;  // offset, and two intervals with their copies
   constexpr std::uint64_t kDefaultSlabBytes = std::uint64_t{512} << 20;
@@ -41,18 +43,35 @@ int slab_rows(const VoxelGrid& grid, Axis axis, const Execution& execution) {
                                    : kDefaultSlabBytes;
   const std::uint64_t rows =
       budget / (kBytesPerColumn * static_cast<std::uint64_t>(grid.dims[frame.u]));
-  const std::uint64_t tile_rows = std::max<std::uint64_t>(1, rows / kTileSide);
-  return static_cast<int>(std::min<std::uint64_t>(tile_rows * kTileSide, kMaxGridSide));
+  const auto unit = static_cast<std::uint64_t>(kTileSide) * static_cast<std::uint64_t>(samples);
+  const std::uint64_t units = std::max<std::uint64_t>(1, rows / unit);
+  return static_cast<int>(std::min<std::uint64_t>(units * unit, kMaxGridSide / unit * unit));
+}
+
+Result<void> check_samples(const VoxelGrid& grid, const VoxelizeOptions& options) {
+  const int samples = options.samples;
+  const int longest = std::max({grid.dims.x, grid.dims.y, grid.dims.z});
+  if (samples < 1 || samples > kMaxGridSide / longest) {
+    return fail(ErrorCode::kUsage,
+                "samples a side of a voxel must be 1 to {} on a grid of {} x {} x {}, got {}",
+                kMaxGridSide / longest, grid.dims.x, grid.dims.y, grid.dims.z, samples);
+  }
+  if (samples > 1 && options.filter != nullptr && options.filter->labelled()) {
+    return fail(ErrorCode::kUsage, "labels are of whole voxels, samples have none");
+  }
+  return {};
 }
 
 /// Takes a finished slab over.
 using OwningSink = std::function<Result<void>(VoxelIntervals&&)>;
 
-/// The work of both entry points: slabs of `step` rows, which go to `sink` in increasing v.
-Result<VoxelizeReport> run(const TriangleSoup& mesh, const VoxelGrid& grid,
-                           const VoxelizeOptions& options, const Execution& execution, int step,
-                           const OwningSink& sink) {
-  if (auto valid = check_grid(grid); !valid) return tl::unexpected(valid.error());
+/// The work of both entry points: slabs, or one, go to `sink` in increasing v.
+/// @param asked the grid of the result; inside, `grid` is that of the samples
+Result<VoxelizeReport> run(const TriangleSoup& mesh, const VoxelGrid& asked,
+                           const VoxelizeOptions& options, const Execution& execution,
+                           bool in_slabs, const OwningSink& sink) {
+  if (auto valid = check_grid(asked); !valid) return tl::unexpected(valid.error());
+  if (auto valid = check_samples(asked, options); !valid) return tl::unexpected(valid.error());
   if (!options.solid && !options.surface) {
     return fail(ErrorCode::kUsage, "neither the solid nor the surface is asked for");
   }
@@ -65,12 +84,15 @@ Result<VoxelizeReport> run(const TriangleSoup& mesh, const VoxelGrid& grid,
   if (!options.closed && options.open == OpenMode::kFail) {
     return fail(ErrorCode::kGeometry, "the mesh is not closed");
   }
+  const VoxelGrid grid = refined(asked, options.samples);
+  const int step =
+      in_slabs ? slab_rows(grid, options.axis, options.samples, execution) : kMaxGridSide;
   const auto snapped = snap_to_lattice(mesh, grid, execution);
   if (!snapped) return tl::unexpected(snapped.error());
   const LatticeMesh& lattice = *snapped;
 
   VoxelizeReport report;
-  SetChecksum checksum(grid);
+  SetChecksum checksum(asked);
   Execution quiet = execution;  // inner phases do not report progress of their own
   quiet.progress = {};
   const bool open_surface = !options.closed && options.open == OpenMode::kSurface;
@@ -92,6 +114,7 @@ Result<VoxelizeReport> run(const TriangleSoup& mesh, const VoxelGrid& grid,
       if (!skin) return tl::unexpected(skin.error());
       slab = std::move(*skin);
     }
+    if (options.samples > 1) slab = count_samples(slab, asked, options.samples, quiet);
     if (options.statistics) {
       report.solid_voxels += slab.solid_voxels();
       report.intervals += slab.interval_count();
@@ -128,7 +151,7 @@ Result<VoxelizeReport> run(const TriangleSoup& mesh, const VoxelGrid& grid,
 Result<VoxelizeReport> voxelize_slabs(const TriangleSoup& mesh, const VoxelGrid& grid,
                                       const VoxelizeOptions& options, const Execution& execution,
                                       const SlabSink& sink) {
-  return run(mesh, grid, options, execution, slab_rows(grid, options.axis, execution),
+  return run(mesh, grid, options, execution, true,
              [&](VoxelIntervals&& slab) { return sink(slab); });
 }
 
@@ -137,7 +160,7 @@ Result<VoxelIntervals> voxelize(const TriangleSoup& mesh, const VoxelGrid& grid,
                                 VoxelizeReport* report) {
   VoxelIntervals result;
   const auto done =
-      run(mesh, grid, options, execution, kMaxGridSide, [&](VoxelIntervals&& slab) -> Result<void> {
+      run(mesh, grid, options, execution, false, [&](VoxelIntervals&& slab) -> Result<void> {
         result = std::move(slab);
         return {};
       });

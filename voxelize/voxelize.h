@@ -41,6 +41,12 @@ struct VoxelizeOptions {
   bool closed = true;  ///< the mesh is known to be closed; false: `open` applies
   StoreKind store = StoreKind::kAuto;
   OffsetKind offsets = OffsetKind::kPlaneFirst;
+  /// With n > 1 the filled fraction of voxels: the mesh is voxelized with n voxels for one along
+  /// each axis, so that a voxel has n^3 samples, and a voxel's label says how many of those are
+  /// solid, 1 to n^3. Exact as all voxels are, and the same for every axis; intervals end where the
+  /// label changes. Takes n^2 times the columns: time and memory grow with the surface at n times
+  /// the resolution. Not of labelled lists.
+  int samples = 1;
   bool statistics = false;  ///< count and hash what comes out
   /// Makes other lists of the mesh's before they are filled: a Boolean tree. Borrowed. Then the
   /// rule applies to what it makes, and a voxel is of the surface when faces of solids pass through
@@ -72,8 +78,8 @@ using SlabSink = std::function<Result<void>(const VoxelIntervals&)>;
 
 /// Voxelizes `mesh` on `grid`, slab by slab of bounded memory. Voxel centres decide (law 7): same
 /// set for every axis, store, thread count and order of triangles.
-/// @return kUsage (a surface of labelled lists), kGeometry (coordinates too large, open mesh with
-/// OpenMode::kFail), kLimit, kCancelled, or the sink's error.
+/// @return kUsage (a surface or samples of labelled lists), kGeometry (coordinates too large, open
+/// mesh with OpenMode::kFail), kLimit, kCancelled, or the sink's error.
 Result<VoxelizeReport> voxelize_slabs(const TriangleSoup& mesh, const VoxelGrid& grid,
                                       const VoxelizeOptions& options, const Execution& execution,
                                       const SlabSink& sink);
