@@ -187,9 +187,16 @@ void define_voxelize(CLI::App& app, Words& words) {
       ->type_name("FORMAT")
       ->group(output);
   app.add_flag("--list-formats", words.list_formats, "List the formats and end")->group(output);
-  app.add_flag("--fog", words.fog, ".vdb: a float fog volume, not a mask")->group(output);
+  app.add_flag("--fog{auto}", words.fog,
+               "--fog[=N], .vdb: fog volume, 0 to 1 by NxNxN samples a voxel; 4")
+      ->group(output);
+  app.add_flag("--mask", words.mask, ".vdb: a mask grid: smaller, opened by fewer programs")
+      ->group(output);
   app.add_flag("--ids", words.ids,
                "Values say which solid or file: 1, 2, ...; --json has the names")
+      ->group(output);
+  app.add_option("--name", words.name, "Of the grid: .vdb .nrrd .vti; density, ids or solid")
+      ->type_name("NAME")
       ->group(output);
   app.add_flag("--stats", words.stats, "Print statistics")->group(output);
   add_json(app, words, output);
@@ -333,6 +340,38 @@ GridRequest grid_request(const Words& words, Reader& reader) {
   return grid;
 }
 
+/// --fog and what else says what a voxel of the file is.
+void read_values(const Words& words, VoxelizeCommand& command, Reader& reader) {
+  constexpr std::int64_t kFogSamples = 4, kMostFogSamples = 16;
+  command.ids = words.ids;
+  command.mask = words.mask;
+  if (!words.name.empty()) command.name = words.name;
+  if (!words.fog.empty()) {
+    command.fog_by_default = words.fog == "auto";
+    std::int64_t samples = command.surface ? 1 : kFogSamples;
+    if (!command.fog_by_default) reader.take(parse_integer("--fog", words.fog), samples);
+    if (samples < 1 || samples > kMostFogSamples) {
+      reader.fail_with(fmt::format("--fog must be 1 to {}, got {}", kMostFogSamples, samples));
+    }
+    if (command.surface && samples > 1) {
+      reader.fail_with("--fog=N with N > 1 is the filled fraction of solids; --surface has none");
+    }
+    command.fog = static_cast<int>(samples);
+  }
+  const char* fog_or_mask = command.fog != 0 ? "--fog" : "--mask";
+  if (command.ids && (command.surface || command.fog != 0 || command.mask)) {
+    reader.fail_with(fmt::format("--ids are of solids; {} has none",
+                                 command.surface ? "--surface" : fog_or_mask));
+  }
+  if (command.fog != 0 && command.mask) {
+    reader.fail_with("--fog has numbers, --mask has none; give one of them");
+  }
+  const bool named = command.name.has_value();
+  if (command.output.empty() && (command.fog != 0 || command.mask || named)) {
+    reader.fail_with(fmt::format("{} needs -o", named ? "--name" : fog_or_mask));
+  }
+}
+
 VoxelizeCommand voxelize_command(const Words& words, Reader& reader) {
   VoxelizeCommand command;
   command.common = common_options(words, reader);
@@ -341,8 +380,6 @@ VoxelizeCommand voxelize_command(const Words& words, Reader& reader) {
   command.input = input_options(words, reader);
   command.output = words.output;
   command.format = words.format;
-  command.fog = words.fog;
-  command.ids = words.ids;
   command.surface = !words.surface.empty();
   command.solid = words.solid || !command.surface;
   if (command.surface) {
@@ -361,16 +398,11 @@ VoxelizeCommand voxelize_command(const Words& words, Reader& reader) {
   if (!words.json.empty()) command.json = words.json;
   if (command.input.files.empty()) reader.fail_with("no mesh file and no scene is given");
   command.grid = grid_request(words, reader);
-  if (command.ids && (command.surface || command.fog)) {
-    reader.fail_with(
-        fmt::format("--ids are of solids; {} has none", command.surface ? "--surface" : "--fog"));
-  }
+  read_values(words, command, reader);
   if (command.backend == Backend::kGl && !command.solid) {
     reader.fail_with("--backend gl makes depth lists; --surface alone has none and is the CPU's");
   }
-  if (command.output.empty() && (command.fog || !words.format.empty())) {
-    reader.fail_with(fmt::format("{} needs -o", command.fog ? "--fog" : "--format"));
-  }
+  if (command.output.empty() && !words.format.empty()) reader.fail_with("--format needs -o");
   if (command.output.empty() && !command.stats && !command.json && !command.checksum &&
       !command.dry_run) {
     reader.fail_with("nothing to do: give -o FILE, --stats, --json or --checksum");

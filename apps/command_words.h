@@ -24,8 +24,9 @@ struct Words {
   bool quiet = false, verbose = false, strict = false;
   std::string output, format, json;
   std::string resolution, voxel_size, grid, bounds, origin, padding;
-  bool align = false, solid = false, fog = false, ids = false, keep_orientation = false,
+  bool align = false, solid = false, mask = false, ids = false, keep_orientation = false,
        samples = false;
+  std::string fog, name;
   std::string surface, rule = "winding", open = "vote", axis = "auto", store = "auto",
                        offsets = "plane-first", backend = "auto";
   bool stats = false, checksum = false, dry_run = false, list_formats = false, gl = false;

@@ -48,10 +48,13 @@ struct InputOptions {
 struct VoxelizeCommand {
   CommonOptions common;
   InputOptions input;
-  std::string output;  ///< empty: none, "-": standard output
-  std::string format;  ///< empty: by extension
-  bool fog = false;
-  bool ids = false;  ///< values say which solid
+  std::string output;           ///< empty: none, "-": standard output
+  std::string format;           ///< empty: by extension
+  int fog = 0;                  ///< samples along a voxel's side of a fog volume; 0: none
+  bool fog_by_default = false;  ///< of which no number was given
+  bool mask = false;
+  bool ids = false;                 ///< values say which solid
+  std::optional<std::string> name;  ///< of the grid in the file
   GridRequest grid;
   bool solid = true, surface = false;
   SurfaceKind surface_kind = SurfaceKind::kConservative;

@@ -31,10 +31,14 @@ std::uint64_t rounded(double bytes) {
 
 }  // namespace
 
-MemoryEstimate estimate_memory(const MeshInput& input, const VoxelGrid& grid, Axis axis,
-                               const VoxelizeCommand& command, std::string_view format, int threads,
-                               std::uint64_t limit) {
+MemoryEstimate estimate_memory(const MeshInput& input, const VoxelGrid& voxels, Axis axis,
+                               int samples, const VoxelizeCommand& command, std::string_view format,
+                               int threads, std::uint64_t limit) {
   MemoryEstimate estimate;
+  const int fine = std::max(samples, 1);
+  VoxelGrid grid = voxels;  // that is walked: of the samples
+  grid.dims *= fine;
+  grid.voxel_size /= fine;
   const auto vertices = static_cast<double>(input.soup.positions.size());
   const auto triangles = static_cast<double>(input.soup.triangles.size());
   const double elements = static_cast<double>(input.soup.face_elements.size());
@@ -56,7 +60,7 @@ MemoryEstimate estimate_memory(const MeshInput& input, const VoxelGrid& grid, Ax
   // but hold 64 rows at least (see voxelize_slabs).
   constexpr double kColumnBytes = 16, kDefaultSlab = 512.0 * 1024 * 1024;
   const AxisFrame frame(axis);
-  const double least = 64.0 * grid.dims[frame.u] * kColumnBytes;
+  const double least = 64.0 * fine * grid.dims[frame.u] * kColumnBytes;
   const double budget =
       limit > 0 ? std::min(kDefaultSlab, static_cast<double>(limit) / 8) : kDefaultSlab;
   double slab = std::min(columns(grid, axis) * kColumnBytes, std::max(least, budget));
@@ -72,8 +76,12 @@ MemoryEstimate estimate_memory(const MeshInput& input, const VoxelGrid& grid, Ax
 
   if (format == "vdb") {
     // A surface of area A meets about 1.5 A / 64 leaves, of 64 bytes and their share of nodes; ids
-    // are a zlib stream a leaf, which takes about as much.
-    estimate.output = rounded(area * 1.5 / 64 * (command.ids ? 144 : 72));
+    // are a zlib stream a leaf, which takes about as much, fractions about four
+    // times that.
+    const double leaf = command.ids ? 144 : command.fog != 0 ? 600 : 72;
+    const double there = std::ceil(voxels.dims.x / 8.0) * std::ceil(voxels.dims.y / 8.0) *
+                         std::ceil(voxels.dims.z / 8.0);
+    estimate.output = rounded(std::min(area / (fine * fine) * 1.5 / 64, there) * leaf);
   } else if (format == "binvox") {
     const double longest = std::max({grid.dims.x, grid.dims.y, grid.dims.z});
     estimate.output = rounded(columns(grid, axis) * 8 + longest * longest / 127 * threads);

@@ -20,10 +20,11 @@ struct MemoryEstimate {
 };
 
 /// Estimates from the areas of the mesh and the grid, before anything is built.
+/// @param samples  along a voxel's side of a fog volume; 0 or 1: no more than the voxel's centre
 /// @param format  name of the output format; empty for none
 /// @param limit   bytes; slabs are cut to fit it
 MemoryEstimate estimate_memory(const MeshInput& input, const VoxelGrid& grid, Axis axis,
-                               const VoxelizeCommand& command, std::string_view format, int threads,
-                               std::uint64_t limit);
+                               int samples, const VoxelizeCommand& command, std::string_view format,
+                               int threads, std::uint64_t limit);
 
 }  // namespace strata::apps

@@ -39,8 +39,13 @@ Result<void> check_output(const VoxelizeCommand& command) {
   }
   const auto format = voxel_format_for(command.output, command.format);
   if (!format) return tl::unexpected(format.error());
-  if (command.fog && format->name != "vdb") {
-    return fail(ErrorCode::kUsage, "--fog is for .vdb; format {} holds no fog volume",
+  if ((command.fog != 0 || command.mask) && format->name != "vdb") {
+    return fail(ErrorCode::kUsage, "{} is for .vdb; format {} holds no {}",
+                command.mask ? "--mask" : "--fog", format->name,
+                command.mask ? "mask" : "fog volume");
+  }
+  if (command.name && !format->named) {
+    return fail(ErrorCode::kUsage, "--name is for .vdb, .nrrd and .vti; format {} holds no name",
                 format->name);
   }
   if (command.ids) {
@@ -198,6 +203,12 @@ bool is_surface_alone(const VoxelizeCommand& command, const MeshInput& input) {
   return !command.solid || (!input.closed && command.open == OpenMode::kSurface);
 }
 
+/// Samples along a voxel's side of a fog volume; 0: none is asked for. A surface alone has no
+/// filled fraction.
+int fog_samples(const VoxelizeCommand& command, const MeshInput& input) {
+  return command.fog_by_default && is_surface_alone(command, input) ? 1 : command.fog;
+}
+
 /// Has the solids of a scene labelled, by number or by colour, when the format is to hold that.
 void label_solids(const VoxelizeCommand& command, VoxelizeOutcome& outcome,
                   VoxelWriterOptions& options, Session& session) {
@@ -226,6 +237,15 @@ void label_solids(const VoxelizeCommand& command, VoxelizeOutcome& outcome,
   if (!parts.colours.empty()) outcome.input.tree->set_labels(parts.labels);
 }
 
+Result<void> check_samples(int samples, const VoxelGrid& grid) {
+  const int longest = std::max({grid.dims.x, grid.dims.y, grid.dims.z});
+  if (samples * longest <= kMaxGridSide) return {};
+  return fail(
+      ErrorCode::kLimit,
+      "--fog: {} samples a side of {} x {} x {} voxels are more than {}; --fog=N takes fewer",
+      samples, grid.dims.x, grid.dims.y, grid.dims.z, kMaxGridSide);
+}
+
 void count_ids(const VoxelIntervals& slab, std::vector<std::uint64_t>& voxels) {
   for (int tv = 0; tv < slab.tiles_v(); ++tv) {
     for (int tu = 0; tu < slab.tiles_u(); ++tu) {
@@ -242,8 +262,11 @@ Result<void> voxelize_and_write(const VoxelizeCommand& command, VoxelizeOutcome&
                                 Session& session) {
   std::unique_ptr<VoxelWriter> writer;
   VoxelWriterOptions file;
-  file.fog = command.fog;
-  file.name = command.ids ? "ids" : command.solid ? "solid" : "surface";
+  const int samples = fog_samples(command, outcome.input);
+  file.fog = static_cast<std::uint32_t>(samples * samples * samples);
+  file.mask = command.mask;
+  if (!command.solid && samples == 0) file.name = "surface";
+  if (command.name) file.name = *command.name;
   label_solids(command, outcome, file, session);
   if (!command.output.empty()) {
     auto opened = open_voxel_writer(command.output, command.format, outcome.grid, file);
@@ -279,7 +302,7 @@ Result<void> voxelize_and_write(const VoxelizeCommand& command, VoxelizeOutcome&
     options.source = *source;
   }
 
-  Execution execution = session.execution("voxelizing", 1.0);
+  Execution execution = session.execution("voxelizing", samples > 1 ? 0.2 : 1.0);
   // The mesh is there already; what the format holds is not the voxelizer's.
   const std::uint64_t taken = outcome.estimate.mesh + outcome.estimate.output;
   execution.memory_limit = std::max<std::uint64_t>(
@@ -290,15 +313,18 @@ Result<void> voxelize_and_write(const VoxelizeCommand& command, VoxelizeOutcome&
   std::optional<BoundaryArea> boundary;
   if (command.stats || command.json) boundary.emplace(outcome.grid, outcome.axis);
   double write_ms = 0;
-  const auto sink = [&](const VoxelIntervals& slab) -> Result<void> {
-    if (!options.statistics) solid_voxels += slab.solid_voxels();
-    if (boundary) boundary->add(slab, quiet);
-    if (command.ids) count_ids(slab, outcome.id_voxels);
+  const auto write = [&](const VoxelIntervals& slab) -> Result<void> {
     if (!writer) return {};
     const double start = session.milliseconds();
     auto done = writer->add(slab, quiet);
     write_ms += session.milliseconds() - start;
     return done;
+  };
+  const auto sink = [&](const VoxelIntervals& slab) -> Result<void> {
+    if (!options.statistics) solid_voxels += slab.solid_voxels();
+    if (boundary) boundary->add(slab, quiet);
+    if (command.ids) count_ids(slab, outcome.id_voxels);
+    return samples > 1 ? Result<void>() : write(slab);
   };
   auto report = voxelize_slabs(outcome.input.soup, outcome.grid, options, execution, sink);
   if (!report) return tl::unexpected(report.error());
@@ -317,6 +343,16 @@ Result<void> voxelize_and_write(const VoxelizeCommand& command, VoxelizeOutcome&
   }
   if (auto strict = session.check_strict(); !strict) return strict;
   if (!writer) return {};
+  if (samples > 1) {
+    // The numbers above are of the voxels whose centre is inside; the file has the filled fraction.
+    options.samples = samples;
+    options.statistics = false;
+    Execution fine = session.execution("sampling", 1.0);
+    fine.memory_limit = execution.memory_limit;
+    const auto done = voxelize_slabs(outcome.input.soup, outcome.grid, options, fine, write);
+    if (!done) return tl::unexpected(done.error());
+    if (session.interrupted()) return fail(ErrorCode::kCancelled, "stopped");
+  }
   const double start = session.milliseconds();
   if (auto done = writer->finish(quiet); !done) return done;
   writer.reset();
@@ -351,7 +387,9 @@ Result<void> run_voxelize(const VoxelizeCommand& command, Session& session) {
     outcome.format = format->name;
   }
   outcome.axis = choose_axis(command, command.output.empty() ? nullptr : &*format, outcome.grid);
-  outcome.estimate = estimate_memory(outcome.input, outcome.grid, outcome.axis, command,
+  const int samples = fog_samples(command, outcome.input);
+  if (const auto valid = check_samples(samples, outcome.grid); !valid) return valid;
+  outcome.estimate = estimate_memory(outcome.input, outcome.grid, outcome.axis, samples, command,
                                      outcome.format, session.threads(), session.memory_limit());
   session.note(fmt::format("grid {} x {} x {}, about {} to hold", grid->dims.x, grid->dims.y,
                            grid->dims.z, readable_bytes(outcome.estimate.total())));

@@ -91,7 +91,7 @@ def main():
         for path in files:
             mesh = os.path.splitext(os.path.basename(path))[0]
             jobs.append(Job(mesh, 1024, "OBJ to .vdb mask", "strata",
-                            [strata, "voxelize", path, "-r", "1024", "-o", output("a.vdb")],
+                            [strata, "voxelize", path, "-r", "1024", "--mask", "-o", output("a.vdb")],
                             output("a.vdb"), options.budget))
             if os.path.exists(openvdb):
                 jobs.append(Job(mesh, 1024, "OBJ to .vdb mask", "OpenVDB",

@@ -54,7 +54,7 @@ std::string metadata(const VdbHeader& header, const std::string& compression) {
     put_text(entries, value);
     ++count;
   };
-  if (header.values == VdbValues::kFog) put_meta("class", "string", "fog volume");
+  if (header.fog) put_meta("class", "string", "fog volume");
   put_meta("creator", "string", "strata");
   put_meta("file_bbox_max", "vec3i", raw(upper));
   put_meta("file_bbox_min", "vec3i", raw(lower));
@@ -92,12 +92,12 @@ std::string vdb_header_bytes(const VdbHeader& header) {
   put(bytes, std::uint32_t{1});  // grids
 
   put_text(bytes, header.name);
-  put_text(bytes, header.values == VdbValues::kMask  ? "Tree_mask_5_4_3"
-                  : header.values == VdbValues::kFog ? "Tree_float_5_4_3"
-                                                     : "Tree_int32_5_4_3");
+  put_text(bytes, header.values == VdbValues::kMask   ? "Tree_mask_5_4_3"
+                  : header.values == VdbValues::kBool ? "Tree_bool_5_4_3"
+                                                      : "Tree_float_5_4_3");
   put_text(bytes, "");  // not an instance of another grid
 
-  const bool zip = header.values != VdbValues::kMask;
+  const bool zip = header.values == VdbValues::kFloat;
   std::string grid = raw(kCompressActiveMask | (zip ? kCompressZip : 0));
   grid += metadata(header, zip ? "zip + active values" : "active values");
   grid += transform(header.grid);

@@ -8,15 +8,16 @@
 
 namespace strata {
 
-/// What the voxels of an OpenVDB file hold: they are active (MaskGrid), 1 in a FloatGrid of class
-/// fog volume, or ids in an Int32Grid. The values of the latter two are compressed by zlib.
-enum class VdbValues { kMask, kFog, kIds };
+/// What the voxels of an OpenVDB file hold: nothing, they are active (MaskGrid); true (BoolGrid);
+/// numbers (FloatGrid), which are compressed by zlib.
+enum class VdbValues { kMask, kBool, kFloat };
 
 /// What stands in an OpenVDB file before the tree (internal to voxelize/).
 struct VdbHeader {
   std::string name;
   VoxelGrid grid;
-  VdbValues values = VdbValues::kMask;
+  VdbValues values = VdbValues::kBool;
+  bool fog = false;               ///< the class of the grid is fog volume
   std::uint64_t voxels = 0;       ///< active ones
   glm::ivec3 lower{0}, upper{0};  ///< bounds of the active voxels, inclusive, if there are any
   std::uint64_t hash = 0;         ///< of the content; becomes the file's UUID

@@ -47,9 +47,9 @@ std::unique_ptr<T[]> exact_copy(const std::vector<T>& items) {
 
 }  // namespace
 
-VdbLeafBuilder::VdbLeafBuilder(int depth, bool ids)
+VdbLeafBuilder::VdbLeafBuilder(int depth, std::uint32_t divisor)
     : leaves_z_((depth + 7) / 8),
-      ids_(ids),
+      divisor_(divisor),
       // One more than leaves: an interval may cease at the very end.
       events_(static_cast<std::size_t>(leaves_z_) + 1),
       has_event_((events_.size() + 7) / 8 * 8) {}
@@ -61,7 +61,7 @@ std::unique_ptr<VdbLeafTile> VdbLeafBuilder::build(const VoxelIntervals& slab, i
   leaves_.clear();
   leaf_z_.clear();
   runs_.clear();
-  run_ids_.clear();
+  run_values_.clear();
   first_value_.assign(1, 0);
   values_.clear();
   hash_ = 0;
@@ -78,7 +78,7 @@ std::unique_ptr<VdbLeafTile> VdbLeafBuilder::build(const VoxelIntervals& slab, i
     sweep_leaf_column(place);
     for (std::size_t i = first_run_; i < runs_.size(); ++i) {
       hash_ += mix(place + runs_[i].begin) * 3 + mix(place + runs_[i].end) * 5;
-      if (ids_) hash_ += mix(mix(place + runs_[i].begin) + run_ids_[i]) * 7;
+      if (divisor_ != 0) hash_ += mix(mix(place + runs_[i].begin) + run_values_[i]) * 7;
     }
     const auto next = static_cast<std::size_t>(column) + 1;
     tile->first_leaf[next] = static_cast<std::uint32_t>(leaves_.size());
@@ -87,8 +87,8 @@ std::unique_ptr<VdbLeafTile> VdbLeafBuilder::build(const VoxelIntervals& slab, i
   tile->leaves = exact_copy(leaves_);
   tile->leaf_z = exact_copy(leaf_z_);
   tile->runs = exact_copy(runs_);
-  if (ids_) {
-    tile->run_ids = exact_copy(run_ids_);
+  if (divisor_ != 0) {
+    tile->run_values = exact_copy(run_values_);
     tile->values.assign(values_.begin(), values_.end());
     tile->first_value = exact_copy(first_value_);
   }
@@ -193,56 +193,56 @@ void VdbLeafBuilder::sweep_leaf_column(std::uint64_t place) {
   }
 }
 
-// Leaves that are all solid, and alike: a run if they are of one id.
+// Leaves that are all solid, and alike: a run if they are of one value.
 void VdbLeafBuilder::put_whole(int begin, int end, std::uint64_t place) {
   if (begin >= end) return;
-  if (!ids_) return put_run(begin, end, 1);
+  if (divisor_ == 0) return put_run(begin, end, 1);
   std::uint32_t first = 0;
   bool alike = true;
-  for_each_id(begin, [&](std::uint32_t id, int) {
-    if (first == 0) first = id;
-    alike = alike && id == first;
+  for_each_value(begin, [&](std::uint32_t value, int) {
+    if (first == 0) first = value;
+    alike = alike && value == first;
   });
   if (alike) return put_run(begin, end, first);
   for (int z = begin; z < end; ++z) put_leaf(z, spread(kAllColumns), place);
 }
 
-void VdbLeafBuilder::put_run(int begin, int end, std::uint32_t id) {
-  const bool goes_on =
-      runs_.size() > first_run_ && runs_.back().end == begin && (!ids_ || run_ids_.back() == id);
+void VdbLeafBuilder::put_run(int begin, int end, std::uint32_t value) {
+  const bool goes_on = runs_.size() > first_run_ && runs_.back().end == begin &&
+                       (divisor_ == 0 || run_values_.back() == value);
   if (goes_on) {
     runs_.back().end = static_cast<std::uint16_t>(end);
     return;
   }
   runs_.push_back({static_cast<std::uint16_t>(begin), static_cast<std::uint16_t>(end)});
-  if (ids_) run_ids_.push_back(id);
+  if (divisor_ != 0) run_values_.push_back(value);
 }
 
-// Calls run(id, length) for the solid voxels of leaf z of the leaf column, in OpenVDB's order. The
-// leaves have to be asked for from below, one of them as often as wanted.
+// Calls run(value, length) for the solid voxels of leaf z of the leaf column, in OpenVDB's order.
+// The leaves have to be asked for from below, one of them as often as wanted.
 template <class Run>
-void VdbLeafBuilder::for_each_id(int z, Run&& run) {
+void VdbLeafBuilder::for_each_value(int z, Run&& run) {
   const int begin = z * 8, end = begin + 8;
   for (Column& column : columns_) {
     while (column.item < column.end && view_.items[column.item].end() <= begin) ++column.item;
     for (std::uint32_t i = column.item; i < column.end; ++i) {
       const Interval& item = view_.items[i];
       if (item.begin() >= end) break;
-      run(view_.label(i), std::min(end, item.end()) - std::max(begin, item.begin()));
+      run(value_of(view_.label(i)), std::min(end, item.end()) - std::max(begin, item.begin()));
     }
   }
 }
 
 // Appends the values of a leaf as OpenVDB has them, [bytes:64 | zlib stream], or minus the bytes
 // and the values themselves where that is shorter. @return a hash of them
-std::uint64_t VdbLeafBuilder::put_ids(int z, std::size_t voxels) {
+std::uint64_t VdbLeafBuilder::put_values(int z, std::size_t voxels) {
   const std::size_t begin = values_.size();
   values_.resize(begin + sizeof(std::int64_t));
   std::uint64_t hash = 0;
   append_zlib_stream(deflater_, values_, [&](RunDeflater& to) {
-    for_each_id(z, [&](std::uint32_t id, int length) {
-      to.run(id, static_cast<std::uint64_t>(length));
-      hash = (hash ^ id) * 0x9e3779b97f4a7c15u + static_cast<std::uint64_t>(length);
+    for_each_value(z, [&](std::uint32_t value, int length) {
+      to.run(value, static_cast<std::uint64_t>(length));
+      hash = (hash ^ value) * 0x9e3779b97f4a7c15u + static_cast<std::uint64_t>(length);
     });
   });
   const std::size_t plain = voxels * sizeof(std::uint32_t);
@@ -251,8 +251,8 @@ std::uint64_t VdbLeafBuilder::put_ids(int z, std::size_t voxels) {
     count = -static_cast<std::int64_t>(plain);
     values_.resize(begin + sizeof count + plain);
     std::byte* to = values_.data() + begin + sizeof count;
-    for_each_id(z, [&](std::uint32_t id, int length) {
-      for (int i = 0; i < length; ++i, to += sizeof id) std::memcpy(to, &id, sizeof id);
+    for_each_value(z, [&](std::uint32_t value, int length) {
+      for (int i = 0; i < length; ++i, to += sizeof value) std::memcpy(to, &value, sizeof value);
     });
   }
   std::memcpy(values_.data() + begin, &count, sizeof count);
@@ -268,7 +268,7 @@ void VdbLeafBuilder::put_leaf(int z, const VdbLeaf& leaf, std::uint64_t place) {
     // Odd factors, one a word, so that swapped words differ.
     sum += (leaf.words[i] ^ leaf.words[i] >> 32) * (0x9e3779b97f4a7c15u + 2 * i);
   }
-  if (ids_) sum += put_ids(z, static_cast<std::size_t>(leaf.count()));
+  if (divisor_ != 0) sum += put_values(z, static_cast<std::size_t>(leaf.count()));
   hash_ += mix(sum ^ mix(place + static_cast<std::uint64_t>(z)));
 }
 

@@ -36,8 +36,8 @@ static_assert(sizeof(VdbLeaf) == 64);
 
 /// The leaves above one 64 x 64 tile of z columns. A leaf column is 8 x 8 columns of voxels and has
 /// the index (x / 8 % 8) * 8 + y / 8 % 8; along it, a leaf that is partly solid is stored, one that
-/// is all solid is a part of a run, and one that is empty is not there. With ids, a leaf that is
-/// all solid but of several ids is stored too.
+/// is all solid is a part of a run, and one that is empty is not there. With values, a leaf that
+/// is all solid but of several values is stored too.
 struct VdbLeafTile {
   static constexpr int kLeafColumns = 64;
   struct Run {
@@ -49,13 +49,16 @@ struct VdbLeafTile {
   std::unique_ptr<VdbLeaf[]> leaves;
   std::unique_ptr<std::uint16_t[]> leaf_z;  ///< z / 8 of a leaf; increasing within a leaf column
   std::unique_ptr<Run[]> runs;              ///< increasing within a leaf column
-  // With ids only:
-  std::unique_ptr<std::uint32_t[]> run_ids;  ///< one a run
-  Bytes values;  ///< of the leaves, one after the other, the ids of the solid voxels: see put_ids()
+  // With values only:
+  std::unique_ptr<std::uint32_t[]> run_values;  ///< the bits of a float, one a run
+  Bytes
+      values;  ///< of the leaves, one after the other, those of the solid voxels: see put_values()
   std::unique_ptr<std::uint32_t[]> first_value;  ///< into values; one a leaf and the end
 
-  /// 1 without ids.
-  [[nodiscard]] std::uint32_t run_id(std::uint32_t run) const { return run_ids ? run_ids[run] : 1; }
+  /// 1 without values.
+  [[nodiscard]] std::uint32_t run_value(std::uint32_t run) const {
+    return run_values ? run_values[run] : 1;
+  }
   [[nodiscard]] std::span<const std::byte> leaf_values(std::uint32_t leaf) const {
     return std::span(values).subspan(first_value[leaf], first_value[leaf + 1] - first_value[leaf]);
   }
@@ -70,8 +73,8 @@ struct VdbLeafTile {
 class VdbLeafBuilder {
  public:
   /// @param depth voxels along z
-  /// @param ids labels become values of the voxels
-  VdbLeafBuilder(int depth, bool ids);
+  /// @param divisor the value of a voxel is its label divided by that; 0: voxels have no values
+  VdbLeafBuilder(int depth, std::uint32_t divisor);
   /// @param slab intervals along z
   /// @return null for a tile without solid voxels
   std::unique_ptr<VdbLeafTile> build(const VoxelIntervals& slab, int tile_u, int tile_v);
@@ -86,11 +89,15 @@ class VdbLeafBuilder {
   void collect_leaf_column(int leaf_x, int leaf_y);
   void sweep_leaf_column(std::uint64_t place);
   void put_whole(int begin, int end, std::uint64_t place);
-  void put_run(int begin, int end, std::uint32_t id);
+  void put_run(int begin, int end, std::uint32_t value);
   void put_leaf(int z, const VdbLeaf& leaf, std::uint64_t place);
   template <class Run>
-  void for_each_id(int z, Run&& run);
-  [[nodiscard]] std::uint64_t put_ids(int z, std::size_t voxels);
+  void for_each_value(int z, Run&& run);
+  [[nodiscard]] std::uint64_t put_values(int z, std::size_t voxels);
+  [[nodiscard]] std::uint32_t value_of(std::uint32_t label) const {
+    return std::bit_cast<std::uint32_t>(
+        static_cast<float>(static_cast<double>(label) / static_cast<double>(divisor_)));
+  }
   static void set_bounds(const VoxelIntervals::TileView& view, VdbLeafTile& tile);
 
   /// A column of voxels of the leaf column in work: its items from the first that is not yet
@@ -100,7 +107,7 @@ class VdbLeafBuilder {
   };
 
   int leaves_z_;
-  bool ids_;
+  std::uint32_t divisor_;
   // Of the leaf column in work, by z / 8. All zero between two leaf columns.
   std::vector<Event> events_;
   std::vector<std::uint8_t> has_event_;  // a multiple of 8 long
@@ -110,8 +117,8 @@ class VdbLeafBuilder {
   std::vector<VdbLeafTile::Run> runs_;
   std::size_t first_run_ = 0;  // of the leaf column
   VoxelIntervals::TileView view_;
-  std::array<Column, 64> columns_;  // of the leaf column; with ids only, as all that follows
-  std::vector<std::uint32_t> run_ids_, first_value_;
+  std::array<Column, 64> columns_;  // of the leaf column; with values only, as all that follows
+  std::vector<std::uint32_t> run_values_, first_value_;
   Bytes values_;
   RunDeflater deflater_{RunBytes::kIds, sizeof(std::uint32_t)};
   std::uint64_t hash_ = 0;

@@ -63,15 +63,16 @@ VoxelWriterResult open_format(const std::string& path, const std::string& name,
 
 const std::vector<VoxelFormat>& voxel_formats() {
   constexpr std::uint32_t kAnyId = 0x7fffffff;
+  constexpr std::uint32_t kFloatIds = 1 << 24;  // that a float counts
   static const std::vector<VoxelFormat> kFormats = {
-      {"vdb", ".vdb", "OpenVDB: active voxels, a fog volume, or ids; world transform", Axis::kZ, 0,
-       kAnyId},
+      {"vdb", ".vdb", "OpenVDB: bool, or float (fog volume, ids); world transform", Axis::kZ, 0,
+       kFloatIds, true},
       {"npy", ".npy", "NumPy: bool array indexed [x, y, z]; ids", Axis::kX, 0, kAnyId},
       {"npz", ".npz", "NumPy: arrays voxels (as .npy, deflated), origin, spacing; ids", Axis::kX, 0,
        kAnyId},
-      {"nrrd", ".nrrd", "NRRD: uint8, gzip; world transform; ids", Axis::kX, 0, kAnyId},
+      {"nrrd", ".nrrd", "NRRD: uint8, gzip; world transform; ids", Axis::kX, 0, kAnyId, true},
       {"vti", ".vti", "VTK image data: uint8 cells, zlib; world transform; ids", Axis::kX, 0,
-       kAnyId},
+       kAnyId, true},
       {"binvox", ".binvox", "binvox: run lengths; cubic voxels in a cube, world transform",
        Axis::kY},
       {"vox", ".vox", "MagicaVoxel: up to 2000 voxels a side; colours of scenes, ids", Axis::kZ,
@@ -145,15 +146,23 @@ Result<std::unique_ptr<VoxelWriter>> open_voxel_writer(const std::string& path,
   if (Result<void> held = check_ids(*chosen, options.ids); !held) {
     return tl::unexpected(held.error());
   }
-  if (options.ids != 0 && options.fog) {
-    return fail(ErrorCode::kUsage, "{}: a fog volume holds no ids", path);
+  const bool fog = options.fog != 0;
+  if ((fog || options.mask) && chosen->name != "vdb") {
+    return fail(ErrorCode::kUsage, "{}: a {} is for .vdb, the format is {}", path,
+                fog ? "fog volume" : "mask", chosen->name);
+  }
+  if (int{options.ids != 0} + int{fog} + int{options.mask} > 1) {
+    return fail(ErrorCode::kUsage, "{}: a {} holds no {}", path, fog ? "fog volume" : "mask",
+                options.ids != 0 ? "ids" : "numbers");
   }
   if (options.colours.size() > chosen->colours) {
     return fail(ErrorCode::kUsage, "{}: {} colours, the format {} holds {}", path,
                 options.colours.size(), chosen->name, chosen->colours);
   }
   try {
-    return open_format(path, chosen->name, grid, options);
+    VoxelWriterOptions named = options;
+    if (named.name.empty()) named.name = fog ? "density" : options.ids != 0 ? "ids" : "solid";
+    return open_format(path, chosen->name, grid, named);
   } catch (const std::bad_alloc&) {
     return fail(ErrorCode::kLimit, "{}: out of memory for a grid of {} x {} x {}", path,
                 grid.dims.x, grid.dims.y, grid.dims.z);

@@ -22,18 +22,25 @@ struct VoxelFormat {
   Axis axis = Axis::kZ;
   std::size_t colours = 0;  ///< that a file holds, one a voxel; 0: none
   std::uint32_t ids = 0;    ///< the largest id that a voxel can have; 0: no ids
+  bool named = false;       ///< holds the name of the grid
 };
 
 /// The formats this build can write.
 [[nodiscard]] const std::vector<VoxelFormat>& voxel_formats();
 
 struct VoxelWriterOptions {
-  bool fog = false;  ///< .vdb: a float fog volume (1 inside) instead of a mask of active voxels;
-                     ///< not with ids
-  std::string name = "solid";  ///< .vdb, .vti, .nrrd: name of the grid
+  /// .vdb: a float fog volume. Labels say how many of so many samples of a voxel are solid (see
+  /// VoxelizeOptions::samples), and its value is the fraction; with 1, slabs without labels have 1
+  /// inside. 0: none. Not with ids.
+  std::uint32_t fog = 0;
+  /// .vdb: a MaskGrid, which is smaller; not all programs open it. Else a BoolGrid.
+  bool mask = false;
+  /// .vdb, .vti, .nrrd: name of the grid. Empty: `density` of a fog volume, `ids` with ids, else
+  /// `solid`.
+  std::string name{};
   /// The largest of the slabs' labels, which become the values of voxels, in the narrowest unsigned
-  /// type that holds it (.vdb: always 32 bits, signed); 0: a voxel is solid or not. Slabs have
-  /// labels with ids or colours only.
+  /// type that holds it (.vdb: float); 0: a voxel is solid or not. Slabs have labels with ids, fog
+  /// or colours only.
   std::uint32_t ids = 0;
   /// Of label n the colour at n - 1: red, green, blue, alpha; none: one colour. Not with ids.
   std::vector<glm::u8vec4> colours{};
@@ -54,8 +61,8 @@ class VoxelWriter {
 
 /// Opens a writer for `path` ("-": standard output). The format is `format`, or if that is empty
 /// the path's extension. @return kUsage: no such format, none for the extension, a folder format on
-/// standard output, a grid, ids or colours the format cannot hold, a fog volume with ids; kOutput:
-/// the file or folder cannot be made.
+/// standard output, a grid, ids or colours the format cannot hold, fog, mask and ids together;
+/// kOutput: the file or folder cannot be made.
 Result<std::unique_ptr<VoxelWriter>> open_voxel_writer(const std::string& path,
                                                        const std::string& format,
                                                        const VoxelGrid& grid,

@@ -1,22 +1,21 @@
 // OpenVDB files, version 224, written straight from leaves.
 //
-// The tree is OpenVDB's (tree/RootNode.h, InternalNode.h, LeafNodeMask.h, LeafNode.h and
-// io/Compression.h of OpenVDB 10.0), topology and then buffers, both depth first:
+// The tree is OpenVDB's (tree/RootNode.h, InternalNode.h, LeafNodeMask.h, LeafNodeBool.h,
+// LeafNode.h and io/Compression.h of OpenVDB 10.0), topology and then buffers, both depth first:
 //   topology  root, upper node (32^3 lower nodes), lower node (16^3 leaves), mask of a leaf
-//   buffers   mask of a leaf again and its origin, or its active values for a fog volume or ids
+//   buffers   mask of a leaf again, then its origin (mask), its origin and the mask once more as
+//             values (bool), or its active values (float: a fog volume, ids)
 // Not with the library itself: loading libopenvdb takes 45 ms, several times what a whole 1024^3
 // solid takes here, and a lower node of its tree is 33 KB to be filled and freed. The tests read
 // the files back with OpenVDB and compare the bytes of the tree with those that OpenVDB writes.
 
-#include <zlib.h>
-
 #include <algorithm>
 #include <array>
 #include <climits>
+#include <cmath>
 #include <cstring>
 #include <glm/common.hpp>
 #include <memory>
-#include <mutex>
 #include <span>
 #include <string>
 #include <utility>
@@ -49,26 +48,26 @@ constexpr std::uint8_t kActiveValuesOnly = 0;
 int parts(int voxels, int part) { return (voxels + part - 1) / part; }
 std::size_t size(int value) { return static_cast<std::size_t>(value); }
 
-/// The one id of several things, as they come; without ids all are 1.
-class OneId {
+/// The one value of several things, as they come: the bits of a float > 0; without values 1.
+class OneValue {
  public:
-  void add(std::uint32_t id) { id_ = id_ == 0 || id_ == id ? id : kSeveral; }
-  [[nodiscard]] std::uint32_t get() const { return id_; }
-  [[nodiscard]] bool several() const { return id_ == kSeveral; }
+  void add(std::uint32_t value) { value_ = value_ == 0 || value_ == value ? value : kSeveral; }
+  [[nodiscard]] std::uint32_t get() const { return value_; }
+  [[nodiscard]] bool several() const { return value_ == kSeveral; }
 
  private:
   static constexpr std::uint32_t kSeveral = ~std::uint32_t{0};
-  std::uint32_t id_ = 0;
+  std::uint32_t value_ = 0;
 };
 
 /// What is known of a lower node after counting.
 struct LowerNode {
   std::uint32_t leaves = 0;  // partly solid: stored
   std::uint32_t solid = 0;   // all solid: active tiles of the node
-  OneId id;                  // of those
+  OneValue value;            // of those
 
   [[nodiscard]] bool all_solid() const {  // a tile of its parent
-    return solid == kLowerSlots && !id.several();
+    return solid == kLowerSlots && !value.several();
   }
   [[nodiscard]] bool stored() const { return !all_solid() && (leaves != 0 || solid != 0); }
 };
@@ -82,7 +81,7 @@ struct Upper {
 /// An upper node that is all solid.
 struct RootTile {
   glm::ivec3 index{0};
-  std::uint32_t id = 0;
+  std::uint32_t value = 0;
 };
 
 /// A piece of the file that one thread makes: the head of an upper node, or the topology or the
@@ -93,65 +92,27 @@ struct Block {
   int x = 0, y = 0;       // in lower nodes of the whole grid
 };
 
-/// The active values of a node as they stand in a file. Their number tells how many bytes they
-/// take, and all but ids are alike.
-class ValueLists {
+/// The active values of an inner node as they stand in a file: true, or floats. Tiles are few, so
+/// floats stand as they are: [minus their bytes:64 | floats].
+class TileValues {
  public:
-  explicit ValueLists(VdbValues values) : values_(values) {
-    if (values == VdbValues::kFog) lists_.resize(kUpperSlots + 1);
-  }
-  /// Notes that a list of n values will be asked for. Not from several threads.
-  void need(std::size_t n) {
-    if (values_ == VdbValues::kFog && lists_[n].empty()) {
-      lists_[n] = " ";
-      needed_.push_back(n);
-    }
-  }
-  void make(const Execution& execution) {
-    parallel_for(execution, needed_.size(),
-                 [&](std::size_t i, int) { lists_[needed_[i]] = zipped_ones(needed_[i]); });
-    needed_.clear();
-  }
+  explicit TileValues(VdbValues values) : floats_(values == VdbValues::kFloat) {}
   [[nodiscard]] std::size_t bytes(std::size_t n) const {
-    if (values_ == VdbValues::kMask) return n;
-    if (values_ == VdbValues::kFog) return lists_[n].size();
-    return sizeof(std::int64_t) + n * sizeof(std::uint32_t);
+    return floats_ ? sizeof(std::int64_t) + n * sizeof(float) : n;
   }
-  /// Writes the list of n values. `ids`, the values, count with ids only; tiles are few, so theirs
-  /// stand as they are.
-  std::byte* copy(std::size_t n, std::byte* to, std::span<const std::uint32_t> ids = {}) const {
-    if (values_ == VdbValues::kMask) {
+  /// Writes the list of n values. `values`, the bits of floats, count with floats only.
+  void copy(std::size_t n, std::byte* to, std::span<const std::uint32_t> values) const {
+    if (!floats_) {
       std::memset(to, 1, n);
-    } else if (values_ == VdbValues::kFog) {
-      std::memcpy(to, lists_[n].data(), lists_[n].size());
-    } else {
-      const std::int64_t count = -static_cast<std::int64_t>(ids.size_bytes());
-      std::memcpy(to, &count, sizeof count);
-      if (n != 0) std::memcpy(to + sizeof count, ids.data(), ids.size_bytes());
+      return;
     }
-    return to + bytes(n);
+    const std::int64_t count = -static_cast<std::int64_t>(values.size_bytes());
+    std::memcpy(to, &count, sizeof count);
+    if (n != 0) std::memcpy(to + sizeof count, values.data(), values.size_bytes());
   }
 
  private:
-  // [bytes:64 | zlib stream], or minus the bytes and the values themselves if that is shorter
-  static std::string zipped_ones(std::size_t n) {
-    const std::vector<float> ones(n, 1.0f);
-    const auto plain = static_cast<uLong>(n * sizeof(float));
-    uLongf length = compressBound(plain);
-    std::string data(length, '\0');
-    const int status = compress2(reinterpret_cast<Bytef*>(data.data()), &length,
-                                 reinterpret_cast<const Bytef*>(ones.data()), plain, 6);
-    const bool smaller = status == Z_OK && length < plain;
-    const std::int64_t count =
-        smaller ? static_cast<std::int64_t>(length) : -static_cast<std::int64_t>(plain);
-    std::string list(reinterpret_cast<const char*>(&count), sizeof count);
-    if (smaller) return list.append(data, 0, length);
-    return list.append(reinterpret_cast<const char*>(ones.data()), plain);
-  }
-
-  VdbValues values_;
-  std::vector<std::string> lists_;
-  std::vector<std::size_t> needed_;
+  bool floats_;
 };
 
 class VdbWriter final : public SlabWriter {
@@ -159,10 +120,12 @@ class VdbWriter final : public SlabWriter {
   VdbWriter(const std::string& path, const VoxelGrid& grid, const VoxelWriterOptions& options,
             BlockOutput output)
       : SlabWriter(path, grid, Axis::kZ),
-        kind_(options.ids != 0 ? VdbValues::kIds
-              : options.fog    ? VdbValues::kFog
-                               : VdbValues::kMask),
-        name_(options.name.empty() ? "solid" : options.name),
+        divisor_(options.ids != 0 ? 1 : options.fog),
+        kind_(divisor_ != 0  ? VdbValues::kFloat
+              : options.mask ? VdbValues::kMask
+                             : VdbValues::kBool),
+        fog_(options.fog != 0),
+        name_(options.name),
         output_(std::move(output)),
         tiles_x_(parts(grid.dims.x, kTileSide)),
         tiles_y_(parts(grid.dims.y, kTileSide)),
@@ -199,8 +162,14 @@ class VdbWriter final : public SlabWriter {
   void make_head(const Block& block, Bytes& out);
   void make_topology(const Block& block, Bytes& out);
   void make_buffers(const Block& block, Bytes& out);
+  /// Of a leaf without numbers: mask, origin and, of bools, the mask as values.
+  [[nodiscard]] std::size_t leaf_buffer_bytes() const {
+    return sizeof(VdbLeaf) + sizeof(glm::ivec3) + (kind_ == VdbValues::kBool ? sizeof(VdbLeaf) : 0);
+  }
 
+  std::uint32_t divisor_;  // of labels, which makes them values; 0: no values
   VdbValues kind_;
+  bool fog_;
   std::string name_;
   BlockOutput output_;
   int tiles_x_, tiles_y_;
@@ -211,8 +180,7 @@ class VdbWriter final : public SlabWriter {
   std::vector<Upper> uppers_;                              // stored nodes
   std::vector<RootTile> root_tiles_;
   std::vector<Block> blocks_;
-  ValueLists values_;
-  std::array<std::uint64_t, kLeafVoxels + 1> leaf_sizes_{};  // leaves by number of voxels; fog only
+  TileValues values_;
   std::uint64_t leaves_ = 0;
 };
 
@@ -225,7 +193,7 @@ Result<void> VdbWriter::add_slab(const VoxelIntervals& slab, const Execution& ex
     const int tv = static_cast<int>(index) / slab.tiles_u();
     if (slab.tile_empty(tu, tv)) return;
     std::unique_ptr<VdbLeafBuilder>& builder = builders_[size(worker)];
-    if (!builder) builder = std::make_unique<VdbLeafBuilder>(dims().z, kind_ == VdbValues::kIds);
+    if (!builder) builder = std::make_unique<VdbLeafBuilder>(dims().z, divisor_);
     tiles_[first + index] = builder->build(slab, tu, tv);
   });
   return {};
@@ -255,29 +223,23 @@ VdbWriter::LeafColumnArray VdbWriter::leaf_columns(int x, int y, int first_z) co
 
 void VdbWriter::count(const Execution& execution) {
   lower_nodes_.resize(size(lowers_.x) * size(lowers_.y) * size(lowers_.z));
-  std::mutex mutex;
   parallel_for(execution, size(lowers_.x) * size(lowers_.y), [&](std::size_t index, int) {
     const int x = static_cast<int>(index) / lowers_.y, y = static_cast<int>(index) % lowers_.y;
     LowerNode* nodes = lower_column(x, y);
-    std::array<std::uint64_t, kLeafVoxels + 1> sizes{};
     for (const LeafColumn& column : leaf_columns(x, y, 0)) {
       for (std::uint32_t i = column.leaf; i < column.leaf_end; ++i) {
         ++nodes[column.tile->leaf_z[i] / kLowerSide].leaves;
-        if (kind_ == VdbValues::kFog) ++sizes[size(column.tile->leaves[i].count())];
       }
       for (std::uint32_t i = column.run; i < column.run_end; ++i) {
         const VdbLeafTile::Run run = column.tile->runs[i];
         for (int begin = run.begin; begin < run.end;) {
           const int end = std::min<int>(run.end, (begin / kLowerSide + 1) * kLowerSide);
           nodes[begin / kLowerSide].solid += static_cast<std::uint32_t>(end - begin);
-          nodes[begin / kLowerSide].id.add(column.tile->run_id(i));
+          nodes[begin / kLowerSide].value.add(column.tile->run_value(i));
           begin = end;
         }
       }
     }
-    if (kind_ != VdbValues::kFog) return;
-    const std::lock_guard lock(mutex);
-    for (std::size_t n = 0; n <= kLeafVoxels; ++n) leaf_sizes_[n] += sizes[n];
   });
 }
 
@@ -297,15 +259,12 @@ void VdbWriter::lay_out() {
     blocks_.push_back(blocks_[i]);
     blocks_.back().kind = Block::kBuffers;
   }
-  for (std::size_t n = 0; n <= kLeafVoxels; ++n) {
-    if (leaf_sizes_[n] != 0) values_.need(n);
-  }
 }
 
 void VdbWriter::lay_out_upper(const glm::ivec3& upper) {
   const glm::ivec3 first = first_lower(upper), last = last_lower(upper);
   std::size_t solid = 0;
-  OneId id;
+  OneValue value;
   const std::size_t blocks_before = blocks_.size();
   blocks_.push_back({Block::kHead, uppers_.size(), 0, 0});
   for (int x = first.x; x < last.x; ++x) {
@@ -315,23 +274,21 @@ void VdbWriter::lay_out_upper(const glm::ivec3& upper) {
       for (int z = first.z; z < last.z; ++z) {
         if (nodes[z].all_solid()) {
           ++solid;
-          id.add(nodes[z].id.get());
+          value.add(nodes[z].value.get());
         }
         if (!nodes[z].stored()) continue;
         stored = true;
-        values_.need(nodes[z].solid);
         leaves_ += nodes[z].leaves;
       }
       if (stored) blocks_.push_back({Block::kTopology, uppers_.size(), x, y});
     }
   }
   const bool nothing = solid == 0 && blocks_.size() == blocks_before + 1;
-  if (nothing || (solid == kUpperSlots && !id.several())) {
+  if (nothing || (solid == kUpperSlots && !value.several())) {
     blocks_.pop_back();
-    if (!nothing) root_tiles_.push_back({upper, id.get()});
+    if (!nothing) root_tiles_.push_back({upper, value.get()});
     return;
   }
-  values_.need(solid);
   uppers_.push_back({upper, solid});
 }
 
@@ -342,10 +299,9 @@ std::string VdbWriter::root() const {
   const auto put = [&](const auto& value) {
     bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
   };
-  const auto put_value = [&](std::uint32_t id) {
-    if (kind_ == VdbValues::kMask) put(static_cast<std::uint8_t>(id));
-    if (kind_ == VdbValues::kFog) put(static_cast<float>(id));
-    if (kind_ == VdbValues::kIds) put(id);
+  const auto put_value = [&](std::uint32_t value) {
+    if (kind_ == VdbValues::kFloat) return put(value);
+    put(static_cast<std::uint8_t>(value));
   };
   put(std::uint32_t{1});  // one buffer a leaf
   put_value(0);           // background
@@ -353,7 +309,7 @@ std::string VdbWriter::root() const {
   put(static_cast<std::uint32_t>(uppers_.size()));
   for (const RootTile& tile : root_tiles_) {
     put(tile.index * kUpperVoxels);
-    put_value(tile.id);
+    put_value(tile.value);
     put(std::uint8_t{1});  // active
   }
   return bytes;
@@ -364,7 +320,7 @@ void VdbWriter::make_head(const Block& block, Bytes& out) {
   const glm::ivec3 upper = uppers_[block.upper].index;
   const glm::ivec3 first = first_lower(upper), last = last_lower(upper);
   std::array<std::uint32_t, kUpperSlots / 32> child{}, active{};  // a word is a column along z
-  std::vector<std::uint32_t> ids;
+  std::vector<std::uint32_t> values;
   for (int x = first.x; x < last.x; ++x) {
     for (int y = first.y; y < last.y; ++y) {
       const LowerNode* nodes = lower_column(x, y);
@@ -374,7 +330,7 @@ void VdbWriter::make_head(const Block& block, Bytes& out) {
         if (nodes[z].stored()) child[word] |= bit;
         if (!nodes[z].all_solid()) continue;
         active[word] |= bit;
-        ids.push_back(nodes[z].id.get());
+        values.push_back(nodes[z].value.get());
       }
     }
   }
@@ -386,7 +342,7 @@ void VdbWriter::make_head(const Block& block, Bytes& out) {
   std::memcpy(to += sizeof origin, child.data(), sizeof child);
   std::memcpy(to += sizeof child, active.data(), sizeof active);
   *(to += sizeof active) = std::byte{kActiveValuesOnly};
-  values_.copy(solid, to + 1, ids);
+  values_.copy(solid, to + 1, values);
 }
 
 void VdbWriter::make_topology(const Block& block, Bytes& out) {
@@ -402,15 +358,15 @@ void VdbWriter::make_topology(const Block& block, Bytes& out) {
   }
   out.resize(bytes);
   std::byte* to = out.data();
-  const bool with_ids = kind_ == VdbValues::kIds;
-  std::vector<std::uint32_t> ids;
+  const bool with_values = kind_ == VdbValues::kFloat;
+  std::vector<std::uint32_t> values;
   LeafColumnArray columns = leaf_columns(block.x, block.y, z_begin * kLowerSide);
   for (int z = z_begin; z < z_end; ++z) {
     const bool stored = nodes[z].stored();
     const int begin = z * kLowerSide, end = begin + kLowerSide;
     std::byte* head = to;
     if (stored) to += kLowerBytes + values_.bytes(nodes[z].solid);
-    ids.clear();
+    values.clear();
     // Also where nothing is stored, since the columns have to move on.
     for (std::size_t c = 0; c < kLeafColumns; ++c) {
       LeafColumn& column = columns[c];
@@ -421,7 +377,9 @@ void VdbWriter::make_topology(const Block& block, Bytes& out) {
         const int from = std::max<int>(run.begin, begin) - begin;
         const int past = std::min<int>(run.end, end) - begin;
         active_bits |= (1u << past) - (1u << from);
-        if (with_ids) ids.insert(ids.end(), size(past - from), column.tile->run_ids[column.run]);
+        if (with_values) {
+          values.insert(values.end(), size(past - from), column.tile->run_values[column.run]);
+        }
         if (run.end > end) break;  // goes on in the next node
       }
       const std::uint32_t first = column.leaf;
@@ -442,7 +400,7 @@ void VdbWriter::make_topology(const Block& block, Bytes& out) {
     std::memcpy(head, child.data(), sizeof child);
     std::memcpy(head += sizeof child, active.data(), sizeof active);
     *(head += sizeof active) = std::byte{kActiveValuesOnly};
-    values_.copy(nodes[z].solid, head + 1, ids);
+    values_.copy(nodes[z].solid, head + 1, values);
   }
 }
 
@@ -454,9 +412,9 @@ void VdbWriter::make_buffers(const Block& block, Bytes& out) {
   for (int z = z_begin; z < z_end; ++z) leaves += nodes[z].leaves;
   glm::ivec3 origin;
   const std::size_t largest =
-      sizeof(VdbLeaf) + (kind_ == VdbValues::kMask
-                             ? sizeof origin
-                             : 1 + sizeof(std::int64_t) + kLeafVoxels * sizeof(float));
+      kind_ == VdbValues::kFloat
+          ? sizeof(VdbLeaf) + 1 + sizeof(std::int64_t) + kLeafVoxels * sizeof(float)
+          : leaf_buffer_bytes();
   out.resize(leaves * largest);
   std::byte* to = out.data();
   LeafColumnArray columns = leaf_columns(block.x, block.y, z_begin * kLowerSide);
@@ -473,18 +431,19 @@ void VdbWriter::make_buffers(const Block& block, Bytes& out) {
         const VdbLeaf& leaf = column.tile->leaves[column.leaf];
         std::memcpy(to, &leaf, sizeof leaf);
         to += sizeof leaf;
-        if (kind_ != VdbValues::kMask) *to++ = std::byte{kActiveValuesOnly};
-        if (kind_ == VdbValues::kFog) {
-          to = values_.copy(size(leaf.count()), to);
-        } else if (kind_ == VdbValues::kIds) {
+        if (kind_ == VdbValues::kFloat) {
+          *to++ = std::byte{kActiveValuesOnly};
           const std::span<const std::byte> list = column.tile->leaf_values(column.leaf);
           std::memcpy(to, list.data(), list.size());
           to += list.size();
-        } else {
-          origin.z = leaf_z * 8;
-          std::memcpy(to, &origin, sizeof origin);
-          to += sizeof origin;
+          continue;
         }
+        origin.z = leaf_z * 8;
+        std::memcpy(to, &origin, sizeof origin);
+        to += sizeof origin;
+        if (kind_ == VdbValues::kMask) continue;
+        std::memcpy(to, &leaf, sizeof leaf);  // the values of a bool are bits, too
+        to += sizeof leaf;
       }
     }
   }
@@ -496,6 +455,7 @@ VdbHeader VdbWriter::header(std::uint64_t topology_bytes) const {
   header.name = name_;
   header.grid = grid();
   header.values = kind_;
+  header.fog = fog_;
   std::uint64_t value_bytes = 0;
   header.lower = glm::ivec3(INT_MAX);
   header.upper = glm::ivec3(INT_MIN);
@@ -508,17 +468,8 @@ VdbHeader VdbWriter::header(std::uint64_t topology_bytes) const {
     header.upper = glm::max(header.upper, tile->upper);
   }
   header.topology_bytes = topology_bytes;
-  if (kind_ == VdbValues::kIds) {
-    header.buffers_bytes = leaves_ * (sizeof(VdbLeaf) + 1) + value_bytes;
-  } else if (kind_ == VdbValues::kFog) {
-    for (std::size_t n = 0; n <= kLeafVoxels; ++n) {
-      if (leaf_sizes_[n] != 0) {
-        header.buffers_bytes += leaf_sizes_[n] * (sizeof(VdbLeaf) + 1 + values_.bytes(n));
-      }
-    }
-  } else {
-    header.buffers_bytes = leaves_ * (sizeof(VdbLeaf) + sizeof(glm::ivec3));
-  }
+  header.buffers_bytes = kind_ == VdbValues::kFloat ? leaves_ * (sizeof(VdbLeaf) + 1) + value_bytes
+                                                    : leaves_ * leaf_buffer_bytes();
   return header;
 }
 
@@ -526,7 +477,6 @@ Result<void> VdbWriter::finish_output(const Execution& execution) {
   builders_.clear();
   count(execution);
   lay_out();
-  values_.make(execution);
   // What was skipped would be missing in the sizes below.
   if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "cancelled");
 
@@ -560,6 +510,16 @@ Result<void> VdbWriter::finish_output(const Execution& execution) {
 
 VoxelWriterResult open_vdb_writer(const std::string& path, const VoxelGrid& grid,
                                   const VoxelWriterOptions& options) {
+  // math/Maps.h: 3 * Tolerance<double>::value(). Such a file can be read, but not copied or scaled.
+  constexpr double kLeastVolume = 3e-15;
+  const glm::dvec3 s = grid.voxel_size;
+  const double volume = s.x * s.y * s.z;
+  if (!(volume >= kLeastVolume) || !std::isfinite(volume)) {
+    return fail(ErrorCode::kUsage,
+                "{}: voxels of {} x {} x {} have a volume of {:.3g}; OpenVDB takes 3e-15 to 1e308: "
+                "scale the mesh, or write another format",
+                path, s.x, s.y, s.z, volume);
+  }
   Result<BlockOutput> output = BlockOutput::create(path);
   if (!output) return tl::unexpected(output.error());
   return std::make_unique<VdbWriter>(path, grid, options, std::move(*output));

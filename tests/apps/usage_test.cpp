@@ -126,6 +126,19 @@ TEST_F(Usage, OptionsThatWouldHaveNoEffectAreRefused) {
   refuses({"voxelize", "box.obj", "-r", "4", "--fog", "-o", "a.x", "--format", "nrrd"},
           "format nrrd holds no fog");
   refuses({"voxelize", "box.obj", "-r", "4", "--fog", "--stats"}, "--fog needs -o");
+  refuses({"voxelize", "box.obj", "-r", "4", "--fog", "--surface=6", "--ids", "-o", "a.vdb"},
+          "--ids");
+  refuses({"voxelize", "box.obj", "-r", "4", "--fog=4", "--surface", "-o", "a.vdb"}, "--surface");
+  refuses({"voxelize", "box.obj", "-r", "4", "--fog=0", "-o", "a.vdb"}, "1 to 16, got 0");
+  refuses({"voxelize", "box.obj", "-r", "4", "--fog=17", "-o", "a.vdb"}, "1 to 16, got 17");
+  refuses({"voxelize", "box.obj", "-r", "4", "--fog=x", "-o", "a.vdb"}, "'x'");
+  refuses({"voxelize", "box.obj", "-r", "4", "--mask", "-o", "a.npy"}, "--mask is for .vdb");
+  refuses({"voxelize", "box.obj", "-r", "4", "--mask", "--ids", "-o", "a.vdb"}, "--mask has none");
+  refuses({"voxelize", "box.obj", "-r", "4", "--mask", "--fog", "-o", "a.vdb"}, "--mask");
+  refuses({"voxelize", "box.obj", "-r", "4", "--mask", "--stats"}, "--mask needs -o");
+  refuses({"voxelize", "box.obj", "-r", "4", "--name", "a", "-o", "a.npy"},
+          "format npy holds no name");
+  refuses({"voxelize", "box.obj", "-r", "4", "--name", "a", "--stats"}, "--name needs -o");
   refuses({"voxelize", "box.obj", "-r", "4", "--stats", "--surface", "--backend", "gl"},
           "--surface alone has none");
   for (const char* backend : {"cpu", "auto"}) {

@@ -281,12 +281,35 @@ TEST_F(Voxelize, FilesOfEveryFormatAppearAndAreReported) {
     EXPECT_EQ(found["output"]["bytes"], place.read(name).size()) << name;
     EXPECT_GT(place.read(name).size(), 100u) << name;
   }
+  const auto has = [&](const char* file, const char* word) {
+    return place.read(file).find(word) != std::string::npos;
+  };
+  EXPECT_TRUE(has("a.vdb", "Tree_bool_5_4_3") && has("a.vdb", "solid"));
+  (void)report({"box.obj", "-r", "16", "--mask", "--name", "mine", "-o", "a.vdb"});
+  EXPECT_TRUE(has("a.vdb", "Tree_mask_5_4_3") && has("a.vdb", "mine") && !has("a.vdb", "solid"));
+  (void)report({"box.obj", "-r", "16", "--name", "mine", "-o", "a.vti"});
+  EXPECT_TRUE(has("a.vti", "Name=\"mine\""));
   const json slices = report({"box.obj", "-r", "16", "-o", "slices/"});
   EXPECT_EQ(slices["output"]["format"], "png");
   EXPECT_TRUE(slices["output"]["bytes"].is_null());
   EXPECT_TRUE(place.has("slices"));
   (void)report({"box.obj", "-r", "16", "-o", "a.zarr"});
   EXPECT_TRUE(place.has("a.zarr/.zarray"));
+}
+
+// The numbers are of the voxels whose centre is inside, whatever the file's values are.
+TEST_F(Voxelize, FogHasTheReportOfTheSolid) {
+  put("ball.obj", make_icosphere(1.0, 4));
+  const json solid = report({"ball.obj", "-r", "50", "--checksum", "-o", "solid.vdb"});
+  const json fog = report({"ball.obj", "-r", "50", "--checksum", "--fog", "-o", "fog.vdb"});
+  EXPECT_EQ(fog["voxels"], solid["voxels"]);
+  EXPECT_EQ(fog["lists"], solid["lists"]);
+  const auto bytes = [](const json& found) { return found["output"]["bytes"].get<int>(); };
+  EXPECT_GT(bytes(fog), bytes(solid));
+  // A surface has no filled fraction: its voxels are 1, with or without a number.
+  (void)report({"ball.obj", "-r", "50", "--surface", "--fog", "-o", "a.vdb"});
+  (void)report({"ball.obj", "-r", "50", "--surface", "--fog=1", "-o", "b.vdb"});
+  EXPECT_EQ(place.read("a.vdb"), place.read("b.vdb"));
 }
 
 TEST_F(Voxelize, AFileOnStandardOutputIsTheSameFileAndNothingElse) {

@@ -4,6 +4,8 @@
 #include <openvdb/io/Stream.h>
 #include <openvdb/openvdb.h>
 
+#include <cmath>
+#include <glm/vector_relational.hpp>
 #include <sstream>
 
 #include "tests/voxelize/voxel_samples.h"
@@ -45,8 +47,9 @@ class WriteVdb : public ::testing::Test {
   }
 
   /// The tree that OpenVDB makes of the same set.
-  static openvdb::MaskGrid::Ptr reference(const VoxelIntervals& set) {
-    auto grid = openvdb::MaskGrid::create();
+  template <class GridType = openvdb::BoolGrid>
+  static typename GridType::Ptr reference(const VoxelIntervals& set) {
+    auto grid = GridType::create();
     for (int y = 0; y < set.grid().dims.y; ++y) {
       for (int x = 0; x < set.grid().dims.x; ++x) {
         for (const Interval& interval : set.column(x, y)) {
@@ -62,6 +65,12 @@ class WriteVdb : public ::testing::Test {
   int files_ = 0;
 };
 
+VoxelWriterOptions of_kind(bool fog) {
+  VoxelWriterOptions options;
+  options.fog = fog ? 1 : 0;
+  return options;
+}
+
 std::string tree_bytes(const openvdb::GridBase& grid) {
   std::ostringstream stream(std::ios::binary);
   openvdb::io::setDataCompression(stream, openvdb::io::COMPRESS_ACTIVE_MASK);
@@ -70,18 +79,24 @@ std::string tree_bytes(const openvdb::GridBase& grid) {
   return stream.str();
 }
 
-TEST_F(WriteVdb, MaskHoldsExactlyTheSet) {
+TEST_F(WriteVdb, BoolsHoldExactlyTheSet) {
   for (const Sample& sample : small_samples()) {
     SCOPED_TRACE(sample.name);
     const VoxelIntervals set = intervals_of(sample, Axis::kZ);
-    const auto grid = read<openvdb::MaskGrid>(write(set));
+    const auto grid = read<openvdb::BoolGrid>(write(set));
+    EXPECT_FALSE(grid->background());
     ASSERT_EQ(grid->activeVoxelCount(), set.solid_voxels());
     auto accessor = grid->getConstAccessor();
     int wrong = 0;
-    for (int i = 0; i < sample.grid.dims.x; ++i) {
-      for (int j = 0; j < sample.grid.dims.y; ++j) {
-        for (int k = 0; k < sample.grid.dims.z; ++k) {
-          wrong += accessor.isValueOn({i, j, k}) != sample.solid(i, j, k) ? 1 : 0;
+    for (int i = -1; i <= sample.grid.dims.x; ++i) {
+      for (int j = -1; j <= sample.grid.dims.y; ++j) {
+        for (int k = -1; k <= sample.grid.dims.z; ++k) {
+          const glm::ivec3 at(i, j, k);
+          const bool in_grid = glm::all(glm::greaterThanEqual(at, glm::ivec3(0))) &&
+                               glm::all(glm::lessThan(at, sample.grid.dims));
+          const bool solid = in_grid && sample.solid(i, j, k);
+          wrong += accessor.isValueOn({i, j, k}) != solid ? 1 : 0;
+          wrong += accessor.getValue({i, j, k}) != solid ? 1 : 0;
         }
       }
     }
@@ -93,10 +108,19 @@ TEST_F(WriteVdb, TreeIsByteForByteTheOneOpenVdbWrites) {
   for (const Sample& sample : small_samples()) {
     SCOPED_TRACE(sample.name);
     const VoxelIntervals set = intervals_of(sample, Axis::kZ);
-    const std::string expected = tree_bytes(*reference(set));
-    const std::string bytes = file_bytes(write(set));
-    ASSERT_GT(bytes.size(), expected.size());
-    EXPECT_TRUE(bytes.ends_with(expected));
+    for (const bool mask : {false, true}) {
+      const std::string expected =
+          mask ? tree_bytes(*reference<openvdb::MaskGrid>(set)) : tree_bytes(*reference(set));
+      VoxelWriterOptions options;
+      options.mask = mask;
+      const std::string path = write(set, options);
+      const std::string bytes = file_bytes(path);
+      ASSERT_GT(bytes.size(), expected.size());
+      EXPECT_TRUE(bytes.ends_with(expected));
+      if (mask) {
+        EXPECT_EQ(read<openvdb::MaskGrid>(path)->activeVoxelCount(), set.solid_voxels());
+      }
+    }
   }
 }
 
@@ -104,7 +128,7 @@ TEST_F(WriteVdb, InsideIsTiles) {
   const VoxelGrid grid = make_grid({300, 290, 280});
   const VoxelIntervals set =
       intervals_from_predicate(grid, Axis::kZ, [](int, int, int) { return true; });
-  const auto read_back = read<openvdb::MaskGrid>(write(set));
+  const auto read_back = read<openvdb::BoolGrid>(write(set));
   // 2 x 2 x 2 whole nodes of 128^3 become tiles of the node above.
   std::vector<openvdb::Index32> nodes = read_back->tree().nodeCount();
   EXPECT_EQ(nodes.at(1), 27u - 8u);
@@ -121,7 +145,7 @@ TEST_F(WriteVdb, GridsBeyondOneRootNodeKeepTheirOrder) {
                         }};
     const VoxelIntervals set = intervals_of(sample, Axis::kZ);
     const std::string path = write(set);
-    EXPECT_EQ(read<openvdb::MaskGrid>(path)->activeVoxelCount(), set.solid_voxels());
+    EXPECT_EQ(read<openvdb::BoolGrid>(path)->activeVoxelCount(), set.solid_voxels());
     EXPECT_TRUE(file_bytes(path).ends_with(tree_bytes(*reference(set)))) << dims.x << " " << dims.y;
   }
 }
@@ -136,11 +160,11 @@ TEST_F(WriteVdb, SolidRootNodeIsOneTile) {
     for (int tu = 0; tu < set.tiles_u(); ++tu) set.set_tile(tu, tv, offsets, items);
   }
   for (const bool fog : {false, true}) {
-    const std::string path = write(set, {.fog = fog});
+    const std::string path = write(set, of_kind(fog));
     EXPECT_LT(file_bytes(path).size(), 2000u);
     openvdb::io::File file(path);
     file.open();
-    const auto read_back = file.readGrid("solid");
+    const auto read_back = file.readGrid(fog ? "density" : "solid");
     EXPECT_EQ(read_back->activeVoxelCount(), std::uint64_t{1} << 36);
     EXPECT_EQ(read_back->baseTree().nonLeafCount(), 1u);  // the root alone
   }
@@ -150,7 +174,7 @@ TEST_F(WriteVdb, FogIsOneInsideAndZeroOutside) {
   for (const Sample& sample : small_samples()) {
     SCOPED_TRACE(sample.name);
     const VoxelIntervals set = intervals_of(sample, Axis::kZ);
-    const auto grid = read<openvdb::FloatGrid>(write(set, {.fog = true}));
+    const auto grid = read<openvdb::FloatGrid>(write(set, of_kind(true)), "density");
     EXPECT_EQ(grid->getGridClass(), openvdb::GRID_FOG_VOLUME);
     EXPECT_EQ(grid->background(), 0.0f);
     EXPECT_TRUE(grid->tree().hasSameTopology(reference(set)->tree()));
@@ -168,6 +192,28 @@ TEST_F(WriteVdb, FogIsOneInsideAndZeroOutside) {
     }
     EXPECT_EQ(wrong, 0);
   }
+}
+
+TEST_F(WriteVdb, FogIsTheFractionOfSamplesThatLabelsCount) {
+  const VoxelGrid grid = make_grid({75, 70, 66});
+  const IdOf samples = some_ids(27);
+  VoxelWriterOptions options;
+  options.fog = 27;
+  const std::string path = write(labelled(grid, Axis::kZ, samples), options);
+  const auto fog = read<openvdb::FloatGrid>(path, "density");
+  EXPECT_EQ(fog->getGridClass(), openvdb::GRID_FOG_VOLUME);
+  auto accessor = fog->getConstAccessor();
+  int wrong = 0;
+  for (int i = 0; i < grid.dims.x; ++i) {
+    for (int j = 0; j < grid.dims.y; ++j) {
+      for (int k = 0; k < grid.dims.z; ++k) {
+        const std::uint32_t count = samples(i, j, k);
+        wrong += accessor.getValue({i, j, k}) != static_cast<float>(count) / 27.0f ? 1 : 0;
+        wrong += accessor.isValueOn({i, j, k}) != (count != 0) ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_EQ(wrong, 0);
 }
 
 TEST_F(WriteVdb, IdsAreTheTreeThatOpenVdbMakes) {
@@ -205,17 +251,17 @@ TEST_F(WriteVdb, IdsAreTheTreeThatOpenVdbMakes) {
     options.name = "ids";
     const std::string path = write(set, options);
     EXPECT_EQ(file_bytes(write(set, options, 5, 1)), file_bytes(path));
-    const auto grid = read<openvdb::Int32Grid>(path, "ids");
-    EXPECT_EQ(grid->background(), 0);
+    const auto grid = read<openvdb::FloatGrid>(path, "ids");
+    EXPECT_EQ(grid->background(), 0.0f);
     EXPECT_EQ(grid->activeVoxelCount(), set.solid_voxels());
-    auto expected = openvdb::Int32Grid::create();
+    auto expected = openvdb::FloatGrid::create();
     auto to = expected->getAccessor();
     auto from = grid->getConstAccessor();
     int wrong = 0;
     for (int i = 0; i < dims.x; ++i) {
       for (int j = 0; j < dims.y; ++j) {
         for (int k = 0; k < dims.z; ++k) {
-          const auto id = static_cast<int>(sample.id(i, j, k));
+          const auto id = static_cast<float>(sample.id(i, j, k));
           if (id != 0) to.setValueOn({i, j, k}, id);
           wrong += from.getValue({i, j, k}) != id || from.isValueOn({i, j, k}) != (id != 0) ? 1 : 0;
         }
@@ -248,7 +294,7 @@ TEST_F(WriteVdb, IdsOfSolidRootNodesAreTiles) {
     }
     VoxelWriterOptions options;
     options.ids = 8;
-    const auto read_back = read<openvdb::Int32Grid>(write(set, options));
+    const auto read_back = read<openvdb::FloatGrid>(write(set, options), "ids");
     EXPECT_EQ(read_back->activeVoxelCount(), std::uint64_t{1} << 36);
     EXPECT_EQ(read_back->tree().leafCount(), 0u);
     EXPECT_EQ(read_back->tree().nonLeafCount(), pieces == 1 ? 1u : 2u);
@@ -258,13 +304,49 @@ TEST_F(WriteVdb, IdsOfSolidRootNodesAreTiles) {
   }
 }
 
-TEST_F(WriteVdb, FogWithIdsIsRefused) {
+TEST_F(WriteVdb, FogIdsAndMaskTogetherAreRefused) {
+  for (const int two : {1 | 2, 1 | 4, 2 | 4}) {
+    VoxelWriterOptions options;
+    options.ids = (two & 1) != 0 ? 2 : 0;
+    options.fog = (two & 2) != 0 ? 8 : 0;
+    options.mask = (two & 4) != 0;
+    const auto refused =
+        open_voxel_writer(folder_.file("a.vdb"), "", make_grid({8, 8, 8}), options);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::kUsage);
+  }
+}
+
+TEST_F(WriteVdb, IdsThatFloatsDoNotCountAreRefused) {
   VoxelWriterOptions options;
-  options.ids = 2;
-  options.fog = true;
+  options.ids = 1 << 24;
+  EXPECT_TRUE(open_voxel_writer(folder_.file("a.vdb"), "", make_grid({8, 8, 8}), options));
+  ++options.ids;
   const auto refused = open_voxel_writer(folder_.file("a.vdb"), "", make_grid({8, 8, 8}), options);
   ASSERT_FALSE(refused);
-  EXPECT_EQ(refused.error().code, ErrorCode::kUsage);
+  EXPECT_NE(refused.error().message.find("16777216"), std::string::npos) << refused.error().message;
+}
+
+// Programs copy and scale transforms: a file that only opens is not enough.
+TEST_F(WriteVdb, VoxelSizesThatOpenVdbRefusesAreRefused) {
+  for (const glm::dvec3 size :
+       {glm::dvec3(1e-4), glm::dvec3(1.45e-5), glm::dvec3(1.44e-5), glm::dvec3(1e-5),
+        glm::dvec3(1e-110), glm::dvec3(1e80), glm::dvec3(1.0, 1.0, 4e-15),
+        glm::dvec3(1.0, 1.0, 2e-15), glm::dvec3(1e-6, 1e-6, 1.0), glm::dvec3(1e120)}) {
+    bool taken = true;
+    try {
+      const openvdb::math::ScaleMap map(openvdb::Vec3d(size.x, size.y, size.z));
+      taken = std::isfinite(map.getAffineMap()->determinant());
+    } catch (const openvdb::ArithmeticError&) {
+      taken = false;
+    }
+    const auto opened =
+        open_voxel_writer(folder_.file("a.vdb"), "", make_grid({8, 8, 8}, glm::dvec3(0), size));
+    EXPECT_EQ(opened.has_value(), taken) << size.x << " " << size.z;
+    if (!opened) {
+      EXPECT_EQ(opened.error().code, ErrorCode::kUsage);
+    }
+  }
 }
 
 TEST_F(WriteVdb, IndexCoordinatesAreVoxelCentres) {
@@ -273,9 +355,9 @@ TEST_F(WriteVdb, IndexCoordinatesAreVoxelCentres) {
       const VoxelGrid grid = make_grid({20, 30, 40}, {1.0 / 3, -1e6, 0.7}, size);
       const VoxelIntervals set =
           intervals_from_predicate(grid, Axis::kZ, [](int i, int j, int) { return i == j; });
-      openvdb::io::File file(write(set, {.fog = fog}));
+      openvdb::io::File file(write(set, of_kind(fog)));
       file.open();
-      const auto read_back = file.readGrid("solid");
+      const auto read_back = file.readGrid(fog ? "density" : "solid");
       const openvdb::math::Transform& transform = read_back->transform();
       EXPECT_TRUE(transform.isLinear());
       EXPECT_EQ(transform.hasUniformScale(), size.x == size.y);
@@ -301,7 +383,7 @@ TEST_F(WriteVdb, MetadataTellsCountAndBounds) {
   const VoxelIntervals set = intervals_from_predicate(grid, Axis::kZ, [](int i, int j, int k) {
     return i >= 7 && i <= 90 && j >= 66 && j <= 190 && k >= 5 && k <= 280;
   });
-  const auto read_back = read<openvdb::MaskGrid>(write(set));
+  const auto read_back = read<openvdb::BoolGrid>(write(set));
   EXPECT_EQ(read_back->metaValue<openvdb::Int64>("file_voxel_count"),
             static_cast<openvdb::Int64>(set.solid_voxels()));
   EXPECT_EQ(read_back->metaValue<openvdb::Vec3i>("file_bbox_min"), openvdb::Vec3i(7, 66, 5));
@@ -324,10 +406,10 @@ TEST_F(WriteVdb, BytesDoNotDependOnThreadsOrSlabs) {
     SCOPED_TRACE(sample.name);
     const VoxelIntervals set = intervals_of(sample, Axis::kZ);
     for (const bool fog : {false, true}) {
-      const std::string expected = file_bytes(write(set, {.fog = fog}, 1));
-      EXPECT_EQ(file_bytes(write(set, {.fog = fog}, 1)), expected);
-      EXPECT_EQ(file_bytes(write(set, {.fog = fog}, 2, 1)), expected);
-      EXPECT_EQ(file_bytes(write(set, {.fog = fog}, 5, 2)), expected);
+      const std::string expected = file_bytes(write(set, of_kind(fog), 1));
+      EXPECT_EQ(file_bytes(write(set, of_kind(fog), 1)), expected);
+      EXPECT_EQ(file_bytes(write(set, of_kind(fog), 2, 1)), expected);
+      EXPECT_EQ(file_bytes(write(set, of_kind(fog), 5, 2)), expected);
     }
   }
 }
