@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "csg/geometry.h"
 #include "csg/program.h"
 #include "csg/view.h"
 #include "raster/lattice_mesh.h"
@@ -45,6 +46,8 @@ class Coincidence {
   /// @param world_error how far the scene's faces may be from where they are meant, world units
   Coincidence(const View& view, double world_error);
 
+  [[nodiscard]] double world_error() const { return world_error_; }
+
   /// How much nearer and how much farther the face behind a crossing may be, in depth steps.
   struct Bound {
     double nearer = 0, farther = 0;
@@ -68,8 +71,35 @@ class Coincidence {
     return 1.5 + flat_ * nearness * nearness;
   }
   double a_ = 1, b_ = 0;  ///< 1 / distance = a - b * depth; 1 for an orthographic view
-  double flat_ = 0;       ///< depth steps of world_error, times distance squared
+  double world_error_ = 0;
+  double flat_ = 0;  ///< depth steps of world_error, times distance squared
   double steep_from_ = 0;
+};
+
+/// The faces behind flips, as SurfaceFinder asks about them.
+class FlipFaces {
+ public:
+  /// Keeps references to all of them.
+  FlipFaces(const std::vector<Geometry::Part>& parts, const std::vector<ViewPart>& view_parts,
+            const Coincidence& coincidence)
+      : parts_(&parts), view_parts_(&view_parts), coincidence_(&coincidence) {}
+
+  [[nodiscard]] Coincidence::Bound bound(const Flip& flip) const {
+    if (flip.triangle == Surface::kNone) return {};
+    return coincidence_->bound((*view_parts_)[flip.solid].mesh, flip.triangle, flip.depth);
+  }
+  /// Whether the face of `below` lies beneath the plane of `above`, but not the other way around:
+  /// it begins at that plane, and `above` may go on where it does so.
+  [[nodiscard]] bool ends_at(const Flip& below, const Flip& above) const {
+    return beneath(below, above) && !beneath(above, below);
+  }
+
+ private:
+  [[nodiscard]] bool beneath(const Flip& below, const Flip& above) const;
+
+  const std::vector<Geometry::Part>* parts_;
+  const std::vector<ViewPart>* view_parts_;
+  const Coincidence* coincidence_;
 };
 
 /// Finds the visible surface among all flips of one ray. The tree is evaluated after all flips of a
@@ -80,15 +110,16 @@ class Coincidence {
 ///   united with the rest has no such other side, and stays;
 /// - of several solids whose faces coincide with the surface and contribute to it, the one shown is
 ///   one without which it would not be there (a hidden face that ends in it has no part in it),
-///   then one that the ray enters rather than one that it leaves, then the first of the tree.
+///   then one that the ray enters rather than one that it leaves, then the first of the tree; but
+///   a face that ends at the plane of another gives way to it: the slope of a solid whose top lies
+///   in the top of another one, where the snap has put it in front.
 /// A ray that begins inside the tree (the eye is in the material) shows where it leaves it.
 class SurfaceFinder {
  public:
   explicit SurfaceFinder(const Program& program) : state_(program), last_(program.leaves.size()) {}
 
-  /// `bound(flip)` gives a flip's bound. Sorts `flips`.
-  template <class Bound>
-  Surface find(std::vector<Flip>& flips, Bound&& bound);
+  /// Sorts `flips`.
+  Surface find(std::vector<Flip>& flips, const FlipFaces& faces);
 
  private:
   [[nodiscard]] static Surface surface_of(const Flip& flip, std::uint32_t depth) {
@@ -114,6 +145,19 @@ class SurfaceFinder {
     state_.flip_all(turned_);
   }
 
+  /// A flip whose face coincides with the surface.
+  struct Candidate {
+    const Flip* flip;
+    bool alone;  ///< without it the surface would not be there
+  };
+  [[nodiscard]] static bool goes_before(const Candidate& a, const Candidate& b) {
+    if (a.alone != b.alone) return a.alone;
+    if (a.flip->exit != b.flip->exit) return b.flip->exit;
+    return a.flip->solid < b.flip->solid;
+  }
+  /// The one that is shown. @pre there are candidates
+  [[nodiscard]] const Flip& choose(const FlipFaces& faces) const;
+
   [[nodiscard]] bool is_plain_entry(const Flip& flip) const {
     return !flip.exit && state_.program().plain(flip.solid);
   }
@@ -123,103 +167,7 @@ class SurfaceFinder {
   std::vector<Flip> sorted_;
   std::vector<std::uint32_t> turned_;
   std::vector<std::size_t> last_;  ///< of each solid: one of its flips
+  std::vector<Candidate> candidates_;
 };
-
-template <class Bound>
-Surface SurfaceFinder::find(std::vector<Flip>& flips, Bound&& bound) {
-  sort(flips);
-  Surface found;
-  std::size_t at = 0;
-  // Of the flips that the tree's value rests on.
-  const auto group_bound = [&](std::size_t begin, std::size_t end) {
-    Coincidence::Bound largest;
-    for (std::size_t i = begin; i < end; ++i) {
-      if (!state_.supports(flips[i].solid)) continue;
-      const Coincidence::Bound one = bound(flips[i]);
-      largest.nearer = std::max(largest.nearer, one.nearer);
-      largest.farther = std::max(largest.farther, one.farther);
-    }
-    return largest;
-  };
-  while (at < flips.size()) {
-    const std::size_t begin = at;
-    at = apply(flips, at);
-    if (!state_.value()) continue;
-    const std::uint32_t depth = flips[begin].depth;
-    const Coincidence::Bound own = group_bound(begin, at);
-    const bool embedded = depth == 0 && flips[begin].triangle == Surface::kNone;
-
-    // On to where the interval ends. What lies within the bound of its beginning is settled with
-    // it; that must not depend on flips that do not matter.
-    const double settles = depth + 2.0 * own.farther;
-    std::size_t settled = at, end_begin = at, end = at;
-    bool plain = false;
-    for (std::size_t i = begin; i < at; ++i) plain = plain || is_plain_entry(flips[i]);
-    while (end < flips.size()) {
-      end_begin = end;
-      end = apply(flips, end);
-      if (!state_.value()) break;
-      if (flips[end_begin].depth <= settles) settled = end;
-      for (std::size_t i = end_begin; i < end; ++i) plain = plain || is_plain_entry(flips[i]);
-    }
-    if (!state_.value()) {
-      if (embedded) {
-        for (std::size_t i = end_begin; i < end; ++i) {
-          if (!state_.supports(flips[i].solid)) continue;
-          found = surface_of(flips[i], flips[i].depth);
-          break;
-        }
-        at = end;
-        break;
-      }
-      if (!plain &&
-          flips[end_begin].depth - depth <= own.farther + group_bound(end_begin, end).nearer) {
-        at = end;
-        continue;
-      }
-    }
-    flip_all(flips, settled, end);
-
-    // Of one solid only its last flip counts, unless it has one in the group.
-    for (std::size_t i = 0; i < settled; ++i) last_[flips[i].solid] = i;
-    for (std::size_t i = begin; i < at; ++i) last_[flips[i].solid] = i;
-    const Flip* best = nullptr;
-    bool best_alone = false;
-    for (std::size_t i = 0; i < settled; ++i) {
-      const Flip& flip = flips[i];
-      if (flip.triangle == Surface::kNone) continue;
-      if (state_.inside(flip.solid) == flip.exit) continue;
-      const bool in_group = i >= begin && i < at;
-      if (!in_group) {
-        const Coincidence::Bound its = bound(flip);
-        if (flip.depth < depth ? depth - flip.depth > own.nearer + its.farther
-                               : flip.depth - depth > own.farther + its.nearer) {
-          continue;
-        }
-        if (last_[flip.solid] != i) continue;
-      }
-      if (!state_.supports(flip.solid)) continue;  // last: it climbs the tree
-      const bool alone = state_.decides(flip.solid);
-      const bool better =
-          best == nullptr || (alone && !best_alone) ||
-          (alone == best_alone &&
-           ((best->exit && !flip.exit) || (best->exit == flip.exit && flip.solid < best->solid)));
-      if (!better) continue;
-      best = &flip;
-      best_alone = alone;
-    }
-    if (best == nullptr) best = &flips[begin];
-    found = surface_of(*best, depth);
-    at = settled;
-    break;
-  }
-  // Copying the state is a sixteenth of a flip's work for each solid and node.
-  if (at * 16 > state_.program().nodes.size() + state_.program().leaves.size()) {
-    state_.reset();
-  } else {
-    flip_all(flips, 0, at);
-  }
-  return found;
-}
 
 }  // namespace strata::csg

@@ -205,10 +205,7 @@ void TileFinder::normalize_pixel(LeafLayers& leaf, std::size_t at) {
 
 void TileFinder::show(std::uint64_t pixel) {
   ++resolved_;
-  const Surface surface = finder_.find(flips_, [&](const Flip& flip) {
-    if (flip.triangle == Surface::kNone) return Coincidence::Bound{};
-    return coincidence_->bound(view_parts_[flip.solid].mesh, flip.triangle, flip.depth);
-  });
+  const Surface surface = finder_.find(flips_, FlipFaces(parts_, view_parts_, *coincidence_));
   part_.image->depth[pixel] = surface.depth;
   part_.image->solid[pixel] = surface.solid;
   part_.image->triangle[pixel] = surface.triangle | (surface.exit ? SurfaceImage::kExit : 0u);

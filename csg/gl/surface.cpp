@@ -112,10 +112,7 @@ class PixelJudge {
         flips_of(crossings_, solid, part.rule, false, flips_);
       }
     }
-    return finder_.find(flips_, [this](const Flip& flip) {
-      return frame_->coincidence.bound(frame_->view_parts[flip.solid].mesh, flip.triangle,
-                                       flip.depth);
-    });
+    return finder_.find(flips_, FlipFaces(frame_->parts, frame_->view_parts, frame_->coincidence));
   }
 
  private:

@@ -56,10 +56,7 @@ std::vector<Pixel> by_full_lists(const Tree& tree, const View& view, double rela
           flips_of(of_solid[solid], solid, part.rule, parts[solid].cut, flips);
         }
       }
-      const Surface surface = finder.find(flips, [&](const Flip& flip) {
-        if (flip.triangle == Surface::kNone) return Coincidence::Bound{};
-        return coincidence.bound(parts[flip.solid].mesh, flip.triangle, flip.depth);
-      });
+      const Surface surface = finder.find(flips, FlipFaces(geometry.parts(), parts, coincidence));
       const bool seen = surface.depth != Surface::kNone;
       const std::uint32_t triangle = seen ? parts[surface.solid].source(surface.triangle) : 0;
       result.push_back(
@@ -457,6 +454,68 @@ TEST(ConcaveSolids, ShowNothingThatIsNotThere) {
   EXPECT_EQ(wrong, 0u) << "of " << covered;
   EXPECT_GT(covered, 100'000u);
 }
+
+/// A pyramid without its tip: from z = 0 to its top at z = 1.
+TriangleSoup make_frustum(double bottom, double top) {
+  TriangleSoup mesh = make_box({-1, -1, 0}, {1, 1, 1});
+  for (glm::dvec3& p : mesh.positions) {
+    const double half = p.z > 0.5 ? top : bottom;
+    p.x *= half, p.y *= half;
+  }
+  return mesh;
+}
+
+/// Small frusta whose tops lie in the top of a large one: their slopes begin there and are hidden.
+void expect_only_tops(bool taken_away) {
+  std::size_t tops = 0, slopes = 0;
+  for (int seed = 0; seed < 60; ++seed) {
+    RandomTree random(static_cast<std::uint64_t>(seed));
+    Tree tree;
+    std::vector<Tree::NodeId> frusta;
+    for (int i = 0; i < 9; ++i) {
+      Solid solid;
+      const double size = random.real(0.5, 2);
+      const bool is_large = i == 8;
+      solid.mesh = std::make_shared<TriangleSoup>(
+          is_large ? make_frustum(9, 8) : make_frustum(size * random.real(1.1, 2), size));
+      // Cutters are upside down, and what were tops are the floor of a pit.
+      if (taken_away) solid.world_from_mesh[2].z = -1;
+      if (!is_large) {
+        solid.world_from_mesh[3] = {random.real(-4, 4), random.real(-4, 4), 0, 1};
+        solid.world_from_mesh =
+            glm::rotate(solid.world_from_mesh, random.real(0, 6.3), glm::dvec3(0, 0, 1));
+      }
+      frusta.push_back(tree.add_solid(std::move(solid)));
+    }
+    Tree::NodeId root = tree.add(Operation::kUnion, frusta);
+    if (taken_away) {
+      root =
+          tree.add(Operation::kDifference, {box_node(tree, {-12, -12, -3}, {12, 12, -0.5}), root});
+    }
+    tree.set_root(root);
+    Preview preview(tree, {}, seed % 2 ? 5e-6 : 0.0);
+    Camera camera = random_camera(random, preview.box());
+    camera.rotation.x = random.real(0, taken_away ? 40 : 85);
+    camera.rotation.y = 0;
+    const auto view = make_view(camera, {300, 300}, preview.box());
+    const auto image = preview.draw(*view);
+    ASSERT_TRUE(image.has_value());
+    for (std::size_t i = 0; i < (*image)->depth.size(); ++i) {
+      if ((*image)->depth[i] == SurfaceImage::kNone || (*image)->solid[i] >= 8) continue;
+      const Solid& solid = tree.solids()[(*image)->solid[i]];
+      const glm::uvec3& t = solid.mesh->triangles[(*image)->triangle[i] & ~SurfaceImage::kExit];
+      const bool is_top = solid.mesh->positions[t.x].z == 1 && solid.mesh->positions[t.y].z == 1 &&
+                          solid.mesh->positions[t.z].z == 1;
+      (is_top ? tops : slopes) += 1;
+    }
+  }
+  EXPECT_EQ(slopes, 0u) << "beside " << tops;
+  EXPECT_GT(tops, 10'000u);
+}
+
+TEST(CoincidentFaces, SlopesThatEndInATopDoNotShowThere) { expect_only_tops(false); }
+
+TEST(CoincidentFaces, SlopesThatEndInAFloorDoNotShowThere) { expect_only_tops(true); }
 
 TEST(NestedDifferences, ShowNothingThatIsNotThere) {
   // Balls one in another, each taken from the next larger one, all cut open.
