@@ -176,17 +176,32 @@ std::vector<Plane> planes_of(const Cutter& cutter, const Bounds& box) {
   return planes.take();
 }
 
-void add_pieces(TriangleSoup& mesh, const Plane& plane, const Outline& region, bool up) {
+/// Triangles no higher than `tolerance` are left out, with what only they have: where faces of two
+/// leaves coincide, rounding leaves spikes without width that reach out of the region.
+void add_pieces(TriangleSoup& mesh, const Plane& plane, const Outline& region, bool up,
+                double tolerance) {
   if (region.empty()) return;
-  const auto first = static_cast<std::uint32_t>(mesh.positions.size());
+  std::vector<glm::dvec2> points;
   for (const auto& contour : region.contours) {
-    for (const glm::dvec2& p : contour) {
-      mesh.positions.push_back(plane.origin + p.x * plane.u + p.y * plane.v);
-    }
+    points.insert(points.end(), contour.begin(), contour.end());
   }
+  constexpr std::uint32_t kNone = ~std::uint32_t{0};
+  std::vector<std::uint32_t> index(points.size(), kNone);
   for (glm::uvec3 t : triangulate(region)) {
+    const glm::dvec2 a = points[t.y] - points[t.x], b = points[t.z] - points[t.x];
+    const double longest = std::max({glm::length(a), glm::length(b), glm::length(b - a)});
+    if (std::abs(a.x * b.y - a.y * b.x) <= tolerance * longest) continue;
+    for (int i = 0; i < 3; ++i) {
+      std::uint32_t& vertex = index[t[i]];
+      if (vertex == kNone) {
+        vertex = static_cast<std::uint32_t>(mesh.positions.size());
+        const glm::dvec2& p = points[t[i]];
+        mesh.positions.push_back(plane.origin + p.x * plane.u + p.y * plane.v);
+      }
+      t[i] = vertex;
+    }
     if (!up) std::swap(t.y, t.z);
-    mesh.triangles.push_back(t + first);
+    mesh.triangles.push_back(t);
   }
 }
 
@@ -214,7 +229,9 @@ Result<TriangleSoup> cut_boundary(const Tree& tree, Tree::NodeId node, std::uint
         {window.low, {window.high.x, window.low.y}, window.high, {window.low.x, window.high.y}});
     for (const bool up : {true, false}) {
       const std::vector<Outline> seen{subtract(sides), frame};
-      if (!seen[0].empty()) add_pieces(pieces[i], planes[i], intersect(seen), up);
+      if (!seen[0].empty()) {
+        add_pieces(pieces[i], planes[i], intersect(seen), up, cutter.tolerance());
+      }
       std::swap(sides[0], sides[1]);
     }
   });

@@ -177,6 +177,7 @@ void Evaluator::walk(std::uint32_t first, std::uint32_t end) {
   top.node = static_cast<std::uint32_t>(ast_.nodes.size());
   top.end = end;
   frames_.push_back(std::move(top));
+  walk_first_ = first, walk_end_ = end;
   for (std::uint32_t node = first; !error_;) {
     while (frames_.size() > 1 && frames_.back().end <= node && !error_) leave();
     if (node >= end || error_) break;
@@ -185,15 +186,28 @@ void Evaluator::walk(std::uint32_t first, std::uint32_t end) {
         error_ = {ErrorCode::kCancelled, "stopped"};
         break;
       }
-      if (execution_.progress) {
-        execution_.progress(static_cast<double>(node - first) / (end - first));
-      }
+      report(static_cast<double>(node - first) / (end - first));
     }
     const std::size_t depth = frames_.size();
     if (!(ast_.nodes[node].modifiers & AstNode::kDisabled)) enter(node);
     // A leaf is done with, and so is what it had as children.
     node = frames_.size() > depth ? node + 1 : ast_.nodes[node].end;
   }
+}
+
+/// Never less than before: the work on a node comes after that on its children.
+void Evaluator::report(double done) {
+  reported_ = std::max(reported_, done);
+  if (execution_.progress) execution_.progress(reported_);
+}
+
+Execution Evaluator::part_execution(const Frame& frame) {
+  Execution execution = execution_;
+  const double count = walk_end_ - walk_first_;
+  const double begin = std::max(reported_, (frame.node - walk_first_) / count);
+  const double end = std::max(begin, (frame.end - walk_first_) / count);
+  execution.progress = [this, begin, end](double done) { report(begin + done * (end - begin)); };
+  return execution;
 }
 
 void Evaluator::enter(std::uint32_t node) {

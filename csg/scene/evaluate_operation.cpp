@@ -6,15 +6,10 @@
 #include "csg/scene/evaluator.h"
 #include "csg/scene/hull.h"
 #include "csg/scene/minkowski.h"
+#include "csg/scene/primitives.h"
 #include "mesh/soup_tools.h"
 
 namespace strata::csg {
-namespace {
-
-const char* const kTooMuch = "not-done";
-
-}  // namespace
-
 /// Replaces the operands of a node that has a frame by what it makes of them, outside that frame.
 void Evaluator::operate(Frame& frame) {
   leftovers_ = true;
@@ -114,7 +109,7 @@ TriangleSoup Evaluator::boundary_mesh(std::uint32_t node, Tree::NodeId solid) {
 void Evaluator::hull(Frame& frame) {
   const TriangleSoup mesh = boundary_mesh(frame.node, united_solid(frame.base));
   if (error_ || mesh.positions.empty()) return;
-  auto hull = convex_hull(mesh.positions);
+  auto hull = convex_hull(mesh.positions, execution_.stop);
   if (!hull) return leave_out(frame.node, "geometry", hull.error(), "the hull is left out");
   add_solid(frame.node, frame.outside, *std::move(hull));
 }
@@ -128,78 +123,94 @@ void Evaluator::minkowski(Frame& frame) {
   }
   operands_.resize(frame.base);
   std::vector<Tree::NodeId> sources;  // of parts
-  std::vector<MinkowskiPart> sum;
-  bool approximate = false;
-  for (std::size_t child = 0; child < children.size(); ++child) {
+  std::vector<std::vector<MinkowskiPart>> operands;
+  for (const std::vector<Tree::NodeId>& child : children) {
     std::vector<MinkowskiPart> parts;
-    for (const Tree::NodeId id : children[child]) {
+    for (const Tree::NodeId id : child) {
       for_each_operand(scene_.tree, id, [&](Tree::NodeId operand) {
         if (error_) return;
-        parts.push_back(make_part(boundary_mesh(frame.node, operand),
-                                  static_cast<std::uint32_t>(sources.size())));
+        const TriangleSoup mesh = boundary_mesh(frame.node, operand);
+        if (error_) return;
+        auto part = make_part(mesh, static_cast<std::uint32_t>(sources.size()), execution_);
+        if (!part) return stop(part.error().code, frame.node, part.error().message);
         sources.push_back(operand);
+        if (!part->empty()) parts.push_back(*std::move(part));
       });
     }
     if (error_) return;
-    std::erase_if(parts, [](const MinkowskiPart& p) { return p.convex() && p.hull.empty(); });
-    if (parts.empty()) continue;  // an empty operand is left out
-    if (sum.empty()) {
-      sum = std::move(parts);
-      continue;
-    }
-    auto next = minkowski_sum(sum, parts, approximate, execution_);
+    if (!parts.empty()) operands.push_back(std::move(parts));  // an empty operand is left out
+  }
+  if (operands.empty()) return;
+  // The order of operands does not matter: the convex ones first make one.
+  std::stable_partition(operands.begin(), operands.end(),
+                        [](const auto& parts) { return parts.size() == 1 && parts[0].convex(); });
+  std::vector<MinkowskiPart> sum = std::move(operands[0]);
+  for (std::size_t i = 1; i < operands.size(); ++i) {
+    auto next = minkowski_sum(sum, operands[i], i + 1 < operands.size(), part_execution(frame));
     if (!next) {
-      if (next.error().code == ErrorCode::kCancelled) {
-        return stop(next.error().code, frame.node, next.error().message);
-      }
-      warn(frame.node, kTooMuch,
-           fmt::format("'minkowski': {}; it is shown without operand {} and those after it",
-                       next.error().message, child));
-      break;
+      return stop(next.error().code, frame.node,
+                  next.error().code == ErrorCode::kCancelled
+                      ? next.error().message
+                      : fmt::format("'minkowski': {}", next.error().message));
     }
     sum = *std::move(next);
   }
-  if (approximate) {
-    warn(frame.node, "approximate",
-         "'minkowski': of very fine convex operands only the vertices farthest along 3000 even "
-         "directions are taken; the sum is too small by less than 1/1000 of its size");
-  }
-  add_sum(frame, sum, sources);
+  add_sum(frame, std::move(sum), sources);
 }
 
 /// The parts as solids that are united. Where there are very many convex ones, they are one mesh
 /// that overlaps itself; its pieces share edges, which readers of meshes take for faults.
-void Evaluator::add_sum(const Frame& frame, std::span<const MinkowskiPart> sum,
+void Evaluator::add_sum(const Frame& frame, std::vector<MinkowskiPart> sum,
                         std::span<const Tree::NodeId> sources) {
   constexpr std::ptrdiff_t kMostSolids = 4096;
   const bool apart = std::count_if(sum.begin(), sum.end(),
                                    [](const auto& part) { return part.convex(); }) <= kMostSolids;
   TriangleSoup all;
-  for (const MinkowskiPart& part : sum) {
-    if (part.convex()) {
-      auto hull = convex_hull(part.hull);
-      if (!hull) continue;
-      if (apart) {
-        add_solid(frame.node, frame.outside, *std::move(hull));
-      } else {
-        append(all, *hull);
-      }
-      continue;
+  if (!apart) {
+    std::size_t vertices = 0, triangles = 0;
+    for (const MinkowskiPart& part : sum) {
+      vertices += part.hull.mesh.positions.size();
+      triangles += part.hull.mesh.triangles.size();
     }
+    all.positions.reserve(vertices);
+    all.triangles.reserve(triangles);
+  }
+  const std::size_t first_piece = scene_.tree.solids().size();
+  for (MinkowskiPart& part : sum) {
+    if (apart) {
+      add_solid(frame.node, frame.outside, std::move(part.hull.mesh));
+    } else {
+      append(all, part.hull.mesh);
+    }
+    part.hull = {};
+  }
+  add_solid(frame.node, frame.outside, std::move(all));
+  Bounds box;
+  for (const Solid& piece : scene_.tree.solids().subspan(first_piece)) box.include(bounds(piece));
+  for (const MinkowskiPart& part : sum) {
+    if (part.convex()) continue;
     const glm::dmat4 world = frame.outside.world * glm::translate(glm::dmat4(1.0), part.offset);
     const Tree::NodeId source = sources[part.source];
     Operand operand;
     operand.node = frame.node;
     const std::size_t first = scene_.tree.solids().size();
     operand.solid = copy_nodes(std::span(&source, 1), world, scene_.tree, scene_.tree)[0];
+    // It lies inside the other parts, but the box of its operands may not.
+    const Bounds reach = bounds(scene_.tree, operand.solid);
+    if (!box.empty() &&
+        !(glm::min(reach.low, box.low) == box.low && glm::max(reach.high, box.high) == box.high)) {
+      Solid frame_box;
+      frame_box.mesh = std::make_shared<const TriangleSoup>(make_cube(box.high - box.low, false));
+      frame_box.world_from_mesh = glm::translate(glm::dmat4(1.0), box.low);
+      operand.solid = scene_.tree.add(Operation::kIntersection,
+                                      {operand.solid, scene_.tree.add_solid(std::move(frame_box))});
+    }
     for (Solid& solid : scene_.tree.solids().subspan(first)) {
       solid.colour = frame.outside.colour;
       solid.name = fmt::format("{} at {}", name(frame.node), place(frame.node));
     }
     operands_.push_back(std::move(operand));
   }
-  all.face_elements.clear();
-  add_solid(frame.node, frame.outside, std::move(all));
 }
 
 void Evaluator::resize(Frame& frame) {

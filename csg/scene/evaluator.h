@@ -86,6 +86,7 @@ class Evaluator {
 
   // evaluate.cpp: the walk
   void walk(std::uint32_t first, std::uint32_t end);
+  void report(double done);
   void enter(std::uint32_t node);
   void leave();
   void combine(Frame& frame);
@@ -143,8 +144,10 @@ class Evaluator {
   void operate(Frame& frame);
   void hull(Frame& frame);
   void minkowski(Frame& frame);
-  void add_sum(const Frame& frame, std::span<const MinkowskiPart> sum,
+  void add_sum(const Frame& frame, std::vector<MinkowskiPart> sum,
                std::span<const Tree::NodeId> sources);
+  /// For long work on one node: its progress is the node's part of the file.
+  [[nodiscard]] Execution part_execution(const Frame& frame);
   void resize(Frame& frame);
   void projection(Frame& frame);
   void linear_extrude(Frame& frame);
@@ -186,6 +189,8 @@ class Evaluator {
   bool leftovers_ = false;           ///< the tree has nodes that are part of nothing
   bool newer_ = false;               ///< the dialect after 2021.01
   Scene scene_;
+  std::uint32_t walk_first_ = 0, walk_end_ = 0;  ///< nodes
+  double reported_ = 0;                          ///< progress
   std::vector<Frame> frames_;
   std::vector<Operand> operands_;
   std::uint64_t warnings_left_out_ = 0;

@@ -1,201 +1,330 @@
 #include "csg/scene/minkowski.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <numeric>
-#include <unordered_map>
+#include <limits>
+#include <optional>
+#include <utility>
 
-#include "csg/scene/hull.h"
 #include "mesh/soup_tools.h"
 
 namespace strata::csg {
 namespace {
 
-constexpr double kMostHulls = 3e6;
-constexpr double kMostPoints = 4e8;            // into all hulls of a sum: minutes
-constexpr std::size_t kMostPairs = 4'000'000;  // of vertices of two convex parts
+constexpr double kMostPieces = 3e6;
+constexpr double kMostVertices = 1e8;  // of all pieces: minutes
+/// Sums of so few points are made of all pairs.
+constexpr std::size_t kFewPairs = 1024;
+/// Points that one run of Qhull takes where all pairs are needed.
+constexpr std::size_t kPairsAtOnce = 100'000;
 
-/// A point of each component, where triangles are connected that have corners in the same cell of
-/// a grid much finer than the mesh; too many components only make the sum larger to write.
-std::vector<glm::dvec3> find_anchors(std::span<const glm::dvec3> triangles) {
-  glm::dvec3 low = triangles[0], high = triangles[0];
-  for (const glm::dvec3& p : triangles) {
-    low = glm::min(low, p);
-    high = glm::max(high, p);
-  }
-  const double cell = 1e-6 * glm::length(high - low);
-  std::vector<std::uint32_t> parent(triangles.size() / 3);
-  std::iota(parent.begin(), parent.end(), 0u);
-  const auto root = [&](std::uint32_t i) {
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
+/// The corners of a polytope or of a flat polygon, each with the directions in which it is the
+/// farthest: those that make no obtuse angle with any of its rays.
+struct Corners {
+  std::vector<glm::dvec3> points;
+  std::vector<glm::dvec3> along;     ///< one of the directions; 0 where the corner is none
+  std::vector<std::uint32_t> first;  ///< of its rays, and of the next corner's
+  std::vector<glm::dvec3> rays;      ///< from a neighbour to the corner, unit
+};
+
+/// A polytope with its edges, vertex by vertex.
+struct Polytope {
+  struct Spoke {
+    std::uint32_t to;
+    glm::dvec3 normals[2];
   };
-  std::unordered_map<std::uint64_t, std::uint32_t> owner;
-  for (std::size_t i = 0; i < triangles.size(); ++i) {
-    const glm::dvec3 at = (triangles[i] - low) / cell;
-    // 21 bits an axis are enough for 1e6 cells.
-    const auto part = [&](double x) { return static_cast<std::uint64_t>(std::llround(x)); };
-    const std::uint64_t key = part(at.x) << 42 | part(at.y) << 21 | part(at.z);
-    const auto triangle = static_cast<std::uint32_t>(i / 3);
-    const auto [found, is_new] = owner.try_emplace(key, triangle);
-    if (!is_new) parent[root(triangle)] = root(found->second);
-  }
-  std::vector<glm::dvec3> anchors;
-  for (std::uint32_t t = 0; t < parent.size(); ++t) {
-    if (root(t) == t) anchors.push_back(triangles[3 * std::size_t{t}]);
-  }
-  return anchors;
+  Corners corners;
+  std::vector<Spoke> spokes;  ///< as corners.rays; empty where Qhull's facets do not fit together
+};
+
+glm::dvec3 unit(const glm::dvec3& v) {
+  const double length = glm::length(v);
+  return length > 0.0 ? v / length : glm::dvec3(0.0);
 }
 
-/// The vertices of the hull of `points`; none if they lie in a plane.
-std::vector<glm::dvec3> hull_vertices(std::span<const glm::dvec3> points) {
-  auto hull = convex_hull(points);
-  return hull ? std::move(hull->positions) : std::vector<glm::dvec3>();
-}
-
-/// Those of `points` that lie farthest along one of `directions`.
-std::vector<glm::dvec3> extremes(std::span<const glm::dvec3> points,
-                                 std::span<const glm::dvec3> directions) {
-  std::vector<bool> taken(points.size(), false);
-  for (const glm::dvec3& direction : directions) {
-    std::size_t best = 0;
-    for (std::size_t i = 1; i < points.size(); ++i) {
-      if (glm::dot(points[i], direction) > glm::dot(points[best], direction)) best = i;
+Polytope make_polytope(const ConvexHull& hull) {
+  Polytope polytope;
+  Corners& corners = polytope.corners;
+  corners.points = hull.mesh.positions;
+  if (hull.edges.empty()) return polytope;
+  corners.first.assign(corners.points.size() + 1, 0);
+  for (const ConvexHull::Edge& edge : hull.edges) {
+    for (const std::uint32_t v : edge.vertices) ++corners.first[v + 1];
+  }
+  for (std::size_t v = 0; v < corners.points.size(); ++v) corners.first[v + 1] += corners.first[v];
+  std::vector<std::uint32_t> next(corners.first.begin(), corners.first.end() - 1);
+  polytope.spokes.resize(corners.first.back());
+  corners.rays.resize(corners.first.back());
+  corners.along.assign(corners.points.size(), glm::dvec3(0.0));
+  for (const ConvexHull::Edge& edge : hull.edges) {
+    for (int end = 0; end < 2; ++end) {
+      const std::uint32_t v = edge.vertices[end], to = edge.vertices[1 - end];
+      const std::uint32_t at = next[v]++;
+      polytope.spokes[at] = {to, {edge.normals[0], edge.normals[1]}};
+      corners.rays[at] = unit(corners.points[v] - corners.points[to]);
+      corners.along[v] += edge.normals[0] + edge.normals[1];
     }
-    taken[best] = true;
   }
-  std::vector<glm::dvec3> result;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    if (taken[i]) result.push_back(points[i]);
-  }
-  return result;
+  return polytope;
 }
 
-/// Even directions: a Fibonacci spiral on the sphere.
-std::vector<glm::dvec3> even_directions(int count) {
-  std::vector<glm::dvec3> directions;
-  const double turn = 2.39996322972865332;  // the golden angle
-  for (int i = 0; i < count; ++i) {
-    const double z = 1.0 - 2.0 * (i + 0.5) / count, r = std::sqrt(1.0 - z * z);
-    directions.emplace_back(r * std::cos(turn * i), r * std::sin(turn * i), z);
+Corners corners_of(std::span<const glm::dvec3> facet) {
+  Corners corners;
+  corners.points.assign(facet.begin(), facet.end());
+  for (std::size_t i = 0; i < facet.size(); ++i) {
+    const glm::dvec3& before = facet[(i + facet.size() - 1) % facet.size()];
+    const glm::dvec3& after = facet[(i + 1) % facet.size()];
+    corners.first.push_back(static_cast<std::uint32_t>(corners.rays.size()));
+    corners.rays.push_back(unit(facet[i] - before));
+    corners.rays.push_back(unit(facet[i] - after));
+    const glm::dvec3 along = corners.rays.end()[-1] + corners.rays.end()[-2];
+    // A point within a side stands out by nothing.
+    corners.along.push_back(glm::length(along) > 1e-9 ? along : glm::dvec3(0.0));
   }
-  return directions;
+  corners.first.push_back(static_cast<std::uint32_t>(corners.rays.size()));
+  return corners;
 }
 
-std::vector<glm::dvec3> pairwise(std::span<const glm::dvec3> a, std::span<const glm::dvec3> b) {
+/// Finds the vertices of sums with a polytope; scratch of one thread. A vertex of a sum is the sum
+/// of two vertices that are the farthest in one direction. From one that is, the walk goes along
+/// edges of the polytope, over those whose facets have a direction between their normals that
+/// belongs to the corner: the directions of a corner are convex, so it reaches them all.
+class VertexWalk {
+ public:
+  void add_sums(const Corners& corners, const Polytope& polytope, std::vector<glm::dvec3>& sums) {
+    const std::vector<glm::dvec3>& points = polytope.corners.points;
+    seen_.assign(points.size(), 0);
+    for (std::uint32_t c = 0; c < corners.points.size(); ++c) {
+      const glm::dvec3& along = corners.along[c];
+      if (along == glm::dvec3(0.0)) continue;
+      const auto rays = std::span(corners.rays)
+                            .subspan(corners.first[c], corners.first[c + 1] - corners.first[c]);
+      std::uint32_t farthest = 0;
+      for (std::uint32_t v = 1; v < points.size(); ++v) {
+        if (glm::dot(points[v] - points[farthest], along) > 0.0) farthest = v;
+      }
+      waiting_.assign(1, farthest);
+      seen_[farthest] = c + 1;
+      while (!waiting_.empty()) {
+        const std::uint32_t v = waiting_.back();
+        waiting_.pop_back();
+        sums.push_back(corners.points[c] + points[v]);
+        for (std::uint32_t s = polytope.corners.first[v]; s < polytope.corners.first[v + 1]; ++s) {
+          const Polytope::Spoke& spoke = polytope.spokes[s];
+          if (seen_[spoke.to] == c + 1 || !meets(spoke, rays)) continue;
+          seen_[spoke.to] = c + 1;
+          waiting_.push_back(spoke.to);
+        }
+      }
+    }
+  }
+
+ private:
+  /// Whether a direction between the two normals makes no obtuse angle with any ray. What does so
+  /// by rounding only is taken along: the hull drops it.
+  static bool meets(const Polytope::Spoke& spoke, std::span<const glm::dvec3> rays) {
+    constexpr double kRounding = 1e-7;
+    double low = 0.0, high = 1.0;  // from the first normal to the second
+    for (const glm::dvec3& ray : rays) {
+      const double one = glm::dot(spoke.normals[0], ray) + kRounding;
+      const double other = glm::dot(spoke.normals[1], ray) + kRounding;
+      if (one < 0.0 && other < 0.0) return false;
+      if (one < 0.0) low = std::max(low, one / (one - other));
+      if (other < 0.0) high = std::min(high, one / (one - other));
+    }
+    return low <= high;
+  }
+
+  std::vector<std::uint32_t> seen_;  ///< for which corner, counted from 1
+  std::vector<std::uint32_t> waiting_;
+};
+
+/// The hull of the sums of all pairs, made of not too many at a time.
+Result<ConvexHull> hull_of_pairs(std::span<const glm::dvec3> a, std::span<const glm::dvec3> b,
+                                 const std::stop_token& stop) {
   std::vector<glm::dvec3> sums;
-  sums.reserve(a.size() * b.size());
-  for (const glm::dvec3& p : a) {
-    for (const glm::dvec3& q : b) sums.push_back(p + q);
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    for (const glm::dvec3& q : b) sums.push_back(a[i] + q);
+    if (sums.size() < kPairsAtOnce || i + 1 == a.size()) continue;
+    auto hull = convex_hull(sums, stop);
+    if (!hull && hull.error().code != ErrorCode::kGeometry) return tl::unexpected(hull.error());
+    if (hull) sums = std::move(hull->positions);
   }
-  return sums;
+  return convex_hull_with_edges(sums, stop);
+}
+
+/// The centre of mass: deep inside a polytope.
+glm::dvec3 middle_of(const TriangleSoup& mesh) {
+  const glm::dvec3 about = mesh.positions[0];
+  glm::dvec3 sum(0.0);
+  double volume = 0.0;
+  for (const glm::uvec3& t : mesh.triangles) {
+    const glm::dvec3 p = mesh.positions[t.x] - about, q = mesh.positions[t.y] - about,
+                     r = mesh.positions[t.z] - about;
+    const double part = glm::dot(p, glm::cross(q, r));
+    volume += part;
+    sum += part * (p + q + r);
+  }
+  return volume > 0.0 ? about + sum / (4.0 * volume) : about;
 }
 
 MinkowskiPart moved(const MinkowskiPart& part, const glm::dvec3& by) {
   MinkowskiPart result = part;
-  for (glm::dvec3& p : result.triangles) p += by;
+  for (glm::dvec3& p : result.facets.corners) p += by;
   for (glm::dvec3& p : result.anchors) p += by;
   result.offset += by;
   return result;
 }
 
-/// One convex sum to be made: of `a` with `b`, both convex point sets.
+/// One convex sum to be made, of two polytopes or facets.
 struct Task {
-  std::span<const glm::dvec3> a, b;
+  const Polytope* polytopes[2] = {nullptr, nullptr};
+  std::span<const glm::dvec3> facets[2];  ///< where there is no polytope
 };
+
+Result<ConvexHull> sum_of(const Task& task, VertexWalk& walk, const std::stop_token& stop) {
+  std::span<const glm::dvec3> points[2];
+  for (int i = 0; i < 2; ++i) {
+    points[i] = task.polytopes[i] ? std::span<const glm::dvec3>(task.polytopes[i]->corners.points)
+                                  : task.facets[i];
+  }
+  // The walk goes over the larger polytope.
+  int over = points[0].size() > points[1].size() ? 0 : 1;
+  const auto has_edges = [&](int i) {
+    return task.polytopes[i] && !task.polytopes[i]->spokes.empty();
+  };
+  if (!has_edges(over)) over = 1 - over;
+  const int other = 1 - over;
+  if (points[0].size() * points[1].size() <= kFewPairs || !has_edges(over) ||
+      (task.polytopes[other] && !has_edges(other))) {
+    return hull_of_pairs(points[0], points[1], stop);
+  }
+  std::vector<glm::dvec3> sums;
+  if (task.polytopes[other]) {
+    walk.add_sums(task.polytopes[other]->corners, *task.polytopes[over], sums);
+  } else {
+    walk.add_sums(corners_of(task.facets[other]), *task.polytopes[over], sums);
+  }
+  return convex_hull_with_edges(sums, stop);
+}
+
+/// What all sums of pieces together take.
+struct Cost {
+  double pieces = 0.0, vertices = 0.0;
+  [[nodiscard]] double bytes() const {
+    // Vertices and two triangles each: pieces, then one mesh, then what shows it.
+    return vertices * 3.0 * (sizeof(glm::dvec3) + 2 * sizeof(glm::uvec3));
+  }
+};
+
+Cost cost_of(std::span<const MinkowskiPart> a, std::span<const MinkowskiPart> b) {
+  Cost cost;
+  const auto pieces = [](const MinkowskiPart& part) {
+    return part.convex() ? 1.0 : static_cast<double>(part.facets.size());
+  };
+  const auto points = [](const MinkowskiPart& part) {  // of a piece
+    return part.convex() ? static_cast<double>(part.hull.mesh.positions.size())
+                         : static_cast<double>(part.facets.corners.size()) /
+                               static_cast<double>(part.facets.size());
+  };
+  for (const MinkowskiPart& p : a) {
+    for (const MinkowskiPart& q : b) {
+      const double count = pieces(p) * pieces(q), m = points(p), n = points(q);
+      cost.pieces += count;
+      // Corners of the maps of their normals, laid over each other: theirs and crossings.
+      cost.vertices += count * std::min(m * n, m + n + 2.0 * std::sqrt(m * n));
+    }
+  }
+  return cost;
+}
 
 }  // namespace
 
-MinkowskiPart make_part(const TriangleSoup& mesh, std::uint32_t source) {
-  MinkowskiPart part;
-  part.source = source;
-  if (mesh.triangles.empty()) return part;
-  if (const auto hull = convex_hull(mesh.positions)) {
-    const double whole = signed_volume(*hull);
-    if (std::abs(whole - signed_volume(mesh)) <= 1e-9 * whole) {
-      part.hull = hull->positions;
-      return part;
+Result<std::vector<MinkowskiPart>> minkowski_sum(std::span<const MinkowskiPart> a,
+                                                 std::span<const MinkowskiPart> b, bool goes_on,
+                                                 const Execution& execution) {
+  const Cost cost = cost_of(a, b);
+  const double most_bytes = execution.memory_limit > 0 ? static_cast<double>(execution.memory_limit)
+                                                       : std::numeric_limits<double>::infinity();
+  if (cost.pieces > kMostPieces || cost.vertices > kMostVertices || cost.bytes() > most_bytes) {
+    return fail(ErrorCode::kLimit,
+                "the sum takes {:.0f} convex pieces with about {:.3g} vertices and {:.3g} GB; the "
+                "limits are {:.0f} pieces, {:g} vertices and {:.3g} GB",
+                cost.pieces, cost.vertices, cost.bytes() / 1e9, kMostPieces, kMostVertices,
+                most_bytes / 1e9);
+  }
+  std::vector<Polytope> polytopes[2];
+  const std::span<const MinkowskiPart> sides[2] = {a, b};
+  for (int side = 0; side < 2; ++side) {
+    for (const MinkowskiPart& part : sides[side]) {
+      polytopes[side].push_back(part.convex() ? make_polytope(part.hull) : Polytope());
     }
   }
-  part.triangles.reserve(3 * mesh.triangles.size());
-  for (const glm::uvec3& t : mesh.triangles) {
-    for (int i = 0; i < 3; ++i) part.triangles.push_back(mesh.positions[t[i]]);
-  }
-  part.anchors = find_anchors(part.triangles);
-  return part;
-}
-
-Result<std::vector<MinkowskiPart>> minkowski_sum(std::span<const MinkowskiPart> a,
-                                                 std::span<const MinkowskiPart> b,
-                                                 bool& approximate, const Execution& execution) {
   std::vector<MinkowskiPart> result;
   std::vector<Task> tasks;
   const auto pieces = [](const MinkowskiPart& part) {
-    return part.convex() ? 1.0 : static_cast<double>(part.triangles.size()) / 3.0;
+    return part.convex() ? std::size_t{1} : part.facets.size();
   };
-  const auto piece_points = [](const MinkowskiPart& part) {
-    return part.convex() ? static_cast<double>(part.hull.size()) : 3.0;
-  };
-  double hulls = 0.0, points = 0.0;
-  for (const MinkowskiPart& p : a) {
-    for (const MinkowskiPart& q : b) {
-      hulls += pieces(p) * pieces(q);
-      points += pieces(p) * pieces(q) * piece_points(p) * piece_points(q);
+  const auto set_piece = [&](Task& task, int side, std::size_t part, std::size_t piece) {
+    const MinkowskiPart& of = sides[side][part];
+    if (of.convex()) {
+      task.polytopes[side] = &polytopes[side][part];
+    } else {
+      task.facets[side] = of.facets[piece];
     }
-  }
-  if (hulls > kMostHulls || points > kMostPoints) {
-    return fail(ErrorCode::kLimit, "it would take {:.0f} convex hulls of {:.0f} points in all",
-                hulls, points);
-  }
-  const auto piece = [](const MinkowskiPart& part, std::size_t i) {
-    return part.convex() ? std::span<const glm::dvec3>(part.hull)
-                         : std::span<const glm::dvec3>(part.triangles).subspan(3 * i, 3);
   };
-  for (const MinkowskiPart& p : a) {
-    for (const MinkowskiPart& q : b) {
-      if ((p.convex() && p.hull.empty()) || (q.convex() && q.hull.empty())) continue;
-      for (std::size_t i = 0; i < static_cast<std::size_t>(pieces(p)); ++i) {
-        for (std::size_t j = 0; j < static_cast<std::size_t>(pieces(q)); ++j) {
-          tasks.push_back({piece(p, i), piece(q, j)});
+  const auto move = [&](const MinkowskiPart& part, const MinkowskiPart& other) {
+    if (part.convex()) return;
+    if (other.convex()) {
+      result.push_back(moved(part, middle_of(other.hull.mesh)));
+      return;
+    }
+    for (const glm::dvec3& by : other.anchors) result.push_back(moved(part, by));
+  };
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      if (a[i].empty() || b[j].empty()) continue;
+      for (std::size_t p = 0; p < pieces(a[i]); ++p) {
+        for (std::size_t q = 0; q < pieces(b[j]); ++q) {
+          Task& task = tasks.emplace_back();
+          set_piece(task, 0, i, p);
+          set_piece(task, 1, j, q);
         }
       }
-      if (!p.convex()) {
-        for (const glm::dvec3& by :
-             q.convex() ? std::span(q.hull).first(1) : std::span(q.anchors)) {
-          result.push_back(moved(p, by));
-        }
-      }
-      if (!q.convex()) {
-        for (const glm::dvec3& by :
-             p.convex() ? std::span(p.hull).first(1) : std::span(p.anchors)) {
-          result.push_back(moved(q, by));
-        }
-      }
+      move(a[i], b[j]);
+      move(b[j], a[i]);
     }
   }
   std::vector<MinkowskiPart> sums(tasks.size());
-  Execution quiet = execution;
-  quiet.progress = {};
-  std::atomic<bool> thinned{false};
-  parallel_for(quiet, tasks.size(), [&](std::size_t i, int) {
-    const Task& task = tasks[i];
-    if (task.a.size() * task.b.size() <= kMostPairs) {
-      sums[i].hull = hull_vertices(pairwise(task.a, task.b));
-      return;
+  std::vector<VertexWalk> walks(static_cast<std::size_t>(execution.thread_count()));
+  std::vector<std::optional<Error>> errors(walks.size());
+  const std::size_t at_once = std::max<std::size_t>(64, tasks.size() / 256);
+  for (std::size_t first = 0; first < tasks.size() && !execution.stop.stop_requested();
+       first += at_once) {
+    const std::size_t count = std::min(at_once, tasks.size() - first);
+    parallel_for(execution, count, [&](std::size_t i, int worker) {
+      const auto w = static_cast<std::size_t>(worker);
+      auto hull = sum_of(tasks[first + i], walks[w], execution.stop);
+      if (hull) {
+        sums[first + i].hull = *std::move(hull);
+        if (!goes_on) sums[first + i].hull.edges = {};
+      } else if (hull.error().code != ErrorCode::kGeometry) {
+        errors[w] = hull.error();
+      }
+    });
+    if (execution.progress) {
+      execution.progress(static_cast<double>(first + count) / static_cast<double>(tasks.size()));
     }
-    const auto directions = even_directions(3000);
-    sums[i].hull =
-        hull_vertices(pairwise(extremes(task.a, directions), extremes(task.b, directions)));
-    thinned = true;
-  });
-  if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
-  approximate |= thinned;
-  for (MinkowskiPart& sum : sums) {
-    if (!sum.hull.empty()) result.push_back(std::move(sum));
   }
+  if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+  for (const auto& error : errors) {
+    if (error) return tl::unexpected(*error);
+  }
+  std::erase_if(sums, [](const MinkowskiPart& sum) { return sum.empty(); });
+  result.insert(result.end(), std::make_move_iterator(sums.begin()),
+                std::make_move_iterator(sums.end()));
   return result;
 }
 

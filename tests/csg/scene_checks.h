@@ -11,6 +11,13 @@
 
 namespace strata::csg {
 
+inline std::string moved(double x, double y, double z) {
+  return fmt::format("multmatrix([[1,0,0,{}],[0,1,0,{}],[0,0,1,{}],[0,0,0,1]]) ", x, y, z);
+}
+
+/// A cube with its middle at the origin, hollow.
+inline const std::string kFrame = "difference() { cube([10,10,10], true); cube([6,6,6], true); }";
+
 /// A scene that must be read; empty, with a failure, if it is refused.
 inline Scene scene_of(std::string_view text) {
   auto scene = parse_scene(text, "test.csg");

@@ -14,9 +14,6 @@ std::string repeated(std::string_view text, int count) {
   return all;
 }
 
-std::string moved(double x, double y, double z) {
-  return fmt::format("multmatrix([[1,0,0,{}],[0,1,0,{}],[0,0,1,{}],[0,0,0,1]]) ", x, y, z);
-}
 std::string scaled(double x, double y, double z) {
   return fmt::format("multmatrix([[{},0,0,0],[0,{},0,0],[0,0,{},0],[0,0,0,1]]) ", x, y, z);
 }
