@@ -19,6 +19,7 @@
 #include "hashbuffer/depth_list_store.h"
 #include "hashbuffer/list_image.h"
 #include "hashbuffer/offsets.h"
+#include "hashbuffer/overflow.h"
 #include "hashbuffer/record.h"
 #include "hashbuffer/resize_policy.h"
 
@@ -44,20 +45,26 @@
 //  3. Ages start at 1 and count probes. A record proposes to its cell at its age; the cell keeps
 //     the larger word; the loser goes on at its own age + 1 (an evicted record from the age it had
 //     in the cell). An equal word loses too: duplicates are kept, at different ages.
-//  4. The limit n = min(kAgeMax, cells, the option age_limit). A record that loses at age n is
-//     lost and counted as a failure.
+//  4. The limit n = min(kAgeMax, cells, the option age_limit). A record that loses at age n leaves
+//     the table and is counted as a failure.
 //
 // What follows (tests/hashbuffer hold the code to it). Cells only grow. The final table is unique:
 // this is deferred acceptance (proposals in order of age, a fixed strict order in every cell), so
 // its bits depend neither on the order of insertion nor on threads, nor does the set of failures.
-// Ages along a pixel's list are those of rising (depth, payload). When fragments fail, every pixel
-// keeps the nearest ones. (Not with culling, where only the visible part is unique.)
+// Ages along a pixel's list are those of rising (depth, payload). When fragments fail, the table
+// keeps the nearest ones of every pixel: cells only grow, so what a record has lost against, those
+// behind it lose against as well. (With culling only the visible part is unique.)
+//
+// NOTHING IS LOST. What fails is kept beside the table (overflow.h), and lists go on there. That is
+// slow: build() of hashbuffer/hash_buffer_build.h gives every frame the room it needs instead.
 
 namespace strata {
 
 /// Settings of a hash buffer.
 struct HashBufferOptions {
-  /// Cells of the first table; raised to the number of pixels if smaller, which is the default.
+  /// Cells of the first table; raised to the number of pixels if smaller. 1.25 for each fragment
+  /// expected is right. 0: as many as pixels, and build() runs the generator of the first frame
+  /// once more, before all else, to count its fragments.
   std::uint64_t cells = 0;
   OffsetKind offsets = OffsetKind::kPlaneFirst;
   /// Of the offsets. Frame f draws from (seed, f); kFarthestPoint is made once a table size.
@@ -75,8 +82,9 @@ struct HashBufferOptions {
 };
 
 /// A hash table of fragments whose probe sequences are the sorted depth lists. See the table law
-/// above. `Record` is a policy of record.h, `Concurrency` is Concurrent or Exclusive. Use
-/// build(buffer, generator) for whole frames; insert() and the rest serve other drivers.
+/// above. `Record` is a policy of record.h, `Concurrency` is Concurrent or Exclusive. For whole
+/// frames use build(buffer, generator) of hashbuffer/hash_buffer_build.h, which makes room;
+/// insert() and the rest serve other drivers.
 template <RecordPolicy RecordType, class Concurrency>
 class HashBuffer {
  public:
@@ -124,12 +132,12 @@ class HashBuffer {
   [[nodiscard]] bool is_culling() const { return guarded_; }
 
   /// Adds a fragment at pixel (x, y). Depths beyond 2^24 - 1 are clamped. Any thread, if the form
-  /// is Concurrent.
+  /// is Concurrent. What the table has no room for is kept beside it and stays in the lists, but
+  /// costs a probe of every age, a lock and a sort: see failures(), and HashBufferOptions::cells.
   /// @pre 0 <= x < width, 0 <= y < height, Record::payload_fits(payload)
   void insert(int x, int y, std::uint32_t depth, std::uint32_t payload) noexcept {
     if (table_.empty()) {  // after a resize that memory did not even allow to undo
-      Concurrency::fetch_increment(failures_);
-      return;
+      return spill(pixel_of(x, y), Record::pack(1, depth, payload));
     }
     Insertion insertion(*this, x, y, depth, payload);
     if (guarded_) {
@@ -192,7 +200,7 @@ class HashBuffer {
         }
       }
       if (age_ >= limit_) {
-        Concurrency::fetch_increment(buffer_->failures_);
+        buffer_->spill(pixel_, record_);
         return false;
       }
       ++age_;
@@ -241,32 +249,28 @@ class HashBuffer {
   void for_each(int x, int y, Visit&& visit) const {
     const std::uint64_t pixel = pixel_of(x, y);
     const unsigned last = max_ages_[block_of(x, y)];
-    double transmittance = 1.0;
-    unsigned kept = 0;
+    ListEnd end;
     for (unsigned age = 1; age <= last; ++age) {
       std::uint64_t cell = pixel + offsets_[age];
       if (cell >= table_.size()) cell -= table_.size();
       const Word record = table_[cell];
-      // A later record of this pixel would have been compared here and left something of this age.
+      // A later record of this pixel, in the table or not, would have been compared here and left
+      // something of this age.
       if (Record::age(record) < age) return;
-      if (Record::age(record) > age) continue;
-      if constexpr (std::is_convertible_v<decltype(visit(Record::item(record))), bool>) {
-        if (!visit(Record::item(record))) return;
-      } else {
-        visit(Record::item(record));
-      }
-      if (guarded_) {
-        if (options_.keep_nearest > 0 && ++kept >= options_.keep_nearest) return;
-        if (!options_.opacity) continue;
-        transmittance *= transmittance_of(record, options_);
-        if (transmittance < 1.0 - options_.opacity_threshold) return;
-      }
+      if (Record::age(record) == age && !goes_on(visit, record, end)) return;
     }
+    if (failures_ == 0) return;
+    overflow_.for_each(pixel, [&](Word record) { return goes_on(visit, record, end); });
   }
 
   /// All lists as an image (depth_limit 2^24, world_from_image left at identity); rows in parallel.
-  /// ErrorCode::kLimit if it cannot be allocated, kCancelled on request.
+  /// ErrorCode::kLimit if it cannot be allocated, or if memory did not suffice for fragments that
+  /// the table had no room for; kCancelled on request.
   [[nodiscard]] Result<LayeredDepthImage> depth_image(const Execution& execution = {}) const {
+    if (const std::uint64_t lost = overflow_.lost(); lost > 0) {
+      return fail(ErrorCode::kLimit, "hash buffer: no memory for {} of {} fragments", lost,
+                  stored() + failures_);
+    }
     return make_list_image(*this, execution);
   }
 
@@ -279,14 +283,15 @@ class HashBuffer {
   [[nodiscard]] double load() const {
     return static_cast<double>(stored()) / static_cast<double>(table_.size());
   }
-  /// Fragments lost because their age ran out, since the last clear. Not with inserting threads.
+  /// Fragments whose age ran out since the last clear: not in the table, but kept beside it. Not
+  /// with inserting threads.
   [[nodiscard]] std::uint64_t failures() const { return failures_; }
   /// Fragments dropped by keep_nearest or opacity since the last clear.
   [[nodiscard]] std::uint64_t dropped() const { return dropped_; }
 
-  /// Empties the table; returns how many records it held. Offsets stay.
+  /// Empties the buffer; returns how many records it held. Offsets stay.
   std::uint64_t clear() noexcept {
-    std::uint64_t held = 0;
+    std::uint64_t held = overflow_.size();
     for (Word& cell : table_) {
       held += cell != Record::kEmpty;
       cell = Record::kEmpty;
@@ -297,11 +302,13 @@ class HashBuffer {
 
   /// Empties the buffer, adapts the table to the load of the last frame as far as `memory_limit`
   /// (bytes, 0: none) allows, and draws the offsets of the new frame. The first frame keeps its
-  /// size. ErrorCode::kLimit if even a table of one cell a pixel exceeds the limit.
+  /// size, unless what was inserted before did not fit. ErrorCode::kLimit if even a table of one
+  /// cell a pixel exceeds the limit.
   [[nodiscard]] Result<void> begin_frame(std::uint64_t memory_limit = 0) {
+    const bool had_failures = failures_ > 0;
     const std::uint64_t held = clear();
     std::uint64_t target = std::max(table_.size(), pixels_);
-    if (frame_ > 0) target = next_frame_cells(target, pixels_, held);
+    if (frame_ > 0 || had_failures) target = next_frame_cells(target, pixels_, held);
     ++frame_;
     if (memory_limit > 0) target = std::min(target, largest_cells(memory_limit));
     if (target < pixels_) {
@@ -353,9 +360,11 @@ class HashBuffer {
     }
   }
 
-  /// Bytes held: the table, the max-age table, the offsets.
-  [[nodiscard]] std::uint64_t memory_bytes() const { return bytes_of(table_.size()); }
-  /// The same for a table of that many cells.
+  /// Bytes held: the table, the max-age table, the offsets, and what lies beside the table.
+  [[nodiscard]] std::uint64_t memory_bytes() const {
+    return bytes_of(table_.size()) + overflow_.memory_bytes();
+  }
+  /// The same for a table of that many cells, with nothing beside it.
   [[nodiscard]] std::uint64_t bytes_of(std::uint64_t cells) const {
     return cells * sizeof(Word) + block_count() * sizeof(Age) +
            (std::min<std::uint64_t>(age_wanted(), cells) + 1) * sizeof(std::uint64_t);
@@ -379,15 +388,15 @@ class HashBuffer {
     return hash;
   }
 
-  /// A pixel with the most fragments, and how many.
-  struct DeepestPixel {
+  /// A pixel with the most fragments, how many those are, and how many all pixels keep.
+  struct FragmentCount {
     int x = 0, y = 0;
-    std::uint64_t fragments = 0;
+    std::uint64_t deepest = 0, kept = 0;
   };
   /// Runs the generator once to count the fragments of each pixel in the table's own cells. Leaves
   /// the buffer empty.
   template <class Generator>
-  [[nodiscard]] DeepestPixel count_deepest(Generator& generator) {
+  [[nodiscard]] FragmentCount count_fragments(Generator& generator) {
     clear();
     LayerCounter counter{this};
     generator(counter);
@@ -395,11 +404,22 @@ class HashBuffer {
         std::max_element(table_.begin(), table_.begin() + static_cast<std::ptrdiff_t>(pixels_));
     const auto pixel = static_cast<std::uint64_t>(deepest - table_.begin());
     const auto columns = static_cast<std::uint64_t>(width_);
-    const DeepestPixel result{static_cast<int>(pixel % columns), static_cast<int>(pixel / columns),
-                              *deepest};
+    FragmentCount result{static_cast<int>(pixel % columns), static_cast<int>(pixel / columns),
+                         *deepest, 0};
+    const std::uint64_t most = options_.keep_nearest > 0 ? options_.keep_nearest : *deepest;
+    for (std::uint64_t i = 0; i < pixels_; ++i) {
+      result.kept += std::min<std::uint64_t>(table_[i], most);
+    }
     clear();
     return result;
   }
+
+  /// True when nothing is known of earlier frames: the first since create(), with a table whose
+  /// size nobody chose.
+  [[nodiscard]] bool has_unknown_load() const { return frame_ <= 1 && options_.cells == 0; }
+  /// Whether what the table has no room for is kept. build() does without while it runs, since it
+  /// runs the generator again.
+  void keep_failures(bool keep) { keep_failures_ = keep; }
 
  private:
   struct LayerCounter {
@@ -416,6 +436,26 @@ class HashBuffer {
         pixels_(static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height)),
         blocks_per_row_((static_cast<std::size_t>(width) + kBlockSide - 1) / kBlockSide),
         guarded_(options.keep_nearest > 0 || options.opacity) {}
+
+  /// How much of a list has been visited, where culling ends it.
+  struct ListEnd {
+    double transmittance = 1.0;
+    unsigned kept = 0;
+  };
+  /// Visits a record; whether the list goes on behind it.
+  template <class Visit>
+  bool goes_on(Visit& visit, Word record, ListEnd& end) const {
+    if constexpr (std::is_convertible_v<decltype(visit(Record::item(record))), bool>) {
+      if (!visit(Record::item(record))) return false;
+    } else {
+      visit(Record::item(record));
+    }
+    if (!guarded_) return true;
+    if (options_.keep_nearest > 0 && ++end.kept >= options_.keep_nearest) return false;
+    if (!options_.opacity) return true;
+    end.transmittance *= transmittance_of(record, options_);
+    return end.transmittance >= 1.0 - options_.opacity_threshold;
+  }
 
   [[nodiscard]] static double transmittance_of(Word record, const HashBufferOptions& options) {
     return 1.0 - std::clamp(options.opacity(Record::payload(record)), 0.0, 1.0);
@@ -446,7 +486,13 @@ class HashBuffer {
                                .seed = options_.seed ^ draw * 0x9e3779b97f4a7c15u});
   }
 
+  void spill(std::uint64_t pixel, Word record) noexcept {
+    Concurrency::fetch_increment(failures_);
+    if (keep_failures_) overflow_.add(pixel, record);
+  }
+
   void clear_counters() noexcept {
+    overflow_.clear();
     std::fill(max_ages_.begin(), max_ages_.end(), Age{0});
     failures_ = 0;
     dropped_ = 0;
@@ -475,6 +521,8 @@ class HashBuffer {
   std::vector<std::uint64_t> offsets_;
   OffsetKind drawn_kind_ = OffsetKind::kRandom;
   std::vector<Age> max_ages_;
+  mutable Overflow<Record> overflow_;  // sorted when it is read
+  bool keep_failures_ = true;
   // Counters that threads write live apart from what they read.
   alignas(64) std::uint64_t failures_ = 0;
   std::uint64_t dropped_ = 0;

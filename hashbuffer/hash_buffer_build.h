@@ -1,11 +1,42 @@
 #pragma once
 
+#include <algorithm>
+#include <optional>
+
 #include "hashbuffer/hash_buffer.h"
 
 namespace strata {
 
+namespace detail {
+
+/// Ages are more than any table offers. @return kLimit naming the split to take
+template <class Record, class Concurrency>
+[[nodiscard]] Result<void> check_depth(
+    const HashBuffer<Record, Concurrency>& buffer,
+    const typename HashBuffer<Record, Concurrency>::FragmentCount& count) {
+  if (count.deepest <= buffer.age_wanted()) return {};
+  return fail(
+      ErrorCode::kLimit, "hash buffer: pixel ({}, {}) has {} fragments, {} counts {} at most; {}",
+      count.x, count.y, count.deepest, Record::kName, buffer.age_wanted(),
+      buffer.age_wanted() < Record::kAgeMax ? "raise the option age_limit" : Record::kDeeper);
+}
+
+/// Room for that many fragments, from a table of `cells`, as far as `limit` (bytes, 0: none)
+/// allows.
+template <class Record, class Concurrency>
+[[nodiscard]] std::uint64_t cells_for(const HashBuffer<Record, Concurrency>& buffer,
+                                      std::uint64_t fragments, std::uint64_t cells,
+                                      std::uint64_t limit) {
+  while (is_too_full(fragments, cells)) cells = grown_cells(cells);
+  return limit > 0 ? std::min(cells, buffer.largest_cells(limit)) : cells;
+}
+
+}  // namespace detail
+
 /// Builds a frame: empties the buffer, adapts its table to the last frame's load, runs the
-/// generator, and if a fragment did not fit, rebuilds the frame with more room until all fit.
+/// generator, and if a fragment did not fit, rebuilds the frame with more room until all fit. The
+/// generator runs once a frame; twice for the first one, whose fragments are counted before
+/// (HashBufferOptions::cells spares that), and for one that outgrew the frame before.
 ///
 /// `execution.memory_limit` bounds the buffer's own bytes. Its threads are not used; the generator
 /// brings its own. Exceptions of the generator pass through.
@@ -21,39 +52,66 @@ template <class Record, class Concurrency, class Generator>
   if (auto begun = buffer.begin_frame(limit); !begun) {
     return tl::unexpected(std::move(begun.error()));
   }
-  std::uint64_t deepest_fragments = 0;  // 0: not counted
-  for (int calls = 1;; ++calls) {
-    generator(buffer);
+  struct KeepFailures {  // again, whatever ends the frame
+    explicit KeepFailures(HashBuffer<Record, Concurrency>& to_set) : buffer(to_set) {
+      buffer.keep_failures(false);
+    }
+    ~KeepFailures() { buffer.keep_failures(true); }
+    KeepFailures(const KeepFailures&) = delete;
+    KeepFailures& operator=(const KeepFailures&) = delete;
+    HashBuffer<Record, Concurrency>& buffer;
+  } const keep_failures(buffer);
+  int calls = 0, failed_frames = 0;
+  std::optional<typename HashBuffer<Record, Concurrency>::FragmentCount> count;
+  // With culling by opacity the count would be far more than what is kept.
+  if (buffer.has_unknown_load() && buffer.options().opacity == nullptr) {
+    count = buffer.count_fragments(generator);
+    ++calls;
+    if (!buffer.is_culling()) {
+      if (auto held = detail::check_depth(buffer, *count); !held) {
+        return tl::unexpected(std::move(held.error()));
+      }
+    }
+    const std::uint64_t cells = buffer.cells().size();
+    const std::uint64_t target = detail::cells_for(buffer, count->kept, cells, limit);
+    if (target > cells) {
+      if (auto resized = buffer.resize(target); !resized) {
+        return fail(ErrorCode::kLimit, "hash buffer: {} fragments; {}", count->kept,
+                    resized.error().message);
+      }
+    }
+  }
+  for (;;) {
     if (execution.stop.stop_requested()) {
       buffer.clear();
       return fail(ErrorCode::kCancelled, "hash buffer: stopped on request");
     }
+    generator(buffer);
+    ++calls;
+    if (execution.stop.stop_requested()) continue;
     const std::uint64_t missing = buffer.failures();
     const std::uint64_t stored = buffer.stored();
     const std::uint64_t cells = buffer.cells().size();
     if (missing == 0) return BuildReport{stored, calls, buffer.memory_bytes()};
 
-    // With culling, a pixel may have more fragments than it keeps; then only a table that fails
-    // though it is nearly empty proves that room is not what it lacks.
+    // Where room does not help, the ages may not suffice. With culling, a pixel may have more
+    // fragments than it keeps; then only a table that fails though it is nearly empty proves that.
     const bool lacks_ages = is_too_empty(stored + missing, cells);
-    if (deepest_fragments == 0 && (!buffer.is_culling() || lacks_ages)) {
-      const auto deepest = buffer.count_deepest(generator);
-      ++calls;
-      if (deepest.fragments > buffer.age_wanted()) {
-        return fail(
-            ErrorCode::kLimit,
-            "hash buffer: pixel ({}, {}) has {} fragments, {} counts {} at most; {}", deepest.x,
-            deepest.y, deepest.fragments, Record::kName, buffer.age_wanted(),
-            buffer.age_wanted() < Record::kAgeMax ? "raise the option age_limit" : Record::kDeeper);
+    if (lacks_ages || (++failed_frames > 1 && !buffer.is_culling())) {
+      if (!count) {
+        count = buffer.count_fragments(generator);
+        ++calls;
       }
-      deepest_fragments = deepest.fragments;
+      if (auto held = detail::check_depth(buffer, *count); !held) {
+        buffer.clear();
+        return tl::unexpected(std::move(held.error()));
+      }
     }
     // All fragments are known now: stored + missing. At least one step up, since a table that is
     // not full fails by bad luck with its ages. Where luck fails again and again, one plane a
     // layer cannot.
-    std::uint64_t target = grown_cells(cells);
-    while (is_too_full(stored + missing, target)) target = grown_cells(target);
-    if (limit > 0) target = std::min(target, buffer.largest_cells(limit));
+    const std::uint64_t target =
+        detail::cells_for(buffer, stored + missing, grown_cells(cells), limit);
     if (target <= cells) {
       buffer.clear();
       return fail(ErrorCode::kLimit,

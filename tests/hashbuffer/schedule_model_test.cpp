@@ -124,19 +124,19 @@ TYPED_TEST(ScheduleModel, EveryScheduleMakesTheSameTableAndTheSortedLists) {
       const auto lists = buffer.depth_image(Execution{.threads = 1}).value();
       const auto expected =
           sort_everything<Record>(instance.width, instance.height, instance.fragments);
+      ASSERT_EQ(lists, expected) << "instance " << number;
       if (buffer.failures() == 0) {
         ++exact;
-        ASSERT_EQ(lists, expected) << "instance " << number;
       } else {
         ++over_full;
-        ASSERT_EQ(lists.items.size(), buffer.stored());
         for (std::uint64_t pixel = 0; pixel < instance.pixels; ++pixel) {
           const int x = static_cast<int>(pixel) % instance.width;
           const int y = static_cast<int>(pixel) / instance.width;
-          const auto kept = lists.list(x, y), all = expected.list(x, y);
+          const auto all = expected.list(x, y);
+          const auto kept = records_of<Record>(buffer.cells(), buffer.offsets(), pixel);
           ASSERT_LE(kept.size(), all.size());
           ASSERT_TRUE(std::equal(kept.begin(), kept.end(), all.begin()))
-              << "not the nearest fragments, instance " << number;
+              << "not the nearest fragments in the table, instance " << number;
         }
       }
 
