@@ -126,6 +126,9 @@ std::string temporary_name(const std::string& target) {
 
 constexpr int kNameAttempts = 1000;  // names can be left over from a killed process of our number
 
+/// Of this thread, while it lives.
+thread_local OutputGroup* current_group = nullptr;
+
 void remove_tree(const std::string& name) noexcept {
   std::error_code ignored;
   std::filesystem::remove_all(name, ignored);
@@ -304,6 +307,10 @@ Result<void> AtomicFile::commit() {
     return fail(ErrorCode::kOutput, "{}: cannot finish: {}", path_, reason_text(reason));
   }
   if (target_.empty()) return {};
+  if (current_group != nullptr) {
+    current_group->waiting_.push_back({path_, target_, temporary_, std::exchange(slot_, -1)});
+    return {};
+  }
   if (std::rename(temporary_.c_str(), target_.c_str()) != 0) {
     const int reason = errno;
     discard();
@@ -382,6 +389,10 @@ void AtomicFolder::discard() noexcept {
 
 Result<void> AtomicFolder::commit() {
   if (slot_ < 0) return fail(ErrorCode::kInternal, "{}: committed twice", path_);
+  if (current_group != nullptr) {
+    current_group->waiting_.push_back({path_, target_, temporary_, std::exchange(slot_, -1), true});
+    return {};
+  }
   // Takes the place of an empty folder in one step; the system refuses one with content.
   if (std::rename(temporary_.c_str(), target_.c_str()) != 0) {
     const int reason = errno;
@@ -391,6 +402,67 @@ Result<void> AtomicFolder::commit() {
   }
   leave_temporary(slot_);
   return {};
+}
+
+// --- OutputGroup --------------------------------------------------------------------------------
+
+OutputGroup::OutputGroup() { current_group = this; }
+
+OutputGroup::~OutputGroup() {
+  current_group = nullptr;
+  for (Waiting& output : waiting_) {
+    remove_tree(output.temporary);
+    leave_temporary(output.slot);
+  }
+}
+
+std::string OutputGroup::place_of(const std::string& path) const {
+  for (const Waiting& output : waiting_) {
+    if (output.path == path) return output.temporary;
+  }
+  return path;
+}
+
+// Gives an output its name. Returns 0 or the system's reason.
+int OutputGroup::place(Waiting& output) const {
+  struct stat before {};
+  const bool there = lstat(output.target.c_str(), &before) == 0;
+  // Only of several may one have to be taken back. A folder takes the place of an empty one alone.
+  if (waiting_.size() > 1 && there && !output.folder && !S_ISDIR(before.st_mode)) {
+    output.exchanged = renameat2(AT_FDCWD, output.temporary.c_str(), AT_FDCWD,
+                                 output.target.c_str(), RENAME_EXCHANGE) == 0;
+    if (output.exchanged) return 0;
+  }
+  if (std::rename(output.temporary.c_str(), output.target.c_str()) != 0) return errno;
+  output.replaced = there && !output.folder;
+  return 0;
+}
+
+void OutputGroup::take_back(Waiting& output) noexcept {
+  if (output.exchanged) {
+    (void)!renameat2(AT_FDCWD, output.temporary.c_str(), AT_FDCWD, output.target.c_str(),
+                     RENAME_EXCHANGE);
+  } else if (!output.replaced) {
+    (void)!std::rename(output.target.c_str(), output.temporary.c_str());
+  }
+}
+
+Result<void> OutputGroup::commit() {
+  std::size_t placed = 0;
+  int reason = 0;
+  while (placed < waiting_.size() && (reason = place(waiting_[placed])) == 0) ++placed;
+  Result<void> result;
+  if (reason != 0) {
+    result = fail(ErrorCode::kOutput, "{}: cannot rename {} to it: {}", waiting_[placed].path,
+                  waiting_[placed].temporary, reason_text(reason));
+    for (std::size_t i = placed; i-- > 0;) take_back(waiting_[i]);
+  }
+  for (Waiting& output : waiting_) {
+    if (reason != 0 || output.exchanged) remove_tree(output.temporary);
+    leave_temporary(output.slot);
+  }
+  waiting_.clear();
+  return result;
 }
 
 }  // namespace strata

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "core/result.h"
 
@@ -68,6 +69,39 @@ class AtomicFolder {
   void discard() noexcept;
   std::string path_, target_, temporary_;
   int slot_ = -1;
+};
+
+/// Several outputs that appear together or not at all: while it lives, commit() of files and
+/// folders on this thread only completes them, and commit() here gives all of them their names.
+/// Where that fails half way, those that have theirs already are taken back, and what they replaced
+/// is there again (where the file system can exchange two names; else the new file stays).
+/// Destroyed uncommitted it leaves nothing. At most one lives on a thread at a time.
+class OutputGroup {
+ public:
+  OutputGroup();
+  OutputGroup(const OutputGroup&) = delete;
+  OutputGroup& operator=(const OutputGroup&) = delete;
+  ~OutputGroup();
+
+  /// Renames all that was completed since the last time. @return kOutput naming the one that failed
+  Result<void> commit();
+  /// Where the bytes of a completed output lie now: under a temporary name, or its own.
+  /// @param path  as it was created
+  [[nodiscard]] std::string place_of(const std::string& path) const;
+
+ private:
+  friend class AtomicFile;
+  friend class AtomicFolder;
+  struct Waiting {
+    std::string path, target, temporary;
+    int slot = -1;
+    bool folder = false;
+    bool exchanged = false;  ///< the temporary name has what was there before
+    bool replaced = false;   ///< what was there before is gone
+  };
+  int place(Waiting& output) const;
+  static void take_back(Waiting& output) noexcept;
+  std::vector<Waiting> waiting_;
 };
 
 /// Most AtomicFile and AtomicFolder objects that may live at once in a process.

@@ -450,5 +450,78 @@ TEST_F(AtomicFolderTest, AFileOfThatNameIsRefused) {
   EXPECT_EQ(refused.error().code, ErrorCode::kOutput);
 }
 
+using OutputGroupTest = AtomicFileTest;
+
+Result<void> write_to(const std::string& path, const std::string& text) {
+  auto file = AtomicFile::create(path);
+  if (!file) return tl::unexpected(file.error());
+  if (auto done = file->write(text.data(), text.size()); !done) return done;
+  return file->commit();
+}
+
+TEST_F(OutputGroupTest, AppearsTogether) {
+  put(at("b"), "old");
+  OutputGroup group;
+  ASSERT_TRUE(write_to(at("a"), "first"));
+  ASSERT_TRUE(write_to(at("b"), "second"));
+  auto folder = AtomicFolder::create(at("c/"));
+  ASSERT_TRUE(folder);
+  put(folder->temporary_path() + "/in", "third");
+  ASSERT_TRUE(folder->commit());
+  EXPECT_FALSE(fs::exists(at("a")));
+  EXPECT_FALSE(fs::exists(at("c")));
+  EXPECT_EQ(content_of(at("b")), "old");
+  EXPECT_EQ(content_of(group.place_of(at("b"))), "second");
+  EXPECT_EQ(group.place_of(at("other")), at("other"));
+  ASSERT_TRUE(group.commit());
+  EXPECT_EQ(content_of(at("a")), "first");
+  EXPECT_EQ(content_of(at("b")), "second");
+  EXPECT_EQ(content_of(at("c/in")), "third");
+  EXPECT_EQ(entries(), 3u);
+  EXPECT_TRUE(group.commit());  // of nothing
+}
+
+TEST_F(OutputGroupTest, OrNotAtAll) {
+  put(at("b"), "old");
+  {
+    OutputGroup group;
+    ASSERT_TRUE(write_to(at("a"), "first"));
+    ASSERT_TRUE(write_to(at("b"), "second"));
+    ASSERT_TRUE(write_to(at("c"), "third"));
+    fs::create_directory(at("c"));  // meanwhile
+    const auto done = group.commit();
+    ASSERT_FALSE(done);
+    EXPECT_EQ(done.error().code, ErrorCode::kOutput);
+    EXPECT_NE(done.error().message.find(at("c")), std::string::npos);
+    EXPECT_FALSE(fs::exists(at("a")));
+    EXPECT_EQ(content_of(at("b")), "old");
+    EXPECT_EQ(entries(), 2u);  // b and the folder c
+  }
+  {
+    OutputGroup group;
+    ASSERT_TRUE(write_to(at("d"), "first"));
+  }
+  EXPECT_EQ(entries(), 2u);
+  ASSERT_TRUE(write_to(at("d"), "alone"));
+  EXPECT_EQ(content_of(at("d")), "alone");
+}
+
+TEST_F(OutputGroupTest, IsOfItsThreadAlone) {
+  OutputGroup group;
+  std::thread([this] { EXPECT_TRUE(write_to(at("a"), "other")); }).join();
+  EXPECT_EQ(content_of(at("a")), "other");
+}
+
+TEST_F(OutputGroupTest, ASignalRemovesWhatWaits) {
+  EXPECT_EQ(in_child([this] {
+              OutputGroup group;
+              if (!write_to(at("a"), "first")) return 1;
+              remove_temporary_files();
+              return 0;
+            }),
+            0);
+  EXPECT_EQ(entries(), 0u);
+}
+
 }  // namespace
 }  // namespace strata
