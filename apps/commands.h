@@ -44,6 +44,12 @@ struct InputOptions {
   csg::ReadSceneOptions scene;  ///< for the scenes among them
 };
 
+/// A file that is to be read or written, and how the user asked for that: "--ids".
+struct FileUse {
+  std::string asked_by;
+  std::string path;
+};
+
 /// `strata voxelize`
 struct VoxelizeCommand {
   CommonOptions common;
@@ -98,7 +104,7 @@ struct SectionPlane {
   bool towards_eye = false;  ///< turned so that the side the eye is on is cut away
 };
 
-/// `strata csg`
+/// `strata csg`, and what a window shows
 struct CsgCommand {
   CommonOptions common;
   InputOptions input;
@@ -120,6 +126,7 @@ struct CsgCommand {
   std::vector<SectionPlane> cuts;
   std::optional<std::string> json;        ///< "-": standard output
   std::optional<int> measure_resolution;  ///< of the report's measures; none: csg::MeasureOptions'
+  std::vector<FileUse> outputs;           ///< of a window: the pictures that it will write
 };
 
 /// Text to print and an exit code: help, version, mistakes in the command line.

@@ -268,27 +268,31 @@ Result<csg::Scene> load_scene(const CsgCommand& command, Session& session,
     expression = *std::move(parsed);
   }
   std::vector<csg::Scene> inputs;
+  std::vector<FileIdentity> files_read;
   for (const std::string& path : files) {
     auto scene = load_one(path, command, session, facts);
     if (!scene) return tl::unexpected(scene.error());
+    if (auto kept = session.opened(scene->files); !kept) return tl::unexpected(kept.error());
     for (const std::string& note : scene->notes) {
       note.starts_with("ECHO: ") ? session.echo(note) : session.note(note);
     }
     for (const csg::SceneWarning& warning : scene->warnings) {
       session.warn(warning.code, warning.message);
     }
+    files_read.insert(files_read.end(), scene->files.begin(), scene->files.end());
     inputs.push_back(*std::move(scene));
   }
   const bool flat =
       std::all_of(inputs.begin(), inputs.end(), [](const csg::Scene& input) { return input.flat; });
   if (!command.expression.empty()) {
     auto built = Builder(expression, inputs).run();
-    if (built) built->flat = flat;
+    if (built) built->flat = flat, built->files = std::move(files_read);
     return built;
   }
   if (inputs.size() == 1) return std::move(inputs.front());
   csg::Scene all;
   all.flat = flat;
+  all.files = std::move(files_read);
   std::vector<Tree::NodeId> roots;
   for (const csg::Scene& input : inputs) {
     roots.push_back(add_scene(all, input, true));

@@ -5,7 +5,7 @@
 #include <iterator>
 #include <utility>
 
-#include "apps/scene_files.h"
+#include "csg/scene/scene.h"
 
 namespace strata::apps {
 namespace {
@@ -42,19 +42,16 @@ std::vector<FileUse> outputs(std::initializer_list<FileUse> uses) {
   return result;
 }
 
-/// What a command reads, scenes' own files included, against what it writes.
-Result<void> check(const CsgCommand& command, const std::vector<FileUse>& written) {
-  std::vector<FileUse> read = inputs_of(command.input);
-  const auto more = scene_files_of(command, written);
-  read.insert(read.end(), more.begin(), more.end());
-  return check_files(read, written);
+/// Whether the folder that a name means has a file in it, at any depth. A folder of files takes its
+/// place.
+bool holds(const std::string& folder, const std::string& file) {
+  std::error_code error;
+  return fs::is_directory(folder, error) && csg::lies_below(file, folder);
 }
 
-/// The same of another command.
-Result<void> check(const InputOptions& input, const std::vector<FileUse>& written) {
-  CsgCommand command;
-  command.input = input;
-  return check(command, written);
+tl::unexpected<Error> overwrites(const FileUse& out, std::string_view what,
+                                 const std::string& path) {
+  return fail(ErrorCode::kUsage, "{} {} would overwrite {} {}", out.asked_by, out.path, what, path);
 }
 
 }  // namespace
@@ -75,30 +72,15 @@ std::vector<FileUse> inputs_of(const InputOptions& input) {
   return uses;
 }
 
-std::vector<FileUse> scene_files_of(const CsgCommand& command,
-                                    const std::vector<FileUse>& written) {
-  const bool endangered = std::any_of(written.begin(), written.end(), [](const FileUse& use) {
-    std::error_code error;
-    return fs::is_regular_file(use.path, error) && !is_stream(use.path);
-  });
-  if (!endangered) return {};
-  const auto& files = command.input.files;
-  const auto all = with_scene_files(files, command.input.scene.asset_folder, command.scene_format);
-  std::vector<FileUse> uses;
-  for (std::size_t i = files.size(); i < all.size(); ++i) {
-    uses.push_back({"a file of the scene,", all[i]});
-  }
-  return uses;
-}
-
 Result<void> check_files(const std::vector<FileUse>& read, const std::vector<FileUse>& written) {
   for (std::size_t i = 0; i < written.size(); ++i) {
     const FileUse& out = written[i];
     if (is_stream(out.path)) continue;
     for (const FileUse& in : read) {
-      if (is_stream(in.path) || !same_file(in.path, out.path)) continue;
-      return fail(ErrorCode::kUsage, "{} {} would overwrite {} {}", out.asked_by, out.path,
-                  in.asked_by, in.path);
+      if (is_stream(in.path)) continue;
+      if (same_file(in.path, out.path) || holds(out.path, in.path)) {
+        return overwrites(out, in.asked_by, in.path);
+      }
     }
     for (std::size_t j = 0; j < i; ++j) {
       if (is_stream(written[j].path) || !same_file(written[j].path, out.path)) continue;
@@ -109,24 +91,34 @@ Result<void> check_files(const std::vector<FileUse>& read, const std::vector<Fil
   return {};
 }
 
-Result<void> check_files(const VoxelizeCommand& command) {
-  return check(command.input,
-               outputs({{"-o", command.output}, {"--json", command.json.value_or("")}}));
+Result<void> check_opened(const FileIdentity& opened, const std::vector<FileUse>& written) {
+  if (!opened.is_there()) return {};
+  for (const FileUse& out : written) {
+    if (is_stream(out.path)) continue;
+    if (opened.is_same_file(identify_file(out.path)) || holds(out.path, opened.path)) {
+      return overwrites(out, "a file of the scene,", opened.path);
+    }
+  }
+  return {};
 }
 
-Result<void> check_files(const InfoCommand& command) {
-  return check(command.input, outputs({{"--json", command.json.value_or("")}}));
+std::vector<FileUse> outputs_of(const VoxelizeCommand& command) {
+  return outputs({{"-o", command.output}, {"--json", command.json.value_or("")}});
 }
 
-Result<void> check_files(const LdiCommand& command) {
-  return check(command.input, outputs({{"-o", command.output}}));
+std::vector<FileUse> outputs_of(const InfoCommand& command) {
+  return outputs({{"--json", command.json.value_or("")}});
 }
 
-Result<void> check_files(const CsgCommand& command) {
-  return check(command, outputs({{"-o", command.output},
-                                 {"--ids", command.ids},
-                                 {"--depth", command.depth},
-                                 {"--json", command.json.value_or("")}}));
+std::vector<FileUse> outputs_of(const LdiCommand& command) {
+  return outputs({{"-o", command.output}});
+}
+
+std::vector<FileUse> outputs_of(const CsgCommand& command) {
+  return outputs({{"-o", command.output},
+                  {"--ids", command.ids},
+                  {"--depth", command.depth},
+                  {"--json", command.json.value_or("")}});
 }
 
 }  // namespace strata::apps

@@ -281,6 +281,7 @@ Result<void> run_info(const InfoCommand& command, Session& session) {
   const auto printed = command.json ? print_report(json.take(), *command.json, false)
                                     : print_report(text, "-", false);
   if (!printed) return printed;
+  if (auto done = session.commit_outputs(); !done) return done;
   if (first_error) return tl::unexpected(*first_error);
   return session.check_strict();
 }

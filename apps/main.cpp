@@ -63,20 +63,28 @@ int exit_code(const Result<void>& result, Session& session) {
   return static_cast<int>(code);
 }
 
+Result<void> run_command(const VoxelizeCommand& command, Session& session) {
+  return run_voxelize(command, session);
+}
+Result<void> run_command(const InfoCommand& command, Session& session) {
+  return run_info(command, session);
+}
+Result<void> run_command(const LdiCommand& command, Session& session) {
+  return run_ldi(command, session);
+}
+Result<void> run_command(const CsgCommand& command, Session& session) {
+  return run_csg(command, session);
+}
+
 template <class AnyCommand>
 Result<void> run(const AnyCommand& command, Session& session) {
   try {
     session.configure(command.common);
-    if (auto kept = check_files(command); !kept) return kept;
-    if constexpr (std::is_same_v<AnyCommand, VoxelizeCommand>) {
-      return run_voxelize(command, session);
-    } else if constexpr (std::is_same_v<AnyCommand, InfoCommand>) {
-      return run_info(command, session);
-    } else if constexpr (std::is_same_v<AnyCommand, CsgCommand>) {
-      return run_csg(command, session);
-    } else {
-      return run_ldi(command, session);
-    }
+    const std::vector<FileUse> written = outputs_of(command);
+    if (auto kept = check_files(inputs_of(command.input), written); !kept) return kept;
+    session.set_outputs(written, true);
+    auto done = run_command(command, session);
+    return done ? session.commit_outputs() : done;
   } catch (const std::bad_alloc&) {
     return fail(ErrorCode::kLimit, "{}", kNoMemory);
   } catch (const std::system_error& failure) {
@@ -130,6 +138,7 @@ int strata_main(int argc, char** argv) {
   session.end_progress();
   const int code = exit_code(result, session);
 #ifndef STRATA_ORDERLY_EXIT
+  if (code != 0) remove_temporary_files();  // those that wait for others
   // All files are committed. Giving memory and threads back one by one would only take time.
   std::_Exit(code);
 #endif

@@ -1,5 +1,8 @@
 #pragma once
 
+// A guess from the text which files a scene may read, also where it cannot be loaded: to watch
+// them. What a scene really read is in csg::Scene::files.
+
 #include <string>
 #include <string_view>
 #include <vector>

@@ -13,6 +13,7 @@
 #include <mutex>
 #include <utility>
 
+#include "apps/file_conflicts.h"
 #include "core/atomic_file.h"
 #include "core/memory.h"
 #include "core/printable.h"
@@ -77,6 +78,20 @@ void Session::watch_time(double limit_s) {
     std::_Exit(static_cast<int>(ErrorCode::kLimit));
   });
 }
+
+void Session::set_outputs(std::vector<FileUse> written, bool together) {
+  outputs_ = std::move(written);
+  if (together) group_.emplace();
+}
+
+Result<void> Session::opened(std::span<const FileIdentity> files) const {
+  for (const FileIdentity& file : files) {
+    if (auto kept = check_opened(file, outputs_); !kept) return kept;
+  }
+  return {};
+}
+
+Result<void> Session::commit_outputs() { return group_ ? group_->commit() : Result<void>(); }
 
 int Session::threads() const {
   if (given_) return given_->thread_count();

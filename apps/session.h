@@ -4,6 +4,7 @@
 #include <chrono>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -11,7 +12,9 @@
 #include <vector>
 
 #include "apps/commands.h"
+#include "core/atomic_file.h"
 #include "core/execution.h"
+#include "core/file_identity.h"
 #include "core/interrupt.h"
 #include "core/progress.h"
 #include "core/result.h"
@@ -39,6 +42,18 @@ class Session {
 
   /// Takes the options every command has. Sets a wall against memory beyond the limit.
   void configure(const CommonOptions& options);
+
+  /// What the command writes, for opened(). @param together  the files appear together, by
+  /// commit_outputs(); for the thread that writes them
+  void set_outputs(std::vector<FileUse> written, bool together = false);
+  /// Holds files that were opened against those that will be written. @return kUsage naming the two
+  [[nodiscard]] Result<void> opened(std::span<const FileIdentity> files) const;
+  /// Gives all files that have been written their names. @return kOutput
+  Result<void> commit_outputs();
+  /// Where an output lies before that.
+  [[nodiscard]] std::string place_of(const std::string& path) const {
+    return group_ ? group_->place_of(path) : path;
+  }
 
   /// For the next phase of the job; `label` is what the progress bar says. All phases share one
   /// bar, which never goes back: this one goes on from where the last one was seen, and takes
@@ -78,6 +93,8 @@ class Session {
   std::uint64_t memory_limit_ = 0;
   std::optional<ProgressBar> bar_;
   double shown_ = 0;  ///< of the bar
+  std::vector<FileUse> outputs_;
+  std::optional<OutputGroup> group_;
   std::vector<Warning> warnings_;
   std::set<std::string> given_warnings_;
   std::atomic<bool> timed_out_{false};

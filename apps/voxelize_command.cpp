@@ -182,9 +182,15 @@ std::optional<std::uint64_t> size_of_file(const std::string& path) {
 }
 
 Result<void> print_reports(const VoxelizeCommand& command, const VoxelizeOutcome& outcome,
-                           const Session& session) {
+                           Session& session) {
   const bool json_on_stdout = command.json == "-";
   const bool file_on_stdout = command.output == "-" && !command.dry_run;
+  // All files are there before a reader of standard output goes on.
+  if (command.json && !json_on_stdout) {
+    const std::string text = voxelize_json(command, outcome, session);
+    if (auto done = print_report(text, *command.json, false); !done) return done;
+  }
+  if (auto done = session.commit_outputs(); !done) return done;
   if (command.checksum && !command.stats && !command.json && !command.dry_run) {
     const std::string line = fmt::format("{:016x}\n", outcome.report.checksum);
     if (auto done = print_report(line, "-", file_on_stdout); !done) return done;
@@ -193,8 +199,8 @@ Result<void> print_reports(const VoxelizeCommand& command, const VoxelizeOutcome
     const std::string text = voxelize_text(command, outcome, session);
     if (auto done = print_report(text, "-", file_on_stdout || json_on_stdout); !done) return done;
   }
-  if (!command.json) return {};
-  return print_report(voxelize_json(command, outcome, session), *command.json, file_on_stdout);
+  if (!json_on_stdout) return {};
+  return print_report(voxelize_json(command, outcome, session), "-", file_on_stdout);
 }
 
 /// Whether no voxel is asked for its inside: without --solid, or of an open mesh under --open
@@ -358,7 +364,7 @@ Result<void> voxelize_and_write(const VoxelizeCommand& command, VoxelizeOutcome&
   writer.reset();
   outcome.write_ms = write_ms + session.milliseconds() - start;
   if (session.interrupted()) session.note("the interrupt came too late: the output is complete");
-  outcome.output_bytes = size_of_file(command.output);
+  outcome.output_bytes = size_of_file(session.place_of(command.output));
   return {};
 }
 

@@ -128,15 +128,11 @@ std::string report(const Verification& found, double milliseconds) {
 Result<void> run(const Words& words, Session& session) {
   session.configure(words.command.common);
   if (words.has_json) {
-    CsgCommand other = words.command;
-    std::vector<FileUse> read = inputs_of(other.input);
-    if (!words.against.empty()) {
-      other.input.files.push_back(words.against);
-      read.push_back({"--against", words.against});
-    }
+    std::vector<FileUse> read = inputs_of(words.command.input);
+    if (!words.against.empty()) read.push_back({"--against", words.against});
     const std::vector<FileUse> written{{"--json", words.json}};
-    for (FileUse& use : scene_files_of(other, written)) read.push_back(std::move(use));
     if (auto kept = check_files(read, written); !kept) return kept;
+    session.set_outputs(written);
   }
   const auto scene = load_scene(words.command, session);
   if (!scene) return tl::unexpected(scene.error());

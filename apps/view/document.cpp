@@ -118,6 +118,7 @@ bool operator==(const Looks& a, const Looks& b) {
 Result<std::shared_ptr<const Model>> load_model(const apps::CsgCommand& command,
                                                 const Execution& execution) {
   apps::Session session(apps::Session::Clock::now(), execution);
+  session.set_outputs(command.outputs);
   auto scene = apps::load_scene(command, session);
   if (!scene) return tl::unexpected(scene.error());
   auto model = std::make_shared<Model>();

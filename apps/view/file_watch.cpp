@@ -20,9 +20,13 @@ FileWatch::Stamp FileWatch::stamp_of(const std::string& path) {
           static_cast<std::uint64_t>(facts.st_size), true};
 }
 
-void FileWatch::refresh() {
+void FileWatch::refresh(std::span<const FileIdentity> opened) {
   std::vector<Watched> watched;
-  for (const std::string& path : apps::with_scene_files(roots_, asset_folder_)) {
+  std::vector<std::string> files = apps::with_scene_files(roots_, asset_folder_);
+  for (const FileIdentity& file : opened) {
+    if (std::find(files.begin(), files.end(), file.path) == files.end()) files.push_back(file.path);
+  }
+  for (const std::string& path : files) {
     const auto old = std::find_if(watched_.begin(), watched_.end(),
                                   [&](const Watched& one) { return one.path == path; });
     // What has changed since it was loaded must still be noticed.

@@ -1,8 +1,11 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
+
+#include "core/file_identity.h"
 
 // Whether files that a scene is made of have changed on the disk.
 
@@ -21,7 +24,8 @@ class FileWatch {
   /// Whether something has changed since the last time this said so. Costs a stat() a file.
   [[nodiscard]] bool changed();
   /// Reads anew which files the scenes name. To be called when they have been loaded.
-  void refresh();
+  /// @param opened what was read then; of what could not be loaded the text alone tells
+  void refresh(std::span<const FileIdentity> opened = {});
 
   [[nodiscard]] std::vector<std::string> files() const;
 

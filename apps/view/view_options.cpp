@@ -159,7 +159,7 @@ std::variant<apps::ParseOutcome, ViewOptions> parse_view_options(int argc,
   return options;
 }
 
-Result<void> check_files(const ViewOptions& options, const std::vector<ScriptCommand>& commands) {
+Result<void> check_files(ViewOptions& options, const std::vector<ScriptCommand>& commands) {
   std::vector<apps::FileUse> written;
   for (const ScriptCommand& command : commands) {
     if (command.action != Action::kScreenshot && command.action != Action::kPicture) continue;
@@ -171,9 +171,7 @@ Result<void> check_files(const ViewOptions& options, const std::vector<ScriptCom
   if (!options.screenshot.empty()) written.push_back({"--screenshot", options.screenshot});
   std::vector<apps::FileUse> read = apps::inputs_of(options.command.input);
   if (!options.script.empty()) read.push_back({"--script", options.script});
-  for (apps::FileUse& use : apps::scene_files_of(options.command, written)) {
-    read.push_back(std::move(use));
-  }
+  options.command.outputs = written;
   return apps::check_files(read, written);
 }
 

@@ -30,8 +30,9 @@ struct ViewOptions {
     int argc, const char* const* argv);
 
 /// Looks whether the window would write a file that it reads, or one twice.
+/// Those of scenes are looked at when they are loaded.
 /// @param commands of the script @return as apps::check_files()
-[[nodiscard]] Result<void> check_files(const ViewOptions& options,
+[[nodiscard]] Result<void> check_files(ViewOptions& options,
                                        const std::vector<ScriptCommand>& commands);
 
 }  // namespace strata::view

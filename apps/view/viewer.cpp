@@ -100,7 +100,7 @@ void Viewer::tick() {
       load_error_ = load_error_code_ == ErrorCode::kCancelled ? "loading was cancelled"
                                                               : loaded->error().message;
     }
-    if (watch_) watch_->refresh();
+    if (watch_) watch_->refresh(model_ ? model_->scene.files : std::vector<FileIdentity>());
   }
   if (options_.watch) {
     if (!watch_) {

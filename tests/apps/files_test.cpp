@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <filesystem>
 
 #include "mesh/shapes.h"
@@ -83,10 +84,84 @@ TEST_F(Files, WhatAScenesNamesMeanIsFoundAsTheSceneFindsIt) {
           {"would overwrite a file of the scene, ", "heights.png"});
   place.write("quotes.csg", "text(text = \"5\\\" x\"); surface(file = \"old.png\"); cube();\n");
   refuses({"csg", "quotes.csg", "-o", "old.png"}, {"would overwrite a file of the scene, old.png"});
-  place.write("my lib.scad", "module m() cube();\n");
-  place.write("uses.scad", "include <my lib.scad>\nm();\n");
-  refuses({"csg", "uses.scad", "-o", "x.png", "--json=my lib.scad"},
-          {"would overwrite a file of the scene, my lib.scad"});
+}
+
+/// What was opened counts, not what a text looks like.
+TEST_F(Files, AFileOfASceneIsKeptHoweverItIsNamed) {
+  const auto keeps = [&](const std::string& scene, const std::string& file) {
+    place.write("named.csg", scene);
+    refuses({"voxelize", "named.csg", "-r", "4", "-o", file, "--format", "npy"},
+            {"-o " + file + " would overwrite a file of the scene, "});
+  };
+  keeps("import(file = \"p\\x61rt.stl\");", "part.stl");
+  keeps("import(file = \"\\u0070art.stl\");", "part.stl");
+  keeps("/* 5\" */ import(file = \"part.stl\"); // 3\"", "part.stl");
+  keeps("import(file = \"./././part.stl\");", "hard.stl");
+  std::filesystem::create_symlink("part.stl", place.path("soft.stl"));
+  keeps("import(file = \"part.stl\");", "soft.stl");
+  keeps("import(file = \"soft.stl\");", "part.stl");
+  place.write("heights", "1 2\n3 4\n");
+  keeps("surface(file = \"heights\");", "heights");
+  keeps("surface(file = \"heights\"); import(file = \"missing.stl\");", "heights");
+  keeps(std::string((std::size_t{64} << 20) + 1, ' ') + "import(file = \"part.stl\");", "part.stl");
+  place.write("broken.off", "OFF of no kind");
+  keeps("import(file = \"broken.off\"); cube();", "broken.off");
+  // An unused name is free.
+  place.write("named.csg", "*import(file = \"part.stl\"); text(\"old.png\"); cube();");
+  const RunResult run = place.run({"csg", "named.csg", "-o", "old.png", "--size=8,8"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+}
+
+TEST_F(Files, WhatOpenscadReadIsKept) {
+  if (std::system("openscad --version > /dev/null 2>&1") != 0) {
+    GTEST_SKIP() << "openscad is not installed";
+  }
+  std::filesystem::create_directories(place.path("lib"));
+  place.write("lib/names", "name = str(\"pa\", \"rt\", \".stl\");\n");
+  place.write("my lib.scad", "module m() import(name);\n");
+  place.write("main.scad", "include <lib/names>\ninclude <my lib.scad>\nm();\n");
+  for (const char* file : {"part.stl", "lib/names", "hard.stl", "my lib.scad"}) {
+    refuses({"csg", "main.scad", "-o", "x.png", std::string("--json=") + file},
+            {std::string("--json ") + file + " would overwrite a file of the scene, "});
+  }
+}
+
+TEST_F(Files, AFolderThatHoldsAnInputIsNotReplaced) {
+  std::filesystem::create_directories(place.path("slices/deep"));
+  std::filesystem::rename(place.path("part.stl"), place.path("slices/deep/part.stl"));
+  place.write("slices.csg", "import(file = \"slices/deep/part.stl\");");
+  for (const char* format : {"png", "zarr"}) {
+    refuses({"voxelize", "slices/deep/part.stl", "-r", "4", "-o", "slices", "--format", format},
+            {"-o slices would overwrite the input slices/deep/part.stl"});
+    refuses({"voxelize", "slices.csg", "-r", "4", "-o", "./slices/", "--format", format},
+            {"would overwrite a file of the scene, slices/deep/part.stl"});
+  }
+}
+
+TEST_F(Files, OutputsAppearTogetherOrNotAtAll) {
+  const auto fails = [&](const std::vector<std::string>& arguments) {
+    const auto before = contents();
+    const RunResult run = place.run(arguments);
+    EXPECT_EQ(run.exit_code, 4) << run.err;
+    EXPECT_EQ(before, contents()) << arguments.back();
+  };
+  fails({"csg", "scene.csg", "-o", "a.png", "--json=no/folder.json", "--size=8,8"});
+  fails({"csg", "scene.csg", "-o", "old.png", "--ids=no/ids.png", "--size=8,8"});
+  fails({"csg", "scene.csg", "-o", "a.png", "--ids=b.png", "--depth=no/z.exr", "--size=8,8"});
+  fails({"voxelize", "part.stl", "-r", "4", "-o", "a.npy", "--json=no/folder.json"});
+  fails({"voxelize", "part.stl", "-r", "4", "-o", "s", "--format=png", "--json=no/r.json"});
+  // A report holds the size of a file that does not have its name yet.
+  const RunResult run =
+      place.run({"voxelize", "part.stl", "-r", "4", "-o", "a.npy", "--json=r.json"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_NE(place.read("r.json").find("\"bytes\": " + std::to_string(place.read("a.npy").size())),
+            std::string::npos);
+}
+
+TEST_F(Files, TwoNamesOfOneFileAreNotTwoOutputs) {
+  std::filesystem::create_hard_link(place.path("old.png"), place.path("twin.png"));
+  refuses({"csg", "scene.csg", "-o", "old.png", "--ids=twin.png"},
+          {"would be written to one file"});
 }
 
 TEST_F(Files, OutputsDoNotOverwriteEachOther) {

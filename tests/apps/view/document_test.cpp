@@ -289,6 +289,20 @@ TEST_F(Files, WhatASceneNamesIsWatchedToo) {
   EXPECT_EQ(watch.files(), (std::vector<std::string>{path("main.scad"), path("other.scad")}));
 }
 
+TEST_F(Files, APictureIsNotWrittenOverAFileOfTheScene) {
+  write("a.csg", "surface(file = \"h\\x65ight.dat\"); cube();");
+  write("height.dat", "1 2\n3 4\n");
+  apps::CsgCommand command;
+  command.input.files = {path("a.csg")};
+  command.outputs = {{"--screenshot", path("other.dat")}};
+  EXPECT_TRUE(load_model(command, {}).has_value());
+  command.outputs.push_back({"--screenshot", path("height.dat")});
+  const auto refused = load_model(command, {});
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_EQ(refused.error().code, ErrorCode::kUsage);
+  EXPECT_NE(refused.error().message.find("would overwrite a file of the scene"), std::string::npos);
+}
+
 TEST_F(Files, TheLoaderReadsScenesAndReportsErrors) {
   write("good.csg", csg_of());
   write("bad.csg", "cube(size = [1, 1);\n");
