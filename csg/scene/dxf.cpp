@@ -109,7 +109,10 @@ class Drawing {
     for (auto& path : joined.paths) {
       for (glm::dvec2& p : path) p = (p - options_.origin) * options_.scale;
     }
-    return clean({std::move(joined.paths)}, Fill::kEvenOdd);
+    OutlineJob job(execution_);
+    Outline outline = clean({std::move(joined.paths)}, Fill::kEvenOdd, &job);
+    if (job.ended()) return fail(job.error->code, "{}: {}", name_, job.error->message);
+    return outline;
   }
 
  private:

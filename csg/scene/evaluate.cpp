@@ -140,7 +140,11 @@ bool same_colour(const std::optional<glm::vec4>& a, const std::optional<glm::vec
 
 Evaluator::Evaluator(const Ast& ast, const Execution& execution, std::string folder,
                      std::string root)
-    : ast_(ast), execution_(execution), folder_(std::move(folder)), root_(std::move(root)) {}
+    : ast_(ast),
+      execution_(execution),
+      folder_(std::move(folder)),
+      root_(std::move(root)),
+      job_(execution_) {}
 
 Result<Scene> Evaluator::run() {
   newer_ = is_newer_dialect(ast_);
@@ -164,8 +168,11 @@ Result<Scene> Evaluator::run() {
     }
   }
   walk(first, end);
+  job_ended(first);
   if (error_) return tl::unexpected(*error_);
   Scene scene = take_scene();
+  job_ended(first);
+  if (error_) return tl::unexpected(*error_);
   if (auto checked = check_coordinates(scene.tree); !checked) {
     return tl::unexpected(checked.error());
   }
@@ -181,11 +188,11 @@ void Evaluator::walk(std::uint32_t first, std::uint32_t end) {
   for (std::uint32_t node = first; !error_;) {
     while (frames_.size() > 1 && frames_.back().end <= node && !error_) leave();
     if (node >= end || error_) break;
+    if (execution_.stop.stop_requested()) {
+      error_ = {ErrorCode::kCancelled, "stopped"};
+      break;
+    }
     if ((node & 63u) == 0) {
-      if (execution_.stop.stop_requested()) {
-        error_ = {ErrorCode::kCancelled, "stopped"};
-        break;
-      }
       report(static_cast<double>(node - first) / (end - first));
     }
     const std::size_t depth = frames_.size();
@@ -362,21 +369,23 @@ void Evaluator::combine_flat(Frame& frame) {
       for (; i < operands_.size() && operands_[i].child == child; ++i) {
         group.push_back(std::move(operands_[i].outline));
       }
-      regions.push_back(group.size() == 1 ? std::move(group[0]) : unite(group));
+      regions.push_back(group.size() == 1 ? std::move(group[0]) : unite(group, &job_));
     }
   }
   operands_.resize(first_end);
   if (regions.size() == 1) return;
   if (frame.kind == NodeKind::kDifference && regions.size() > 2 && first_end > frame.base + 1) {
-    Outline all = unite(std::span(regions).subspan(1));
+    Outline all = unite(std::span(regions).subspan(1), &job_);
     regions.resize(2);
     regions[1] = std::move(all);
   }
   for (std::size_t i = frame.base; i < first_end; ++i) {
+    if (job_ended(frame.node)) return;
     regions[0] = std::move(operands_[i].outline);
     operands_[i].outline =
-        frame.kind == NodeKind::kDifference ? subtract(regions) : intersect(regions);
+        frame.kind == NodeKind::kDifference ? subtract(regions, &job_) : intersect(regions, &job_);
   }
+  if (job_ended(frame.node)) return;
   const auto from = operands_.begin() + static_cast<std::ptrdiff_t>(frame.base);
   operands_.erase(std::remove_if(from, operands_.end(),
                                  [](const Operand& operand) { return operand.outline.empty(); }),
@@ -437,7 +446,7 @@ Tree::NodeId Evaluator::ghost(std::size_t base) {
       continue;
     }
     Solid solid;
-    solid.mesh = std::make_shared<TriangleSoup>(make_slab(operand.outline, -0.5, 0.5));
+    solid.mesh = std::make_shared<TriangleSoup>(make_slab(operand.outline, -0.5, 0.5, &job_));
     solid.colour = operand.colour;
     solid.name = fmt::format("{} at {}", name(operand.node), place(operand.node));
     nodes.push_back(scene_.tree.add_solid(std::move(solid)));
@@ -458,9 +467,10 @@ void Evaluator::make_slabs(std::size_t base) {
       done[j] = true;
       pieces.push_back(std::move(operands_[j].outline));
     }
-    const Outline region = pieces.size() == 1 ? std::move(pieces[0]) : unite(pieces);
+    const Outline region = pieces.size() == 1 ? std::move(pieces[0]) : unite(pieces, &job_);
     Solid solid;
-    solid.mesh = std::make_shared<TriangleSoup>(make_slab(region, -0.5, 0.5));
+    solid.mesh = std::make_shared<TriangleSoup>(make_slab(region, -0.5, 0.5, &job_));
+    if (job_ended(operands_[i].node)) return;
     solid.colour = operands_[i].colour;
     solid.name = fmt::format("{} at {}", name(operands_[i].node), place(operands_[i].node));
     Operand slab;

@@ -198,7 +198,7 @@ void Evaluator::polygon(std::uint32_t node, const Context& context) {
   }
   if (!flat_path.empty()) paths.push_back(std::move(flat_path));
   for (const std::string& text : reader.faults()) warn(node, "geometry", text);
-  auto outline = make_polygon(points, paths);
+  auto outline = make_polygon(points, paths, &job_);
   if (!outline) {
     return leave_out(node, "geometry", outline.error(), "the polygon is left out");
   }
@@ -220,7 +220,7 @@ void Evaluator::text(std::uint32_t node, const Context& context) {
   options.valign = given.find("valign").string(options.valign);
   options.segments = segments(node);
   std::string missing;
-  auto outline = make_text(options, missing);
+  auto outline = make_text(options, missing, &job_);
   if (!outline) {
     return leave_out(node, "missing-font", outline.error(),
                      fmt::format("the text '{}' is left out", options.text));
@@ -240,7 +240,7 @@ void Evaluator::surface(std::uint32_t node, const Context& context) {
   if (!path) return;
   std::string short_rows;
   auto mesh = read_surface(*path, given.find("center", 1).truth(false),
-                           given.truth("invert", false), &short_rows);
+                           given.truth("invert", false), &short_rows, execution_);
   if (!short_rows.empty()) warn(node, "geometry", short_rows);
   if (!mesh) return leave_out(node, "geometry", mesh.error(), "the surface is left out");
   add_solid(node, context, *std::move(mesh));

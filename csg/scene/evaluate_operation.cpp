@@ -12,6 +12,11 @@
 namespace strata::csg {
 /// Replaces the operands of a node that has a frame by what it makes of them, outside that frame.
 void Evaluator::operate(Frame& frame) {
+  replace_operands(frame);
+  job_ended(frame.node);
+}
+
+void Evaluator::replace_operands(Frame& frame) {
   leftovers_ = true;
   const bool takes_flat = frame.kind == NodeKind::kLinearExtrude ||
                           frame.kind == NodeKind::kRotateExtrude ||
@@ -58,7 +63,7 @@ Outline Evaluator::united(std::size_t base) {
     outlines.push_back(std::move(operands_[i].outline));
   }
   operands_.resize(base);
-  return outlines.size() == 1 ? std::move(outlines[0]) : unite(outlines);
+  return outlines.size() == 1 ? std::move(outlines[0]) : unite(outlines, &job_);
 }
 
 Tree::NodeId Evaluator::united_solid(std::size_t base) {
@@ -261,7 +266,7 @@ void Evaluator::projection(Frame& frame) {
   if (given.find("cut", 0).truth(false)) {
     add_outline(frame.node, frame.outside, cross_section(scene_.tree, child));
   } else {
-    add_outline(frame.node, frame.outside, shadow(boundary_mesh(frame.node, child)));
+    add_outline(frame.node, frame.outside, shadow(boundary_mesh(frame.node, child), &job_));
   }
 }
 
@@ -298,7 +303,9 @@ void Evaluator::linear_extrude(Frame& frame) {
                             options.twist, options.scale.x, options.scale.y));
   }
   SliceCount slices;
-  add_solid(frame.node, frame.outside, csg::linear_extrude(outline, options, &slices));
+  TriangleSoup mesh = csg::linear_extrude(outline, options, &slices, &job_);
+  if (job_ended(frame.node)) return;
+  add_solid(frame.node, frame.outside, std::move(mesh));
   if (static_cast<double>(slices.made) < slices.wanted) {
     warn(frame.node, "approximate",
          fmt::format("'linear_extrude': it would take {:g} slices (twist {:g}, $fn {:g}), {} are "
@@ -321,7 +328,7 @@ void Evaluator::rotate_extrude(Frame& frame) {
   options.start = given.number("start", full ? 180.0 : 0.0);
   options.round_up = newer_;
   options.segments = segments(frame.node);
-  auto mesh = csg::rotate_extrude(outline, options);
+  auto mesh = csg::rotate_extrude(outline, options, &job_);
   if (!mesh) {
     return leave_out(frame.node, "geometry", mesh.error(), "the 'rotate_extrude' is left out");
   }
@@ -341,7 +348,7 @@ void Evaluator::flat_operation(Frame& frame) {
     std::reverse(operands.begin(), operands.end());
     if (operands.empty()) return;
     add_outline(frame.node, frame.outside,
-                operands.size() == 1 ? std::move(operands[0]) : minkowski_sum(operands));
+                operands.size() == 1 ? std::move(operands[0]) : minkowski_sum(operands, &job_));
     return;
   }
   Outline outline = united(frame.base);
@@ -350,7 +357,7 @@ void Evaluator::flat_operation(Frame& frame) {
       outline = convex_hull(std::span<const Outline>(&outline, 1));
       break;
     case NodeKind::kFill:
-      outline = without_holes(outline);
+      outline = without_holes(outline, &job_);
       break;
     case NodeKind::kResize: {
       double size[2] = {0.0, 0.0};
@@ -374,8 +381,8 @@ void Evaluator::flat_operation(Frame& frame) {
                     fmt::format("'offset' by {:g}, which must be less than {:g}; it is left out",
                                 by, kMostCoordinate));
       }
-      outline = delta.is_number() ? offset_delta(outline, by, given.truth("chamfer", false))
-                                  : offset_round(outline, by, segments(frame.node));
+      outline = delta.is_number() ? offset_delta(outline, by, given.truth("chamfer", false), &job_)
+                                  : offset_round(outline, by, segments(frame.node), &job_);
       break;
     }
     case NodeKind::kRoof: {

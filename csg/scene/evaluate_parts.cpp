@@ -50,6 +50,11 @@ void Evaluator::leave_out(std::uint32_t node, std::string code, const Error& err
   warn(node, std::move(code), fmt::format("{}; {}", error.message, what));
 }
 
+bool Evaluator::job_ended(std::uint32_t node) {
+  if (job_.ended()) stop(job_.error->code, node, job_.error->message);
+  return job_.error.has_value();
+}
+
 void Evaluator::add_solid(std::uint32_t node, const Context& context, TriangleSoup mesh,
                           InsideRule rule) {
   if (mesh.triangles.empty()) return;

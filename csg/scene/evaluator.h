@@ -142,6 +142,7 @@ class Evaluator {
 
   // evaluate_operation.cpp: nodes with a frame of their own; operands from `base` on are replaced
   void operate(Frame& frame);
+  void replace_operands(Frame& frame);
   void hull(Frame& frame);
   void minkowski(Frame& frame);
   void add_sum(const Frame& frame, std::vector<MinkowskiPart> sum,
@@ -176,6 +177,8 @@ class Evaluator {
   /// Warns that the error leaves something out: `error; what`. What a limit, the memory's above
   /// all, or the user has stopped ends the whole run: another picture would be wrong.
   void leave_out(std::uint32_t node, std::string code, const Error& error, std::string_view what);
+  /// Whether work on flat geometry ended early, which then ends the run.
+  bool job_ended(std::uint32_t node);
   [[nodiscard]] std::string place(std::uint32_t node) const;
   [[nodiscard]] std::string_view name(std::uint32_t node) const;
   [[nodiscard]] NodeArguments arguments(std::uint32_t node) const {
@@ -195,6 +198,7 @@ class Evaluator {
   std::vector<Operand> operands_;
   std::uint64_t warnings_left_out_ = 0;
   std::optional<Error> error_;
+  OutlineJob job_;  ///< of flat geometry
   using PrimitiveKey = std::pair<std::string_view, std::vector<double>>;
   std::map<PrimitiveKey, std::shared_ptr<const TriangleSoup>> primitives_;
   struct Imported {

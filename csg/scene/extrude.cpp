@@ -2,7 +2,9 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <numbers>
+#include <numeric>
 #include <queue>
+#include <utility>
 
 #include "csg/scene/orient.h"
 #include "csg/scene/outline.h"
@@ -87,7 +89,10 @@ std::vector<double> edge_lengths(const Contour& contour, const LinearExtrude& op
                                  std::size_t slices) {
   std::vector<double> lengths(contour.size(), 0.0);
   const bool uniform = options.scale.x == options.scale.y;
-  for (std::size_t j = 0; j <= (uniform ? 0 : slices); ++j) {
+  // Of very many slices some are looked at.
+  constexpr std::size_t kMostLooks = 20'000'000;
+  const std::size_t step = 1 + slices * contour.size() / kMostLooks;
+  for (std::size_t j = 0; j <= (uniform ? 0 : slices); j += step) {
     const Slice slice(options, static_cast<double>(j) / static_cast<double>(slices));
     for (std::size_t i = 0; i < contour.size(); ++i) {
       const double length =
@@ -99,6 +104,7 @@ std::vector<double> edge_lengths(const Contour& contour, const LinearExtrude& op
 }
 
 Contour divided(const Contour& contour, const std::vector<std::size_t>& parts) {
+  if (parts.empty()) return contour;
   Contour result;
   for (std::size_t i = 0; i < contour.size(); ++i) {
     const glm::dvec2 &p = contour[i], &q = contour[(i + 1) % contour.size()];
@@ -112,9 +118,9 @@ Contour divided(const Contour& contour, const std::vector<std::size_t>& parts) {
 
 /// Divides the edges with the longest parts, those that are about equal together, while there are
 /// at most `wanted` vertices.
-Contour divide_to_count(const Contour& contour, const LinearExtrude& options, std::size_t slices,
-                        std::size_t wanted) {
-  if (contour.size() >= wanted) return contour;
+std::vector<std::size_t> divide_to_count(const Contour& contour, const LinearExtrude& options,
+                                         std::size_t slices, std::size_t wanted) {
+  if (contour.size() >= wanted) return {};
   const std::vector<double> lengths = edge_lengths(contour, options, slices);
   std::vector<std::size_t> parts(contour.size(), 1);
   // Between the length of the parts now and when there is one more.
@@ -140,41 +146,43 @@ Contour divide_to_count(const Contour& contour, const LinearExtrude& options, st
       queue.emplace(measure(i), i);
     }
   }
-  return divided(contour, parts);
+  return parts;
 }
 
-Contour divide_to_length(const Contour& contour, const LinearExtrude& options, std::size_t slices,
-                         double length) {
+std::vector<std::size_t> divide_to_length(const Contour& contour, const LinearExtrude& options,
+                                          std::size_t slices, double length) {
   const std::vector<double> lengths = edge_lengths(contour, options, slices);
   std::vector<std::size_t> parts;
   for (const double whole : lengths) {
     parts.push_back(static_cast<std::size_t>(std::clamp(std::ceil(whole / length), 1.0, 1e6)));
   }
-  return divided(contour, parts);
+  return parts;
 }
 
-Outline divide_edges(const Outline& outline, const LinearExtrude& options, std::size_t slices) {
+/// In how many parts each edge of each contour is divided; nothing for a contour that stays.
+std::vector<std::vector<std::size_t>> divide_edges(const Outline& outline,
+                                                   const LinearExtrude& options,
+                                                   std::size_t slices) {
   const bool bent = options.twist != 0 || options.scale.x != options.scale.y;
   const Segments& s = options.segments;
-  Outline result;
+  std::vector<std::vector<std::size_t>> result;
   for (const Contour& contour : outline.contours) {
+    std::vector<std::size_t>& parts = result.emplace_back();
     if (options.outline_segments > 0) {
-      result.contours.push_back(divide_to_count(
-          contour, options, slices, static_cast<std::size_t>(options.outline_segments)));
+      parts = divide_to_count(contour, options, slices,
+                              static_cast<std::size_t>(options.outline_segments));
     } else if (!options.divide_outline || !bent || !std::isfinite(s.fn)) {
-      result.contours.push_back(contour);
+      continue;
     } else if (s.fn > 0) {
       const auto wanted = static_cast<std::size_t>(std::min(std::max(s.fn, 3.0), 1e6));
-      result.contours.push_back(divide_to_count(contour, options, slices, wanted));
+      parts = divide_to_count(contour, options, slices, wanted);
     } else {
       const auto by_angle = static_cast<std::size_t>(std::ceil(360.0 / std::max(s.fa, 0.01)));
-      if (contour.size() >= by_angle) {
-        result.contours.push_back(contour);
-        continue;
+      if (contour.size() >= by_angle) continue;
+      parts = divide_to_length(contour, options, slices, std::max(s.fs, 0.01));
+      if (std::accumulate(parts.begin(), parts.end(), std::size_t{0}) >= by_angle) {
+        parts = divide_to_count(contour, options, slices, by_angle);
       }
-      Contour fine = divide_to_length(contour, options, slices, std::max(s.fs, 0.01));
-      if (fine.size() >= by_angle) fine = divide_to_count(contour, options, slices, by_angle);
-      result.contours.push_back(std::move(fine));
     }
   }
   return result;
@@ -205,9 +213,84 @@ void close_at_point(const Outline& outline, std::size_t bottom, const glm::dvec3
   }
 }
 
+/// Points on an edge, from the number `first` on.
+struct Dots {
+  std::uint32_t first = 0, count = 0;
+};
+
+/// The triangle (a, b, c) with dots on its edges, a fan from the corner opposite of each.
+void fan(const glm::uvec3& corners, const Dots (&dots)[3], std::vector<glm::uvec3>& triangles) {
+  const int edge = dots[0].count > 0 ? 0 : dots[1].count > 0 ? 1 : 2;
+  if (dots[edge].count == 0) {
+    triangles.push_back(corners);
+    return;
+  }
+  const std::uint32_t from = corners[edge], to = corners[(edge + 1) % 3];
+  const std::uint32_t tip = corners[(edge + 2) % 3];
+  std::uint32_t last = from;
+  for (std::uint32_t k = 0; k <= dots[edge].count; ++k) {
+    const std::uint32_t next = k == dots[edge].count ? to : dots[edge].first + k;
+    const Dots left[3] = {
+        {}, next == to ? dots[(edge + 1) % 3] : Dots{}, k == 0 ? dots[(edge + 2) % 3] : Dots{}};
+    fan({last, next, tip}, left, triangles);
+    last = next;
+  }
+}
+
+/// Triangles of `divided`, which is `raw` with more points on its edges: the triangles of `raw`,
+/// with fans to these. Ears of a million points in line take hours.
+std::vector<glm::uvec3> triangulate_divided(const Outline& raw, const Outline& divided,
+                                            const std::vector<std::vector<std::size_t>>& parts,
+                                            OutlineJob* job) {
+  std::vector<glm::uvec3> coarse = triangulate_pieces(raw, job);
+  std::vector<std::uint32_t> next, number;  // of raw's points: the next one, and its number
+  std::vector<Dots> dots;                   // behind each
+  std::uint32_t at = 0;
+  for (std::size_t c = 0; c < raw.contours.size(); ++c) {
+    const auto first = static_cast<std::uint32_t>(next.size());
+    const auto count = static_cast<std::uint32_t>(raw.contours[c].size());
+    for (std::uint32_t i = 0; i < count; ++i) {
+      const auto more = static_cast<std::uint32_t>(parts[c].empty() ? 0 : parts[c][i] - 1);
+      next.push_back(first + (i + 1) % count);
+      number.push_back(at);
+      dots.push_back({at + 1, more});
+      at += 1 + more;
+    }
+  }
+  std::size_t undone = 0;  // edges with dots that no triangle has taken
+  for (const Dots& edge : dots) undone += edge.count > 0 ? 1 : 0;
+  std::vector<glm::uvec3> triangles;
+  triangles.reserve(at);
+  for (const glm::uvec3& t : coarse) {
+    Dots on[3];
+    for (int i = 0; i < 3; ++i) {
+      const std::uint32_t from = t[i];
+      if (next[from] != t[(i + 1) % 3] || dots[from].count == 0) continue;
+      on[i] = std::exchange(dots[from], Dots{});
+      --undone;
+    }
+    fan({number[t.x], number[t.y], number[t.z]}, on, triangles);
+  }
+  // Points in one place may have swapped their parts in the triangles.
+  return undone == 0 ? triangles : triangulate_pieces(divided, job);
+}
+
+/// Whether the mesh would be larger than the job allows.
+bool too_large(double vertices, double triangles, const char* what, OutlineJob* job) {
+  if (!job || job->error || job->execution.memory_limit == 0) return job && job->error;
+  const double bytes = vertices * sizeof(glm::dvec3) + triangles * sizeof(glm::uvec3);
+  if (bytes <= static_cast<double>(job->execution.memory_limit)) return false;
+  job->error = Error{ErrorCode::kLimit,
+                     fmt::format("{}: {:.3g} vertices and {:.3g} triangles take {:.3g} bytes, the "
+                                 "memory limit is {}",
+                                 what, vertices, triangles, bytes, job->execution.memory_limit)};
+  return true;
+}
+
 }  // namespace
 
-TriangleSoup linear_extrude(const Outline& raw, const LinearExtrude& given, SliceCount* count) {
+TriangleSoup linear_extrude(const Outline& raw, const LinearExtrude& given, SliceCount* count,
+                            OutlineJob* job) {
   LinearExtrude options = given;
   options.scale = glm::max(options.scale, glm::dvec2(0));
   const glm::dvec3 way = options.direction * options.height;
@@ -219,12 +302,18 @@ TriangleSoup linear_extrude(const Outline& raw, const LinearExtrude& given, Slic
   }
   const double wanted = slice_count(raw, options);
   auto slices = static_cast<std::size_t>(std::min(wanted, 1e6));
-  const Outline outline = divide_edges(raw, options, slices);
+  const auto parts = divide_edges(raw, options, slices);
+  Outline outline;
   std::size_t stride = 0;
-  for (const Contour& contour : outline.contours) stride += contour.size();
+  for (std::size_t i = 0; i < raw.contours.size(); ++i) {
+    outline.contours.push_back(divided(raw.contours[i], parts[i]));
+    stride += outline.contours.back().size();
+  }
   if (stride == 0 || stride > kMostVertices) return {};
   slices = std::clamp<std::size_t>(slices, 1, std::max<std::size_t>(kMostVertices / stride, 2) - 1);
   if (count) *count = {wanted, slices};
+  const double walls = static_cast<double>(stride) * static_cast<double>(slices);
+  if (too_large(walls + static_cast<double>(stride), 2 * walls, "linear_extrude", job)) return {};
 
   const glm::dvec3 bottom = options.centre ? -way / 2.0 : glm::dvec3(0);
   const bool pointed = options.scale == glm::dvec2(0);
@@ -232,6 +321,7 @@ TriangleSoup linear_extrude(const Outline& raw, const LinearExtrude& given, Slic
   mesh.positions.reserve(stride * (slices + 1));
   mesh.triangles.reserve(stride * 2 * (slices + 1));
   for (std::size_t j = 0; j < slices + (pointed ? 0 : 1); ++j) {
+    if (job && job->ended()) return {};
     const double t = static_cast<double>(j) / static_cast<double>(slices);
     const Slice slice(options, t);
     // Half the way up from the middle, not the bottom plus the whole: both ends alike.
@@ -241,6 +331,7 @@ TriangleSoup linear_extrude(const Outline& raw, const LinearExtrude& given, Slic
     }
   }
   for (std::size_t j = 1; j < slices + (pointed ? 0 : 1); ++j) {
+    if (job && job->ended()) return {};
     const std::size_t low = (j - 1) * stride;
     // An edge that shrinks to nothing at the top must not be left with the long diagonal.
     const bool shrinks = j == slices && (options.scale.x == 0 || options.scale.y == 0);
@@ -268,10 +359,13 @@ TriangleSoup linear_extrude(const Outline& raw, const LinearExtrude& given, Slic
   }
   // Slices are affine images of the outline: its triangles close both ends.
   const auto top = static_cast<std::uint32_t>(slices * stride);
-  for (const glm::uvec3& t : triangulate(outline)) {
+  const bool same = outline.contours == raw.contours;
+  for (const glm::uvec3& t :
+       same ? triangulate_pieces(outline, job) : triangulate_divided(raw, outline, parts, job)) {
     mesh.triangles.emplace_back(t.x, t.z, t.y);
     if (!pointed) mesh.triangles.push_back(t + top);
   }
+  if (job && job->ended()) return {};
   if (pointed) close_at_point(outline, (slices - 1) * stride, bottom + way, mesh);
   if (way.z < 0) {
     for (glm::uvec3& t : mesh.triangles) std::swap(t.y, t.z);
@@ -279,15 +373,16 @@ TriangleSoup linear_extrude(const Outline& raw, const LinearExtrude& given, Slic
   return mesh;
 }
 
-TriangleSoup make_slab(const Outline& outline, double low, double high) {
+TriangleSoup make_slab(const Outline& outline, double low, double high, OutlineJob* job) {
   LinearExtrude options;
   options.height = high - low;
-  TriangleSoup mesh = linear_extrude(outline, options);
+  TriangleSoup mesh = linear_extrude(outline, options, nullptr, job);
   for (glm::dvec3& p : mesh.positions) p.z = p.z > 0 ? high : low;
   return mesh;
 }
 
-Result<TriangleSoup> rotate_extrude(const Outline& outline, const RotateExtrude& options) {
+Result<TriangleSoup> rotate_extrude(const Outline& outline, const RotateExtrude& options,
+                                    OutlineJob* job) {
   if (outline.empty() || !std::isfinite(options.start)) return TriangleSoup{};
   double low = 0, high = 0;
   std::size_t stride = 0;
@@ -309,11 +404,15 @@ Result<TriangleSoup> rotate_extrude(const Outline& outline, const RotateExtrude&
       std::max(options.round_up ? std::ceil(steps) : std::floor(steps), 1.0));
   fragments = std::min(fragments, std::max<std::size_t>(kMostVertices / stride, 2) - 1);
 
+  const double walls = static_cast<double>(stride) * static_cast<double>(fragments);
+  if (too_large(walls, 2 * walls, "rotate_extrude", job)) return tl::unexpected(*job->error);
+
   // Points on the axis stay where they are: one vertex for all steps.
   TriangleSoup mesh;
   const std::size_t rings = fragments + (full ? 0 : 1);
   std::vector<std::uint32_t> vertex(rings * stride);
   for (std::size_t j = 0; j < rings; ++j) {
+    if (job && job->ended()) return tl::unexpected(*job->error);
     const double at =
         options.start + turn * static_cast<double>(j) / static_cast<double>(fragments);
     const double cosine = cos_degrees(at), sine = sin_degrees(at);
@@ -334,6 +433,7 @@ Result<TriangleSoup> rotate_extrude(const Outline& outline, const RotateExtrude&
     if (a != b && b != c && c != a) mesh.triangles.emplace_back(a, b, c);
   };
   for (std::size_t j = 0; j < fragments; ++j) {
+    if (job && job->ended()) return tl::unexpected(*job->error);
     const std::uint32_t *here = &vertex[j * stride], *there = &vertex[(j + 1) % rings * stride];
     std::size_t first = 0;
     for (const Contour& contour : outline.contours) {
@@ -347,7 +447,9 @@ Result<TriangleSoup> rotate_extrude(const Outline& outline, const RotateExtrude&
   }
   if (!full) {
     const std::uint32_t* last = &vertex[fragments * stride];
-    for (const glm::uvec3& t : triangulate(outline)) {
+    const std::vector<glm::uvec3> ends = triangulate_pieces(outline, job);
+    if (job && job->ended()) return tl::unexpected(*job->error);
+    for (const glm::uvec3& t : ends) {
       mesh.triangles.emplace_back(vertex[t.x], vertex[t.y], vertex[t.z]);
       mesh.triangles.emplace_back(last[t.x], last[t.z], last[t.y]);
     }

@@ -33,7 +33,7 @@ Outline make_circle(double radius, const Segments& segments) {
 }
 
 Result<Outline> make_polygon(std::span<const glm::dvec2> points,
-                             std::span<const std::vector<std::uint32_t>> paths) {
+                             std::span<const std::vector<std::uint32_t>> paths, OutlineJob* job) {
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (!finite(points[i])) {
       return fail(ErrorCode::kInput, "polygon: point {} is ({}, {}), not finite", i, points[i].x,
@@ -52,7 +52,9 @@ Result<Outline> make_polygon(std::span<const glm::dvec2> points,
       contour.push_back(points[index]);
     }
   }
-  return clean(raw, Fill::kEvenOdd);
+  Outline outline = clean(raw, Fill::kEvenOdd, job);
+  if (job && job->error) return tl::unexpected(*job->error);
+  return outline;
 }
 
 Outline convex_hull(std::span<const Outline> operands) {
@@ -84,13 +86,13 @@ Outline convex_hull(std::span<const Outline> operands) {
   return {{std::move(hull)}};
 }
 
-Outline without_holes(const Outline& outline) {
+Outline without_holes(const Outline& outline, OutlineJob* job) {
   Outline outer;
   for (const auto& contour : outline.contours) {
     if (signed_area(contour) > 0) outer.contours.push_back(contour);
   }
   // Islands in holes are covered by what surrounds them.
-  return clean(outer, Fill::kNonzero);
+  return clean(outer, Fill::kNonzero, job);
 }
 
 Outline transform(const Outline& outline, const glm::dmat3& m) {

@@ -2,6 +2,7 @@
 
 #include <glm/mat3x3.hpp>
 #include <glm/vec2.hpp>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -25,31 +26,49 @@ struct Outline {
 
 enum class Fill { kEvenOdd, kNonzero };
 
+/// Lets operations on outlines end early: one that is stopped, or meets a limit, says so here and
+/// gives an empty outline. Without a job nothing ends early. A stopped operation of Clipper goes on
+/// in a thread of its own, whose result is thrown away.
+struct OutlineJob {
+  explicit OutlineJob(const Execution& given) : execution(given) {}
+  /// Whether the result does not count; asks for a stop.
+  bool ended() {
+    if (!error && execution.stop.stop_requested()) error = {ErrorCode::kCancelled, "stopped"};
+    return error.has_value();
+  }
+
+  const Execution& execution;
+  std::optional<Error> error;  ///< kCancelled or kLimit
+};
+
 // --- shapes ------------------------------------------------------------------------------------
 
 [[nodiscard]] Outline make_square(const glm::dvec2& size, bool centre);
 [[nodiscard]] Outline make_circle(double radius, const Segments& segments);
 /// `polygon`: one path for each contour (empty: all points in order), cleaned by even-odd.
-/// @return kInput naming the index that is out of range
+/// @return kInput naming the index that is out of range; the job's error
 Result<Outline> make_polygon(std::span<const glm::dvec2> points,
-                             std::span<const std::vector<std::uint32_t>> paths);
+                             std::span<const std::vector<std::uint32_t>> paths,
+                             OutlineJob* job = nullptr);
 
 // --- operations (Clipper; coordinates on a fine integer grid) ----------------------------------
 
-[[nodiscard]] Outline clean(const Outline& outline, Fill fill);
-[[nodiscard]] Outline unite(std::span<const Outline> operands);
-[[nodiscard]] Outline intersect(std::span<const Outline> operands);
+[[nodiscard]] Outline clean(const Outline& outline, Fill fill, OutlineJob* job = nullptr);
+[[nodiscard]] Outline unite(std::span<const Outline> operands, OutlineJob* job = nullptr);
+[[nodiscard]] Outline intersect(std::span<const Outline> operands, OutlineJob* job = nullptr);
 /// The first minus all others.
-[[nodiscard]] Outline subtract(std::span<const Outline> operands);
+[[nodiscard]] Outline subtract(std::span<const Outline> operands, OutlineJob* job = nullptr);
 [[nodiscard]] Outline convex_hull(std::span<const Outline> operands);
 /// Empty if an operand is.
-[[nodiscard]] Outline minkowski_sum(std::span<const Outline> operands);
+[[nodiscard]] Outline minkowski_sum(std::span<const Outline> operands, OutlineJob* job = nullptr);
 /// `fill`: without holes.
-[[nodiscard]] Outline without_holes(const Outline& outline);
+[[nodiscard]] Outline without_holes(const Outline& outline, OutlineJob* job = nullptr);
 /// Rounded joins with `segments` for a circle of the radius; negative shrinks.
-[[nodiscard]] Outline offset_round(const Outline& outline, double radius, const Segments& segments);
+[[nodiscard]] Outline offset_round(const Outline& outline, double radius, const Segments& segments,
+                                   OutlineJob* job = nullptr);
 /// Mitered or chamfered joins.
-[[nodiscard]] Outline offset_delta(const Outline& outline, double delta, bool chamfer);
+[[nodiscard]] Outline offset_delta(const Outline& outline, double delta, bool chamfer,
+                                   OutlineJob* job = nullptr);
 /// p' = m * (p, 1); contours are turned when m mirrors.
 [[nodiscard]] Outline transform(const Outline& outline, const glm::dmat3& m);
 /// `resize` in the plane: see csg_format; 0 keeps an axis, or follows the largest given one.
@@ -75,7 +94,7 @@ struct SliceCount {
 };
 /// A closed mesh with shared vertices; empty for an empty outline or height <= 0.
 [[nodiscard]] TriangleSoup linear_extrude(const Outline& outline, const LinearExtrude& options,
-                                          SliceCount* count = nullptr);
+                                          SliceCount* count = nullptr, OutlineJob* job = nullptr);
 
 struct RotateExtrude {
   double angle = 360;     ///< degrees
@@ -83,11 +102,13 @@ struct RotateExtrude {
   bool round_up = false;  ///< newer dialect: number of steps is rounded up
   Segments segments;
 };
-/// A closed mesh. @return kGeometry when the outline crosses the axis
-Result<TriangleSoup> rotate_extrude(const Outline& outline, const RotateExtrude& options);
+/// A closed mesh. @return kGeometry when the outline crosses the axis; the job's error
+Result<TriangleSoup> rotate_extrude(const Outline& outline, const RotateExtrude& options,
+                                    OutlineJob* job = nullptr);
 
 /// A closed slab between z = low and z = high: flat scenes, 1 mm thick.
-[[nodiscard]] TriangleSoup make_slab(const Outline& outline, double low, double high);
+[[nodiscard]] TriangleSoup make_slab(const Outline& outline, double low, double high,
+                                     OutlineJob* job = nullptr);
 
 /// `roof`: straight skeleton or Voronoi roof over the outline. @return kGeometry if it cannot be
 /// done
@@ -98,11 +119,14 @@ Result<TriangleSoup> make_roof(const Outline& outline, const std::string& method
 /// corner and none is added: by position, the boundary of the triangles is the outline, edge for
 /// edge, even where the outline is not clean. Contours of fewer than 3 points are left out.
 [[nodiscard]] std::vector<glm::uvec3> triangulate(const Outline& outline);
+/// The same, an outer contour with its holes at a time where there are many: letters of a text.
+[[nodiscard]] std::vector<glm::uvec3> triangulate_pieces(const Outline& outline,
+                                                         OutlineJob* job = nullptr);
 
 // --- solid to flat ------------------------------------------------------------------------------
 
 /// The shadow of triangles on the xy plane.
-[[nodiscard]] Outline shadow(const TriangleSoup& mesh);
+[[nodiscard]] Outline shadow(const TriangleSoup& mesh, OutlineJob* job = nullptr);
 /// The cross-section at z = 0 of a closed mesh.
 [[nodiscard]] Outline cross_section(const TriangleSoup& mesh);
 
@@ -131,7 +155,9 @@ struct TextOptions {
 };
 /// Text as OpenSCAD sets it (FreeType, HarfBuzz, fontconfig); letters are as far apart as in
 /// versions after 2021.01, which set them 2.3 % closer. `missing` gets the name of a font
-/// that is not installed and was replaced. @return kInput when no font at all is found
-Result<Outline> make_text(const TextOptions& options, std::string& missing);
+/// that is not installed and was replaced. @return kInput when no font at all is found; kLimit
+/// beyond 1 MiB of text or 20 million points; the job's error
+Result<Outline> make_text(const TextOptions& options, std::string& missing,
+                          OutlineJob* job = nullptr);
 
 }  // namespace strata::csg

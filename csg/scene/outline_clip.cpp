@@ -4,11 +4,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <condition_variable>
+#include <cstdint>
+#include <exception>
 #include <glm/common.hpp>
 #include <limits>
+#include <memory>
+#include <mutex>
 #include <new>
 #include <numbers>
 #include <polyclipping/clipper.hpp>
+#include <thread>
 #include <unordered_map>
 #include <utility>
 
@@ -113,43 +119,171 @@ class Grid {
   std::unordered_map<IntPoint, glm::dvec2, PointHash> originals_;
 };
 
-Paths execute(ClipperLib::ClipType type, const Paths& subject, const Paths& clip,
-              ClipperLib::PolyFillType fill) {
-  Paths result;
-  try {
-    ClipperLib::Clipper clipper;
-    const bool has_subject = clipper.AddPaths(subject, ClipperLib::ptSubject, true);
-    const bool has_clip = clipper.AddPaths(clip, ClipperLib::ptClip, true);
-    if (!has_subject && !has_clip) return {};  // nothing has an area
-    // It catches what it throws inside, above all that memory has run out.
-    if (!clipper.Execute(type, result, fill, fill)) throw std::bad_alloc();
-  } catch (const ClipperLib::clipperException&) {
-    return {};  // a coordinate out of range; the grid excludes it
+std::size_t count_points(const Paths& paths) {
+  std::size_t points = 0;
+  for (const Path& path : paths) points += path.size();
+  return points;
+}
+
+/// Mirrors at the diagonal; outer contours stay counter-clockwise.
+void mirror(Paths& paths) {
+  for (Path& path : paths) {
+    for (IntPoint& p : path) std::swap(p.X, p.Y);
+    std::reverse(path.begin(), path.end());
   }
-  return result;
+}
+
+/// Whether far fewer edges are active at once when the sweep goes along x. Clipper sweeps along y,
+/// in time that grows with the active edges: those of a line of text are all active.
+bool better_mirrored(const Paths& paths) {
+  constexpr std::size_t kFewest = 1000;
+  constexpr double kMuch = 4.0;
+  if (count_points(paths) < kFewest) return false;
+  double along_x = 0, along_y = 0;
+  ClipperLib::IntRect box{INT64_MAX, INT64_MAX, INT64_MIN, INT64_MIN};
+  for (const Path& path : paths) {
+    IntPoint last = path.empty() ? IntPoint() : path.back();
+    for (const IntPoint& p : path) {
+      along_x += std::abs(static_cast<double>(p.X - last.X));
+      along_y += std::abs(static_cast<double>(p.Y - last.Y));
+      box.left = std::min(box.left, p.X), box.right = std::max(box.right, p.X);
+      box.top = std::min(box.top, p.Y), box.bottom = std::max(box.bottom, p.Y);
+      last = p;
+    }
+  }
+  const double width = static_cast<double>(box.right - box.left);
+  const double height = static_cast<double>(box.bottom - box.top);
+  return along_y * width > kMuch * along_x * height;
+}
+
+/// How many pairs of edges cross, from a sample of them.
+double estimate_crossings(const Paths& subject, const Paths& clip) {
+  std::vector<std::pair<glm::dvec2, glm::dvec2>> edges;
+  for (const Paths* paths : {&subject, &clip}) {
+    for (const Path& path : *paths) {
+      for (std::size_t i = 0; i < path.size(); ++i) {
+        const IntPoint &p = path[i], &q = path[(i + 1) % path.size()];
+        edges.emplace_back(glm::dvec2(p.X, p.Y), glm::dvec2(q.X, q.Y));
+      }
+    }
+  }
+  constexpr int kSamples = 200'000;
+  std::uint64_t random = 1;
+  const auto next = [&] {
+    random = random * 6364136223846793005u + 1442695040888963407u;
+    return static_cast<std::size_t>((random >> 33) % edges.size());
+  };
+  int crossing = 0;
+  for (int i = 0; i < kSamples; ++i) {
+    const auto& [a, b] = edges[next()];
+    const auto& [c, d] = edges[next()];
+    crossing += orient(a, b, c) * orient(a, b, d) < 0 && orient(c, d, a) * orient(c, d, b) < 0;
+  }
+  const auto count = static_cast<double>(edges.size());
+  return crossing * (count * count / 2) / kSamples;
+}
+
+/// Whether the job ended, or ends here since the outlines cross too often: Clipper takes some
+/// microseconds and 400 bytes for each crossing.
+bool ends_before(const Paths& subject, const Paths& clip, OutlineJob* job) {
+  if (!job || job->ended()) return job != nullptr;
+  constexpr double kMostCrossings = 5e5, kBytes = 400;
+  const std::size_t points = count_points(subject) + count_points(clip);
+  if (static_cast<double>(points) * static_cast<double>(points) / 2 < kMostCrossings) return false;
+  const double crossings = estimate_crossings(subject, clip);
+  const auto limit = static_cast<double>(job->execution.memory_limit);
+  if (crossings > kMostCrossings || (limit > 0 && crossings * kBytes > limit)) {
+    job->error =
+        Error{ErrorCode::kLimit,
+              fmt::format("flat outlines with {} edges cross each other about {:.2g} "
+                          "times; the limit is {:.2g}",
+                          points, crossings,
+                          limit > 0 ? std::min(kMostCrossings, limit / kBytes) : kMostCrossings)};
+  }
+  return job->error.has_value();
+}
+
+/// What `work` gives. Clipper cannot be stopped: where it may take long and a stop is asked for,
+/// it is left to end by itself in a thread of its own, which holds all that it needs.
+template <class Work>
+Paths run_until_stopped(std::size_t points, OutlineJob* job, Work work) {
+  constexpr std::size_t kLong = 5000;
+  if (!job || !job->execution.stop.stop_possible() || points < kLong) return work();
+  struct Shared {
+    std::mutex lock;
+    std::condition_variable_any changed;
+    bool done = false;
+    Paths result;
+    std::exception_ptr error;
+  };
+  const auto shared = std::make_shared<Shared>();
+  std::thread([shared, work = std::move(work)]() mutable {
+    Paths result;
+    std::exception_ptr error;
+    try {
+      result = work();
+    } catch (...) {
+      error = std::current_exception();
+    }
+    const std::lock_guard hold(shared->lock);
+    shared->result = std::move(result);
+    shared->error = error;
+    shared->done = true;
+    shared->changed.notify_all();
+  }).detach();
+  std::unique_lock hold(shared->lock);
+  if (!shared->changed.wait(hold, job->execution.stop, [&] { return shared->done; })) {
+    job->ended();
+    return {};
+  }
+  if (shared->error) std::rethrow_exception(shared->error);
+  return std::move(shared->result);
+}
+
+Paths execute(ClipperLib::ClipType type, Paths subject, Paths clip, ClipperLib::PolyFillType fill,
+              OutlineJob* job) {
+  if (ends_before(subject, clip, job)) return {};
+  const std::size_t points = count_points(subject) + count_points(clip);
+  return run_until_stopped(
+      points, job, [type, subject = std::move(subject), clip = std::move(clip), fill]() mutable {
+        const bool mirrored = better_mirrored(subject);
+        if (mirrored) mirror(subject), mirror(clip);
+        Paths result;
+        try {
+          ClipperLib::Clipper clipper;
+          const bool has_subject = clipper.AddPaths(subject, ClipperLib::ptSubject, true);
+          const bool has_clip = clipper.AddPaths(clip, ClipperLib::ptClip, true);
+          if (!has_subject && !has_clip) return Paths();  // nothing has an area
+          // It catches what it throws inside, above all that memory has run out.
+          if (!clipper.Execute(type, result, fill, fill)) throw std::bad_alloc();
+        } catch (const ClipperLib::clipperException&) {
+          return Paths();  // a coordinate out of range; the grid excludes it
+        }
+        if (mirrored) mirror(result);
+        return result;
+      });
 }
 
 /// Union of counter-clockwise paths, halved until it is small: Clipper's sweep is quadratic in the
 /// edges that are active at once, and most edges vanish early.
-Paths unite_in_halves(std::span<const Paths> parts) {
+Paths unite_in_halves(std::span<const Paths> parts, OutlineJob* job) {
   constexpr std::size_t kAtOnce = 8000;
   std::size_t points = 0;
-  for (const Paths& part : parts) {
-    for (const Path& path : part) points += path.size();
-  }
+  for (const Paths& part : parts) points += count_points(part);
   if (parts.size() <= 1 || points <= kAtOnce) {
     Paths all;
     for (const Paths& part : parts) all.insert(all.end(), part.begin(), part.end());
-    return execute(ClipperLib::ctUnion, all, {}, ClipperLib::pftNonZero);
+    return execute(ClipperLib::ctUnion, std::move(all), {}, ClipperLib::pftNonZero, job);
   }
   const std::size_t half = parts.size() / 2;
-  Paths left = unite_in_halves(parts.first(half));
-  const Paths right = unite_in_halves(parts.subspan(half));
+  Paths left = unite_in_halves(parts.first(half), job);
+  const Paths right = unite_in_halves(parts.subspan(half), job);
   left.insert(left.end(), right.begin(), right.end());
-  return execute(ClipperLib::ctUnion, left, {}, ClipperLib::pftNonZero);
+  return execute(ClipperLib::ctUnion, std::move(left), {}, ClipperLib::pftNonZero, job);
 }
 
-Outline offset(const Outline& outline, double delta, ClipperLib::JoinType join, int segments) {
+Outline offset(const Outline& outline, double delta, ClipperLib::JoinType join, int segments,
+               OutlineJob* job) {
   if (outline.empty() || !std::isfinite(delta)) return {};
   if (delta == 0) return outline;
   Grid grid(std::span(&outline, 1), kOffsetGridBits, std::abs(delta));
@@ -157,14 +291,26 @@ Outline offset(const Outline& outline, double delta, ClipperLib::JoinType join, 
   // Clipper makes an arc of as many steps as keep it within the tolerance of the circle.
   const double tolerance = size * (1.0 - std::cos(std::numbers::pi / std::max(segments, 3)));
   constexpr double kMitreLimit = 1e6;
-  Paths result;
-  try {
-    ClipperLib::ClipperOffset work(join == ClipperLib::jtMiter ? kMitreLimit : 2.0, tolerance);
-    work.AddPaths(grid.to_grid(outline, false), join, ClipperLib::etClosedPolygon);
-    work.Execute(result, grid.length(delta));
-  } catch (const ClipperLib::clipperException&) {
-    return {};
-  }
+  const double limit = join == ClipperLib::jtMiter ? kMitreLimit : 2.0;
+  Paths paths = grid.to_grid(outline, false);
+  if (ends_before(paths, {}, job)) return {};
+  const bool mirrored = better_mirrored(paths);
+  if (mirrored) mirror(paths);
+  const std::size_t points = count_points(paths);
+  Paths result = run_until_stopped(
+      points, job,
+      [paths = std::move(paths), limit, tolerance, join, by = grid.length(delta)]() mutable {
+        Paths made;
+        try {
+          ClipperLib::ClipperOffset work(limit, tolerance);
+          work.AddPaths(paths, join, ClipperLib::etClosedPolygon);
+          work.Execute(made, by);
+        } catch (const ClipperLib::clipperException&) {
+          made.clear();
+        }
+        return made;
+      });
+  if (mirrored) mirror(result);
   return grid.from_grid(result);
 }
 
@@ -217,6 +363,24 @@ void sweep_along(const Path& path, const Paths& shape, bool convex, std::vector<
   }
 }
 
+/// Whether the job ended, or ends here since the sum would have too many pieces.
+bool ends_before_sum(std::size_t path, std::size_t shape, bool convex, OutlineJob* job) {
+  if (!job || job->ended()) return job != nullptr;
+  constexpr double kMostPoints = 2e7, kBytes = 100;
+  const double points =
+      (convex ? 2.0 : 4.0) * static_cast<double>(path) * static_cast<double>(shape);
+  const auto limit = static_cast<double>(job->execution.memory_limit);
+  if (points > kMostPoints || (limit > 0 && points * kBytes > limit)) {
+    job->error = Error{
+        ErrorCode::kLimit,
+        fmt::format("the sum of flat outlines with {} and {} points has pieces with {:.2g} points; "
+                    "the limit is {:.2g}",
+                    path, shape, points,
+                    limit > 0 ? std::min(kMostPoints, limit / kBytes) : kMostPoints)};
+  }
+  return job->error.has_value();
+}
+
 Paths moved(const Paths& paths, const IntPoint& by) {
   Paths result = paths;
   for (Path& path : result) {
@@ -227,23 +391,22 @@ Paths moved(const Paths& paths, const IntPoint& by) {
 
 }  // namespace
 
-Outline clean(const Outline& outline, Fill fill) {
+Outline clean(const Outline& outline, Fill fill, OutlineJob* job) {
   Grid grid(std::span(&outline, 1), kGridBits);
-  const Paths paths = grid.to_grid(outline);
   return grid.from_grid(
-      execute(ClipperLib::ctUnion, paths, {},
-              fill == Fill::kEvenOdd ? ClipperLib::pftEvenOdd : ClipperLib::pftNonZero));
+      execute(ClipperLib::ctUnion, grid.to_grid(outline), {},
+              fill == Fill::kEvenOdd ? ClipperLib::pftEvenOdd : ClipperLib::pftNonZero, job));
 }
 
-Outline unite(std::span<const Outline> operands) {
+Outline unite(std::span<const Outline> operands, OutlineJob* job) {
   if (operands.size() == 1) return operands[0];
   Grid grid(operands, kGridBits);
   std::vector<Paths> parts;
   for (const Outline& operand : operands) parts.push_back(grid.to_grid(operand));
-  return grid.from_grid(unite_in_halves(parts));
+  return grid.from_grid(unite_in_halves(parts, job));
 }
 
-Outline intersect(std::span<const Outline> operands) {
+Outline intersect(std::span<const Outline> operands, OutlineJob* job) {
   if (operands.empty()) return {};
   for (const Outline& operand : operands) {
     if (operand.empty()) return {};
@@ -252,26 +415,26 @@ Outline intersect(std::span<const Outline> operands) {
   Grid grid(operands, kGridBits);
   Paths result = grid.to_grid(operands[0]);
   for (const Outline& operand : operands.subspan(1)) {
-    result =
-        execute(ClipperLib::ctIntersection, result, grid.to_grid(operand), ClipperLib::pftNonZero);
+    result = execute(ClipperLib::ctIntersection, std::move(result), grid.to_grid(operand),
+                     ClipperLib::pftNonZero, job);
   }
   return grid.from_grid(result);
 }
 
-Outline subtract(std::span<const Outline> operands) {
+Outline subtract(std::span<const Outline> operands, OutlineJob* job) {
   if (operands.empty() || operands[0].empty()) return {};
   if (operands.size() == 1) return operands[0];
   Grid grid(operands, kGridBits);
-  const Paths first = grid.to_grid(operands[0]);
-  Paths others;
+  Paths first = grid.to_grid(operands[0]), others;
   for (const Outline& operand : operands.subspan(1)) {
     const Paths paths = grid.to_grid(operand);
     others.insert(others.end(), paths.begin(), paths.end());
   }
-  return grid.from_grid(execute(ClipperLib::ctDifference, first, others, ClipperLib::pftNonZero));
+  return grid.from_grid(execute(ClipperLib::ctDifference, std::move(first), std::move(others),
+                                ClipperLib::pftNonZero, job));
 }
 
-Outline minkowski_sum(std::span<const Outline> operands) {
+Outline minkowski_sum(std::span<const Outline> operands, OutlineJob* job) {
   Outline sum;
   for (const Outline& operand : operands) {
     if (operand.empty()) return {};  // no point to move anything to
@@ -298,9 +461,9 @@ Outline minkowski_sum(std::span<const Outline> operands) {
     const Paths paths = grid.to_grid(path_side, false), shape = grid.to_grid(shape_side, false);
     if (paths.empty() || shape.empty()) return {};
     std::vector<Paths> parts;
-    for (const Path& path : paths) {
-      sweep_along(path, shape, sum_convex || operand_convex, parts);
-    }
+    const bool convex = sum_convex || operand_convex;
+    if (ends_before_sum(count_points(paths), count_points(shape), convex, job)) return {};
+    for (const Path& path : paths) sweep_along(path, shape, convex, parts);
     // The sum of the boundaries, and each side at one point of every piece of the other.
     for (const Path& path : shape) {
       if (ClipperLib::Orientation(path)) parts.push_back(moved(paths, path[0]));
@@ -308,22 +471,23 @@ Outline minkowski_sum(std::span<const Outline> operands) {
     for (const Path& path : paths) {
       if (ClipperLib::Orientation(path)) parts.push_back(moved(shape, path[0]));
     }
-    sum = grid.from_grid(unite_in_halves(parts));
+    sum = grid.from_grid(unite_in_halves(parts, job));
     if (sum.empty()) return {};
   }
   return sum;
 }
 
-Outline offset_round(const Outline& outline, double radius, const Segments& segments) {
-  return offset(outline, radius, ClipperLib::jtRound, segments.count(std::abs(radius)));
+Outline offset_round(const Outline& outline, double radius, const Segments& segments,
+                     OutlineJob* job) {
+  return offset(outline, radius, ClipperLib::jtRound, segments.count(std::abs(radius)), job);
 }
 
-Outline offset_delta(const Outline& outline, double delta, bool chamfer) {
-  return offset(outline, delta, chamfer ? ClipperLib::jtSquare : ClipperLib::jtMiter, 0);
+Outline offset_delta(const Outline& outline, double delta, bool chamfer, OutlineJob* job) {
+  return offset(outline, delta, chamfer ? ClipperLib::jtSquare : ClipperLib::jtMiter, 0, job);
 }
 
 Outline stroke(std::span<const glm::dvec2> line, bool closed, double width, StrokeCap cap,
-               StrokeJoin join, int segments) {
+               StrokeJoin join, int segments, OutlineJob* job) {
   if (line.empty() || !std::isfinite(width) || !(width > 0)) return {};
   Outline frame;
   frame.contours.emplace_back(line.begin(), line.end());
@@ -342,16 +506,26 @@ Outline stroke(std::span<const glm::dvec2> line, bool closed, double width, Stro
                     : cap == StrokeCap::kButt  ? ClipperLib::etOpenButt
                     : cap == StrokeCap::kRound ? ClipperLib::etOpenRound
                                                : ClipperLib::etOpenSquare;
-  Paths result;
-  try {
-    constexpr double kMitreLimit = 4.0;  // of SVG
-    ClipperLib::ClipperOffset work(
-        kMitreLimit, half * (1.0 - std::cos(std::numbers::pi / std::max(segments, 3))));
-    work.AddPath(path, joins, ends);
-    work.Execute(result, half);
-  } catch (const ClipperLib::clipperException&) {
-    return {};
-  }
+  Paths paths{std::move(path)};
+  if (ends_before(paths, {}, job)) return {};
+  const bool mirrored = better_mirrored(paths);
+  if (mirrored) mirror(paths);
+  const std::size_t points = count_points(paths);
+  const double tolerance = half * (1.0 - std::cos(std::numbers::pi / std::max(segments, 3)));
+  Paths result = run_until_stopped(
+      points, job, [paths = std::move(paths), tolerance, joins, ends, half]() mutable {
+        Paths made;
+        try {
+          constexpr double kMitreLimit = 4.0;  // of SVG
+          ClipperLib::ClipperOffset work(kMitreLimit, tolerance);
+          work.AddPaths(paths, joins, ends);
+          work.Execute(made, half);
+        } catch (const ClipperLib::clipperException&) {
+          made.clear();
+        }
+        return made;
+      });
+  if (mirrored) mirror(result);
   return grid.from_grid(result);
 }
 

@@ -12,6 +12,7 @@ enum class StrokeJoin { kMiter, kRound, kBevel };
 
 /// The band of `width` along a line, open or closed. Round parts have `segments` of a full circle.
 [[nodiscard]] Outline stroke(std::span<const glm::dvec2> line, bool closed, double width,
-                             StrokeCap cap, StrokeJoin join, int segments);
+                             StrokeCap cap, StrokeJoin join, int segments,
+                             OutlineJob* job = nullptr);
 
 }  // namespace strata::csg

@@ -150,7 +150,7 @@ bool usable(const TriangleSoup& mesh, const glm::uvec3& t) {
 
 }  // namespace
 
-Outline shadow(const TriangleSoup& mesh) {
+Outline shadow(const TriangleSoup& mesh, OutlineJob* job) {
   // The triangles that face up, as a chain: how often its boundary winds around a point is how many
   // of them cover it. Only the silhouette reaches Clipper. An open mesh needs the others too,
   // turned around.
@@ -168,7 +168,7 @@ Outline shadow(const TriangleSoup& mesh) {
     chain.add(j, k);
     chain.add(k, i);
   }
-  return clean(chain.loops(places.points), Fill::kNonzero);
+  return clean(chain.loops(places.points), Fill::kNonzero, job);
 }
 
 Outline cross_section(const TriangleSoup& mesh) {

@@ -50,7 +50,22 @@ bool read_row(std::string_view line, std::vector<double>& numbers) {
   }
 }
 
-Result<HeightMap> read_numbers(const std::string& path) {
+/// @return kLimit, kCancelled
+Result<void> check_cells(const std::string& path, std::size_t cells, const Execution& execution) {
+  if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+  // Two vertices and four triangles each, and the heights before.
+  constexpr std::size_t kBytes = 2 * sizeof(glm::dvec3) + 4 * sizeof(glm::uvec3) + 16;
+  if (cells > kMostCells) {
+    return fail(ErrorCode::kLimit, "{}: {} heights; the limit is {}", path, cells, kMostCells);
+  }
+  if (execution.memory_limit != 0 && cells * kBytes > execution.memory_limit) {
+    return fail(ErrorCode::kLimit, "{}: {} heights take {} bytes, the memory limit is {}", path,
+                cells, cells * kBytes, execution.memory_limit);
+  }
+  return {};
+}
+
+Result<HeightMap> read_numbers(const std::string& path, const Execution& execution) {
   auto bytes = detail::InputBytes::open(path, 0);
   if (!bytes) return tl::unexpected(bytes.error());
   std::vector<double> numbers;
@@ -73,8 +88,8 @@ Result<HeightMap> read_numbers(const std::string& path) {
     if (numbers.size() == before) continue;
     columns = std::max(columns, numbers.size() - before);
     row_ends.push_back(numbers.size());
-    if (columns * row_ends.size() > kMostCells) {
-      return fail(ErrorCode::kLimit, "{}:{}: more than {} heights", path, line_number, kMostCells);
+    if (auto checked = check_cells(path, columns * row_ends.size(), execution); !checked) {
+      return tl::unexpected(checked.error());
     }
   }
   HeightMap map;
@@ -99,17 +114,16 @@ Result<HeightMap> read_numbers(const std::string& path) {
   return map;
 }
 
-Result<HeightMap> read_picture(const std::string& path, bool invert) {
+Result<HeightMap> read_picture(const std::string& path, bool invert, const Execution& execution) {
   png_image image{};
   image.version = PNG_IMAGE_VERSION;
   if (!png_image_begin_read_from_file(&image, path.c_str())) {
     return fail(ErrorCode::kInput, "{}: {}", path, image.message);
   }
   const std::size_t columns = image.width, rows = image.height;
-  if (columns * rows > kMostCells) {
+  if (auto checked = check_cells(path, columns * rows, execution); !checked) {
     png_image_free(&image);
-    return fail(ErrorCode::kLimit, "{}: {} x {} pixels; the limit is {} in all", path, columns,
-                rows, kMostCells);
+    return tl::unexpected(checked.error());
   }
   image.format = PNG_FORMAT_RGBA;
   std::vector<std::uint8_t> pixels(columns * rows * 4);
@@ -188,10 +202,11 @@ TriangleSoup make_solid(const HeightMap& map, bool centre) {
 }  // namespace
 
 Result<TriangleSoup> read_surface(const std::string& path, bool centre, bool invert,
-                                  std::string* short_rows) {
+                                  std::string* short_rows, const Execution& execution) {
   std::string extension = std::filesystem::path(path).extension().string();
   for (char& c : extension) c = static_cast<char>(c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c);
-  auto map = extension == ".png" ? read_picture(path, invert) : read_numbers(path);
+  auto map =
+      extension == ".png" ? read_picture(path, invert, execution) : read_numbers(path, execution);
   if (!map) return tl::unexpected(map.error());
   if (map->columns < 2 || map->rows < 2) {
     return fail(ErrorCode::kInput, "{}: {} x {} heights; a surface needs 2 x 2", path, map->columns,

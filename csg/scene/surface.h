@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "core/execution.h"
 #include "core/result.h"
 #include "mesh/triangle_soup.h"
 
@@ -11,10 +12,11 @@ namespace strata::csg {
 /// A .png is read as grey levels 0 to 100, its last row at y = 0, floor one below the lowest; any
 /// other file as rows of numbers, the first at y = 0, comments after '#', floor at
 /// min(1, lowest) - 1. `centre` puts the middle at x = y = 0; `invert` turns grey levels around.
-/// @return kInput naming file and line; kLimit beyond 20 million cells. Maps of less than 2 x 2
-/// are kInput
+/// @return kInput naming file and line; kLimit beyond 20 million cells or the memory limit;
+/// kCancelled. Maps of less than 2 x 2 are kInput
 /// @param short_rows  gets a sentence about rows with fewer numbers than others, which end in 0
 Result<TriangleSoup> read_surface(const std::string& path, bool centre, bool invert,
-                                  std::string* short_rows = nullptr);
+                                  std::string* short_rows = nullptr,
+                                  const Execution& execution = {});
 
 }  // namespace strata::csg

@@ -190,7 +190,7 @@ class Reader {
       : text_(text),
         name_(name),
         options_(options),
-        execution_(execution),
+        job_(execution),
         drawing_(options.layer.empty()) {}
 
   Result<Outline> run() {
@@ -212,7 +212,9 @@ class Reader {
     if (!found_ && !options_.layer.empty()) {
       return fail(ErrorCode::kInput, "{}: no layer and no id is '{}'", name_, options_.layer);
     }
-    return unite(shapes_);
+    Outline outline = unite(shapes_, &job_);
+    if (job_.ended()) return tl::unexpected(ended());
+    return outline;
   }
 
  private:
@@ -223,6 +225,10 @@ class Reader {
       name.remove_prefix(colon + 1);
     }
     return name;
+  }
+
+  [[nodiscard]] Error ended() const {
+    return {job_.error->code, fmt::format("{}: {}", name_, job_.error->message)};
   }
 
   std::size_t line_at(std::ptrdiff_t offset) const {
@@ -255,7 +261,7 @@ class Reader {
   Result<void> element(const pugi::xml_node& node, const glm::dmat3& outer,
                        const Style& outer_style, int depth, bool root = false) {
     if (node.type() != pugi::node_element) return {};
-    if (execution_.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+    if (job_.ended()) return tl::unexpected(ended());
     if (depth > kDeepest) return too_deep(node);
     if (++elements_ > kMostElements) {
       return fail(ErrorCode::kLimit, "{}: more than {} elements are drawn", name_, kMostElements);
@@ -350,10 +356,11 @@ class Reader {
       } else if (line.points.size() > 1) {
         const int steps = std::max(options_.segments.count(style.stroke_width / 2), 16);
         shapes_.push_back(transform(
-            stroke(line.points, false, style.stroke_width, style.cap, style.join, steps), place));
+            stroke(line.points, false, style.stroke_width, style.cap, style.join, steps, &job_),
+            place));
       }
     }
-    if (!filled.empty()) shapes_.push_back(transform(clean(filled, style.fill), place));
+    if (!filled.empty()) shapes_.push_back(transform(clean(filled, style.fill, &job_), place));
     return {};
   }
 
@@ -391,7 +398,7 @@ class Reader {
   std::string_view text_;
   const std::string& name_;
   const OutlineImport& options_;
-  const Execution& execution_;
+  OutlineJob job_;
   std::map<std::string, pugi::xml_node, std::less<>> ids_;
   std::vector<Outline> shapes_;
   std::size_t elements_ = 0;

@@ -240,7 +240,8 @@ glm::dvec2 alignment(const TextOptions& options, const Extent& extent, bool hori
   return shift;
 }
 
-Outline set_text(const TextOptions& options, FT_Face face) {
+Result<Outline> set_text(const TextOptions& options, FT_Face face, OutlineJob* job) {
+  const auto ended = [&] { return job && job->ended(); };
   const Font font(hb_ft_font_create(face, nullptr));
   const Buffer buffer(hb_buffer_create());
   hb_buffer_add_utf8(buffer.get(), options.text.data(), static_cast<int>(options.text.size()), 0,
@@ -273,6 +274,7 @@ Outline set_text(const TextOptions& options, FT_Face face) {
   std::vector<Glyph> glyphs;
   Extent extent;
   for (unsigned i = 0; i < count; ++i) {
+    if (ended()) return tl::unexpected(*job->error);
     const Glyph glyph{infos[i].codepoint,
                       glm::dvec2(places[i].x_offset, places[i].y_offset) / kScale,
                       glm::dvec2(places[i].x_advance, places[i].y_advance) / kScale};
@@ -304,7 +306,16 @@ Outline set_text(const TextOptions& options, FT_Face face) {
   // Curves of letters are short: an eighth of the segments of a circle of the text's size.
   pen.steps = std::max(options.segments.count(options.size) / 8 + 1, 2);
   glm::dvec2 place = alignment(options, extent, HB_DIRECTION_IS_HORIZONTAL(direction));
+  std::size_t points = 0, counted = 0;
   for (const Glyph& glyph : glyphs) {
+    if (ended()) return tl::unexpected(*job->error);
+    for (; counted < pen.contours.size(); ++counted) points += pen.contours[counted].size();
+    constexpr std::size_t kMostPoints = 20'000'000;
+    if (points > kMostPoints) {
+      return fail(ErrorCode::kLimit,
+                  "text: {} letters with curves of {} steps have more than {} points",
+                  glyphs.size(), pen.steps, kMostPoints);
+    }
     if (succeeded(FT_Load_Glyph(face, glyph.index, FT_LOAD_DEFAULT))) {
       pen.origin = place + glyph.offset;
       succeeded(FT_Outline_Decompose(&face->glyph->outline, &funcs, &pen));
@@ -314,18 +325,20 @@ Outline set_text(const TextOptions& options, FT_Face face) {
   for (auto& contour : pen.contours) {
     if (contour.size() > 1 && contour.back() == contour.front()) contour.pop_back();
   }
-  return clean({std::move(pen.contours)}, Fill::kNonzero);
+  Outline outline = clean({std::move(pen.contours)}, Fill::kNonzero, job);
+  if (ended()) return tl::unexpected(*job->error);
+  return outline;
 }
 
 }  // namespace
 
-Result<Outline> make_text(const TextOptions& options, std::string& missing) {
+Result<Outline> make_text(const TextOptions& options, std::string& missing, OutlineJob* job) {
   missing.clear();
   if (!std::isfinite(options.size) || !std::isfinite(options.spacing)) {
     return fail(ErrorCode::kInput, "text: size {} and spacing {} must be finite", options.size,
                 options.spacing);
   }
-  constexpr std::size_t kLongest = 1 << 24;
+  constexpr std::size_t kLongest = 1 << 20;
   if (options.text.size() > kLongest) {
     return fail(ErrorCode::kLimit, "text: {} bytes, at most {}", options.text.size(), kLongest);
   }
@@ -342,7 +355,7 @@ Result<Outline> make_text(const TextOptions& options, std::string& missing) {
                                   kDotsPerInch))) {
     return fail(ErrorCode::kInput, "text: font '{}' cannot be scaled", options.font);
   }
-  return set_text(options, match.face);
+  return set_text(options, match.face, job);
 }
 
 }  // namespace strata::csg
@@ -351,7 +364,7 @@ Result<Outline> make_text(const TextOptions& options, std::string& missing) {
 
 namespace strata::csg {
 
-Result<Outline> make_text(const TextOptions& options, std::string& missing) {
+Result<Outline> make_text(const TextOptions& options, std::string& missing, OutlineJob*) {
   missing = options.font;
   return fail(ErrorCode::kInput, "text: this build has no FreeType, HarfBuzz and fontconfig");
 }

@@ -168,6 +168,27 @@ TEST(LinearExtrude, NonsenseIsEmpty) {
   EXPECT_TRUE(linear_extrude({}, options).triangles.empty());
 }
 
+TEST(LinearExtrude, DividedEdgesAreClosedAtBothEnds) {
+  // Edges divided into parts whose points are a rounding off the line; holes as well.
+  Outline outline = make_square({3, 2}, true);
+  outline.contours.push_back({{-0.7, -0.3}, {-0.1, 0.7}, {0.9, 0.1}});
+  for (const int segments : {5, 7, 64, 1000, 20000}) {
+    LinearExtrude options;
+    options.height = 2;
+    options.outline_segments = segments;
+    options.twist = 0;
+    const TriangleSoup mesh = linear_extrude(outline, options);
+    EXPECT_TRUE(is_closed(mesh));
+    EXPECT_NEAR(signed_volume(mesh), 2 * testing::area(outline), 1e-9) << segments;
+    const auto expected = [&](std::size_t corners) {
+      return std::max(corners, static_cast<std::size_t>(segments));
+    };
+    EXPECT_NEAR(static_cast<double>(mesh.positions.size()) / 2,
+                static_cast<double>(expected(4) + expected(3)), 8)
+        << segments;
+  }
+}
+
 TEST(RotateExtrude, FullTurnIsATorusOfTheFormula) {
   RotateExtrude options;
   options.start = 180;

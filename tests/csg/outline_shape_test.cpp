@@ -3,6 +3,10 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <random>
+#include <stop_token>
+#include <string>
+#include <vector>
 
 #include "csg/scene/orient.h"
 #include "tests/csg/outline_checks.h"
@@ -187,6 +191,79 @@ TEST(Outline, OrientationIsExactWhereRoundingHidesIt) {
   }
   EXPECT_EQ(orient({0.1, 0.1}, {0.2, 0.2}, {0.3, 0.3}), 0);
   EXPECT_EQ(orient({0.1, 0.1}, {0.2, 0.2}, {0.3, std::nextafter(0.3, 1)}), 1);
+}
+
+/// A comb with teeth of different heights, lying or standing.
+Outline comb(int teeth, bool standing) {
+  Outline outline;
+  auto& contour = outline.contours.emplace_back();
+  std::mt19937 random(7);
+  for (int i = 0; i < teeth; ++i) {
+    contour.emplace_back(i, 5 + static_cast<double>(random() % 1000) / 1000);
+    contour.emplace_back(i + 0.5, static_cast<double>(random() % 1000) / 1000);
+  }
+  contour.emplace_back(teeth, -5);
+  contour.emplace_back(0, -5);
+  if (standing) {
+    for (glm::dvec2& p : contour) p = {-p.y, p.x};
+  }
+  return outline;
+}
+
+TEST(Outline, SweepsAlongEitherAxisGiveTheSame) {
+  const Outline lying = clean(comb(1000, false), Fill::kEvenOdd);
+  const Outline standing = clean(comb(1000, true), Fill::kEvenOdd);
+  EXPECT_EQ(lying.contours.size(), standing.contours.size());
+  EXPECT_GT(area(lying), 0);
+  EXPECT_NEAR(area(lying), area(standing), 1e-9 * area(lying));
+  const Outline bar = {{{{-1, 1}, {2000, 1}, {2000, 3}, {-1, 3}}}};
+  const std::vector<Outline> both{lying, bar};
+  const double crossed = area(intersect(both));
+  EXPECT_NEAR(area(unite(both)), area(lying) + area(bar) - crossed, 1e-6);
+  EXPECT_NEAR(area(subtract(both)), area(lying) - crossed, 1e-6);
+  for (const double by : {0.1, -0.1}) {
+    EXPECT_NEAR(area(offset_delta(lying, by, false)), area(offset_delta(standing, by, false)),
+                1e-6 * area(lying));
+  }
+}
+
+TEST(Outline, JobsEndWithAStopOrALimit) {
+  std::mt19937 random(9);
+  Outline tangle;
+  auto& contour = tangle.contours.emplace_back();
+  for (int i = 0; i < 6000; ++i) {
+    contour.emplace_back(static_cast<double>(random() % 10000),
+                         static_cast<double>(random() % 10000));
+  }
+  Execution execution;
+  OutlineJob limited(execution);
+  EXPECT_TRUE(clean(tangle, Fill::kEvenOdd, &limited).empty());
+  ASSERT_TRUE(limited.error);
+  EXPECT_EQ(limited.error->code, ErrorCode::kLimit);
+  EXPECT_NE(limited.error->message.find("cross each other about"), std::string::npos);
+  execution.memory_limit = 1 << 20;
+  OutlineJob small(execution);
+  const std::vector<Outline> combs{comb(3000, false), comb(3000, true)};
+  EXPECT_TRUE(minkowski_sum(combs, &small).empty());
+  ASSERT_TRUE(small.error);
+  EXPECT_EQ(small.error->code, ErrorCode::kLimit);
+  execution.memory_limit = 0;
+  std::stop_source source;
+  execution.stop = source.get_token();
+  OutlineJob job(execution);
+  const Outline lying = clean(comb(10000, false), Fill::kEvenOdd, &job);
+  EXPECT_EQ(area(lying), area(clean(comb(10000, false), Fill::kEvenOdd)));
+  EXPECT_FALSE(job.error);
+  source.request_stop();
+  EXPECT_TRUE(clean(lying, Fill::kEvenOdd, &job).empty());
+  ASSERT_TRUE(job.error);
+  EXPECT_EQ(job.error->code, ErrorCode::kCancelled);
+  std::string missing;
+  TextOptions text;
+  text.text = "stop";
+  EXPECT_FALSE(make_text(text, missing, &job));
+  EXPECT_TRUE(linear_extrude(lying, {}, nullptr, &job).triangles.empty());
+  EXPECT_FALSE(rotate_extrude(make_circle(1, {}), {}, &job));
 }
 
 }  // namespace

@@ -226,5 +226,32 @@ TEST(Triangulate, HundredThousandPoints) {
   expect_exact(make_circle(3, segments));
 }
 
+TEST(Triangulate, PiecesWithTheirHolesGiveTheSameRegion) {
+  std::mt19937 random(3);
+  Outline outline;
+  const auto ring = [&](double x, double y, double r, int count, bool hole) {
+    auto& contour = outline.contours.emplace_back();
+    for (int i = 0; i < count; ++i) {
+      const double a = 360.0 * (hole ? count - i : i) / count;
+      contour.emplace_back(x + r * cos_degrees(a), y + r * sin_degrees(a));
+    }
+  };
+  // Rings in rows, islands in some of their holes, boxes that overlap; a frame around a part.
+  for (int i = 0; i < 300; ++i) {
+    const double x = 10 * (i % 60), y = 9.5 * (i / 60);
+    ring(x, y, 4.5, 5 + static_cast<int>(random() % 20), false);
+    ring(x, y, 2, 3 + static_cast<int>(random() % 9), true);
+    if (i % 3 == 0) ring(x, y, 0.5, 4, false);
+  }
+  std::shuffle(outline.contours.begin(), outline.contours.end(), random);
+  outline.contours.push_back({{-50, -50}, {700, -50}, {700, 100}, {-50, 100}});
+  outline.contours.push_back({{-40, -40}, {-40, 90}, {690, 90}, {690, -40}});
+  const auto triangles = triangulate_pieces(outline);
+  const auto report = testing::check(outline, triangles);
+  EXPECT_TRUE(report.closed);
+  EXPECT_EQ(report.negative, 0);
+  EXPECT_NEAR(report.positive, testing::area(outline), 1e-9 * report.positive);
+}
+
 }  // namespace
 }  // namespace strata::csg
