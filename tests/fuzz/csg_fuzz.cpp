@@ -1,10 +1,17 @@
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "csg/scene/csg_parser.h"
+#include "csg/scene/node_arguments.h"
 #include "csg/scene/scene.h"
+#include "tests/csg/zip_files.h"
 #include "tests/fuzz/mesh_fuzzing.h"
 
 namespace strata {
@@ -53,6 +60,61 @@ void check_scene(const csg::Scene& scene) {
   }
 }
 
+/// Small files of each kind that a scene can import.
+class Assets {
+ public:
+  Assets() {
+    std::string name = (std::filesystem::temp_directory_path() / "strata-fuzz-XXXXXX").string();
+    must(::mkdtemp(name.data()) != nullptr, "there is a folder for assets");
+    folder_ = name;
+    write("a.dxf", "0\nSECTION\n2\nENTITIES\n0\nCIRCLE\n8\nrim\n10\n1\n20\n2\n40\n3\n0\nEOF\n");
+    write("a.svg", "<svg viewBox='0 0 9 9'><path id='p' d='M1 1h5v4z'/><path d='M0 0L9 9'/></svg>");
+    write("a.dat", "1 2 3\n4 5 6\n");
+    write("a.stl",
+          "solid a\nfacet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 0 1 0\nvertex 1 0 0\n"
+          "endloop\nendfacet\nendsolid\n");
+    write("a.off", "OFF 4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n");
+    write("a.3mf",
+          csg::zip_of({{"a.model",
+                        "<model><resources><object id='1'><mesh><vertices><vertex x='0' y='0' "
+                        "z='0'/><vertex x='1' y='0' z='0'/><vertex x='0' y='1' z='0'/></vertices>"
+                        "<triangles><triangle v1='0' v2='1' v3='2'/></triangles></mesh></object>"
+                        "</resources><build><item objectid='1'/></build></model>"}}));
+  }
+  ~Assets() {
+    std::error_code ignored;
+    std::filesystem::remove_all(folder_, ignored);
+  }
+  Assets(const Assets&) = delete;
+  Assets& operator=(const Assets&) = delete;
+
+  [[nodiscard]] bool holds(std::string_view name) const {
+    return std::find(names_.begin(), names_.end(), name) != names_.end();
+  }
+  [[nodiscard]] bool all_ours(const csg::Ast& ast, const csg::AstNode& node) const {
+    return holds(csg::NodeArguments(ast, node).find("file", 0).string());
+  }
+  [[nodiscard]] csg::ReadSceneOptions options() const {
+    csg::ReadSceneOptions options;
+    options.asset_folder = folder_.string();
+    return options;
+  }
+
+ private:
+  void write(const std::string& name, const std::string& bytes) {
+    std::ofstream(folder_ / name, std::ios::binary) << bytes;
+    names_.push_back(name);
+  }
+
+  std::filesystem::path folder_;
+  std::vector<std::string> names_;
+};
+
+bool is_short_text(const csg::Ast& ast, const csg::AstNode& node) {
+  constexpr std::size_t kLongest = 100;
+  return csg::NodeArguments(ast, node).find("text", 0).string().size() <= kLongest;
+}
+
 }  // namespace
 }  // namespace strata
 
@@ -66,12 +128,17 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     return 0;
   }
   check_ast(*ast);
-  // Files would be those of the machine, and round things of a million segments take long.
+  // Other files than ours would be those of the machine, and round things of a million segments
+  // take long.
+  static const Assets assets;
   for (const csg::AstNode& node : ast->nodes) {
-    if (node.name == "import" || node.name == "surface" || node.name == "text") return 0;
+    if (node.name == "text" && !is_short_text(*ast, node)) return 0;
+    if ((node.name == "import" || node.name == "surface") && !assets.all_ours(*ast, node)) return 0;
     for (std::uint32_t i = 0; i < node.argument_count; ++i) {
       const csg::AstArgument& argument = ast->arguments[node.first_argument + i];
-      if (argument.name == "file") return 0;
+      if (argument.name == "file" && !assets.holds(csg::ValueRef(*ast, argument.value).string())) {
+        return 0;
+      }
       const double number = csg::ValueRef(*ast, argument.value).number(1.0);
       const bool detail = argument.name.starts_with("$f") || argument.name == "slices" ||
                           argument.name == "segments" || argument.name == "twist";
@@ -84,7 +151,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (ast->nodes.size() > 200) return 0;
   Execution execution;
   execution.threads = 1;
-  const auto scene = csg::parse_scene(text, "input", {}, execution);
+  const auto scene = csg::parse_scene(text, "input", assets.options(), execution);
   if (!scene) {
     must(scene.error().code == ErrorCode::kInput || scene.error().code == ErrorCode::kLimit,
          "a refusal is kInput or kLimit");
