@@ -24,8 +24,8 @@ Bounds bounds_of(const Geometry::Part& part) {
   return box;
 }
 
-/// Whether the mesh is closed and no vertex lies outside of any face; meshes too large to try are
-/// taken for not convex.
+/// Whether the mesh is closed, has a volume, and no vertex lies outside of any face; meshes too
+/// large to try are taken for not convex.
 bool is_convex(const TriangleSoup& mesh) {
   constexpr std::size_t kMostTests = std::size_t{1} << 21;
   if (mesh.triangles.empty() || mesh.triangles.size() * mesh.positions.size() > kMostTests) {
@@ -36,10 +36,15 @@ bool is_convex(const TriangleSoup& mesh) {
   for (const glm::uvec3& t : mesh.triangles) {
     const glm::dvec3& a = mesh.positions[t.x];
     const glm::dvec3 across = glm::cross(mesh.positions[t.y] - a, mesh.positions[t.z] - a);
-    const double limit = glm::dot(across, a) + 1e-9 * size * glm::length(across);
+    const double at = glm::dot(across, a), little = 1e-9 * size * glm::length(across);
+    double lowest = at;
     for (const glm::dvec3& p : mesh.positions) {
-      if (glm::dot(across, p) > limit) return false;
+      const double height = glm::dot(across, p);
+      if (height > at + little) return false;
+      lowest = std::min(lowest, height);
     }
+    // Flat: a ray leaves it where it enters it, and that is nothing.
+    if (little > 0 && lowest >= at - little) return false;
   }
   return is_closed(mesh);
 }

@@ -4,6 +4,8 @@
 #include <new>
 #include <numeric>
 
+#include "hashbuffer/list_filter.h"
+
 namespace strata::csg {
 
 // --- Arena --------------------------------------------------------------------------------------
@@ -165,15 +167,45 @@ void TileFinder::make(LeafLayers& leaf) {
   const ViewPart& part = view_parts_[leaf.solid];
   const RasterTarget target{Axis::kZ, view_->size.x, view_->size.y, kPictureDepthLimit};
   const Input input = input_of(leaf.solid);
-  constexpr std::size_t kTrianglesAtOnce = 2048;  // lists may be very long
+  constexpr std::size_t kTrianglesAtOnce = 256;  // lists may be very long
+  std::uint64_t fragments = 0;
   for (std::size_t i = 0; i < input.triangles.size() && !stop_.stop_requested();
        i += kTrianglesAtOnce) {
     const auto some =
         input.triangles.subspan(i, std::min(kTrianglesAtOnce, input.triangles.size() - i));
-    fragments_ += raster_layers(part.mesh, target, some, input.clip, coincidence_->steep_from(),
-                                leaf, arena_);
+    fragments += raster_layers(part.mesh, target, some, input.clip, coincidence_->steep_from(),
+                               leaf, arena_);
+    if (leaf.keys.size() > LeafLayers::kMostLayers) return make_deep(leaf, input);
   }
+  fragments_ += fragments;
   if (!leaf.keys.empty()) normalize_layers(leaf, part.cut, *this);
+}
+
+void TileFinder::make_deep(LeafLayers& leaf, const Input& input) {
+  const ViewPart& part = view_parts_[leaf.solid];
+  const RasterTarget target{Axis::kZ, view_->size.x, view_->size.y, kPictureDepthLimit};
+  leaf.deep = true;
+  leaf.keys.clear();
+  leaf.triangles.clear();
+  leaf.flips.clear();
+  leaf.flip_ends.assign(kTilePixels, 0);
+  leaf.areas = 0xffff;
+  leaf.nearest = 0;
+  leaf.farthest = kPictureDepthLimit;
+  const auto lists =
+      lists_.build(part.mesh, target, input.triangles, tile_.u0 / kTileSide, tile_.v0 / kTileSide);
+  if (!lists) throw std::bad_alloc();  // its only error
+  fragments_ += lists->fragments;
+  for (std::size_t pixel = 0; pixel < kTilePixels && !stop_.stop_requested(); ++pixel) {
+    crossings_.clear();
+    for_each_item(*lists, pixel, [this](DepthItem item) { crossings_.push_back(item); });
+    if (leaf.kind == LeafLayers::Kind::kFirst) {
+      first_entry_of(crossings_, leaf.solid, leaf.flips);
+    } else {
+      flips_of(crossings_, leaf.solid, parts_[leaf.solid].rule, part.cut, leaf.flips);
+    }
+    leaf.flip_ends[pixel] = static_cast<std::uint32_t>(leaf.flips.size());
+  }
 }
 
 void TileFinder::normalize_pixel(LeafLayers& leaf, std::size_t at) {
@@ -220,6 +252,12 @@ void TileFinder::resolve(const TileProgram& program, std::uint64_t pixel) {
     LeafLayers& leaf = leaves_[slot];
     if (v < leaf.rect.v0 || v >= leaf.rect.v1 || u < leaf.rect.u0 || u >= leaf.rect.u1) continue;
     if (!leaf.made) make(leaf);
+    if (leaf.deep) {
+      const auto place = static_cast<std::size_t>((v - tile_.v0) * kTileSide + (u - tile_.u0));
+      const auto begin = leaf.flips.begin() + (place > 0 ? leaf.flip_ends[place - 1] : 0);
+      flips_.insert(flips_.end(), begin, leaf.flips.begin() + leaf.flip_ends[place]);
+      continue;
+    }
     const auto at = static_cast<std::size_t>((v - leaf.rect.v0) * leaf.stride + (u - leaf.rect.u0));
     for (std::size_t k = 0; k < leaf.keys.size(); ++k) {
       if (leaf.keys[k][at] == LeafLayers::kEmpty) break;
@@ -246,8 +284,7 @@ void TileFinder::find(int tile_u, int tile_v, std::span<const std::uint32_t> sol
     const ViewPart& view_part = view_parts_[solid];
     if (view_part.binned && view_part.bins.tile(tile_u, tile_v).empty()) continue;
     LeafLayers& leaf = leaves_[count++];
-    leaf.made = false;
-    leaf.steep = false;
+    leaf.made = leaf.deep = leaf.steep = false;
     leaf.kind = kind_of(*program_, solid, parts_[solid], view_part);
     leaf.solid = solid;
     leaf.nearest = view_part.cut ? 0 : view_part.nearest;
@@ -299,14 +336,22 @@ void TileFinder::find(int tile_u, int tile_v, std::span<const std::uint32_t> sol
       simplifier_.simplify(area.leaves, present_, tile_program_);
       if (tile_program_.constant) continue;
       doubtful_.clear();
-      if (cut || tile_program_.depth > kMaxSearchDepth) {
+      const auto is_deep = [&] {
+        return std::any_of(tile_program_.leaves.begin(), tile_program_.leaves.end(),
+                           [&](std::uint32_t slot) { return leaves_[slot].deep; });
+      };
+      bool one_by_one = cut || tile_program_.depth > kMaxSearchDepth || is_deep();
+      if (!one_by_one) {
+        search_surface(area, *this);
+        one_by_one = is_deep();  // it has made leaves
+      }
+      if (one_by_one) {
+        doubtful_.clear();
         for (int y = area.rect.v0; y < area.rect.v1; ++y) {
           for (int x = u; x < std::min(tile_.u1, u + kAreaSide); ++x) {
             doubtful_.push_back(part.index(x, y));
           }
         }
-      } else {
-        search_surface(area, *this);
       }
       for (const std::uint64_t pixel : doubtful_) {
         if (stop.stop_requested()) return;  // lists may be very long

@@ -11,6 +11,7 @@
 #include "csg/geometry.h"
 #include "csg/picture.h"
 #include "csg/surface.h"
+#include "hashbuffer/tile_builder.h"
 
 // The visible surface of a Boolean tree in one tile of a picture. Private to csg/.
 
@@ -62,6 +63,13 @@ struct LeafLayers {
   /// While rasterizing depth << 1 | exit, then depths of flips. kEmpty where there is none.
   std::vector<std::uint32_t*> keys;
   std::vector<std::uint32_t*> triangles;  ///< [steep:1 | triangle:31]
+  /// With more crossings a pixel than kMostLayers there are no layers: inserting into them takes
+  /// time that grows with the square. Then these are the flips of each pixel of the tile, one
+  /// after the other, and all pixels are decided one by one.
+  static constexpr std::size_t kMostLayers = 192;
+  bool deep = false;
+  std::vector<std::uint32_t> flip_ends;  ///< of each pixel of the tile: where its flips end
+  std::vector<Flip> flips;
 
   [[nodiscard]] std::size_t words() const {  // vectors may reach beyond the last row
     return static_cast<std::size_t>((rect.v1 - rect.v0 + 4) * stride + 2 * kLanes);
@@ -211,6 +219,8 @@ class TileFinder {
     std::span<const std::uint32_t> triangles;
   };
   [[nodiscard]] Input input_of(std::uint32_t solid);
+  /// Makes the flips of a leaf that has too many crossings for layers.
+  void make_deep(LeafLayers& leaf, const Input& input);
 
   const Program* program_;
   const std::vector<ViewPart>& view_parts_;
@@ -227,6 +237,7 @@ class TileFinder {
   std::vector<std::uint64_t> doubtful_;
   std::vector<std::uint32_t> slot_solids_;
   std::vector<Flip> flips_, leaf_flips_;
+  ItemTileBuilder lists_{{.store = StoreKind::kCountScan}};
   std::vector<DepthItem> crossings_;
   PixelRect tile_;
   SurfacePart part_;

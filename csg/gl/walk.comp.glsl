@@ -51,6 +51,7 @@ void main() {
   int far = 0;     // what begins there or before is near to what is seen
   int front = -1;  // how far back crossings before the group may be
   uint group_count = 0u, group_depth = 0u, group_payload = 0u;
+  bool group_enters = false;  // a solid is entered in the group
   int group_more = 0;
   uint count = 0u;
   StrataCursor cursor = strata_list(pixel);
@@ -82,14 +83,19 @@ void main() {
       }
       group_count = 0u;
       group_more = 0;
+      group_enters = false;
     }
     if (!present) break;
-    doubt = doubt || walk_inside(slot) != (payload >> 31 != 0u);
+    bool leaves = payload >> 31 != 0u;
+    doubt = doubt || walk_inside(slot) != leaves;
+    // It may be left where it is entered: whether that is something depends on the solid.
+    doubt = doubt || (leaves && group_enters && depth == group_depth);
     if (walk_rounds <= WALK_MOST_ROUNDS) walk_flip(tile, slot);
     if (found) {
       doubt = doubt || int(depth) - more <= far;
     } else {
       ++group_count;
+      group_enters = group_enters || !leaves;
       group_depth = depth;
       group_payload = payload;
       group_more = max(group_more, more);

@@ -6,12 +6,14 @@
 
 #include <filesystem>
 #include <functional>
+#include <glm/gtc/matrix_transform.hpp>
 #include <set>
 
 #include "csg/picture.h"
 #include "csg/scene/scene.h"
 #include "hashbuffer/gl/hash_store.h"
 #include "hashbuffer/gl/scan_store.h"
+#include "mesh/shapes.h"
 #include "tests/csg/random_tree.h"
 #include "tests/gl/gl_testing.h"
 
@@ -100,6 +102,81 @@ TEST_F(GlSurface, RandomTreesLookAsTheyDoToTheCpu) {
   EXPECT_GT(doubtful_, 0u);
   EXPECT_LT(doubtful_, walked_ / 2);
   EXPECT_EQ(left_, 0u);
+}
+
+/// Solids without volume, or with hardly any: sheets of two sides, single and turned triangles,
+/// needles, boxes that are flat along an axis, faces that are there many times.
+TriangleSoup degenerate_solid(RandomTree& random) {
+  const auto point = [&] {
+    // Few places, so that points coincide and lie in one plane.
+    return glm::dvec3(random.pick(-3, 3), random.pick(-3, 3), random.pick(-3, 3));
+  };
+  TriangleSoup mesh;
+  switch (random.pick(0, 5)) {
+    case 0:  // a lamina
+      mesh.positions = {point(), point(), point()};
+      mesh.triangles = {{0, 1, 2}, {2, 1, 0}};
+      break;
+    case 1:  // one triangle
+      mesh.positions = {point(), point(), point()};
+      mesh.triangles = {{0, 1, 2}};
+      break;
+    case 2: {  // a box that is flat, or nearly
+      const glm::dvec3 low = point();
+      glm::dvec3 size(random.pick(1, 4), random.pick(1, 4), random.pick(1, 4));
+      size[random.pick(0, 2)] = random.pick(0, 1) == 0 ? 0.0 : 1e-9;
+      mesh = make_box(low, low + size);
+      break;
+    }
+    case 3:  // a tetrahedron, maybe flat, maybe inside out
+      mesh.positions = {point(), point(), point(), point()};
+      mesh.triangles = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}};
+      break;
+    case 4:  // equal faces, facing both ways
+      mesh.positions = {point(), point(), point()};
+      for (int i = random.pick(2, 6); i > 0; --i) {
+        mesh.triangles.push_back(random.pick(0, 1) == 0 ? glm::uvec3(0, 1, 2)
+                                                        : glm::uvec3(0, 2, 1));
+      }
+      break;
+    default: {
+      const glm::dvec3 low = point();
+      mesh =
+          make_box(low, low + glm::dvec3(random.pick(1, 4), random.pick(1, 4), random.pick(1, 4)));
+    }
+  }
+  return mesh;
+}
+
+TEST_F(GlSurface, SolidsWithoutVolumeLookAsTheyDoToTheCpu) {
+  for (int seed = 0; seed < 120; ++seed) {
+    RandomTree random(static_cast<std::uint64_t>(seed) + 9000);
+    Tree tree;
+    std::vector<Tree::NodeId> nodes;
+    for (int i = random.pick(1, 6); i > 0; --i) {
+      Solid solid;
+      solid.mesh = std::make_shared<TriangleSoup>(degenerate_solid(random));
+      // Turned ones meet no lattice by chance.
+      if (random.pick(0, 1) == 0) {
+        solid.world_from_mesh =
+            glm::rotate(glm::dmat4(1), random.real(0, 3), glm::dvec3(0.36, 0.48, 0.8));
+      }
+      nodes.push_back(tree.add_solid(std::move(solid)));
+      if (nodes.size() == 3) {
+        const Operation operations[] = {Operation::kUnion, Operation::kDifference,
+                                        Operation::kIntersection};
+        const auto joined = tree.add(operations[random.pick(0, 2)], nodes);
+        nodes.assign(1, joined);
+      }
+    }
+    tree.set_root(nodes.size() == 1 ? nodes[0] : tree.add(Operation::kUnion, nodes));
+    Bounds box = bounds(tree, tree.root());
+    if (box.empty() || box.low == box.high) continue;
+    expect_same(tree, random_camera(random, box), {random.pick(20, 120), random.pick(20, 120)},
+                "seed " + std::to_string(seed));
+    if (HasFailure()) return;
+  }
+  EXPECT_GT(walked_, 100000u);
 }
 
 TEST_F(GlSurface, AnEyeInTheSceneSeesWhatTheCpuSees) {
