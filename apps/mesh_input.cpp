@@ -1,6 +1,7 @@
 #include "apps/mesh_input.h"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <glm/geometric.hpp>
 #include <utility>
@@ -18,6 +19,7 @@ struct Measures {
   double area = 0.0;
   double volume = 0.0;  // about the point given
   std::uint64_t zero_area = 0;
+  double longest_square = 0.0;  // of an edge
 };
 
 Measures measure(const TriangleSoup& soup, const glm::dvec3& about, const Execution& execution) {
@@ -31,11 +33,14 @@ Measures measure(const TriangleSoup& soup, const glm::dvec3& about, const Execut
         sum.area += twice;
         sum.volume += glm::dot(a, glm::cross(b, c));
         if (!(twice > 0.0)) ++sum.zero_area;
+        sum.longest_square = std::max({sum.longest_square, glm::dot(b - a, b - a),
+                                       glm::dot(c - a, c - a), glm::dot(c - b, c - b)});
       },
       [](Measures& sum, const Measures& part) {
         sum.area += part.area;
         sum.volume += part.volume;
         sum.zero_area += part.zero_area;
+        sum.longest_square = std::max(sum.longest_square, part.longest_square);
       });
   total.area /= 2;
   total.volume /= 6;
@@ -122,6 +127,7 @@ Result<InputFacts> inspect(TriangleSoup& soup, MeshReadStats stats, const std::s
     facts.area = measures.area;
     facts.volume = measures.volume;
     facts.zero_area_faces = measures.zero_area;
+    facts.longest_edge = std::sqrt(measures.longest_square);
   };
   take_measures();
   const double volume_before = facts.volume;
@@ -225,6 +231,7 @@ void MeshInput::add(InputFacts facts) {
   closed = closed && facts.closed;
   area += facts.area;
   volume += facts.volume;
+  longest_edge = std::max(longest_edge, facts.longest_edge);
   bounds.include(facts.bounds);
   files.push_back(std::move(facts));
 }

@@ -26,6 +26,7 @@ struct InputFacts {
   InsideRule rule = InsideRule::kWinding;
   double area = 0.0;    ///< square world units
   double volume = 0.0;  ///< signed, after turning; of an open mesh about the middle of its bounds
+  double longest_edge = 0.0;
   Bounds bounds;
   std::uint64_t zero_area_faces = 0;
   std::uint64_t unbalanced_edges = 0;
@@ -46,7 +47,7 @@ struct MeshInput {
   Bounds bounds;
   bool closed = true;                      ///< all of them
   InsideRule rule = InsideRule::kWinding;  ///< of the soup; solids of a tree have their own
-  double area = 0.0, volume = 0.0;
+  double area = 0.0, volume = 0.0, longest_edge = 0.0;
   double read_ms = 0.0, diagnose_ms = 0.0;
 
   /// Counts one more mesh in, all but its triangles.

@@ -18,6 +18,7 @@
 #include "csg/picture.h"
 #include "csg/solid_labels.h"
 #include "csg/solid_lists.h"
+#include "voxelize/lost_walls.h"
 #include "voxelize/voxel_writer.h"
 
 namespace strata::apps {
@@ -98,54 +99,43 @@ Axis choose_axis(const VoxelizeCommand& command, const VoxelFormat* format, cons
   return grid.dims.y >= grid.dims.x ? Axis::kY : Axis::kX;
 }
 
-bool covers(const VoxelGrid& grid, const Bounds& box) {
-  for (int axis = 0; axis < 3; ++axis) {
-    const double s = grid.voxel_size[axis];
-    if (box.low[axis] < grid.origin[axis] - s / 2 ||
-        box.high[axis] > grid.origin[axis] + (grid.dims[axis] + 0.5) * s) {
-      return false;
-    }
+/// Tells of walls that lie between voxel centres, or that nothing is solid.
+Result<void> check_thin(const VoxelizeCommand& command, VoxelizeOutcome& outcome,
+                        const Execution& execution, Session& session) {
+  const MeshInput& input = outcome.input;
+  LostWallOptions options;
+  options.rule = input.rule;
+  if (!input.has_scene()) options.longest_edge = input.longest_edge;
+  if (input.tree) {
+    options.filter = &input.tree->plain_filter();
+    options.taken_away = [&](std::uint32_t t) { return input.tree->taken_away(t); };
   }
-  return true;
-}
-
-/// Tells when parts of what is voxelized are too thin for voxel centres to hit them.
-void check_thin(const VoxelizeCommand& command, const MeshInput& input, const VoxelGrid& grid,
-                std::uint64_t solid_voxels, Session& session) {
-  const glm::dvec3 s = grid.voxel_size;
-  const bool scene = input.has_scene();
-  const bool measured = input.closed && !scene;
-  const double volume = input.volume / (s.x * s.y * s.z);
-  std::string holds = fmt::format("the solid holds {} voxels", solid_voxels);
-  if (measured) holds += fmt::format(" where the mesh's volume is {:.1f} voxels", volume);
+  const std::uint64_t solid = outcome.report.solid_voxels;
   const char* remedy =
       command.ids ? "; --surface, without --ids, holds all of it" : "; --surface holds all of it";
-  for (int axis = 0; axis < 3; ++axis) {
-    const double extent = (input.bounds.high[axis] - input.bounds.low[axis]) / s[axis];
-    if (extent >= 1.0) continue;
-    return session.warn("thin", fmt::format("{}: the {} is {:.3g} voxels thick along {}{}", holds,
-                                            scene ? "scene" : "mesh", extent,
-                                            word_of(kAxisWords, static_cast<Axis>(axis)), remedy));
+  if (input.closed) {
+    auto found = find_lost_walls(input.soup, outcome.grid, options, execution);
+    if (!found) return tl::unexpected(found.error());
+    outcome.lost_walls = *std::move(found);
   }
-  const auto warn_of_none = [&](const char* why) {
-    if (solid_voxels == 0) session.warn("empty", fmt::format("no voxel is solid{}{}", why, remedy));
-  };
-  if (scene) return warn_of_none(": the scene's result is empty, or thinner than a voxel");
-  if (!measured) return warn_of_none("");
-  // Twice the volume over the area is the mean thickness: exact for plates and shells.
-  const double thickness =
-      input.area > 0 ? 2 * input.volume / input.area / std::cbrt(s.x * s.y * s.z) : 0.0;
-  // Centres miss or hit a body of some voxels' thickness about as often; several percent of its
-  // volume are lost or won only where it is thin. Overlaps count twice in the mesh's volume, so a
-  // loss alone proves nothing.
-  const double off = std::abs(static_cast<double>(solid_voxels) - volume);
-  if (thickness < 1.0 || (thickness < 4.0 && off > 0.1 * volume + 1.0)) {
-    return session.warn("thin",
-                        fmt::format("{}: parts are thinner than a voxel ({:.3g} voxels on average)"
-                                    "{}",
-                                    holds, thickness, remedy));
+  const LostWalls& lost = outcome.lost_walls;
+  if (lost.count > 0) {
+    const LostWall& wall = lost.largest.front();
+    session.warn(
+        "thin",
+        fmt::format("{} thinner than a voxel fell between voxel centres; {} {:.3g} voxels "
+                    "thick along {}, from {} to {}; the solid holds {}{}",
+                    counted(lost.count, "wall"), lost.count == 1 ? "it is" : "the largest is",
+                    wall.thickness, word_of(kAxisWords, wall.axis), triple(wall.low),
+                    triple(wall.high), counted(solid, "voxel"), remedy));
+  } else if (solid == 0) {
+    const char* why = !input.closed       ? ""
+                      : input.has_scene() ? ": the scene's result is empty, or thinner than a voxel"
+                                          : ": the mesh lies outside the grid, or is thinner than "
+                                            "a voxel";
+    session.warn("empty", fmt::format("no voxel is solid{}{}", why, remedy));
   }
-  warn_of_none("");
+  return {};
 }
 
 void check_columns(const VoxelizeCommand& command, const VoxelizeOutcome& outcome,
@@ -341,9 +331,8 @@ Result<void> voxelize_and_write(const VoxelizeCommand& command, VoxelizeOutcome&
   if (boundary) outcome.area_estimate = boundary->estimate();
 
   check_columns(command, outcome, session);
-  if (!command.surface && !is_surface_alone(command, outcome.input) &&
-      covers(outcome.grid, outcome.input.bounds)) {
-    check_thin(command, outcome.input, outcome.grid, outcome.report.solid_voxels, session);
+  if (!command.surface && !is_surface_alone(command, outcome.input)) {
+    if (auto done = check_thin(command, outcome, quiet, session); !done) return done;
   } else if (outcome.report.solid_voxels == 0) {
     session.warn("empty", "no voxel is solid; does the grid hold the mesh?");
   }

@@ -31,10 +31,6 @@ std::vector<std::uint64_t> depth_histogram(const VoxelizeOutcome& outcome) {
   return result;
 }
 
-std::string triple(const glm::dvec3& v) {
-  return fmt::format("({:.6g}, {:.6g}, {:.6g})", v.x, v.y, v.z);
-}
-
 /// 1234567 as 1 234 567.
 std::string grouped(std::uint64_t number) {
   std::string text = std::to_string(number);
@@ -103,6 +99,20 @@ void write_results(JsonWriter& json, const VoxelizeCommand& command,
   if (command.checksum) json.member("checksum", fmt::format("{:016x}", report.checksum));
   json.end_object();
 
+  json.key("lost_walls").begin_object();
+  json.member("count", outcome.lost_walls.count);
+  json.key("largest").begin_array();
+  for (const LostWall& wall : outcome.lost_walls.largest) {
+    json.begin_object();
+    json.member("axis", word_of(kAxisWords, wall.axis));
+    json.member("thickness", wall.thickness);
+    json.member("low", wall.low);
+    json.member("high", wall.high);
+    json.end_object();
+  }
+  json.end_array();
+  json.end_object();
+
   json.key("lists").begin_object();
   json.member("crossings", report.crossings);
   json.member("columns", column_count(outcome));
@@ -132,6 +142,10 @@ void write_ids(JsonWriter& json, const VoxelizeOutcome& outcome) {
 }
 
 }  // namespace
+
+std::string triple(const glm::dvec3& v) {
+  return fmt::format("({:.6g}, {:.6g}, {:.6g})", v.x, v.y, v.z);
+}
 
 std::string voxelize_text(const VoxelizeCommand& command, const VoxelizeOutcome& outcome,
                           const Session& session) {

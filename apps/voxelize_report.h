@@ -10,6 +10,7 @@
 #include "apps/mesh_input.h"
 #include "apps/session.h"
 #include "core/grid.h"
+#include "voxelize/lost_walls.h"
 #include "voxelize/voxelize.h"
 
 namespace strata::apps {
@@ -21,13 +22,17 @@ struct VoxelizeOutcome {
   Axis axis = Axis::kZ;
   MemoryEstimate estimate;
   VoxelizeReport report;
-  bool measured = false;       ///< the report's statistics are filled
+  bool measured = false;  ///< the report's statistics are filled
+  LostWalls lost_walls;
   double area_estimate = 0.0;  ///< of the set's boundary, square world units
   std::string format;          ///< of the output; empty: none
   std::optional<std::uint64_t> output_bytes;
   std::vector<std::uint64_t> id_voxels;  ///< of solid n of the scene, with --ids
   double write_ms = 0.0;
 };
+
+/// "(1, 2.5, 3)"
+[[nodiscard]] std::string triple(const glm::dvec3& v);
 
 /// For people: a line a topic.
 [[nodiscard]] std::string voxelize_text(const VoxelizeCommand& command,

@@ -67,8 +67,9 @@ bool is_inside(InsideRule rule, int winding) {
 
 class BooleanWorker final : public TileListFilter::Worker {
  public:
-  explicit BooleanWorker(const Shared& shared)
+  BooleanWorker(const Shared& shared, bool labelled)
       : shared_(&shared),
+        labelled_(labelled),
         state_(shared.program),
         added_(std::max<std::size_t>(shared.labels.size(), 1)),
         windings_(shared.rules.size(), 0),
@@ -117,7 +118,7 @@ class BooleanWorker final : public TileListFilter::Worker {
     state_.flip(solid);
     if (labelled() && shared_->ranks[solid] != Shared::kNoRank) added_.flip(shared_->ranks[solid]);
   }
-  [[nodiscard]] bool labelled() const { return !shared_->labels.empty(); }
+  [[nodiscard]] bool labelled() const { return labelled_; }
   /// What the ray is in: the label, 1 without labels; 0: not in the tree. Where the tree is true,
   /// it is in a solid that adds: were all of them outside, more solids would not make it true.
   [[nodiscard]] std::uint32_t label() const {
@@ -199,6 +200,7 @@ class BooleanWorker final : public TileListFilter::Worker {
   }
 
   const Shared* shared_;
+  bool labelled_;
   ProgramState state_;
   LeastOf added_;  ///< ranks of the solids that the ray is in
   std::vector<int> windings_;
@@ -210,20 +212,22 @@ class BooleanWorker final : public TileListFilter::Worker {
 
 class BooleanFilter final : public TreeFilter {
  public:
-  explicit BooleanFilter(const Shared& shared) : shared_(&shared) {}
+  /// @param plain  without labels, whether there are some or not
+  BooleanFilter(const Shared& shared, bool plain) : shared_(&shared), plain_(plain) {}
   [[nodiscard]] std::unique_ptr<Worker> worker() const override {
-    return std::make_unique<BooleanWorker>(*shared_);
+    return std::make_unique<BooleanWorker>(*shared_, labelled());
   }
   [[nodiscard]] Tables tables() const override {
     return {shared_->program, shared_->rules, shared_->solid_of};
   }
-  [[nodiscard]] bool labelled() const override { return !shared_->labels.empty(); }
+  [[nodiscard]] bool labelled() const override { return !plain_ && !shared_->labels.empty(); }
   [[nodiscard]] std::uint32_t solid_of(std::uint32_t triangle) const override {
     return shared_->solid_of[triangle];
   }
 
  private:
   const Shared* shared_;
+  bool plain_;
 };
 
 }  // namespace
@@ -232,7 +236,7 @@ struct SolidLists::Impl {
   Shared shared;
   TriangleSoup soup;
   std::vector<std::uint32_t> added;  ///< solids by rank
-  BooleanFilter filter{shared};
+  BooleanFilter filter{shared, false}, plain{shared, true};
 };
 
 SolidLists::SolidLists(const Tree& tree, Tree::NodeId root) : impl_(std::make_unique<Impl>()) {
@@ -262,6 +266,10 @@ SolidLists& SolidLists::operator=(SolidLists&&) noexcept = default;
 const TriangleSoup& SolidLists::soup() const { return impl_->soup; }
 TriangleSoup SolidLists::take_soup() { return std::exchange(impl_->soup, {}); }
 const TileListFilter& SolidLists::filter() const { return impl_->filter; }
+const TileListFilter& SolidLists::plain_filter() const { return impl_->plain; }
+bool SolidLists::taken_away(std::uint32_t triangle) const {
+  return impl_->shared.ranks[solid_of(triangle)] == Shared::kNoRank;
+}
 void SolidLists::set_labels(const std::vector<std::uint32_t>& labels) {
   impl_->shared.labels.clear();
   for (const std::uint32_t solid : impl_->added) {

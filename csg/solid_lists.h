@@ -29,10 +29,14 @@ class SolidLists {
   /// Takes the soup away; the filter stays good.
   [[nodiscard]] TriangleSoup take_soup();
   [[nodiscard]] const TileListFilter& filter() const;
+  /// The same, never labelled.
+  [[nodiscard]] const TileListFilter& plain_filter() const;
   /// From now on the filter's lists are labelled: what lies behind a crossing is the label of the
   /// solid that csg/solid_labels.h says. @param labels of each solid of the tree, in [1, 2^31).
   /// Not while the filter has workers.
   void set_labels(const std::vector<std::uint32_t>& labels);
+  /// Whether a triangle's solid is taken away, so that it faces into the result.
+  [[nodiscard]] bool taken_away(std::uint32_t triangle) const;
   /// Index into Tree::solids().
   [[nodiscard]] std::uint32_t solid_of(std::uint32_t triangle) const;
 

@@ -224,8 +224,13 @@ TEST_F(Voxelize, APlateThinnerThanAVoxelIsReportedAndItsSurfaceHeld) {
   put("plate.obj", make_box({0, 0, 0}, {128, 128, 0.1}));
   const json solid = report({"plate.obj", "-r", "128"});
   EXPECT_EQ(codes(solid), std::vector<std::string>{"thin"});
-  EXPECT_NE(last_error.find("1638.4"), std::string::npos) << last_error;
-  EXPECT_NE(last_error.find("0.1 voxels thick along z"), std::string::npos) << last_error;
+  EXPECT_NE(last_error.find("1 wall thinner than a voxel fell between voxel centres; it is 0.1 "
+                            "voxels thick along z, from (0, 0, 0) to (128, 128, 0.1); the solid "
+                            "holds 0 voxels; --surface holds all of it"),
+            std::string::npos)
+      << last_error;
+  EXPECT_EQ(solid["lost_walls"]["count"], 1);
+  EXPECT_EQ(solid["lost_walls"]["largest"][0]["axis"], "z");
   const json surface = report({"plate.obj", "-r", "128", "--surface"});
   EXPECT_EQ(surface["voxels"]["solid"], 128 * 128);
   EXPECT_TRUE(surface["warnings"].empty());
@@ -239,6 +244,16 @@ TEST_F(Voxelize, APlateThinnerThanAVoxelIsReportedAndItsSurfaceHeld) {
   // And nothing of the kind for what is thick.
   put("ball.obj", make_icosphere(1.0, 5));
   EXPECT_TRUE(codes(report({"ball.obj", "-r", "16"})).empty()) << last_error;
+  put("cube.obj", make_box(glm::dvec3(-1), glm::dvec3(1)));
+  const json cube = report({"cube.obj", "-r", "2"});
+  EXPECT_EQ(cube["voxels"]["solid"], 8);
+  EXPECT_TRUE(codes(cube).empty()) << last_error;
+  EXPECT_EQ(cube["lost_walls"]["count"], 0);
+  // A plate that is thin, but whose middle is hit everywhere.
+  put("hit.obj", make_box({0, 0, 0.45}, {16, 16, 0.55}));
+  const json hit = report({"hit.obj", "--voxel-size", "1", "--bounds=0,0,0,16,16,1"});
+  EXPECT_EQ(hit["voxels"]["solid"], 256);
+  EXPECT_TRUE(codes(hit).empty()) << last_error;
 }
 
 TEST_F(Voxelize, SolidAndSurfaceTogetherAreTheUnion) {

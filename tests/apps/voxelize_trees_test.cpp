@@ -125,20 +125,42 @@ TEST_F(VoxelizeTrees, ThinSolidsOfTreesAreReportedLikeMeshes) {
   const std::vector<std::string> thin = {"thin"};
   EXPECT_EQ(said({"plate.obj"}), thin);
   const std::string of_mesh = last_error.substr(0, last_error.find(';'));
-  EXPECT_NE(of_mesh.find("where the mesh's volume is 4.1 voxels"), std::string::npos) << of_mesh;
+  EXPECT_NE(of_mesh.find("1 wall thinner than a voxel"), std::string::npos) << of_mesh;
+  EXPECT_NE(last_error.find("0.016 voxels thick along z"), std::string::npos) << last_error;
   EXPECT_EQ(said({"plate.obj", "--ids"}), thin);
   EXPECT_TRUE(last_error.starts_with(of_mesh)) << last_error;
   EXPECT_NE(last_error.find("--surface, without --ids, holds"), std::string::npos) << last_error;
   EXPECT_EQ(said({"plate.csg"}), thin);
-  EXPECT_NE(last_error.find("the scene is 0.016 voxels thick along z; --surface holds"),
-            std::string::npos)
-      << last_error;
-  // Whose box is thick, and whose result is not.
+  EXPECT_TRUE(last_error.starts_with(of_mesh)) << last_error;
+  // Whose box is thick, and whose result is not; from a corner to the other.
   place.write("slice.csg",
               "difference() { cube(size = [10, 10, 10], center = false); "
               "multmatrix([[1, 0, 0, -1], [0, 1, 0, -1], [0, 0, 1, 0.01], [0, 0, 0, 1]]) "
               "{ cube(size = [12, 12, 12], center = false); } }\n");
-  EXPECT_EQ(said({"slice.csg"}), std::vector<std::string>{"empty"});
+  EXPECT_EQ(said({"slice.csg"}), thin);
+  EXPECT_NE(last_error.find("1 wall thinner than a voxel"), std::string::npos) << last_error;
+  // Walls between slots, whose faces are those of what is taken away, with ids or without.
+  std::string slots = "difference() { cube(size = [20, 10, 10], center = false); union() {\n";
+  for (int i = 0; i < 10; ++i) {
+    slots += fmt::format(
+        "multmatrix([[1, 0, 0, 10], [0, 1, 0, {}], [0, 0, 1, -1], [0, 0, 0, 1]]) "
+        "{{ cube(size = [11, 0.9, 12], center = false); }}\n",
+        0.1 + i);
+  }
+  place.write("slots.csg", slots + "} }\n");
+  for (const bool ids : {false, true}) {
+    std::vector<std::string> run = {"slots.csg", "--voxel-size", "1"};
+    if (ids) run.emplace_back("--ids");
+    const json found = report(run);
+    EXPECT_EQ(found["lost_walls"]["count"], 10) << last_error;
+    EXPECT_EQ(found["voxels"]["solid"], 1000);
+    EXPECT_EQ(codes(found), thin);
+  }
+  // Nothing at all.
+  place.write("nothing.csg",
+              "difference() { cube(size = [10, 10, 10], center = false); "
+              "cube(size = [12, 12, 12], center = false); }\n");
+  EXPECT_EQ(said({"nothing.csg"}), std::vector<std::string>{"empty"});
   EXPECT_NE(last_error.find("the scene's result is empty, or thinner than a voxel; --surface"),
             std::string::npos)
       << last_error;
