@@ -83,8 +83,9 @@ Result<void> run(const AnyCommand& command, Session& session) {
     const std::vector<FileUse> written = outputs_of(command);
     if (auto kept = check_files(inputs_of(command.input), written); !kept) return kept;
     session.set_outputs(written, true);
-    auto done = run_command(command, session);
-    return done ? session.commit_outputs() : done;
+    if (auto done = run_command(command, session); !done) return done;
+    if (allocation_has_failed()) return fail(ErrorCode::kLimit, "{}", kNoMemory);
+    return session.commit_outputs();
   } catch (const std::bad_alloc&) {
     return fail(ErrorCode::kLimit, "{}", kNoMemory);
   } catch (const std::system_error& failure) {
