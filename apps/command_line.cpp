@@ -346,6 +346,10 @@ void read_values(const Words& words, VoxelizeCommand& command, Reader& reader) {
   command.ids = words.ids;
   command.mask = words.mask;
   if (!words.name.empty()) command.name = words.name;
+  if (std::any_of(words.name.begin(), words.name.end(),
+                  [](unsigned char letter) { return letter < ' ' || letter == 0x7f; })) {
+    reader.fail_with("--name must be text without control characters");
+  }
   if (!words.fog.empty()) {
     command.fog_by_default = words.fog == "auto";
     std::int64_t samples = command.surface ? 1 : kFogSamples;

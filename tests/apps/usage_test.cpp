@@ -139,6 +139,11 @@ TEST_F(Usage, OptionsThatWouldHaveNoEffectAreRefused) {
   refuses({"voxelize", "box.obj", "-r", "4", "--name", "a", "-o", "a.npy"},
           "format npy holds no name");
   refuses({"voxelize", "box.obj", "-r", "4", "--name", "a", "--stats"}, "--name needs -o");
+  refuses({"voxelize", "box.obj", "-r", "4", "--name",
+           "a\x1e"
+           "b",
+           "-o", "a.vdb"},
+          "control");
   refuses({"voxelize", "box.obj", "-r", "4", "--stats", "--surface", "--backend", "gl"},
           "--surface alone has none");
   for (const char* backend : {"cpu", "auto"}) {
