@@ -4,7 +4,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-#include "csg/scene/orient.h"
+#include "mesh/plane_predicates.h"
 
 namespace strata::csg {
 namespace {

@@ -11,6 +11,7 @@
 #include "core/result.h"
 #include "csg/scene/segments.h"
 #include "mesh/triangle_soup.h"
+#include "mesh/triangulate.h"
 
 namespace strata::csg {
 
@@ -115,10 +116,10 @@ Result<TriangleSoup> rotate_extrude(const Outline& outline, const RotateExtrude&
 Result<TriangleSoup> make_roof(const Outline& outline, const std::string& method,
                                const Segments& segments);
 
-/// Triangles of the outline, indices into all contours' points one after another. Every point is a
-/// corner and none is added: by position, the boundary of the triangles is the outline, edge for
-/// edge, even where the outline is not clean. Contours of fewer than 3 points are left out.
-[[nodiscard]] std::vector<glm::uvec3> triangulate(const Outline& outline);
+/// Triangles of the outline, as mesh/triangulate.h says.
+[[nodiscard]] inline std::vector<glm::uvec3> triangulate(const Outline& outline) {
+  return strata::triangulate(outline.contours);
+}
 /// The same, an outer contour with its holes at a time where there are many: letters of a text.
 [[nodiscard]] std::vector<glm::uvec3> triangulate_pieces(const Outline& outline,
                                                          OutlineJob* job = nullptr);

@@ -18,7 +18,7 @@
 #include <unordered_map>
 #include <utility>
 
-#include "csg/scene/orient.h"
+#include "mesh/plane_predicates.h"
 
 namespace strata::csg {
 namespace {

@@ -4,9 +4,9 @@
 #include <glm/common.hpp>
 #include <limits>
 
-#include "csg/scene/orient.h"
 #include "csg/scene/outline.h"
 #include "csg/scene/straight_skeleton.h"
+#include "mesh/plane_predicates.h"
 #include "mesh/soup_tools.h"
 
 namespace strata::csg {

@@ -6,9 +6,9 @@
 #include <unordered_map>
 #include <utility>
 
-#include "csg/scene/orient.h"
 #include "csg/scene/outline.h"
 #include "mesh/diagnose.h"
+#include "mesh/plane_predicates.h"
 
 namespace strata::csg {
 namespace {

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <random>
 
-#include "csg/scene/orient.h"
+#include "mesh/plane_predicates.h"
 
 namespace strata::csg {
 namespace {

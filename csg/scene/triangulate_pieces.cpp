@@ -7,8 +7,8 @@
 #include <optional>
 #include <vector>
 
-#include "csg/scene/orient.h"
 #include "csg/scene/outline.h"
+#include "mesh/plane_predicates.h"
 
 namespace strata::csg {
 namespace {

@@ -6,8 +6,8 @@
 #include <map>
 #include <vector>
 
-#include "csg/scene/orient.h"
 #include "csg/scene/outline.h"
+#include "mesh/plane_predicates.h"
 
 namespace strata::csg::testing {
 

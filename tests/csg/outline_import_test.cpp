@@ -7,9 +7,9 @@
 #include <numbers>
 #include <random>
 
-#include "csg/scene/orient.h"
 #include "csg/scene/outline.h"
 #include "csg/scene/outline_import.h"
+#include "mesh/plane_predicates.h"
 #include "tests/csg/outline_checks.h"
 
 namespace strata::csg {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "csg/scene/orient.h"
+#include "mesh/plane_predicates.h"
 #include "tests/csg/outline_checks.h"
 
 namespace strata::csg {

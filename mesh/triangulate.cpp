@@ -1,3 +1,5 @@
+#include "mesh/triangulate.h"
+
 // Ear clipping that adds and drops no vertex. Holes are joined to what surrounds them by bridges,
 // as in D. Eberly, "Triangulation by ear clipping", 2002. Every step keeps the sum of the triangles
 // and the rest of the loop equal to the region, so that the boundary of the result is that of the
@@ -14,10 +16,9 @@
 #include <utility>
 #include <vector>
 
-#include "csg/scene/orient.h"
-#include "csg/scene/outline.h"
+#include "mesh/plane_predicates.h"
 
-namespace strata::csg {
+namespace strata {
 namespace {
 
 using Index = std::uint32_t;
@@ -36,12 +37,12 @@ struct Node {
 class Clipping {
  public:
   /// `turns` quarter turns of the plane: another direction for the bridges.
-  Clipping(const Outline& outline, int turns) {
+  Clipping(std::span<const std::vector<glm::dvec2>> contours, int turns) {
     std::size_t total = 0;
-    for (const auto& contour : outline.contours) total += contour.size();
-    nodes_.reserve(total + 2 * outline.contours.size());
+    for (const auto& contour : contours) total += contour.size();
+    nodes_.reserve(total + 2 * contours.size());
     Index vertex = 0;
-    for (const auto& contour : outline.contours) {
+    for (const auto& contour : contours) {
       if (contour.size() < 3) {
         vertex += static_cast<Index>(contour.size());
         continue;
@@ -482,14 +483,14 @@ class Clipping {
 
 }  // namespace
 
-std::vector<glm::uvec3> triangulate(const Outline& outline) {
+std::vector<glm::uvec3> triangulate(std::span<const std::vector<glm::dvec2>> contours) {
   double area = 0;
-  for (const auto& contour : outline.contours) area += std::abs(signed_area(contour));
+  for (const auto& contour : contours) area += std::abs(signed_area(contour));
   std::vector<glm::uvec3> best;
   double least = std::numeric_limits<double>::infinity();
   // Outlines that touch themselves within rounding may do better with other bridges.
   for (int turns = 0; turns < 4; ++turns) {
-    Clipping clipping(outline, turns);
+    Clipping clipping(contours, turns);
     clipping.run();
     if (clipping.turned_area() < least) {
       least = clipping.turned_area();
@@ -501,4 +502,4 @@ std::vector<glm::uvec3> triangulate(const Outline& outline) {
   return best;
 }
 
-}  // namespace strata::csg
+}  // namespace strata

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <glm/vec2.hpp>
 
-namespace strata::csg {
+namespace strata {
 
 /// The sign of twice the area of the triangle (a, b, c), exactly: 1 when it turns to the left, -1
 /// to the right, 0 when the points lie on a line. A floating-point filter first, then an expansion
@@ -63,4 +63,4 @@ template <class Points>
   return twice / 2.0;
 }
 
-}  // namespace strata::csg
+}  // namespace strata
