@@ -166,8 +166,8 @@ void warn_of_reading(const std::string& path, const MeshReadStats& stats, Sessio
                                               stats.dropped_faces(), stats.faces, causes));
   }
   if (stats.non_planar > 0) {
-    session.warn("non-planar", fmt::format("{}: {} not flat; cut into fans from the first corner",
-                                           path, counted(stats.non_planar, "polygon")));
+    session.warn("non-planar",
+                 fmt::format("{}: {} not flat", path, counted(stats.non_planar, "polygon")));
   }
   for (const std::string& text : stats.warnings) session.warn("reader", text);
 }

@@ -1,10 +1,9 @@
-#include <glm/geometric.hpp>
-
 #include <algorithm>
 #include <atomic>
-#include <cmath>
 #include <limits>
+#include <span>
 
+#include "mesh/polygon_cutter.h"
 #include "mesh/reader_common.h"
 
 namespace strata::detail {
@@ -58,7 +57,8 @@ struct Losses {
   std::uint64_t first_non_finite = kNone, non_finite_vertex = 0;
 };
 
-/// Removes what cannot stay, face by face.
+/// Removes faces that cannot stay. Triangles with two corners at one vertex are left: polygons are
+/// cut anew before.
 Losses drop_bad_faces(RawMesh& mesh) {
   TriangleSoup& soup = mesh.soup;
   Losses losses;
@@ -98,12 +98,7 @@ Losses drop_bad_faces(RawMesh& mesh) {
       continue;
     }
     for (std::size_t t = begin; t < end; ++t) {
-      const glm::uvec3 triangle = soup.triangles[t];
-      if (triangle.x == triangle.y || triangle.y == triangle.z || triangle.z == triangle.x) {
-        ++mesh.stats.degenerate;
-        continue;
-      }
-      soup.triangles[kept++] = triangle;
+      soup.triangles[kept++] = soup.triangles[t];
       elements.push_back(element);
     }
   }
@@ -124,37 +119,113 @@ void drop_non_finite_vertices(TriangleSoup& soup) {
   for (glm::uvec3& t : soup.triangles) t = {new_index[t.x], new_index[t.y], new_index[t.z]};
 }
 
-/// How many polygons leave the plane of their mean normal by more than 1/1000 of their diagonal: a
-/// fan of such a polygon is one of several surfaces it could mean. The bound is wide enough for
-/// coordinates written with four digits.
-std::uint64_t count_non_planar(const TriangleSoup& soup, std::uint64_t& first) {
-  std::uint64_t count = 0;
-  const auto& elements = soup.face_elements;
-  for (std::size_t begin = 0, end = 0; begin < elements.size(); begin = end) {
-    for (end = begin + 1; end < elements.size() && elements[end] == elements[begin];) ++end;
-    if (end - begin < 2) continue;
-    const glm::dvec3 anchor = soup.positions[soup.triangles[begin].x];
-    glm::dvec3 normal(0.0), low(anchor), high(anchor);
-    for (std::size_t t = begin; t < end; ++t) {
-      const glm::dvec3 b = soup.positions[soup.triangles[t].y];
-      const glm::dvec3 c = soup.positions[soup.triangles[t].z];
-      normal += glm::cross(b - anchor, c - anchor);
-      low = glm::min(low, glm::min(b, c));
-      high = glm::max(high, glm::max(b, c));
+/// The polygons that are not flat.
+struct Bent {
+  std::uint64_t count = 0, first = kNone;
+  Bend bend;  ///< of the first
+};
+
+/// Cuts the polygons that a reader made fans of, where the fan from the first corner is not right.
+class PolygonCuts {
+ public:
+  explicit PolygonCuts(TriangleSoup& soup) : soup_(soup) {}
+
+  /// @param execution  its stop leaves some polygons as they are
+  Bent run(const Execution& execution) {
+    const std::size_t count = soup_.face_elements.size();  // none: all faces are triangles
+    const std::size_t blocks = (count + kBlock - 1) / kBlock;
+    std::vector<Bent> bent(blocks);
+    parallel_for(execution, blocks, [&](std::size_t block, int) {
+      bent[block] = cut_block(block * kBlock, std::min(count, (block + 1) * kBlock));
+    });
+    Bent all;
+    for (const Bent& one : bent) {
+      if (all.count == 0)
+        all = one;
+      else
+        all.count += one.count;
     }
-    double least = 0.0, most = 0.0;
-    for (std::size_t t = begin; t < end; ++t) {
-      for (int k = 1; k < 3; ++k) {
-        const double height = glm::dot(normal, soup.positions[soup.triangles[t][k]] - anchor);
-        least = std::min(least, height);
-        most = std::max(most, height);
+    return all;
+  }
+  /// Whether triangles were left over, all of whose corners are kNoVertex or one and the same.
+  [[nodiscard]] bool left_over() const { return left_over_; }
+
+ private:
+  /// The polygons that begin in [begin, end).
+  Bent cut_block(std::size_t begin, std::size_t end) {
+    const std::vector<std::uint32_t>& elements = soup_.face_elements;
+    Bent bent;
+    PolygonCutter cutter;
+    while (begin > 0 && begin < end && elements[begin] == elements[begin - 1]) ++begin;
+    for (std::size_t stop = begin; begin < end; begin = stop) {
+      for (stop = begin + 1; stop < elements.size() && elements[stop] == elements[begin];) ++stop;
+      if (stop - begin < 2) continue;
+      const Bend bend = stop - begin == 2 ? cut_quad_at(begin) : cut_at(begin, stop, cutter);
+      if (bend.large() && bent.count++ == 0) {
+        bent.first = elements[begin];
+        bent.bend = bend;
       }
     }
-    if (most - least > 1e-3 * glm::length(normal) * glm::length(high - low)) {
-      if (count++ == 0) first = elements[begin];
-    }
+    return bent;
   }
-  return count;
+
+  Bend cut_quad_at(std::size_t at) {
+    glm::uvec3 &first = soup_.triangles[at], &second = soup_.triangles[at + 1];
+    const std::uint32_t a = first.x, b = first.y, c = first.z, d = second.z;
+    const std::vector<glm::dvec3>& p = soup_.positions;
+    const QuadCut quad = cut_quad(p[a], p[b], p[c], p[d]);
+    if (!quad.fan) {
+      first = {b, c, d};
+      second = {b, d, a};
+    }
+    return quad.bend;
+  }
+
+  Bend cut_at(std::size_t begin, std::size_t end, PolygonCutter& cutter) {
+    std::vector<std::uint32_t> corners;
+    std::vector<glm::dvec3> positions;
+    const std::vector<glm::uvec3>& fan = soup_.triangles;
+    corners = {fan[begin].x};
+    for (std::size_t t = begin; t < end; ++t) corners.push_back(fan[t].y);
+    corners.push_back(fan[end - 1].z);
+    for (const std::uint32_t corner : corners) positions.push_back(soup_.positions[corner]);
+    const std::span<const glm::uvec3> cut = cutter.cut(positions);
+    if (cut.empty()) return cutter.bend();
+    std::size_t twice = 0;  // corners that repeat the one before
+    for (std::size_t i = 0; i < corners.size(); ++i) {
+      twice += corners[i] == corners[i == 0 ? corners.size() - 1 : i - 1] ? 1 : 0;
+    }
+    std::size_t t = begin;
+    for (const glm::uvec3& one : cut) {
+      soup_.triangles[t++] = {corners[one.x], corners[one.y], corners[one.z]};
+    }
+    if (t < end) left_over_ = true;
+    for (; t < end; ++t) {
+      soup_.triangles[t] = glm::uvec3(twice > 0 ? corners[0] : kNoVertex);
+      twice -= twice > 0 ? 1 : 0;
+    }
+    return cutter.bend();
+  }
+
+  TriangleSoup& soup_;
+  std::atomic<bool> left_over_ = false;
+};
+
+/// Removes triangles with two corners at one vertex, and counts them unless they hold none.
+void drop_degenerate(RawMesh& mesh) {
+  TriangleSoup& soup = mesh.soup;
+  std::size_t kept = 0;
+  for (std::size_t t = 0; t < soup.triangles.size(); ++t) {
+    const glm::uvec3 triangle = soup.triangles[t];
+    if (triangle.x == triangle.y || triangle.y == triangle.z || triangle.z == triangle.x) {
+      mesh.stats.degenerate += triangle.x != kNoVertex ? 1 : 0;
+      continue;
+    }
+    soup.triangles[kept] = triangle;
+    soup.face_elements[kept++] = soup.face_elements[t];
+  }
+  soup.triangles.resize(kept);
+  soup.face_elements.resize(kept);
 }
 
 std::string faces_text(std::uint64_t count) {
@@ -172,7 +243,14 @@ Result<MeshFile> finish_mesh(const ReaderInput& input, RawMesh&& raw, const Loca
   const std::size_t vertices = soup.positions.size();
   const bool non_finite = any_non_finite(input.execution, soup.positions);
   Losses losses;
-  if (non_finite || any_bad_triangle(input.execution, soup)) losses = drop_bad_faces(raw);
+  const bool bad = non_finite || any_bad_triangle(input.execution, soup);
+  if (bad) losses = drop_bad_faces(raw);
+  PolygonCuts cuts(soup);
+  const Bent bent = cuts.run(input.execution);
+  if (input.execution.stop.stop_requested()) {
+    return fail(ErrorCode::kCancelled, "{}: reading was stopped", input.name);
+  }
+  if (bad || cuts.left_over()) drop_degenerate(raw);
 
   if (stats.too_few_vertices != 0) {
     stats.warnings.push_back(
@@ -209,12 +287,12 @@ Result<MeshFile> finish_mesh(const ReaderInput& input, RawMesh&& raw, const Loca
                 stats.warnings.empty() ? std::string() : stats.warnings.front());
   }
   if (non_finite) drop_non_finite_vertices(soup);
-  std::uint64_t first_bent = 0;
-  stats.non_planar = count_non_planar(soup, first_bent);
-  if (stats.non_planar != 0) {
+  stats.non_planar = bent.count;
+  if (bent.count != 0) {
     stats.warnings.push_back(fmt::format(
-        "{}: polygon is not flat ({} such); it was cut into a fan from its first vertex",
-        locate(static_cast<std::uint32_t>(first_bent)).place, stats.non_planar));
+        "{}: polygon is not flat: {} ({} such); its triangles are one of several ways to "
+        "fill it",
+        locate(static_cast<std::uint32_t>(bent.first)).place, bent.bend.text(), bent.count));
   }
   bool identity = true;
   for (std::size_t t = 0; t < soup.face_elements.size() && identity; ++t) {

@@ -68,12 +68,12 @@ struct MeshFile {
   MeshReadStats stats;
 };
 
-/// Reads the triangles of a mesh file. Polygons become fans from their first corner, whose
-/// triangles share the face element; for a flat polygon, even a concave one, the signed and the
-/// parity counts of such a fan are exact. STL corners are welded by exact position (-0 equals +0).
-/// Vertices keep the order of the file. Text may begin with a
-/// UTF-8 byte order mark. Counts in headers are claims: nothing is allocated that the
-/// bytes of the file do not back. The result does not depend on the number of threads.
+/// Reads the triangles of a mesh file. Polygons are cut by PolygonCutter: flat convex ones are fans
+/// from their first corner, others Delaunay triangles or at least triangles that do not overlap;
+/// all share the face element. STL corners are welded by exact position (-0 equals +0). Vertices
+/// keep the order of the file. Text may begin with a UTF-8 byte order mark. Counts in headers are
+/// claims: nothing is allocated that the bytes of the file do not back. The result does not depend
+/// on the number of threads.
 /// @param path  a file, or "-" for standard input, which needs options.format
 /// @return kInput, with line or byte: no such file, unknown format, empty, malformed, truncated,
 /// UTF-16 text, no vertices, no usable face, or with `strict` a face that had to be dropped;

@@ -85,7 +85,8 @@ Result<MeshFile> read_off(const ReaderInput& input);
 /// Whether the size of a file is that of a binary STL file of as many triangles as it claims.
 [[nodiscard]] bool is_binary_stl(std::string_view bytes);
 
-/// Appends polygons as fans and keeps count of their elements, for readers that go face by face.
+/// Appends polygons as fans, which finish_mesh() cuts anew where that is not right, and keeps count
+/// of their elements, for readers that go face by face.
 class FanBuilder {
  public:
   explicit FanBuilder(RawMesh& mesh) : mesh_(mesh) {}

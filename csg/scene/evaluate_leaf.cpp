@@ -152,7 +152,15 @@ void Evaluator::polyhedron(std::uint32_t node, const Context& context) {
     std::reverse(corners.begin(), corners.end());  // clockwise seen from outside in the file
   }
   for (const std::string& text : reader.faults()) warn(node, "geometry", text);
-  TriangleSoup mesh = make_faces(std::move(points), faces);
+  BentFaces bent;
+  TriangleSoup mesh = make_faces(std::move(points), faces, &bent);
+  if (bent.count > 0) {
+    warn(
+        node, "non-planar",
+        fmt::format("face {} of the polyhedron is not flat: {} ({} such); its triangles are one of "
+                    "several ways to fill it",
+                    bent.first, bent.bend.text(), bent.count));
+  }
   if (mesh.triangles.empty()) return;
   const InsideRule rule = inspect(node, mesh);
   add_solid(node, context, std::move(mesh), rule);

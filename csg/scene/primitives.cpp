@@ -2,10 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <glm/geometric.hpp>
-#include <glm/vec2.hpp>
-
-#include "csg/scene/outline.h"
+#include <tuple>
 
 namespace strata::csg {
 namespace {
@@ -112,74 +109,52 @@ TriangleSoup make_cylinder(double height, double radius1, double radius2, bool c
 
 namespace {
 
-/// Twice the area vector of a polygon (Newell's method): its direction is the normal.
-glm::dvec3 area_vector(std::span<const glm::dvec3> points, std::span<const std::uint32_t> face) {
-  glm::dvec3 sum(0.0);
-  const glm::dvec3 about = points[face[0]];
-  for (std::size_t i = 1; i + 1 < face.size(); ++i) {
-    sum += glm::cross(points[face[i]] - about, points[face[i + 1]] - about);
-  }
-  return sum;
-}
-
-bool is_convex(std::span<const glm::dvec2> polygon) {
-  const std::size_t n = polygon.size();
-  double turned = 0.0;
-  for (std::size_t i = 0; i < n; ++i) {
-    const glm::dvec2 a = polygon[(i + 1) % n] - polygon[i];
-    const glm::dvec2 b = polygon[(i + 2) % n] - polygon[(i + 1) % n];
-    const double cross = a.x * b.y - a.y * b.x;
-    if (cross < 0.0) return false;
-    turned += std::atan2(cross, a.x * b.x + a.y * b.y);
-  }
-  return turned < 7.0;  // once around is 6.28; stars go around twice
-}
-
-/// Adds the triangles of one face.
-void add_face(TriangleSoup& mesh, std::span<const std::uint32_t> face, std::uint32_t element) {
-  const auto add = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
-    if (a == b || b == c || c == a) return;
-    mesh.triangles.emplace_back(a, b, c);
-    mesh.face_elements.push_back(element);
+/// Begins a face at its least point, so that fans do not depend on where it began.
+void begin_at_least_point(std::vector<std::uint32_t>& face, std::span<const glm::dvec3> points) {
+  const auto key = [&](std::uint32_t i) {
+    return std::tuple(points[i].x, points[i].y, points[i].z);
   };
-  const auto fan = [&] {
-    for (std::size_t i = 1; i + 1 < face.size(); ++i) add(face[0], face[i], face[i + 1]);
-  };
-  const glm::dvec3 area = area_vector(mesh.positions, face);
-  const double length = glm::length(area);
-  if (face.size() == 3 || !(length > 0.0)) return fan();
-  // Seen along the longest axis of the normal the polygon keeps its shape up to an affine map.
-  const glm::dvec3 size = glm::abs(area);
-  const int along = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
-  const int u = (along + 1) % 3, v = (along + 2) % 3;
-  std::vector<glm::dvec2> flat;
-  for (const std::uint32_t index : face) {
-    const glm::dvec3& p = mesh.positions[index];
-    flat.push_back(area[along] > 0.0 ? glm::dvec2(p[u], p[v]) : glm::dvec2(p[v], p[u]));
-  }
-  if (is_convex(flat)) return fan();
-  Outline outline;
-  outline.contours.push_back(std::move(flat));
-  const std::vector<glm::uvec3> cut = triangulate(outline);
-  // A face that crosses itself in this view is no region; its fan counts as often as it winds.
-  if (cut.size() != face.size() - 2) return fan();
-  for (const glm::uvec3& t : cut) add(face[t.x], face[t.y], face[t.z]);
+  const auto least = std::min_element(
+      face.begin(), face.end(), [&](std::uint32_t a, std::uint32_t b) { return key(a) < key(b); });
+  std::rotate(face.begin(), least, face.end());
 }
 
 }  // namespace
 
 TriangleSoup make_faces(std::vector<glm::dvec3> points,
-                        std::span<const std::vector<std::uint32_t>> faces) {
+                        std::span<const std::vector<std::uint32_t>> faces, BentFaces* bent) {
   TriangleSoup mesh;
   mesh.positions = std::move(points);
+  PolygonCutter cutter;
   std::vector<std::uint32_t> corners;
+  std::vector<glm::dvec3> places;
   for (std::size_t f = 0; f < faces.size(); ++f) {
     corners.clear();
     for (const std::uint32_t index : faces[f]) {
       if (corners.empty() || corners.back() != index) corners.push_back(index);
     }
     while (corners.size() > 1 && corners.front() == corners.back()) corners.pop_back();
-    if (corners.size() >= 3) add_face(mesh, corners, static_cast<std::uint32_t>(f));
+    if (corners.size() < 3) continue;
+    const auto add = [&](std::size_t a, std::size_t b, std::size_t c) {
+      const glm::uvec3 t(corners[a], corners[b], corners[c]);
+      if (t.x == t.y || t.y == t.z || t.z == t.x) return;
+      mesh.triangles.push_back(t);
+      mesh.face_elements.push_back(static_cast<std::uint32_t>(f));
+    };
+    if (corners.size() == 3) {
+      add(0, 1, 2);
+      continue;
+    }
+    begin_at_least_point(corners, mesh.positions);
+    places.clear();
+    for (const std::uint32_t index : corners) places.push_back(mesh.positions[index]);
+    const std::span<const glm::uvec3> cut = cutter.cut(places);
+    for (const glm::uvec3& t : cut) add(t.x, t.y, t.z);
+    for (std::size_t i = 2; cut.empty() && i < corners.size(); ++i) add(0, i - 1, i);
+    if (bent != nullptr && cutter.bend().large() && bent->count++ == 0) {
+      bent->first = f;
+      bent->bend = cutter.bend();
+    }
   }
   return mesh;
 }

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "csg/scene/segments.h"
+#include "mesh/polygon_cutter.h"
 #include "mesh/triangle_soup.h"
 
 /// OpenSCAD's solids, vertex for vertex: the formulas stand in the functions. All but
@@ -26,10 +27,16 @@ namespace strata::csg {
 /// Triangles that make_sphere would make, for limits.
 [[nodiscard]] double sphere_triangle_count(double radius, const Segments& segments);
 
-/// Faces of any number of corners, counter-clockwise seen from outside: convex ones become fans,
-/// others are cut in the plane they lie in, or nearly. Face elements are indices of `faces`.
-/// Corners that repeat their predecessor are left out. @pre indices < points.size()
+/// Faces that are not flat.
+struct BentFaces {
+  std::size_t count = 0, first = 0;
+  Bend bend;  ///< of the first
+};
+/// Faces of any number of corners, counter-clockwise seen from outside, cut by PolygonCutter; how
+/// does not depend on where a face begins. Face elements are indices of `faces`. Corners that
+/// repeat their predecessor are left out. @pre indices < points.size()
 [[nodiscard]] TriangleSoup make_faces(std::vector<glm::dvec3> points,
-                                      std::span<const std::vector<std::uint32_t>> faces);
+                                      std::span<const std::vector<std::uint32_t>> faces,
+                                      BentFaces* bent = nullptr);
 
 }  // namespace strata::csg

@@ -163,6 +163,53 @@ TEST(Primitives, FacesMayLookAnyWayAndRepeatCorners) {
   EXPECT_TRUE(is_closed(*scene.tree.solids()[0].mesh));
 }
 
+TEST(Primitives, FacesThatAreNotFlatAreCutAsInOpenScadWhereverTheyBegin) {
+  // A block of 6 x 6 whose top rises by 3 at two opposite corners: OpenSCAD joins these two, since
+  // both ways are equally long, and the mean height is 9 + (3 + 3 + 0) / 3. Turned by a quarter,
+  // the others are joined.
+  const auto block = [](const char* top, int first, int second) {
+    return volume_of(scene_of(
+        fmt::format("polyhedron(points = "
+                    "[[0,0,0],[6,0,0],[6,6,0],[0,6,0],[0,0,{0}],[6,0,{1}],[6,6,{0}],[0,6,{1}]], "
+                    "faces = [[0,1,2,3],{2},[0,4,5,1],[1,5,6,2],[2,6,7,3],[3,7,4,0]]);",
+                    first, second, top)));
+  };
+  for (const char* top : {"[7,6,5,4]", "[6,5,4,7]", "[5,4,7,6]", "[4,7,6,5]"}) {
+    EXPECT_NEAR(block(top, 9, 12), 36 * 11.0, 1e-9) << top;
+    EXPECT_NEAR(block(top, 12, 9), 36 * 10.0, 1e-9) << top;
+  }
+  // A hexagonal prism turned by 20 degrees from bottom to top: the shorter cuts bulge.
+  std::string points, faces = "[0,1,2,3,4,5],[11,10,9,8,7,6]";
+  double volume = 0;
+  std::vector<glm::dvec3> p;
+  for (int i = 0; i < 12; ++i) {
+    const double angle = (60.0 * (i % 6) + (i < 6 ? 0 : 20)) * 0.017453292519943295;
+    p.emplace_back(8 * std::cos(angle), 8 * std::sin(angle), i < 6 ? 0 : 12);
+    points += fmt::format("{}[{},{},{}]", i == 0 ? "" : ",", p.back().x, p.back().y, p.back().z);
+  }
+  for (int i = 0; i < 6; ++i) {
+    const int j = (i + 1) % 6;
+    faces += fmt::format(",[{},{},{},{}]", i, i + 6, j + 6, j);
+    // Cones from the middle of the bottom: over the two triangles of each side.
+    const auto cone = [&](int a, int b, int c) {
+      const auto n = static_cast<std::size_t>(a);
+      return glm::dot(p[n],
+                      glm::cross(p[static_cast<std::size_t>(b)], p[static_cast<std::size_t>(c)])) /
+             6;
+    };
+    volume += cone(i, j, i + 6) + cone(j, j + 6, i + 6);
+  }
+  volume += 12 * 6 * 0.5 * 64 * std::sin(1.0471975511965976) / 3;  // and over the top
+  const Scene twisted =
+      scene_of(fmt::format("polyhedron(points = [{}], faces = [{}]);", points, faces));
+  EXPECT_NEAR(volume_of(twisted), volume, 1e-3);
+  EXPECT_GT(volume, 2086.0);  // 12 * 6 * 16 * sqrt(3) = 1995 without the bulges
+  ASSERT_EQ(codes_of(twisted), "non-planar ");
+  EXPECT_NE(twisted.warnings[0].message.find("face 2 of the polyhedron is not flat"),
+            std::string::npos);
+  EXPECT_NE(twisted.warnings[0].message.find("(6 such)"), std::string::npos);
+}
+
 TEST(Primitives, PolyhedraInsideOutAreTurnedAndOpenOnesReported) {
   const std::string points = "polyhedron(points = [[0,0,0],[1,0,0],[0,1,0],[0,0,1]], faces = ";
   const Scene right = scene_of(points + "[[0,1,2],[0,3,1],[0,2,3],[1,3,2]]);");

@@ -151,7 +151,22 @@ TEST(ObjReader, BentPolygonIsReportedFlatOneIsNot) {
   EXPECT_TRUE(parsed(kObj, kSquare + "f 1 2 3 4\n").stats.warnings.empty());
   const MeshFile file = parsed(kObj, "v 0 0 0\nv 1 0 0\nv 1 1 0.1\nv 0 1 0\nf 1 2 3 4\n");
   EXPECT_EQ(file.stats.non_planar, 1u);
-  EXPECT_CONTAINS(only_warning(file), "file:5: polygon is not flat");
+  EXPECT_CONTAINS(only_warning(file), "file:5: polygon is not flat: its corners lie 0.0");
+  // The same triangles wherever the face begins.
+  for (const char* face : {"f 2 3 4 1\n", "f 3 4 1 2\n", "f 4 1 2 3\n"}) {
+    const std::string text = std::string("v 0 0 0\nv 1 0 0\nv 1 1 0.1\nv 0 1 0\n") + face;
+    EXPECT_EQ(six_volumes(parsed(kObj, text).soup), six_volumes(file.soup)) << face;
+  }
+}
+
+TEST(ObjReader, PolygonsThatRepeatACornerLoseNothingElse) {
+  // A concave polygon, one corner twice, and its first one at the end again.
+  const MeshFile file =
+      parsed(kObj, "v 0 0 0\nv 4 0 0\nv 4 4 0\nv 2 1 0\nv 0 4 0\nf 1 2 2 3 4 5 1\nf 1 2 3\n");
+  EXPECT_EQ(file.stats.degenerate, 2u);
+  EXPECT_EQ(file.soup.triangles.size(), 4u);
+  EXPECT_EQ(file.soup.face_elements, (std::vector<std::uint32_t>{0, 0, 0, 1}));
+  EXPECT_CONTAINS(only_warning(file), "2 triangles with two corners at the same vertex");
 }
 
 TEST(ObjReader, VertexLinesMayCarryWeightsAndColours) {
@@ -167,9 +182,10 @@ TEST(ObjReader, ChunksJoinToTheSameMeshForAnyThreads) {
   std::vector<std::uint32_t> elements;
   std::uint32_t vertices = 0, element = 0;
   while (text.size() < 3'000'000) {
+    // Four corners of a flat convex polygon.
+    const double height = static_cast<double>(random() % 1000) * 1e-3;
     for (int i = 0; i < 4; ++i) {
-      text += fmt::format("v {} {} {}\n", vertices * 0.25, i,
-                          static_cast<double>(random() % 1000) * 1e-3);
+      text += fmt::format("v {} {} {}\n", vertices * 0.25, i * i, height);
       ++vertices;
     }
     switch (random() % 5) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <glm/geometric.hpp>
 #include <stop_token>
 #include <thread>
 
@@ -78,6 +79,55 @@ TEST_F(ReadMesh, TextMayBeginWithAByteOrderMark) {
     EXPECT_EQ(plain->soup.triangles, marked->soup.triangles) << name;
     EXPECT_TRUE(marked->stats.warnings.empty()) << name;
     EXPECT_EQ(marked->stats.bytes, text.size() + 3);
+  }
+}
+
+TEST_F(ReadMesh, ConcavePolygonsAreCutInEveryFormat) {
+  // A U of 9 x 6 with a slot of 3 x 4, 4 high. Fans would overlap outside of it.
+  const std::vector<glm::dvec2> u = {{0, 0}, {9, 0}, {9, 6}, {6, 6},
+                                     {6, 2}, {3, 2}, {3, 6}, {0, 6}};
+  std::vector<glm::dvec3> vertices;
+  for (const double z : {0.0, 4.0}) {
+    for (const glm::dvec2& p : u) vertices.emplace_back(p, z);
+  }
+  std::vector<std::vector<int>> faces = {{7, 6, 5, 4, 3, 2, 1, 0}, {8, 9, 10, 11, 12, 13, 14, 15}};
+  for (int i = 0; i < 8; ++i) faces.push_back({i, (i + 1) % 8, (i + 1) % 8 + 8, i + 8});
+  std::string obj, off = fmt::format("OFF\n16 {} 0\n", faces.size()), stl = "solid\n";
+  std::string ply = fmt::format(
+      "ply\nformat ascii 1.0\nelement vertex 16\nproperty float x\nproperty float y\n"
+      "property float z\nelement face {}\nproperty list uchar int vertex_indices\nend_header\n",
+      faces.size());
+  for (const glm::dvec3& p : vertices) {
+    const std::string line = fmt::format("{} {} {}\n", p.x, p.y, p.z);
+    obj += "v " + line, off += line, ply += line;
+  }
+  for (const std::vector<int>& face : faces) {
+    std::string numbers;
+    obj += "f", stl += "facet normal 0 0 0 outer loop\n";
+    for (const int i : face) {
+      const glm::dvec3& p = vertices[static_cast<std::size_t>(i)];
+      obj += fmt::format(" {}", i + 1), numbers += fmt::format(" {}", i);
+      stl += fmt::format("vertex {} {} {}\n", p.x, p.y, p.z);
+    }
+    obj += "\n", stl += "endloop endfacet\n";
+    off += fmt::format("{}{}\n", face.size(), numbers),
+        ply += fmt::format("{}{}\n", face.size(), numbers);
+  }
+  const std::pair<const char*, std::string> kFiles[] = {
+      {"u.obj", obj}, {"u.off", off}, {"u.ply", ply}, {"u.stl", stl + "endsolid\n"}};
+  for (const auto& [name, text] : kFiles) {
+    const auto file = read_mesh(write(name, text));
+    ASSERT_TRUE(file.has_value()) << file.error().message;
+    EXPECT_EQ(file->soup.triangles.size(), 28u) << name;
+    EXPECT_EQ(six_volumes(file->soup), 6 * 168.0) << name;
+    double area = 0.0;
+    for (const glm::uvec3& t : file->soup.triangles) {
+      const glm::dvec3 a = file->soup.positions[t.x];
+      area +=
+          glm::length(glm::cross(file->soup.positions[t.y] - a, file->soup.positions[t.z] - a)) / 2;
+    }
+    EXPECT_NEAR(area, 236.0, 1e-12) << name;
+    EXPECT_TRUE(file->stats.warnings.empty()) << name;
   }
 }
 
