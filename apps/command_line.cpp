@@ -217,7 +217,7 @@ void define_voxelize(CLI::App& app, Words& words) {
                "Do not turn meshes around that are inside out")
       ->group(solid);
   app.add_option("--open", words.open,
-                 "Meshes with holes: vote of three axes (default), surface or fail")
+                 "Meshes with holes: vote of rays of all directions (default), surface or fail")
       ->type_name("HOW")
       ->group(solid);
   add_engine(app, words, "Of the rays: x, y, z or auto (that of the format, or fewest rays)");

@@ -54,7 +54,14 @@ MemoryEstimate estimate_memory(const MeshInput& input, const VoxelGrid& voxels, 
   const double tiles = columns(grid, axis) / kTilePixels + 1;
   const double across = 1 + side / kTileSide;
   const double references = triangles * std::min(across * across, tiles);
-  estimate.bins = rounded(triangles * 8 + references * 4 + tiles * (4.0 + 8.0 * threads));
+  double open = 0;
+  if (!input.closed && !input.tree && command.solid && command.open == OpenMode::kVote) {
+    // The closed mesh beside the open one, its pieces, and the caps with their tree.
+    double edges = 0;
+    for (const InputFacts& file : input.files) edges += static_cast<double>(file.unbalanced_edges);
+    open = vertices * (12 + 36) + triangles * 12 + edges * 400;
+  }
+  estimate.bins = rounded(open + triangles * 8 + references * 4 + tiles * (4.0 + 8.0 * threads));
 
   // Offsets and two intervals a column, with their copies; slabs keep to an eighth of the limit,
   // but hold 64 rows at least (see voxelize_slabs).
@@ -64,12 +71,6 @@ MemoryEstimate estimate_memory(const MeshInput& input, const VoxelGrid& voxels, 
   const double budget =
       limit > 0 ? std::min(kDefaultSlab, static_cast<double>(limit) / 8) : kDefaultSlab;
   double slab = std::min(columns(grid, axis) * kColumnBytes, std::max(least, budget));
-  if (!input.closed && !input.tree && command.solid && command.open == OpenMode::kVote) {
-    // The vote holds the intervals of all three axes.
-    slab = 0;
-    for (const Axis each : {Axis::kX, Axis::kY, Axis::kZ})
-      slab += columns(grid, each) * kColumnBytes;
-  }
   if (command.surface && command.solid) slab *= 2;
   constexpr double kWorkerBytes = 6e6;
   estimate.slabs = rounded(slab + kWorkerBytes * threads);

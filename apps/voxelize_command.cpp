@@ -77,7 +77,7 @@ Result<void> check_open(const VoxelizeCommand& command, const MeshInput& input, 
   }
   if (command.ids && !input.has_scene()) {
     return fail(ErrorCode::kUsage,
-                "--ids are of closed meshes: for open ones the three axes vote on each voxel, and "
+                "--ids are of closed meshes: for open ones all directions vote on each voxel, and "
                 "no vote says of which solid it is; close {}, or do without --ids",
                 file.path);
   }
@@ -145,14 +145,14 @@ void check_columns(const VoxelizeCommand& command, const VoxelizeOutcome& outcom
   // Parity does not ask which way a closed mesh is crossed.
   const bool both_ways = outcome.input.closed && outcome.input.rule == InsideRule::kParity;
   if (report.unbalanced_columns > 0 && !both_ways) {
-    session.warn(
-        "unbalanced-columns",
-        fmt::format("{} entered and left unequally often; {}",
-                    report.unbalanced_columns == 1
-                        ? std::string("1 column is")
-                        : fmt::format("{} columns are", report.unbalanced_columns),
-                    command.open == OpenMode::kVote ? "the vote of three axes decided their voxels"
-                                                    : "their voxels are not to be trusted"));
+    session.warn("unbalanced-columns",
+                 fmt::format("{} entered and left unequally often; {}",
+                             report.unbalanced_columns == 1
+                                 ? std::string("1 column is")
+                                 : fmt::format("{} columns are", report.unbalanced_columns),
+                             command.open == OpenMode::kVote
+                                 ? "caps and winding numbers decided their voxels"
+                                 : "their voxels are not to be trusted"));
   }
   if (report.negative_columns > 0 && outcome.input.closed &&
       outcome.input.rule == InsideRule::kWinding) {

@@ -10,6 +10,15 @@
 namespace strata {
 namespace {
 
+/// The lists of a tile without crossings.
+template <class Key>
+TileLists<Key> no_lists() {
+  static constexpr std::uint32_t kNone[kTilePixels + 1] = {};
+  TileLists<Key> lists;
+  lists.offsets = kNone;
+  return lists;
+}
+
 double milliseconds_between(std::chrono::steady_clock::time_point from,
                             std::chrono::steady_clock::time_point to) {
   return std::chrono::duration<double, std::milli>(to - from).count();
@@ -27,15 +36,18 @@ struct SolidVoxelizer::Worker {
   std::unique_ptr<TileListFilter::Worker> filter;
   TileCutter cutter;
   TileIntervals intervals;
+  WindingField::Scratch winding;
   VoxelizeReport report;
 };
 
 Result<SolidVoxelizer> SolidVoxelizer::create(const LatticeMesh& mesh, const VoxelGrid& grid,
                                               Axis axis, const VoxelizeOptions& options,
-                                              const Execution& execution) {
+                                              const Execution& execution,
+                                              const WindingField* field) {
   SolidVoxelizer result;
   result.mesh_ = &mesh;
   result.grid_ = &grid;
+  result.field_ = field;
   result.options_ = options;
   result.target_ = raster_target(grid, axis);
   const TileListFilter* filter = options.filter;
@@ -55,16 +67,19 @@ Result<SolidVoxelizer> SolidVoxelizer::create(const LatticeMesh& mesh, const Vox
 
 template <class Builder>
 Result<void> SolidVoxelizer::run_tile(Builder& builder, Worker& worker, int tu, int tv, int v_begin,
-                                      VoxelIntervals& out, ColumnMarks* marks) const {
+                                      VoxelIntervals& out, const Execution& execution) const {
+  using Key = typename Builder::Key;
   const auto triangles = bins_.tile(tu, tv);
-  if (triangles.empty()) return {};
+  if (triangles.empty()) {
+    if (field_ != nullptr) walk(no_lists<Key>(), worker, tu, tv, v_begin, out, execution);
+    return {};
+  }
   const auto start = std::chrono::steady_clock::now();
   const auto lists = builder.build(*mesh_, target_, triangles, tu, tv);
   if (!lists) return tl::unexpected(lists.error());
   const auto built = std::chrono::steady_clock::now();
   worker.report.lists_ms += milliseconds_between(start, built);
-  if (lists->fragments == 0) return {};
-  walk(*lists, worker, tu, tv, v_begin, out, marks);
+  walk(lists->fragments > 0 ? *lists : no_lists<Key>(), worker, tu, tv, v_begin, out, execution);
   worker.report.intervals_ms += milliseconds_between(built, std::chrono::steady_clock::now());
   return {};
 }
@@ -72,8 +87,13 @@ Result<void> SolidVoxelizer::run_tile(Builder& builder, Worker& worker, int tu, 
 /// Lists to intervals.
 template <class Key>
 void SolidVoxelizer::walk(const TileLists<Key>& lists, Worker& worker, int tu, int tv, int v_begin,
-                          VoxelIntervals& out, ColumnMarks* marks) const {
+                          VoxelIntervals& out, const Execution& execution) const {
   TileIntervals& tile = worker.intervals;
+  std::span<const WindingStep> steps;
+  if (field_ != nullptr) {
+    steps = field_->steps(target_.axis, tu, tv, execution.stop, worker.winding);
+  }
+  if (lists.fragments == 0 && steps.empty()) return;
   if constexpr (std::is_same_v<Key, DepthItem>) {
     // Without a worker the lists have gone through the filter already.
     const auto& filtered = worker.filter ? worker.filter->apply(lists) : lists;
@@ -85,6 +105,7 @@ void SolidVoxelizer::walk(const TileLists<Key>& lists, Worker& worker, int tu, i
   } else {
     walk_tile(lists, options_.rule, options_.statistics, tile);
   }
+  if (!steps.empty()) add_winding_steps(lists, options_.rule, steps, tile);
   if (tile.offsets.back() > 0) {
     out.set_tile(tu, tv - v_begin / kTileSide, tile.offsets,
                  std::span<const Interval>(tile.items).first(tile.offsets.back()), tile.labels);
@@ -97,17 +118,11 @@ void SolidVoxelizer::walk(const TileLists<Key>& lists, Worker& worker, int tu, i
   for (std::size_t i = 0; i < report.depth_histogram.size(); ++i) {
     report.depth_histogram[i] += tile.histogram[i];
   }
-  if (marks != nullptr && tile.unbalanced > 0) {
-    const int rows = std::min(kTileSide, target_.height - tv * kTileSide);
-    for (int row = 0; row < rows; ++row) {
-      marks->word(tu, tv * kTileSide + row) = tile.unbalanced_rows[row];
-    }
-  }
 }
 
 /// All tiles of a slab from the lists of a source, some rows of tiles after another.
 Result<void> SolidVoxelizer::run_source(int v_begin, const Execution& execution,
-                                        VoxelIntervals& out, ColumnMarks* marks) const {
+                                        VoxelIntervals& out) const {
   const int v_end = out.v_end(), step = options_.source->rows_at_once(target_);
   for (int v = v_begin; v < v_end; v += step) {
     const auto start = std::chrono::steady_clock::now();
@@ -127,8 +142,7 @@ Result<void> SolidVoxelizer::run_source(int v_begin, const Execution& execution,
                    const int tv = v / kTileSide + static_cast<int>(index) / out.tiles_u();
                    const auto begin = std::chrono::steady_clock::now();
                    const auto lists = worker.cutter.cut(*rows, v, tu, tv);
-                   if (lists.fragments == 0) return;
-                   walk(lists, worker, tu, tv, v_begin, out, marks);
+                   walk(lists, worker, tu, tv, v_begin, out, execution);
                    worker.report.intervals_ms +=
                        milliseconds_between(begin, std::chrono::steady_clock::now());
                  });
@@ -138,7 +152,7 @@ Result<void> SolidVoxelizer::run_source(int v_begin, const Execution& execution,
 }
 
 Result<VoxelIntervals> SolidVoxelizer::slab(int v_begin, int v_end, const Execution& execution,
-                                            VoxelizeReport& report, ColumnMarks* marks) {
+                                            VoxelizeReport& report) {
   VoxelIntervals result(*grid_, target_.axis, v_begin, v_end);
   const int first_tile_row = v_begin / kTileSide;
   const auto tiles =
@@ -146,15 +160,15 @@ Result<VoxelIntervals> SolidVoxelizer::slab(int v_begin, int v_end, const Execut
   std::mutex failure_mutex;
   Result<void> status;
   for (auto& worker : workers_) worker->report = {};
-  if (options_.source != nullptr) status = run_source(v_begin, execution, result, marks);
+  if (options_.source != nullptr) status = run_source(v_begin, execution, result);
   const std::size_t own_tiles = options_.source != nullptr ? 0 : tiles;
   parallel_for(execution, own_tiles, [&](std::size_t index, int worker_index) {
     Worker& worker = *workers_[static_cast<std::size_t>(worker_index)];
     const int tu = static_cast<int>(index) % result.tiles_u();
     const int tv = static_cast<int>(index) / result.tiles_u() + first_tile_row;
     const auto done = target_.depth_limit <= kMaxDepthKeyLimit && options_.filter == nullptr
-                          ? run_tile(worker.keys, worker, tu, tv, v_begin, result, marks)
-                          : run_tile(worker.items, worker, tu, tv, v_begin, result, marks);
+                          ? run_tile(worker.keys, worker, tu, tv, v_begin, result, execution)
+                          : run_tile(worker.items, worker, tu, tv, v_begin, result, execution);
     if (!done) {
       const std::lock_guard lock(failure_mutex);
       if (status) status = done;

@@ -113,9 +113,7 @@ void walk_planes(const TileLists<DepthKey>& lists, bool histogram, TileIntervals
         std::int32_t windings[kMaxLanes];
         hn::StoreU(winding, di, windings);
         for (std::size_t lane = 0; lane < lanes; ++lane) {
-          if (windings[lane] == 0) continue;
-          ++out.unbalanced;
-          out.unbalanced_rows[row] |= std::uint64_t{1} << (u + lane);
+          if (windings[lane] != 0) ++out.unbalanced;
         }
         out.negative += hn::CountTrue(di, negative);
       }
@@ -202,8 +200,7 @@ bool is_inside(InsideRule rule, int winding) {
 /// The walk written plainly, one column at a time: for the form of lists that is not planar, and
 /// the yardstick of the other.
 template <class Key>
-void walk_column(std::span<const Key> list, InsideRule rule, std::size_t pixel, bool histogram,
-                 TileIntervals& out) {
+void walk_column(std::span<const Key> list, InsideRule rule, bool histogram, TileIntervals& out) {
   const std::size_t first = out.items.size();
   int winding = 0, lowest = 0;
   std::uint32_t begin = 0;
@@ -223,10 +220,7 @@ void walk_column(std::span<const Key> list, InsideRule rule, std::size_t pixel, 
       }
     }
   }
-  if (winding != 0) {
-    ++out.unbalanced;
-    out.unbalanced_rows[pixel / kTileSide] |= std::uint64_t{1} << (pixel % kTileSide);
-  }
+  if (winding != 0) ++out.unbalanced;
   if (lowest < 0) ++out.negative;
   out.max_depth = std::max<std::uint64_t>(out.max_depth, list.size());
   if (histogram && !list.empty()) ++out.histogram[std::min<std::size_t>(list.size(), 64)];
@@ -248,13 +242,13 @@ void walk_rows(const TileLists<Key>& lists, InsideRule rule, bool histogram, Til
           if (record == 0) break;
           list.push_back(tile_key<Record64>(record));
         }
-        walk_column(std::span<const Key>(list), rule, pixel, histogram, out);
+        walk_column(std::span<const Key>(list), rule, histogram, out);
         continue;
       }
     }
     walk_column(std::span<const Key>(lists.keys + lists.offsets[pixel],
                                      lists.keys + lists.offsets[pixel + 1]),
-                rule, pixel, histogram, out);
+                rule, histogram, out);
   }
   out.offsets[kTilePixels] = static_cast<std::uint32_t>(out.items.size());
 }
@@ -262,7 +256,6 @@ void walk_rows(const TileLists<Key>& lists, InsideRule rule, bool histogram, Til
 void begin_walk(TileIntervals& out) {
   out.offsets.resize(kTilePixels + 1);
   out.labels.clear();
-  std::fill(std::begin(out.unbalanced_rows), std::end(out.unbalanced_rows), 0);
   std::fill(std::begin(out.histogram), std::end(out.histogram), 0);
   out.unbalanced = out.negative = out.max_depth = 0;
 }
@@ -308,15 +301,80 @@ void walk_labelled_tile(const TileLists<DepthItem>& lists, bool histogram, TileI
       label = next;
       begin = voxel;
     });
-    if (label != 0) {
-      ++out.unbalanced;
-      out.unbalanced_rows[pixel / kTileSide] |= std::uint64_t{1} << (pixel % kTileSide);
-    }
+    if (label != 0) ++out.unbalanced;
     out.max_depth = std::max<std::uint64_t>(out.max_depth, length);
     if (histogram && length > 0) ++out.histogram[std::min<std::size_t>(length, 64)];
   }
   out.offsets[kTilePixels] = static_cast<std::uint32_t>(out.items.size());
 }
+
+namespace {
+
+/// Calls body(key) for the sorted list of a pixel.
+template <class Key, class Body>
+void for_each_key(const TileLists<Key>& lists, std::size_t pixel, Body&& body) {
+  if constexpr (std::is_same_v<Key, DepthItem>) {
+    for_each_item(lists, pixel, body);
+  } else if (lists.planes32 == nullptr) {
+    std::for_each(lists.keys + lists.offsets[pixel], lists.keys + lists.offsets[pixel + 1], body);
+  } else {
+    const int row = static_cast<int>(pixel) / kTileSide;
+    if (row < lists.row_begin || row >= lists.row_end) return;
+    for (std::size_t age = 0; age < static_cast<std::size_t>(lists.ages); ++age) {
+      const std::uint32_t record = lists.planes32[age * kTilePixels + pixel];
+      if (record == 0) return;
+      body(tile_key<Record32>(record));
+    }
+  }
+}
+
+}  // namespace
+
+template <class Key>
+void add_winding_steps(const TileLists<Key>& lists, InsideRule rule,
+                       std::span<const WindingStep> steps, TileIntervals& out) {
+  std::vector<Interval> items;
+  std::vector<std::pair<int, int>> changes;  // by the first voxel beyond them
+  std::size_t next = 0;
+  std::uint32_t begin = 0;  // of the column in what was there
+  for (std::size_t pixel = 0; pixel < kTilePixels; ++pixel) {
+    const std::uint32_t end = out.offsets[pixel + 1];
+    out.offsets[pixel] = static_cast<std::uint32_t>(items.size());
+    if (next == steps.size() || steps[next].pixel != pixel) {
+      items.insert(items.end(), out.items.begin() + begin, out.items.begin() + end);
+      begin = end;
+      continue;
+    }
+    begin = end;
+    changes.clear();
+    for_each_key(lists, pixel, [&](Key key) {
+      changes.emplace_back((depth_of(key) + kLatticeSteps / 2) >> kLatticeBits,
+                           exit_of(key) ? -1 : 1);
+    });
+    for (; next < steps.size() && steps[next].pixel == pixel; ++next) {
+      changes.emplace_back(steps[next].voxel, steps[next].change);
+    }
+    std::sort(changes.begin(), changes.end());
+    int winding = 0, first = 0;
+    for (std::size_t i = 0; i < changes.size();) {
+      const bool was = is_inside(rule, winding);
+      const int voxel = changes[i].first;
+      for (; i < changes.size() && changes[i].first == voxel; ++i) winding += changes[i].second;
+      const bool now = is_inside(rule, winding);
+      if (now && !was) first = voxel;
+      if (was && !now) {
+        items.push_back({static_cast<std::uint16_t>(first), static_cast<std::uint16_t>(voxel - 1)});
+      }
+    }
+  }
+  out.offsets[kTilePixels] = static_cast<std::uint32_t>(items.size());
+  out.items = std::move(items);
+}
+
+template void add_winding_steps<DepthKey>(const TileLists<DepthKey>&, InsideRule,
+                                          std::span<const WindingStep>, TileIntervals&);
+template void add_winding_steps<DepthItem>(const TileLists<DepthItem>&, InsideRule,
+                                           std::span<const WindingStep>, TileIntervals&);
 
 }  // namespace strata
 #endif  // HWY_ONCE

@@ -6,6 +6,7 @@
 
 #include "hashbuffer/tile_builder.h"
 #include "voxelize/voxelize.h"
+#include "voxelize/winding_field.h"
 
 // Depth lists of a tile -> runs of solid voxels. Private to voxelize/.
 
@@ -16,10 +17,8 @@ struct TileIntervals {
   std::vector<std::uint32_t> offsets;  ///< kTilePixels + 1
   std::vector<Interval> items;         ///< the first offsets.back() are valid
   std::vector<std::uint32_t> labels;   ///< of those items, or none
-  /// Bit u of row v is set where the column's winding number does not return to 0.
-  std::uint64_t unbalanced_rows[kTileSide];
-  std::uint64_t unbalanced = 0;  ///< columns so marked
-  std::uint64_t negative = 0;    ///< columns whose winding number falls below 0
+  std::uint64_t unbalanced = 0;        ///< columns whose winding number does not return to 0
+  std::uint64_t negative = 0;          ///< columns whose winding number falls below 0
   std::uint64_t max_depth = 0;
   /// Columns with n = 1..63 fragments at [n], the deeper ones at [64]; filled when asked for.
   std::uint64_t histogram[65];
@@ -34,5 +33,11 @@ void walk_tile(const TileLists<DepthItem>& lists, InsideRule rule, bool histogra
                TileIntervals& out);
 /// The same of labelled lists (TileListFilter::labelled()).
 void walk_labelled_tile(const TileLists<DepthItem>& lists, bool histogram, TileIntervals& out);
+
+/// Does the columns that have steps again: there the winding number changes at crossings and steps.
+/// @param steps  sorted by pixel and voxel @pre `out` is what walk_tile() made of the lists
+template <class Key>
+void add_winding_steps(const TileLists<Key>& lists, InsideRule rule,
+                       std::span<const WindingStep> steps, TileIntervals& out);
 
 }  // namespace strata

@@ -2,16 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "raster/lattice_mesh.h"
+#include "voxelize/boundary_caps.h"
 #include "voxelize/checksum.h"
 #include "voxelize/samples.h"
 #include "voxelize/solid.h"
 #include "voxelize/surface.h"
 #include "voxelize/tree_surface.h"
-#include "voxelize/vote.h"
+#include "voxelize/winding_field.h"
 
 namespace strata {
 namespace {
@@ -61,6 +64,76 @@ Result<void> check_samples(const VoxelGrid& grid, const VoxelizeOptions& options
   }
   return {};
 }
+
+/// The solid of a mesh, slab by slab along options.axis. An open mesh is closed by caps, and what
+/// its winding numbers are other than those of the closed one is added (voxelize/winding_field.h).
+class SolidSlabs {
+ public:
+  /// Keeps references to all arguments but `execution`.
+  static Result<SolidSlabs> create(const LatticeMesh& mesh, const VoxelGrid& grid,
+                                   const VoxelizeOptions& options, const Execution& execution) {
+    SolidSlabs result;
+    const LatticeMesh* whole = &mesh;
+    if (!options.closed) {
+      if (auto caps = boundary_caps(mesh, execution); !caps.triangles.empty()) {
+        result.open_ = std::make_unique<Open>(mesh, std::move(caps), grid, execution.stop);
+        if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+        whole = &result.open_->whole;
+        VoxelizeOptions counting = options;
+        counting.source = nullptr;
+        counting.statistics = false;
+        auto made =
+            SolidVoxelizer::create(result.open_->caps, grid, options.axis, counting, execution);
+        if (!made) return tl::unexpected(made.error());
+        result.open_->columns = *std::move(made);
+      }
+    }
+    auto made = SolidVoxelizer::create(*whole, grid, options.axis, options, execution,
+                                       result.open_ ? &result.open_->field : nullptr);
+    if (!made) return tl::unexpected(made.error());
+    result.solid_ = *std::move(made);
+    return result;
+  }
+
+  Result<VoxelIntervals> slab(int v_begin, int v_end, const Execution& execution,
+                              VoxelizeReport& report) {
+    auto result = solid_.slab(v_begin, v_end, execution, report);
+    if (!result || !open_) return result;
+    // The caps are missing where the mesh's columns are unbalanced, and their crossings are not
+    // its.
+    VoxelizeReport caps;
+    const auto counted = open_->columns.slab(v_begin, v_end, execution, caps);
+    if (!counted) return tl::unexpected(counted.error());
+    report.unbalanced_columns += caps.unbalanced_columns;
+    report.crossings -= caps.crossings;
+    return result;
+  }
+
+ private:
+  struct Open {
+    Open(const LatticeMesh& mesh, BoundaryCaps&& closing, const VoxelGrid& grid,
+         const std::stop_token& stop)
+        : triangles(mesh.triangles.begin(), mesh.triangles.end()),
+          cap_triangles(std::move(closing.triangles)),
+          field(mesh, std::span(cap_triangles).first(closing.doubtful), grid, stop) {
+      triangles.insert(triangles.end(), cap_triangles.begin(), cap_triangles.end());
+      whole = {mesh.vertices, triangles};
+      for (glm::uvec3& t : cap_triangles) {
+        for (int i = 0; i < 3; ++i) {
+          caps.vertices.push_back(mesh.vertices[t[i]]);
+          t[i] = static_cast<std::uint32_t>(caps.vertices.size() - 1);
+        }
+      }
+      caps.triangles = cap_triangles;
+    }
+    std::vector<glm::uvec3> triangles, cap_triangles;  ///< the mesh's and the caps; the caps
+    LatticeMesh whole, caps;
+    WindingField field;
+    SolidVoxelizer columns;  ///< of the caps alone
+  };
+  std::unique_ptr<Open> open_;
+  SolidVoxelizer solid_;
+};
 
 /// Takes a finished slab over.
 using OwningSink = std::function<Result<void>(VoxelIntervals&&)>;
@@ -123,24 +196,21 @@ Result<VoxelizeReport> run(const TriangleSoup& mesh, const VoxelGrid& asked,
     return sink(std::move(slab));
   };
 
-  if (solid && !options.closed) {
-    const auto done = vote_slabs(lattice, grid, options, execution, step, report, pass_on);
-    if (!done) return tl::unexpected(done.error());
-  } else {
-    Result<SolidVoxelizer> voxelizer =
-        solid ? SolidVoxelizer::create(lattice, grid, options.axis, options, quiet)
-              : SolidVoxelizer();
-    if (!voxelizer) return tl::unexpected(voxelizer.error());
-    const int rows = grid.dims[AxisFrame(options.axis).v];
-    for (int v = 0; v < rows; v += step) {
-      const int end = std::min(rows, v + step);
-      Result<VoxelIntervals> slab = solid ? voxelizer->slab(v, end, quiet, report)
-                                          : VoxelIntervals(grid, options.axis, v, end);
-      if (!slab) return tl::unexpected(slab.error());
-      if (auto done = pass_on(std::move(*slab)); !done) return tl::unexpected(done.error());
-      if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
-      if (execution.progress) execution.progress(static_cast<double>(end) / rows);
-    }
+  std::optional<SolidSlabs> slabs;
+  if (solid) {
+    auto made = SolidSlabs::create(lattice, grid, options, quiet);
+    if (!made) return tl::unexpected(made.error());
+    slabs = *std::move(made);
+  }
+  const int rows = grid.dims[AxisFrame(options.axis).v];
+  for (int v = 0; v < rows; v += step) {
+    const int end = std::min(rows, v + step);
+    Result<VoxelIntervals> slab =
+        slabs ? slabs->slab(v, end, quiet, report) : VoxelIntervals(grid, options.axis, v, end);
+    if (!slab) return tl::unexpected(slab.error());
+    if (auto done = pass_on(std::move(*slab)); !done) return tl::unexpected(done.error());
+    if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+    if (execution.progress) execution.progress(static_cast<double>(end) / rows);
   }
   if (options.statistics) report.checksum = checksum.value();
   return report;

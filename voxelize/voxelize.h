@@ -20,7 +20,7 @@ namespace strata {
 
 /// What to do with a mesh that is not closed.
 enum class OpenMode {
-  kVote,     ///< the lists of all three axes decide each voxel by majority
+  kVote,     ///< flat holes are closed; else the rays of all directions: winding numbers
   kSurface,  ///< keep only the voxels that the surface touches
   kFail      ///< ErrorCode::kGeometry
 };

@@ -77,7 +77,7 @@ TEST_F(Backends, WriteTheSameVoxels) {
       EXPECT_EQ(sums[0], sums[1]) << grid << " along " << axis;
     }
   }
-  expect_same({"voxelize", kOpen, "-r", "90"}, ".npy");  // a vote of three axes
+  expect_same({"voxelize", kOpen, "-r", "90"}, ".npy");  // closed by caps
   expect_same({"voxelize", kKnot, "-r", "60", "--solid", "--surface"}, ".npy");
   for (const char* store : {"ha", "scan"}) {
     expect_same({"voxelize", kKnot, "-r", "100", "--store", store}, ".npy");
