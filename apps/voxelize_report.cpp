@@ -6,6 +6,7 @@
 #include "apps/choice_words.h"
 #include "apps/json_writer.h"
 #include "core/memory.h"
+#include "core/printable.h"
 
 namespace strata::apps {
 namespace {
@@ -155,7 +156,7 @@ std::string voxelize_text(const VoxelizeCommand& command, const VoxelizeOutcome&
   };
   for (const InputFacts& file : outcome.input.files) {
     line("input",
-         fmt::format("{}: {} triangles, {} vertices, {}{}", file.path,
+         fmt::format("{}: {} triangles, {} vertices, {}{}", printable(file.path),
                      grouped(file.stats.triangles), grouped(file.stats.vertices),
                      file.closed ? "closed" : "open", file.turned_around ? ", turned around" : ""));
   }

@@ -423,7 +423,7 @@ TEST_F(Voxelize, TheFormatOfAPipeIsNotThatOfFilesBesideIt) {
         << untold.err;
   }
   // Without a pipe it is that of all files.
-  const RunResult wrong = run({"other.obj", "--input-format", "stl"});
+  const RunResult wrong = run({"other.obj", "--input-format", "ply"});
   EXPECT_EQ(wrong.exit_code, 3) << wrong.err;
 }
 
