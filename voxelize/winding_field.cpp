@@ -15,8 +15,8 @@
 // G. Barill, N. G. Dickson, R. Schmidt, D. I. W. Levin, A. Jacobson: Fast Winding Numbers for Soups
 // and Clouds, 2018: far triangles as dipoles.
 //
-// We differ: the mesh itself is never summed up, only its caps are; cubes of voxels in which the sum
-// keeps away from halves are done as a whole; and far dipoles are a series around a cube.
+// We differ: the mesh itself is never summed up, only its caps are; cubes of voxels in which the
+// sum keeps away from halves are done as a whole; and far dipoles are a series around a cube.
 
 namespace strata {
 namespace {
