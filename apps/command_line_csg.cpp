@@ -23,6 +23,8 @@ constexpr const char* kCsgExamples =
 
 In --expr, + and | unite, - takes away, * and & intersect and bind first, ^ is in one of the two.
 A .scad file that sets $vpr, $vpt, $vpd or $vpf places the camera; --camera overrules it.
+OpenSCAD's options have a block below; --imgsize, --camera, --viewall, --autocenter, --projection,
+--colorscheme, --render and --hardwarnings are OpenSCAD's, too.
 )";
 
 using Group = const char*;
@@ -60,7 +62,7 @@ void define_openscad(CLI::App& app, CsgWords& csg) {
                  "N pictures with $t = 0, 1/N, ...: -o a.png makes a00000.png, a00001.png, ...")
       ->type_name("N")
       ->group(kOpenscadGroup);
-  app.add_option("--export-format", csg.export_format, "png")
+  app.add_option("--export-format", csg.export_format, "png: what -o writes")
       ->type_name("FORMAT")
       ->group(kOpenscadGroup);
   app.add_flag("--summary{all}", csg.summary, "Print the report as text, beside a picture")
