@@ -25,11 +25,12 @@
 namespace strata {
 namespace {
 
-constexpr int kMostCells = 64;            // a side
-constexpr double kFacing = 0.5;           // a face looks along an axis: 60 degrees
-constexpr double kOpposite = -0.985;      // two look opposite ways: 10 degrees
-constexpr double kNoThickness = 1e-6;     // voxels
-constexpr std::size_t kBlock = 1u << 14;  // triangles a task
+constexpr int kMostCells = 64;             // a side
+constexpr double kFacing = 0.5;            // a face looks along an axis: 60 degrees
+constexpr double kOpposite = -0.985;       // two look opposite ways: 10 degrees
+constexpr double kNoThickness = 1e-6;      // voxels
+constexpr double kMostColumns = 1u << 17;  // looked at closely along an axis, about
+constexpr std::size_t kBlock = 1u << 14;   // triangles a task
 
 /// Bits of a cell: along axis a, faces that are entered are 1 << 2 a, those that are left 2 << 2 a.
 using Sides = std::uint8_t;
@@ -312,8 +313,9 @@ class WallSearch {
     return (depth + kLatticeSteps / 2) >> kLatticeBits;
   }
 
-  /// The tiles in which sampled rays find walls that they may lose.
-  std::vector<char> sample(Axis axis) const {
+  /// The tiles in which sampled rays find walls that they may lose. Says how far apart walk() takes
+  /// columns.
+  std::vector<char> sample(Axis axis) {
     const RasterTarget target = raster_target(grid_, axis);
     const int tiles_u = (target.width + kTileSide - 1) / kTileSide,
               tiles_v = (target.height + kTileSide - 1) / kTileSide;
@@ -328,6 +330,7 @@ class WallSearch {
       return std::tie(a.column, a.depth, a.exit, a.triangle) <
              std::tie(b.column, b.depth, b.exit, b.triangle);
     });
+    std::size_t walls = 0;
     for (std::size_t i = 1; i < hits.size(); ++i) {
       const Hit &in = hits[i - 1], &out = hits[i];
       if (in.column != out.column || in.exit || !out.exit || voxel(in.depth) != voxel(out.depth)) {
@@ -337,8 +340,13 @@ class WallSearch {
       const int u = sampled(row, static_cast<int>(out.column) % (kMostCells + 1));
       char& tile = tiles[static_cast<std::size_t>(row * step_ / kTileSide * tiles_u) +
                          static_cast<std::size_t>(u / kTileSide)];
-      if (tile == 0 && is_wall(in.triangle, out.triangle, static_cast<int>(axis))) tile = 1;
+      if (!is_wall(in.triangle, out.triangle, static_cast<int>(axis))) continue;
+      tile = 1;
+      ++walls;
     }
+    int& apart = apart_[static_cast<std::size_t>(axis)];
+    const double columns = static_cast<double>(walls) * step_ * step_;
+    while (2 * apart <= step_ && columns > kMostColumns * apart * apart) apart *= 2;
     return tiles;
   }
 
@@ -395,25 +403,32 @@ class WallSearch {
     std::mutex mutex;
     Result<void> status;
     std::vector<std::vector<Miss>> parts(chosen.size());
-    parallel_for(execution_, chosen.size(), [&](std::size_t i, int) {
+    struct Worker {
+      ItemTileBuilder builder;
+      std::unique_ptr<TileListFilter::Worker> filter;
+      std::vector<DepthItem> list;
+    };
+    std::vector<Worker> workers(static_cast<std::size_t>(execution_.thread_count()));
+    parallel_for(execution_, chosen.size(), [&](std::size_t i, int index) {
+      Worker& worker = workers[static_cast<std::size_t>(index)];
       const int tu = static_cast<int>(chosen[i]) % bins->tiles_u,
                 tv = static_cast<int>(chosen[i]) / bins->tiles_u;
-      ItemTileBuilder builder;
-      const auto built = builder.build(lattice_, target, bins->tile(tu, tv), tu, tv);
+      const auto built = worker.builder.build(lattice_, target, bins->tile(tu, tv), tu, tv);
       if (!built) {
         const std::lock_guard lock(mutex);
         if (status) status = tl::unexpected(built.error());
         return;
       }
-      const auto worker = options_.filter != nullptr ? options_.filter->worker() : nullptr;
-      const TileLists<DepthItem> lists = worker ? worker->apply(*built) : *built;
-      std::vector<DepthItem> list;
+      if (options_.filter != nullptr && !worker.filter) worker.filter = options_.filter->worker();
+      const TileLists<DepthItem> lists = worker.filter ? worker.filter->apply(*built) : *built;
+      const int apart = apart_[static_cast<std::size_t>(axis)];
       for (std::size_t pixel = 0; pixel < kTilePixels; ++pixel) {
-        list.clear();
-        for_each_item(lists, pixel, [&](DepthItem item) { list.push_back(item); });
-        walk_column(list, axis, tu * kTileSide + static_cast<int>(pixel) % kTileSide,
-                    tv * kTileSide + static_cast<int>(pixel) / kTileSide, target.depth_limit,
-                    parts[i]);
+        const int u = tu * kTileSide + static_cast<int>(pixel) % kTileSide,
+                  v = tv * kTileSide + static_cast<int>(pixel) / kTileSide;
+        if (u % apart != 0 || v % apart != 0) continue;
+        worker.list.clear();
+        for_each_item(lists, pixel, [&](DepthItem item) { worker.list.push_back(item); });
+        walk_column(worker.list, axis, u, v, target.depth_limit, parts[i]);
       }
     });
     if (!status) return status;
@@ -465,7 +480,9 @@ class WallSearch {
   /// Whether 2 x 2 columns stand together; `misses` are of one wall and axis, sorted by v, u.
   [[nodiscard]] bool is_wide(std::span<const Miss> misses) const {
     const AxisFrame frame(static_cast<Axis>(misses.front().axis));
-    const int du = grid_.dims[frame.u] > 1 ? 1 : 0, dv = grid_.dims[frame.v] > 1 ? 1 : 0;
+    const int apart = apart_[static_cast<std::size_t>(frame.w)];
+    const int du = grid_.dims[frame.u] > apart ? apart : 0,
+              dv = grid_.dims[frame.v] > apart ? apart : 0;
     const auto has = [&](int u, int v) {
       const auto at = std::lower_bound(
           misses.begin(), misses.end(), std::pair(v, u),
@@ -479,13 +496,14 @@ class WallSearch {
 
   [[nodiscard]] LostWall measure(std::span<const Miss> misses) const {
     const AxisFrame frame(static_cast<Axis>(misses.front().axis));
+    const int apart = apart_[static_cast<std::size_t>(frame.w)];
     LostWall wall;
     wall.axis = static_cast<Axis>(frame.w);
     wall.low = glm::dvec3(INFINITY), wall.high = glm::dvec3(-INFINITY);
     for (const Miss& miss : misses) {
       glm::dvec3 low, high;
-      low[frame.u] = miss.u, high[frame.u] = miss.u + 1;
-      low[frame.v] = miss.v, high[frame.v] = miss.v + 1;
+      low[frame.u] = miss.u, high[frame.u] = std::min(miss.u + apart, grid_.dims[frame.u]);
+      low[frame.v] = miss.v, high[frame.v] = std::min(miss.v + apart, grid_.dims[frame.v]);
       low[frame.w] = miss.low, high[frame.w] = miss.high;
       wall.low = glm::min(wall.low, low);
       wall.high = glm::max(wall.high, high);
@@ -493,7 +511,7 @@ class WallSearch {
     }
     wall.low = grid_.origin + wall.low * grid_.voxel_size;
     wall.high = grid_.origin + wall.high * grid_.voxel_size;
-    wall.columns = misses.size();
+    wall.columns = misses.size() * static_cast<std::size_t>(apart * apart);
     return wall;
   }
 
@@ -534,9 +552,10 @@ class WallSearch {
   const VoxelGrid& grid_;
   const LostWallOptions& options_;
   Execution execution_;
-  int step_ = 1;              ///< voxels along a cell, and columns between sampled ones
-  glm::ivec3 cells_;          ///< along each axis
-  glm::dvec3 scale_, shift_;  ///< world to cells
+  std::array<int, 3> apart_{1, 1, 1};  ///< columns that walk() takes of each axis: every so many
+  int step_ = 1;                       ///< voxels along a cell, and columns between sampled ones
+  glm::ivec3 cells_;                   ///< along each axis
+  glm::dvec3 scale_, shift_;           ///< world to cells
   std::size_t count_ = 0;
   std::unique_ptr<Sides[], Free> sides_;  ///< of each cell; memory that nobody writes costs nothing
   std::vector<std::pair<std::uint32_t, Sides>> near_;  ///< triangles, and axes

@@ -19,8 +19,8 @@ struct LostWall {
   Axis axis = Axis::kZ;  ///< that it is thin along
   /// World space: the box of the columns along `axis` that pass through it between two centres.
   glm::dvec3 low{0.0}, high{0.0};
-  double thickness = 0.0;  ///< greatest, along the axis, in voxels
-  std::uint64_t columns = 0;
+  double thickness = 0.0;     ///< greatest, along the axis, in voxels
+  std::uint64_t columns = 0;  ///< about, where there are millions
 };
 
 struct LostWalls {
