@@ -9,9 +9,6 @@
 namespace strata::csg {
 namespace {
 
-/// More would be a typing mistake, and gigabytes.
-constexpr double kMostTriangles = 100e6;
-
 /// No argument stands there.
 constexpr auto kNamedOnly = std::numeric_limits<std::uint32_t>::max();
 
@@ -73,13 +70,16 @@ void Evaluator::leaf(std::uint32_t node, const Context& context) {
   }
 }
 
-/// One mesh for all primitives with these arguments.
+/// One mesh for all primitives with these arguments; none if it is beyond the limits.
 template <class Make>
 std::shared_ptr<const TriangleSoup> Evaluator::primitive(std::uint32_t node,
-                                                         std::vector<double> key,
-                                                         const Make& make) {
+                                                         std::vector<double> key, double segments,
+                                                         double triangles, const Make& make) {
   auto& mesh = primitives_[{name(node), std::move(key)}];
-  if (!mesh) mesh = std::make_shared<const TriangleSoup>(make());
+  if (mesh || !fits(node, fmt::format("{:g} segments", segments), triangles, Made::kTriangles)) {
+    return mesh;
+  }
+  mesh = std::make_shared<const TriangleSoup>(make());
   return mesh;
 }
 
@@ -90,7 +90,7 @@ void Evaluator::cube(std::uint32_t node, const Context& context) {
     if (!is_length(node, "a size", size[i])) return;
   }
   const bool centre = arguments(node).find("center", 1).truth(false);
-  add_solid(node, context, primitive(node, {size.x, size.y, size.z, double(centre)}, [&] {
+  add_solid(node, context, primitive(node, {size.x, size.y, size.z, double(centre)}, 4, 12, [&] {
               return make_cube(size, centre);
             }));
 }
@@ -99,15 +99,10 @@ void Evaluator::sphere(std::uint32_t node, const Context& context) {
   const double radius = this->radius(node, "r", "d", 0, 1.0);
   if (!is_length(node, "the radius", radius)) return;
   const Segments round = segments(node);
-  if (sphere_triangle_count(radius, round) > kMostTriangles) {
-    return stop(
-        ErrorCode::kLimit, node,
-        fmt::format("a sphere of {} segments would have {:.3g} triangles; the limit is {:g}",
-                    round.count(radius), sphere_triangle_count(radius, round), kMostTriangles));
-  }
-  add_solid(node, context, primitive(node, {radius, double(round.count(radius))}, [&] {
-              return make_sphere(radius, round);
-            }));
+  const double count = round.count(radius);
+  add_solid(node, context,
+            primitive(node, {radius, count}, count, sphere_triangle_count(radius, round),
+                      [&] { return make_sphere(radius, round); }));
 }
 
 void Evaluator::cylinder(std::uint32_t node, const Context& context) {
@@ -122,9 +117,9 @@ void Evaluator::cylinder(std::uint32_t node, const Context& context) {
   }
   const bool centre = given.find("center", 3).truth(false);
   const Segments round = segments(node);
-  const int count = round.count(std::max(radius1, radius2));
+  const double count = round.count(std::max(radius1, radius2));
   add_solid(node, context,
-            primitive(node, {height, radius1, radius2, double(centre), double(count)},
+            primitive(node, {height, radius1, radius2, double(centre), count}, count, 4.0 * count,
                       [&] { return make_cylinder(height, radius1, radius2, centre, round); }));
 }
 
@@ -176,7 +171,10 @@ void Evaluator::square(std::uint32_t node, const Context& context) {
 void Evaluator::circle(std::uint32_t node, const Context& context) {
   const double radius = this->radius(node, "r", "d", 0, 1.0);
   if (!is_length(node, "the radius", radius)) return;
-  add_outline(node, context, make_circle(radius, segments(node)));
+  const Segments round = segments(node);
+  const double count = round.count(radius);
+  if (!fits(node, fmt::format("{:g} segments", count), count, Made::kPoints)) return;
+  add_outline(node, context, make_circle(radius, round));
 }
 
 void Evaluator::polygon(std::uint32_t node, const Context& context) {
@@ -227,6 +225,13 @@ void Evaluator::text(std::uint32_t node, const Context& context) {
   options.halign = given.find("halign").string(options.halign);
   options.valign = given.find("valign").string(options.valign);
   options.segments = segments(node);
+  // A letter has about twenty curves, each an eighth of a circle or less.
+  const double count = options.segments.count(options.size);
+  const double points = 20.0 * static_cast<double>(options.text.size()) * (count / 8 + 1);
+  if (!fits(node, fmt::format("{} bytes with {:g} segments a circle", options.text.size(), count),
+            points, Made::kPoints)) {
+    return;
+  }
   std::string missing;
   auto outline = make_text(options, missing, &job_);
   if (!outline) {

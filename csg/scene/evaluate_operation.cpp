@@ -114,6 +114,11 @@ TriangleSoup Evaluator::boundary_mesh(std::uint32_t node, Tree::NodeId solid) {
 void Evaluator::hull(Frame& frame) {
   const TriangleSoup mesh = boundary_mesh(frame.node, united_solid(frame.base));
   if (error_ || mesh.positions.empty()) return;
+  const auto points = static_cast<double>(mesh.positions.size());
+  if (!fits(frame.node, fmt::format("{} points", mesh.positions.size()), 2.0 * points,
+            Made::kTriangles)) {
+    return;
+  }
   auto hull = convex_hull(mesh.positions, execution_.stop);
   if (!hull) return leave_out(frame.node, "geometry", hull.error(), "the hull is left out");
   add_solid(frame.node, frame.outside, *std::move(hull));
@@ -302,16 +307,13 @@ void Evaluator::linear_extrude(Frame& frame) {
                             "finite; it is left out",
                             options.twist, options.scale.x, options.scale.y));
   }
-  SliceCount slices;
-  TriangleSoup mesh = csg::linear_extrude(outline, options, &slices, &job_);
+  const ExtrusionSize size = size_of(outline, options);
+  const std::string of = fmt::format("{:g} slices (twist {:g}, $fn {:g})", size.steps,
+                                     options.twist, options.segments.fn);
+  if (!fits(frame.node, of, size.triangles, Made::kTriangles)) return;
+  TriangleSoup mesh = csg::linear_extrude(outline, options, &job_);
   if (job_ended(frame.node)) return;
   add_solid(frame.node, frame.outside, std::move(mesh));
-  if (static_cast<double>(slices.made) < slices.wanted) {
-    warn(frame.node, "approximate",
-         fmt::format("'linear_extrude': it would take {:g} slices (twist {:g}, $fn {:g}), {} are "
-                     "made",
-                     slices.wanted, options.twist, options.segments.fn, slices.made));
-  }
 }
 
 void Evaluator::rotate_extrude(Frame& frame) {
@@ -328,6 +330,10 @@ void Evaluator::rotate_extrude(Frame& frame) {
   options.start = given.number("start", full ? 180.0 : 0.0);
   options.round_up = newer_;
   options.segments = segments(frame.node);
+  const ExtrusionSize size = size_of(outline, options);
+  if (!fits(frame.node, fmt::format("{:g} steps", size.steps), size.triangles, Made::kTriangles)) {
+    return;
+  }
   auto mesh = csg::rotate_extrude(outline, options, &job_);
   if (!mesh) {
     return leave_out(frame.node, "geometry", mesh.error(), "the 'rotate_extrude' is left out");
@@ -380,6 +386,14 @@ void Evaluator::flat_operation(Frame& frame) {
         return warn(frame.node, "geometry",
                     fmt::format("'offset' by {:g}, which must be less than {:g}; it is left out",
                                 by, kMostCoordinate));
+      }
+      if (!delta.is_number()) {
+        const Segments round = segments(frame.node);
+        const double points = offset_point_count(outline, by, round);
+        if (!fits(frame.node, fmt::format("{} segments", round.count(std::abs(by))), points,
+                  Made::kPoints)) {
+          return;
+        }
       }
       outline = delta.is_number() ? offset_delta(outline, by, given.truth("chamfer", false), &job_)
                                   : offset_round(outline, by, segments(frame.node), &job_);

@@ -42,6 +42,32 @@ void Evaluator::stop(ErrorCode code, std::uint32_t node, std::string_view text) 
             code == ErrorCode::kCancelled ? shown : fmt::format("{}: {}", place(node), shown)};
 }
 
+bool Evaluator::fits(std::uint32_t node, std::string_view of, double count, Made made) {
+  // A triangle with its half of a vertex, in the mesh and in what shows it; a point of an outline
+  // with Clipper's edges around it.
+  const bool flat = made == Made::kPoints;
+  const double each = flat ? 200.0 : 64.0, most = flat ? 20e6 : 100e6;
+  const std::string_view unit = flat ? "points" : "triangles";
+  const double bytes = count * each;
+  if (!(count <= most)) {
+    stop(ErrorCode::kLimit, node,
+         fmt::format("'{}' of {} would have {:.3g} {}; the limit is {:g}", name(node), of, count,
+                     unit, most));
+    return false;
+  }
+  if (execution_.memory_limit > 0 &&
+      made_bytes_ + bytes > static_cast<double>(execution_.memory_limit)) {
+    stop(ErrorCode::kLimit, node,
+         fmt::format("'{}' of {} would have {:.3g} {}; with what the scene has so far they take "
+                     "about {:.3g} GB, the memory limit is {:.3g} GB",
+                     name(node), of, count, unit, (made_bytes_ + bytes) / 1e9,
+                     static_cast<double>(execution_.memory_limit) / 1e9));
+    return false;
+  }
+  if (!flat) made_bytes_ += bytes;
+  return true;
+}
+
 void Evaluator::leave_out(std::uint32_t node, std::string code, const Error& error,
                           std::string_view what) {
   if (error.code == ErrorCode::kLimit || error.code == ErrorCode::kCancelled) {

@@ -105,6 +105,7 @@ class Evaluator {
   void leaf(std::uint32_t node, const Context& context);
   template <class Make>
   std::shared_ptr<const TriangleSoup> primitive(std::uint32_t node, std::vector<double> key,
+                                                double segments, double triangles,
                                                 const Make& make);
   void cube(std::uint32_t node, const Context& context);
   void sphere(std::uint32_t node, const Context& context);
@@ -174,6 +175,11 @@ class Evaluator {
                                        Tree& to);
   void warn(std::uint32_t node, std::string code, std::string_view text);
   void stop(ErrorCode code, std::uint32_t node, std::string_view text);
+  /// What a node makes, as far as limits go.
+  enum class Made { kTriangles, kPoints };
+  /// Before a node makes so many: whether they are within the limits. Else the run ends.
+  /// @param of  what they come from: "360 segments"
+  [[nodiscard]] bool fits(std::uint32_t node, std::string_view of, double count, Made made);
   /// Warns that the error leaves something out: `error; what`. What a limit, the memory's above
   /// all, or the user has stopped ends the whole run: another picture would be wrong.
   void leave_out(std::uint32_t node, std::string code, const Error& error, std::string_view what);
@@ -193,6 +199,7 @@ class Evaluator {
   bool newer_ = false;               ///< the dialect after 2021.01
   Scene scene_;
   std::uint32_t walk_first_ = 0, walk_end_ = 0;  ///< nodes
+  double made_bytes_ = 0;                        ///< of the meshes so far, estimated
   double reported_ = 0;                          ///< progress
   std::vector<Frame> frames_;
   std::vector<Operand> operands_;

@@ -13,7 +13,7 @@ namespace strata::csg {
 namespace {
 
 /// No more vertices than this: absurd numbers of slices are cut down to it.
-constexpr std::size_t kMostVertices = std::size_t{1} << 26;
+constexpr std::size_t kMostVertices = std::size_t{1} << 28;
 
 using Contour = std::vector<glm::dvec2>;
 
@@ -289,8 +289,24 @@ bool too_large(double vertices, double triangles, const char* what, OutlineJob* 
 
 }  // namespace
 
-TriangleSoup linear_extrude(const Outline& raw, const LinearExtrude& given, SliceCount* count,
-                            OutlineJob* job) {
+ExtrusionSize size_of(const Outline& outline, const LinearExtrude& options) {
+  const double slices = slice_count(outline, options);
+  const bool bent = options.twist != 0 || options.scale.x != options.scale.y;
+  const Segments& s = options.segments;
+  double divided = 0;  // points that a contour is divided into
+  if (options.outline_segments > 0) {
+    divided = options.outline_segments;
+  } else if (options.divide_outline && bent && s.fn > 0) {
+    divided = std::min(s.fn, 1e6);
+  }
+  double points = 0;
+  for (const Contour& contour : outline.contours) {
+    points += std::max(divided, static_cast<double>(contour.size()));
+  }
+  return {slices, 2.0 * points * (slices + 1.0)};
+}
+
+TriangleSoup linear_extrude(const Outline& raw, const LinearExtrude& given, OutlineJob* job) {
   LinearExtrude options = given;
   options.scale = glm::max(options.scale, glm::dvec2(0));
   const glm::dvec3 way = options.direction * options.height;
@@ -301,7 +317,7 @@ TriangleSoup linear_extrude(const Outline& raw, const LinearExtrude& given, Slic
     return {};
   }
   const double wanted = slice_count(raw, options);
-  auto slices = static_cast<std::size_t>(std::min(wanted, 1e6));
+  const auto slices = static_cast<std::size_t>(std::min(wanted, double{kMostVertices}));
   const auto parts = divide_edges(raw, options, slices);
   Outline outline;
   std::size_t stride = 0;
@@ -309,9 +325,7 @@ TriangleSoup linear_extrude(const Outline& raw, const LinearExtrude& given, Slic
     outline.contours.push_back(divided(raw.contours[i], parts[i]));
     stride += outline.contours.back().size();
   }
-  if (stride == 0 || stride > kMostVertices) return {};
-  slices = std::clamp<std::size_t>(slices, 1, std::max<std::size_t>(kMostVertices / stride, 2) - 1);
-  if (count) *count = {wanted, slices};
+  if (stride == 0 || stride > kMostVertices / (slices + 1)) return {};
   const double walls = static_cast<double>(stride) * static_cast<double>(slices);
   if (too_large(walls + static_cast<double>(stride), 2 * walls, "linear_extrude", job)) return {};
 
@@ -376,9 +390,31 @@ TriangleSoup linear_extrude(const Outline& raw, const LinearExtrude& given, Slic
 TriangleSoup make_slab(const Outline& outline, double low, double high, OutlineJob* job) {
   LinearExtrude options;
   options.height = high - low;
-  TriangleSoup mesh = linear_extrude(outline, options, nullptr, job);
+  TriangleSoup mesh = linear_extrude(outline, options, job);
   for (glm::dvec3& p : mesh.positions) p.z = p.z > 0 ? high : low;
   return mesh;
+}
+
+namespace {
+
+/// Steps around the axis for an outline of this width.
+double step_count(double width, const RotateExtrude& options) {
+  const double angle =
+      std::isfinite(options.angle) ? std::min(std::abs(options.angle), 360.0) : 360;
+  const double steps = options.segments.count(width) * angle / 360.0;
+  return std::max(options.round_up ? std::ceil(steps) : std::floor(steps), 1.0);
+}
+
+}  // namespace
+
+ExtrusionSize size_of(const Outline& outline, const RotateExtrude& options) {
+  double low = 0, high = 0, points = 0;
+  for (const Contour& contour : outline.contours) {
+    points += static_cast<double>(contour.size());
+    for (const glm::dvec2& p : contour) low = std::min(low, p.x), high = std::max(high, p.x);
+  }
+  const double steps = step_count(high - low, options);
+  return {steps, 2.0 * points * (steps + 1.0)};
 }
 
 Result<TriangleSoup> rotate_extrude(const Outline& outline, const RotateExtrude& options,
@@ -399,10 +435,11 @@ Result<TriangleSoup> rotate_extrude(const Outline& outline, const RotateExtrude&
   if (angle == 0) return TriangleSoup{};
   const bool full = std::abs(angle) >= 360;
   const double turn = full ? 360.0 : angle;
-  const double steps = options.segments.count(high - low) * std::abs(turn) / 360.0;
-  auto fragments = static_cast<std::size_t>(
-      std::max(options.round_up ? std::ceil(steps) : std::floor(steps), 1.0));
-  fragments = std::min(fragments, std::max<std::size_t>(kMostVertices / stride, 2) - 1);
+  const auto fragments = static_cast<std::size_t>(step_count(high - low, options));
+  if (stride > kMostVertices / (fragments + 1)) {
+    return fail(ErrorCode::kLimit, "rotate_extrude: {} steps of {} points; the limit is {} in all",
+                fragments, stride, kMostVertices);
+  }
 
   const double walls = static_cast<double>(stride) * static_cast<double>(fragments);
   if (too_large(walls, 2 * walls, "rotate_extrude", job)) return tl::unexpected(*job->error);

@@ -25,7 +25,7 @@ struct CloseFile {
 using File = std::unique_ptr<std::FILE, CloseFile>;
 
 /// One run of Qhull; its memory goes with it. What Qhull prints goes to a file that keeps nothing:
-/// with each line, one every few thousand facets, it asks for a stop and sets Qhull's own end.
+/// with each line, one every fifty facets, it asks for a stop and sets Qhull's own end.
 class Run {
  public:
   explicit Run(const std::stop_token& stop) : stop_(stop) {
@@ -112,7 +112,7 @@ Result<TriangleSoup> make_hull(std::span<const glm::dvec3> points, EdgeCollector
   Run run(stop);
   if (!run.output()) return fail(ErrorCode::kInternal, "no file for what Qhull prints");
   qhT* qh = run.get();
-  char command[] = "qhull Pp TF1000";
+  char command[] = "qhull Pp TF50";
   const int status = qh_new_qhull(qh, 3, static_cast<int>(points.size()), coordinates.data(), False,
                                   command, nullptr, run.output());
   if (run.stopped()) return fail(ErrorCode::kCancelled, "stopped");

@@ -67,6 +67,9 @@ Result<Outline> make_polygon(std::span<const glm::dvec2> points,
 /// Rounded joins with `segments` for a circle of the radius; negative shrinks.
 [[nodiscard]] Outline offset_round(const Outline& outline, double radius, const Segments& segments,
                                    OutlineJob* job = nullptr);
+/// Points that it makes at most, for limits: the joins of a contour turn as far as its corners.
+[[nodiscard]] double offset_point_count(const Outline& outline, double radius,
+                                        const Segments& segments);
 /// Mitered or chamfered joins.
 [[nodiscard]] Outline offset_delta(const Outline& outline, double delta, bool chamfer,
                                    OutlineJob* job = nullptr);
@@ -89,13 +92,16 @@ struct LinearExtrude {
   bool divide_outline = false;  ///< newer dialect: divide edges of twisted outlines
   Segments segments;
 };
-struct SliceCount {
-  double wanted = 0;
-  std::size_t made = 0;  ///< less where there would be more than a million, or too many vertices
+/// How many pieces an extrusion is made of, for limits.
+struct ExtrusionSize {
+  double steps = 0;      ///< slices, or steps around the axis
+  double triangles = 0;  ///< about
 };
-/// A closed mesh with shared vertices; empty for an empty outline or height <= 0.
+[[nodiscard]] ExtrusionSize size_of(const Outline& outline, const LinearExtrude& options);
+/// A closed mesh with shared vertices; empty for an empty outline or height <= 0, and beyond 2^28
+/// vertices.
 [[nodiscard]] TriangleSoup linear_extrude(const Outline& outline, const LinearExtrude& options,
-                                          SliceCount* count = nullptr, OutlineJob* job = nullptr);
+                                          OutlineJob* job = nullptr);
 
 struct RotateExtrude {
   double angle = 360;     ///< degrees
@@ -103,7 +109,9 @@ struct RotateExtrude {
   bool round_up = false;  ///< newer dialect: number of steps is rounded up
   Segments segments;
 };
-/// A closed mesh. @return kGeometry when the outline crosses the axis; the job's error
+[[nodiscard]] ExtrusionSize size_of(const Outline& outline, const RotateExtrude& options);
+/// A closed mesh. @return kLimit beyond 2^28 vertices; kGeometry when the outline crosses the axis;
+/// the job's error
 Result<TriangleSoup> rotate_extrude(const Outline& outline, const RotateExtrude& options,
                                     OutlineJob* job = nullptr);
 

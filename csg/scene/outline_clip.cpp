@@ -482,6 +482,21 @@ Outline offset_round(const Outline& outline, double radius, const Segments& segm
   return offset(outline, radius, ClipperLib::jtRound, segments.count(std::abs(radius)), job);
 }
 
+double offset_point_count(const Outline& outline, double radius, const Segments& segments) {
+  double points = 0.0, turned = 0.0;
+  for (const auto& contour : outline.contours) {
+    const std::size_t n = contour.size();
+    points += static_cast<double>(n);
+    for (std::size_t i = 0; i < n; ++i) {
+      const glm::dvec2 a = contour[(i + 1) % n] - contour[i];
+      const glm::dvec2 b = contour[(i + 2) % n] - contour[(i + 1) % n];
+      const double turn = std::atan2(a.x * b.y - a.y * b.x, a.x * b.x + a.y * b.y);
+      if (turn * radius > 0.0) turned += std::abs(turn);
+    }
+  }
+  return points + segments.count(std::abs(radius)) * turned / (2.0 * std::numbers::pi);
+}
+
 Outline offset_delta(const Outline& outline, double delta, bool chamfer, OutlineJob* job) {
   return offset(outline, delta, chamfer ? ClipperLib::jtSquare : ClipperLib::jtMiter, 0, job);
 }

@@ -262,7 +262,7 @@ TEST(Outline, JobsEndWithAStopOrALimit) {
   TextOptions text;
   text.text = "stop";
   EXPECT_FALSE(make_text(text, missing, &job));
-  EXPECT_TRUE(linear_extrude(lying, {}, nullptr, &job).triangles.empty());
+  EXPECT_TRUE(linear_extrude(lying, {}, &job).triangles.empty());
   EXPECT_FALSE(rotate_extrude(make_circle(1, {}), {}, &job));
 }
 

@@ -108,15 +108,53 @@ TEST(Arguments, AbsurdNumbersOfPiecesAreNamed) {
   };
   EXPECT_EQ(warning("cylinder(h=1,r1=1,r2=0,$fn=1e7);"),
             "test.csg:1:1: 'cylinder': $fn is 1e+07; 1e+06 is taken");
+}
+
+/// The message with which a scene is beyond a limit.
+std::string limit_of(const std::string& text, std::uint64_t memory_limit = 0) {
+  Execution execution;
+  execution.memory_limit = memory_limit;
+  const auto scene = parse_scene("cube();\n " + text, "test.csg", {}, execution);
+  EXPECT_FALSE(scene.has_value()) << text;
+  if (scene) return {};
+  EXPECT_EQ(scene.error().code, ErrorCode::kLimit) << text << scene.error().message;
+  return scene.error().message;
+}
+
+TEST(Arguments, WhatWouldBeTooLargeIsRefusedBeforeItIsMade) {
   const std::string triangle = " polygon([[0,0],[1,0],[0,1]]);";
   EXPECT_EQ(
-      warning("linear_extrude(height=1,center=false,scale=[1,1],twist=9,slices=1e9)" + triangle),
-      "test.csg:1:1: 'linear_extrude': it would take 1e+09 slices (twist 9, $fn 0), 1000000 "
-      "are made");
+      limit_of("linear_extrude(height=1,center=false,scale=[1,1],twist=9,slices=1e9)" + triangle),
+      "test.csg:2:2: 'linear_extrude' of 1e+09 slices (twist 9, $fn 0) would have 6e+09 triangles; "
+      "the limit is 1e+08");
   EXPECT_EQ(
-      warning("linear_extrude(height=1,center=false,scale=[1,1],twist=1e9,$fn=8)" + triangle),
-      "test.csg:1:1: 'linear_extrude': it would take 2.22222e+07 slices (twist 1e+09, $fn 8), "
-      "1000000 are made");
+      limit_of("linear_extrude(height=1,center=false,scale=[1,1],twist=1e9,$fn=8)" + triangle),
+      "test.csg:2:2: 'linear_extrude' of 2.22222e+07 slices (twist 1e+09, $fn 8) would have "
+      "1.33e+08 triangles; the limit is 1e+08");
+  EXPECT_EQ(limit_of("sphere($fn=20000);"),
+            "test.csg:2:2: 'sphere' of 20000 segments would have 4e+08 triangles; the limit is "
+            "1e+08");
+  EXPECT_EQ(limit_of("rotate_extrude($fn=1e5) multmatrix([[1,0,0,5],[0,1,0,0],[0,0,1,0],"
+                     "[0,0,0,1]]) circle($fn=1000);"),
+            "test.csg:2:2: 'rotate_extrude' of 100000 steps would have 2e+08 triangles; the limit "
+            "is 1e+08");
+  const std::uint64_t megabyte = 1'000'000;
+  EXPECT_EQ(limit_of("sphere($fn=1000);", 40 * megabyte),
+            "test.csg:2:2: 'sphere' of 1000 segments would have 1e+06 triangles; with what the "
+            "scene has so far they take about 0.0641 GB, the memory limit is 0.04 GB");
+  for (const std::string& made : std::initializer_list<std::string>{
+           "cylinder($fn=1e6);", "linear_extrude(height=1,twist=360,slices=1e6)" + triangle,
+           "rotate_extrude($fn=1e6)" + triangle, "hull() { sphere($fn=300); sphere($fn=500); }",
+           "circle($fn=1e6);", "offset(r=1,$fn=1e6) square(1);", "text(\"Strata\",$fn=100000);",
+           "minkowski() { difference() { sphere($fn=50); "
+           "cube([1,1,9],true); } sphere($fn=50); }"}) {
+    EXPECT_EQ(limit_of(made, 40 * megabyte).find("test.csg:2:2: '"), 0u) << made;
+  }
+  // What exists twice is one mesh.
+  Execution execution;
+  execution.memory_limit = 15 * megabyte;
+  EXPECT_TRUE(parse_scene("sphere($fn=400); sphere($fn=400);", "a", {}, execution).has_value());
+  EXPECT_FALSE(parse_scene("sphere($fn=400); sphere($fn=402);", "a", {}, execution).has_value());
 }
 
 TEST(Arguments, MatricesThatAreNoneAreNamed) {
