@@ -40,17 +40,19 @@ Result<MeshFile> read_binary(const ReaderInput& input) {
   }
   const std::uint64_t claimed = little_endian_32(data + 80);
   const std::uint64_t held = (size - kHeaderBytes) / kFacetBytes;
-  if (held == 0) {
-    if (claimed == 0) return fail(ErrorCode::kInput, "{}: no triangles", input.name);
+  if (held == 0 && claimed == 0) return fail(ErrorCode::kInput, "{}: no triangles", input.name);
+  // The size decides, unless the file ends in something that is no triangle: then what follows the
+  // claimed ones may all be that, or the file is cut off.
+  const std::size_t odd = (size - kHeaderBytes) % kFacetBytes;
+  const std::uint64_t count = claimed == 0 || odd == 0 ? held : claimed;
+  // Text of any other kind holds no zeros, triangles do.
+  const bool is_text =
+      input.text.substr(kHeaderBytes, 16 * kFacetBytes).find('\0') == std::string_view::npos;
+  if (count > held || (count != claimed && is_text)) {
     return fail(ErrorCode::kInput,
                 "{}: byte 80 claims {} triangles, which end at byte {}, but the file has {} bytes",
                 input.name, claimed, kHeaderBytes + kFacetBytes * claimed, size);
   }
-  // The size decides, unless the file ends in something that is no triangle: then what follows the
-  // claimed ones may all be that.
-  const std::size_t odd = (size - kHeaderBytes) % kFacetBytes;
-  const bool by_size = claimed == 0 || claimed > held || odd == 0;
-  const std::uint64_t count = by_size ? held : claimed;
   const std::size_t corners = 3 * count;
   if (corners > kMaxVertices || exceeds_limit(input.execution, count / 2, count)) {
     return fail(ErrorCode::kLimit, "{}: {} triangles are more than the memory limit or {} corners",

@@ -270,7 +270,7 @@ TEST_F(Csg, FlatScenesTogetherAreRenderedFromAboveLikeOne) {
 
 TEST_F(Csg, CoordinatesThatNoCameraReachesAreTheScenesFault) {
   place.write("huge.csg", "cube(size = [1e300, 1e300, 1e300]);");
-  EXPECT_TRUE(has(refused({"huge.csg", "-o", "out.png"}, 5), "too large for a picture"));
+  EXPECT_TRUE(has(refused({"huge.csg", "-o", "out.png"}, 5), "huge.csg:1:1: 'cube'"));
 }
 
 TEST_F(Csg, FilesThatAreNoScenesAreSaidToBeWhatTheyAre) {

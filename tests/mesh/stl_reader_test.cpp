@@ -63,12 +63,14 @@ TEST(StlReader, SizeDecidesWhereTheCountIsWrong) {
                     count, count == 1 ? "" : "s"));
     EXPECT_CONTAINS(refusal(kStl, bytes, true), "room for 12");
   }
-  // A part of a triangle at the end is none.
-  const MeshFile cut = parsed(kStl, whole.substr(0, 650));
-  EXPECT_EQ(cut.soup.triangles.size(), 11u);
-  ASSERT_EQ(cut.stats.warnings.size(), 2u);
-  EXPECT_CONTAINS(cut.stats.warnings[0], "claims 12 triangles, but the file has 650 bytes");
-  EXPECT_CONTAINS(cut.stats.warnings[1], "16 bytes after the 11 triangles");
+  // A file that ends within a triangle is cut off.
+  EXPECT_CONTAINS(refusal(kStl, whole.substr(0, 650)), "which end at byte 684");
+}
+
+TEST(StlReader, TextOfAnotherKindHasNoTriangles) {
+  // As long as one triangle, and as two.
+  EXPECT_CONTAINS(refusal(kStl, "o box\n" + std::string(128, 'v')), "claims");
+  EXPECT_CONTAINS(refusal(kStl, "o box\n" + std::string(178, 'v')), "claims");
 }
 
 TEST(StlReader, BinaryFilesWithoutATriangleAreRefused) {
