@@ -91,7 +91,12 @@ Result<void> Session::opened(std::span<const FileIdentity> files) const {
   return {};
 }
 
-Result<void> Session::commit_outputs() { return group_ ? group_->commit() : Result<void>(); }
+Result<void> Session::commit_outputs() {
+  if (!group_) return {};
+  auto done = group_->commit();
+  committed_ = committed_ || done.has_value();
+  return done;
+}
 
 int Session::threads() const {
   if (given_) return given_->thread_count();
@@ -154,12 +159,12 @@ Result<void> Session::check_strict() const {
 }
 
 void Session::complain(const Error& error) {
+  const char* written = committed_ ? "what was complete before stays" : "no output was written";
   if (timed_out()) {
-    return say("error: ",
-               fmt::format("not done within {:g} s (--time-limit); no output was written",
-                           options_.time_limit_s));
+    return say("error: ", fmt::format("not done within {:g} s (--time-limit); {}",
+                                      options_.time_limit_s, written));
   }
-  if (error.code == ErrorCode::kCancelled) return say("", "interrupted; no output was written");
+  if (error.code == ErrorCode::kCancelled) return say("", fmt::format("interrupted; {}", written));
   say("error: ", error.message);
 }
 

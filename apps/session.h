@@ -95,6 +95,7 @@ class Session {
   double shown_ = 0;  ///< of the bar
   std::vector<FileUse> outputs_;
   std::optional<OutputGroup> group_;
+  bool committed_ = false;  ///< some outputs have their names
   std::vector<Warning> warnings_;
   std::set<std::string> given_warnings_;
   std::atomic<bool> timed_out_{false};

@@ -223,6 +223,16 @@ TEST_F(Openscad, AnAnimationIsNumberedAsOpenscadNumbersIt) {
       0);
   EXPECT_EQ(place.read("a00002.png"), place.read("b.png"));
   EXPECT_NE(place.read("a00000.png"), place.read("a00001.png"));
+  RunOptions options;
+  options.while_running = [this](int tool) {
+    for (int i = 0; i < 3000 && !place.has("long00001.png"); ++i) usleep(10'000);
+    kill(tool, SIGTERM);
+  };
+  const RunResult cut =
+      place.run({"turn.scad", "--animate=9000", "-o", "long.png", "--size=9,9"}, options);
+  EXPECT_EQ(cut.exit_code, 130) << cut.err;
+  EXPECT_NE(cut.err.find("interrupted; what was complete before stays"), std::string::npos)
+      << cut.err;
 }
 
 }  // namespace
