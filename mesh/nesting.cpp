@@ -6,7 +6,9 @@
 #include <numeric>
 #include <tuple>
 
-#include "mesh/orient.h"
+#include "mesh/block_sum.h"
+#include "mesh/part_measures.h"
+#include "mesh/weld.h"
 
 // Which part of a mesh lies within which: a ray upwards from a point of each part, all rays at
 // once. The points are sorted into a grid in x, y; each triangle asks those that it may lie above.
@@ -128,6 +130,96 @@ std::vector<Winding> windings_around(const TriangleSoup& mesh,
   }
   found.resize(kept);
   return found;
+}
+
+namespace {
+
+constexpr std::uint32_t kNone = 0xffffffffu;
+
+/// A piece that shares no vertex with the others.
+struct Piece {
+  Wedge wedge;
+  Extent extent;
+};
+
+/// Whether all pieces that are not outward bound cavities of others.
+/// @param piece_of  of each triangle
+bool only_cavities(const TriangleSoup& mesh, std::vector<Piece>& pieces,
+                   std::vector<std::uint32_t>& piece_of) {
+  for (std::size_t t = 0; t < piece_of.size(); ++t) pieces[piece_of[t]].extent.include(mesh, t);
+  std::vector<std::uint32_t> order(pieces.size()), place(pieces.size());
+  std::iota(order.begin(), order.end(), 0u);
+  std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return std::abs(pieces[a].wedge.volume) > std::abs(pieces[b].wedge.volume);
+  });
+  std::vector<PartSample> samples;
+  for (const std::uint32_t piece : order) {
+    place[piece] = static_cast<std::uint32_t>(samples.size());
+    samples.push_back(pieces[piece].extent.sample());
+  }
+  for (std::uint32_t& piece : piece_of) piece = place[piece];
+  std::vector<int> around(pieces.size(), 0);
+  for (const Winding& winding :
+       windings_around(mesh, piece_of, std::vector<char>(piece_of.size(), 0), samples)) {
+    const double outer = std::abs(pieces[order[winding.part]].wedge.volume),
+                 inner = std::abs(pieces[order[winding.around]].wedge.volume);
+    if (outer > (1 + 1e-6) * inner) around[winding.around] += winding.times;
+  }
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const Wedge& wedge = pieces[order[i]].wedge;
+    if (!wedge.positive() && !(wedge.negative() && around[i] > 0)) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+bool all_outward(const TriangleSoup& mesh, std::span<const EdgeSum> by_index, bool all_positive,
+                 const Execution& execution) {
+  Sets sets(mesh.positions.size());
+  std::size_t joined = 0;
+  for (const glm::uvec3& t : mesh.triangles) {
+    if (sets.known_same(t.x, t.y, t.z)) continue;
+    joined += sets.join(t.x, t.y);
+    joined += sets.join(t.x, t.z);
+  }
+  if (joined + 1 == mesh.positions.size() && all_positive) return true;
+  if (!by_index.empty()) {
+    WeldTable<double> table(2 * by_index.size());
+    for (const EdgeSum& edge : by_index) {
+      for (const std::uint32_t end : {edge.low, edge.high}) {
+        const auto key = table.canonical(mesh.positions[end]);
+        sets.join(end, table.find_or_insert(key, table.hash(key), end));
+      }
+    }
+  }
+  const glm::dvec3 about = mesh.positions[mesh.triangles.front().x];
+  const std::uint32_t first = sets.find(mesh.triangles.front().x);
+  if (std::all_of(mesh.triangles.begin(), mesh.triangles.end(),
+                  [&](const glm::uvec3& t) { return sets.find(t.x) == first; })) {
+    return fold_blocks<Wedge>(
+               execution, mesh.triangles.size(),
+               [&](Wedge& sum, std::size_t t) { sum.add(mesh, t, about, false); },
+               [](Wedge& sum, const Wedge& part) {
+                 sum.volume += part.volume;
+                 sum.size += part.size;
+               })
+        .positive();
+  }
+  std::vector<Piece> pieces;
+  std::vector<std::uint32_t> number(mesh.positions.size(), kNone), piece_of(mesh.triangles.size());
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    std::uint32_t& piece = number[sets.find(mesh.triangles[t].x)];
+    if (piece == kNone) {
+      piece = static_cast<std::uint32_t>(pieces.size());
+      pieces.emplace_back();
+    }
+    piece_of[t] = piece;
+    pieces[piece].wedge.add(mesh, t, about, false);
+  }
+  return std::all_of(pieces.begin(), pieces.end(),
+                     [](const Piece& piece) { return piece.wedge.positive(); }) ||
+         only_cavities(mesh, pieces, piece_of);
 }
 
 }  // namespace strata::detail

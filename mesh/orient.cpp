@@ -15,6 +15,7 @@
 #include "mesh/diagnose.h"
 #include "mesh/edge_balance.h"
 #include "mesh/edge_uses.h"
+#include "mesh/part_measures.h"
 #include "mesh/soup_tools.h"
 #include "mesh/weld.h"
 
@@ -22,104 +23,9 @@ namespace strata {
 namespace {
 
 constexpr std::uint32_t kNone = 0xffffffffu;
-/// Volumes below this share of what they are summed of are none.
-constexpr double kNoVolume = 1e-9;
-
-/// Joins items; each set is known by its least one.
-class Sets {
- public:
-  explicit Sets(std::size_t count) : parent_(count) {
-    std::iota(parent_.begin(), parent_.end(), std::uint32_t{0});
-  }
-  std::uint32_t find(std::uint32_t i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];  // halves the path
-    return i;
-  }
-  /// At a glance: false may be wrong.
-  [[nodiscard]] bool known_same(std::uint32_t a, std::uint32_t b, std::uint32_t c) const {
-    return parent_[a] == parent_[b] && parent_[b] == parent_[c];
-  }
-  /// @return whether they were apart
-  bool join(std::uint32_t a, std::uint32_t b) {
-    a = find(a), b = find(b);
-    if (a < b) parent_[b] = a;
-    if (b < a) parent_[a] = b;
-    return a != b;
-  }
-
- private:
-  std::vector<std::uint32_t> parent_;
-};
-
-/// Six times the volume between a triangle and a point, and its size without the sign.
-struct Wedge {
-  double volume = 0.0, size = 0.0;
-  void add(const TriangleSoup& mesh, std::size_t t, const glm::dvec3& about, bool turned) {
-    const glm::dvec3 a = mesh.positions[mesh.triangles[t].x] - about,
-                     b = mesh.positions[mesh.triangles[t].y] - about,
-                     c = mesh.positions[mesh.triangles[t].z] - about;
-    const double six = glm::dot(a, glm::cross(b, c));
-    volume += turned ? -six : six;
-    size += std::abs(six);
-  }
-  [[nodiscard]] bool negative() const { return volume < -kNoVolume * size; }
-  [[nodiscard]] bool positive() const { return volume > kNoVolume * size; }
-};
-
-/// Whether every piece of a closed mesh that shares no vertex with the others has a volume above 0.
-/// @param by_index  edges that are balanced by position alone: their ends are one
-/// @param all_positive  it is known that all of the mesh has
-bool all_outward(const TriangleSoup& mesh, const std::vector<detail::EdgeSum>& by_index,
-                 bool all_positive, const Execution& execution) {
-  Sets sets(mesh.positions.size());
-  std::size_t joined = 0;
-  for (const glm::uvec3& t : mesh.triangles) {
-    if (sets.known_same(t.x, t.y, t.z)) continue;
-    joined += sets.join(t.x, t.y);
-    joined += sets.join(t.x, t.z);
-  }
-  if (joined + 1 == mesh.positions.size() && all_positive) return true;
-  if (!by_index.empty()) {
-    detail::WeldTable<double> table(2 * by_index.size());
-    for (const detail::EdgeSum& edge : by_index) {
-      for (const std::uint32_t end : {edge.low, edge.high}) {
-        const auto key = table.canonical(mesh.positions[end]);
-        sets.join(end, table.find_or_insert(key, table.hash(key), end));
-      }
-    }
-  }
-  const glm::dvec3 about = mesh.positions[mesh.triangles.front().x];
-  const std::uint32_t first = sets.find(mesh.triangles.front().x);
-  if (std::all_of(mesh.triangles.begin(), mesh.triangles.end(),
-                  [&](const glm::uvec3& t) { return sets.find(t.x) == first; })) {
-    return detail::fold_blocks<Wedge>(
-               execution, mesh.triangles.size(),
-               [&](Wedge& sum, std::size_t t) { sum.add(mesh, t, about, false); },
-               [](Wedge& sum, const Wedge& part) {
-                 sum.volume += part.volume;
-                 sum.size += part.size;
-               })
-        .positive();
-  }
-  std::vector<Wedge> wedges;
-  std::vector<std::uint32_t> piece_of(mesh.positions.size(), kNone);
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    std::uint32_t& piece = piece_of[sets.find(mesh.triangles[t].x)];
-    if (piece == kNone) {
-      piece = static_cast<std::uint32_t>(wedges.size());
-      wedges.emplace_back();
-    }
-    wedges[piece].add(mesh, t, about, false);
-  }
-  return std::all_of(wedges.begin(), wedges.end(), [](const Wedge& w) { return w.positive(); });
-}
-
-/// A triangle's positions, the least first, so that the order in the file does not matter.
-using Corners = std::array<glm::dvec3, 3>;
-
-bool less(const glm::dvec3& a, const glm::dvec3& b) {
-  return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z);
-}
+using detail::Extent;
+using detail::Sets;
+using detail::Wedge;
 
 struct Part {
   double kept = 0.0, against = 0.0;  ///< area of the triangles that agree with the first, or do not
@@ -127,9 +33,8 @@ struct Part {
   bool doubled = false;  ///< of second sides, so that the file tells no side
   bool turned = false;   ///< against its first triangle, in the end
   bool as_file = false;  ///< not mixed, and turned against the file
-  Bounds box;
+  Extent extent;
   Wedge wedge;
-  Corners least{};  ///< of the triangle whose positions are least
 };
 
 class Orienter {
@@ -384,27 +289,20 @@ class Orienter {
   }
 
   void measure() {
-    std::vector<Corners> least(parts_.size());
     for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) {
       if (part_of_[t] == kNone) continue;
       Part& part = parts_[part_of_[t]];
-      Corners corners{mesh_.positions[mesh_.triangles[t].x], mesh_.positions[mesh_.triangles[t].y],
-                      mesh_.positions[mesh_.triangles[t].z]};
-      const double twice =
-          glm::length(glm::cross(corners[1] - corners[0], corners[2] - corners[0]));
-      (turned_[t] != 0 ? part.against : part.kept) += twice;
-      const bool first = part.box.empty();
-      for (const glm::dvec3& corner : corners) part.box.include(corner);
-      std::sort(corners.begin(), corners.end(), less);
-      if (first || std::lexicographical_compare(corners.begin(), corners.end(), part.least.begin(),
-                                                part.least.end(), less)) {
-        part.least = corners;
-      }
+      const glm::uvec3 at = mesh_.triangles[t];
+      const glm::dvec3& a = mesh_.positions[at.x];
+      (turned_[t] != 0 ? part.against : part.kept) +=
+          glm::length(glm::cross(mesh_.positions[at.y] - a, mesh_.positions[at.z] - a));
+      part.extent.include(mesh_, t);
     }
     for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) {
       if (part_of_[t] == kNone) continue;
       Part& part = parts_[part_of_[t]];
-      part.wedge.add(mesh_, t, 0.5 * part.box.low + 0.5 * part.box.high, turned_[t] != 0);
+      const Bounds& box = part.extent.box;
+      part.wedge.add(mesh_, t, 0.5 * box.low + 0.5 * box.high, turned_[t] != 0);
     }
   }
 
@@ -440,10 +338,8 @@ class Orienter {
     });
     std::vector<detail::PartSample> samples(order.size());
     for (std::uint32_t i = 0; i < order.size(); ++i) {
-      const Part& part = parts_[order[i]];
       place[order[i]] = i;
-      samples[i] = {(part.least[0] + part.least[1] + part.least[2]) / 3.0, part.box.low,
-                    part.box.high};
+      samples[i] = parts_[order[i]].extent.sample();
     }
     std::vector<std::uint32_t> place_of(part_of_.size(), kNone);
     std::vector<char> turned(turned_);
@@ -480,7 +376,7 @@ class Orienter {
     bool even = true;
     for (const Part& part : parts_) {
       if (part.closed) continue;
-      box.include(part.box);
+      box.include(part.extent.box);
       even = false;
     }
     if (even || box.empty()) return;
@@ -547,14 +443,15 @@ Orientation orient_parts(TriangleSoup& mesh, const Execution& execution,
       detail::unbalanced_by_position<double>(by_index, std::span(std::as_const(mesh.positions)))
           .empty();
   if (mesh.triangles.size() >= std::size_t{1} << 31) return found;
-  if (found.closed && all_outward(mesh, by_index, options.positive, execution)) return found;
+  if (found.closed && detail::all_outward(mesh, by_index, options.positive, execution))
+    return found;
   by_index = {};
   Orienter orienter(mesh, execution);
   orienter.run(found);
   if (execution.stop.stop_requested() || !options.change) return found;
   if (!found.changed()) return found;
   orienter.apply();
-  found.closed = is_closed(mesh, execution);
+  if (!found.all_turned) found.closed = is_closed(mesh, execution);
   return found;
 }
 

@@ -63,26 +63,4 @@ Orientation orient_parts(TriangleSoup& mesh, const Execution& execution = {},
 /// `turned_open_volume`, which speak of the mesh. @param changed  OrientOptions::change
 [[nodiscard]] std::vector<std::string> sentences(const Orientation& found, bool changed);
 
-namespace detail {
-
-/// How often the surface of `part` winds around the sample of another one.
-struct Winding {
-  std::uint32_t around = 0, part = 0;
-  int times = 0;
-};
-
-/// Of each closed part: a point on it, and its box.
-struct PartSample {
-  glm::dvec3 point{0.0}, low{0.0}, high{0.0};
-};
-
-/// The windings that are not 0 of each part around the samples of those whose box its own box
-/// holds, sorted. @param part_of  of each triangle; those >= samples.size() do not count
-/// @param turned  triangles that count the other way around
-[[nodiscard]] std::vector<Winding> windings_around(const TriangleSoup& mesh,
-                                                   const std::vector<std::uint32_t>& part_of,
-                                                   const std::vector<char>& turned,
-                                                   const std::vector<PartSample>& samples);
-
-}  // namespace detail
 }  // namespace strata
