@@ -104,7 +104,7 @@ class Drawing {
     // OpenSCAD's grid, in units of the scene, takes in what lies up to 1.5 steps away.
     constexpr double kOpenScad = 1.5e-5;
     if (options_.scale == 0) return Outline{};
-    JoinedLines joined = joiner_.join(kOpenScad / std::abs(options_.scale));
+    JoinedLines joined = joiner_.join(kOpenScad / std::abs(options_.scale), execution_.stop);
     if (warnings) note_open(joined.open, *warnings);
     for (auto& path : joined.paths) {
       for (glm::dvec2& p : path) p = (p - options_.origin) * options_.scale;
@@ -448,7 +448,7 @@ class Drawing {
 Result<Outline> read_dxf(std::string_view text, const std::string& name,
                          const OutlineImport& options, const Execution& execution,
                          std::vector<std::string>* warnings) {
-  const auto file = parse_dxf(text, name);
+  const auto file = parse_dxf(text, name, execution.stop);
   if (!file) return tl::unexpected(file.error());
   if (!std::isfinite(options.scale) || !std::isfinite(options.origin.x) ||
       !std::isfinite(options.origin.y)) {

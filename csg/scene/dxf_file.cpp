@@ -58,8 +58,9 @@ class Parser {
  public:
   Parser(std::string_view text, const std::string& name) : groups_(text, name), name_(name) {}
 
-  Result<DxfFile> run() {
+  Result<DxfFile> run(const std::stop_token& stop) {
     while (true) {
+      if (stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
       auto group = groups_.next();
       if (!group) return tl::unexpected(group.error());
       if (group->code < 0) break;
@@ -161,14 +162,15 @@ Result<double> dxf_number(const DxfGroup& group, const std::string& name) {
   return value;
 }
 
-Result<DxfFile> parse_dxf(std::string_view text, const std::string& name) {
+Result<DxfFile> parse_dxf(std::string_view text, const std::string& name,
+                          const std::stop_token& stop) {
   if (text.starts_with("AutoCAD Binary DXF")) {
     return fail(ErrorCode::kInput, "{}: binary DXF is not read; save it as text", name);
   }
   if (detail::is_wide_text(text)) {
     return fail(ErrorCode::kInput, "{}: {}", name, detail::kWideText);
   }
-  return Parser(detail::without_byte_order_mark(text), name).run();
+  return Parser(detail::without_byte_order_mark(text), name).run(stop);
 }
 
 }  // namespace strata::csg

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <glm/vec2.hpp>
 #include <map>
+#include <stop_token>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -39,8 +40,9 @@ struct DxfFile {
 };
 
 /// Parses `text`, which must outlive the result; `name` is for messages. @return kInput naming file
-/// and line
-Result<DxfFile> parse_dxf(std::string_view text, const std::string& name);
+/// and line; kCancelled
+Result<DxfFile> parse_dxf(std::string_view text, const std::string& name,
+                          const std::stop_token& stop = {});
 
 /// A number as DXF writes it. @return kInput naming file and line: not a finite number
 Result<double> dxf_number(const DxfGroup& group, const std::string& name);

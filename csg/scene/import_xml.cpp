@@ -9,6 +9,7 @@
 #include <memory>
 #include <new>
 #include <optional>
+#include <stop_token>
 #include <string_view>
 #include <unordered_map>
 #include <unordered_set>
@@ -58,7 +59,8 @@ std::optional<double> read_number(std::string_view text) {
 
 class XmlMesh {
  public:
-  XmlMesh(const std::string& path, std::string text) : path_(path), text_(std::move(text)) {}
+  XmlMesh(const std::string& path, std::string text, std::stop_token stop = {})
+      : path_(path), text_(std::move(text)), stop_(std::move(stop)) {}
 
   Result<void> parse() {
     const pugi::xml_parse_result parsed = document_.load_buffer(text_.data(), text_.size());
@@ -78,6 +80,7 @@ class XmlMesh {
     return fail(code, "{}:{}: {}", path_, line(node.offset_debug()), text);
   }
   [[nodiscard]] const std::string& path() const { return path_; }
+  [[nodiscard]] bool stopped() const { return stop_.stop_requested(); }
 
   /// A corner of a triangle: an index below `count`.
   Result<std::uint32_t> corner(const pugi::xml_node& node, std::string_view text,
@@ -95,6 +98,7 @@ class XmlMesh {
 
   Result<void> add_triangle(TriangleSoup& mesh, const pugi::xml_node& node,
                             const std::string_view (&texts)[3], std::size_t first) const {
+    if (stopped()) return fail(ErrorCode::kCancelled, "stopped");
     glm::uvec3 triangle(0u);
     for (int i = 0; i < 3; ++i) {
       auto index = corner(node, texts[i], mesh.positions.size() - first);
@@ -116,6 +120,7 @@ class XmlMesh {
 
   std::string path_;
   std::string text_;
+  std::stop_token stop_;
   pugi::xml_document document_;
 };
 
@@ -141,6 +146,7 @@ Result<TriangleSoup> read_object_mesh(const XmlMesh& file, const pugi::xml_node&
   TriangleSoup mesh;
   for (const pugi::xml_node& vertex : child(node, "vertices").children()) {
     if (vertex.type() != pugi::node_element) continue;
+    if (file.stopped()) return fail(ErrorCode::kCancelled, "stopped");
     glm::dvec3 p;
     const char* const axes[] = {"x", "y", "z"};
     for (int i = 0; i < 3; ++i) {
@@ -276,7 +282,7 @@ class Package {
     auto text = archive_.read(name, execution_);
     if (!text) return tl::unexpected(text.error());
     auto made = std::make_unique<ModelPart>(
-        ModelPart{XmlMesh(archive_.path() + "/" + name, *std::move(text)), {}});
+        ModelPart{XmlMesh(archive_.path() + "/" + name, *std::move(text), execution_.stop), {}});
     if (auto parsed = made->file.parse(); !parsed) return tl::unexpected(parsed.error());
     for (const pugi::xml_node& object : child(made->file.root(), "resources").children()) {
       if (local_name(object) != "object") continue;
@@ -362,6 +368,9 @@ class Package {
                   "{}: the model has {} triangles and {} vertices in {} objects; the limit is {}",
                   archive_.path(), triangles, positions, instances_.size(), kMostTriangles);
     }
+    if (triangles == 0) {
+      return fail(ErrorCode::kInput, "{}: no build item has a triangle", archive_.path());
+    }
     const std::size_t bytes = positions * sizeof(glm::dvec3) + triangles * sizeof(glm::uvec3);
     if (execution_.memory_limit != 0 && bytes > execution_.memory_limit) {
       return fail(ErrorCode::kLimit, "{}: the model takes {} bytes, the memory limit is {}",
@@ -396,6 +405,7 @@ Result<void> read_amf_mesh(const XmlMesh& file, const pugi::xml_node& node, Tria
   for (const pugi::xml_node& vertex : child(node, "vertices").children()) {
     if (local_name(vertex) != "vertex") continue;
     const pugi::xml_node place = child(vertex, "coordinates");
+    if (file.stopped()) return fail(ErrorCode::kCancelled, "stopped");
     glm::dvec3 p;
     const char* const axes[] = {"x", "y", "z"};
     for (int i = 0; i < 3; ++i) {
@@ -448,7 +458,7 @@ Result<TriangleSoup> read_amf(const std::string& path, const Execution& executio
     if (!unpacked) return tl::unexpected(unpacked.error());
     text = *std::move(unpacked);
   }
-  XmlMesh file(path, std::move(text));
+  XmlMesh file(path, std::move(text), execution.stop);
   if (auto parsed = file.parse(); !parsed) return tl::unexpected(parsed.error());
   if (warnings) note_unit(file, *warnings);
   TriangleSoup all;
@@ -459,6 +469,7 @@ Result<TriangleSoup> read_amf(const std::string& path, const Execution& executio
       return tl::unexpected(read.error());
     }
   }
+  if (all.triangles.empty()) return fail(ErrorCode::kInput, "{}: no object has a triangle", path);
   return all;
 } catch (const std::bad_alloc&) {
   return fail(ErrorCode::kLimit, "{}: too large for the memory", path);

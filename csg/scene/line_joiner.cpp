@@ -17,6 +17,8 @@ using Index = std::uint32_t;
 /// Ends of lines in groups of those that are one point.
 class Points {
  public:
+  explicit Points(const std::stop_token& stop) : stop_(stop) {}
+
   void add(const glm::dvec2& p, double reach) {
     places_.push_back(p + 0.0);  // no negative zero
     reaches_.push_back(reach);
@@ -115,6 +117,7 @@ class Points {
                 order.end());
     for (const Index i : order) cells[cell_of(places_[i])].push_back(i);
     for (const Index i : order) {
+      if (stop_.stop_requested()) return;
       if (!wanted[i]) continue;
       const Cell middle = cell_of(places_[i]);
       for (std::int64_t x = middle.first - 1; x <= middle.first + 1; ++x) {
@@ -129,6 +132,7 @@ class Points {
     }
   }
 
+  const std::stop_token& stop_;
   std::vector<glm::dvec2> places_;  ///< the ends of line i are 2 i and 2 i + 1
   std::vector<double> reaches_;
   std::vector<Index> groups_;  ///< a tree for each group; its root stands for it
@@ -218,14 +222,16 @@ void LineJoiner::add(const glm::dvec2& from, const glm::dvec2& to, double reach,
   if (from != to) lines_.push_back({{from, to}, reach, tag});
 }
 
-JoinedLines LineJoiner::join(double tolerance) const {
-  Points points;
+JoinedLines LineJoiner::join(double tolerance, const std::stop_token& stop) const {
+  Points points(stop);
   for (const Line& line : lines_) {
     for (const glm::dvec2& end : line.ends) points.add(end, line.reach);
   }
   points.group_equal();
   points.unite_within(tolerance);
+  if (stop.stop_requested()) return {};
   points.unite_odd();
+  if (stop.stop_requested()) return {};
   std::vector<Walk::Line> lines;
   std::vector<Index> numbers(2 * lines_.size(), 0);  // of a group's root, from 1
   std::vector<glm::dvec2> places;

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <glm/vec2.hpp>
+#include <stop_token>
 #include <utility>
 #include <vector>
 
@@ -34,7 +35,8 @@ class LineJoiner {
   /// not shrink to a point. Paths that begin where a line is alone come first, then those that
   /// close by themselves. Each line is used once, earlier ones first, as OpenSCAD does: lines drawn
   /// twice cancel when the paths are filled by the even-odd rule.
-  [[nodiscard]] JoinedLines join(double tolerance) const;
+  /// What is left when a stop is asked for counts for nothing.
+  [[nodiscard]] JoinedLines join(double tolerance, const std::stop_token& stop = {}) const;
 
  private:
   struct Line {

@@ -156,7 +156,7 @@ bool better_mirrored(const Paths& paths) {
   return along_y * width > kMuch * along_x * height;
 }
 
-/// How many pairs of edges cross, from a sample of them.
+/// How many pairs of edges cross, from a sample of them; 0 where too few of the sample do.
 double estimate_crossings(const Paths& subject, const Paths& clip) {
   std::vector<std::pair<glm::dvec2, glm::dvec2>> edges;
   for (const Paths* paths : {&subject, &clip}) {
@@ -167,7 +167,7 @@ double estimate_crossings(const Paths& subject, const Paths& clip) {
       }
     }
   }
-  constexpr int kSamples = 200'000;
+  constexpr int kFirst = 20'000, kSamples = 200'000, kFewest = 10;
   std::uint64_t random = 1;
   const auto next = [&] {
     random = random * 6364136223846793005u + 1442695040888963407u;
@@ -175,10 +175,12 @@ double estimate_crossings(const Paths& subject, const Paths& clip) {
   };
   int crossing = 0;
   for (int i = 0; i < kSamples; ++i) {
+    if (i == kFirst && crossing == 0) return 0;
     const auto& [a, b] = edges[next()];
     const auto& [c, d] = edges[next()];
     crossing += orient(a, b, c) * orient(a, b, d) < 0 && orient(c, d, a) * orient(c, d, b) < 0;
   }
+  if (crossing < kFewest) return 0;
   const auto count = static_cast<double>(edges.size());
   return crossing * (count * count / 2) / kSamples;
 }
@@ -294,9 +296,18 @@ Outline offset(const Outline& outline, double delta, ClipperLib::JoinType join, 
   const double limit = join == ClipperLib::jtMiter ? kMitreLimit : 2.0;
   Paths paths = grid.to_grid(outline, false);
   if (ends_before(paths, {}, job)) return {};
+  constexpr double kMostPoints = 2e7;
+  const double rounded = static_cast<double>(segments) * static_cast<double>(paths.size());
+  if (job && join == ClipperLib::jtRound && rounded > kMostPoints) {
+    job->error = Error{ErrorCode::kLimit,
+                       fmt::format("'offset': rounding {} contours with {} segments of a circle "
+                                   "makes {:.2g} points; the limit is {:g}",
+                                   paths.size(), segments, rounded, kMostPoints)};
+    return {};
+  }
   const bool mirrored = better_mirrored(paths);
   if (mirrored) mirror(paths);
-  const std::size_t points = count_points(paths);
+  const std::size_t points = count_points(paths) + static_cast<std::size_t>(segments);
   Paths result = run_until_stopped(
       points, job,
       [paths = std::move(paths), limit, tolerance, join, by = grid.length(delta)]() mutable {

@@ -5,6 +5,7 @@
 #endif
 
 #include <algorithm>
+#include <charconv>
 #include <new>
 
 namespace strata::csg {
@@ -19,15 +20,32 @@ std::string_view without_slash(std::string_view name) {
 }  // namespace
 
 std::optional<std::string> ZipArchive::find(std::string_view name) const {
+  const auto look = [&](std::string_view wanted) -> std::optional<std::string> {
+    for (const std::string& known : names_) {
+      const std::string_view other = without_slash(known);
+      if (std::equal(wanted.begin(), wanted.end(), other.begin(), other.end(),
+                     [](char a, char b) { return lower(a) == lower(b); })) {
+        return known;
+      }
+    }
+    return std::nullopt;
+  };
   const std::string_view wanted = without_slash(name);
-  for (const std::string& known : names_) {
-    const std::string_view other = without_slash(known);
-    if (std::equal(wanted.begin(), wanted.end(), other.begin(), other.end(),
-                   [](char a, char b) { return lower(a) == lower(b); })) {
-      return known;
+  auto found = look(wanted);
+  if (found || wanted.find('%') == std::string_view::npos) return found;
+  std::string decoded;
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    unsigned value = 0;
+    const char* const digits = wanted.data() + i + 1;
+    if (wanted[i] == '%' && i + 2 < wanted.size() &&
+        std::from_chars(digits, digits + 2, value, 16).ptr == digits + 2) {
+      decoded += static_cast<char>(value);
+      i += 2;
+    } else {
+      decoded += wanted[i];
     }
   }
-  return std::nullopt;
+  return look(decoded);
 }
 
 #ifdef STRATA_HAVE_LIBZIP

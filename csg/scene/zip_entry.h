@@ -22,7 +22,7 @@ class ZipArchive {
   /// The names of all files and folders, in the archive's order; folders end in '/'.
   [[nodiscard]] const std::vector<std::string>& names() const { return names_; }
   /// The name of a file as the archive spells it: capitals of ASCII and a leading '/' make no
-  /// difference, as in packages (ISO/IEC 29500-2).
+  /// difference, nor does "%20" for a blank, as in packages (ISO/IEC 29500-2).
   [[nodiscard]] std::optional<std::string> find(std::string_view name) const;
   /// Unpacks a file of `names()`. @return kInput: damaged; kLimit: more than 2 GiB unpacked, or
   /// more than the memory limit; kCancelled

@@ -81,6 +81,26 @@ TEST_F(ThreeMf, ComponentsLieInOtherPartsOfTheArchive) {
   EXPECT_NEAR(signed_volume(item), 1.0 / 6, 1e-12);
 }
 
+TEST_F(ThreeMf, NamesOfPartsMayBeEncoded) {
+  const std::string part = model(object_of("1", kTetraMesh), "");
+  for (const char* name : {"3D/my part.model", "3D/my%20part.model"}) {
+    const TriangleSoup mesh =
+        soup({{"3D/3dmodel.model", model("", use_of("item", "1", " p:path='/3D/my%20part.model'"))},
+              {name, part}});
+    EXPECT_NEAR(signed_volume(mesh), 1.0 / 6, 1e-12) << name;
+  }
+}
+
+TEST_F(ThreeMf, ModelsWithoutTrianglesAreErrors) {
+  for (const std::string& text :
+       {model("", ""), model(object_of("1", kTetraMesh), ""),
+        model(object_of("1", "<mesh><vertices/><triangles/></mesh>"), use_of("item", "1"))}) {
+    const Error error = error_of({{"3D/3dmodel.model", text}});
+    EXPECT_EQ(error.code, ErrorCode::kInput);
+    EXPECT_NE(error.message.find("no build item has a triangle"), std::string::npos);
+  }
+}
+
 TEST_F(ThreeMf, TheRootIsWhatTheRelationshipsName) {
   const auto only = [](double x) {
     return model(object_of("1", kTetraMesh), use_of("item", "1", moved_by(x, 0, 0)));
