@@ -6,6 +6,7 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <numeric>
 #include <utility>
 
 #include "mesh/plane_predicates.h"
@@ -184,41 +185,90 @@ void PolygonCutter::begin_at_least_corner(std::span<const glm::dvec3> corners) {
   }
 }
 
-/// Cuts points_ where they cross or touch. Holes that are joined to what surrounds them by an edge
-/// there and back become contours of their own.
-void PolygonCutter::cut_by_ears() {
+/// Gives the points that are in one place in space one number.
+void PolygonCutter::number_places(std::span<const glm::dvec3> corners) {
+  const auto count = static_cast<std::uint32_t>(points_.size());
+  const auto at = [&](std::uint32_t i) -> const glm::dvec3& { return corners[corner_[i]]; };
+  std::vector<std::uint32_t> order(count);
+  std::iota(order.begin(), order.end(), 0u);
+  std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return at(a) != at(b) ? least_first(at(a), at(b)) : a < b;
+  });
+  place_.resize(count);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const bool again = i > 0 && at(order[i]) == at(order[i - 1]);
+    place_[order[i]] = again ? place_[order[i - 1]] : order[i];
+  }
+}
+
+std::pair<std::uint32_t, std::uint32_t> PolygonCutter::edge(std::uint32_t a,
+                                                            std::uint32_t b) const {
+  return std::minmax({place_[a], place_[b]});
+}
+
+/// Takes out edges that are walked there and back. @return what follows each point then
+std::vector<std::uint32_t> PolygonCutter::without_bridges() const {
   const auto count = static_cast<std::uint32_t>(points_.size());
   std::vector<std::uint32_t> next(count), edges(count);
   for (std::uint32_t i = 0; i < count; ++i) next[i] = (i + 1) % count, edges[i] = i;
-  const auto ends = [&](std::uint32_t edge) {
-    const glm::dvec2 &a = points_[edge], &b = points_[(edge + 1) % count];
-    return left_first(b, a) ? std::pair(b, a) : std::pair(a, b);
-  };
-  const auto forward = [&](std::uint32_t edge) { return ends(edge).first == points_[edge]; };
+  const auto ends = [&](std::uint32_t i) { return edge(i, (i + 1) % count); };
   std::sort(edges.begin(), edges.end(), [&](std::uint32_t a, std::uint32_t b) {
-    const auto p = ends(a), q = ends(b);
-    if (p.first != q.first) return left_first(p.first, q.first);
-    return p.second != q.second ? left_first(p.second, q.second) : a < b;
+    return std::pair(ends(a), a) < std::pair(ends(b), b);
   });
   for (std::size_t i = 1; i < count; ++i) {
     const std::uint32_t a = edges[i - 1], b = edges[i];
-    if (ends(a) != ends(b) || forward(a) == forward(b)) continue;
+    if (ends(a) != ends(b) || place_[a] == place_[b]) continue;
     std::swap(next[a], next[b]);
     ++i;
   }
+  return next;
+}
+
+/// Whether the triangles leave each edge of the outline once and use all others as often there as
+/// back.
+bool PolygonCutter::keeps_outline() const {
+  struct Use {
+    std::pair<std::uint32_t, std::uint32_t> edge;
+    int times;
+  };
+  std::vector<Use> uses;
+  const auto use = [&](std::uint32_t a, std::uint32_t b, int times) {
+    if (place_[a] != place_[b])
+      uses.push_back({edge(a, b), place_[a] < place_[b] ? times : -times});
+  };
+  const auto count = static_cast<std::uint32_t>(points_.size());
+  for (std::uint32_t i = 0; i < count; ++i) use(i, (i + 1) % count, -1);
+  for (const glm::uvec3& t : triangles_) use(t.x, t.y, 1), use(t.y, t.z, 1), use(t.z, t.x, 1);
+  std::sort(uses.begin(), uses.end(), [](const Use& a, const Use& b) { return a.edge < b.edge; });
+  int balance = 0;
+  for (std::size_t i = 0; i < uses.size(); ++i) {
+    balance += uses[i].times;
+    const bool last = i + 1 == uses.size() || uses[i + 1].edge != uses[i].edge;
+    if (last && balance != 0) return false;
+  }
+  return true;
+}
+
+/// Cuts points_ where they cross or touch. Holes that are joined to what surrounds them by an edge
+/// there and back become contours of their own.
+/// @return false when the outline would not be kept in space, as where corners above each other
+/// are one point of the view
+bool PolygonCutter::cut_by_ears(std::span<const glm::dvec3> corners) {
+  number_places(corners);
+  const std::vector<std::uint32_t> next = without_bridges();
   std::vector<std::vector<glm::dvec2>> contours;
   std::vector<std::uint32_t> vertices;  // all contours' points
-  std::vector<bool> seen(count, false);
-  for (std::uint32_t start = 0; start < count; ++start) {
+  std::vector<bool> seen(points_.size(), false);
+  for (std::uint32_t start = 0; start < points_.size(); ++start) {
     std::vector<glm::dvec2> contour;
     const std::size_t before = vertices.size();
     for (std::uint32_t i = start; !seen[i]; i = next[i]) {
       seen[i] = true;
-      if (!contour.empty() && contour.back() == points_[i]) continue;
+      if (!contour.empty() && place_[vertices.back()] == place_[i]) continue;
       contour.push_back(points_[i]);
       vertices.push_back(i);
     }
-    while (contour.size() > 1 && contour.front() == contour.back()) {
+    while (contour.size() > 1 && place_[vertices[before]] == place_[vertices.back()]) {
       contour.pop_back();
       vertices.pop_back();
     }
@@ -232,6 +282,7 @@ void PolygonCutter::cut_by_ears() {
   for (glm::uvec3& t : triangles_) t = {vertices[t.x], vertices[t.y], vertices[t.z]};
   std::erase_if(triangles_,
                 [](const glm::uvec3& t) { return t.x == t.y || t.y == t.z || t.z == t.x; });
+  return triangles_.size() <= points_.size() - 2 && keeps_outline();
 }
 
 std::span<const glm::uvec3> PolygonCutter::cut(std::span<const glm::dvec3> corners) {
@@ -254,9 +305,9 @@ std::span<const glm::uvec3> PolygonCutter::cut(std::span<const glm::dvec3> corne
       triangles_ = {{1, 2, 3}, {1, 3, 0}};
     }
   } else {
-    if (!sweep_.cut(points_, triangles_)) {
-      cut_by_ears();
-      if (triangles_.size() > count - 2) return {};
+    if (!sweep_.cut(points_, triangles_) && !cut_by_ears(corners)) {
+      triangles_.clear();
+      for (std::uint32_t i = 2; i < count; ++i) triangles_.emplace_back(0, i - 1, i);
     }
     if (!flat_) detail::refine_delaunay(points_, triangles_);
   }

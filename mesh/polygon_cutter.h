@@ -5,6 +5,7 @@
 #include <glm/vec3.hpp>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "mesh/polygon_sweep.h"
@@ -41,13 +42,19 @@ class PolygonCutter {
   [[nodiscard]] bool measure(std::span<const glm::dvec3> corners);
   [[nodiscard]] bool convex() const;
   void begin_at_least_corner(std::span<const glm::dvec3> corners);
-  void cut_by_ears();
+  void number_places(std::span<const glm::dvec3> corners);
+  [[nodiscard]] std::pair<std::uint32_t, std::uint32_t> edge(std::uint32_t a,
+                                                             std::uint32_t b) const;
+  [[nodiscard]] std::vector<std::uint32_t> without_bridges() const;
+  [[nodiscard]] bool keeps_outline() const;
+  [[nodiscard]] bool cut_by_ears(std::span<const glm::dvec3> corners);
 
   Bend bend_;
   glm::dvec3 normal_{0.0};
   bool flat_ = true;
   std::vector<glm::dvec2> points_;     ///< in the view, counter-clockwise as a whole
   std::vector<std::uint32_t> corner_;  ///< which corner each point is
+  std::vector<std::uint32_t> place_;   ///< of each point; one for those in one place in space
   std::vector<glm::uvec3> triangles_;
   detail::PolygonSweep sweep_;
 };

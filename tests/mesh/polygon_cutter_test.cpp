@@ -182,6 +182,37 @@ TEST(PolygonCutter, PolygonsThatTouchThemselvesAreFilledOnce) {
               81 - 7.5);
 }
 
+TEST(PolygonCutter, OutlinesAreKeptWhateverTheyAreLike) {
+  // Few places, so that corners meet, edges cross and corners lie above each other.
+  std::mt19937 random(6);
+  int cuts = 0;
+  for (int round = 0; round < 5000; ++round) {
+    Points points;
+    const auto side = 2 + random() % 4, high = 1 + random() % 3;
+    const std::size_t count = 4 + random() % 12;
+    while (points.size() < count) {
+      points.emplace_back(random() % side, random() % side,
+                          0.3 * static_cast<double>(random() % high));
+    }
+    PolygonCutter cutter;
+    const auto triangles = cutter.cut(points);
+    if (triangles.empty()) continue;
+    ++cuts;
+    EXPECT_LE(triangles.size(), count - 2);
+    std::map<std::array<double, 6>, int> uses;
+    const auto use = [&](const glm::dvec3& a, const glm::dvec3& b, int times) {
+      uses[{a.x, a.y, a.z, b.x, b.y, b.z}] += times;
+      uses[{b.x, b.y, b.z, a.x, a.y, a.z}] -= times;
+    };
+    for (std::size_t i = 0; i < count; ++i) use(points[i], points[(i + 1) % count], -1);
+    for (const glm::uvec3& t : triangles) {
+      for (int k = 0; k < 3; ++k) use(points[t[k]], points[t[(k + 1) % 3]], 1);
+    }
+    for (const auto& [edge, balance] : uses) ASSERT_EQ(balance, 0) << round;
+  }
+  EXPECT_GT(cuts, 3000);
+}
+
 TEST(PolygonCutter, CutsDoNotDependOnTheFirstCorner) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> bend(-0.3, 0.3);
