@@ -35,6 +35,7 @@ Result<void> run_ldi(const LdiCommand& command, Session& session) {
   }
 
   const Execution execution = session.execution("depth lists", 0.8);
+  if (auto done = input->fit(*grid, execution); !done) return done;
   const auto lattice = snap_to_lattice(input->soup, *grid, execution);
   if (!lattice) return tl::unexpected(lattice.error());
   const auto gpu = Gpu::open(command.backend, session);

@@ -14,12 +14,13 @@ double columns(const VoxelGrid& grid, Axis axis) {
   return static_cast<double>(grid.dims[frame.u]) * static_cast<double>(grid.dims[frame.v]);
 }
 
-/// Of all solids of a tree, those that are taken away included.
-double area_of(const TriangleSoup& soup) {
+/// Of all solids of a tree, those that are taken away included. In squares of side `unit`.
+double area_of(const TriangleSoup& soup, double unit) {
   double twice = 0;
   for (const glm::uvec3& t : soup.triangles) {
     const glm::dvec3& a = soup.positions[t.x];
-    twice += glm::length(glm::cross(soup.positions[t.y] - a, soup.positions[t.z] - a));
+    twice +=
+        glm::length(glm::cross((soup.positions[t.y] - a) / unit, (soup.positions[t.z] - a) / unit));
   }
   return twice / 2;
 }
@@ -49,7 +50,7 @@ MemoryEstimate estimate_memory(const MeshInput& input, const VoxelGrid& voxels, 
   // Area in voxel faces; a triangle of side d voxels meets about (1 + d / 64)^2 tiles.
   const glm::dvec3 s = grid.voxel_size;
   const double face = std::cbrt(s.x) * std::cbrt(s.y) * std::cbrt(s.z);  // the product may be 0
-  const double area = (input.tree ? area_of(input.soup) : input.area) / (face * face);
+  const double area = input.tree ? area_of(input.soup, face) : input.area / (face * face);
   const double side = triangles > 0 ? std::sqrt(2 * area / triangles) : 0;
   const double tiles = columns(grid, axis) / kTilePixels + 1;
   const double across = 1 + side / kTileSide;

@@ -10,6 +10,7 @@
 #include "apps/session.h"
 #include "mesh/block_sum.h"
 #include "mesh/soup_tools.h"
+#include "raster/lattice_mesh.h"
 
 namespace strata::apps {
 namespace {
@@ -242,6 +243,13 @@ void MeshInput::set_tree(csg::Tree made) {
   // The soup has all triangles that are needed from here on.
   for (csg::Solid& solid : made.solids()) solid.mesh.reset();
   scene = std::make_shared<csg::Tree>(std::move(made));
+}
+
+Result<void> MeshInput::fit(const VoxelGrid& grid, const Execution& execution) {
+  if (tree) return tree->fit(grid, &soup, execution);
+  const auto done = fit_lattice(soup, bounds, grid, execution);
+  if (!done) return tl::unexpected(done.error());
+  return {};
 }
 
 bool MeshInput::has_scene() const {

@@ -55,6 +55,9 @@ struct MeshInput {
   /// The lists of a tree take the place of the soup.
   void set_tree(csg::Tree tree);
   [[nodiscard]] bool has_scene() const;
+  /// Cuts off what does not fit the lattice of a grid; rays through the grid see no difference.
+  /// @return kGeometry, kCancelled
+  Result<void> fit(const VoxelGrid& grid, const Execution& execution);
 };
 
 struct MeshInputRules {

@@ -322,6 +322,7 @@ Result<void> voxelize_and_write(const VoxelizeCommand& command, VoxelizeOutcome&
     if (command.ids) count_ids(slab, outcome.id_voxels);
     return samples > 1 ? Result<void>() : write(slab);
   };
+  if (auto done = outcome.input.fit(outcome.grid, quiet); !done) return done;
   auto report = voxelize_slabs(outcome.input.soup, outcome.grid, options, execution, sink);
   if (!report) return tl::unexpected(report.error());
   if (session.interrupted()) return fail(ErrorCode::kCancelled, "stopped");

@@ -5,8 +5,10 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
+#include <glm/vector_relational.hpp>
 #include <unordered_map>
 
+#include "mesh/clamp.h"
 #include "mesh/diagnose.h"
 
 namespace strata::csg {
@@ -24,6 +26,21 @@ Bounds bounds_of(const Geometry::Part& part) {
   return box;
 }
 
+double longest_side(const Bounds& box) {
+  const glm::dvec3 size = box.high - box.low;
+  return std::max({size.x, size.y, size.z});
+}
+
+/// Its distance from the origin.
+double farthest_corner(const Bounds& box) {
+  return box.empty() ? 0.0 : glm::length(glm::max(glm::abs(box.low), glm::abs(box.high)));
+}
+
+bool holds(const Bounds& box, const Bounds& other) {
+  return glm::all(glm::lessThanEqual(box.low, other.low)) &&
+         glm::all(glm::lessThanEqual(other.high, box.high));
+}
+
 /// Whether the mesh is closed, has a volume, and no vertex lies outside of any face; meshes too
 /// large to try are taken for not convex.
 bool is_convex(const TriangleSoup& mesh) {
@@ -33,6 +50,8 @@ bool is_convex(const TriangleSoup& mesh) {
   }
   const Bounds box = bounds(mesh);
   const double size = glm::length(box.high - box.low);
+  constexpr double kMostSize = 1e75;  // of which the fourth power is a number
+  if (!(size < kMostSize)) return false;
   for (const glm::uvec3& t : mesh.triangles) {
     const glm::dvec3& a = mesh.positions[t.x];
     const glm::dvec3 across = glm::cross(mesh.positions[t.y] - a, mesh.positions[t.z] - a);
@@ -153,7 +172,10 @@ Geometry::Geometry(const Tree& tree, const Execution& execution) {
   const auto solids = tree.solids();
   parts_.resize(solids.size());
   meshes_.reserve(solids.size());
-  for (const Solid& solid : solids) meshes_.push_back(solid.mesh);
+  for (const Solid& solid : solids) {
+    meshes_.push_back(solid.mesh);
+    places_.push_back(solid.world_from_mesh);
+  }
   std::unordered_map<const TriangleSoup*, std::size_t> firsts;
   std::vector<std::size_t> first_with;
   for (std::size_t i = 0; i < solids.size(); ++i) {
@@ -166,18 +188,57 @@ Geometry::Geometry(const Tree& tree, const Execution& execution) {
     if (mesh != nullptr) {
       if (first_with[i] == i) convex[i] = is_convex(*mesh) ? 1 : 0;
     }
-    place(static_cast<std::uint32_t>(i), solids[i].world_from_mesh);
+    place(static_cast<std::uint32_t>(i));
   });
   for (std::size_t i = 0; i < parts_.size(); ++i) parts_[i].convex = convex[first_with[i]] != 0;
+  any_cut_off_ = cut_off_vast(tree);
   measure();
+  share_error(tree);
 }
 
-void Geometry::move_solid(std::uint32_t solid, const glm::dmat4& world_from_mesh) {
-  place(solid, world_from_mesh);
+bool Geometry::move_solid(const Tree& tree, std::uint32_t solid,
+                          const glm::dmat4& world_from_mesh) {
+  places_[solid] = world_from_mesh;
+  place(solid);
+  parts_[solid].error_share = 1.0;
+  const Bounds& moved = parts_[solid].whole;
+  const bool is_vast = longest_side(moved) > kVast * longest_side(box_);
+  const bool again = any_cut_off_ || (!moved.empty() && is_vast);
+  if (again) {  // the others are needed whole, to be cut off where the solid is now
+    for (std::uint32_t i = 0; i < parts_.size(); ++i) place(i);
+    any_cut_off_ = cut_off_vast(tree);
+  }
   measure();
+  return again;
 }
 
-void Geometry::place(std::uint32_t solid, const glm::dmat4& world_from_mesh) {
+bool Geometry::cut_off_vast(const Tree& tree) {
+  const std::vector<Mattering> matters = mattering(tree, boxes());
+  bool any = false;
+  for (std::size_t i = 0; i < parts_.size(); ++i) {
+    Part& part = parts_[i];
+    Bounds box = matters[i].box;
+    if (part.triangles.empty() || box.empty()) continue;
+    const double size = longest_side(box);
+    const auto around = [&](double sizes) {
+      return Bounds{box.low - glm::dvec3(sizes * size), box.high + glm::dvec3(sizes * size)};
+    };
+    if (!(size > 0) || holds(around(kVast), part.whole)) continue;
+    // What is taken away reaches farther than what it is taken from.
+    ClampedMesh cut =
+        clamp_to_box(part.positions, part.triangles, around(matters[i].taken_away ? 0.5 : 0.25));
+    part.positions = std::move(cut.positions);
+    part.turned = std::move(cut.triangles);
+    part.triangles = part.turned;
+    part.box = bounds_of(part);
+    part.convex = false;  // sheets on the sides
+    any = true;
+  }
+  return any;
+}
+
+void Geometry::place(std::uint32_t solid) {
+  const glm::dmat4& world_from_mesh = places_[solid];
   Part& part = parts_[solid];
   const TriangleSoup* mesh = meshes_[solid].get();
   if (mesh == nullptr) return;
@@ -195,6 +256,7 @@ void Geometry::place(std::uint32_t solid, const glm::dmat4& world_from_mesh) {
   }
   part.box = bounds_of(part);
   if (part.triangles.empty()) part.box = {};
+  part.whole = part.box;
 }
 
 void Geometry::measure() {
@@ -202,10 +264,20 @@ void Geometry::measure() {
   for (const Part& part : parts_) box_.include(part.box);
 }
 
+void Geometry::share_error(const Tree& tree) {
+  // Rotations about points far away leave errors of that distance: hardly of more than this.
+  constexpr double kFarther = 32.0;
+  const double error = world_error(tree, 1.0);
+  for (Part& part : parts_) {
+    const double own = kFarther * farthest_corner(part.box);
+    part.error_share = own < error ? own / error : 1.0;
+  }
+}
+
 std::vector<Bounds> Geometry::boxes() const {
   std::vector<Bounds> boxes;
   boxes.reserve(parts_.size());
-  for (const Part& part : parts_) boxes.push_back(part.box);
+  for (const Part& part : parts_) boxes.push_back(part.whole);
   return boxes;
 }
 
@@ -214,8 +286,8 @@ double Geometry::world_error(const Tree& tree, double relative_precision) const 
   if (box_.empty()) return 0;
   Bounds result = bounds(tree, tree.root(), boxes());
   if (result.empty()) result = box_;
-  const double reach = glm::length(glm::max(glm::abs(box_.low), glm::abs(box_.high)));
-  return relative_precision * std::min(reach, kMostSizes * glm::length(result.high - result.low));
+  return relative_precision *
+         std::min(farthest_corner(box_), kMostSizes * glm::length(result.high - result.low));
 }
 
 Result<ViewPart> view_part(const Geometry::Part& part, const View& view,

@@ -13,15 +13,21 @@
 
 namespace strata::csg {
 
-/// The solids of a tree in world space, made once and seen by many views and grids.
+/// The solids of a tree in world space, made once and seen by many views and grids. Those that are
+/// vast beside what they can matter to, such as half spaces, are cut off around it (kVast): what is
+/// seen, measured and filled is the same, and coordinates stay small.
 class Geometry {
  public:
   struct Part {
     std::vector<glm::dvec3> positions;      ///< world space
-    std::vector<glm::uvec3> turned;         ///< own triangles of a mirrored solid
+    std::vector<glm::uvec3> turned;         ///< own triangles of a mirrored or a vast solid
     std::span<const glm::uvec3> triangles;  ///< counter-clockwise from outside
-    Bounds box;
+    Bounds box;                             ///< of `positions`
+    Bounds whole;  ///< of the solid; not `box` where a vast one was cut off
     InsideRule rule = InsideRule::kWinding;
+    /// How far its faces may be off, as part of Geometry::world_error(): less than 1 for solids
+    /// that are small and near the origin beside what is vast.
+    double error_share = 1.0;
     bool convex = false;  ///< known to be; a hint that only speed depends on
   };
 
@@ -32,12 +38,13 @@ class Geometry {
   Geometry(Geometry&&) = default;
   Geometry& operator=(Geometry&&) = default;
 
-  /// Puts a solid somewhere else.
-  void move_solid(std::uint32_t solid, const glm::dmat4& world_from_mesh);
+  /// Puts a solid somewhere else. @param tree  the one that these are the solids of
+  /// @return whether other solids may have been cut off elsewhere
+  bool move_solid(const Tree& tree, std::uint32_t solid, const glm::dmat4& world_from_mesh);
 
   [[nodiscard]] const std::vector<Part>& parts() const { return parts_; }
   [[nodiscard]] const Bounds& box() const { return box_; }  ///< around all parts
-  [[nodiscard]] std::vector<Bounds> boxes() const;          ///< around each part
+  [[nodiscard]] std::vector<Bounds> boxes() const;          ///< around each solid
   /// How far faces of the result of `tree`, whose solids these are, may be from where they are
   /// meant when numbers are off by `relative_precision` of themselves. Solids far from the origin,
   /// or cutters that are far larger than what they cut, do not blur what there is: it is never
@@ -45,12 +52,17 @@ class Geometry {
   [[nodiscard]] double world_error(const Tree& tree, double relative_precision) const;
 
  private:
-  void place(std::uint32_t solid, const glm::dmat4& world_from_mesh);
+  void place(std::uint32_t solid);
+  /// Cuts off vast parts. @return whether there are any
+  bool cut_off_vast(const Tree& tree);
   void measure();
+  void share_error(const Tree& tree);
 
   std::vector<std::shared_ptr<const TriangleSoup>> meshes_;
+  std::vector<glm::dmat4> places_;
   std::vector<Part> parts_;
   Bounds box_;
+  bool any_cut_off_ = false;
 };
 
 /// A solid as a view sees it: vertices snapped to the image lattice, cut at the near plane where

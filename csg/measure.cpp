@@ -301,7 +301,8 @@ class Measurer {
 
 Result<Measures> Measurer::once(int resolution, const Share& share) {
   const VoxelGrid grid = grid_around(box_, resolution);
-  const SolidLists lists(*tree_, root_);
+  SolidLists lists(*tree_, root_);
+  if (auto done = lists.fit(grid, nullptr, *execution_); !done) return tl::unexpected(done.error());
   auto snapped = snap_to_lattice(lists.soup(), grid, *execution_);
   if (!snapped) return tl::unexpected(snapped.error());
   Sums sums(lists, *snapped, grid, error_);
@@ -315,6 +316,10 @@ Result<Measures> Measurer::once(int resolution, const Share& share) {
   }
   Measures result = sums.finish();
   result.resolution = resolution;
+  if (!std::isfinite(result.volume)) {
+    return fail(ErrorCode::kGeometry, "the result is {:g} long: its volume is no number",
+                glm::length(box_.high - box_.low));
+  }
   if (!result.empty) settle_bounds(grid, sums.crossed(), result);
   return result;
 }

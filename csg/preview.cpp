@@ -374,8 +374,10 @@ Result<const SurfaceImage*> Preview::draw(const View& view, const Execution& exe
 Result<const SurfaceImage*> Preview::move_solid(std::uint32_t solid,
                                                 const glm::dmat4& world_from_mesh,
                                                 const Execution& execution) {
-  impl_->geometry.move_solid(solid, world_from_mesh);
-  if (auto done = impl_->frame.moved(solid, execution); !done) return tl::unexpected(done.error());
+  const bool others = impl_->geometry.move_solid(impl_->tree, solid, world_from_mesh);
+  auto done = others ? impl_->frame.draw(impl_->frame.view(), execution)
+                     : impl_->frame.moved(solid, execution);
+  if (!done) return tl::unexpected(done.error());
   return impl_->surfaces();
 }
 

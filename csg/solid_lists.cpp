@@ -12,6 +12,7 @@
 #include "csg/surface.h"
 #include "csg/tile_surface.h"
 #include "csg/tree_filter.h"
+#include "raster/lattice_mesh.h"
 
 namespace strata::csg {
 namespace {
@@ -235,6 +236,7 @@ class BooleanFilter final : public TreeFilter {
 struct SolidLists::Impl {
   Shared shared;
   TriangleSoup soup;
+  Bounds box;                        ///< around the soup
   std::vector<std::uint32_t> added;  ///< solids by rank
   BooleanFilter filter{shared, false}, plain{shared, true};
 };
@@ -248,6 +250,7 @@ SolidLists::SolidLists(const Tree& tree, Tree::NodeId root) : impl_(std::make_un
     shared.rules.push_back(tree.solids()[solid].rule);
     if (shared.program.leaves[solid].parent == Program::kNone) continue;
     const Geometry::Part& part = geometry.parts()[solid];
+    impl_->box.include(part.box);
     const auto first = static_cast<std::uint32_t>(soup.positions.size());
     soup.positions.insert(soup.positions.end(), part.positions.begin(), part.positions.end());
     for (const glm::uvec3& triangle : part.triangles) soup.triangles.push_back(triangle + first);
@@ -275,6 +278,19 @@ void SolidLists::set_labels(const std::vector<std::uint32_t>& labels) {
   for (const std::uint32_t solid : impl_->added) {
     impl_->shared.labels.push_back(labels[solid]);
   }
+}
+Result<void> SolidLists::fit(const VoxelGrid& grid, TriangleSoup* taken,
+                             const Execution& execution) {
+  TriangleSoup& soup = taken != nullptr ? *taken : impl_->soup;
+  const auto sources = fit_lattice(soup, impl_->box, grid, execution);
+  if (!sources) return tl::unexpected(sources.error());
+  if (sources->empty()) return {};
+  std::vector<std::uint32_t> solid_of;
+  solid_of.reserve(sources->size());
+  for (const std::uint32_t source : *sources) solid_of.push_back(impl_->shared.solid_of[source]);
+  impl_->shared.solid_of = std::move(solid_of);
+  impl_->box = bounds(soup);
+  return {};
 }
 std::uint32_t SolidLists::solid_of(std::uint32_t triangle) const {
   return impl_->shared.solid_of[triangle];

@@ -5,6 +5,9 @@
 #include <memory>
 #include <vector>
 
+#include "core/execution.h"
+#include "core/grid.h"
+#include "core/result.h"
 #include "csg/tree.h"
 #include "hashbuffer/list_filter.h"
 #include "mesh/triangle_soup.h"
@@ -31,6 +34,12 @@ class SolidLists {
   [[nodiscard]] const TileListFilter& filter() const;
   /// The same, never labelled.
   [[nodiscard]] const TileListFilter& plain_filter() const;
+  /// Cuts the soup off where it does not fit the lattice of `grid`, far outside of that: lists
+  /// of the grid's rays are as of the whole soup. Not while the filter has workers.
+  /// @param taken  the soup, when it was taken away
+  /// @return kCancelled
+  Result<void> fit(const VoxelGrid& grid, TriangleSoup* taken = nullptr,
+                   const Execution& execution = {});
   /// From now on the filter's lists are labelled: what lies behind a crossing is the label of the
   /// solid that csg/solid_labels.h says. @param labels of each solid of the tree, in [1, 2^31).
   /// Not while the filter has workers.

@@ -1,7 +1,10 @@
 #include "csg/tree.h"
 
+#include <algorithm>
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
+
+#include "mesh/diagnose.h"
 
 namespace strata::csg {
 
@@ -42,6 +45,84 @@ Bounds bounds(const Tree& tree, Tree::NodeId node) {
 
 namespace {
 
+double longest_side(const Bounds& box) {
+  const glm::dvec3 size = box.high - box.low;
+  return std::max({size.x, size.y, size.z});
+}
+
+bool is_empty(const Bounds& box) {
+  return box.empty() || box.low.y > box.high.y || box.low.z > box.high.z;
+}
+
+/// Whether a node is a closed mesh of a box whose sides are parallel to the axes: all of `box`.
+bool fills_box(const Tree& tree, Tree::NodeId node, const Bounds& box) {
+  if (tree.nodes()[node].operation != Operation::kSolid) return false;
+  const Solid& solid = tree.solids()[tree.nodes()[node].first];
+  if (!solid.mesh || solid.mesh->positions.size() != 8 || solid.mesh->triangles.size() != 12) {
+    return false;
+  }
+  unsigned corners = 0;
+  for (const glm::dvec3& position : solid.mesh->positions) {
+    const glm::dvec3 p(solid.world_from_mesh * glm::dvec4(position, 1.0));
+    unsigned corner = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      if (p[axis] != box.low[axis] && p[axis] != box.high[axis]) return false;
+      corner |= p[axis] == box.high[axis] ? 1u << axis : 0u;
+    }
+    corners |= 1u << corner;
+  }
+  return corners == 0xffu && is_closed(*solid.mesh);
+}
+
+/// Takes `cutter` away from `box`, where what is left is a box.
+void take_away(Bounds& box, const Bounds& cutter) {
+  int axis = -1;  // along which the cutter does not reach from end to end
+  for (int i = 0; i < 3; ++i) {
+    if (cutter.low[i] <= box.low[i] && box.high[i] <= cutter.high[i]) continue;
+    if (axis >= 0) return;
+    axis = i;
+  }
+  if (axis < 0) {
+    box = {};
+  } else if (cutter.low[axis] <= box.low[axis]) {
+    box.low[axis] = std::max(box.low[axis], cutter.high[axis]);
+  } else if (cutter.high[axis] >= box.high[axis]) {
+    box.high[axis] = std::min(box.high[axis], cutter.low[axis]);
+  }
+}
+
+/// What the cutters for which `is_box` leave of `box`.
+template <class IsBox>
+Bounds left_of(const Bounds& box, std::span<const Tree::NodeId> cutters,
+               std::span<const Bounds> boxes, const IsBox& is_box) {
+  Bounds left = box;
+  for (int round = 0; round < 6; ++round) {  // each cut may let another one reach from end to end
+    const Bounds before = left;
+    for (const Tree::NodeId cutter : cutters) {
+      Bounds cut = left;
+      take_away(cut, boxes[cutter]);
+      if (!(cut == left) && is_box(cutter)) left = cut;
+      if (is_empty(left)) return {};
+    }
+    if (left == before) break;
+  }
+  return left;
+}
+
+Bounds difference_bounds(const Tree& tree, std::span<const Tree::NodeId> operands,
+                         std::span<const Bounds> boxes) {
+  const Bounds& whole = boxes[operands[0]];
+  const auto is_vast = [&](const Bounds& left) {
+    return is_empty(left) || longest_side(whole) > kVast * longest_side(left);
+  };
+  const auto cutters = operands.subspan(1);
+  if (!is_vast(left_of(whole, cutters, boxes, [](Tree::NodeId) { return true; }))) return whole;
+  const Bounds left = left_of(whole, cutters, boxes, [&](Tree::NodeId cutter) {
+    return fills_box(tree, cutter, boxes[cutter]);
+  });
+  return is_vast(left) && !is_empty(left) ? left : whole;
+}
+
 /// The boxes of the first `count` nodes.
 std::vector<Bounds> node_bounds(const Tree& tree, std::size_t count,
                                 std::span<const Bounds> solids) {
@@ -53,21 +134,21 @@ std::vector<Bounds> node_bounds(const Tree& tree, std::size_t count,
       continue;
     }
     const auto operands = tree.operands(id);
-    for (std::size_t i = 0; i < operands.size(); ++i) {
-      const Bounds& box = boxes[operands[i]];
-      if (i == 0) {
-        boxes[id] = box;
-      } else if (at.operation == Operation::kUnion) {
-        boxes[id].include(box);
+    if (operands.empty()) continue;
+    Bounds& box = boxes[id];
+    box = boxes[operands[0]];
+    for (const Tree::NodeId operand : operands.subspan(1)) {
+      if (at.operation == Operation::kUnion) {
+        box.include(boxes[operand]);
       } else if (at.operation == Operation::kIntersection) {
-        boxes[id].low = glm::max(boxes[id].low, box.low);
-        boxes[id].high = glm::min(boxes[id].high, box.high);
+        box.low = glm::max(box.low, boxes[operand].low);
+        box.high = glm::min(box.high, boxes[operand].high);
       }
     }
-    if (boxes[id].empty() || boxes[id].low.y > boxes[id].high.y ||
-        boxes[id].low.z > boxes[id].high.z) {
-      boxes[id] = {};
+    if (at.operation == Operation::kDifference && !is_empty(box)) {
+      box = difference_bounds(tree, operands, boxes);
     }
+    if (is_empty(box)) box = {};
   }
   return boxes;
 }
@@ -78,9 +159,36 @@ Bounds bounds(const Tree& tree, Tree::NodeId node, std::span<const Bounds> solid
   return node == Tree::kNone ? Bounds{} : node_bounds(tree, node + 1, solids).back();
 }
 
+std::vector<Mattering> mattering(const Tree& tree, std::span<const Bounds> solids) {
+  const std::vector<Bounds> boxes = node_bounds(tree, tree.nodes().size(), solids);
+  std::vector<Mattering> nodes(boxes.size()), result(solids.size());
+  std::vector<std::uint8_t> is_operand(boxes.size(), 0);
+  for (auto id = static_cast<Tree::NodeId>(boxes.size()); id-- > 0;) {  // from the roots down
+    Mattering& here = nodes[id];
+    if (is_operand[id] == 0) here.box = boxes[id];
+    const Tree::Node& node = tree.nodes()[id];
+    if (node.operation == Operation::kSolid) {
+      result[node.first] = here;
+      continue;
+    }
+    Bounds inner = boxes[id];
+    inner.low = glm::max(inner.low, here.box.low);
+    inner.high = glm::min(inner.high, here.box.high);
+    if (is_empty(inner)) continue;
+    bool first = true;
+    for (const Tree::NodeId operand : tree.operands(id)) {
+      nodes[operand].box.include(inner);
+      nodes[operand].taken_away =
+          here.taken_away != (node.operation == Operation::kDifference && !first);
+      is_operand[operand] = 1;
+      first = false;
+    }
+  }
+  return result;
+}
+
 Bounds picture_box(const Tree& tree, std::span<const Bounds> solids,
                    std::span<const Tree::NodeId> shown) {
-  constexpr double kFarLarger = 1000.0;
   Bounds all, seen;
   for (const Bounds& solid : solids) all.include(solid);
   const std::vector<Bounds> boxes = node_bounds(tree, tree.nodes().size(), solids);
@@ -88,7 +196,7 @@ Bounds picture_box(const Tree& tree, std::span<const Bounds> solids,
     if (node != Tree::kNone) seen.include(boxes[node]);
   }
   const auto size = [](const Bounds& box) { return glm::length(box.high - box.low); };
-  return !seen.empty() && size(all) > kFarLarger * size(seen) ? seen : all;
+  return !seen.empty() && size(all) > kVast * size(seen) ? seen : all;
 }
 
 }  // namespace strata::csg

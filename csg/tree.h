@@ -81,11 +81,23 @@ class Tree {
 /// The least box around a solid in world space.
 [[nodiscard]] Bounds bounds(const Solid& solid);
 
+/// How many times larger than a result its solids are from where on they count as vast: such
+/// solids bound no picture, and are cut off where they cannot matter.
+inline constexpr double kVast = 1000.0;
+
 /// A box that the result of `node` lies in: union of the operands' for a union, intersection for an
-/// intersection, the first operand's for a difference.
+/// intersection, the first operand's for a difference. Of a first operand that is vast beside what
+/// axis-parallel boxes leave of it, as of half spaces that are made of vast cubes, only that.
 [[nodiscard]] Bounds bounds(const Tree& tree, Tree::NodeId node);
 /// The same from the boxes of the tree's solids.
 [[nodiscard]] Bounds bounds(const Tree& tree, Tree::NodeId node, std::span<const Bounds> solids);
+/// Where a solid can matter.
+struct Mattering {
+  Bounds box;  ///< beyond it the nodes above the solid are empty, whatever it is there
+  bool taken_away = false;
+};
+/// Of each solid. @param solids  boxes of the tree's solids
+[[nodiscard]] std::vector<Mattering> mattering(const Tree& tree, std::span<const Bounds> solids);
 /// The box that gives a picture its depths, from the boxes of the tree's solids: around all of
 /// them; without cutters that are far larger than `shown`, which are the nodes that can be seen:
 /// they would leave it no depth.

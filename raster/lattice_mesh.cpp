@@ -2,6 +2,11 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
+#include <glm/common.hpp>
+#include <utility>
+
+#include "mesh/clamp.h"
 
 namespace strata {
 namespace {
@@ -55,6 +60,37 @@ Result<LatticeMesh> snap_to_lattice(const TriangleSoup& mesh, const VoxelGrid& g
                 grid.voxel_size.x, grid.voxel_size.y, grid.voxel_size.z);
   }
   return result;
+}
+
+Result<std::vector<std::uint32_t>> fit_lattice(TriangleSoup& mesh, const Bounds& box,
+                                               const VoxelGrid& grid, const Execution& execution) {
+  constexpr double kMostVoxels = kMaxLatticeCoordinate / kLatticeSteps - 1;
+  if (box.empty()) return {};
+  bool fits = true;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const double at : {box.low[axis], box.high[axis]}) {
+      fits = fits && std::abs(at - grid.origin[axis]) / grid.voxel_size[axis] <= kMostVoxels;
+      if (std::abs(at) < kMostClamped) continue;
+      return fail(ErrorCode::kGeometry, "the mesh reaches {} = {:g}; coordinates are below {:g}",
+                  "xyz"[axis], at, kMostClamped);
+    }
+  }
+  if (fits) return {};
+  // As far around the grid as it is from there to the lattice's end, about.
+  const glm::dvec3 around = kMostVoxels / 2 * grid.voxel_size;
+  const Bounds kept{grid.origin - around,
+                    grid.origin + glm::dvec3(grid.dims) * grid.voxel_size + around};
+  ClampedMesh cut = clamp_to_box(mesh.positions, mesh.triangles, kept, execution.stop);
+  if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+  std::vector<std::uint32_t> elements;
+  elements.reserve(cut.sources.size());
+  for (const std::uint32_t source : cut.sources) {
+    elements.push_back(mesh.face_elements.empty() ? source : mesh.face_elements[source]);
+  }
+  mesh.positions = std::move(cut.positions);
+  mesh.triangles = std::move(cut.triangles);
+  mesh.face_elements = std::move(elements);
+  return std::move(cut.sources);
 }
 
 }  // namespace strata

@@ -8,6 +8,7 @@
 #include "core/execution.h"
 #include "core/grid.h"
 #include "core/result.h"
+#include "mesh/soup_tools.h"
 #include "mesh/triangle_soup.h"
 
 namespace strata {
@@ -31,5 +32,15 @@ struct LatticeMesh {
 /// kMaxLatticeCoordinate.
 Result<LatticeMesh> snap_to_lattice(const TriangleSoup& mesh, const VoxelGrid& grid,
                                     const Execution& execution = {});
+
+/// Cuts a mesh off where it does not fit the lattice of `grid`: far outside of the grid it is moved
+/// onto a box (clamp_to_box()), so that rays through the grid meet it as often as before.
+/// @param box  around the mesh
+/// @return the triangle of the mesh before that each triangle is a piece of; empty when all of it
+/// fitted and nothing was done. kGeometry naming the vertex whose coordinate is not below
+/// kMostClamped; kCancelled
+Result<std::vector<std::uint32_t>> fit_lattice(TriangleSoup& mesh, const Bounds& box,
+                                               const VoxelGrid& grid,
+                                               const Execution& execution = {});
 
 }  // namespace strata

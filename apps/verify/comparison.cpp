@@ -82,10 +82,13 @@ class Surfaces {
 /// Which voxels of a grid the lists fill.
 class Filled {
  public:
-  static Result<Filled> make(const csg::SolidLists& lists, const VoxelGrid& grid,
+  static Result<Filled> make(csg::SolidLists& lists, const VoxelGrid& grid,
                              const Execution& execution) {
     Filled filled;
     if (lists.soup().triangles.empty()) return filled;
+    if (auto done = lists.fit(grid, nullptr, execution); !done) {
+      return tl::unexpected(done.error());
+    }
     VoxelizeOptions options;
     options.filter = &lists.filter();
     auto intervals = voxelize(lists.soup(), grid, options, execution);

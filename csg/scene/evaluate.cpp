@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/matrix.hpp>
-#include <unordered_map>
 #include <utility>
 
 #include "csg/scene/evaluator.h"
@@ -99,39 +98,6 @@ bool is_finite(const glm::dmat4& matrix) {
   return true;
 }
 
-/// Solids beyond this could not be looked at: cameras and volumes multiply lengths.
-constexpr double kMostSceneCoordinate = 1e100;
-
-/// @return kGeometry naming the first solid that reaches too far, or whose place is no number
-Result<void> check_coordinates(const Tree& tree) {
-  std::unordered_map<const TriangleSoup*, double> sizes;  // the largest coordinate of each mesh
-  for (const Solid& solid : tree.solids()) {
-    if (!solid.mesh) continue;
-    const auto [size, is_new] = sizes.try_emplace(solid.mesh.get(), 0.0);
-    if (is_new) {
-      for (const glm::dvec3& p : solid.mesh->positions) {
-        const double far = std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)});
-        size->second = std::max(size->second, std::isnan(p.x + p.y + p.z) ? HUGE_VAL : far);
-      }
-    }
-    const glm::dmat4& m = solid.world_from_mesh;
-    for (int i = 0; i < 3; ++i) {
-      const double reach =
-          (std::abs(m[0][i]) + std::abs(m[1][i]) + std::abs(m[2][i])) * size->second +
-          std::abs(m[3][i]);
-      if (reach < kMostSceneCoordinate) continue;
-      const std::size_t at = solid.name.find(" at ");
-      const bool placed = at != std::string::npos;
-      return fail(ErrorCode::kGeometry,
-                  "{}: '{}' has coordinates {}; those of a scene must be below {:g}",
-                  placed ? solid.name.substr(at + 4) : "scene", solid.name.substr(0, at),
-                  std::isfinite(reach) ? fmt::format("of about {:.3g}", reach) : "beyond 1e+308",
-                  kMostSceneCoordinate);
-    }
-  }
-  return {};
-}
-
 bool same_colour(const std::optional<glm::vec4>& a, const std::optional<glm::vec4>& b) {
   return a.has_value() == b.has_value() && (!a || *a == *b);
 }
@@ -173,7 +139,7 @@ Result<Scene> Evaluator::run() {
   Scene scene = take_scene();
   job_ended(first);
   if (error_) return tl::unexpected(*error_);
-  if (auto checked = check_coordinates(scene.tree); !checked) {
+  if (auto checked = check_coordinates(scene); !checked) {
     return tl::unexpected(checked.error());
   }
   return scene;

@@ -215,4 +215,8 @@ class Evaluator {
   std::map<std::pair<std::string, bool>, Imported> imports_;  ///< by path, and whether centred
 };
 
+/// Looks at solids that reach far out: warns of those whose faces are not known well enough for
+/// what they meet. @return kGeometry naming the first solid that cannot be worked with
+Result<void> check_coordinates(Scene& scene);
+
 }  // namespace strata::csg

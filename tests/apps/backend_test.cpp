@@ -117,6 +117,25 @@ TEST_F(Backends, WriteTheSamePicturesAndVoxelsOfScenes) {
   expect_same({"ldi", "scene.csg", "-r", "60"}, ".npz");
 }
 
+TEST_F(Backends, CutVastSolidsOffAlike) {
+  for (const char* size : {"1e10", "1e20", "1e200"}) {
+    std::string scene = "difference() { sphere($fn = 32, r = 5); cube(size = [S, S, S]); }";
+    for (auto at = scene.find('S'); at != std::string::npos; at = scene.find('S')) {
+      scene.replace(at, 1, size);
+    }
+    place_.write("vast.csg", scene);
+    expect_same({"csg", "vast.csg", "--size", "120,90", "--camera=0,0,0,55,0,155,40"}, ".png");
+    expect_same({"voxelize", "vast.csg", "-r", "60"}, ".npy");
+    expect_same({"ldi", "vast.csg", "-r", "40"}, ".npz");
+  }
+  // A small part before a vast one, which surrounds the eye's side of the scene.
+  place_.write("beside.csg",
+               "cube(size = [1e5, 1e5, 1e5]); multmatrix([[1, 0, 0, -5], [0, 1, 0, -5], "
+               "[0, 0, 1, -5], [0, 0, 0, 1]]) { cube(size = [1, 1, 1]); }");
+  expect_same({"csg", "beside.csg", "--size", "120,90", "--camera=-4.5,-4.5,-4.5,55,0,25,8"},
+              ".png");
+}
+
 TEST_F(Backends, MakeTheSameListsOfTrees) {
   place_.write("scene.csg", kScene);
   for (const char* axis : {"x", "y", "z"}) {

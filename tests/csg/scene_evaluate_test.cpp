@@ -324,6 +324,24 @@ TEST(Evaluate, PrecisionIsThatOfSixDigits) {
   EXPECT_EQ(scene_of("cube();").relative_precision, 5e-6);
 }
 
+TEST(Scene, VastCuttersWhoseSlopesAreNotKnownAreNamed) {
+  const auto warnings = [](const std::string& size, const std::string& turn) {
+    const auto scene = parse_scene("difference() {\n sphere(5);\n multmatrix([" + turn +
+                                       "]) multmatrix([[1,0,0,-" + size + "],[0,1,0,0],[0,0,1,-" +
+                                       size + "]]) cube(2" + size.substr(1) + "); }",
+                                   "s.csg");
+    EXPECT_TRUE(scene.has_value());
+    return scene ? scene->warnings : std::vector<SceneWarning>{};
+  };
+  const std::string turned = "[0.866025,-0.5,0,0],[0.5,0.866025,0,0],[0,0,1,0]";
+  const std::string straight = "[0,-1,0,0],[1,0,0,0],[0,0,1,0]";
+  ASSERT_EQ(warnings("1e20", turned).size(), 1u);
+  EXPECT_EQ(warnings("1e20", turned)[0].code, "approximate");
+  EXPECT_EQ(warnings("1e20", turned)[0].message.find("s.csg:3:"), 0u);
+  EXPECT_TRUE(warnings("1e20", straight).empty());
+  EXPECT_TRUE(warnings("1e9", turned).empty());
+}
+
 TEST(Scene, CoordinatesBeyondAllUseAreAnErrorThatNamesTheSolid) {
   const auto error = [](const std::string& text) {
     const auto scene = parse_scene(text, "s.csg");
@@ -338,8 +356,11 @@ TEST(Scene, CoordinatesBeyondAllUseAreAnErrorThatNamesTheSolid) {
     EXPECT_EQ(error(text).code, ErrorCode::kGeometry) << text;
     EXPECT_NE(error(text).message.find("has coordinates "), std::string::npos);
   }
+  EXPECT_NE(error(scaled(scaled("cube();"))).message.find("those of a solid must be below 1e+300"),
+            std::string::npos);
+  EXPECT_TRUE(parse_scene("difference() { sphere(); cube(1e250); }", "s.csg").has_value());
   EXPECT_EQ(error("sphere(); cube(1e120);").message,
-            "s.csg:1:11: 'cube' has coordinates of about 1e+120; those of a scene must be below "
+            "s.csg:1:11: 'cube' has coordinates of about 1e+120; those of a result must be below "
             "1e+100");
   EXPECT_EQ(scene_of("cube(1e90); multmatrix([[1,0,0,-1e90]]) cube();").tree.solids().size(), 2u);
 }
