@@ -291,7 +291,7 @@ Result<void> run_one(CsgCommand command, Session& session) {
   std::optional<csg::View> view;
   begin = session.milliseconds();
   if (!command.ids.empty() || !command.depth.empty()) {
-    const auto made = csg::make_view(camera, command.size, preview.box());
+    const auto made = preview.view(camera, command.size, execution);
     if (!made) return tl::unexpected(made.error());
     view = *made;
     const auto image = drawn(preview, may_fall_back, session,

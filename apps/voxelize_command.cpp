@@ -322,7 +322,9 @@ Result<void> voxelize_and_write(const VoxelizeCommand& command, VoxelizeOutcome&
     if (command.ids) count_ids(slab, outcome.id_voxels);
     return samples > 1 ? Result<void>() : write(slab);
   };
-  if (auto done = outcome.input.fit(outcome.grid, quiet); !done) return done;
+  VoxelGrid finest = outcome.grid;
+  finest.dims *= std::max(1, samples), finest.voxel_size /= std::max(1, samples);
+  if (auto done = outcome.input.fit(finest, quiet); !done) return done;
   auto report = voxelize_slabs(outcome.input.soup, outcome.grid, options, execution, sink);
   if (!report) return tl::unexpected(report.error());
   if (session.interrupted()) return fail(ErrorCode::kCancelled, "stopped");

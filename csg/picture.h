@@ -89,6 +89,11 @@ class Preview {
   /// Around all solids that are drawn: what a camera should see. Cutters more than a thousand times
   /// larger than the result do not count.
   [[nodiscard]] Bounds box() const;
+  /// The view of pictures: make_view() of box(). Where things stand around the eye, its depths
+  /// begin at the nearest face in the picture, so that what is small and near is seen whole before
+  /// what is vast and far. @return as make_view()
+  [[nodiscard]] Result<View> view(const Camera& camera, const glm::ivec2& size,
+                                  const Execution& execution = {}) const;
   [[nodiscard]] const Tree& tree() const;
 
   /// Has surfaces found elsewhere from now on, by a GPU say: the same, bit for bit. Borrowed, used

@@ -6,6 +6,7 @@
 #include <new>
 #include <numeric>
 
+#include "csg/depth_range.h"
 #include "csg/ghosts.h"
 #include "csg/picture.h"
 #include "csg/program.h"
@@ -234,6 +235,7 @@ struct Preview::Impl {
     for (const Translucent& part : translucent) shown.push_back(part.node);
     return picture_box(tree, geometry.boxes(), shown);
   }
+  Result<View> view(const Camera& camera, const glm::ivec2& size, const Execution& execution) const;
   std::span<const Translucent> with_ghosts(std::span<const Ghost> given) {
     for (const Ghost& ghost : given) translucent.push_back({ghost.node, ghost.colour});
     return translucent;
@@ -264,6 +266,22 @@ struct Preview::Impl {
   bool report_covers = false;  ///< report.covered is known
 };
 
+Result<View> Preview::Impl::view(const Camera& camera, const glm::ivec2& size,
+                                 const Execution& execution) const {
+  auto made = make_view(camera, size, box());
+  if (!made || !made->cut_short) return made;
+  const std::vector<Bounds> boxes = geometry.boxes();
+  Bounds seen = bounds(tree, tree.root(), boxes);
+  for (const Translucent& part : translucent) seen.include(bounds(tree, part.node, boxes));
+  const auto distances = seen_distances(geometry, *made, seen, execution);
+  // A face through the eye is cut off all the same: no depth would be left for all others.
+  constexpr double kLeastPart = 1.0 / (1 << 20);
+  if (!distances || distances->x < distances->y * kLeastPart) return made;
+  constexpr double kRoom = 1e-6;  // so that rounding clamps nothing
+  made->set_distances(distances->x * (1 - kRoom), distances->y * (1 + kRoom));
+  return made;
+}
+
 Result<Picture> Preview::Impl::picture(const Camera& camera, const glm::ivec2& size,
                                        const PictureOptions& options, const Execution& execution) {
   if (options.samples < 1 || options.samples > 64 ||
@@ -274,7 +292,7 @@ Result<Picture> Preview::Impl::picture(const Camera& camera, const glm::ivec2& s
   // As square a grid as can be.
   const int bits = std::countr_zero(static_cast<unsigned>(options.samples));
   const int across = 1 << ((bits + 1) / 2), down = 1 << (bits / 2);
-  const auto whole = make_view(camera, size, box());
+  const auto whole = view(camera, size, execution);
   if (!whole) return tl::unexpected(whole.error());
   if (size.x > kMaxPictureSide / across) {
     return fail(ErrorCode::kUsage, "{} pixels of {} samples in a row: {} samples can be had",
@@ -350,6 +368,10 @@ Preview::Preview(Preview&&) noexcept = default;
 Preview& Preview::operator=(Preview&&) noexcept = default;
 
 Bounds Preview::box() const { return impl_->box(); }
+Result<View> Preview::view(const Camera& camera, const glm::ivec2& size,
+                           const Execution& execution) const {
+  return impl_->view(camera, size, execution);
+}
 const Tree& Preview::tree() const { return impl_->tree; }
 void Preview::set_source(SurfaceSource* source) { impl_->frame.set_source(source); }
 

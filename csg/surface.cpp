@@ -53,14 +53,14 @@ Coincidence::Coincidence(const View& view, double world_error) : world_error_(wo
 }
 
 Coincidence::Bound Coincidence::bound(const LatticeMesh& mesh, std::uint32_t triangle,
-                                      std::uint32_t depth) const {
+                                      std::uint32_t depth, double share) const {
   const glm::uvec3& t = mesh.triangles[triangle];
   const glm::ivec3 &p = mesh.vertices[t.x], &q = mesh.vertices[t.y], &r = mesh.vertices[t.z];
   TriangleSetup setup;
   if (!setup_triangle(p, q, r, AxisFrame(Axis::kZ), setup)) return {};
   const double slopes = 0.5 * setup.steepness();
   const auto [low, high] = std::minmax({p.z, q.z, r.z});
-  const double least = flat(depth), at = depth;
+  const double least = flat(depth, share), at = depth;
   return {least + std::min(slopes, std::max(0.0, at - low)),
           least + std::min(slopes, std::max(0.0, high - at))};
 }

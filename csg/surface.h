@@ -52,8 +52,9 @@ class Coincidence {
   struct Bound {
     double nearer = 0, farther = 0;
   };
-  [[nodiscard]] Bound bound(const LatticeMesh& mesh, std::uint32_t triangle,
-                            std::uint32_t depth) const;
+  /// @param share  of the world error, Geometry::Part::error_share
+  [[nodiscard]] Bound bound(const LatticeMesh& mesh, std::uint32_t triangle, std::uint32_t depth,
+                            double share = 1.0) const;
 
   /// Steepness (see TriangleSetup) from which a triangle's bound is more than a tenth of a pixel:
   /// there are few such pixels, and each is looked at by itself.
@@ -66,9 +67,9 @@ class Coincidence {
   [[nodiscard]] Range range() const;
 
  private:
-  [[nodiscard]] double flat(double depth) const {
+  [[nodiscard]] double flat(double depth, double share) const {
     const double nearness = a_ - b_ * depth;
-    return 1.5 + flat_ * nearness * nearness;
+    return 1.5 + share * flat_ * nearness * nearness;
   }
   double a_ = 1, b_ = 0;  ///< 1 / distance = a - b * depth; 1 for an orthographic view
   double world_error_ = 0;
@@ -86,7 +87,8 @@ class FlipFaces {
 
   [[nodiscard]] Coincidence::Bound bound(const Flip& flip) const {
     if (flip.triangle == Surface::kNone) return {};
-    return coincidence_->bound((*view_parts_)[flip.solid].mesh, flip.triangle, flip.depth);
+    return coincidence_->bound((*view_parts_)[flip.solid].mesh, flip.triangle, flip.depth,
+                               (*parts_)[flip.solid].error_share);
   }
   /// Whether the face of `below` lies beneath the plane of `above`, but not the other way around:
   /// it begins at that plane, and `above` may go on where it does so.

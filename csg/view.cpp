@@ -70,6 +70,16 @@ double View::distance(double depth) const {
   return 1.0 / (1.0 / near - part * (1.0 / near - 1.0 / far));
 }
 
+void View::set_distances(double nearest, double farthest) {
+  near = nearest, far = farthest;
+  const double range = 1.0 / (1.0 / nearest - 1.0 / farthest) * kPictureDepthLimit;
+  for (int column = 0; column < 4; ++column) {
+    // Along the view axis eye space has -z.
+    const double along = eye_from_world[column].z, one = eye_from_world[column].w;
+    image_from_world[column].z = -range / nearest * along - range * one;
+  }
+}
+
 Result<View> make_view(const Camera& camera, const glm::ivec2& size, const Bounds& box) {
   if (size.x < 1 || size.y < 1 || size.x > kMaxPictureSide || size.y > kMaxPictureSide) {
     return fail(ErrorCode::kUsage, "a picture of {} x {} pixels: each side is 1 to {}", size.x,
@@ -104,6 +114,7 @@ Result<View> make_view(const Camera& camera, const glm::ivec2& size, const Bound
   nearest -= room, farthest += room;
   if (view.perspective) {
     farthest = std::max(farthest, 1e-9 * camera.distance);
+    view.cut_short = nearest < farthest * kNearestPart;
     nearest = std::max(nearest, farthest * kNearestPart);
   }
   view.near = nearest, view.far = farthest;

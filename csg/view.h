@@ -47,6 +47,11 @@ struct View {
   /// What lies before `near` is cut off there; the state of the ray at `near` is kept.
   double near = 1.0, far = 2.0;
 
+  /// The box that the view was made for reaches behind or beside the eye, or nearer than `near`.
+  bool cut_short = false;
+
+  /// Spreads the depths of a perspective view from one distance to another, both above 0.
+  void set_distances(double nearest, double farthest);
   /// Distance along the view axis of a depth.
   [[nodiscard]] double distance(double depth) const;
 };
@@ -56,8 +61,9 @@ inline constexpr std::uint32_t kPictureDepthLimit = std::uint32_t{1} << 24;
 /// Largest side of a picture, samples included.
 inline constexpr int kMaxPictureSide = 65536;
 
-/// The view of `camera` on what lies in `box`. Solids may be larger. @return kUsage when the size
-/// or camera is out of range
+/// The view of `camera` on what lies in `box`. Where a perspective one is cut short, its depths
+/// begin at 1/1024 of their end: Preview::view() knows better. Solids may be larger. @return kUsage
+/// when the size or camera is out of range
 Result<View> make_view(const Camera& camera, const glm::ivec2& size, const Bounds& box);
 
 }  // namespace strata::csg

@@ -70,7 +70,7 @@ class PreviewRenderer final : public Renderer {
     picked.pixel = pixel;
     adopt(request.what);
     if (!preview_) prepare(execution);
-    const auto whole = csg::make_view(request.camera, request.size, preview_->box());
+    const auto whole = preview_->view(request.camera, request.size, execution);
     if (!whole) return tl::unexpected(whole.error());
     // The picture's lattice, moved by whole pixels: the same bits.
     csg::View view = *whole;
