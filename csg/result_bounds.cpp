@@ -83,11 +83,13 @@ void unite(Reach& reach, const Reach& one) {
 
 Reach reach_of(const Tree& tree, Tree::NodeId root) {
   std::vector<Reach> all(root + 1);  // operands stand before the nodes that take them
+  std::vector<Bounds> solids(tree.solids().size());
   for (Tree::NodeId id = 0; id <= root; ++id) {
     Reach& reach = all[id];
     const Tree::Node& node = tree.nodes()[id];
     if (node.operation == Operation::kSolid) {
       reach = reach_of(tree.solids()[node.first]);
+      solids[node.first] = reach.box;
       continue;
     }
     const auto operands = tree.operands(id);
@@ -111,7 +113,14 @@ Reach reach_of(const Tree& tree, Tree::NodeId root) {
     }
     if (!glm::all(glm::lessThanEqual(reach.box.low, reach.box.high))) reach = {};
   }
-  return std::move(all[root]);
+  Reach& result = all[root];
+  // Of vast solids it knows what is left.
+  const Bounds left = bounds(tree, root, solids);
+  for (std::size_t i = 0; i < 6; ++i) {
+    if (side(left, i) != side(result.box, i)) result.witnesses[i].clear();
+  }
+  result.box = left;
+  return std::move(result);
 }
 
 enum class Side : std::uint8_t { kOutside, kInside, kUnknown };
