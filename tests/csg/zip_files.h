@@ -34,7 +34,8 @@ inline std::string zip_of(const std::vector<std::pair<std::string, std::string>>
     directory += "PK\1\2";
     number(directory, 20, 2);
     directory += common;
-    number(directory, 0, 10);  // comment, disk, attributes
+    number(directory, 0, 8);  // comment, disk, attributes
+    number(directory, 0, 2);
     number(directory, zip.size(), 4);
     directory += name;
     zip += "PK\3\4" + common + name + bytes;
