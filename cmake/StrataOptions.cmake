@@ -9,6 +9,7 @@ option(STRATA_WITH_OPENVDB "Compare with OpenVDB in tests and benchmarks; .vdb f
 option(STRATA_WITH_OPENEXR "Read and write deep .exr files" ON)
 option(STRATA_WITH_OPENMESH "Build the OpenMesh bridge" ON)
 option(STRATA_WITH_GL "Build the OpenGL part: libepoxy, EGL; the window: GLFW, Dear ImGui" ON)
+option(STRATA_JOIN_SOURCES "Compile several sources of a library as one: a whole build in half the time" OFF)
 set(STRATA_SANITIZE "" CACHE STRING "Sanitizers, as for -fsanitize=")
 
 if(NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)

@@ -1,7 +1,15 @@
 # The shapes of Strata's targets. All that a folder's CMakeLists.txt needs is here.
 
-# Warnings, sanitizers and the arithmetic that results may depend on.
+# Warnings, sanitizers, hardening and the arithmetic that results may depend on.
 function(strata_set_flags target)
+  # What is not a debug build goes to users: overflows of the stack and of known buffers end it, and no table of
+  # functions can be written once main() has begun (SECURITY.md).
+  if(NOT STRATA_SANITIZE)
+    set(optimized "$<NOT:$<CONFIG:Debug>>")
+    target_compile_options(${target} PRIVATE
+      "$<${optimized}:-fstack-protector-strong>" "$<${optimized}:-U_FORTIFY_SOURCE>" "$<${optimized}:-D_FORTIFY_SOURCE=2>")
+    target_link_options(${target} PRIVATE "$<${optimized}:LINKER:-z,relro,-z,now>")
+  endif()
   # Depth must not depend on the compiler: no fused multiply-add that the source does not ask for.
   target_compile_options(${target} PRIVATE
     -Wall -Wextra -Wpedantic -Wshadow -Wconversion -ffp-contract=off)
@@ -26,6 +34,12 @@ function(strata_set_flags target)
   endif()
 endfunction()
 
+# strata_compile_alone(FILES...): sources that another of their folder would disturb when several are compiled as one
+#   (STRATA_JOIN_SOURCES): Highway includes its files again for each target, and local names may be there twice.
+function(strata_compile_alone)
+  set_source_files_properties(${ARGN} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+endfunction()
+
 # strata_add_library(NAME SOURCES... [PUBLIC targets...] [PRIVATE targets...])
 #   makes strata_NAME, alias strata::NAME, headers found as "NAME/file.h" from the project's root. It is installed, and
 #   part of the umbrella strata::strata, unless it is INTERNAL.
@@ -33,7 +47,7 @@ function(strata_add_library name)
   cmake_parse_arguments(arg "INTERNAL" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
   add_library(strata_${name} STATIC ${arg_SOURCES})
   add_library(strata::${name} ALIAS strata_${name})
-  set_target_properties(strata_${name} PROPERTIES EXPORT_NAME ${name})
+  set_target_properties(strata_${name} PROPERTIES EXPORT_NAME ${name} UNITY_BUILD ${STRATA_JOIN_SOURCES})
   target_include_directories(strata_${name} PUBLIC
     "$<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>" "$<INSTALL_INTERFACE:include/strata>")
   target_compile_features(strata_${name} PUBLIC cxx_std_20)
@@ -72,15 +86,21 @@ function(strata_add_tool name)
   set_property(GLOBAL APPEND PROPERTY STRATA_TOOLS ${name})
 endfunction()
 
-# strata_add_test(NAME SOURCES... [LIBRARIES targets...]): a Google Test executable, one ctest entry a case.
+# strata_add_test(NAME [SANITIZED] SOURCES... [LIBRARIES targets...]): a Google Test executable, one ctest entry a case.
+#   SANITIZED: it reads what may be hostile, and is one of those that `./dev test` runs under sanitizers as well.
 function(strata_add_test name)
-  cmake_parse_arguments(arg "" "" "SOURCES;LIBRARIES" ${ARGN})
+  cmake_parse_arguments(arg "SANITIZED" "" "SOURCES;LIBRARIES" ${ARGN})
   add_executable(${name} ${arg_SOURCES})
   target_link_libraries(${name} PRIVATE ${arg_LIBRARIES} GTest::gtest GTest::gtest_main)
   target_compile_definitions(${name} PRIVATE STRATA_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
   strata_set_flags(${name})
   include(GoogleTest)
-  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 120 PROPERTIES TIMEOUT 600)
+  set(labels)
+  if(arg_SANITIZED)
+    set(labels LABELS sanitized)
+    add_dependencies(sanitized_tests ${name})
+  endif()
+  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 120 PROPERTIES TIMEOUT 600 ${labels})
 endfunction()
 
 # strata_add_fuzz(NAME SOURCES... CORPUS folder [LIBRARIES targets...])
@@ -95,7 +115,8 @@ function(strata_add_fuzz name)
   else()
     add_executable(${name} ${arg_SOURCES} "${PROJECT_SOURCE_DIR}/tests/fuzz/replay_main.cpp")
     add_test(NAME fuzz.${name} COMMAND ${name} "${arg_CORPUS}")
-    set_tests_properties(fuzz.${name} PROPERTIES TIMEOUT 600)
+    set_tests_properties(fuzz.${name} PROPERTIES TIMEOUT 600 LABELS sanitized)
+    add_dependencies(sanitized_tests ${name})
   endif()
   target_link_libraries(${name} PRIVATE ${arg_LIBRARIES})
   strata_set_flags(${name})
