@@ -7,8 +7,8 @@
 
 #include "apps/commands.h"
 #include "apps/session.h"
-#include "csg/picture.h"
 #include "csg/measure.h"
+#include "csg/picture.h"
 
 namespace strata::apps {
 
