@@ -55,6 +55,7 @@ void draw_outlines(csg::Picture& picture, const csg::Rgba& background) {
 void forget_looks(csg::Scene& scene) {
   scene.backgrounds.clear();
   scene.highlights.clear();
+  scene.shown.clear();
   for (csg::Solid& solid : scene.tree.solids()) solid.colour.reset();
 }
 
@@ -253,6 +254,10 @@ Result<void> run_one(CsgCommand command, Session& session) {
   const bool more = measures || !command.ids.empty() || !command.depth.empty();
   const Execution execution = session.execution("drawing", more ? 0.6 : 1.0);
   std::vector<csg::Ghost> ghosts = ghosts_of(*scene);
+  const csg::Tree::NodeId result = scene->tree.root();
+  if (!scene->shown.empty()) {
+    scene->tree.set_root(scene->tree.add(csg::Operation::kUnion, scene->shown));
+  }
   csg::Preview preview(std::move(scene->tree), std::move(ghosts), scene->relative_precision,
                        execution);
   if (*gpu) {
@@ -303,7 +308,7 @@ Result<void> run_one(CsgCommand command, Session& session) {
   if (measures) {
     begin = session.milliseconds();
     const csg::Tree& tree = preview.tree();
-    auto measured = csg::measure(tree, tree.root(), measure_options(command, *scene),
+    auto measured = csg::measure(tree, result, measure_options(command, *scene),
                                  session.execution("measuring"));
     if (!measured) return tl::unexpected(measured.error());
     outcome.measures = *measured;

@@ -233,9 +233,9 @@ std::shared_ptr<const TriangleSoup> half_space(const glm::dvec3& normal, double 
   return std::make_shared<const TriangleSoup>(transform(box, place));
 }
 
-/// What the unions at the top of the tree unite.
-std::vector<Tree::NodeId> united(const Tree& tree) {
-  std::vector<Tree::NodeId> stack{tree.root()}, parts;
+/// What the unions at the top of a node unite.
+std::vector<Tree::NodeId> united(const Tree& tree, Tree::NodeId node) {
+  std::vector<Tree::NodeId> stack{node}, parts;
   while (!stack.empty()) {
     const Tree::NodeId id = stack.back();
     stack.pop_back();
@@ -293,18 +293,29 @@ Result<csg::Scene> load_scene(const CsgCommand& command, Session& session,
   csg::Scene all;
   all.flat = flat;
   all.files = std::move(files_read);
-  std::vector<Tree::NodeId> roots;
+  std::vector<Tree::NodeId> roots, shown;
   for (const csg::Scene& input : inputs) {
+    const auto before = static_cast<Tree::NodeId>(all.tree.nodes().size());
     roots.push_back(add_scene(all, input, true));
+    // Nodes are added in their order.
+    for (const Tree::NodeId node : input.shown) shown.push_back(before + node);
+    if (input.shown.empty()) shown.push_back(roots.back());
     all.relative_precision = std::max(all.relative_precision, input.relative_precision);
   }
   all.tree.set_root(all.tree.add(Operation::kUnion, roots));
+  if (shown != roots) all.shown = std::move(shown);
   return all;
 }
 
 Result<Bounds> visible_box(const csg::Scene& scene, const Execution& execution) {
-  auto box = csg::result_bounds(scene.tree, scene.tree.root(), scene.relative_precision, execution);
-  if (!box) return box;
+  std::vector<Tree::NodeId> shown = scene.shown;
+  if (shown.empty()) shown.push_back(scene.tree.root());
+  Result<Bounds> box{Bounds{}};
+  for (const Tree::NodeId node : shown) {
+    const auto one = csg::result_bounds(scene.tree, node, scene.relative_precision, execution);
+    if (!one) return one;
+    box->include(*one);
+  }
   for (const auto* ghosts : {&scene.backgrounds, &scene.highlights}) {
     for (const Tree::NodeId ghost : *ghosts) box->include(csg::bounds(scene.tree, ghost));
   }
@@ -340,18 +351,19 @@ void cut_scene(csg::Scene& scene, const std::vector<SectionPlane>& cuts,
       const Tree::NodeId half = scene.tree.add_solid(std::move(solid));
       return scene.tree.add(Operation::kDifference, {node, half});
     };
-    if (scene.tree.root() != Tree::kNone) {
+    const auto cut_root = [&](Tree::NodeId root) {
       // Translucent solids stay children of the root's union.
       std::vector<Tree::NodeId> parts;
       if (has_translucent) {
-        parts = united(scene.tree);
+        parts = united(scene.tree, root);
         for (std::size_t k = 0; k < parts.size(); ++k) {
           parts[k] = cut(parts[k], parts.size() > 1 ? fmt::format(" of part {}", k + 1) : "");
         }
       }
-      scene.tree.set_root(has_translucent ? scene.tree.add(Operation::kUnion, parts)
-                                          : cut(scene.tree.root(), ""));
-    }
+      return has_translucent ? scene.tree.add(Operation::kUnion, parts) : cut(root, "");
+    };
+    if (scene.tree.root() != Tree::kNone) scene.tree.set_root(cut_root(scene.tree.root()));
+    for (Tree::NodeId& node : scene.shown) node = cut_root(node);
     std::size_t ghosts = 0;
     for (auto* list : {&scene.backgrounds, &scene.highlights}) {
       for (Tree::NodeId& ghost : *list) ghost = cut(ghost, fmt::format(" of ghost {}", ++ghosts));

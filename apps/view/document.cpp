@@ -150,6 +150,13 @@ apps::SectionPlane face(apps::SectionPlane plane, const csg::Camera& camera) {
 std::shared_ptr<const Arrangement> arrange(const Model& model, const Looks& looks) {
   const csg::Scene& scene = model.scene;
   Copier copier(scene.tree, looks);
+  if (!scene.shown.empty()) {
+    std::vector<Tree::NodeId> nodes;
+    for (const Tree::NodeId node : scene.shown) {
+      if (copier.made(node) != Tree::kNone) nodes.push_back(copier.made(node));
+    }
+    copier.tree().set_root(copier.tree().add(Operation::kUnion, nodes));
+  }
   csg::Scene shown;
   // What each ghost is drawn in, in the order of first the backgrounds, then the highlights.
   std::vector<glm::vec4> colours;

@@ -272,10 +272,12 @@ void Evaluator::leave() {
   Frame frame = std::move(frames_.back());
   frames_.pop_back();
   if (frame.emptied && operands_.size() > frame.base) {
+    show_highlights(frame.base, operands_.size(), frame.inside.outer);
     operands_.resize(frame.base);
     leftovers_ = true;
   }
   if (has_own_frame(frame.kind)) {
+    show_highlights(frame.base, operands_.size(), frame.inside.outer);
     operate(frame);
   } else if (operands_.size() > frame.base) {
     combine(frame);
@@ -293,6 +295,14 @@ void Evaluator::combine(Frame& frame) {
   if (frame.kind == NodeKind::kUnion) return;
   if (frame.dimension == Dimension::kFlat) return combine_flat(frame);
   const bool difference = frame.kind == NodeKind::kDifference;
+  // As in OpenSCAD a result is highlighted with its first operand, or with all it is common to.
+  std::size_t first_end = frame.base;
+  while (first_end < operands_.size() &&
+         (!difference || operands_[first_end].child == operands_[frame.base].child)) {
+    ++first_end;
+  }
+  const bool highlighted = all_highlighted(frame.base, first_end);
+  show_highlights(highlighted ? first_end : frame.base, operands_.size(), frame.inside.outer);
   std::vector<Tree::NodeId> operands, group;
   for (std::size_t i = frame.base; i < operands_.size();) {
     const std::uint32_t child = operands_[i].child;
@@ -308,6 +318,7 @@ void Evaluator::combine(Frame& frame) {
   }
   Operand result;
   result.node = frame.node;
+  result.highlight = highlighted ? ++highlights_ : 0;
   result.solid = operands.size() == 1 ? operands[0]
                                       : scene_.tree.add(difference ? Operation::kDifference
                                                                    : Operation::kIntersection,
@@ -323,6 +334,7 @@ void Evaluator::combine_flat(Frame& frame) {
          operands_[first_end].child == operands_[frame.base].child) {
     ++first_end;
   }
+  show_highlights(first_end, operands_.size(), frame.inside.outer);
   std::vector<Outline> regions{Outline{}};  // the piece, and what it meets
   if (frame.kind == NodeKind::kDifference) {
     for (std::size_t i = first_end; i < operands_.size(); ++i) {
@@ -364,15 +376,14 @@ void Evaluator::finish(std::uint32_t node, std::uint8_t modifiers, const Context
   if (error_) return;
   if (modifiers & AstNode::kBackground) {
     if (dimension != Dimension::kNone) {
-      scene_.backgrounds.push_back(ghost(base));
+      scene_.backgrounds.push_back(ghost(base, operands_.size()));
     }
     operands_.resize(base);
     return;
   }
   if ((modifiers & AstNode::kHighlight) && !outside.highlighted && dimension != Dimension::kNone) {
-    const Tree::NodeId shown = ghost(base);
-    scene_.highlights.push_back(
-        copy_nodes(std::span(&shown, 1), outside.outer, scene_.tree, scene_.tree)[0]);
+    ++highlights_;
+    for (std::size_t i = base; i < operands_.size(); ++i) operands_[i].highlight = highlights_;
   }
   take_child(frames_.back(), node, base, dimension);
 }
@@ -387,9 +398,11 @@ void Evaluator::take_child(Frame& parent, std::uint32_t node, std::size_t base,
   }
   if (parent.dimension != Dimension::kNone && parent.dimension != dimension) {
     const bool flat = dimension == Dimension::kFlat;
+    const bool shown = show_beside(base);
     warn(node, "ignored",
-         fmt::format("'{}' is {} and stands beside what is {}; it is left out", name(node),
-                     flat ? "flat" : "solid", flat ? "solid" : "flat"));
+         fmt::format("'{}' is {} and stands beside what is {}; {}", name(node),
+                     flat ? "flat" : "solid", flat ? "solid" : "flat",
+                     shown ? "previews show it, the result is without it" : "it is left out"));
     operands_.resize(base);
     leftovers_ = true;
     return;
@@ -401,11 +414,9 @@ void Evaluator::take_child(Frame& parent, std::uint32_t node, std::size_t base,
   ++parent.children;
 }
 
-/// The operands from `base` on as one node. It takes them: they, or it, must be copied if they are
-/// used further.
-Tree::NodeId Evaluator::ghost(std::size_t base) {
+Tree::NodeId Evaluator::ghost(std::size_t begin, std::size_t end, bool placed) {
   std::vector<Tree::NodeId> nodes;
-  for (std::size_t i = base; i < operands_.size(); ++i) {
+  for (std::size_t i = begin; i < end; ++i) {
     const Operand& operand = operands_[i];
     if (!operand.flat) {
       nodes.push_back(operand.solid);
@@ -413,12 +424,48 @@ Tree::NodeId Evaluator::ghost(std::size_t base) {
     }
     Solid solid;
     solid.mesh = std::make_shared<TriangleSoup>(make_slab(operand.outline, -0.5, 0.5, &job_));
+    if (placed) solid.world_from_mesh = operand.place;
     solid.colour = operand.colour;
     solid.name = fmt::format("{} at {}", name(operand.node), place(operand.node));
     nodes.push_back(scene_.tree.add_solid(std::move(solid)));
   }
   leftovers_ = true;
   return nodes.size() == 1 ? nodes[0] : scene_.tree.add(Operation::kUnion, nodes);
+}
+
+bool Evaluator::all_highlighted(std::size_t begin, std::size_t end) const {
+  return begin < end && std::all_of(operands_.begin() + static_cast<std::ptrdiff_t>(begin),
+                                    operands_.begin() + static_cast<std::ptrdiff_t>(end),
+                                    [](const Operand& one) { return one.highlight != 0; });
+}
+
+void Evaluator::show_highlights(std::size_t begin, std::size_t end, const glm::dmat4& outer) {
+  for (std::size_t i = begin; i < end;) {
+    const std::uint32_t highlight = operands_[i].highlight;
+    std::size_t next = i;
+    for (; next < end && operands_[next].highlight == highlight; ++next) {
+    }
+    if (highlight != 0) {
+      const Tree::NodeId shown = ghost(i, next);
+      scene_.highlights.push_back(
+          copy_nodes(std::span(&shown, 1), outer, scene_.tree, scene_.tree)[0]);
+    }
+    for (; i < next; ++i) operands_[i].highlight = 0;
+  }
+}
+
+bool Evaluator::show_beside(std::size_t base) {
+  const std::size_t end = operands_.size();
+  const bool at_top = std::all_of(frames_.begin(), frames_.end(), [](const Frame& frame) {
+    return frame.kind == NodeKind::kUnion && !(frame.modifiers & AstNode::kBackground);
+  });
+  if (!at_top) return false;
+  if (all_highlighted(base, end)) {
+    show_highlights(base, end, glm::dmat4(1.0));
+  } else {
+    beside_.push_back(ghost(base, end, true));
+  }
+  return true;
 }
 
 /// The flat operands from `base` on become slabs, one for each colour.
@@ -429,7 +476,10 @@ void Evaluator::make_slabs(std::size_t base) {
     if (done[i]) continue;
     std::vector<Outline> pieces;
     for (std::size_t j = i; j < operands_.size(); ++j) {
-      if (done[j] || !same_colour(operands_[j].colour, operands_[i].colour)) continue;
+      if (done[j] || !same_colour(operands_[j].colour, operands_[i].colour) ||
+          operands_[j].highlight != operands_[i].highlight) {
+        continue;
+      }
       done[j] = true;
       pieces.push_back(std::move(operands_[j].outline));
     }
@@ -441,6 +491,7 @@ void Evaluator::make_slabs(std::size_t base) {
     solid.name = fmt::format("{} at {}", name(operands_[i].node), place(operands_[i].node));
     Operand slab;
     slab.node = operands_[i].node;
+    slab.highlight = operands_[i].highlight;
     slab.solid = scene_.tree.add_solid(std::move(solid));
     slabs.push_back(std::move(slab));
   }
@@ -453,27 +504,51 @@ void Evaluator::drop_leftovers() {
   std::vector<Tree::NodeId> kept{scene_.tree.root()};
   kept.insert(kept.end(), scene_.backgrounds.begin(), scene_.backgrounds.end());
   kept.insert(kept.end(), scene_.highlights.begin(), scene_.highlights.end());
+  kept.insert(kept.end(), beside_.begin(), beside_.end());
   Tree tree;
   kept = copy_nodes(kept, glm::dmat4(1.0), scene_.tree, tree);
   tree.set_root(kept[0]);
   const auto ghosts = kept.begin() + 1;
   const auto backgrounds = static_cast<std::ptrdiff_t>(scene_.backgrounds.size());
   scene_.backgrounds.assign(ghosts, ghosts + backgrounds);
-  scene_.highlights.assign(ghosts + backgrounds, kept.end());
+  const auto beside = kept.end() - static_cast<std::ptrdiff_t>(beside_.size());
+  scene_.highlights.assign(ghosts + backgrounds, beside);
+  beside_.assign(beside, kept.end());
   scene_.tree = std::move(tree);
 }
 
 Scene Evaluator::take_scene() {
+  const bool placed = !beside_.empty() && !operands_.empty() && operands_[0].flat;
   if (!operands_.empty() && operands_[0].flat) {
     scene_.flat = true;
+    // Beside solids they are seen where their transforms in space put them.
+    for (std::size_t i = 0; i < operands_.size() && placed; ++i) {
+      if (operands_[i].highlight == 0) beside_.push_back(ghost(i, i + 1, true));
+    }
     make_slabs(0);
   }
   std::vector<Tree::NodeId> roots;
-  for (const Operand& operand : operands_) roots.push_back(operand.solid);
+  std::vector<bool> is_ghost;  // highlighted parts of the scene are seen through
+  for (const Operand& operand : operands_) {
+    roots.push_back(operand.solid);
+    is_ghost.push_back(operand.highlight != 0);
+  }
+  const bool all_ghosts = all_highlighted(0, operands_.size()) && beside_.empty();
+  const bool any_ghost = std::find(is_ghost.begin(), is_ghost.end(), true) != is_ghost.end();
+  show_highlights(0, operands_.size(), glm::dmat4(1.0));
   const Tree::NodeId root =
       roots.size() == 1 ? roots[0] : scene_.tree.add(Operation::kUnion, roots);
   scene_.tree.set_root(root);
   if (leftovers_) drop_leftovers();
+  if (!beside_.empty() || (any_ghost && !all_ghosts)) {
+    std::vector<Tree::NodeId>& shown = scene_.shown;
+    const auto parts = roots.size() == 1 ? std::span<const Tree::NodeId>()
+                                         : scene_.tree.operands(scene_.tree.root());
+    for (std::size_t i = 0; i < roots.size(); ++i) {
+      if (!is_ghost[i] && !placed) shown.push_back(parts.empty() ? scene_.tree.root() : parts[i]);
+    }
+    shown.insert(shown.end(), beside_.begin(), beside_.end());
+  }
   if (warnings_left_out_ > 0) {
     scene_.warnings.push_back(
         {"ignored", fmt::format("{}: {} more warnings", ast_.name, warnings_left_out_)});

@@ -120,6 +120,10 @@ void Evaluator::add_outline(std::uint32_t node, const Context& context, Outline 
     }
     operand.outline = transform(outline, context.plane);
   }
+  const glm::dmat3& p = context.plane;
+  const glm::dmat4 plane(glm::dvec4(p[0].x, p[0].y, 0, 0), glm::dvec4(p[1].x, p[1].y, 0, 0),
+                         glm::dvec4(0, 0, 1, 0), glm::dvec4(p[2].x, p[2].y, 0, 1));
+  if (context.world != plane) operand.place = context.world * glm::inverse(plane);
   operand.flat = true;
   operand.node = node;
   operand.colour = context.colour;

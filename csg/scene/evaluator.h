@@ -46,6 +46,8 @@ struct Operand {
   std::optional<glm::vec4> colour;  ///< of an outline
   std::uint32_t node = 0;           ///< of the Ast, where it comes from
   std::uint32_t child = 0;          ///< which child of the node that takes it
+  std::uint32_t highlight = 0;      ///< number of the `#` that it is of; 0: none
+  glm::dmat4 place{1.0};            ///< of an outline's slab in pictures: all of its transform
   bool flat = false;
 };
 
@@ -96,7 +98,15 @@ class Evaluator {
   void take_child(Frame& parent, std::uint32_t node, std::size_t base, Dimension dimension);
   bool enter_transform(Frame& frame);
   void enter_colour(Frame& frame);
-  Tree::NodeId ghost(std::size_t base);
+  /// Operands as one node. It takes them: they, or it, must be copied if they are used further.
+  /// @param placed  outlines stand where their transforms in space put them
+  Tree::NodeId ghost(std::size_t begin, std::size_t end, bool placed = false);
+  /// Operands that are highlighted become ghosts, and are no longer marked.
+  void show_highlights(std::size_t begin, std::size_t end, const glm::dmat4& outer);
+  /// Operands that the result is without, since they are flat beside solids or the other way
+  /// around: pictures may show them. @return whether they do
+  bool show_beside(std::size_t base);
+  [[nodiscard]] bool all_highlighted(std::size_t begin, std::size_t end) const;
   void make_slabs(std::size_t base);
   void drop_leftovers();
   Scene take_scene();
@@ -194,9 +204,11 @@ class Evaluator {
   const Ast& ast_;
   const Execution& execution_;
   std::string folder_, root_;
-  std::set<std::string> asked_for_;  ///< paths of files
-  bool leftovers_ = false;           ///< the tree has nodes that are part of nothing
-  bool newer_ = false;               ///< the dialect after 2021.01
+  std::set<std::string> asked_for_;   ///< paths of files
+  std::uint32_t highlights_ = 0;      ///< numbers of `#` given
+  std::vector<Tree::NodeId> beside_;  ///< shown, but no part of the result
+  bool leftovers_ = false;            ///< the tree has nodes that are part of nothing
+  bool newer_ = false;                ///< the dialect after 2021.01
   Scene scene_;
   std::uint32_t walk_first_ = 0, walk_end_ = 0;  ///< nodes
   double made_bytes_ = 0;                        ///< of the meshes so far, estimated

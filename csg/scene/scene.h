@@ -35,6 +35,9 @@ struct Scene {
   std::vector<Tree::NodeId> backgrounds;
   /// Subtrees with `#`: part of the tree, and shown again as red ghosts (nodes of their own).
   std::vector<Tree::NodeId> highlights;
+  /// What pictures show in place of the root; empty: the root. Highlighted parts are seen as ghosts
+  /// alone, and flat parts beside solids, which the root is without, as slabs.
+  std::vector<Tree::NodeId> shown;
   std::vector<SceneWarning> warnings;
   std::vector<std::string> notes;  ///< what a program printed with echo(), line by line, and such
   /// The top level is flat: its outlines are slabs of thickness 1, z from -0.5 to 0.5.

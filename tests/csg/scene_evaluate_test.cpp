@@ -175,6 +175,49 @@ TEST(Evaluate, HighlightsArePartOfTheSceneAndShownAgain) {
   EXPECT_EQ(scene_of("#cube(); #sphere();").highlights.size(), 2u);
 }
 
+/// Around what pictures show.
+Bounds box_shown(const Scene& scene) {
+  Bounds box;
+  for (const Tree::NodeId node : scene.shown) box.include(bounds(scene.tree, node));
+  return box;
+}
+
+// As in OpenSCAD's preview.
+TEST(Evaluate, HighlightedPartsBesideOthersAreSeenThrough) {
+  const Scene scene = scene_of("#cube([4,4,4]); " + moved(9, 0, 0) + "cube();");
+  expect_box(bounds(scene.tree, scene.tree.root()), {0, 0, 0}, {10, 4, 4});
+  expect_box(box_shown(scene), {9, 0, 0}, {10, 1, 1});
+  ASSERT_EQ(scene.highlights.size(), 1u);
+  expect_box(bounds(scene.tree, scene.highlights[0]), {0, 0, 0}, {4, 4, 4});
+  // A difference with its first operand; the scene as a whole stays.
+  const Scene whole = scene_of("difference() { #cube([4,4,4]); cube([2,4,4]); }");
+  EXPECT_TRUE(whole.shown.empty());
+  ASSERT_EQ(whole.highlights.size(), 1u);
+  EXPECT_NEAR(signed_volume(result_of(whole.tree, whole.highlights[0])), 32.0, 1e-9);
+  const Scene part = scene_of("difference() { #cube([4,4,4]); cube([2,4,4]); } " + moved(9, 0, 0) +
+                              "group() { cube(); } #" + moved(0, 9, 0) + "square();");
+  expect_box(box_shown(part), {9, 0, 0}, {10, 1, 1});
+  EXPECT_EQ(part.highlights.size(), 2u);
+}
+
+TEST(Evaluate, FlatPartsBesideSolidsAreSlabsOfPicturesOnly) {
+  for (const bool first : {false, true}) {
+    const std::string flat = moved(0, 0, 8) + "{ " + moved(5, 0, 0) + "square([2, 3]); }";
+    const Scene scene = scene_of(first ? flat + "cube();" : "cube();" + flat);
+    EXPECT_EQ(codes_of(scene), "ignored ");
+    expect_box(box_shown(scene), {0, 0, 0}, {7, 3, 8.5});
+    EXPECT_EQ(scene.flat, first);
+    if (first) {
+      EXPECT_NEAR(volume_of(scene), 6.0, 1e-9);
+    } else {
+      EXPECT_NEAR(volume_of(scene), 1.0, 1e-9);
+    }
+  }
+  // Where operations take them they are left out.
+  const Scene cut = scene_of("difference() { cube([4,4,4]); square(9); }");
+  EXPECT_TRUE(cut.shown.empty());
+}
+
 TEST(Evaluate, GhostsInsideHullsStandWhereTheyWouldBe) {
   const Scene scene =
       scene_of(moved(10, 0, 0) + "hull() { " + moved(0, 5, 0) + "{ %cube(); #cube(); } cube(); }");
