@@ -308,6 +308,7 @@ Result<void> AtomicFile::commit() {
   }
   if (target_.empty()) return {};
   if (current_group != nullptr) {
+    current_group->waiting_.reserve(current_group->waiting_.size() + 1);  // else the slot is lost
     current_group->waiting_.push_back({path_, target_, temporary_, std::exchange(slot_, -1)});
     return {};
   }
@@ -390,6 +391,7 @@ void AtomicFolder::discard() noexcept {
 Result<void> AtomicFolder::commit() {
   if (slot_ < 0) return fail(ErrorCode::kInternal, "{}: committed twice", path_);
   if (current_group != nullptr) {
+    current_group->waiting_.reserve(current_group->waiting_.size() + 1);  // else the slot is lost
     current_group->waiting_.push_back({path_, target_, temporary_, std::exchange(slot_, -1), true});
     return {};
   }
