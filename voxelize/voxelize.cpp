@@ -48,7 +48,8 @@ int slab_rows(const VoxelGrid& grid, Axis axis, int samples, const Execution& ex
       budget / (kBytesPerColumn * static_cast<std::uint64_t>(grid.dims[frame.u]));
   const auto unit = static_cast<std::uint64_t>(kTileSide) * static_cast<std::uint64_t>(samples);
   const std::uint64_t units = std::max<std::uint64_t>(1, rows / unit);
-  return static_cast<int>(std::min<std::uint64_t>(units * unit, kMaxGridSide / unit * unit));
+  const std::uint64_t most = std::max<std::uint64_t>(1, kMaxGridSide / unit);
+  return static_cast<int>(std::min(units, most) * unit);
 }
 
 Result<void> check_samples(const VoxelGrid& grid, const VoxelizeOptions& options) {

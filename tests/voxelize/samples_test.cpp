@@ -174,6 +174,20 @@ TEST(Samples, OfSlabsAreThoseOfThePiece) {
   }
 }
 
+TEST(Samples, MayBeMoreThanARowOfTilesHolds) {
+  const TriangleSoup box = make_box({0, 0, 0}, {1, 1, 1});
+  VoxelGrid grid;
+  grid.dims = {1, 1, 1};
+  grid.voxel_size = glm::dvec3(1.0);
+  std::uint32_t label = 0;
+  ASSERT_TRUE(voxelize_slabs(box, grid, with_samples(1100), {}, [&](const VoxelIntervals& slab) {
+    EXPECT_EQ(slab.v_end(), 1);  // with 0 rows it would go on for ever
+    label = label_at(slab, {0, 0, 0});
+    return slab.v_end() == 1 ? Result<void>() : fail(ErrorCode::kInternal, "no rows");
+  }));
+  EXPECT_EQ(label, 1100u * 1100u * 1100u);
+}
+
 TEST(Samples, BeyondTheLargestGridAreRefused) {
   const TriangleSoup box = make_box({0, 0, 0}, {1, 1, 1});
   VoxelGrid grid;
