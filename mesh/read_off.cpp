@@ -64,6 +64,7 @@ class OffReader {
     while (*p_ != '\n' && *p_ != '\r' && !at_end()) ++p_;
   }
   [[nodiscard]] bool at_end() const { return p_ >= end_; }
+  [[nodiscard]] bool at_line_end() const { return *p_ == '\n' || *p_ == '\r' || *p_ == '#'; }
   [[nodiscard]] tl::unexpected<Error> error(const std::string& message) const {
     return fail(ErrorCode::kInput, "{}:{}: {}", input_.name, line_of(input_.text, p_), message);
   }
@@ -88,7 +89,9 @@ class OffReader {
   const char* end_;
   const char* p_;
   Attempt how_;
-  bool homogeneous_ = false;  ///< four coordinates, the last divides
+  bool counts_in_line_ = true;  ///< those of vertices and faces stand in one line
+  bool left_over_ = false;      ///< something follows the last face
+  bool homogeneous_ = false;    ///< four coordinates, the last divides
   bool normals_ = false, colours_ = false, texture_ = false, with_dimension_ = false;
   std::uint64_t vertex_count_ = 0, face_count_ = 0;
   const char* faces_begin_ = nullptr;
@@ -137,18 +140,30 @@ Result<void> OffReader::read_header() {
   p_ = begin_;
   skip_gap();
   if (auto prefixes = read_prefixes(); !prefixes) return prefixes;
-  std::int64_t dimension = 3, vertices = 0, faces = 0, edges = 0;
-  if (with_dimension_ && (!next_integer(dimension) || dimension != 3)) {
-    return error(fmt::format("only 3 dimensions are supported, {}", found()));
+  std::int64_t dimension = 0, vertices = 0, faces = 0, edges = 0;
+  if (with_dimension_ && !next_integer(dimension)) {
+    return error(fmt::format("expected the dimension, {}", found()));
+  }
+  if (with_dimension_ && dimension != 3) {
+    return error(fmt::format("only 3 dimensions are supported, got {}", dimension));
   }
   if (!next_integer(vertices) || vertices < 0) {
     return error(fmt::format("expected the number of vertices, {}", found()));
   }
+  const char* const line = p_;
   if (!next_integer(faces) || faces < 0) {
     return error(fmt::format("expected the number of faces, {}", found()));
   }
+  counts_in_line_ = std::find_if(line, p_, [](char c) { return c == '\n' || c == '\r'; }) == p_;
   if (how_.layout == Layout::kLines) {
-    skip_line();  // the number of edges, which nobody needs
+    skip_inside();
+    const bool has_edges = !at_line_end();
+    skip_line();
+    // The number of edges may have a line of its own, which is too short for a vertex.
+    const char* const next = p_;
+    const bool is_number = !has_edges && next_integer(edges);
+    skip_inside();
+    if (!is_number || !at_line_end()) p_ = next;
   } else if (how_.edges_on_line) {
     while (is_blank(*p_) && *p_ != '\r') ++p_;
     (void)take_integer(edges);
@@ -272,7 +287,8 @@ Result<void> OffReader::attempt(const Attempt& attempt) {
     return fail(ErrorCode::kCancelled, "{}: reading was stopped", input_.name);
   }
   skip_gap();
-  if (!at_end()) {
+  left_over_ = !at_end();
+  if (left_over_) {
     if (how_.layout != Layout::kLines) return error(fmt::format("expected the end, {}", found()));
     mesh_.stats.warnings.push_back(fmt::format("{}:{}: what follows the last face is ignored",
                                                input_.name, line_of(input_.text, p_)));
@@ -282,7 +298,7 @@ Result<void> OffReader::attempt(const Attempt& attempt) {
 }
 
 Result<MeshFile> OffReader::read() {
-  Error furthest;
+  Error furthest{ErrorCode::kInput, {}};
   const char* furthest_place = nullptr;
   const auto good = [&](const Attempt& how) {
     auto done = attempt(how);
@@ -295,8 +311,11 @@ Result<MeshFile> OffReader::read() {
     }
     return false;
   };
-  bool read = good({});
-  for (const bool edges_on_line : {true, false}) {
+  const bool lines = good({});
+  bool read = lines && !left_over_;
+  // Where the counts have a line each, that of edges most likely has one, too.
+  const bool first = counts_in_line_;
+  for (const bool edges_on_line : {first, !first}) {
     for (const int colour_values : {4, 3}) {
       for (const Layout layout : {Layout::kWrapped, Layout::kTokens}) {
         if (read || furthest.code != ErrorCode::kInput || (colour_values == 3 && !colours_)) break;
@@ -304,6 +323,8 @@ Result<MeshFile> OffReader::read() {
       }
     }
   }
+  // A file that can be read by lines and in no other way ends in something else.
+  if (!read && lines && furthest.code == ErrorCode::kInput) read = good({});
   if (!read) return tl::unexpected(std::move(furthest));
   return finish_mesh(input_, std::move(mesh_),
                      [this](std::uint32_t element) { return locate(element); });

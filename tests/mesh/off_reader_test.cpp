@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "mesh/shapes.h"
 #include "mesh/write_mesh.h"
 #include "tests/mesh/reading.h"
@@ -70,6 +72,36 @@ TEST(OffReader, TokensMayStandInAnyLines) {
     EXPECT_EQ(file.soup.triangles, expected.soup.triangles) << text;
     EXPECT_TRUE(file.stats.warnings.empty()) << text;
   }
+}
+
+TEST(OffReader, NumberOfEdgesMayHaveALineOfItsOwn) {
+  // The last coordinate, 4, must not be taken for the size of a face "3 0 1 2".
+  const std::string lines = "0 0 0\n1 0 0\n1 1 0\n0 1 4\n3 0 1 2\n3 0 2 3\n";
+  std::string tokens = lines;
+  std::replace(tokens.begin(), tokens.end(), ' ', '\n');
+  for (const std::string& text :
+       {"OFF\n4\n2\n5\n" + lines, "OFF\n4\n2\n5 # edges\n" + lines, "OFF\n4\n2\n5\n" + tokens,
+        "OFF\n4 2\n5\n" + lines, "OFF\r\n4\r\n2\r\n5\r\n" + lines, "OFF\n4 2\n" + tokens,
+        "OFF\n4\n2\n" + lines}) {
+    const MeshFile file = parsed(kOff, text);
+    ASSERT_EQ(file.soup.positions.size(), 4u) << text;
+    EXPECT_EQ(file.soup.positions[0], glm::dvec3(0)) << text;
+    EXPECT_EQ(file.soup.positions[3], glm::dvec3(0, 1, 4)) << text;
+    EXPECT_EQ(file.soup.triangles, kTwoTriangles) << text;
+    EXPECT_TRUE(file.stats.warnings.empty()) << text;
+  }
+}
+
+TEST(OffReader, LinesThatLeaveSomethingOverAreReadByTokens) {
+  // Read by lines, the colours would be vertices, and the last two vertices faces.
+  const MeshFile file =
+      parsed(kOff,
+             "COFF\n4 2 0\n0 0 0\n9 9 9 1\n1 0 0\n9 9 9 1\n3 1 0\n3 0 1 2\n3 2 1\n3 0 1 2\n"
+             "3 0 1 2\n3 0 2 3\n");
+  EXPECT_EQ(file.soup.positions[1], glm::dvec3(1, 0, 0));
+  EXPECT_EQ(file.soup.positions[3], glm::dvec3(3, 2, 1));
+  EXPECT_EQ(file.soup.triangles, kTwoTriangles);
+  EXPECT_TRUE(file.stats.warnings.empty());
 }
 
 TEST(OffReader, TokensInLinesThatMakeNoWholeAreRefused) {
