@@ -269,10 +269,15 @@ Result<void> PlyReader::read_vertices(Source& source, const Element& element) {
   return {};
 }
 
+/// An index that no vertex has, and that is no -1 either.
+constexpr std::uint32_t kBadVertex = kMaxVertices;
+
+/// @return kNoVertex for -1, as signed or unsigned type, which parts strips
 std::uint32_t vertex_index(double value) {
-  return value >= 0.0 && value <= static_cast<double>(kMaxVertices) && value == std::floor(value)
+  if (value == -1.0 || value == static_cast<double>(kNoVertex)) return kNoVertex;
+  return value >= 0.0 && value < static_cast<double>(kBadVertex) && value == std::floor(value)
              ? static_cast<std::uint32_t>(value)
-             : kNoVertex;
+             : kBadVertex;
 }
 
 /// Calls visit(a, b, c) for the triangles of a strip, turned alike, until it returns false. Those
@@ -377,7 +382,7 @@ FacePlace PlyReader::locate(std::span<const FaceSource<Source>> sources, std::ui
           if (seen <= face) return true;
           result.place = place(Source(start, end_));
           for (const std::uint32_t corner : corners) {
-            if (corner == kNoVertex && one.kind == FaceKind::kPolygon) {
+            if (corner == kBadVertex || (corner == kNoVertex && one.kind == FaceKind::kPolygon)) {
               result.vertex = "with no valid number";
             }
           }

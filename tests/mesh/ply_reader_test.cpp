@@ -204,6 +204,12 @@ TEST(PlyReader, TriangleStripsTurnAlikeAndRestart) {
   EXPECT_EQ(bad.soup.triangles, (std::vector<glm::uvec3>{{0, 1, 2}, {2, 1, 3}}));
   EXPECT_EQ(only_warning(bad),
             "file:19: face refers to vertex 8, the file has 8; 1 face was dropped");
+  // Only -1 begins a new strip.
+  const MeshFile negative = parsed(kPly, header + "4 0 1 2 3\n6 4 5 -1 5 6 -7\n");
+  EXPECT_EQ(negative.soup.triangles, bad.soup.triangles);
+  EXPECT_EQ(only_warning(negative),
+            "file:19: face refers to vertex with no valid number, the file has 8; 1 face was "
+            "dropped");
 }
 
 TEST(PlyReader, BinaryTriangleStripsAreReadToo) {
