@@ -136,7 +136,8 @@ class PolygonCuts {
     const std::size_t blocks = (count + kBlock - 1) / kBlock;
     std::vector<Bent> bent(blocks);
     parallel_for(execution, blocks, [&](std::size_t block, int) {
-      bent[block] = cut_block(block * kBlock, std::min(count, (block + 1) * kBlock));
+      bent[block] =
+          cut_block(block * kBlock, std::min(count, (block + 1) * kBlock), execution.stop);
     });
     Bent all;
     for (const Bent& one : bent) {
@@ -152,7 +153,7 @@ class PolygonCuts {
 
  private:
   /// The polygons that begin in [begin, end).
-  Bent cut_block(std::size_t begin, std::size_t end) {
+  Bent cut_block(std::size_t begin, std::size_t end, const std::stop_token& stop_token) {
     const std::vector<std::uint32_t>& elements = soup_.face_elements;
     Bent bent;
     PolygonCutter cutter;
@@ -160,6 +161,8 @@ class PolygonCuts {
     for (std::size_t stop = begin; begin < end; begin = stop) {
       for (stop = begin + 1; stop < elements.size() && elements[stop] == elements[begin];) ++stop;
       if (stop - begin < 2) continue;
+      constexpr std::size_t kMany = 1024;  // corners of a polygon that may take long
+      if (stop - begin > kMany && stop_token.stop_requested()) break;
       const Bend bend = stop - begin == 2 ? cut_quad_at(begin) : cut_at(begin, stop, cutter);
       if (bend.large() && bent.count++ == 0) {
         bent.first = elements[begin];

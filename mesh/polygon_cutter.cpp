@@ -168,12 +168,23 @@ bool PolygonCutter::convex() const {
 void PolygonCutter::begin_at_least_corner(std::span<const glm::dvec3> corners) {
   const std::size_t count = corners.size();
   const auto corner = [&](std::size_t i) -> const glm::dvec3& { return corners[i % count]; };
+  // Where several corners are in the least place, what follows decides. Two candidates, of which
+  // the one that loses after k equal corners takes with it the k that follow.
   std::size_t least = 0;
-  for (std::size_t i = 1; i < count; ++i) {
-    if (least_first(corner(least), corner(i))) continue;
-    std::size_t k = 0;  // where several corners are in the least place, what follows decides
-    while (k < count && corner(i + k) == corner(least + k)) ++k;
-    if (k < count && least_first(corner(i + k), corner(least + k))) least = i;
+  for (std::size_t other = 1, k = 0; other < count && k < count;) {
+    const glm::dvec3 &p = corner(least + k), &q = corner(other + k);
+    if (p == q) {
+      ++k;
+      continue;
+    }
+    if (least_first(q, p)) {
+      const std::size_t beyond = least + k + 1;
+      least = other;
+      other = std::max(beyond, other + 1);
+    } else {
+      other += k + 1;
+    }
+    k = 0;
   }
   corner_.clear();
   for (std::size_t i = least; i < least + count; ++i) {

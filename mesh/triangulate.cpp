@@ -72,6 +72,8 @@ class Clipping {
   const std::vector<glm::uvec3>& triangles() const { return triangles_; }
   /// How much area lies in triangles that are turned around.
   double turned_area() const { return turned_area_; }
+  /// Whether the search for ears was given up: the outline crosses itself all over.
+  bool gave_up() const { return looks_ > most_looks(); }
 
  private:
   int turn(Index a, Index b, Index c) const {
@@ -372,7 +374,12 @@ class Clipping {
   /// How much an ear is asked for; a level is tried when the one before finds none.
   enum Level { kClear, kTouched, kFlat, kConvex, kAny, kLevels };
 
+  /// Far more than simple outlines take. Those that cross themselves all over have few ears, and
+  /// the search for each would go through all that is left.
+  std::uint64_t most_looks() const { return (std::uint64_t{1} << 22) + 4096 * nodes_.size(); }
+
   bool is_ear(Index b, Level level) {
+    ++looks_;
     const Index a = nodes_[b].prev, c = nodes_[b].next;
     const glm::dvec2 &pa = nodes_[a].p, &pb = nodes_[b].p, &pc = nodes_[c].p;
     // Two points in one place: nothing is cut off.
@@ -388,6 +395,7 @@ class Clipping {
     const glm::dvec2 low = glm::min(pa, glm::min(pb, pc)), high = glm::max(pa, glm::max(pb, pc));
     if (level == kFlat) return true;
     return !reflex_.any(low, high, [&](Index i) {
+      ++looks_;
       if (i == a || i == b || i == c) return false;
       const glm::dvec2& p = nodes_[i].p;
       if (p.x < low.x || p.x > high.x || p.y < low.y || p.y > high.y) return false;
@@ -455,7 +463,7 @@ class Clipping {
         continue;
       }
       node.waits = false;
-      if (!is_ear(i, static_cast<Level>(level))) continue;
+      if (!is_ear(i, gave_up() ? kAny : static_cast<Level>(level))) continue;
       cut(i);
       --left;
       ++cuts;
@@ -479,6 +487,7 @@ class Clipping {
   glm::dvec2 low_{0}, high_{0};
   std::vector<glm::uvec3> triangles_;
   double turned_area_ = 0;
+  std::uint64_t looks_ = 0;  ///< at nodes, for ears
 };
 
 }  // namespace
@@ -497,7 +506,7 @@ std::vector<glm::uvec3> triangulate(std::span<const std::vector<glm::dvec2>> con
       best = clipping.triangles();
     }
     constexpr double kNothing = 1e-12;
-    if (least <= kNothing * area) break;
+    if (least <= kNothing * area || clipping.gave_up()) break;
   }
   return best;
 }

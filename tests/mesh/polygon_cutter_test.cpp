@@ -304,5 +304,33 @@ TEST(PolygonCutter, TimeGrowsWithTheCornersNotWithTheirSquare) {
   EXPECT_LT(time_of(64'000), 150.0 * time_of(4'000));
 }
 
+TEST(PolygonCutter, TimeOfPolygonsThatCrossThemselvesStaysBounded) {
+  const auto time_of = [](const Points& points) {
+    const auto start = std::chrono::steady_clock::now();
+    const Triangles triangles = cut(points);
+    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+    glm::dvec3 sum(0.0);
+    for (const glm::uvec3& t : triangles) sum += area_vector(points, t);
+    const glm::dvec3 wanted = area_vector(points);
+    EXPECT_NEAR(sum.z, wanted.z, 1e-9 * std::abs(wanted.z));
+    return took.count();
+  };
+  const auto scattered = [](int count) {
+    std::mt19937 random(7);
+    std::uniform_real_distribution<double> place(0.0, 1.0);
+    Points points(static_cast<std::size_t>(count));
+    for (glm::dvec3& p : points) p = {place(random), place(random), 0.0};
+    return points;
+  };
+  // Four times the corners: 64 times where each ear is looked for among all that is left.
+  EXPECT_LT(time_of(scattered(4'000)), 24.0 * time_of(scattered(1'000)));
+  const auto rounds = [](int times) {
+    Points points;
+    for (int i = 0; i < times; ++i) points.insert(points.end(), {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}});
+    return points;
+  };
+  EXPECT_LT(time_of(rounds(32'000)), 100.0 * time_of(rounds(2'000)));
+}
+
 }  // namespace
 }  // namespace strata
