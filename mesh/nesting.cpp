@@ -101,11 +101,13 @@ bool holds(const PartSample& outer, const PartSample& inner) {
 std::vector<Winding> windings_around(const TriangleSoup& mesh,
                                      const std::vector<std::uint32_t>& part_of,
                                      const std::vector<char>& turned,
-                                     const std::vector<PartSample>& samples) {
+                                     const std::vector<PartSample>& samples,
+                                     const std::stop_token& stop) {
   std::vector<Winding> found;
   if (samples.size() < 2) return found;
   const SampleGrid grid(samples);
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    if (t % 1024 == 0 && stop.stop_requested()) break;
     const std::uint32_t part = part_of[t];
     if (part >= samples.size()) continue;
     const glm::dvec3 &a = mesh.positions[mesh.triangles[t].x],
@@ -145,7 +147,7 @@ struct Piece {
 /// Whether all pieces that are not outward bound cavities of others.
 /// @param piece_of  of each triangle
 bool only_cavities(const TriangleSoup& mesh, std::vector<Piece>& pieces,
-                   std::vector<std::uint32_t>& piece_of) {
+                   std::vector<std::uint32_t>& piece_of, const std::stop_token& stop) {
   for (std::size_t t = 0; t < piece_of.size(); ++t) pieces[piece_of[t]].extent.include(mesh, t);
   std::vector<std::uint32_t> order(pieces.size()), place(pieces.size());
   std::iota(order.begin(), order.end(), 0u);
@@ -160,7 +162,7 @@ bool only_cavities(const TriangleSoup& mesh, std::vector<Piece>& pieces,
   for (std::uint32_t& piece : piece_of) piece = place[piece];
   std::vector<int> around(pieces.size(), 0);
   for (const Winding& winding :
-       windings_around(mesh, piece_of, std::vector<char>(piece_of.size(), 0), samples)) {
+       windings_around(mesh, piece_of, std::vector<char>(piece_of.size(), 0), samples, stop)) {
     const double outer = std::abs(pieces[order[winding.part]].wedge.volume),
                  inner = std::abs(pieces[order[winding.around]].wedge.volume);
     if (outer > (1 + 1e-6) * inner) around[winding.around] += winding.times;
@@ -219,7 +221,7 @@ bool all_outward(const TriangleSoup& mesh, std::span<const EdgeSum> by_index, bo
   }
   return std::all_of(pieces.begin(), pieces.end(),
                      [](const Piece& piece) { return piece.wedge.positive(); }) ||
-         only_cavities(mesh, pieces, piece_of);
+         only_cavities(mesh, pieces, piece_of, execution.stop);
 }
 
 }  // namespace strata::detail

@@ -348,7 +348,8 @@ class Orienter {
       place_of[t] = place[part_of_[t]];
       turned[t] = static_cast<char>(turned_[t] ^ static_cast<char>(parts_[part_of_[t]].turned));
     }
-    const auto windings = detail::windings_around(mesh_, place_of, turned, samples);
+    const auto windings =
+        detail::windings_around(mesh_, place_of, turned, samples, execution_.stop);
     std::vector<char> flipped(order.size(), 0);
     auto next = windings.begin();
     for (std::uint32_t i = 0; i < order.size(); ++i) {

@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 #include <numeric>
 #include <span>
+#include <stop_token>
 #include <tuple>
 #include <vector>
 
@@ -105,10 +106,12 @@ struct Winding {
 /// The windings that are not 0 of each part around the samples of those whose box its own box
 /// holds, sorted. @param part_of  of each triangle; those >= samples.size() do not count
 /// @param turned  triangles that count the other way around
+/// @param stop  some are missing once it is requested
 [[nodiscard]] std::vector<Winding> windings_around(const TriangleSoup& mesh,
                                                    const std::vector<std::uint32_t>& part_of,
                                                    const std::vector<char>& turned,
-                                                   const std::vector<PartSample>& samples);
+                                                   const std::vector<PartSample>& samples,
+                                                   const std::stop_token& stop);
 
 /// Whether every piece of a closed mesh that shares no vertex with the others has a volume above 0,
 /// or bounds a cavity.
