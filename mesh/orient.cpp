@@ -8,6 +8,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <numeric>
+#include <span>
 #include <tuple>
 #include <utility>
 
@@ -125,7 +126,74 @@ class Orienter {
     for (std::size_t t = 0; t < count; ++t) {
       if (several[first[t]] != 0) partner[t] = kNone;
     }
+    pair_polygons(partner);
     return partner;
+  }
+
+  /// The same of polygons that look opposite ways, which may be cut along other diagonals.
+  void pair_polygons(std::vector<std::uint32_t>& partner) const {
+    struct Side {
+      std::uint32_t low, high;
+      int way;
+    };
+    struct Polygon {
+      std::size_t begin, end;   ///< triangles
+      std::size_t first, last;  ///< sides
+    };
+    const auto less = [](const Side& a, const Side& b) {
+      return std::tie(a.low, a.high) < std::tie(b.low, b.high);
+    };
+    std::vector<Side> sides;
+    std::vector<Polygon> polygons;
+    const std::vector<std::uint32_t>& elements = mesh_.face_elements;
+    for (std::size_t begin = 0, end = 0; begin < elements.size(); begin = end) {
+      const std::size_t first = sides.size();
+      bool whole = true;
+      for (end = begin; end < elements.size() && elements[end] == elements[begin]; ++end) {
+        const glm::uvec3 c = welded_corners(end);
+        whole = whole && counts(end);
+        for (int k = 0; k < 3; ++k) {
+          const std::uint32_t a = c[k], b = c[(k + 1) % 3];
+          sides.push_back({std::min(a, b), std::max(a, b), a < b ? 1 : -1});
+        }
+      }
+      std::sort(sides.begin() + static_cast<std::ptrdiff_t>(first), sides.end(), less);
+      std::size_t last = first;  // diagonals, used once each way, fall out
+      for (std::size_t i = first; i < sides.size();) {
+        Side side = sides[i];
+        for (++i; i < sides.size() && !less(side, sides[i]); ++i) side.way += sides[i].way;
+        if (side.way != 0) sides[last++] = side;
+      }
+      if (end - begin < 2 || !whole) last = first;
+      sides.resize(last);
+      if (last > first) polygons.push_back({begin, end, first, last});
+    }
+    const auto of = [&](const Polygon& polygon) {
+      return std::span<const Side>(sides).subspan(polygon.first, polygon.last - polygon.first);
+    };
+    const auto before = [&](const Polygon& a, const Polygon& b) {
+      const auto p = of(a), q = of(b);
+      return std::lexicographical_compare(p.begin(), p.end(), q.begin(), q.end(), less);
+    };
+    std::stable_sort(polygons.begin(), polygons.end(), before);
+    for (std::size_t i = 0, end = 0; i < polygons.size(); i = end) {
+      for (end = i + 1; end < polygons.size() && !before(polygons[i], polygons[end]);) ++end;
+      if (end - i != 2) continue;
+      const Polygon &a = polygons[i], &b = polygons[i + 1];
+      const auto p = of(a), q = of(b);
+      if (a.end - a.begin != b.end - b.begin ||
+          !std::equal(p.begin(), p.end(), q.begin(), q.end(),
+                      [](const Side& s, const Side& t) { return s.way == -t.way; })) {
+        continue;
+      }
+      for (std::size_t t = a.begin, u = b.begin; t < a.end; ++t, ++u) {
+        for (const std::uint32_t old : {partner[t], partner[u]}) {
+          if (old != kNone) partner[old] = kNone;
+        }
+        partner[t] = static_cast<std::uint32_t>(u);
+        partner[u] = static_cast<std::uint32_t>(t);
+      }
+    }
   }
 
   /// Removes the second sides of parts that have each face twice and are closed by one of them.

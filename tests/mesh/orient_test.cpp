@@ -205,6 +205,30 @@ TEST(Orient, ADoubleSidedSolidIsOneSolid) {
   expect_stays(joined({cube, sheet}));
 }
 
+TEST(Orient, SidesOfADoubleSidedSolidMayBeCutAlongOtherDiagonals) {
+  // As of quadrilaterals "f 1 2 3 4" and "f 4 3 2 1", which are fans from their first corners.
+  constexpr std::uint32_t kFaces[6][4] = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4},
+                                          {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
+  TriangleSoup mesh;
+  for (int i = 0; i < 8; ++i) mesh.positions.emplace_back(i & 1, i >> 1 & 1, i >> 2);
+  const auto add = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c, std::uint32_t d) {
+    const auto element = static_cast<std::uint32_t>(mesh.triangles.size() / 2);
+    mesh.triangles.insert(mesh.triangles.end(), {{a, b, c}, {a, c, d}});
+    mesh.face_elements.insert(mesh.face_elements.end(), 2, element);
+  };
+  for (const auto& f : kFaces) add(f[0], f[1], f[2], f[3]);
+  for (const auto& f : kFaces) add(f[3], f[2], f[1], f[0]);
+  for (const bool turned : {false, true}) {
+    TriangleSoup both = mesh;
+    if (turned) std::reverse(both.triangles.begin(), both.triangles.end());
+    const Orientation found = orient_parts(both);
+    EXPECT_EQ(found.double_faces, 12u);
+    EXPECT_TRUE(found.closed);
+    EXPECT_EQ(both.triangles.size(), 12u);
+    EXPECT_EQ(signed_volume(both), 1.0);
+  }
+}
+
 TEST(Orient, AMoebiusStripStaysAsItIs) {
   TriangleSoup strip;
   constexpr std::uint32_t kSteps = 12;
