@@ -87,7 +87,7 @@ function(strata_add_tool name)
 endfunction()
 
 # strata_add_test(NAME [SANITIZED] SOURCES... [LIBRARIES targets...]): a Google Test executable, one ctest entry a case.
-#   SANITIZED: it reads what may be hostile, and is one of those that `./dev test` runs under sanitizers as well.
+#   SANITIZED: it reads what may be hostile, and is one of those that `./dev sanitized` runs.
 function(strata_add_test name)
   cmake_parse_arguments(arg "SANITIZED" "" "SOURCES;LIBRARIES" ${ARGN})
   add_executable(${name} ${arg_SOURCES})
