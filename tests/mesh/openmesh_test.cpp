@@ -4,6 +4,7 @@
 #include <cmath>
 #include <fstream>
 #include <map>
+#include <set>
 
 #include "mesh/diagnose.h"
 #include "mesh/openmesh_bridge.h"
@@ -97,19 +98,30 @@ TEST(OpenMeshReader, PipesAndForeignExtensionsAreUsageErrors) {
   EXPECT_EQ(read_mesh("a.obj", options).error().code, ErrorCode::kUsage);
 }
 
-/// The corners of every face element.
+/// The corners of every face element, however it is cut into triangles: the edges that no other of
+/// its triangles has the other way round, one after the other.
 std::vector<std::vector<glm::dvec3>> polygons(const TriangleSoup& soup) {
   std::vector<std::vector<glm::dvec3>> result;
-  std::uint32_t last = 0xffffffffu;
-  for (std::size_t t = 0; t < soup.triangles.size(); ++t) {
-    const glm::uvec3 corners = soup.triangles[t];
-    const std::uint32_t element =
-        soup.face_elements.empty() ? static_cast<std::uint32_t>(t) : soup.face_elements[t];
-    if (result.empty() || element != last) {
-      result.push_back({soup.positions[corners.x], soup.positions[corners.y]});
+  const auto element = [&](std::size_t t) {
+    return soup.face_elements.empty() ? static_cast<std::uint32_t>(t) : soup.face_elements[t];
+  };
+  for (std::size_t t = 0; t < soup.triangles.size();) {
+    std::map<std::uint32_t, std::uint32_t> next;  // along the outline
+    std::set<std::pair<std::uint32_t, std::uint32_t>> edges;
+    const std::size_t begin = t;
+    for (; t < soup.triangles.size() && element(t) == element(begin); ++t) {
+      const glm::uvec3& c = soup.triangles[t];
+      for (int i = 0; i < 3; ++i) edges.emplace(c[i], c[(i + 1) % 3]);
     }
-    result.back().push_back(soup.positions[corners.z]);
-    last = element;
+    for (const auto& [from, to] : edges) {
+      if (!edges.contains({to, from})) next[from] = to;
+    }
+    std::vector<glm::dvec3>& corners = result.emplace_back();
+    std::uint32_t at = soup.triangles[begin].x;
+    if (!next.contains(at) && !next.empty()) at = next.begin()->first;
+    for (std::size_t i = 0; i < next.size(); ++i, at = next[at]) {
+      corners.push_back(soup.positions[at]);
+    }
   }
   return result;
 }
