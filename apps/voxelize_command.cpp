@@ -82,10 +82,10 @@ Result<void> check_open(const VoxelizeCommand& command, const MeshInput& input, 
                 file.path);
   }
   if (input.has_scene() && command.open == OpenMode::kVote) {
-    session.warn("open",
-                 fmt::format("{}: with scenes the three axes do not vote: each ray by itself pairs "
-                             "the faces of an open mesh, and one without a partner is a sheet",
-                             file.path));
+    session.warn(
+        "open", fmt::format("{}: holes are not closed beside a scene: each ray by itself pairs the "
+                            "faces of an open mesh, and a face without a partner becomes a sheet",
+                            file.path));
   }
   return {};
 }

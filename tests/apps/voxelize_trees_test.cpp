@@ -94,7 +94,7 @@ TEST_F(VoxelizeTrees, OpenMeshesInScenesAreReportedWithTheRuleThatDecides) {
     const json found = report(with({}));
     const auto said = codes(found);
     EXPECT_NE(std::find(said.begin(), said.end(), "open"), said.end()) << files.back();
-    EXPECT_NE(last_error.find(files.back() + ": with scenes the three axes do not vote"),
+    EXPECT_NE(last_error.find(files.back() + ": holes are not closed beside a scene"),
               std::string::npos)
         << last_error;
     EXPECT_EQ(found["input"]["closed"], false);
