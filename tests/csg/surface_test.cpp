@@ -1,7 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <chrono>
-
 #include "csg/picture.h"
 #include "csg/surface.h"
 #include "csg/tile_surface.h"
@@ -563,39 +561,6 @@ TEST(VisibleSurface, AThousandLayersInOnePixelAreRight) {
   camera.distance /= 40;
   camera.rotation = {1.5, 0, 30};
   expect_same(tree, camera, {64, 64}, "from above");
-}
-
-/// A tetrahedron of which one face is there `count` times.
-Tree equal_faces(std::uint32_t count) {
-  TriangleSoup mesh;
-  mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-  mesh.triangles.assign(count, glm::uvec3(0, 1, 2));
-  mesh.triangles.insert(mesh.triangles.end(), {{0, 1, 3}, {1, 2, 3}, {2, 0, 3}});
-  Tree tree;
-  tree.set_root(tree.add_solid({std::make_shared<TriangleSoup>(std::move(mesh))}));
-  return tree;
-}
-
-TEST(Surface, ManyEqualFacesTakeTimeThatGrowsWithTheirNumber) {
-  const auto seconds = [](std::uint32_t count, std::size_t& covered) {
-    Preview preview(equal_faces(count), {}, 0);
-    Camera camera = look_at({3, 4, 5}, {0.3, 0.3, 0.3});
-    const auto view = make_view(camera, {64, 64}, preview.box());
-    EXPECT_TRUE(view);
-    const auto start = std::chrono::steady_clock::now();
-    const auto image = preview.draw(*view);
-    EXPECT_TRUE(image);
-    const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
-    covered = 0;
-    for (const std::uint32_t depth : (*image)->depth) covered += depth != SurfaceImage::kNone;
-    return taken.count();
-  };
-  std::size_t few = 0, many = 0;
-  const double short_time = seconds(1000, few);
-  const double long_time = seconds(8000, many);
-  EXPECT_GT(few, 50u);
-  EXPECT_EQ(few, many);
-  EXPECT_LT(long_time, 24 * short_time);  // with its square 64 times
 }
 
 }  // namespace
