@@ -7,6 +7,7 @@
 #include "apps/commands.h"
 #include "apps/csg_report.h"
 #include "apps/csg_scene.h"
+#include "apps/file_conflicts.h"
 #include "apps/gpu.h"
 #include "apps/session.h"
 #include "csg/picture.h"
@@ -193,6 +194,9 @@ Result<void> run_csg(const CsgCommand& command, Session& session) {
     one.input.scene.openscad_options.insert(
         one.input.scene.openscad_options.end(),
         {"-D", fmt::format("$t={}", static_cast<double>(frame) / command.frames)});
+    const std::vector<FileUse> written = outputs_of(one);
+    if (auto kept = check_files(inputs_of(one.input), written); !kept) return kept;
+    session.set_outputs(written, true);
     if (auto done = run_one(std::move(one), session); !done) return done;
   }
   return {};

@@ -69,6 +69,10 @@ bool is_stream(const std::string& path) {
 std::vector<FileUse> inputs_of(const InputOptions& input) {
   std::vector<FileUse> uses;
   for (const std::string& path : input.files) uses.push_back({"the input", path});
+  const std::vector<std::string>& options = input.scene.openscad_options;
+  for (std::size_t i = 0; i + 1 < options.size(); i += 2) {
+    if (options[i] == "-p") uses.push_back({"the parameters", options[i + 1]});
+  }
   return uses;
 }
 

@@ -12,7 +12,7 @@ namespace strata::apps {
 /// Whether bytes for this name go to a pipe, a device or an open file: "-", /dev/stdout, /dev/null.
 [[nodiscard]] bool is_stream(const std::string& path);
 
-/// What a command reads: its inputs.
+/// What a command reads: its inputs, and the parameters of programs.
 [[nodiscard]] std::vector<FileUse> inputs_of(const InputOptions& input);
 
 /// What a command writes.

@@ -3,10 +3,12 @@
 #include "apps/commands.h"
 #include "apps/csg_report.h"
 #include "apps/csg_scene.h"
+#include "apps/file_conflicts.h"
 #include "apps/gl_info.h"
 #include "apps/json_writer.h"
 #include "apps/mesh_input.h"
 #include "apps/session.h"
+#include "core/file_identity.h"
 #include "core/memory.h"
 #include "core/printable.h"
 #include "csg/solid_lists.h"
@@ -239,6 +241,7 @@ Result<void> run_info(const InfoCommand& command, Session& session) {
   json.key("files").begin_array();
   std::string text;
   std::optional<Error> first_error;  // the other files are still looked at
+  bool scene_failed = false;
   for (const std::string& path : command.input.files) {
     const auto tell = [&](const auto& info) -> Result<void> {
       if (!info) return tl::unexpected(info.error());
@@ -253,9 +256,20 @@ Result<void> run_info(const InfoCommand& command, Session& session) {
     if (told) continue;
     if (session.interrupted()) return told;
     if (first_error) session.complain(*first_error);
+    // A report must not overwrite what a scene has opened.
+    if (scene && told.error().code == ErrorCode::kUsage) return told;
+    scene_failed = scene_failed || scene;
     first_error = told.error();
   }
   json.end_array();
+  const bool replaces =
+      command.json && !is_stream(*command.json) && identify_file(*command.json).is_there();
+  if (scene_failed && replaces) {
+    session.complain(*first_error);
+    return fail(first_error->code,
+                "--json {}: the file is kept: a scene that cannot be read may need it",
+                *command.json);
+  }
   if (command.gl) {
     if (const auto told = tell_gl(json, text); !told) {
       if (first_error) session.complain(*first_error);

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <string_view>
 
 #include "apps/option_values.h"
 
@@ -12,6 +13,28 @@ namespace strata::apps {
 namespace {
 
 namespace fs = std::filesystem;
+
+/// Whether the text of a customizer's file has a set: a name inside of "parameterSets".
+bool has_set(std::string_view text, std::string_view name) {
+  int depth = 0;
+  std::string_view section;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (text[i] == '{' || text[i] == '[') ++depth;
+    if (text[i] == '}' || text[i] == ']') --depth;
+    if (text[i] != '"') continue;
+    const std::size_t begin = i + 1;
+    for (i = begin; i < text.size() && text[i] != '"'; ++i) {
+      if (text[i] == '\\') ++i;
+    }
+    if (i >= text.size()) return false;
+    const std::size_t next = text.find_first_not_of(" \t\r\n", i + 1);
+    if (next == std::string_view::npos || text[next] != ':') continue;  // a value
+    const std::string_view key = text.substr(begin, i - begin);
+    if (depth == 1) section = key;
+    if (depth == 2 && section == "parameterSets" && key == name) return true;
+  }
+  return false;
+}
 
 /// openscad takes its defaults, without a word, where a set is not in the file.
 Result<void> check_parameters(const SceneWords& words) {
@@ -30,7 +53,7 @@ Result<void> check_parameters(const SceneWords& words) {
   const bool plain =
       std::all_of(words.parameter_set.begin(), words.parameter_set.end(),
                   [](char c) { return c >= ' ' && c <= '~' && c != '"' && c != '\\'; });
-  if (plain && text.find('"' + words.parameter_set + '"') == std::string::npos) {
+  if (plain && !has_set(text, words.parameter_set)) {
     return fail(ErrorCode::kUsage, "-P {}: the file {} has no set of that name",
                 words.parameter_set, words.parameter_file);
   }

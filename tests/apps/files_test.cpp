@@ -126,6 +126,40 @@ TEST_F(Files, WhatOpenscadReadIsKept) {
   }
 }
 
+/// It goes on after files that it cannot read, but not over what a scene has opened.
+TEST_F(Files, TheReportOfInfoIsHeldAgainstScenesToo) {
+  refuses({"info", "scene.csg", "--json=part.stl"},
+          {"--json part.stl would overwrite a file of the scene, part.stl"});
+  place.write("broken.csg", "import(file = \"part.stl\"); cube(");
+  const auto before = contents();
+  RunResult run = place.run({"info", "broken.csg", "scene.csg", "--json=hard.stl"});
+  EXPECT_EQ(run.exit_code, 2) << run.err;
+  run = place.run({"info", "broken.csg", "--json=part.stl"});
+  EXPECT_EQ(run.exit_code, 3) << run.err;
+  EXPECT_NE(run.err.find("--json part.stl: the file is kept"), std::string::npos) << run.err;
+  EXPECT_EQ(before, contents());
+  EXPECT_EQ(place.run({"info", "broken.csg", "--json=new.json"}).exit_code, 3);
+  EXPECT_NE(place.read("new.json").find("\"files\": []"), std::string::npos);
+}
+
+TEST_F(Files, PicturesOfAnAnimationAndParametersAreHeldAgainstInputs) {
+  if (std::system("openscad --version > /dev/null 2>&1") != 0) {
+    GTEST_SKIP() << "openscad is not installed";
+  }
+  place.write("a00000.png", "1 2\n3 4\n");
+  place.write("heights.scad", "surface(file = \"a00000.png\"); cube(1);\n");
+  refuses({"csg", "heights.scad", "--animate=2", "-o", "a.png", "--size=8,8"},
+          {"-o a00000.png would overwrite a file of the scene, a00000.png"});
+  place.write("sets.json", R"({"parameterSets": {"wide": {"x": "4"}}, "fileFormatVersion": "1"})");
+  place.write("main.scad", "x = 1; cube(x);\n");
+  refuses({"csg", "main.scad", "-p", "sets.json", "-P", "wide", "-o", "x.png", "--json=sets.json"},
+          {"--json sets.json would overwrite the parameters sets.json"});
+  for (const char* no_set : {"x", "parameterSets", "fileFormatVersion", "1", "wid"}) {
+    refuses({"csg", "main.scad", "-p", "sets.json", "-P", no_set},
+            {std::string("-P ") + no_set + ": the file sets.json has no set of that name"});
+  }
+}
+
 TEST_F(Files, AFolderThatHoldsAnInputIsNotReplaced) {
   std::filesystem::create_directories(place.path("slices/deep"));
   std::filesystem::rename(place.path("part.stl"), place.path("slices/deep/part.stl"));
