@@ -227,9 +227,10 @@ Measures Sums::finish() const {
   const glm::dvec3& step = grid_->voxel_size;
   const double cube = step.x * step.y * step.z;
   const double snap = glm::dot(projected_, step) / (2.0 * kLatticeSteps) / cube;
-  // An axis counts by how sure it is.
+  // An axis counts by how sure it is; not if all its rays pass by what others meet.
   double weight = 0;
   for (int i = 0; i < 3; ++i) {
+    if (!(volumes_[i] > 0)) continue;
     const double error = errors_[i] + snap;
     const double own = 1.0 / std::max(error * error, std::numeric_limits<double>::min());
     weight += own;
@@ -238,11 +239,17 @@ Measures Sums::finish() const {
   }
   result.volume /= weight;
   result.volume_error /= weight;
-  // Where the axes contradict each other, some rays have passed by what others meet.
+  // Where the axes contradict each other, some rays have passed by what others meet: any of the
+  // axes may be the right one.
+  double farthest = 0;
+  bool contradict = false;
   for (int i = 0; i < 3; ++i) {
-    const double apart = std::abs(volumes_[i] - result.volume) - errors_[i] - snap;
-    result.volume_error = std::max(result.volume_error, apart);
+    const double error = errors_[i] + snap;
+    const double apart = std::abs(volumes_[i] - result.volume);
+    contradict = contradict || apart > error + result.volume_error;
+    if (volumes_[i] > 0) farthest = std::max(farthest, apart + error);
   }
+  if (contradict) result.volume_error = std::max(result.volume_error, farthest);
   result.volume *= cube;
   result.volume_error *= cube;
   result.area = half_areas_[0] + half_areas_[1];
@@ -367,7 +374,10 @@ Result<Measures> Measurer::run(const MeasureOptions& options) {
       return next;
     }
     result = *next;
-    if (result.empty || result.volume_error <= kGoodBound * result.volume) return result;
+    // Small parts far apart may lie between all rays.
+    const bool done =
+        result.empty ? box->empty() : result.volume_error <= kGoodBound * result.volume;
+    if (done) return result;
     const bool many = 4 * result.result_crossings > kMostCrossings;
     if (many || resolution * 2 > kLastResolution) return result;
     begin += length, length *= 4;

@@ -223,14 +223,25 @@ Bounds reached_vertices(const Tree& tree, Tree::NodeId root, const Geometry& geo
   const Bounds outer = bounds(tree, root);
   std::uint64_t looked_at = 0;
   std::vector<Side> sides(parts.size(), Side::kOutside);
+  // Of the vertices those that a triangle has.
+  std::vector<std::vector<bool>> used(parts.size());
+  for (std::size_t solid = 0; solid < parts.size(); ++solid) {
+    used[solid].resize(parts[solid].positions.size(), false);
+    for (const glm::uvec3& t : parts[solid].triangles) {
+      for (int k = 0; k < 3; ++k) used[solid][t[k]] = true;
+    }
+  }
   std::vector<Candidate> candidates;
   for (std::size_t i = 0; i < 6; ++i) {
     const int axis = static_cast<int>(i) % 3;
     const auto out = [&](const glm::dvec3& p) { return i < 3 ? -p[axis] : p[axis]; };
     candidates.clear();
     for (std::uint32_t solid = 0; solid < parts.size(); ++solid) {
-      for (const glm::dvec3& p : parts[solid].positions) {
-        if (-side(known, i) < out(p) && inside_closed(p, outer)) candidates.push_back({p, solid});
+      for (std::size_t at = 0; at < used[solid].size(); ++at) {
+        const glm::dvec3& p = parts[solid].positions[at];
+        if (-side(known, i) < out(p) && used[solid][at] && inside_closed(p, outer)) {
+          candidates.push_back({p, solid});
+        }
       }
     }
     const auto first = [&](const Candidate& a, const Candidate& b) {

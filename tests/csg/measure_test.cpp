@@ -207,6 +207,49 @@ TEST(Measures, FilmsWhereFacesCoincideAreNeitherAreaNorVolume) {
   EXPECT_NEAR(thin->area, 200.0, 6.0);
 }
 
+TEST(Measures, AnAxisWhoseRaysPassByDoesNotTakeFromTheVolume) {
+  Tree tree;
+  tree.set_root(tree.add(Operation::kUnion,
+                         {add(tree, make_box(glm::dvec3(0), glm::dvec3(1))),
+                          add(tree, make_box(glm::dvec3(1e5, 0, 0), glm::dvec3(1e5 + 1, 1, 1)))}));
+  const auto m = measure(tree, tree.root());
+  ASSERT_TRUE(m.has_value());
+  EXPECT_LE(std::abs(m->volume - 2.0), m->volume_error);
+  EXPECT_LE(m->volume_error, 1.0);
+}
+
+TEST(Measures, SmallPartsBetweenTheFirstRaysAreLookedForWithMore) {
+  Tree tree;
+  const glm::dvec3 far(2000, 1500, 0);
+  tree.set_root(tree.add(Operation::kUnion, {add(tree, make_box(glm::dvec3(0), glm::dvec3(2))),
+                                             add(tree, make_box(far, far + 2.0))}));
+  const auto coarse = measure(tree, tree.root(), {.resolution = 256});
+  ASSERT_TRUE(coarse.has_value());
+  EXPECT_TRUE(coarse->empty);
+  const auto m = measure(tree, tree.root());
+  ASSERT_TRUE(m.has_value());
+  EXPECT_FALSE(m->empty);
+  EXPECT_LE(std::abs(m->volume - 16.0), m->volume_error);
+}
+
+TEST(Measures, VerticesOfNoTriangleReachNothing) {
+  TriangleSoup pyramid;
+  pyramid.positions = {{0, 0, 0},  {10, 0, 0}, {10, 10, 0}, {0, 10, 0},
+                       {5, 5, 10}, {0, 0, 6},  {10, 10, 6}};
+  pyramid.triangles = {{2, 1, 0}, {3, 2, 0}, {0, 1, 4}, {1, 2, 4}, {2, 3, 4}, {3, 0, 4}};
+  Tree tree;
+  tree.set_root(tree.add(Operation::kIntersection,
+                         {add(tree, pyramid), add(tree, make_box({-1, -1, 5}, {11, 11, 11}))}));
+  const auto m = measure(tree, tree.root(), {.resolution = 64});
+  ASSERT_TRUE(m.has_value());
+  const glm::dvec3 low(2.5, 2.5, 5), high(7.5, 7.5, 10);
+  for (int axis = 0; axis < 3; ++axis) {
+    EXPECT_NEAR(m->low[axis], low[axis], 0.2);
+    EXPECT_NEAR(m->high[axis], high[axis], 0.2);
+    EXPECT_LE(std::abs(m->high[axis] - high[axis]), m->bounds_error);
+  }
+}
+
 TEST(Measures, ResolutionGrowsWhereTheBoundIsPoor) {
   Tree ball;
   ball.set_root(add(ball, make_icosphere(5.0, 4)));
