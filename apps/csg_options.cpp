@@ -109,6 +109,12 @@ Result<void> read_openscad_words(const CsgWords& words, CsgCommand& command) {
                 words.summary_file, words.summary_file);
   }
   command.summary = !words.summary.empty();
+  constexpr std::string_view kSummaries[] = {"all",      "cache",        "time", "camera",
+                                             "geometry", "bounding-box", "area"};
+  if (command.summary && std::find(std::begin(kSummaries), std::end(kSummaries), words.summary) ==
+                             std::end(kSummaries)) {
+    return no_such_choice("--summary", words.summary, kSummaries);
+  }
   if (!words.csg_limit.empty()) {
     if (auto limit = parse_integer("--csglimit", words.csg_limit); !limit) {
       return tl::unexpected(limit.error());
@@ -248,6 +254,9 @@ Result<void> read_csg_options(const CsgWords& words, CsgCommand& command) {
   }
   if (command.output.empty() && command.ids.empty() && command.depth.empty() && !command.json) {
     command.summary = true;
+  }
+  if (command.measure_resolution && !command.json && !command.summary) {
+    return fail(ErrorCode::kUsage, "--measure is of the report: give --summary or --json");
   }
   for (const auto& [asked_by, path, depth] :
        {std::tuple("", &command.output, false), std::tuple("--ids ", &command.ids, false),

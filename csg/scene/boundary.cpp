@@ -48,11 +48,13 @@ class Cutter {
   [[nodiscard]] double tolerance() const { return 1e-10 * scale_; }
 
   /// @param steps  grows by the work that was done
-  [[nodiscard]] Outline section(const Plane& plane, Side side, std::uint64_t& steps) const {
+  [[nodiscard]] Outline section(const Plane& plane, Side side, std::uint64_t& steps,
+                                OutlineJob* job = nullptr) const {
     std::vector<Outline> results(reached_.size());
     steps += reached_.size();
     std::vector<Outline> operands;
     for (std::size_t i = 0; i < reached_.size(); ++i) {
+      if (job != nullptr && job->ended()) return {};
       const Tree::Node& node = tree_.nodes()[reached_[i]];
       if (node.operation == Operation::kSolid) {
         results[i] = csg::section(leaves_[leaf_of_[i]], plane, tolerance(), side, steps);
@@ -72,11 +74,11 @@ class Cutter {
       if (operands.size() == 1) {
         results[i] = std::move(operands[0]);
       } else if (node.operation == Operation::kUnion) {
-        results[i] = unite(operands);
+        results[i] = unite(operands, job);
       } else if (node.operation == Operation::kIntersection) {
-        results[i] = intersect(operands);
+        results[i] = intersect(operands, job);
       } else {
-        results[i] = subtract(operands);
+        results[i] = subtract(operands, job);
       }
     }
     return std::move(results.back());  // the root stands last
@@ -269,13 +271,13 @@ void for_each_operand(const Tree& tree, Tree::NodeId node,
   }
 }
 
-Outline cross_section(const Tree& tree, Tree::NodeId node) {
+Outline cross_section(const Tree& tree, Tree::NodeId node, OutlineJob* job) {
   const Cutter cutter(tree, node);
   const Plane plane;
   std::uint64_t steps = 0;
-  std::vector<Outline> sides{cutter.section(plane, Side::kBelow, steps),
-                             cutter.section(plane, Side::kAbove, steps)};
-  return unite(sides);
+  std::vector<Outline> sides{cutter.section(plane, Side::kBelow, steps, job),
+                             cutter.section(plane, Side::kAbove, steps, job)};
+  return unite(sides, job);
 }
 
 Result<TriangleSoup> boundary(const Tree& tree, Tree::NodeId node, const Execution& execution,

@@ -16,7 +16,7 @@
 namespace strata::csg {
 
 /// Where a tree meets the plane z = 0, from either side: the cross-section of its closure.
-[[nodiscard]] Outline cross_section(const Tree& tree, Tree::NodeId node);
+[[nodiscard]] Outline cross_section(const Tree& tree, Tree::NodeId node, OutlineJob* job = nullptr);
 
 /// Triangles that together are the boundary of `node`, outward; neighbours in different planes
 /// share no vertices, and agree to the grid of the flat operations. For unions of leaves alone the

@@ -86,13 +86,15 @@ std::optional<std::string> Evaluator::asset(std::uint32_t node, const std::strin
   }
   const std::string wanted = (fs::path(folder_) / file).string();
   if (asked_for_.insert(wanted).second) scene_.files.push_back({wanted, 0, 0});
-  const auto folder = first_place(folder_, file, [](const fs::path& path) {
+  const auto other = first_place(folder_, file, [](const fs::path& path) {
     std::error_code ignored;
-    return fs::is_directory(path, ignored);
+    return fs::exists(path, ignored);
   });
   warn(node, "missing-file",
        fmt::format("'{}' needs the file '{}', which is {}; it is left out", name(node), shown(file),
-                   folder ? "a folder" : "not there"));
+                   !other                     ? "not there"
+                   : fs::is_directory(*other) ? "a folder"
+                                              : "no regular file"));
   return std::nullopt;
 }
 

@@ -269,7 +269,7 @@ void Evaluator::projection(Frame& frame) {
   const Tree::NodeId child = united_solid(frame.base);
   const NodeArguments given = arguments(frame.node);
   if (given.find("cut", 0).truth(false)) {
-    add_outline(frame.node, frame.outside, cross_section(scene_.tree, child));
+    add_outline(frame.node, frame.outside, cross_section(scene_.tree, child, &job_));
   } else {
     add_outline(frame.node, frame.outside, shadow(boundary_mesh(frame.node, child), &job_));
   }

@@ -93,6 +93,7 @@ class Speech {
   [[nodiscard]] std::size_t further_errors() const { return errors_ > 0 ? errors_ - 1 : 0; }
   [[nodiscard]] std::vector<std::string>& warnings() { return warnings_; }
   [[nodiscard]] std::vector<std::string>& notes() { return notes_; }
+  [[nodiscard]] std::size_t further_notes() const { return further_notes_; }
   /// Whether the program says something of the camera, and what lies behind the mark.
   [[nodiscard]] bool has_view() const { return has_view_; }
   [[nodiscard]] const std::string& view() const { return view_; }
@@ -126,6 +127,8 @@ class Speech {
       if (warnings_.size() < kMostLines) warnings_.push_back(placed(plain_line(line)));
     } else if (notes_.size() < kMostLines) {
       notes_.push_back(plain_line(line));
+    } else {
+      ++further_notes_;
     }
   }
 
@@ -154,7 +157,7 @@ class Speech {
   const std::string mark_;
   std::string said_, line_, error_, view_;
   std::vector<std::string> warnings_, notes_;
-  std::size_t errors_ = 0;
+  std::size_t errors_ = 0, further_notes_ = 0;
   bool has_view_ = false;
 };
 
@@ -316,7 +319,7 @@ Result<void> wait_for(Child& child, Speech& said, const std::string& path, doubl
   }
   for (int i = 0; i < 1000 && talks; ++i) talks = child.listen(0, said) && i < 100;
   said.end();
-  if (!WIFEXITED(ended) || WEXITSTATUS(ended) != 0) {
+  if (said.error().empty() && (!WIFEXITED(ended) || WEXITSTATUS(ended) != 0)) {
     return fail(ErrorCode::kInput, "{}: openscad failed: {}", path, said.last_words());
   }
   if (said.error().empty()) return {};
@@ -436,6 +439,9 @@ Result<OpenscadRun> run_openscad(const std::string& path, const OpenscadOptions&
   if (said.has_view()) run.view = read_view(said.view(), run.files);
   run.warnings = std::move(said.warnings());
   run.notes = std::move(said.notes());
+  if (said.further_notes() > 0) {
+    run.notes.push_back(fmt::format("ECHO: [... {} more lines]", said.further_notes()));
+  }
   return run;
 }
 

@@ -157,7 +157,10 @@ Outline shadow(const TriangleSoup& mesh, OutlineJob* job) {
   const bool closed = is_closed(mesh);
   Places places;
   Chain chain;
-  for (const glm::uvec3& t : mesh.triangles) {
+  constexpr std::size_t kAsk = 1 << 14;  // triangles between two looks at whether to stop
+  for (std::size_t at = 0; at < mesh.triangles.size(); ++at) {
+    if (job != nullptr && at % kAsk == 0 && job->ended()) return {};
+    const glm::uvec3& t = mesh.triangles[at];
     if (!usable(mesh, t)) continue;
     const glm::dvec2 a(mesh.positions[t.x]), b(mesh.positions[t.y]), c(mesh.positions[t.z]);
     const int side = orient(a, b, c);

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
@@ -115,6 +116,8 @@ TEST_F(Openscad, OptionsThatCannotBeDoneSayWhatToUse) {
   refuses({"part.csg", "--view=edge"}, "not 'edge'");
   refuses({"part.csg", "--export-format=stl"}, "strata voxelize");
   refuses({"part.csg", "--summary-file", "a.json"}, "use --json=a.json");
+  refuses({"part.csg", "--summary=some"}, "--summary");
+  refuses({"part.csg", "--measure=9", "-o", "a.png"}, "--measure is of the report");
   refuses({"part.csg", "--animate", "3", "-o", "a.png"}, "no input is a .scad file");
   refuses({"part.scad", "--animate", "0", "-o", "a.png"}, "--animate must be 1 to 99999, got 0");
   refuses({"part.scad", "--animate", "2", "-o", "-"}, "- is a stream");
@@ -135,6 +138,10 @@ TEST_F(Openscad, WhatAProgramEchoesIsPrinted) {
   EXPECT_EQ(run.exit_code, 0);
   EXPECT_EQ(run.err, "ECHO: \"a\", 3\\x1b[2J\n");
   EXPECT_EQ(place.run({"part.scad", "-q"}, with_fake).err, "");
+  fake("echo 'cube([2,1,1]);' > \"$2\"\nyes 'ECHO: 1' | head -n 1234 >&2\n");
+  const RunResult many = place.run({"part.scad"}, with_fake);
+  EXPECT_EQ(std::count(many.err.begin(), many.err.end(), '\n'), 1001);
+  EXPECT_TRUE(many.err.ends_with("ECHO: 1\nECHO: [... 234 more lines]\n")) << many.err;
 }
 
 /// Also where nothing can be done about it any more.
