@@ -195,7 +195,8 @@ void define_voxelize(CLI::App& app, Words& words) {
   app.add_flag("--ids", words.ids,
                "Values say which solid or file: 1, 2, ...; --json has the names")
       ->group(output);
-  app.add_option("--name", words.name, "Of the grid: .vdb .nrrd .vti; density, ids or solid")
+  app.add_option("--name", words.name,
+                 "Of the grid: .vdb .nrrd .vti; default: density, ids, surface or solid")
       ->type_name("NAME")
       ->group(output);
   app.add_flag("--stats", words.stats, "Print statistics")->group(output);
@@ -263,7 +264,7 @@ CommonOptions common_options(const Words& words, Reader& reader) {
   std::int64_t threads = 0;
   if (!words.threads.empty()) reader.take(parse_integer("--threads", words.threads), threads);
   if (threads < 0 || threads > 4096) {
-    reader.fail_with(fmt::format("--threads {}: 0 to 4096 can be had", threads));
+    reader.fail_with(fmt::format("--threads must be 0 to 4096, got {}", threads));
   }
   common.threads = static_cast<int>(threads);
   if (!words.memory_limit.empty()) {

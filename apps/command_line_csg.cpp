@@ -115,8 +115,8 @@ void define_csg(CLI::App& app, Words& words) {
   option("--depth", csg.depth, "Distance along the view, .exr, channel Z", "FILE", output);
   add_json(app, words, output);
   option("--measure", csg.measure,
-         "Voxels along each side of the box that the report measures on; 256, more where the "
-         "volume's error asks for it",
+         "Voxels along each side of the box that the report measures on; default: 256, up to "
+         "1024 where the volume's error asks for it",
          "N", output);
   const Group camera = "Camera (default: all in view from OpenSCAD's place, or as a .scad says)";
   option("--size,--imgsize", csg.size, "width,height in pixels; 512,512", "W,H", camera);

@@ -112,7 +112,7 @@ Result<void> read(Words& words, ViewOptions& options) {
     auto threads = apps::parse_integer("--threads", words.threads);
     if (!threads) return tl::unexpected(threads.error());
     if (*threads < 0 || *threads > 4096) {
-      return fail(ErrorCode::kUsage, "--threads {}: 0 to 4096 can be had", *threads);
+      return fail(ErrorCode::kUsage, "--threads must be 0 to 4096, got {}", *threads);
     }
     command.common.threads = static_cast<int>(*threads);
   }
