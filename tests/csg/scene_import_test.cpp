@@ -376,7 +376,8 @@ TEST_F(SceneFiles, WarningsAndErrorsOfOpenscadAreOurs) {
   EXPECT_EQ(scene.warnings[1].message,
             path + ": openscad: WARNING: Can't open include file 'b.scad'.");
   EXPECT_EQ(scene.warnings[2].message, "lib/c.scad:2: openscad: WARNING: odd");
-  ASSERT_EQ(scene.notes.size(), 1000u);
+  ASSERT_EQ(scene.notes.size(), 1001u);
+  EXPECT_EQ(scene.notes.back(), "ECHO: [... 19001 more lines]");
   EXPECT_EQ(scene.notes[1], "ECHO: \"line 1 of many\"");
   says(
       "ERROR: Assertion 'false' failed: \"boo\" in file a.scad, line 1\n"
