@@ -146,12 +146,6 @@ double distance_squared(const glm::dvec3& p, const glm::dvec3& a, const glm::dve
   return height * height / area;
 }
 
-bool is_inside(InsideRule rule, int winding) {
-  return rule == InsideRule::kWinding   ? winding > 0
-         : rule == InsideRule::kNonzero ? winding != 0
-                                        : winding % 2 != 0;
-}
-
 /// Where a point is of a solid: by the winding along a ray in no special direction.
 Side side_of(const glm::dvec3& p, const Geometry::Part& part, double tolerance) {
   const glm::dvec3 along(0.5321348901, 0.3178562391, 0.7847112345);

@@ -54,18 +54,6 @@ class LeastOf {
   std::vector<std::uint64_t> words_, tops_;
 };
 
-bool is_inside(InsideRule rule, int winding) {
-  switch (rule) {
-    case InsideRule::kWinding:
-      return winding > 0;
-    case InsideRule::kNonzero:
-      return winding != 0;
-    case InsideRule::kParity:
-      break;
-  }
-  return winding % 2 != 0;
-}
-
 class BooleanWorker final : public TileListFilter::Worker {
  public:
   BooleanWorker(const Shared& shared, bool labelled)

@@ -39,17 +39,6 @@ void LeafLayers::add_layer(Arena& arena) {
 
 void flips_of(std::span<const DepthItem> crossings, std::uint32_t solid, InsideRule rule, bool cut,
               std::vector<Flip>& flips) {
-  const auto is_inside = [rule](int winding) {
-    switch (rule) {
-      case InsideRule::kWinding:
-        return winding > 0;
-      case InsideRule::kNonzero:
-        return winding != 0;
-      case InsideRule::kParity:
-        break;
-    }
-    return winding % 2 != 0;
-  };
   int sum = 0;
   for (const DepthItem item : crossings) sum += item.exit() ? -1 : 1;
   const bool unbalanced = rule == InsideRule::kParity ? sum % 2 != 0 : sum != 0;
@@ -91,7 +80,7 @@ void flips_of(std::span<const DepthItem> crossings, std::uint32_t solid, InsideR
     return;
   }
   int winding = cut ? -sum : 0;
-  bool inside = is_inside(winding);
+  bool inside = is_inside(rule, winding);
   if (inside) flips.push_back({0, solid, Surface::kNone, false});
   for (std::size_t i = 0; i < crossings.size();) {
     const std::size_t begin = i;
@@ -99,7 +88,7 @@ void flips_of(std::span<const DepthItem> crossings, std::uint32_t solid, InsideR
     for (; i < crossings.size() && crossings[i].depth() == depth; ++i) {
       winding += crossings[i].exit() ? -1 : 1;
     }
-    if (is_inside(winding) == inside) continue;
+    if (is_inside(rule, winding) == inside) continue;
     std::size_t turns = begin;  // the first that faces the right way
     while (turns < i && crossings[turns].exit() != inside) ++turns;
     if (turns == i) turns = begin;

@@ -185,18 +185,6 @@ std::uint32_t depth_of(DepthItem item) { return item.depth(); }
 bool exit_of(DepthKey key) { return (key & 1) != 0; }
 bool exit_of(DepthItem item) { return item.exit(); }
 
-bool is_inside(InsideRule rule, int winding) {
-  switch (rule) {
-    case InsideRule::kWinding:
-      return winding > 0;
-    case InsideRule::kNonzero:
-      return winding != 0;
-    case InsideRule::kParity:
-      break;
-  }
-  return (winding & 1) != 0;
-}
-
 /// The walk written plainly, one column at a time: for the form of lists that is not planar, and
 /// the yardstick of the other.
 template <class Key>
