@@ -94,6 +94,17 @@ class WeldTable {
   std::size_t mask_ = 0, size_ = 0;
 };
 
+/// The place of a position among `kept`, where it is put when it is not there yet.
+/// @param table  holds the places of all of `kept`
+inline std::uint32_t find_or_keep(WeldTable<double>& table, std::vector<glm::dvec3>& kept,
+                                  const glm::dvec3& position) {
+  const glm::dvec3 key = WeldTable<double>::canonical(position);
+  const auto next = static_cast<std::uint32_t>(kept.size());
+  const std::uint32_t at = table.find_or_insert(key, WeldTable<double>::hash(key), next);
+  if (at == next) kept.push_back(key);
+  return at;
+}
+
 /// For every i in [0, count): first[i] = the least j whose position equals that of i. Each thread
 /// owns the positions whose hash falls to it, so the result does not depend on their number.
 /// @param load  load(i) -> glm::vec<3, Scalar> @pre count < 2^32 - 1

@@ -13,16 +13,10 @@
 
 #include "csg/scene/minkowski.h"
 #include "mesh/soup_tools.h"
+#include "mesh/weld.h"
 
 namespace strata::csg {
 namespace {
-
-struct HashPoint {
-  std::size_t operator()(const glm::dvec3& p) const {
-    const std::hash<double> hash;
-    return hash(p.x) * 0x9e3779b97f4a7c15u ^ hash(p.y) * 0xc2b2ae3d27d4eb4fu ^ hash(p.z);
-  }
-};
 
 /// Indices that become one another's.
 class Groups {
@@ -47,13 +41,9 @@ class FacetMerger {
     const Bounds box = bounds(mesh);
     if (box.empty()) return;
     tolerance_ = 1e-10 * glm::length(box.high - box.low);
-    std::unordered_map<glm::dvec3, std::uint32_t, HashPoint> index_of;
+    detail::WeldTable<double> table(mesh.positions.size());
     const auto weld = [&](std::uint32_t vertex) {
-      const glm::dvec3 p = mesh.positions[vertex] + 0.0;  // -0 equals +0
-      const auto [at, is_new] =
-          index_of.try_emplace(p, static_cast<std::uint32_t>(positions_.size()));
-      if (is_new) positions_.push_back(p);
-      return at->second;
+      return detail::find_or_keep(table, positions_, mesh.positions[vertex]);
     };
     for (const glm::uvec3& t : mesh.triangles) {
       Polygon polygon{{weld(t.x), weld(t.y), weld(t.z)}, {}};

@@ -6,6 +6,7 @@
 #include <unordered_map>
 
 #include "csg/scene/boundary.h"
+#include "mesh/weld.h"
 
 namespace strata::csg {
 namespace {
@@ -40,13 +41,6 @@ void shorten(std::vector<glm::dvec2>& contour, const Rectangle& rectangle) {
   }
   contour.resize(kept);
 }
-
-struct HashPoint {
-  std::size_t operator()(const glm::dvec3& p) const {
-    const std::hash<double> hash;
-    return hash(p.x) * 0x9e3779b97f4a7c15u ^ hash(p.y) * 0xc2b2ae3d27d4eb4fu ^ hash(p.z);
-  }
-};
 
 /// Where the surface of a leaf goes through a plane, moved off it by less than any distance.
 class LeafSection {
@@ -223,14 +217,10 @@ void BoxTree::build(std::span<const glm::dvec3> positions, std::vector<glm::uvec
 Leaf make_leaf(const Solid& solid) {
   Leaf leaf;
   const TriangleSoup mesh = world_mesh(solid);
-  std::unordered_map<glm::dvec3, std::uint32_t, HashPoint> index_of;
+  detail::WeldTable<double> table(mesh.positions.size());
   std::vector<std::uint32_t> index(mesh.positions.size());
   for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
-    const glm::dvec3 p = mesh.positions[i] + 0.0;  // -0 equals +0
-    const auto [at, is_new] =
-        index_of.try_emplace(p, static_cast<std::uint32_t>(leaf.positions.size()));
-    if (is_new) leaf.positions.push_back(p);
-    index[i] = at->second;
+    index[i] = detail::find_or_keep(table, leaf.positions, mesh.positions[i]);
   }
   for (const glm::uvec3& t : mesh.triangles) {
     const glm::uvec3 welded(index[t.x], index[t.y], index[t.z]);
