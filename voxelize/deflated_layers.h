@@ -6,9 +6,12 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <string_view>
 #include <vector>
 
+#include "voxelize/block_output.h"
 #include "voxelize/dense_rows.h"
+#include "voxelize/run_deflate.h"
 
 namespace strata {
 
@@ -66,6 +69,46 @@ class LayerCrc {
   std::vector<std::vector<std::uint32_t>> tails_;  // by bit: of so many ones at the end of a row
   std::array<std::array<std::uint32_t, 256>, 4> next_row_;
   std::uint32_t constant_ = 0;  // the CRC of zeros
+};
+
+/// The layers of a grid as one raw deflate stream, made from runs. (Internal to voxelize/.)
+class DeflatedLayers {
+ public:
+  /// What ends the stream: an empty block of fixed codes, marked as the last.
+  static constexpr std::string_view kEnd{"\x03\x00", 2};
+
+  DeflatedLayers(const VoxelGrid& grid, const DenseValues& values)
+      : values_(values),
+        layer_crc_(grid.dims.x, grid.dims.y, values),
+        layer_bytes_(static_cast<z_off_t>(values.bytes) * grid.dims.x * grid.dims.y) {}
+
+  /// Appends the layers of a slab to `output`.
+  /// @param crc  the CRC-32 of what came before them; theirs is taken in
+  Result<void> append(const VoxelIntervals& slab, BlockOutput& output, std::uint32_t& crc,
+                      const Execution& execution) const {
+    std::vector<uLong> crcs(static_cast<std::size_t>(slab.v_end() - slab.v_begin()));
+    Result<void> written =
+        output.append_blocks(execution, crcs.size(), [&](std::size_t index, Bytes& out, int) {
+          const int z = slab.v_begin() + static_cast<int>(index);
+          out.clear();
+          RunDeflater deflater(values_.kind, values_.bytes);
+          deflater.begin(out, false);
+          emit_layer(slab, z, [&](std::uint32_t value, int length) {
+            deflater.run(value, static_cast<std::uint64_t>(length));
+          });
+          deflater.end();
+          crcs[index] = layer_crc_.of(slab, z);
+        });
+    for (const uLong layer : crcs) {
+      crc = static_cast<std::uint32_t>(crc32_combine(crc, layer, layer_bytes_));
+    }
+    return written;
+  }
+
+ private:
+  DenseValues values_;
+  LayerCrc layer_crc_;
+  z_off_t layer_bytes_;
 };
 
 }  // namespace strata

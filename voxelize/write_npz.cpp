@@ -19,10 +19,9 @@
 #include <vector>
 
 #include "voxelize/block_output.h"
+#include "voxelize/deflated_layers.h"
 #include "voxelize/dense_rows.h"
-#include "voxelize/layer_crc.h"
 #include "voxelize/npy_head.h"
-#include "voxelize/run_deflate.h"
 #include "voxelize/slab_writer.h"
 #include "voxelize/writers.h"
 
@@ -108,7 +107,7 @@ class NpzWriter final : public SlabWriter {
       : SlabWriter(path, grid, Axis::kX),
         values_(ids),
         output_(std::move(output)),
-        layer_crc_(grid.dims.x, grid.dims.y, values_) {}
+        layers_(grid, values_) {}
 
   Result<void> begin() {
     for (const auto& [name, vector] :
@@ -150,30 +149,12 @@ class NpzWriter final : public SlabWriter {
   }
 
   Result<void> add_slab(const VoxelIntervals& slab, const Execution& execution) override {
-    std::vector<uLong> crcs(static_cast<std::size_t>(slab.v_end() - slab.v_begin()));
-    Result<void> written =
-        output_.append_blocks(execution, crcs.size(), [&](std::size_t index, Bytes& out, int) {
-          const int z = slab.v_begin() + static_cast<int>(index);
-          out.clear();
-          RunDeflater deflater(values_.kind, values_.bytes);
-          deflater.begin(out, false);
-          emit_layer(slab, z, [&](std::uint32_t value, int length) {
-            deflater.run(value, static_cast<std::uint64_t>(length));
-          });
-          deflater.end();
-          crcs[index] = layer_crc_.of(slab, z);
-        });
-    const auto layer = static_cast<z_off_t>(values_.bytes) * dims().x * dims().y;
-    Entry& voxels = entries_.back();
-    for (const uLong crc : crcs) {
-      voxels.crc = static_cast<std::uint32_t>(crc32_combine(voxels.crc, crc, layer));
-    }
-    return written;
+    return layers_.append(slab, output_, entries_.back().crc, execution);
   }
 
   Result<void> finish_output(const Execution&) override {
     Entry& voxels = entries_.back();
-    std::string end("\x03\x00", 2);  // an empty block of fixed codes, marked as the last
+    std::string end(DeflatedLayers::kEnd);
     voxels.compressed = output_.position() + end.size() - data_begin_;
     if (voxels.follows) {
       end += voxels.descriptor();
@@ -211,7 +192,7 @@ class NpzWriter final : public SlabWriter {
 
   DenseValues values_;
   BlockOutput output_;
-  LayerCrc layer_crc_;
+  DeflatedLayers layers_;
   std::vector<Entry> entries_;  // the voxels last
   std::uint64_t data_begin_ = 0;
 };

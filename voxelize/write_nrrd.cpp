@@ -11,9 +11,8 @@
 #include <vector>
 
 #include "voxelize/block_output.h"
+#include "voxelize/deflated_layers.h"
 #include "voxelize/dense_rows.h"
-#include "voxelize/layer_crc.h"
-#include "voxelize/run_deflate.h"
 #include "voxelize/slab_writer.h"
 #include "voxelize/writers.h"
 
@@ -33,7 +32,7 @@ class NrrdWriter final : public SlabWriter {
       : SlabWriter(path, grid, Axis::kX),
         values_(ids),
         output_(std::move(output)),
-        layer_crc_(grid.dims.x, grid.dims.y, values_) {}
+        layers_(grid, values_) {}
 
   Result<void> begin(const std::string& name) {
     const VoxelGrid& g = grid();
@@ -54,30 +53,15 @@ class NrrdWriter final : public SlabWriter {
 
  private:
   Result<void> add_slab(const VoxelIntervals& slab, const Execution& execution) override {
-    std::vector<uLong> crcs(static_cast<std::size_t>(slab.v_end() - slab.v_begin()));
-    Result<void> written =
-        output_.append_blocks(execution, crcs.size(), [&](std::size_t index, Bytes& out, int) {
-          const int z = slab.v_begin() + static_cast<int>(index);
-          out.clear();
-          RunDeflater deflater(values_.kind, values_.bytes);
-          deflater.begin(out, false);
-          emit_layer(slab, z, [&](std::uint32_t value, int length) {
-            deflater.run(value, static_cast<std::uint64_t>(length));
-          });
-          deflater.end();
-          crcs[index] = layer_crc_.of(slab, z);
-        });
-    const auto layer = static_cast<z_off_t>(values_.bytes) * dims().x * dims().y;
-    for (const uLong crc : crcs) crc_ = crc32_combine(crc_, crc, layer);
-    return written;
+    return layers_.append(slab, output_, crc_, execution);
   }
 
   Result<void> finish_output(const Execution&) override {
-    std::string end("\x03\x00", 2);  // an empty block of fixed codes, marked as the last
+    std::string end(DeflatedLayers::kEnd);
     const std::uint64_t bytes = static_cast<std::uint64_t>(dims().x) *
                                 static_cast<std::uint64_t>(dims().y) *
                                 static_cast<std::uint64_t>(dims().z) * values_.bytes;
-    for (const std::uint64_t value : {static_cast<std::uint64_t>(crc_), bytes}) {
+    for (const std::uint64_t value : {std::uint64_t{crc_}, bytes}) {
       for (int i = 0; i < 4; ++i) end += static_cast<char>(value >> (8 * i) & 0xff);
     }
     if (Result<void> written = output_.append(end); !written) return written;
@@ -86,8 +70,8 @@ class NrrdWriter final : public SlabWriter {
 
   DenseValues values_;
   BlockOutput output_;
-  LayerCrc layer_crc_;
-  uLong crc_ = 0;
+  DeflatedLayers layers_;
+  std::uint32_t crc_ = 0;
 };
 
 }  // namespace
