@@ -178,7 +178,7 @@ bool only_cavities(const TriangleSoup& mesh, std::vector<Piece>& pieces,
 
 bool all_outward(const TriangleSoup& mesh, std::span<const EdgeSum> by_index, bool all_positive,
                  const Execution& execution) {
-  Sets sets(mesh.positions.size());
+  DisjointSets sets(mesh.positions.size());
   std::size_t joined = 0;
   for (const glm::uvec3& t : mesh.triangles) {
     if (sets.known_same(t.x, t.y, t.z)) continue;

@@ -24,8 +24,8 @@ namespace strata {
 namespace {
 
 constexpr std::uint32_t kNone = 0xffffffffu;
+using detail::DisjointSets;
 using detail::Extent;
-using detail::Sets;
 using detail::Wedge;
 
 struct Part {
@@ -206,7 +206,7 @@ class Orienter {
     if (!many) return;
     const std::vector<std::uint32_t> partner = opposite_pairs();
     const auto second = [&](std::size_t t) { return partner[t] < t; };
-    Sets sheets(mesh_.triangles.size());
+    DisjointSets sheets(mesh_.triangles.size());
     std::vector<char> refused(mesh_.triangles.size(), 0);
     const auto each_edge = [&](auto&& visit) {
       for (std::size_t v = 0; v < welded_.size(); ++v) uses.for_edges(v, visit);

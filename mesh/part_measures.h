@@ -5,13 +5,13 @@
 #include <cmath>
 #include <cstdint>
 #include <glm/geometric.hpp>
-#include <numeric>
 #include <span>
 #include <stop_token>
 #include <tuple>
 #include <vector>
 
 #include "core/execution.h"
+#include "mesh/disjoint_sets.h"
 #include "mesh/edge_balance.h"
 #include "mesh/soup_tools.h"
 #include "mesh/triangle_soup.h"
@@ -22,32 +22,6 @@ namespace strata::detail {
 
 /// Volumes below this share of what they are summed of are none.
 inline constexpr double kNoVolume = 1e-9;
-
-/// Joins items; each set is known by its least one.
-class Sets {
- public:
-  explicit Sets(std::size_t count) : parent_(count) {
-    std::iota(parent_.begin(), parent_.end(), std::uint32_t{0});
-  }
-  std::uint32_t find(std::uint32_t i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];  // halves the path
-    return i;
-  }
-  /// At a glance: false may be wrong.
-  [[nodiscard]] bool known_same(std::uint32_t a, std::uint32_t b, std::uint32_t c) const {
-    return parent_[a] == parent_[b] && parent_[b] == parent_[c];
-  }
-  /// @return whether they were apart
-  bool join(std::uint32_t a, std::uint32_t b) {
-    a = find(a), b = find(b);
-    if (a < b) parent_[b] = a;
-    if (b < a) parent_[a] = b;
-    return a != b;
-  }
-
- private:
-  std::vector<std::uint32_t> parent_;
-};
 
 /// Six times the volume between a triangle and a point, and its size without the sign.
 struct Wedge {

@@ -4,10 +4,10 @@
 #include <cmath>
 #include <cstdint>
 #include <glm/geometric.hpp>
-#include <numeric>
 #include <span>
 #include <utility>
 
+#include "mesh/disjoint_sets.h"
 #include "mesh/edge_balance.h"
 #include "raster/triangle_setup.h"
 
@@ -107,23 +107,27 @@ class Pieces {
  public:
   /// @param seams  edges at whose ends vertices of equal positions may differ
   Pieces(const LatticeMesh& mesh, std::span<const detail::EdgeSum> seams)
-      : mesh_(mesh), parent_(mesh.vertices.size()), area_(mesh.vertices.size()) {
-    std::iota(parent_.begin(), parent_.end(), 0u);
-    for (const glm::uvec3& t : mesh.triangles) unite(t.x, t.y), unite(t.y, t.z);
+      : mesh_(mesh), connected_(mesh.vertices.size()), area_(mesh.vertices.size()) {
+    for (const glm::uvec3& t : mesh.triangles) {
+      connected_.join(t.x, t.y);
+      connected_.join(t.y, t.z);
+    }
     std::vector<std::uint32_t> ends;
     for (const detail::EdgeSum& seam : seams) ends.insert(ends.end(), {seam.low, seam.high});
     std::sort(ends.begin(), ends.end(), [&](std::uint32_t a, std::uint32_t b) {
       return before(mesh.vertices[a], mesh.vertices[b]);
     });
     for (std::size_t i = 1; i < ends.size(); ++i) {
-      if (mesh.vertices[ends[i - 1]] == mesh.vertices[ends[i]]) unite(ends[i - 1], ends[i]);
+      if (mesh.vertices[ends[i - 1]] == mesh.vertices[ends[i]]) {
+        connected_.join(ends[i - 1], ends[i]);
+      }
     }
-    for (const glm::uvec3& t : mesh.triangles) area_[find(t.x)].mesh += area_of(mesh, t);
+    for (const glm::uvec3& t : mesh.triangles) area_[connected_.find(t.x)].mesh += area_of(mesh, t);
   }
-  void add_cap(const glm::uvec3& t) { area_[find(t.x)].caps += area_of(mesh_, t); }
+  void add_cap(const glm::uvec3& t) { area_[connected_.find(t.x)].caps += area_of(mesh_, t); }
   /// Whether the caps of the piece at a vertex are nearly as large as it is.
   [[nodiscard]] bool mostly_open(std::uint32_t vertex) {
-    const Area& area = area_[find(vertex)];
+    const Area& area = area_[connected_.find(vertex)];
     return 3 * area.caps >= 2 * area.mesh;
   }
 
@@ -131,16 +135,8 @@ class Pieces {
   struct Area {
     Int128 mesh = 0, caps = 0;
   };
-  std::uint32_t find(std::uint32_t vertex) {
-    while (parent_[vertex] != vertex) vertex = parent_[vertex] = parent_[parent_[vertex]];
-    return vertex;
-  }
-  void unite(std::uint32_t a, std::uint32_t b) {
-    a = find(a), b = find(b);
-    parent_[std::max(a, b)] = std::min(a, b);
-  }
   const LatticeMesh& mesh_;
-  std::vector<std::uint32_t> parent_;
+  detail::DisjointSets connected_;  ///< vertices
   std::vector<Area> area_;
 };
 

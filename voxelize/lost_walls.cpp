@@ -10,12 +10,12 @@
 #include <glm/geometric.hpp>
 #include <memory>
 #include <mutex>
-#include <numeric>
 #include <tuple>
 #include <utility>
 
 #include "hashbuffer/build_ldi.h"
 #include "hashbuffer/tile_builder.h"
+#include "mesh/disjoint_sets.h"
 #include "raster/tile_bins.h"
 #include "raster/triangle_setup.h"
 
@@ -364,18 +364,13 @@ class WallSearch {
   void walk_column(std::span<const DepthItem> list, Axis axis, int u, int v, std::uint32_t limit,
                    std::vector<Miss>& misses) const {
     const InsideRule rule = options_.filter != nullptr ? InsideRule::kWinding : options_.rule;
-    const auto inside = [rule](int winding) {
-      return rule == InsideRule::kWinding   ? winding > 0
-             : rule == InsideRule::kNonzero ? winding != 0
-                                            : winding % 2 != 0;
-    };
     const AxisFrame frame(axis);
     int winding = 0;
     DepthItem entry;
     for (const DepthItem item : list) {
-      const bool was = inside(winding);
+      const bool was = is_inside(rule, winding);
       winding += item.exit() ? -1 : 1;
-      const bool now = inside(winding);
+      const bool now = is_inside(rule, winding);
       if (now && !was) entry = item;
       if (now || !was) continue;
       if (voxel(item.depth()) != voxel(entry.depth())) continue;
@@ -447,17 +442,8 @@ class WallSearch {
       return static_cast<std::uint32_t>(std::lower_bound(involved.begin(), involved.end(), t) -
                                         involved.begin());
     };
-    std::vector<std::uint32_t> parent(involved.size());
-    std::iota(parent.begin(), parent.end(), 0u);
-    const auto find = [&](std::uint32_t i) {
-      while (parent[i] != i) i = parent[i] = parent[parent[i]];
-      return i;
-    };
-    const auto unite = [&](std::uint32_t a, std::uint32_t b) {
-      a = find(a), b = find(b);
-      parent[std::max(a, b)] = std::min(a, b);
-    };
-    for (const Miss& miss : misses_) unite(place(miss.in), place(miss.out));
+    detail::DisjointSets walls(involved.size());
+    for (const Miss& miss : misses_) walls.join(place(miss.in), place(miss.out));
     struct Corner {
       glm::ivec3 at;
       std::uint32_t triangle;
@@ -472,9 +458,10 @@ class WallSearch {
     std::sort(corners.begin(), corners.end(),
               [&](const Corner& a, const Corner& b) { return key(a) < key(b); });
     for (std::size_t i = 1; i < corners.size(); ++i) {
-      if (corners[i].at == corners[i - 1].at) unite(corners[i].triangle, corners[i - 1].triangle);
+      if (corners[i].at != corners[i - 1].at) continue;
+      walls.join(corners[i].triangle, corners[i - 1].triangle);
     }
-    for (Miss& miss : misses_) miss.wall = find(place(miss.in));
+    for (Miss& miss : misses_) miss.wall = walls.find(place(miss.in));
   }
 
   /// Whether 2 x 2 columns stand together; `misses` are of one wall and axis, sorted by v, u.
