@@ -26,11 +26,6 @@ Bounds bounds_of(const Geometry::Part& part) {
   return box;
 }
 
-double longest_side(const Bounds& box) {
-  const glm::dvec3 size = box.high - box.low;
-  return std::max({size.x, size.y, size.z});
-}
-
 /// Its distance from the origin.
 double farthest_corner(const Bounds& box) {
   return box.empty() ? 0.0 : glm::length(glm::max(glm::abs(box.low), glm::abs(box.high)));
@@ -202,7 +197,7 @@ bool Geometry::move_solid(const Tree& tree, std::uint32_t solid,
   place(solid);
   parts_[solid].error_share = 1.0;
   const Bounds& moved = parts_[solid].whole;
-  const bool is_vast = longest_side(moved) > kVast * longest_side(box_);
+  const bool is_vast = moved.longest_side() > kVast * box_.longest_side();
   const bool again = any_cut_off_ || (!moved.empty() && is_vast);
   if (again) {  // the others are needed whole, to be cut off where the solid is now
     for (std::uint32_t i = 0; i < parts_.size(); ++i) place(i);
@@ -219,7 +214,7 @@ bool Geometry::cut_off_vast(const Tree& tree) {
     Part& part = parts_[i];
     Bounds box = matters[i].box;
     if (part.triangles.empty() || box.empty()) continue;
-    const double size = longest_side(box);
+    const double size = box.longest_side();
     const auto around = [&](double sizes) {
       return Bounds{box.low - glm::dvec3(sizes * size), box.high + glm::dvec3(sizes * size)};
     };

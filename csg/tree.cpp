@@ -45,11 +45,6 @@ Bounds bounds(const Tree& tree, Tree::NodeId node) {
 
 namespace {
 
-double longest_side(const Bounds& box) {
-  const glm::dvec3 size = box.high - box.low;
-  return std::max({size.x, size.y, size.z});
-}
-
 bool is_empty(const Bounds& box) {
   return box.empty() || box.low.y > box.high.y || box.low.z > box.high.z;
 }
@@ -113,7 +108,7 @@ Bounds difference_bounds(const Tree& tree, std::span<const Tree::NodeId> operand
                          std::span<const Bounds> boxes) {
   const Bounds& whole = boxes[operands[0]];
   const auto is_vast = [&](const Bounds& left) {
-    return is_empty(left) || longest_side(whole) > kVast * longest_side(left);
+    return is_empty(left) || whole.longest_side() > kVast * left.longest_side();
   };
   const auto cutters = operands.subspan(1);
   if (!is_vast(left_of(whole, cutters, boxes, [](Tree::NodeId) { return true; }))) return whole;

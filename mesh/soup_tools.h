@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <glm/common.hpp>
 #include <glm/vec3.hpp>
 #include <limits>
@@ -15,6 +16,11 @@ struct Bounds {
   glm::dvec3 high{-std::numeric_limits<double>::infinity()};
 
   [[nodiscard]] bool empty() const { return !(low.x <= high.x); }
+  /// Below 0 when it is empty.
+  [[nodiscard]] double longest_side() const {
+    const glm::dvec3 size = high - low;
+    return std::max({size.x, size.y, size.z});
+  }
   void include(const glm::dvec3& point) {
     low = glm::min(low, point);
     high = glm::max(high, point);

@@ -24,11 +24,6 @@ double largest(const glm::dvec3& p) {
 
 double largest(const Bounds& box) { return std::max(largest(box.low), largest(box.high)); }
 
-double longest_side(const Bounds& box) {
-  const glm::dvec3 size = box.high - box.low;
-  return std::max({size.x, size.y, size.z});
-}
-
 /// Whether a face that is not parallel to two axes passes through `box`, or may, when it is off by
 /// `error`. @param reach  of the solid's coordinates
 bool has_skew_face(const Solid& solid, const Bounds& box, double error, double reach) {
@@ -114,7 +109,7 @@ Result<void> check_coordinates(Scene& scene) {
       return tl::unexpected(too_far(solid, reaches[i], "result", kMostResult));
     }
     const double reach = largest(boxes[i]), error = reach * 0x1p-52;
-    const double size = longest_side(matters[i].box);
+    const double size = matters[i].box.longest_side();
     if (!(error > scene.relative_precision * size)) continue;
     if (!has_skew_face(solid, matters[i].box, error, reach) || !told.insert(solid.name).second) {
       continue;
