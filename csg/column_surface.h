@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "csg/program.h"
-#include "csg/tile_surface.h"
+#include "csg/transition.h"
 #include "hashbuffer/list_filter.h"
 
 // Private to csg/.

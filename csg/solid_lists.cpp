@@ -9,8 +9,7 @@
 #include "csg/geometry.h"
 #include "csg/program.h"
 #include "csg/solid_labels.h"
-#include "csg/surface.h"
-#include "csg/tile_surface.h"
+#include "csg/transition.h"
 #include "csg/tree_filter.h"
 #include "raster/lattice_mesh.h"
 

@@ -6,6 +6,7 @@
 
 #include "csg/geometry.h"
 #include "csg/program.h"
+#include "csg/transition.h"
 #include "csg/view.h"
 #include "raster/lattice_mesh.h"
 #include "raster/triangle_setup.h"
@@ -13,15 +14,6 @@
 // What a ray sees first of a Boolean tree. Private to csg/.
 
 namespace strata::csg {
-
-/// Where a ray enters or leaves one solid: its flips along a ray increase in depth and begin with
-/// an entry.
-struct Flip {
-  std::uint32_t depth = 0;
-  std::uint32_t solid = 0;
-  std::uint32_t triangle = 0;  ///< of the solid's ViewPart
-  bool exit = false;
-};
 
 /// The visible surface of one pixel.
 struct Surface {

@@ -7,9 +7,9 @@
 #include "core/execution.h"
 #include "core/result.h"
 #include "csg/geometry.h"
-#include "csg/picture.h"
 #include "csg/program.h"
 #include "csg/surface.h"
+#include "csg/surface_image.h"
 
 // The seam between a preview and what finds its surfaces elsewhere. Private to csg/.
 

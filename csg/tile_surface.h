@@ -9,8 +9,8 @@
 
 #include "core/depth_list.h"
 #include "csg/geometry.h"
-#include "csg/picture.h"
 #include "csg/surface.h"
+#include "csg/surface_image.h"
 #include "hashbuffer/tile_builder.h"
 
 // The visible surface of a Boolean tree in one tile of a picture. Private to csg/.
@@ -279,12 +279,6 @@ void find_hidden(const PixelRect& clip, const Coincidence::Range& range, UnitedL
 /// Shows the nearest entry of each pixel of `tile`. `doubtful` gets pixels where another is close.
 void find_united(const UnitedLayers& layers, const PixelRect& tile, const Coincidence::Range& range,
                  const SurfacePart& part, std::vector<std::uint64_t>& doubtful);
-
-/// Turns the sorted crossings of one ray with one solid into flips under an inside rule, appended
-/// to `flips`. With `cut` the ray may begin inside, which the crossings tell from the far end.
-/// Crossings of an open solid that have no partner become sheets one step thick.
-void flips_of(std::span<const DepthItem> crossings, std::uint32_t solid, InsideRule rule, bool cut,
-              std::vector<Flip>& flips);
 
 /// How the crossings of a part are kept: what lies behind the first entry of a convex solid that is
 /// united with all the rest is not asked for.

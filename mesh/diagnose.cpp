@@ -7,6 +7,7 @@
 #include "mesh/block_sum.h"
 #include "mesh/edge_balance.h"
 #include "mesh/edge_uses.h"
+#include "mesh/no_vertex.h"
 #include "mesh/weld.h"
 
 namespace strata {

@@ -8,7 +8,7 @@
 #include <tuple>
 #include <vector>
 
-#include "mesh/reader_common.h"
+#include "core/reserve_large.h"
 
 namespace strata::detail {
 

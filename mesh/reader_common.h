@@ -1,7 +1,5 @@
 #pragma once
 
-#include <sys/mman.h>
-
 #include <cstdint>
 #include <functional>
 #include <string>
@@ -9,15 +7,12 @@
 #include <thread>
 #include <vector>
 
+#include "core/reserve_large.h"
+#include "mesh/no_vertex.h"
 #include "mesh/read_mesh.h"
 
 /// What the readers of this folder share; not for others.
 namespace strata::detail {
-
-/// A vertex index that names no vertex, whatever the file holds.
-inline constexpr std::uint32_t kNoVertex = 0xffffffffu;
-/// Most vertices a soup may have, so that kNoVertex stays free.
-inline constexpr std::uint64_t kMaxVertices = 0xfffffffeu;
 
 /// The arguments of a reader. The text ends in a readable zero byte.
 struct ReaderInput {
@@ -115,20 +110,6 @@ class FanBuilder {
   RawMesh& mesh_;
   bool identity_ = true;
 };
-
-/// Reserves room and asks for large pages, since the first touch of small ones costs more than
-/// filling them.
-template <class T>
-void reserve_large(std::vector<T>& values, std::size_t count) {
-  values.reserve(count);
-  constexpr std::uintptr_t kPage = 4096;
-  const auto begin = (reinterpret_cast<std::uintptr_t>(values.data()) + kPage - 1) / kPage * kPage;
-  const auto end =
-      reinterpret_cast<std::uintptr_t>(values.data() + values.capacity()) / kPage * kPage;
-  if (end > begin && end - begin >= (std::uintptr_t{4} << 20)) {
-    ::madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE);
-  }
-}
 
 /// True when the memory limit of the execution forbids a soup of this size.
 [[nodiscard]] inline bool exceeds_limit(const Execution& execution, std::uint64_t vertices,

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "core/execution.h"
-#include "mesh/reader_common.h"
+#include "core/reserve_large.h"
 
 /// Finding equal positions; not for others.
 namespace strata::detail {

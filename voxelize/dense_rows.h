@@ -7,6 +7,7 @@
 
 #include "voxelize/block_output.h"
 #include "voxelize/intervals.h"
+#include "voxelize/npy_head.h"
 #include "voxelize/run_deflate.h"
 
 namespace strata {
@@ -87,6 +88,15 @@ void emit_layer(const VoxelIntervals& slab, int z, Run&& run) {
     });
     if (length > done) run(std::uint32_t{0}, length - done);
   }
+}
+
+/// The head of a .npy file of voxels, x fastest.
+inline std::string npy_head(const DenseValues& values, const glm::ivec3& dims) {
+  const char* type = values.kind == RunBytes::kFlags ? "|b1"
+                     : values.bytes == 1             ? "|u1"
+                     : values.bytes == 2             ? "<u2"
+                                                     : "<u4";
+  return npy_head(type, true, fmt::format("({}, {}, {})", dims.x, dims.y, dims.z));
 }
 
 }  // namespace strata

@@ -2,11 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <glm/vec3.hpp>
 #include <string>
 #include <string_view>
-
-#include "voxelize/dense_rows.h"
 
 namespace strata {
 
@@ -22,15 +19,6 @@ inline std::string npy_head(std::string_view type, bool fortran_order, std::stri
   head += static_cast<char>(text.size() & 0xff);
   head += static_cast<char>(text.size() >> 8);
   return head + text;
-}
-
-/// The same of voxels, x fastest.
-inline std::string npy_head(const DenseValues& values, const glm::ivec3& dims) {
-  const char* type = values.kind == RunBytes::kFlags ? "|b1"
-                     : values.bytes == 1             ? "|u1"
-                     : values.bytes == 2             ? "<u2"
-                                                     : "<u4";
-  return npy_head(type, true, fmt::format("({}, {}, {})", dims.x, dims.y, dims.z));
 }
 
 }  // namespace strata

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace strata::csg {
+
+/// What was drawn, in numbers.
+struct DrawReport {
+  std::uint64_t fragments = 0;  ///< crossings that were made
+  std::uint64_t resolved = 0;   ///< pixels decided one by one: faces that coincide, deep nesting
+  std::uint64_t covered = 0;    ///< pixels where something is seen
+};
+
+/// The visible surface of each pixel, row by row from the top.
+struct SurfaceImage {
+  static constexpr std::uint32_t kNone = 0xffffffffu;
+  static constexpr std::uint32_t kExit = 0x80000000u;
+  int width = 0, height = 0;
+  std::vector<std::uint32_t> depth;     ///< in steps of the view, View::distance(); kNone: nothing
+  std::vector<std::uint32_t> solid;     ///< index into the tree; meaningless where nothing is seen
+  std::vector<std::uint32_t> triangle;  ///< [exit:1 | triangle:31] of the solid's mesh; exit: a cut
+                                        ///< face, the surface is left there
+  void resize(int columns, int rows) {
+    width = columns, height = rows;
+    const std::size_t pixels = static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
+    for (auto* plane : {&depth, &solid, &triangle}) plane->resize(pixels);
+  }
+};
+
+}  // namespace strata::csg

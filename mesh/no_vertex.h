@@ -1,0 +1,13 @@
+#pragma once
+
+#include <cstdint>
+
+// Private: not installed.
+namespace strata::detail {
+
+/// A vertex index that names no vertex, whatever the file holds.
+inline constexpr std::uint32_t kNoVertex = 0xffffffffu;
+/// Most vertices a soup may have, so that kNoVertex stays free.
+inline constexpr std::uint64_t kMaxVertices = 0xfffffffeu;
+
+}  // namespace strata::detail
