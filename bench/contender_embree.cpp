@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "bench/contenders.h"
-#include "voxelize/intervals.h"
+#include "strata/voxelize/intervals.h"
 
 namespace strata::bench {
 namespace {

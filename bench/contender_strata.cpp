@@ -3,7 +3,7 @@
 #include <utility>
 
 #include "bench/contenders.h"
-#include "voxelize/voxelize.h"
+#include "strata/voxelize/voxelize.h"
 
 namespace strata::bench {
 namespace {

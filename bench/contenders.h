@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "core/grid.h"
 #include "hashbuffer/tile_builder.h"
-#include "mesh/triangle_soup.h"
+#include "strata/core/grid.h"
+#include "strata/mesh/triangle_soup.h"
 
 /// Ways from a mesh in memory to its solid voxels, each in the form that is natural to it.
 namespace strata::bench {

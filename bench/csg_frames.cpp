@@ -20,7 +20,7 @@
 #include "bench/csg_scenes.h"
 #include "bench/support.h"
 #include "csg/geometry.h"
-#include "csg/picture.h"
+#include "strata/csg/picture/picture.h"
 #ifdef STRATA_HAVE_OPENCSG
 #include "bench/opencsg_peer.h"
 #endif

@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "core/result.h"
-#include "csg/tree.h"
+#include "strata/core/result.h"
+#include "strata/csg/tree.h"
 
 namespace strata::bench {
 

@@ -8,9 +8,9 @@
 #include <random>
 #include <utility>
 
-#include "csg/scene/scene.h"
-#include "mesh/read_mesh.h"
-#include "mesh/shapes.h"
+#include "strata/csg/scene/scene.h"
+#include "strata/mesh/formats/read_mesh.h"
+#include "strata/mesh/shapes.h"
 
 namespace strata::bench {
 namespace {

@@ -4,10 +4,10 @@
 #include <string>
 #include <vector>
 
-#include "core/execution.h"
-#include "core/result.h"
-#include "csg/tree.h"
-#include "csg/view.h"
+#include "strata/core/execution.h"
+#include "strata/core/result.h"
+#include "strata/csg/tree.h"
+#include "strata/csg/view.h"
 
 namespace strata::bench {
 

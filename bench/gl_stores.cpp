@@ -18,16 +18,16 @@
 #include <utility>
 #include <vector>
 
-#include "gl/buffer.h"
-#include "gl/context.h"
-#include "gl/program.h"
-#include "hashbuffer/build_ldi.h"
 #include "hashbuffer/gl/hash_store.h"
 #include "hashbuffer/gl/scan_store.h"
-#include "hashbuffer/record.h"
-#include "mesh/shapes.h"
 #include "raster/gl/compute.h"
 #include "raster/gl/hardware.h"
+#include "strata/gl/buffer.h"
+#include "strata/gl/context.h"
+#include "strata/gl/shader_program.h"
+#include "strata/hashbuffer/build_ldi.h"
+#include "strata/hashbuffer/record.h"
+#include "strata/mesh/shapes.h"
 
 namespace strata::bench {
 namespace {

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "bench/support.h"
-#include "voxelize/voxelize.h"
+#include "strata/voxelize/voxelize.h"
 
 namespace strata::bench {
 namespace {

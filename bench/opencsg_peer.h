@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "bench/csg_products.h"
-#include "core/result.h"
-#include "csg/view.h"
+#include "strata/core/result.h"
+#include "strata/csg/view.h"
 
 namespace strata::bench {
 

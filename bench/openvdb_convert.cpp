@@ -14,7 +14,7 @@
 
 #include "bench/openvdb_solid.h"
 #include "bench/support.h"
-#include "mesh/read_mesh.h"
+#include "strata/mesh/formats/read_mesh.h"
 
 int main(int argc, char** argv) {
   using namespace strata::bench;

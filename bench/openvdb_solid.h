@@ -9,8 +9,8 @@
 #include <glm/vec3.hpp>
 #include <vector>
 
-#include "core/grid.h"
-#include "mesh/triangle_soup.h"
+#include "strata/core/grid.h"
+#include "strata/mesh/triangle_soup.h"
 
 namespace strata::bench {
 

@@ -17,8 +17,8 @@
 
 #include "bench/other_readers.h"
 #include "bench/support.h"
-#include "mesh/read_mesh.h"
-#include "mesh/write_mesh.h"
+#include "strata/mesh/formats/read_mesh.h"
+#include "strata/mesh/formats/write_mesh.h"
 
 namespace strata::bench {
 namespace {

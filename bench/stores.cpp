@@ -24,9 +24,9 @@
 
 #include <fmt/format.h>
 
-#include "hashbuffer/count_scan_store.h"
-#include "hashbuffer/hash_buffer_build.h"
-#include "hashbuffer/random.h"
+#include "strata/hashbuffer/count_scan_store.h"
+#include "strata/hashbuffer/hash_buffer_build.h"
+#include "strata/hashbuffer/random.h"
 
 namespace strata {
 namespace {

@@ -16,12 +16,12 @@
 #include <thread>
 #include <utility>
 
-#include "core/memory.h"
-#include "mesh/diagnose.h"
-#include "mesh/read_mesh.h"
-#include "mesh/shapes.h"
-#include "mesh/soup_tools.h"
-#include "voxelize/grid_fit.h"
+#include "apps/session/process_memory.h"
+#include "strata/mesh/diagnose.h"
+#include "strata/mesh/formats/read_mesh.h"
+#include "strata/mesh/shapes.h"
+#include "strata/mesh/soup_tools.h"
+#include "strata/voxelize/grid_fit.h"
 
 namespace strata::bench {
 namespace {

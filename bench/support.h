@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "core/grid.h"
-#include "core/result.h"
-#include "mesh/triangle_soup.h"
+#include "strata/core/grid.h"
+#include "strata/core/result.h"
+#include "strata/mesh/triangle_soup.h"
 
 /// What the benchmark programs share: meshes, clocks, interleaved rounds, tables.
 namespace strata::bench {

@@ -14,7 +14,7 @@
 
 #include "bench/contenders.h"
 #include "bench/support.h"
-#include "mesh/write_mesh.h"
+#include "strata/mesh/formats/write_mesh.h"
 
 namespace strata::bench {
 namespace {

@@ -5,7 +5,7 @@ if(text MATCHES "\\)glsl\"")
 endif()
 file(CONFIGURE OUTPUT "${OUTPUT}" @ONLY CONTENT [==[
 // Made from @PATH@ by cmake/StrataEmbedGlsl.cmake.
-#include "gl/program.h"
+#include "strata/gl/shader_program.h"
 namespace strata::glsl {
 extern const gl::GlslPiece @SYMBOL@;
 const gl::GlslPiece @SYMBOL@{"@PATH@", R"glsl(@text@)glsl"};

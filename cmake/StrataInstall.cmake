@@ -27,9 +27,9 @@ if(strata_tools)
 endif()
 install(EXPORT strata NAMESPACE strata:: FILE strataTargets.cmake DESTINATION "${strata_package_dir}")
 
-# Headers keep their folder, and only those of libraries that are built: a header without its library, or without the
-# package it includes, is a trap.
-set(strata_folders "")
+# Public headers are those below strata/; they include no others. Only those of libraries that are built are installed: a
+# header without its library, or without the package it includes, is a trap.
+set(strata_folders ".")
 foreach(library IN LISTS strata_libraries)
   get_target_property(folder ${library} SOURCE_DIR)
   cmake_path(RELATIVE_PATH folder BASE_DIRECTORY "${PROJECT_SOURCE_DIR}")
@@ -37,11 +37,10 @@ foreach(library IN LISTS strata_libraries)
 endforeach()
 list(REMOVE_DUPLICATES strata_folders)
 foreach(folder IN LISTS strata_folders)
-  file(GLOB headers CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/${folder}/*.h")
+  file(GLOB headers CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/strata/${folder}/*.h")
   if(NOT STRATA_HAVE_OPENMESH)
     list(FILTER headers EXCLUDE REGEX "/openmesh_bridge\\.h$")
   endif()
-  list(FILTER headers EXCLUDE REGEX "/gl/window\\.h$")  # of strata-view alone
   install(FILES ${headers} DESTINATION "${strata_include_dir}/${folder}")
 endforeach()
 

@@ -49,7 +49,7 @@ function(strata_add_library name)
   add_library(strata::${name} ALIAS strata_${name})
   set_target_properties(strata_${name} PROPERTIES EXPORT_NAME ${name} UNITY_BUILD ${STRATA_JOIN_SOURCES})
   target_include_directories(strata_${name} PUBLIC
-    "$<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>" "$<INSTALL_INTERFACE:include/strata>")
+    "$<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>" "$<INSTALL_INTERFACE:include>")
   target_compile_features(strata_${name} PUBLIC cxx_std_20)
   target_link_libraries(strata_${name} PUBLIC ${arg_PUBLIC} PRIVATE ${arg_PRIVATE})
   strata_set_flags(strata_${name})
@@ -60,7 +60,7 @@ endfunction()
 
 # strata_embed_glsl(TARGET FILES...): compiles shader text into the target, so that nothing is looked for at run time.
 #   `raster/gl/cover.comp.glsl` becomes `extern const gl::GlslPiece raster_gl_cover_comp;` in namespace strata::glsl:
-#   declare it where it is used (gl/program.h has the type). `name.glsl.h` becomes ..._name_h.
+#   declare it where it is used (strata/gl/shader_program.h has the type). `name.glsl.h` becomes ..._name_h.
 function(strata_embed_glsl target)
   foreach(file IN LISTS ARGN)
     cmake_path(ABSOLUTE_PATH file OUTPUT_VARIABLE input)
@@ -86,7 +86,37 @@ function(strata_add_tool name)
   set_property(GLOBAL APPEND PROPERTY STRATA_TOOLS ${name})
 endfunction()
 
-# strata_add_test(NAME [SANITIZED] SOURCES... [LIBRARIES targets...]): a Google Test executable, one ctest entry a case.
+# strata_room_of_test(VARIABLE LABELS): the room that this folder of tests/ is about, such as csg/scene, and the labels of
+#   its tests: csg, csg/scene; gl where the last folder is gl. The targets test_csg and test_csg_scene build them.
+function(strata_room_of_test variable labels)
+  cmake_path(RELATIVE_PATH CMAKE_CURRENT_SOURCE_DIR BASE_DIRECTORY "${PROJECT_SOURCE_DIR}/tests" OUTPUT_VARIABLE room)
+  set(all "")
+  set(path "${room}")
+  while(path)
+    list(APPEND all "${path}")
+    cmake_path(GET path PARENT_PATH path)
+  endwhile()
+  if(room MATCHES "/gl$")
+    list(APPEND all gl)
+  endif()
+  set(${variable} "${room}" PARENT_SCOPE)
+  set(${labels} "${all}" PARENT_SCOPE)
+endfunction()
+
+# strata_tests_of_room(TARGETS...): what must be built before the tests of this folder run.
+function(strata_tests_of_room)
+  strata_room_of_test(room labels)
+  foreach(label IN LISTS labels)
+    string(REPLACE "/" "_" target "test_${label}")
+    if(NOT TARGET ${target})
+      add_custom_target(${target})
+    endif()
+    add_dependencies(${target} ${ARGN})
+  endforeach()
+endfunction()
+
+# strata_add_test(NAME [SANITIZED] SOURCES... [LIBRARIES targets...]): a Google Test executable, one ctest entry a case,
+#   named `room.Suite.Case` and labelled with its room.
 #   SANITIZED: it reads what may be hostile, and is one of those that `./dev sanitized` runs.
 function(strata_add_test name)
   cmake_parse_arguments(arg "SANITIZED" "" "SOURCES;LIBRARIES" ${ARGN})
@@ -95,12 +125,18 @@ function(strata_add_test name)
   target_compile_definitions(${name} PRIVATE STRATA_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
   strata_set_flags(${name})
   include(GoogleTest)
-  set(labels)
+  strata_room_of_test(room labels)
+  strata_tests_of_room(${name})
   if(arg_SANITIZED)
-    set(labels LABELS sanitized)
+    list(APPEND labels sanitized)
     add_dependencies(sanitized_tests ${name})
   endif()
-  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 120 PROPERTIES TIMEOUT 600 ${labels})
+  string(REPLACE "/" "." prefix "${room}.")
+  gtest_discover_tests(${name} TEST_PREFIX "${prefix}" DISCOVERY_TIMEOUT 120 PROPERTIES TIMEOUT 600)
+  # gtest_discover_tests() takes no list as a property.
+  file(CONFIGURE OUTPUT "${name}_labels.cmake" @ONLY
+    CONTENT "set_tests_properties(\${@name@_TESTS} PROPERTIES LABELS \"@labels@\")\n")
+  set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES "${CMAKE_CURRENT_BINARY_DIR}/${name}_labels.cmake")
 endfunction()
 
 # strata_add_fuzz(NAME SOURCES... CORPUS folder [LIBRARIES targets...])
@@ -115,8 +151,9 @@ function(strata_add_fuzz name)
   else()
     add_executable(${name} ${arg_SOURCES} "${PROJECT_SOURCE_DIR}/tests/fuzz/replay_main.cpp")
     add_test(NAME fuzz.${name} COMMAND ${name} "${arg_CORPUS}")
-    set_tests_properties(fuzz.${name} PROPERTIES TIMEOUT 600 LABELS sanitized)
+    set_tests_properties(fuzz.${name} PROPERTIES TIMEOUT 600 LABELS "fuzz;sanitized")
     add_dependencies(sanitized_tests ${name})
+    strata_tests_of_room(${name})
   endif()
   target_link_libraries(${name} PRIVATE ${arg_LIBRARIES})
   strata_set_flags(${name})

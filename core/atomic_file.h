@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "core/result.h"
+#include "strata/core/result.h"
 
 namespace strata {
 

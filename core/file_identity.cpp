@@ -1,4 +1,4 @@
-#include "core/file_identity.h"
+#include "strata/core/file_identity.h"
 
 #include <sys/stat.h>
 

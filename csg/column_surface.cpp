@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "raster/lattice_mesh.h"
+#include "strata/raster/lattice_mesh.h"
 
 namespace strata::csg {
 

@@ -6,7 +6,7 @@
 
 #include "csg/program.h"
 #include "csg/transition.h"
-#include "hashbuffer/list_filter.h"
+#include "strata/hashbuffer/list_filter.h"
 
 // Private to csg/.
 

@@ -9,7 +9,7 @@
 #include <unordered_map>
 
 #include "mesh/clamp.h"
-#include "mesh/diagnose.h"
+#include "strata/mesh/diagnose.h"
 
 namespace strata::csg {
 namespace {

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "csg/tree.h"
+#include "strata/csg/tree.h"
 
 namespace strata::csg {
 

@@ -1,4 +1,4 @@
-#include "csg/solid_labels.h"
+#include "strata/csg/solid_labels.h"
 
 #include <array>
 #include <bit>

@@ -1,4 +1,4 @@
-#include "csg/solid_lists.h"
+#include "strata/csg/solid_lists.h"
 
 #include <algorithm>
 #include <bit>
@@ -8,10 +8,10 @@
 #include "csg/column_surface.h"
 #include "csg/geometry.h"
 #include "csg/program.h"
-#include "csg/solid_labels.h"
 #include "csg/transition.h"
 #include "csg/tree_filter.h"
-#include "raster/lattice_mesh.h"
+#include "strata/csg/solid_labels.h"
+#include "strata/raster/lattice_mesh.h"
 
 namespace strata::csg {
 namespace {

@@ -4,8 +4,8 @@
 #include <span>
 #include <vector>
 
-#include "core/depth_list.h"
-#include "core/inside_rule.h"
+#include "strata/core/depth_list.h"
+#include "strata/core/inside_rule.h"
 
 // Private to csg/.
 

@@ -1,10 +1,10 @@
-#include "csg/tree.h"
+#include "strata/csg/tree.h"
 
 #include <algorithm>
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 
-#include "mesh/diagnose.h"
+#include "strata/mesh/diagnose.h"
 
 namespace strata::csg {
 

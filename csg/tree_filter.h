@@ -3,9 +3,9 @@
 #include <cstdint>
 #include <span>
 
-#include "core/inside_rule.h"
 #include "csg/program.h"
-#include "hashbuffer/list_filter.h"
+#include "strata/core/inside_rule.h"
+#include "strata/hashbuffer/list_filter.h"
 
 // Private to csg/.
 

@@ -1,4 +1,4 @@
-#include "csg/view.h"
+#include "strata/csg/view.h"
 
 #include <algorithm>
 #include <cmath>

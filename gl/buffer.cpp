@@ -1,4 +1,4 @@
-#include "gl/buffer.h"
+#include "strata/gl/buffer.h"
 
 #include <epoxy/gl.h>
 
@@ -6,8 +6,8 @@
 #include <cassert>
 #include <cstring>
 
-#include "gl/context.h"
 #include "gl/faults.h"
+#include "strata/gl/context.h"
 
 namespace strata::gl {
 

@@ -1,4 +1,4 @@
-#include "gl/context.h"
+#include "strata/gl/context.h"
 
 #include <epoxy/gl.h>
 #include <fmt/format.h>
@@ -8,8 +8,8 @@
 #include <iterator>
 
 #include "gl/faults.h"
-#include "gl/program.h"
 #include "gl/workarounds.h"
+#include "strata/gl/shader_program.h"
 
 namespace strata::gl {
 namespace {

@@ -1,6 +1,6 @@
 #include "gl/faults.h"
 
-#include "gl/context.h"
+#include "strata/gl/context.h"
 
 #include <algorithm>
 #include <charconv>

@@ -2,8 +2,8 @@
 
 #include <span>
 
-#include "core/result.h"
-#include "gl/program.h"
+#include "strata/core/result.h"
+#include "strata/gl/shader_program.h"
 
 // Faults that tests provoke, since the driver that they have never shows them by itself. Private
 // to gl/; context.h has pretends_hardware().

@@ -8,7 +8,7 @@
 #include <cstring>
 #include <optional>
 
-#include "gl/context.h"
+#include "strata/gl/context.h"
 
 // Contexts of EGL, without a display.
 

@@ -3,8 +3,8 @@
 #include <memory>
 #include <string>
 
-#include "core/result.h"
-#include "gl/context.h"
+#include "strata/core/result.h"
+#include "strata/gl/context.h"
 
 struct GLFWwindow;
 

@@ -3,7 +3,7 @@
 #include <string_view>
 #include <vector>
 
-#include "gl/context.h"
+#include "strata/gl/context.h"
 
 namespace strata::gl {
 

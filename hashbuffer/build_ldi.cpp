@@ -1,4 +1,4 @@
-#include "hashbuffer/build_ldi.h"
+#include "strata/hashbuffer/build_ldi.h"
 
 #include <algorithm>
 #include <atomic>
@@ -6,6 +6,8 @@
 #include <new>
 #include <utility>
 #include <vector>
+
+#include "hashbuffer/tile_builder.h"
 
 namespace strata {
 namespace {

@@ -1,9 +1,9 @@
-#include "hashbuffer/list_source.h"
+#include "strata/hashbuffer/list_source.h"
 
 #include <algorithm>
 #include <utility>
 
-#include "hashbuffer/build_ldi.h"
+#include "strata/hashbuffer/build_ldi.h"
 
 namespace strata {
 

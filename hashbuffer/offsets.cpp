@@ -1,11 +1,11 @@
-#include "hashbuffer/offsets.h"
+#include "strata/hashbuffer/offsets.h"
 
 #include <algorithm>
 #include <cstddef>
 #include <limits>
 #include <unordered_set>
 
-#include "hashbuffer/random.h"
+#include "strata/hashbuffer/random.h"
 
 namespace strata {
 namespace {

@@ -11,8 +11,8 @@
 
 namespace strata {
 
-/// The HA-buffer of one tile, with plain stores; see hashbuffer/hash_buffer.h for the law of the
-/// table.
+/// The HA-buffer of one tile, with plain stores; see strata/hashbuffer/hash_buffer.h for the law of
+/// the table.
 template <class Record>
 struct TileTable {
   using Bits = typename Record::Word;

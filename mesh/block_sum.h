@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "core/execution.h"
+#include "strata/core/execution.h"
 
 namespace strata::detail {
 

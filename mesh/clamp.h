@@ -6,7 +6,7 @@
 #include <stop_token>
 #include <vector>
 
-#include "mesh/soup_tools.h"
+#include "strata/mesh/soup_tools.h"
 
 namespace strata {
 

@@ -1,4 +1,4 @@
-#include "mesh/diagnose.h"
+#include "strata/mesh/diagnose.h"
 
 #include <algorithm>
 #include <glm/geometric.hpp>

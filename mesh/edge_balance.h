@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "core/execution.h"
+#include "strata/core/execution.h"
 
 namespace strata::detail {
 

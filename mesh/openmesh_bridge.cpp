@@ -1,4 +1,4 @@
-#include "mesh/openmesh_bridge.h"
+#include "strata/mesh/openmesh_bridge.h"
 
 namespace strata {
 

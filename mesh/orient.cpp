@@ -1,4 +1,4 @@
-#include "mesh/orient.h"
+#include "strata/mesh/orient.h"
 
 #include <fmt/format.h>
 
@@ -13,12 +13,12 @@
 #include <utility>
 
 #include "mesh/block_sum.h"
-#include "mesh/diagnose.h"
 #include "mesh/edge_balance.h"
 #include "mesh/edge_uses.h"
 #include "mesh/part_measures.h"
-#include "mesh/soup_tools.h"
 #include "mesh/weld.h"
+#include "strata/mesh/diagnose.h"
+#include "strata/mesh/soup_tools.h"
 
 namespace strata {
 namespace {

@@ -10,11 +10,11 @@
 #include <tuple>
 #include <vector>
 
-#include "core/execution.h"
 #include "mesh/disjoint_sets.h"
 #include "mesh/edge_balance.h"
-#include "mesh/soup_tools.h"
-#include "mesh/triangle_soup.h"
+#include "strata/core/execution.h"
+#include "strata/mesh/soup_tools.h"
+#include "strata/mesh/triangle_soup.h"
 
 // What orient_parts() knows of parts; private to mesh/.
 

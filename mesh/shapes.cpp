@@ -1,4 +1,4 @@
-#include "mesh/shapes.h"
+#include "strata/mesh/shapes.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 #include <numbers>
 #include <unordered_map>
 
-#include "mesh/soup_tools.h"
+#include "strata/mesh/soup_tools.h"
 
 namespace strata {
 namespace {

@@ -1,4 +1,4 @@
-#include "mesh/soup_tools.h"
+#include "strata/mesh/soup_tools.h"
 
 #include <algorithm>
 #include <glm/geometric.hpp>

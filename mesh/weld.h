@@ -9,8 +9,8 @@
 #include <type_traits>
 #include <vector>
 
-#include "core/execution.h"
 #include "core/reserve_large.h"
+#include "strata/core/execution.h"
 
 /// Finding equal positions; not for others.
 namespace strata::detail {

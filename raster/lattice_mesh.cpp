@@ -1,4 +1,4 @@
-#include "raster/lattice_mesh.h"
+#include "strata/raster/lattice_mesh.h"
 
 #include <algorithm>
 #include <atomic>

@@ -4,15 +4,11 @@
 #include <span>
 #include <vector>
 
-#include "core/execution.h"
-#include "raster/lattice_mesh.h"
 #include "raster/triangle_setup.h"
+#include "strata/core/execution.h"
+#include "strata/raster/lattice_mesh.h"
 
 namespace strata {
-
-/// Pixels along a side of a tile: bulk work is done tile by tile, each one thread's alone.
-inline constexpr int kTileSide = 64;
-inline constexpr int kTilePixels = kTileSide * kTileSide;
 
 /// Which triangles may cover a pixel of which tile, by their boxes. Triangles that cover no pixel
 /// centre are in no tile.

@@ -6,8 +6,9 @@
 #include <glm/vec3.hpp>
 #include <utility>
 
-#include "core/grid.h"
-#include "raster/lattice_mesh.h"
+#include "strata/core/grid.h"
+#include "strata/raster/lattice_mesh.h"
+#include "strata/raster/raster_target.h"
 
 // The exact geometry of a triangle seen along an axis: which pixel centres it covers and at what
 // depth, in integers, with ties decided by one symbolic perturbation of the sample point by
@@ -18,20 +19,6 @@
 namespace strata {
 
 __extension__ using Int128 = __int128;
-
-/// What rays along one axis see: pixel (u, v) has its centre at lattice (256 u + 128, 256 v + 128).
-struct RasterTarget {
-  Axis axis = Axis::kZ;
-  int width = 0;                  ///< pixels along u
-  int height = 0;                 ///< pixels along v
-  std::uint32_t depth_limit = 0;  ///< depths are clamped to [0, depth_limit), never dropped
-};
-
-/// A half-open box of pixels.
-struct PixelRect {
-  int u0 = 0, v0 = 0, u1 = 0, v1 = 0;
-  [[nodiscard]] bool empty() const { return u0 >= u1 || v0 >= v1; }
-};
 
 /// A triangle in the frame of a target, turned counter-clockwise.
 struct TriangleSetup {

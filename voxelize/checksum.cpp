@@ -1,4 +1,4 @@
-#include "voxelize/checksum.h"
+#include "strata/voxelize/checksum.h"
 
 #include <bit>
 #include <cstddef>

@@ -1,9 +1,9 @@
-#include "voxelize/grid_fit.h"
+#include "strata/voxelize/grid_fit.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "raster/lattice_mesh.h"
+#include "strata/raster/lattice_mesh.h"
 
 namespace strata {
 namespace {

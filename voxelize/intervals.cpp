@@ -1,4 +1,4 @@
-#include "voxelize/intervals.h"
+#include "strata/voxelize/intervals.h"
 
 #include <algorithm>
 #include <cstring>

@@ -1,8 +1,8 @@
 #pragma once
 
-#include "core/execution.h"
-#include "core/grid.h"
-#include "voxelize/intervals.h"
+#include "strata/core/execution.h"
+#include "strata/core/grid.h"
+#include "strata/voxelize/intervals.h"
 
 // The filled fraction of voxels, from a set with several voxels for one. Private to voxelize/.
 

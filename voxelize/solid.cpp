@@ -5,7 +5,7 @@
 #include <mutex>
 #include <utility>
 
-#include "hashbuffer/build_ldi.h"
+#include "strata/hashbuffer/build_ldi.h"
 
 namespace strata {
 namespace {

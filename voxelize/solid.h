@@ -4,9 +4,9 @@
 #include <vector>
 
 #include "raster/tile_bins.h"
+#include "strata/voxelize/voxelize.h"
+#include "voxelize/open/winding_field.h"
 #include "voxelize/tile_walk.h"
-#include "voxelize/voxelize.h"
-#include "voxelize/winding_field.h"
 
 // Lists along one axis -> intervals, tile row by tile row. Private to voxelize/.
 

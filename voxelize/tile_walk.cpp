@@ -8,8 +8,8 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-#include "hashbuffer/list_filter.h"
-#include "raster/lattice_mesh.h"
+#include "strata/hashbuffer/list_filter.h"
+#include "strata/raster/lattice_mesh.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace strata {

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "hashbuffer/tile_builder.h"
-#include "voxelize/voxelize.h"
-#include "voxelize/winding_field.h"
+#include "strata/voxelize/voxelize.h"
+#include "voxelize/open/winding_field.h"
 
 // Depth lists of a tile -> runs of solid voxels. Private to voxelize/.
 

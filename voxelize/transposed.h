@@ -1,7 +1,7 @@
 #pragma once
 
-#include "core/execution.h"
-#include "voxelize/intervals.h"
+#include "strata/core/execution.h"
+#include "strata/voxelize/intervals.h"
 
 namespace strata {
 

@@ -1,4 +1,4 @@
-#include "voxelize/voxelize.h"
+#include "strata/voxelize/voxelize.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,14 +7,14 @@
 #include <utility>
 #include <vector>
 
-#include "raster/lattice_mesh.h"
-#include "voxelize/boundary_caps.h"
-#include "voxelize/checksum.h"
+#include "strata/raster/lattice_mesh.h"
+#include "strata/voxelize/checksum.h"
+#include "strata/voxelize/shell_voxels.h"
+#include "voxelize/open/boundary_caps.h"
+#include "voxelize/open/winding_field.h"
 #include "voxelize/samples.h"
 #include "voxelize/solid.h"
-#include "voxelize/surface.h"
-#include "voxelize/tree_surface.h"
-#include "voxelize/winding_field.h"
+#include "voxelize/tree_shell.h"
 
 namespace strata {
 namespace {
@@ -67,7 +67,8 @@ Result<void> check_samples(const VoxelGrid& grid, const VoxelizeOptions& options
 }
 
 /// The solid of a mesh, slab by slab along options.axis. An open mesh is closed by caps, and what
-/// its winding numbers are other than those of the closed one is added (voxelize/winding_field.h).
+/// its winding numbers are other than those of the closed one is added
+/// (voxelize/open/winding_field.h).
 class SolidSlabs {
  public:
   /// Keeps references to all arguments but `execution`.

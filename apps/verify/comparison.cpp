@@ -8,10 +8,10 @@
 #include <random>
 
 #include "csg/geometry.h"
-#include "csg/measure.h"
-#include "csg/solid_lists.h"
-#include "voxelize/grid_fit.h"
-#include "voxelize/voxelize.h"
+#include "strata/csg/measure/measure.h"
+#include "strata/csg/solid_lists.h"
+#include "strata/voxelize/grid_fit.h"
+#include "strata/voxelize/voxelize.h"
 
 namespace strata::apps {
 namespace {

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "apps/verify/exact_solid.h"
-#include "core/execution.h"
-#include "core/result.h"
-#include "csg/tree.h"
+#include "strata/core/execution.h"
+#include "strata/core/result.h"
+#include "strata/csg/tree.h"
 
 namespace strata::apps {
 

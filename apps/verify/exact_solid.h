@@ -4,9 +4,9 @@
 #include <glm/vec3.hpp>
 #include <memory>
 
-#include "core/execution.h"
-#include "core/result.h"
-#include "csg/tree.h"
+#include "strata/core/execution.h"
+#include "strata/core/result.h"
+#include "strata/csg/tree.h"
 
 namespace strata::apps {
 

@@ -5,7 +5,7 @@
 #include <optional>
 #include <string_view>
 
-#include "csg/view.h"
+#include "strata/csg/view.h"
 
 // How a hand moves a camera. Pixels count from the upper left corner of the picture, downwards.
 

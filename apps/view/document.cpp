@@ -7,9 +7,9 @@
 #include <map>
 #include <utility>
 
-#include "apps/csg_scene.h"
-#include "apps/session.h"
-#include "csg/result_bounds.h"
+#include "apps/strata/csg_scene.h"
+#include "apps/strata/session.h"
+#include "csg/measure/result_bounds.h"
 
 namespace strata::view {
 namespace {

@@ -9,11 +9,11 @@
 #include <unordered_map>
 #include <vector>
 
-#include "apps/commands.h"
-#include "core/execution.h"
-#include "core/result.h"
-#include "csg/picture.h"
-#include "csg/scene/scene.h"
+#include "apps/strata/commands.h"
+#include "strata/core/execution.h"
+#include "strata/core/result.h"
+#include "strata/csg/picture/picture.h"
+#include "strata/csg/scene/scene.h"
 
 // What a window shows: the scene as it was read, and how it is looked at.
 

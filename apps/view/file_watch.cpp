@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "apps/scene_files.h"
+#include "apps/strata/scene_files.h"
 
 namespace strata::view {
 FileWatch::FileWatch(std::vector<std::string> files, std::string asset_folder)

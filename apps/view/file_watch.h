@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "core/file_identity.h"
+#include "strata/core/file_identity.h"
 
 // Whether files that a scene is made of have changed on the disk.
 

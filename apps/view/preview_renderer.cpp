@@ -3,11 +3,11 @@
 #include <cmath>
 #include <utility>
 
-#include "apps/gpu.h"
-#include "apps/session.h"
+#include "apps/strata/gpu.h"
+#include "apps/strata/session.h"
 #include "apps/view/camera_control.h"
 #include "apps/view/renderer.h"
-#include "csg/ray_image.h"
+#include "csg/measure/ray_image.h"
 
 namespace strata::view {
 namespace {

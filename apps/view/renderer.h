@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "apps/view/document.h"
-#include "core/execution.h"
-#include "core/result.h"
-#include "csg/picture.h"
+#include "strata/core/execution.h"
+#include "strata/core/result.h"
+#include "strata/csg/picture/picture.h"
 
 // The seam between the window and what draws its pictures.
 

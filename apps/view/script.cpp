@@ -10,11 +10,11 @@
 #include <iterator>
 #include <optional>
 
-#include "apps/csg_options.h"
-#include "apps/option_values.h"
+#include "apps/strata/csg_options.h"
+#include "apps/strata/option_values.h"
 #include "apps/view/camera_control.h"
-#include "csg/picture.h"
-#include "mesh/text_scanner.h"
+#include "mesh/formats/text_scanner.h"
+#include "strata/csg/picture/picture.h"
 
 namespace strata::view {
 namespace {

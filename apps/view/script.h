@@ -4,7 +4,7 @@
 #include <string_view>
 #include <vector>
 
-#include "core/result.h"
+#include "strata/core/result.h"
 
 // What drives the window without a person: a command a line.
 

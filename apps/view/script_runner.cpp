@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "apps/csg_options.h"
+#include "apps/strata/csg_options.h"
 
 namespace strata::view {
 namespace {

@@ -9,11 +9,11 @@
 #include <algorithm>
 #include <utility>
 
-#include "apps/choice_words.h"
-#include "apps/csg_options.h"
-#include "apps/file_conflicts.h"
-#include "apps/option_values.h"
-#include "apps/scene_options.h"
+#include "apps/strata/choice_words.h"
+#include "apps/strata/csg_options.h"
+#include "apps/strata/file_conflicts.h"
+#include "apps/strata/option_values.h"
+#include "apps/strata/scene_options.h"
 #include "apps/view/script.h"
 #include "apps/view/viewer.h"
 

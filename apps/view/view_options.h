@@ -6,7 +6,7 @@
 #include <variant>
 #include <vector>
 
-#include "apps/commands.h"
+#include "apps/strata/commands.h"
 #include "apps/view/renderer.h"
 #include "apps/view/script.h"
 

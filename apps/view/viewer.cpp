@@ -4,7 +4,7 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
-#include "apps/session.h"
+#include "apps/strata/session.h"
 
 namespace strata::view {
 namespace {

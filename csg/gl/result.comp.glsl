@@ -17,7 +17,7 @@ layout(std430, binding = 5) buffer ResultItems {
   uint result_used;      // items, also those that found no room
   uint result_too_long;  // a list that must not be walked here was met
   uint result_unused[2];
-  uvec2 result_items[];  // of core/depth_list.h
+  uvec2 result_items[];  // of strata/core/depth_list.h
 };
 uniform uint walk_width;      // pixels of a row
 uniform uint walk_row_begin;  // of the screen

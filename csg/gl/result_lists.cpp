@@ -1,4 +1,4 @@
-#include "csg/gl/result_lists.h"
+#include "strata/csg/gl/result_lists.h"
 
 #include <algorithm>
 #include <array>
@@ -11,7 +11,7 @@
 
 #include "csg/gl/walk_programs.h"
 #include "csg/tree_filter.h"
-#include "hashbuffer/build_ldi.h"
+#include "strata/hashbuffer/build_ldi.h"
 
 namespace strata::glsl {
 extern const gl::GlslPiece csg_gl_result_comp;

@@ -4,8 +4,8 @@
 #include <span>
 #include <vector>
 
-#include "csg/surface_source.h"
-#include "csg/tile_surface.h"
+#include "csg/surface/surface_source.h"
+#include "csg/surface/tile_surface.h"
 
 // The tree as the walk of the GPU wants it. Private to csg/gl/.
 

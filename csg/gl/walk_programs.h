@@ -5,10 +5,10 @@
 #include <vector>
 
 #include "csg/gl/tile_programs.h"
-#include "gl/buffer.h"
-#include "gl/context.h"
-#include "gl/program.h"
-#include "hashbuffer/gl/store.h"
+#include "strata/gl/buffer.h"
+#include "strata/gl/context.h"
+#include "strata/gl/shader_program.h"
+#include "strata/hashbuffer/gl/store.h"
 
 // What the walks of lists share on this side. Private to csg/gl/.
 

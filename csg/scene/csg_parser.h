@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "core/result.h"
+#include "strata/core/result.h"
 
 /// The text of a `.csg` file as a tree of calls. Nothing is evaluated here, and nothing recurses:
 /// nodes and values lie in preorder in flat arrays, each with the index after its last descendant.

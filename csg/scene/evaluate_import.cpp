@@ -4,9 +4,9 @@
 
 #include "core/printable.h"
 #include "csg/scene/evaluator.h"
-#include "csg/scene/import_xml.h"
-#include "mesh/read_mesh.h"
-#include "mesh/soup_tools.h"
+#include "mesh/formats/read_3mf_amf.h"
+#include "strata/mesh/formats/read_mesh.h"
+#include "strata/mesh/soup_tools.h"
 
 namespace strata::csg {
 namespace {

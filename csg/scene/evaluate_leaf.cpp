@@ -3,8 +3,8 @@
 #include <limits>
 
 #include "csg/scene/evaluator.h"
-#include "csg/scene/primitives.h"
-#include "csg/scene/surface.h"
+#include "csg/solids/height_map.h"
+#include "csg/solids/primitives.h"
 
 namespace strata::csg {
 namespace {

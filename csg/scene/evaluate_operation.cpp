@@ -2,12 +2,12 @@
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
 
-#include "csg/scene/boundary.h"
 #include "csg/scene/evaluator.h"
-#include "csg/scene/hull.h"
-#include "csg/scene/minkowski.h"
-#include "csg/scene/primitives.h"
-#include "mesh/soup_tools.h"
+#include "csg/solids/boundary.h"
+#include "csg/solids/hull.h"
+#include "csg/solids/minkowski.h"
+#include "csg/solids/primitives.h"
+#include "strata/mesh/soup_tools.h"
 
 namespace strata::csg {
 /// Replaces the operands of a node that has a frame by what it makes of them, outside that frame.

@@ -4,9 +4,9 @@
 
 #include "core/printable.h"
 #include "csg/scene/evaluator.h"
-#include "mesh/diagnose.h"
-#include "mesh/orient.h"
-#include "mesh/soup_tools.h"
+#include "strata/mesh/diagnose.h"
+#include "strata/mesh/orient.h"
+#include "strata/mesh/soup_tools.h"
 
 namespace strata::csg {
 namespace {

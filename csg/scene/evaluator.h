@@ -12,11 +12,11 @@
 #include <unordered_map>
 #include <vector>
 
+#include "csg/outline/outline.h"
 #include "csg/scene/csg_parser.h"
-#include "csg/scene/minkowski.h"
 #include "csg/scene/node_arguments.h"
-#include "csg/scene/outline.h"
-#include "csg/scene/scene.h"
+#include "csg/solids/minkowski.h"
+#include "strata/csg/scene/scene.h"
 
 /// Parts of the scene reader; not for users of the library.
 namespace strata::csg {

@@ -2,8 +2,8 @@
 
 #include <string_view>
 
+#include "csg/outline/segments.h"
 #include "csg/scene/csg_parser.h"
-#include "csg/scene/segments.h"
 
 namespace strata::csg {
 

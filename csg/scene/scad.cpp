@@ -1,4 +1,4 @@
-#include "csg/scene/scad.h"
+#include "strata/csg/scene/scad.h"
 
 #include <fcntl.h>
 #include <poll.h>
@@ -22,7 +22,7 @@
 #include <vector>
 
 #include "core/printable.h"
-#include "mesh/input_bytes.h"
+#include "mesh/formats/input_bytes.h"
 
 namespace strata::csg {
 namespace {

@@ -5,8 +5,8 @@
 #include <string>
 #include <utility>
 
-#include "hashbuffer/record.h"
-#include "hashbuffer/resize_policy.h"
+#include "strata/hashbuffer/record.h"
+#include "strata/hashbuffer/resize_policy.h"
 
 namespace strata::glsl {
 extern const gl::GlslPiece hashbuffer_gl_clear_and_count_comp;

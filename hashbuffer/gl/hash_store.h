@@ -4,14 +4,14 @@
 #include <memory>
 #include <vector>
 
-#include "gl/buffer.h"
-#include "gl/context.h"
-#include "gl/program.h"
-#include "hashbuffer/gl/store.h"
-#include "hashbuffer/offsets.h"
+#include "strata/gl/buffer.h"
+#include "strata/gl/context.h"
+#include "strata/gl/shader_program.h"
+#include "strata/hashbuffer/gl/store.h"
+#include "strata/hashbuffer/offsets.h"
 
 // After: Lefebvre, Hornus, Lasram, "HA-Buffer: Coherent Hashing for single-pass A-buffer", INRIA
-// RR-8282, 2013. The table law is that of hashbuffer/hash_buffer.h, bit for bit.
+// RR-8282, 2013. The table law is that of strata/hashbuffer/hash_buffer.h, bit for bit.
 // We differ: 64-bit words without 64-bit atomics, in two passes over the geometry.
 
 namespace strata::gl {
@@ -32,8 +32,9 @@ struct HashStoreOptions {
   OffsetKind offsets = OffsetKind::kPlaneFirst;
   std::uint64_t seed = 1;
   unsigned age_limit = 0;
-  /// The table grows and shrinks with the load of the last frame (hashbuffer/resize_policy.h). Off:
-  /// it keeps its size and its offsets until something does not fit; no load is counted.
+  /// The table grows and shrinks with the load of the last frame
+  /// (strata/hashbuffer/resize_policy.h). Off: it keeps its size and its offsets until something
+  /// does not fit; no load is counted.
   bool resize = true;
   /// A plain load before each atomic maximum, which is then done only if it can win. The same bits.
   bool read_first = true;

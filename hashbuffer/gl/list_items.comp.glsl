@@ -1,4 +1,4 @@
-// The lists of `pixels` pixels from `first_pixel` on, side by side, as items of core/depth_list.h. begins[first_begin + i] counts
+// The lists of `pixels` pixels from `first_pixel` on, side by side, as items of strata/core/depth_list.h. begins[first_begin + i] counts
 // from `first_item`.
 layout(local_size_x = 64) in;
 layout(std430, binding = 0) readonly buffer begins_block { uint begins[]; };

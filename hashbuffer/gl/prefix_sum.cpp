@@ -1,6 +1,6 @@
 #include "hashbuffer/gl/prefix_sum.h"
 
-#include "gl/context.h"
+#include "strata/gl/context.h"
 
 namespace strata::glsl {
 extern const gl::GlslPiece hashbuffer_gl_prefix_sum_comp;

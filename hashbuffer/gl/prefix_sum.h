@@ -3,9 +3,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/result.h"
-#include "gl/buffer.h"
-#include "gl/program.h"
+#include "strata/core/result.h"
+#include "strata/gl/buffer.h"
+#include "strata/gl/shader_program.h"
 
 namespace strata::gl {
 

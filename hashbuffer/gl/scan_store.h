@@ -4,11 +4,11 @@
 #include <memory>
 #include <vector>
 
-#include "gl/buffer.h"
-#include "gl/context.h"
-#include "gl/program.h"
 #include "hashbuffer/gl/prefix_sum.h"
-#include "hashbuffer/gl/store.h"
+#include "strata/gl/buffer.h"
+#include "strata/gl/context.h"
+#include "strata/gl/shader_program.h"
+#include "strata/hashbuffer/gl/store.h"
 
 // After: Maule, Comba, Torchelsen, Bastos, "Memory-Optimized Order-Independent Transparency with
 // Dynamic Fragment Buffer", 2012/2014.

@@ -1,4 +1,4 @@
-#include "hashbuffer/gl/store.h"
+#include "strata/hashbuffer/gl/store.h"
 
 #include <algorithm>
 #include <limits>

@@ -5,13 +5,13 @@
 #include <utility>
 #include <vector>
 
-#include "core/result.h"
-#include "gl/buffer.h"
-#include "gl/context.h"
-#include "gl/program.h"
-#include "raster/gl/producer.h"
-#include "raster/lattice_mesh.h"
 #include "raster/triangle_setup.h"
+#include "strata/core/result.h"
+#include "strata/gl/buffer.h"
+#include "strata/gl/context.h"
+#include "strata/gl/shader_program.h"
+#include "strata/raster/gl/producer.h"
+#include "strata/raster/lattice_mesh.h"
 
 namespace strata::gl {
 

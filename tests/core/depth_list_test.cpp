@@ -1,4 +1,4 @@
-#include "core/depth_list.h"
+#include "strata/core/depth_list.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <tuple>
 #include <vector>
 
-#include "core/grid.h"
+#include "strata/core/grid.h"
 
 namespace strata {
 namespace {

@@ -1,4 +1,4 @@
-#include "core/execution.h"
+#include "strata/core/execution.h"
 
 #include <gtest/gtest.h>
 #include <sched.h>

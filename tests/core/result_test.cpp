@@ -1,4 +1,4 @@
-#include "core/result.h"
+#include "strata/core/result.h"
 
 #include <gtest/gtest.h>
 

@@ -8,8 +8,8 @@
 #include <random>
 #include <vector>
 
-#include "csg/tree.h"
-#include "mesh/shapes.h"
+#include "strata/csg/tree.h"
+#include "strata/mesh/shapes.h"
 
 namespace strata::csg {
 

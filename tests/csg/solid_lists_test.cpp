@@ -1,4 +1,4 @@
-#include "csg/solid_lists.h"
+#include "strata/csg/solid_lists.h"
 
 #include <gtest/gtest.h>
 
@@ -6,11 +6,11 @@
 #include <chrono>
 
 #include "csg/geometry.h"
-#include "csg/solid_labels.h"
-#include "hashbuffer/build_ldi.h"
-#include "mesh/shapes.h"
+#include "strata/csg/solid_labels.h"
+#include "strata/hashbuffer/build_ldi.h"
+#include "strata/mesh/shapes.h"
+#include "strata/voxelize/voxelize.h"
 #include "tests/csg/random_tree.h"
-#include "voxelize/voxelize.h"
 
 namespace strata::csg {
 namespace {

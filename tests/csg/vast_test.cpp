@@ -9,13 +9,13 @@
 #include <memory>
 
 #include "csg/geometry.h"
-#include "csg/measure.h"
-#include "csg/picture.h"
-#include "csg/result_bounds.h"
-#include "csg/solid_lists.h"
-#include "mesh/shapes.h"
-#include "voxelize/grid_fit.h"
-#include "voxelize/voxelize.h"
+#include "csg/measure/result_bounds.h"
+#include "strata/csg/measure/measure.h"
+#include "strata/csg/picture/picture.h"
+#include "strata/csg/solid_lists.h"
+#include "strata/mesh/shapes.h"
+#include "strata/voxelize/grid_fit.h"
+#include "strata/voxelize/voxelize.h"
 
 namespace strata::csg {
 namespace {

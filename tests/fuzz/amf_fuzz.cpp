@@ -1,4 +1,4 @@
-#include "csg/scene/import_xml.h"
+#include "mesh/formats/read_3mf_amf.h"
 #include "tests/fuzz/input_file.h"
 #include "tests/fuzz/scene_fuzzing.h"
 

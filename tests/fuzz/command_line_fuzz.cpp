@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "apps/commands.h"
+#include "apps/strata/commands.h"
 #include "tests/fuzz/mesh_fuzzing.h"
 
 namespace strata::apps {

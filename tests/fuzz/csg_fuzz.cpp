@@ -10,8 +10,8 @@
 
 #include "csg/scene/csg_parser.h"
 #include "csg/scene/node_arguments.h"
-#include "csg/scene/scene.h"
-#include "tests/csg/zip_files.h"
+#include "strata/csg/scene/scene.h"
+#include "tests/csg/scene/zip_files.h"
 #include "tests/fuzz/mesh_fuzzing.h"
 
 namespace strata {

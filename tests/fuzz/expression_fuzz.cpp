@@ -4,7 +4,7 @@
 #include <string_view>
 #include <vector>
 
-#include "apps/expression.h"
+#include "apps/strata/expression.h"
 #include "tests/fuzz/mesh_fuzzing.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

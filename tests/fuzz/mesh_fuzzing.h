@@ -6,8 +6,8 @@
 #include <cstdlib>
 #include <string_view>
 
-#include "mesh/diagnose.h"
-#include "mesh/read_mesh.h"
+#include "strata/mesh/diagnose.h"
+#include "strata/mesh/formats/read_mesh.h"
 
 namespace strata {
 

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <string_view>
 
-#include "csg/scene/outline.h"
-#include "mesh/triangle_soup.h"
+#include "csg/outline/outline.h"
+#include "strata/mesh/triangle_soup.h"
 #include "tests/fuzz/mesh_fuzzing.h"
 
 namespace strata {

@@ -1,5 +1,5 @@
 // Height maps: pictures, which begin as PNG files do, and rows of numbers.
-#include "csg/scene/surface.h"
+#include "csg/solids/height_map.h"
 
 #include "tests/fuzz/input_file.h"
 #include "tests/fuzz/scene_fuzzing.h"

@@ -1,4 +1,4 @@
-#include "csg/scene/outline_import.h"
+#include "csg/outline/formats/outline_import.h"
 #include "tests/fuzz/scene_fuzzing.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -1,5 +1,5 @@
 // Text: lines for the font, the direction, the script, and what is set.
-#include "csg/scene/outline.h"
+#include "csg/outline/outline.h"
 #include "tests/fuzz/scene_fuzzing.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -3,8 +3,8 @@
 #include <utility>
 #include <vector>
 
-#include "csg/scene/import_xml.h"
-#include "tests/csg/zip_files.h"
+#include "mesh/formats/read_3mf_amf.h"
+#include "tests/csg/scene/zip_files.h"
 #include "tests/fuzz/input_file.h"
 #include "tests/fuzz/scene_fuzzing.h"
 

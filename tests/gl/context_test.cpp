@@ -1,13 +1,13 @@
-#include "gl/context.h"
+#include "strata/gl/context.h"
 
 #include <algorithm>
 #include <cstdlib>
 #include <numeric>
 #include <thread>
 
-#include "gl/buffer.h"
-#include "gl/program.h"
 #include "gl/workarounds.h"
+#include "strata/gl/buffer.h"
+#include "strata/gl/shader_program.h"
 #include "tests/gl/gl_testing.h"
 
 namespace strata::glsl {

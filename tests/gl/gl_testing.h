@@ -6,7 +6,7 @@
 #include <memory>
 #include <utility>
 
-#include "gl/context.h"
+#include "strata/gl/context.h"
 
 namespace strata::test {
 

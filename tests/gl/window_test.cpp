@@ -4,7 +4,7 @@
 
 #include <cstdlib>
 
-#include "gl/buffer.h"
+#include "strata/gl/buffer.h"
 
 namespace strata::gl {
 namespace {

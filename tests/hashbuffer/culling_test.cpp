@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "hashbuffer/hash_buffer_build.h"
+#include "strata/hashbuffer/hash_buffer_build.h"
 #include "tests/hashbuffer/store_support.h"
 
 namespace strata {

@@ -7,7 +7,7 @@
 #include <map>
 #include <set>
 
-#include "hashbuffer/hash_buffer_build.h"
+#include "strata/hashbuffer/hash_buffer_build.h"
 #include "tests/hashbuffer/store_support.h"
 
 namespace strata {

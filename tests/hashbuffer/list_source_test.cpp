@@ -1,14 +1,14 @@
 // Lists that come from elsewhere are taken as the tiles' own are.
 
-#include "hashbuffer/list_source.h"
+#include "strata/hashbuffer/list_source.h"
 
 #include <gtest/gtest.h>
 
-#include "hashbuffer/build_ldi.h"
-#include "mesh/shapes.h"
+#include "strata/hashbuffer/build_ldi.h"
+#include "strata/mesh/shapes.h"
+#include "strata/voxelize/voxelize.h"
 #include "tests/support/lists.h"
 #include "tests/support/trouble.h"
-#include "voxelize/voxelize.h"
 
 namespace strata {
 namespace {

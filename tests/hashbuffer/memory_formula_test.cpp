@@ -7,8 +7,8 @@
 #include <cstdlib>
 #include <new>
 
-#include "hashbuffer/count_scan_store.h"
-#include "hashbuffer/hash_buffer_build.h"
+#include "strata/hashbuffer/count_scan_store.h"
+#include "strata/hashbuffer/hash_buffer_build.h"
 #include "tests/hashbuffer/store_support.h"
 
 namespace {

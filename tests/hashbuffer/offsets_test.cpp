@@ -1,4 +1,4 @@
-#include "hashbuffer/offsets.h"
+#include "strata/hashbuffer/offsets.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <set>
 
-#include "hashbuffer/random.h"
+#include "strata/hashbuffer/random.h"
 
 namespace strata {
 namespace {

@@ -1,10 +1,10 @@
-#include "hashbuffer/record.h"
+#include "strata/hashbuffer/record.h"
 
 #include <gtest/gtest.h>
 
 #include <limits>
 
-#include "hashbuffer/random.h"
+#include "strata/hashbuffer/random.h"
 
 namespace strata {
 namespace {

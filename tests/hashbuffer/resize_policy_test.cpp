@@ -1,4 +1,4 @@
-#include "hashbuffer/resize_policy.h"
+#include "strata/hashbuffer/resize_policy.h"
 
 #include <gtest/gtest.h>
 

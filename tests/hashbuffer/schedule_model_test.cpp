@@ -6,7 +6,7 @@
 #include <memory>
 #include <optional>
 
-#include "hashbuffer/hash_buffer_build.h"
+#include "strata/hashbuffer/hash_buffer_build.h"
 #include "tests/hashbuffer/store_support.h"
 
 namespace strata {

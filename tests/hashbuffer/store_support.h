@@ -6,9 +6,9 @@
 #include <thread>
 #include <vector>
 
-#include "core/depth_list.h"
-#include "hashbuffer/random.h"
-#include "hashbuffer/record.h"
+#include "strata/core/depth_list.h"
+#include "strata/hashbuffer/random.h"
+#include "strata/hashbuffer/record.h"
 
 namespace strata::test {
 

@@ -19,10 +19,10 @@ set(prefix "${WORK_DIR}/prefix")
 
 # The installed headers hold no private ones of a part that is not built.
 if(NOT OPENMESH AND EXISTS "${prefix}/include/strata/mesh/openmesh_bridge.h")
-  message(FATAL_ERROR "mesh/openmesh_bridge.h is installed without OpenMesh")
+  message(FATAL_ERROR "strata/mesh/openmesh_bridge.h is installed without OpenMesh")
 endif()
 if(NOT EXISTS "${prefix}/include/strata/core/result.h")
-  message(FATAL_ERROR "core/result.h is not installed in include/strata")
+  message(FATAL_ERROR "strata/core/result.h is not installed in include/strata")
 endif()
 
 set(flags "")

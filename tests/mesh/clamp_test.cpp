@@ -7,8 +7,8 @@
 #include <random>
 #include <string>
 
-#include "mesh/diagnose.h"
-#include "mesh/shapes.h"
+#include "strata/mesh/diagnose.h"
+#include "strata/mesh/shapes.h"
 
 namespace strata {
 namespace {

@@ -2,8 +2,8 @@
 
 #include <filesystem>
 
-#include "mesh/diagnose.h"
-#include "mesh/read_mesh.h"
+#include "strata/mesh/diagnose.h"
+#include "strata/mesh/formats/read_mesh.h"
 
 namespace strata {
 namespace {

@@ -1,4 +1,4 @@
-#include "mesh/diagnose.h"
+#include "strata/mesh/diagnose.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <random>
 
 #include "mesh/edge_balance.h"
-#include "mesh/shapes.h"
+#include "strata/mesh/shapes.h"
 
 namespace strata {
 namespace {

@@ -6,9 +6,9 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <string>
 
-#include "mesh/shapes.h"
-#include "mesh/soup_tools.h"
-#include "mesh/write_mesh.h"
+#include "strata/mesh/formats/write_mesh.h"
+#include "strata/mesh/shapes.h"
+#include "strata/mesh/soup_tools.h"
 
 namespace {
 

@@ -1,4 +1,4 @@
-#include "mesh/orient.h"
+#include "strata/mesh/orient.h"
 
 #include <gtest/gtest.h>
 
@@ -6,9 +6,9 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <random>
 
-#include "mesh/diagnose.h"
-#include "mesh/shapes.h"
-#include "mesh/soup_tools.h"
+#include "strata/mesh/diagnose.h"
+#include "strata/mesh/shapes.h"
+#include "strata/mesh/soup_tools.h"
 
 namespace strata {
 namespace {

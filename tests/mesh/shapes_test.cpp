@@ -1,10 +1,10 @@
-#include "mesh/shapes.h"
+#include "strata/mesh/shapes.h"
 
 #include <gtest/gtest.h>
 
 #include <glm/gtc/matrix_transform.hpp>
 
-#include "mesh/diagnose.h"
+#include "strata/mesh/diagnose.h"
 
 namespace strata {
 namespace {

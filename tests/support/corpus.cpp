@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <system_error>
 
-#include "mesh/read_mesh.h"
+#include "strata/mesh/formats/read_mesh.h"
 
 namespace strata::testkit {
 namespace {

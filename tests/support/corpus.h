@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "mesh/triangle_soup.h"
+#include "strata/mesh/triangle_soup.h"
 #include "tests/support/trouble.h"
 
 // Real meshes, where present. Tests that need one skip with `missing_reason` when it is not there.

@@ -5,10 +5,10 @@
 #include <type_traits>
 #include <vector>
 
-#include "core/depth_list.h"
 #include "hashbuffer/tile_builder.h"
-#include "raster/lattice_mesh.h"
 #include "raster/triangle_setup.h"
+#include "strata/core/depth_list.h"
+#include "strata/raster/lattice_mesh.h"
 #include "tests/support/voxel_set.h"
 
 namespace strata::testkit {

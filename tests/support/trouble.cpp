@@ -8,8 +8,8 @@
 #include <map>
 #include <tuple>
 
-#include "mesh/shapes.h"
-#include "mesh/soup_tools.h"
+#include "strata/mesh/shapes.h"
+#include "strata/mesh/soup_tools.h"
 
 namespace strata::testkit {
 namespace {

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "core/grid.h"
-#include "mesh/triangle_soup.h"
+#include "strata/core/grid.h"
+#include "strata/mesh/triangle_soup.h"
 #include "tests/support/voxel_set.h"
 
 // Meshes that are made to cause trouble, and the grids they are put on.

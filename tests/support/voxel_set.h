@@ -7,8 +7,8 @@
 #include <glm/vec3.hpp>
 #include <vector>
 
-#include "core/grid.h"
-#include "voxelize/intervals.h"
+#include "strata/core/grid.h"
+#include "strata/voxelize/intervals.h"
 
 namespace strata::testkit {
 

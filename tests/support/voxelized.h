@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <utility>
 
-#include "raster/lattice_mesh.h"
+#include "strata/raster/lattice_mesh.h"
+#include "strata/voxelize/voxelize.h"
 #include "tests/support/voxel_set.h"
-#include "voxelize/voxelize.h"
 
 // Calls of the library that are expected to succeed.
 

@@ -1,4 +1,4 @@
-#include "voxelize/grid_fit.h"
+#include "strata/voxelize/grid_fit.h"
 
 #include <gtest/gtest.h>
 
@@ -6,8 +6,8 @@
 #include <limits>
 #include <random>
 
-#include "mesh/shapes.h"
-#include "raster/lattice_mesh.h"
+#include "strata/mesh/shapes.h"
+#include "strata/raster/lattice_mesh.h"
 
 namespace strata {
 namespace {

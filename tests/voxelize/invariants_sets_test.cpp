@@ -6,14 +6,14 @@
 #include <algorithm>
 #include <random>
 
-#include "mesh/diagnose.h"
-#include "mesh/shapes.h"
-#include "mesh/soup_tools.h"
+#include "strata/mesh/diagnose.h"
+#include "strata/mesh/shapes.h"
+#include "strata/mesh/soup_tools.h"
+#include "strata/voxelize/checksum.h"
 #include "tests/support/lists.h"
 #include "tests/support/simd_targets.h"
 #include "tests/support/trouble.h"
 #include "tests/support/voxelized.h"
-#include "voxelize/checksum.h"
 
 namespace strata {
 namespace {

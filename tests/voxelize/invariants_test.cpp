@@ -7,14 +7,14 @@
 #include <random>
 #include <set>
 
-#include "mesh/diagnose.h"
-#include "mesh/shapes.h"
-#include "mesh/soup_tools.h"
+#include "strata/mesh/diagnose.h"
+#include "strata/mesh/shapes.h"
+#include "strata/mesh/soup_tools.h"
+#include "strata/voxelize/checksum.h"
 #include "tests/support/corpus.h"
 #include "tests/support/lists.h"
 #include "tests/support/trouble.h"
 #include "tests/support/voxelized.h"
-#include "voxelize/checksum.h"
 
 namespace strata {
 namespace {

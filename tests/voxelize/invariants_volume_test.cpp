@@ -7,9 +7,9 @@
 #include <numbers>
 #include <random>
 
-#include "mesh/diagnose.h"
-#include "mesh/shapes.h"
-#include "mesh/soup_tools.h"
+#include "strata/mesh/diagnose.h"
+#include "strata/mesh/shapes.h"
+#include "strata/mesh/soup_tools.h"
 #include "tests/support/corpus.h"
 #include "tests/support/lists.h"
 #include "tests/support/trouble.h"

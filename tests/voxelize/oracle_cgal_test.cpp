@@ -13,8 +13,8 @@
 #include <optional>
 #include <tuple>
 
-#include "mesh/diagnose.h"
-#include "mesh/shapes.h"
+#include "strata/mesh/diagnose.h"
+#include "strata/mesh/shapes.h"
 #include "tests/support/corpus.h"
 #include "tests/support/trouble.h"
 #include "tests/support/voxelized.h"

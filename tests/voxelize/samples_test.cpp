@@ -4,10 +4,10 @@
 
 #include <cmath>
 
-#include "mesh/shapes.h"
-#include "mesh/soup_tools.h"
+#include "strata/mesh/shapes.h"
+#include "strata/mesh/soup_tools.h"
+#include "strata/voxelize/voxelize.h"
 #include "tests/support/trouble.h"
-#include "voxelize/voxelize.h"
 
 namespace strata {
 namespace {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "voxelize/intervals.h"
+#include "strata/voxelize/intervals.h"
 
 // Voxel sets for the tests of writers and checksums.
 

@@ -2,8 +2,8 @@
 
 #include <glm/vec2.hpp>
 
-#include "core/result.h"
-#include "csg/picture.h"
+#include "strata/core/result.h"
+#include "strata/csg/picture/picture.h"
 
 namespace strata::view {
 

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "apps/session.h"
+#include "apps/strata/session.h"
 #include "apps/view/gl/theme.h"
 
 namespace strata::view {

@@ -8,11 +8,11 @@
 #include <fstream>
 #include <thread>
 
-#include "apps/scene_files.h"
+#include "apps/strata/scene_files.h"
 #include "apps/view/file_watch.h"
 #include "apps/view/loader.h"
-#include "csg/measure.h"
-#include "csg/ray_image.h"
+#include "csg/measure/ray_image.h"
+#include "strata/csg/measure/measure.h"
 
 namespace strata::view {
 namespace {

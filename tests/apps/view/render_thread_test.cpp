@@ -8,7 +8,7 @@
 #include <tuple>
 #include <vector>
 
-#include "csg/picture.h"
+#include "strata/csg/picture/picture.h"
 
 namespace strata::view {
 namespace {

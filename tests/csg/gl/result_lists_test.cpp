@@ -1,7 +1,7 @@
 // The lists of a tree's result that the GPU makes are those that the CPU's filter makes, bit for
 // bit.
 
-#include "csg/gl/result_lists.h"
+#include "strata/csg/gl/result_lists.h"
 
 #include <gtest/gtest.h>
 
@@ -11,15 +11,15 @@
 #include <thread>
 #include <utility>
 
-#include "csg/solid_labels.h"
-#include "csg/solid_lists.h"
-#include "hashbuffer/build_ldi.h"
 #include "hashbuffer/gl/hash_store.h"
 #include "hashbuffer/gl/scan_store.h"
-#include "mesh/soup_tools.h"
+#include "strata/csg/solid_labels.h"
+#include "strata/csg/solid_lists.h"
+#include "strata/hashbuffer/build_ldi.h"
+#include "strata/mesh/soup_tools.h"
+#include "strata/voxelize/voxelize.h"
 #include "tests/csg/random_tree.h"
 #include "tests/gl/gl_testing.h"
-#include "voxelize/voxelize.h"
 
 namespace strata::csg {
 namespace {

@@ -6,9 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include "gl/buffer.h"
-#include "gl/program.h"
-#include "raster/gl/producer.h"
+#include "strata/gl/buffer.h"
+#include "strata/gl/shader_program.h"
+#include "strata/raster/gl/producer.h"
 #include "tests/hashbuffer/store_support.h"
 
 namespace strata::glsl {

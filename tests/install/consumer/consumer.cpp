@@ -1,7 +1,7 @@
 // Uses an installed Strata as a whole: a cube becomes voxels.
 #include <cstdio>
 
-#include "voxelize/voxelize.h"
+#include "strata/voxelize/voxelize.h"
 
 int main() {
   strata::TriangleSoup cube;

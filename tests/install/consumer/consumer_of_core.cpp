@@ -2,8 +2,8 @@
 #include <atomic>
 #include <cstdio>
 
-#include "core/execution.h"
-#include "core/result.h"
+#include "strata/core/execution.h"
+#include "strata/core/result.h"
 
 int main() {
   std::atomic<int> sum{0};

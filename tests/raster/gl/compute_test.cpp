@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <random>
 
-#include "mesh/shapes.h"
+#include "strata/mesh/shapes.h"
 #include "tests/gl/gl_testing.h"
 #include "tests/raster/gl/fragment_log.h"
 #include "tests/support/corpus.h"

@@ -4,9 +4,9 @@
 #include <array>
 #include <vector>
 
-#include "core/depth_list.h"
-#include "gl/buffer.h"
-#include "raster/gl/producer.h"
+#include "strata/core/depth_list.h"
+#include "strata/gl/buffer.h"
+#include "strata/raster/gl/producer.h"
 #include "tests/support/lists.h"
 
 namespace strata::test {

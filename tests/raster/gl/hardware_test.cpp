@@ -7,11 +7,11 @@
 #include <memory>
 #include <string>
 
-#include "hashbuffer/build_ldi.h"
 #include "hashbuffer/gl/hash_store.h"
 #include "hashbuffer/gl/scan_store.h"
-#include "hashbuffer/random.h"
-#include "mesh/shapes.h"
+#include "strata/hashbuffer/build_ldi.h"
+#include "strata/hashbuffer/random.h"
+#include "strata/mesh/shapes.h"
 #include "tests/gl/gl_testing.h"
 
 namespace strata::gl {

@@ -6,12 +6,12 @@
 #include <functional>
 #include <map>
 
-#include "hashbuffer/build_ldi.h"
-#include "hashbuffer/gl/compute_lists.h"
 #include "hashbuffer/gl/hash_store.h"
 #include "hashbuffer/gl/scan_store.h"
-#include "mesh/read_mesh.h"
-#include "mesh/shapes.h"
+#include "strata/hashbuffer/build_ldi.h"
+#include "strata/hashbuffer/gl/compute_lists.h"
+#include "strata/mesh/formats/read_mesh.h"
+#include "strata/mesh/shapes.h"
 #include "tests/gl/gl_testing.h"
 #include "tests/support/corpus.h"
 #include "tests/support/lists.h"

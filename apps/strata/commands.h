@@ -1,0 +1,155 @@
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "apps/session/progress.h"
+#include "hashbuffer/tile_builder.h"
+#include "strata/csg/picture/picture.h"
+#include "strata/csg/scene/scene.h"
+#include "strata/hashbuffer/offsets.h"
+#include "strata/mesh/formats/read_mesh.h"
+#include "strata/voxelize/grid_fit.h"
+#include "strata/voxelize/voxelize.h"
+
+namespace strata::apps {
+
+/// What every sub-command takes.
+struct CommonOptions {
+  int threads = 0;                 ///< 0: all processors
+  std::uint64_t memory_limit = 0;  ///< bytes; 0: three quarters of what this process may use
+  bool quiet = false;              ///< errors only
+  bool verbose = false;            ///< also say what is done
+  ProgressMode progress = ProgressMode::kAuto;
+  bool strict = false;        ///< warnings are errors
+  double time_limit_s = 0.0;  ///< of the whole command; 0: none
+};
+
+/// Who makes depth lists and finds surfaces; the results are the same.
+enum class Backend {
+  kAuto,  ///< a hardware GPU if there is one, else the CPU
+  kCpu,
+  kGl  ///< OpenGL 4.5, a software renderer too
+};
+
+/// Where meshes and scenes come from.
+struct InputOptions {
+  std::vector<std::string> files;
+  MeshReader reader = MeshReader::kOwn;
+  MeshFormat format = MeshFormat::kAuto;
+  csg::ReadSceneOptions scene;  ///< for the scenes among them
+};
+
+/// A file that is to be read or written, and how the user asked for that: "--ids".
+struct FileUse {
+  std::string asked_by;
+  std::string path;
+};
+
+/// `strata voxelize`
+struct VoxelizeCommand {
+  CommonOptions common;
+  InputOptions input;
+  std::string output;           ///< empty: none, "-": standard output
+  std::string format;           ///< empty: by extension
+  int fog = 0;                  ///< samples along a voxel's side of a fog volume; 0: none
+  bool fog_by_default = false;  ///< of which no number was given
+  bool mask = false;
+  bool ids = false;                 ///< values say which solid
+  std::optional<std::string> name;  ///< of the grid in the file
+  GridRequest grid;
+  bool solid = true, surface = false;
+  SurfaceKind surface_kind = SurfaceKind::kConservative;
+  InsideRule rule = InsideRule::kWinding;
+  OpenMode open = OpenMode::kVote;
+  bool keep_orientation = false;
+  std::optional<Axis> axis;  ///< empty: auto
+  StoreKind store = StoreKind::kAuto;
+  OffsetKind offsets = OffsetKind::kPlaneFirst;
+  Backend backend = Backend::kAuto;
+  bool stats = false, checksum = false, dry_run = false, list_formats = false;
+  std::optional<std::string> json;  ///< "-": standard output
+};
+
+/// `strata info`
+struct InfoCommand {
+  CommonOptions common;
+  InputOptions input;
+  bool gl = false;  ///< also what OpenGL there is
+  std::optional<std::string> json;
+};
+
+/// `strata ldi`
+struct LdiCommand {
+  CommonOptions common;
+  InputOptions input;
+  std::string output;
+  GridRequest grid;
+  bool samples = false;
+  Axis axis = Axis::kZ;
+  StoreKind store = StoreKind::kAuto;
+  OffsetKind offsets = OffsetKind::kPlaneFirst;
+  Backend backend = Backend::kAuto;
+  bool keep_orientation = false;
+};
+
+/// A section: points p with dot(normal, p) > offset are cut away.
+struct SectionPlane {
+  glm::dvec3 normal{0.0};  ///< of length 1
+  double offset = 0;
+  bool towards_eye = false;  ///< turned so that the side the eye is on is cut away
+};
+
+/// `strata csg`, and what a window shows
+struct CsgCommand {
+  CommonOptions common;
+  InputOptions input;
+  bool scene_format = false;  ///< inputs are .csg, whatever their names are
+  InsideRule rule = InsideRule::kWinding;
+  bool keep_orientation = false;
+  std::string expression;          ///< over the inputs; empty: their union
+  std::string output, ids, depth;  ///< files; empty: none, output "-": standard output
+  glm::ivec2 size{512};
+  csg::Camera camera;
+  bool view_all = false, auto_centre = false;
+  bool default_camera = false;  ///< none was given
+  bool asked_view = false;      ///< --view-all or --auto-center was given
+  int frames = 0;               ///< pictures with $t = 0, 1/frames, ...; 0: one without
+  bool summary = false;         ///< the report as text
+  bool render = false;          ///< the result alone: no ghosts, no colours, flat scenes from above
+  Backend backend = Backend::kAuto;
+  csg::PictureOptions picture;
+  std::vector<SectionPlane> cuts;
+  std::optional<std::string> json;        ///< "-": standard output
+  std::optional<int> measure_resolution;  ///< of the report's measures; none: csg::MeasureOptions'
+  std::vector<FileUse> outputs;           ///< of a window: the pictures that it will write
+};
+
+/// Text to print and an exit code: help, version, mistakes in the command line.
+struct ParseOutcome {
+  std::string text;
+  bool to_stderr = false;
+  int exit_code = 0;
+};
+
+using Command = std::variant<ParseOutcome, VoxelizeCommand, InfoCommand, LdiCommand, CsgCommand>;
+
+/// Reads the command line.
+Command parse_command_line(int argc, const char* const* argv);
+
+class Session;
+Result<void> run_voxelize(const VoxelizeCommand& command, Session& session);
+Result<void> run_info(const InfoCommand& command, Session& session);
+Result<void> run_ldi(const LdiCommand& command, Session& session);
+Result<void> run_csg(const CsgCommand& command, Session& session);
+
+/// `strata view`: becomes the program strata-view that lies beside this one, with these arguments.
+/// Returns an exit code when that cannot be, after a sentence on standard error. So this program
+/// needs none of the libraries of a window.
+int run_view_program(char** arguments);
+
+}  // namespace strata::apps

@@ -1,0 +1,274 @@
+#include "apps/strata/csg_options.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <tuple>
+
+#include "apps/strata/file_conflicts.h"
+#include "apps/strata/option_values.h"
+
+namespace strata::apps {
+namespace {
+
+constexpr std::pair<std::string_view, csg::Projection> kProjections[] = {
+    {"p", csg::Projection::kPerspective},
+    {"perspective", csg::Projection::kPerspective},
+    {"o", csg::Projection::kOrthographic},
+    {"ortho", csg::Projection::kOrthographic},
+    {"orthogonal", csg::Projection::kOrthographic},
+    {"orthographic", csg::Projection::kOrthographic}};
+
+/// `512,512`, and `512x512` as people write it.
+Result<glm::ivec2> parse_size(std::string_view text) {
+  const std::size_t mark = text.find_first_of(",x");
+  if (mark == std::string_view::npos) {
+    return fail(ErrorCode::kUsage, "--size takes width,height, not '{}'", text);
+  }
+  const auto width = parse_integer("--size", text.substr(0, mark));
+  const auto height = parse_integer("--size", text.substr(mark + 1));
+  if (!width || !height) {
+    return fail(ErrorCode::kUsage, "--size takes two whole numbers, width,height, not '{}'", text);
+  }
+  if (*width < 1 || *height < 1 || *width > csg::kMaxPictureSide ||
+      *height > csg::kMaxPictureSide) {
+    return fail(ErrorCode::kUsage, "--size {}: each side is 1 to {} pixels", text,
+                csg::kMaxPictureSide);
+  }
+  return glm::ivec2(*width, *height);
+}
+
+Result<const csg::ColourScheme*> parse_scheme(std::string_view text) {
+  const csg::ColourScheme* scheme = csg::find_colour_scheme(text);
+  if (scheme != nullptr) return scheme;
+  std::vector<std::string_view> names;
+  for (const csg::ColourScheme& one : csg::colour_schemes()) names.push_back(one.name);
+  return no_such_choice("--colorscheme", text, names);
+}
+
+Result<int> parse_samples(std::string_view text) {
+  const auto count = parse_integer("--samples", text);
+  if (!count) return tl::unexpected(count.error());
+  if (*count < 1 || *count > 64 || !std::has_single_bit(static_cast<std::uint64_t>(*count))) {
+    return fail(ErrorCode::kUsage, "--samples is 1, 2, 4, 8, 16, 32 or 64, not '{}'", text);
+  }
+  return static_cast<int>(*count);
+}
+
+/// `--view edges,axes`: what openscad shows beside the scene.
+Result<void> read_shown(std::string_view list, CsgCommand& command) {
+  while (!list.empty()) {
+    const std::string_view word = list.substr(0, list.find(','));
+    list.remove_prefix(std::min(word.size() + 1, list.size()));
+    if (word == "edges") {
+      command.picture.edges = true;
+    } else if (word == "axes" || word == "crosshairs" || word == "scales") {
+      return fail(ErrorCode::kUsage,
+                  "--view {}: strata draws none; openscad -o FILE.png --view {} does", word, word);
+    } else if (word == "wireframe") {
+      return fail(
+          ErrorCode::kUsage,
+          "--view wireframe: strata draws faces; --view edges adds lines along their edges");
+    } else {
+      return fail(ErrorCode::kUsage,
+                  "--view takes edges, not '{}' (nor axes, crosshairs, scales, wireframe)", word);
+    }
+  }
+  return {};
+}
+
+/// Of openscad's options those that are not handed on to it: done, or a sentence on what to use.
+Result<void> read_openscad_words(const CsgWords& words, CsgCommand& command) {
+  const std::string& render = words.render;
+  command.render = !render.empty();
+  if (command.render && render != "-" && render != "cgal" && render != "force" &&
+      render != "true") {
+    return fail(ErrorCode::kUsage, "--render takes nothing, cgal or force, not '{}'", render);
+  }
+  if (!words.preview.empty() && words.preview != "-") {
+    return fail(
+        ErrorCode::kUsage,
+        "--preview={}: strata has one preview; use --preview alone, or strata view --ghosts "
+        "to see what is subtracted",
+        words.preview);
+  }
+  if (!words.preview.empty() && command.render) {
+    return fail(ErrorCode::kUsage, "--preview and --render exclude each other");
+  }
+  if (auto read = read_shown(words.shown, command); !read) return read;
+  if (!words.export_format.empty() && words.export_format != "png") {
+    return fail(ErrorCode::kUsage,
+                "--export-format {}: strata csg writes png; openscad --export-format {} writes "
+                "geometry, strata voxelize voxels",
+                words.export_format, words.export_format);
+  }
+  if (!words.summary_file.empty()) {
+    return fail(ErrorCode::kUsage,
+                "--summary-file {}: use --json={}, which writes strata's own report",
+                words.summary_file, words.summary_file);
+  }
+  command.summary = !words.summary.empty();
+  constexpr std::string_view kSummaries[] = {"all",      "cache",        "time", "camera",
+                                             "geometry", "bounding-box", "area"};
+  if (command.summary && std::find(std::begin(kSummaries), std::end(kSummaries), words.summary) ==
+                             std::end(kSummaries)) {
+    return no_such_choice("--summary", words.summary, kSummaries);
+  }
+  if (!words.csg_limit.empty()) {
+    if (auto limit = parse_integer("--csglimit", words.csg_limit); !limit) {
+      return tl::unexpected(limit.error());
+    }
+  }
+  if (words.frames.empty()) return {};
+  constexpr std::int64_t kMostFrames = 99'999;  // five digits in the names
+  const auto frames = parse_integer("--animate", words.frames);
+  if (!frames) return tl::unexpected(frames.error());
+  if (*frames < 1 || *frames > kMostFrames) {
+    return fail(ErrorCode::kUsage, "--animate must be 1 to {}, got {}", kMostFrames, *frames);
+  }
+  command.frames = static_cast<int>(*frames);
+  const auto& files = command.input.files;
+  if (std::none_of(files.begin(), files.end(),
+                   [](const auto& file) { return has_extension(file, ".scad"); })) {
+    return fail(ErrorCode::kUsage, "--animate sets $t of programs: no input is a .scad file");
+  }
+  for (const auto* path : {&command.output, &command.ids, &command.depth}) {
+    if (!path->empty() && is_stream(*path)) {
+      return fail(ErrorCode::kUsage, "--animate writes several files; {} is a stream", *path);
+    }
+  }
+  if (command.output.empty() || command.json || command.summary) {
+    return fail(ErrorCode::kUsage,
+                "--animate makes pictures: it needs -o FILE.png, and goes "
+                "without --json and --summary");
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<void> check_picture_name(std::string_view asked_by, const std::string& path, bool depth) {
+  if (is_stream(path) || has_extension(path, depth ? ".exr" : ".png")) return {};
+  return fail(ErrorCode::kUsage, "{}{}: {}", asked_by, path,
+              depth ? "distances are written as .exr" : "pictures are written as .png");
+}
+
+Result<csg::Projection> parse_projection(std::string_view text) {
+  return parse_choice("--projection", text, kProjections);
+}
+
+Result<csg::Camera> parse_camera(std::string_view text) {
+  const auto numbers = parse_numbers("--camera", text, 6, 7);
+  if (!numbers) return tl::unexpected(numbers.error());
+  const auto& n = *numbers;
+  const glm::dvec3 first(n[0], n[1], n[2]), second(n[3], n[4], n[5]);
+  if (n.size() == 6) {
+    if (first == second) {
+      return fail(ErrorCode::kUsage, "--camera {}: the eye is where it looks at", text);
+    }
+    return csg::look_at(first, second);
+  }
+  csg::Camera camera;
+  camera.target = first;
+  camera.rotation = second;
+  camera.distance = n[6];
+  return camera;
+}
+
+Result<SectionPlane> parse_section(std::string_view text) {
+  SectionPlane plane;
+  const auto no_plane = [text] {
+    return fail(ErrorCode::kUsage, "--cut takes a plane such as x=5, z<10 or nx,ny,nz,d, not '{}'",
+                text);
+  };
+  const std::size_t axis =
+      text.empty() ? std::string_view::npos : std::string_view("xyz").find(text[0]);
+  if (axis != std::string_view::npos && text.size() > 2 &&
+      std::string_view("=<>").find(text[1]) != std::string_view::npos) {
+    const auto at = parse_numbers("--cut", text.substr(2), 1, 1);
+    if (!at) return no_plane();
+    plane.normal[static_cast<int>(axis)] = text[1] == '>' ? -1.0 : 1.0;
+    plane.offset = text[1] == '>' ? -at->front() : at->front();
+    plane.towards_eye = text[1] == '=';
+    return plane;
+  }
+  if (text.find(',') == std::string_view::npos) return no_plane();
+  const auto numbers = parse_numbers("--cut", text, 4, 4);
+  if (!numbers) return tl::unexpected(numbers.error());
+  const auto& n = *numbers;
+  plane.normal = {n[0], n[1], n[2]};
+  const double length = glm::length(plane.normal);
+  if (!(length > 0) || !std::isfinite(length)) {
+    return fail(ErrorCode::kUsage, "--cut {}: the plane's normal has no direction", text);
+  }
+  plane.normal /= length;
+  plane.offset = n[3] / length;
+  return plane;
+}
+
+Result<void> read_csg_options(const CsgWords& words, CsgCommand& command) {
+  std::optional<Error> error;
+  const auto take = [&error](auto value, auto& target) {
+    if (value) {
+      target = *std::move(value);
+    } else if (!error) {
+      error = std::move(value.error());
+    }
+  };
+  command.expression = words.expression;
+  if (!words.size.empty()) take(parse_size(words.size), command.size);
+  command.view_all = words.view_all;
+  command.auto_centre = words.auto_centre;
+  command.asked_view = words.view_all || words.auto_centre;
+  if (words.camera.empty()) {
+    command.view_all = command.auto_centre = command.default_camera = true;
+  } else {
+    take(parse_camera(words.camera), command.camera);
+  }
+  if (!words.projection.empty()) {
+    take(parse_projection(words.projection), command.camera.projection);
+  }
+  if (!words.scheme.empty()) take(parse_scheme(words.scheme), command.picture.scheme);
+  if (!words.measure.empty()) {
+    std::int64_t resolution = 0;
+    take(parse_integer("--measure", words.measure), resolution);
+    if (!error && (resolution < 1 || resolution > kMaxGridSide / 2)) {
+      error = Error{ErrorCode::kUsage, fmt::format("--measure must be 1 to {}, got {}",
+                                                   kMaxGridSide / 2, words.measure)};
+    }
+    command.measure_resolution = static_cast<int>(resolution);
+  }
+  if (!words.samples.empty()) take(parse_samples(words.samples), command.picture.samples);
+  command.picture.edges = words.edges;
+  command.picture.transparent_background = words.transparent;
+  for (const std::string& cut : words.cuts) {
+    take(parse_section(cut), command.cuts.emplace_back());
+  }
+  command.ids = words.ids;
+  command.depth = words.depth;
+  if (error) return tl::unexpected(*error);
+  if (auto read = read_openscad_words(words, command); !read) return read;
+  if (command.input.files.empty()) {
+    return fail(ErrorCode::kUsage, "no scene and no mesh file is given");
+  }
+  if (command.output.empty() && command.ids.empty() && command.depth.empty() && !command.json) {
+    command.summary = true;
+  }
+  if (command.measure_resolution && !command.json && !command.summary) {
+    return fail(ErrorCode::kUsage, "--measure is of the report: give --summary or --json");
+  }
+  for (const auto& [asked_by, path, depth] :
+       {std::tuple("", &command.output, false), std::tuple("--ids ", &command.ids, false),
+        std::tuple("--depth ", &command.depth, true)}) {
+    if (path->empty()) continue;
+    if (auto named = check_picture_name(asked_by, *path, depth); !named) return named;
+  }
+  if (!(command.camera.distance > 0) && !command.view_all) {
+    return fail(ErrorCode::kUsage, "--camera {}: the distance must be above 0, or give --view-all",
+                words.camera);
+  }
+  return {};
+}
+
+}  // namespace strata::apps

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "apps/strata/commands.h"
+#include "apps/strata/scene_options.h"
+#include "strata/core/result.h"
+
+namespace strata::apps {
+
+/// The options of `strata csg` as words. Empty: not given.
+struct CsgWords {
+  SceneWords scene;
+  std::string expression, size, camera, projection, scheme, samples, ids, depth, measure;
+  std::string preview, render, shown, frames, export_format, summary, summary_file, csg_limit;
+  std::vector<std::string> cuts;
+  bool view_all = false, auto_centre = false, edges = false, transparent = false;
+};
+
+/// Whether a picture, or with `depth` a file of distances, can be written under a name: .png, .exr
+/// or a stream. @param asked_by what the sentence begins with: "--ids " @return kUsage
+Result<void> check_picture_name(std::string_view asked_by, const std::string& path,
+                                bool depth = false);
+
+/// Reads the words into `command`, whose common part, inputs, output and report are set.
+/// @return kUsage
+Result<void> read_csg_options(const CsgWords& words, CsgCommand& command);
+
+/// A camera as OpenSCAD's --camera has it: seven numbers, target, rotation and distance, or six,
+/// eye and target. @return kUsage
+Result<csg::Camera> parse_camera(std::string_view text);
+
+/// p(erspective) or o(rthographic), in OpenSCAD's spellings. @return kUsage
+Result<csg::Projection> parse_projection(std::string_view text);
+
+/// A section plane: `x=5`, `z<10`, `y>0` or `nx,ny,nz,d`. @return kUsage
+Result<SectionPlane> parse_section(std::string_view text);
+
+}  // namespace strata::apps

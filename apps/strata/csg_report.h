@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/strata/commands.h"
+#include "apps/strata/session.h"
+#include "strata/csg/measure/measure.h"
+#include "strata/csg/picture/picture.h"
+
+namespace strata::apps {
+
+/// All that `strata csg` can tell of a run.
+struct CsgOutcome {
+  std::uint64_t solids = 0, nodes = 0, triangles = 0;
+  bool flat = false;
+  csg::Camera camera;
+  csg::DrawReport drawn;
+  std::optional<csg::Measures> measures;  ///< with --json
+  std::vector<std::uint32_t> seen;        ///< solids in the picture of --ids, increasing
+  std::vector<std::string> names;         ///< of those
+  double read_ms = 0, prepare_ms = 0, draw_ms = 0, write_ms = 0, measure_ms = 0;
+};
+
+/// The colour that stands for a solid in the picture of --ids: never black, no two alike.
+[[nodiscard]] csg::Rgba colour_of_solid(std::uint32_t solid);
+
+/// For people: a line a topic.
+[[nodiscard]] std::string csg_text(const CsgCommand& command, const CsgOutcome& outcome);
+
+/// For programs, as docs/json.md says.
+[[nodiscard]] std::string csg_json(const CsgCommand& command, const CsgOutcome& outcome,
+                                   const Session& session);
+
+}  // namespace strata::apps

@@ -1,0 +1,128 @@
+#include "apps/strata/file_conflicts.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <iterator>
+#include <utility>
+
+#include "strata/csg/scene/scene.h"
+
+namespace strata::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Most links to links that are followed; the system follows as many.
+constexpr int kMaxLinks = 40;
+
+/// The file that a name would make, links followed even where nothing is there yet.
+fs::path resolved(const std::string& name) {
+  std::string bare = name;
+  while (bare.size() > 1 && bare.ends_with('/')) bare.pop_back();
+  std::error_code error;
+  fs::path path = fs::weakly_canonical(fs::absolute(bare, error), error);
+  for (int i = 0; i < kMaxLinks && fs::is_symlink(path, error); ++i) {
+    const fs::path target = fs::read_symlink(path, error);
+    if (error) break;
+    path = fs::weakly_canonical(path.parent_path() / target, error);
+  }
+  return path;
+}
+
+bool same_file(const std::string& a, const std::string& b) {
+  std::error_code error;
+  if (fs::equivalent(a, b, error) && !error) return true;  // hard links, too
+  return resolved(a) == resolved(b);
+}
+
+std::vector<FileUse> outputs(std::initializer_list<FileUse> uses) {
+  std::vector<FileUse> result;
+  std::copy_if(uses.begin(), uses.end(), std::back_inserter(result),
+               [](const FileUse& use) { return !use.path.empty(); });
+  return result;
+}
+
+/// Whether the folder that a name means has a file in it, at any depth. A folder of files takes its
+/// place.
+bool holds(const std::string& folder, const std::string& file) {
+  std::error_code error;
+  return fs::is_directory(folder, error) && csg::lies_below(file, folder);
+}
+
+tl::unexpected<Error> overwrites(const FileUse& out, std::string_view what,
+                                 const std::string& path) {
+  return fail(ErrorCode::kUsage, "{} {} would overwrite {} {}", out.asked_by, out.path, what, path);
+}
+
+}  // namespace
+
+bool is_stream(const std::string& path) {
+  if (path == "-") return true;
+  for (const char* begin : {"/dev/std", "/dev/fd/", "/proc/"}) {
+    if (path.starts_with(begin)) return true;
+  }
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  return fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status);
+}
+
+std::vector<FileUse> inputs_of(const InputOptions& input) {
+  std::vector<FileUse> uses;
+  for (const std::string& path : input.files) uses.push_back({"the input", path});
+  const std::vector<std::string>& options = input.scene.openscad_options;
+  for (std::size_t i = 0; i + 1 < options.size(); i += 2) {
+    if (options[i] == "-p") uses.push_back({"the parameters", options[i + 1]});
+  }
+  return uses;
+}
+
+Result<void> check_files(const std::vector<FileUse>& read, const std::vector<FileUse>& written) {
+  for (std::size_t i = 0; i < written.size(); ++i) {
+    const FileUse& out = written[i];
+    if (is_stream(out.path)) continue;
+    for (const FileUse& in : read) {
+      if (is_stream(in.path)) continue;
+      if (same_file(in.path, out.path) || holds(out.path, in.path)) {
+        return overwrites(out, in.asked_by, in.path);
+      }
+    }
+    for (std::size_t j = 0; j < i; ++j) {
+      if (is_stream(written[j].path) || !same_file(written[j].path, out.path)) continue;
+      return fail(ErrorCode::kUsage, "{} {} and {} {} would be written to one file",
+                  written[j].asked_by, written[j].path, out.asked_by, out.path);
+    }
+  }
+  return {};
+}
+
+Result<void> check_opened(const FileIdentity& opened, const std::vector<FileUse>& written) {
+  if (!opened.is_there()) return {};
+  for (const FileUse& out : written) {
+    if (is_stream(out.path)) continue;
+    if (opened.is_same_file(identify_file(out.path)) || holds(out.path, opened.path)) {
+      return overwrites(out, "a file of the scene,", opened.path);
+    }
+  }
+  return {};
+}
+
+std::vector<FileUse> outputs_of(const VoxelizeCommand& command) {
+  return outputs({{"-o", command.output}, {"--json", command.json.value_or("")}});
+}
+
+std::vector<FileUse> outputs_of(const InfoCommand& command) {
+  return outputs({{"--json", command.json.value_or("")}});
+}
+
+std::vector<FileUse> outputs_of(const LdiCommand& command) {
+  return outputs({{"-o", command.output}});
+}
+
+std::vector<FileUse> outputs_of(const CsgCommand& command) {
+  return outputs({{"-o", command.output},
+                  {"--ids", command.ids},
+                  {"--depth", command.depth},
+                  {"--json", command.json.value_or("")}});
+}
+
+}  // namespace strata::apps

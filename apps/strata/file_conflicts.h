@@ -1,0 +1,32 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "apps/strata/commands.h"
+#include "strata/core/file_identity.h"
+#include "strata/core/result.h"
+
+namespace strata::apps {
+
+/// Whether bytes for this name go to a pipe, a device or an open file: "-", /dev/stdout, /dev/null.
+[[nodiscard]] bool is_stream(const std::string& path);
+
+/// What a command reads: its inputs, and the parameters of programs.
+[[nodiscard]] std::vector<FileUse> inputs_of(const InputOptions& input);
+
+/// What a command writes.
+[[nodiscard]] std::vector<FileUse> outputs_of(const VoxelizeCommand& command);
+[[nodiscard]] std::vector<FileUse> outputs_of(const InfoCommand& command);
+[[nodiscard]] std::vector<FileUse> outputs_of(const LdiCommand& command);
+[[nodiscard]] std::vector<FileUse> outputs_of(const CsgCommand& command);
+
+/// Looks, before any work is done, whether a file would be written that is read too, or that is
+/// written twice: by whatever names, links followed. Streams may carry several things.
+/// @return kUsage naming the two and the file
+Result<void> check_files(const std::vector<FileUse>& read, const std::vector<FileUse>& written);
+
+/// The same of a file of a scene that has been opened, whatever name it was asked for by.
+Result<void> check_opened(const FileIdentity& opened, const std::vector<FileUse>& written);
+
+}  // namespace strata::apps

@@ -1,0 +1,303 @@
+#include <utility>
+
+#include "apps/session/json_writer.h"
+#include "apps/session/process_memory.h"
+#include "apps/strata/commands.h"
+#include "apps/strata/csg_report.h"
+#include "apps/strata/csg_scene.h"
+#include "apps/strata/file_conflicts.h"
+#include "apps/strata/gl_info.h"
+#include "apps/strata/mesh_input.h"
+#include "apps/strata/session.h"
+#include "core/printable.h"
+#include "strata/core/file_identity.h"
+#include "strata/csg/solid_lists.h"
+#include "strata/mesh/diagnose.h"
+#include "strata/mesh/orient.h"
+
+namespace strata::apps {
+namespace {
+
+struct FileInfo {
+  std::string path;
+  MeshReadStats stats;
+  MeshDiagnosis found;
+  Orientation orientation;
+};
+
+std::string info_text(const FileInfo& info) {
+  const MeshDiagnosis& found = info.found;
+  std::string text = printable(info.path) + "\n";
+  const auto line = [&](std::string_view topic, const std::string& rest) {
+    text += fmt::format("  {:<12} {}\n", topic, rest);
+  };
+  const auto triple = [](const glm::dvec3& v) {
+    return fmt::format("({:.9g}, {:.9g}, {:.9g})", v.x, v.y, v.z);
+  };
+  line("format", fmt::format("{}, {} bytes", info.stats.format, info.stats.bytes));
+  line("triangles", fmt::format("{} of {} faces", found.triangles, info.stats.faces));
+  line("vertices",
+       fmt::format("{}, {} different positions", found.vertices, found.welded_vertices));
+  line("components", std::to_string(found.components));
+  line("bounds", fmt::format("{} to {}", triple(found.bounds.low), triple(found.bounds.high)));
+  line("area", fmt::format("{:.9g}", found.area));
+  line("volume", fmt::format("{:.9g}{}", found.volume, found.closed ? "" : " (the mesh is open)"));
+  line("orientation", !found.closed      ? "not known: the mesh is open"
+                      : found.inverted   ? "inside out"
+                      : found.volume > 0 ? "outward"
+                                         : "no volume");
+  for (const std::string& text_of : sentences(info.orientation, false)) line("", text_of);
+  if (found.closed) {
+    line("closed", fmt::format("yes, all {} edges are balanced", found.edges));
+  } else {
+    line("closed", fmt::format("no, {} of {} edges are unbalanced ({} border a hole, {} join faces "
+                               "that look opposite ways)",
+                               found.unbalanced_edges, found.edges, found.boundary_edges,
+                               found.misoriented_edges));
+    for (const UnbalancedEdge& edge : found.examples) line("", describe(edge));
+    if (found.examples.size() < found.unbalanced_edges) {
+      line("", fmt::format("and {} more", found.unbalanced_edges - found.examples.size()));
+    }
+  }
+  if (found.non_manifold_edges > 0) {
+    line("non-manifold",
+         fmt::format("{} used more than twice", counted(found.non_manifold_edges, "edge")));
+  }
+  const auto defect = [&](std::uint64_t count, const char* topic, const char* what) {
+    if (count > 0) line(topic, fmt::format("{} {}", counted(count, "face"), what));
+  };
+  defect(found.degenerate_faces + info.stats.degenerate, "degenerate", "without area");
+  defect(found.duplicate_faces, "duplicate", "that repeat another");
+  defect(info.stats.out_of_range, "dropped", "with an index that names no vertex");
+  defect(info.stats.non_finite, "dropped", "with a coordinate that is not finite");
+  defect(info.stats.too_few_vertices, "dropped", "with fewer than three vertices");
+  defect(info.stats.non_planar, "non-planar", "that are polygons and not flat");
+  if (info.stats.ignored > 0) {
+    line("ignored", counted(info.stats.ignored, "element") + " that are no faces");
+  }
+  return text;
+}
+
+void write_edge(JsonWriter& json, const UnbalancedEdge& edge) {
+  json.begin_object();
+  json.member("from", edge.from);
+  json.member("to", edge.to);
+  json.member("face", edge.element);
+  json.member("forward", edge.forward);
+  json.member("backward", edge.backward);
+  json.end_object();
+}
+
+void write_info(JsonWriter& json, const FileInfo& info) {
+  const MeshDiagnosis& found = info.found;
+  json.begin_object();
+  json.member("path", info.path);
+  json.member("format", info.stats.format);
+  json.member("bytes", info.stats.bytes);
+  json.member("faces", info.stats.faces);
+  json.member("triangles", found.triangles);
+  json.member("vertices", found.vertices);
+  json.member("welded_vertices", found.welded_vertices);
+  json.member("components", found.components);
+  json.key("bounds").begin_object();
+  json.member("low", found.bounds.low);
+  json.member("high", found.bounds.high);
+  json.end_object();
+  json.member("area", found.area);
+  json.member("volume", found.volume);
+  json.member("closed", found.closed);
+  json.member("even", found.even);
+  json.member("inverted", found.inverted);
+  json.key("orientation").begin_object();
+  json.member("parts", info.orientation.parts);
+  json.member("parts_inside_out", info.orientation.turned_parts);
+  json.member("turned_triangles", info.orientation.turned_triangles);
+  json.member("double_faces", info.orientation.double_faces);
+  json.member("not_orientable", info.orientation.not_orientable);
+  json.end_object();
+  json.key("edges").begin_object();
+  json.member("total", found.edges);
+  json.member("unbalanced", found.unbalanced_edges);
+  json.member("boundary", found.boundary_edges);
+  json.member("misoriented", found.misoriented_edges);
+  json.member("non_manifold", found.non_manifold_edges);
+  json.key("examples").begin_array();
+  for (const UnbalancedEdge& edge : found.examples) write_edge(json, edge);
+  json.end_array();
+  json.end_object();
+  json.key("bad_faces").begin_object();
+  json.member("degenerate", found.degenerate_faces + info.stats.degenerate);
+  json.member("duplicate", found.duplicate_faces);
+  json.member("out_of_range", info.stats.out_of_range);
+  json.member("non_finite", info.stats.non_finite);
+  json.member("too_few_vertices", info.stats.too_few_vertices);
+  json.member("non_planar", info.stats.non_planar);
+  json.member("ignored", info.stats.ignored);
+  json.end_object();
+  json.end_object();
+}
+
+struct SceneInfo {
+  std::string path;
+  InputFacts facts;
+  std::uint64_t solids = 0, nodes = 0;
+  csg::Measures result;
+};
+
+std::string info_text(const SceneInfo& info) {
+  std::string text = printable(info.path) + "\n";
+  const auto line = [&](std::string_view topic, const std::string& rest) {
+    text += fmt::format("  {:<12} {}\n", topic, rest);
+  };
+  const auto triple = [](const glm::dvec3& v) {
+    return fmt::format("({:.9g}, {:.9g}, {:.9g})", v.x, v.y, v.z);
+  };
+  const csg::Measures& m = info.result;
+  line("format", fmt::format("{}, {} bytes", info.facts.stats.format, info.facts.stats.bytes));
+  line("solids", fmt::format("{} in {}", info.solids, counted(info.nodes, "node")));
+  line("triangles", fmt::format("{} of all solids", info.facts.stats.triangles));
+  if (m.empty) {
+    line("result", "empty, or smaller than a voxel of the grid that is measured on");
+    return text;
+  }
+  line("bounds",
+       fmt::format("{} to {}, within {:.2g}", triple(m.low), triple(m.high), m.bounds_error));
+  line("area", fmt::format("{:.6g}, about within {:.2g}", m.area, m.area_error));
+  line("volume", fmt::format("{:.6g}, within {:.2g}", m.volume, m.volume_error));
+  line("closed", info.facts.closed ? "yes, all meshes of the result"
+                                   : fmt::format("no, {}", printable(info.facts.open)));
+  return text;
+}
+
+void write_info(JsonWriter& json, const SceneInfo& info) {
+  const csg::Measures& m = info.result;
+  json.begin_object();
+  json.member("path", info.path);
+  json.member("format", info.facts.stats.format);
+  json.member("bytes", info.facts.stats.bytes);
+  json.member("solids", info.solids);
+  json.member("nodes", info.nodes);
+  json.member("triangles", info.facts.stats.triangles);
+  json.member("vertices", info.facts.stats.vertices);
+  json.member("empty", m.empty);
+  json.key("bounds").begin_object();
+  json.member("low", m.low);
+  json.member("high", m.high);
+  json.end_object();
+  json.member("bounds_error", m.bounds_error);
+  json.member("area", m.area);
+  json.member("area_error", m.area_error);
+  json.member("volume", m.volume);
+  json.member("volume_error", m.volume_error);
+  json.member("closed", info.facts.closed);
+  json.end_object();
+}
+
+Result<SceneInfo> look_at_scene(const std::string& path, const InfoCommand& command,
+                                Session& session) {
+  CsgCommand one;
+  one.input = command.input;
+  one.input.files = {path};
+  std::vector<InputFacts> facts;
+  const auto scene = load_scene(one, session, &facts);
+  if (!scene) return tl::unexpected(scene.error());
+  Execution execution = session.execution("measuring");
+  execution.progress = {};
+  auto measures =
+      csg::measure(scene->tree, scene->tree.root(),
+                   {.resolution = {}, .relative_precision = scene->relative_precision}, execution);
+  if (!measures) return tl::unexpected(measures.error());
+  SceneInfo info{path, std::move(facts.front()), scene->tree.solids().size(),
+                 scene->tree.nodes().size(), *measures};
+  if (command.common.strict && !info.facts.closed) {
+    session.warn("open", fmt::format("{}: {}", path, info.facts.open));
+  }
+  return info;
+}
+
+Result<FileInfo> look_at(const std::string& path, const InfoCommand& command, Session& session) {
+  auto file = read_input(path, command.input, session);
+  if (!file) return tl::unexpected(file.error());
+  warn_of_reading(path, file->stats, session);
+  Execution execution = session.execution("checking");
+  execution.progress = {};
+  FileInfo info{path, std::move(file->stats), diagnose(file->soup, execution),
+                orient_parts(file->soup, execution, {.change = false})};
+  if (session.interrupted()) return fail(ErrorCode::kCancelled, "stopped");
+  if (command.common.strict && !info.found.closed) {
+    session.warn("open", fmt::format("{}: the mesh is not closed: {} of {} edges are unbalanced",
+                                     path, info.found.unbalanced_edges, info.found.edges));
+  }
+  return info;
+}
+
+}  // namespace
+
+Result<void> run_info(const InfoCommand& command, Session& session) {
+  JsonWriter json;
+  json.begin_object();
+  json.member("strata", STRATA_VERSION);
+  json.member("command", "info");
+  json.key("files").begin_array();
+  std::string text;
+  std::optional<Error> first_error;  // the other files are still looked at
+  bool scene_failed = false;
+  for (const std::string& path : command.input.files) {
+    const auto tell = [&](const auto& info) -> Result<void> {
+      if (!info) return tl::unexpected(info.error());
+      write_info(json, *info);
+      if (!text.empty()) text += '\n';
+      text += info_text(*info);
+      return {};
+    };
+    const bool scene = is_scene_name(path) && format_of(path, command.input) == MeshFormat::kAuto;
+    const auto told =
+        scene ? tell(look_at_scene(path, command, session)) : tell(look_at(path, command, session));
+    if (told) continue;
+    if (session.interrupted()) return told;
+    if (first_error) session.complain(*first_error);
+    // A report must not overwrite what a scene has opened.
+    if (scene && told.error().code == ErrorCode::kUsage) return told;
+    scene_failed = scene_failed || scene;
+    first_error = told.error();
+  }
+  json.end_array();
+  const bool replaces =
+      command.json && !is_stream(*command.json) && identify_file(*command.json).is_there();
+  if (scene_failed && replaces) {
+    session.complain(*first_error);
+    return fail(first_error->code,
+                "--json {}: the file is kept: a scene that cannot be read may need it",
+                *command.json);
+  }
+  if (command.gl) {
+    if (const auto told = tell_gl(json, text); !told) {
+      if (first_error) session.complain(*first_error);
+      first_error = told.error();
+    }
+  }
+  json.key("memory").begin_object();
+  json.member("peak_bytes", peak_memory_bytes());
+  json.end_object();
+  json.key("timings_ms").begin_object();
+  json.member("total", session.milliseconds());
+  json.end_object();
+  json.key("warnings").begin_array();
+  for (const Warning& warning : session.warnings()) {
+    json.begin_object();
+    json.member("code", warning.code);
+    json.member("message", warning.message);
+    json.end_object();
+  }
+  json.end_array();
+  json.end_object();
+  session.end_progress();
+  const auto printed = command.json ? print_report(json.take(), *command.json, false)
+                                    : print_report(text, "-", false);
+  if (!printed) return printed;
+  if (auto done = session.commit_outputs(); !done) return done;
+  if (first_error) return tl::unexpected(*first_error);
+  return session.check_strict();
+}
+
+}  // namespace strata::apps

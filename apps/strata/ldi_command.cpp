@@ -1,0 +1,66 @@
+#include <glm/vec3.hpp>
+#include <utility>
+
+#include "apps/strata/commands.h"
+#include "apps/strata/gpu.h"
+#include "apps/strata/mesh_input.h"
+#include "apps/strata/option_values.h"
+#include "apps/strata/session.h"
+#include "strata/hashbuffer/build_ldi.h"
+#include "strata/hashbuffer/formats/ldi_io.h"
+#include "strata/hashbuffer/formats/xray.h"
+#include "strata/raster/lattice_mesh.h"
+
+namespace strata::apps {
+
+Result<void> run_ldi(const LdiCommand& command, Session& session) {
+  const bool exr = has_extension(command.output, ".exr");
+  const bool npz = has_extension(command.output, ".npz");
+  const bool png = has_extension(command.output, ".png");
+  if (!exr && !npz && !png) {
+    return fail(ErrorCode::kUsage, "{}: layered depth images are written as .exr, .npz or .png",
+                command.output);
+  }
+  if (!exr && command.samples) {
+    return fail(ErrorCode::kUsage, "{}: --samples is for .exr", command.output);
+  }
+  auto input = load_solids(
+      command.input, {.keep_orientation = command.keep_orientation, .rule = InsideRule::kWinding},
+      session);
+  if (!input) return tl::unexpected(input.error());
+  if (auto strict = session.check_strict(); !strict) return strict;
+  const auto grid = fit_grid(input->bounds, command.grid);
+  if (!grid) {
+    return fail(grid.error().code, "{}: {}", command.input.files.front(), grid.error().message);
+  }
+
+  const Execution execution = session.execution("depth lists", 0.8);
+  if (auto done = input->fit(*grid, execution); !done) return done;
+  const auto lattice = snap_to_lattice(input->soup, *grid, execution);
+  if (!lattice) return tl::unexpected(lattice.error());
+  const auto gpu = Gpu::open(command.backend, session);
+  if (!gpu) return tl::unexpected(gpu.error());
+  ListSource* source = nullptr;
+  if (*gpu) {
+    const auto lists = (*gpu)->lists(command.store);
+    if (!lists) return tl::unexpected(lists.error());
+    source = *lists;
+  }
+  const RasterTarget target = raster_target(*grid, command.axis);
+  const TileListFilter* filter = input->tree ? &input->tree->filter() : nullptr;
+  auto image = source != nullptr ? build_ldi(*source, *lattice, target, execution, filter)
+                                 : build_ldi(*lattice, target,
+                                             {.store = command.store, .offsets = command.offsets},
+                                             execution, filter);
+  if (!image) return tl::unexpected(image.error());
+  image->world_from_image = world_from_image(*grid, command.axis);
+  session.note(fmt::format("{} x {} pixels, {}", image->width, image->height,
+                           counted(image->items.size(), "crossing")));
+
+  const Execution writing = session.execution("writing", 1.0);
+  if (png) return write_xray_png(command.output, *image);
+  return exr ? write_ldi_exr(command.output, *image, {.samples = command.samples}, writing)
+             : write_ldi_npz(command.output, *image, {}, writing);
+}
+
+}  // namespace strata::apps

@@ -1,0 +1,132 @@
+#include "apps/strata/scene_options.h"
+
+#include <CLI/App.hpp>
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string_view>
+
+#include "apps/strata/option_values.h"
+
+namespace strata::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Whether the text of a customizer's file has a set: a name inside of "parameterSets".
+bool has_set(std::string_view text, std::string_view name) {
+  int depth = 0;
+  std::string_view section;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (text[i] == '{' || text[i] == '[') ++depth;
+    if (text[i] == '}' || text[i] == ']') --depth;
+    if (text[i] != '"') continue;
+    const std::size_t begin = i + 1;
+    for (i = begin; i < text.size() && text[i] != '"'; ++i) {
+      if (text[i] == '\\') ++i;
+    }
+    if (i >= text.size()) return false;
+    const std::size_t next = text.find_first_not_of(" \t\r\n", i + 1);
+    if (next == std::string_view::npos || text[next] != ':') continue;  // a value
+    const std::string_view key = text.substr(begin, i - begin);
+    if (depth == 1) section = key;
+    if (depth == 2 && section == "parameterSets" && key == name) return true;
+  }
+  return false;
+}
+
+/// openscad takes its defaults, without a word, where a set is not in the file.
+Result<void> check_parameters(const SceneWords& words) {
+  if (words.parameter_file.empty() != words.parameter_set.empty()) {
+    return fail(ErrorCode::kUsage, "-p FILE and -P SET belong together: {} is missing",
+                words.parameter_file.empty() ? "-p" : "-P");
+  }
+  if (words.parameter_file.empty()) return {};
+  std::error_code ignored;
+  if (!fs::is_regular_file(words.parameter_file, ignored)) {
+    return fail(ErrorCode::kUsage, "-p {}: there is no such file", words.parameter_file);
+  }
+  std::ifstream in(words.parameter_file, std::ios::binary);
+  const std::string text{std::istreambuf_iterator<char>(in), {}};
+  // Other characters may be written as escapes.
+  const bool plain =
+      std::all_of(words.parameter_set.begin(), words.parameter_set.end(),
+                  [](char c) { return c >= ' ' && c <= '~' && c != '"' && c != '\\'; });
+  if (plain && !has_set(text, words.parameter_set)) {
+    return fail(ErrorCode::kUsage, "-P {}: the file {} has no set of that name",
+                words.parameter_set, words.parameter_file);
+  }
+  return {};
+}
+
+}  // namespace
+
+void define_scene_options(CLI::App& app, SceneWords& words) {
+  const auto option = [&app](const char* names, std::string& word, const char* what,
+                             const char* type, const char* group) {
+    app.add_option(names, word, what)->type_name(type)->group(group);
+  };
+  const char* input = "Input";
+  option("--assets", words.assets, "Where scenes look for files; else beside the scene", "FOLDER",
+         input);
+  option("--root", words.root, "Scenes may read files below this folder only", "FOLDER", input);
+  option("--scad-timeout", words.scad_timeout, "Seconds that openscad may take for a .scad; 300",
+         "S", input);
+  app.add_option("-D", words.definitions, "Set a variable of a .scad: -D 'x=40', -D 'label=\"B\"'")
+      ->type_name("NAME=VALUE")
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
+      ->group(kOpenscadGroup);
+  option("-p", words.parameter_file, "Customizer's parameters of a .scad, .json", "FILE",
+         kOpenscadGroup);
+  option("-P", words.parameter_set, "Which set of that file", "SET", kOpenscadGroup);
+  option("--check-parameters", words.check_parameters, "Of modules and functions: true or false",
+         "BOOL", kOpenscadGroup);
+  option("--check-parameter-ranges", words.check_ranges, "Of built-in modules: true or false",
+         "BOOL", kOpenscadGroup);
+}
+
+Result<void> read_scene_options(const SceneWords& words, InputOptions& input) {
+  csg::ReadSceneOptions& scene = input.scene;
+  scene.asset_folder = words.assets;
+  scene.root_folder = words.root;
+  std::error_code ignored;
+  if (!words.root.empty() && !fs::is_directory(words.root, ignored)) {
+    return fail(ErrorCode::kUsage, "--root {}: there is no such folder", words.root);
+  }
+  if (!words.scad_timeout.empty()) {
+    const auto seconds = parse_seconds("--scad-timeout", words.scad_timeout);
+    if (!seconds) return tl::unexpected(seconds.error());
+    scene.scad_timeout_s = *seconds;
+  }
+  std::vector<std::string>& options = scene.openscad_options;
+  for (const std::string& definition : words.definitions) {
+    if (definition.find('=') == std::string::npos) {
+      return fail(ErrorCode::kUsage, "-D takes NAME=VALUE, not '{}'", definition);
+    }
+    options.insert(options.end(), {"-D", definition});
+  }
+  if (auto checked = check_parameters(words); !checked) return checked;
+  if (!words.parameter_file.empty()) {
+    options.insert(options.end(), {"-p", words.parameter_file, "-P", words.parameter_set});
+  }
+  for (const auto& [name, word] : {std::pair("--check-parameters", &words.check_parameters),
+                                   std::pair("--check-parameter-ranges", &words.check_ranges)}) {
+    if (word->empty()) continue;
+    if (*word != "true" && *word != "false") {
+      return fail(ErrorCode::kUsage, "{} takes true or false, not '{}'", name, *word);
+    }
+    options.insert(options.end(), {name, *word});
+  }
+  const bool runs = std::any_of(input.files.begin(), input.files.end(),
+                                [](const auto& file) { return has_extension(file, ".scad"); });
+  if (!options.empty() && !runs) {
+    return fail(ErrorCode::kUsage,
+                "{} is for programs, which openscad runs: no input is a .scad file",
+                options.front());
+  }
+  return {};
+}
+
+}  // namespace strata::apps

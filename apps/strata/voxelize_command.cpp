@@ -1,0 +1,409 @@
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <memory>
+#include <utility>
+
+#include "apps/strata/boundary_area.h"
+#include "apps/strata/choice_words.h"
+#include "apps/strata/commands.h"
+#include "apps/strata/gpu.h"
+#include "apps/strata/memory_estimate.h"
+#include "apps/strata/mesh_input.h"
+#include "apps/strata/session.h"
+#include "apps/strata/voxelize_report.h"
+#include "strata/csg/picture/picture.h"
+#include "strata/csg/solid_labels.h"
+#include "strata/csg/solid_lists.h"
+#include "strata/voxelize/formats/voxel_writer.h"
+#include "voxelize/open/lost_walls.h"
+
+namespace strata::apps {
+namespace {
+
+std::string format_list() {
+  std::string text;
+  for (const VoxelFormat& format : voxel_formats()) {
+    text += fmt::format("{:<8} {:<8} {}\n", format.name, format.extension, format.description);
+  }
+  return text;
+}
+
+/// Refuses what would be found out only after the work.
+Result<void> check_output(const VoxelizeCommand& command) {
+  if (command.output.empty()) return {};
+  if (command.output == "-" && isatty(STDOUT_FILENO) != 0) {
+    return fail(ErrorCode::kUsage, "standard output is a terminal; a voxel file is no text");
+  }
+  const auto format = voxel_format_for(command.output, command.format);
+  if (!format) return tl::unexpected(format.error());
+  if ((command.fog != 0 || command.mask) && format->name != "vdb") {
+    return fail(ErrorCode::kUsage, "{} is for .vdb; format {} holds no {}",
+                command.mask ? "--mask" : "--fog", format->name,
+                command.mask ? "mask" : "fog volume");
+  }
+  if (command.name && !format->named) {
+    return fail(ErrorCode::kUsage, "--name is for .vdb, .nrrd and .vti; format {} holds no name",
+                format->name);
+  }
+  if (command.ids) {
+    if (auto held = check_ids(*format, 1); !held) return held;
+  }
+  if (command.axis && *command.axis != format->axis) {
+    return fail(
+        ErrorCode::kUsage,
+        "--axis {}: {} is written from rays along {}; without --axis the voxels are the same",
+        "xyz"[static_cast<int>(*command.axis)], format -> name,
+        "xyz"[static_cast<int>(format->axis)]);
+  }
+  return {};
+}
+
+/// What --open says of meshes that are not closed: refuses, or says who decides where no vote can.
+Result<void> check_open(const VoxelizeCommand& command, const MeshInput& input, Session& session) {
+  if (input.closed || !command.solid) return {};
+  const InputFacts& file =
+      *std::find_if(input.files.begin(), input.files.end(),
+                    [](const InputFacts& facts) { return !facts.open.empty(); });
+  if (command.open == OpenMode::kFail) {
+    return fail(ErrorCode::kGeometry, "{} (--open fail)", file.open);
+  }
+  if (command.ids && command.open == OpenMode::kSurface) {
+    return fail(ErrorCode::kUsage, "--ids are of solids; under --open surface there is none: {}",
+                file.open);
+  }
+  if (command.ids && !input.has_scene()) {
+    return fail(ErrorCode::kUsage,
+                "--ids are of closed meshes: for open ones all directions vote on each voxel, and "
+                "no vote says of which solid it is; close {}, or do without --ids",
+                file.path);
+  }
+  if (input.has_scene() && command.open == OpenMode::kVote) {
+    session.warn(
+        "open", fmt::format("{}: holes are not closed beside a scene: each ray by itself pairs the "
+                            "faces of an open mesh, and a face without a partner becomes a sheet",
+                            file.path));
+  }
+  return {};
+}
+
+/// The axis the format is written from, or the one with the fewest columns.
+Axis choose_axis(const VoxelizeCommand& command, const VoxelFormat* format, const VoxelGrid& grid) {
+  if (command.axis) return *command.axis;
+  if (format != nullptr) return format->axis;
+  // The longest side has the smallest cross-section.
+  if (grid.dims.z >= grid.dims.x && grid.dims.z >= grid.dims.y) return Axis::kZ;
+  return grid.dims.y >= grid.dims.x ? Axis::kY : Axis::kX;
+}
+
+/// Tells of walls that lie between voxel centres, or that nothing is solid.
+Result<void> check_thin(const VoxelizeCommand& command, VoxelizeOutcome& outcome,
+                        const Execution& execution, Session& session) {
+  const MeshInput& input = outcome.input;
+  LostWallOptions options;
+  options.rule = input.rule;
+  if (!input.has_scene()) options.longest_edge = input.longest_edge;
+  if (input.tree) {
+    options.filter = &input.tree->plain_filter();
+    options.taken_away = [&](std::uint32_t t) { return input.tree->taken_away(t); };
+  }
+  const std::uint64_t solid = outcome.report.solid_voxels;
+  const char* remedy =
+      command.ids ? "; --surface, without --ids, holds all of it" : "; --surface holds all of it";
+  if (input.closed) {
+    auto found = find_lost_walls(input.soup, outcome.grid, options, execution);
+    if (!found) return tl::unexpected(found.error());
+    outcome.lost_walls = *std::move(found);
+  }
+  const LostWalls& lost = outcome.lost_walls;
+  if (lost.count > 0) {
+    const LostWall& wall = lost.largest.front();
+    session.warn(
+        "thin",
+        fmt::format("{} thinner than a voxel fell between voxel centres; {} {:.3g} voxels "
+                    "thick along {}, from {} to {}; the solid holds {}{}",
+                    counted(lost.count, "wall"), lost.count == 1 ? "it is" : "the largest is",
+                    wall.thickness, word_of(kAxisWords, wall.axis), triple(wall.low),
+                    triple(wall.high), counted(solid, "voxel"), remedy));
+  } else if (solid == 0) {
+    const char* why = !input.closed       ? ""
+                      : input.has_scene() ? ": the scene's result is empty, or thinner than a voxel"
+                                          : ": the mesh lies outside the grid, or is thinner than "
+                                            "a voxel";
+    session.warn("empty", fmt::format("no voxel is solid{}{}", why, remedy));
+  }
+  return {};
+}
+
+void check_columns(const VoxelizeCommand& command, const VoxelizeOutcome& outcome,
+                   Session& session) {
+  const VoxelizeReport& report = outcome.report;
+  if (!command.solid) return;
+  // Parity does not ask which way a closed mesh is crossed.
+  const bool both_ways = outcome.input.closed && outcome.input.rule == InsideRule::kParity;
+  if (report.unbalanced_columns > 0 && !both_ways) {
+    session.warn("unbalanced-columns",
+                 fmt::format("{} entered and left unequally often; {}",
+                             report.unbalanced_columns == 1
+                                 ? std::string("1 column is")
+                                 : fmt::format("{} columns are", report.unbalanced_columns),
+                             command.open == OpenMode::kVote
+                                 ? "caps and winding numbers decided their voxels"
+                                 : "their voxels are not to be trusted"));
+  }
+  if (report.negative_columns > 0 && outcome.input.closed &&
+      outcome.input.rule == InsideRule::kWinding) {
+    session.warn("negative-winding",
+                 fmt::format("{} columns run through parts that are inside out, which are not "
+                             "solid; --rule nonzero fills them",
+                             report.negative_columns));
+  }
+}
+
+std::optional<std::uint64_t> size_of_file(const std::string& path) {
+  struct stat status {};
+  if (path == "-" || stat(path.c_str(), &status) != 0 || !S_ISREG(status.st_mode)) {
+    return std::nullopt;
+  }
+  return static_cast<std::uint64_t>(status.st_size);
+}
+
+Result<void> print_reports(const VoxelizeCommand& command, const VoxelizeOutcome& outcome,
+                           Session& session) {
+  const bool json_on_stdout = command.json == "-";
+  const bool file_on_stdout = command.output == "-" && !command.dry_run;
+  // All files are there before a reader of standard output goes on.
+  if (command.json && !json_on_stdout) {
+    const std::string text = voxelize_json(command, outcome, session);
+    if (auto done = print_report(text, *command.json, false); !done) return done;
+  }
+  if (auto done = session.commit_outputs(); !done) return done;
+  if (command.checksum && !command.stats && !command.json && !command.dry_run) {
+    const std::string line = fmt::format("{:016x}\n", outcome.report.checksum);
+    if (auto done = print_report(line, "-", file_on_stdout); !done) return done;
+  }
+  if (command.stats || (command.dry_run && !command.json)) {
+    const std::string text = voxelize_text(command, outcome, session);
+    if (auto done = print_report(text, "-", file_on_stdout || json_on_stdout); !done) return done;
+  }
+  if (!json_on_stdout) return {};
+  return print_report(voxelize_json(command, outcome, session), "-", file_on_stdout);
+}
+
+/// Whether no voxel is asked for its inside: without --solid, or of an open mesh under --open
+/// surface.
+bool is_surface_alone(const VoxelizeCommand& command, const MeshInput& input) {
+  return !command.solid || (!input.closed && command.open == OpenMode::kSurface);
+}
+
+/// Samples along a voxel's side of a fog volume; 0: none is asked for. A surface alone has no
+/// filled fraction.
+int fog_samples(const VoxelizeCommand& command, const MeshInput& input) {
+  return command.fog_by_default && is_surface_alone(command, input) ? 1 : command.fog;
+}
+
+/// Has the solids of a scene labelled, by number or by colour, when the format is to hold that.
+void label_solids(const VoxelizeCommand& command, VoxelizeOutcome& outcome,
+                  VoxelWriterOptions& options, Session& session) {
+  if (!outcome.input.tree) return;
+  const csg::Tree& scene = *outcome.input.scene;
+  if (command.ids) {
+    // Solids that are taken away have numbers, too, but no voxel has them.
+    const std::vector<std::uint32_t> added = csg::added_solids(scene, scene.root());
+    options.ids = added.empty() ? 1 : *std::max_element(added.begin(), added.end()) + 1;
+    outcome.id_voxels.resize(scene.solids().size(), 0);
+    return outcome.input.tree->set_labels(csg::id_labels(scene));
+  }
+  const bool surface = command.surface || is_surface_alone(command, outcome.input);
+  if (command.output.empty() || surface) return;
+  const std::size_t most = voxel_format_for(command.output, command.format)->colours;
+  if (most == 0) return;
+  const glm::vec4 none(glm::vec3(csg::colour_schemes().front().face) / 255.0f, 1.0f);
+  const csg::ColourLabels parts = csg::colour_labels(scene, scene.root(), none);
+  if (parts.colours.size() > most) {
+    return session.warn("colours", fmt::format("{} colours, a {} file holds {}: written without",
+                                               parts.colours.size(), outcome.format, most));
+  }
+  for (const glm::vec4& colour : parts.colours) {
+    options.colours.emplace_back(glm::clamp(colour, 0.0f, 1.0f) * 255.0f + 0.5f);
+  }
+  if (!parts.colours.empty()) outcome.input.tree->set_labels(parts.labels);
+}
+
+Result<void> check_samples(int samples, const VoxelGrid& grid) {
+  const int longest = std::max({grid.dims.x, grid.dims.y, grid.dims.z});
+  if (samples * longest <= kMaxGridSide) return {};
+  return fail(
+      ErrorCode::kLimit,
+      "--fog: {} samples a side of {} x {} x {} voxels are more than {}; --fog=N takes fewer",
+      samples, grid.dims.x, grid.dims.y, grid.dims.z, kMaxGridSide);
+}
+
+void count_ids(const VoxelIntervals& slab, std::vector<std::uint64_t>& voxels) {
+  for (int tv = 0; tv < slab.tiles_v(); ++tv) {
+    for (int tu = 0; tu < slab.tiles_u(); ++tu) {
+      const VoxelIntervals::TileView tile = slab.tile(tu, tv);
+      for (std::size_t i = 0; i < tile.labels.size(); ++i) {
+        voxels[tile.labels[i] - 1] += static_cast<std::uint64_t>(tile.items[i].length());
+      }
+    }
+  }
+}
+
+/// The work itself: lists, intervals, file.
+Result<void> voxelize_and_write(const VoxelizeCommand& command, VoxelizeOutcome& outcome,
+                                Session& session) {
+  std::unique_ptr<VoxelWriter> writer;
+  VoxelWriterOptions file;
+  const int samples = fog_samples(command, outcome.input);
+  file.fog = static_cast<std::uint32_t>(samples * samples * samples);
+  file.mask = command.mask;
+  if (!command.solid && samples == 0) file.name = "surface";
+  if (command.name) file.name = *command.name;
+  label_solids(command, outcome, file, session);
+  if (!command.output.empty()) {
+    auto opened = open_voxel_writer(command.output, command.format, outcome.grid, file);
+    if (!opened) return tl::unexpected(opened.error());
+    writer = *std::move(opened);
+  }
+  VoxelizeOptions options;
+  options.rule = outcome.input.rule;
+  options.axis = outcome.axis;
+  options.solid = command.solid;
+  options.surface = command.surface;
+  options.surface_kind = command.surface_kind;
+  options.open = command.open;
+  options.closed = outcome.input.closed;
+  options.store = command.store;
+  options.offsets = command.offsets;
+  if (outcome.input.tree) {
+    options.filter = &outcome.input.tree->filter();
+    if (is_surface_alone(command, outcome.input)) options.solid = false, options.surface = true;
+    options.closed = true;                // it makes closed lists of open ones
+    options.rule = InsideRule::kWinding;  // the solids' rules are the filter's
+  }
+  options.statistics = command.stats || command.json || command.checksum;
+  std::unique_ptr<Gpu> gpu;
+  if (command.solid) {
+    auto opened = Gpu::open(command.backend, session);
+    if (!opened) return tl::unexpected(opened.error());
+    gpu = *std::move(opened);
+  }
+  if (gpu) {
+    const auto source = gpu->lists(command.store);
+    if (!source) return tl::unexpected(source.error());
+    options.source = *source;
+  }
+
+  Execution execution = session.execution("voxelizing", samples > 1 ? 0.2 : 1.0);
+  // The mesh is there already; what the format holds is not the voxelizer's.
+  const std::uint64_t taken = outcome.estimate.mesh + outcome.estimate.output;
+  execution.memory_limit = std::max<std::uint64_t>(
+      session.memory_limit() > taken ? session.memory_limit() - taken : 0, 1);
+  Execution quiet = execution;
+  quiet.progress = {};
+  std::uint64_t solid_voxels = 0;
+  std::optional<BoundaryArea> boundary;
+  if (command.stats || command.json) boundary.emplace(outcome.grid, outcome.axis);
+  double write_ms = 0;
+  const auto write = [&](const VoxelIntervals& slab) -> Result<void> {
+    if (!writer) return {};
+    const double start = session.milliseconds();
+    auto done = writer->add(slab, quiet);
+    write_ms += session.milliseconds() - start;
+    return done;
+  };
+  const auto sink = [&](const VoxelIntervals& slab) -> Result<void> {
+    if (!options.statistics) solid_voxels += slab.solid_voxels();
+    if (boundary) boundary->add(slab, quiet);
+    if (command.ids) count_ids(slab, outcome.id_voxels);
+    return samples > 1 ? Result<void>() : write(slab);
+  };
+  VoxelGrid finest = outcome.grid;
+  finest.dims *= std::max(1, samples), finest.voxel_size /= std::max(1, samples);
+  if (auto done = outcome.input.fit(finest, quiet); !done) return done;
+  auto report = voxelize_slabs(outcome.input.soup, outcome.grid, options, execution, sink);
+  if (!report) return tl::unexpected(report.error());
+  if (session.interrupted()) return fail(ErrorCode::kCancelled, "stopped");
+  outcome.report = *report;
+  outcome.measured = true;
+  if (!options.statistics) outcome.report.solid_voxels = solid_voxels;
+  if (boundary) outcome.area_estimate = boundary->estimate();
+
+  check_columns(command, outcome, session);
+  if (!command.surface && !is_surface_alone(command, outcome.input)) {
+    if (auto done = check_thin(command, outcome, quiet, session); !done) return done;
+  } else if (outcome.report.solid_voxels == 0) {
+    session.warn("empty", "no voxel is solid; does the grid hold the mesh?");
+  }
+  if (auto strict = session.check_strict(); !strict) return strict;
+  if (!writer) return {};
+  if (samples > 1) {
+    // The numbers above are of the voxels whose centre is inside; the file has the filled fraction.
+    options.samples = samples;
+    options.statistics = false;
+    Execution fine = session.execution("sampling", 1.0);
+    fine.memory_limit = execution.memory_limit;
+    const auto done = voxelize_slabs(outcome.input.soup, outcome.grid, options, fine, write);
+    if (!done) return tl::unexpected(done.error());
+    if (session.interrupted()) return fail(ErrorCode::kCancelled, "stopped");
+  }
+  const double start = session.milliseconds();
+  if (auto done = writer->finish(quiet); !done) return done;
+  writer.reset();
+  outcome.write_ms = write_ms + session.milliseconds() - start;
+  if (session.interrupted()) session.note("the interrupt came too late: the output is complete");
+  outcome.output_bytes = size_of_file(session.place_of(command.output));
+  return {};
+}
+
+}  // namespace
+
+Result<void> run_voxelize(const VoxelizeCommand& command, Session& session) {
+  if (command.list_formats) return print_report(format_list(), "-", false);
+  if (auto valid = check_output(command); !valid) return valid;
+
+  VoxelizeOutcome outcome;
+  const MeshInputRules rules{command.keep_orientation, command.rule, command.ids};
+  auto input = load_solids(command.input, rules, session);
+  if (!input) return tl::unexpected(input.error());
+  outcome.input = *std::move(input);
+  if (auto valid = check_open(command, outcome.input, session); !valid) return valid;
+  if (auto strict = session.check_strict(); !strict) return strict;
+
+  auto grid = fit_grid(outcome.input.bounds, command.grid);
+  if (!grid) {
+    return fail(grid.error().code, "{}: {}", command.input.files.front(), grid.error().message);
+  }
+  outcome.grid = *grid;
+  Result<VoxelFormat> format;
+  if (!command.output.empty()) {
+    format = voxel_format_for(command.output, command.format);
+    outcome.format = format->name;
+  }
+  outcome.axis = choose_axis(command, command.output.empty() ? nullptr : &*format, outcome.grid);
+  const int samples = fog_samples(command, outcome.input);
+  if (const auto valid = check_samples(samples, outcome.grid); !valid) return valid;
+  outcome.estimate = estimate_memory(outcome.input, outcome.grid, outcome.axis, samples, command,
+                                     outcome.format, session.threads(), session.memory_limit());
+  session.note(fmt::format("grid {} x {} x {}, about {} to hold", grid->dims.x, grid->dims.y,
+                           grid->dims.z, readable_bytes(outcome.estimate.total())));
+  if (session.memory_limit() > 0 && outcome.estimate.total() > session.memory_limit() &&
+      !command.dry_run) {
+    return fail(ErrorCode::kLimit,
+                "a grid of {} x {} x {} voxels of this mesh takes about {}, the limit is {} "
+                "(--memory-limit)",
+                grid->dims.x, grid->dims.y, grid->dims.z, readable_bytes(outcome.estimate.total()),
+                readable_bytes(session.memory_limit()));
+  }
+  if (!command.dry_run) {
+    if (auto done = voxelize_and_write(command, outcome, session); !done) return done;
+  }
+  session.end_progress();
+  return print_reports(command, outcome, session);
+}
+
+}  // namespace strata::apps

@@ -1,0 +1,297 @@
+#include "apps/strata/voxelize_report.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "apps/session/json_writer.h"
+#include "apps/session/process_memory.h"
+#include "apps/strata/choice_words.h"
+#include "core/printable.h"
+
+namespace strata::apps {
+namespace {
+
+std::uint64_t column_count(const VoxelizeOutcome& outcome) {
+  const AxisFrame frame(outcome.axis);
+  return static_cast<std::uint64_t>(outcome.grid.dims[frame.u]) *
+         static_cast<std::uint64_t>(outcome.grid.dims[frame.v]);
+}
+
+double voxel_volume(const VoxelGrid& grid) {
+  return grid.voxel_size.x * grid.voxel_size.y * grid.voxel_size.z;
+}
+
+/// Columns with n crossings, n = 0 .. 64, the last one 64 and more; without trailing zeros.
+std::vector<std::uint64_t> depth_histogram(const VoxelizeOutcome& outcome) {
+  const auto& counts = outcome.report.depth_histogram;
+  std::vector<std::uint64_t> result(counts.begin(), counts.end());
+  const std::uint64_t covered = std::accumulate(result.begin() + 1, result.end(), std::uint64_t{0});
+  const std::uint64_t columns = column_count(outcome);
+  result[0] = columns > covered ? columns - covered : 0;
+  while (result.size() > 1 && result.back() == 0) result.pop_back();
+  return result;
+}
+
+/// 1234567 as 1 234 567.
+std::string grouped(std::uint64_t number) {
+  std::string text = std::to_string(number);
+  for (std::size_t place = text.size(); place > 3;) {
+    place -= 3;
+    text.insert(place, " ");
+  }
+  return text;
+}
+
+void write_input(JsonWriter& json, const MeshInput& input) {
+  json.key("input").begin_object();
+  std::uint64_t triangles = 0, vertices = 0;
+  for (const InputFacts& file : input.files) {
+    triangles += file.stats.triangles;
+    vertices += file.stats.vertices;
+  }
+  json.member("triangles", triangles);
+  json.member("vertices", vertices);
+  json.member("closed", input.closed);
+  if (!input.tree) {  // of the result of a scene they are not known
+    json.member("area", input.area);
+    json.member("volume", input.volume);
+  }
+  json.key("bounds").begin_object();
+  json.member("low", input.bounds.low);
+  json.member("high", input.bounds.high);
+  json.end_object();
+  json.key("files").begin_array();
+  for (const InputFacts& file : input.files) {
+    json.begin_object();
+    json.member("path", file.path);
+    json.member("format", file.stats.format);
+    json.member("bytes", file.stats.bytes);
+    json.member("vertices", file.stats.vertices);
+    json.member("triangles", file.stats.triangles);
+    json.member("closed", file.closed);
+    json.member("unbalanced_edges", file.unbalanced_edges);
+    if (!file.is_scene) {
+      json.member("faces", file.stats.faces);
+      json.member("dropped_faces", file.stats.dropped_faces());
+      json.member("zero_area_faces", file.zero_area_faces);
+      json.member("turned_around", file.turned_around);
+      json.member("turned_parts", file.orientation.turned_parts);
+      json.member("turned_triangles", file.orientation.turned_triangles);
+      json.member("double_faces", file.orientation.double_faces);
+      json.member("rule", word_of(kRuleWords, file.rule));
+      json.member("area", file.area);
+      json.member("volume", file.volume);
+    }
+    json.end_object();
+  }
+  json.end_array();
+  json.end_object();
+}
+
+void write_results(JsonWriter& json, const VoxelizeCommand& command,
+                   const VoxelizeOutcome& outcome) {
+  const VoxelizeReport& report = outcome.report;
+  if (!outcome.measured) return;
+  json.key("voxels").begin_object();
+  json.member("solid", report.solid_voxels);
+  json.member("volume", static_cast<double>(report.solid_voxels) * voxel_volume(outcome.grid));
+  json.member("area_estimate", outcome.area_estimate);
+  json.member("intervals", report.intervals);
+  if (command.checksum) json.member("checksum", fmt::format("{:016x}", report.checksum));
+  json.end_object();
+
+  json.key("lost_walls").begin_object();
+  json.member("count", outcome.lost_walls.count);
+  json.key("largest").begin_array();
+  for (const LostWall& wall : outcome.lost_walls.largest) {
+    json.begin_object();
+    json.member("axis", word_of(kAxisWords, wall.axis));
+    json.member("thickness", wall.thickness);
+    json.member("low", wall.low);
+    json.member("high", wall.high);
+    json.end_object();
+  }
+  json.end_array();
+  json.end_object();
+
+  json.key("lists").begin_object();
+  json.member("crossings", report.crossings);
+  json.member("columns", column_count(outcome));
+  json.member("max_depth", report.max_depth_complexity);
+  json.member("unbalanced_columns", report.unbalanced_columns);
+  json.member("negative_columns", report.negative_columns);
+  json.member("rebuilt_tiles", report.rebuilt_tiles);
+  json.key("depth_histogram").begin_array();
+  for (const std::uint64_t count : depth_histogram(outcome)) json.value(count);
+  json.end_array();
+  json.end_object();
+}
+
+/// The solids that have voxels.
+void write_ids(JsonWriter& json, const VoxelizeOutcome& outcome) {
+  json.key("ids").begin_array();
+  for (std::size_t solid = 0; solid < outcome.id_voxels.size(); ++solid) {
+    if (outcome.id_voxels[solid] == 0) continue;
+    json.begin_object();
+    json.member("id", solid + 1);
+    json.member("solid", solid);
+    json.member("name", outcome.input.scene->solids()[solid].name);
+    json.member("voxels", outcome.id_voxels[solid]);
+    json.end_object();
+  }
+  json.end_array();
+}
+
+}  // namespace
+
+std::string triple(const glm::dvec3& v) {
+  return fmt::format("({:.6g}, {:.6g}, {:.6g})", v.x, v.y, v.z);
+}
+
+std::string voxelize_text(const VoxelizeCommand& command, const VoxelizeOutcome& outcome,
+                          const Session& session) {
+  std::string text;
+  const auto line = [&](std::string_view topic, const std::string& rest) {
+    text += fmt::format("{:<9} {}\n", topic, rest);
+  };
+  for (const InputFacts& file : outcome.input.files) {
+    line("input",
+         fmt::format("{}: {} triangles, {} vertices, {}{}", printable(file.path),
+                     grouped(file.stats.triangles), grouped(file.stats.vertices),
+                     file.closed ? "closed" : "open", file.turned_around ? ", turned around" : ""));
+  }
+  const std::string bounds =
+      fmt::format("{} to {}", triple(outcome.input.bounds.low), triple(outcome.input.bounds.high));
+  if (outcome.input.tree) {
+    line("scene", bounds);
+  } else {
+    line("mesh", fmt::format("{}, area {:.6g}, volume {:.6g}", bounds, outcome.input.area,
+                             outcome.input.volume));
+  }
+  const VoxelGrid& grid = outcome.grid;
+  const glm::dvec3 s = grid.voxel_size;
+  line("grid",
+       fmt::format("{} x {} x {} voxels of {}, origin {}, rays along {}", grid.dims.x, grid.dims.y,
+                   grid.dims.z, s.x == s.y && s.y == s.z ? fmt::format("{:.6g}", s.x) : triple(s),
+                   triple(grid.origin), word_of(kAxisWords, outcome.axis)));
+  if (outcome.measured) {
+    const VoxelizeReport& report = outcome.report;
+    const double cells =
+        static_cast<double>(column_count(outcome)) * grid.dims[AxisFrame(outcome.axis).w];
+    const auto solid = static_cast<double>(report.solid_voxels);
+    line(!command.surface ? "solid"
+         : command.solid  ? "both"
+                          : "surface",
+         fmt::format("{} voxels ({:.4g} %), volume {:.6g}, area about {:.3g}, in {} intervals",
+                     grouped(report.solid_voxels), 100 * solid / cells, solid * voxel_volume(grid),
+                     outcome.area_estimate, grouped(report.intervals)));
+    if (command.checksum) line("checksum", fmt::format("{:016x}", report.checksum));
+    line("lists", fmt::format("{} crossings, at most {} in a column", grouped(report.crossings),
+                              report.max_depth_complexity));
+    std::string depths;
+    const auto histogram = depth_histogram(outcome);
+    for (std::size_t n = 0; n < histogram.size(); ++n) {
+      if (histogram[n] == 0) continue;
+      depths += fmt::format("{}{}{}: {}", depths.empty() ? "" : ", ", n, n == 64 ? "+" : "",
+                            grouped(histogram[n]));
+    }
+    line("depth", "columns by crossings " + depths);
+    if (report.unbalanced_columns > 0) {
+      line("holes", fmt::format("{} columns are entered and left unequally often",
+                                grouped(report.unbalanced_columns)));
+    }
+    line("time",
+         fmt::format("{:.1f} ms: read {:.1f}, check {:.1f}, lists {:.1f}, intervals {:.1f}, "
+                     "write {:.1f}",
+                     session.milliseconds(), outcome.input.read_ms, outcome.input.diagnose_ms,
+                     report.lists_ms, report.intervals_ms, outcome.write_ms));
+    line("memory", fmt::format("{} at most", readable_bytes(peak_memory_bytes())));
+  } else {
+    line("memory", fmt::format("about {} would be held, the limit is {}",
+                               readable_bytes(outcome.estimate.total()),
+                               readable_bytes(session.memory_limit())));
+  }
+  if (outcome.output_bytes) {
+    line("output", fmt::format("{}: {}, {} bytes", command.output, outcome.format,
+                               grouped(*outcome.output_bytes)));
+  }
+  return text;
+}
+
+std::string voxelize_json(const VoxelizeCommand& command, const VoxelizeOutcome& outcome,
+                          const Session& session) {
+  JsonWriter json;
+  json.begin_object();
+  json.member("strata", STRATA_VERSION);
+  json.member("command", "voxelize");
+  write_input(json, outcome.input);
+
+  json.key("grid").begin_object();
+  json.member("dims", outcome.grid.dims);
+  json.member("origin", outcome.grid.origin);
+  json.member("voxel_size", outcome.grid.voxel_size);
+  json.end_object();
+
+  json.key("options").begin_object();
+  json.member("solid", command.solid);
+  json.key("surface");
+  if (command.surface) {
+    json.value(word_of(kSurfaceKindWords, command.surface_kind));
+  } else {
+    json.null();
+  }
+  json.member("rule", word_of(kRuleWords, command.rule));
+  json.member("open", word_of(kOpenModeWords, command.open));
+  json.member("axis", word_of(kAxisWords, outcome.axis));
+  json.member("store", word_of(kStoreWords, command.store));
+  json.member("offsets", word_of(kOffsetWords, command.offsets));
+  json.member("threads", session.threads());
+  json.end_object();
+
+  write_results(json, command, outcome);
+  if (command.ids && outcome.measured) write_ids(json, outcome);
+
+  json.key("output");
+  if (command.output.empty() || command.dry_run) {
+    json.null();
+  } else {
+    json.begin_object();
+    json.member("path", command.output);
+    json.member("format", outcome.format);
+    json.key("bytes");
+    if (outcome.output_bytes) {
+      json.value(*outcome.output_bytes);
+    } else {
+      json.null();
+    }
+    json.end_object();
+  }
+
+  json.key("timings_ms").begin_object();
+  json.member("read", outcome.input.read_ms);
+  json.member("check", outcome.input.diagnose_ms);
+  json.member("lists", outcome.report.lists_ms);
+  json.member("intervals", outcome.report.intervals_ms);
+  json.member("write", outcome.write_ms);
+  json.member("total", session.milliseconds());
+  json.end_object();
+
+  json.key("memory").begin_object();
+  json.member("peak_bytes", peak_memory_bytes());
+  json.member("estimated_bytes", outcome.estimate.total());
+  json.member("limit_bytes", session.memory_limit());
+  json.end_object();
+
+  json.key("warnings").begin_array();
+  for (const Warning& warning : session.warnings()) {
+    json.begin_object();
+    json.member("code", warning.code);
+    json.member("message", warning.message);
+    json.end_object();
+  }
+  json.end_array();
+  json.end_object();
+  return json.take();
+}
+
+}  // namespace strata::apps

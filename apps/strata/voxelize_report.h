@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/strata/commands.h"
+#include "apps/strata/memory_estimate.h"
+#include "apps/strata/mesh_input.h"
+#include "apps/strata/session.h"
+#include "strata/core/grid.h"
+#include "strata/voxelize/voxelize.h"
+#include "voxelize/open/lost_walls.h"
+
+namespace strata::apps {
+
+/// All that `strata voxelize` can tell of a run.
+struct VoxelizeOutcome {
+  MeshInput input;
+  VoxelGrid grid;
+  Axis axis = Axis::kZ;
+  MemoryEstimate estimate;
+  VoxelizeReport report;
+  bool measured = false;  ///< the report's statistics are filled
+  LostWalls lost_walls;
+  double area_estimate = 0.0;  ///< of the set's boundary, square world units
+  std::string format;          ///< of the output; empty: none
+  std::optional<std::uint64_t> output_bytes;
+  std::vector<std::uint64_t> id_voxels;  ///< of solid n of the scene, with --ids
+  double write_ms = 0.0;
+};
+
+/// "(1, 2.5, 3)"
+[[nodiscard]] std::string triple(const glm::dvec3& v);
+
+/// For people: a line a topic.
+[[nodiscard]] std::string voxelize_text(const VoxelizeCommand& command,
+                                        const VoxelizeOutcome& outcome, const Session& session);
+
+/// For programs, as docs/json.md says.
+[[nodiscard]] std::string voxelize_json(const VoxelizeCommand& command,
+                                        const VoxelizeOutcome& outcome, const Session& session);
+
+}  // namespace strata::apps

@@ -1,0 +1,207 @@
+// strata-verify: is what Strata makes of a tree what CGAL's exact Booleans make of it? Exit codes
+// are those of ErrorCode; 7 says no.
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <cstdio>
+#include <exception>
+#include <new>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "apps/session/json_writer.h"
+#include "apps/strata/csg_scene.h"
+#include "apps/strata/file_conflicts.h"
+#include "apps/strata/session.h"
+#include "apps/verify/comparison.h"
+
+namespace strata::apps {
+namespace {
+
+struct Words {
+  CsgCommand command;
+  std::string against, json;
+  bool has_json = false;
+  VerifyOptions options;
+};
+
+void define(CLI::App& app, Words& words) {
+  app.set_version_flag("--version", "strata-verify " STRATA_VERSION);
+  app.add_option("input", words.command.input.files, "a scene (.csg, .scad) or meshes")->required();
+  app.add_option("--expr", words.command.expression,
+                 "Boolean expression over the inputs, as for strata csg");
+  app.add_option("--against", words.against,
+                 "CGAL evaluates this scene or mesh instead: are the two one solid?");
+  app.add_option("--resolution", words.options.resolution,
+                 "voxels along the longest side of the grid that is compared whole")
+      ->check(CLI::Range(1, 1024))
+      ->capture_default_str();
+  app.add_option("--points", words.options.points, "random points to compare")
+      ->check(CLI::Range(0, 100'000'000))
+      ->capture_default_str();
+  app.add_option("--seed", words.options.seed, "of the random points")->capture_default_str();
+  app.add_option("--threads", words.command.common.threads, "of Strata; CGAL has one")
+      ->check(CLI::Range(0, 1024));
+  app.add_flag("-q,--quiet", words.command.common.quiet, "errors only");
+  app.add_flag("--strict", words.command.common.strict, "warnings are errors");
+  app.add_option("--json", words.json, "write a report there, - is standard output")
+      ->expected(0, 1)
+      ->default_str("-");
+  app.footer(
+      "Compares volume, area, and inside or outside at voxel centres and random points. "
+      "Differences\n"
+      "within the bounds of the method (area * length of a voxel; centres within 1/256 voxel of a\n"
+      "surface) are none. Exit code 0: they agree, 7: they do not, 5: CGAL cannot take a solid.");
+}
+
+std::string size_line(const char* name, const SizeCheck& check) {
+  return fmt::format("{:<8} {:>16.9g}  CGAL {:>16.9g}  difference {:.3g}, bound {:.3g}{}\n", name,
+                     check.lists, check.exact, check.difference(), check.bound,
+                     check.within() ? "" : "  OUTSIDE");
+}
+
+std::string point_lines(const char* name, const PointCheck& check) {
+  std::string text = fmt::format(
+      "{:<8} {} compared, {} inside; {} on the surface, {} differ within the snap, {} wrong{}\n",
+      name, check.compared, check.inside, check.boundary, check.near, check.wrong,
+      check.wrong == 0 ? "" : "  OUTSIDE");
+  for (const auto& example : check.examples) {
+    text += fmt::format("         {}, {}, {} is {} by CGAL\n", example.point.x, example.point.y,
+                        example.point.z, example.inside ? "inside" : "outside");
+  }
+  return text;
+}
+
+void write(JsonWriter& json, const char* name, const SizeCheck& check) {
+  json.key(name).begin_object();
+  json.member("lists", check.lists);
+  json.member("exact", check.exact);
+  json.member("difference", check.difference());
+  json.member("bound", check.bound);
+  json.member("within", check.within());
+  json.end_object();
+}
+
+void write(JsonWriter& json, const char* name, const PointCheck& check) {
+  json.key(name).begin_object();
+  json.member("compared", check.compared);
+  json.member("inside", check.inside);
+  json.member("boundary", check.boundary);
+  json.member("near", check.near);
+  json.member("wrong", check.wrong);
+  json.key("examples").begin_array();
+  for (const auto& example : check.examples) {
+    json.begin_object();
+    json.member("point", example.point);
+    json.member("inside", example.inside);
+    json.end_object();
+  }
+  json.end_array();
+  json.end_object();
+}
+
+std::string report(const Verification& found, double milliseconds) {
+  JsonWriter json;
+  json.begin_object();
+  json.member("agrees", found.agrees());
+  write(json, "volume", found.volume);
+  write(json, "area", found.area);
+  write(json, "voxels", found.voxels);
+  write(json, "points", found.points);
+  json.key("exact").begin_object();
+  json.member("solids", found.exact.solids);
+  json.member("corefinements", found.exact.corefinements);
+  json.member("nef_operations", found.exact.nef_operations);
+  json.member("triangles", found.exact.triangles);
+  json.end_object();
+  json.member("milliseconds", milliseconds);
+  json.end_object();
+  return json.take();
+}
+
+Result<void> run(const Words& words, Session& session) {
+  session.configure(words.command.common);
+  if (words.has_json) {
+    std::vector<FileUse> read = inputs_of(words.command.input);
+    if (!words.against.empty()) read.push_back({"--against", words.against});
+    const std::vector<FileUse> written{{"--json", words.json}};
+    if (auto kept = check_files(read, written); !kept) return kept;
+    session.set_outputs(written);
+  }
+  const auto scene = load_scene(words.command, session);
+  if (!scene) return tl::unexpected(scene.error());
+  std::optional<csg::Scene> other;
+  if (!words.against.empty()) {
+    CsgCommand command = words.command;
+    command.input.files = {words.against};
+    command.expression.clear();
+    auto loaded = load_scene(command, session);
+    if (!loaded) return tl::unexpected(loaded.error());
+    other = *std::move(loaded);
+  }
+  if (auto strict = session.check_strict(); !strict) return strict;
+  const Execution execution = session.execution("verifying", 1.0);
+  const auto found =
+      verify(scene->tree, other ? other->tree : scene->tree, words.options, execution);
+  session.end_progress();
+  if (!found) return tl::unexpected(found.error());
+  if (words.has_json) {
+    auto printed = print_report(report(*found, session.milliseconds()), words.json, false);
+    if (!printed) return printed;
+  }
+  if (!words.command.common.quiet && !(words.has_json && words.json == "-")) {
+    const std::string text = size_line("volume", found->volume) + size_line("area", found->area) +
+                             point_lines("voxels", found->voxels) +
+                             point_lines("points", found->points);
+    auto printed = write_text(STDOUT_FILENO, text, "standard output");
+    if (!printed) return printed;
+  }
+  if (!found->agrees()) {
+    return fail(ErrorCode::kVerification,
+                "Strata and CGAL differ by more than the method explains");
+  }
+  return {};
+}
+
+int verify_main(int argc, char** argv) {
+  Session session(Session::Clock::now());
+  CLI::App app("Compares Boolean trees with CGAL's exact Booleans", "strata-verify");
+  Words words;
+  define(app, words);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : static_cast<int>(ErrorCode::kUsage);
+  }
+  words.has_json = app.count("--json") > 0;
+  if (words.has_json && words.json.empty()) words.json = "-";
+  Result<void> result;
+  try {
+    result = run(words, session);
+  } catch (const std::bad_alloc&) {
+    result = fail(ErrorCode::kLimit, "out of memory");
+  }
+  session.end_progress();
+  if (result) return 0;
+  const ErrorCode code = session.interrupted() ? ErrorCode::kCancelled : result.error().code;
+  session.complain({code, result.error().message});
+  return static_cast<int>(code);
+}
+
+}  // namespace
+}  // namespace strata::apps
+
+int main(int argc, char** argv) {
+  try {
+    return strata::apps::verify_main(argc, argv);
+  } catch (const std::exception& failure) {
+    std::fprintf(stderr, "strata-verify: error: %s\n", failure.what());
+    return static_cast<int>(strata::ErrorCode::kInternal);
+  }
+}

@@ -1,0 +1,361 @@
+// strata-view: the window of Strata. `strata view` becomes this program.
+
+#include <GLFW/glfw3.h>
+#include <backends/imgui_impl_glfw.h>
+#include <backends/imgui_impl_opengl3.h>
+#include <fmt/format.h>
+#include <imgui.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <filesystem>
+#include <new>
+#include <optional>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include "apps/strata/session.h"
+#include "apps/view/gl/canvas.h"
+#include "apps/view/gl/panels.h"
+#include "apps/view/script_runner.h"
+#include "apps/view/view_options.h"
+#include "apps/view/viewer.h"
+#include "core/atomic_file.h"
+#include "gl/window.h"
+
+namespace strata::view {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// GLFW's name of a key as Viewer::key() has it; empty for those that mean nothing.
+std::string key_name(int key, int modifiers) {
+  std::string name;
+  if ((modifiers & GLFW_MOD_CONTROL) != 0) name += "ctrl+";
+  if ((modifiers & GLFW_MOD_ALT) != 0) name += "alt+";
+  if ((modifiers & GLFW_MOD_SHIFT) != 0) name += "shift+";
+  if (key >= GLFW_KEY_A && key <= GLFW_KEY_Z)
+    return name + static_cast<char>('a' + key - GLFW_KEY_A);
+  if (key >= GLFW_KEY_0 && key <= GLFW_KEY_9)
+    return name + static_cast<char>('0' + key - GLFW_KEY_0);
+  if (key >= GLFW_KEY_KP_0 && key <= GLFW_KEY_KP_9) {
+    return name + static_cast<char>('0' + key - GLFW_KEY_KP_0);
+  }
+  if (key >= GLFW_KEY_F1 && key <= GLFW_KEY_F12)
+    return fmt::format("{}f{}", name, key - GLFW_KEY_F1 + 1);
+  constexpr std::pair<int, const char*> kOthers[] = {
+      {GLFW_KEY_LEFT, "left"},     {GLFW_KEY_RIGHT, "right"},    {GLFW_KEY_UP, "up"},
+      {GLFW_KEY_DOWN, "down"},     {GLFW_KEY_HOME, "home"},      {GLFW_KEY_TAB, "tab"},
+      {GLFW_KEY_ESCAPE, "escape"}, {GLFW_KEY_LEFT_BRACKET, "["}, {GLFW_KEY_RIGHT_BRACKET, "]"},
+      {GLFW_KEY_EQUAL, "="},       {GLFW_KEY_MINUS, "-"},        {GLFW_KEY_KP_ADD, "+"},
+      {GLFW_KEY_KP_SUBTRACT, "-"}};
+  for (const auto& [code, word] : kOthers) {
+    if (code == key) return name + word;
+  }
+  return {};
+}
+
+/// Says it on standard error; what was said last is not said again.
+void complain(const Error& error) {
+  static std::string last;
+  if (error.message == last) return;
+  last = error.message;
+  std::fprintf(stderr, "strata view: error: %s\n", error.message.c_str());
+}
+
+/// The window, what is in it, and its loop.
+class Program final : public Stage {
+ public:
+  Program(ViewOptions options, std::unique_ptr<gl::Window> window, ScriptRunner script)
+      : options_(std::move(options)), window_(std::move(window)), script_(std::move(script)) {}
+
+  Result<void> run() {
+    start();
+    auto result = loop();
+    ImGui_ImplOpenGL3_Shutdown();
+    ImGui_ImplGlfw_Shutdown();
+    ImGui::DestroyContext();
+    canvas_.reset();
+    leave_soon(result);
+    if (auto checked = window_->check(); !checked && result) result = std::move(checked);
+    if (!result) return result;
+    // Nothing was ever shown: that is how the program ends, too.
+    if (viewer_->model() == nullptr && !viewer_->load_error().empty()) {
+      return tl::unexpected(Error{viewer_->load_error_code(), viewer_->load_error()});
+    }
+    return {};
+  }
+
+  /// A load that does not stop in time is left to the system; it has nothing to put in order.
+  void leave_soon(const Result<void>& result) {
+    viewer_->cancel_load();
+    for (int i = 0; i < 50 && viewer_->loading(); ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    if (!viewer_->loading()) return;
+    if (!result) complain(result.error());
+    remove_temporary_files();
+    std::_Exit(result ? 0 : static_cast<int>(result.error().code));
+  }
+
+  // --- Stage
+  void resize(const glm::ivec2& size) override {
+    glfwSetWindowSize(window_->glfw(), size.x, size.y);
+  }
+  Result<void> screenshot(const std::string& path, bool picture_only) override {
+    // Drawn again: what is in the back buffer after a swap is not defined.
+    draw(picture_only);
+    const csg::Picture picture =
+        read_back(picture_only ? area_ : Area{{0, 0}, window_size_}, window_size_);
+    return csg::write_png(picture, path);
+  }
+  void print(const std::string& line) override {
+    std::printf("%s\n", line.c_str());
+    std::fflush(stdout);
+  }
+
+ private:
+  void start() {
+    viewer_.emplace(options_, make_renderer(options_.command.backend),
+                    [] { glfwPostEmptyEvent(); });
+    canvas_.emplace();
+    canvas_->warm_up();
+    GLFWwindow* glfw = window_->glfw();
+    glfwSetWindowUserPointer(glfw, this);
+    glfwSetMouseButtonCallback(glfw, [](GLFWwindow* w, int button, int action, int modifiers) {
+      self(w).on_button(button, action, modifiers);
+    });
+    glfwSetCursorPosCallback(glfw, [](GLFWwindow* w, double, double) {
+      Program& program = self(w);
+      // What a drag changes shows with the next picture.
+      if (!program.viewer_->dragging()) return program.touch();
+      program.viewer_->mouse_move(program.mouse());
+    });
+    glfwSetScrollCallback(glfw, [](GLFWwindow* w, double, double y) {
+      Program& program = self(w);
+      program.touch();
+      if (!ImGui::GetIO().WantCaptureMouse) program.viewer_->wheel(y, program.mouse());
+    });
+    glfwSetKeyCallback(glfw, [](GLFWwindow* w, int key, int, int action, int modifiers) {
+      self(w).touch();
+      if (action == GLFW_RELEASE || ImGui::GetIO().WantTextInput) return;
+      self(w).viewer_->key(key_name(key, modifiers));
+    });
+    glfwSetCharCallback(glfw, [](GLFWwindow* w, unsigned) { self(w).touch(); });
+    glfwSetCursorEnterCallback(glfw, [](GLFWwindow* w, int) { self(w).touch(); });
+    glfwSetWindowRefreshCallback(glfw, [](GLFWwindow* w) { self(w).touch(); });
+    glfwSetFramebufferSizeCallback(glfw, [](GLFWwindow* w, int, int) { self(w).touch(); });
+    IMGUI_CHECKVERSION();
+    ImGui::CreateContext();
+    float scale = 1, scale_y = 1;
+    glfwGetWindowContentScale(glfw, &scale, &scale_y);
+    panels_.emplace(std::max(1.0f, scale), short_name(window_->info().renderer));
+    ImGui_ImplGlfw_InitForOpenGL(glfw, true);  // calls the callbacks from above, too
+    ImGui_ImplOpenGL3_Init("#version 450 core");
+  }
+
+  Result<void> loop() {
+    while (!window_->should_close() && !viewer_->wants_quit) {
+      const bool hurried = viewer_->busy() || !script_.ended() || finishing();
+      glfwWaitEventsTimeout(hurried ? 0.008 : options_.watch ? 0.1 : 0.5);
+      lay_out();
+      viewer_->tick();
+      tell_load_error();
+      if (draw_due()) {
+        const auto begin = Clock::now();
+        draw(false);
+        window_->swap_buffers();
+        drawn_at_ = Clock::now();
+        const std::chrono::duration<double, std::milli> took = drawn_at_ - begin;
+        viewer_->presented(took.count());
+        if (auto checked = window_->check(); !checked) return checked;
+      }
+      if (std::exchange(viewer_->wants_screenshot, false)) keep_screenshot();
+      const std::size_t before = script_.position();
+      if (auto done = script_.step(*viewer_, *this); !done) return done;
+      if (script_.position() != before) touch();
+      if (script_.quit()) return {};
+      if (finishing() && viewer_->settled() && ++settled_turns_ > 2) {
+        return screenshot(options_.screenshot, false);
+      }
+    }
+    return {};
+  }
+
+  /// What the window says of a scene that cannot be read, for who does not look at it.
+  void tell_load_error() {
+    if (viewer_->loads() == loads_told_) return;
+    loads_told_ = viewer_->loads();
+    if (viewer_->load_error().empty() || viewer_->load_error_code() == ErrorCode::kCancelled)
+      return;
+    complain({viewer_->load_error_code(), viewer_->load_error()});
+  }
+
+  /// Something that panels show may have changed. They take some turns to follow: what is below
+  /// the mouse is known in the next one.
+  void touch() { turns_to_draw_ = 3; }
+
+  /// Drawing the window costs a software renderer as much as a coarse picture: it is done when
+  /// there is something new.
+  [[nodiscard]] bool draw_due() {
+    const bool whole = viewer_->settled();
+    if (whole != was_settled_) turns_to_draw_ = std::max(turns_to_draw_, 1);
+    was_settled_ = whole;
+    constexpr std::chrono::milliseconds kProgress{100}, kAtLeast{1000};
+    const auto since = Clock::now() - drawn_at_;
+    if ((viewer_->loading() && since > kProgress) || since > kAtLeast) return true;
+    if (viewer_->frame_serial() != uploaded_) return true;
+    if (turns_to_draw_ == 0) return false;
+    --turns_to_draw_;
+    return true;
+  }
+
+  /// All commands are done, and only the last screenshot is left.
+  [[nodiscard]] bool finishing() const { return script_.ended() && !options_.screenshot.empty(); }
+
+  void lay_out() {
+    const gl::Window::Size size = window_->framebuffer_size();
+    window_size_ = {size.width, size.height};
+    if (size.width < 1 || size.height < 1) return;  // minimized
+    area_ = panels_->picture_area(window_size_, viewer_->show_panels);
+    viewer_->set_viewport(area_.size);
+  }
+
+  void draw(bool picture_only) {
+    if (window_size_.x < 1 || window_size_.y < 1) return;
+    const Frame* frame = viewer_->frame();
+    if (frame != nullptr && viewer_->frame_serial() != uploaded_) {
+      canvas_->upload(frame->picture);
+      uploaded_ = viewer_->frame_serial();
+    }
+    const csg::ColourScheme* scheme = viewer_->picture_options().scheme;
+    if (scheme == nullptr) scheme = csg::colour_schemes().data();
+    Area shown = area_;
+    if (frame != nullptr && frame->wanted != area_.size) {
+      // The window has just changed its size: the old picture is as high as the new one will be.
+      shown.size.x = static_cast<int>(
+          std::lround(static_cast<double>(area_.size.y) * frame->wanted.x / frame->wanted.y));
+      shown.at.x += (area_.size.x - shown.size.x) / 2;
+    }
+    canvas_->draw(shown, window_size_, scheme->background);
+    if (picture_only) return;
+    ImGui_ImplOpenGL3_NewFrame();
+    ImGui_ImplGlfw_NewFrame();
+    ImGui::NewFrame();
+    panels_->draw(*viewer_, window_size_, area_);
+    ImGui::Render();
+    ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
+  }
+
+  void keep_screenshot() {
+    for (int number = 1; number < 10000; ++number) {
+      const std::string path = fmt::format("strata-view-{}.png", number);
+      std::error_code error;
+      if (std::filesystem::exists(path, error)) continue;
+      const auto done = screenshot(path, false);
+      panels_->tell(done ? "written: " + path : done.error().message);
+      if (!done) complain(done.error());
+      return;
+    }
+  }
+
+  void on_button(int button, int action, int modifiers) {
+    touch();
+    if (button > GLFW_MOUSE_BUTTON_MIDDLE) return;
+    const bool down = action == GLFW_PRESS;
+    if (down && ImGui::GetIO().WantCaptureMouse) return;
+    constexpr MouseButton kButtons[] = {MouseButton::kLeft, MouseButton::kRight,
+                                        MouseButton::kMiddle};
+    viewer_->mouse_button(kButtons[button], down, mouse(), (modifiers & GLFW_MOD_SHIFT) != 0,
+                          (modifiers & GLFW_MOD_CONTROL) != 0);
+  }
+
+  /// The cursor in pixels of the picture.
+  [[nodiscard]] glm::dvec2 mouse() const {
+    double x = 0, y = 0;
+    int width = 1, height = 1;
+    glfwGetCursorPos(window_->glfw(), &x, &y);
+    glfwGetWindowSize(window_->glfw(), &width, &height);
+    const glm::dvec2 dots = glm::dvec2(window_size_) / glm::dvec2(width, height);
+    return glm::dvec2(x, y) * dots - glm::dvec2(area_.at);
+  }
+  static Program& self(GLFWwindow* window) {
+    return *static_cast<Program*>(glfwGetWindowUserPointer(window));
+  }
+  /// `llvmpipe` of `llvmpipe (LLVM 15.0.6, 256 bits)`.
+  static std::string short_name(const std::string& renderer) {
+    return renderer.substr(0, renderer.find(" ("));
+  }
+
+  ViewOptions options_;
+  std::unique_ptr<gl::Window> window_;
+  ScriptRunner script_;
+  std::optional<Panels> panels_;
+  std::optional<Canvas> canvas_;
+  std::optional<Viewer> viewer_;  ///< last: its threads wake the window
+  glm::ivec2 window_size_{0};
+  Area area_;
+  std::uint64_t uploaded_ = 0, loads_told_ = 0;
+  int settled_turns_ = 0, turns_to_draw_ = 3;
+  bool was_settled_ = false;
+  Clock::time_point drawn_at_{};
+};
+
+Result<void> run(ViewOptions options) {
+  std::vector<ScriptCommand> commands;
+  if (!options.script.empty()) {
+    auto read = read_script(options.script);
+    if (!read) return tl::unexpected(read.error());
+    commands = *std::move(read);
+  }
+  if (auto kept = check_files(options, commands); !kept) return kept;
+  gl::WindowOptions wish;
+  const auto& files = options.command.input.files;
+  wish.title = std::filesystem::path(files.front()).filename().string() +
+               (files.size() > 1 ? " ... - Strata" : " - Strata");
+  wish.width = options.command.size.x, wish.height = options.command.size.y;
+  auto window = gl::Window::open(wish);
+  if (!window) {
+    Error error = std::move(window.error());
+    error.message += "; strata csg draws pictures without a window";
+    return tl::unexpected(std::move(error));
+  }
+  const std::string name = options.script == "-" ? "standard input" : options.script;
+  Program program(std::move(options), *std::move(window), {std::move(commands), name});
+  return program.run();
+}
+
+int view_main(int argc, char** argv) {
+  auto parsed = parse_view_options(argc, argv);
+  if (const auto* outcome = std::get_if<apps::ParseOutcome>(&parsed)) {
+    const bool shown = apps::write_text(outcome->to_stderr ? STDERR_FILENO : STDOUT_FILENO,
+                                        outcome->text, "standard output")
+                           .has_value();
+    return shown || outcome->exit_code != 0 ? outcome->exit_code
+                                            : static_cast<int>(ErrorCode::kOutput);
+  }
+  const Result<void> result = run(std::get<ViewOptions>(std::move(parsed)));
+  if (result) return 0;
+  complain(result.error());
+  return static_cast<int>(result.error().code);
+}
+
+}  // namespace
+}  // namespace strata::view
+
+int main(int argc, char** argv) {
+  try {
+    return strata::view::view_main(argc, argv);
+  } catch (const std::bad_alloc&) {
+    std::fprintf(stderr, "strata view: error: out of memory\n");
+    return static_cast<int>(strata::ErrorCode::kLimit);
+  } catch (const std::exception& failure) {
+    std::fprintf(stderr, "strata view: error: %s\n", failure.what());
+    return static_cast<int>(strata::ErrorCode::kInternal);
+  }
+}

@@ -1,0 +1,413 @@
+#include <algorithm>
+#include <atomic>
+#include <bit>
+#include <functional>
+#include <glm/geometric.hpp>
+#include <new>
+#include <numeric>
+
+#include "csg/picture/ghosts.h"
+#include "csg/picture/shade.h"
+#include "csg/program.h"
+#include "csg/surface/depth_range.h"
+#include "csg/surface/surface_source.h"
+#include "csg/surface/tile_surface.h"
+#include "strata/csg/picture/picture.h"
+
+namespace strata::csg {
+namespace {
+
+/// Solids with more triangles than this are prepared one after another, each by all threads.
+constexpr std::size_t kLargePart = 20000;
+
+/// Which solids may be met in which tile.
+struct TileSolids {
+  std::vector<std::uint32_t> offsets, solids;
+
+  void build(std::span<const ViewPart> parts, int tiles_u, int tiles_v) {
+    offsets.assign(static_cast<std::size_t>(tiles_u) * static_cast<std::size_t>(tiles_v) + 1, 0);
+    const auto for_each = [&](auto&& body) {
+      for (std::uint32_t solid = 0; solid < parts.size(); ++solid) {
+        const PixelRect& rect = parts[solid].rect;
+        if (rect.empty()) continue;
+        for (int tv = rect.v0 / kTileSide; tv <= (rect.v1 - 1) / kTileSide; ++tv) {
+          for (int tu = rect.u0 / kTileSide; tu <= (rect.u1 - 1) / kTileSide; ++tu) {
+            body(static_cast<std::size_t>(tv) * static_cast<std::size_t>(tiles_u) +
+                     static_cast<std::size_t>(tu),
+                 solid);
+          }
+        }
+      }
+    };
+    for_each([&](std::size_t tile, std::uint32_t) { ++offsets[tile + 1]; });
+    std::partial_sum(offsets.begin(), offsets.end(), offsets.begin());
+    solids.resize(offsets.back());
+    std::vector<std::uint32_t> cursor(offsets.begin(), offsets.end() - 1);
+    for_each([&](std::size_t tile, std::uint32_t solid) { solids[cursor[tile]++] = solid; });
+  }
+  [[nodiscard]] std::span<const std::uint32_t> at(std::size_t tile) const {
+    return std::span(solids).subspan(offsets[tile], offsets[tile + 1] - offsets[tile]);
+  }
+};
+
+/// One tree of solids in one view.
+class Frame {
+ public:
+  Frame(const Program& program, const Geometry& geometry, double world_error)
+      : program_(&program), geometry_(&geometry), world_error_(world_error) {}
+
+  /// What is to be done with a tile's surfaces: pixels `rect` of the picture.
+  using OnTile = std::function<void(const SurfaceImage& tile, const PixelRect& rect)>;
+
+  /// Finds all surfaces. With `on_tile` they are handed to it, from any thread, and image() is not
+  /// kept: memory is slower than the search.
+  Result<void> draw(const View& view, const Execution& execution, const OnTile& on_tile = {}) {
+    view_ = view;
+    coincidence_ = Coincidence(view, world_error_);
+    tiles_u_ = (view.size.x + kTileSide - 1) / kTileSide;
+    tiles_v_ = (view.size.y + kTileSide - 1) / kTileSide;
+    const auto& parts = geometry_->parts();
+    view_parts_.clear();
+    view_parts_.resize(parts.size());
+    std::vector<std::uint32_t> small, large;
+    for (std::uint32_t solid = 0; solid < parts.size(); ++solid) {
+      if (program_->leaves[solid].parent == Program::kNone) continue;
+      (parts[solid].triangles.size() > kLargePart ? large : small).push_back(solid);
+    }
+    std::vector<Result<void>> failures(parts.size());
+    const auto prepare = [&](std::uint32_t solid, const Execution& how) {
+      auto part = view_part(parts[solid], view_, how);
+      if (part) {
+        view_parts_[solid] = std::move(*part);
+      } else {
+        failures[solid] = tl::unexpected(part.error());
+      }
+    };
+    constexpr std::size_t kAtOnce = 16;
+    Execution alone;
+    alone.threads = 1;
+    parallel_for(execution, (small.size() + kAtOnce - 1) / kAtOnce, [&](std::size_t chunk, int) {
+      const std::size_t end = std::min(small.size(), (chunk + 1) * kAtOnce);
+      for (std::size_t i = chunk * kAtOnce; i < end; ++i) prepare(small[i], alone);
+    });
+    for (const std::uint32_t solid : large) prepare(solid, execution);
+    for (const auto& failure : failures) {
+      if (!failure) return failure;
+    }
+    if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+    report_ = {};
+    solids_.build(view_parts_, tiles_u_, tiles_v_);
+    whole_ = false;
+    return find_all(execution, on_tile);
+  }
+
+  Result<void> moved(std::uint32_t solid, const Execution& execution) {
+    const PixelRect before = view_parts_[solid].rect;
+    auto part = view_part(geometry_->parts()[solid], view_, execution);
+    if (!part) return tl::unexpected(part.error());
+    view_parts_[solid] = std::move(*part);
+    const PixelRect after = view_parts_[solid].rect;
+    solids_.build(view_parts_, tiles_u_, tiles_v_);
+    if (!whole_ || source_ != nullptr) return find_all(execution, {});
+    std::vector<std::uint32_t> tiles;
+    for (int tv = 0; tv < tiles_v_; ++tv) {
+      for (int tu = 0; tu < tiles_u_; ++tu) {
+        const auto meets = [&](const PixelRect& rect) {
+          return !rect.empty() && rect.u0 < (tu + 1) * kTileSide && rect.u1 > tu * kTileSide &&
+                 rect.v0 < (tv + 1) * kTileSide && rect.v1 > tv * kTileSide;
+        };
+        if (meets(before) || meets(after)) {
+          tiles.push_back(static_cast<std::uint32_t>(tv * tiles_u_ + tu));
+        }
+      }
+    }
+    return find(tiles, execution, {});
+  }
+
+  /// Null: the surfaces are found here.
+  void set_source(SurfaceSource* source) { source_ = source; }
+  [[nodiscard]] bool has_source() const { return source_ != nullptr; }
+
+  [[nodiscard]] const SurfaceImage& image() const { return image_; }
+  [[nodiscard]] const View& view() const { return view_; }
+  [[nodiscard]] const DrawReport& report() const { return report_; }
+
+ private:
+  Result<void> find_all(const Execution& execution, const OnTile& on_tile) {
+    std::vector<std::uint32_t> tiles(static_cast<std::size_t>(tiles_u_ * tiles_v_));
+    std::iota(tiles.begin(), tiles.end(), 0u);
+    if (!on_tile) image_.resize(view_.size.x, view_.size.y);
+    if (source_ != nullptr && !on_tile) {
+      DrawReport elsewhere;
+      tiles.clear();
+      const FrameInput input{*program_, geometry_->parts(), view_parts_,
+                             view_,     coincidence_,       tiles_u_,
+                             tiles_v_,  solids_.offsets,    solids_.solids};
+      auto found = source_->find(input, image_, elsewhere, tiles, execution);
+      if (found) found = find(tiles, execution, {});
+      report_.fragments += elsewhere.fragments;
+      report_.resolved += elsewhere.resolved;
+      whole_ = found.has_value();
+      return found;
+    }
+    auto done = find(tiles, execution, on_tile);
+    whole_ = done.has_value() && !on_tile;
+    return done;
+  }
+
+  Result<void> find(std::span<const std::uint32_t> tiles, const Execution& execution,
+                    const OnTile& on_tile) {
+    const auto workers = static_cast<std::size_t>(execution.thread_count());
+    while (finders_.size() < workers) {
+      finders_.push_back(std::make_unique<TileFinder>(*program_, view_parts_, geometry_->parts(),
+                                                      view_, coincidence_));
+      tile_images_.emplace_back().resize(kTileSide, kTileSide);
+    }
+    for (const auto& finder : finders_) finder->reset_counts();
+    parallel_for(execution, tiles.size(), [&](std::size_t i, int worker) {
+      const auto tile = static_cast<int>(tiles[i]);
+      const int tile_u = tile % tiles_u_, tile_v = tile / tiles_u_;
+      const PixelRect rect{tile_u * kTileSide, tile_v * kTileSide,
+                           std::min(view_.size.x, (tile_u + 1) * kTileSide),
+                           std::min(view_.size.y, (tile_v + 1) * kTileSide)};
+      SurfacePart part{&image_};
+      if (on_tile) part = {&tile_images_[static_cast<std::size_t>(worker)], rect.u0, rect.v0};
+      finders_[static_cast<std::size_t>(worker)]->find(
+          tile_u, tile_v, solids_.at(static_cast<std::size_t>(tile)), part, execution.stop);
+      if (on_tile) on_tile(*part.image, rect);
+    });
+    report_.fragments = report_.resolved = 0;
+    for (const auto& finder : finders_) {
+      report_.fragments += finder->fragments();
+      report_.resolved += finder->resolved();
+    }
+    if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+    return {};
+  }
+
+  const Program* program_;
+  const Geometry* geometry_;
+  double world_error_;
+  View view_;
+  Coincidence coincidence_;
+  int tiles_u_ = 0, tiles_v_ = 0;
+  std::vector<ViewPart> view_parts_;
+  TileSolids solids_;
+  std::vector<std::unique_ptr<TileFinder>> finders_;
+  std::vector<SurfaceImage> tile_images_;  ///< of each worker
+  bool whole_ = false;                     ///< image_ shows all of view_
+  SurfaceSource* source_ = nullptr;
+  SurfaceImage image_;
+  DrawReport report_;
+};
+
+/// Samples of a picture that are drawn at once: memory stays bounded.
+constexpr std::int64_t kSamplesAtOnce = std::int64_t{1} << 22;
+
+/// The part of a view that begins at row `first` of the picture and has `rows` rows, each pixel
+/// `across` x `down` samples.
+View band_of(const View& view, int first, int rows, int across, int down) {
+  View band = view;
+  band.size = {view.size.x * across, rows * down};
+  // Rows of the matrix: u w, v w, depth w, w.
+  for (int column = 0; column < 4; ++column) {
+    glm::dvec4& m = band.image_from_world[column];
+    m.x *= across;
+    m.y = (m.y - first * m.w) * down;
+  }
+  return band;
+}
+
+}  // namespace
+
+struct Preview::Impl {
+  Impl(Tree t, std::span<const Ghost> given, double relative_precision, const Execution& execution)
+      : tree(std::move(t)),
+        opaque_root(take_translucent(tree, translucent)),
+        geometry(tree, execution),
+        program(compile(tree, opaque_root)),
+        error(geometry.world_error(tree, relative_precision)),
+        frame(program, geometry, error),
+        painter(tree, with_ghosts(given), geometry, error) {}
+
+  [[nodiscard]] Bounds box() const {
+    std::vector<Tree::NodeId> shown{tree.root()};
+    for (const Translucent& part : translucent) shown.push_back(part.node);
+    return picture_box(tree, geometry.boxes(), shown);
+  }
+  Result<View> view(const Camera& camera, const glm::ivec2& size, const Execution& execution) const;
+  std::span<const Translucent> with_ghosts(std::span<const Ghost> given) {
+    for (const Ghost& ghost : given) translucent.push_back({ghost.node, ghost.colour});
+    return translucent;
+  }
+
+  Result<const SurfaceImage*> draw(const View& view, const Execution& execution) {
+    if (auto done = frame.draw(view, execution); !done) return tl::unexpected(done.error());
+    return surfaces();
+  }
+  const SurfaceImage* surfaces() {
+    report = frame.report();
+    report_covers = false;
+    return &frame.image();
+  }
+
+  Result<Picture> picture(const Camera& camera, const glm::ivec2& size,
+                          const PictureOptions& options, const Execution& execution);
+
+  Tree tree;
+  std::vector<Translucent> translucent;
+  Tree::NodeId opaque_root;
+  Geometry geometry;
+  Program program;
+  double error;
+  Frame frame;
+  GhostPainter painter;
+  DrawReport report;
+  bool report_covers = false;  ///< report.covered is known
+};
+
+Result<View> Preview::Impl::view(const Camera& camera, const glm::ivec2& size,
+                                 const Execution& execution) const {
+  auto made = make_view(camera, size, box());
+  if (!made || !made->cut_short) return made;
+  const std::vector<Bounds> boxes = geometry.boxes();
+  Bounds seen = bounds(tree, tree.root(), boxes);
+  for (const Translucent& part : translucent) seen.include(bounds(tree, part.node, boxes));
+  const auto distances = seen_distances(geometry, *made, seen, execution);
+  // A face through the eye is cut off all the same: no depth would be left for all others.
+  constexpr double kLeastPart = 1.0 / (1 << 20);
+  if (!distances || distances->x < distances->y * kLeastPart) return made;
+  constexpr double kRoom = 1e-6;  // so that rounding clamps nothing
+  made->set_distances(distances->x * (1 - kRoom), distances->y * (1 + kRoom));
+  return made;
+}
+
+Result<Picture> Preview::Impl::picture(const Camera& camera, const glm::ivec2& size,
+                                       const PictureOptions& options, const Execution& execution) {
+  if (options.samples < 1 || options.samples > 64 ||
+      !std::has_single_bit(static_cast<unsigned>(options.samples))) {
+    return fail(ErrorCode::kUsage, "{} samples a pixel: 1, 2, 4, 8, 16, 32 or 64 can be had",
+                options.samples);
+  }
+  // As square a grid as can be.
+  const int bits = std::countr_zero(static_cast<unsigned>(options.samples));
+  const int across = 1 << ((bits + 1) / 2), down = 1 << (bits / 2);
+  const auto whole = view(camera, size, execution);
+  if (!whole) return tl::unexpected(whole.error());
+  if (size.x > kMaxPictureSide / across) {
+    return fail(ErrorCode::kUsage, "{} pixels of {} samples in a row: {} samples can be had",
+                size.x, across, kMaxPictureSide);
+  }
+  const ColourScheme& scheme =
+      options.scheme != nullptr ? *options.scheme : colour_schemes().front();
+  const Shader shader(tree, geometry, *whole, scheme);
+  const Rgba background = options.transparent_background ? Rgba(0) : Rgba(scheme.background, 255);
+  Picture result{size.x, size.y, {}};
+  const auto width = static_cast<std::size_t>(size.x);
+  result.pixels.resize(width * static_cast<std::size_t>(size.y));
+  // One row of tiles at least.
+  const std::int64_t samples_a_row = std::int64_t{size.x} * across * down;
+  const int rows_at_once = static_cast<int>(std::clamp<std::int64_t>(
+      kSamplesAtOnce / samples_a_row, std::max(1, kTileSide / down), size.y));
+  const bool direct =
+      options.samples == 1 && painter.empty() && !options.edges && !frame.has_source();
+  std::vector<Rgba> samples;
+  DrawReport total;
+  for (int first = 0; first < size.y; first += rows_at_once) {
+    const int rows = std::min(rows_at_once, size.y - first);
+    // Edges look one row down.
+    const int drawn = options.edges ? std::min(rows + 1, size.y - first) : rows;
+    Execution part = execution;
+    if (execution.progress) {
+      part.progress = [&](double done) {
+        execution.progress((first + done * rows) / static_cast<double>(size.y));
+      };
+    }
+    const View view = band_of(*whole, first, drawn, across, down);
+    const auto pixels = std::span(result.pixels)
+                            .subspan(static_cast<std::size_t>(first) * width,
+                                     static_cast<std::size_t>(rows) * width);
+    if (direct) {
+      std::atomic<std::uint64_t> covered{0};
+      const auto on_tile = [&](const SurfaceImage& tile, const PixelRect& rect) {
+        covered += shade_tile(tile, rect, shader, background, size.x, pixels);
+      };
+      if (auto done = frame.draw(view, part, on_tile); !done) return tl::unexpected(done.error());
+      total.fragments += frame.report().fragments;
+      total.resolved += frame.report().resolved;
+      total.covered += covered;
+      continue;
+    }
+    const auto image = draw(view, part);
+    if (!image) return tl::unexpected(image.error());
+    total.fragments += report.fragments;
+    total.resolved += report.resolved;
+    part.progress = {};
+    samples.resize((*image)->depth.size());
+    shade(**image, shader, Rgba(0), part, samples);
+    if (options.edges) draw_edges(**image, shader, across, down, part, samples);
+    if (!painter.empty()) {
+      if (auto done = painter.paint(view, **image, shader, part, samples); !done) {
+        return tl::unexpected(done.error());
+      }
+      total.fragments += painter.fragments();
+    }
+    total.covered += average(samples, across, down, background, part, size.x, pixels);
+  }
+  if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+  report = total;
+  report_covers = true;
+  return result;
+}
+
+Preview::Preview(Tree tree, std::vector<Ghost> ghosts, double relative_precision,
+                 const Execution& execution)
+    : impl_(std::make_unique<Impl>(std::move(tree), ghosts, relative_precision, execution)) {}
+Preview::~Preview() = default;
+Preview::Preview(Preview&&) noexcept = default;
+Preview& Preview::operator=(Preview&&) noexcept = default;
+
+Bounds Preview::box() const { return impl_->box(); }
+Result<View> Preview::view(const Camera& camera, const glm::ivec2& size,
+                           const Execution& execution) const {
+  return impl_->view(camera, size, execution);
+}
+const Tree& Preview::tree() const { return impl_->tree; }
+void Preview::set_source(SurfaceSource* source) { impl_->frame.set_source(source); }
+
+const DrawReport& Preview::report() const {
+  if (!impl_->report_covers) {
+    const auto& depth = impl_->frame.image().depth;
+    impl_->report.covered =
+        static_cast<std::uint64_t>(depth.size()) -
+        static_cast<std::uint64_t>(std::count(depth.begin(), depth.end(), SurfaceImage::kNone));
+    impl_->report_covers = true;
+  }
+  return impl_->report;
+}
+
+Result<const SurfaceImage*> Preview::draw(const View& view, const Execution& execution) try {
+  return impl_->draw(view, execution);
+} catch (const std::bad_alloc&) {
+  return fail(ErrorCode::kLimit, "out of memory for a picture of {} x {} pixels", view.size.x,
+              view.size.y);
+}
+
+Result<const SurfaceImage*> Preview::move_solid(std::uint32_t solid,
+                                                const glm::dmat4& world_from_mesh,
+                                                const Execution& execution) {
+  const bool others = impl_->geometry.move_solid(impl_->tree, solid, world_from_mesh);
+  auto done = others ? impl_->frame.draw(impl_->frame.view(), execution)
+                     : impl_->frame.moved(solid, execution);
+  if (!done) return tl::unexpected(done.error());
+  return impl_->surfaces();
+}
+
+Result<Picture> Preview::picture(const Camera& camera, const glm::ivec2& size,
+                                 const PictureOptions& options, const Execution& execution) try {
+  return impl_->picture(camera, size, options, execution);
+} catch (const std::bad_alloc&) {
+  return fail(ErrorCode::kLimit, "out of memory for a picture of {} x {} pixels", size.x, size.y);
+}
+
+}  // namespace strata::csg

@@ -1,0 +1,331 @@
+#include "csg/solids/minkowski.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include "strata/mesh/soup_tools.h"
+
+namespace strata::csg {
+namespace {
+
+constexpr double kMostPieces = 3e6;
+constexpr double kMostVertices = 1e8;  // of all pieces: minutes
+/// Sums of so few points are made of all pairs.
+constexpr std::size_t kFewPairs = 1024;
+/// Points that one run of Qhull takes where all pairs are needed.
+constexpr std::size_t kPairsAtOnce = 100'000;
+
+/// The corners of a polytope or of a flat polygon, each with the directions in which it is the
+/// farthest: those that make no obtuse angle with any of its rays.
+struct Corners {
+  std::vector<glm::dvec3> points;
+  std::vector<glm::dvec3> along;     ///< one of the directions; 0 where the corner is none
+  std::vector<std::uint32_t> first;  ///< of its rays, and of the next corner's
+  std::vector<glm::dvec3> rays;      ///< from a neighbour to the corner, unit
+};
+
+/// A polytope with its edges, vertex by vertex.
+struct Polytope {
+  struct Spoke {
+    std::uint32_t to;
+    glm::dvec3 normals[2];
+  };
+  Corners corners;
+  std::vector<Spoke> spokes;  ///< as corners.rays; empty where Qhull's facets do not fit together
+};
+
+glm::dvec3 unit(const glm::dvec3& v) {
+  const double length = glm::length(v);
+  return length > 0.0 ? v / length : glm::dvec3(0.0);
+}
+
+Polytope make_polytope(const ConvexHull& hull) {
+  Polytope polytope;
+  Corners& corners = polytope.corners;
+  corners.points = hull.mesh.positions;
+  if (hull.edges.empty()) return polytope;
+  corners.first.assign(corners.points.size() + 1, 0);
+  for (const ConvexHull::Edge& edge : hull.edges) {
+    for (const std::uint32_t v : edge.vertices) ++corners.first[v + 1];
+  }
+  for (std::size_t v = 0; v < corners.points.size(); ++v) corners.first[v + 1] += corners.first[v];
+  std::vector<std::uint32_t> next(corners.first.begin(), corners.first.end() - 1);
+  polytope.spokes.resize(corners.first.back());
+  corners.rays.resize(corners.first.back());
+  corners.along.assign(corners.points.size(), glm::dvec3(0.0));
+  for (const ConvexHull::Edge& edge : hull.edges) {
+    for (int end = 0; end < 2; ++end) {
+      const std::uint32_t v = edge.vertices[end], to = edge.vertices[1 - end];
+      const std::uint32_t at = next[v]++;
+      polytope.spokes[at] = {to, {edge.normals[0], edge.normals[1]}};
+      corners.rays[at] = unit(corners.points[v] - corners.points[to]);
+      corners.along[v] += edge.normals[0] + edge.normals[1];
+    }
+  }
+  return polytope;
+}
+
+Corners corners_of(std::span<const glm::dvec3> facet) {
+  Corners corners;
+  corners.points.assign(facet.begin(), facet.end());
+  for (std::size_t i = 0; i < facet.size(); ++i) {
+    const glm::dvec3& before = facet[(i + facet.size() - 1) % facet.size()];
+    const glm::dvec3& after = facet[(i + 1) % facet.size()];
+    corners.first.push_back(static_cast<std::uint32_t>(corners.rays.size()));
+    corners.rays.push_back(unit(facet[i] - before));
+    corners.rays.push_back(unit(facet[i] - after));
+    const glm::dvec3 along = corners.rays.end()[-1] + corners.rays.end()[-2];
+    // A point within a side stands out by nothing.
+    corners.along.push_back(glm::length(along) > 1e-9 ? along : glm::dvec3(0.0));
+  }
+  corners.first.push_back(static_cast<std::uint32_t>(corners.rays.size()));
+  return corners;
+}
+
+/// Finds the vertices of sums with a polytope; scratch of one thread. A vertex of a sum is the sum
+/// of two vertices that are the farthest in one direction. From one that is, the walk goes along
+/// edges of the polytope, over those whose facets have a direction between their normals that
+/// belongs to the corner: the directions of a corner are convex, so it reaches them all.
+class VertexWalk {
+ public:
+  void add_sums(const Corners& corners, const Polytope& polytope, std::vector<glm::dvec3>& sums) {
+    const std::vector<glm::dvec3>& points = polytope.corners.points;
+    seen_.assign(points.size(), 0);
+    for (std::uint32_t c = 0; c < corners.points.size(); ++c) {
+      const glm::dvec3& along = corners.along[c];
+      if (along == glm::dvec3(0.0)) continue;
+      const auto rays = std::span(corners.rays)
+                            .subspan(corners.first[c], corners.first[c + 1] - corners.first[c]);
+      std::uint32_t farthest = 0;
+      for (std::uint32_t v = 1; v < points.size(); ++v) {
+        if (glm::dot(points[v] - points[farthest], along) > 0.0) farthest = v;
+      }
+      waiting_.assign(1, farthest);
+      seen_[farthest] = c + 1;
+      while (!waiting_.empty()) {
+        const std::uint32_t v = waiting_.back();
+        waiting_.pop_back();
+        sums.push_back(corners.points[c] + points[v]);
+        for (std::uint32_t s = polytope.corners.first[v]; s < polytope.corners.first[v + 1]; ++s) {
+          const Polytope::Spoke& spoke = polytope.spokes[s];
+          if (seen_[spoke.to] == c + 1 || !meets(spoke, rays)) continue;
+          seen_[spoke.to] = c + 1;
+          waiting_.push_back(spoke.to);
+        }
+      }
+    }
+  }
+
+ private:
+  /// Whether a direction between the two normals makes no obtuse angle with any ray. What does so
+  /// by rounding only is taken along: the hull drops it.
+  static bool meets(const Polytope::Spoke& spoke, std::span<const glm::dvec3> rays) {
+    constexpr double kRounding = 1e-7;
+    double low = 0.0, high = 1.0;  // from the first normal to the second
+    for (const glm::dvec3& ray : rays) {
+      const double one = glm::dot(spoke.normals[0], ray) + kRounding;
+      const double other = glm::dot(spoke.normals[1], ray) + kRounding;
+      if (one < 0.0 && other < 0.0) return false;
+      if (one < 0.0) low = std::max(low, one / (one - other));
+      if (other < 0.0) high = std::min(high, one / (one - other));
+    }
+    return low <= high;
+  }
+
+  std::vector<std::uint32_t> seen_;  ///< for which corner, counted from 1
+  std::vector<std::uint32_t> waiting_;
+};
+
+/// The hull of the sums of all pairs, made of not too many at a time.
+Result<ConvexHull> hull_of_pairs(std::span<const glm::dvec3> a, std::span<const glm::dvec3> b,
+                                 const std::stop_token& stop) {
+  std::vector<glm::dvec3> sums;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    for (const glm::dvec3& q : b) sums.push_back(a[i] + q);
+    if (sums.size() < kPairsAtOnce || i + 1 == a.size()) continue;
+    auto hull = convex_hull(sums, stop);
+    if (!hull && hull.error().code != ErrorCode::kGeometry) return tl::unexpected(hull.error());
+    if (hull) sums = std::move(hull->positions);
+  }
+  return convex_hull_with_edges(sums, stop);
+}
+
+/// The centre of mass: deep inside a polytope.
+glm::dvec3 middle_of(const TriangleSoup& mesh) {
+  const glm::dvec3 about = mesh.positions[0];
+  glm::dvec3 sum(0.0);
+  double volume = 0.0;
+  for (const glm::uvec3& t : mesh.triangles) {
+    const glm::dvec3 p = mesh.positions[t.x] - about, q = mesh.positions[t.y] - about,
+                     r = mesh.positions[t.z] - about;
+    const double part = glm::dot(p, glm::cross(q, r));
+    volume += part;
+    sum += part * (p + q + r);
+  }
+  return volume > 0.0 ? about + sum / (4.0 * volume) : about;
+}
+
+MinkowskiPart moved(const MinkowskiPart& part, const glm::dvec3& by) {
+  MinkowskiPart result = part;
+  for (glm::dvec3& p : result.facets.corners) p += by;
+  for (glm::dvec3& p : result.anchors) p += by;
+  result.offset += by;
+  return result;
+}
+
+/// One convex sum to be made, of two polytopes or facets.
+struct Task {
+  const Polytope* polytopes[2] = {nullptr, nullptr};
+  std::span<const glm::dvec3> facets[2];  ///< where there is no polytope
+};
+
+Result<ConvexHull> sum_of(const Task& task, VertexWalk& walk, const std::stop_token& stop) {
+  std::span<const glm::dvec3> points[2];
+  for (int i = 0; i < 2; ++i) {
+    points[i] = task.polytopes[i] ? std::span<const glm::dvec3>(task.polytopes[i]->corners.points)
+                                  : task.facets[i];
+  }
+  // The walk goes over the larger polytope.
+  int over = points[0].size() > points[1].size() ? 0 : 1;
+  const auto has_edges = [&](int i) {
+    return task.polytopes[i] && !task.polytopes[i]->spokes.empty();
+  };
+  if (!has_edges(over)) over = 1 - over;
+  const int other = 1 - over;
+  if (points[0].size() * points[1].size() <= kFewPairs || !has_edges(over) ||
+      (task.polytopes[other] && !has_edges(other))) {
+    return hull_of_pairs(points[0], points[1], stop);
+  }
+  std::vector<glm::dvec3> sums;
+  if (task.polytopes[other]) {
+    walk.add_sums(task.polytopes[other]->corners, *task.polytopes[over], sums);
+  } else {
+    walk.add_sums(corners_of(task.facets[other]), *task.polytopes[over], sums);
+  }
+  return convex_hull_with_edges(sums, stop);
+}
+
+/// What all sums of pieces together take.
+struct Cost {
+  double pieces = 0.0, vertices = 0.0;
+  [[nodiscard]] double bytes() const {
+    // Vertices and two triangles each: pieces, then one mesh, then what shows it.
+    return vertices * 3.0 * (sizeof(glm::dvec3) + 2 * sizeof(glm::uvec3));
+  }
+};
+
+Cost cost_of(std::span<const MinkowskiPart> a, std::span<const MinkowskiPart> b) {
+  Cost cost;
+  const auto pieces = [](const MinkowskiPart& part) {
+    return part.convex() ? 1.0 : static_cast<double>(part.facets.size());
+  };
+  const auto points = [](const MinkowskiPart& part) {  // of a piece
+    return part.convex() ? static_cast<double>(part.hull.mesh.positions.size())
+                         : static_cast<double>(part.facets.corners.size()) /
+                               static_cast<double>(part.facets.size());
+  };
+  for (const MinkowskiPart& p : a) {
+    for (const MinkowskiPart& q : b) {
+      const double count = pieces(p) * pieces(q), m = points(p), n = points(q);
+      cost.pieces += count;
+      // Corners of the maps of their normals, laid over each other: theirs and crossings.
+      cost.vertices += count * std::min(m * n, m + n + 2.0 * std::sqrt(m * n));
+    }
+  }
+  return cost;
+}
+
+}  // namespace
+
+Result<std::vector<MinkowskiPart>> minkowski_sum(std::span<const MinkowskiPart> a,
+                                                 std::span<const MinkowskiPart> b, bool goes_on,
+                                                 const Execution& execution) {
+  const Cost cost = cost_of(a, b);
+  const double most_bytes = execution.memory_limit > 0 ? static_cast<double>(execution.memory_limit)
+                                                       : std::numeric_limits<double>::infinity();
+  if (cost.pieces > kMostPieces || cost.vertices > kMostVertices || cost.bytes() > most_bytes) {
+    return fail(ErrorCode::kLimit,
+                "the sum takes {:.0f} convex pieces with about {:.3g} vertices and {:.3g} GB; the "
+                "limits are {:.0f} pieces, {:g} vertices and {:.3g} GB",
+                cost.pieces, cost.vertices, cost.bytes() / 1e9, kMostPieces, kMostVertices,
+                most_bytes / 1e9);
+  }
+  std::vector<Polytope> polytopes[2];
+  const std::span<const MinkowskiPart> sides[2] = {a, b};
+  for (int side = 0; side < 2; ++side) {
+    for (const MinkowskiPart& part : sides[side]) {
+      polytopes[side].push_back(part.convex() ? make_polytope(part.hull) : Polytope());
+    }
+  }
+  std::vector<MinkowskiPart> result;
+  std::vector<Task> tasks;
+  const auto pieces = [](const MinkowskiPart& part) {
+    return part.convex() ? std::size_t{1} : part.facets.size();
+  };
+  const auto set_piece = [&](Task& task, int side, std::size_t part, std::size_t piece) {
+    const MinkowskiPart& of = sides[side][part];
+    if (of.convex()) {
+      task.polytopes[side] = &polytopes[side][part];
+    } else {
+      task.facets[side] = of.facets[piece];
+    }
+  };
+  const auto move = [&](const MinkowskiPart& part, const MinkowskiPart& other) {
+    if (part.convex()) return;
+    if (other.convex()) {
+      result.push_back(moved(part, middle_of(other.hull.mesh)));
+      return;
+    }
+    for (const glm::dvec3& by : other.anchors) result.push_back(moved(part, by));
+  };
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      if (a[i].empty() || b[j].empty()) continue;
+      for (std::size_t p = 0; p < pieces(a[i]); ++p) {
+        for (std::size_t q = 0; q < pieces(b[j]); ++q) {
+          Task& task = tasks.emplace_back();
+          set_piece(task, 0, i, p);
+          set_piece(task, 1, j, q);
+        }
+      }
+      move(a[i], b[j]);
+      move(b[j], a[i]);
+    }
+  }
+  std::vector<MinkowskiPart> sums(tasks.size());
+  std::vector<VertexWalk> walks(static_cast<std::size_t>(execution.thread_count()));
+  std::vector<std::optional<Error>> errors(walks.size());
+  const std::size_t at_once = std::max<std::size_t>(64, tasks.size() / 256);
+  for (std::size_t first = 0; first < tasks.size() && !execution.stop.stop_requested();
+       first += at_once) {
+    const std::size_t count = std::min(at_once, tasks.size() - first);
+    parallel_for(execution, count, [&](std::size_t i, int worker) {
+      const auto w = static_cast<std::size_t>(worker);
+      auto hull = sum_of(tasks[first + i], walks[w], execution.stop);
+      if (hull) {
+        sums[first + i].hull = *std::move(hull);
+        if (!goes_on) sums[first + i].hull.edges = {};
+      } else if (hull.error().code != ErrorCode::kGeometry) {
+        errors[w] = hull.error();
+      }
+    });
+    if (execution.progress) {
+      execution.progress(static_cast<double>(first + count) / static_cast<double>(tasks.size()));
+    }
+  }
+  if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+  for (const auto& error : errors) {
+    if (error) return tl::unexpected(*error);
+  }
+  std::erase_if(sums, [](const MinkowskiPart& sum) { return sum.empty(); });
+  result.insert(result.end(), std::make_move_iterator(sums.begin()),
+                std::make_move_iterator(sums.end()));
+  return result;
+}
+
+}  // namespace strata::csg

@@ -1,0 +1,305 @@
+#include "csg/surface/tile_surface.h"
+
+#include <algorithm>
+#include <new>
+#include <numeric>
+
+#include "strata/hashbuffer/list_filter.h"
+
+namespace strata::csg {
+
+// --- Arena --------------------------------------------------------------------------------------
+
+std::uint32_t* Arena::words(std::size_t count) {
+  const std::size_t rounded = (count + 15) / 16 * 16;
+  while (block_ < blocks_.size() && used_ + rounded > blocks_[block_].size) {
+    ++block_;
+    used_ = 0;
+  }
+  if (block_ == blocks_.size()) {
+    const std::size_t size = std::max(rounded, kBlockWords);
+    auto* words = static_cast<std::uint32_t*>(std::aligned_alloc(64, size * 4));
+    if (words == nullptr) throw std::bad_alloc();
+    blocks_.push_back({std::unique_ptr<std::uint32_t, Free>(words), size});
+    used_ = 0;
+  }
+  std::uint32_t* result = blocks_[block_].words.get() + used_;
+  used_ += rounded;
+  return result;
+}
+
+void LeafLayers::add_layer(Arena& arena) {
+  const std::size_t count = words();
+  keys.push_back(arena.words(count));
+  std::fill_n(keys.back(), count, kEmpty);
+  triangles.push_back(arena.words(count));  // means nothing where there is no key
+}
+
+LeafLayers::Kind kind_of(const Program& program, std::uint32_t solid, const Geometry::Part& part,
+                         const ViewPart& view_part) {
+  if (!part.convex) return LeafLayers::Kind::kSorted;
+  return program.plain(solid) && !view_part.cut ? LeafLayers::Kind::kFirst
+                                                : LeafLayers::Kind::kConvex;
+}
+
+void first_entry_of(std::span<const DepthItem> crossings, std::uint32_t solid,
+                    std::vector<Flip>& flips) {
+  const auto entry =
+      std::find_if(crossings.begin(), crossings.end(), [](DepthItem item) { return !item.exit(); });
+  if (entry != crossings.end()) flips.push_back({entry->depth(), solid, entry->triangle(), false});
+}
+
+// --- TileFinder ---------------------------------------------------------------------------------
+
+namespace {
+
+/// Deeper nesting is walked pixel by pixel: asking nodes again for each answer would multiply.
+constexpr int kMaxSearchDepth = 3;
+constexpr int kAreaSide = LeafLayers::kLanes;
+
+}  // namespace
+
+TileFinder::TileFinder(const Program& program, const std::vector<ViewPart>& view_parts,
+                       const std::vector<Geometry::Part>& parts, const View& view,
+                       const Coincidence& coincidence)
+    : program_(&program),
+      view_parts_(view_parts),
+      parts_(parts),
+      view_(&view),
+      coincidence_(&coincidence),
+      simplifier_(program),
+      finder_(program) {}
+
+TileFinder::~TileFinder() = default;
+
+TileFinder::Input TileFinder::input_of(std::uint32_t solid) {
+  const ViewPart& part = view_parts_[solid];
+  Input input;
+  input.clip = {std::max(tile_.u0, part.rect.u0), std::max(tile_.v0, part.rect.v0),
+                std::min(tile_.u1, part.rect.u1), std::min(tile_.v1, part.rect.v1)};
+  if (part.binned) {
+    input.triangles = part.bins.tile(tile_.u0 / kTileSide, tile_.v0 / kTileSide);
+  } else {
+    while (all_triangles_.size() < part.mesh.triangles.size()) {
+      all_triangles_.push_back(static_cast<std::uint32_t>(all_triangles_.size()));
+    }
+    input.triangles = std::span(all_triangles_).first(part.mesh.triangles.size());
+  }
+  return input;
+}
+
+void TileFinder::make(LeafLayers& leaf) {
+  leaf.made = true;
+  leaf.areas = 0;
+  const ViewPart& part = view_parts_[leaf.solid];
+  const RasterTarget target{Axis::kZ, view_->size.x, view_->size.y, kPictureDepthLimit};
+  const Input input = input_of(leaf.solid);
+  constexpr std::size_t kTrianglesAtOnce = 256;  // lists may be very long
+  std::uint64_t fragments = 0;
+  for (std::size_t i = 0; i < input.triangles.size() && !stop_.stop_requested();
+       i += kTrianglesAtOnce) {
+    const auto some =
+        input.triangles.subspan(i, std::min(kTrianglesAtOnce, input.triangles.size() - i));
+    fragments += raster_layers(part.mesh, target, some, input.clip, coincidence_->steep_from(),
+                               leaf, arena_);
+    if (leaf.keys.size() > LeafLayers::kMostLayers) return make_deep(leaf, input);
+  }
+  fragments_ += fragments;
+  if (!leaf.keys.empty()) normalize_layers(leaf, part.cut, *this);
+}
+
+void TileFinder::make_deep(LeafLayers& leaf, const Input& input) {
+  const ViewPart& part = view_parts_[leaf.solid];
+  const RasterTarget target{Axis::kZ, view_->size.x, view_->size.y, kPictureDepthLimit};
+  leaf.deep = true;
+  leaf.keys.clear();
+  leaf.triangles.clear();
+  leaf.flips.clear();
+  leaf.flip_ends.assign(kTilePixels, 0);
+  leaf.areas = 0xffff;
+  leaf.nearest = 0;
+  leaf.farthest = kPictureDepthLimit;
+  const auto lists =
+      lists_.build(part.mesh, target, input.triangles, tile_.u0 / kTileSide, tile_.v0 / kTileSide);
+  if (!lists) throw std::bad_alloc();  // its only error
+  fragments_ += lists->fragments;
+  for (std::size_t pixel = 0; pixel < kTilePixels && !stop_.stop_requested(); ++pixel) {
+    crossings_.clear();
+    for_each_item(*lists, pixel, [this](DepthItem item) { crossings_.push_back(item); });
+    if (leaf.kind == LeafLayers::Kind::kFirst) {
+      first_entry_of(crossings_, leaf.solid, leaf.flips);
+    } else {
+      flips_of(crossings_, leaf.solid, parts_[leaf.solid].rule, part.cut, leaf.flips);
+    }
+    leaf.flip_ends[pixel] = static_cast<std::uint32_t>(leaf.flips.size());
+  }
+}
+
+void TileFinder::normalize_pixel(LeafLayers& leaf, std::size_t at) {
+  crossings_.clear();
+  bool steep = false;
+  for (std::size_t k = 0; k < leaf.keys.size(); ++k) {
+    if (leaf.keys[k][at] == LeafLayers::kEmpty) continue;
+    const std::uint32_t key = leaf.keys[k][at], triangle = leaf.triangles[k][at];
+    steep = steep || (triangle & LeafLayers::kSteep) != 0;
+    crossings_.emplace_back(key >> 1, (key & 1) != 0, triangle & ~LeafLayers::kSteep);
+    leaf.keys[k][at] = LeafLayers::kEmpty;
+  }
+  // Layers of convex solids are not sorted, and others by marked triangles.
+  std::sort(crossings_.begin(), crossings_.end());
+  leaf_flips_.clear();
+  flips_of(crossings_, leaf.solid, parts_[leaf.solid].rule, view_parts_[leaf.solid].cut,
+           leaf_flips_);
+  while (leaf.keys.size() < leaf_flips_.size()) leaf.add_layer(arena_);
+  for (std::size_t k = 0; k < leaf_flips_.size(); ++k) {
+    leaf.keys[k][at] = leaf_flips_[k].depth;
+    leaf.triangles[k][at] = leaf_flips_[k].triangle | (steep ? LeafLayers::kSteep : 0);
+  }
+  leaf.steep = leaf.steep || steep;
+  if (!leaf_flips_.empty()) {
+    leaf.nearest = std::min(leaf.nearest, leaf_flips_.front().depth);
+    leaf.farthest = std::max(leaf.farthest, leaf_flips_.back().depth);
+  }
+}
+
+void TileFinder::show(std::uint64_t pixel) {
+  ++resolved_;
+  const Surface surface = finder_.find(flips_, FlipFaces(parts_, view_parts_, *coincidence_));
+  part_.image->depth[pixel] = surface.depth;
+  part_.image->solid[pixel] = surface.solid;
+  part_.image->triangle[pixel] = surface.triangle | (surface.exit ? SurfaceImage::kExit : 0u);
+}
+
+void TileFinder::resolve(const TileProgram& program, std::uint64_t pixel) {
+  const auto width = static_cast<std::uint64_t>(part_.image->width);
+  const int u = part_.u0 + static_cast<int>(pixel % width);
+  const int v = part_.v0 + static_cast<int>(pixel / width);
+  flips_.clear();
+  for (const std::uint32_t slot : program.leaves) {
+    LeafLayers& leaf = leaves_[slot];
+    if (v < leaf.rect.v0 || v >= leaf.rect.v1 || u < leaf.rect.u0 || u >= leaf.rect.u1) continue;
+    if (!leaf.made) make(leaf);
+    if (leaf.deep) {
+      const auto place = static_cast<std::size_t>((v - tile_.v0) * kTileSide + (u - tile_.u0));
+      const auto begin = leaf.flips.begin() + (place > 0 ? leaf.flip_ends[place - 1] : 0);
+      flips_.insert(flips_.end(), begin, leaf.flips.begin() + leaf.flip_ends[place]);
+      continue;
+    }
+    const auto at = static_cast<std::size_t>((v - leaf.rect.v0) * leaf.stride + (u - leaf.rect.u0));
+    for (std::size_t k = 0; k < leaf.keys.size(); ++k) {
+      if (leaf.keys[k][at] == LeafLayers::kEmpty) break;
+      std::uint32_t triangle = leaf.triangles[k][at];
+      if (triangle != Surface::kNone) triangle &= ~LeafLayers::kSteep;
+      flips_.push_back({leaf.keys[k][at], leaf.solid, triangle, (k & 1) != 0});
+    }
+  }
+  show(pixel);
+}
+
+void TileFinder::find(int tile_u, int tile_v, std::span<const std::uint32_t> solids,
+                      const SurfacePart& part, const std::stop_token& stop) {
+  part_ = part;
+  stop_ = stop;
+  tile_ = {tile_u * kTileSide, tile_v * kTileSide,
+           std::min(view_->size.x, (tile_u + 1) * kTileSide),
+           std::min(view_->size.y, (tile_v + 1) * kTileSide)};
+  arena_.clear();
+  if (leaves_.size() < solids.size()) leaves_.resize(solids.size());
+  std::size_t count = 0;
+  bool cut = false, united = true;
+  for (const std::uint32_t solid : solids) {
+    const ViewPart& view_part = view_parts_[solid];
+    if (view_part.binned && view_part.bins.tile(tile_u, tile_v).empty()) continue;
+    LeafLayers& leaf = leaves_[count++];
+    leaf.made = leaf.deep = leaf.steep = false;
+    leaf.kind = kind_of(*program_, solid, parts_[solid], view_part);
+    leaf.solid = solid;
+    leaf.nearest = view_part.cut ? 0 : view_part.nearest;
+    leaf.farthest = view_part.farthest;
+    leaf.keys.clear();
+    leaf.triangles.clear();
+    const auto down = [&](int u) { return tile_.u0 + (u - tile_.u0) / kAreaSide * kAreaSide; };
+    leaf.rect = {down(std::max(tile_.u0, view_part.rect.u0)), std::max(tile_.v0, view_part.rect.v0),
+                 down(std::min(tile_.u1, view_part.rect.u1) + kAreaSide - 1),
+                 std::min(tile_.v1, view_part.rect.v1)};
+    leaf.stride = leaf.rect.u1 - leaf.rect.u0;
+    if (leaf.rect.empty()) {
+      --count;
+      continue;
+    }
+    cut = cut || view_part.cut;
+    united = united && leaf.kind == LeafLayers::Kind::kFirst;
+  }
+  if (count > 0 && united) return find_united(std::span(leaves_).first(count));
+  for (int v = tile_.v0; v < tile_.v1; ++v) {
+    const std::size_t row = part.index(tile_.u0, v);
+    std::fill_n(part.image->depth.data() + row, tile_.u1 - tile_.u0, Surface::kNone);
+  }
+  if (count == 0) return;
+  SearchArea area;
+  area.leaves = std::span(leaves_).first(count);
+  area.program = &tile_program_;
+  area.end = view_->size.x;
+  area.range = coincidence_->range();
+  area.part = part;
+  area.doubtful = &doubtful_;
+  slot_solids_.clear();
+  for (std::size_t i = 0; i < count; ++i) slot_solids_.push_back(leaves_[i].solid);
+  area.solids = slot_solids_.data();
+  for (int v = tile_.v0; v < tile_.v1; v += kAreaSide) {
+    for (int u = tile_.u0; u < tile_.u1; u += kAreaSide) {
+      const int area_index =
+          (v - tile_.v0) / kAreaSide * (kTileSide / kAreaSide) + (u - tile_.u0) / kAreaSide;
+      area.rect = {u, v, u + kAreaSide, std::min(tile_.v1, v + kAreaSide)};
+      present_.clear();
+      for (std::uint32_t slot = 0; slot < count; ++slot) {
+        const LeafLayers& leaf = leaves_[slot];
+        if (leaf.made && (leaf.areas >> area_index & 1) == 0) continue;
+        const PixelRect& rect = leaf.rect;
+        if (rect.u0 <= u && u < rect.u1 && rect.v0 < area.rect.v1 && area.rect.v0 < rect.v1) {
+          present_.push_back(slot);
+        }
+      }
+      simplifier_.simplify(area.leaves, present_, tile_program_);
+      if (tile_program_.constant) continue;
+      doubtful_.clear();
+      const auto is_deep = [&] {
+        return std::any_of(tile_program_.leaves.begin(), tile_program_.leaves.end(),
+                           [&](std::uint32_t slot) { return leaves_[slot].deep; });
+      };
+      bool one_by_one = cut || tile_program_.depth > kMaxSearchDepth || is_deep();
+      if (!one_by_one) {
+        search_surface(area, *this);
+        one_by_one = is_deep();  // it has made leaves
+      }
+      if (one_by_one) {
+        doubtful_.clear();
+        for (int y = area.rect.v0; y < area.rect.v1; ++y) {
+          for (int x = u; x < std::min(tile_.u1, u + kAreaSide); ++x) {
+            doubtful_.push_back(part.index(x, y));
+          }
+        }
+      }
+      for (const std::uint64_t pixel : doubtful_) {
+        if (stop.stop_requested()) return;  // lists may be very long
+        resolve(tile_program_, pixel);
+      }
+    }
+  }
+  if (cut) number_sources();
+}
+
+void TileFinder::number_sources() {
+  for (int v = tile_.v0; v < tile_.v1; ++v) {
+    for (int u = tile_.u0; u < tile_.u1; ++u) {
+      const std::size_t pixel = part_.index(u, v);
+      if (part_.image->depth[pixel] == SurfaceImage::kNone) continue;
+      std::uint32_t& face = part_.image->triangle[pixel];
+      const std::uint32_t exit = face & SurfaceImage::kExit;
+      const ViewPart& view_part = view_parts_[part_.image->solid[pixel]];
+      face = view_part.source(face & ~SurfaceImage::kExit) | exit;
+    }
+  }
+}
+
+}  // namespace strata::csg

@@ -1,0 +1,446 @@
+#include "csg/surface/tile_surface.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "csg/surface/tile_surface_simd.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include "csg/surface/coincidence_reach-inl.h"
+#include "raster/rasterize-inl.h"
+
+// Visible surfaces without lists: each solid keeps its own sorted layers, and a vector of pixels
+// asks the tree where it is met first. A node answers with its value at a depth and the next depth
+// where that changes, from the same answers of its children; a node that is true asks on from the
+// farthest of them until none is true. Solids behind what is found are not even rasterized.
+//
+// This work is related to: C. Zanni, F. Claux, S. Lefebvre, HCSG: Hashing for real-time CSG
+// modeling, 2018, which walks depth slabs front to back. We differ: the window is per vector of
+// pixels and closes by itself, and solids are sorted apart, so that no list mixes them.
+
+HWY_BEFORE_NAMESPACE();
+namespace strata::csg {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+namespace simd = strata::HWY_NAMESPACE;
+
+using D = hn::CappedTag<std::uint32_t, LeafLayers::kLanes>;
+using V = hn::Vec<D>;
+using M = hn::Mask<D>;
+
+HWY_INLINE M no_lane(D d) { return hn::Ne(hn::Zero(d), hn::Zero(d)); }
+
+/// Inserts crossings into a leaf's layers, sorted by key, then triangle.
+class LayerSink {
+ public:
+  LayerSink(LeafLayers& leaf, Arena& arena, double steep_from)
+      : leaf_(&leaf), arena_(&arena), steep_from_(steep_from) {}
+  HWY_INLINE void steepness(double steepness) {
+    steep_ = steepness > steep_from_ ? LeafLayers::kSteep : 0;
+    leaf_->steep = leaf_->steep || steep_ != 0;
+  }
+  [[nodiscard]] HWY_INLINE bool wants(bool exit) const {
+    return !exit || leaf_->kind != LeafLayers::Kind::kFirst;
+  }
+  HWY_INLINE void begin(bool exit, std::uint32_t triangle, const PixelRect&) {
+    exit_ = exit ? 1 : 0;
+    triangle_ = triangle | steep_;
+  }
+  /// key + 1, so that 0 is no crossing.
+  template <class D2, class V2 = hn::Vec<D2>>
+  HWY_INLINE V2 encode(D2 d, V2 depth, hn::Mask<D2> covered) {
+    fragments_ += hn::CountTrue(d, covered);
+    const V2 key = hn::Or(hn::ShiftLeft<1>(depth), hn::Set(d, exit_));
+    return hn::IfThenElseZero(covered, hn::Add(key, hn::Set(d, 1u)));
+  }
+  template <int columns>
+  HWY_INLINE void put_block(int u, int v, const std::uint32_t* words, int rows) {
+    const hn::CappedTag<std::uint32_t, columns> d;
+    for (int row = 0; row < rows; ++row, words += columns) {
+      const std::size_t at = pixel_at(u, v + row);
+      for (std::size_t i = 0; i < columns; i += hn::Lanes(d)) insert(d, at + i, words + i);
+    }
+  }
+  HWY_INLINE void put_one(int u, int v, std::uint32_t depth) {
+    ++fragments_;
+    const hn::CappedTag<std::uint32_t, 1> d;
+    const std::uint32_t word[1] = {(depth << 1 | exit_) + 1};
+    insert(d, pixel_at(u, v), word);
+  }
+  [[nodiscard]] std::uint64_t fragments() const { return fragments_; }
+
+ private:
+  [[nodiscard]] HWY_INLINE std::size_t pixel_at(int u, int v) const {
+    return static_cast<std::size_t>((v - leaf_->rect.v0) * leaf_->stride + (u - leaf_->rect.u0));
+  }
+  template <class D2>
+  HWY_INLINE void insert(D2 d, std::size_t at, const std::uint32_t* words) {
+    const auto empty = hn::Set(d, LeafLayers::kEmpty);
+    auto key = hn::Sub(hn::LoadU(d, words), hn::Set(d, 1u));
+    auto triangle = hn::Set(d, triangle_);
+    if (hn::AllTrue(d, hn::Eq(key, empty))) return;
+    if (leaf_->kind == LeafLayers::Kind::kFirst) return keep_first(d, at, key, triangle);
+    if (leaf_->kind == LeafLayers::Kind::kConvex) return place(d, at, key, triangle);
+    for (std::size_t k = 0;; ++k) {
+      if (k == leaf_->keys.size()) leaf_->add_layer(*arena_);
+      std::uint32_t* HWY_RESTRICT keys = leaf_->keys[k] + at;
+      std::uint32_t* HWY_RESTRICT triangles = leaf_->triangles[k] + at;
+      const auto old_key = hn::LoadU(d, keys), old_triangle = hn::LoadU(d, triangles);
+      const auto less = hn::Or(hn::Lt(key, old_key),
+                               hn::And(hn::Eq(key, old_key), hn::Lt(triangle, old_triangle)));
+      hn::StoreU(hn::IfThenElse(less, key, old_key), d, keys);
+      hn::StoreU(hn::IfThenElse(less, triangle, old_triangle), d, triangles);
+      key = hn::IfThenElse(less, old_key, key);
+      triangle = hn::IfThenElse(less, old_triangle, triangle);
+      if (hn::AllTrue(d, hn::Eq(key, empty))) return;
+    }
+  }
+
+  template <class D2>
+  HWY_INLINE void keep_first(D2 d, std::size_t at, hn::Vec<D2> key, hn::Vec<D2> triangle) {
+    if (leaf_->keys.empty()) leaf_->add_layer(*arena_);
+    std::uint32_t* HWY_RESTRICT keys = leaf_->keys[0] + at;
+    std::uint32_t* HWY_RESTRICT triangles = leaf_->triangles[0] + at;
+    const auto old_key = hn::LoadU(d, keys), old_triangle = hn::LoadU(d, triangles);
+    const auto unmarked = hn::Set(d, ~LeafLayers::kSteep);
+    const auto lower = hn::Lt(hn::And(triangle, unmarked), hn::And(old_triangle, unmarked));
+    const auto less = hn::Or(hn::Lt(key, old_key), hn::And(hn::Eq(key, old_key), lower));
+    hn::StoreU(hn::Min(key, old_key), d, keys);
+    hn::StoreU(hn::IfThenElse(less, triangle, old_triangle), d, triangles);
+  }
+  /// Entries go to layer 0, exits to layer 1, unsorted.
+  template <class D2>
+  HWY_INLINE void place(D2 d, std::size_t at, hn::Vec<D2> key, hn::Vec<D2> triangle) {
+    const auto empty = hn::Set(d, LeafLayers::kEmpty);
+    for (std::size_t k = exit_;; k = k < 2 ? 2 : k + 1) {
+      while (k >= leaf_->keys.size()) leaf_->add_layer(*arena_);
+      std::uint32_t* HWY_RESTRICT keys = leaf_->keys[k] + at;
+      std::uint32_t* HWY_RESTRICT triangles = leaf_->triangles[k] + at;
+      const auto old_key = hn::LoadU(d, keys);
+      const auto take = hn::And(hn::Ne(key, empty), hn::Eq(old_key, empty));
+      hn::StoreU(hn::IfThenElse(take, key, old_key), d, keys);
+      hn::StoreU(hn::IfThenElse(take, triangle, hn::LoadU(d, triangles)), d, triangles);
+      key = hn::IfThenElse(take, empty, key);
+      if (hn::AllTrue(d, hn::Eq(key, empty))) return;
+    }
+  }
+
+  LeafLayers* leaf_;
+  Arena* arena_;
+  double steep_from_;
+  std::uint32_t exit_ = 0, triangle_ = 0, steep_ = 0;
+  std::uint64_t fragments_ = 0;
+};
+
+std::uint64_t RasterLayers(const LatticeMesh& mesh, const RasterTarget& target,
+                           std::span<const std::uint32_t> triangles, const PixelRect& clip,
+                           double steep_from, LeafLayers& leaf, Arena& arena) {
+  LayerSink sink(leaf, arena, steep_from);
+  simd::rasterize_triangles(mesh, target, triangles, clip, sink);
+  return sink.fragments();
+}
+
+void NormalizeLayers(LeafLayers& leaf, bool all_special, TileFinder& finder) {
+  const D d;
+  const V empty = hn::Set(d, LeafLayers::kEmpty), one = hn::Set(d, 1u), zero = hn::Zero(d);
+  const std::size_t layers = leaf.keys.size();
+  const auto columns = static_cast<std::size_t>(leaf.stride);
+  const std::size_t cells = static_cast<std::size_t>(leaf.rect.v1 - leaf.rect.v0) * columns;
+  const std::size_t lanes = hn::Lanes(d);
+  // Where in the tile the leaf begins, in areas.
+  constexpr std::size_t kSide = LeafLayers::kLanes;
+  const std::size_t first_column = static_cast<std::size_t>(leaf.rect.u0 % kTileSide) / kSide;
+  const std::size_t first_row = static_cast<std::size_t>(leaf.rect.v0 % kTileSide);
+  leaf.areas = 0;
+  alignas(64) std::uint32_t special_lanes[LeafLayers::kLanes];
+  V nearest = empty, farthest = zero;
+  leaf.nearest = LeafLayers::kEmpty;
+  leaf.farthest = 0;
+  std::size_t row = first_row, column = 0;
+  unsigned area_row = 1u << (row / kSide * (kTileSide / kSide));
+  for (std::size_t at = 0; at < cells; at += lanes, column += lanes) {
+    if (column == columns) {
+      column = 0;
+      area_row = 1u << (++row / kSide * (kTileSide / kSide));
+    }
+    M special = no_lane(d);
+    V before = zero;  // depth of the last exit, plus 1
+    for (std::size_t k = 0; k < layers; k += 2) {
+      const V enter = hn::Load(d, leaf.keys[k] + at);
+      const V leave = k + 1 < layers ? hn::Load(d, leaf.keys[k + 1] + at) : empty;
+      const M none = hn::And(hn::Eq(enter, empty), hn::Eq(leave, empty));
+      const V enter_depth = hn::ShiftRight<1>(enter), leave_depth = hn::ShiftRight<1>(leave);
+      const M facing =
+          hn::And(hn::Eq(hn::And(enter, one), zero), hn::Ne(hn::And(leave, one), zero));
+      const M ordered =
+          hn::And(hn::Lt(enter_depth, leave_depth), hn::Not(hn::Lt(enter_depth, before)));
+      const M plain = hn::And(hn::And(facing, ordered), hn::Ne(leave, empty));
+      if (leaf.kind != LeafLayers::Kind::kFirst) {
+        special = hn::Or(special, hn::Not(hn::Or(none, plain)));
+      }
+      before = hn::Add(leave_depth, one);
+    }
+    if (all_special) {  // of a convex solid there may be an exit alone
+      for (std::size_t k = 0; k < std::min<std::size_t>(layers, 2); ++k) {
+        special = hn::Or(special, hn::Ne(hn::Load(d, leaf.keys[k] + at), empty));
+      }
+    }
+    M any = no_lane(d);
+    for (std::size_t k = 0; k < layers; ++k) {
+      const V key = hn::Load(d, leaf.keys[k] + at);
+      const M present = hn::AndNot(special, hn::Ne(key, empty));
+      const V depth = hn::IfThenElse(present, hn::ShiftRight<1>(key), empty);
+      nearest = hn::Min(nearest, depth);
+      farthest = hn::Max(farthest, hn::IfThenElseZero(present, depth));
+      any = hn::Or(any, hn::Ne(key, empty));
+      hn::Store(hn::IfThenElse(special, key, depth), d, leaf.keys[k] + at);
+    }
+    if (!hn::AllFalse(d, any)) {
+      leaf.areas |= static_cast<std::uint16_t>(area_row << (first_column + column / kSide));
+    }
+    if (hn::AllFalse(d, special)) continue;
+    hn::Store(hn::IfThenElseZero(special, one), d, special_lanes);
+    for (std::size_t i = 0; i < lanes; ++i) {
+      if (special_lanes[i] != 0) finder.normalize_pixel(leaf, at + i);
+    }
+  }
+  leaf.nearest = std::min(leaf.nearest, hn::GetLane(hn::MinOfLanes(d, nearest)));
+  leaf.farthest = std::max(leaf.farthest, hn::GetLane(hn::MaxOfLanes(d, farthest)));
+}
+
+/// The search in one vector of pixels.
+class Search {
+ public:
+  Search(const SearchArea& area, TileFinder& finder) : area_(area), finder_(finder) {}
+
+  void set_pixels(int u, int v) {
+    u_ = u;
+    v_ = v;
+  }
+
+  /// Depths where the tree becomes true first, kEmpty for never, and the leaf that turns it.
+  HWY_INLINE void find(V& depth, V& who) {
+    const D d;
+    M value;
+    const bool inverted = area_.program->root_inverted;
+    // not(node) becomes true where the node, true at first, becomes false.
+    probe(area_.program->root, hn::Zero(d), hn::Not(no_lane(d)), inverted, !inverted, value, depth,
+          who);
+    const M waits = inverted ? value : hn::Not(value);
+    depth = hn::IfThenElse(waits, depth, hn::Set(d, LeafLayers::kEmpty));
+  }
+
+  /// Whether there is another flip near `depth` or a steep one anywhere, and the triangle of the
+  /// flip at `depth`.
+  HWY_INLINE M judge(V depth, V who, V& triangle) {
+    const D d;
+    const M hit = hn::Ne(depth, hn::Set(d, LeafLayers::kEmpty));
+    const V reach = coincidence_reach(d, area_.range, hn::IfThenElseZero(hit, depth));
+    const V last = hn::IfThenElseZero(hit, hn::Add(depth, reach));
+    M doubt = no_lane(d);
+    M exits = no_lane(d);
+    const V zero = hn::Zero(d), empty = hn::Set(d, LeafLayers::kEmpty);
+    triangle = zero;
+    const std::uint32_t latest = hn::GetLane(hn::MaxOfLanes(d, last));
+    for (const std::uint32_t slot : area_.program->leaves) {
+      LeafLayers& leaf = area_.leaves[slot];
+      if (leaf.nearest > latest || !holds(leaf) || leaf.nearest > latest) continue;
+      const std::size_t offset = offset_in(leaf);
+      const M own = hn::Eq(who, hn::Set(d, slot));
+      for (std::size_t k = 0; k < leaf.keys.size(); ++k) {
+        const V flip = hn::Load(d, leaf.keys[k] + offset);
+        const V gap = hn::Sub(hn::Max(flip, depth), hn::Min(flip, depth));
+        const M same = hn::And(own, hn::Eq(flip, depth));
+        doubt = hn::Or(doubt, hn::AndNot(same, hn::Not(hn::Gt(gap, reach))));
+        if (!leaf.steep && hn::AllFalse(d, same)) continue;
+        const V its_triangle = hn::Load(d, leaf.triangles[k] + offset);
+        const V marked = hn::And(its_triangle, hn::Set(d, LeafLayers::kSteep));
+        doubt = hn::Or(doubt, hn::And(hn::Ne(marked, zero), hn::Ne(flip, empty)));
+        triangle = hn::IfThenElse(same, its_triangle, triangle);
+        if ((k & 1) != 0) exits = hn::Or(exits, same);
+      }
+    }
+    triangle = hn::Or(triangle, hn::IfThenElseZero(exits, hn::Set(d, 0x80000000u)));
+    return hn::And(hit, doubt);
+  }
+
+ private:
+  /// Whether the pixels lie in the leaf's rectangle; then its layers are there.
+  HWY_INLINE bool holds(LeafLayers& leaf) {
+    if (v_ < leaf.rect.v0 || v_ >= leaf.rect.v1 || u_ < leaf.rect.u0 || u_ >= leaf.rect.u1) {
+      return false;
+    }
+    if (!leaf.made) finder_.make(leaf);
+    return true;
+  }
+  HWY_INLINE std::size_t offset_in(const LeafLayers& leaf) const {
+    return static_cast<std::size_t>((v_ - leaf.rect.v0) * leaf.stride + (u_ - leaf.rect.u0));
+  }
+
+  /// Whether a ray is inside a leaf after all flips before `from`, and its next flip.
+  HWY_INLINE void probe_leaf(std::uint32_t slot, V from, M& inside, V& next) {
+    const D d;
+    inside = no_lane(d);
+    next = hn::Set(d, LeafLayers::kEmpty);
+    LeafLayers& leaf = area_.leaves[slot];
+    if (!holds(leaf)) return;
+    const std::size_t offset = offset_in(leaf);
+    for (std::size_t k = 0; k < leaf.keys.size(); ++k) {
+      const V flip = hn::Load(d, leaf.keys[k] + offset);
+      const M past = hn::Lt(flip, from);
+      inside = hn::Xor(inside, past);
+      next = hn::Min(next, hn::Or(flip, hn::VecFromMask(d, past)));
+    }
+  }
+
+  /// The same for an edge, as its node sees it.
+  HWY_INLINE void probe_edge(Program::Edge edge, V from, M active, bool need_true, bool need_false,
+                             M& value, V& next, V& who) {
+    const D d;
+    if (edge.leaf()) {
+      probe_leaf(edge.child(), from, value, next);
+      who = hn::Set(d, edge.child());
+    } else {
+      probe(edge.child(), from, active, edge.inverted() ? need_false : need_true,
+            edge.inverted() ? need_true : need_false, value, next, who);
+    }
+    if (edge.inverted()) value = hn::Not(value);
+  }
+
+  /// The value of a node after all flips before `from`, in the lanes `active`; and the next depth
+  /// where it changes, where it is true and `need_true`, or false and `need_false`.
+  HWY_NOINLINE void probe(std::uint32_t index, V from, M active, bool need_true, bool need_false,
+                          M& value, V& next, V& who) {
+    const D d;
+    const TileProgram::Node& node = area_.program->nodes[index];
+    const Program::Edge* edges = area_.program->edges.data() + node.first;
+    const std::uint32_t* nearest = area_.program->nearest.data() + node.first;
+    const V none = hn::Set(d, LeafLayers::kEmpty), zero = hn::Zero(d);
+    V near = hn::IfThenElse(active, none, zero), near_who = zero, far = zero, far_who = zero;
+    M any = no_lane(d);
+    for (std::uint32_t i = 0; i < node.count; ++i) {
+      if (!need_true &&
+          hn::AllTrue(d, hn::Or(any, hn::Not(hn::Gt(near, hn::Set(d, nearest[i])))))) {
+        break;  // what comes is false here and changes later
+      }
+      M edge_value;
+      V edge_next, edge_who;
+      probe_edge(edges[i], from, active, need_true, need_false, edge_value, edge_next, edge_who);
+      any = hn::Or(any, edge_value);
+      const M nearer = hn::AndNot(edge_value, hn::Lt(edge_next, near));
+      near = hn::IfThenElse(nearer, edge_next, near);
+      near_who = hn::IfThenElse(nearer, edge_who, near_who);
+      const M farther = hn::And(edge_value, hn::Gt(edge_next, far));
+      far = hn::IfThenElse(farther, edge_next, far);
+      far_who = hn::IfThenElse(farther, edge_who, far_who);
+    }
+    value = any;
+    next = near;
+    who = near_who;
+    if (!need_true) return;
+    M open = hn::And(hn::And(any, active), hn::Lt(far, none));
+    while (!hn::AllFalse(d, open)) {
+      const V beyond = hn::Add(far, hn::Set(d, 1u));
+      M still = no_lane(d);
+      V farther = zero, farther_who = zero;
+      const std::uint32_t first =
+          hn::GetLane(hn::MinOfLanes(d, hn::IfThenElse(open, beyond, none)));
+      const std::uint32_t last = hn::GetLane(hn::MaxOfLanes(d, hn::IfThenElseZero(open, beyond)));
+      for (std::uint32_t i = 0; i < node.count; ++i) {
+        if (edges[i].leaf() && !edges[i].inverted()) {  // a ray is outside there
+          const LeafLayers& leaf = area_.leaves[edges[i].child()];
+          if (leaf.nearest >= last || (leaf.made && leaf.farthest < first)) continue;
+        }
+        M edge_value;
+        V edge_next, edge_who;
+        probe_edge(edges[i], beyond, open, true, false, edge_value, edge_next, edge_who);
+        still = hn::Or(still, edge_value);
+        const M more = hn::And(edge_value, hn::Gt(edge_next, farther));
+        farther = hn::IfThenElse(more, edge_next, farther);
+        farther_who = hn::IfThenElse(more, edge_who, farther_who);
+      }
+      open = hn::And(open, still);
+      far = hn::IfThenElse(open, farther, far);
+      far_who = hn::IfThenElse(open, farther_who, far_who);
+      open = hn::And(open, hn::Lt(far, none));
+    }
+    next = hn::IfThenElse(any, far, near);
+    who = hn::IfThenElse(any, far_who, near_who);
+  }
+
+  const SearchArea& area_;
+  TileFinder& finder_;
+  int u_ = 0, v_ = 0;
+};
+
+void SearchSurface(const SearchArea& area, TileFinder& finder) {
+  const D d;
+  const auto lanes = static_cast<int>(hn::Lanes(d));
+  Search search(area, finder);
+  SurfaceImage& image = *area.part.image;
+  alignas(64) std::uint32_t depths[LeafLayers::kLanes], slots[LeafLayers::kLanes],
+      triangles[LeafLayers::kLanes], doubts[LeafLayers::kLanes];
+  for (int v = area.rect.v0; v < area.rect.v1; ++v) {
+    for (int u = area.rect.u0; u < area.rect.u1; u += lanes) {
+      search.set_pixels(u, v);
+      V depth, who, triangle;
+      search.find(depth, who);
+      const std::size_t at = area.part.index(u, v);
+      const int count = std::min(lanes, area.end - u);
+      if (count <= 0) continue;
+      hn::Store(depth, d, depths);
+      if (hn::AllTrue(d, hn::Eq(depth, hn::Set(d, LeafLayers::kEmpty)))) {
+        std::copy(depths, depths + count, image.depth.begin() + static_cast<long>(at));
+        continue;
+      }
+      const M doubt = search.judge(depth, who, triangle);
+      const V solid = hn::GatherIndex(d, area.solids, hn::BitCast(hn::RebindToSigned<D>(), who));
+      if (count == lanes) {
+        hn::StoreU(depth, d, image.depth.data() + at);
+        hn::StoreU(solid, d, image.solid.data() + at);
+        hn::StoreU(triangle, d, image.triangle.data() + at);
+      } else {
+        hn::Store(solid, d, slots);
+        hn::Store(triangle, d, triangles);
+        for (int i = 0; i < count; ++i) {
+          const std::size_t pixel = at + static_cast<std::size_t>(i);
+          image.depth[pixel] = depths[i];
+          image.solid[pixel] = slots[i];
+          image.triangle[pixel] = triangles[i];
+        }
+      }
+      if (hn::AllFalse(d, doubt)) continue;
+      hn::Store(hn::VecFromMask(d, doubt), d, doubts);
+      for (int i = 0; i < count; ++i) {
+        if (doubts[i] != 0) {
+          area.doubtful->push_back(at + static_cast<std::size_t>(i));
+        }
+      }
+    }
+  }
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace strata::csg
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace strata::csg {
+
+HWY_EXPORT(RasterLayers);
+HWY_EXPORT(NormalizeLayers);
+HWY_EXPORT(SearchSurface);
+
+std::uint64_t raster_layers(const LatticeMesh& mesh, const RasterTarget& target,
+                            std::span<const std::uint32_t> triangles, const PixelRect& clip,
+                            double steep_from, LeafLayers& leaf, Arena& arena) {
+  return HWY_DYNAMIC_DISPATCH(RasterLayers)(mesh, target, triangles, clip, steep_from, leaf, arena);
+}
+void normalize_layers(LeafLayers& leaf, bool all_pixels_special, TileFinder& finder) {
+  HWY_DYNAMIC_DISPATCH(NormalizeLayers)(leaf, all_pixels_special, finder);
+}
+void search_surface(const SearchArea& area, TileFinder& finder) {
+  HWY_DYNAMIC_DISPATCH(SearchSurface)(area, finder);
+}
+
+}  // namespace strata::csg
+#endif  // HWY_ONCE

@@ -1,0 +1,397 @@
+// Depth lists as a NumPy archive: a ZIP of .npy arrays. The layout is in ldi_io.h.
+
+#include <unzip.h>
+#include <zip.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <charconv>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <memory>
+#include <new>
+#include <span>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "hashbuffer/formats/npy_head.h"
+#include "hashbuffer/formats/seekable_output.h"
+#include "strata/core/grid.h"
+#include "strata/hashbuffer/formats/ldi_io.h"
+
+namespace strata {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "arrays are written as they are");
+
+constexpr std::size_t kPart = std::size_t{1} << 16;  // elements converted or copied at a time
+
+// --- writing ------------------------------------------------------------------------------------
+
+// minizip's view of a SeekableOutput.
+zlib_filefunc64_def output_functions(SeekableOutput& output) {
+  zlib_filefunc64_def f{};
+  f.opaque = &output;
+  f.zopen64_file = [](voidpf opaque, const void*, int) { return opaque; };
+  f.zread_file = [](voidpf, voidpf, void*, uLong) { return uLong{0}; };
+  f.zwrite_file = [](voidpf opaque, voidpf, const void* data, uLong bytes) {
+    return static_cast<SeekableOutput*>(opaque)->write(data, bytes) ? bytes : uLong{0};
+  };
+  f.ztell64_file = [](voidpf opaque, voidpf) {
+    return static_cast<ZPOS64_T>(static_cast<SeekableOutput*>(opaque)->position());
+  };
+  f.zseek64_file = [](voidpf opaque, voidpf, ZPOS64_T offset, int origin) {
+    auto& to = *static_cast<SeekableOutput*>(opaque);
+    to.seek(offset + (origin == ZLIB_FILEFUNC_SEEK_CUR   ? to.position()
+                      : origin == ZLIB_FILEFUNC_SEEK_END ? to.end()
+                                                         : 0));
+    return 0L;
+  };
+  f.zclose_file = [](voidpf, voidpf) { return 0; };
+  f.zerror_file = [](voidpf opaque, voidpf) {
+    return static_cast<SeekableOutput*>(opaque)->status() ? 0 : 1;
+  };
+  return f;
+}
+
+class NpzWriter {
+ public:
+  NpzWriter(SeekableOutput& output, const LdiNpzOptions& options, const Execution& execution,
+            std::uint64_t total_bytes)
+      : options_(options),
+        execution_(execution),
+        total_(std::max<std::uint64_t>(total_bytes, 1)),
+        functions_(output_functions(output)),
+        zip_(zipOpen2_64("", APPEND_STATUS_CREATE, nullptr, &functions_)) {}
+  NpzWriter(const NpzWriter&) = delete;
+  NpzWriter& operator=(const NpzWriter&) = delete;
+  ~NpzWriter() { (void)close(); }
+
+  // Adds array `name` of `count` elements, which part(begin, end) gives as bytes.
+  template <class Part>
+  bool add(const char* name, std::string_view type, const std::string& shape, std::size_t count,
+           Part&& part) {
+    if (!zip_) return false;
+    zip_fileinfo info{};
+    info.dosDate = (1u << 21) | (1u << 16);  // 1980-01-01: the same lists give the same bytes
+    const int method = options_.compress ? Z_DEFLATED : 0;
+    if (zipOpenNewFileInZip64(zip_, (std::string(name) + ".npy").c_str(), &info, nullptr, 0,
+                              nullptr, 0, nullptr, method, Z_DEFAULT_COMPRESSION, 1) != ZIP_OK) {
+      return false;
+    }
+    const std::string head = npy_head(type, false, shape);
+    bool ok = write(std::as_bytes(std::span(head)));
+    for (std::size_t begin = 0; ok && begin < count; begin += kPart) {
+      if (execution_.stop.stop_requested()) return false;
+      ok = write(part(begin, std::min(begin + kPart, count)));
+    }
+    return zipCloseFileInZip(zip_) == ZIP_OK && ok;
+  }
+  bool close() { return zip_ && zipClose(std::exchange(zip_, nullptr), nullptr) == ZIP_OK; }
+
+ private:
+  bool write(std::span<const std::byte> bytes) {
+    done_ += bytes.size();
+    if (execution_.progress) {
+      execution_.progress(std::min(1.0, static_cast<double>(done_) / static_cast<double>(total_)));
+    }
+    return zipWriteInFileInZip(zip_, bytes.data(), static_cast<unsigned>(bytes.size())) == ZIP_OK;
+  }
+  LdiNpzOptions options_;
+  const Execution& execution_;
+  std::uint64_t total_, done_ = 0;
+  zlib_filefunc64_def functions_;
+  zipFile zip_;
+};
+
+bool write_arrays(NpzWriter& zip, const LayeredDepthImage& image) {
+  const std::span<const DepthItem> items = image.items;
+  const auto borrowed = [](const auto& array) {
+    return [view = std::span(array)](std::size_t begin, std::size_t end) {
+      return std::as_bytes(view.subspan(begin, end - begin));
+    };
+  };
+  std::vector<std::uint32_t> part;
+  const auto converted = [&](auto value) {
+    return [&, value](std::size_t begin, std::size_t end) {
+      part.resize(end - begin);
+      std::transform(items.begin() + static_cast<std::ptrdiff_t>(begin),
+                     items.begin() + static_cast<std::ptrdiff_t>(end), part.begin(), value);
+      return std::as_bytes(std::span<const std::uint32_t>(part));
+    };
+  };
+  std::array<double, 16> matrix;
+  for (int row = 0; row < 4; ++row) {
+    for (int column = 0; column < 4; ++column) {
+      matrix[static_cast<std::size_t>(4 * row + column)] = image.world_from_image[column][row];
+    }
+  }
+  const std::array<std::int64_t, 2> shape = {image.height, image.width};
+  const std::array<std::uint32_t, 1> limit = {image.depth_limit};
+  return zip.add("shape", "<i8", "(2,)", 2, borrowed(shape)) &&
+         zip.add("depth_limit", "<u4", "()", 1, borrowed(limit)) &&
+         zip.add("world_from_image", "<f8", "(4, 4)", 16, borrowed(matrix)) &&
+         zip.add("offsets", "<u8", fmt::format("({},)", image.offsets.size()), image.offsets.size(),
+                 borrowed(image.offsets)) &&
+         zip.add("depth", "<u4", fmt::format("({},)", items.size()), items.size(),
+                 converted([](DepthItem item) { return item.depth(); })) &&
+         zip.add("payload", "<u4", fmt::format("({},)", items.size()), items.size(),
+                 converted([](DepthItem item) { return item.payload(); })) &&
+         zip.close();
+}
+
+// --- reading ------------------------------------------------------------------------------------
+
+// deflate cannot make more than this many bytes of one.
+constexpr std::uint64_t kLargestRatio = 1040;
+
+// Whether the last bytes are a ZIP's closing record. minizip does without the last of them.
+bool ends_as_archive(const std::string& path) {
+  constexpr std::streamoff kRecord = 22;  // without a comment, as NumPy and we write it
+  std::ifstream file(path, std::ios::binary | std::ios::ate);
+  if (!file || file.tellg() < kRecord) return false;
+  std::array<char, 4> signature{};
+  file.seekg(-kRecord, std::ios::end);
+  file.read(signature.data(), signature.size());
+  return file && std::memcmp(signature.data(), "PK\5\6", 4) == 0;
+}
+
+struct UnzipCloser {
+  void operator()(void* zip) const { unzClose(zip); }
+};
+
+// What a .npy head says.
+struct ArrayHead {
+  std::string type;
+  std::vector<std::uint64_t> shape;
+  std::uint64_t count = 1;
+};
+
+// The text that follows `key` in the dictionary of a head.
+std::string_view value_of(std::string_view text, std::string_view key) {
+  const std::size_t at = text.find(key);
+  if (at == std::string_view::npos) return {};
+  text.remove_prefix(at + key.size());
+  const std::size_t start = text.find_first_not_of(" :");
+  return start == std::string_view::npos ? std::string_view{} : text.substr(start);
+}
+
+// Empty type: malformed.
+ArrayHead parse_head(std::string_view text) {
+  ArrayHead head;
+  const std::string_view type = value_of(text, "'descr'");
+  const std::string_view order = value_of(text, "'fortran_order'");
+  std::string_view shape = value_of(text, "'shape'");
+  const std::size_t end = shape.find(')');
+  if (type.size() < 5 || type[0] != '\'' || type[4] != '\'' || !order.starts_with("False") ||
+      !shape.starts_with('(') || end == std::string_view::npos) {
+    return head;
+  }
+  shape = shape.substr(1, end - 1);
+  while (true) {
+    const std::size_t start = shape.find_first_not_of(" ,");
+    if (start == std::string_view::npos) break;
+    shape.remove_prefix(start);
+    std::uint64_t length = 0;
+    const auto [rest, error] = std::from_chars(shape.data(), shape.data() + shape.size(), length);
+    if (error != std::errc() || length > std::numeric_limits<std::uint32_t>::max() * 16ULL ||
+        (head.count != 0 && length > std::numeric_limits<std::uint64_t>::max() / head.count)) {
+      return head;
+    }
+    shape.remove_prefix(static_cast<std::size_t>(rest - shape.data()));
+    head.shape.push_back(length);
+    head.count *= length;
+  }
+  head.type = std::string(type.substr(1, 3));
+  return head;
+}
+
+class NpzReader {
+ public:
+  NpzReader(const std::string& path, const Execution& execution)
+      : path_(path), execution_(execution) {
+    std::error_code error;
+    file_bytes_ = std::filesystem::file_size(path, error);
+    if (!error && ends_as_archive(path)) zip_.reset(unzOpen64(path.c_str()));
+  }
+  [[nodiscard]] bool opened() const { return zip_ != nullptr; }
+
+  // Reads a whole array. `shape` is checked, where an entry of kAny takes any length. What the
+  // caller makes of an element, `bytes_beside`, counts for the memory limit too.
+  static constexpr std::uint64_t kAny = ~std::uint64_t{0};
+  template <class T>
+  Result<std::vector<T>> read(const char* name, const char* type,
+                              const std::vector<std::uint64_t>& shape,
+                              std::size_t bytes_beside = 0) {
+    const Result<std::uint64_t> count = open(name, type, sizeof(T), bytes_beside, shape);
+    if (!count) return tl::unexpected(count.error());
+    std::vector<T> values(*count);
+    const auto bytes = std::as_writable_bytes(std::span(values));
+    for (std::size_t begin = 0; begin < bytes.size(); begin += kPart) {
+      if (execution_.stop.stop_requested()) {
+        return fail(ErrorCode::kCancelled, "{}: cancelled", path_);
+      }
+      if (!read_bytes(bytes.subspan(begin, std::min(kPart, bytes.size() - begin)))) {
+        return damaged(name);
+      }
+    }
+    // Reads the end of the entry and checks its checksum.
+    std::byte beyond;
+    if (unzReadCurrentFile(zip_.get(), &beyond, 1) != 0 ||
+        unzCloseCurrentFile(zip_.get()) != UNZ_OK) {
+      return damaged(name);
+    }
+    return values;
+  }
+
+ private:
+  tl::unexpected<Error> damaged(const char* name) const {
+    return fail(ErrorCode::kInput, "{}: array {} is damaged or ends early", path_, name);
+  }
+  bool read_bytes(std::span<std::byte> out) {
+    while (!out.empty()) {
+      const int got = unzReadCurrentFile(zip_.get(), out.data(), static_cast<unsigned>(out.size()));
+      if (got <= 0) return false;
+      out = out.subspan(static_cast<std::size_t>(got));
+    }
+    return true;
+  }
+  // Moves to the data of an array. @return its number of elements
+  Result<std::uint64_t> open(const char* name, const char* type, std::size_t size,
+                             std::size_t bytes_beside, const std::vector<std::uint64_t>& shape) {
+    unz_file_info64 info{};
+    if (unzLocateFile(zip_.get(), (std::string(name) + ".npy").c_str(), 1) != UNZ_OK ||
+        unzGetCurrentFileInfo64(zip_.get(), &info, nullptr, 0, nullptr, 0, nullptr, 0) != UNZ_OK) {
+      return fail(ErrorCode::kInput, "{}: no array {}", path_, name);
+    }
+    std::array<char, 10> start{};
+    std::string text;
+    if (unzOpenCurrentFile(zip_.get()) != UNZ_OK ||
+        !read_bytes(std::as_writable_bytes(std::span(start))) ||
+        std::memcmp(start.data(), "\x93NUMPY\x01", 7) != 0) {
+      return damaged(name);
+    }
+    const std::size_t length =
+        static_cast<unsigned char>(start[8]) + 256u * static_cast<unsigned char>(start[9]);
+    text.resize(length);
+    if (!read_bytes(std::as_writable_bytes(std::span(text)))) return damaged(name);
+    const ArrayHead head = parse_head(text);
+    bool fits = head.type == type && head.shape.size() == shape.size();
+    for (std::size_t i = 0; fits && i < shape.size(); ++i) {
+      fits = shape[i] == kAny || shape[i] == head.shape[i];
+    }
+    if (!fits) {
+      return fail(ErrorCode::kInput, "{}: array {} has type '{}' and shape ({}), not '{}' and ({})",
+                  path_, name, head.type, fmt::join(head.shape, ", "), type, describe(shape));
+    }
+    const std::uint64_t bytes = head.count * size;
+    if (info.uncompressed_size != start.size() + length + bytes ||
+        bytes / kLargestRatio > file_bytes_) {
+      return fail(ErrorCode::kInput, "{}: array {} of {} elements has {} bytes", path_, name,
+                  head.count, info.uncompressed_size);
+    }
+    held_ += head.count * (size + bytes_beside);
+    if (execution_.memory_limit != 0 && held_ > execution_.memory_limit) {
+      return fail(ErrorCode::kLimit, "{}: array {} needs {} bytes, the memory limit is {}", path_,
+                  name, held_, execution_.memory_limit);
+    }
+    return head.count;
+  }
+  static std::string describe(const std::vector<std::uint64_t>& shape) {
+    std::vector<std::string> words;
+    for (const std::uint64_t length : shape) {
+      words.push_back(length == kAny ? "any" : std::to_string(length));
+    }
+    return fmt::format("{}", fmt::join(words, ", "));
+  }
+
+  const std::string& path_;
+  const Execution& execution_;
+  std::uint64_t file_bytes_ = 0, held_ = 0;
+  std::unique_ptr<void, UnzipCloser> zip_;
+};
+
+Result<LayeredDepthImage> read_arrays(const std::string& path, const Execution& execution) {
+  NpzReader zip(path, execution);
+  if (!zip.opened()) {
+    return fail(ErrorCode::kInput, "{}: not a NumPy archive, or it ends early", path);
+  }
+  const auto shape = zip.read<std::int64_t>("shape", "<i8", {2});
+  if (!shape) return tl::unexpected(shape.error());
+  const auto limit = zip.read<std::uint32_t>("depth_limit", "<u4", {});
+  if (!limit) return tl::unexpected(limit.error());
+  const auto matrix = zip.read<double>("world_from_image", "<f8", {4, 4});
+  if (!matrix) return tl::unexpected(matrix.error());
+  const auto [height, width] = std::pair((*shape)[0], (*shape)[1]);
+  if (height < 1 || width < 1 || height > kMaxGridSide || width > kMaxGridSide) {
+    return fail(ErrorCode::kInput, "{}: {} x {} pixels; 1 to {} a side are possible", path, width,
+                height, kMaxGridSide);
+  }
+  LayeredDepthImage image;
+  image.width = static_cast<int>(width);
+  image.height = static_cast<int>(height);
+  image.depth_limit = limit->front();
+  for (int row = 0; row < 4; ++row) {
+    for (int column = 0; column < 4; ++column) {
+      image.world_from_image[column][row] = (*matrix)[static_cast<std::size_t>(4 * row + column)];
+    }
+  }
+  auto offsets =
+      zip.read<std::uint64_t>("offsets", "<u8", {static_cast<std::uint64_t>(width * height) + 1});
+  if (!offsets) return tl::unexpected(offsets.error());
+  image.offsets = std::move(*offsets);
+  {
+    const auto depth =
+        zip.read<std::uint32_t>("depth", "<u4", {NpzReader::kAny}, sizeof(DepthItem));
+    if (!depth) return tl::unexpected(depth.error());
+    image.items.reserve(depth->size());
+    for (const std::uint32_t d : *depth) image.items.emplace_back(std::uint64_t{d} << 32);
+  }
+  const auto payload = zip.read<std::uint32_t>("payload", "<u4", {image.items.size()});
+  if (!payload) return tl::unexpected(payload.error());
+  for (std::size_t i = 0; i < payload->size(); ++i) image.items[i].bits |= (*payload)[i];
+  if (const Result<void> valid = check_layered_depth_image(image); !valid) {
+    return fail(ErrorCode::kInput, "{}: {}", path, valid.error().message);
+  }
+  return image;
+}
+
+}  // namespace
+
+Result<void> write_ldi_npz(const std::string& path, const LayeredDepthImage& image,
+                           const LdiNpzOptions& options, const Execution& execution) {
+  if (const Result<void> valid = check_layered_depth_image(image); !valid) return valid;
+  try {
+    Result<SeekableOutput> output = SeekableOutput::create(path);
+    if (!output) return tl::unexpected(output.error());
+    bool written = false;
+    {
+      NpzWriter zip(*output, options, execution, image.offsets.size() * 8 + image.items.size() * 8);
+      written = write_arrays(zip, image);
+    }
+    if (execution.stop.stop_requested() && !written) {
+      return fail(ErrorCode::kCancelled, "{}: cancelled", path);
+    }
+    if (!output->status()) return output->status();
+    if (!written) return fail(ErrorCode::kOutput, "{}: the archive cannot be written", path);
+    return output->finish();
+  } catch (const std::bad_alloc&) {
+    return fail(ErrorCode::kLimit, "{}: out of memory", path);
+  }
+}
+
+Result<LayeredDepthImage> read_ldi_npz(const std::string& path, const Execution& execution) {
+  try {
+    return read_arrays(path, execution);
+  } catch (const std::bad_alloc&) {
+    return fail(ErrorCode::kLimit, "{}: out of memory", path);
+  }
+}
+
+}  // namespace strata

@@ -1,0 +1,151 @@
+#include "strata/mesh/formats/read_mesh.h"
+
+#include <new>
+#include <stdexcept>
+
+#include "mesh/formats/input_bytes.h"
+#include "mesh/formats/reader_common.h"
+#include "mesh/formats/text_scanner.h"
+#ifdef STRATA_HAVE_OPENMESH
+#include "mesh/formats/openmesh_reader.h"
+#endif
+
+namespace strata {
+namespace {
+
+using detail::equals_no_case;
+
+struct NamedFormat {
+  MeshFormat format;
+  const char* name;
+};
+constexpr NamedFormat kFormats[] = {{MeshFormat::kObj, "obj"},
+                                    {MeshFormat::kStl, "stl"},
+                                    {MeshFormat::kPly, "ply"},
+                                    {MeshFormat::kOff, "off"}};
+
+/// What the first bytes say, for a hint when reading by the extension failed.
+MeshFormat format_by_content(std::string_view text) {
+  if (text.starts_with("ply\n") || text.starts_with("ply\r")) return MeshFormat::kPly;
+  if (text.starts_with("solid ") || text.starts_with("solid\n")) return MeshFormat::kStl;
+  if (text.starts_with("OFF\n") || text.starts_with("OFF\r") || text.starts_with("OFF ") ||
+      text.starts_with("COFF")) {
+    return MeshFormat::kOff;
+  }
+  return MeshFormat::kAuto;
+}
+
+Result<MeshFile> read_as(const detail::ReaderInput& input) {
+  switch (input.options.format) {
+    case MeshFormat::kObj:
+      return detail::read_obj(input);
+    case MeshFormat::kStl:
+      return detail::read_stl(input);
+    case MeshFormat::kPly:
+      return detail::read_ply(input);
+    case MeshFormat::kOff:
+      return detail::read_off(input);
+    case MeshFormat::kAuto:
+      break;
+  }
+  return fail(ErrorCode::kUsage, "{}: no format was given", input.name);
+}
+
+/// Reads text that ends in a readable zero byte; keeps exceptions (memory) inside.
+Result<MeshFile> read_text(std::string_view text, const std::string& name,
+                           const MeshReadOptions& options, const Execution& execution) {
+  if (text.empty()) return fail(ErrorCode::kInput, "{}: the file is empty", name);
+  // The 80 bytes before the triangles of a binary STL file may be anything.
+  const bool anything = options.format == MeshFormat::kStl && detail::is_binary_stl(text);
+  if (!anything && detail::is_wide_text(text)) {
+    return fail(ErrorCode::kInput, "{}: {}", name, detail::kWideText);
+  }
+  const std::size_t size = text.size();
+  if (!anything) text = detail::without_byte_order_mark(text);
+  try {
+    Result<MeshFile> result = read_as({text, name, options, execution, size - text.size()});
+    if (result) result->stats.bytes = size;
+    const MeshFormat looks_like = format_by_content(text);
+    if (!result && result.error().code == ErrorCode::kInput && looks_like != MeshFormat::kAuto &&
+        looks_like != options.format) {
+      result.error().message +=
+          fmt::format(" (read as {}, but it looks like {})", mesh_format_name(options.format),
+                      mesh_format_name(looks_like));
+    }
+    return result;
+  } catch (const std::bad_alloc&) {
+    return fail(ErrorCode::kLimit, "{}: not enough memory for the mesh of {} bytes", name,
+                text.size());
+  } catch (const std::length_error&) {
+    return fail(ErrorCode::kLimit, "{}: not enough memory for the mesh of {} bytes", name,
+                text.size());
+  }
+}
+
+}  // namespace
+
+MeshFormat mesh_format_named(std::string_view name) {
+  for (const NamedFormat& known : kFormats) {
+    if (equals_no_case(name, known.name)) return known.format;
+  }
+  return MeshFormat::kAuto;
+}
+
+MeshFormat mesh_format_of(std::string_view path) {
+  const std::size_t dot = path.find_last_of("./");
+  if (dot == std::string_view::npos || path[dot] != '.') return MeshFormat::kAuto;
+  return mesh_format_named(path.substr(dot + 1));
+}
+
+const char* mesh_format_name(MeshFormat format) {
+  for (const NamedFormat& known : kFormats) {
+    if (known.format == format) return known.name;
+  }
+  return "auto";
+}
+
+Result<MeshFile> parse_mesh(std::string_view bytes, const std::string& name,
+                            const MeshReadOptions& options, const Execution& execution) {
+  try {
+    const std::string terminated(bytes);  // for the zero byte behind it
+    return read_text(terminated, name, options, execution);
+  } catch (const std::bad_alloc&) {
+    return fail(ErrorCode::kLimit, "{}: not enough memory for {} bytes", name, bytes.size());
+  }
+}
+
+Result<MeshFile> read_mesh(const std::string& path, const MeshReadOptions& options,
+                           const Execution& execution) {
+  MeshReadOptions known = options;
+  if (known.format == MeshFormat::kAuto) {
+    if (path == "-") {
+      return fail(ErrorCode::kUsage, "standard input needs a format: obj, stl, ply or off");
+    }
+    known.format = mesh_format_of(path);
+    if (known.format == MeshFormat::kAuto) {
+      return fail(ErrorCode::kInput,
+                  "{}: its name ends in none of .obj, .stl, .ply, .off; name the format", path);
+    }
+  }
+  if (known.reader == MeshReader::kOpenMesh) {
+#ifdef STRATA_HAVE_OPENMESH
+    return read_with_openmesh(path, known, execution);
+#else
+    return fail(ErrorCode::kUsage, "{}: this build has no OpenMesh", path);
+#endif
+  }
+  try {
+    const auto file = detail::InputBytes::open(path, execution.memory_limit, execution.stop);
+    if (!file) return tl::unexpected(file.error());
+    Result<MeshFile> result =
+        read_text(file->view(), path == "-" ? "standard input" : path, known, execution);
+    if (file->changed()) {
+      return fail(ErrorCode::kInput, "{}: the file changed while it was read", path);
+    }
+    return result;
+  } catch (const std::bad_alloc&) {
+    return fail(ErrorCode::kLimit, "{}: not enough memory to read the file", path);
+  }
+}
+
+}  // namespace strata

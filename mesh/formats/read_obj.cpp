@@ -1,0 +1,392 @@
+#include <algorithm>
+#include <atomic>
+#include <limits>
+#include <memory>
+#include <mutex>
+
+#include "mesh/formats/reader_common.h"
+#include "mesh/formats/text_scanner.h"
+
+// The text is cut at line ends into chunks that are parsed on all threads; finished chunks are
+// appended in order. Face indices are absolute in OBJ, so only negative ones, which count back from
+// the last vertex read, need the number of vertices before their chunk.
+
+namespace strata::detail {
+namespace {
+
+/// Past blanks and continued line ends.
+const char* skip_blanks_obj(const char* p) {
+  for (;;) {
+    if (is_blank(*p)) {
+      ++p;
+    } else if (*p == '\\' && p[1] == '\n') {
+      p += 2;
+    } else if (*p == '\\' && p[1] == '\r') {
+      p += p[2] == '\n' ? 3 : 2;
+    } else {
+      return p;
+    }
+  }
+}
+
+/// The line end at or after p, or `end`.
+const char* find_line_end(const char* p, const char* end) {
+  const auto* stop =
+      static_cast<const char*>(std::memchr(p, '\n', static_cast<std::size_t>(end - p)));
+  return stop == nullptr ? end : stop;
+}
+
+/// The start of the line after p's.
+const char* next_line(const char* p, const char* end) {
+  const char* stop = find_line_end(p, end);
+  return stop == end ? end : stop + 1;
+}
+
+/// Where a statement that was read to p ends: at its line end, which a backslash may put off.
+const char* skip_statement(const char* p, const char* end) {
+  for (;;) {
+    if (*p == '\n') return p + 1;
+    const char* stop = find_line_end(p, end);
+    if (stop == end) return end;
+    const char* last = stop;
+    while (last > p && last[-1] == '\r') --last;
+    if (last == p || last[-1] != '\\') return stop + 1;
+    p = stop + 1;
+  }
+}
+
+/// What a chunk holds; reused for later chunks once appended.
+struct Chunk {
+  std::vector<glm::dvec3> positions;
+  std::vector<glm::uvec3> triangles;
+  std::vector<std::uint32_t> elements;  ///< of each triangle, within the chunk; empty: identity
+  std::vector<std::size_t> relative;    ///< triangles with corners counted from the chunk's start
+  std::vector<std::uint8_t> relative_corners;  ///< and which of them: bits 0 to 2
+  std::uint64_t faces = 0, short_faces = 0, first_short_face = 0, ignored = 0;
+  std::size_t error_offset = std::numeric_limits<std::size_t>::max();
+  std::string error;
+
+  void clear() {
+    positions.clear();
+    triangles.clear();
+    elements.clear();
+    relative.clear();
+    relative_corners.clear();
+    faces = short_faces = first_short_face = ignored = 0;
+  }
+};
+
+class ObjReader {
+ public:
+  explicit ObjReader(const ReaderInput& input)
+      : input_(input), begin_(input.text.data()), end_(begin_ + input.text.size()) {}
+
+  Result<MeshFile> read();
+
+ private:
+  void cut();
+  void parse(const char* p, const char* end, Chunk& chunk) const;
+  const char* parse_vertex(const char* p, Chunk& chunk) const;
+  const char* parse_face(const char* p, Chunk& chunk) const;
+  const char* fail_at(const char* p, Chunk& chunk, std::string message) const;
+  void append(Chunk& chunk);
+  void reserve();
+  FacePlace locate(std::uint32_t element) const;
+
+  const ReaderInput& input_;
+  const char* begin_;
+  const char* end_;
+  std::vector<const char*> cuts_;  ///< chunk i is [cuts_[i], cuts_[i + 1])
+  RawMesh mesh_;
+  bool identity_ = true;
+  std::size_t error_offset_ = std::numeric_limits<std::size_t>::max();
+  std::string error_;
+  bool over_limit_ = false;
+  std::int64_t vertex_total_ = 0;
+};
+
+void ObjReader::cut() {
+  cuts_.push_back(begin_);
+  const char* p = begin_;
+  while (static_cast<std::size_t>(end_ - p) > input_.options.chunk_bytes) {
+    p += input_.options.chunk_bytes;
+    for (;;) {
+      const char* stop = find_line_end(p, end_);
+      p = stop == end_ ? end_ : stop + 1;
+      if (stop == end_) break;
+      while (stop > begin_ && stop[-1] == '\r') --stop;
+      if (stop == begin_ || stop[-1] != '\\') break;
+    }
+    if (p < end_) cuts_.push_back(p);
+  }
+  cuts_.push_back(end_);
+}
+
+const char* ObjReader::fail_at(const char* p, Chunk& chunk, std::string message) const {
+  chunk.error_offset = static_cast<std::size_t>(p - begin_);
+  chunk.error = std::move(message);
+  return nullptr;
+}
+
+const char* ObjReader::parse_vertex(const char* p, Chunk& chunk) const {
+  glm::dvec3 position;
+  for (int i = 0; i < 3; ++i) {
+    p = skip_blanks_obj(p);
+    const char* next = parse_double(p, position[i]);
+    if (next == nullptr || !(ends_token(*next) || *next == '\\')) {
+      return fail_at(p, chunk,
+                     ends_token(*p) ? fmt::format("vertex has {} of 3 coordinates", i)
+                                    : describe(p, end_) + " is not a number");
+    }
+    p = next;
+  }
+  chunk.positions.push_back(position);
+  return p;
+}
+
+const char* ObjReader::parse_face(const char* p, Chunk& chunk) const {
+  const std::size_t first_triangle = chunk.triangles.size();
+  std::uint32_t corners[3] = {};
+  unsigned relative = 0;  // which corners count from the chunk's start
+  std::size_t count = 0;
+  for (;;) {
+    p = skip_blanks_obj(p);
+    if (*p == '\n' || *p == '\0' || *p == '#') break;
+    std::int64_t index = 0;
+    const char* next = parse_integer(p, index);
+    if (next == nullptr || !(ends_token(*next) || *next == '/' || *next == '\\')) {
+      return fail_at(p, chunk, describe(p, end_) + " is not a vertex of a face");
+    }
+    while (!ends_token(*next) && *next != '\\') ++next;  // texture and normal
+    if (*next == '\\' && next[1] != '\n' && next[1] != '\r') next = skip_token(next);
+    p = next;
+
+    std::uint32_t corner = kNoVertex;
+    bool counted_back = false;
+    if (index > 0 && index <= static_cast<std::int64_t>(kMaxVertices)) {
+      corner = static_cast<std::uint32_t>(index - 1);
+    } else if (index < 0 && index >= std::numeric_limits<std::int32_t>::min()) {
+      // Modulo 2^32; append() adds the vertices before the chunk and looks for a wrap.
+      corner =
+          static_cast<std::uint32_t>(static_cast<std::int64_t>(chunk.positions.size()) + index);
+      counted_back = true;
+    }
+    const unsigned slot = count < 2 ? static_cast<unsigned>(count) : 2u;
+    if (count > 2) {
+      corners[1] = corners[2];
+      relative = (relative & 1u) | (relative >> 1 & 2u);
+    }
+    corners[slot] = corner;
+    relative |= static_cast<unsigned>(counted_back) << slot;
+    if (++count >= 3) {
+      if (relative != 0) {
+        chunk.relative.push_back(chunk.triangles.size());
+        chunk.relative_corners.push_back(static_cast<std::uint8_t>(relative));
+      }
+      chunk.triangles.emplace_back(corners[0], corners[1], corners[2]);
+    }
+  }
+  if (count < 3 && chunk.short_faces++ == 0) chunk.first_short_face = chunk.faces;
+  if (chunk.elements.empty() && (count != 3 || first_triangle != chunk.faces)) {
+    chunk.elements.resize(first_triangle);
+    for (std::size_t i = 0; i < first_triangle; ++i) {
+      chunk.elements[i] = static_cast<std::uint32_t>(i);
+    }
+  }
+  if (!chunk.elements.empty() || first_triangle != chunk.faces || count != 3) {
+    chunk.elements.resize(chunk.triangles.size(), static_cast<std::uint32_t>(chunk.faces));
+  }
+  ++chunk.faces;
+  return p;
+}
+
+void ObjReader::parse(const char* p, const char* end, Chunk& chunk) const {
+  while (p < end) {
+    p = skip_blanks(p);
+    const bool short_word = *p != '\0' && (ends_token(p[1]) || p[1] == '\\');
+    if (*p == 'v' && short_word) {
+      p = parse_vertex(p + 1, chunk);
+      if (p == nullptr) return;
+      p = skip_statement(p, end);
+    } else if ((*p == 'f' && short_word) || (*p == 'f' && p[1] == 'o' && is_blank(p[2]))) {
+      p = parse_face(p + (short_word ? 1 : 2), chunk);
+      if (p == nullptr) return;
+      p = skip_statement(p, end);
+    } else if ((*p == 'l' || *p == 'p') && short_word) {
+      ++chunk.ignored;
+      p = skip_statement(p, end);
+    } else {
+      // No continuation here: a comment may end in the backslash of a path.
+      p = next_line(p, end);
+    }
+  }
+}
+
+/// Guesses the sizes from samples, so that the vectors need not grow by copying.
+void ObjReader::reserve() {
+  constexpr std::size_t kSamples = 64, kSampleBytes = 2048;
+  std::uint64_t vertices = 0, faces = 0, bytes = 0;
+  const std::size_t step = std::max<std::size_t>(input_.text.size() / kSamples, kSampleBytes);
+  for (std::size_t at = 0; at + kSampleBytes <= input_.text.size(); at += step) {
+    const char* p = begin_ + at;
+    const char* const stop = p + kSampleBytes;
+    for (; p + 1 < stop; ++p) {
+      if (*p != '\n') continue;
+      vertices += p[1] == 'v' && p[2] == ' ';
+      faces += p[1] == 'f';
+    }
+    bytes += kSampleBytes;
+  }
+  if (bytes == 0) return;
+  const double scale = 1.1 * static_cast<double>(input_.text.size()) / static_cast<double>(bytes);
+  const auto room = [&](std::uint64_t sampled, std::size_t least) {
+    return std::min(static_cast<std::size_t>(static_cast<double>(sampled) * scale),
+                    input_.text.size() / least);
+  };
+  // "v 0 0 0" and "f 1 2 3" with their line ends are 8 bytes.
+  const std::size_t vertex_room = room(vertices, 8), face_room = room(faces, 8);
+  if (exceeds_limit(input_.execution, vertex_room, face_room)) return;
+  reserve_large(mesh_.soup.positions, vertex_room);
+  reserve_large(mesh_.soup.triangles, face_room);
+}
+
+void ObjReader::append(Chunk& chunk) {
+  TriangleSoup& soup = mesh_.soup;
+  MeshReadStats& stats = mesh_.stats;
+  if (chunk.error_offset != std::numeric_limits<std::size_t>::max()) {
+    error_offset_ = chunk.error_offset;  // the chunk ends in the middle of a statement
+    error_ = std::move(chunk.error);
+    return;
+  }
+  const std::uint64_t base = soup.positions.size();
+  over_limit_ = over_limit_ || base + chunk.positions.size() > kMaxVertices ||
+                exceeds_limit(input_.execution, base + chunk.positions.size(),
+                              soup.triangles.size() + chunk.triangles.size());
+  if (over_limit_) return;
+  for (std::size_t i = 0; i < chunk.relative.size(); ++i) {
+    glm::uvec3& triangle = chunk.triangles[chunk.relative[i]];
+    for (int k = 0; k < 3; ++k) {
+      if ((chunk.relative_corners[i] >> k & 1) == 0) continue;
+      const std::int64_t corner =
+          static_cast<std::int64_t>(base) + static_cast<std::int32_t>(triangle[k]);
+      triangle[k] = corner >= 0 ? static_cast<std::uint32_t>(corner) : kNoVertex;
+    }
+  }
+  if (identity_ && (!chunk.elements.empty() || soup.triangles.size() != stats.faces)) {
+    identity_ = false;
+    soup.face_elements.resize(soup.triangles.size());
+    for (std::size_t i = 0; i < soup.face_elements.size(); ++i) {
+      soup.face_elements[i] = static_cast<std::uint32_t>(i);
+    }
+  }
+  if (!identity_) {
+    for (std::size_t i = 0; i < chunk.triangles.size(); ++i) {
+      const std::size_t element = chunk.elements.empty() ? i : chunk.elements[i];
+      soup.face_elements.push_back(static_cast<std::uint32_t>(stats.faces + element));
+    }
+  }
+  if (stats.too_few_vertices == 0) {
+    mesh_.first_short_face = stats.faces + chunk.first_short_face;
+  }
+  soup.positions.insert(soup.positions.end(), chunk.positions.begin(), chunk.positions.end());
+  soup.triangles.insert(soup.triangles.end(), chunk.triangles.begin(), chunk.triangles.end());
+  stats.faces += chunk.faces;
+  stats.too_few_vertices += chunk.short_faces;
+  stats.ignored += chunk.ignored;
+}
+
+Result<MeshFile> ObjReader::read() {
+  cut();
+  reserve();
+  std::mutex mutex;
+  std::atomic<bool> over = false;  // an appended chunk ended the reading; the rest is not needed
+  std::vector<std::unique_ptr<Chunk>> spare, ready(cuts_.size() - 1);
+  std::size_t next = 0;
+  ReadWatch watch(input_);
+  parallel_for(input_.execution, ready.size(), [&](std::size_t index, int) {
+    if (over.load(std::memory_order_relaxed)) return;
+    std::unique_ptr<Chunk> chunk;
+    {
+      const std::lock_guard lock(mutex);
+      if (!spare.empty()) {
+        chunk = std::move(spare.back());
+        spare.pop_back();
+      }
+    }
+    if (!chunk) chunk = std::make_unique<Chunk>();
+    parse(cuts_[index], cuts_[index + 1], *chunk);
+    const std::lock_guard lock(mutex);
+    ready[index] = std::move(chunk);
+    for (; next < ready.size() && ready[next] && !over; ++next) {
+      append(*ready[next]);
+      over = over_limit_ || error_offset_ != std::numeric_limits<std::size_t>::max();
+      ready[next]->clear();
+      spare.push_back(std::move(ready[next]));
+    }
+    (void)watch.at(static_cast<double>(next) / static_cast<double>(ready.size()));
+  });
+  if (input_.execution.stop.stop_requested()) {
+    return fail(ErrorCode::kCancelled, "{}: reading was stopped", input_.name);
+  }
+  if (over_limit_) {
+    return fail(ErrorCode::kLimit, "{}: the mesh needs more than the memory limit or {} vertices",
+                input_.name, kMaxVertices);
+  }
+  if (error_offset_ != std::numeric_limits<std::size_t>::max()) {
+    return fail(ErrorCode::kInput, "{}:{}: {}", input_.name,
+                line_of(input_.text, begin_ + error_offset_), error_);
+  }
+  mesh_.stats.format = "obj";
+  vertex_total_ = static_cast<std::int64_t>(mesh_.soup.positions.size());
+  return finish_mesh(input_, std::move(mesh_),
+                     [this](std::uint32_t element) { return locate(element); });
+}
+
+/// Reads again up to the face: slow, but only for a message.
+FacePlace ObjReader::locate(std::uint32_t element) const {
+  Chunk chunk;
+  std::uint64_t vertices = 0, faces = 0;
+  for (const char* p = begin_; p < end_;) {
+    chunk.clear();
+    const char* const statement = skip_blanks(p);
+    // One statement: a comment ends with its line, the others may be continued.
+    const bool continued = statement[0] == 'v' || statement[0] == 'f';
+    const char* const next = continued ? skip_statement(statement, end_) : next_line(p, end_);
+    parse(p, next, chunk);
+    if (chunk.faces != 0 && faces++ == element) {
+      FacePlace result{fmt::format("{}:{}", input_.name, line_of(input_.text, statement)), {}};
+      for (const char* q = skip_token(statement);;) {
+        q = skip_blanks_obj(q);
+        std::int64_t index = 0;
+        const char* stop = parse_integer(q, index);
+        if (stop == nullptr) break;
+        if (index == 0 || index > vertex_total_ || index < -static_cast<std::int64_t>(vertices)) {
+          result.vertex = std::string(q, stop);
+          break;
+        }
+        q = stop;
+        while (!ends_token(*q) && *q != '\\') ++q;
+      }
+      return result;
+    }
+    vertices += chunk.positions.size();
+    p = next;
+  }
+  return {input_.name, {}};
+}
+
+}  // namespace
+
+Result<MeshFile> read_obj(const ReaderInput& input) {
+  if (input.text.find('\n') != std::string_view::npos ||
+      input.text.find('\r') == std::string_view::npos) {
+    return ObjReader(input).read();
+  }
+  // An old Macintosh ended its lines with carriage returns. Rare enough for a copy.
+  std::string text(input.text);
+  std::replace(text.begin(), text.end(), '\r', '\n');
+  const ReaderInput copy{text, input.name, input.options, input.execution};
+  return ObjReader(copy).read();
+}
+
+}  // namespace strata::detail

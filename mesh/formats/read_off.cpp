@@ -1,0 +1,337 @@
+#include <algorithm>
+
+#include "mesh/formats/reader_common.h"
+#include "mesh/formats/text_scanner.h"
+
+// [ST][C][N][4][n]OFF, the prefixes in any order, then for nOFF the dimension, then the numbers of
+// vertices, faces and edges; then the vertices and the faces. (Geomview manual, "OFF Files".)
+//
+// Most files give a line to each vertex and each face, and what the line says beyond coordinates or
+// corners (normals, colours, texture) is skipped, with or without a prefix that announces it. But
+// the format is one of tokens: files in which an element does not fit its line, or that end too
+// early when they are read by lines, are read again token by token. Then a vertex has the values
+// that the prefixes announce, and nothing may be left over: a file that has two meanings is an
+// error. Comments and blank lines may stand anywhere.
+
+namespace strata::detail {
+namespace {
+
+/// How elements are told apart.
+enum class Layout {
+  kLines,    ///< one a line; the rest of its line is skipped
+  kWrapped,  ///< vertices by tokens; the rest of the line behind a face is skipped
+  kTokens    ///< all by tokens
+};
+
+/// One way to read a file.
+struct Attempt {
+  Layout layout = Layout::kLines;
+  bool edges_on_line =
+      true;               ///< the number of edges, if given, stands in the line of that of faces
+  int colour_values = 4;  ///< of a vertex in COFF
+};
+
+class OffReader {
+ public:
+  explicit OffReader(const ReaderInput& input)
+      : input_(input), begin_(input.text.data()), end_(begin_ + input.text.size()), p_(begin_) {}
+  Result<MeshFile> read();
+
+ private:
+  Result<void> attempt(const Attempt& attempt);
+  Result<void> read_prefixes();
+  Result<void> read_header();
+  Result<void> read_vertices();
+  /// Reads faces from p_ on; visit(start, corners) returns false to stop.
+  template <class Visit>
+  Result<void> read_faces(Visit&& visit);
+  FacePlace locate(std::uint32_t element);
+
+  /// Past white space, comments and line ends.
+  void skip_gap() {
+    for (;;) {
+      while (is_space(*p_)) ++p_;
+      if (*p_ != '#') return;
+      skip_line();
+    }
+  }
+  /// To a value inside an element.
+  void skip_inside() {
+    if (how_.layout != Layout::kLines) return skip_gap();
+    while (is_blank(*p_) && *p_ != '\r') ++p_;
+  }
+  void skip_line() {
+    while (*p_ != '\n' && *p_ != '\r' && !at_end()) ++p_;
+  }
+  [[nodiscard]] bool at_end() const { return p_ >= end_; }
+  [[nodiscard]] bool at_line_end() const { return *p_ == '\n' || *p_ == '\r' || *p_ == '#'; }
+  [[nodiscard]] tl::unexpected<Error> error(const std::string& message) const {
+    return fail(ErrorCode::kInput, "{}:{}: {}", input_.name, line_of(input_.text, p_), message);
+  }
+  [[nodiscard]] std::string found() const {
+    if (at_end()) return "the file ends";
+    return *p_ == '#' || *p_ == '\r' ? "found the end of the line" : "found " + describe(p_, end_);
+  }
+  /// An integer at p_ that ends its token; false leaves p_ at what stands there.
+  bool take_integer(std::int64_t& value) {
+    const char* stop = parse_integer(p_, value);
+    if (stop == nullptr || !(ends_token(*stop) || *stop == '#')) return false;
+    p_ = stop;
+    return true;
+  }
+  bool next_integer(std::int64_t& value) {
+    skip_gap();
+    return take_integer(value);
+  }
+
+  const ReaderInput& input_;
+  const char* begin_;
+  const char* end_;
+  const char* p_;
+  Attempt how_;
+  bool counts_in_line_ = true;  ///< those of vertices and faces stand in one line
+  bool left_over_ = false;      ///< something follows the last face
+  bool homogeneous_ = false;    ///< four coordinates, the last divides
+  bool normals_ = false, colours_ = false, texture_ = false, with_dimension_ = false;
+  std::uint64_t vertex_count_ = 0, face_count_ = 0;
+  const char* faces_begin_ = nullptr;
+  RawMesh mesh_;
+};
+
+/// The word OFF and what it is told of; p_ is left behind it, where a count may follow at once, as
+/// in the files of ModelNet40 ("OFF8 6 0").
+Result<void> OffReader::read_prefixes() {
+  homogeneous_ = normals_ = colours_ = texture_ = with_dimension_ = false;
+  std::string_view word = token_at(p_);
+  const bool lower = word.find("off") < word.find("OFF");
+  const std::size_t size = word.find(lower ? "off" : "OFF");
+  const char behind =
+      size == std::string_view::npos || size + 3 >= word.size() ? '0' : word[size + 3];
+  if (size == std::string_view::npos || !is_digit(behind)) {
+    if (is_digit(*p_)) return {};  // counts at once
+    return error(fmt::format("expected OFF, {}", found()));
+  }
+  word = word.substr(0, size);
+  const struct {
+    std::string_view upper, lower;
+    bool& flag;
+  } kPrefixes[] = {{"ST", "st", texture_},
+                   {"C", "c", colours_},
+                   {"N", "N", normals_},
+                   {"4", "4", homogeneous_},
+                   {"n", "n", with_dimension_}};
+  while (!word.empty()) {
+    bool known = false;
+    for (const auto& prefix : kPrefixes) {
+      if (prefix.flag || !word.starts_with(lower ? prefix.lower : prefix.upper)) continue;
+      word.remove_prefix(prefix.upper.size());
+      known = prefix.flag = true;
+      break;
+    }
+    if (!known) return error(fmt::format("'{}' is no prefix of OFF", word));
+  }
+  p_ += size + 3;
+  skip_gap();
+  if (token_at(p_) == "BINARY") return error("binary OFF files are not supported");
+  return {};
+}
+
+Result<void> OffReader::read_header() {
+  p_ = begin_;
+  skip_gap();
+  if (auto prefixes = read_prefixes(); !prefixes) return prefixes;
+  std::int64_t dimension = 0, vertices = 0, faces = 0, edges = 0;
+  if (with_dimension_ && !next_integer(dimension)) {
+    return error(fmt::format("expected the dimension, {}", found()));
+  }
+  if (with_dimension_ && dimension != 3) {
+    return error(fmt::format("only 3 dimensions are supported, got {}", dimension));
+  }
+  if (!next_integer(vertices) || vertices < 0) {
+    return error(fmt::format("expected the number of vertices, {}", found()));
+  }
+  const char* const line = p_;
+  if (!next_integer(faces) || faces < 0) {
+    return error(fmt::format("expected the number of faces, {}", found()));
+  }
+  counts_in_line_ = std::find_if(line, p_, [](char c) { return c == '\n' || c == '\r'; }) == p_;
+  if (how_.layout == Layout::kLines) {
+    skip_inside();
+    const bool has_edges = !at_line_end();
+    skip_line();
+    // The number of edges may have a line of its own, which is too short for a vertex.
+    const char* const next = p_;
+    const bool is_number = !has_edges && next_integer(edges);
+    skip_inside();
+    if (!is_number || !at_line_end()) p_ = next;
+  } else if (how_.edges_on_line) {
+    while (is_blank(*p_) && *p_ != '\r') ++p_;
+    (void)take_integer(edges);
+  } else {
+    (void)next_integer(edges);
+  }
+  vertex_count_ = static_cast<std::uint64_t>(vertices);
+  face_count_ = static_cast<std::uint64_t>(faces);
+  // A vertex is at least "0 0 0\n", a face "0\n".
+  const auto left = static_cast<std::uint64_t>(end_ - p_);
+  if (vertex_count_ > left / 6 + 1 || face_count_ > left / 2 + 1) {
+    return error(fmt::format("{} vertices and {} faces are claimed, but only {} bytes follow",
+                             vertex_count_, face_count_, left));
+  }
+  if (vertex_count_ > kMaxVertices || exceeds_limit(input_.execution, vertex_count_, face_count_)) {
+    return fail(ErrorCode::kLimit, "{}: {} vertices and {} faces are more than the memory limit",
+                input_.name, vertex_count_, face_count_);
+  }
+  return {};
+}
+
+Result<void> OffReader::read_vertices() {
+  reserve_large(mesh_.soup.positions, vertex_count_);
+  ReadWatch watch(input_);
+  const bool by_lines = how_.layout == Layout::kLines;
+  const int coordinates = homogeneous_ ? 4 : 3;
+  const int more =
+      by_lines ? 0 : (normals_ ? 3 : 0) + (colours_ ? how_.colour_values : 0) + (texture_ ? 2 : 0);
+  for (std::uint64_t v = 0; v < vertex_count_; ++v) {
+    double value[4] = {0.0, 0.0, 0.0, 1.0};
+    for (int i = 0; i < coordinates + more; ++i) {
+      i == 0 ? skip_gap() : skip_inside();
+      double skipped = 0.0;
+      const char* stop = parse_double(p_, i < coordinates ? value[i] : skipped);
+      if (stop == nullptr || !(ends_token(*stop) || *stop == '#')) {
+        return error(fmt::format("expected {} {} of vertex {} of {}, {}",
+                                 i < coordinates ? "coordinate" : "value", i, v, vertex_count_,
+                                 found()));
+      }
+      p_ = stop;
+    }
+    glm::dvec3 position(value[0], value[1], value[2]);
+    if (homogeneous_) position /= value[3];
+    mesh_.soup.positions.push_back(position);
+    if (by_lines) skip_line();
+    if (!watch.step(v, p_)) return {};
+  }
+  return {};
+}
+
+template <class Visit>
+Result<void> OffReader::read_faces(Visit&& visit) {
+  std::vector<std::uint32_t> corners;
+  const bool by_lines = how_.layout == Layout::kLines;
+  for (std::uint64_t f = 0; f < face_count_; ++f) {
+    std::int64_t count = 0;
+    if (!next_integer(count) || count < (by_lines ? 0 : 1)) {
+      return error(fmt::format("expected the size of face {} of {}, {}", f, face_count_, found()));
+    }
+    const char* const start = p_;
+    corners.clear();
+    for (std::int64_t i = 0; i < count; ++i) {
+      std::int64_t index = 0;
+      skip_inside();
+      if (!take_integer(index) ||
+          (!by_lines && (index < 0 || index >= static_cast<std::int64_t>(vertex_count_)))) {
+        return error(
+            fmt::format("expected corner {} of the {} of face {}, {}", i, count, f, found()));
+      }
+      corners.push_back(index >= 0 && index <= static_cast<std::int64_t>(kMaxVertices)
+                            ? static_cast<std::uint32_t>(index)
+                            : kNoVertex);
+    }
+    if (how_.layout != Layout::kTokens) skip_line();
+    if (!visit(start, corners)) break;
+  }
+  return {};
+}
+
+FacePlace OffReader::locate(std::uint32_t element) {
+  p_ = faces_begin_;
+  FacePlace result{input_.name, {}};
+  std::uint32_t face = 0;
+  (void)read_faces([&](const char* start, const std::vector<std::uint32_t>& corners) {
+    if (face++ != element) return true;
+    result.place = fmt::format("{}:{}", input_.name, line_of(input_.text, start));
+    for (const std::uint32_t corner : corners) {
+      std::int64_t written = 0;
+      while (is_space(*start)) ++start;
+      const char* stop = parse_integer(start, written);
+      if (corner >= vertex_count_) {
+        result.vertex = std::string(token_at(start));
+        break;
+      }
+      start = stop == nullptr ? start : stop;
+    }
+    return false;
+  });
+  return result;
+}
+
+Result<void> OffReader::attempt(const Attempt& attempt) {
+  how_ = attempt;
+  mesh_ = {};
+  if (auto header = read_header(); !header) return tl::unexpected(header.error());
+  if (auto vertices = read_vertices(); !vertices) return tl::unexpected(vertices.error());
+  if (input_.execution.stop.stop_requested()) {
+    return fail(ErrorCode::kCancelled, "{}: reading was stopped", input_.name);
+  }
+  reserve_large(mesh_.soup.triangles, face_count_);
+  faces_begin_ = p_;
+  FanBuilder fans(mesh_);
+  ReadWatch watch(input_);
+  std::uint64_t face = 0;
+  auto faces = read_faces([&](const char* place, const std::vector<std::uint32_t>& corners) {
+    fans.add(corners.data(), corners.size());
+    return watch.step(face++, place);
+  });
+  if (!faces) return tl::unexpected(faces.error());
+  if (input_.execution.stop.stop_requested()) {
+    return fail(ErrorCode::kCancelled, "{}: reading was stopped", input_.name);
+  }
+  skip_gap();
+  left_over_ = !at_end();
+  if (left_over_) {
+    if (how_.layout != Layout::kLines) return error(fmt::format("expected the end, {}", found()));
+    mesh_.stats.warnings.push_back(fmt::format("{}:{}: what follows the last face is ignored",
+                                               input_.name, line_of(input_.text, p_)));
+  }
+  mesh_.stats.format = "off";
+  return {};
+}
+
+Result<MeshFile> OffReader::read() {
+  Error furthest{ErrorCode::kInput, {}};
+  const char* furthest_place = nullptr;
+  const auto good = [&](const Attempt& how) {
+    auto done = attempt(how);
+    if (done) return true;
+    // The way that read most of the file has the error that helps.
+    if (furthest_place == nullptr || p_ > furthest_place ||
+        done.error().code != ErrorCode::kInput) {
+      furthest = done.error();
+      furthest_place = p_;
+    }
+    return false;
+  };
+  const bool lines = good({});
+  bool read = lines && !left_over_;
+  // Where the counts have a line each, that of edges most likely has one, too.
+  const bool first = counts_in_line_;
+  for (const bool edges_on_line : {first, !first}) {
+    for (const int colour_values : {4, 3}) {
+      for (const Layout layout : {Layout::kWrapped, Layout::kTokens}) {
+        if (read || furthest.code != ErrorCode::kInput || (colour_values == 3 && !colours_)) break;
+        read = good({layout, edges_on_line, colour_values});
+      }
+    }
+  }
+  // A file that can be read by lines and in no other way ends in something else.
+  if (!read && lines && furthest.code == ErrorCode::kInput) read = good({});
+  if (!read) return tl::unexpected(std::move(furthest));
+  return finish_mesh(input_, std::move(mesh_),
+                     [this](std::uint32_t element) { return locate(element); });
+}
+
+}  // namespace
+
+Result<MeshFile> read_off(const ReaderInput& input) { return OffReader(input).read(); }
+
+}  // namespace strata::detail

@@ -1,0 +1,505 @@
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <optional>
+#include <span>
+#include <utility>
+
+#include "mesh/formats/ply_source.h"
+#include "mesh/formats/reader_common.h"
+#include "mesh/formats/text_scanner.h"
+
+// A text header lists elements, each with a count and properties: scalars, or lists with their own
+// count. Positions are x, y, z of element "vertex"; faces the list vertex_indices (or vertex_index)
+// of element "face", triangles that of element "tristrips", in which -1 begins a new strip. All
+// else is stepped over by its declared type. (G. Turk, The PLY Polygon File Format, 1994.)
+//
+// An ascii element is a line, and the line may hold more than the header declares. A file in which
+// an element does not fit its line is read again token by token; then nothing may be left over.
+
+namespace strata::detail {
+namespace {
+
+using namespace ply;
+
+/// What the corners of an element make.
+enum class FaceKind { kPolygon, kStrip };
+
+/// An element that holds faces, for messages about one of them.
+template <class Source>
+struct FaceSource {
+  const Element* element;
+  Source source;
+  FaceKind kind;
+  std::uint64_t faces;  ///< how many it made
+};
+
+class PlyReader {
+ public:
+  explicit PlyReader(const ReaderInput& input)
+      : input_(input), begin_(input.text.data()), end_(begin_ + input.text.size()), p_(begin_) {}
+  Result<MeshFile> read();
+
+ private:
+  Result<void> read_header();
+  Result<void> read_element_line(std::string_view line);
+  Result<void> read_property_line(std::string_view line);
+  Result<MeshFile> read_ascii();
+  template <class Source>
+  Result<MeshFile> read_body(Source source);
+  template <class Source>
+  Result<void> read_face_element(Source& source, const Element& element, FaceKind kind,
+                                 FanBuilder& fans);
+  template <class Source>
+  Result<void> read_vertices(Source& source, const Element& element);
+  template <class Source, class Visit>
+  Result<void> read_faces(Source& source, const Element& element, Visit&& visit);
+  template <class Source>
+  Result<void> skip_element(Source& source, const Element& element);
+  template <class Source>
+  bool skip_property(Source& source, const Property& property);
+  template <class Source>
+  std::string place(const Source& source) const;
+  template <class Source>
+  tl::unexpected<Error> cut_short(const Source& source, const Element& element,
+                                  std::uint64_t index);
+  template <class Source>
+  FacePlace locate(std::span<const FaceSource<Source>> sources, std::uint64_t face);
+  [[nodiscard]] tl::unexpected<Error> header_error(const std::string& message) const {
+    return fail(ErrorCode::kInput, "{}:{}: {}", input_.name, line_, message);
+  }
+
+  const ReaderInput& input_;
+  const char* begin_;
+  const char* end_;
+  const char* p_;
+  std::uint64_t line_ = 0;
+  Encoding encoding_ = Encoding::kAscii;
+  std::vector<Element> elements_;
+  RawMesh mesh_;
+  std::size_t failed_at_ = 0;  ///< where in the text a body ended too early
+};
+
+/// Takes the next word of a line.
+std::string_view take_word(std::string_view& line) {
+  while (!line.empty() && is_blank(line.front())) line.remove_prefix(1);
+  std::size_t size = 0;
+  while (size < line.size() && !is_blank(line[size])) ++size;
+  const std::string_view word = line.substr(0, size);
+  line.remove_prefix(size);
+  return word;
+}
+
+Result<void> PlyReader::read_element_line(std::string_view line) {
+  Element element;
+  element.name = take_word(line);
+  const std::string_view count = take_word(line);
+  const auto [stop, code] =
+      std::from_chars(count.data(), count.data() + count.size(), element.count);
+  if (element.name.empty() || code != std::errc() || stop != count.data() + count.size()) {
+    return header_error(fmt::format("'{}' is no element count", count.substr(0, 40)));
+  }
+  elements_.push_back(std::move(element));
+  return {};
+}
+
+Result<void> PlyReader::read_property_line(std::string_view line) {
+  if (elements_.empty()) return header_error("a property before the first element");
+  Property property;
+  std::string_view word = take_word(line);
+  if (word == "list") {
+    word = take_word(line);
+    property.list_type = type_named(word);
+    if (!property.list_type) return header_error(fmt::format("unknown type '{}'", word));
+    word = take_word(line);
+  }
+  const std::optional<Type> type = type_named(word);
+  if (!type) return header_error(fmt::format("unknown type '{}'", word.substr(0, 40)));
+  property.type = *type;
+  property.name = take_word(line);
+  elements_.back().properties.push_back(std::move(property));
+  return {};
+}
+
+Result<void> PlyReader::read_header() {
+  bool has_format = false;
+  std::size_t end_size = 0;  // the first line tells how lines end: 1 for \n or \r, 2 for \r\n
+  while (p_ < end_) {
+    ++line_;
+    const char* stop = p_;
+    while (stop < end_ && *stop != '\n' && *stop != '\r') ++stop;
+    if (stop == end_) break;
+    if (end_size == 0) end_size = *stop == '\r' && stop[1] == '\n' ? 2 : 1;
+    std::string_view line(p_, static_cast<std::size_t>(stop - p_));
+    // A lone \r\n in a file of \n lines is still one end of line; binary data may follow the last.
+    p_ = *stop == '\r' && stop[1] == '\n' && (end_size == 2 || line != "end_header") ? stop + 2
+                                                                                     : stop + 1;
+    const std::string_view word = take_word(line);
+    if (line_ == 1) {
+      if (word != "ply") return header_error("expected 'ply'");
+    } else if (word == "format") {
+      const std::string_view name = take_word(line);
+      has_format = true;
+      if (name == "ascii") {
+        encoding_ = Encoding::kAscii;
+      } else if (name == "binary_little_endian") {
+        encoding_ = Encoding::kLittle;
+      } else if (name == "binary_big_endian") {
+        encoding_ = Encoding::kBig;
+      } else {
+        return header_error(fmt::format("unknown format '{}'", name.substr(0, 40)));
+      }
+    } else if (word == "element") {
+      if (auto done = read_element_line(line); !done) return done;
+    } else if (word == "property") {
+      if (auto done = read_property_line(line); !done) return done;
+    } else if (word == "end_header") {
+      if (!has_format) return header_error("no 'format' line in the header");
+      return {};
+    } else if (word != "comment" && word != "obj_info" && !word.empty()) {
+      // Some exporters forget the word "comment".
+      mesh_.stats.warnings.push_back(fmt::format("{}:{}: header line '{}' is ignored", input_.name,
+                                                 line_, word.substr(0, 40)));
+    }
+  }
+  return header_error("the file ends inside the header");
+}
+
+template <class Source>
+std::string PlyReader::place(const Source& source) const {
+  if constexpr (Source::kBinary) {
+    return fmt::format("{}: byte {}", input_.name,
+                       source.position() - begin_ + static_cast<std::ptrdiff_t>(input_.skipped));
+  } else {
+    return fmt::format("{}:{}", input_.name, line_of(input_.text, source.position()));
+  }
+}
+
+template <class Source>
+tl::unexpected<Error> PlyReader::cut_short(const Source& source, const Element& element,
+                                           std::uint64_t index) {
+  const char* at = source.position();
+  failed_at_ = static_cast<std::size_t>(at - begin_);
+  while (!Source::kBinary && is_space(*at)) ++at;  // in lines, what is missing may be in the next
+  if (at < end_ && !Source::kBinary) at = source.position();
+  const bool ends = Source::kBinary || at >= end_;
+  return fail(ErrorCode::kInput, "{}: {} in element {} {} of {}", place(Source(at, end_)),
+              ends ? "the file ends" : describe(at, end_) + " is not a value", element.name, index,
+              element.count);
+}
+
+template <class Source>
+bool PlyReader::skip_property(Source& source, const Property& property) {
+  if (!property.list_type) return source.skip(property.type, 1);
+  double count = 0.0;
+  return source.read(*property.list_type, count) && count >= 0.0 && count < 9e15 &&
+         source.skip(property.type, static_cast<std::uint64_t>(count));
+}
+
+template <class Source>
+Result<void> PlyReader::read_vertices(Source& source, const Element& element) {
+  int axis_of[3] = {-1, -1, -1};
+  bool lists = false;
+  std::size_t stride = 0, offset[3] = {};
+  for (std::size_t i = 0; i < element.properties.size(); ++i) {
+    const Property& property = element.properties[i];
+    for (int axis = 0; axis < 3; ++axis) {
+      if (property.list_type || property.name.size() != 1 || property.name[0] != 'x' + axis)
+        continue;
+      axis_of[axis] = static_cast<int>(i);
+      offset[axis] = stride;
+    }
+    lists = lists || property.list_type.has_value();
+    stride += bytes_of(property.type);
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    if (axis_of[axis] < 0) {
+      return fail(ErrorCode::kInput, "{}: element vertex has no property {}", input_.name,
+                  "xyz"[axis]);
+    }
+  }
+  std::vector<glm::dvec3>& positions = mesh_.soup.positions;
+  reserve_large(positions, element.count);
+  if constexpr (Source::kBinary) {
+    if (!lists && source.left() / stride >= element.count) {
+      Type types[3];
+      for (int axis = 0; axis < 3; ++axis) {
+        types[axis] = element.properties[static_cast<std::size_t>(axis_of[axis])].type;
+      }
+      positions.resize(element.count);
+      const char* const data = source.position();
+      constexpr std::size_t kBlock = 1 << 15;
+      parallel_for(
+          input_.execution, (element.count + kBlock - 1) / kBlock, [&](std::size_t block, int) {
+            const std::size_t stop = std::min<std::size_t>(element.count, (block + 1) * kBlock);
+            for (std::size_t v = block * kBlock; v < stop; ++v) {
+              const char* p = data + v * stride;
+              positions[v] = {Source::at(types[0], p + offset[0]),
+                              Source::at(types[1], p + offset[1]),
+                              Source::at(types[2], p + offset[2])};
+            }
+          });
+      source.advance(stride * element.count);
+      return {};
+    }
+  }
+  ReadWatch watch(input_);
+  for (std::uint64_t v = 0; v < element.count; ++v) {
+    glm::dvec3 position(0.0);
+    source.begin_element();
+    for (std::size_t i = 0; i < element.properties.size(); ++i) {
+      const Property& property = element.properties[i];
+      const int index = static_cast<int>(i);
+      bool good = true;
+      if (index == axis_of[0]) {
+        good = source.read(property.type, position.x);
+      } else if (index == axis_of[1]) {
+        good = source.read(property.type, position.y);
+      } else if (index == axis_of[2]) {
+        good = source.read(property.type, position.z);
+      } else {
+        good = skip_property(source, property);
+      }
+      if (!good) return cut_short(source, element, v);
+    }
+    source.end_element();
+    positions.push_back(position);
+    if (!watch.step(v, source.position())) return {};
+  }
+  return {};
+}
+
+/// An index that no vertex has, and that is no -1 either.
+constexpr std::uint32_t kBadVertex = kMaxVertices;
+
+/// @return kNoVertex for -1, as signed or unsigned type, which parts strips
+std::uint32_t vertex_index(double value) {
+  if (value == -1.0 || value == static_cast<double>(kNoVertex)) return kNoVertex;
+  return value >= 0.0 && value < static_cast<double>(kBadVertex) && value == std::floor(value)
+             ? static_cast<std::uint32_t>(value)
+             : kBadVertex;
+}
+
+/// Calls visit(a, b, c) for the triangles of a strip, turned alike, until it returns false. Those
+/// that only lead on have two corners in one place.
+template <class Visit>
+bool each_strip_triangle(std::span<const std::uint32_t> strip, Visit&& visit) {
+  std::size_t begin = 0;
+  for (std::size_t i = 0; i < strip.size(); ++i) {
+    if (strip[i] == kNoVertex) begin = i + 1;
+    if (i < begin + 2) continue;
+    const std::uint32_t a = strip[i - 2], b = strip[i - 1], c = strip[i];
+    if (a == b || b == c || c == a) continue;
+    const bool odd = (i - begin) % 2 != 0;
+    if (!visit(odd ? b : a, odd ? a : b, c)) return false;
+  }
+  return true;
+}
+
+/// Calls visit(start, corners) for the faces from source on, until it returns false.
+template <class Source, class Visit>
+Result<void> PlyReader::read_faces(Source& source, const Element& element, Visit&& visit) {
+  const Property* indices = nullptr;
+  for (const Property& property : element.properties) {
+    if (property.list_type &&
+        (property.name == "vertex_indices" || property.name == "vertex_index")) {
+      indices = &property;
+    }
+  }
+  if (indices == nullptr) {
+    return fail(ErrorCode::kInput, "{}: element {} has no list vertex_indices", input_.name,
+                element.name);
+  }
+  // Almost all binary files hold a byte and then 32-bit indices.
+  const bool plain = Source::kBinary && element.properties.size() == 1 &&
+                     bytes_of(*indices->list_type) == 1 &&
+                     (indices->type == Type::kInt32 || indices->type == Type::kUint32);
+  std::vector<std::uint32_t> corners;
+  for (std::uint64_t f = 0; f < element.count; ++f) {
+    source.begin_element();
+    const char* const start = source.position();
+    if constexpr (Source::kBinary) {
+      if (plain && source.left() >= 13 && *start == 3) {
+        const std::uint32_t three[3] = {Source::template load<std::uint32_t>(start + 1),
+                                        Source::template load<std::uint32_t>(start + 5),
+                                        Source::template load<std::uint32_t>(start + 9)};
+        source.advance(13);
+        if (!visit(start, std::span<const std::uint32_t>(three))) return {};
+        continue;
+      }
+    }
+    for (const Property& property : element.properties) {
+      if (&property != indices) {
+        if (!skip_property(source, property)) return cut_short(source, element, f);
+        continue;
+      }
+      double count = 0.0, value = 0.0;
+      if (!source.read(*property.list_type, count)) return cut_short(source, element, f);
+      if (!(count >= 0.0 && count == std::floor(count))) {
+        return fail(ErrorCode::kInput, "{}: face {} claims {} vertices", place(source), f, count);
+      }
+      corners.clear();
+      for (double i = 0.0; i < count; ++i) {
+        if (!source.read(property.type, value)) return cut_short(source, element, f);
+        corners.push_back(vertex_index(value));
+      }
+    }
+    source.end_element();
+    if (!visit(start, std::span<const std::uint32_t>(corners))) return {};
+  }
+  return {};
+}
+
+template <class Source>
+Result<void> PlyReader::skip_element(Source& source, const Element& element) {
+  for (std::uint64_t i = 0; i < element.count; ++i) {
+    source.begin_element();
+    for (const Property& property : element.properties) {
+      if (!skip_property(source, property)) return cut_short(source, element, i);
+    }
+    source.end_element();
+  }
+  return {};
+}
+
+template <class Source>
+FacePlace PlyReader::locate(std::span<const FaceSource<Source>> sources, std::uint64_t face) {
+  FacePlace result{input_.name, {}};
+  for (const FaceSource<Source>& one : sources) {
+    if (face >= one.faces) {
+      face -= one.faces;
+      continue;
+    }
+    std::uint64_t seen = 0;
+    Source source = one.source;
+    (void)read_faces(
+        source, *one.element, [&](const char* start, std::span<const std::uint32_t> corners) {
+          std::uint64_t made = one.kind == FaceKind::kPolygon ? 1 : 0;
+          if (one.kind == FaceKind::kStrip) {
+            each_strip_triangle(corners, [&](auto, auto, auto) { return ++made != 0; });
+          }
+          seen += made;
+          if (seen <= face) return true;
+          result.place = place(Source(start, end_));
+          for (const std::uint32_t corner : corners) {
+            if (corner == kBadVertex || (corner == kNoVertex && one.kind == FaceKind::kPolygon)) {
+              result.vertex = "with no valid number";
+            }
+          }
+          return false;
+        });
+    break;
+  }
+  return result;
+}
+
+template <class Source>
+Result<void> PlyReader::read_face_element(Source& source, const Element& element, FaceKind kind,
+                                          FanBuilder& fans) {
+  if (exceeds_limit(input_.execution, mesh_.soup.positions.size(), element.count)) {
+    return fail(ErrorCode::kLimit, "{}: {} faces are more than the memory limit", input_.name,
+                element.count);
+  }
+  ReadWatch watch(input_);
+  std::uint64_t face = 0;
+  if (kind == FaceKind::kStrip) {
+    return read_faces(source, element,
+                      [&](const char* place, std::span<const std::uint32_t> corners) {
+                        return each_strip_triangle(
+                            corners, [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
+                              const std::uint32_t triangle[] = {a, b, c};
+                              fans.add(triangle, 3);
+                              return watch.step(face++, place);
+                            });
+                      });
+  }
+  reserve_large(mesh_.soup.triangles, element.count);
+  return read_faces(source, element,
+                    [&](const char* place, std::span<const std::uint32_t> corners) {
+                      fans.add(corners.data(), corners.size());
+                      return watch.step(face++, place);
+                    });
+}
+
+template <class Source>
+Result<MeshFile> PlyReader::read_body(Source source) {
+  FanBuilder fans(mesh_);
+  std::vector<FaceSource<Source>> sources;
+  for (const Element& element : elements_) {
+    std::uint64_t least = 0;
+    for (const Property& property : element.properties) least += Source::least_bytes(property);
+    if (least == 0) continue;  // nothing in the body
+    // The last value of an ascii file may lack its blank.
+    if (element.count > (source.left() + 1) / least) {
+      return fail(ErrorCode::kInput,
+                  "{}: {} elements '{}' are claimed, {} bytes or more, but only {} bytes follow",
+                  place(source), element.count, element.name,
+                  static_cast<double>(element.count) * static_cast<double>(least), source.left());
+    }
+    Result<void> done;
+    if (element.name == "vertex" && mesh_.soup.positions.empty()) {
+      if (element.count > kMaxVertices || exceeds_limit(input_.execution, element.count, 0)) {
+        return fail(ErrorCode::kLimit, "{}: {} vertices are more than the memory limit",
+                    input_.name, element.count);
+      }
+      done = read_vertices(source, element);
+    } else if (element.name == "face" || element.name == "tristrips") {
+      const FaceKind kind = element.name == "face" ? FaceKind::kPolygon : FaceKind::kStrip;
+      const std::uint64_t before = mesh_.stats.faces;
+      const Source start = source;
+      done = read_face_element(source, element, kind, fans);
+      sources.push_back({&element, start, kind, mesh_.stats.faces - before});
+    } else {
+      mesh_.stats.ignored += element.count;
+      done = skip_element(source, element);
+    }
+    if (!done) return tl::unexpected(done.error());
+    if (input_.execution.stop.stop_requested()) {
+      return fail(ErrorCode::kCancelled, "{}: reading was stopped", input_.name);
+    }
+  }
+  if constexpr (!Source::kBinary) {
+    source.begin_element();
+    if (!source.by_lines() && source.left() != 0) {
+      return fail(ErrorCode::kInput, "{}: text follows the last element", place(source));
+    }
+  }
+  return finish_mesh(input_, std::move(mesh_), [&](std::uint32_t face) {
+    return locate(std::span<const FaceSource<Source>>(sources), face);
+  });
+}
+
+Result<MeshFile> PlyReader::read_ascii() {
+  const std::vector<std::string> warnings = mesh_.stats.warnings;
+  Result<MeshFile> by_lines = read_body(AsciiSource(p_, end_));
+  if (by_lines || by_lines.error().code != ErrorCode::kInput) return by_lines;
+  const std::size_t line_failed_at = std::exchange(failed_at_, 0);
+  mesh_ = {};
+  mesh_.stats.format = "ply ascii";
+  mesh_.stats.warnings = warnings;
+  Result<MeshFile> by_tokens = read_body(AsciiSource(p_, end_, false));
+  // The way that read most of the file has the error that helps.
+  return by_tokens || failed_at_ > line_failed_at ? by_tokens : by_lines;
+}
+
+Result<MeshFile> PlyReader::read() {
+  if (auto header = read_header(); !header) return tl::unexpected(header.error());
+  switch (encoding_) {
+    case Encoding::kLittle:
+      mesh_.stats.format = "ply binary little endian";
+      return read_body(BinarySource<std::endian::little>(p_, end_));
+    case Encoding::kBig:
+      mesh_.stats.format = "ply binary big endian";
+      return read_body(BinarySource<std::endian::big>(p_, end_));
+    case Encoding::kAscii:
+      break;
+  }
+  mesh_.stats.format = "ply ascii";
+  return read_ascii();
+}
+
+}  // namespace
+
+Result<MeshFile> read_ply(const ReaderInput& input) { return PlyReader(input).read(); }
+
+}  // namespace strata::detail

@@ -1,0 +1,418 @@
+#include <algorithm>
+#include <atomic>
+#include <limits>
+#include <memory>
+#include <mutex>
+
+#include "mesh/formats/reader_common.h"
+#include "mesh/formats/text_scanner.h"
+#include "mesh/weld.h"
+
+// Binary: 80 bytes of anything, a count, and 50 bytes a facet: normal, three corners as float, two
+// bytes. Ascii: facet normal x y z, outer loop, vertex x y z ..., endloop, endfacet; numbers are
+// read as double. Exporters also write "end loop", a name glued to "endsolid", and lines of their
+// own between the loops, as of colours. In both, corners become vertices where their positions are
+// equal.
+
+namespace strata::detail {
+namespace {
+
+constexpr std::size_t kHeaderBytes = 84, kFacetBytes = 50;
+
+std::uint32_t little_endian_32(const char* p) {
+  std::uint32_t value = 0;
+  std::memcpy(&value, p, sizeof value);
+  return std::endian::native == std::endian::little ? value : __builtin_bswap32(value);
+}
+
+/// Corner `c` of a binary file, three to a facet.
+glm::vec3 binary_corner(const char* data, std::size_t c) {
+  const char* p = data + kHeaderBytes + c / 3 * kFacetBytes + 12 + c % 3 * 12;
+  return {std::bit_cast<float>(little_endian_32(p)), std::bit_cast<float>(little_endian_32(p + 4)),
+          std::bit_cast<float>(little_endian_32(p + 8))};
+}
+
+Result<MeshFile> read_binary(const ReaderInput& input) {
+  const std::size_t size = input.text.size();
+  const char* const data = input.text.data();
+  if (size < kHeaderBytes) {
+    return fail(ErrorCode::kInput, "{}: {} bytes are too few for an STL file", input.name, size);
+  }
+  const std::uint64_t claimed = little_endian_32(data + 80);
+  const std::uint64_t held = (size - kHeaderBytes) / kFacetBytes;
+  if (held == 0 && claimed == 0) return fail(ErrorCode::kInput, "{}: no triangles", input.name);
+  // The size decides, unless the file ends in something that is no triangle: then what follows the
+  // claimed ones may all be that, or the file is cut off.
+  const std::size_t odd = (size - kHeaderBytes) % kFacetBytes;
+  const std::uint64_t count = claimed == 0 || odd == 0 ? held : claimed;
+  // Text of any other kind holds no zeros, triangles do.
+  const bool is_text =
+      input.text.substr(kHeaderBytes, 16 * kFacetBytes).find('\0') == std::string_view::npos;
+  if (count > held || (count != claimed && is_text)) {
+    return fail(ErrorCode::kInput,
+                "{}: byte 80 claims {} triangles, which end at byte {}, but the file has {} bytes",
+                input.name, claimed, kHeaderBytes + kFacetBytes * claimed, size);
+  }
+  const std::size_t corners = 3 * count;
+  if (corners > kMaxVertices || exceeds_limit(input.execution, count / 2, count)) {
+    return fail(ErrorCode::kLimit, "{}: {} triangles are more than the memory limit or {} corners",
+                input.name, count, kMaxVertices);
+  }
+  RawMesh mesh;
+  mesh.stats.format = "stl binary";
+  mesh.stats.faces = count;
+  if (count != claimed) {
+    mesh.stats.warnings.push_back(
+        fmt::format("{}: byte 80 claims {} triangle{}, but the file has {} bytes, room for {}: all "
+                    "{} are read",
+                    input.name, claimed, claimed == 1 ? "" : "s", size, held, held));
+    if (input.options.strict) return fail(ErrorCode::kInput, "{}", mesh.stats.warnings.front());
+  }
+  if (const std::size_t rest = size - kHeaderBytes - kFacetBytes * count; rest != 0) {
+    mesh.stats.warnings.push_back(
+        fmt::format("{}: {} bytes after the {} triangles are ignored", input.name, rest, count));
+  }
+  TriangleSoup& soup = mesh.soup;
+  reserve_large(soup.triangles, count);
+  soup.triangles.resize(count);
+  static_assert(sizeof(glm::uvec3) == 3 * sizeof(std::uint32_t));
+  auto* const index = &soup.triangles.front().x;  // corner c is component c % 3 of triangle c / 3
+  ReadWatch watch(input);
+  const std::size_t different = weld_first<float>(
+      input.execution, corners, [data](std::size_t c) { return binary_corner(data, c); }, index,
+      [&](std::size_t c) {
+        return watch.at(static_cast<double>(c) / static_cast<double>(corners));
+      });
+  if (input.execution.stop.stop_requested()) {
+    return fail(ErrorCode::kCancelled, "{}: reading was stopped", input.name);
+  }
+  reserve_large(soup.positions, different);
+  // First occurrences become vertices in the order of the file; what follows looks back to them.
+  for (std::size_t c = 0; c < corners; ++c) {
+    if (index[c] == c) {
+      index[c] = static_cast<std::uint32_t>(soup.positions.size());
+      soup.positions.emplace_back(WeldTable<float>::canonical(binary_corner(data, c)));
+    } else {
+      index[c] = index[index[c]];
+    }
+  }
+  return finish_mesh(input, std::move(mesh), [&input](std::uint32_t element) {
+    return FacePlace{fmt::format("{}: triangle {} (byte {})", input.name, element,
+                                 kHeaderBytes + kFacetBytes * element),
+                     {}};
+  });
+}
+
+/// Facets of a part of an ascii file.
+struct Chunk {
+  std::vector<glm::dvec3> corners;
+  std::vector<std::uint32_t> sizes;  ///< corners of each loop
+  std::size_t error_offset = std::numeric_limits<std::size_t>::max();
+  std::string error;
+  bool ended = false;  ///< the last solid was closed by endsolid
+  std::uint64_t strange_lines = 0;
+  std::size_t first_strange = 0;  ///< offset of the first strange line
+};
+
+class AsciiReader {
+ public:
+  explicit AsciiReader(const ReaderInput& input)
+      : input_(input), begin_(input.text.data()), end_(begin_ + input.text.size()) {}
+  Result<MeshFile> read();
+
+ private:
+  void cut();
+  void parse(const char* p, const char* end, Chunk& chunk) const;
+  const char* parse_vertex(const char* p, Chunk& chunk) const;
+  const char* parse_strange(const char* p, Chunk& chunk) const;
+  void append(const Chunk& chunk);
+  FacePlace locate(std::uint32_t element) const;
+
+  const ReaderInput& input_;
+  const char* begin_;
+  const char* end_;
+  std::vector<const char*> cuts_;
+  RawMesh mesh_;
+  FanBuilder fans_{mesh_};
+  WeldTable<double> table_{1024};
+  std::vector<std::uint32_t> loop_;
+  bool ended_ = false, over_limit_ = false;
+  std::size_t error_offset_ = std::numeric_limits<std::size_t>::max();
+  std::string error_;
+  std::uint64_t strange_lines_ = 0;
+  std::size_t first_strange_ = 0;
+};
+
+const char* skip_spaces(const char* p) {
+  while (is_space(*p)) ++p;
+  return p;
+}
+
+const char* skip_line(const char* p) {
+  while (*p != '\n' && *p != '\r' && *p != '\0') ++p;
+  return p;
+}
+
+/// What a token means.
+enum class Word { kSolid, kEndSolid, kFacet, kEndFacet, kLoop, kEndLoop, kNormal, kVertex, kOther };
+
+bool starts_no_case(std::string_view text, std::string_view word) {
+  return equals_no_case(text.substr(0, word.size()), word);
+}
+
+/// The meaning of the token at p; `stop` is set behind it. "end" and its word may be parted by
+/// blanks, and the name of a solid may be glued to "solid" and "endsolid".
+Word word_at(const char* p, const char*& stop) {
+  stop = skip_token(p);
+  std::string_view token(p, static_cast<std::size_t>(stop - p));
+  const auto is = [token](std::string_view word, Word meaning) {
+    return equals_no_case(token, word) ? meaning : Word::kOther;
+  };
+  switch (*p | 0x20) {
+    case 'v':
+      return is("vertex", Word::kVertex);
+    case 'f':
+      return is("facet", Word::kFacet);
+    case 'n':
+      return is("normal", Word::kNormal);
+    case 'o':
+      return is("outer", Word::kLoop);
+    case 'l':
+      return is("loop", Word::kLoop);
+    case 's':
+      return starts_no_case(token, "solid") ? Word::kSolid : Word::kOther;
+    case 'e':
+      break;
+    default:
+      return Word::kOther;
+  }
+  if (!starts_no_case(token, "end")) return Word::kOther;
+  token.remove_prefix(3);
+  if (token.empty()) {
+    const char* const second = skip_blanks(stop);
+    const char* const second_stop = skip_token(second);
+    token = {second, static_cast<std::size_t>(second_stop - second)};
+    if (equals_no_case(token, "facet") || equals_no_case(token, "loop") ||
+        starts_no_case(token, "solid")) {
+      stop = second_stop;
+    }
+  }
+  if (equals_no_case(token, "loop")) return Word::kEndLoop;
+  if (equals_no_case(token, "facet")) return Word::kEndFacet;
+  return starts_no_case(token, "solid") ? Word::kEndSolid : Word::kOther;
+}
+
+/// Whether a line that begins so tells of looks, which any exporter may add to a facet or a vertex.
+bool tells_of_looks(std::string_view word) {
+  constexpr std::string_view kWords[] = {"color", "colour", "rgb", "material", "attribute"};
+  return std::any_of(std::begin(kWords), std::end(kWords),
+                     [&](std::string_view known) { return starts_no_case(word, known); });
+}
+
+/// Chunks end behind an "endfacet" that begins a line, where the grammar starts afresh. (Further to
+/// the right it may be part of a solid's name.)
+void AsciiReader::cut() {
+  cuts_.push_back(begin_);
+  const char* p = begin_;
+  while (static_cast<std::size_t>(end_ - p) > input_.options.chunk_bytes) {
+    p += input_.options.chunk_bytes;
+    bool found = false;
+    while (p < end_ && !found) {
+      while (p < end_ && *p != '\n' && *p != '\r') ++p;
+      p = skip_spaces(p);
+      const char* stop = p;
+      found = p < end_ && word_at(p, stop) == Word::kEndFacet;
+      if (found) p = stop;
+    }
+    if (!found) break;
+    cuts_.push_back(p);
+  }
+  cuts_.push_back(end_);
+}
+
+const char* AsciiReader::parse_vertex(const char* p, Chunk& chunk) const {
+  glm::dvec3 corner;
+  for (int i = 0; i < 3; ++i) {
+    p = skip_spaces(p);
+    const char* next = parse_double(p, corner[i]);
+    if (next == nullptr || !ends_token(*next)) {
+      chunk.error_offset = static_cast<std::size_t>(p - begin_);
+      chunk.error =
+          p >= end_ ? "the file ends inside a vertex" : describe(p, end_) + " is not a number";
+      return nullptr;
+    }
+    p = next;
+  }
+  chunk.corners.push_back(corner);
+  return p;
+}
+
+void AsciiReader::parse(const char* p, const char* end, Chunk& chunk) const {
+  bool in_loop = false;
+  std::size_t loop_begin = 0;
+  const auto broken = [&](const char* at, std::string message) {
+    chunk.error_offset = static_cast<std::size_t>(at - begin_);
+    chunk.error = std::move(message);
+  };
+  for (p = skip_spaces(p); p < end; p = skip_spaces(p)) {
+    const char* stop = p;
+    const Word word = word_at(p, stop);
+    const std::string_view text(p, static_cast<std::size_t>(stop - p));
+    if (word == Word::kVertex) {
+      if (!in_loop) return broken(p, "vertex outside of a loop");
+      p = parse_vertex(stop, chunk);
+      if (p == nullptr) return;
+    } else if (word == Word::kFacet || word == Word::kEndFacet) {
+      if (in_loop) return broken(p, fmt::format("'{}' inside a loop", text));
+      chunk.ended = false;
+      p = stop;
+    } else if (word == Word::kNormal) {
+      p = stop;
+      double unused = 0.0;
+      for (const char* q = p; q != nullptr;) {  // not used, so any number of numbers will do
+        p = q;
+        q = parse_double(skip_spaces(p), unused);
+        if (q != nullptr && !ends_token(*q)) q = nullptr;
+      }
+    } else if (word == Word::kLoop) {
+      if (in_loop && text.size() == 5) return broken(p, "a loop inside a loop");
+      if (!in_loop) loop_begin = chunk.corners.size();
+      in_loop = true;
+      p = stop;
+    } else if (word == Word::kEndLoop) {
+      if (!in_loop) return broken(p, fmt::format("'{}' without a loop", text));
+      in_loop = false;
+      chunk.sizes.push_back(static_cast<std::uint32_t>(chunk.corners.size() - loop_begin));
+      p = stop;
+    } else if (word == Word::kSolid || word == Word::kEndSolid) {
+      if (in_loop) return broken(p, fmt::format("'{}' inside a loop", text));
+      chunk.ended = word == Word::kEndSolid;
+      p = skip_line(stop);  // the rest is a name
+    } else if (!in_loop || tells_of_looks(text)) {
+      p = parse_strange(p, chunk);
+    } else {
+      return broken(p, describe(p, end_) + " is no word of a loop of an ascii STL file");
+    }
+  }
+  if (in_loop) broken(p, "the file ends inside a facet");
+}
+
+/// Past what no STL file should hold, to the end of the line or a known word.
+const char* AsciiReader::parse_strange(const char* p, Chunk& chunk) const {
+  const char* stop = skip_token(p);
+  if (!tells_of_looks({p, static_cast<std::size_t>(stop - p)}) && chunk.strange_lines++ == 0) {
+    chunk.first_strange = static_cast<std::size_t>(p - begin_);
+  }
+  for (p = stop; p < end_;) {
+    while (is_blank(*p) && *p != '\r') ++p;
+    if (*p == '\n' || *p == '\r' || p >= end_) break;
+    if (word_at(p, stop) != Word::kOther) break;
+    p = std::max(p + 1, skip_token(p));
+  }
+  return p;
+}
+
+void AsciiReader::append(const Chunk& chunk) {
+  std::size_t corner = 0;
+  std::vector<glm::dvec3>& positions = mesh_.soup.positions;
+  for (const std::uint32_t size : chunk.sizes) {
+    loop_.clear();
+    for (std::uint32_t i = 0; i < size; ++i) {
+      const glm::dvec3 key = WeldTable<double>::canonical(chunk.corners[corner++]);
+      const std::uint32_t vertex = table_.find_or_insert(
+          key, WeldTable<double>::hash(key), static_cast<std::uint32_t>(positions.size()));
+      if (vertex == positions.size()) positions.push_back(key);
+      loop_.push_back(vertex);
+    }
+    fans_.add(loop_.data(), loop_.size());
+  }
+  over_limit_ = positions.size() > kMaxVertices - 0x10000000u ||
+                exceeds_limit(input_.execution, positions.size(), mesh_.soup.triangles.size());
+  if (!chunk.sizes.empty() || chunk.ended) ended_ = chunk.ended;
+  error_offset_ = chunk.error_offset;
+  error_ = chunk.error;
+  if (strange_lines_ == 0) first_strange_ = chunk.first_strange;
+  strange_lines_ += chunk.strange_lines;
+}
+
+FacePlace AsciiReader::locate(std::uint32_t element) const {
+  std::uint32_t loops = 0;
+  const char* stop = begin_;
+  for (const char* p = begin_; p < end_; p = stop) {
+    while (p < end_ && ends_token(*p)) ++p;
+    if (p >= end_) break;
+    if (word_at(p, stop) == Word::kEndLoop && loops++ == element) {
+      return {fmt::format("{}:{}", input_.name, line_of(input_.text, p)), {}};
+    }
+  }
+  return {input_.name, {}};
+}
+
+Result<MeshFile> AsciiReader::read() {
+  cut();
+  std::mutex mutex;
+  std::atomic<bool> over = false;
+  std::vector<std::unique_ptr<Chunk>> ready(cuts_.size() - 1);
+  std::size_t next = 0;
+  ReadWatch watch(input_);
+  parallel_for(input_.execution, ready.size(), [&](std::size_t index, int) {
+    if (over.load(std::memory_order_relaxed)) return;
+    auto chunk = std::make_unique<Chunk>();
+    parse(cuts_[index], cuts_[index + 1], *chunk);
+    const std::lock_guard lock(mutex);
+    ready[index] = std::move(chunk);
+    for (; next < ready.size() && ready[next] && !over; ++next) {
+      append(*ready[next]);
+      over = over_limit_ || error_offset_ != std::numeric_limits<std::size_t>::max();
+      ready[next].reset();
+    }
+    (void)watch.at(static_cast<double>(next) / static_cast<double>(ready.size()));
+  });
+  if (input_.execution.stop.stop_requested()) {
+    return fail(ErrorCode::kCancelled, "{}: reading was stopped", input_.name);
+  }
+  if (over_limit_) {
+    return fail(ErrorCode::kLimit, "{}: the mesh needs more than the memory limit", input_.name);
+  }
+  if (error_offset_ != std::numeric_limits<std::size_t>::max()) {
+    return fail(ErrorCode::kInput, "{}:{}: {}", input_.name,
+                line_of(input_.text, begin_ + error_offset_), error_);
+  }
+  if (strange_lines_ != 0) {
+    const char* const first = begin_ + first_strange_;
+    const std::string what = fmt::format("{}:{}: {} is no word of an ascii STL file", input_.name,
+                                         line_of(input_.text, first), describe(first, end_));
+    if (mesh_.soup.positions.empty()) return fail(ErrorCode::kInput, "{}", what);
+    mesh_.stats.warnings.push_back(fmt::format("{}; {} such line{} skipped", what, strange_lines_,
+                                               strange_lines_ == 1 ? " was" : "s were"));
+  }
+  if (!ended_) {
+    mesh_.stats.warnings.push_back(fmt::format(
+        "{}: no 'endsolid' after the last facet; the file may be cut short", input_.name));
+  }
+  mesh_.stats.format = "stl ascii";
+  return finish_mesh(input_, std::move(mesh_),
+                     [this](std::uint32_t element) { return locate(element); });
+}
+
+/// Text that begins like an ascii file. Binary headers may begin with "solid" too, but hold zeros.
+bool looks_ascii(std::string_view text) {
+  if (text.substr(0, 512).find('\0') != std::string_view::npos) return false;
+  const std::string_view word = token_at(skip_spaces(text.data()));
+  return starts_no_case(word, "solid") || equals_no_case(word, "facet");
+}
+
+}  // namespace
+
+bool is_binary_stl(std::string_view bytes) {
+  return bytes.size() >= kHeaderBytes &&
+         bytes.size() ==
+             kHeaderBytes + kFacetBytes * std::size_t{little_endian_32(bytes.data() + 80)};
+}
+
+Result<MeshFile> read_stl(const ReaderInput& input) {
+  if (!is_binary_stl(input.text) && looks_ascii(input.text)) return AsciiReader(input).read();
+  return read_binary(input);
+}
+
+}  // namespace strata::detail

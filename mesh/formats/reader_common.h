@@ -1,0 +1,121 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <vector>
+
+#include "core/reserve_large.h"
+#include "mesh/no_vertex.h"
+#include "strata/mesh/formats/read_mesh.h"
+
+/// What the readers of this folder share; not for others.
+namespace strata::detail {
+
+/// The arguments of a reader. The text ends in a readable zero byte.
+struct ReaderInput {
+  std::string_view text;
+  const std::string& name;
+  const MeshReadOptions& options;
+  const Execution& execution;
+  std::size_t skipped = 0;  ///< bytes of the file before the text: a byte order mark
+};
+
+/// Tells how far a reader is, and whether it shall go on. Of the thread that made it: others may
+/// ask, and are not told on.
+class ReadWatch {
+ public:
+  explicit ReadWatch(const ReaderInput& input)
+      : input_(input), thread_(std::this_thread::get_id()) {}
+
+  /// @param done  share of the file, in [0, 1]. @return false once a stop is requested
+  bool at(double done) {
+    constexpr double kOfAll = 0.9;  // the rest is finish_mesh()
+    if (input_.execution.progress && std::this_thread::get_id() == thread_ && done >= told_) {
+      told_ = done;
+      input_.execution.progress(kOfAll * done);
+    }
+    return !input_.execution.stop.stop_requested();
+  }
+  /// The same for loops: looks up every 2^14th time. @param place  in the text
+  bool step(std::uint64_t index, const char* place) {
+    constexpr std::uint64_t kRarely = (1 << 14) - 1;
+    return (index & kRarely) != kRarely || at(static_cast<double>(place - input_.text.data()) /
+                                              static_cast<double>(input_.text.size()));
+  }
+
+ private:
+  const ReaderInput& input_;
+  std::thread::id thread_;
+  double told_ = 0;  // of that thread
+};
+
+/// Everything a file says, unchecked: indices may be out of range, coordinates not finite.
+/// `stats.faces` and the counts a reader alone can know (too_few_vertices, ignored) are set.
+struct RawMesh {
+  TriangleSoup soup;
+  MeshReadStats stats;
+  std::uint64_t first_short_face = 0;  ///< element of the first face with too few vertices
+};
+
+/// Where a face element stands in the file, for messages: "bunny.obj:1204", and as the file writes
+/// it the vertex it should not name (empty: its 0-based index).
+struct FacePlace {
+  std::string place;
+  std::string vertex;
+};
+using LocateFace = std::function<FacePlace(std::uint32_t element)>;
+
+/// Drops and counts what cannot stay in a soup, gathers warnings, and judges the whole: the last
+/// step of every reader. @return kInput when nothing is left, or with `strict` something was lost
+Result<MeshFile> finish_mesh(const ReaderInput& input, RawMesh&& raw, const LocateFace& locate);
+
+Result<MeshFile> read_obj(const ReaderInput& input);
+Result<MeshFile> read_stl(const ReaderInput& input);
+Result<MeshFile> read_ply(const ReaderInput& input);
+Result<MeshFile> read_off(const ReaderInput& input);
+
+/// Whether the size of a file is that of a binary STL file of as many triangles as it claims.
+[[nodiscard]] bool is_binary_stl(std::string_view bytes);
+
+/// Appends polygons as fans, which finish_mesh() cuts anew where that is not right, and keeps count
+/// of their elements, for readers that go face by face.
+class FanBuilder {
+ public:
+  explicit FanBuilder(RawMesh& mesh) : mesh_(mesh) {}
+  /// Adds the next face element. @pre indices beyond 32 bits were replaced by kNoVertex
+  void add(const std::uint32_t* corners, std::size_t count) {
+    const std::uint64_t element = mesh_.stats.faces++;
+    TriangleSoup& soup = mesh_.soup;
+    if (count < 3) {
+      if (mesh_.stats.too_few_vertices++ == 0) mesh_.first_short_face = element;
+      return;
+    }
+    if (identity_ && (count > 3 || soup.triangles.size() != element)) {
+      identity_ = false;
+      soup.face_elements.resize(soup.triangles.size());
+      for (std::size_t i = 0; i < soup.face_elements.size(); ++i) {
+        soup.face_elements[i] = static_cast<std::uint32_t>(i);
+      }
+    }
+    for (std::size_t i = 2; i < count; ++i) {
+      soup.triangles.emplace_back(corners[0], corners[i - 1], corners[i]);
+      if (!identity_) soup.face_elements.push_back(static_cast<std::uint32_t>(element));
+    }
+  }
+
+ private:
+  RawMesh& mesh_;
+  bool identity_ = true;
+};
+
+/// True when the memory limit of the execution forbids a soup of this size.
+[[nodiscard]] inline bool exceeds_limit(const Execution& execution, std::uint64_t vertices,
+                                        std::uint64_t triangles) {
+  return execution.memory_limit != 0 &&
+         vertices * sizeof(glm::dvec3) + triangles * sizeof(glm::uvec3) > execution.memory_limit;
+}
+
+}  // namespace strata::detail

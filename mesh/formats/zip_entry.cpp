@@ -1,0 +1,125 @@
+#include "mesh/formats/zip_entry.h"
+
+#ifdef STRATA_HAVE_LIBZIP
+#include <zip.h>
+#endif
+
+#include <algorithm>
+#include <charconv>
+#include <new>
+
+namespace strata::csg {
+namespace {
+
+char lower(char c) { return static_cast<char>(c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c); }
+
+std::string_view without_slash(std::string_view name) {
+  return name.starts_with('/') ? name.substr(1) : name;
+}
+
+}  // namespace
+
+std::optional<std::string> ZipArchive::find(std::string_view name) const {
+  const auto look = [&](std::string_view wanted) -> std::optional<std::string> {
+    for (const std::string& known : names_) {
+      const std::string_view other = without_slash(known);
+      if (std::equal(wanted.begin(), wanted.end(), other.begin(), other.end(),
+                     [](char a, char b) { return lower(a) == lower(b); })) {
+        return known;
+      }
+    }
+    return std::nullopt;
+  };
+  const std::string_view wanted = without_slash(name);
+  auto found = look(wanted);
+  if (found || wanted.find('%') == std::string_view::npos) return found;
+  std::string decoded;
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    unsigned value = 0;
+    const char* const digits = wanted.data() + i + 1;
+    if (wanted[i] == '%' && i + 2 < wanted.size() &&
+        std::from_chars(digits, digits + 2, value, 16).ptr == digits + 2) {
+      decoded += static_cast<char>(value);
+      i += 2;
+    } else {
+      decoded += wanted[i];
+    }
+  }
+  return look(decoded);
+}
+
+#ifdef STRATA_HAVE_LIBZIP
+
+// libzip, since minizip refuses the archives that lib3mf 1 writes, and with it OpenSCAD 2021.
+Result<ZipArchive> ZipArchive::open(const std::string& path) {
+  int reason = 0;
+  zip_t* const opened = zip_open(path.c_str(), ZIP_RDONLY, &reason);
+  if (!opened) {
+    zip_error_t error;
+    zip_error_init_with_code(&error, reason);
+    const std::string text = zip_error_strerror(&error);
+    zip_error_fini(&error);
+    return fail(reason == ZIP_ER_MEMORY ? ErrorCode::kLimit : ErrorCode::kInput,
+                "{}: not a zip archive ({})", path, text);
+  }
+  ZipArchive archive;
+  archive.archive_ =
+      std::shared_ptr<void>(opened, [](void* at) { zip_discard(static_cast<zip_t*>(at)); });
+  archive.path_ = path;
+  const zip_int64_t count = zip_get_num_entries(opened, 0);
+  for (zip_int64_t i = 0; i < count; ++i) {
+    const char* name = zip_get_name(opened, static_cast<zip_uint64_t>(i), 0);
+    archive.names_.emplace_back(name ? name : "");
+  }
+  return archive;
+}
+
+Result<std::string> ZipArchive::read(const std::string& name, const Execution& execution) const {
+  constexpr std::size_t kMostBytes = std::size_t{1} << 31;
+  struct Close {
+    void operator()(zip_file_t* file) const { zip_fclose(file); }
+  };
+  auto* const archive = static_cast<zip_t*>(archive_.get());
+  const auto at = std::find(names_.begin(), names_.end(), name);
+  const std::unique_ptr<zip_file_t, Close> file(
+      at == names_.end()
+          ? nullptr
+          : zip_fopen_index(archive, static_cast<zip_uint64_t>(at - names_.begin()), 0));
+  if (!file) {
+    return fail(ErrorCode::kInput, "{}: '{}' in the archive: {}", path_, name,
+                at == names_.end() ? "it is not there" : zip_strerror(archive));
+  }
+  const std::uint64_t most = execution.memory_limit == 0
+                                 ? kMostBytes
+                                 : std::min<std::uint64_t>(kMostBytes, execution.memory_limit);
+  std::string bytes;
+  char buffer[1 << 16];
+  for (;;) {
+    if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+    const zip_int64_t read = zip_fread(file.get(), buffer, sizeof buffer);
+    if (read < 0) {
+      return fail(ErrorCode::kInput, "{}: '{}' in the archive is damaged", path_, name);
+    }
+    if (read == 0) return bytes;
+    bytes.append(buffer, static_cast<std::size_t>(read));
+    if (bytes.size() > most) {
+      return fail(ErrorCode::kLimit, "{}: '{}' has more than {} bytes unpacked, which is the {}",
+                  path_, name, most, most == kMostBytes ? "most that is read" : "memory limit");
+    }
+  }
+}
+
+#else
+
+Result<ZipArchive> ZipArchive::open(const std::string& path) {
+  return fail(ErrorCode::kUsage, "{}: this build cannot unpack it (libzip-dev was missing)", path);
+}
+
+Result<std::string> ZipArchive::read(const std::string& name, const Execution&) const {
+  return fail(ErrorCode::kUsage, "{}: this build cannot unpack '{}' (libzip-dev was missing)",
+              path_, name);
+}
+
+#endif
+
+}  // namespace strata::csg

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "strata/core/execution.h"
+#include "strata/hashbuffer/gl/compute_lists.h"
+
+namespace strata::csg {
+
+/// Lists of a mesh on the GPU and, where the mesh is the soup of SolidLists, those of the tree's
+/// result: the filter's, bit for bit. A walk of the solids' lists makes them where they are, with a
+/// bit a solid, the tree simplified tile by tile. Pixels that the walk does not decide (solids that
+/// are open or overlap themselves, tiles of more than 1024 solids or nodes) are downloaded as they
+/// are, and go through the filter here; so do all of the rows that are made at once where a list is
+/// longer than a thread may walk.
+class GlResultSource final : public gl::ComputeListSource {
+ public:
+  /// As ComputeListSource::create(). @param execution threads of the filter as well
+  [[nodiscard]] static Result<std::unique_ptr<GlResultSource>> create(
+      const gl::Context& context, std::unique_ptr<gl::Store> store,
+      std::unique_ptr<gl::Store> spare = nullptr,
+      std::int64_t pixels_at_once = std::int64_t{1} << 22, const Execution& execution = {});
+  ~GlResultSource() override;
+
+  Result<void> set_mesh(const LatticeMesh& mesh) override;
+  bool use_filter(const TileListFilter& filter) override;
+
+  /// Tables of at most that many bytes, 32 at least, where the driver takes larger ones: for tests.
+  void limit_binding(std::uint64_t bytes);
+
+  /// Who made the lists since the filter was set; rows with a list that is too long to be walked
+  /// are not counted.
+  struct Counts {
+    std::uint64_t walked = 0;       ///< pixels with crossings that the walk decided
+    std::uint64_t handed_over = 0;  ///< pixels that the filter decided
+  };
+  [[nodiscard]] const Counts& counts() const;
+
+ private:
+  struct Impl;
+  explicit GlResultSource(std::unique_ptr<Impl> impl);
+  Result<LayeredDepthImage> read(gl::Store& store, const RasterTarget& target, int v_begin,
+                                 int v_end) override;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace strata::csg

@@ -1,0 +1,101 @@
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "strata/core/execution.h"
+#include "strata/core/result.h"
+#include "strata/csg/surface/surface_image.h"
+#include "strata/csg/tree.h"
+#include "strata/csg/view.h"
+
+namespace strata::csg {
+
+using Rgba = glm::vec<4, std::uint8_t>;
+
+/// An image of 8 bits a channel, rows from the top.
+struct Picture {
+  int width = 0, height = 0;
+  std::vector<Rgba> pixels;
+};
+
+/// Colours of a picture; the names and values are OpenSCAD's.
+struct ColourScheme {
+  std::string_view name;
+  glm::u8vec3 background, face, cut;
+};
+[[nodiscard]] std::span<const ColourScheme> colour_schemes();
+/// Null when there is none of that name (case does not matter).
+[[nodiscard]] const ColourScheme* find_colour_scheme(std::string_view name);
+
+/// A part of the tree that is shown beside it, transparent.
+struct Ghost {
+  Tree::NodeId node = Tree::kNone;
+  glm::vec4 colour{0.7f, 0.7f, 0.7f, 0.5f};  ///< red, green, blue, alpha in [0, 1]
+};
+inline constexpr glm::vec4 kBackgroundGhost{180 / 255.f, 180 / 255.f, 180 / 255.f, 128 / 255.f};
+inline constexpr glm::vec4 kHighlightGhost{255 / 255.f, 81 / 255.f, 81 / 255.f, 128 / 255.f};
+
+struct PictureOptions {
+  const ColourScheme* scheme = nullptr;  ///< null: Cornfield
+  /// Samples a pixel: 1, 2, 4, 8, 16, 32 or 64, on a regular grid within it.
+  int samples = 1;
+  bool transparent_background = false;
+  bool edges = false;  ///< dark lines where the faces of neighbouring pixels differ
+};
+
+class SurfaceSource;
+
+/// Draws a tree, again and again: what does not change from frame to frame is kept.
+class Preview {
+ public:
+  /// Keeps the tree's meshes alive. Draws the tree's root and, transparent, the ghosts.
+  /// @param relative_precision how far coordinates may be off, relative to the scene's size; faces
+  /// nearer than that coincide (see Scene::relative_precision)
+  Preview(Tree tree, std::vector<Ghost> ghosts, double relative_precision,
+          const Execution& execution = {});
+  ~Preview();
+  Preview(Preview&&) noexcept;
+  Preview& operator=(Preview&&) noexcept;
+
+  /// Around all solids that are drawn: what a camera should see. Cutters more than a thousand times
+  /// larger than the result do not count.
+  [[nodiscard]] Bounds box() const;
+  /// The view of pictures: make_view() of box(). Where things stand around the eye, its depths
+  /// begin at the nearest face in the picture, so that what is small and near is seen whole before
+  /// what is vast and far. @return as make_view()
+  [[nodiscard]] Result<View> view(const Camera& camera, const glm::ivec2& size,
+                                  const Execution& execution = {}) const;
+  [[nodiscard]] const Tree& tree() const;
+
+  /// Has surfaces found elsewhere from now on, by a GPU say: the same, bit for bit. Borrowed, used
+  /// by the thread that draws; null is this process's threads. Ghosts and light are always theirs.
+  void set_source(SurfaceSource* source);
+
+  /// The visible surfaces. Valid until the next call.
+  /// @return kUsage, kGeometry (coordinates too large), kCancelled
+  Result<const SurfaceImage*> draw(const View& view, const Execution& execution = {});
+  /// Moves a solid and draws again only what it touches, in the view of the last draw().
+  Result<const SurfaceImage*> move_solid(std::uint32_t solid, const glm::dmat4& world_from_mesh,
+                                         const Execution& execution = {});
+  [[nodiscard]] const DrawReport& report() const;
+
+  /// The shaded picture of `camera`. @return as draw()
+  Result<Picture> picture(const Camera& camera, const glm::ivec2& size,
+                          const PictureOptions& options = {}, const Execution& execution = {});
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Writes a PNG file, or to standard output for "-". @return kOutput naming the file
+Result<void> write_png(const Picture& picture, const std::string& path);
+
+}  // namespace strata::csg

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstdint>
+#include <glm/vec4.hpp>
+#include <vector>
+
+#include "strata/csg/tree.h"
+
+// What cuts the result of a tree into parts: a point belongs to the first solid of the tree that
+// holds it, of those that are not taken away from something. SolidLists::set_labels() makes lists
+// that tell parts apart by a label of that solid.
+
+namespace strata::csg {
+
+/// The solids below `root` that are not taken away, in the order of the tree's operands.
+[[nodiscard]] std::vector<std::uint32_t> added_solids(const Tree& tree, Tree::NodeId root);
+
+/// Labels by which a tree is cut into parts of one colour.
+struct ColourLabels {
+  std::vector<std::uint32_t> labels;  ///< of each solid of the tree; colour n has the label n + 1
+  std::vector<glm::vec4> colours;     ///< of the solids that are not taken away, by appearance
+};
+
+/// @param none  the colour of solids without one
+[[nodiscard]] ColourLabels colour_labels(const Tree& tree, Tree::NodeId root,
+                                         const glm::vec4& none);
+
+/// Labels by which a tree is cut into its solids: solid n has the label n + 1.
+[[nodiscard]] std::vector<std::uint32_t> id_labels(const Tree& tree);
+
+}  // namespace strata::csg

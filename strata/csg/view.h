@@ -1,0 +1,69 @@
+#pragma once
+
+#include <glm/mat4x4.hpp>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+
+#include "strata/core/result.h"
+#include "strata/mesh/soup_tools.h"
+
+namespace strata::csg {
+
+enum class Projection { kPerspective, kOrthographic };
+
+/// Where a picture is taken from, in OpenSCAD's terms.
+struct Camera {
+  Projection projection = Projection::kPerspective;
+  glm::dvec3 target{0.0};                ///< world point in the middle of the picture
+  glm::dvec3 rotation{55.0, 0.0, 25.0};  ///< $vpr: degrees; 0, 0, 0 looks down from +z, +y up
+  double distance = 140.0;               ///< of the eye from the target, > 0
+  double field_of_view = 22.5;           ///< degrees, of the picture's height; in (0, 180)
+};
+
+/// A camera at `eye` that looks at `centre`, +z up as far as possible.
+[[nodiscard]] Camera look_at(const glm::dvec3& eye, const glm::dvec3& centre);
+
+/// Moves the target to the middle of `box` (--auto-center).
+void centre_camera(Camera& camera, const Bounds& box);
+/// Sets the distance so that the ball around `box` and the target just fits (--view-all).
+/// @param aspect the picture's width / height; OpenSCAD looks at the height alone, so that narrow
+/// pictures lose the sides there
+void fit_camera(Camera& camera, const Bounds& box, double aspect = 1.0);
+
+/// Eye space: x right, y up, the camera looks along -z.
+[[nodiscard]] glm::dmat4 eye_from_world(const Camera& camera);
+
+/// How world space becomes the image lattice: pixel (u, v) of `size`, v downwards, depth away from
+/// the eye, spread over the 24 bits of a crossing.
+struct View {
+  glm::ivec2 size{0};  ///< pixels
+  /// (u w, v w, depth w, w), w = 1 for an orthographic view and the distance along the view axis
+  /// for a perspective one.
+  glm::dmat4 image_from_world{1.0};
+  glm::dmat4 eye_from_world{1.0};
+  bool perspective = true;
+  /// Distances along the view axis at depth 0 and at the largest depth. Depth is linear in the
+  /// distance for an orthographic view, in its reciprocal for a perspective one.
+  /// What lies before `near` is cut off there; the state of the ray at `near` is kept.
+  double near = 1.0, far = 2.0;
+
+  /// The box that the view was made for reaches behind or beside the eye, or nearer than `near`.
+  bool cut_short = false;
+
+  /// Spreads the depths of a perspective view from one distance to another, both above 0.
+  void set_distances(double nearest, double farthest);
+  /// Distance along the view axis of a depth.
+  [[nodiscard]] double distance(double depth) const;
+};
+
+/// Depth steps of a picture: 24 bits.
+inline constexpr std::uint32_t kPictureDepthLimit = std::uint32_t{1} << 24;
+/// Largest side of a picture, samples included.
+inline constexpr int kMaxPictureSide = 65536;
+
+/// The view of `camera` on what lies in `box`. Where a perspective one is cut short, its depths
+/// begin at 1/1024 of their end: Preview::view() knows better. Solids may be larger. @return kUsage
+/// when the size or camera is out of range
+Result<View> make_view(const Camera& camera, const glm::ivec2& size, const Bounds& box);
+
+}  // namespace strata::csg

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "strata/core/result.h"
+
+namespace strata::gl {
+
+/// A part of a shader's text. Errors name it and count lines in it. Files are embedded by
+/// strata_embed_glsl (cmake/StrataTargets.cmake).
+struct GlslPiece {
+  std::string_view name;  ///< "hashbuffer/gl/insert_32.glsl"
+  std::string_view text;  ///< without #version
+};
+
+/// What stands before the pieces, after `#version 450 core`.
+struct GlslSettings {
+  std::vector<std::string> extensions;  ///< required ones
+  std::vector<std::pair<std::string, std::string>> defines;
+};
+
+/// A linked shader program of the current context. Move-only.
+class Program {
+ public:
+  Program() = default;
+  ~Program() { reset(); }
+  Program(Program&& other) noexcept : id_(std::exchange(other.id_, 0)) {}
+  Program& operator=(Program&& other) noexcept {
+    if (this != &other) {
+      reset();
+      id_ = std::exchange(other.id_, 0);
+    }
+    return *this;
+  }
+
+  /// ErrorCode::kInternal with the compiler's log, piece and line named, if the driver refuses it.
+  [[nodiscard]] static Result<Program> compute(std::span<const GlslPiece> pieces,
+                                               const GlslSettings& settings = {});
+  [[nodiscard]] static Result<Program> graphics(std::span<const GlslPiece> vertex,
+                                                std::span<const GlslPiece> fragment,
+                                                const GlslSettings& settings = {});
+
+  [[nodiscard]] unsigned id() const { return id_; }
+  [[nodiscard]] explicit operator bool() const { return id_ != 0; }
+  void use() const;
+
+  /// Sets a uniform of that name; one that the compiler removed is no mistake.
+  void set(const char* name, std::uint32_t value) const;
+  void set(const char* name, std::int32_t value) const;
+  void set(const char* name, float value) const;
+  void set(const char* name, std::uint32_t x, std::uint32_t y) const;
+
+  /// Runs a compute program on that many work groups. @pre within Limits::compute_groups
+  void dispatch(std::uint32_t x, std::uint32_t y = 1, std::uint32_t z = 1) const;
+
+ private:
+  void reset() noexcept;
+  unsigned id_ = 0;
+};
+
+/// Work groups for `items` items, `group_size` in each, as a grid that every driver takes:
+/// 65535 x n. A shader computes its item as
+/// `(gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * group_size + local index`, and
+/// returns if there is none of that number.
+struct Groups {
+  std::uint32_t x = 1, y = 1;
+};
+[[nodiscard]] Groups groups_for(std::uint64_t items, std::uint32_t group_size);
+
+}  // namespace strata::gl

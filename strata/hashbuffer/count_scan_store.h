@@ -1,0 +1,235 @@
+#pragma once
+
+#include <algorithm>
+#include <cassert>
+#include <cstddef>
+#include <cstdint>
+#include <new>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "strata/core/depth_list.h"
+#include "strata/core/execution.h"
+#include "strata/core/result.h"
+#include "strata/hashbuffer/concurrency.h"
+#include "strata/hashbuffer/depth_list_store.h"
+#include "strata/hashbuffer/record.h"
+
+// After: Maule, Comba, Torchelsen, Bastos, "Memory-Optimized Order-Independent Transparency with
+// Dynamic Fragment Buffer", 2012/2014.
+// We differ: one 64-bit array serves as counter, base address and cursor, and ends as the offsets
+// of the lists; lists are sorted by the total order (depth, payload), so no bit depends on threads.
+
+namespace strata {
+
+/// Two geometry passes: count the fragments of each pixel, sum up, store each in its place; then
+/// sort the lists. Exact size, lists of any length. `RecordType` says which bits of a payload are
+/// kept, so that lists equal those of a HashBuffer with the same policy; `Concurrency` is
+/// Concurrent (the generator may insert from any thread) or Exclusive.
+///
+/// Memory: 8 bytes a fragment (of the largest frame so far) and 8 a pixel, plus 8.
+template <RecordPolicy RecordType, class Concurrency>
+class CountScanStore {
+ public:
+  using Record = RecordType;
+  static constexpr bool kAnyThread = Concurrency::kAnyThread;
+
+  /// A screen of width x height pixels, each at least 1 (ErrorCode::kUsage), with empty lists.
+  /// ErrorCode::kLimit if memory does not allow it.
+  [[nodiscard]] static Result<CountScanStore> create(int width, int height) {
+    if (width < 1 || height < 1) {
+      return fail(ErrorCode::kUsage, "count/scan store: a screen of {} x {} pixels", width, height);
+    }
+    try {
+      CountScanStore store(width, height);
+      store.ends_.resize(store.pixels() + 1);
+      return store;
+    } catch (const std::exception&) {
+      return fail(ErrorCode::kLimit, "count/scan store: no memory for {} x {} pixels", width,
+                  height);
+    }
+  }
+
+  [[nodiscard]] int width() const { return width_; }
+  [[nodiscard]] int height() const { return height_; }
+  [[nodiscard]] std::uint64_t stored() const { return items_.size(); }
+  /// Bytes held: 8 a fragment of the largest frame so far, 8 a pixel, and 8.
+  [[nodiscard]] std::uint64_t memory_bytes() const { return bytes_of(items_.capacity()); }
+  [[nodiscard]] std::uint64_t bytes_of(std::uint64_t fragments) const {
+    return fragments * sizeof(DepthItem) + (pixels() + 1) * sizeof(std::uint64_t);
+  }
+
+  /// Pass 1: counts. @pre 0 <= x < width, 0 <= y < height
+  class Counter {
+   public:
+    explicit Counter(CountScanStore& store) : store_(&store) {}
+    void insert(int x, int y, std::uint32_t, std::uint32_t) noexcept {
+      Concurrency::fetch_increment(store_->ends_[store_->pixel_of(x, y) + 1]);
+    }
+
+   private:
+    CountScanStore* store_;
+  };
+
+  /// Pass 2: stores. @pre as for Counter, and Record::payload_fits(payload)
+  class Writer {
+   public:
+    explicit Writer(CountScanStore& store) : store_(&store) {}
+    void insert(int x, int y, std::uint32_t depth, std::uint32_t payload) noexcept {
+      assert(Record::payload_fits(payload));
+      const std::uint64_t slot =
+          Concurrency::fetch_increment(store_->ends_[store_->pixel_of(x, y) + 1]);
+      // Only a generator that gives other fragments than it was counted with gets past the end.
+      if (slot < store_->items_.size()) store_->items_[slot] = Record::item(depth, payload);
+    }
+
+   private:
+    CountScanStore* store_;
+  };
+
+  /// Visits the list of pixel (x, y) front to back; stops early if `visit` returns false (it may
+  /// also return nothing).
+  template <class Visit>
+  void for_each(int x, int y, Visit&& visit) const {
+    const std::uint64_t pixel = pixel_of(x, y);
+    for (std::uint64_t i = ends_[pixel]; i < ends_[pixel + 1]; ++i) {
+      if constexpr (std::is_convertible_v<decltype(visit(items_[i])), bool>) {
+        if (!visit(items_[i])) return;
+      } else {
+        visit(items_[i]);
+      }
+    }
+  }
+
+  /// A copy of all lists as an image (depth_limit 2^24, world_from_image left at identity).
+  [[nodiscard]] Result<LayeredDepthImage> depth_image(const Execution& = {}) const {
+    try {
+      return image_of(ends_, items_);
+    } catch (const std::exception&) {
+      return fail(ErrorCode::kLimit, "count/scan store: no memory for a copy of {} fragments",
+                  stored());
+    }
+  }
+  /// All lists as an image, without copying. Leaves the store unusable.
+  [[nodiscard]] LayeredDepthImage take_depth_image() && {
+    return image_of(std::move(ends_), std::move(items_));
+  }
+
+  /// Builds a frame: runs the generator twice, then sorts the rows on `execution`'s threads.
+  /// `execution.memory_limit` bounds the store's own bytes. Exceptions of the generator pass
+  /// through.
+  /// @return how it was built. ErrorCode::kLimit, and empty lists, with the number of fragments
+  /// that do not fit; kInternal if the generator was seen to give other fragments the second time;
+  /// kCancelled on request.
+  template <class Generator>
+  [[nodiscard]] friend Result<BuildReport> build(CountScanStore& store, Generator&& generator,
+                                                 const Execution& execution = {}) {
+    store.clear();
+    Counter counter(store);
+    generator(counter);
+    const std::uint64_t fragments = store.scan();
+    const std::uint64_t limit = execution.memory_limit;
+    if (limit > 0 && store.bytes_of(fragments) > limit) {
+      const std::uint64_t fixed = store.bytes_of(0);
+      const std::uint64_t room = limit < fixed ? 0 : (limit - fixed) / sizeof(DepthItem);
+      store.clear();
+      return fail(ErrorCode::kLimit,
+                  "count/scan store: {} of {} fragments do not fit; they need {} bytes, the limit "
+                  "is {}",
+                  fragments - room, fragments, store.bytes_of(fragments), limit);
+    }
+    try {
+      // The old array goes before the new one comes; one that is large enough is used again.
+      if (store.items_.capacity() < fragments || (limit > 0 && store.memory_bytes() > limit)) {
+        std::vector<DepthItem>().swap(store.items_);
+      }
+      store.items_.resize(fragments);
+    } catch (const std::exception&) {
+      store.clear();
+      return fail(ErrorCode::kLimit, "count/scan store: no memory for {} fragments, {} bytes",
+                  fragments, store.bytes_of(fragments));
+    }
+    Writer writer(store);
+    generator(writer);
+    // Sorting must not be led astray by a generator that broke its promise.
+    if (store.ends_.back() != fragments ||
+        !std::is_sorted(store.ends_.begin(), store.ends_.end())) {
+      store.clear();
+      return fail(ErrorCode::kInternal,
+                  "count/scan store: the generator gave other fragments the second time");
+    }
+    store.sort(execution);
+    if (execution.stop.stop_requested()) {
+      store.clear();
+      return fail(ErrorCode::kCancelled, "count/scan store: stopped on request");
+    }
+    return BuildReport{fragments, 2, store.memory_bytes()};
+  }
+
+ private:
+  CountScanStore(int width, int height) : width_(width), height_(height) {}
+
+  [[nodiscard]] std::uint64_t pixels() const {
+    return static_cast<std::uint64_t>(width_) * static_cast<std::uint64_t>(height_);
+  }
+  [[nodiscard]] std::uint64_t pixel_of(int x, int y) const noexcept {
+    assert(x >= 0 && x < width_ && y >= 0 && y < height_);
+    return static_cast<std::uint64_t>(y) * static_cast<std::uint64_t>(width_) +
+           static_cast<std::uint64_t>(x);
+  }
+
+  void clear() noexcept {
+    std::fill(ends_.begin(), ends_.end(), 0);
+    items_.clear();
+  }
+
+  /// Element p + 1 of `ends_` turns from the count of pixel p into the begin of its list. Pass 2
+  /// advances it to the end, which is the begin of the next: then the array holds the offsets.
+  std::uint64_t scan() noexcept {
+    std::uint64_t sum = 0;
+    for (std::uint64_t& entry : ends_) sum += std::exchange(entry, sum);
+    return sum;
+  }
+
+  void sort(const Execution& execution) {
+    const auto columns = static_cast<std::size_t>(width_);
+    parallel_for(execution, static_cast<std::size_t>(height_), [&](std::size_t row, int) {
+      for (std::size_t pixel = row * columns; pixel < (row + 1) * columns; ++pixel) {
+        sort_list(items_.data() + ends_[pixel], items_.data() + ends_[pixel + 1]);
+      }
+    });
+  }
+
+  static void sort_list(DepthItem* begin, DepthItem* end) {
+    constexpr std::ptrdiff_t kInsertionSortLimit = 32;
+    if (end - begin > kInsertionSortLimit) {
+      std::sort(begin, end);
+      return;
+    }
+    for (DepthItem* next = begin; next != end; ++next) {
+      const DepthItem item = *next;
+      DepthItem* place = next;
+      for (; place != begin && item < place[-1]; --place) *place = place[-1];
+      *place = item;
+    }
+  }
+
+  template <class Ends, class Items>
+  [[nodiscard]] LayeredDepthImage image_of(Ends&& ends, Items&& items) const {
+    LayeredDepthImage image;
+    image.width = width_;
+    image.height = height_;
+    image.depth_limit = kRecordDepthMax + 1;
+    image.offsets = std::forward<Ends>(ends);
+    image.items = std::forward<Items>(items);
+    return image;
+  }
+
+  int width_;
+  int height_;
+  std::vector<std::uint64_t> ends_;
+  std::vector<DepthItem> items_;
+};
+
+}  // namespace strata

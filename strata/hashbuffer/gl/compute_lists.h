@@ -1,0 +1,53 @@
+#pragma once
+
+#include <memory>
+
+#include "raster/gl/compute.h"
+#include "strata/core/execution.h"
+#include "strata/gl/context.h"
+#include "strata/hashbuffer/gl/store.h"
+#include "strata/hashbuffer/list_source.h"
+
+namespace strata::gl {
+
+/// build(store, rasterizer), after a pass that counts where the store gains by the hint; the
+/// report's fragments are told then too.
+[[nodiscard]] Result<BuildReport> build_sized(Store& store, ComputeRasterizer& rasterizer,
+                                              const Execution& execution = {});
+
+/// Lists by the compute rasterizer in a store of the GPU: the CPU's, bit for bit.
+class ComputeListSource : public ListSource {
+ public:
+  /// `context` stays current while this is used. @param store keeps whole payloads
+  /// @param spare takes over for good where `store` fails, as with lists beyond its ages; may
+  /// be null @param pixels_at_once see rows_at_once(), about @param execution its stop and memory
+  /// limit (that of a store), asked by lists() @return kUsage where the driver cannot
+  [[nodiscard]] static Result<std::unique_ptr<ComputeListSource>> create(
+      const Context& context, std::unique_ptr<Store> store, std::unique_ptr<Store> spare = nullptr,
+      std::int64_t pixels_at_once = std::int64_t{1} << 22, const Execution& execution = {});
+
+  Result<void> set_mesh(const LatticeMesh& mesh) override;
+  Result<LayeredDepthImage> lists(const RasterTarget& target, int v_begin, int v_end) override;
+  [[nodiscard]] std::uint64_t crossings() const override { return crossings_; }
+  [[nodiscard]] int rows_at_once(const RasterTarget& target) const override;
+
+ protected:
+  /// @param execution without its progress, of which lists() would tell a part only
+  explicit ComputeListSource(const Execution& execution) : execution_(execution) {
+    execution_.progress = {};
+  }
+  [[nodiscard]] Result<void> open(const Context& context, std::unique_ptr<Store> store,
+                                  std::unique_ptr<Store> spare, std::int64_t pixels_at_once);
+  /// The lists of rows [v_begin, v_end) of `target`, which `store` holds. Sets crossings_.
+  [[nodiscard]] virtual Result<LayeredDepthImage> read(Store& store, const RasterTarget& target,
+                                                       int v_begin, int v_end);
+  std::uint64_t crossings_ = 0;
+  Execution execution_;
+
+ private:
+  std::unique_ptr<ComputeRasterizer> rasterizer_;
+  std::unique_ptr<Store> store_, spare_;
+  std::int64_t pixels_at_once_ = 0;
+};
+
+}  // namespace strata::gl

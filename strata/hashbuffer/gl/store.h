@@ -1,0 +1,100 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "hashbuffer/gl/prefix_sum.h"
+#include "strata/core/depth_list.h"
+#include "strata/core/execution.h"
+#include "strata/core/result.h"
+#include "strata/gl/buffer.h"
+#include "strata/gl/context.h"
+#include "strata/gl/shader_program.h"
+#include "strata/hashbuffer/depth_list_store.h"
+#include "strata/raster/gl/producer.h"
+
+namespace strata::gl {
+
+/// A store of a frame's fragments on the GPU, under the law of
+/// strata/hashbuffer/depth_list_store.h: every list sorted by (depth, payload), equal fragments as
+/// often as they came, nothing dropped silently. Use build(store, producer).
+///
+/// A screen whose table is larger than one binding is cut into bands of rows, each with a table of
+/// its own; a band is drawn, and read, apart from the others.
+class Store {
+ public:
+  virtual ~Store() = default;
+
+  /// A hint before begin(): how many fragments will come, about. Without effect where room is made
+  /// as it is needed.
+  virtual void expect(std::uint64_t fragments) { static_cast<void>(fragments); }
+  /// Whether expect() is worth a pass that counts: a table that is far too full is slow to tell.
+  [[nodiscard]] virtual bool gains_by_hint() const { return false; }
+  /// Empties the store for a frame of that size, in pixels, each side at least 1 (kUsage).
+  [[nodiscard]] virtual Result<void> begin(std::uint32_t width, std::uint32_t height) = 0;
+  /// Passes over the geometry. May change in begin(), begin_pass() and end().
+  [[nodiscard]] virtual int passes() const = 0;
+  /// The text of that pass's strata_insert. @pre pass < passes()
+  [[nodiscard]] virtual StoreGlsl glsl(int pass) const = 0;
+  /// The rows that the pass keeps fragments of.
+  [[nodiscard]] virtual PixelRows rows_of(int pass) const = 0;
+  /// Binds what the pass needs; then draw. False: nothing needs to be drawn in this pass.
+  [[nodiscard]] virtual Result<bool> begin_pass(int pass) = 0;
+  /// After the last pass: true, the lists are complete; false, what was missing is counted and the
+  /// store has grown: all passes must be drawn again. ErrorCode::kLimit if that cannot help.
+  [[nodiscard]] virtual Result<bool> end() = 0;
+
+  /// Screen of the last begin().
+  [[nodiscard]] std::uint32_t width() const { return width_; }
+  [[nodiscard]] std::uint32_t height() const { return height_; }
+  /// Bytes on the GPU that the lists may take, 0: no limit. From the next begin() on.
+  void limit_memory(std::uint64_t bytes) { memory_limit_ = bytes; }
+  /// Bytes on the GPU.
+  [[nodiscard]] virtual std::uint64_t memory_bytes() const = 0;
+  /// Fragments of the frame; 0 where the store does not need to count them.
+  [[nodiscard]] virtual std::uint64_t fragments() const { return 0; }
+  /// Bits of a payload that come back; 0 where a store keeps depth alone.
+  [[nodiscard]] virtual std::uint32_t payload_mask() const = 0;
+
+  // --- reading, after end() said true -----------------------------------------------------------
+
+  /// Bands of rows to be read apart: for each, bind_for_reading() and dispatch over its rows.
+  [[nodiscard]] virtual int bands() const = 0;
+  [[nodiscard]] virtual PixelRows band_rows(int band) const = 0;
+  /// GLSL text for reading, any stage with storage blocks. Bindings as for inserting. It defines
+  ///
+  ///     struct StrataCursor { ... };
+  ///     StrataCursor strata_list(uint pixel);   // pixel of the whole screen, within the band
+  ///     bool strata_next(inout StrataCursor cursor, out uint depth, out uint payload);
+  ///
+  /// strata_next gives the list front to back; false at its end.
+  [[nodiscard]] virtual StoreGlsl glsl_read() const = 0;
+  virtual void bind_for_reading(int band) const = 0;
+
+  /// All lists (depth_limit 2^24, world_from_image left at identity). ErrorCode::kLimit without the
+  /// memory.
+  [[nodiscard]] Result<LayeredDepthImage> download();
+
+ protected:
+  explicit Store(const Limits& limits) : binding_bytes_(limits.storage_block_bytes) {}
+
+  std::uint32_t width_ = 0, height_ = 0;
+  std::uint64_t memory_limit_ = 0;
+  std::uint64_t binding_bytes_;  ///< what a shader sees at one binding at most
+
+ private:
+  [[nodiscard]] Result<void> download_band(int band, LayeredDepthImage& image);
+
+  Program lengths_, items_;  ///< of download(), made when it is first called
+  PrefixSum prefix_sum_;
+  Buffer lengths_buffer_, items_buffer_;
+};
+
+/// Builds a frame: draws the producer once a pass, and again where something did not fit.
+/// `execution` is asked for its stop and its memory limit.
+/// @return how it was built; `fragments` as Store::fragments().
+/// ErrorCode::kLimit as Store::end(), kCancelled on request, and what the producer fails with.
+[[nodiscard]] Result<BuildReport> build(Store& store, Producer& producer,
+                                        const Execution& execution = {});
+
+}  // namespace strata::gl

@@ -1,0 +1,77 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "strata/core/depth_list.h"
+#include "strata/hashbuffer/tile_lists.h"
+
+namespace strata {
+
+/// Voxels first..last of a column that faces of one solid of a mesh pass through.
+struct FaceRun {
+  std::uint32_t solid = 0;
+  int first = 0, last = 0;
+};
+struct VoxelRun {
+  int first = 0, last = 0;
+};
+
+/// Makes other lists of the sorted lists of a tile before they are used: a Boolean tree makes the
+/// lists of its result of the lists of its solids. What comes out must be sorted as well.
+class TileListFilter {
+ public:
+  virtual ~TileListFilter() = default;
+
+  /// The scratch memory of one thread.
+  class Worker {
+   public:
+    virtual ~Worker() = default;
+    /// The filtered lists, as compressed rows; valid until the next call.
+    virtual TileLists<DepthItem> apply(const TileLists<DepthItem>& lists) = 0;
+    /// Appends those of the voxels of `faces` that the surface of the result may pass through:
+    /// where it depends on the solids whose faces are in the voxel, all others being as they are at
+    /// its centre. Runs in increasing order that do not touch. A filter that does not override
+    /// solid_of() may leave it at this: the faces of one solid come as such runs.
+    /// @param lists of the tile, as apply() takes them
+    /// @param faces of the column of pixel `pixel`, in any order of their solids
+    virtual void surface(const TileLists<DepthItem>& lists, std::size_t pixel,
+                         std::span<const FaceRun> faces, std::vector<VoxelRun>& kept) {
+      (void)lists, (void)pixel;
+      for (const FaceRun& run : faces) kept.push_back({run.first, run.last});  // knows no solids
+    }
+  };
+  /// Threads may ask at once.
+  [[nodiscard]] virtual std::unique_ptr<Worker> worker() const = 0;
+  /// What comes out is labelled: each crossing says what lies behind it, at exit() nothing, else
+  /// what the label triangle() stands for. A list has no two crossings of one depth then, and
+  /// labels follow one another without an exit between.
+  [[nodiscard]] virtual bool labelled() const { return false; }
+  /// The solid of a triangle of the mesh; 0 where that has but one.
+  [[nodiscard]] virtual std::uint32_t solid_of(std::uint32_t triangle) const {
+    (void)triangle;
+    return 0;
+  }
+};
+
+/// Calls body(item) for each crossing of pixel `pixel` of a tile, in order.
+template <class Body>
+void for_each_item(const TileLists<DepthItem>& lists, std::size_t pixel, Body&& body) {
+  if (lists.planes64 == nullptr) {
+    for (std::uint32_t i = lists.offsets[pixel]; i < lists.offsets[pixel + 1]; ++i) {
+      body(lists.keys[i]);
+    }
+    return;
+  }
+  const int row = static_cast<int>(pixel) / kTileSide;
+  if (row < lists.row_begin || row >= lists.row_end) return;
+  for (std::size_t age = 0; age < static_cast<std::size_t>(lists.ages); ++age) {
+    const std::uint64_t record = lists.planes64[age * kTilePixels + pixel];
+    if (record == 0) break;
+    body(tile_key<Record64>(record));
+  }
+}
+
+}  // namespace strata

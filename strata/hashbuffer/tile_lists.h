@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstdint>
+#include <type_traits>
+
+#include "strata/core/depth_list.h"
+#include "strata/hashbuffer/offsets.h"
+#include "strata/hashbuffer/record.h"
+#include "strata/raster/raster_target.h"
+
+namespace strata {
+
+/// Where crossings are kept until sorted. kAuto: the faster one measured for the scene.
+enum class StoreKind { kAuto, kHaBuffer, kCountScan };
+
+/// A crossing without its triangle: depth << 1 | exit, 24 bits, which orders like DepthItem as far
+/// as it goes. Serves depth limits up to 2^23, grids up to 32768 voxels deep.
+using DepthKey = std::uint32_t;
+inline constexpr std::uint32_t kMaxDepthKeyLimit = std::uint32_t{1} << 23;
+
+/// The sorted depth lists of one tile, in one of two forms. `Key` is DepthKey or DepthItem. Memory
+/// is the builder's, valid until its next tile.
+template <class Key>
+struct TileLists {
+  /// Rows of the tile that may hold fragments; all other lists are empty.
+  int row_begin = 0, row_end = 0;
+  std::uint64_t fragments = 0;
+
+  /// Planar form (when `planes` is set): the fragment of age a = 1..ages of pixel p is the record
+  /// planes[(a - 1) * kTilePixels + p], present when its age field says a, absent when it is 0.
+  /// Rows outside [row_begin, row_end) hold rubbish. Record: see TileRecord<Key>.
+  const std::uint32_t* planes32 = nullptr;
+  const std::uint64_t* planes64 = nullptr;
+  int ages = 0;
+
+  /// Compressed rows (when `offsets` is set): kTilePixels + 1 offsets into `keys`.
+  const std::uint32_t* offsets = nullptr;
+  const Key* keys = nullptr;
+};
+
+/// What a record says in a tile's lists: Record32 stores DepthKeys in the place of depths, Record64
+/// DepthItems.
+template <class Record>
+using TileKey = std::conditional_t<Record::kPayloadBits == 0, DepthKey, DepthItem>;
+
+/// The key in a record: nearness and payload are stored inverted, so that larger is nearer.
+template <class Record>
+[[nodiscard]] constexpr TileKey<Record> tile_key(typename Record::Word record) {
+  return TileKey<Record>(Record::rank(static_cast<typename Record::Word>(~record)));
+}
+
+struct TileStoreOptions {
+  StoreKind store = StoreKind::kAuto;
+  OffsetKind offsets = OffsetKind::kPlaneFirst;
+  std::uint64_t seed = 1;
+};
+
+}  // namespace strata

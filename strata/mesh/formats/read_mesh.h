@@ -1,0 +1,99 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "strata/core/execution.h"
+#include "strata/core/result.h"
+#include "strata/mesh/triangle_soup.h"
+
+namespace strata {
+
+/// The mesh files Strata reads by itself.
+enum class MeshFormat {
+  kAuto,  ///< by the extension of the path
+  kObj,   ///< Wavefront OBJ: v and f statements; all else is skipped
+  kStl,   ///< STL, ascii or binary, told apart by size; a wrong count gives way to the size
+  kPly,   ///< PLY 1.0, ascii or binary of either byte order: faces and triangle strips
+  kOff    ///< Object File Format, ascii, with the prefixes ST, C, N, 4 in any order
+};
+
+/// Who reads the file.
+enum class MeshReader {
+  kOwn,      ///< the readers of this folder
+  kOpenMesh  ///< OpenMesh, to compare; positions pass through float there
+};
+
+/// How to read.
+struct MeshReadOptions {
+  MeshFormat format = MeshFormat::kAuto;
+  MeshReader reader = MeshReader::kOwn;
+  /// A face that would be dropped and counted (vertex out of range, not finite, fewer than three
+  /// vertices) is ErrorCode::kInput instead.
+  bool strict = false;
+  /// Text of OBJ and ascii STL is parsed in pieces of about this many bytes, on all threads. The
+  /// mesh does not depend on it; tests make it small.
+  std::size_t chunk_bytes = std::size_t{1} << 19;
+};
+
+/// What the reader met. Faces that were dropped are counted by cause, one cause a face, in the
+/// order of the fields. Faces of no area, duplicates and open edges are diagnose()'s business.
+struct MeshReadStats {
+  std::string format;           ///< "obj", "stl ascii", "stl binary", "ply ascii", ...
+  std::uint64_t bytes = 0;      ///< size of the file
+  std::uint64_t vertices = 0;   ///< in the soup (STL: after welding)
+  std::uint64_t faces = 0;      ///< face elements of the file, polygons counted once
+  std::uint64_t triangles = 0;  ///< in the soup
+
+  std::uint64_t too_few_vertices = 0;  ///< faces dropped: fewer than three vertices
+  std::uint64_t out_of_range = 0;      ///< faces dropped: an index names no vertex
+  std::uint64_t non_finite = 0;        ///< faces dropped: a coordinate is NaN or infinite
+  std::uint64_t degenerate = 0;        ///< triangles dropped: two corners are the same vertex
+  std::uint64_t ignored = 0;           ///< elements that are no faces: lines, points, edges
+  std::uint64_t non_planar = 0;        ///< polygons more than 1/1000 of their size out of flat
+  std::vector<std::string> warnings;   ///< sentences with places, for the user
+
+  /// Faces of the file that left nothing in the soup or lost a part because of bad data.
+  [[nodiscard]] std::uint64_t dropped_faces() const {
+    return too_few_vertices + out_of_range + non_finite;
+  }
+};
+
+/// A mesh and how its reading went.
+struct MeshFile {
+  TriangleSoup soup;
+  MeshReadStats stats;
+};
+
+/// Reads the triangles of a mesh file. Polygons are cut by PolygonCutter: flat convex ones are fans
+/// from their first corner, others Delaunay triangles or at least triangles that do not overlap;
+/// all share the face element. STL corners are welded by exact position (-0 equals +0). Vertices
+/// keep the order of the file. Text may begin with a UTF-8 byte order mark. Counts in headers are
+/// claims: nothing is allocated that the bytes of the file do not back. The result does not depend
+/// on the number of threads.
+/// @param path  a file, or "-" for standard input, which needs options.format
+/// @return kInput, with line or byte: no such file, unknown format, empty, malformed, truncated,
+/// UTF-16 text, no vertices, no usable face, or with `strict` a face that had to be dropped;
+/// kUsage: "-" without a format, OpenMesh not in this build; kLimit: more than 2^32 - 2 vertices,
+/// memory; kCancelled. The file must not be changed by others meanwhile.
+Result<MeshFile> read_mesh(const std::string& path, const MeshReadOptions& options = {},
+                           const Execution& execution = {});
+
+/// The same for bytes in memory. @param name  stands for the path in messages
+/// @pre options.format is not kAuto; options.reader is kOwn
+Result<MeshFile> parse_mesh(std::string_view bytes, const std::string& name,
+                            const MeshReadOptions& options, const Execution& execution = {});
+
+/// The format for a path's extension, in any letter case; kAuto when it names none.
+[[nodiscard]] MeshFormat mesh_format_of(std::string_view path);
+
+/// "obj", "stl", "ply", "off"; kAuto for any other name.
+[[nodiscard]] MeshFormat mesh_format_named(std::string_view name);
+
+/// The inverse of mesh_format_named; "auto" for kAuto.
+[[nodiscard]] const char* mesh_format_name(MeshFormat format);
+
+}  // namespace strata

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <span>
+#include <vector>
+
+#include "strata/core/execution.h"
+#include "strata/core/grid.h"
+#include "strata/core/result.h"
+#include "strata/mesh/soup_tools.h"
+#include "strata/mesh/triangle_soup.h"
+
+namespace strata {
+
+/// Lattice steps along a voxel or pixel: positions are 24.8 fixed point.
+inline constexpr int kLatticeBits = 8;
+inline constexpr int kLatticeSteps = 1 << kLatticeBits;
+/// Coordinates beyond this many lattice steps (2^20 voxels) are refused.
+inline constexpr std::int32_t kMaxLatticeCoordinate = 1 << 28;
+
+/// A mesh whose vertices were snapped, once and in 3D, to the lattice of a grid: the only geometry
+/// that the rasterizer, the surface voxelizer and the oracles see (law 3). Lattice point (x, y, z)
+/// lies at world grid.origin + (x, y, z) / 256 * grid.voxel_size; voxel centres are at 256 i + 128.
+struct LatticeMesh {
+  std::vector<glm::ivec3> vertices;       ///< |coordinate| <= kMaxLatticeCoordinate
+  std::span<const glm::uvec3> triangles;  ///< borrowed from the soup it was made of
+};
+
+/// Snaps to nearest, ties up: floor((p - origin) / voxel_size * 256 + 0.5).
+/// @return kGeometry naming the vertex and its coordinate when it is not finite or farther than
+/// kMaxLatticeCoordinate.
+Result<LatticeMesh> snap_to_lattice(const TriangleSoup& mesh, const VoxelGrid& grid,
+                                    const Execution& execution = {});
+
+/// Cuts a mesh off where it does not fit the lattice of `grid`: far outside of the grid it is moved
+/// onto a box (clamp_to_box()), so that rays through the grid meet it as often as before.
+/// @param box  around the mesh
+/// @return the triangle of the mesh before that each triangle is a piece of; empty when all of it
+/// fitted and nothing was done. kGeometry naming the vertex whose coordinate is not below
+/// kMostClamped; kCancelled
+Result<std::vector<std::uint32_t>> fit_lattice(TriangleSoup& mesh, const Bounds& box,
+                                               const VoxelGrid& grid,
+                                               const Execution& execution = {});
+
+}  // namespace strata

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstdint>
+
+#include "strata/core/grid.h"
+
+namespace strata {
+
+/// What rays along one axis see: pixel (u, v) has its centre at lattice (256 u + 128, 256 v + 128).
+struct RasterTarget {
+  Axis axis = Axis::kZ;
+  int width = 0;                  ///< pixels along u
+  int height = 0;                 ///< pixels along v
+  std::uint32_t depth_limit = 0;  ///< depths are clamped to [0, depth_limit), never dropped
+};
+
+/// A half-open box of pixels.
+struct PixelRect {
+  int u0 = 0, v0 = 0, u1 = 0, v1 = 0;
+  [[nodiscard]] bool empty() const { return u0 >= u1 || v0 >= v1; }
+};
+
+/// Pixels along a side of a tile: bulk work is done tile by tile, each one thread's alone.
+inline constexpr int kTileSide = 64;
+inline constexpr int kTilePixels = kTileSide * kTileSide;
+
+}  // namespace strata

@@ -1,0 +1,176 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "strata/core/grid.h"
+
+namespace strata {
+
+/// A run of solid voxels along a column, both ends inclusive, so that 16 bits serve the largest
+/// grid. [first:16 | last:16]
+struct Interval {
+  std::uint16_t first = 0;
+  std::uint16_t last = 0;
+
+  [[nodiscard]] int begin() const { return first; }
+  [[nodiscard]] int end() const { return last + 1; }  ///< one past the last voxel
+  [[nodiscard]] int length() const { return last - first + 1; }
+  friend bool operator==(const Interval&, const Interval&) = default;
+};
+
+/// The solid voxels of rows [v_begin, v_end) of a grid as disjoint, increasing, non-touching
+/// intervals along `axis`. A column is (u, v) with the axes of AxisFrame(axis). Memory grows with
+/// the surface, not with the volume. Storage is by tiles of kTileSide x kTileSide columns; a tile
+/// without solid voxels holds nothing.
+///
+/// Intervals may have labels, such as the number of a solid. Then those that touch differ in
+/// theirs.
+class VoxelIntervals {
+ public:
+  static constexpr int kTileSide = 64;
+  static constexpr std::size_t kTileColumns = std::size_t{kTileSide} * kTileSide;
+
+  VoxelIntervals() = default;
+  /// An empty slab. @pre v_begin is a multiple of kTileSide, 0 <= v_begin < v_end <= rows of grid
+  VoxelIntervals(const VoxelGrid& grid, Axis axis, int v_begin, int v_end);
+  /// All rows of the grid, empty.
+  VoxelIntervals(const VoxelGrid& grid, Axis axis);
+
+  [[nodiscard]] const VoxelGrid& grid() const { return grid_; }
+  [[nodiscard]] Axis axis() const { return axis_; }
+  [[nodiscard]] int columns() const { return columns_; }  ///< voxels along u
+  [[nodiscard]] int v_begin() const { return v_begin_; }
+  [[nodiscard]] int v_end() const { return v_end_; }
+  [[nodiscard]] int tiles_u() const { return tiles_u_; }
+  [[nodiscard]] int tiles_v() const { return tiles_v_; }
+
+  /// The intervals of column (u, v). @pre 0 <= u < columns(), v_begin() <= v < v_end()
+  [[nodiscard]] std::span<const Interval> column(int u, int v) const {
+    const Tile& tile = tile_of(u, v);
+    if (!tile.offsets) return {};
+    const std::size_t local = local_of(u, v);
+    return {tile.items.get() + tile.offsets[local], tile.offsets[local + 1] - tile.offsets[local]};
+  }
+  /// The labels of the intervals of column (u, v); none where they were not given.
+  [[nodiscard]] std::span<const std::uint32_t> column_labels(int u, int v) const {
+    const Tile& tile = tile_of(u, v);
+    if (!tile.labels) return {};
+    const std::size_t local = local_of(u, v);
+    return {tile.labels.get() + tile.offsets[local], tile.offsets[local + 1] - tile.offsets[local]};
+  }
+  /// True when no column of tile (tu, tv) of this slab is solid anywhere: lets writers skip it.
+  [[nodiscard]] bool tile_empty(int tu, int tv) const {
+    return !tiles_[static_cast<std::size_t>(tv) * static_cast<std::size_t>(tiles_u_) +
+                   static_cast<std::size_t>(tu)]
+                .offsets;
+  }
+
+  /// The whole of tile (tu, tv) at once, for loops that column() would slow down: offsets as given
+  /// to set_tile (kTileColumns + 1 of them, or none for an empty tile) and the intervals.
+  struct TileView {
+    std::span<const std::uint32_t> offsets;
+    std::span<const Interval> items;
+    std::span<const std::uint32_t> labels;  ///< of the items, or none
+    [[nodiscard]] std::uint32_t label(std::size_t item) const {
+      return labels.empty() ? 1 : labels[item];
+    }
+  };
+  [[nodiscard]] TileView tile(int tu, int tv) const {
+    const Tile& stored = tiles_[static_cast<std::size_t>(tv) * static_cast<std::size_t>(tiles_u_) +
+                                static_cast<std::size_t>(tu)];
+    if (!stored.offsets) return {};
+    const std::size_t count = stored.offsets[kTileColumns];
+    return {{stored.offsets.get(), kTileColumns + 1},
+            {stored.items.get(), count},
+            {stored.labels.get(), stored.labels ? count : 0}};
+  }
+
+  /// Stores tile (tu, tv): `offsets` has kTileColumns + 1 entries, row by row (columns outside the
+  /// grid are empty), `items` is offsets.back() long, and so is `labels` unless it is empty.
+  /// Different tiles may be set by different threads at once.
+  void set_tile(int tu, int tv, std::span<const std::uint32_t> offsets,
+                std::span<const Interval> items, std::span<const std::uint32_t> labels = {});
+
+  [[nodiscard]] std::uint64_t solid_voxels() const;  ///< sum of the lengths; O(intervals)
+  /// Runs of solid voxels, whatever their labels are. O(intervals) where there are labels.
+  [[nodiscard]] std::uint64_t interval_count() const;
+  [[nodiscard]] std::uint64_t memory_bytes() const;  ///< bytes held by the tiles
+
+ private:
+  struct Tile {
+    std::unique_ptr<std::uint32_t[]> offsets;
+    std::unique_ptr<Interval[]> items;
+    std::unique_ptr<std::uint32_t[]> labels;
+  };
+  [[nodiscard]] const Tile& tile_of(int u, int v) const {
+    return tiles_[static_cast<std::size_t>((v - v_begin_) / kTileSide) *
+                      static_cast<std::size_t>(tiles_u_) +
+                  static_cast<std::size_t>(u / kTileSide)];
+  }
+  [[nodiscard]] std::size_t local_of(int u, int v) const {
+    return static_cast<std::size_t>((v - v_begin_) % kTileSide) * kTileSide +
+           static_cast<std::size_t>(u % kTileSide);
+  }
+  VoxelGrid grid_;
+  Axis axis_ = Axis::kZ;
+  int columns_ = 0, v_begin_ = 0, v_end_ = 0, tiles_u_ = 0, tiles_v_ = 0;
+  std::vector<Tile> tiles_;
+};
+
+/// Runs of solid voxels of a column: intervals that touch, of different labels, are one.
+[[nodiscard]] inline std::size_t run_count(std::span<const Interval> column) {
+  std::size_t count = column.size();
+  for (std::size_t i = 1; i < column.size(); ++i) {
+    if (column[i].begin() == column[i - 1].end()) --count;
+  }
+  return count;
+}
+
+/// Calls run(interval, label) for the intervals of column (u, v); the label is 1 where none is
+/// given.
+template <class Run>
+void for_each_labelled(const VoxelIntervals& set, int u, int v, Run&& run) {
+  const std::span<const Interval> column = set.column(u, v);
+  const std::span<const std::uint32_t> labels = set.column_labels(u, v);
+  for (std::size_t i = 0; i < column.size(); ++i) {
+    run(column[i], labels.empty() ? std::uint32_t{1} : labels[i]);
+  }
+}
+
+/// Builds intervals from a predicate solid(i, j, k), by brute force: for tests and small grids.
+template <class Predicate>
+VoxelIntervals intervals_from_predicate(const VoxelGrid& grid, Axis axis, Predicate&& solid) {
+  const AxisFrame frame(axis);
+  VoxelIntervals result(grid, axis);
+  constexpr int kSide = VoxelIntervals::kTileSide;
+  for (int tv = 0; tv < result.tiles_v(); ++tv) {
+    for (int tu = 0; tu < result.tiles_u(); ++tu) {
+      std::vector<std::uint32_t> offsets(1, 0);
+      std::vector<Interval> items;
+      for (int local = 0; local < kSide * kSide; ++local) {
+        glm::ivec3 index{0};
+        index[frame.u] = tu * kSide + local % kSide;
+        index[frame.v] = tv * kSide + local / kSide;
+        if (index[frame.u] < grid.dims[frame.u] && index[frame.v] < grid.dims[frame.v]) {
+          bool inside = false;
+          for (int k = 0; k < grid.dims[frame.w]; ++k) {
+            index[frame.w] = k;
+            const bool now = solid(index.x, index.y, index.z);
+            if (now && !inside) items.push_back({static_cast<std::uint16_t>(k), 0});
+            if (now) items.back().last = static_cast<std::uint16_t>(k);
+            inside = now;
+          }
+        }
+        offsets.push_back(static_cast<std::uint32_t>(items.size()));
+      }
+      if (!items.empty()) result.set_tile(tu, tv, offsets, items);
+    }
+  }
+  return result;
+}
+
+}  // namespace strata

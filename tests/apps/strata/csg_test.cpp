@@ -1,0 +1,503 @@
+// `strata csg`: pictures through the tool, its options and what it says of mistakes.
+
+#include <gtest/gtest.h>
+#include <png.h>
+
+#include <algorithm>
+#include <array>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "strata/mesh/formats/write_mesh.h"
+#include "strata/mesh/shapes.h"
+#include "tests/apps/strata/run_tool.h"
+
+namespace strata {
+namespace {
+
+using nlohmann::json;
+using testkit::RunResult;
+using testkit::Workplace;
+
+using Pixel = std::array<std::uint8_t, 4>;
+
+struct Image {
+  int width = 0, height = 0;
+  std::vector<Pixel> pixels;
+  [[nodiscard]] const Pixel& at(int u, int v) const {
+    return pixels[static_cast<std::size_t>(v * width + u)];
+  }
+  friend bool operator==(const Image&, const Image&) = default;
+};
+
+Image decode(const std::string& bytes) {
+  Image image;
+  png_image png{};
+  png.version = PNG_IMAGE_VERSION;
+  if (png_image_begin_read_from_memory(&png, bytes.data(), bytes.size()) == 0) {
+    ADD_FAILURE() << png.message;
+    return image;
+  }
+  png.format = PNG_FORMAT_RGBA;
+  image.width = static_cast<int>(png.width), image.height = static_cast<int>(png.height);
+  image.pixels.resize(static_cast<std::size_t>(png.width) * png.height);
+  EXPECT_NE(png_image_finish_read(&png, nullptr, image.pixels.data(), 0, nullptr), 0);
+  return image;
+}
+
+constexpr Pixel kBackground{0xff, 0xff, 0xe5, 255};
+
+std::size_t covered(const Image& image) {
+  return image.pixels.size() - static_cast<std::size_t>(std::count(
+                                   image.pixels.begin(), image.pixels.end(), kBackground));
+}
+
+void put(const Workplace& place, const std::string& name, const TriangleSoup& mesh) {
+  const auto written = write_mesh(place.path(name), mesh);
+  ASSERT_TRUE(written.has_value()) << written.error().message;
+}
+
+constexpr const char* kCube = "cube(size = [10, 10, 10], center = false);\n";
+constexpr const char* kDrilled =
+    "difference() {\n"
+    "  cube(size = [10, 10, 10], center = true);\n"
+    "  cube(size = [4, 4, 20], center = true);\n"
+    "}\n";
+
+class Csg : public testing::Test {
+ protected:
+  /// The picture of `scene` with these options.
+  Image draw(const std::string& scene, std::vector<std::string> options = {}) {
+    place.write("scene.csg", scene);
+    std::vector<std::string> arguments{"csg", "scene.csg", "-o", "out.png"};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    last = place.run(arguments);
+    EXPECT_EQ(last.exit_code, 0) << last.err;
+    return last.exit_code == 0 ? decode(place.read("out.png")) : Image{};
+  }
+  /// What the tool says of a mistake; checks the exit code and that nothing was written.
+  std::string refused(std::vector<std::string> arguments, int code) {
+    arguments.insert(arguments.begin(), "csg");
+    last = place.run(arguments);
+    EXPECT_EQ(last.exit_code, code) << last.err;
+    EXPECT_FALSE(place.has("out.png"));
+    return last.err;
+  }
+  Workplace place;
+  RunResult last;
+};
+
+bool has(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+TEST_F(Csg, APictureIs512PixelsASideAndShowsAllOfTheScene) {
+  const Image image = draw(kCube);
+  EXPECT_EQ(image.width, 512);
+  EXPECT_EQ(image.height, 512);
+  EXPECT_GT(covered(image), image.pixels.size() / 4);
+  for (int i = 0; i < 512; ++i) {
+    for (const Pixel& pixel :
+         {image.at(i, 0), image.at(i, 511), image.at(0, i), image.at(511, i)}) {
+      ASSERT_EQ(pixel, kBackground);
+    }
+  }
+  EXPECT_EQ(last.err, "");
+  EXPECT_EQ(last.out, "");
+}
+
+TEST_F(Csg, SizesAreWrittenInTwoWays) {
+  for (const char* option : {"--size=30,20", "--imgsize=30,20", "--size=30x20"}) {
+    const Image image = draw(kCube, {option});
+    EXPECT_EQ(image.width, 30) << option;
+    EXPECT_EQ(image.height, 20) << option;
+  }
+}
+
+TEST_F(Csg, EyeAndTargetGiveThePictureOfTargetRotationAndDistance) {
+  // From (0, -100, 0) towards the origin is a turn by 90 degrees about x.
+  const Image gimbal = draw(kDrilled, {"--camera=0,0,0,90,0,0,100", "--size=100,100"});
+  const Image eye = draw(kDrilled, {"--camera=0,-100,0,0,0,0", "--size=100,100"});
+  EXPECT_GT(covered(gimbal), 100u);
+  EXPECT_EQ(gimbal, eye);
+  const Image apart = draw(kDrilled, {"--camera", "0,-100,0,0,0,0", "--size", "100,100"});
+  EXPECT_EQ(eye, apart);
+}
+
+TEST_F(Csg, NoCameraIsViewAllAndAutoCenterFromTheUsualSide) {
+  const Image none = draw(kCube, {"--size=100,100"});
+  EXPECT_EQ(none, draw(kCube, {"--size=100,100", "--camera=7,7,7,55,0,25,1", "--viewall",
+                               "--autocenter"}));
+  EXPECT_EQ(none, draw(kCube, {"--size=100,100", "--camera=0,0,0,55,0,25,0", "--view-all",
+                               "--auto-center"}));
+}
+
+TEST_F(Csg, ProjectionsHaveOpenScadsNames) {
+  const Image perspective = draw(kCube, {"--size=100,100"});
+  EXPECT_EQ(perspective, draw(kCube, {"--size=100,100", "--projection=p"}));
+  EXPECT_EQ(perspective, draw(kCube, {"--size=100,100", "--projection=perspective"}));
+  const Image ortho = draw(kCube, {"--size=100,100", "--projection=o"});
+  EXPECT_NE(perspective, ortho);
+  EXPECT_EQ(ortho, draw(kCube, {"--size=100,100", "--projection=ortho"}));
+}
+
+TEST_F(Csg, AnExpressionOverMeshesIsTheSameAsTheScene) {
+  const std::vector<std::string> camera{"--camera=0,0,0,55,0,25,60", "--size=100,100"};
+  const Image scene = draw(kDrilled, camera);
+  put(place, "cube.stl", make_box({-5, -5, -5}, {5, 5, 5}));
+  put(place, "hole.off", make_box({-2, -2, -10}, {2, 2, 10}));
+  for (const char* text : {"a - b", "cube - hole", "cube-(hole)", "a - (b + b)", "(a ^ b) & a"}) {
+    const RunResult run = place.run(
+        {"csg", "cube.stl", "hole.off", "--expr", text, camera[0], camera[1], "-o", "out.png"});
+    ASSERT_EQ(run.exit_code, 0) << run.err;
+    EXPECT_EQ(decode(place.read("out.png")), scene) << text;
+  }
+  const RunResult all = place.run({"csg", "cube.stl", "hole.off", camera[0], camera[1], "-o", "-"});
+  EXPECT_EQ(all.exit_code, 0) << all.err;
+  EXPECT_GT(covered(decode(all.out)), covered(scene));
+}
+
+TEST_F(Csg, ScenesAndMeshesStandTogether) {
+  place.write("hole.csg", "cube(size = [4, 4, 20], center = true);\n");
+  put(place, "cube.stl", make_box({-5, -5, -5}, {5, 5, 5}));
+  const std::vector<std::string> camera{"--camera=0,0,0,55,0,25,60", "--size=100,100"};
+  const RunResult run = place.run(
+      {"csg", "cube.stl", "hole.csg", "--expr=cube - hole", camera[0], camera[1], "-o", "out.png"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const Image mixed = decode(place.read("out.png"));
+  EXPECT_EQ(mixed, draw(kDrilled, camera));
+}
+
+TEST_F(Csg, ASceneMayComeThroughAPipe) {
+  const RunResult run =
+      place.run({"csg", "-", "--input-format=csg", "-o", "-", "--size=50,50"}, {.input = kCube});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(decode(run.out), draw(kCube, {"--size=50,50"}));
+  // Beside a mesh, whose name tells what it is.
+  put(place, "box.stl", make_box({0, 0, 0}, {1, 1, 1}));
+  const RunResult both =
+      place.run({"csg", "box.stl", "-", "--input-format=csg", "--json"}, {.input = kCube});
+  EXPECT_EQ(both.exit_code, 0) << both.err;
+  EXPECT_NE(both.out.find("\"solids\": 2"), std::string::npos) << both.out;
+}
+
+TEST_F(Csg, MistakesInAnExpressionAreMarked) {
+  put(place, "a.stl", make_box({0, 0, 0}, {1, 1, 1}));
+  put(place, "part.stl", make_box({0, 0, 0}, {1, 1, 1}));
+  const auto says = [&](const std::string& text) {
+    return refused({"a.stl", "part.stl", "-o", "out.png", "--expr=" + text}, 2);
+  };
+  EXPECT_TRUE(has(says("a - "), "missing here\n  a - \n      ^"));
+  EXPECT_TRUE(has(says("a - hole"), "no file is called hole\n  a - hole\n      ^"));
+  EXPECT_TRUE(has(says("(a - b"), "a closing parenthesis is missing here"));
+  EXPECT_TRUE(has(says("a) - b"), "no parenthesis is open here"));
+  EXPECT_TRUE(has(says("a b"), "an operator is expected here"));
+  EXPECT_TRUE(has(says("a - c"), "c would be file 3, but there are only 2"));
+  EXPECT_TRUE(has(says("* a"), "a name or an opening parenthesis is expected here"));
+  EXPECT_TRUE(has(says(std::string(2000, '(')), "more than 1000 parentheses are open here"));
+  std::string doubling = "a";
+  for (int i = 0; i < 40; ++i) doubling = "(" + doubling + " ^ part)";
+  refused({"a.stl", "part.stl", "-o", "out.png", "--expr=" + doubling}, 6);
+}
+
+TEST_F(Csg, MistakesInOptionsAreNamed) {
+  place.write("scene.csg", kCube);
+  const auto says = [&](const std::string& option) {
+    return refused({"scene.csg", "-o", "out.png", option}, 2);
+  };
+  EXPECT_TRUE(has(says("--size=5"), "--size takes width,height, not '5'"));
+  EXPECT_TRUE(has(says("--size=0,5"), "each side is 1 to 65536 pixels"));
+  EXPECT_TRUE(has(says("--camera=1,2,3"), "--camera takes 6 or 7 numbers"));
+  EXPECT_TRUE(has(says("--camera=1,2,3,1,2,3"), "the eye is where it looks at"));
+  EXPECT_TRUE(has(says("--camera=1,2,3,1,2,3,0"), "the distance must be above 0"));
+  EXPECT_TRUE(has(says("--projection=fisheye"), "--projection is"));
+  EXPECT_TRUE(has(says("--colorscheme=pink"), "Cornfield"));
+  EXPECT_TRUE(has(says("--samples=3"), "--samples is 1, 2, 4, 8, 16, 32 or 64"));
+  EXPECT_TRUE(has(says("--cut=w=3"), "--cut takes a plane"));
+  EXPECT_TRUE(has(says("--cut=x=far"), "--cut takes"));
+  EXPECT_TRUE(has(says("--cut=0,0,0,1"), "no direction"));
+  EXPECT_TRUE(has(says("--scad-timeout=0"), "--scad-timeout must be seconds above 0, got 0"));
+  EXPECT_TRUE(has(refused({"-o", "out.png"}, 2), "no scene and no mesh file"));
+  EXPECT_TRUE(has(refused({"scene.csg", "-o", "out.gif"}, 2), "written as .png"));
+  EXPECT_TRUE(has(refused({"scene.csg", "--ids", "ids.jpg"}, 2),
+                  "--ids ids.jpg: pictures are written as .png"));
+  EXPECT_TRUE(has(refused({"scene.csg", "--depth", "d.png"}, 2),
+                  "--depth d.png: distances are written as .exr"));
+  // The whole value is quoted, one number is one, and an empty value takes no other option's name.
+  EXPECT_TRUE(has(says("--cut=x>=5"), "not 'x>=5'"));
+  EXPECT_TRUE(has(says("--size=5,five"), "not '5,five'"));
+  EXPECT_TRUE(has(says("--scad-timeout=soon"), "takes a number, not 'soon'"));
+  EXPECT_TRUE(has(refused({"scene.csg", "-o", "out.png", "--camera=", "--progress", "none"}, 2),
+                  "--camera is given an empty value"));
+  EXPECT_TRUE(has(refused({"scene.csg", "-o", "out.png", "--expr", ""}, 2),
+                  "--expr is given an empty value"));
+}
+
+TEST_F(Csg, NothingIsWrittenWhereTheMeasuresFail) {
+  // Its volume is no number; pictures take it.
+  put(place, "far.obj", make_box(glm::dvec3(0.0), glm::dvec3(1e110)));
+  const auto drawn = place.run({"csg", "far.obj", "-o", "far.png", "--size=16,16"});
+  EXPECT_EQ(drawn.exit_code, 0) << drawn.err;
+  const auto before = place.names();
+  const auto failed = place.run({"csg", "far.obj", "-o", "new.png", "--ids", "ids.png", "--depth",
+                                 "d.exr", "--json=j.json", "--size=16,16"});
+  EXPECT_NE(failed.exit_code, 0);
+  EXPECT_EQ(place.names(), before) << failed.err;
+}
+
+TEST_F(Csg, FlatScenesTogetherAreRenderedFromAboveLikeOne) {
+  place.write("flat.csg", "square(size = [3, 2]);");
+  place.write("left.csg",
+              "multmatrix([[1,0,0,-1],[0,1,0,0],[0,0,1,0],[0,0,0,1]]) "
+              "{ square(size = [2, 2]); }");
+  place.write("both.csg",
+              "square(size = [3, 2]); multmatrix([[1,0,0,-1],[0,1,0,0],[0,0,1,0],"
+              "[0,0,0,1]]) { square(size = [2, 2]); }");
+  for (const std::vector<std::string>& inputs :
+       {std::vector<std::string>{"both.csg"}, {"flat.csg", "left.csg"}}) {
+    std::vector<std::string> words{"csg"};
+    words.insert(words.end(), inputs.begin(), inputs.end());
+    for (const char* word : {"--render", "--size=60,40", "-o"}) words.emplace_back(word);
+    words.push_back(std::to_string(inputs.size()) + ".png");
+    const auto run = place.run(words);
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+  }
+  EXPECT_EQ(place.read("1.png"), place.read("2.png"));
+}
+
+TEST_F(Csg, ResultsWhoseVolumeIsNoNumberAreNamed) {
+  place.write("huge.csg", "sphere(r = 1);\n  cube(size = [1e200, 1e200, 1e200]);");
+  EXPECT_TRUE(has(refused({"huge.csg", "-o", "out.png"}, 5),
+                  "huge.csg:2:3: 'cube' has coordinates of about 1e+200"));
+}
+
+TEST_F(Csg, FilesThatAreNoScenesAreSaidToBeWhatTheyAre) {
+  place.write("scene.csg", kCube);
+  place.write("scene.txt", kCube);
+  EXPECT_TRUE(has(refused({".", "-o", "out.png"}, 3), ".: it is a folder"));
+  EXPECT_TRUE(has(refused({"scene.txt", "-o", "out.png"}, 3), "none of .csg, .scad, .obj"));
+  EXPECT_TRUE(has(refused({"-", "-o", "out.png"}, 2), "--input-format: csg, obj"));
+  const RunResult info = place.run({"info", "scene.csg"});
+  EXPECT_EQ(info.exit_code, 0) << info.err;
+  EXPECT_TRUE(has(info.out, "volume       1000, within")) << info.out;
+  for (const char* command : {"voxelize", "ldi", "info"}) {
+    EXPECT_TRUE(has(place.run({command, "--help"}).out, "scenes (.csg .scad)")) << command;
+  }
+}
+
+TEST_F(Csg, FilesWhoseNamesAreNoWordsAreUsedByPosition) {
+  put(place, "my part.stl", make_box({0, 0, 0}, {1, 1, 1}));
+  put(place, "hole.stl", make_box({0, 0, 0}, {1, 1, 1}));
+  const auto says = [&](const std::string& text) {
+    return refused({"my part.stl", "hole.stl", "-o", "out.png", "--expr=" + text}, 2);
+  };
+  EXPECT_TRUE(has(says("my part - hole"), "no file is called my; by position, a is my part.stl\n"));
+  EXPECT_TRUE(has(says("'my part' - hole"), "expected here; by position, a is my part.stl\n"));
+  EXPECT_TRUE(has(says("hole - nothing"), "by position, a is my part.stl"));
+  EXPECT_EQ(place.run({"csg", "my part.stl", "hole.stl", "--expr=a - b", "--json"}).exit_code, 0);
+}
+
+TEST_F(Csg, ChainsOfOneOperatorDoNotRepeatAnInput) {
+  put(place, "a.stl", make_box({-5, -5, -5}, {5, 5, 5}));
+  put(place, "b.stl", make_box({-2, -2, -10}, {2, 2, 10}));
+  const std::vector<std::string> camera{"--camera=0,0,0,55,0,25,60", "--size=100,100"};
+  const auto solids = [&](const std::string& text) {
+    const RunResult run = place.run({"csg", "a.stl", "b.stl", "--expr=" + text, "--json", "-o",
+                                     "out.png", camera[0], camera[1]});
+    EXPECT_EQ(run.exit_code, 0) << text << run.err;
+    return json::parse(run.out)["scene"]["solids"].get<int>();
+  };
+  std::string chain = "a";
+  for (int i = 0; i < 60000; ++i) chain += "*a";
+  EXPECT_EQ(solids(chain), 1);
+  const Image cube = decode(place.read("out.png"));
+  EXPECT_GT(covered(cube), 1000u);
+  EXPECT_EQ(solids("a + a * (a | a)"), 3);
+  EXPECT_EQ(decode(place.read("out.png")), cube);
+  EXPECT_EQ(solids("a - b - b - b"), 2);
+  const Image drilled = decode(place.read("out.png"));
+  EXPECT_NE(drilled, cube);
+  EXPECT_EQ(solids("(a + a - b) * a * a"), 3);
+  EXPECT_EQ(decode(place.read("out.png")), drilled);
+  EXPECT_EQ(solids("a - b + b - b"), 4);
+  EXPECT_EQ(decode(place.read("out.png")), drilled);
+  EXPECT_EQ(solids("a - a"), 2);  // what stands first is not what is taken away
+  EXPECT_EQ(covered(decode(place.read("out.png"))), 0u);
+}
+
+TEST_F(Csg, SolidsOfThePictureOfIdsHaveDifferentNames) {
+  draw(
+      "color([1, 0, 0, 0.5]) cube(size = [10, 10, 10], center = false);\n"
+      "multmatrix([[1, 0, 0, 20], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]) {\n"
+      "  cube(size = [10, 10, 10], center = false);\n}\n",
+      {"--cut=y>5", "--camera=15,5,5,90,0,0,100", "--ids=ids.png", "--json", "--size=100,100"});
+  std::set<std::string> names;
+  const json report = json::parse(last.out);
+  for (const json& entry : report["ids"]) names.insert(entry["name"].get<std::string>());
+  EXPECT_EQ(names.size(), report["ids"].size()) << report["ids"];
+}
+
+TEST_F(Csg, BadFilesHaveTheirCodes) {
+  place.write("bad.csg", "cube(size = [1, 1\n");
+  EXPECT_TRUE(has(refused({"bad.csg", "-o", "out.png"}, 3), "bad.csg:"));
+  EXPECT_TRUE(has(refused({"none.csg", "-o", "out.png"}, 3), "none.csg"));
+  place.write("scene.csg", kCube);
+  refused({"scene.csg", "-o", "no/such/folder/out.png"}, 4);
+  refused({"scene.csg", "--ids", "no/such/folder/out.png"}, 4);
+}
+
+TEST_F(Csg, WarningsOfASceneAreErrorsUnderStrict) {
+  place.write("scene.csg", "import(file = \"missing.stl\");\ncube(size = [1, 1, 1]);\n");
+  const RunResult run = place.run({"csg", "scene.csg", "-o", "out.png"});
+  EXPECT_EQ(run.exit_code, 0);
+  EXPECT_TRUE(has(run.err, "warning: ")) << run.err;
+  EXPECT_TRUE(has(run.err, "missing.stl")) << run.err;
+  const RunResult strict = place.run({"csg", "scene.csg", "-o", "strict.png", "--strict"});
+  EXPECT_EQ(strict.exit_code, 5);
+  EXPECT_TRUE(has(strict.err, "missing.stl")) << strict.err;
+  EXPECT_FALSE(place.has("strict.png"));
+}
+
+TEST_F(Csg, AnEmptyPictureSaysWhy) {
+  const Image nothing = draw("group();\n", {"--size=40,30"});
+  EXPECT_EQ(covered(nothing), 0u);
+  EXPECT_EQ(nothing.width, 40);
+  EXPECT_TRUE(has(last.err, "there is no solid in the scene")) << last.err;
+  draw(
+      "difference() {\n  cube(size = [1, 1, 1], center = true);\n"
+      "  cube(size = [2, 2, 2], center = true);\n}\n");
+  EXPECT_TRUE(has(last.err, "its operations leave nothing")) << last.err;
+  draw(kCube, {"--camera=1000,0,0,0,0,0,10"});
+  EXPECT_TRUE(has(last.err, "nothing is in the camera's view")) << last.err;
+  EXPECT_EQ(place.run({"csg", "scene.csg", "-o", "a.png", "--camera=1000,0,0,0,0,0,10", "--strict"})
+                .exit_code,
+            5);
+}
+
+TEST_F(Csg, SectionsAreCappedInTheCutColour) {
+  // Seen from the front (-y); y=5 takes the near half away.
+  const std::vector<std::string> front{"--camera=5,5,5,90,0,0,60", "--size=60,60"};
+  const Image whole = draw(kCube, front);
+  for (const char* cut : {"--cut=y=5", "--cut=y>5", "--cut=0,-1,0,-5", "--cut=0,-2,0,-10"}) {
+    const Image image = draw(kCube, {front[0], front[1], cut});
+    const Pixel cap = image.at(30, 30);
+    EXPECT_GT(cap[1], cap[0]) << cut;  // green, not yellow
+    EXPECT_NE(image, whole);
+    EXPECT_LT(covered(image), covered(whole));  // it is farther away
+  }
+  EXPECT_EQ(draw(kCube, {front[0], front[1], "--cut=y<5"}), whole);  // only the far half is gone
+  EXPECT_EQ(draw(kCube, {front[0], front[1], "--cut=y<50"}), whole);
+  draw(kCube, {front[0], front[1], "--cut=y<-1"});
+  EXPECT_TRUE(has(last.err, "the picture is empty")) << last.err;
+}
+
+TEST_F(Csg, TwoSectionsTakeAQuarterAway) {
+  const std::vector<std::string> above{"--camera=5,5,5,0,0,0,60", "--size=60,60"};
+  const std::size_t whole = covered(draw(kCube, above));
+  const std::size_t quarter =
+      covered(draw(kCube, {above[0], above[1], "--cut", "x<5", "--cut", "y<5"}));
+  EXPECT_NEAR(static_cast<double>(quarter) / static_cast<double>(whole), 0.25, 0.02);
+}
+
+TEST_F(Csg, GhostsAreSeenAndRenderLeavesThemOut) {
+  const std::string ghost = std::string(kCube) +
+                            "%multmatrix([[1, 0, 0, 20], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])"
+                            " {\n  cube(size = [10, 10, 10], center = false);\n}\n";
+  const std::vector<std::string> camera{"--camera=10,5,5,55,0,25,140", "--size=100,100"};
+  const Image both = draw(ghost, camera);
+  const Image alone = draw(kCube, camera);
+  EXPECT_GT(covered(both), covered(alone) * 3 / 2);
+  EXPECT_EQ(draw(ghost, {camera[0], camera[1], "--render"}), alone);
+}
+
+TEST_F(Csg, IdsAreColoursThatTheReportExplains) {
+  const Image shaded = draw(kDrilled, {"--ids=ids.png", "--json", "--size=100,100"});
+  const json report = json::parse(last.out);
+  std::set<std::string> legend;
+  for (const json& entry : report["ids"]) legend.insert(entry["colour"].get<std::string>());
+  EXPECT_EQ(legend.size(), 2u);
+  EXPECT_TRUE(has(report["ids"][0]["name"], "scene.csg:2")) << report["ids"];
+  const Image ids = decode(place.read("ids.png"));
+  std::set<std::string> seen;
+  for (std::size_t i = 0; i < ids.pixels.size(); ++i) {
+    const Pixel& p = ids.pixels[i];
+    EXPECT_EQ(p == (Pixel{0, 0, 0, 255}), shaded.pixels[i] == kBackground);
+    if (p == Pixel{0, 0, 0, 255}) continue;
+    char text[8];
+    std::snprintf(text, sizeof text, "#%02x%02x%02x", p[0], p[1], p[2]);
+    seen.insert(text);
+  }
+  EXPECT_EQ(seen, legend);
+}
+
+TEST_F(Csg, TransparentBackgroundsAndSchemes) {
+  const Image clear = draw(kCube, {"--transparent", "--size=40,40"});
+  EXPECT_EQ(clear.at(0, 0)[3], 0);
+  EXPECT_EQ(clear.at(20, 20)[3], 255);
+  const Image night = draw(kCube, {"--colorscheme=starnight", "--size=40,40"});
+  EXPECT_EQ(night.at(0, 0), (Pixel{0, 0, 0, 255}));
+}
+
+TEST_F(Csg, SamplesAndEdgesChangeOnlyWhatTheySay) {
+  const Image plain = draw(kCube, {"--size=100,100"});
+  const Image smooth = draw(kCube, {"--size=100,100", "--samples=16"});
+  const Image edges = draw(kCube, {"--size=100,100", "--edges"});
+  std::size_t changed = 0, dark = 0;
+  for (std::size_t i = 0; i < plain.pixels.size(); ++i) {
+    changed += plain.pixels[i] != smooth.pixels[i] ? 1 : 0;
+    dark += plain.pixels[i] != edges.pixels[i] ? 1 : 0;
+  }
+  EXPECT_GT(changed, 100u);
+  EXPECT_LT(changed, 1500u);
+  EXPECT_GT(dark, 100u);
+  EXPECT_LT(dark, 1500u);
+}
+
+TEST_F(Csg, DepthIsAnOpenExrFileOrRefused) {
+  place.write("scene.csg", kCube);
+  const RunResult run = place.run({"csg", "scene.csg", "--depth", "z.exr", "--size=40,40"});
+  if (run.exit_code == 2) {
+    EXPECT_TRUE(has(run.err, "no OpenEXR")) << run.err;
+    return;
+  }
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(place.read("z.exr").substr(0, 4), "\x76\x2f\x31\x01");
+  EXPECT_EQ(place.run({"csg", "scene.csg", "--depth", "-"}).exit_code, 2);
+}
+
+/// The names of all plain values in a report, as docs/json.md writes them.
+void collect(const json& value, const std::string& name, std::set<std::string>& names) {
+  if (value.is_object()) {
+    for (const auto& [key, member] : value.items()) {
+      collect(member, name.empty() ? key : name + "." + key, names);
+    }
+  } else if (value.is_array() && !value.empty() && value[0].is_object()) {
+    for (const json& element : value) collect(element, name + "[]", names);
+  } else {
+    names.insert(name);
+  }
+}
+
+TEST_F(Csg, TheDocumentationNamesExactlyWhatJsonPrints) {
+  place.write("scene.csg", std::string(kCube) + "import(file = \"missing.stl\");\n");
+  const RunResult run = place.run({"csg", "scene.csg", "--json", "--ids=ids.png"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  std::set<std::string> names, documented;
+  collect(json::parse(run.out), "", names);
+  std::ifstream in(STRATA_SOURCE_DIR "/docs/json.md");
+  bool inside = false;
+  for (std::string line; std::getline(in, line);) {
+    if (line.starts_with("## ")) inside = line == "## `strata csg`";
+    if (inside && line.starts_with("| `")) documented.insert(line.substr(3, line.find('`', 3) - 3));
+  }
+  EXPECT_EQ(names, documented);
+}
+
+TEST_F(Csg, ThePictureDoesNotDependOnThreads) {
+  const Image one = draw(kDrilled, {"-j1", "--samples=4", "--edges"});
+  EXPECT_EQ(one, draw(kDrilled, {"-j3", "--samples=4", "--edges"}));
+}
+
+}  // namespace
+}  // namespace strata

@@ -1,0 +1,240 @@
+// What `strata info` tells, and that docs/json.md says what --json prints.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <regex>
+#include <set>
+
+#include "strata/mesh/formats/write_mesh.h"
+#include "strata/mesh/shapes.h"
+#include "strata/mesh/soup_tools.h"
+#include "tests/apps/strata/run_tool.h"
+
+namespace strata {
+namespace {
+
+using nlohmann::json;
+using testkit::RunResult;
+using testkit::Workplace;
+
+void put(const Workplace& place, const std::string& name, const TriangleSoup& mesh) {
+  const auto written = write_mesh(place.path(name), mesh);
+  ASSERT_TRUE(written.has_value()) << written.error().message;
+}
+
+TriangleSoup open_box() {
+  TriangleSoup box = make_box({0, 0, 0}, {1, 2, 3});
+  box.triangles.pop_back();
+  return box;
+}
+
+TEST(Info, TellsTheMeasuresOfABox) {
+  const Workplace place;
+  put(place, "box.obj", make_box({0, 0, 0}, {1, 2, 3}));
+  const RunResult run = place.run({"info", "--json", "box.obj"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const json file = json::parse(run.out)["files"][0];
+  EXPECT_EQ(file["path"], "box.obj");
+  EXPECT_EQ(file["triangles"], 12);
+  EXPECT_EQ(file["vertices"], 8);
+  EXPECT_EQ(file["components"], 1);
+  EXPECT_DOUBLE_EQ(file["area"], 22.0);
+  EXPECT_DOUBLE_EQ(file["volume"], 6.0);
+  EXPECT_EQ(file["bounds"]["high"], (json{1.0, 2.0, 3.0}));
+  EXPECT_EQ(file["closed"], true);
+  EXPECT_EQ(file["inverted"], false);
+  EXPECT_EQ(file["edges"]["total"], 18);
+  const RunResult text = place.run({"info", "box.obj"});
+  EXPECT_EQ(text.exit_code, 0);
+  EXPECT_EQ(text.err, "");
+  EXPECT_NE(text.out.find("12 of 12 faces"), std::string::npos) << text.out;
+  EXPECT_NE(text.out.find("outward"), std::string::npos) << text.out;
+}
+
+TEST(Info, SaysWhereAMeshIsOpen) {
+  const Workplace place;
+  put(place, "open.obj", open_box());
+  const RunResult run = place.run({"info", "open.obj"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_NE(run.out.find("3 of 18 edges are unbalanced"), std::string::npos) << run.out;
+  EXPECT_NE(run.out.find("of face"), std::string::npos) << run.out;
+  EXPECT_EQ(place.run({"info", "open.obj", "--strict"}).exit_code, 5);
+}
+
+TEST(Info, SaysThatAMeshIsInsideOut) {
+  const Workplace place;
+  TriangleSoup box = make_box({0, 0, 0}, {1, 2, 3});
+  reverse_orientation(box);
+  put(place, "box.obj", box);
+  EXPECT_NE(place.run({"info", "box.obj"}).out.find("inside out"), std::string::npos);
+}
+
+TEST(Info, LooksAtTheOtherFilesWhenOneCannotBeRead) {
+  const Workplace place;
+  put(place, "box.obj", make_box({0, 0, 0}, {1, 2, 3}));
+  const RunResult run = place.run({"info", "missing.obj", "box.obj", "--json=report.json"});
+  EXPECT_EQ(run.exit_code, 3);
+  EXPECT_EQ(run.out, "");
+  EXPECT_NE(run.err.find("missing.obj"), std::string::npos) << run.err;
+  EXPECT_EQ(json::parse(place.read("report.json"))["files"].size(), 1u);
+}
+
+TEST(Info, TellsWhatOpenGlThereIsOrSaysWhyNot) {
+  const Workplace place;
+  const RunResult run = place.run({"info", "--gl"});
+  if (run.exit_code != 0) {
+    EXPECT_EQ(run.exit_code, 2);
+    EXPECT_NE(run.err.find("OpenGL"), std::string::npos) << run.err;
+    const bool built_without = run.err.find("built without") != std::string::npos;
+    ASSERT_TRUE(built_without || !std::getenv("CI")) << run.err;
+    GTEST_SKIP() << run.err;
+  }
+  EXPECT_EQ(run.err, "");
+  for (const char* word : {"renderer", "GL_NV_shader_atomic_int64", "storage_block_bytes",
+                           "ha32: ", "ha64: ", "workarounds"}) {
+    EXPECT_NE(run.out.find(word), std::string::npos) << word << " in\n" << run.out;
+  }
+}
+
+TEST(Info, WithoutAContextIsASentenceAndAnExitCode) {
+  const Workplace place;
+  const RunResult run =
+      place.run({"info", "--gl"}, {.environment = {"STRATA_GL_DEVICE=device:4711"}});
+  EXPECT_EQ(run.exit_code, 2);
+  EXPECT_EQ(run.signal, 0);
+  EXPECT_NE(run.err.find("OpenGL"), std::string::npos) << run.err;
+  // Files are told of all the same.
+  put(place, "box.obj", make_box({0, 0, 0}, {1, 2, 3}));
+  const RunResult both = place.run({"info", "--gl", "--json", "box.obj"},
+                                   {.environment = {"STRATA_GL_DEVICE=device:4711"}});
+  EXPECT_EQ(both.exit_code, 2);
+  EXPECT_EQ(json::parse(both.out)["files"].size(), 1u);
+  EXPECT_FALSE(json::parse(both.out).contains("gl"));
+}
+
+/// The names of all plain values in a report, as docs/json.md writes them.
+void collect(const json& value, const std::string& name, std::set<std::string>& names) {
+  if (value.is_object()) {
+    for (const auto& [key, member] : value.items()) {
+      collect(member, name.empty() ? key : name + "." + key, names);
+    }
+  } else if (value.is_array() && !value.empty() && value[0].is_object()) {
+    for (const json& element : value) collect(element, name + "[]", names);
+  } else {
+    names.insert(name);
+  }
+}
+
+/// The names in the table under a heading of docs/json.md.
+std::set<std::string> documented(const std::string& heading) {
+  std::ifstream in(STRATA_SOURCE_DIR "/docs/json.md");
+  std::set<std::string> names;
+  bool inside = false;
+  for (std::string line; std::getline(in, line);) {
+    if (line.starts_with("## ")) inside = line == "## " + heading;
+    if (!inside || !line.starts_with("| `")) continue;
+    names.insert(line.substr(3, line.find('`', 3) - 3));
+  }
+  return names;
+}
+
+TEST(Json, TheDocumentationNamesExactlyWhatInfoPrints) {
+  const Workplace place;
+  put(place, "open.obj", open_box());
+  place.write("scene.csg", "cube();\n");
+  std::set<std::string> names;
+  collect(json::parse(place.run({"info", "scene.csg", "--json"}).out), "", names);
+  collect(json::parse(place.run({"info", "open.obj", "--json"}).out), "", names);
+  names.erase("warnings");  // empty here
+  names.insert({"warnings[].code", "warnings[].message"});
+  std::set<std::string> told = documented("`strata info`"), of_gl;
+  for (const std::string& name : told) {
+    if (name.starts_with("gl.")) of_gl.insert(name);
+  }
+  for (const std::string& name : of_gl) told.erase(name);
+  EXPECT_EQ(names, told);
+
+  const RunResult with_gl = place.run({"info", "--gl", "--json"});
+  if (with_gl.exit_code != 0) GTEST_SKIP() << with_gl.err;
+  std::set<std::string> printed;
+  collect(json::parse(with_gl.out)["gl"], "gl", printed);
+  EXPECT_EQ(printed, of_gl);
+}
+
+TEST(Json, TheDocumentationNamesExactlyWhatVoxelizePrints) {
+  const Workplace place;
+  put(place, "open.obj", open_box());
+  put(place, "box.obj", make_box({0, 0, 0}, {1, 2, 3}));
+  put(place, "plate.obj", make_box({0, 0, 0}, {1, 1, 0.001}));
+  std::set<std::string> names;
+  for (const std::vector<std::string>& more : std::vector<std::vector<std::string>>{
+           {"open.obj", "--stats", "--json=report.json"},
+           {"open.obj", "-o", "a.vdb", "--json=report.json"},
+           {"plate.obj", "--json=report.json"},
+           {"box.obj", "-o", "a.npy", "--ids", "--json=report.json"}}) {
+    std::vector<std::string> arguments = {"voxelize", "-r", "8", "--checksum"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const RunResult run = place.run(arguments);
+    ASSERT_EQ(run.exit_code, 0) << run.err;
+    collect(json::parse(place.read("report.json")), "", names);
+  }
+  names.erase("warnings");  // empty of the box
+  names.erase("lost_walls.largest");
+  EXPECT_EQ(names, documented("`strata voxelize`"));
+}
+
+/// Codes of warnings in a source: in quotes as first or second argument of a function warn(), as
+/// value of a constant that stands there, or first in braces.
+void collect_codes(const std::string& text, std::set<std::string>& codes, int& unknown) {
+  const std::regex calls(
+      R"re(\bwarn\(\s*(?:[\w.>-]+,\s*)?(?:"([a-z-]+)"|(k\w+))|warnings\.push_back\(\s*\{"([a-z-]+)")re");
+  for (std::sregex_iterator at(text.begin(), text.end(), calls), end; at != end; ++at) {
+    if ((*at)[2].matched) {
+      std::smatch value;
+      const std::regex constant((*at)[2].str() + R"re( = "([a-z-]+)";)re");
+      if (!std::regex_search(text, value, constant)) {
+        ++unknown;
+        continue;
+      }
+      codes.insert(value[1]);
+    } else {
+      codes.insert((*at)[(*at)[1].matched ? 1 : 3]);
+    }
+  }
+}
+
+TEST(Json, TheDocumentationNamesExactlyTheCodesOfWarnings) {
+  std::set<std::string> codes;
+  int unknown = 0;
+  namespace fs = std::filesystem;
+  for (const char* folder : {"/apps", "/csg"}) {
+    for (const auto& entry :
+         fs::recursive_directory_iterator(std::string(STRATA_SOURCE_DIR) + folder)) {
+      if (entry.path().extension() != ".cpp") continue;
+      std::ifstream in(entry.path());
+      collect_codes({std::istreambuf_iterator<char>(in), {}}, codes, unknown);
+    }
+  }
+  EXPECT_EQ(unknown, 0);
+  EXPECT_EQ(codes, documented("Codes of warnings"));
+}
+
+TEST(Json, FileNamesOfAnyBytesGiveValidText) {
+  const Workplace place;
+  const std::string name = "a \"b\\c\n\xff\xc3\xa9.obj";
+  place.write(name, "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");
+  const RunResult run = place.run({"info", name, "--json"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const json report = json::parse(run.out, nullptr, false);
+  ASSERT_FALSE(report.is_discarded()) << run.out;
+  EXPECT_EQ(report["files"][0]["path"], "a \"b\\c\n\xef\xbf\xbd\xc3\xa9.obj");
+}
+
+}  // namespace
+}  // namespace strata

@@ -1,0 +1,185 @@
+// What the command line takes and refuses.
+
+#include <gtest/gtest.h>
+
+#include "strata/mesh/formats/write_mesh.h"
+#include "strata/mesh/shapes.h"
+#include "tests/apps/strata/run_tool.h"
+
+namespace strata {
+namespace {
+
+using testkit::RunResult;
+using testkit::Workplace;
+
+class Usage : public testing::Test {
+ protected:
+  Usage() { EXPECT_TRUE(write_mesh(place.path("box.obj"), make_box({0, 0, 0}, {1, 1, 1}))); }
+
+  /// Expects exit code 2 and a sentence with `part`, on standard error alone.
+  void refuses(const std::vector<std::string>& arguments, const std::string& part) const {
+    const RunResult run = place.run(arguments);
+    EXPECT_EQ(run.exit_code, 2) << run.err;
+    EXPECT_EQ(run.out, "");
+    EXPECT_TRUE(run.err.starts_with("strata: error: ")) << run.err;
+    EXPECT_NE(run.err.find(part), std::string::npos) << run.err;
+    EXPECT_EQ(place.names(), std::vector<std::string>{"box.obj"});
+  }
+
+  Workplace place;
+};
+
+TEST_F(Usage, NoArgumentsPrintsShortHelpOnStandardError) {
+  const RunResult run = place.run({});
+  EXPECT_EQ(run.exit_code, 2);
+  EXPECT_EQ(run.out, "");
+  EXPECT_NE(run.err.find("strata voxelize knot.obj"), std::string::npos);
+}
+
+TEST_F(Usage, HelpBeginsWithExamplesAndEndsWithTheExitCodes) {
+  const RunResult run = place.run({"--help"});
+  EXPECT_EQ(run.exit_code, 0);
+  EXPECT_EQ(run.err, "");
+  EXPECT_LT(run.out.find("strata voxelize knot.obj"), run.out.find("commands:"));
+  for (const char* code : {"0 ", "1 ", "2 ", "3 ", "4 ", "5 ", "6 ", "7 ", "130 "}) {
+    EXPECT_NE(run.out.find(std::string("\n  ") + code, run.out.find("exit codes")),
+              std::string::npos)
+        << code;
+  }
+  EXPECT_EQ(place.run({"-h"}).out, run.out);
+}
+
+TEST_F(Usage, EveryCommandHasHelpThatBeginsWithExamples) {
+  for (const char* command : {"voxelize", "info", "ldi"}) {
+    const RunResult run = place.run({command, "--help"});
+    EXPECT_EQ(run.exit_code, 0);
+    EXPECT_EQ(run.err, "");
+    const auto example = run.out.find(std::string("  strata ") + command);
+    EXPECT_LT(example, run.out.find("Usage")) << run.out;
+    EXPECT_NE(run.out.find("--memory-limit"), std::string::npos);
+  }
+}
+
+TEST_F(Usage, VersionIsPrintedWithoutAnythingElse) {
+  const RunResult run = place.run({"--version"});
+  EXPECT_EQ(run.exit_code, 0);
+  EXPECT_TRUE(run.out.starts_with("strata ")) << run.out;
+  EXPECT_EQ(run.out.find('\n'), run.out.size() - 1);
+  EXPECT_EQ(place.run({"-V"}).out, run.out);
+}
+
+TEST_F(Usage, FormatsAreListedWithoutAnInput) {
+  const RunResult run = place.run({"voxelize", "--list-formats"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  for (const char* name : {"vdb", "npy", "npz", "nrrd", "vti", "binvox", "vox", "png", "zarr"}) {
+    EXPECT_NE(run.out.find(std::string(name) + " "), std::string::npos) << name;
+  }
+}
+
+TEST_F(Usage, UnknownWordsAreNamed) {
+  refuses({"voxelise", "box.obj"}, "voxelise");
+  refuses({"--resolution", "4"}, "--resolution");
+  refuses({"voxelize", "box.obj", "-r", "4", "--stats", "--no-such"}, "--no-such");
+  refuses({"voxelize", "box.obj", "-r", "4", "--stats", "--rule", "maybe"}, "'maybe'");
+  refuses({"voxelize", "box.obj", "-r", "4", "--stats", "--surface=18"}, "'18'");
+  refuses({"voxelize", "box.obj", "-r", "4", "--stats", "--axis", "w"}, "'w'");
+  refuses({"voxelize", "box.obj", "-r", "4", "-o", "box.cube"}, "box.cube");
+  refuses({"voxelize", "box.obj", "-r", "4", "-o", "box"}, "box");
+  refuses({"voxelize", "box.obj", "-r", "4", "-o", "box.x", "--format", "cube"}, "cube");
+  refuses({"ldi", "box.obj", "-r", "4", "-o", "box.tif"}, "box.tif");
+  refuses({"voxelize", "box.obj", "-r", "4", "--axis", "x", "-o", "box.vdb"}, "along z");
+}
+
+TEST_F(Usage, ExactlyOneSizeIsNeeded) {
+  refuses({"voxelize", "box.obj", "--stats"}, "none of -r");
+  refuses({"voxelize", "box.obj", "--stats", "-r", "4", "--voxel-size", "1"}, "two of -r");
+  refuses({"voxelize", "box.obj", "--stats", "-r", "4", "--voxel-size", "1", "--grid", "1,1,1"},
+          "all of -r");
+}
+
+TEST_F(Usage, NumbersThatAreNoneAreNamed) {
+  refuses({"voxelize", "box.obj", "--stats", "-r", "4x"}, "'4x'");
+  refuses({"voxelize", "box.obj", "--stats", "-r", "4.5"}, "'4.5'");
+  refuses({"voxelize", "box.obj", "--stats", "-r", "99999999999999999999"}, "99999999999999999999");
+  refuses({"voxelize", "box.obj", "--stats", "--voxel-size", "1,2"}, "'1,2'");
+  refuses({"voxelize", "box.obj", "--stats", "--voxel-size", "nan"}, "'nan'");
+  refuses({"voxelize", "box.obj", "--stats", "--grid", "1,2"}, "'1,2'");
+  refuses({"voxelize", "box.obj", "--stats", "--grid", "1,2,"}, "''");
+  refuses({"voxelize", "box.obj", "--stats", "-r", "4", "--bounds", "0,0,0,1,1"}, "0,0,0,1,1");
+  refuses({"voxelize", "box.obj", "--stats", "-r", "4", "-j", "-1"}, "-1");
+  refuses({"voxelize", "box.obj", "--stats", "-r", "4", "--memory-limit", "much"}, "'much'");
+  refuses({"voxelize", "box.obj", "--stats", "-r", "4", "--memory-limit", "0"}, "'0'");
+}
+
+TEST_F(Usage, SizesOutOfRangeAreNamed) {
+  refuses({"voxelize", "box.obj", "--stats", "-r", "0"}, "resolution of 0");
+  refuses({"voxelize", "box.obj", "--stats", "-r", "-5"}, "-5");
+  refuses({"voxelize", "box.obj", "--stats", "--voxel-size", "0"}, "0");
+  refuses({"voxelize", "box.obj", "--stats", "--voxel-size", "-0.5"}, "-0.5");
+  refuses({"voxelize", "box.obj", "--stats", "--grid", "4,0,4"}, "0 voxels along y");
+  refuses({"voxelize", "box.obj", "--stats", "-r", "4", "--padding", "-1"}, "-1");
+  refuses({"voxelize", "box.obj", "--stats", "-r", "4", "--bounds", "0,0,0,1,-1,1"}, "-1");
+}
+
+TEST_F(Usage, OptionsThatWouldHaveNoEffectAreRefused) {
+  refuses({"voxelize", "box.obj", "-r", "4", "--fog", "-o", "a.npy"}, "--fog is for .vdb");
+  refuses({"voxelize", "box.obj", "-r", "4", "--fog", "-o", "a.x", "--format", "nrrd"},
+          "format nrrd holds no fog");
+  refuses({"voxelize", "box.obj", "-r", "4", "--fog", "--stats"}, "--fog needs -o");
+  refuses({"voxelize", "box.obj", "-r", "4", "--fog", "--surface=6", "--ids", "-o", "a.vdb"},
+          "--ids");
+  refuses({"voxelize", "box.obj", "-r", "4", "--fog=4", "--surface", "-o", "a.vdb"}, "--surface");
+  refuses({"voxelize", "box.obj", "-r", "4", "--fog=0", "-o", "a.vdb"}, "1 to 16, got 0");
+  refuses({"voxelize", "box.obj", "-r", "4", "--fog=17", "-o", "a.vdb"}, "1 to 16, got 17");
+  refuses({"voxelize", "box.obj", "-r", "4", "--fog=x", "-o", "a.vdb"}, "'x'");
+  refuses({"voxelize", "box.obj", "-r", "4", "--mask", "-o", "a.npy"}, "--mask is for .vdb");
+  refuses({"voxelize", "box.obj", "-r", "4", "--mask", "--ids", "-o", "a.vdb"}, "--mask has none");
+  refuses({"voxelize", "box.obj", "-r", "4", "--mask", "--fog", "-o", "a.vdb"}, "--mask");
+  refuses({"voxelize", "box.obj", "-r", "4", "--mask", "--stats"}, "--mask needs -o");
+  refuses({"voxelize", "box.obj", "-r", "4", "--name", "a", "-o", "a.npy"},
+          "format npy holds no name");
+  refuses({"voxelize", "box.obj", "-r", "4", "--name", "a", "--stats"}, "--name needs -o");
+  refuses({"voxelize", "box.obj", "-r", "4", "--name",
+           "a\x1e"
+           "b",
+           "-o", "a.vdb"},
+          "control");
+  refuses({"voxelize", "box.obj", "-r", "4", "--stats", "--surface", "--backend", "gl"},
+          "--surface alone has none");
+  for (const char* backend : {"cpu", "auto"}) {
+    const RunResult run = place.run(
+        {"voxelize", "box.obj", "-r", "4", "--checksum", "--surface", "--backend", backend});
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+  }
+}
+
+TEST_F(Usage, SomethingMustComeOut) {
+  refuses({"voxelize", "box.obj", "-r", "4"}, "-o FILE");
+  refuses({"voxelize", "-r", "4", "--stats"}, "no mesh file");
+  refuses({"info"}, "no mesh file");
+  refuses({"voxelize", "box.obj", "-r", "4", "-o", "-"}, "format");
+  refuses({"voxelize", "box.obj", "-r", "4", "-o", "-", "--format", "png"}, "folder");
+}
+
+TEST_F(Usage, AnInputIsNotOverwritten) {
+  const std::string before = place.read("box.obj");
+  refuses({"voxelize", "box.obj", "-r", "4", "-o", "./box.obj", "--format", "npy"}, "box.obj");
+  EXPECT_EQ(place.read("box.obj"), before);
+}
+
+TEST_F(Usage, NegativeNumbersAreValuesAndNotOptions) {
+  const RunResult run = place.run(
+      {"voxelize", "box.obj", "--voxel-size", "0.5", "--bounds", "-1,-1,-1,1,1,1", "--stats"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_NE(run.out.find("4 x 4 x 4 voxels"), std::string::npos) << run.out;
+}
+
+TEST_F(Usage, SurfaceWithoutAKindDoesNotTakeTheNextWord) {
+  const RunResult run =
+      place.run({"voxelize", "--stats", "-r", "4", "--json=report.json", "--surface", "box.obj"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_NE(place.read("report.json").find("\"surface\": \"conservative\""), std::string::npos);
+}
+
+}  // namespace
+}  // namespace strata

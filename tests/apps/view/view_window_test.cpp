@@ -1,0 +1,447 @@
+// The window under Xvfb, driven by scripts, through the executable that people start.
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <png.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "tests/apps/strata/run_tool.h"
+
+namespace strata::testkit {
+namespace {
+
+/// A display without a screen, for as long as all tests run.
+class Display : public testing::Environment {
+ public:
+  void SetUp() override {
+    int ends[2];
+    if (pipe(ends) != 0) return;
+    child_ = fork();
+    if (child_ == 0) {
+      close(ends[0]);
+      const std::string number = std::to_string(ends[1]);
+      const char* words[] = {"Xvfb",         "-displayfd", number.c_str(), "-screen", "0",
+                             "1600x1200x24", "-nolisten",  "tcp",          nullptr};
+      const int nothing = open("/dev/null", O_WRONLY);
+      dup2(nothing, STDERR_FILENO);
+      execvp(words[0], const_cast<char* const*>(words));
+      _exit(127);
+    }
+    close(ends[1]);
+    // The number and the end of its line may come one after the other.
+    std::string text;
+    char letter = 0;
+    while (read(ends[0], &letter, 1) == 1 && letter != '\n') text += letter;
+    close(ends[0]);
+    if (!text.empty()) name_ = ":" + text;
+  }
+  void TearDown() override {
+    if (child_ <= 0) return;
+    kill(child_, SIGTERM);
+    waitpid(child_, nullptr, 0);
+  }
+  /// Empty when there is none.
+  [[nodiscard]] const std::string& name() const { return name_; }
+
+ private:
+  pid_t child_ = -1;
+  std::string name_;
+};
+Display* const display =
+    static_cast<Display*>(testing::AddGlobalTestEnvironment(new Display));  // gtest owns it
+
+struct Image {
+  int width = 0, height = 0;
+  std::vector<std::uint8_t> rgb;
+  [[nodiscard]] const std::uint8_t* at(int u, int v) const {
+    return rgb.data() + 3 * (static_cast<std::size_t>(v) * static_cast<std::size_t>(width) +
+                             static_cast<std::size_t>(u));
+  }
+  friend bool operator==(const Image&, const Image&) = default;
+};
+
+Image image_of(const Workplace& place, const std::string& name) {
+  Image image;
+  png_image png{};
+  png.version = PNG_IMAGE_VERSION;
+  if (png_image_begin_read_from_file(&png, place.path(name).c_str()) == 0) {
+    ADD_FAILURE() << name << ": " << png.message;
+    return image;
+  }
+  png.format = PNG_FORMAT_RGB;
+  image.width = static_cast<int>(png.width), image.height = static_cast<int>(png.height);
+  image.rgb.resize(PNG_IMAGE_SIZE(png));
+  png_image_finish_read(&png, nullptr, image.rgb.data(), 0, nullptr);
+  return image;
+}
+
+/// How many pixels of the rectangle differ, `b` beginning at (0, 0).
+int different(const Image& a, const Image& b, int width, int height) {
+  int count = 0;
+  for (int v = 0; v < height; ++v) {
+    for (int u = 0; u < width; ++u)
+      count += std::equal(a.at(u, v), a.at(u, v) + 3, b.at(u, v)) ? 0 : 1;
+  }
+  return count;
+}
+
+constexpr const char* kScene =
+    "difference() {\n"
+    "cube(size = [20, 20, 6], center = true);\n"
+    "multmatrix([[1,0,0,5],[0,1,0,5],[0,0,1,0],[0,0,0,1]]) { cylinder($fn = 24, h = 9, r1 = 3, r2 "
+    "= 3, center = true); }\n"
+    "multmatrix([[1,0,0,-5],[0,1,0,-4],[0,0,1,3],[0,0,0,1]]) { sphere($fn = 32, r = 4); }\n"
+    "}\n"
+    "color([0.2, 0.4, 0.8, 1]) multmatrix([[1,0,0,-6],[0,1,0,6],[0,0,1,5],[0,0,0,1]]) { cube(size "
+    "= [4, 4, 4], center = true); }\n";
+
+class Window : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (display->name().empty()) {
+      const char* why = "no Xvfb could be started (package xvfb)";
+      if (std::getenv("CI") != nullptr) FAIL() << why;
+      GTEST_SKIP() << why;
+    }
+    place_.write("part.csg", kScene);
+  }
+
+  /// Mistakes in the use of GL end the program with an error. AddressSanitizer's leaks do not: the
+  /// X libraries that GLFW opens and closes leave 112 bytes behind, which no suppression can name.
+  RunOptions options() const {
+    RunOptions options;
+    options.environment = {"DISPLAY=" + display->name(), "LP_NUM_THREADS=1",
+                           "STRATA_GL_DEBUG=1",          "LIBGL_ALWAYS_SOFTWARE=1",
+                           "STRATA_GL_FAULTS=" + fault_, "ASAN_OPTIONS=detect_leaks=0"};
+    return options;
+  }
+  RunResult view(const std::string& script, std::vector<std::string> arguments = {},
+                 std::function<void(int)> meanwhile = {}) {
+    place_.write("drive.txt", script);
+    std::vector<std::string> words = {"view", "part.csg", "--script", "drive.txt"};
+    words.insert(words.end(), arguments.begin(), arguments.end());
+    RunOptions how = options();
+    how.while_running = std::move(meanwhile);
+    return place_.run(words, how);
+  }
+  Image csg(const std::vector<std::string>& arguments) {
+    std::vector<std::string> words = {"csg", "part.csg", "-o", "expected.png"};
+    words.insert(words.end(), arguments.begin(), arguments.end());
+    const RunResult run = place_.run(words);
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    return image_of(place_, "expected.png");
+  }
+  /// Waits until the program has written a file.
+  void await(const std::string& name) const {
+    for (int i = 0; i < 3000 && !place_.has(name); ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    EXPECT_TRUE(place_.has(name)) << "never came: " << name;
+  }
+
+  Workplace place_;
+  std::string fault_;  ///< that is provoked
+};
+
+TEST_F(Window, ShowsThePicturesOfStrataCsg) {
+  const RunResult run = view(
+      "axes off\n"
+      "screenshot plain.png\n"
+      "edges on\npicture edges.png\nedges off\n"
+      "section z=1\npicture section.png\nsection off\n"
+      "camera 1,2,0,70,0,200,60\npicture camera.png\n"
+      "projection orthographic\nscheme Nature\npicture ortho.png\n"
+      "quit\n",
+      {"--size", "403,301", "--no-panels"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const std::string size = "403,301";
+  EXPECT_EQ(image_of(place_, "plain.png"), csg({"--size", size}));
+  EXPECT_EQ(image_of(place_, "edges.png"), csg({"--size", size, "--edges"}));
+  EXPECT_EQ(image_of(place_, "section.png"), csg({"--size", size, "--cut", "z=1"}));
+  const std::string camera = "--camera=1,2,0,70,0,200,60";
+  EXPECT_EQ(image_of(place_, "camera.png"), csg({"--size", size, camera}));
+  EXPECT_EQ(image_of(place_, "ortho.png"),
+            csg({"--size", size, camera, "--projection", "o", "--colorscheme", "Nature"}));
+}
+
+TEST_F(Window, WhoeverFindsTheSurfacesThePictureIsTheSame) {
+  const RunResult run = view("axes off\norbit 40 -20\npicture gl.png\nstats\nquit\n",
+                             {"--size", "203,151", "--no-panels", "--backend", "gl"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  // Or the CPU, and why.
+  EXPECT_TRUE(run.out.find("\"renderer\": \"GPU\"") != std::string::npos ||
+              run.out.find("\"renderer\": \"CPU (") != std::string::npos)
+      << run.out;
+  ASSERT_EQ(view("axes off\norbit 40 -20\npicture cpu.png\nquit\n",
+                 {"--size", "203,151", "--no-panels", "--backend", "cpu"})
+                .exit_code,
+            0);
+  EXPECT_EQ(image_of(place_, "gl.png"), image_of(place_, "cpu.png"));
+}
+
+TEST_F(Window, AContextThatIsLostIsTheCpusToReplace) {
+  const std::vector<std::string> size{"--size", "203,151", "--no-panels"};
+  const std::string script =
+      "axes off\npicture a.png\norbit 40 -20\npicture b.png\npick 100 70\nstats\nquit\n";
+  const auto run_with = [&](const char* backend) {
+    std::vector<std::string> arguments = size;
+    arguments.insert(arguments.end(), {"--backend", backend});
+    return view(script, arguments);
+  };
+  ASSERT_EQ(run_with("cpu").exit_code, 0);
+  const Image first = image_of(place_, "a.png"), second = image_of(place_, "b.png");
+  // While it is tried, in the first picture, in a later one, and in a pick.
+  int lost = 0;
+  for (const int at : {1, 6, 11, 14, 17, 20, 23, 26, 30, 35}) {
+    fault_ = "lose-context=" + std::to_string(at);
+    const RunResult run = run_with("gl");
+    ASSERT_EQ(run.exit_code, 0) << fault_ << ": " << run.err;
+    EXPECT_EQ(image_of(place_, "a.png"), first) << fault_;
+    EXPECT_EQ(image_of(place_, "b.png"), second) << fault_;
+    const std::size_t said = run.out.find("context was lost");
+    const bool by_gpu = run.out.find("\"renderer\": \"GPU\"") != std::string::npos;
+    EXPECT_EQ(said == std::string::npos, by_gpu) << fault_ << ": " << run.out;
+    lost += by_gpu ? 0 : 1;
+  }
+  EXPECT_GT(lost, 3);
+  fault_ = "refuse-shader=csg/gl/walk.comp";
+  const RunResult refused = run_with("gl");
+  ASSERT_EQ(refused.exit_code, 0) << refused.err;
+  EXPECT_EQ(image_of(place_, "b.png"), second);
+  EXPECT_NE(refused.out.find("refuses a shader"), std::string::npos) << refused.out;
+}
+
+TEST_F(Window, LeavesThePictureAloneWhereNothingLiesOnIt) {
+  const RunResult run =
+      view("screenshot window.png\npicture picture.png\nquit\n", {"--size", "1000,700"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const Image window = image_of(place_, "window.png"), picture = image_of(place_, "picture.png");
+  EXPECT_EQ(window.width, 1000);
+  EXPECT_EQ(window.height, 700);
+  ASSERT_LT(picture.width, 1000);
+  ASSERT_LT(picture.height, 700);
+  EXPECT_EQ(picture,
+            csg({"--size", std::to_string(picture.width) + "," + std::to_string(picture.height)}));
+  // The axes stand in the lower left corner.
+  EXPECT_EQ(different(window, picture, picture.width, picture.height - 120), 0);
+  EXPECT_GT(different(window, picture, picture.width, picture.height), 50);
+}
+
+TEST_F(Window, TheMouseTurnsMovesAndZooms) {
+  const RunResult run = view(
+      "axes off\n"
+      "picture before.png\n"
+      "drag left 200 150 260 130\npicture turned.png\n"
+      "drag left 260 130 200 150\npicture back.png\n"
+      "drag right 100 100 130 120\npicture moved.png\n"
+      "drag right 130 120 100 100\nzoom 3\npicture nearer.png\n"
+      "view reset\npicture reset.png\n"
+      "key ctrl+8\npicture front.png\n"
+      "view left\nview front\npicture front2.png\nquit\n",
+      {"--no-panels", "--size", "400,300"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const Image before = image_of(place_, "before.png");
+  for (const char* changed : {"turned.png", "moved.png", "nearer.png", "front.png"}) {
+    EXPECT_GT(different(before, image_of(place_, changed), 400, 300), 1000) << changed;
+  }
+  // There and back again: angles are sums of rounded numbers.
+  EXPECT_LT(different(before, image_of(place_, "back.png"), 400, 300), 40);
+  EXPECT_EQ(before, image_of(place_, "reset.png"));
+  EXPECT_EQ(image_of(place_, "front.png"), image_of(place_, "front2.png"));
+}
+
+TEST_F(Window, PicksSolidTriangleAndPlace) {
+  const RunResult run = view(
+      "view top\nprojection orthographic\nview all\n"
+      "pick 200 150\n"
+      "pick 2 2\n"
+      "click 200 150\n"
+      "hide cube\nshow @0\npick 200 150\n"
+      "quit\n",
+      {"--no-panels", "--size", "400,300"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(run.out.find("pick 200 150: cube at part.csg:2:1, triangle "), 0u) << run.out;
+  EXPECT_NE(run.out.find(" 3\npick 2 2: nothing\n"), std::string::npos) << run.out;
+}
+
+TEST_F(Window, HiddenSolidsAndColoursShow) {
+  const RunResult run = view(
+      "axes off\npicture before.png\n"
+      "hide sphere\npicture hidden.png\n"
+      "show all\npicture shown.png\n"
+      "colour @0 #ff0000\npicture red.png\n"
+      "colour @0 none\npicture none.png\n"
+      "ghosts on\npicture ghosts.png\nghosts off\n"
+      "heat thickness\npicture thickness.png\nheat depth\npicture depth.png\nheat off\n"
+      "picture after.png\nquit\n",
+      {"--no-panels", "--size", "300,200"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const Image before = image_of(place_, "before.png");
+  for (const char* changed :
+       {"hidden.png", "red.png", "ghosts.png", "thickness.png", "depth.png"}) {
+    EXPECT_GT(different(before, image_of(place_, changed), 300, 200), 200) << changed;
+  }
+  for (const char* same : {"shown.png", "none.png", "after.png"}) {
+    EXPECT_EQ(before, image_of(place_, same)) << same;
+  }
+}
+
+TEST_F(Window, ASectionIsDragged) {
+  // What can be seen lies between z = -3 and 7: the section's arrow begins in the middle.
+  const RunResult run = view(
+      "axes off\nview front\nprojection orthographic\nview all\nsection z=2\n"
+      "picture before.png\n"
+      "drag left 200 150 200 190\npicture moved.png\n"
+      "section z=2\npicture again.png\n"
+      "drag left 20 20 20 60\npicture turned.png\nquit\n",
+      {"--no-panels", "--size", "400,300"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const Image before = image_of(place_, "before.png");
+  EXPECT_GT(different(before, image_of(place_, "moved.png"), 400, 300), 500);
+  EXPECT_EQ(before, image_of(place_, "again.png"));  // the camera has not turned
+  EXPECT_GT(different(before, image_of(place_, "turned.png"), 400, 300), 500);
+}
+
+TEST_F(Window, ResizesAndClosesOnScreenshot) {
+  const RunResult run = view("axes off\nresize 500 260\nresize 333 444\n",
+                             {"--no-panels", "--size", "400,300", "--screenshot", "last.png"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const Image last = image_of(place_, "last.png");
+  EXPECT_EQ(last.width, 333);
+  EXPECT_EQ(last.height, 444);
+}
+
+TEST_F(Window, WatchesFilesAndKeepsTheCamera) {
+  const RunResult run = view(
+      "axes off\ncamera 1,2,0,70,0,200,60\npicture before.png\n"
+      "wait reload\npicture broken.png\nscreenshot error.png\nstats\n"
+      "wait reload\npicture after.png\nstats\nquit\n",
+      {"--no-panels", "--size", "400,300", "--watch"}, [this](int) {
+        await("before.png");
+        place_.write("part.csg", "cube(size = [1, 1);\n");
+        await("error.png");
+        place_.write("part.csg", "sphere($fn = 40, r = 7);\n");
+      });
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(image_of(place_, "before.png"), image_of(place_, "broken.png"));  // still the old one
+  EXPECT_NE(run.out.find("part.csg:1:"), std::string::npos) << run.out;
+  // The message lies on the picture.
+  EXPECT_GT(different(image_of(place_, "error.png"), image_of(place_, "broken.png"), 400, 300),
+            500);
+  const std::size_t last = run.out.rfind("\"error\": ");
+  EXPECT_EQ(run.out.substr(last, 12), "\"error\": \"\"}") << run.out;
+  EXPECT_EQ(image_of(place_, "after.png"),
+            csg({"--size", "400,300", "--camera=1,2,0,70,0,200,60"}));
+}
+
+TEST_F(Window, ASceneThatCannotBeReadIsShownAndIsTheExitCode) {
+  place_.write("part.csg", "cube(size = [1, 1);\n");
+  const RunResult run = view("", {"--size", "400,300", "--screenshot", "error.png"});
+  EXPECT_EQ(run.exit_code, 3);
+  EXPECT_NE(run.err.find("part.csg:1:"), std::string::npos) << run.err;
+  EXPECT_TRUE(place_.has("error.png"));
+}
+
+TEST_F(Window, TheKeyOfAScreenshotIsWaitedFor) {
+  const RunResult run = view("key ctrl+s\nquit\n", {"--size", "400,300"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(image_of(place_, "strata-view-1.png").width, 400);
+}
+
+TEST_F(Window, AMessageOfTheWindowIsOnStandardErrorWhileItIsOpen) {
+  place_.write("part.csg", "cube(size = [1, 1);\n");
+  const RunResult run = view("wait\nprint still here\nwait 0.2\nquit\n", {"--size", "400,300"});
+  EXPECT_EQ(run.exit_code, 3);
+  EXPECT_NE(run.out.find("still here"), std::string::npos);
+  const std::size_t first = run.err.find("part.csg:1:");
+  EXPECT_NE(first, std::string::npos) << run.err;
+  EXPECT_EQ(run.err.find("part.csg:1:", first + 1), std::string::npos) << run.err;  // once
+}
+
+TEST_F(Window, MistakesOfScriptsNameFileAndLine) {
+  RunResult run = view("wait\nhide \"no such solid\"\n");
+  EXPECT_EQ(run.exit_code, 2);
+  EXPECT_EQ(run.err, "strata view: error: drive.txt:2: no solid's name holds 'no such solid'\n");
+  run = view("\nscreenshot no/such/folder/x.png\n");
+  EXPECT_EQ(run.exit_code, 4);
+  EXPECT_NE(run.err.find("drive.txt:2: no/such/folder/x.png"), std::string::npos) << run.err;
+  run = view("key hyper+q\n");
+  EXPECT_EQ(run.exit_code, 2);
+  run = view("jump\n");
+  EXPECT_EQ(run.exit_code, 2);
+  EXPECT_EQ(run.err, "strata view: error: drive.txt:1: no such command: 'jump'\n");
+}
+
+TEST(WithoutDisplay, IsASentence) {
+  Workplace place;
+  place.write("part.csg", kScene);
+  RunOptions options;
+  options.environment = {"DISPLAY=", "WAYLAND_DISPLAY="};
+  const RunResult run = place.run({"view", "part.csg"}, options);
+  EXPECT_EQ(run.exit_code, 2);
+  EXPECT_EQ(run.err.find("strata view: error: no window"), 0u) << run.err;
+  EXPECT_NE(run.err.find("strata csg draws pictures without a window"), std::string::npos);
+}
+
+TEST(WithoutDisplay, HelpAndMistakesNeedNone) {
+  Workplace place;
+  RunOptions options;
+  options.environment = {"DISPLAY=", "WAYLAND_DISPLAY="};
+  RunResult run = place.run({"view", "--help"}, options);
+  EXPECT_EQ(run.exit_code, 0);
+  for (const char* word : {"--watch", "ctrl+4", "section PLANE", "screenshot FILE.png"}) {
+    EXPECT_NE(run.out.find(word), std::string::npos) << word;
+  }
+  run = place.run({"view"}, options);
+  EXPECT_EQ(run.exit_code, 2);
+  run = place.run({"view", "a.csg", "--size", "x"}, options);
+  EXPECT_EQ(run.exit_code, 2);
+  EXPECT_EQ(run.err.find("strata view: error: "), 0u) << run.err;
+}
+
+TEST(WithoutDisplay, NoFileIsWrittenThatIsReadOrThatIsWrittenAlready) {
+  Workplace place;
+  RunOptions options;
+  options.environment = {"DISPLAY=", "WAYLAND_DISPLAY="};
+  const auto says = [&](const std::string& script, std::vector<std::string> more = {}) {
+    place.write("part.csg", kScene);
+    place.write("drive.txt", script);
+    std::vector<std::string> words = {"view", "part.csg", "--script", "drive.txt"};
+    words.insert(words.end(), more.begin(), more.end());
+    const RunResult run = place.run(words, options);
+    EXPECT_EQ(run.exit_code, 2);
+    EXPECT_EQ(place.names(), (std::vector<std::string>{"drive.txt", "part.csg"}));
+    return run.err;
+  };
+  EXPECT_EQ(says("picture a.png\nscreenshot ./a.png\n"),
+            "strata view: error: drive.txt:1: picture a.png and drive.txt:2: screenshot ./a.png "
+            "would be written to one file\n");
+  EXPECT_EQ(says("picture a.png\n", {"--screenshot", "a.png"}),
+            "strata view: error: drive.txt:1: picture a.png and --screenshot a.png would be "
+            "written to one file\n");
+  EXPECT_NE(says("quit\n").find("no window"), std::string::npos);
+}
+
+TEST(WithoutWindowProgram, IsASentence) {
+  Workplace place;
+  std::filesystem::copy_file(STRATA_TOOL, place.path("strata"));
+  const std::string command = place.path("strata") + " view part.csg 2> " + place.path("said");
+  const int status = std::system(command.c_str());
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 2);
+  EXPECT_NE(place.read("said").find("strata-view"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace strata::testkit

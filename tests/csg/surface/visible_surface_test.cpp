@@ -1,0 +1,567 @@
+#include <gtest/gtest.h>
+
+#include "csg/surface/tile_surface.h"
+#include "csg/surface/visible_surface.h"
+#include "strata/csg/picture/picture.h"
+#include "strata/hashbuffer/build_ldi.h"
+#include "tests/csg/random_tree.h"
+
+namespace strata::csg {
+namespace {
+
+struct Pixel {
+  std::uint32_t depth, solid, triangle;
+  friend bool operator==(const Pixel&, const Pixel&) = default;
+};
+
+/// The visible surfaces from the full lists of all solids in an HA-buffer.
+std::vector<Pixel> by_full_lists(const Tree& tree, const View& view, double relative_precision) {
+  const Geometry geometry(tree);
+  std::vector<ViewPart> parts;
+  LatticeMesh all;
+  std::vector<glm::uvec3> triangles;
+  std::vector<std::uint32_t> solid_of, first_of;
+  for (const Geometry::Part& part : geometry.parts()) {
+    auto seen = view_part(part, view);
+    EXPECT_TRUE(seen.has_value());
+    const auto first = static_cast<std::uint32_t>(all.vertices.size());
+    first_of.push_back(static_cast<std::uint32_t>(triangles.size()));
+    for (const glm::uvec3& t : seen->mesh.triangles) triangles.push_back(t + first);
+    all.vertices.insert(all.vertices.end(), seen->mesh.vertices.begin(), seen->mesh.vertices.end());
+    solid_of.resize(triangles.size(), static_cast<std::uint32_t>(parts.size()));
+    parts.push_back(std::move(*seen));
+  }
+  all.triangles = triangles;
+  const RasterTarget target{Axis::kZ, view.size.x, view.size.y, kPictureDepthLimit};
+  const auto lists = build_ldi(all, target);
+  EXPECT_TRUE(lists.has_value());
+
+  const Program program = compile(tree, tree.root());
+  SurfaceFinder finder(program);
+  const Coincidence coincidence(view, geometry.world_error(tree, relative_precision));
+  std::vector<Pixel> result;
+  for (int v = 0; v < view.size.y; ++v) {
+    for (int u = 0; u < view.size.x; ++u) {
+      std::vector<Flip> flips;
+      std::vector<std::vector<DepthItem>> of_solid(parts.size());
+      for (const DepthItem item : lists->list(u, v)) {
+        const std::uint32_t solid = solid_of[item.triangle()];
+        of_solid[solid].emplace_back(item.depth(), item.exit(), item.triangle() - first_of[solid]);
+      }
+      for (std::uint32_t solid = 0; solid < parts.size(); ++solid) {
+        const Geometry::Part& part = geometry.parts()[solid];
+        if (kind_of(program, solid, part, parts[solid]) == LeafLayers::Kind::kFirst) {
+          first_entry_of(of_solid[solid], solid, flips);
+        } else {
+          flips_of(of_solid[solid], solid, part.rule, parts[solid].cut, flips);
+        }
+      }
+      const Surface surface = finder.find(flips, FlipFaces(geometry.parts(), parts, coincidence));
+      const bool seen = surface.depth != Surface::kNone;
+      const std::uint32_t triangle = seen ? parts[surface.solid].source(surface.triangle) : 0;
+      result.push_back(
+          {surface.depth, surface.solid, triangle | (surface.exit ? SurfaceImage::kExit : 0u)});
+    }
+  }
+  return result;
+}
+
+/// Compares a preview with the full lists, pixel by pixel.
+void expect_same(const Tree& tree, const Camera& camera, const glm::ivec2& size,
+                 const std::string& what) {
+  Preview preview(tree, {}, 0.0);
+  const auto view = make_view(camera, size, preview.box());
+  ASSERT_TRUE(view.has_value()) << what;
+  const auto image = preview.draw(*view);
+  ASSERT_TRUE(image.has_value()) << what << ": " << image.error().message;
+  const std::vector<Pixel> expected = by_full_lists(tree, *view, 0.0);
+  std::size_t different = 0, covered = 0;
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    const SurfaceImage& found = **image;
+    covered += expected[i].depth != Surface::kNone ? 1 : 0;
+    if (found.depth[i] == Surface::kNone && expected[i].depth == Surface::kNone) continue;
+    const Pixel pixel{found.depth[i], found.solid[i], found.triangle[i]};
+    if (pixel == expected[i]) continue;
+    if (++different <= 3) {
+      ADD_FAILURE() << what << ": pixel " << i % static_cast<std::size_t>(size.x) << ", "
+                    << i / static_cast<std::size_t>(size.x) << " shows depth " << pixel.depth
+                    << " solid " << pixel.solid << " triangle " << pixel.triangle
+                    << ", the lists say " << expected[i].depth << " " << expected[i].solid << " "
+                    << expected[i].triangle;
+    }
+  }
+  EXPECT_EQ(different, 0u) << what << ", of " << covered << " covered";
+}
+
+Camera random_camera(RandomTree& random, const Bounds& box) {
+  Camera camera;
+  camera.projection = random.pick(0, 1) == 0 ? Projection::kPerspective : Projection::kOrthographic;
+  centre_camera(camera, box);
+  fit_camera(camera, box);
+  camera.rotation = {random.real(0, 180), random.real(0, 360), random.real(0, 360)};
+  return camera;
+}
+
+// The law: a picture culls, a measurement does not, and both see the same.
+TEST(VisibleSurface, IsTheOneOfTheFullListsForAnyTree) {
+  for (int seed = 0; seed < 250; ++seed) {
+    RandomTree random(static_cast<std::uint64_t>(seed));
+    Tree tree;
+    tree.set_root(random.grow(tree, random.pick(1, seed % 8 == 0 ? 60 : 12), seed % 3 == 0));
+    Preview preview(tree, {}, 0.0);
+    const Camera camera = random_camera(random, preview.box());
+    expect_same(tree, camera, {random.pick(1, 150), random.pick(1, 150)},
+                "seed " + std::to_string(seed));
+    if (HasFailure()) return;
+  }
+}
+
+TEST(VisibleSurface, IsTheOneOfTheFullListsWithTheEyeInTheScene) {
+  for (int seed = 0; seed < 60; ++seed) {
+    RandomTree random(static_cast<std::uint64_t>(seed) + 500);
+    Tree tree;
+    tree.set_root(random.grow(tree, random.pick(1, 12), seed % 3 == 0));
+    Camera camera = look_at({random.real(-6, 6), random.real(-6, 6), random.real(-6, 6)},
+                            {random.real(-6, 6), random.real(-6, 6), random.real(-6, 6)});
+    camera.field_of_view = 60;
+    expect_same(tree, camera, {90, 70}, "seed " + std::to_string(seed));
+    if (HasFailure()) return;
+  }
+}
+
+TEST(VisibleSurface, OfSolidsAroundTheEyeIsTheirFarSides) {
+  for (int seed = 0; seed < 40; ++seed) {
+    RandomTree random(static_cast<std::uint64_t>(seed) + 700);
+    Tree tree;
+    const glm::dvec3 half(random.real(3, 6), random.real(3, 6), random.real(3, 6));
+    Tree::NodeId root = tree.add_solid({std::make_shared<TriangleSoup>(make_box(-half, half))});
+    if (seed % 2 == 1) {  // a room
+      const glm::dvec3 inner = half * random.real(0.5, 0.9);
+      root = tree.add(
+          Operation::kDifference,
+          {root, tree.add_solid({std::make_shared<TriangleSoup>(make_box(-inner, inner))})});
+    }
+    tree.set_root(root);
+    Camera camera = look_at({random.real(-1, 1), random.real(-1, 1), random.real(-1, 1)},
+                            {random.real(-6, 6), random.real(-6, 6), random.real(-6, 6)});
+    camera.field_of_view = 60;
+    const std::string what = "seed " + std::to_string(seed);
+    expect_same(tree, camera, {90, 70}, what);
+    Preview preview(tree, {}, 0.0);
+    const auto image = preview.draw(make_view(camera, {90, 70}, preview.box()).value());
+    ASSERT_TRUE(image.has_value());
+    const auto& depths = (*image)->depth;
+    EXPECT_EQ(std::count(depths.begin(), depths.end(), SurfaceImage::kNone), 0) << what;
+  }
+}
+
+TEST(VisibleSurface, ACutterIsAsLargeAsItLikes) {
+  // Half of a cube, seen from where only it would be in the way.
+  for (const double size : {1e2, 1e4, 1e6, 1e9}) {
+    for (const Projection projection : {Projection::kPerspective, Projection::kOrthographic}) {
+      Tree tree;
+      const auto box = [&](const glm::dvec3& low, const glm::dvec3& high) {
+        return tree.add_solid({std::make_shared<TriangleSoup>(make_box(low, high))});
+      };
+      tree.set_root(tree.add(
+          Operation::kDifference,
+          {box(glm::dvec3(-1), glm::dvec3(1)), box({-size, -size, 0}, {size, size, 2 * size})}));
+      Camera camera;
+      camera.projection = projection;
+      camera.rotation = {55, 0, 25};
+      fit_camera(camera, Bounds{glm::dvec3(-1), glm::dvec3(1)});
+      Preview preview(tree, {}, 5e-6);
+      const auto view = make_view(camera, {101, 101}, preview.box());
+      ASSERT_TRUE(view.has_value());
+      const auto image = preview.draw(*view);
+      ASSERT_TRUE(image.has_value()) << size << ": " << image.error().message;
+      // The middle is the cut face, below it is a side of the cube.
+      EXPECT_EQ((*image)->solid[50 * 101 + 50], 1u) << size;
+      EXPECT_NEAR(view->distance((*image)->depth[50 * 101 + 50] + 0.5), camera.distance, 1e-2);
+      EXPECT_EQ((*image)->solid[82 * 101 + 50], 0u) << size;
+    }
+  }
+}
+
+TEST(VisibleSurface, AMovedSolidGivesTheSameAsAFreshPicture) {
+  for (int seed = 0; seed < 40; ++seed) {
+    RandomTree random(static_cast<std::uint64_t>(seed) + 900);
+    Tree tree;
+    tree.set_root(random.grow(tree, random.pick(2, 20), false));
+    Preview preview(tree, {}, 0.0);
+    const auto view = make_view(random_camera(random, preview.box()), {200, 180}, preview.box());
+    ASSERT_TRUE(view.has_value());
+    ASSERT_TRUE(preview.draw(*view).has_value());
+    const auto solid =
+        static_cast<std::uint32_t>(random.pick(0, static_cast<int>(tree.solids().size()) - 1));
+    const glm::dmat4 moved =
+        glm::translate(glm::dmat4(1), glm::dvec3(random.real(-1, 1), random.real(-1, 1), 0)) *
+        tree.solids()[solid].world_from_mesh;
+    const auto after = preview.move_solid(solid, moved);
+    ASSERT_TRUE(after.has_value());
+    Tree other = tree;
+    other.solids()[solid].world_from_mesh = moved;
+    Preview fresh(other, {}, 0.0);
+    const auto expected = fresh.draw(*view);
+    ASSERT_TRUE(expected.has_value());
+    EXPECT_EQ((*after)->depth, (*expected)->depth) << "seed " << seed;
+  }
+}
+
+TEST(VisibleSurface, OpenSolidsShowTheirSheets) {
+  // Half of a box: the far wall is seen through the missing front.
+  TriangleSoup mesh = make_box(glm::dvec3(-1), glm::dvec3(1));
+  mesh.triangles.resize(6);
+  Tree tree;
+  tree.set_root(tree.add_solid({std::make_shared<TriangleSoup>(mesh)}));
+  for (int i = 0; i < 20; ++i) {
+    RandomTree random(static_cast<std::uint64_t>(i));
+    Camera camera = random_camera(random, bounds(tree, tree.root()));
+    expect_same(tree, camera, {64, 64}, "view " + std::to_string(i));
+  }
+}
+
+// Law 5: faces that coincide leave nothing that is not there, at any camera angle.
+
+Tree::NodeId box_node(Tree& tree, const glm::dvec3& low, const glm::dvec3& high) {
+  return tree.add_solid({std::make_shared<TriangleSoup>(make_box(low, high))});
+}
+
+/// World position of a pixel's surface.
+glm::dvec3 position(const View& view, int u, int v, std::uint32_t depth) {
+  const double distance = view.distance(depth);
+  const glm::dmat4 image_from_eye = view.image_from_world * glm::inverse(view.eye_from_world);
+  const double w = view.perspective ? distance : 1.0;
+  const double x = ((u + 0.5) - view.size.x / 2.0) * w / image_from_eye[0][0];
+  const double y = ((v + 0.5) - view.size.y / 2.0) * w / image_from_eye[1][1];
+  return glm::dvec3(glm::inverse(view.eye_from_world) * glm::dvec4(x, y, -distance, 1.0));
+}
+
+/// Counts pixels whose surface lies where `is_wrong` says nothing is, from 100 cameras.
+std::size_t wrong_pixels(const Tree& tree, const std::function<bool(const glm::dvec3&)>& is_wrong,
+                         std::size_t& covered) {
+  Preview preview(tree, {}, 0.0);
+  std::size_t wrong = 0;
+  for (int i = 0; i < 100; ++i) {
+    RandomTree random(static_cast<std::uint64_t>(i) + 77);
+    const Camera camera = random_camera(random, preview.box());
+    const auto view = make_view(camera, {160, 160}, preview.box());
+    const auto image = preview.draw(*view);
+    EXPECT_TRUE(image.has_value());
+    for (int v = 0; v < 160; ++v) {
+      for (int u = 0; u < 160; ++u) {
+        const std::uint32_t depth = (*image)->depth[static_cast<std::size_t>(v * 160 + u)];
+        if (depth == SurfaceImage::kNone) continue;
+        ++covered;
+        wrong += is_wrong(position(*view, u, v, depth)) ? 1 : 0;
+      }
+    }
+  }
+  return wrong;
+}
+
+/// Whether p is farther than a margin from the surface of [low, high].
+bool off_box(const glm::dvec3& p, const glm::dvec3& low, const glm::dvec3& high) {
+  constexpr double kMargin = 0.05;
+  const glm::dvec3 out = glm::max(low - p, p - high);
+  return std::abs(std::max({out.x, out.y, out.z})) > kMargin;
+}
+
+TEST(CoincidentFaces, ACubeMinusACubeThatSharesFacesShowsOnlyWhatIsLeft) {
+  // The second cube takes the first's half x > 5, and shares 3, then 4, then 5 of its faces.
+  struct Case {
+    glm::dvec3 low, high;
+  };
+  const Case cases[] = {{{5, 0, 0}, {10, 10, 10}},
+                        {{5, 0, 0}, {12, 10, 10}},
+                        {{5, -1, 0}, {10, 10, 10}},
+                        {{5, -1, -2}, {10, 11, 10}}};
+  for (const Case& c : cases) {
+    Tree tree;
+    const auto a = box_node(tree, {0, 0, 0}, {10, 10, 10});
+    const auto b = box_node(tree, c.low, c.high);
+    tree.set_root(tree.add(Operation::kDifference, {a, b}));
+    std::size_t covered = 0;
+    const std::size_t wrong = wrong_pixels(
+        tree,
+        [](const glm::dvec3& p) {
+          return off_box(p, {0, 0, 0}, {5, 10, 10});
+        },
+        covered);
+    EXPECT_EQ(wrong, 0u) << "of " << covered;
+    EXPECT_GT(covered, 100000u);
+    EXPECT_GT(covered, 100'000u);
+  }
+}
+
+TEST(CoincidentFaces, ACubeMinusItselfIsEmpty) {
+  Tree tree;
+  const auto a = box_node(tree, {0, 0, 0}, {10, 10, 10});
+  const auto b = box_node(tree, {0, 0, 0}, {10, 10, 10});
+  tree.set_root(tree.add(Operation::kDifference, {a, b}));
+  std::size_t covered = 0;
+  wrong_pixels(
+      tree, [](const glm::dvec3&) { return true; }, covered);
+  EXPECT_EQ(covered, 0u);
+}
+
+TEST(CoincidentFaces, APlateMinusACylinderOfEqualHeightHasAHole) {
+  Tree tree;
+  const auto plate = box_node(tree, {-10, -10, 0}, {10, 10, 4});
+  const auto drill = tree.add_solid({std::make_shared<TriangleSoup>(make_cylinder(6, 4, 48))});
+  tree.set_root(tree.add(Operation::kDifference, {plate, drill}));
+  std::size_t covered = 0;
+  const std::size_t wrong = wrong_pixels(
+      tree, [](const glm::dvec3& p) { return std::hypot(p.x, p.y) < 5.9; }, covered);
+  EXPECT_EQ(wrong, 0u) << "of " << covered;
+  EXPECT_GT(covered, 100000u);
+}
+
+TEST(CoincidentFaces, StackedCubesShowNoSeamAndNothingBetween) {
+  Tree tree;
+  std::vector<Tree::NodeId> cubes;
+  for (int i = 0; i < 8; ++i) {
+    const glm::dvec3 low((i & 1) * 5, (i >> 1 & 1) * 5, (i >> 2) * 5);
+    cubes.push_back(box_node(tree, low, low + glm::dvec3(5)));
+  }
+  tree.set_root(tree.add(Operation::kUnion, cubes));
+  std::size_t covered = 0;
+  const std::size_t wrong = wrong_pixels(
+      tree, [](const glm::dvec3& p) { return off_box(p, glm::dvec3(0), glm::dvec3(10)); }, covered);
+  EXPECT_EQ(wrong, 0u) << "of " << covered;
+  EXPECT_GT(covered, 100000u);
+}
+
+TEST(CoincidentFaces, TouchingIntersectionIsEmpty) {
+  Tree tree;
+  const auto a = box_node(tree, {0, 0, 0}, {5, 10, 10});
+  const auto b = box_node(tree, {5, 0, 0}, {10, 10, 10});
+  tree.set_root(tree.add(Operation::kIntersection, {a, b}));
+  std::size_t covered = 0;
+  wrong_pixels(
+      tree, [](const glm::dvec3&) { return true; }, covered);
+  EXPECT_EQ(covered, 0u);
+}
+
+TEST(CoincidentFaces, TheSameFaceTwiceIsShownInOneColour) {
+  // Two solids with a common face: everywhere the first of the tree is shown.
+  Tree tree;
+  const auto a = box_node(tree, {0, 0, 0}, {10, 10, 10});
+  const auto b = box_node(tree, {0, 0, 0}, {10, 10, 5});
+  tree.set_root(tree.add(Operation::kUnion, {a, b}));
+  Preview preview(tree, {}, 0.0);
+  for (int i = 0; i < 50; ++i) {
+    RandomTree random(static_cast<std::uint64_t>(i) + 7);
+    const auto view = make_view(random_camera(random, preview.box()), {120, 120}, preview.box());
+    const auto image = preview.draw(*view);
+    std::size_t second = 0, all = 0;
+    for (std::size_t p = 0; p < (*image)->depth.size(); ++p) {
+      if ((*image)->depth[p] == SurfaceImage::kNone) continue;
+      ++all;
+      second += (*image)->solid[p] == 1 ? 1 : 0;
+    }
+    // The faces' outlines are snapped alike, for their corners are the same; only the side walls
+    // have corners of their own.
+    EXPECT_LE(second, all / 500) << "camera " << i;
+  }
+}
+
+TEST(CoincidentFaces, ACutFaceShowsNothingOfTheFacesThatEndInIt) {
+  // Solids that overlap, all cut at y = 0: inside the cut face every pixel is the cutter's, also
+  // where hidden faces meet it.
+  Tree tree;
+  const auto plate = box_node(tree, {-10, -8, 0}, {10, 8, 3});
+  const auto rib = box_node(tree, {-8, -2, 1}, {8, 1, 9});
+  const auto ball = tree.add_solid({std::make_shared<TriangleSoup>(make_icosphere(4, 3)),
+                                    glm::translate(glm::dmat4(1), glm::dvec3(0.5, 0.3, 4))});
+  const auto cutter = box_node(tree, {-30, -30, -30}, {30, 0, 30});
+  const auto all = tree.add(Operation::kUnion, {plate, rib, ball});
+  tree.set_root(tree.add(Operation::kDifference, {all, cutter}));
+  Preview preview(tree, {}, 0.0);
+  std::size_t inside = 0, wrong = 0;
+  for (int i = 0; i < 100; ++i) {
+    RandomTree random(static_cast<std::uint64_t>(i) + 177);
+    const Camera camera = random_camera(random, Bounds{{-10, -8, 0}, {10, 8, 9}});
+    const auto view = make_view(camera, {200, 200}, preview.box());
+    const auto image = preview.draw(*view);
+    ASSERT_TRUE(image.has_value());
+    for (int v = 0; v < 200; ++v) {
+      for (int u = 0; u < 200; ++u) {
+        const auto at = static_cast<std::size_t>(v * 200 + u);
+        const std::uint32_t depth = (*image)->depth[at];
+        if (depth == SurfaceImage::kNone) continue;
+        const glm::dvec3 p = position(*view, u, v, depth);
+        // Faces that end in the cut face may be seen right at its outline.
+        const auto within = [&](double x0, double x1, double z0, double z1) {
+          return p.x > x0 + 0.2 && p.x < x1 - 0.2 && p.z > z0 + 0.2 && p.z < z1 - 0.2;
+        };
+        if (std::abs(p.y) > 0.02 || !(within(-10, 10, 0, 3) || within(-8, 8, 1, 9))) continue;
+        ++inside;
+        wrong += (*image)->solid[at] != 3 ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_EQ(wrong, 0u) << "of " << inside;
+  EXPECT_GT(inside, 100'000u);
+}
+
+TEST(NestedDifferences, TwentyAndTwoHundredDeepAreRight) {
+  for (const int deep : {20, 200}) {
+    // Boxes one in another, each taken from the next larger one: shells.
+    Tree tree;
+    Tree::NodeId node = Tree::kNone;
+    for (int i = 0; i < deep; ++i) {
+      const double half = i + 1;
+      const auto box =
+          box_node(tree, {-half, -half, -half}, {half, half, i == deep - 1 ? 0.3 : half});
+      node = node == Tree::kNone ? box : tree.add(Operation::kDifference, {box, node});
+    }
+    tree.set_root(node);
+    RandomTree random(3);
+    Camera camera;
+    centre_camera(camera, bounds(tree, tree.root()));
+    camera.rotation = {10, 0, 20};
+    fit_camera(camera, bounds(tree, tree.root()));
+    expect_same(tree, camera, {128, 128}, std::to_string(deep) + " deep");
+  }
+}
+
+// What is shown lies on the result's surface, by formulas that know no triangles: negative inside.
+
+double torus_formula(const glm::dvec3& p, double major, double minor) {
+  return std::hypot(std::hypot(p.x, p.y) - major, p.z) - minor;
+}
+
+TEST(ConcaveSolids, ShowNothingThatIsNotThere) {
+  // A pipe bent to a ring, cut open, with a bar through it that the ring takes its share of.
+  Tree tree;
+  const auto ring = [&](double minor) {
+    return tree.add_solid({std::make_shared<TriangleSoup>(make_torus(10, minor, 160, 80))});
+  };
+  const auto outer = ring(4), inner = ring(3), cutter = box_node(tree, {-20, 2, -20}, {20, 20, 20});
+  const auto bar = box_node(tree, {-16, -1, -1}, {16, 1, 1}), taken = ring(3.5);
+  const auto pipe = tree.add(Operation::kDifference, {outer, inner, cutter});
+  tree.set_root(
+      tree.add(Operation::kUnion, {pipe, tree.add(Operation::kDifference, {bar, taken})}));
+  std::size_t covered = 0;
+  const std::size_t wrong = wrong_pixels(
+      tree,
+      [](const glm::dvec3& p) {
+        const double pipe_at =
+            std::max({torus_formula(p, 10, 4), -torus_formula(p, 10, 3), p.y - 2});
+        const double bar_at = std::max(
+            {std::abs(p.x) - 16, std::abs(p.y) - 1, std::abs(p.z) - 1, -torus_formula(p, 10, 3.5)});
+        return std::abs(std::min(pipe_at, bar_at)) > 0.05;
+      },
+      covered);
+  EXPECT_EQ(wrong, 0u) << "of " << covered;
+  EXPECT_GT(covered, 100000u);
+  EXPECT_GT(covered, 100'000u);
+}
+
+/// A pyramid without its tip: from z = 0 to its top at z = 1.
+TriangleSoup make_frustum(double bottom, double top) {
+  TriangleSoup mesh = make_box({-1, -1, 0}, {1, 1, 1});
+  for (glm::dvec3& p : mesh.positions) {
+    const double half = p.z > 0.5 ? top : bottom;
+    p.x *= half, p.y *= half;
+  }
+  return mesh;
+}
+
+/// Small frusta whose tops lie in the top of a large one: their slopes begin there and are hidden.
+void expect_only_tops(bool taken_away) {
+  std::size_t tops = 0, slopes = 0;
+  for (int seed = 0; seed < 60; ++seed) {
+    RandomTree random(static_cast<std::uint64_t>(seed));
+    Tree tree;
+    std::vector<Tree::NodeId> frusta;
+    for (int i = 0; i < 9; ++i) {
+      Solid solid;
+      const double size = random.real(0.5, 2);
+      const bool is_large = i == 8;
+      solid.mesh = std::make_shared<TriangleSoup>(
+          is_large ? make_frustum(9, 8) : make_frustum(size * random.real(1.1, 2), size));
+      // Cutters are upside down, and what were tops are the floor of a pit.
+      if (taken_away) solid.world_from_mesh[2].z = -1;
+      if (!is_large) {
+        solid.world_from_mesh[3] = {random.real(-4, 4), random.real(-4, 4), 0, 1};
+        solid.world_from_mesh =
+            glm::rotate(solid.world_from_mesh, random.real(0, 6.3), glm::dvec3(0, 0, 1));
+      }
+      frusta.push_back(tree.add_solid(std::move(solid)));
+    }
+    Tree::NodeId root = tree.add(Operation::kUnion, frusta);
+    if (taken_away) {
+      root =
+          tree.add(Operation::kDifference, {box_node(tree, {-12, -12, -3}, {12, 12, -0.5}), root});
+    }
+    tree.set_root(root);
+    Preview preview(tree, {}, seed % 2 ? 5e-6 : 0.0);
+    Camera camera = random_camera(random, preview.box());
+    camera.rotation.x = random.real(0, taken_away ? 40 : 85);
+    camera.rotation.y = 0;
+    const auto view = make_view(camera, {300, 300}, preview.box());
+    const auto image = preview.draw(*view);
+    ASSERT_TRUE(image.has_value());
+    for (std::size_t i = 0; i < (*image)->depth.size(); ++i) {
+      if ((*image)->depth[i] == SurfaceImage::kNone || (*image)->solid[i] >= 8) continue;
+      const Solid& solid = tree.solids()[(*image)->solid[i]];
+      const glm::uvec3& t = solid.mesh->triangles[(*image)->triangle[i] & ~SurfaceImage::kExit];
+      const bool is_top = solid.mesh->positions[t.x].z == 1 && solid.mesh->positions[t.y].z == 1 &&
+                          solid.mesh->positions[t.z].z == 1;
+      (is_top ? tops : slopes) += 1;
+    }
+  }
+  EXPECT_EQ(slopes, 0u) << "beside " << tops;
+  EXPECT_GT(tops, 10'000u);
+}
+
+TEST(CoincidentFaces, SlopesThatEndInATopDoNotShowThere) { expect_only_tops(false); }
+
+TEST(CoincidentFaces, SlopesThatEndInAFloorDoNotShowThere) { expect_only_tops(true); }
+
+TEST(NestedDifferences, ShowNothingThatIsNotThere) {
+  // Balls one in another, each taken from the next larger one, all cut open.
+  constexpr int kDeep = 20;
+  Tree tree;
+  Tree::NodeId node = Tree::kNone;
+  for (int i = 1; i <= kDeep; ++i) {
+    const auto ball = tree.add_solid({std::make_shared<TriangleSoup>(make_icosphere(i, 4))});
+    node = i == 1 ? ball : tree.add(Operation::kDifference, {ball, node});
+  }
+  const auto cutter = box_node(tree, {-30, -30, 0}, {30, 30, 30});
+  tree.set_root(tree.add(Operation::kDifference, {node, cutter}));
+  std::size_t covered = 0;
+  const std::size_t wrong = wrong_pixels(
+      tree,
+      [](const glm::dvec3& p) {
+        double at = 1e9;
+        for (int i = 1; i <= kDeep; ++i) at = std::max(glm::length(p) - i, -at);
+        return std::abs(std::max(at, p.z)) > 0.05;
+      },
+      covered);
+  EXPECT_EQ(wrong, 0u) << "of " << covered;
+  EXPECT_GT(covered, 100000u);
+  EXPECT_GT(covered, 100'000u);
+}
+
+TEST(VisibleSurface, AThousandLayersInOnePixelAreRight) {
+  Tree tree;
+  std::vector<Tree::NodeId> plates{box_node(tree, {-10, -10, 0}, {10, 10, 1001})};
+  for (int i = 0; i < 500; ++i) {
+    plates.push_back(box_node(tree, {-9, -9, 2.0 * i - 0.5}, {9, 9, 2.0 * i + 0.5}));
+  }
+  tree.set_root(tree.add(Operation::kDifference, plates));
+  Camera camera;
+  camera.projection = Projection::kOrthographic;
+  camera.rotation = {0, 0, 0};
+  centre_camera(camera, bounds(tree, tree.root()));
+  fit_camera(camera, bounds(tree, tree.root()));
+  camera.distance /= 40;
+  camera.rotation = {1.5, 0, 30};
+  expect_same(tree, camera, {64, 64}, "from above");
+}
+
+}  // namespace
+}  // namespace strata::csg

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <new>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "core/atomic_file.h"
+#include "strata/core/execution.h"
+#include "strata/core/result.h"
+
+namespace strata {
+
+/// Leaves new bytes unset: blocks are written in full, and clearing them first costs as much again.
+template <class T>
+struct UnsetAllocator : std::allocator<T> {
+  template <class U>
+  struct rebind {
+    using other = UnsetAllocator<U>;
+  };
+  template <class U>
+  void construct(U* at) noexcept {
+    ::new (static_cast<void*>(at)) U;
+  }
+  template <class U, class... Args>
+  void construct(U* at, Args&&... args) {
+    std::construct_at(at, std::forward<Args>(args)...);
+  }
+};
+
+/// The bytes of a file under construction. resize() does not clear.
+using Bytes = std::vector<std::byte, UnsetAllocator<std::byte>>;
+
+/// A single-file output that is made of blocks by several threads (internal to voxelize/). The
+/// bytes are the same on a file, where blocks are written side by side, and on a pipe, where they
+/// queue.
+class BlockOutput {
+ public:
+  /// @return kOutput, kLimit as AtomicFile::create
+  static Result<BlockOutput> create(const std::string& path);
+
+  /// Makes the block of an index: sets the size and content of `out`, which arrives with the size
+  /// and content that the same worker gave it before.
+  using MakeBlock = std::function<void(std::size_t index, Bytes& out, int worker)>;
+
+  /// Appends blocks 0 .. count-1 in this order; they may be of any size. Holds one block a worker.
+  /// @return kOutput; kCancelled when stopped before the last block
+  Result<void> append_blocks(const Execution& execution, std::size_t count, const MakeBlock& make);
+  Result<void> append(const void* data, std::size_t bytes);
+  Result<void> append(std::string_view text) { return append(text.data(), text.size()); }
+
+  /// Overwrites earlier bytes. @pre !sequential()
+  Result<void> patch(std::uint64_t offset, const void* data, std::size_t bytes);
+  /// Standard output, a pipe or a device: what is written cannot be changed any more.
+  [[nodiscard]] bool sequential() const { return sequential_; }
+  [[nodiscard]] std::uint64_t position() const { return position_; }
+  Result<void> commit() { return file_.commit(); }
+
+ private:
+  explicit BlockOutput(AtomicFile file);
+
+  AtomicFile file_;
+  bool sequential_ = false;
+  std::uint64_t position_ = 0;
+  std::vector<Bytes> scratch_;  // by worker; kept, since fresh pages are dear
+};
+
+}  // namespace strata

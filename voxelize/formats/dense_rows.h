@@ -1,0 +1,102 @@
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cstdint>
+#include <cstring>
+
+#include "hashbuffer/formats/npy_head.h"
+#include "strata/voxelize/intervals.h"
+#include "voxelize/formats/block_output.h"
+#include "voxelize/formats/run_deflate.h"
+
+namespace strata {
+
+/// Slabs of x intervals as one value a voxel, 0 outside, x fastest, then y, then z: the order of
+/// .npy, .nrrd and .vti. A layer is one z. (Internal to voxelize/.)
+
+/// What stands for a voxel: flags in a byte, or the ids up to a largest one, little-endian.
+struct DenseValues {
+  explicit DenseValues(std::uint32_t largest_id)
+      : bytes(largest_id <= 0xff     ? 1
+              : largest_id <= 0xffff ? 2
+                                     : 4),
+        bits(largest_id == 0 ? 1 : std::bit_width(largest_id)),
+        kind(largest_id == 0 ? RunBytes::kFlags : RunBytes::kIds) {}
+  std::size_t bytes;
+  int bits;  ///< of the largest value
+  RunBytes kind;
+};
+
+static_assert(std::endian::native == std::endian::little, "values are copied as they are");
+
+/// The rows of a slab in blocks of about a megabyte.
+class RowBlocks {
+ public:
+  RowBlocks(const VoxelIntervals& slab, std::size_t value_bytes)
+      : slab_(slab),
+        bytes_(value_bytes),
+        length_(static_cast<std::size_t>(slab.grid().dims.x)),
+        rows_(static_cast<std::size_t>(slab.columns()) *
+              static_cast<std::size_t>(slab.v_end() - slab.v_begin())),
+        rows_a_block_(std::max<std::size_t>(1, (std::size_t{1} << 20) / (length_ * bytes_))) {}
+
+  [[nodiscard]] std::size_t count() const { return (rows_ + rows_a_block_ - 1) / rows_a_block_; }
+
+  void make(std::size_t index, Bytes& out) const {
+    const std::size_t first = index * rows_a_block_;
+    const std::size_t last = std::min(first + rows_a_block_, rows_);
+    out.resize((last - first) * length_ * bytes_);
+    std::memset(out.data(), 0, out.size());
+    std::byte* to = out.data();
+    const auto columns = static_cast<std::size_t>(slab_.columns());
+    for (std::size_t row = first; row < last; ++row, to += length_ * bytes_) {
+      for_each_labelled(
+          slab_, static_cast<int>(row % columns), slab_.v_begin() + static_cast<int>(row / columns),
+          [&](const Interval& interval, std::uint32_t value) { fill(to, interval, value); });
+    }
+  }
+
+ private:
+  // Rows begin at multiples of a value's size.
+  void fill(std::byte* row, const Interval& interval, std::uint32_t value) const {
+    std::byte* to = row + static_cast<std::size_t>(interval.begin()) * bytes_;
+    const auto count = static_cast<std::size_t>(interval.length());
+    if (bytes_ == 1) {
+      std::memset(to, static_cast<int>(value), count);
+    } else if (bytes_ == 2) {
+      std::fill_n(reinterpret_cast<std::uint16_t*>(to), count, static_cast<std::uint16_t>(value));
+    } else {
+      std::fill_n(reinterpret_cast<std::uint32_t*>(to), count, value);
+    }
+  }
+
+  const VoxelIntervals& slab_;
+  std::size_t bytes_, length_, rows_, rows_a_block_;
+};
+
+/// Gives the values of layer z of a slab as runs: run(value, length), row by row.
+template <class Run>
+void emit_layer(const VoxelIntervals& slab, int z, Run&& run) {
+  const int length = slab.grid().dims.x;
+  for (int y = 0; y < slab.columns(); ++y) {
+    int done = 0;
+    for_each_labelled(slab, y, z, [&](const Interval& interval, std::uint32_t value) {
+      if (interval.begin() > done) run(std::uint32_t{0}, interval.begin() - done);
+      run(value, interval.length());
+      done = interval.end();
+    });
+    if (length > done) run(std::uint32_t{0}, length - done);
+  }
+}
+
+/// The head of a .npy file of voxels, x fastest.
+inline std::string npy_head(const DenseValues& values, const glm::ivec3& dims) {
+  const char* type = values.kind == RunBytes::kFlags ? "|b1"
+                     : values.bytes == 1             ? "|u1"
+                     : values.bytes == 2             ? "<u2"
+                                                     : "<u4";
+  return npy_head(type, true, fmt::format("({}, {}, {})", dims.x, dims.y, dims.z));
+}
+
+}  // namespace strata

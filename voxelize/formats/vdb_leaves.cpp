@@ -1,0 +1,275 @@
+#include "voxelize/formats/vdb_leaves.h"
+
+#include <algorithm>
+#include <climits>
+#include <cstring>
+#include <utility>
+
+namespace strata {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "VdbLeaf counts bytes from the low end");
+
+constexpr int kSide = VoxelIntervals::kTileSide;
+constexpr std::uint64_t kAllColumns = ~std::uint64_t{0};
+
+// Byte b is 0xff where bit b of the index is set.
+constexpr std::array<std::uint64_t, 256> make_spread() {
+  std::array<std::uint64_t, 256> table{};
+  for (std::size_t bits = 0; bits < 256; ++bits) {
+    for (std::size_t b = 0; b < 8; ++b) {
+      if (bits >> b & 1) table[bits] |= std::uint64_t{0xff} << (8 * b);
+    }
+  }
+  return table;
+}
+constexpr std::array<std::uint64_t, 256> kSpread = make_spread();
+
+VdbLeaf spread(std::uint64_t columns) {
+  VdbLeaf leaf;
+  for (std::size_t x = 0; x < 8; ++x) leaf.words[x] = kSpread[columns >> (8 * x) & 0xff];
+  return leaf;
+}
+
+// The finisher of splitmix64 (Steele, Lea, Flood, 2014).
+constexpr std::uint64_t mix(std::uint64_t value) {
+  value = (value ^ value >> 30) * 0xbf58476d1ce4e5b9u;
+  value = (value ^ value >> 27) * 0x94d049bb133111ebu;
+  return value ^ value >> 31;
+}
+
+template <class T>
+std::unique_ptr<T[]> exact_copy(const std::vector<T>& items) {
+  auto copy = std::make_unique_for_overwrite<T[]>(items.size());
+  std::copy(items.begin(), items.end(), copy.get());
+  return copy;
+}
+
+}  // namespace
+
+VdbLeafBuilder::VdbLeafBuilder(int depth, std::uint32_t divisor)
+    : leaves_z_((depth + 7) / 8),
+      divisor_(divisor),
+      // One more than leaves: an interval may cease at the very end.
+      events_(static_cast<std::size_t>(leaves_z_) + 1),
+      has_event_((events_.size() + 7) / 8 * 8) {}
+
+std::unique_ptr<VdbLeafTile> VdbLeafBuilder::build(const VoxelIntervals& slab, int tile_u,
+                                                   int tile_v) {
+  view_ = slab.tile(tile_u, tile_v);
+  if (view_.items.empty()) return nullptr;
+  leaves_.clear();
+  leaf_z_.clear();
+  runs_.clear();
+  run_values_.clear();
+  first_value_.assign(1, 0);
+  values_.clear();
+  hash_ = 0;
+
+  auto tile = std::make_unique<VdbLeafTile>();
+  const int first_x = tile_u * (kSide / 8);
+  const int first_y = slab.v_begin() / 8 + tile_v * (kSide / 8);
+  for (int column = 0; column < VdbLeafTile::kLeafColumns; ++column) {
+    const int x = column / 8, y = column % 8;
+    const std::uint64_t place = static_cast<std::uint64_t>(first_x + x) << 32 |
+                                static_cast<std::uint64_t>(first_y + y) << 16;
+    first_run_ = runs_.size();
+    collect_leaf_column(x, y);
+    sweep_leaf_column(place);
+    for (std::size_t i = first_run_; i < runs_.size(); ++i) {
+      hash_ += mix(place + runs_[i].begin) * 3 + mix(place + runs_[i].end) * 5;
+      if (divisor_ != 0) hash_ += mix(mix(place + runs_[i].begin) + run_values_[i]) * 7;
+    }
+    const auto next = static_cast<std::size_t>(column) + 1;
+    tile->first_leaf[next] = static_cast<std::uint32_t>(leaves_.size());
+    tile->first_run[next] = static_cast<std::uint32_t>(runs_.size());
+  }
+  tile->leaves = exact_copy(leaves_);
+  tile->leaf_z = exact_copy(leaf_z_);
+  tile->runs = exact_copy(runs_);
+  if (divisor_ != 0) {
+    tile->run_values = exact_copy(run_values_);
+    tile->values.assign(values_.begin(), values_.end());
+    tile->first_value = exact_copy(first_value_);
+  }
+  tile->hash = hash_;
+  set_bounds(view_, *tile);
+  tile->lower += glm::ivec3(first_x * 8, first_y * 8, 0);
+  tile->upper += glm::ivec3(first_x * 8, first_y * 8, 0);
+  return tile;
+}
+
+// Counts the voxels and bounds them, relative to the corner of the tile.
+void VdbLeafBuilder::set_bounds(const VoxelIntervals::TileView& view, VdbLeafTile& tile) {
+  int first = INT_MAX, last = 0;
+  for (const Interval& interval : view.items) {
+    tile.voxels += static_cast<std::uint64_t>(interval.length());
+    first = std::min<int>(first, interval.first);
+    last = std::max<int>(last, interval.last);
+  }
+  tile.lower = glm::ivec3(INT_MAX, INT_MAX, first);
+  tile.upper = glm::ivec3(0, 0, last);
+  for (int y = 0; y < kSide; ++y) {
+    const std::uint32_t* offsets = view.offsets.data() + y * kSide;
+    if (offsets[0] == offsets[kSide]) continue;
+    tile.lower.y = std::min(tile.lower.y, y);
+    tile.upper.y = y;
+    int left = 0, right = kSide - 1;
+    while (offsets[left + 1] == offsets[0]) ++left;
+    while (offsets[right] == offsets[kSide]) --right;
+    tile.lower.x = std::min(tile.lower.x, left);
+    tile.upper.x = std::max(tile.upper.x, right);
+  }
+}
+
+// Enters the interval ends of 8 x 8 columns: the bits of the byte where an interval begins and of
+// the one where it ends, and between them, where its bytes become whole and cease to be.
+void VdbLeafBuilder::collect_leaf_column(int leaf_x, int leaf_y) {
+  for (int y = 0; y < 8; ++y) {
+    const std::uint32_t* offsets = view_.offsets.data() + (leaf_y * 8 + y) * kSide + leaf_x * 8;
+    for (int x = 0; x < 8; ++x) {
+      const int column = x * 8 + y;
+      columns_[static_cast<std::size_t>(column)] = {offsets[x], offsets[x + 1]};
+      const std::uint64_t bit = std::uint64_t{1} << column;
+      const auto partial = [&](std::size_t z) -> std::uint64_t& {
+        return events_[z].partial.words[static_cast<std::size_t>(x)];
+      };
+      for (std::uint32_t i = offsets[x]; i < offsets[x + 1]; ++i) {
+        const auto begin = static_cast<std::size_t>(view_.items[i].begin());
+        const auto end = static_cast<std::size_t>(view_.items[i].end());
+        const std::size_t first = begin / 8, last = end / 8;
+        const std::uint64_t head = 0xffu << begin % 8 & 0xffu;
+        const std::uint64_t tail = (1u << end % 8) - 1;
+        has_event_[first] = 1;
+        if (first == last) {
+          partial(first) |= (head & tail) << (8 * y);
+          continue;
+        }
+        partial(first) |= head << (8 * y);
+        partial(last) |= tail << (8 * y);
+        events_[first + 1].toggles ^= bit;
+        events_[last].toggles ^= bit;
+        has_event_[first + 1] = 1;
+        has_event_[last] = 1;
+      }
+    }
+  }
+}
+
+// Walks up the events of a leaf column; between two of them all leaves are alike.
+void VdbLeafBuilder::sweep_leaf_column(std::uint64_t place) {
+  std::uint64_t solid = 0;  // bit c: the bytes of column c are 0xff from here on
+  int done = 0;
+  for (std::size_t group = 0; group < has_event_.size(); group += 8) {
+    std::uint64_t marks;
+    std::memcpy(&marks, has_event_.data() + group, sizeof marks);
+    if (marks == 0) continue;
+    std::memset(has_event_.data() + group, 0, sizeof marks);
+    for (; marks != 0; marks &= marks - 1) {
+      const int z = static_cast<int>(group) + std::countr_zero(marks) / 8;
+      if (solid == kAllColumns) {
+        put_whole(done, z, place);
+      } else if (solid != 0) {
+        const VdbLeaf between = spread(solid);
+        for (; done < z; ++done) put_leaf(done, between, place);
+      }
+      Event& event = events_[static_cast<std::size_t>(z)];
+      solid ^= event.toggles;
+      VdbLeaf leaf = spread(solid);
+      std::uint64_t any = 0, all = kAllColumns;
+      for (std::size_t i = 0; i < 8; ++i) {
+        leaf.words[i] |= event.partial.words[i];
+        any |= leaf.words[i];
+        all &= leaf.words[i];
+      }
+      event = {};
+      if (all == kAllColumns) {
+        put_whole(z, z + 1, place);
+      } else if (any != 0) {
+        put_leaf(z, leaf, place);
+      }
+      done = z + 1;
+    }
+  }
+}
+
+// Leaves that are all solid, and alike: a run if they are of one value.
+void VdbLeafBuilder::put_whole(int begin, int end, std::uint64_t place) {
+  if (begin >= end) return;
+  if (divisor_ == 0) return put_run(begin, end, 1);
+  std::uint32_t first = 0;
+  bool alike = true;
+  for_each_value(begin, [&](std::uint32_t value, int) {
+    if (first == 0) first = value;
+    alike = alike && value == first;
+  });
+  if (alike) return put_run(begin, end, first);
+  for (int z = begin; z < end; ++z) put_leaf(z, spread(kAllColumns), place);
+}
+
+void VdbLeafBuilder::put_run(int begin, int end, std::uint32_t value) {
+  const bool goes_on = runs_.size() > first_run_ && runs_.back().end == begin &&
+                       (divisor_ == 0 || run_values_.back() == value);
+  if (goes_on) {
+    runs_.back().end = static_cast<std::uint16_t>(end);
+    return;
+  }
+  runs_.push_back({static_cast<std::uint16_t>(begin), static_cast<std::uint16_t>(end)});
+  if (divisor_ != 0) run_values_.push_back(value);
+}
+
+// Calls run(value, length) for the solid voxels of leaf z of the leaf column, in OpenVDB's order.
+// The leaves have to be asked for from below, one of them as often as wanted.
+template <class Run>
+void VdbLeafBuilder::for_each_value(int z, Run&& run) {
+  const int begin = z * 8, end = begin + 8;
+  for (Column& column : columns_) {
+    while (column.item < column.end && view_.items[column.item].end() <= begin) ++column.item;
+    for (std::uint32_t i = column.item; i < column.end; ++i) {
+      const Interval& item = view_.items[i];
+      if (item.begin() >= end) break;
+      run(value_of(view_.label(i)), std::min(end, item.end()) - std::max(begin, item.begin()));
+    }
+  }
+}
+
+// Appends the values of a leaf as OpenVDB has them, [bytes:64 | zlib stream], or minus the bytes
+// and the values themselves where that is shorter. @return a hash of them
+std::uint64_t VdbLeafBuilder::put_values(int z, std::size_t voxels) {
+  const std::size_t begin = values_.size();
+  values_.resize(begin + sizeof(std::int64_t));
+  std::uint64_t hash = 0;
+  append_zlib_stream(deflater_, values_, [&](RunDeflater& to) {
+    for_each_value(z, [&](std::uint32_t value, int length) {
+      to.run(value, static_cast<std::uint64_t>(length));
+      hash = (hash ^ value) * 0x9e3779b97f4a7c15u + static_cast<std::uint64_t>(length);
+    });
+  });
+  const std::size_t plain = voxels * sizeof(std::uint32_t);
+  auto count = static_cast<std::int64_t>(values_.size() - begin - sizeof(std::int64_t));
+  if (static_cast<std::size_t>(count) >= plain) {
+    count = -static_cast<std::int64_t>(plain);
+    values_.resize(begin + sizeof count + plain);
+    std::byte* to = values_.data() + begin + sizeof count;
+    for_each_value(z, [&](std::uint32_t value, int length) {
+      for (int i = 0; i < length; ++i, to += sizeof value) std::memcpy(to, &value, sizeof value);
+    });
+  }
+  std::memcpy(values_.data() + begin, &count, sizeof count);
+  first_value_.push_back(static_cast<std::uint32_t>(values_.size()));
+  return hash;
+}
+
+void VdbLeafBuilder::put_leaf(int z, const VdbLeaf& leaf, std::uint64_t place) {
+  leaves_.push_back(leaf);
+  leaf_z_.push_back(static_cast<std::uint16_t>(z));
+  std::uint64_t sum = 0;
+  for (std::size_t i = 0; i < 8; ++i) {
+    // Odd factors, one a word, so that swapped words differ.
+    sum += (leaf.words[i] ^ leaf.words[i] >> 32) * (0x9e3779b97f4a7c15u + 2 * i);
+  }
+  if (divisor_ != 0) sum += put_values(z, static_cast<std::size_t>(leaf.count()));
+  hash_ += mix(sum ^ mix(place + static_cast<std::uint64_t>(z)));
+}
+
+}  // namespace strata

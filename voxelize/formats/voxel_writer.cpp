@@ -1,0 +1,182 @@
+#include "strata/voxelize/formats/voxel_writer.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <exception>
+#include <string_view>
+
+#include "voxelize/formats/writers.h"
+
+namespace strata {
+namespace {
+
+std::string lower_case(std::string_view text) {
+  std::string lower(text);
+  std::transform(lower.begin(), lower.end(), lower.begin(),
+                 [](unsigned char letter) { return static_cast<char>(std::tolower(letter)); });
+  return lower;
+}
+
+bool is_folder(const VoxelFormat& format) { return format.extension.ends_with('/'); }
+
+std::string format_names() {
+  std::string names;
+  for (const VoxelFormat& format : voxel_formats()) {
+    names += names.empty() ? "" : ", ";
+    names += format.name;
+  }
+  return names;
+}
+
+Result<void> check_grid(const VoxelGrid& grid) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const char name = "xyz"[axis];
+    if (grid.dims[axis] < 1 || grid.dims[axis] > kMaxGridSide) {
+      return fail(ErrorCode::kUsage, "{} voxels along {}: a grid has 1 to {}", grid.dims[axis],
+                  name, kMaxGridSide);
+    }
+    if (!std::isfinite(grid.origin[axis]) || !std::isfinite(grid.voxel_size[axis]) ||
+        grid.voxel_size[axis] <= 0) {
+      return fail(ErrorCode::kUsage, "the grid's origin {} or voxel size {} along {} is no length",
+                  grid.origin[axis], grid.voxel_size[axis], name);
+    }
+  }
+  return {};
+}
+
+VoxelWriterResult open_format(const std::string& path, const std::string& name,
+                              const VoxelGrid& grid, const VoxelWriterOptions& options) {
+  if (name == "vdb") return open_vdb_writer(path, grid, options);
+  if (name == "png") return open_png_writer(path, grid, options);
+  if (name == "npy") return open_npy_writer(path, grid, options);
+  if (name == "npz") return open_npz_writer(path, grid, options);
+  if (name == "nrrd") return open_nrrd_writer(path, grid, options);
+  if (name == "vti") return open_vti_writer(path, grid, options);
+  if (name == "binvox") return open_binvox_writer(path, grid);
+  if (name == "vox") return open_vox_writer(path, grid, options);
+  if (name == "zarr") return open_zarr_writer(path, grid, options);
+  return fail(ErrorCode::kInternal, "format {} has no writer", name);
+}
+
+}  // namespace
+
+const std::vector<VoxelFormat>& voxel_formats() {
+  constexpr std::uint32_t kAnyId = 0x7fffffff;
+  constexpr std::uint32_t kFloatIds = 1 << 24;  // that a float counts
+  static const std::vector<VoxelFormat> kFormats = {
+      {"vdb", ".vdb", "OpenVDB: bool, or float (fog volume, ids); world transform", Axis::kZ, 0,
+       kFloatIds, true},
+      {"npy", ".npy", "NumPy: bool array indexed [x, y, z]; ids", Axis::kX, 0, kAnyId},
+      {"npz", ".npz", "NumPy: arrays voxels (as .npy, deflated), origin, spacing; ids", Axis::kX, 0,
+       kAnyId},
+      {"nrrd", ".nrrd", "NRRD: uint8, gzip; world transform; ids", Axis::kX, 0, kAnyId, true},
+      {"vti", ".vti", "VTK image data: uint8 cells, zlib; world transform; ids", Axis::kX, 0,
+       kAnyId, true},
+      {"binvox", ".binvox", "binvox: run lengths; cubic voxels in a cube, world transform",
+       Axis::kY},
+      {"vox", ".vox", "MagicaVoxel: up to 2000 voxels a side; colours of scenes, ids", Axis::kZ,
+       kVoxColours, kVoxColours},
+      {"png", "/", "folder of 1-bit PNG slices, one a layer of z, and slices.json; ids", Axis::kX,
+       0, 0xffff},
+      {"zarr", ".zarr/", "folder: Zarr 2 array, uint8, zlib; world transform; ids", Axis::kZ, 0,
+       kAnyId},
+  };
+  return kFormats;
+}
+
+Result<VoxelFormat> voxel_format_for(const std::string& path, const std::string& format) {
+  const auto checked = [&](const VoxelFormat& found) -> Result<VoxelFormat> {
+    if (path == "-" && is_folder(found)) {
+      return fail(ErrorCode::kUsage, "format {} is a folder and cannot go to standard output",
+                  found.name);
+    }
+    return found;
+  };
+  if (!format.empty()) {
+    for (const VoxelFormat& candidate : voxel_formats()) {
+      if (candidate.name == lower_case(format)) return checked(candidate);
+    }
+    return fail(ErrorCode::kUsage, "no voxel format {}; there are {}", format, format_names());
+  }
+  if (path == "-") {
+    return fail(ErrorCode::kUsage, "standard output needs a format: {}", format_names());
+  }
+  std::string name = lower_case(path);
+  const bool slash = name.ends_with('/');
+  while (name.ends_with('/')) name.pop_back();
+  const VoxelFormat* plain_folder = nullptr;
+  for (const VoxelFormat& candidate : voxel_formats()) {
+    std::string_view extension = candidate.extension;
+    if (is_folder(candidate)) extension.remove_suffix(1);
+    if (extension.empty()) {
+      plain_folder = &candidate;
+      continue;
+    }
+    if ((!slash || is_folder(candidate)) && name.ends_with(extension)) return checked(candidate);
+  }
+  if (slash && plain_folder != nullptr) return checked(*plain_folder);
+  return fail(ErrorCode::kUsage,
+              "{}: its extension names no voxel format; there are {} (a folder name ends with /)",
+              path, format_names());
+}
+
+Result<void> check_ids(const VoxelFormat& format, std::uint32_t largest) {
+  if (largest <= format.ids) return {};
+  std::string names;
+  for (const VoxelFormat& candidate : voxel_formats()) {
+    if (candidate.ids < largest) continue;
+    names += names.empty() ? "" : ", ";
+    names += candidate.name;
+  }
+  if (format.ids == 0) {
+    return fail(ErrorCode::kUsage, "format {} holds no ids; {} do", format.name, names);
+  }
+  return fail(ErrorCode::kUsage, "format {} holds ids up to {}, here they reach {}; {} hold them",
+              format.name, format.ids, largest, names);
+}
+
+Result<std::unique_ptr<VoxelWriter>> open_voxel_writer(const std::string& path,
+                                                       const std::string& format,
+                                                       const VoxelGrid& grid,
+                                                       const VoxelWriterOptions& options) {
+  const Result<VoxelFormat> chosen = voxel_format_for(path, format);
+  if (!chosen) return tl::unexpected(chosen.error());
+  if (Result<void> valid = check_grid(grid); !valid) return tl::unexpected(valid.error());
+  if (Result<void> held = check_ids(*chosen, options.ids); !held) {
+    return tl::unexpected(held.error());
+  }
+  const bool fog = options.fog != 0;
+  if ((fog || options.mask) && chosen->name != "vdb") {
+    return fail(ErrorCode::kUsage, "{}: a {} is for .vdb, the format is {}", path,
+                fog ? "fog volume" : "mask", chosen->name);
+  }
+  if (int{options.ids != 0} + int{fog} + int{options.mask} > 1) {
+    return fail(ErrorCode::kUsage, "{}: a {} holds no {}", path, fog ? "fog volume" : "mask",
+                options.ids != 0 ? "ids" : "numbers");
+  }
+  if (options.colours.size() > chosen->colours) {
+    return fail(ErrorCode::kUsage, "{}: {} colours, the format {} holds {}", path,
+                options.colours.size(), chosen->name, chosen->colours);
+  }
+  try {
+    VoxelWriterOptions named = options;
+    if (named.name.empty()) named.name = fog ? "density" : options.ids != 0 ? "ids" : "solid";
+    return open_format(path, chosen->name, grid, named);
+  } catch (const std::bad_alloc&) {
+    return fail(ErrorCode::kLimit, "{}: out of memory for a grid of {} x {} x {}", path,
+                grid.dims.x, grid.dims.y, grid.dims.z);
+  } catch (const std::exception& error) {
+    return fail(ErrorCode::kInternal, "{}: {}", path, error.what());
+  }
+}
+
+Result<void> write_voxels(const VoxelIntervals& set, const std::string& path,
+                          const VoxelWriterOptions& options, const Execution& execution) {
+  auto writer = open_voxel_writer(path, "", set.grid(), options);
+  if (!writer) return tl::unexpected(writer.error());
+  if (auto added = (*writer)->add(set, execution); !added) return added;
+  return (*writer)->finish(execution);
+}
+
+}  // namespace strata

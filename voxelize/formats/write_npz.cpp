@@ -1,0 +1,211 @@
+// NumPy's .npz (numpy.savez_compressed): a ZIP (PKWARE, APPNOTE.TXT 6.3) of three .npy arrays:
+//   origin   float64 (3,): lower corner of voxel (0, 0, 0) in world space
+//   spacing  float64 (3,): world length of a voxel along x, y, z
+//   voxels   as write_npy.cpp has it, shape (nx, ny, nz)
+// The voxels are one deflated entry, made of pieces that threads deflate apart from runs, a layer
+// each; minizip would want the bytes. What is known only at the end (CRC, compressed bytes) is
+// filled in, or on a pipe follows the data, which flag 3 says. Arrays of 2 GiB and more have 64-bit
+// sizes.
+
+#include <zlib.h>
+
+#include <array>
+#include <bit>
+#include <cstring>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "hashbuffer/formats/npy_head.h"
+#include "voxelize/formats/block_output.h"
+#include "voxelize/formats/deflated_layers.h"
+#include "voxelize/formats/dense_rows.h"
+#include "voxelize/formats/slab_writer.h"
+#include "voxelize/formats/writers.h"
+
+namespace strata {
+namespace {
+
+constexpr std::uint32_t kUnknown = 0xffffffff;  // the 64-bit field has the number
+
+template <class T>
+void put(std::string& to, T value) {
+  static_assert(std::endian::native == std::endian::little);
+  to.append(reinterpret_cast<const char*>(&value), sizeof value);
+}
+void put16(std::string& to, unsigned value) { put(to, static_cast<std::uint16_t>(value)); }
+void put32(std::string& to, std::uint64_t value) { put(to, static_cast<std::uint32_t>(value)); }
+
+struct Entry {
+  std::string name;
+  bool deflated = false;
+  bool follows = false;  // CRC and sizes stand after the data
+  bool wide = false;     // sizes of 64 bits
+  std::uint32_t crc = 0;
+  std::uint64_t bytes = 0, compressed = 0;
+  std::uint64_t offset = 0;  // of the local head; three small arrays: below 2^32
+
+  // What the local head and the directory share, from the version on.
+  void put_common(std::string& to) const {
+    put16(to, wide ? 45 : 20);  // version needed
+    put16(to, follows ? 1 << 3 : 0);
+    put16(to, deflated ? 8 : 0);
+    put16(to, 0);           // time
+    put16(to, 1 << 5 | 1);  // 1980-01-01: the same voxels give the same bytes
+    put32(to, crc);
+    put32(to, wide ? kUnknown : compressed);
+    put32(to, wide ? kUnknown : bytes);
+    put16(to, static_cast<unsigned>(name.size()));
+    put16(to, wide ? 20 : 0);
+  }
+  void put_extra(std::string& to) const {
+    to += name;
+    if (!wide) return;
+    put16(to, 1);
+    put16(to, 16);
+    put(to, bytes);
+    put(to, compressed);
+  }
+  [[nodiscard]] std::string local_head() const {
+    std::string head("PK\x03\x04", 4);
+    Entry shown = *this;
+    if (follows) shown.crc = 0, shown.bytes = shown.compressed = 0;
+    shown.put_common(head);
+    shown.put_extra(head);
+    return head;
+  }
+  [[nodiscard]] std::string descriptor() const {
+    std::string text("PK\x07\x08", 4);
+    put32(text, crc);
+    for (const std::uint64_t size : {compressed, bytes}) {
+      if (wide) {
+        put(text, size);
+      } else {
+        put32(text, size);
+      }
+    }
+    return text;
+  }
+  void put_in_directory(std::string& to) const {
+    to.append("PK\x01\x02", 4);
+    put16(to, wide ? 45 : 20);  // version made by
+    put_common(to);
+    put16(to, 0);  // comment
+    put16(to, 0);  // disk
+    put16(to, 0);  // attributes
+    put32(to, 0);
+    put32(to, offset);
+    put_extra(to);
+  }
+};
+
+class NpzWriter final : public SlabWriter {
+ public:
+  NpzWriter(const std::string& path, const VoxelGrid& grid, std::uint32_t ids, BlockOutput output)
+      : SlabWriter(path, grid, Axis::kX),
+        values_(ids),
+        output_(std::move(output)),
+        layers_(grid, values_) {}
+
+  Result<void> begin() {
+    for (const auto& [name, vector] :
+         {std::pair{"origin.npy", grid().origin}, std::pair{"spacing.npy", grid().voxel_size}}) {
+      std::string data = npy_head("<f8", false, "(3,)");
+      for (int axis = 0; axis < 3; ++axis) put(data, vector[axis]);
+      Entry& entry = entries_.emplace_back();
+      entry.name = name;
+      entry.crc = checksum(data);
+      entry.bytes = entry.compressed = data.size();
+      entry.offset = output_.position();
+      if (auto written = output_.append(entry.local_head() + data); !written) return written;
+    }
+    const std::string head = npy_head(values_, dims());
+    Entry& voxels = entries_.emplace_back();
+    voxels.name = "voxels.npy";
+    voxels.deflated = true;
+    voxels.follows = output_.sequential();
+    voxels.crc = checksum(head);
+    voxels.bytes = head.size() + static_cast<std::uint64_t>(dims().x) *
+                                     static_cast<std::uint64_t>(dims().y) *
+                                     static_cast<std::uint64_t>(dims().z) * values_.bytes;
+    voxels.wide = voxels.bytes >= std::uint64_t{1} << 31;  // ten bits a byte at the most
+    voxels.offset = output_.position();
+    Bytes deflated;
+    RunDeflater deflater(values_.kind, values_.bytes);
+    deflater.begin(deflated, false);
+    for (const char letter : head) deflater.byte(static_cast<std::uint8_t>(letter));
+    deflater.end();
+    if (auto written = output_.append(voxels.local_head()); !written) return written;
+    data_begin_ = output_.position();
+    return output_.append(deflated.data(), deflated.size());
+  }
+
+ private:
+  static std::uint32_t checksum(const std::string& data) {
+    return static_cast<std::uint32_t>(
+        crc32_z(crc32_z(0, nullptr, 0), reinterpret_cast<const Bytef*>(data.data()), data.size()));
+  }
+
+  Result<void> add_slab(const VoxelIntervals& slab, const Execution& execution) override {
+    return layers_.append(slab, output_, entries_.back().crc, execution);
+  }
+
+  Result<void> finish_output(const Execution&) override {
+    Entry& voxels = entries_.back();
+    std::string end(DeflatedLayers::kEnd);
+    voxels.compressed = output_.position() + end.size() - data_begin_;
+    if (voxels.follows) {
+      end += voxels.descriptor();
+    } else {
+      const std::string head = voxels.local_head();
+      auto patched = output_.patch(voxels.offset, head.data(), head.size());
+      if (!patched) return patched;
+    }
+    const std::uint64_t begin = output_.position() + end.size();
+    std::string directory;
+    for (const Entry& entry : entries_) entry.put_in_directory(directory);
+    const std::uint64_t size = directory.size(), count = entries_.size();
+    if (voxels.wide) {
+      directory.append("PK\x06\x06", 4);
+      put(directory, std::uint64_t{44});  // bytes that follow
+      put16(directory, 45);
+      put16(directory, 45);
+      put(directory, std::uint64_t{0});  // disks
+      for (const std::uint64_t number : {count, count, size, begin}) put(directory, number);
+      directory.append("PK\x06\x07", 4);
+      put32(directory, 0);
+      put(directory, begin + size);  // of the record before
+      put32(directory, 1);           // disks
+    }
+    directory.append("PK\x05\x06", 4);
+    put32(directory, 0);  // disks
+    put16(directory, static_cast<unsigned>(count));
+    put16(directory, static_cast<unsigned>(count));
+    put32(directory, size);
+    put32(directory, voxels.wide ? kUnknown : begin);
+    put16(directory, 0);  // comment
+    if (auto written = output_.append(end + directory); !written) return written;
+    return output_.commit();
+  }
+
+  DenseValues values_;
+  BlockOutput output_;
+  DeflatedLayers layers_;
+  std::vector<Entry> entries_;  // the voxels last
+  std::uint64_t data_begin_ = 0;
+};
+
+}  // namespace
+
+VoxelWriterResult open_npz_writer(const std::string& path, const VoxelGrid& grid,
+                                  const VoxelWriterOptions& options) {
+  Result<BlockOutput> output = BlockOutput::create(path);
+  if (!output) return tl::unexpected(output.error());
+  auto writer = std::make_unique<NpzWriter>(path, grid, options.ids, std::move(*output));
+  if (Result<void> begun = writer->begin(); !begun) return tl::unexpected(begun.error());
+  return writer;
+}
+
+}  // namespace strata

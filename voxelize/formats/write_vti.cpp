@@ -1,0 +1,137 @@
+// VTK XML image data (vtkXMLImageDataWriter), appended raw, one unsigned number a cell, x fastest.
+// Cells, so that a voxel is a box: extent 0..n, origin at the corner of the grid. A layer is a zlib
+// block of vtkZLibDataCompressor; the table of their sizes stands before them and is filled in at
+// the end. A pipe cannot be filled in later, and gets the bytes as they are.
+
+#include <fmt/format.h>
+
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "voxelize/formats/block_output.h"
+#include "voxelize/formats/dense_rows.h"
+#include "voxelize/formats/run_deflate.h"
+#include "voxelize/formats/slab_writer.h"
+#include "voxelize/formats/writers.h"
+
+namespace strata {
+namespace {
+
+std::string xml_text(const std::string& text) {
+  std::string escaped;
+  for (const char letter : text) {
+    switch (letter) {
+      case '&':
+        escaped += "&amp;";
+        break;
+      case '<':
+        escaped += "&lt;";
+        break;
+      case '>':
+        escaped += "&gt;";
+        break;
+      case '"':
+        escaped += "&quot;";
+        break;
+      default:
+        escaped += static_cast<unsigned char>(letter) < ' ' ? ' ' : letter;
+    }
+  }
+  return escaped;
+}
+
+class VtiWriter final : public SlabWriter {
+ public:
+  VtiWriter(const std::string& path, const VoxelGrid& grid, std::uint32_t ids, BlockOutput output)
+      : SlabWriter(path, grid, Axis::kX), values_(ids), output_(std::move(output)) {}
+
+  Result<void> begin(const std::string& name) {
+    const VoxelGrid& g = grid();
+    const std::string extent = fmt::format("0 {} 0 {} 0 {}", g.dims.x, g.dims.y, g.dims.z);
+    const std::string title = xml_text(name);
+    const std::string header = fmt::format(
+        "<?xml version=\"1.0\"?>\n"
+        "<VTKFile type=\"ImageData\" version=\"1.0\" byte_order=\"LittleEndian\" "
+        "header_type=\"UInt64\"{}>\n"
+        "  <ImageData WholeExtent=\"{}\" Origin=\"{} {} {}\" Spacing=\"{} {} {}\">\n"
+        "    <Piece Extent=\"{}\">\n"
+        "      <PointData/>\n"
+        "      <CellData Scalars=\"{}\">\n"
+        "        <DataArray type=\"UInt{}\" Name=\"{}\" format=\"appended\" offset=\"0\"/>\n"
+        "      </CellData>\n    </Piece>\n  </ImageData>\n  <AppendedData encoding=\"raw\">\n_",
+        compressed() ? " compressor=\"vtkZLibDataCompressor\"" : "", extent, g.origin.x, g.origin.y,
+        g.origin.z, g.voxel_size.x, g.voxel_size.y, g.voxel_size.z, extent, title,
+        8 * values_.bytes, title);
+    if (Result<void> written = output_.append(header); !written) return written;
+    table_position_ = output_.position();
+    const std::uint64_t layer =
+        static_cast<std::uint64_t>(g.dims.x) * static_cast<std::uint64_t>(g.dims.y) * values_.bytes;
+    const auto layers = static_cast<std::uint64_t>(g.dims.z);
+    if (compressed()) {
+      // Blocks, bytes of a block, bytes of a shorter last one (none), compressed sizes.
+      table_ = {layers, layer, 0};
+      table_.resize(table_.size() + layers);
+    } else {
+      table_ = {layers * layer};
+    }
+    return output_.append(table_.data(), table_.size() * sizeof(std::uint64_t));
+  }
+
+ private:
+  [[nodiscard]] bool compressed() const { return !output_.sequential(); }
+
+  Result<void> add_slab(const VoxelIntervals& slab, const Execution& execution) override {
+    if (!compressed()) {
+      const RowBlocks blocks(slab, values_.bytes);
+      return output_.append_blocks(
+          execution, blocks.count(),
+          [&](std::size_t index, Bytes& out, int) { blocks.make(index, out); });
+    }
+    const auto layers = static_cast<std::size_t>(slab.v_end() - slab.v_begin());
+    return output_.append_blocks(execution, layers, [&](std::size_t index, Bytes& out, int) {
+      const int z = slab.v_begin() + static_cast<int>(index);
+      out.clear();
+      RunDeflater deflater(values_.kind, values_.bytes);
+      append_zlib_stream(deflater, out, [&](RunDeflater& to) {
+        emit_layer(slab, z, [&](std::uint32_t value, int length) {
+          to.run(value, static_cast<std::uint64_t>(length));
+        });
+      });
+      table_[3 + static_cast<std::size_t>(z)] = out.size();
+    });
+  }
+
+  Result<void> finish_output(const Execution&) override {
+    if (Result<void> written = output_.append("\n  </AppendedData>\n</VTKFile>\n"); !written) {
+      return written;
+    }
+    if (compressed()) {
+      Result<void> patched =
+          output_.patch(table_position_, table_.data(), table_.size() * sizeof(std::uint64_t));
+      if (!patched) return patched;
+    }
+    return output_.commit();
+  }
+
+  DenseValues values_;
+  BlockOutput output_;
+  std::uint64_t table_position_ = 0;
+  std::vector<std::uint64_t> table_;
+};
+
+}  // namespace
+
+VoxelWriterResult open_vti_writer(const std::string& path, const VoxelGrid& grid,
+                                  const VoxelWriterOptions& options) {
+  Result<BlockOutput> output = BlockOutput::create(path);
+  if (!output) return tl::unexpected(output.error());
+  auto writer = std::make_unique<VtiWriter>(path, grid, options.ids, std::move(*output));
+  if (Result<void> begun = writer->begin(options.name); !begun) {
+    return tl::unexpected(begun.error());
+  }
+  return writer;
+}
+
+}  // namespace strata

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "strata/voxelize/formats/voxel_writer.h"
+
+namespace strata {
+
+/// The writers behind open_voxel_writer, one a format (internal to voxelize/). The grid is valid.
+using VoxelWriterResult = Result<std::unique_ptr<VoxelWriter>>;
+
+/// Colours of a .vox palette; index 0 means no voxel.
+inline constexpr std::size_t kVoxColours = 255;
+
+VoxelWriterResult open_vdb_writer(const std::string& path, const VoxelGrid& grid,
+                                  const VoxelWriterOptions& options);
+VoxelWriterResult open_png_writer(const std::string& path, const VoxelGrid& grid,
+                                  const VoxelWriterOptions& options);
+VoxelWriterResult open_npy_writer(const std::string& path, const VoxelGrid& grid,
+                                  const VoxelWriterOptions& options);
+VoxelWriterResult open_npz_writer(const std::string& path, const VoxelGrid& grid,
+                                  const VoxelWriterOptions& options);
+VoxelWriterResult open_nrrd_writer(const std::string& path, const VoxelGrid& grid,
+                                   const VoxelWriterOptions& options);
+VoxelWriterResult open_vti_writer(const std::string& path, const VoxelGrid& grid,
+                                  const VoxelWriterOptions& options);
+VoxelWriterResult open_binvox_writer(const std::string& path, const VoxelGrid& grid);
+VoxelWriterResult open_vox_writer(const std::string& path, const VoxelGrid& grid,
+                                  const VoxelWriterOptions& options);
+VoxelWriterResult open_zarr_writer(const std::string& path, const VoxelGrid& grid,
+                                   const VoxelWriterOptions& options);
+
+}  // namespace strata
