@@ -1,7 +1,8 @@
-# See CMakeLists.txt. Arguments: WAY (find_package or pkg_config), BUILD_DIR, WORK_DIR, CONSUMER_DIR, COMPILER,
-# SANITIZE, VERSION, OPENMESH.
+# What the scripts of this folder share. Their arguments: BUILD_DIR, SOURCE_DIR, PREFIX (the installed tree), WORK_DIR,
+# COMPILER, LAUNCHER (ccache or nothing), SANITIZE, VERSION, OPENMESH.
 cmake_minimum_required(VERSION 3.25)
 
+# run(COMMAND...): ends the test if it fails; `output` is what it printed.
 function(run)
   execute_process(COMMAND ${ARGN} RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE output)
   if(NOT result EQUAL 0)
@@ -11,51 +12,21 @@ function(run)
   set(output "${output}" PARENT_SCOPE)
 endfunction()
 
-file(REMOVE_RECURSE "${WORK_DIR}")
-run("${CMAKE_COMMAND}" --install "${BUILD_DIR}" --prefix "${WORK_DIR}/first")
-# A tree that was moved after its installation must work as well.
-file(RENAME "${WORK_DIR}/first" "${WORK_DIR}/prefix")
-set(prefix "${WORK_DIR}/prefix")
-
-# The installed headers hold no private ones of a part that is not built.
-if(NOT OPENMESH AND EXISTS "${prefix}/include/strata/mesh/openmesh_bridge.h")
-  message(FATAL_ERROR "strata/mesh/openmesh_bridge.h is installed without OpenMesh")
-endif()
-if(NOT EXISTS "${prefix}/include/strata/core/result.h")
-  message(FATAL_ERROR "strata/core/result.h is not installed in include/strata")
-endif()
-
-set(flags "")
-if(SANITIZE)
-  set(flags "-fsanitize=${SANITIZE}")
-endif()
-
-if(WAY STREQUAL "find_package")
-  run("${CMAKE_COMMAND}" -S "${CONSUMER_DIR}" -B "${WORK_DIR}/build" -G Ninja "-DCMAKE_PREFIX_PATH=${prefix}"
-    "-DCMAKE_CXX_COMPILER=${COMPILER}" "-DCMAKE_CXX_FLAGS=${flags}" "-DEXPECTED_VERSION=${VERSION}")
-  run("${CMAKE_COMMAND}" --build "${WORK_DIR}/build")
-  set(programs "${WORK_DIR}/build/consumer" "${WORK_DIR}/build/consumer_of_core")
-else()
-  file(GLOB_RECURSE pc "${prefix}/*/strata.pc")
-  cmake_path(GET pc PARENT_PATH folder)
-  set(ENV{PKG_CONFIG_PATH} "${folder}")
-  run(pkg-config --modversion strata)
-  string(STRIP "${output}" output)
-  if(NOT output STREQUAL VERSION)
-    message(FATAL_ERROR "strata.pc says version ${output}, the project is ${VERSION}")
-  endif()
-  run(pkg-config --cflags --libs strata)
-  separate_arguments(arguments UNIX_COMMAND "${output}")
-  file(MAKE_DIRECTORY "${WORK_DIR}/build")
-  run("${COMPILER}" -std=c++20 ${flags} "${CONSUMER_DIR}/consumer.cpp" ${arguments} -o "${WORK_DIR}/build/consumer")
-  set(programs "${WORK_DIR}/build/consumer")
-endif()
-
-foreach(program IN LISTS programs)
+# run_consumer(PROGRAM): it must say that Strata works.
+function(run_consumer program)
   run("${program}")
-  message("${program} says: ${output}")
   if(NOT output MATCHES "strata works")
-    message(FATAL_ERROR "${program} did not say that strata works")
+    message(FATAL_ERROR "${program} did not say that strata works, but: ${output}")
   endif()
-endforeach()
+endfunction()
+
+set(flags "-Wall -Wextra -Werror")  # what Strata's headers must not disturb
+if(SANITIZE)
+  string(APPEND flags " -fsanitize=${SANITIZE}")
+endif()
+set(configure -G Ninja "-DCMAKE_PREFIX_PATH=${PREFIX}" "-DCMAKE_CXX_COMPILER=${COMPILER}"
+  "-DCMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER}" "-DCMAKE_CXX_FLAGS=${flags}"
+  -DCMAKE_NO_SYSTEM_FROM_IMPORTED=ON)  # or the compiler keeps quiet about our headers
+set(consumer_dir "${SOURCE_DIR}/tests/install/consumer")
 file(REMOVE_RECURSE "${WORK_DIR}")
+file(MAKE_DIRECTORY "${WORK_DIR}")

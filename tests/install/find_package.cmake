@@ -1,0 +1,5 @@
+include("${CMAKE_CURRENT_LIST_DIR}/run.cmake")
+run("${CMAKE_COMMAND}" -S "${consumer_dir}" -B "${WORK_DIR}" ${configure} "-DEXPECTED_VERSION=${VERSION}")
+run("${CMAKE_COMMAND}" --build "${WORK_DIR}")
+run_consumer("${WORK_DIR}/consumer")
+run_consumer("${WORK_DIR}/consumer_of_core")
