@@ -10,6 +10,7 @@
 #include "apps/strata/choice_words.h"
 #include "apps/strata/command_words.h"
 #include "apps/strata/csg_scene.h"
+#include "apps/strata/help.h"
 #include "apps/strata/option_values.h"
 #include "apps/strata/scene_options.h"
 #include "core/printable.h"
@@ -17,84 +18,96 @@
 namespace strata::apps {
 namespace {
 
-constexpr const char* kTopHelp = R"(strata: triangle meshes to voxels, exactly and fast
+constexpr const char* kCommands[] = {"voxelize", "info", "ldi", "csg"};
 
-  strata voxelize knot.obj -r 512 -o knot.vdb          solid, 512 voxels along the longest side
-  strata voxelize a.stl b.stl --voxel-size 0.2 -o all.nrrd     two meshes on one grid
-  strata voxelize scan.ply -r 1024 --stats --json      only statistics, for a program to read
-  strata info scan.ply                                 size, volume, closed or not and where
-  strata ldi knot.obj -r 512 -o knot.exr               depth lists as a deep image
-  strata csg plate.csg -o plate.png                    a picture of a Boolean tree
-  strata part.scad -o part.png                         the same: a file instead of a command
-  strata view plate.scad --watch                       a window on it
+constexpr const char* kTopHelp = R"(strata: exact voxels, depth lists and pictures of solids
 
-usage: strata COMMAND [OPTIONS] FILE...
+  strata voxelize knot.obj -r 512 -o knot.vdb      solid voxels, the longest side 512
+  strata voxelize a.stl b.stl --voxel-size 0.2 -o all.nrrd   the union
+  strata voxelize scan.ply -r 1024 --stats --json  statistics for a program
+  strata info scan.ply                             size, volume, holes
+  strata ldi knot.obj -r 512 -o knot.exr           depth lists as a deep image
+  strata csg plate.csg -o plate.png                a picture of a Boolean tree
+  strata part.scad -o part.png                     the same without a command
+  strata view plate.scad --watch                   a window that shows the scene
 
-commands:
-  voxelize    meshes or scenes to a voxel grid, a file of it, or statistics
-  info        what a mesh or a scene holds: counts, bounds, area, volume, holes
-  ldi         meshes or a scene to a layered depth image
-  csg         a scene (.csg, .scad) or an expression over meshes to a picture
-  view        the same in a window: turn, cut, pick, measure, reload
+Usage: strata COMMAND [OPTIONS] FILE...
 
-  strata COMMAND --help lists the options of a command.
-  -h, --help      this text
-  -V, --version   the version
+Commands:
+  voxelize    Turn meshes and scenes into a voxel file or statistics
+  info        Report counts, bounds, area, volume and holes
+  ldi         Write the depth lists of meshes or a scene: a layered depth image
+  csg         Draw or measure a scene (.csg, .scad) or an expression over meshes
+  view        Show the same in a window: turn, cut, pick, measure, reload
+
+Options:
+  -h, --help      Print this help and exit
+  --help-all      Print the help of every command with all options, and exit
+  -V, --version   Print the version and exit
+
+`strata COMMAND --help` lists the options of a command.
 )";
 
-constexpr const char* kExitCodes = R"(
-exit codes:
-  0    done
-  1    an error inside strata
-  2    options that are wrong or contradict each other
-  3    an input file that cannot be read or is malformed
-  4    an output that cannot be written
-  5    geometry that is refused (--strict, --open fail, no extent, coordinates too large)
-  6    a limit: memory, size of the grid, --time-limit
-  7    two results differ that should agree
-  130  interrupted
-)";
+std::string top_help() {
+  std::string text = std::string(kTopHelp) + "\nExit codes:\n";
+  for (const auto& [code, what] : kExitCodes) text += fmt::format("  {:<5}{}\n", code, what);
+  return text;
+}
 
 constexpr const char* kVoxelizeExamples =
-    R"(Meshes and scenes to voxels. A voxel is solid when its centre is inside.
+    R"(Turn meshes and scenes into voxels. A voxel is solid when its centre is inside.
 
-  strata voxelize knot.obj -r 512 -o knot.vdb            512 voxels along the longest side
-  strata voxelize a.stl b.stl --voxel-size 0.2 -o all.nrrd       the union, on one grid
-  strata voxelize leaf.obj -r 256 --surface -o leaf.npy  every voxel that the surface touches
+  strata voxelize knot.obj -r 512 -o knot.vdb      the longest side 512
+  strata voxelize a.stl b.stl --voxel-size 0.2 -o all.nrrd    the union
+  strata voxelize leaf.obj -r 256 --surface -o leaf.npy     the surface
   strata voxelize part.stl --voxel-size 0.05,0.05,0.1 -o slices/ --format png
-  strata voxelize plate.csg -r 256 --ids -o plate.nrrd   which solid a voxel is of
+  strata voxelize plate.csg -r 256 --ids -o plate.nrrd     label voxels by solid
   strata voxelize part.stl -r 300 -o - --format npy | program
-  strata voxelize scan.ply -r 1024 --stats               only statistics
+  strata voxelize scan.ply -r 1024 --stats         statistics only
 )";
 
 constexpr const char* kInfoExamples =
-    R"(What meshes and scenes hold: counts, bounds, area, volume, and where they are not closed.
+    R"(Report what meshes and scenes hold: counts, bounds, area, volume and holes.
 
   strata info scan.ply
   strata info --json *.stl
-  strata info plate.csg                                measured by rays, with error bounds
-  strata info --gl                                     what OpenGL there is, and how it is used
+  strata info plate.csg                measured by rays, with error bounds
+  strata info --gl                     OpenGL: what is found and how it is used
 )";
 
 constexpr const char* kLdiExamples =
-    R"(Meshes or a scene to a layered depth image: per pixel, the sorted depths where a ray meets it.
+    R"(Write a layered depth image: for each pixel the sorted depths of all surfaces.
 
-  strata ldi knot.obj -r 512 -o knot.exr              solid intervals, deep scanline EXR
-  strata ldi knot.obj -r 512 --samples -o knot.exr    a sample for each surface
+  strata ldi knot.obj -r 512 -o knot.exr              solid intervals, deep EXR
+  strata ldi knot.obj -r 512 --samples -o knot.exr    a sample each surface
   strata ldi knot.obj -r 512 --axis x -o knot.npz     arrays for NumPy
 )";
 
+/// Defines an option with a value on `app`.
+CLI::Option* option(CLI::App& app, const char* group, const char* names, std::string& word,
+                    const std::string& value, const char* what) {
+  return app.add_option(names, word, what)->type_name(value)->group(group);
+}
+
+/// Defines an option without one, or with one that may be left out: `--fog[=N]`.
+template <class T>
+void flag(CLI::App& app, const char* group, const char* names, T& target, const char* what,
+          const std::string& value = "") {
+  app.add_flag(names, target, what)->type_name(value)->group(group);
+}
+
 void add_inputs(CLI::App& app, Words& words) {
+  const char* group = "Input";
   app.add_option("INPUT", words.files,
-                 "Meshes (.obj .stl .ply .off), scenes (.csg .scad); - a pipe of a mesh")
-      ->type_name("");
-  app.add_option("--input-format", words.input_format,
-                 "obj, stl, ply or off: of -, else of all files whatever their names are")
-      ->type_name("FORMAT")
-      ->group("Input");
-  app.add_option("--reader", words.reader, "own (default) or openmesh, to compare")
-      ->type_name("NAME")
-      ->group("Input");
+                 "Meshes (.obj .stl .ply .off) and scenes (.csg .scad); - reads a mesh from "
+                 "standard input")
+      ->type_name("")
+      ->group(group);
+  option(app, group, "--input-format", words.input_format, choices(kMeshFormatWords),
+         "Format of standard input, or of every file where standard input is not read (default: "
+         "auto, by name and content)");
+  option(app, kDeveloperGroup, "--reader", words.reader, choices(kReaderWords),
+         "Mesh reader: Strata's own or OpenMesh's (default: own)");
   define_scene_options(app, words.csg.scene);
 }
 
@@ -102,134 +115,112 @@ void add_inputs(CLI::App& app, Words& words) {
 
 void add_common(CLI::App& app, Words& words) {
   const char* group = "Running";
-  app.add_option("-j,--threads", words.threads, "Threads; 0 (default): one a processor")
-      ->type_name("N")
-      ->group(group);
-  app.add_option("--memory-limit", words.memory_limit,
-                 "Bytes, or with K, M, G; default: three quarters of the machine or container")
-      ->type_name("SIZE")
-      ->group(group);
-  app.add_option("--time-limit", words.time_limit,
-                 "Seconds after which the command ends without output (exit code 6)")
-      ->type_name("S")
-      ->group(group);
-  app.add_flag("--strict,--hardwarnings", words.strict, "Warnings are errors (exit code 5)")
-      ->group(group);
-  app.add_flag("-q,--quiet", words.quiet, "Print errors only")->group(group);
-  app.add_flag("-v,--verbose", words.verbose, "Say what is done")->group(group);
-  app.add_option("--progress", words.progress, "auto (a bar on terminals), bar or none")
-      ->type_name("MODE")
-      ->group(group);
+  option(app, group, "-j,--threads", words.threads, "N",
+         "Number of threads, 0 to 4096; 0 means one per processor (default: 0)");
+  option(app, group, "--memory-limit", words.memory_limit, "SIZE",
+         "Most memory to use, in bytes or with K, M, G or T: 512M, 2G (default: three quarters of "
+         "the machine's or container's)");
+  option(app, group, "--time-limit", words.time_limit, "SECONDS",
+         "Stop after this time, without output and with exit code 6 (default: no limit)");
+  flag(app, group, "--strict,--hardwarnings", words.strict,
+       "Treat warnings as errors, with exit code 5");
+  flag(app, group, "-q,--quiet", words.quiet, "Print errors only");
+  flag(app, group, "-v,--verbose", words.verbose, "Print what is read and done as well");
+  option(app, group, "--progress", words.progress, choices(kProgressWords),
+         "Progress bar on standard error (default: auto, on terminals only)");
 }
 
 void add_json(CLI::App& app, Words& words, const char* group) {
-  app.add_flag("--json{-}", words.json, "--json[=FILE]: a report for programs (docs/json.md)")
-      ->group(group);
+  flag(app, group, "--json{-}", words.json,
+       "Write a report for programs to FILE (default: to standard output)", "[=FILE]");
 }
 
 namespace {
 
 void add_grid(CLI::App& app, Words& words) {
-  const char* group = "Grid (one of -r, --voxel-size, --grid)";
-  app.add_option("-r,--resolution", words.resolution, "Voxels along the longest side of the mesh")
-      ->type_name("N")
-      ->group(group);
-  app.add_option("--voxel-size", words.voxel_size, "World length of a voxel, or three: sx,sy,sz")
-      ->type_name("S")
-      ->group(group);
-  app.add_option("--grid", words.grid, "nx,ny,nz voxels, stretched to fit the mesh")
-      ->type_name("N,N,N")
-      ->group(group);
-  app.add_option("--bounds", words.bounds, "x0,y0,z0,x1,y1,z1: the box to cover, not the mesh's")
-      ->type_name("BOX")
-      ->group(group);
-  app.add_option("--origin", words.origin, "x,y,z: lower corner of the grid")
-      ->type_name("X,Y,Z")
-      ->group(group);
-  app.add_option("--padding", words.padding,
-                 "Empty voxels on each side: added to -r, part of --grid")
-      ->type_name("N")
-      ->group(group);
-  app.add_flag("--align", words.align, "Make the origin a multiple of the voxel size")
-      ->group(group);
+  const char* group = "Grid (exactly one of -r, --voxel-size and --grid is needed)";
+  option(app, group, "-r,--resolution", words.resolution, "N",
+         "Voxels along the longest side of the input, 1 to 65536");
+  option(app, group, "--voxel-size", words.voxel_size, "S",
+         "Side of a voxel in the input's units, or three sides: sx,sy,sz");
+  option(app, group, "--grid", words.grid, "NX,NY,NZ",
+         "Voxels along x, y and z, 1 to 65536 each, stretched to fit the input");
+  option(app, group, "--bounds", words.bounds, "BOX",
+         "Box to cover, x0,y0,z0,x1,y1,z1 in the input's units (default: the input's box)");
+  option(app, group, "--origin", words.origin, "X,Y,Z",
+         "Lower corner of the grid in the input's units (default: that of the box)");
+  option(app, group, "--padding", words.padding, "N",
+         "Empty voxels on each side, in addition to -r but included in --grid (default: 0)");
+  flag(app, group, "--align", words.align, "Make the origin a multiple of the voxel size");
 }
 
 }  // namespace
 
 void add_backend(CLI::App& app, Words& words, const char* group) {
-  app.add_option("--backend", words.backend, "cpu, gl (OpenGL 4.5) or auto: a GPU if there is one")
-      ->type_name("B")
-      ->group(group);
+  option(app, group, "--backend", words.backend, choices(kBackendWords),
+         "Processor for the depth lists: cpu, gl (OpenGL 4.5), or auto, which is a hardware GPU if "
+         "there is one, else the CPU (default: auto); the result is the same");
 }
 
 namespace {
 
-void add_engine(CLI::App& app, Words& words, const char* axes) {
-  const char* group = "Engine (same result whatever is chosen)";
-  add_backend(app, words, group);
-  app.add_option("--axis", words.axis, axes)->type_name("A")->group(group);
-  app.add_option("--store", words.store, "Of the depth lists: ha (HA-buffer), scan or auto")
-      ->type_name("S")
-      ->group(group);
-  app.add_option("--offsets", words.offsets, "Of the HA-buffer: plane-first, random or farthest")
-      ->type_name("O")
-      ->group(group);
+void add_stores(CLI::App& app, Words& words) {
+  option(app, kDeveloperGroup, "--store", words.store, choices(kStoreWords),
+         "Store of the depth lists: ha (HA-buffer), scan (count/scan) or auto (default: auto)");
+  option(app, kDeveloperGroup, "--offsets", words.offsets, choices(kOffsetWords),
+         "Probe offsets of the HA-buffer (default: plane-first)");
 }
 
 void define_voxelize(CLI::App& app, Words& words) {
   app.description(kVoxelizeExamples);
   add_inputs(app, words);
   const char* output = "Output";
-  app.add_option("-o,--output", words.output, "File or folder to write; - for standard output")
-      ->type_name("FILE")
-      ->group(output);
-  app.add_option("--format", words.format, "Its format, whatever the name is")
-      ->type_name("FORMAT")
-      ->group(output);
-  app.add_flag("--list-formats", words.list_formats, "List the formats and end")->group(output);
-  app.add_flag("--fog{auto}", words.fog,
-               "--fog[=N], .vdb: fog volume, 0 to 1 by NxNxN samples a voxel; 4")
-      ->group(output);
-  app.add_flag("--mask", words.mask, ".vdb: a mask grid: smaller, opened by fewer programs")
-      ->group(output);
-  app.add_flag("--ids", words.ids,
-               "Values say which solid or file: 1, 2, ...; --json has the names")
-      ->group(output);
-  app.add_option("--name", words.name,
-                 "Of the grid: .vdb .nrrd .vti; default: density, ids, surface or solid")
-      ->type_name("NAME")
-      ->group(output);
-  app.add_flag("--stats", words.stats, "Print statistics")->group(output);
+  option(app, output, "-o,--output", words.output, "FILE",
+         "File or folder to write; - for standard output");
+  option(app, output, "--format", words.format, "FORMAT",
+         "Format of the output, see --list-formats (default: by the file's name)");
+  flag(app, output, "--list-formats", words.list_formats, "List the formats and exit");
+  flag(app, output, "--fog{auto}", words.fog,
+       "Write a fog volume to a .vdb: the filled fraction of each voxel, 0 to 1, from NxNxN "
+       "samples; N is 1 to 16 (default: 4)",
+       "[=N]");
+  flag(app, output, "--mask", words.mask,
+       "Write a mask grid to a .vdb: smaller, but fewer programs read it");
+  flag(app, output, "--ids", words.ids,
+       "Label each voxel with its solid or file: 1, 2, ...; --json lists the names");
+  option(app, output, "--name", words.name, "NAME",
+         "Name of the grid in a .vdb, .nrrd or .vti (default: density, ids, surface or solid)");
+  flag(app, output, "--stats", words.stats, "Print statistics");
   add_json(app, words, output);
-  app.add_flag("--checksum", words.checksum, "A hash of the solid voxels and the grid")
-      ->group(output);
-  app.add_flag("--dry-run", words.dry_run, "Only say what grid and memory it would take")
-      ->group(output);
+  flag(app, output, "--checksum", words.checksum, "Print a hash of the solid voxels and the grid");
+  flag(app, output, "--dry-run", words.dry_run,
+       "Print the grid and the memory that the command would take, and exit");
   add_grid(app, words);
-  const char* solid = "What is solid";
-  app.add_flag("--solid", words.solid, "Voxels whose centre is inside (default)")->group(solid);
-  app.add_flag("--surface{conservative}", words.surface,
-               "--surface[=conservative|26|6]: voxels of the surface; with --solid: both")
-      ->group(solid);
-  app.add_option("--rule", words.rule, "Inside is winding (> 0, default), nonzero or parity (odd)")
-      ->type_name("RULE")
-      ->group(solid);
-  app.add_flag("--keep-orientation", words.keep_orientation,
-               "Do not turn meshes around that are inside out")
-      ->group(solid);
-  app.add_option("--open", words.open,
-                 "Meshes with holes: vote of rays of all directions (default), surface or fail")
-      ->type_name("HOW")
-      ->group(solid);
-  add_engine(app, words, "Of the rays: x, y, z or auto (that of the format, or fewest rays)");
+  const char* solid = "Solid voxels";
+  flag(app, solid, "--solid", words.solid, "Voxels whose centre is inside (default)");
+  flag(app, solid, "--surface{conservative}", words.surface,
+       "Voxels of the surface: all it touches, or a 26- or 6-separating shell (default: "
+       "conservative); with --solid both",
+       "[=" + choices(kSurfaceKindWords) + "]");
+  option(app, solid, "--rule", words.rule, choices(kRuleWords),
+         "Winding numbers that are inside a mesh: above 0, not 0, or odd (default: winding)");
+  flag(app, solid, "--keep-orientation", words.keep_orientation,
+       "Do not reverse meshes that are inside out");
+  option(app, solid, "--open", words.open, choices(kOpenModeWords),
+         "Meshes with holes: rays along x, y and z vote, only the surface is kept, or the command "
+         "fails (default: vote)");
+  add_backend(app, words, "Running");
   add_common(app, words);
+  option(app, kDeveloperGroup, "--axis", words.axis, choices(kAxisWords),
+         "Ray direction (default: auto, the format's axis, else the one with fewest rays)");
+  add_stores(app, words);
 }
 
 void define_info(CLI::App& app, Words& words) {
   app.description(kInfoExamples);
   add_inputs(app, words);
-  app.add_flag("--gl", words.gl, "What OpenGL there is, and how it is used; files are not needed")
-      ->group("Output");
+  flag(app, "Output", "--gl", words.gl,
+       "Report the OpenGL that is found and how it is used; needs no input");
   add_json(app, words, "Output");
   add_common(app, words);
 }
@@ -237,18 +228,43 @@ void define_info(CLI::App& app, Words& words) {
 void define_ldi(CLI::App& app, Words& words) {
   app.description(kLdiExamples);
   add_inputs(app, words);
-  app.add_option("-o,--output", words.output,
-                 "File to write: .exr, .npz, or .png (an X-ray picture)")
-      ->type_name("FILE")
-      ->group("Output");
-  app.add_flag("--samples", words.samples, "A sample for each surface, not solid intervals")
-      ->group("Output");
-  app.add_flag("--keep-orientation", words.keep_orientation,
-               "Do not turn a mesh around that is inside out")
-      ->group("Input");
+  flag(app, "Input", "--keep-orientation", words.keep_orientation,
+       "Do not reverse meshes that are inside out");
+  option(app, "Output", "-o,--output", words.output, "FILE",
+         "File to write: .exr, .npz, or .png (an X-ray picture)");
+  flag(app, "Output", "--samples", words.samples,
+       "Write one sample for each surface instead of solid intervals");
+  option(app, "Output", "--axis", words.axis, "x|y|z", "Ray direction (default: z)");
   add_grid(app, words);
-  add_engine(app, words, "Of the rays: x, y or z (default)");
+  add_backend(app, words, "Running");
   add_common(app, words);
+  add_stores(app, words);
+}
+
+/// Defines the options of a command, with its description and footer. False: there is no command
+/// of that name.
+bool define_command(std::string_view name, CLI::App& app, Words& words) {
+  define_help(app);
+  app.footer("`strata --help` lists the commands and the exit codes.");
+  if (name == "voxelize") {
+    define_voxelize(app, words);
+  } else if (name == "info") {
+    define_info(app, words);
+  } else if (name == "ldi") {
+    define_ldi(app, words);
+  } else if (name == "csg") {
+    define_csg(app, words);
+  } else {
+    return false;
+  }
+  return true;
+}
+
+std::string command_help(std::string_view name) {
+  Words words;
+  CLI::App app("", "strata " + std::string(name));
+  define_command(name, app, words);
+  return help_text(app, true);
 }
 
 }  // namespace
@@ -455,8 +471,8 @@ ParseOutcome usage_error(std::string_view command, std::string_view message) {
 /// Whether a command line is one of openscad: no command, but a file, or options and a scene.
 bool begins_with_a_file(const std::vector<std::string>& words) {
   const std::string& first = words.front();
-  for (const char* command : {"voxelize", "info", "ldi", "csg"}) {
-    if (first == command) return false;
+  if (std::find(std::begin(kCommands), std::end(kCommands), first) != std::end(kCommands)) {
+    return false;
   }
   if (first.starts_with('-')) return std::any_of(words.begin(), words.end(), is_scene_name);
   std::error_code ignored;
@@ -471,7 +487,12 @@ Command parse_command_line(int argc, const char* const* argv) {
   std::string_view name = argv[1];
   int first = 2;
   if (name == "-h" || name == "--help" || name == "help") {
-    return ParseOutcome{std::string(kTopHelp) + kExitCodes, false, 0};
+    return ParseOutcome{top_help(), false, 0};
+  }
+  if (name == "--help-all") {
+    std::string text = top_help();
+    for (const char* command : kCommands) text += "\n" + command_help(command);
+    return ParseOutcome{std::move(text), false, 0};
   }
   if (name == "-V" || name == "--version") {
     return ParseOutcome{"strata " STRATA_VERSION "\n", false, 0};
@@ -483,21 +504,11 @@ Command parse_command_line(int argc, const char* const* argv) {
   // Only the options of the command asked for are built: that is most of the time CLI11 takes.
   Words words;
   CLI::App app("", "strata " + std::string(name));
-  app.get_formatter()->column_width(26);
-  if (name == "voxelize") {
-    define_voxelize(app, words);
-  } else if (name == "info") {
-    define_info(app, words);
-  } else if (name == "ldi") {
-    define_ldi(app, words);
-  } else if (name == "csg") {
-    define_csg(app, words);
-  } else {
+  if (!define_command(name, app, words)) {
     return usage_error("", name.starts_with('-')
-                               ? fmt::format("no such option: {}; the command comes first", name)
-                               : fmt::format("no such command: {}", name));
+                               ? fmt::format("unknown option {}; the command comes first", name)
+                               : fmt::format("unknown command '{}'", name));
   }
-  app.footer("strata --help lists the exit codes.");
   try {
     std::vector<std::string> arguments(argv + first, argv + argc);
     if (const auto mistake = empty_value(arguments); !mistake.empty()) {
@@ -506,9 +517,11 @@ Command parse_command_line(int argc, const char* const* argv) {
     std::reverse(arguments.begin(), arguments.end());  // CLI11 takes them from the back
     app.parse(std::move(arguments));
   } catch (const CLI::CallForHelp&) {
-    return ParseOutcome{app.help(), false, 0};
+    return ParseOutcome{help_text(app, false), false, 0};
+  } catch (const CLI::CallForAllHelp&) {
+    return ParseOutcome{help_text(app, true), false, 0};
   } catch (const CLI::ParseError& error) {
-    return usage_error(name, error.what());
+    return usage_error(name, parse_mistake(app, error));
   }
   Reader reader;
   Command command;

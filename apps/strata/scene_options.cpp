@@ -7,6 +7,7 @@
 #include <iterator>
 #include <string_view>
 
+#include "apps/strata/help.h"
 #include "apps/strata/option_values.h"
 
 namespace strata::apps {
@@ -68,23 +69,27 @@ void define_scene_options(CLI::App& app, SceneWords& words) {
     app.add_option(names, word, what)->type_name(type)->group(group);
   };
   const char* input = "Input";
-  option("--assets", words.assets, "Where scenes look for files; else beside the scene", "FOLDER",
-         input);
-  option("--root", words.root, "Scenes may read files below this folder only", "FOLDER", input);
-  option("--scad-timeout", words.scad_timeout, "Seconds that openscad may take for a .scad; 300",
-         "S", input);
-  app.add_option("-D", words.definitions, "Set a variable of a .scad: -D 'x=40', -D 'label=\"B\"'")
+  option("--assets", words.assets,
+         "Folder in which scenes look for files (default: the scene's own)", "FOLDER", input);
+  option("--root", words.root,
+         "Folder outside of which scenes may not read files (default: no limit)", "FOLDER", input);
+  option("--scad-timeout", words.scad_timeout,
+         "Longest time that openscad may take for a .scad (default: 300)", "SECONDS", input);
+  app.add_option("-D", words.definitions,
+                 "Set a variable of a .scad: -D 'x=40', -D 'label=\"B\"'; may be repeated")
       ->type_name("NAME=VALUE")
       ->expected(1)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
       ->group(kOpenscadGroup);
-  option("-p", words.parameter_file, "Customizer's parameters of a .scad, .json", "FILE",
+  option("-p", words.parameter_file, "File with the customizer's parameters for a .scad, .json",
+         "FILE", kOpenscadGroup);
+  option("-P", words.parameter_set, "Parameter set of that file to use", "SET", kOpenscadGroup);
+  option("--check-parameters", words.check_parameters,
+         "Let openscad check the parameters of modules and functions", "true|false",
          kOpenscadGroup);
-  option("-P", words.parameter_set, "Which set of that file", "SET", kOpenscadGroup);
-  option("--check-parameters", words.check_parameters, "Of modules and functions: true or false",
-         "BOOL", kOpenscadGroup);
-  option("--check-parameter-ranges", words.check_ranges, "Of built-in modules: true or false",
-         "BOOL", kOpenscadGroup);
+  option("--check-parameter-ranges", words.check_ranges,
+         "Let openscad check the parameter ranges of built-in modules", "true|false",
+         kOpenscadGroup);
 }
 
 Result<void> read_scene_options(const SceneWords& words, InputOptions& input) {

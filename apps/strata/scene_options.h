@@ -12,9 +12,6 @@ class App;
 
 namespace strata::apps {
 
-/// Heading of the options that openscad has as well.
-inline constexpr const char* kOpenscadGroup = "OpenSCAD's options";
-
 /// The options of every command that reads scenes, as words. Empty: not given.
 struct SceneWords {
   std::string assets, root, scad_timeout;

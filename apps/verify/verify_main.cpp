@@ -1,5 +1,5 @@
-// strata-verify: is what Strata makes of a tree what CGAL's exact Booleans make of it? Exit codes
-// are those of ErrorCode; 7 says no.
+// strata-verify compares Strata's result of a Boolean tree with CGAL's exact one. Exit codes are
+// those of ErrorCode; 7 means that they differ.
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -18,47 +18,13 @@
 #include "apps/session/json_writer.h"
 #include "apps/strata/csg_scene.h"
 #include "apps/strata/file_conflicts.h"
+#include "apps/strata/help.h"
 #include "apps/strata/session.h"
 #include "apps/verify/comparison.h"
+#include "apps/verify/verify_options.h"
 
 namespace strata::apps {
 namespace {
-
-struct Words {
-  CsgCommand command;
-  std::string against, json;
-  bool has_json = false;
-  VerifyOptions options;
-};
-
-void define(CLI::App& app, Words& words) {
-  app.set_version_flag("--version", "strata-verify " STRATA_VERSION);
-  app.add_option("input", words.command.input.files, "a scene (.csg, .scad) or meshes")->required();
-  app.add_option("--expr", words.command.expression,
-                 "Boolean expression over the inputs, as for strata csg");
-  app.add_option("--against", words.against,
-                 "CGAL evaluates this scene or mesh instead: are the two one solid?");
-  app.add_option("--resolution", words.options.resolution,
-                 "voxels along the longest side of the grid that is compared whole")
-      ->check(CLI::Range(1, 1024))
-      ->capture_default_str();
-  app.add_option("--points", words.options.points, "random points to compare")
-      ->check(CLI::Range(0, 100'000'000))
-      ->capture_default_str();
-  app.add_option("--seed", words.options.seed, "of the random points")->capture_default_str();
-  app.add_option("--threads", words.command.common.threads, "of Strata; CGAL has one")
-      ->check(CLI::Range(0, 1024));
-  app.add_flag("-q,--quiet", words.command.common.quiet, "errors only");
-  app.add_flag("--strict", words.command.common.strict, "warnings are errors");
-  app.add_option("--json", words.json, "write a report there, - is standard output")
-      ->expected(0, 1)
-      ->default_str("-");
-  app.footer(
-      "Compares volume, area, and inside or outside at voxel centres and random points. "
-      "Differences\n"
-      "within the bounds of the method (area * length of a voxel; centres within 1/256 voxel of a\n"
-      "surface) are none. Exit code 0: they agree, 7: they do not, 5: CGAL cannot take a solid.");
-}
 
 std::string size_line(const char* name, const SizeCheck& check) {
   return fmt::format("{:<8} {:>16.9g}  CGAL {:>16.9g}  difference {:.3g}, bound {:.3g}{}\n", name,
@@ -125,7 +91,7 @@ std::string report(const Verification& found, double milliseconds) {
   return json.take();
 }
 
-Result<void> run(const Words& words, Session& session) {
+Result<void> run(const VerifyWords& words, Session& session) {
   session.configure(words.command.common);
   if (words.has_json) {
     std::vector<FileUse> read = inputs_of(words.command.input);
@@ -171,13 +137,22 @@ Result<void> run(const Words& words, Session& session) {
 
 int verify_main(int argc, char** argv) {
   Session session(Session::Clock::now());
-  CLI::App app("Compares Boolean trees with CGAL's exact Booleans", "strata-verify");
-  Words words;
-  define(app, words);
+  CLI::App app("", "strata-verify");
+  VerifyWords words;
+  define_verify_options(app, words);
   try {
     app.parse(argc, argv);
+  } catch (const CLI::Success& asked) {
+    const bool all = dynamic_cast<const CLI::CallForAllHelp*>(&asked) != nullptr;
+    const bool version = dynamic_cast<const CLI::CallForVersion*>(&asked) != nullptr;
+    const std::string text = version ? app.version() + "\n" : help_text(app, all);
+    return write_text(STDOUT_FILENO, text, "standard output")
+               ? 0
+               : static_cast<int>(ErrorCode::kOutput);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : static_cast<int>(ErrorCode::kUsage);
+    fmt::print(stderr, "strata-verify: error: {}\nstrata-verify: see strata-verify --help\n",
+               parse_mistake(app, error));
+    return static_cast<int>(ErrorCode::kUsage);
   }
   words.has_json = app.count("--json") > 0;
   if (words.has_json && words.json.empty()) words.json = "-";

@@ -12,6 +12,7 @@
 #include "apps/strata/choice_words.h"
 #include "apps/strata/csg_options.h"
 #include "apps/strata/file_conflicts.h"
+#include "apps/strata/help.h"
 #include "apps/strata/option_values.h"
 #include "apps/strata/scene_options.h"
 #include "apps/view/script.h"
@@ -21,12 +22,12 @@ namespace strata::view {
 namespace {
 
 constexpr const char* kExamples =
-    R"(A window on a scene, on meshes united, on an expression over them.
+    R"(Show a scene, the union of meshes or an expression over them in a window.
 
-  strata view plate.csg                     turn, cut, pick, measure
-  strata view part.scad --watch             drawn again whenever the file is saved
+  strata view plate.csg                 turn, cut, pick, measure
+  strata view part.scad --watch         draw again whenever the file is saved
   strata view plate.stl holes.stl --expr 'plate - holes' --ghosts
-  strata view part.csg --screenshot part.png --script tour.txt     without a person
+  strata view part.csg --screenshot part.png --script tour.txt    unattended
 )";
 
 constexpr std::pair<std::string_view, Heat> kHeats[] = {
@@ -42,52 +43,68 @@ struct Words {
 void define(CLI::App& app, Words& words, ViewOptions& options) {
   apps::CsgWords& csg = words.csg;
   const auto option = [&app](const char* names, std::string& word, const char* what,
-                             const char* type, const char* group) {
-    app.add_option(names, word, what)->type_name(type)->group(group);
+                             const std::string& value, const char* group) {
+    app.add_option(names, word, what)->type_name(value)->group(group);
   };
-  app.add_option("INPUT", words.files, "Scenes (.csg .scad), meshes (.obj .stl .ply .off)")
-      ->type_name("");
+  const auto flag = [&app](const char* names, bool& target, const char* what, const char* group) {
+    app.add_flag(names, target, what)->group(group);
+  };
   const char* input = "Input";
-  option("--expr", csg.expression, "What is shown, such as 'a - b'; else all inputs united", "EXPR",
+  app.add_option("INPUT", words.files, "Scenes (.csg .scad) and meshes (.obj .stl .ply .off)")
+      ->type_name("")
+      ->group(input);
+  option("--expr", csg.expression,
+         "Boolean expression to show, such as 'a - b' (default: the union of all inputs)", "EXPR",
          input);
-  option("--input-format", words.format, "csg, obj, stl, ply or off, whatever the name is",
-         "FORMAT", input);
-  option("--rule", words.rule, "Inside of meshes: winding (> 0, default), nonzero, parity (odd)",
-         "RULE", input);
-  app.add_flag("--keep-orientation", options.command.keep_orientation,
-               "Do not turn meshes around that are inside out")
-      ->group(input);
-  app.add_flag("--watch", options.watch, "Read again what changes on the disk; the camera stays")
-      ->group(input);
-  const char* look = "Look";
-  option("--size", csg.size, "width,height of the window in pixels; 1280,800", "W,H", look);
-  option("--camera", csg.camera, "x,y,z,rx,ry,rz,distance or eye x,y,z, target x,y,z", "NUMBERS",
+  option("--input-format", words.format,
+         "Format of every file, whatever its name (default: auto, by name and content)",
+         "csg|" + apps::choices(apps::kMeshFormatWords), input);
+  option("--rule", words.rule,
+         "Winding numbers that are inside a mesh: above 0, not 0, or odd (default: winding)",
+         apps::choices(apps::kRuleWords), input);
+  flag("--keep-orientation", options.command.keep_orientation,
+       "Do not reverse meshes that are inside out", input);
+  flag("--watch", options.watch, "Load the files again when they change; the camera stays", input);
+  const char* look = "Appearance";
+  option("--size", csg.size, "Width and height of the window in pixels (default: 1280,800)", "W,H",
          look);
-  option("--projection", csg.projection, "p(erspective, default) or o(rtho)", "P", look);
-  option("--colorscheme", csg.scheme, "Cornfield (default) or another of OpenSCAD's", "NAME", look);
-  app.add_option("--cut", csg.cuts, "Section: x=5 (cuts what is nearer), z<10 or nx,ny,nz,d")
+  option("--camera", csg.camera,
+         "Target x,y,z, rotation rx,ry,rz in degrees and distance; or eye x,y,z and target x,y,z",
+         "NUMBERS", look);
+  option("--projection", csg.projection, "Perspective or orthographic (default: p)", "p|o", look);
+  option("--colorscheme", csg.scheme, "One of OpenSCAD's colour schemes (default: Cornfield)",
+         "SCHEME", look);
+  app.add_option("--cut", csg.cuts,
+                 "Section plane: x=5 removes the half towards the camera, z<10 keeps z below 10, "
+                 "nx,ny,nz,d keeps nx*x + ny*y + nz*z below d")
       ->type_name("PLANE")
       ->expected(1)
       ->group(look);
-  app.add_flag("--edges", csg.edges, "Dark lines along the edges of faces")->group(look);
-  app.add_flag("--ghosts", options.ghosts, "Show what is subtracted, transparent")->group(look);
-  option("--heat", words.heat, "Colours: off (the scene's, default), thickness, depth (complexity)",
-         "MAP", look);
+  flag("--edges", csg.edges, "Draw dark lines along the edges of faces", look);
+  flag("--ghosts", options.ghosts, "Show subtracted solids, transparent", look);
+  option("--heat", words.heat,
+         "Colour by thickness or by depth complexity instead of the scene's colours (default: off)",
+         apps::choices(kHeats), look);
+  flag("--no-panels", words.no_panels, "Show the picture without panels", look);
   apps::define_scene_options(app, csg.scene);
-  app.add_flag("--no-panels", words.no_panels, "The picture alone")->group(look);
-  const char* drive = "Without a person";
-  option("--screenshot", options.screenshot, "When all is drawn, a picture of the window; then end",
-         "FILE.png", drive);
-  option("--script", options.script, "Commands, one a line (below); - for standard input", "FILE",
-         drive);
-  option("--backend", words.backend, "Who finds surfaces: cpu, gl (OpenGL 4.5) or auto", "B",
-         "Running");
-  option("-j,--threads", words.threads, "Threads; 0 (default): one a processor", "N", "Running");
+  const char* drive = "Unattended";
+  option("--screenshot", options.screenshot,
+         "Write a picture of the window, .png, once everything is drawn, and exit", "FILE", drive);
+  option("--script", options.script, "Run the commands of FILE, one a line; - for standard input",
+         "FILE", drive);
+  const char* running = "Running";
+  option(
+      "--backend", words.backend,
+      "Processor for the visible surface: cpu, gl (OpenGL 4.5), or auto, which is a hardware GPU "
+      "if there is one, else the CPU (default: auto); the picture is the same",
+      apps::choices(apps::kBackendWords), running);
+  option("-j,--threads", words.threads,
+         "Number of threads, 0 to 4096; 0 means one per processor (default: 0)", "N", running);
 }
 
 std::string footer() {
-  return "keys and mouse:\n" + key_help() + "\ncommands of a script:\n" + script_help() +
-         "\nstrata --help lists the exit codes.";
+  return "Keys and mouse:\n" + key_help() + "\nCommands of a script:\n" + script_help() +
+         "\n`strata --help` lists the exit codes.";
 }
 
 Result<void> read(Words& words, ViewOptions& options) {
@@ -137,7 +154,7 @@ std::variant<apps::ParseOutcome, ViewOptions> parse_view_options(int argc,
   Words words;
   ViewOptions options;
   CLI::App app(kExamples, "strata view");
-  app.get_formatter()->column_width(26);
+  apps::define_help(app);
   define(app, words, options);
   const auto mistake = [](std::string_view message) {
     return apps::ParseOutcome{
@@ -151,9 +168,12 @@ std::variant<apps::ParseOutcome, ViewOptions> parse_view_options(int argc,
     app.parse(std::move(arguments));
   } catch (const CLI::CallForHelp&) {
     app.footer(footer());
-    return apps::ParseOutcome{app.help(), false, 0};
+    return apps::ParseOutcome{apps::help_text(app, false), false, 0};
+  } catch (const CLI::CallForAllHelp&) {
+    app.footer(footer());
+    return apps::ParseOutcome{apps::help_text(app, true), false, 0};
   } catch (const CLI::ParseError& error) {
-    return mistake(error.what());
+    return mistake(apps::parse_mistake(app, error));
   }
   if (auto done = read(words, options); !done) return mistake(done.error().message);
   return options;

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <sstream>
+
 #include "strata/mesh/formats/write_mesh.h"
 #include "strata/mesh/shapes.h"
 #include "tests/apps/strata/run_tool.h"
@@ -40,9 +42,9 @@ TEST_F(Usage, HelpBeginsWithExamplesAndEndsWithTheExitCodes) {
   const RunResult run = place.run({"--help"});
   EXPECT_EQ(run.exit_code, 0);
   EXPECT_EQ(run.err, "");
-  EXPECT_LT(run.out.find("strata voxelize knot.obj"), run.out.find("commands:"));
+  EXPECT_LT(run.out.find("strata voxelize knot.obj"), run.out.find("Commands:"));
   for (const char* code : {"0 ", "1 ", "2 ", "3 ", "4 ", "5 ", "6 ", "7 ", "130 "}) {
-    EXPECT_NE(run.out.find(std::string("\n  ") + code, run.out.find("exit codes")),
+    EXPECT_NE(run.out.find(std::string("\n  ") + code, run.out.find("Exit codes")),
               std::string::npos)
         << code;
   }
@@ -58,6 +60,37 @@ TEST_F(Usage, EveryCommandHasHelpThatBeginsWithExamples) {
     EXPECT_LT(example, run.out.find("Usage")) << run.out;
     EXPECT_NE(run.out.find("--memory-limit"), std::string::npos);
   }
+}
+
+TEST_F(Usage, HelpLeavesOutWhatHelpAllShowsToDevelopers) {
+  for (const char* command : {"voxelize", "ldi", "info"}) {
+    const RunResult help = place.run({command, "--help"}), all = place.run({command, "--help-all"});
+    EXPECT_EQ(all.exit_code, 0);
+    EXPECT_EQ(all.err, "");
+    for (const char* option : {"--reader", "--store", "--offsets"}) {
+      EXPECT_EQ(help.out.find(option), std::string::npos) << command << option;
+      EXPECT_EQ(all.out.find(option) != std::string::npos,
+                command != std::string("info") || option == std::string("--reader"))
+          << command << option;
+    }
+    EXPECT_NE(all.out.find("For developers"), std::string::npos);
+    const std::string everything = place.run({"--help-all"}).out;
+    EXPECT_NE(everything.find(all.out), std::string::npos) << command;
+  }
+}
+
+TEST_F(Usage, HelpIsTidy) {
+  for (const char* command : {"voxelize", "ldi", "info", "csg"}) {
+    const std::string help = place.run({command, "--help-all"}).out;
+    EXPECT_EQ(help.find("\n\n\n"), std::string::npos) << help;
+    EXPECT_EQ(help.find_first_of("{}"), std::string::npos) << help;
+    EXPECT_EQ(help.find("--json[=FILE]") != std::string::npos, command != std::string("ldi"));
+    EXPECT_EQ(help.find("Print this help and exit"), help.rfind("Print this help and exit"));
+    std::istringstream lines(help);
+    for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 80u) << line;
+  }
+  const std::string csg = place.run({"csg", "--help"}).out;
+  EXPECT_GT(csg.find("--imgsize"), csg.find("OpenSCAD's options:"));
 }
 
 TEST_F(Usage, VersionIsPrintedWithoutAnythingElse) {
@@ -79,7 +112,10 @@ TEST_F(Usage, FormatsAreListedWithoutAnInput) {
 TEST_F(Usage, UnknownWordsAreNamed) {
   refuses({"voxelise", "box.obj"}, "voxelise");
   refuses({"--resolution", "4"}, "--resolution");
-  refuses({"voxelize", "box.obj", "-r", "4", "--stats", "--no-such"}, "--no-such");
+  refuses({"voxelize", "box.obj", "-r", "4", "--stats", "--no-such"}, "unknown option --no-such");
+  refuses({"voxelize", "box.obj", "--stats", "-r"}, "--resolution needs a value: N");
+  refuses({"voxelize", "box.obj", "--stats", "-r", "4", "-r", "5"},
+          "--resolution is given 2 times");
   refuses({"voxelize", "box.obj", "-r", "4", "--stats", "--rule", "maybe"}, "'maybe'");
   refuses({"voxelize", "box.obj", "-r", "4", "--stats", "--surface=18"}, "'18'");
   refuses({"voxelize", "box.obj", "-r", "4", "--stats", "--axis", "w"}, "'w'");
