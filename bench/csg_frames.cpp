@@ -31,7 +31,7 @@ namespace {
 constexpr std::size_t kMostProducts = 100000;
 
 struct Settings {
-  std::string folder = STRATA_SOURCE_DIR "/../shared/csg/bench";
+  std::string folder = STRATA_SOURCE_DIR "/build/bench/scenes";
   std::vector<std::string> scenes = csg_scene_names();
   int side = 1024;
   int threads = 2;
@@ -357,7 +357,7 @@ int run(const Settings& settings) {
 int main(int argc, char** argv) {
   strata::bench::Settings settings;
   CLI::App app("Frames of Boolean trees, against OpenCSG");
-  app.add_option("--folder", settings.folder, "where the scenes are");
+  app.add_option("--folder", settings.folder, "where bench/csg_make_scenes.py has made the scenes");
   app.add_option("--scene", settings.scenes, "scenes, instead of all");
   app.add_option("--side", settings.side, "pixels a side")->check(CLI::Range(16, 16384));
   app.add_option("--threads", settings.threads)->check(CLI::Range(1, 256));

@@ -42,7 +42,7 @@ void see_all(CsgScene& scene) {
 
 Result<CsgScene> turned_bunny(const std::string& folder, const std::string& name,
                               const Execution& execution) {
-  auto file = read_mesh(folder + "/bunny70k.off", {}, execution);
+  auto file = read_mesh(folder + "/bunny00.off", {}, execution);
   if (!file) return tl::unexpected(file.error());
   TriangleSoup mesh = std::move(file->soup);
   if (name == "bunny-1m") mesh = subdivide(subdivide(mesh));
@@ -65,7 +65,7 @@ Result<CsgScene> turned_bunny(const std::string& folder, const std::string& name
 std::vector<std::string> csg_scene_names() {
   return {"drill",         "plate100",       "plate400",        "menger3",
           "union_cubes50", "union_mixed200", "inter_spheres20", "inter_spheres50",
-          "diff_u30_u30",  "diff_u50_u50",   "bunny-70k",       "bunny-1m"};
+          "diff_u30_u30",  "diff_u50_u50",   "bunny-75k",       "bunny-1m"};
 }
 
 Result<CsgScene> csg_scene(const std::string& folder, const std::string& name,

@@ -24,8 +24,8 @@ struct CsgScene {
 /// All scenes that the frames are measured on.
 [[nodiscard]] std::vector<std::string> csg_scene_names();
 
-/// `bunny-70k` and `bunny-1m` are a mesh minus itself turned by 40 degrees; any other name is
-/// `folder`/NAME.csg, seen as that folder's README says.
+/// A scene of a folder that bench/csg_make_scenes.py has made. `bunny-75k` and `bunny-1m` are a
+/// mesh minus itself turned by 40 degrees; any other name is `folder`/NAME.csg.
 Result<CsgScene> csg_scene(const std::string& folder, const std::string& name,
                            const Execution& execution);
 

@@ -65,7 +65,7 @@ def main():
     parser.add_argument("bin", help="folder of the executables")
     parser.add_argument("--rounds", type=int, default=9)
     parser.add_argument("--budget", type=float, default=15, help="seconds a program may use for each task")
-    parser.add_argument("--model", action="append", default=[], help="an OBJ file, beside the generated one")
+    parser.add_argument("--model", action="append", default=[], help="a mesh, beside the generated ones")
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--csv")
     options = parser.parse_args()
@@ -82,11 +82,10 @@ def main():
             return os.path.join(folder, name)
 
         files = []
-        for name in ["bumps-82k"] if options.quick else ["bumps-82k", "bumps-328k"]:
-            path = os.path.join(folder, name + ".obj")
+        for name in ["bumps-82k"] if options.quick else ["bumps-82k", "bumps-328k", *options.model]:
+            path = os.path.join(folder, os.path.splitext(os.path.basename(name))[0] + ".obj")
             subprocess.run([maker, "--mesh", name, "--write", path], check=True)
             files.append(path)
-        files += options.model
 
         for path in files:
             mesh = os.path.splitext(os.path.basename(path))[0]
