@@ -18,8 +18,6 @@
 namespace strata::apps {
 namespace {
 
-constexpr const char* kCommands[] = {"voxelize", "info", "ldi", "csg"};
-
 constexpr const char* kTopHelp = R"(strata: exact voxels, depth lists and pictures of solids
 
   strata voxelize knot.obj -r 512 -o knot.vdb      solid voxels, the longest side 512
@@ -30,26 +28,19 @@ constexpr const char* kTopHelp = R"(strata: exact voxels, depth lists and pictur
   strata csg plate.csg -o plate.png                a picture of a Boolean tree
   strata part.scad -o part.png                     the same without a command
   strata view plate.scad --watch                   a window that shows the scene
-
-Usage: strata COMMAND [OPTIONS] FILE...
-
-Commands:
-  voxelize    Turn meshes and scenes into a voxel file or statistics
-  info        Report counts, bounds, area, volume and holes
-  ldi         Write the depth lists of meshes or a scene: a layered depth image
-  csg         Draw or measure a scene (.csg, .scad) or an expression over meshes
-  view        Show the same in a window: turn, cut, pick, measure, reload
-
-Options:
-  -h, --help      Print this help and exit
-  --help-all      Print the help of every command with all options, and exit
-  -V, --version   Print the version and exit
-
-`strata COMMAND --help` lists the options of a command.
 )";
 
 std::string top_help() {
-  std::string text = std::string(kTopHelp) + "\nExit codes:\n";
+  std::string text =
+      std::string(kTopHelp) + "\nUsage: strata COMMAND [OPTIONS] FILE...\n\nCommands:\n";
+  for (const auto& [name, what] : kCommands) text += fmt::format("  {:<12}{}\n", name, what);
+  text +=
+      "\nOptions:\n"
+      "  -h, --help      Print this help and exit\n"
+      "  --help-all      Print the help of every command with all options, and exit\n"
+      "  -V, --version   Print the version and exit\n"
+      "\n`strata COMMAND --help` lists the options of a command.\n"
+      "\nExit codes:\n";
   for (const auto& [code, what] : kExitCodes) text += fmt::format("  {:<5}{}\n", code, what);
   return text;
 }
@@ -241,8 +232,10 @@ void define_ldi(CLI::App& app, Words& words) {
   add_stores(app, words);
 }
 
-/// Defines the options of a command, with its description and footer. False: there is no command
-/// of that name.
+}  // namespace
+
+std::string_view top_examples() { return kTopHelp; }
+
 bool define_command(std::string_view name, CLI::App& app, Words& words) {
   define_help(app);
   app.footer("`strata --help` lists the commands and the exit codes.");
@@ -259,6 +252,8 @@ bool define_command(std::string_view name, CLI::App& app, Words& words) {
   }
   return true;
 }
+
+namespace {
 
 std::string command_help(std::string_view name) {
   Words words;
@@ -471,8 +466,8 @@ ParseOutcome usage_error(std::string_view command, std::string_view message) {
 /// Whether a command line is one of openscad: no command, but a file, or options and a scene.
 bool begins_with_a_file(const std::vector<std::string>& words) {
   const std::string& first = words.front();
-  if (std::find(std::begin(kCommands), std::end(kCommands), first) != std::end(kCommands)) {
-    return false;
+  for (const auto& [command, what] : kCommands) {
+    if (first == command) return false;
   }
   if (first.starts_with('-')) return std::any_of(words.begin(), words.end(), is_scene_name);
   std::error_code ignored;
@@ -491,7 +486,9 @@ Command parse_command_line(int argc, const char* const* argv) {
   }
   if (name == "--help-all") {
     std::string text = top_help();
-    for (const char* command : kCommands) text += "\n" + command_help(command);
+    for (const auto& [command, what] : kCommands) {
+      if (command != "view") text += "\n" + command_help(command);
+    }
     return ParseOutcome{std::move(text), false, 0};
   }
   if (name == "-V" || name == "--version") {

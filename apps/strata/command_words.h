@@ -2,6 +2,7 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -62,6 +63,24 @@ void add_json(CLI::App& app, Words& words, const char* group);
 void add_backend(CLI::App& app, Words& words, const char* group);
 CommonOptions common_options(const Words& words, Reader& reader);
 InputOptions input_options(const Words& words, Reader& reader);
+
+/// The commands of the tool, and what --help says of each.
+struct CommandSummary {
+  std::string_view name, what;
+};
+inline constexpr CommandSummary kCommands[] = {
+    {"voxelize", "Turn meshes and scenes into a voxel file or statistics"},
+    {"info", "Report counts, bounds, area, volume and holes"},
+    {"ldi", "Write the depth lists of meshes or a scene: a layered depth image"},
+    {"csg", "Draw or measure a scene (.csg, .scad) or an expression over meshes"},
+    {"view", "Show the same in a window: turn, cut, pick, measure, reload"}};
+
+/// Defines the options of a command, with its description and footer. False: there is no command
+/// of that name here; `view` is a program of its own.
+bool define_command(std::string_view name, CLI::App& app, Words& words);
+
+/// The text of `strata --help` above its list of commands.
+[[nodiscard]] std::string_view top_examples();
 
 // command_line_csg.cpp: `strata csg`
 void define_csg(CLI::App& app, Words& words);

@@ -74,8 +74,9 @@ void define_verify_options(CLI::App& app, VerifyWords& words) {
       ->type_name("N")
       ->group(compared);
   app.add_option("--seed", words.options.seed,
-                 "Seed of the random points, 0 to 4294967295 (default: " +
+                 "Seed of the random points, a whole number (default: " +
                      std::to_string(words.options.seed) + ")")
+      ->check(range(0, std::numeric_limits<std::int64_t>::max()))
       ->type_name("N")
       ->group(compared);
   const char* running = "Running";

@@ -149,6 +149,16 @@ Result<void> read(Words& words, ViewOptions& options) {
 
 }  // namespace
 
+void visit_view_options(const std::function<void(const CLI::App&)>& visit) {
+  Words words;
+  ViewOptions options;
+  CLI::App app(kExamples, "strata view");
+  apps::define_help(app);
+  define(app, words, options);
+  app.footer(footer());
+  visit(app);
+}
+
 std::variant<apps::ParseOutcome, ViewOptions> parse_view_options(int argc,
                                                                  const char* const* argv) {
   Words words;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <glm/vec2.hpp>
 #include <optional>
 #include <string>
@@ -9,6 +10,10 @@
 #include "apps/strata/commands.h"
 #include "apps/view/renderer.h"
 #include "apps/view/script.h"
+
+namespace CLI {
+class App;
+}
 
 namespace strata::view {
 
@@ -28,6 +33,9 @@ struct ViewOptions {
 /// Reads the command line. A ParseOutcome is to be printed, and the program to end.
 [[nodiscard]] std::variant<apps::ParseOutcome, ViewOptions> parse_view_options(
     int argc, const char* const* argv);
+
+/// Defines the options, without what they are read into, and hands them to `visit`.
+void visit_view_options(const std::function<void(const CLI::App&)>& visit);
 
 /// Looks whether the window would write a file that it reads, or one twice.
 /// Those of scenes are looked at when they are loaded.
