@@ -1,7 +1,7 @@
 #include "strata/gl/context.h"
 
 #include <epoxy/gl.h>
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cstdlib>

@@ -1,7 +1,7 @@
 #include "strata/gl/shader_program.h"
 
 #include <epoxy/gl.h>
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <charconv>

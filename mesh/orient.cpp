@@ -1,6 +1,6 @@
 #include "strata/mesh/orient.h"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <array>

@@ -1,6 +1,6 @@
 #include "apps/session/json_writer.h"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <cmath>
 #include <cstdint>

@@ -1,7 +1,7 @@
 // strata-verify compares Strata's result of a Boolean tree with CGAL's exact one. Exit codes are
 // those of ErrorCode; 7 means that they differ.
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <unistd.h>
 
 #include <CLI/App.hpp>

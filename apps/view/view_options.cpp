@@ -1,7 +1,7 @@
 // The only file of the window that knows CLI11.
 #include "apps/view/view_options.h"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>

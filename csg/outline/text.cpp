@@ -1,5 +1,5 @@
 // Text: fontconfig finds the font, HarfBuzz sets the glyphs, FreeType draws them.
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "csg/outline/outline.h"
 

@@ -1,5 +1,6 @@
 // Depth lists as a NumPy archive: a ZIP of .npy arrays. The layout is in ldi_io.h.
 
+#include <fmt/format.h>
 #include <unzip.h>
 #include <zip.h>
 

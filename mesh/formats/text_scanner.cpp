@@ -1,6 +1,6 @@
 #include "mesh/formats/text_scanner.h"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 namespace strata::detail {
 

@@ -1,6 +1,6 @@
 #include "mesh/polygons/polygon_cutter.h"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cmath>

@@ -1,10 +1,9 @@
 #pragma once
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <string>
 #include <tl/expected.hpp>
-#include <utility>
 
 namespace strata {
 
@@ -32,11 +31,16 @@ struct Error {
 template <class T>
 using Result = tl::expected<T, Error>;
 
+/// Builds the failed side of a Result from a text and arguments packed by fmt; use fail().
+[[nodiscard]] tl::unexpected<Error> fail_with(ErrorCode code, fmt::string_view text,
+                                              fmt::format_args args);
+
 /// Builds the failed side of a Result: `return fail(ErrorCode::kInput, "{}: empty file", name);`
+/// The arguments are numbers and text; include <fmt/format.h> too for fmt::join and the like.
 template <class... Args>
 [[nodiscard]] tl::unexpected<Error> fail(ErrorCode code, fmt::format_string<Args...> text,
                                          Args&&... args) {
-  return tl::unexpected<Error>(Error{code, fmt::format(text, std::forward<Args>(args)...)});
+  return fail_with(code, text, fmt::make_format_args(args...));
 }
 
 }  // namespace strata

@@ -2,7 +2,7 @@
 
 #include "voxelize/formats/vdb_header.h"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <climits>
 #include <string_view>

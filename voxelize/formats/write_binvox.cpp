@@ -5,7 +5,7 @@
 //
 // Slabs come by z, the file wants x slowest: the run lengths wait in memory until all are there.
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <memory>

@@ -2,7 +2,7 @@
 // fastest, gzip. Voxels are cells; "space origin" is the centre of the first one, as the format
 // has it. The gzip stream is one member, made of pieces that threads deflate apart, a layer each.
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <zlib.h>
 
 #include <memory>

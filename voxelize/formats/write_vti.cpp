@@ -3,7 +3,7 @@
 // block of vtkZLibDataCompressor; the table of their sizes stands before them and is filled in at
 // the end. A pipe cannot be filled in later, and gets the bytes as they are.
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <memory>
 #include <string>

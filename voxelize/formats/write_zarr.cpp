@@ -3,7 +3,7 @@
 // border are whole, as the format wants it; what lies outside is 0. The world transform stands in
 // the attributes.
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <array>
 #include <memory>

@@ -1,6 +1,6 @@
 // Outlines from SVG 1.1. Fill and stroke as OpenSCAD takes them: closed shapes are filled whatever
 // their paint, open lines are bands of their stroke width.
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <optional>
 

@@ -1,6 +1,6 @@
 #include "csg/outline/formats/svg_path.h"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <charconv>
