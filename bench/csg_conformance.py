@@ -22,18 +22,18 @@ BACKGROUND = np.array([255, 255, 229])
 
 # Scenes below 0.97, and why. "Newer": the expected picture was made by a later OpenSCAD than the scene file.
 REASONS = {
-    "dxf-import-centered": "Newer: the file does not say `center`, which 2021.01 did not know.",
-    "roof": "Newer: the file, dumped by 2021.01, holds no roof.",
-    "rotate_extrude-angle": "Newer: `rotate_extrude(45)` was dumped as a file name.",
+    "dxf-import-centered": "Newer: the file lacks `center`, which 2021.01 did not know.",
+    "roof": "Newer: the file that 2021.01 dumped holds no roof.",
+    "rotate_extrude-angle": "Newer: 2021.01 dumped `rotate_extrude(45)` as a file name.",
     "linear_extrude_invisible-tests": "Newer: the file says a height of 100; the picture shows less.",
-    "text-metrics": "Newer: `textmetrics()` was dumped as nothing.",
-    "issue1529": "Newer: one of the two `%` is missing in the file, dumped by 2021.01.",
+    "text-metrics": "Newer: 2021.01 dumped `textmetrics()` as nothing.",
+    "issue1529": "Newer: one of the two `%` is missing in the file that 2021.01 dumped.",
     "issue5555": "Newer: `rotate_extrude` starts elsewhere.",
-    "primitive-inf-tests": "Infinite sizes: a polygon with an infinite point is dropped here, with a warning.",
-    "import-single-triangle": "An open face is shown as a sheet; OpenSCAD shows nothing.",
-    "issue2220": "The expected picture shows this flat scene from the camera of bodies; flat scenes are shown from above.",
+    "primitive-inf-tests": "Infinite sizes: we drop a polygon with an infinite point, with a warning.",
+    "import-single-triangle": "We show an open face as a sheet; OpenSCAD shows nothing.",
+    "issue2220": "The expected picture shows this flat scene from the camera for solids; we show flat scenes from above.",
     "fill-rule": "We follow the SVG's fill rule; OpenSCAD fills everything by even-odd.",
-    "minkowski2-tests": "A sum with an empty operand is empty in the picture; 2021.01 and we leave that operand out.",
+    "minkowski2-tests": "The expected picture treats a sum with an empty operand as empty; 2021.01 and we ignore that operand.",
     "text-font-symbol": "The font is not installed.",
     "text-font-overlap": "The font is not installed.",
     "text-font-ttb-alignment-tests": "Newer: 2021.01 dumps `halign=\"left\"` where vertical text was centred.",
@@ -42,7 +42,7 @@ REASONS = {
 }
 
 
-THIN = "Flat and a few pixels wide: OpenSCAD's red outlines lie up to a pixel elsewhere."
+THIN = "Flat and a few pixels wide: OpenSCAD's red outlines are off by up to a pixel."
 
 
 def reason(row):
@@ -126,20 +126,23 @@ def main():
     low = [row for row in rows if row[1] < 0.97]
     lines = [
         "# Our pictures beside OpenSCAD's", "",
-        "Made by `bench/csg_conformance.py` with `strata csg --render` at 512 x 512. IoU: intersection over union of the",
-        "silhouettes. Rule: OpenSCAD's own comparison, which also looks at colours. The scenes were dumped by OpenSCAD",
-        "2021.01, most of the pictures were made by later versions.", "",
+        "`bench/csg_conformance.py` makes this page with `strata csg --render` at 512 x 512. It compares our pictures with those that",
+        "the tests of OpenSCAD expect. OpenSCAD 2021.01 dumped the scenes; later versions made most of the pictures.", "",
+        "- IoU is the intersection of the two silhouettes over their union: 1 when they are equal.",
+        "- Rule is OpenSCAD's own comparison of pictures, which also looks at colours.", "",
+        "## Result", "",
         f"- {len(rows)} scenes with an expected picture; median IoU {np.median(overlaps):.5f}",
         f"- {sum(row[2] for row in rows)} pass OpenSCAD's rule",
-        f"- {len(low)} below 0.97, listed with the reason", "",
-        "## Below 0.97", "", "| scene | IoU | why |", "|---|---|---|"]
+        f"- {len(low)} have an IoU below 0.97; the next table gives the reasons", "",
+        "## Below 0.97", "",
+        '"Newer" means that the expected picture comes from a later OpenSCAD than the scene file.', "", "| scene | IoU | why |", "|---|---|---|"]
     lines += [f"| {row[0]} | {row[1]:.4f} | {reason(row)} |" for row in low]
     lines += ["", "## All others", "", "| scene | IoU | rule |", "|---|---|---|"]
     lines += [f"| {row[0]} | {row[1]:.4f} | {'passes' if row[2] else 'differs'} |" for row in rows if row[1] >= 0.97]
     if without_scene:
         lines += ["", f"No scene file for: {', '.join(without_scene)}."]
     pathlib.Path(arguments.output).write_text("\n".join(lines) + "\n")
-    print("\n".join(lines[6:9]))
+    print("\n".join(lines[10:13]))
     return 0
 
 
