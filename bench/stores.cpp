@@ -24,9 +24,9 @@
 
 #include <fmt/format.h>
 
+#include "hashbuffer/random.h"
 #include "strata/hashbuffer/count_scan_store.h"
-#include "strata/hashbuffer/hash_buffer_build.h"
-#include "strata/hashbuffer/random.h"
+#include "strata/hashbuffer/hash_buffer.h"
 
 namespace strata {
 namespace {
@@ -47,7 +47,11 @@ struct Scene {
       const Quad& quad = quads[i];
       for (int y = quad.y0; y < quad.y1; ++y) {
         for (int x = quad.x0; x < quad.x1; ++x) {
-          sink.insert(x, y, quad.depth, static_cast<std::uint32_t>(i));
+          if constexpr (requires { sink.insert(x, y, quad.depth); }) {
+            sink.insert(x, y, quad.depth);
+          } else {
+            sink.insert(x, y, quad.depth, static_cast<std::uint32_t>(i));
+          }
         }
       }
     }

@@ -5,7 +5,7 @@
 #include <limits>
 #include <unordered_set>
 
-#include "strata/hashbuffer/random.h"
+#include "hashbuffer/random.h"
 
 namespace strata {
 namespace {

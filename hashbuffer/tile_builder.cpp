@@ -6,34 +6,16 @@
 #include <utility>
 
 #include "hashbuffer/tile_store.h"
+#include "strata/hashbuffer/depth_list_store.h"
+#include "strata/hashbuffer/resize_policy.h"
 
 namespace strata {
-namespace {
-
-/// Sorts a short list in place: insertion sort, which few and nearly sorted fragments like best.
-template <class Key>
-void sort_list(Key* begin, Key* end) {
-  if (end - begin > 32) {
-    std::sort(begin, end);
-    return;
-  }
-  for (Key* next = begin + 1; next < end; ++next) {
-    const Key key = *next;
-    Key* hole = next;
-    for (; hole > begin && key < hole[-1]; --hole) *hole = hole[-1];
-    *hole = key;
-  }
-}
-
-}  // namespace
-
 template <class Record>
 struct TileBuilder<Record>::Impl {
   using Bits = typename Record::Word;
   /// At most this many planes are laid out side by side: deeper pixels are rare enough to scatter.
   static constexpr int kMaxPlanes = 64;
   static constexpr int kFirstPlanes = 8;
-  static constexpr double kGrowLoad = 0.8;
   /// Layers of a tile, in the mean over its pixels, from which the count/scan store is faster: each
   /// insertion passes the records before it.
   static constexpr std::uint64_t kDeepLayers = 8;
@@ -86,7 +68,9 @@ struct TileBuilder<Record>::Impl {
 
   static bool is_deep(std::uint64_t fragments) { return fragments > kDeepLayers * kTilePixels; }
 
-  int planes() const { return static_cast<int>(table.size / kTilePixels); }
+  static int planes_for(std::uint64_t cells) {
+    return static_cast<int>((cells + kTilePixels - 1) / kTilePixels);
+  }
 
   /// Collects the lists of a table in which fragments of different pixels are mixed.
   void compact_table() {
@@ -117,7 +101,7 @@ struct TileBuilder<Record>::Impl {
     for (std::size_t pixel = kTilePixels; pixel > 0; --pixel) offsets[pixel] = offsets[pixel - 1];
     offsets[0] = 0;
     for (std::size_t pixel = 0; pixel < kTilePixels; ++pixel) {
-      sort_list(keys.data() + offsets[pixel], keys.data() + offsets[pixel + 1]);
+      detail::sort_list(keys.data() + offsets[pixel], keys.data() + offsets[pixel + 1]);
     }
   }
 
@@ -157,10 +141,9 @@ struct TileBuilder<Record>::Impl {
         // Nothing is lost: the tile is built again with more room. A pixel with more layers than
         // the age can count would fail in any table; the other store has no such limit.
         ++rebuilt;
-        const double load = static_cast<double>(raster.fragments) / static_cast<double>(table.size);
         table.mixed = true;
-        if (load < 0.5) return scan(input);
-        resize_table(std::max(planes() + 1, static_cast<int>(load / 0.5 * planes()) + 1));
+        if (raster.fragments < table.size / 2) return scan(input);
+        resize_table(planes_for(rebuilt_cells(raster.fragments, table.size)));
         deep = is_deep(raster.fragments);
         if (deep && choose) return scan(input);
         continue;
@@ -168,13 +151,13 @@ struct TileBuilder<Record>::Impl {
       deep = is_deep(raster.fragments);
       if (table.mixed) {
         compact_table();
-        const double load = static_cast<double>(raster.fragments) / static_cast<double>(table.size);
         const TileLists<Key> lists = csr(raster);
         // More room for the next tile: one that is nearly full, or deeper than its planes.
-        if (load >= kGrowLoad) {
-          resize_table(planes() * 25 / 16 + 1);
+        const int grown = planes_for(grown_cells(table.size));
+        if (is_too_full(raster.fragments, table.size)) {
+          resize_table(grown);
         } else if (table.planes > 0 && table.planes < kMaxPlanes) {
-          resize_table(std::min(kMaxPlanes, std::max(planes() * 25 / 16 + 1, table.oldest)));
+          resize_table(std::min(kMaxPlanes, std::max(grown, table.oldest)));
         }
         return lists;
       }

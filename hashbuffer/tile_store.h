@@ -8,11 +8,12 @@
 #include <vector>
 
 #include "hashbuffer/tile_builder.h"
+#include "strata/hashbuffer/concurrency.h"
+#include "strata/hashbuffer/table_law.h"
 
 namespace strata {
 
-/// The HA-buffer of one tile, with plain stores; see strata/hashbuffer/hash_buffer.h for the law of
-/// the table.
+/// The HA-buffer of one tile, with plain stores; see strata/hashbuffer/table_law.h.
 template <class Record>
 struct TileTable {
   using Bits = typename Record::Word;
@@ -34,26 +35,20 @@ struct TileTable {
 
   /// Inserts a record, whose age is the first to be tried, into the list of `pixel`.
   void insert(std::size_t pixel, Bits record) {
+    detail::Flight<Record> flight{record, pixel, Record::age(record)};
     for (;;) {
-      int age = static_cast<int>(Record::age(record));
+      const int age = static_cast<int>(flight.age);
       mixed = mixed || age > planes;
-      std::size_t cell = pixel + offset(age);
-      if (cell >= size) cell -= size;
-      const Bits old = cells[cell];
-      if (old < record) {  // equality falls through: equal fragments are two fragments
-        cells[cell] = record;
-        oldest = std::max(oldest, age);
-        if (old == 0) return;
-        record = old;
-        age = static_cast<int>(Record::age(old));
-        const std::size_t shift = offset(age);
-        pixel = cell >= shift ? cell - shift : cell + size - shift;
-      }
-      if (age == static_cast<int>(Record::kAgeMax)) {
+      Bits found;
+      const detail::Outcome outcome = detail::propose<Record, Exclusive>(
+          flight, cells.data(), size, [this](unsigned of) { return offset(static_cast<int>(of)); },
+          found);
+      if (outcome != detail::Outcome::kLost) oldest = std::max(oldest, age);
+      if (outcome == detail::Outcome::kPlaced) return;
+      if (!flight.grow_older(Record::kAgeMax)) {
         ++failures;
         return;
       }
-      record = Record::with_next_age(record);
     }
   }
 };

@@ -11,7 +11,7 @@
 #include "strata/hashbuffer/offsets.h"
 
 // After: Lefebvre, Hornus, Lasram, "HA-Buffer: Coherent Hashing for single-pass A-buffer", INRIA
-// RR-8282, 2013. The table law is that of strata/hashbuffer/hash_buffer.h, bit for bit.
+// RR-8282, 2013. The table law is that of strata/hashbuffer/table_law.h, bit for bit.
 // We differ: 64-bit words without 64-bit atomics, in two passes over the geometry.
 
 namespace strata::gl {

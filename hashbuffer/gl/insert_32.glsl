@@ -1,4 +1,4 @@
-// The table law of strata/hashbuffer/hash_buffer.h for 32-bit words [age:8 | nearness:24], after Lefebvre, Hornus, Lasram,
+// The table law of strata/hashbuffer/table_law.h for 32-bit words [age:8 | nearness:24], after Lefebvre, Hornus, Lasram,
 // "HA-Buffer", 2013. With STORE_PAYLOADS only the keys of a 64-bit table: its payloads follow in a second pass
 // (insert_payload.glsl), which can find each key again since the table is unique.
 layout(std430, binding = 8) STORE_COHERENT buffer store_table_block { uint store_table[]; };

@@ -1,4 +1,4 @@
-// The table law of strata/hashbuffer/hash_buffer.h for 64-bit words [age:8 | nearness:24 | ~payload:32]; see insert_32.glsl.
+// The table law of strata/hashbuffer/table_law.h for 64-bit words [age:8 | nearness:24 | ~payload:32]; see insert_32.glsl.
 layout(std430, binding = 8) STORE_COHERENT buffer store_table_block { uint64_t store_table[]; };
 layout(std430, binding = 9) readonly buffer store_offsets_block { uint store_offsets[]; };
 layout(std430, binding = 10) buffer store_counts_block { uint store_counts[]; };

@@ -60,23 +60,28 @@ class CountScanStore {
     return fragments * sizeof(DepthItem) + (pixels() + 1) * sizeof(std::uint64_t);
   }
 
-  /// Pass 1: counts. @pre 0 <= x < width, 0 <= y < height
-  class Counter {
+  /// Pass 1: counts.
+  class Counter : public detail::SinkForms<Counter, Record> {
    public:
     explicit Counter(CountScanStore& store) : store_(&store) {}
-    void insert(int x, int y, std::uint32_t, std::uint32_t) noexcept {
+
+   private:
+    friend detail::SinkForms<Counter, Record>;
+    void put(int x, int y, std::uint32_t, std::uint32_t) noexcept {
       Concurrency::fetch_increment(store_->ends_[store_->pixel_of(x, y) + 1]);
     }
 
-   private:
     CountScanStore* store_;
   };
 
-  /// Pass 2: stores. @pre as for Counter, and Record::payload_fits(payload)
-  class Writer {
+  /// Pass 2: stores.
+  class Writer : public detail::SinkForms<Writer, Record> {
    public:
     explicit Writer(CountScanStore& store) : store_(&store) {}
-    void insert(int x, int y, std::uint32_t depth, std::uint32_t payload) noexcept {
+
+   private:
+    friend detail::SinkForms<Writer, Record>;
+    void put(int x, int y, std::uint32_t depth, std::uint32_t payload) noexcept {
       assert(Record::payload_fits(payload));
       const std::uint64_t slot =
           Concurrency::fetch_increment(store_->ends_[store_->pixel_of(x, y) + 1]);
@@ -84,7 +89,6 @@ class CountScanStore {
       if (slot < store_->items_.size()) store_->items_[slot] = Record::item(depth, payload);
     }
 
-   private:
     CountScanStore* store_;
   };
 
@@ -123,48 +127,29 @@ class CountScanStore {
   /// that do not fit; kInternal if the generator was seen to give other fragments the second time;
   /// kCancelled on request.
   template <class Generator>
-  [[nodiscard]] friend Result<BuildReport> build(CountScanStore& store, Generator&& generator,
-                                                 const Execution& execution = {}) {
-    store.clear();
-    Counter counter(store);
+  [[nodiscard]] Result<BuildReport> build(Generator&& generator, const Execution& execution = {}) {
+    clear();
+    Counter counter(*this);
     generator(counter);
-    const std::uint64_t fragments = store.scan();
-    const std::uint64_t limit = execution.memory_limit;
-    if (limit > 0 && store.bytes_of(fragments) > limit) {
-      const std::uint64_t fixed = store.bytes_of(0);
-      const std::uint64_t room = limit < fixed ? 0 : (limit - fixed) / sizeof(DepthItem);
-      store.clear();
-      return fail(ErrorCode::kLimit,
-                  "count/scan store: {} of {} fragments do not fit; they need {} bytes, the limit "
-                  "is {}",
-                  fragments - room, fragments, store.bytes_of(fragments), limit);
+    const std::uint64_t fragments = scan();
+    if (auto room = make_room(fragments, execution.memory_limit); !room) {
+      clear();
+      return tl::unexpected(std::move(room.error()));
     }
-    try {
-      // The old array goes before the new one comes; one that is large enough is used again.
-      if (store.items_.capacity() < fragments || (limit > 0 && store.memory_bytes() > limit)) {
-        std::vector<DepthItem>().swap(store.items_);
-      }
-      store.items_.resize(fragments);
-    } catch (const std::exception&) {
-      store.clear();
-      return fail(ErrorCode::kLimit, "count/scan store: no memory for {} fragments, {} bytes",
-                  fragments, store.bytes_of(fragments));
-    }
-    Writer writer(store);
+    Writer writer(*this);
     generator(writer);
     // Sorting must not be led astray by a generator that broke its promise.
-    if (store.ends_.back() != fragments ||
-        !std::is_sorted(store.ends_.begin(), store.ends_.end())) {
-      store.clear();
+    if (ends_.back() != fragments || !std::is_sorted(ends_.begin(), ends_.end())) {
+      clear();
       return fail(ErrorCode::kInternal,
                   "count/scan store: the generator gave other fragments the second time");
     }
-    store.sort(execution);
+    sort(execution);
     if (execution.stop.stop_requested()) {
-      store.clear();
+      clear();
       return fail(ErrorCode::kCancelled, "count/scan store: stopped on request");
     }
-    return BuildReport{fragments, 2, store.memory_bytes()};
+    return BuildReport{fragments, 2, memory_bytes()};
   }
 
  private:
@@ -177,6 +162,29 @@ class CountScanStore {
     assert(x >= 0 && x < width_ && y >= 0 && y < height_);
     return static_cast<std::uint64_t>(y) * static_cast<std::uint64_t>(width_) +
            static_cast<std::uint64_t>(x);
+  }
+
+  /// Room for that many fragments. @param limit bytes of the whole store, 0: none
+  [[nodiscard]] Result<void> make_room(std::uint64_t fragments, std::uint64_t limit) {
+    if (limit > 0 && bytes_of(fragments) > limit) {
+      const std::uint64_t fixed = bytes_of(0);
+      const std::uint64_t room = limit < fixed ? 0 : (limit - fixed) / sizeof(DepthItem);
+      return fail(ErrorCode::kLimit,
+                  "count/scan store: {} of {} fragments do not fit; they need {} bytes, the limit "
+                  "is {}",
+                  fragments - room, fragments, bytes_of(fragments), limit);
+    }
+    try {
+      // The old array goes before the new one comes; one that is large enough is used again.
+      if (items_.capacity() < fragments || (limit > 0 && memory_bytes() > limit)) {
+        std::vector<DepthItem>().swap(items_);
+      }
+      items_.resize(fragments);
+    } catch (const std::exception&) {
+      return fail(ErrorCode::kLimit, "count/scan store: no memory for {} fragments, {} bytes",
+                  fragments, bytes_of(fragments));
+    }
+    return {};
   }
 
   void clear() noexcept {
@@ -196,23 +204,9 @@ class CountScanStore {
     const auto columns = static_cast<std::size_t>(width_);
     parallel_for(execution, static_cast<std::size_t>(height_), [&](std::size_t row, int) {
       for (std::size_t pixel = row * columns; pixel < (row + 1) * columns; ++pixel) {
-        sort_list(items_.data() + ends_[pixel], items_.data() + ends_[pixel + 1]);
+        detail::sort_list(items_.data() + ends_[pixel], items_.data() + ends_[pixel + 1]);
       }
     });
-  }
-
-  static void sort_list(DepthItem* begin, DepthItem* end) {
-    constexpr std::ptrdiff_t kInsertionSortLimit = 32;
-    if (end - begin > kInsertionSortLimit) {
-      std::sort(begin, end);
-      return;
-    }
-    for (DepthItem* next = begin; next != end; ++next) {
-      const DepthItem item = *next;
-      DepthItem* place = next;
-      for (; place != begin && item < place[-1]; --place) *place = place[-1];
-      *place = item;
-    }
   }
 
   template <class Ends, class Items>

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <algorithm>
 #include <concepts>
+#include <cstddef>
 #include <cstdint>
 
 #include "strata/core/depth_list.h"
@@ -10,12 +12,17 @@
 namespace strata {
 
 /// Anything that takes fragments. A generator of fragments is a callable that accepts any sink:
-/// `[&](auto& sink) { sink.insert(x, y, depth, payload); }`. It may be called several times for one
-/// frame and must then give the same fragments, in any order, from any number of its own threads
-/// (one, if the store is Exclusive), and return when all are inserted.
+/// `[&](auto& sink) { sink.insert(x, y, depth, payload); }`, without the payload where the store's
+/// records keep depth alone. It may be called several times for one frame and must then give the
+/// same fragments, in any order, from any number of its own threads (one, if the store is
+/// Exclusive), and return when all are inserted.
 template <class S>
 concept FragmentSink = requires(S& sink, int x, int y, std::uint32_t depth, std::uint32_t payload) {
   { sink.insert(x, y, depth, payload) }
+  noexcept;
+}
+|| requires(S& sink, int x, int y, std::uint32_t depth) {
+  { sink.insert(x, y, depth) }
   noexcept;
 };
 
@@ -27,6 +34,43 @@ struct BuildReport {
 };
 
 namespace detail {
+
+/// The two forms of insert(), which end in Self::put(x, y, depth, payload).
+template <class Self, class Record>
+class SinkForms {
+ public:
+  /// Adds a fragment at pixel (x, y). Depths beyond 2^24 - 1 are clamped. Any thread, if the store
+  /// is Concurrent. @pre 0 <= x < width, 0 <= y < height
+  void insert(int x, int y, std::uint32_t depth) noexcept requires(Record::kPayloadBits == 0) {
+    static_cast<Self*>(this)->put(x, y, depth, 0);
+  }
+  /// The same with a payload. @pre Record::payload_fits(payload)
+  void insert(int x, int y, std::uint32_t depth, std::uint32_t payload) noexcept {
+    static_assert(
+        Record::kPayloadBits > 0,
+        "Record32 keeps depth alone and would drop the payload: call insert(x, y, depth), "
+        "or take a store of Record64");
+    static_cast<Self*>(this)->put(x, y, depth, payload);
+  }
+};
+
+/// Sorts a list in place: by insertion, which few and nearly sorted fragments like best, or by
+/// std::sort if it is long.
+template <class Item>
+void sort_list(Item* begin, Item* end) {
+  constexpr std::ptrdiff_t kInsertionSortLimit = 32;
+  if (end - begin > kInsertionSortLimit) {
+    std::sort(begin, end);
+    return;
+  }
+  for (Item* next = begin; next != end; ++next) {
+    const Item item = *next;
+    Item* place = next;
+    for (; place != begin && item < place[-1]; --place) *place = place[-1];
+    *place = item;
+  }
+}
+
 /// A generator for use in concepts.
 struct NoFragments {
   void operator()(FragmentSink auto& sink) const { static_cast<void>(sink); }
@@ -35,6 +79,14 @@ struct IgnoreItem {
   void operator()(DepthItem item) const { static_cast<void>(item); }
 };
 }  // namespace detail
+
+/// store.build(generator, execution): replaces the frame that the store holds. See the store.
+template <class Store, class Generator>
+requires requires { typename Store::Record; }
+[[nodiscard]] Result<BuildReport> build(Store& store, Generator&& generator,
+                                        const Execution& execution = {}) {
+  return store.build(generator, execution);
+}
 
 /// A store of a frame's fragments that gives them back as sorted depth lists. The law: the list of
 /// a pixel holds every fragment that was inserted there, sorted by (depth, payload), equal ones as

@@ -1,11 +1,14 @@
 #pragma once
 
 #include <algorithm>
+#include <atomic>
 #include <cassert>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <mutex>
 #include <new>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <type_traits>
@@ -17,93 +20,169 @@
 #include "strata/core/result.h"
 #include "strata/hashbuffer/concurrency.h"
 #include "strata/hashbuffer/depth_list_store.h"
-#include "strata/hashbuffer/list_image.h"
 #include "strata/hashbuffer/offsets.h"
-#include "strata/hashbuffer/overflow.h"
 #include "strata/hashbuffer/record.h"
 #include "strata/hashbuffer/resize_policy.h"
+#include "strata/hashbuffer/table_law.h"
 
 // After: Lefebvre, Hornus, Lasram, "HA-Buffer: Coherent Hashing for single-pass A-buffer", INRIA
-// RR-8282, 2013.
-// We differ: equal records are kept, since a second crossing at the same depth is a crossing; the
-// age is bounded and what does not fit is counted; traversal visits the largest age too; wrapping
-// is done on reduced numbers, so tables of any size work; culling counts a record once at most.
+// RR-8282, 2013; table_law.h has the law of the table and how we differ. Besides: traversal visits
+// the largest age too; culling counts a record once at most.
 //
-// THE TABLE LAW (every form of the table, tile-private and SIMD ones included, obeys it)
+// GLOSSARY
+//   fragment       a depth and a payload at a pixel: what a ray meets there
+//   depth list     the fragments of a pixel, sorted by (depth, payload); equal ones are kept
+//   depth complexity, layers    the length of a list
+//   store          what takes fragments and gives back depth lists (depth_list_store.h)
+//   generator      the caller's code that inserts the fragments of a frame into a sink
+//   frame          the lists of a whole screen; a store holds one
+//   record, word   a fragment as the table keeps it, [age | nearness | payload] (record.h)
+//   cell           a place of the table, for one record; 0 when empty
+//   load           records over cells; near 1 insertion is slow
+//   probe          one look at a cell; the first of a record is of age 1, the next of age 2, ...
+//   age            the number of the probe at which a record lies, from 1 on
+//   offset         where the probes of an age go: cell = pixel + offset (offsets.h)
+//   propose, evict a record asks for a cell; the larger word stays, the other goes on
+//   failure        a record whose ages ran out; it is kept beside the table (Overflow)
+//   cull           to drop what cannot be seen: behind enough opacity, or behind the k nearest
 //
-//  1. Cells. A screen of `pixels` = width * height pixels is keyed by pixel = y * width + x,
-//  64-bit.
-//     The table has `cells` >= pixels cells, all 0 at first. With distinct offsets o[1..n], each in
-//     [0, cells), the cell of a pixel at age a is
-//         cell(pixel, a) = (pixel + o[a]) mod cells        (one conditional subtraction),
-//     and the pixel of a record found in cell c at age a is
-//         pixel(c, a) = (c + cells - o[a]) mod cells       (one conditional subtraction).
-//     As cells >= pixels, no two pixels share a cell at the same age: no key is stored.
-//  2. Order. A record is the word [age | nearness | payload'], nearness = kDepthMax - depth and
-//     payload' the complement of the payload (record.h). Words compare as unsigned numbers: the
-//     larger one is older, then nearer, then of smaller payload.
-//  3. Ages start at 1 and count probes. A record proposes to its cell at its age; the cell keeps
-//     the larger word; the loser goes on at its own age + 1 (an evicted record from the age it had
-//     in the cell). An equal word loses too: duplicates are kept, at different ages.
-//  4. The limit n = min(kAgeMax, cells, the option age_limit). A record that loses at age n leaves
-//     the table and is counted as a failure.
-//
-// What follows (tests/hashbuffer hold the code to it). Cells only grow. The final table is unique:
-// this is deferred acceptance (proposals in order of age, a fixed strict order in every cell), so
-// its bits depend neither on the order of insertion nor on threads, nor does the set of failures.
-// Ages along a pixel's list are those of rising (depth, payload). When fragments fail, the table
-// keeps the nearest ones of every pixel: cells only grow, so what a record has lost against, those
-// behind it lose against as well. (With culling only the visible part is unique.)
-//
-// NOTHING IS LOST. What fails is kept beside the table (overflow.h), and lists go on there. That is
-// slow: build() of strata/hashbuffer/hash_buffer_build.h gives every frame the room it needs
-// instead.
+// NOTHING IS LOST. What fails is kept beside the table, and lists go on there. That is slow:
+// build() gives every frame the room it needs instead. If there is no memory even beside the table,
+// finish() and build() say how many fragments are missing.
 
 namespace strata {
 
 /// Settings of a hash buffer.
 struct HashBufferOptions {
-  /// Cells of the first table; raised to the number of pixels if smaller. 1.25 for each fragment
-  /// expected is right. 0: as many as pixels, and build() runs the generator of the first frame
+  /// Cells of the first table; raised to the number of pixels if smaller. Set it to 1.25 times the
+  /// fragments you expect. 0: as many as pixels, and build() runs the generator of the first frame
   /// once more, before all else, to count its fragments.
   std::uint64_t cells = 0;
   OffsetKind offsets = OffsetKind::kPlaneFirst;
-  /// Of the offsets. Frame f draws from (seed, f); kFarthestPoint is made once a table size.
+  /// Seed of the offset table. Frame f uses the generator (seed, f); kFarthestPoint is made once a
+  /// table size.
   std::uint64_t seed = 1;
   /// Largest age, if smaller than the record's kAgeMax; 0 means kAgeMax.
   unsigned age_limit = 0;
   /// Keeps the first `keep_nearest` fragments of each list; 0 keeps all. Lists are then cut to that
   /// length. (A fragment is dropped as soon as that many were met in front of it.)
   unsigned keep_nearest = 0;
-  /// Opacity in [0, 1] of a payload; with it, a list ends with the fragment that brings the
-  /// transmittance of the list below 1 - opacity_threshold. Null: off. Not for volumes, Booleans or
-  /// voxels, which need every crossing.
-  double (*opacity)(std::uint32_t payload) = nullptr;
+  /// With an Opacity: a list ends with the fragment that brings the transmittance of the list below
+  /// 1 - opacity_threshold.
   double opacity_threshold = 0.99;
 };
 
-/// A hash table of fragments whose probe sequences are the sorted depth lists. See the table law
-/// above. `Record` is a policy of record.h, `Concurrency` is Concurrent or Exclusive. For whole
-/// frames use build(buffer, generator) of strata/hashbuffer/hash_buffer_build.h, which makes room;
-/// insert() and the rest serve other drivers.
-template <RecordPolicy RecordType, class Concurrency>
-class HashBuffer {
+/// The Opacity of a HashBuffer whose lists are not cut by opacity.
+struct NoOpacity {};
+
+namespace detail {
+
+/// The records that a hash table had no room for, by pixel. All records
+/// of a pixel that are in the table lie in front of those here.
+template <RecordPolicy Record>
+class Overflow {
+ public:
+  using Word = typename Record::Word;
+
+  Overflow() = default;
+  /// Not while others use either.
+  Overflow(Overflow&& other) noexcept
+      : sorted_(other.sorted_.load()), entries_(std::move(other.entries_)), lost_(other.lost_) {}
+  Overflow& operator=(Overflow&& other) noexcept {
+    sorted_ = other.sorted_.load();
+    entries_ = std::move(other.entries_);
+    lost_ = other.lost_;
+    return *this;
+  }
+
+  /// Any thread may add.
+  void add(std::uint64_t pixel, Word record) noexcept {
+    const std::lock_guard lock(mutex_);
+    sorted_ = false;
+    try {
+      entries_.push_back({pixel, Record::rank(record)});
+    } catch (const std::bad_alloc&) {
+      ++lost_;
+    }
+  }
+
+  void clear() noexcept {
+    std::vector<Entry>().swap(entries_);
+    lost_ = 0;
+  }
+
+  /// Visits the records of a pixel front to back while `visit` returns true. Not while others add;
+  /// the first call sorts.
+  template <class Visit>
+  void for_each(std::uint64_t pixel, Visit&& visit) {
+    sort();
+    const auto first = std::lower_bound(
+        entries_.begin(), entries_.end(), pixel,
+        [](const Entry& entry, std::uint64_t wanted) { return entry.pixel < wanted; });
+    for (auto entry = first; entry != entries_.end() && entry->pixel == pixel; ++entry) {
+      if (!visit(entry->record)) return;
+    }
+  }
+
+  [[nodiscard]] std::size_t size() const { return entries_.size(); }
+  /// Records for which memory did not suffice.
+  [[nodiscard]] std::uint64_t lost() const { return lost_; }
+  [[nodiscard]] std::uint64_t memory_bytes() const { return entries_.capacity() * sizeof(Entry); }
+
+ private:
+  struct Entry {
+    std::uint64_t pixel = 0;
+    Word record = 0;  // without its age
+  };
+
+  void sort() {
+    if (sorted_.load(std::memory_order_acquire)) return;
+    const std::lock_guard lock(mutex_);
+    if (sorted_) return;
+    std::sort(entries_.begin(), entries_.end(), [](const Entry& a, const Entry& b) {
+      return a.pixel != b.pixel ? a.pixel < b.pixel : a.record > b.record;
+    });
+    sorted_.store(true, std::memory_order_release);
+  }
+
+  std::mutex mutex_;
+  std::atomic<bool> sorted_{true};
+  std::vector<Entry> entries_;
+  std::uint64_t lost_ = 0;
+};
+
+}  // namespace detail
+
+/// A hash table of fragments whose probe sequences are the sorted depth lists.
+///
+/// Fill it by build(generator), which makes room; or by begin_frame(), insert() and finish().
+///
+/// @tparam RecordType a policy of record.h: what is kept of a fragment, and how many layers
+/// @tparam Concurrency Concurrent (any thread inserts) or Exclusive (one)
+/// @tparam Opacity a callable that gives the opacity in [0, 1] of a payload: lists are then cut
+/// behind what hides the rest (HashBufferOptions::opacity_threshold). Not for volumes, Booleans or
+/// voxels, which need every crossing.
+template <RecordPolicy RecordType, class Concurrency, class Opacity = NoOpacity>
+class HashBuffer
+    : public detail::SinkForms<HashBuffer<RecordType, Concurrency, Opacity>, RecordType> {
  public:
   using Record = RecordType;
   using Word = typename Record::Word;
   /// Entry of the max-age table.
   using Age = std::conditional_t<(Record::kAgeBits > 8), std::uint16_t, std::uint8_t>;
   static constexpr bool kAnyThread = Concurrency::kAnyThread;
+  static constexpr bool kHasOpacity = !std::is_same_v<Opacity, NoOpacity>;
   static constexpr int kBlockSide = 8;  ///< pixels along one side of a block of the max-age table
 
   /// A screen of width x height pixels, each at least 1 (ErrorCode::kUsage), cleared and ready for
   /// insert(). ErrorCode::kLimit if the table cannot be allocated.
   [[nodiscard]] static Result<HashBuffer> create(int width, int height,
-                                                 const HashBufferOptions& options = {}) {
+                                                 const HashBufferOptions& options = {},
+                                                 Opacity opacity = {}) {
     if (width < 1 || height < 1) {
       return fail(ErrorCode::kUsage, "hash buffer: a screen of {} x {} pixels", width, height);
     }
-    HashBuffer buffer(width, height, options);
+    HashBuffer buffer(width, height, options, std::move(opacity));
     if (auto resized = buffer.resize(options.cells); !resized) {
       return tl::unexpected(std::move(resized.error()));
     }
@@ -129,26 +208,8 @@ class HashBuffer {
     return options_.age_limit == 0 ? Record::kAgeMax
                                    : std::min(options_.age_limit, Record::kAgeMax);
   }
-  /// True if keep_nearest or opacity is on.
+  /// True if lists are cut, by keep_nearest or by opacity.
   [[nodiscard]] bool is_culling() const { return guarded_; }
-
-  /// Adds a fragment at pixel (x, y). Depths beyond 2^24 - 1 are clamped. Any thread, if the form
-  /// is Concurrent. What the table has no room for is kept beside it and stays in the lists, but
-  /// costs a probe of every age, a lock and a sort: see failures(), and HashBufferOptions::cells.
-  /// @pre 0 <= x < width, 0 <= y < height, Record::payload_fits(payload)
-  void insert(int x, int y, std::uint32_t depth, std::uint32_t payload) noexcept {
-    if (table_.empty()) {  // after a resize that memory did not even allow to undo
-      return spill(pixel_of(x, y), Record::pack(1, depth, payload));
-    }
-    Insertion insertion(*this, x, y, depth, payload);
-    if (guarded_) {
-      while (insertion.template step<true>()) {
-      }
-    } else {
-      while (insertion.template step<false>()) {
-      }
-    }
-  }
 
   /// One insertion in steps: a step is one atomic maximum on the table, so that a test can drive
   /// every interleaving of several insertions.
@@ -159,9 +220,8 @@ class HashBuffer {
           table_(buffer.table_.data()),
           offsets_(buffer.offsets_.data()),
           cells_(buffer.table_.size()),
-          pixel_(buffer.pixel_of(x, y)),
           block_(buffer.block_of(x, y)),
-          record_(Record::pack(1, depth, payload)),
+          flight_{Record::pack(1, depth, payload), buffer.pixel_of(x, y), 1},
           limit_(buffer.age_limit()) {
       assert(x >= 0 && x < buffer.width_ && y >= 0 && y < buffer.height_);
       assert(Record::payload_fits(payload));
@@ -171,42 +231,34 @@ class HashBuffer {
     /// @tparam guarded whether keep_nearest and opacity are looked at
     template <bool guarded>
     bool step() noexcept {
-      const std::uint64_t offset = offsets_[age_];
-      std::uint64_t cell = pixel_ + offset;
-      if (cell >= cells_) cell -= cells_;
-      const Word proposed = record_;
-      const Word found = Concurrency::fetch_max(table_[cell], proposed);
-      // Equality falls through to the next age: two equal records are two fragments.
-      if (found < proposed) {
-        Concurrency::fetch_max(buffer_->max_ages_[block_], static_cast<Age>(age_));
-        if (found == Record::kEmpty) return false;
-        record_ = found;
-        if (Record::age(found) != age_) {  // evicted from another pixel
-          age_ = Record::age(found);
-          // Both numbers are below cells_, so neither branch wraps around 2^64.
-          const std::uint64_t back = offsets_[age_];
-          pixel_ = cell >= back ? cell - back : cell + cells_ - back;
-          block_ = buffer_->block_of(pixel_);
+      const Word proposed = flight_.record;
+      const auto age = static_cast<Age>(flight_.age);
+      Word found;
+      const detail::Outcome outcome = detail::propose<Record, Concurrency>(
+          flight_, table_, cells_, [this](unsigned of) { return offsets_[of]; }, found);
+      if (outcome == detail::Outcome::kLost) {
+        if constexpr (guarded) {
+          if (Record::age(found) == flight_.age) guard_.count(found, flight_.record, *buffer_);
+        }
+      } else {
+        Concurrency::fetch_max(buffer_->max_ages_[block_], age);
+        if (outcome == detail::Outcome::kPlaced) return false;
+        if (outcome == detail::Outcome::kEvictedOther) {
+          block_ = buffer_->block_of(flight_.pixel);
           if constexpr (guarded) guard_ = Guard{};
         } else if constexpr (guarded) {  // evicted from this pixel by what lies in front of it
-          guard_.count(proposed, record_, buffer_->options_);
+          guard_.count(proposed, flight_.record, *buffer_);
         }
-      } else if constexpr (guarded) {
-        if (Record::age(found) == age_) guard_.count(found, record_, buffer_->options_);
       }
       if constexpr (guarded) {
-        if (guard_.closed(buffer_->options_)) {
+        if (guard_.closed(*buffer_)) {
           Concurrency::fetch_increment(buffer_->dropped_);
           return false;
         }
       }
-      if (age_ >= limit_) {
-        buffer_->spill(pixel_, record_);
-        return false;
-      }
-      ++age_;
-      record_ = Record::with_next_age(record_);
-      return true;
+      if (flight_.grow_older(limit_)) return true;
+      buffer_->spill(flight_.pixel, flight_.record);
+      return false;
     }
 
    private:
@@ -219,16 +271,17 @@ class HashBuffer {
       unsigned in_front = 0;
       Word last_rank = std::numeric_limits<Word>::max();
 
-      void count(Word met, Word in_flight, const HashBufferOptions& options) noexcept {
+      void count(Word met, Word in_flight, const HashBuffer& buffer) noexcept {
         const Word rank = Record::rank(met);
         if (rank >= last_rank || rank <= Record::rank(in_flight)) return;
         last_rank = rank;
         ++in_front;
-        if (options.opacity) transmittance *= transmittance_of(met, options);
+        if constexpr (kHasOpacity) transmittance *= buffer.transmittance_of(met);
       }
-      [[nodiscard]] bool closed(const HashBufferOptions& options) const noexcept {
+      [[nodiscard]] bool closed(const HashBuffer& buffer) const noexcept {
+        const HashBufferOptions& options = buffer.options_;
         return (options.keep_nearest > 0 && in_front >= options.keep_nearest) ||
-               (options.opacity && transmittance < 1.0 - options.opacity_threshold);
+               (kHasOpacity && transmittance < 1.0 - options.opacity_threshold);
       }
     };
 
@@ -236,16 +289,15 @@ class HashBuffer {
     Word* table_;
     const std::uint64_t* offsets_;
     std::uint64_t cells_;
-    std::uint64_t pixel_;
     std::size_t block_;
-    Word record_;
-    unsigned age_ = 1;
+    detail::Flight<Record> flight_;
     unsigned limit_;
     Guard guard_;
   };
 
   /// Visits the list of pixel (x, y) front to back; stops early if `visit` returns false (it may
-  /// also return nothing). No thread may be inserting.
+  /// also return nothing). No thread may be inserting. @pre build() or finish() succeeded, or a
+  /// fragment may be missing
   template <class Visit>
   void for_each(int x, int y, Visit&& visit) const {
     const std::uint64_t pixel = pixel_of(x, y);
@@ -264,15 +316,23 @@ class HashBuffer {
     overflow_.for_each(pixel, [&](Word record) { return goes_on(visit, record, end); });
   }
 
-  /// All lists as an image (depth_limit 2^24, world_from_image left at identity); rows in parallel.
-  /// ErrorCode::kLimit if it cannot be allocated, or if memory did not suffice for fragments that
-  /// the table had no room for; kCancelled on request.
-  [[nodiscard]] Result<LayeredDepthImage> depth_image(const Execution& execution = {}) const {
+  /// Ends a frame that insert() filled: do its lists hold all? Call it when all threads have
+  /// inserted, before lists are read.
+  /// @return the frame. ErrorCode::kLimit with the number of fragments that are missing, because
+  /// the table had no room for them and memory none beside it
+  [[nodiscard]] Result<BuildReport> finish() const {
     if (const std::uint64_t lost = overflow_.lost(); lost > 0) {
       return fail(ErrorCode::kLimit, "hash buffer: no memory for {} of {} fragments", lost,
                   stored() + failures_);
     }
-    return make_list_image(*this, execution);
+    return BuildReport{stored() + failures_, 1, memory_bytes()};
+  }
+
+  /// All lists as an image (depth_limit 2^24, world_from_image left at identity); rows in parallel.
+  /// ErrorCode::kLimit as finish(), or if the image cannot be allocated; kCancelled on request.
+  [[nodiscard]] Result<LayeredDepthImage> depth_image(const Execution& execution = {}) const {
+    if (auto complete = finish(); !complete) return tl::unexpected(std::move(complete.error()));
+    return copy_lists(execution);
   }
 
   /// Records in the table. Walks the whole table.
@@ -380,63 +440,87 @@ class HashBuffer {
   }
 
   /// A hash of the raw table: the same bits, the same checksum.
-  [[nodiscard]] std::uint64_t checksum() const {
-    std::uint64_t hash = 0x9e3779b97f4a7c15u ^ table_.size();
-    for (const Word word : table_) {
-      hash = (hash ^ word) * 0xff51afd7ed558ccdu;
-      hash ^= hash >> 29;
-    }
-    return hash;
-  }
+  [[nodiscard]] std::uint64_t checksum() const { return detail::table_checksum(table_); }
 
-  /// A pixel with the most fragments, how many those are, and how many all pixels keep.
-  struct FragmentCount {
-    int x = 0, y = 0;
-    std::uint64_t deepest = 0, kept = 0;
-  };
-  /// Runs the generator once to count the fragments of each pixel in the table's own cells. Leaves
-  /// the buffer empty.
+  /// Builds a frame: empties the buffer, adapts its table to the last frame's load, runs the
+  /// generator, and if a fragment did not fit, rebuilds the frame with more room until all fit. The
+  /// generator runs once a frame; twice for the first one, whose fragments are counted before
+  /// (HashBufferOptions::cells spares that), and for one that outgrew the frame before.
+  ///
+  /// `execution.memory_limit` bounds the buffer's own bytes. Its threads are not used; the
+  /// generator brings its own. Exceptions of the generator pass through.
+  ///
+  /// @return how the frame was built. ErrorCode::kLimit, and an empty buffer, if a pixel has more
+  /// fragments than the record can count (no room can mend that; the message names the split to
+  /// take), or if fragments were still missing in the largest table that memory allows (the message
+  /// says how many). ErrorCode::kCancelled on request.
   template <class Generator>
-  [[nodiscard]] FragmentCount count_fragments(Generator& generator) {
-    clear();
-    LayerCounter counter{this};
-    generator(counter);
-    const auto deepest =
-        std::max_element(table_.begin(), table_.begin() + static_cast<std::ptrdiff_t>(pixels_));
-    const auto pixel = static_cast<std::uint64_t>(deepest - table_.begin());
-    const auto columns = static_cast<std::uint64_t>(width_);
-    FragmentCount result{static_cast<int>(pixel % columns), static_cast<int>(pixel / columns),
-                         *deepest, 0};
-    const std::uint64_t most = options_.keep_nearest > 0 ? options_.keep_nearest : *deepest;
-    for (std::uint64_t i = 0; i < pixels_; ++i) {
-      result.kept += std::min<std::uint64_t>(table_[i], most);
+  [[nodiscard]] Result<BuildReport> build(Generator&& generator, const Execution& execution = {}) {
+    if (auto begun = begin_frame(execution.memory_limit); !begun) {
+      return tl::unexpected(std::move(begun.error()));
+    }
+    const FailuresForgotten while_building(*this);
+    Attempt attempt{execution.memory_limit, 0, 0, {}};
+    // With culling by opacity the count would be far more than what is kept.
+    const bool has_unknown_load = frame_ <= 1 && options_.cells == 0;
+    if (has_unknown_load && !kHasOpacity) {
+      if (auto sized = size_first_frame(generator, attempt); !sized) {
+        return tl::unexpected(std::move(sized.error()));
+      }
+    }
+    while (!execution.stop.stop_requested()) {
+      generator(*this);
+      ++attempt.generator_calls;
+      if (execution.stop.stop_requested()) break;
+      if (failures_ == 0) return BuildReport{stored(), attempt.generator_calls, memory_bytes()};
+      if (auto grown = grow(generator, attempt); !grown) {
+        return tl::unexpected(std::move(grown.error()));
+      }
     }
     clear();
-    return result;
+    return fail(ErrorCode::kCancelled, "hash buffer: stopped on request");
   }
-
-  /// True when nothing is known of earlier frames: the first since create(), with a table whose
-  /// size nobody chose.
-  [[nodiscard]] bool has_unknown_load() const { return frame_ <= 1 && options_.cells == 0; }
-  /// Whether what the table has no room for is kept. build() does without while it runs, since it
-  /// runs the generator again.
-  void keep_failures(bool keep) { keep_failures_ = keep; }
 
  private:
-  struct LayerCounter {
-    HashBuffer* buffer;
-    void insert(int x, int y, std::uint32_t, std::uint32_t) noexcept {
-      Concurrency::fetch_increment(buffer->table_[buffer->pixel_of(x, y)]);
+  friend detail::SinkForms<HashBuffer, Record>;
+
+  /// Counts fragments in the table's own cells.
+  class LayerCounter : public detail::SinkForms<LayerCounter, Record> {
+   public:
+    explicit LayerCounter(HashBuffer& buffer) : buffer_(&buffer) {}
+
+   private:
+    friend detail::SinkForms<LayerCounter, Record>;
+    void put(int x, int y, std::uint32_t, std::uint32_t) noexcept {
+      Concurrency::fetch_increment(buffer_->table_[buffer_->pixel_of(x, y)]);
     }
+    HashBuffer* buffer_;
   };
 
-  HashBuffer(int width, int height, const HashBufferOptions& options)
+  HashBuffer(int width, int height, const HashBufferOptions& options, Opacity opacity)
       : options_(options),
+        opacity_(std::move(opacity)),
         width_(width),
         height_(height),
         pixels_(static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height)),
         blocks_per_row_((static_cast<std::size_t>(width) + kBlockSide - 1) / kBlockSide),
-        guarded_(options.keep_nearest > 0 || options.opacity) {}
+        guarded_(options.keep_nearest > 0 || kHasOpacity) {}
+
+  /// What insert() does. What the table has no room for costs a probe of every age, a lock and a
+  /// sort.
+  void put(int x, int y, std::uint32_t depth, std::uint32_t payload) noexcept {
+    if (table_.empty()) {  // after a resize that memory did not even allow to undo
+      return spill(pixel_of(x, y), Record::pack(1, depth, payload));
+    }
+    Insertion insertion(*this, x, y, depth, payload);
+    if (guarded_) {
+      while (insertion.template step<true>()) {
+      }
+    } else {
+      while (insertion.template step<false>()) {
+      }
+    }
+  }
 
   /// How much of a list has been visited, where culling ends it.
   struct ListEnd {
@@ -453,13 +537,161 @@ class HashBuffer {
     }
     if (!guarded_) return true;
     if (options_.keep_nearest > 0 && ++end.kept >= options_.keep_nearest) return false;
-    if (!options_.opacity) return true;
-    end.transmittance *= transmittance_of(record, options_);
+    if constexpr (!kHasOpacity) return true;
+    end.transmittance *= transmittance_of(record);
     return end.transmittance >= 1.0 - options_.opacity_threshold;
   }
 
-  [[nodiscard]] static double transmittance_of(Word record, const HashBufferOptions& options) {
-    return 1.0 - std::clamp(options.opacity(Record::payload(record)), 0.0, 1.0);
+  [[nodiscard]] double transmittance_of(Word record) const {
+    if constexpr (kHasOpacity) {
+      return 1.0 - std::clamp<double>(opacity_(Record::payload(record)), 0.0, 1.0);
+    } else {
+      return 1.0;
+    }
+  }
+
+  Result<LayeredDepthImage> copy_lists(const Execution& execution) const {
+    const auto rows = static_cast<std::size_t>(height_);
+    const auto columns = static_cast<std::size_t>(width_);
+    try {
+      LayeredDepthImage image;
+      image.width = width_;
+      image.height = height_;
+      image.depth_limit = kRecordDepthMax + 1;
+      image.offsets.resize(rows * columns + 1);
+      parallel_for(execution, rows, [&](std::size_t row, int) {
+        for (std::size_t column = 0; column < columns; ++column) {
+          std::uint64_t count = 0;
+          for_each(static_cast<int>(column), static_cast<int>(row), [&](DepthItem) { ++count; });
+          image.offsets[row * columns + column + 1] = count;
+        }
+      });
+      for (std::size_t pixel = 0; pixel < rows * columns; ++pixel) {
+        image.offsets[pixel + 1] += image.offsets[pixel];
+      }
+      if (!execution.stop.stop_requested()) {
+        image.items.resize(image.offsets.back());
+        parallel_for(execution, rows, [&](std::size_t row, int) {
+          DepthItem* next = image.items.data() + image.offsets[row * columns];
+          for (std::size_t column = 0; column < columns; ++column) {
+            for_each(static_cast<int>(column), static_cast<int>(row),
+                     [&](DepthItem item) { *next++ = item; });
+          }
+        });
+      }
+      if (execution.stop.stop_requested()) {
+        return fail(ErrorCode::kCancelled, "depth lists: stopped on request");
+      }
+      return image;
+    } catch (const std::bad_alloc&) {
+      return fail(ErrorCode::kLimit, "depth lists: no memory for the lists of {} x {} pixels",
+                  width_, height_);
+    } catch (const std::length_error&) {
+      return fail(ErrorCode::kLimit, "depth lists: {} x {} pixels are more than memory can address",
+                  width_, height_);
+    }
+  }
+
+  /// A pixel with the most fragments, how many those are, and how many all pixels keep.
+  struct FragmentCount {
+    int x = 0, y = 0;
+    std::uint64_t deepest = 0, kept = 0;
+  };
+  /// Where build() is.
+  struct Attempt {
+    std::uint64_t memory_limit = 0;  ///< bytes, 0: none
+    int generator_calls = 0, failed_frames = 0;
+    std::optional<FragmentCount> count;  ///< once the fragments were counted
+  };
+  /// What the table has no room for is not kept while build() runs: it runs the generator again.
+  struct FailuresForgotten {
+    explicit FailuresForgotten(HashBuffer& of) : buffer(of) { buffer.keep_failures_ = false; }
+    ~FailuresForgotten() { buffer.keep_failures_ = true; }
+    FailuresForgotten(const FailuresForgotten&) = delete;
+    FailuresForgotten& operator=(const FailuresForgotten&) = delete;
+    HashBuffer& buffer;
+  };
+
+  /// Runs the generator once to count the fragments of each pixel in the table's own cells. Leaves
+  /// the buffer empty.
+  template <class Generator>
+  void count_fragments(Generator& generator, Attempt& attempt) {
+    clear();
+    LayerCounter counter(*this);
+    generator(counter);
+    ++attempt.generator_calls;
+    const auto deepest =
+        std::max_element(table_.begin(), table_.begin() + static_cast<std::ptrdiff_t>(pixels_));
+    const auto pixel = static_cast<std::uint64_t>(deepest - table_.begin());
+    const auto columns = static_cast<std::uint64_t>(width_);
+    FragmentCount result{static_cast<int>(pixel % columns), static_cast<int>(pixel / columns),
+                         *deepest, 0};
+    const std::uint64_t most = options_.keep_nearest > 0 ? options_.keep_nearest : *deepest;
+    for (std::uint64_t i = 0; i < pixels_; ++i) {
+      result.kept += std::min<std::uint64_t>(table_[i], most);
+    }
+    clear();
+    attempt.count = result;
+  }
+
+  /// @return kLimit naming the split to take if a pixel has more fragments than there are ages
+  [[nodiscard]] Result<void> check_ages(const FragmentCount& count) const {
+    if (count.deepest <= age_wanted()) return {};
+    return fail(ErrorCode::kLimit,
+                "hash buffer: pixel ({}, {}) has {} fragments, {} counts {} at most; {}", count.x,
+                count.y, count.deepest, Record::kName, age_wanted(),
+                age_wanted() < Record::kAgeMax ? "raise the option age_limit" : Record::kDeeper);
+  }
+  [[nodiscard]] std::uint64_t allowed(std::uint64_t cells, const Attempt& attempt) const {
+    return attempt.memory_limit > 0 ? std::min(cells, largest_cells(attempt.memory_limit)) : cells;
+  }
+
+  /// Counts the fragments of the first frame and makes room for them.
+  template <class Generator>
+  [[nodiscard]] Result<void> size_first_frame(Generator& generator, Attempt& attempt) {
+    count_fragments(generator, attempt);
+    if (!is_culling()) {
+      if (auto held = check_ages(*attempt.count); !held) return held;
+    }
+    const std::uint64_t kept = attempt.count->kept;
+    const std::uint64_t target = allowed(cells_for(kept, table_.size()), attempt);
+    if (target <= table_.size()) return {};
+    if (auto resized = resize(target); !resized) {
+      return fail(ErrorCode::kLimit, "hash buffer: {} fragments; {}", kept,
+                  resized.error().message);
+    }
+    return {};
+  }
+
+  /// After a frame of which fragments did not fit: an emptied table with more room.
+  template <class Generator>
+  [[nodiscard]] Result<void> grow(Generator& generator, Attempt& attempt) {
+    const std::uint64_t missing = failures_, fragments = stored() + missing;
+    const std::uint64_t cells = table_.size();
+    // Where room does not help, the ages may not suffice. With culling, a pixel may have more
+    // fragments than it keeps; then only a table that fails though it is nearly empty proves that.
+    const bool lacks_ages = is_too_empty(fragments, cells);
+    if (lacks_ages || (++attempt.failed_frames > 1 && !is_culling())) {
+      if (!attempt.count) count_fragments(generator, attempt);
+      if (auto held = check_ages(*attempt.count); !held) {
+        clear();
+        return held;
+      }
+    }
+    const std::uint64_t target = allowed(rebuilt_cells(fragments, cells), attempt);
+    if (target <= cells) {
+      clear();
+      return fail(ErrorCode::kLimit,
+                  "hash buffer: {} of {} fragments did not fit in {} cells, {} bytes; the limit is "
+                  "{} bytes",
+                  missing, fragments, cells, bytes_of(cells), attempt.memory_limit);
+    }
+    const OffsetKind kind = lacks_ages ? OffsetKind::kPlaneFirst : options_.offsets;
+    if (auto resized = resize(target, kind); !resized) {
+      return fail(ErrorCode::kLimit, "hash buffer: {} of {} fragments did not fit in {} cells; {}",
+                  missing, fragments, cells, resized.error().message);
+    }
+    return {};
   }
 
   [[nodiscard]] std::uint64_t pixel_of(int x, int y) const noexcept {
@@ -512,6 +744,7 @@ class HashBuffer {
   }
 
   HashBufferOptions options_;
+  [[no_unique_address]] Opacity opacity_;
   int width_;
   int height_;
   std::uint64_t pixels_;
@@ -522,7 +755,7 @@ class HashBuffer {
   std::vector<std::uint64_t> offsets_;
   OffsetKind drawn_kind_ = OffsetKind::kRandom;
   std::vector<Age> max_ages_;
-  mutable Overflow<Record> overflow_;  // sorted when it is read
+  mutable detail::Overflow<Record> overflow_;  // sorted when it is read
   bool keep_failures_ = true;
   // Counters that threads write live apart from what they read.
   alignas(64) std::uint64_t failures_ = 0;

@@ -26,6 +26,13 @@ inline constexpr std::uint32_t kRecordDepthMax = (1u << 24) - 1;
   return static_cast<std::uint32_t>(u * kRecordDepthMax);
 }
 
+/// The inverse of record_depth(): the middle of the normalized depths that become `depth`, at most
+/// half a step (3e-8) from the one that was given, and 1 for kRecordDepthMax. record_depth() of it
+/// is `depth` again. @pre depth <= kRecordDepthMax
+[[nodiscard]] constexpr double normalized_depth(std::uint32_t depth) {
+  return std::min((depth + 0.5) / kRecordDepthMax, 1.0);
+}
+
 /// A record [age | nearness | payload], most significant bits first, in one unsigned word.
 ///
 /// - age: the index of the probe at which the record sits, counted from 1. Age 0 is an empty cell,

@@ -27,6 +27,19 @@ namespace strata {
   return stored < cells / 10 * 3 + (cells % 10 * 3 + 9) / 10;
 }
 
+/// `cells`, grown until that many fragments are not too many.
+[[nodiscard]] constexpr std::uint64_t cells_for(std::uint64_t fragments, std::uint64_t cells) {
+  while (is_too_full(fragments, cells)) cells = grown_cells(cells);
+  return cells;
+}
+
+/// The size after a table of `cells` cells did not take all `fragments`: at least one step up,
+/// since a table that is not full fails by bad luck with its ages. (Where luck fails again and
+/// again, OffsetKind::kPlaneFirst with one plane a layer cannot.)
+[[nodiscard]] constexpr std::uint64_t rebuilt_cells(std::uint64_t fragments, std::uint64_t cells) {
+  return cells_for(fragments, grown_cells(cells));
+}
+
 /// The size of the next frame's table, from the fragments of the last frame: grows while the load
 /// would be 80 % or more, else shrinks while it would be less than 30 %, never below `pixels`.
 /// A grown table is at least 51 % full (unless one step was not enough for the first) and a shrunk
@@ -34,10 +47,7 @@ namespace strata {
 [[nodiscard]] constexpr std::uint64_t next_frame_cells(std::uint64_t cells, std::uint64_t pixels,
                                                        std::uint64_t fragments) {
   cells = std::max(cells, pixels);
-  if (is_too_full(fragments, cells)) {
-    while (is_too_full(fragments, cells)) cells = grown_cells(cells);
-    return cells;
-  }
+  if (is_too_full(fragments, cells)) return cells_for(fragments, cells);
   while (cells > pixels && is_too_empty(fragments, cells)) {
     cells = std::max(shrunk_cells(cells), pixels);
   }

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "strata/hashbuffer/hash_buffer_build.h"
+#include "strata/hashbuffer/hash_buffer.h"
 #include "tests/hashbuffer/store_support.h"
 
 namespace strata {
@@ -19,9 +19,22 @@ using test::submit;
 /// The low 8 bits of a payload, over 255.
 double opacity_of(std::uint32_t payload) { return (payload & 0xff) / 255.0; }
 
-template <class Form>
-HashBuffer<Record64, Form> make(int width, int height, const HashBufferOptions& options) {
-  auto buffer = HashBuffer<Record64, Form>::create(width, height, options);
+/// opacity_of(), and that from a table, as a caller with materials has it.
+struct OpacityTable {
+  std::vector<double> of_low_bits;
+  double operator()(std::uint32_t payload) const { return of_low_bits[payload & 0xff]; }
+};
+OpacityTable opacity_table() {
+  OpacityTable table;
+  for (std::uint32_t low = 0; low < 256; ++low) table.of_low_bits.push_back(opacity_of(low));
+  return table;
+}
+
+template <class Form, class Opacity = NoOpacity>
+HashBuffer<Record64, Form, Opacity> make(int width, int height, const HashBufferOptions& options,
+                                         Opacity opacity = {}) {
+  auto buffer =
+      HashBuffer<Record64, Form, Opacity>::create(width, height, options, std::move(opacity));
   if (!buffer) throw std::runtime_error(buffer.error().message);
   return std::move(*buffer);
 }
@@ -56,7 +69,7 @@ double composite(std::span<const DepthItem> list) {
 TEST(Culling, IsOffByDefault) {
   const HashBufferOptions options;
   EXPECT_EQ(options.keep_nearest, 0u);
-  EXPECT_EQ(options.opacity, nullptr);
+  EXPECT_FALSE((HashBuffer<Record64, Exclusive>::kHasOpacity));
 }
 
 // Erratum E3: the printed culling counts a record twice when another thread pushes it on.
@@ -69,8 +82,8 @@ TEST(Culling, E3ListsAreTheVisiblePartForAnyOrderAndThreads) {
         cut_at_opacity(sort_everything<Record64>(9, 5, fragments), threshold);
     for (const int threads : {1, 2, 4, 8}) {
       test::shuffle(random, fragments);
-      auto buffer = make<Concurrent>(
-          9, 5, {.cells = 800, .opacity = opacity_of, .opacity_threshold = threshold});
+      auto buffer =
+          make<Concurrent>(9, 5, {.cells = 800, .opacity_threshold = threshold}, opacity_table());
       submit(buffer, fragments, threads);
       ASSERT_EQ(buffer.failures(), 0u);
       EXPECT_EQ(buffer.stored() + buffer.dropped(), fragments.size());
@@ -83,7 +96,7 @@ TEST(Culling, TheLostWeightIsBelowOneMinusTheThreshold) {
   Random random(42);
   const auto fragments = random_fragments(random, 8, 8, 2000);
   const LayeredDepthImage exact = sort_everything<Record64>(8, 8, fragments);
-  auto buffer = make<Exclusive>(8, 8, {.cells = 3000, .opacity = opacity_of});
+  auto buffer = make<Exclusive>(8, 8, {.cells = 3000}, &opacity_of);
   submit(buffer, fragments);
   const auto culled = buffer.depth_image(Execution{.threads = 1}).value();
   EXPECT_LT(culled.items.size(), exact.items.size());
@@ -101,8 +114,8 @@ TEST(Culling, SequentiallyFrontToBackStoresLittleAndMoreOpacityNeverMore) {
   const auto stored_with = [&](std::uint32_t opacity, double threshold) {
     auto submitted = fragments;
     for (Fragment& fragment : submitted) fragment.payload |= opacity;
-    auto buffer = make<Exclusive>(
-        8, 8, {.cells = 100 * 64, .opacity = opacity_of, .opacity_threshold = threshold});
+    auto buffer =
+        make<Exclusive>(8, 8, {.cells = 100 * 64, .opacity_threshold = threshold}, &opacity_of);
     submit(buffer, submitted);
     return buffer.stored();
   };

@@ -7,7 +7,7 @@
 #include <map>
 #include <set>
 
-#include "strata/hashbuffer/hash_buffer_build.h"
+#include "strata/hashbuffer/hash_buffer.h"
 #include "tests/hashbuffer/store_support.h"
 
 namespace strata {
@@ -160,7 +160,7 @@ TYPED_TEST(HashBufferTable, TraversalWithoutTheMaxAgeTableGivesTheSameLists) {
 // depth one vanishes.
 TYPED_TEST(HashBufferTable, E1EqualRecordsAreTwoFragments) {
   auto buffer = make<TypeParam, Concurrent>(3, 3);
-  for (int copy = 0; copy < 5; ++copy) buffer.insert(1, 1, 42, 7);
+  for (int copy = 0; copy < 5; ++copy) test::insert_into(buffer, {1, 1, 42, 7});
   EXPECT_EQ(buffer.stored(), 5u);
   EXPECT_EQ(lists(buffer).list(1, 1).size(), 5u);
 }
@@ -170,7 +170,7 @@ TYPED_TEST(HashBufferTable, E1EqualRecordsAreTwoFragments) {
 TYPED_TEST(HashBufferTable, E2TraversalVisitsTheLargestAgeOfABlock) {
   for (unsigned layers = 0; layers <= 3; ++layers) {
     auto buffer = make<TypeParam>(8, 8, {.cells = 1000});
-    for (unsigned layer = 0; layer < layers; ++layer) buffer.insert(5, 5, layer, 0);
+    for (unsigned layer = 0; layer < layers; ++layer) test::insert_into(buffer, {5, 5, layer, 0});
     EXPECT_EQ(buffer.max_ages()[0], layers);
     EXPECT_EQ(lists(buffer).list(5, 5).size(), layers);
   }
@@ -181,12 +181,12 @@ TYPED_TEST(HashBufferTable, E2TraversalVisitsTheLargestAgeOfABlock) {
 TYPED_TEST(HashBufferTable, E4AFullTableEndsTheLoopAndCountsTheFailure) {
   for (const OffsetKind kind : kKinds) {
     auto buffer = make<TypeParam, Concurrent>(2, 2, {.cells = 4, .offsets = kind});
-    for (std::uint32_t i = 0; i < 3000; ++i) buffer.insert(0, 0, i * 7919 % 3000, 0);
+    for (std::uint32_t i = 0; i < 3000; ++i) test::insert_into(buffer, {0, 0, i * 7919 % 3000, 0});
     EXPECT_EQ(buffer.stored() + buffer.failures(), 3000u);
     EXPECT_LE(buffer.stored(), 4u);
     // Deeper than any age: in the table as many as the age field counts, the nearest ones.
     auto deep = make<TypeParam, Concurrent>(1, 1, {.cells = 5000, .offsets = kind});
-    for (std::uint32_t i = 0; i < 3000; ++i) deep.insert(0, 0, i * 7919 % 3000, 0);
+    for (std::uint32_t i = 0; i < 3000; ++i) test::insert_into(deep, {0, 0, i * 7919 % 3000, 0});
     EXPECT_EQ(deep.stored(), TypeParam::kAgeMax);
     EXPECT_EQ(deep.failures(), 3000u - TypeParam::kAgeMax);
     std::uint32_t next = 0;
@@ -202,9 +202,9 @@ TYPED_TEST(HashBufferTable, E4AFullTableEndsTheLoopAndCountsTheFailure) {
 // E5 is tests/hashbuffer/record_test.cpp, E5DepthNeverRunsIntoTheAge; here through the table.
 TYPED_TEST(HashBufferTable, E5TheNearestDepthStaysInItsField) {
   auto buffer = make<TypeParam>(4, 4);
-  buffer.insert(0, 0, record_depth(0.0), 0);
-  buffer.insert(0, 0, record_depth(1.0), 0);
-  buffer.insert(0, 0, 0xffffffffu, 0);
+  test::insert_into(buffer, {0, 0, record_depth(0.0), 0});
+  test::insert_into(buffer, {0, 0, record_depth(1.0), 0});
+  test::insert_into(buffer, {0, 0, 0xffffffffu, 0});
   const auto image = lists(buffer);
   ASSERT_EQ(image.list(0, 0).size(), 3u);
   EXPECT_EQ(image.list(0, 0)[0].depth(), 0u);
@@ -220,8 +220,8 @@ TYPED_TEST(HashBufferTable, E8MaxAgeBlocksAre8x8WithRoundedUpRows) {
       for (int x = 0; x < width; ++x) {
         auto buffer = make<TypeParam>(width, height, {.cells = 5000});
         ASSERT_EQ(buffer.max_ages().size(), static_cast<std::size_t>(columns * rows));
-        buffer.insert(x, y, 1, 1);
-        buffer.insert(x, y, 2, 2);
+        test::insert_into(buffer, {x, y, 1, 1});
+        test::insert_into(buffer, {x, y, 2, 2});
         for (int block = 0; block < columns * rows; ++block) {
           EXPECT_EQ(buffer.max_ages()[static_cast<std::size_t>(block)],
                     block == y / 8 * columns + x / 8 ? 2 : 0);
@@ -312,8 +312,8 @@ TYPED_TEST(HashBufferTable, InsertLosesNothingWhateverTheRoom) {
     EXPECT_EQ(lists(buffer), exact);
     EXPECT_GT(buffer.failures(), fragments.size() / 2);
     // More of them, after lists were read.
-    buffer.insert(3, 5, 77, 1);
-    buffer.insert(3, 5, 0, 1);
+    test::insert_into(buffer, {3, 5, 77, 1});
+    test::insert_into(buffer, {3, 5, 0, 1});
     EXPECT_EQ(lists(buffer).items.size(), fragments.size() + 2);
     std::vector<DepthItem> list;
     buffer.for_each(3, 5, [&](DepthItem item) { list.push_back(item); });
@@ -361,7 +361,7 @@ TEST(HashBuffer, AFrameBuiltKeepsWhatIsInsertedLater) {
   auto buffer = make<Record64>(2, 2);
   const std::vector<Fragment> some{{0, 0, 5, 1}, {0, 0, 9, 1}};
   ASSERT_TRUE(build(buffer, Submission(some)));
-  for (std::uint32_t i = 0; i < 100; ++i) buffer.insert(0, 0, 10 + i, 1);
+  for (std::uint32_t i = 0; i < 100; ++i) test::insert_into(buffer, {0, 0, 10 + i, 1});
   EXPECT_EQ(lists(buffer).list(0, 0).size(), 102u);
   ASSERT_TRUE(build(buffer, Submission(some)));
   EXPECT_EQ(lists(buffer).list(0, 0).size(), 2u);
@@ -449,7 +449,7 @@ TEST(HashBuffer, AFailedAllocationIsAnErrorAndTheBufferStaysUsable) {
     ASSERT_FALSE(resized);
     EXPECT_EQ(resized.error().code, ErrorCode::kLimit);
   }
-  buffer.insert(1, 2, 3, 4);
+  test::insert_into(buffer, {1, 2, 3, 4});
   EXPECT_EQ(buffer.cells().size(), 16u);
   EXPECT_EQ(lists(buffer).list(1, 2).size(), 1u);
   EXPECT_FALSE((HashBuffer<Record64, Exclusive>::create(1 << 30, 1 << 30)));

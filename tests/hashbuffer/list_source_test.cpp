@@ -7,7 +7,7 @@
 #include "strata/hashbuffer/build_ldi.h"
 #include "strata/mesh/shapes.h"
 #include "strata/voxelize/voxelize.h"
-#include "tests/support/lists.h"
+#include "tests/support/reference_lists.h"
 #include "tests/support/trouble.h"
 
 namespace strata {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <set>
 
-#include "strata/hashbuffer/random.h"
+#include "hashbuffer/random.h"
 
 namespace strata {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <limits>
 
-#include "strata/hashbuffer/random.h"
+#include "hashbuffer/random.h"
 
 namespace strata {
 namespace {
@@ -83,6 +83,18 @@ TYPED_TEST(RecordLaws, E5DepthNeverRunsIntoTheAge) {
   EXPECT_EQ(record_depth(0.5), R::kDepthMax / 2);
   EXPECT_EQ(R::age(R::pack(7, 0xffffffffu, 0)), 7u);
   EXPECT_EQ(R::depth(R::pack(7, 1u << 24, 0)), R::kDepthMax);
+}
+
+TEST(NormalizedDepth, IsTheInverseOfRecordDepth) {
+  for (std::uint32_t depth = 0; depth <= kRecordDepthMax; ++depth) {
+    ASSERT_EQ(record_depth(normalized_depth(depth)), depth);
+  }
+  Random random(9);
+  for (int i = 0; i < 10000; ++i) {
+    const double u = static_cast<double>(random.below(1u << 30)) / ((1u << 30) - 1);
+    EXPECT_NEAR(normalized_depth(record_depth(u)), u, 0.5000001 / kRecordDepthMax);
+  }
+  EXPECT_EQ(normalized_depth(kRecordDepthMax), 1.0);
 }
 
 TEST(Record64Deep, KeepsTheExitBitAndTheLow29BitsOfTheTriangle) {

@@ -6,7 +6,7 @@
 #include <memory>
 #include <optional>
 
-#include "strata/hashbuffer/hash_buffer_build.h"
+#include "strata/hashbuffer/hash_buffer.h"
 #include "tests/hashbuffer/store_support.h"
 
 namespace strata {
@@ -231,13 +231,12 @@ Instance culling_instance(Random& random, int number) {
   instance.options.cells = instance.pixels * 3 + instance.fragments.size() + random.below(4);
   instance.options.offsets = kKinds[number % 3];
   instance.options.seed = static_cast<std::uint64_t>(number);
-  instance.options.opacity = opacity_of;
   instance.options.opacity_threshold = 0.75 + 0.01 * static_cast<double>(random.below(20));
   return instance;
 }
 
 TEST(ScheduleModelCulling, E3NoScheduleDropsAVisibleFragmentButThePrintedRuleDoes) {
-  using Buffer = HashBuffer<Record64, Concurrent>;
+  using Buffer = HashBuffer<Record64, Concurrent, double (*)(std::uint32_t)>;
   Random random(52);
   int printed_errors = 0, printed_sequential_errors = 0, culled = 0;
   for (int number = 0; number < 2000 * kTenth; ++number) {
@@ -247,7 +246,7 @@ TEST(ScheduleModelCulling, E3NoScheduleDropsAVisibleFragmentButThePrintedRuleDoe
     bool printed_failed = false;
     for (int schedule = 0; schedule < 4; ++schedule) {
       test::shuffle(random, instance.fragments);
-      auto buffer = Buffer::create(instance.width, 1, instance.options).value();
+      auto buffer = Buffer::create(instance.width, 1, instance.options, opacity_of).value();
       const std::size_t threads = schedule == 0 ? 1 : 2 + random.below(4);
       run_schedule(
           random, instance.fragments, threads,

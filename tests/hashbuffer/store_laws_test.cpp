@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "strata/hashbuffer/count_scan_store.h"
-#include "strata/hashbuffer/hash_buffer_build.h"
+#include "strata/hashbuffer/hash_buffer.h"
 #include "tests/hashbuffer/store_support.h"
 
 namespace strata {

@@ -6,8 +6,8 @@
 #include <thread>
 #include <vector>
 
+#include "hashbuffer/random.h"
 #include "strata/core/depth_list.h"
-#include "strata/hashbuffer/random.h"
 #include "strata/hashbuffer/record.h"
 
 namespace strata::test {
@@ -97,6 +97,16 @@ inline LayeredDepthImage cut_lists(const LayeredDepthImage& image, std::size_t c
   return result;
 }
 
+/// Inserts a fragment, without its payload where the sink keeps none.
+template <class Sink>
+void insert_into(Sink& sink, const Fragment& f) {
+  if constexpr (requires { sink.insert(f.x, f.y, f.depth); }) {
+    sink.insert(f.x, f.y, f.depth);
+  } else {
+    sink.insert(f.x, f.y, f.depth, f.payload);
+  }
+}
+
 /// Inserts the fragments from `threads` threads that start together and yield now and then.
 class Submission {
  public:
@@ -106,7 +116,7 @@ class Submission {
   template <class Sink>
   void operator()(Sink& sink) const {
     if (threads_ == 1) {
-      for (const Fragment& f : *fragments_) sink.insert(f.x, f.y, f.depth, f.payload);
+      for (const Fragment& f : *fragments_) insert_into(sink, f);
       return;
     }
     std::vector<std::jthread> pool;
@@ -114,8 +124,7 @@ class Submission {
       pool.emplace_back([this, thread, &sink] {
         Random random(thread);
         for (std::size_t i = thread; i < fragments_->size(); i += threads_) {
-          const Fragment& f = (*fragments_)[i];
-          sink.insert(f.x, f.y, f.depth, f.payload);
+          insert_into(sink, (*fragments_)[i]);
           if (random.below(64) == 0) std::this_thread::yield();
         }
       });

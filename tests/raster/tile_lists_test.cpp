@@ -8,7 +8,7 @@
 #include <random>
 
 #include "raster/tile_bins.h"
-#include "tests/support/lists.h"
+#include "tests/support/reference_lists.h"
 #include "tests/support/simd_targets.h"
 #include "tests/support/trouble.h"
 

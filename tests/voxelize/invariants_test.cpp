@@ -12,7 +12,7 @@
 #include "strata/mesh/soup_tools.h"
 #include "strata/voxelize/checksum.h"
 #include "tests/support/corpus.h"
-#include "tests/support/lists.h"
+#include "tests/support/reference_lists.h"
 #include "tests/support/trouble.h"
 #include "tests/support/voxelized.h"
 

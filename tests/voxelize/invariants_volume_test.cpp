@@ -11,7 +11,7 @@
 #include "strata/mesh/shapes.h"
 #include "strata/mesh/soup_tools.h"
 #include "tests/support/corpus.h"
-#include "tests/support/lists.h"
+#include "tests/support/reference_lists.h"
 #include "tests/support/trouble.h"
 #include "tests/support/voxelized.h"
 

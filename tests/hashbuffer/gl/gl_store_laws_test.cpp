@@ -9,7 +9,7 @@
 
 #include "hashbuffer/gl/hash_store.h"
 #include "hashbuffer/gl/scan_store.h"
-#include "strata/hashbuffer/hash_buffer_build.h"
+#include "strata/hashbuffer/hash_buffer.h"
 #include "tests/gl/gl_testing.h"
 #include "tests/hashbuffer/gl/submission.h"
 

@@ -12,7 +12,7 @@
 #include "tests/gl/gl_testing.h"
 #include "tests/raster/gl/fragment_log.h"
 #include "tests/support/corpus.h"
-#include "tests/support/lists.h"
+#include "tests/support/reference_lists.h"
 #include "tests/support/trouble.h"
 
 namespace strata {

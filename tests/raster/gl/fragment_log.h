@@ -7,7 +7,7 @@
 #include "strata/core/depth_list.h"
 #include "strata/gl/buffer.h"
 #include "strata/raster/gl/producer.h"
-#include "tests/support/lists.h"
+#include "tests/support/reference_lists.h"
 
 namespace strata::test {
 

@@ -9,8 +9,8 @@
 
 #include "hashbuffer/gl/hash_store.h"
 #include "hashbuffer/gl/scan_store.h"
+#include "hashbuffer/random.h"
 #include "strata/hashbuffer/build_ldi.h"
-#include "strata/hashbuffer/random.h"
 #include "strata/mesh/shapes.h"
 #include "tests/gl/gl_testing.h"
 

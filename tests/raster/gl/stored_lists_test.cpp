@@ -14,7 +14,7 @@
 #include "strata/mesh/shapes.h"
 #include "tests/gl/gl_testing.h"
 #include "tests/support/corpus.h"
-#include "tests/support/lists.h"
+#include "tests/support/reference_lists.h"
 #include "tests/support/trouble.h"
 
 namespace strata {

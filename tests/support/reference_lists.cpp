@@ -1,4 +1,4 @@
-#include "tests/support/lists.h"
+#include "tests/support/reference_lists.h"
 
 #include <gtest/gtest.h>
 

@@ -1,0 +1,163 @@
+#pragma once
+
+#include <cassert>
+#include <cstdint>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "strata/core/execution.h"
+#include "strata/core/result.h"
+#include "strata/hashbuffer/count_scan_store.h"
+#include "strata/hashbuffer/hash_buffer.h"
+
+// Depth lists of fragments of your own: whatever you draw, trace or sample, from any threads, comes
+// back as one list a pixel, sorted by depth, then payload. Nothing is dropped, equal fragments are
+// kept, and no bit depends on the order of insertion or on threads.
+//
+//     auto lists = strata::PayloadLists::create(width, height);
+//     auto report = lists->build([&](auto& sink) { sink.insert(x, y, depth, payload); ... });
+//     lists->for_each(x, y, [](strata::Fragment f) { ... });   // front to back
+//
+// WHICH LISTS
+//
+//     alias               keeps            layers   generator runs              bytes
+//     DepthLists          depth            any      twice                       8 a fragment, 8 a
+//     pixel PayloadLists        depth, 32 bits   any      twice                       8 a fragment,
+//     8 a pixel OnePassDepthLists   depth            255      once; or insert() at will   about 6 a
+//     fragment OnePassLists        depth, 32 bits   255      once; or insert() at will   about 12 a
+//     fragment DeepLists           depth, 30 bits   1023     once; or insert() at will   about 12 a
+//     fragment
+//
+// Take DepthLists or PayloadLists (count/scan: count, sum up, store, sort) if you can give the same
+// fragments twice: they are faster in most scenes, and no list is too long. Take the one-pass lists
+// (the HA-buffer, a hash table) if you cannot, or if making a fragment is what costs time. The
+// generator runs a second time for the first frame unless create() is told how many fragments
+// to expect, and for a frame that outgrew the one before. DeepLists are one-pass lists with more
+// than 255 layers in a pixel; their payloads have bit 31 and the bits 0 to 28.
+//
+// Million fragments a second by one thread, 1024 x 1024 pixels, generator, lists and a walk over
+// them (docs/performance.md has the whole table and the machine):
+//
+//     mean layers    count/scan    one pass, depth    one pass, payload    (load 0.5 of the table)
+//          1            24.6            23.8                24.3
+//          4            24.0            20.3                15.7
+//         10            18.0            13.1                10.2
+//         20            14.8             9.9                 8.2
+
+namespace strata {
+
+/// A fragment of a list.
+struct Fragment {
+  std::uint32_t depth = 0;    ///< [0, 2^24); record_depth() makes it, normalized_depth() reads it
+  std::uint32_t payload = 0;  ///< as it was inserted; 0 where the lists keep depth alone
+  friend bool operator==(const Fragment&, const Fragment&) = default;
+};
+
+/// The depth lists of a screen, kept by `Store`. Use the aliases below. One thread builds; several
+/// may read.
+template <DepthListStore Store>
+class FragmentLists {
+ public:
+  using Record = typename Store::Record;
+  static constexpr bool kHasPayload = Record::kPayloadBits > 0;
+  /// Fragments may come at any time, by insert(), and not only from a generator.
+  static constexpr bool kOnePass = requires(Store & store) { store.begin_frame(); };
+
+  /// Empty lists of a screen of width x height pixels, each side at least 1 (ErrorCode::kUsage).
+  /// ErrorCode::kLimit if memory does not suffice.
+  /// @param expected_fragments of a frame, about; 0: not known. One-pass lists make room for them.
+  [[nodiscard]] static Result<FragmentLists> create(int width, int height,
+                                                    std::uint64_t expected_fragments = 0) {
+    auto store = [&] {
+      if constexpr (kOnePass) {
+        return Store::create(width, height, {.cells = expected_fragments + expected_fragments / 2});
+      } else {
+        return Store::create(width, height);
+      }
+    }();
+    if (!store) return tl::unexpected(std::move(store.error()));
+    return FragmentLists(*std::move(store));
+  }
+
+  [[nodiscard]] int width() const { return store_.width(); }
+  [[nodiscard]] int height() const { return store_.height(); }
+  /// Bytes held.
+  [[nodiscard]] std::uint64_t memory_bytes() const { return store_.memory_bytes(); }
+
+  /// Replaces the lists by those of a new frame. `generator(sink)` calls sink.insert(x, y, depth,
+  /// payload), without the payload for lists of depth alone, for every fragment: from any number of
+  /// its own threads, in any order; it returns when all are inserted. If it runs again it must give
+  /// the same fragments. `execution.memory_limit` bounds the bytes held.
+  /// @return how it was built. ErrorCode::kLimit, and empty lists, if a list is too long (the
+  /// message names pixel and length) or memory does not suffice (it says how many fragments are
+  /// missing); kInternal if the generator was seen to give other fragments; kCancelled on request
+  template <class Generator>
+  [[nodiscard]] Result<BuildReport> build(Generator&& generator, const Execution& execution = {}) {
+    auto report = store_.build(generator, execution);
+    is_complete_ = report.has_value();
+    return report;
+  }
+
+  /// Empties one-pass lists for a new frame, with the room that the last one would have needed.
+  /// Then insert(), from any threads, and finish(). @return as build()
+  [[nodiscard]] Result<void> begin() requires kOnePass {
+    is_complete_ = false;
+    return store_.begin_frame();
+  }
+  /// Adds a fragment to one-pass lists; any thread.
+  /// @pre 0 <= x < width, 0 <= y < height, begin() before and finish() not yet
+  void insert(int x, int y, std::uint32_t depth) noexcept requires(kOnePass && !kHasPayload) {
+    store_.insert(x, y, depth);
+  }
+  void insert(int x, int y, std::uint32_t depth, std::uint32_t payload) noexcept requires kOnePass {
+    store_.insert(x, y, depth, payload);
+  }
+  /// Ends the frame: call it when all threads have inserted, before lists are read.
+  /// @return as build(): ErrorCode::kLimit says how many fragments are missing
+  [[nodiscard]] Result<BuildReport> finish() requires kOnePass {
+    auto report = store_.finish();
+    is_complete_ = report.has_value();
+    return report;
+  }
+
+  /// Visits the list of pixel (x, y) front to back; stops early if `visit` returns false (it may
+  /// also return nothing). @pre build() or finish() succeeded
+  template <class Visit>
+  void for_each(int x, int y, Visit&& visit) const {
+    assert(is_complete_);
+    store_.for_each(x, y, [&](DepthItem item) {
+      const Fragment fragment{item.depth(), item.payload()};
+      if constexpr (std::is_convertible_v<decltype(visit(fragment)), bool>) {
+        return static_cast<bool>(visit(fragment));
+      } else {
+        visit(fragment);
+        return true;
+      }
+    });
+  }
+  /// A copy of the list of pixel (x, y). @pre as for_each()
+  [[nodiscard]] std::vector<Fragment> list(int x, int y) const {
+    std::vector<Fragment> fragments;
+    for_each(x, y, [&](Fragment fragment) { fragments.push_back(fragment); });
+    return fragments;
+  }
+
+ private:
+  explicit FragmentLists(Store&& store) : store_(std::move(store)) {}
+  Store store_;
+  bool is_complete_ = true;  ///< empty lists are
+};
+
+/// Depth alone, any number of layers; the generator runs twice.
+using DepthLists = FragmentLists<CountScanStore<Record32, Concurrent>>;
+/// Depth and 32 bits of payload, any number of layers; the generator runs twice.
+using PayloadLists = FragmentLists<CountScanStore<Record64, Concurrent>>;
+/// Depth alone, at most 255 layers a pixel, in one pass.
+using OnePassDepthLists = FragmentLists<HashBuffer<Record32, Concurrent>>;
+/// Depth and 32 bits of payload, at most 255 layers a pixel, in one pass.
+using OnePassLists = FragmentLists<HashBuffer<Record64, Concurrent>>;
+/// Depth and 30 bits of payload (bit 31, bits 0 to 28), at most 1023 layers a pixel, in one pass.
+using DeepLists = FragmentLists<HashBuffer<Record64Deep, Concurrent>>;
+
+}  // namespace strata

@@ -1,0 +1,113 @@
+// The lists of strata/lists.h against the sort of everything: each alias, by a generator and by
+// insert() from several threads.
+
+#include "strata/lists.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/hashbuffer/store_support.h"
+
+namespace strata {
+namespace {
+
+using test::random_fragments;
+using test::sort_everything;
+using test::Submission;
+
+template <class Lists>
+class OwnLists : public testing::Test {};
+using Every = testing::Types<DepthLists, PayloadLists, OnePassDepthLists, OnePassLists, DeepLists>;
+TYPED_TEST_SUITE(OwnLists, Every);
+
+template <class Lists>
+void expect_lists(const Lists& lists, const std::vector<test::Fragment>& fragments) {
+  const auto exact =
+      sort_everything<typename Lists::Record>(lists.width(), lists.height(), fragments);
+  for (int y = 0; y < lists.height(); ++y) {
+    for (int x = 0; x < lists.width(); ++x) {
+      std::vector<Fragment> expected;
+      for (const DepthItem item : exact.list(x, y)) {
+        expected.push_back({item.depth(), item.payload()});
+      }
+      ASSERT_EQ(lists.list(x, y), expected) << x << ", " << y;
+    }
+  }
+}
+
+TYPED_TEST(OwnLists, OfAGeneratorAreTheSortOfEverything) {
+  Random random(71);
+  for (const std::uint64_t expected_fragments : {0u, 100u, 3000u}) {
+    auto lists = TypeParam::create(13, 9, expected_fragments).value();
+    for (const std::size_t count : {std::size_t{3000}, std::size_t{0}, std::size_t{500}}) {
+      const auto fragments = random_fragments(random, 13, 9, count, 60);
+      const auto report = lists.build(Submission(fragments, 3));
+      ASSERT_TRUE(report) << report.error().message;
+      EXPECT_EQ(report->fragments, count);
+      expect_lists(lists, fragments);
+    }
+  }
+}
+
+TYPED_TEST(OwnLists, OfInsertFromManyThreadsAreTheSortOfEverything) {
+  if constexpr (TypeParam::kOnePass) {
+    Random random(72);
+    auto lists = TypeParam::create(13, 9).value();  // far too little room
+    for (const std::size_t count : {2000u, 0u, 4000u}) {
+      const auto fragments = random_fragments(random, 13, 9, count, 60);
+      ASSERT_TRUE(lists.begin());
+      test::submit(lists, fragments, 4);
+      const auto report = lists.finish();
+      ASSERT_TRUE(report) << report.error().message;
+      EXPECT_EQ(report->fragments, count);
+      expect_lists(lists, fragments);
+    }
+  } else {
+    GTEST_SKIP() << "these lists take a generator";
+  }
+}
+
+TYPED_TEST(OwnLists, AVisitorMayStop) {
+  auto lists = TypeParam::create(1, 1).value();
+  const std::vector<test::Fragment> fragments{{0, 0, 3, 0}, {0, 0, 1, 0}, {0, 0, 2, 0}};
+  ASSERT_TRUE(lists.build(Submission(fragments)));
+  std::vector<std::uint32_t> seen;
+  lists.for_each(0, 0, [&](Fragment fragment) {
+    seen.push_back(fragment.depth);
+    return seen.size() < 2;
+  });
+  EXPECT_EQ(seen, (std::vector<std::uint32_t>{1, 2}));
+}
+
+TEST(OwnListsOfOnePass, RunTheGeneratorOnceWhereTheyKnowWhatToExpect) {
+  Random random(73);
+  const auto fragments = random_fragments(random, 40, 30, 12000);
+  auto known = OnePassLists::create(40, 30, fragments.size()).value();
+  EXPECT_EQ(known.build(Submission(fragments)).value().generator_calls, 1);
+  auto unknown = OnePassLists::create(40, 30).value();
+  EXPECT_EQ(unknown.build(Submission(fragments)).value().generator_calls, 2);
+  EXPECT_EQ(unknown.build(Submission(fragments)).value().generator_calls, 1);
+}
+
+TEST(OwnListsOfOnePass, ThatAreTooLongNameTheListsToTake) {
+  std::vector<test::Fragment> fragments;
+  for (std::uint32_t i = 0; i < 600; ++i) fragments.push_back({1, 0, i, i});
+  auto shallow = OnePassLists::create(2, 2).value();
+  const auto report = shallow.build(Submission(fragments));
+  ASSERT_FALSE(report);
+  EXPECT_EQ(report.error().code, ErrorCode::kLimit);
+  EXPECT_NE(report.error().message.find("pixel (1, 0) has 600 fragments"), std::string::npos)
+      << report.error().message;
+  auto deep = DeepLists::create(2, 2).value();
+  ASSERT_TRUE(deep.build(Submission(fragments)));
+  expect_lists(deep, fragments);
+}
+
+// A sink of depth alone has no form with a payload that a concept could take for one without.
+template <class Sink>
+concept TakesDepthAlone = requires(Sink& sink) {
+  sink.insert(0, 0, 1u);
+};
+static_assert(TakesDepthAlone<OnePassDepthLists> && !TakesDepthAlone<OnePassLists>);
+
+}  // namespace
+}  // namespace strata
