@@ -4,7 +4,7 @@
 #include <string_view>
 #include <vector>
 
-#include "apps/strata/help.h"
+#include "apps/session/help.h"
 
 // What a manual page and a completion say of a program, or of a command of `strata`.
 

@@ -31,7 +31,7 @@ void JsonWriter::separate(bool nested) {
   Level& level = levels_.back();
   if (!level.empty) text_ += ',';
   level.nested = level.nested || nested;
-  if (level.object || level.nested) {
+  if (!one_line_ && (level.object || level.nested)) {
     line_break();
   } else if (!level.empty) {
     text_ += ' ';
@@ -48,7 +48,7 @@ void JsonWriter::open(char bracket) {
 void JsonWriter::close(char bracket) {
   const Level level = levels_.back();
   levels_.pop_back();
-  if (!level.empty && (level.object || level.nested)) line_break();
+  if (!one_line_ && !level.empty && (level.object || level.nested)) line_break();
   text_ += bracket;
 }
 
@@ -71,6 +71,11 @@ void JsonWriter::value(bool flag) { scalar(flag ? "true" : "false"); }
 void JsonWriter::value(double number) {
   if (!std::isfinite(number)) return null();
   scalar(fmt::format("{}", number));
+}
+
+void JsonWriter::value(double number, int decimals) {
+  if (!std::isfinite(number)) return null();
+  scalar(fmt::format("{:.{}f}", number, decimals));
 }
 
 void JsonWriter::value(std::string_view text) {

@@ -13,6 +13,10 @@ namespace strata::apps {
 /// as the same number, NaN and infinities as null. Arrays of plain values stand on one line.
 class JsonWriter {
  public:
+  enum class Layout { kLines, kOneLine };
+  /// @param layout  a member a line, or all on one line
+  explicit JsonWriter(Layout layout = Layout::kLines) : one_line_(layout == Layout::kOneLine) {}
+
   void begin_object() { open('{'); }
   void end_object() { close('}'); }
   void begin_array() { open('['); }
@@ -27,12 +31,17 @@ class JsonWriter {
   void value(const char* text) { value(std::string_view(text)); }
   template <std::integral T>
   requires(!std::same_as<T, bool>) void value(T number) { scalar(std::to_string(number)); }
+  void value(double number, int decimals);
   void value(const glm::dvec3& v);
   void value(const glm::ivec3& v);
 
   template <class T>
   void member(std::string_view name, const T& v) {
     key(name).value(v);
+  }
+
+  void member(std::string_view name, double number, int decimals) {
+    key(name).value(number, decimals);
   }
 
   /// The finished text with a line end. @pre all objects and arrays are closed
@@ -51,6 +60,7 @@ class JsonWriter {
   void quote(std::string_view text);
   void line_break();
 
+  bool one_line_;
   std::string text_;
   std::vector<Level> levels_;
   bool after_key_ = false;

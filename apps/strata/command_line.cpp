@@ -7,11 +7,11 @@
 #include <array>
 #include <filesystem>
 
+#include "apps/session/help.h"
+#include "apps/session/option_values.h"
 #include "apps/strata/choice_words.h"
 #include "apps/strata/command_words.h"
 #include "apps/strata/csg_scene.h"
-#include "apps/strata/help.h"
-#include "apps/strata/option_values.h"
 #include "apps/strata/scene_options.h"
 #include "core/printable.h"
 

@@ -2,10 +2,10 @@
 
 #include <CLI/App.hpp>
 
+#include "apps/session/help.h"
+#include "apps/session/option_values.h"
 #include "apps/strata/choice_words.h"
 #include "apps/strata/command_words.h"
-#include "apps/strata/help.h"
-#include "apps/strata/option_values.h"
 #include "apps/strata/scene_options.h"
 
 namespace strata::apps {

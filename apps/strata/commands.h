@@ -7,7 +7,8 @@
 #include <variant>
 #include <vector>
 
-#include "apps/session/progress.h"
+#include "apps/session/help.h"
+#include "apps/session/session.h"
 #include "hashbuffer/tile_builder.h"
 #include "strata/csg/picture/picture.h"
 #include "strata/csg/scene/scene.h"
@@ -17,17 +18,6 @@
 #include "strata/voxelize/voxelize.h"
 
 namespace strata::apps {
-
-/// What every sub-command takes.
-struct CommonOptions {
-  int threads = 0;                 ///< 0: all processors
-  std::uint64_t memory_limit = 0;  ///< bytes; 0: three quarters of what this process may use
-  bool quiet = false;              ///< errors only
-  bool verbose = false;            ///< also say what is done
-  ProgressMode progress = ProgressMode::kAuto;
-  bool strict = false;        ///< warnings are errors
-  double time_limit_s = 0.0;  ///< of the whole command; 0: none
-};
 
 /// Who makes depth lists and finds surfaces; the results are the same.
 enum class Backend {
@@ -42,12 +32,6 @@ struct InputOptions {
   MeshReader reader = MeshReader::kOwn;
   MeshFormat format = MeshFormat::kAuto;
   csg::ReadSceneOptions scene;  ///< for the scenes among them
-};
-
-/// A file that is to be read or written, and how the user asked for that: "--ids".
-struct FileUse {
-  std::string asked_by;
-  std::string path;
 };
 
 /// `strata voxelize`
@@ -129,19 +113,11 @@ struct CsgCommand {
   std::vector<FileUse> outputs;           ///< of a window: the pictures that it will write
 };
 
-/// Text to print and an exit code: help, version, mistakes in the command line.
-struct ParseOutcome {
-  std::string text;
-  bool to_stderr = false;
-  int exit_code = 0;
-};
-
 using Command = std::variant<ParseOutcome, VoxelizeCommand, InfoCommand, LdiCommand, CsgCommand>;
 
 /// Reads the command line.
 Command parse_command_line(int argc, const char* const* argv);
 
-class Session;
 Result<void> run_voxelize(const VoxelizeCommand& command, Session& session);
 Result<void> run_info(const InfoCommand& command, Session& session);
 Result<void> run_ldi(const LdiCommand& command, Session& session);

@@ -4,12 +4,13 @@
 #include <optional>
 #include <utility>
 
+#include "apps/session/file_conflicts.h"
+#include "apps/session/session.h"
 #include "apps/strata/commands.h"
 #include "apps/strata/csg_report.h"
 #include "apps/strata/csg_scene.h"
-#include "apps/strata/file_conflicts.h"
+#include "apps/strata/file_uses.h"
 #include "apps/strata/gpu.h"
-#include "apps/strata/session.h"
 #include "csg/measure/result_bounds.h"
 #include "strata/csg/picture/picture.h"
 #include "strata/csg/picture/write_depth.h"

@@ -6,8 +6,8 @@
 #include <glm/geometric.hpp>
 #include <tuple>
 
-#include "apps/strata/file_conflicts.h"
-#include "apps/strata/option_values.h"
+#include "apps/session/file_conflicts.h"
+#include "apps/session/option_values.h"
 
 namespace strata::apps {
 namespace {

@@ -1,7 +1,6 @@
 #include "apps/strata/csg_report.h"
 
-#include "apps/session/json_writer.h"
-#include "apps/session/process_memory.h"
+#include "apps/session/report.h"
 #include "core/printable.h"
 
 namespace strata::apps {
@@ -37,82 +36,87 @@ std::string csg_text(const CsgCommand& command, const CsgOutcome& outcome) {
   return text;
 }
 
-std::string csg_json(const CsgCommand& command, const CsgOutcome& outcome, const Session& session) {
-  JsonWriter json;
-  json.begin_object();
-  json.member("strata", STRATA_VERSION);
-  json.member("command", "csg");
+namespace {
+
+void write_scene(JsonWriter& json, const CsgOutcome& outcome) {
   json.key("scene").begin_object();
   json.member("solids", outcome.solids);
   json.member("nodes", outcome.nodes);
   json.member("triangles", outcome.triangles);
   json.member("flat", outcome.flat);
   json.end_object();
+}
+
+void write_camera(JsonWriter& json, const csg::Camera& camera) {
   json.key("camera").begin_object();
-  json.member("projection", outcome.camera.projection == csg::Projection::kPerspective
-                                ? "perspective"
-                                : "orthographic");
-  json.member("target", outcome.camera.target);
-  json.member("rotation", outcome.camera.rotation);
-  json.member("distance", outcome.camera.distance);
-  json.member("field_of_view", outcome.camera.field_of_view);
+  json.member("projection",
+              camera.projection == csg::Projection::kPerspective ? "perspective" : "orthographic");
+  json.member("target", camera.target);
+  json.member("rotation", camera.rotation);
+  json.member("distance", camera.distance);
+  json.member("field_of_view", camera.field_of_view);
   json.end_object();
+}
+
+void write_picture(JsonWriter& json, const CsgCommand& command, const csg::DrawReport& drawn) {
   json.key("picture").begin_object();
   json.member("width", command.size.x);
   json.member("height", command.size.y);
   json.member("samples", command.picture.samples);
-  json.member("covered_pixels", outcome.drawn.covered);
-  json.member("fragments", outcome.drawn.fragments);
-  json.member("resolved", outcome.drawn.resolved);
+  json.member("covered_pixels", drawn.covered);
+  json.member("fragments", drawn.fragments);
+  json.member("resolved", drawn.resolved);
   json.end_object();
-  if (outcome.measures) {
-    const csg::Measures& m = *outcome.measures;
-    json.key("result").begin_object();
-    json.member("empty", m.empty);
-    json.member("resolution", m.resolution);
-    json.member("volume", m.volume);
-    json.member("volume_error", m.volume_error);
-    json.member("area", m.area);
-    json.member("area_error", m.area_error);
-    json.member("centre_of_mass", m.centre);
-    json.member("low", m.low);
-    json.member("high", m.high);
-    json.member("bounds_error", m.bounds_error);
-    json.member("crossings", m.result_crossings);
-    json.member("max_depth_complexity", m.max_depth_complexity);
-    json.end_object();
-  }
-  if (!command.ids.empty()) {
-    json.key("ids").begin_array();
-    for (std::size_t i = 0; i < outcome.seen.size(); ++i) {
-      const csg::Rgba colour = colour_of_solid(outcome.seen[i]);
-      json.begin_object();
-      json.member("solid", outcome.seen[i]);
-      json.member("colour", fmt::format("#{:02x}{:02x}{:02x}", colour.r, colour.g, colour.b));
-      json.member("name", outcome.names[i]);
-      json.end_object();
-    }
-    json.end_array();
-  }
-  json.key("timings_ms").begin_object();
-  json.member("read", outcome.read_ms);
-  json.member("prepare", outcome.prepare_ms);
-  json.member("draw", outcome.draw_ms);
-  json.member("measure", outcome.measure_ms);
-  json.member("write", outcome.write_ms);
-  json.member("total", session.milliseconds());
+}
+
+void write_measures(JsonWriter& json, const csg::Measures& m) {
+  json.key("result").begin_object();
+  json.member("empty", m.empty);
+  json.member("resolution", m.resolution);
+  json.member("volume", m.volume);
+  json.member("volume_error", m.volume_error);
+  json.member("area", m.area);
+  json.member("area_error", m.area_error);
+  json.member("centre_of_mass", m.centre);
+  json.member("low", m.low);
+  json.member("high", m.high);
+  json.member("bounds_error", m.bounds_error);
+  json.member("crossings", m.result_crossings);
+  json.member("max_depth_complexity", m.max_depth_complexity);
   json.end_object();
-  json.key("memory").begin_object();
-  json.member("peak_bytes", peak_memory_bytes());
-  json.end_object();
-  json.key("warnings").begin_array();
-  for (const Warning& warning : session.warnings()) {
+}
+
+void write_seen_ids(JsonWriter& json, const CsgOutcome& outcome) {
+  json.key("ids").begin_array();
+  for (std::size_t i = 0; i < outcome.seen.size(); ++i) {
+    const csg::Rgba colour = colour_of_solid(outcome.seen[i]);
     json.begin_object();
-    json.member("code", warning.code);
-    json.member("message", warning.message);
+    json.member("solid", outcome.seen[i]);
+    json.member("colour", fmt::format("#{:02x}{:02x}{:02x}", colour.r, colour.g, colour.b));
+    json.member("name", outcome.names[i]);
     json.end_object();
   }
   json.end_array();
+}
+
+}  // namespace
+
+std::string csg_json(const CsgCommand& command, const CsgOutcome& outcome, const Session& session) {
+  JsonWriter json;
+  begin_report(json, "csg");
+  write_scene(json, outcome);
+  write_camera(json, outcome.camera);
+  write_picture(json, command, outcome.drawn);
+  if (outcome.measures) write_measures(json, *outcome.measures);
+  if (!command.ids.empty()) write_seen_ids(json, outcome);
+  write_timings(json, session,
+                {{"read", outcome.read_ms},
+                 {"prepare", outcome.prepare_ms},
+                 {"draw", outcome.draw_ms},
+                 {"measure", outcome.measure_ms},
+                 {"write", outcome.write_ms}});
+  write_memory(json);
+  write_warnings(json, session);
   json.end_object();
   return json.take();
 }

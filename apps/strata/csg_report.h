@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "apps/session/session.h"
 #include "apps/strata/commands.h"
-#include "apps/strata/session.h"
 #include "strata/csg/measure/measure.h"
 #include "strata/csg/picture/picture.h"
 

@@ -10,9 +10,9 @@
 #include <system_error>
 #include <utility>
 
+#include "apps/session/option_values.h"
 #include "apps/strata/expression.h"
 #include "apps/strata/mesh_input.h"
-#include "apps/strata/option_values.h"
 #include "csg/measure/result_bounds.h"
 #include "strata/mesh/diagnose.h"
 #include "strata/mesh/shapes.h"

@@ -3,9 +3,9 @@
 #include <string>
 #include <vector>
 
+#include "apps/session/session.h"
 #include "apps/strata/commands.h"
 #include "apps/strata/mesh_input.h"
-#include "apps/strata/session.h"
 #include "strata/core/result.h"
 #include "strata/csg/scene/scene.h"
 

@@ -1,6 +1,6 @@
 #include "apps/strata/gpu.h"
 
-#include "apps/strata/session.h"
+#include "apps/session/session.h"
 
 #ifdef STRATA_HAVE_GL
 #include <algorithm>

@@ -1,14 +1,13 @@
 #include <utility>
 
-#include "apps/session/json_writer.h"
-#include "apps/session/process_memory.h"
+#include "apps/session/file_conflicts.h"
+#include "apps/session/report.h"
+#include "apps/session/session.h"
 #include "apps/strata/commands.h"
 #include "apps/strata/csg_report.h"
 #include "apps/strata/csg_scene.h"
-#include "apps/strata/file_conflicts.h"
 #include "apps/strata/gl_info.h"
 #include "apps/strata/mesh_input.h"
-#include "apps/strata/session.h"
 #include "core/printable.h"
 #include "strata/core/file_identity.h"
 #include "strata/csg/solid_lists.h"
@@ -235,9 +234,7 @@ Result<FileInfo> look_at(const std::string& path, const InfoCommand& command, Se
 
 Result<void> run_info(const InfoCommand& command, Session& session) {
   JsonWriter json;
-  json.begin_object();
-  json.member("strata", STRATA_VERSION);
-  json.member("command", "info");
+  begin_report(json, "info");
   json.key("files").begin_array();
   std::string text;
   std::optional<Error> first_error;  // the other files are still looked at
@@ -276,20 +273,9 @@ Result<void> run_info(const InfoCommand& command, Session& session) {
       first_error = told.error();
     }
   }
-  json.key("memory").begin_object();
-  json.member("peak_bytes", peak_memory_bytes());
-  json.end_object();
-  json.key("timings_ms").begin_object();
-  json.member("total", session.milliseconds());
-  json.end_object();
-  json.key("warnings").begin_array();
-  for (const Warning& warning : session.warnings()) {
-    json.begin_object();
-    json.member("code", warning.code);
-    json.member("message", warning.message);
-    json.end_object();
-  }
-  json.end_array();
+  write_memory(json);
+  write_timings(json, session);
+  write_warnings(json, session);
   json.end_object();
   session.end_progress();
   const auto printed = command.json ? print_report(json.take(), *command.json, false)

@@ -1,11 +1,11 @@
 #include <glm/vec3.hpp>
 #include <utility>
 
+#include "apps/session/option_values.h"
+#include "apps/session/session.h"
 #include "apps/strata/commands.h"
 #include "apps/strata/gpu.h"
 #include "apps/strata/mesh_input.h"
-#include "apps/strata/option_values.h"
-#include "apps/strata/session.h"
 #include "strata/hashbuffer/build_ldi.h"
 #include "strata/hashbuffer/formats/ldi_io.h"
 #include "strata/hashbuffer/formats/xray.h"

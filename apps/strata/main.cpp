@@ -14,10 +14,11 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include "apps/session/file_conflicts.h"
+#include "apps/session/session.h"
 #include "apps/strata/allocation_failures.h"
 #include "apps/strata/commands.h"
-#include "apps/strata/file_conflicts.h"
-#include "apps/strata/session.h"
+#include "apps/strata/file_uses.h"
 #include "core/atomic_file.h"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)

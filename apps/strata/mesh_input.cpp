@@ -6,8 +6,8 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
+#include "apps/session/session.h"
 #include "apps/strata/csg_scene.h"
-#include "apps/strata/session.h"
 #include "mesh/block_sum.h"
 #include "strata/mesh/soup_tools.h"
 #include "strata/raster/lattice_mesh.h"

@@ -7,8 +7,8 @@
 #include <iterator>
 #include <string_view>
 
-#include "apps/strata/help.h"
-#include "apps/strata/option_values.h"
+#include "apps/session/help.h"
+#include "apps/session/option_values.h"
 
 namespace strata::apps {
 namespace {

@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <utility>
 
+#include "apps/session/session.h"
 #include "apps/strata/csg_scene.h"
 #include "apps/strata/mesh_input.h"
-#include "apps/strata/session.h"
 
 namespace strata::apps {
 namespace {

@@ -7,13 +7,13 @@
 #include <memory>
 #include <utility>
 
+#include "apps/session/session.h"
 #include "apps/strata/boundary_area.h"
 #include "apps/strata/choice_words.h"
 #include "apps/strata/commands.h"
 #include "apps/strata/gpu.h"
 #include "apps/strata/memory_estimate.h"
 #include "apps/strata/mesh_input.h"
-#include "apps/strata/session.h"
 #include "apps/strata/voxelize_report.h"
 #include "strata/csg/picture/picture.h"
 #include "strata/csg/solid_labels.h"

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <numeric>
 
-#include "apps/session/json_writer.h"
 #include "apps/session/process_memory.h"
+#include "apps/session/report.h"
 #include "apps/strata/choice_words.h"
 #include "core/printable.h"
 
@@ -221,9 +221,7 @@ std::string voxelize_text(const VoxelizeCommand& command, const VoxelizeOutcome&
 std::string voxelize_json(const VoxelizeCommand& command, const VoxelizeOutcome& outcome,
                           const Session& session) {
   JsonWriter json;
-  json.begin_object();
-  json.member("strata", STRATA_VERSION);
-  json.member("command", "voxelize");
+  begin_report(json, "voxelize");
   write_input(json, outcome.input);
 
   json.key("grid").begin_object();
@@ -267,29 +265,15 @@ std::string voxelize_json(const VoxelizeCommand& command, const VoxelizeOutcome&
     json.end_object();
   }
 
-  json.key("timings_ms").begin_object();
-  json.member("read", outcome.input.read_ms);
-  json.member("check", outcome.input.diagnose_ms);
-  json.member("lists", outcome.report.lists_ms);
-  json.member("intervals", outcome.report.intervals_ms);
-  json.member("write", outcome.write_ms);
-  json.member("total", session.milliseconds());
-  json.end_object();
-
-  json.key("memory").begin_object();
-  json.member("peak_bytes", peak_memory_bytes());
-  json.member("estimated_bytes", outcome.estimate.total());
-  json.member("limit_bytes", session.memory_limit());
-  json.end_object();
-
-  json.key("warnings").begin_array();
-  for (const Warning& warning : session.warnings()) {
-    json.begin_object();
-    json.member("code", warning.code);
-    json.member("message", warning.message);
-    json.end_object();
-  }
-  json.end_array();
+  write_timings(json, session,
+                {{"read", outcome.input.read_ms},
+                 {"check", outcome.input.diagnose_ms},
+                 {"lists", outcome.report.lists_ms},
+                 {"intervals", outcome.report.intervals_ms},
+                 {"write", outcome.write_ms}});
+  write_memory(json, {{"estimated_bytes", outcome.estimate.total()},
+                      {"limit_bytes", session.memory_limit()}});
+  write_warnings(json, session);
   json.end_object();
   return json.take();
 }

@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
+#include "apps/session/session.h"
 #include "apps/strata/commands.h"
 #include "apps/strata/memory_estimate.h"
 #include "apps/strata/mesh_input.h"
-#include "apps/strata/session.h"
 #include "strata/core/grid.h"
 #include "strata/voxelize/voxelize.h"
 #include "voxelize/open/lost_walls.h"

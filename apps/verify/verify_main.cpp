@@ -15,11 +15,12 @@
 #include <utility>
 #include <vector>
 
+#include "apps/session/file_conflicts.h"
+#include "apps/session/help.h"
 #include "apps/session/json_writer.h"
+#include "apps/session/session.h"
 #include "apps/strata/csg_scene.h"
-#include "apps/strata/file_conflicts.h"
-#include "apps/strata/help.h"
-#include "apps/strata/session.h"
+#include "apps/strata/file_uses.h"
 #include "apps/verify/comparison.h"
 #include "apps/verify/verify_options.h"
 

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "apps/strata/help.h"
+#include "apps/session/help.h"
 
 namespace strata::apps {
 namespace {

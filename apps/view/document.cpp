@@ -7,8 +7,8 @@
 #include <map>
 #include <utility>
 
+#include "apps/session/session.h"
 #include "apps/strata/csg_scene.h"
-#include "apps/strata/session.h"
 #include "csg/measure/result_bounds.h"
 
 namespace strata::view {

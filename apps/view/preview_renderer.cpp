@@ -3,8 +3,8 @@
 #include <cmath>
 #include <utility>
 
+#include "apps/session/session.h"
 #include "apps/strata/gpu.h"
-#include "apps/strata/session.h"
 #include "apps/view/camera_control.h"
 #include "apps/view/renderer.h"
 #include "csg/measure/ray_image.h"

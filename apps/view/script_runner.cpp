@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "apps/session/json_writer.h"
 #include "apps/strata/csg_options.h"
 
 namespace strata::view {
@@ -38,21 +39,6 @@ MouseButton button_of(const std::string& word) {
   return word == "left"    ? MouseButton::kLeft
          : word == "right" ? MouseButton::kRight
                            : MouseButton::kMiddle;
-}
-
-std::string json_text(std::string_view text) {
-  std::string out = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') {
-      out += '\\';
-      out += c;
-    } else if (static_cast<unsigned char>(c) < 0x20) {
-      out += fmt::format("\\u{:04x}", static_cast<unsigned>(c));
-    } else {
-      out += c;
-    }
-  }
-  return out + '"';
 }
 
 }  // namespace
@@ -282,20 +268,36 @@ Result<void> ScriptRunner::solids(const ScriptCommand& command, Viewer& viewer) 
 std::string statistics_json(const Viewer& viewer) {
   const Statistics& s = viewer.statistics();
   const Model* model = viewer.model();
-  std::string error = viewer.load_error().empty() ? viewer.draw_error() : viewer.load_error();
-  return fmt::format(
-      "{{\"renderer\": {}, \"width\": {}, \"height\": {}, \"solids\": {}, \"triangles\": {}, "
-      "\"load_ms\": {:.1f}, \"prepare_ms\": {:.2f}, \"coarse_ms\": {:.2f}, \"divisor\": {}, "
-      "\"whole_ms\": {:.2f}, \"whole_latency_ms\": {:.1f}, \"reaction_ms\": {:.1f}, "
-      "\"largest_reaction_ms\": {:.1f}, \"reactions\": {}, \"present_ms\": {:.2f}, \"frames\": {}, "
-      "\"crossings\": {}, \"resolved\": {}, \"covered\": {}, \"longest_list\": {}, \"loads\": {}, "
-      "\"error\": {}}}",
-      json_text(viewer.drawn_by()), viewer.viewport().x, viewer.viewport().y,
-      model != nullptr ? model->scene.tree.solids().size() : 0,
-      model != nullptr ? model->triangles : 0, model != nullptr ? model->load_ms : 0.0,
-      s.prepare_ms, s.coarse_ms, s.divisor, s.whole_ms, s.whole_latency_ms, s.reaction_ms,
-      s.largest_reaction_ms, s.reactions, s.present_ms, s.frames, s.report.fragments,
-      s.report.resolved, s.report.covered, s.longest_list, viewer.loads(), json_text(error));
+  const std::string& error =
+      viewer.load_error().empty() ? viewer.draw_error() : viewer.load_error();
+  apps::JsonWriter json(apps::JsonWriter::Layout::kOneLine);
+  json.begin_object();
+  json.member("renderer", viewer.drawn_by());
+  json.member("width", viewer.viewport().x);
+  json.member("height", viewer.viewport().y);
+  json.member("solids", model != nullptr ? model->scene.tree.solids().size() : 0);
+  json.member("triangles", model != nullptr ? model->triangles : 0);
+  json.member("load_ms", model != nullptr ? model->load_ms : 0.0, 1);
+  json.member("prepare_ms", s.prepare_ms, 2);
+  json.member("coarse_ms", s.coarse_ms, 2);
+  json.member("divisor", s.divisor);
+  json.member("whole_ms", s.whole_ms, 2);
+  json.member("whole_latency_ms", s.whole_latency_ms, 1);
+  json.member("reaction_ms", s.reaction_ms, 1);
+  json.member("largest_reaction_ms", s.largest_reaction_ms, 1);
+  json.member("reactions", s.reactions);
+  json.member("present_ms", s.present_ms, 2);
+  json.member("frames", s.frames);
+  json.member("crossings", s.report.fragments);
+  json.member("resolved", s.report.resolved);
+  json.member("covered", s.report.covered);
+  json.member("longest_list", s.longest_list);
+  json.member("loads", viewer.loads());
+  json.member("error", error);
+  json.end_object();
+  std::string text = json.take();
+  text.pop_back();  // the line's end is the stage's
+  return text;
 }
 
 }  // namespace strata::view

@@ -4,7 +4,7 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
-#include "apps/strata/session.h"
+#include "apps/session/session.h"
 
 namespace strata::view {
 namespace {

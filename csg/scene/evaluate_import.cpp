@@ -64,15 +64,6 @@ std::optional<std::string> find_asset(const std::string& folder, const std::stri
   });
 }
 
-bool lies_below(const std::string& path, const std::string& root) {
-  std::error_code error;
-  const fs::path folder = fs::canonical(root, error);
-  if (error) return false;
-  const fs::path real = fs::weakly_canonical(path, error);
-  return !error && std::mismatch(folder.begin(), folder.end(), real.begin(), real.end()).first ==
-                       folder.end();
-}
-
 std::optional<std::string> Evaluator::asset(std::uint32_t node, const std::string& file) {
   if (auto found = find_asset(folder_, file)) {
     if (!root_.empty() && !lies_below(*found, root_)) {

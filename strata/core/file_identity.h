@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 
 namespace strata {
 
@@ -19,5 +20,11 @@ struct FileIdentity {
 
 /// Of what lies under a name now, links followed.
 [[nodiscard]] FileIdentity identify_file(const std::string& path);
+
+/// Whether a file lies in a folder or in those below it, links followed.
+[[nodiscard]] bool lies_below(const std::string& path, const std::string& folder);
+
+/// Whether a file's name ends with `extension` (lower case, with the dot), in either case.
+[[nodiscard]] bool has_extension(std::string_view path, std::string_view extension);
 
 }  // namespace strata

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "apps/strata/session.h"
+#include "apps/session/session.h"
 #include "apps/view/gl/theme.h"
 
 namespace strata::view {

@@ -19,7 +19,7 @@
 #include <thread>
 #include <utility>
 
-#include "apps/strata/session.h"
+#include "apps/session/session.h"
 #include "apps/view/gl/canvas.h"
 #include "apps/view/gl/panels.h"
 #include "apps/view/script_runner.h"

@@ -65,9 +65,6 @@ struct ReadSceneOptions {
 [[nodiscard]] std::optional<std::string> find_asset(const std::string& folder,
                                                     const std::string& name);
 
-/// Whether a file lies in a folder or in those below it, links followed.
-[[nodiscard]] bool lies_below(const std::string& path, const std::string& folder);
-
 /// Reads `.csg` (the whole language of both OpenSCAD 2021.01 and later) or, with the help of an
 /// installed `openscad`, `.scad`. @return kInput naming file:line:column, also for a file outside
 /// of the root folder; kLimit, kCancelled

@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "apps/session/json_writer.h"
-#include "apps/strata/option_values.h"
+#include "apps/session/option_values.h"
 
 namespace strata::apps {
 namespace {

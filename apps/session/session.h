@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <cstdint>
 #include <optional>
 #include <set>
 #include <span>
@@ -11,15 +12,26 @@
 #include <utility>
 #include <vector>
 
+#include "apps/session/file_conflicts.h"
 #include "apps/session/interrupt.h"
 #include "apps/session/progress.h"
-#include "apps/strata/commands.h"
 #include "core/atomic_file.h"
 #include "strata/core/execution.h"
 #include "strata/core/file_identity.h"
 #include "strata/core/result.h"
 
 namespace strata::apps {
+
+/// What every sub-command takes.
+struct CommonOptions {
+  int threads = 0;                 ///< 0: all processors
+  std::uint64_t memory_limit = 0;  ///< bytes; 0: three quarters of what this process may use
+  bool quiet = false;              ///< errors only
+  bool verbose = false;            ///< also say what is done
+  ProgressMode progress = ProgressMode::kAuto;
+  bool strict = false;        ///< warnings are errors
+  double time_limit_s = 0.0;  ///< of the whole command; 0: none
+};
 
 /// Something the user should know of that did not stop the run.
 struct Warning {

@@ -1,4 +1,4 @@
-#include "apps/strata/help.h"
+#include "apps/session/help.h"
 
 #include <CLI/App.hpp>
 #include <algorithm>

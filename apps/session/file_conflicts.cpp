@@ -1,11 +1,7 @@
-#include "apps/strata/file_conflicts.h"
+#include "apps/session/file_conflicts.h"
 
-#include <algorithm>
 #include <filesystem>
-#include <iterator>
-#include <utility>
-
-#include "strata/csg/scene/scene.h"
+#include <system_error>
 
 namespace strata::apps {
 namespace {
@@ -35,18 +31,11 @@ bool same_file(const std::string& a, const std::string& b) {
   return resolved(a) == resolved(b);
 }
 
-std::vector<FileUse> outputs(std::initializer_list<FileUse> uses) {
-  std::vector<FileUse> result;
-  std::copy_if(uses.begin(), uses.end(), std::back_inserter(result),
-               [](const FileUse& use) { return !use.path.empty(); });
-  return result;
-}
-
 /// Whether the folder that a name means has a file in it, at any depth. A folder of files takes its
 /// place.
 bool holds(const std::string& folder, const std::string& file) {
   std::error_code error;
-  return fs::is_directory(folder, error) && csg::lies_below(file, folder);
+  return fs::is_directory(folder, error) && lies_below(file, folder);
 }
 
 tl::unexpected<Error> overwrites(const FileUse& out, std::string_view what,
@@ -64,16 +53,6 @@ bool is_stream(const std::string& path) {
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
   return fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status);
-}
-
-std::vector<FileUse> inputs_of(const InputOptions& input) {
-  std::vector<FileUse> uses;
-  for (const std::string& path : input.files) uses.push_back({"the input", path});
-  const std::vector<std::string>& options = input.scene.openscad_options;
-  for (std::size_t i = 0; i + 1 < options.size(); i += 2) {
-    if (options[i] == "-p") uses.push_back({"the parameters", options[i + 1]});
-  }
-  return uses;
 }
 
 Result<void> check_files(const std::vector<FileUse>& read, const std::vector<FileUse>& written) {
@@ -104,25 +83,6 @@ Result<void> check_opened(const FileIdentity& opened, const std::vector<FileUse>
     }
   }
   return {};
-}
-
-std::vector<FileUse> outputs_of(const VoxelizeCommand& command) {
-  return outputs({{"-o", command.output}, {"--json", command.json.value_or("")}});
-}
-
-std::vector<FileUse> outputs_of(const InfoCommand& command) {
-  return outputs({{"--json", command.json.value_or("")}});
-}
-
-std::vector<FileUse> outputs_of(const LdiCommand& command) {
-  return outputs({{"-o", command.output}});
-}
-
-std::vector<FileUse> outputs_of(const CsgCommand& command) {
-  return outputs({{"-o", command.output},
-                  {"--ids", command.ids},
-                  {"--depth", command.depth},
-                  {"--json", command.json.value_or("")}});
 }
 
 }  // namespace strata::apps

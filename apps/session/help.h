@@ -19,6 +19,13 @@ inline constexpr const char* kOpenscadGroup = "OpenSCAD's options";
 /// Heading of the options that --help leaves out and --help-all shows.
 inline constexpr const char* kDeveloperGroup = "For developers (the result is the same)";
 
+/// Text to print and an exit code: help, version, mistakes in the command line.
+struct ParseOutcome {
+  std::string text;
+  bool to_stderr = false;
+  int exit_code = 0;
+};
+
 struct OptionText {
   std::vector<std::string> names;  ///< "-j", "--threads"; of the inputs "INPUT"
   std::string value;               ///< "N", "cpu|gl|auto", "[=FILE]"; empty: the option is a flag

@@ -1,4 +1,4 @@
-#include "apps/strata/session.h"
+#include "apps/session/session.h"
 
 #include <fcntl.h>
 #include <sys/resource.h>
@@ -13,8 +13,8 @@
 #include <mutex>
 #include <utility>
 
+#include "apps/session/file_conflicts.h"
 #include "apps/session/process_memory.h"
-#include "apps/strata/file_conflicts.h"
 #include "core/atomic_file.h"
 #include "core/printable.h"
 

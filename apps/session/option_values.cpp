@@ -1,4 +1,4 @@
-#include "apps/strata/option_values.h"
+#include "apps/session/option_values.h"
 
 #include <algorithm>
 #include <charconv>
@@ -102,14 +102,6 @@ tl::unexpected<Error> no_such_choice(std::string_view option, std::string_view t
     list += names[i];
   }
   return fail(ErrorCode::kUsage, "{} is {}, not '{}'", option, list, text);
-}
-
-bool has_extension(std::string_view path, std::string_view extension) {
-  if (path.size() < extension.size()) return false;
-  path.remove_prefix(path.size() - extension.size());
-  return std::equal(path.begin(), path.end(), extension.begin(), [](char a, char b) {
-    return (a >= 'A' && a <= 'Z' ? static_cast<char>(a - 'A' + 'a') : a) == b;
-  });
 }
 
 }  // namespace strata::apps

@@ -47,7 +47,4 @@ Result<T> parse_choice(std::string_view option, std::string_view text,
   return no_such_choice(option, text, names);
 }
 
-/// Whether a file's name ends with `extension` (lower case, with the dot), in either case.
-[[nodiscard]] bool has_extension(std::string_view path, std::string_view extension);
-
 }  // namespace strata::apps

@@ -3,23 +3,19 @@
 #include <string>
 #include <vector>
 
-#include "apps/strata/commands.h"
 #include "strata/core/file_identity.h"
 #include "strata/core/result.h"
 
 namespace strata::apps {
 
+/// A file that is to be read or written, and how the user asked for that: "--ids".
+struct FileUse {
+  std::string asked_by;
+  std::string path;
+};
+
 /// Whether bytes for this name go to a pipe, a device or an open file: "-", /dev/stdout, /dev/null.
 [[nodiscard]] bool is_stream(const std::string& path);
-
-/// What a command reads: its inputs, and the parameters of programs.
-[[nodiscard]] std::vector<FileUse> inputs_of(const InputOptions& input);
-
-/// What a command writes.
-[[nodiscard]] std::vector<FileUse> outputs_of(const VoxelizeCommand& command);
-[[nodiscard]] std::vector<FileUse> outputs_of(const InfoCommand& command);
-[[nodiscard]] std::vector<FileUse> outputs_of(const LdiCommand& command);
-[[nodiscard]] std::vector<FileUse> outputs_of(const CsgCommand& command);
 
 /// Looks, before any work is done, whether a file would be written that is read too, or that is
 /// written twice: by whatever names, links followed. Streams may carry several things.

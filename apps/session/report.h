@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cstdint>
+#include <initializer_list>
+#include <string_view>
+#include <utility>
+
+#include "apps/session/json_writer.h"
+#include "apps/session/session.h"
+
+// What the reports of all commands have in common, as docs/json.md says.
+
+namespace strata::apps {
+
+/// Begins the report's object: version and command.
+void begin_report(JsonWriter& json, std::string_view command);
+
+/// "timings_ms": the phases of a command, and the total since the program began.
+void write_timings(JsonWriter& json, const Session& session,
+                   std::initializer_list<std::pair<std::string_view, double>> phases = {});
+
+/// "memory": the peak of this process, and what else a command knows of its memory.
+void write_memory(JsonWriter& json,
+                  std::initializer_list<std::pair<std::string_view, std::uint64_t>> more = {});
+
+/// "warnings": those of the session, in their order.
+void write_warnings(JsonWriter& json, const Session& session);
+
+}  // namespace strata::apps

@@ -1,0 +1,48 @@
+#include "apps/strata/file_uses.h"
+
+#include <algorithm>
+#include <initializer_list>
+#include <iterator>
+
+namespace strata::apps {
+namespace {
+
+std::vector<FileUse> outputs(std::initializer_list<FileUse> uses) {
+  std::vector<FileUse> result;
+  std::copy_if(uses.begin(), uses.end(), std::back_inserter(result),
+               [](const FileUse& use) { return !use.path.empty(); });
+  return result;
+}
+
+}  // namespace
+
+std::vector<FileUse> inputs_of(const InputOptions& input) {
+  std::vector<FileUse> uses;
+  for (const std::string& path : input.files) uses.push_back({"the input", path});
+  const std::vector<std::string>& options = input.scene.openscad_options;
+  for (std::size_t i = 0; i + 1 < options.size(); i += 2) {
+    if (options[i] == "-p") uses.push_back({"the parameters", options[i + 1]});
+  }
+  return uses;
+}
+
+std::vector<FileUse> outputs_of(const VoxelizeCommand& command) {
+  return outputs({{"-o", command.output}, {"--json", command.json.value_or("")}});
+}
+
+std::vector<FileUse> outputs_of(const InfoCommand& command) {
+  return outputs({{"--json", command.json.value_or("")}});
+}
+
+std::vector<FileUse> outputs_of(const LdiCommand& command) {
+  return outputs({{"-o", command.output}});
+}
+
+std::vector<FileUse> outputs_of(const CsgCommand& command) {
+  return outputs({{"-o", command.output},
+                  {"--ids", command.ids},
+                  {"--depth", command.depth},
+                  {"--json", command.json.value_or("")}});
+}
+
+}  // namespace strata::apps

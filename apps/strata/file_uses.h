@@ -1,0 +1,19 @@
+#pragma once
+
+#include <vector>
+
+#include "apps/session/file_conflicts.h"
+#include "apps/strata/commands.h"
+
+namespace strata::apps {
+
+/// What a command reads: its inputs, and the parameters of programs.
+[[nodiscard]] std::vector<FileUse> inputs_of(const InputOptions& input);
+
+/// What a command writes.
+[[nodiscard]] std::vector<FileUse> outputs_of(const VoxelizeCommand& command);
+[[nodiscard]] std::vector<FileUse> outputs_of(const InfoCommand& command);
+[[nodiscard]] std::vector<FileUse> outputs_of(const LdiCommand& command);
+[[nodiscard]] std::vector<FileUse> outputs_of(const CsgCommand& command);
+
+}  // namespace strata::apps
