@@ -208,11 +208,11 @@ bool Geometry::move_solid(const Tree& tree, std::uint32_t solid,
 }
 
 bool Geometry::cut_off_vast(const Tree& tree) {
-  const std::vector<Mattering> matters = mattering(tree, boxes());
+  const std::vector<ActiveBox> active = active_boxes(tree, boxes());
   bool any = false;
   for (std::size_t i = 0; i < parts_.size(); ++i) {
     Part& part = parts_[i];
-    Bounds box = matters[i].box;
+    Bounds box = active[i].box;
     if (part.triangles.empty() || box.empty()) continue;
     const double size = box.longest_side();
     const auto around = [&](double sizes) {
@@ -221,7 +221,7 @@ bool Geometry::cut_off_vast(const Tree& tree) {
     if (!(size > 0) || holds(around(kVast), part.whole)) continue;
     // What is taken away reaches farther than what it is taken from.
     ClampedMesh cut =
-        clamp_to_box(part.positions, part.triangles, around(matters[i].taken_away ? 0.5 : 0.25));
+        clamp_to_box(part.positions, part.triangles, around(active[i].subtracted ? 0.5 : 0.25));
     part.positions = std::move(cut.positions);
     part.turned = std::move(cut.triangles);
     part.triangles = part.turned;

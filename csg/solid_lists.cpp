@@ -256,8 +256,8 @@ SolidLists& SolidLists::operator=(SolidLists&&) noexcept = default;
 const TriangleSoup& SolidLists::soup() const { return impl_->soup; }
 TriangleSoup SolidLists::take_soup() { return std::exchange(impl_->soup, {}); }
 const TileListFilter& SolidLists::filter() const { return impl_->filter; }
-const TileListFilter& SolidLists::plain_filter() const { return impl_->plain; }
-bool SolidLists::taken_away(std::uint32_t triangle) const {
+const TileListFilter& SolidLists::unlabelled_filter() const { return impl_->plain; }
+bool SolidLists::is_subtracted(std::uint32_t triangle) const {
   return impl_->shared.ranks[solid_of(triangle)] == Shared::kNoRank;
 }
 void SolidLists::set_labels(const std::vector<std::uint32_t>& labels) {

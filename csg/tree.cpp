@@ -3,10 +3,23 @@
 #include <algorithm>
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
+#include <queue>
 
 #include "strata/mesh/diagnose.h"
 
+// active_boxes() computes the S-bounds of S. Cameron, "Efficient intersection tests for objects
+// defined constructively" (1989) as axis-parallel boxes, and with them boxes around the active
+// zones of J. R. Rossignac and H. B. Voelcker, "Active zones in CSG for accelerating boundary
+// evaluation, redundancy elimination, interference detection, and shading algorithms" (1989). We
+// differ: one pass up and one pass down, not repeated until nothing shrinks; and a difference
+// shrinks the box of its first operand where vast boxes are subtracted from vast boxes.
+
 namespace strata::csg {
+
+Tree::Tree(Solid solid) : root_(0) { add_solid(std::move(solid)); }
+
+Tree::Tree(TriangleSoup mesh)
+    : Tree(Solid{std::make_shared<const TriangleSoup>(std::move(mesh))}) {}
 
 Tree::NodeId Tree::add_solid(Solid solid) {
   nodes_.push_back({Operation::kSolid, static_cast<std::uint32_t>(solids_.size()), 0});
@@ -23,6 +36,96 @@ Tree::NodeId Tree::add(Operation operation, std::span<const NodeId> operands) {
 
 Tree::NodeId Tree::add(Operation operation, std::initializer_list<NodeId> operands) {
   return add(operation, std::span(operands.begin(), operands.size()));
+}
+
+std::vector<Tree::NodeId> Tree::append(const Tree& from, std::span<const NodeId> nodes,
+                                       const glm::dmat4& target_from_source) {
+  // The nodes to copy, largest id first, so that each is met after all nodes that take it.
+  std::priority_queue<NodeId> queue(nodes.begin(), nodes.end());
+  std::vector<NodeId> sources;
+  while (!queue.empty()) {
+    const NodeId id = queue.top();
+    queue.pop();
+    if (!sources.empty() && sources.back() == id) continue;
+    sources.push_back(id);
+    if (from.nodes_[id].operation == Operation::kSolid) continue;
+    for (const NodeId operand : from.operands(id)) queue.push(operand);
+  }
+  std::reverse(sources.begin(), sources.end());
+  std::vector<NodeId> copies;
+  const auto copy_of = [&](NodeId id) {
+    const auto at = std::lower_bound(sources.begin(), sources.end(), id);
+    return copies[static_cast<std::size_t>(at - sources.begin())];
+  };
+  const bool moves = target_from_source != glm::dmat4(1.0);
+  std::vector<NodeId> operands;
+  for (const NodeId id : sources) {
+    const Node node = from.nodes_[id];  // by value: `from` may be this tree, which grows
+    if (node.operation == Operation::kSolid) {
+      Solid solid = from.solids_[node.first];
+      if (moves) solid.world_from_mesh = target_from_source * solid.world_from_mesh;
+      copies.push_back(add_solid(std::move(solid)));
+      continue;
+    }
+    operands.clear();
+    for (const NodeId operand : from.operands(id)) operands.push_back(copy_of(operand));
+    copies.push_back(add(node.operation, operands));
+  }
+  std::vector<NodeId> result;
+  for (const NodeId node : nodes) result.push_back(copy_of(node));
+  return result;
+}
+
+Tree::NodeId Tree::append(const Tree& from, NodeId node, const glm::dmat4& target_from_source) {
+  return append(from, std::span(&node, 1), target_from_source)[0];
+}
+
+Tree& Tree::combine(Operation operation, const Tree& other) {
+  const auto or_empty = [this](NodeId node) {
+    return node == kNone ? add(Operation::kUnion, {}) : node;
+  };
+  const NodeId first = or_empty(root_);
+  const NodeId second = or_empty(other.root_ == kNone ? kNone : append(other, other.root_));
+  root_ = add(operation, {first, second});
+  return *this;
+}
+
+Tree transform(const glm::dmat4& target_from_source, Tree tree) {
+  for (Solid& solid : tree.solids()) {
+    solid.world_from_mesh = target_from_source * solid.world_from_mesh;
+  }
+  return tree;
+}
+
+Result<void> check_tree(const Tree& tree, Tree::NodeId root) {
+  if (root == Tree::kNone) return {};
+  const std::size_t count = tree.nodes().size();
+  if (root >= count) {
+    return fail(ErrorCode::kUsage, "node {} is unknown; the tree has {} nodes", root, count);
+  }
+  std::vector<Tree::NodeId> parents(count, Tree::kNone);
+  parents[root] = root;
+  std::vector<Tree::NodeId> stack{root};
+  while (!stack.empty()) {
+    const Tree::NodeId id = stack.back();
+    stack.pop_back();
+    if (tree.nodes()[id].operation == Operation::kSolid) continue;
+    for (const Tree::NodeId operand : tree.operands(id)) {
+      if (operand >= id) {
+        return fail(ErrorCode::kUsage,
+                    "node {} takes node {}; operands must be added before the node that takes them",
+                    id, operand);
+      }
+      if (parents[operand] != Tree::kNone) {
+        return fail(ErrorCode::kUsage,
+                    "node {} is an operand twice, of node {} and of node {}; append() copies it",
+                    operand, parents[operand], id);
+      }
+      parents[operand] = id;
+      stack.push_back(operand);
+    }
+  }
+  return {};
 }
 
 Bounds bounds(const Solid& solid) {
@@ -42,6 +145,8 @@ Bounds bounds(const Tree& tree, Tree::NodeId node) {
   for (const Solid& solid : tree.solids()) solids.push_back(bounds(solid));
   return bounds(tree, node, solids);
 }
+
+Bounds bounds(const Tree& tree) { return bounds(tree, tree.root()); }
 
 namespace {
 
@@ -154,12 +259,12 @@ Bounds bounds(const Tree& tree, Tree::NodeId node, std::span<const Bounds> solid
   return node == Tree::kNone ? Bounds{} : node_bounds(tree, node + 1, solids).back();
 }
 
-std::vector<Mattering> mattering(const Tree& tree, std::span<const Bounds> solids) {
+std::vector<ActiveBox> active_boxes(const Tree& tree, std::span<const Bounds> solids) {
   const std::vector<Bounds> boxes = node_bounds(tree, tree.nodes().size(), solids);
-  std::vector<Mattering> nodes(boxes.size()), result(solids.size());
+  std::vector<ActiveBox> nodes(boxes.size()), result(solids.size());
   std::vector<std::uint8_t> is_operand(boxes.size(), 0);
   for (auto id = static_cast<Tree::NodeId>(boxes.size()); id-- > 0;) {  // from the roots down
-    Mattering& here = nodes[id];
+    ActiveBox& here = nodes[id];
     if (is_operand[id] == 0) here.box = boxes[id];
     const Tree::Node& node = tree.nodes()[id];
     if (node.operation == Operation::kSolid) {
@@ -173,8 +278,8 @@ std::vector<Mattering> mattering(const Tree& tree, std::span<const Bounds> solid
     bool first = true;
     for (const Tree::NodeId operand : tree.operands(id)) {
       nodes[operand].box.include(inner);
-      nodes[operand].taken_away =
-          here.taken_away != (node.operation == Operation::kDifference && !first);
+      nodes[operand].subtracted =
+          here.subtracted != (node.operation == Operation::kDifference && !first);
       is_operand[operand] = 1;
       first = false;
     }

@@ -333,18 +333,20 @@ Result<void> run_one(CsgCommand command, Session& session) {
   }
   outcome.write_ms = numbers_ms + session.milliseconds() - begin;
   session.end_progress();
+  // The texts are made before the outputs get their names: a run that lacks memory leaves none.
+  const std::string summary = command.summary ? csg_text(command, outcome) : "";
+  const std::string json = command.json ? csg_json(command, outcome, session) : "";
   const bool to_file = command.json && *command.json != "-";
   if (to_file) {
-    const std::string text = csg_json(command, outcome, session);
-    if (auto done = print_report(text, *command.json, false); !done) return done;
+    if (auto done = print_report(json, *command.json, false); !done) return done;
   }
   if (auto done = session.commit_outputs(); !done) return done;
   if (command.summary) {
     const bool taken = command.output == "-" || command.json == "-";
-    if (auto done = print_report(csg_text(command, outcome), "-", taken); !done) return done;
+    if (auto done = print_report(summary, "-", taken); !done) return done;
   }
   if (!command.json || to_file) return {};
-  return print_report(csg_json(command, outcome, session), *command.json, command.output == "-");
+  return print_report(json, *command.json, command.output == "-");
 }
 
 }  // namespace

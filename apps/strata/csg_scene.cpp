@@ -6,6 +6,7 @@
 #include <glm/matrix.hpp>
 #include <memory>
 #include <optional>
+#include <numeric>
 #include <set>
 #include <system_error>
 #include <utility>
@@ -110,26 +111,15 @@ Result<csg::Scene> load_one(const std::string& path, const CsgCommand& command, 
 
 /// Adds all of a scene to another one. Gives the root.
 Tree::NodeId add_scene(csg::Scene& all, const csg::Scene& part, bool with_ghosts) {
-  std::vector<Tree::NodeId> renumbered(part.tree.nodes().size());
-  std::vector<Tree::NodeId> operands;
-  for (Tree::NodeId id = 0; id < renumbered.size(); ++id) {
-    const Tree::Node& node = part.tree.nodes()[id];
-    if (node.operation == Operation::kSolid) {
-      renumbered[id] = all.tree.add_solid(part.tree.solids()[node.first]);
-      continue;
-    }
-    operands.clear();
-    for (const Tree::NodeId operand : part.tree.operands(id)) {
-      operands.push_back(renumbered[operand]);
-    }
-    renumbered[id] = all.tree.add(node.operation, operands);
-  }
+  std::vector<Tree::NodeId> nodes(part.tree.nodes().size());
+  std::iota(nodes.begin(), nodes.end(), Tree::NodeId{0});
+  const std::vector<Tree::NodeId> copies = all.tree.append(part.tree, nodes);
   if (with_ghosts) {
-    for (const Tree::NodeId ghost : part.backgrounds) all.backgrounds.push_back(renumbered[ghost]);
-    for (const Tree::NodeId ghost : part.highlights) all.highlights.push_back(renumbered[ghost]);
+    for (const Tree::NodeId ghost : part.backgrounds) all.backgrounds.push_back(copies[ghost]);
+    for (const Tree::NodeId ghost : part.highlights) all.highlights.push_back(copies[ghost]);
   }
   if (part.tree.root() == Tree::kNone) return all.tree.add(Operation::kUnion, {});
-  return renumbered[part.tree.root()];
+  return copies[part.tree.root()];
 }
 
 /// Builds an expression over inputs.

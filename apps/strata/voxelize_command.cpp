@@ -107,8 +107,8 @@ Result<void> check_thin(const VoxelizeCommand& command, VoxelizeOutcome& outcome
   options.rule = input.rule;
   if (!input.has_scene()) options.longest_edge = input.longest_edge;
   if (input.tree) {
-    options.filter = &input.tree->plain_filter();
-    options.taken_away = [&](std::uint32_t t) { return input.tree->taken_away(t); };
+    options.filter = &input.tree->unlabelled_filter();
+    options.taken_away = [&](std::uint32_t t) { return input.tree->is_subtracted(t); };
   }
   const std::uint64_t solid = outcome.report.solid_voxels;
   const char* remedy =

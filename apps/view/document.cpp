@@ -52,19 +52,6 @@ class Copier {
   [[nodiscard]] Tree& tree() { return tree_; }
   [[nodiscard]] Tree::NodeId made(Tree::NodeId old) const { return made_[old]; }
 
-  /// Another copy of what is shown below a node, for a ghost.
-  Tree::NodeId again(Tree::NodeId node) {
-    const Tree::Node what = tree_.nodes()[node];
-    if (what.operation == Operation::kSolid) {
-      csg::Solid copy = tree_.solids()[what.first];
-      return tree_.add_solid(std::move(copy));
-    }
-    const auto old = tree_.operands(node);
-    std::vector<Tree::NodeId> operands(old.begin(), old.end());
-    for (Tree::NodeId& operand : operands) operand = again(operand);
-    return tree_.add(what.operation, operands);
-  }
-
   /// The largest subtrees that take away, below a node of the new tree.
   [[nodiscard]] std::vector<Tree::NodeId> subtracted() const {
     std::vector<Tree::NodeId> found;
@@ -173,7 +160,8 @@ std::shared_ptr<const Arrangement> arrange(const Model& model, const Looks& look
   if (looks.ghosts) {
     // As one ghost: a section cuts each ghost by a box of its own that covers the whole picture.
     std::vector<Tree::NodeId> copies;
-    for (const Tree::NodeId node : copier.subtracted()) copies.push_back(copier.again(node));
+    for (const Tree::NodeId node : copier.subtracted())
+      copies.push_back(copier.tree().append(copier.tree(), node));
     if (!copies.empty()) {
       shown.highlights.push_back(copier.tree().add(Operation::kUnion, copies));
       colours.push_back(kSubtracted);

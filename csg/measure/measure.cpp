@@ -393,7 +393,13 @@ Result<Measures> measure(const Tree& tree, Tree::NodeId root, const MeasureOptio
     return fail(ErrorCode::kUsage, "the resolution of measures must be 1 to {} voxels, got {}",
                 kMost, *options.resolution);
   }
+  if (auto checked = check_tree(tree, root); !checked) return tl::unexpected(checked.error());
   return Measurer(tree, root, execution).run(options);
+}
+
+Result<Measures> measure(const Tree& tree, const MeasureOptions& options,
+                         const Execution& execution) {
+  return measure(tree, tree.root(), options, execution);
 }
 
 }  // namespace strata::csg

@@ -410,4 +410,22 @@ Result<Picture> Preview::picture(const Camera& camera, const glm::ivec2& size,
   return fail(ErrorCode::kLimit, "out of memory for a picture of {} x {} pixels", size.x, size.y);
 }
 
+Result<Picture> picture(const Tree& tree, const std::optional<Camera>& camera,
+                        const glm::ivec2& size, const PictureOptions& options,
+                        const Execution& execution) {
+  if (auto checked = check_tree(tree, tree.root()); !checked) {
+    return tl::unexpected(checked.error());
+  }
+  Preview preview(tree, {}, 0.0, execution);
+  if (camera) return preview.picture(*camera, size, options, execution);
+  Camera all;
+  const Bounds box = preview.box();
+  if (!box.empty()) {
+    centre_camera(all, box);
+    const double aspect = size.y > 0 ? static_cast<double>(size.x) / size.y : 1.0;
+    fit_camera(all, box, std::min(aspect, 1.0));
+  }
+  return preview.picture(all, size, options, execution);
+}
+
 }  // namespace strata::csg

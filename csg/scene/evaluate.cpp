@@ -258,7 +258,7 @@ void Evaluator::enter_colour(Frame& frame) {
   const bool is_set = numbers[0] >= 0.0 && numbers[1] >= 0.0 && numbers[2] >= 0.0;
   std::optional<glm::vec4>& inside = frame.inside.colour;
   if (inside && inside->r >= 0.0f) return;  // the outermost colour that is set wins
-  glm::vec4 colour(kSchemesOwn, 1.0f);
+  glm::vec4 colour(kSchemeColour, 1.0f);
   for (int i = 0; i < 4; ++i) {
     if (numbers[i] >= 0.0 && (is_set || i == 3)) {
       colour[i] = static_cast<float>(std::min(numbers[i], 1.0));
@@ -447,8 +447,7 @@ void Evaluator::show_highlights(std::size_t begin, std::size_t end, const glm::d
     }
     if (highlight != 0) {
       const Tree::NodeId shown = ghost(i, next);
-      scene_.highlights.push_back(
-          copy_nodes(std::span(&shown, 1), outer, scene_.tree, scene_.tree)[0]);
+      scene_.highlights.push_back(scene_.tree.append(scene_.tree, shown, outer));
     }
     for (; i < next; ++i) operands_[i].highlight = 0;
   }
@@ -506,7 +505,7 @@ void Evaluator::drop_leftovers() {
   kept.insert(kept.end(), scene_.highlights.begin(), scene_.highlights.end());
   kept.insert(kept.end(), beside_.begin(), beside_.end());
   Tree tree;
-  kept = copy_nodes(kept, glm::dmat4(1.0), scene_.tree, tree);
+  kept = tree.append(scene_.tree, kept);
   tree.set_root(kept[0]);
   const auto ghosts = kept.begin() + 1;
   const auto backgrounds = static_cast<std::ptrdiff_t>(scene_.backgrounds.size());

@@ -204,7 +204,7 @@ void Evaluator::add_sum(const Frame& frame, std::vector<MinkowskiPart> sum,
     Operand operand;
     operand.node = frame.node;
     const std::size_t first = scene_.tree.solids().size();
-    operand.solid = copy_nodes(std::span(&source, 1), world, scene_.tree, scene_.tree)[0];
+    operand.solid = scene_.tree.append(scene_.tree, source, world);
     // It lies inside the other parts, but the box of its operands may not.
     const Bounds reach = bounds(scene_.tree, operand.solid);
     if (!box.empty() &&
@@ -261,7 +261,7 @@ void Evaluator::resize(Frame& frame) {
     }
   }
   const glm::dmat4 world = frame.outside.world * glm::scale(glm::dmat4(1.0), scale);
-  operand.solid = copy_nodes(std::span(&child, 1), world, scene_.tree, scene_.tree)[0];
+  operand.solid = scene_.tree.append(scene_.tree, child, world);
   operands_.push_back(std::move(operand));
 }
 

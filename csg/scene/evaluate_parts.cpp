@@ -165,40 +165,4 @@ InsideRule Evaluator::inspect(std::uint32_t node, TriangleSoup& mesh) {
   return InsideRule::kWinding;
 }
 
-/// Copies subtrees between trees, or within one. Every node is an operand once at most, so nothing
-/// is met twice.
-std::vector<Tree::NodeId> Evaluator::copy_nodes(std::span<const Tree::NodeId> roots,
-                                                const glm::dmat4& target_from_source,
-                                                const Tree& from, Tree& to) {
-  std::vector<Tree::NodeId> reached(roots.begin(), roots.end());
-  for (std::size_t i = 0; i < reached.size(); ++i) {
-    if (from.nodes()[reached[i]].operation == Operation::kSolid) continue;
-    const auto operands = from.operands(reached[i]);
-    reached.insert(reached.end(), operands.begin(), operands.end());
-  }
-  std::sort(reached.begin(), reached.end());  // operands stand before the nodes that take them
-  std::vector<Tree::NodeId> copies(reached.size());
-  const auto copy_of = [&](Tree::NodeId id) {
-    const auto at = std::lower_bound(reached.begin(), reached.end(), id);
-    return copies[static_cast<std::size_t>(at - reached.begin())];
-  };
-  const bool moves = target_from_source != glm::dmat4(1.0);
-  std::vector<Tree::NodeId> operands;
-  for (std::size_t i = 0; i < reached.size(); ++i) {
-    const Tree::Node node = from.nodes()[reached[i]];
-    if (node.operation == Operation::kSolid) {
-      Solid solid = from.solids()[node.first];
-      if (moves) solid.world_from_mesh = target_from_source * solid.world_from_mesh;
-      copies[i] = to.add_solid(std::move(solid));
-    } else {
-      operands.clear();
-      for (const Tree::NodeId id : from.operands(reached[i])) operands.push_back(copy_of(id));
-      copies[i] = to.add(node.operation, operands);
-    }
-  }
-  std::vector<Tree::NodeId> result;
-  for (const Tree::NodeId root : roots) result.push_back(copy_of(root));
-  return result;
-}
-
 }  // namespace strata::csg

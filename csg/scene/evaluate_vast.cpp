@@ -98,20 +98,20 @@ Result<void> check_coordinates(Scene& scene) {
   if (farthest < kFar) return {};
   std::vector<Bounds> boxes;
   for (const Solid& solid : tree.solids()) boxes.push_back(bounds(solid));
-  const std::vector<Mattering> matters = mattering(tree, boxes);
+  const std::vector<ActiveBox> active = active_boxes(tree, boxes);
   std::set<std::string> told;
   for (std::size_t i = 0; i < boxes.size(); ++i) {
     const Solid& solid = tree.solids()[i];
-    if (boxes[i].empty() || matters[i].box.empty()) continue;
-    const Bounds own{glm::max(boxes[i].low, matters[i].box.low),
-                     glm::min(boxes[i].high, matters[i].box.high)};
-    if (!matters[i].taken_away && !(largest(own) < kMostResult)) {
+    if (boxes[i].empty() || active[i].box.empty()) continue;
+    const Bounds own{glm::max(boxes[i].low, active[i].box.low),
+                     glm::min(boxes[i].high, active[i].box.high)};
+    if (!active[i].subtracted && !(largest(own) < kMostResult)) {
       return tl::unexpected(too_far(solid, reaches[i], "result", kMostResult));
     }
     const double reach = largest(boxes[i]), error = reach * 0x1p-52;
-    const double size = matters[i].box.longest_side();
+    const double size = active[i].box.longest_side();
     if (!(error > scene.relative_precision * size)) continue;
-    if (!has_skew_face(solid, matters[i].box, error, reach) || !told.insert(solid.name).second) {
+    if (!has_skew_face(solid, active[i].box, error, reach) || !told.insert(solid.name).second) {
       continue;
     }
     scene.warnings.push_back(

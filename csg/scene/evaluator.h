@@ -180,9 +180,6 @@ class Evaluator {
   void add_outline(std::uint32_t node, const Context& context, Outline outline);
   /// Looks whether a mesh from outside is closed and outward, turns it if not, warns.
   [[nodiscard]] InsideRule inspect(std::uint32_t node, TriangleSoup& mesh);
-  std::vector<Tree::NodeId> copy_nodes(std::span<const Tree::NodeId> roots,
-                                       const glm::dmat4& target_from_source, const Tree& from,
-                                       Tree& to);
   void warn(std::uint32_t node, std::string code, std::string_view text);
   void stop(ErrorCode code, std::uint32_t node, std::string_view text);
   /// What a node makes, as far as limits go.

@@ -32,8 +32,8 @@ class SolidLists {
   /// Takes the soup away; the filter stays good.
   [[nodiscard]] TriangleSoup take_soup();
   [[nodiscard]] const TileListFilter& filter() const;
-  /// The same, never labelled.
-  [[nodiscard]] const TileListFilter& plain_filter() const;
+  /// The same, but never labelled.
+  [[nodiscard]] const TileListFilter& unlabelled_filter() const;
   /// Cuts the soup off where it does not fit the lattice of `grid`, far outside of that: lists
   /// of the grid's rays are as of the whole soup. Not while the filter has workers.
   /// @param taken  the soup, when it was taken away
@@ -44,8 +44,8 @@ class SolidLists {
   /// solid that strata/csg/solid_labels.h says. @param labels of each solid of the tree, in [1,
   /// 2^31). Not while the filter has workers.
   void set_labels(const std::vector<std::uint32_t>& labels);
-  /// Whether a triangle's solid is taken away, so that it faces into the result.
-  [[nodiscard]] bool taken_away(std::uint32_t triangle) const;
+  /// Whether a triangle's solid is subtracted, so that the triangle faces into the result.
+  [[nodiscard]] bool is_subtracted(std::uint32_t triangle) const;
   /// Index into Tree::solids().
   [[nodiscard]] std::uint32_t solid_of(std::uint32_t triangle) const;
 

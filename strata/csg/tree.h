@@ -8,22 +8,24 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "strata/core/inside_rule.h"
+#include "strata/core/result.h"
 #include "strata/mesh/soup_tools.h"
 #include "strata/mesh/triangle_soup.h"
 
 namespace strata::csg {
 
-/// Red, green and blue of a colour that is the scheme's but for its alpha.
-inline constexpr glm::vec3 kSchemesOwn{-1.0f};
+/// Marks a colour whose red, green and blue come from the colour scheme; only alpha is set.
+inline constexpr glm::vec3 kSchemeColour{-1.0f};
 
-/// The colour of a face. @param own  the scheme's
+/// The colour of a face of a solid, which may have none or only an alpha.
 [[nodiscard]] inline glm::vec4 colour_or(const std::optional<glm::vec4>& colour,
-                                         const glm::vec4& own) {
-  if (!colour) return own;
-  return colour->r < 0.0f ? glm::vec4(glm::vec3(own), colour->a) : *colour;
+                                         const glm::vec4& scheme_colour) {
+  if (!colour) return scheme_colour;
+  return colour->r < 0.0f ? glm::vec4(glm::vec3(scheme_colour), colour->a) : *colour;
 }
 
 enum class Operation : std::uint8_t { kSolid, kUnion, kIntersection, kDifference };
@@ -32,16 +34,23 @@ enum class Operation : std::uint8_t { kSolid, kUnion, kIntersection, kDifference
 struct Solid {
   /// May overlap itself, may be open or inside out; null is the empty solid.
   std::shared_ptr<const TriangleSoup> mesh;
-  glm::dmat4 world_from_mesh{1.0};  ///< affine; one that mirrors turns the triangles around
-  /// Red, green, blue (or kSchemesOwn), alpha in [0, 1]; empty: the scheme's.
+  glm::dmat4 world_from_mesh{1.0};  ///< affine; a mirroring one reverses the triangles
+  /// Red, green, blue (or kSchemeColour), alpha in [0, 1]; empty: the scheme's.
   std::optional<glm::vec4> colour = {};
   InsideRule rule = InsideRule::kWinding;  ///< which winding numbers are inside
   std::string name = {};                   ///< for messages and pick: `cube at plate.csg:12:3`
 };
 
 /// A Boolean tree of solids, as a value. No limit on solids, depth or shape; nothing is required of
-/// the solids (convexity, closedness, disjointness). Built bottom up: operands exist before the
-/// node that takes them, and each node is an operand once at most.
+/// the solids (convexity, closedness, disjointness).
+///
+/// Trees combine by operators: `(a - b) | c`. Each operator copies the nodes of its right operand,
+/// so a tree may be used any number of times; meshes are shared, not copied. `all |= part` takes
+/// time in proportion to `part`.
+///
+/// Or they are built node by node, bottom up: operands exist before the node that takes them.
+/// Below one root each node is an operand once; append() makes further copies. check_tree() tells
+/// whether a tree keeps these rules.
 class Tree {
  public:
   using NodeId = std::uint32_t;
@@ -54,15 +63,33 @@ class Tree {
     std::uint32_t count = 0;
   };
 
+  /// The empty set.
+  Tree() = default;
+  /// One solid.
+  explicit Tree(Solid solid);
+  explicit Tree(TriangleSoup mesh);
+
   NodeId add_solid(Solid solid);
   /// A node over `operands`: union (none: empty), intersection (none: empty), difference (the first
-  /// minus all others; none: empty).
+  /// minus all others; none: empty). @pre ids that this tree has given
   NodeId add(Operation operation, std::span<const NodeId> operands);
   NodeId add(Operation operation, std::initializer_list<NodeId> operands);
+  /// Copies the subtrees below nodes of a tree, which may be this one, and moves the copies.
+  /// Nodes and solids keep their order; what several of the subtrees share is copied once.
+  /// @return the copies of `nodes`
+  std::vector<NodeId> append(const Tree& from, std::span<const NodeId> nodes,
+                             const glm::dmat4& target_from_source = glm::dmat4(1.0));
+  NodeId append(const Tree& from, NodeId node,
+                const glm::dmat4& target_from_source = glm::dmat4(1.0));
 
   /// The node that is pictured, measured, voxelized; kNone: the empty set.
   void set_root(NodeId root) { root_ = root; }
   [[nodiscard]] NodeId root() const { return root_; }
+
+  /// Union, intersection and difference of the two roots become the root.
+  Tree& operator|=(const Tree& other) { return combine(Operation::kUnion, other); }
+  Tree& operator&=(const Tree& other) { return combine(Operation::kIntersection, other); }
+  Tree& operator-=(const Tree& other) { return combine(Operation::kDifference, other); }
 
   [[nodiscard]] std::span<const Solid> solids() const { return solids_; }
   [[nodiscard]] std::span<Solid> solids() { return solids_; }
@@ -72,11 +99,25 @@ class Tree {
   }
 
  private:
+  Tree& combine(Operation operation, const Tree& other);
+
   std::vector<Solid> solids_;
   std::vector<Node> nodes_;  ///< operands before the nodes that take them
   std::vector<NodeId> operands_;
   NodeId root_ = kNone;
 };
+
+[[nodiscard]] inline Tree operator|(Tree a, const Tree& b) { return std::move(a |= b); }
+[[nodiscard]] inline Tree operator&(Tree a, const Tree& b) { return std::move(a &= b); }
+[[nodiscard]] inline Tree operator-(Tree a, const Tree& b) { return std::move(a -= b); }
+
+/// Moves all solids of a tree. @pre the matrix is affine
+[[nodiscard]] Tree transform(const glm::dmat4& target_from_source, Tree tree);
+
+/// Whether the nodes below `root` are as Tree asks for. Else nothing may be done with them.
+/// @return kUsage naming the node: an id that is unknown or not older than the node that takes it,
+/// or a node that is an operand twice
+Result<void> check_tree(const Tree& tree, Tree::NodeId root);
 
 /// The least box around a solid in world space.
 [[nodiscard]] Bounds bounds(const Solid& solid);
@@ -89,15 +130,17 @@ inline constexpr double kVast = 1000.0;
 /// intersection, the first operand's for a difference. Of a first operand that is vast beside what
 /// axis-parallel boxes leave of it, as of half spaces that are made of vast cubes, only that.
 [[nodiscard]] Bounds bounds(const Tree& tree, Tree::NodeId node);
+/// The same of the root.
+[[nodiscard]] Bounds bounds(const Tree& tree);
 /// The same from the boxes of the tree's solids.
 [[nodiscard]] Bounds bounds(const Tree& tree, Tree::NodeId node, std::span<const Bounds> solids);
-/// Where a solid can matter.
-struct Mattering {
-  Bounds box;  ///< beyond it the nodes above the solid are empty, whatever it is there
-  bool taken_away = false;
+/// Where a solid can change the result.
+struct ActiveBox {
+  Bounds box;  ///< outside of it the nodes above the solid are empty, whatever the solid is there
+  bool subtracted = false;  ///< an odd number of differences above the solid subtract it
 };
-/// Of each solid. @param solids  boxes of the tree's solids
-[[nodiscard]] std::vector<Mattering> mattering(const Tree& tree, std::span<const Bounds> solids);
+/// The active box of each solid. @param solids  boxes of the tree's solids
+[[nodiscard]] std::vector<ActiveBox> active_boxes(const Tree& tree, std::span<const Bounds> solids);
 /// The box that gives a picture its depths, from the boxes of the tree's solids: around all of
 /// them; without cutters that are far larger than `shown`, which are the nodes that can be seen:
 /// they would leave it no depth.

@@ -59,22 +59,8 @@ class Pair {
     a_root_ = random.grow(a_, solids, on_grid);
     b_root_ = random.grow(b_, solids, on_grid);
   }
-  static Tree::NodeId copy(Tree& to, const Tree& from, Tree::NodeId root) {
-    std::vector<Tree::NodeId> renumbered(root + 1);
-    for (Tree::NodeId id = 0; id <= root; ++id) {
-      const Tree::Node& node = from.nodes()[id];
-      if (node.operation == Operation::kSolid) {
-        renumbered[id] = to.add_solid(from.solids()[node.first]);
-        continue;
-      }
-      std::vector<Tree::NodeId> operands;
-      for (const Tree::NodeId operand : from.operands(id)) operands.push_back(renumbered[operand]);
-      renumbered[id] = to.add(node.operation, operands);
-    }
-    return renumbered[root];
-  }
-  Tree::NodeId a(Tree& to) const { return copy(to, a_, a_root_); }
-  Tree::NodeId b(Tree& to) const { return copy(to, b_, b_root_); }
+  Tree::NodeId a(Tree& to) const { return to.append(a_, a_root_); }
+  Tree::NodeId b(Tree& to) const { return to.append(b_, b_root_); }
 
  private:
   Tree a_, b_;

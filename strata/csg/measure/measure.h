@@ -43,8 +43,11 @@ struct MeasureOptions {
 };
 
 /// Measures the result of `root`, on a grid around what result_bounds() tells of it.
-/// @return kUsage (resolution), kGeometry, kLimit, kCancelled
+/// @return kUsage (resolution, a tree that check_tree() refuses), kGeometry, kLimit, kCancelled
 Result<Measures> measure(const Tree& tree, Tree::NodeId root, const MeasureOptions& options = {},
+                         const Execution& execution = {});
+/// The same of the tree's root.
+Result<Measures> measure(const Tree& tree, const MeasureOptions& options = {},
                          const Execution& execution = {});
 
 }  // namespace strata::csg

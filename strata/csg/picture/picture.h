@@ -4,6 +4,7 @@
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -58,8 +59,9 @@ class Preview {
   /// Keeps the tree's meshes alive. Draws the tree's root and, transparent, the ghosts.
   /// @param relative_precision how far coordinates may be off, relative to the scene's size; faces
   /// nearer than that coincide (see Scene::relative_precision)
-  Preview(Tree tree, std::vector<Ghost> ghosts, double relative_precision,
-          const Execution& execution = {});
+  /// @pre check_tree() of the root and of the ghosts
+  explicit Preview(Tree tree, std::vector<Ghost> ghosts = {}, double relative_precision = 0.0,
+                   const Execution& execution = {});
   ~Preview();
   Preview(Preview&&) noexcept;
   Preview& operator=(Preview&&) noexcept;
@@ -94,6 +96,13 @@ class Preview {
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
+
+/// Draws the root of a tree once. @param camera  none: OpenSCAD's direction, with all in view
+/// @return kUsage (camera, size, options, a tree that check_tree() refuses), kGeometry, kLimit,
+/// kCancelled
+Result<Picture> picture(const Tree& tree, const std::optional<Camera>& camera = {},
+                        const glm::ivec2& size = {512, 512}, const PictureOptions& options = {},
+                        const Execution& execution = {});
 
 /// Writes a PNG file, or to standard output for "-". @return kOutput naming the file
 Result<void> write_png(const Picture& picture, const std::string& path);

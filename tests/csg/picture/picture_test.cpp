@@ -172,7 +172,7 @@ TEST(Picture, TranslucentSolidsAreBlendedNearFirstWhateverTheirOrder) {
 TEST(Picture, AnAlphaAloneMakesTheSchemesColourTranslucent) {
   Tree tree;
   const NodeId ground = tree.add_solid(box({-2, -2, -1}, {2, 2, 0}, glm::vec4(0, 0, 1, 1)));
-  const NodeId glass = tree.add_solid(box({-1, -1, 3}, {1, 1, 4}, glm::vec4(kSchemesOwn, 0.5f)));
+  const NodeId glass = tree.add_solid(box({-1, -1, 3}, {1, 1, 4}, glm::vec4(kSchemeColour, 0.5f)));
   tree.set_root(tree.add(Operation::kUnion, {ground, glass}));
   Preview preview(std::move(tree), {}, 0);
   const Picture picture = draw(preview, from_above(10, 60), {60, 60});

@@ -117,7 +117,7 @@ TEST(Evaluate, TheOutermostColourThatIsSetWins) {
   EXPECT_EQ(colour("color([0,0,1,0.25]) cube();"), glm::vec4(0, 0, 1, 0.25f));
   EXPECT_EQ(colour("color([0,0,7,2]) cube();"), blue);
   // An alpha alone leaves the scheme's colour, or that of a colour inside.
-  const glm::vec4 half(kSchemesOwn, 0.5f);
+  const glm::vec4 half(kSchemeColour, 0.5f);
   EXPECT_EQ(colour("color([-1,-1,-1,0.5]) cube();"), half);
   EXPECT_EQ(colour("color([-1,-1,-1,0.5]) color([0,0,1]) cube();"), blue);
   EXPECT_EQ(colour("color([0,0,1]) color([-1,-1,-1,0.5]) cube();"), blue);

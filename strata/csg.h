@@ -1,0 +1,34 @@
+#pragma once
+
+#include "strata/csg/measure/measure.h"
+#include "strata/csg/picture/picture.h"
+#include "strata/csg/scene/scene.h"
+#include "strata/csg/solid_lists.h"
+#include "strata/csg/tree.h"
+#include "strata/csg/view.h"
+#include "strata/mesh/shapes.h"
+#include "strata/voxelize/grid_fit.h"
+#include "strata/voxelize/voxelize.h"
+
+/// All that Boolean trees of solids need: build them of meshes by operators (csg::Tree) or read
+/// them (csg::read_scene), and make of a tree its picture (csg::picture), its volume and area
+/// (csg::measure) and its voxels (csg::voxelize). examples/csg_tree.cpp shows each.
+namespace strata::csg {
+
+/// The voxels of a tree's result, as strata::voxelize() makes them of a mesh: a voxel is solid when
+/// its centre is in the result. The options' `filter` is ignored.
+/// @return also kUsage for a tree that check_tree() refuses
+inline Result<VoxelIntervals> voxelize(const Tree& tree, const VoxelGrid& grid,
+                                       VoxelizeOptions options = {},
+                                       const Execution& execution = {},
+                                       VoxelizeReport* report = nullptr) {
+  if (auto checked = check_tree(tree, tree.root()); !checked) {
+    return tl::unexpected(checked.error());
+  }
+  SolidLists lists(tree, tree.root());
+  if (auto done = lists.fit(grid, nullptr, execution); !done) return tl::unexpected(done.error());
+  options.filter = &lists.filter();
+  return strata::voxelize(lists.soup(), grid, options, execution, report);
+}
+
+}  // namespace strata::csg
