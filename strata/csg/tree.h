@@ -16,6 +16,23 @@
 #include "strata/mesh/soup_tools.h"
 #include "strata/mesh/triangle_soup.h"
 
+// The words of csg/:
+//   solid             a mesh at its place; a leaf of the tree
+//   crossing          a point where a ray meets a triangle of a solid
+//   transition        a point where a ray enters or leaves a solid; one or several crossings
+//   visible surface   what a ray meets first of the tree's result; picture: its shaded image
+//   coincide          two crossings so close that they may be the same face, stored twice (law 5)
+//   program           the compiled tree: unions of edges, each of which may be inverted
+//   flattened         a union below a union became part of it
+//   true outside      the value of a node is true where a ray is outside of all solids
+//   union operand     a solid that is an operand of the union at the top of the tree
+//   subtracted        an odd number of differences above a solid subtract it
+//   active box        the box outside of which a solid cannot change the result
+//   vast              much larger than the result (kVast): half spaces made of huge cubes
+//   ghost             a part that a picture shows beside the result, transparent
+//   label             a number that lists of the result carry: which solid or colour a stretch has
+//   slot              the index of a solid in a tile; leaf: a solid as an operand of a program
+
 namespace strata::csg {
 
 /// Marks a colour whose red, green and blue come from the colour scheme; only alpha is set.
