@@ -21,7 +21,7 @@ class Strata : public Contender {
  public:
   Strata(StoreKind store, int threads, bool closed) : threads_(threads) {
     options_.store = store;
-    options_.closed = closed;
+    options_.closedness = closed ? Closedness::kAssumeClosed : Closedness::kAssumeOpen;
   }
   [[nodiscard]] std::string name() const override {
     switch (options_.store) {

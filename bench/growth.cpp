@@ -44,7 +44,7 @@ struct Outcome {
 Result<std::shared_ptr<Outcome>> run_job(const BenchMesh& mesh, const VoxelGrid& grid, int threads,
                                          bool statistics) {
   VoxelizeOptions options;
-  options.closed = mesh.closed;
+  options.closedness = mesh.closed ? Closedness::kAssumeClosed : Closedness::kAssumeOpen;
   options.statistics = statistics;
   auto outcome = std::make_shared<Outcome>();
   if (statistics) {

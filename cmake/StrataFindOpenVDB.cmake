@@ -1,4 +1,4 @@
-# Makes the imported target strata_openvdb when OpenVDB is here, and sets STRATA_OPENVDB_FOUND. Installed beside
+# Makes the imported target OpenVDB::openvdb, as OpenVDB's own find module does, when OpenVDB is here, and sets STRATA_OPENVDB_FOUND. Installed beside
 # strataConfig.cmake. OpenVDB's own find module needs boost-iostreams' headers; linking it needs nothing of the kind.
 find_path(OPENVDB_INCLUDE_DIR openvdb/openvdb.h)
 find_library(OPENVDB_LIBRARY openvdb)
@@ -8,9 +8,9 @@ find_package(Imath CONFIG QUIET)
 set(STRATA_OPENVDB_FOUND OFF)
 if(OPENVDB_INCLUDE_DIR AND OPENVDB_LIBRARY AND TBB_FOUND AND Imath_FOUND)
   set(STRATA_OPENVDB_FOUND ON)
-  if(NOT TARGET strata_openvdb)
-    add_library(strata_openvdb INTERFACE IMPORTED)
-    target_include_directories(strata_openvdb SYSTEM INTERFACE "${OPENVDB_INCLUDE_DIR}")
-    target_link_libraries(strata_openvdb INTERFACE "${OPENVDB_LIBRARY}" TBB::tbb Imath::Imath)
+  if(NOT TARGET OpenVDB::openvdb)
+    add_library(OpenVDB::openvdb INTERFACE IMPORTED)
+    target_include_directories(OpenVDB::openvdb SYSTEM INTERFACE "${OPENVDB_INCLUDE_DIR}")
+    target_link_libraries(OpenVDB::openvdb INTERFACE "${OPENVDB_LIBRARY}" TBB::tbb Imath::Imath)
   endif()
 endif()

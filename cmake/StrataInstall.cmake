@@ -1,6 +1,7 @@
 # The umbrella target strata::strata, the target `product` (all that is installed), and install(): headers, libraries,
 # tools, the CMake package and strata.pc. It takes what strata_add_library and strata_add_tool have listed.
 get_property(strata_libraries GLOBAL PROPERTY STRATA_LIBRARIES)
+get_property(strata_bridges GLOBAL PROPERTY STRATA_BRIDGES)
 get_property(strata_tools GLOBAL PROPERTY STRATA_TOOLS)
 if(TARGET strata AND NOT "strata" IN_LIST strata_tools)
   list(APPEND strata_tools strata)
@@ -11,7 +12,7 @@ add_library(strata::strata ALIAS strata_all)
 set_target_properties(strata_all PROPERTIES EXPORT_NAME strata)
 target_link_libraries(strata_all INTERFACE ${strata_libraries})
 add_custom_target(product)
-add_dependencies(product ${strata_libraries} ${strata_tools})
+add_dependencies(product ${strata_libraries} ${strata_bridges} ${strata_tools})
 
 if(NOT STRATA_INSTALL)
   return()
@@ -38,6 +39,9 @@ endforeach()
 list(REMOVE_DUPLICATES strata_folders)
 foreach(folder IN LISTS strata_folders)
   file(GLOB headers CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/strata/${folder}/*.h")
+  if(NOT STRATA_HAVE_OPENVDB)
+    list(FILTER headers EXCLUDE REGEX "/openvdb_bridge\\.h$")
+  endif()
   if(NOT STRATA_HAVE_OPENMESH)
     list(FILTER headers EXCLUDE REGEX "/openmesh_bridge\\.h$")
   endif()
@@ -87,7 +91,6 @@ strata_depends(PkgConfig::epoxy "${pc_modules}(epoxy REQUIRED QUIET IMPORTED_TAR
 strata_depends(pugixml::pugixml "find_dependency(pugixml CONFIG)" pugixml "")
 strata_depends(OpenEXR::OpenEXR "find_dependency(OpenEXR CONFIG)" OpenEXR "")
 strata_depends(OpenMeshCore "find_dependency(OpenMesh CONFIG)" "" "-lOpenMeshCore")  # Debian has no module of it
-strata_depends(strata_openvdb "include(\"\${CMAKE_CURRENT_LIST_DIR}/StrataFindOpenVDB.cmake\")" Imath "-lopenvdb")
 if(strata_links)
   message(FATAL_ERROR "cmake/StrataInstall.cmake does not know what a user needs for: ${strata_links}")
 endif()
@@ -95,7 +98,12 @@ foreach(list strata_pc_requires strata_pc_libraries)
   string(REGEX REPLACE " +" " " ${list} "${${list}}")
   string(STRIP "${${list}}" ${list})
 endforeach()
-if(STRATA_HAVE_OPENVDB)
+set(strata_find_bridges "")
+if(strata_bridges)  # without OpenVDB there is no target strata::openvdb, and all else works
+  install(TARGETS ${strata_bridges} EXPORT strata_bridges)
+  install(EXPORT strata_bridges NAMESPACE strata:: FILE strataBridges.cmake DESTINATION "${strata_package_dir}")
+  string(APPEND strata_find_bridges "include(\"\${CMAKE_CURRENT_LIST_DIR}/StrataFindOpenVDB.cmake\")\n"
+    "if(STRATA_OPENVDB_FOUND)\n  include(\"\${CMAKE_CURRENT_LIST_DIR}/strataBridges.cmake\")\nendif()\n")
   install(FILES "${PROJECT_SOURCE_DIR}/cmake/StrataFindOpenVDB.cmake" DESTINATION "${strata_package_dir}")
 endif()
 configure_package_config_file("${PROJECT_SOURCE_DIR}/cmake/strataConfig.cmake.in" "${PROJECT_BINARY_DIR}/strataConfig.cmake"

@@ -42,9 +42,10 @@ endfunction()
 
 # strata_add_library(NAME SOURCES... [PUBLIC targets...] [PRIVATE targets...])
 #   makes strata_NAME, alias strata::NAME, headers found as "NAME/file.h" from the project's root. It is installed, and
-#   part of the umbrella strata::strata, unless it is INTERNAL.
+#   part of the umbrella strata::strata, unless it is INTERNAL. A BRIDGE is installed but no part of the umbrella: who
+#   links it needs a library that others do not.
 function(strata_add_library name)
-  cmake_parse_arguments(arg "INTERNAL" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  cmake_parse_arguments(arg "INTERNAL;BRIDGE" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
   add_library(strata_${name} STATIC ${arg_SOURCES})
   add_library(strata::${name} ALIAS strata_${name})
   set_target_properties(strata_${name} PROPERTIES EXPORT_NAME ${name} UNITY_BUILD ${STRATA_JOIN_SOURCES})
@@ -53,7 +54,9 @@ function(strata_add_library name)
   target_compile_features(strata_${name} PUBLIC cxx_std_20)
   target_link_libraries(strata_${name} PUBLIC ${arg_PUBLIC} PRIVATE ${arg_PRIVATE})
   strata_set_flags(strata_${name})
-  if(NOT arg_INTERNAL)
+  if(arg_BRIDGE)
+    set_property(GLOBAL APPEND PROPERTY STRATA_BRIDGES strata_${name})
+  elseif(NOT arg_INTERNAL)
     set_property(GLOBAL APPEND PROPERTY STRATA_LIBRARIES strata_${name})
   endif()
 endfunction()

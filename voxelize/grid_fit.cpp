@@ -186,4 +186,24 @@ Result<VoxelGrid> fit_grid(const Bounds& mesh_bounds, const GridRequest& request
   return grid;
 }
 
+Result<void> check_grid(const VoxelGrid& grid) {
+  for (int axis = 0; axis < 3; ++axis) {
+    if (grid.dims[axis] < 1 || grid.dims[axis] > kMaxGridSide) {
+      return fail(ErrorCode::kUsage, "a grid must have 1 to {} voxels along {}, got {}",
+                  kMaxGridSide, kAxisNames[axis], grid.dims[axis]);
+    }
+    const double size = grid.voxel_size[axis], origin = grid.origin[axis];
+    if (!(size > 0) || !std::isfinite(size)) {
+      return fail(ErrorCode::kUsage,
+                  "a grid's voxel size along {} must be finite and above 0, got {}",
+                  kAxisNames[axis], size);
+    }
+    if (!std::isfinite(origin)) {
+      return fail(ErrorCode::kUsage, "a grid's origin along {} must be finite, got {}",
+                  kAxisNames[axis], origin);
+    }
+  }
+  return {};
+}
+
 }  // namespace strata

@@ -1,7 +1,8 @@
 #include "strata/voxelize/intervals.h"
 
 #include <algorithm>
-#include <cstring>
+#include <new>
+#include <stdexcept>
 
 namespace strata {
 
@@ -58,6 +59,11 @@ std::uint64_t VoxelIntervals::solid_voxels() const {
   return count;
 }
 
+bool VoxelIntervals::has_labels() const {
+  return std::any_of(tiles_.begin(), tiles_.end(),
+                     [](const Tile& tile) { return tile.labels != nullptr; });
+}
+
 std::uint64_t VoxelIntervals::memory_bytes() const {
   std::uint64_t bytes = tiles_.size() * sizeof(Tile);
   for (const Tile& tile : tiles_) {
@@ -67,6 +73,63 @@ std::uint64_t VoxelIntervals::memory_bytes() const {
                    (sizeof(Interval) + (tile.labels ? sizeof(std::uint32_t) : 0));
   }
   return bytes;
+}
+
+bool VoxelIntervals::contains(int i, int j, int k) const {
+  const glm::ivec3 at(i, j, k);
+  const AxisFrame frame(axis_);
+  const int u = at[frame.u], v = at[frame.v], w = at[frame.w];
+  if (u < 0 || u >= columns_ || v < v_begin_ || v >= v_end_) return false;
+  const auto runs = column(u, v);
+  const auto after = std::upper_bound(runs.begin(), runs.end(), w,
+                                      [](int place, Interval run) { return place < run.begin(); });
+  return after != runs.begin() && w < std::prev(after)->end();
+}
+
+namespace {
+
+/// value(label) for each solid voxel, 0 for the others.
+template <class T, class Value>
+Result<std::vector<T>> dense(const VoxelIntervals& set, const Execution& execution, Value&& value) {
+  const glm::ivec3 dims = set.grid().dims;
+  const auto x = static_cast<std::size_t>(dims.x), y = static_cast<std::size_t>(dims.y);
+  const std::size_t voxels = x * y * static_cast<std::size_t>(dims.z);  // below 2^48
+  const auto too_large = [&] {
+    return fail(ErrorCode::kLimit, "no memory for an array of {} x {} x {} voxels of {} bytes",
+                dims.x, dims.y, dims.z, sizeof(T));
+  };
+  if (execution.memory_limit != 0 && voxels * sizeof(T) > execution.memory_limit) {
+    return too_large();
+  }
+  try {
+    std::vector<T> result(voxels);
+    const std::size_t steps[3] = {1, x, x * y};
+    const std::size_t step = steps[AxisFrame(set.axis()).w];
+    for_each_run(set, [&](const glm::ivec3& first, const glm::ivec3& last, std::uint32_t label) {
+      std::size_t at = 0, end = 0;
+      for (int axis = 0; axis < 3; ++axis) {
+        at += steps[axis] * static_cast<std::size_t>(first[axis]);
+        end += steps[axis] * static_cast<std::size_t>(last[axis]);
+      }
+      for (; at <= end; at += step) result[at] = value(label);
+    });
+    return result;
+  } catch (const std::bad_alloc&) {
+    return too_large();
+  } catch (const std::length_error&) {
+    return too_large();
+  }
+}
+
+}  // namespace
+
+Result<std::vector<std::uint8_t>> to_dense(const VoxelIntervals& set, const Execution& execution) {
+  return dense<std::uint8_t>(set, execution, [](std::uint32_t) { return std::uint8_t{1}; });
+}
+
+Result<std::vector<std::uint32_t>> to_dense_labels(const VoxelIntervals& set,
+                                                   const Execution& execution) {
+  return dense<std::uint32_t>(set, execution, [](std::uint32_t label) { return label; });
 }
 
 }  // namespace strata

@@ -4,7 +4,10 @@
 #include <vector>
 
 #include "raster/tile_bins.h"
-#include "strata/voxelize/voxelize.h"
+#include "strata/hashbuffer/list_filter.h"
+#include "strata/hashbuffer/list_source.h"
+#include "strata/voxelize/intervals.h"
+#include "strata/voxelize/voxelize_options.h"
 #include "voxelize/open/winding_field.h"
 #include "voxelize/tile_walk.h"
 

@@ -157,15 +157,6 @@ class Transposer {
   std::vector<Interval> items_;
 };
 
-bool has_labels(const VoxelIntervals& set) {
-  for (int tv = 0; tv < set.tiles_v(); ++tv) {
-    for (int tu = 0; tu < set.tiles_u(); ++tu) {
-      if (!set.tile(tu, tv).labels.empty()) return true;
-    }
-  }
-  return false;
-}
-
 }  // namespace
 
 VoxelIntervals transposed(const VoxelIntervals& set, Axis axis, const Execution& execution) {
@@ -180,7 +171,7 @@ VoxelIntervals transposed(const VoxelIntervals& set, Axis axis, const Execution&
     }
     return result;
   }
-  const bool labelled = has_labels(set);
+  const bool labelled = set.has_labels();
   const int fixed = 3 - static_cast<int>(axis) - static_cast<int>(set.axis());
   std::vector<std::unique_ptr<Transposer>> workers(size(execution.thread_count()));
   parallel_for(execution, size((set.grid().dims[fixed] + kSide - 1) / kSide),

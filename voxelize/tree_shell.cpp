@@ -14,7 +14,7 @@ using surface::Bins;
 using surface::Budget;
 
 /// The scratch of one thread, and its work on one tile.
-struct TreeSurface::Worker {
+struct TreeShell::Worker {
   explicit Worker(const VoxelizeOptions& options)
       : builder({.store = options.store, .offsets = options.offsets}),
         filter(options.filter->worker()) {}
@@ -44,10 +44,10 @@ struct TreeSurface::Worker {
   std::vector<Interval> items;
 };
 
-void TreeSurface::Worker::find_faces(const LatticeMesh& mesh,
-                                     std::span<const std::uint32_t> triangles,
-                                     const surface::Window& window, AxisFrame frame,
-                                     const VoxelizeOptions& options) {
+void TreeShell::Worker::find_faces(const LatticeMesh& mesh,
+                                   std::span<const std::uint32_t> triangles,
+                                   const surface::Window& window, AxisFrame frame,
+                                   const VoxelizeOptions& options) {
   found.clear();
   for (std::size_t i = 0; i < triangles.size();) {
     const std::uint32_t solid = options.filter->solid_of(triangles[i]);
@@ -74,7 +74,7 @@ void TreeSurface::Worker::find_faces(const LatticeMesh& mesh,
   for (const Found& one : found) faces[next[one.local]++] = one.run;
 }
 
-bool TreeSurface::Worker::keep(const TileLists<DepthItem>& lists) {
+bool TreeShell::Worker::keep(const TileLists<DepthItem>& lists) {
   offsets.assign(1, 0);
   items.clear();
   for (std::size_t local = 0; local < VoxelIntervals::kTileColumns; ++local) {
@@ -92,10 +92,9 @@ bool TreeSurface::Worker::keep(const TileLists<DepthItem>& lists) {
   return !items.empty();
 }
 
-Result<TreeSurface> TreeSurface::create(const LatticeMesh& mesh, const VoxelGrid& grid,
-                                        const VoxelizeOptions& options,
-                                        const Execution& execution) {
-  TreeSurface result;
+Result<TreeShell> TreeShell::create(const LatticeMesh& mesh, const VoxelGrid& grid,
+                                    const VoxelizeOptions& options, const Execution& execution) {
+  TreeShell result;
   result.mesh_ = &mesh;
   result.grid_ = &grid;
   result.options_ = options;
@@ -109,7 +108,7 @@ Result<TreeSurface> TreeSurface::create(const LatticeMesh& mesh, const VoxelGrid
   return result;
 }
 
-Result<VoxelIntervals> TreeSurface::slab(int v_begin, int v_end, const Execution& execution) {
+Result<VoxelIntervals> TreeShell::slab(int v_begin, int v_end, const Execution& execution) {
   try {
     const AxisFrame frame(options_.axis);
     VoxelIntervals slab(*grid_, options_.axis, v_begin, v_end);

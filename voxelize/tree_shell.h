@@ -4,7 +4,9 @@
 #include <vector>
 
 #include "raster/tile_bins.h"
-#include "strata/voxelize/voxelize.h"
+#include "strata/hashbuffer/list_filter.h"
+#include "strata/voxelize/intervals.h"
+#include "strata/voxelize/voxelize_options.h"
 
 // Private to voxelize/.
 
@@ -15,11 +17,11 @@ namespace strata {
 /// others being as they are at its centre. Where the faces in a voxel are of one solid that is the
 /// tree's surface; where several solids have faces in it, none of the surface is lost, and a voxel
 /// may be kept that it misses.
-class TreeSurface {
+class TreeShell {
  public:
   /// Keeps references to `mesh` and `grid`. @pre options.filter is set
-  static Result<TreeSurface> create(const LatticeMesh& mesh, const VoxelGrid& grid,
-                                    const VoxelizeOptions& options, const Execution& execution);
+  static Result<TreeShell> create(const LatticeMesh& mesh, const VoxelGrid& grid,
+                                  const VoxelizeOptions& options, const Execution& execution);
 
   /// Rows [v_begin, v_end), as voxelize_surface() has them.
   Result<VoxelIntervals> slab(int v_begin, int v_end, const Execution& execution);

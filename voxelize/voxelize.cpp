@@ -7,8 +7,11 @@
 #include <utility>
 #include <vector>
 
+#include "strata/hashbuffer/list_filter.h"
+#include "strata/mesh/diagnose.h"
 #include "strata/raster/lattice_mesh.h"
 #include "strata/voxelize/checksum.h"
+#include "strata/voxelize/grid_fit.h"
 #include "strata/voxelize/shell_voxels.h"
 #include "voxelize/open/boundary_caps.h"
 #include "voxelize/open/winding_field.h"
@@ -18,22 +21,6 @@
 
 namespace strata {
 namespace {
-
-Result<void> check_grid(const VoxelGrid& grid) {
-  for (int axis = 0; axis < 3; ++axis) {
-    if (grid.dims[axis] < 1 || grid.dims[axis] > kMaxGridSide) {
-      return fail(ErrorCode::kUsage, "the grid has {} voxels along {}; 1 to {} can be had",
-                  grid.dims[axis], "xyz"[axis], kMaxGridSide);
-    }
-    if (!(grid.voxel_size[axis] > 0) || !std::isfinite(grid.voxel_size[axis]) ||
-        !std::isfinite(grid.origin[axis])) {
-      return fail(ErrorCode::kUsage,
-                  "voxel size {} and origin {} along {} must be finite, the size > 0",
-                  grid.voxel_size[axis], grid.origin[axis], "xyz"[axis]);
-    }
-  }
-  return {};
-}
 
 /// Rows of a slab whose intervals are expected to stay within an eighth of the memory limit.
 /// With samples of voxels, whole tiles of those.
@@ -72,11 +59,11 @@ Result<void> check_samples(const VoxelGrid& grid, const VoxelizeOptions& options
 class SolidSlabs {
  public:
   /// Keeps references to all arguments but `execution`.
-  static Result<SolidSlabs> create(const LatticeMesh& mesh, const VoxelGrid& grid,
+  static Result<SolidSlabs> create(const LatticeMesh& mesh, const VoxelGrid& grid, bool closed,
                                    const VoxelizeOptions& options, const Execution& execution) {
     SolidSlabs result;
     const LatticeMesh* whole = &mesh;
-    if (!options.closed) {
+    if (!closed) {
       if (auto caps = boundary_caps(mesh, execution); !caps.triangles.empty()) {
         result.open_ = std::make_unique<Open>(mesh, std::move(caps), grid, execution.stop);
         if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
@@ -140,77 +127,138 @@ class SolidSlabs {
 /// Takes a finished slab over.
 using OwningSink = std::function<Result<void>(VoxelIntervals&&)>;
 
+/// Options that no mesh could be voxelized with.
+Result<void> check_options(const VoxelGrid& grid, const VoxelizeOptions& options) {
+  if (auto valid = check_grid(grid); !valid) return valid;
+  if (auto valid = check_samples(grid, options); !valid) return valid;
+  if (!options.solid && !options.surface) {
+    return fail(ErrorCode::kUsage, "neither the solid nor the surface is asked for");
+  }
+  if (options.filter != nullptr && options.closedness == Closedness::kAssumeOpen) {
+    return fail(ErrorCode::kUsage,
+                "the lists of a Boolean tree are closed; voting on open meshes does not apply");
+  }
+  if (options.filter != nullptr && options.surface && options.filter->labelled()) {
+    return fail(ErrorCode::kUsage, "labels need a solid voxelization without its surface");
+  }
+  return {};
+}
+
+/// What is assumed of the mesh, or found out where it matters.
+bool counts_as_closed(const TriangleSoup& mesh, const VoxelizeOptions& options,
+                      const Execution& execution) {
+  const bool matters = options.solid || options.open == OpenMode::kFail;
+  if (options.closedness != Closedness::kCheck || options.filter != nullptr || !matters) {
+    return options.closedness != Closedness::kAssumeOpen;
+  }
+  if (is_closed(mesh, execution)) return true;
+  return options.rule == InsideRule::kParity && diagnose(mesh, execution).even;
+}
+
+/// The surface of a mesh or of a tree, slab by slab.
+class ShellSlabs {
+ public:
+  /// Keeps references to all arguments but `execution`.
+  static Result<ShellSlabs> create(const LatticeMesh& mesh, const VoxelGrid& grid,
+                                   const VoxelizeOptions& options, const Execution& execution) {
+    ShellSlabs result;
+    result.mesh_ = &mesh;
+    result.grid_ = &grid;
+    result.options_ = &options;
+    if (options.filter == nullptr) return result;
+    auto made = TreeShell::create(mesh, grid, options, execution);
+    if (!made) return tl::unexpected(made.error());
+    result.tree_ = *std::move(made);
+    return result;
+  }
+  Result<VoxelIntervals> slab(int v_begin, int v_end, const Execution& execution) {
+    return tree_ ? tree_->slab(v_begin, v_end, execution)
+                 : voxelize_surface(*mesh_, *grid_, options_->surface_kind, options_->axis, v_begin,
+                                    v_end, execution);
+  }
+
+ private:
+  const LatticeMesh* mesh_ = nullptr;
+  const VoxelGrid* grid_ = nullptr;
+  const VoxelizeOptions* options_ = nullptr;
+  std::optional<TreeShell> tree_;
+};
+
+/// What is asked of a mesh, slab by slab: its solid, its surface, or both.
+class Slabs {
+ public:
+  /// Keeps references to all arguments but `execution`.
+  static Result<Slabs> create(const LatticeMesh& mesh, const VoxelGrid& grid, bool closed,
+                              const VoxelizeOptions& options, const Execution& execution) {
+    Slabs result(grid, options.axis);
+    const bool open_surface = !closed && options.open == OpenMode::kSurface;
+    if (options.surface || open_surface) {
+      auto made = ShellSlabs::create(mesh, grid, options, execution);
+      if (!made) return tl::unexpected(made.error());
+      result.shell_ = *std::move(made);
+    }
+    if (options.solid && !open_surface) {
+      auto made = SolidSlabs::create(mesh, grid, closed, options, execution);
+      if (!made) return tl::unexpected(made.error());
+      result.solid_ = *std::move(made);
+    }
+    return result;
+  }
+
+  Result<VoxelIntervals> slab(int v_begin, int v_end, const Execution& execution,
+                              VoxelizeReport& report) {
+    auto solid = solid_ ? solid_->slab(v_begin, v_end, execution, report)
+                        : VoxelIntervals(*grid_, axis_, v_begin, v_end);
+    if (!solid || !shell_) return solid;
+    auto shell = shell_->slab(v_begin, v_end, execution);
+    return shell && solid_ ? union_intervals(*solid, *shell, execution) : std::move(shell);
+  }
+
+ private:
+  Slabs(const VoxelGrid& grid, Axis axis) : grid_(&grid), axis_(axis) {}
+
+  const VoxelGrid* grid_;
+  Axis axis_;
+  std::optional<SolidSlabs> solid_;
+  std::optional<ShellSlabs> shell_;
+};
+
+/// Takes a finished slab over.
+using OwningSink = std::function<Result<void>(VoxelIntervals&&)>;
+
 /// The work of both entry points: slabs, or one, go to `sink` in increasing v.
 /// @param asked the grid of the result; inside, `grid` is that of the samples
 Result<VoxelizeReport> run(const TriangleSoup& mesh, const VoxelGrid& asked,
                            const VoxelizeOptions& options, const Execution& execution,
                            bool in_slabs, const OwningSink& sink) {
-  if (auto valid = check_grid(asked); !valid) return tl::unexpected(valid.error());
-  if (auto valid = check_samples(asked, options); !valid) return tl::unexpected(valid.error());
-  if (!options.solid && !options.surface) {
-    return fail(ErrorCode::kUsage, "neither the solid nor the surface is asked for");
-  }
-  if (options.filter != nullptr && !options.closed) {
-    return fail(ErrorCode::kUsage, "the lists of a Boolean tree are closed; there is no vote");
-  }
-  if (options.filter != nullptr && options.surface && options.filter->labelled()) {
-    return fail(ErrorCode::kUsage, "labels are of solids, the surface has none");
-  }
-  if (!options.closed && options.open == OpenMode::kFail) {
-    return fail(ErrorCode::kGeometry, "the mesh is not closed");
-  }
+  if (auto valid = check_options(asked, options); !valid) return tl::unexpected(valid.error());
   const VoxelGrid grid = refined(asked, options.samples);
-  const int step =
-      in_slabs ? slab_rows(grid, options.axis, options.samples, execution) : kMaxGridSide;
-  const auto snapped = snap_to_lattice(mesh, grid, execution);
-  if (!snapped) return tl::unexpected(snapped.error());
-  const LatticeMesh& lattice = *snapped;
-
-  VoxelizeReport report;
-  SetChecksum checksum(asked);
+  const auto lattice = snap_to_lattice(mesh, grid, execution);
+  if (!lattice) return tl::unexpected(lattice.error());
   Execution quiet = execution;  // inner phases do not report progress of their own
   quiet.progress = {};
-  const bool open_surface = !options.closed && options.open == OpenMode::kSurface;
-  const bool solid = options.solid && !open_surface;
-  const bool surface = options.surface || open_surface;
-  std::optional<TreeSurface> tree;
-  if (surface && options.filter != nullptr) {
-    auto made = TreeSurface::create(lattice, grid, options, quiet);
-    if (!made) return tl::unexpected(made.error());
-    tree = *std::move(made);
+  VoxelizeReport report;
+  report.closed = counts_as_closed(mesh, options, quiet);
+  if (!report.closed && options.open == OpenMode::kFail) {
+    return fail(ErrorCode::kGeometry, "the mesh is not closed");
   }
+  auto slabs = Slabs::create(*lattice, grid, report.closed, options, quiet);
+  if (!slabs) return tl::unexpected(slabs.error());
 
-  const auto pass_on = [&](VoxelIntervals&& slab) -> Result<void> {
-    if (surface) {
-      auto skin = tree ? tree->slab(slab.v_begin(), slab.v_end(), quiet)
-                       : voxelize_surface(lattice, grid, options.surface_kind, options.axis,
-                                          slab.v_begin(), slab.v_end(), quiet);
-      if (skin && solid) skin = union_intervals(slab, *skin, quiet);
-      if (!skin) return tl::unexpected(skin.error());
-      slab = std::move(*skin);
-    }
-    if (options.samples > 1) slab = count_samples(slab, asked, options.samples, quiet);
-    if (options.statistics) {
-      report.solid_voxels += slab.solid_voxels();
-      report.intervals += slab.interval_count();
-      checksum.add(slab, quiet);
-    }
-    return sink(std::move(slab));
-  };
-
-  std::optional<SolidSlabs> slabs;
-  if (solid) {
-    auto made = SolidSlabs::create(lattice, grid, options, quiet);
-    if (!made) return tl::unexpected(made.error());
-    slabs = *std::move(made);
-  }
+  SetChecksum checksum(asked);
   const int rows = grid.dims[AxisFrame(options.axis).v];
+  const int step = in_slabs ? slab_rows(grid, options.axis, options.samples, execution) : rows;
   for (int v = 0; v < rows; v += step) {
     const int end = std::min(rows, v + step);
-    Result<VoxelIntervals> slab =
-        slabs ? slabs->slab(v, end, quiet, report) : VoxelIntervals(grid, options.axis, v, end);
+    auto slab = slabs->slab(v, end, quiet, report);
     if (!slab) return tl::unexpected(slab.error());
-    if (auto done = pass_on(std::move(*slab)); !done) return tl::unexpected(done.error());
+    if (options.samples > 1) *slab = count_samples(*slab, asked, options.samples, quiet);
+    if (options.statistics) {
+      report.solid_voxels += slab->solid_voxels();
+      report.intervals += slab->interval_count();
+      checksum.add(*slab, quiet);
+    }
+    if (auto done = sink(std::move(*slab)); !done) return tl::unexpected(done.error());
     if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
     if (execution.progress) execution.progress(static_cast<double>(end) / rows);
   }

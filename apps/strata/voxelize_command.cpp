@@ -276,14 +276,14 @@ Result<void> voxelize_and_write(const VoxelizeCommand& command, VoxelizeOutcome&
   options.surface = command.surface;
   options.surface_kind = command.surface_kind;
   options.open = command.open;
-  options.closed = outcome.input.closed;
+  options.closedness = outcome.input.closed ? Closedness::kAssumeClosed : Closedness::kAssumeOpen;
   options.store = command.store;
   options.offsets = command.offsets;
   if (outcome.input.tree) {
     options.filter = &outcome.input.tree->filter();
     if (is_surface_alone(command, outcome.input)) options.solid = false, options.surface = true;
-    options.closed = true;                // it makes closed lists of open ones
-    options.rule = InsideRule::kWinding;  // the solids' rules are the filter's
+    options.closedness = Closedness::kAssumeClosed;  // it makes closed lists of open ones
+    options.rule = InsideRule::kWinding;             // the solids' rules are the filter's
   }
   options.statistics = command.stats || command.json || command.checksum;
   std::unique_ptr<Gpu> gpu;

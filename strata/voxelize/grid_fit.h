@@ -14,17 +14,17 @@ namespace strata {
 /// How large a grid is wanted. Exactly one of `resolution`, `voxel_size` and `dims` is set.
 struct GridRequest {
   /// Voxels along the longest side of the box; cubic voxels. Padding is added to it.
-  std::optional<std::int64_t> resolution;
+  std::optional<std::int64_t> resolution{};
   /// World length of a voxel along x, y, z.
-  std::optional<glm::dvec3> voxel_size;
+  std::optional<glm::dvec3> voxel_size{};
   /// Voxels along x, y, z, padding included; voxels are stretched to fit the box.
-  std::optional<std::array<std::int64_t, 3>> dims;
+  std::optional<std::array<std::int64_t, 3>> dims{};
 
   /// The box to cover, in place of that of the mesh.
-  std::optional<Bounds> bounds;
+  std::optional<Bounds> bounds{};
   /// The lower corner of the grid, padding aside, in place of that of the box. What lies below it
   /// is cut off.
-  std::optional<glm::dvec3> origin;
+  std::optional<glm::dvec3> origin{};
   std::int64_t padding = 0;  ///< empty voxels on each of the six sides
   bool align = false;        ///< the origin becomes a multiple of the voxel size, at most one lower
 };
@@ -39,5 +39,9 @@ struct GridRequest {
 /// coordinates too large for the voxel size, nothing beyond the origin; kLimit: more than
 /// kMaxGridSide voxels along a side. Each names the number.
 Result<VoxelGrid> fit_grid(const Bounds& mesh_bounds, const GridRequest& request);
+
+/// Whether a grid of one's own keeps the ranges of VoxelGrid. @return kUsage, with the axis and the
+/// number
+Result<void> check_grid(const VoxelGrid& grid);
 
 }  // namespace strata

@@ -4,9 +4,12 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
+#include "strata/core/execution.h"
 #include "strata/core/grid.h"
+#include "strata/core/result.h"
 
 namespace strata {
 
@@ -62,6 +65,8 @@ class VoxelIntervals {
     const std::size_t local = local_of(u, v);
     return {tile.labels.get() + tile.offsets[local], tile.offsets[local + 1] - tile.offsets[local]};
   }
+  /// Whether voxel (i, j, k) is solid; false outside the grid and the slab. O(log of the column).
+  [[nodiscard]] bool contains(int i, int j, int k) const;
   /// True when no column of tile (tu, tv) of this slab is solid anywhere: lets writers skip it.
   [[nodiscard]] bool tile_empty(int tu, int tv) const {
     return !tiles_[static_cast<std::size_t>(tv) * static_cast<std::size_t>(tiles_u_) +
@@ -98,6 +103,7 @@ class VoxelIntervals {
   [[nodiscard]] std::uint64_t solid_voxels() const;  ///< sum of the lengths; O(intervals)
   /// Runs of solid voxels, whatever their labels are. O(intervals) where there are labels.
   [[nodiscard]] std::uint64_t interval_count() const;
+  [[nodiscard]] bool has_labels() const;             ///< that any of its intervals has one
   [[nodiscard]] std::uint64_t memory_bytes() const;  ///< bytes held by the tiles
 
  private:
@@ -141,36 +147,32 @@ void for_each_labelled(const VoxelIntervals& set, int u, int v, Run&& run) {
   }
 }
 
-/// Builds intervals from a predicate solid(i, j, k), by brute force: for tests and small grids.
-template <class Predicate>
-VoxelIntervals intervals_from_predicate(const VoxelGrid& grid, Axis axis, Predicate&& solid) {
-  const AxisFrame frame(axis);
-  VoxelIntervals result(grid, axis);
-  constexpr int kSide = VoxelIntervals::kTileSide;
-  for (int tv = 0; tv < result.tiles_v(); ++tv) {
-    for (int tu = 0; tu < result.tiles_u(); ++tu) {
-      std::vector<std::uint32_t> offsets(1, 0);
-      std::vector<Interval> items;
-      for (int local = 0; local < kSide * kSide; ++local) {
-        glm::ivec3 index{0};
-        index[frame.u] = tu * kSide + local % kSide;
-        index[frame.v] = tv * kSide + local / kSide;
-        if (index[frame.u] < grid.dims[frame.u] && index[frame.v] < grid.dims[frame.v]) {
-          bool inside = false;
-          for (int k = 0; k < grid.dims[frame.w]; ++k) {
-            index[frame.w] = k;
-            const bool now = solid(index.x, index.y, index.z);
-            if (now && !inside) items.push_back({static_cast<std::uint16_t>(k), 0});
-            if (now) items.back().last = static_cast<std::uint16_t>(k);
-            inside = now;
-          }
-        }
-        offsets.push_back(static_cast<std::uint32_t>(items.size()));
-      }
-      if (!items.empty()) result.set_tile(tu, tv, offsets, items);
+/// Calls run(first, last, label) for each run of solid voxels: voxels `first` to `last`, which
+/// differ along set.axis() alone, both of the run. Columns come in the order of v, then u. The
+/// label is 1 where none is given.
+template <class Run>
+void for_each_run(const VoxelIntervals& set, Run&& run) {
+  const AxisFrame frame(set.axis());
+  glm::ivec3 first, last;
+  for (int v = set.v_begin(); v < set.v_end(); ++v) {
+    for (int u = 0; u < set.columns(); ++u) {
+      first[frame.u] = last[frame.u] = u;
+      first[frame.v] = last[frame.v] = v;
+      for_each_labelled(set, u, v, [&](const Interval& interval, std::uint32_t label) {
+        first[frame.w] = interval.first;
+        last[frame.w] = interval.last;
+        run(std::as_const(first), std::as_const(last), label);
+      });
     }
   }
-  return result;
 }
+
+/// An array with a byte for each voxel of the grid: 1 where it is solid, else 0. Voxel (i, j, k) is
+/// at i + dims.x * (j + dims.y * k). @return kLimit: execution.memory_limit or memory is exceeded
+Result<std::vector<std::uint8_t>> to_dense(const VoxelIntervals& set,
+                                           const Execution& execution = {});
+/// The same with labels in place of ones.
+Result<std::vector<std::uint32_t>> to_dense_labels(const VoxelIntervals& set,
+                                                   const Execution& execution = {});
 
 }  // namespace strata

@@ -1,84 +1,22 @@
 #pragma once
 
-#include <array>
-#include <cstdint>
 #include <functional>
-#include <string>
-#include <vector>
 
 #include "strata/core/execution.h"
 #include "strata/core/grid.h"
-#include "strata/core/inside_rule.h"
 #include "strata/core/result.h"
-#include "strata/hashbuffer/list_filter.h"
-#include "strata/hashbuffer/list_source.h"
-#include "strata/hashbuffer/tile_lists.h"
 #include "strata/mesh/triangle_soup.h"
 #include "strata/voxelize/intervals.h"
+#include "strata/voxelize/voxelize_options.h"
 
 namespace strata {
-
-/// What to do with a mesh that is not closed.
-enum class OpenMode {
-  kVote,     ///< flat holes are closed; else the rays of all directions: winding numbers
-  kSurface,  ///< keep only the voxels that the surface touches
-  kFail      ///< ErrorCode::kGeometry
-};
-/// Which voxels a surface fills.
-enum class SurfaceKind {
-  kConservative,  ///< every voxel that the surface touches (closed boxes), exactly
-  k26,            ///< 26-separating: no path of 26-neighbours crosses it
-  k6              ///< 6-separating: no path of face neighbours crosses it; the thinnest
-};
-
-struct VoxelizeOptions {
-  InsideRule rule = InsideRule::kWinding;
-  Axis axis = Axis::kZ;  ///< of the rays and of the intervals returned
-  bool solid = true;     ///< voxels whose centre is inside
-  bool surface = false;  ///< voxels of the surface; with solid: the union
-  SurfaceKind surface_kind = SurfaceKind::kConservative;
-  OpenMode open = OpenMode::kVote;
-  bool closed = true;  ///< the mesh is known to be closed; false: `open` applies
-  StoreKind store = StoreKind::kAuto;
-  OffsetKind offsets = OffsetKind::kPlaneFirst;
-  /// With n > 1 the filled fraction of voxels: the mesh is voxelized with n voxels for one along
-  /// each axis, so that a voxel has n^3 samples, and a voxel's label says how many of those are
-  /// solid, 1 to n^3. Exact as all voxels are, and the same for every axis; intervals end where the
-  /// label changes. Takes n^2 times the columns: time and memory grow with the surface at n times
-  /// the resolution. Not of labelled lists.
-  int samples = 1;
-  bool statistics = false;  ///< count and hash what comes out
-  /// Makes other lists of the mesh's before they are filled: a Boolean tree. Borrowed. Then the
-  /// rule applies to what it makes, and a voxel is of the surface when faces of solids pass through
-  /// it and the tree depends on those solids there (where they are several, that may be some voxels
-  /// more than the surface meets). Of labelled lists it makes labelled intervals.
-  const TileListFilter* filter = nullptr;
-  /// Makes the lists in place of this process's threads: a GPU. Borrowed; used by the calling
-  /// thread alone. `store` and `offsets` are its own then, and surfaces are not its work.
-  ListSource* source = nullptr;
-};
-
-/// What voxelizing found out.
-struct VoxelizeReport {
-  std::uint64_t solid_voxels = 0;  ///< with `statistics`
-  std::uint64_t intervals = 0;     ///< with `statistics`
-  std::uint64_t crossings = 0;     ///< fragments stored, along the axis asked for
-  std::uint64_t max_depth_complexity = 0;
-  /// Columns with n crossings, n = 0..; the last entry counts the rest. With `statistics`.
-  std::array<std::uint64_t, 65> depth_histogram{};
-  std::uint64_t unbalanced_columns = 0;  ///< columns entered and left unequally often: holes
-  std::uint64_t negative_columns = 0;    ///< columns where the winding number falls below 0
-  std::uint64_t rebuilt_tiles = 0;       ///< tiles built again with a larger table
-  std::uint64_t checksum =
-      0;  ///< see set_checksum in strata/voxelize/checksum.h; with `statistics`
-  double lists_ms = 0, intervals_ms = 0;  ///< CPU-thread-independent wall times of the two phases
-};
 
 /// Receives the slabs in increasing v.
 using SlabSink = std::function<Result<void>(const VoxelIntervals&)>;
 
 /// Voxelizes `mesh` on `grid`, slab by slab of bounded memory. Voxel centres decide (law 7): same
-/// set for every axis, store, thread count and order of triangles.
+/// set for every axis, store, thread count and order of triangles. A mesh that is not closed is
+/// treated as `strata voxelize` does it: VoxelizeOptions::open.
 /// @return kUsage (a surface or samples of labelled lists), kGeometry (coordinates too large, open
 /// mesh with OpenMode::kFail), kLimit, kCancelled, or the sink's error.
 Result<VoxelizeReport> voxelize_slabs(const TriangleSoup& mesh, const VoxelGrid& grid,

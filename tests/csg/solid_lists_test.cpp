@@ -11,6 +11,7 @@
 #include "strata/mesh/shapes.h"
 #include "strata/voxelize/voxelize.h"
 #include "tests/csg/random_tree.h"
+#include "tests/support/predicate_intervals.h"
 
 namespace strata::csg {
 namespace {

@@ -124,7 +124,7 @@ TEST(ListSource, GivesTheVoxelsThatTheTilesGive) {
     for (const Axis axis : {Axis::kX, Axis::kY, Axis::kZ}) {
       VoxelizeOptions options;
       options.axis = axis;
-      options.closed = closed;
+      options.closedness = closed ? Closedness::kCheck : Closedness::kAssumeOpen;
       options.statistics = true;
       VoxelizeReport expected, found;
       ASSERT_TRUE(voxelize(soup, grid, options, {}, &expected));

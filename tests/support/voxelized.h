@@ -16,6 +16,9 @@ namespace strata::testkit {
 inline constexpr InsideRule kAllRules[] = {InsideRule::kWinding, InsideRule::kNonzero,
                                            InsideRule::kParity};
 
+inline constexpr Closedness kAllClosedness[] = {Closedness::kCheck, Closedness::kAssumeClosed,
+                                                Closedness::kAssumeOpen};
+
 inline VoxelIntervals voxelized(const TriangleSoup& mesh, const VoxelGrid& grid,
                                 const VoxelizeOptions& options = {},
                                 const Execution& execution = {}, VoxelizeReport* report = nullptr) {

@@ -5,6 +5,7 @@
 #include <map>
 #include <set>
 
+#include "tests/support/predicate_intervals.h"
 #include "tests/voxelize/voxel_samples.h"
 
 namespace strata::testing {

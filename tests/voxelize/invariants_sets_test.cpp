@@ -358,7 +358,8 @@ TEST(ClosingCap, ChangesOnlyTheColumnsUnderIt) {
       const auto target = target_of(grid, axis);
       const auto lattice = snap_to_lattice(cap, grid);
       const auto crossed = reference_lists<DepthKey>(*lattice, target);
-      const VoxelSet before = voxel_set(open, grid, {.axis = axis});
+      const VoxelSet before =
+          voxel_set(open, grid, {.axis = axis, .closedness = Closedness::kAssumeClosed});
       const VoxelSet after = voxel_set(closed, grid, {.axis = axis});
       std::int64_t changed = 0;
       before.for_each([&](const glm::ivec3& p) {
@@ -370,7 +371,8 @@ TEST(ClosingCap, ChangesOnlyTheColumnsUnderIt) {
       EXPECT_EQ(changed, 0);
     }
     // Where two columns know, the vote is right, too, but in dents of holes that are not flat.
-    const VoxelSet voted = voxel_set(open, grid, {.open = OpenMode::kVote, .closed = false});
+    const VoxelSet voted =
+        voxel_set(open, grid, {.open = OpenMode::kVote, .closedness = Closedness::kAssumeOpen});
     const VoxelSet whole = voxel_set(closed, grid);
     std::int64_t wrong = 0, decided = 0;
     voted.for_each([&](const glm::ivec3& p) {

@@ -12,6 +12,7 @@
 #include "strata/mesh/soup_tools.h"
 #include "strata/voxelize/checksum.h"
 #include "tests/support/corpus.h"
+#include "tests/support/predicate_intervals.h"
 #include "tests/support/reference_lists.h"
 #include "tests/support/trouble.h"
 #include "tests/support/voxelized.h"
@@ -136,12 +137,12 @@ TEST(SameBits, SlabsAreThePiecesOfTheWhole) {
   VoxelGrid grid = grid_around(mesh, 200, 3);
   for (const Axis axis : kAllAxes) {
     const VoxelIntervals whole = voxelized(mesh, grid, {.axis = axis});
-    for (const bool closed : {true, false}) {
+    for (const Closedness closedness : kAllClosedness) {
       Execution execution;
       execution.memory_limit = 1 << 20;  // one tile row a slab
       int slabs = 0, next_row = 0;
       const auto done =
-          voxelize_slabs(mesh, grid, {.axis = axis, .closed = closed}, execution,
+          voxelize_slabs(mesh, grid, {.axis = axis, .closedness = closedness}, execution,
                          [&](const VoxelIntervals& slab) -> Result<void> {
                            ++slabs;
                            EXPECT_EQ(slab.v_begin(), next_row);
@@ -265,7 +266,8 @@ TEST(VoxelSetBoundary, VoxelizesToTheSetItself) {
         ASSERT_EQ(set_of(found), set) << "round " << round << ", axis " << static_cast<int>(axis);
       }
     }
-    const auto voted = voxelized(mesh, grid, {.open = OpenMode::kVote, .closed = false});
+    const auto voted =
+        voxelized(mesh, grid, {.open = OpenMode::kVote, .closedness = Closedness::kAssumeOpen});
     ASSERT_EQ(set_of(voted), set) << "round " << round << ", by vote";
   }
 }

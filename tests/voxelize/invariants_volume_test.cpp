@@ -47,8 +47,8 @@ TEST(AlignedBox, HasExactlyItsVoxels) {
     const VoxelGrid grid = unit_grid(glm::ivec3(static_cast<int>(n)));
     const TriangleSoup cube = make_box(glm::dvec3(0), glm::dvec3(n));
     for (const Axis axis : kAllAxes) {
-      for (const bool closed : {true, false}) {
-        const auto voxels = voxelized(cube, grid, {.axis = axis, .closed = closed});
+      for (const Closedness closedness : kAllClosedness) {
+        const auto voxels = voxelized(cube, grid, {.axis = axis, .closedness = closedness});
         EXPECT_EQ(voxels.solid_voxels(), std::uint64_t{n} * n * n) << n;
         EXPECT_EQ(voxels.interval_count(), std::uint64_t{n} * n) << n;
       }

@@ -123,7 +123,8 @@ void expect_nearly_whole(const TriangleSoup& open, double cut = 2 * kRadius) {
   for (const Axis axis : kAllAxes) {
     VoxelizeReport report;
     const VoxelSet found = set_of(voxelized(
-        open, kGrid, {.axis = axis, .open = OpenMode::kVote, .closed = false}, {}, &report));
+        open, kGrid, {.axis = axis, .open = OpenMode::kVote, .closedness = Closedness::kAssumeOpen},
+        {}, &report));
     EXPECT_NEAR(static_cast<double>(count(found)), whole, 0.01 * whole);
     std::int64_t outside = 0, missing = 0;
     found.for_each([&](const glm::ivec3& p) {
@@ -153,12 +154,12 @@ TEST(Robustness, SphereWithItsCapCutOffIsWholeWithoutStreaks) {
       if (axis == 2 && !low) {
         expect_nearly_whole(open, cut);
         VoxelizeReport report;
-        voxelized(open, kGrid, {.closed = false}, {}, &report);
+        voxelized(open, kGrid, {.closedness = Closedness::kAssumeOpen}, {}, &report);
         // The columns through the cap's circle, radius sqrt(2 r d - d^2).
         const double opening = std::numbers::pi * (2 * kRadius - (kSide - cut)) * (kSide - cut);
         EXPECT_NEAR(static_cast<double>(report.unbalanced_columns), opening, 0.1 * opening);
       } else {
-        const VoxelSet found = voxel_set(open, kGrid, {.closed = false});
+        const VoxelSet found = voxel_set(open, kGrid, {.closedness = Closedness::kAssumeOpen});
         const auto whole = static_cast<double>(count(voxel_set(sphere(), kGrid)));
         EXPECT_NEAR(static_cast<double>(count(found)), whole, 0.01 * whole);
         std::int64_t outside = 0;
@@ -182,7 +183,7 @@ TEST(Robustness, SphereWithFortyTrianglesMissingIsWholeWithoutStreaks) {
     SCOPED_TRACE(seed);
     expect_nearly_whole(open);
     VoxelizeReport report;
-    voxelized(open, kGrid, {.closed = false}, {}, &report);
+    voxelized(open, kGrid, {.closedness = Closedness::kAssumeOpen}, {}, &report);
     EXPECT_GT(report.unbalanced_columns, 0u);
   }
 }
@@ -247,7 +248,8 @@ TEST(Robustness, StanfordBunnyWithItsHolesHasItsVolume) {
   constexpr double kExact = 3'356'000;
   std::optional<VoxelSet> first;
   for (const Axis axis : kAllAxes) {
-    const VoxelSet found = voxel_set(*bunny, grid, {.axis = axis, .closed = false});
+    const VoxelSet found =
+        voxel_set(*bunny, grid, {.axis = axis, .closedness = Closedness::kAssumeOpen});
     EXPECT_NEAR(static_cast<double>(count(found)), kExact, 0.005 * kExact);
     if (!first) first = found;
     EXPECT_EQ(found, *first);
@@ -257,18 +259,59 @@ TEST(Robustness, StanfordBunnyWithItsHolesHasItsVolume) {
 TEST(OpenMesh, IsRefusedOrShownAsSurfaceWhenAskedFor) {
   TriangleSoup open = sphere();
   open.triangles.pop_back();
-  const auto refused = voxelize(open, kGrid, {.open = OpenMode::kFail, .closed = false});
+  const auto refused =
+      voxelize(open, kGrid, {.open = OpenMode::kFail, .closedness = Closedness::kAssumeOpen});
   ASSERT_FALSE(refused.has_value());
   EXPECT_EQ(refused.error().code, ErrorCode::kGeometry);
-  EXPECT_EQ(voxel_set(open, kGrid, {.open = OpenMode::kSurface, .closed = false}),
-            voxel_set(open, kGrid, {.solid = false, .surface = true}));
+  EXPECT_EQ(
+      voxel_set(open, kGrid, {.open = OpenMode::kSurface, .closedness = Closedness::kAssumeOpen}),
+      voxel_set(open, kGrid, {.solid = false, .surface = true}));
+}
+
+TEST(Closedness, ACheckFindsWhatCouldBeAssumed) {
+  TriangleSoup open = sphere();
+  open.triangles.resize(open.triangles.size() - 7);
+  TriangleSoup turned = sphere();  // every edge has two faces, some look opposite ways
+  for (std::size_t t = 0; t < turned.triangles.size(); t += 3) {
+    std::swap(turned.triangles[t].x, turned.triangles[t].y);
+  }
+  for (const InsideRule rule : kAllRules) {
+    const bool parity = rule == InsideRule::kParity;
+    for (const auto& [mesh, closed] :
+         {std::pair(sphere(), true), std::pair(open, false), std::pair(turned, parity)}) {
+      for (const OpenMode mode : {OpenMode::kVote, OpenMode::kSurface}) {
+        VoxelizeReport report;
+        const VoxelSet found =
+            set_of(voxelized(mesh, kGrid, {.rule = rule, .open = mode}, {}, &report));
+        EXPECT_EQ(report.closed, closed);
+        const Closedness known = closed ? Closedness::kAssumeClosed : Closedness::kAssumeOpen;
+        EXPECT_EQ(found, voxel_set(mesh, kGrid, {.rule = rule, .open = mode, .closedness = known}));
+        EXPECT_GT(count(found), 0);
+      }
+      const auto strict = voxelize(mesh, kGrid, {.rule = rule, .open = OpenMode::kFail});
+      EXPECT_EQ(strict.has_value(), closed);
+      if (!closed) {
+        EXPECT_EQ(strict.error().code, ErrorCode::kGeometry);
+      }
+    }
+  }
+}
+
+TEST(Closedness, AnOpenMeshIsVoxelizedRightByItself) {
+  TriangleSoup cup = make_box(glm::dvec3(-0.7), glm::dvec3(0.7));
+  const VoxelSet solid = voxel_set(cup, kGrid);
+  EXPECT_GT(count(solid), 0);
+  cup.triangles.erase(cup.triangles.begin(), cup.triangles.begin() + 2);  // a side is missing
+  EXPECT_EQ(voxel_set(cup, kGrid), solid);
+  EXPECT_NE(voxel_set(cup, kGrid, {.closedness = Closedness::kAssumeClosed}), solid);
 }
 
 TEST(OpenMesh, ClosedMeshLosesNothingByAVote) {
   for (const auto& [name, mesh] : simple_solids()) {
     const VoxelGrid grid = grid_around(mesh, 70, 1);
     for (const Axis axis : kAllAxes) {
-      EXPECT_EQ(voxel_set(mesh, grid, {.axis = axis, .closed = false}), voxel_set(mesh, grid))
+      EXPECT_EQ(voxel_set(mesh, grid, {.axis = axis, .closedness = Closedness::kAssumeOpen}),
+                voxel_set(mesh, grid))
           << name;
     }
   }

@@ -98,7 +98,7 @@ TEST(Samples, OfOpenMeshesAndSurfacesAreTheSame) {
   EXPECT_GT(expect_counts(ball, grid, 4, surface), 10000u);
   ball.triangles.resize(ball.triangles.size() - 5);
   VoxelizeOptions open;
-  open.closed = false;
+  open.closedness = Closedness::kAssumeOpen;
   EXPECT_GT(expect_counts(ball, grid, 4, open), 10000u);
 }
 

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/predicate_intervals.h"
 #include "tests/voxelize/shell_testing.h"
 #include "voxelize/shell_overlap.h"
 

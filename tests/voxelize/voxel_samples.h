@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "strata/voxelize/intervals.h"
+#include "tests/support/predicate_intervals.h"
 
 // Voxel sets for the tests of writers and checksums.
 

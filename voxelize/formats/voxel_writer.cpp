@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cctype>
-#include <cmath>
 #include <exception>
 #include <string_view>
 
+#include "strata/voxelize/grid_fit.h"
 #include "voxelize/formats/writers.h"
 
 namespace strata {
@@ -27,22 +27,6 @@ std::string format_names() {
     names += format.name;
   }
   return names;
-}
-
-Result<void> check_grid(const VoxelGrid& grid) {
-  for (int axis = 0; axis < 3; ++axis) {
-    const char name = "xyz"[axis];
-    if (grid.dims[axis] < 1 || grid.dims[axis] > kMaxGridSide) {
-      return fail(ErrorCode::kUsage, "{} voxels along {}: a grid has 1 to {}", grid.dims[axis],
-                  name, kMaxGridSide);
-    }
-    if (!std::isfinite(grid.origin[axis]) || !std::isfinite(grid.voxel_size[axis]) ||
-        grid.voxel_size[axis] <= 0) {
-      return fail(ErrorCode::kUsage, "the grid's origin {} or voxel size {} along {} is no length",
-                  grid.origin[axis], grid.voxel_size[axis], name);
-    }
-  }
-  return {};
 }
 
 VoxelWriterResult open_format(const std::string& path, const std::string& name,

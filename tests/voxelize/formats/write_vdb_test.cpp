@@ -4,11 +4,14 @@
 #include <openvdb/io/Stream.h>
 #include <openvdb/openvdb.h>
 
+#include <array>
 #include <cmath>
 #include <glm/vector_relational.hpp>
 #include <sstream>
 
+#include "strata/voxelize/formats/openvdb_bridge.h"
 #include "strata/voxelize/formats/voxel_writer.h"
+#include "tests/support/predicate_intervals.h"
 #include "tests/voxelize/voxel_samples.h"
 
 namespace strata::testing {
@@ -438,6 +441,69 @@ TEST_F(WriteVdb, UniqueTagFollowsTheContent) {
   };
   EXPECT_EQ(tag_of_ids(4), tag_of_ids(4));
   EXPECT_NE(tag_of_ids(4), tag_of_ids(5));
+}
+
+class OpenVdbBridge : public WriteVdb {
+ protected:
+  /// The grid made in memory is the one that the file holds.
+  template <class Grid>
+  static void expect_same(const VoxelIntervals& set, const OpenVdbOptions& options,
+                          const std::string& path, const std::string& name) {
+    const auto from_file = read<Grid>(path, name);
+    const auto made = to_openvdb<Grid>(set, options);
+    ASSERT_TRUE(made) << made.error().message;
+    EXPECT_EQ(tree_bytes(**made), tree_bytes(*from_file));
+    EXPECT_EQ((*made)->activeVoxelCount(), set.solid_voxels());
+    EXPECT_EQ((*made)->getName(), name);
+    EXPECT_EQ((*made)->getGridClass(), from_file->getGridClass());
+    EXPECT_EQ((*made)->transform(), from_file->transform());
+    EXPECT_EQ((*made)->background(), from_file->background());
+  }
+};
+
+TEST_F(OpenVdbBridge, MakesTheGridsOfTheFilesAlongAnyAxis) {
+  VoxelWriterOptions mask;
+  mask.mask = true;
+  for (const Sample& sample : small_samples()) {
+    SCOPED_TRACE(sample.name);
+    const VoxelIntervals along_z = intervals_of(sample, Axis::kZ);
+    const std::array paths = {write(along_z), write(along_z, mask), write(along_z, of_kind(true))};
+    for (const Axis axis : {Axis::kX, Axis::kY, Axis::kZ}) {
+      const VoxelIntervals set = intervals_of(sample, axis);
+      expect_same<openvdb::BoolGrid>(set, {}, paths[0], "solid");
+      expect_same<openvdb::MaskGrid>(set, {}, paths[1], "solid");
+      expect_same<openvdb::FloatGrid>(set, {}, paths[2], "density");
+    }
+  }
+}
+
+TEST_F(OpenVdbBridge, LabelsAreFractionsOrIds) {
+  const VoxelGrid grid = make_grid({70, 90, 150}, glm::dvec3(0), {0.1, 0.25, 7.0});
+  VoxelWriterOptions fog, ids;
+  fog.fog = 27;
+  ids.ids = 27;
+  const VoxelIntervals along_z = labelled(grid, Axis::kZ, some_ids(27));
+  const std::array paths = {write(along_z, fog), write(along_z, ids)};
+  for (const Axis axis : {Axis::kX, Axis::kY, Axis::kZ}) {
+    const VoxelIntervals set = labelled(grid, axis, some_ids(27));
+    expect_same<openvdb::FloatGrid>(set, {.samples = 27}, paths[0], "density");
+    expect_same<openvdb::FloatGrid>(set, {.samples = 0}, paths[1], "ids");
+  }
+}
+
+TEST_F(OpenVdbBridge, RefusesPartsAndSizesThatOpenVdbDoesNotTake) {
+  const VoxelIntervals set =
+      intervals_of({"", make_grid({8, 130, 8}), [](int, int, int) { return true; }}, Axis::kZ);
+  for (const VoxelIntervals& slab : cut(set, 1)) {
+    const auto refused = to_openvdb(slab);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::kUsage);
+    EXPECT_NE(refused.error().message.find("130"), std::string::npos) << refused.error().message;
+  }
+  const auto tiny =
+      to_openvdb(VoxelIntervals(make_grid({8, 8, 8}, {}, glm::dvec3(1e-110)), Axis::kZ));
+  ASSERT_FALSE(tiny);
+  EXPECT_EQ(tiny.error().code, ErrorCode::kUsage);
 }
 
 }  // namespace

@@ -24,11 +24,13 @@ using namespace testkit;  // NOLINT: the tests' own vocabulary
 VoxelSet voted(const TriangleSoup& mesh, const VoxelGrid& grid,
                InsideRule rule = InsideRule::kWinding) {
   EXPECT_FALSE(is_closed(mesh));
-  const VoxelSet first = voxel_set(mesh, grid, {.rule = rule, .closed = false});
+  const VoxelSet first =
+      voxel_set(mesh, grid, {.rule = rule, .closedness = Closedness::kAssumeOpen});
   for (const Axis axis : kAllAxes) {
     const int threads = 2 + static_cast<int>(axis);
     const VoxelSet other = set_of(
-        voxelized(mesh, grid, {.rule = rule, .axis = axis, .closed = false}, {.threads = threads}));
+        voxelized(mesh, grid, {.rule = rule, .axis = axis, .closedness = Closedness::kAssumeOpen},
+                  {.threads = threads}));
     EXPECT_EQ(other, first) << "axis " << static_cast<int>(axis);
   }
   return first;
@@ -229,7 +231,8 @@ TEST(Scan, WithManyTrianglesMissingIsTheClosedOne) {
       EXPECT_LE(static_cast<double>(differences(found, whole)), 0.1 * share * voxels + 2);
       TriangleSoup other = open;
       shuffle(other, random);
-      EXPECT_EQ(voxel_set(other, grid, {.closed = false}), found) << "in another order";
+      EXPECT_EQ(voxel_set(other, grid, {.closedness = Closedness::kAssumeOpen}), found)
+          << "in another order";
     }
   }
 }
@@ -299,7 +302,8 @@ TEST(WindingNumbers, AreTheSameBitsOnEverySimdUnit) {
   const VoxelSet expected = voted(mesh, grid);
   EXPECT_GT(count(expected), 1000);
   EXPECT_GT(for_each_simd_target([&](const std::string& name) {
-              EXPECT_EQ(voxel_set(mesh, grid, {.closed = false}), expected) << name;
+              EXPECT_EQ(voxel_set(mesh, grid, {.closedness = Closedness::kAssumeOpen}), expected)
+                  << name;
             }),
             1);
 }
@@ -313,11 +317,12 @@ TEST(OpenMesh, ReportsItsOwnCrossingsAndColumns) {
   });
   ASSERT_EQ(box.triangles.size(), 10u);
   VoxelizeReport report;
-  const VoxelIntervals found = voxelized(box, grid, {.closed = false}, {}, &report);
+  const VoxelIntervals found =
+      voxelized(box, grid, {.closedness = Closedness::kAssumeOpen}, {}, &report);
   EXPECT_EQ(found.solid_voxels(), 480u);
   EXPECT_EQ(report.crossings, 80u);
   EXPECT_EQ(report.unbalanced_columns, 80u);
-  voxelized(box, grid, {.axis = Axis::kX, .closed = false}, {}, &report);
+  voxelized(box, grid, {.axis = Axis::kX, .closedness = Closedness::kAssumeOpen}, {}, &report);
   EXPECT_EQ(report.crossings, 2u * 48);
   EXPECT_EQ(report.unbalanced_columns, 0u);
 }

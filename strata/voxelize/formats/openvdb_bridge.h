@@ -1,0 +1,46 @@
+#pragma once
+
+#include <openvdb/openvdb.h>
+
+#include <cstdint>
+#include <string>
+
+#include "strata/core/execution.h"
+#include "strata/core/result.h"
+#include "strata/voxelize/intervals.h"
+
+/// Sets of voxels as OpenVDB grids in memory, for programs that use both: link strata::openvdb. The
+/// only header that includes OpenVDB; files are written without it (write_voxels()).
+namespace strata {
+
+struct OpenVdbOptions {
+  /// Empty: `solid` of a BoolGrid or MaskGrid, `density` of a FloatGrid, `ids` of one of ids.
+  std::string name{};
+  /// FloatGrid: the value of a voxel is its label divided by this number, and the grid a fog
+  /// volume. Give samples^3 with VoxelizeOptions::samples. 0: labels are ids, and are the values.
+  std::uint32_t samples = 1;
+};
+
+/// The grid that `strata voxelize -o x.vdb` would write: the solid voxels are active, those that
+/// are alike in a node are a tile, index (i, j, k) is the centre of voxel (i, j, k) in world space.
+/// Work grows with the surface, and with the volume in blocks of 8 x 8 x 8 voxels. Grid is
+/// openvdb::BoolGrid, MaskGrid or FloatGrid. openvdb::initialize() is needed to write it, not for
+/// this.
+/// @param set along any axis, all rows of its grid
+/// @return kUsage: not all rows, a voxel size that OpenVDB does not take; kLimit: out of memory;
+/// kCancelled
+template <class Grid = openvdb::BoolGrid>
+Result<typename Grid::Ptr> to_openvdb(const VoxelIntervals& set, const OpenVdbOptions& options = {},
+                                      const Execution& execution = {});
+
+// Compiled once, in strata::openvdb.
+extern template Result<openvdb::BoolGrid::Ptr> to_openvdb<openvdb::BoolGrid>(const VoxelIntervals&,
+                                                                             const OpenVdbOptions&,
+                                                                             const Execution&);
+extern template Result<openvdb::MaskGrid::Ptr> to_openvdb<openvdb::MaskGrid>(const VoxelIntervals&,
+                                                                             const OpenVdbOptions&,
+                                                                             const Execution&);
+extern template Result<openvdb::FloatGrid::Ptr> to_openvdb<openvdb::FloatGrid>(
+    const VoxelIntervals&, const OpenVdbOptions&, const Execution&);
+
+}  // namespace strata

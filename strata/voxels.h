@@ -1,0 +1,23 @@
+#pragma once
+
+/// From a mesh file to voxels:
+///
+///   auto file = strata::read_mesh("part.stl");                                  // or any
+///   TriangleSoup auto grid = strata::fit_grid(strata::bounds(file->soup), {.resolution = 256});
+///   auto set = strata::voxelize(file->soup, *grid);                             // VoxelIntervals
+///   auto done = strata::write_voxels(*set, "part.vdb");                         // .npy, .vti, ...
+///
+/// Each returns a Result, an error being one sentence. A voxel is solid when its centre is inside
+/// the mesh, whose vertices are rounded to 1/256 voxel; all else is exact. A mesh that is not
+/// closed is noticed: see VoxelizeOptions::open. Sets are runs of voxels along an axis: their
+/// memory grows with the surface. VoxelIntervals::contains(), for_each_run() and to_dense() look
+/// into one; voxelize_slabs() and open_voxel_writer() never hold a whole one.
+/// strata/voxelize/formats/openvdb_bridge.h hands one to OpenVDB.
+
+#include "strata/mesh/formats/read_mesh.h"
+#include "strata/mesh/soup_tools.h"
+#include "strata/voxelize/checksum.h"
+#include "strata/voxelize/formats/voxel_writer.h"
+#include "strata/voxelize/grid_fit.h"
+#include "strata/voxelize/intervals.h"
+#include "strata/voxelize/voxelize.h"
