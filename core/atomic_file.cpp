@@ -126,6 +126,27 @@ std::string temporary_name(const std::string& target) {
 
 constexpr int kNameAttempts = 1000;  // names can be left over from a killed process of our number
 
+/// Finds a name beside `target` that nothing has, and makes something of that name.
+/// @param temporary, slot  its name, and its place among those that a signal removes
+/// @param make  of a name; false with errno
+template <class Make>
+Result<void> make_temporary(const std::string& path, const std::string& target, bool folder,
+                            std::string& temporary, int& slot, Make&& make) {
+  for (int attempt = 0; attempt < kNameAttempts; ++attempt) {
+    temporary = temporary_name(target);
+    // Entered before it exists: a signal between the two finds nothing, rather than forgets it.
+    slot = enter_temporary(temporary, folder);
+    if (slot < 0) {
+      return temporary.size() >= PATH_MAX ? cannot_create(path, ENAMETOOLONG) : too_many(path);
+    }
+    if (make(temporary.c_str())) return {};
+    const int reason = errno;
+    leave_temporary(slot);
+    if (reason != EEXIST && reason != EINTR) return cannot_create(path, reason);
+  }
+  return cannot_create(path, EEXIST);
+}
+
 /// Of this thread, while it lives.
 thread_local OutputGroup* current_group = nullptr;
 
@@ -185,22 +206,13 @@ Result<AtomicFile> AtomicFile::create(const std::string& path) {
     const std::filesystem::path resolved = std::filesystem::canonical(path, ignored);
     if (!ignored) file.target_ = resolved.string();
   }
-  for (int attempt = 0; attempt < kNameAttempts; ++attempt) {
-    file.temporary_ = temporary_name(file.target_);
-    // Entered before it exists: a signal between the two finds nothing, rather than forgets it.
-    file.slot_ = enter_temporary(file.temporary_, false);
-    if (file.slot_ < 0) {
-      return file.temporary_.size() >= PATH_MAX ? cannot_create(path, ENAMETOOLONG)
-                                                : too_many(path);
-    }
-    file.descriptor_ = open(file.temporary_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC,
-                            S_IRUSR | S_IWUSR | S_IRGRP | S_IWGRP | S_IROTH | S_IWOTH);
-    if (file.descriptor_ >= 0) break;
-    const int reason = errno;
-    leave_temporary(file.slot_);
-    if (reason != EEXIST && reason != EINTR) return cannot_create(path, reason);
-  }
-  if (file.descriptor_ < 0) return cannot_create(path, EEXIST);
+  const auto made =
+      make_temporary(path, file.target_, false, file.temporary_, file.slot_, [&](const char* name) {
+        file.descriptor_ = open(name, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC,
+                                S_IRUSR | S_IWUSR | S_IRGRP | S_IWGRP | S_IROTH | S_IWOTH);
+        return file.descriptor_ >= 0;
+      });
+  if (!made) return tl::unexpected(made.error());
   if (file.descriptor_ <= STDERR_FILENO) {
     // A caller with a closed standard stream must not print into this file.
     const int higher = fcntl(file.descriptor_, F_DUPFD_CLOEXEC, STDERR_FILENO + 1);
@@ -350,19 +362,11 @@ Result<AtomicFolder> AtomicFolder::create(const std::string& path) {
       if (!reason) folder.target_ = resolved.string();
     }
   }
-  for (int attempt = 0; attempt < kNameAttempts; ++attempt) {
-    folder.temporary_ = temporary_name(folder.target_);
-    folder.slot_ = enter_temporary(folder.temporary_, true);
-    if (folder.slot_ < 0) {
-      return folder.temporary_.size() >= PATH_MAX ? cannot_create(path, ENAMETOOLONG)
-                                                  : too_many(path);
-    }
-    if (mkdir(folder.temporary_.c_str(), 0777) == 0) return folder;
-    const int error = errno;
-    leave_temporary(folder.slot_);
-    if (error != EEXIST) return cannot_create(path, error);
-  }
-  return cannot_create(path, EEXIST);
+  const auto made =
+      make_temporary(path, folder.target_, true, folder.temporary_, folder.slot_,
+                     [](const char* folder_name) { return mkdir(folder_name, 0777) == 0; });
+  if (!made) return tl::unexpected(made.error());
+  return folder;
 }
 
 AtomicFolder::AtomicFolder(AtomicFolder&& other) noexcept

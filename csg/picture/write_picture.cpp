@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "core/atomic_file.h"
+#include "core/png_chunks.h"
 #include "strata/csg/picture/picture.h"
 
 namespace strata::csg {
@@ -117,40 +118,6 @@ PngImage to_png_image(const Picture& picture) {
   return image;
 }
 
-std::vector<std::uint8_t> header_of(const Picture& picture, const PngImage& image) {
-  std::vector<std::uint8_t> header;
-  for (const int number : {picture.width, picture.height}) {
-    for (int shift = 24; shift >= 0; shift -= 8) {
-      header.push_back(static_cast<std::uint8_t>(number >> shift));
-    }
-  }
-  // Bits a channel, kind, deflate, filters by row, not interlaced.
-  header.insert(header.end(), {image.bits, image.colour_type, 0, 0, 0});
-  return header;
-}
-
-/// Puts a file together, chunk by chunk.
-class PngFile {
- public:
-  PngFile() : bytes_{0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'} {}
-  void add_chunk(std::string_view type, std::span<const std::uint8_t> data) {
-    add_number(static_cast<std::uint32_t>(data.size()));
-    const std::size_t begin = bytes_.size();
-    bytes_.insert(bytes_.end(), type.begin(), type.end());
-    bytes_.insert(bytes_.end(), data.begin(), data.end());
-    add_number(libdeflate_crc32(0, bytes_.data() + begin, bytes_.size() - begin));
-  }
-  [[nodiscard]] std::span<const std::uint8_t> bytes() const { return bytes_; }
-
- private:
-  void add_number(std::uint32_t number) {
-    for (int shift = 24; shift >= 0; shift -= 8) {
-      bytes_.push_back(static_cast<std::uint8_t>(number >> shift));
-    }
-  }
-  std::vector<std::uint8_t> bytes_;
-};
-
 /// All rows, each after the byte that says how it is filtered: not at all. Faces are runs of one
 /// colour, which deflate finds as they are.
 std::vector<std::uint8_t> compress(const PngImage& image, int height) {
@@ -177,20 +144,28 @@ std::vector<std::uint8_t> compress(const PngImage& image, int height) {
 Result<void> write_png(const Picture& picture, const std::string& path) {
   try {
     const PngImage image = to_png_image(picture);
-    PngFile png;
-    png.add_chunk("IHDR", header_of(picture, image));
-    if (!image.palette.empty()) png.add_chunk("PLTE", image.palette);
-    if (!image.alpha.empty()) png.add_chunk("tRNS", image.alpha);
+    std::vector<std::uint8_t> bytes;
+    PngChunks png(bytes, [](const void* data, std::size_t count) {
+      return libdeflate_crc32(0, data, count);
+    });
+    const auto add_chunk = [&](std::string_view type, std::span<const std::uint8_t> data) {
+      png.begin(type);
+      bytes.insert(bytes.end(), data.begin(), data.end());
+      png.end();
+    };
+    png.header(picture.width, picture.height, image.bits, image.colour_type);
+    if (!image.palette.empty()) add_chunk("PLTE", image.palette);
+    if (!image.alpha.empty()) add_chunk("tRNS", image.alpha);
     // A chunk's length has 31 bits.
     constexpr std::size_t kMostBytes = 0x7fffffff;
     const std::vector<std::uint8_t> data = compress(image, picture.height);
     for (std::size_t at = 0; at < data.size(); at += kMostBytes) {
-      png.add_chunk("IDAT", std::span(data).subspan(at, std::min(kMostBytes, data.size() - at)));
+      add_chunk("IDAT", std::span(data).subspan(at, std::min(kMostBytes, data.size() - at)));
     }
-    png.add_chunk("IEND", {});
+    add_chunk("IEND", {});
     auto file = AtomicFile::create(path);
     if (!file) return tl::unexpected(file.error());
-    if (auto done = file->write(png.bytes().data(), png.bytes().size()); !done) return done;
+    if (auto done = file->write(bytes.data(), bytes.size()); !done) return done;
     return file->commit();
   } catch (const std::bad_alloc&) {
     return fail(ErrorCode::kLimit, "{}: out of memory for a picture of {} x {} pixels", path,

@@ -6,12 +6,10 @@
 
 #include <zlib.h>
 
-#include <array>
-#include <cstring>
 #include <memory>
-#include <string_view>
 #include <utility>
 
+#include "core/png_chunks.h"
 #include "voxelize/formats/dense_rows.h"
 #include "voxelize/formats/folder_output.h"
 #include "voxelize/formats/run_deflate.h"
@@ -21,28 +19,7 @@
 namespace strata {
 namespace {
 
-constexpr std::array<unsigned char, 8> kSignature = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
 constexpr std::uint8_t kNoFilter = 0;
-
-void put_big_endian(Bytes& out, std::uint32_t value) {
-  for (const int shift : {24, 16, 8, 0}) out.push_back(static_cast<std::byte>(value >> shift));
-}
-
-// [length:32 | type:32 | data | crc of type and data:32]
-std::size_t begin_chunk(Bytes& out, std::string_view type) {
-  const std::size_t begin = out.size();
-  put_big_endian(out, 0);  // length, set by end_chunk
-  for (const char letter : type) out.push_back(static_cast<std::byte>(letter));
-  return begin;
-}
-void end_chunk(Bytes& out, std::size_t begin) {
-  const auto length = static_cast<std::uint32_t>(out.size() - begin - 8);
-  for (std::size_t i = 0; i < 4; ++i)
-    out[begin + i] = static_cast<std::byte>(length >> (24 - 8 * i));
-  const auto* checked = reinterpret_cast<const Bytef*>(out.data() + begin + 4);
-  put_big_endian(out, static_cast<std::uint32_t>(
-                          crc32_z(crc32_z(0, nullptr, 0), checked, std::size_t{length} + 4)));
-}
 
 // Pixels of a row are bits, the first one highest; solid is 1.
 void emit_row(RunDeflater& deflater, std::span<const Interval> row, int row_bytes) {
@@ -106,17 +83,13 @@ class PngWriter final : public SlabWriter {
   }
 
   void make_picture(const VoxelIntervals& slab, int z, Bytes& out) const {
-    out.clear();
-    for (const unsigned char byte : kSignature) out.push_back(static_cast<std::byte>(byte));
-    const std::size_t header = begin_chunk(out, "IHDR");
-    put_big_endian(out, static_cast<std::uint32_t>(dims().x));
-    put_big_endian(out, static_cast<std::uint32_t>(dims().y));
-    // Depth; grey; deflate; filter method 0; not interlaced.
+    PngChunks png(out, [](const void* data, std::size_t bytes) {
+      return static_cast<std::uint32_t>(crc32_z(0, static_cast<const Bytef*>(data), bytes));
+    });
     const bool flags = values_.kind == RunBytes::kFlags;
-    out.push_back(static_cast<std::byte>(flags ? 1 : 8 * values_.bytes));
-    for (int i = 0; i < 4; ++i) out.push_back(std::byte{0});
-    end_chunk(out, header);
-    const std::size_t data = begin_chunk(out, "IDAT");
+    constexpr unsigned kGrey = 0;
+    png.header(dims().x, dims().y, flags ? 1 : 8 * static_cast<unsigned>(values_.bytes), kGrey);
+    png.begin("IDAT");
     RunDeflater deflater(flags ? RunBytes::kBits : RunBytes::kIds, values_.bytes);
     append_zlib_stream(deflater, out, [&](RunDeflater& to) {
       const int row_bytes = (dims().x + 7) / 8;
@@ -128,8 +101,9 @@ class PngWriter final : public SlabWriter {
         }
       }
     });
-    end_chunk(out, data);
-    end_chunk(out, begin_chunk(out, "IEND"));
+    png.end();
+    png.begin("IEND");
+    png.end();
   }
 
   Result<void> finish_output(const Execution&) override {
