@@ -130,8 +130,8 @@ class Orienter {
     return partner;
   }
 
-  /// The same of polygons that look opposite ways, which may be cut along other diagonals.
-  void pair_polygons(std::vector<std::uint32_t>& partner) const {
+  /// The outlines of polygons, which diagonals are no part of.
+  struct Outlines {
     struct Side {
       std::uint32_t low, high;
       int way;
@@ -140,11 +140,31 @@ class Orienter {
       std::size_t begin, end;   ///< triangles
       std::size_t first, last;  ///< sides
     };
-    const auto less = [](const Side& a, const Side& b) {
+    static bool less(const Side& a, const Side& b) {
       return std::tie(a.low, a.high) < std::tie(b.low, b.high);
-    };
+    }
+    [[nodiscard]] std::span<const Side> of(const Polygon& polygon) const {
+      return std::span(sides).subspan(polygon.first, polygon.last - polygon.first);
+    }
+    [[nodiscard]] bool before(const Polygon& a, const Polygon& b) const {
+      const auto p = of(a), q = of(b);
+      return std::lexicographical_compare(p.begin(), p.end(), q.begin(), q.end(), less);
+    }
+    /// That they have the same sides, and look opposite ways.
+    [[nodiscard]] bool opposite(const Polygon& a, const Polygon& b) const {
+      const auto p = of(a), q = of(b);
+      return a.end - a.begin == b.end - b.begin &&
+             std::equal(p.begin(), p.end(), q.begin(), q.end(),
+                        [](const Side& s, const Side& t) { return s.way == -t.way; });
+    }
     std::vector<Side> sides;
     std::vector<Polygon> polygons;
+  };
+
+  /// Of the faces that are several triangles, all of which count.
+  [[nodiscard]] Outlines outlines() const {
+    Outlines result;
+    auto& sides = result.sides;
     const std::vector<std::uint32_t>& elements = mesh_.face_elements;
     for (std::size_t begin = 0, end = 0; begin < elements.size(); begin = end) {
       const std::size_t first = sides.size();
@@ -157,36 +177,33 @@ class Orienter {
           sides.push_back({std::min(a, b), std::max(a, b), a < b ? 1 : -1});
         }
       }
-      std::sort(sides.begin() + static_cast<std::ptrdiff_t>(first), sides.end(), less);
+      std::sort(sides.begin() + static_cast<std::ptrdiff_t>(first), sides.end(), Outlines::less);
       std::size_t last = first;  // diagonals, used once each way, fall out
       for (std::size_t i = first; i < sides.size();) {
-        Side side = sides[i];
-        for (++i; i < sides.size() && !less(side, sides[i]); ++i) side.way += sides[i].way;
+        Outlines::Side side = sides[i];
+        for (++i; i < sides.size() && !Outlines::less(side, sides[i]); ++i) {
+          side.way += sides[i].way;
+        }
         if (side.way != 0) sides[last++] = side;
       }
       if (end - begin < 2 || !whole) last = first;
       sides.resize(last);
-      if (last > first) polygons.push_back({begin, end, first, last});
+      if (last > first) result.polygons.push_back({begin, end, first, last});
     }
-    const auto of = [&](const Polygon& polygon) {
-      return std::span<const Side>(sides).subspan(polygon.first, polygon.last - polygon.first);
-    };
-    const auto before = [&](const Polygon& a, const Polygon& b) {
-      const auto p = of(a), q = of(b);
-      return std::lexicographical_compare(p.begin(), p.end(), q.begin(), q.end(), less);
-    };
+    return result;
+  }
+
+  /// The same of polygons that look opposite ways, which may be cut along other diagonals.
+  void pair_polygons(std::vector<std::uint32_t>& partner) const {
+    Outlines found = outlines();
+    auto& polygons = found.polygons;
+    const auto before = [&](const auto& a, const auto& b) { return found.before(a, b); };
     std::stable_sort(polygons.begin(), polygons.end(), before);
     for (std::size_t i = 0, end = 0; i < polygons.size(); i = end) {
       for (end = i + 1; end < polygons.size() && !before(polygons[i], polygons[end]);) ++end;
-      if (end - i != 2) continue;
-      const Polygon &a = polygons[i], &b = polygons[i + 1];
-      const auto p = of(a), q = of(b);
-      if (a.end - a.begin != b.end - b.begin ||
-          !std::equal(p.begin(), p.end(), q.begin(), q.end(),
-                      [](const Side& s, const Side& t) { return s.way == -t.way; })) {
-        continue;
-      }
-      for (std::size_t t = a.begin, u = b.begin; t < a.end; ++t, ++u) {
+      if (end - i != 2 || !found.opposite(polygons[i], polygons[i + 1])) continue;
+      for (std::size_t t = polygons[i].begin, u = polygons[i + 1].begin; t < polygons[i].end;
+           ++t, ++u) {
         for (const std::uint32_t old : {partner[t], partner[u]}) {
           if (old != kNone) partner[old] = kNone;
         }

@@ -33,6 +33,21 @@ TileRect tile_rect(const LatticeMesh& mesh, const glm::uvec3& triangle, const Ax
           static_cast<std::uint16_t>(tile(v1 - 1) + covers)};
 }
 
+/// Makes places of the counts of each part, by tile and then by part. The last count of a part is
+/// of no tile. @param offsets  of the tiles; the last one is left @return the sum of the counts
+std::uint64_t to_cursors(std::vector<std::uint64_t>& counts, std::size_t parts,
+                         std::vector<std::uint32_t>& offsets) {
+  const std::size_t stride = offsets.size();
+  std::uint64_t sum = 0;
+  for (std::size_t tile = 0; tile + 1 < stride; ++tile) {
+    offsets[tile] = static_cast<std::uint32_t>(sum);
+    for (std::size_t part = 0; part < parts; ++part) {
+      sum += std::exchange(counts[part * stride + tile], sum);
+    }
+  }
+  return sum;
+}
+
 }  // namespace
 
 Result<TileBins> bin_triangles(const LatticeMesh& mesh, const RasterTarget& target,
@@ -69,13 +84,7 @@ Result<TileBins> bin_triangles(const LatticeMesh& mesh, const RasterTarget& targ
     }
   });
   bins.offsets.resize(tiles + 1);
-  std::uint64_t sum = 0;
-  for (std::size_t tile = 0; tile < tiles; ++tile) {
-    bins.offsets[tile] = static_cast<std::uint32_t>(sum);
-    for (std::size_t part = 0; part < parts; ++part) {
-      sum += std::exchange(cursors[part * stride + tile], sum);
-    }
-  }
+  const std::uint64_t sum = to_cursors(cursors, parts, bins.offsets);
   if (sum > std::numeric_limits<std::uint32_t>::max()) {
     return fail(
         ErrorCode::kLimit,

@@ -45,6 +45,115 @@ struct Finished {
   }
 };
 
+/// Walks the lists of a vector of columns, the first of which is that of `cell`. `winding` is left
+/// as it is behind the last crossing. @return the length of the longest list
+template <InsideRule rule>
+HWY_INLINE int walk_columns(const std::uint32_t* cell, int ages, bool histogram, Finished& finished,
+                            VecInt& winding, VecInt& lowest, Vec& list_length) {
+  const Lane d;
+  const LaneInt di;
+  Vec begin = hn::Zero(d);  // of the interval being walked
+  Vec pending_begin = hn::Zero(d),
+      pending_end = hn::Zero(d);  // the last one, not yet handed out
+  int age = 0;
+  for (; age < ages; ++age, cell += kTilePixels) {
+    const Vec record = hn::LoadU(d, cell);
+    const Mask present = hn::Ne(record, hn::Zero(d));
+    if (hn::AllFalse(d, present)) break;
+    const Vec key = hn::AndNot(record, hn::Set(d, 0xffffffu));
+    const Vec exit = hn::And(key, hn::Set(d, 1u));
+    const Vec voxel = hn::ShiftRight<kLatticeBits>(
+        hn::Add(hn::ShiftRight<1>(key), hn::Set(d, std::uint32_t{kLatticeSteps / 2})));
+    // +1 on entering, -1 on leaving, 0 where the list has ended.
+    const VecInt change =
+        hn::BitCast(di, hn::IfThenElseZero(present, hn::Sub(hn::Set(d, 1u), hn::Add(exit, exit))));
+    const auto was = inside<rule>(winding);
+    winding = hn::Add(winding, change);
+    lowest = hn::Min(lowest, winding);
+    const auto now = inside<rule>(winding);
+    const Mask starts = hn::RebindMask(d, hn::AndNot(was, now));
+    const Mask ends = hn::RebindMask(d, hn::AndNot(now, was));
+    if (histogram) list_length = hn::Sub(list_length, hn::VecFromMask(d, present));
+    if (!hn::AllFalse(d, starts)) {
+      // A start on the end of the last interval carries that one on.
+      const Mask has_pending = hn::Gt(pending_end, pending_begin);
+      const Mask joins = hn::And(has_pending, hn::Eq(voxel, pending_end));
+      const Mask hand_out = hn::And(starts, hn::AndNot(joins, has_pending));
+      if (!hn::AllFalse(d, hand_out)) finished.add(hand_out, pending_begin, pending_end);
+      begin = hn::IfThenElse(starts, hn::IfThenElse(joins, pending_begin, voxel), begin);
+      pending_end = hn::IfThenElse(hand_out, pending_begin, pending_end);
+    }
+    const Mask closes = hn::And(ends, hn::Gt(voxel, begin));
+    pending_begin = hn::IfThenElse(closes, begin, pending_begin);
+    pending_end = hn::IfThenElse(closes, voxel, pending_end);
+  }
+  if (age == 0) return 0;
+  const Mask has_pending = hn::Gt(pending_end, pending_begin);
+  if (!hn::AllFalse(d, has_pending)) finished.add(has_pending, pending_begin, pending_end);
+  return age;
+}
+
+/// What the report counts of a vector of columns.
+HWY_INLINE void count_columns(VecInt winding, VecInt lowest, Vec list_length, bool histogram,
+                              TileIntervals& out) {
+  const Lane d;
+  const LaneInt di;
+  const std::size_t lanes = hn::Lanes(d);
+  // Columns whose winding number is not 0 again, or was negative, are rare.
+  const auto unbalanced = hn::Ne(winding, hn::Zero(di));
+  const auto negative = hn::Lt(lowest, hn::Zero(di));
+  if (!hn::AllFalse(di, hn::Or(unbalanced, negative))) {
+    std::int32_t windings[kMaxLanes];
+    hn::StoreU(winding, di, windings);
+    for (std::size_t lane = 0; lane < lanes; ++lane) {
+      if (windings[lane] != 0) ++out.unbalanced;
+    }
+    out.negative += hn::CountTrue(di, negative);
+  }
+  if (!histogram) return;
+  std::uint32_t depths[kMaxLanes];
+  hn::StoreU(list_length, d, depths);
+  for (std::size_t lane = 0; lane < lanes; ++lane) {
+    if (depths[lane] > 0) ++out.histogram[std::min<std::uint32_t>(depths[lane], 64)];
+  }
+}
+
+/// Hands intervals out column by column. @return their number, with the `count` that were there
+HWY_INLINE std::uint32_t hand_out_columns(const Finished& finished, std::size_t pixel,
+                                          std::uint32_t count, TileIntervals& out) {
+  const Lane d;
+  const std::size_t lanes = hn::Lanes(d);
+  if (out.items.size() < count + (finished.rounds + 1) * lanes) {
+    out.items.resize((count + (finished.rounds + 1) * lanes) * 2);
+  }
+  auto* items = reinterpret_cast<std::uint32_t*>(out.items.data());
+  if (finished.rounds == 1) {
+    const Vec marks = hn::LoadU(d, finished.marks[0]);
+    hn::CompressStore(hn::LoadU(d, finished.packed[0]), hn::Ne(marks, hn::Zero(d)), d,
+                      items + count);
+    for (std::size_t lane = 0; lane < lanes; ++lane) {
+      out.offsets[pixel + lane] = count;
+      count += finished.marks[0][lane];
+    }
+    return count;
+  }
+  Vec sum = hn::Zero(d);
+  for (std::size_t round = 0; round < finished.rounds; ++round) {
+    sum = hn::Add(sum, hn::LoadU(d, finished.marks[round]));
+  }
+  std::uint32_t counts[kMaxLanes];
+  hn::StoreU(sum, d, counts);
+  for (std::size_t lane = 0; lane < lanes; ++lane) {
+    out.offsets[pixel + lane] = count;
+    if (counts[lane] == 0) continue;
+    for (std::size_t round = 0; round < finished.rounds; ++round) {
+      items[count] = finished.packed[round][lane];
+      count += finished.marks[round][lane];
+    }
+  }
+  return count;
+}
+
 template <InsideRule rule>
 void walk_planes(const TileLists<DepthKey>& lists, bool histogram, TileIntervals& out) {
   const Lane d;
@@ -52,106 +161,21 @@ void walk_planes(const TileLists<DepthKey>& lists, bool histogram, TileIntervals
   const std::size_t lanes = hn::Lanes(d);
   std::uint32_t count = 0;
   Finished finished;
-  std::uint32_t counts[kMaxLanes];
-  std::uint32_t depths[kMaxLanes];
-
   for (int row = lists.row_begin; row < lists.row_end; ++row) {
     for (std::size_t u = 0; u < kTileSide; u += lanes) {
       const std::size_t pixel = static_cast<std::size_t>(row) * kTileSide + u;
-      const std::uint32_t* cell = lists.planes32 + pixel;
-      VecInt winding = hn::Zero(di);
-      VecInt lowest = hn::Zero(di);
-      Vec begin = hn::Zero(d);  // of the interval being walked
-      Vec pending_begin = hn::Zero(d),
-          pending_end = hn::Zero(d);  // the last one, not yet handed out
+      VecInt winding = hn::Zero(di), lowest = hn::Zero(di);
       Vec list_length = hn::Zero(d);
       finished.rounds = 0;
-      int age = 0;
-      for (; age < lists.ages; ++age, cell += kTilePixels) {
-        const Vec record = hn::LoadU(d, cell);
-        const Mask present = hn::Ne(record, hn::Zero(d));
-        if (hn::AllFalse(d, present)) break;
-        const Vec key = hn::AndNot(record, hn::Set(d, 0xffffffu));
-        const Vec exit = hn::And(key, hn::Set(d, 1u));
-        const Vec voxel = hn::ShiftRight<kLatticeBits>(
-            hn::Add(hn::ShiftRight<1>(key), hn::Set(d, std::uint32_t{kLatticeSteps / 2})));
-        // +1 on entering, -1 on leaving, 0 where the list has ended.
-        const VecInt change = hn::BitCast(
-            di, hn::IfThenElseZero(present, hn::Sub(hn::Set(d, 1u), hn::Add(exit, exit))));
-        const auto was = inside<rule>(winding);
-        winding = hn::Add(winding, change);
-        lowest = hn::Min(lowest, winding);
-        const auto now = inside<rule>(winding);
-        const Mask starts = hn::RebindMask(d, hn::AndNot(was, now));
-        const Mask ends = hn::RebindMask(d, hn::AndNot(now, was));
-        if (histogram) list_length = hn::Sub(list_length, hn::VecFromMask(d, present));
-        if (!hn::AllFalse(d, starts)) {
-          // A start on the end of the last interval carries that one on.
-          const Mask has_pending = hn::Gt(pending_end, pending_begin);
-          const Mask joins = hn::And(has_pending, hn::Eq(voxel, pending_end));
-          const Mask hand_out = hn::And(starts, hn::AndNot(joins, has_pending));
-          if (!hn::AllFalse(d, hand_out)) finished.add(hand_out, pending_begin, pending_end);
-          begin = hn::IfThenElse(starts, hn::IfThenElse(joins, pending_begin, voxel), begin);
-          pending_end = hn::IfThenElse(hand_out, pending_begin, pending_end);
-        }
-        const Mask closes = hn::And(ends, hn::Gt(voxel, begin));
-        pending_begin = hn::IfThenElse(closes, begin, pending_begin);
-        pending_end = hn::IfThenElse(closes, voxel, pending_end);
-      }
+      const int age = walk_columns<rule>(lists.planes32 + pixel, lists.ages, histogram, finished,
+                                         winding, lowest, list_length);
       out.max_depth = std::max<std::uint64_t>(out.max_depth, static_cast<std::uint64_t>(age));
       if (age == 0) {
         for (std::size_t lane = 0; lane < lanes; ++lane) out.offsets[pixel + lane] = count;
         continue;
       }
-      const Mask has_pending = hn::Gt(pending_end, pending_begin);
-      if (!hn::AllFalse(d, has_pending)) finished.add(has_pending, pending_begin, pending_end);
-
-      // Columns whose winding number is not 0 again, or was negative, are rare.
-      const auto unbalanced = hn::Ne(winding, hn::Zero(di));
-      const auto negative = hn::Lt(lowest, hn::Zero(di));
-      if (!hn::AllFalse(di, hn::Or(unbalanced, negative))) {
-        std::int32_t windings[kMaxLanes];
-        hn::StoreU(winding, di, windings);
-        for (std::size_t lane = 0; lane < lanes; ++lane) {
-          if (windings[lane] != 0) ++out.unbalanced;
-        }
-        out.negative += hn::CountTrue(di, negative);
-      }
-      if (histogram) {
-        hn::StoreU(list_length, d, depths);
-        for (std::size_t lane = 0; lane < lanes; ++lane) {
-          if (depths[lane] > 0) ++out.histogram[std::min<std::uint32_t>(depths[lane], 64)];
-        }
-      }
-
-      // Hand the intervals out column by column.
-      if (out.items.size() < count + (finished.rounds + 1) * lanes) {
-        out.items.resize((count + (finished.rounds + 1) * lanes) * 2);
-      }
-      auto* items = reinterpret_cast<std::uint32_t*>(out.items.data());
-      if (finished.rounds == 1) {
-        const Vec marks = hn::LoadU(d, finished.marks[0]);
-        hn::CompressStore(hn::LoadU(d, finished.packed[0]), hn::Ne(marks, hn::Zero(d)), d,
-                          items + count);
-        for (std::size_t lane = 0; lane < lanes; ++lane) {
-          out.offsets[pixel + lane] = count;
-          count += finished.marks[0][lane];
-        }
-        continue;
-      }
-      Vec sum = hn::Zero(d);
-      for (std::size_t round = 0; round < finished.rounds; ++round) {
-        sum = hn::Add(sum, hn::LoadU(d, finished.marks[round]));
-      }
-      hn::StoreU(sum, d, counts);
-      for (std::size_t lane = 0; lane < lanes; ++lane) {
-        out.offsets[pixel + lane] = count;
-        if (counts[lane] == 0) continue;
-        for (std::size_t round = 0; round < finished.rounds; ++round) {
-          items[count] = finished.packed[round][lane];
-          count += finished.marks[round][lane];
-        }
-      }
+      count_columns(winding, lowest, list_length, histogram, out);
+      count = hand_out_columns(finished, pixel, count, out);
     }
   }
   const std::size_t end = static_cast<std::size_t>(lists.row_end) * kTileSide;

@@ -340,6 +340,42 @@ struct Layout {
   std::uint64_t sample_bytes = 0;  // of all channels in the file
 };
 
+Result<Layout> check_channels(const Imf::Header& header, const std::string& path, bool samples) {
+  Layout layout{samples, 0};
+  for (auto i = header.channels().begin(); i != header.channels().end(); ++i) {
+    if (i.channel().xSampling != 1 || i.channel().ySampling != 1) {
+      return not_ours(path, "a channel is subsampled");
+    }
+    layout.sample_bytes += i.channel().type == Imf::HALF ? 2 : 4;
+  }
+  for (const Channel& channel : channels_of(layout.samples)) {
+    const Imf::Channel* found = header.channels().findChannel(channel.name);
+    const bool exact = std::string(channel.name).starts_with("strata.");
+    if (exact && (!found || found->type != channel.type)) {
+      return not_ours(path, "no UINT channel " + std::string(channel.name));
+    }
+  }
+  return layout;
+}
+
+// That the file can hold the image, and that the image may be held.
+Result<void> check_size(const LayeredDepthImage& image, const std::string& path,
+                        std::uint64_t file_bytes, std::uint64_t memory_limit) {
+  // Every row has a chunk, and its table of counts is compressed at best by zlib's limit.
+  const std::uint64_t width = static_cast<std::uint64_t>(image.width);
+  const std::uint64_t height = static_cast<std::uint64_t>(image.height);
+  if (height * (8 + kChunkHeader + 4 * width / kLargestRatio) > file_bytes) {
+    return fail(ErrorCode::kInput, "{}: {} bytes cannot hold {} x {} pixels", path, file_bytes,
+                image.width, image.height);
+  }
+  const std::uint64_t need = width * height * (sizeof(std::uint64_t) + sizeof(std::uint32_t));
+  if (memory_limit != 0 && need > memory_limit) {
+    return fail(ErrorCode::kLimit, "{}: {} x {} pixels need {} bytes, the memory limit is {}", path,
+                image.width, image.height, need, memory_limit);
+  }
+  return {};
+}
+
 // Fills in all of the image but its lists.
 Result<Layout> check_header(const Imf::Header& header, const std::string& path,
                             std::uint64_t file_bytes, std::uint64_t memory_limit,
@@ -370,37 +406,16 @@ Result<Layout> check_header(const Imf::Header& header, const std::string& path,
       window.max.x >= kMaxGridSide || window.max.y >= kMaxGridSide) {
     return not_ours(path, "its data window does not start at (0, 0) or is too large");
   }
-  Layout layout{mode->value() == kSamples, 0};
-  for (auto i = header.channels().begin(); i != header.channels().end(); ++i) {
-    if (i.channel().xSampling != 1 || i.channel().ySampling != 1) {
-      return not_ours(path, "a channel is subsampled");
-    }
-    layout.sample_bytes += i.channel().type == Imf::HALF ? 2 : 4;
-  }
-  for (const Channel& channel : channels_of(layout.samples)) {
-    const Imf::Channel* found = header.channels().findChannel(channel.name);
-    const bool exact = std::string(channel.name).starts_with("strata.");
-    if (exact && (!found || found->type != channel.type)) {
-      return not_ours(path, "no UINT channel " + std::string(channel.name));
-    }
-  }
+  const auto layout = check_channels(header, path, mode->value() == kSamples);
+  if (!layout) return layout;
   image.width = window.max.x + 1;
   image.height = window.max.y + 1;
   image.depth_limit = static_cast<std::uint32_t>(limit->value());
   for (int i = 0; i < 4; ++i) {
     for (int j = 0; j < 4; ++j) image.world_from_image[i][j] = matrix->value()[i][j];
   }
-  // Every row has a chunk, and its table of counts is compressed at best by zlib's limit.
-  const std::uint64_t width = static_cast<std::uint64_t>(image.width);
-  const std::uint64_t height = static_cast<std::uint64_t>(image.height);
-  if (height * (8 + kChunkHeader + 4 * width / kLargestRatio) > file_bytes) {
-    return fail(ErrorCode::kInput, "{}: {} bytes cannot hold {} x {} pixels", path, file_bytes,
-                image.width, image.height);
-  }
-  const std::uint64_t need = width * height * (sizeof(std::uint64_t) + sizeof(std::uint32_t));
-  if (memory_limit != 0 && need > memory_limit) {
-    return fail(ErrorCode::kLimit, "{}: {} x {} pixels need {} bytes, the memory limit is {}", path,
-                image.width, image.height, need, memory_limit);
+  if (auto fits = check_size(image, path, file_bytes, memory_limit); !fits) {
+    return tl::unexpected(fits.error());
   }
   return layout;
 }

@@ -235,6 +235,33 @@ std::string faces_text(std::uint64_t count) {
   return count == 1 ? "1 face was dropped" : fmt::format("{} faces were dropped", count);
 }
 
+/// A warning for each cause that faces were dropped for, with the first of them.
+/// @param vertices  that the file has
+void warn_of_dropped_faces(RawMesh& raw, const Losses& losses, std::size_t vertices,
+                           const LocateFace& locate) {
+  MeshReadStats& stats = raw.stats;
+  if (stats.too_few_vertices != 0) {
+    stats.warnings.push_back(
+        fmt::format("{}: face has fewer than 3 vertices; {}",
+                    locate(static_cast<std::uint32_t>(raw.first_short_face)).place,
+                    faces_text(stats.too_few_vertices)));
+  }
+  if (stats.out_of_range != 0) {
+    const FacePlace at = locate(static_cast<std::uint32_t>(losses.first_out_of_range));
+    stats.warnings.push_back(
+        fmt::format("{}: face refers to vertex {}, the file has {}; {}", at.place,
+                    at.vertex.empty() ? std::to_string(losses.out_of_range_vertex) : at.vertex,
+                    vertices, faces_text(stats.out_of_range)));
+  }
+  if (stats.non_finite != 0) {
+    const glm::dvec3 p = raw.soup.positions[losses.non_finite_vertex];
+    stats.warnings.push_back(
+        fmt::format("{}: face uses the vertex ({}, {}, {}), which is not finite; {}",
+                    locate(static_cast<std::uint32_t>(losses.first_non_finite)).place, p.x, p.y,
+                    p.z, faces_text(stats.non_finite)));
+  }
+}
+
 }  // namespace
 
 Result<MeshFile> finish_mesh(const ReaderInput& input, RawMesh&& raw, const LocateFace& locate) {
@@ -255,26 +282,7 @@ Result<MeshFile> finish_mesh(const ReaderInput& input, RawMesh&& raw, const Loca
   }
   if (bad || cuts.left_over()) drop_degenerate(raw);
 
-  if (stats.too_few_vertices != 0) {
-    stats.warnings.push_back(
-        fmt::format("{}: face has fewer than 3 vertices; {}",
-                    locate(static_cast<std::uint32_t>(raw.first_short_face)).place,
-                    faces_text(stats.too_few_vertices)));
-  }
-  if (stats.out_of_range != 0) {
-    const FacePlace at = locate(static_cast<std::uint32_t>(losses.first_out_of_range));
-    stats.warnings.push_back(
-        fmt::format("{}: face refers to vertex {}, the file has {}; {}", at.place,
-                    at.vertex.empty() ? std::to_string(losses.out_of_range_vertex) : at.vertex,
-                    vertices, faces_text(stats.out_of_range)));
-  }
-  if (stats.non_finite != 0) {
-    const glm::dvec3 p = soup.positions[losses.non_finite_vertex];
-    stats.warnings.push_back(
-        fmt::format("{}: face uses the vertex ({}, {}, {}), which is not finite; {}",
-                    locate(static_cast<std::uint32_t>(losses.first_non_finite)).place, p.x, p.y,
-                    p.z, faces_text(stats.non_finite)));
-  }
+  warn_of_dropped_faces(raw, losses, vertices, locate);
   if (input.options.strict && stats.dropped_faces() != 0) {
     return fail(ErrorCode::kInput, "{}", stats.warnings.front());
   }

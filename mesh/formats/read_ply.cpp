@@ -196,24 +196,58 @@ bool PlyReader::skip_property(Source& source, const Property& property) {
          source.skip(property.type, static_cast<std::uint64_t>(count));
 }
 
-template <class Source>
-Result<void> PlyReader::read_vertices(Source& source, const Element& element) {
-  int axis_of[3] = {-1, -1, -1};
+/// Where the coordinates stand among the properties of a vertex.
+struct VertexLayout {
+  int property[3] = {-1, -1, -1};  ///< by axis; -1: none
+  std::size_t offset[3] = {};      ///< bytes, where there are no lists
+  std::size_t stride = 0;          ///< bytes of a vertex, where there are no lists
   bool lists = false;
-  std::size_t stride = 0, offset[3] = {};
+};
+
+VertexLayout layout_of(const Element& element) {
+  VertexLayout layout;
   for (std::size_t i = 0; i < element.properties.size(); ++i) {
     const Property& property = element.properties[i];
     for (int axis = 0; axis < 3; ++axis) {
       if (property.list_type || property.name.size() != 1 || property.name[0] != 'x' + axis)
         continue;
-      axis_of[axis] = static_cast<int>(i);
-      offset[axis] = stride;
+      layout.property[axis] = static_cast<int>(i);
+      layout.offset[axis] = layout.stride;
     }
-    lists = lists || property.list_type.has_value();
-    stride += bytes_of(property.type);
+    layout.lists = layout.lists || property.list_type.has_value();
+    layout.stride += bytes_of(property.type);
   }
+  return layout;
+}
+
+/// All vertices at once, where each takes as many bytes. @pre source has them all
+template <class Source>
+void read_equal_vertices(Source& source, const Element& element, const VertexLayout& layout,
+                         const Execution& execution, std::vector<glm::dvec3>& positions) {
+  Type types[3];
   for (int axis = 0; axis < 3; ++axis) {
-    if (axis_of[axis] < 0) {
+    types[axis] = element.properties[static_cast<std::size_t>(layout.property[axis])].type;
+  }
+  positions.resize(element.count);
+  const char* const data = source.position();
+  constexpr std::size_t kBlock = 1 << 15;
+  parallel_for(execution, (element.count + kBlock - 1) / kBlock, [&](std::size_t block, int) {
+    const std::size_t stop = std::min<std::size_t>(element.count, (block + 1) * kBlock);
+    for (std::size_t v = block * kBlock; v < stop; ++v) {
+      const char* p = data + v * layout.stride;
+      positions[v] = {Source::at(types[0], p + layout.offset[0]),
+                      Source::at(types[1], p + layout.offset[1]),
+                      Source::at(types[2], p + layout.offset[2])};
+    }
+  });
+  source.advance(layout.stride * element.count);
+}
+
+template <class Source>
+Result<void> PlyReader::read_vertices(Source& source, const Element& element) {
+  const VertexLayout layout = layout_of(element);
+  for (int axis = 0; axis < 3; ++axis) {
+    if (layout.property[axis] < 0) {
       return fail(ErrorCode::kInput, "{}: element vertex has no property {}", input_.name,
                   "xyz"[axis]);
     }
@@ -221,25 +255,8 @@ Result<void> PlyReader::read_vertices(Source& source, const Element& element) {
   std::vector<glm::dvec3>& positions = mesh_.soup.positions;
   reserve_large(positions, element.count);
   if constexpr (Source::kBinary) {
-    if (!lists && source.left() / stride >= element.count) {
-      Type types[3];
-      for (int axis = 0; axis < 3; ++axis) {
-        types[axis] = element.properties[static_cast<std::size_t>(axis_of[axis])].type;
-      }
-      positions.resize(element.count);
-      const char* const data = source.position();
-      constexpr std::size_t kBlock = 1 << 15;
-      parallel_for(
-          input_.execution, (element.count + kBlock - 1) / kBlock, [&](std::size_t block, int) {
-            const std::size_t stop = std::min<std::size_t>(element.count, (block + 1) * kBlock);
-            for (std::size_t v = block * kBlock; v < stop; ++v) {
-              const char* p = data + v * stride;
-              positions[v] = {Source::at(types[0], p + offset[0]),
-                              Source::at(types[1], p + offset[1]),
-                              Source::at(types[2], p + offset[2])};
-            }
-          });
-      source.advance(stride * element.count);
+    if (!layout.lists && source.left() / layout.stride >= element.count) {
+      read_equal_vertices(source, element, layout, input_.execution, positions);
       return {};
     }
   }
@@ -251,11 +268,11 @@ Result<void> PlyReader::read_vertices(Source& source, const Element& element) {
       const Property& property = element.properties[i];
       const int index = static_cast<int>(i);
       bool good = true;
-      if (index == axis_of[0]) {
+      if (index == layout.property[0]) {
         good = source.read(property.type, position.x);
-      } else if (index == axis_of[1]) {
+      } else if (index == layout.property[1]) {
         good = source.read(property.type, position.y);
-      } else if (index == axis_of[2]) {
+      } else if (index == layout.property[2]) {
         good = source.read(property.type, position.z);
       } else {
         good = skip_property(source, property);

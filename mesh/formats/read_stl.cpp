@@ -32,47 +32,47 @@ glm::vec3 binary_corner(const char* data, std::size_t c) {
           std::bit_cast<float>(little_endian_32(p + 8))};
 }
 
-Result<MeshFile> read_binary(const ReaderInput& input) {
+/// How many triangles a binary file has: its size decides, unless it ends in something that is no
+/// triangle. Then what follows the claimed ones may all be that, or the file is cut off.
+struct BinaryCount {
+  std::uint64_t claimed = 0;  ///< in the head
+  std::uint64_t held = 0;     ///< that the size has room for
+  std::uint64_t count = 0;    ///< to read
+};
+
+Result<BinaryCount> count_binary(const ReaderInput& input) {
   const std::size_t size = input.text.size();
-  const char* const data = input.text.data();
   if (size < kHeaderBytes) {
     return fail(ErrorCode::kInput, "{}: {} bytes are too few for an STL file", input.name, size);
   }
-  const std::uint64_t claimed = little_endian_32(data + 80);
-  const std::uint64_t held = (size - kHeaderBytes) / kFacetBytes;
-  if (held == 0 && claimed == 0) return fail(ErrorCode::kInput, "{}: no triangles", input.name);
-  // The size decides, unless the file ends in something that is no triangle: then what follows the
-  // claimed ones may all be that, or the file is cut off.
+  BinaryCount found;
+  found.claimed = little_endian_32(input.text.data() + 80);
+  found.held = (size - kHeaderBytes) / kFacetBytes;
+  if (found.held == 0 && found.claimed == 0) {
+    return fail(ErrorCode::kInput, "{}: no triangles", input.name);
+  }
   const std::size_t odd = (size - kHeaderBytes) % kFacetBytes;
-  const std::uint64_t count = claimed == 0 || odd == 0 ? held : claimed;
+  found.count = found.claimed == 0 || odd == 0 ? found.held : found.claimed;
   // Text of any other kind holds no zeros, triangles do.
   const bool is_text =
       input.text.substr(kHeaderBytes, 16 * kFacetBytes).find('\0') == std::string_view::npos;
-  if (count > held || (count != claimed && is_text)) {
+  if (found.count > found.held || (found.count != found.claimed && is_text)) {
     return fail(ErrorCode::kInput,
                 "{}: byte 80 claims {} triangles, which end at byte {}, but the file has {} bytes",
-                input.name, claimed, kHeaderBytes + kFacetBytes * claimed, size);
+                input.name, found.claimed, kHeaderBytes + kFacetBytes * found.claimed, size);
   }
-  const std::size_t corners = 3 * count;
-  if (corners > kMaxVertices || exceeds_limit(input.execution, count / 2, count)) {
+  if (3 * found.count > kMaxVertices ||
+      exceeds_limit(input.execution, found.count / 2, found.count)) {
     return fail(ErrorCode::kLimit, "{}: {} triangles are more than the memory limit or {} corners",
-                input.name, count, kMaxVertices);
+                input.name, found.count, kMaxVertices);
   }
-  RawMesh mesh;
-  mesh.stats.format = "stl binary";
-  mesh.stats.faces = count;
-  if (count != claimed) {
-    mesh.stats.warnings.push_back(
-        fmt::format("{}: byte 80 claims {} triangle{}, but the file has {} bytes, room for {}: all "
-                    "{} are read",
-                    input.name, claimed, claimed == 1 ? "" : "s", size, held, held));
-    if (input.options.strict) return fail(ErrorCode::kInput, "{}", mesh.stats.warnings.front());
-  }
-  if (const std::size_t rest = size - kHeaderBytes - kFacetBytes * count; rest != 0) {
-    mesh.stats.warnings.push_back(
-        fmt::format("{}: {} bytes after the {} triangles are ignored", input.name, rest, count));
-  }
-  TriangleSoup& soup = mesh.soup;
+  return found;
+}
+
+/// Welds the corners. @return kCancelled
+Result<void> read_facets(const ReaderInput& input, std::size_t count, TriangleSoup& soup) {
+  const char* const data = input.text.data();
+  const std::size_t corners = 3 * count;
   reserve_large(soup.triangles, count);
   soup.triangles.resize(count);
   static_assert(sizeof(glm::uvec3) == 3 * sizeof(std::uint32_t));
@@ -96,6 +96,29 @@ Result<MeshFile> read_binary(const ReaderInput& input) {
       index[c] = index[index[c]];
     }
   }
+  return {};
+}
+
+Result<MeshFile> read_binary(const ReaderInput& input) {
+  const auto found = count_binary(input);
+  if (!found) return tl::unexpected(found.error());
+  const auto [claimed, held, count] = *found;
+  const std::size_t size = input.text.size();
+  RawMesh mesh;
+  mesh.stats.format = "stl binary";
+  mesh.stats.faces = count;
+  if (count != claimed) {
+    mesh.stats.warnings.push_back(
+        fmt::format("{}: byte 80 claims {} triangle{}, but the file has {} bytes, room for {}: all "
+                    "{} are read",
+                    input.name, claimed, claimed == 1 ? "" : "s", size, held, held));
+    if (input.options.strict) return fail(ErrorCode::kInput, "{}", mesh.stats.warnings.front());
+  }
+  if (const std::size_t rest = size - kHeaderBytes - kFacetBytes * count; rest != 0) {
+    mesh.stats.warnings.push_back(
+        fmt::format("{}: {} bytes after the {} triangles are ignored", input.name, rest, count));
+  }
+  if (auto done = read_facets(input, count, mesh.soup); !done) return tl::unexpected(done.error());
   return finish_mesh(input, std::move(mesh), [&input](std::uint32_t element) {
     return FacePlace{fmt::format("{}: triangle {} (byte {})", input.name, element,
                                  kHeaderBytes + kFacetBytes * element),

@@ -30,8 +30,10 @@ inline constexpr double kPowers[23] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6, 
 const char* parse_double_slowly(const char* text, double& value);
 }  // namespace scanner
 
-/// Reads a decimal number at `text`, correctly rounded and free of locales. Numbers beyond the
-/// range of double become infinite or zero; nan, inf and Microsoft's 1.#INF are read.
+/// Reads a decimal number at `text`, correctly rounded and free of locales. Not std::from_chars for
+/// all of them: over the coordinates of 11 OBJ files (bunny, teapot, knot, ...) it takes 1.27 to
+/// 1.78 times as long with g++ 12, fast_float 3.9 takes 1.06 to 1.36 times as long. Numbers beyond
+/// the range of double become infinite or zero; nan, inf and Microsoft's 1.#INF are read.
 /// @return past the number, or null when there is none
 inline const char* parse_double(const char* text, double& value) {
   const char* p = text;

@@ -19,6 +19,18 @@ void raster_narrow(int64_t at, int64_t down, inout int begin, inout int end) {
   }
 }
 
+// An edge at pixel (u, v), from what it is at (0, 0).
+int64_t raster_edge(uvec2 at, int along_u, int along_v, int u, int v) {
+  return int64_t(packUint2x32(at)) + int64_t(along_u) * int64_t(u) + int64_t(along_v) * int64_t(v);
+}
+
+RasterFraction raster_fraction(uint quotient, uvec2 remainder) {
+  RasterFraction result;
+  result.quotient = quotient;
+  result.remainder = packUint2x32(remainder);
+  return result;
+}
+
 void main() {
   uint index = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
   if (index >= raster_block_count) return;
@@ -35,13 +47,9 @@ void main() {
   int u = first_u + lane_u, v = first_v + lane_v;  // from the first pixel of the box
 
   ivec4 along_u = raster_large[slot].edge_along_u, along_v = raster_large[slot].edge_along_v;
-  int64_t step_u = int64_t(u), step_v = int64_t(v);
-  int64_t edge0 = int64_t(packUint2x32(raster_large[slot].edge0)) + int64_t(along_u.x) * step_u +
-                  int64_t(along_v.x) * step_v;
-  int64_t edge1 = int64_t(packUint2x32(raster_large[slot].edge1)) + int64_t(along_u.y) * step_u +
-                  int64_t(along_v.y) * step_v;
-  int64_t edge2 = int64_t(packUint2x32(raster_large[slot].edge2)) + int64_t(along_u.z) * step_u +
-                  int64_t(along_v.z) * step_v;
+  int64_t edge0 = raster_edge(raster_large[slot].edge0, along_u.x, along_v.x, u, v);
+  int64_t edge1 = raster_edge(raster_large[slot].edge1, along_u.y, along_v.y, u, v);
+  int64_t edge2 = raster_edge(raster_large[slot].edge2, along_u.z, along_v.z, u, v);
   int64_t down0 = int64_t(along_v.x) * int64_t(rows), down1 = int64_t(along_v.y) * int64_t(rows),
           down2 = int64_t(along_v.z) * int64_t(rows);
 
@@ -57,15 +65,13 @@ void main() {
   v += begin * rows;
 
   uint64_t area = packUint2x32(raster_large[slot].area);
-  RasterFraction base, by_u, by_v, none;
-  base.quotient = raster_large[slot].quotient;
-  base.remainder = packUint2x32(raster_large[slot].remainder);
-  by_u.quotient = raster_large[slot].quotient_u;
-  by_u.remainder = packUint2x32(raster_large[slot].remainder_u);
-  by_v.quotient = raster_large[slot].quotient_v;
-  by_v.remainder = packUint2x32(raster_large[slot].remainder_v);
-  none.quotient = 0u;
-  none.remainder = uint64_t(0u);
+  RasterFraction base =
+      raster_fraction(raster_large[slot].quotient, raster_large[slot].remainder);
+  RasterFraction by_u =
+      raster_fraction(raster_large[slot].quotient_u, raster_large[slot].remainder_u);
+  RasterFraction by_v =
+      raster_fraction(raster_large[slot].quotient_v, raster_large[slot].remainder_v);
+  RasterFraction none = raster_fraction(0u, uvec2(0u));
   RasterFraction at = raster_stride(base, by_u, u, by_v, v, area);
   RasterFraction down = raster_stride(none, by_u, 0, by_v, rows, area);
   uint payload = raster_large[slot].payload;
