@@ -2,7 +2,7 @@
 
 #include <cstdlib>
 
-namespace strata::surface {
+namespace strata::shell {
 namespace {
 
 // One edge's crossings with the lines between strips. Vertices are the caller's.
@@ -162,4 +162,4 @@ bool SegmentTest::meets_in_plane(const Vector& d) const {
   return false;
 }
 
-}  // namespace strata::surface
+}  // namespace strata::shell

@@ -23,7 +23,7 @@
 
 #include "strata/raster/lattice_mesh.h"
 
-namespace strata::surface {
+namespace strata::shell {
 
 __extension__ typedef __int128 Wide;  // not ISO C++: -Wpedantic
 /// A lattice point or vector as (u, v, w): two axes of the image, then the axis of the columns.
@@ -200,4 +200,4 @@ class SegmentTest {
   std::array<Vector, 3> edges_{};  ///< (a - centre) x (b - centre) of the edges
 };
 
-}  // namespace strata::surface
+}  // namespace strata::shell

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-namespace strata::surface {
+namespace strata::shell {
 namespace {
 
 constexpr int kSide = VoxelIntervals::kTileSide;
@@ -142,4 +142,4 @@ void collect(const Triangle& triangle, const Window& window, SurfaceKind kind,
   });
 }
 
-}  // namespace strata::surface
+}  // namespace strata::shell

@@ -19,7 +19,7 @@
 #include "strata/voxelize/voxelize_options.h"
 #include "voxelize/shell_overlap.h"
 
-namespace strata::surface {
+namespace strata::shell {
 
 /// Bytes held by a job, against its limit.
 class Budget {
@@ -131,4 +131,4 @@ class RunCollector {
 void collect(const Triangle& triangle, const Window& window, SurfaceKind kind,
              RunCollector& collector);
 
-}  // namespace strata::surface
+}  // namespace strata::shell

@@ -10,10 +10,10 @@
 namespace strata {
 namespace {
 
-using surface::Bins;
-using surface::Budget;
-using surface::for_each_tile;
-using surface::RunCollector;
+using shell::Bins;
+using shell::Budget;
+using shell::for_each_tile;
+using shell::RunCollector;
 
 constexpr int kSide = VoxelIntervals::kTileSide;
 
@@ -40,14 +40,14 @@ void append_union(std::span<const Interval> a, std::span<const Interval> b,
 
 }  // namespace
 
-Result<VoxelIntervals> voxelize_surface(const LatticeMesh& mesh, const VoxelGrid& grid,
-                                        SurfaceKind kind, Axis axis, int v_begin, int v_end,
-                                        const Execution& execution) {
+Result<VoxelIntervals> voxelize_shell(const LatticeMesh& mesh, const VoxelGrid& grid,
+                                      SurfaceKind kind, Axis axis, int v_begin, int v_end,
+                                      const Execution& execution) {
   try {
     const AxisFrame frame(axis);
     VoxelIntervals slab(grid, axis, v_begin, v_end);
     Budget budget(execution.memory_limit);
-    const Result<Bins> bins = surface::bin_by_tile(mesh, slab, execution, budget);
+    const Result<Bins> bins = shell::bin_by_tile(mesh, slab, execution, budget);
     if (!bins) return tl::unexpected(bins.error());
 
     std::vector<RunCollector> collectors(static_cast<std::size_t>(execution.thread_count()));
@@ -59,9 +59,9 @@ Result<VoxelIntervals> voxelize_surface(const LatticeMesh& mesh, const VoxelGrid
           collector.clear();
           const int tu = static_cast<int>(tile) % slab.tiles_u();
           const int tv = static_cast<int>(tile) / slab.tiles_u();
-          const surface::Window window = surface::window_of(slab, tu, tv);
+          const shell::Window window = shell::window_of(slab, tu, tv);
           for (std::size_t i = bins->offsets[tile]; i < bins->offsets[tile + 1]; ++i) {
-            collect(surface::corners(mesh, bins->triangles[i], frame), window, kind, collector);
+            collect(shell::corners(mesh, bins->triangles[i], frame), window, kind, collector);
             collector.compact_if_large();
           }
           collector.finish();

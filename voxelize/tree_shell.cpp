@@ -10,8 +10,8 @@
 
 namespace strata {
 
-using surface::Bins;
-using surface::Budget;
+using shell::Bins;
+using shell::Budget;
 
 /// The scratch of one thread, and its work on one tile.
 struct TreeShell::Worker {
@@ -21,7 +21,7 @@ struct TreeShell::Worker {
 
   /// The runs of each solid's faces, column by column.
   void find_faces(const LatticeMesh& mesh, std::span<const std::uint32_t> triangles,
-                  const surface::Window& window, AxisFrame frame, const VoxelizeOptions& options);
+                  const shell::Window& window, AxisFrame frame, const VoxelizeOptions& options);
   /// What the filter keeps of them. @return whether there is any
   bool keep(const TileLists<DepthItem>& lists);
   [[nodiscard]] std::uint64_t bytes() const {
@@ -35,7 +35,7 @@ struct TreeShell::Worker {
   };
   ItemTileBuilder builder;
   std::unique_ptr<TileListFilter::Worker> filter;
-  surface::RunCollector collector;
+  shell::RunCollector collector;
   std::vector<Found> found;
   std::vector<FaceRun> faces;  // by column
   std::vector<std::uint32_t> first_face;
@@ -46,15 +46,15 @@ struct TreeShell::Worker {
 
 void TreeShell::Worker::find_faces(const LatticeMesh& mesh,
                                    std::span<const std::uint32_t> triangles,
-                                   const surface::Window& window, AxisFrame frame,
+                                   const shell::Window& window, AxisFrame frame,
                                    const VoxelizeOptions& options) {
   found.clear();
   for (std::size_t i = 0; i < triangles.size();) {
     const std::uint32_t solid = options.filter->solid_of(triangles[i]);
     collector.clear();
     for (; i < triangles.size() && options.filter->solid_of(triangles[i]) == solid; ++i) {
-      surface::collect(surface::corners(mesh, triangles[i], frame), window, options.surface_kind,
-                       collector);
+      shell::collect(shell::corners(mesh, triangles[i], frame), window, options.surface_kind,
+                     collector);
       collector.compact_if_large();
     }
     collector.finish();
@@ -113,7 +113,7 @@ Result<VoxelIntervals> TreeShell::slab(int v_begin, int v_end, const Execution& 
     const AxisFrame frame(options_.axis);
     VoxelIntervals slab(*grid_, options_.axis, v_begin, v_end);
     Budget budget(execution.memory_limit);
-    const Result<Bins> bins = surface::bin_by_tile(*mesh_, slab, execution, budget);
+    const Result<Bins> bins = shell::bin_by_tile(*mesh_, slab, execution, budget);
     if (!bins) return tl::unexpected(bins.error());
     const std::vector<std::uint32_t> no_offsets(kTilePixels + 1, 0);
     TileLists<DepthItem> no_lists;  // of a tile whose pixel centres no triangle covers
@@ -128,7 +128,7 @@ Result<VoxelIntervals> TreeShell::slab(int v_begin, int v_end, const Execution& 
       const int tu = static_cast<int>(tile) % slab.tiles_u();
       const int tv = static_cast<int>(tile) / slab.tiles_u();
       worker.find_faces(*mesh_, std::span(bins->triangles).subspan(begin, end - begin),
-                        surface::window_of(slab, tu, tv), frame, options_);
+                        shell::window_of(slab, tu, tv), frame, options_);
       const int row = v_begin / kTileSide + tv;
       const auto covering = bins_.tile(tu, row);
       TileLists<DepthItem> lists = no_lists;
@@ -148,7 +148,7 @@ Result<VoxelIntervals> TreeShell::slab(int v_begin, int v_end, const Execution& 
                         worker.offsets.size() * sizeof(std::uint32_t));
     };
     const Result<void> done =
-        surface::for_each_tile(execution, bins->offsets.size() - 1, budget.limit(), make_tile);
+        shell::for_each_tile(execution, bins->offsets.size() - 1, budget.limit(), make_tile);
     if (!status) return tl::unexpected(status.error());
     if (!done) return tl::unexpected(done.error());
     return slab;

@@ -13,7 +13,7 @@
 namespace strata {
 
 /// The voxels that the surface of a Boolean tree passes through, slab by slab. A voxel counts when
-/// faces of solids do, by the test of voxelize_surface(), and the tree depends on those solids, all
+/// faces of solids do, by the test of voxelize_shell(), and the tree depends on those solids, all
 /// others being as they are at its centre. Where the faces in a voxel are of one solid that is the
 /// tree's surface; where several solids have faces in it, none of the surface is lost, and a voxel
 /// may be kept that it misses.
@@ -23,7 +23,7 @@ class TreeShell {
   static Result<TreeShell> create(const LatticeMesh& mesh, const VoxelGrid& grid,
                                   const VoxelizeOptions& options, const Execution& execution);
 
-  /// Rows [v_begin, v_end), as voxelize_surface() has them.
+  /// Rows [v_begin, v_end), as voxelize_shell() has them.
   Result<VoxelIntervals> slab(int v_begin, int v_end, const Execution& execution);
 
  private:

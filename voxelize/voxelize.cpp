@@ -173,8 +173,8 @@ class ShellSlabs {
   }
   Result<VoxelIntervals> slab(int v_begin, int v_end, const Execution& execution) {
     return tree_ ? tree_->slab(v_begin, v_end, execution)
-                 : voxelize_surface(*mesh_, *grid_, options_->surface_kind, options_->axis, v_begin,
-                                    v_end, execution);
+                 : voxelize_shell(*mesh_, *grid_, options_->surface_kind, options_->axis, v_begin,
+                                  v_end, execution);
   }
 
  private:

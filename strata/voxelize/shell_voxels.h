@@ -40,9 +40,9 @@ namespace strata {
 /// @pre grid.dims in [1, kMaxGridSide], v_begin is a multiple of VoxelIntervals::kTileSide,
 ///   0 <= v_begin < v_end <= rows of the grid; indices of mesh.triangles are in range
 /// @return kLimit when bins, result and scratch outgrow execution.memory_limit, kCancelled
-Result<VoxelIntervals> voxelize_surface(const LatticeMesh& mesh, const VoxelGrid& grid,
-                                        SurfaceKind kind, Axis axis, int v_begin, int v_end,
-                                        const Execution& execution = {});
+Result<VoxelIntervals> voxelize_shell(const LatticeMesh& mesh, const VoxelGrid& grid,
+                                      SurfaceKind kind, Axis axis, int v_begin, int v_end,
+                                      const Execution& execution = {});
 
 /// The voxels of `a` or of `b`. O(intervals).
 /// @return kUsage when grid, axis or rows of the two differ, kLimit when memory runs out,

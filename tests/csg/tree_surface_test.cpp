@@ -134,7 +134,7 @@ Set brute_force(const Tree& tree) {
     const SolidLists lists(alone, alone.root());
     const auto snapped = snap_to_lattice(lists.soup(), kGrid);
     faces.push_back(set_of(
-        voxelize_surface(*snapped, kGrid, SurfaceKind::kConservative, Axis::kZ, 0, kSide).value()));
+        voxelize_shell(*snapped, kGrid, SurfaceKind::kConservative, Axis::kZ, 0, kSide).value()));
     inside.push_back(set_of(voxelize(lists.soup(), kGrid).value()));
   }
   Set result;

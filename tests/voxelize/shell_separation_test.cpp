@@ -12,7 +12,7 @@
 namespace strata {
 namespace {
 
-using namespace surface_testing;  // NOLINT: the vocabulary of this file
+using namespace shell_testing;  // NOLINT: the vocabulary of this file
 
 // Winding number by solid angles (Van Oosterom and Strackee 1983), in full turns.
 double winding(const Mesh& mesh, glm::dvec3 q) {

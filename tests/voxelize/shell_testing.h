@@ -13,7 +13,7 @@
 
 #include "strata/voxelize/shell_voxels.h"
 
-namespace strata::surface_testing {
+namespace strata::shell_testing {
 
 inline constexpr std::array kAllAxes = {Axis::kX, Axis::kY, Axis::kZ};
 inline constexpr std::array kAllKinds = {SurfaceKind::kConservative, SurfaceKind::k26,
@@ -105,7 +105,7 @@ inline VoxelSet surface_set(const Mesh& mesh, const VoxelGrid& grid, SurfaceKind
   const int rows = grid.dims[AxisFrame(axis).v];
   Execution execution;
   execution.threads = threads;
-  const auto slab = voxelize_surface(mesh.lattice(), grid, kind, axis, 0, rows, execution);
+  const auto slab = voxelize_shell(mesh.lattice(), grid, kind, axis, 0, rows, execution);
   EXPECT_TRUE(slab.has_value()) << slab.error().message;
   if (slab) add_to(set, *slab);
   return set;
@@ -164,4 +164,4 @@ inline Mesh cuboid(glm::ivec3 low, glm::ivec3 high) {
   return mesh;
 }
 
-}  // namespace strata::surface_testing
+}  // namespace strata::shell_testing

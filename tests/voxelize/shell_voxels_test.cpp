@@ -18,7 +18,7 @@
 namespace strata {
 namespace {
 
-using namespace surface_testing;  // NOLINT: the vocabulary of this file
+using namespace shell_testing;  // NOLINT: the vocabulary of this file
 
 __extension__ typedef __int128 Wide;  // not ISO C++: -Wpedantic
 using WideVector = std::array<Wide, 3>;
@@ -218,8 +218,8 @@ TEST(Surface, EqualsTheOracleAcrossTilesAndSlabs) {
         VoxelSet by_slabs(dims);
         const int rows = dims[AxisFrame(axis).v];
         for (int v = 0; v < rows; v += 64) {
-          const auto slab = voxelize_surface(mesh.lattice(), grid, kind, axis, v,
-                                             std::min(v + 64, rows), Execution{});
+          const auto slab = voxelize_shell(mesh.lattice(), grid, kind, axis, v,
+                                           std::min(v + 64, rows), Execution{});
           ASSERT_TRUE(slab.has_value());
           add_to(by_slabs, *slab);
         }
@@ -263,7 +263,7 @@ TEST(SurfaceOverlap, HugeTrianglesAreExactAtTheFarCornerOfTheLargestGrid) {
   std::mt19937_64 random(9);
   const int side = kMaxGridSide;
   const glm::ivec3 corner(side - 5, side - 4, side - 6);
-  const surface::Window window{corner.x, side, corner.y, side, side};
+  const shell::Window window{corner.x, side, corner.y, side, side};
   std::uniform_int_distribution<int> far(-kMaxLatticeCoordinate, kMaxLatticeCoordinate);
   int touched = 0;
   for (int round = 0; round < 400; ++round) {
@@ -274,17 +274,17 @@ TEST(SurfaceOverlap, HugeTrianglesAreExactAtTheFarCornerOfTheLargestGrid) {
     const std::array<glm::ivec3, 3> corners = {p, glm::ivec3(far(random), far(random), far(random)),
                                                2 * near - p};
     const OracleTriangle expected(corners[0], corners[1], corners[2]);
-    surface::Triangle triangle;
+    shell::Triangle triangle;
     for (std::size_t i = 0; i < 3; ++i) triangle[i] = {corners[i].x, corners[i].y, corners[i].z};
     for (const SurfaceKind kind : kAllKinds) {
       VoxelSet found({5, 4, 6});
-      surface::SegmentTest thin(triangle, kind == SurfaceKind::k26);
+      shell::SegmentTest thin(triangle, kind == SurfaceKind::k26);
       const auto add = [&](int u, int v, int first, int last) {
         for (int w = std::max(first, corner.z); w <= last; ++w) {
           found.at(glm::ivec3(u, v, w) - corner) = true;
         }
       };
-      surface::conservative_runs(triangle, window, [&](int u, int v, int first, int last) {
+      shell::conservative_runs(triangle, window, [&](int u, int v, int first, int last) {
         if (kind == SurfaceKind::kConservative) return add(u, v, first, last);
         first = std::max(first, corner.z);
         if (first <= last) {
@@ -400,8 +400,8 @@ TEST(Surface, AMemoryLimitIsAnErrorThatNamesIt) {
   const Mesh mesh = wavy_sphere({65, 70, 75}, 60, 0.05, 9, 40);
   Execution execution;
   execution.memory_limit = 10000;
-  const auto slab = voxelize_surface(mesh.lattice(), grid_of(130, 140, 150),
-                                     SurfaceKind::kConservative, Axis::kZ, 0, 140, execution);
+  const auto slab = voxelize_shell(mesh.lattice(), grid_of(130, 140, 150),
+                                   SurfaceKind::kConservative, Axis::kZ, 0, 140, execution);
   ASSERT_FALSE(slab.has_value());
   EXPECT_EQ(slab.error().code, ErrorCode::kLimit);
   EXPECT_NE(slab.error().message.find("10000"), std::string::npos) << slab.error().message;
@@ -413,8 +413,8 @@ TEST(Surface, AStopRequestCancels) {
   stop.request_stop();
   Execution execution;
   execution.stop = stop.get_token();
-  const auto slab = voxelize_surface(mesh.lattice(), grid_of(20, 20, 20), SurfaceKind::k6, Axis::kY,
-                                     0, 20, execution);
+  const auto slab = voxelize_shell(mesh.lattice(), grid_of(20, 20, 20), SurfaceKind::k6, Axis::kY,
+                                   0, 20, execution);
   ASSERT_FALSE(slab.has_value());
   EXPECT_EQ(slab.error().code, ErrorCode::kCancelled);
 }
@@ -428,8 +428,8 @@ TEST(Surface, ProgressEndsAtOne) {
     EXPECT_GT(fraction, last);
     last = fraction;
   };
-  ASSERT_TRUE(voxelize_surface(mesh.lattice(), grid_of(200, 200, 20), SurfaceKind::k26, Axis::kZ, 0,
-                               200, execution));
+  ASSERT_TRUE(voxelize_shell(mesh.lattice(), grid_of(200, 200, 20), SurfaceKind::k26, Axis::kZ, 0,
+                             200, execution));
   EXPECT_EQ(last, 1.0);
 }
 
