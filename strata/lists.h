@@ -21,13 +21,12 @@
 //
 // WHICH LISTS
 //
-//     alias               keeps            layers   generator runs              bytes
-//     DepthLists          depth            any      twice                       8 a fragment, 8 a
-//     pixel PayloadLists        depth, 32 bits   any      twice                       8 a fragment,
-//     8 a pixel OnePassDepthLists   depth            255      once; or insert() at will   about 6 a
-//     fragment OnePassLists        depth, 32 bits   255      once; or insert() at will   about 12 a
-//     fragment DeepLists           depth, 30 bits   1023     once; or insert() at will   about 12 a
-//     fragment
+//     alias              keeps            layers   generator runs     bytes
+//     DepthLists         depth            any      twice              8 a fragment, 8 a pixel
+//     PayloadLists       depth, 32 bits   any      twice              8 a fragment, 8 a pixel
+//     OnePassDepthLists  depth            255      once, or insert()  about 6 a fragment
+//     OnePassLists       depth, 32 bits   255      once, or insert()  about 12 a fragment
+//     DeepLists          depth, 30 bits   1023     once, or insert()  about 12 a fragment
 //
 // Take DepthLists or PayloadLists (count/scan: count, sum up, store, sort) if you can give the same
 // fragments twice: they are faster in most scenes, and no list is too long. Take the one-pass lists

@@ -2,10 +2,10 @@
 
 /// From a mesh file to voxels:
 ///
-///   auto file = strata::read_mesh("part.stl");                                  // or any
-///   TriangleSoup auto grid = strata::fit_grid(strata::bounds(file->soup), {.resolution = 256});
-///   auto set = strata::voxelize(file->soup, *grid);                             // VoxelIntervals
-///   auto done = strata::write_voxels(*set, "part.vdb");                         // .npy, .vti, ...
+///   auto file = strata::read_mesh("part.stl");  // or any TriangleSoup
+///   auto grid = strata::fit_grid(strata::bounds(file->soup), {.resolution = 256});
+///   auto set = strata::voxelize(file->soup, *grid);  // VoxelIntervals
+///   auto done = strata::write_voxels(*set, "part.vdb");  // .npy, .vti, ...
 ///
 /// Each returns a Result, an error being one sentence. A voxel is solid when its centre is inside
 /// the mesh, whose vertices are rounded to 1/256 voxel; all else is exact. A mesh that is not
