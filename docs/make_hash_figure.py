@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Draws docs/hash_buffer.svg: how the probe order of a hash table becomes a sorted list.
 
-The table of the figure is computed, by the insertion that strata/hashbuffer/hash_buffer.h states as its law. The script also
+The table of the figure is computed, by the insertion that strata/hashbuffer/table_law.h states. The script also
 checks that the lists are sorted and that 1,000 other orders of arrival give the same table.
 
 usage: make_hash_figure.py FILE           writes the figure
