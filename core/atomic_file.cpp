@@ -327,7 +327,7 @@ Result<void> AtomicFile::commit() {
   if (std::rename(temporary_.c_str(), target_.c_str()) != 0) {
     const int reason = errno;
     discard();
-    return fail(ErrorCode::kOutput, "{}: cannot rename {} to it: {}", path_, temporary_,
+    return fail(ErrorCode::kOutput, "{}: cannot rename {} to this name: {}", path_, temporary_,
                 reason_text(reason));
   }
   leave_temporary(slot_);
@@ -403,7 +403,7 @@ Result<void> AtomicFolder::commit() {
   if (std::rename(temporary_.c_str(), target_.c_str()) != 0) {
     const int reason = errno;
     discard();
-    return fail(ErrorCode::kOutput, "{}: cannot rename {} to it: {}", path_, temporary_,
+    return fail(ErrorCode::kOutput, "{}: cannot rename {} to this name: {}", path_, temporary_,
                 reason_text(reason));
   }
   leave_temporary(slot_);
@@ -459,8 +459,8 @@ Result<void> OutputGroup::commit() {
   while (placed < waiting_.size() && (reason = place(waiting_[placed])) == 0) ++placed;
   Result<void> result;
   if (reason != 0) {
-    result = fail(ErrorCode::kOutput, "{}: cannot rename {} to it: {}", waiting_[placed].path,
-                  waiting_[placed].temporary, reason_text(reason));
+    result = fail(ErrorCode::kOutput, "{}: cannot rename {} to this name: {}",
+                  waiting_[placed].path, waiting_[placed].temporary, reason_text(reason));
     for (std::size_t i = placed; i-- > 0;) take_back(waiting_[i]);
   }
   for (Waiting& output : waiting_) {

@@ -82,7 +82,7 @@ void View::set_distances(double nearest, double farthest) {
 
 Result<View> make_view(const Camera& camera, const glm::ivec2& size, const Bounds& box) {
   if (size.x < 1 || size.y < 1 || size.x > kMaxPictureSide || size.y > kMaxPictureSide) {
-    return fail(ErrorCode::kUsage, "a picture of {} x {} pixels: each side is 1 to {}", size.x,
+    return fail(ErrorCode::kUsage, "a picture of {} x {} pixels: each side must be 1 to {}", size.x,
                 size.y, kMaxPictureSide);
   }
   const bool finite = std::isfinite(camera.distance) && std::isfinite(camera.target.x) &&

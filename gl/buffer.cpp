@@ -19,7 +19,7 @@ Result<Buffer> Buffer::allocate(std::uint64_t bytes) {
                        nullptr, GL_DYNAMIC_STORAGE_BIT);
   // An error of an earlier call comes to light here too; it is not lost.
   if (auto checked = check_errors("allocation"); !checked) {
-    return fail(checked.error().code, "OpenGL: no buffer of {} bytes: {}", bytes,
+    return fail(checked.error().code, "OpenGL: cannot make a buffer of {} bytes: {}", bytes,
                 checked.error().message);
   }
   buffer.bytes_ = bytes;

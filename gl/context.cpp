@@ -88,7 +88,7 @@ void probe_int64(Info& info) {
                        .has_value();
   // Asked for by name where it is listed only: some drivers warn of unknown extensions and go on.
   if (!info.has_extension("GL_NV_shader_atomic_int64")) {
-    info.int64_atomics_reason = "GL_NV_shader_atomic_int64 is not there";
+    info.int64_atomics_reason = "GL_NV_shader_atomic_int64 is missing";
     return;
   }
   const auto probe = compiles({"GL_ARB_gpu_shader_int64", "GL_NV_shader_atomic_int64"},

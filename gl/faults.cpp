@@ -48,7 +48,7 @@ Result<void> begin_faults() {
       known = read.ec == std::errc() && read.ptr == end && faults.downloads_left > 0;
     }
     if (!known) {
-      status = fail(ErrorCode::kUsage, "STRATA_GL_FAULTS: {}={} is no fault", name, value);
+      status = fail(ErrorCode::kUsage, "STRATA_GL_FAULTS: unknown fault {}={}", name, value);
     }
   });
   return status;

@@ -122,7 +122,7 @@ class EglContext final : public Context {
       return fail(ErrorCode::kUsage, "{}: no context without a surface", name_);
     }
     if (!eglBindAPI(EGL_OPENGL_API)) {
-      return fail(ErrorCode::kUsage, "{}: has no OpenGL, only OpenGL ES", name_);
+      return fail(ErrorCode::kUsage, "{}: no OpenGL, only OpenGL ES", name_);
     }
     const EGLint wanted[] = {EGL_SURFACE_TYPE, EGL_DONT_CARE, EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT,
                              EGL_NONE};
@@ -201,7 +201,8 @@ Result<std::unique_ptr<Context>> open_named(const Ways& ways, const std::string&
   const char* end = name.data() + name.size();
   if (!name.starts_with(prefix) ||
       std::from_chars(name.data() + prefix.size(), end, number).ptr != end) {
-    return fail(ErrorCode::kUsage, "OpenGL device '{}': write surfaceless or device:N", name);
+    return fail(ErrorCode::kUsage, "the OpenGL device must be surfaceless or device:N, got '{}'",
+                name);
   }
   if (number >= ways.devices()) {
     return fail(ErrorCode::kUsage, "OpenGL device '{}': EGL has {} devices, counted from 0", name,

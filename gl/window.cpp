@@ -46,7 +46,7 @@ Result<std::unique_ptr<Window>> Window::open(const WindowOptions& options) {
     if (window->window_) break;
   }
   if (!window->window_) {
-    auto error = fail(ErrorCode::kUsage, "no window of OpenGL 4.5: {}", glfw_error());
+    auto error = fail(ErrorCode::kUsage, "no window with OpenGL 4.5: {}", glfw_error());
     end_glfw();
     return error;
   }

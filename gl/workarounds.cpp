@@ -13,12 +13,11 @@ struct Known {
 };
 
 constexpr std::array kKnown{
-    Known{
-        "loop-rounds",
-        "llvmpipe ends the loops of an invocation after 65535 rounds in all, without a word: "
-        "lists of more than 1024 items are sorted in stages, by many invocations, and threads that "
-        "fill a hash table take 8000 steps",
-        is_llvmpipe},
+    Known{"loop-rounds",
+          "llvmpipe silently ends the loops of an invocation after 65535 rounds in all: lists of "
+          "more than 1024 items are sorted in stages, by many invocations, and threads that "
+          "fill a hash table take 8000 steps",
+          is_llvmpipe},
 };
 
 }  // namespace

@@ -71,7 +71,7 @@ LayeredDepthImage empty_image(const RasterTarget& target) {
 Error too_much(const RasterTarget& target, std::uint64_t limit, std::uint64_t held) {
   return {ErrorCode::kLimit,
           fmt::format("the depth lists of {} x {} pixels need more than the memory limit of {} "
-                      "bytes; {} bytes were reached",
+                      "bytes; they had reached {} bytes",
                       target.width, target.height, limit, held)};
 }
 

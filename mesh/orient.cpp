@@ -545,21 +545,21 @@ std::vector<std::string> sentences(const Orientation& found, bool changed) {
   std::vector<std::string> result;
   if (found.turned_parts > 0 && !found.all_turned) {
     result.push_back(fmt::format("{} of {} parts {}", found.turned_parts, found.parts,
-                                 changed ? "were inside out and are turned" : "are inside out"));
+                                 changed ? "were inside out and were reversed" : "are inside out"));
   }
   if (found.turned_triangles > 0) {
     const bool one = found.turned_triangles == 1;
-    result.push_back(fmt::format("{} triangle{} {} against {} neighbours", found.turned_triangles,
-                                 one ? "" : "s",
-                                 changed ? "turned that looked"
-                                 : one   ? "looks"
-                                         : "look",
-                                 one ? "its" : "their"));
+    result.push_back(fmt::format(
+        "{} triangle{} against {} neighbours{}", found.turned_triangles,
+        changed ? (one ? " faced" : "s faced") : (one ? " faces" : "s face"), one ? "its" : "their",
+        !changed ? ""
+        : one    ? " and was reversed"
+                 : " and were reversed"));
   }
   if (found.double_faces > 0) {
-    result.push_back(fmt::format("double-sided: {} triangles are there once each way{}",
+    result.push_back(fmt::format("double-sided: {} triangles occur once each way{}",
                                  found.double_faces,
-                                 changed ? "; one side of them is taken as the solid" : ""));
+                                 changed ? "; one of the two is used as the solid's surface" : ""));
   }
   return result;
 }

@@ -71,8 +71,9 @@ Result<std::vector<std::uint32_t>> fit_lattice(TriangleSoup& mesh, const Bounds&
     for (const double at : {box.low[axis], box.high[axis]}) {
       fits = fits && std::abs(at - grid.origin[axis]) / grid.voxel_size[axis] <= kMostVoxels;
       if (std::abs(at) < kMostClamped) continue;
-      return fail(ErrorCode::kGeometry, "the mesh reaches {} = {:g}; coordinates are below {:g}",
-                  "xyz"[axis], at, kMostClamped);
+      return fail(ErrorCode::kGeometry,
+                  "the mesh reaches {} = {:g}; coordinates must be below {:g}", "xyz"[axis], at,
+                  kMostClamped);
     }
   }
   if (fits) return {};

@@ -24,48 +24,50 @@ Result<void> check_request(const GridRequest& request) {
                     int{request.dims.has_value()};
   if (sizes != 1) {
     return fail(ErrorCode::kUsage,
-                "{} of resolution, voxel size and grid are given; exactly one is needed", sizes);
+                "exactly one of resolution, voxel size and grid must be given, got {}", sizes);
   }
   if (request.resolution && *request.resolution < 1) {
-    return fail(ErrorCode::kUsage, "a resolution of {} voxels; at least 1 is needed",
+    return fail(ErrorCode::kUsage, "the resolution must be at least 1 voxel, got {}",
                 *request.resolution);
   }
   if (request.padding < 0) {
-    return fail(ErrorCode::kUsage, "a padding of {} voxels; at least 0 is needed", request.padding);
+    return fail(ErrorCode::kUsage, "the padding must be at least 0 voxels, got {}",
+                request.padding);
   }
   if (request.padding >= kMaxGridSide / 2) {
-    return fail(ErrorCode::kLimit, "a padding of {} voxels; a grid has at most {} along a side",
+    return fail(ErrorCode::kLimit,
+                "a padding of {} voxels is too large: a grid has at most {} along a side",
                 request.padding, kMaxGridSide);
   }
   for (int axis = 0; axis < 3; ++axis) {
     if (request.voxel_size && !((*request.voxel_size)[axis] > 0.0)) {
-      return fail(ErrorCode::kUsage, "a voxel size of {} along {}; it must be above 0",
+      return fail(ErrorCode::kUsage, "the voxel size along {1} must be above 0, got {0}",
                   (*request.voxel_size)[axis], kAxisNames[axis]);
     }
     if (request.voxel_size && !std::isfinite((*request.voxel_size)[axis])) {
-      return fail(ErrorCode::kUsage, "a voxel size of {} along {}; it must be finite",
+      return fail(ErrorCode::kUsage, "the voxel size along {1} must be finite, got {0}",
                   (*request.voxel_size)[axis], kAxisNames[axis]);
     }
     if (!request.dims) continue;
     const std::int64_t count = (*request.dims)[static_cast<std::size_t>(axis)];
     if (count < 1) {
-      return fail(ErrorCode::kUsage, "a grid of {} voxels along {}; at least 1 is needed", count,
-                  kAxisNames[axis]);
-    }
-    if (count <= 2 * request.padding) {
-      return fail(ErrorCode::kUsage, "a grid of {} voxels along {}, all of which are padding",
+      return fail(ErrorCode::kUsage, "the grid must have at least 1 voxel along {1}, got {0}",
                   count, kAxisNames[axis]);
     }
+    if (count <= 2 * request.padding) {
+      return fail(ErrorCode::kUsage, "the {} voxels of the grid along {} are all padding", count,
+                  kAxisNames[axis]);
+    }
     if (count > kMaxGridSide) {
-      return fail(ErrorCode::kLimit, "a grid of {} voxels along {}; at most {} can be had", count,
-                  kAxisNames[axis], kMaxGridSide);
+      return fail(ErrorCode::kLimit, "the grid must have at most {2} voxels along {1}, got {0}",
+                  count, kAxisNames[axis], kMaxGridSide);
     }
   }
   if (request.align && request.dims) {
     return fail(ErrorCode::kUsage, "a grid of fixed size cannot be aligned; give the voxel size");
   }
   if (request.align && request.origin) {
-    return fail(ErrorCode::kUsage, "an origin is given, so it cannot be aligned");
+    return fail(ErrorCode::kUsage, "an origin and alignment cannot be combined");
   }
   if (request.origin && !finite(*request.origin)) {
     return fail(ErrorCode::kUsage, "the origin ({}, {}, {}) must be finite", request.origin->x,
@@ -81,12 +83,13 @@ Result<Bounds> covered_box(const Bounds& mesh_bounds, const GridRequest& request
   if (!given && box.empty())
     return fail(ErrorCode::kGeometry, "the mesh has no triangles to fit a grid to");
   if (given && request.origin) {
-    return fail(ErrorCode::kUsage, "bounds and an origin are given; one decides the lower corner");
+    return fail(ErrorCode::kUsage,
+                "bounds and an origin cannot be combined: each sets the lower corner");
   }
   for (int axis = 0; axis < 3; ++axis) {
     if (!std::isfinite(box.low[axis]) || !std::isfinite(box.high[axis]) ||
         !std::isfinite(box.high[axis] - box.low[axis])) {
-      return fail(ErrorCode::kGeometry, "the {} from {} to {} along {}: too large a range",
+      return fail(ErrorCode::kGeometry, "the {} from {} to {} along {}; this range is too large",
                   given ? "bounds run" : "mesh runs", box.low[axis], box.high[axis],
                   kAxisNames[axis]);
     }
@@ -114,14 +117,15 @@ Result<glm::dvec3> voxel_size_for(const Bounds& box, const GridRequest& request)
   }
   if (request.voxel_size) return *request.voxel_size;
   if (!(longest > 1e-300)) {
-    return fail(ErrorCode::kGeometry, "the mesh is {} long, too small to be divided", longest);
+    return fail(ErrorCode::kGeometry, "the mesh is {} long, which is too small to be divided",
+                longest);
   }
   if (request.resolution) {
     if (*request.resolution + 2 * request.padding > kMaxGridSide) {
-      return fail(ErrorCode::kLimit,
-                  "a resolution of {} voxels with a padding of {}; at most {} along a side can be "
-                  "had",
-                  *request.resolution, request.padding, kMaxGridSide);
+      return fail(
+          ErrorCode::kLimit,
+          "a resolution of {} voxels with a padding of {} exceeds the limit of {} along a side",
+          *request.resolution, request.padding, kMaxGridSide);
     }
     return glm::dvec3(longest / static_cast<double>(*request.resolution));
   }
@@ -164,9 +168,8 @@ Result<VoxelGrid> fit_grid(const Bounds& mesh_bounds, const GridRequest& request
     }
     const double total = count + 2 * padding;
     if (!(total <= kMaxGridSide)) {
-      return fail(ErrorCode::kLimit,
-                  "voxels of {} make a grid of {:.0f} along {}; at most {} can be had", s, total,
-                  kAxisNames[axis], kMaxGridSide);
+      return fail(ErrorCode::kLimit, "voxels of {} make a grid of {:.0f} along {}; the limit is {}",
+                  s, total, kAxisNames[axis], kMaxGridSide);
     }
     grid.dims[axis] = static_cast<int>(total);
     grid.origin[axis] = request.align ? (first - padding) * s : begin - padding * s;
@@ -179,7 +182,7 @@ Result<VoxelGrid> fit_grid(const Bounds& mesh_bounds, const GridRequest& request
     if (!std::isfinite(far) || !(step > 0.0) || !(far + step > far)) {
       return fail(ErrorCode::kGeometry,
                   "voxels of {} are too small for coordinates of {} along {}: double precision "
-                  "cannot tell their parts apart",
+                  "cannot resolve them",
                   s, far, kAxisNames[axis]);
     }
   }

@@ -44,11 +44,11 @@ Result<void> check_samples(const VoxelGrid& grid, const VoxelizeOptions& options
   const int longest = std::max({grid.dims.x, grid.dims.y, grid.dims.z});
   if (samples < 1 || samples > kMaxGridSide / longest) {
     return fail(ErrorCode::kUsage,
-                "samples a side of a voxel must be 1 to {} on a grid of {} x {} x {}, got {}",
+                "samples per side of a voxel must be 1 to {} on a grid of {} x {} x {}, got {}",
                 kMaxGridSide / longest, grid.dims.x, grid.dims.y, grid.dims.z, samples);
   }
   if (samples > 1 && options.filter != nullptr && options.filter->labelled()) {
-    return fail(ErrorCode::kUsage, "labels are of whole voxels, samples have none");
+    return fail(ErrorCode::kUsage, "labels cannot be combined with samples");
   }
   return {};
 }
@@ -132,7 +132,7 @@ Result<void> check_options(const VoxelGrid& grid, const VoxelizeOptions& options
   if (auto valid = check_grid(grid); !valid) return valid;
   if (auto valid = check_samples(grid, options); !valid) return valid;
   if (!options.solid && !options.surface) {
-    return fail(ErrorCode::kUsage, "neither the solid nor the surface is asked for");
+    return fail(ErrorCode::kUsage, "neither solid nor surface is requested");
   }
   if (options.filter != nullptr && options.closedness == Closedness::kAssumeOpen) {
     return fail(ErrorCode::kUsage,

@@ -114,7 +114,8 @@ std::string man_page(const ProgramText& program, const std::vector<std::string>&
                                  kDate, STRATA_VERSION);
   page += fmt::format(".SH NAME\n{} \\- {}\n", escaped(name), escaped(what));
   page += fmt::format(".SH SYNOPSIS\n\\fB{}\\fR\n", escaped(program.usage));
-  page += fmt::format(".SH DESCRIPTION\n{}.\n", escaped(program.what));
+  what[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(what[0])));
+  page += fmt::format(".SH DESCRIPTION\n{}.\n", escaped(what));
   for (const std::string& paragraph : program.paragraphs)
     page += ".PP\n" + escaped(paragraph) + "\n";
   if (!program.examples.empty()) page += ".SH EXAMPLES\n" + as_printed(program.examples);

@@ -19,7 +19,7 @@ bool read_all(std::string_view text, T& value) {
 Result<std::int64_t> parse_integer(std::string_view option, std::string_view text) {
   std::int64_t value = 0;
   if (!read_all(text, value)) {
-    return fail(ErrorCode::kUsage, "{} takes a whole number, not '{}'", option, text);
+    return fail(ErrorCode::kUsage, "{} must be a whole number, got '{}'", option, text);
   }
   return value;
 }
@@ -31,11 +31,11 @@ Result<std::vector<double>> parse_numbers(std::string_view option, std::string_v
     const std::size_t comma = rest.find(',');
     double value = 0;
     if (!read_all(rest.substr(0, comma), value) || !std::isfinite(value)) {
-      return fail(ErrorCode::kUsage, "{} takes {}, not '{}'", option,
+      return fail(ErrorCode::kUsage, "{} must be {}, got '{}'", option,
                   most == 1 ? std::string("a number")
                   : least == most
-                      ? fmt::format("{} numbers with commas between", least)
-                      : fmt::format("{} or {} numbers with commas between", least, most),
+                      ? fmt::format("{} numbers separated by commas", least)
+                      : fmt::format("{} or {} numbers separated by commas", least, most),
                   text);
     }
     values.push_back(value);
@@ -43,7 +43,7 @@ Result<std::vector<double>> parse_numbers(std::string_view option, std::string_v
     rest.remove_prefix(comma + 1);
   }
   if (values.size() != least && values.size() != most) {
-    return fail(ErrorCode::kUsage, "{} takes {}{} number{}, not the {} of '{}'", option,
+    return fail(ErrorCode::kUsage, "{} must be {}{} number{}, got {}: '{}'", option,
                 least == most ? "" : fmt::format("{} or ", least), most, most == 1 ? "" : "s",
                 values.size(), text);
   }
@@ -75,7 +75,7 @@ Result<std::uint64_t> parse_bytes(std::string_view option, std::string_view text
   double value = 0;
   if (!read_all(digits, value) || !(value > 0) || !(value * unit >= 1) || value * unit > 1e18) {
     return fail(ErrorCode::kUsage,
-                "{} takes a number of bytes above 0, such as 512M or 2G, not '{}'", option, text);
+                "{} must be a number of bytes above 0, such as 512M or 2G, got '{}'", option, text);
   }
   return static_cast<std::uint64_t>(value * unit);
 }
@@ -84,11 +84,11 @@ std::string empty_value(std::span<const std::string> arguments) {
   for (std::size_t i = 0; i < arguments.size() && arguments[i] != "--"; ++i) {
     const std::string& word = arguments[i];
     if (word.starts_with("--") && word.find('=') + 1 == word.size()) {
-      return fmt::format("{} is given an empty value", word.substr(0, word.size() - 1));
+      return fmt::format("{} has an empty value", word.substr(0, word.size() - 1));
     }
     const bool takes_next = word.size() > 1 && word[0] == '-' && word.find('=') == word.npos;
     if (takes_next && i + 1 < arguments.size() && arguments[i + 1].empty()) {
-      return fmt::format("{} is given an empty value", word);
+      return fmt::format("{} has an empty value", word);
     }
   }
   return {};
@@ -101,7 +101,7 @@ tl::unexpected<Error> no_such_choice(std::string_view option, std::string_view t
     list += i == 0 ? "" : i + 1 == names.size() ? " or " : ", ";
     list += names[i];
   }
-  return fail(ErrorCode::kUsage, "{} is {}, not '{}'", option, list, text);
+  return fail(ErrorCode::kUsage, "{} must be {}, got '{}'", option, list, text);
 }
 
 }  // namespace strata::apps

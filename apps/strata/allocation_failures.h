@@ -8,6 +8,6 @@ namespace strata::apps {
 
 /// The sentence for it.
 inline constexpr const char* kNoMemory =
-    "out of memory: the limit (--memory-limit) or what the system grants is used up";
+    "out of memory: --memory-limit or the system's limit is reached";
 
 }  // namespace strata::apps

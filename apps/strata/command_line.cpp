@@ -301,7 +301,7 @@ GridRequest grid_request(const Words& words, Reader& reader) {
   const int sizes =
       int{!words.resolution.empty()} + int{!words.voxel_size.empty()} + int{!words.grid.empty()};
   if (sizes != 1) {
-    reader.fail_with(fmt::format("{} of -r, --voxel-size and --grid; exactly one decides the size",
+    reader.fail_with(fmt::format("exactly one of -r, --voxel-size and --grid must be given, got {}",
                                  sizes == 0   ? "none"
                                  : sizes == 2 ? "two"
                                               : "all"));
@@ -324,7 +324,7 @@ GridRequest grid_request(const Words& words, Reader& reader) {
     for (std::size_t i = 0; i < 3; ++i) {
       const std::size_t comma = i < 2 ? rest.find(',') : rest.size();
       if (comma == std::string_view::npos) {
-        reader.fail_with(fmt::format("--grid takes nx,ny,nz, not '{}'", words.grid));
+        reader.fail_with(fmt::format("--grid must be nx,ny,nz, got '{}'", words.grid));
         return grid;
       }
       reader.take(parse_integer("--grid", rest.substr(0, comma)), dims[i]);
@@ -360,7 +360,7 @@ void read_values(const Words& words, VoxelizeCommand& command, Reader& reader) {
   if (!words.name.empty()) command.name = words.name;
   if (std::any_of(words.name.begin(), words.name.end(),
                   [](unsigned char letter) { return letter < ' ' || letter == 0x7f; })) {
-    reader.fail_with("--name must be text without control characters");
+    reader.fail_with("--name must not contain control characters");
   }
   if (!words.fog.empty()) {
     command.fog_by_default = words.fog == "auto";
@@ -370,17 +370,17 @@ void read_values(const Words& words, VoxelizeCommand& command, Reader& reader) {
       reader.fail_with(fmt::format("--fog must be 1 to {}, got {}", kMostFogSamples, samples));
     }
     if (command.surface && samples > 1) {
-      reader.fail_with("--fog=N with N > 1 is the filled fraction of solids; --surface has none");
+      reader.fail_with("--fog=N with N > 1 needs a solid voxelization; remove --surface");
     }
     command.fog = static_cast<int>(samples);
   }
   const char* fog_or_mask = command.fog != 0 ? "--fog" : "--mask";
   if (command.ids && (command.surface || command.fog != 0 || command.mask)) {
-    reader.fail_with(fmt::format("--ids are of solids; {} has none",
+    reader.fail_with(fmt::format("--ids cannot be combined with {}",
                                  command.surface ? "--surface" : fog_or_mask));
   }
   if (command.fog != 0 && command.mask) {
-    reader.fail_with("--fog has numbers, --mask has none; give one of them");
+    reader.fail_with("--fog and --mask cannot be combined");
   }
   const bool named = command.name.has_value();
   if (command.output.empty() && (command.fog != 0 || command.mask || named)) {
@@ -412,16 +412,17 @@ VoxelizeCommand voxelize_command(const Words& words, Reader& reader) {
   command.checksum = words.checksum;
   command.dry_run = words.dry_run;
   if (!words.json.empty()) command.json = words.json;
-  if (command.input.files.empty()) reader.fail_with("no mesh file and no scene is given");
+  if (command.input.files.empty()) reader.fail_with("no input file is given");
   command.grid = grid_request(words, reader);
   read_values(words, command, reader);
   if (command.backend == Backend::kGl && !command.solid) {
-    reader.fail_with("--backend gl makes depth lists; --surface alone has none and is the CPU's");
+    reader.fail_with(
+        "--backend gl cannot be combined with --surface alone, which needs no depth lists");
   }
   if (command.output.empty() && !words.format.empty()) reader.fail_with("--format needs -o");
   if (command.output.empty() && !command.stats && !command.json && !command.checksum &&
       !command.dry_run) {
-    reader.fail_with("nothing to do: give -o FILE, --stats, --json or --checksum");
+    reader.fail_with("nothing to do: give -o FILE, --stats, --json, --checksum or --dry-run");
   }
   return command;
 }
@@ -432,8 +433,7 @@ InfoCommand info_command(const Words& words, Reader& reader) {
   command.input = input_options(words, reader);
   command.gl = words.gl;
   if (!words.json.empty()) command.json = words.json;
-  if (command.input.files.empty() && !command.gl)
-    reader.fail_with("no mesh file and no scene is given");
+  if (command.input.files.empty() && !command.gl) reader.fail_with("no input file is given");
   return command;
 }
 
@@ -450,9 +450,9 @@ LdiCommand ldi_command(const Words& words, Reader& reader) {
   reader.take(parse_choice("--store", words.store, kStoreWords), command.store);
   reader.take(parse_choice("--offsets", words.offsets, kOffsetWords), command.offsets);
   reader.take(parse_choice("--backend", words.backend, kBackendWords), command.backend);
-  if (command.input.files.empty()) reader.fail_with("no mesh file and no scene is given");
+  if (command.input.files.empty()) reader.fail_with("no input file is given");
   if (command.output.empty())
-    reader.fail_with("no output is given: -o FILE.exr, FILE.npz or FILE.png");
+    reader.fail_with("no output is given: give -o FILE.exr, -o FILE.npz or -o FILE.png");
   command.grid = grid_request(words, reader);
   return command;
 }

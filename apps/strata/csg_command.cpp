@@ -82,14 +82,14 @@ std::string why_empty(const CsgCommand& command, const csg::Preview& preview, co
   if (triangles_of(preview.tree()) == 0) {
     return because(session.warnings().empty()
                        ? "there is no solid in the scene"
-                       : "what the warnings name is all that there is in the scene");
+                       : "everything in the scene was left out, see the warnings");
   }
   if (box.empty()) {
-    return because(fmt::format("of {} its operations leave nothing",
+    return because(fmt::format("the scene has {}, but its operations leave nothing",
                                counted(preview.tree().solids().size(), "solid")));
   }
   return because(fmt::format(
-      "nothing is in the camera's view; what there is lies between ({:.6g}, {:.6g}, {:.6g}) and "
+      "nothing is in the camera's view; the scene lies between ({:.6g}, {:.6g}, {:.6g}) and "
       "({:.6g}, {:.6g}, {:.6g}){}",
       box.low.x, box.low.y, box.low.z, box.high.x, box.high.y, box.high.z,
       command.cuts.empty() ? "" : ", before --cut"));
@@ -114,7 +114,7 @@ auto drawn(csg::Preview& preview, bool may_fall_back, Session& session, Draw&& d
     const std::string failure = result.error().message;
     result = draw();
     if (result) {
-      session.warn("backend", fmt::format("the GPU failed, the CPU did the work: {}", failure));
+      session.warn("backend", fmt::format("the GPU failed and the CPU did the work: {}", failure));
     }
   }
   if (!result) return tl::unexpected(with_limit(std::move(result.error()), session));
@@ -150,8 +150,8 @@ csg::Camera placed_camera(CsgCommand& command, const csg::Scene& scene, Session&
   camera.distance = view.distance.value_or(camera.distance);
   camera.field_of_view = view.field_of_view.value_or(camera.field_of_view);
   if (command.asked_view) {
-    session.warn("ignored", fmt::format("{}: it sets $vpr, $vpt, $vpd or $vpf; --view-all and "
-                                        "--auto-center have no effect beside them",
+    session.warn("ignored", fmt::format("{}: the file sets $vpr, $vpt, $vpd or $vpf, so --view-all "
+                                        "and --auto-center have no effect",
                                         command.input.files.front()));
   }
   command.default_camera = command.view_all = command.auto_centre = false;
@@ -246,8 +246,8 @@ Result<void> run_one(CsgCommand command, Session& session) {
   }
   if (!std::isfinite(camera.distance)) {
     return fail(ErrorCode::kGeometry,
-                "what is in the scene reaches from ({:.6g}, {:.6g}, {:.6g}) to ({:.6g}, {:.6g}, "
-                "{:.6g}): these coordinates are too large for a picture",
+                "the scene reaches from ({:.6g}, {:.6g}, {:.6g}) to ({:.6g}, {:.6g}, {:.6g}); "
+                "these coordinates are too large for a picture",
                 box.low.x, box.low.y, box.low.z, box.high.x, box.high.y, box.high.z);
   }
   const bool pictures = !command.output.empty() || !command.ids.empty() || !command.depth.empty();

@@ -24,16 +24,16 @@ constexpr std::pair<std::string_view, csg::Projection> kProjections[] = {
 Result<glm::ivec2> parse_size(std::string_view text) {
   const std::size_t mark = text.find_first_of(",x");
   if (mark == std::string_view::npos) {
-    return fail(ErrorCode::kUsage, "--size takes width,height, not '{}'", text);
+    return fail(ErrorCode::kUsage, "--size must be width,height, got '{}'", text);
   }
   const auto width = parse_integer("--size", text.substr(0, mark));
   const auto height = parse_integer("--size", text.substr(mark + 1));
   if (!width || !height) {
-    return fail(ErrorCode::kUsage, "--size takes two whole numbers, width,height, not '{}'", text);
+    return fail(ErrorCode::kUsage, "--size must be two whole numbers width,height, got '{}'", text);
   }
   if (*width < 1 || *height < 1 || *width > csg::kMaxPictureSide ||
       *height > csg::kMaxPictureSide) {
-    return fail(ErrorCode::kUsage, "--size {}: each side is 1 to {} pixels", text,
+    return fail(ErrorCode::kUsage, "--size {}: each side must be 1 to {} pixels", text,
                 csg::kMaxPictureSide);
   }
   return glm::ivec2(*width, *height);
@@ -51,7 +51,7 @@ Result<int> parse_samples(std::string_view text) {
   const auto count = parse_integer("--samples", text);
   if (!count) return tl::unexpected(count.error());
   if (*count < 1 || *count > 64 || !std::has_single_bit(static_cast<std::uint64_t>(*count))) {
-    return fail(ErrorCode::kUsage, "--samples is 1, 2, 4, 8, 16, 32 or 64, not '{}'", text);
+    return fail(ErrorCode::kUsage, "--samples must be 1, 2, 4, 8, 16, 32 or 64, got '{}'", text);
   }
   return static_cast<int>(*count);
 }
@@ -65,14 +65,14 @@ Result<void> read_shown(std::string_view list, CsgCommand& command) {
       command.picture.edges = true;
     } else if (word == "axes" || word == "crosshairs" || word == "scales") {
       return fail(ErrorCode::kUsage,
-                  "--view {}: strata draws none; openscad -o FILE.png --view {} does", word, word);
+                  "--view {}: strata does not draw this; openscad -o FILE.png --view {} does", word,
+                  word);
     } else if (word == "wireframe") {
       return fail(
           ErrorCode::kUsage,
           "--view wireframe: strata draws faces; --view edges adds lines along their edges");
     } else {
-      return fail(ErrorCode::kUsage,
-                  "--view takes edges, not '{}' (nor axes, crosshairs, scales, wireframe)", word);
+      return fail(ErrorCode::kUsage, "--view must be edges, got '{}'", word);
     }
   }
   return {};
@@ -84,23 +84,23 @@ Result<void> read_openscad_words(const CsgWords& words, CsgCommand& command) {
   command.render = !render.empty();
   if (command.render && render != "-" && render != "cgal" && render != "force" &&
       render != "true") {
-    return fail(ErrorCode::kUsage, "--render takes nothing, cgal or force, not '{}'", render);
+    return fail(ErrorCode::kUsage, "--render must have no value, or cgal or force, got '{}'",
+                render);
   }
   if (!words.preview.empty() && words.preview != "-") {
-    return fail(
-        ErrorCode::kUsage,
-        "--preview={}: strata has one preview; use --preview alone, or strata view --ghosts "
-        "to see what is subtracted",
-        words.preview);
+    return fail(ErrorCode::kUsage,
+                "--preview={}: strata has one preview; use --preview alone, or strata view "
+                "--ghosts to show subtracted solids",
+                words.preview);
   }
   if (!words.preview.empty() && command.render) {
-    return fail(ErrorCode::kUsage, "--preview and --render exclude each other");
+    return fail(ErrorCode::kUsage, "--preview and --render cannot be combined");
   }
   if (auto read = read_shown(words.shown, command); !read) return read;
   if (!words.export_format.empty() && words.export_format != "png") {
     return fail(ErrorCode::kUsage,
-                "--export-format {}: strata csg writes png; openscad --export-format {} writes "
-                "geometry, strata voxelize voxels",
+                "--export-format {}: strata csg writes png only; openscad --export-format {} "
+                "writes geometry, strata voxelize writes voxels",
                 words.export_format, words.export_format);
   }
   if (!words.summary_file.empty()) {
@@ -131,17 +131,16 @@ Result<void> read_openscad_words(const CsgWords& words, CsgCommand& command) {
   const auto& files = command.input.files;
   if (std::none_of(files.begin(), files.end(),
                    [](const auto& file) { return has_extension(file, ".scad"); })) {
-    return fail(ErrorCode::kUsage, "--animate sets $t of programs: no input is a .scad file");
+    return fail(ErrorCode::kUsage, "--animate needs a .scad input, whose $t it sets");
   }
   for (const auto* path : {&command.output, &command.ids, &command.depth}) {
     if (!path->empty() && is_stream(*path)) {
-      return fail(ErrorCode::kUsage, "--animate writes several files; {} is a stream", *path);
+      return fail(ErrorCode::kUsage, "--animate writes several files, but {} is a stream", *path);
     }
   }
   if (command.output.empty() || command.json || command.summary) {
     return fail(ErrorCode::kUsage,
-                "--animate makes pictures: it needs -o FILE.png, and goes "
-                "without --json and --summary");
+                "--animate needs -o FILE.png and cannot be combined with --json or --summary");
   }
   return {};
 }
@@ -165,7 +164,7 @@ Result<csg::Camera> parse_camera(std::string_view text) {
   const glm::dvec3 first(n[0], n[1], n[2]), second(n[3], n[4], n[5]);
   if (n.size() == 6) {
     if (first == second) {
-      return fail(ErrorCode::kUsage, "--camera {}: the eye is where it looks at", text);
+      return fail(ErrorCode::kUsage, "--camera {}: eye and target must differ", text);
     }
     return csg::look_at(first, second);
   }
@@ -179,8 +178,8 @@ Result<csg::Camera> parse_camera(std::string_view text) {
 Result<SectionPlane> parse_section(std::string_view text) {
   SectionPlane plane;
   const auto no_plane = [text] {
-    return fail(ErrorCode::kUsage, "--cut takes a plane such as x=5, z<10 or nx,ny,nz,d, not '{}'",
-                text);
+    return fail(ErrorCode::kUsage,
+                "--cut must be a plane such as x=5, z<10 or nx,ny,nz,d, got '{}'", text);
   };
   const std::size_t axis =
       text.empty() ? std::string_view::npos : std::string_view("xyz").find(text[0]);
@@ -200,7 +199,7 @@ Result<SectionPlane> parse_section(std::string_view text) {
   plane.normal = {n[0], n[1], n[2]};
   const double length = glm::length(plane.normal);
   if (!(length > 0) || !std::isfinite(length)) {
-    return fail(ErrorCode::kUsage, "--cut {}: the plane's normal has no direction", text);
+    return fail(ErrorCode::kUsage, "--cut {}: the normal nx,ny,nz must be finite and not 0", text);
   }
   plane.normal /= length;
   plane.offset = n[3] / length;
@@ -250,13 +249,13 @@ Result<void> read_csg_options(const CsgWords& words, CsgCommand& command) {
   if (error) return tl::unexpected(*error);
   if (auto read = read_openscad_words(words, command); !read) return read;
   if (command.input.files.empty()) {
-    return fail(ErrorCode::kUsage, "no scene and no mesh file is given");
+    return fail(ErrorCode::kUsage, "no input file is given");
   }
   if (command.output.empty() && command.ids.empty() && command.depth.empty() && !command.json) {
     command.summary = true;
   }
   if (command.measure_resolution && !command.json && !command.summary) {
-    return fail(ErrorCode::kUsage, "--measure is of the report: give --summary or --json");
+    return fail(ErrorCode::kUsage, "--measure needs --summary or --json");
   }
   for (const auto& [asked_by, path, depth] :
        {std::tuple("", &command.output, false), std::tuple("--ids ", &command.ids, false),

@@ -24,14 +24,14 @@ std::string csg_text(const CsgCommand& command, const CsgOutcome& outcome) {
                             counted(outcome.nodes, "node"), counted(outcome.triangles, "triangle"),
                             outcome.flat ? "; flat, as slabs of thickness 1" : ""));
   if (!outcome.measures || outcome.measures->empty) {
-    line("result", "empty, or smaller than a voxel of the grid that is measured on");
+    line("result", "empty, or smaller than a voxel of the measuring grid");
     return text;
   }
   const csg::Measures& m = *outcome.measures;
-  line("bounds",
-       fmt::format("{} to {}, within {:.2g}", triple(m.low), triple(m.high), m.bounds_error));
-  line("volume", fmt::format("{:.6g}, within {:.2g}", m.volume, m.volume_error));
-  line("area", fmt::format("{:.6g}, about within {:.2g}", m.area, m.area_error));
+  line("bounds", fmt::format("{} to {}, error at most {:.2g}", triple(m.low), triple(m.high),
+                             m.bounds_error));
+  line("volume", fmt::format("{:.6g}, error at most {:.2g}", m.volume, m.volume_error));
+  line("area", fmt::format("{:.6g}, error about {:.2g}", m.area, m.area_error));
   line("centre of mass", triple(m.centre));
   return text;
 }

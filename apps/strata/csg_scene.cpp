@@ -5,8 +5,8 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <memory>
-#include <optional>
 #include <numeric>
+#include <optional>
 #include <set>
 #include <system_error>
 #include <utility>
@@ -139,7 +139,7 @@ class Builder {
       sizes[i] = node.kind == Expression::Kind::kExclusive ? 2 * both : both;
     }
     if (sizes.back() > kMaxNodes) {
-      return fail(ErrorCode::kLimit, "--expr: the tree has {:.3g} nodes, {} can be had",
+      return fail(ErrorCode::kLimit, "--expr: the tree has {:.3g} nodes; the limit is {}",
                   sizes.back(), kMaxNodes);
     }
     for (const csg::Scene& input : inputs_) {

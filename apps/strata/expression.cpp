@@ -133,7 +133,7 @@ class Parser {
     }
     at_ = begin;
     if (many > 1) {
-      complain(fmt::format("{} files are called {}: say which by a letter, a for the first", many,
+      complain(fmt::format("{} files are called {}: name one by its letter, a for the first", many,
                            word));
     } else if (letter) {
       complain(fmt::format("{} would be file {}, but there {} only {}", word, word[0] - 'a' + 1,

@@ -86,7 +86,7 @@ Result<void> try_lists(ListSource& source, const TriangleSoup& soup, const glm::
   const auto expected = build_ldi(*mesh, target, {}, {}, filter);
   if (!expected) return tl::unexpected(expected.error());
   if (*found == *expected) return {};
-  return fail(ErrorCode::kInternal, "an example's lists are not the CPU's");
+  return fail(ErrorCode::kInternal, "the self-test's lists differ from the CPU's");
 }
 
 Result<void> try_lists(ListSource& source) {
@@ -109,7 +109,7 @@ Result<void> try_surfaces(csg::SurfaceSource& source) {
   if (!expected) return tl::unexpected(expected.error());
   if (!found) return tl::unexpected(found.error());
   if (found->pixels == expected->pixels) return {};
-  return fail(ErrorCode::kInternal, "an example's picture is not the CPU's");
+  return fail(ErrorCode::kInternal, "the self-test's picture differs from the CPU's");
 }
 
 class GlGpu final : public Gpu {
@@ -128,7 +128,7 @@ class GlGpu final : public Gpu {
     fallback_ = std::make_unique<ListSourceOrCpu>(
         *lists_, session_->execution("depth lists"), [this](const Error& error) {
           session_->warn("backend",
-                         fmt::format("the GPU failed, the CPU goes on: {}", error.message));
+                         fmt::format("the GPU failed and the CPU continues: {}", error.message));
         });
     return fallback_.get();
   }
@@ -173,7 +173,7 @@ class GlGpu final : public Gpu {
     if (error.code == ErrorCode::kCancelled) return tl::unexpected(error);
     const std::string why = fmt::format("{}: {}", context_->info().renderer, error.message);
     if (backend_ == Backend::kGl) return fail(ErrorCode::kUsage, "--backend gl: {}", why);
-    session_->warn("backend", fmt::format("the CPU does what the GPU cannot: {}", why));
+    session_->warn("backend", fmt::format("the CPU does the work, since the GPU cannot: {}", why));
     return Source{nullptr};
   }
 
@@ -203,7 +203,7 @@ Result<std::unique_ptr<Gpu>> Gpu::open(Backend backend, Session& session) {
   }
   const gl::Info& info = (*context)->info();
   if (backend == Backend::kAuto && info.is_software) {
-    session.note(fmt::format("{} is no GPU: the CPU does the work", info.renderer));
+    session.note(fmt::format("{} is not a GPU: the CPU does the work", info.renderer));
     return nullptr;
   }
   session.note(fmt::format("{}, OpenGL {}", info.renderer, info.version));

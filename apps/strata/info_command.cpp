@@ -50,7 +50,7 @@ std::string info_text(const FileInfo& info) {
     line("closed", fmt::format("yes, all {} edges are balanced", found.edges));
   } else {
     line("closed", fmt::format("no, {} of {} edges are unbalanced ({} border a hole, {} join faces "
-                               "that look opposite ways)",
+                               "of opposite orientation)",
                                found.unbalanced_edges, found.edges, found.boundary_edges,
                                found.misoriented_edges));
     for (const UnbalancedEdge& edge : found.examples) line("", describe(edge));
@@ -67,12 +67,12 @@ std::string info_text(const FileInfo& info) {
   };
   defect(found.degenerate_faces + info.stats.degenerate, "degenerate", "without area");
   defect(found.duplicate_faces, "duplicate", "that repeat another");
-  defect(info.stats.out_of_range, "dropped", "with an index that names no vertex");
+  defect(info.stats.out_of_range, "dropped", "with an invalid vertex index");
   defect(info.stats.non_finite, "dropped", "with a coordinate that is not finite");
   defect(info.stats.too_few_vertices, "dropped", "with fewer than three vertices");
-  defect(info.stats.non_planar, "non-planar", "that are polygons and not flat");
+  defect(info.stats.non_planar, "non-planar", "that are non-planar polygons");
   if (info.stats.ignored > 0) {
-    line("ignored", counted(info.stats.ignored, "element") + " that are no faces");
+    line("ignored", counted(info.stats.ignored, "element") + " that are not faces");
   }
   return text;
 }
@@ -156,13 +156,13 @@ std::string info_text(const SceneInfo& info) {
   line("solids", fmt::format("{} in {}", info.solids, counted(info.nodes, "node")));
   line("triangles", fmt::format("{} of all solids", info.facts.stats.triangles));
   if (m.empty) {
-    line("result", "empty, or smaller than a voxel of the grid that is measured on");
+    line("result", "empty, or smaller than a voxel of the measuring grid");
     return text;
   }
-  line("bounds",
-       fmt::format("{} to {}, within {:.2g}", triple(m.low), triple(m.high), m.bounds_error));
-  line("area", fmt::format("{:.6g}, about within {:.2g}", m.area, m.area_error));
-  line("volume", fmt::format("{:.6g}, within {:.2g}", m.volume, m.volume_error));
+  line("bounds", fmt::format("{} to {}, error at most {:.2g}", triple(m.low), triple(m.high),
+                             m.bounds_error));
+  line("area", fmt::format("{:.6g}, error about {:.2g}", m.area, m.area_error));
+  line("volume", fmt::format("{:.6g}, error at most {:.2g}", m.volume, m.volume_error));
   line("closed", info.facts.closed ? "yes, all meshes of the result"
                                    : fmt::format("no, {}", printable(info.facts.open)));
   return text;
@@ -263,9 +263,10 @@ Result<void> run_info(const InfoCommand& command, Session& session) {
       command.json && !is_stream(*command.json) && identify_file(*command.json).is_there();
   if (scene_failed && replaces) {
     session.complain(*first_error);
-    return fail(first_error->code,
-                "--json {}: the file is kept: a scene that cannot be read may need it",
-                *command.json);
+    return fail(
+        first_error->code,
+        "--json {}: the file is not overwritten, since a scene that cannot be read may need it",
+        *command.json);
   }
   if (command.gl) {
     if (const auto told = tell_gl(json, text); !told) {

@@ -22,7 +22,7 @@ Result<void> run_ldi(const LdiCommand& command, Session& session) {
                 command.output);
   }
   if (!exr && command.samples) {
-    return fail(ErrorCode::kUsage, "{}: --samples is for .exr", command.output);
+    return fail(ErrorCode::kUsage, "{}: --samples needs an .exr file", command.output);
   }
   auto input = load_solids(
       command.input, {.keep_orientation = command.keep_orientation, .rule = InsideRule::kWinding},

@@ -91,7 +91,7 @@ Result<void> run(const AnyCommand& command, Session& session) {
     return fail(ErrorCode::kLimit, "{}", kNoMemory);
   } catch (const std::system_error& failure) {
     // Threads that cannot be started, above all.
-    return fail(ErrorCode::kLimit, "the system refuses: {}", failure.what());
+    return fail(ErrorCode::kLimit, "the system refused: {}", failure.what());
   } catch (const std::runtime_error& failure) {
     // oneTBB reports threads that cannot be started like this, in words only.
     if (std::string_view(failure.what()).find("pthread_create") != std::string_view::npos) {
@@ -157,7 +157,7 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "strata: error: out of memory\n");
     return static_cast<int>(strata::ErrorCode::kLimit);
   } catch (const std::system_error& failure) {  // threads that cannot be started, above all
-    std::fprintf(stderr, "strata: error: the system refuses: %s\n", failure.what());
+    std::fprintf(stderr, "strata: error: the system refused: %s\n", failure.what());
     return static_cast<int>(strata::ErrorCode::kLimit);
   } catch (const std::exception& failure) {
     std::fprintf(stderr, "strata: error: %s\n", failure.what());

@@ -57,7 +57,7 @@ bool describe_open(const TriangleSoup& soup, const Execution& execution, InputFa
                      found.unbalanced_edges, found.edges);
   if (found.boundary_edges > 0) text += fmt::format(", {} border a hole", found.boundary_edges);
   if (found.misoriented_edges > 0) {
-    text += fmt::format(", {} join faces that look opposite ways", found.misoriented_edges);
+    text += fmt::format(", {} join faces of opposite orientation", found.misoriented_edges);
   }
   if (!found.examples.empty()) text += fmt::format("; {}", describe(found.examples.front()));
   return found.even;
@@ -79,13 +79,13 @@ void check_closed(const TriangleSoup& soup, const MeshInputRules& rules, const E
     facts.closed = true;
     facts.rule = InsideRule::kParity;
     session.warn("not-orientable",
-                 fmt::format("{}: no side of the mesh is its outside ({} of its parts cannot be "
+                 fmt::format("{}: the mesh has no outside ({} of its parts cannot be "
                              "oriented), but every edge has an even number of faces; parity "
                              "decides what is inside",
                              facts.path, facts.orientation.not_orientable));
     return;
   }
-  if (even) text += "; --rule parity takes it as closed";
+  if (even) text += "; --rule parity treats it as closed";
   session.warn("open", text);
   facts.open = std::move(text);
 }
@@ -97,7 +97,7 @@ void tell_orientation(const MeshInputRules& rules, InputFacts& facts, double vol
   const bool kept = rules.keep_orientation;
   const bool by_parity = !found.closed && facts.rule == InsideRule::kParity;
   const bool all = found.all_turned && found.turned_parts > 0;
-  const std::string done = kept ? "kept as it is" : "it was turned around";
+  const std::string done = kept ? "kept as it is" : "it was reversed";
   if (all || (facts.orientation.closed && found.turned_open_volume != 0.0)) {
     session.warn("inverted", fmt::format("{}: the mesh is inside out (its volume is {:.6g}); {}",
                                          facts.path, volume_before, done));
@@ -149,7 +149,7 @@ Result<InputFacts> inspect(TriangleSoup& soup, MeshReadStats stats, const std::s
 std::string describe(const UnbalancedEdge& edge) {
   return fmt::format(
       "the edge from ({:.9g}, {:.9g}, {:.9g}) to ({:.9g}, {:.9g}, {:.9g}) of face {} "
-      "is used {} times this way and {} times back",
+      "is used {} times in this direction and {} times in the other",
       edge.from.x, edge.from.y, edge.from.z, edge.to.x, edge.to.y, edge.to.z, edge.element,
       edge.forward, edge.backward);
 }
@@ -160,7 +160,7 @@ void warn_of_reading(const std::string& path, const MeshReadStats& stats, Sessio
     const auto add = [&](std::uint64_t count, const char* cause) {
       if (count > 0) causes += fmt::format("{}{} {}", causes.empty() ? "" : ", ", count, cause);
     };
-    add(stats.out_of_range, "with an index that names no vertex");
+    add(stats.out_of_range, "with an invalid vertex index");
     add(stats.non_finite, "with a coordinate that is not finite");
     add(stats.too_few_vertices, "with fewer than three vertices");
     session.warn("dropped-faces", fmt::format("{}: {} of {} faces dropped: {}", path,
@@ -191,14 +191,14 @@ Result<void> check_input_name(const std::string& path, const InputOptions& input
   if (mesh_format_of(path) != MeshFormat::kAuto) return {};
   if (scenes) {
     return fail(ErrorCode::kInput,
-                "{}: its name ends in none of .csg, .scad, .obj, .stl, .ply, .off; name the format "
-                "(--input-format)",
+                "{}: the file name must end in .csg, .scad, .obj, .stl, .ply or .off, or "
+                "--input-format must be given",
                 path);
   }
-  return fail(ErrorCode::kInput,
-              "{}: its name ends in none of .obj, .stl, .ply, .off; name the format "
-              "(--input-format)",
-              path);
+  return fail(
+      ErrorCode::kInput,
+      "{}: the file name must end in .obj, .stl, .ply or .off, or --input-format must be given",
+      path);
 }
 
 Result<MeshFile> read_input(const std::string& path, const InputOptions& input, Session& session) {
@@ -282,8 +282,8 @@ Result<MeshInput> load_meshes(const InputOptions& input, const MeshInputRules& r
       all.soup = std::move(soup);
     } else {
       if (all.soup.positions.size() + soup.positions.size() > 0xfffffffeu) {
-        return fail(ErrorCode::kLimit, "{}: with it the inputs have more than 2^32 - 2 vertices",
-                    path);
+        return fail(ErrorCode::kLimit,
+                    "{}: the inputs up to this one have more than 2^32 - 2 vertices", path);
       }
       append(all.soup, soup);
     }

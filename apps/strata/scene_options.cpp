@@ -108,7 +108,7 @@ Result<void> read_scene_options(const SceneWords& words, InputOptions& input) {
   std::vector<std::string>& options = scene.openscad_options;
   for (const std::string& definition : words.definitions) {
     if (definition.find('=') == std::string::npos) {
-      return fail(ErrorCode::kUsage, "-D takes NAME=VALUE, not '{}'", definition);
+      return fail(ErrorCode::kUsage, "-D must be NAME=VALUE, got '{}'", definition);
     }
     options.insert(options.end(), {"-D", definition});
   }
@@ -120,16 +120,14 @@ Result<void> read_scene_options(const SceneWords& words, InputOptions& input) {
                                    std::pair("--check-parameter-ranges", &words.check_ranges)}) {
     if (word->empty()) continue;
     if (*word != "true" && *word != "false") {
-      return fail(ErrorCode::kUsage, "{} takes true or false, not '{}'", name, *word);
+      return fail(ErrorCode::kUsage, "{} must be true or false, got '{}'", name, *word);
     }
     options.insert(options.end(), {name, *word});
   }
   const bool runs = std::any_of(input.files.begin(), input.files.end(),
                                 [](const auto& file) { return has_extension(file, ".scad"); });
   if (!options.empty() && !runs) {
-    return fail(ErrorCode::kUsage,
-                "{} is for programs, which openscad runs: no input is a .scad file",
-                options.front());
+    return fail(ErrorCode::kUsage, "{} needs a .scad input", options.front());
   }
   return {};
 }

@@ -23,12 +23,11 @@ int run_view_program(char** arguments) {
   words.push_back(nullptr);
   execv(program.c_str(), words.data());
   if (errno == ENOENT) {
-    std::fprintf(
-        stderr,
-        "strata: error: strata view needs the program strata-view beside strata, and there "
-        "is no %s; builds have it when libepoxy-dev, libglfw3-dev and libimgui-dev are "
-        "installed. strata csg draws pictures without a window.\n",
-        program.c_str());
+    std::fprintf(stderr,
+                 "strata: error: strata view needs the program strata-view next to strata, but "
+                 "there is no %s; a build makes it when libepoxy-dev, libglfw3-dev and "
+                 "libimgui-dev are installed. strata csg draws pictures without a window.\n",
+                 program.c_str());
   } else {
     std::fprintf(stderr, "strata: error: %s: %s\n", program.c_str(), std::strerror(errno));
   }

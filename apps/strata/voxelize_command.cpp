@@ -36,28 +36,28 @@ std::string format_list() {
 Result<void> check_output(const VoxelizeCommand& command) {
   if (command.output.empty()) return {};
   if (command.output == "-" && isatty(STDOUT_FILENO) != 0) {
-    return fail(ErrorCode::kUsage, "standard output is a terminal; a voxel file is no text");
+    return fail(ErrorCode::kUsage, "standard output is a terminal, but voxel files are binary");
   }
   const auto format = voxel_format_for(command.output, command.format);
   if (!format) return tl::unexpected(format.error());
   if ((command.fog != 0 || command.mask) && format->name != "vdb") {
-    return fail(ErrorCode::kUsage, "{} is for .vdb; format {} holds no {}",
+    return fail(ErrorCode::kUsage, "{} needs a .vdb file; format {} cannot store a {}",
                 command.mask ? "--mask" : "--fog", format->name,
                 command.mask ? "mask" : "fog volume");
   }
   if (command.name && !format->named) {
-    return fail(ErrorCode::kUsage, "--name is for .vdb, .nrrd and .vti; format {} holds no name",
+    return fail(ErrorCode::kUsage,
+                "--name needs a .vdb, .nrrd or .vti file; format {} cannot store a name",
                 format->name);
   }
   if (command.ids) {
     if (auto held = check_ids(*format, 1); !held) return held;
   }
   if (command.axis && *command.axis != format->axis) {
-    return fail(
-        ErrorCode::kUsage,
-        "--axis {}: {} is written from rays along {}; without --axis the voxels are the same",
-        "xyz"[static_cast<int>(*command.axis)], format -> name,
-        "xyz"[static_cast<int>(format->axis)]);
+    return fail(ErrorCode::kUsage,
+                "--axis {}: format {} needs rays along {}; without --axis the voxels are the same",
+                "xyz"[static_cast<int>(*command.axis)], format -> name,
+                "xyz"[static_cast<int>(format->axis)]);
   }
   return {};
 }
@@ -72,20 +72,19 @@ Result<void> check_open(const VoxelizeCommand& command, const MeshInput& input, 
     return fail(ErrorCode::kGeometry, "{} (--open fail)", file.open);
   }
   if (command.ids && command.open == OpenMode::kSurface) {
-    return fail(ErrorCode::kUsage, "--ids are of solids; under --open surface there is none: {}",
-                file.open);
+    return fail(ErrorCode::kUsage,
+                "--ids needs solids, but --open surface keeps only the surface: {}", file.open);
   }
   if (command.ids && !input.has_scene()) {
     return fail(ErrorCode::kUsage,
-                "--ids are of closed meshes: for open ones all directions vote on each voxel, and "
-                "no vote says of which solid it is; close {}, or do without --ids",
+                "--ids needs closed meshes: in open ones rays along three axes vote on each voxel, "
+                "and a vote does not tell solids apart; close {}, or remove --ids",
                 file.path);
   }
   if (input.has_scene() && command.open == OpenMode::kVote) {
-    session.warn(
-        "open", fmt::format("{}: holes are not closed beside a scene: each ray by itself pairs the "
-                            "faces of an open mesh, and a face without a partner becomes a sheet",
-                            file.path));
+    session.warn("open", fmt::format("{}: scenes do not use axis voting: each ray pairs the faces "
+                                     "it meets, and a face without a partner becomes a thin sheet",
+                                     file.path));
   }
   return {};
 }
@@ -112,7 +111,7 @@ Result<void> check_thin(const VoxelizeCommand& command, VoxelizeOutcome& outcome
   }
   const std::uint64_t solid = outcome.report.solid_voxels;
   const char* remedy =
-      command.ids ? "; --surface, without --ids, holds all of it" : "; --surface holds all of it";
+      command.ids ? "; --surface, without --ids, keeps all of it" : "; --surface keeps all of it";
   if (input.closed) {
     auto found = find_lost_walls(input.soup, outcome.grid, options, execution);
     if (!found) return tl::unexpected(found.error());
@@ -152,7 +151,7 @@ void check_columns(const VoxelizeCommand& command, const VoxelizeOutcome& outcom
                                  : fmt::format("{} columns are", report.unbalanced_columns),
                              command.open == OpenMode::kVote
                                  ? "caps and winding numbers decided their voxels"
-                                 : "their voxels are not to be trusted"));
+                                 : "their voxels may be wrong"));
   }
   if (report.negative_columns > 0 && outcome.input.closed &&
       outcome.input.rule == InsideRule::kWinding) {
@@ -224,8 +223,11 @@ void label_solids(const VoxelizeCommand& command, VoxelizeOutcome& outcome,
   const glm::vec4 none(glm::vec3(csg::colour_schemes().front().face) / 255.0f, 1.0f);
   const csg::ColourLabels parts = csg::colour_labels(scene, scene.root(), none);
   if (parts.colours.size() > most) {
-    return session.warn("colours", fmt::format("{} colours, a {} file holds {}: written without",
-                                               parts.colours.size(), outcome.format, most));
+    return session.warn(
+        "colours",
+        fmt::format(
+            "the scene has {} colours, but a {} file holds {}; it is written without colours",
+            parts.colours.size(), outcome.format, most));
   }
   for (const glm::vec4& colour : parts.colours) {
     options.colours.emplace_back(glm::clamp(colour, 0.0f, 1.0f) * 255.0f + 0.5f);
@@ -236,10 +238,10 @@ void label_solids(const VoxelizeCommand& command, VoxelizeOutcome& outcome,
 Result<void> check_samples(int samples, const VoxelGrid& grid) {
   const int longest = std::max({grid.dims.x, grid.dims.y, grid.dims.z});
   if (samples * longest <= kMaxGridSide) return {};
-  return fail(
-      ErrorCode::kLimit,
-      "--fog: {} samples a side of {} x {} x {} voxels are more than {}; --fog=N takes fewer",
-      samples, grid.dims.x, grid.dims.y, grid.dims.z, kMaxGridSide);
+  return fail(ErrorCode::kLimit,
+              "--fog: {} samples per side on a grid of {} x {} x {} voxels exceed {}; give a "
+              "smaller --fog=N",
+              samples, grid.dims.x, grid.dims.y, grid.dims.z, kMaxGridSide);
 }
 
 void count_ids(const VoxelIntervals& slab, std::vector<std::uint64_t>& voxels) {
@@ -337,7 +339,7 @@ Result<void> voxelize_and_write(const VoxelizeCommand& command, VoxelizeOutcome&
   if (!command.surface && !is_surface_alone(command, outcome.input)) {
     if (auto done = check_thin(command, outcome, quiet, session); !done) return done;
   } else if (outcome.report.solid_voxels == 0) {
-    session.warn("empty", "no voxel is solid; does the grid hold the mesh?");
+    session.warn("empty", "no voxel is solid; does the grid cover the mesh?");
   }
   if (auto strict = session.check_strict(); !strict) return strict;
   if (!writer) return {};
@@ -389,12 +391,12 @@ Result<void> run_voxelize(const VoxelizeCommand& command, Session& session) {
   if (const auto valid = check_samples(samples, outcome.grid); !valid) return valid;
   outcome.estimate = estimate_memory(outcome.input, outcome.grid, outcome.axis, samples, command,
                                      outcome.format, session.threads(), session.memory_limit());
-  session.note(fmt::format("grid {} x {} x {}, about {} to hold", grid->dims.x, grid->dims.y,
+  session.note(fmt::format("grid {} x {} x {}, about {} of memory", grid->dims.x, grid->dims.y,
                            grid->dims.z, readable_bytes(outcome.estimate.total())));
   if (session.memory_limit() > 0 && outcome.estimate.total() > session.memory_limit() &&
       !command.dry_run) {
     return fail(ErrorCode::kLimit,
-                "a grid of {} x {} x {} voxels of this mesh takes about {}, the limit is {} "
+                "a grid of {} x {} x {} voxels needs about {} for this mesh; the limit is {} "
                 "(--memory-limit)",
                 grid->dims.x, grid->dims.y, grid->dims.z, readable_bytes(outcome.estimate.total()),
                 readable_bytes(session.memory_limit()));

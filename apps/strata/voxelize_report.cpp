@@ -158,7 +158,7 @@ std::string voxelize_text(const VoxelizeCommand& command, const VoxelizeOutcome&
     line("input",
          fmt::format("{}: {} triangles, {} vertices, {}{}", printable(file.path),
                      grouped(file.stats.triangles), grouped(file.stats.vertices),
-                     file.closed ? "closed" : "open", file.turned_around ? ", turned around" : ""));
+                     file.closed ? "closed" : "open", file.turned_around ? ", reversed" : ""));
   }
   const std::string bounds =
       fmt::format("{} to {}", triple(outcome.input.bounds.low), triple(outcome.input.bounds.high));
@@ -207,7 +207,7 @@ std::string voxelize_text(const VoxelizeCommand& command, const VoxelizeOutcome&
                      report.lists_ms, report.intervals_ms, outcome.write_ms));
     line("memory", fmt::format("{} at most", readable_bytes(peak_memory_bytes())));
   } else {
-    line("memory", fmt::format("about {} would be held, the limit is {}",
+    line("memory", fmt::format("about {} would be needed; the limit is {}",
                                readable_bytes(outcome.estimate.total()),
                                readable_bytes(session.memory_limit())));
   }

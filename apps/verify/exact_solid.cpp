@@ -163,7 +163,7 @@ double area_of(const Mesh& mesh) {
 /// Turns meshes of the tree into what CGAL's operations may be given.
 Components components_of(const csg::Geometry::Part& part, const std::string& name) {
   const auto refuse = [&name](const char* why) -> Failed {
-    return {{ErrorCode::kGeometry, fmt::format("{}: CGAL cannot take it: {}", name, why)}};
+    return {{ErrorCode::kGeometry, fmt::format("{}: CGAL cannot process it: {}", name, why)}};
   };
   if (part.triangles.empty()) return {};
   Mesh mesh = weld(part);

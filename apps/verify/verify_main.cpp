@@ -130,8 +130,7 @@ Result<void> run(const VerifyWords& words, Session& session) {
     if (!printed) return printed;
   }
   if (!found->agrees()) {
-    return fail(ErrorCode::kVerification,
-                "Strata and CGAL differ by more than the method explains");
+    return fail(ErrorCode::kVerification, "Strata and CGAL differ by more than the method allows");
   }
   return {};
 }

@@ -192,7 +192,7 @@ Result<std::vector<std::uint32_t>> find_solids(const Model& model, std::string_v
       if (index < solids.size()) index = index * 10 + static_cast<std::uint64_t>(c - '0');
     }
     if (pattern.size() == 1 || index >= solids.size()) {
-      return fail(ErrorCode::kUsage, "no such solid: '{}'; there are @0 to @{}", pattern,
+      return fail(ErrorCode::kUsage, "the solid must be @0 to @{1}, got '{0}'", pattern,
                   solids.empty() ? 0 : solids.size() - 1);
     }
     return std::vector{static_cast<std::uint32_t>(index)};
@@ -203,7 +203,7 @@ Result<std::vector<std::uint32_t>> find_solids(const Model& model, std::string_v
   }
   if (!whole.empty()) return whole;
   if (!part.empty()) return part;
-  return fail(ErrorCode::kUsage, "no solid's name holds '{}'", pattern);
+  return fail(ErrorCode::kUsage, "no solid has '{}' in its name", pattern);
 }
 
 std::string short_name(std::string_view name) {

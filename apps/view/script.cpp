@@ -40,38 +40,42 @@ struct Rule {
 };
 
 constexpr Rule kRules[] = {
-    {"orbit", Action::kOrbit, Form::kTwoNumbers, "DX DY", "turn, as the mouse by so many pixels"},
-    {"pan", Action::kPan, Form::kTwoNumbers, "DX DY", "move, in pixels"},
-    {"zoom", Action::kZoom, Form::kZoom, "STEPS [X Y]", "nearer by a tenth each step"},
+    {"orbit", Action::kOrbit, Form::kTwoNumbers, "DX DY",
+     "turn, as a mouse drag of so many pixels does"},
+    {"pan", Action::kPan, Form::kTwoNumbers, "DX DY", "move, as a drag of so many pixels does"},
+    {"zoom", Action::kZoom, Form::kZoom, "STEPS [X Y]", "come nearer by a tenth per step"},
     {"drag", Action::kDrag, Form::kDrag, "BUTTON X Y X Y [MOVES]",
-     "the mouse, with left, right or middle"},
-    {"click", Action::kClick, Form::kTwoNumbers, "X Y", "the left button"},
-    {"key", Action::kKey, Form::kWord, "KEY", "such as ctrl+4, p or escape"},
+     "drag the mouse with left, right or middle"},
+    {"click", Action::kClick, Form::kTwoNumbers, "X Y", "click with the left button"},
+    {"key", Action::kKey, Form::kWord, "KEY", "press a key, such as ctrl+4, p or escape"},
     {"view", Action::kView, Form::kWord, "NAME",
      "top bottom left right front back diagonal centre all reset"},
-    {"camera", Action::kCamera, Form::kWord, "NUMBERS", "as --camera"},
-    {"projection", Action::kProjection, Form::kWord, "P", "as --projection"},
+    {"camera", Action::kCamera, Form::kWord, "NUMBERS", "set the camera, as --camera does"},
+    {"projection", Action::kProjection, Form::kWord, "P",
+     "set the projection, as --projection does"},
     {"section", Action::kSection, Form::kSection, "PLANE",
      "z=3.5 or z 3.5, y>0, nx,ny,nz,d; off; flip"},
-    {"ghosts", Action::kGhosts, Form::kOnOff, "on|off", "of what is subtracted"},
-    {"edges", Action::kEdges, Form::kOnOff, "on|off", "dark lines along edges"},
-    {"axes", Action::kAxes, Form::kOnOff, "on|off", "the cross of axes in the corner"},
-    {"panels", Action::kPanels, Form::kOnOff, "on|off", "all that is not the picture"},
+    {"ghosts", Action::kGhosts, Form::kOnOff, "on|off", "show subtracted solids"},
+    {"edges", Action::kEdges, Form::kOnOff, "on|off", "show dark lines along edges"},
+    {"axes", Action::kAxes, Form::kOnOff, "on|off", "show the axes in the corner"},
+    {"panels", Action::kPanels, Form::kOnOff, "on|off", "show the panels"},
     {"heat", Action::kHeat, Form::kWord, "MAP", "off, thickness or depth"},
-    {"scheme", Action::kScheme, Form::kWord, "NAME", "a colour scheme"},
-    {"hide", Action::kHide, Form::kWord, "SOLID", "by a part of its name, @index, or all"},
-    {"show", Action::kShow, Form::kWord, "SOLID", "the same"},
-    {"colour", Action::kColour, Form::kColour, "SOLID COLOUR", "#rrggbb, #rrggbbaa or none"},
-    {"pick", Action::kPick, Form::kTwoNumbers, "X Y", "print which solid, triangle, where"},
-    {"reload", Action::kReload, Form::kNone, "", "read the files again, and wait"},
-    {"cancel", Action::kCancel, Form::kNone, "", "stop the load that is under way"},
-    {"resize", Action::kResize, Form::kTwoNumbers, "WIDTH HEIGHT", "the window"},
+    {"scheme", Action::kScheme, Form::kWord, "NAME", "set the colour scheme"},
+    {"hide", Action::kHide, Form::kWord, "SOLID", "hide a solid: part of its name, @index, or all"},
+    {"show", Action::kShow, Form::kWord, "SOLID", "show a hidden solid again, named as for hide"},
+    {"colour", Action::kColour, Form::kColour, "SOLID COLOUR",
+     "colour a solid: #rrggbb, #rrggbbaa or none"},
+    {"pick", Action::kPick, Form::kTwoNumbers, "X Y", "print the solid, triangle and position"},
+    {"reload", Action::kReload, Form::kNone, "", "load the files again, and wait"},
+    {"cancel", Action::kCancel, Form::kNone, "", "stop loading"},
+    {"resize", Action::kResize, Form::kTwoNumbers, "WIDTH HEIGHT", "set the size of the window"},
     {"wait", Action::kWait, Form::kWait, "[SECONDS|reload]",
      "until the picture is whole, or until a changed file is loaded (--watch)"},
-    {"screenshot", Action::kScreenshot, Form::kWord, "FILE.png", "of the whole window"},
+    {"screenshot", Action::kScreenshot, Form::kWord, "FILE.png",
+     "write a picture of the whole window"},
     {"picture", Action::kPicture, Form::kWord, "FILE.png",
-     "of the picture, without what lies on it"},
-    {"print", Action::kPrint, Form::kText, "TEXT", "to standard output"},
+     "write the picture without panels and overlays"},
+    {"print", Action::kPrint, Form::kText, "TEXT", "print to standard output"},
     {"stats", Action::kStats, Form::kNone, "", "print times and list statistics as JSON"},
     {"reset-stats", Action::kResetStats, Form::kNone, "", "forget the largest times"},
     {"quit", Action::kQuit, Form::kNone, "", "close the window"},
@@ -164,7 +168,7 @@ class Line {
 
  private:
   [[nodiscard]] tl::unexpected<Error> usage() const {
-    return fail(ErrorCode::kUsage, "{}: write {} {}", where_, rule_.name, rule_.usage);
+    return fail(ErrorCode::kUsage, "{}: usage: {} {}", where_, rule_.name, rule_.usage);
   }
   [[nodiscard]] Result<void> expect(std::size_t least, std::size_t most) const {
     if (words_.size() >= least && words_.size() <= most) return {};
@@ -176,7 +180,7 @@ class Line {
     for (std::size_t i = first; i < words_.size(); ++i) {
       const auto value = number_of(words_[i]);
       if (!value) {
-        return fail(ErrorCode::kUsage, "{}: '{}' is not a number; write {} {}", where_, words_[i],
+        return fail(ErrorCode::kUsage, "{}: '{}' is not a number; usage: {} {}", where_, words_[i],
                     rule_.name, rule_.usage);
       }
       command.numbers.push_back(*value);
@@ -184,8 +188,9 @@ class Line {
     if (command.action == Action::kResize &&
         (command.numbers[0] < 1 || command.numbers[1] < 1 || command.numbers[0] > 16384 ||
          command.numbers[1] > 16384)) {
-      return fail(ErrorCode::kUsage, "{}: a window of {} x {} pixels", where_, command.numbers[0],
-                  command.numbers[1]);
+      return fail(ErrorCode::kUsage,
+                  "{}: the window must be 1 to 16384 pixels wide and high, got {} x {}", where_,
+                  command.numbers[0], command.numbers[1]);
     }
     return {};
   }
@@ -206,8 +211,8 @@ class Line {
   Result<void> check_word(const ScriptCommand& command) const {
     const auto one_of = [&](std::initializer_list<std::string_view> names) -> Result<void> {
       if (std::find(names.begin(), names.end(), command.word) != names.end()) return {};
-      return fail(ErrorCode::kUsage, "{}: no such {}: '{}'; there are {}", where_, rule_.name,
-                  command.word, fmt::join(names, ", "));
+      return fail(ErrorCode::kUsage, "{}: unknown {} '{}'; it must be one of {}", where_,
+                  rule_.name, command.word, fmt::join(names, ", "));
     };
     switch (command.action) {
       case Action::kView:
@@ -230,7 +235,7 @@ class Line {
       }
       case Action::kScheme:
         if (csg::find_colour_scheme(command.word) != nullptr) return {};
-        return fail(ErrorCode::kUsage, "{}: no such colour scheme: '{}'", where_, command.word);
+        return fail(ErrorCode::kUsage, "{}: unknown colour scheme '{}'", where_, command.word);
       default:
         return {};
     }
@@ -240,8 +245,8 @@ class Line {
     const bool hex = (word.size() == 7 || word.size() == 9) && word[0] == '#' &&
                      word.find_first_not_of("0123456789abcdefABCDEF", 1) == std::string::npos;
     if (hex) return {};
-    return fail(ErrorCode::kUsage, "{}: a colour is #rrggbb, #rrggbbaa or none, not '{}'", where_,
-                word);
+    return fail(ErrorCode::kUsage, "{}: the colour must be #rrggbb, #rrggbbaa or none, got '{}'",
+                where_, word);
   }
 
   const Rule& rule_;
@@ -266,7 +271,7 @@ Result<std::vector<ScriptCommand>> parse_script(std::string_view text, const std
     const auto* rule = std::find_if(std::begin(kRules), std::end(kRules),
                                     [&](const Rule& one) { return one.name == words->front(); });
     if (rule == std::end(kRules)) {
-      return fail(ErrorCode::kUsage, "{}: no such command: '{}'", where, words->front());
+      return fail(ErrorCode::kUsage, "{}: unknown command '{}'", where, words->front());
     }
     ScriptCommand command;
     command.line = number;

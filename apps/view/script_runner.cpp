@@ -92,7 +92,7 @@ Result<bool> ScriptRunner::run(const ScriptCommand& command, Viewer& viewer, Sta
     case Action::kKey:
       if (begun_) return !viewer.wants_screenshot;
       if (!viewer.key(command.word)) {
-        return fail(ErrorCode::kUsage, "no key does anything by the name '{}'", command.word);
+        return fail(ErrorCode::kUsage, "unknown key '{}'", command.word);
       }
       return !viewer.wants_screenshot;  // else the window's next turn takes it
     case Action::kView:

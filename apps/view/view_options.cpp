@@ -136,7 +136,7 @@ Result<void> read(Words& words, ViewOptions& options) {
   }
   for (const std::string& file : words.files) {
     if (file == "-") {
-      return fail(ErrorCode::kUsage, "a window reads files, which it can read again; not -");
+      return fail(ErrorCode::kUsage, "strata view cannot read standard input; give files");
     }
   }
   if (words.csg.size.empty()) words.csg.size = "1280,800";

@@ -60,7 +60,7 @@ constexpr Key kKeys[] = {
      [](Viewer& v) {
        v.orbit_by({-kKeyPixels, 0});
      },
-     "turn; so do right, up, down"},
+     "turn; also right, up, down"},
     {"right",
      [](Viewer& v) {
        v.orbit_by({kKeyPixels, 0});
@@ -80,7 +80,7 @@ constexpr Key kKeys[] = {
      [](Viewer& v) {
        v.pan_by({-kKeyPixels, 0});
      },
-     "move; the same"},
+     "move; also right, up, down"},
     {"shift+right",
      [](Viewer& v) {
        v.pan_by({kKeyPixels, 0});
@@ -114,19 +114,19 @@ constexpr Key kKeys[] = {
        looks.ghosts = !looks.ghosts;
        v.set_looks(std::move(looks));
      },
-     "ghosts of what is subtracted"},
+     "show subtracted solids"},
     {"s", [](Viewer& v) { v.toggle_section(); }, "section on or off"},
     {"x", [](Viewer& v) { section_across(v, 0); }, "section across x; so do y and z"},
     {"y", [](Viewer& v) { section_across(v, 1); }, ""},
     {"z", [](Viewer& v) { section_across(v, 2); }, ""},
-    {"i", [](Viewer& v) { v.flip_section(); }, "the section's other side"},
+    {"i", [](Viewer& v) { v.flip_section(); }, "flip the section"},
     {"t", [](Viewer& v) { toggle_heat(v, Heat::kThickness); }, "heat map of the thickness"},
     {"d", [](Viewer& v) { toggle_heat(v, Heat::kDepth); }, "heat map of the depth complexity"},
     {"h",
      [](Viewer& v) {
        if (v.looks().selected) v.set_hidden(*v.looks().selected, true);
      },
-     "hide the solid that was picked"},
+     "hide the picked solid"},
     {"shift+h",
      [](Viewer& v) {
        Looks looks = v.looks();
@@ -134,7 +134,7 @@ constexpr Key kKeys[] = {
        v.set_looks(std::move(looks));
      },
      "show all solids"},
-    {"f5", [](Viewer& v) { v.reload(); }, "read the files again; also F4"},
+    {"f5", [](Viewer& v) { v.reload(); }, "load the files again; also F4"},
     {"f4", [](Viewer& v) { v.reload(); }, ""},
     {"tab", [](Viewer& v) { v.show_panels = !v.show_panels; }, "panels on or off"},
     {"ctrl+s", [](Viewer& v) { v.wants_screenshot = true; }, "screenshot, strata-view-N.png"},
@@ -143,7 +143,7 @@ constexpr Key kKeys[] = {
        if (v.loading()) return v.cancel_load();
        v.select({});
      },
-     "stop loading; forget what was picked"},
+     "stop loading; clear the pick"},
     {"ctrl+q", [](Viewer& v) { v.wants_quit = true; }, "close the window"},
 };
 
@@ -153,8 +153,8 @@ struct Gesture {
 constexpr Gesture kGestures[] = {
     {"left drag", "turn; on the section's arrow: move the section"},
     {"right or middle drag", "move; also shift + left"},
-    {"wheel, ctrl + drag", "nearer and farther"},
-    {"click", "pick: which solid, which triangle, where"},
+    {"wheel, ctrl + drag", "zoom"},
+    {"click", "pick: print the solid, triangle and position"},
     {"double click", "pick, and turn about that point"},
 };
 

@@ -324,7 +324,7 @@ Result<Measures> Measurer::once(int resolution, const Share& share) {
   Measures result = sums.finish();
   result.resolution = resolution;
   if (!std::isfinite(result.volume)) {
-    return fail(ErrorCode::kGeometry, "the result is {:g} long: its volume is no number",
+    return fail(ErrorCode::kGeometry, "the result is {:g} long; its volume is not finite",
                 glm::length(box_.high - box_.low));
   }
   if (!result.empty) settle_bounds(grid, sums.crossed(), result);

@@ -177,7 +177,8 @@ struct RayMeter::Impl {
       vertices += part.mesh.vertices.size(), count += part.mesh.triangles.size();
     }
     if (vertices > 0xffffffffu || count > 0x7fffffffu) {
-      return fail(ErrorCode::kLimit, "{} triangles, {} can be measured", count, 0x7fffffffu);
+      return fail(ErrorCode::kLimit, "the tree has {} triangles, but at most {} can be measured",
+                  count, 0x7fffffffu);
     }
     LatticeMesh mesh;
     std::vector<glm::uvec3> triangles;

@@ -280,10 +280,11 @@ bool too_large(double vertices, double triangles, const char* what, OutlineJob* 
   if (!job || job->error || job->execution.memory_limit == 0) return job && job->error;
   const double bytes = vertices * sizeof(glm::dvec3) + triangles * sizeof(glm::uvec3);
   if (bytes <= static_cast<double>(job->execution.memory_limit)) return false;
-  job->error = Error{ErrorCode::kLimit,
-                     fmt::format("{}: {:.3g} vertices and {:.3g} triangles take {:.3g} bytes, the "
-                                 "memory limit is {}",
-                                 what, vertices, triangles, bytes, job->execution.memory_limit)};
+  job->error = Error{
+      ErrorCode::kLimit,
+      fmt::format(
+          "{}: {:.3g} vertices and {:.3g} triangles need {:.3g} bytes, but the memory limit is {}",
+          what, vertices, triangles, bytes, job->execution.memory_limit)};
   return true;
 }
 

@@ -46,7 +46,7 @@ Result<Outline> make_polygon(std::span<const glm::dvec2> points,
     auto& contour = raw.contours.emplace_back();
     for (const std::uint32_t index : paths[p]) {
       if (index >= points.size()) {
-        return fail(ErrorCode::kInput, "polygon: path {} refers to point {}, there are {}", p,
+        return fail(ErrorCode::kInput, "polygon: path {} refers to point {}, but there are {}", p,
                     index, points.size());
       }
       contour.push_back(points[index]);

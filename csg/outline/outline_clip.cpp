@@ -195,12 +195,11 @@ bool ends_before(const Paths& subject, const Paths& clip, OutlineJob* job) {
   const double crossings = estimate_crossings(subject, clip);
   const auto limit = static_cast<double>(job->execution.memory_limit);
   if (crossings > kMostCrossings || (limit > 0 && crossings * kBytes > limit)) {
-    job->error =
-        Error{ErrorCode::kLimit,
-              fmt::format("flat outlines with {} edges cross each other about {:.2g} "
-                          "times; the limit is {:.2g}",
-                          points, crossings,
-                          limit > 0 ? std::min(kMostCrossings, limit / kBytes) : kMostCrossings)};
+    job->error = Error{
+        ErrorCode::kLimit,
+        fmt::format("flat outlines with {} edges have about {:.2g} crossings; the limit is {:.2g}",
+                    points, crossings,
+                    limit > 0 ? std::min(kMostCrossings, limit / kBytes) : kMostCrossings)};
   }
   return job->error.has_value();
 }

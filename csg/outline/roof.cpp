@@ -113,7 +113,7 @@ Result<TriangleSoup> make_roof(const Outline& outline, const std::string& method
                                const Segments& segments) {
   const bool voronoi = method == "voronoi";
   if (!voronoi && method != "straight") {
-    return fail(ErrorCode::kGeometry, "roof: the method is '{}', not 'straight' or 'voronoi'",
+    return fail(ErrorCode::kGeometry, "roof: the method must be 'straight' or 'voronoi', got '{}'",
                 method);
   }
   glm::dvec2 low(std::numeric_limits<double>::infinity()), high = -low;

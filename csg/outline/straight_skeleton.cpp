@@ -29,7 +29,8 @@ class Wavefront {
     constexpr double kMostWork = 3e9;
     if (static_cast<double>(points) * static_cast<double>(points) * static_cast<double>(reflex) >
         kMostWork) {
-      return fail(ErrorCode::kGeometry, "roof: {} points in one piece are too many", points);
+      return fail(ErrorCode::kGeometry, "roof: one piece has {} points, which are too many",
+                  points);
     }
     const std::size_t most_events = 40 * points + 100;
     for (std::size_t event = 0; !active_.empty(); ++event) {

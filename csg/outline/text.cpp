@@ -340,7 +340,8 @@ Result<Outline> make_text(const TextOptions& options, std::string& missing, Outl
   }
   constexpr std::size_t kLongest = 1 << 20;
   if (options.text.size() > kLongest) {
-    return fail(ErrorCode::kLimit, "text: {} bytes, at most {}", options.text.size(), kLongest);
+    return fail(ErrorCode::kLimit, "text: {} bytes; the limit is {}", options.text.size(),
+                kLongest);
   }
   if (options.text.empty() || options.size <= 0) return Outline{};
   static Fonts fonts;

@@ -274,7 +274,7 @@ Result<void> GhostPainter::paint(const View& view, const SurfaceImage& opaque, c
     vertices += part.mesh.vertices.size(), triangles += part.mesh.triangles.size();
   }
   if (vertices > 0xffffffffu || triangles > 0x7fffffffu) {
-    return fail(ErrorCode::kLimit, "{} triangles are transparent, {} can be", triangles,
+    return fail(ErrorCode::kLimit, "{} triangles are transparent; the limit is {}", triangles,
                 0x7fffffffu);
   }
   painted.mesh.vertices.reserve(vertices);

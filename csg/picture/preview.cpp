@@ -286,7 +286,7 @@ Result<Picture> Preview::Impl::picture(const Camera& camera, const glm::ivec2& s
                                        const PictureOptions& options, const Execution& execution) {
   if (options.samples < 1 || options.samples > 64 ||
       !std::has_single_bit(static_cast<unsigned>(options.samples))) {
-    return fail(ErrorCode::kUsage, "{} samples a pixel: 1, 2, 4, 8, 16, 32 or 64 can be had",
+    return fail(ErrorCode::kUsage, "samples per pixel must be 1, 2, 4, 8, 16, 32 or 64, got {}",
                 options.samples);
   }
   // As square a grid as can be.
@@ -295,8 +295,9 @@ Result<Picture> Preview::Impl::picture(const Camera& camera, const glm::ivec2& s
   const auto whole = view(camera, size, execution);
   if (!whole) return tl::unexpected(whole.error());
   if (size.x > kMaxPictureSide / across) {
-    return fail(ErrorCode::kUsage, "{} pixels of {} samples in a row: {} samples can be had",
-                size.x, across, kMaxPictureSide);
+    return fail(ErrorCode::kUsage,
+                "a row of {} pixels with {} samples each exceeds the limit of {} samples", size.x,
+                across, kMaxPictureSide);
   }
   const ColourScheme& scheme =
       options.scheme != nullptr ? *options.scheme : colour_schemes().front();

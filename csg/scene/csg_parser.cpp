@@ -102,7 +102,7 @@ class Parser {
       } else if (c == '/' && end_ - at_ > 1 && at_[1] == '*') {
         const std::string_view rest(at_, static_cast<std::size_t>(end_ - at_));
         const std::size_t close = rest.find("*/", 2);
-        if (close == std::string_view::npos) return refuse(at_, "a comment that is never closed");
+        if (close == std::string_view::npos) return refuse(at_, "the comment is not closed");
         at_ += close + 2;
       } else {
         break;
@@ -344,9 +344,9 @@ class Parser {
       const char* plain = at_;
       while (at_ < end_ && *at_ != '"' && *at_ != '\\') ++at_;
       text.append(plain, at_);
-      if (at_ == end_) return refuse(start, "a string that is never closed");
+      if (at_ == end_) return refuse(start, "the string is not closed");
       if (*at_++ == '"') break;
-      if (at_ == end_) return refuse(start, "a string that is never closed");
+      if (at_ == end_) return refuse(start, "the string is not closed");
       escape(text);
     }
     ast_.values.push_back(

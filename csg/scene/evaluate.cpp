@@ -238,8 +238,8 @@ bool Evaluator::enter_transform(Frame& frame) {
   const bool stays = is_finite(matrix);
   if (!fault.empty() || !stays) {
     warn(frame.node, "geometry",
-         fmt::format("the matrix has {}; {}", fault.empty() ? "numbers beyond all limits" : fault,
-                     stays ? "the identity's is taken" : "what it moves is left out"));
+         fmt::format("the matrix has {}; {}", fault.empty() ? "numbers that are not finite" : fault,
+                     stays ? "using the identity's entry there" : "its children are left out"));
   }
   if (!stays) return false;
   Context& inside = frame.inside;
@@ -400,9 +400,9 @@ void Evaluator::take_child(Frame& parent, std::uint32_t node, std::size_t base,
     const bool flat = dimension == Dimension::kFlat;
     const bool shown = show_beside(base);
     warn(node, "ignored",
-         fmt::format("'{}' is {} and stands beside what is {}; {}", name(node),
-                     flat ? "flat" : "solid", flat ? "solid" : "flat",
-                     shown ? "previews show it, the result is without it" : "it is left out"));
+         fmt::format("'{}' is {} but its siblings are {}; {}", name(node), flat ? "flat" : "solid",
+                     flat ? "solid" : "flat",
+                     shown ? "previews show it, but the result leaves it out" : "it is left out"));
     operands_.resize(base);
     leftovers_ = true;
     return;

@@ -9,7 +9,7 @@ double Evaluator::number(std::uint32_t node, std::string_view argument, const Va
                          double otherwise) {
   if (value.given() && !value.is_number()) {
     warn(node, "geometry",
-         fmt::format("'{}': {} is {}, not a number; {:g} is taken", name(node), argument,
+         fmt::format("'{}': {} is {}, not a number; {:g} is used", name(node), argument,
                      value.shown(), otherwise));
   }
   return value.number(otherwise);
@@ -25,7 +25,7 @@ void Evaluator::read_sizes(std::uint32_t node, std::span<double> sizes) {
   if (count == sizes.size() && value.numbers(sizes.data(), count) == count) return;
   std::fill(sizes.begin(), sizes.end(), 1.0);
   warn(node, "geometry",
-       fmt::format("'{}': size is {}, not a number or {} numbers; 1 is taken", name(node),
+       fmt::format("'{}': size is {}, not a number or {} numbers; 1 is used", name(node),
                    value.shown(), sizes.size()));
 }
 
@@ -42,8 +42,9 @@ void Evaluator::read_new_size(std::uint32_t node, std::span<double> sizes) {
   }
   if (!all) {
     warn(node, "geometry",
-         fmt::format("'{}': newsize is {}, not finite numbers; the size is kept where it is none",
-                     name(node), value.shown()));
+         fmt::format(
+             "'{}': newsize is {}, not finite numbers; sizes that are not finite numbers are kept",
+             name(node), value.shown()));
   }
 }
 
@@ -62,13 +63,13 @@ Segments Evaluator::segments(std::uint32_t node) {
     const ValueRef value = given.find(name);
     if (!value.given() || value.is_number()) continue;
     warn(node, "geometry",
-         fmt::format("'{}': {} is {}, not a number; its default is taken", this->name(node), name,
+         fmt::format("'{}': {} is {}, not a number; its default is used", this->name(node), name,
                      value.shown()));
   }
   const Segments segments = given.segments(newer_);
   if (std::isfinite(segments.fn) && segments.fn > Segments::kMost) {
     warn(node, "approximate",
-         fmt::format("'{}': $fn is {:g}; {:g} is taken", name(node), segments.fn, Segments::kMost));
+         fmt::format("'{}': $fn is {:g}; {:g} is used", name(node), segments.fn, Segments::kMost));
   }
   return segments;
 }

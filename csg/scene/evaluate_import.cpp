@@ -83,9 +83,9 @@ std::optional<std::string> Evaluator::asset(std::uint32_t node, const std::strin
   });
   warn(node, "missing-file",
        fmt::format("'{}' needs the file '{}', which is {}; it is left out", name(node), shown(file),
-                   !other                     ? "not there"
+                   !other                     ? "missing"
                    : fs::is_directory(*other) ? "a folder"
-                                              : "no regular file"));
+                                              : "not a regular file"));
   return std::nullopt;
 }
 
@@ -104,7 +104,7 @@ void Evaluator::import(std::uint32_t node, const Context& context) {
     return warn(node, "not-done",
                 extension == ".nef3"
                     ? fmt::format("'{}': Nef polyhedra are not read; it is left out", shown(file))
-                    : fmt::format("'{}': a file of an unknown kind; it is left out", shown(file)));
+                    : fmt::format("'{}': the file's type is unknown; it is left out", shown(file)));
   }
   const bool centre = given.truth("center", false);
   Imported& imported = imports_[{*path, centre}];

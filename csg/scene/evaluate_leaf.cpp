@@ -32,13 +32,13 @@ class IndexReader {
     std::vector<std::string> texts;
     if (out_of_range_.count > 0) {
       texts.push_back(
-          fmt::format("{} corners of {}s are no indices of the {} points, the first is "
+          fmt::format("{} corners of {}s are not indices of the {} points, the first is "
                       "{}; they are left out",
                       out_of_range_.count, list_, points_, out_of_range_.first));
     }
     if (broken_.count > 0) {
       texts.push_back(
-          fmt::format("{} corners of {}s are no whole numbers, the first is {}; they "
+          fmt::format("{} corners of {}s are not whole numbers, the first is {}; they "
                       "are rounded down",
                       broken_.count, list_, broken_.first));
     }
@@ -150,11 +150,10 @@ void Evaluator::polyhedron(std::uint32_t node, const Context& context) {
   BentFaces bent;
   TriangleSoup mesh = make_faces(std::move(points), faces, &bent);
   if (bent.count > 0) {
-    warn(
-        node, "non-planar",
-        fmt::format("face {} of the polyhedron is not flat: {} ({} such); its triangles are one of "
-                    "several ways to fill it",
-                    bent.first, bent.bend.text(), bent.count));
+    warn(node, "non-planar",
+         fmt::format("face {} of the polyhedron is not flat: {} ({} such); it can be divided into "
+                     "triangles in several ways",
+                     bent.first, bent.bend.text(), bent.count));
   }
   if (mesh.triangles.empty()) return;
   const InsideRule rule = inspect(node, mesh);
@@ -240,7 +239,7 @@ void Evaluator::text(std::uint32_t node, const Context& context) {
   }
   if (!missing.empty()) {
     warn(node, "missing-font",
-         fmt::format("the font '{}' is not installed; another is shown instead", missing));
+         fmt::format("the font '{}' is not installed; another font is used", missing));
   }
   add_outline(node, context, *std::move(outline));
 }

@@ -34,7 +34,7 @@ void Evaluator::replace_operands(Frame& frame) {
   const bool flat = frame.dimension == Dimension::kFlat;
   if ((flat && takes_solid) || (!flat && takes_flat)) {
     warn(frame.node, "ignored",
-         fmt::format("'{}' takes {} children; these are {} and are left out", name(frame.node),
+         fmt::format("'{}' takes {} children; the {} ones are left out", name(frame.node),
                      takes_flat ? "flat" : "solid", flat ? "flat" : "solid"));
     operands_.resize(frame.base);
     return;
@@ -103,8 +103,8 @@ TriangleSoup Evaluator::boundary_mesh(std::uint32_t node, Tree::NodeId solid) {
   const glm::dvec3 size = exact.empty() ? glm::dvec3(0.0) : exact.high - exact.low;
   warn(
       node, "approximate",
-      fmt::format("'{}': {}; only the first operands of differences and intersections are taken, "
-                  "in a box of {:.6g} x {:.6g} x {:.6g} where the result lies in {:.6g} x {:.6g} x "
+      fmt::format("'{}': {}; only the first operands of differences and intersections are used, in "
+                  "a box of {:.6g} x {:.6g} x {:.6g} where the result lies in {:.6g} x {:.6g} x "
                   "{:.6g}",
                   name(node), mesh.error().message, taken.high.x - taken.low.x,
                   taken.high.y - taken.low.y, taken.high.z - taken.low.z, size.x, size.y, size.z));
@@ -256,7 +256,8 @@ void Evaluator::resize(Frame& frame) {
       if (follow[i] && size[i] == 0.0) scale[i] = shared;
     }
     if (!std::isfinite(scale.x) || !std::isfinite(scale.y) || !std::isfinite(scale.z)) {
-      warn(frame.node, "geometry", "'resize' of something flat; its size is kept");
+      warn(frame.node, "geometry",
+           "'resize' would scale a flat object along an axis without extent; its size is kept");
       scale = glm::dvec3(1.0);
     }
   }
@@ -323,7 +324,7 @@ void Evaluator::rotate_extrude(Frame& frame) {
   options.angle = number(frame.node, "angle", given.find("angle", 0), options.angle);
   if (!std::isfinite(options.angle)) {
     warn(frame.node, "geometry",
-         fmt::format("'rotate_extrude': angle is {:g}, not finite; 360 is taken", options.angle));
+         fmt::format("'rotate_extrude': angle is {:g}, not finite; 360 is used", options.angle));
     options.angle = 360.0;
   }
   const bool full = std::abs(options.angle) >= 360.0;

@@ -58,8 +58,8 @@ bool Evaluator::fits(std::uint32_t node, std::string_view of, double count, Made
   if (execution_.memory_limit > 0 &&
       made_bytes_ + bytes > static_cast<double>(execution_.memory_limit)) {
     stop(ErrorCode::kLimit, node,
-         fmt::format("'{}' of {} would have {:.3g} {}; with what the scene has so far they take "
-                     "about {:.3g} GB, the memory limit is {:.3g} GB",
+         fmt::format("'{}' of {} would have {:.3g} {}; with the scene so far they need about "
+                     "{:.3g} GB, but the memory limit is {:.3g} GB",
                      name(node), of, count, unit, (made_bytes_ + bytes) / 1e9,
                      static_cast<double>(execution_.memory_limit) / 1e9));
     return false;
@@ -144,7 +144,7 @@ InsideRule Evaluator::inspect(std::uint32_t node, TriangleSoup& mesh) {
                                    found.unbalanced_edges, found.edges);
     if (found.boundary_edges > 0) text += fmt::format(", {} border a hole", found.boundary_edges);
     if (found.misoriented_edges > 0) {
-      text += fmt::format(", {} join faces that look opposite ways", found.misoriented_edges);
+      text += fmt::format(", {} join faces of opposite orientation", found.misoriented_edges);
     }
     if (!found.examples.empty()) {
       const UnbalancedEdge& edge = found.examples.front();
@@ -159,7 +159,7 @@ InsideRule Evaluator::inspect(std::uint32_t node, TriangleSoup& mesh) {
   }
   if (turned.all_turned && turned.turned_parts > 0) {
     warn(node, "geometry",
-         fmt::format("'{}' is inside out (its volume is {:.6g}); it was turned around", name(node),
+         fmt::format("'{}' is inside out (its volume is {:.6g}); it was reversed", name(node),
                      volume));
   }
   return InsideRule::kWinding;

@@ -79,7 +79,7 @@ std::string named(const Solid& solid) {
 Error too_far(const Solid& solid, double reach, std::string_view what, double limit) {
   return {
       ErrorCode::kGeometry,
-      fmt::format("{} has coordinates {}; those of a {} must be below {:g}", named(solid),
+      fmt::format("{} has coordinates {}; in a {} they must be below {:g}", named(solid),
                   std::isfinite(reach) ? fmt::format("of about {:.3g}", reach) : "beyond 1e+308",
                   what, limit)};
 }
@@ -115,10 +115,9 @@ Result<void> check_coordinates(Scene& scene) {
       continue;
     }
     scene.warnings.push_back(
-        {"approximate",
-         fmt::format("{} reaches out to {:.3g}; where its faces slope they are known to about "
-                     "{:.2g}, and what they meet is {:.3g} long",
-                     named(solid), reach, error, size)});
+        {"approximate", fmt::format("{} reaches to {:.3g}; its sloping faces are exact to about "
+                                    "{:.2g}, and the solids that they meet are {:.3g} long",
+                                    named(solid), reach, error, size)});
   }
   return {};
 }

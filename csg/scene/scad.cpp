@@ -86,7 +86,7 @@ class Speech {
     while (!said.empty() && said.back() == '\n') said.remove_suffix(1);
     const std::string text =
         plain_line(said.size() > kMost ? said.substr(said.size() - kMost) : said);
-    return text.empty() ? "it said nothing" : text;
+    return text.empty() ? "it printed nothing" : text;
   }
   /// The first error; empty: there was none.
   [[nodiscard]] const std::string& error() const { return error_; }
@@ -308,7 +308,7 @@ Result<void> wait_for(Child& child, Speech& said, const std::string& path, doubl
   while (!child.ended(ended)) {
     if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
     if (std::chrono::duration<double>(Clock::now() - begin).count() > timeout_s) {
-      return fail(ErrorCode::kInput, "{}: openscad took more than {:g} s and was ended: {}", path,
+      return fail(ErrorCode::kInput, "{}: openscad took more than {:g} s and was stopped: {}", path,
                   timeout_s, said.last_words());
     }
     if (talks) {
@@ -401,7 +401,7 @@ Result<OpenscadRun> run_openscad(const std::string& path, const OpenscadOptions&
   run.files.push_back(identify_file(path));
   const Memory output, rule;
   if (output.descriptor() < 0 || rule.descriptor() < 0) {
-    return fail(ErrorCode::kLimit, "{}: no memory can be opened for what openscad writes", path);
+    return fail(ErrorCode::kLimit, "{}: no memory for the output of openscad", path);
   }
   const std::string mark = random_word();
   std::vector<std::string> words{"openscad", "-o", output.path(), "--export-format",
@@ -417,12 +417,11 @@ Result<OpenscadRun> run_openscad(const std::string& path, const OpenscadOptions&
   Child child;
   const int reason = child.start(arguments.data(), {output.descriptor(), rule.descriptor()});
   if (reason != 0) {
-    return fail(
-        ErrorCode::kInput,
-        "{}: a program needs `openscad` to be run, and that cannot be started ({}): install "
-        "the package openscad, or write `openscad -o scene.csg {}` where it is installed "
-        "and give the .csg file",
-        path, std::generic_category().message(reason), path);
+    return fail(ErrorCode::kInput,
+                "{}: a .scad file needs `openscad`, which cannot be started ({}): install the "
+                "package openscad, or run `openscad -o scene.csg {}` where it is installed "
+                "and give the .csg file",
+                path, std::generic_category().message(reason), path);
   }
   Speech said(path, fmt::format("ECHO: \"{}\", ", mark));
   if (auto done = wait_for(child, said, path, options.timeout_s, execution); !done) {

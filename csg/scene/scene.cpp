@@ -23,7 +23,7 @@ Result<Scene> evaluate(std::string_view text, const std::string& name, const std
                    options.root_folder)
       .run();
 } catch (const std::bad_alloc&) {
-  return fail(ErrorCode::kLimit, "{}: too large for the memory", name);
+  return fail(ErrorCode::kLimit, "{}: out of memory", name);
 } catch (const std::exception& error) {
   return fail(ErrorCode::kInternal, "{}: {}", name, error.what());
 }

@@ -240,7 +240,7 @@ Result<TriangleSoup> cut_boundary(const Tree& tree, Tree::NodeId node, std::uint
   if (steps > most_steps) {
     std::size_t triangles = 0;
     for (const Leaf& leaf : cutter.leaves()) triangles += leaf.triangles.size();
-    return fail(ErrorCode::kLimit, "{} triangles would have to be cut by {} planes", triangles,
+    return fail(ErrorCode::kLimit, "{} triangles and {} planes are too many to be cut", triangles,
                 planes.size());
   }
   if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");

@@ -59,7 +59,7 @@ Result<void> check_cells(const std::string& path, std::size_t cells, const Execu
     return fail(ErrorCode::kLimit, "{}: {} heights; the limit is {}", path, cells, kMostCells);
   }
   if (execution.memory_limit != 0 && cells * kBytes > execution.memory_limit) {
-    return fail(ErrorCode::kLimit, "{}: {} heights take {} bytes, the memory limit is {}", path,
+    return fail(ErrorCode::kLimit, "{}: {} heights need {} bytes, but the memory limit is {}", path,
                 cells, cells * kBytes, execution.memory_limit);
   }
   return {};
@@ -102,7 +102,7 @@ Result<HeightMap> read_numbers(const std::string& path, const Execution& executi
               numbers.begin() + static_cast<std::ptrdiff_t>(row_ends[row]),
               map.heights.begin() + static_cast<std::ptrdiff_t>(row * columns));
     if (row_ends[row] - from < columns && short_rows++ == 0) {
-      map.short_rows = fmt::format("row {} has {} numbers, the longest {}; what is missing is 0",
+      map.short_rows = fmt::format("row {} has {} numbers, the longest {}; missing numbers are 0",
                                    row + 1, row_ends[row] - from, columns);
     }
     from = row_ends[row];
@@ -209,8 +209,8 @@ Result<TriangleSoup> read_surface(const std::string& path, bool centre, bool inv
       extension == ".png" ? read_picture(path, invert, execution) : read_numbers(path, execution);
   if (!map) return tl::unexpected(map.error());
   if (map->columns < 2 || map->rows < 2) {
-    return fail(ErrorCode::kInput, "{}: {} x {} heights; a surface needs 2 x 2", path, map->columns,
-                map->rows);
+    return fail(ErrorCode::kInput, "{}: {} x {} heights; a surface needs at least 2 x 2", path,
+                map->columns, map->rows);
   }
   if (short_rows && !map->short_rows.empty()) {
     *short_rows = fmt::format("{}: {}", path, map->short_rows);

@@ -94,7 +94,7 @@ class EdgeCollector {
 Result<TriangleSoup> make_hull(std::span<const glm::dvec3> points, EdgeCollector* edges,
                                const std::stop_token& stop) {
   if (points.size() > static_cast<std::size_t>(std::numeric_limits<int>::max()) / 3) {
-    return fail(ErrorCode::kLimit, "{} points for a convex hull", points.size());
+    return fail(ErrorCode::kLimit, "a convex hull of {} points is too large", points.size());
   }
   if (points.size() < 4) return fail(ErrorCode::kGeometry, "the points lie in a plane");
   glm::dvec3 low = points[0], high = points[0];
@@ -110,7 +110,7 @@ Result<TriangleSoup> make_hull(std::span<const glm::dvec3> points, EdgeCollector
     for (int i = 0; i < 3; ++i) coordinates.push_back(p[i] - middle[i]);
   }
   Run run(stop);
-  if (!run.output()) return fail(ErrorCode::kInternal, "no file for what Qhull prints");
+  if (!run.output()) return fail(ErrorCode::kInternal, "cannot open a file for Qhull's messages");
   qhT* qh = run.get();
   char command[] = "qhull Pp TF50";
   const int status = qh_new_qhull(qh, 3, static_cast<int>(points.size()), coordinates.data(), False,

@@ -250,7 +250,7 @@ Result<std::vector<MinkowskiPart>> minkowski_sum(std::span<const MinkowskiPart> 
                                                        : std::numeric_limits<double>::infinity();
   if (cost.pieces > kMostPieces || cost.vertices > kMostVertices || cost.bytes() > most_bytes) {
     return fail(ErrorCode::kLimit,
-                "the sum takes {:.0f} convex pieces with about {:.3g} vertices and {:.3g} GB; the "
+                "the sum needs {:.0f} convex pieces with about {:.3g} vertices and {:.3g} GB; the "
                 "limits are {:.0f} pieces, {:g} vertices and {:.3g} GB",
                 cost.pieces, cost.vertices, cost.bytes() / 1e9, kMostPieces, kMostVertices,
                 most_bytes / 1e9);

@@ -9,11 +9,11 @@ namespace strata {
 Result<void> check_layered_depth_image(const LayeredDepthImage& image) {
   if (image.width < 1 || image.height < 1 || image.width > kMaxGridSide ||
       image.height > kMaxGridSide) {
-    return fail(ErrorCode::kUsage, "depth lists of {} x {} pixels; 1 to {} a side are possible",
+    return fail(ErrorCode::kUsage, "depth lists of {} x {} pixels: each side must be 1 to {}",
                 image.width, image.height, kMaxGridSide);
   }
   if (image.depth_limit < 1 || image.depth_limit > 1u << 24) {
-    return fail(ErrorCode::kUsage, "depth lists with a depth limit of {}; it is in [1, 16777216]",
+    return fail(ErrorCode::kUsage, "the depth limit of depth lists must be 1 to 16777216, got {}",
                 image.depth_limit);
   }
   const auto width = static_cast<std::size_t>(image.width);
@@ -38,7 +38,7 @@ Result<void> check_layered_depth_image(const LayeredDepthImage& image) {
                     pixel % width, pixel / width, image.items[i].depth(), image.depth_limit);
       }
       if (i > begin && image.items[i] < image.items[i - 1]) {
-        return fail(ErrorCode::kUsage, "pixel ({}, {}): crossing {} is not sorted", pixel % width,
+        return fail(ErrorCode::kUsage, "pixel ({}, {}): crossing {} is out of order", pixel % width,
                     pixel / width, i - begin);
       }
     }

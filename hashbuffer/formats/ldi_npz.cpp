@@ -331,7 +331,7 @@ Result<LayeredDepthImage> read_arrays(const std::string& path, const Execution& 
   if (!matrix) return tl::unexpected(matrix.error());
   const auto [height, width] = std::pair((*shape)[0], (*shape)[1]);
   if (height < 1 || width < 1 || height > kMaxGridSide || width > kMaxGridSide) {
-    return fail(ErrorCode::kInput, "{}: {} x {} pixels; 1 to {} a side are possible", path, width,
+    return fail(ErrorCode::kInput, "{}: {} x {} pixels; each side must be 1 to {}", path, width,
                 height, kMaxGridSide);
   }
   LayeredDepthImage image;

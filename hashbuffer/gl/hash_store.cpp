@@ -46,7 +46,7 @@ StoreGlsl glsl_of(const GlslPiece& piece, GlslSettings settings) {
 Result<std::unique_ptr<HashStore>> HashStore::create(const Info& info,
                                                      const HashStoreOptions& options) {
   if (options.record_bits != 32 && options.record_bits != 64) {
-    return fail(ErrorCode::kUsage, "hash store: words of {} bits; 32 and 64 are there",
+    return fail(ErrorCode::kUsage, "hash store: records must have 32 or 64 bits, got {}",
                 options.record_bits);
   }
   if (options.record_bits == 64 && options.path == WordPath::kAtomic && !info.has_int64_atomics &&
@@ -173,7 +173,8 @@ Result<bool> HashStore::begin_pass(int pass) {
 Result<void> HashStore::begin(std::uint32_t width, std::uint32_t height) {
   if (width < 1 || height < 1 ||
       std::uint64_t{width} * height > std::numeric_limits<std::uint32_t>::max()) {
-    return fail(ErrorCode::kUsage, "hash store: a screen of {} x {} pixels", width, height);
+    return fail(ErrorCode::kUsage,
+                "hash store: a screen must have 1 to 2^32 - 1 pixels, got {} x {}", width, height);
   }
   if (!clear_) {
     const GlslPiece piece = glsl::hashbuffer_gl_clear_and_count_comp;
@@ -202,8 +203,9 @@ Result<void> HashStore::lay_out(std::uint64_t bands, std::uint64_t cells) {
   while (bands < height_ && ((height_ + bands - 1) / bands) * width_ > most_cells()) ++bands;
   bands = std::min<std::uint64_t>(bands, height_);
   if (((height_ + bands - 1) / bands) * width_ > most_cells()) {
-    return fail(ErrorCode::kLimit, "hash store: a row of {} pixels, a table has {} cells at most",
-                width_, most_cells());
+    return fail(ErrorCode::kLimit,
+                "hash store: a row has {} pixels, but a table has at most {} cells", width_,
+                most_cells());
   }
   bands_.clear();
   bands_.resize(bands);
@@ -407,11 +409,11 @@ Result<bool> HashStore::look_at_layers() {
       band.table.clear();
       if (*deepest > ages) {
         const auto pixel = static_cast<std::uint64_t>(deepest - layers.begin());
-        return fail(ErrorCode::kLimit,
-                    "hash store: pixel ({}, {}) has {} fragments, {} counts {} at most; take the "
-                    "count/scan store",
-                    pixel % width_, band.rows.begin + pixel / width_, *deepest, name_of_words(),
-                    ages);
+        return fail(
+            ErrorCode::kLimit,
+            "hash store: pixel ({}, {}) has {} fragments, but {} counts at most {}; use the "
+            "count/scan store",
+            pixel % width_, band.rows.begin + pixel / width_, *deepest, name_of_words(), ages);
       }
     }
     if (band.offset_kind == OffsetKind::kPlaneFirst && band.pixels * band.deepest <= band.cells) {
@@ -425,7 +427,7 @@ Result<bool> HashStore::look_at_layers() {
         if (*done) return false;
       }
       return fail(ErrorCode::kLimit,
-                  "hash store: lists of {} fragments take more than the {} steps of a thread; take "
+                  "hash store: lists of {} fragments need more than the {} steps of a thread; use "
                   "the count/scan store",
                   band.deepest, most_steps_);
     }

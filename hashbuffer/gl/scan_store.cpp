@@ -89,8 +89,9 @@ Result<void> ScanStore::lay_out(std::uint64_t bands) {
   };
   while (bands < height_ && most_pixels(bands) * 4 > binding_bytes_) ++bands;
   if (most_pixels(bands) * 4 > binding_bytes_) {
-    return fail(ErrorCode::kLimit, "count/scan store: a row of {} pixels, {} fit one binding",
-                width_, binding_bytes_ / 4);
+    return fail(ErrorCode::kLimit,
+                "count/scan store: a row has {} pixels, but one binding holds {}", width_,
+                binding_bytes_ / 4);
   }
   bands_.clear();
   bands_.resize(bands);
@@ -112,7 +113,9 @@ Result<void> ScanStore::lay_out(std::uint64_t bands) {
 Result<void> ScanStore::begin(std::uint32_t width, std::uint32_t height) {
   if (width < 1 || height < 1 ||
       std::uint64_t{width} * height > std::numeric_limits<std::uint32_t>::max()) {
-    return fail(ErrorCode::kUsage, "count/scan store: a screen of {} x {} pixels", width, height);
+    return fail(ErrorCode::kUsage,
+                "count/scan store: a screen must have 1 to 2^32 - 1 pixels, got {} x {}", width,
+                height);
   }
   if (!sort_) {
     const GlslPiece here = glsl::hashbuffer_gl_sort_lists_comp;
@@ -150,8 +153,8 @@ Result<void> ScanStore::make_room(Band& band) {
   if (bytes > binding_bytes_) {
     if (band.rows.end - band.rows.begin <= 1) {
       return fail(ErrorCode::kLimit,
-                  "count/scan store: row {} has {} fragments, {} fit one binding", band.rows.begin,
-                  band.items, binding_bytes_ / item_bytes());
+                  "count/scan store: row {} has {} fragments, but one binding holds {}",
+                  band.rows.begin, band.items, binding_bytes_ / item_bytes());
     }
     too_large_ = true;
     return {};
@@ -247,7 +250,7 @@ Result<bool> ScanStore::end() {
     }
     if (last != band.items) {
       return fail(ErrorCode::kInternal,
-                  "count/scan store: {} fragments were counted, not the same were stored",
+                  "count/scan store: the stored fragments differ from the {} that were counted",
                   band.items);
     }
     bind_for_reading(static_cast<int>(i));

@@ -115,10 +115,11 @@ Result<void> Store::download_band(int band, LayeredDepthImage& image) {
     const auto above = std::upper_bound(begins.begin() + begin, begins.end(), begins[begin] + most);
     const auto end = static_cast<std::uint32_t>(above - begins.begin()) - 1;
     if (end == begin) {
-      return fail(ErrorCode::kLimit,
-                  "OpenGL store: pixel ({}, {}) has {} fragments, {} can be read at once",
-                  (first + begin) % width_, (first + begin) / width_,
-                  begins[begin + 1] - begins[begin], most);
+      return fail(
+          ErrorCode::kLimit,
+          "OpenGL store: pixel ({}, {}) has {} fragments, but at most {} can be read at once",
+          (first + begin) % width_, (first + begin) / width_, begins[begin + 1] - begins[begin],
+          most);
     }
     const std::uint64_t count = begins[end] - begins[begin];
     if (count > 0) {

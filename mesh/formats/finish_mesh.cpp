@@ -256,7 +256,7 @@ void warn_of_dropped_faces(RawMesh& raw, const Losses& losses, std::size_t verti
   if (stats.non_finite != 0) {
     const glm::dvec3 p = raw.soup.positions[losses.non_finite_vertex];
     stats.warnings.push_back(
-        fmt::format("{}: face uses the vertex ({}, {}, {}), which is not finite; {}",
+        fmt::format("{}: face has a vertex at ({}, {}, {}), which is not finite; {}",
                     locate(static_cast<std::uint32_t>(losses.first_non_finite)).place, p.x, p.y,
                     p.z, faces_text(stats.non_finite)));
   }
@@ -301,8 +301,7 @@ Result<MeshFile> finish_mesh(const ReaderInput& input, RawMesh&& raw, const Loca
   stats.non_planar = bent.count;
   if (bent.count != 0) {
     stats.warnings.push_back(fmt::format(
-        "{}: polygon is not flat: {} ({} such); its triangles are one of several ways to "
-        "fill it",
+        "{}: polygon is not flat: {} ({} such); it can be divided into triangles in several ways",
         locate(static_cast<std::uint32_t>(bent.first)).place, bent.bend.text(), bent.count));
   }
   bool identity = true;

@@ -87,7 +87,7 @@ class XmlMesh {
                                std::size_t count) const {
     const auto number = read_number(text);
     if (!number || *number < 0.0 || *number != std::floor(*number)) {
-      return refuse(node, fmt::format("'{}' is no index of a vertex", text.substr(0, 40)));
+      return refuse(node, fmt::format("'{}' is not a vertex index", text.substr(0, 40)));
     }
     if (*number >= static_cast<double>(count)) {
       return refuse(
@@ -151,7 +151,7 @@ Result<TriangleSoup> read_object_mesh(const XmlMesh& file, const pugi::xml_node&
     const char* const axes[] = {"x", "y", "z"};
     for (int i = 0; i < 3; ++i) {
       const auto number = read_number(vertex.attribute(axes[i]).value());
-      if (!number) return file.refuse(vertex, fmt::format("a vertex without a usable {}", axes[i]));
+      if (!number) return file.refuse(vertex, fmt::format("a vertex has no valid {}", axes[i]));
       p[i] = *number;
     }
     mesh.positions.push_back(p);
@@ -178,12 +178,12 @@ Result<glm::dmat4> read_transform(const XmlMesh& file, const pugi::xml_node& nod
     text.remove_prefix(std::min(text.find_first_not_of(kSpace), text.size()));
     const std::size_t space = std::min(text.find_first_of(kSpace), text.size());
     const auto number = read_number(text.substr(0, space));
-    if (!number) return file.refuse(node, "a transform that is not twelve numbers");
+    if (!number) return file.refuse(node, "a transform must have 12 numbers");
     matrix[i / 3][i % 3] = *number;
     text.remove_prefix(space);
   }
   if (text.find_first_not_of(kSpace) != std::string_view::npos) {
-    return file.refuse(node, "a transform that is more than twelve numbers");
+    return file.refuse(node, "a transform must have 12 numbers, got more");
   }
   return matrix;
 }
@@ -319,8 +319,8 @@ class Package {
       return home.file.refuse(item, fmt::format("object '{}' is a component of itself", id));
     }
     if (depth > kMostDepth) {
-      return home.file.refuse(
-          item, fmt::format("components within components, more than {} deep", kMostDepth));
+      return home.file.refuse(item,
+                              fmt::format("components are nested more than {} deep", kMostDepth));
     }
     const glm::dmat4 world = around * *matrix;
     std::array<double, 12> place;
@@ -373,7 +373,7 @@ class Package {
     }
     const std::size_t bytes = positions * sizeof(glm::dvec3) + triangles * sizeof(glm::uvec3);
     if (execution_.memory_limit != 0 && bytes > execution_.memory_limit) {
-      return fail(ErrorCode::kLimit, "{}: the model takes {} bytes, the memory limit is {}",
+      return fail(ErrorCode::kLimit, "{}: the model needs {} bytes, but the memory limit is {}",
                   archive_.path(), bytes, execution_.memory_limit);
     }
     TriangleSoup all;
@@ -385,7 +385,8 @@ class Package {
     }
     for (const glm::dvec3& p : all.positions) {
       if (std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z)) continue;
-      return fail(ErrorCode::kInput, "{}: its transforms lead beyond all numbers", archive_.path());
+      return fail(ErrorCode::kInput, "{}: its transforms give coordinates that are not finite",
+                  archive_.path());
     }
     return all;
   }
@@ -410,7 +411,7 @@ Result<void> read_amf_mesh(const XmlMesh& file, const pugi::xml_node& node, Tria
     const char* const axes[] = {"x", "y", "z"};
     for (int i = 0; i < 3; ++i) {
       const auto number = read_number(child(place, axes[i]).text().get());
-      if (!number) return file.refuse(vertex, fmt::format("a vertex without a usable {}", axes[i]));
+      if (!number) return file.refuse(vertex, fmt::format("a vertex has no valid {}", axes[i]));
       p[i] = *number;
     }
     all.positions.push_back(p);
@@ -436,7 +437,7 @@ Result<TriangleSoup> read_3mf(const std::string& path, const Execution& executio
   if (!archive) return tl::unexpected(archive.error());
   return Package(*std::move(archive), execution).assemble(warnings);
 } catch (const std::bad_alloc&) {
-  return fail(ErrorCode::kLimit, "{}: too large for the memory", path);
+  return fail(ErrorCode::kLimit, "{}: out of memory", path);
 }
 
 Result<TriangleSoup> read_amf(const std::string& path, const Execution& execution,
@@ -472,7 +473,7 @@ Result<TriangleSoup> read_amf(const std::string& path, const Execution& executio
   if (all.triangles.empty()) return fail(ErrorCode::kInput, "{}: no object has a triangle", path);
   return all;
 } catch (const std::bad_alloc&) {
-  return fail(ErrorCode::kLimit, "{}: too large for the memory", path);
+  return fail(ErrorCode::kLimit, "{}: out of memory", path);
 }
 
 #else

@@ -123,8 +123,10 @@ Result<MeshFile> read_mesh(const std::string& path, const MeshReadOptions& optio
     }
     known.format = mesh_format_of(path);
     if (known.format == MeshFormat::kAuto) {
-      return fail(ErrorCode::kInput,
-                  "{}: its name ends in none of .obj, .stl, .ply, .off; name the format", path);
+      return fail(
+          ErrorCode::kInput,
+          "{}: the file name must end in .obj, .stl, .ply or .off, or the format must be given",
+          path);
     }
   }
   if (known.reader == MeshReader::kOpenMesh) {

@@ -128,7 +128,7 @@ Result<void> OffReader::read_prefixes() {
       known = prefix.flag = true;
       break;
     }
-    if (!known) return error(fmt::format("'{}' is no prefix of OFF", word));
+    if (!known) return error(fmt::format("'{}' is not a known prefix of OFF", word));
   }
   p_ += size + 3;
   skip_gap();
@@ -290,7 +290,7 @@ Result<void> OffReader::attempt(const Attempt& attempt) {
   left_over_ = !at_end();
   if (left_over_) {
     if (how_.layout != Layout::kLines) return error(fmt::format("expected the end, {}", found()));
-    mesh_.stats.warnings.push_back(fmt::format("{}:{}: what follows the last face is ignored",
+    mesh_.stats.warnings.push_back(fmt::format("{}:{}: text after the last face is ignored",
                                                input_.name, line_of(input_.text, p_)));
   }
   mesh_.stats.format = "off";

@@ -97,7 +97,7 @@ Result<void> PlyReader::read_element_line(std::string_view line) {
   const auto [stop, code] =
       std::from_chars(count.data(), count.data() + count.size(), element.count);
   if (element.name.empty() || code != std::errc() || stop != count.data() + count.size()) {
-    return header_error(fmt::format("'{}' is no element count", count.substr(0, 40)));
+    return header_error(fmt::format("'{}' is not an element count", count.substr(0, 40)));
   }
   elements_.push_back(std::move(element));
   return {};

@@ -314,7 +314,7 @@ void AsciiReader::parse(const char* p, const char* end, Chunk& chunk) const {
     } else if (!in_loop || tells_of_looks(text)) {
       p = parse_strange(p, chunk);
     } else {
-      return broken(p, describe(p, end_) + " is no word of a loop of an ascii STL file");
+      return broken(p, describe(p, end_) + " is not a word of a loop in an ASCII STL file");
     }
   }
   if (in_loop) broken(p, "the file ends inside a facet");
@@ -403,8 +403,9 @@ Result<MeshFile> AsciiReader::read() {
   }
   if (strange_lines_ != 0) {
     const char* const first = begin_ + first_strange_;
-    const std::string what = fmt::format("{}:{}: {} is no word of an ascii STL file", input_.name,
-                                         line_of(input_.text, first), describe(first, end_));
+    const std::string what =
+        fmt::format("{}:{}: {} is not a word of an ASCII STL file", input_.name,
+                    line_of(input_.text, first), describe(first, end_));
     if (mesh_.soup.positions.empty()) return fail(ErrorCode::kInput, "{}", what);
     mesh_.stats.warnings.push_back(fmt::format("{}; {} such line{} skipped", what, strange_lines_,
                                                strange_lines_ == 1 ? " was" : "s were"));

@@ -111,7 +111,7 @@ std::string mesh_to_bytes(const TriangleSoup& mesh, MeshFormat format) {
 Result<void> write_mesh(const std::string& path, const TriangleSoup& mesh, MeshFormat format) {
   if (format == MeshFormat::kAuto) format = mesh_format_of(path);
   if (format == MeshFormat::kAuto) {
-    return fail(ErrorCode::kUsage, "{}: name a mesh format: obj, stl, ply or off", path);
+    return fail(ErrorCode::kUsage, "{}: the format must be obj, stl, ply or off", path);
   }
   if (format == MeshFormat::kStl &&
       mesh.triangles.size() > std::numeric_limits<std::uint32_t>::max()) {

@@ -87,7 +87,7 @@ Result<std::string> ZipArchive::read(const std::string& name, const Execution& e
           : zip_fopen_index(archive, static_cast<zip_uint64_t>(at - names_.begin()), 0));
   if (!file) {
     return fail(ErrorCode::kInput, "{}: '{}' in the archive: {}", path_, name,
-                at == names_.end() ? "it is not there" : zip_strerror(archive));
+                at == names_.end() ? "it is missing" : zip_strerror(archive));
   }
   const std::uint64_t most = execution.memory_limit == 0
                                  ? kMostBytes

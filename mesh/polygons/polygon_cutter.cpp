@@ -86,7 +86,7 @@ bool quad_is_fan(const glm::dvec2 (&p)[4]) {
 bool Bend::large() const { return height > kLarge * size; }
 
 std::string Bend::text() const {
-  return fmt::format("its corners lie {:.3g} out of one plane, and it is {:.3g} long", height,
+  return fmt::format("its corners deviate {:.3g} from a plane, and it is {:.3g} long", height,
                      size);
 }
 

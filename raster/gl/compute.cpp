@@ -85,7 +85,7 @@ Result<void> ComputeRasterizer::set_mesh(const LatticeMesh& mesh) {
   const bool shared = mesh.vertices.size() * kVertexBytes <= binding_bytes_;
   const std::size_t count = mesh.triangles.size();
   if (count > std::numeric_limits<std::int32_t>::max()) {
-    return fail(ErrorCode::kLimit, "{} triangles: 2^31 - 1 can be told apart", count);
+    return fail(ErrorCode::kLimit, "the mesh has {} triangles; the limit is 2^31 - 1", count);
   }
   if (shared) {
     auto uploaded = vertices_.assign(std::span<const glm::ivec3>(mesh.vertices));
@@ -172,7 +172,7 @@ Result<void> ComputeRasterizer::bin(Part& part) {
       blocks = binding_bytes_ / kBlockBytes;
       if (counted[2] > blocks) {
         return fail(ErrorCode::kLimit,
-                    "{} blocks of 32 x 32 pixels of large triangles, of which one binding of {} "
+                    "large triangles cover {} blocks of 32 x 32 pixels, but one binding of {} "
                     "holds {}: draw fewer rows at once",
                     counted[2], binding_bytes_, blocks);
       }

@@ -94,7 +94,8 @@ Result<void> HardwareRasterizer::set_mesh(const LatticeMesh& mesh) {
       std::max(mesh.vertices.size() * sizeof(glm::ivec3), mesh.triangles.size_bytes());
   if (largest > limits_.storage_block_bytes || mesh.triangles.size() > 0x7fffffffu) {
     return fail(ErrorCode::kLimit,
-                "hardware rasterizer: a mesh of {} triangles takes {} bytes, a binding {} at most",
+                "hardware rasterizer: a mesh of {} triangles needs {} bytes, but a binding holds "
+                "at most {}",
                 mesh.triangles.size(), largest, limits_.storage_block_bytes);
   }
   auto vertices = Buffer::of(std::span<const glm::ivec3>(mesh.vertices));

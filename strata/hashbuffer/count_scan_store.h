@@ -39,7 +39,9 @@ class CountScanStore {
   /// ErrorCode::kLimit if memory does not allow it.
   [[nodiscard]] static Result<CountScanStore> create(int width, int height) {
     if (width < 1 || height < 1) {
-      return fail(ErrorCode::kUsage, "count/scan store: a screen of {} x {} pixels", width, height);
+      return fail(ErrorCode::kUsage,
+                  "count/scan store: width and height must be at least 1, got {} x {}", width,
+                  height);
     }
     try {
       CountScanStore store(width, height);
@@ -142,7 +144,7 @@ class CountScanStore {
     if (ends_.back() != fragments || !std::is_sorted(ends_.begin(), ends_.end())) {
       clear();
       return fail(ErrorCode::kInternal,
-                  "count/scan store: the generator gave other fragments the second time");
+                  "count/scan store: the generator gave different fragments the second time");
     }
     sort(execution);
     if (execution.stop.stop_requested()) {

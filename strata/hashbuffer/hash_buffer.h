@@ -180,7 +180,8 @@ class HashBuffer
                                                  const HashBufferOptions& options = {},
                                                  Opacity opacity = {}) {
     if (width < 1 || height < 1) {
-      return fail(ErrorCode::kUsage, "hash buffer: a screen of {} x {} pixels", width, height);
+      return fail(ErrorCode::kUsage,
+                  "hash buffer: width and height must be at least 1, got {} x {}", width, height);
     }
     HashBuffer buffer(width, height, options, std::move(opacity));
     if (auto resized = buffer.resize(options.cells); !resized) {
@@ -638,8 +639,8 @@ class HashBuffer
   [[nodiscard]] Result<void> check_ages(const FragmentCount& count) const {
     if (count.deepest <= age_wanted()) return {};
     return fail(ErrorCode::kLimit,
-                "hash buffer: pixel ({}, {}) has {} fragments, {} counts {} at most; {}", count.x,
-                count.y, count.deepest, Record::kName, age_wanted(),
+                "hash buffer: pixel ({}, {}) has {} fragments, but {} counts at most {}; {}",
+                count.x, count.y, count.deepest, Record::kName, age_wanted(),
                 age_wanted() < Record::kAgeMax ? "raise the option age_limit" : Record::kDeeper);
   }
   [[nodiscard]] std::uint64_t allowed(std::uint64_t cells, const Attempt& attempt) const {

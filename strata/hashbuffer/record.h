@@ -121,20 +121,19 @@ struct BasicRecord {
 /// and both stay.
 struct Record32 : BasicRecord<std::uint32_t, 8, 0> {
   static constexpr std::string_view kName = "Record32 [age:8|nearness:24]";
-  static constexpr std::string_view kDeeper = "take Record64Deep [age:10|nearness:24|payload:30]";
+  static constexpr std::string_view kDeeper = "use Record64Deep [age:10|nearness:24|payload:30]";
 };
 
 /// [age:8 | nearness:24 | payload:32]: at most 255 layers a pixel.
 struct Record64 : BasicRecord<std::uint64_t, 8, 32> {
   static constexpr std::string_view kName = "Record64 [age:8|nearness:24|payload:32]";
-  static constexpr std::string_view kDeeper = "take Record64Deep [age:10|nearness:24|payload:30]";
+  static constexpr std::string_view kDeeper = "use Record64Deep [age:10|nearness:24|payload:30]";
 };
 
 /// [age:10 | nearness:24 | payload:30]: at most 1023 layers a pixel; triangles below 2^29.
 struct Record64Deep : BasicRecord<std::uint64_t, 10, 30> {
   static constexpr std::string_view kName = "Record64Deep [age:10|nearness:24|payload:30]";
-  static constexpr std::string_view kDeeper =
-      "take CountScanStore, whose lists may be of any length";
+  static constexpr std::string_view kDeeper = "use CountScanStore, whose lists may have any length";
 };
 
 /// What a hash buffer asks of a record policy.

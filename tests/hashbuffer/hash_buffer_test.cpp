@@ -265,9 +265,10 @@ TEST(HashBuffer, E17TooManyLayersNameTheSplitThatHoldsThem) {
   const auto report = build(shallow, Submission(fragments));
   ASSERT_FALSE(report);
   EXPECT_EQ(report.error().code, ErrorCode::kLimit);
-  EXPECT_EQ(report.error().message,
-            "hash buffer: pixel (3, 1) has 590 fragments, Record64 [age:8|nearness:24|payload:32] "
-            "counts 255 at most; take Record64Deep [age:10|nearness:24|payload:30]");
+  EXPECT_EQ(
+      report.error().message,
+      "hash buffer: pixel (3, 1) has 590 fragments, but Record64 [age:8|nearness:24|payload:32] "
+      "counts at most 255; use Record64Deep [age:10|nearness:24|payload:30]");
   auto deep = make<Record64Deep>(5, 5);
   ASSERT_TRUE(build(deep, Submission(fragments)));
   EXPECT_EQ(lists(deep), sort_everything<Record64Deep>(5, 5, fragments));

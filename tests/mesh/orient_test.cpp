@@ -87,7 +87,7 @@ TEST(Orient, APartInsideOutBesideAnotherIsTurned) {
     EXPECT_EQ(found.parts, 2u);
     EXPECT_TRUE(found.closed);
     EXPECT_EQ(sentences(found, true),
-              std::vector<std::string>{"1 of 2 parts were inside out and are turned"});
+              std::vector<std::string>{"1 of 2 parts were inside out and were reversed"});
   }
 }
 

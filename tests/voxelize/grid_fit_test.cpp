@@ -183,7 +183,8 @@ TEST(GridFit, SizesOutOfRangeNameTheNumber) {
   expect_failure(fit_grid(unit, voxel_size(1e-9, 1, 1)), ErrorCode::kLimit, "1000000000");
   expect_failure(fit_grid(unit, voxel_size(NAN, 1, 1)), ErrorCode::kUsage, "nan");
   expect_failure(fit_grid(unit, voxel_size(INFINITY, 1, 1)), ErrorCode::kUsage, "inf");
-  expect_failure(fit_grid(unit, dims(1, 0, 1)), ErrorCode::kUsage, "0 voxels along y");
+  expect_failure(fit_grid(unit, dims(1, 0, 1)), ErrorCode::kUsage,
+                 "at least 1 voxel along y, got 0");
   expect_failure(fit_grid(unit, dims(1, 1, 65537)), ErrorCode::kLimit, "65537");
   GridRequest padded = resolution(65536);
   padded.padding = 1;
@@ -197,10 +198,10 @@ TEST(GridFit, SizesOutOfRangeNameTheNumber) {
 
 TEST(GridFit, ExactlyOneSizeIsNeeded) {
   const Bounds unit = box({0, 0, 0}, {1, 1, 1});
-  expect_failure(fit_grid(unit, {}), ErrorCode::kUsage, "0 of");
+  expect_failure(fit_grid(unit, {}), ErrorCode::kUsage, "must be given, got 0");
   GridRequest both = resolution(4);
   both.voxel_size = glm::dvec3(1);
-  expect_failure(fit_grid(unit, both), ErrorCode::kUsage, "2 of");
+  expect_failure(fit_grid(unit, both), ErrorCode::kUsage, "must be given, got 2");
 }
 
 TEST(GridFit, RequestsThatContradictThemselvesAreRefused) {

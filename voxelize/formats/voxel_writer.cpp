@@ -81,7 +81,8 @@ Result<VoxelFormat> voxel_format_for(const std::string& path, const std::string&
     for (const VoxelFormat& candidate : voxel_formats()) {
       if (candidate.name == lower_case(format)) return checked(candidate);
     }
-    return fail(ErrorCode::kUsage, "no voxel format {}; there are {}", format, format_names());
+    return fail(ErrorCode::kUsage, "unknown voxel format '{}'; it must be one of {}", format,
+                format_names());
   }
   if (path == "-") {
     return fail(ErrorCode::kUsage, "standard output needs a format: {}", format_names());
@@ -101,7 +102,7 @@ Result<VoxelFormat> voxel_format_for(const std::string& path, const std::string&
   }
   if (slash && plain_folder != nullptr) return checked(*plain_folder);
   return fail(ErrorCode::kUsage,
-              "{}: its extension names no voxel format; there are {} (a folder name ends with /)",
+              "{}: the extension must be that of a voxel format: {} (a folder's name ends with /)",
               path, format_names());
 }
 
@@ -114,10 +115,11 @@ Result<void> check_ids(const VoxelFormat& format, std::uint32_t largest) {
     names += candidate.name;
   }
   if (format.ids == 0) {
-    return fail(ErrorCode::kUsage, "format {} holds no ids; {} do", format.name, names);
+    return fail(ErrorCode::kUsage, "format {} cannot store ids; {} can", format.name, names);
   }
-  return fail(ErrorCode::kUsage, "format {} holds ids up to {}, here they reach {}; {} hold them",
-              format.name, format.ids, largest, names);
+  return fail(ErrorCode::kUsage,
+              "format {} stores ids up to {}, but they reach {}; {} can store them", format.name,
+              format.ids, largest, names);
 }
 
 Result<std::unique_ptr<VoxelWriter>> open_voxel_writer(const std::string& path,
@@ -132,15 +134,15 @@ Result<std::unique_ptr<VoxelWriter>> open_voxel_writer(const std::string& path,
   }
   const bool fog = options.fog != 0;
   if ((fog || options.mask) && chosen->name != "vdb") {
-    return fail(ErrorCode::kUsage, "{}: a {} is for .vdb, the format is {}", path,
+    return fail(ErrorCode::kUsage, "{}: a {} needs format vdb, got {}", path,
                 fog ? "fog volume" : "mask", chosen->name);
   }
   if (int{options.ids != 0} + int{fog} + int{options.mask} > 1) {
-    return fail(ErrorCode::kUsage, "{}: a {} holds no {}", path, fog ? "fog volume" : "mask",
+    return fail(ErrorCode::kUsage, "{}: a {} cannot store {}", path, fog ? "fog volume" : "mask",
                 options.ids != 0 ? "ids" : "numbers");
   }
   if (options.colours.size() > chosen->colours) {
-    return fail(ErrorCode::kUsage, "{}: {} colours, the format {} holds {}", path,
+    return fail(ErrorCode::kUsage, "{}: {} colours; format {} stores {}", path,
                 options.colours.size(), chosen->name, chosen->colours);
   }
   try {

@@ -125,8 +125,8 @@ class BinvoxWriter final : public SlabWriter {
 VoxelWriterResult open_binvox_writer(const std::string& path, const VoxelGrid& grid) {
   const glm::dvec3 size = grid.voxel_size;
   if (size.x != size.y || size.y != size.z) {
-    return fail(ErrorCode::kUsage, "{}: .binvox holds cubic voxels only, these are {} x {} x {}",
-                path, size.x, size.y, size.z);
+    return fail(ErrorCode::kUsage, "{}: .binvox needs cubic voxels, these are {} x {} x {}", path,
+                size.x, size.y, size.z);
   }
   Result<BlockOutput> output = BlockOutput::create(path);
   if (!output) return tl::unexpected(output.error());

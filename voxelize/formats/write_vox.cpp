@@ -113,7 +113,7 @@ class VoxWriter final : public SlabWriter {
       }
     }
     if (total_ * 4 > kLargestFile) {
-      return fail(ErrorCode::kLimit, "{}: {} or more solid voxels, .vox holds {} at most", path(),
+      return fail(ErrorCode::kLimit, "{}: {} or more solid voxels; .vox holds at most {}", path(),
                   total_, kLargestFile / 4);
     }
     return {};
@@ -132,7 +132,7 @@ class VoxWriter final : public SlabWriter {
     const std::uint64_t children =
         kept.size() * kModelHeads + total_ * 4 + graph.size() + colours.size();
     if (children > kLargestFile) {
-      return fail(ErrorCode::kLimit, "{}: {} bytes, a .vox file holds {}", path(), children,
+      return fail(ErrorCode::kLimit, "{}: {} bytes; a .vox file holds at most {}", path(), children,
                   kLargestFile);
     }
     Bytes head;
@@ -248,7 +248,7 @@ VoxelWriterResult open_vox_writer(const std::string& path, const VoxelGrid& grid
                                   const VoxelWriterOptions& options) {
   for (int axis = 0; axis < 3; ++axis) {
     if (grid.dims[axis] > kLargestSide) {
-      return fail(ErrorCode::kUsage, "{}: {} voxels along {}, a .vox scene holds {}", path,
+      return fail(ErrorCode::kUsage, "{}: {} voxels along {}; a .vox scene holds at most {}", path,
                   grid.dims[axis], "xyz"[axis], kLargestSide);
     }
   }

@@ -64,7 +64,8 @@ class WallSearch {
   }
 
   Result<LostWalls> run() {
-    if (sides_ == nullptr) return fail(ErrorCode::kLimit, "no memory to look for thin walls");
+    if (sides_ == nullptr)
+      return fail(ErrorCode::kLimit, "out of memory while looking for thin walls");
     mark_sides();
     if (stopped()) return fail(ErrorCode::kCancelled, "stopped");
     if (!keep_near()) return LostWalls{};

@@ -99,7 +99,7 @@ void Panels::side(Viewer& viewer, const glm::ivec2& window) {
                    ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoMove |
                    ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoBringToFrontOnFocus);
   if (ImGui::CollapsingHeader("Camera", ImGuiTreeNodeFlags_DefaultOpen)) camera(viewer);
-  if (ImGui::CollapsingHeader("Look", ImGuiTreeNodeFlags_DefaultOpen)) look(viewer);
+  if (ImGui::CollapsingHeader("Appearance", ImGuiTreeNodeFlags_DefaultOpen)) look(viewer);
   if (ImGui::CollapsingHeader("Section", ImGuiTreeNodeFlags_DefaultOpen)) section(viewer);
   if (ImGui::CollapsingHeader("Picked", ImGuiTreeNodeFlags_DefaultOpen)) picked(viewer);
   // In a low window the solids need the room.
@@ -151,7 +151,7 @@ void Panels::look(Viewer& viewer) {
     looks.ghosts = !looks.ghosts;
     viewer.set_looks(looks);
   }
-  hint("what is subtracted; g");
+  hint("show subtracted solids; g");
   ImGui::SameLine();
   if (toggle("Axes", viewer.show_axes, third)) viewer.show_axes = !viewer.show_axes;
   hint("ctrl+2");
@@ -161,7 +161,7 @@ void Panels::look(Viewer& viewer) {
   };
   heat("Shaded", Heat::kOff, "the scene's colours");
   ImGui::SameLine();
-  heat("Thickness", Heat::kThickness, "of the first wall, along the ray; t");
+  heat("Thickness", Heat::kThickness, "thickness of the first wall along the ray; t");
   ImGui::SameLine();
   heat("Depth", Heat::kDepth, "depth complexity: crossings of all solids; d");
   const csg::ColourScheme* scheme = viewer.picture_options().scheme;
@@ -207,7 +207,7 @@ void Panels::section(Viewer& viewer) {
 }
 
 void Panels::picked(Viewer& viewer) {
-  if (viewer.picking()) return faint("looking ...");
+  if (viewer.picking()) return faint("picking ...");
   const auto& picked = viewer.picked();
   if (!picked) return faint("click on a face");
   if (!picked->hit) return faint("nothing there");
@@ -289,8 +289,8 @@ void Panels::statistics(const Viewer& viewer) {
   row("panels", fmt::format("{:.1f} ms", s.present_ms));
   row("crossings", fmt::format("{}", s.report.fragments));
   if (s.report.covered > 0) {
-    row("  a pixel", fmt::format("{:.2f}", static_cast<double>(s.report.fragments) /
-                                               static_cast<double>(s.report.covered)));
+    row("  per pixel", fmt::format("{:.2f}", static_cast<double>(s.report.fragments) /
+                                                 static_cast<double>(s.report.covered)));
   }
   if (s.longest_list > 0) row("longest list", fmt::format("{}", s.longest_list));
   row("covered", fmt::format("{} pixels", s.report.covered));
@@ -315,7 +315,7 @@ void Panels::status(const Viewer& viewer, const glm::ivec2& window) {
   std::string left = files.empty() ? std::string() : files.front();
   if (files.size() > 1) left += fmt::format(" and {} more", files.size() - 1);
   const csg::Camera& c = viewer.camera();
-  left += fmt::format("     turned {:.0f}, {:.0f}, {:.0f}   distance {:.4g}", c.rotation.x,
+  left += fmt::format("     rotation {:.0f}, {:.0f}, {:.0f}   distance {:.4g}", c.rotation.x,
                       c.rotation.y, c.rotation.z, c.distance);
   text(left);
   const bool whole = viewer.frame() != nullptr && viewer.frame()->divisor == 1;
@@ -369,7 +369,7 @@ void Panels::messages(Viewer& viewer, const Area& area) {
   if (lines.size() > kMostLines) {
     const std::size_t more = lines.size() - (kMostLines - 1);
     lines.resize(kMostLines - 1);
-    lines.push_back(fmt::format("and {} like these", apps::counted(more, "warning")));
+    lines.push_back(fmt::format("and {} more", apps::counted(more, "warning")));
   }
   const float wrap = std::max(80 * scale_, width - 48 * scale_);
   if (wrong || (viewer.show_panels && !lines.empty())) {
@@ -380,7 +380,7 @@ void Panels::messages(Viewer& viewer, const Area& area) {
     ImGui::PushTextWrapPos(wrap);
     if (wrong) {
       text(trouble);
-      if (viewer.model() != nullptr) faint("What is shown is from before.");
+      if (viewer.model() != nullptr) faint("The window shows the version before.");
     } else {
       for (const std::string& line : lines) text(line);
       if (ImGui::SmallButton("Hide warnings")) hidden_warnings_ = viewer.loads();
@@ -394,8 +394,8 @@ void Panels::messages(Viewer& viewer, const Area& area) {
     ImGui::SetNextWindowPos(at(width / 2, height / 2), 0, {0.5f, 0.5f});
     ImGui::Begin("empty", nullptr, kBox | ImGuiWindowFlags_NoInputs);
     text(viewer.model() != nullptr && viewer.model()->box.empty()
-             ? "There is nothing to see in this scene."
-             : "Nothing is in view. f shows all.");
+             ? "This scene is empty."
+             : "Nothing is in view. Press f to show everything.");
     ImGui::End();
   }
   if (viewer.loading() && viewer.load_seconds() > 0.25) {

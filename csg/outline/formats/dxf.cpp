@@ -98,8 +98,8 @@ class Drawing {
       if (auto done = draw(entity, {}, 0); !done) return tl::unexpected(done.error());
     }
     if (!found) {
-      return fail(ErrorCode::kInput, "{}: nothing is in a layer '{}', there {}", name_,
-                  options_.layer, layers());
+      return fail(ErrorCode::kInput, "{}: layer '{}' is empty; there {}", name_, options_.layer,
+                  layers());
     }
     // OpenSCAD's grid, in units of the scene, takes in what lies up to 1.5 steps away.
     constexpr double kOpenScad = 1.5e-5;
@@ -405,12 +405,12 @@ class Drawing {
     const std::string_view block_name = values.text(2);
     const auto block = file_.blocks.find(block_name);
     if (block == file_.blocks.end()) {
-      return fail(ErrorCode::kInput, "{}:{}: INSERT of block '{}', which the file does not have",
+      return fail(ErrorCode::kInput, "{}:{}: INSERT refers to block '{}', which is not in the file",
                   name_, entity.line, std::string(block_name));
     }
     if (depth >= kDeepest) {
-      return fail(ErrorCode::kInput, "{}:{}: blocks are nested {} deep; one may hold itself", name_,
-                  entity.line, depth);
+      return fail(ErrorCode::kInput, "{}:{}: blocks are nested {} deep; one may contain itself",
+                  name_, entity.line, depth);
     }
     const double angle = values.number(50, 0);
     const glm::dvec2 scale(values.number(41, 1), values.number(42, 1)), at = values.point(10);

@@ -210,7 +210,7 @@ class Reader {
       return tl::unexpected(done.error());
     }
     if (!found_ && !options_.layer.empty()) {
-      return fail(ErrorCode::kInput, "{}: no layer and no id is '{}'", name_, options_.layer);
+      return fail(ErrorCode::kInput, "{}: there is no layer or id '{}'", name_, options_.layer);
     }
     Outline outline = unite(shapes_, &job_);
     if (job_.ended()) return tl::unexpected(ended());

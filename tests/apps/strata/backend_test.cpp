@@ -309,7 +309,7 @@ TEST(Backend, IsAutoCpuOrGl) {
   const RunResult wrong =
       place.run({"voxelize", kKnot, "-r", "8", "--checksum", "--backend", "cuda"});
   EXPECT_EQ(wrong.exit_code, 2);
-  EXPECT_NE(wrong.err.find("--backend is auto, cpu or gl, not 'cuda'"), std::string::npos)
+  EXPECT_NE(wrong.err.find("--backend must be auto, cpu or gl, got 'cuda'"), std::string::npos)
       << wrong.err;
 }
 

@@ -255,7 +255,7 @@ TEST_F(Faults, ATimeLimitEndsTheCommand) {
   ASSERT_EQ(mkfifo(place.path("pipe.csg").c_str(), 0600), 0);
   before = place.names();
   fails({"csg", "pipe.csg", "-o", "a.png", "--time-limit", "0.2"}, 6,
-        "not done within 0.2 s (--time-limit); no output was written");
+        "not finished within 0.2 s (--time-limit); no output was written");
   fails({"info", "ball.obj", "--time-limit", "0"}, 2,
         "--time-limit must be seconds above 0, got 0");
   const RunResult run = place.run({"info", "ball.obj", "--time-limit", "1e300"});

@@ -136,7 +136,8 @@ TEST_F(Files, TheReportOfInfoIsHeldAgainstScenesToo) {
   EXPECT_EQ(run.exit_code, 2) << run.err;
   run = place.run({"info", "broken.csg", "--json=part.stl"});
   EXPECT_EQ(run.exit_code, 3) << run.err;
-  EXPECT_NE(run.err.find("--json part.stl: the file is kept"), std::string::npos) << run.err;
+  EXPECT_NE(run.err.find("--json part.stl: the file is not overwritten"), std::string::npos)
+      << run.err;
   EXPECT_EQ(before, contents());
   EXPECT_EQ(place.run({"info", "broken.csg", "--json=new.json"}).exit_code, 3);
   EXPECT_NE(place.read("new.json").find("\"files\": []"), std::string::npos);

@@ -127,10 +127,11 @@ TEST_F(Usage, UnknownWordsAreNamed) {
 }
 
 TEST_F(Usage, ExactlyOneSizeIsNeeded) {
-  refuses({"voxelize", "box.obj", "--stats"}, "none of -r");
-  refuses({"voxelize", "box.obj", "--stats", "-r", "4", "--voxel-size", "1"}, "two of -r");
+  refuses({"voxelize", "box.obj", "--stats"}, "must be given, got none");
+  refuses({"voxelize", "box.obj", "--stats", "-r", "4", "--voxel-size", "1"},
+          "must be given, got two");
   refuses({"voxelize", "box.obj", "--stats", "-r", "4", "--voxel-size", "1", "--grid", "1,1,1"},
-          "all of -r");
+          "must be given, got all");
 }
 
 TEST_F(Usage, NumbersThatAreNoneAreNamed) {
@@ -148,19 +149,19 @@ TEST_F(Usage, NumbersThatAreNoneAreNamed) {
 }
 
 TEST_F(Usage, SizesOutOfRangeAreNamed) {
-  refuses({"voxelize", "box.obj", "--stats", "-r", "0"}, "resolution of 0");
+  refuses({"voxelize", "box.obj", "--stats", "-r", "0"}, "must be at least 1 voxel, got 0");
   refuses({"voxelize", "box.obj", "--stats", "-r", "-5"}, "-5");
   refuses({"voxelize", "box.obj", "--stats", "--voxel-size", "0"}, "0");
   refuses({"voxelize", "box.obj", "--stats", "--voxel-size", "-0.5"}, "-0.5");
-  refuses({"voxelize", "box.obj", "--stats", "--grid", "4,0,4"}, "0 voxels along y");
+  refuses({"voxelize", "box.obj", "--stats", "--grid", "4,0,4"}, "at least 1 voxel along y, got 0");
   refuses({"voxelize", "box.obj", "--stats", "-r", "4", "--padding", "-1"}, "-1");
   refuses({"voxelize", "box.obj", "--stats", "-r", "4", "--bounds", "0,0,0,1,-1,1"}, "-1");
 }
 
 TEST_F(Usage, OptionsThatWouldHaveNoEffectAreRefused) {
-  refuses({"voxelize", "box.obj", "-r", "4", "--fog", "-o", "a.npy"}, "--fog is for .vdb");
+  refuses({"voxelize", "box.obj", "-r", "4", "--fog", "-o", "a.npy"}, "--fog needs a .vdb file");
   refuses({"voxelize", "box.obj", "-r", "4", "--fog", "-o", "a.x", "--format", "nrrd"},
-          "format nrrd holds no fog");
+          "format nrrd cannot store a fog");
   refuses({"voxelize", "box.obj", "-r", "4", "--fog", "--stats"}, "--fog needs -o");
   refuses({"voxelize", "box.obj", "-r", "4", "--fog", "--surface=6", "--ids", "-o", "a.vdb"},
           "--ids");
@@ -168,12 +169,13 @@ TEST_F(Usage, OptionsThatWouldHaveNoEffectAreRefused) {
   refuses({"voxelize", "box.obj", "-r", "4", "--fog=0", "-o", "a.vdb"}, "1 to 16, got 0");
   refuses({"voxelize", "box.obj", "-r", "4", "--fog=17", "-o", "a.vdb"}, "1 to 16, got 17");
   refuses({"voxelize", "box.obj", "-r", "4", "--fog=x", "-o", "a.vdb"}, "'x'");
-  refuses({"voxelize", "box.obj", "-r", "4", "--mask", "-o", "a.npy"}, "--mask is for .vdb");
-  refuses({"voxelize", "box.obj", "-r", "4", "--mask", "--ids", "-o", "a.vdb"}, "--mask has none");
+  refuses({"voxelize", "box.obj", "-r", "4", "--mask", "-o", "a.npy"}, "--mask needs a .vdb file");
+  refuses({"voxelize", "box.obj", "-r", "4", "--mask", "--ids", "-o", "a.vdb"},
+          "--ids cannot be combined with --mask");
   refuses({"voxelize", "box.obj", "-r", "4", "--mask", "--fog", "-o", "a.vdb"}, "--mask");
   refuses({"voxelize", "box.obj", "-r", "4", "--mask", "--stats"}, "--mask needs -o");
   refuses({"voxelize", "box.obj", "-r", "4", "--name", "a", "-o", "a.npy"},
-          "format npy holds no name");
+          "format npy cannot store a name");
   refuses({"voxelize", "box.obj", "-r", "4", "--name", "a", "--stats"}, "--name needs -o");
   refuses({"voxelize", "box.obj", "-r", "4", "--name",
            "a\x1e"
@@ -181,7 +183,7 @@ TEST_F(Usage, OptionsThatWouldHaveNoEffectAreRefused) {
            "-o", "a.vdb"},
           "control");
   refuses({"voxelize", "box.obj", "-r", "4", "--stats", "--surface", "--backend", "gl"},
-          "--surface alone has none");
+          "--surface alone, which needs no depth lists");
   for (const char* backend : {"cpu", "auto"}) {
     const RunResult run = place.run(
         {"voxelize", "box.obj", "-r", "4", "--checksum", "--surface", "--backend", backend});
@@ -191,8 +193,8 @@ TEST_F(Usage, OptionsThatWouldHaveNoEffectAreRefused) {
 
 TEST_F(Usage, SomethingMustComeOut) {
   refuses({"voxelize", "box.obj", "-r", "4"}, "-o FILE");
-  refuses({"voxelize", "-r", "4", "--stats"}, "no mesh file");
-  refuses({"info"}, "no mesh file");
+  refuses({"voxelize", "-r", "4", "--stats"}, "no input file is given");
+  refuses({"info"}, "no input file is given");
   refuses({"voxelize", "box.obj", "-r", "4", "-o", "-"}, "format");
   refuses({"voxelize", "box.obj", "-r", "4", "-o", "-", "--format", "png"}, "folder");
 }

@@ -238,7 +238,7 @@ TEST(Verify, NamesTheSolidThatCgalCannotTake) {
   const auto found = verify(tree, tree, coarse());
   ASSERT_FALSE(found.has_value());
   EXPECT_EQ(found.error().code, ErrorCode::kGeometry);
-  EXPECT_EQ(found.error().message, "box at scene.csg:3:1: CGAL cannot take it: it is open");
+  EXPECT_EQ(found.error().message, "box at scene.csg:3:1: CGAL cannot process it: it is open");
 }
 
 TEST(Verify, ScenesOfTheBenchmarks) {

@@ -101,7 +101,7 @@ TEST_F(Voxelize, PartsAndTrianglesThatAreInsideOutAreTurnedAndCounted) {
   EXPECT_EQ(found["input"]["files"][0]["turned_around"], false);
   EXPECT_EQ(found["input"]["volume"], 2.0);
   EXPECT_EQ(codes(found), std::vector<std::string>{"inverted"});
-  EXPECT_NE(last_error.find("part.stl: 1 of 2 parts were inside out and are turned"),
+  EXPECT_NE(last_error.find("part.stl: 1 of 2 parts were inside out and were reversed"),
             std::string::npos)
       << last_error;
   EXPECT_EQ(report({"part.stl", "-r", "30", "--keep-orientation"})["voxels"]["solid"], 1000);
@@ -119,7 +119,7 @@ TEST_F(Voxelize, PartsAndTrianglesThatAreInsideOutAreTurnedAndCounted) {
   EXPECT_EQ(found["input"]["closed"], true);
   EXPECT_EQ(found["input"]["files"][0]["turned_triangles"], 427);
   report({"turned.obj", "-r", "64"});
-  EXPECT_NE(last_error.find("427 triangles turned"), std::string::npos) << last_error;
+  EXPECT_NE(last_error.find("427 triangles faced against"), std::string::npos) << last_error;
 
   reverse_orientation(both);
   append(both, left);
@@ -226,7 +226,7 @@ TEST_F(Voxelize, APlateThinnerThanAVoxelIsReportedAndItsSurfaceHeld) {
   EXPECT_EQ(codes(solid), std::vector<std::string>{"thin"});
   EXPECT_NE(last_error.find("1 wall thinner than a voxel fell between voxel centres; it is 0.1 "
                             "voxels thick along z, from (0, 0, 0) to (128, 128, 0.1); the solid "
-                            "holds 0 voxels; --surface holds all of it"),
+                            "holds 0 voxels; --surface keeps all of it"),
             std::string::npos)
       << last_error;
   EXPECT_EQ(solid["lost_walls"]["count"], 1);

@@ -55,17 +55,18 @@ TEST(Script, ReadsCommandsWithTheirLines) {
 }
 
 TEST(Script, MistakesNameFileAndLine) {
-  EXPECT_EQ(error_of("wait\norbitt 1 2\n"), "drive.txt:2: no such command: 'orbitt'");
-  EXPECT_EQ(error_of("orbit 1\n"), "drive.txt:1: write orbit DX DY");
-  EXPECT_EQ(error_of("orbit 1 x\n"), "drive.txt:1: 'x' is not a number; write orbit DX DY");
-  EXPECT_EQ(error_of("orbit 1 nan\n"), "drive.txt:1: 'nan' is not a number; write orbit DX DY");
+  EXPECT_EQ(error_of("wait\norbitt 1 2\n"), "drive.txt:2: unknown command 'orbitt'");
+  EXPECT_EQ(error_of("orbit 1\n"), "drive.txt:1: usage: orbit DX DY");
+  EXPECT_EQ(error_of("orbit 1 x\n"), "drive.txt:1: 'x' is not a number; usage: orbit DX DY");
+  EXPECT_EQ(error_of("orbit 1 nan\n"), "drive.txt:1: 'nan' is not a number; usage: orbit DX DY");
   EXPECT_EQ(error_of("\n\nhide \"cube\n"), "drive.txt:3: a quote is not closed");
-  EXPECT_EQ(error_of("edges maybe"), "drive.txt:1: write edges on|off");
-  EXPECT_EQ(error_of("zoom 1 2"), "drive.txt:1: write zoom STEPS [X Y]");
-  EXPECT_EQ(error_of("resize 0 5"), "drive.txt:1: a window of 0 x 5 pixels");
+  EXPECT_EQ(error_of("edges maybe"), "drive.txt:1: usage: edges on|off");
+  EXPECT_EQ(error_of("zoom 1 2"), "drive.txt:1: usage: zoom STEPS [X Y]");
+  EXPECT_EQ(error_of("resize 0 5"),
+            "drive.txt:1: the window must be 1 to 16384 pixels wide and high, got 0 x 5");
   EXPECT_EQ(error_of("colour @1 red"),
-            "drive.txt:1: a colour is #rrggbb, #rrggbbaa or none, not 'red'");
-  EXPECT_NE(error_of("view sideways").find("drive.txt:1: no such view: 'sideways'"),
+            "drive.txt:1: the colour must be #rrggbb, #rrggbbaa or none, got 'red'");
+  EXPECT_NE(error_of("view sideways").find("drive.txt:1: unknown view 'sideways'"),
             std::string::npos);
   EXPECT_NE(error_of("section q=1").find("drive.txt:1: "), std::string::npos);
   EXPECT_NE(error_of("camera 1,2").find("drive.txt:1: "), std::string::npos);
@@ -105,7 +106,7 @@ TEST(Script, TheHelpNamesEveryCommand) {
     // Without arguments each is known, whether or not it needs some.
     const auto script = parse_script(name, "x");
     if (!script) {
-      EXPECT_EQ(script.error().message.find("no such command"), std::string::npos) << name;
+      EXPECT_EQ(script.error().message.find("unknown command"), std::string::npos) << name;
     }
   }
   EXPECT_GT(count, 25);

@@ -372,7 +372,7 @@ TEST_F(Window, AMessageOfTheWindowIsOnStandardErrorWhileItIsOpen) {
 TEST_F(Window, MistakesOfScriptsNameFileAndLine) {
   RunResult run = view("wait\nhide \"no such solid\"\n");
   EXPECT_EQ(run.exit_code, 2);
-  EXPECT_EQ(run.err, "strata view: error: drive.txt:2: no solid's name holds 'no such solid'\n");
+  EXPECT_EQ(run.err, "strata view: error: drive.txt:2: no solid has 'no such solid' in its name\n");
   run = view("\nscreenshot no/such/folder/x.png\n");
   EXPECT_EQ(run.exit_code, 4);
   EXPECT_NE(run.err.find("drive.txt:2: no/such/folder/x.png"), std::string::npos) << run.err;
@@ -380,7 +380,7 @@ TEST_F(Window, MistakesOfScriptsNameFileAndLine) {
   EXPECT_EQ(run.exit_code, 2);
   run = view("jump\n");
   EXPECT_EQ(run.exit_code, 2);
-  EXPECT_EQ(run.err, "strata view: error: drive.txt:1: no such command: 'jump'\n");
+  EXPECT_EQ(run.err, "strata view: error: drive.txt:1: unknown command 'jump'\n");
 }
 
 TEST(WithoutDisplay, IsASentence) {

@@ -191,8 +191,9 @@ TEST_F(ThreeMf, MissingPartsObjectsAndNumbersAreNamed) {
   expect(message("1", " p:path='/x.model'"), ":7: there is no part '/x.model'");
   expect(message("1", " p:path='/b.model'"), ":7: there is no object '1' in part '/b.model'");
   expect(message("1", " p:path='/c.model'"), "a.3mf/c.model:1: ");
-  expect(message("1", " transform='1 2 3'"), ":7: a transform that is not twelve numbers");
-  expect(message("1", " transform='1e300 0 0 0 1 0 0 0 1e300 1e308 0 0 7'"), "more than twelve");
+  expect(message("1", " transform='1 2 3'"), ":7: a transform must have 12 numbers");
+  expect(message("1", " transform='1e300 0 0 0 1 0 0 0 1e300 1e308 0 0 7'"),
+         "12 numbers, got more");
   expect(error_of({{"readme", ""}}).message, "a.3mf: the archive has no model");
   expect(error_of({{"_rels/.rels", relations("/x.model")}}).message, "there is no part '/x.model'");
   EXPECT_EQ(read_3mf(write("b.3mf", "no archive")).error().code, ErrorCode::kInput);

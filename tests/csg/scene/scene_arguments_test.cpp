@@ -77,24 +77,24 @@ TEST(Arguments, WhatIsNoSizeIsNamed) {
 }
 
 TEST(Arguments, WhatIsNoNumberIsNamed) {
-  EXPECT_EQ(warning_of("sphere(r=\"5\");"), "1:1: 'sphere': r is \"5\", not a number; 1 is taken");
-  EXPECT_EQ(warning_of("circle(d=true);"), "1:1: 'circle': d is true, not a number; 2 is taken");
+  EXPECT_EQ(warning_of("sphere(r=\"5\");"), "1:1: 'sphere': r is \"5\", not a number; 1 is used");
+  EXPECT_EQ(warning_of("circle(d=true);"), "1:1: 'circle': d is true, not a number; 2 is used");
   EXPECT_EQ(warning_of("cylinder(\"5\",2);"),
-            "1:1: 'cylinder': h is \"5\", not a number; 1 is taken");
+            "1:1: 'cylinder': h is \"5\", not a number; 1 is used");
   EXPECT_EQ(warning_of("cube(\"a\");"),
-            "1:1: 'cube': size is \"a\", not a number or 3 numbers; 1 is taken");
+            "1:1: 'cube': size is \"a\", not a number or 3 numbers; 1 is used");
   // OpenSCAD takes 1 for all of them too.
   EXPECT_NEAR(volume_of("cube([2,3]);"), 1.0, 1e-9);
   EXPECT_EQ(warning_of("cube([2,[\"b\",[]],false]);"),
-            "1:1: 'cube': size is [2, [\"b\", []], false], not a number or 3 numbers; 1 is taken");
+            "1:1: 'cube': size is [2, [\"b\", []], false], not a number or 3 numbers; 1 is used");
   EXPECT_EQ(warning_of("square([1,2,3]);"),
-            "1:1: 'square': size is [1, 2, 3], not a number or 2 numbers; 1 is taken");
+            "1:1: 'square': size is [1, 2, 3], not a number or 2 numbers; 1 is used");
   EXPECT_EQ(warning_of("linear_extrude(height=1,scale=\"x\") square(1);"),
-            "1:1: 'linear_extrude': scale is \"x\", not a number; 1 is taken");
+            "1:1: 'linear_extrude': scale is \"x\", not a number; 1 is used");
   EXPECT_EQ(warning_of("sphere(1,$fn=\"a\");"),
-            "1:1: 'sphere': $fn is \"a\", not a number; its default is taken");
+            "1:1: 'sphere': $fn is \"a\", not a number; its default is used");
   EXPECT_EQ(warning_of("rotate_extrude(angle=\"x\") square(1);"),
-            "1:1: 'rotate_extrude': angle is \"x\", not a number; 360 is taken");
+            "1:1: 'rotate_extrude': angle is \"x\", not a number; 360 is used");
   const std::string long_one = warning_of("sphere(\"" + std::string(5000, 'x') + "\");");
   EXPECT_LT(long_one.size(), 160u);
   EXPECT_EQ(codes_of(scene_of("sphere(r=undef); cube(undef); cylinder(h=undef);")), "");
@@ -107,7 +107,7 @@ TEST(Arguments, AbsurdNumbersOfPiecesAreNamed) {
     return scene.warnings.empty() ? "" : scene.warnings[0].message;
   };
   EXPECT_EQ(warning("cylinder(h=1,r1=1,r2=0,$fn=1e7);"),
-            "test.csg:1:1: 'cylinder': $fn is 1e+07; 1e+06 is taken");
+            "test.csg:1:1: 'cylinder': $fn is 1e+07; 1e+06 is used");
 }
 
 /// The message with which a scene is beyond a limit.
@@ -140,8 +140,8 @@ TEST(Arguments, WhatWouldBeTooLargeIsRefusedBeforeItIsMade) {
             "is 1e+08");
   const std::uint64_t megabyte = 1'000'000;
   EXPECT_EQ(limit_of("sphere($fn=1000);", 40 * megabyte),
-            "test.csg:2:2: 'sphere' of 1000 segments would have 1e+06 triangles; with what the "
-            "scene has so far they take about 0.0641 GB, the memory limit is 0.04 GB");
+            "test.csg:2:2: 'sphere' of 1000 segments would have 1e+06 triangles; with the scene so "
+            "far they need about 0.0641 GB, but the memory limit is 0.04 GB");
   for (const std::string& made : std::initializer_list<std::string>{
            "cylinder($fn=1e6);", "linear_extrude(height=1,twist=360,slices=1e6)" + triangle,
            "rotate_extrude($fn=1e6)" + triangle, "hull() { sphere($fn=300); sphere($fn=500); }",
@@ -159,12 +159,12 @@ TEST(Arguments, WhatWouldBeTooLargeIsRefusedBeforeItIsMade) {
 
 TEST(Arguments, MatricesThatAreNoneAreNamed) {
   EXPECT_EQ(warning_of("multmatrix([[1,0,0,0],[0,1,0,nan]]) cube();"),
-            "1:1: the matrix has nan in row 2, column 4; what it moves is left out");
+            "1:1: the matrix has nan in row 2, column 4; its children are left out");
   EXPECT_EQ(warning_of("multmatrix([[1],[],[],[0,0,0,inf]]) cube();"),
-            "1:1: the matrix has inf in row 4, column 4; what it moves is left out");
+            "1:1: the matrix has inf in row 4, column 4; its children are left out");
   const char* text = "multmatrix([[2,\"x\",0,1]]) cube();";
   EXPECT_EQ(warning_of(text),
-            "1:1: the matrix has \"x\" in row 1, column 2; the identity's is taken");
+            "1:1: the matrix has \"x\" in row 1, column 2; using the identity's entry there");
   expect_box(box_of(scene_of(text)), {1, 0, 0}, {3, 1, 1});
 }
 
@@ -172,17 +172,18 @@ TEST(Arguments, IndicesThatAreNoneAreNamed) {
   const std::string points = "points=[[0,0,0],[1,0,0],[0,1,0],[0,0,1]],";
   const std::string text = "polyhedron(" + points + "faces=[[0,1.5,2],[0,3,1],[1,3,2],[0,2,3]]);";
   EXPECT_EQ(warning_of(text),
-            "1:1: 1 corners of faces are no whole numbers, the first is 1.5 in face 0; they are "
+            "1:1: 1 corners of faces are not whole numbers, the first is 1.5 in face 0; they are "
             "rounded down");
   EXPECT_NEAR(volume_of(text), 1.0 / 6.0, 1e-9);
   const Scene scene =
       scene_of("polyhedron(" + points + "faces=[[0,1,2],[0,3,-1,1],[1,3,2,4],[0,2,3]]);");
   EXPECT_EQ(scene.warnings.at(0).message,
-            "test.csg:1:1: 2 corners of faces are no indices of the 4 points, the first is -1 in "
+            "test.csg:1:1: 2 corners of faces are not indices of the 4 points, the first is -1 in "
             "face 1; they are left out");
-  EXPECT_EQ(warning_of("polygon([[0,0],[1,0],[0,1]],[[0,1,2,\"a\"]]);"),
-            "1:1: 1 corners of paths are no indices of the 3 points, the first is \"a\" in path 0; "
-            "they are left out");
+  EXPECT_EQ(
+      warning_of("polygon([[0,0],[1,0],[0,1]],[[0,1,2,\"a\"]]);"),
+      "1:1: 1 corners of paths are not indices of the 3 points, the first is \"a\" in path 0; "
+      "they are left out");
   EXPECT_EQ(warning_of("polyhedron([[0,0,0],[1,0]],[[0,1,2]]);"),
             "1:1: point 1 of the polyhedron is [1, 0], not three finite numbers; the polyhedron is "
             "left out");

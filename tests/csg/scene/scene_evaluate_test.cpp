@@ -399,11 +399,11 @@ TEST(Scene, CoordinatesBeyondAllUseAreAnErrorThatNamesTheSolid) {
     EXPECT_EQ(error(text).code, ErrorCode::kGeometry) << text;
     EXPECT_NE(error(text).message.find("has coordinates "), std::string::npos);
   }
-  EXPECT_NE(error(scaled(scaled("cube();"))).message.find("those of a solid must be below 1e+300"),
+  EXPECT_NE(error(scaled(scaled("cube();"))).message.find("in a solid they must be below 1e+300"),
             std::string::npos);
   EXPECT_TRUE(parse_scene("difference() { sphere(); cube(1e250); }", "s.csg").has_value());
   EXPECT_EQ(error("sphere(); cube(1e120);").message,
-            "s.csg:1:11: 'cube' has coordinates of about 1e+120; those of a result must be below "
+            "s.csg:1:11: 'cube' has coordinates of about 1e+120; in a result they must be below "
             "1e+100");
   EXPECT_EQ(scene_of("cube(1e90); multmatrix([[1,0,0,-1e90]]) cube();").tree.solids().size(), 2u);
 }

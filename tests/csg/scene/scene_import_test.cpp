@@ -158,9 +158,9 @@ TEST_F(SceneFiles, BrokenAmfNamesTheLine) {
   EXPECT_NE(message("<v3>3</v3>", "<v3>4</v3>")
                 .find("a.amf:3: a triangle refers to vertex 4, the mesh has 4"),
             std::string::npos);
-  EXPECT_NE(message("<v3>3</v3>", "<v3>-1</v3>").find("a.amf:3: '-1' is no index"),
+  EXPECT_NE(message("<v3>3</v3>", "<v3>-1</v3>").find("a.amf:3: '-1' is not a vertex index"),
             std::string::npos);
-  EXPECT_NE(message("<x> 1 </x>", "<x>one</x>").find("a.amf:3: a vertex without a usable x"),
+  EXPECT_NE(message("<x> 1 </x>", "<x>one</x>").find("a.amf:3: a vertex has no valid x"),
             std::string::npos);
   EXPECT_NE(message("</object>", "</objekt>").find("a.amf:3: "), std::string::npos);
 }
@@ -256,8 +256,8 @@ TEST_F(SceneFiles, FaultsOfSurfacesAreNamedByTheirPlace) {
     EXPECT_FALSE(has(warning_of(text), "secret")) << text;
   }
   const std::string one = warning_of("1 2 3\n4 5\n6 7 8\n");
-  EXPECT_TRUE(has(one, "a.dat: row 2 has 2 numbers, the longest 3; what is missing is 0")) << one;
-  EXPECT_TRUE(has(warning_of("1 2\n4\n6\n"), "what is missing is 0 (2 rows are short)"));
+  EXPECT_TRUE(has(one, "a.dat: row 2 has 2 numbers, the longest 3; missing numbers are 0")) << one;
+  EXPECT_TRUE(has(warning_of("1 2\n4\n6\n"), "missing numbers are 0 (2 rows are short)"));
 }
 
 TEST_F(SceneFiles, AFolderIsNoFile) {
@@ -279,10 +279,9 @@ TEST_F(SceneFiles, LayersThatAreNotThereAreNamed) {
   EXPECT_EQ(codes_of(import("rim")), "");
   const Scene scene = import("hole");
   ASSERT_EQ(codes_of(scene), "geometry ");
-  EXPECT_NE(
-      scene.warnings[0].message.find("a.dxf: nothing is in a layer 'hole', there are 'holes', "
-                                     "'rim'; it is left out"),
-      std::string::npos)
+  EXPECT_NE(scene.warnings[0].message.find("a.dxf: layer 'hole' is empty; there are 'holes', "
+                                           "'rim'; it is left out"),
+            std::string::npos)
       << scene.warnings[0].message;
 }
 

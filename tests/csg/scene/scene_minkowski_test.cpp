@@ -423,7 +423,7 @@ TEST(Minkowski, ThatWouldTakeTooLongIsRefusedBeforeTheWork) {
   const auto scene = parse_scene(text, "test.csg");
   ASSERT_FALSE(scene.has_value());
   EXPECT_EQ(scene.error().code, ErrorCode::kLimit);
-  EXPECT_EQ(scene.error().message.find("test.csg:2:3: 'minkowski': the sum takes "), 0u)
+  EXPECT_EQ(scene.error().message.find("test.csg:2:3: 'minkowski': the sum needs "), 0u)
       << scene.error().message;
   EXPECT_NE(scene.error().message.find("convex pieces"), std::string::npos);
 

@@ -40,8 +40,8 @@ TEST(Resize, KeepsWhereNoSizeIsGiven) {
   expect_box(box_of(scene), {0, 0, 0}, {1, 4, 3});
   ASSERT_EQ(codes_of(scene), "geometry ");
   EXPECT_EQ(scene.warnings[0].message,
-            "test.csg:1:1: 'resize': newsize is [nan, 4, 0], not finite numbers; the size is kept "
-            "where it is none");
+            "test.csg:1:1: 'resize': newsize is [nan, 4, 0], not finite numbers; sizes that are "
+            "not finite numbers are kept");
 }
 
 TEST(Resize, MeasuresWhatIsLeftOfADifference) {
@@ -148,7 +148,7 @@ TEST(Boundary, TooMuchWorkIsALimit) {
   const auto mesh = boundary(tree, difference, {}, 1000);
   ASSERT_FALSE(mesh.has_value());
   EXPECT_EQ(mesh.error().code, ErrorCode::kLimit);
-  EXPECT_EQ(mesh.error().message, "2400 triangles would have to be cut by 1140 planes");
+  EXPECT_EQ(mesh.error().message, "2400 triangles and 1140 planes are too many to be cut");
 }
 
 // --- extrusions and other nodes: that arguments reach them

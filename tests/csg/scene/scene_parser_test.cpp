@@ -133,8 +133,8 @@ TEST(CsgParser, ErrorsNameFileLineAndColumn) {
   EXPECT_EQ(refusal_of("union() {\n cube();"),
             "test.csg:2:9: the file ends inside 'union', which begins at test.csg:1:1");
   EXPECT_EQ(refusal_of("cube(size = [1, 2);"), "test.csg:1:18: expected ',' or ']', not ')'");
-  EXPECT_EQ(refusal_of("/* x"), "test.csg:1:1: a comment that is never closed");
-  EXPECT_EQ(refusal_of("text(\"x"), "test.csg:1:6: a string that is never closed");
+  EXPECT_EQ(refusal_of("/* x"), "test.csg:1:1: the comment is not closed");
+  EXPECT_EQ(refusal_of("text(\"x"), "test.csg:1:6: the string is not closed");
   EXPECT_EQ(refusal_of("# ;"), "test.csg:1:3: expected a name after a modifier, not ';'");
   EXPECT_EQ(refusal_of("cube(\x01);"), "test.csg:1:6: expected a value, not byte 0x01");
   EXPECT_NE(refusal_of("module a() { }").find("openscad -o"), std::string::npos);

@@ -222,7 +222,7 @@ TEST(Primitives, PolyhedraInsideOutAreTurnedAndOpenOnesReported) {
   ASSERT_EQ(codes_of(mixed), "geometry ");
   EXPECT_EQ(mixed.tree.solids()[0].rule, InsideRule::kWinding);
   EXPECT_NEAR(volume_of(mixed), 1.0 / 6, 1e-12);
-  EXPECT_NE(mixed.warnings[0].message.find("1 triangle turned"), std::string::npos)
+  EXPECT_NE(mixed.warnings[0].message.find("1 triangle faced against"), std::string::npos)
       << mixed.warnings[0].message;
   // Two of them, one inside out.
   const std::string two =
@@ -231,7 +231,7 @@ TEST(Primitives, PolyhedraInsideOutAreTurnedAndOpenOnesReported) {
   const Scene one_turned = scene_of(two);
   ASSERT_EQ(codes_of(one_turned), "geometry ");
   EXPECT_NEAR(volume_of(one_turned), 2.0 / 6, 1e-12);
-  EXPECT_NE(one_turned.warnings[0].message.find("1 of 2 parts were inside out and are turned"),
+  EXPECT_NE(one_turned.warnings[0].message.find("1 of 2 parts were inside out and were reversed"),
             std::string::npos)
       << one_turned.warnings[0].message;
   const Scene open = scene_of(points + "[[0,1,2],[0,3,1],[0,2,3]]);");

@@ -98,7 +98,7 @@ TEST(ObjReader, FaceWithNonFiniteVertexIsDroppedAndCounted) {
     const std::vector<glm::uvec3> expected = {{0, 1, 2}, {0, 2, 3}};
     EXPECT_EQ(file.soup.triangles, expected) << bad;
     EXPECT_EQ(file.soup.face_elements, (std::vector<std::uint32_t>{0, 2})) << bad;
-    EXPECT_CONTAINS(only_warning(file), "file:7: face uses the vertex (9, 9, ");
+    EXPECT_CONTAINS(only_warning(file), "file:7: face has a vertex at (9, 9, ");
   }
 }
 
@@ -125,7 +125,7 @@ TEST(ObjReader, StrictTurnsADroppedFaceIntoAnError) {
                   "file:6: face refers to vertex 9");
   EXPECT_CONTAINS(refusal(kObj, kSquare + "f 1 2 3\nf 1 2\n", true), "file:6: face has fewer");
   EXPECT_CONTAINS(refusal(kObj, kSquare + "v 1 nan 0\nf 1 2 3\nf 1 2 5\n", true),
-                  "file:7: face uses");
+                  "file:7: face has");
   EXPECT_TRUE(parse(kObj, kSquare + "f 1 2 3\nf 1 1 2\n", true).has_value());
 }
 
@@ -151,7 +151,7 @@ TEST(ObjReader, BentPolygonIsReportedFlatOneIsNot) {
   EXPECT_TRUE(parsed(kObj, kSquare + "f 1 2 3 4\n").stats.warnings.empty());
   const MeshFile file = parsed(kObj, "v 0 0 0\nv 1 0 0\nv 1 1 0.1\nv 0 1 0\nf 1 2 3 4\n");
   EXPECT_EQ(file.stats.non_planar, 1u);
-  EXPECT_CONTAINS(only_warning(file), "file:5: polygon is not flat: its corners lie 0.0");
+  EXPECT_CONTAINS(only_warning(file), "file:5: polygon is not flat: its corners deviate 0.0");
   // The same triangles wherever the face begins.
   for (const char* face : {"f 2 3 4 1\n", "f 3 4 1 2\n", "f 4 1 2 3\n"}) {
     const std::string text = std::string("v 0 0 0\nv 1 0 0\nv 1 1 0.1\nv 0 1 0\n") + face;

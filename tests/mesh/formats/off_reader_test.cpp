@@ -52,7 +52,7 @@ TEST(OffReader, PrefixesStandInAnyOrder) {
   }
   EXPECT_EQ(parsed(kOff, "N4OFF\n3 1 0\n0 0 0 1\n2 0 0 2\n0 2 0 2\n3 0 1 2\n").soup.positions[1],
             glm::dvec3(1, 0, 0));
-  EXPECT_CONTAINS(refusal(kOff, "CCOFF\n4 2 0\n" + kBody), "'C' is no prefix of OFF");
+  EXPECT_CONTAINS(refusal(kOff, "CCOFF\n4 2 0\n" + kBody), "'C' is not a known prefix of OFF");
 }
 
 TEST(OffReader, TokensMayStandInAnyLines) {
@@ -170,12 +170,12 @@ TEST(OffReader, HugeFaceSizeEndsWithTheFile) {
 
 TEST(OffReader, WhatFollowsTheLastFaceIsReported) {
   EXPECT_EQ(only_warning(parsed(kOff, "OFF\n4 1 0\n" + kBody)),
-            "file:8: what follows the last face is ignored");
+            "file:8: text after the last face is ignored");
 }
 
 TEST(OffReader, MalformedTextIsNamed) {
   EXPECT_EQ(refusal(kOff, "OFX\n"), "file:1: expected OFF, found 'OFX'");
-  EXPECT_EQ(refusal(kOff, "XOFF\n"), "file:1: 'X' is no prefix of OFF");
+  EXPECT_EQ(refusal(kOff, "XOFF\n"), "file:1: 'X' is not a known prefix of OFF");
   EXPECT_EQ(refusal(kOff, "OFF BINARY\n"), "file:1: binary OFF files are not supported");
   EXPECT_EQ(refusal(kOff, "OFF\nmany\n"), "file:2: expected the number of vertices, found 'many'");
   EXPECT_EQ(refusal(kOff, "OFF\n4 2 0\n0 0 0\n1 0\n1x 1 0\n" + kBody),

@@ -233,7 +233,7 @@ TEST(PlyReader, HeaderErrorsNameTheLine) {
   EXPECT_EQ(refusal(kPly, "ply\nformat binary_middle 1.0\n"),
             "file:2: unknown format 'binary_middle'");
   EXPECT_EQ(refusal(kPly, "ply\nformat ascii 1.0\nelement vertex -4\n"),
-            "file:3: '-4' is no element count");
+            "file:3: '-4' is not an element count");
   EXPECT_EQ(refusal(kPly, "ply\nformat ascii 1.0\nproperty int x\n"),
             "file:3: a property before the first element");
   EXPECT_EQ(refusal(kPly, "ply\nformat ascii 1.0\nelement vertex 1\nproperty quad x\n"),

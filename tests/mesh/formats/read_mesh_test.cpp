@@ -154,7 +154,7 @@ TEST_F(ReadMesh, WideTextIsNamed) {
 TEST_F(ReadMesh, FormatMayBeNamed) {
   const std::string path = write("mesh.dat", mesh_to_bytes(ball(), MeshFormat::kOff));
   EXPECT_FALSE(read_mesh(path).has_value());
-  EXPECT_CONTAINS(read_mesh(path).error().message, "name the format");
+  EXPECT_CONTAINS(read_mesh(path).error().message, "the format must be given");
   MeshReadOptions options;
   options.format = MeshFormat::kOff;
   EXPECT_TRUE(read_mesh(path, options).has_value());

@@ -96,7 +96,7 @@ TEST(StlReader, NonFiniteCornersDropTheFacet) {
   EXPECT_EQ(file.stats.non_finite, 1u);
   EXPECT_EQ(file.soup.triangles.size(), 11u);
   EXPECT_EQ(file.soup.face_elements[3], 4u);
-  EXPECT_CONTAINS(only_warning(file), "file: triangle 3 (byte 234): face uses the vertex (nan, ");
+  EXPECT_CONTAINS(only_warning(file), "file: triangle 3 (byte 234): face has a vertex at (nan, ");
 }
 
 TEST(StlReader, NonFiniteNormalsDoNotMatter) {
@@ -185,16 +185,16 @@ TEST(StlReader, SpellingsOfExportersAreRead) {
   const MeshFile strange = parsed(kStl, with("endloop\n", "endloop\nweight 3\n"));
   EXPECT_EQ(strange.soup.triangles, expected.soup.triangles);
   EXPECT_EQ(only_warning(strange),
-            "file:8: 'weight' is no word of an ascii STL file; 2 such lines were skipped");
+            "file:8: 'weight' is not a word of an ASCII STL file; 2 such lines were skipped");
   EXPECT_CONTAINS(refusal(kStl, with("vertex 1 0 0", "vertx 1 0 0")),
-                  "file:5: 'vertx' is no word of a loop");
+                  "file:5: 'vertx' is not a word of a loop");
 }
 
 TEST(StlReader, AsciiErrorsNameTheLine) {
   EXPECT_EQ(refusal(kStl, "solid\n" + kFacet + "facet normal 0 0 1\nouter loop\nvertex 1 2 z\n"),
             "file:11: 'z' is not a number");
   EXPECT_EQ(refusal(kStl, "solid\nvertex 0 0 0\n"), "file:2: vertex outside of a loop");
-  EXPECT_EQ(refusal(kStl, "solid\nhello\n"), "file:2: 'hello' is no word of an ascii STL file");
+  EXPECT_EQ(refusal(kStl, "solid\nhello\n"), "file:2: 'hello' is not a word of an ASCII STL file");
   EXPECT_CONTAINS(refusal(kStl, "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\n"),
                   "the file ends inside a facet");
   EXPECT_CONTAINS(refusal(kStl, "solid\nendsolid\n"), "no vertices");

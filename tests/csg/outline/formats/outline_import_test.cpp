@@ -244,7 +244,7 @@ TEST(DxfReader, OpenContoursAndStrayLinesAreNamedWithTheirPlace) {
 
 TEST(DxfReader, BlocksThatHoldThemselvesEnd) {
   const std::string self = "0\nBLOCK\n2\na\n0\nINSERT\n2\na\n10\n0\n20\n0\n0\nENDBLK\n";
-  EXPECT_NE(dxf_error(dxf("0\nINSERT\n2\na\n10\n0\n20\n0\n", self)).find("may hold itself"),
+  EXPECT_NE(dxf_error(dxf("0\nINSERT\n2\na\n10\n0\n20\n0\n", self)).find("may contain itself"),
             std::string::npos);
   // Ten of each next one, twenty deep: stopped by a limit.
   std::string blocks;
