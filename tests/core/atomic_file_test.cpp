@@ -10,22 +10,22 @@
 #include <csignal>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <optional>
 #include <string>
 #include <thread>
 #include <utility>
 #include <vector>
 
+#include "tests/support/child_process.h"
+#include "tests/support/temporary_folder.h"
+
 namespace strata {
 namespace {
 
 namespace fs = std::filesystem;
 
-std::string content_of(const fs::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-}
+using testkit::bytes_of;
+using testkit::in_child;
 
 void put(const fs::path& path, const std::string& text) {
   std::ofstream(path, std::ios::binary) << text;
@@ -33,32 +33,12 @@ void put(const fs::path& path, const std::string& text) {
 
 class AtomicFileTest : public testing::Test {
  protected:
-  void SetUp() override {
-    std::string pattern = (fs::temp_directory_path() / "strata-atomic-XXXXXX").string();
-    ASSERT_NE(mkdtemp(pattern.data()), nullptr);
-    folder_ = pattern;
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
   [[nodiscard]] std::string at(const std::string& name) const { return (folder_ / name).string(); }
-  [[nodiscard]] std::size_t entries() const {
-    return static_cast<std::size_t>(
-        std::distance(fs::directory_iterator(folder_), fs::directory_iterator()));
-  }
+  [[nodiscard]] std::size_t entries() const { return place_.names().size(); }
 
-  fs::path folder_;
+  const testkit::TemporaryFolder place_;
+  const fs::path folder_ = place_.path();
 };
-
-/// Runs `body` in a child process, so that limits, users and closed streams stay there.
-/// @return the child's exit status, or 128 + the signal that ended it.
-template <class Body>
-int in_child(Body body) {
-  const pid_t child = fork();
-  if (child == 0) _exit(body());
-  int status = 0;
-  waitpid(child, &status, 0);
-  return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-}
 
 using AtomicFolderTest = AtomicFileTest;
 
@@ -71,7 +51,7 @@ TEST_F(AtomicFileTest, AppearsUnderItsNameOnlyAtCommit) {
   EXPECT_EQ(fs::path(file->temporary_path()).parent_path(), folder_);
   EXPECT_TRUE(fs::exists(file->temporary_path()));
   ASSERT_TRUE(file->commit());
-  EXPECT_EQ(content_of(at("a.bin")), "hello world");
+  EXPECT_EQ(bytes_of(at("a.bin")), "hello world");
   EXPECT_EQ(entries(), 1u);
 }
 
@@ -92,7 +72,7 @@ TEST_F(AtomicFileTest, UncommittedKeepsTheOldContent) {
     ASSERT_TRUE(file);
     ASSERT_TRUE(file->write("new", 3));
   }
-  EXPECT_EQ(content_of(at("a.bin")), "old");
+  EXPECT_EQ(bytes_of(at("a.bin")), "old");
 }
 
 TEST_F(AtomicFileTest, ReplacedFileKeepsItsPermissions) {
@@ -102,7 +82,7 @@ TEST_F(AtomicFileTest, ReplacedFileKeepsItsPermissions) {
   ASSERT_TRUE(file);
   ASSERT_TRUE(file->write("new", 3));
   ASSERT_TRUE(file->commit());
-  EXPECT_EQ(content_of(at("a.bin")), "new");
+  EXPECT_EQ(bytes_of(at("a.bin")), "new");
   EXPECT_EQ(fs::status(at("a.bin")).permissions(), fs::perms::owner_read | fs::perms::owner_write);
 }
 
@@ -116,7 +96,7 @@ TEST_F(AtomicFileTest, ASymbolicLinkIsFollowed) {
   ASSERT_TRUE(file->write("new", 3));
   ASSERT_TRUE(file->commit());
   EXPECT_TRUE(fs::is_symlink(at("link.bin")));
-  EXPECT_EQ(content_of(at("real/a.bin")), "new");
+  EXPECT_EQ(bytes_of(at("real/a.bin")), "new");
 }
 
 TEST_F(AtomicFileTest, TwoWritersOfOneNameDoNotMix) {
@@ -127,9 +107,9 @@ TEST_F(AtomicFileTest, TwoWritersOfOneNameDoNotMix) {
   ASSERT_TRUE(first->write("1", 1));
   ASSERT_TRUE(second->write("2", 1));
   ASSERT_TRUE(first->commit());
-  EXPECT_EQ(content_of(at("a.bin")), "1");
+  EXPECT_EQ(bytes_of(at("a.bin")), "1");
   ASSERT_TRUE(second->commit());
-  EXPECT_EQ(content_of(at("a.bin")), "2");
+  EXPECT_EQ(bytes_of(at("a.bin")), "2");
 }
 
 TEST_F(AtomicFileTest, WriteAtFillsHolesFromSeveralThreads) {
@@ -148,8 +128,8 @@ TEST_F(AtomicFileTest, WriteAtFillsHolesFromSeveralThreads) {
     }
   }
   ASSERT_TRUE(file->commit());
-  EXPECT_EQ(content_of(at("a.bin")), std::string(kPart, 'd') + std::string(kPart, 'c') +
-                                         std::string(kPart, 'b') + std::string(kPart, 'a'));
+  EXPECT_EQ(bytes_of(at("a.bin")), std::string(kPart, 'd') + std::string(kPart, 'c') +
+                                       std::string(kPart, 'b') + std::string(kPart, 'a'));
 }
 
 TEST_F(AtomicFileTest, ALibraryMayWriteTheTemporaryByName) {
@@ -157,7 +137,7 @@ TEST_F(AtomicFileTest, ALibraryMayWriteTheTemporaryByName) {
   ASSERT_TRUE(file);
   put(file->temporary_path(), "by name");
   ASSERT_TRUE(file->commit());
-  EXPECT_EQ(content_of(at("a.bin")), "by name");
+  EXPECT_EQ(bytes_of(at("a.bin")), "by name");
 }
 
 TEST_F(AtomicFileTest, MovedFromOwnsNothing) {
@@ -293,7 +273,7 @@ TEST_F(AtomicFileTest, DashIsStandardOutputAndStaysOpen) {
     return 0;
   });
   EXPECT_EQ(status, 0);
-  EXPECT_EQ(content_of(at("out")), "one two");
+  EXPECT_EQ(bytes_of(at("out")), "one two");
 }
 
 TEST_F(AtomicFileTest, ANonBlockingPipeIsWaitedFor) {
@@ -330,7 +310,7 @@ TEST_F(AtomicFileTest, AClosedStandardStreamIsNotTakenOver) {
     return file->commit() ? 0 : 2;
   });
   EXPECT_EQ(status, 0);
-  EXPECT_EQ(content_of(at("a.bin")), "data");
+  EXPECT_EQ(bytes_of(at("a.bin")), "data");
 }
 
 TEST_F(AtomicFileTest, SignalRemovesAllLiveTemporaries) {
@@ -401,7 +381,7 @@ TEST_F(AtomicFolderTest, AppearsUnderItsNameOnlyAtCommit) {
   put(folder->temporary_path() + "/0.png", "x");
   EXPECT_FALSE(fs::exists(at("slices")));
   ASSERT_TRUE(folder->commit());
-  EXPECT_EQ(content_of(at("slices/0.png")), "x");
+  EXPECT_EQ(bytes_of(at("slices/0.png")), "x");
   EXPECT_EQ(entries(), 1u);
 }
 
@@ -421,7 +401,7 @@ TEST_F(AtomicFolderTest, ReplacesAnEmptyFolderButNotOneWithContent) {
   ASSERT_TRUE(folder) << folder.error().message;
   put(folder->temporary_path() + "/0.png", "x");
   ASSERT_TRUE(folder->commit());
-  EXPECT_EQ(content_of(at("slices/0.png")), "x");
+  EXPECT_EQ(bytes_of(at("slices/0.png")), "x");
 
   const auto refused = AtomicFolder::create(at("slices"));
   ASSERT_FALSE(refused);
@@ -439,7 +419,7 @@ TEST_F(AtomicFolderTest, ContentThatAppearsMeanwhileIsKept) {
   const auto committed = folder->commit();
   ASSERT_FALSE(committed);
   EXPECT_EQ(committed.error().code, ErrorCode::kOutput);
-  EXPECT_EQ(content_of(at("slices/0.png")), "theirs");
+  EXPECT_EQ(bytes_of(at("slices/0.png")), "theirs");
   EXPECT_EQ(entries(), 1u);
 }
 
@@ -470,13 +450,13 @@ TEST_F(OutputGroupTest, AppearsTogether) {
   ASSERT_TRUE(folder->commit());
   EXPECT_FALSE(fs::exists(at("a")));
   EXPECT_FALSE(fs::exists(at("c")));
-  EXPECT_EQ(content_of(at("b")), "old");
-  EXPECT_EQ(content_of(group.place_of(at("b"))), "second");
+  EXPECT_EQ(bytes_of(at("b")), "old");
+  EXPECT_EQ(bytes_of(group.place_of(at("b"))), "second");
   EXPECT_EQ(group.place_of(at("other")), at("other"));
   ASSERT_TRUE(group.commit());
-  EXPECT_EQ(content_of(at("a")), "first");
-  EXPECT_EQ(content_of(at("b")), "second");
-  EXPECT_EQ(content_of(at("c/in")), "third");
+  EXPECT_EQ(bytes_of(at("a")), "first");
+  EXPECT_EQ(bytes_of(at("b")), "second");
+  EXPECT_EQ(bytes_of(at("c/in")), "third");
   EXPECT_EQ(entries(), 3u);
   EXPECT_TRUE(group.commit());  // of nothing
 }
@@ -494,7 +474,7 @@ TEST_F(OutputGroupTest, OrNotAtAll) {
     EXPECT_EQ(done.error().code, ErrorCode::kOutput);
     EXPECT_NE(done.error().message.find(at("c")), std::string::npos);
     EXPECT_FALSE(fs::exists(at("a")));
-    EXPECT_EQ(content_of(at("b")), "old");
+    EXPECT_EQ(bytes_of(at("b")), "old");
     EXPECT_EQ(entries(), 2u);  // b and the folder c
   }
   {
@@ -503,13 +483,13 @@ TEST_F(OutputGroupTest, OrNotAtAll) {
   }
   EXPECT_EQ(entries(), 2u);
   ASSERT_TRUE(write_to(at("d"), "alone"));
-  EXPECT_EQ(content_of(at("d")), "alone");
+  EXPECT_EQ(bytes_of(at("d")), "alone");
 }
 
 TEST_F(OutputGroupTest, IsOfItsThreadAlone) {
   OutputGroup group;
   std::thread([this] { EXPECT_TRUE(write_to(at("a"), "other")); }).join();
-  EXPECT_EQ(content_of(at("a")), "other");
+  EXPECT_EQ(bytes_of(at("a")), "other");
 }
 
 TEST_F(OutputGroupTest, ASignalRemovesWhatWaits) {

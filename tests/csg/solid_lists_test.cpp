@@ -137,7 +137,8 @@ TEST(SetAlgebra, HoldsOnTheListsOfRandomTrees) {
   }
 }
 
-// The tree against brute force at the centres of voxels, along all axes.
+// The tree against brute force at the centres of voxels, along all axes. What is inside a solid
+// alone the voxelizer tells, which CGAL holds (tests/voxelize/oracle_cgal_test.cpp).
 TEST(SolidLists, AgreeWithRecursionAtVoxelCentres) {
   for (std::uint64_t seed = 0; seed < 60; ++seed) {
     RandomTree random(seed + 300);

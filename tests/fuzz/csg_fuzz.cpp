@@ -2,8 +2,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
-#include <filesystem>
-#include <fstream>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -13,6 +11,7 @@
 #include "strata/csg/scene/scene.h"
 #include "tests/csg/scene/zip_files.h"
 #include "tests/fuzz/mesh_fuzzing.h"
+#include "tests/support/temporary_folder.h"
 
 namespace strata {
 namespace {
@@ -64,9 +63,6 @@ void check_scene(const csg::Scene& scene) {
 class Assets {
  public:
   Assets() {
-    std::string name = (std::filesystem::temp_directory_path() / "strata-fuzz-XXXXXX").string();
-    must(::mkdtemp(name.data()) != nullptr, "there is a folder for assets");
-    folder_ = name;
     write("a.dxf", "0\nSECTION\n2\nENTITIES\n0\nCIRCLE\n8\nrim\n10\n1\n20\n2\n40\n3\n0\nEOF\n");
     write("a.svg", "<svg viewBox='0 0 9 9'><path id='p' d='M1 1h5v4z'/><path d='M0 0L9 9'/></svg>");
     write("a.dat", "1 2 3\n4 5 6\n");
@@ -81,13 +77,6 @@ class Assets {
                         "<triangles><triangle v1='0' v2='1' v3='2'/></triangles></mesh></object>"
                         "</resources><build><item objectid='1'/></build></model>"}}));
   }
-  ~Assets() {
-    std::error_code ignored;
-    std::filesystem::remove_all(folder_, ignored);
-  }
-  Assets(const Assets&) = delete;
-  Assets& operator=(const Assets&) = delete;
-
   [[nodiscard]] bool holds(std::string_view name) const {
     return std::find(names_.begin(), names_.end(), name) != names_.end();
   }
@@ -96,17 +85,17 @@ class Assets {
   }
   [[nodiscard]] csg::ReadSceneOptions options() const {
     csg::ReadSceneOptions options;
-    options.asset_folder = folder_.string();
+    options.asset_folder = folder_.path().string();
     return options;
   }
 
  private:
   void write(const std::string& name, const std::string& bytes) {
-    std::ofstream(folder_ / name, std::ios::binary) << bytes;
+    folder_.write(name, bytes);
     names_.push_back(name);
   }
 
-  std::filesystem::path folder_;
+  testkit::TemporaryFolder folder_;
   std::vector<std::string> names_;
 };
 

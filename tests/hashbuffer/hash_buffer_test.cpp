@@ -444,7 +444,7 @@ TEST(HashBuffer, AFailedAllocationIsAnErrorAndTheBufferStaysUsable) {
   auto buffer = make<Record64>(4, 4);
   std::vector<std::uint64_t> sizes{1ull << 60, ~0ull};
   // The sanitizers' allocators end the program instead of throwing.
-  if (!test::kSanitized) sizes.push_back(1ull << 44);
+  if (!testkit::kSanitized) sizes.push_back(1ull << 44);
   for (const std::uint64_t cells : sizes) {
     const auto resized = buffer.resize(cells);
     ASSERT_FALSE(resized);

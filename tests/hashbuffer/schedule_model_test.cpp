@@ -17,7 +17,7 @@ using test::random_fragments;
 using test::sort_everything;
 
 // Sanitizers make it ten times slower and find nothing more in the last nine tenths.
-constexpr int kTenth = test::kSanitized ? 1 : 10;
+constexpr int kTenth = testkit::kSanitized ? 1 : 10;
 
 constexpr OffsetKind kKinds[] = {OffsetKind::kRandom, OffsetKind::kFarthestPoint,
                                  OffsetKind::kPlaneFirst};

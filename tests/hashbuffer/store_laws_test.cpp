@@ -149,7 +149,7 @@ TEST_P(StoreLaws, ListsEqualTheSortOfEverything) {
 
 TEST_P(StoreLaws, ListsOfAThousandSmallScenesAreExact) {
   Random random(12);
-  for (int scene = 0; scene < (test::kSanitized ? 100 : 1000); ++scene) {
+  for (int scene = 0; scene < (testkit::kSanitized ? 100 : 1000); ++scene) {
     const int width = 1 + static_cast<int>(random.below(5));
     const int height = 1 + static_cast<int>(random.below(4));
     auto store = make(width, height);

@@ -9,20 +9,9 @@
 #include "hashbuffer/random.h"
 #include "strata/core/depth_list.h"
 #include "strata/hashbuffer/record.h"
+#include "tests/support/sanitized.h"
 
 namespace strata::test {
-
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-inline constexpr bool kSanitized = true;
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
-inline constexpr bool kSanitized = true;
-#else
-inline constexpr bool kSanitized = false;
-#endif
-#else
-inline constexpr bool kSanitized = false;
-#endif
 
 struct Fragment {
   int x = 0, y = 0;

@@ -1,29 +1,51 @@
 #pragma once
 
-#include <optional>
+#include <filesystem>
+#include <initializer_list>
 #include <string>
 #include <vector>
 
 #include "strata/mesh/triangle_soup.h"
-#include "tests/support/trouble.h"
 
-// Real meshes, where present. Tests that need one skip with `missing_reason` when it is not there.
+// Real files of Debian packages, those that are installed (group corpus of cmake/packages.txt).
+// Tests that need some skip with the reason when none is there.
 
 namespace strata::testkit {
 
-/// A model of the folder shared/models beside the source tree, by its stem ("cow").
-[[nodiscard]] std::optional<TriangleSoup> shared_model(const std::string& stem);
+struct NamedMesh {
+  std::string name;
+  TriangleSoup mesh;
+};
 
-/// All models there, in a fixed order; empty when there is no such folder.
-[[nodiscard]] std::vector<NamedMesh> shared_models();
+struct CorpusFile {
+  std::string name;  ///< "cgal/cube.off": source and file name, for tables and messages
+  std::filesystem::path path;
+};
 
-/// Meshes of Debian's assimp-testmodels, libcgal-demo and openscad-testing-data, those that are
-/// installed, that the readers take, and that have at most `max_triangles`; in a fixed order.
-[[nodiscard]] std::vector<NamedMesh> debian_meshes(std::size_t max_triangles);
+/// Meshes of assimp-testmodels (`assimp/`), libcgal-demo (`cgal/`) and openscad-testing-data
+/// (`openscad/`), and, where the folder shared/models lies beside the checkout, its (`models/`),
+/// sorted by name. The archive of libcgal-demo is unpacked for as long as the process lives.
+[[nodiscard]] const std::vector<CorpusFile>& mesh_files();
 
-inline constexpr char kNoModels[] =
-    "no models: they are looked for in shared/models beside the source tree";
-inline constexpr char kNoCorpus[] =
-    "no corpus: install assimp-testmodels, libcgal-demo or openscad-testing-data";
+/// Those of them that the readers take and that have at most `max_triangles`.
+[[nodiscard]] std::vector<NamedMesh> real_meshes(std::size_t max_triangles);
+
+/// Meshes of libcgal-demo by their stems ("bunny00"), those that are there.
+[[nodiscard]] std::vector<NamedMesh> scans(std::initializer_list<const char*> stems);
+
+struct CorpusScene {
+  std::string name;            ///< "union-tests"
+  std::filesystem::path file;  ///< a .csg
+  std::filesystem::path
+      assets;  ///< where the program lies that it was dumped from, and its imports
+};
+
+/// What OpenSCAD's own tests expect `openscad -o x.csg` to write: of openscad-testing-data, sorted.
+[[nodiscard]] const std::vector<CorpusScene>& scene_files();
+
+inline constexpr char kNoScenes[] = "needs Debian's openscad-testing-data";
+inline constexpr char kNoMeshes[] =
+    "needs meshes of Debian's assimp-testmodels, libcgal-demo or openscad-testing-data";
+inline constexpr char kNoScans[] = "needs Debian's libcgal-demo";
 
 }  // namespace strata::testkit

@@ -7,16 +7,12 @@
 
 #include "strata/core/grid.h"
 #include "strata/mesh/triangle_soup.h"
+#include "tests/support/corpus.h"
 #include "tests/support/voxel_set.h"
 
 // Meshes that are made to cause trouble, and the grids they are put on.
 
 namespace strata::testkit {
-
-struct NamedMesh {
-  std::string name;
-  TriangleSoup mesh;
-};
 
 /// Lattice steps as positions: on a grid with origin 0 and voxel size 1 they snap to themselves.
 [[nodiscard]] inline glm::dvec3 at_lattice(const glm::ivec3& p) { return glm::dvec3(p) / 256.0; }

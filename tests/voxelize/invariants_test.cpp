@@ -55,10 +55,7 @@ std::vector<Scene> closed_scenes() {
 /// Real meshes that are closed once snapped to their grid, `longest` voxels along the longest side.
 std::vector<Scene> closed_real_scenes(int longest, std::size_t max_triangles) {
   std::vector<Scene> scenes;
-  std::vector<NamedMesh> meshes = shared_models();
-  for (auto& mesh : debian_meshes(max_triangles)) meshes.push_back(std::move(mesh));
-  for (auto& [name, mesh] : meshes) {
-    if (mesh.triangles.size() > max_triangles) continue;
+  for (auto& [name, mesh] : real_meshes(max_triangles)) {
     const glm::dvec3 extent = bounds(mesh).high - bounds(mesh).low;
     if (!(std::max({extent.x, extent.y, extent.z}) > 0)) continue;
     const VoxelGrid grid = grid_around(mesh, longest, 1);
@@ -92,7 +89,7 @@ TEST(ClosedMesh, EveryRayEntersAsOftenAsItLeaves) {
 
 TEST(ClosedMesh, EveryRayEntersAsOftenAsItLeavesInTheRealOnes) {
   const auto scenes = closed_real_scenes(100, 300'000);
-  if (scenes.empty()) GTEST_SKIP() << kNoModels << "; " << kNoCorpus;
+  if (scenes.empty()) GTEST_SKIP() << kNoMeshes;
   for (const Scene& scene : scenes) {
     for (const Axis axis : kAllAxes) {
       VoxelizeReport report;
@@ -221,7 +218,7 @@ TEST(ThreeAxes, AgreeOnThousandsOfRandomClosedSoups) {
 TEST(ThreeAxes, AgreeOnRealMeshes) {
   for (const int longest : {64, 100}) {
     const auto scenes = closed_real_scenes(longest, 300'000);
-    if (scenes.empty()) GTEST_SKIP() << kNoModels << "; " << kNoCorpus;
+    if (scenes.empty()) GTEST_SKIP() << kNoMeshes;
     std::uint64_t voxels = 0;
     for (const Scene& scene : scenes) {
       for (const InsideRule rule : {InsideRule::kWinding, InsideRule::kParity}) {

@@ -97,8 +97,9 @@ TEST(AlignedBox, OnVoxelCentresIsHalfOpenOnAllAxes) {
 // I18
 TEST(Volume, DiffersFromTheMeshsByLessThanItsSurfaceTimesAVoxel) {
   std::vector<NamedMesh> meshes = simple_solids();
-  for (auto& model : shared_models()) {
-    if (is_closed(model.mesh)) meshes.push_back(std::move(model));
+  for (auto& scan : scans({"bunny00", "cow", "fandisk", "man"})) {
+    EXPECT_TRUE(is_closed(scan.mesh)) << scan.name;
+    meshes.push_back(std::move(scan));
   }
   for (const auto& [name, mesh] : meshes) {
     const MeshDiagnosis known = diagnose(mesh);
@@ -190,10 +191,7 @@ TEST(Volume, StaysWhenTheMeshIsTurned) {
   std::mt19937_64 random(23);
   std::vector<NamedMesh> meshes;
   for (auto& solid : simple_solids()) meshes.push_back(std::move(solid));
-  for (const char* name : {"cow", "spot", "rocker-arm"}) {
-    auto model = shared_model(name);
-    if (model && is_closed(*model)) meshes.push_back({name, std::move(*model)});
-  }
+  for (auto& scan : scans({"cow", "homer", "fandisk"})) meshes.push_back(std::move(scan));
   for (const auto& [name, mesh] : meshes) {
     const MeshDiagnosis known = diagnose(mesh);
     const double size = grid_around(mesh, 40).voxel_size.x;

@@ -1,34 +1,26 @@
 #include "apps/session/interrupt.h"
 
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <array>
 #include <atomic>
 #include <csignal>
-#include <filesystem>
 #include <string>
 #include <thread>
 
 #include "core/atomic_file.h"
 #include "strata/core/execution.h"
+#include "tests/support/child_process.h"
+#include "tests/support/temporary_folder.h"
 
 namespace strata {
 namespace {
 
+using testkit::in_child;
+
 void wait_for_stop(const InterruptGuard& guard) {
   while (!guard.interrupted()) std::this_thread::yield();  // ctest's time limit ends a failure
-}
-
-/// Exit status of a child that runs `body`, or 128 + the signal that ended it.
-template <class Body>
-int in_child(Body body) {
-  const pid_t child = fork();
-  if (child == 0) _exit(body());
-  int status = 0;
-  waitpid(child, &status, 0);
-  return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
 }
 
 TEST(InterruptGuard, TheFirstSignalRequestsAStop) {
@@ -57,11 +49,10 @@ TEST(InterruptGuard, StopsAParallelJob) {
 }
 
 TEST(InterruptGuard, TheSecondSignalRemovesTemporariesAndExits130) {
-  std::string folder = (std::filesystem::temp_directory_path() / "strata-int-XXXXXX").string();
-  ASSERT_NE(mkdtemp(folder.data()), nullptr);
+  const testkit::TemporaryFolder folder;
   const int status = in_child([&folder] {
     const InterruptGuard guard;
-    auto file = AtomicFile::create(folder + "/a.bin");
+    auto file = AtomicFile::create(folder.file("a.bin"));
     if (!file || !file->write("half", 4)) return 1;
     raise(SIGINT);
     wait_for_stop(guard);
@@ -69,8 +60,7 @@ TEST(InterruptGuard, TheSecondSignalRemovesTemporariesAndExits130) {
     return 2;
   });
   EXPECT_EQ(status, 130);
-  EXPECT_TRUE(std::filesystem::is_empty(folder));
-  std::filesystem::remove_all(folder);
+  EXPECT_TRUE(folder.is_empty());
 }
 
 TEST(InterruptGuard, FormerHandlersComeBack) {

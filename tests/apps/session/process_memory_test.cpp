@@ -6,24 +6,16 @@
 #include <unistd.h>
 
 #include <cstring>
-#include <filesystem>
-#include <fstream>
 #include <memory>
 #include <string>
+
+#include "tests/support/sanitized.h"
+#include "tests/support/temporary_folder.h"
 
 namespace strata {
 namespace {
 
-namespace fs = std::filesystem;
-
-// Sanitizers keep memory that was given back, and reserve more address space than any limit.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr bool kSanitized = true;
-#elif defined(__has_feature)
-constexpr bool kSanitized = __has_feature(address_sanitizer) || __has_feature(thread_sanitizer);
-#else
-constexpr bool kSanitized = false;
-#endif
+using testkit::kSanitized;
 
 /// Allocates, writes to and gives back; what is written is asked for, or compilers leave all of it
 /// out.
@@ -76,20 +68,11 @@ TEST(Memory, AnAddressSpaceLimitCounts) {
 
 class CgroupMemory : public testing::Test {
  protected:
-  void SetUp() override {
-    std::string pattern = (fs::temp_directory_path() / "strata-cgroup-XXXXXX").string();
-    ASSERT_NE(mkdtemp(pattern.data()), nullptr);
-    root_ = pattern;
-  }
-  void TearDown() override { fs::remove_all(root_); }
-  void put(const std::string& name, const std::string& text) const {
-    fs::create_directories((root_ / name).parent_path());
-    std::ofstream(root_ / name) << text;
-  }
+  void put(const std::string& name, const std::string& text) const { root_.write(name, text); }
   [[nodiscard]] std::optional<std::uint64_t> limit() const {
-    return cgroup_memory_limit((root_ / "self").string(), (root_ / "fs").string());
+    return cgroup_memory_limit(root_.file("self"), root_.file("fs"));
   }
-  fs::path root_;
+  testkit::TemporaryFolder root_;
 };
 
 TEST_F(CgroupMemory, Version2TakesTheLeastOfTheGroupAndItsParents) {

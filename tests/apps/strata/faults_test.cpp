@@ -17,6 +17,7 @@
 #include "strata/mesh/formats/write_mesh.h"
 #include "strata/mesh/shapes.h"
 #include "tests/apps/strata/run_tool.h"
+#include "tests/support/sanitized.h"
 
 namespace strata {
 namespace {
@@ -147,7 +148,7 @@ TEST_F(Faults, AFileSizeLimitIsCode4AndLeavesNothing) {
 }
 
 TEST_F(Faults, AnInterruptIsCode130AndLeavesNothing) {
-  if (testkit::is_sanitized()) GTEST_SKIP() << "the job would take minutes";
+  if (testkit::kSanitized) GTEST_SKIP() << "the job would take minutes";
   for (const int signal : {SIGINT, SIGTERM}) {
     RunOptions options;
     options.while_running = [&](int pid) {
@@ -184,7 +185,7 @@ TEST_F(Faults, AnInterruptEndsTheWaitForAPipe) {
 }
 
 TEST_F(Faults, TooLittleAddressSpaceIsCode6AndLeavesNothing) {
-  if (testkit::is_sanitized()) GTEST_SKIP() << "sanitizers take address space without limit";
+  if (testkit::kSanitized) GTEST_SKIP() << "sanitizers take address space without limit";
   int refused = 0, done = 0;
   for (rlim_t megabytes = 24; megabytes <= 400; megabytes += megabytes < 100 ? 4 : 50) {
     const RunOptions options{.address_space = megabytes << 20};

@@ -5,19 +5,12 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <csignal>
 #include <cstdlib>
 #include <fstream>
-#include <iterator>
 
 namespace strata::testkit {
 namespace {
-
-std::string contents(const std::filesystem::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-}
 
 void limit(__rlimit_resource resource, const std::optional<rlim_t>& value) {
   if (!value) return;
@@ -33,38 +26,22 @@ void redirect(const char* path, int flags, int to) {
 
 }  // namespace
 
-Workplace::Workplace() {
-  std::string pattern = (std::filesystem::temp_directory_path() / "strata_cli_XXXXXX").string();
-  if (mkdtemp(pattern.data()) == nullptr) ADD_FAILURE() << "no temporary folder";
-  folder_ = std::filesystem::path(pattern) / "here";
-  talk_ = std::filesystem::path(pattern) / "talk";
+Workplace::Workplace() : folder_(place_.path() / "here"), talk_(place_.path() / "talk") {
   std::filesystem::create_directories(folder_);
   std::filesystem::create_directories(talk_);
-}
-
-Workplace::~Workplace() {
-  std::error_code ignored;
-  std::filesystem::remove_all(folder_.parent_path(), ignored);
 }
 
 std::string Workplace::path(const std::string& name) const { return (folder_ / name).string(); }
 bool Workplace::has(const std::string& name) const {
   return std::filesystem::exists(folder_ / name);
 }
-std::string Workplace::read(const std::string& name) const { return contents(folder_ / name); }
+std::string Workplace::read(const std::string& name) const { return bytes_of(folder_ / name); }
 
 void Workplace::write(const std::string& name, const std::string& bytes) const {
   std::ofstream(folder_ / name, std::ios::binary) << bytes;
 }
 
-std::vector<std::string> Workplace::names() const {
-  std::vector<std::string> result;
-  for (const auto& entry : std::filesystem::directory_iterator(folder_)) {
-    result.push_back(entry.path().filename().string());
-  }
-  std::sort(result.begin(), result.end());
-  return result;
-}
+std::vector<std::string> Workplace::names() const { return names_in(folder_); }
 
 RunResult Workplace::run(const std::vector<std::string>& arguments,
                          const RunOptions& options) const {
@@ -118,20 +95,9 @@ RunResult Workplace::run(const std::vector<std::string>& arguments,
   waitpid(child, &status, 0);
   if (WIFEXITED(status)) result.exit_code = WEXITSTATUS(status);
   if (WIFSIGNALED(status)) result.signal = WTERMSIG(status);
-  if (!options.closed_stdout_pipe && !options.stdout_path) result.out = contents(out);
-  result.err = contents(err);
+  if (!options.closed_stdout_pipe && !options.stdout_path) result.out = bytes_of(out);
+  result.err = bytes_of(err);
   return result;
-}
-
-bool is_sanitized() {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-  return true;
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
-  return true;
-#endif
-#endif
-  return false;
 }
 
 }  // namespace strata::testkit

@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/temporary_folder.h"
+
 // Runs the real executable in a folder of its own.
 
 namespace strata::testkit {
@@ -35,9 +37,6 @@ struct RunOptions {
 class Workplace {
  public:
   Workplace();
-  Workplace(const Workplace&) = delete;
-  Workplace& operator=(const Workplace&) = delete;
-  ~Workplace();
 
   /// Runs `strata ARGUMENTS...` here. Relative paths are of this folder.
   RunResult run(const std::vector<std::string>& arguments, const RunOptions& options = {}) const;
@@ -50,11 +49,9 @@ class Workplace {
   [[nodiscard]] std::vector<std::string> names() const;
 
  private:
+  TemporaryFolder place_;
   std::filesystem::path folder_;
   std::filesystem::path talk_;  // beside it, for what the tool says
 };
-
-/// Whether this build has an address sanitizer, which takes address space without limit.
-[[nodiscard]] bool is_sanitized();
 
 }  // namespace strata::testkit

@@ -8,6 +8,7 @@
 #include "strata/mesh/shapes.h"
 #include "strata/mesh/soup_tools.h"
 #include "tests/apps/strata/voxelize_fixture.h"
+#include "tests/support/sanitized.h"
 
 namespace strata {
 namespace {
@@ -187,7 +188,7 @@ TEST_F(VoxelizeTrees, AScenesMemoryIsEstimatedLikeThatOfItsMesh) {
     EXPECT_NE(run.err.find("--memory-limit"), std::string::npos) << run.err;
     EXPECT_FALSE(place.has("a.vdb"));
   }
-  if (testkit::is_sanitized()) return;  // which hold more
+  if (testkit::kSanitized) return;  // which hold more
   for (std::vector<std::string> words :
        {std::vector<std::string>{"ball.csg"}, {"ball.csg", "--ids"}}) {
     words.insert(words.end(), {"-r", "1600", "-o", "a.vdb", "-j", "2", "--memory-limit", "80M"});

@@ -13,6 +13,7 @@
 #include "apps/view/loader.h"
 #include "csg/measure/ray_image.h"
 #include "strata/csg/measure/measure.h"
+#include "tests/support/temporary_folder.h"
 
 namespace strata::view {
 namespace {
@@ -228,17 +229,9 @@ TEST(RayImage, CuttersFarLargerThanTheResultLeaveItDepth) {
 
 class Files : public testing::Test {
  protected:
-  void SetUp() override {
-    std::string pattern = (std::filesystem::temp_directory_path() / "strata_view_XXXXXX").string();
-    ASSERT_NE(mkdtemp(pattern.data()), nullptr);
-    folder_ = pattern;
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-  std::string path(const std::string& name) const { return (folder_ / name).string(); }
-  void write(const std::string& name, const std::string& text) const {
-    std::ofstream(path(name), std::ios::binary) << text;
-  }
-  std::filesystem::path folder_;
+  [[nodiscard]] std::string path(const std::string& name) const { return folder_.file(name); }
+  void write(const std::string& name, const std::string& text) const { folder_.write(name, text); }
+  testkit::TemporaryFolder folder_;
 };
 
 TEST(QuotedNames, AreWhatASceneMayRead) {

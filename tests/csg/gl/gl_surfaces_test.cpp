@@ -4,10 +4,10 @@
 
 #include <gtest/gtest.h>
 
-#include <filesystem>
+#include <algorithm>
 #include <functional>
 #include <glm/gtc/matrix_transform.hpp>
-#include <set>
+#include <vector>
 
 #include "hashbuffer/gl/hash_store.h"
 #include "hashbuffer/gl/scan_store.h"
@@ -15,7 +15,9 @@
 #include "strata/csg/scene/scene.h"
 #include "strata/mesh/shapes.h"
 #include "tests/csg/random_tree.h"
+#include "tests/csg/surface/surface_checks.h"
 #include "tests/gl/gl_testing.h"
+#include "tests/support/corpus.h"
 
 namespace strata::csg {
 namespace {
@@ -52,22 +54,7 @@ class GlSurface : public test::GlTest {
     EXPECT_TRUE(expected) << what;
     EXPECT_TRUE(found) << what << ": " << found.error().message;
     if (!expected || !found) return 0;
-    std::size_t different = 0;
-    for (std::size_t i = 0; i < (*expected)->depth.size(); ++i) {
-      const SurfaceImage &a = **expected, &b = **found;
-      if (a.depth[i] == SurfaceImage::kNone && b.depth[i] == SurfaceImage::kNone) continue;
-      if (a.depth[i] == b.depth[i] && a.solid[i] == b.solid[i] && a.triangle[i] == b.triangle[i]) {
-        continue;
-      }
-      if (++different <= 3) {
-        ADD_FAILURE() << what << ": pixel " << i % static_cast<std::size_t>(size.x) << ", "
-                      << i / static_cast<std::size_t>(size.x) << " is depth " << b.depth[i]
-                      << " solid " << b.solid[i] << " triangle " << b.triangle[i]
-                      << ", the CPU has " << a.depth[i] << " " << a.solid[i] << " "
-                      << a.triangle[i];
-      }
-    }
-    EXPECT_EQ(different, 0u) << what;
+    expect_same_surface(**found, **expected, what);
     walked_ += source_->counts().walked;
     doubtful_ += source_->counts().doubtful;
     left_ += source_->counts().left;
@@ -77,15 +64,6 @@ class GlSurface : public test::GlTest {
   std::unique_ptr<GlSurfaceSource> source_;
   std::uint64_t walked_ = 0, doubtful_ = 0, left_ = 0;
 };
-
-Camera random_camera(RandomTree& random, const Bounds& box) {
-  Camera camera;
-  camera.projection = random.pick(0, 1) == 0 ? Projection::kPerspective : Projection::kOrthographic;
-  centre_camera(camera, box);
-  fit_camera(camera, box);
-  camera.rotation = {random.real(0, 180), random.real(0, 360), random.real(0, 360)};
-  return camera;
-}
 
 TEST_F(GlSurface, RandomTreesLookAsTheyDoToTheCpu) {
   for (int seed = 0; seed < 60; ++seed) {
@@ -406,22 +384,24 @@ TEST_F(GlSurface, PicturesOfAllKindsAreTheCpus) {
 }
 
 TEST_F(GlSurface, ScenesLookAsTheyDoToTheCpu) {
-  const std::filesystem::path folder = STRATA_SOURCE_DIR "/../shared/csg/bench";
-  std::error_code absent;
-  std::set<std::filesystem::path> files;
-  for (const auto& entry : std::filesystem::directory_iterator(folder, absent)) {
-    if (entry.path().extension() == ".csg") files.insert(entry.path());
-  }
-  if (files.empty()) GTEST_SKIP() << "no scenes: they are looked for in shared/csg/bench";
-  for (const auto& file : files) {
-    const auto scene = read_scene(file.string());
+  // OpenSCAD's examples, and a scene of ours.
+  std::vector<testkit::CorpusScene> files = testkit::scene_files();
+  std::erase_if(files, [](const testkit::CorpusScene& entry) {
+    return entry.file.parent_path().filename() != "dumptest-examples" ||
+           entry.name == "example025";  // is no scene
+  });
+  files.push_back({"plate", STRATA_SOURCE_DIR "/data/plate.csg", ""});
+  for (const auto& [name, file, assets] : files) {
+    ReadSceneOptions options;
+    options.asset_folder = assets.string();
+    const auto scene = read_scene(file.string(), options);
     ASSERT_TRUE(scene) << file << ": " << scene.error().message;
     const Bounds box = bounds(scene->tree, scene->tree.root());
     if (box.empty()) continue;
     Camera camera;
     centre_camera(camera, box);
     fit_camera(camera, box);
-    expect_same(scene->tree, camera, {150, 110}, file.filename().string());
+    expect_same(scene->tree, camera, {150, 110}, name);
   }
   EXPECT_GT(walked_, 10000u);
 }
@@ -439,7 +419,8 @@ TEST_F(GlSurface, AMovedSolidIsSeenWhereItIs) {
   const auto expected = own.move_solid(0, m);
   const auto found = other.move_solid(0, m);
   ASSERT_TRUE(expected && found);
-  EXPECT_TRUE((*found)->depth == (*expected)->depth);
+  expect_same_surface(**found, **expected, "moved");
+  EXPECT_GT(std::count((*found)->solid.begin(), (*found)->solid.end(), 0u), 0);
 }
 
 }  // namespace

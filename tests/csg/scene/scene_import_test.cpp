@@ -165,23 +165,24 @@ TEST_F(SceneFiles, BrokenAmfNamesTheLine) {
   EXPECT_NE(message("</object>", "</objekt>").find("a.amf:3: "), std::string::npos);
 }
 
-std::string asset(const std::string& name) {
-  return std::string(STRATA_SOURCE_DIR) + "/../shared/csg/tests/" + name;
-}
+/// A file of Debian's openscad-testing-data.
+fs::path asset(const std::string& name) { return fs::path("/usr/share/openscad") / name; }
+constexpr char kNoAssets[] = "needs Debian's openscad-testing-data";
 
 TEST(SceneAssets, ThreeMfOfLib3mfIsRead) {
-  const std::string path = asset("3mf/far-out-ring.3mf");
-  if (!fs::exists(path)) GTEST_SKIP() << path << " is not there";
+  const fs::path path = asset("testdata/scad/3D/features/import.3mf");
+  if (!fs::exists(path)) GTEST_SKIP() << kNoAssets;
   const auto mesh = read_3mf(path);
   if (!mesh && mesh.error().code == ErrorCode::kUsage) GTEST_SKIP() << mesh.error().message;
   ASSERT_TRUE(mesh.has_value()) << mesh.error().message;
   EXPECT_TRUE(is_closed(*mesh));
-  EXPECT_EQ(mesh->triangles.size(), 3072u);
+  EXPECT_EQ(mesh->triangles.size(), 36u);
+  EXPECT_NEAR(signed_volume(*mesh), 48.810974174, 1e-9);  // from its XML, by another program
 }
 
 TEST(SceneAssets, ZippedAmfIsRead) {
-  const std::string path = asset("amf/split_pyramid.amf");
-  if (!fs::exists(path)) GTEST_SKIP() << path << " is not there";
+  const fs::path path = asset("testdata/amf/split_pyramid.amf");
+  if (!fs::exists(path)) GTEST_SKIP() << kNoAssets;
   const auto mesh = read_amf(path);
   if (!mesh && mesh.error().code == ErrorCode::kUsage) GTEST_SKIP() << mesh.error().message;
   ASSERT_TRUE(mesh.has_value()) << mesh.error().message;

@@ -5,17 +5,15 @@
 #include "strata/csg/picture/picture.h"
 #include "strata/hashbuffer/build_ldi.h"
 #include "tests/csg/random_tree.h"
+#include "tests/csg/surface/surface_checks.h"
 
 namespace strata::csg {
 namespace {
 
-struct Pixel {
-  std::uint32_t depth, solid, triangle;
-  friend bool operator==(const Pixel&, const Pixel&) = default;
-};
-
-/// The visible surfaces from the full lists of all solids in an HA-buffer.
-std::vector<Pixel> by_full_lists(const Tree& tree, const View& view, double relative_precision) {
+/// The visible surfaces from the full lists of all solids in an HA-buffer. They hold that pictures,
+/// which cull, see what measurements see, and use much of what draws pictures: whether that is
+/// right, ray_oracle_test.cpp tells.
+SurfaceImage by_full_lists(const Tree& tree, const View& view, double relative_precision) {
   const Geometry geometry(tree);
   std::vector<ViewPart> parts;
   LatticeMesh all;
@@ -39,7 +37,8 @@ std::vector<Pixel> by_full_lists(const Tree& tree, const View& view, double rela
   const Program program = compile(tree, tree.root());
   SurfaceFinder finder(program);
   const Coincidence coincidence(view, geometry.world_error(tree, relative_precision));
-  std::vector<Pixel> result;
+  SurfaceImage result;
+  result.width = view.size.x, result.height = view.size.y;
   for (int v = 0; v < view.size.y; ++v) {
     for (int u = 0; u < view.size.x; ++u) {
       std::vector<Flip> flips;
@@ -59,8 +58,9 @@ std::vector<Pixel> by_full_lists(const Tree& tree, const View& view, double rela
       const Surface surface = finder.find(flips, FlipFaces(geometry.parts(), parts, coincidence));
       const bool seen = surface.depth != Surface::kNone;
       const std::uint32_t triangle = seen ? parts[surface.solid].source(surface.triangle) : 0;
-      result.push_back(
-          {surface.depth, surface.solid, triangle | (surface.exit ? SurfaceImage::kExit : 0u)});
+      result.depth.push_back(seen ? surface.depth : SurfaceImage::kNone);
+      result.solid.push_back(surface.solid);
+      result.triangle.push_back(triangle | (surface.exit ? SurfaceImage::kExit : 0u));
     }
   }
   return result;
@@ -74,32 +74,7 @@ void expect_same(const Tree& tree, const Camera& camera, const glm::ivec2& size,
   ASSERT_TRUE(view.has_value()) << what;
   const auto image = preview.draw(*view);
   ASSERT_TRUE(image.has_value()) << what << ": " << image.error().message;
-  const std::vector<Pixel> expected = by_full_lists(tree, *view, 0.0);
-  std::size_t different = 0, covered = 0;
-  for (std::size_t i = 0; i < expected.size(); ++i) {
-    const SurfaceImage& found = **image;
-    covered += expected[i].depth != Surface::kNone ? 1 : 0;
-    if (found.depth[i] == Surface::kNone && expected[i].depth == Surface::kNone) continue;
-    const Pixel pixel{found.depth[i], found.solid[i], found.triangle[i]};
-    if (pixel == expected[i]) continue;
-    if (++different <= 3) {
-      ADD_FAILURE() << what << ": pixel " << i % static_cast<std::size_t>(size.x) << ", "
-                    << i / static_cast<std::size_t>(size.x) << " shows depth " << pixel.depth
-                    << " solid " << pixel.solid << " triangle " << pixel.triangle
-                    << ", the lists say " << expected[i].depth << " " << expected[i].solid << " "
-                    << expected[i].triangle;
-    }
-  }
-  EXPECT_EQ(different, 0u) << what << ", of " << covered << " covered";
-}
-
-Camera random_camera(RandomTree& random, const Bounds& box) {
-  Camera camera;
-  camera.projection = random.pick(0, 1) == 0 ? Projection::kPerspective : Projection::kOrthographic;
-  centre_camera(camera, box);
-  fit_camera(camera, box);
-  camera.rotation = {random.real(0, 180), random.real(0, 360), random.real(0, 360)};
-  return camera;
+  expect_same_surface(**image, by_full_lists(tree, *view, 0.0), what);
 }
 
 // The law: a picture culls, a measurement does not, and both see the same.
@@ -184,6 +159,7 @@ TEST(VisibleSurface, ACutterIsAsLargeAsItLikes) {
 }
 
 TEST(VisibleSurface, AMovedSolidGivesTheSameAsAFreshPicture) {
+  std::size_t covered = 0;
   for (int seed = 0; seed < 40; ++seed) {
     RandomTree random(static_cast<std::uint64_t>(seed) + 900);
     Tree tree;
@@ -204,8 +180,9 @@ TEST(VisibleSurface, AMovedSolidGivesTheSameAsAFreshPicture) {
     Preview fresh(other, {}, 0.0);
     const auto expected = fresh.draw(*view);
     ASSERT_TRUE(expected.has_value());
-    EXPECT_EQ((*after)->depth, (*expected)->depth) << "seed " << seed;
+    covered += expect_same_surface(**after, **expected, "seed " + std::to_string(seed));
   }
+  EXPECT_GT(covered, 50'000u);
 }
 
 TEST(VisibleSurface, OpenSolidsShowTheirSheets) {
@@ -227,17 +204,8 @@ Tree::NodeId box_node(Tree& tree, const glm::dvec3& low, const glm::dvec3& high)
   return tree.add_solid({std::make_shared<TriangleSoup>(make_box(low, high))});
 }
 
-/// World position of a pixel's surface.
-glm::dvec3 position(const View& view, int u, int v, std::uint32_t depth) {
-  const double distance = view.distance(depth);
-  const glm::dmat4 image_from_eye = view.image_from_world * glm::inverse(view.eye_from_world);
-  const double w = view.perspective ? distance : 1.0;
-  const double x = ((u + 0.5) - view.size.x / 2.0) * w / image_from_eye[0][0];
-  const double y = ((v + 0.5) - view.size.y / 2.0) * w / image_from_eye[1][1];
-  return glm::dvec3(glm::inverse(view.eye_from_world) * glm::dvec4(x, y, -distance, 1.0));
-}
-
-/// Counts pixels whose surface lies where `is_wrong` says nothing is, from 100 cameras.
+/// Counts pixels whose surface lies where `is_wrong` says nothing is, from 100 cameras, and those
+/// of some that do not show what rays meet, so that nothing is missing.
 std::size_t wrong_pixels(const Tree& tree, const std::function<bool(const glm::dvec3&)>& is_wrong,
                          std::size_t& covered) {
   Preview preview(tree, {}, 0.0);
@@ -248,12 +216,14 @@ std::size_t wrong_pixels(const Tree& tree, const std::function<bool(const glm::d
     const auto view = make_view(camera, {160, 160}, preview.box());
     const auto image = preview.draw(*view);
     EXPECT_TRUE(image.has_value());
+    const RayOracle oracle(tree, *view);
     for (int v = 0; v < 160; ++v) {
       for (int u = 0; u < 160; ++u) {
         const std::uint32_t depth = (*image)->depth[static_cast<std::size_t>(v * 160 + u)];
+        if (i % 5 == 0 && u % 16 == 7 && v % 16 == 7 && !oracle.agrees(u, v, depth)) ++wrong;
         if (depth == SurfaceImage::kNone) continue;
         ++covered;
-        wrong += is_wrong(position(*view, u, v, depth)) ? 1 : 0;
+        wrong += is_wrong(position(*view, u + 0.5, v + 0.5, depth)) ? 1 : 0;
       }
     }
   }
@@ -289,7 +259,6 @@ TEST(CoincidentFaces, ACubeMinusACubeThatSharesFacesShowsOnlyWhatIsLeft) {
         },
         covered);
     EXPECT_EQ(wrong, 0u) << "of " << covered;
-    EXPECT_GT(covered, 100000u);
     EXPECT_GT(covered, 100'000u);
   }
 }
@@ -350,20 +319,31 @@ TEST(CoincidentFaces, TheSameFaceTwiceIsShownInOneColour) {
   const auto b = box_node(tree, {0, 0, 0}, {10, 10, 5});
   tree.set_root(tree.add(Operation::kUnion, {a, b}));
   Preview preview(tree, {}, 0.0);
+  std::size_t all = 0;
   for (int i = 0; i < 50; ++i) {
     RandomTree random(static_cast<std::uint64_t>(i) + 7);
     const auto view = make_view(random_camera(random, preview.box()), {120, 120}, preview.box());
     const auto image = preview.draw(*view);
-    std::size_t second = 0, all = 0;
-    for (std::size_t p = 0; p < (*image)->depth.size(); ++p) {
-      if ((*image)->depth[p] == SurfaceImage::kNone) continue;
-      ++all;
-      second += (*image)->solid[p] == 1 ? 1 : 0;
+    const auto shows = [&](int u, int v) {
+      const bool within = u >= 0 && v >= 0 && u < 120 && v < 120;
+      const auto at = static_cast<std::size_t>(v * 120 + u);
+      return !within || (*image)->depth[at] == SurfaceImage::kNone
+                 ? -1
+                 : static_cast<int>((*image)->solid[at]);
+    };
+    for (int v = 0; v < 120; ++v) {
+      for (int u = 0; u < 120; ++u) {
+        all += shows(u, v) >= 0 ? 1 : 0;
+        if (shows(u, v) != 1) continue;
+        // The side walls of the second have upper corners of their own, which are snapped: at the
+        // outline of the picture they may cover a pixel that the first does not.
+        bool at_outline = false;
+        for (int i9 = 0; i9 < 9; ++i9) at_outline |= shows(u + i9 % 3 - 1, v + i9 / 3 - 1) < 0;
+        EXPECT_TRUE(at_outline) << "camera " << i << ", pixel " << u << ", " << v;
+      }
     }
-    // The faces' outlines are snapped alike, for their corners are the same; only the side walls
-    // have corners of their own.
-    EXPECT_LE(second, all / 500) << "camera " << i;
   }
+  EXPECT_GT(all, 100'000u);
 }
 
 TEST(CoincidentFaces, ACutFaceShowsNothingOfTheFacesThatEndInIt) {
@@ -390,7 +370,7 @@ TEST(CoincidentFaces, ACutFaceShowsNothingOfTheFacesThatEndInIt) {
         const auto at = static_cast<std::size_t>(v * 200 + u);
         const std::uint32_t depth = (*image)->depth[at];
         if (depth == SurfaceImage::kNone) continue;
-        const glm::dvec3 p = position(*view, u, v, depth);
+        const glm::dvec3 p = position(*view, u + 0.5, v + 0.5, depth);
         // Faces that end in the cut face may be seen right at its outline.
         const auto within = [&](double x0, double x1, double z0, double z1) {
           return p.x > x0 + 0.2 && p.x < x1 - 0.2 && p.z > z0 + 0.2 && p.z < z1 - 0.2;
@@ -455,7 +435,6 @@ TEST(ConcaveSolids, ShowNothingThatIsNotThere) {
       },
       covered);
   EXPECT_EQ(wrong, 0u) << "of " << covered;
-  EXPECT_GT(covered, 100000u);
   EXPECT_GT(covered, 100'000u);
 }
 
@@ -542,7 +521,6 @@ TEST(NestedDifferences, ShowNothingThatIsNotThere) {
       },
       covered);
   EXPECT_EQ(wrong, 0u) << "of " << covered;
-  EXPECT_GT(covered, 100000u);
   EXPECT_GT(covered, 100'000u);
 }
 

@@ -81,7 +81,7 @@ class ExrBridge : public testing::Test {
     EXPECT_TRUE(written.has_value()) << written.error().message;
     return look(path);
   }
-  ScratchFolder folder;
+  TemporaryFolder folder;
   std::string path = folder.file("lists.exr");
 };
 
@@ -212,7 +212,7 @@ TEST_F(ExrBridge, TheHeaderHoldsTheTransform) {
 
 TEST_F(ExrBridge, ASizeThatLiesIsRefusedBeforeMemoryIsTaken) {
   ASSERT_TRUE(write_ldi_exr(path, random_image(5, 6, 5)));
-  std::string bytes = read_bytes(path);
+  std::string bytes = testkit::bytes_of(path);
   const std::size_t at = bytes.find(std::string("dataWindow\0box2i\0", 17));
   ASSERT_NE(at, std::string::npos);
   const std::int32_t side = 65535;

@@ -68,9 +68,9 @@ class LdiFile : public testing::TestWithParam<Format> {
     EXPECT_EQ(read->world_from_image, image.world_from_image);
     EXPECT_EQ(read->offsets, image.offsets);
     EXPECT_TRUE(read->items == image.items);
-    EXPECT_EQ(folder.count(), 1) << "something was left beside the file";
+    EXPECT_EQ(folder.names().size(), 1) << "something was left beside the file";
   }
-  ScratchFolder folder;
+  TemporaryFolder folder;
 };
 
 INSTANTIATE_TEST_SUITE_P(Formats, LdiFile, testing::ValuesIn(formats()),
@@ -114,7 +114,7 @@ TEST_P(LdiFile, KeepsCrossingsThatMakeNoInterval) {
 TEST_P(LdiFile, EveryTruncationIsAnErrorThatNamesTheFile) {
   const std::string path = folder.file("lists"), cut = folder.file("cut");
   ASSERT_TRUE(GetParam().write(path, random_image(3, 4, 3), {}));
-  const std::string bytes = read_bytes(path);
+  const std::string bytes = testkit::bytes_of(path);
   ASSERT_GT(bytes.size(), 300u);
   for (std::size_t length = 0; length < bytes.size(); ++length) {
     write_bytes(cut, bytes.substr(0, length));
@@ -128,7 +128,7 @@ TEST_P(LdiFile, EveryTruncationIsAnErrorThatNamesTheFile) {
 TEST_P(LdiFile, DamageIsAnErrorOrHarmless) {
   const std::string path = folder.file("lists"), damaged = folder.file("damaged");
   ASSERT_TRUE(GetParam().write(path, random_image(4, 5, 4), {}));
-  const std::string bytes = read_bytes(path);
+  const std::string bytes = testkit::bytes_of(path);
   std::mt19937_64 random(5);
   Execution execution;
   execution.memory_limit = 1 << 24;
@@ -185,7 +185,7 @@ TEST_P(LdiFile, AFullDiskIsAnErrorAndLeavesNothing) {
     setrlimit(RLIMIT_FSIZE, &before);
     ASSERT_FALSE(written.has_value());
     EXPECT_EQ(written.error().code, ErrorCode::kOutput) << written.error().message;
-    EXPECT_EQ(folder.count(), 0);
+    EXPECT_EQ(folder.names().size(), 0);
   }
   std::signal(SIGXFSZ, handler);
 }
@@ -204,7 +204,7 @@ TEST_P(LdiFile, TheSameBytesForAnyNumberOfThreadsAndOnStandardOutput) {
   ASSERT_TRUE(GetParam().write(one, image, execution));
   execution.threads = 4;
   ASSERT_TRUE(GetParam().write(four, image, execution));
-  EXPECT_EQ(read_bytes(one), read_bytes(four));
+  EXPECT_EQ(testkit::bytes_of(one), testkit::bytes_of(four));
 
   std::fflush(stdout);
   const int saved = dup(STDOUT_FILENO);
@@ -215,7 +215,7 @@ TEST_P(LdiFile, TheSameBytesForAnyNumberOfThreadsAndOnStandardOutput) {
   close(file);
   close(saved);
   ASSERT_TRUE(written.has_value()) << written.error().message;
-  EXPECT_EQ(read_bytes(one), read_bytes(out));
+  EXPECT_EQ(testkit::bytes_of(one), testkit::bytes_of(out));
 }
 
 TEST_P(LdiFile, AMemoryLimitStopsReadingWithItsNumber) {
@@ -243,7 +243,7 @@ TEST_P(LdiFile, AStopRequestCancelsAndLeavesNothing) {
   const auto written = GetParam().write(path, random_image(10, 20, 20), execution);
   ASSERT_FALSE(written.has_value());
   EXPECT_EQ(written.error().code, ErrorCode::kCancelled);
-  EXPECT_EQ(folder.count(), 0);
+  EXPECT_EQ(folder.names().size(), 0);
   ASSERT_TRUE(GetParam().write(path, random_image(10, 20, 20), {}));
   EXPECT_EQ(GetParam().read(path, execution).error().code, ErrorCode::kCancelled);
 }
@@ -262,7 +262,7 @@ TEST_P(LdiFile, InvalidListsAreNotWritten) {
     ASSERT_FALSE(written.has_value());
     EXPECT_EQ(written.error().code, ErrorCode::kUsage);
   }
-  EXPECT_EQ(folder.count(), 0);
+  EXPECT_EQ(folder.names().size(), 0);
   const auto error = check_layered_depth_image(unsorted).error().message;
   EXPECT_NE(error.find("pixel (1, 0)"), std::string::npos) << error;
 }
@@ -279,12 +279,12 @@ TEST_P(LdiFile, ProgressEndsAtOne) {
 #ifdef STRATA_HAVE_MINIZIP
 TEST(LdiNpz, ArraysStandWhereNumpyLooksForThem) {
   // A stored archive holds each array as a .npy file, as it is: look for the bytes.
-  ScratchFolder folder;
+  TemporaryFolder folder;
   const std::string path = folder.file("lists.npz");
   LayeredDepthImage image = image_of(2, 1, {{DepthItem(7, false, 3)}, {}});
   image.world_from_image[3][0] = 42.5;  // a shift along x: first row, last column for NumPy
   ASSERT_TRUE(write_ldi_npz(path, image));
-  const std::string bytes = read_bytes(path);
+  const std::string bytes = testkit::bytes_of(path);
   EXPECT_EQ(bytes.substr(0, 4), std::string("PK\3\4"));
   const auto array = [&](const std::string& head, const void* data, std::size_t size) {
     const std::size_t at = bytes.find(head);

@@ -11,11 +11,11 @@
 #include "strata/mesh/formats/write_mesh.h"
 #include "strata/mesh/openmesh_bridge.h"
 #include "strata/mesh/shapes.h"
-#include "tests/mesh/formats/mesh_corpus.h"
+#include "tests/support/corpus.h"
+#include "tests/support/temporary_folder.h"
 
 namespace strata {
 namespace {
-using namespace testing_mesh;
 
 TEST(OpenMeshBridge, ClosedMeshGoesThereAndBackUnchanged) {
   const TriangleSoup mesh = make_torus(2.0, 0.7, 20, 10);
@@ -78,13 +78,10 @@ TEST(OpenMeshBridge, DeletedFacesStayBehindAndPolygonsBecomeFans) {
 }
 
 TEST(OpenMeshReader, FileThatAbortsItIsRefusedBefore) {
-  const std::string path =
-      testing::TempDir() + "strata_abort_" + std::to_string(::getpid()) + ".obj";
-  std::ofstream(path) << "f /1";
+  const testkit::TemporaryFolder folder;
   MeshReadOptions options;
   options.reader = MeshReader::kOpenMesh;
-  const auto file = read_mesh(path, options);
-  std::remove(path.c_str());
+  const auto file = read_mesh(folder.write("abort.obj", "f /1"), options);
   ASSERT_FALSE(file.has_value());
   EXPECT_EQ(file.error().code, ErrorCode::kInput);
   EXPECT_NE(file.error().message.find("OpenMesh was not asked"), std::string::npos);
@@ -165,13 +162,12 @@ const std::map<std::string, Difference> kKnown = {
 };
 
 TEST(OpenMeshReader, AgreesWithOursOnPublicFilesButForKnownDifferences) {
-  const std::string scratch = testing::TempDir() + "strata_openmesh_" + std::to_string(::getpid());
-  const auto files = corpus_files(scratch);
+  if (testkit::mesh_files().empty()) GTEST_SKIP() << testkit::kNoMeshes;
   int compared = 0;
-  for (const CorpusFile& entry : files) {
+  for (const testkit::CorpusFile& entry : testkit::mesh_files()) {
     SCOPED_TRACE(entry.name);
     const auto own = read_mesh(entry.path);
-    if (!own) continue;  // corpus_test.cpp lists these
+    if (!own) continue;  // mesh_corpus_test.cpp lists these
     const auto other = read_with_openmesh(entry.path);
     const long triangles = other ? static_cast<long>(other->stats.triangles) : -1;
     if (const auto known = kKnown.find(entry.name); known != kKnown.end()) {
@@ -190,11 +186,6 @@ TEST(OpenMeshReader, AgreesWithOursOnPublicFilesButForKnownDifferences) {
       ASSERT_TRUE(same_polygon(a[i], b[i], size * 0x1p-23)) << "polygon " << i;
     }
     ++compared;
-  }
-  std::filesystem::remove_all(scratch);
-  if (files.empty()) {
-    GTEST_SKIP() << "no public meshes here (Debian: assimp-testmodels, openscad-testing-data, "
-                    "libcgal-demo)";
   }
   EXPECT_GT(compared, 0);
 }

@@ -12,6 +12,7 @@
 #include "strata/mesh/formats/write_mesh.h"
 #include "strata/mesh/shapes.h"
 #include "tests/mesh/formats/reading.h"
+#include "tests/support/temporary_folder.h"
 
 namespace strata {
 namespace {
@@ -21,21 +22,12 @@ namespace fs = std::filesystem;
 /// A folder of its own for each test.
 class ReadMesh : public ::testing::Test {
  protected:
-  void SetUp() override {
-    folder_ = fs::temp_directory_path() /
-              fmt::format("strata_read_mesh_{}_{}", ::getpid(),
-                          ::testing::UnitTest::GetInstance()->current_test_info()->name());
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
   std::string write(const std::string& name, std::string_view bytes) {
-    const std::string path = folder_ / name;
-    std::ofstream(path, std::ios::binary) << bytes;
-    return path;
+    return place_.write(name, bytes);
   }
 
-  fs::path folder_;
+  const testkit::TemporaryFolder place_;
+  const fs::path folder_ = place_.path();
 };
 
 const TriangleSoup& ball() {

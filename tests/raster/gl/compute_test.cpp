@@ -171,14 +171,9 @@ TEST_F(ComputeRasterizerTest, BandsOfRowsAreTheRowsOfTheWhole) {
 }
 
 TEST_F(ComputeRasterizerTest, RealMeshesGiveTheFragmentsOfTheReference) {
-  int read = 0;
-  for (const char* name : {"stanford-bunny", "cow", "suzanne", "teapot"}) {
-    if (const auto soup = testkit::shared_model(name)) {
-      expect_same(*soup, 200, name);
-      ++read;
-    }
-  }
-  if (read == 0) GTEST_SKIP() << testkit::kNoModels;
+  const auto meshes = testkit::scans({"bunny00", "cow", "homer", "lion-head"});
+  if (meshes.empty()) GTEST_SKIP() << testkit::kNoScans;
+  for (const auto& [name, mesh] : meshes) expect_same(mesh, 200, name);
 }
 
 }  // namespace

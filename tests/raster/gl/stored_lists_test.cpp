@@ -192,10 +192,8 @@ TEST_F(StoredLists, OfRealMeshesAreTheCpus) {
     ASSERT_TRUE(soup) << name << ": " << soup.error().message;
     expect_same(soup->soup, testkit::grid_around(soup->soup, 150), name);
   }
-  for (const char* name : {"stanford-bunny", "rocker-arm"}) {
-    if (const auto soup = testkit::shared_model(name)) {
-      expect_same(*soup, testkit::grid_around(*soup, 256), name);
-    }
+  for (const auto& [name, mesh] : testkit::scans({"bunny00", "man"})) {
+    expect_same(mesh, testkit::grid_around(mesh, 256), name);
   }
 }
 

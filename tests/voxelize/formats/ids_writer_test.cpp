@@ -92,11 +92,11 @@ TEST_P(Ids, AreTheSameBytesForAnyThreadsSlabsAndAxis) {
     ASSERT_TRUE(write(name, cut(of_axis(axis), 1), largest, 5));
     const std::filesystem::path a = folder_.file("a"), b = folder_.file(name);
     if (!std::filesystem::is_directory(a)) {
-      EXPECT_EQ(file_bytes(a), file_bytes(b));
+      EXPECT_EQ(testkit::bytes_of(a), testkit::bytes_of(b));
       continue;
     }
     for (const auto& entry : std::filesystem::directory_iterator(a)) {
-      EXPECT_EQ(file_bytes(entry.path()), file_bytes(b / entry.path().filename()));
+      EXPECT_EQ(testkit::bytes_of(entry.path()), testkit::bytes_of(b / entry.path().filename()));
     }
   }
 }

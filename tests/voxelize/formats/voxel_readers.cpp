@@ -178,10 +178,10 @@ glm::dvec3 three_doubles(const std::string& npy) {
 
 }  // namespace
 
-ReadVoxels read_npy(const std::string& path) { return parse_npy(file_bytes(path)); }
+ReadVoxels read_npy(const std::string& path) { return parse_npy(testkit::bytes_of(path)); }
 
 ReadVoxels read_npz(const std::string& path) {
-  const auto arrays = read_zip(file_bytes(path));
+  const auto arrays = read_zip(testkit::bytes_of(path));
   require(arrays.size() == 3, "three arrays");
   auto voxels = parse_npy(arrays.at("voxels.npy"));
   voxels.origin = three_doubles(arrays.at("origin.npy"));
@@ -190,7 +190,7 @@ ReadVoxels read_npz(const std::string& path) {
 }
 
 ReadVoxels read_nrrd(const std::string& path) {
-  const std::string data = file_bytes(path);
+  const std::string data = testkit::bytes_of(path);
   require(data.starts_with("NRRD0004\n"), "magic");
   const std::size_t end = data.find("\n\n");
   require(end != std::string::npos, "end of header");
@@ -214,7 +214,7 @@ ReadVoxels read_nrrd(const std::string& path) {
 }
 
 ReadVoxels read_vti(const std::string& path) {
-  const std::string data = file_bytes(path);
+  const std::string data = testkit::bytes_of(path);
   const std::string marker = "<AppendedData encoding=\"raw\">\n_";
   const std::size_t begin = data.find(marker);
   require(begin != std::string::npos, "appended data");
@@ -259,7 +259,7 @@ ReadVoxels read_vti(const std::string& path) {
 }
 
 ReadVoxels read_binvox(const std::string& path, glm::ivec3 dims) {
-  const std::string data = file_bytes(path);
+  const std::string data = testkit::bytes_of(path);
   const std::size_t end = data.find("\ndata\n");
   require(data.starts_with("#binvox 1\n") && end != std::string::npos, "header");
   const std::string header = data.substr(0, end + 1);
@@ -404,7 +404,7 @@ void read_vox_chunk(const std::string& id, const std::string& content, VoxScene&
 }  // namespace
 
 ReadVoxels read_vox(const std::string& path, glm::ivec3 dims) {
-  const std::string data = file_bytes(path);
+  const std::string data = testkit::bytes_of(path);
   require(data.starts_with("VOX "), "magic");
   require(number_at<std::int32_t>(data, 4) == 150, "version");
   require(data.substr(8, 4) == "MAIN" && number_at<std::int32_t>(data, 12) == 0, "MAIN");
@@ -462,7 +462,7 @@ void take_grey(const std::string& file, int k, ReadVoxels& voxels) {
 }  // namespace
 
 ReadVoxels read_png_folder(const std::string& path) {
-  const std::string json = file_bytes(path + "/slices.json");
+  const std::string json = testkit::bytes_of(path + "/slices.json");
   auto voxels = of_size(vector_of<glm::ivec3>(match(json, "\"dims\": \\[([^\\]]*)\\]")));
   voxels.origin = vector_of<glm::dvec3>(match(json, "\"origin\": \\[([^\\]]*)\\]"));
   voxels.voxel_size = vector_of<glm::dvec3>(match(json, "\"voxel_size\": \\[([^\\]]*)\\]"));
@@ -477,7 +477,7 @@ ReadVoxels read_png_folder(const std::string& path) {
   for (int k = 0; k < voxels.dims.z; ++k) {
     std::array<char, 32> name;
     std::snprintf(name.data(), name.size(), "/slice_%05d.png", k);
-    const std::string file = file_bytes(path + name.data());
+    const std::string file = testkit::bytes_of(path + name.data());
     png_image image{};
     image.version = PNG_IMAGE_VERSION;
     require(png_image_begin_read_from_memory(&image, file.data(), file.size()) != 0, image.message);
@@ -506,8 +506,8 @@ ReadVoxels read_png_folder(const std::string& path) {
 }
 
 ReadVoxels read_zarr(const std::string& path) {
-  const std::string array = file_bytes(path + "/.zarray");
-  const std::string attributes = file_bytes(path + "/.zattrs");
+  const std::string array = testkit::bytes_of(path + "/.zarray");
+  const std::string attributes = testkit::bytes_of(path + "/.zattrs");
   const std::string type = match(array, "\"dtype\": \"([^\"]*)\"");
   require(type == "|u1" || type == "<u2" || type == "<u4", "type");
   require(match(array, "\"order\": \"(.)\"") == "C", "order");
@@ -525,7 +525,7 @@ ReadVoxels read_zarr(const std::string& path) {
     std::replace(name.begin(), name.end(), '.', ' ');
     const glm::ivec3 corner = vector_of<glm::ivec3>(name) * chunks;
     const std::size_t bytes = volume(chunks) * value_bytes;
-    const std::string chunk = inflate_all(file_bytes(entry.path()), 15, bytes);
+    const std::string chunk = inflate_all(testkit::bytes_of(entry.path()), 15, bytes);
     require(chunk.size() == bytes, "size of a chunk");
     require(chunk.find_first_not_of('\0') != std::string::npos, "an empty chunk was written");
     std::size_t at = 0;

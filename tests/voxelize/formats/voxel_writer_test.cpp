@@ -43,12 +43,12 @@ ReadVoxels read(const std::string& path, const std::string& format, glm::ivec3 d
 
 /// All bytes of a file, or of the files of a folder with their names.
 std::string all_bytes(const std::string& path) {
-  if (!std::filesystem::is_directory(path)) return file_bytes(path);
+  if (!std::filesystem::is_directory(path)) return testkit::bytes_of(path);
   std::vector<std::filesystem::path> files;
   for (const auto& entry : std::filesystem::directory_iterator(path)) files.push_back(entry);
   std::sort(files.begin(), files.end());
   std::string bytes;
-  for (const auto& file : files) bytes += file.filename().string() + "\n" + file_bytes(file);
+  for (const auto& file : files) bytes += file.filename().string() + "\n" + testkit::bytes_of(file);
   return bytes;
 }
 
@@ -370,7 +370,7 @@ TEST_P(OnPipes, StandardOutputGetsTheFile) {
       EXPECT_EQ(solid, set.solid_voxels());
     } else {
       ASSERT_TRUE(write(path, format().name, set));
-      EXPECT_EQ(piped, file_bytes(path));
+      EXPECT_EQ(piped, testkit::bytes_of(path));
     }
   }
 }
@@ -500,7 +500,7 @@ TEST(PngWriter, ALayerIsSeenUprightFromAbove) {
                         return i == 0 || (j == 4 && i < 4) || (j == 2 && i < 3);
                       }};
   ASSERT_TRUE(write(folder.file("f/"), "", intervals_of(sample, Axis::kX)));
-  const std::string file = file_bytes(folder.file("f/slice_00000.png"));
+  const std::string file = testkit::bytes_of(folder.file("f/slice_00000.png"));
   const std::size_t data = file.find("IDAT") + 4;
   const std::size_t end = file.find("IEND") - 8;
   const std::string rows = inflate_all(file.substr(data, end - data), 15, 10);
@@ -513,7 +513,7 @@ TEST(PngWriter, AFolderWithContentIsNotReplaced) {
   std::ofstream(folder.file("slices/mine.txt")) << "keep";
   const auto writer = open_voxel_writer(folder.file("slices/"), "", make_grid({4, 4, 4}));
   EXPECT_FALSE(writer && (*writer)->finish({}));
-  EXPECT_EQ(file_bytes(folder.file("slices/mine.txt")), "keep");
+  EXPECT_EQ(testkit::bytes_of(folder.file("slices/mine.txt")), "keep");
 }
 
 // Sizes of 32 bits end at 4 GiB; the file itself is small.
@@ -522,7 +522,7 @@ TEST(NpzWriter, AnArrayOfTwoGibibytesHasSizesOf64Bits) {
   const VoxelGrid grid = make_grid({2048, 1024, 1024});
   const VoxelIntervals set(grid, Axis::kX);
   ASSERT_TRUE(write(folder.file("a.npz"), "", set));
-  const std::string file = file_bytes(folder.file("a.npz"));
+  const std::string file = testkit::bytes_of(folder.file("a.npz"));
   const auto number = [&](std::size_t at) {
     std::uint64_t value = 0;
     std::memcpy(&value, file.data() + at, sizeof value);
@@ -554,7 +554,8 @@ TEST(VtiWriter, NamesAreEscaped) {
   options.name = "a \"<&>\" b";
   auto writer = open_voxel_writer(path, "", set.grid(), options);
   ASSERT_TRUE(writer && (*writer)->add(set, {}) && (*writer)->finish({}));
-  EXPECT_NE(file_bytes(path).find("Name=\"a &quot;&lt;&amp;&gt;&quot; b\""), std::string::npos);
+  EXPECT_NE(testkit::bytes_of(path).find("Name=\"a &quot;&lt;&amp;&gt;&quot; b\""),
+            std::string::npos);
 }
 
 TEST(NrrdWriter, NamesCannotEndTheHeader) {

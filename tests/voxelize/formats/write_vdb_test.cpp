@@ -117,7 +117,7 @@ TEST_F(WriteVdb, TreeIsByteForByteTheOneOpenVdbWrites) {
       VoxelWriterOptions options;
       options.mask = mask;
       const std::string path = write(set, options);
-      const std::string bytes = file_bytes(path);
+      const std::string bytes = testkit::bytes_of(path);
       ASSERT_GT(bytes.size(), expected.size());
       EXPECT_TRUE(bytes.ends_with(expected));
       if (mask) {
@@ -136,7 +136,7 @@ TEST_F(WriteVdb, InsideIsTiles) {
   std::vector<openvdb::Index32> nodes = read_back->tree().nodeCount();
   EXPECT_EQ(nodes.at(1), 27u - 8u);
   EXPECT_EQ(read_back->activeVoxelCount(), set.solid_voxels());
-  EXPECT_TRUE(file_bytes(write(set)).ends_with(tree_bytes(*reference(set))));
+  EXPECT_TRUE(testkit::bytes_of(write(set)).ends_with(tree_bytes(*reference(set))));
 }
 
 TEST_F(WriteVdb, GridsBeyondOneRootNodeKeepTheirOrder) {
@@ -149,7 +149,8 @@ TEST_F(WriteVdb, GridsBeyondOneRootNodeKeepTheirOrder) {
     const VoxelIntervals set = intervals_of(sample, Axis::kZ);
     const std::string path = write(set);
     EXPECT_EQ(read<openvdb::BoolGrid>(path)->activeVoxelCount(), set.solid_voxels());
-    EXPECT_TRUE(file_bytes(path).ends_with(tree_bytes(*reference(set)))) << dims.x << " " << dims.y;
+    EXPECT_TRUE(testkit::bytes_of(path).ends_with(tree_bytes(*reference(set))))
+        << dims.x << " " << dims.y;
   }
 }
 
@@ -164,7 +165,7 @@ TEST_F(WriteVdb, SolidRootNodeIsOneTile) {
   }
   for (const bool fog : {false, true}) {
     const std::string path = write(set, of_kind(fog));
-    EXPECT_LT(file_bytes(path).size(), 2000u);
+    EXPECT_LT(testkit::bytes_of(path).size(), 2000u);
     openvdb::io::File file(path);
     file.open();
     const auto read_back = file.readGrid(fog ? "density" : "solid");
@@ -253,7 +254,7 @@ TEST_F(WriteVdb, IdsAreTheTreeThatOpenVdbMakes) {
     options.ids = 3'000'000;
     options.name = "ids";
     const std::string path = write(set, options);
-    EXPECT_EQ(file_bytes(write(set, options, 5, 1)), file_bytes(path));
+    EXPECT_EQ(testkit::bytes_of(write(set, options, 5, 1)), testkit::bytes_of(path));
     const auto grid = read<openvdb::FloatGrid>(path, "ids");
     EXPECT_EQ(grid->background(), 0.0f);
     EXPECT_EQ(grid->activeVoxelCount(), set.solid_voxels());
@@ -409,10 +410,10 @@ TEST_F(WriteVdb, BytesDoNotDependOnThreadsOrSlabs) {
     SCOPED_TRACE(sample.name);
     const VoxelIntervals set = intervals_of(sample, Axis::kZ);
     for (const bool fog : {false, true}) {
-      const std::string expected = file_bytes(write(set, of_kind(fog), 1));
-      EXPECT_EQ(file_bytes(write(set, of_kind(fog), 1)), expected);
-      EXPECT_EQ(file_bytes(write(set, of_kind(fog), 2, 1)), expected);
-      EXPECT_EQ(file_bytes(write(set, of_kind(fog), 5, 2)), expected);
+      const std::string expected = testkit::bytes_of(write(set, of_kind(fog), 1));
+      EXPECT_EQ(testkit::bytes_of(write(set, of_kind(fog), 1)), expected);
+      EXPECT_EQ(testkit::bytes_of(write(set, of_kind(fog), 2, 1)), expected);
+      EXPECT_EQ(testkit::bytes_of(write(set, of_kind(fog), 5, 2)), expected);
     }
   }
 }
