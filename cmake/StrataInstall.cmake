@@ -20,57 +20,58 @@ endif()
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 set(strata_package_dir "${CMAKE_INSTALL_LIBDIR}/cmake/strata")
-set(strata_include_dir "${CMAKE_INSTALL_INCLUDEDIR}/strata")
 
-install(TARGETS strata_all ${strata_libraries} EXPORT strata)
+# Public headers are those that the libraries list as HEADERS, and those right in strata/. Headers of a library that is not
+# built are not installed: one without its library, or without the package it includes, is a trap.
+file(GLOB strata_umbrella_headers CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/strata/*.h")
+target_sources(strata_all INTERFACE
+  FILE_SET HEADERS BASE_DIRS "${PROJECT_SOURCE_DIR}" FILES ${strata_umbrella_headers})
+install(TARGETS strata_all ${strata_libraries} EXPORT strata FILE_SET HEADERS DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
 if(strata_tools)
   install(TARGETS ${strata_tools})
 endif()
 install(EXPORT strata NAMESPACE strata:: FILE strataTargets.cmake DESTINATION "${strata_package_dir}")
 
-# Public headers are those below strata/; they include no others. Only those of libraries that are built are installed: a
-# header without its library, or without the package it includes, is a trap.
-set(strata_folders ".")
-foreach(library IN LISTS strata_libraries)
-  get_target_property(folder ${library} SOURCE_DIR)
-  cmake_path(RELATIVE_PATH folder BASE_DIRECTORY "${PROJECT_SOURCE_DIR}")
-  list(APPEND strata_folders "${folder}")
-endforeach()
-list(REMOVE_DUPLICATES strata_folders)
-foreach(folder IN LISTS strata_folders)
-  file(GLOB headers CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/strata/${folder}/*.h")
-  if(NOT STRATA_HAVE_OPENVDB)
-    list(FILTER headers EXCLUDE REGEX "/openvdb_bridge\\.h$")
-  endif()
-  if(NOT STRATA_HAVE_OPENMESH)
-    list(FILTER headers EXCLUDE REGEX "/openmesh_bridge\\.h$")
-  endif()
-  install(FILES ${headers} DESTINATION "${strata_include_dir}/${folder}")
-endforeach()
-
 # --- the CMake package: whoever links the static libraries needs what they were built with -------------------------------
 set(strata_find_dependencies "")  # lines of strataConfig.cmake
 set(strata_pc_requires "")        # modules of strata.pc
 set(strata_pc_libraries "")       # libraries that have no module
+set(strata_components "")         # what find_package(strata COMPONENTS ...) takes: gl, mesh, ...
+set(strata_component_needs "")    # for each, a line of strataConfig.cmake: all targets it links, directly or not
 set(strata_links "")
-foreach(library IN LISTS strata_libraries)
+foreach(library IN LISTS strata_libraries strata_bridges)  # foundations first
+  get_target_property(component ${library} EXPORT_NAME)
   get_target_property(links ${library} LINK_LIBRARIES)
-  list(APPEND strata_links ${links})
+  set(needs_${component} "")
+  foreach(link IN LISTS links)
+    if(link MATCHES "^strata::(.*)$")
+      list(APPEND needs_${component} ${needs_${CMAKE_MATCH_1}})
+    else()
+      list(APPEND needs_${component} ${link})
+    endif()
+  endforeach()
+  list(REMOVE_DUPLICATES needs_${component})
+  list(APPEND strata_components ${component})
+  if(library IN_LIST strata_bridges)
+    list(REMOVE_ITEM needs_${component} OpenVDB::openvdb)  # StrataFindOpenVDB.cmake finds it
+  endif()
+  list(APPEND strata_links ${needs_${component}})
+  list(JOIN needs_${component} " " needs)
+  string(APPEND strata_component_needs "set(strata_${component}_needs ${needs})\n")
 endforeach()
 list(REMOVE_DUPLICATES strata_links)
-list(FILTER strata_links EXCLUDE REGEX "^strata::")
-list(REMOVE_ITEM strata_links ${strata_libraries})
+list(JOIN strata_components " " strata_components)
 
 # strata_depends(TARGET LINE MODULE LIBRARY): what a link to TARGET asks of a user of the libraries.
 macro(strata_depends target line module library)
   if("${target}" IN_LIST strata_links)
     list(REMOVE_ITEM strata_links "${target}")
-    string(APPEND strata_find_dependencies "${line}\n")
+    string(APPEND strata_find_dependencies "if(\"${target}\" IN_LIST strata_needs)\n  ${line}\nendif()\n")
     string(APPEND strata_pc_requires " ${module}")
     string(APPEND strata_pc_libraries " ${library}")
   endif()
 endmacro()
-set(pc_modules "find_dependency(PkgConfig)\npkg_check_modules")
+set(pc_modules "find_dependency(PkgConfig)\n  pkg_check_modules")
 strata_depends(Threads::Threads "find_dependency(Threads)" "" "-pthread")
 strata_depends(fmt::fmt "find_dependency(fmt)" fmt "")
 strata_depends(glm::glm "find_dependency(glm)" "" "")
@@ -100,10 +101,12 @@ foreach(list strata_pc_requires strata_pc_libraries)
 endforeach()
 set(strata_find_bridges "")
 if(strata_bridges)  # without OpenVDB there is no target strata::openvdb, and all else works
-  install(TARGETS ${strata_bridges} EXPORT strata_bridges)
+  install(TARGETS ${strata_bridges} EXPORT strata_bridges FILE_SET HEADERS DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
   install(EXPORT strata_bridges NAMESPACE strata:: FILE strataBridges.cmake DESTINATION "${strata_package_dir}")
-  string(APPEND strata_find_bridges "include(\"\${CMAKE_CURRENT_LIST_DIR}/StrataFindOpenVDB.cmake\")\n"
-    "if(STRATA_OPENVDB_FOUND)\n  include(\"\${CMAKE_CURRENT_LIST_DIR}/strataBridges.cmake\")\nendif()\n")
+  string(APPEND strata_find_bridges "if(\"openvdb\" IN_LIST strata_wanted)\n"
+    "  include(\"\${CMAKE_CURRENT_LIST_DIR}/StrataFindOpenVDB.cmake\")\n"
+    "  set(strata_openvdb_FOUND \${STRATA_OPENVDB_FOUND})\n"
+    "  if(STRATA_OPENVDB_FOUND)\n    include(\"\${CMAKE_CURRENT_LIST_DIR}/strataBridges.cmake\")\n  endif()\nendif()\n")
   install(FILES "${PROJECT_SOURCE_DIR}/cmake/StrataFindOpenVDB.cmake" DESTINATION "${strata_package_dir}")
 endif()
 configure_package_config_file("${PROJECT_SOURCE_DIR}/cmake/strataConfig.cmake.in" "${PROJECT_BINARY_DIR}/strataConfig.cmake"

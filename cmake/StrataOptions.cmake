@@ -1,4 +1,5 @@
 # Options of the build; each is off by itself when the package it needs is missing (StrataDependencies).
+option(STRATA_BUILD_TOOLS "Build the tools, strata and strata-view; tests, benchmarks and fuzz targets need them" ${PROJECT_IS_TOP_LEVEL})
 option(STRATA_BUILD_TESTS "Build the tests" ${PROJECT_IS_TOP_LEVEL})
 option(STRATA_BUILD_BENCH "Build the benchmarks" OFF)
 option(STRATA_BUILD_FUZZ "Build the fuzz targets (clang only)" OFF)
@@ -12,7 +13,10 @@ option(STRATA_WITH_GL "Build the OpenGL part: libepoxy, EGL; the window: GLFW, D
 option(STRATA_JOIN_SOURCES "Compile several sources of a library as one: a whole build in half the time" OFF)
 set(STRATA_SANITIZE "" CACHE STRING "Sanitizers, as for -fsanitize=")
 
-if(NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
+if(STRATA_BUILD_TESTS OR STRATA_BUILD_BENCH OR STRATA_BUILD_FUZZ)
+  set(STRATA_BUILD_TOOLS ON)
+endif()
+if(PROJECT_IS_TOP_LEVEL AND NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
   set(CMAKE_BUILD_TYPE Release CACHE STRING "Build type" FORCE)
 endif()
 set(CMAKE_CXX_STANDARD 20)

@@ -40,17 +40,24 @@ function(strata_compile_alone)
   set_source_files_properties(${ARGN} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 endfunction()
 
-# strata_add_library(NAME SOURCES... [PUBLIC targets...] [PRIVATE targets...])
-#   makes strata_NAME, alias strata::NAME, headers found as "NAME/file.h" from the project's root. It is installed, and
-#   part of the umbrella strata::strata, unless it is INTERNAL. A BRIDGE is installed but no part of the umbrella: who
-#   links it needs a library that others do not.
+# strata_add_library(NAME [HEADERS...] SOURCES... [PUBLIC targets...] [PRIVATE targets...])
+#   makes strata_NAME, alias strata::NAME. It is installed, and part of the umbrella strata::strata, unless it is INTERNAL.
+#   A BRIDGE is installed but no part of the umbrella: who links it needs a library that others do not.
+#   HEADERS are the public ones, by their names in strata/ROOM/; no others are installed. All headers are found from the
+#   project's root. The libraries are static whatever BUILD_SHARED_LIBS says: there is no stable binary interface yet.
 function(strata_add_library name)
-  cmake_parse_arguments(arg "INTERNAL;BRIDGE" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  cmake_parse_arguments(arg "INTERNAL;BRIDGE" "" "HEADERS;SOURCES;PUBLIC;PRIVATE" ${ARGN})
   add_library(strata_${name} STATIC ${arg_SOURCES})
   add_library(strata::${name} ALIAS strata_${name})
   set_target_properties(strata_${name} PROPERTIES EXPORT_NAME ${name} UNITY_BUILD ${STRATA_JOIN_SOURCES})
   target_include_directories(strata_${name} PUBLIC
     "$<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>" "$<INSTALL_INTERFACE:include>")
+  if(arg_HEADERS)
+    cmake_path(RELATIVE_PATH CMAKE_CURRENT_SOURCE_DIR BASE_DIRECTORY "${PROJECT_SOURCE_DIR}" OUTPUT_VARIABLE room)
+    list(TRANSFORM arg_HEADERS PREPEND "${PROJECT_SOURCE_DIR}/strata/${room}/")
+    target_sources(strata_${name} PUBLIC
+      FILE_SET HEADERS BASE_DIRS "${PROJECT_SOURCE_DIR}" FILES ${arg_HEADERS})
+  endif()
   target_compile_features(strata_${name} PUBLIC cxx_std_20)
   target_link_libraries(strata_${name} PUBLIC ${arg_PUBLIC} PRIVATE ${arg_PRIVATE})
   strata_set_flags(strata_${name})

@@ -7,11 +7,12 @@
 
 #include "csg/gl/tile_programs.h"
 #include "csg/gl/walk_programs.h"
+#include "csg/surface/frame_input.h"
 #include "csg/surface/tile_surface.h"
+#include "hashbuffer/gl/build_sized.h"
 #include "raster/gl/compute.h"
 #include "strata/gl/buffer.h"
 #include "strata/gl/shader_program.h"
-#include "strata/hashbuffer/gl/compute_lists.h"
 
 namespace strata::glsl {
 extern const gl::GlslPiece csg_gl_walk_comp;

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "csg/gl/result_lists_for_tests.h"
 #include "csg/gl/walk_programs.h"
 #include "csg/tree_filter.h"
 #include "strata/hashbuffer/build_ldi.h"
@@ -100,8 +101,8 @@ Result<std::unique_ptr<GlResultSource>> GlResultSource::create(const gl::Context
   return result;
 }
 
-void GlResultSource::limit_binding(std::uint64_t bytes) {
-  impl_->binding_bytes = std::min(impl_->binding_bytes, bytes);
+void ResultListsForTests::limit_binding(GlResultSource& source, std::uint64_t bytes) {
+  source.impl_->binding_bytes = std::min(source.impl_->binding_bytes, bytes);
 }
 
 Result<void> GlResultSource::set_mesh(const LatticeMesh& mesh) {

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "csg/surface/surface_source.h"
+#include "csg/surface/frame_input.h"
 #include "csg/surface/tile_surface.h"
 
 // The tree as the walk of the GPU wants it. Private to csg/gl/.

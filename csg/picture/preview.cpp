@@ -10,9 +10,10 @@
 #include "csg/picture/shade.h"
 #include "csg/program.h"
 #include "csg/surface/depth_range.h"
-#include "csg/surface/surface_source.h"
+#include "csg/surface/frame_input.h"
 #include "csg/surface/tile_surface.h"
 #include "strata/csg/picture/picture.h"
+#include "strata/csg/surface/surface_source.h"
 
 namespace strata::csg {
 namespace {

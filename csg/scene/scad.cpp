@@ -1,4 +1,4 @@
-#include "strata/csg/scene/scad.h"
+#include "csg/scene/scad.h"
 
 #include <fcntl.h>
 #include <poll.h>

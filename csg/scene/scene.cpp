@@ -9,8 +9,8 @@
 #include "core/printable.h"
 #include "csg/scene/csg_parser.h"
 #include "csg/scene/evaluator.h"
+#include "csg/scene/scad.h"
 #include "mesh/formats/input_bytes.h"
-#include "strata/csg/scene/scad.h"
 
 namespace strata::csg {
 namespace {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "hashbuffer/gl/build_sized.h"
+
 namespace strata::gl {
 
 Result<BuildReport> build_sized(Store& store, ComputeRasterizer& rasterizer,
@@ -21,6 +23,11 @@ Result<BuildReport> build_sized(Store& store, ComputeRasterizer& rasterizer,
   if (report && report->fragments == 0) report->fragments = fragments;
   return report;
 }
+
+ComputeListSource::ComputeListSource(const Execution& execution) : execution_(execution) {
+  execution_.progress = {};
+}
+ComputeListSource::~ComputeListSource() = default;
 
 Result<std::unique_ptr<ComputeListSource>> ComputeListSource::create(const Context& context,
                                                                      std::unique_ptr<Store> store,

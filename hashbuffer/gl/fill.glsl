@@ -6,21 +6,11 @@ layout(std430, binding = 9) writeonly buffer store_items_block { uvec2 store_ite
 #else
 layout(std430, binding = 9) writeonly buffer store_items_block { uint store_items[]; };
 #endif
-layout(std140, binding = 8) uniform store_block {
-  uint store_first_pixel;
-  uint store_pixels;
-  uint store_items_room;
-  uint store_band;
-};
 
 void strata_insert(uint pixel, uint depth, uint payload) {
-#ifdef STRATA_FRAGMENT_STAGE
-  if (gl_HelperInvocation) return;
-#endif
-  pixel -= store_first_pixel;
-  if (pixel >= store_pixels) return;
+  if (!store_takes(pixel)) return;
   uint slot = atomicAdd(store_ends[pixel], 1u);
-  if (slot >= store_items_room) return;  // only geometry that differs from that of the first pass
+  if (slot >= store_room) return;  // only geometry that differs from that of the first pass
 #ifdef STORE_PAYLOADS
   store_items[slot] = uvec2(payload, min(depth, 0xffffffu));
 #else

@@ -5,8 +5,10 @@
 #include <string>
 #include <utility>
 
+#include "hashbuffer/gl/store_glsl.h"
 #include "strata/hashbuffer/record.h"
 #include "strata/hashbuffer/resize_policy.h"
+#include "strata/hashbuffer/table_law.h"
 
 namespace strata::glsl {
 extern const gl::GlslPiece hashbuffer_gl_clear_and_count_comp;
@@ -24,21 +26,12 @@ constexpr unsigned kTable = 8, kOffsets = 9, kCounts = 10, kPayloads = 11, kPara
 constexpr std::uint32_t kCellsOfGroup = 2048;
 constexpr std::uint64_t kOffsetBytes = (Record32::kAgeMax + 1) * sizeof(std::uint32_t);
 
-/// store_block of the shaders, std140.
-struct Params {
-  std::uint32_t first_pixel, pixels, cells, age_limit, band, unused[3];
-};
-
 /// llvmpipe ends all loops of an invocation after 65535 rounds, without a word, and counts those of
 /// the slowest of its neighbours in a vector.
 std::uint32_t most_steps(const Info& info) {
   if (!info.works_around("loop-rounds")) return 1000000;
   const bool has_16_neighbours = info.renderer.find("512 bits") != std::string::npos;
   return has_16_neighbours ? 4000 : 8000;
-}
-
-StoreGlsl glsl_of(const GlslPiece& piece, GlslSettings settings) {
-  return {std::string(piece.name), std::move(settings), std::string(piece.text)};
 }
 
 }  // namespace
@@ -70,7 +63,7 @@ HashStore::HashStore(const Info& info, const HashStoreOptions& options, WordPath
 }
 
 std::uint64_t HashStore::bytes_of(std::uint64_t cells) const {
-  return cells * word_bytes() * (two_tables() ? 2 : 1) + kOffsetBytes + sizeof(Params);
+  return cells * word_bytes() * (two_tables() ? 2 : 1) + kOffsetBytes + sizeof(StoreBlock);
 }
 
 std::uint64_t HashStore::allowed_cells() const {
@@ -124,9 +117,9 @@ PixelRows HashStore::rows_of(int pass) const { return bands_[band_of(pass)].rows
 StoreGlsl HashStore::glsl(int pass) const {
   switch (kind_of(pass)) {
     case Kind::kLayers:
-      return glsl_of(glsl::hashbuffer_gl_count_layers, {});
+      return store_glsl(glsl::hashbuffer_gl_count_layers, {});
     case Kind::kPayloads:
-      return glsl_of(glsl::hashbuffer_gl_insert_payload, {});
+      return store_glsl(glsl::hashbuffer_gl_insert_payload, {});
     case Kind::kWords:
       break;
   }
@@ -141,16 +134,16 @@ StoreGlsl HashStore::glsl(int pass) const {
     } else {
       settings.extensions.emplace_back("GL_NV_shader_atomic_int64");
     }
-    return glsl_of(glsl::hashbuffer_gl_insert_64, std::move(settings));
+    return store_glsl(glsl::hashbuffer_gl_insert_64, std::move(settings));
   }
-  return glsl_of(glsl::hashbuffer_gl_insert_32, std::move(settings));
+  return store_glsl(glsl::hashbuffer_gl_insert_32, std::move(settings));
 }
 
 StoreGlsl HashStore::glsl_read() const {
   GlslSettings settings;
   settings.defines = {{"STORE_WORDS", options_.record_bits == 64 ? "2" : "1"}};
   if (two_tables()) settings.defines.emplace_back("STORE_PAYLOADS", "1");
-  return glsl_of(glsl::hashbuffer_gl_read_hash, std::move(settings));
+  return store_glsl(glsl::hashbuffer_gl_read_hash, std::move(settings));
 }
 
 void HashStore::bind_for_reading(int band) const {
@@ -313,12 +306,9 @@ Result<void> HashStore::draw_offsets(Band& band, OffsetKind kind) {
   band.offset_kind = kind;
   auto uploaded = band.offsets.assign(std::span<const std::uint32_t>(words));
   if (!uploaded) return uploaded;
-  const Params params{band.rows.begin * width_,
-                      static_cast<std::uint32_t>(band.pixels),
-                      static_cast<std::uint32_t>(band.cells),
-                      band.age_limit,
-                      static_cast<std::uint32_t>(&band - bands_.data()),
-                      {}};
+  const StoreBlock params{band.rows.begin * width_, static_cast<std::uint32_t>(band.pixels),
+                          static_cast<std::uint32_t>(band.cells), band.age_limit,
+                          static_cast<std::uint32_t>(&band - bands_.data())};
   return band.params.assign(std::span(&params, 1));
 }
 
@@ -431,12 +421,9 @@ Result<bool> HashStore::look_at_layers() {
                   "the count/scan store",
                   band.deepest, most_steps_);
     }
-    // At least one step up, since a table that is not full fails by bad luck with its ages. Where
-    // luck fails again and again, one plane a layer cannot.
     const std::uint64_t needed = band.stored + band.missing;
     const bool lacks_ages = is_too_empty(needed, band.cells);
-    std::uint64_t target = grown_cells(band.cells);
-    while (is_too_full(needed, target)) target = grown_cells(target);
+    std::uint64_t target = rebuilt_cells(needed, band.cells);
     if (target > most_cells()) {
       mode_ = Mode::kInsert;
       const auto done = split(target * bands_.size());
@@ -480,14 +467,6 @@ std::vector<std::uint64_t> HashStore::table(int band) const {
   return words;
 }
 
-std::uint64_t HashStore::checksum(int band) const {
-  const auto words = table(band);
-  std::uint64_t hash = 0x9e3779b97f4a7c15u ^ words.size();
-  for (const std::uint64_t word : words) {
-    hash = (hash ^ word) * 0xff51afd7ed558ccdu;
-    hash ^= hash >> 29;
-  }
-  return hash;
-}
+std::uint64_t HashStore::checksum(int band) const { return detail::table_checksum(table(band)); }
 
 }  // namespace strata::gl

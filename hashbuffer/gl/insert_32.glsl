@@ -4,13 +4,6 @@
 layout(std430, binding = 8) STORE_COHERENT buffer store_table_block { uint store_table[]; };
 layout(std430, binding = 9) readonly buffer store_offsets_block { uint store_offsets[]; };
 layout(std430, binding = 10) buffer store_counts_block { uint store_counts[]; };
-layout(std140, binding = 8) uniform store_block {
-  uint store_first_pixel;  // of the band
-  uint store_pixels;
-  uint store_cells;
-  uint store_age_limit;
-  uint store_band;
-};
 
 // Steps of this invocation so far, and the most of them (HashStore chooses). Chains of evictions may be that long in
 // tables that are far too full, and so may the lists of all pixels of a thread together, where it inserts many: what is
@@ -19,16 +12,12 @@ uint store_steps = 0u;
 const uint kStoreMostSteps = STORE_MOST_STEPS;
 
 void strata_insert(uint pixel, uint depth, uint payload) {
-#ifdef STRATA_FRAGMENT_STAGE
-  if (gl_HelperInvocation) return;  // its atomics return nonsense
-#endif
-  pixel -= store_first_pixel;
-  if (pixel >= store_pixels) return;  // of another band
+  if (!store_takes(pixel)) return;
   uint age = 1u;
   uint record = 0x1ffffffu - min(depth, 0xffffffu);
   for (; store_steps < kStoreMostSteps; ++store_steps) {
     uint cell = pixel + store_offsets[age];
-    if (cell >= store_cells) cell -= store_cells;
+    if (cell >= store_room) cell -= store_room;
 #ifdef STORE_READ_FIRST
     // Cells only grow: what is not larger than an old value is not larger than the new one.
     uint found = store_table[cell];
@@ -44,7 +33,7 @@ void strata_insert(uint pixel, uint depth, uint payload) {
       if (found_age != age) {  // evicted from another pixel
         age = found_age;
         uint back = store_offsets[age];
-        pixel = cell >= back ? cell - back : cell + (store_cells - back);
+        pixel = cell >= back ? cell - back : cell + (store_room - back);
       }
     }
     if (age >= store_age_limit) break;

@@ -2,13 +2,6 @@
 layout(std430, binding = 8) STORE_COHERENT buffer store_table_block { uint64_t store_table[]; };
 layout(std430, binding = 9) readonly buffer store_offsets_block { uint store_offsets[]; };
 layout(std430, binding = 10) buffer store_counts_block { uint store_counts[]; };
-layout(std140, binding = 8) uniform store_block {
-  uint store_first_pixel;
-  uint store_pixels;
-  uint store_cells;
-  uint store_age_limit;
-  uint store_band;
-};
 
 #ifdef STORE_SERIAL
 uint64_t store_max(inout uint64_t cell, uint64_t value) {
@@ -24,16 +17,12 @@ uint store_steps = 0u;  // see insert_32.glsl
 const uint kStoreMostSteps = STORE_MOST_STEPS;
 
 void strata_insert(uint pixel, uint depth, uint payload) {
-#ifdef STRATA_FRAGMENT_STAGE
-  if (gl_HelperInvocation) return;
-#endif
-  pixel -= store_first_pixel;
-  if (pixel >= store_pixels) return;
+  if (!store_takes(pixel)) return;
   uint age = 1u;
   uint64_t record = packUint2x32(uvec2(~payload, 0x1ffffffu - min(depth, 0xffffffu)));
   for (; store_steps < kStoreMostSteps; ++store_steps) {
     uint cell = pixel + store_offsets[age];
-    if (cell >= store_cells) cell -= store_cells;
+    if (cell >= store_room) cell -= store_room;
 #ifdef STORE_READ_FIRST
     uint64_t found = store_table[cell];
     if (found < record) found = store_max(store_table[cell], record);
@@ -47,7 +36,7 @@ void strata_insert(uint pixel, uint depth, uint payload) {
       if (found_age != age) {
         age = found_age;
         uint back = store_offsets[age];
-        pixel = cell >= back ? cell - back : cell + (store_cells - back);
+        pixel = cell >= back ? cell - back : cell + (store_room - back);
       }
     }
     if (age >= store_age_limit) break;

@@ -7,27 +7,16 @@ layout(std430, binding = 8) readonly buffer store_table_block { uint store_table
 layout(std430, binding = 9) readonly buffer store_offsets_block { uint store_offsets[]; };
 layout(std430, binding = 10) buffer store_counts_block { uint store_counts[]; };
 layout(std430, binding = 11) buffer store_payloads_block { uint store_payloads[]; };
-layout(std140, binding = 8) uniform store_block {
-  uint store_first_pixel;
-  uint store_pixels;
-  uint store_cells;
-  uint store_age_limit;
-  uint store_band;
-};
 
 void strata_insert(uint pixel, uint depth, uint payload) {
-#ifdef STRATA_FRAGMENT_STAGE
-  if (gl_HelperInvocation) return;
-#endif
-  pixel -= store_first_pixel;
-  if (pixel >= store_pixels) return;
+  if (!store_takes(pixel)) return;
   if (store_counts[4u * store_band] != 0u) return;  // keys are missing, the frame will be built again
   uint nearness = 0xffffffu - min(depth, 0xffffffu);
   uint value = ~payload;
   if (value == 0u) return;
   for (uint age = 1u; age <= store_age_limit; ++age) {
     uint cell = pixel + store_offsets[age];
-    if (cell >= store_cells) cell -= store_cells;
+    if (cell >= store_room) cell -= store_room;
     uint key = store_table[cell];
     uint found_age = key >> 24;
     if (found_age < age) break;

@@ -8,13 +8,6 @@ layout(std430, binding = 9) readonly buffer store_offsets_block { uint store_off
 #ifdef STORE_PAYLOADS
 layout(std430, binding = 11) readonly buffer store_payloads_block { uint store_payloads[]; };
 #endif
-layout(std140, binding = 8) uniform store_block {
-  uint store_first_pixel;
-  uint store_pixels;
-  uint store_cells;
-  uint store_age_limit;
-  uint store_band;
-};
 
 struct StrataCursor {
   uint pixel;  // of the band
@@ -26,7 +19,7 @@ StrataCursor strata_list(uint pixel) { return StrataCursor(pixel - store_first_p
 bool strata_next(inout StrataCursor cursor, out uint depth, out uint payload) {
   for (; cursor.age <= store_age_limit; ++cursor.age) {
     uint cell = cursor.pixel + store_offsets[cursor.age];
-    if (cell >= store_cells) cell -= store_cells;
+    if (cell >= store_room) cell -= store_room;
 #if STORE_WORDS == 2 && !defined(STORE_PAYLOADS)
     uvec2 word = store_table[cell];
     uint key = word.y;

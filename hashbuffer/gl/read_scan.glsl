@@ -5,12 +5,6 @@ layout(std430, binding = 9) readonly buffer store_items_block { uvec2 store_item
 #else
 layout(std430, binding = 9) readonly buffer store_items_block { uint store_items[]; };
 #endif
-layout(std140, binding = 8) uniform store_block {
-  uint store_first_pixel;
-  uint store_pixels;
-  uint store_items_room;
-  uint store_band;
-};
 
 struct StrataCursor {
   uint item;  // next

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "hashbuffer/gl/store_glsl.h"
+
 namespace strata::glsl {
 extern const gl::GlslPiece hashbuffer_gl_count;
 extern const gl::GlslPiece hashbuffer_gl_fill;
@@ -17,15 +19,6 @@ namespace {
 constexpr unsigned kEnds = 8, kItems = 9, kParams = 8;
 constexpr std::uint32_t kPixelsOfGroup = 64;
 constexpr std::uint32_t kMostRows = 65535;  ///< work groups along one axis, on every driver
-
-/// store_block of the shaders, std140.
-struct Params {
-  std::uint32_t first_pixel, pixels, items_room, band;
-};
-
-StoreGlsl glsl_of(const GlslPiece& piece, GlslSettings settings) {
-  return {std::string(piece.name), std::move(settings), std::string(piece.text)};
-}
 
 }  // namespace
 
@@ -48,12 +41,12 @@ GlslSettings ScanStore::settings() const {
 }
 
 StoreGlsl ScanStore::glsl(int pass) const {
-  if (pass % 2 == 0) return glsl_of(glsl::hashbuffer_gl_count, {});
-  return glsl_of(glsl::hashbuffer_gl_fill, settings());
+  if (pass % 2 == 0) return store_glsl(glsl::hashbuffer_gl_count, {});
+  return store_glsl(glsl::hashbuffer_gl_fill, settings());
 }
 
 StoreGlsl ScanStore::glsl_read() const {
-  return glsl_of(glsl::hashbuffer_gl_read_scan, settings());
+  return store_glsl(glsl::hashbuffer_gl_read_scan, settings());
 }
 
 PixelRows ScanStore::rows_of(int pass) const { return band_rows(pass / 2); }
@@ -102,7 +95,7 @@ Result<void> ScanStore::lay_out(std::uint64_t bands) {
     band.pixels = (band.rows.end - band.rows.begin) * width_;
     auto ends = Buffer::allocate(std::uint64_t{band.pixels} * 4);
     if (!ends) return tl::unexpected(ends.error());
-    auto params = Buffer::allocate(sizeof(Params));
+    auto params = Buffer::allocate(sizeof(StoreBlock));
     if (!params) return tl::unexpected(params.error());
     band.ends = std::move(*ends);
     band.params = std::move(*params);
@@ -136,8 +129,8 @@ Result<void> ScanStore::begin(std::uint32_t width, std::uint32_t height) {
   for (Band& band : bands_) {
     band.ends.clear();
     band.items = 0;
-    const Params params{band.rows.begin * width_, band.pixels, 0,
-                        static_cast<std::uint32_t>(&band - bands_.data())};
+    const StoreBlock params{band.rows.begin * width_, band.pixels, 0, 0,
+                            static_cast<std::uint32_t>(&band - bands_.data())};
     band.params.upload(std::span(&params, 1));
   }
   return {};
@@ -176,8 +169,8 @@ Result<void> ScanStore::make_room(Band& band) {
   if (auto room = band.items_buffer.reserve(std::max<std::uint64_t>(bytes, item_bytes())); !room) {
     return room;
   }
-  const Params params{band.rows.begin * width_, band.pixels, band.items,
-                      static_cast<std::uint32_t>(&band - bands_.data())};
+  const StoreBlock params{band.rows.begin * width_, band.pixels, band.items, 0,
+                          static_cast<std::uint32_t>(&band - bands_.data())};
   band.params.upload(std::span(&params, 1));
   return {};
 }

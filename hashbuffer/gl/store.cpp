@@ -3,10 +3,20 @@
 #include <algorithm>
 #include <limits>
 #include <new>
+#include <string>
+#include <utility>
+
+#include "hashbuffer/gl/hash_store.h"
+#include "hashbuffer/gl/prefix_sum.h"
+#include "hashbuffer/gl/scan_store.h"
+#include "hashbuffer/gl/store_glsl.h"
+#include "strata/gl/buffer.h"
+#include "strata/gl/shader_program.h"
 
 namespace strata::glsl {
 extern const gl::GlslPiece hashbuffer_gl_list_lengths_comp;
 extern const gl::GlslPiece hashbuffer_gl_list_items_comp;
+extern const gl::GlslPiece hashbuffer_gl_store_common;
 }  // namespace strata::glsl
 
 namespace strata::gl {
@@ -54,8 +64,30 @@ Result<BuildReport> build(Store& store, Producer& producer, const Execution& exe
               kMostAttempts);
 }
 
+StoreGlsl store_glsl(const GlslPiece& piece, GlslSettings settings) {
+  return {std::string(piece.name), std::move(settings),
+          std::string(glsl::hashbuffer_gl_store_common.text) + std::string(piece.text)};
+}
+
+Result<std::unique_ptr<Store>> make_hash_store(const Info& info, int record_bits) {
+  return HashStore::create(info, {.record_bits = record_bits});
+}
+Result<std::unique_ptr<Store>> make_scan_store(const Info& info, bool payload) {
+  return ScanStore::create(info, {.payload = payload});
+}
+
+struct Store::Reader {
+  Program lengths, items;
+  PrefixSum prefix_sum;
+  Buffer lengths_buffer, items_buffer;
+};
+
+Store::Store(const Limits& limits) : binding_bytes_(limits.storage_block_bytes) {}
+Store::~Store() = default;
+
 Result<LayeredDepthImage> Store::download() {
-  if (!lengths_) {
+  if (!reader_) {
+    auto reader = std::make_unique<Reader>();
     const StoreGlsl read = glsl_read();
     const GlslPiece counting[] = {read.piece(), glsl::hashbuffer_gl_list_lengths_comp};
     const GlslPiece copying[] = {read.piece(), glsl::hashbuffer_gl_list_items_comp};
@@ -63,8 +95,9 @@ Result<LayeredDepthImage> Store::download() {
     if (!lengths) return tl::unexpected(lengths.error());
     auto items = Program::compute(copying, read.settings);
     if (!items) return tl::unexpected(items.error());
-    lengths_ = std::move(*lengths);
-    items_ = std::move(*items);
+    reader->lengths = std::move(*lengths);
+    reader->items = std::move(*items);
+    reader_ = std::move(reader);
   }
   LayeredDepthImage image;
   image.width = static_cast<int>(width_);
@@ -83,25 +116,26 @@ Result<LayeredDepthImage> Store::download() {
 }
 
 Result<void> Store::download_band(int band, LayeredDepthImage& image) {
+  Reader& reader = *reader_;
   const PixelRows rows = band_rows(band);
   const std::uint32_t first = rows.begin * width_;
   const std::uint32_t pixels = (rows.end - rows.begin) * width_;
-  if (auto room = lengths_buffer_.reserve(std::uint64_t{pixels} * 4); !room) return room;
+  if (auto room = reader.lengths_buffer.reserve(std::uint64_t{pixels} * 4); !room) return room;
   const Groups groups = groups_for(pixels, kPixelsOfGroup);
   storage_barrier();
   bind_for_reading(band);
-  lengths_buffer_.bind(0);
-  lengths_.set("first_pixel", first);
-  lengths_.set("pixels", pixels);
-  lengths_.dispatch(groups.x, groups.y);
+  reader.lengths_buffer.bind(0);
+  reader.lengths.set("first_pixel", first);
+  reader.lengths.set("pixels", pixels);
+  reader.lengths.dispatch(groups.x, groups.y);
   storage_barrier();
-  const auto total = prefix_sum_.run(lengths_buffer_, pixels);
+  const auto total = reader.prefix_sum.run(reader.lengths_buffer, pixels);
   if (!total) return tl::unexpected(total.error());
   if (*total == std::numeric_limits<std::uint32_t>::max()) {
     return fail(ErrorCode::kLimit, "OpenGL store: 2^32 fragments or more in one band");
   }
   std::vector<std::uint32_t> begins(std::size_t{pixels} + 1, *total);
-  lengths_buffer_.download(std::span(begins).first(pixels));
+  reader.lengths_buffer.download(std::span(begins).first(pixels));
   if (auto checked = check_errors("OpenGL store: reading"); !checked) return checked;
   const std::uint64_t before = image.items.size();
   for (std::uint32_t i = 0; i < pixels; ++i) {
@@ -123,17 +157,17 @@ Result<void> Store::download_band(int band, LayeredDepthImage& image) {
     }
     const std::uint64_t count = begins[end] - begins[begin];
     if (count > 0) {
-      if (auto room = items_buffer_.reserve(count * sizeof(DepthItem)); !room) return room;
+      if (auto room = reader.items_buffer.reserve(count * sizeof(DepthItem)); !room) return room;
       bind_for_reading(band);
-      lengths_buffer_.bind(0);
-      items_buffer_.bind(1);
-      items_.set("first_pixel", first + begin);
-      items_.set("pixels", end - begin);
-      items_.set("first_begin", begin);
-      items_.set("first_item", begins[begin]);
+      reader.lengths_buffer.bind(0);
+      reader.items_buffer.bind(1);
+      reader.items.set("first_pixel", first + begin);
+      reader.items.set("pixels", end - begin);
+      reader.items.set("first_begin", begin);
+      reader.items.set("first_item", begins[begin]);
       const Groups copies = groups_for(end - begin, kPixelsOfGroup);
-      items_.dispatch(copies.x, copies.y);
-      items_buffer_.download(std::span(image.items).subspan(before + begins[begin], count));
+      reader.items.dispatch(copies.x, copies.y);
+      reader.items_buffer.download(std::span(image.items).subspan(before + begins[begin], count));
     }
     begin = end;
   }

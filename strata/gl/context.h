@@ -63,7 +63,7 @@ struct ContextOptions {
   /// "": a GPU's EGL device if there is one, else Mesa without a surface, else any device.
   /// "surfaceless", or "device:N" as `strata info --gl` counts them. STRATA_GL_DEVICE in the
   /// environment takes its place if this is empty.
-  std::string device;
+  std::string device = {};
 };
 
 /// An OpenGL 4.5 core context. One thread at a time may use it, after make_current(). Everything

@@ -4,11 +4,9 @@
 #include <memory>
 #include <vector>
 
-#include "csg/surface/surface_source.h"
+#include "strata/csg/surface/surface_source.h"
 #include "strata/gl/context.h"
 #include "strata/hashbuffer/gl/store.h"
-
-// Visible surfaces of a Boolean tree on the GPU. Private to csg/.
 
 namespace strata::csg {
 

@@ -26,9 +26,6 @@ class GlResultSource final : public gl::ComputeListSource {
   Result<void> set_mesh(const LatticeMesh& mesh) override;
   bool use_filter(const TileListFilter& filter) override;
 
-  /// Tables of at most that many bytes, 32 at least, where the driver takes larger ones: for tests.
-  void limit_binding(std::uint64_t bytes);
-
   /// Who made the lists since the filter was set; rows with a list that is too long to be walked
   /// are not counted.
   struct Counts {
@@ -38,6 +35,7 @@ class GlResultSource final : public gl::ComputeListSource {
   [[nodiscard]] const Counts& counts() const;
 
  private:
+  friend struct ResultListsForTests;
   struct Impl;
   explicit GlResultSource(std::unique_ptr<Impl> impl);
   Result<LayeredDepthImage> read(gl::Store& store, const RasterTarget& target, int v_begin,

@@ -52,12 +52,12 @@ struct Scene {
 
 struct ReadSceneOptions {
   /// Where relative names of imported files are looked for; empty: the folder of the scene.
-  std::string asset_folder;
+  std::string asset_folder = {};
   double scad_timeout_s = 300.0;  ///< for the `openscad` program that turns .scad into .csg
   /// Options of `openscad` for programs, word by word, such as "-D", "x=40".
-  std::vector<std::string> openscad_options;
+  std::vector<std::string> openscad_options = {};
   /// A scene may read files below this folder only, links followed; empty: any regular file.
-  std::string root_folder;
+  std::string root_folder = {};
 };
 
 /// Where a scene in `folder` finds the file that it calls `name`: there, or in a folder around it,

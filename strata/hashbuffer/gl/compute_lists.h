@@ -1,8 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 
-#include "raster/gl/compute.h"
 #include "strata/core/execution.h"
 #include "strata/gl/context.h"
 #include "strata/hashbuffer/gl/store.h"
@@ -10,14 +10,13 @@
 
 namespace strata::gl {
 
-/// build(store, rasterizer), after a pass that counts where the store gains by the hint; the
-/// report's fragments are told then too.
-[[nodiscard]] Result<BuildReport> build_sized(Store& store, ComputeRasterizer& rasterizer,
-                                              const Execution& execution = {});
+class ComputeRasterizer;
 
 /// Lists by the compute rasterizer in a store of the GPU: the CPU's, bit for bit.
 class ComputeListSource : public ListSource {
  public:
+  ~ComputeListSource() override;
+
   /// `context` stays current while this is used. @param store keeps whole payloads
   /// @param spare takes over for good where `store` fails, as with lists beyond its ages; may
   /// be null @param pixels_at_once see rows_at_once(), about @param execution its stop and memory
@@ -33,9 +32,7 @@ class ComputeListSource : public ListSource {
 
  protected:
   /// @param execution without its progress, of which lists() would tell a part only
-  explicit ComputeListSource(const Execution& execution) : execution_(execution) {
-    execution_.progress = {};
-  }
+  explicit ComputeListSource(const Execution& execution);
   [[nodiscard]] Result<void> open(const Context& context, std::unique_ptr<Store> store,
                                   std::unique_ptr<Store> spare, std::int64_t pixels_at_once);
   /// The lists of rows [v_begin, v_end) of `target`, which `store` holds. Sets crossings_.

@@ -1,15 +1,12 @@
 #pragma once
 
 #include <cstdint>
-#include <string>
+#include <memory>
 
-#include "hashbuffer/gl/prefix_sum.h"
 #include "strata/core/depth_list.h"
 #include "strata/core/execution.h"
 #include "strata/core/result.h"
-#include "strata/gl/buffer.h"
 #include "strata/gl/context.h"
-#include "strata/gl/shader_program.h"
 #include "strata/hashbuffer/depth_list_store.h"
 #include "strata/raster/gl/producer.h"
 
@@ -23,7 +20,7 @@ namespace strata::gl {
 /// its own; a band is drawn, and read, apart from the others.
 class Store {
  public:
-  virtual ~Store() = default;
+  virtual ~Store();
 
   /// A hint before begin(): how many fragments will come, about. Without effect where room is made
   /// as it is needed.
@@ -76,19 +73,28 @@ class Store {
   [[nodiscard]] Result<LayeredDepthImage> download();
 
  protected:
-  explicit Store(const Limits& limits) : binding_bytes_(limits.storage_block_bytes) {}
+  explicit Store(const Limits& limits);
 
   std::uint32_t width_ = 0, height_ = 0;
   std::uint64_t memory_limit_ = 0;
   std::uint64_t binding_bytes_;  ///< what a shader sees at one binding at most
 
  private:
+  struct Reader;  ///< the programs and buffers of download()
   [[nodiscard]] Result<void> download_band(int band, LayeredDepthImage& image);
 
-  Program lengths_, items_;  ///< of download(), made when it is first called
-  PrefixSum prefix_sum_;
-  Buffer lengths_buffer_, items_buffer_;
+  std::unique_ptr<Reader> reader_;  ///< made when it is first called
 };
+
+/// The HA-buffer on the GPU: one pass, lists of 255 fragments at most. One context, one thread.
+/// @param record_bits 32: depth only; 64: depth and a payload of 32 bits
+/// @return kUsage for a driver that cannot
+[[nodiscard]] Result<std::unique_ptr<Store>> make_hash_store(const Info& info,
+                                                             int record_bits = 64);
+
+/// The count/scan store on the GPU: two passes, lists of any length.
+/// @param payload whether the 32 bits of the payload are kept
+[[nodiscard]] Result<std::unique_ptr<Store>> make_scan_store(const Info& info, bool payload = true);
 
 /// Builds a frame: draws the producer once a pass, and again where something did not fit.
 /// `execution` is asked for its stop and its memory limit.

@@ -11,6 +11,7 @@
 #include <thread>
 #include <utility>
 
+#include "csg/gl/result_lists_for_tests.h"
 #include "hashbuffer/gl/hash_store.h"
 #include "hashbuffer/gl/scan_store.h"
 #include "strata/csg/solid_labels.h"
@@ -287,7 +288,7 @@ TEST_F(GlResult, OfItemsBeyondABindingIsTheFilters) {
     auto store = gl::ScanStore::create(info);
     ASSERT_TRUE(store);
     use(std::move(store));
-    source_->limit_binding(bytes);
+    ResultListsForTests::limit_binding(*source_, bytes);
     for (int seed = 0; seed < 6; ++seed) {
       RandomTree random(static_cast<std::uint64_t>(seed) + 300);
       Tree tree;

@@ -8,6 +8,7 @@
 
 #include "hashbuffer/gl/hash_store.h"
 #include "hashbuffer/gl/scan_store.h"
+#include "raster/gl/compute.h"
 #include "strata/hashbuffer/build_ldi.h"
 #include "strata/hashbuffer/gl/compute_lists.h"
 #include "strata/mesh/formats/read_mesh.h"

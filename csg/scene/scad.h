@@ -12,7 +12,7 @@
 namespace strata::csg {
 
 struct OpenscadOptions {
-  std::vector<std::string> options;  ///< handed on, word by word: "-D", "x=40"
+  std::vector<std::string> options = {};  ///< handed on, word by word: "-D", "x=40"
   double timeout_s = 300.0;
 };
 

@@ -1,0 +1,18 @@
+# Compiles each installed header alone: it needs no other before it, gives no warning, and includes nothing of Strata that
+# is not installed, since nothing but the installed tree is on the include path.
+include("${CMAKE_CURRENT_LIST_DIR}/run.cmake")
+file(GLOB_RECURSE headers RELATIVE "${PREFIX}/include" "${PREFIX}/include/*.h")
+list(LENGTH headers count)
+if(count LESS 30)
+  message(FATAL_ERROR "${count} headers are installed")
+endif()
+file(GLOB entries RELATIVE "${PREFIX}/include" "${PREFIX}/include/*")
+if(NOT entries STREQUAL "strata")
+  message(FATAL_ERROR "besides strata/ there is in include/: ${entries}")
+endif()
+if(NOT OPENMESH AND EXISTS "${PREFIX}/include/strata/mesh/openmesh_bridge.h")
+  message(FATAL_ERROR "strata/mesh/openmesh_bridge.h is installed without OpenMesh")
+endif()
+run("${CMAKE_COMMAND}" -S "${CMAKE_CURRENT_LIST_DIR}/headers" -B "${WORK_DIR}" ${configure} "-DINSTALLED=${PREFIX}")
+run("${CMAKE_COMMAND}" --build "${WORK_DIR}")
+file(REMOVE_RECURSE "${WORK_DIR}")

@@ -1,0 +1,18 @@
+# Strata as a part of another project: no tools, no tests, and that project's own build type.
+include("${CMAKE_CURRENT_LIST_DIR}/run.cmake")
+file(WRITE "${WORK_DIR}/source/CMakeLists.txt" "cmake_minimum_required(VERSION 3.25)
+project(parent LANGUAGES CXX)
+add_subdirectory(\"${SOURCE_DIR}\" strata)
+if(NOT TARGET strata::strata)
+  message(FATAL_ERROR \"no strata::strata\")
+endif()
+if(TARGET strata OR TARGET test_core)
+  message(FATAL_ERROR \"tools or tests are built\")
+endif()
+if(DEFINED CACHE{CMAKE_BUILD_TYPE} AND CACHE{CMAKE_BUILD_TYPE})
+  message(FATAL_ERROR \"the build type is $CACHE{CMAKE_BUILD_TYPE}, which nobody chose\")
+endif()
+")
+run("${CMAKE_COMMAND}" -S "${WORK_DIR}/source" -B "${WORK_DIR}/build" -G Ninja "-DCMAKE_CXX_COMPILER=${COMPILER}"
+  -DCMAKE_DISABLE_FIND_PACKAGE_CLI11=ON)
+file(REMOVE_RECURSE "${WORK_DIR}")
