@@ -11,7 +11,8 @@ TernaryState::TernaryState(const Program& program)
       counts_(program.nodes.size()),
       inside_(program.leaves.size(), 0),
       unknown_(program.leaves.size(), 0) {
-  for (std::size_t i = 0; i < counts_.size(); ++i) counts_[i].yes = program.nodes[i].idle_true;
+  for (std::size_t i = 0; i < counts_.size(); ++i)
+    counts_[i].yes = program.nodes[i].true_when_outside;
   if (!counts_.empty()) root_ = counts_.back().value();
 }
 
@@ -61,16 +62,16 @@ void ColumnSurface::take(const Event& event) {
   if (before != (runs > 0)) state_.set_unknown(event.solid, runs > 0);
 }
 
-void ColumnSurface::find(std::span<const Flip> flips, std::span<const FaceRun> faces,
+void ColumnSurface::find(std::span<const Transition> transitions, std::span<const FaceRun> faces,
                          std::vector<VoxelRun>& kept) {
   events_.clear();
   for (const FaceRun& run : faces) {
     events_.push_back({run.first, run.solid, 1});
     events_.push_back({run.last + 1, run.solid, -1});
   }
-  for (const Flip& flip : flips) {
-    const std::uint32_t voxel = (flip.depth + kLatticeSteps / 2) >> kLatticeBits;
-    events_.push_back({static_cast<int>(voxel), flip.solid, 0});
+  for (const Transition& transition : transitions) {
+    const std::uint32_t voxel = (transition.depth + kLatticeSteps / 2) >> kLatticeBits;
+    events_.push_back({static_cast<int>(voxel), transition.solid, 0});
   }
   std::sort(events_.begin(), events_.end(),
             [](const Event& a, const Event& b) { return a.voxel < b.voxel; });
@@ -86,8 +87,8 @@ void ColumnSurface::find(std::span<const Flip> flips, std::span<const FaceRun> f
       kept.push_back({voxel, last});
     }
   }
-  for (const Flip& flip : flips) {
-    if (state_.inside(flip.solid)) state_.set_inside(flip.solid, false);
+  for (const Transition& transition : transitions) {
+    if (state_.inside(transition.solid)) state_.set_inside(transition.solid, false);
   }
 }
 

@@ -49,8 +49,8 @@ class ColumnSurface {
  public:
   explicit ColumnSurface(const Program& program);
 
-  /// See TileListFilter::Worker::surface(). @param flips of the column's ray
-  void find(std::span<const Flip> flips, std::span<const FaceRun> faces,
+  /// See TileListFilter::Worker::surface(). @param transitions of the column's ray
+  void find(std::span<const Transition> transitions, std::span<const FaceRun> faces,
             std::vector<VoxelRun>& kept);
 
  private:

@@ -223,8 +223,8 @@ bool Geometry::cut_off_vast(const Tree& tree) {
     ClampedMesh cut =
         clamp_to_box(part.positions, part.triangles, around(active[i].subtracted ? 0.5 : 0.25));
     part.positions = std::move(cut.positions);
-    part.turned = std::move(cut.triangles);
-    part.triangles = part.turned;
+    part.own_triangles = std::move(cut.triangles);
+    part.triangles = part.own_triangles;
     part.box = bounds_of(part);
     part.convex = false;  // sheets on the sides
     any = true;
@@ -241,11 +241,11 @@ void Geometry::place(std::uint32_t solid) {
   for (std::size_t i = 0; i < part.positions.size(); ++i) {
     part.positions[i] = glm::dvec3(world_from_mesh * glm::dvec4(mesh->positions[i], 1.0));
   }
-  part.turned.clear();
+  part.own_triangles.clear();
   if (glm::determinant(glm::dmat3(world_from_mesh)) < 0) {
-    part.turned = mesh->triangles;
-    for (glm::uvec3& triangle : part.turned) std::swap(triangle.y, triangle.z);
-    part.triangles = part.turned;
+    part.own_triangles = mesh->triangles;
+    for (glm::uvec3& triangle : part.own_triangles) std::swap(triangle.y, triangle.z);
+    part.triangles = part.own_triangles;
   } else {
     part.triangles = mesh->triangles;
   }

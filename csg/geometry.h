@@ -14,13 +14,15 @@
 namespace strata::csg {
 
 /// The solids of a tree in world space, made once and seen by many views and grids. Those that are
-/// vast beside what they can matter to, such as half spaces, are cut off around it (kVast): what is
+/// vast beside what they can change, such as half spaces, are cut off around it (kVast): what is
 /// seen, measured and filled is the same, and coordinates stay small.
 class Geometry {
  public:
   struct Part {
-    std::vector<glm::dvec3> positions;      ///< world space
-    std::vector<glm::uvec3> turned;         ///< own triangles of a mirrored or a vast solid
+    std::vector<glm::dvec3> positions;  ///< world space
+    /// The triangles where they are not the mesh's: of a mirrored solid reversed, of a vast one
+    /// those that are left.
+    std::vector<glm::uvec3> own_triangles;
     std::span<const glm::uvec3> triangles;  ///< counter-clockwise from outside
     Bounds box;                             ///< of `positions`
     Bounds whole;  ///< of the solid; not `box` where a vast one was cut off

@@ -7,34 +7,25 @@
 namespace strata::csg {
 namespace {
 
-/// Of a tree node: the edge that leads to it when it stands alone.
-struct Link {
-  Program::Edge edge;
-  bool empty = false;  ///< the node is the empty set
-};
+/// Edges of each program node in the order of the tree; nodes are numbered from the root down.
+using EdgeLists = std::vector<std::vector<Program::Edge>>;
 
-}  // namespace
+/// Whether a node's edges go to the union above it, which sees the node inverted or not:
+/// not(A - B) = not A or B and not(A and B) = not A or not B are unions of inverted edges.
+bool is_flattened(const Tree::Node& node, bool inverted) {
+  if (node.count == 0 && inverted) return false;  // everything: a node of its own
+  return inverted ? node.operation != Operation::kUnion : node.operation == Operation::kUnion;
+}
 
-Program compile(const Tree& tree, Tree::NodeId root) {
-  Program program;
-  program.leaves.resize(tree.solids().size());
-  if (root == Tree::kNone) return program;
-
-  // Which nodes the root reaches, and how each is seen by its parent: a node is `merged` when it is
-  // a union in the eyes of the parent's union, so that its edges go to the parent.
+/// The edges below `root`.
+EdgeLists flatten(const Tree& tree, Tree::NodeId root) {
   struct Visit {
     Tree::NodeId node;
     std::uint32_t target;  // the program node that takes its edges
     bool inverted;         // how the target sees it
   };
-  // Edges of each program node in the order of the tree; nodes are numbered from the root down,
-  // then turned around.
-  std::vector<std::vector<Program::Edge>> lists(1);
+  EdgeLists lists(1);
   std::vector<Visit> stack{{root, 0, false}};
-  const auto is_union = [](Operation operation, bool inverted) {
-    // not(A - B) = not A or B and not(A and B) = not A or not B are unions of inverted edges.
-    return inverted ? operation != Operation::kUnion : operation == Operation::kUnion;
-  };
   while (!stack.empty()) {
     const Visit visit = stack.back();
     stack.pop_back();
@@ -46,16 +37,14 @@ Program compile(const Tree& tree, Tree::NodeId root) {
     const auto operands = tree.operands(visit.node);
     std::uint32_t target = visit.target;
     bool inverted = visit.inverted;  // of `target`'s union over this node
-    // No operands: the empty set; an inverted empty set is everything, a node of its own.
-    const bool melts = is_union(node.operation, inverted) && !(operands.empty() && inverted);
-    if (!melts) {
+    if (!is_flattened(node, inverted)) {
       target = static_cast<std::uint32_t>(lists.size());
       lists[visit.target].emplace_back(target, false, true);
       lists.emplace_back();
       inverted = !inverted;
       if (operands.empty()) {
         // inverted was true: not(empty); the new node is empty, and its edge is inverted. A node
-        // that is not inverted and no union is an empty difference: the new node must say true.
+        // that is not inverted and no union is an empty difference: the new node must be true.
         if (inverted) {
           lists.emplace_back();
           lists[target].emplace_back(static_cast<std::uint32_t>(lists.size() - 1), false, true);
@@ -69,7 +58,16 @@ Program compile(const Tree& tree, Tree::NodeId root) {
       stack.push_back({operands[i], target, inverted != negative});
     }
   }
+  return lists;
+}
 
+}  // namespace
+
+Program compile(const Tree& tree, Tree::NodeId root) {
+  Program program;
+  program.leaves.resize(tree.solids().size());
+  if (root == Tree::kNone) return program;
+  const EdgeLists lists = flatten(tree, root);
   // Numbered from the root down, parents come first; the other way around children do.
   const auto count = static_cast<std::uint32_t>(lists.size());
   const auto renumbered = [count](std::uint32_t node) { return count - 1 - node; };
@@ -84,8 +82,8 @@ Program compile(const Tree& tree, Tree::NodeId root) {
       program.edges.emplace_back(child, edge.leaf(), edge.inverted());
       const Program::Up up{id, edge.inverted()};
       (edge.leaf() ? program.leaves[child] : program.nodes[child].up) = up;
-      const bool idle = edge.leaf() ? false : program.idle(child);
-      node.idle_true += idle != edge.inverted() ? 1 : 0;
+      const bool true_outside = edge.leaf() ? false : program.true_when_outside(child);
+      node.true_when_outside += true_outside != edge.inverted() ? 1 : 0;
     }
   }
   return program;
@@ -93,23 +91,23 @@ Program compile(const Tree& tree, Tree::NodeId root) {
 
 ProgramState::ProgramState(const Program& program)
     : program_(&program),
-      idle_counts_(program.nodes.size()),
+      outside_counts_(program.nodes.size()),
       inside_(program.leaves.size()),
       known_(program.nodes.size()) {
-  for (std::size_t i = 0; i < idle_counts_.size(); ++i) {
-    idle_counts_[i] = program.nodes[i].idle_true;
+  for (std::size_t i = 0; i < outside_counts_.size(); ++i) {
+    outside_counts_[i] = program.nodes[i].true_when_outside;
   }
   reset();
 }
 
 void ProgramState::reset() {
   ++known_stamp_;
-  counts_ = idle_counts_;
+  counts_ = outside_counts_;
   std::fill(inside_.begin(), inside_.end(), std::uint8_t{0});
-  value_ = program_->idle_value();
+  value_ = program_->value_when_outside();
 }
 
-void ProgramState::flip_all(std::span<const std::uint32_t> solids) {
+void ProgramState::toggle_all(std::span<const std::uint32_t> solids) {
   ++known_stamp_;
   const auto count = [&](const Program::Up& up, bool value) {
     Known& known = known_[up.parent];
@@ -155,8 +153,7 @@ ProgramState::Weight ProgramState::above(std::uint32_t solid) {
     climbed_.push_back(up.parent);
     up = program_->nodes[up.parent].up;
   }
-  // What the tree's value rests on through an edge that says `edge`, given how it rests on its
-  // node.
+  // How the tree's value rests on an edge whose value is `edge`, given how it rests on its node.
   const auto through = [&](Weight node, std::uint32_t index, bool edge) {
     const std::uint32_t count = counts_[index];
     return Weight{node.supports && (edge || count == 0), node.decides && count == (edge ? 1u : 0u)};

@@ -8,9 +8,15 @@
 
 namespace strata::csg {
 
-/// A tree compiled for evaluation. Every node is a union of edges, and an edge may turn its child
-/// around: A - B is not(not A or B), A and B is not(not A or not B). So one kind of node serves all
-/// of them, and unions below unions melt into one node.
+/// A tree compiled for evaluation. Every node is a union of edges, and an edge may invert its
+/// child: A - B is not(not A or B), A and B is not(not A or not B). So one kind of node serves all
+/// of them, and nested unions are flattened into one node.
+///
+/// Blist (J. Rossignac, "Blist: A Boolean list formulation of CSG trees", 1999) and Blister (J.
+/// Hable and J. Rossignac, "Blister: GPU-based rendering of Boolean combinations of free-form
+/// triangulated shapes", 2005) normalize operations, too. We differ: the tree stays a tree with
+/// counts, so that a transition updates only the nodes that change; they evaluate a list of all
+/// primitives with a few bits of state.
 ///
 /// A solid appears once as a leaf. Leaves are solids by their index; a solid that the root does not
 /// reach has no parent.
@@ -34,7 +40,8 @@ struct Program {
   };
   struct Node {
     std::uint32_t first = 0, count = 0;  ///< edges
-    std::uint32_t idle_true = 0;         ///< edges that say true while every solid is outside
+    std::uint32_t true_when_outside =
+        0;  ///< edges that are true while the ray is outside of all solids
     Up up;
   };
 
@@ -42,15 +49,17 @@ struct Program {
   std::vector<Node> nodes;  ///< children before parents; the last one is the root
   std::vector<Up> leaves;   ///< of each solid of the tree
 
-  /// Whether a solid is united with all the rest: inside it is inside the tree.
-  [[nodiscard]] bool plain(std::uint32_t solid) const {
+  /// Whether a solid is an operand of the union at the top: inside it is inside the tree.
+  [[nodiscard]] bool is_union_operand(std::uint32_t solid) const {
     const Up& up = leaves[solid];
     return up.parent + 1 == nodes.size() && !up.inverted;
   }
-  [[nodiscard]] bool idle(std::uint32_t node) const { return nodes[node].idle_true > 0; }
-  /// The tree's value with every solid outside.
-  [[nodiscard]] bool idle_value() const {
-    return !nodes.empty() && idle(static_cast<std::uint32_t>(nodes.size() - 1));
+  [[nodiscard]] bool true_when_outside(std::uint32_t node) const {
+    return nodes[node].true_when_outside > 0;
+  }
+  /// The tree's value outside of all solids.
+  [[nodiscard]] bool value_when_outside() const {
+    return !nodes.empty() && true_when_outside(static_cast<std::uint32_t>(nodes.size() - 1));
   }
 };
 
@@ -58,15 +67,19 @@ struct Program {
 [[nodiscard]] Program compile(const Tree& tree, Tree::NodeId root);
 
 /// The state of a program along one ray: for each solid whether the ray is inside, for each node
-/// how many of its edges say true. A flip climbs only while nodes change.
+/// how many of its edges are true. A transition climbs only while nodes change.
+///
+/// To classify a ray against each solid and combine along the tree is S. D. Roth, "Ray casting for
+/// modeling solids" (1982). We differ: no intervals are merged at the nodes; transitions of all
+/// solids are sorted together and the tree's value is kept up to date from one to the next.
 class ProgramState {
  public:
   explicit ProgramState(const Program& program);
 
   /// Every solid outside again. O(nodes + solids), in words.
   void reset();
-  /// Turns a solid's bit around.
-  void flip(std::uint32_t solid) {
+  /// Enters or leaves a solid.
+  void toggle(std::uint32_t solid) {
     ++known_stamp_;
     inside_[solid] ^= 1;
     Program::Up up = program_->leaves[solid];
@@ -83,17 +96,17 @@ class ProgramState {
     }
     value_ = !value_;
   }
-  /// Turns the bits of all of them around at once: each node is asked once, however many of its
-  /// solids turn. In a chain of differences one after another would each climb to the root.
-  void flip_all(std::span<const std::uint32_t> solids);
+  /// Enters or leaves all of them at once: each node is updated once, however many of its solids
+  /// change. In a chain of differences, each toggle() would climb to the root.
+  void toggle_all(std::span<const std::uint32_t> solids);
   [[nodiscard]] bool inside(std::uint32_t solid) const { return inside_[solid] != 0; }
   [[nodiscard]] bool value() const { return value_; }  ///< of the whole tree
   [[nodiscard]] const Program& program() const { return *program_; }
   /// Whether the tree has its value also because of this solid's: on the way up, no node that is
-  /// true stands on other edges alone. Asked for all solids between two flips it is O(nodes).
+  /// true stands on other edges alone. Asked for all solids between two transitions it is O(nodes).
   [[nodiscard]] bool supports(std::uint32_t solid) { return above(solid).supports; }
-  /// Whether the tree has its value because of this solid's alone: a flip would turn it around. As
-  /// quick as supports().
+  /// Whether the tree has its value because of this solid's alone: a transition of that solid would
+  /// change it. As quick as supports().
   [[nodiscard]] bool decides(std::uint32_t solid) { return above(solid).decides; }
 
  private:
@@ -104,13 +117,13 @@ class ProgramState {
   struct Known {
     std::uint64_t stamp = 0;
     Weight weight;
-    std::uint64_t touched = 0;  ///< flip_all(): a stamp, and its value before
+    std::uint64_t touched = 0;  ///< toggle_all(): a stamp, and its value before
     bool before = false;
   };
   [[nodiscard]] Weight above(std::uint32_t solid);
 
   const Program* program_;
-  std::vector<std::uint32_t> idle_counts_, counts_;
+  std::vector<std::uint32_t> outside_counts_, counts_;
   std::vector<std::uint8_t> inside_;
   bool value_ = false;
   std::uint64_t known_stamp_ = 1;  ///< of the state as it is

@@ -33,7 +33,7 @@ class LeastOf {
   explicit LeastOf(std::size_t count) : words_((count + 63) / 64), tops_((count + 4095) / 4096) {}
 
   /// Puts a number in, or takes it out.
-  void flip(std::uint32_t number) {
+  void toggle(std::uint32_t number) {
     std::uint64_t& word = words_[number / 64];
     word ^= std::uint64_t{1} << (number % 64);
     const std::uint64_t bit = std::uint64_t{1} << (number / 64 % 64);
@@ -94,7 +94,7 @@ class BooleanWorker final : public TileListFilter::Worker {
     for_each_item(lists, pixel, [this](DepthItem item) { items_.push_back(item); });
     find_flips();
     if (!surface_) surface_.emplace(shared_->program);
-    surface_->find(flips_, faces, kept);
+    surface_->find(transitions_, faces, kept);
   }
 
  private:
@@ -102,9 +102,10 @@ class BooleanWorker final : public TileListFilter::Worker {
     return shared_->solid_of[item.triangle()];
   }
 
-  void flip(std::uint32_t solid) {
-    state_.flip(solid);
-    if (labelled() && shared_->ranks[solid] != Shared::kNoRank) added_.flip(shared_->ranks[solid]);
+  void toggle(std::uint32_t solid) {
+    state_.toggle(solid);
+    if (labelled() && shared_->ranks[solid] != Shared::kNoRank)
+      added_.toggle(shared_->ranks[solid]);
   }
   [[nodiscard]] bool labelled() const { return labelled_; }
   /// What the ray is in: the label, 1 without labels; 0: not in the tree. Where the tree is true,
@@ -136,7 +137,7 @@ class BooleanWorker final : public TileListFilter::Worker {
         const bool was = is_inside(rule, winding);
         winding += items_[i].exit() ? -1 : 1;
         if (is_inside(rule, winding) != was) {
-          flip(solid);
+          toggle(solid);
           if (state_.value() != value) shown = items_[i];
         }
       }
@@ -148,7 +149,7 @@ class BooleanWorker final : public TileListFilter::Worker {
       const std::uint32_t solid = solid_of(item);
       const int winding = std::exchange(windings_[solid], 0);
       if (winding == 0) continue;
-      if (is_inside(shared_->rules[solid], winding)) flip(solid);
+      if (is_inside(shared_->rules[solid], winding)) toggle(solid);
       balanced = balanced && shared_->rules[solid] == InsideRule::kParity && winding % 2 == 0;
     }
     if (!balanced) keys_.resize(before);
@@ -159,14 +160,14 @@ class BooleanWorker final : public TileListFilter::Worker {
   void walk_open() {
     find_flips();
     std::uint32_t last = label();
-    for (std::size_t i = 0; i < flips_.size();) {
+    for (std::size_t i = 0; i < transitions_.size();) {
       const std::size_t begin = i;
-      for (; i < flips_.size() && flips_[i].depth == flips_[begin].depth; ++i) {
-        flip(flips_[i].solid);
+      for (; i < transitions_.size() && transitions_[i].depth == transitions_[begin].depth; ++i) {
+        toggle(transitions_[i].solid);
       }
       if (label() == last) continue;
       last = label();
-      put(flips_[begin].depth, last, flips_[begin].triangle);
+      put(transitions_[begin].depth, last, transitions_[begin].triangle);
     }
   }
 
@@ -174,17 +175,18 @@ class BooleanWorker final : public TileListFilter::Worker {
   void find_flips() {
     std::stable_sort(items_.begin(), items_.end(),
                      [this](DepthItem a, DepthItem b) { return solid_of(a) < solid_of(b); });
-    flips_.clear();
+    transitions_.clear();
     for (std::size_t i = 0; i < items_.size();) {
       const std::size_t begin = i;
       const std::uint32_t solid = solid_of(items_[begin]);
       while (i < items_.size() && solid_of(items_[i]) == solid) ++i;
-      flips_of(std::span(items_).subspan(begin, i - begin), solid, shared_->rules[solid], false,
-               flips_);
+      transitions_of(std::span(items_).subspan(begin, i - begin), solid, shared_->rules[solid],
+                     false, transitions_);
     }
-    std::sort(flips_.begin(), flips_.end(), [](const Flip& a, const Flip& b) {
-      return a.depth != b.depth ? a.depth < b.depth : a.solid < b.solid;
-    });
+    std::sort(transitions_.begin(), transitions_.end(),
+              [](const Transition& a, const Transition& b) {
+                return a.depth != b.depth ? a.depth < b.depth : a.solid < b.solid;
+              });
   }
 
   const Shared* shared_;
@@ -194,28 +196,29 @@ class BooleanWorker final : public TileListFilter::Worker {
   std::vector<int> windings_;
   std::vector<std::uint32_t> offsets_;
   std::vector<DepthItem> keys_, items_;
-  std::vector<Flip> flips_;
+  std::vector<Transition> transitions_;
   std::optional<ColumnSurface> surface_;
 };
 
 class BooleanFilter final : public TreeFilter {
  public:
-  /// @param plain  without labels, whether there are some or not
-  BooleanFilter(const Shared& shared, bool plain) : shared_(&shared), plain_(plain) {}
+  /// @param unlabelled  without labels, whether there are some or not
+  BooleanFilter(const Shared& shared, bool unlabelled)
+      : shared_(&shared), unlabelled_(unlabelled) {}
   [[nodiscard]] std::unique_ptr<Worker> worker() const override {
     return std::make_unique<BooleanWorker>(*shared_, labelled());
   }
   [[nodiscard]] Tables tables() const override {
     return {shared_->program, shared_->rules, shared_->solid_of};
   }
-  [[nodiscard]] bool labelled() const override { return !plain_ && !shared_->labels.empty(); }
+  [[nodiscard]] bool labelled() const override { return !unlabelled_ && !shared_->labels.empty(); }
   [[nodiscard]] std::uint32_t solid_of(std::uint32_t triangle) const override {
     return shared_->solid_of[triangle];
   }
 
  private:
   const Shared* shared_;
-  bool plain_;
+  bool unlabelled_;
 };
 
 }  // namespace
@@ -225,7 +228,7 @@ struct SolidLists::Impl {
   TriangleSoup soup;
   Bounds box;                        ///< around the soup
   std::vector<std::uint32_t> added;  ///< solids by rank
-  BooleanFilter filter{shared, false}, plain{shared, true};
+  BooleanFilter filter{shared, false}, unlabelled{shared, true};
 };
 
 SolidLists::SolidLists(const Tree& tree, Tree::NodeId root) : impl_(std::make_unique<Impl>()) {
@@ -256,7 +259,7 @@ SolidLists& SolidLists::operator=(SolidLists&&) noexcept = default;
 const TriangleSoup& SolidLists::soup() const { return impl_->soup; }
 TriangleSoup SolidLists::take_soup() { return std::exchange(impl_->soup, {}); }
 const TileListFilter& SolidLists::filter() const { return impl_->filter; }
-const TileListFilter& SolidLists::unlabelled_filter() const { return impl_->plain; }
+const TileListFilter& SolidLists::unlabelled_filter() const { return impl_->unlabelled; }
 bool SolidLists::is_subtracted(std::uint32_t triangle) const {
   return impl_->shared.ranks[solid_of(triangle)] == Shared::kNoRank;
 }

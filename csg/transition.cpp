@@ -4,8 +4,8 @@
 
 namespace strata::csg {
 
-void flips_of(std::span<const DepthItem> crossings, std::uint32_t solid, InsideRule rule, bool cut,
-              std::vector<Flip>& flips) {
+void transitions_of(std::span<const DepthItem> crossings, std::uint32_t solid, InsideRule rule,
+                    bool cut, std::vector<Transition>& transitions) {
   int sum = 0;
   for (const DepthItem item : crossings) sum += item.exit() ? -1 : 1;
   const bool unbalanced = rule == InsideRule::kParity ? sum % 2 != 0 : sum != 0;
@@ -41,14 +41,14 @@ void flips_of(std::span<const DepthItem> crossings, std::uint32_t solid, InsideR
         if (spans[i].end > all.end) all.end = spans[i].end, all.last = spans[i].last;
       }
       if (all.begin == all.end) continue;
-      flips.push_back({all.begin, solid, all.first, false});
-      flips.push_back({all.end, solid, all.last, true});
+      transitions.push_back({all.begin, solid, all.first, false});
+      transitions.push_back({all.end, solid, all.last, true});
     }
     return;
   }
   int winding = cut ? -sum : 0;
   bool inside = is_inside(rule, winding);
-  if (inside) flips.push_back({0, solid, Flip::kNone, false});
+  if (inside) transitions.push_back({0, solid, Transition::kNone, false});
   for (std::size_t i = 0; i < crossings.size();) {
     const std::size_t begin = i;
     const std::uint32_t depth = crossings[begin].depth();
@@ -59,7 +59,7 @@ void flips_of(std::span<const DepthItem> crossings, std::uint32_t solid, InsideR
     std::size_t turns = begin;  // the first that faces the right way
     while (turns < i && crossings[turns].exit() != inside) ++turns;
     if (turns == i) turns = begin;
-    flips.push_back({depth, solid, crossings[turns].triangle(), inside});
+    transitions.push_back({depth, solid, crossings[turns].triangle(), inside});
     inside = !inside;
   }
 }

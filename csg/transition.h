@@ -11,9 +11,10 @@
 
 namespace strata::csg {
 
-/// Where a ray enters or leaves one solid: its flips along a ray increase in depth and begin with
-/// an entry.
-struct Flip {
+/// Where a ray enters or leaves one solid. The transitions of a solid along a ray increase in depth
+/// and begin with an entry. S. D. Roth, "Ray casting for modeling solids" (1982), classifies
+/// rays so.
+struct Transition {
   static constexpr std::uint32_t kNone = 0xffffffffu;
   std::uint32_t depth = 0;
   std::uint32_t solid = 0;
@@ -21,10 +22,10 @@ struct Flip {
   bool exit = false;
 };
 
-/// Turns the sorted crossings of one ray with one solid into flips under an inside rule, appended
-/// to `flips`. With `cut` the ray may begin inside, which the crossings tell from the far end.
-/// Crossings of an open solid that have no partner become sheets one step thick.
-void flips_of(std::span<const DepthItem> crossings, std::uint32_t solid, InsideRule rule, bool cut,
-              std::vector<Flip>& flips);
+/// Turns the sorted crossings of one ray with one solid into transitions under an inside rule,
+/// appended to `transitions`. With `cut` the ray may begin inside, which the crossings tell from
+/// the far end. Crossings of an open solid that have no partner become sheets one step thick.
+void transitions_of(std::span<const DepthItem> crossings, std::uint32_t solid, InsideRule rule,
+                    bool cut, std::vector<Transition>& transitions);
 
 }  // namespace strata::csg

@@ -32,7 +32,7 @@ struct AllSolids {
   std::vector<glm::ivec3> vertices;
   std::vector<glm::uvec3> triangles;
   std::vector<std::uint32_t> first_of;  ///< first triangle of each part
-  std::vector<glm::uvec2> facts;        ///< of each triangle: solid, and how many depth steps more
+  std::vector<glm::uvec2> facts;        ///< of each triangle: solid, and extra depth steps of a
                                         ///< than Coincidence::range() it may be off
 
   void gather(const FrameInput& frame, const std::vector<std::uint8_t>& used,
@@ -98,7 +98,7 @@ class PixelJudge {
     }
     std::stable_sort(items_.begin(), items_.end(),
                      [](const Item& a, const Item& b) { return a.solid < b.solid; });
-    flips_.clear();
+    transitions_.clear();
     for (std::size_t i = 0; i < items_.size();) {
       const std::uint32_t solid = items_[i].solid;
       crossings_.clear();
@@ -107,13 +107,14 @@ class PixelJudge {
       }
       const Geometry::Part& part = frame_->parts[solid];
       const ViewPart& view_part = frame_->view_parts[solid];
-      if (kind_of(frame_->program, solid, part, view_part) == LeafLayers::Kind::kFirst) {
-        first_entry_of(crossings_, solid, flips_);
+      if (kind_of(frame_->program, solid, part, view_part) == LeafLayers::Kind::kFirstEntryOnly) {
+        first_entry_of(crossings_, solid, transitions_);
       } else {
-        flips_of(crossings_, solid, part.rule, false, flips_);
+        transitions_of(crossings_, solid, part.rule, false, transitions_);
       }
     }
-    return finder_.find(flips_, FlipFaces(frame_->parts, frame_->view_parts, frame_->coincidence));
+    return finder_.find(transitions_,
+                        TransitionFaces(frame_->parts, frame_->view_parts, frame_->coincidence));
   }
 
  private:
@@ -123,10 +124,10 @@ class PixelJudge {
   };
   const FrameInput* frame_;
   const AllSolids* all_;
-  SurfaceFinder finder_;
+  FirstHit finder_;
   std::vector<Item> items_;
   std::vector<DepthItem> crossings_;
-  std::vector<Flip> flips_;
+  std::vector<Transition> transitions_;
 };
 
 }  // namespace
@@ -284,10 +285,10 @@ Result<void> GlSurfaceSource::Impl::walk(const FrameInput& frame, const gl::Prog
   program.set("walk_tiles_u", static_cast<std::uint32_t>(frame.tiles_u));
   program.set("walk_doubt_capacity",
               static_cast<std::uint32_t>((doubts.bytes() - kDoubtHeader) / 4));
-  program.set("walk_range_a", range.a);
-  program.set("walk_range_b", range.b);
-  program.set("walk_range_offset", range.offset);
-  program.set("walk_range_square", range.square);
+  program.set("walk_range_intercept", range.intercept);
+  program.set("walk_range_slope", range.slope);
+  program.set("walk_range_constant", range.constant);
+  program.set("walk_range_quadratic", range.quadratic);
   program.set("walk_depth_limit", static_cast<float>(kPictureDepthLimit));
   for (int band = 0; band < store->bands(); ++band) {
     const gl::PixelRows rows = store->band_rows(band);

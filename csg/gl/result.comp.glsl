@@ -1,4 +1,4 @@
-// Makes the lists of a tree's result of the lists of its solids, a thread a pixel: a crossing flips
+// Makes the lists of a tree's result of the lists of its solids, a thread a pixel: a crossing toggles
 // the bit of its solid, and where the tree's value is another one after all crossings of a depth,
 // the result has a crossing there, that of the last of them (law 6). A pixel where a solid is not
 // entered and left in turn hands its list over, and so do all pixels of a tile without a program.
@@ -9,7 +9,7 @@ const uint kResultKept = 16u;  // crossings that a thread keeps; longer results 
 const uint kResultParity = 0x80000000u;
 const uint kResultHandedOver = 0x80000000u;
 
-// Of each triangle its solid, and kResultParity where any crossing turns the solid around.
+// Of each triangle its solid, and kResultParity where any crossing enters or leaves the solid.
 layout(std430, binding = 0) readonly buffer ResultTriangles { uint result_triangles[]; };
 // Of each pixel: where its items begin; [handed over:1 | crossings:15 | items:16].
 layout(std430, binding = 4) writeonly buffer ResultPlaces { uvec2 result_places[]; };
@@ -73,7 +73,7 @@ bool result_walk(WalkTile tile, uint pixel, uint at, out uint count, out uint fo
       walks = false;
       continue;
     }
-    walk_flip(tile, slot);
+    walk_toggle(tile, slot);
     group = true;
     group_depth = depth;
   }
@@ -86,16 +86,16 @@ void main() {
   uint pixel = v * walk_width + u, place = pixel - walk_row_begin * walk_width;
   WalkTile tile = walk_tiles[((v + walk_first_row) >> 6) * walk_tiles_u + (u >> 6)];
   uint count, found;
-  bool plain = result_walk(tile, pixel, kWalkNone, count, found);
+  bool walked = result_walk(tile, pixel, kWalkNone, count, found);
   if (count > walk_longest) {
     result_too_long = 1u;
     return;
   }
-  uint items = plain ? found : count, at = 0u;
+  uint items = walked ? found : count, at = 0u;
   if (items > 0u) at = atomicAdd(result_used, items);
-  result_places[place] = uvec2(at, (plain ? 0u : kResultHandedOver) | count << 16 | items);
+  result_places[place] = uvec2(at, (walked ? 0u : kResultHandedOver) | count << 16 | items);
   if (items == 0u || at + items > walk_capacity) return;
-  if (!plain) {
+  if (!walked) {
     StrataCursor cursor = strata_list(pixel);
     for (uint i = 0u; i < count; ++i) {
       uint depth, payload;

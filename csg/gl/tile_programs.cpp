@@ -20,7 +20,7 @@ void TilePrograms::make(const FrameInput& frame, std::uint64_t binding_bytes,
   begin(count, frame.view_parts.size());
   Simplifier simplifier(frame.program);
   // A tree that is true outside of everything begins where nothing is; the CPU knows.
-  const bool odd = frame.program.nodes.empty() || frame.program.idle_value();
+  const bool odd = frame.program.nodes.empty() || frame.program.value_when_outside();
   for (std::uint32_t tile = 0; tile < count; ++tile) {
     if (odd || slots.size() * sizeof(std::uint32_t) > binding_bytes / 2 ||
         !add(frame, tile, simplifier)) {

@@ -2,7 +2,7 @@
 
 // A tile's program: solids have slots, nodes are unions of edges as in csg/program.h. At walk_nodes
 // + nodes lie the edges above the slots, then those above the nodes, then of each node how many of
-// its edges say true while the ray is outside of all solids.
+// its edges are true while the ray is outside of all solids.
 struct WalkTile {
   uint slot_count;  // 0: nothing is to be found in the tile
   uint node_count;
@@ -15,14 +15,14 @@ struct WalkTile {
 };
 
 const uint kWalkNone = 0xffffffffu;
-const uint kWalkRoot = 0xfffffffeu;  // an edge to nothing: what turns around is the tree
+const uint kWalkRoot = 0xfffffffeu;  // an edge to nothing: the value of the tree changes
 
 layout(std430, binding = 1) readonly buffer WalkTiles { WalkTile walk_tiles[]; };
 layout(std430, binding = 2) readonly buffer WalkSlots { uint walk_slots[]; };
 layout(std430, binding = 3) readonly buffer WalkNodes { uint walk_nodes[]; };
 
 uint walk_bits[WALK_WORDS];    // a bit a slot: the ray is inside
-uint walk_counts[WALK_NODES];  // of each node: its edges that say true
+uint walk_counts[WALK_NODES];  // of each node: its edges that are true
 bool walk_value;               // of the tree
 uint walk_rounds;              // of loops
 
@@ -38,8 +38,8 @@ void walk_begin(WalkTile tile) {
 
 bool walk_inside(uint slot) { return (walk_bits[slot >> 5] >> (slot & 31u) & 1u) != 0u; }
 
-// Turns a solid around. That climbs while nodes change.
-void walk_flip(WalkTile tile, uint slot) {
+// Enters or leaves a solid. That climbs while nodes change.
+void walk_toggle(WalkTile tile, uint slot) {
   uint bits = walk_bits[slot >> 5] ^ 1u << (slot & 31u);
   walk_bits[slot >> 5] = bits;
   bool value = (bits >> (slot & 31u) & 1u) != 0u;

@@ -56,12 +56,12 @@ class RayWalk {
     std::size_t next = 0;
     for (const DepthItem item : items_) {
       if (lists_->solid_of[item.triangle()] >= counted) continue;
-      for (; next < flips_.size() && flips_[next].depth <= item.depth(); ++next) {
-        const Flip& flip = flips_[next];
-        if (flip.solid < counted) continue;
-        std::uint8_t& within = within_[flip.solid - counted];
+      for (; next < transitions_.size() && transitions_[next].depth <= item.depth(); ++next) {
+        const Transition& transition = transitions_[next];
+        if (transition.solid < counted) continue;
+        std::uint8_t& within = within_[transition.solid - counted];
         // A face where the section begins is still there.
-        if (within == 0 && flip.depth == item.depth()) break;
+        if (within == 0 && transition.depth == item.depth()) break;
         within ^= 1;
         around += within != 0 ? 1 : -1;
       }
@@ -76,9 +76,10 @@ class RayWalk {
     bool inside = state_.value();
     if (inside) begin = view_->near;
     std::size_t i = 0;
-    while (i < flips_.size()) {
-      const std::uint32_t depth = flips_[i].depth;
-      for (; i < flips_.size() && flips_[i].depth == depth; ++i) state_.flip(flips_[i].solid);
+    while (i < transitions_.size()) {
+      const std::uint32_t depth = transitions_[i].depth;
+      for (; i < transitions_.size() && transitions_[i].depth == depth; ++i)
+        state_.toggle(transitions_[i].solid);
       if (state_.value() == inside) continue;
       const double distance = view_->distance(depth);
       const double nothing = slack_ + slack_per_distance_ * distance + step(depth);
@@ -94,8 +95,8 @@ class RayWalk {
       }
       inside = state_.value();
     }
-    const bool open = inside && end < 0 && i == flips_.size();
-    for (std::size_t j = 0; j < i; ++j) state_.flip(flips_[j].solid);
+    const bool open = inside && end < 0 && i == transitions_.size();
+    for (std::size_t j = 0; j < i; ++j) state_.toggle(transitions_[j].solid);
     if (open && begin >= 0) return std::numeric_limits<float>::infinity();
     if (begin < 0 || end < 0) return 0.0f;
     return static_cast<float>((end - begin) * slant(u, v));
@@ -113,9 +114,9 @@ class RayWalk {
     const double y = (v + 0.5 - view_->size.y / 2.0) / scale_;
     return std::sqrt(1.0 + x * x + y * y);
   }
-  /// The flips of a ray, sorted by depth.
+  /// The transitions of a ray, sorted by depth.
   void gather(std::span<const DepthItem> items) {
-    flips_.clear();
+    transitions_.clear();
     sorted_.assign(items.begin(), items.end());
     std::stable_sort(sorted_.begin(), sorted_.end(), [this](DepthItem a, DepthItem b) {
       return lists_->solid_of[a.triangle()] < lists_->solid_of[b.triangle()];
@@ -124,11 +125,11 @@ class RayWalk {
       const std::size_t begin = i;
       const std::uint32_t solid = lists_->solid_of[sorted_[begin].triangle()];
       while (i < sorted_.size() && lists_->solid_of[sorted_[i].triangle()] == solid) ++i;
-      flips_of(std::span(sorted_).subspan(begin, i - begin), solid, geometry_->parts()[solid].rule,
-               lists_->parts[solid].cut, flips_);
+      transitions_of(std::span(sorted_).subspan(begin, i - begin), solid,
+                     geometry_->parts()[solid].rule, lists_->parts[solid].cut, transitions_);
     }
-    std::stable_sort(flips_.begin(), flips_.end(),
-                     [](const Flip& a, const Flip& b) { return a.depth < b.depth; });
+    std::stable_sort(transitions_.begin(), transitions_.end(),
+                     [](const Transition& a, const Transition& b) { return a.depth < b.depth; });
   }
 
   const Geometry* geometry_;
@@ -138,7 +139,7 @@ class RayWalk {
   double scale_ = 1, slack_ = 0, slack_per_distance_ = 0;
   std::span<const DepthItem> items_;
   std::vector<DepthItem> sorted_;
-  std::vector<Flip> flips_;
+  std::vector<Transition> transitions_;
   std::vector<std::uint8_t> within_;  ///< each solid that is not counted
 };
 

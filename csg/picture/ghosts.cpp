@@ -172,14 +172,15 @@ class GhostPainter::PixelPainter {
     });
     for (std::size_t i = 0; i < sorted_.size();) {
       const std::uint32_t ghost = slot(sorted_[i]).ghost;
-      flips_.clear();
+      transitions_.clear();
       while (i < sorted_.size() && slot(sorted_[i]).ghost == ghost) {
         const std::size_t begin = i;
         const std::uint32_t at = painted_->slot_of[sorted_[begin].triangle()];
         while (i < sorted_.size() && painted_->slot_of[sorted_[i].triangle()] == at) ++i;
         const Slot& one = painter_->slots_[at];
-        flips_of(std::span(sorted_).subspan(begin, i - begin), one.leaf,
-                 painter_->geometry_->parts()[one.solid].rule, painted_->parts[at].cut, flips_);
+        transitions_of(std::span(sorted_).subspan(begin, i - begin), one.leaf,
+                       painter_->geometry_->parts()[one.solid].rule, painted_->parts[at].cut,
+                       transitions_);
       }
       walk(ghost);
     }
@@ -188,41 +189,42 @@ class GhostPainter::PixelPainter {
     std::erase_if(fragments_, [](const Fragment& f) { return f.triangle == Surface::kNone; });
   }
 
-  /// The surfaces of one ghost's tree, from its flips.
+  /// The surfaces of one ghost's tree, from its transitions.
   void walk(std::uint32_t ghost) {
-    std::stable_sort(flips_.begin(), flips_.end(),
-                     [](const Flip& a, const Flip& b) { return a.depth < b.depth; });
+    std::stable_sort(transitions_.begin(), transitions_.end(),
+                     [](const Transition& a, const Transition& b) { return a.depth < b.depth; });
     if (!states_[ghost]) {
       states_[ghost] = std::make_unique<ProgramState>(painter_->programs_[ghost].program);
     }
     ProgramState& state = *states_[ghost];
     const std::size_t first = fragments_.size();
     bool value = state.value();
-    for (std::size_t i = 0; i < flips_.size();) {
+    for (std::size_t i = 0; i < transitions_.size();) {
       const std::size_t begin = i;
       std::size_t shown = begin;
-      for (; i < flips_.size() && flips_[i].depth == flips_[begin].depth; ++i) {
+      for (; i < transitions_.size() && transitions_[i].depth == transitions_[begin].depth; ++i) {
         const bool before = state.value();
-        state.flip(flips_[i].solid);
+        state.toggle(transitions_[i].solid);
         if (state.value() != before) shown = i;
       }
       if (state.value() == value) continue;
       value = !value;
-      const Flip& flip = flips_[shown];
+      const Transition& transition = transitions_[shown];
       // Faces that coincide leave slivers and gaps that are none.
-      if (fragments_.size() > first && fragments_.back().solid != flip.solid &&
-          flip.depth - fragments_.back().depth <= slack(flip.depth)) {
+      if (fragments_.size() > first && fragments_.back().solid != transition.solid &&
+          transition.depth - fragments_.back().depth <= slack(transition.depth)) {
         fragments_.pop_back();
         continue;
       }
-      fragments_.push_back({flip.depth, ghost, flip.solid, flip.triangle, flip.exit});
+      fragments_.push_back(
+          {transition.depth, ghost, transition.solid, transition.triangle, transition.exit});
     }
-    for (const Flip& flip : flips_)
-      state.flip(flip.solid);  // an even number of each or all of them
+    for (const Transition& transition : transitions_)
+      state.toggle(transition.solid);  // an even number of each or all of them
     if (state.value() != states_initial(ghost)) states_[ghost].reset();
   }
   [[nodiscard]] bool states_initial(std::uint32_t ghost) const {
-    return painter_->programs_[ghost].program.idle_value();
+    return painter_->programs_[ghost].program.value_when_outside();
   }
 
   [[nodiscard]] glm::vec4 face_colour(const Fragment& fragment) const {
@@ -246,7 +248,7 @@ class GhostPainter::PixelPainter {
   double a_ = 1, b_ = 0, pixel_ = 0, flat_ = 0;
   std::vector<std::unique_ptr<ProgramState>> states_;
   std::vector<DepthItem> sorted_;
-  std::vector<Flip> flips_;
+  std::vector<Transition> transitions_;
   std::vector<Fragment> fragments_;
 };
 

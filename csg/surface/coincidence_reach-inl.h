@@ -22,9 +22,10 @@ HWY_INLINE V coincidence_reach(D d, const Coincidence::Range& range, V depth) {
   const hn::RebindToSigned<D> di;
   const hn::RebindToFloat<D> df;
   const auto at = hn::ConvertTo(df, hn::BitCast(di, depth));
-  const auto nearness = hn::Sub(hn::Set(df, range.a), hn::Mul(hn::Set(df, range.b), at));
-  const auto square = hn::Mul(nearness, hn::Mul(nearness, hn::Set(df, range.square)));
-  const auto reach = hn::Add(hn::Set(df, range.offset), square);
+  const auto nearness =
+      hn::Sub(hn::Set(df, range.intercept), hn::Mul(hn::Set(df, range.slope), at));
+  const auto square = hn::Mul(nearness, hn::Mul(nearness, hn::Set(df, range.quadratic)));
+  const auto reach = hn::Add(hn::Set(df, range.constant), square);
   const auto most = hn::Set(df, static_cast<float>(kPictureDepthLimit));
   return hn::BitCast(d, hn::ConvertTo(di, hn::Min(reach, most)));
 }

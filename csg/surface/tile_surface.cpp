@@ -38,15 +38,16 @@ void LeafLayers::add_layer(Arena& arena) {
 LeafLayers::Kind kind_of(const Program& program, std::uint32_t solid, const Geometry::Part& part,
                          const ViewPart& view_part) {
   if (!part.convex) return LeafLayers::Kind::kSorted;
-  return program.plain(solid) && !view_part.cut ? LeafLayers::Kind::kFirst
-                                                : LeafLayers::Kind::kConvex;
+  return program.is_union_operand(solid) && !view_part.cut ? LeafLayers::Kind::kFirstEntryOnly
+                                                           : LeafLayers::Kind::kConvex;
 }
 
 void first_entry_of(std::span<const DepthItem> crossings, std::uint32_t solid,
-                    std::vector<Flip>& flips) {
+                    std::vector<Transition>& transitions) {
   const auto entry =
       std::find_if(crossings.begin(), crossings.end(), [](DepthItem item) { return !item.exit(); });
-  if (entry != crossings.end()) flips.push_back({entry->depth(), solid, entry->triangle(), false});
+  if (entry != crossings.end())
+    transitions.push_back({entry->depth(), solid, entry->triangle(), false});
 }
 
 // --- TileFinder ---------------------------------------------------------------------------------
@@ -68,7 +69,7 @@ TileFinder::TileFinder(const Program& program, const std::vector<ViewPart>& view
       view_(&view),
       coincidence_(&coincidence),
       simplifier_(program),
-      finder_(program) {}
+      first_hit_(program) {}
 
 TileFinder::~TileFinder() = default;
 
@@ -114,8 +115,8 @@ void TileFinder::make_deep(LeafLayers& leaf, const Input& input) {
   leaf.deep = true;
   leaf.keys.clear();
   leaf.triangles.clear();
-  leaf.flips.clear();
-  leaf.flip_ends.assign(kTilePixels, 0);
+  leaf.transitions.clear();
+  leaf.transition_ends.assign(kTilePixels, 0);
   leaf.areas = 0xffff;
   leaf.nearest = 0;
   leaf.farthest = kPictureDepthLimit;
@@ -126,12 +127,12 @@ void TileFinder::make_deep(LeafLayers& leaf, const Input& input) {
   for (std::size_t pixel = 0; pixel < kTilePixels && !stop_.stop_requested(); ++pixel) {
     crossings_.clear();
     for_each_item(*lists, pixel, [this](DepthItem item) { crossings_.push_back(item); });
-    if (leaf.kind == LeafLayers::Kind::kFirst) {
-      first_entry_of(crossings_, leaf.solid, leaf.flips);
+    if (leaf.kind == LeafLayers::Kind::kFirstEntryOnly) {
+      first_entry_of(crossings_, leaf.solid, leaf.transitions);
     } else {
-      flips_of(crossings_, leaf.solid, parts_[leaf.solid].rule, part.cut, leaf.flips);
+      transitions_of(crossings_, leaf.solid, parts_[leaf.solid].rule, part.cut, leaf.transitions);
     }
-    leaf.flip_ends[pixel] = static_cast<std::uint32_t>(leaf.flips.size());
+    leaf.transition_ends[pixel] = static_cast<std::uint32_t>(leaf.transitions.size());
   }
 }
 
@@ -147,24 +148,25 @@ void TileFinder::normalize_pixel(LeafLayers& leaf, std::size_t at) {
   }
   // Layers of convex solids are not sorted, and others by marked triangles.
   std::sort(crossings_.begin(), crossings_.end());
-  leaf_flips_.clear();
-  flips_of(crossings_, leaf.solid, parts_[leaf.solid].rule, view_parts_[leaf.solid].cut,
-           leaf_flips_);
-  while (leaf.keys.size() < leaf_flips_.size()) leaf.add_layer(arena_);
-  for (std::size_t k = 0; k < leaf_flips_.size(); ++k) {
-    leaf.keys[k][at] = leaf_flips_[k].depth;
-    leaf.triangles[k][at] = leaf_flips_[k].triangle | (steep ? LeafLayers::kSteep : 0);
+  leaf_transitions_.clear();
+  transitions_of(crossings_, leaf.solid, parts_[leaf.solid].rule, view_parts_[leaf.solid].cut,
+                 leaf_transitions_);
+  while (leaf.keys.size() < leaf_transitions_.size()) leaf.add_layer(arena_);
+  for (std::size_t k = 0; k < leaf_transitions_.size(); ++k) {
+    leaf.keys[k][at] = leaf_transitions_[k].depth;
+    leaf.triangles[k][at] = leaf_transitions_[k].triangle | (steep ? LeafLayers::kSteep : 0);
   }
   leaf.steep = leaf.steep || steep;
-  if (!leaf_flips_.empty()) {
-    leaf.nearest = std::min(leaf.nearest, leaf_flips_.front().depth);
-    leaf.farthest = std::max(leaf.farthest, leaf_flips_.back().depth);
+  if (!leaf_transitions_.empty()) {
+    leaf.nearest = std::min(leaf.nearest, leaf_transitions_.front().depth);
+    leaf.farthest = std::max(leaf.farthest, leaf_transitions_.back().depth);
   }
 }
 
 void TileFinder::show(std::uint64_t pixel) {
   ++resolved_;
-  const Surface surface = finder_.find(flips_, FlipFaces(parts_, view_parts_, *coincidence_));
+  const Surface surface =
+      first_hit_.find(transitions_, TransitionFaces(parts_, view_parts_, *coincidence_));
   part_.image->depth[pixel] = surface.depth;
   part_.image->solid[pixel] = surface.solid;
   part_.image->triangle[pixel] = surface.triangle | (surface.exit ? SurfaceImage::kExit : 0u);
@@ -174,15 +176,17 @@ void TileFinder::resolve(const TileProgram& program, std::uint64_t pixel) {
   const auto width = static_cast<std::uint64_t>(part_.image->width);
   const int u = part_.u0 + static_cast<int>(pixel % width);
   const int v = part_.v0 + static_cast<int>(pixel / width);
-  flips_.clear();
+  transitions_.clear();
   for (const std::uint32_t slot : program.leaves) {
     LeafLayers& leaf = leaves_[slot];
     if (v < leaf.rect.v0 || v >= leaf.rect.v1 || u < leaf.rect.u0 || u >= leaf.rect.u1) continue;
     if (!leaf.made) make(leaf);
     if (leaf.deep) {
       const auto place = static_cast<std::size_t>((v - tile_.v0) * kTileSide + (u - tile_.u0));
-      const auto begin = leaf.flips.begin() + (place > 0 ? leaf.flip_ends[place - 1] : 0);
-      flips_.insert(flips_.end(), begin, leaf.flips.begin() + leaf.flip_ends[place]);
+      const auto begin =
+          leaf.transitions.begin() + (place > 0 ? leaf.transition_ends[place - 1] : 0);
+      transitions_.insert(transitions_.end(), begin,
+                          leaf.transitions.begin() + leaf.transition_ends[place]);
       continue;
     }
     const auto at = static_cast<std::size_t>((v - leaf.rect.v0) * leaf.stride + (u - leaf.rect.u0));
@@ -190,10 +194,30 @@ void TileFinder::resolve(const TileProgram& program, std::uint64_t pixel) {
       if (leaf.keys[k][at] == LeafLayers::kEmpty) break;
       std::uint32_t triangle = leaf.triangles[k][at];
       if (triangle != Surface::kNone) triangle &= ~LeafLayers::kSteep;
-      flips_.push_back({leaf.keys[k][at], leaf.solid, triangle, (k & 1) != 0});
+      transitions_.push_back({leaf.keys[k][at], leaf.solid, triangle, (k & 1) != 0});
     }
   }
   show(pixel);
+}
+
+bool TileFinder::place(LeafLayers& leaf, std::uint32_t solid) const {
+  const ViewPart& part = view_parts_[solid];
+  if (part.binned && part.bins.tile(tile_.u0 / kTileSide, tile_.v0 / kTileSide).empty()) {
+    return false;
+  }
+  leaf.made = leaf.deep = leaf.steep = false;
+  leaf.kind = kind_of(*program_, solid, parts_[solid], part);
+  leaf.solid = solid;
+  leaf.nearest = part.cut ? 0 : part.nearest;
+  leaf.farthest = part.farthest;
+  leaf.keys.clear();
+  leaf.triangles.clear();
+  const auto down = [&](int u) { return tile_.u0 + (u - tile_.u0) / kAreaSide * kAreaSide; };
+  leaf.rect = {down(std::max(tile_.u0, part.rect.u0)), std::max(tile_.v0, part.rect.v0),
+               down(std::min(tile_.u1, part.rect.u1) + kAreaSide - 1),
+               std::min(tile_.v1, part.rect.v1)};
+  leaf.stride = leaf.rect.u1 - leaf.rect.u0;
+  return !leaf.rect.empty();
 }
 
 void TileFinder::find(int tile_u, int tile_v, std::span<const std::uint32_t> solids,
@@ -208,27 +232,11 @@ void TileFinder::find(int tile_u, int tile_v, std::span<const std::uint32_t> sol
   std::size_t count = 0;
   bool cut = false, united = true;
   for (const std::uint32_t solid : solids) {
-    const ViewPart& view_part = view_parts_[solid];
-    if (view_part.binned && view_part.bins.tile(tile_u, tile_v).empty()) continue;
-    LeafLayers& leaf = leaves_[count++];
-    leaf.made = leaf.deep = leaf.steep = false;
-    leaf.kind = kind_of(*program_, solid, parts_[solid], view_part);
-    leaf.solid = solid;
-    leaf.nearest = view_part.cut ? 0 : view_part.nearest;
-    leaf.farthest = view_part.farthest;
-    leaf.keys.clear();
-    leaf.triangles.clear();
-    const auto down = [&](int u) { return tile_.u0 + (u - tile_.u0) / kAreaSide * kAreaSide; };
-    leaf.rect = {down(std::max(tile_.u0, view_part.rect.u0)), std::max(tile_.v0, view_part.rect.v0),
-                 down(std::min(tile_.u1, view_part.rect.u1) + kAreaSide - 1),
-                 std::min(tile_.v1, view_part.rect.v1)};
-    leaf.stride = leaf.rect.u1 - leaf.rect.u0;
-    if (leaf.rect.empty()) {
-      --count;
-      continue;
-    }
-    cut = cut || view_part.cut;
-    united = united && leaf.kind == LeafLayers::Kind::kFirst;
+    LeafLayers& leaf = leaves_[count];
+    if (!place(leaf, solid)) continue;
+    ++count;
+    cut = cut || view_parts_[solid].cut;
+    united = united && leaf.kind == LeafLayers::Kind::kFirstEntryOnly;
   }
   if (count > 0 && united) return find_united(std::span(leaves_).first(count));
   for (int v = tile_.v0; v < tile_.v1; ++v) {
@@ -248,45 +256,55 @@ void TileFinder::find(int tile_u, int tile_v, std::span<const std::uint32_t> sol
   area.solids = slot_solids_.data();
   for (int v = tile_.v0; v < tile_.v1; v += kAreaSide) {
     for (int u = tile_.u0; u < tile_.u1; u += kAreaSide) {
-      const int area_index =
-          (v - tile_.v0) / kAreaSide * (kTileSide / kAreaSide) + (u - tile_.u0) / kAreaSide;
       area.rect = {u, v, u + kAreaSide, std::min(tile_.v1, v + kAreaSide)};
-      present_.clear();
-      for (std::uint32_t slot = 0; slot < count; ++slot) {
-        const LeafLayers& leaf = leaves_[slot];
-        if (leaf.made && (leaf.areas >> area_index & 1) == 0) continue;
-        const PixelRect& rect = leaf.rect;
-        if (rect.u0 <= u && u < rect.u1 && rect.v0 < area.rect.v1 && area.rect.v0 < rect.v1) {
-          present_.push_back(slot);
-        }
-      }
-      simplifier_.simplify(area.leaves, present_, tile_program_);
-      if (tile_program_.constant) continue;
-      doubtful_.clear();
-      const auto is_deep = [&] {
-        return std::any_of(tile_program_.leaves.begin(), tile_program_.leaves.end(),
-                           [&](std::uint32_t slot) { return leaves_[slot].deep; });
-      };
-      bool one_by_one = cut || tile_program_.depth > kMaxSearchDepth || is_deep();
-      if (!one_by_one) {
-        search_surface(area, *this);
-        one_by_one = is_deep();  // it has made leaves
-      }
-      if (one_by_one) {
-        doubtful_.clear();
-        for (int y = area.rect.v0; y < area.rect.v1; ++y) {
-          for (int x = u; x < std::min(tile_.u1, u + kAreaSide); ++x) {
-            doubtful_.push_back(part.index(x, y));
-          }
-        }
-      }
-      for (const std::uint64_t pixel : doubtful_) {
-        if (stop.stop_requested()) return;  // lists may be very long
-        resolve(tile_program_, pixel);
-      }
+      find_area(area, cut);
+      if (stop.stop_requested()) return;
     }
   }
   if (cut) number_sources();
+}
+
+void TileFinder::list_present(const SearchArea& area) {
+  const int u = area.rect.u0, v = area.rect.v0;
+  const int area_index =
+      (v - tile_.v0) / kAreaSide * (kTileSide / kAreaSide) + (u - tile_.u0) / kAreaSide;
+  present_.clear();
+  for (std::uint32_t slot = 0; slot < area.leaves.size(); ++slot) {
+    const LeafLayers& leaf = area.leaves[slot];
+    if (leaf.made && (leaf.areas >> area_index & 1) == 0) continue;
+    const PixelRect& rect = leaf.rect;
+    if (rect.u0 <= u && u < rect.u1 && rect.v0 < area.rect.v1 && v < rect.v1) {
+      present_.push_back(slot);
+    }
+  }
+}
+
+void TileFinder::find_area(const SearchArea& area, bool cut) {
+  list_present(area);
+  simplifier_.simplify(area.leaves, present_, tile_program_);
+  if (tile_program_.constant) return;
+  doubtful_.clear();
+  const auto is_deep = [&] {
+    return std::any_of(tile_program_.leaves.begin(), tile_program_.leaves.end(),
+                       [&](std::uint32_t slot) { return leaves_[slot].deep; });
+  };
+  bool one_by_one = cut || tile_program_.depth > kMaxSearchDepth || is_deep();
+  if (!one_by_one) {
+    search_surface(area, *this);
+    one_by_one = is_deep();  // it has made leaves
+  }
+  if (one_by_one) {
+    doubtful_.clear();
+    for (int y = area.rect.v0; y < area.rect.v1; ++y) {
+      for (int x = area.rect.u0; x < std::min(tile_.u1, area.rect.u1); ++x) {
+        doubtful_.push_back(part_.index(x, y));
+      }
+    }
+  }
+  for (const std::uint64_t pixel : doubtful_) {
+    if (stop_.stop_requested()) return;  // lists may be very long
+    resolve(tile_program_, pixel);
+  }
 }
 
 void TileFinder::number_sources() {

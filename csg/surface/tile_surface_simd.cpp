@@ -13,9 +13,11 @@
 // where that changes, from the same answers of its children; a node that is true asks on from the
 // farthest of them until none is true. Solids behind what is found are not even rasterized.
 //
-// This work is related to: C. Zanni, F. Claux, S. Lefebvre, HCSG: Hashing for real-time CSG
-// modeling, 2018, which walks depth slabs front to back. We differ: the window is per vector of
-// pixels and closes by itself, and solids are sorted apart, so that no list mixes them.
+// This work is related to: C. Zanni, F. Claux, S. Lefebvre, "HCSG: Hashing for real-time CSG
+// modeling" (2018), which walks depth slabs front to back, and S. Lefebvre, "IceSL: A GPU
+// accelerated CSG modeler and slicer" (2013), which sorts all fragments of a ray in an A-buffer
+// first. We differ: the window is per vector of pixels and closes by itself, and solids are sorted
+// apart, so that no list mixes them.
 
 HWY_BEFORE_NAMESPACE();
 namespace strata::csg {
@@ -39,7 +41,7 @@ class LayerSink {
     leaf_->steep = leaf_->steep || steep_ != 0;
   }
   [[nodiscard]] HWY_INLINE bool wants(bool exit) const {
-    return !exit || leaf_->kind != LeafLayers::Kind::kFirst;
+    return !exit || leaf_->kind != LeafLayers::Kind::kFirstEntryOnly;
   }
   HWY_INLINE void begin(bool exit, std::uint32_t triangle, const PixelRect&) {
     exit_ = exit ? 1 : 0;
@@ -78,7 +80,7 @@ class LayerSink {
     auto key = hn::Sub(hn::LoadU(d, words), hn::Set(d, 1u));
     auto triangle = hn::Set(d, triangle_);
     if (hn::AllTrue(d, hn::Eq(key, empty))) return;
-    if (leaf_->kind == LeafLayers::Kind::kFirst) return keep_first(d, at, key, triangle);
+    if (leaf_->kind == LeafLayers::Kind::kFirstEntryOnly) return keep_first(d, at, key, triangle);
     if (leaf_->kind == LeafLayers::Kind::kConvex) return place(d, at, key, triangle);
     for (std::size_t k = 0;; ++k) {
       if (k == leaf_->keys.size()) leaf_->add_layer(*arena_);
@@ -139,6 +141,35 @@ std::uint64_t RasterLayers(const LatticeMesh& mesh, const RasterTarget& target,
   return sink.fragments();
 }
 
+/// The pixels from `at` on where a leaf is not entered and left in turn.
+HWY_INLINE M SpecialPixels(const LeafLayers& leaf, std::size_t at, bool all_special) {
+  const D d;
+  const V empty = hn::Set(d, LeafLayers::kEmpty), one = hn::Set(d, 1u), zero = hn::Zero(d);
+  const std::size_t layers = leaf.keys.size();
+  M special = no_lane(d);
+  V before = zero;  // depth of the last exit, plus 1
+  for (std::size_t k = 0; k < layers; k += 2) {
+    const V enter = hn::Load(d, leaf.keys[k] + at);
+    const V leave = k + 1 < layers ? hn::Load(d, leaf.keys[k + 1] + at) : empty;
+    const M none = hn::And(hn::Eq(enter, empty), hn::Eq(leave, empty));
+    const V enter_depth = hn::ShiftRight<1>(enter), leave_depth = hn::ShiftRight<1>(leave);
+    const M facing = hn::And(hn::Eq(hn::And(enter, one), zero), hn::Ne(hn::And(leave, one), zero));
+    const M ordered =
+        hn::And(hn::Lt(enter_depth, leave_depth), hn::Not(hn::Lt(enter_depth, before)));
+    const M paired = hn::And(hn::And(facing, ordered), hn::Ne(leave, empty));
+    if (leaf.kind != LeafLayers::Kind::kFirstEntryOnly) {
+      special = hn::Or(special, hn::Not(hn::Or(none, paired)));
+    }
+    before = hn::Add(leave_depth, one);
+  }
+  if (all_special) {  // of a convex solid there may be an exit alone
+    for (std::size_t k = 0; k < std::min<std::size_t>(layers, 2); ++k) {
+      special = hn::Or(special, hn::Ne(hn::Load(d, leaf.keys[k] + at), empty));
+    }
+  }
+  return special;
+}
+
 void NormalizeLayers(LeafLayers& leaf, bool all_special, TileFinder& finder) {
   const D d;
   const V empty = hn::Set(d, LeafLayers::kEmpty), one = hn::Set(d, 1u), zero = hn::Zero(d);
@@ -162,28 +193,7 @@ void NormalizeLayers(LeafLayers& leaf, bool all_special, TileFinder& finder) {
       column = 0;
       area_row = 1u << (++row / kSide * (kTileSide / kSide));
     }
-    M special = no_lane(d);
-    V before = zero;  // depth of the last exit, plus 1
-    for (std::size_t k = 0; k < layers; k += 2) {
-      const V enter = hn::Load(d, leaf.keys[k] + at);
-      const V leave = k + 1 < layers ? hn::Load(d, leaf.keys[k + 1] + at) : empty;
-      const M none = hn::And(hn::Eq(enter, empty), hn::Eq(leave, empty));
-      const V enter_depth = hn::ShiftRight<1>(enter), leave_depth = hn::ShiftRight<1>(leave);
-      const M facing =
-          hn::And(hn::Eq(hn::And(enter, one), zero), hn::Ne(hn::And(leave, one), zero));
-      const M ordered =
-          hn::And(hn::Lt(enter_depth, leave_depth), hn::Not(hn::Lt(enter_depth, before)));
-      const M plain = hn::And(hn::And(facing, ordered), hn::Ne(leave, empty));
-      if (leaf.kind != LeafLayers::Kind::kFirst) {
-        special = hn::Or(special, hn::Not(hn::Or(none, plain)));
-      }
-      before = hn::Add(leave_depth, one);
-    }
-    if (all_special) {  // of a convex solid there may be an exit alone
-      for (std::size_t k = 0; k < std::min<std::size_t>(layers, 2); ++k) {
-        special = hn::Or(special, hn::Ne(hn::Load(d, leaf.keys[k] + at), empty));
-      }
-    }
+    const M special = SpecialPixels(leaf, at, all_special);
     M any = no_lane(d);
     for (std::size_t k = 0; k < layers; ++k) {
       const V key = hn::Load(d, leaf.keys[k] + at);
@@ -217,21 +227,22 @@ class Search {
     v_ = v;
   }
 
-  /// Depths where the tree becomes true first, kEmpty for never, and the leaf that turns it.
-  HWY_INLINE void find(V& depth, V& who) {
+  /// Depths where the tree becomes true first, kEmpty for never, and the leaf whose transition that
+  /// is.
+  HWY_INLINE void find(V& depth, V& leaf_at) {
     const D d;
     M value;
     const bool inverted = area_.program->root_inverted;
     // not(node) becomes true where the node, true at first, becomes false.
     probe(area_.program->root, hn::Zero(d), hn::Not(no_lane(d)), inverted, !inverted, value, depth,
-          who);
+          leaf_at);
     const M waits = inverted ? value : hn::Not(value);
     depth = hn::IfThenElse(waits, depth, hn::Set(d, LeafLayers::kEmpty));
   }
 
-  /// Whether there is another flip near `depth` or a steep one anywhere, and the triangle of the
-  /// flip at `depth`.
-  HWY_INLINE M judge(V depth, V who, V& triangle) {
+  /// Whether there is another transition near `depth` or a steep one anywhere, and the triangle of
+  /// the transition at `depth`.
+  HWY_INLINE M judge(V depth, V leaf_at, V& triangle) {
     const D d;
     const M hit = hn::Ne(depth, hn::Set(d, LeafLayers::kEmpty));
     const V reach = coincidence_reach(d, area_.range, hn::IfThenElseZero(hit, depth));
@@ -245,17 +256,17 @@ class Search {
       LeafLayers& leaf = area_.leaves[slot];
       if (leaf.nearest > latest || !holds(leaf) || leaf.nearest > latest) continue;
       const std::size_t offset = offset_in(leaf);
-      const M own = hn::Eq(who, hn::Set(d, slot));
+      const M own = hn::Eq(leaf_at, hn::Set(d, slot));
       for (std::size_t k = 0; k < leaf.keys.size(); ++k) {
-        const V flip = hn::Load(d, leaf.keys[k] + offset);
-        const V gap = hn::Sub(hn::Max(flip, depth), hn::Min(flip, depth));
-        const M same = hn::And(own, hn::Eq(flip, depth));
+        const V transition = hn::Load(d, leaf.keys[k] + offset);
+        const V gap = hn::Sub(hn::Max(transition, depth), hn::Min(transition, depth));
+        const M same = hn::And(own, hn::Eq(transition, depth));
         doubt = hn::Or(doubt, hn::AndNot(same, hn::Not(hn::Gt(gap, reach))));
         if (!leaf.steep && hn::AllFalse(d, same)) continue;
-        const V its_triangle = hn::Load(d, leaf.triangles[k] + offset);
-        const V marked = hn::And(its_triangle, hn::Set(d, LeafLayers::kSteep));
-        doubt = hn::Or(doubt, hn::And(hn::Ne(marked, zero), hn::Ne(flip, empty)));
-        triangle = hn::IfThenElse(same, its_triangle, triangle);
+        const V found_triangle = hn::Load(d, leaf.triangles[k] + offset);
+        const V marked = hn::And(found_triangle, hn::Set(d, LeafLayers::kSteep));
+        doubt = hn::Or(doubt, hn::And(hn::Ne(marked, zero), hn::Ne(transition, empty)));
+        triangle = hn::IfThenElse(same, found_triangle, triangle);
         if ((k & 1) != 0) exits = hn::Or(exits, same);
       }
     }
@@ -276,7 +287,7 @@ class Search {
     return static_cast<std::size_t>((v_ - leaf.rect.v0) * leaf.stride + (u_ - leaf.rect.u0));
   }
 
-  /// Whether a ray is inside a leaf after all flips before `from`, and its next flip.
+  /// Whether a ray is inside a leaf after all transitions before `from`, and its next transition.
   HWY_INLINE void probe_leaf(std::uint32_t slot, V from, M& inside, V& next) {
     const D d;
     inside = no_lane(d);
@@ -285,37 +296,37 @@ class Search {
     if (!holds(leaf)) return;
     const std::size_t offset = offset_in(leaf);
     for (std::size_t k = 0; k < leaf.keys.size(); ++k) {
-      const V flip = hn::Load(d, leaf.keys[k] + offset);
-      const M past = hn::Lt(flip, from);
+      const V transition = hn::Load(d, leaf.keys[k] + offset);
+      const M past = hn::Lt(transition, from);
       inside = hn::Xor(inside, past);
-      next = hn::Min(next, hn::Or(flip, hn::VecFromMask(d, past)));
+      next = hn::Min(next, hn::Or(transition, hn::VecFromMask(d, past)));
     }
   }
 
   /// The same for an edge, as its node sees it.
   HWY_INLINE void probe_edge(Program::Edge edge, V from, M active, bool need_true, bool need_false,
-                             M& value, V& next, V& who) {
+                             M& value, V& next, V& leaf_at) {
     const D d;
     if (edge.leaf()) {
       probe_leaf(edge.child(), from, value, next);
-      who = hn::Set(d, edge.child());
+      leaf_at = hn::Set(d, edge.child());
     } else {
       probe(edge.child(), from, active, edge.inverted() ? need_false : need_true,
-            edge.inverted() ? need_true : need_false, value, next, who);
+            edge.inverted() ? need_true : need_false, value, next, leaf_at);
     }
     if (edge.inverted()) value = hn::Not(value);
   }
 
-  /// The value of a node after all flips before `from`, in the lanes `active`; and the next depth
-  /// where it changes, where it is true and `need_true`, or false and `need_false`.
+  /// The value of a node after all transitions before `from`, in the lanes `active`; and the next
+  /// depth where it changes, where it is true and `need_true`, or false and `need_false`.
   HWY_NOINLINE void probe(std::uint32_t index, V from, M active, bool need_true, bool need_false,
-                          M& value, V& next, V& who) {
+                          M& value, V& next, V& leaf_at) {
     const D d;
     const TileProgram::Node& node = area_.program->nodes[index];
     const Program::Edge* edges = area_.program->edges.data() + node.first;
     const std::uint32_t* nearest = area_.program->nearest.data() + node.first;
     const V none = hn::Set(d, LeafLayers::kEmpty), zero = hn::Zero(d);
-    V near = hn::IfThenElse(active, none, zero), near_who = zero, far = zero, far_who = zero;
+    V near = hn::IfThenElse(active, none, zero), near_leaf = zero, far = zero, far_leaf = zero;
     M any = no_lane(d);
     for (std::uint32_t i = 0; i < node.count; ++i) {
       if (!need_true &&
@@ -323,25 +334,25 @@ class Search {
         break;  // what comes is false here and changes later
       }
       M edge_value;
-      V edge_next, edge_who;
-      probe_edge(edges[i], from, active, need_true, need_false, edge_value, edge_next, edge_who);
+      V edge_next, edge_leaf;
+      probe_edge(edges[i], from, active, need_true, need_false, edge_value, edge_next, edge_leaf);
       any = hn::Or(any, edge_value);
       const M nearer = hn::AndNot(edge_value, hn::Lt(edge_next, near));
       near = hn::IfThenElse(nearer, edge_next, near);
-      near_who = hn::IfThenElse(nearer, edge_who, near_who);
+      near_leaf = hn::IfThenElse(nearer, edge_leaf, near_leaf);
       const M farther = hn::And(edge_value, hn::Gt(edge_next, far));
       far = hn::IfThenElse(farther, edge_next, far);
-      far_who = hn::IfThenElse(farther, edge_who, far_who);
+      far_leaf = hn::IfThenElse(farther, edge_leaf, far_leaf);
     }
     value = any;
     next = near;
-    who = near_who;
+    leaf_at = near_leaf;
     if (!need_true) return;
     M open = hn::And(hn::And(any, active), hn::Lt(far, none));
     while (!hn::AllFalse(d, open)) {
       const V beyond = hn::Add(far, hn::Set(d, 1u));
       M still = no_lane(d);
-      V farther = zero, farther_who = zero;
+      V farther = zero, farther_leaf = zero;
       const std::uint32_t first =
           hn::GetLane(hn::MinOfLanes(d, hn::IfThenElse(open, beyond, none)));
       const std::uint32_t last = hn::GetLane(hn::MaxOfLanes(d, hn::IfThenElseZero(open, beyond)));
@@ -351,20 +362,20 @@ class Search {
           if (leaf.nearest >= last || (leaf.made && leaf.farthest < first)) continue;
         }
         M edge_value;
-        V edge_next, edge_who;
-        probe_edge(edges[i], beyond, open, true, false, edge_value, edge_next, edge_who);
+        V edge_next, edge_leaf;
+        probe_edge(edges[i], beyond, open, true, false, edge_value, edge_next, edge_leaf);
         still = hn::Or(still, edge_value);
         const M more = hn::And(edge_value, hn::Gt(edge_next, farther));
         farther = hn::IfThenElse(more, edge_next, farther);
-        farther_who = hn::IfThenElse(more, edge_who, farther_who);
+        farther_leaf = hn::IfThenElse(more, edge_leaf, farther_leaf);
       }
       open = hn::And(open, still);
       far = hn::IfThenElse(open, farther, far);
-      far_who = hn::IfThenElse(open, farther_who, far_who);
+      far_leaf = hn::IfThenElse(open, farther_leaf, far_leaf);
       open = hn::And(open, hn::Lt(far, none));
     }
     next = hn::IfThenElse(any, far, near);
-    who = hn::IfThenElse(any, far_who, near_who);
+    leaf_at = hn::IfThenElse(any, far_leaf, near_leaf);
   }
 
   const SearchArea& area_;
@@ -382,8 +393,8 @@ void SearchSurface(const SearchArea& area, TileFinder& finder) {
   for (int v = area.rect.v0; v < area.rect.v1; ++v) {
     for (int u = area.rect.u0; u < area.rect.u1; u += lanes) {
       search.set_pixels(u, v);
-      V depth, who, triangle;
-      search.find(depth, who);
+      V depth, leaf_at, triangle;
+      search.find(depth, leaf_at);
       const std::size_t at = area.part.index(u, v);
       const int count = std::min(lanes, area.end - u);
       if (count <= 0) continue;
@@ -392,8 +403,9 @@ void SearchSurface(const SearchArea& area, TileFinder& finder) {
         std::copy(depths, depths + count, image.depth.begin() + static_cast<long>(at));
         continue;
       }
-      const M doubt = search.judge(depth, who, triangle);
-      const V solid = hn::GatherIndex(d, area.solids, hn::BitCast(hn::RebindToSigned<D>(), who));
+      const M doubt = search.judge(depth, leaf_at, triangle);
+      const V solid =
+          hn::GatherIndex(d, area.solids, hn::BitCast(hn::RebindToSigned<D>(), leaf_at));
       if (count == lanes) {
         hn::StoreU(depth, d, image.depth.data() + at);
         hn::StoreU(solid, d, image.solid.data() + at);

@@ -16,20 +16,21 @@ void UnitedLayers::clear(Arena& arena, const PixelRect& tile) {
     std::fill_n(words, kWords, kEmpty);
   }
   for (std::uint32_t*& words : faces) words = arena.words(kWords);
-  rest = arena.words(kWords);
-  std::fill_n(rest, kWords, kEmpty);
-  std::fill(std::begin(far), std::end(far), kEmpty);
-  std::fill(std::begin(hidden), std::end(hidden), kEmpty);
+  bound_behind = arena.words(kWords);
+  std::fill_n(bound_behind, kWords, kEmpty);
+  std::fill(std::begin(hidden_beyond), std::end(hidden_beyond), kEmpty);
+  std::fill(std::begin(skipped_from), std::end(skipped_from), kEmpty);
   face_solids.clear();
   face_triangles.clear();
-  more.clear();
+  extra_steps.clear();
 }
 
 bool UnitedLayers::hides(const PixelRect& clip, std::uint32_t nearest) {
   bool all = true;
-  for_each_area(clip, [&](std::size_t area) { all = all && far[area] < nearest; });
+  for_each_area(clip, [&](std::size_t area) { all = all && hidden_beyond[area] < nearest; });
   if (!all) return false;
-  for_each_area(clip, [&](std::size_t area) { hidden[area] = std::min(hidden[area], nearest); });
+  for_each_area(
+      clip, [&](std::size_t area) { skipped_from[area] = std::min(skipped_from[area], nearest); });
   return true;
 }
 
@@ -38,14 +39,15 @@ std::uint32_t UnitedLayers::add_face(const LatticeMesh& mesh, std::uint32_t soli
   const auto face = static_cast<std::uint32_t>(face_solids.size());
   face_solids.push_back(solid);
   face_triangles.push_back(triangle);
-  more.push_back(0);
+  extra_steps.push_back(0);
   if (!steep) return face;
   // No bound is more than the triangle is deep.
   const glm::uvec3& t = mesh.triangles[triangle];
   const auto [low, high] =
       std::minmax({mesh.vertices[t.x].z, mesh.vertices[t.y].z, mesh.vertices[t.z].z});
   constexpr auto kLimit = static_cast<std::int32_t>(kPictureDepthLimit);
-  more.back() = static_cast<std::uint32_t>(std::clamp(high, 0, kLimit) - std::min(low, kLimit)) + 1;
+  extra_steps.back() =
+      static_cast<std::uint32_t>(std::clamp(high, 0, kLimit) - std::min(low, kLimit)) + 1;
   return face | kSteep;
 }
 
@@ -55,31 +57,31 @@ bool TileFinder::show_united(std::uint64_t pixel) {
                                        part_.v0 + static_cast<int>(pixel / width));
   const double first = united_.depths[0][at];
   const Coincidence::Range range = coincidence_->range();
-  const double nearness = range.a - static_cast<double>(range.b) * first;
-  flips_.clear();
-  double last = first + range.offset + range.square * nearness * nearness + 1;
+  const double nearness = range.intercept - static_cast<double>(range.slope) * first;
+  transitions_.clear();
+  double last = first + range.constant + range.quadratic * nearness * nearness + 1;
   for (int k = 0; k < UnitedLayers::kKept; ++k) {
     const std::uint32_t depth = united_.depths[k][at];
     if (depth == UnitedLayers::kEmpty) break;
     const std::uint32_t face = united_.faces[k][at] & ~UnitedLayers::kSteep;
-    const double more = united_.more[face];
+    const double extra = united_.extra_steps[face];
     if (k == 0) {
-      last += 2 * more;
-    } else if (depth - more > last) {
+      last += 2 * extra;
+    } else if (depth - extra > last) {
       continue;
     }
     const std::uint32_t solid = united_.face_solids[face];
     // A ray enters a convex solid once, or nearly so.
-    for (const Flip& flip : flips_) {
-      if (flip.solid == solid) return false;
+    for (const Transition& transition : transitions_) {
+      if (transition.solid == solid) return false;
     }
-    flips_.push_back({depth, solid, united_.face_triangles[face], false});
+    transitions_.push_back({depth, solid, united_.face_triangles[face], false});
   }
   constexpr std::size_t kSide = LeafLayers::kLanes;
   const std::size_t area =
       at / kTileSide / kSide * UnitedLayers::kAreasAcross + at % kTileSide / kSide;
-  if (std::min(united_.rest[at], united_.hidden[area]) <= last) return false;
-  if (flips_.size() > 1) show(pixel);
+  if (std::min(united_.bound_behind[at], united_.skipped_from[area]) <= last) return false;
+  if (transitions_.size() > 1) show(pixel);
   return true;
 }
 

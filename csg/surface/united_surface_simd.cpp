@@ -54,13 +54,13 @@ class UnitedSink {
   template <class D2>
   HWY_INLINE void insert(D2 d, std::size_t at, const std::uint32_t* words) {
     auto depth = hn::Sub(hn::LoadU(d, words), hn::Set(d, 1u));  // kEmpty where not covered
-    std::uint32_t* HWY_RESTRICT rest = layers_->rest + at;
-    const auto old_rest = hn::LoadU(d, rest);
+    std::uint32_t* HWY_RESTRICT behind = layers_->bound_behind + at;
+    const auto old_behind = hn::LoadU(d, behind);
     const auto empty = hn::Set(d, UnitedLayers::kEmpty);
     auto face = hn::Set(d, face_);
     if (steep_) {
       if (hn::AllTrue(d, hn::Eq(depth, empty))) return;
-    } else if (hn::AllFalse(d, hn::Lt(depth, old_rest))) {
+    } else if (hn::AllFalse(d, hn::Lt(depth, old_behind))) {
       return;
     }
     for (int k = 0; k < UnitedLayers::kKept; ++k) {
@@ -75,7 +75,7 @@ class UnitedSink {
       if (hn::AllTrue(d, hn::Eq(depth, empty))) return;
     }
     const auto left = hn::Ne(depth, empty);
-    hn::StoreU(hn::Min(depth, old_rest), d, rest);
+    hn::StoreU(hn::Min(depth, old_behind), d, behind);
     const auto steep = hn::Ne(hn::And(face, hn::Set(d, UnitedLayers::kSteep)), hn::Zero(d));
     if (hn::AllFalse(d, hn::And(left, steep))) return;
     alignas(64) std::uint32_t depths[HWY_MAX_BYTES / 4], faces[HWY_MAX_BYTES / 4];
@@ -83,8 +83,8 @@ class UnitedSink {
     hn::Store(face, d, faces);
     for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
       if (depths[i] == UnitedLayers::kEmpty || (faces[i] & UnitedLayers::kSteep) == 0) continue;
-      const std::uint32_t more = layers_->more[faces[i] & ~UnitedLayers::kSteep];
-      rest[i] = std::min(rest[i], depths[i] - std::min(depths[i], more));
+      const std::uint32_t extra = layers_->extra_steps[faces[i] & ~UnitedLayers::kSteep];
+      behind[i] = std::min(behind[i], depths[i] - std::min(depths[i], extra));
     }
   }
 
@@ -126,7 +126,7 @@ void FindHidden(const PixelRect& clip, const Coincidence::Range& range, UnitedLa
       if (hn::GetLane(hn::MaxOfLanes(d, farthest)) == UnitedLayers::kEmpty) return;
     }
     const auto last = hn::MaxOfLanes(d, farthest);
-    layers.far[area] = hn::GetLane(hn::Add(last, coincidence_reach(d, range, last))) + 1;
+    layers.hidden_beyond[area] = hn::GetLane(hn::Add(last, coincidence_reach(d, range, last))) + 1;
   });
 }
 
@@ -183,7 +183,8 @@ void FindUnited(const UnitedLayers& layers, const PixelRect& tile, const Coincid
           marked, hn::IfThenElseZero(hn::Ne(second, empty), hn::Load(d, layers.faces[1] + at)));
       bits =
           hn::Or(bits, hn::IfThenElseZero(hn::Ne(third, empty), hn::Load(d, layers.faces[2] + at)));
-      const auto near = hn::Not(hn::Gt(hn::Min(second, hn::Load(d, layers.rest + at)), last));
+      const auto near =
+          hn::Not(hn::Gt(hn::Min(second, hn::Load(d, layers.bound_behind + at)), last));
       const auto doubt = hn::And(hit, hn::Or(near, hn::Ne(hn::And(bits, steep), zero)));
       if (hn::AllFalse(d, doubt)) continue;
       hn::Store(hn::VecFromMask(d, doubt), d, doubts);

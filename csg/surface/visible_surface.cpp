@@ -12,7 +12,7 @@ namespace strata::csg {
 namespace {
 
 /// Lists from this length on are sorted in time that grows with it, byte by byte.
-constexpr std::size_t kFewFlips = 64;
+constexpr std::size_t kFewTransitions = 64;
 
 /// Sorts by the upper half, a byte at a time; what is equal stays in order.
 void sort_by_bytes(std::vector<std::uint64_t>& keys, std::vector<std::uint64_t>& scratch) {
@@ -72,10 +72,11 @@ Coincidence::Range Coincidence::range() const {
           static_cast<float>(kMore * flat_)};
 }
 
-bool FlipFaces::beneath(const Flip& below, const Flip& above) const {
-  const auto corners = [&](const Flip& flip) {
-    const Geometry::Part& part = (*parts_)[flip.solid];
-    const glm::uvec3& t = part.triangles[(*view_parts_)[flip.solid].source(flip.triangle)];
+bool TransitionFaces::beneath(const Transition& below, const Transition& above) const {
+  const auto corners = [&](const Transition& transition) {
+    const Geometry::Part& part = (*parts_)[transition.solid];
+    const glm::uvec3& t =
+        part.triangles[(*view_parts_)[transition.solid].source(transition.triangle)];
     return std::array<glm::dvec3, 3>{part.positions[t.x], part.positions[t.y], part.positions[t.z]};
   };
   const auto of_above = corners(above), of_below = corners(below);
@@ -87,7 +88,7 @@ bool FlipFaces::beneath(const Flip& below, const Flip& above) const {
   });
 }
 
-const Flip& SurfaceFinder::choose(const FlipFaces& faces) const {
+const Transition& FirstHit::choose(const TransitionFaces& faces) const {
   const auto first_of = [&](const auto& may) {
     const Candidate* best = nullptr;
     for (const Candidate& candidate : candidates_) {
@@ -97,128 +98,153 @@ const Flip& SurfaceFinder::choose(const FlipFaces& faces) const {
   };
   const Candidate* best = first_of([](const Candidate&) { return true; });
   // Of united solids the outermost face shows. Where solids are intersected, each is needed.
-  if (candidates_.size() == 1 || best->flip->triangle == Surface::kNone ||
-      (best->alone && !best->flip->exit)) {
-    return *best->flip;
+  if (candidates_.size() == 1 || best->transition->triangle == Surface::kNone ||
+      (best->alone && !best->transition->exit)) {
+    return *best->transition;
   }
   constexpr int kMostPlanes = 4;
   for (int i = 0; i < kMostPlanes; ++i) {
     const Candidate* above = first_of([&](const Candidate& candidate) {
-      return candidate.alone == best->alone && candidate.flip->exit == best->flip->exit &&
-             candidate.flip->solid != best->flip->solid &&
-             faces.ends_at(*best->flip, *candidate.flip);
+      return candidate.alone == best->alone &&
+             candidate.transition->exit == best->transition->exit &&
+             candidate.transition->solid != best->transition->solid &&
+             faces.ends_at(*best->transition, *candidate.transition);
     });
     if (above == nullptr) break;
     best = above;
   }
-  return *best->flip;
+  return *best->transition;
 }
 
-Surface SurfaceFinder::find(std::vector<Flip>& flips, const FlipFaces& faces) {
-  sort(flips);
+Coincidence::Bound FirstHit::bound_of(const std::vector<Transition>& transitions, std::size_t begin,
+                                      std::size_t end, const TransitionFaces& faces) {
+  Coincidence::Bound largest;
+  for (std::size_t i = begin; i < end; ++i) {
+    if (!state_.supports(transitions[i].solid)) continue;
+    const Coincidence::Bound one = faces.bound(transitions[i]);
+    largest.nearer = std::max(largest.nearer, one.nearer);
+    largest.farther = std::max(largest.farther, one.farther);
+  }
+  return largest;
+}
+
+FirstHit::Interval FirstHit::walk_inside(const std::vector<Transition>& transitions,
+                                         std::size_t begin, std::size_t at, double settles) {
+  Interval interval;
+  interval.begin = begin, interval.group_end = at;
+  interval.settled = interval.exit_begin = interval.exit_end = at;
+  const auto note_operands = [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i) {
+      interval.union_operand = interval.union_operand || enters_union_operand(transitions[i]);
+    }
+  };
+  note_operands(begin, at);
+  while (interval.exit_end < transitions.size()) {
+    interval.exit_begin = interval.exit_end;
+    interval.exit_end = apply(transitions, interval.exit_end);
+    if (!state_.value()) break;
+    if (transitions[interval.exit_begin].depth <= settles) interval.settled = interval.exit_end;
+    note_operands(interval.exit_begin, interval.exit_end);
+  }
+  return interval;
+}
+
+void FirstHit::list_candidates(const std::vector<Transition>& transitions, const Interval& interval,
+                               const Coincidence::Bound& surface_bound,
+                               const TransitionFaces& faces) {
+  const std::uint32_t depth = transitions[interval.begin].depth;
+  // Of one solid only its last transition counts, unless it has one in the group.
+  for (std::size_t i = 0; i < interval.settled; ++i) last_[transitions[i].solid] = i;
+  for (std::size_t i = interval.begin; i < interval.group_end; ++i) {
+    last_[transitions[i].solid] = i;
+  }
+  candidates_.clear();
+  for (std::size_t i = 0; i < interval.settled; ++i) {
+    const Transition& transition = transitions[i];
+    if (transition.triangle == Surface::kNone) continue;
+    if (state_.inside(transition.solid) == transition.exit) continue;
+    const bool in_group = i >= interval.begin && i < interval.group_end;
+    if (!in_group) {
+      const Coincidence::Bound bound = faces.bound(transition);
+      if (transition.depth < depth
+              ? depth - transition.depth > surface_bound.nearer + bound.farther
+              : transition.depth - depth > surface_bound.farther + bound.nearer) {
+        continue;
+      }
+      if (last_[transition.solid] != i) continue;
+    }
+    if (!state_.supports(transition.solid)) continue;  // last: it climbs the tree
+    candidates_.push_back({&transition, state_.decides(transition.solid)});
+  }
+}
+
+Surface FirstHit::find(std::vector<Transition>& transitions, const TransitionFaces& faces) {
+  sort(transitions);
   Surface found;
   std::size_t at = 0;
-  // Of the flips that the tree's value rests on.
-  const auto group_bound = [&](std::size_t begin, std::size_t end) {
-    Coincidence::Bound largest;
-    for (std::size_t i = begin; i < end; ++i) {
-      if (!state_.supports(flips[i].solid)) continue;
-      const Coincidence::Bound one = faces.bound(flips[i]);
-      largest.nearer = std::max(largest.nearer, one.nearer);
-      largest.farther = std::max(largest.farther, one.farther);
-    }
-    return largest;
-  };
-  while (at < flips.size()) {
+  while (at < transitions.size()) {
     const std::size_t begin = at;
-    at = apply(flips, at);
+    at = apply(transitions, at);
     if (!state_.value()) continue;
-    const std::uint32_t depth = flips[begin].depth;
-    const Coincidence::Bound own = group_bound(begin, at);
-    const bool embedded = depth == 0 && flips[begin].triangle == Surface::kNone;
-
+    const std::uint32_t depth = transitions[begin].depth;
+    const Coincidence::Bound bound = bound_of(transitions, begin, at, faces);
     // On to where the interval ends. What lies within the bound of its beginning is settled with
-    // it; that must not depend on flips that do not matter.
-    const double settles = depth + 2.0 * own.farther;
-    std::size_t settled = at, end_begin = at, end = at;
-    bool plain = false;
-    for (std::size_t i = begin; i < at; ++i) plain = plain || is_plain_entry(flips[i]);
-    while (end < flips.size()) {
-      end_begin = end;
-      end = apply(flips, end);
-      if (!state_.value()) break;
-      if (flips[end_begin].depth <= settles) settled = end;
-      for (std::size_t i = end_begin; i < end; ++i) plain = plain || is_plain_entry(flips[i]);
-    }
+    // it; that must not depend on transitions that do not matter.
+    const Interval interval = walk_inside(transitions, begin, at, depth + 2.0 * bound.farther);
     if (!state_.value()) {
-      if (embedded) {
-        for (std::size_t i = end_begin; i < end; ++i) {
-          if (!state_.supports(flips[i].solid)) continue;
-          found = surface_of(flips[i], flips[i].depth);
+      const bool eye_inside = depth == 0 && transitions[begin].triangle == Surface::kNone;
+      if (eye_inside) {
+        for (std::size_t i = interval.exit_begin; i < interval.exit_end; ++i) {
+          if (!state_.supports(transitions[i].solid)) continue;
+          found = surface_of(transitions[i], transitions[i].depth);
           break;
         }
-        at = end;
+        at = interval.exit_end;
         break;
       }
-      if (!plain &&
-          flips[end_begin].depth - depth <= own.farther + group_bound(end_begin, end).nearer) {
-        at = end;
+      if (!interval.union_operand &&
+          transitions[interval.exit_begin].depth - depth <=
+              bound.farther +
+                  bound_of(transitions, interval.exit_begin, interval.exit_end, faces).nearer) {
+        at = interval.exit_end;
         continue;
       }
     }
-    flip_all(flips, settled, end);
-
-    // Of one solid only its last flip counts, unless it has one in the group.
-    for (std::size_t i = 0; i < settled; ++i) last_[flips[i].solid] = i;
-    for (std::size_t i = begin; i < at; ++i) last_[flips[i].solid] = i;
-    candidates_.clear();
-    for (std::size_t i = 0; i < settled; ++i) {
-      const Flip& flip = flips[i];
-      if (flip.triangle == Surface::kNone) continue;
-      if (state_.inside(flip.solid) == flip.exit) continue;
-      const bool in_group = i >= begin && i < at;
-      if (!in_group) {
-        const Coincidence::Bound its = faces.bound(flip);
-        if (flip.depth < depth ? depth - flip.depth > own.nearer + its.farther
-                               : flip.depth - depth > own.farther + its.nearer) {
-          continue;
-        }
-        if (last_[flip.solid] != i) continue;
-      }
-      if (!state_.supports(flip.solid)) continue;  // last: it climbs the tree
-      candidates_.push_back({&flip, state_.decides(flip.solid)});
-    }
-    found = surface_of(candidates_.empty() ? flips[begin] : choose(faces), depth);
-    at = settled;
+    toggle_all(transitions, interval.settled, interval.exit_end);
+    list_candidates(transitions, interval, bound, faces);
+    found = surface_of(candidates_.empty() ? transitions[begin] : choose(faces), depth);
+    at = interval.settled;
     break;
   }
-  // Copying the state is a sixteenth of a flip's work for each solid and node.
+  // Copying the state is a sixteenth of a transition's work for each solid and node.
   if (at * 16 > state_.program().nodes.size() + state_.program().leaves.size()) {
     state_.reset();
   } else {
-    flip_all(flips, 0, at);
+    toggle_all(transitions, 0, at);
   }
   return found;
 }
 
-void SurfaceFinder::sort(std::vector<Flip>& flips) {
+void FirstHit::sort(std::vector<Transition>& transitions) {
   order_.clear();
-  for (const Flip& flip : flips) {
-    order_.push_back(std::uint64_t{flip.depth} << 32 | order_.size());
+  for (const Transition& transition : transitions) {
+    order_.push_back(std::uint64_t{transition.depth} << 32 | order_.size());
   }
-  if (order_.size() < kFewFlips) {
+  if (order_.size() < kFewTransitions) {
     std::sort(order_.begin(), order_.end());
   } else {
     sort_by_bytes(order_, other_order_);
   }
   sorted_.clear();
-  for (const std::uint64_t key : order_) sorted_.push_back(flips[static_cast<std::uint32_t>(key)]);
-  std::swap(flips, sorted_);
-  for (auto begin = flips.begin(); begin != flips.end();) {
+  for (const std::uint64_t key : order_)
+    sorted_.push_back(transitions[static_cast<std::uint32_t>(key)]);
+  std::swap(transitions, sorted_);
+  for (auto begin = transitions.begin(); begin != transitions.end();) {
     auto end = begin + 1;
-    while (end != flips.end() && end->depth == begin->depth) ++end;
+    while (end != transitions.end() && end->depth == begin->depth) ++end;
     if (end - begin > 1) {
-      std::sort(begin, end, [](const Flip& a, const Flip& b) { return a.solid < b.solid; });
+      std::sort(begin, end,
+                [](const Transition& a, const Transition& b) { return a.solid < b.solid; });
     }
     begin = end;
   }

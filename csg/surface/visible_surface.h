@@ -52,9 +52,10 @@ class Coincidence {
   /// there are few such pixels, and each is looked at by itself.
   [[nodiscard]] double steep_from() const { return steep_from_; }
   /// A little more than the sum of the bounds of two crossings near a depth, of triangles that are
-  /// not steep: offset + nearness * nearness * square with nearness = a - b * depth.
+  /// not steep: constant + quadratic * nearness * nearness with nearness = intercept - slope *
+  /// depth.
   struct Range {
-    float a, b, offset, square;
+    float intercept, slope, constant, quadratic;
   };
   [[nodiscard]] Range range() const;
 
@@ -69,98 +70,122 @@ class Coincidence {
   double steep_from_ = 0;
 };
 
-/// The faces behind flips, as SurfaceFinder asks about them.
-class FlipFaces {
+/// The faces behind transitions, as FirstHit asks about them.
+class TransitionFaces {
  public:
   /// Keeps references to all of them.
-  FlipFaces(const std::vector<Geometry::Part>& parts, const std::vector<ViewPart>& view_parts,
-            const Coincidence& coincidence)
+  TransitionFaces(const std::vector<Geometry::Part>& parts, const std::vector<ViewPart>& view_parts,
+                  const Coincidence& coincidence)
       : parts_(&parts), view_parts_(&view_parts), coincidence_(&coincidence) {}
 
-  [[nodiscard]] Coincidence::Bound bound(const Flip& flip) const {
-    if (flip.triangle == Surface::kNone) return {};
-    return coincidence_->bound((*view_parts_)[flip.solid].mesh, flip.triangle, flip.depth,
-                               (*parts_)[flip.solid].error_share);
+  [[nodiscard]] Coincidence::Bound bound(const Transition& transition) const {
+    if (transition.triangle == Surface::kNone) return {};
+    return coincidence_->bound((*view_parts_)[transition.solid].mesh, transition.triangle,
+                               transition.depth, (*parts_)[transition.solid].error_share);
   }
   /// Whether the face of `below` lies beneath the plane of `above`, but not the other way around:
   /// it begins at that plane, and `above` may go on where it does so.
-  [[nodiscard]] bool ends_at(const Flip& below, const Flip& above) const {
+  [[nodiscard]] bool ends_at(const Transition& below, const Transition& above) const {
     return beneath(below, above) && !beneath(above, below);
   }
 
  private:
-  [[nodiscard]] bool beneath(const Flip& below, const Flip& above) const;
+  [[nodiscard]] bool beneath(const Transition& below, const Transition& above) const;
 
   const std::vector<Geometry::Part>* parts_;
   const std::vector<ViewPart>* view_parts_;
   const Coincidence* coincidence_;
 };
 
-/// Finds the visible surface among all flips of one ray. The tree is evaluated after all flips of a
-/// depth. Then coincidence (law 5):
+/// Finds the visible surface among all transitions of one ray: image-based CSG, as J. Goldfeather,
+/// S. Molnar, G. Turk and H. Fuchs, "Near real-time CSG rendering using tree normalization and
+/// geometric pruning" (1989), and N. Stewart, G. Leach and S. John, "An improved Z-buffer CSG
+/// rendering algorithm" (1998). We differ: no normal form of the tree, one evaluation of it along
+/// the ray, and faces that coincide within a derived bound are one face. The tree is evaluated
+/// after all transitions of a depth. Then coincidence (law 5):
 /// - an interval inside the tree that is no longer than the bounds of its two ends together is
 ///   nothing: two faces that coincide, or the outermost 1/256 of a pixel of an outline, where the
-///   snap may have moved the outline of another solid to the other side. A solid that is just
-///   united with the rest has no such other side, and stays;
+///   snap may have moved the outline of another solid to the other side. A union operand has
+///   no such other side, and stays;
 /// - of several solids whose faces coincide with the surface and contribute to it, the one shown is
 ///   one without which it would not be there (a hidden face that ends in it has no part in it),
 ///   then one that the ray enters rather than one that it leaves, then the first of the tree; but
 ///   a face that ends at the plane of another gives way to it: the slope of a solid whose top lies
 ///   in the top of another one, where the snap has put it in front.
 /// A ray that begins inside the tree (the eye is in the material) shows where it leaves it.
-class SurfaceFinder {
+class FirstHit {
  public:
-  explicit SurfaceFinder(const Program& program) : state_(program), last_(program.leaves.size()) {}
+  explicit FirstHit(const Program& program) : state_(program), last_(program.leaves.size()) {}
 
-  /// Sorts `flips`.
-  Surface find(std::vector<Flip>& flips, const FlipFaces& faces);
+  /// Sorts `transitions`.
+  Surface find(std::vector<Transition>& transitions, const TransitionFaces& faces);
 
  private:
-  [[nodiscard]] static Surface surface_of(const Flip& flip, std::uint32_t depth) {
-    return {depth, flip.solid, flip.triangle, flip.exit};
+  [[nodiscard]] static Surface surface_of(const Transition& transition, std::uint32_t depth) {
+    return {depth, transition.solid, transition.triangle, transition.exit};
   }
   /// By depth, then solid.
-  void sort(std::vector<Flip>& flips);
-  /// Applies all flips at the depth of flips[at]; gives the index after them.
-  std::size_t apply(const std::vector<Flip>& flips, std::size_t at) {
+  void sort(std::vector<Transition>& transitions);
+  /// Applies all transitions at the depth of transitions[at]; gives the index after them.
+  std::size_t apply(const std::vector<Transition>& transitions, std::size_t at) {
     std::size_t end = at + 1;
-    while (end < flips.size() && flips[end].depth == flips[at].depth) ++end;
-    flip_all(flips, at, end);
+    while (end < transitions.size() && transitions[end].depth == transitions[at].depth) ++end;
+    toggle_all(transitions, at, end);
     return end;
   }
-  void flip_all(const std::vector<Flip>& flips, std::size_t begin, std::size_t end) {
+  void toggle_all(const std::vector<Transition>& transitions, std::size_t begin, std::size_t end) {
     constexpr std::size_t kFew = 4;
     if (end - begin < kFew) {
-      for (std::size_t i = begin; i < end; ++i) state_.flip(flips[i].solid);
+      for (std::size_t i = begin; i < end; ++i) state_.toggle(transitions[i].solid);
       return;
     }
-    turned_.clear();
-    for (std::size_t i = begin; i < end; ++i) turned_.push_back(flips[i].solid);
-    state_.flip_all(turned_);
+    toggled_.clear();
+    for (std::size_t i = begin; i < end; ++i) toggled_.push_back(transitions[i].solid);
+    state_.toggle_all(toggled_);
   }
 
-  /// A flip whose face coincides with the surface.
+  /// An interval inside the tree, in indices of transitions.
+  struct Interval {
+    std::size_t begin = 0, group_end = 0;      ///< the group where it begins
+    std::size_t settled = 0;                   ///< the end of what is settled with its beginning
+    std::size_t exit_begin = 0, exit_end = 0;  ///< the group where it ends
+    bool union_operand = false;                ///< a union operand is entered in it
+  };
+  /// Applies transitions from index `at` on until the tree is false.
+  /// @param settles  depth up to which transitions are settled with the beginning
+  Interval walk_inside(const std::vector<Transition>& transitions, std::size_t begin,
+                       std::size_t at, double settles);
+  /// The largest bounds of those transitions that the tree's value rests on.
+  [[nodiscard]] Coincidence::Bound bound_of(const std::vector<Transition>& transitions,
+                                            std::size_t begin, std::size_t end,
+                                            const TransitionFaces& faces);
+  /// candidates_ become the transitions whose faces coincide with the surface at an interval's
+  /// beginning and contribute to it.
+  void list_candidates(const std::vector<Transition>& transitions, const Interval& interval,
+                       const Coincidence::Bound& surface_bound, const TransitionFaces& faces);
+
+  /// A transition whose face coincides with the surface.
   struct Candidate {
-    const Flip* flip;
+    const Transition* transition;
     bool alone;  ///< without it the surface would not be there
   };
   [[nodiscard]] static bool goes_before(const Candidate& a, const Candidate& b) {
     if (a.alone != b.alone) return a.alone;
-    if (a.flip->exit != b.flip->exit) return b.flip->exit;
-    return a.flip->solid < b.flip->solid;
+    if (a.transition->exit != b.transition->exit) return b.transition->exit;
+    return a.transition->solid < b.transition->solid;
   }
   /// The one that is shown. @pre there are candidates
-  [[nodiscard]] const Flip& choose(const FlipFaces& faces) const;
+  [[nodiscard]] const Transition& choose(const TransitionFaces& faces) const;
 
-  [[nodiscard]] bool is_plain_entry(const Flip& flip) const {
-    return !flip.exit && state_.program().plain(flip.solid);
+  [[nodiscard]] bool enters_union_operand(const Transition& transition) const {
+    return !transition.exit && state_.program().is_union_operand(transition.solid);
   }
 
   ProgramState state_;
   std::vector<std::uint64_t> order_, other_order_;  ///< [depth:32 | index:32]
-  std::vector<Flip> sorted_;
-  std::vector<std::uint32_t> turned_;
-  std::vector<std::size_t> last_;  ///< of each solid: one of its flips
+  std::vector<Transition> sorted_;
+  std::vector<std::uint32_t> toggled_;
+  std::vector<std::size_t> last_;  ///< of each solid: one of its transitions
   std::vector<Candidate> candidates_;
 };
 

@@ -47,7 +47,7 @@ TEST(Program, AgreesWithRecursionAfterEachFlip) {
     ASSERT_EQ(state.value(), expected()) << "seed " << seed;
     for (int step = 0; step < (solids > 100 ? 200 : 300); ++step) {
       const auto solid = static_cast<std::uint32_t>(random.pick(0, solids - 1));
-      state.flip(solid);
+      state.toggle(solid);
       inside[solid] = !inside[solid];
       ASSERT_EQ(state.value(), expected()) << "seed " << seed << ", step " << step;
     }
@@ -63,15 +63,15 @@ TEST(Program, ASupportIsASolidThatTheValueRestsOn) {
     const Program program = compile(tree, tree.root());
     ProgramState state(program);
     for (int step = 0; step < 20; ++step) {
-      state.flip(static_cast<std::uint32_t>(random.pick(0, solids - 1)));
+      state.toggle(static_cast<std::uint32_t>(random.pick(0, solids - 1)));
       const bool value = state.value();
       std::vector<std::uint32_t> others;
       for (std::uint32_t solid = 0; solid < static_cast<std::uint32_t>(solids); ++solid) {
         if (!state.supports(solid)) others.push_back(solid);
       }
-      for (const std::uint32_t solid : others) state.flip(solid);
+      for (const std::uint32_t solid : others) state.toggle(solid);
       ASSERT_EQ(state.value(), value) << "seed " << seed << ", step " << step;
-      for (const std::uint32_t solid : others) state.flip(solid);
+      for (const std::uint32_t solid : others) state.toggle(solid);
     }
   }
 }
@@ -84,13 +84,13 @@ TEST(Program, ASolidThatDecidesTurnsTheValue) {
     const Program program = compile(tree, tree.root());
     ProgramState state(program);
     for (int step = 0; step < 20; ++step) {
-      state.flip(static_cast<std::uint32_t>(random.pick(0, solids - 1)));
+      state.toggle(static_cast<std::uint32_t>(random.pick(0, solids - 1)));
       const bool value = state.value();
       for (std::uint32_t solid = 0; solid < static_cast<std::uint32_t>(solids); ++solid) {
         const bool decides = state.decides(solid);
-        state.flip(solid);
+        state.toggle(solid);
         ASSERT_EQ(decides, state.value() != value) << "seed " << seed << ", step " << step;
-        state.flip(solid);
+        state.toggle(solid);
       }
     }
   }
@@ -107,9 +107,9 @@ TEST(Program, FlipsTogetherAreThoseOneAfterAnother) {
       std::vector<std::uint32_t> turned(static_cast<std::size_t>(random.pick(0, solids)));
       for (std::uint32_t& solid : turned) {
         solid = static_cast<std::uint32_t>(random.pick(0, solids - 1));
-        single.flip(solid);
+        single.toggle(solid);
       }
-      together.flip_all(turned);
+      together.toggle_all(turned);
       for (std::uint32_t solid = 0; solid < static_cast<std::uint32_t>(solids); ++solid) {
         ASSERT_EQ(together.inside(solid), single.inside(solid));
         ASSERT_EQ(together.supports(solid), single.supports(solid));
@@ -130,12 +130,12 @@ TEST(Program, ADeepTreeNeedsNoStack) {
   tree.set_root(node);
   const Program program = compile(tree, node);
   ProgramState state(program);
-  for (std::uint32_t solid = 0; solid <= kDeep; ++solid) state.flip(solid);
+  for (std::uint32_t solid = 0; solid <= kDeep; ++solid) state.toggle(solid);
   // A1 - (A2 - (A3 - ...)) with all inside: true for an odd number of solids.
   EXPECT_EQ(state.value(), (kDeep + 1) % 2 == 1);
   std::vector<std::uint32_t> all(kDeep + 1);
   std::iota(all.begin(), all.end(), 0u);
-  state.flip_all(all);
+  state.toggle_all(all);
   EXPECT_FALSE(state.value());
 }
 

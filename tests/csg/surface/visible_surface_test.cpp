@@ -35,13 +35,13 @@ SurfaceImage by_full_lists(const Tree& tree, const View& view, double relative_p
   EXPECT_TRUE(lists.has_value());
 
   const Program program = compile(tree, tree.root());
-  SurfaceFinder finder(program);
+  FirstHit finder(program);
   const Coincidence coincidence(view, geometry.world_error(tree, relative_precision));
   SurfaceImage result;
   result.width = view.size.x, result.height = view.size.y;
   for (int v = 0; v < view.size.y; ++v) {
     for (int u = 0; u < view.size.x; ++u) {
-      std::vector<Flip> flips;
+      std::vector<Transition> transitions;
       std::vector<std::vector<DepthItem>> of_solid(parts.size());
       for (const DepthItem item : lists->list(u, v)) {
         const std::uint32_t solid = solid_of[item.triangle()];
@@ -49,13 +49,14 @@ SurfaceImage by_full_lists(const Tree& tree, const View& view, double relative_p
       }
       for (std::uint32_t solid = 0; solid < parts.size(); ++solid) {
         const Geometry::Part& part = geometry.parts()[solid];
-        if (kind_of(program, solid, part, parts[solid]) == LeafLayers::Kind::kFirst) {
-          first_entry_of(of_solid[solid], solid, flips);
+        if (kind_of(program, solid, part, parts[solid]) == LeafLayers::Kind::kFirstEntryOnly) {
+          first_entry_of(of_solid[solid], solid, transitions);
         } else {
-          flips_of(of_solid[solid], solid, part.rule, parts[solid].cut, flips);
+          transitions_of(of_solid[solid], solid, part.rule, parts[solid].cut, transitions);
         }
       }
-      const Surface surface = finder.find(flips, FlipFaces(geometry.parts(), parts, coincidence));
+      const Surface surface =
+          finder.find(transitions, TransitionFaces(geometry.parts(), parts, coincidence));
       const bool seen = surface.depth != Surface::kNone;
       const std::uint32_t triangle = seen ? parts[surface.solid].source(surface.triangle) : 0;
       result.depth.push_back(seen ? surface.depth : SurfaceImage::kNone);
