@@ -25,6 +25,11 @@ std::atomic<bool> has_failed{false};
 
 namespace strata::apps {
 bool allocation_has_failed() noexcept { return has_failed.load(std::memory_order_relaxed); }
+
+Result<void> commit_outputs(Session& session) {
+  if (allocation_has_failed()) return fail(ErrorCode::kLimit, "{}", kNoMemory);
+  return session.commit_outputs();
+}
 }  // namespace strata::apps
 
 #if defined(__has_feature)

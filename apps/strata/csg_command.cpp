@@ -6,6 +6,7 @@
 
 #include "apps/session/file_conflicts.h"
 #include "apps/session/session.h"
+#include "apps/strata/allocation_failures.h"
 #include "apps/strata/commands.h"
 #include "apps/strata/csg_report.h"
 #include "apps/strata/csg_scene.h"
@@ -340,7 +341,7 @@ Result<void> run_one(CsgCommand command, Session& session) {
   if (to_file) {
     if (auto done = print_report(json, *command.json, false); !done) return done;
   }
-  if (auto done = session.commit_outputs(); !done) return done;
+  if (auto done = commit_outputs(session); !done) return done;
   if (command.summary) {
     const bool taken = command.output == "-" || command.json == "-";
     if (auto done = print_report(summary, "-", taken); !done) return done;

@@ -3,6 +3,7 @@
 #include "apps/session/file_conflicts.h"
 #include "apps/session/report.h"
 #include "apps/session/session.h"
+#include "apps/strata/allocation_failures.h"
 #include "apps/strata/commands.h"
 #include "apps/strata/csg_report.h"
 #include "apps/strata/csg_scene.h"
@@ -282,7 +283,7 @@ Result<void> run_info(const InfoCommand& command, Session& session) {
   const auto printed = command.json ? print_report(json.take(), *command.json, false)
                                     : print_report(text, "-", false);
   if (!printed) return printed;
-  if (auto done = session.commit_outputs(); !done) return done;
+  if (auto done = commit_outputs(session); !done) return done;
   if (first_error) return tl::unexpected(*first_error);
   return session.check_strict();
 }

@@ -85,8 +85,7 @@ Result<void> run(const AnyCommand& command, Session& session) {
     if (auto kept = check_files(inputs_of(command.input), written); !kept) return kept;
     session.set_outputs(written, true);
     if (auto done = run_command(command, session); !done) return done;
-    if (allocation_has_failed()) return fail(ErrorCode::kLimit, "{}", kNoMemory);
-    return session.commit_outputs();
+    return commit_outputs(session);
   } catch (const std::bad_alloc&) {
     return fail(ErrorCode::kLimit, "{}", kNoMemory);
   } catch (const std::system_error& failure) {

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "apps/session/session.h"
+#include "apps/strata/allocation_failures.h"
 #include "apps/strata/boundary_area.h"
 #include "apps/strata/choice_words.h"
 #include "apps/strata/commands.h"
@@ -179,7 +180,7 @@ Result<void> print_reports(const VoxelizeCommand& command, const VoxelizeOutcome
     const std::string text = voxelize_json(command, outcome, session);
     if (auto done = print_report(text, *command.json, false); !done) return done;
   }
-  if (auto done = session.commit_outputs(); !done) return done;
+  if (auto done = commit_outputs(session); !done) return done;
   if (command.checksum && !command.stats && !command.json && !command.dry_run) {
     const std::string line = fmt::format("{:016x}\n", outcome.report.checksum);
     if (auto done = print_report(line, "-", file_on_stdout); !done) return done;
