@@ -307,6 +307,36 @@ ExtrusionSize size_of(const Outline& outline, const LinearExtrude& options) {
   return {slices, 2.0 * points * (slices + 1.0)};
 }
 
+namespace {
+
+/// The walls between a slice, whose points begin at `low`, and the next one.
+/// @param lean  by how much the next slice is moved along x and y
+void add_walls(const Outline& outline, std::size_t low, std::size_t stride, const glm::dvec2& lean,
+               bool twists_down, bool shrinks, TriangleSoup& mesh) {
+  std::size_t first = 0;
+  for (const Contour& contour : outline.contours) {
+    const bool falls_if_equal = (signed_area(contour) < 0) != twists_down;
+    for (std::size_t i = 0; i < contour.size(); ++i) {
+      const auto a = static_cast<std::uint32_t>(low + first + i);
+      const auto b = static_cast<std::uint32_t>(low + first + (i + 1) % contour.size());
+      const auto rise = static_cast<std::uint32_t>(stride);
+      const auto flat = [&](std::uint32_t k) { return glm::dvec2(mesh.positions[k]); };
+      const bool rising = rising_diagonal(flat(a) + lean, flat(b) + lean, flat(a + rise),
+                                          flat(b + rise), falls_if_equal);
+      if (rising != shrinks) {
+        mesh.triangles.emplace_back(a, b, b + rise);
+        mesh.triangles.emplace_back(a, b + rise, a + rise);
+      } else {
+        mesh.triangles.emplace_back(a, b, a + rise);
+        mesh.triangles.emplace_back(b, b + rise, a + rise);
+      }
+    }
+    first += contour.size();
+  }
+}
+
+}  // namespace
+
 TriangleSoup linear_extrude(const Outline& raw, const LinearExtrude& given, OutlineJob* job) {
   LinearExtrude options = given;
   options.scale = glm::max(options.scale, glm::dvec2(0));
@@ -347,30 +377,10 @@ TriangleSoup linear_extrude(const Outline& raw, const LinearExtrude& given, Outl
   }
   for (std::size_t j = 1; j < slices + (pointed ? 0 : 1); ++j) {
     if (job && job->ended()) return {};
-    const std::size_t low = (j - 1) * stride;
     // An edge that shrinks to nothing at the top must not be left with the long diagonal.
     const bool shrinks = j == slices && (options.scale.x == 0 || options.scale.y == 0);
-    std::size_t first = 0;
-    for (const Contour& contour : outline.contours) {
-      const bool falls_if_equal = (signed_area(contour) < 0) != (options.twist <= 0);
-      for (std::size_t i = 0; i < contour.size(); ++i) {
-        const auto a = static_cast<std::uint32_t>(low + first + i);
-        const auto b = static_cast<std::uint32_t>(low + first + (i + 1) % contour.size());
-        const auto rise = static_cast<std::uint32_t>(stride);
-        const auto flat = [&](std::uint32_t k) { return glm::dvec2(mesh.positions[k]); };
-        const glm::dvec2 lean = glm::dvec2(way) / static_cast<double>(slices);
-        const bool rising = rising_diagonal(flat(a) + lean, flat(b) + lean, flat(a + rise),
-                                            flat(b + rise), falls_if_equal);
-        if (rising != shrinks) {
-          mesh.triangles.emplace_back(a, b, b + rise);
-          mesh.triangles.emplace_back(a, b + rise, a + rise);
-        } else {
-          mesh.triangles.emplace_back(a, b, a + rise);
-          mesh.triangles.emplace_back(b, b + rise, a + rise);
-        }
-      }
-      first += contour.size();
-    }
+    const glm::dvec2 lean = glm::dvec2(way) / static_cast<double>(slices);
+    add_walls(outline, (j - 1) * stride, stride, lean, options.twist <= 0, shrinks, mesh);
   }
   // Slices are affine images of the outline: its triangles close both ends.
   const auto top = static_cast<std::uint32_t>(slices * stride);

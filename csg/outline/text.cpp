@@ -240,34 +240,59 @@ glm::dvec2 alignment(const TextOptions& options, const Extent& extent, bool hori
   return shift;
 }
 
-Result<Outline> set_text(const TextOptions& options, FT_Face face, OutlineJob* job) {
-  const auto ended = [&] { return job && job->ended(); };
-  const Font font(hb_ft_font_create(face, nullptr));
-  const Buffer buffer(hb_buffer_create());
-  hb_buffer_add_utf8(buffer.get(), options.text.data(), static_cast<int>(options.text.size()), 0,
-                     static_cast<int>(options.text.size()));
-  const hb_script_t script = script_of(options, buffer.get());
+/// The direction that the options ask for, else that of the script.
+hb_direction_t direction_of(const TextOptions& options, hb_script_t script) {
   hb_direction_t direction = hb_direction_from_string(options.direction.c_str(), -1);
   if (options.direction.empty() || direction == HB_DIRECTION_INVALID) {
     direction = hb_script_get_horizontal_direction(script);
   }
-  if (direction == HB_DIRECTION_INVALID) direction = HB_DIRECTION_LTR;
-  hb_buffer_set_script(buffer.get(), script);
-  hb_buffer_set_direction(buffer.get(), direction);
-  hb_buffer_set_language(buffer.get(), hb_language_from_string(options.language.c_str(), -1));
+  return direction == HB_DIRECTION_INVALID ? HB_DIRECTION_LTR : direction;
+}
+
+/// Fills the buffer with the glyphs of the text and their places. @return the direction of the text
+hb_direction_t shape_text(const TextOptions& options, FT_Face face, hb_buffer_t* buffer) {
+  const Font font(hb_ft_font_create(face, nullptr));
+  hb_buffer_add_utf8(buffer, options.text.data(), static_cast<int>(options.text.size()), 0,
+                     static_cast<int>(options.text.size()));
+  const hb_script_t script = script_of(options, buffer);
+  const hb_direction_t direction = direction_of(options, script);
+  hb_buffer_set_script(buffer, script);
+  hb_buffer_set_direction(buffer, direction);
+  hb_buffer_set_language(buffer, hb_language_from_string(options.language.c_str(), -1));
   if (face->charmap != nullptr && face->charmap->encoding == FT_ENCODING_MS_SYMBOL) {
     // Symbol fonts have their glyphs in the private use area.
     unsigned count = 0;
-    hb_glyph_info_t* infos = hb_buffer_get_glyph_infos(buffer.get(), &count);
+    hb_glyph_info_t* infos = hb_buffer_get_glyph_infos(buffer, &count);
     for (unsigned i = 0; i < count; ++i) {
       if (infos[i].codepoint < 0x100) infos[i].codepoint += 0xf000;
     }
   }
-  hb_shape(font.get(), buffer.get(), nullptr, 0);
-  if (font.get() == hb_font_get_empty() || !hb_buffer_allocation_successful(buffer.get())) {
+  hb_shape(font.get(), buffer, nullptr, 0);
+  if (font.get() == hb_font_get_empty() || !hb_buffer_allocation_successful(buffer)) {
     throw std::bad_alloc();
   }
+  return direction;
+}
 
+/// Adds the glyph that `face` has loaded to the extent of the text before it.
+void include_glyph(const Glyph& glyph, FT_Face face, Extent& extent) {
+  FT_BBox box;
+  FT_Outline_Get_CBox(&face->glyph->outline, &box);
+  // Whole pixels, as OpenSCAD measures them.
+  box.xMin &= ~63, box.yMin &= ~63;
+  box.xMax = (box.xMax + 63) & ~63, box.yMax = (box.yMax + 63) & ~63;
+  if (box.xMax <= box.xMin || box.yMax <= box.yMin) return;
+  const double x = extent.advance.x + glyph.offset.x;
+  extent.left = std::min(extent.left, x + static_cast<double>(box.xMin) / kScale);
+  extent.right = std::max(extent.right, x + static_cast<double>(box.xMax) / kScale);
+  extent.ascent = std::max(extent.ascent, static_cast<double>(box.yMax) / kScale);
+  extent.descent = std::min(extent.descent, static_cast<double>(box.yMin) / kScale);
+}
+
+Result<Outline> set_text(const TextOptions& options, FT_Face face, OutlineJob* job) {
+  const auto ended = [&] { return job && job->ended(); };
+  const Buffer buffer(hb_buffer_create());
+  const hb_direction_t direction = shape_text(options, face, buffer.get());
   unsigned count = 0;
   const hb_glyph_info_t* infos = hb_buffer_get_glyph_infos(buffer.get(), &count);
   const hb_glyph_position_t* places = hb_buffer_get_glyph_positions(buffer.get(), &count);
@@ -281,18 +306,7 @@ Result<Outline> set_text(const TextOptions& options, FT_Face face, OutlineJob* j
     if (!succeeded(FT_Load_Glyph(face, glyph.index, FT_LOAD_DEFAULT))) continue;
     if (face->glyph->format != FT_GLYPH_FORMAT_OUTLINE) continue;
     glyphs.push_back(glyph);
-    FT_BBox box;
-    FT_Outline_Get_CBox(&face->glyph->outline, &box);
-    // Whole pixels, as OpenSCAD measures them.
-    box.xMin &= ~63, box.yMin &= ~63;
-    box.xMax = (box.xMax + 63) & ~63, box.yMax = (box.yMax + 63) & ~63;
-    if (box.xMax > box.xMin && box.yMax > box.yMin) {
-      const double x = extent.advance.x + glyph.offset.x;
-      extent.left = std::min(extent.left, x + static_cast<double>(box.xMin) / kScale);
-      extent.right = std::max(extent.right, x + static_cast<double>(box.xMax) / kScale);
-      extent.ascent = std::max(extent.ascent, static_cast<double>(box.yMax) / kScale);
-      extent.descent = std::min(extent.descent, static_cast<double>(box.yMin) / kScale);
-    }
+    include_glyph(glyph, face, extent);
     extent.advance += glyph.advance * options.spacing;
   }
 

@@ -240,6 +240,62 @@ Cost cost_of(std::span<const MinkowskiPart> a, std::span<const MinkowskiPart> b)
   return cost;
 }
 
+/// The sums of convex pieces that make up the sum of two operands, and the parts that are the parts
+/// of one operand, moved.
+class Plan {
+ public:
+  Plan(std::span<const MinkowskiPart> a, std::span<const MinkowskiPart> b) : sides_{a, b} {
+    for (int side = 0; side < 2; ++side) {
+      for (const MinkowskiPart& part : sides_[side]) {
+        polytopes_[side].push_back(part.convex() ? make_polytope(part.hull) : Polytope());
+      }
+    }
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      for (std::size_t j = 0; j < b.size(); ++j) {
+        if (!a[i].empty() && !b[j].empty()) add(i, j);
+      }
+    }
+  }
+  std::vector<Task> tasks;  ///< they refer to this plan
+  std::vector<MinkowskiPart> moved_parts;
+
+ private:
+  static std::size_t pieces(const MinkowskiPart& part) {
+    return part.convex() ? std::size_t{1} : part.facets.size();
+  }
+  void add(std::size_t i, std::size_t j) {
+    const MinkowskiPart &a = sides_[0][i], &b = sides_[1][j];
+    for (std::size_t p = 0; p < pieces(a); ++p) {
+      for (std::size_t q = 0; q < pieces(b); ++q) {
+        Task& task = tasks.emplace_back();
+        set_piece(task, 0, i, p);
+        set_piece(task, 1, j, q);
+      }
+    }
+    move(a, b);
+    move(b, a);
+  }
+  void set_piece(Task& task, int side, std::size_t part, std::size_t piece) const {
+    const MinkowskiPart& of = sides_[side][part];
+    if (of.convex()) {
+      task.polytopes[side] = &polytopes_[side][part];
+    } else {
+      task.facets[side] = of.facets[piece];
+    }
+  }
+  void move(const MinkowskiPart& part, const MinkowskiPart& other) {
+    if (part.convex()) return;
+    if (other.convex()) {
+      moved_parts.push_back(moved(part, middle_of(other.hull.mesh)));
+      return;
+    }
+    for (const glm::dvec3& by : other.anchors) moved_parts.push_back(moved(part, by));
+  }
+
+  std::span<const MinkowskiPart> sides_[2];
+  std::vector<Polytope> polytopes_[2];
+};
+
 }  // namespace
 
 Result<std::vector<MinkowskiPart>> minkowski_sum(std::span<const MinkowskiPart> a,
@@ -255,48 +311,8 @@ Result<std::vector<MinkowskiPart>> minkowski_sum(std::span<const MinkowskiPart> 
                 cost.pieces, cost.vertices, cost.bytes() / 1e9, kMostPieces, kMostVertices,
                 most_bytes / 1e9);
   }
-  std::vector<Polytope> polytopes[2];
-  const std::span<const MinkowskiPart> sides[2] = {a, b};
-  for (int side = 0; side < 2; ++side) {
-    for (const MinkowskiPart& part : sides[side]) {
-      polytopes[side].push_back(part.convex() ? make_polytope(part.hull) : Polytope());
-    }
-  }
-  std::vector<MinkowskiPart> result;
-  std::vector<Task> tasks;
-  const auto pieces = [](const MinkowskiPart& part) {
-    return part.convex() ? std::size_t{1} : part.facets.size();
-  };
-  const auto set_piece = [&](Task& task, int side, std::size_t part, std::size_t piece) {
-    const MinkowskiPart& of = sides[side][part];
-    if (of.convex()) {
-      task.polytopes[side] = &polytopes[side][part];
-    } else {
-      task.facets[side] = of.facets[piece];
-    }
-  };
-  const auto move = [&](const MinkowskiPart& part, const MinkowskiPart& other) {
-    if (part.convex()) return;
-    if (other.convex()) {
-      result.push_back(moved(part, middle_of(other.hull.mesh)));
-      return;
-    }
-    for (const glm::dvec3& by : other.anchors) result.push_back(moved(part, by));
-  };
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      if (a[i].empty() || b[j].empty()) continue;
-      for (std::size_t p = 0; p < pieces(a[i]); ++p) {
-        for (std::size_t q = 0; q < pieces(b[j]); ++q) {
-          Task& task = tasks.emplace_back();
-          set_piece(task, 0, i, p);
-          set_piece(task, 1, j, q);
-        }
-      }
-      move(a[i], b[j]);
-      move(b[j], a[i]);
-    }
-  }
+  Plan plan(a, b);
+  const std::vector<Task>& tasks = plan.tasks;
   std::vector<MinkowskiPart> sums(tasks.size());
   std::vector<VertexWalk> walks(static_cast<std::size_t>(execution.thread_count()));
   std::vector<std::optional<Error>> errors(walks.size());
@@ -323,6 +339,7 @@ Result<std::vector<MinkowskiPart>> minkowski_sum(std::span<const MinkowskiPart> 
     if (error) return tl::unexpected(*error);
   }
   std::erase_if(sums, [](const MinkowskiPart& sum) { return sum.empty(); });
+  std::vector<MinkowskiPart> result = std::move(plan.moved_parts);
   result.insert(result.end(), std::make_move_iterator(sums.begin()),
                 std::make_move_iterator(sums.end()));
   return result;
