@@ -83,4 +83,8 @@ std::string printable_lines(std::string_view text) {
   }
 }
 
+std::string counted(std::uint64_t count, std::string_view noun) {
+  return fmt::format("{} {}{}", count, noun, count == 1 ? "" : "s");
+}
+
 }  // namespace strata

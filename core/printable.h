@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <string>
 #include <string_view>
 
@@ -23,5 +24,8 @@ namespace strata {
 /// The same of a message of several lines: a line break stays where the next line is indented by
 /// two blanks, as messages are that show a place in an expression.
 [[nodiscard]] std::string printable_lines(std::string_view text);
+
+/// "1 face", "2 faces".
+[[nodiscard]] std::string counted(std::uint64_t count, std::string_view noun);
 
 }  // namespace strata

@@ -16,6 +16,7 @@
 #include "apps/session/interrupt.h"
 #include "apps/session/progress.h"
 #include "core/atomic_file.h"
+#include "core/printable.h"
 #include "strata/core/execution.h"
 #include "strata/core/file_identity.h"
 #include "strata/core/result.h"
@@ -123,8 +124,5 @@ Result<void> print_report(std::string_view text, const std::string& where, bool 
 
 /// "12.3 MB", powers of 1000 with three digits.
 [[nodiscard]] std::string readable_bytes(std::uint64_t bytes);
-
-/// "1 face", "2 faces".
-[[nodiscard]] std::string counted(std::uint64_t count, std::string_view noun);
 
 }  // namespace strata::apps

@@ -11,9 +11,9 @@
 #include "apps/session/option_values.h"
 #include "apps/strata/choice_words.h"
 #include "apps/strata/command_words.h"
-#include "apps/strata/csg_scene.h"
 #include "apps/strata/scene_options.h"
 #include "core/printable.h"
+#include "strata/csg/input/scene_input.h"
 
 namespace strata::apps {
 namespace {
@@ -285,8 +285,8 @@ CommonOptions common_options(const Words& words, Reader& reader) {
   return common;
 }
 
-InputOptions input_options(const Words& words, Reader& reader) {
-  InputOptions input;
+csg::SceneInput input_options(const Words& words, Reader& reader) {
+  csg::SceneInput input;
   input.files = words.files;
   reader.take(parse_choice("--reader", words.reader, kReaderWords), input.reader);
   reader.take(parse_choice("--input-format", words.input_format, kMeshFormatWords), input.format);
@@ -401,13 +401,13 @@ VoxelizeCommand voxelize_command(const Words& words, Reader& reader) {
   if (command.surface) {
     reader.take(parse_choice("--surface", words.surface, kSurfaceKindWords), command.surface_kind);
   }
-  reader.take(parse_choice("--rule", words.rule, kRuleWords), command.rule);
+  reader.take(parse_choice("--rule", words.rule, kRuleWords), command.input.rule);
   reader.take(parse_choice("--open", words.open, kOpenModeWords), command.open);
   reader.take(parse_choice("--axis", words.axis, kAxisWords), command.axis);
   reader.take(parse_choice("--store", words.store, kStoreWords), command.store);
   reader.take(parse_choice("--offsets", words.offsets, kOffsetWords), command.offsets);
   reader.take(parse_choice("--backend", words.backend, kBackendWords), command.backend);
-  command.keep_orientation = words.keep_orientation;
+  command.input.keep_orientation = words.keep_orientation;
   command.stats = words.stats;
   command.checksum = words.checksum;
   command.dry_run = words.dry_run;
@@ -443,7 +443,7 @@ LdiCommand ldi_command(const Words& words, Reader& reader) {
   command.input = input_options(words, reader);
   command.output = words.output;
   command.samples = words.samples;
-  command.keep_orientation = words.keep_orientation;
+  command.input.keep_orientation = words.keep_orientation;
   std::optional<Axis> axis;
   reader.take(parse_choice("--axis", words.axis, kAxisWords), axis);
   command.axis = axis.value_or(Axis::kZ);
@@ -469,9 +469,9 @@ bool begins_with_a_file(const std::vector<std::string>& words) {
   for (const auto& [command, what] : kCommands) {
     if (first == command) return false;
   }
-  if (first.starts_with('-')) return std::any_of(words.begin(), words.end(), is_scene_name);
+  if (first.starts_with('-')) return std::any_of(words.begin(), words.end(), csg::is_scene_name);
   std::error_code ignored;
-  return is_scene_name(first) || mesh_format_of(first) != MeshFormat::kAuto ||
+  return csg::is_scene_name(first) || mesh_format_of(first) != MeshFormat::kAuto ||
          std::filesystem::is_regular_file(first, ignored);
 }
 

@@ -148,12 +148,13 @@ void define_csg(CLI::App& app, Words& words) {
 CsgCommand csg_command(Words words, Reader& reader) {
   CsgCommand command;
   command.common = common_options(words, reader);
-  command.scene_format = words.input_format == "csg";
-  if (command.scene_format) words.input_format = "auto";
+  const bool scenes = words.input_format == "csg";
+  if (scenes) words.input_format = "auto";
   command.input = input_options(words, reader);
-  reader.take(parse_choice("--rule", words.rule, kRuleWords), command.rule);
+  command.input.scene_format = scenes;
+  reader.take(parse_choice("--rule", words.rule, kRuleWords), command.input.rule);
   reader.take(parse_choice("--backend", words.backend, kBackendWords), command.backend);
-  command.keep_orientation = words.keep_orientation;
+  command.input.keep_orientation = words.keep_orientation;
   command.output = words.output;
   if (!words.json.empty()) command.json = words.json;
   if (!reader.error()) reader.take(read_csg_options(words.csg, command));

@@ -10,10 +10,10 @@
 #include "apps/session/help.h"
 #include "apps/session/session.h"
 #include "hashbuffer/tile_builder.h"
+#include "strata/csg/input/mesh_input.h"
+#include "strata/csg/input/sections.h"
 #include "strata/csg/picture/picture.h"
-#include "strata/csg/scene/scene.h"
 #include "strata/hashbuffer/offsets.h"
-#include "strata/mesh/formats/read_mesh.h"
 #include "strata/voxelize/grid_fit.h"
 #include "strata/voxelize/voxelize.h"
 
@@ -26,18 +26,10 @@ enum class Backend {
   kGl  ///< OpenGL 4.5, a software renderer too
 };
 
-/// Where meshes and scenes come from.
-struct InputOptions {
-  std::vector<std::string> files;
-  MeshReader reader = MeshReader::kOwn;
-  MeshFormat format = MeshFormat::kAuto;
-  csg::ReadSceneOptions scene;  ///< for the scenes among them
-};
-
 /// `strata voxelize`
 struct VoxelizeCommand {
   CommonOptions common;
-  InputOptions input;
+  csg::SceneInput input;
   std::string output;           ///< empty: none, "-": standard output
   std::string format;           ///< empty: by extension
   int fog = 0;                  ///< samples along a voxel's side of a fog volume; 0: none
@@ -48,9 +40,7 @@ struct VoxelizeCommand {
   GridRequest grid;
   bool solid = true, surface = false;
   SurfaceKind surface_kind = SurfaceKind::kConservative;
-  InsideRule rule = InsideRule::kWinding;
   OpenMode open = OpenMode::kVote;
-  bool keep_orientation = false;
   std::optional<Axis> axis;  ///< empty: auto
   StoreKind store = StoreKind::kAuto;
   OffsetKind offsets = OffsetKind::kPlaneFirst;
@@ -62,7 +52,7 @@ struct VoxelizeCommand {
 /// `strata info`
 struct InfoCommand {
   CommonOptions common;
-  InputOptions input;
+  csg::SceneInput input;
   bool gl = false;  ///< also what OpenGL there is
   std::optional<std::string> json;
 };
@@ -70,7 +60,7 @@ struct InfoCommand {
 /// `strata ldi`
 struct LdiCommand {
   CommonOptions common;
-  InputOptions input;
+  csg::SceneInput input;
   std::string output;
   GridRequest grid;
   bool samples = false;
@@ -78,24 +68,12 @@ struct LdiCommand {
   StoreKind store = StoreKind::kAuto;
   OffsetKind offsets = OffsetKind::kPlaneFirst;
   Backend backend = Backend::kAuto;
-  bool keep_orientation = false;
-};
-
-/// A section: points p with dot(normal, p) > offset are cut away.
-struct SectionPlane {
-  glm::dvec3 normal{0.0};  ///< of length 1
-  double offset = 0;
-  bool towards_eye = false;  ///< turned so that the side the eye is on is cut away
 };
 
 /// `strata csg`, and what a window shows
 struct CsgCommand {
   CommonOptions common;
-  InputOptions input;
-  bool scene_format = false;  ///< inputs are .csg, whatever their names are
-  InsideRule rule = InsideRule::kWinding;
-  bool keep_orientation = false;
-  std::string expression;          ///< over the inputs; empty: their union
+  csg::SceneInput input;
   std::string output, ids, depth;  ///< files; empty: none, output "-": standard output
   glm::ivec2 size{512};
   csg::Camera camera;
@@ -107,7 +85,7 @@ struct CsgCommand {
   bool render = false;          ///< the result alone: no ghosts, no colours, flat scenes from above
   Backend backend = Backend::kAuto;
   csg::PictureOptions picture;
-  std::vector<SectionPlane> cuts;
+  std::vector<csg::SectionPlane> cuts;
   std::optional<std::string> json;        ///< "-": standard output
   std::optional<int> measure_resolution;  ///< of the report's measures; none: csg::MeasureOptions'
   std::vector<FileUse> outputs;           ///< of a window: the pictures that it will write

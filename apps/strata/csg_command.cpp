@@ -9,10 +9,10 @@
 #include "apps/strata/allocation_failures.h"
 #include "apps/strata/commands.h"
 #include "apps/strata/csg_report.h"
-#include "apps/strata/csg_scene.h"
 #include "apps/strata/file_uses.h"
-#include "apps/strata/gpu.h"
+#include "apps/strata/library_session.h"
 #include "csg/measure/result_bounds.h"
+#include "strata/csg/input/scene_input.h"
 #include "strata/csg/picture/picture.h"
 #include "strata/csg/picture/write_depth.h"
 
@@ -141,38 +141,257 @@ csg::Picture picture_of_ids(const csg::SurfaceImage& surfaces, const csg::Tree& 
   return ids;
 }
 
-/// Where the camera stands before it is fitted: as the command says, else as the scene does.
-csg::Camera placed_camera(CsgCommand& command, const csg::Scene& scene, Session& session) {
-  csg::Camera camera = command.camera;
-  if (!command.default_camera || !scene.view) return camera;
-  const csg::SceneView& view = *scene.view;
-  camera.target = view.target.value_or(camera.target);
-  camera.rotation = view.rotation.value_or(camera.rotation);
-  camera.distance = view.distance.value_or(camera.distance);
-  camera.field_of_view = view.field_of_view.value_or(camera.field_of_view);
-  if (command.asked_view) {
-    session.warn("ignored", fmt::format("{}: the file sets $vpr, $vpt, $vpd or $vpf, so --view-all "
-                                        "and --auto-center have no effect",
-                                        command.input.files.front()));
+/// The work of one picture, or of one report.
+class CsgRun {
+ public:
+  CsgRun(CsgCommand command, Session& session)
+      : command_(std::move(command)), session_(session), look_(command_.picture) {}
+
+  Result<void> run() {
+    if (auto done = load(); !done) return done;
+    if (auto done = place_camera(); !done) return done;
+    const bool pictures =
+        !command_.output.empty() || !command_.ids.empty() || !command_.depth.empty();
+    if (!pictures && !command_.json) return print_measures();
+    if (auto done = open_preview(); !done) return done;
+    if (auto done = draw(); !done) return done;
+    if (auto done = draw_numbers(); !done) return done;
+    if (auto done = measure(); !done) return done;
+    // Nothing is written before all is known.
+    if (auto done = write(); !done) return done;
+    return report();
   }
-  command.default_camera = command.view_all = command.auto_centre = false;
-  return camera;
+
+ private:
+  Result<void> load();
+  void take_scene_view();
+  void render_alone();
+  Result<void> place_camera();
+  Result<void> print_measures();
+  Result<void> open_preview();
+  Result<void> draw();
+  Result<void> check_covered();
+  Result<void> draw_numbers();
+  Result<void> measure();
+  Result<void> write();
+  Result<void> report();
+
+  [[nodiscard]] bool draws_numbers() const {
+    return !command_.ids.empty() || !command_.depth.empty();
+  }
+  [[nodiscard]] bool measures() const { return command_.json || command_.summary; }
+  [[nodiscard]] bool may_fall_back() const { return gpu_ && command_.backend == Backend::kAuto; }
+  [[nodiscard]] csg::MeasureOptions measure_options() const {
+    return {command_.measure_resolution, scene_.relative_precision};
+  }
+  csg::Camera& camera() { return outcome_.camera; }
+
+  CsgCommand command_;
+  Session& session_;
+  CsgOutcome outcome_;
+  csg::Scene scene_;
+  csg::PictureOptions look_;
+  csg::ColourScheme flat_scheme_;  ///< look_'s, where a flat scene is seen from above
+  bool from_above_ = false;
+  Bounds box_;  ///< of what can be seen; empty: not asked for yet
+  std::unique_ptr<csg::Gpu> gpu_;
+  Execution drawing_;
+  csg::Tree::NodeId result_ = csg::Tree::kNone;
+  std::optional<csg::Preview> preview_;
+  csg::Picture picture_;
+  const csg::SurfaceImage* surfaces_ = nullptr;  ///< the preview's
+  std::optional<csg::View> view_;
+};
+
+Result<void> CsgRun::load() {
+  auto scene =
+      csg::load_scene(command_.input, messages_of(session_), session_.execution("reading"));
+  if (!scene) return tl::unexpected(scene.error());
+  if (auto strict = session_.check_strict(); !strict) return strict;
+  scene_ = *std::move(scene);
+  outcome_.read_ms = session_.milliseconds();
+  outcome_.flat = scene_.flat;
+  outcome_.solids = scene_.tree.solids().size();
+  outcome_.nodes = scene_.tree.nodes().size();
+  outcome_.triangles = triangles_of(scene_.tree);
+  return {};
 }
 
-csg::MeasureOptions measure_options(const CsgCommand& command, const csg::Scene& scene) {
-  return {command.measure_resolution, scene.relative_precision};
+/// Where the camera stands before it is fitted: as the command says, else as the scene does.
+void CsgRun::take_scene_view() {
+  camera() = command_.camera;
+  if (!command_.default_camera || !scene_.view) return;
+  const csg::SceneView& view = *scene_.view;
+  camera().target = view.target.value_or(camera().target);
+  camera().rotation = view.rotation.value_or(camera().rotation);
+  camera().distance = view.distance.value_or(camera().distance);
+  camera().field_of_view = view.field_of_view.value_or(camera().field_of_view);
+  if (command_.asked_view) {
+    session_.warn("ignored",
+                  fmt::format("{}: the file sets $vpr, $vpt, $vpd or $vpf, so --view-all "
+                              "and --auto-center have no effect",
+                              command_.input.files.front()));
+  }
+  command_.default_camera = command_.view_all = command_.auto_centre = false;
+}
+
+/// --render
+void CsgRun::render_alone() {
+  forget_looks(scene_);
+  from_above_ = scene_.flat;
+  if (!from_above_) return;
+  flat_scheme_ = look_.scheme != nullptr ? *look_.scheme : csg::colour_schemes().front();
+  flat_scheme_.face = kFlatFace;
+  look_.scheme = &flat_scheme_;
+  if (!command_.default_camera) return;
+  camera().rotation = glm::dvec3(0.0);
+  camera().projection = csg::Projection::kOrthographic;
+}
+
+Result<void> CsgRun::place_camera() {
+  take_scene_view();
+  if (auto strict = session_.check_strict(); !strict) return strict;
+  if (command_.render) render_alone();
+  if (command_.auto_centre || command_.view_all) {
+    auto visible = csg::visible_box(scene_, session_.execution("measuring"));
+    if (!visible) return tl::unexpected(visible.error());
+    box_ = *visible;
+    if (from_above_ && !box_.empty())
+      box_.low.z = box_.high.z = 0.0;  // an outline has no thickness
+  }
+  if (command_.auto_centre) csg::centre_camera(camera(), box_);
+  if (command_.view_all) {
+    csg::fit_camera(camera(), box_, static_cast<double>(command_.size.x) / command_.size.y);
+    if (!(camera().distance > 0)) camera().distance = csg::Camera{}.distance;  // nothing to fit
+  }
+  if (std::isfinite(camera().distance)) return {};
+  return fail(ErrorCode::kGeometry,
+              "the scene reaches from ({:.6g}, {:.6g}, {:.6g}) to ({:.6g}, {:.6g}, {:.6g}); "
+              "these coordinates are too large for a picture",
+              box_.low.x, box_.low.y, box_.low.z, box_.high.x, box_.high.y, box_.high.z);
 }
 
 /// The report of a run that makes no picture.
-Result<void> run_report(const CsgCommand& command, csg::Scene& scene, CsgOutcome& outcome,
-                        Session& session) {
-  cut_scene(scene, command.cuts, outcome.camera);
-  auto measures = csg::measure(scene.tree, scene.tree.root(), measure_options(command, scene),
-                               session.execution("measuring", 1.0));
-  if (!measures) return tl::unexpected(with_limit(std::move(measures.error()), session));
-  outcome.measures = *measures;
-  session.end_progress();
-  return print_report(csg_text(command, outcome), "-", false);
+Result<void> CsgRun::print_measures() {
+  csg::cut_scene(scene_, command_.cuts, camera());
+  auto measures = csg::measure(scene_.tree, scene_.tree.root(), measure_options(),
+                               session_.execution("measuring", 1.0));
+  if (!measures) return tl::unexpected(with_limit(std::move(measures.error()), session_));
+  outcome_.measures = *measures;
+  session_.end_progress();
+  return print_report(csg_text(command_, outcome_), "-", false);
+}
+
+Result<void> CsgRun::open_preview() {
+  csg::cut_scene(scene_, command_.cuts, camera());
+  auto gpu = open_gpu(command_.backend, session_);
+  if (!gpu) return tl::unexpected(gpu.error());
+  gpu_ = *std::move(gpu);
+  drawing_ = session_.execution("drawing", measures() || draws_numbers() ? 0.6 : 1.0);
+  std::vector<csg::Ghost> ghosts = ghosts_of(scene_);
+  result_ = scene_.tree.root();
+  if (!scene_.shown.empty()) {
+    scene_.tree.set_root(scene_.tree.add(csg::Operation::kUnion, scene_.shown));
+  }
+  preview_.emplace(std::move(scene_.tree), std::move(ghosts), scene_.relative_precision, drawing_);
+  if (gpu_) {
+    const auto surfaces = gpu_->surfaces();
+    if (!surfaces) return tl::unexpected(surfaces.error());
+    preview_->set_source(*surfaces);
+  }
+  outcome_.prepare_ms = session_.milliseconds() - outcome_.read_ms;
+  return {};
+}
+
+Result<void> CsgRun::draw() {
+  const double begin = session_.milliseconds();
+  auto picture = drawn(*preview_, may_fall_back(), session_,
+                       [&] { return preview_->picture(camera(), command_.size, look_, drawing_); });
+  if (!picture) return tl::unexpected(picture.error());
+  picture_ = *std::move(picture);
+  if (from_above_) {
+    const glm::u8vec3 ground = look_.scheme->background;
+    draw_outlines(picture_, {ground, look_.transparent_background ? 0 : 255});
+  }
+  outcome_.drawn = preview_->report();
+  outcome_.draw_ms = session_.milliseconds() - begin;
+  if (auto seen = check_covered(); !seen) return seen;
+  session_.note(fmt::format("{}, {}, {} of {} covered", counted(outcome_.solids, "solid"),
+                            counted(outcome_.drawn.fragments, "crossing"), outcome_.drawn.covered,
+                            counted(picture_.pixels.size(), "pixel")));
+  return {};
+}
+
+/// Says why nothing is seen.
+Result<void> CsgRun::check_covered() {
+  if (outcome_.drawn.covered > 0) return {};
+  if (box_.empty()) {
+    const csg::Tree& tree = preview_->tree();
+    auto bounds = csg::result_bounds(tree, tree.root(), 0, session_.execution("measuring"));
+    if (bounds) box_ = *bounds;
+  }
+  session_.warn("empty", why_empty(command_, *preview_, box_, session_));
+  return session_.check_strict();
+}
+
+/// The pictures of numbers have one sample a pixel.
+Result<void> CsgRun::draw_numbers() {
+  if (!draws_numbers()) return {};
+  const double begin = session_.milliseconds();
+  const auto made = preview_->view(camera(), command_.size, drawing_);
+  if (!made) return tl::unexpected(made.error());
+  view_ = *made;
+  const auto image = drawn(*preview_, may_fall_back(), session_,
+                           [&] { return preview_->draw(*view_, session_.execution("drawing")); });
+  if (!image) return tl::unexpected(image.error());
+  surfaces_ = *image;
+  outcome_.write_ms = session_.milliseconds() - begin;
+  return {};
+}
+
+Result<void> CsgRun::measure() {
+  if (!measures()) return {};
+  const double begin = session_.milliseconds();
+  auto measured =
+      csg::measure(preview_->tree(), result_, measure_options(), session_.execution("measuring"));
+  if (!measured) return tl::unexpected(measured.error());
+  outcome_.measures = *measured;
+  outcome_.measure_ms = session_.milliseconds() - begin;
+  return {};
+}
+
+Result<void> CsgRun::write() {
+  const double begin = session_.milliseconds();
+  if (!command_.output.empty()) {
+    if (auto done = csg::write_png(picture_, command_.output); !done) return done;
+  }
+  if (!command_.depth.empty()) {
+    if (auto done = csg::write_depth_exr(*surfaces_, *view_, command_.depth); !done) return done;
+  }
+  if (!command_.ids.empty()) {
+    const csg::Picture ids = picture_of_ids(*surfaces_, preview_->tree(), outcome_);
+    if (auto done = csg::write_png(ids, command_.ids); !done) return done;
+  }
+  outcome_.write_ms += session_.milliseconds() - begin;
+  return {};
+}
+
+Result<void> CsgRun::report() {
+  session_.end_progress();
+  // The texts are made before the outputs get their names: a run that lacks memory leaves none.
+  const std::string summary = command_.summary ? csg_text(command_, outcome_) : "";
+  const std::string json = command_.json ? csg_json(command_, outcome_, session_) : "";
+  const bool to_file = command_.json && *command_.json != "-";
+  if (to_file) {
+    if (auto done = print_report(json, *command_.json, false); !done) return done;
+  }
+  if (auto done = commit_outputs(session_); !done) return done;
+  if (command_.summary) {
+    const bool taken = command_.output == "-" || command_.json == "-";
+    if (auto done = print_report(summary, "-", taken); !done) return done;
+  }
+  if (!command_.json || to_file) return {};
+  return print_report(json, *command_.json, command_.output == "-");
 }
 
 /// `a.png` becomes `a00012.png`, as openscad numbers them.
@@ -184,12 +403,10 @@ std::string numbered(const std::string& path, int frame) {
       .string();
 }
 
-Result<void> run_one(CsgCommand command, Session& session);
-
 }  // namespace
 
 Result<void> run_csg(const CsgCommand& command, Session& session) {
-  if (command.frames == 0) return run_one(command, session);
+  if (command.frames == 0) return CsgRun(command, session).run();
   for (int frame = 0; frame < command.frames; ++frame) {
     CsgCommand one = command;
     for (std::string* path : {&one.output, &one.ids, &one.depth}) *path = numbered(*path, frame);
@@ -199,156 +416,9 @@ Result<void> run_csg(const CsgCommand& command, Session& session) {
     const std::vector<FileUse> written = outputs_of(one);
     if (auto kept = check_files(inputs_of(one.input), written); !kept) return kept;
     session.set_outputs(written, true);
-    if (auto done = run_one(std::move(one), session); !done) return done;
+    if (auto done = CsgRun(std::move(one), session).run(); !done) return done;
   }
   return {};
 }
 
-namespace {
-
-Result<void> run_one(CsgCommand command, Session& session) {
-  CsgOutcome outcome;
-  auto scene = load_scene(command, session);
-  if (!scene) return tl::unexpected(scene.error());
-  if (auto strict = session.check_strict(); !strict) return strict;
-  outcome.read_ms = session.milliseconds();
-  outcome.flat = scene->flat;
-  outcome.solids = scene->tree.solids().size();
-  outcome.nodes = scene->tree.nodes().size();
-  outcome.triangles = triangles_of(scene->tree);
-
-  csg::Camera& camera = outcome.camera;
-  camera = placed_camera(command, *scene, session);
-  if (auto strict = session.check_strict(); !strict) return strict;
-  csg::PictureOptions look = command.picture;
-  csg::ColourScheme flat_scheme;
-  const bool from_above = command.render && scene->flat;
-  if (command.render) forget_looks(*scene);
-  if (from_above) {
-    flat_scheme = look.scheme != nullptr ? *look.scheme : csg::colour_schemes().front();
-    flat_scheme.face = kFlatFace;
-    look.scheme = &flat_scheme;
-    if (command.default_camera) {
-      camera.rotation = glm::dvec3(0.0);
-      camera.projection = csg::Projection::kOrthographic;
-    }
-  }
-  Bounds box;
-  if (command.auto_centre || command.view_all) {
-    auto visible = visible_box(*scene, session.execution("measuring"));
-    if (!visible) return tl::unexpected(visible.error());
-    box = *visible;
-    if (from_above && !box.empty()) box.low.z = box.high.z = 0.0;  // an outline has no thickness
-  }
-  if (command.auto_centre) csg::centre_camera(camera, box);
-  if (command.view_all) {
-    csg::fit_camera(camera, box, static_cast<double>(command.size.x) / command.size.y);
-    if (!(camera.distance > 0)) camera.distance = csg::Camera{}.distance;  // nothing to fit
-  }
-  if (!std::isfinite(camera.distance)) {
-    return fail(ErrorCode::kGeometry,
-                "the scene reaches from ({:.6g}, {:.6g}, {:.6g}) to ({:.6g}, {:.6g}, {:.6g}); "
-                "these coordinates are too large for a picture",
-                box.low.x, box.low.y, box.low.z, box.high.x, box.high.y, box.high.z);
-  }
-  const bool pictures = !command.output.empty() || !command.ids.empty() || !command.depth.empty();
-  if (!pictures && !command.json) return run_report(command, *scene, outcome, session);
-  cut_scene(*scene, command.cuts, camera);
-  const auto gpu = Gpu::open(command.backend, session);
-  if (!gpu) return tl::unexpected(gpu.error());
-  const bool measures = command.json || command.summary;
-  const bool more = measures || !command.ids.empty() || !command.depth.empty();
-  const Execution execution = session.execution("drawing", more ? 0.6 : 1.0);
-  std::vector<csg::Ghost> ghosts = ghosts_of(*scene);
-  const csg::Tree::NodeId result = scene->tree.root();
-  if (!scene->shown.empty()) {
-    scene->tree.set_root(scene->tree.add(csg::Operation::kUnion, scene->shown));
-  }
-  csg::Preview preview(std::move(scene->tree), std::move(ghosts), scene->relative_precision,
-                       execution);
-  if (*gpu) {
-    const auto surfaces = (*gpu)->surfaces();
-    if (!surfaces) return tl::unexpected(surfaces.error());
-    preview.set_source(*surfaces);
-  }
-  outcome.prepare_ms = session.milliseconds() - outcome.read_ms;
-
-  double begin = session.milliseconds();
-  const bool may_fall_back = *gpu && command.backend == Backend::kAuto;
-  auto picture = drawn(preview, may_fall_back, session,
-                       [&] { return preview.picture(camera, command.size, look, execution); });
-  if (!picture) return tl::unexpected(picture.error());
-  if (from_above) {
-    const glm::u8vec3 ground = look.scheme->background;
-    draw_outlines(*picture, {ground, look.transparent_background ? 0 : 255});
-  }
-  outcome.drawn = preview.report();
-  outcome.draw_ms = session.milliseconds() - begin;
-  if (outcome.drawn.covered == 0) {
-    if (box.empty()) {
-      const csg::Tree& tree = preview.tree();
-      auto bounds = csg::result_bounds(tree, tree.root(), 0, session.execution("measuring"));
-      if (bounds) box = *bounds;
-    }
-    session.warn("empty", why_empty(command, preview, box, session));
-    if (auto strict = session.check_strict(); !strict) return strict;
-  }
-  session.note(fmt::format("{}, {}, {} of {} covered", counted(outcome.solids, "solid"),
-                           counted(outcome.drawn.fragments, "crossing"), outcome.drawn.covered,
-                           counted(picture->pixels.size(), "pixel")));
-
-  // The pictures of numbers have one sample a pixel.
-  const csg::SurfaceImage* surfaces = nullptr;
-  std::optional<csg::View> view;
-  begin = session.milliseconds();
-  if (!command.ids.empty() || !command.depth.empty()) {
-    const auto made = preview.view(camera, command.size, execution);
-    if (!made) return tl::unexpected(made.error());
-    view = *made;
-    const auto image = drawn(preview, may_fall_back, session,
-                             [&] { return preview.draw(*view, session.execution("drawing")); });
-    if (!image) return tl::unexpected(image.error());
-    surfaces = *image;
-  }
-  const double numbers_ms = session.milliseconds() - begin;
-  if (measures) {
-    begin = session.milliseconds();
-    const csg::Tree& tree = preview.tree();
-    auto measured = csg::measure(tree, result, measure_options(command, *scene),
-                                 session.execution("measuring"));
-    if (!measured) return tl::unexpected(measured.error());
-    outcome.measures = *measured;
-    outcome.measure_ms = session.milliseconds() - begin;
-  }
-  // Nothing is written before all is known.
-  begin = session.milliseconds();
-  if (!command.output.empty()) {
-    if (auto done = csg::write_png(*picture, command.output); !done) return done;
-  }
-  if (!command.depth.empty()) {
-    if (auto done = csg::write_depth_exr(*surfaces, *view, command.depth); !done) return done;
-  }
-  if (!command.ids.empty()) {
-    const csg::Picture ids = picture_of_ids(*surfaces, preview.tree(), outcome);
-    if (auto done = csg::write_png(ids, command.ids); !done) return done;
-  }
-  outcome.write_ms = numbers_ms + session.milliseconds() - begin;
-  session.end_progress();
-  // The texts are made before the outputs get their names: a run that lacks memory leaves none.
-  const std::string summary = command.summary ? csg_text(command, outcome) : "";
-  const std::string json = command.json ? csg_json(command, outcome, session) : "";
-  const bool to_file = command.json && *command.json != "-";
-  if (to_file) {
-    if (auto done = print_report(json, *command.json, false); !done) return done;
-  }
-  if (auto done = commit_outputs(session); !done) return done;
-  if (command.summary) {
-    const bool taken = command.output == "-" || command.json == "-";
-    if (auto done = print_report(summary, "-", taken); !done) return done;
-  }
-  if (!command.json || to_file) return {};
-  return print_report(json, *command.json, command.output == "-");
-}
-
-}  // namespace
 }  // namespace strata::apps

@@ -175,8 +175,8 @@ Result<csg::Camera> parse_camera(std::string_view text) {
   return camera;
 }
 
-Result<SectionPlane> parse_section(std::string_view text) {
-  SectionPlane plane;
+Result<csg::SectionPlane> parse_section(std::string_view text) {
+  csg::SectionPlane plane;
   const auto no_plane = [text] {
     return fail(ErrorCode::kUsage,
                 "--cut must be a plane such as x=5, z<10 or nx,ny,nz,d, got '{}'", text);
@@ -215,7 +215,7 @@ Result<void> read_csg_options(const CsgWords& words, CsgCommand& command) {
       error = std::move(value.error());
     }
   };
-  command.expression = words.expression;
+  command.input.expression = words.expression;
   if (!words.size.empty()) take(parse_size(words.size), command.size);
   command.view_all = words.view_all;
   command.auto_centre = words.auto_centre;

@@ -36,6 +36,6 @@ Result<csg::Camera> parse_camera(std::string_view text);
 Result<csg::Projection> parse_projection(std::string_view text);
 
 /// A section plane: `x=5`, `z<10`, `y>0` or `nx,ny,nz,d`. @return kUsage
-Result<SectionPlane> parse_section(std::string_view text);
+Result<csg::SectionPlane> parse_section(std::string_view text);
 
 }  // namespace strata::apps

@@ -16,7 +16,7 @@ std::vector<FileUse> outputs(std::initializer_list<FileUse> uses) {
 
 }  // namespace
 
-std::vector<FileUse> inputs_of(const InputOptions& input) {
+std::vector<FileUse> inputs_of(const csg::SceneInput& input) {
   std::vector<FileUse> uses;
   for (const std::string& path : input.files) uses.push_back({"the input", path});
   const std::vector<std::string>& options = input.scene.openscad_options;

@@ -8,7 +8,7 @@
 namespace strata::apps {
 
 /// What a command reads: its inputs, and the parameters of programs.
-[[nodiscard]] std::vector<FileUse> inputs_of(const InputOptions& input);
+[[nodiscard]] std::vector<FileUse> inputs_of(const csg::SceneInput& input);
 
 /// What a command writes.
 [[nodiscard]] std::vector<FileUse> outputs_of(const VoxelizeCommand& command);

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <utility>
 
 #include "apps/session/file_conflicts.h"
@@ -6,11 +7,12 @@
 #include "apps/strata/allocation_failures.h"
 #include "apps/strata/commands.h"
 #include "apps/strata/csg_report.h"
-#include "apps/strata/csg_scene.h"
 #include "apps/strata/gl_info.h"
-#include "apps/strata/mesh_input.h"
+#include "apps/strata/library_session.h"
 #include "core/printable.h"
 #include "strata/core/file_identity.h"
+#include "strata/csg/input/scene_input.h"
+#include "strata/csg/input/solid_input.h"
 #include "strata/csg/solid_lists.h"
 #include "strata/mesh/diagnose.h"
 #include "strata/mesh/orient.h"
@@ -54,7 +56,7 @@ std::string info_text(const FileInfo& info) {
                                "of opposite orientation)",
                                found.unbalanced_edges, found.edges, found.boundary_edges,
                                found.misoriented_edges));
-    for (const UnbalancedEdge& edge : found.examples) line("", describe(edge));
+    for (const UnbalancedEdge& edge : found.examples) line("", csg::describe(edge));
     if (found.examples.size() < found.unbalanced_edges) {
       line("", fmt::format("and {} more", found.unbalanced_edges - found.examples.size()));
     }
@@ -139,7 +141,7 @@ void write_info(JsonWriter& json, const FileInfo& info) {
 
 struct SceneInfo {
   std::string path;
-  InputFacts facts;
+  csg::InputFacts facts;
   std::uint64_t solids = 0, nodes = 0;
   csg::Measures result;
 };
@@ -195,11 +197,11 @@ void write_info(JsonWriter& json, const SceneInfo& info) {
 
 Result<SceneInfo> look_at_scene(const std::string& path, const InfoCommand& command,
                                 Session& session) {
-  CsgCommand one;
-  one.input = command.input;
-  one.input.files = {path};
-  std::vector<InputFacts> facts;
-  const auto scene = load_scene(one, session, &facts);
+  csg::SceneInput one = command.input;
+  one.files = {path};
+  std::vector<csg::InputFacts> facts;
+  const auto scene =
+      csg::load_scene(one, messages_of(session), session.execution("reading"), &facts);
   if (!scene) return tl::unexpected(scene.error());
   Execution execution = session.execution("measuring");
   execution.progress = {};
@@ -215,10 +217,13 @@ Result<SceneInfo> look_at_scene(const std::string& path, const InfoCommand& comm
   return info;
 }
 
-Result<FileInfo> look_at(const std::string& path, const InfoCommand& command, Session& session) {
-  auto file = read_input(path, command.input, session);
+Result<FileInfo> look_at(const std::string& path, const csg::InputKind& kind,
+                         const InfoCommand& command, Session& session) {
+  const double share =
+      0.5 / static_cast<double>(std::max<std::size_t>(command.input.files.size(), 1));
+  auto file = csg::read_mesh_input(path, kind, command.input, session.execution("reading", share));
   if (!file) return tl::unexpected(file.error());
-  warn_of_reading(path, file->stats, session);
+  csg::warn_of_reading(path, file->stats, messages_of(session));
   Execution execution = session.execution("checking");
   execution.progress = {};
   FileInfo info{path, std::move(file->stats), diagnose(file->soup, execution),
@@ -229,6 +234,15 @@ Result<FileInfo> look_at(const std::string& path, const InfoCommand& command, Se
                                      path, info.found.unbalanced_edges, info.found.edges));
   }
   return info;
+}
+
+/// --gl, which says what it can beside files that failed.
+void add_gl(JsonWriter& json, std::string& text, std::optional<Error>& first_error,
+            Session& session) {
+  const auto told = tell_gl(json, text);
+  if (told) return;
+  if (first_error) session.complain(*first_error);
+  first_error = told.error();
 }
 
 }  // namespace
@@ -248,15 +262,15 @@ Result<void> run_info(const InfoCommand& command, Session& session) {
       text += info_text(*info);
       return {};
     };
-    const bool scene = is_scene_name(path) && format_of(path, command.input) == MeshFormat::kAuto;
-    const auto told =
-        scene ? tell(look_at_scene(path, command, session)) : tell(look_at(path, command, session));
+    const csg::InputKind kind = csg::kind_of(path, command.input);
+    const auto told = kind.is_scene ? tell(look_at_scene(path, command, session))
+                                    : tell(look_at(path, kind, command, session));
     if (told) continue;
     if (session.interrupted()) return told;
     if (first_error) session.complain(*first_error);
     // A report must not overwrite what a scene has opened.
-    if (scene && told.error().code == ErrorCode::kUsage) return told;
-    scene_failed = scene_failed || scene;
+    if (kind.is_scene && told.error().code == ErrorCode::kUsage) return told;
+    scene_failed = scene_failed || kind.is_scene;
     first_error = told.error();
   }
   json.end_array();
@@ -269,12 +283,7 @@ Result<void> run_info(const InfoCommand& command, Session& session) {
         "--json {}: the file is not overwritten, since a scene that cannot be read may need it",
         *command.json);
   }
-  if (command.gl) {
-    if (const auto told = tell_gl(json, text); !told) {
-      if (first_error) session.complain(*first_error);
-      first_error = told.error();
-    }
-  }
+  if (command.gl) add_gl(json, text, first_error, session);
   write_memory(json);
   write_timings(json, session);
   write_warnings(json, session);

@@ -4,8 +4,8 @@
 #include "apps/session/option_values.h"
 #include "apps/session/session.h"
 #include "apps/strata/commands.h"
-#include "apps/strata/gpu.h"
-#include "apps/strata/mesh_input.h"
+#include "apps/strata/library_session.h"
+#include "strata/csg/input/solid_input.h"
 #include "strata/hashbuffer/build_ldi.h"
 #include "strata/hashbuffer/formats/ldi_io.h"
 #include "strata/hashbuffer/formats/xray.h"
@@ -24,9 +24,8 @@ Result<void> run_ldi(const LdiCommand& command, Session& session) {
   if (!exr && command.samples) {
     return fail(ErrorCode::kUsage, "{}: --samples needs an .exr file", command.output);
   }
-  auto input = load_solids(
-      command.input, {.keep_orientation = command.keep_orientation, .rule = InsideRule::kWinding},
-      session);
+  auto input =
+      csg::load_solids(command.input, false, messages_of(session), session.execution("reading"));
   if (!input) return tl::unexpected(input.error());
   if (auto strict = session.check_strict(); !strict) return strict;
   const auto grid = fit_grid(input->bounds, command.grid);
@@ -38,11 +37,11 @@ Result<void> run_ldi(const LdiCommand& command, Session& session) {
   if (auto done = input->fit(*grid, execution); !done) return done;
   const auto lattice = snap_to_lattice(input->soup, *grid, execution);
   if (!lattice) return tl::unexpected(lattice.error());
-  const auto gpu = Gpu::open(command.backend, session);
+  const auto gpu = open_gpu(command.backend, session);
   if (!gpu) return tl::unexpected(gpu.error());
   ListSource* source = nullptr;
   if (*gpu) {
-    const auto lists = (*gpu)->lists(command.store);
+    const auto lists = (*gpu)->lists(command.store, session.execution("depth lists"));
     if (!lists) return tl::unexpected(lists.error());
     source = *lists;
   }

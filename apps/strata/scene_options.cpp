@@ -92,7 +92,7 @@ void define_scene_options(CLI::App& app, SceneWords& words) {
          kOpenscadGroup);
 }
 
-Result<void> read_scene_options(const SceneWords& words, InputOptions& input) {
+Result<void> read_scene_options(const SceneWords& words, csg::SceneInput& input) {
   csg::ReadSceneOptions& scene = input.scene;
   scene.asset_folder = words.assets;
   scene.root_folder = words.root;

@@ -23,6 +23,6 @@ struct SceneWords {
 void define_scene_options(CLI::App& app, SceneWords& words);
 
 /// Reads the words into `input`, whose files and format are set. @return kUsage
-Result<void> read_scene_options(const SceneWords& words, InputOptions& input);
+Result<void> read_scene_options(const SceneWords& words, csg::SceneInput& input);
 
 }  // namespace strata::apps

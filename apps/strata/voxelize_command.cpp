@@ -9,16 +9,16 @@
 
 #include "apps/session/session.h"
 #include "apps/strata/allocation_failures.h"
-#include "apps/strata/boundary_area.h"
 #include "apps/strata/choice_words.h"
 #include "apps/strata/commands.h"
-#include "apps/strata/gpu.h"
-#include "apps/strata/memory_estimate.h"
-#include "apps/strata/mesh_input.h"
+#include "apps/strata/library_session.h"
 #include "apps/strata/voxelize_report.h"
+#include "strata/csg/input/solid_input.h"
 #include "strata/csg/picture/picture.h"
 #include "strata/csg/solid_labels.h"
 #include "strata/csg/solid_lists.h"
+#include "strata/voxelize/boundary_area.h"
+#include "strata/voxelize/formats/memory_estimate.h"
 #include "strata/voxelize/formats/voxel_writer.h"
 #include "voxelize/open/lost_walls.h"
 
@@ -33,9 +33,9 @@ std::string format_list() {
   return text;
 }
 
-/// Refuses what would be found out only after the work.
-Result<void> check_output(const VoxelizeCommand& command) {
-  if (command.output.empty()) return {};
+/// The format of the output, if there is one. Refuses what would be found out only after the work.
+Result<std::optional<VoxelFormat>> output_format(const VoxelizeCommand& command) {
+  if (command.output.empty()) return std::optional<VoxelFormat>();
   if (command.output == "-" && isatty(STDOUT_FILENO) != 0) {
     return fail(ErrorCode::kUsage, "standard output is a terminal, but voxel files are binary");
   }
@@ -52,7 +52,7 @@ Result<void> check_output(const VoxelizeCommand& command) {
                 format->name);
   }
   if (command.ids) {
-    if (auto held = check_ids(*format, 1); !held) return held;
+    if (auto held = check_ids(*format, 1); !held) return tl::unexpected(held.error());
   }
   if (command.axis && *command.axis != format->axis) {
     return fail(ErrorCode::kUsage,
@@ -60,15 +60,16 @@ Result<void> check_output(const VoxelizeCommand& command) {
                 "xyz"[static_cast<int>(*command.axis)], format -> name,
                 "xyz"[static_cast<int>(format->axis)]);
   }
-  return {};
+  return std::optional(*format);
 }
 
 /// What --open says of meshes that are not closed: refuses, or says who decides where no vote can.
-Result<void> check_open(const VoxelizeCommand& command, const MeshInput& input, Session& session) {
+Result<void> check_open(const VoxelizeCommand& command, const csg::SolidInput& input,
+                        Session& session) {
   if (input.closed || !command.solid) return {};
-  const InputFacts& file =
+  const csg::InputFacts& file =
       *std::find_if(input.files.begin(), input.files.end(),
-                    [](const InputFacts& facts) { return !facts.open.empty(); });
+                    [](const csg::InputFacts& facts) { return !facts.open.empty(); });
   if (command.open == OpenMode::kFail) {
     return fail(ErrorCode::kGeometry, "{} (--open fail)", file.open);
   }
@@ -91,9 +92,10 @@ Result<void> check_open(const VoxelizeCommand& command, const MeshInput& input, 
 }
 
 /// The axis the format is written from, or the one with the fewest columns.
-Axis choose_axis(const VoxelizeCommand& command, const VoxelFormat* format, const VoxelGrid& grid) {
+Axis choose_axis(const VoxelizeCommand& command, const std::optional<VoxelFormat>& format,
+                 const VoxelGrid& grid) {
   if (command.axis) return *command.axis;
-  if (format != nullptr) return format->axis;
+  if (format) return format->axis;
   // The longest side has the smallest cross-section.
   if (grid.dims.z >= grid.dims.x && grid.dims.z >= grid.dims.y) return Axis::kZ;
   return grid.dims.y >= grid.dims.x ? Axis::kY : Axis::kX;
@@ -102,7 +104,7 @@ Axis choose_axis(const VoxelizeCommand& command, const VoxelFormat* format, cons
 /// Tells of walls that lie between voxel centres, or that nothing is solid.
 Result<void> check_thin(const VoxelizeCommand& command, VoxelizeOutcome& outcome,
                         const Execution& execution, Session& session) {
-  const MeshInput& input = outcome.input;
+  const csg::SolidInput& input = outcome.input;
   LostWallOptions options;
   options.rule = input.rule;
   if (!input.has_scene()) options.longest_edge = input.longest_edge;
@@ -195,13 +197,13 @@ Result<void> print_reports(const VoxelizeCommand& command, const VoxelizeOutcome
 
 /// Whether no voxel is asked for its inside: without --solid, or of an open mesh under --open
 /// surface.
-bool is_surface_alone(const VoxelizeCommand& command, const MeshInput& input) {
+bool is_surface_alone(const VoxelizeCommand& command, const csg::SolidInput& input) {
   return !command.solid || (!input.closed && command.open == OpenMode::kSurface);
 }
 
 /// Samples along a voxel's side of a fog volume; 0: none is asked for. A surface alone has no
 /// filled fraction.
-int fog_samples(const VoxelizeCommand& command, const MeshInput& input) {
+int fog_samples(const VoxelizeCommand& command, const csg::SolidInput& input) {
   return command.fog_by_default && is_surface_alone(command, input) ? 1 : command.fog;
 }
 
@@ -219,7 +221,7 @@ void label_solids(const VoxelizeCommand& command, VoxelizeOutcome& outcome,
   }
   const bool surface = command.surface || is_surface_alone(command, outcome.input);
   if (command.output.empty() || surface) return;
-  const std::size_t most = voxel_format_for(command.output, command.format)->colours;
+  const std::size_t most = outcome.format->colours;
   if (most == 0) return;
   const glm::vec4 none(glm::vec3(csg::colour_schemes().front().face) / 255.0f, 1.0f);
   const csg::ColourLabels parts = csg::colour_labels(scene, scene.root(), none);
@@ -228,7 +230,7 @@ void label_solids(const VoxelizeCommand& command, VoxelizeOutcome& outcome,
         "colours",
         fmt::format(
             "the scene has {} colours, but a {} file holds {}; it is written without colours",
-            parts.colours.size(), outcome.format, most));
+            parts.colours.size(), outcome.format->name, most));
   }
   for (const glm::vec4& colour : parts.colours) {
     options.colours.emplace_back(glm::clamp(colour, 0.0f, 1.0f) * 255.0f + 0.5f);
@@ -256,22 +258,19 @@ void count_ids(const VoxelIntervals& slab, std::vector<std::uint64_t>& voxels) {
   }
 }
 
-/// The work itself: lists, intervals, file.
-Result<void> voxelize_and_write(const VoxelizeCommand& command, VoxelizeOutcome& outcome,
-                                Session& session) {
-  std::unique_ptr<VoxelWriter> writer;
+/// What the file's voxels are; labels the solids accordingly.
+VoxelWriterOptions writer_options(const VoxelizeCommand& command, VoxelizeOutcome& outcome,
+                                  int samples, Session& session) {
   VoxelWriterOptions file;
-  const int samples = fog_samples(command, outcome.input);
   file.fog = static_cast<std::uint32_t>(samples * samples * samples);
   file.mask = command.mask;
   if (!command.solid && samples == 0) file.name = "surface";
   if (command.name) file.name = *command.name;
   label_solids(command, outcome, file, session);
-  if (!command.output.empty()) {
-    auto opened = open_voxel_writer(command.output, command.format, outcome.grid, file);
-    if (!opened) return tl::unexpected(opened.error());
-    writer = *std::move(opened);
-  }
+  return file;
+}
+
+VoxelizeOptions voxelize_options(const VoxelizeCommand& command, const VoxelizeOutcome& outcome) {
   VoxelizeOptions options;
   options.rule = outcome.input.rule;
   options.axis = outcome.axis;
@@ -282,96 +281,201 @@ Result<void> voxelize_and_write(const VoxelizeCommand& command, VoxelizeOutcome&
   options.closedness = outcome.input.closed ? Closedness::kAssumeClosed : Closedness::kAssumeOpen;
   options.store = command.store;
   options.offsets = command.offsets;
-  if (outcome.input.tree) {
-    options.filter = &outcome.input.tree->filter();
-    if (is_surface_alone(command, outcome.input)) options.solid = false, options.surface = true;
-    options.closedness = Closedness::kAssumeClosed;  // it makes closed lists of open ones
-    options.rule = InsideRule::kWinding;             // the solids' rules are the filter's
-  }
   options.statistics = command.stats || command.json || command.checksum;
-  std::unique_ptr<Gpu> gpu;
-  if (command.solid) {
-    auto opened = Gpu::open(command.backend, session);
-    if (!opened) return tl::unexpected(opened.error());
-    gpu = *std::move(opened);
-  }
-  if (gpu) {
-    const auto source = gpu->lists(command.store);
-    if (!source) return tl::unexpected(source.error());
-    options.source = *source;
-  }
+  if (!outcome.input.tree) return options;
+  options.filter = &outcome.input.tree->filter();
+  if (is_surface_alone(command, outcome.input)) options.solid = false, options.surface = true;
+  options.closedness = Closedness::kAssumeClosed;  // it makes closed lists of open ones
+  options.rule = InsideRule::kWinding;             // the solids' rules are the filter's
+  return options;
+}
 
-  Execution execution = session.execution("voxelizing", samples > 1 ? 0.2 : 1.0);
-  // The mesh is there already; what the format holds is not the voxelizer's.
-  const std::uint64_t taken = outcome.estimate.mesh + outcome.estimate.output;
-  execution.memory_limit = std::max<std::uint64_t>(
-      session.memory_limit() > taken ? session.memory_limit() - taken : 0, 1);
-  Execution quiet = execution;
-  quiet.progress = {};
-  std::uint64_t solid_voxels = 0;
-  std::optional<BoundaryArea> boundary;
-  if (command.stats || command.json) boundary.emplace(outcome.grid, outcome.axis);
-  double write_ms = 0;
-  const auto write = [&](const VoxelIntervals& slab) -> Result<void> {
-    if (!writer) return {};
-    const double start = session.milliseconds();
-    auto done = writer->add(slab, quiet);
-    write_ms += session.milliseconds() - start;
-    return done;
-  };
-  const auto sink = [&](const VoxelIntervals& slab) -> Result<void> {
-    if (!options.statistics) solid_voxels += slab.solid_voxels();
-    if (boundary) boundary->add(slab, quiet);
-    if (command.ids) count_ids(slab, outcome.id_voxels);
-    return samples > 1 ? Result<void>() : write(slab);
-  };
-  VoxelGrid finest = outcome.grid;
-  finest.dims *= std::max(1, samples), finest.voxel_size /= std::max(1, samples);
-  if (auto done = outcome.input.fit(finest, quiet); !done) return done;
-  auto report = voxelize_slabs(outcome.input.soup, outcome.grid, options, execution, sink);
-  if (!report) return tl::unexpected(report.error());
-  if (session.interrupted()) return fail(ErrorCode::kCancelled, "stopped");
-  outcome.report = *report;
-  outcome.measured = true;
-  if (!options.statistics) outcome.report.solid_voxels = solid_voxels;
-  if (boundary) outcome.area_estimate = boundary->estimate();
-
+/// Looks at the voxels that were made, and tells what users should know.
+Result<void> check_voxels(const VoxelizeCommand& command, VoxelizeOutcome& outcome,
+                          const Execution& execution, Session& session) {
   check_columns(command, outcome, session);
   if (!command.surface && !is_surface_alone(command, outcome.input)) {
-    if (auto done = check_thin(command, outcome, quiet, session); !done) return done;
+    if (auto done = check_thin(command, outcome, execution, session); !done) return done;
   } else if (outcome.report.solid_voxels == 0) {
     session.warn("empty", "no voxel is solid; does the grid cover the mesh?");
   }
-  if (auto strict = session.check_strict(); !strict) return strict;
-  if (!writer) return {};
-  if (samples > 1) {
-    // The numbers above are of the voxels whose centre is inside; the file has the filled fraction.
-    options.samples = samples;
-    options.statistics = false;
-    Execution fine = session.execution("sampling", 1.0);
-    fine.memory_limit = execution.memory_limit;
-    const auto done = voxelize_slabs(outcome.input.soup, outcome.grid, options, fine, write);
-    if (!done) return tl::unexpected(done.error());
-    if (session.interrupted()) return fail(ErrorCode::kCancelled, "stopped");
+  return session.check_strict();
+}
+
+/// The work itself: lists, intervals, file.
+class VoxelizeRun {
+ public:
+  VoxelizeRun(const VoxelizeCommand& command, VoxelizeOutcome& outcome, Session& session)
+      : command_(command),
+        outcome_(outcome),
+        session_(session),
+        samples_(fog_samples(command, outcome.input)) {}
+
+  Result<void> run() {
+    if (auto done = open(); !done) return done;
+    if (auto done = voxelize(); !done) return done;
+    if (auto done = check_voxels(command_, outcome_, quiet_, session_); !done) return done;
+    if (!writer_) return {};
+    if (auto done = write_samples(); !done) return done;
+    return finish();
   }
-  const double start = session.milliseconds();
-  if (auto done = writer->finish(quiet); !done) return done;
-  writer.reset();
-  outcome.write_ms = write_ms + session.milliseconds() - start;
-  if (session.interrupted()) session.note("the interrupt came too late: the output is complete");
-  outcome.output_bytes = size_of_file(session.place_of(command.output));
+
+ private:
+  Result<void> open();
+  Result<void> open_source();
+  Result<void> voxelize();
+  Result<void> write_samples();
+  Result<void> finish();
+  Result<void> write(const VoxelIntervals& slab);
+
+  const VoxelizeCommand& command_;
+  VoxelizeOutcome& outcome_;
+  Session& session_;
+  int samples_;  ///< along a voxel's side
+  std::unique_ptr<VoxelWriter> writer_;
+  std::unique_ptr<csg::Gpu> gpu_;
+  VoxelizeOptions options_;
+  Execution execution_, quiet_;  ///< of the voxels; without progress
+  double write_ms_ = 0;
+};
+
+Result<void> VoxelizeRun::open() {
+  const VoxelWriterOptions file = writer_options(command_, outcome_, samples_, session_);
+  if (!command_.output.empty()) {
+    auto opened = open_voxel_writer(command_.output, outcome_.format->name, outcome_.grid, file);
+    if (!opened) return tl::unexpected(opened.error());
+    writer_ = *std::move(opened);
+  }
+  options_ = voxelize_options(command_, outcome_);
+  if (command_.solid) {
+    if (auto done = open_source(); !done) return done;
+  }
+  execution_ = session_.execution("voxelizing", samples_ > 1 ? 0.2 : 1.0);
+  // The mesh is there already; what the format holds is not the voxelizer's.
+  const std::uint64_t taken = outcome_.estimate.mesh + outcome_.estimate.output;
+  execution_.memory_limit = std::max<std::uint64_t>(
+      session_.memory_limit() > taken ? session_.memory_limit() - taken : 0, 1);
+  quiet_ = execution_;
+  quiet_.progress = {};
   return {};
+}
+
+/// Depth lists by a GPU, if one is to make them.
+Result<void> VoxelizeRun::open_source() {
+  auto gpu = open_gpu(command_.backend, session_);
+  if (!gpu) return tl::unexpected(gpu.error());
+  gpu_ = *std::move(gpu);
+  if (!gpu_) return {};
+  const auto source = gpu_->lists(command_.store, session_.execution("depth lists"));
+  if (!source) return tl::unexpected(source.error());
+  options_.source = *source;
+  return {};
+}
+
+Result<void> VoxelizeRun::write(const VoxelIntervals& slab) {
+  if (!writer_) return {};
+  const double start = session_.milliseconds();
+  auto done = writer_->add(slab, quiet_);
+  write_ms_ += session_.milliseconds() - start;
+  return done;
+}
+
+Result<void> VoxelizeRun::voxelize() {
+  std::uint64_t solid_voxels = 0;
+  std::optional<BoundaryArea> boundary;
+  if (command_.stats || command_.json) boundary.emplace(outcome_.grid, outcome_.axis);
+  const auto sink = [&](const VoxelIntervals& slab) -> Result<void> {
+    if (!options_.statistics) solid_voxels += slab.solid_voxels();
+    if (boundary) boundary->add(slab, quiet_);
+    if (command_.ids) count_ids(slab, outcome_.id_voxels);
+    return samples_ > 1 ? Result<void>() : write(slab);
+  };
+  VoxelGrid finest = outcome_.grid;
+  finest.dims *= std::max(1, samples_), finest.voxel_size /= std::max(1, samples_);
+  if (auto done = outcome_.input.fit(finest, quiet_); !done) return done;
+  auto report = voxelize_slabs(outcome_.input.soup, outcome_.grid, options_, execution_, sink);
+  if (!report) return tl::unexpected(report.error());
+  if (session_.interrupted()) return fail(ErrorCode::kCancelled, "stopped");
+  outcome_.report = *report;
+  outcome_.measured = true;
+  if (!options_.statistics) outcome_.report.solid_voxels = solid_voxels;
+  if (boundary) outcome_.area_estimate = boundary->estimate();
+  return {};
+}
+
+/// The numbers of the report are of the voxels whose centre is inside; a fog volume has the filled
+/// fraction.
+Result<void> VoxelizeRun::write_samples() {
+  if (samples_ <= 1) return {};
+  options_.samples = samples_;
+  options_.statistics = false;
+  Execution fine = session_.execution("sampling", 1.0);
+  fine.memory_limit = execution_.memory_limit;
+  const auto done = voxelize_slabs(outcome_.input.soup, outcome_.grid, options_, fine,
+                                   [this](const VoxelIntervals& slab) { return write(slab); });
+  if (!done) return tl::unexpected(done.error());
+  if (session_.interrupted()) return fail(ErrorCode::kCancelled, "stopped");
+  return {};
+}
+
+Result<void> VoxelizeRun::finish() {
+  const double start = session_.milliseconds();
+  if (auto done = writer_->finish(quiet_); !done) return done;
+  writer_.reset();
+  outcome_.write_ms = write_ms_ + session_.milliseconds() - start;
+  if (session_.interrupted()) session_.note("the interrupt came too late: the output is complete");
+  outcome_.output_bytes = size_of_file(session_.place_of(command_.output));
+  return {};
+}
+
+/// What decides how much the job will hold.
+MemoryEstimate estimate(const VoxelizeCommand& command, const VoxelizeOutcome& outcome, int samples,
+                        const Session& session) {
+  const csg::SolidInput& input = outcome.input;
+  MemoryFactors factors;
+  factors.mesh = &input.soup;
+  factors.is_tree = input.tree != nullptr;
+  factors.area = input.area;
+  factors.votes = !input.closed && !input.tree && command.solid && command.open == OpenMode::kVote;
+  for (const csg::InputFacts& file : input.files) factors.open_edges += file.unbalanced_edges;
+  factors.axis = outcome.axis;
+  factors.samples = samples;
+  factors.solid = command.solid;
+  factors.surface = command.surface;
+  if (outcome.format) factors.format = outcome.format->name;
+  factors.ids = command.ids;
+  factors.fog = command.fog != 0;
+  factors.threads = session.threads();
+  factors.limit = session.memory_limit();
+  return estimate_memory(outcome.grid, factors);
+}
+
+/// Refuses what will not fit the memory limit.
+Result<void> check_memory(const VoxelizeCommand& command, const VoxelizeOutcome& outcome,
+                          Session& session) {
+  const glm::ivec3 dims = outcome.grid.dims;
+  const std::uint64_t bytes = outcome.estimate.total();
+  session.note(fmt::format("grid {} x {} x {}, about {} of memory", dims.x, dims.y, dims.z,
+                           readable_bytes(bytes)));
+  if (session.memory_limit() == 0 || bytes <= session.memory_limit() || command.dry_run) return {};
+  return fail(ErrorCode::kLimit,
+              "a grid of {} x {} x {} voxels needs about {} for this mesh; the limit is {} "
+              "(--memory-limit)",
+              dims.x, dims.y, dims.z, readable_bytes(bytes),
+              readable_bytes(session.memory_limit()));
 }
 
 }  // namespace
 
 Result<void> run_voxelize(const VoxelizeCommand& command, Session& session) {
   if (command.list_formats) return print_report(format_list(), "-", false);
-  if (auto valid = check_output(command); !valid) return valid;
-
   VoxelizeOutcome outcome;
-  const MeshInputRules rules{command.keep_orientation, command.rule, command.ids};
-  auto input = load_solids(command.input, rules, session);
+  auto format = output_format(command);
+  if (!format) return tl::unexpected(format.error());
+  outcome.format = *std::move(format);
+
+  auto input = csg::load_solids(command.input, command.ids, messages_of(session),
+                                session.execution("reading"));
   if (!input) return tl::unexpected(input.error());
   outcome.input = *std::move(input);
   if (auto valid = check_open(command, outcome.input, session); !valid) return valid;
@@ -382,28 +486,13 @@ Result<void> run_voxelize(const VoxelizeCommand& command, Session& session) {
     return fail(grid.error().code, "{}: {}", command.input.files.front(), grid.error().message);
   }
   outcome.grid = *grid;
-  Result<VoxelFormat> format;
-  if (!command.output.empty()) {
-    format = voxel_format_for(command.output, command.format);
-    outcome.format = format->name;
-  }
-  outcome.axis = choose_axis(command, command.output.empty() ? nullptr : &*format, outcome.grid);
+  outcome.axis = choose_axis(command, outcome.format, outcome.grid);
   const int samples = fog_samples(command, outcome.input);
   if (const auto valid = check_samples(samples, outcome.grid); !valid) return valid;
-  outcome.estimate = estimate_memory(outcome.input, outcome.grid, outcome.axis, samples, command,
-                                     outcome.format, session.threads(), session.memory_limit());
-  session.note(fmt::format("grid {} x {} x {}, about {} of memory", grid->dims.x, grid->dims.y,
-                           grid->dims.z, readable_bytes(outcome.estimate.total())));
-  if (session.memory_limit() > 0 && outcome.estimate.total() > session.memory_limit() &&
-      !command.dry_run) {
-    return fail(ErrorCode::kLimit,
-                "a grid of {} x {} x {} voxels needs about {} for this mesh; the limit is {} "
-                "(--memory-limit)",
-                grid->dims.x, grid->dims.y, grid->dims.z, readable_bytes(outcome.estimate.total()),
-                readable_bytes(session.memory_limit()));
-  }
+  outcome.estimate = estimate(command, outcome, samples, session);
+  if (auto valid = check_memory(command, outcome, session); !valid) return valid;
   if (!command.dry_run) {
-    if (auto done = voxelize_and_write(command, outcome, session); !done) return done;
+    if (auto done = VoxelizeRun(command, outcome, session).run(); !done) return done;
   }
   session.end_progress();
   return print_reports(command, outcome, session);

@@ -42,10 +42,10 @@ std::string grouped(std::uint64_t number) {
   return text;
 }
 
-void write_input(JsonWriter& json, const MeshInput& input) {
+void write_input(JsonWriter& json, const csg::SolidInput& input) {
   json.key("input").begin_object();
   std::uint64_t triangles = 0, vertices = 0;
-  for (const InputFacts& file : input.files) {
+  for (const csg::InputFacts& file : input.files) {
     triangles += file.stats.triangles;
     vertices += file.stats.vertices;
   }
@@ -61,7 +61,7 @@ void write_input(JsonWriter& json, const MeshInput& input) {
   json.member("high", input.bounds.high);
   json.end_object();
   json.key("files").begin_array();
-  for (const InputFacts& file : input.files) {
+  for (const csg::InputFacts& file : input.files) {
     json.begin_object();
     json.member("path", file.path);
     json.member("format", file.stats.format);
@@ -148,13 +148,22 @@ std::string triple(const glm::dvec3& v) {
   return fmt::format("({:.6g}, {:.6g}, {:.6g})", v.x, v.y, v.z);
 }
 
-std::string voxelize_text(const VoxelizeCommand& command, const VoxelizeOutcome& outcome,
-                          const Session& session) {
-  std::string text;
-  const auto line = [&](std::string_view topic, const std::string& rest) {
-    text += fmt::format("{:<9} {}\n", topic, rest);
-  };
-  for (const InputFacts& file : outcome.input.files) {
+namespace {
+
+/// Lines of a topic each.
+class Lines {
+ public:
+  void operator()(std::string_view topic, const std::string& rest) {
+    text_ += fmt::format("{:<9} {}\n", topic, rest);
+  }
+  [[nodiscard]] std::string take() { return std::move(text_); }
+
+ private:
+  std::string text_;
+};
+
+void tell_input(Lines& line, const VoxelizeOutcome& outcome) {
+  for (const csg::InputFacts& file : outcome.input.files) {
     line("input",
          fmt::format("{}: {} triangles, {} vertices, {}{}", printable(file.path),
                      grouped(file.stats.triangles), grouped(file.stats.vertices),
@@ -174,48 +183,99 @@ std::string voxelize_text(const VoxelizeCommand& command, const VoxelizeOutcome&
        fmt::format("{} x {} x {} voxels of {}, origin {}, rays along {}", grid.dims.x, grid.dims.y,
                    grid.dims.z, s.x == s.y && s.y == s.z ? fmt::format("{:.6g}", s.x) : triple(s),
                    triple(grid.origin), word_of(kAxisWords, outcome.axis)));
+}
+
+void tell_results(Lines& line, const VoxelizeCommand& command, const VoxelizeOutcome& outcome,
+                  const Session& session) {
+  const VoxelizeReport& report = outcome.report;
+  const double cells =
+      static_cast<double>(column_count(outcome)) * outcome.grid.dims[AxisFrame(outcome.axis).w];
+  const auto solid = static_cast<double>(report.solid_voxels);
+  line(!command.surface ? "solid"
+       : command.solid  ? "both"
+                        : "surface",
+       fmt::format("{} voxels ({:.4g} %), volume {:.6g}, area about {:.3g}, in {} intervals",
+                   grouped(report.solid_voxels), 100 * solid / cells,
+                   solid * voxel_volume(outcome.grid), outcome.area_estimate,
+                   grouped(report.intervals)));
+  if (command.checksum) line("checksum", fmt::format("{:016x}", report.checksum));
+  line("lists", fmt::format("{} crossings, at most {} in a column", grouped(report.crossings),
+                            report.max_depth_complexity));
+  std::string depths;
+  const auto histogram = depth_histogram(outcome);
+  for (std::size_t n = 0; n < histogram.size(); ++n) {
+    if (histogram[n] == 0) continue;
+    depths += fmt::format("{}{}{}: {}", depths.empty() ? "" : ", ", n, n == 64 ? "+" : "",
+                          grouped(histogram[n]));
+  }
+  line("depth", "columns by crossings " + depths);
+  if (report.unbalanced_columns > 0) {
+    line("holes", fmt::format("{} columns are entered and left unequally often",
+                              grouped(report.unbalanced_columns)));
+  }
+  line("time", fmt::format("{:.1f} ms: read {:.1f}, check {:.1f}, lists {:.1f}, intervals {:.1f}, "
+                           "write {:.1f}",
+                           session.milliseconds(), outcome.input.read_ms, outcome.input.diagnose_ms,
+                           report.lists_ms, report.intervals_ms, outcome.write_ms));
+  line("memory", fmt::format("{} at most", readable_bytes(peak_memory_bytes())));
+}
+
+void write_options(JsonWriter& json, const VoxelizeCommand& command, const VoxelizeOutcome& outcome,
+                   const Session& session) {
+  json.key("options").begin_object();
+  json.member("solid", command.solid);
+  json.key("surface");
+  if (command.surface) {
+    json.value(word_of(kSurfaceKindWords, command.surface_kind));
+  } else {
+    json.null();
+  }
+  json.member("rule", word_of(kRuleWords, command.input.rule));
+  json.member("open", word_of(kOpenModeWords, command.open));
+  json.member("axis", word_of(kAxisWords, outcome.axis));
+  json.member("store", word_of(kStoreWords, command.store));
+  json.member("offsets", word_of(kOffsetWords, command.offsets));
+  json.member("threads", session.threads());
+  json.end_object();
+}
+
+void write_output(JsonWriter& json, const VoxelizeCommand& command,
+                  const VoxelizeOutcome& outcome) {
+  json.key("output");
+  if (command.output.empty() || command.dry_run) {
+    json.null();
+  } else {
+    json.begin_object();
+    json.member("path", command.output);
+    json.member("format", outcome.format->name);
+    json.key("bytes");
+    if (outcome.output_bytes) {
+      json.value(*outcome.output_bytes);
+    } else {
+      json.null();
+    }
+    json.end_object();
+  }
+}
+
+}  // namespace
+
+std::string voxelize_text(const VoxelizeCommand& command, const VoxelizeOutcome& outcome,
+                          const Session& session) {
+  Lines line;
+  tell_input(line, outcome);
   if (outcome.measured) {
-    const VoxelizeReport& report = outcome.report;
-    const double cells =
-        static_cast<double>(column_count(outcome)) * grid.dims[AxisFrame(outcome.axis).w];
-    const auto solid = static_cast<double>(report.solid_voxels);
-    line(!command.surface ? "solid"
-         : command.solid  ? "both"
-                          : "surface",
-         fmt::format("{} voxels ({:.4g} %), volume {:.6g}, area about {:.3g}, in {} intervals",
-                     grouped(report.solid_voxels), 100 * solid / cells, solid * voxel_volume(grid),
-                     outcome.area_estimate, grouped(report.intervals)));
-    if (command.checksum) line("checksum", fmt::format("{:016x}", report.checksum));
-    line("lists", fmt::format("{} crossings, at most {} in a column", grouped(report.crossings),
-                              report.max_depth_complexity));
-    std::string depths;
-    const auto histogram = depth_histogram(outcome);
-    for (std::size_t n = 0; n < histogram.size(); ++n) {
-      if (histogram[n] == 0) continue;
-      depths += fmt::format("{}{}{}: {}", depths.empty() ? "" : ", ", n, n == 64 ? "+" : "",
-                            grouped(histogram[n]));
-    }
-    line("depth", "columns by crossings " + depths);
-    if (report.unbalanced_columns > 0) {
-      line("holes", fmt::format("{} columns are entered and left unequally often",
-                                grouped(report.unbalanced_columns)));
-    }
-    line("time",
-         fmt::format("{:.1f} ms: read {:.1f}, check {:.1f}, lists {:.1f}, intervals {:.1f}, "
-                     "write {:.1f}",
-                     session.milliseconds(), outcome.input.read_ms, outcome.input.diagnose_ms,
-                     report.lists_ms, report.intervals_ms, outcome.write_ms));
-    line("memory", fmt::format("{} at most", readable_bytes(peak_memory_bytes())));
+    tell_results(line, command, outcome, session);
   } else {
     line("memory", fmt::format("about {} would be needed; the limit is {}",
                                readable_bytes(outcome.estimate.total()),
                                readable_bytes(session.memory_limit())));
   }
   if (outcome.output_bytes) {
-    line("output", fmt::format("{}: {}, {} bytes", command.output, outcome.format,
+    line("output", fmt::format("{}: {}, {} bytes", command.output, outcome.format->name,
                                grouped(*outcome.output_bytes)));
   }
-  return text;
+  return line.take();
 }
 
 std::string voxelize_json(const VoxelizeCommand& command, const VoxelizeOutcome& outcome,
@@ -230,41 +290,11 @@ std::string voxelize_json(const VoxelizeCommand& command, const VoxelizeOutcome&
   json.member("voxel_size", outcome.grid.voxel_size);
   json.end_object();
 
-  json.key("options").begin_object();
-  json.member("solid", command.solid);
-  json.key("surface");
-  if (command.surface) {
-    json.value(word_of(kSurfaceKindWords, command.surface_kind));
-  } else {
-    json.null();
-  }
-  json.member("rule", word_of(kRuleWords, command.rule));
-  json.member("open", word_of(kOpenModeWords, command.open));
-  json.member("axis", word_of(kAxisWords, outcome.axis));
-  json.member("store", word_of(kStoreWords, command.store));
-  json.member("offsets", word_of(kOffsetWords, command.offsets));
-  json.member("threads", session.threads());
-  json.end_object();
-
+  write_options(json, command, outcome, session);
   write_results(json, command, outcome);
   if (command.ids && outcome.measured) write_ids(json, outcome);
 
-  json.key("output");
-  if (command.output.empty() || command.dry_run) {
-    json.null();
-  } else {
-    json.begin_object();
-    json.member("path", command.output);
-    json.member("format", outcome.format);
-    json.key("bytes");
-    if (outcome.output_bytes) {
-      json.value(*outcome.output_bytes);
-    } else {
-      json.null();
-    }
-    json.end_object();
-  }
-
+  write_output(json, command, outcome);
   write_timings(json, session,
                 {{"read", outcome.input.read_ms},
                  {"check", outcome.input.diagnose_ms},

@@ -7,9 +7,10 @@
 
 #include "apps/session/session.h"
 #include "apps/strata/commands.h"
-#include "apps/strata/memory_estimate.h"
-#include "apps/strata/mesh_input.h"
 #include "strata/core/grid.h"
+#include "strata/csg/input/solid_input.h"
+#include "strata/voxelize/formats/memory_estimate.h"
+#include "strata/voxelize/formats/voxel_writer.h"
 #include "strata/voxelize/voxelize.h"
 #include "voxelize/open/lost_walls.h"
 
@@ -17,15 +18,15 @@ namespace strata::apps {
 
 /// All that `strata voxelize` can tell of a run.
 struct VoxelizeOutcome {
-  MeshInput input;
+  csg::SolidInput input;
   VoxelGrid grid;
   Axis axis = Axis::kZ;
   MemoryEstimate estimate;
   VoxelizeReport report;
   bool measured = false;  ///< the report's statistics are filled
   LostWalls lost_walls;
-  double area_estimate = 0.0;  ///< of the set's boundary, square world units
-  std::string format;          ///< of the output; empty: none
+  double area_estimate = 0.0;         ///< of the set's boundary, square world units
+  std::optional<VoxelFormat> format;  ///< of the output; none without one
   std::optional<std::uint64_t> output_bytes;
   std::vector<std::uint64_t> id_voxels;  ///< of solid n of the scene, with --ids
   double write_ms = 0.0;

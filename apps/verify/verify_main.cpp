@@ -19,10 +19,11 @@
 #include "apps/session/help.h"
 #include "apps/session/json_writer.h"
 #include "apps/session/session.h"
-#include "apps/strata/csg_scene.h"
 #include "apps/strata/file_uses.h"
+#include "apps/strata/library_session.h"
 #include "apps/verify/comparison.h"
 #include "apps/verify/verify_options.h"
+#include "strata/csg/input/scene_input.h"
 
 namespace strata::apps {
 namespace {
@@ -101,14 +102,17 @@ Result<void> run(const VerifyWords& words, Session& session) {
     if (auto kept = check_files(read, written); !kept) return kept;
     session.set_outputs(written);
   }
-  const auto scene = load_scene(words.command, session);
+  const auto load = [&session](const csg::SceneInput& input) {
+    return csg::load_scene(input, messages_of(session), session.execution("reading"));
+  };
+  const auto scene = load(words.command.input);
   if (!scene) return tl::unexpected(scene.error());
   std::optional<csg::Scene> other;
   if (!words.against.empty()) {
-    CsgCommand command = words.command;
-    command.input.files = {words.against};
-    command.expression.clear();
-    auto loaded = load_scene(command, session);
+    csg::SceneInput input = words.command.input;
+    input.files = {words.against};
+    input.expression.clear();
+    auto loaded = load(input);
     if (!loaded) return tl::unexpected(loaded.error());
     other = *std::move(loaded);
   }

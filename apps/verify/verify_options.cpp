@@ -51,7 +51,7 @@ void define_verify_options(CLI::App& app, VerifyWords& words) {
       ->required()
       ->type_name("")
       ->group(input);
-  app.add_option("--expr", words.command.expression,
+  app.add_option("--expr", words.command.input.expression,
                  "Boolean expression over the inputs, as for strata csg")
       ->type_name("EXPR")
       ->group(input);

@@ -2,14 +2,13 @@
 
 #include <algorithm>
 #include <chrono>
-#include <glm/geometric.hpp>
-#include <glm/matrix.hpp>
 #include <map>
 #include <utility>
 
 #include "apps/session/session.h"
-#include "apps/strata/csg_scene.h"
+#include "apps/strata/library_session.h"
 #include "csg/measure/result_bounds.h"
+#include "strata/csg/input/scene_input.h"
 
 namespace strata::view {
 namespace {
@@ -106,10 +105,10 @@ Result<std::shared_ptr<const Model>> load_model(const apps::CsgCommand& command,
                                                 const Execution& execution) {
   apps::Session session(apps::Session::Clock::now(), execution);
   session.set_outputs(command.outputs);
-  auto scene = apps::load_scene(command, session);
+  auto scene = csg::load_scene(command.input, apps::messages_of(session), execution);
   if (!scene) return tl::unexpected(scene.error());
   auto model = std::make_shared<Model>();
-  const auto box = apps::visible_box(*scene, execution);
+  const auto box = csg::visible_box(*scene, execution);
   if (!box) return tl::unexpected(box.error());
   model->box = *box;
   for (const csg::Solid& solid : scene->tree.solids()) {
@@ -121,17 +120,6 @@ Result<std::shared_ptr<const Model>> load_model(const apps::CsgCommand& command,
   model->scene = *std::move(scene);
   model->load_ms = session.milliseconds();
   return model;
-}
-
-apps::SectionPlane face(apps::SectionPlane plane, const csg::Camera& camera) {
-  const glm::dvec3 to_eye =
-      glm::transpose(glm::dmat3(csg::eye_from_world(camera))) * glm::dvec3(0, 0, 1);
-  if (plane.towards_eye && glm::dot(plane.normal, to_eye) < 0) {
-    plane.normal = -plane.normal;
-    plane.offset = -plane.offset;
-  }
-  plane.towards_eye = false;
-  return plane;
 }
 
 std::shared_ptr<const Arrangement> arrange(const Model& model, const Looks& looks) {
@@ -168,7 +156,7 @@ std::shared_ptr<const Arrangement> arrange(const Model& model, const Looks& look
     }
   }
   shown.tree = std::move(copier.tree());
-  if (looks.section) apps::cut_scene(shown, {*looks.section}, csg::Camera{});
+  if (looks.section) csg::cut_scene(shown, std::span(&*looks.section, 1), csg::Camera{});
 
   auto result = std::make_shared<Arrangement>();
   result->tree = std::move(shown.tree);

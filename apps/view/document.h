@@ -36,14 +36,11 @@ Result<std::shared_ptr<const Model>> load_model(const apps::CsgCommand& command,
 struct Looks {
   std::vector<std::uint8_t> hidden;                      ///< of each solid; short: all shown
   std::unordered_map<std::uint32_t, glm::vec4> colours;  ///< of solids, instead of their own
-  std::optional<apps::SectionPlane> section;             ///< not towards_eye: see face()
+  std::optional<csg::SectionPlane> section;              ///< not towards_eye: see facing()
   bool ghosts = false;                                   ///< of what is subtracted
   std::optional<std::uint32_t> selected;                 ///< its faces are tinted
   friend bool operator==(const Looks& a, const Looks& b);
 };
-
-/// Turns a plane that cuts towards the eye into one that stays as it is.
-[[nodiscard]] apps::SectionPlane face(apps::SectionPlane plane, const csg::Camera& camera);
 
 /// What is drawn. Does not change.
 struct Arrangement {

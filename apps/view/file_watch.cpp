@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "apps/strata/scene_files.h"
+#include "apps/view/scene_files.h"
 
 namespace strata::view {
 FileWatch::FileWatch(std::vector<std::string> files, std::string asset_folder)
@@ -22,7 +22,7 @@ FileWatch::Stamp FileWatch::stamp_of(const std::string& path) {
 
 void FileWatch::refresh(std::span<const FileIdentity> opened) {
   std::vector<Watched> watched;
-  std::vector<std::string> files = apps::with_scene_files(roots_, asset_folder_);
+  std::vector<std::string> files = with_scene_files(roots_, asset_folder_);
   for (const FileIdentity& file : opened) {
     if (std::find(files.begin(), files.end(), file.path) == files.end()) files.push_back(file.path);
   }

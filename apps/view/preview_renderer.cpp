@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "apps/session/session.h"
-#include "apps/strata/gpu.h"
+#include "apps/strata/library_session.h"
 #include "apps/view/camera_control.h"
 #include "apps/view/renderer.h"
 #include "csg/measure/ray_image.h"
@@ -118,7 +118,7 @@ class PreviewRenderer final : public Renderer {
     own.stop = {};
     own.progress = {};
     session_.emplace(Clock::now(), own);
-    auto gpu = apps::Gpu::open(backend_, *session_);
+    auto gpu = apps::open_gpu(backend_, *session_);
     if (!gpu) return say_why(gpu.error());
     if (*gpu == nullptr) return;  // auto, and there is none
     auto surfaces = (*gpu)->surfaces();
@@ -194,7 +194,7 @@ class PreviewRenderer final : public Renderer {
   bool looked_for_gpu_ = false;
   std::string drawn_by_ = "CPU";
   std::optional<apps::Session> session_;
-  std::unique_ptr<apps::Gpu> gpu_;
+  std::unique_ptr<csg::Gpu> gpu_;
   csg::SurfaceSource* surfaces_ = nullptr;
   std::shared_ptr<const Arrangement> what_;
   std::optional<csg::Preview> preview_;

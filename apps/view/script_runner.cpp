@@ -64,6 +64,73 @@ Result<void> ScriptRunner::step(Viewer& viewer, Stage& stage) {
   return {};
 }
 
+/// What is done at once: the camera, and how the scene is shown.
+Result<void> ScriptRunner::apply(const ScriptCommand& command, Viewer& viewer) {
+  const auto& n = command.numbers;
+  switch (command.action) {
+    case Action::kOrbit:
+      viewer.orbit_by({n[0], n[1]});
+      return {};
+    case Action::kPan:
+      viewer.pan_by({n[0], n[1]});
+      return {};
+    case Action::kZoom:
+      viewer.zoom_by(n[0], n.size() == 3 ? std::optional(glm::dvec2(n[1], n[2])) : std::nullopt);
+      return {};
+    case Action::kView:
+      viewer.look(command.word);
+      return {};
+    case Action::kCamera: {
+      auto camera = apps::parse_camera(command.word);
+      if (!camera) return tl::unexpected(camera.error());
+      camera->projection = viewer.camera().projection;
+      viewer.set_camera(*camera);
+      return {};
+    }
+    case Action::kProjection: {
+      csg::Camera camera = viewer.camera();
+      camera.projection = apps::parse_projection(command.word).value_or(camera.projection);
+      viewer.set_camera(camera);
+      return {};
+    }
+    case Action::kSection:
+      return section(command, viewer);
+    case Action::kGhosts: {
+      Looks looks = viewer.looks();
+      looks.ghosts = command.on;
+      viewer.set_looks(std::move(looks));
+      return {};
+    }
+    case Action::kEdges:
+      viewer.set_edges(command.on);
+      return {};
+    case Action::kAxes:
+      viewer.show_axes = command.on;
+      return {};
+    case Action::kHeat:
+      viewer.set_heat(command.word == "off"         ? Heat::kOff
+                      : command.word == "thickness" ? Heat::kThickness
+                                                    : Heat::kDepth);
+      return {};
+    case Action::kScheme:
+      viewer.set_scheme(csg::find_colour_scheme(command.word));
+      return {};
+    case Action::kHide:
+    case Action::kShow:
+    case Action::kColour:
+      return solids(command, viewer);
+    case Action::kCancel:
+      viewer.cancel_load();
+      return {};
+    case Action::kResetStats:
+      viewer.reset_statistics();
+      return {};
+    default:
+      return fail(ErrorCode::kInternal, "a command that is not known");
+  }
+}
+
+/// What looks at the screen, or takes several turns; else apply().
 Result<bool> ScriptRunner::run(const ScriptCommand& command, Viewer& viewer, Stage& stage) {
   const auto& n = command.numbers;
   const auto done = [](const Result<void>& result) -> Result<bool> {
@@ -71,15 +138,6 @@ Result<bool> ScriptRunner::run(const ScriptCommand& command, Viewer& viewer, Sta
     return true;
   };
   switch (command.action) {
-    case Action::kOrbit:
-      viewer.orbit_by({n[0], n[1]});
-      return true;
-    case Action::kPan:
-      viewer.pan_by({n[0], n[1]});
-      return true;
-    case Action::kZoom:
-      viewer.zoom_by(n[0], n.size() == 3 ? std::optional(glm::dvec2(n[1], n[2])) : std::nullopt);
-      return true;
     case Action::kDrag:
       return drag(command, viewer);
     case Action::kClick:
@@ -95,53 +153,11 @@ Result<bool> ScriptRunner::run(const ScriptCommand& command, Viewer& viewer, Sta
         return fail(ErrorCode::kUsage, "unknown key '{}'", command.word);
       }
       return !viewer.wants_screenshot;  // else the window's next turn takes it
-    case Action::kView:
-      viewer.look(command.word);
-      return true;
-    case Action::kCamera: {
-      auto camera = apps::parse_camera(command.word);
-      if (!camera) return tl::unexpected(camera.error());
-      camera->projection = viewer.camera().projection;
-      viewer.set_camera(*camera);
-      return true;
-    }
-    case Action::kProjection: {
-      csg::Camera camera = viewer.camera();
-      camera.projection = apps::parse_projection(command.word).value_or(camera.projection);
-      viewer.set_camera(camera);
-      return true;
-    }
-    case Action::kSection:
-      return done(section(command, viewer));
-    case Action::kGhosts: {
-      Looks looks = viewer.looks();
-      looks.ghosts = command.on;
-      viewer.set_looks(std::move(looks));
-      return true;
-    }
-    case Action::kEdges:
-      viewer.set_edges(command.on);
-      return true;
-    case Action::kAxes:
-      viewer.show_axes = command.on;
-      return true;
     case Action::kPanels:
       viewer.show_panels = command.on;
       // The window lays itself out anew, and the picture gets another size.
       if (!begun_) return false;
       return true;
-    case Action::kHeat:
-      viewer.set_heat(command.word == "off"         ? Heat::kOff
-                      : command.word == "thickness" ? Heat::kThickness
-                                                    : Heat::kDepth);
-      return true;
-    case Action::kScheme:
-      viewer.set_scheme(csg::find_colour_scheme(command.word));
-      return true;
-    case Action::kHide:
-    case Action::kShow:
-    case Action::kColour:
-      return done(solids(command, viewer));
     case Action::kPick:
       if (!begun_) {
         viewer.pick(glm::ivec2(static_cast<int>(n[0]), static_cast<int>(n[1])));
@@ -158,9 +174,6 @@ Result<bool> ScriptRunner::run(const ScriptCommand& command, Viewer& viewer, Sta
       }
       if (!viewer.loaded()) return false;
       loads_seen_ = viewer.loads();
-      return true;
-    case Action::kCancel:
-      viewer.cancel_load();
       return true;
     case Action::kResize:
       if (!begun_) {
@@ -182,14 +195,12 @@ Result<bool> ScriptRunner::run(const ScriptCommand& command, Viewer& viewer, Sta
     case Action::kStats:
       stage.print(statistics_json(viewer));
       return true;
-    case Action::kResetStats:
-      viewer.reset_statistics();
-      return true;
     case Action::kQuit:
       quit_ = true;
       return true;
+    default:
+      return done(apply(command, viewer));
   }
-  return true;
 }
 
 bool ScriptRunner::drag(const ScriptCommand& command, Viewer& viewer) {

@@ -41,6 +41,7 @@ class ScriptRunner {
   using Clock = std::chrono::steady_clock;
   /// True when the command is done, false when it wants another turn.
   Result<bool> run(const ScriptCommand& command, Viewer& viewer, Stage& stage);
+  static Result<void> apply(const ScriptCommand& command, Viewer& viewer);
   bool drag(const ScriptCommand& command, Viewer& viewer);
   bool wait(const ScriptCommand& command, const Viewer& viewer);
   static Result<void> section(const ScriptCommand& command, Viewer& viewer);

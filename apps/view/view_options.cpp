@@ -63,7 +63,7 @@ void define(CLI::App& app, Words& words, ViewOptions& options) {
   option("--rule", words.rule,
          "Winding numbers that are inside a mesh: above 0, not 0, or odd (default: winding)",
          apps::choices(apps::kRuleWords), input);
-  flag("--keep-orientation", options.command.keep_orientation,
+  flag("--keep-orientation", options.command.input.keep_orientation,
        "Do not reverse meshes that are inside out", input);
   flag("--watch", options.watch, "Load the files again when they change; the camera stays", input);
   const char* look = "Appearance";
@@ -110,15 +110,15 @@ std::string footer() {
 
 Result<void> read(Words& words, ViewOptions& options) {
   apps::CsgCommand& command = options.command;
-  command.scene_format = words.format == "csg";
-  if (command.scene_format) words.format = "auto";
+  command.input.scene_format = words.format == "csg";
+  if (command.input.scene_format) words.format = "auto";
   command.input.files = words.files;
   auto format = apps::parse_choice("--input-format", words.format, apps::kMeshFormatWords);
   if (!format) return tl::unexpected(format.error());
   command.input.format = *format;
   auto rule = apps::parse_choice("--rule", words.rule, apps::kRuleWords);
   if (!rule) return tl::unexpected(rule.error());
-  command.rule = *rule;
+  command.input.rule = *rule;
   auto heat = apps::parse_choice("--heat", words.heat, kHeats);
   if (!heat) return tl::unexpected(heat.error());
   options.heat = *heat;

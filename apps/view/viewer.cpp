@@ -59,7 +59,7 @@ void Viewer::first_camera() {
   }
   start_camera_ = camera_;
   camera_set_ = true;
-  if (!command.cuts.empty()) looks_.section = face(command.cuts.front(), camera_);
+  if (!command.cuts.empty()) looks_.section = csg::facing(command.cuts.front(), camera_);
 }
 
 void Viewer::take_model(std::shared_ptr<const Model> model) {
@@ -236,9 +236,9 @@ void Viewer::set_hidden(std::uint32_t solid, bool hidden) {
   change(true);
 }
 
-void Viewer::set_section(std::optional<apps::SectionPlane> plane) {
+void Viewer::set_section(std::optional<csg::SectionPlane> plane) {
   if (looks_.section) last_section_ = looks_.section;
-  if (plane) plane = face(*plane, camera_);
+  if (plane) plane = csg::facing(*plane, camera_);
   looks_.section = plane;
   change(true);
 }
@@ -255,7 +255,7 @@ void Viewer::toggle_section() {
   if (last_section_) return set_section(last_section_);
   if (!model_ || model_->box.empty()) return;
   const glm::dvec3 middle = (model_->box.low + model_->box.high) * 0.5;
-  set_section(apps::SectionPlane{{0, 1, 0}, middle.y, true});
+  set_section(csg::SectionPlane{{0, 1, 0}, middle.y, true});
 }
 
 glm::dvec2 Viewer::section_range() const {

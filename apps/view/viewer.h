@@ -83,7 +83,7 @@ class Viewer {
   [[nodiscard]] const Looks& looks() const { return looks_; }
   void set_looks(Looks looks);
   void set_hidden(std::uint32_t solid, bool hidden);
-  void set_section(std::optional<apps::SectionPlane> plane);
+  void set_section(std::optional<csg::SectionPlane> plane);
   void flip_section();
   void toggle_section();
   /// The least and largest offset at which the section cuts anything.
@@ -143,7 +143,7 @@ class Viewer {
   csg::PictureOptions picture_;
   Heat heat_ = Heat::kOff;
   Looks looks_;
-  std::optional<apps::SectionPlane> last_section_;
+  std::optional<csg::SectionPlane> last_section_;
   std::shared_ptr<const Model> model_;
   std::shared_ptr<const Arrangement> arrangement_;
   glm::ivec2 viewport_{0};

@@ -30,7 +30,7 @@ void toggle_heat(Viewer& viewer, Heat heat) {
 void section_across(Viewer& viewer, int axis) {
   const Model* model = viewer.model();
   if (model == nullptr || model->box.empty()) return;
-  apps::SectionPlane plane;
+  csg::SectionPlane plane;
   plane.normal[axis] = 1.0;
   plane.offset = (model->box.low[axis] + model->box.high[axis]) * 0.5;
   plane.towards_eye = true;
@@ -205,7 +205,7 @@ void Viewer::mouse_move(const glm::dvec2& at) {
       return zoom_by(-by.y / 10.0, pressed_at_);
     case Drag::kSection: {
       if (!looks_.section || !model_) return;
-      apps::SectionPlane& plane = *looks_.section;
+      csg::SectionPlane& plane = *looks_.section;
       const glm::dvec3 centre = (model_->box.low + model_->box.high) * 0.5;
       const glm::dvec3 foot =
           centre + plane.normal * (plane.offset - glm::dot(plane.normal, centre));

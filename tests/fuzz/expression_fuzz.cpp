@@ -4,15 +4,15 @@
 #include <string_view>
 #include <vector>
 
-#include "apps/strata/expression.h"
+#include "csg/input/expression.h"
 #include "tests/fuzz/mesh_fuzzing.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using strata::must;
-  using strata::apps::Expression;
+  using strata::csg::Expression;
   const std::vector<std::string> files{"x/plate.stl", "hole.obj", "plate.csg", "my part.ply"};
   const std::string_view text(reinterpret_cast<const char*>(data), size);
-  const auto expression = strata::apps::parse_expression(text, files);
+  const auto expression = strata::csg::parse_expression(text, files);
   if (!expression) {
     must(expression.error().code == strata::ErrorCode::kUsage, "a refusal is kUsage");
     must(!expression.error().message.empty(), "a refusal says why");

@@ -369,7 +369,7 @@ void Panels::messages(Viewer& viewer, const Area& area) {
   if (lines.size() > kMostLines) {
     const std::size_t more = lines.size() - (kMostLines - 1);
     lines.resize(kMostLines - 1);
-    lines.push_back(fmt::format("and {} more", apps::counted(more, "warning")));
+    lines.push_back(fmt::format("and {} more", counted(more, "warning")));
   }
   const float wrap = std::max(80 * scale_, width - 48 * scale_);
   if (wrong || (viewer.show_panels && !lines.empty())) {

@@ -8,9 +8,9 @@
 #include <fstream>
 #include <thread>
 
-#include "apps/strata/scene_files.h"
 #include "apps/view/file_watch.h"
 #include "apps/view/loader.h"
+#include "apps/view/scene_files.h"
 #include "csg/measure/ray_image.h"
 #include "strata/csg/measure/measure.h"
 #include "tests/support/temporary_folder.h"
@@ -90,9 +90,9 @@ TEST(Arrange, ASectionCutsTheResultAndTheGhosts) {
   const Model model = model_of(csg_of());
   Looks looks;
   looks.hidden = {0, 1, 1, 1};
-  looks.section = apps::SectionPlane{{0, 0, 1}, 0.5, false};
+  looks.section = csg::SectionPlane{{0, 0, 1}, 0.5, false};
   EXPECT_NEAR(volume_of(*arrange(model, looks)), 50, 0.5);
-  looks.section = apps::SectionPlane{{0, 0, -1}, -0.5, false};
+  looks.section = csg::SectionPlane{{0, 0, -1}, -0.5, false};
   EXPECT_NEAR(volume_of(*arrange(model, looks)), 150, 0.5);
 }
 
@@ -109,12 +109,12 @@ TEST(Arrange, ColoursReplaceTheScenes) {
 TEST(Section, TowardsTheEyeIsDecidedOnce) {
   csg::Camera camera;
   camera.rotation = {90, 0, 0};  // the eye is at -y
-  const auto plane = face({{0, 1, 0}, 4, true}, camera);
+  const auto plane = csg::facing({{0, 1, 0}, 4, true}, camera);
   EXPECT_EQ(plane.normal, glm::dvec3(0, -1, 0));
   EXPECT_EQ(plane.offset, -4);
   EXPECT_FALSE(plane.towards_eye);
   camera.rotation = {90, 0, 180};
-  EXPECT_EQ(face({{0, 1, 0}, 4, true}, camera).normal, glm::dvec3(0, 1, 0));
+  EXPECT_EQ(csg::facing({{0, 1, 0}, 4, true}, camera).normal, glm::dvec3(0, 1, 0));
 }
 
 TEST(FindSolids, ByIndexNameAndPartOfIt) {
@@ -235,16 +235,15 @@ class Files : public testing::Test {
 };
 
 TEST(QuotedNames, AreWhatASceneMayRead) {
-  EXPECT_EQ(
-      apps::quoted_names("use <lib.scad>\nimport(file = \"part.stl\"); echo(\"hello\"); a < b; "
+  EXPECT_EQ(quoted_names("use <lib.scad>\nimport(file = \"part.stl\"); echo(\"hello\"); a < b; "
                          "text(\"x.y\nz\")"),
-      (std::vector<std::string>{"lib.scad", "part.stl"}));
-  EXPECT_EQ(apps::quoted_names("include < my lib.scad>\nif (a<b.c>d) use<x.y>;"),
+            (std::vector<std::string>{"lib.scad", "part.stl"}));
+  EXPECT_EQ(quoted_names("include < my lib.scad>\nif (a<b.c>d) use<x.y>;"),
             (std::vector<std::string>{" my lib.scad", "x.y"}));
-  EXPECT_EQ(apps::quoted_names("// 5\" tube\ntext(\"5\\\" x\"); surface(\"a\\\\b.png\");"),
+  EXPECT_EQ(quoted_names("// 5\" tube\ntext(\"5\\\" x\"); surface(\"a\\\\b.png\");"),
             (std::vector<std::string>{"a\\b.png"}));
-  EXPECT_TRUE(apps::quoted_names("\"").empty());
-  EXPECT_TRUE(apps::quoted_names("").empty());
+  EXPECT_TRUE(quoted_names("\"").empty());
+  EXPECT_TRUE(quoted_names("").empty());
 }
 
 TEST_F(Files, AChangeIsSeenOnceItIsWhole) {

@@ -331,7 +331,7 @@ TEST(CpuRenderer, HeatMapsCountTheScenesSolidsAloneAndWhereTheSectionLeavesThem)
   Model model;
   model.scene.tree = ball_and_box();
   Looks looks;
-  looks.section = apps::SectionPlane{{1, 0, 0}, 0, false};
+  looks.section = csg::SectionPlane{{1, 0, 0}, 0, false};
   looks.ghosts = true;
   FrameRequest request;
   request.what = arrange(model, looks);
@@ -357,7 +357,7 @@ TEST(CpuRenderer, HeatMapsCountTheScenesSolidsAloneAndWhereTheSectionLeavesThem)
     EXPECT_EQ(at(empty, 32), at(0, 0));  // cut away: the background
   }
   // Across the rays: what lies above the plane is cut away.
-  looks.section = apps::SectionPlane{{0, 0, 1}, 3, false};
+  looks.section = csg::SectionPlane{{0, 0, 1}, 3, false};
   request.what = arrange(model, looks);
   const auto frame = renderer->draw(request, {});
   ASSERT_TRUE(frame);

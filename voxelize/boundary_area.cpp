@@ -1,9 +1,9 @@
-#include "apps/strata/boundary_area.h"
+#include "strata/voxelize/boundary_area.h"
 
 #include <algorithm>
 #include <span>
 
-namespace strata::apps {
+namespace strata {
 namespace {
 
 using Column = std::span<const Interval>;
@@ -88,4 +88,4 @@ double BoundaryArea::estimate() const {
           static_cast<double>(faces_[2]) * s.x * s.y);
 }
 
-}  // namespace strata::apps
+}  // namespace strata

@@ -1,4 +1,4 @@
-#include "apps/strata/scene_files.h"
+#include "apps/view/scene_files.h"
 
 #include <filesystem>
 #include <fstream>
@@ -6,10 +6,10 @@
 #include <set>
 #include <utility>
 
-#include "apps/strata/csg_scene.h"
+#include "strata/csg/input/scene_input.h"
 #include "strata/csg/scene/scene.h"
 
-namespace strata::apps {
+namespace strata::view {
 namespace {
 
 /// Of a scene no more is read in search of names.
@@ -63,7 +63,7 @@ std::vector<std::string> with_scene_files(std::vector<std::string> files,
   const std::size_t given = files.size();
   std::set<std::string> known(files.begin(), files.end());
   for (std::size_t i = 0; i < files.size() && files.size() < kMaxFiles; ++i) {
-    if (!is_scene_name(files[i]) && !(all_scenes && i < given)) continue;
+    if (!csg::is_scene_name(files[i]) && !(all_scenes && i < given)) continue;
     std::vector<std::string> folders{std::filesystem::path(files[i]).parent_path().string()};
     if (!asset_folder.empty()) folders.push_back(asset_folder);
     for (const std::string& name : quoted_names(text_of(files[i]))) {
@@ -76,4 +76,4 @@ std::vector<std::string> with_scene_files(std::vector<std::string> files,
   return files;
 }
 
-}  // namespace strata::apps
+}  // namespace strata::view

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-namespace strata::apps {
+namespace strata::view {
 
 /// Names in quotes or after include and use in a scene's text: `"part.stl"`, `<lib.scad>`.
 [[nodiscard]] std::vector<std::string> quoted_names(std::string_view text);
@@ -20,4 +20,4 @@ namespace strata::apps {
                                                         const std::string& asset_folder,
                                                         bool all_scenes = false);
 
-}  // namespace strata::apps
+}  // namespace strata::view

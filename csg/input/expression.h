@@ -7,7 +7,7 @@
 
 #include "strata/core/result.h"
 
-namespace strata::apps {
+namespace strata::csg {
 
 /// A Boolean expression over files: names, operators, parentheses.
 ///
@@ -33,4 +33,4 @@ inline constexpr int kMaxExpressionDepth = 1000;
 /// @return kUsage with the place marked
 Result<Expression> parse_expression(std::string_view text, const std::vector<std::string>& files);
 
-}  // namespace strata::apps
+}  // namespace strata::csg

@@ -7,7 +7,7 @@
 #include "strata/core/grid.h"
 #include "strata/voxelize/intervals.h"
 
-namespace strata::apps {
+namespace strata {
 
 /// Counts the faces between the voxels of a set and the rest, slab by slab.
 class BoundaryArea {
@@ -34,4 +34,4 @@ class BoundaryArea {
   std::vector<Interval> last_items_;
 };
 
-}  // namespace strata::apps
+}  // namespace strata

@@ -1,10 +1,10 @@
-#include "apps/strata/expression.h"
+#include "csg/input/expression.h"
 
 #include <algorithm>
 #include <filesystem>
 #include <optional>
 
-namespace strata::apps {
+namespace strata::csg {
 namespace {
 
 bool is_name_character(char c) {
@@ -159,4 +159,4 @@ Result<Expression> parse_expression(std::string_view text, const std::vector<std
   return Parser(text, files).run();
 }
 
-}  // namespace strata::apps
+}  // namespace strata::csg

@@ -1,36 +1,24 @@
-#include "apps/strata/gpu.h"
+#include "strata/csg/gl/gpu.h"
 
-#include "apps/session/session.h"
-
-#ifdef STRATA_HAVE_GL
 #include <algorithm>
 #include <filesystem>
 #include <system_error>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "hashbuffer/gl/hash_store.h"
 #include "hashbuffer/gl/scan_store.h"
 #include "strata/csg/gl/gl_surfaces.h"
 #include "strata/csg/gl/result_lists.h"
+#include "strata/csg/picture/picture.h"
 #include "strata/csg/solid_lists.h"
 #include "strata/gl/context.h"
 #include "strata/hashbuffer/build_ldi.h"
 #include "strata/mesh/shapes.h"
 #include "strata/raster/lattice_mesh.h"
-#endif
 
-namespace strata::apps {
-
-#ifndef STRATA_HAVE_GL
-
-Result<std::unique_ptr<Gpu>> Gpu::open(Backend backend, Session&) {
-  if (backend != Backend::kGl) return nullptr;
-  return fail(ErrorCode::kUsage,
-              "--backend gl: this strata was built without OpenGL (STRATA_WITH_GL, libepoxy-dev)");
-}
-
-#else
-
+namespace strata::csg {
 namespace {
 
 /// Whether this machine may have a GPU. Loading a driver to find out takes longer than many a job.
@@ -55,18 +43,18 @@ TriangleSoup example() {
 }
 
 /// A tree of three solids.
-csg::Tree example_tree() {
-  csg::Tree tree;
+Tree example_tree() {
+  Tree tree;
   const auto add = [&tree](TriangleSoup mesh) {
-    csg::Solid solid;
+    Solid solid;
     solid.mesh = std::make_shared<TriangleSoup>(std::move(mesh));
     return tree.add_solid(std::move(solid));
   };
   const auto box = add(make_box({-1, -1, -1}, {1, 1, 1}));
   const auto ball = add(make_icosphere(1.3, 2));
   const auto hole = add(make_cylinder(0.4, 3, 12));
-  const auto both = tree.add(csg::Operation::kIntersection, {box, ball});
-  tree.set_root(tree.add(csg::Operation::kDifference, {both, hole}));
+  const auto both = tree.add(Operation::kIntersection, {box, ball});
+  tree.set_root(tree.add(Operation::kDifference, {both, hole}));
   return tree;
 }
 
@@ -91,19 +79,19 @@ Result<void> try_lists(ListSource& source, const TriangleSoup& soup, const glm::
 
 Result<void> try_lists(ListSource& source) {
   if (auto tried = try_lists(source, example(), {3.6, 3.6, 1.6}, nullptr); !tried) return tried;
-  const csg::Tree tree = example_tree();
-  const csg::SolidLists lists(tree, tree.root());
+  const Tree tree = example_tree();
+  const SolidLists lists(tree, tree.root());
   return try_lists(source, lists.soup(), {1.2, 1.1, 1.6}, &lists.filter());
 }
 
 /// The same for the surfaces of a small tree.
-Result<void> try_surfaces(csg::SurfaceSource& source) {
-  const csg::Tree tree = example_tree();
-  csg::Preview own(tree, {}, 1e-6), other(tree, {}, 1e-6);
+Result<void> try_surfaces(SurfaceSource& source) {
+  const Tree tree = example_tree();
+  Preview own(tree, {}, 1e-6), other(tree, {}, 1e-6);
   other.set_source(&source);
-  csg::Camera camera;
-  csg::centre_camera(camera, own.box());
-  csg::fit_camera(camera, own.box());
+  Camera camera;
+  centre_camera(camera, own.box());
+  fit_camera(camera, own.box());
   const auto expected = own.picture(camera, {48, 40});
   const auto found = other.picture(camera, {48, 40});
   if (!expected) return tl::unexpected(expected.error());
@@ -114,102 +102,103 @@ Result<void> try_surfaces(csg::SurfaceSource& source) {
 
 class GlGpu final : public Gpu {
  public:
-  GlGpu(std::unique_ptr<gl::Context> context, Backend backend, Session& session)
-      : context_(std::move(context)), backend_(backend), session_(&session) {}
+  GlGpu(std::unique_ptr<gl::Context> context, GpuRequest request)
+      : context_(std::move(context)), request_(std::move(request)) {}
 
-  Result<ListSource*> lists(StoreKind store) override {
-    auto source = make_lists(store);
+  Result<ListSource*> lists(StoreKind store, const Execution& execution) override {
+    auto source = make_lists(store, execution);
     if (source) {
       if (auto tried = try_lists(**source); !tried) source = tl::unexpected(tried.error());
     }
     if (!source) return refused<ListSource*>(source.error());
     lists_ = *std::move(source);
-    if (backend_ == Backend::kGl) return lists_.get();
-    fallback_ = std::make_unique<ListSourceOrCpu>(
-        *lists_, session_->execution("depth lists"), [this](const Error& error) {
-          session_->warn("backend",
-                         fmt::format("the GPU failed and the CPU continues: {}", error.message));
-        });
+    if (is_required()) return lists_.get();
+    fallback_ = std::make_unique<ListSourceOrCpu>(*lists_, execution, [this](const Error& error) {
+      warn(fmt::format("the GPU failed and the CPU continues: {}", error.message));
+    });
     return fallback_.get();
   }
 
-  Result<csg::SurfaceSource*> surfaces() override {
+  Result<SurfaceSource*> surfaces() override {
     auto source = make_surfaces();
     if (source) {
       if (auto tried = try_surfaces(**source); !tried) source = tl::unexpected(tried.error());
     }
-    if (!source) return refused<csg::SurfaceSource*>(source.error());
+    if (!source) return refused<SurfaceSource*>(source.error());
     surfaces_ = *std::move(source);
     return surfaces_.get();
   }
 
  private:
-  Result<std::unique_ptr<csg::GlResultSource>> make_lists(StoreKind kind) {
+  [[nodiscard]] bool is_required() const { return !request_.required_by.empty(); }
+  Result<std::unique_ptr<GlResultSource>> make_lists(StoreKind kind, const Execution& execution) {
+    const std::int64_t pixels = pixels_at_once(execution.memory_limit);
     auto scan = gl::ScanStore::create(context_->info());
     if (!scan) return tl::unexpected(scan.error());
     if (kind != StoreKind::kHaBuffer) {
-      return csg::GlResultSource::create(*context_, *std::move(scan), nullptr, pixels_at_once(),
-                                         session_->execution("depth lists"));
+      return GlResultSource::create(*context_, *std::move(scan), nullptr, pixels, execution);
     }
     auto hash = gl::HashStore::create(context_->info());
     if (!hash) return tl::unexpected(hash.error());
-    return csg::GlResultSource::create(*context_, *std::move(hash), *std::move(scan),
-                                       pixels_at_once(), session_->execution("depth lists"));
+    return GlResultSource::create(*context_, *std::move(hash), *std::move(scan), pixels, execution);
   }
   /// Lists of about 16 crossings, and their copies, within a quarter of the memory limit.
-  [[nodiscard]] std::int64_t pixels_at_once() const {
+  static std::int64_t pixels_at_once(std::uint64_t memory_limit) {
     constexpr std::uint64_t kMost = std::uint64_t{1} << 22, kBytesAPixel = 300;
-    if (session_->memory_limit() == 0) return kMost;
-    return static_cast<std::int64_t>(std::min(kMost, session_->memory_limit() / 4 / kBytesAPixel));
+    if (memory_limit == 0) return kMost;
+    return static_cast<std::int64_t>(std::min(kMost, memory_limit / 4 / kBytesAPixel));
   }
-  Result<std::unique_ptr<csg::GlSurfaceSource>> make_surfaces() {
+  Result<std::unique_ptr<GlSurfaceSource>> make_surfaces() {
     auto scan = gl::ScanStore::create(context_->info());
     if (!scan) return tl::unexpected(scan.error());
-    return csg::GlSurfaceSource::create(*context_, *std::move(scan));
+    return GlSurfaceSource::create(*context_, *std::move(scan));
   }
   /// What is said, and what the CPU then does, where this driver cannot.
   template <class Source>
   Result<Source> refused(const Error& error) {
     if (error.code == ErrorCode::kCancelled) return tl::unexpected(error);
     const std::string why = fmt::format("{}: {}", context_->info().renderer, error.message);
-    if (backend_ == Backend::kGl) return fail(ErrorCode::kUsage, "--backend gl: {}", why);
-    session_->warn("backend", fmt::format("the CPU does the work, since the GPU cannot: {}", why));
+    if (is_required()) return fail(ErrorCode::kUsage, "{}: {}", request_.required_by, why);
+    warn(fmt::format("the CPU does the work, since the GPU cannot: {}", why));
     return Source{nullptr};
+  }
+  void warn(std::string text) const {
+    if (request_.warn) request_.warn(std::move(text));
   }
 
   std::unique_ptr<gl::Context> context_;  // goes last
-  Backend backend_;
-  Session* session_;
-  std::unique_ptr<csg::GlResultSource> lists_;
+  GpuRequest request_;
+  std::unique_ptr<GlResultSource> lists_;
   std::unique_ptr<ListSourceOrCpu> fallback_;
-  std::unique_ptr<csg::GlSurfaceSource> surfaces_;
+  std::unique_ptr<GlSurfaceSource> surfaces_;
 };
 
 }  // namespace
 
-Result<std::unique_ptr<Gpu>> Gpu::open(Backend backend, Session& session) {
-  if (backend == Backend::kCpu) return nullptr;
-  if (backend == Backend::kAuto && !has_gpu_device()) {
-    session.note("no GPU: the CPU does the work");
+Result<std::unique_ptr<Gpu>> Gpu::open(GpuRequest request) {
+  const bool required = !request.required_by.empty();
+  const auto note = [&request](std::string text) {
+    if (request.note) request.note(std::move(text));
+  };
+  if (!required && !has_gpu_device()) {
+    note("no GPU: the CPU does the work");
     return nullptr;
   }
   auto context = gl::Context::headless();
   if (!context) {
-    if (backend == Backend::kGl) {
-      return fail(ErrorCode::kUsage, "--backend gl: {}", context.error().message);
+    if (required) {
+      return fail(ErrorCode::kUsage, "{}: {}", request.required_by, context.error().message);
     }
-    session.note(fmt::format("the CPU does the work: {}", context.error().message));
+    note(fmt::format("the CPU does the work: {}", context.error().message));
     return nullptr;
   }
   const gl::Info& info = (*context)->info();
-  if (backend == Backend::kAuto && info.is_software) {
-    session.note(fmt::format("{} is not a GPU: the CPU does the work", info.renderer));
+  if (!required && info.is_software) {
+    note(fmt::format("{} is not a GPU: the CPU does the work", info.renderer));
     return nullptr;
   }
-  session.note(fmt::format("{}, OpenGL {}", info.renderer, info.version));
-  return std::make_unique<GlGpu>(*std::move(context), backend, session);
+  note(fmt::format("{}, OpenGL {}", info.renderer, info.version));
+  return std::make_unique<GlGpu>(*std::move(context), std::move(request));
 }
 
-#endif
-
-}  // namespace strata::apps
+}  // namespace strata::csg

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <memory>
+
+#include "apps/session/session.h"
+#include "apps/strata/commands.h"
+#include "strata/core/result.h"
+#include "strata/csg/gl/gpu.h"
+#include "strata/csg/input/mesh_input.h"
+
+// What the library tells while it works, told to a session.
+
+namespace strata::apps {
+
+/// Of inputs that are read. The session must outlive it.
+[[nodiscard]] csg::InputMessages messages_of(Session& session);
+
+/// The GPU of --backend. Null where the CPU is to do the work: --backend cpu, or auto without a
+/// hardware GPU. The session must outlive it. @return kUsage under --backend gl, with a sentence,
+/// where no context can be had, or this build is without OpenGL
+Result<std::unique_ptr<csg::Gpu>> open_gpu(Backend backend, Session& session);
+
+}  // namespace strata::apps

@@ -1,0 +1,139 @@
+#include "strata/csg/input/solid_input.h"
+
+#include <algorithm>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "core/printable.h"
+#include "csg/input/input_parts.h"
+#include "strata/csg/input/scene_input.h"
+#include "strata/mesh/soup_tools.h"
+#include "strata/raster/lattice_mesh.h"
+
+namespace strata::csg {
+namespace {
+
+Solid solid_of(TriangleSoup soup, InsideRule rule, const std::string& name) {
+  Solid solid;
+  solid.mesh = std::make_shared<const TriangleSoup>(std::move(soup));
+  solid.rule = rule;
+  solid.name = name;
+  return solid;
+}
+
+void set_union(SolidInput& all, std::vector<Solid> solids) {
+  Tree tree;
+  std::vector<Tree::NodeId> nodes;
+  for (Solid& solid : solids) nodes.push_back(tree.add_solid(std::move(solid)));
+  tree.set_root(tree.add(Operation::kUnion, nodes));
+  all.set_tree(std::move(tree));
+}
+
+/// Appends a mesh to the one soup of those that share a rule.
+Result<void> append_mesh(TriangleSoup& all, TriangleSoup soup, const std::string& path) {
+  if (all.triangles.empty()) {
+    all = std::move(soup);
+    return {};
+  }
+  if (all.positions.size() + soup.positions.size() > 0xfffffffeu) {
+    return fail(ErrorCode::kLimit, "{}: the inputs up to this one have more than 2^32 - 2 vertices",
+                path);
+  }
+  append(all, soup);
+  return {};
+}
+
+/// Meshes as one soup, or as a tree where they have several rules or are to stay apart.
+Result<SolidInput> load_meshes(const SceneInput& input, bool as_tree, const InputMessages& messages,
+                               const Execution& execution) {
+  SolidInput all;
+  if (!as_tree) all.rule = input.rule;  // solids of a tree have their own
+  std::vector<Solid> apart;             // those with a rule of their own, or all
+  for (std::size_t i = 0; i < input.files.size(); ++i) {
+    const std::string& path = input.files[i];
+    const detail::Stopwatch watch;
+    TriangleSoup soup;
+    double read_ms = 0;
+    auto facts = load_mesh(path, kind_of(path, input), input, messages,
+                           detail::part_of(execution, i, input.files.size()), soup, &read_ms);
+    if (!facts) return tl::unexpected(facts.error());
+    all.read_ms += read_ms;
+    const InsideRule rule = facts->rule;
+    all.add(*std::move(facts));
+    if (as_tree) {
+      apart.push_back(solid_of(std::move(soup), rule, path));
+    } else if (input.files.size() == 1) {
+      all.soup = std::move(soup);
+      all.rule = rule;
+    } else if (rule != input.rule) {
+      apart.push_back(solid_of(std::move(soup), rule, path));
+    } else if (auto added = append_mesh(all.soup, std::move(soup), path); !added) {
+      return tl::unexpected(added.error());
+    }
+    all.diagnose_ms += watch.milliseconds() - read_ms;
+  }
+  if (apart.empty() && !as_tree) return all;
+  if (!all.soup.triangles.empty()) {
+    apart.push_back(solid_of(std::move(all.soup), input.rule, input.files.front()));
+  }
+  set_union(all, std::move(apart));
+  return all;
+}
+
+}  // namespace
+
+void SolidInput::add(InputFacts facts) {
+  closed = closed && facts.closed;
+  area += facts.area;
+  volume += facts.volume;
+  longest_edge = std::max(longest_edge, facts.longest_edge);
+  bounds.include(facts.bounds);
+  files.push_back(std::move(facts));
+}
+
+void SolidInput::set_tree(Tree made) {
+  tree = std::make_shared<SolidLists>(made, made.root());
+  soup = tree->take_soup();
+  // The soup has all triangles that are needed from here on.
+  for (Solid& solid : made.solids()) solid.mesh.reset();
+  scene = std::make_shared<Tree>(std::move(made));
+}
+
+Result<void> SolidInput::fit(const VoxelGrid& grid, const Execution& execution) {
+  if (tree) return tree->fit(grid, &soup, execution);
+  const auto done = fit_lattice(soup, bounds, grid, execution);
+  if (!done) return tl::unexpected(done.error());
+  return {};
+}
+
+bool SolidInput::has_scene() const {
+  return std::any_of(files.begin(), files.end(), [](const auto& file) { return file.is_scene; });
+}
+
+Result<SolidInput> load_solids(const SceneInput& input, bool as_tree, const InputMessages& messages,
+                               const Execution& execution) {
+  if (input.format == MeshFormat::kAuto && reads_standard_input(input)) {
+    return fail(ErrorCode::kUsage, "standard input needs --input-format: obj, stl, ply or off");
+  }
+  if (std::none_of(input.files.begin(), input.files.end(), is_scene_name)) {
+    return load_meshes(input, as_tree, messages, execution);
+  }
+  const detail::Stopwatch watch;
+  SolidInput all;
+  auto scene = load_scene(input, messages, execution, &all.files);
+  if (!scene) return tl::unexpected(scene.error());
+  all.bounds = strata::csg::bounds(scene->tree, scene->tree.root());
+  if (all.bounds.empty()) {
+    return fail(ErrorCode::kGeometry, "{}: the scene is empty", input.files.front());
+  }
+  all.set_tree(std::move(scene->tree));
+  for (const InputFacts& facts : all.files) all.closed = all.closed && facts.closed;
+  all.read_ms = watch.milliseconds();
+  detail::note(messages, fmt::format("{}: {}, {}", input.files.front(),
+                                     counted(all.scene->solids().size(), "solid"),
+                                     counted(all.soup.triangles.size(), "triangle")));
+  return all;
+}
+
+}  // namespace strata::csg

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <glm/vec3.hpp>
+#include <span>
+
+#include "strata/csg/scene/scene.h"
+#include "strata/csg/view.h"
+
+namespace strata::csg {
+
+/// A section: points p with dot(normal, p) > offset are cut away.
+struct SectionPlane {
+  glm::dvec3 normal{0.0};  ///< of length 1
+  double offset = 0;
+  bool towards_eye = false;  ///< turned so that the side the eye is on is cut away
+};
+
+/// The plane as it cuts for a camera: one that is towards_eye is turned, and stays as it is then.
+[[nodiscard]] SectionPlane facing(SectionPlane plane, const Camera& camera);
+
+/// Takes the sections away from the scene and its ghosts.
+void cut_scene(Scene& scene, std::span<const SectionPlane> cuts, const Camera& camera);
+
+}  // namespace strata::csg

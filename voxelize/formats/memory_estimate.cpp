@@ -1,0 +1,113 @@
+#include "strata/voxelize/formats/memory_estimate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "strata/raster/raster_target.h"
+
+namespace strata {
+namespace {
+
+double columns(const VoxelGrid& grid, Axis axis) {
+  const AxisFrame frame(axis);
+  return static_cast<double>(grid.dims[frame.u]) * static_cast<double>(grid.dims[frame.v]);
+}
+
+std::uint64_t rounded(double bytes) {
+  return bytes < 1e19 ? static_cast<std::uint64_t>(bytes)
+                      : std::uint64_t{10'000'000'000'000'000'000u};
+}
+
+/// Of all solids of a tree, those that are taken away included. In squares of side `unit`.
+double area_of(const TriangleSoup& soup, double unit) {
+  double twice = 0;
+  for (const glm::uvec3& t : soup.triangles) {
+    const glm::dvec3& a = soup.positions[t.x];
+    twice +=
+        glm::length(glm::cross((soup.positions[t.y] - a) / unit, (soup.positions[t.z] - a) / unit));
+  }
+  return twice / 2;
+}
+
+/// Area in voxel faces.
+double faces_of(const MemoryFactors& factors, const VoxelGrid& grid) {
+  const glm::dvec3 s = grid.voxel_size;
+  const double face = std::cbrt(s.x) * std::cbrt(s.y) * std::cbrt(s.z);  // the product may be 0
+  return factors.is_tree ? area_of(*factors.mesh, face) : factors.area / (face * face);
+}
+
+/// The triangles of each tile, and what a vote on an open mesh holds.
+double bin_bytes(const VoxelGrid& grid, const MemoryFactors& factors, double area) {
+  const auto triangles = static_cast<double>(factors.mesh->triangles.size());
+  // A triangle of side d voxels meets about (1 + d / 64)^2 tiles.
+  const double side = triangles > 0 ? std::sqrt(2 * area / triangles) : 0;
+  const double tiles = columns(grid, factors.axis) / kTilePixels + 1;
+  const double across = 1 + side / kTileSide;
+  const double references = triangles * std::min(across * across, tiles);
+  double open = 0;
+  if (factors.votes) {
+    // The closed mesh beside the open one, its pieces, and the caps with their tree.
+    open = static_cast<double>(factors.mesh->positions.size()) * (12 + 36) + triangles * 12 +
+           static_cast<double>(factors.open_edges) * 400;
+  }
+  return open + triangles * 8 + references * 4 + tiles * (4.0 + 8.0 * factors.threads);
+}
+
+/// Offsets and two intervals a column, with their copies; slabs keep to an eighth of the limit, but
+/// hold 64 rows at least (see voxelize_slabs).
+double slab_bytes(const VoxelGrid& grid, const MemoryFactors& factors) {
+  constexpr double kColumnBytes = 16, kDefaultSlab = 512.0 * 1024 * 1024;
+  const AxisFrame frame(factors.axis);
+  const double least = 64.0 * std::max(factors.samples, 1) * grid.dims[frame.u] * kColumnBytes;
+  const double budget = factors.limit > 0
+                            ? std::min(kDefaultSlab, static_cast<double>(factors.limit) / 8)
+                            : kDefaultSlab;
+  double slab = std::min(columns(grid, factors.axis) * kColumnBytes, std::max(least, budget));
+  if (factors.surface && factors.solid) slab *= 2;
+  constexpr double kWorkerBytes = 6e6;
+  return slab + kWorkerBytes * factors.threads;
+}
+
+double output_bytes(const VoxelGrid& voxels, const VoxelGrid& grid, const MemoryFactors& factors,
+                    double area) {
+  if (factors.format.empty()) return 0;
+  if (factors.format == "vdb") {
+    // A surface of area A meets about 1.5 A / 64 leaves, of 64 bytes and their share of nodes; ids
+    // are a zlib stream a leaf, which takes about as much, fractions about four times that.
+    const double leaf = factors.ids ? 144 : factors.fog ? 600 : 72;
+    const double there = std::ceil(voxels.dims.x / 8.0) * std::ceil(voxels.dims.y / 8.0) *
+                         std::ceil(voxels.dims.z / 8.0);
+    const int fine = std::max(factors.samples, 1);
+    return std::min(area / (fine * fine) * 1.5 / 64, there) * leaf;
+  }
+  if (factors.format == "binvox") {
+    const double longest = std::max({grid.dims.x, grid.dims.y, grid.dims.z});
+    return columns(grid, factors.axis) * 8 + longest * longest / 127 * factors.threads;
+  }
+  // Formats written piece by piece: a few layers of packed or compressed voxels.
+  return 16e6 + columns(grid, factors.axis);
+}
+
+}  // namespace
+
+MemoryEstimate estimate_memory(const VoxelGrid& voxels, const MemoryFactors& factors) {
+  const int fine = std::max(factors.samples, 1);
+  VoxelGrid grid = voxels;  // that is walked: of the samples
+  grid.dims *= fine;
+  grid.voxel_size /= fine;
+  // Of a tree also whose each triangle is.
+  const auto triangles = static_cast<double>(factors.mesh->triangles.size());
+  const double owners = factors.is_tree ? triangles * 4 : 0.0;
+  const double area = faces_of(factors, grid);
+  MemoryEstimate estimate;
+  estimate.mesh =
+      rounded(static_cast<double>(factors.mesh->positions.size()) * (24 + 12) + triangles * 12 +
+              static_cast<double>(factors.mesh->face_elements.size()) * 4 + owners);
+  estimate.bins = rounded(bin_bytes(grid, factors, area));
+  estimate.slabs = rounded(slab_bytes(grid, factors));
+  estimate.output = rounded(output_bytes(voxels, grid, factors, area));
+  return estimate;
+}
+
+}  // namespace strata
