@@ -113,7 +113,7 @@ Result<void> check_tree(const Tree& tree, Tree::NodeId root) {
     for (const Tree::NodeId operand : tree.operands(id)) {
       if (operand >= id) {
         return fail(ErrorCode::kUsage,
-                    "node {} takes node {}; operands must be added before the node that takes them",
+                    "node {} uses node {}; operands must be added before the node that uses them",
                     id, operand);
       }
       if (parents[operand] != Tree::kNone) {

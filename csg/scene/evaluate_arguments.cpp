@@ -41,10 +41,11 @@ void Evaluator::read_new_size(std::uint32_t node, std::span<double> sizes) {
     if (axis < sizes.size()) sizes[axis++] = std::isfinite(size) ? std::max(size, 0.0) : 0.0;
   }
   if (!all) {
-    warn(node, "geometry",
-         fmt::format(
-             "'{}': newsize is {}, not finite numbers; sizes that are not finite numbers are kept",
-             name(node), value.shown()));
+    warn(
+        node, "geometry",
+        fmt::format(
+            "'{}': newsize is {}, not finite numbers; axes without a finite number keep their size",
+            name(node), value.shown()));
   }
 }
 

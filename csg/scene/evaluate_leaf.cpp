@@ -150,10 +150,11 @@ void Evaluator::polyhedron(std::uint32_t node, const Context& context) {
   BentFaces bent;
   TriangleSoup mesh = make_faces(std::move(points), faces, &bent);
   if (bent.count > 0) {
-    warn(node, "non-planar",
-         fmt::format("face {} of the polyhedron is not flat: {} ({} such); it can be divided into "
-                     "triangles in several ways",
-                     bent.first, bent.bend.text(), bent.count));
+    warn(
+        node, "non-planar",
+        fmt::format("face {} of the polyhedron is not flat: {} ({} in all); it can be divided into "
+                    "triangles in several ways",
+                    bent.first, bent.bend.text(), bent.count));
   }
   if (mesh.triangles.empty()) return;
   const InsideRule rule = inspect(node, mesh);

@@ -301,7 +301,7 @@ Result<MeshFile> finish_mesh(const ReaderInput& input, RawMesh&& raw, const Loca
   stats.non_planar = bent.count;
   if (bent.count != 0) {
     stats.warnings.push_back(fmt::format(
-        "{}: polygon is not flat: {} ({} such); it can be divided into triangles in several ways",
+        "{}: polygon is not flat: {} ({} in all); it can be divided into triangles in several ways",
         locate(static_cast<std::uint32_t>(bent.first)).place, bent.bend.text(), bent.count));
   }
   bool identity = true;

@@ -158,13 +158,13 @@ TEST(Tree, UnknownOperandsAndSecondUsesAreRefused) {
   Tree unknown = box(0, 1);
   unknown.set_root(unknown.add(Operation::kUnion, {0, 7}));
   EXPECT_EQ(refusal_of(unknown),
-            "node 1 takes node 7; operands must be added before the node that takes them");
+            "node 1 uses node 7; operands must be added before the node that uses them");
   Tree none = box(0, 1);
   none.set_root(none.add(Operation::kUnion, {Tree::kNone}));
-  EXPECT_NE(refusal_of(none).find("node 1 takes node 4294967295"), std::string::npos);
+  EXPECT_NE(refusal_of(none).find("node 1 uses node 4294967295"), std::string::npos);
   Tree itself = box(0, 1);
   itself.set_root(itself.add(Operation::kUnion, {1}));
-  EXPECT_NE(refusal_of(itself).find("node 1 takes node 1"), std::string::npos);
+  EXPECT_NE(refusal_of(itself).find("node 1 uses node 1"), std::string::npos);
   Tree twice = box(0, 1);
   const auto pair = twice.add(Operation::kUnion, {0, 0});
   twice.set_root(pair);

@@ -61,7 +61,7 @@ const std::vector<VoxelFormat>& voxel_formats() {
        Axis::kY},
       {"vox", ".vox", "MagicaVoxel: up to 2000 voxels a side; colours of scenes, ids", Axis::kZ,
        kVoxColours, kVoxColours},
-      {"png", "/", "folder of 1-bit PNG slices, one a layer of z, and slices.json; ids", Axis::kX,
+      {"png", "/", "folder of 1-bit PNG slices, one per layer of z, and slices.json; ids", Axis::kX,
        0, 0xffff},
       {"zarr", ".zarr/", "folder: Zarr 2 array, uint8, zlib; world transform; ids", Axis::kZ, 0,
        kAnyId},

@@ -39,9 +39,10 @@ TEST(Resize, KeepsWhereNoSizeIsGiven) {
   const Scene scene = scene_of("resize([nan,4,0]) cube([1,2,3]);");
   expect_box(box_of(scene), {0, 0, 0}, {1, 4, 3});
   ASSERT_EQ(codes_of(scene), "geometry ");
-  EXPECT_EQ(scene.warnings[0].message,
-            "test.csg:1:1: 'resize': newsize is [nan, 4, 0], not finite numbers; sizes that are "
-            "not finite numbers are kept");
+  EXPECT_EQ(
+      scene.warnings[0].message,
+      "test.csg:1:1: 'resize': newsize is [nan, 4, 0], not finite numbers; axes without a finite "
+      "number keep their size");
 }
 
 TEST(Resize, MeasuresWhatIsLeftOfADifference) {

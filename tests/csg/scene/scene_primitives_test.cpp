@@ -207,7 +207,7 @@ TEST(Primitives, FacesThatAreNotFlatAreCutAsInOpenScadWhereverTheyBegin) {
   ASSERT_EQ(codes_of(twisted), "non-planar ");
   EXPECT_NE(twisted.warnings[0].message.find("face 2 of the polyhedron is not flat"),
             std::string::npos);
-  EXPECT_NE(twisted.warnings[0].message.find("(6 such)"), std::string::npos);
+  EXPECT_NE(twisted.warnings[0].message.find("(6 in all)"), std::string::npos);
 }
 
 TEST(Primitives, PolyhedraInsideOutAreTurnedAndOpenOnesReported) {
