@@ -10,7 +10,7 @@ option(STRATA_WITH_OPENVDB "A bridge to OpenVDB; comparisons in tests and benchm
 option(STRATA_WITH_OPENEXR "Read and write deep .exr files" ON)
 option(STRATA_WITH_OPENMESH "Build the OpenMesh bridge" ON)
 option(STRATA_WITH_GL "Build the OpenGL part: libepoxy, EGL; the window: GLFW, Dear ImGui" ON)
-option(STRATA_JOIN_SOURCES "Compile several sources of a library as one: a whole build in half the time" OFF)
+option(STRATA_JOIN_SOURCES "Compile several sources of a target as one: a whole build in half the time" OFF)
 set(STRATA_SANITIZE "" CACHE STRING "Sanitizers, as for -fsanitize=")
 
 if(STRATA_BUILD_TESTS OR STRATA_BUILD_BENCH OR STRATA_BUILD_FUZZ)
@@ -24,6 +24,8 @@ set(CMAKE_CXX_STANDARD_REQUIRED ON)
 set(CMAKE_CXX_EXTENSIONS OFF)
 set(CMAKE_POSITION_INDEPENDENT_CODE ON)
 set(CMAKE_EXPORT_COMPILE_COMMANDS ON)  # for clang-tidy and clangd
+set(CMAKE_UNITY_BUILD ${STRATA_JOIN_SOURCES})
+set(CMAKE_UNITY_BUILD_BATCH_SIZE 16)  # a room is one unit, or two
 set(CMAKE_RUNTIME_OUTPUT_DIRECTORY "${CMAKE_BINARY_DIR}/bin")
 
 find_program(STRATA_CCACHE ccache)

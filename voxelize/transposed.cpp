@@ -8,7 +8,7 @@
 namespace strata {
 namespace {
 
-constexpr int kSide = VoxelIntervals::kTileSide;
+constexpr int kTile = VoxelIntervals::kTileSide;
 constexpr std::size_t kTileColumns = VoxelIntervals::kTileColumns;
 
 std::size_t size(int value) { return static_cast<std::size_t>(value); }
@@ -61,8 +61,8 @@ class Transposer {
 
   void block(int index, const Execution& execution) {
     runs_.clear();
-    const int first = index * kSide;
-    const int last = std::min(first + kSide, set_.grid().dims[fixed_]);
+    const int first = index * kTile;
+    const int last = std::min(first + kTile, set_.grid().dims[fixed_]);
     for (int row = first; row < last; ++row) {
       if (execution.stop.stop_requested()) return;
       sweep(row);
@@ -115,8 +115,8 @@ class Transposer {
   [[nodiscard]] std::uint32_t column_of(int row, int place) const {
     const bool row_is_v = AxisFrame(result_.axis()).v == fixed_;
     const int u = row_is_v ? place : row, v = row_is_v ? row : place;
-    return static_cast<std::uint32_t>(size(place / kSide) * kTileColumns +
-                                      size(v % kSide * kSide + u % kSide));
+    return static_cast<std::uint32_t>(size(place / kTile) * kTileColumns +
+                                      size(v % kTile * kTile + u % kTile));
   }
 
   // Sorts the runs by column; those of a column have come in their order.
@@ -174,7 +174,7 @@ VoxelIntervals transposed(const VoxelIntervals& set, Axis axis, const Execution&
   const bool labelled = set.has_labels();
   const int fixed = 3 - static_cast<int>(axis) - static_cast<int>(set.axis());
   std::vector<std::unique_ptr<Transposer>> workers(size(execution.thread_count()));
-  parallel_for(execution, size((set.grid().dims[fixed] + kSide - 1) / kSide),
+  parallel_for(execution, size((set.grid().dims[fixed] + kTile - 1) / kTile),
                [&](std::size_t index, int worker) {
                  auto& transposer = workers[size(worker)];
                  if (!transposer) transposer = std::make_unique<Transposer>(set, result, labelled);

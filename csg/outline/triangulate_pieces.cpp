@@ -14,7 +14,7 @@ namespace strata::csg {
 namespace {
 
 using Contour = std::vector<glm::dvec2>;
-constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
+constexpr std::size_t kNoOuter = std::numeric_limits<std::size_t>::max();
 
 struct Box {
   glm::dvec2 low{std::numeric_limits<double>::infinity()}, high{-low};
@@ -70,7 +70,7 @@ class Surroundings {
   /// Whether boxes overlap so much that looking at them all would take longer than it saves.
   [[nodiscard]] bool crowded() const { return entries_ > kMostEntries * outers_.size(); }
 
-  /// Into the outers; kNone: nothing is around the hole.
+  /// Into the outers; kNoOuter: nothing is around the hole.
   [[nodiscard]] std::size_t of(const Contour& hole) const {
     const Box box(hole);
     const auto [x, y] = column(box.low);
@@ -79,7 +79,7 @@ class Surroundings {
       if (boxes_[i].holds(box)) around.push_back(i);
     }
     if (around.size() == 1) return around[0];
-    std::size_t best = kNone;
+    std::size_t best = kNoOuter;
     double least = std::numeric_limits<double>::infinity();
     for (const std::size_t i : around) {
       const Contour& outer = outline_.contours[outers_[i]];
@@ -124,7 +124,7 @@ std::optional<std::vector<std::vector<std::size_t>>> find_pieces(const Outline& 
   for (const std::size_t outer : outers) pieces.push_back({outer});
   for (const std::size_t hole : holes) {
     const std::size_t around = surroundings.of(outline.contours[hole]);
-    if (around == kNone) return std::nullopt;
+    if (around == kNoOuter) return std::nullopt;
     pieces[around].push_back(hole);
   }
   return pieces;

@@ -489,7 +489,7 @@ class WallSearch {
     wall.axis = static_cast<Axis>(frame.w);
     wall.low = glm::dvec3(INFINITY), wall.high = glm::dvec3(-INFINITY);
     for (const Miss& miss : misses) {
-      glm::dvec3 low, high;
+      glm::dvec3 low(0), high(0);
       low[frame.u] = miss.u, high[frame.u] = std::min(miss.u + apart, grid_.dims[frame.u]);
       low[frame.v] = miss.v, high[frame.v] = std::min(miss.v + apart, grid_.dims[frame.v]);
       low[frame.w] = miss.low, high[frame.w] = miss.high;
