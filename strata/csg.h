@@ -10,13 +10,13 @@
 #include "strata/voxelize/grid_fit.h"
 #include "strata/voxelize/voxelize.h"
 
-/// All that Boolean trees of solids need: build them of meshes by operators (csg::Tree) or read
-/// them (csg::read_scene), and make of a tree its picture (csg::picture), its volume and area
-/// (csg::measure) and its voxels (csg::voxelize). examples/csg_tree.cpp shows each.
+/// Everything for Boolean trees of solids. Build a tree from meshes with operators (csg::Tree) or
+/// read it (csg::read_scene); then draw it (csg::picture), measure its volume and area
+/// (csg::measure) or voxelize it (csg::voxelize). examples/csg_tree.cpp shows each.
 namespace strata::csg {
 
-/// The voxels of a tree's result, as strata::voxelize() makes them of a mesh: a voxel is solid when
-/// its centre is in the result. The options' `filter` is ignored.
+/// The voxels of a tree's result, like strata::voxelize() of a mesh: a voxel is solid when its
+/// centre is in the result. The options' `filter` is ignored.
 /// @return also kUsage for a tree that check_tree() refuses
 inline Result<VoxelIntervals> voxelize(const Tree& tree, const VoxelGrid& grid,
                                        VoxelizeOptions options = {},

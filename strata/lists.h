@@ -11,8 +11,8 @@
 #include "strata/hashbuffer/count_scan_store.h"
 #include "strata/hashbuffer/hash_buffer.h"
 
-// Depth lists of fragments of your own: whatever you draw, trace or sample, from any threads, comes
-// back as one list a pixel, sorted by depth, then payload. Nothing is dropped, equal fragments are
+// Depth lists of your own fragments: insert what you draw, trace or sample, from any threads, and
+// read one list per pixel, sorted by depth, then payload. Nothing is dropped, equal fragments are
 // kept, and no bit depends on the order of insertion or on threads.
 //
 //     auto lists = strata::PayloadLists::create(width, height);
@@ -90,7 +90,8 @@ class FragmentLists {
   /// the same fragments. `execution.memory_limit` bounds the bytes held.
   /// @return how it was built. ErrorCode::kLimit, and empty lists, if a list is too long (the
   /// message names pixel and length) or memory does not suffice (it says how many fragments are
-  /// missing); kInternal if the generator was seen to give other fragments; kCancelled on request
+  /// missing); kInternal if the generator produced different fragments the second time; kCancelled
+  /// on request
   template <class Generator>
   [[nodiscard]] Result<BuildReport> build(Generator&& generator, const Execution& execution = {}) {
     auto report = store_.build(generator, execution);

@@ -7,12 +7,12 @@
 ///   auto set = strata::voxelize(file->soup, *grid);  // VoxelIntervals
 ///   auto done = strata::write_voxels(*set, "part.vdb");  // .npy, .vti, ...
 ///
-/// Each returns a Result, an error being one sentence. A voxel is solid when its centre is inside
-/// the mesh, whose vertices are rounded to 1/256 voxel; all else is exact. A mesh that is not
-/// closed is noticed: see VoxelizeOptions::open. Sets are runs of voxels along an axis: their
-/// memory grows with the surface. VoxelIntervals::contains(), for_each_run() and to_dense() look
-/// into one; voxelize_slabs() and open_voxel_writer() never hold a whole one.
-/// strata/voxelize/formats/openvdb_bridge.h hands one to OpenVDB.
+/// Each returns a Result; an error is one sentence. A voxel is solid when its centre is inside the
+/// mesh, whose vertices are rounded to 1/256 voxel; all else is exact. voxelize() checks whether
+/// the mesh is closed: see VoxelizeOptions::open. Sets are runs of voxels along an axis: their
+/// memory grows with the surface. VoxelIntervals::contains(), for_each_run() and to_dense() read a
+/// set; voxelize_slabs() and open_voxel_writer() never hold a whole one.
+/// strata/voxelize/formats/openvdb_bridge.h passes a set to OpenVDB.
 
 #include "strata/mesh/formats/read_mesh.h"
 #include "strata/mesh/soup_tools.h"

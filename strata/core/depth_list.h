@@ -8,8 +8,8 @@
 
 namespace strata {
 
-/// One crossing of a ray with a surface, in a form that sorts as law 1 asks: by depth, then
-/// entering before exiting, then by triangle. [depth:32 | exit:1 | triangle:31]
+/// One crossing of a ray with a surface, sorted as law 1 demands: by depth, then entering before
+/// exiting, then by triangle. [depth:32 | exit:1 | triangle:31]
 struct DepthItem {
   std::uint64_t bits = 0;
 
@@ -37,7 +37,7 @@ struct LayeredDepthImage {
   int height = 0;                 ///< pixels along v
   std::uint32_t depth_limit = 0;  ///< depths are in [0, depth_limit), at most 2^24
   /// World position (x, y, z, 1) from (u + 0.5, v + 0.5, depth in lattice steps, 1) of a pixel
-  /// centre. Column-major, as GLM has it.
+  /// centre. Column-major, like GLM.
   glm::dmat4 world_from_image{1.0};
   std::vector<std::uint64_t> offsets;  ///< width * height + 1, starts with 0
   std::vector<DepthItem> items;

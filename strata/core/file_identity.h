@@ -6,11 +6,12 @@
 
 namespace strata {
 
-/// Which file a name meant when it was opened: names change hands, and links give one file several.
+/// Identity of a file when it was opened. A name may later belong to another file, and links give
+/// one file several names.
 struct FileIdentity {
   std::string path;          ///< as it was opened
   std::uint64_t device = 0;  ///< with the inode: the file, on this machine
-  std::uint64_t inode = 0;   ///< 0: nothing was there
+  std::uint64_t inode = 0;   ///< 0: there was no file
 
   [[nodiscard]] bool is_there() const { return inode != 0; }
   [[nodiscard]] bool is_same_file(const FileIdentity& other) const {
@@ -18,7 +19,7 @@ struct FileIdentity {
   }
 };
 
-/// Of what lies under a name now, links followed.
+/// Identity of the file that a name leads to now, links followed.
 [[nodiscard]] FileIdentity identify_file(const std::string& path);
 
 /// Whether a file lies in a folder or in those below it, links followed.

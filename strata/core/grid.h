@@ -20,7 +20,7 @@ struct AxisFrame {
 inline constexpr int kMaxGridSide = 65536;
 
 /// A box of voxels in world space. Voxel (i, j, k) covers origin + (i..i+1, j..j+1, k..k+1) *
-/// voxel_size; its centre, which decides whether it is solid, is half a voxel further in.
+/// voxel_size; its centre, half a voxel from each side, decides whether it is solid.
 struct VoxelGrid {
   glm::ivec3 dims{0};          ///< voxels along x, y, z; each in [1, kMaxGridSide]
   glm::dvec3 origin{0.0};      ///< world position of the lower corner of voxel (0, 0, 0)

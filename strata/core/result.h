@@ -7,10 +7,10 @@
 
 namespace strata {
 
-/// What went wrong, by the party that can mend it. The value is the exit code of the command-line
-/// tool.
+/// Error category, by who can fix it: user, file, system or Strata itself. The value is the exit
+/// code of the command-line tool.
 enum class ErrorCode : int {
-  kInternal = 1,  ///< our own fault
+  kInternal = 1,  ///< a fault in Strata itself
   kUsage = 2,     ///< options that contradict each other or are out of range
   kInput = 3,     ///< a file that cannot be read or is malformed
   kOutput = 4,    ///< a file that cannot be written

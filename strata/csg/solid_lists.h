@@ -14,12 +14,12 @@
 
 namespace strata::csg {
 
-/// A tree for those who work on lists of crossings: all its solids as one soup in world space, and
-/// the filter that makes the lists of the tree's result of the soup's lists. So whatever takes a
-/// mesh and a filter (voxelize(), build_ldi()) takes a tree, with every crossing (law 6): a depth
-/// is inside where the tree is true after all crossings up to it. No tolerance is applied.
+/// A tree for algorithms on lists of crossings: all its solids as one soup in world space, and the
+/// filter that turns the soup's lists into the lists of the tree's result. So all functions that
+/// take a mesh and a filter (voxelize(), build_ldi()) also take a tree, with every crossing (law
+/// 6): a depth is inside if the tree is true after all crossings up to it. No tolerance is applied.
 ///
-/// A result's crossing carries the number of a triangle of `soup`; solid_of() tells whose it is.
+/// A crossing of the result has the index of a triangle of `soup`; solid_of() gives its solid.
 class SolidLists {
  public:
   /// The tree below `root`. Solids that it does not reach are left out of the soup.
@@ -29,20 +29,20 @@ class SolidLists {
   SolidLists& operator=(SolidLists&&) noexcept;
 
   [[nodiscard]] const TriangleSoup& soup() const;
-  /// Takes the soup away; the filter stays good.
+  /// Moves the soup out; the filter stays valid.
   [[nodiscard]] TriangleSoup take_soup();
   [[nodiscard]] const TileListFilter& filter() const;
   /// The same, but never labelled.
   [[nodiscard]] const TileListFilter& unlabelled_filter() const;
-  /// Cuts the soup off where it does not fit the lattice of `grid`, far outside of that: lists
-  /// of the grid's rays are as of the whole soup. Not while the filter has workers.
-  /// @param taken  the soup, when it was taken away
+  /// Clips the soup where it does not fit the lattice of `grid`, far outside of the grid. Lists of
+  /// the grid's rays do not change. The filter must have no workers meanwhile.
+  /// @param taken  the soup, if it was moved out
   /// @return kCancelled
   Result<void> fit(const VoxelGrid& grid, TriangleSoup* taken = nullptr,
                    const Execution& execution = {});
-  /// From now on the filter's lists are labelled: what lies behind a crossing is the label of the
-  /// solid that strata/csg/solid_labels.h says. @param labels of each solid of the tree, in [1,
-  /// 2^31). Not while the filter has workers.
+  /// Labels the filter's lists from now on: the label of a crossing is that of the solid behind it,
+  /// see strata/csg/solid_labels.h. The filter must have no workers meanwhile. @param labels one
+  /// for each solid of the tree, in [1, 2^31)
   void set_labels(const std::vector<std::uint32_t>& labels);
   /// Whether a triangle's solid is subtracted, so that the triangle faces into the result.
   [[nodiscard]] bool is_subtracted(std::uint32_t triangle) const;

@@ -49,7 +49,7 @@ enum class Operation : std::uint8_t { kSolid, kUnion, kIntersection, kDifference
 
 /// A leaf of a tree: a mesh at its place. Many solids may share one mesh.
 struct Solid {
-  /// May overlap itself, may be open or inside out; null is the empty solid.
+  /// It may overlap itself, be open or inside out; null is the empty solid.
   std::shared_ptr<const TriangleSoup> mesh;
   glm::dmat4 world_from_mesh{1.0};  ///< affine; a mirroring one reverses the triangles
   /// Red, green, blue (or kSchemeColour), alpha in [0, 1]; empty: the scheme's.
@@ -91,15 +91,15 @@ class Tree {
   /// minus all others; none: empty). @pre ids that this tree has given
   NodeId add(Operation operation, std::span<const NodeId> operands);
   NodeId add(Operation operation, std::initializer_list<NodeId> operands);
-  /// Copies the subtrees below nodes of a tree, which may be this one, and moves the copies.
-  /// Nodes and solids keep their order; what several of the subtrees share is copied once.
+  /// Copies the subtrees below nodes of a tree, which may be this one, and moves the copies. Nodes
+  /// and solids keep their order; nodes that several of the subtrees share are copied once.
   /// @return the copies of `nodes`
   std::vector<NodeId> append(const Tree& from, std::span<const NodeId> nodes,
                              const glm::dmat4& target_from_source = glm::dmat4(1.0));
   NodeId append(const Tree& from, NodeId node,
                 const glm::dmat4& target_from_source = glm::dmat4(1.0));
 
-  /// The node that is pictured, measured, voxelized; kNone: the empty set.
+  /// The node that is drawn, measured or voxelized; kNone: the empty set.
   void set_root(NodeId root) { root_ = root; }
   [[nodiscard]] NodeId root() const { return root_; }
 
@@ -119,7 +119,7 @@ class Tree {
   Tree& combine(Operation operation, const Tree& other);
 
   std::vector<Solid> solids_;
-  std::vector<Node> nodes_;  ///< operands before the nodes that take them
+  std::vector<Node> nodes_;  ///< operands before the nodes that use them
   std::vector<NodeId> operands_;
   NodeId root_ = kNone;
 };
@@ -131,7 +131,8 @@ class Tree {
 /// Moves all solids of a tree. @pre the matrix is affine
 [[nodiscard]] Tree transform(const glm::dmat4& target_from_source, Tree tree);
 
-/// Whether the nodes below `root` are as Tree asks for. Else nothing may be done with them.
+/// Checks that the nodes below `root` keep the rules of Tree, which functions that take a tree
+/// require.
 /// @return kUsage naming the node: an id that is unknown or not older than the node that takes it,
 /// or a node that is an operand twice
 Result<void> check_tree(const Tree& tree, Tree::NodeId root);
@@ -139,17 +140,18 @@ Result<void> check_tree(const Tree& tree, Tree::NodeId root);
 /// The least box around a solid in world space.
 [[nodiscard]] Bounds bounds(const Solid& solid);
 
-/// How many times larger than a result its solids are from where on they count as vast: such
-/// solids bound no picture, and are cut off where they cannot matter.
+/// A solid this many times larger than the result counts as vast: it does not bound a picture, and
+/// it is clipped where it cannot matter.
 inline constexpr double kVast = 1000.0;
 
 /// A box that the result of `node` lies in: union of the operands' for a union, intersection for an
-/// intersection, the first operand's for a difference. Of a first operand that is vast beside what
-/// axis-parallel boxes leave of it, as of half spaces that are made of vast cubes, only that.
+/// intersection, the first operand's for a difference. A first operand that is vast compared with
+/// what axis-parallel boxes leave of it, such as a half space made of a vast cube, counts only with
+/// what they leave.
 [[nodiscard]] Bounds bounds(const Tree& tree, Tree::NodeId node);
 /// The same of the root.
 [[nodiscard]] Bounds bounds(const Tree& tree);
-/// The same from the boxes of the tree's solids.
+/// The same, given the boxes of the tree's solids.
 [[nodiscard]] Bounds bounds(const Tree& tree, Tree::NodeId node, std::span<const Bounds> solids);
 /// Where a solid can change the result.
 struct ActiveBox {
@@ -158,9 +160,9 @@ struct ActiveBox {
 };
 /// The active box of each solid. @param solids  boxes of the tree's solids
 [[nodiscard]] std::vector<ActiveBox> active_boxes(const Tree& tree, std::span<const Bounds> solids);
-/// The box that gives a picture its depths, from the boxes of the tree's solids: around all of
-/// them; without cutters that are far larger than `shown`, which are the nodes that can be seen:
-/// they would leave it no depth.
+/// The box that sets the depth range of a picture, given the boxes of the tree's solids: the box
+/// around all of them, without cutters that are far larger than the visible nodes `shown`, since
+/// those would leave no depth resolution.
 [[nodiscard]] Bounds picture_box(const Tree& tree, std::span<const Bounds> solids,
                                  std::span<const Tree::NodeId> shown);
 

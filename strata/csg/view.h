@@ -11,7 +11,7 @@ namespace strata::csg {
 
 enum class Projection { kPerspective, kOrthographic };
 
-/// Where a picture is taken from, in OpenSCAD's terms.
+/// The camera of a picture, in OpenSCAD's terms.
 struct Camera {
   Projection projection = Projection::kPerspective;
   glm::dvec3 target{0.0};                ///< world point in the middle of the picture

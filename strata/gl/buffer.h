@@ -11,8 +11,8 @@
 
 namespace strata::gl {
 
-/// A buffer of the current context, for shaders (SSBO, UBO). Move-only. Calls
-/// need the context that it was made in; so does its end.
+/// A buffer of the current context, for shaders (SSBO, UBO). Move-only. Its functions and its
+/// destructor need the context that it was made in.
 class Buffer {
  public:
   Buffer() = default;
@@ -28,8 +28,8 @@ class Buffer {
     return *this;
   }
 
-  /// `bytes` of undefined content (at least 1 is held). ErrorCode::kLimit without the memory; what
-  /// check_errors() says of earlier calls, the context's loss among them.
+  /// `bytes` of undefined content (at least 1 is held). @return kLimit without the memory; else
+  /// errors of earlier calls that check_errors() reports, such as the loss of the context.
   [[nodiscard]] static Result<Buffer> allocate(std::uint64_t bytes);
   /// A copy of `data`.
   template <class T>
@@ -60,8 +60,8 @@ class Buffer {
     upload_bytes(data.data(), data.size_bytes(), offset);
   }
   /// Fills `data` from byte `offset`; waits for what was asked of the GPU before, and makes what
-  /// shaders wrote visible first. Rubbish comes where the context was lost: ask check_errors()
-  /// before it is used. @pre it fits
+  /// shaders wrote visible first. After the loss of the context the data are undefined: call
+  /// check_errors() before using them. @pre it fits
   template <class T>
   void download(std::span<T> data, std::uint64_t offset = 0) const {
     static_assert(std::is_trivially_copyable_v<T>);
@@ -94,9 +94,9 @@ class Buffer {
   std::uint64_t bytes_ = 0;
 };
 
-/// What shaders wrote to buffers is seen by the shaders that follow.
+/// Makes what shaders wrote to buffers visible to the shaders that follow.
 void storage_barrier();
-/// Waits until all that was asked of the GPU is done. For clocks.
+/// Waits until the GPU has done all its work. For time measurements.
 void finish();
 
 }  // namespace strata::gl

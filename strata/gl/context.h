@@ -11,12 +11,13 @@
 
 // OpenGL 4.5 core, with a display or without. All of Strata's GL code stands on this folder.
 //
-// Nothing here links libEGL or libGL: they are opened when the first context is asked for, so a
-// program that never asks pays nothing, and one that cannot have them gets a sentence.
+// Nothing here links libEGL or libGL: they are opened when the first context is created. So a
+// program without a context pays nothing, and a system without the libraries gives an error
+// message.
 
 namespace strata::gl {
 
-/// Numbers that a driver bounds, asked for once.
+/// Limits of the driver, queried once.
 struct Limits {
   std::uint64_t storage_block_bytes = 0;  ///< largest buffer that a shader sees at one binding
   std::uint32_t storage_bindings = 0;     ///< bindings of such buffers
@@ -35,11 +36,11 @@ struct Limits {
 /// separated by commas.
 struct Workaround {
   std::string_view name;
-  std::string_view story;  ///< what was seen, where, and what is done instead
+  std::string_view story;  ///< the fault, where it was seen, and the remedy
   bool in_force = false;
 };
 
-/// What a context can do.
+/// Properties of a context.
 struct Info {
   std::string window_system;  ///< "EGL surfaceless", "EGL device 0", "GLFW X11"
   std::string vendor, renderer, version, glsl_version;
@@ -57,8 +58,8 @@ struct Info {
 
 /// How to get a context without a window.
 struct ContextOptions {
-  /// A debug context: mistakes in the use of GL come back from Context::check() as sentences.
-  /// Also on with STRATA_GL_DEBUG=1 in the environment. Slower with some drivers.
+  /// A debug context: Context::check() reports wrong uses of GL as sentences. Also on with
+  /// STRATA_GL_DEBUG=1 in the environment. Slower with some drivers.
   bool debug = false;
   /// "": a GPU's EGL device if there is one, else Mesa without a surface, else any device.
   /// "surfaceless", or "device:N" as `strata info --gl` counts them. STRATA_GL_DEVICE in the
@@ -67,11 +68,11 @@ struct ContextOptions {
 };
 
 /// An OpenGL 4.5 core context. One thread at a time may use it, after make_current(). Everything
-/// made in it (Buffer, Program) must go before it does.
+/// made in it (Buffer, Program) must be destroyed before it.
 class Context {
  public:
-  /// A context that draws into no window. ErrorCode::kUsage with a sentence that says what was
-  /// tried and how each attempt failed, if there is none.
+  /// A context without a window. @return kUsage with a sentence that tells what was tried and how
+  /// each attempt failed
   [[nodiscard]] static Result<std::unique_ptr<Context>> headless(
       const ContextOptions& options = {});
 
@@ -105,7 +106,7 @@ class Context {
       std::make_unique<std::vector<std::string>>();
 };
 
-/// Whether contexts are to say that they are a GPU's (`hardware` in STRATA_GL_FAULTS): for tests.
+/// Whether contexts shall pretend to be a GPU's (`hardware` in STRATA_GL_FAULTS); for tests.
 [[nodiscard]] bool pretends_hardware();
 
 /// Errors of the current context since the last call, and its loss, for code that has no Context at

@@ -11,14 +11,14 @@
 
 namespace strata::gl {
 
-/// A part of a shader's text. Errors name it and count lines in it. Files are embedded by
-/// strata_embed_glsl (cmake/StrataTargets.cmake).
+/// A part of a shader's text. Error messages give its name and the line within it. Files are
+/// embedded by strata_embed_glsl (cmake/StrataTargets.cmake).
 struct GlslPiece {
   std::string_view name;  ///< "hashbuffer/gl/insert_32.glsl"
   std::string_view text;  ///< without #version
 };
 
-/// What stands before the pieces, after `#version 450 core`.
+/// Text between `#version 450 core` and the pieces.
 struct GlslSettings {
   std::vector<std::string> extensions;  ///< required ones
   std::vector<std::pair<std::string, std::string>> defines;
@@ -49,7 +49,7 @@ class Program {
   [[nodiscard]] explicit operator bool() const { return id_ != 0; }
   void use() const;
 
-  /// Sets a uniform of that name; one that the compiler removed is no mistake.
+  /// Sets a uniform of that name; a uniform that the compiler removed is not an error.
   void set(const char* name, std::uint32_t value) const;
   void set(const char* name, std::int32_t value) const;
   void set(const char* name, float value) const;

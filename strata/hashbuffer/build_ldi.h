@@ -14,24 +14,23 @@ namespace strata {
 /// The sorted depth lists of a snapped mesh seen along an axis: every crossing of every pixel's
 /// ray, with its triangle. Same bits for any store, offsets, number of threads and order of
 /// triangles (up to the triangles' numbers). world_from_image is left as the identity. `filter`, if
-/// given, makes other lists of them, tile by tile.
+/// given, transforms the lists tile by tile.
 /// @return kLimit when the lists outgrow execution.memory_limit or memory, kCancelled
 Result<LayeredDepthImage> build_ldi(const LatticeMesh& mesh, const RasterTarget& target,
                                     const TileStoreOptions& options = {},
                                     const Execution& execution = {},
                                     const TileListFilter* filter = nullptr);
 
-/// The same lists from a source of its own.
+/// The same lists from `source`.
 Result<LayeredDepthImage> build_ldi(ListSource& source, const LatticeMesh& mesh,
                                     const RasterTarget& target, const Execution& execution = {},
                                     const TileListFilter* filter = nullptr);
 
-/// What `filter` makes of the lists of an image of rows. @return kLimit without the memory,
-/// kCancelled
+/// Applies `filter` to the lists of an image of rows. @return kLimit without the memory, kCancelled
 Result<LayeredDepthImage> filter_lists(const LayeredDepthImage& rows, const TileListFilter& filter,
                                        const Execution& execution = {});
 
-/// What the rays of the voxel columns of a grid along `axis` see.
+/// The image of the rays through the voxel columns of a grid along `axis`.
 [[nodiscard]] RasterTarget raster_target(const VoxelGrid& grid, Axis axis);
 
 /// The world_from_image of such lists (see LayeredDepthImage).

@@ -126,7 +126,7 @@ class CountScanStore {
   /// `execution.memory_limit` bounds the store's own bytes. Exceptions of the generator pass
   /// through.
   /// @return how it was built. ErrorCode::kLimit, and empty lists, with the number of fragments
-  /// that do not fit; kInternal if the generator was seen to give other fragments the second time;
+  /// that do not fit; kInternal if the generator produced different fragments the second time;
   /// kCancelled on request.
   template <class Generator>
   [[nodiscard]] Result<BuildReport> build(Generator&& generator, const Execution& execution = {}) {

@@ -13,8 +13,8 @@ namespace strata {
 
 /// Anything that takes fragments. A generator of fragments is a callable that accepts any sink:
 /// `[&](auto& sink) { sink.insert(x, y, depth, payload); }`, without the payload where the store's
-/// records keep depth alone. It may be called several times for one frame and must then give the
-/// same fragments, in any order, from any number of its own threads (one, if the store is
+/// records keep depth alone. It may be called several times for one frame. Each time it must insert
+/// the same fragments, in any order, from any number of its own threads (one if the store is
 /// Exclusive), and return when all are inserted.
 template <class S>
 concept FragmentSink = requires(S& sink, int x, int y, std::uint32_t depth, std::uint32_t payload) {

@@ -33,7 +33,7 @@
 //   fragment       a depth and a payload at a pixel: what a ray meets there
 //   depth list     the fragments of a pixel, sorted by (depth, payload); equal ones are kept
 //   depth complexity, layers    the length of a list
-//   store          what takes fragments and gives back depth lists (depth_list_store.h)
+//   store          a container that takes fragments and gives back depth lists (depth_list_store.h)
 //   generator      the caller's code that inserts the fragments of a frame into a sink
 //   frame          the lists of a whole screen; a store holds one
 //   record, word   a fragment as the table keeps it, [age | nearness | payload] (record.h)
@@ -46,9 +46,9 @@
 //   failure        a record whose ages ran out; it is kept beside the table (Overflow)
 //   cull           to drop what cannot be seen: behind enough opacity, or behind the k nearest
 //
-// NOTHING IS LOST. What fails is kept beside the table, and lists go on there. That is slow:
-// build() gives every frame the room it needs instead. If there is no memory even beside the table,
-// finish() and build() say how many fragments are missing.
+// NOTHING IS LOST. A record that fails is kept outside of the table, and lists continue there. That
+// is slow, so build() gives every frame the room it needs. If memory does not suffice even outside
+// of the table, finish() and build() say how many fragments are missing.
 
 namespace strata {
 
@@ -65,7 +65,7 @@ struct HashBufferOptions {
   /// Largest age, if smaller than the record's kAgeMax; 0 means kAgeMax.
   unsigned age_limit = 0;
   /// Keeps the first `keep_nearest` fragments of each list; 0 keeps all. Lists are then cut to that
-  /// length. (A fragment is dropped as soon as that many were met in front of it.)
+  /// length. (A fragment is dropped once that many were found in front of it.)
   unsigned keep_nearest = 0;
   /// With an Opacity: a list ends with the fragment that brings the transmittance of the list below
   /// 1 - opacity_threshold.
@@ -77,15 +77,15 @@ struct NoOpacity {};
 
 namespace detail {
 
-/// The records that a hash table had no room for, by pixel. All records
-/// of a pixel that are in the table lie in front of those here.
+/// The records for which a hash table had no room, by pixel. All records of a pixel in the table
+/// lie in front of those here.
 template <RecordPolicy Record>
 class Overflow {
  public:
   using Word = typename Record::Word;
 
   Overflow() = default;
-  /// Not while others use either.
+  /// No other thread may use either of the two meanwhile.
   Overflow(Overflow&& other) noexcept
       : sorted_(other.sorted_.load()), entries_(std::move(other.entries_)), lost_(other.lost_) {}
   Overflow& operator=(Overflow&& other) noexcept {
@@ -111,8 +111,8 @@ class Overflow {
     lost_ = 0;
   }
 
-  /// Visits the records of a pixel front to back while `visit` returns true. Not while others add;
-  /// the first call sorts.
+  /// Visits the records of a pixel front to back while `visit` returns true. No thread may add
+  /// meanwhile; the first call sorts.
   template <class Visit>
   void for_each(std::uint64_t pixel, Visit&& visit) {
     sort();
@@ -160,8 +160,8 @@ class Overflow {
 /// @tparam RecordType a policy of record.h: what is kept of a fragment, and how many layers
 /// @tparam Concurrency Concurrent (any thread inserts) or Exclusive (one)
 /// @tparam Opacity a callable that gives the opacity in [0, 1] of a payload: lists are then cut
-/// behind what hides the rest (HashBufferOptions::opacity_threshold). Not for volumes, Booleans or
-/// voxels, which need every crossing.
+/// where the fragments in front hide the rest (HashBufferOptions::opacity_threshold). Not for
+/// volumes, Booleans or voxels, which need every crossing.
 template <RecordPolicy RecordType, class Concurrency, class Opacity = NoOpacity>
 class HashBuffer
     : public detail::SinkForms<HashBuffer<RecordType, Concurrency, Opacity>, RecordType> {
@@ -317,10 +317,10 @@ class HashBuffer
     overflow_.for_each(pixel, [&](Word record) { return goes_on(visit, record, end); });
   }
 
-  /// Ends a frame that insert() filled: do its lists hold all? Call it when all threads have
-  /// inserted, before lists are read.
-  /// @return the frame. ErrorCode::kLimit with the number of fragments that are missing, because
-  /// the table had no room for them and memory none beside it
+  /// Ends a frame that insert() filled, and checks that its lists are complete. Call it when all
+  /// threads have inserted, before lists are read.
+  /// @return the frame. ErrorCode::kLimit with the number of fragments that are missing, for which
+  /// neither the table nor memory had room
   [[nodiscard]] Result<BuildReport> finish() const {
     if (const std::uint64_t lost = overflow_.lost(); lost > 0) {
       return fail(ErrorCode::kLimit, "hash buffer: no memory for {} of {} fragments", lost,
@@ -345,8 +345,8 @@ class HashBuffer
   [[nodiscard]] double load() const {
     return static_cast<double>(stored()) / static_cast<double>(table_.size());
   }
-  /// Fragments whose age ran out since the last clear: not in the table, but kept beside it. Not
-  /// with inserting threads.
+  /// Fragments whose age ran out since the last clear: kept outside of the table. No thread may be
+  /// inserting.
   [[nodiscard]] std::uint64_t failures() const { return failures_; }
   /// Fragments dropped by keep_nearest or opacity since the last clear.
   [[nodiscard]] std::uint64_t dropped() const { return dropped_; }
@@ -364,8 +364,8 @@ class HashBuffer
 
   /// Empties the buffer, adapts the table to the load of the last frame as far as `memory_limit`
   /// (bytes, 0: none) allows, and draws the offsets of the new frame. The first frame keeps its
-  /// size, unless what was inserted before did not fit. ErrorCode::kLimit if even a table of one
-  /// cell a pixel exceeds the limit.
+  /// size, unless the fragments inserted before did not fit. ErrorCode::kLimit if even a table of
+  /// one cell a pixel exceeds the limit.
   [[nodiscard]] Result<void> begin_frame(std::uint64_t memory_limit = 0) {
     const bool had_failures = failures_ > 0;
     const std::uint64_t held = clear();
@@ -422,11 +422,11 @@ class HashBuffer
     }
   }
 
-  /// Bytes held: the table, the max-age table, the offsets, and what lies beside the table.
+  /// Bytes held: the table, the max-age table, the offsets, and the fragments outside of the table.
   [[nodiscard]] std::uint64_t memory_bytes() const {
     return bytes_of(table_.size()) + overflow_.memory_bytes();
   }
-  /// The same for a table of that many cells, with nothing beside it.
+  /// The same for a table of that many cells, without fragments outside of it.
   [[nodiscard]] std::uint64_t bytes_of(std::uint64_t cells) const {
     return cells * sizeof(Word) + block_count() * sizeof(Age) +
            (std::min<std::uint64_t>(age_wanted(), cells) + 1) * sizeof(std::uint64_t);
@@ -452,9 +452,9 @@ class HashBuffer
   /// generator brings its own. Exceptions of the generator pass through.
   ///
   /// @return how the frame was built. ErrorCode::kLimit, and an empty buffer, if a pixel has more
-  /// fragments than the record can count (no room can mend that; the message names the split to
-  /// take), or if fragments were still missing in the largest table that memory allows (the message
-  /// says how many). ErrorCode::kCancelled on request.
+  /// fragments than the record can count (a larger table does not help; the message names the
+  /// record policy to use), or if fragments were still missing in the largest table that memory
+  /// allows (the message says how many). ErrorCode::kCancelled on request.
   template <class Generator>
   [[nodiscard]] Result<BuildReport> build(Generator&& generator, const Execution& execution = {}) {
     if (auto begun = begin_frame(execution.memory_limit); !begun) {
@@ -507,8 +507,8 @@ class HashBuffer
         blocks_per_row_((static_cast<std::size_t>(width) + kBlockSide - 1) / kBlockSide),
         guarded_(options.keep_nearest > 0 || kHasOpacity) {}
 
-  /// What insert() does. What the table has no room for costs a probe of every age, a lock and a
-  /// sort.
+  /// The work of insert(). A fragment for which the table has no room costs a probe of every age, a
+  /// lock and a sort.
   void put(int x, int y, std::uint32_t depth, std::uint32_t payload) noexcept {
     if (table_.empty()) {  // after a resize that memory did not even allow to undo
       return spill(pixel_of(x, y), Record::pack(1, depth, payload));
@@ -523,7 +523,7 @@ class HashBuffer
     }
   }
 
-  /// How much of a list has been visited, where culling ends it.
+  /// How much of a list has been visited, to find the place where culling ends it.
   struct ListEnd {
     double transmittance = 1.0;
     unsigned kept = 0;
@@ -598,13 +598,14 @@ class HashBuffer
     int x = 0, y = 0;
     std::uint64_t deepest = 0, kept = 0;
   };
-  /// Where build() is.
+  /// State of a build().
   struct Attempt {
     std::uint64_t memory_limit = 0;  ///< bytes, 0: none
     int generator_calls = 0, failed_frames = 0;
     std::optional<FragmentCount> count;  ///< once the fragments were counted
   };
-  /// What the table has no room for is not kept while build() runs: it runs the generator again.
+  /// Fragments for which the table has no room are not kept while build() runs: it runs the
+  /// generator again.
   struct FailuresForgotten {
     explicit FailuresForgotten(HashBuffer& of) : buffer(of) { buffer.keep_failures_ = false; }
     ~FailuresForgotten() { buffer.keep_failures_ = true; }
@@ -635,7 +636,8 @@ class HashBuffer
     attempt.count = result;
   }
 
-  /// @return kLimit naming the split to take if a pixel has more fragments than there are ages
+  /// @return kLimit naming the record policy to use if a pixel has more fragments than there are
+  /// ages
   [[nodiscard]] Result<void> check_ages(const FragmentCount& count) const {
     if (count.deepest <= age_wanted()) return {};
     return fail(ErrorCode::kLimit,
@@ -664,7 +666,7 @@ class HashBuffer
     return {};
   }
 
-  /// After a frame of which fragments did not fit: an emptied table with more room.
+  /// After a frame whose fragments did not fit: empties the table and makes more room.
   template <class Generator>
   [[nodiscard]] Result<void> grow(Generator& generator, Attempt& attempt) {
     const std::uint64_t missing = failures_, fragments = stored() + missing;

@@ -19,8 +19,8 @@ struct VoxelRun {
   int first = 0, last = 0;
 };
 
-/// Makes other lists of the sorted lists of a tile before they are used: a Boolean tree makes the
-/// lists of its result of the lists of its solids. What comes out must be sorted as well.
+/// Transforms the sorted lists of a tile before they are used, e.g. from the lists of a tree's
+/// solids to the lists of its Boolean result. The output must be sorted as well.
 class TileListFilter {
  public:
   virtual ~TileListFilter() = default;
@@ -31,10 +31,11 @@ class TileListFilter {
     virtual ~Worker() = default;
     /// The filtered lists, as compressed rows; valid until the next call.
     virtual TileLists<DepthItem> apply(const TileLists<DepthItem>& lists) = 0;
-    /// Appends those of the voxels of `faces` that the surface of the result may pass through:
-    /// where it depends on the solids whose faces are in the voxel, all others being as they are at
-    /// its centre. Runs in increasing order that do not touch. A filter that does not override
-    /// solid_of() may leave it at this: the faces of one solid come as such runs.
+    /// Appends the voxels of `faces` that the surface of the result may pass through: those in
+    /// which the result depends on the solids with faces in the voxel, while all other solids are
+    /// as at its centre. Appends runs in increasing order that do not touch. A filter that does not
+    /// override solid_of() need not override this: the faces of one solid already are runs of this
+    /// kind.
     /// @param lists of the tile, as apply() takes them
     /// @param faces of the column of pixel `pixel`, in any order of their solids
     virtual void surface(const TileLists<DepthItem>& lists, std::size_t pixel,
@@ -43,13 +44,13 @@ class TileListFilter {
       for (const FaceRun& run : faces) kept.push_back({run.first, run.last});  // knows no solids
     }
   };
-  /// Threads may ask at once.
+  /// May be called by several threads at once.
   [[nodiscard]] virtual std::unique_ptr<Worker> worker() const = 0;
-  /// What comes out is labelled: each crossing says what lies behind it, at exit() nothing, else
-  /// what the label triangle() stands for. A list has no two crossings of one depth then, and
-  /// labels follow one another without an exit between.
+  /// The output is labelled: each crossing tells what lies behind it, nothing at exit(), else the
+  /// label triangle(). No list then has two crossings at the same depth, and two labels may follow
+  /// each other without an exit between them.
   [[nodiscard]] virtual bool labelled() const { return false; }
-  /// The solid of a triangle of the mesh; 0 where that has but one.
+  /// The solid of a triangle of the mesh; 0 if there is only one.
   [[nodiscard]] virtual std::uint32_t solid_of(std::uint32_t triangle) const {
     (void)triangle;
     return 0;

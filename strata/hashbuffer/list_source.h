@@ -13,19 +13,21 @@
 
 namespace strata {
 
-/// Makes the lists of a mesh elsewhere than in the tiles of this process's threads: on a GPU. What
-/// takes one (build_ldi(), VoxelizeOptions) gets the same lists, bit for bit (law 2).
+/// Computes the lists of a mesh outside of this process's threads, such as on a GPU. Users of a
+/// source (build_ldi(), VoxelizeOptions) get the same lists, bit for bit (law 2).
 ///
-/// One thread calls at a time, the one that gave it away.
+/// Only one thread at a time may call it: the one that passed it on.
 class ListSource {
  public:
   virtual ~ListSource() = default;
 
-  /// The mesh of the calls that follow, without a filter; borrowed until the next one.
+  /// Sets the mesh for the calls that follow and removes the filter. The mesh is borrowed until the
+  /// next call.
   /// @return kLimit without the memory
   virtual Result<void> set_mesh(const LatticeMesh& mesh) = 0;
-  /// True: lists() gives from now on what `filter` (borrowed) makes of the mesh's lists, bit for
-  /// bit. False where this source leaves that to who takes its lists, which are the mesh's then.
+  /// Returns true if lists() from now on applies `filter` (borrowed), bit for bit. Returns false if
+  /// this source cannot apply it; lists() then returns the unfiltered lists and the caller must
+  /// filter.
   virtual bool use_filter(const TileListFilter& filter) {
     static_cast<void>(filter);
     return false;
@@ -33,16 +35,16 @@ class ListSource {
   /// The sorted lists of rows [v_begin, v_end) of `target`, as an image of those rows;
   /// world_from_image is left as the identity. @return kLimit without the memory, kCancelled
   virtual Result<LayeredDepthImage> lists(const RasterTarget& target, int v_begin, int v_end) = 0;
-  /// Crossings of the mesh in the rows of the last lists(): those that came back, but for a filter.
+  /// Crossings of the mesh in the rows of the last lists(), before the filter.
   [[nodiscard]] virtual std::uint64_t crossings() const = 0;
-  /// How many rows of `target` are best asked for at once: a multiple of kTileSide, at least that.
+  /// The best number of rows of `target` per call: a multiple of kTileSide, at least kTileSide.
   [[nodiscard]] virtual int rows_at_once(const RasterTarget& target) const = 0;
 };
 
-/// A source, and this process's threads from its first failure on; a stop is none.
+/// Uses a source until it first fails (cancellation is not a failure), then this process's threads.
 class ListSourceOrCpu final : public ListSource {
  public:
-  /// Borrows `source`. @param on_failure told the failure, once
+  /// Borrows `source`. @param on_failure called once with the failure
   ListSourceOrCpu(ListSource& source, Execution execution,
                   std::function<void(const Error&)> on_failure);
 
@@ -58,7 +60,7 @@ class ListSourceOrCpu final : public ListSource {
   Execution execution_;
   std::function<void(const Error&)> on_failure_;
   const LatticeMesh* mesh_ = nullptr;
-  const TileListFilter* filter_ = nullptr;  ///< that the lists have gone through
+  const TileListFilter* filter_ = nullptr;  ///< already applied to the lists
   std::uint64_t crossings_ = 0;
 };
 

@@ -11,20 +11,20 @@
 
 namespace strata {
 
-/// Where the probes of a pixel go.
+/// Order in which a pixel probes cells.
 enum class OffsetKind {
   /// Independent uniform draws without repetition. Robust against any arrangement of fragments.
   kRandom,
   /// Each offset is as far from all earlier ones as can be found. Probes of clustered fragments
   /// leave the cluster at small ages. Worse than random on a shallow, fully covered screen in a
-  /// full table (the near-lattice lets distant pixels share most of their cells).
+  /// full table, where the near-lattice lets distant pixels share most of their cells.
   kFarthestPoint,
   /// Age a probes plane a - 1 of the table while whole planes of `pixels` cells last: there no two
   /// pixels meet, and neighbours probe neighbouring cells of one row. Then random.
   kPlaneFirst,
 };
 
-/// What an offset sequence depends on. The same request gives the same offsets on every platform.
+/// Parameters of an offset sequence. The same request gives the same offsets on every platform.
 struct OffsetRequest {
   std::uint64_t pixels = 0;  ///< keys are in [0, pixels)
   std::uint64_t cells = 0;   ///< of the table, at least `pixels`
@@ -34,8 +34,8 @@ struct OffsetRequest {
 };
 
 /// The offsets by age: element a is the offset of age a, in [0, cells), all different; element 0 is
-/// 0 and unused. There are min(ages, cells) of them, since a further one would repeat a probe. The
-/// cell of a pixel at age a is (pixel + offsets[a]) mod cells.
+/// 0 and unused. There are min(ages, cells) of them, since more would repeat a probe. The cell of a
+/// pixel at age a is (pixel + offsets[a]) mod cells.
 ///
 /// kFarthestPoint measures on a torus of `width` columns and ceil(cells / width) rows, which
 /// differs from the true neighbourhood of the key table by one row where a row wraps around. It

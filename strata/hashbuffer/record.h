@@ -18,8 +18,8 @@ namespace strata {
 inline constexpr std::uint32_t kRecordDepthMax = (1u << 24) - 1;
 
 /// Maps a normalized depth, 0 at the near plane and 1 at the far plane, to [0, kRecordDepthMax] by
-/// floor(u * (2^24 - 1)). What lies outside is clamped; NaN counts as far. (A factor of 2^24 would
-/// let u = 1 run over into the age.)
+/// floor(u * (2^24 - 1)). Values outside are clamped; NaN counts as far. (With a factor of 2^24, u
+/// = 1 would overflow into the age.)
 [[nodiscard]] constexpr std::uint32_t record_depth(double u) {
   if (!(u < 1.0)) return kRecordDepthMax;
   if (!(u > 0.0)) return 0;
@@ -54,10 +54,10 @@ struct BasicRecord {
   static constexpr unsigned kAgeMax = (1u << kAgeBits) - 1;
   static constexpr std::uint32_t kDepthMax = kRecordDepthMax;
   static constexpr Word kEmpty = 0;
-  /// What one more age adds to a word.
+  /// The difference of two words whose ages differ by 1.
   static constexpr Word kAgeUnit = Word{1} << (kNearnessBits + kPayloadBits);
 
-  /// True if no bit of the payload is lost. Without payload bits none is asked for.
+  /// True if no bit of the payload is lost; always true for records without payload.
   [[nodiscard]] static constexpr bool payload_fits(std::uint32_t payload) {
     return kPayloadBits == 0 || widen(narrow(payload)) == payload;
   }
@@ -136,7 +136,7 @@ struct Record64Deep : BasicRecord<std::uint64_t, 10, 30> {
   static constexpr std::string_view kDeeper = "use CountScanStore, whose lists may have any length";
 };
 
-/// What a hash buffer asks of a record policy.
+/// Requirements of a hash buffer on a record policy.
 template <class R>
 concept RecordPolicy = std::unsigned_integral<typename R::Word> &&
     requires(typename R::Word word, unsigned age, std::uint32_t value) {

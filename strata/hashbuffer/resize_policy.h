@@ -41,9 +41,9 @@ namespace strata {
 }
 
 /// The size of the next frame's table, from the fragments of the last frame: grows while the load
-/// would be 80 % or more, else shrinks while it would be less than 30 %, never below `pixels`.
-/// A grown table is at least 51 % full (unless one step was not enough for the first) and a shrunk
-/// one at most 54 %, so a constant number of fragments causes one change and no more.
+/// would be 80 % or more, else shrinks while it would be less than 30 %, never below `pixels`. A
+/// grown table is at least 51 % full (unless one step was not enough for the first) and a shrunk
+/// one at most 54 %, so a constant number of fragments causes at most one change.
 [[nodiscard]] constexpr std::uint64_t next_frame_cells(std::uint64_t cells, std::uint64_t pixels,
                                                        std::uint64_t fragments) {
   cells = std::max(cells, pixels);

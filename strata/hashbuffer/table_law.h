@@ -51,7 +51,7 @@ struct Flight {
   }
 };
 
-/// What became of a proposal.
+/// Result of a proposal.
 enum class Outcome {
   kLost,          ///< the cell keeps what it has
   kPlaced,        ///< the cell was empty; nothing is in flight any more

@@ -10,16 +10,17 @@
 
 namespace strata {
 
-/// Where crossings are kept until sorted. kAuto: the faster one measured for the scene.
+/// Store of the crossings until they are sorted. kAuto: the one that measurements found faster for
+/// the scene.
 enum class StoreKind { kAuto, kHaBuffer, kCountScan };
 
-/// A crossing without its triangle: depth << 1 | exit, 24 bits, which orders like DepthItem as far
-/// as it goes. Serves depth limits up to 2^23, grids up to 32768 voxels deep.
+/// A crossing without its triangle: depth << 1 | exit, 24 bits, which sorts like DepthItem without
+/// the triangle. Serves depth limits up to 2^23, grids up to 32768 voxels deep.
 using DepthKey = std::uint32_t;
 inline constexpr std::uint32_t kMaxDepthKeyLimit = std::uint32_t{1} << 23;
 
-/// The sorted depth lists of one tile, in one of two forms. `Key` is DepthKey or DepthItem. Memory
-/// is the builder's, valid until its next tile.
+/// The sorted depth lists of one tile, in one of two forms. `Key` is DepthKey or DepthItem. The
+/// memory belongs to the builder and is valid until its next tile.
 template <class Key>
 struct TileLists {
   /// Rows of the tile that may hold fragments; all other lists are empty.
@@ -28,7 +29,7 @@ struct TileLists {
 
   /// Planar form (when `planes` is set): the fragment of age a = 1..ages of pixel p is the record
   /// planes[(a - 1) * kTilePixels + p], present when its age field says a, absent when it is 0.
-  /// Rows outside [row_begin, row_end) hold rubbish. Record: see TileRecord<Key>.
+  /// Rows outside [row_begin, row_end) are undefined. Record: see TileRecord<Key>.
   const std::uint32_t* planes32 = nullptr;
   const std::uint64_t* planes64 = nullptr;
   int ages = 0;
@@ -38,8 +39,8 @@ struct TileLists {
   const Key* keys = nullptr;
 };
 
-/// What a record says in a tile's lists: Record32 stores DepthKeys in the place of depths, Record64
-/// DepthItems.
+/// Contents of a record in a tile's lists: Record32 stores DepthKeys in place of depths, Record64
+/// stores DepthItems.
 template <class Record>
 using TileKey = std::conditional_t<Record::kPayloadBits == 0, DepthKey, DepthItem>;
 

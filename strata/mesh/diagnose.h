@@ -13,14 +13,14 @@ namespace strata {
 
 /// An edge that is not used equally often in both directions.
 struct UnbalancedEdge {
-  glm::dvec3 from{0.0}, to{0.0};  ///< as its first triangle runs along it
-  std::uint32_t element = 0;      ///< face element of the file of that triangle
+  glm::dvec3 from{0.0}, to{0.0};  ///< in the direction of its first triangle
+  std::uint32_t element = 0;      ///< face element of that triangle in the file
   std::uint32_t forward = 0;      ///< uses from -> to
   std::uint32_t backward = 0;     ///< uses to -> from
 };
 
-/// What is known about a mesh. Vertices are taken as equal where their positions are (-0 equals
-/// +0); no tolerance. An edge joins two different positions.
+/// Facts about a mesh. Vertices are equal if their positions are (-0 equals +0), without tolerance.
+/// An edge joins two different positions.
 struct MeshDiagnosis {
   std::uint64_t triangles = 0;
   std::uint64_t vertices = 0;         ///< in the soup
@@ -47,13 +47,13 @@ struct MeshDiagnosis {
   bool inverted = false;  ///< closed, and the signed volume is negative
 };
 
-/// Looks at everything. Cost: about 0.1 s for a million triangles on two threads; O(n) hashing.
-/// Non-manifold edges and self-intersections are allowed in a closed mesh. A stop request is not
-/// obeyed. @pre indices < positions.size(); fewer than 2^31 triangles
+/// Computes all of MeshDiagnosis. Cost: about 0.1 s for a million triangles on two threads; O(n)
+/// hashing. Non-manifold edges and self-intersections are allowed in a closed mesh. Stop requests
+/// are ignored. @pre indices < positions.size(); fewer than 2^31 triangles
 [[nodiscard]] MeshDiagnosis diagnose(const TriangleSoup& mesh, const Execution& execution = {});
 
-/// MeshDiagnosis::closed alone, much faster: edges are balanced by index first, and only what is
-/// left is looked up by position. @pre indices < positions.size()
+/// MeshDiagnosis::closed alone, much faster: edges are balanced by index first, and only the
+/// remaining ones are looked up by position. @pre indices < positions.size()
 [[nodiscard]] bool is_closed(const TriangleSoup& mesh, const Execution& execution = {});
 
 /// The same for any positions, such as those of a LatticeMesh.

@@ -21,9 +21,9 @@ using OpenMeshPolyMesh = OpenMesh::PolyMesh_ArrayKernelT<OpenMeshTraits>;
 
 /// What to_openmesh had to do.
 struct OpenMeshReport {
-  /// Triangles a half-edge mesh cannot join to their neighbours (a third face at an edge, a pinched
-  /// vertex): they have three vertices of their own. Their edges look like boundary; ask diagnose()
-  /// about closedness, never OpenMesh.
+  /// Triangles that a half-edge mesh cannot connect to their neighbours (a third face at an edge, a
+  /// pinched vertex): they get three vertices of their own. Their edges look like boundary, so use
+  /// diagnose() to find out whether a mesh is closed, never OpenMesh.
   std::uint64_t detached_triangles = 0;
   std::uint64_t dropped_triangles = 0;  ///< two corners the same vertex, which OpenMesh cannot hold
 };

@@ -13,8 +13,8 @@ namespace strata {
 /// The box [low, high]: 8 vertices, 12 triangles. @pre low < high in every component
 [[nodiscard]] TriangleSoup make_box(const glm::dvec3& low, const glm::dvec3& high);
 
-/// A sphere about the origin of `rings` bands of latitude along z and `segments` of longitude.
-/// 2 * segments * (rings - 1) triangles. @pre radius > 0, segments >= 3, rings >= 2
+/// A sphere about the origin with `rings` bands of latitude along z and `segments` of longitude. 2
+/// * segments * (rings - 1) triangles. @pre radius > 0, segments >= 3, rings >= 2
 [[nodiscard]] TriangleSoup make_uv_sphere(double radius, int segments, int rings);
 
 /// A sphere about the origin: an icosahedron divided `subdivisions` times, all vertices at
@@ -44,7 +44,7 @@ namespace strata {
 [[nodiscard]] TriangleSoup subdivide(const TriangleSoup& mesh);
 
 /// Every position p becomes m * (p, 1). When m mirrors (negative determinant) the triangles are
-/// turned around, so that outside stays outside. @pre m is affine
+/// reversed, so that outside stays outside. @pre m is affine
 [[nodiscard]] TriangleSoup transform(const TriangleSoup& mesh, const glm::dmat4& m);
 
 }  // namespace strata

@@ -25,7 +25,7 @@ struct Bounds {
     low = glm::min(low, point);
     high = glm::max(high, point);
   }
-  /// An empty box adds nothing.
+  /// An empty box changes nothing.
   void include(const Bounds& other) {
     if (other.empty()) return;
     low = glm::min(low, other.low);
@@ -42,7 +42,7 @@ struct Bounds {
 /// the sum does not depend on the number of threads.
 [[nodiscard]] double signed_volume(const TriangleSoup& mesh, const Execution& execution = {});
 
-/// Turns every triangle around.
+/// Reverses every triangle.
 void reverse_orientation(TriangleSoup& mesh);
 
 /// Adds the triangles of `other`. Its face elements follow those of `mesh`, as if both were one

@@ -7,7 +7,7 @@
 namespace strata {
 
 /// Triangles in world space, counter-clockwise seen from outside. Nothing is required of their
-/// connectivity: rays need none, and bad meshes are what users have.
+/// connectivity: rays need none, and users' meshes are often bad.
 struct TriangleSoup {
   std::vector<glm::dvec3> positions;  ///< world space; finite
   std::vector<glm::uvec3> triangles;  ///< indices into positions, each < positions.size()

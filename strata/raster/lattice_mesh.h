@@ -33,11 +33,11 @@ struct LatticeMesh {
 Result<LatticeMesh> snap_to_lattice(const TriangleSoup& mesh, const VoxelGrid& grid,
                                     const Execution& execution = {});
 
-/// Cuts a mesh off where it does not fit the lattice of `grid`: far outside of the grid it is moved
-/// onto a box (clamp_to_box()), so that rays through the grid meet it as often as before.
+/// Clips a mesh that does not fit the lattice of `grid`: parts far outside the grid are moved onto
+/// a box (clamp_to_box()), so that rays through the grid meet the mesh as often as before.
 /// @param box  around the mesh
-/// @return the triangle of the mesh before that each triangle is a piece of; empty when all of it
-/// fitted and nothing was done. kGeometry naming the vertex whose coordinate is not below
+/// @return for each triangle the index of the original triangle that it is a piece of; empty when
+/// the mesh fitted and was not changed. kGeometry naming the vertex whose coordinate is not below
 /// kMostClamped; kCancelled
 Result<std::vector<std::uint32_t>> fit_lattice(TriangleSoup& mesh, const Bounds& box,
                                                const VoxelGrid& grid,

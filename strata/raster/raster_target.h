@@ -6,7 +6,8 @@
 
 namespace strata {
 
-/// What rays along one axis see: pixel (u, v) has its centre at lattice (256 u + 128, 256 v + 128).
+/// The image of rays along one axis: pixel (u, v) has its centre at lattice (256 u + 128, 256 v +
+/// 128).
 struct RasterTarget {
   Axis axis = Axis::kZ;
   int width = 0;                  ///< pixels along u
@@ -20,7 +21,7 @@ struct PixelRect {
   [[nodiscard]] bool empty() const { return u0 >= u1 || v0 >= v1; }
 };
 
-/// Pixels along a side of a tile: bulk work is done tile by tile, each one thread's alone.
+/// Pixels along a side of a tile: bulk work is done tile by tile, each tile by one thread.
 inline constexpr int kTileSide = 64;
 inline constexpr int kTilePixels = kTileSide * kTileSide;
 

@@ -12,11 +12,11 @@ namespace strata {
 
 /// A 64-bit hash of a set of solid voxels and its grid. Equal for equal sets and grids, whatever
 /// the axis of the intervals, the slabs and their order, the threads or the machine; different for
-/// different sets but for one chance in about 2^60.
+/// different sets, except with a probability of about 2^-60.
 ///
 /// The sum over the solid voxels of f(x) g(y) h(z), modulo the prime 2^61 - 1, with f, g, h
 /// pseudo-random: a polynomial that vanishes only by chance (Schwartz, 1980; Zippel, 1979), and
-/// whose sum along an interval is a difference of two prefix sums. Not for adversaries.
+/// whose sum along an interval is a difference of two prefix sums. Not safe against adversaries.
 class SetChecksum {
  public:
   explicit SetChecksum(const VoxelGrid& grid);

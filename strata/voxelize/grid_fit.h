@@ -11,7 +11,7 @@
 
 namespace strata {
 
-/// How large a grid is wanted. Exactly one of `resolution`, `voxel_size` and `dims` is set.
+/// Size and place of the wanted grid. Exactly one of `resolution`, `voxel_size` and `dims` is set.
 struct GridRequest {
   /// Voxels along the longest side of the box; cubic voxels. Padding is added to it.
   std::optional<std::int64_t> resolution{};
@@ -22,22 +22,22 @@ struct GridRequest {
 
   /// The box to cover, in place of that of the mesh.
   std::optional<Bounds> bounds{};
-  /// The lower corner of the grid, padding aside, in place of that of the box. What lies below it
-  /// is cut off.
+  /// The lower corner of the grid without padding, in place of that of the box. Parts of the mesh
+  /// below it are cut off.
   std::optional<glm::dvec3> origin{};
   std::int64_t padding = 0;  ///< empty voxels on each of the six sides
   bool align = false;        ///< the origin becomes a multiple of the voxel size, at most one lower
 };
 
 /// The grid for a request. Its cells cover the box from the lower corner on, each side with the
-/// least whole number of voxels; what reaches less than half a lattice step (1/512 voxel) into a
-/// further voxel is snapped onto its border and needs no voxel. A side of no length gets one voxel
-/// (with `dims` as many as asked for), whose middle the box lies in.
+/// least whole number of voxels; a part that reaches less than half a lattice step (1/512 voxel)
+/// into a further voxel is snapped onto its border and needs no voxel. A side without length gets
+/// one voxel (with `dims` the requested number), and the box lies in its middle.
 /// @param mesh_bounds  of the mesh; used without request.bounds
 /// @return kUsage: not exactly one size, a size or a padding below its range, bounds or an origin
-/// that contradict each other or `align`; kGeometry: a box without extent or with infinite ones,
-/// coordinates too large for the voxel size, nothing beyond the origin; kLimit: more than
-/// kMaxGridSide voxels along a side. Each names the number.
+/// that contradict each other or `align`; kGeometry: a box without extent or with an infinite one,
+/// coordinates too large for the voxel size, or a mesh that ends before the origin; kLimit: more
+/// than kMaxGridSide voxels along a side. Each names the number.
 Result<VoxelGrid> fit_grid(const Bounds& mesh_bounds, const GridRequest& request);
 
 /// Whether a grid of one's own keeps the ranges of VoxelGrid. @return kUsage, with the axis and the

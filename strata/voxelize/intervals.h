@@ -30,8 +30,8 @@ struct Interval {
 /// the surface, not with the volume. Storage is by tiles of kTileSide x kTileSide columns; a tile
 /// without solid voxels holds nothing.
 ///
-/// Intervals may have labels, such as the number of a solid. Then those that touch differ in
-/// theirs.
+/// Intervals may have labels, such as the number of a solid. Intervals that touch then have
+/// different labels.
 class VoxelIntervals {
  public:
   static constexpr int kTileSide = 64;
@@ -58,7 +58,7 @@ class VoxelIntervals {
     const std::size_t local = local_of(u, v);
     return {tile.items.get() + tile.offsets[local], tile.offsets[local + 1] - tile.offsets[local]};
   }
-  /// The labels of the intervals of column (u, v); none where they were not given.
+  /// The labels of the intervals of column (u, v); empty if none were given.
   [[nodiscard]] std::span<const std::uint32_t> column_labels(int u, int v) const {
     const Tile& tile = tile_of(u, v);
     if (!tile.labels) return {};

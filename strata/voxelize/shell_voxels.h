@@ -25,13 +25,13 @@ namespace strata {
 ///   Huang et al.'s 26-separating test; at borders of triangles it is the exact and thinner one.
 /// - k6: the triangle meets one of the 3 line segments between the centres of opposite faces.
 ///
-/// What the thin sets promise: a step between two centres that are 26-neighbours (6-neighbours)
+/// Guarantee of the thin sets: a step between two centres that are 26-neighbours (6-neighbours)
 /// runs along half a segment of the one voxel and half a segment of the other. A step that meets
 /// the surface therefore has an end in the set. So for a closed mesh, two voxels outside the set
-/// that a path of 26-neighbours (6-neighbours) outside the set joins have the same winding number.
-/// No connectivity is needed, and holes smaller than the segments can see stay sealed. Always k6
-/// within k26 within kConservative; where the surface meets a shared end of two segments, both
-/// voxels are filled. (Laine 2013's segments, closed on both ends.)
+/// have the same winding number if a path of 26-neighbours (6-neighbours) outside the set connects
+/// them. The mesh needs no connectivity, and holes smaller than the spacing of the segments stay
+/// sealed. k6 is always a subset of k26, and k26 of kConservative; where the surface meets a shared
+/// end of two segments, both voxels are filled. (Laine 2013's segments, closed on both ends.)
 ///
 /// Work is proportional to the runs of voxels stored (the thin sets: to the voxels of the
 /// conservative one). The result does not depend on the axis, the threads or the order of the
@@ -45,7 +45,7 @@ Result<VoxelIntervals> voxelize_shell(const LatticeMesh& mesh, const VoxelGrid& 
                                       const Execution& execution = {});
 
 /// The voxels of `a` or of `b`. O(intervals).
-/// @return kUsage when grid, axis or rows of the two differ, kLimit when memory runs out,
+/// @return kUsage when the two differ in grid, axis or rows, kLimit when memory runs out,
 /// kCancelled
 Result<VoxelIntervals> union_intervals(const VoxelIntervals& a, const VoxelIntervals& b,
                                        const Execution& execution = {});

@@ -12,20 +12,20 @@ namespace strata {
 class ListSource;      // strata/hashbuffer/list_source.h
 class TileListFilter;  // strata/hashbuffer/list_filter.h
 
-/// What is known of a mesh: whether it is closed, that is, whether every edge is used equally often
-/// in both directions (is_closed(); under InsideRule::kParity an even number of times will do).
+/// Whether a mesh is known to be closed: every edge is used equally often in both directions
+/// (is_closed(); with InsideRule::kParity an even number of times suffices).
 enum class Closedness {
-  kCheck,         ///< voxelize() finds out, in a small part of the time it takes
+  kCheck,         ///< voxelize() checks it, at a small part of its cost
   kAssumeClosed,  ///< known to be closed; the voxels of an open mesh would be wrong
-  kAssumeOpen     ///< known to be open; of a closed mesh the voxels are the same, later
+  kAssumeOpen     ///< known to be open; for a closed mesh the voxels are the same, but take longer
 };
 /// What to do with a mesh that is not closed.
 enum class OpenMode {
-  kVote,     ///< flat holes are closed; else the rays of all directions: winding numbers
+  kVote,     ///< flat holes are closed; elsewhere rays along all axes decide by winding numbers
   kSurface,  ///< keep only the voxels that the surface touches
   kFail      ///< ErrorCode::kGeometry
 };
-/// Which voxels a surface fills.
+/// Voxels that represent a surface.
 enum class SurfaceKind {
   kConservative,  ///< every voxel that the surface touches (closed boxes), exactly
   k26,            ///< 26-separating: no path of 26-neighbours crosses it
@@ -39,29 +39,30 @@ struct VoxelizeOptions {
   bool surface = false;  ///< voxels of the surface; with solid: the union
   SurfaceKind surface_kind = SurfaceKind::kConservative;
   OpenMode open = OpenMode::kVote;
-  /// Where the mesh is not closed, `open` decides what its voxels are. A tree's lists are closed: a
-  /// filter asks for no check.
+  /// Where the mesh is not closed, `open` decides what its voxels are. With a filter there is no
+  /// check, since a tree's lists are closed.
   Closedness closedness = Closedness::kCheck;
   StoreKind store = StoreKind::kAuto;
   OffsetKind offsets = OffsetKind::kPlaneFirst;
-  /// With n > 1 the filled fraction of voxels: the mesh is voxelized with n voxels for one along
-  /// each axis, so that a voxel has n^3 samples, and a voxel's label says how many of those are
-  /// solid, 1 to n^3. Exact as all voxels are, and the same for every axis; intervals end where the
-  /// label changes. Takes n^2 times the columns: time and memory grow with the surface at n times
-  /// the resolution. Not of labelled lists.
+  /// With n > 1, labels give the filled fraction of voxels: the mesh is voxelized at n times the
+  /// resolution, so that a voxel has n^3 samples, and its label is the number of solid samples, 1
+  /// to n^3. The labels are exact and the same for every axis; intervals end where the label
+  /// changes. Takes n^2 times the columns: time and memory grow with the surface at n times the
+  /// resolution. Not for labelled lists.
   int samples = 1;
-  bool statistics = false;  ///< count and hash what comes out
-  /// Makes other lists of the mesh's before they are filled: a Boolean tree. Borrowed. Then the
-  /// rule applies to what it makes, and a voxel is of the surface when faces of solids pass through
-  /// it and the tree depends on those solids there (where they are several, that may be some voxels
-  /// more than the surface meets). Of labelled lists it makes labelled intervals.
+  bool statistics = false;  ///< count and hash the result
+  /// Transforms the mesh's lists before they are filled, e.g. for a Boolean tree. Borrowed. The
+  /// rule then applies to the transformed lists, and a voxel belongs to the surface when faces of
+  /// solids pass through it and the tree depends on those solids there (with several solids, these
+  /// may be a few more voxels than the surface meets). Labelled lists give labelled intervals.
   const TileListFilter* filter = nullptr;
-  /// Makes the lists in place of this process's threads: a GPU. Borrowed; used by the calling
-  /// thread alone. `store` and `offsets` are its own then, and surfaces are not its work.
+  /// Computes the lists in place of this process's threads, such as on a GPU. Borrowed; used by the
+  /// calling thread alone. `store` and `offsets` are ignored then, and surfaces are still found by
+  /// the CPU.
   ListSource* source = nullptr;
 };
 
-/// What voxelizing found out.
+/// Statistics of a voxelization.
 struct VoxelizeReport {
   std::uint64_t solid_voxels = 0;  ///< with `statistics`
   std::uint64_t intervals = 0;     ///< with `statistics`

@@ -10,17 +10,17 @@
 
 namespace strata::csg {
 
-/// Finds surfaces by a walk of the lists of all solids, in a compute shader over any store: a bit a
-/// solid, the tree simplified tile by tile as on the CPU. A pixel where the walk alone does not
-/// decide (faces that coincide, solids that are open or overlap themselves) is decided by the CPU's
-/// code from its list, which is downloaded. So the surfaces are the CPU's, bit for bit.
+/// Finds surfaces by a walk over the lists of all solids, in a compute shader over any store, with
+/// one bit per solid and the tree simplified tile by tile as on the CPU. A pixel that the walk
+/// cannot decide (coincident faces, solids that are open or overlap themselves) is decided by the
+/// CPU's code from its downloaded list. So the surfaces are bit-identical to the CPU's.
 ///
 /// Tiles where the near plane cuts a solid, or that meet more than 1024 solids or nodes, are left
 /// to the CPU.
 class GlSurfaceSource final : public SurfaceSource {
  public:
   /// @param store keeps whole payloads; its lists may be of any length
-  /// @param pixels_at_once of rows of tiles that are drawn at once, about
+  /// @param pixels_at_once about how many pixels are drawn at once, in whole rows of tiles
   /// @return kUsage where the driver cannot; kInternal where it refuses a shader
   [[nodiscard]] static Result<std::unique_ptr<GlSurfaceSource>> create(
       const gl::Context& context, std::unique_ptr<gl::Store> store,
@@ -30,9 +30,9 @@ class GlSurfaceSource final : public SurfaceSource {
   Result<void> find(const FrameInput& frame, SurfaceImage& image, DrawReport& report,
                     std::vector<std::uint32_t>& left, const Execution& execution) override;
 
-  /// Who found the surfaces of the last frame.
+  /// Who found the surfaces of the last frame, GPU or CPU.
   struct Counts {
-    std::uint64_t walked = 0;    ///< pixels that the walk decided, in tiles that have something
+    std::uint64_t walked = 0;    ///< pixels that the walk decided, in tiles with solids
     std::uint64_t doubtful = 0;  ///< pixels decided from their lists
     std::uint64_t left = 0;      ///< tiles left to the CPU
   };

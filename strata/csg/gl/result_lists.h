@@ -8,12 +8,12 @@
 
 namespace strata::csg {
 
-/// Lists of a mesh on the GPU and, where the mesh is the soup of SolidLists, those of the tree's
-/// result: the filter's, bit for bit. A walk of the solids' lists makes them where they are, with a
-/// bit a solid, the tree simplified tile by tile. Pixels that the walk does not decide (solids that
-/// are open or overlap themselves, tiles of more than 1024 solids or nodes) are downloaded as they
-/// are, and go through the filter here; so do all of the rows that are made at once where a list is
-/// longer than a thread may walk.
+/// Lists of a mesh on the GPU and, if the mesh is the soup of SolidLists, of the tree's result,
+/// bit-identical to the filter's. A walk over the solids' lists computes them on the GPU, with one
+/// bit per solid and the tree simplified tile by tile. Pixels that the walk does not decide (solids
+/// that are open or overlap themselves, tiles of more than 1024 solids or nodes) are downloaded
+/// unchanged and filtered on the CPU; so are all rows of a batch in which a list is longer than a
+/// thread may walk.
 class GlResultSource final : public gl::ComputeListSource {
  public:
   /// As ComputeListSource::create(). @param execution threads of the filter as well
@@ -26,8 +26,8 @@ class GlResultSource final : public gl::ComputeListSource {
   Result<void> set_mesh(const LatticeMesh& mesh) override;
   bool use_filter(const TileListFilter& filter) override;
 
-  /// Who made the lists since the filter was set; rows with a list that is too long to be walked
-  /// are not counted.
+  /// Who computed the lists since the filter was set. Rows with a list that is too long to walk are
+  /// not counted.
   struct Counts {
     std::uint64_t walked = 0;       ///< pixels with crossings that the walk decided
     std::uint64_t handed_over = 0;  ///< pixels that the filter decided

@@ -14,15 +14,15 @@ namespace strata::csg {
 /// different solids that coincide (law 5) are left out: they have no thickness.
 struct Measures {
   double volume = 0;  ///< cubic world units
-  /// Bound for all that the rays meet: between two rays the length inside changes by no more than
-  /// what the slopes of the faces that both meet do not explain; half a lattice step of the
-  /// surface for the snap; more where the axes contradict each other.
+  /// Bound for the parts that rays meet. It is the change of the inside length between two rays
+  /// that the slopes of the faces met by both do not explain, plus half a lattice step of the
+  /// surface for the snap, and more where the axes contradict each other.
   double volume_error = 0;
   double area = 0;        ///< square world units
   double area_error = 0;  ///< estimate: cells at outlines, or three times the spread between
                           ///< interleaved half grids
   glm::dvec3 centre{0};   ///< centre of mass, world space
-  /// Bounds, world space: of the crossings, and of the solids' vertices that the result reaches.
+  /// Bounds in world space: of the crossings and of the solids' vertices that lie on the result.
   glm::dvec3 low{0}, high{0};
   /// Bound: no side of the result is farther from `low` or `high`. 0 where vertices decide all
   /// sides.
@@ -30,7 +30,7 @@ struct Measures {
   int resolution = 0;                      ///< voxels along each side of the box measured on
   std::uint64_t result_crossings = 0;      ///< all axes
   std::uint64_t max_depth_complexity = 0;  ///< of the result
-  bool empty = true;  ///< no ray met anything: the result is empty, or smaller than a voxel
+  bool empty = true;  ///< no ray met the result: it is empty or smaller than a voxel
 };
 
 struct MeasureOptions {
@@ -38,11 +38,11 @@ struct MeasureOptions {
   /// 1024 while volume_error is more than a thousandth of the volume and the lists are not very
   /// long.
   std::optional<int> resolution = {};
-  /// As Preview has it: faces this near count as coinciding.
+  /// As for Preview: faces nearer than this coincide.
   double relative_precision = 0;
 };
 
-/// Measures the result of `root`, on a grid around what result_bounds() tells of it.
+/// Measures the result of `root` on a grid around result_bounds().
 /// @return kUsage (resolution, a tree that check_tree() refuses), kGeometry, kLimit, kCancelled
 Result<Measures> measure(const Tree& tree, Tree::NodeId root, const MeasureOptions& options = {},
                          const Execution& execution = {});

@@ -35,7 +35,7 @@ struct ColourScheme {
 /// Null when there is none of that name (case does not matter).
 [[nodiscard]] const ColourScheme* find_colour_scheme(std::string_view name);
 
-/// A part of the tree that is shown beside it, transparent.
+/// A part of the tree that is also shown as a transparent ghost.
 struct Ghost {
   Tree::NodeId node = Tree::kNone;
   glm::vec4 colour{0.7f, 0.7f, 0.7f, 0.5f};  ///< red, green, blue, alpha in [0, 1]
@@ -53,12 +53,12 @@ struct PictureOptions {
 
 class SurfaceSource;
 
-/// Draws a tree, again and again: what does not change from frame to frame is kept.
+/// Draws a tree repeatedly; keeps what does not change from frame to frame.
 class Preview {
  public:
   /// Keeps the tree's meshes alive. Draws the tree's root and, transparent, the ghosts.
-  /// @param relative_precision how far coordinates may be off, relative to the scene's size; faces
-  /// nearer than that coincide (see Scene::relative_precision)
+  /// @param relative_precision error of coordinates relative to the scene's size; faces nearer than
+  /// this coincide (see Scene::relative_precision)
   /// @pre check_tree() of the root and of the ghosts
   explicit Preview(Tree tree, std::vector<Ghost> ghosts = {}, double relative_precision = 0.0,
                    const Execution& execution = {});
@@ -66,24 +66,24 @@ class Preview {
   Preview(Preview&&) noexcept;
   Preview& operator=(Preview&&) noexcept;
 
-  /// Around all solids that are drawn: what a camera should see. Cutters more than a thousand times
+  /// The box around all drawn solids, which a camera should see. Cutters more than a thousand times
   /// larger than the result do not count.
   [[nodiscard]] Bounds box() const;
-  /// The view of pictures: make_view() of box(). Where things stand around the eye, its depths
-  /// begin at the nearest face in the picture, so that what is small and near is seen whole before
-  /// what is vast and far. @return as make_view()
+  /// The view of pictures: make_view() of box(). If solids surround the eye, its depths begin at
+  /// the nearest face in the picture, so that small near solids are resolved in front of vast far
+  /// ones. @return as make_view()
   [[nodiscard]] Result<View> view(const Camera& camera, const glm::ivec2& size,
                                   const Execution& execution = {}) const;
   [[nodiscard]] const Tree& tree() const;
 
-  /// Has surfaces found elsewhere from now on, by a GPU say: the same, bit for bit. Borrowed, used
-  /// by the thread that draws; null is this process's threads. Ghosts and light are always theirs.
+  /// Lets `source`, such as a GPU, find the surfaces from now on, bit-identical. Borrowed; used by
+  /// the thread that draws. Null: this process's threads, which always do ghosts and light.
   void set_source(SurfaceSource* source);
 
   /// The visible surfaces. Valid until the next call.
   /// @return kUsage, kGeometry (coordinates too large), kCancelled
   Result<const SurfaceImage*> draw(const View& view, const Execution& execution = {});
-  /// Moves a solid and draws again only what it touches, in the view of the last draw().
+  /// Moves a solid and redraws only the tiles it touches, in the view of the last draw().
   Result<const SurfaceImage*> move_solid(std::uint32_t solid, const glm::dmat4& world_from_mesh,
                                          const Execution& execution = {});
   [[nodiscard]] const DrawReport& report() const;

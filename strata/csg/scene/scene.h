@@ -12,7 +12,7 @@
 
 namespace strata::csg {
 
-/// Something in a scene that was done otherwise than written, or not at all.
+/// Something in a scene that was done differently than written, or not at all.
 struct SceneWarning {
   /// For machines: "not-done" (a node that cannot be done), "missing-file", "missing-font",
   /// "approximate", "ignored", "geometry", "openscad" (a warning of its own about a program).
@@ -20,7 +20,7 @@ struct SceneWarning {
   std::string message;  ///< begins with `file:line:column: `, of openscad's with what it names
 };
 
-/// What a program says of the camera by `$vpt`, `$vpr`, `$vpd` and `$vpf`; empty: not said.
+/// The camera that a program sets by `$vpt`, `$vpr`, `$vpd` and `$vpf`; empty: not set.
 struct SceneView {
   std::optional<glm::dvec3> target;     ///< world
   std::optional<glm::dvec3> rotation;   ///< degrees
@@ -28,30 +28,31 @@ struct SceneView {
   std::optional<double> field_of_view;  ///< degrees, of the picture's height, in (0, 180)
 };
 
-/// A scene: its tree, and what modifiers ask to be shown beside it.
+/// A scene: its tree, and the subtrees that modifiers show as ghosts.
 struct Scene {
   Tree tree;  ///< the root is the union of the top level
-  /// Subtrees with `%`: shown as grey ghosts, part of nothing.
+  /// Subtrees with `%`: shown as grey ghosts, not part of the result.
   std::vector<Tree::NodeId> backgrounds;
   /// Subtrees with `#`: part of the tree, and shown again as red ghosts (nodes of their own).
   std::vector<Tree::NodeId> highlights;
-  /// What pictures show in place of the root; empty: the root. Highlighted parts are seen as ghosts
-  /// alone, and flat parts beside solids, which the root is without, as slabs.
+  /// The node that pictures show in place of the root; empty: the root. It shows highlighted parts
+  /// only as ghosts, and shows flat parts among solids, which the root leaves out, as slabs.
   std::vector<Tree::NodeId> shown;
   std::vector<SceneWarning> warnings;
-  std::vector<std::string> notes;  ///< what a program printed with echo(), line by line, and such
+  std::vector<std::string> notes;  ///< output of a program's echo() and the like, line by line
   /// The top level is flat: its outlines are slabs of thickness 1, z from -0.5 to 0.5.
   bool flat = false;
   /// How far numbers in the file may be off, relative to their size: 5e-6 for six printed digits.
   double relative_precision = 0.0;
-  std::optional<SceneView> view;  ///< of a program that says something of it
-  /// What was opened: the scene itself, what it imports, and all that openscad read for a program.
-  /// What was asked for and is not there has no identity.
+  std::optional<SceneView> view;  ///< if a program sets it
+  /// The files that were opened: the scene itself, its imports, and all files that openscad read
+  /// for a program. A missing file has no identity.
   std::vector<FileIdentity> files;
 };
 
 struct ReadSceneOptions {
-  /// Where relative names of imported files are looked for; empty: the folder of the scene.
+  /// Folder in which relative names of imported files are looked up; empty: the folder of the
+  /// scene.
   std::string asset_folder = {};
   double scad_timeout_s = 300.0;  ///< for the `openscad` program that turns .scad into .csg
   /// Options of `openscad` for programs, word by word, such as "-D", "x=40".
@@ -60,8 +61,8 @@ struct ReadSceneOptions {
   std::string root_folder = {};
 };
 
-/// Where a scene in `folder` finds the file that it calls `name`: there, or in a folder around it,
-/// since scenes are often written to another folder than their source.
+/// Finds the file `name` of a scene in `folder`: there, or in a folder above it, since scenes are
+/// often written to another folder than their source.
 [[nodiscard]] std::optional<std::string> find_asset(const std::string& folder,
                                                     const std::string& name);
 
@@ -71,7 +72,7 @@ struct ReadSceneOptions {
 Result<Scene> read_scene(const std::string& path, const ReadSceneOptions& options = {},
                          const Execution& execution = {});
 
-/// The same from text; `name` is what messages call it.
+/// The same from text; messages call it `name`.
 Result<Scene> parse_scene(std::string_view text, const std::string& name,
                           const ReadSceneOptions& options = {}, const Execution& execution = {});
 

@@ -6,11 +6,11 @@
 
 namespace strata::csg {
 
-/// What was drawn, in numbers.
+/// Statistics of a drawing.
 struct DrawReport {
-  std::uint64_t fragments = 0;  ///< crossings that were made
-  std::uint64_t resolved = 0;   ///< pixels decided one by one: faces that coincide, deep nesting
-  std::uint64_t covered = 0;    ///< pixels where something is seen
+  std::uint64_t fragments = 0;  ///< crossings that were computed
+  std::uint64_t resolved = 0;   ///< pixels decided individually: coincident faces, deep nesting
+  std::uint64_t covered = 0;    ///< pixels that show a solid
 };
 
 /// The visible surface of each pixel, row by row from the top.
@@ -18,10 +18,11 @@ struct SurfaceImage {
   static constexpr std::uint32_t kNone = 0xffffffffu;
   static constexpr std::uint32_t kExit = 0x80000000u;
   int width = 0, height = 0;
-  std::vector<std::uint32_t> depth;     ///< in steps of the view, View::distance(); kNone: nothing
-  std::vector<std::uint32_t> solid;     ///< index into the tree; meaningless where nothing is seen
+  std::vector<std::uint32_t> depth;  ///< in steps of the view, View::distance(); kNone: nothing
+  std::vector<std::uint32_t>
+      solid;  ///< index into the tree's solids; undefined where no solid is visible
   std::vector<std::uint32_t> triangle;  ///< [exit:1 | triangle:31] of the solid's mesh; exit: a cut
-                                        ///< face, the surface is left there
+                                        ///< face, where the ray leaves the solid
   void resize(int columns, int rows) {
     width = columns, height = rows;
     const std::size_t pixels = static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);

@@ -12,14 +12,14 @@ namespace strata::gl {
 
 class ComputeRasterizer;
 
-/// Lists by the compute rasterizer in a store of the GPU: the CPU's, bit for bit.
+/// Lists computed by the compute rasterizer in a store on the GPU; bit-identical to the CPU's.
 class ComputeListSource : public ListSource {
  public:
   ~ComputeListSource() override;
 
   /// `context` stays current while this is used. @param store keeps whole payloads
-  /// @param spare takes over for good where `store` fails, as with lists beyond its ages; may
-  /// be null @param pixels_at_once see rows_at_once(), about @param execution its stop and memory
+  /// @param spare used from the first failure of `store` on, as with lists beyond its ages; may be
+  /// null @param pixels_at_once see rows_at_once(), about @param execution its stop and memory
   /// limit (that of a store), asked by lists() @return kUsage where the driver cannot
   [[nodiscard]] static Result<std::unique_ptr<ComputeListSource>> create(
       const Context& context, std::unique_ptr<Store> store, std::unique_ptr<Store> spare = nullptr,
@@ -31,7 +31,7 @@ class ComputeListSource : public ListSource {
   [[nodiscard]] int rows_at_once(const RasterTarget& target) const override;
 
  protected:
-  /// @param execution without its progress, of which lists() would tell a part only
+  /// @param execution without its progress, since lists() would report only a part of it
   explicit ComputeListSource(const Execution& execution);
   [[nodiscard]] Result<void> open(const Context& context, std::unique_ptr<Store> store,
                                   std::unique_ptr<Store> spare, std::int64_t pixels_at_once);

@@ -25,13 +25,13 @@ class Store {
   /// A hint before begin(): how many fragments will come, about. Without effect where room is made
   /// as it is needed.
   virtual void expect(std::uint64_t fragments) { static_cast<void>(fragments); }
-  /// Whether expect() is worth a pass that counts: a table that is far too full is slow to tell.
+  /// Whether a counting pass for expect() pays: a table that is far too full takes long to fail.
   [[nodiscard]] virtual bool gains_by_hint() const { return false; }
-  /// Empties the store for a frame of that size, in pixels, each side at least 1 (kUsage).
+  /// Empties the store for a frame of width x height pixels, each at least 1 (kUsage).
   [[nodiscard]] virtual Result<void> begin(std::uint32_t width, std::uint32_t height) = 0;
   /// Passes over the geometry. May change in begin(), begin_pass() and end().
   [[nodiscard]] virtual int passes() const = 0;
-  /// The text of that pass's strata_insert. @pre pass < passes()
+  /// The GLSL text of strata_insert for that pass. @pre pass < passes()
   [[nodiscard]] virtual StoreGlsl glsl(int pass) const = 0;
   /// The rows that the pass keeps fragments of.
   [[nodiscard]] virtual PixelRows rows_of(int pass) const = 0;
@@ -50,7 +50,7 @@ class Store {
   [[nodiscard]] virtual std::uint64_t memory_bytes() const = 0;
   /// Fragments of the frame; 0 where the store does not need to count them.
   [[nodiscard]] virtual std::uint64_t fragments() const { return 0; }
-  /// Bits of a payload that come back; 0 where a store keeps depth alone.
+  /// Bits of a payload that are kept; 0 for stores of depths alone.
   [[nodiscard]] virtual std::uint32_t payload_mask() const = 0;
 
   // --- reading, after end() said true -----------------------------------------------------------
@@ -77,7 +77,7 @@ class Store {
 
   std::uint32_t width_ = 0, height_ = 0;
   std::uint64_t memory_limit_ = 0;
-  std::uint64_t binding_bytes_;  ///< what a shader sees at one binding at most
+  std::uint64_t binding_bytes_;  ///< most bytes that a shader sees at one binding
 
  private:
   struct Reader;  ///< the programs and buffers of download()
@@ -98,8 +98,8 @@ class Store {
 
 /// Builds a frame: draws the producer once a pass, and again where something did not fit.
 /// `execution` is asked for its stop and its memory limit.
-/// @return how it was built; `fragments` as Store::fragments().
-/// ErrorCode::kLimit as Store::end(), kCancelled on request, and what the producer fails with.
+/// @return how it was built; `fragments` as Store::fragments(). ErrorCode::kLimit as Store::end(),
+/// kCancelled on request, or the producer's error.
 [[nodiscard]] Result<BuildReport> build(Store& store, Producer& producer,
                                         const Execution& execution = {});
 

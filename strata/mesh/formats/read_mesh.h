@@ -16,7 +16,7 @@ namespace strata {
 enum class MeshFormat {
   kAuto,  ///< by the extension of the path
   kObj,   ///< Wavefront OBJ: v and f statements; all else is skipped
-  kStl,   ///< STL, ascii or binary, told apart by size; a wrong count gives way to the size
+  kStl,   ///< STL, ascii or binary, distinguished by size; the size overrules a wrong count
   kPly,   ///< PLY 1.0, ascii or binary of either byte order: faces and triangle strips
   kOff    ///< Object File Format, ascii, with the prefixes ST, C, N, 4 in any order
 };
@@ -24,7 +24,7 @@ enum class MeshFormat {
 /// Who reads the file.
 enum class MeshReader {
   kOwn,      ///< the readers of this folder
-  kOpenMesh  ///< OpenMesh, to compare; positions pass through float there
+  kOpenMesh  ///< OpenMesh, for comparison; it rounds positions to float
 };
 
 /// How to read.
@@ -39,8 +39,8 @@ struct MeshReadOptions {
   std::size_t chunk_bytes = std::size_t{1} << 19;
 };
 
-/// What the reader met. Faces that were dropped are counted by cause, one cause a face, in the
-/// order of the fields. Faces of no area, duplicates and open edges are diagnose()'s business.
+/// Statistics of the reader. Dropped faces are counted by cause, one cause per face, in the order
+/// of the fields. diagnose() counts faces without area, duplicates and open edges.
 struct MeshReadStats {
   std::string format;           ///< "obj", "stl ascii", "stl binary", "ply ascii", ...
   std::uint64_t bytes = 0;      ///< size of the file
@@ -49,14 +49,15 @@ struct MeshReadStats {
   std::uint64_t triangles = 0;  ///< in the soup
 
   std::uint64_t too_few_vertices = 0;  ///< faces dropped: fewer than three vertices
-  std::uint64_t out_of_range = 0;      ///< faces dropped: an index names no vertex
+  std::uint64_t out_of_range = 0;      ///< faces dropped: an index is not that of a vertex
   std::uint64_t non_finite = 0;        ///< faces dropped: a coordinate is NaN or infinite
   std::uint64_t degenerate = 0;        ///< triangles dropped: two corners are the same vertex
-  std::uint64_t ignored = 0;           ///< elements that are no faces: lines, points, edges
-  std::uint64_t non_planar = 0;        ///< polygons more than 1/1000 of their size out of flat
-  std::vector<std::string> warnings;   ///< sentences with places, for the user
+  std::uint64_t ignored = 0;           ///< elements that are not faces: lines, points, edges
+  std::uint64_t non_planar =
+      0;  ///< polygons that deviate from a plane by more than 1/1000 of their size
+  std::vector<std::string> warnings;  ///< sentences with places, for the user
 
-  /// Faces of the file that left nothing in the soup or lost a part because of bad data.
+  /// Faces of the file that are missing in the soup, wholly or in part, because of bad data.
   [[nodiscard]] std::uint64_t dropped_faces() const {
     return too_few_vertices + out_of_range + non_finite;
   }
@@ -72,8 +73,8 @@ struct MeshFile {
 /// from their first corner, others Delaunay triangles or at least triangles that do not overlap;
 /// all share the face element. STL corners are welded by exact position (-0 equals +0). Vertices
 /// keep the order of the file. Text may begin with a UTF-8 byte order mark. Counts in headers are
-/// claims: nothing is allocated that the bytes of the file do not back. The result does not depend
-/// on the number of threads.
+/// not trusted: the reader allocates no more than the bytes of the file can fill. The result does
+/// not depend on the number of threads.
 /// @param path  a file, or "-" for standard input, which needs options.format
 /// @return kInput, with line or byte: no such file, unknown format, empty, malformed, truncated,
 /// UTF-16 text, no vertices, no usable face, or with `strict` a face that had to be dropped;

@@ -6,7 +6,7 @@
 #include "strata/core/result.h"
 #include "strata/gl/shader_program.h"
 
-// Between what makes fragments on the GPU (raster/gl) and what keeps them (hashbuffer/gl).
+// The interface between producers of fragments on the GPU (raster/gl) and stores (hashbuffer/gl).
 
 namespace strata::gl {
 
@@ -21,7 +21,7 @@ namespace strata::gl {
 /// stage that has storage blocks. The function returns early for helper invocations by itself only
 /// where the producer defines STRATA_FRAGMENT_STAGE before it.
 ///
-/// Programs made of it can be kept: the same text and settings mean the same, whatever the frame.
+/// Programs made from it can be reused: the same text and settings mean the same in every frame.
 struct StoreGlsl {
   std::string name;       ///< for error messages
   GlslSettings settings;  ///< extensions and defines that the text needs
@@ -39,13 +39,13 @@ struct PixelRows {
   std::uint32_t begin = 0, end = 0;
 };
 
-/// Something that draws: gives the same fragments, in any order, each time it is asked.
+/// A source of fragments: produces the same fragments, in any order, each time it is asked.
 class Producer {
  public:
   virtual ~Producer() = default;
   [[nodiscard]] virtual std::uint32_t width() const = 0;   ///< pixels
   [[nodiscard]] virtual std::uint32_t height() const = 0;  ///< pixels
-  /// Gives every fragment of `rows` to the store's strata_insert once; others may be given too.
+  /// Passes every fragment of `rows` to the store's strata_insert once; it may pass others as well.
   /// The store's buffers are bound. Leaves them visible to the shaders that follow.
   [[nodiscard]] virtual Result<void> draw(const StoreGlsl& store, PixelRows rows) = 0;
 };

@@ -14,15 +14,16 @@
 namespace strata {
 
 struct OpenVdbOptions {
-  /// Empty: `solid` of a BoolGrid or MaskGrid, `density` of a FloatGrid, `ids` of one of ids.
+  /// Empty: `solid` for a BoolGrid or MaskGrid, `density` for a FloatGrid, `ids` for a FloatGrid of
+  /// ids.
   std::string name{};
   /// FloatGrid: the value of a voxel is its label divided by this number, and the grid a fog
   /// volume. Give samples^3 with VoxelizeOptions::samples. 0: labels are ids, and are the values.
   std::uint32_t samples = 1;
 };
 
-/// The grid that `strata voxelize -o x.vdb` would write: the solid voxels are active, those that
-/// are alike in a node are a tile, index (i, j, k) is the centre of voxel (i, j, k) in world space.
+/// The grid that `strata voxelize -o x.vdb` would write: the solid voxels are active, a node of
+/// equal voxels is a tile, and index (i, j, k) is the centre of voxel (i, j, k) in world space.
 /// Work grows with the surface, and with the volume in blocks of 8 x 8 x 8 voxels. Grid is
 /// openvdb::BoolGrid, MaskGrid or FloatGrid. openvdb::initialize() is needed to write it, not for
 /// this.

@@ -17,10 +17,10 @@ struct VoxelFormat {
                      ///< "png", "zarr"
   std::string extension;    ///< with the dot; that of a folder format ends with a slash
   std::string description;  ///< one line for --list-formats
-  /// The axis of the intervals that this format is written from as they come. Those of another axis
-  /// are turned first (voxelize/transposed.h).
+  /// The axis of the intervals that this format is written from as they come. Intervals along
+  /// another axis are transposed first (voxelize/transposed.h).
   Axis axis = Axis::kZ;
-  std::size_t colours = 0;  ///< that a file holds, one a voxel; 0: none
+  std::size_t colours = 0;  ///< most colours in a file, one per voxel; 0: none
   std::uint32_t ids = 0;    ///< the largest id that a voxel can have; 0: no ids
   bool named = false;       ///< holds the name of the grid
 };
@@ -29,11 +29,11 @@ struct VoxelFormat {
 [[nodiscard]] const std::vector<VoxelFormat>& voxel_formats();
 
 struct VoxelWriterOptions {
-  /// .vdb: a float fog volume. Labels say how many of so many samples of a voxel are solid (see
-  /// VoxelizeOptions::samples), and its value is the fraction; with 1, slabs without labels have 1
-  /// inside. 0: none. Not with ids.
+  /// .vdb: a float fog volume with this many samples per voxel. Labels are the number of solid
+  /// samples of a voxel (see VoxelizeOptions::samples) and values the fraction; with 1, slabs
+  /// without labels have the value 1 inside. 0: no fog volume. Not with ids.
   std::uint32_t fog = 0;
-  /// .vdb: a MaskGrid, which is smaller; not all programs open it. Else a BoolGrid.
+  /// .vdb: a MaskGrid, which is smaller; not all programs can read it. Otherwise a BoolGrid.
   bool mask = false;
   /// .vdb, .vti, .nrrd: name of the grid. Empty: `density` of a fog volume, `ids` with ids, else
   /// `solid`.
@@ -42,15 +42,15 @@ struct VoxelWriterOptions {
   /// type that holds it (.vdb: float); 0: a voxel is solid or not. Slabs have labels with ids, fog
   /// or colours only.
   std::uint32_t ids = 0;
-  /// Of label n the colour at n - 1: red, green, blue, alpha; none: one colour. Not with ids.
+  /// Label n has the colour at n - 1: red, green, blue, alpha. Empty: one colour. Not with ids.
   std::vector<glm::u8vec4> colours{};
 };
 
 /// Writes a voxel set slab by slab: every slab of one axis, in increasing v, then finish(). Any
-/// axis will do. Nothing stands under the final name until finish() succeeds; a writer destroyed
-/// before leaves nothing behind. Memory: one slab, and what the format itself must hold; with slabs
-/// of another axis than VoxelFormat::axis the intervals of the whole set, twice, which grow with
-/// its surface.
+/// axis is accepted. The file appears under its name only when finish() succeeds; a writer
+/// destroyed before leaves nothing behind. Memory: one slab and the data that the format itself
+/// must hold; with slabs of another axis than VoxelFormat::axis the intervals of the whole set,
+/// twice, which grow with its surface.
 class VoxelWriter {
  public:
   virtual ~VoxelWriter() = default;
@@ -60,7 +60,7 @@ class VoxelWriter {
 };
 
 /// Opens a writer for `path` ("-": standard output). The format is `format`, or if that is empty
-/// the path's extension. @return kUsage: no such format, none for the extension, a folder format on
+/// the path's extension. @return kUsage: unknown format, unknown extension, a folder format on
 /// standard output, a grid, ids or colours the format cannot hold, fog, mask and ids together;
 /// kOutput: the file or folder cannot be made.
 Result<std::unique_ptr<VoxelWriter>> open_voxel_writer(const std::string& path,
@@ -74,10 +74,10 @@ Result<std::unique_ptr<VoxelWriter>> open_voxel_writer(const std::string& path,
 Result<void> write_voxels(const VoxelIntervals& set, const std::string& path,
                           const VoxelWriterOptions& options = {}, const Execution& execution = {});
 
-/// The format that open_voxel_writer would take. @return kUsage as there
+/// The format that open_voxel_writer would choose. @return kUsage as there
 Result<VoxelFormat> voxel_format_for(const std::string& path, const std::string& format);
 
-/// Whether a format holds ids up to `largest`. @return kUsage naming those that do
+/// Checks that a format can store ids up to `largest`. @return kUsage naming those that can
 Result<void> check_ids(const VoxelFormat& format, std::uint32_t largest);
 
 }  // namespace strata
