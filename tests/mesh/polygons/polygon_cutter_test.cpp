@@ -275,7 +275,7 @@ TEST(PolygonCutter, SizeOfTheBendIsTold) {
   const QuadCut quad = cut_quad({0, 0, 14}, {10, 0, 10}, {10, 10, 14}, {0, 10, 10});
   EXPECT_TRUE(quad.bend.large());
   EXPECT_DOUBLE_EQ(quad.bend.height, 4.0);
-  EXPECT_NE(quad.bend.text().find("4 out of one plane"), std::string::npos) << quad.bend.text();
+  EXPECT_NE(quad.bend.text().find("deviate 4 from a plane"), std::string::npos) << quad.bend.text();
 }
 
 TEST(PolygonCutter, WhatHasNoPlaneStaysAFan) {
