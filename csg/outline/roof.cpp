@@ -7,6 +7,7 @@
 #include "csg/outline/outline.h"
 #include "csg/outline/straight_skeleton.h"
 #include "mesh/polygons/plane_predicates.h"
+#include "strata/mesh/diagnose.h"
 #include "strata/mesh/soup_tools.h"
 
 namespace strata::csg {
@@ -72,7 +73,7 @@ std::vector<std::vector<Index>> loops_of(std::vector<std::pair<Index, Index>> ed
 }
 
 /// The roof over one outer contour with its holes.
-Result<TriangleSoup> piece_roof(const Outline& piece, int steps, double jitter) {
+Result<TriangleSoup> piece_roof(const Outline& piece, int steps, const Jitter& jitter) {
   auto skeleton = straight_skeleton(piece, steps, jitter);
   if (!skeleton) return tl::unexpected(skeleton.error());
   TriangleSoup mesh;
@@ -104,6 +105,10 @@ Result<TriangleSoup> piece_roof(const Outline& piece, int steps, double jitter) 
     return fail(ErrorCode::kGeometry,
                 "roof: the faces cover {} of {}: the outline is too intricate", covered, area);
   }
+  if (!is_closed(mesh)) {
+    return fail(ErrorCode::kGeometry,
+                "roof: the faces leave gaps between each other: the outline is too intricate");
+  }
   return mesh;
 }
 
@@ -124,10 +129,12 @@ Result<TriangleSoup> make_roof(const Outline& outline, const std::string& method
   const int steps = voronoi ? segments.count(extent / 2) : 0;
   TriangleSoup mesh;
   for (const Outline& piece : pieces(outline)) {
-    auto roof = piece_roof(piece, steps, 0);
+    auto roof = piece_roof(piece, steps, {});
     // Events that fall together within rounding can be mistaken; a little noise parts them.
-    for (const double jitter : {1e-8, 1e-7, 1e-6}) {
-      if (!roof) roof = piece_roof(piece, steps, jitter * extent);
+    for (std::uint32_t seed = 1; seed <= 4; ++seed) {
+      for (const double distance : {1e-8, 1e-7, 1e-6}) {
+        if (!roof) roof = piece_roof(piece, steps, {distance * extent, seed});
+      }
     }
     if (!roof) return roof;
     append(mesh, *roof);

@@ -21,7 +21,7 @@ double cross(const glm::dvec2& a, const glm::dvec2& b) { return a.x * b.y - a.y 
 /// The wavefront: loops of vertices between edges whose lines move inwards.
 class Wavefront {
  public:
-  Result<StraightSkeleton> run(const Outline& outline, int corner_steps, double jitter) {
+  Result<StraightSkeleton> run(const Outline& outline, int corner_steps, const Jitter& jitter) {
     begin(outline, corner_steps, jitter);
     const std::size_t points = vertices_.size();
     std::size_t reflex = 1;
@@ -61,18 +61,22 @@ class Wavefront {
     bool alive = true;
   };
 
-  void begin(const Outline& outline, int corner_steps, double jitter) {
+  void begin(const Outline& outline, int corner_steps, const Jitter& jitter) {
     glm::dvec2 low(kNever), high(-kNever);
     for (const auto& contour : outline.contours) {
       for (const glm::dvec2& p : contour) low = glm::min(low, p), high = glm::max(high, p);
     }
     tolerance_ = 1e-9 * std::max(high.x - low.x, high.y - low.y);
-    std::mt19937 random(1);  // NOLINT: the same every time
-    std::uniform_real_distribution<double> noise(-jitter, jitter);
+    std::mt19937 random(jitter.seed);
+    std::uniform_real_distribution<double> noise(-jitter.distance, jitter.distance);
     for (const auto& exact : outline.contours) {
       auto contour = exact;
-      if (jitter > 0) {
-        for (glm::dvec2& p : contour) p += glm::dvec2(noise(random), noise(random));
+      if (jitter.distance > 0) {
+        for (glm::dvec2& p : contour) {
+          // As arguments of one call the two would be drawn in an order that each compiler chooses.
+          const double y = noise(random), x = noise(random);
+          p += glm::dvec2(x, y);
+        }
       }
       const auto first = static_cast<Index>(vertices_.size());
       const std::size_t n = contour.size();
@@ -309,7 +313,7 @@ class Wavefront {
 }  // namespace
 
 Result<StraightSkeleton> straight_skeleton(const Outline& outline, int corner_steps,
-                                           double jitter) {
+                                           const Jitter& jitter) {
   return Wavefront().run(outline, corner_steps, jitter);
 }
 

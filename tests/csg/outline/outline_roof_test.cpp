@@ -89,7 +89,7 @@ TEST(Roof, RandomStarsAreClosedAndBelowTheirInradius) {
 
 TEST(Roof, LatticeRegionsAreClosed) {
   std::mt19937 random(6);
-  for (int round = 0; round < 100; ++round) {
+  for (int round = 0; round < 2000; ++round) {
     std::vector<Outline> cells;
     for (int x = 0; x < 6; ++x) {
       for (int y = 0; y < 6; ++y) {
