@@ -144,7 +144,8 @@ class Comparer {
   Result<PointCheck> points() {
     std::mt19937_64 random(options_.seed);
     std::uniform_real_distribution<double> unit(0.0, 1.0);
-    const glm::dvec3 shift(unit(random), unit(random), unit(random));
+    glm::dvec3 shift;
+    for (int axis = 0; axis < 3; ++axis) shift[axis] = unit(random);
     return run(options_.point_resolution, shift, [&](const VoxelGrid& grid, const auto& visit) {
       for (int i = 0; i < options_.points; ++i) {
         glm::ivec3 voxel;
