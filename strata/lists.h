@@ -30,10 +30,10 @@
 //
 // Take DepthLists or PayloadLists (count/scan: count, sum up, store, sort) if you can give the same
 // fragments twice: they are faster in most scenes, and no list is too long. Take the one-pass lists
-// (the HA-buffer, a hash table) if you cannot, or if making a fragment is what costs time. The
-// generator runs a second time for the first frame unless create() is told how many fragments
-// to expect, and for a frame that outgrew the one before. DeepLists are one-pass lists with more
-// than 255 layers in a pixel; their payloads have bit 31 and the bits 0 to 28.
+// (the HA-buffer, a hash table) if you cannot, or if fragments are expensive to make. Their
+// generator runs a second time for a frame that outgrew the one before. It also runs a second time
+// for the first frame, unless create() is told how many fragments to expect. DeepLists are one-pass
+// lists for more than 255 layers in a pixel; their payloads have bit 31 and the bits 0 to 28.
 //
 // Million fragments a second by one thread, 1024 x 1024 pixels, generator, lists and a walk over
 // them (docs/performance.md has the whole table and the machine):
@@ -60,12 +60,12 @@ class FragmentLists {
  public:
   using Record = typename Store::Record;
   static constexpr bool kHasPayload = Record::kPayloadBits > 0;
-  /// Fragments may come at any time, by insert(), and not only from a generator.
+  /// True if insert() may add fragments at any time, without a generator.
   static constexpr bool kOnePass = requires(Store & store) { store.begin_frame(); };
 
   /// Empty lists of a screen of width x height pixels, each side at least 1 (ErrorCode::kUsage).
   /// ErrorCode::kLimit if memory does not suffice.
-  /// @param expected_fragments of a frame, about; 0: not known. One-pass lists make room for them.
+  /// @param expected_fragments  of a frame, roughly; 0: unknown. One-pass lists make room for them.
   [[nodiscard]] static Result<FragmentLists> create(int width, int height,
                                                     std::uint64_t expected_fragments = 0) {
     auto store = [&] {
@@ -85,9 +85,9 @@ class FragmentLists {
   [[nodiscard]] std::uint64_t memory_bytes() const { return store_.memory_bytes(); }
 
   /// Replaces the lists by those of a new frame. `generator(sink)` calls sink.insert(x, y, depth,
-  /// payload), without the payload for lists of depth alone, for every fragment: from any number of
-  /// its own threads, in any order; it returns when all are inserted. If it runs again it must give
-  /// the same fragments. `execution.memory_limit` bounds the bytes held.
+  /// payload) for every fragment, without the payload for lists of depth alone. It may insert from
+  /// any number of its own threads, in any order, and returns when all are inserted. If it runs
+  /// again it must give the same fragments. `execution.memory_limit` bounds the bytes held.
   /// @return how it was built. ErrorCode::kLimit, and empty lists, if a list is too long (the
   /// message names pixel and length) or memory does not suffice (it says how many fragments are
   /// missing); kInternal if the generator produced different fragments the second time; kCancelled
@@ -99,7 +99,7 @@ class FragmentLists {
     return report;
   }
 
-  /// Empties one-pass lists for a new frame, with the room that the last one would have needed.
+  /// Empties one-pass lists for a new frame, with the room that the last frame would have needed.
   /// Then insert(), from any threads, and finish(). @return as build()
   [[nodiscard]] Result<void> begin() requires kOnePass {
     is_complete_ = false;
@@ -146,7 +146,7 @@ class FragmentLists {
  private:
   explicit FragmentLists(Store&& store) : store_(std::move(store)) {}
   Store store_;
-  bool is_complete_ = true;  ///< empty lists are
+  bool is_complete_ = true;  ///< true of empty lists
 };
 
 /// Depth alone, any number of layers; the generator runs twice.

@@ -11,7 +11,7 @@
 /// mesh, whose vertices are rounded to 1/256 voxel; all else is exact. voxelize() checks whether
 /// the mesh is closed: see VoxelizeOptions::open. Sets are runs of voxels along an axis: their
 /// memory grows with the surface. VoxelIntervals::contains(), for_each_run() and to_dense() read a
-/// set; voxelize_slabs() and open_voxel_writer() never hold a whole one.
+/// set; voxelize_slabs() and open_voxel_writer() never hold a whole set.
 /// strata/voxelize/formats/openvdb_bridge.h passes a set to OpenVDB.
 
 #include "strata/mesh/formats/read_mesh.h"

@@ -20,7 +20,7 @@
 //   solid             a mesh at its place; a leaf of the tree
 //   crossing          a point where a ray meets a triangle of a solid
 //   transition        a point where a ray enters or leaves a solid; one or several crossings
-//   visible surface   what a ray meets first of the tree's result; picture: its shaded image
+//   visible surface   the first point of the tree's result on each ray; picture: its shaded image
 //   coincide          two crossings so close that they may be the same face, stored twice (law 5)
 //   program           the compiled tree: unions of edges, each of which may be inverted
 //   flattened         a union below a union became part of it
@@ -30,7 +30,7 @@
 //   active box        the box outside of which a solid cannot change the result
 //   vast              much larger than the result (kVast): half spaces made of huge cubes
 //   ghost             a part that a picture shows beside the result, transparent
-//   label             a number that lists of the result carry: which solid or colour a stretch has
+//   label             a number of a stretch of a result's list: names its solid or its colour
 //   slot              the index of a solid in a tile; leaf: a solid as an operand of a program
 
 namespace strata::csg {
@@ -65,7 +65,7 @@ struct Solid {
 /// so a tree may be used any number of times; meshes are shared, not copied. `all |= part` takes
 /// time in proportion to `part`.
 ///
-/// Or they are built node by node, bottom up: operands exist before the node that takes them.
+/// Trees are also built node by node, bottom up: operands exist before the node that takes them.
 /// Below one root each node is an operand once; append() makes further copies. check_tree() tells
 /// whether a tree keeps these rules.
 class Tree {
@@ -73,10 +73,10 @@ class Tree {
   using NodeId = std::uint32_t;
   static constexpr NodeId kNone = 0xffffffffu;
 
-  /// A node [kind | range of operands]; of a solid, `first` is its index into solids().
+  /// A node [kind | range of operands]. For a solid `first` is its index into solids().
   struct Node {
     Operation operation = Operation::kUnion;
-    std::uint32_t first = 0;  ///< into operands(), or the solid
+    std::uint32_t first = 0;  ///< index into the operands, or of the solid
     std::uint32_t count = 0;
   };
 
@@ -88,7 +88,7 @@ class Tree {
 
   NodeId add_solid(Solid solid);
   /// A node over `operands`: union (none: empty), intersection (none: empty), difference (the first
-  /// minus all others; none: empty). @pre ids that this tree has given
+  /// minus all others; none: empty). @pre all ids come from this tree
   NodeId add(Operation operation, std::span<const NodeId> operands);
   NodeId add(Operation operation, std::initializer_list<NodeId> operands);
   /// Copies the subtrees below nodes of a tree, which may be this one, and moves the copies. Nodes
@@ -141,15 +141,15 @@ Result<void> check_tree(const Tree& tree, Tree::NodeId root);
 [[nodiscard]] Bounds bounds(const Solid& solid);
 
 /// A solid this many times larger than the result counts as vast: it does not bound a picture, and
-/// it is clipped where it cannot matter.
+/// its vertices are clamped to the box in which it can change the result.
 inline constexpr double kVast = 1000.0;
 
-/// A box that the result of `node` lies in: union of the operands' for a union, intersection for an
-/// intersection, the first operand's for a difference. A first operand that is vast compared with
-/// what axis-parallel boxes leave of it, such as a half space made of a vast cube, counts only with
-/// what they leave.
+/// A box that the result of `node` lies in. For a union it is the union of the operands' boxes, for
+/// an intersection their intersection, for a difference the box of the first operand. The first
+/// operand may be vast compared with the part that axis-parallel boxes leave of it, such as a half
+/// space made of a vast cube. Then it counts only with that part.
 [[nodiscard]] Bounds bounds(const Tree& tree, Tree::NodeId node);
-/// The same of the root.
+/// The same for the root.
 [[nodiscard]] Bounds bounds(const Tree& tree);
 /// The same, given the boxes of the tree's solids.
 [[nodiscard]] Bounds bounds(const Tree& tree, Tree::NodeId node, std::span<const Bounds> solids);

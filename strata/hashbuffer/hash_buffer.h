@@ -26,11 +26,11 @@
 #include "strata/hashbuffer/table_law.h"
 
 // After: Lefebvre, Hornus, Lasram, "HA-Buffer: Coherent Hashing for single-pass A-buffer", INRIA
-// RR-8282, 2013; table_law.h has the law of the table and how we differ. Besides: traversal visits
-// the largest age too; culling counts a record once at most.
+// RR-8282, 2013; table_law.h has the law of the table and how we differ. We also differ in two
+// details: traversal visits the largest age too, and culling counts a record at most once.
 //
 // GLOSSARY
-//   fragment       a depth and a payload at a pixel: what a ray meets there
+//   fragment       a depth and a payload at a pixel: a point where its ray meets a surface
 //   depth list     the fragments of a pixel, sorted by (depth, payload); equal ones are kept
 //   depth complexity, layers    the length of a list
 //   store          a container that takes fragments and gives back depth lists (depth_list_store.h)
@@ -39,12 +39,12 @@
 //   record, word   a fragment as the table keeps it, [age | nearness | payload] (record.h)
 //   cell           a place of the table, for one record; 0 when empty
 //   load           records over cells; near 1 insertion is slow
-//   probe          one look at a cell; the first of a record is of age 1, the next of age 2, ...
+//   probe          one look at a cell; a record's first probe has age 1, its next age 2, ...
 //   age            the number of the probe at which a record lies, from 1 on
-//   offset         where the probes of an age go: cell = pixel + offset (offsets.h)
+//   offset         leads the probes of an age to their cells: cell = pixel + offset (offsets.h)
 //   propose, evict a record asks for a cell; the larger word stays, the other goes on
 //   failure        a record whose ages ran out; it is kept beside the table (Overflow)
-//   cull           to drop what cannot be seen: behind enough opacity, or behind the k nearest
+//   cull           to drop a fragment that is behind enough opacity, or behind the k nearest
 //
 // NOTHING IS LOST. A record that fails is kept outside of the table, and lists continue there. That
 // is slow, so build() gives every frame the room it needs. If memory does not suffice even outside
@@ -85,7 +85,7 @@ class Overflow {
   using Word = typename Record::Word;
 
   Overflow() = default;
-  /// No other thread may use either of the two meanwhile.
+  /// No other thread may use either object during the move.
   Overflow(Overflow&& other) noexcept
       : sorted_(other.sorted_.load()), entries_(std::move(other.entries_)), lost_(other.lost_) {}
   Overflow& operator=(Overflow&& other) noexcept {
@@ -263,10 +263,10 @@ class HashBuffer
     }
 
    private:
-    /// What is known to lie in front of the record in flight. Another thread may push a counted
-    /// record to the next age, where it is met again: so only what lies strictly behind the last
-    /// counted one counts, and what lies strictly in front of the record in flight. What was
-    /// counted was inserted, and the list has it or culled it for things still further in front.
+    /// The records known to lie in front of the record in flight. Another thread may push a counted
+    /// record to the next age, where it is met again. So a record counts only if it lies strictly
+    /// behind the last counted record and strictly in front of the record in flight. Each counted
+    /// record was inserted: the list has it, or culled it for records still further in front.
     struct Guard {
       double transmittance = 1.0;  // a product, so that rounding cannot make a subset smaller
       unsigned in_front = 0;
@@ -297,8 +297,8 @@ class HashBuffer
   };
 
   /// Visits the list of pixel (x, y) front to back; stops early if `visit` returns false (it may
-  /// also return nothing). No thread may be inserting. @pre build() or finish() succeeded, or a
-  /// fragment may be missing
+  /// also return nothing). No thread may be inserting. Fragments may be missing unless build() or
+  /// finish() succeeded.
   template <class Visit>
   void for_each(int x, int y, Visit&& visit) const {
     const std::uint64_t pixel = pixel_of(x, y);
@@ -381,7 +381,7 @@ class HashBuffer
     return resize(target);
   }
 
-  /// Makes a table of that many cells, or of one cell a pixel if that is more, empties it, and
+  /// Makes a table of `cells` cells, or of one cell a pixel if that is more, empties it, and
   /// draws its offsets. Never holds the old and the new table at once. On ErrorCode::kLimit the
   /// buffer keeps its size, emptied.
   [[nodiscard]] Result<void> resize(std::uint64_t cells) { return resize(cells, options_.offsets); }
@@ -528,7 +528,7 @@ class HashBuffer
     double transmittance = 1.0;
     unsigned kept = 0;
   };
-  /// Visits a record; whether the list goes on behind it.
+  /// Visits a record. @return whether the list goes on behind it
   template <class Visit>
   bool goes_on(Visit& visit, Word record, ListEnd& end) const {
     if constexpr (std::is_convertible_v<decltype(visit(Record::item(record))), bool>) {

@@ -20,16 +20,16 @@ class BoundaryArea {
   /// Faces whose normal is along x, y, z. @pre all slabs were added
   [[nodiscard]] const std::uint64_t (&faces() const)[3] { return faces_; }
 
-  /// Area of the surface that the set stands for, in square world units: 2/3 of the area of the
+  /// Area of the surface that the set approximates, in square world units: 2/3 of the area of the
   /// faces, since |nx| + |ny| + |nz| is 3/2 on average over all directions of a normal. Too small
-  /// by a third for boxes along the axes, right for round things.
+  /// by a third for boxes along the axes, right for round shapes.
   [[nodiscard]] double estimate() const;
 
  private:
   VoxelGrid grid_;
   AxisFrame frame_;
   std::uint64_t faces_[3] = {0, 0, 0};
-  // The last row of the slab before, to compare with: as VoxelIntervals::column, one after another.
+  // The last row of the previous slab, to compare with: the intervals of its columns in order.
   std::vector<std::uint32_t> last_offsets_;
   std::vector<Interval> last_items_;
 };

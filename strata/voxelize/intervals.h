@@ -79,7 +79,7 @@ class VoxelIntervals {
   struct TileView {
     std::span<const std::uint32_t> offsets;
     std::span<const Interval> items;
-    std::span<const std::uint32_t> labels;  ///< of the items, or none
+    std::span<const std::uint32_t> labels;  ///< one for each item, or none
     [[nodiscard]] std::uint32_t label(std::size_t item) const {
       return labels.empty() ? 1 : labels[item];
     }
@@ -103,7 +103,7 @@ class VoxelIntervals {
   [[nodiscard]] std::uint64_t solid_voxels() const;  ///< sum of the lengths; O(intervals)
   /// Runs of solid voxels, whatever their labels are. O(intervals) where there are labels.
   [[nodiscard]] std::uint64_t interval_count() const;
-  [[nodiscard]] bool has_labels() const;             ///< that any of its intervals has one
+  [[nodiscard]] bool has_labels() const;             ///< true if any interval has one
   [[nodiscard]] std::uint64_t memory_bytes() const;  ///< bytes held by the tiles
 
  private:
@@ -147,9 +147,9 @@ void for_each_labelled(const VoxelIntervals& set, int u, int v, Run&& run) {
   }
 }
 
-/// Calls run(first, last, label) for each run of solid voxels: voxels `first` to `last`, which
-/// differ along set.axis() alone, both of the run. Columns come in the order of v, then u. The
-/// label is 1 where none is given.
+/// Calls run(first, last, label) for each run of solid voxels. `first` and `last` are the first and
+/// the last voxel of the run and differ along set.axis() alone. Columns come in the order of v,
+/// then u. The label is 1 where none is given.
 template <class Run>
 void for_each_run(const VoxelIntervals& set, Run&& run) {
   const AxisFrame frame(set.axis());

@@ -21,7 +21,7 @@ enum class Closedness {
 };
 /// What to do with a mesh that is not closed.
 enum class OpenMode {
-  kVote,     ///< flat holes are closed; elsewhere rays along all axes decide by winding numbers
+  kVote,     ///< holes are closed by caps; near doubtful caps winding numbers decide
   kSurface,  ///< keep only the voxels that the surface touches
   kFail      ///< ErrorCode::kGeometry
 };
@@ -75,7 +75,7 @@ struct VoxelizeReport {
   std::uint64_t rebuilt_tiles = 0;       ///< tiles built again with a larger table
   std::uint64_t checksum =
       0;               ///< see set_checksum in strata/voxelize/checksum.h; with `statistics`
-  bool closed = true;  ///< found or assumed; false: `open` decided
+  bool closed = true;  ///< found or assumed to be closed; false: `open` decided
   double lists_ms = 0, intervals_ms = 0;  ///< mean time per thread of the two phases
 };
 

@@ -8,26 +8,26 @@
 
 namespace strata {
 
-/// What a job is expected to hold at most, in bytes.
+/// The largest memory that a job is expected to hold, in bytes.
 struct MemoryEstimate {
   std::uint64_t mesh = 0;    ///< triangles, positions, positions on the lattice
-  std::uint64_t bins = 0;    ///< which triangles meet which tile
+  std::uint64_t bins = 0;    ///< lists of the triangles that meet each tile
   std::uint64_t slabs = 0;   ///< intervals in flight, and tables of the threads
-  std::uint64_t output = 0;  ///< what the format must hold until the end
+  std::uint64_t output = 0;  ///< data that the format must hold until the end
 
   [[nodiscard]] std::uint64_t total() const { return mesh + bins + slabs + output; }
 };
 
-/// What decides the memory of voxels that are made and written.
+/// The facts on which the memory for making and writing voxels depends.
 struct MemoryFactors {
-  const TriangleSoup* mesh = nullptr;  ///< of a tree all its solids; not null
+  const TriangleSoup* mesh = nullptr;  ///< or all solids of a tree; not null
   bool is_tree = false;
-  double area = 0.0;             ///< of a mesh that is no tree, square world units
-  bool votes = false;            ///< the mesh is open, and its voxels are voted on
-  std::uint64_t open_edges = 0;  ///< of such a mesh: edges that are not balanced
+  double area = 0.0;             ///< of the mesh, square world units; unused for a tree
+  bool votes = false;            ///< the mesh is open, and OpenMode::kVote decides its voxels
+  std::uint64_t open_edges = 0;  ///< with `votes`: edges that are not balanced
   // The voxels.
   Axis axis = Axis::kZ;
-  int samples = 0;  ///< along a voxel's side of a fog volume; 0 or 1: no more than its centre
+  int samples = 0;  ///< of a fog volume, along a voxel's side; 0 or 1: the centre alone
   bool solid = true, surface = false;
   // The file.
   std::string_view format;  ///< name of the output format; empty: none

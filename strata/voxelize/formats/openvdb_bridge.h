@@ -18,17 +18,17 @@ struct OpenVdbOptions {
   /// ids.
   std::string name{};
   /// FloatGrid: the value of a voxel is its label divided by this number, and the grid a fog
-  /// volume. Give samples^3 with VoxelizeOptions::samples. 0: labels are ids, and are the values.
+  /// volume. Give samples^3 with VoxelizeOptions::samples. 0: labels are ids and become the values.
   std::uint32_t samples = 1;
 };
 
 /// The grid that `strata voxelize -o x.vdb` would write: the solid voxels are active, a node of
 /// equal voxels is a tile, and index (i, j, k) is the centre of voxel (i, j, k) in world space.
 /// Work grows with the surface, and with the volume in blocks of 8 x 8 x 8 voxels. Grid is
-/// openvdb::BoolGrid, MaskGrid or FloatGrid. openvdb::initialize() is needed to write it, not for
-/// this.
+/// openvdb::BoolGrid, MaskGrid or FloatGrid. Writing the grid needs openvdb::initialize(),
+/// to_openvdb() does not.
 /// @param set along any axis, all rows of its grid
-/// @return kUsage: not all rows, a voxel size that OpenVDB does not take; kLimit: out of memory;
+/// @return kUsage: not all rows, a voxel size that OpenVDB refuses; kLimit: out of memory;
 /// kCancelled
 template <class Grid = openvdb::BoolGrid>
 Result<typename Grid::Ptr> to_openvdb(const VoxelIntervals& set, const OpenVdbOptions& options = {},

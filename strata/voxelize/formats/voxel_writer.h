@@ -17,8 +17,8 @@ struct VoxelFormat {
                      ///< "png", "zarr"
   std::string extension;    ///< with the dot; that of a folder format ends with a slash
   std::string description;  ///< one line for --list-formats
-  /// The axis of the intervals that this format is written from as they come. Intervals along
-  /// another axis are transposed first (voxelize/transposed.h).
+  /// Intervals along this axis are written as they come. Intervals along another axis are
+  /// transposed first (voxelize/transposed.h).
   Axis axis = Axis::kZ;
   std::size_t colours = 0;  ///< most colours in a file, one per voxel; 0: none
   std::uint32_t ids = 0;    ///< the largest id that a voxel can have; 0: no ids
@@ -38,19 +38,20 @@ struct VoxelWriterOptions {
   /// .vdb, .vti, .nrrd: name of the grid. Empty: `density` of a fog volume, `ids` with ids, else
   /// `solid`.
   std::string name{};
-  /// The largest of the slabs' labels, which become the values of voxels, in the narrowest unsigned
-  /// type that holds it (.vdb: float); 0: a voxel is solid or not. Slabs have labels with ids, fog
-  /// or colours only.
+  /// The largest label of the slabs. Labels become the values of voxels, in the narrowest unsigned
+  /// type that holds the largest (.vdb: float). 0: a voxel is solid or not. Slabs have labels with
+  /// ids, fog or colours only.
   std::uint32_t ids = 0;
-  /// Label n has the colour at n - 1: red, green, blue, alpha. Empty: one colour. Not with ids.
+  /// Label n has the colour colours[n - 1]: red, green, blue, alpha. Empty: one colour. Not with
+  /// ids.
   std::vector<glm::u8vec4> colours{};
 };
 
 /// Writes a voxel set slab by slab: every slab of one axis, in increasing v, then finish(). Any
 /// axis is accepted. The file appears under its name only when finish() succeeds; a writer
-/// destroyed before leaves nothing behind. Memory: one slab and the data that the format itself
-/// must hold; with slabs of another axis than VoxelFormat::axis the intervals of the whole set,
-/// twice, which grow with its surface.
+/// destroyed before leaves nothing behind. The writer holds one slab and the data that the format
+/// itself must hold. For slabs of another axis than VoxelFormat::axis it holds the intervals of the
+/// whole set, twice; they grow with the surface.
 class VoxelWriter {
  public:
   virtual ~VoxelWriter() = default;
