@@ -1,10 +1,8 @@
 #include <algorithm>
-#include <atomic>
 #include <limits>
-#include <memory>
-#include <mutex>
 
 #include "mesh/formats/reader_common.h"
+#include "mesh/formats/text_chunks.h"
 #include "mesh/formats/text_scanner.h"
 
 // The text is cut at line ends into chunks that are parsed on all threads; finished chunks are
@@ -63,7 +61,7 @@ struct Chunk {
   std::vector<std::size_t> relative;    ///< triangles with corners counted from the chunk's start
   std::vector<std::uint8_t> relative_corners;  ///< and which of them: bits 0 to 2
   std::uint64_t faces = 0, short_faces = 0, first_short_face = 0, ignored = 0;
-  std::size_t error_offset = std::numeric_limits<std::size_t>::max();
+  std::size_t error_offset = ChunksEnd::kNone;
   std::string error;
 
   void clear() {
@@ -99,9 +97,7 @@ class ObjReader {
   std::vector<const char*> cuts_;  ///< chunk i is [cuts_[i], cuts_[i + 1])
   RawMesh mesh_;
   bool identity_ = true;
-  std::size_t error_offset_ = std::numeric_limits<std::size_t>::max();
-  std::string error_;
-  bool over_limit_ = false;
+  ChunksEnd chunks_end_;
   std::int64_t vertex_total_ = 0;
 };
 
@@ -253,16 +249,16 @@ void ObjReader::reserve() {
 void ObjReader::append(Chunk& chunk) {
   TriangleSoup& soup = mesh_.soup;
   MeshReadStats& stats = mesh_.stats;
-  if (chunk.error_offset != std::numeric_limits<std::size_t>::max()) {
-    error_offset_ = chunk.error_offset;  // the chunk ends in the middle of a statement
-    error_ = std::move(chunk.error);
+  if (chunk.error_offset != ChunksEnd::kNone) {
+    chunks_end_.error_offset = chunk.error_offset;  // the chunk ends in the middle of a statement
+    chunks_end_.error = std::move(chunk.error);
     return;
   }
   const std::uint64_t base = soup.positions.size();
-  over_limit_ = over_limit_ || base + chunk.positions.size() > kMaxVertices ||
-                exceeds_limit(input_.execution, base + chunk.positions.size(),
-                              soup.triangles.size() + chunk.triangles.size());
-  if (over_limit_) return;
+  chunks_end_.over_limit = chunks_end_.over_limit || base + chunk.positions.size() > kMaxVertices ||
+                           exceeds_limit(input_.execution, base + chunk.positions.size(),
+                                         soup.triangles.size() + chunk.triangles.size());
+  if (chunks_end_.over_limit) return;
   for (std::size_t i = 0; i < chunk.relative.size(); ++i) {
     glm::uvec3& triangle = chunk.triangles[chunk.relative[i]];
     for (int k = 0; k < 3; ++k) {
@@ -298,44 +294,11 @@ void ObjReader::append(Chunk& chunk) {
 Result<MeshFile> ObjReader::read() {
   cut();
   reserve();
-  std::mutex mutex;
-  std::atomic<bool> over = false;  // an appended chunk ended the reading; the rest is not needed
-  std::vector<std::unique_ptr<Chunk>> spare, ready(cuts_.size() - 1);
-  std::size_t next = 0;
-  ReadWatch watch(input_);
-  parallel_for(input_.execution, ready.size(), [&](std::size_t index, int) {
-    if (over.load(std::memory_order_relaxed)) return;
-    std::unique_ptr<Chunk> chunk;
-    {
-      const std::lock_guard lock(mutex);
-      if (!spare.empty()) {
-        chunk = std::move(spare.back());
-        spare.pop_back();
-      }
-    }
-    if (!chunk) chunk = std::make_unique<Chunk>();
-    parse(cuts_[index], cuts_[index + 1], *chunk);
-    const std::lock_guard lock(mutex);
-    ready[index] = std::move(chunk);
-    for (; next < ready.size() && ready[next] && !over; ++next) {
-      append(*ready[next]);
-      over = over_limit_ || error_offset_ != std::numeric_limits<std::size_t>::max();
-      ready[next]->clear();
-      spare.push_back(std::move(ready[next]));
-    }
-    (void)watch.at(static_cast<double>(next) / static_cast<double>(ready.size()));
-  });
-  if (input_.execution.stop.stop_requested()) {
-    return fail(ErrorCode::kCancelled, "{}: reading was stopped", input_.name);
-  }
-  if (over_limit_) {
-    return fail(ErrorCode::kLimit, "{}: the mesh needs more than the memory limit or {} vertices",
-                input_.name, kMaxVertices);
-  }
-  if (error_offset_ != std::numeric_limits<std::size_t>::max()) {
-    return fail(ErrorCode::kInput, "{}:{}: {}", input_.name,
-                line_of(input_.text, begin_ + error_offset_), error_);
-  }
+  read_chunks<Chunk>(
+      input_, cuts_, chunks_end_,
+      [this](const char* begin, const char* end, Chunk& chunk) { parse(begin, end, chunk); },
+      [this](Chunk& chunk) { append(chunk); });
+  if (auto status = chunks_end_.status(input_); !status) return tl::unexpected(status.error());
   mesh_.stats.format = "obj";
   vertex_total_ = static_cast<std::int64_t>(mesh_.soup.positions.size());
   return finish_mesh(input_, std::move(mesh_),

@@ -1,10 +1,9 @@
 #include <algorithm>
-#include <atomic>
 #include <limits>
 #include <memory>
-#include <mutex>
 
 #include "mesh/formats/reader_common.h"
+#include "mesh/formats/text_chunks.h"
 #include "mesh/formats/text_scanner.h"
 #include "mesh/weld.h"
 
@@ -130,11 +129,18 @@ Result<MeshFile> read_binary(const ReaderInput& input) {
 struct Chunk {
   std::vector<glm::dvec3> corners;
   std::vector<std::uint32_t> sizes;  ///< corners of each loop
-  std::size_t error_offset = std::numeric_limits<std::size_t>::max();
+  std::size_t error_offset = ChunksEnd::kNone;
   std::string error;
   bool ended = false;  ///< the last solid was closed by endsolid
   std::uint64_t strange_lines = 0;
   std::size_t first_strange = 0;  ///< offset of the first strange line
+
+  void clear() {
+    corners.clear();
+    sizes.clear();
+    ended = false;
+    strange_lines = first_strange = 0;
+  }
 };
 
 class AsciiReader {
@@ -159,9 +165,8 @@ class AsciiReader {
   FanBuilder fans_{mesh_};
   WeldTable<double> table_{1024};
   std::vector<std::uint32_t> loop_;
-  bool ended_ = false, over_limit_ = false;
-  std::size_t error_offset_ = std::numeric_limits<std::size_t>::max();
-  std::string error_;
+  bool ended_ = false;
+  ChunksEnd chunks_end_{.most_vertices = kMaxVertices - 0x10000000u};
   std::uint64_t strange_lines_ = 0;
   std::size_t first_strange_ = 0;
 };
@@ -349,11 +354,12 @@ void AsciiReader::append(const Chunk& chunk) {
     }
     fans_.add(loop_.data(), loop_.size());
   }
-  over_limit_ = positions.size() > kMaxVertices - 0x10000000u ||
-                exceeds_limit(input_.execution, positions.size(), mesh_.soup.triangles.size());
+  chunks_end_.over_limit =
+      positions.size() > chunks_end_.most_vertices ||
+      exceeds_limit(input_.execution, positions.size(), mesh_.soup.triangles.size());
   if (!chunk.sizes.empty() || chunk.ended) ended_ = chunk.ended;
-  error_offset_ = chunk.error_offset;
-  error_ = chunk.error;
+  chunks_end_.error_offset = chunk.error_offset;
+  chunks_end_.error = chunk.error;
   if (strange_lines_ == 0) first_strange_ = chunk.first_strange;
   strange_lines_ += chunk.strange_lines;
 }
@@ -373,34 +379,11 @@ FacePlace AsciiReader::locate(std::uint32_t element) const {
 
 Result<MeshFile> AsciiReader::read() {
   cut();
-  std::mutex mutex;
-  std::atomic<bool> over = false;
-  std::vector<std::unique_ptr<Chunk>> ready(cuts_.size() - 1);
-  std::size_t next = 0;
-  ReadWatch watch(input_);
-  parallel_for(input_.execution, ready.size(), [&](std::size_t index, int) {
-    if (over.load(std::memory_order_relaxed)) return;
-    auto chunk = std::make_unique<Chunk>();
-    parse(cuts_[index], cuts_[index + 1], *chunk);
-    const std::lock_guard lock(mutex);
-    ready[index] = std::move(chunk);
-    for (; next < ready.size() && ready[next] && !over; ++next) {
-      append(*ready[next]);
-      over = over_limit_ || error_offset_ != std::numeric_limits<std::size_t>::max();
-      ready[next].reset();
-    }
-    (void)watch.at(static_cast<double>(next) / static_cast<double>(ready.size()));
-  });
-  if (input_.execution.stop.stop_requested()) {
-    return fail(ErrorCode::kCancelled, "{}: reading was stopped", input_.name);
-  }
-  if (over_limit_) {
-    return fail(ErrorCode::kLimit, "{}: the mesh needs more than the memory limit", input_.name);
-  }
-  if (error_offset_ != std::numeric_limits<std::size_t>::max()) {
-    return fail(ErrorCode::kInput, "{}:{}: {}", input_.name,
-                line_of(input_.text, begin_ + error_offset_), error_);
-  }
+  read_chunks<Chunk>(
+      input_, cuts_, chunks_end_,
+      [this](const char* begin, const char* end, Chunk& chunk) { parse(begin, end, chunk); },
+      [this](const Chunk& chunk) { append(chunk); });
+  if (auto status = chunks_end_.status(input_); !status) return tl::unexpected(status.error());
   if (strange_lines_ != 0) {
     const char* const first = begin_ + first_strange_;
     const std::string what =

@@ -50,7 +50,6 @@ std::optional<std::string> ZipArchive::find(std::string_view name) const {
 
 #ifdef STRATA_HAVE_LIBZIP
 
-// libzip, since minizip refuses the archives that lib3mf 1 writes, and with it OpenSCAD 2021.
 Result<ZipArchive> ZipArchive::open(const std::string& path) {
   int reason = 0;
   zip_t* const opened = zip_open(path.c_str(), ZIP_RDONLY, &reason);

@@ -1,0 +1,82 @@
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "mesh/formats/reader_common.h"
+#include "mesh/formats/text_scanner.h"
+
+namespace strata::detail {
+
+/// Why reading text in pieces came to its end before the end of the text.
+struct ChunksEnd {
+  static constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
+  std::size_t error_offset = kNone;  ///< in the text
+  std::string error{};
+  bool over_limit = false;
+  std::uint32_t most_vertices = kMaxVertices;  ///< that the reader can hold
+
+  [[nodiscard]] bool early() const { return over_limit || error_offset != kNone; }
+  /// @return kCancelled, kLimit, or kInput with the line
+  [[nodiscard]] Result<void> status(const ReaderInput& input) const {
+    if (input.execution.stop.stop_requested()) {
+      return fail(ErrorCode::kCancelled, "{}: reading was stopped", input.name);
+    }
+    if (over_limit) {
+      return fail(ErrorCode::kLimit, "{}: the mesh needs more than the memory limit or {} vertices",
+                  input.name, most_vertices);
+    }
+    if (error_offset != kNone) {
+      return fail(ErrorCode::kInput, "{}:{}: {}", input.name,
+                  line_of(input.text, input.text.data() + error_offset), error);
+    }
+    return {};
+  }
+};
+
+/// Reads text in pieces, on all threads, and puts them together in the order of the text.
+/// @tparam Chunk  what is read of a piece; clear() makes it as new
+/// @param cuts  piece i is [cuts[i], cuts[i + 1])
+/// @param parse  of (begin, end, Chunk&), by several threads at once
+/// @param append  of Chunk&, by one thread at a time; sets `end`, then the rest is not needed
+template <class Chunk, class Parse, class Append>
+void read_chunks(const ReaderInput& input, std::span<const char* const> cuts, const ChunksEnd& end,
+                 Parse&& parse, Append&& append) {
+  std::mutex mutex;
+  std::atomic<bool> over = false;
+  std::vector<std::unique_ptr<Chunk>> spare, ready(cuts.size() - 1);
+  std::size_t next = 0;
+  ReadWatch watch(input);
+  parallel_for(input.execution, ready.size(), [&](std::size_t index, int) {
+    if (over.load(std::memory_order_relaxed)) return;
+    std::unique_ptr<Chunk> chunk;
+    {
+      const std::lock_guard lock(mutex);
+      if (!spare.empty()) {
+        chunk = std::move(spare.back());
+        spare.pop_back();
+      }
+    }
+    if (!chunk) chunk = std::make_unique<Chunk>();
+    parse(cuts[index], cuts[index + 1], *chunk);
+    const std::lock_guard lock(mutex);
+    ready[index] = std::move(chunk);
+    for (; next < ready.size() && ready[next] && !over; ++next) {
+      append(*ready[next]);
+      over = end.early();
+      ready[next]->clear();
+      spare.push_back(std::move(ready[next]));
+    }
+    (void)watch.at(static_cast<double>(next) / static_cast<double>(ready.size()));
+  });
+}
+
+}  // namespace strata::detail
