@@ -81,7 +81,6 @@ strata_depends(ZLIB::ZLIB "find_dependency(ZLIB)" zlib "")
 strata_depends(PNG::PNG "find_dependency(PNG)" libpng "")
 strata_depends(PkgConfig::hwy "${pc_modules}(hwy REQUIRED QUIET IMPORTED_TARGET libhwy)" libhwy "")
 strata_depends(PkgConfig::libdeflate "${pc_modules}(libdeflate REQUIRED QUIET IMPORTED_TARGET libdeflate)" libdeflate "")
-strata_depends(PkgConfig::minizip "${pc_modules}(minizip REQUIRED QUIET IMPORTED_TARGET minizip)" minizip "")
 strata_depends(PkgConfig::polyclipping
   "${pc_modules}(polyclipping REQUIRED QUIET IMPORTED_TARGET polyclipping)" polyclipping "")
 strata_depends(PkgConfig::qhull_r "${pc_modules}(qhull_r REQUIRED QUIET IMPORTED_TARGET qhull_r)" qhull_r "")

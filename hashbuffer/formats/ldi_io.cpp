@@ -56,13 +56,13 @@ Result<LayeredDepthImage> read_ldi_exr(const std::string& path, const Execution&
 }
 #endif
 
-#ifndef STRATA_HAVE_MINIZIP
+#ifndef STRATA_HAVE_LIBZIP
 Result<void> write_ldi_npz(const std::string& path, const LayeredDepthImage&, const LdiNpzOptions&,
                            const Execution&) {
-  return fail(ErrorCode::kUsage, "{}: this build has no minizip", path);
+  return fail(ErrorCode::kUsage, "{}: this build has no libzip", path);
 }
 Result<LayeredDepthImage> read_ldi_npz(const std::string& path, const Execution&) {
-  return fail(ErrorCode::kUsage, "{}: this build has no minizip", path);
+  return fail(ErrorCode::kUsage, "{}: this build has no libzip", path);
 }
 #endif
 

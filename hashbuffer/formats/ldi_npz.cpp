@@ -1,7 +1,6 @@
 // Depth lists as a NumPy archive: a ZIP of .npy arrays. The layout is in ldi_io.h.
 
 #include <fmt/format.h>
-#include <unzip.h>
 #include <zip.h>
 
 #include <algorithm>
@@ -11,6 +10,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <new>
@@ -35,80 +35,160 @@ constexpr std::size_t kPart = std::size_t{1} << 16;  // elements converted or co
 
 // --- writing ------------------------------------------------------------------------------------
 
-// minizip's view of a SeekableOutput.
-zlib_filefunc64_def output_functions(SeekableOutput& output) {
-  zlib_filefunc64_def f{};
-  f.opaque = &output;
-  f.zopen64_file = [](voidpf opaque, const void*, int) { return opaque; };
-  f.zread_file = [](voidpf, voidpf, void*, uLong) { return uLong{0}; };
-  f.zwrite_file = [](voidpf opaque, voidpf, const void* data, uLong bytes) {
-    return static_cast<SeekableOutput*>(opaque)->write(data, bytes) ? bytes : uLong{0};
-  };
-  f.ztell64_file = [](voidpf opaque, voidpf) {
-    return static_cast<ZPOS64_T>(static_cast<SeekableOutput*>(opaque)->position());
-  };
-  f.zseek64_file = [](voidpf opaque, voidpf, ZPOS64_T offset, int origin) {
-    auto& to = *static_cast<SeekableOutput*>(opaque);
-    to.seek(offset + (origin == ZLIB_FILEFUNC_SEEK_CUR   ? to.position()
-                      : origin == ZLIB_FILEFUNC_SEEK_END ? to.end()
-                                                         : 0));
-    return 0L;
-  };
-  f.zclose_file = [](voidpf, voidpf) { return 0; };
-  f.zerror_file = [](voidpf opaque, voidpf) {
-    return static_cast<SeekableOutput*>(opaque)->status() ? 0 : 1;
-  };
-  return f;
+// libzip's view of a SeekableOutput, which is empty before.
+zip_int64_t call_output(void* state, void* data, zip_uint64_t bytes, zip_source_cmd_t command) {
+  auto& to = *static_cast<SeekableOutput*>(state);
+  zip_error_t error{};
+  switch (command) {
+    case ZIP_SOURCE_SUPPORTS:
+      return zip_source_make_command_bitmap(
+          ZIP_SOURCE_OPEN, ZIP_SOURCE_READ, ZIP_SOURCE_CLOSE, ZIP_SOURCE_STAT, ZIP_SOURCE_ERROR,
+          ZIP_SOURCE_FREE, ZIP_SOURCE_SEEK, ZIP_SOURCE_TELL, ZIP_SOURCE_BEGIN_WRITE,
+          ZIP_SOURCE_COMMIT_WRITE, ZIP_SOURCE_ROLLBACK_WRITE, ZIP_SOURCE_WRITE,
+          ZIP_SOURCE_SEEK_WRITE, ZIP_SOURCE_TELL_WRITE, ZIP_SOURCE_REMOVE, -1);
+    case ZIP_SOURCE_STAT: {
+      auto& told = *static_cast<zip_stat_t*>(data);
+      zip_stat_init(&told);
+      told.size = 0;
+      told.valid = ZIP_STAT_SIZE;
+      return sizeof told;
+    }
+    case ZIP_SOURCE_ERROR:
+      zip_error_set(&error, ZIP_ER_WRITE, 0);
+      return zip_error_to_data(&error, data, bytes);
+    case ZIP_SOURCE_WRITE:
+      return to.write(data, bytes) ? static_cast<zip_int64_t>(bytes) : -1;
+    case ZIP_SOURCE_SEEK_WRITE: {
+      const zip_int64_t offset =
+          zip_source_seek_compute_offset(to.position(), to.end(), data, bytes, &error);
+      if (offset < 0) return -1;
+      to.seek(static_cast<std::uint64_t>(offset));
+      return 0;
+    }
+    case ZIP_SOURCE_TELL_WRITE:
+      return static_cast<zip_int64_t>(to.position());
+    default:
+      return 0;
+  }
 }
+
+// A .npy file that libzip reads, made part by part.
+struct ArraySource {
+  std::string head;
+  std::size_t count = 0, element_bytes = 0;
+  std::function<std::span<const std::byte>(std::size_t, std::size_t)> part;  // elements as bytes
+  std::function<bool(std::size_t)> go_on;  // told the bytes that were made
+  std::size_t next = 0;
+  std::span<const std::byte> left{};  // of the part in hand
+
+  zip_int64_t read(std::byte* to, std::size_t bytes) {
+    std::size_t done = 0;
+    while (done < bytes) {
+      if (left.empty()) {
+        if (next == count) break;
+        const std::size_t end = std::min(next + kPart, count);
+        left = part(std::exchange(next, end), end);
+        if (!go_on(left.size())) return -1;
+      }
+      const std::size_t taken = std::min(left.size(), bytes - done);
+      std::copy_n(left.begin(), taken, to + done);
+      left = left.subspan(taken);
+      done += taken;
+    }
+    return static_cast<zip_int64_t>(done);
+  }
+
+  static zip_int64_t call(void* state, void* data, zip_uint64_t bytes, zip_source_cmd_t command) {
+    auto& array = *static_cast<ArraySource*>(state);
+    switch (command) {
+      case ZIP_SOURCE_SUPPORTS:
+        return zip_source_make_command_bitmap(ZIP_SOURCE_OPEN, ZIP_SOURCE_READ, ZIP_SOURCE_CLOSE,
+                                              ZIP_SOURCE_STAT, ZIP_SOURCE_ERROR, ZIP_SOURCE_FREE,
+                                              -1);
+      case ZIP_SOURCE_OPEN:
+        array.next = 0;
+        array.left = std::as_bytes(std::span(array.head));
+        return 0;
+      case ZIP_SOURCE_READ:
+        return array.read(static_cast<std::byte*>(data), bytes);
+      case ZIP_SOURCE_STAT: {
+        auto& told = *static_cast<zip_stat_t*>(data);
+        zip_stat_init(&told);
+        told.size = array.head.size() + array.count * array.element_bytes;
+        told.valid = ZIP_STAT_SIZE;
+        return sizeof told;
+      }
+      case ZIP_SOURCE_ERROR: {
+        zip_error_t error{};
+        zip_error_set(&error, ZIP_ER_CANCELLED, 0);
+        return zip_error_to_data(&error, data, bytes);
+      }
+      default:
+        return 0;
+    }
+  }
+};
 
 class NpzWriter {
  public:
   NpzWriter(SeekableOutput& output, const LdiNpzOptions& options, const Execution& execution,
             std::uint64_t total_bytes)
-      : options_(options),
-        execution_(execution),
-        total_(std::max<std::uint64_t>(total_bytes, 1)),
-        functions_(output_functions(output)),
-        zip_(zipOpen2_64("", APPEND_STATUS_CREATE, nullptr, &functions_)) {}
+      : options_(options), execution_(execution), total_(std::max<std::uint64_t>(total_bytes, 1)) {
+    zip_source_t* const sink = zip_source_function_create(call_output, &output, nullptr);
+    if (sink == nullptr) return;
+    zip_ = zip_open_from_source(sink, ZIP_CREATE | ZIP_TRUNCATE, nullptr);
+    if (zip_ == nullptr) zip_source_free(sink);
+  }
   NpzWriter(const NpzWriter&) = delete;
   NpzWriter& operator=(const NpzWriter&) = delete;
-  ~NpzWriter() { (void)close(); }
+  ~NpzWriter() {
+    if (zip_ != nullptr) zip_discard(zip_);
+  }
 
-  // Adds array `name` of `count` elements, which part(begin, end) gives as bytes.
+  // Adds array `name` of `count` elements, which part(begin, end) gives as bytes when close() asks.
   template <class Part>
   bool add(const char* name, std::string_view type, const std::string& shape, std::size_t count,
-           Part&& part) {
-    if (!zip_) return false;
-    zip_fileinfo info{};
-    info.dosDate = (1u << 21) | (1u << 16);  // 1980-01-01: the same lists give the same bytes
-    const int method = options_.compress ? Z_DEFLATED : 0;
-    if (zipOpenNewFileInZip64(zip_, (std::string(name) + ".npy").c_str(), &info, nullptr, 0,
-                              nullptr, 0, nullptr, method, Z_DEFAULT_COMPRESSION, 1) != ZIP_OK) {
+           std::size_t element_bytes, Part&& part) {
+    if (zip_ == nullptr) return false;
+    const auto go_on = [this](std::size_t bytes) { return made(bytes); };
+    arrays_.push_back(std::make_unique<ArraySource>(
+        ArraySource{npy_head(type, false, shape), count, element_bytes, part, go_on}));
+    zip_source_t* const source = zip_source_function(zip_, ArraySource::call, arrays_.back().get());
+    if (source == nullptr) return false;
+    const zip_int64_t index =
+        zip_file_add(zip_, (std::string(name) + ".npy").c_str(), source, ZIP_FL_ENC_UTF_8);
+    if (index < 0) {
+      zip_source_free(source);
       return false;
     }
-    const std::string head = npy_head(type, false, shape);
-    bool ok = write(std::as_bytes(std::span(head)));
-    for (std::size_t begin = 0; ok && begin < count; begin += kPart) {
-      if (execution_.stop.stop_requested()) return false;
-      ok = write(part(begin, std::min(begin + kPart, count)));
-    }
-    return zipCloseFileInZip(zip_) == ZIP_OK && ok;
+    const auto entry = static_cast<zip_uint64_t>(index);
+    constexpr zip_uint16_t kFirstDay = 1 << 5 | 1;  // 1980-01-01: the same lists, the same bytes
+    return zip_set_file_compression(zip_, entry, options_.compress ? ZIP_CM_DEFLATE : ZIP_CM_STORE,
+                                    kLevel) == 0 &&
+           zip_file_set_dostime(zip_, entry, 0, kFirstDay, 0) == 0;
   }
-  bool close() { return zip_ && zipClose(std::exchange(zip_, nullptr), nullptr) == ZIP_OK; }
+  // Writes all of it.
+  bool close() {
+    if (zip_ == nullptr || zip_close(zip_) != 0) return false;
+    zip_ = nullptr;
+    return true;
+  }
 
  private:
-  bool write(std::span<const std::byte> bytes) {
-    done_ += bytes.size();
+  static constexpr zip_uint32_t kLevel = 6;  // zlib's own choice
+
+  bool made(std::size_t bytes) {
+    done_ += bytes;
     if (execution_.progress) {
       execution_.progress(std::min(1.0, static_cast<double>(done_) / static_cast<double>(total_)));
     }
-    return zipWriteInFileInZip(zip_, bytes.data(), static_cast<unsigned>(bytes.size())) == ZIP_OK;
+    return !execution_.stop.stop_requested();
   }
   LdiNpzOptions options_;
   const Execution& execution_;
   std::uint64_t total_, done_ = 0;
-  zlib_filefunc64_def functions_;
-  zipFile zip_;
+  std::vector<std::unique_ptr<ArraySource>> arrays_;
+  zip_t* zip_ = nullptr;
 };
 
 bool write_arrays(NpzWriter& zip, const LayeredDepthImage& image) {
@@ -135,14 +215,14 @@ bool write_arrays(NpzWriter& zip, const LayeredDepthImage& image) {
   }
   const std::array<std::int64_t, 2> shape = {image.height, image.width};
   const std::array<std::uint32_t, 1> limit = {image.depth_limit};
-  return zip.add("shape", "<i8", "(2,)", 2, borrowed(shape)) &&
-         zip.add("depth_limit", "<u4", "()", 1, borrowed(limit)) &&
-         zip.add("world_from_image", "<f8", "(4, 4)", 16, borrowed(matrix)) &&
+  return zip.add("shape", "<i8", "(2,)", 2, 8, borrowed(shape)) &&
+         zip.add("depth_limit", "<u4", "()", 1, 4, borrowed(limit)) &&
+         zip.add("world_from_image", "<f8", "(4, 4)", 16, 8, borrowed(matrix)) &&
          zip.add("offsets", "<u8", fmt::format("({},)", image.offsets.size()), image.offsets.size(),
-                 borrowed(image.offsets)) &&
-         zip.add("depth", "<u4", fmt::format("({},)", items.size()), items.size(),
+                 8, borrowed(image.offsets)) &&
+         zip.add("depth", "<u4", fmt::format("({},)", items.size()), items.size(), 4,
                  converted([](DepthItem item) { return item.depth(); })) &&
-         zip.add("payload", "<u4", fmt::format("({},)", items.size()), items.size(),
+         zip.add("payload", "<u4", fmt::format("({},)", items.size()), items.size(), 4,
                  converted([](DepthItem item) { return item.payload(); })) &&
          zip.close();
 }
@@ -152,7 +232,7 @@ bool write_arrays(NpzWriter& zip, const LayeredDepthImage& image) {
 // deflate cannot make more than this many bytes of one.
 constexpr std::uint64_t kLargestRatio = 1040;
 
-// Whether the last bytes are a ZIP's closing record. minizip does without the last of them.
+// Whether the last bytes are a ZIP's closing record, to the very end of the file.
 bool ends_as_archive(const std::string& path) {
   constexpr std::streamoff kRecord = 22;  // without a comment, as NumPy and we write it
   std::ifstream file(path, std::ios::binary | std::ios::ate);
@@ -163,8 +243,9 @@ bool ends_as_archive(const std::string& path) {
   return file && std::memcmp(signature.data(), "PK\5\6", 4) == 0;
 }
 
-struct UnzipCloser {
-  void operator()(void* zip) const { unzClose(zip); }
+struct ZipCloser {
+  void operator()(zip_t* zip) const { zip_discard(zip); }
+  void operator()(zip_file_t* file) const { zip_fclose(file); }
 };
 
 // What a .npy head says.
@@ -219,7 +300,7 @@ class NpzReader {
       : path_(path), execution_(execution) {
     std::error_code error;
     file_bytes_ = std::filesystem::file_size(path, error);
-    if (!error && ends_as_archive(path)) zip_.reset(unzOpen64(path.c_str()));
+    if (!error && ends_as_archive(path)) zip_.reset(zip_open(path.c_str(), ZIP_RDONLY, nullptr));
   }
   [[nodiscard]] bool opened() const { return zip_ != nullptr; }
 
@@ -244,10 +325,8 @@ class NpzReader {
     }
     // Reads the end of the entry and checks its checksum.
     std::byte beyond;
-    if (unzReadCurrentFile(zip_.get(), &beyond, 1) != 0 ||
-        unzCloseCurrentFile(zip_.get()) != UNZ_OK) {
-      return damaged(name);
-    }
+    if (zip_fread(entry_.get(), &beyond, 1) != 0) return damaged(name);
+    entry_.reset();
     return values;
   }
 
@@ -257,7 +336,7 @@ class NpzReader {
   }
   bool read_bytes(std::span<std::byte> out) {
     while (!out.empty()) {
-      const int got = unzReadCurrentFile(zip_.get(), out.data(), static_cast<unsigned>(out.size()));
+      const zip_int64_t got = zip_fread(entry_.get(), out.data(), out.size());
       if (got <= 0) return false;
       out = out.subspan(static_cast<std::size_t>(got));
     }
@@ -266,15 +345,15 @@ class NpzReader {
   // Moves to the data of an array. @return its number of elements
   Result<std::uint64_t> open(const char* name, const char* type, std::size_t size,
                              std::size_t bytes_beside, const std::vector<std::uint64_t>& shape) {
-    unz_file_info64 info{};
-    if (unzLocateFile(zip_.get(), (std::string(name) + ".npy").c_str(), 1) != UNZ_OK ||
-        unzGetCurrentFileInfo64(zip_.get(), &info, nullptr, 0, nullptr, 0, nullptr, 0) != UNZ_OK) {
+    zip_stat_t info{};
+    if (zip_stat(zip_.get(), (std::string(name) + ".npy").c_str(), 0, &info) != 0 ||
+        (info.valid & ZIP_STAT_SIZE) == 0 || (info.valid & ZIP_STAT_INDEX) == 0) {
       return fail(ErrorCode::kInput, "{}: no array {}", path_, name);
     }
     std::array<char, 10> start{};
     std::string text;
-    if (unzOpenCurrentFile(zip_.get()) != UNZ_OK ||
-        !read_bytes(std::as_writable_bytes(std::span(start))) ||
+    entry_.reset(zip_fopen_index(zip_.get(), info.index, 0));
+    if (entry_ == nullptr || !read_bytes(std::as_writable_bytes(std::span(start))) ||
         std::memcmp(start.data(), "\x93NUMPY\x01", 7) != 0) {
       return damaged(name);
     }
@@ -292,10 +371,9 @@ class NpzReader {
                   path_, name, head.type, fmt::join(head.shape, ", "), type, describe(shape));
     }
     const std::uint64_t bytes = head.count * size;
-    if (info.uncompressed_size != start.size() + length + bytes ||
-        bytes / kLargestRatio > file_bytes_) {
+    if (info.size != start.size() + length + bytes || bytes / kLargestRatio > file_bytes_) {
       return fail(ErrorCode::kInput, "{}: array {} of {} elements has {} bytes", path_, name,
-                  head.count, info.uncompressed_size);
+                  head.count, info.size);
     }
     held_ += head.count * (size + bytes_beside);
     if (execution_.memory_limit != 0 && held_ > execution_.memory_limit) {
@@ -315,7 +393,8 @@ class NpzReader {
   const std::string& path_;
   const Execution& execution_;
   std::uint64_t file_bytes_ = 0, held_ = 0;
-  std::unique_ptr<void, UnzipCloser> zip_;
+  std::unique_ptr<zip_t, ZipCloser> zip_;
+  std::unique_ptr<zip_file_t, ZipCloser> entry_;  // in work
 };
 
 Result<LayeredDepthImage> read_arrays(const std::string& path, const Execution& execution) {

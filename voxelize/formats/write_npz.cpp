@@ -3,7 +3,7 @@
 //   spacing  float64 (3,): world length of a voxel along x, y, z
 //   voxels   as write_npy.cpp has it, shape (nx, ny, nz)
 // The voxels are one deflated entry, made of pieces that threads deflate apart from runs, a layer
-// each; minizip would want the bytes. What is known only at the end (CRC, compressed bytes) is
+// each; libzip would want the bytes. What is known only at the end (CRC, compressed bytes) is
 // filled in, or on a pipe follows the data, which flag 3 says. Arrays of 2 GiB and more have 64-bit
 // sizes.
 

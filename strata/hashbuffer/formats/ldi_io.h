@@ -69,13 +69,13 @@ struct LdiNpzOptions {
 /// | shape            | <i8  | (2)                  | height, width                               |
 /// | depth_limit      | <u4  | ()                   | depths are below it                         |
 ///
-/// @return kUsage when `image` is not valid or this build has no minizip, kOutput, kLimit,
+/// @return kUsage when `image` is not valid or this build has no libzip, kOutput, kLimit,
 ///   kCancelled
 Result<void> write_ldi_npz(const std::string& path, const LayeredDepthImage& image,
                            const LdiNpzOptions& options = {}, const Execution& execution = {});
 
 /// Reads such an archive, written here or by numpy.savez. Sizes are checked as for EXR.
-/// @return kInput naming the file and the array, kLimit, kUsage without minizip, kCancelled
+/// @return kInput naming the file and the array, kLimit, kUsage without libzip, kCancelled
 Result<LayeredDepthImage> read_ldi_npz(const std::string& path, const Execution& execution = {});
 
 /// Whether width and height are in [1, 65536], depth_limit in [1, 2^24], offsets rise from 0 to the

@@ -41,7 +41,7 @@ std::vector<Format> formats() {
                    read_ldi_exr});
   }
 #endif
-#ifdef STRATA_HAVE_MINIZIP
+#ifdef STRATA_HAVE_LIBZIP
   for (const bool compress : {false, true}) {
     all.push_back({compress ? "NpzDeflated" : "NpzStored",
                    [compress](const auto& path, const auto& image, const auto& execution) {
@@ -276,7 +276,7 @@ TEST_P(LdiFile, ProgressEndsAtOne) {
   EXPECT_EQ(last, 1.0);
 }
 
-#ifdef STRATA_HAVE_MINIZIP
+#ifdef STRATA_HAVE_LIBZIP
 TEST(LdiNpz, ArraysStandWhereNumpyLooksForThem) {
   // A stored archive holds each array as a .npy file, as it is: look for the bytes.
   TemporaryFolder folder;
