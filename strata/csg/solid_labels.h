@@ -6,9 +6,9 @@
 
 #include "strata/csg/tree.h"
 
-// What cuts the result of a tree into parts: a point belongs to the first solid of the tree that
-// holds it, of those that are not taken away from something. SolidLists::set_labels() makes lists
-// that tell parts apart by a label of that solid.
+// Labels divide the result of a tree into parts. A point belongs to the first solid of the tree
+// that holds it and is not subtracted. SolidLists::set_labels() makes lists that name the parts by
+// the labels of their solids.
 
 namespace strata::csg {
 

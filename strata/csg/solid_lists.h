@@ -34,7 +34,7 @@ class SolidLists {
   [[nodiscard]] const TileListFilter& filter() const;
   /// The same, but never labelled.
   [[nodiscard]] const TileListFilter& unlabelled_filter() const;
-  /// Clips the soup where it does not fit the lattice of `grid`, far outside of the grid. Lists of
+  /// Clamps the soup where it does not fit the lattice of `grid`, far outside the grid. Lists of
   /// the grid's rays do not change. The filter must have no workers meanwhile.
   /// @param taken  the soup, if it was moved out
   /// @return kCancelled

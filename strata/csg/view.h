@@ -26,8 +26,8 @@ struct Camera {
 /// Moves the target to the middle of `box` (--auto-center).
 void centre_camera(Camera& camera, const Bounds& box);
 /// Sets the distance so that the ball around `box` and the target just fits (--view-all).
-/// @param aspect the picture's width / height; OpenSCAD looks at the height alone, so that narrow
-/// pictures lose the sides there
+/// @param aspect the picture's width / height. OpenSCAD considers the height alone, so that its
+/// narrow pictures lose their sides
 void fit_camera(Camera& camera, const Bounds& box, double aspect = 1.0);
 
 /// Eye space: x right, y up, the camera looks along -z.
@@ -44,7 +44,7 @@ struct View {
   bool perspective = true;
   /// Distances along the view axis at depth 0 and at the largest depth. Depth is linear in the
   /// distance for an orthographic view, in its reciprocal for a perspective one.
-  /// What lies before `near` is cut off there; the state of the ray at `near` is kept.
+  /// Parts nearer than `near` are cut off there; the state of the ray at `near` is kept.
   double near = 1.0, far = 2.0;
 
   /// The box that the view was made for reaches behind or beside the eye, or nearer than `near`.

@@ -46,9 +46,9 @@ class TileListFilter {
   };
   /// May be called by several threads at once.
   [[nodiscard]] virtual std::unique_ptr<Worker> worker() const = 0;
-  /// The output is labelled: each crossing tells what lies behind it, nothing at exit(), else the
-  /// label triangle(). No list then has two crossings at the same depth, and two labels may follow
-  /// each other without an exit between them.
+  /// True if the output is labelled: each crossing says what lies behind it. Behind an exit() lies
+  /// nothing, behind any other crossing the part with the label triangle(). No list then has two
+  /// crossings at the same depth. Two labels may follow each other without an exit between them.
   [[nodiscard]] virtual bool labelled() const { return false; }
   /// The solid of a triangle of the mesh; 0 if there is only one.
   [[nodiscard]] virtual std::uint32_t solid_of(std::uint32_t triangle) const {

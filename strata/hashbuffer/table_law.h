@@ -29,9 +29,9 @@
 // What follows (tests/hashbuffer hold the code to it). Cells only grow. The final table is unique:
 // this is deferred acceptance (proposals in order of age, a fixed strict order in every cell), so
 // its bits depend neither on the order of insertion nor on threads, nor does the set of failures.
-// Ages along a pixel's list are those of rising (depth, payload). When fragments fail, the table
-// keeps the nearest ones of every pixel: cells only grow, so what a record has lost against, those
-// behind it lose against as well. (With culling only the visible part is unique.)
+// Along a pixel's list, ages rise with (depth, payload). When fragments fail, the table keeps the
+// nearest ones of every pixel: cells only grow, so where a record has lost, the records behind it
+// lose as well. (With culling only the visible part is unique.)
 
 namespace strata::detail {
 

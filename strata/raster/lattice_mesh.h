@@ -33,7 +33,7 @@ struct LatticeMesh {
 Result<LatticeMesh> snap_to_lattice(const TriangleSoup& mesh, const VoxelGrid& grid,
                                     const Execution& execution = {});
 
-/// Clips a mesh that does not fit the lattice of `grid`: parts far outside the grid are moved onto
+/// Clamps a mesh that does not fit the lattice of `grid`: parts far outside the grid are moved onto
 /// a box (clamp_to_box()), so that rays through the grid meet the mesh as often as before.
 /// @param box  around the mesh
 /// @return for each triangle the index of the original triangle that it is a piece of; empty when

@@ -19,74 +19,76 @@
 
 namespace strata::csg {
 
-/// Files and how they are read.
+/// The input files, and how they are read.
 struct SceneInput {
   std::vector<std::string> files;  ///< meshes and scenes; "-": standard input
   MeshReader reader = MeshReader::kOwn;
-  /// Of standard input where that is among the files, else of all files; kAuto: by name and
+  /// Format of standard input if it is among the files, else of all files; kAuto: by name and
   /// content.
   MeshFormat format = MeshFormat::kAuto;
-  bool scene_format = false;               ///< the same: they are .csg, whatever their names are
-  ReadSceneOptions scene;                  ///< for the scenes among them
+  bool scene_format = false;               ///< true: that format is .csg
+  ReadSceneOptions scene;                  ///< for scenes among the files
   InsideRule rule = InsideRule::kWinding;  ///< which winding numbers are inside a mesh
-  bool keep_orientation = false;           ///< meshes that are inside out are not turned
+  bool keep_orientation = false;           ///< meshes that are inside out are not reversed
   /// A Boolean expression over the files, such as "a - b"; empty: their union. load_scene() only.
   std::string expression;
 };
 
-/// What is told while files are read, in this order; an empty one is not called.
+/// Callbacks for messages while files are read. An empty callback is not called.
 struct InputMessages {
-  /// Something that did not stop the work. @param code  for machines, see docs/json.md
+  /// A fault that does not stop the work. @param code  for machines, see docs/json.md
   std::function<void(std::string code, std::string message)> warn;
-  std::function<void(std::string_view line)> note;  ///< what was read
+  std::function<void(std::string_view line)> note;  ///< a sentence about a file that was read
   std::function<void(std::string_view line)> echo;  ///< a line that a scene's program prints
   /// The files that a scene has opened; a failure ends the work.
   std::function<Result<void>(std::span<const FileIdentity> files)> opened;
 };
 
-/// What a file is taken for.
+/// How a file is read: as a scene, or as a mesh of a format.
 struct InputKind {
   bool is_scene = false;
-  MeshFormat format = MeshFormat::kAuto;  ///< of a mesh; kAuto: its name and content tell
+  MeshFormat format = MeshFormat::kAuto;  ///< of a mesh; kAuto: by name and content
 };
 
-/// By the options, and by the file's name.
+/// The kind of a file, from the options and from its name.
 [[nodiscard]] InputKind kind_of(const std::string& path, const SceneInput& input);
 
-/// What is known about one input file after it was read and turned.
+/// The facts about one input file after its faces were reversed where needed.
 struct InputFacts {
   std::string path;
   MeshReadStats stats;
   bool closed = false;         ///< under the inside rule: every ray enters as often as it leaves
-  bool turned_around = false;  ///< all of it was inside out and has been turned
-  Orientation orientation;     ///< what was turned, part by part
-  /// What is inside: as asked for, but parity where faces have no common side.
+  bool turned_around = false;  ///< all of it was inside out and has been reversed
+  Orientation orientation;     ///< which parts were reversed
+  /// The rule that was asked for, or parity where no side of the mesh is its outside.
   InsideRule rule = InsideRule::kWinding;
   double area = 0.0;    ///< square world units
-  double volume = 0.0;  ///< signed, after turning; of an open mesh about the middle of its bounds
+  double volume = 0.0;  ///< signed, after reversal; an open mesh: about the middle of its bounds
   double longest_edge = 0.0;
   Bounds bounds;
   std::uint64_t zero_area_faces = 0;
   std::uint64_t unbalanced_edges = 0;
   std::string open;  ///< a sentence that says what is not closed; empty where all is
-  /// A scene: of `stats` there are format, bytes, vertices and triangles; area, volume and
-  /// zero_area_faces are not known.
+  /// True for a scene. Then `stats` has only format, bytes, vertices and triangles, and area,
+  /// volume and zero_area_faces are not known.
   bool is_scene = false;
 };
 
-/// Looks whether a mesh is closed and the right way around, turns it where it is not and may be,
-/// and warns of what users should know. @param path  what messages call it @return kCancelled
+/// Checks whether a mesh is closed and faces outward. Reverses what is inside out, unless
+/// input.keep_orientation. Warns of faults that users should know.
+/// @param path  the mesh's name in messages
+/// @return kCancelled
 Result<InputFacts> inspect_mesh(TriangleSoup& soup, MeshReadStats stats, const std::string& path,
                                 const SceneInput& input, const InputMessages& messages = {},
                                 const Execution& execution = {});
 
-/// One mesh file, read as the options say. @return as read_mesh(); kInput where neither its name
-/// nor the options say what format it has
+/// Reads one mesh file as the options say. @return as read_mesh(); kInput if neither its name nor
+/// the options give its format
 Result<MeshFile> read_mesh_input(const std::string& path, const InputKind& kind,
                                  const SceneInput& input, const Execution& execution = {});
 
-/// The same, then inspected: its triangles go to `soup`. With `read_ms` the time it took to read is
-/// added there.
+/// Reads a mesh file, inspects it, and puts its triangles into `soup`. Adds the time of reading to
+/// `read_ms` if that is not null.
 Result<InputFacts> load_mesh(const std::string& path, const InputKind& kind,
                              const SceneInput& input, const InputMessages& messages,
                              const Execution& execution, TriangleSoup& soup,
@@ -95,8 +97,8 @@ Result<InputFacts> load_mesh(const std::string& path, const InputKind& kind,
 /// Whether standard input is among the files.
 [[nodiscard]] bool reads_standard_input(const SceneInput& input);
 
-/// Whether a file's name or the options say what format it has. @param scenes where scenes can be
-/// read, too @return kInput naming what there is
+/// Checks that a file's name or the options give its format. @param scenes  true if scenes may be
+/// read too @return kInput naming the formats that there are
 Result<void> check_input_name(const std::string& path, const InputKind& kind, bool scenes);
 
 /// Warnings of the reader about a file.

@@ -12,13 +12,13 @@ namespace strata::csg {
 struct SectionPlane {
   glm::dvec3 normal{0.0};  ///< of length 1
   double offset = 0;
-  bool towards_eye = false;  ///< turned so that the side the eye is on is cut away
+  bool towards_eye = false;  ///< true: the side of the eye is cut away
 };
 
 /// The plane as it cuts for a camera: one that is towards_eye is turned, and stays as it is then.
 [[nodiscard]] SectionPlane facing(SectionPlane plane, const Camera& camera);
 
-/// Takes the sections away from the scene and its ghosts.
+/// Cuts the scene and its ghosts by the sections.
 void cut_scene(Scene& scene, std::span<const SectionPlane> cuts, const Camera& camera);
 
 }  // namespace strata::csg

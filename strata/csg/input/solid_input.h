@@ -16,30 +16,30 @@ namespace strata::csg {
 /// All inputs as one soup, for voxels and depth lists.
 struct SolidInput {
   TriangleSoup soup;
-  /// Of trees: what makes the lists of the result of the lists of the soup, all solids'. Where
-  /// has_scene(), area and volume are not known, and the bounds may be larger than the result.
+  /// For a tree: turns the lists of the soup, which holds all solids, into the lists of the result.
+  /// If has_scene(), area and volume are not known, and the bounds may be larger than the result.
   std::shared_ptr<SolidLists> tree;
-  std::shared_ptr<const Tree> scene;  ///< what `tree` was made of, without meshes
+  std::shared_ptr<const Tree> scene;  ///< the tree that `tree` was made from, without meshes
   std::vector<InputFacts> files;
   Bounds bounds;
-  bool closed = true;                      ///< all of them
+  bool closed = true;                      ///< all files are closed
   InsideRule rule = InsideRule::kWinding;  ///< of the soup; solids of a tree have their own
   double area = 0.0, volume = 0.0, longest_edge = 0.0;
   double read_ms = 0.0, diagnose_ms = 0.0;
 
-  /// Counts one more mesh in, all but its triangles.
+  /// Adds the facts of one more mesh, without its triangles.
   void add(InputFacts facts);
-  /// The lists of a tree take the place of the soup.
+  /// Replaces the soup by a tree.
   void set_tree(Tree tree);
   [[nodiscard]] bool has_scene() const;
-  /// Cuts off what does not fit the lattice of a grid; rays through the grid see no difference.
+  /// Clamps parts that do not fit the lattice of a grid; rays through the grid see no difference.
   /// @return kGeometry, kCancelled
   Result<void> fit(const VoxelGrid& grid, const Execution& execution = {});
 };
 
-/// Reads the files and unites them: scenes, and meshes as load_mesh() does. Of several meshes of
-/// which some take parity a tree is made. @return kInput, kUsage, kLimit, kCancelled
-/// @param as_tree  meshes become the solids of a tree, each by itself
+/// Reads the files, meshes as load_mesh() does, and unites them. Several meshes become a tree if
+/// parity is the rule of one of them. @return kInput, kUsage, kLimit, kCancelled
+/// @param as_tree  each mesh becomes a solid of a tree
 Result<SolidInput> load_solids(const SceneInput& input, bool as_tree = false,
                                const InputMessages& messages = {}, const Execution& execution = {});
 

@@ -12,12 +12,12 @@
 
 namespace strata::csg {
 
-/// Something in a scene that was done differently than written, or not at all.
+/// A warning about a part of a scene that was done differently than written, or not at all.
 struct SceneWarning {
   /// For machines: "not-done" (a node that cannot be done), "missing-file", "missing-font",
-  /// "approximate", "ignored", "geometry", "openscad" (a warning of its own about a program).
+  /// "approximate", "ignored", "geometry", "openscad" (openscad's own warning about a program).
   std::string code;
-  std::string message;  ///< begins with `file:line:column: `, of openscad's with what it names
+  std::string message;  ///< begins with `file:line:column: `, or with the place that openscad names
 };
 
 /// The camera that a program sets by `$vpt`, `$vpr`, `$vpd` and `$vpf`; empty: not set.

@@ -18,8 +18,8 @@ class SurfaceSource {
  public:
   virtual ~SurfaceSource() = default;
 
-  /// Fills `image`, which has the view's size, but for the tiles that it appends to `left`: those
-  /// are found as if it were not there. Adds to `report`. Called by one thread at a time.
+  /// Fills `image`, which has the view's size, except for the tiles that it appends to `left`: the
+  /// CPU finds the surfaces of those. Adds to `report`. Called by one thread at a time.
   /// @return kLimit, kInternal, kCancelled
   virtual Result<void> find(const FrameInput& frame, SurfaceImage& image, DrawReport& report,
                             std::vector<std::uint32_t>& left, const Execution& execution) = 0;
