@@ -26,13 +26,13 @@ FONT = "openscad refuses the program: Debian leaves out the font file that it na
 
 # Scenes below 0.97, and why.
 REASONS = {
-    "issue1137": "A polyhedron that is not closed: OpenSCAD shows nothing, here parity decides what is inside.",
+    "issue1137": "The polyhedron is not closed. OpenSCAD shows nothing; Strata decides by parity what is inside.",
     "nef3_cube": "Nef polyhedra are not read.",
     "intersection-tests": "A flat circle beside solids is left out of the result; OpenSCAD shows it as a slab.",
-    "preview_variable": "The program asks whether it is a preview: it is one while openscad writes the .csg.",
-    "polyhedron-tests": "Faces with corners that are no points are left out, and so is a polyhedron with an infinite point.",
-    "issue2220": "The expected picture shows this flat scene from the camera for solids; we show flat scenes from above.",
-    "minkowski2-tests": "The expected picture treats a sum with an empty operand as empty; we ignore that operand.",
+    "preview_variable": "The program asks whether it runs as a preview, which is true while openscad writes the .csg.",
+    "polyhedron-tests": "A face is left out if a corner names no point. A polyhedron with an infinite point is left out.",
+    "issue2220": "The expected picture shows this flat scene from the camera for solids; Strata shows flat scenes from above.",
+    "minkowski2-tests": "The expected picture treats a sum with an empty operand as empty; Strata ignores that operand.",
     "text-font-symbol": "The font is not installed.",
     "logo_and_text": "The font is not installed.",
     "text-font-alignment-tests": FONT,
@@ -43,11 +43,11 @@ REASONS = {
 }
 
 
-THIN = "Flat and a few pixels wide: OpenSCAD's red outlines are off by up to a pixel."
+THIN = "The scene is flat and a few pixels wide, and OpenSCAD's red outlines are off by up to a pixel."
 
 
 def reason(row):
-    return REASONS.get(row[0], THIN if row[3] and row[1] > 0.75 else "Not looked into yet.")
+    return REASONS.get(row[0], THIN if row[3] and row[1] > 0.75 else "Not examined yet.")
 
 
 def load(path):
@@ -123,8 +123,8 @@ def main():
     overlaps = [row[1] for row in rows]
     low = [row for row in rows if row[1] < 0.97]
     lines = [
-        "# Our pictures beside OpenSCAD's", "",
-        "`bench/csg_conformance.py` makes this page with `strata csg --render` at 512 x 512. It compares our pictures with those that",
+        "# Strata's pictures compared with OpenSCAD's", "",
+        "`bench/csg_conformance.py` makes this page with `strata csg --render` at 512 x 512. It compares the pictures with those that",
         "the tests and examples of OpenSCAD 2021.01 expect: Debian's packages openscad and openscad-testing-data hold both.", "",
         "- IoU is the intersection of the two silhouettes over their union: 1 when they are equal.",
         "- Rule is OpenSCAD's own comparison of pictures, which also looks at colours.", "",
