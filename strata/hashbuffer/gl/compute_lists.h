@@ -17,10 +17,12 @@ class ComputeListSource : public ListSource {
  public:
   ~ComputeListSource() override;
 
-  /// `context` stays current while this is used. @param store keeps whole payloads
-  /// @param spare used from the first failure of `store` on, as with lists beyond its ages; may be
-  /// null @param pixels_at_once see rows_at_once(), about @param execution its stop and memory
-  /// limit (that of a store), asked by lists() @return kUsage where the driver cannot
+  /// `context` stays current while this is used.
+  /// @param store  keeps whole payloads
+  /// @param spare  used from the first failure of `store` on, such as a list beyond its ages; or null
+  /// @param pixels_at_once  approximate; see rows_at_once()
+  /// @param execution  lists() uses its stop and its memory limit, which bounds a store
+  /// @return kUsage if the driver cannot run it
   [[nodiscard]] static Result<std::unique_ptr<ComputeListSource>> create(
       const Context& context, std::unique_ptr<Store> store, std::unique_ptr<Store> spare = nullptr,
       std::int64_t pixels_at_once = std::int64_t{1} << 22, const Execution& execution = {});

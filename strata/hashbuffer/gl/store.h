@@ -22,7 +22,7 @@ class Store {
  public:
   virtual ~Store();
 
-  /// A hint before begin(): how many fragments will come, about. Without effect where room is made
+  /// A hint before begin(): the approximate number of fragments. Without effect where room is made
   /// as it is needed.
   virtual void expect(std::uint64_t fragments) { static_cast<void>(fragments); }
   /// Whether a counting pass for expect() pays: a table that is far too full takes long to fail.
@@ -33,7 +33,7 @@ class Store {
   [[nodiscard]] virtual int passes() const = 0;
   /// The GLSL text of strata_insert for that pass. @pre pass < passes()
   [[nodiscard]] virtual StoreGlsl glsl(int pass) const = 0;
-  /// The rows that the pass keeps fragments of.
+  /// The rows whose fragments the pass keeps.
   [[nodiscard]] virtual PixelRows rows_of(int pass) const = 0;
   /// Binds what the pass needs; then draw. False: nothing needs to be drawn in this pass.
   [[nodiscard]] virtual Result<bool> begin_pass(int pass) = 0;
