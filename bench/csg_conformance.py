@@ -30,7 +30,7 @@ REASONS = {
     "nef3_cube": "Nef polyhedra are not read.",
     "intersection-tests": "A flat circle beside solids is left out of the result; OpenSCAD shows it as a slab.",
     "preview_variable": "The program asks whether it runs as a preview, which is true while openscad writes the .csg.",
-    "polyhedron-tests": "A face is left out if a corner names no point. A polyhedron with an infinite point is left out.",
+    "polyhedron-tests": "A corner that names no point is left out of its face. A polyhedron with an infinite point is left out.",
     "issue2220": "The expected picture shows this flat scene from the camera for solids; Strata shows flat scenes from above.",
     "minkowski2-tests": "The expected picture treats a sum with an empty operand as empty; Strata ignores that operand.",
     "text-font-symbol": "The font is not installed.",
