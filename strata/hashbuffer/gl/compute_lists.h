@@ -19,7 +19,7 @@ class ComputeListSource : public ListSource {
 
   /// `context` stays current while this is used.
   /// @param store  keeps whole payloads
-  /// @param spare  used from the first failure of `store` on, such as a list beyond its ages; or null
+  /// @param spare  used after the first failure of `store`, such as a list beyond its ages; or null
   /// @param pixels_at_once  approximate; see rows_at_once()
   /// @param execution  lists() uses its stop and its memory limit, which bounds a store
   /// @return kUsage if the driver cannot run it
