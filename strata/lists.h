@@ -1,7 +1,10 @@
 #pragma once
 
+#include <atomic>
 #include <cassert>
+#include <concepts>
 #include <cstdint>
+#include <memory>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -53,6 +56,47 @@ struct Fragment {
   friend bool operator==(const Fragment&, const Fragment&) = default;
 };
 
+/// The first fragment that no list can keep.
+struct RefusedFragment {
+  std::atomic<bool> any = false;
+  int x = 0, y = 0;
+  std::uint32_t depth = 0;
+};
+
+template <class Sink, class... Payload>
+concept TakesFragment = requires(Sink& sink, Payload... payload) {
+  sink.insert(0, 0, 0u, payload...);
+};
+
+/// What a generator inserts into; any thread. A fragment outside of the screen, or of a depth of
+/// 2^24 or more, is in no list: build() and finish() name the first one.
+template <class Sink>
+class CheckedSink {
+ public:
+  CheckedSink(Sink& sink, int width, int height, RefusedFragment& refused)
+      : sink_(sink), width_(width), height_(height), refused_(refused) {}
+
+  /// The payload is left out for lists of depth alone.
+  template <class... Payload>
+  requires TakesFragment<Sink, Payload...>
+  void insert(int x, int y, std::uint32_t depth, Payload... payload) noexcept {
+    if (static_cast<unsigned>(x) < static_cast<unsigned>(width_) &&
+        static_cast<unsigned>(y) < static_cast<unsigned>(height_) && depth >> 24 == 0) {
+      sink_.insert(x, y, depth, payload...);
+    } else if (!refused_.any.exchange(true, std::memory_order_relaxed)) {
+      refused_.x = x, refused_.y = y, refused_.depth = depth;
+    }
+  }
+  /// Depths are integers: record_depth() makes them.
+  template <std::floating_point Depth, class... Payload>
+  void insert(int x, int y, Depth depth, Payload... payload) = delete;
+
+ private:
+  Sink& sink_;
+  int width_, height_;
+  RefusedFragment& refused_;
+};
+
 /// The depth lists of a screen, kept by `Store`. Use the aliases below. One thread builds; several
 /// may read.
 template <DepthListStore Store>
@@ -90,35 +134,42 @@ class FragmentLists {
   /// again it must give the same fragments. `execution.memory_limit` bounds the bytes held.
   /// @return how it was built. ErrorCode::kLimit, and empty lists, if a list is too long (the
   /// message names pixel and length) or memory does not suffice (it says how many fragments are
-  /// missing); kInternal if the generator produced different fragments the second time; kCancelled
-  /// on request
+  /// missing); kInternal if the generator produced different fragments the second time; kUsage
+  /// naming the first fragment outside of the screen or of a depth of 2^24 or more; kCancelled on
+  /// request
   template <class Generator>
   [[nodiscard]] Result<BuildReport> build(Generator&& generator, const Execution& execution = {}) {
-    auto report = store_.build(generator, execution);
-    is_complete_ = report.has_value();
-    return report;
+    refused_->any = false;
+    auto report = store_.build(
+        [&](auto& store_sink) {
+          CheckedSink sink(store_sink, width(), height(), *refused_);
+          generator(sink);
+        },
+        execution);
+    return completed(std::move(report));
   }
 
   /// Empties one-pass lists for a new frame, with the room that the last frame would have needed.
   /// Then insert(), from any threads, and finish(). @return as build()
   [[nodiscard]] Result<void> begin() requires kOnePass {
     is_complete_ = false;
+    refused_->any = false;
     return store_.begin_frame();
   }
   /// Adds a fragment to one-pass lists; any thread.
-  /// @pre 0 <= x < width, 0 <= y < height, begin() before and finish() not yet
+  /// @pre begin() before and finish() not yet
   void insert(int x, int y, std::uint32_t depth) noexcept requires(kOnePass && !kHasPayload) {
-    store_.insert(x, y, depth);
+    CheckedSink(store_, width(), height(), *refused_).insert(x, y, depth);
   }
   void insert(int x, int y, std::uint32_t depth, std::uint32_t payload) noexcept requires kOnePass {
-    store_.insert(x, y, depth, payload);
+    CheckedSink(store_, width(), height(), *refused_).insert(x, y, depth, payload);
   }
+  template <std::floating_point Depth, class... Payload>
+  void insert(int x, int y, Depth depth, Payload... payload) = delete;
   /// Ends the frame: call it when all threads have inserted, before lists are read.
   /// @return as build(): ErrorCode::kLimit says how many fragments are missing
   [[nodiscard]] Result<BuildReport> finish() requires kOnePass {
-    auto report = store_.finish();
-    is_complete_ = report.has_value();
-    return report;
+    return completed(store_.finish());
   }
 
   /// Visits the list of pixel (x, y) front to back; stops early if `visit` returns false (it may
@@ -145,7 +196,20 @@ class FragmentLists {
 
  private:
   explicit FragmentLists(Store&& store) : store_(std::move(store)) {}
+
+  Result<BuildReport> completed(Result<BuildReport>&& report) {
+    if (report && refused_->any) {
+      report = fail(ErrorCode::kUsage,
+                    "a fragment of depth {} was inserted at pixel ({}, {}): depths must be 0 to "
+                    "16777215, pixels (0, 0) to ({}, {})",
+                    refused_->depth, refused_->x, refused_->y, width() - 1, height() - 1);
+    }
+    is_complete_ = report.has_value();
+    return std::move(report);
+  }
+
   Store store_;
+  std::unique_ptr<RefusedFragment> refused_ = std::make_unique<RefusedFragment>();
   bool is_complete_ = true;  ///< true of empty lists
 };
 

@@ -102,6 +102,41 @@ TEST(OwnListsOfOnePass, ThatAreTooLongNameTheListsToTake) {
   expect_lists(deep, fragments);
 }
 
+TYPED_TEST(OwnLists, NameTheFragmentThatNoListCanKeep) {
+  struct Case {
+    int x, y;
+    std::uint32_t depth;
+    const char* said;
+  };
+  for (const Case& wrong :
+       {Case{8, 3, 5, "a fragment of depth 5 was inserted at pixel (8, 3): "},
+        Case{3, -1, 5, "at pixel (3, -1)"}, Case{0, 0, 1u << 24, "of depth 16777216"}}) {
+    auto lists = TypeParam::create(8, 8).value();
+    const auto draw = [&](int x, int y, std::uint32_t depth) {
+      return [=](auto& sink) {
+        if constexpr (TypeParam::kHasPayload) {
+          sink.insert(x, y, depth, 1u);
+        } else {
+          sink.insert(x, y, depth);
+        }
+      };
+    };
+    const auto report = lists.build(draw(wrong.x, wrong.y, wrong.depth));
+    ASSERT_FALSE(report) << wrong.said;
+    EXPECT_EQ(report.error().code, ErrorCode::kUsage);
+    EXPECT_NE(report.error().message.find(wrong.said), std::string::npos) << report.error().message;
+    // The next frame is not held against the last one.
+    ASSERT_TRUE(lists.build(draw(7, 7, (1u << 24) - 1)));
+    EXPECT_EQ(lists.list(7, 7).size(), 1u);
+  }
+}
+
+template <class Lists>
+concept TakesARealDepth = requires(Lists& lists) {
+  lists.insert(0, 0, 0.5f, 1u);
+};
+static_assert(!TakesARealDepth<OnePassLists> && !TakesARealDepth<DeepLists>);
+
 // A sink of depth alone has no form with a payload that a concept could take for one without.
 template <class Sink>
 concept TakesDepthAlone = requires(Sink& sink) {
