@@ -14,7 +14,7 @@ int main() {
   const auto set = strata::voxelize(file->soup, grid.value(), {.samples = 4});
   if (!set) return std::fprintf(stderr, "%s\n", set.error().message.c_str()), 1;
 
-  const auto fog = strata::to_openvdb<openvdb::FloatGrid>(*set, {.samples = 64});
+  const auto fog = strata::to_openvdb<openvdb::FloatGrid>(*set, {.full_label = 64});
   if (!fog) return std::fprintf(stderr, "%s\n", fog.error().message.c_str()), 1;
   double volume = 0;
   for (auto voxel = (*fog)->cbeginValueOn(); voxel; ++voxel) {

@@ -102,7 +102,7 @@ class TreeFiller {
 
 template <class Grid>
 void describe(const VoxelGrid& voxels, const OpenVdbOptions& options, Grid& grid) {
-  const bool ids = kIsFloat<Grid> && options.samples == 0;
+  const bool ids = kIsFloat<Grid> && options.full_label == 0;
   if (kIsFloat<Grid> && !ids) grid.setGridClass(openvdb::GRID_FOG_VOLUME);
   grid.setName(!options.name.empty() ? options.name
                : ids                 ? "ids"
@@ -125,7 +125,7 @@ Result<typename Grid::Ptr> make_grid(const VoxelIntervals& set, const OpenVdbOpt
                                      const Execution& execution) {
   auto grid = Grid::create();
   const bool labels = kIsFloat<Grid> && set.has_labels();
-  const std::uint32_t divisor = labels ? std::max(options.samples, std::uint32_t{1}) : 0;
+  const std::uint32_t divisor = labels ? std::max(options.full_label, std::uint32_t{1}) : 0;
   VdbLeafBuilder builder(set.grid().dims.z, divisor);
   TreeFiller<Grid> filler(set, divisor, *grid);
   for (int tv = 0; tv < set.tiles_v(); ++tv) {

@@ -17,9 +17,9 @@ struct OpenVdbOptions {
   /// Empty: `solid` for a BoolGrid or MaskGrid, `density` for a FloatGrid, `ids` for a FloatGrid of
   /// ids.
   std::string name{};
-  /// FloatGrid: the value of a voxel is its label divided by this number, and the grid a fog
+  /// FloatGrid: the label of a full voxel. Values are labels divided by it, and the grid is a fog
   /// volume. Give samples^3 with VoxelizeOptions::samples. 0: labels are ids and become the values.
-  std::uint32_t samples = 1;
+  std::uint32_t full_label = 1;
 };
 
 /// The grid that `strata voxelize -o x.vdb` would write: the solid voxels are active, a node of

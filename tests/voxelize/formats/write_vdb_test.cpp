@@ -487,8 +487,8 @@ TEST_F(OpenVdbBridge, LabelsAreFractionsOrIds) {
   const std::array paths = {write(along_z, fog), write(along_z, ids)};
   for (const Axis axis : {Axis::kX, Axis::kY, Axis::kZ}) {
     const VoxelIntervals set = labelled(grid, axis, some_ids(27));
-    expect_same<openvdb::FloatGrid>(set, {.samples = 27}, paths[0], "density");
-    expect_same<openvdb::FloatGrid>(set, {.samples = 0}, paths[1], "ids");
+    expect_same<openvdb::FloatGrid>(set, {.full_label = 27}, paths[0], "density");
+    expect_same<openvdb::FloatGrid>(set, {.full_label = 0}, paths[1], "ids");
   }
 }
 
