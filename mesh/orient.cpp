@@ -557,7 +557,7 @@ std::vector<std::string> sentences(const Orientation& found, bool changed) {
                  : " and were reversed"));
   }
   if (found.double_faces > 0) {
-    result.push_back(fmt::format("double-sided: {} triangles occur once each way{}",
+    result.push_back(fmt::format("double-sided: {} triangles occur in both orientations{}",
                                  found.double_faces,
                                  changed ? "; one of the two is used as the solid's surface" : ""));
   }

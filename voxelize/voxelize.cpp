@@ -136,7 +136,7 @@ Result<void> check_options(const VoxelGrid& grid, const VoxelizeOptions& options
   }
   if (options.filter != nullptr && options.closedness == Closedness::kAssumeOpen) {
     return fail(ErrorCode::kUsage,
-                "the lists of a Boolean tree are closed; voting on open meshes does not apply");
+                "the lists of a Boolean tree are closed; OpenMode::kVote does not apply");
   }
   if (options.filter != nullptr && options.surface && options.filter->labelled()) {
     return fail(ErrorCode::kUsage, "labels need a solid voxelization without its surface");

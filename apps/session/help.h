@@ -69,7 +69,7 @@ inline constexpr ExitCode kExitCodes[] = {
     {4, "output not writable"},
     {5, "geometry refused: --strict, --open fail, no extent, coordinates too large"},
     {6, "limit exceeded: memory, size of the grid, --time-limit"},
-    {7, "two results differ that should agree"},
+    {7, "two results that should agree differ"},
     {130, "interrupted"}};
 
 /// The values of a choice as they stand behind its option: `winding|nonzero|parity`.

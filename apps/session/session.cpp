@@ -159,8 +159,7 @@ Result<void> Session::check_strict() const {
 }
 
 void Session::complain(const Error& error) {
-  const char* written =
-      committed_ ? "outputs that were complete are kept" : "no output was written";
+  const char* written = committed_ ? "complete outputs are kept" : "no output was written";
   if (timed_out()) {
     return say("error: ", fmt::format("not finished within {:g} s (--time-limit); {}",
                                       options_.time_limit_s, written));

@@ -26,7 +26,7 @@ constexpr const char* kTopHelp = R"(strata: exact voxels, depth lists and pictur
   strata info scan.ply                             size, volume, holes
   strata ldi knot.obj -r 512 -o knot.exr           depth lists as a deep image
   strata csg plate.csg -o plate.png                a picture of a Boolean tree
-  strata part.scad -o part.png                     the same without a command
+  strata part.scad -o part.png                     a picture, without naming the command
   strata view plate.scad --watch                   a window that shows the scene
 )";
 
@@ -109,14 +109,15 @@ void add_common(CLI::App& app, Words& words) {
   option(app, group, "-j,--threads", words.threads, "N",
          "Number of threads, 0 to 4096; 0 means one per processor (default: 0)");
   option(app, group, "--memory-limit", words.memory_limit, "SIZE",
-         "Most memory to use, in bytes or with K, M, G or T: 512M, 2G (default: three quarters of "
+         "Largest amount of memory to use, in bytes or with K, M, G or T: 512M, 2G (default: three "
+         "quarters of "
          "the machine's or container's)");
   option(app, group, "--time-limit", words.time_limit, "SECONDS",
          "Stop after this time, without output and with exit code 6 (default: no limit)");
   flag(app, group, "--strict,--hardwarnings", words.strict,
        "Treat warnings as errors, with exit code 5");
   flag(app, group, "-q,--quiet", words.quiet, "Print errors only");
-  flag(app, group, "-v,--verbose", words.verbose, "Print what is read and done as well");
+  flag(app, group, "-v,--verbose", words.verbose, "Also print each file read and each step");
   option(app, group, "--progress", words.progress, choices(kProgressWords),
          "Progress bar on standard error (default: auto, on terminals only)");
 }
@@ -198,8 +199,8 @@ void define_voxelize(CLI::App& app, Words& words) {
   flag(app, solid, "--keep-orientation", words.keep_orientation,
        "Do not reverse meshes that are inside out");
   option(app, solid, "--open", words.open, choices(kOpenModeWords),
-         "Meshes with holes: rays along x, y and z vote, only the surface is kept, or the command "
-         "fails (default: vote)");
+         "Meshes with holes: vote closes holes by caps and winding numbers, surface keeps only the "
+         "surface, fail ends the command (default: vote)");
   add_backend(app, words, "Running");
   add_common(app, words);
   option(app, kDeveloperGroup, "--axis", words.axis, choices(kAxisWords),

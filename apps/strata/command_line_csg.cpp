@@ -58,7 +58,8 @@ void define_input(CLI::App& app, Words& words) {
 /// Those that openscad has, too, and that are not among the others.
 void define_openscad(CLI::App& app, CsgWords& csg) {
   define_scene_options(app, csg.scene);
-  app.add_flag("--preview{-}", csg.preview, "Draw as without --render (default)")
+  app.add_flag("--preview{-}", csg.preview,
+               "Draw with ghosts and colours (default; the opposite of --render)")
       ->group(kOpenscadGroup);
   app.add_option("--view", csg.shown, "The same as --edges")
       ->type_name("edges")
@@ -76,7 +77,7 @@ void define_openscad(CLI::App& app, CsgWords& csg) {
   app.add_option("--summary-file", csg.summary_file, "Refused: --json=FILE does this")
       ->type_name("FILE")
       ->group("");
-  app.add_option("--csglimit", csg.csg_limit, "Accepted without effect: scenes have no limit")
+  app.add_option("--csglimit", csg.csg_limit, "Has no effect: scenes have no limit")
       ->type_name("N")
       ->group(kOpenscadGroup);
 }

@@ -73,7 +73,7 @@ inline constexpr CommandSummary kCommands[] = {
     {"info", "Report counts, bounds, area, volume and holes"},
     {"ldi", "Write the depth lists of meshes or a scene: a layered depth image"},
     {"csg", "Draw or measure a scene (.csg, .scad) or an expression over meshes"},
-    {"view", "Show the same in a window: turn, cut, pick, measure, reload"}};
+    {"view", "Show a scene or meshes in a window: turn, cut, pick, measure, reload"}};
 
 /// Defines the options of a command, with its description and footer. False: there is no command
 /// of that name here; `view` is a program of its own.

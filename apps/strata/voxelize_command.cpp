@@ -79,14 +79,15 @@ Result<void> check_open(const VoxelizeCommand& command, const csg::SolidInput& i
   }
   if (command.ids && !input.has_scene()) {
     return fail(ErrorCode::kUsage,
-                "--ids needs closed meshes: in open ones rays along three axes vote on each voxel, "
-                "and a vote does not tell solids apart; close {}, or remove --ids",
+                "--ids needs closed meshes: in open ones winding numbers decide, and they do not "
+                "tell solids apart; close {}, or remove --ids",
                 file.path);
   }
   if (input.has_scene() && command.open == OpenMode::kVote) {
-    session.warn("open", fmt::format("{}: scenes do not use axis voting: each ray pairs the faces "
-                                     "it meets, and a face without a partner becomes a thin sheet",
-                                     file.path));
+    session.warn("open",
+                 fmt::format("{}: scenes do not use winding numbers: each ray pairs the faces "
+                             "it meets, and a face without a partner becomes a thin sheet",
+                             file.path));
   }
   return {};
 }
@@ -297,7 +298,7 @@ Result<void> check_voxels(const VoxelizeCommand& command, VoxelizeOutcome& outco
   if (!command.surface && !is_surface_alone(command, outcome.input)) {
     if (auto done = check_thin(command, outcome, execution, session); !done) return done;
   } else if (outcome.report.solid_voxels == 0) {
-    session.warn("empty", "no voxel is solid; does the grid cover the mesh?");
+    session.warn("empty", "no voxel is solid; the grid may not cover the mesh");
   }
   return session.check_strict();
 }

@@ -81,9 +81,9 @@ void define_verify_options(CLI::App& app, VerifyWords& words) {
       ->group(compared);
   const char* running = "Running";
   app.add_option("-j,--threads", words.command.common.threads,
-                 "Number of Strata's threads, 0 to 1024; 0 means one per processor (default: 0); "
+                 "Number of Strata's threads, 0 to 4096; 0 means one per processor (default: 0); "
                  "CGAL uses one")
-      ->check(range(0, 1024))
+      ->check(range(0, 4096))
       ->type_name("N")
       ->group(running);
   app.add_flag("-q,--quiet", words.command.common.quiet, "Print errors only")->group(running);

@@ -43,7 +43,7 @@ constexpr Rule kRules[] = {
     {"orbit", Action::kOrbit, Form::kTwoNumbers, "DX DY",
      "turn, as a mouse drag of so many pixels does"},
     {"pan", Action::kPan, Form::kTwoNumbers, "DX DY", "move, as a drag of so many pixels does"},
-    {"zoom", Action::kZoom, Form::kZoom, "STEPS [X Y]", "come nearer by a tenth per step"},
+    {"zoom", Action::kZoom, Form::kZoom, "STEPS [X Y]", "zoom in by a tenth per step"},
     {"drag", Action::kDrag, Form::kDrag, "BUTTON X Y X Y [MOVES]",
      "drag the mouse with left, right or middle"},
     {"click", Action::kClick, Form::kTwoNumbers, "X Y", "click with the left button"},

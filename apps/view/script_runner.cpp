@@ -126,7 +126,7 @@ Result<void> ScriptRunner::apply(const ScriptCommand& command, Viewer& viewer) {
       viewer.reset_statistics();
       return {};
     default:
-      return fail(ErrorCode::kInternal, "a command that is not known");
+      return fail(ErrorCode::kInternal, "unknown command");
   }
 }
 

@@ -46,7 +46,7 @@ constexpr Key kKeys[] = {
     {"ctrl+9", [](Viewer& v) { v.look("back"); }, "from behind"},
     {"ctrl+0", [](Viewer& v) { v.look("diagonal"); }, "diagonally"},
     {"ctrl+shift+0", [](Viewer& v) { v.look("centre"); }, "the origin in the middle"},
-    {"ctrl+alt+0", [](Viewer& v) { v.look("reset"); }, "as at the beginning"},
+    {"ctrl+alt+0", [](Viewer& v) { v.look("reset"); }, "reset the camera"},
     {"ctrl+shift+v", [](Viewer& v) { v.look("all"); }, "all in view; also f and home"},
     {"f", [](Viewer& v) { v.look("all"); }, ""},
     {"home", [](Viewer& v) { v.look("all"); }, ""},

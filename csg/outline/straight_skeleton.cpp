@@ -35,7 +35,7 @@ class Wavefront {
     const std::size_t most_events = 40 * points + 100;
     for (std::size_t event = 0; !active_.empty(); ++event) {
       if (event > most_events) {
-        return fail(ErrorCode::kGeometry, "roof: the edges of the outline do not come together");
+        return fail(ErrorCode::kGeometry, "roof: the edges of the outline do not meet");
       }
       if (!step()) break;
     }

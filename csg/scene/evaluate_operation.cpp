@@ -101,13 +101,13 @@ TriangleSoup Evaluator::boundary_mesh(std::uint32_t node, Tree::NodeId solid) {
   }
   const Bounds exact = bounds(scene_.tree, solid), taken = bounds(all);
   const glm::dvec3 size = exact.empty() ? glm::dvec3(0.0) : exact.high - exact.low;
-  warn(
-      node, "approximate",
-      fmt::format("'{}': {}; only the first operands of differences and intersections are used, in "
-                  "a box of {:.6g} x {:.6g} x {:.6g} where the result lies in {:.6g} x {:.6g} x "
-                  "{:.6g}",
-                  name(node), mesh.error().message, taken.high.x - taken.low.x,
-                  taken.high.y - taken.low.y, taken.high.z - taken.low.z, size.x, size.y, size.z));
+  warn(node, "approximate",
+       fmt::format(
+           "'{}': {}; only the first operands of differences and intersections are used: "
+           "their box is {:.6g} x {:.6g} x {:.6g}, the box of the result is {:.6g} x {:.6g} x "
+           "{:.6g}",
+           name(node), mesh.error().message, taken.high.x - taken.low.x, taken.high.y - taken.low.y,
+           taken.high.z - taken.low.z, size.x, size.y, size.z));
   return all;
 }
 

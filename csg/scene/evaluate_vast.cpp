@@ -115,9 +115,10 @@ Result<void> check_coordinates(Scene& scene) {
       continue;
     }
     scene.warnings.push_back(
-        {"approximate", fmt::format("{} reaches to {:.3g}; its sloping faces are exact to about "
-                                    "{:.2g}, and the solids that they meet are {:.3g} long",
-                                    named(solid), reach, error, size)});
+        {"approximate",
+         fmt::format("{} has coordinates up to {:.3g}; its sloping faces are exact to about "
+                     "{:.2g}, but the solids that they meet are only {:.3g} long",
+                     named(solid), reach, error, size)});
   }
   return {};
 }

@@ -98,7 +98,7 @@ Result<InputBytes> InputBytes::read_all(int descriptor, const std::string& name,
         ::read(descriptor, file.owned_.data() + filled, file.owned_.size() - filled);
     if (got < 0 && (errno == EINTR || errno == EAGAIN)) continue;
     if (got < 0 && errno == EBADF && descriptor == STDIN_FILENO) {
-      return fail(ErrorCode::kInput, "{}: it is closed", name);
+      return fail(ErrorCode::kInput, "{} is closed", name);
     }
     if (got < 0) {
       return fail(ErrorCode::kInput, "{}: {} after {} bytes", name, reason(errno), filled);

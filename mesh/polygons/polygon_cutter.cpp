@@ -86,8 +86,8 @@ bool quad_is_fan(const glm::dvec2 (&p)[4]) {
 bool Bend::large() const { return height > kLarge * size; }
 
 std::string Bend::text() const {
-  return fmt::format("its corners deviate {:.3g} from a plane, and it is {:.3g} long", height,
-                     size);
+  return fmt::format("its corners deviate {:.3g} from a plane, and the polygon is {:.3g} long",
+                     height, size);
 }
 
 QuadCut cut_quad(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c,

@@ -224,8 +224,8 @@ TEST_F(Faults, AnExistingFileSurvivesAFailedRun) {
 TEST_F(Faults, AClosedStandardInputIsNotAnotherFile) {
   RunOptions closed;
   closed.closed_stdin = true;
-  fails({"info", "-", "--input-format", "stl"}, 3, "standard input: it is closed", closed);
-  fails({"csg", "-", "--input-format", "csg", "-o", "a.png"}, 3, "it is closed", closed);
+  fails({"info", "-", "--input-format", "stl"}, 3, "standard input is closed", closed);
+  fails({"csg", "-", "--input-format", "csg", "-o", "a.png"}, 3, "is closed", closed);
   const RunResult run = place.run({"info", "ball.obj"}, closed);
   EXPECT_EQ(run.exit_code, 0) << run.err;
 }

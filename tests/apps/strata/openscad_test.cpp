@@ -238,8 +238,7 @@ TEST_F(Openscad, AnAnimationIsNumberedAsOpenscadNumbersIt) {
   const RunResult cut =
       place.run({"turn.scad", "--animate=9000", "-o", "long.png", "--size=9,9"}, options);
   EXPECT_EQ(cut.exit_code, 130) << cut.err;
-  EXPECT_NE(cut.err.find("interrupted; outputs that were complete are kept"), std::string::npos)
-      << cut.err;
+  EXPECT_NE(cut.err.find("interrupted; complete outputs are kept"), std::string::npos) << cut.err;
 }
 
 }  // namespace

@@ -48,7 +48,7 @@ TEST_F(VoxelizeTrees, IdsOfOpenMeshesAreRefused) {
     const RunResult refused = run(files);
     EXPECT_EQ(refused.exit_code, 2) << refused.err;
     EXPECT_EQ(refused.out, "");
-    EXPECT_NE(refused.err.find("vote"), std::string::npos) << refused.err;
+    EXPECT_NE(refused.err.find("winding numbers decide"), std::string::npos) << refused.err;
     EXPECT_NE(refused.err.find("close open.obj, or remove --ids"), std::string::npos)
         << refused.err;
   }
@@ -95,7 +95,8 @@ TEST_F(VoxelizeTrees, OpenMeshesInScenesAreReportedWithTheRuleThatDecides) {
     const json found = report(with({}));
     const auto said = codes(found);
     EXPECT_NE(std::find(said.begin(), said.end(), "open"), said.end()) << files.back();
-    EXPECT_NE(last_error.find(files.back() + ": scenes do not use axis voting"), std::string::npos)
+    EXPECT_NE(last_error.find(files.back() + ": scenes do not use winding numbers"),
+              std::string::npos)
         << last_error;
     EXPECT_EQ(found["input"]["closed"], false);
     const RunResult failed = run({"--checksum", "--open", "fail", "-q"});
