@@ -81,7 +81,7 @@ class CheckedSink {
   requires TakesFragment<Sink, Payload...>
   void insert(int x, int y, std::uint32_t depth, Payload... payload) noexcept {
     if (static_cast<unsigned>(x) < static_cast<unsigned>(width_) &&
-        static_cast<unsigned>(y) < static_cast<unsigned>(height_) && depth >> 24 == 0) {
+        static_cast<unsigned>(y) < static_cast<unsigned>(height_) && depth <= kRecordDepthMax) {
       sink_.insert(x, y, depth, payload...);
     } else if (!refused_.any.exchange(true, std::memory_order_relaxed)) {
       refused_.x = x, refused_.y = y, refused_.depth = depth;
@@ -201,8 +201,9 @@ class FragmentLists {
     if (report && refused_->any) {
       report = fail(ErrorCode::kUsage,
                     "a fragment of depth {} was inserted at pixel ({}, {}): depths must be 0 to "
-                    "16777215, pixels (0, 0) to ({}, {})",
-                    refused_->depth, refused_->x, refused_->y, width() - 1, height() - 1);
+                    "{}, pixels (0, 0) to ({}, {})",
+                    refused_->depth, refused_->x, refused_->y, kRecordDepthMax, width() - 1,
+                    height() - 1);
     }
     is_complete_ = report.has_value();
     return std::move(report);
