@@ -5,18 +5,20 @@
 
 #include <algorithm>
 #include <array>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <set>
 
 #include "strata/mesh/formats/write_mesh.h"
 #include "strata/mesh/shapes.h"
+#include "tests/apps/strata/json_names.h"
 #include "tests/apps/strata/run_tool.h"
 
 namespace strata {
 namespace {
 
 using nlohmann::json;
+using testkit::collect;
+using testkit::documented;
 using testkit::RunResult;
 using testkit::Workplace;
 
@@ -466,32 +468,13 @@ TEST_F(Csg, DepthIsAnOpenExrFileOrRefused) {
   EXPECT_EQ(place.run({"csg", "scene.csg", "--depth", "-"}).exit_code, 2);
 }
 
-/// The names of all plain values in a report, as docs/json.md writes them.
-void collect(const json& value, const std::string& name, std::set<std::string>& names) {
-  if (value.is_object()) {
-    for (const auto& [key, member] : value.items()) {
-      collect(member, name.empty() ? key : name + "." + key, names);
-    }
-  } else if (value.is_array() && !value.empty() && value[0].is_object()) {
-    for (const json& element : value) collect(element, name + "[]", names);
-  } else {
-    names.insert(name);
-  }
-}
-
 TEST_F(Csg, TheDocumentationNamesExactlyWhatJsonPrints) {
   place.write("scene.csg", std::string(kCube) + "import(file = \"missing.stl\");\n");
   const RunResult run = place.run({"csg", "scene.csg", "--json", "--ids=ids.png"});
   ASSERT_EQ(run.exit_code, 0) << run.err;
-  std::set<std::string> names, documented;
+  std::set<std::string> names;
   collect(json::parse(run.out), "", names);
-  std::ifstream in(STRATA_SOURCE_DIR "/docs/json.md");
-  bool inside = false;
-  for (std::string line; std::getline(in, line);) {
-    if (line.starts_with("## ")) inside = line == "## `strata csg`";
-    if (inside && line.starts_with("| `")) documented.insert(line.substr(3, line.find('`', 3) - 3));
-  }
-  EXPECT_EQ(names, documented);
+  EXPECT_EQ(names, documented("`strata csg`"));
 }
 
 TEST_F(Csg, ThePictureDoesNotDependOnThreads) {

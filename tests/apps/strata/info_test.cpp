@@ -14,12 +14,15 @@
 #include "strata/mesh/formats/write_mesh.h"
 #include "strata/mesh/shapes.h"
 #include "strata/mesh/soup_tools.h"
+#include "tests/apps/strata/json_names.h"
 #include "tests/apps/strata/run_tool.h"
 
 namespace strata {
 namespace {
 
 using nlohmann::json;
+using testkit::collect;
+using testkit::documented;
 using testkit::RunResult;
 using testkit::Workplace;
 
@@ -116,32 +119,6 @@ TEST(Info, WithoutAContextIsASentenceAndAnExitCode) {
   EXPECT_EQ(both.exit_code, 2);
   EXPECT_EQ(json::parse(both.out)["files"].size(), 1u);
   EXPECT_FALSE(json::parse(both.out).contains("gl"));
-}
-
-/// The names of all plain values in a report, as docs/json.md writes them.
-void collect(const json& value, const std::string& name, std::set<std::string>& names) {
-  if (value.is_object()) {
-    for (const auto& [key, member] : value.items()) {
-      collect(member, name.empty() ? key : name + "." + key, names);
-    }
-  } else if (value.is_array() && !value.empty() && value[0].is_object()) {
-    for (const json& element : value) collect(element, name + "[]", names);
-  } else {
-    names.insert(name);
-  }
-}
-
-/// The names in the table under a heading of docs/json.md.
-std::set<std::string> documented(const std::string& heading) {
-  std::ifstream in(STRATA_SOURCE_DIR "/docs/json.md");
-  std::set<std::string> names;
-  bool inside = false;
-  for (std::string line; std::getline(in, line);) {
-    if (line.starts_with("## ")) inside = line == "## " + heading;
-    if (!inside || !line.starts_with("| `")) continue;
-    names.insert(line.substr(3, line.find('`', 3) - 3));
-  }
-  return names;
 }
 
 TEST(Json, TheDocumentationNamesExactlyWhatInfoPrints) {

@@ -42,6 +42,14 @@ inline std::size_t expect_same_surface(const SurfaceImage& found, const SurfaceI
   return covered;
 }
 
+/// Somewhere among the solids of a RandomTree, looking anywhere.
+inline csg::Camera random_camera_inside(csg::RandomTree& random) {
+  csg::Camera camera = csg::look_at({random.real(-6, 6), random.real(-6, 6), random.real(-6, 6)},
+                                    {random.real(-6, 6), random.real(-6, 6), random.real(-6, 6)});
+  camera.field_of_view = 60;
+  return camera;
+}
+
 inline Camera random_camera(RandomTree& random, const Bounds& box) {
   Camera camera;
   camera.projection = random.pick(0, 1) == 0 ? Projection::kPerspective : Projection::kOrthographic;
