@@ -36,7 +36,7 @@
 // (the HA-buffer, a hash table) if you cannot, or if fragments are expensive to make. Their
 // generator runs a second time for a frame that outgrew the one before. It also runs a second time
 // for the first frame, unless create() is told how many fragments to expect. DeepLists are one-pass
-// lists for more than 255 layers in a pixel; their payloads have bit 31 and the bits 0 to 28.
+// lists for more than 255 layers in a pixel; bits 29 and 30 of their payloads must be 0.
 //
 // Million fragments a second by one thread, 1024 x 1024 pixels, generator, lists and a walk over
 // them (docs/performance.md has the whole table and the machine):
@@ -60,17 +60,19 @@ struct Fragment {
 struct RefusedFragment {
   std::atomic<bool> any = false;
   int x = 0, y = 0;
-  std::uint32_t depth = 0;
+  std::uint32_t depth = 0, payload = 0;
 };
 
+/// True if `Sink` takes a pixel, a depth and this payload.
 template <class Sink, class... Payload>
 concept TakesFragment = requires(Sink& sink, Payload... payload) {
   sink.insert(0, 0, 0u, payload...);
 };
 
-/// What a generator inserts into; any thread. A fragment outside of the screen, or of a depth of
-/// 2^24 or more, is in no list: build() and finish() name the first one.
-template <class Sink>
+/// What a generator inserts into; any thread. A fragment outside of the screen, of a depth of 2^24
+/// or more, or of a payload that `Record` cannot keep is in no list: build() and finish() name the
+/// first one.
+template <RecordPolicy Record, class Sink>
 class CheckedSink {
  public:
   CheckedSink(Sink& sink, int width, int height, RefusedFragment& refused)
@@ -81,10 +83,12 @@ class CheckedSink {
   requires TakesFragment<Sink, Payload...>
   void insert(int x, int y, std::uint32_t depth, Payload... payload) noexcept {
     if (static_cast<unsigned>(x) < static_cast<unsigned>(width_) &&
-        static_cast<unsigned>(y) < static_cast<unsigned>(height_) && depth <= kRecordDepthMax) {
+        static_cast<unsigned>(y) < static_cast<unsigned>(height_) && depth <= kRecordDepthMax &&
+        (Record::payload_fits(payload) && ...)) {
       sink_.insert(x, y, depth, payload...);
     } else if (!refused_.any.exchange(true, std::memory_order_relaxed)) {
       refused_.x = x, refused_.y = y, refused_.depth = depth;
+      ((refused_.payload = payload), ...);
     }
   }
   /// Depths are integers: record_depth() makes them.
@@ -135,14 +139,14 @@ class FragmentLists {
   /// @return how it was built. ErrorCode::kLimit, and empty lists, if a list is too long (the
   /// message names pixel and length) or memory does not suffice (it says how many fragments are
   /// missing); kInternal if the generator produced different fragments the second time; kUsage
-  /// naming the first fragment outside of the screen or of a depth of 2^24 or more; kCancelled on
-  /// request
+  /// naming the first fragment outside of the screen, of a depth of 2^24 or more, or of a payload
+  /// that these lists cannot keep; kCancelled on request
   template <class Generator>
   [[nodiscard]] Result<BuildReport> build(Generator&& generator, const Execution& execution = {}) {
     refused_->any = false;
     auto report = store_.build(
         [&](auto& store_sink) {
-          CheckedSink sink(store_sink, width(), height(), *refused_);
+          auto sink = checked(store_sink);
           generator(sink);
         },
         execution);
@@ -159,10 +163,10 @@ class FragmentLists {
   /// Adds a fragment to one-pass lists; any thread.
   /// @pre begin() before and finish() not yet
   void insert(int x, int y, std::uint32_t depth) noexcept requires(kOnePass && !kHasPayload) {
-    CheckedSink(store_, width(), height(), *refused_).insert(x, y, depth);
+    checked(store_).insert(x, y, depth);
   }
   void insert(int x, int y, std::uint32_t depth, std::uint32_t payload) noexcept requires kOnePass {
-    CheckedSink(store_, width(), height(), *refused_).insert(x, y, depth, payload);
+    checked(store_).insert(x, y, depth, payload);
   }
   template <std::floating_point Depth, class... Payload>
   void insert(int x, int y, Depth depth, Payload... payload) = delete;
@@ -197,16 +201,29 @@ class FragmentLists {
  private:
   explicit FragmentLists(Store&& store) : store_(std::move(store)) {}
 
+  template <class Sink>
+  CheckedSink<Record, Sink> checked(Sink& sink) const noexcept {
+    return {sink, width(), height(), *refused_};
+  }
+
   Result<BuildReport> completed(Result<BuildReport>&& report) {
-    if (report && refused_->any) {
-      report = fail(ErrorCode::kUsage,
-                    "a fragment of depth {} was inserted at pixel ({}, {}): depths must be 0 to "
-                    "{}, pixels (0, 0) to ({}, {})",
-                    refused_->depth, refused_->x, refused_->y, kRecordDepthMax, width() - 1,
-                    height() - 1);
-    }
+    if (report && refused_->any) report = refusal();
     is_complete_ = report.has_value();
     return std::move(report);
+  }
+
+  tl::unexpected<Error> refusal() const {
+    const RefusedFragment& first = *refused_;
+    if (!Record::payload_fits(first.payload)) {
+      return fail(ErrorCode::kUsage,
+                  "a fragment of payload 0x{:08x} was inserted at pixel ({}, {}): bits {} and "
+                  "30 of payloads must be 0, these lists keep {} bits",
+                  first.payload, first.x, first.y, Record::kPayloadBits - 1, Record::kPayloadBits);
+    }
+    return fail(ErrorCode::kUsage,
+                "a fragment of depth {} was inserted at pixel ({}, {}): depths must be 0 to "
+                "{}, pixels (0, 0) to ({}, {})",
+                first.depth, first.x, first.y, kRecordDepthMax, width() - 1, height() - 1);
   }
 
   Store store_;
@@ -222,7 +239,7 @@ using PayloadLists = FragmentLists<CountScanStore<Record64, Concurrent>>;
 using OnePassDepthLists = FragmentLists<HashBuffer<Record32, Concurrent>>;
 /// Depth and 32 bits of payload, at most 255 layers a pixel, in one pass.
 using OnePassLists = FragmentLists<HashBuffer<Record64, Concurrent>>;
-/// Depth and 30 bits of payload (bit 31, bits 0 to 28), at most 1023 layers a pixel, in one pass.
+/// Depth and a payload whose bits 29 and 30 are 0, at most 1023 layers a pixel, in one pass.
 using DeepLists = FragmentLists<HashBuffer<Record64Deep, Concurrent>>;
 
 }  // namespace strata

@@ -3,6 +3,7 @@
 
 #include "strata/lists.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "tests/hashbuffer/store_support.h"
@@ -129,6 +130,35 @@ TYPED_TEST(OwnLists, NameTheFragmentThatNoListCanKeep) {
     ASSERT_TRUE(lists.build(draw(7, 7, (1u << 24) - 1)));
     EXPECT_EQ(lists.list(7, 7).size(), 1u);
   }
+}
+
+TEST(DeepLists, NameThePayloadThatTheyCannotKeep) {
+  for (const std::uint32_t payload : {1u << 29, 1u << 30, 0xffffffffu}) {
+    auto lists = DeepLists::create(8, 8).value();
+    const auto report = lists.build([=](auto& sink) {
+      sink.insert(1, 1, 5, 0x9fffffffu);
+      sink.insert(3, 4, 5, payload);
+    });
+    ASSERT_FALSE(report) << payload;
+    EXPECT_EQ(report.error().code, ErrorCode::kUsage);
+    EXPECT_EQ(
+        report.error().message,
+        fmt::format("a fragment of payload 0x{:08x} was inserted at pixel (3, 4): bits 29 and "
+                    "30 of payloads must be 0, these lists keep 30 bits",
+                    payload));
+    ASSERT_TRUE(lists.begin());
+    lists.insert(3, 4, 5, payload);
+    EXPECT_FALSE(lists.finish());
+    // All payloads that they can keep come back, and the next frame is as good as the first.
+    ASSERT_TRUE(lists.begin());
+    lists.insert(0, 0, 1, 0x1fffffffu);
+    lists.insert(0, 0, 2, 0x9fffffffu);
+    ASSERT_TRUE(lists.finish());
+    EXPECT_EQ(lists.list(0, 0), (std::vector<Fragment>{{1, 0x1fffffffu}, {2, 0x9fffffffu}}));
+  }
+  auto all = PayloadLists::create(1, 1).value();
+  ASSERT_TRUE(all.build([](auto& sink) { sink.insert(0, 0, 1, 0x60000000u); }));
+  EXPECT_EQ(all.list(0, 0), (std::vector<Fragment>{{1, 0x60000000u}}));
 }
 
 template <class Lists>
