@@ -482,12 +482,10 @@ class Orienter {
   /// Triangles as they come out, and the numbers.
   void count(Orientation& found) {
     found.parts = parts_.size();
-    std::uint64_t turned = 0;
     for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) {
       if (part_of_[t] == kNone) continue;
       const Part& part = parts_[part_of_[t]];
       turned_[t] = static_cast<char>(turned_[t] ^ static_cast<char>(part.turned));
-      turned += static_cast<std::uint64_t>(turned_[t]);
       if (part.mixed && !part.doubled && part.orientable &&
           (part.closed || found.turned_open_volume == 0.0)) {
         found.turned_triangles += static_cast<std::uint64_t>(turned_[t]);

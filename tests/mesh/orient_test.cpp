@@ -147,7 +147,7 @@ TEST(Orient, ManyCavitiesAreFoundAtOnce) {
 
 TEST(Orient, TrianglesThatFaceTheOtherWayAreTurned) {
   const TriangleSoup sphere = make_icosphere(1.0, 3);
-  for (const std::size_t nth : {2, 3, 10, 500}) {
+  for (const std::size_t nth : {2u, 3u, 10u, 500u}) {
     const Orientation found = expect_becomes(mixed(sphere, nth), sphere);
     EXPECT_EQ(found.mixed_parts, 1u);
     EXPECT_EQ(found.turned_triangles, (sphere.triangles.size() + nth - 1) / nth);

@@ -21,7 +21,7 @@ struct DenseValues {
       : bytes(largest_id <= 0xff     ? 1
               : largest_id <= 0xffff ? 2
                                      : 4),
-        bits(largest_id == 0 ? 1 : std::bit_width(largest_id)),
+        bits(largest_id == 0 ? 1 : static_cast<int>(std::bit_width(largest_id))),
         kind(largest_id == 0 ? RunBytes::kFlags : RunBytes::kIds) {}
   std::size_t bytes;
   int bits;  ///< of the largest value
