@@ -65,15 +65,15 @@ class Ours {
     }
     return std::make_shared<csg::Picture>(std::move(*picture));
   }
-  [[nodiscard]] Result<csg::View> view() const {
-    return csg::make_view(camera_, size_, preview_.box());
+  [[nodiscard]] Result<View> view() const {
+    return make_view(camera_, size_, preview_.box());
   }
   csg::Preview& preview() { return preview_; }
   [[nodiscard]] const Execution& execution() const { return execution_; }
   [[nodiscard]] const Result<void>& status() const { return status_; }
 
  private:
-  csg::Camera camera_;
+  Camera camera_;
   glm::ivec2 size_;
   Execution execution_;
   csg::Preview preview_;
@@ -96,7 +96,7 @@ Difference compare(const csg::SurfaceImage& ours, const std::vector<float>& thei
     if (here != there) {
       ++difference.silhouette;
     } else if (here) {
-      const double depth = ours.depth[i] / static_cast<double>(csg::kPictureDepthLimit);
+      const double depth = ours.depth[i] / static_cast<double>(kPictureDepthLimit);
       if (std::abs(depth - static_cast<double>(theirs[i])) > 2e-4) ++difference.depth;
     }
   }
@@ -104,7 +104,7 @@ Difference compare(const csg::SurfaceImage& ours, const std::vector<float>& thei
 }
 
 /// Gives a scene to OpenCSG.
-Result<std::size_t> load_peer(OpenCsgPeer& peer, const CsgScene& scene, const csg::View& view,
+Result<std::size_t> load_peer(OpenCsgPeer& peer, const CsgScene& scene, const View& view,
                               bool with_boxes) {
   const auto products = sum_of_products(scene.tree, kMostProducts);
   if (!products) return tl::unexpected(products.error());

@@ -7,7 +7,7 @@
 #include "strata/core/execution.h"
 #include "strata/core/result.h"
 #include "strata/csg/tree.h"
-#include "strata/csg/view.h"
+#include "strata/raster/view.h"
 
 namespace strata::bench {
 
@@ -15,7 +15,7 @@ namespace strata::bench {
 struct CsgScene {
   std::string name;
   csg::Tree tree;
-  csg::Camera camera;
+  Camera camera;
   double relative_precision = 0;
   unsigned concave_convexity = 1;  ///< of the solids that are not convex, for OpenCSG
   std::uint64_t triangles = 0;     ///< of all solids

@@ -94,14 +94,14 @@ class MeshPrimitive : public OpenCSG::Primitive {
   const Buffers* buffers_;
 };
 
-/// From eye space to what OpenGL clips, so that window depths are csg::View's depths and pixels its
+/// From eye space to what OpenGL clips, so that window depths are View's depths and pixels its
 /// pixels.
-glm::dmat4 clip_from_eye(const csg::View& view) {
+glm::dmat4 clip_from_eye(const View& view) {
   // image = (u w, v w, depth w, w); window coordinates have v upwards.
   glm::dmat4 clip_from_image(0.0);
   clip_from_image[0][0] = 2.0 / view.size.x;
   clip_from_image[1][1] = -2.0 / view.size.y;
-  clip_from_image[2][2] = 2.0 / csg::kPictureDepthLimit;
+  clip_from_image[2][2] = 2.0 / kPictureDepthLimit;
   clip_from_image[3] = {-1.0, 1.0, -1.0, 1.0};
   return clip_from_image * view.image_from_world * glm::inverse(view.eye_from_world);
 }
@@ -233,7 +233,7 @@ std::string OpenCsgPeer::renderer() const {
 }
 
 void OpenCsgPeer::load(std::span<const PeerSolid> solids, std::span<const Product> products,
-                       const csg::View& view, bool with_boxes) {
+                       const View& view, bool with_boxes) {
   impl_->clear();
   impl_->projection = clip_from_eye(view);
   impl_->model = view.eye_from_world;

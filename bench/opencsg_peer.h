@@ -10,7 +10,7 @@
 
 #include "bench/csg_products.h"
 #include "strata/core/result.h"
-#include "strata/csg/view.h"
+#include "strata/raster/view.h"
 
 namespace strata::bench {
 
@@ -37,11 +37,11 @@ class OpenCsgPeer {
 
   /// Takes a scene. @param with_boxes  OpenCSG is told where solids lie in the picture
   void load(std::span<const PeerSolid> solids, std::span<const Product> products,
-            const csg::View& view, bool with_boxes);
+            const View& view, bool with_boxes);
   /// One frame, shaded, from cleared buffers to glFinish().
   void draw();
   /// The frame's window depths in [0, 1], row by row from the top; 1 where nothing is seen. Linear
-  /// in csg::View's depth.
+  /// in View's depth.
   [[nodiscard]] std::vector<float> depths() const;
 
  private:

@@ -5,11 +5,10 @@
 #include <span>
 #include <vector>
 
-#include "raster/tile_bins.h"
+#include "raster/view_part.h"
 #include "strata/core/execution.h"
 #include "strata/core/result.h"
 #include "strata/csg/tree.h"
-#include "strata/csg/view.h"
 
 namespace strata::csg {
 
@@ -31,6 +30,8 @@ class Geometry {
     /// that are small and near the origin beside what is vast.
     double error_share = 1.0;
     bool convex = false;  ///< known to be; a hint that only speed depends on
+
+    [[nodiscard]] PlacedMesh placed() const { return {positions, triangles, box}; }
   };
 
   /// Keeps the meshes of `tree` alive.
@@ -66,27 +67,5 @@ class Geometry {
   Bounds box_;
   bool any_cut_off_ = false;
 };
-
-/// A solid as a view sees it: vertices snapped to the image lattice, cut at the near plane where
-/// that is needed, triangles sorted into tiles where they are many.
-struct ViewPart {
-  std::vector<glm::ivec3> vertices;
-  std::vector<glm::uvec3> cut_triangles;    ///< instead of the part's, when it was cut
-  std::vector<std::uint32_t> cut_sources;   ///< the part's triangle of each of those
-  LatticeMesh mesh;                         ///< its vertices are moved out of `vertices`
-  PixelRect rect;                           ///< pixels it may cover
-  std::uint32_t nearest = 0, farthest = 0;  ///< bounds of its depths
-  bool cut = false;                         ///< the near plane may cut it
-  bool binned = false;
-  TileBins bins;
-
-  /// The part's triangle behind triangle `t` of `mesh`.
-  [[nodiscard]] std::uint32_t source(std::uint32_t t) const { return cut ? cut_sources[t] : t; }
-};
-
-/// Snaps a part into the image lattice of `view` (law 3). @return kGeometry when coordinates do not
-/// fit.
-Result<ViewPart> view_part(const Geometry::Part& part, const View& view,
-                           const Execution& execution = {});
 
 }  // namespace strata::csg

@@ -76,7 +76,7 @@ struct CsgCommand {
   csg::SceneInput input;
   std::string output, ids, depth;  ///< files; empty: none, output "-": standard output
   glm::ivec2 size{512};
-  csg::Camera camera;
+  Camera camera;
   bool view_all = false, auto_centre = false;
   bool default_camera = false;  ///< none was given
   bool asked_view = false;      ///< --view-all or --auto-center was given

@@ -184,7 +184,7 @@ class CsgRun {
   [[nodiscard]] csg::MeasureOptions measure_options() const {
     return {command_.measure_resolution, scene_.relative_precision};
   }
-  csg::Camera& camera() { return outcome_.camera; }
+  Camera& camera() { return outcome_.camera; }
 
   CsgCommand command_;
   Session& session_;
@@ -200,7 +200,7 @@ class CsgRun {
   std::optional<csg::Preview> preview_;
   csg::Picture picture_;
   const csg::SurfaceImage* surfaces_ = nullptr;  ///< the preview's
-  std::optional<csg::View> view_;
+  std::optional<View> view_;
 };
 
 Result<void> CsgRun::load() {
@@ -245,7 +245,7 @@ void CsgRun::render_alone() {
   look_.scheme = &flat_scheme_;
   if (!command_.default_camera) return;
   camera().rotation = glm::dvec3(0.0);
-  camera().projection = csg::Projection::kOrthographic;
+  camera().projection = Projection::kOrthographic;
 }
 
 Result<void> CsgRun::place_camera() {
@@ -259,10 +259,10 @@ Result<void> CsgRun::place_camera() {
     if (from_above_ && !box_.empty())
       box_.low.z = box_.high.z = 0.0;  // an outline has no thickness
   }
-  if (command_.auto_centre) csg::centre_camera(camera(), box_);
+  if (command_.auto_centre) centre_camera(camera(), box_);
   if (command_.view_all) {
-    csg::fit_camera(camera(), box_, static_cast<double>(command_.size.x) / command_.size.y);
-    if (!(camera().distance > 0)) camera().distance = csg::Camera{}.distance;  // nothing to fit
+    fit_camera(camera(), box_, static_cast<double>(command_.size.x) / command_.size.y);
+    if (!(camera().distance > 0)) camera().distance = Camera{}.distance;  // nothing to fit
   }
   if (std::isfinite(camera().distance)) return {};
   return fail(ErrorCode::kGeometry,

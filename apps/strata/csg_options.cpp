@@ -12,13 +12,13 @@
 namespace strata::apps {
 namespace {
 
-constexpr std::pair<std::string_view, csg::Projection> kProjections[] = {
-    {"p", csg::Projection::kPerspective},
-    {"perspective", csg::Projection::kPerspective},
-    {"o", csg::Projection::kOrthographic},
-    {"ortho", csg::Projection::kOrthographic},
-    {"orthogonal", csg::Projection::kOrthographic},
-    {"orthographic", csg::Projection::kOrthographic}};
+constexpr std::pair<std::string_view, Projection> kProjections[] = {
+    {"p", Projection::kPerspective},
+    {"perspective", Projection::kPerspective},
+    {"o", Projection::kOrthographic},
+    {"ortho", Projection::kOrthographic},
+    {"orthogonal", Projection::kOrthographic},
+    {"orthographic", Projection::kOrthographic}};
 
 /// `512,512`, and `512x512` as people write it.
 Result<glm::ivec2> parse_size(std::string_view text) {
@@ -31,10 +31,10 @@ Result<glm::ivec2> parse_size(std::string_view text) {
   if (!width || !height) {
     return fail(ErrorCode::kUsage, "--size must be two whole numbers width,height, got '{}'", text);
   }
-  if (*width < 1 || *height < 1 || *width > csg::kMaxPictureSide ||
-      *height > csg::kMaxPictureSide) {
+  if (*width < 1 || *height < 1 || *width > kMaxPictureSide ||
+      *height > kMaxPictureSide) {
     return fail(ErrorCode::kUsage, "--size {}: each side must be 1 to {} pixels", text,
-                csg::kMaxPictureSide);
+                kMaxPictureSide);
   }
   return glm::ivec2(*width, *height);
 }
@@ -153,11 +153,11 @@ Result<void> check_picture_name(std::string_view asked_by, const std::string& pa
               depth ? "distances are written as .exr" : "pictures are written as .png");
 }
 
-Result<csg::Projection> parse_projection(std::string_view text) {
+Result<Projection> parse_projection(std::string_view text) {
   return parse_choice("--projection", text, kProjections);
 }
 
-Result<csg::Camera> parse_camera(std::string_view text) {
+Result<Camera> parse_camera(std::string_view text) {
   const auto numbers = parse_numbers("--camera", text, 6, 7);
   if (!numbers) return tl::unexpected(numbers.error());
   const auto& n = *numbers;
@@ -166,9 +166,9 @@ Result<csg::Camera> parse_camera(std::string_view text) {
     if (first == second) {
       return fail(ErrorCode::kUsage, "--camera {}: eye and target must differ", text);
     }
-    return csg::look_at(first, second);
+    return look_at(first, second);
   }
-  csg::Camera camera;
+  Camera camera;
   camera.target = first;
   camera.rotation = second;
   camera.distance = n[6];

@@ -30,10 +30,10 @@ Result<void> read_csg_options(const CsgWords& words, CsgCommand& command);
 
 /// A camera as OpenSCAD's --camera has it: seven numbers, target, rotation and distance, or six,
 /// eye and target. @return kUsage
-Result<csg::Camera> parse_camera(std::string_view text);
+Result<Camera> parse_camera(std::string_view text);
 
 /// p(erspective) or o(rthographic), in OpenSCAD's spellings. @return kUsage
-Result<csg::Projection> parse_projection(std::string_view text);
+Result<Projection> parse_projection(std::string_view text);
 
 /// A section plane: `x=5`, `z<10`, `y>0` or `nx,ny,nz,d`. @return kUsage
 Result<csg::SectionPlane> parse_section(std::string_view text);

@@ -47,10 +47,10 @@ void write_scene(JsonWriter& json, const CsgOutcome& outcome) {
   json.end_object();
 }
 
-void write_camera(JsonWriter& json, const csg::Camera& camera) {
+void write_camera(JsonWriter& json, const Camera& camera) {
   json.key("camera").begin_object();
   json.member("projection",
-              camera.projection == csg::Projection::kPerspective ? "perspective" : "orthographic");
+              camera.projection == Projection::kPerspective ? "perspective" : "orthographic");
   json.member("target", camera.target);
   json.member("rotation", camera.rotation);
   json.member("distance", camera.distance);

@@ -16,7 +16,7 @@ namespace strata::apps {
 struct CsgOutcome {
   std::uint64_t solids = 0, nodes = 0, triangles = 0;
   bool flat = false;
-  csg::Camera camera;
+  Camera camera;
   csg::DrawReport drawn;
   std::optional<csg::Measures> measures;  ///< with --json
   std::vector<std::uint32_t> seen;        ///< solids in the picture of --ids, increasing

@@ -28,8 +28,8 @@ constexpr NamedRotation kViews[] = {{"top", NamedView::kTop, {0, 0, 0}},
                                     {"diagonal", NamedView::kDiagonal, {55, 0, 25}}};
 
 /// World directions of the screen's right, up, and towards the eye.
-glm::dmat3 screen_axes(const csg::Camera& camera) {
-  return glm::transpose(glm::dmat3(csg::eye_from_world(camera)));
+glm::dmat3 screen_axes(const Camera& camera) {
+  return glm::transpose(glm::dmat3(eye_from_world(camera)));
 }
 
 double turned(double degrees) {
@@ -51,28 +51,28 @@ std::optional<NamedView> find_named_view(std::string_view name) {
   return {};
 }
 
-void look_from(csg::Camera& camera, NamedView view) {
+void look_from(Camera& camera, NamedView view) {
   for (const NamedRotation& one : kViews) {
     if (one.view == view) camera.rotation = one.rotation;
   }
 }
 
-void orbit(csg::Camera& camera, const glm::dvec2& pixels) {
+void orbit(Camera& camera, const glm::dvec2& pixels) {
   camera.rotation.x = turned(camera.rotation.x - pixels.y * kDegreesPerPixel);
   camera.rotation.z = turned(camera.rotation.z - pixels.x * kDegreesPerPixel);
 }
 
-double world_per_pixel(const csg::Camera& camera, const glm::ivec2& size) {
+double world_per_pixel(const Camera& camera, const glm::ivec2& size) {
   return 2.0 * camera.distance * std::tan(glm::radians(camera.field_of_view) / 2.0) /
          std::max(1, size.y);
 }
 
-void pan(csg::Camera& camera, const glm::dvec2& pixels, const glm::ivec2& size) {
+void pan(Camera& camera, const glm::dvec2& pixels, const glm::ivec2& size) {
   const glm::dmat3 axes = screen_axes(camera);
   camera.target -= (axes[0] * pixels.x - axes[1] * pixels.y) * world_per_pixel(camera, size);
 }
 
-void zoom(csg::Camera& camera, double steps, const glm::dvec2& cursor, const glm::ivec2& size) {
+void zoom(Camera& camera, double steps, const glm::dvec2& cursor, const glm::ivec2& size) {
   const double before = world_per_pixel(camera, size);
   camera.distance = std::clamp(camera.distance * std::pow(kZoomStep, steps), kNearest, kFarthest);
   const double gone = before - world_per_pixel(camera, size);
@@ -81,25 +81,25 @@ void zoom(csg::Camera& camera, double steps, const glm::dvec2& cursor, const glm
   camera.target += (axes[0] * at.x + axes[1] * at.y) * gone;
 }
 
-void view_all(csg::Camera& camera, const Bounds& box, const glm::ivec2& size) {
+void view_all(Camera& camera, const Bounds& box, const glm::ivec2& size) {
   if (box.empty()) return;
-  csg::centre_camera(camera, box);
-  csg::fit_camera(camera, box, static_cast<double>(size.x) / std::max(1, size.y));
+  centre_camera(camera, box);
+  fit_camera(camera, box, static_cast<double>(size.x) / std::max(1, size.y));
   // A point has no size to fit.
-  if (!(camera.distance > 0)) camera.distance = csg::Camera{}.distance;
+  if (!(camera.distance > 0)) camera.distance = Camera{}.distance;
 }
 
-std::optional<glm::dvec2> project(const csg::Camera& camera, const glm::ivec2& size,
+std::optional<glm::dvec2> project(const Camera& camera, const glm::ivec2& size,
                                   const glm::dvec3& world) {
-  const glm::dvec3 eye = csg::eye_from_world(camera) * glm::dvec4(world, 1.0);
-  const bool perspective = camera.projection == csg::Projection::kPerspective;
+  const glm::dvec3 eye = eye_from_world(camera) * glm::dvec4(world, 1.0);
+  const bool perspective = camera.projection == Projection::kPerspective;
   if (perspective && !(-eye.z > 1e-6 * camera.distance)) return {};
   const double scale =
       1.0 / world_per_pixel(camera, size) * (perspective ? camera.distance / -eye.z : 1.0);
   return glm::dvec2(size.x * 0.5 + eye.x * scale, size.y * 0.5 - eye.y * scale);
 }
 
-double slide(const csg::Camera& camera, const glm::ivec2& size, const glm::dvec3& point,
+double slide(const Camera& camera, const glm::ivec2& size, const glm::dvec3& point,
              const glm::dvec3& direction, const glm::dvec2& pixels) {
   const double unit = world_per_pixel(camera, size);
   const glm::dmat3 axes = screen_axes(camera);
@@ -109,14 +109,14 @@ double slide(const csg::Camera& camera, const glm::ivec2& size, const glm::dvec3
   constexpr double kTooShort = 0.2;
   if (length < kTooShort) return -pixels.y * unit;
   double scale = 1.0;
-  if (camera.projection == csg::Projection::kPerspective) {
-    const glm::dvec3 eye = csg::eye_from_world(camera) * glm::dvec4(point, 1.0);
+  if (camera.projection == Projection::kPerspective) {
+    const glm::dvec3 eye = eye_from_world(camera) * glm::dvec4(point, 1.0);
     scale = std::clamp(-eye.z / camera.distance, 0.01, 100.0);
   }
   return glm::dot(pixels, along) / (length * length) * unit * scale;
 }
 
-glm::dvec3 world_of(const csg::View& view, const glm::dvec2& pixel_centre, double depth) {
+glm::dvec3 world_of(const View& view, const glm::dvec2& pixel_centre, double depth) {
   const glm::dvec4 world =
       glm::inverse(view.image_from_world) * glm::dvec4(pixel_centre, depth, 1.0);
   return glm::dvec3(world) / world.w;

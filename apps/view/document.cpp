@@ -156,7 +156,7 @@ std::shared_ptr<const Arrangement> arrange(const Model& model, const Looks& look
     }
   }
   shown.tree = std::move(copier.tree());
-  if (looks.section) csg::cut_scene(shown, std::span(&*looks.section, 1), csg::Camera{});
+  if (looks.section) csg::cut_scene(shown, std::span(&*looks.section, 1), Camera{});
 
   auto result = std::make_shared<Arrangement>();
   result->tree = std::move(shown.tree);

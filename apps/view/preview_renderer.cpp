@@ -73,7 +73,7 @@ class PreviewRenderer final : public Renderer {
     const auto whole = preview_->view(request.camera, request.size, execution);
     if (!whole) return tl::unexpected(whole.error());
     // The picture's lattice, moved by whole pixels: the same bits.
-    csg::View view = *whole;
+    View view = *whole;
     view.size = {1, 1};
     for (int column = 0; column < 4; ++column) {
       glm::dvec4& m = view.image_from_world[column];
@@ -147,7 +147,7 @@ class PreviewRenderer final : public Renderer {
     for (const csg::Solid& solid : what_->tree.solids()) boxes.push_back(csg::bounds(solid));
     const csg::Tree::NodeId root = what_->tree.root();
     const Bounds box = csg::picture_box(what_->tree, boxes, std::span(&root, 1));
-    const auto view = csg::make_view(request.camera, request.size, box);
+    const auto view = make_view(request.camera, request.size, box);
     if (!view) return tl::unexpected(view.error());
     const auto rays = meter_->measure(*view, execution);
     if (!rays) return tl::unexpected(rays.error());

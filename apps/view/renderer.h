@@ -27,7 +27,7 @@ enum class Heat : std::uint8_t {
 struct FrameRequest {
   std::uint64_t number = 0;  ///< counts up
   std::shared_ptr<const Arrangement> what;
-  csg::Camera camera;
+  Camera camera;
   glm::ivec2 size{1};
   csg::PictureOptions look;
   Heat heat = Heat::kOff;
@@ -43,7 +43,7 @@ struct HeatScale {
 struct Frame {
   std::uint64_t number = 0;  ///< of the request
   csg::Picture picture;
-  csg::Camera camera;
+  Camera camera;
   glm::ivec2 wanted{1};  ///< the size that was asked for
   int divisor = 1;       ///< 1: whole; n: a pixel stands for n x n
   std::string drawn_by;  ///< the CPU or a GPU, and why not something better

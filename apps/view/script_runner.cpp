@@ -88,7 +88,7 @@ Result<void> ScriptRunner::apply(const ScriptCommand& command, Viewer& viewer) {
       return {};
     }
     case Action::kProjection: {
-      csg::Camera camera = viewer.camera();
+      Camera camera = viewer.camera();
       camera.projection = apps::parse_projection(command.word).value_or(camera.projection);
       viewer.set_camera(camera);
       return {};

@@ -52,10 +52,10 @@ void Viewer::set_viewport(const glm::ivec2& size) {
 
 void Viewer::first_camera() {
   const apps::CsgCommand& command = options_.command;
-  if (command.auto_centre) csg::centre_camera(camera_, model_->box);
+  if (command.auto_centre) centre_camera(camera_, model_->box);
   if (command.view_all) {
-    csg::fit_camera(camera_, model_->box, static_cast<double>(viewport_.x) / viewport_.y);
-    if (!(camera_.distance > 0)) camera_.distance = csg::Camera{}.distance;  // nothing to fit
+    fit_camera(camera_, model_->box, static_cast<double>(viewport_.x) / viewport_.y);
+    if (!(camera_.distance > 0)) camera_.distance = Camera{}.distance;  // nothing to fit
   }
   start_camera_ = camera_;
   camera_set_ = true;
@@ -188,7 +188,7 @@ void Viewer::reset_statistics() {
 
 // --- what is shown ------------------------------------------------------------------------------
 
-void Viewer::set_camera(const csg::Camera& camera) {
+void Viewer::set_camera(const Camera& camera) {
   camera_ = camera;
   change(false);
 }
@@ -201,7 +201,7 @@ void Viewer::look(std::string_view name) {
   } else if (name == "all" && model_) {
     view_all(camera_, model_->box, glm::max(viewport_, glm::ivec2(1)));
   } else if (name == "reset" && camera_set_) {
-    const csg::Projection projection = camera_.projection;
+    const Projection projection = camera_.projection;
     camera_ = start_camera_;
     camera_.projection = projection;
   }

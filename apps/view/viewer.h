@@ -74,8 +74,8 @@ class Viewer {
   [[nodiscard]] bool dragging() const { return drag_ != Drag::kNone; }
 
   // What panels and scripts set. Each asks for a new picture.
-  [[nodiscard]] const csg::Camera& camera() const { return camera_; }
-  void set_camera(const csg::Camera& camera);
+  [[nodiscard]] const Camera& camera() const { return camera_; }
+  void set_camera(const Camera& camera);
   void look(std::string_view name);  ///< a named view, `centre`, `all`, `reset`
   void orbit_by(const glm::dvec2& pixels);
   void pan_by(const glm::dvec2& pixels);
@@ -138,7 +138,7 @@ class Viewer {
   void first_camera();
 
   ViewOptions options_;
-  csg::Camera camera_, start_camera_;
+  Camera camera_, start_camera_;
   bool camera_set_ = false;
   csg::PictureOptions picture_;
   Heat heat_ = Heat::kOff;

@@ -98,10 +98,10 @@ constexpr Key kKeys[] = {
      ""},
     {"p",
      [](Viewer& v) {
-       csg::Camera camera = v.camera();
-       camera.projection = camera.projection == csg::Projection::kPerspective
-                               ? csg::Projection::kOrthographic
-                               : csg::Projection::kPerspective;
+       Camera camera = v.camera();
+       camera.projection = camera.projection == Projection::kPerspective
+                               ? Projection::kOrthographic
+                               : Projection::kPerspective;
        v.set_camera(camera);
      },
      "perspective or orthographic"},

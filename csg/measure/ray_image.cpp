@@ -162,7 +162,7 @@ struct RayMeter::Impl {
       if (program.leaves[i].parent == Program::kNone) return;
       Execution alone;
       alone.threads = 1;
-      auto part = view_part(parts[i], view, alone);
+      auto part = view_part(parts[i].placed(), view, alone);
       if (part) {
         lists.parts[i] = std::move(*part);
       } else {

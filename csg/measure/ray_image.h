@@ -8,7 +8,7 @@
 #include "strata/core/execution.h"
 #include "strata/core/result.h"
 #include "strata/csg/tree.h"
-#include "strata/csg/view.h"
+#include "strata/raster/view.h"
 
 namespace strata::csg {
 

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "strata/csg/picture/picture.h"
-#include "strata/csg/view.h"
+#include "strata/raster/view.h"
 
 namespace strata::csg {
 namespace {

@@ -260,7 +260,7 @@ Result<void> GhostPainter::paint(const View& view, const SurfaceImage& opaque, c
   parallel_for(execution, slots_.size(), [&](std::size_t i, int) {
     Execution alone;
     alone.threads = 1;
-    auto part = view_part(geometry_->parts()[slots_[i].solid], view, alone);
+    auto part = view_part(geometry_->parts()[slots_[i].solid].placed(), view, alone);
     if (part) {
       painted.parts[i] = std::move(*part);
     } else {

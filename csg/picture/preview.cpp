@@ -77,7 +77,7 @@ class Frame {
     }
     std::vector<Result<void>> failures(parts.size());
     const auto prepare = [&](std::uint32_t solid, const Execution& how) {
-      auto part = view_part(parts[solid], view_, how);
+      auto part = view_part(parts[solid].placed(), view_, how);
       if (part) {
         view_parts_[solid] = std::move(*part);
       } else {
@@ -104,7 +104,7 @@ class Frame {
 
   Result<void> moved(std::uint32_t solid, const Execution& execution) {
     const PixelRect before = view_parts_[solid].rect;
-    auto part = view_part(geometry_->parts()[solid], view_, execution);
+    auto part = view_part(geometry_->parts()[solid].placed(), view_, execution);
     if (!part) return tl::unexpected(part.error());
     view_parts_[solid] = std::move(*part);
     const PixelRect after = view_parts_[solid].rect;
@@ -205,20 +205,6 @@ class Frame {
 /// Samples of a picture that are drawn at once: memory stays bounded.
 constexpr std::int64_t kSamplesAtOnce = std::int64_t{1} << 22;
 
-/// The part of a view that begins at row `first` of the picture and has `rows` rows, each pixel
-/// `across` x `down` samples.
-View band_of(const View& view, int first, int rows, int across, int down) {
-  View band = view;
-  band.size = {view.size.x * across, rows * down};
-  // Rows of the matrix: u w, v w, depth w, w.
-  for (int column = 0; column < 4; ++column) {
-    glm::dvec4& m = band.image_from_world[column];
-    m.x *= across;
-    m.y = (m.y - first * m.w) * down;
-  }
-  return band;
-}
-
 }  // namespace
 
 struct Preview::Impl {
@@ -290,9 +276,7 @@ Result<Picture> Preview::Impl::picture(const Camera& camera, const glm::ivec2& s
     return fail(ErrorCode::kUsage, "samples per pixel must be 1, 2, 4, 8, 16, 32 or 64, got {}",
                 options.samples);
   }
-  // As square a grid as can be.
-  const int bits = std::countr_zero(static_cast<unsigned>(options.samples));
-  const int across = 1 << ((bits + 1) / 2), down = 1 << (bits / 2);
+  const auto [across, down] = sample_grid(options.samples);
   const auto whole = view(camera, size, execution);
   if (!whole) return tl::unexpected(whole.error());
   if (size.x > kMaxPictureSide / across) {

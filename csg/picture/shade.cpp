@@ -74,13 +74,7 @@ glm::dvec3 Shader::across(std::uint32_t solid, std::uint32_t triangle) const {
 
 float Shader::light(std::uint32_t solid, std::uint32_t triangle, bool exit) const {
   const glm::dvec3 in_eye = eye_from_world_ * across(solid, triangle);
-  const double length = glm::length(in_eye);
-  if (!(length > 0)) return 1.0f;
-  const glm::dvec3 normal = in_eye / (exit ? -length : length);
-  const double third = 1.0 / std::sqrt(3.0);
-  const double one = std::max(0.0, glm::dot(normal, glm::dvec3(-third, third, third)));
-  const double other = std::max(0.0, glm::dot(normal, glm::dvec3(third, -third, -third)));
-  return static_cast<float>(std::min(1.0, 0.2 + one + other));
+  return eye_light(exit ? -in_eye : in_eye);
 }
 
 glm::vec4 Shader::base(std::uint32_t solid, bool exit) const {

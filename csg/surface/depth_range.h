@@ -5,7 +5,7 @@
 
 #include "csg/geometry.h"
 #include "strata/core/execution.h"
-#include "strata/csg/view.h"
+#include "strata/raster/view.h"
 
 // How near and how far a perspective picture reaches. Private to csg/.
 

@@ -35,7 +35,7 @@ void rimmed(ImDrawList* list, const ImVec2& from, const ImVec2& to, ImU32 colour
 }  // namespace
 
 void Panels::axes(const Viewer& viewer, const Area& area) {
-  const glm::dmat3 eye(csg::eye_from_world(viewer.camera()));
+  const glm::dmat3 eye(eye_from_world(viewer.camera()));
   struct Axis {
     glm::dvec3 in_eye;
     ImU32 colour;

@@ -126,16 +126,16 @@ void Panels::camera(Viewer& viewer) {
     hint(kButtons[i].keys);
   }
   const float half = share(2);
-  const bool perspective = viewer.camera().projection == csg::Projection::kPerspective;
-  const auto project = [&](csg::Projection projection) {
-    csg::Camera changed = viewer.camera();
+  const bool perspective = viewer.camera().projection == Projection::kPerspective;
+  const auto project = [&](Projection projection) {
+    Camera changed = viewer.camera();
     changed.projection = projection;
     viewer.set_camera(changed);
   };
-  if (toggle("Perspective", perspective, half)) project(csg::Projection::kPerspective);
+  if (toggle("Perspective", perspective, half)) project(Projection::kPerspective);
   hint("p");
   ImGui::SameLine();
-  if (toggle("Orthographic", !perspective, half)) project(csg::Projection::kOrthographic);
+  if (toggle("Orthographic", !perspective, half)) project(Projection::kOrthographic);
   hint("p");
 }
 
@@ -314,7 +314,7 @@ void Panels::status(const Viewer& viewer, const glm::ivec2& window) {
   const auto& files = viewer.options().command.input.files;
   std::string left = files.empty() ? std::string() : files.front();
   if (files.size() > 1) left += fmt::format(" and {} more", files.size() - 1);
-  const csg::Camera& c = viewer.camera();
+  const Camera& c = viewer.camera();
   left += fmt::format("     rotation {:.0f}, {:.0f}, {:.0f}   distance {:.4g}", c.rotation.x,
                       c.rotation.y, c.rotation.z, c.distance);
   text(left);

@@ -4,7 +4,7 @@
 #include <span>
 
 #include "strata/csg/scene/scene.h"
-#include "strata/csg/view.h"
+#include "strata/raster/view.h"
 
 namespace strata::csg {
 

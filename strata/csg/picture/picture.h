@@ -14,7 +14,7 @@
 #include "strata/core/result.h"
 #include "strata/csg/surface/surface_image.h"
 #include "strata/csg/tree.h"
-#include "strata/csg/view.h"
+#include "strata/raster/view.h"
 
 namespace strata::csg {
 

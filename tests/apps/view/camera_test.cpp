@@ -9,8 +9,8 @@ namespace {
 
 constexpr glm::ivec2 kSize(800, 600);
 
-csg::Camera camera_at(csg::Projection projection) {
-  csg::Camera camera;
+Camera camera_at(Projection projection) {
+  Camera camera;
   camera.projection = projection;
   camera.target = {3, -4, 5};
   camera.rotation = {40, 0, 130};
@@ -18,17 +18,17 @@ csg::Camera camera_at(csg::Projection projection) {
   return camera;
 }
 
-class BothProjections : public testing::TestWithParam<csg::Projection> {};
+class BothProjections : public testing::TestWithParam<Projection> {};
 INSTANTIATE_TEST_SUITE_P(, BothProjections,
-                         testing::Values(csg::Projection::kPerspective,
-                                         csg::Projection::kOrthographic),
+                         testing::Values(Projection::kPerspective,
+                                         Projection::kOrthographic),
                          [](const auto& one) {
-                           return one.param == csg::Projection::kPerspective ? "Perspective"
+                           return one.param == Projection::kPerspective ? "Perspective"
                                                                              : "Orthographic";
                          });
 
 TEST_P(BothProjections, TheTargetIsInTheMiddle) {
-  const csg::Camera camera = camera_at(GetParam());
+  const Camera camera = camera_at(GetParam());
   const auto pixel = project(camera, kSize, camera.target);
   ASSERT_TRUE(pixel);
   EXPECT_NEAR(pixel->x, 400, 1e-9);
@@ -36,10 +36,10 @@ TEST_P(BothProjections, TheTargetIsInTheMiddle) {
 }
 
 TEST_P(BothProjections, ProjectAgreesWithTheViewThatPicturesAreDrawnIn) {
-  const csg::Camera camera = camera_at(GetParam());
+  const Camera camera = camera_at(GetParam());
   Bounds box;
   box.low = {-5, -10, 0}, box.high = {10, 5, 9};
-  const auto view = csg::make_view(camera, kSize, box);
+  const auto view = make_view(camera, kSize, box);
   ASSERT_TRUE(view);
   for (const glm::dvec3 point : {glm::dvec3(1, 2, 3), glm::dvec3(-4, 0, 8), glm::dvec3(9, -9, 1)}) {
     const glm::dvec4 image = view->image_from_world * glm::dvec4(point, 1);
@@ -53,7 +53,7 @@ TEST_P(BothProjections, ProjectAgreesWithTheViewThatPicturesAreDrawnIn) {
 }
 
 TEST_P(BothProjections, PanMovesTheTargetsPlaneWithTheMouse) {
-  csg::Camera camera = camera_at(GetParam());
+  Camera camera = camera_at(GetParam());
   const glm::dvec3 point = camera.target;
   pan(camera, {37, -21}, kSize);
   const auto pixel = project(camera, kSize, point);
@@ -63,8 +63,8 @@ TEST_P(BothProjections, PanMovesTheTargetsPlaneWithTheMouse) {
 }
 
 TEST_P(BothProjections, ZoomKeepsWhatIsBelowTheCursor) {
-  csg::Camera camera = camera_at(GetParam());
-  csg::Camera moved = camera;
+  Camera camera = camera_at(GetParam());
+  Camera moved = camera;
   pan(moved, {-150, 90}, kSize);  // then the target lies at (400, 300) + (150, -90) of the old one
   const glm::dvec3 point = moved.target;
   const glm::dvec2 cursor = *project(camera, kSize, point);
@@ -79,7 +79,7 @@ TEST_P(BothProjections, ZoomKeepsWhatIsBelowTheCursor) {
 }
 
 TEST_P(BothProjections, SlideFollowsTheMouseAlongTheDirection) {
-  const csg::Camera camera = camera_at(GetParam());
+  const Camera camera = camera_at(GetParam());
   for (const glm::dvec3 direction : {glm::dvec3(0, 0, 1), glm::dvec3(1, 0, 0)}) {
     const glm::dvec3 from = camera.target, to = camera.target + direction * 0.5;
     const glm::dvec2 pixels = *project(camera, kSize, to) - *project(camera, kSize, from);
@@ -93,7 +93,7 @@ TEST_P(BothProjections, ViewAllHoldsTheWholeBox) {
   Bounds box;
   box.low = {100, 0, -3}, box.high = {140, 10, 8};
   for (const glm::ivec2 size : {glm::ivec2(800, 600), glm::ivec2(300, 900)}) {
-    csg::Camera camera = camera_at(GetParam());
+    Camera camera = camera_at(GetParam());
     view_all(camera, box, size);
     for (int i = 0; i < 8; ++i) {
       const glm::dvec3 corner((i & 1) != 0 ? box.high.x : box.low.x,
@@ -107,7 +107,7 @@ TEST_P(BothProjections, ViewAllHoldsTheWholeBox) {
 }
 
 TEST(Camera, OrbitTurnsTheSceneWithTheMouse) {
-  csg::Camera camera;
+  Camera camera;
   camera.rotation = {90, 0, 0};  // from the front, +x to the right
   const glm::dvec3 near_point(0, -10, 0);
   orbit(camera, {20, 0});
@@ -119,8 +119,8 @@ TEST(Camera, OrbitTurnsTheSceneWithTheMouse) {
 }
 
 TEST(Camera, OrbitComesAroundAfterAFullTurn) {
-  csg::Camera camera;
-  const csg::Camera before = camera;
+  Camera camera;
+  const Camera before = camera;
   for (int i = 0; i < 36; ++i) orbit(camera, {100 / 7.0, -100 / 7.0});
   EXPECT_NEAR(camera.rotation.x, before.rotation.x, 1e-9);
   EXPECT_NEAR(camera.rotation.z, before.rotation.z, 1e-9);
@@ -136,7 +136,7 @@ TEST(Camera, NamedViewsAreOpenScads) {
                           {"left", {0, -1, 0}, {0, 0, 1}}, {"right", {0, 1, 0}, {0, 0, 1}}};
   for (const Expected& one : all) {
     SCOPED_TRACE(one.name);
-    csg::Camera camera;
+    Camera camera;
     look_from(camera, *find_named_view(one.name));
     const glm::dvec2 right = *project(camera, kSize, one.right),
                      up = *project(camera, kSize, one.up);
@@ -145,15 +145,15 @@ TEST(Camera, NamedViewsAreOpenScads) {
     EXPECT_LT(up.y, 299);
     EXPECT_NEAR(up.x, 400, 1e-6);
   }
-  csg::Camera camera;
+  Camera camera;
   camera.rotation = {};
   look_from(camera, NamedView::kDiagonal);
-  EXPECT_EQ(camera.rotation, csg::Camera{}.rotation);
+  EXPECT_EQ(camera.rotation, Camera{}.rotation);
   EXPECT_FALSE(find_named_view("upside down"));
 }
 
 TEST(Camera, ZoomHasAnEnd) {
-  csg::Camera camera;
+  Camera camera;
   zoom(camera, 1e6, {400, 300}, kSize);
   EXPECT_GT(camera.distance, 0);
   zoom(camera, -1e7, {0, 0}, kSize);
@@ -161,7 +161,7 @@ TEST(Camera, ZoomHasAnEnd) {
 }
 
 TEST(Camera, NothingBehindTheEyeHasAPixel) {
-  csg::Camera camera = camera_at(csg::Projection::kPerspective);
+  Camera camera = camera_at(Projection::kPerspective);
   camera.rotation = {0, 0, 0};  // looks down
   EXPECT_FALSE(project(camera, kSize, camera.target + glm::dvec3(0, 0, 60)));
 }

@@ -107,7 +107,7 @@ TEST(Arrange, ColoursReplaceTheScenes) {
 }
 
 TEST(Section, TowardsTheEyeIsDecidedOnce) {
-  csg::Camera camera;
+  Camera camera;
   camera.rotation = {90, 0, 0};  // the eye is at -y
   const auto plane = csg::facing({{0, 1, 0}, 4, true}, camera);
   EXPECT_EQ(plane.normal, glm::dvec3(0, -1, 0));
@@ -167,14 +167,14 @@ TEST(RayImage, ThicknessIsThatOfTheFirstWall) {
       "difference() { cube(size = [6, 6, 6], center = true); cube(size = [4, 4, 9], center = "
       "true); "
       "}");
-  for (const auto projection : {csg::Projection::kOrthographic, csg::Projection::kPerspective}) {
-    csg::Camera camera;
+  for (const auto projection : {Projection::kOrthographic, Projection::kPerspective}) {
+    Camera camera;
     camera.projection = projection;
     camera.rotation = {90, 0, 0};
     camera.distance = 60;
     Bounds box;
     box.low = glm::dvec3(-5), box.high = glm::dvec3(5);
-    const auto view = csg::make_view(camera, {101, 101}, box);
+    const auto view = make_view(camera, {101, 101}, box);
     ASSERT_TRUE(view);
     const csg::RayMeter meter(model.scene.tree, model.scene.tree.root(), 0);
     const auto rays = meter.measure(*view);
@@ -191,14 +191,14 @@ TEST(RayImage, WallsThatTouchAreOne) {
   const Model model = model_of(
       "cube(size = [2, 2, 2]); multmatrix([[1,0,0,0],[0,1,0,2],[0,0,1,0],[0,0,0,1]]) { cube(size = "
       "[2, 3, 2]); }");
-  csg::Camera camera;
-  camera.projection = csg::Projection::kOrthographic;
+  Camera camera;
+  camera.projection = Projection::kOrthographic;
   camera.rotation = {90, 0, 0};
   camera.target = {1, 1, 1};
   camera.distance = 20;
   Bounds box;
   box.low = glm::dvec3(0), box.high = glm::dvec3(2, 5, 2);
-  const auto view = csg::make_view(camera, {64, 64}, box);
+  const auto view = make_view(camera, {64, 64}, box);
   ASSERT_TRUE(view);
   const auto rays = csg::RayMeter(model.scene.tree, model.scene.tree.root(), 5e-6).measure(*view);
   ASSERT_TRUE(rays);
@@ -215,12 +215,12 @@ TEST(RayImage, CuttersFarLargerThanTheResultLeaveItDepth) {
   const csg::Tree::NodeId root = tree.root();
   const Bounds box = csg::picture_box(tree, solids, std::span(&root, 1));
   EXPECT_EQ(box.high, glm::dvec3(10));
-  csg::Camera camera;
-  camera.projection = csg::Projection::kOrthographic;
+  Camera camera;
+  camera.projection = Projection::kOrthographic;
   camera.rotation = glm::dvec3(0);
   camera.target = glm::dvec3(2.5, 5, 5);
   camera.distance = 60;
-  const auto view = csg::make_view(camera, {64, 64}, box);
+  const auto view = make_view(camera, {64, 64}, box);
   ASSERT_TRUE(view);
   const auto rays = csg::RayMeter(tree, root, 5e-6).measure(*view);
   ASSERT_TRUE(rays);

@@ -269,10 +269,10 @@ TEST(CpuRenderer, PicksAreThePixelsOfThePicture) {
   request.size = {97, 61};
   request.camera.distance = 40;
   const auto renderer = make_renderer();
-  for (const auto projection : {csg::Projection::kPerspective, csg::Projection::kOrthographic}) {
+  for (const auto projection : {Projection::kPerspective, Projection::kOrthographic}) {
     request.camera.projection = projection;
     csg::Preview preview(ball_and_box(), {}, 0);
-    const auto view = csg::make_view(request.camera, request.size, preview.box());
+    const auto view = make_view(request.camera, request.size, preview.box());
     ASSERT_TRUE(view);
     const auto image = preview.draw(*view);
     ASSERT_TRUE(image);
@@ -309,7 +309,7 @@ TEST(CpuRenderer, HeatMapsSayWhatTheirColoursMean) {
   FrameRequest request;
   request.what = what;
   request.size = {64, 64};
-  request.camera.projection = csg::Projection::kOrthographic;
+  request.camera.projection = Projection::kOrthographic;
   request.camera.rotation = {0, 0, 0};
   request.camera.distance = 40;
   const auto renderer = make_renderer();
@@ -337,7 +337,7 @@ TEST(CpuRenderer, HeatMapsCountTheScenesSolidsAloneAndWhereTheSectionLeavesThem)
   request.what = arrange(model, looks);
   ASSERT_GT(request.what->tree.solids().size(), request.what->model_solids);
   request.size = {64, 64};
-  request.camera.projection = csg::Projection::kOrthographic;
+  request.camera.projection = Projection::kOrthographic;
   request.camera.rotation = {0, 0, 0};
   request.camera.distance = 40;
   request.heat = Heat::kDepth;

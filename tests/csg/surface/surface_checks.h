@@ -14,7 +14,7 @@
 
 #include "strata/csg/surface/surface_image.h"
 #include "strata/csg/tree.h"
-#include "strata/csg/view.h"
+#include "strata/raster/view.h"
 #include "tests/csg/random_tree.h"
 
 namespace strata::csg {
@@ -43,8 +43,8 @@ inline std::size_t expect_same_surface(const SurfaceImage& found, const SurfaceI
 }
 
 /// Somewhere among the solids of a RandomTree, looking anywhere.
-inline csg::Camera random_camera_inside(csg::RandomTree& random) {
-  csg::Camera camera = csg::look_at({random.real(-6, 6), random.real(-6, 6), random.real(-6, 6)},
+inline Camera random_camera_inside(csg::RandomTree& random) {
+  Camera camera = look_at({random.real(-6, 6), random.real(-6, 6), random.real(-6, 6)},
                                     {random.real(-6, 6), random.real(-6, 6), random.real(-6, 6)});
   camera.field_of_view = 60;
   return camera;

@@ -20,7 +20,7 @@ SurfaceImage by_full_lists(const Tree& tree, const View& view, double relative_p
   std::vector<glm::uvec3> triangles;
   std::vector<std::uint32_t> solid_of, first_of;
   for (const Geometry::Part& part : geometry.parts()) {
-    auto seen = view_part(part, view);
+    auto seen = view_part(part.placed(), view);
     EXPECT_TRUE(seen.has_value());
     const auto first = static_cast<std::uint32_t>(all.vertices.size());
     first_of.push_back(static_cast<std::uint32_t>(triangles.size()));

@@ -1,13 +1,14 @@
-#include "strata/csg/view.h"
+#include "strata/raster/view.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <glm/ext/matrix_transform.hpp>
 #include <glm/geometric.hpp>
 #include <glm/trigonometric.hpp>
 #include <limits>
 
-namespace strata::csg {
+namespace strata {
 namespace {
 
 /// With something behind or beside the eye the depth range starts at this part of its end: nearer,
@@ -139,4 +140,31 @@ Result<View> make_view(const Camera& camera, const glm::ivec2& size, const Bound
   return view;
 }
 
-}  // namespace strata::csg
+View band_of(const View& view, int first, int rows, int across, int down) {
+  View band = view;
+  band.size = {view.size.x * across, rows * down};
+  // Rows of the matrix: u w, v w, depth w, w.
+  for (int column = 0; column < 4; ++column) {
+    glm::dvec4& m = band.image_from_world[column];
+    m.x *= across;
+    m.y = (m.y - first * m.w) * down;
+  }
+  return band;
+}
+
+SampleGrid sample_grid(int samples) {
+  const int bits = std::countr_zero(static_cast<unsigned>(samples));
+  return {1 << ((bits + 1) / 2), 1 << (bits / 2)};
+}
+
+float eye_light(const glm::dvec3& normal) {
+  const double length = glm::length(normal);
+  if (!(length > 0)) return 1.0f;
+  const glm::dvec3 unit = normal / length;
+  const double third = 1.0 / std::sqrt(3.0);
+  const double one = std::max(0.0, glm::dot(unit, glm::dvec3(-third, third, third)));
+  const double other = std::max(0.0, glm::dot(unit, glm::dvec3(third, -third, -third)));
+  return static_cast<float>(std::min(1.0, 0.2 + one + other));
+}
+
+}  // namespace strata

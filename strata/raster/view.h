@@ -7,7 +7,7 @@
 #include "strata/core/result.h"
 #include "strata/mesh/soup_tools.h"
 
-namespace strata::csg {
+namespace strata {
 
 enum class Projection { kPerspective, kOrthographic };
 
@@ -66,4 +66,20 @@ inline constexpr int kMaxPictureSide = 65536;
 /// when the size or camera is out of range
 Result<View> make_view(const Camera& camera, const glm::ivec2& size, const Bounds& box);
 
-}  // namespace strata::csg
+/// The part of a view that begins at row `first` of the picture and has `rows` rows, each pixel
+/// `across` x `down` samples on a regular grid.
+[[nodiscard]] View band_of(const View& view, int first, int rows, int across, int down);
+
+/// How a pixel is divided into samples: `across` x `down`, as square as can be.
+struct SampleGrid {
+  int across = 1, down = 1;
+};
+/// @pre samples is 1, 2, 4, 8, 16, 32 or 64
+[[nodiscard]] SampleGrid sample_grid(int samples);
+
+/// How bright a flat face is, in [0, 1]: two directional lights of the eye, and what comes from
+/// everywhere. @param normal  of the face, towards the side that is seen, in eye space; its length
+/// does not matter
+[[nodiscard]] float eye_light(const glm::dvec3& normal);
+
+}  // namespace strata
