@@ -1,0 +1,12 @@
+#pragma once
+
+// Order-independent transparency: one scene, one view, any technique of the field, each with what
+// it costs and where it fails.
+//
+//     auto frame = strata::transparency::Frame::make(scene, view);
+//     auto technique = strata::transparency::parse_technique("count-scan");
+//     auto rendering = frame->render(*technique->technique, technique->settings);
+
+#include "strata/raster/view.h"
+#include "strata/transparency/stream/frame.h"
+#include "strata/transparency/techniques.h"

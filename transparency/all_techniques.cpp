@@ -1,0 +1,17 @@
+#include <array>
+
+#include "strata/transparency/techniques.h"
+#include "transparency/lists/list_techniques.h"
+
+namespace strata::transparency {
+namespace {
+
+constexpr std::array kAll{
+    &kCountScan,
+};
+
+}  // namespace
+
+std::span<const Technique* const> techniques() { return kAll; }
+
+}  // namespace strata::transparency
