@@ -65,9 +65,7 @@ class Ours {
     }
     return std::make_shared<csg::Picture>(std::move(*picture));
   }
-  [[nodiscard]] Result<View> view() const {
-    return make_view(camera_, size_, preview_.box());
-  }
+  [[nodiscard]] Result<View> view() const { return make_view(camera_, size_, preview_.box()); }
   csg::Preview& preview() { return preview_; }
   [[nodiscard]] const Execution& execution() const { return execution_; }
   [[nodiscard]] const Result<void>& status() const { return status_; }

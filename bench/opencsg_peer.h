@@ -36,8 +36,8 @@ class OpenCsgPeer {
   [[nodiscard]] std::string renderer() const;
 
   /// Takes a scene. @param with_boxes  OpenCSG is told where solids lie in the picture
-  void load(std::span<const PeerSolid> solids, std::span<const Product> products,
-            const View& view, bool with_boxes);
+  void load(std::span<const PeerSolid> solids, std::span<const Product> products, const View& view,
+            bool with_boxes);
   /// One frame, shaded, from cleared buffers to glFinish().
   void draw();
   /// The frame's window depths in [0, 1], row by row from the top; 1 where nothing is seen. Linear

@@ -5,8 +5,8 @@
 #include "strata/csg/scene/scene.h"
 #include "strata/csg/solid_lists.h"
 #include "strata/csg/tree.h"
-#include "strata/raster/view.h"
 #include "strata/mesh/shapes.h"
+#include "strata/raster/view.h"
 #include "strata/voxelize/grid_fit.h"
 #include "strata/voxelize/voxelize.h"
 

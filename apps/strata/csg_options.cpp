@@ -13,12 +13,9 @@ namespace strata::apps {
 namespace {
 
 constexpr std::pair<std::string_view, Projection> kProjections[] = {
-    {"p", Projection::kPerspective},
-    {"perspective", Projection::kPerspective},
-    {"o", Projection::kOrthographic},
-    {"ortho", Projection::kOrthographic},
-    {"orthogonal", Projection::kOrthographic},
-    {"orthographic", Projection::kOrthographic}};
+    {"p", Projection::kPerspective},           {"perspective", Projection::kPerspective},
+    {"o", Projection::kOrthographic},          {"ortho", Projection::kOrthographic},
+    {"orthogonal", Projection::kOrthographic}, {"orthographic", Projection::kOrthographic}};
 
 /// `512,512`, and `512x512` as people write it.
 Result<glm::ivec2> parse_size(std::string_view text) {
@@ -31,8 +28,7 @@ Result<glm::ivec2> parse_size(std::string_view text) {
   if (!width || !height) {
     return fail(ErrorCode::kUsage, "--size must be two whole numbers width,height, got '{}'", text);
   }
-  if (*width < 1 || *height < 1 || *width > kMaxPictureSide ||
-      *height > kMaxPictureSide) {
+  if (*width < 1 || *height < 1 || *width > kMaxPictureSide || *height > kMaxPictureSide) {
     return fail(ErrorCode::kUsage, "--size {}: each side must be 1 to {} pixels", text,
                 kMaxPictureSide);
   }

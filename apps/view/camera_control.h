@@ -44,12 +44,10 @@ void view_all(Camera& camera, const Bounds& box, const glm::ivec2& size);
 /// How far a point that slides along `direction` (world space, of length 1) goes when the mouse
 /// moves: the part of the movement that lies along the direction's picture. Where the direction
 /// points at the eye, its picture is short and the way up the screen counts instead.
-[[nodiscard]] double slide(const Camera& camera, const glm::ivec2& size,
-                           const glm::dvec3& point, const glm::dvec3& direction,
-                           const glm::dvec2& pixels);
+[[nodiscard]] double slide(const Camera& camera, const glm::ivec2& size, const glm::dvec3& point,
+                           const glm::dvec3& direction, const glm::dvec2& pixels);
 
 /// The world point of a depth (steps of the view) at a pixel's centre.
-[[nodiscard]] glm::dvec3 world_of(const View& view, const glm::dvec2& pixel_centre,
-                                  double depth);
+[[nodiscard]] glm::dvec3 world_of(const View& view, const glm::dvec2& pixel_centre, double depth);
 
 }  // namespace strata::view

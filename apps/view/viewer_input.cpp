@@ -99,9 +99,8 @@ constexpr Key kKeys[] = {
     {"p",
      [](Viewer& v) {
        Camera camera = v.camera();
-       camera.projection = camera.projection == Projection::kPerspective
-                               ? Projection::kOrthographic
-                               : Projection::kPerspective;
+       camera.projection = camera.projection == Projection::kPerspective ? Projection::kOrthographic
+                                                                         : Projection::kPerspective;
        v.set_camera(camera);
      },
      "perspective or orthographic"},

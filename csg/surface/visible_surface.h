@@ -8,8 +8,8 @@
 #include "csg/program.h"
 #include "csg/transition.h"
 #include "raster/triangle_setup.h"
-#include "strata/raster/view.h"
 #include "strata/raster/lattice_mesh.h"
+#include "strata/raster/view.h"
 
 // What a ray sees first of a Boolean tree. Private to csg/.
 

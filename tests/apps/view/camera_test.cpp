@@ -20,11 +20,10 @@ Camera camera_at(Projection projection) {
 
 class BothProjections : public testing::TestWithParam<Projection> {};
 INSTANTIATE_TEST_SUITE_P(, BothProjections,
-                         testing::Values(Projection::kPerspective,
-                                         Projection::kOrthographic),
+                         testing::Values(Projection::kPerspective, Projection::kOrthographic),
                          [](const auto& one) {
                            return one.param == Projection::kPerspective ? "Perspective"
-                                                                             : "Orthographic";
+                                                                        : "Orthographic";
                          });
 
 TEST_P(BothProjections, TheTargetIsInTheMiddle) {

@@ -45,7 +45,7 @@ inline std::size_t expect_same_surface(const SurfaceImage& found, const SurfaceI
 /// Somewhere among the solids of a RandomTree, looking anywhere.
 inline Camera random_camera_inside(csg::RandomTree& random) {
   Camera camera = look_at({random.real(-6, 6), random.real(-6, 6), random.real(-6, 6)},
-                                    {random.real(-6, 6), random.real(-6, 6), random.real(-6, 6)});
+                          {random.real(-6, 6), random.real(-6, 6), random.real(-6, 6)});
   camera.field_of_view = 60;
   return camera;
 }
