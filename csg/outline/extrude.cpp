@@ -12,12 +12,12 @@
 namespace strata::csg {
 namespace {
 
-/// No more vertices than this: absurd numbers of slices are cut down to it.
+/// Most vertices of an extrusion. A number of slices that would exceed it is reduced.
 constexpr std::size_t kMostVertices = std::size_t{1} << 28;
 
 using Contour = std::vector<glm::dvec2>;
 
-/// Where a point of the outline is at height t in [0, 1]: turned first, then scaled.
+/// Maps the outline to the slice at height t in [0, 1]: rotates it first, then scales it.
 struct Slice {
   double cosine, sine;
   glm::dvec2 scale;
@@ -25,7 +25,7 @@ struct Slice {
   Slice(const LinearExtrude& options, double t) {
     const double angle = -options.twist * t;
     cosine = cos_degrees(angle), sine = sin_degrees(angle);
-    // The top is exactly at its scale: 0 must make an edge or a point.
+    // The top has exactly the given scale, so that a scale of 0 makes an edge or a point.
     scale = t == 1 ? options.scale : 1.0 - (1.0 - options.scale) * t;
   }
   glm::dvec2 operator()(const glm::dvec2& p) const {
@@ -33,7 +33,7 @@ struct Slice {
   }
 };
 
-/// Length of the part of an Archimedean spiral from its centre to the angle `theta`.
+/// Length of an Archimedean spiral from its centre to the angle `theta`.
 double spiral_length(double a, double theta) {
   return 0.5 * a * (theta * std::sqrt(1 + theta * theta) + std::asinh(theta));
 }
@@ -44,7 +44,7 @@ double slices_for_twist(const LinearExtrude& options, double radius) {
   const double least = std::max(std::ceil(degrees / 120.0), 1.0);
   if (radius < 0x1p-20 || !std::isfinite(s.fn)) return least;
   if (s.fn > 0) return std::max(std::ceil(degrees * s.fn / 360.0), least);
-  double flat = radians * radius;  // how far the farthest point goes, seen from above
+  double flat = radians * radius;  // length of the farthest point's path, seen from above
   if (options.scale.x == options.scale.y && options.scale.x != 1) {
     const double scale = options.scale.x;
     const double end = scale > 1 ? radians * scale / (scale - 1) : radians / (1 - scale);
@@ -84,12 +84,12 @@ double slice_count(const Outline& outline, const LinearExtrude& options) {
   return std::max(slices, 1.0);
 }
 
-/// The longest that each edge of the contour gets in any slice.
+/// The greatest length that each edge of the contour has in any slice.
 std::vector<double> edge_lengths(const Contour& contour, const LinearExtrude& options,
                                  std::size_t slices) {
   std::vector<double> lengths(contour.size(), 0.0);
   const bool uniform = options.scale.x == options.scale.y;
-  // Of very many slices some are looked at.
+  // A sample suffices when there are very many slices.
   constexpr std::size_t kMostLooks = 20'000'000;
   const std::size_t step = 1 + slices * contour.size() / kMostLooks;
   for (std::size_t j = 0; j <= (uniform ? 0 : slices); j += step) {
@@ -116,14 +116,15 @@ Contour divided(const Contour& contour, const std::vector<std::size_t>& parts) {
   return result;
 }
 
-/// Divides the edges with the longest parts, those that are about equal together, while there are
-/// at most `wanted` vertices.
+/// Divides edges into parts until the contour has `wanted` vertices or one step more would exceed
+/// them. Each step divides the edges with the longest parts; edges whose parts are about equally
+/// long are divided together.
 std::vector<std::size_t> divide_to_count(const Contour& contour, const LinearExtrude& options,
                                          std::size_t slices, std::size_t wanted) {
   if (contour.size() >= wanted) return {};
   const std::vector<double> lengths = edge_lengths(contour, options, slices);
   std::vector<std::size_t> parts(contour.size(), 1);
-  // Between the length of the parts now and when there is one more.
+  // Lies between the length of a part now and after one more division.
   const auto measure = [&](std::size_t i) {
     return lengths[i] / (static_cast<double>(parts[i]) + 0.5);
   };
@@ -159,7 +160,8 @@ std::vector<std::size_t> divide_to_length(const Contour& contour, const LinearEx
   return parts;
 }
 
-/// In how many parts each edge of each contour is divided; nothing for a contour that stays.
+/// The number of parts that each edge of each contour is divided into. A contour that stays as it
+/// is has an empty list.
 std::vector<std::vector<std::size_t>> divide_edges(const Outline& outline,
                                                    const LinearExtrude& options,
                                                    std::size_t slices) {
@@ -188,8 +190,9 @@ std::vector<std::vector<std::size_t>> divide_edges(const Outline& outline,
   return result;
 }
 
-/// Whether the diagonal from the lower first to the upper second point is taken. Diagonals within
-/// 1e-5 of each other are equal; then the turn of the twist decides, so that neighbours agree.
+/// Whether the diagonal of a wall runs from low0 to high1 rather than from low1 to high0. The
+/// shorter one is taken. Lengths that differ by less than 1e-5 count as equal; then
+/// `falls_if_equal`, which the twist's direction sets, decides, so that neighbours agree.
 bool rising_diagonal(const glm::dvec2& low0, const glm::dvec2& low1, const glm::dvec2& high0,
                      const glm::dvec2& high1, bool falls_if_equal) {
   const double rising = glm::distance(low0, high1), falling = glm::distance(low1, high0);
@@ -198,7 +201,7 @@ bool rising_diagonal(const glm::dvec2& low0, const glm::dvec2& low1, const glm::
   return !falls_if_equal;
 }
 
-/// Both ends shrink to a point at the top: a pyramid over the outline, with one apex.
+/// Adds the side of a pyramid: the outline at the bottom, one apex at the top.
 void close_at_point(const Outline& outline, std::size_t bottom, const glm::dvec3& apex,
                     TriangleSoup& mesh) {
   const auto top = static_cast<std::uint32_t>(mesh.positions.size());
@@ -213,12 +216,13 @@ void close_at_point(const Outline& outline, std::size_t bottom, const glm::dvec3
   }
 }
 
-/// Points on an edge, from the number `first` on.
+/// The points on an edge. They are numbered from `first` on.
 struct Dots {
   std::uint32_t first = 0, count = 0;
 };
 
-/// The triangle (a, b, c) with dots on its edges, a fan from the corner opposite of each.
+/// Triangulates the triangle (a, b, c), whose edges have dots on them. An edge with dots becomes a
+/// fan around the corner opposite to it.
 void fan(const glm::uvec3& corners, const Dots (&dots)[3], std::vector<glm::uvec3>& triangles) {
   const int edge = dots[0].count > 0 ? 0 : dots[1].count > 0 ? 1 : 2;
   if (dots[edge].count == 0) {
@@ -237,14 +241,15 @@ void fan(const glm::uvec3& corners, const Dots (&dots)[3], std::vector<glm::uvec
   }
 }
 
-/// Triangles of `divided`, which is `raw` with more points on its edges: the triangles of `raw`,
-/// with fans to these. Ears of a million points in line take hours.
+/// Triangulates `divided`, which is `raw` with additional points on its edges. It takes the
+/// triangles of `raw` and cuts them into fans that reach these points. Clipping the ears of a
+/// million points in a line would take hours.
 std::vector<glm::uvec3> triangulate_divided(const Outline& raw, const Outline& divided,
                                             const std::vector<std::vector<std::size_t>>& parts,
                                             OutlineJob* job) {
   std::vector<glm::uvec3> coarse = triangulate_pieces(raw, job);
-  std::vector<std::uint32_t> next, number;  // of raw's points: the next one, and its number
-  std::vector<Dots> dots;                   // behind each
+  std::vector<std::uint32_t> next, number;  // for each point of raw; numbers in `divided`
+  std::vector<Dots> dots;                   // on the edge after each point
   std::uint32_t at = 0;
   for (std::size_t c = 0; c < raw.contours.size(); ++c) {
     const auto first = static_cast<std::uint32_t>(next.size());
@@ -257,7 +262,7 @@ std::vector<glm::uvec3> triangulate_divided(const Outline& raw, const Outline& d
       at += 1 + more;
     }
   }
-  std::size_t undone = 0;  // edges with dots that no triangle has taken
+  std::size_t undone = 0;  // edges with dots that no triangle has used
   for (const Dots& edge : dots) undone += edge.count > 0 ? 1 : 0;
   std::vector<glm::uvec3> triangles;
   triangles.reserve(at);
@@ -271,11 +276,11 @@ std::vector<glm::uvec3> triangulate_divided(const Outline& raw, const Outline& d
     }
     fan({number[t.x], number[t.y], number[t.z]}, on, triangles);
   }
-  // Points in one place may have swapped their parts in the triangles.
+  // Points in the same place may have been exchanged in the triangles.
   return undone == 0 ? triangles : triangulate_pieces(divided, job);
 }
 
-/// Whether the mesh would be larger than the job allows.
+/// Whether the mesh would exceed the memory limit of the job, or the job has ended.
 bool too_large(double vertices, double triangles, const char* what, OutlineJob* job) {
   if (!job || job->error || job->execution.memory_limit == 0) return job && job->error;
   const double bytes = vertices * sizeof(glm::dvec3) + triangles * sizeof(glm::uvec3);
@@ -294,7 +299,7 @@ ExtrusionSize size_of(const Outline& outline, const LinearExtrude& options) {
   const double slices = slice_count(outline, options);
   const bool bent = options.twist != 0 || options.scale.x != options.scale.y;
   const Segments& s = options.segments;
-  double divided = 0;  // points that a contour is divided into
+  double divided = 0;  // points of the contours after division
   if (options.outline_segments > 0) {
     divided = options.outline_segments;
   } else if (options.divide_outline && bent && s.fn > 0) {
@@ -309,8 +314,8 @@ ExtrusionSize size_of(const Outline& outline, const LinearExtrude& options) {
 
 namespace {
 
-/// The walls between a slice, whose points begin at `low`, and the next one.
-/// @param lean  by how much the next slice is moved along x and y
+/// Adds the walls between a slice, whose points begin at `low`, and the next slice.
+/// @param lean  how far the next slice is moved along x and y
 void add_walls(const Outline& outline, std::size_t low, std::size_t stride, const glm::dvec2& lean,
                bool twists_down, bool shrinks, TriangleSoup& mesh) {
   std::size_t first = 0;
@@ -369,7 +374,7 @@ TriangleSoup linear_extrude(const Outline& raw, const LinearExtrude& given, Outl
     if (job && job->ended()) return {};
     const double t = static_cast<double>(j) / static_cast<double>(slices);
     const Slice slice(options, t);
-    // Half the way up from the middle, not the bottom plus the whole: both ends alike.
+    // The offset is half the way, counted from the middle, so that both ends are rounded alike.
     const glm::dvec3 at = options.centre && j == slices ? way / 2.0 : bottom + way * t;
     for (const Contour& contour : outline.contours) {
       for (const glm::dvec2& p : contour) mesh.positions.emplace_back(glm::dvec3(slice(p), 0) + at);
@@ -377,12 +382,12 @@ TriangleSoup linear_extrude(const Outline& raw, const LinearExtrude& given, Outl
   }
   for (std::size_t j = 1; j < slices + (pointed ? 0 : 1); ++j) {
     if (job && job->ended()) return {};
-    // An edge that shrinks to nothing at the top must not be left with the long diagonal.
+    // An edge that shrinks to nothing at the top must not keep the long diagonal.
     const bool shrinks = j == slices && (options.scale.x == 0 || options.scale.y == 0);
     const glm::dvec2 lean = glm::dvec2(way) / static_cast<double>(slices);
     add_walls(outline, (j - 1) * stride, stride, lean, options.twist <= 0, shrinks, mesh);
   }
-  // Slices are affine images of the outline: its triangles close both ends.
+  // Slices are affine images of the outline, so its triangles close both ends.
   const auto top = static_cast<std::uint32_t>(slices * stride);
   const bool same = outline.contours == raw.contours;
   for (const glm::uvec3& t :
@@ -455,7 +460,7 @@ Result<TriangleSoup> rotate_extrude(const Outline& outline, const RotateExtrude&
   const double walls = static_cast<double>(stride) * static_cast<double>(fragments);
   if (too_large(walls, 2 * walls, "rotate_extrude", job)) return tl::unexpected(*job->error);
 
-  // Points on the axis stay where they are: one vertex for all steps.
+  // A point on the axis does not move: all steps share one vertex.
   TriangleSoup mesh;
   const std::size_t rings = fragments + (full ? 0 : 1);
   std::vector<std::uint32_t> vertex(rings * stride);

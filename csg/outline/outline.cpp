@@ -91,7 +91,7 @@ Outline without_holes(const Outline& outline, OutlineJob* job) {
   for (const auto& contour : outline.contours) {
     if (signed_area(contour) > 0) outer.contours.push_back(contour);
   }
-  // Islands in holes are covered by what surrounds them.
+  // Outer contours cover the islands inside their holes.
   return clean(outer, Fill::kNonzero, job);
 }
 

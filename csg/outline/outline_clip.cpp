@@ -1,5 +1,5 @@
-// The bridge to Clipper 6 (Debian: libpolyclipping), which works on integers. Its exceptions and
-// its header stay here.
+// The bridge to Clipper 6 (Debian: libpolyclipping), which computes with integers. Its header is
+// included here only, and its exceptions stay here.
 #include "csg/outline/outline_clip.h"
 
 #include <algorithm>
@@ -27,8 +27,8 @@ using ClipperLib::IntPoint;
 using ClipperLib::Path;
 using ClipperLib::Paths;
 
-/// Coordinates on the grid stay below 2^kGridBits. More than this and Clipper's own arithmetic in
-/// double would round by more than a step of the grid; offsets leave room for long mitres.
+/// Coordinates on the grid stay below 2^kGridBits. With more bits Clipper's own arithmetic in
+/// double would round by more than a step of the grid. Offsets need room for long mitres.
 constexpr int kGridBits = 45, kOffsetGridBits = 38;
 
 struct PointHash {
@@ -39,9 +39,9 @@ struct PointHash {
   }
 };
 
-/// Between doubles and a grid of a power of two around the middle of the operands. A point of the
-/// grid that an operand has becomes that operand's point again, to the last bit: walls that met
-/// before an operation meet after it.
+/// Converts between doubles and an integer grid, whose step is a power of two and whose origin lies
+/// near the middle of the operands. A point that an operand had before to_grid() comes back from
+/// from_grid() bit for bit: walls that met before an operation meet after it.
 class Grid {
  public:
   Grid(std::span<const Outline> operands, int bits, double margin = 0.0) {
@@ -59,7 +59,8 @@ class Grid {
     int exponent = 0;
     std::frexp(extent, &exponent);
     shift_ = bits - exponent;
-    // The middle lies on a coarse grid, so that short binary fractions are on the fine one.
+    // The origin is a multiple of a coarse power of two, so that short binary fractions lie on the
+    // fine grid.
     const double coarse = std::ldexp(1.0, exponent - 1);
     centre_ = glm::round((low / 2.0 + high / 2.0) / coarse) * coarse;
     originals_.reserve(count);
@@ -88,7 +89,7 @@ class Grid {
     Outline outline;
     Path cleaned;
     for (const Path& path : paths) {
-      // Points that are a step of the grid apart, or off a straight line, come from rounding.
+      // Rounding makes points that are one step apart or nearly in line.
       ClipperLib::CleanPolygon(path, cleaned);
       if (cleaned.size() < 3) continue;
       auto& contour = outline.contours.emplace_back();
@@ -107,7 +108,7 @@ class Grid {
   double length(double world) const { return std::ldexp(world, shift_); }
 
  private:
-  /// Contours with numbers that are not finite, or too large, are left out.
+  /// Whether all coordinates are finite and small enough. Other contours are left out.
   static bool usable(const std::vector<glm::dvec2>& contour) {
     return contour.size() >= 3 && std::all_of(contour.begin(), contour.end(), [](const auto& p) {
              return std::abs(p.x) < kMostCoordinate && std::abs(p.y) < kMostCoordinate;
@@ -125,7 +126,8 @@ std::size_t count_points(const Paths& paths) {
   return points;
 }
 
-/// Mirrors at the diagonal; outer contours stay counter-clockwise.
+/// Mirrors the paths at the diagonal and reverses them, so that outer contours stay
+/// counter-clockwise.
 void mirror(Paths& paths) {
   for (Path& path : paths) {
     for (IntPoint& p : path) std::swap(p.X, p.Y);
@@ -133,8 +135,8 @@ void mirror(Paths& paths) {
   }
 }
 
-/// Whether far fewer edges are active at once when the sweep goes along x. Clipper sweeps along y,
-/// in time that grows with the active edges: those of a line of text are all active.
+/// Whether a sweep along x would have far fewer active edges at a time. Clipper sweeps along y, in
+/// time that grows with the number of active edges; in a line of text all edges are active at once.
 bool better_mirrored(const Paths& paths) {
   constexpr std::size_t kFewest = 1000;
   constexpr double kMuch = 4.0;
@@ -156,7 +158,8 @@ bool better_mirrored(const Paths& paths) {
   return along_y * width > kMuch * along_x * height;
 }
 
-/// How many pairs of edges cross, from a sample of them; 0 where too few of the sample do.
+/// Estimates from a sample how many pairs of edges cross. Returns 0 when too few of the sample
+/// cross.
 double estimate_crossings(const Paths& subject, const Paths& clip) {
   std::vector<std::pair<glm::dvec2, glm::dvec2>> edges;
   for (const Paths* paths : {&subject, &clip}) {
@@ -185,7 +188,7 @@ double estimate_crossings(const Paths& subject, const Paths& clip) {
   return crossing * (count * count / 2) / kSamples;
 }
 
-/// Whether the job ended, or ends here since the outlines cross too often: Clipper takes some
+/// Whether the job has ended. Ends it when the outlines cross too often: Clipper takes some
 /// microseconds and 400 bytes for each crossing.
 bool ends_before(const Paths& subject, const Paths& clip, OutlineJob* job) {
   if (!job || job->ended()) return job != nullptr;
@@ -204,8 +207,9 @@ bool ends_before(const Paths& subject, const Paths& clip, OutlineJob* job) {
   return job->error.has_value();
 }
 
-/// What `work` gives. Clipper cannot be stopped: where it may take long and a stop is asked for,
-/// it is left to end by itself in a thread of its own, which holds all that it needs.
+/// Returns the result of `work`. Clipper cannot be stopped: work that may take long runs in a
+/// thread of its own, which owns all that it needs. After a stop request that thread is left to end
+/// by itself.
 template <class Work>
 Paths run_until_stopped(std::size_t points, OutlineJob* job, Work work) {
   constexpr std::size_t kLong = 5000;
@@ -254,19 +258,20 @@ Paths execute(ClipperLib::ClipType type, Paths subject, Paths clip, ClipperLib::
           ClipperLib::Clipper clipper;
           const bool has_subject = clipper.AddPaths(subject, ClipperLib::ptSubject, true);
           const bool has_clip = clipper.AddPaths(clip, ClipperLib::ptClip, true);
-          if (!has_subject && !has_clip) return Paths();  // nothing has an area
-          // It catches what it throws inside, above all that memory has run out.
+          if (!has_subject && !has_clip) return Paths();  // no contour encloses an area
+          // Clipper catches exceptions inside, above all for lack of memory, and then returns
+          // false.
           if (!clipper.Execute(type, result, fill, fill)) throw std::bad_alloc();
         } catch (const ClipperLib::clipperException&) {
-          return Paths();  // a coordinate out of range; the grid excludes it
+          return Paths();  // a coordinate out of range, which the grid rules out
         }
         if (mirrored) mirror(result);
         return result;
       });
 }
 
-/// Union of counter-clockwise paths, halved until it is small: Clipper's sweep is quadratic in the
-/// edges that are active at once, and most edges vanish early.
+/// Unites counter-clockwise paths by halves. Clipper's sweep is quadratic in the number of active
+/// edges, and most edges vanish in the first unions.
 Paths unite_in_halves(std::span<const Paths> parts, OutlineJob* job) {
   constexpr std::size_t kAtOnce = 8000;
   std::size_t points = 0;
@@ -289,7 +294,7 @@ Outline offset(const Outline& outline, double delta, ClipperLib::JoinType join, 
   if (delta == 0) return outline;
   Grid grid(std::span(&outline, 1), kOffsetGridBits, std::abs(delta));
   const double size = std::abs(grid.length(delta));
-  // Clipper makes an arc of as many steps as keep it within the tolerance of the circle.
+  // The tolerance at which Clipper cuts a full circle into `segments` steps.
   const double tolerance = size * (1.0 - std::cos(std::numbers::pi / std::max(segments, 3)));
   constexpr double kMitreLimit = 1e6;
   const double limit = join == ClipperLib::jtMiter ? kMitreLimit : 2.0;
@@ -327,7 +332,7 @@ Outline offset(const Outline& outline, double delta, ClipperLib::JoinType join, 
 bool is_convex(const Outline& outline) {
   if (outline.contours.size() != 1) return false;
   const auto& c = outline.contours[0];
-  // Every turn is to the left, and all of them make one turn: the direction goes up once only.
+  // A convex path turns only to the left and makes one full turn: its direction rises once only.
   std::size_t rises = 0;
   for (std::size_t i = 0; i < c.size(); ++i) {
     const glm::dvec2 &p = c[i], &q = c[(i + 1) % c.size()], &r = c[(i + 2) % c.size()];
@@ -339,13 +344,13 @@ bool is_convex(const Outline& outline) {
   return rises == 1;
 }
 
-/// What moving `shape` along the edges of `path` covers, one part for each edge.
+/// The areas that `shape` covers while it moves along the edges of `path`: one part for each edge.
 void sweep_along(const Path& path, const Paths& shape, bool convex, std::vector<Paths>& parts) {
   for (std::size_t i = 0; i < path.size(); ++i) {
     const IntPoint p = path[i], q = path[(i + 1) % path.size()];
     Paths& part = parts.emplace_back();
     if (convex) {
-      // Both ends of a convex shape and the edge between are convex: one hull.
+      // A convex shape that moves along an edge covers the hull of its two end positions.
       Outline ends;
       auto& points = ends.contours.emplace_back();
       for (const IntPoint& s : shape[0]) {
@@ -373,7 +378,7 @@ void sweep_along(const Path& path, const Paths& shape, bool convex, std::vector<
   }
 }
 
-/// Whether the job ended, or ends here since the sum would have too many pieces.
+/// Whether the job has ended. Ends it when the sum would have too many pieces.
 bool ends_before_sum(std::size_t path, std::size_t shape, bool convex, OutlineJob* job) {
   if (!job || job->ended()) return job != nullptr;
   constexpr double kMostPoints = 2e7, kBytes = 100;
@@ -447,12 +452,12 @@ Outline subtract(std::span<const Outline> operands, OutlineJob* job) {
 Outline minkowski_sum(std::span<const Outline> operands, OutlineJob* job) {
   Outline sum;
   for (const Outline& operand : operands) {
-    if (operand.empty()) return {};  // no point to move anything to
+    if (operand.empty()) return {};  // the sum with an empty set is empty
     if (&operand == operands.data()) {
       sum = operand;
       continue;
     }
-    // The grid must hold both around the same origin, and their sum.
+    // The grid must hold both operands and their sum around one origin.
     double reach = 0;
     for (const Outline* side : {&std::as_const(sum), &operand}) {
       double largest = 0;
@@ -474,7 +479,8 @@ Outline minkowski_sum(std::span<const Outline> operands, OutlineJob* job) {
     const bool convex = sum_convex || operand_convex;
     if (ends_before_sum(count_points(paths), count_points(shape), convex, job)) return {};
     for (const Path& path : paths) sweep_along(path, shape, convex, parts);
-    // The sum of the boundaries, and each side at one point of every piece of the other.
+    // The sum is the union of the boundaries' sum, of each operand moved to one point of every
+    // piece of the other.
     for (const Path& path : shape) {
       if (ClipperLib::Orientation(path)) parts.push_back(moved(paths, path[0]));
     }
@@ -541,7 +547,7 @@ Outline stroke(std::span<const glm::dvec2> line, bool closed, double width, Stro
       points, job, [paths = std::move(paths), tolerance, joins, ends, half]() mutable {
         Paths made;
         try {
-          constexpr double kMitreLimit = 4.0;  // of SVG
+          constexpr double kMitreLimit = 4.0;  // the default of SVG
           ClipperLib::ClipperOffset work(kMitreLimit, tolerance);
           work.AddPaths(paths, joins, ends);
           work.Execute(made, half);

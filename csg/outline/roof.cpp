@@ -25,7 +25,8 @@ bool surrounds(const std::vector<glm::dvec2>& contour, const glm::dvec2& p) {
   return inside;
 }
 
-/// Each outer contour with the holes that lie in it and in no smaller one.
+/// The pieces of an outline: each outer contour with its holes. A hole belongs to the smallest
+/// outer contour around it.
 std::vector<Outline> pieces(const Outline& outline) {
   std::vector<Outline> result;
   for (const auto& contour : outline.contours) {
@@ -46,7 +47,7 @@ std::vector<Outline> pieces(const Outline& outline) {
   return result;
 }
 
-/// Closed loops of the directed edges, as lists of nodes.
+/// The closed loops that directed edges make, as lists of nodes.
 std::vector<std::vector<Index>> loops_of(std::vector<std::pair<Index, Index>> edges) {
   std::sort(edges.begin(), edges.end());
   std::vector<bool> used(edges.size(), false);
@@ -78,7 +79,7 @@ Result<TriangleSoup> piece_roof(const Outline& piece, int steps, const Jitter& j
   if (!skeleton) return tl::unexpected(skeleton.error());
   TriangleSoup mesh;
   mesh.positions = skeleton->nodes;
-  // The nodes begin with the points of the contours.
+  // The first nodes are the points of the contours.
   for (const glm::uvec3& t : triangulate(piece)) mesh.triangles.emplace_back(t.x, t.z, t.y);
   for (const glm::uvec3& t : skeleton->flats) mesh.triangles.push_back(t);
   double covered = 0;
@@ -130,7 +131,8 @@ Result<TriangleSoup> make_roof(const Outline& outline, const std::string& method
   TriangleSoup mesh;
   for (const Outline& piece : pieces(outline)) {
     auto roof = piece_roof(piece, steps, {});
-    // Events that fall together within rounding can be mistaken; a little noise parts them.
+    // Events that coincide within rounding can be taken in a wrong order. A little noise separates
+    // them.
     for (std::uint32_t seed = 1; seed <= 4; ++seed) {
       for (const double distance : {1e-8, 1e-7, 1e-6}) {
         if (!roof) roof = piece_roof(piece, steps, {distance * extent, seed});

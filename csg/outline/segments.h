@@ -2,16 +2,16 @@
 
 namespace strata::csg {
 
-/// How finely round shapes are cut: OpenSCAD's $fn, $fa and $fs.
+/// How finely round shapes are divided: OpenSCAD's $fn, $fa and $fs.
 struct Segments {
-  static constexpr double kMost = 1e6;  ///< of a full circle
+  static constexpr double kMost = 1e6;  ///< segments of a full circle
 
-  double fn = 0;          ///< segments of a full circle; 0: from fa and fs
+  double fn = 0;          ///< segments of a full circle; 0: derived from fa and fs
   double fa = 12;         ///< smallest angle of a segment, degrees
   double fs = 2;          ///< smallest length of a segment
-  bool round_up = false;  ///< newer dialect: a broken $fn is rounded up, not down
+  bool round_up = false;  ///< newer dialect: a fractional $fn is rounded up, not down
 
-  /// Segments of a full circle of `radius`, at least 3.
+  /// The number of segments of a full circle of `radius`, at least 3.
   [[nodiscard]] int count(double radius) const;
 };
 

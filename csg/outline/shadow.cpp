@@ -23,7 +23,7 @@ struct PairHash {
   }
 };
 
-/// Numbers points; those in one place get one number. -0 is 0.
+/// Numbers points. Points in the same place have the same number; -0 equals 0.
 class Places {
  public:
   Index number(const glm::dvec2& p) {
@@ -45,7 +45,7 @@ class Places {
   std::unordered_map<std::pair<std::uint64_t, std::uint64_t>, Index, PairHash> numbers_;
 };
 
-/// Directed edges between places; an edge and its reverse vanish together.
+/// A sum of directed edges between numbered places. An edge and its reverse cancel.
 class Chain {
  public:
   void add(Index from, Index to) {
@@ -54,8 +54,8 @@ class Chain {
     edges_[{std::min(from, to), std::max(from, to)}] += forward ? 1 : -1;
   }
 
-  /// The edges that are left, as closed loops. Each place has as many edges in as out, if only
-  /// loops were added; what does not close is left out.
+  /// The remaining edges as closed loops. As many edges begin as end at each place if only loops
+  /// were added; edges that close no loop are left out.
   Outline loops(const std::vector<glm::dvec2>& points) const {
     std::vector<std::pair<Index, Index>> left;
     for (const auto& [ends, count] : edges_) {
@@ -66,7 +66,8 @@ class Chain {
       }
     }
     std::sort(left.begin(), left.end());
-    // Edges from a place are [first[place], first[place + 1]); `taken` of them are used.
+    // The edges from a place are [first[place], first[place + 1]). The first `taken` of them are
+    // used.
     std::vector<std::size_t> first(points.size() + 1, 0);
     for (const auto& edge : left) ++first[edge.first + 1];
     for (std::size_t i = 1; i < first.size(); ++i) first[i] += first[i - 1];
@@ -79,7 +80,7 @@ class Chain {
       Index at = start;
       while (true) {
         if (on_path[at] != kNot) {
-          // Back at a place of the path: what lies between is a loop.
+          // The path has come back to one of its places: the edges since then are a loop.
           const std::size_t since = on_path[at];
           auto& contour = outline.contours.emplace_back();
           for (std::size_t i = since; i < path.size(); ++i) {
@@ -108,10 +109,11 @@ class Chain {
   std::unordered_map<std::pair<std::uint64_t, std::uint64_t>, int, PairHash> edges_;
 };
 
-/// The section of the mesh at z = 0, where vertices at z = 0 count as above or as below it.
+/// The section of the mesh at z = 0. Vertices at z = 0 count as above the plane or as below it.
 Outline section(const TriangleSoup& mesh, bool zero_is_above) {
   const auto above = [&](const glm::dvec3& p) { return zero_is_above ? p.z >= 0 : p.z > 0; };
-  // The crossing of an edge is computed from its lower end, by whichever triangle: one point.
+  // The crossing of an edge is computed from its lower end, so that both triangles get the same
+  // point.
   const auto crossing = [&](const glm::dvec3& a, const glm::dvec3& b) {
     const glm::dvec3 &low = above(a) ? b : a, &high = above(a) ? a : b;
     if (low.z == 0) return glm::dvec2(low);
@@ -127,8 +129,8 @@ Outline section(const TriangleSoup& mesh, bool zero_is_above) {
     std::array<bool, 3> up{};
     for (std::size_t i = 0; i < 3; ++i) up[i] = above(p[i]);
     if (up[0] == up[1] && up[1] == up[2]) continue;
-    // A triangle's edges cross once upwards and once downwards. With the inside to the left, seen
-    // from above, the section runs from the upward to the downward crossing.
+    // A triangle crosses the plane once upwards and once downwards. The section runs from the
+    // upward crossing to the downward one: then the inside is on its left, seen from above.
     glm::dvec2 from(0), to(0);
     for (std::size_t i = 0; i < 3; ++i) {
       const std::size_t j = (i + 1) % 3;
@@ -151,13 +153,13 @@ bool usable(const TriangleSoup& mesh, const glm::uvec3& t) {
 }  // namespace
 
 Outline shadow(const TriangleSoup& mesh, OutlineJob* job) {
-  // The triangles that face up, as a chain: how often its boundary winds around a point is how many
-  // of them cover it. Only the silhouette reaches Clipper. An open mesh needs the others too,
-  // turned around.
+  // The triangles that face upwards are added as a chain. Its boundary winds around a point as
+  // often as such triangles cover the point, and only the boundary reaches Clipper. An open mesh
+  // also needs the triangles that face downwards, reversed.
   const bool closed = is_closed(mesh);
   Places places;
   Chain chain;
-  constexpr std::size_t kAsk = 1 << 14;  // triangles between two looks at whether to stop
+  constexpr std::size_t kAsk = 1 << 14;  // triangles between two checks for a stop
   for (std::size_t at = 0; at < mesh.triangles.size(); ++at) {
     if (job != nullptr && at % kAsk == 0 && job->ended()) return {};
     const glm::uvec3& t = mesh.triangles[at];
@@ -188,7 +190,7 @@ Outline cross_section(const TriangleSoup& mesh) {
   const bool touches = std::any_of(used->positions.begin(), used->positions.end(),
                                    [](const glm::dvec3& p) { return p.z == 0; });
   if (!touches) return section(*used, true);
-  // Faces that lie in the plane belong to the section, whichever side the solid is on.
+  // Faces in the plane belong to the section, whichever side of them is solid.
   const std::array<Outline, 2> both{section(*used, true), section(*used, false)};
   return unite(both);
 }

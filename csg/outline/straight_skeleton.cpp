@@ -18,7 +18,7 @@ constexpr double kNever = std::numeric_limits<double>::infinity();
 
 double cross(const glm::dvec2& a, const glm::dvec2& b) { return a.x * b.y - a.y * b.x; }
 
-/// The wavefront: loops of vertices between edges whose lines move inwards.
+/// The wavefront: loops of vertices. The lines of the edges between them move inwards.
 class Wavefront {
  public:
   Result<StraightSkeleton> run(const Outline& outline, int corner_steps, const Jitter& jitter) {
@@ -39,7 +39,7 @@ class Wavefront {
       }
       if (!step()) break;
     }
-    // Nothing moves towards anything else: only rounding leaves loops here; they end level.
+    // No further event is left. Loops can remain because of rounding only; they become level.
     while (!active_.empty()) end_loop(active_[0]);
     return std::move(result_);
   }
@@ -51,13 +51,13 @@ class Wavefront {
     double offset = 0;  ///< normal . p = offset + time
   };
   struct Vertex {
-    Index before = 0, after = 0;  ///< edges
-    Index prev = 0, next = 0;     ///< vertices
+    Index before = 0, after = 0;  ///< indices of edges
+    Index prev = 0, next = 0;     ///< indices of vertices
     glm::dvec2 p{0}, velocity{0};
-    Index born = 0;   ///< node
-    Index place = 0;  ///< in active_
+    Index born = 0;   ///< the node where it began
+    Index place = 0;  ///< index in active_
     bool reflex = false;
-    bool spike = false;  ///< between edges that face each other
+    bool spike = false;  ///< its two edges face each other
     bool alive = true;
   };
 
@@ -73,7 +73,8 @@ class Wavefront {
       auto contour = exact;
       if (jitter.distance > 0) {
         for (glm::dvec2& p : contour) {
-          // As arguments of one call the two would be drawn in an order that each compiler chooses.
+          // Two calls as arguments of one constructor would be evaluated in an order that differs
+          // between compilers.
           const double y = noise(random), x = noise(random);
           p += glm::dvec2(x, y);
         }
@@ -87,7 +88,7 @@ class Wavefront {
       for (std::size_t i = 0; i < n; ++i) {
         const Index before = edge[(i + n - 1) % n], after = edge[i];
         const Index node = add_node(exact[i]);
-        // The base of the face of the edge before ends here, that of the edge after begins.
+        // The face of the previous edge ends at this node; the face of the next edge begins here.
         if (i > 0) link(before, node - 1, node);
         if (i + 1 == n) link(after, node, node - static_cast<Index>(n) + 1);
         Index last = before;
@@ -144,7 +145,7 @@ class Wavefront {
     return active_.back();
   }
 
-  /// The vertex has come to `node`: its path bounds the faces to both sides.
+  /// Ends the path of vertex i at `node`. The path bounds the faces of the two edges at the vertex.
   void end_vertex(Index i, Index node) {
     Vertex& v = vertices_[i];
     link(v.before, v.born, node);
@@ -160,7 +161,7 @@ class Wavefront {
     vertices_[j].prev = i;
   }
 
-  /// Whatever is left of a loop becomes level, and often a line or a point.
+  /// Closes what is left of a loop by level triangles. Often it is only a line or a point.
   void end_loop(Index start) {
     std::vector<Index> loop;
     for (Index i = start; loop.empty() || i != start; i = vertices_[i].next) loop.push_back(i);
@@ -185,7 +186,7 @@ class Wavefront {
     return size;
   }
 
-  /// The edge from i to the next vertex has no length left.
+  /// Removes the edge from vertex i to the next one, which has no length left.
   void collapse(Index i) {
     const Index j = vertices_[i].next;
     if (loop_size(i) < 3) return end_loop(i);
@@ -199,7 +200,7 @@ class Wavefront {
     connect(made, after);
   }
 
-  /// Vertex i has run into the edge from j to its next vertex.
+  /// Splits the loop where vertex i has run into the edge from j to the vertex after j.
   void split(Index i, Index j) {
     const Index k = vertices_[j].next;
     const glm::dvec2 p = vertices_[i].p;
@@ -214,7 +215,7 @@ class Wavefront {
     connect(from_j, after);
   }
 
-  /// The edges at vertex i lie on each other: the shorter one is used up.
+  /// Removes the shorter of the two edges at vertex i, which lie on each other.
   void shorten_spike(Index i) {
     if (loop_size(i) < 3) return end_loop(i);
     const Index u = vertices_[i].prev, w = vertices_[i].next;
@@ -228,7 +229,7 @@ class Wavefront {
     const Index left = first ? vertices_[u].before : a, right = first ? b : vertices_[w].after;
     end_vertex(i, top);
     end_vertex(other, node);
-    // The ridge from the tip to where the shorter edge began lies between both faces.
+    // Both faces share the ridge from the tip to the start of the shorter edge.
     link(a, top, node);
     link(b, node, top);
     const Index made = add_vertex(left, right, p, node);
@@ -241,7 +242,7 @@ class Wavefront {
     }
   }
 
-  /// Goes on to the next event and deals with it; false if there is none.
+  /// Advances to the next event and handles it. @return false if there is none
   bool step() {
     enum class Kind { kNothing, kCollapse, kSplit };
     Kind kind = Kind::kNothing;
@@ -279,19 +280,20 @@ class Wavefront {
         if (away < -tolerance_) continue;
         const double when = std::max(away, 0.0) / closing;
         if (!(when < soonest)) continue;
-        // At that time the vertex must be between the ends of the edge.
+        // The vertex must then be between the ends of the edge.
         const glm::dvec2 hit = v.p + v.velocity * when;
         const double from = glm::dot(hit - s.p - s.velocity * when, edge.along);
         const double to = glm::dot(e.p + e.velocity * when - hit, edge.along);
         if (from < -tolerance_ || to < -tolerance_) continue;
-        // Where an edge ends in a reflex corner, it is not met by what moves on past that end.
+        // An edge that ends in a reflex corner is not hit by a vertex that moves on beyond that
+        // end.
         constexpr double kStill = -1e-9;
         const auto passes = [&](const Vertex& end, double room, const glm::dvec2& towards) {
           return end.reflex && room <= tolerance_ &&
                  glm::dot(v.velocity - end.velocity, towards) < kStill;
         };
         if (passes(s, from, edge.along) || passes(e, to, -edge.along)) continue;
-        // An edge without length has nothing to run into: it is about to vanish, or to grow.
+        // An edge without length cannot be hit: it is about to vanish or to grow.
         if (from + to <= 2 * tolerance_) continue;
         soonest = when, kind = Kind::kSplit, who = i, whom = j;
       }

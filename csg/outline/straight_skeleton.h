@@ -12,31 +12,32 @@
 
 namespace strata::csg {
 
-/// The faces that the edges of a region sweep when all of them move inwards at speed 1 and z is the
-/// time: the roof of slope 45 degrees.
+/// The faces that the edges of a region sweep while all of them move inwards at speed 1, with time
+/// as z: the roof of slope 45 degrees.
 struct StraightSkeleton {
   std::vector<glm::dvec3> nodes;
-  /// Of each edge: the directed boundary of its face, pairs of nodes in any order. What is left
-  /// open between faces is closed by `flats`.
+  /// For each edge the directed boundary of its face, as pairs of nodes in any order. Level faces
+  /// between the edges' faces are in `flats`.
   std::vector<std::vector<std::pair<std::uint32_t, std::uint32_t>>> faces;
-  /// Level triangles where a region stopped moving.
+  /// Level triangles where a part of the region stopped moving.
   std::vector<glm::uvec3> flats;
 };
 
-/// Moves the points before they start, which parts events that fall together; the base stays exact.
+/// Noise that moves the points before the simulation, which separates events that coincide. The
+/// base of the roof stays exact.
 struct Jitter {
-  double distance = 0;     ///< along x and y at most
-  std::uint32_t seed = 1;  ///< of the directions
+  double distance = 0;     ///< greatest displacement along x and along y
+  std::uint32_t seed = 1;  ///< selects the displacements
 };
 
-/// O. Aichholzer, F. Aurenhammer, D. Alberts and B. Gaertner, "A novel type of skeleton for
-/// polygons", 1995, by simulation of the wavefront.
+/// Simulates the wavefront: O. Aichholzer, F. Aurenhammer, D. Alberts and B. Gaertner, "A novel
+/// type of skeleton for polygons", 1995. Time grows with points^2 times reflex corners; outlines
+/// for which this product exceeds 3e9 are refused.
 /// @param outline  one outer contour and its holes, clean
-/// @param corner_steps  edges without length put into a reflex corner for a full turn, which bring
-/// the skeleton close to the medial axis (M. Tanase and R. Veltkamp, "A straight skeleton
-/// approximating the medial axis", 2004); 0: none
-/// Time grows with points^2 times reflex corners; outlines beyond 3e9 of these are refused.
-/// @return kGeometry: too many points, or the simulation did not come to an end
+/// @param corner_steps  number of edges without length that a reflex corner gets for a full turn.
+/// They bring the skeleton close to the medial axis (M. Tanase and R. Veltkamp, "A straight
+/// skeleton approximating the medial axis", 2004); 0: none
+/// @return kGeometry: too many points, or the simulation did not end
 Result<StraightSkeleton> straight_skeleton(const Outline& outline, int corner_steps,
                                            const Jitter& jitter);
 

@@ -1,4 +1,4 @@
-// Text: fontconfig finds the font, HarfBuzz sets the glyphs, FreeType draws them.
+// Text: fontconfig finds the font, HarfBuzz places the glyphs, FreeType gives their contours.
 #include <fmt/core.h>
 
 #include "csg/outline/outline.h"
@@ -25,12 +25,12 @@
 namespace strata::csg {
 namespace {
 
-/// Glyphs are drawn at this many 64ths of a point and 100 dots an inch, then scaled: an em of
-/// `size` 1 has 100 / 72 units, which is what OpenSCAD calls size 1.
+/// Glyphs are loaded at a size of `kScale` / 64 points at 100 dots per inch and then scaled. An em
+/// of `size` 1 has 100 / 72 units, which is OpenSCAD's size 1.
 constexpr double kScale = 1e5;
 constexpr FT_UInt kDotsPerInch = 100;
 
-/// What is used when no font is named.
+/// The font that is used when none is named.
 constexpr const char* kDefaultFont = "Liberation Sans";
 
 template <class T, void (*Free)(T*)>
@@ -41,8 +41,8 @@ using Pattern = std::unique_ptr<FcPattern, Freer<FcPattern, FcPatternDestroy>>;
 using Buffer = std::unique_ptr<hb_buffer_t, Freer<hb_buffer_t, hb_buffer_destroy>>;
 using Font = std::unique_ptr<hb_font_t, Freer<hb_font_t, hb_font_destroy>>;
 
-/// The libraries say by codes and empty objects that memory has run out: that ends the job, as it
-/// does everywhere. @return whether the call of FreeType succeeded
+/// FreeType reports lack of memory by an error code. It becomes std::bad_alloc, which ends the job
+/// as everywhere else. @return whether the call succeeded
 bool succeeded(FT_Error error) {
   if (FT_ERROR_BASE(error) == FT_Err_Out_Of_Memory) throw std::bad_alloc();
   return error == 0;
@@ -50,15 +50,16 @@ bool succeeded(FT_Error error) {
 
 struct Match {
   FT_Face face = nullptr;
-  std::string missing;  ///< the family that was asked for, when this is another
+  std::string missing;  ///< the requested family, when the font has another
 };
 
-/// Fonts by the name a scene gives them. Used under a lock: a face has one current glyph.
+/// Fonts by the name that a scene gives them. A face holds one glyph at a time, so callers take the
+/// lock.
 class Fonts {
  public:
   Fonts() {
     if (FT_Init_FreeType(&library_) != 0) throw std::bad_alloc();
-    config_ = FcInitLoadConfigAndFonts();  // without any file there is still a configuration
+    config_ = FcInitLoadConfigAndFonts();  // works without a configuration file
     if (config_ == nullptr) {
       FT_Done_FreeType(library_);
       throw std::bad_alloc();
@@ -87,7 +88,7 @@ class Fonts {
         FcNameParse(reinterpret_cast<const FcChar8*>(name.empty() ? kDefaultFont : name.c_str())));
     if (!wanted) return {};
     FcPatternAddBool(wanted.get(), FC_SCALABLE, FcTrue);
-    // Asked for before the substitution adds the families that stand in.
+    // The requested family is read before the substitution adds replacement families.
     FcChar8* family = nullptr;
     std::string asked;
     if (FcPatternGetString(wanted.get(), FC_FAMILY, 0, &family) == FcResultMatch) {
@@ -119,7 +120,7 @@ class Fonts {
     return match;
   }
 
-  /// Names that no font has: whichever is chosen is right.
+  /// Generic family names. No font has such a name, so any font that fontconfig picks is right.
   static bool is_generic(const std::string& family) {
     const auto* name = reinterpret_cast<const FcChar8*>(family.c_str());
     return std::any_of(std::begin(kGeneric), std::end(kGeneric), [&](const char* generic) {
@@ -130,14 +131,14 @@ class Fonts {
                                              "monospace", "mono",       "cursive"};
 
   FT_Library library_ = nullptr;
-  FcConfig* config_ = nullptr;  ///< our own: the process's may be in other hands
+  FcConfig* config_ = nullptr;  ///< not the process's configuration, which the application may use
   std::map<std::string, Match> matches_;
 };
 
-/// Collects the contours of glyphs, curves as `steps` segments.
+/// Collects the contours of glyphs. A curve becomes `steps` segments.
 struct Pen {
   std::vector<std::vector<glm::dvec2>> contours;
-  glm::dvec2 origin{0};  ///< of the glyph, in ems
+  glm::dvec2 origin{0};  ///< position of the glyph, ems
   glm::dvec2 last{0};
   double size = 1;
   int steps = 2;
@@ -148,7 +149,7 @@ struct Pen {
   }
   static Pen& of(void* user) { return *static_cast<Pen*>(user); }
 
-  /// An exception must not pass through FreeType: it becomes its code.
+  /// Exceptions must not pass through FreeType, so they become its error code.
   template <class Body>
   static int guarded(const Body& body) {
     try {
@@ -191,7 +192,7 @@ struct Pen {
   }
 };
 
-/// The script of the text: that of its letters, if they are all of one.
+/// The script of the text if all its letters have the same one.
 hb_script_t script_of(const TextOptions& options, hb_buffer_t* buffer) {
   const hb_script_t given = hb_script_from_string(options.script.c_str(), -1);
   if (given != HB_SCRIPT_INVALID && !options.script.empty()) return given;
@@ -212,7 +213,7 @@ struct Glyph {
   glm::dvec2 offset{0}, advance{0};  ///< ems
 };
 
-/// Where the ink of all glyphs lies, and how far they lead; ems.
+/// The box around all glyphs, and the sum of their advances; ems.
 struct Extent {
   double left = std::numeric_limits<double>::infinity(), right = -left;
   double ascent = -left, descent = left;
@@ -231,7 +232,7 @@ glm::dvec2 alignment(const TextOptions& options, const Extent& extent, bool hori
     if (v == "center") shift.y = -(extent.ascent + extent.descent) / 2;
     if (v == "bottom") shift.y = -extent.descent;
   } else {
-    // HarfBuzz sets vertical text downwards from its origin.
+    // HarfBuzz places vertical text downwards from its origin.
     if (h == "right") shift.x = -extent.right;
     if (h == "left") shift.x = -extent.left;
     if (v == "center") shift.y = -extent.advance.y / 2;
@@ -240,7 +241,7 @@ glm::dvec2 alignment(const TextOptions& options, const Extent& extent, bool hori
   return shift;
 }
 
-/// The direction that the options ask for, else that of the script.
+/// The direction that the options give, else the direction of the script.
 hb_direction_t direction_of(const TextOptions& options, hb_script_t script) {
   hb_direction_t direction = hb_direction_from_string(options.direction.c_str(), -1);
   if (options.direction.empty() || direction == HB_DIRECTION_INVALID) {
@@ -249,7 +250,8 @@ hb_direction_t direction_of(const TextOptions& options, hb_script_t script) {
   return direction == HB_DIRECTION_INVALID ? HB_DIRECTION_LTR : direction;
 }
 
-/// Fills the buffer with the glyphs of the text and their places. @return the direction of the text
+/// Fills the buffer with the glyphs of the text and their positions. @return the direction of the
+/// text
 hb_direction_t shape_text(const TextOptions& options, FT_Face face, hb_buffer_t* buffer) {
   const Font font(hb_ft_font_create(face, nullptr));
   hb_buffer_add_utf8(buffer, options.text.data(), static_cast<int>(options.text.size()), 0,
@@ -260,7 +262,7 @@ hb_direction_t shape_text(const TextOptions& options, FT_Face face, hb_buffer_t*
   hb_buffer_set_direction(buffer, direction);
   hb_buffer_set_language(buffer, hb_language_from_string(options.language.c_str(), -1));
   if (face->charmap != nullptr && face->charmap->encoding == FT_ENCODING_MS_SYMBOL) {
-    // Symbol fonts have their glyphs in the private use area.
+    // Symbol fonts have their glyphs in the private use area of Unicode.
     unsigned count = 0;
     hb_glyph_info_t* infos = hb_buffer_get_glyph_infos(buffer, &count);
     for (unsigned i = 0; i < count; ++i) {
@@ -274,11 +276,11 @@ hb_direction_t shape_text(const TextOptions& options, FT_Face face, hb_buffer_t*
   return direction;
 }
 
-/// Adds the glyph that `face` has loaded to the extent of the text before it.
+/// Extends the box of the text by the glyph that `face` has loaded.
 void include_glyph(const Glyph& glyph, FT_Face face, Extent& extent) {
   FT_BBox box;
   FT_Outline_Get_CBox(&face->glyph->outline, &box);
-  // Whole pixels, as OpenSCAD measures them.
+  // OpenSCAD measures in whole pixels.
   box.xMin &= ~63, box.yMin &= ~63;
   box.xMax = (box.xMax + 63) & ~63, box.yMax = (box.yMax + 63) & ~63;
   if (box.xMax <= box.xMin || box.yMax <= box.yMin) return;
@@ -317,7 +319,8 @@ Result<Outline> set_text(const TextOptions& options, FT_Face face, OutlineJob* j
   funcs.cubic_to = Pen::cubic;
   Pen pen;
   pen.size = options.size;
-  // Curves of letters are short: an eighth of the segments of a circle of the text's size.
+  // Curves of letters are short: each gets an eighth of the segments of a circle of the text's
+  // size.
   pen.steps = std::max(options.segments.count(options.size) / 8 + 1, 2);
   glm::dvec2 place = alignment(options, extent, HB_DIRECTION_IS_HORIZONTAL(direction));
   std::size_t points = 0, counted = 0;

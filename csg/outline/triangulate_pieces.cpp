@@ -1,5 +1,5 @@
-// Outlines of many pieces are triangulated piece by piece: the search for what surrounds a hole
-// looks at all that is as high as the hole.
+// Triangulates an outline of many pieces piece by piece. The triangulation of the whole would
+// compare each hole with every edge at its height.
 #include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>
@@ -38,7 +38,7 @@ bool is_inside(const glm::dvec2& p, const Contour& contour) {
   return inside;
 }
 
-/// Finds for a contour the smallest outer contour around it.
+/// Finds the smallest outer contour around a given contour.
 class Surroundings {
  public:
   Surroundings(const Outline& outline, const std::vector<std::size_t>& outers)
@@ -47,7 +47,8 @@ class Surroundings {
     glm::dvec2 high(-std::numeric_limits<double>::infinity());
     low_ = -high;
     for (const Box& box : boxes_) low_ = glm::min(low_, box.low), high = glm::max(high, box.high);
-    // Cells of about the size of a box: a line of text has one row of them.
+    // A cell has about the size of a mean box. The letters of a line of text then fill one row of
+    // cells.
     const auto count = static_cast<double>(outers.size());
     glm::dvec2 mean(0);
     for (const Box& box : boxes_) mean += (box.high - box.low) / count;
@@ -67,10 +68,10 @@ class Surroundings {
     }
   }
 
-  /// Whether boxes overlap so much that looking at them all would take longer than it saves.
+  /// Whether the boxes overlap so much that this search would take longer than it saves.
   [[nodiscard]] bool crowded() const { return entries_ > kMostEntries * outers_.size(); }
 
-  /// Into the outers; kNoOuter: nothing is around the hole.
+  /// Returns an index of `outers`, or kNoOuter when no contour is around the hole.
   [[nodiscard]] std::size_t of(const Contour& hole) const {
     const Box box(hole);
     const auto [x, y] = column(box.low);
@@ -108,7 +109,8 @@ class Surroundings {
   std::size_t columns_ = 1, rows_ = 1, entries_ = 0;
 };
 
-/// The contours of each piece, the outer one first; nothing where the outline is not made of such.
+/// The contours of each piece, the outer one first. Empty where the outline does not consist of
+/// outer contours with holes.
 std::optional<std::vector<std::vector<std::size_t>>> find_pieces(const Outline& outline) {
   std::vector<std::size_t> outers, holes;
   for (std::size_t i = 0; i < outline.contours.size(); ++i) {
@@ -138,7 +140,7 @@ std::vector<glm::uvec3> triangulate_pieces(const Outline& outline, OutlineJob* j
   if (outline.contours.size() < kMany) return triangulate(outline);
   const auto pieces = find_pieces(outline);
   if (!pieces) return triangulate(outline);
-  std::vector<std::uint32_t> firsts;  // the number of each contour's first point
+  std::vector<std::uint32_t> firsts;  // the number of the first point of each contour
   std::uint32_t count = 0;
   for (const Contour& contour : outline.contours) {
     firsts.push_back(count);

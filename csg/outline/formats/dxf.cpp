@@ -1,4 +1,4 @@
-// Outlines from DXF. The format: Autodesk, "DXF Reference". Numbers of segments as OpenSCAD's.
+// Outlines from DXF (Autodesk, "DXF Reference"). Curves have as many segments as in OpenSCAD.
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -16,16 +16,16 @@ namespace strata::csg {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-/// Lines a file may make, through blocks in blocks.
+/// Most lines that a file may make, including those of nested blocks.
 constexpr std::size_t kMostLines = 5'000'000;
 constexpr int kDeepest = 64;
 
-/// Numbers of an entity by group code.
+/// The numbers of an entity, by group code.
 class Values {
  public:
   Values(const DxfEntity& entity, const std::string& name) : entity_(entity), name_(name) {}
 
-  /// The first value of `code`, or the fallback. A bad number is remembered in `error`.
+  /// The first value of `code`, or the fallback. `error` remembers a malformed number.
   double number(int code, double fallback) {
     for (const DxfGroup& group : entity_.groups) {
       if (group.code != code) continue;
@@ -35,7 +35,7 @@ class Values {
     }
     return fallback;
   }
-  /// Likewise, but it must be there.
+  /// The first value of `code`, which must be present.
   double needed(int code) {
     const double value = number(code, std::nan(""));
     if (std::isnan(value) && !error) {
@@ -52,7 +52,7 @@ class Values {
     }
     return {};
   }
-  /// Every value of `code`, in order.
+  /// All values of `code`, in order.
   std::vector<double> all(int code) {
     std::vector<double> values;
     for (const DxfGroup& group : entity_.groups) {
@@ -101,7 +101,7 @@ class Drawing {
       return fail(ErrorCode::kInput, "{}: layer '{}' is empty; there {}", name_, options_.layer,
                   layers());
     }
-    // OpenSCAD's grid, in units of the scene, takes in what lies up to 1.5 steps away.
+    // OpenSCAD snaps to a grid, which joins ends up to 1.5 of its steps apart (units of the scene).
     constexpr double kOpenScad = 1.5e-5;
     if (options_.scale == 0) return Outline{};
     JoinedLines joined = joiner_.join(kOpenScad / std::abs(options_.scale), execution_.stop);
@@ -116,7 +116,7 @@ class Drawing {
   }
 
  private:
-  /// The layers with something in them, for a message: some of them, if there are many.
+  /// The names of the layers that are not empty, for a message; the first few if there are many.
   [[nodiscard]] std::string layers() const {
     constexpr std::size_t kMost = 8;
     std::set<std::string_view> names;
@@ -130,8 +130,8 @@ class Drawing {
     return text;
   }
 
-  /// A unit of the last decimal place that the file writes in these groups; 0 if it writes less
-  /// than three places: then the numbers are meant as they are.
+  /// One unit of the last decimal place that the file writes in these groups. 0 if the file writes
+  /// fewer than three places: such numbers are taken as exact.
   [[nodiscard]] double last_place(std::initializer_list<int> codes) const {
     int most = 0;
     const auto look = [&](const DxfEntity& entity) {
@@ -157,8 +157,9 @@ class Drawing {
     return most < kFewest ? 0.0 : std::pow(10.0, -most);
   }
 
-  /// How far an end of an entity may lie from where it is meant to be, in the drawing: numbers are
-  /// rounded to half a unit, along both axes, and a bit for the arithmetic.
+  /// How far an end of an entity may lie from its intended position, in units of the drawing.
+  /// Numbers are rounded to half a unit along both axes; the factor leaves some room for the
+  /// arithmetic.
   [[nodiscard]] double reach_of(const DxfEntity& entity, Values& values,
                                 const Placement& place) const {
     constexpr double kBoth = 0.75;
@@ -172,7 +173,7 @@ class Drawing {
     return reach * std::max(glm::length(place.x), glm::length(place.y));
   }
 
-  /// Says where contours are open, and which lines are left out since they are in none.
+  /// Warns of contours that are open and of lines that belong to no contour and are left out.
   void note_open(const std::vector<OpenPath>& open, std::vector<std::string>& warnings) const {
     for (const bool lines : {false, true}) {
       std::size_t count = 0;
@@ -247,7 +248,7 @@ class Drawing {
     return {};
   }
 
-  /// Segments of a full circle of this radius at its place.
+  /// The number of segments of a full circle of this radius at its place.
   double segments(double radius, const Placement& place) const {
     return options_.segments.count(std::abs(radius * options_.scale) * glm::length(place.x));
   }
@@ -314,7 +315,7 @@ class Drawing {
     for (const DxfEntity& part : entity.parts) {
       Values values(part, name_);
       constexpr int kFrameOfCurve = 16;
-      if ((values.flags() & kFrameOfCurve) != 0) continue;  // not on the curve
+      if ((values.flags() & kFrameOfCurve) != 0) continue;  // not a point of the curve
       const glm::dvec2 p = values.point(10);
       const double bulge = values.number(42, 0);
       if (values.error) return tl::unexpected(*values.error);
@@ -323,7 +324,7 @@ class Drawing {
     return vertices;
   }
 
-  /// Edges with a bulge are arcs: the tangent of a quarter of their angle.
+  /// Replaces edges with a bulge by arcs. The bulge is the tangent of a quarter of the arc's angle.
   std::vector<glm::dvec2> bulged(const std::vector<Vertex>& vertices, bool closed,
                                  const Placement& place) const {
     std::vector<glm::dvec2> path;
@@ -333,7 +334,7 @@ class Drawing {
       if (bulge == 0 || (i + 1 == vertices.size() && !closed)) continue;
       const glm::dvec2 q = vertices[(i + 1) % vertices.size()].p, half = (q - p) / 2.0;
       const double sweep = 4 * std::atan(bulge);
-      // The centre lies beside the middle of the edge.
+      // The centre lies at this distance from the middle of the edge, over half its length.
       const double beside = (1 - bulge * bulge) / (2 * bulge);
       const glm::dvec2 centre = p + half + beside * glm::dvec2(-half.y, half.x);
       const glm::dvec2 arm = p - centre;
@@ -347,7 +348,8 @@ class Drawing {
     return path;
   }
 
-  /// A B-spline, rational if it has weights, by de Boor's algorithm; or its fit points.
+  /// The points of a B-spline, by de Boor's algorithm (rational if it has weights), or its fit
+  /// points.
   std::vector<glm::dvec2> spline(const DxfEntity& entity, Values& values,
                                  const Placement& place) const {
     const auto points_of = [&](int code) {
@@ -376,7 +378,7 @@ class Drawing {
     }
     for (std::size_t i = 0; i < std::min(weights.size(), points.size()); ++i)
       points[i] *= weights[i];
-    // As many steps in each span as for a curve of a letter or drawing: an eighth of a circle.
+    // Each span has as many steps as a curve of a letter or SVG drawing: an eighth of a circle.
     glm::dvec2 low(points[0] / points[0].z), high = low;
     for (const glm::dvec3& p : points)
       low = glm::min(low, glm::dvec2(p)), high = glm::max(high, glm::dvec2(p));
@@ -438,9 +440,9 @@ class Drawing {
   const OutlineImport& options_;
   const Execution& execution_;
   LineJoiner joiner_;
-  double coordinate_unit_ = 0, angle_unit_ = 0, parameter_unit_ = 0;  ///< of last decimal places
-  std::uint32_t outermost_ = 0;  ///< the entity of the file that is drawn, maybe through blocks
-  std::size_t drawn_ = 0;        ///< entities, those of blocks as often as they are inserted
+  double coordinate_unit_ = 0, angle_unit_ = 0, parameter_unit_ = 0;  ///< last decimal places
+  std::uint32_t outermost_ = 0;  ///< the entity of the file that is drawn, possibly through blocks
+  std::size_t drawn_ = 0;  ///< entities drawn; those of a block count each time it is inserted
 };
 
 }  // namespace

@@ -15,7 +15,7 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(kSpace) - first + 1);
 }
 
-/// Reads groups: two lines each, a code and a value.
+/// Reads groups. A group is two lines: a code and a value.
 class Groups {
  public:
   Groups(std::string_view text, const std::string& name) : text_(text), name_(name) {}
@@ -53,7 +53,7 @@ class Groups {
   std::uint32_t line_ = 0;
 };
 
-/// Puts groups where they belong.
+/// Sorts groups into entities and blocks.
 class Parser {
  public:
   Parser(std::string_view text, const std::string& name) : groups_(text, name), name_(name) {}
@@ -77,7 +77,7 @@ class Parser {
  private:
   enum class Section { kOther, kEntities, kBlocks };
 
-  /// Group 0: something new.
+  /// Group 0 begins an entity, block or section.
   Result<void> begin(const DxfGroup& group) {
     const std::string_view type = group.value;
     entity_ = nullptr;
@@ -144,7 +144,7 @@ class Parser {
   DxfBlock head_;
   DxfBlock* block_ = nullptr;
   DxfEntity* entity_ = nullptr;
-  DxfEntity* polyline_ = nullptr;  ///< whose VERTEX entities follow
+  DxfEntity* polyline_ = nullptr;  ///< the POLYLINE whose VERTEX entities follow
 };
 
 }  // namespace

@@ -16,7 +16,7 @@ namespace strata::csg {
 struct DxfGroup {
   int code = 0;
   std::string_view value;
-  std::uint32_t line = 0;  ///< of the value, from 1
+  std::uint32_t line = 0;  ///< line of the value, from 1
 };
 
 /// An entity: its type, and its groups in order. A POLYLINE has its VERTEX entities as `parts`.
@@ -39,12 +39,12 @@ struct DxfFile {
   std::map<std::string, DxfBlock, std::less<>> blocks;
 };
 
-/// Parses `text`, which must outlive the result; `name` is for messages. @return kInput naming file
-/// and line; kCancelled
+/// Parses `text`, which must outlive the result. Messages call the file `name`. @return kInput
+/// naming file and line; kCancelled
 Result<DxfFile> parse_dxf(std::string_view text, const std::string& name,
                           const std::stop_token& stop = {});
 
-/// A number as DXF writes it. @return kInput naming file and line: not a finite number
+/// Reads a number as DXF writes it. @return kInput naming file and line: not a finite number
 Result<double> dxf_number(const DxfGroup& group, const std::string& name);
 
 }  // namespace strata::csg

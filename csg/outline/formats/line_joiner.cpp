@@ -14,7 +14,7 @@ namespace {
 
 using Index = std::uint32_t;
 
-/// Ends of lines in groups of those that are one point.
+/// The ends of lines, in groups that are taken as one point each.
 class Points {
  public:
   explicit Points(const std::stop_token& stop) : stop_(stop) {}
@@ -24,7 +24,7 @@ class Points {
     reaches_.push_back(reach);
   }
 
-  /// Ends at the same coordinates are one.
+  /// Unites ends that have the same coordinates.
   void group_equal() {
     std::vector<Index> order(places_.size());
     std::iota(order.begin(), order.end(), Index{0});
@@ -42,19 +42,19 @@ class Points {
     extent_ = places_.empty() ? 0.0 : std::max(high.x - low_.x, high.y - low_.y);
   }
 
-  /// Unites what lies within `tolerance` of each other.
+  /// Unites ends that lie within `tolerance` of each other.
   void unite_within(double tolerance) {
     constexpr double kMost = 1e-6;
     const std::vector<double> half(places_.size(), std::min(tolerance, kMost * extent_) / 2);
     unite_near(half, std::vector<bool>(places_.size(), true));
   }
 
-  /// Unites points where an odd number of lines ends with what lies within the reach of both.
+  /// Unites points where an odd number of lines ends with points whose reach overlaps theirs.
   void unite_odd() {
     constexpr double kMost = 1e-3;
     std::vector<bool> odd(places_.size(), false);
     for (Index i = 0; i < places_.size(); ++i) {
-      // A line whose ends are one point counts for nothing.
+      // A line whose two ends are one point does not count.
       if (find(i) != find(i ^ 1u)) odd[find(i)] = !odd[find(i)];
     }
     for (Index i = 0; i < places_.size(); ++i) odd[i] = odd[find(i)];
@@ -70,7 +70,8 @@ class Points {
   const glm::dvec2& place(Index i) const { return places_[i]; }
 
  private:
-  /// The end that stands for both comes first: the one that is known best.
+  /// Whether end `a` represents the group of both rather than `b`: the end with the smaller reach
+  /// does.
   bool before(Index a, Index b) const {
     const glm::dvec2 &p = places_[a], &q = places_[b];
     if (reaches_[a] != reaches_[b]) return reaches_[a] < reaches_[b];
@@ -82,7 +83,8 @@ class Points {
     groups_[b] = a;
   }
 
-  /// Unites points at `wanted` with all that are no farther than the sum of both reaches.
+  /// Unites each end that is `wanted` with every end at a distance of at most the sum of their
+  /// reaches.
   void unite_near(const std::vector<double>& reach, const std::vector<bool>& wanted) {
     double size = 0;
     for (const double r : reach) size = std::max(size, 2 * r);
@@ -101,7 +103,7 @@ class Points {
       const glm::dvec2 at = glm::min(glm::floor((p - low_) / size), glm::dvec2(kMost));
       return Cell(static_cast<std::int64_t>(at.x), static_cast<std::int64_t>(at.y));
     };
-    // Of points in one place the first stands for all.
+    // One end represents all ends in the same place: the one with the largest reach.
     std::unordered_map<Cell, std::vector<Index>, CellHash> cells;
     std::vector<Index> order(places_.size());
     std::iota(order.begin(), order.end(), Index{0});
@@ -135,12 +137,12 @@ class Points {
   const std::stop_token& stop_;
   std::vector<glm::dvec2> places_;  ///< the ends of line i are 2 i and 2 i + 1
   std::vector<double> reaches_;
-  std::vector<Index> groups_;  ///< a tree for each group; its root stands for it
+  std::vector<Index> groups_;  ///< union-find parents; a group is represented by its root
   glm::dvec2 low_{0};
   double extent_ = 0;
 };
 
-/// Walks along lines between numbered points, each line once.
+/// Walks along lines between numbered points. Each line is used once.
 class Walk {
  public:
   struct Line {
@@ -208,11 +210,11 @@ class Walk {
   }
 
   std::vector<Line> lines_;
-  std::vector<std::vector<Index>> at_;  ///< lines at each point, first added first
-  std::vector<Index> left_;             ///< lines at a point that are not used
-  std::vector<Index> looked_;           ///< lines before are used
+  std::vector<std::vector<Index>> at_;  ///< lines at each point, in the order of addition
+  std::vector<Index> left_;             ///< number of unused lines at each point
+  std::vector<Index> looked_;           ///< all lines before this index of at_ are used
   std::vector<bool> used_;
-  std::set<Index> ends_;  ///< unused lines that are alone at one of their points
+  std::set<Index> ends_;  ///< unused lines that are the only one at one of their points
 };
 
 }  // namespace
@@ -233,7 +235,7 @@ JoinedLines LineJoiner::join(double tolerance, const std::stop_token& stop) cons
   points.unite_odd();
   if (stop.stop_requested()) return {};
   std::vector<Walk::Line> lines;
-  std::vector<Index> numbers(2 * lines_.size(), 0);  // of a group's root, from 1
+  std::vector<Index> numbers(2 * lines_.size(), 0);  // by root of a group, from 1; 0: no number yet
   std::vector<glm::dvec2> places;
   const auto number = [&](Index root) {
     if (numbers[root] == 0) {

@@ -8,34 +8,34 @@
 
 namespace strata::csg {
 
-/// A path whose last line does not lead back to where the first begins.
+/// A path that does not return to its start.
 struct OpenPath {
   glm::dvec2 from{0}, to{0};  ///< its two ends
-  std::uint32_t tag = 0;      ///< of the line at `from`
-  bool is_line = false;       ///< one line alone, which has no area
+  std::uint32_t tag = 0;      ///< tag of the line at `from`
+  bool is_line = false;       ///< the path is a single line, which has no area
 };
 
 struct JoinedLines {
-  /// Paths of at least three points, all meant as closed.
+  /// Paths of at least three points. All of them are to be filled as closed contours.
   std::vector<std::vector<glm::dvec2>> paths;
   std::vector<OpenPath> open;
 };
 
-/// Joins lines at their ends to paths. Which ends are one point depends on the ends alone, not on
-/// the order of the lines, and what is near is so transitively.
+/// Joins lines at their ends into paths. The positions of the ends alone decide which of them are
+/// one point, whatever the order of the lines. Nearness is transitive.
 class LineJoiner {
  public:
-  /// @param reach  how far each end may lie from where it is meant to be
+  /// @param reach  how far each end may lie from its intended position
   /// @param tag  names the line in `OpenPath`
   void add(const glm::dvec2& from, const glm::dvec2& to, double reach, std::uint32_t tag);
   [[nodiscard]] std::size_t size() const { return lines_.size(); }
-  /// Ends are one point when they are closer than `tolerance`. Then ends where an odd number of
-  /// lines ends, at which a path would be open, take in what lies within the reach of both. No
-  /// distance is above 1/1000 of the drawing, `tolerance` not above a millionth: a fine curve must
-  /// not shrink to a point. Paths that begin where a line is alone come first, then those that
-  /// close by themselves. Each line is used once, earlier ones first, as OpenSCAD does: lines drawn
-  /// twice cancel when the paths are filled by the even-odd rule.
-  /// What is left when a stop is asked for counts for nothing.
+  /// Two ends are one point when they are closer than `tolerance`. Then points where an odd number
+  /// of lines ends, at which a path would be open, are united with ends that lie within the sum of
+  /// both reaches. To keep fine curves from shrinking to a point, `tolerance` is limited to 1e-6 of
+  /// the drawing's size and distances to 1/1000 of it.
+  /// Paths that begin at a line's free end come first, then closed paths. Each line is used once,
+  /// earlier lines first, as in OpenSCAD: lines drawn twice cancel when the paths are filled by the
+  /// even-odd rule. After a stop request the result is meaningless.
   [[nodiscard]] JoinedLines join(double tolerance, const std::stop_token& stop = {}) const;
 
  private:

@@ -9,8 +9,8 @@
 
 namespace strata::csg {
 
-/// The readers behind read_outline: from the text of a file; `name` is for messages. Not yet
-/// centred.
+/// The readers behind read_outline(). They parse the text of a file, which messages call `name`.
+/// The result is not centred.
 Result<Outline> read_dxf(std::string_view text, const std::string& name,
                          const OutlineImport& options, const Execution& execution = {},
                          std::vector<std::string>* warnings = nullptr);

@@ -1,5 +1,5 @@
-// Outlines from SVG 1.1. Fill and stroke as OpenSCAD takes them: closed shapes are filled whatever
-// their paint, open lines are bands of their stroke width.
+// Outlines from SVG 1.1. Fill and stroke follow OpenSCAD: closed shapes are filled whatever their
+// paint, open lines become bands of their stroke width.
 #include <fmt/core.h>
 
 #include <optional>
@@ -46,7 +46,7 @@ std::optional<Length> parse_length(std::string_view text) {
   return length;
 }
 
-/// In pixels, for coordinates inside the drawing.
+/// A length in pixels, for coordinates inside the drawing.
 double pixels(const pugi::xml_node& node, const char* name, double fallback = 0) {
   const auto length = parse_length(node.attribute(name).value());
   if (!length) return fallback;
@@ -58,7 +58,8 @@ double pixels(const pugi::xml_node& node, const char* name, double fallback = 0)
   return length->number;
 }
 
-/// A property: of the `style` attribute first, then the attribute itself; empty if neither.
+/// A property: from the `style` attribute, else from the attribute of its name; empty if there is
+/// neither.
 std::string_view property(const pugi::xml_node& node, std::string_view name) {
   std::string_view style = node.attribute("style").value();
   while (!style.empty()) {
@@ -73,7 +74,7 @@ std::string_view property(const pugi::xml_node& node, std::string_view name) {
   return trimmed(node.attribute(std::string(name).c_str()).value());
 }
 
-/// The `transform` attribute: a list of functions, the first outermost.
+/// The `transform` attribute: a list of functions, of which the first is the outermost.
 glm::dmat3 parse_transform(std::string_view text) {
   glm::dmat3 result(1);
   while (true) {
@@ -108,7 +109,7 @@ glm::dmat3 parse_transform(std::string_view text) {
   }
 }
 
-/// From the drawing's coordinates to millimetres, y up.
+/// Maps the drawing's coordinates to millimetres, with y upwards.
 glm::dmat3 page_transform(const pugi::xml_node& svg, double dpi) {
   std::array<double, 4> box{};
   SvgScanner scan(svg.attribute("viewBox").value());
@@ -131,7 +132,7 @@ glm::dmat3 page_transform(const pugi::xml_node& svg, double dpi) {
     return has_box ? view : 0.0;
   };
   const double width = millimetres("width", box[2]), height = millimetres("height", box[3]);
-  // Without a box, a unit of the drawing is a millimetre, whatever the size of the page.
+  // Without a view box a unit of the drawing is a millimetre, whatever the size of the page.
   glm::dvec2 scale(1), shift(0);
   if (has_box) {
     scale = {width / box[2], height / box[3]};
@@ -149,13 +150,13 @@ glm::dmat3 page_transform(const pugi::xml_node& svg, double dpi) {
                align("YMin", "YMax", height - both * box[3])};
     }
   }
-  // OpenSCAD moves the top of the box up, not down, by where it begins; scenes rely on it.
+  // OpenSCAD moves the drawing up, not down, by the y at which the box begins. Scenes rely on it.
   return {{scale.x, 0, 0},
           {0, -scale.y, 0},
           {shift.x - scale.x * box[0], height - shift.y - scale.y * box[1], 1}};
 }
 
-/// What children take over from what holds them.
+/// The properties that children inherit from their parent.
 struct Style {
   double stroke_width = 1;
   StrokeCap cap = StrokeCap::kButt;
@@ -166,7 +167,7 @@ struct Style {
 Style derived(const Style& outer, const pugi::xml_node& node) {
   Style style = outer;
   if (const auto width = parse_length(property(node, "stroke-width"))) {
-    constexpr double kThinnest = 0.01;  // thinner ones are drawn with 1, as OpenSCAD does
+    constexpr double kThinnest = 0.01;  // thinner strokes are drawn with width 1, as in OpenSCAD
     style.stroke_width = width->number < kThinnest ? 1 : width->number;
   }
   const std::string_view cap = property(node, "stroke-linecap");
@@ -221,7 +222,7 @@ class Reader {
   static std::string_view local_name(const pugi::xml_node& node) {
     std::string_view name = node.name();
     if (const std::size_t colon = name.find(':'); colon != std::string_view::npos) {
-      if (name.substr(0, colon) != "svg") return {};  // of another language
+      if (name.substr(0, colon) != "svg") return {};  // another XML namespace
       name.remove_prefix(colon + 1);
     }
     return name;
@@ -245,7 +246,8 @@ class Reader {
 
   Result<void> index_ids(const pugi::xml_node& root) {
     pugi::xml_node node = root;
-    // In document order without recursion: depth is checked where elements are drawn.
+    // Visits elements in document order without recursion. The nesting depth is checked where
+    // elements are drawn.
     while (node) {
       if (const auto id = node.attribute("id")) ids_.try_emplace(id.value(), node);
       if (node.first_child()) {
@@ -276,7 +278,7 @@ class Reader {
         drawing_ = found_ = true;
       }
     }
-    // Something that is asked for by name is shown even where the file hides it.
+    // An element that is requested by its id is shown even if the file hides it.
     const bool asked_for = drawing_ && !was_drawing;
     Result<void> done;
     if (property(node, "display") != "none" || asked_for) {
@@ -347,7 +349,7 @@ class Reader {
     }
     Outline filled;
     for (SvgLine& line : lines) {
-      // A path that ends where it began counts as closed.
+      // A path whose end lies this close to its start counts as closed.
       constexpr double kCloses = 0.1;
       const bool meets = name == "path" && line.points.size() > 2 &&
                          glm::length(line.points.back() - line.points.front()) <= kCloses;
@@ -402,7 +404,7 @@ class Reader {
   std::map<std::string, pugi::xml_node, std::less<>> ids_;
   std::vector<Outline> shapes_;
   std::size_t elements_ = 0;
-  bool drawing_ = true;  ///< inside of what was asked for
+  bool drawing_ = true;  ///< inside the requested element
   bool found_ = false;
 };
 

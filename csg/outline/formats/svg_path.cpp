@@ -41,7 +41,7 @@ bool SvgScanner::number_follows() { return !at_end() && starts_number(text_[at_]
 bool SvgScanner::number(double& value) {
   if (!number_follows()) return false;
   const std::size_t from = at_ + (text_[at_] == '+' ? 1 : 0);
-  if (from < text_.size() && is_letter(text_[from])) return false;  // no "inf", no "nan"
+  if (from < text_.size() && is_letter(text_[from])) return false;  // neither inf nor nan
   const char* last = text_.data() + text_.size();
   const auto [end, error] = std::from_chars(text_.data() + from, last, value);
   constexpr double kLargest = 1e100;
@@ -115,7 +115,7 @@ class PathReader {
                                                         : kLeast);
   }
 
-  /// SVG 1.1, appendix F.6: from end points to centre.
+  /// SVG 1.1, appendix F.6: converts an arc from end points to centre parameters.
   void arc(glm::dvec2 radius, double rotation, bool large, bool sweep, const glm::dvec2& to) {
     const glm::dvec2 from = here_;
     radius = glm::abs(radius);
@@ -123,7 +123,7 @@ class PathReader {
     if (radius.x == 0 || radius.y == 0) return line_to(to);
     const double c = cos_degrees(rotation), s = sin_degrees(rotation);
     const glm::dvec2 half = (from - to) / 2.0;
-    // In the frame of the ellipse, scaled to a unit circle.
+    // Coordinates in the frame of the ellipse, scaled so that the ellipse is a unit circle.
     glm::dvec2 p = glm::dvec2(c * half.x + s * half.y, -s * half.x + c * half.y) / radius;
     const double square = glm::dot(p, p);
     if (square > 1) radius *= std::sqrt(square), p /= std::sqrt(square);
@@ -146,14 +146,14 @@ class PathReader {
     }
   }
 
-  /// One set of arguments of the command.
+  /// Reads one set of arguments of the command.
   bool step(bool fresh) {
     const char kind = static_cast<char>(command_ | 0x20);
-    if (kind != 'm' && kind != 'z' && lines_.empty()) return false;  // it begins with a move
+    if (kind != 'm' && kind != 'z' && lines_.empty()) return false;  // path data begins with a move
     glm::dvec2 b(0), c(0), d(0);
     switch (kind) {
       case 'z':
-        if (!fresh) return false;  // numbers after a close
+        if (!fresh) return false;  // numbers after a close command are an error
         if (!lines_.empty()) {
           lines_.back().closed = true;
           auto& points = lines_.back().points;

@@ -10,22 +10,22 @@
 namespace strata::csg {
 
 struct SvgLine {
-  std::vector<glm::dvec2> points;  ///< the first is not repeated at the end
+  std::vector<glm::dvec2> points;  ///< the last point does not repeat the first
   bool closed = false;
 };
 
-/// Reads numbers, commands and flags as the grammar of SVG path data and lists of points has them:
-/// `1.5.5-3` are three numbers.
+/// Reads numbers, commands and flags by the grammar of SVG path data and point lists. `1.5.5-3` is
+/// three numbers.
 class SvgScanner {
  public:
   explicit SvgScanner(std::string_view text) : text_(text) {}
   [[nodiscard]] bool at_end();
-  /// The next letter, or 0 if a number or the end comes.
+  /// Reads the next letter. Returns 0 if a number or the end follows.
   char letter();
-  /// False when no finite number comes.
+  /// @return false when no finite number follows
   bool number(double& value);
   bool flag(bool& value);
-  /// Whether a number comes.
+  /// Whether a number follows.
   bool number_follows();
   [[nodiscard]] std::size_t position() const { return at_; }
 
@@ -35,8 +35,9 @@ class SvgScanner {
   std::size_t at_ = 0;
 };
 
-/// The lines of path data (SVG 1.1, chapter 8); curves are cut as OpenSCAD cuts them, and not more
-/// coarsely than `segments`. `error` gets what is wrong, and where; what comes before is kept.
+/// The lines of path data (SVG 1.1, chapter 8). Curves are divided as in OpenSCAD, but not more
+/// coarsely than `segments`. `error` gets the first fault and its place; the lines before it are
+/// kept.
 std::vector<SvgLine> svg_path_lines(std::string_view data, const Segments& segments,
                                     std::string& error);
 
