@@ -18,52 +18,52 @@
 namespace strata::csg {
 namespace {
 
-/// Sides of a measured box are no less than this part of the longest.
+/// Least side of a measured box, as a part of its longest side.
 constexpr double kThinnest = 1e-9;
 constexpr int kFirstResolution = 256;
 constexpr int kLastResolution = 1024;
-/// More are not asked for without being told to: a second of work.
+/// Most crossings that a measurement uses unless a resolution is given: a second of work.
 constexpr std::uint64_t kMostCrossings = 16'000'000;
-/// Of the volume: a bound worse than this asks for more rays.
+/// A volume bound worse than this part of the volume asks for more rays.
 constexpr double kGoodBound = 1e-3;
 
-/// A triangle as rays along one axis see it.
+/// A triangle as seen by rays along one axis.
 struct Face {
-  float slope_u = 0;                 ///< lattice steps of depth for one along u
-  float slope_v = 0;                 ///< the same along v
+  float slope_u = 0;                 ///< change of depth per lattice step along u
+  float slope_v = 0;                 ///< change of depth per lattice step along v
   float facing = 0;                  ///< |cosine| between the normal and the ray
   std::int32_t least = 0, most = 0;  ///< depths, lattice steps
   std::uint32_t solid = 0;
 };
 
-/// A crossing as the sums need it.
+/// A crossing with the data that the sums need.
 struct Crossing {
-  double depth = 0;  ///< lattice steps, the middle of the step
+  double depth = 0;  ///< lattice steps; the middle of the depth step
   const Face* face = nullptr;
   bool exit = false;
 };
 
-/// Length inside along one ray, and how it changes to its neighbours.
+/// The length inside the result along one ray, and its slopes towards the neighbouring rays.
 struct Column {
-  double length = 0, slope_u = 0, slope_v = 0;  ///< voxels; voxels a voxel
+  double length = 0, slope_u = 0, slope_v = 0;  ///< voxels; slopes are voxels per voxel
   std::uint32_t count = 0;                      ///< crossings
 };
 
-/// What lists along the three axes add up to, in voxels of the grid.
+/// Sums over the depth lists along the three axes, in voxels of the grid.
 class Sums {
  public:
   Sums(const SolidLists& lists, const LatticeMesh& mesh, const VoxelGrid& grid, double world_error)
       : lists_(&lists), mesh_(&mesh), grid_(&grid), world_error_(world_error) {}
 
   void add(Axis axis, const LayeredDepthImage& image);
-  /// @param outer  a box that the result lies in
+  /// @param outer  a box that contains the result
   [[nodiscard]] Measures finish() const;
-  /// World space; of the crossings.
+  /// The box of all crossings, world space.
   [[nodiscard]] Bounds crossed() const;
 
  private:
   void see_faces(const AxisFrame& frame);
-  /// How far a face may be from where it was met, lattice steps (law 5).
+  /// How far a face may be from the measured crossing, lattice steps (law 5).
   [[nodiscard]] double tolerance(const Crossing& one) const;
   void leave_out_films();
   void add_column(const AxisFrame& frame, int u, int v);
@@ -71,8 +71,8 @@ class Sums {
   const SolidLists* lists_;
   const LatticeMesh* mesh_;
   const VoxelGrid* grid_;
-  double world_error_;     ///< of the faces, world units
-  double axis_error_ = 0;  ///< the same along the rays, lattice steps
+  double world_error_;     ///< position error of the faces, world units
+  double axis_error_ = 0;  ///< the same error along the rays, lattice steps
 
   std::vector<Face> faces_;
   std::vector<Crossing> list_;
@@ -81,12 +81,12 @@ class Sums {
   glm::dvec3 low_{std::numeric_limits<double>::infinity()};
   glm::dvec3 high_{-std::numeric_limits<double>::infinity()};
   double volumes_[3] = {}, errors_[3] = {};  ///< cubic voxels
-  double half_areas_[2] = {};                ///< world
-  glm::dvec3 projected_{0};  ///< world area of the surface as it is seen along an axis, all layers
+  double half_areas_[2] = {};  ///< world units; columns of the two colours of a chessboard
+  glm::dvec3 projected_{0};  ///< world area of all layers of the surface, projected along each axis
   double outlines_ = 0;      ///< world area of cells where the number of layers changes
   glm::dvec3 moment_{0};
-  // Where the columns stand that hold some of the result, and its first moment about them: for an
-  // axis whose own rays pass a thin result by.
+  // The extent and the first moment of the columns that hold some of the result. They serve for an
+  // axis whose own rays miss a thin result.
   glm::dvec3 column_low_{low_}, column_high_{high_}, column_moment_{0}, column_weight_{0};
   std::uint64_t crossings_ = 0, most_ = 0;
 };
@@ -102,12 +102,12 @@ void Sums::see_faces(const AxisFrame& frame) {
     face = {};
     face.solid = lists_->solid_of(static_cast<std::uint32_t>(i));
     std::tie(face.least, face.most) = std::minmax({a[frame.w], b[frame.w], c[frame.w]});
-    const glm::dvec3 across = glm::cross(glm::dvec3(b - a), glm::dvec3(c - a));  // of the lattice
+    const glm::dvec3 across = glm::cross(glm::dvec3(b - a), glm::dvec3(c - a));  // lattice units
     if (across[frame.w] != 0.0) {
       face.slope_u = static_cast<float>(-across[frame.u] / across[frame.w]);
       face.slope_v = static_cast<float>(-across[frame.v] / across[frame.w]);
     }
-    // Normals turn the other way round than lengths where voxels are no cubes.
+    // Where voxels are not cubes, normals scale inversely to lengths.
     const glm::dvec3 normal = across / grid_->voxel_size;
     const double size = glm::length(normal);
     if (size > 0) face.facing = static_cast<float>(std::abs(normal[frame.w]) / size);
@@ -115,15 +115,16 @@ void Sums::see_faces(const AxisFrame& frame) {
 }
 
 double Sums::tolerance(const Crossing& one) const {
-  // As Coincidence::bound(): the floor, the snap of the vertices, no farther than the triangle is.
+  // The bound is that of Coincidence::bound(): the rounding of depths and vertices, but no more
+  // than the triangle's own extent.
   const Face& face = *one.face;
   const double slopes = 0.5 * (std::abs(face.slope_u) + std::abs(face.slope_v));
   const double reach = std::max({one.depth - face.least, face.most - one.depth, 0.0});
   return 1.5 + std::min(slopes, reach) + axis_error_;
 }
 
-/// Takes out neighbours that coincide: an entry and the exit of another solid, a film; or an exit
-/// and another solid's entry, a slit.
+/// Removes neighbouring crossings that coincide: a film (an entry and another solid's exit) or a
+/// slit (an exit and another solid's entry).
 void Sums::leave_out_films() {
   std::size_t kept = 0;
   for (const Crossing& next : list_) {
@@ -153,8 +154,8 @@ void Sums::add_column(const AxisFrame& frame, int u, int v) {
     column.slope_u += sign * one.face->slope_u;
     column.slope_v += sign * one.face->slope_v;
     first_moment += sign * depth * depth / 2;
-    // A crossing stands for an area of cell / facing; weighted by facing^2 the three axes add up
-    // to the area itself.
+    // A crossing represents an area of cell / facing. Weighted by facing^2, the contributions of
+    // the three axes add up to the area.
     half_areas_[(u + v) % 2] += cell * one.face->facing;
     low_[frame.w] = std::min(low_[frame.w], depth);
     high_[frame.w] = std::max(high_[frame.w], depth);
@@ -179,7 +180,8 @@ void Sums::add(Axis axis, const LayeredDepthImage& image) {
   row_.assign(static_cast<std::size_t>(image.width), {});
   above_ = row_;
   const double cell = grid_->voxel_size[frame.u] * grid_->voxel_size[frame.v];
-  // Halfway between two rays, told from both. Half a cell may be either's.
+  // Compares the lengths halfway between two rays, extrapolated from both. Half a cell may belong
+  // to either.
   const auto compare = [&](const Column& a, const Column& b, double slope_a, double slope_b) {
     const double ahead = a.length + slope_a / 2, back = b.length - slope_b / 2;
     const bool alike = a.count == b.count;
@@ -227,7 +229,8 @@ Measures Sums::finish() const {
   const glm::dvec3& step = grid_->voxel_size;
   const double cube = step.x * step.y * step.z;
   const double snap = glm::dot(projected_, step) / (2.0 * kLatticeSteps) / cube;
-  // An axis counts by how sure it is; not if all its rays pass by what others meet.
+  // Axes are weighted by the inverse square of their error. An axis whose rays all miss what others
+  // meet does not count.
   double weight = 0;
   for (int i = 0; i < 3; ++i) {
     if (!(volumes_[i] > 0)) continue;
@@ -239,8 +242,8 @@ Measures Sums::finish() const {
   }
   result.volume /= weight;
   result.volume_error /= weight;
-  // Where the axes contradict each other, some rays have passed by what others meet: any of the
-  // axes may be the right one.
+  // If the axes contradict each other, some rays have missed parts that others meet. Any of the
+  // axes may be right.
   double farthest = 0;
   bool contradict = false;
   for (int i = 0; i < 3; ++i) {
@@ -263,9 +266,9 @@ Measures Sums::finish() const {
   return result;
 }
 
-/// As many voxels along each side: thin plates and rods are measured as well as cubes. A voxel of
-/// room all around, so that no depth of the result is clamped. The solids may reach out: there
-/// nothing of the result is.
+/// A grid with the same number of voxels along each side, so that thin plates and rods are measured
+/// as well as cubes. One voxel of room on each side keeps the result's depths from being clamped.
+/// Solids may reach beyond the grid, where nothing belongs to the result.
 VoxelGrid grid_around(const Bounds& box, int resolution) {
   const glm::dvec3 extent = box.high - box.low;
   const double longest = std::max({extent.x, extent.y, extent.z});
@@ -276,7 +279,8 @@ VoxelGrid grid_around(const Bounds& box, int resolution) {
   return grid;
 }
 
-/// The part of the whole that one of several runs is, each with four times the rays.
+/// The share of the whole progress that one run has. Each run has four times the rays of the one
+/// before.
 struct Share {
   double begin = 0, length = 1;
 };
@@ -294,16 +298,16 @@ class Measurer {
 
  private:
   Result<Measures> once(int resolution, const Share& share);
-  /// The sides, and how far they may be off. Vertices count where the result reaches them.
+  /// Sets the sides of the box and their error. Vertices count where the result reaches them.
   void settle_bounds(const VoxelGrid& grid, Bounds crossed, Measures& result) const;
 
   const Tree* tree_;
   Tree::NodeId root_;
   const Execution* execution_;
   Geometry geometry_;
-  Bounds outer_;      ///< the result lies in it
-  Bounds box_;        ///< what is measured
-  double error_ = 0;  ///< of the faces, world units
+  Bounds outer_;      ///< a box that contains the result
+  Bounds box_;        ///< the box that is measured
+  double error_ = 0;  ///< position error of the faces, world units
 };
 
 Result<Measures> Measurer::once(int resolution, const Share& share) {
@@ -332,7 +336,8 @@ Result<Measures> Measurer::once(int resolution, const Share& share) {
 }
 
 void Measurer::settle_bounds(const VoxelGrid& grid, Bounds crossed, Measures& result) const {
-  // A crossing is known to two lattice steps, and never outside what holds the result.
+  // A crossing is known to two lattice steps. No side lies outside the box that contains the
+  // result.
   const glm::dvec3 step = grid.voxel_size * (2.0 / kLatticeSteps);
   crossed.low = glm::clamp(crossed.low, outer_.low, outer_.high);
   crossed.high = glm::clamp(crossed.high, outer_.low, outer_.high);
@@ -369,12 +374,12 @@ Result<Measures> Measurer::run(const MeasureOptions& options) {
   for (int resolution = kFirstResolution;; resolution *= 2) {
     auto next = once(resolution, {begin, length});
     if (!next) {
-      // What there is will do where memory does not suffice for more.
+      // If memory does not suffice for more rays, the previous result is returned.
       if (next.error().code == ErrorCode::kLimit && !result.empty) return result;
       return next;
     }
     result = *next;
-    // Small parts far apart may lie between all rays.
+    // An empty result is not final while small parts far apart may lie between the rays.
     const bool done =
         result.empty ? box->empty() : result.volume_error <= kGoodBound * result.volume;
     if (done) return result;

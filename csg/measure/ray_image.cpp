@@ -19,14 +19,14 @@
 namespace strata::csg {
 namespace {
 
-/// All solids in one view as one mesh.
+/// All solids in one view, as one mesh.
 struct Lists {
-  std::vector<ViewPart> parts;          ///< of each solid
-  std::vector<std::uint32_t> solid_of;  ///< of each triangle
+  std::vector<ViewPart> parts;          ///< the view of each solid
+  std::vector<std::uint32_t> solid_of;  ///< the solid of each triangle
   LayeredDepthImage image;
 };
 
-/// Walks the lists of one view; scratch of one thread.
+/// Walks the depth lists of one view. One object serves one thread.
 class RayWalk {
  public:
   RayWalk(const Program& program, const Geometry& geometry, const Lists& lists, const View& view,
@@ -35,7 +35,8 @@ class RayWalk {
     const glm::dmat4 image_from_eye = view.image_from_world * glm::inverse(view.eye_from_world);
     scale_ = image_from_eye[0][0];
     const double pixels = std::max(std::abs(image_from_eye[0][0]), std::abs(image_from_eye[1][1]));
-    // World units along the axis that count as nothing: constant, and a unit of distance.
+    // Lengths along the view axis that count as nothing, in world units: a constant and a multiple
+    // of the distance.
     const double tenth = 0.1 / pixels;
     slack_ = world_error + (view.perspective ? 0.0 : tenth);
     slack_per_distance_ = view.perspective ? tenth : 0.0;
@@ -47,12 +48,12 @@ class RayWalk {
     gather(items);
   }
 
-  /// Crossings with the first `counted` solids that lie in none of the others.
+  /// Counts the crossings with the first `counted` solids that lie in none of the other solids.
   std::uint32_t crossings(std::size_t counted) {
     if (counted >= lists_->parts.size()) return static_cast<std::uint32_t>(items_.size());
     within_.assign(lists_->parts.size() - counted, 0);
     std::uint32_t count = 0;
-    int around = 0;  // others that the ray is in
+    int around = 0;  // number of the other solids that the ray is in
     std::size_t next = 0;
     for (const DepthItem item : items_) {
       if (lists_->solid_of[item.triangle()] >= counted) continue;
@@ -60,7 +61,7 @@ class RayWalk {
         const Transition& transition = transitions_[next];
         if (transition.solid < counted) continue;
         std::uint8_t& within = within_[transition.solid - counted];
-        // A face where the section begins is still there.
+        // A face at the depth where a section begins still counts.
         if (within == 0 && transition.depth == item.depth()) break;
         within ^= 1;
         around += within != 0 ? 1 : -1;
@@ -70,7 +71,7 @@ class RayWalk {
     return count;
   }
 
-  /// The first interval's length along the ray of pixel (u, v).
+  /// The length of the first interval inside the tree, along the ray of pixel (u, v).
   float thickness(int u, int v) {
     double begin = -1, end = -1;
     bool inside = state_.value();
@@ -84,7 +85,7 @@ class RayWalk {
       const double distance = view_->distance(depth);
       const double nothing = slack_ + slack_per_distance_ * distance + step(depth);
       if (!inside) {
-        // A gap that is none goes on with what came before; beyond a real one the walk is done.
+        // A negligible gap joins the next interval to the first; a larger gap ends the walk.
         if (end >= 0 && distance - end > nothing) break;
         if (end < 0) begin = distance;
         end = -1;
@@ -103,11 +104,11 @@ class RayWalk {
   }
 
  private:
-  /// World length of three depth steps.
+  /// The world length of three depth steps.
   [[nodiscard]] double step(std::uint32_t depth) const {
     return 3.0 * (view_->distance(depth + 1.0) - view_->distance(depth));
   }
-  /// Length along the ray of a unit along the view axis.
+  /// The length along the ray per unit of length along the view axis.
   [[nodiscard]] double slant(int u, int v) const {
     if (!view_->perspective) return 1.0;
     const double x = (u + 0.5 - view_->size.x / 2.0) / scale_;
@@ -140,7 +141,7 @@ class RayWalk {
   std::span<const DepthItem> items_;
   std::vector<DepthItem> sorted_;
   std::vector<Transition> transitions_;
-  std::vector<std::uint8_t> within_;  ///< each solid that is not counted
+  std::vector<std::uint8_t> within_;  ///< whether the ray is in each solid that is not counted
 };
 
 }  // namespace

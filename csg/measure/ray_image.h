@@ -12,32 +12,33 @@
 
 namespace strata::csg {
 
-/// What the rays of a view meet in a tree, row by row from the top.
+/// What the rays of a view meet in a tree; row by row, the top row first.
 struct RayImage {
   int width = 0, height = 0;
-  /// World length of the material behind the visible surface, along the ray: of the first interval
-  /// that lies inside the tree. 0 where the ray misses; infinity where it does not come out again.
+  /// World length along the ray of the first interval inside the tree: the material behind the
+  /// visible surface. 0 where the ray misses; infinity where it does not leave the tree again.
   std::vector<float> thickness;
-  /// Crossings with the solids of the tree, whether they show or not: depth complexity.
+  /// The depth complexity: crossings with the solids of the tree, visible or not.
   std::vector<std::uint32_t> crossings;
   std::uint64_t fragments = 0;  ///< sum of crossings
 };
 
-/// Measures along the rays of a tree, in one view after another. Draws every crossing of every
-/// solid into the HA-buffer and walks the lists; nothing is culled.
+/// Measures along the rays of a tree, in one view after another. It draws every crossing of every
+/// solid into the HA-buffer and walks the lists, without culling.
 class RayMeter {
  public:
-  /// Keeps the tree's meshes alive. @param relative_precision as Preview has it
-  /// @param counted crossings are counted with so many of the tree's first solids, and outside of
-  /// all others: those are sections, which take away and are nothing themselves
+  /// Keeps the tree's meshes alive.
+  /// @param relative_precision  as for Preview
+  /// @param counted  counts only crossings of this many first solids. The remaining solids are
+  /// section cutters; crossings inside them are skipped
   RayMeter(const Tree& tree, Tree::NodeId root, double relative_precision,
            const Execution& execution = {}, std::size_t counted = SIZE_MAX);
   ~RayMeter();
   RayMeter(RayMeter&&) noexcept;
   RayMeter& operator=(RayMeter&&) noexcept;
 
-  /// Intervals and gaps that faces which coincide would leave (a tenth of a pixel, the scene's own
-  /// digits) are none. @return kGeometry, kLimit, kCancelled
+  /// Intervals and gaps shorter than a tenth of a pixel or than the scene's precision are ignored:
+  /// coinciding faces make such intervals. @return kGeometry, kLimit, kCancelled
   Result<RayImage> measure(const View& view, const Execution& execution = {}) const;
 
  private:

@@ -15,17 +15,17 @@
 namespace strata::csg {
 namespace {
 
-/// Points that stand for a side: the result reaches it while one of them is in the result.
+/// Number of witness points for a side. The result reaches the side while it holds one of them.
 constexpr std::size_t kWitnesses = 4;
 
-/// A box that the result of a node lies in, and for each side (low x, y, z, high x, y, z) points of
-/// the result that lie there. A side without any may be cut off.
+/// A box that contains the result of a node. Each side (low x, y, z, high x, y, z) has witnesses:
+/// points of the result that lie on the side. The result may not reach a side without witnesses.
 struct Reach {
   Bounds box;
   std::array<std::vector<glm::dvec3>, 6> witnesses;
 };
 
-/// The less, the farther out.
+/// The position of a side; a smaller value is farther out.
 double side(const Bounds& box, std::size_t i) {
   return i < 3 ? box.low[static_cast<int>(i)] : -box.high[static_cast<int>(i) - 3];
 }
@@ -43,7 +43,8 @@ Reach reach_of(const Solid& solid) {
       const glm::dvec3 p(place * glm::dvec4(solid.mesh->positions[triangle[k]], 1.0));
       for (std::size_t i = 0; i < 6; ++i) {
         if (!reaches(i, p)) continue;
-        // Of the many points of a round face, the outermost in each of four directions.
+        // A round face has many points on a side. The outermost in each of four directions are
+        // kept.
         auto& points = reach.witnesses[i];
         points.resize(kWitnesses, p);
         const int u = static_cast<int>(i + 1) % 3, v = static_cast<int>(i + 2) % 3;
@@ -82,7 +83,7 @@ void unite(Reach& reach, const Reach& one) {
 }
 
 Reach reach_of(const Tree& tree, Tree::NodeId root) {
-  std::vector<Reach> all(root + 1);  // operands stand before the nodes that take them
+  std::vector<Reach> all(root + 1);  // operands come before the nodes that use them
   std::vector<Bounds> solids(tree.solids().size());
   for (Tree::NodeId id = 0; id <= root; ++id) {
     Reach& reach = all[id];
@@ -114,7 +115,7 @@ Reach reach_of(const Tree& tree, Tree::NodeId root) {
     if (!glm::all(glm::lessThanEqual(reach.box.low, reach.box.high))) reach = {};
   }
   Reach& result = all[root];
-  // Of vast solids it knows what is left.
+  // bounds() also accounts for vast solids that are cut down.
   const Bounds left = bounds(tree, root, solids);
   for (std::size_t i = 0; i < 6; ++i) {
     if (side(left, i) != side(result.box, i)) result.witnesses[i].clear();
@@ -125,7 +126,7 @@ Reach reach_of(const Tree& tree, Tree::NodeId root) {
 
 enum class Side : std::uint8_t { kOutside, kInside, kUnknown };
 
-/// The square of the distance of `p` from a triangle.
+/// The square of the distance from `p` to a triangle.
 double distance_squared(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b,
                         const glm::dvec3& c) {
   const glm::dvec3 n = glm::cross(b - a, c - a);
@@ -146,7 +147,8 @@ double distance_squared(const glm::dvec3& p, const glm::dvec3& a, const glm::dve
   return height * height / area;
 }
 
-/// Where a point is of a solid: by the winding along a ray in no special direction.
+/// The side of a solid's surface that a point is on, by the winding number along a ray in a generic
+/// direction.
 Side side_of(const glm::dvec3& p, const Geometry::Part& part, double tolerance) {
   const glm::dvec3 along(0.5321348901, 0.3178562391, 0.7847112345);
   const glm::dvec3 room(tolerance);
@@ -155,7 +157,7 @@ Side side_of(const glm::dvec3& p, const Geometry::Part& part, double tolerance) 
   for (const glm::uvec3& t : part.triangles) {
     const glm::dvec3 &a = part.positions[t.x], &b = part.positions[t.y], &c = part.positions[t.z];
     const glm::dvec3 low = glm::min(glm::min(a, b), c), high = glm::max(glm::max(a, b), c);
-    if (glm::any(glm::lessThan(high + room, p))) continue;  // all behind the ray's beginning
+    if (glm::any(glm::lessThan(high + room, p))) continue;  // the solid is behind the start
     if (glm::all(glm::lessThanEqual(low - room, p)) &&
         distance_squared(p, a, b, c) <= tolerance * tolerance) {
       return Side::kUnknown;
@@ -167,13 +169,14 @@ Side side_of(const glm::dvec3& p, const Geometry::Part& part, double tolerance) 
     const double u = glm::dot(to, q) / area;
     const double v = glm::dot(along, glm::cross(to, b - a)) / area;
     if (u < 0 || v < 0 || u + v > 1) continue;
-    if (glm::dot(c - a, glm::cross(to, b - a)) / area <= 0) continue;  // behind
+    if (glm::dot(c - a, glm::cross(to, b - a)) / area <= 0) continue;  // behind the start
     winding += glm::dot(n, along) > 0 ? 1 : -1;
   }
   return is_inside(part.rule, winding) ? Side::kInside : Side::kOutside;
 }
 
-/// The tree's value where some solids are not known. O(nodes), without recursion.
+/// Evaluates the tree with three values, where some solids are unknown. O(nodes), without
+/// recursion.
 Side value_of(const Tree& tree, Tree::NodeId root, const std::vector<Side>& solids) {
   std::vector<Side> values(root + 1);
   for (Tree::NodeId id = 0; id <= root; ++id) {
@@ -184,7 +187,7 @@ Side value_of(const Tree& tree, Tree::NodeId root, const std::vector<Side>& soli
     }
     const auto operands = tree.operands(id);
     const bool unites = node.operation == Operation::kUnion;
-    // What decides by itself; the others must all say the opposite.
+    // One operand with this value decides; otherwise all operands must have the opposite value.
     const Side decisive = unites ? Side::kInside : Side::kOutside;
     const Side otherwise = unites ? Side::kOutside : Side::kInside;
     Side value = operands.empty() ? Side::kOutside : otherwise;
@@ -204,8 +207,8 @@ Side value_of(const Tree& tree, Tree::NodeId root, const std::vector<Side>& soli
 
 Bounds reached_vertices(const Tree& tree, Tree::NodeId root, const Geometry& geometry,
                         const Bounds& known, double tolerance) {
-  constexpr std::size_t kMostVertices = 64;             // of a side
-  constexpr std::uint64_t kMostTriangles = 50'000'000;  // looked at in all
+  constexpr std::size_t kMostVertices = 64;             // for each side
+  constexpr std::uint64_t kMostTriangles = 50'000'000;  // visited in total
   struct Candidate {
     glm::dvec3 point;
     std::uint32_t solid;
@@ -217,7 +220,7 @@ Bounds reached_vertices(const Tree& tree, Tree::NodeId root, const Geometry& geo
   const Bounds outer = bounds(tree, root);
   std::uint64_t looked_at = 0;
   std::vector<Side> sides(parts.size(), Side::kOutside);
-  // Of the vertices those that a triangle has.
+  // Only vertices that a triangle uses count.
   std::vector<std::vector<bool>> used(parts.size());
   for (std::size_t solid = 0; solid < parts.size(); ++solid) {
     used[solid].resize(parts[solid].positions.size(), false);
@@ -252,7 +255,7 @@ Bounds reached_vertices(const Tree& tree, Tree::NodeId root, const Geometry& geo
     for (auto at = candidates.begin(); at != middle && looked_at < kMostTriangles; ++at) {
       for (std::size_t solid = 0; solid < parts.size(); ++solid) {
         if (solid == at->solid) {
-          sides[solid] = Side::kInside;  // the points of it that lie close to the vertex
+          sides[solid] = Side::kInside;  // some points near the vertex lie inside its own solid
           continue;
         }
         sides[solid] = side_of(at->point, parts[solid], tolerance);
@@ -275,7 +278,8 @@ Result<Bounds> result_bounds(const Tree& tree, Tree::NodeId node, double relativ
                                     [](const auto& points) { return points.empty(); })) {
     return outer;
   }
-  // The other sides are looked at from outside: what is nearest there is the side.
+  // Renders a view of each remaining side from outside. The nearest depth is the position of the
+  // side.
   constexpr int kPixels = 256;
   Tree opaque = tree;
   opaque.set_root(node);
@@ -299,7 +303,8 @@ Result<Bounds> result_bounds(const Tree& tree, Tree::NodeId node, double relativ
     const std::uint32_t nearest = *std::min_element(depths.begin(), depths.end());
     if (nearest == SurfaceImage::kNone) return Bounds{};
     const double height = camera.distance - view->distance(nearest + 0.5);
-    // Near the operands' box it is likelier that just no ray has met the outermost point.
+    // A position within two pixels of the operands' box is taken as the box's side: probably no ray
+    // has met the outermost point.
     const double pixel = glm::length(outer.high - outer.low) / kPixels;
     const double most = 0.5 * (outer.high[axis] - outer.low[axis]);
     if (height > most - 2 * pixel) continue;

@@ -7,19 +7,19 @@
 
 namespace strata::csg {
 
-/// The box around the result of `node`, not only around its operands: what a difference cuts off
-/// does not count. Sides that corners of the operands do not settle are looked at from outside, on
-/// 256 x 256 rays.
-/// @param relative_precision as Preview has it
+/// The box around the result of `node`, not around its operands: parts that a difference removes do
+/// not count. Sides that no vertex of the operands proves are measured from outside with 256 x 256
+/// rays.
+/// @param relative_precision  as for Preview
 /// @return as Preview::draw()
 Result<Bounds> result_bounds(const Tree& tree, Tree::NodeId node, double relative_precision = 0,
                              const Execution& execution = {});
 
-/// A box around vertices of the solids that lie outside of `known` and that the result of `root`
-/// reaches: close to each there are points of the result. Of each side the outermost vertices are
-/// tried, until one is reached; one that lies within `tolerance` of another solid's surface is not
-/// known to be. Empty where there is none.
-/// @param geometry  of `tree`
+/// A box around vertices outside of `known` that the result of `root` reaches, which means that
+/// points of the result lie arbitrarily close to them. The outermost vertices of each side are
+/// tried until the result reaches one. A vertex within `tolerance` of another solid's surface
+/// counts as not reached. Empty where there is none.
+/// @param geometry  the geometry of `tree`
 [[nodiscard]] Bounds reached_vertices(const Tree& tree, Tree::NodeId root, const Geometry& geometry,
                                       const Bounds& known, double tolerance);
 

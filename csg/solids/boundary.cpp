@@ -17,7 +17,7 @@
 namespace strata::csg {
 namespace {
 
-/// The part of a tree below one node, ready to be cut.
+/// The subtree below one node, with its leaves prepared for sections.
 class Cutter {
  public:
   Cutter(const Tree& tree, Tree::NodeId root) : tree_(tree) {
@@ -42,12 +42,12 @@ class Cutter {
 
   [[nodiscard]] std::span<const Leaf> leaves() const { return leaves_; }
   [[nodiscard]] double scale() const { return scale_; }
-  /// Vertices nearer to a plane lie in it. Corners of one polygon are off by some 1e-15 of the
-  /// scale, and by more, seen from the plane of a small triangle; corners that were stored as float
-  /// or with six digits are off by more than 1e-8, and their planes differ.
+  /// Vertices nearer to a plane than this lie in it. Rounding moves the corners of one polygon by
+  /// some 1e-15 of the scale, and by more relative to the plane of a small triangle. Corners that
+  /// were stored as float or with six digits differ by more than 1e-8, and so do their planes.
   [[nodiscard]] double tolerance() const { return 1e-10 * scale_; }
 
-  /// @param steps  grows by the work that was done
+  /// @param steps  is increased by the work done
   [[nodiscard]] Outline section(const Plane& plane, Side side, std::uint64_t& steps,
                                 OutlineJob* job = nullptr) const {
     std::vector<Outline> results(reached_.size());
@@ -81,25 +81,25 @@ class Cutter {
         results[i] = subtract(operands, job);
       }
     }
-    return std::move(results.back());  // the root stands last
+    return std::move(results.back());  // the root is the last node
   }
 
  private:
   const Tree& tree_;
-  std::vector<Tree::NodeId> reached_;  // sorted
+  std::vector<Tree::NodeId> reached_;  // nodes below the root, sorted
   std::vector<std::size_t> leaf_of_;
   std::vector<Leaf> leaves_;
   double scale_ = 0.0;
 };
 
-/// Planes, each once. They are found again by their numbers, rounded to a grid much coarser than
-/// the tolerance: a plane near the border of a cell is looked for in the next cell too.
+/// A set of distinct planes. A plane is looked up by its four coefficients, rounded to a grid much
+/// coarser than the tolerance; near the border of a cell the neighbouring cells are searched too.
 class Planes {
  public:
   explicit Planes(const Cutter& cutter)
       : tolerance_(cutter.tolerance()), grain_{1e-6, 1e-6, 1e-6, 1e-6 * cutter.scale()} {}
 
-  /// Adds the plane of a triangle, or the triangle to a plane that it lies in.
+  /// Widens the window of the plane that holds the triangle, or adds that plane.
   void add(const std::array<glm::dvec3, 3>& corners, const glm::dvec3& normal) {
     Cell low{}, step{};
     const std::array<double, 4> numbers{normal.x, normal.y, normal.z, glm::dot(normal, corners[0])};
@@ -156,7 +156,7 @@ class Planes {
   std::unordered_map<Cell, std::vector<std::size_t>, HashCell> cells_;
 };
 
-/// The planes of all triangles that may be boundary.
+/// The planes of all triangles that may contribute to the boundary.
 std::vector<Plane> planes_of(const Cutter& cutter, const Bounds& box) {
   Planes planes(cutter);
   for (const Leaf& leaf : cutter.leaves()) {
@@ -168,7 +168,7 @@ std::vector<Plane> planes_of(const Cutter& cutter, const Bounds& box) {
       if (!meet(box, around, cutter.tolerance())) continue;
       glm::dvec3 normal = glm::cross(p[1] - p[0], p[2] - p[0]);
       const double length = glm::length(normal);
-      // Without a direction that means something a triangle has no inside to bound.
+      // A triangle without a meaningful normal bounds nothing.
       if (!(length > 1e-24 * cutter.scale() * cutter.scale())) continue;
       normal /= length;
       const int first = std::abs(normal.x) > 0.5 ? 0 : std::abs(normal.y) > 0.5 ? 1 : 2;
@@ -178,8 +178,9 @@ std::vector<Plane> planes_of(const Cutter& cutter, const Bounds& box) {
   return planes.take();
 }
 
-/// Triangles no higher than `tolerance` are left out, with what only they have: where faces of two
-/// leaves coincide, rounding leaves spikes without width that reach out of the region.
+/// Adds the triangles of a region in a plane. Triangles no higher than `tolerance` are left out
+/// with the points that only they use: where faces of two leaves coincide, rounding leaves spikes
+/// without width that reach out of the region.
 void add_pieces(TriangleSoup& mesh, const Plane& plane, const Outline& region, bool up,
                 double tolerance) {
   if (region.empty()) return;
@@ -224,7 +225,7 @@ Result<TriangleSoup> cut_boundary(const Tree& tree, Tree::NodeId node, std::uint
                                cutter.section(planes[i], Side::kAbove, here)};
     steps += here;
     if (sides[0].empty() && sides[1].empty()) return;
-    // Outside the window the sections are not what they seem.
+    // Sections are valid only inside the window.
     const Rectangle window = rectangle_of(planes[i]);
     Outline frame;
     frame.contours.push_back(

@@ -9,29 +9,31 @@
 #include "strata/core/result.h"
 #include "strata/csg/tree.h"
 
-/// Boolean trees as surfaces, for nodes that need the result itself: hulls, shadows, sums. A plane
-/// cuts every leaf into a flat region, and the tree is evaluated on these regions in the plane.
-/// What differs between the two sides of a plane is boundary; boundary lies only in planes of
+/// The boundary meshes of Boolean trees, for operations that need the result itself: hulls,
+/// shadows, Minkowski sums. A plane cuts every leaf into a flat region, and the tree is evaluated
+/// on these regions. The boundary is where the regions just below and just above a plane differ. It
+/// lies only in planes of the leaves' triangles.
 /// triangles of leaves.
 namespace strata::csg {
 
-/// Where a tree meets the plane z = 0, from either side: the cross-section of its closure.
+/// The cross-section of the closure of `node` with the plane z = 0: the union of the sections just
+/// below and just above it.
 [[nodiscard]] Outline cross_section(const Tree& tree, Tree::NodeId node, OutlineJob* job = nullptr);
 
-/// Triangles that together are the boundary of `node`, outward; neighbours in different planes
-/// share no vertices, and agree to the grid of the flat operations. For unions of leaves alone the
-/// leaves' triangles are given as they are, which may lie inside other leaves.
-/// @param most_steps  of work, of some 10 ns each, before it is given up
-/// @return kLimit when too much would have to be cut; kCancelled
+/// A set of triangles that together are the boundary of `node`, facing outward. Neighbours in
+/// different planes share no vertices and agree to the grid of the flat operations. A union of
+/// leaves returns the leaves' own triangles, some of which may lie inside other leaves.
+/// @param most_steps  limit of the work, in steps of some 10 ns
+/// @return kLimit when the cuts would take too much work; kCancelled
 Result<TriangleSoup> boundary(const Tree& tree, Tree::NodeId node, const Execution& execution = {},
                               std::uint64_t most_steps = 3'000'000'000);
 
-/// Calls body(operand) for every operand of the union that `node` is, through nested unions; for
-/// `node` itself if it is none.
+/// Calls body(operand) for every operand of the union `node`, through nested unions. If `node` is
+/// not a union, calls it for `node` itself.
 void for_each_operand(const Tree& tree, Tree::NodeId node,
                       const std::function<void(Tree::NodeId)>& body);
 
-/// The triangles of a leaf in the space of the tree.
+/// The triangles of a leaf, in the space of the tree.
 [[nodiscard]] TriangleSoup world_mesh(const Solid& solid);
 
 }  // namespace strata::csg

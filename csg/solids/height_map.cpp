@@ -22,14 +22,14 @@ constexpr std::size_t kMostCells = 20'000'000;
 
 struct HeightMap {
   std::size_t columns = 0, rows = 0;
-  std::vector<double> heights;  // row by row, the first at y = 0
+  std::vector<double> heights;  // row by row; the first row is at y = 0
   double floor = 0.0;
-  std::string short_rows;  // a sentence about them, if there are any
+  std::string short_rows;  // a sentence about rows with missing numbers, or empty
 
   double at(std::size_t column, std::size_t row) const { return heights[row * columns + column]; }
 };
 
-/// Reads the numbers of one line. @return whether it has nothing else
+/// Reads the numbers of one line. @return whether the line holds nothing else
 bool read_row(std::string_view line, std::vector<double>& numbers) {
   constexpr std::string_view kEnds = " \t\r,#";
   const char* at = line.data();
@@ -50,10 +50,10 @@ bool read_row(std::string_view line, std::vector<double>& numbers) {
   }
 }
 
-/// @return kLimit, kCancelled
+/// Checks the number of cells against the limits. @return kLimit, kCancelled
 Result<void> check_cells(const std::string& path, std::size_t cells, const Execution& execution) {
   if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
-  // Two vertices and four triangles each, and the heights before.
+  // Each cell takes two vertices and four triangles, and its height before that.
   constexpr std::size_t kBytes = 2 * sizeof(glm::dvec3) + 4 * sizeof(glm::uvec3) + 16;
   if (cells > kMostCells) {
     return fail(ErrorCode::kLimit, "{}: {} heights; the limit is {}", path, cells, kMostCells);
@@ -81,7 +81,7 @@ Result<HeightMap> read_numbers(const std::string& path, const Execution& executi
     ++line_number;
     const std::size_t before = numbers.size();
     if (!read_row(line, numbers)) {
-      // What stands there is not shown: a scene may name any file of the machine.
+      // The message does not quote the number: a scene may name any file of the machine.
       return fail(ErrorCode::kInput, "{}:{}: number {} of row {} is not a finite number", path,
                   line_number, numbers.size() - before + 1, row_ends.size() + 1);
     }
@@ -95,7 +95,7 @@ Result<HeightMap> read_numbers(const std::string& path, const Execution& executi
   HeightMap map;
   map.columns = columns;
   map.rows = row_ends.size();
-  map.heights.resize(columns * map.rows, 0.0);  // rows may be short
+  map.heights.resize(columns * map.rows, 0.0);  // missing numbers of short rows are 0
   std::size_t from = 0, short_rows = 0;
   for (std::size_t row = 0; row < map.rows; ++row) {
     std::copy(numbers.begin() + static_cast<std::ptrdiff_t>(from),
@@ -108,7 +108,7 @@ Result<HeightMap> read_numbers(const std::string& path, const Execution& executi
     from = row_ends[row];
   }
   if (short_rows > 1) map.short_rows += fmt::format(" ({} rows are short)", short_rows);
-  double least = 1.0;  // of the numbers that are there
+  double least = 1.0;  // among the numbers that are present
   for (const double number : numbers) least = std::min(least, number);
   map.floor = least - 1.0;
   return map;
@@ -176,7 +176,7 @@ TriangleSoup make_solid(const HeightMap& map, bool centre) {
       triangle(d, a, middle);
     }
   }
-  // The border, counter-clockwise seen from above; below it the floor.
+  // The border is counter-clockwise, seen from above. The floor lies below it.
   std::vector<std::uint32_t> border;
   for (std::uint32_t i = 0; i + 1 < columns; ++i) border.push_back(i);
   for (std::uint32_t j = 0; j + 1 < rows; ++j) border.push_back(j * columns + columns - 1);

@@ -24,8 +24,9 @@ struct CloseFile {
 };
 using File = std::unique_ptr<std::FILE, CloseFile>;
 
-/// One run of Qhull; its memory goes with it. What Qhull prints goes to a file that keeps nothing:
-/// with each line, one every fifty facets, it asks for a stop and sets Qhull's own end.
+/// One run of Qhull, which owns Qhull's memory. Qhull prints into a file that discards its text.
+/// Each line, one every fifty facets, calls ask(), which checks for a stop and then tells Qhull to
+/// end.
 class Run {
  public:
   explicit Run(const std::stop_token& stop) : stop_(stop) {
@@ -41,7 +42,7 @@ class Run {
   Run(const Run&) = delete;
   Run& operator=(const Run&) = delete;
   ~Run() {
-    state_.NOerrexit = True;  // no jump on the way out
+    state_.NOerrexit = True;  // do not longjmp while freeing memory
     qh_freeqhull(&state_, !qh_ALL);
     int long_blocks = 0, long_bytes = 0;
     qh_memfreeshort(&state_, &long_blocks, &long_bytes);
@@ -53,7 +54,7 @@ class Run {
  private:
   void ask() {
     stopped_ = stopped_ || stop_.stop_requested();
-    if (stopped_) state_.STOPadd = 1;  // no further vertex
+    if (stopped_) state_.STOPadd = 1;  // add no further vertex
   }
 
   const std::stop_token& stop_;
@@ -62,7 +63,7 @@ class Run {
   qhT state_;
 };
 
-/// Notes a facet at each of its edges. @param corners  of the facet, in order around it
+/// Collects the edges of facets. @param corners  corners of the facet, in order around it
 class EdgeCollector {
  public:
   void add(std::span<const std::uint32_t> corners, const glm::dvec3& normal) {
@@ -79,7 +80,7 @@ class EdgeCollector {
     }
     corners_ += corners.size();
   }
-  /// Empty unless each edge has two facets.
+  /// The edges; empty unless each edge has exactly two facets.
   std::vector<ConvexHull::Edge> take() {
     if (pairs_ != edges_.size() || corners_ != 2 * pairs_) edges_.clear();
     return std::move(edges_);
@@ -102,7 +103,7 @@ Result<TriangleSoup> make_hull(std::span<const glm::dvec3> points, EdgeCollector
     low = glm::min(low, p);
     high = glm::max(high, p);
   }
-  // About the middle, so that a small hull far from the origin keeps its digits.
+  // Coordinates relative to the middle, so that a small hull far from the origin keeps its digits.
   const glm::dvec3 middle = 0.5 * low + 0.5 * high;
   std::vector<double> coordinates;
   coordinates.reserve(3 * points.size());

@@ -14,29 +14,29 @@ namespace strata::csg {
 namespace {
 
 constexpr double kMostPieces = 3e6;
-constexpr double kMostVertices = 1e8;  // of all pieces: minutes
-/// Sums of so few points are made of all pairs.
+constexpr double kMostVertices = 1e8;  // all pieces together; more take minutes
+/// Up to this many pairs of points, a sum is the hull of all pairs.
 constexpr std::size_t kFewPairs = 1024;
-/// Points that one run of Qhull takes where all pairs are needed.
+/// Most points for one run of Qhull when all pairs are needed.
 constexpr std::size_t kPairsAtOnce = 100'000;
 
-/// The corners of a polytope or of a flat polygon, each with the directions in which it is the
-/// farthest: those that make no obtuse angle with any of its rays.
+/// The corners of a polytope or of a flat polygon. Each corner has the cone of directions in which
+/// it is the farthest corner: the directions that make no obtuse angle with any of its rays.
 struct Corners {
   std::vector<glm::dvec3> points;
-  std::vector<glm::dvec3> along;     ///< one of the directions; 0 where the corner is none
-  std::vector<std::uint32_t> first;  ///< of its rays, and of the next corner's
-  std::vector<glm::dvec3> rays;      ///< from a neighbour to the corner, unit
+  std::vector<glm::dvec3> along;     ///< a direction inside the cone; 0: not a corner
+  std::vector<std::uint32_t> first;  ///< first ray of each corner; one more entry ends the last
+  std::vector<glm::dvec3> rays;      ///< unit vectors to a corner from its neighbours
 };
 
-/// A polytope with its edges, vertex by vertex.
+/// A polytope and its edges, stored by vertex.
 struct Polytope {
   struct Spoke {
     std::uint32_t to;
     glm::dvec3 normals[2];
   };
   Corners corners;
-  std::vector<Spoke> spokes;  ///< as corners.rays; empty where Qhull's facets do not fit together
+  std::vector<Spoke> spokes;  ///< ordered as corners.rays; empty if Qhull gave no edges
 };
 
 glm::dvec3 unit(const glm::dvec3& v) {
@@ -80,17 +80,18 @@ Corners corners_of(std::span<const glm::dvec3> facet) {
     corners.rays.push_back(unit(facet[i] - before));
     corners.rays.push_back(unit(facet[i] - after));
     const glm::dvec3 along = corners.rays.end()[-1] + corners.rays.end()[-2];
-    // A point within a side stands out by nothing.
+    // A point in the middle of a side is not the farthest in any direction.
     corners.along.push_back(glm::length(along) > 1e-9 ? along : glm::dvec3(0.0));
   }
   corners.first.push_back(static_cast<std::uint32_t>(corners.rays.size()));
   return corners;
 }
 
-/// Finds the vertices of sums with a polytope; scratch of one thread. A vertex of a sum is the sum
-/// of two vertices that are the farthest in one direction. From one that is, the walk goes along
-/// edges of the polytope, over those whose facets have a direction between their normals that
-/// belongs to the corner: the directions of a corner are convex, so it reaches them all.
+/// Finds the vertices of the sum of a corner set and a polytope. One object serves one thread. A
+/// vertex of a sum is the sum of two vertices that are both the farthest in some direction. For
+/// each corner, the walk begins at a polytope vertex that is the farthest in a direction of the
+/// corner's cone. It follows edges for which a direction between the normals of their two facets
+/// lies in the cone. Cones are convex, so the walk reaches all vertices.
 class VertexWalk {
  public:
   void add_sums(const Corners& corners, const Polytope& polytope, std::vector<glm::dvec3>& sums) {
@@ -122,11 +123,11 @@ class VertexWalk {
   }
 
  private:
-  /// Whether a direction between the two normals makes no obtuse angle with any ray. What does so
-  /// by rounding only is taken along: the hull drops it.
+  /// Whether a direction between the two normals makes no obtuse angle with any ray. Directions
+  /// that do so only by rounding are accepted: the hull drops superfluous points.
   static bool meets(const Polytope::Spoke& spoke, std::span<const glm::dvec3> rays) {
     constexpr double kRounding = 1e-7;
-    double low = 0.0, high = 1.0;  // from the first normal to the second
+    double low = 0.0, high = 1.0;  // parameters of directions: 0 is the first normal, 1 the second
     for (const glm::dvec3& ray : rays) {
       const double one = glm::dot(spoke.normals[0], ray) + kRounding;
       const double other = glm::dot(spoke.normals[1], ray) + kRounding;
@@ -137,11 +138,11 @@ class VertexWalk {
     return low <= high;
   }
 
-  std::vector<std::uint32_t> seen_;  ///< for which corner, counted from 1
+  std::vector<std::uint32_t> seen_;  ///< the last corner that reached the vertex, from 1
   std::vector<std::uint32_t> waiting_;
 };
 
-/// The hull of the sums of all pairs, made of not too many at a time.
+/// The hull of the sums of all pairs of points, built in batches.
 Result<ConvexHull> hull_of_pairs(std::span<const glm::dvec3> a, std::span<const glm::dvec3> b,
                                  const std::stop_token& stop) {
   std::vector<glm::dvec3> sums;
@@ -155,7 +156,7 @@ Result<ConvexHull> hull_of_pairs(std::span<const glm::dvec3> a, std::span<const 
   return convex_hull_with_edges(sums, stop);
 }
 
-/// The centre of mass: deep inside a polytope.
+/// The centre of mass, which lies deep inside a convex solid.
 glm::dvec3 middle_of(const TriangleSoup& mesh) {
   const glm::dvec3 about = mesh.positions[0];
   glm::dvec3 sum(0.0);
@@ -178,10 +179,10 @@ MinkowskiPart moved(const MinkowskiPart& part, const glm::dvec3& by) {
   return result;
 }
 
-/// One convex sum to be made, of two polytopes or facets.
+/// One convex sum: each operand is a polytope or a flat facet.
 struct Task {
   const Polytope* polytopes[2] = {nullptr, nullptr};
-  std::span<const glm::dvec3> facets[2];  ///< where there is no polytope
+  std::span<const glm::dvec3> facets[2];  ///< used where there is no polytope
 };
 
 Result<ConvexHull> sum_of(const Task& task, VertexWalk& walk, const std::stop_token& stop) {
@@ -190,7 +191,7 @@ Result<ConvexHull> sum_of(const Task& task, VertexWalk& walk, const std::stop_to
     points[i] = task.polytopes[i] ? std::span<const glm::dvec3>(task.polytopes[i]->corners.points)
                                   : task.facets[i];
   }
-  // The walk goes over the larger polytope.
+  // The walk follows the edges of the larger polytope.
   int over = points[0].size() > points[1].size() ? 0 : 1;
   const auto has_edges = [&](int i) {
     return task.polytopes[i] && !task.polytopes[i]->spokes.empty();
@@ -210,11 +211,12 @@ Result<ConvexHull> sum_of(const Task& task, VertexWalk& walk, const std::stop_to
   return convex_hull_with_edges(sums, stop);
 }
 
-/// What all sums of pieces together take.
+/// The size of the sums of all pieces together.
 struct Cost {
   double pieces = 0.0, vertices = 0.0;
   [[nodiscard]] double bytes() const {
-    // Vertices and two triangles each: pieces, then one mesh, then what shows it.
+    // Each vertex comes with two triangles. They exist three times: as pieces, as one mesh, and in
+    // the code that shows it.
     return vertices * 3.0 * (sizeof(glm::dvec3) + 2 * sizeof(glm::uvec3));
   }
 };
@@ -224,7 +226,7 @@ Cost cost_of(std::span<const MinkowskiPart> a, std::span<const MinkowskiPart> b)
   const auto pieces = [](const MinkowskiPart& part) {
     return part.convex() ? 1.0 : static_cast<double>(part.facets.size());
   };
-  const auto points = [](const MinkowskiPart& part) {  // of a piece
+  const auto points = [](const MinkowskiPart& part) {  // mean number of points of a piece
     return part.convex() ? static_cast<double>(part.hull.mesh.positions.size())
                          : static_cast<double>(part.facets.corners.size()) /
                                static_cast<double>(part.facets.size());
@@ -233,15 +235,15 @@ Cost cost_of(std::span<const MinkowskiPart> a, std::span<const MinkowskiPart> b)
     for (const MinkowskiPart& q : b) {
       const double count = pieces(p) * pieces(q), m = points(p), n = points(q);
       cost.pieces += count;
-      // Corners of the maps of their normals, laid over each other: theirs and crossings.
+      // Vertices of a sum are the vertices of the overlaid Gauss maps: those of both maps and the
+      // crossings of their arcs.
       cost.vertices += count * std::min(m * n, m + n + 2.0 * std::sqrt(m * n));
     }
   }
   return cost;
 }
 
-/// The sums of convex pieces that make up the sum of two operands, and the parts that are the parts
-/// of one operand, moved.
+/// The plan of a sum: the convex sums to compute, and the parts of one operand that are only moved.
 class Plan {
  public:
   Plan(std::span<const MinkowskiPart> a, std::span<const MinkowskiPart> b) : sides_{a, b} {
@@ -256,7 +258,7 @@ class Plan {
       }
     }
   }
-  std::vector<Task> tasks;  ///< they refer to this plan
+  std::vector<Task> tasks;  ///< refer to the polytopes of this plan
   std::vector<MinkowskiPart> moved_parts;
 
  private:

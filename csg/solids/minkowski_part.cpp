@@ -1,7 +1,7 @@
-// Operands of Minkowski sums: flat facets of their boundaries, and points inside.
+// The parts of Minkowski operands: the flat facets of their boundaries and points inside them.
 //
-// This work is based on: S. Hertel, K. Mehlhorn, "Fast triangulation of simple polygons", 1983:
-// diagonals that no convex part needs are taken away one after another.
+// This work is based on: S. Hertel, K. Mehlhorn, "Fast triangulation of simple polygons", 1983.
+// Diagonals are removed one after another where the merged polygon stays convex.
 #include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>
@@ -18,7 +18,7 @@
 namespace strata::csg {
 namespace {
 
-/// Indices that become one another's.
+/// Disjoint sets of indices.
 class Groups {
  public:
   explicit Groups(std::size_t count) : parent_(count) {
@@ -34,7 +34,7 @@ class Groups {
   std::vector<std::uint32_t> parent_;
 };
 
-/// Convex polygons that grow.
+/// Merges neighbouring triangles into convex polygons.
 class FacetMerger {
  public:
   explicit FacetMerger(const TriangleSoup& mesh) {
@@ -88,10 +88,10 @@ class FacetMerger {
 
  private:
   static constexpr std::uint32_t kMany = ~std::uint32_t{0};
-  static constexpr std::size_t kMostCorners = 32;  // merging compares all
+  static constexpr std::size_t kMostCorners = 32;  // merging compares every corner with every edge
   struct Polygon {
-    std::vector<std::uint32_t> corners;  // empty: part of another
-    glm::dvec3 area{0.0};                // twice the area along the normal
+    std::vector<std::uint32_t> corners;  // empty: merged into another polygon
+    glm::dvec3 area{0.0};                // twice the area, along the normal
   };
 
   static std::uint64_t key(std::uint32_t from, std::uint32_t to) {
@@ -101,7 +101,7 @@ class FacetMerger {
     return polygons_[polygon].corners[static_cast<std::size_t>(k % 3)];
   }
 
-  /// Puts `other` to `one` over their edge from a to b, if that makes a convex polygon.
+  /// Merges `other` into `one` over their common edge from a to b if the result is convex.
   bool merge(Polygon& one, Polygon& other, std::uint32_t a, std::uint32_t b) {
     if (one.corners.size() + other.corners.size() > kMostCorners) return false;
     if (!(glm::dot(one.area, other.area) > 0.0)) return false;
@@ -117,7 +117,7 @@ class FacetMerger {
     };
     add(one, b, a);
     add(other, a, b);
-    // Further edges that both have.
+    // Removes further edges that both polygons share.
     for (std::size_t i = 0; corners.size() > 2 && i < corners.size();) {
       const std::size_t n = corners.size();
       if (corners[(i + n - 1) % n] != corners[(i + 1) % n]) {
@@ -137,8 +137,8 @@ class FacetMerger {
     return true;
   }
 
-  /// Whether all corners lie in a plane and on the inner side of each edge. Points that rounding
-  /// has set apart make edges without a direction.
+  /// Whether all corners lie in one plane and on the inner side of each edge. Edges between points
+  /// that only rounding has separated are skipped: they have no direction.
   [[nodiscard]] bool is_convex(std::span<const std::uint32_t> corners,
                                const glm::dvec3& normal) const {
     if (corners.size() < 3) return false;
@@ -162,8 +162,8 @@ class FacetMerger {
   double tolerance_ = 0.0;
 };
 
-/// How far along `way` a ray meets a triangle; infinity if it does not. Triangles are a little
-/// larger than they are: a ray along an edge must not pass between two.
+/// The distance along `way` at which a ray meets a triangle; infinity if it does not. The triangle
+/// is taken slightly larger, so that no ray passes between two triangles along their edge.
 double distance_to(const glm::dvec3& origin, const glm::dvec3& way, const glm::dvec3& a,
                    const glm::dvec3& b, const glm::dvec3& c) {
   constexpr double kNone = std::numeric_limits<double>::infinity();
@@ -176,9 +176,9 @@ double distance_to(const glm::dvec3& origin, const glm::dvec3& way, const glm::d
   return s >= -kMore && t >= -kMore && s + t <= 1.0 + kMore ? glm::dot(v, other) / scale : kNone;
 }
 
-/// A point inside each component. Triangles are connected that have corners in the same cell of a
-/// grid much finer than the mesh, or of that grid moved by half a cell; too many components only
-/// make the sum larger to write.
+/// A point inside each component. Triangles count as connected when they have corners in the same
+/// cell of a grid much finer than the mesh, or of that grid moved by half a cell. A component split
+/// in two only makes the sum larger to write.
 std::vector<glm::dvec3> find_anchors(const TriangleSoup& mesh, const Execution& execution) {
   const Bounds box = bounds(mesh);
   const double size = glm::length(box.high - box.low), cell = 1e-6 * size;
@@ -188,7 +188,7 @@ std::vector<glm::dvec3> find_anchors(const TriangleSoup& mesh, const Execution& 
   for (std::uint32_t t = 0; t < triangles.size(); ++t) {
     for (int k = 0; k < 6; ++k) {
       const glm::dvec3 at = (mesh.positions[triangles[t][k % 3]] - box.low) / cell;
-      // 20 bits an axis are enough for 1e6 cells, and the grid that is moved has the next bit.
+      // 20 bits per axis suffice for 1e6 cells. The top bit of the key tells the two grids apart.
       const auto part = [&](double x) {
         return static_cast<std::uint64_t>(std::floor(x + (k < 3 ? 0.0 : 0.5)));
       };
@@ -198,7 +198,8 @@ std::vector<glm::dvec3> find_anchors(const TriangleSoup& mesh, const Execution& 
       if (!is_new) groups.join(t, found->second);
     }
   }
-  // Of each component the largest triangle, and half the way through the material under it.
+  // The anchor lies below the middle of the component's largest triangle, halfway through the
+  // material.
   std::unordered_map<std::uint32_t, std::uint32_t> largest;
   const auto area = [&](std::uint32_t t) {
     const glm::dvec3& a = mesh.positions[triangles[t].x];

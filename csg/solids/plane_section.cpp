@@ -11,21 +11,22 @@
 namespace strata::csg {
 namespace {
 
-/// A point on the contour of a section goes through several flat operations.
+/// Estimated steps for a point on the contour of a section: it passes through several flat
+/// operations.
 constexpr std::uint64_t kStepsOfPoint = 200;
-constexpr std::uint64_t kStepsOfSegment = 10;  ///< chained, then perhaps clipped away
+constexpr std::uint64_t kStepsOfSegment = 10;  ///< a segment is chained and perhaps clipped away
 
-/// Leaves out points far from a rectangle, so that winding numbers inside it stay: a run of points
-/// that are all beyond the same side of it is replaced by its first and last. Cutting the contour
-/// at the rectangle would make edges that lie on each other, which Clipper does not always survive.
+/// Drops points far from a rectangle without changing winding numbers inside it. A run of points
+/// that are all beyond the same side is replaced by its first and last point. Clipping the contour
+/// at the rectangle would make overlapping edges, which Clipper does not always survive.
 void shorten(std::vector<glm::dvec2>& contour, const Rectangle& rectangle) {
   const auto sides_beyond = [&](const glm::dvec2& p) {
     return (p.x < rectangle.low.x ? 1u : 0u) | (p.x > rectangle.high.x ? 2u : 0u) |
            (p.y < rectangle.low.y ? 4u : 0u) | (p.y > rectangle.high.y ? 8u : 0u);
   };
-  std::size_t kept = 1;  // the last of these ends the run so far
+  std::size_t kept = 1;  // contour[kept - 1] is the end of the current run
   unsigned run = sides_beyond(contour[0]);
-  bool has_end = false;  // the run has an end besides its start
+  bool has_end = false;  // the run has an end distinct from its start
   unsigned last = run;
   for (std::size_t i = 1; i < contour.size(); ++i) {
     const unsigned sides = sides_beyond(contour[i]);
@@ -42,7 +43,7 @@ void shorten(std::vector<glm::dvec2>& contour, const Rectangle& rectangle) {
   contour.resize(kept);
 }
 
-/// Where the surface of a leaf goes through a plane, moved off it by less than any distance.
+/// The intersection of a leaf's surface with a plane, after an infinitesimal move of the plane.
 class LeafSection {
  public:
   LeafSection(const Leaf& leaf, const Plane& plane, double tolerance, Side side)
@@ -51,9 +52,9 @@ class LeafSection {
         tolerance_(tolerance),
         in_plane_is_above_(side == Side::kBelow) {}
 
-  /// @param steps  grows by the work that was done
+  /// @param steps  is increased by the work done
   Outline run(const Rectangle* window, std::uint64_t& steps) {
-    // The tolerance is far above the rounding of the boxes' distances.
+    // The margin is far above the rounding of the boxes' distances.
     steps += leaf_.boxes.visit(plane_, 2.0 * tolerance_,
                                [&](std::uint32_t t) { add_triangle(leaf_.triangles[t]); });
     steps += kStepsOfSegment * segments_.size();
@@ -87,7 +88,7 @@ class LeafSection {
     return Edge{std::min(a, b)} << 32 | std::max(a, b);
   }
 
-  /// Of a vertex; 0 in the plane.
+  /// Signed distance of a vertex; 0 for vertices in the plane.
   double distance(std::uint32_t vertex) const {
     const double distance = glm::dot(leaf_.positions[vertex] - plane_.origin, plane_.normal);
     return std::abs(distance) <= tolerance_ ? 0.0 : distance;
@@ -96,23 +97,24 @@ class LeafSection {
   void add_triangle(const glm::uvec3& t) {
     bool above[3];
     for (int i = 0; i < 3; ++i) {
-      // A vertex in the plane is above a plane that is moved down, and the other way around.
+      // A vertex in the plane is above a plane that is moved down, and below one that is moved up.
       const double d = distance(t[i]);
       above[i] = d == 0.0 ? in_plane_is_above_ : d > 0.0;
     }
     const int count = above[0] + above[1] + above[2];
     if (count == 0 || count == 3) return;
-    int odd = 0;  // the corner that is alone on its side
+    int odd = 0;  // the corner that is alone on its side of the plane
     while (above[odd] != (count == 1)) ++odd;
     const Edge from = edge(t[odd], t[(odd + 1) % 3]), to = edge(t[(odd + 2) % 3], t[odd]);
-    // The region is to the left, seen from above.
+    // The region lies to the left, seen from above.
     segments_.push_back(count == 1 ? Segment{from, to, false} : Segment{to, from, false});
     link(segments_.back().from);
-    // Faces that look opposite ways may meet: parity asks for closed lines, not for their sense.
+    // Faces of opposite orientation may meet here. The even-odd rule needs closed lines but not a
+    // consistent direction.
     if (leaf_.fill == Fill::kEvenOdd) link(segments_.back().to);
   }
 
-  /// The last segment can be gone on with from `edge`.
+  /// Notes that the last segment can be continued at `edge`.
   void link(Edge edge) {
     const auto [at, is_new] = last_link_.try_emplace(edge, links_.size());
     links_.push_back({segments_.size() - 1, is_new ? kNone : at->second});
@@ -130,7 +132,7 @@ class LeafSection {
   glm::dvec2 crossing(Edge edge) const {
     const auto a = static_cast<std::uint32_t>(edge >> 32), b = static_cast<std::uint32_t>(edge);
     const glm::dvec3 p = leaf_.positions[a] - plane_.origin, q = leaf_.positions[b] - plane_.origin;
-    const double from = distance(a), t = from / (from - distance(b));  // on different sides
+    const double from = distance(a), t = from / (from - distance(b));  // signs differ
     const glm::dvec3 at = t <= 0.0 ? p : t >= 1.0 ? q : p + t * (q - p);
     return {glm::dot(at, plane_.u), glm::dot(at, plane_.v)};
   }
@@ -141,7 +143,7 @@ class LeafSection {
   bool in_plane_is_above_;
   std::vector<Segment> segments_;
   struct Link {
-    std::size_t segment, before;  // the link before it at the same edge
+    std::size_t segment, before;  // before: the previous link at the same edge
   };
   std::vector<Link> links_;
   std::unordered_map<Edge, std::size_t> last_link_;

@@ -12,13 +12,13 @@
 #include "strata/csg/tree.h"
 #include "strata/mesh/soup_tools.h"
 
-/// Sections of one solid by planes: parts of csg/solids/boundary.h.
+/// Sections of one solid by planes; used by csg/solids/boundary.h.
 namespace strata::csg {
 
-/// A plane with coordinates in it.
+/// A plane with a coordinate system in it.
 struct Plane {
   glm::dvec3 origin{0.0}, normal{0.0, 0.0, 1.0}, u{1.0, 0.0, 0.0}, v{0.0, 1.0, 0.0};
-  Bounds window;  ///< of the triangles that lie in it; empty: all of the plane counts
+  Bounds window;  ///< box around the triangles that lie in it; empty: the whole plane counts
 
   [[nodiscard]] glm::dvec2 flat(const glm::dvec3& p) const {
     return {glm::dot(p - origin, u), glm::dot(p - origin, v)};
@@ -31,23 +31,23 @@ struct Rectangle {
   glm::dvec2 high{-std::numeric_limits<double>::infinity()};
 };
 
-/// Through `origin`, with any coordinates. @pre a unit normal
+/// The plane through `origin`, with any axes in it. @pre `normal` is a unit vector
 [[nodiscard]] Plane make_plane(const glm::dvec3& origin, const glm::dvec3& normal);
 
-/// What a plane's window covers, with a margin.
+/// The rectangle that covers a plane's window, with a margin.
 [[nodiscard]] Rectangle rectangle_of(const Plane& plane);
 
-/// Whether a box comes within `margin` of another.
+/// Whether two boxes come within `margin` of each other.
 [[nodiscard]] bool meet(const Bounds& box, const Bounds& other, double margin);
 
-/// Boxes around boxes around triangles, for those that meet a plane.
+/// A tree of boxes around triangles, which finds the triangles near a plane.
 class BoxTree {
  public:
-  /// Sorts `triangles`.
+  /// Builds the tree. Sorts `triangles`.
   void build(std::span<const glm::dvec3> positions, std::vector<glm::uvec3>& triangles);
 
-  /// Calls body(triangle) for those whose box comes within `margin` of the plane.
-  /// @return boxes looked at
+  /// Calls body(triangle) for the triangles whose box comes within `margin` of the plane. @return
+  /// number of boxes visited
   template <class Body>
   std::uint64_t visit(const Plane& plane, double margin, const Body& body) const {
     if (nodes_.empty()) return 0;
@@ -62,7 +62,7 @@ class BoxTree {
       const glm::dvec3 half = 0.5 * (node.box.high - node.box.low);
       const double distance = glm::dot(node.box.low + half - plane.origin, plane.normal);
       if (std::abs(distance) > glm::dot(half, extent) + margin) continue;
-      if (node.children != 0) {  // halves: 32 levels at most
+      if (node.children != 0) {  // each child has half of the triangles: 32 levels at most
         waiting[count++] = node.children;
         waiting[count++] = node.children + 1;
         continue;
@@ -77,12 +77,12 @@ class BoxTree {
   static constexpr std::uint32_t kFew = 8;
   struct Node {
     Bounds box;
-    std::uint32_t first, count, children;  // children: index of the first of two, 0: none
+    std::uint32_t first, count, children;  // children: index of the first of two; 0: a leaf
   };
   std::vector<Node> nodes_;
 };
 
-/// A leaf in the space of the tree, its vertices welded by position.
+/// A leaf of the Boolean tree in the space of the tree, its vertices welded by position.
 struct Leaf {
   std::vector<glm::dvec3> positions;
   std::vector<glm::uvec3> triangles;
@@ -93,13 +93,13 @@ struct Leaf {
 
 [[nodiscard]] Leaf make_leaf(const Solid& solid);
 
-/// From which side a plane is looked at.
-enum class Side { kBelow, kAbove };  // just below the plane, just above it
+/// The side from which a plane is approached.
+enum class Side { kBelow, kAbove };  // infinitesimally below or above the plane
 
-/// Where the inside of a leaf meets a plane that is moved off by less than any distance. Vertices
-/// within `tolerance` lie in the plane. Where the plane has a window, only what lies in the
-/// window's rectangle is as it should be.
-/// @param steps  grows by the work that was done, in some 10 ns
+/// The section of a leaf with a plane that is moved by an infinitesimal distance to `side`.
+/// Vertices within `tolerance` lie in the plane. If the plane has a window, the section is valid
+/// only in the window's rectangle.
+/// @param steps  is increased by the work done, in units of some 10 ns
 [[nodiscard]] Outline section(const Leaf& leaf, const Plane& plane, double tolerance, Side side,
                               std::uint64_t& steps);
 

@@ -9,7 +9,8 @@ namespace {
 
 bool positive(double value) { return std::isfinite(value) && value > 0.0; }
 
-/// Adds `count` points of a circle about the z axis, the first on +x, counter-clockwise from above.
+/// Adds `count` points of a circle around the z axis: the first on +x, then counter-clockwise seen
+/// from above.
 void add_ring(TriangleSoup& mesh, int count, double radius, double z) {
   for (int i = 0; i < count; ++i) {
     const double angle = (360.0 * i) / count;
@@ -17,7 +18,7 @@ void add_ring(TriangleSoup& mesh, int count, double radius, double z) {
   }
 }
 
-/// The flat end over the `count` points from `first`: up, or down.
+/// Adds the flat end over the `count` points from `first`, facing up or down.
 void add_end(TriangleSoup& mesh, std::uint32_t first, int count, bool up) {
   for (std::uint32_t i = 1; i + 1 < static_cast<std::uint32_t>(count); ++i) {
     const std::uint32_t a = first + i, b = first + i + 1;
@@ -29,7 +30,7 @@ void add_end(TriangleSoup& mesh, std::uint32_t first, int count, bool up) {
   }
 }
 
-/// Quads between a ring at `low` and one above it at `high`.
+/// Adds quads between a ring that begins at `low` and the ring above it, which begins at `high`.
 void add_band(TriangleSoup& mesh, std::uint32_t low, std::uint32_t high, int count) {
   const auto n = static_cast<std::uint32_t>(count);
   for (std::uint32_t i = 0; i < n; ++i) {
@@ -65,7 +66,7 @@ TriangleSoup make_sphere(double radius, const Segments& segments) {
   if (!positive(radius)) return mesh;
   const int count = segments.count(radius);
   const int rings = (count + 1) / 2;
-  for (int k = rings; k-- > 0;) {  // from the lowest up
+  for (int k = rings; k-- > 0;) {  // from the lowest ring upwards
     const double angle = (180.0 * (k + 0.5)) / rings;
     add_ring(mesh, count, radius * sin_degrees(angle), radius * cos_degrees(angle));
   }
@@ -94,7 +95,7 @@ TriangleSoup make_cylinder(double height, double radius1, double radius2, bool c
     add_end(mesh, n, count, true);
     return mesh;
   }
-  mesh.positions.emplace_back(0.0, 0.0, radius1 > 0.0 ? high : low);  // the tip, index n
+  mesh.positions.emplace_back(0.0, 0.0, radius1 > 0.0 ? high : low);  // the tip has index n
   for (std::uint32_t i = 0; i < n; ++i) {
     const std::uint32_t j = (i + 1) % n;
     if (radius1 > 0.0) {
@@ -109,7 +110,8 @@ TriangleSoup make_cylinder(double height, double radius1, double radius2, bool c
 
 namespace {
 
-/// Begins a face at its least point, so that fans do not depend on where it began.
+/// Rotates a face so that its least point comes first. Its fan then does not depend on its first
+/// corner in the file.
 void begin_at_least_point(std::vector<std::uint32_t>& face, std::span<const glm::dvec3> points) {
   const auto key = [&](std::uint32_t i) {
     return std::tuple(points[i].x, points[i].y, points[i].z);

@@ -8,33 +8,35 @@
 #include "mesh/polygons/polygon_cutter.h"
 #include "strata/mesh/triangle_soup.h"
 
-/// OpenSCAD's solids, vertex for vertex: the formulas stand in the functions. All but
-/// polyhedra are closed and outward, with shared vertices; an empty solid has no triangles.
+/// OpenSCAD's solids, vertex for vertex; the functions hold the formulas. All except polyhedra are
+/// closed and face outward, with shared vertices. An empty solid has no triangles.
 namespace strata::csg {
 
-/// [0, size] or, with `centre`, [-size / 2, size / 2]. Empty unless all sizes are finite and > 0.
+/// The box [0, size], or with `centre` [-size / 2, size / 2]. Empty unless all sizes are finite and
+/// > 0.
 [[nodiscard]] TriangleSoup make_cube(const glm::dvec3& size, bool centre);
 
-/// N = segments.count(r) points on each of floor((N + 1) / 2) rings, at the polar angles
-/// 180 (k + 1/2) / rings from +z; flat ends, no poles. Empty unless r is finite and > 0.
+/// A sphere of rings of N = segments.count(r) points each. The floor((N + 1) / 2) rings are at the
+/// polar angles 180 (k + 1/2) / rings from +z. The ends are flat; there are no poles. Empty unless
+/// r is finite and > 0.
 [[nodiscard]] TriangleSoup make_sphere(double radius, const Segments& segments);
 
-/// From z = 0 to h, or about 0; a radius of 0 makes a tip. Empty unless h > 0, both radii are
-/// >= 0, one is > 0 and all are finite.
+/// A cylinder or cone that stands on z = 0, or is centred there with `centre`. A radius of 0 makes
+/// a tip. Empty unless h > 0, both radii are >= 0, one is > 0 and all are finite.
 [[nodiscard]] TriangleSoup make_cylinder(double height, double radius1, double radius2, bool centre,
                                          const Segments& segments);
 
-/// Triangles that make_sphere would make, for limits.
+/// The number of triangles that make_sphere() makes, for limits.
 [[nodiscard]] double sphere_triangle_count(double radius, const Segments& segments);
 
-/// Faces that are not flat.
+/// The faces that are not flat.
 struct BentFaces {
   std::size_t count = 0, first = 0;
-  Bend bend;  ///< of the first
+  Bend bend;  ///< the bend of the first one
 };
-/// Faces of any number of corners, counter-clockwise seen from outside, cut by PolygonCutter; how
-/// does not depend on where a face begins. Face elements are indices of `faces`. Corners that
-/// repeat their predecessor are left out. @pre indices < points.size()
+/// Faces with any number of corners, counter-clockwise seen from outside. PolygonCutter cuts them
+/// into triangles, whichever corner is first. Corners that repeat the previous one are left out.
+/// The mesh's face elements are indices of `faces`. @pre indices < points.size()
 [[nodiscard]] TriangleSoup make_faces(std::vector<glm::dvec3> points,
                                       std::span<const std::vector<std::uint32_t>> faces,
                                       BentFaces* bent = nullptr);
