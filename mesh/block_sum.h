@@ -8,8 +8,8 @@
 
 namespace strata::detail {
 
-/// Folds items [0, count) into a Part by blocks of fixed size, then joins the parts in order, so
-/// that rounding does not depend on the number of threads. A stop request is not obeyed: a partial
+/// Folds the items [0, count) in blocks of fixed size and joins the results in order, so that
+/// rounding does not depend on the number of threads. Stop requests are ignored, since a partial
 /// sum would be wrong.
 /// @param add   add(part, index) @param join  join(total, part)
 template <class Part, class Add, class Join>

@@ -11,9 +11,9 @@ namespace {
 
 using Polygon = std::vector<glm::dvec3>;
 
-/// Where the segment from `a` to `b` meets the plane where coordinate `axis` is `at`. Neighbours
-/// have the segment in opposite directions: it is always walked from its smaller end, which also
-/// keeps its accuracy.
+/// The point where the segment from `a` to `b` meets the plane `coordinate[axis] = at`. Two
+/// neighbouring triangles hold the segment in opposite directions, so it is always walked from its
+/// smaller end. This also keeps accuracy.
 glm::dvec3 cut_segment(glm::dvec3 a, glm::dvec3 b, int axis, double at) {
   const auto key = [](const glm::dvec3& p) {
     return std::array{std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}), p.x, p.y, p.z};
@@ -24,12 +24,12 @@ glm::dvec3 cut_segment(glm::dvec3 a, glm::dvec3 b, int axis, double at) {
   return p;
 }
 
-/// Cuts polygons at planes, and flattens what lies beyond.
+/// Cuts polygons at planes and flattens the parts beyond.
 class Clamper {
  public:
   explicit Clamper(const Bounds& box) : box_(box) {}
 
-  /// The pieces of a triangle, each bent nowhere.
+  /// The pieces of a triangle. Each of them stays flat.
   std::span<const Polygon> pieces(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) {
     pieces_.assign(1, Polygon{a, b, c});
     for (int axis = 0; axis < 3; ++axis) {
@@ -40,7 +40,7 @@ class Clamper {
   }
 
  private:
-  /// @param sign 1: what lies below is moved; -1: what lies above
+  /// @param sign  1 moves the part below the plane; -1 moves the part above
   void at_plane(int axis, double at, double sign) {
     const std::size_t count = pieces_.size();
     for (std::size_t i = 0; i < count; ++i) {

@@ -10,24 +10,24 @@
 
 namespace strata {
 
-/// A mesh whose outside was moved onto the sides of a box.
+/// A mesh whose parts outside a box were moved onto the box's sides.
 struct ClampedMesh {
   std::vector<glm::dvec3> positions;
   std::vector<glm::uvec3> triangles;
-  std::vector<std::uint32_t> sources;  ///< the triangle of the mesh that each one is a piece of
+  std::vector<std::uint32_t> sources;  ///< the original triangle of each triangle
 };
 
-/// The image of a mesh under p -> clamp(p, box.low, box.high): what lies in the box stays where it
-/// is, bit for bit; what lies outside is moved straight onto the box's sides. Triangles are cut
-/// where the box bends them. Both sides of an edge are cut alike, so a closed mesh stays closed,
-/// and around every point within the box the mesh winds as often as before: rays within the box
-/// meet the same solid, however far it reached out. Parts that lie outside become sheets without
-/// volume on the box's sides.
+/// The image of a mesh under p -> clamp(p, box.low, box.high). Points inside the box stay where
+/// they are, bit for bit; points outside move straight onto the box's sides. Triangles are cut
+/// where the box bends them. Both sides of an edge are cut alike, so a closed mesh stays closed.
+/// Around every point within the box the mesh winds as often as before: rays within the box meet
+/// the same solid, however far the mesh reached out. Parts outside become sheets without volume on
+/// the box's sides.
 ///
-/// Where both ends of an edge are far outside, the place of the cut is rounded like they are (2^-52
-/// of their size), but for coordinates that both ends share, which are exact.
-/// Cut short when a stop is asked for.
-/// @param box not empty
+/// A cut between two ends that are far outside is rounded relative to their size (2^-52 of it).
+/// Coordinates that both ends share are exact.
+/// The result is incomplete after a stop request.
+/// @param box  not empty
 /// @pre coordinates are below kMostClamped
 [[nodiscard]] ClampedMesh clamp_to_box(std::span<const glm::dvec3> positions,
                                        std::span<const glm::uvec3> triangles, const Bounds& box,

@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t kExamples = 8;
 
-/// An unbalanced edge, to find those of the first triangles.
+/// An unbalanced edge. Those of the first triangles become examples in the diagnosis.
 struct Candidate {
   std::uint32_t triangle = 0, low = 0, high = 0, up = 0, down = 0;
   bool starts_low = true;
@@ -45,7 +45,7 @@ struct EdgeCounts {
   }
 };
 
-/// Judges the uses of one edge.
+/// Classifies one edge by its uses and counts it.
 void count_edge(std::uint32_t low, std::span<const detail::EdgeUse> uses, EdgeCounts& counts) {
   const detail::EdgeUse front = uses.front();
   std::uint32_t up = 0, down = 0;
@@ -61,7 +61,7 @@ void count_edge(std::uint32_t low, std::span<const detail::EdgeUse> uses, EdgeCo
   if (counts.first.size() > 64 * kExamples) counts.keep_first();
 }
 
-/// The triangles' edges between welded vertices.
+/// Counts the triangles' edges between welded vertices.
 EdgeCounts count_all_edges(const TriangleSoup& mesh, const std::vector<std::uint32_t>& welded,
                            const Execution& execution) {
   detail::EdgeUses uses(mesh.triangles, welded, [](std::size_t) { return true; });
@@ -98,10 +98,10 @@ std::uint64_t count_duplicates(const TriangleSoup& mesh, const std::vector<std::
   const auto turned = [&](std::size_t i) {
     const glm::uvec3 t = mesh.triangles[i];
     const std::uint32_t a = welded[t.x], b = welded[t.y], c = welded[t.z];
-    if (a == b || b == c || c == a) {  // a line is no face to be repeated
+    if (a == b || b == c || c == a) {  // a triangle without area is not compared
       return glm::uvec3(static_cast<std::uint32_t>(i), detail::kNoVertex, detail::kNoVertex);
     }
-    // The least corner first; the orientation stays.
+    // The least corner comes first. The orientation is kept.
     if (a < b && a < c) return glm::uvec3(a, b, c);
     return b < c ? glm::uvec3(b, c, a) : glm::uvec3(c, a, b);
   };
@@ -139,7 +139,7 @@ FaceSums sum_faces(const TriangleSoup& mesh, const Execution& execution) {
 template <class Scalar>
 bool balanced(std::span<const glm::vec<3, Scalar>> positions, std::span<const glm::uvec3> triangles,
               const Execution& execution) {
-  // Edges balanced by index stay so when vertices are welded; only the others need the positions.
+  // Edges that are balanced by index stay balanced after welding. Only the others need positions.
   return detail::unbalanced_by_position<Scalar>(
              detail::unbalanced_by_index(triangles, positions.size(), execution), positions)
       .empty();

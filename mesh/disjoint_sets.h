@@ -7,7 +7,7 @@
 
 namespace strata::detail {
 
-/// Joins items; each set is known by its least one.
+/// Disjoint sets of items. The least item of a set represents it.
 class DisjointSets {
  public:
   explicit DisjointSets(std::size_t count) : parent_(count) {
@@ -17,11 +17,11 @@ class DisjointSets {
     while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];  // halves the path
     return i;
   }
-  /// At a glance: false may be wrong.
+  /// A quick check of whether three items are in one set. It may return false although they are.
   [[nodiscard]] bool known_same(std::uint32_t a, std::uint32_t b, std::uint32_t c) const {
     return parent_[a] == parent_[b] && parent_[b] == parent_[c];
   }
-  /// @return whether they were apart
+  /// @return whether they were in different sets
   bool join(std::uint32_t a, std::uint32_t b) {
     a = find(a), b = find(b);
     if (a < b) parent_[b] = a;

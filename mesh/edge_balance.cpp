@@ -15,12 +15,13 @@ namespace {
 
 constexpr std::size_t kLanes = 4;
 
-/// Uses that wait for their opposite at one vertex: (higher vertex << 1 | direction), 0 is free.
+/// Uses at one vertex that wait for their opposite use: (higher vertex << 1 | direction). 0 is a
+/// free lane.
 struct alignas(16) Bucket {
   std::uint32_t lanes[kLanes] = {};
 };
 
-/// Bit i: lane i equals value; bits 4 to 7: lane is free.
+/// Bits 0 to 3: the lane equals `value`. Bits 4 to 7: the lane is free.
 unsigned match(const Bucket& bucket, std::uint32_t value) {
 #ifdef __SSE2__
   const __m128i lanes = _mm_load_si128(reinterpret_cast<const __m128i*>(bucket.lanes));
@@ -38,7 +39,7 @@ unsigned match(const Bucket& bucket, std::uint32_t value) {
 #endif
 }
 
-/// Sorts and adds up; sums of zero go.
+/// Sorts the edges and adds up the sums of equal edges. Edges whose sum is 0 are removed.
 void cancel(std::vector<EdgeSum>& edges) {
   std::sort(edges.begin(), edges.end(), [](const EdgeSum& a, const EdgeSum& b) {
     return std::pair(a.low, a.high) < std::pair(b.low, b.high);
@@ -54,7 +55,7 @@ void cancel(std::vector<EdgeSum>& edges) {
   edges.resize(kept);
 }
 
-/// Edges whose lower vertex is in [begin, end).
+/// The unbalanced edges whose lower vertex is in [begin, end).
 std::vector<EdgeSum> unbalanced_of_range(std::span<const glm::uvec3> triangles, std::uint32_t begin,
                                          std::uint32_t end) {
   std::vector<Bucket> buckets;
@@ -73,7 +74,8 @@ std::vector<EdgeSum> unbalanced_of_range(std::span<const glm::uvec3> triangles, 
       rest.push_back({low, high, from < to ? 1 : -1});
       return;
     }
-    // An opposite use comes before a free lane. No branch: which of both is a coin's toss.
+    // An opposite use takes precedence over a free lane. Both are equally likely, so a branch would
+    // often be mispredicted.
     const auto lane = static_cast<unsigned>(std::countr_zero(mask));
     bucket.lanes[lane & 3u] = lane < kLanes ? 0u : code;
   };
@@ -91,7 +93,7 @@ std::vector<EdgeSum> unbalanced_of_range(std::span<const glm::uvec3> triangles, 
   return rest;
 }
 
-/// For more vertices than 31 bits name.
+/// For vertex numbers of more than 31 bits.
 std::vector<EdgeSum> unbalanced_by_sorting(std::span<const glm::uvec3> triangles) {
   std::vector<EdgeSum> edges;
   edges.reserve(3 * triangles.size());

@@ -9,21 +9,22 @@
 
 namespace strata::detail {
 
-/// Uses low -> high minus uses high -> low of an undirected edge. @invariant low < high, sum != 0
+/// The number of uses low -> high minus the number of uses high -> low of an undirected edge.
+/// @invariant low < high, sum != 0
 struct EdgeSum {
   std::uint32_t low = 0, high = 0;
   std::int64_t sum = 0;
   friend bool operator==(const EdgeSum&, const EdgeSum&) = default;
 };
 
-/// The edges, by vertex index, that are not used equally often in both directions, sorted. Exact:
-/// a use waits in its lower vertex's bucket until the opposite use takes it out; what the buckets
-/// could not hold is sorted. @pre indices < vertex_count
+/// The edges, by vertex index, that are not used equally often in both directions, sorted. The
+/// result is exact. A use waits in the bucket of its lower vertex until the opposite use removes
+/// it; uses that find no free lane are sorted. @pre indices < vertex_count
 [[nodiscard]] std::vector<EdgeSum> unbalanced_by_index(std::span<const glm::uvec3> triangles,
                                                        std::size_t vertex_count,
                                                        const Execution& execution);
 
-/// Adds up the sums of edges that join the same two positions; edges of equal ends vanish.
+/// Adds up the sums of edges that join the same two positions. Edges with equal ends are removed.
 /// `Scalar` is double or int.
 template <class Scalar>
 [[nodiscard]] std::vector<EdgeSum> unbalanced_by_position(

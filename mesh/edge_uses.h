@@ -12,7 +12,7 @@
 
 namespace strata::detail {
 
-/// A use of an edge, kept at its lower vertex.
+/// A use of an edge by a triangle, stored with the edge's lower vertex.
 struct EdgeUse {
   std::uint32_t high = 0;
   std::uint32_t triangle = 0;  ///< [triangle:31 | high -> low:1]
@@ -24,7 +24,7 @@ struct EdgeUse {
   }
 };
 
-/// The uses of all edges between welded vertices, by their lower vertex.
+/// The uses of all edges between welded vertices, grouped by lower vertex.
 class EdgeUses {
  public:
   /// @param keep  keep(t): whether triangle t counts @pre fewer than 2^31 triangles
@@ -42,7 +42,7 @@ class EdgeUses {
         }
       }
     };
-    // A counting sort: begin_[v + 1] runs from the start to the end of v's uses.
+    // Counting sort. After it, begin_[v] and begin_[v + 1] enclose the uses of v.
     for_uses([&](std::uint32_t low, std::uint32_t, std::uint32_t, bool) { ++begin_[low + 2]; });
     std::partial_sum(begin_.begin(), begin_.end(), begin_.begin());
     reserve_large(uses_, begin_.back());
@@ -56,7 +56,7 @@ class EdgeUses {
     return std::span(uses_).subspan(begin_[low], begin_[low + 1] - begin_[low]);
   }
 
-  /// Calls visit(uses) for every edge at a lower vertex, its uses sorted by triangle.
+  /// Calls visit(uses) for every edge of a lower vertex. The uses are sorted by triangle.
   template <class Visit>
   void for_edges(std::size_t low, Visit&& visit) {
     const std::span<EdgeUse> uses = at(low);

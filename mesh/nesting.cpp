@@ -10,14 +10,15 @@
 #include "mesh/part_measures.h"
 #include "mesh/weld.h"
 
-// Which part of a mesh lies within which: a ray upwards from a point of each part, all rays at
-// once. The points are sorted into a grid in x, y; each triangle asks those that it may lie above.
+// Finds which parts of a mesh lie inside others. A ray leads upwards from one point of each part.
+// The points are sorted into a grid in x, y; each triangle visits the points that it may lie above.
 
 namespace strata::detail {
 namespace {
 
-/// On which side of the edge a -> b, seen from above, p lies: 1 left, -1 right, 0 for no edge. Both
-/// triangles at an edge compute the same bits; points on it are moved by (e, e^2).
+/// The side of the edge a -> b on which p lies, seen from above: 1 left, -1 right, 0 for an edge
+/// without length. Both triangles at an edge compute the same bits. A point on the edge is moved by
+/// (e, e^2).
 int side(glm::dvec3 a, glm::dvec3 b, const glm::dvec3& p) {
   const bool swapped = std::tie(b.x, b.y) < std::tie(a.x, a.y);
   if (swapped) std::swap(a, b);
@@ -29,7 +30,8 @@ int side(glm::dvec3 a, glm::dvec3 b, const glm::dvec3& p) {
   return swapped ? -sign : sign;
 }
 
-/// +1 where a triangle that looks up lies above p, -1 where it looks down, 0 where there is none.
+/// Returns +1 when a triangle that faces upwards lies above p, -1 when it faces downwards, 0 when
+/// it does not lie above p.
 int crossing(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, const glm::dvec3& p) {
   const int turn = side(a, b, p);
   if (turn == 0 || side(b, c, p) != turn || side(c, a, p) != turn) return 0;
@@ -41,7 +43,7 @@ int crossing(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, cons
   return z > p.z ? turn : 0;
 }
 
-/// The samples by cells of a grid in x, y.
+/// The sample points in the cells of a grid in x, y.
 class SampleGrid {
  public:
   explicit SampleGrid(const std::vector<PartSample>& samples) {
@@ -61,7 +63,7 @@ class SampleGrid {
     }
   }
 
-  /// Calls visit(sample) for those in the cells of a box in x, y.
+  /// Calls visit(sample) for the samples in the cells of a box in x, y.
   template <class Visit>
   void within(const glm::dvec3& low, const glm::dvec3& high, Visit&& visit) const {
     if (low.x > high_.x || high.x < low_.x || low.y > high_.y || high.y < low_.y) return;
@@ -138,14 +140,14 @@ namespace {
 
 constexpr std::uint32_t kNone = 0xffffffffu;
 
-/// A piece that shares no vertex with the others.
+/// A piece of a part that shares no vertex with the other pieces.
 struct Piece {
   Wedge wedge;
   Extent extent;
 };
 
-/// Whether all pieces that are not outward bound cavities of others.
-/// @param piece_of  of each triangle
+/// Whether every piece that does not face outward bounds a cavity of another one.
+/// @param piece_of  the piece of each triangle
 bool only_cavities(const TriangleSoup& mesh, std::vector<Piece>& pieces,
                    std::vector<std::uint32_t>& piece_of, const std::stop_token& stop) {
   for (std::size_t t = 0; t < piece_of.size(); ++t) pieces[piece_of[t]].extent.include(mesh, t);

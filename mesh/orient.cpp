@@ -29,11 +29,11 @@ using detail::Extent;
 using detail::Wedge;
 
 struct Part {
-  double kept = 0.0, against = 0.0;  ///< area of the triangles that agree with the first, or do not
+  double kept = 0.0, against = 0.0;  ///< area that agrees with the first triangle, and other area
   bool mixed = false, orientable = true, closed = true;
-  bool doubled = false;  ///< of second sides, so that the file tells no side
-  bool turned = false;   ///< against its first triangle, in the end
-  bool as_file = false;  ///< not mixed, and turned against the file
+  bool doubled = false;  ///< has second sides, so the file does not tell its orientation
+  bool turned = false;   ///< the final orientation is opposite to that of its first triangle
+  bool as_file = false;  ///< reversed against the file, and not mixed
   Extent extent;
   Wedge wedge;
 };
@@ -91,7 +91,7 @@ class Orienter {
     const glm::uvec3 corners = mesh_.triangles[t];
     return {welded_[corners.x], welded_[corners.y], welded_[corners.z]};
   }
-  /// Whether a triangle has an area to speak of: three different positions.
+  /// Whether a triangle is kept and has three different positions.
   [[nodiscard]] bool counts(std::size_t t) const {
     const glm::uvec3 c = welded_corners(t);
     return removed_[t] == 0 && c.x != c.y && c.y != c.z && c.z != c.x;
@@ -100,7 +100,7 @@ class Orienter {
     return {mesh_.triangles, welded_, [this](std::size_t t) { return counts(t); }};
   }
 
-  /// Pairs of equal triangles that look opposite ways: partner, else kNone.
+  /// For each triangle the equal triangle that faces the opposite way, or kNone.
   [[nodiscard]] std::vector<std::uint32_t> opposite_pairs() const {
     const std::size_t count = mesh_.triangles.size();
     std::vector<std::uint32_t> first(count), partner(count, kNone);
@@ -130,15 +130,15 @@ class Orienter {
     return partner;
   }
 
-  /// The outlines of polygons, which diagonals are no part of.
+  /// The outlines of polygons, without the diagonals of their triangulations.
   struct Outlines {
     struct Side {
       std::uint32_t low, high;
       int way;
     };
     struct Polygon {
-      std::size_t begin, end;   ///< triangles
-      std::size_t first, last;  ///< sides
+      std::size_t begin, end;   ///< range of triangles
+      std::size_t first, last;  ///< range of sides
     };
     static bool less(const Side& a, const Side& b) {
       return std::tie(a.low, a.high) < std::tie(b.low, b.high);
@@ -150,7 +150,7 @@ class Orienter {
       const auto p = of(a), q = of(b);
       return std::lexicographical_compare(p.begin(), p.end(), q.begin(), q.end(), less);
     }
-    /// That they have the same sides, and look opposite ways.
+    /// Whether two polygons have the same sides and face opposite ways.
     [[nodiscard]] bool opposite(const Polygon& a, const Polygon& b) const {
       const auto p = of(a), q = of(b);
       return a.end - a.begin == b.end - b.begin &&
@@ -161,7 +161,7 @@ class Orienter {
     std::vector<Polygon> polygons;
   };
 
-  /// Of the faces that are several triangles, all of which count.
+  /// The outlines of the faces that consist of several triangles, all of which count.
   [[nodiscard]] Outlines outlines() const {
     Outlines result;
     auto& sides = result.sides;
@@ -178,7 +178,7 @@ class Orienter {
         }
       }
       std::sort(sides.begin() + static_cast<std::ptrdiff_t>(first), sides.end(), Outlines::less);
-      std::size_t last = first;  // diagonals, used once each way, fall out
+      std::size_t last = first;  // diagonals are used once in each direction and cancel
       for (std::size_t i = first; i < sides.size();) {
         Outlines::Side side = sides[i];
         for (++i; i < sides.size() && !Outlines::less(side, sides[i]); ++i) {
@@ -193,7 +193,7 @@ class Orienter {
     return result;
   }
 
-  /// The same of polygons that look opposite ways, which may be cut along other diagonals.
+  /// Pairs polygons that face opposite ways. Their triangulations may use different diagonals.
   void pair_polygons(std::vector<std::uint32_t>& partner) const {
     Outlines found = outlines();
     auto& polygons = found.polygons;
@@ -213,7 +213,7 @@ class Orienter {
     }
   }
 
-  /// Removes the second sides of parts that have each face twice and are closed by one of them.
+  /// Removes the second sides of parts that have every face twice and are closed by one side alone.
   void find_double_faces(Orientation& found) {
     detail::EdgeUses uses = edge_uses();
     bool many = false;
@@ -271,11 +271,11 @@ class Orienter {
     add(b.of(), a.of());
   }
 
-  /// Joins the triangles at edges of two. What is left stands in loose_.
+  /// Connects the triangles at edges with two uses. Other uses go to loose_.
   void link() {
     links_.assign(mesh_.triangles.size(), {kNone, kNone, kNone});
     detail::EdgeUses uses = edge_uses();
-    std::vector<std::pair<std::uint64_t, detail::EdgeUse>> own;  // by the vertices of the file
+    std::vector<std::pair<std::uint64_t, detail::EdgeUse>> own;  // by the file's own vertices
     for (std::size_t v = 0; v < welded_.size(); ++v) {
       uses.for_edges(v, [&](std::span<const detail::EdgeUse> edge) {
         if (edge.size() == 2) return connect(edge[0], edge[1]);
@@ -303,7 +303,7 @@ class Orienter {
     }
   }
 
-  /// The vertices that a triangle has at the ends of an edge, before welding.
+  /// The two vertices of an edge as the triangle names them, before welding.
   [[nodiscard]] std::uint64_t file_edge(const detail::EdgeUse& use, std::uint32_t low) const {
     const glm::uvec3 corners = mesh_.triangles[use.of()];
     std::uint64_t a = 0, b = 0;
@@ -314,7 +314,7 @@ class Orienter {
     return a << 32 | b;
   }
 
-  /// Parts, and whether each triangle agrees with the first of its part.
+  /// Finds the parts, and whether each triangle agrees with the first one of its part.
   void flood() {
     part_of_.assign(mesh_.triangles.size(), kNone);
     turned_.assign(mesh_.triangles.size(), 0);
@@ -349,8 +349,8 @@ class Orienter {
     }
   }
 
-  /// A part is closed by itself when it uses its edges of more or fewer faces equally often both
-  /// ways.
+  /// Checks which parts are closed: those that use each edge of more or fewer than two faces
+  /// equally often in both directions.
   void check_closed() {
     struct Sum {
       std::uint32_t part, low, high;
@@ -396,7 +396,7 @@ class Orienter {
     part.wedge.volume = -part.wedge.volume;
   }
 
-  /// Of a part whose triangles did not agree the larger area keeps its side; equal ones look
+  /// Orients mixed parts. The larger area keeps its orientation; with equal areas the part faces
   /// outward.
   void choose_larger_side() {
     for (Part& part : parts_) {
@@ -408,11 +408,11 @@ class Orienter {
     }
   }
 
-  /// Turns closed parts that are inside out and bound no cavity, and what is within them.
+  /// Reverses closed parts that are inside out and bound no cavity. Parts inside them follow.
   void turn_inside_out() {
     const auto inside_out = [](const Part& part) { return part.closed && part.wedge.negative(); };
     if (std::none_of(parts_.begin(), parts_.end(), inside_out)) return;
-    // Closed parts, the larger first: what lies within another one comes after it.
+    // Closed parts are sorted by decreasing volume: a part inside another one comes after it.
     std::vector<std::uint32_t> order, place(parts_.size(), kNone);
     for (std::uint32_t i = 0; i < parts_.size(); ++i) {
       const Part& part = parts_[i];
@@ -440,11 +440,11 @@ class Orienter {
     for (std::uint32_t i = 0; i < order.size(); ++i) {
       Part& part = parts_[order[i]];
       int around = 0;
-      std::uint32_t parent = kNone;  // the smallest part around
+      std::uint32_t parent = kNone;  // the smallest part around this one
       for (; next != windings.end() && next->around == i; ++next) {
-        if (next->part >= i) continue;  // not larger: they only cross
+        if (next->part >= i) continue;  // a part that is not larger only crosses this one
         around += flipped[next->part] != 0 ? -next->times : next->times;
-        parent = next->part;  // sorted, so that the last one is the smallest
+        parent = next->part;  // sorted by size, so the last one is the smallest
       }
       const bool follows = parent != kNone && !part.mixed && parts_[order[parent]].as_file;
       bool flip = follows;
@@ -456,7 +456,7 @@ class Orienter {
     }
   }
 
-  /// What is not closed, as a whole.
+  /// Orients the open parts together.
   void turn_open(Orientation& found) {
     Bounds box;
     bool even = true;
@@ -479,7 +479,7 @@ class Orienter {
     }
   }
 
-  /// Triangles as they come out, and the numbers.
+  /// Sets the final orientation of each triangle and counts the changes.
   void count(Orientation& found) {
     found.parts = parts_.size();
     for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) {
@@ -504,11 +504,11 @@ class Orienter {
   TriangleSoup& mesh_;
   const Execution& execution_;
   std::vector<std::uint32_t> welded_;
-  std::vector<char> removed_, doubled_;              ///< second sides, and their partners
-  std::vector<std::array<std::uint32_t, 3>> links_;  ///< [triangle:31 | looks the other way:1]
+  std::vector<char> removed_, doubled_;  ///< second sides, and the triangles they duplicate
+  std::vector<std::array<std::uint32_t, 3>> links_;  ///< [triangle:31 | faces the opposite way:1]
   std::vector<std::pair<std::uint32_t, detail::EdgeUse>> loose_;  ///< uses without a partner
   std::vector<std::uint32_t> part_of_;
-  std::vector<char> turned_;  ///< against the file
+  std::vector<char> turned_;  ///< reversed against the file
   std::vector<Part> parts_;
 };
 

@@ -16,14 +16,14 @@
 #include "strata/mesh/soup_tools.h"
 #include "strata/mesh/triangle_soup.h"
 
-// What orient_parts() knows of parts; private to mesh/.
+// The measures of parts that orient_parts() uses; private to mesh/.
 
 namespace strata::detail {
 
-/// Volumes below this share of what they are summed of are none.
+/// A volume counts as zero below this fraction of the summed absolute volumes.
 inline constexpr double kNoVolume = 1e-9;
 
-/// Six times the volume between a triangle and a point, and its size without the sign.
+/// Six times the volume between triangles and a point, and the sum of the absolute values.
 struct Wedge {
   double volume = 0.0, size = 0.0;
   void add(const TriangleSoup& mesh, std::size_t t, const glm::dvec3& about, bool turned) {
@@ -38,22 +38,22 @@ struct Wedge {
   [[nodiscard]] bool positive() const { return volume > kNoVolume * size; }
 };
 
-/// Of a closed part: a point on it, and its box.
+/// A point on a closed part, and the part's box.
 struct PartSample {
   glm::dvec3 point{0.0}, low{0.0}, high{0.0};
 };
 
-/// A triangle's positions, the least first, so that the order in the file does not matter.
+/// A triangle's sorted positions, independent of their order in the file.
 using Corners = std::array<glm::dvec3, 3>;
 
 inline bool less(const glm::dvec3& a, const glm::dvec3& b) {
   return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z);
 }
 
-/// Where a part lies.
+/// The extent of a part.
 struct Extent {
   Bounds box;
-  Corners least{};  ///< of the triangle whose positions are least
+  Corners least{};  ///< positions of the least triangle
 
   void include(const TriangleSoup& mesh, std::size_t t) {
     const glm::uvec3 at = mesh.triangles[t];
@@ -71,26 +71,26 @@ struct Extent {
   }
 };
 
-/// How often the surface of `part` winds around the sample of another one.
+/// How often the surface of `part` winds around the sample of the part `around`.
 struct Winding {
   std::uint32_t around = 0, part = 0;
   int times = 0;
 };
 
-/// The windings that are not 0 of each part around the samples of those whose box its own box
-/// holds, sorted. @param part_of  of each triangle; those >= samples.size() do not count
-/// @param turned  triangles that count the other way around
-/// @param stop  some are missing once it is requested
+/// The non-zero windings of parts around the samples of other parts, sorted. Only parts whose box
+/// contains the box of the sample's part are examined.
+/// @param part_of  the part of each triangle; triangles with values >= samples.size() do not count
+/// @param turned  the triangles that count as reversed
+/// @param stop  after a stop request some windings are missing
 [[nodiscard]] std::vector<Winding> windings_around(const TriangleSoup& mesh,
                                                    const std::vector<std::uint32_t>& part_of,
                                                    const std::vector<char>& turned,
                                                    const std::vector<PartSample>& samples,
                                                    const std::stop_token& stop);
 
-/// Whether every piece of a closed mesh that shares no vertex with the others has a volume above 0,
-/// or bounds a cavity.
-/// @param by_index  edges that are balanced by position alone: their ends are one
-/// @param all_positive  it is known that all of the mesh has
+/// Whether each vertex-connected piece of a closed mesh has a positive volume or bounds a cavity.
+/// @param by_index  edges that are balanced by position only; their ends are merged
+/// @param all_positive  the volume of the whole mesh is known to be positive
 [[nodiscard]] bool all_outward(const TriangleSoup& mesh, std::span<const EdgeSum> by_index,
                                bool all_positive, const Execution& execution);
 

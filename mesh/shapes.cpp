@@ -15,14 +15,15 @@ namespace {
 
 constexpr double kTau = 2.0 * std::numbers::pi;
 
-/// Two triangles for the quadrilateral a, b, c, d, counter-clockwise from outside.
+/// Adds two triangles for the quadrilateral a, b, c, d, counter-clockwise from outside.
 void add_quad(TriangleSoup& mesh, std::uint32_t a, std::uint32_t b, std::uint32_t c,
               std::uint32_t d) {
   mesh.triangles.emplace_back(a, b, c);
   mesh.triangles.emplace_back(a, c, d);
 }
 
-/// Joins a closed grid of rings: vertex (i, j) is i * sides + j, both wrap around.
+/// Joins rings into a closed surface. Vertex (i, j) has index i * sides + j; both indices wrap
+/// around.
 void add_closed_grid(TriangleSoup& mesh, int rings, int sides) {
   const auto index = [&](int i, int j) {
     return static_cast<std::uint32_t>(i % rings * sides + j % sides);
@@ -168,7 +169,7 @@ TriangleSoup make_torus_knot(int p, int q, double tube, int segments, int sides)
     const glm::dvec3 centre(r * ct, r * st, std::sin(q * t));
     const glm::dvec3 tangent =
         glm::normalize(glm::dvec3(dr * ct - r * p * st, dr * st + r * p * ct, q * std::cos(q * t)));
-    // The frame follows the normal of the torus the knot lies on: it comes back to itself.
+    // The frame follows the normal of the torus that holds the knot, so it closes after one turn.
     const glm::dvec3 outward(std::cos(q * t) * ct, std::cos(q * t) * st, std::sin(q * t));
     const glm::dvec3 e1 = glm::normalize(outward - glm::dot(outward, tangent) * tangent);
     const glm::dvec3 e2 = glm::cross(e1, tangent);
@@ -193,7 +194,8 @@ TriangleSoup subdivide(const TriangleSoup& mesh) {
     const auto [at, fresh] =
         midpoints.try_emplace(edge_key(a, b), static_cast<std::uint32_t>(result.positions.size()));
     if (fresh) {
-      // Lower index first: the same sum for both neighbours even if they were not merged.
+      // The lower index comes first, so that both neighbours compute the same sum even if they are
+      // not merged.
       const std::uint32_t low = std::min(a, b), high = std::max(a, b);
       result.positions.push_back(0.5 * mesh.positions[low] + 0.5 * mesh.positions[high]);
     }

@@ -22,7 +22,8 @@ Bounds bounds(const TriangleSoup& mesh, const Execution& execution) {
 
 double signed_volume(const TriangleSoup& mesh, const Execution& execution) {
   if (mesh.triangles.empty()) return 0.0;
-  // Near the mesh, or far meshes lose all digits.
+  // Positions are taken relative to a point of the mesh. Meshes far from the origin would lose
+  // their digits otherwise.
   const glm::dvec3 origin = mesh.positions[mesh.triangles.front().x];
   const double six = detail::fold_blocks<double>(
       execution, mesh.triangles.size(),

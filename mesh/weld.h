@@ -12,11 +12,12 @@
 #include "core/reserve_large.h"
 #include "strata/core/execution.h"
 
-/// Finding equal positions; not for others.
+/// Finds equal positions; private.
 namespace strata::detail {
 
-/// An open-addressing hash table from three numbers, compared bit by bit, to a 32-bit value. Probes
-/// linearly, grows at 5/8. Keys stand in the slots, so a look-up touches one cache line.
+/// An open-addressing hash table that maps three numbers, compared bit by bit, to a 32-bit value.
+/// It probes linearly and grows at a load of 5/8. Slots hold their keys, so a look-up touches one
+/// cache line.
 template <class Scalar>
 class WeldTable {
  public:
@@ -24,7 +25,7 @@ class WeldTable {
 
   explicit WeldTable(std::size_t expected) { allocate(std::bit_ceil(expected * 8 / 5 + 16)); }
 
-  /// -0 becomes +0, so that both are one position.
+  /// Replaces -0 by +0, so that both are one position.
   static Key canonical(const Key& key) {
     if constexpr (std::is_floating_point_v<Scalar>) {
       return {key.x + Scalar(0), key.y + Scalar(0), key.z + Scalar(0)};
@@ -41,8 +42,8 @@ class WeldTable {
 
   void prefetch(std::uint64_t hash) const { __builtin_prefetch(&slots_[hash & mask_]); }
 
-  /// The value stored for a canonical key; when there is none, `value` is stored first.
-  /// @pre value < 2^32 - 1
+  /// The value stored for a canonical key. If there is none, stores `value` first. @pre value <
+  /// 2^32 - 1
   std::uint32_t find_or_insert(const Key& key, std::uint64_t hash, std::uint32_t value) {
     for (std::size_t at = hash & mask_;; at = (at + 1) & mask_) {
       Slot& slot = slots_[at];
@@ -94,8 +95,8 @@ class WeldTable {
   std::size_t mask_ = 0, size_ = 0;
 };
 
-/// The place of a position among `kept`, where it is put when it is not there yet.
-/// @param table  holds the places of all of `kept`
+/// The index of a position in `kept`. Appends the position if it is not there yet.
+/// @param table  holds the indices of all positions in `kept`
 inline std::uint32_t find_or_keep(WeldTable<double>& table, std::vector<glm::dvec3>& kept,
                                   const glm::dvec3& position) {
   const glm::dvec3 key = WeldTable<double>::canonical(position);
@@ -105,25 +106,26 @@ inline std::uint32_t find_or_keep(WeldTable<double>& table, std::vector<glm::dve
   return at;
 }
 
-/// For every i in [0, count): first[i] = the least j whose position equals that of i. Each thread
-/// owns the positions whose hash falls to it, so the result does not depend on their number.
+/// Sets first[i], for every i in [0, count), to the least j whose position equals that of i. Each
+/// thread owns the positions whose hash falls to it, so the result does not depend on the number of
+/// threads.
 /// @param load  load(i) -> glm::vec<3, Scalar> @pre count < 2^32 - 1
-/// @param go_on  asked by all threads now and then, with i; once it says false, `first` is left
-/// unfinished
+/// @param go_on  go_on(i) is called now and then by all threads; after it returns false, `first`
+/// stays incomplete
 /// @return number of different positions
 template <class Scalar, class Load, class GoOn = bool (*)(std::size_t)>
 std::size_t weld_first(
     const Execution& execution, std::size_t count, Load&& load, std::uint32_t* first,
     GoOn&& go_on = [](std::size_t) { return true; }) {
   using Table = WeldTable<Scalar>;
-  constexpr std::size_t kBatch = 32;  // look-ups in flight, to overlap their cache misses
+  constexpr std::size_t kBatch = 32;  // look-ups in flight, so that their cache misses overlap
   constexpr std::size_t kLookUp = std::size_t{1} << 16;
   const std::size_t parts = count < 50000 ? 1 : static_cast<std::size_t>(execution.thread_count());
   std::vector<std::size_t> different(parts);
   Execution all = execution;
-  all.stop = {};  // a part left out would leave its corners unset
+  all.stop = {};  // a skipped block would leave its corners unset
   parallel_for(all, parts, [&](std::size_t part, int) {
-    Table table(count / 5 / parts);  // a closed mesh has 1/6 as many vertices as corners
+    Table table(count / 5 / parts);  // a closed mesh has one vertex for six corners
     typename Table::Key keys[kBatch];
     std::uint64_t hashes[kBatch];
     std::uint32_t indices[kBatch];

@@ -41,7 +41,7 @@ void append_utf8(std::string& out, std::uint32_t code) {
   byte(0x80 | (code & 0x3f));
 }
 
-/// What stands at a place, for messages.
+/// Describes the text at a place, for messages.
 std::string shown(std::string_view rest) {
   if (rest.empty()) return "the end of the file";
   std::size_t length = 1;
@@ -80,11 +80,11 @@ class Parser {
  private:
   struct Open {
     std::uint32_t node;
-    bool braces;  // else it takes one child: `multmatrix(...) cube();`
+    bool braces;  // false: it takes one child without braces, as in `multmatrix(...) cube();`
   };
 
   bool refuse(const char* where, std::string_view text) {
-    constexpr std::size_t kMost = 600;  // a name in it may be as long as the file
+    constexpr std::size_t kMost = 600;  // a name in a message may be as long as the file
     const auto offset = static_cast<std::uint32_t>(where - begin_);
     error_ = {ErrorCode::kInput, fmt::format("{}: {}", ast_.place(offset), printable(text, kMost))};
     return false;
@@ -119,7 +119,7 @@ class Parser {
 
   std::uint32_t offset() const { return static_cast<std::uint32_t>(at_ - begin_); }
 
-  /// The innermost node is complete; so are those around it that take no braces.
+  /// Completes the innermost node, and with it the nodes around it that take no braces.
   void finish(std::uint32_t node) {
     for (;;) {
       ast_.nodes[node].end = static_cast<std::uint32_t>(ast_.nodes.size());
@@ -224,7 +224,7 @@ class Parser {
           ++at_;
           argument.name = name;
         } else {
-          at_ = start;  // a value such as `true`
+          at_ = start;  // not a call but a value such as `true`
         }
       }
       argument.value = static_cast<std::uint32_t>(ast_.values.size());
@@ -254,7 +254,7 @@ class Parser {
       } else if (!scalar()) {
         return false;
       }
-      // After a value: more of it, or the ends of lists.
+      // A value has ended. More values, or the ends of lists, follow.
       for (;;) {
         if (lists_.size() == depth) return true;
         if (!skip_space()) return false;
@@ -326,11 +326,11 @@ class Parser {
     return true;
   }
 
-  /// A number outside the range of double: infinity or 0, as its exponent says.
+  /// The value of a number beyond the range of double: infinity or 0, depending on its exponent.
   static double huge_or_tiny(std::string_view token) {
     const std::size_t e = token.find_first_of("eE");
     if (e != std::string_view::npos && e + 1 < token.size() && token[e + 1] == '-') return 0.0;
-    // Without a negative exponent only many leading zeros after the point make it tiny.
+    // Without a negative exponent only many zeros after the point can make a number that small.
     const std::size_t digit = token.find_first_of("123456789");
     const std::size_t point = token.find('.');
     if (e == std::string_view::npos && point < digit) return 0.0;
@@ -355,7 +355,8 @@ class Parser {
     return true;
   }
 
-  /// At the character after a backslash. What is no escape stands for itself, as in OpenSCAD.
+  /// Reads the character after a backslash. A character that is no escape stands for itself, as in
+  /// OpenSCAD.
   void escape(std::string& text) {
     const char c = *at_++;
     switch (c) {
@@ -404,7 +405,7 @@ class Parser {
 }  // namespace
 
 std::string Ast::place(std::uint32_t offset) const {
-  // Before line_starts is made (errors of the parser), the lines are counted.
+  // Errors of the parser come before line_starts exists, so the lines are counted here.
   std::size_t line = 0, start = 0;
   if (!line_starts.empty()) {
     const auto after = std::upper_bound(line_starts.begin(), line_starts.end(), offset);
@@ -434,7 +435,7 @@ std::string ValueRef::shown() const {
   constexpr std::size_t kMost = 60;
   if (!ast_) return "undef";
   std::string text;
-  std::vector<std::uint32_t> ends;  // of the lists that are open
+  std::vector<std::uint32_t> ends;  // the ends of the open lists
   const auto close = [&](std::uint32_t at) {
     for (; !ends.empty() && ends.back() == at; ends.pop_back()) text += ']';
   };

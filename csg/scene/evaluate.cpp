@@ -49,7 +49,7 @@ const Module* find_module(std::string_view name) {
 
 bool has_own_frame(NodeKind kind) { return kind >= NodeKind::kHull && kind < NodeKind::kLeaf; }
 
-/// Whether the file was written by a version after 2021.01: it leaves defaults out.
+/// Whether a version after 2021.01 wrote the file. Such versions leave out default values.
 bool is_newer_dialect(const Ast& ast) {
   for (const AstNode& node : ast.nodes) {
     const NodeArguments arguments(ast, node);
@@ -62,8 +62,8 @@ bool is_newer_dialect(const Ast& ast) {
   return false;
 }
 
-/// The argument of multmatrix; what is missing is the identity's.
-/// @param fault  becomes what is no number or not finite, if anything is
+/// Reads the argument of multmatrix. Missing entries are those of the identity.
+/// @param fault  describes an entry that is not a finite number, if there is one
 glm::dmat4 read_matrix(const ValueRef& value, std::string& fault) {
   glm::dmat4 matrix(1.0);
   int row = 0;
@@ -81,7 +81,7 @@ glm::dmat4 read_matrix(const ValueRef& value, std::string& fault) {
     }
     ++row;
   }
-  // Homogeneous coordinates are scaled back; perspective is left out, as in OpenSCAD.
+  // The homogeneous coordinate is divided out; perspective is ignored, as in OpenSCAD.
   const double w = matrix[3][3];
   if (w != 1.0 && w != 0.0 && std::isfinite(w)) matrix *= 1.0 / w;
   matrix[0][3] = matrix[1][3] = matrix[2][3] = 0.0;
@@ -117,7 +117,7 @@ Result<Scene> Evaluator::run() {
   scene_.relative_precision = 5e-6;
   const auto count = static_cast<std::uint32_t>(ast_.nodes.size());
   std::uint32_t first = 0, end = count;
-  // `!`: the first such subtree is the whole scene, without the transforms around it.
+  // The first subtree with `!` is the whole scene, without the transforms around it.
   bool found = false;
   for (std::uint32_t i = 0; i < count; ++i) {
     const AstNode& node = ast_.nodes[i];
@@ -163,12 +163,12 @@ void Evaluator::walk(std::uint32_t first, std::uint32_t end) {
     }
     const std::size_t depth = frames_.size();
     if (!(ast_.nodes[node].modifiers & AstNode::kDisabled)) enter(node);
-    // A leaf is done with, and so is what it had as children.
+    // A leaf is complete now; its children, if any, are skipped.
     node = frames_.size() > depth ? node + 1 : ast_.nodes[node].end;
   }
 }
 
-/// Never less than before: the work on a node comes after that on its children.
+/// Reports progress. The share never decreases: work on a node follows the work on its children.
 void Evaluator::report(double done) {
   reported_ = std::max(reported_, done);
   if (execution_.progress) execution_.progress(reported_);
@@ -193,7 +193,7 @@ void Evaluator::enter(std::uint32_t node) {
   frame.base = operands_.size();
   frame.outside = around;
   if (call.modifiers & AstNode::kBackground) {
-    // Ghosts are shown where they would be, outside of all frames.
+    // Ghosts are placed in the world, outside all frames.
     frame.outside.world = around.outer * around.world;
     frame.outside.outer = glm::dmat4(1.0);
     frame.outside.keep_flattened = false;
@@ -231,7 +231,7 @@ void Evaluator::enter(std::uint32_t node) {
   frames_.push_back(std::move(frame));
 }
 
-/// @return whether the subtree stays
+/// @return whether the subtree is kept
 bool Evaluator::enter_transform(Frame& frame) {
   std::string fault;
   const glm::dmat4 matrix = read_matrix(arguments(frame.node).find("m", 0), fault);
@@ -257,7 +257,7 @@ void Evaluator::enter_colour(Frame& frame) {
   numbers[3] = given.find("alpha", 1).number(numbers[3]);
   const bool is_set = numbers[0] >= 0.0 && numbers[1] >= 0.0 && numbers[2] >= 0.0;
   std::optional<glm::vec4>& inside = frame.inside.colour;
-  if (inside && inside->r >= 0.0f) return;  // the outermost colour that is set wins
+  if (inside && inside->r >= 0.0f) return;  // the outermost colour wins
   glm::vec4 colour(kSchemeColour, 1.0f);
   for (int i = 0; i < 4; ++i) {
     if (numbers[i] >= 0.0 && (is_set || i == 3)) {
@@ -290,12 +290,14 @@ void Evaluator::leave() {
   finish(frame.node, frame.modifiers, frame.outside, frame.base, frame.dimension);
 }
 
-/// Differences and intersections. Unions leave their operands where they are.
+/// Combines the operands of a difference or an intersection. The operands of a union stay on the
+/// stack.
 void Evaluator::combine(Frame& frame) {
   if (frame.kind == NodeKind::kUnion) return;
   if (frame.dimension == Dimension::kFlat) return combine_flat(frame);
   const bool difference = frame.kind == NodeKind::kDifference;
-  // As in OpenSCAD a result is highlighted with its first operand, or with all it is common to.
+  // As in OpenSCAD, a difference is highlighted if its first operand is, and an intersection if all
+  // its operands are.
   std::size_t first_end = frame.base;
   while (first_end < operands_.size() &&
          (!difference || operands_[first_end].child == operands_[frame.base].child)) {
@@ -335,7 +337,7 @@ void Evaluator::combine_flat(Frame& frame) {
     ++first_end;
   }
   show_highlights(first_end, operands_.size(), frame.inside.outer);
-  std::vector<Outline> regions{Outline{}};  // the piece, and what it meets
+  std::vector<Outline> regions{Outline{}};  // the piece, then the operands it is combined with
   if (frame.kind == NodeKind::kDifference) {
     for (std::size_t i = first_end; i < operands_.size(); ++i) {
       regions.push_back(std::move(operands_[i].outline));
@@ -370,7 +372,7 @@ void Evaluator::combine_flat(Frame& frame) {
                   operands_.end());
 }
 
-/// The node is complete: ghosts are shown, and the node around takes the operands.
+/// Completes a node: shows its ghosts and leaves its operands to the node around it.
 void Evaluator::finish(std::uint32_t node, std::uint8_t modifiers, const Context& outside,
                        std::size_t base, Dimension dimension) {
   if (error_) return;
@@ -467,7 +469,7 @@ bool Evaluator::show_beside(std::size_t base) {
   return true;
 }
 
-/// The flat operands from `base` on become slabs, one for each colour.
+/// Turns the flat operands from `base` on into slabs, one for each colour.
 void Evaluator::make_slabs(std::size_t base) {
   std::vector<Operand> slabs;
   std::vector<bool> done(operands_.size(), false);
@@ -498,7 +500,7 @@ void Evaluator::make_slabs(std::size_t base) {
   for (Operand& slab : slabs) operands_.push_back(std::move(slab));
 }
 
-/// Nodes that became parts of hulls and the like leave the tree.
+/// Removes nodes from the tree that were only used to compute hulls and similar operations.
 void Evaluator::drop_leftovers() {
   std::vector<Tree::NodeId> kept{scene_.tree.root()};
   kept.insert(kept.end(), scene_.backgrounds.begin(), scene_.backgrounds.end());
@@ -520,14 +522,14 @@ Scene Evaluator::take_scene() {
   const bool placed = !beside_.empty() && !operands_.empty() && operands_[0].flat;
   if (!operands_.empty() && operands_[0].flat) {
     scene_.flat = true;
-    // Beside solids they are seen where their transforms in space put them.
+    // Beside solids, flat operands are shown where their transforms in space put them.
     for (std::size_t i = 0; i < operands_.size() && placed; ++i) {
       if (operands_[i].highlight == 0) beside_.push_back(ghost(i, i + 1, true));
     }
     make_slabs(0);
   }
   std::vector<Tree::NodeId> roots;
-  std::vector<bool> is_ghost;  // highlighted parts of the scene are seen through
+  std::vector<bool> is_ghost;  // highlighted parts of the scene are drawn as ghosts
   for (const Operand& operand : operands_) {
     roots.push_back(operand.solid);
     is_ghost.push_back(operand.highlight != 0);

@@ -37,7 +37,7 @@ void Evaluator::read_new_size(std::uint32_t node, std::span<double> sizes) {
   for (const ValueRef element : value) {
     const double size = element.number(NAN);
     all &= std::isfinite(size);
-    // Less than 0 keeps the size, as 0 does in OpenSCAD.
+    // A negative size keeps the axis, as 0 does in OpenSCAD.
     if (axis < sizes.size()) sizes[axis++] = std::isfinite(size) ? std::max(size, 0.0) : 0.0;
   }
   if (!all) {
@@ -77,7 +77,7 @@ Segments Evaluator::segments(std::uint32_t node) {
 
 bool Evaluator::is_length(std::uint32_t node, std::string_view argument, double length) {
   if (std::isfinite(length) && length >= 0.0) return true;
-  // A nan has a sign that means nothing.
+  // The sign of a NaN has no meaning.
   warn(node, "geometry",
        fmt::format("'{}': {} is {:g}, {}; it is left out", name(node), argument,
                    std::isnan(length) ? std::abs(length) : length,

@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A file's name in a message.
+/// A file's name as messages show it.
 std::string shown(std::string_view name) { return printable(name, 120); }
 
 std::string extension_of(const std::string& path) {
@@ -41,7 +41,8 @@ void move_to_middle(TriangleSoup& mesh) {
   for (glm::dvec3& p : mesh.positions) p -= middle;
 }
 
-/// The first place of `name` in a folder or those around it that passes the test.
+/// Looks for `name` in a folder and the folders around it. Returns the first path that passes the
+/// test.
 template <class Test>
 std::optional<std::string> first_place(const std::string& folder, const std::string& name,
                                        Test&& test) {

@@ -9,16 +9,16 @@
 namespace strata::csg {
 namespace {
 
-/// No argument stands there.
+/// The position of an argument that can only be given by name.
 constexpr auto kNamedOnly = std::numeric_limits<std::uint32_t>::max();
 
-/// Reads indices of points as OpenSCAD does, and says what is wrong with them.
+/// Reads indices of points as OpenSCAD does, and describes their faults.
 class IndexReader {
  public:
-  /// @param list  what the indices make: "face"
+  /// @param list  the kind of list in messages, such as "face"
   IndexReader(std::string_view list, std::size_t points) : list_(list), points_(points) {}
 
-  /// @param at  which list it stands in
+  /// @param at  number of the list
   void read(const ValueRef& value, std::size_t at, std::vector<std::uint32_t>& indices) {
     const double number = value.number(-1.0);
     const bool there = number >= 0.0 && number < static_cast<double>(points_);
@@ -27,7 +27,7 @@ class IndexReader {
     Fault& fault = there ? broken_ : out_of_range_;
     if (fault.count++ == 0) fault.first = fmt::format("{} in {} {}", value.shown(), list_, at);
   }
-  /// A sentence for each kind of fault.
+  /// One sentence for each kind of fault.
   [[nodiscard]] std::vector<std::string> faults() const {
     std::vector<std::string> texts;
     if (out_of_range_.count > 0) {
@@ -70,7 +70,7 @@ void Evaluator::leaf(std::uint32_t node, const Context& context) {
   }
 }
 
-/// One mesh for all primitives with these arguments; none if it is beyond the limits.
+/// One mesh shared by all primitives with the same arguments; none if it would exceed the limits.
 template <class Make>
 std::shared_ptr<const TriangleSoup> Evaluator::primitive(std::uint32_t node,
                                                          std::vector<double> key, double segments,
@@ -144,7 +144,7 @@ void Evaluator::polyhedron(std::uint32_t node, const Context& context) {
   for (const ValueRef face : list) {
     std::vector<std::uint32_t>& corners = faces.emplace_back();
     for (const ValueRef corner : face) reader.read(corner, faces.size() - 1, corners);
-    std::reverse(corners.begin(), corners.end());  // clockwise seen from outside in the file
+    std::reverse(corners.begin(), corners.end());  // clockwise in the file, seen from outside
   }
   for (const std::string& text : reader.faults()) warn(node, "geometry", text);
   BentFaces bent;
@@ -193,7 +193,7 @@ void Evaluator::polygon(std::uint32_t node, const Context& context) {
   }
   std::vector<std::vector<std::uint32_t>> paths;
   IndexReader reader("path", points.size());
-  std::vector<std::uint32_t> flat_path;  // `paths = [0, 1, 2]`: one path without its brackets
+  std::vector<std::uint32_t> flat_path;  // `paths = [0, 1, 2]` is one path without its own brackets
   for (const ValueRef path : given.find("paths", 1)) {
     if (!path.is_list()) {
       reader.read(path, 0, flat_path);
@@ -225,7 +225,7 @@ void Evaluator::text(std::uint32_t node, const Context& context) {
   options.halign = given.find("halign").string(options.halign);
   options.valign = given.find("valign").string(options.valign);
   options.segments = segments(node);
-  // A letter has about twenty curves, each an eighth of a circle or less.
+  // A letter has about twenty curves, each of an eighth of a circle or less.
   const double count = options.segments.count(options.size);
   const double points = 20.0 * static_cast<double>(options.text.size()) * (count / 8 + 1);
   if (!fits(node, fmt::format("{} bytes with {:g} segments a circle", options.text.size(), count),

@@ -10,7 +10,8 @@
 #include "strata/mesh/soup_tools.h"
 
 namespace strata::csg {
-/// Replaces the operands of a node that has a frame by what it makes of them, outside that frame.
+/// Replaces the operands of a node that has a frame by the node's result, placed outside that
+/// frame.
 void Evaluator::operate(Frame& frame) {
   replace_operands(frame);
   job_ended(frame.node);
@@ -24,7 +25,7 @@ void Evaluator::replace_operands(Frame& frame) {
                           frame.kind == NodeKind::kRoof;
   const bool takes_solid = frame.kind == NodeKind::kProjection;
   if (operands_.size() == frame.base) {
-    // The deprecated form: a file in place of children.
+    // The deprecated form names a file and has no children.
     const std::string file = arguments(frame.node).find("file").string();
     if (file.empty() || !(takes_flat || takes_solid)) return;
     import(frame.node, frame.inside);
@@ -80,8 +81,8 @@ TriangleSoup Evaluator::boundary_mesh(std::uint32_t node, Tree::NodeId solid) {
     stop(mesh.error().code, node, mesh.error().message);
     return {};
   }
-  // What is subtracted or intersected is left out of account: the result is too large by no more
-  // than the box of the first operands.
+  // Where the boundary cannot be computed, subtracted and intersected operands are ignored. The
+  // result is too large then, but stays in the box of the first operands.
   TriangleSoup all;
   std::vector<Tree::NodeId> waiting{solid};
   while (!waiting.empty()) {
@@ -132,7 +133,7 @@ void Evaluator::minkowski(Frame& frame) {
     children.back().push_back(operands_[i].solid);
   }
   operands_.resize(frame.base);
-  std::vector<Tree::NodeId> sources;  // of parts
+  std::vector<Tree::NodeId> sources;  // the solid of each operand, for its parts
   std::vector<std::vector<MinkowskiPart>> operands;
   for (const std::vector<Tree::NodeId>& child : children) {
     std::vector<MinkowskiPart> parts;
@@ -148,10 +149,10 @@ void Evaluator::minkowski(Frame& frame) {
       });
     }
     if (error_) return;
-    if (!parts.empty()) operands.push_back(std::move(parts));  // an empty operand is left out
+    if (!parts.empty()) operands.push_back(std::move(parts));  // empty operands are ignored
   }
   if (operands.empty()) return;
-  // The order of operands does not matter: the convex ones first make one.
+  // Operands commute. The convex ones come first, so that their sum stays a single part.
   std::stable_partition(operands.begin(), operands.end(),
                         [](const auto& parts) { return parts.size() == 1 && parts[0].convex(); });
   std::vector<MinkowskiPart> sum = std::move(operands[0]);
@@ -168,8 +169,8 @@ void Evaluator::minkowski(Frame& frame) {
   add_sum(frame, std::move(sum), sources);
 }
 
-/// The parts as solids that are united. Where there are very many convex ones, they are one mesh
-/// that overlaps itself; its pieces share edges, which readers of meshes take for faults.
+/// Adds the parts of a sum as united solids. Very many convex parts become one mesh that overlaps
+/// itself. Its pieces share edges, which readers of meshes would report as faults.
 void Evaluator::add_sum(const Frame& frame, std::vector<MinkowskiPart> sum,
                         std::span<const Tree::NodeId> sources) {
   constexpr std::ptrdiff_t kMostSolids = 4096;
@@ -205,7 +206,7 @@ void Evaluator::add_sum(const Frame& frame, std::vector<MinkowskiPart> sum,
     operand.node = frame.node;
     const std::size_t first = scene_.tree.solids().size();
     operand.solid = scene_.tree.append(scene_.tree, source, world);
-    // It lies inside the other parts, but the box of its operands may not.
+    // The part lies inside the others, but the box of its operands may be larger.
     const Bounds reach = bounds(scene_.tree, operand.solid);
     if (!box.empty() &&
         !(glm::min(reach.low, box.low) == box.low && glm::max(reach.high, box.high) == box.high)) {
@@ -342,7 +343,7 @@ void Evaluator::rotate_extrude(Frame& frame) {
   add_solid(frame.node, frame.outside, *std::move(mesh));
 }
 
-/// Nodes that make flat regions or roofs of flat regions.
+/// Runs nodes that make flat regions, or roofs of flat regions.
 void Evaluator::flat_operation(Frame& frame) {
   const NodeArguments given = arguments(frame.node);
   if (frame.kind == NodeKind::kMinkowski) {

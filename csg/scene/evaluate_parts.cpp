@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::size_t kMostWarnings = 1000;
 
-/// Of what a message says of a node, names and texts of the scene included.
+/// Longest text of the scene that a message quotes, in characters.
 constexpr std::size_t kMostText = 600;
 
 }  // namespace
@@ -43,8 +43,8 @@ void Evaluator::stop(ErrorCode code, std::uint32_t node, std::string_view text) 
 }
 
 bool Evaluator::fits(std::uint32_t node, std::string_view of, double count, Made made) {
-  // A triangle with its half of a vertex, in the mesh and in what shows it; a point of an outline
-  // with Clipper's edges around it.
+  // A triangle counts with its half of a vertex, once in the mesh and once in the code that shows
+  // it. A point of an outline counts with its edges in Clipper.
   const bool flat = made == Made::kPoints;
   const double each = flat ? 200.0 : 64.0, most = flat ? 20e6 : 100e6;
   const std::string_view unit = flat ? "points" : "triangles";

@@ -8,14 +8,14 @@
 #include "csg/scene/evaluator.h"
 #include "mesh/clamp.h"
 
-// What is said of solids that are far larger than others.
+// Checks and warnings for solids that are far larger than the others.
 
 namespace strata::csg {
 namespace {
 
-/// Results beyond this could not be looked at: cameras and volumes multiply lengths.
+/// Results beyond this could not be viewed or measured: cameras and volumes multiply lengths.
 constexpr double kMostResult = 1e100;
-/// Solids that reach less far are as exact as anything needs.
+/// Solids below this size are always exact enough.
 constexpr double kFar = 1e8;
 
 double largest(const glm::dvec3& p) {
@@ -24,8 +24,8 @@ double largest(const glm::dvec3& p) {
 
 double largest(const Bounds& box) { return std::max(largest(box.low), largest(box.high)); }
 
-/// Whether a face that is not parallel to two axes passes through `box`, or may, when it is off by
-/// `error`. @param reach  of the solid's coordinates
+/// Whether a face that is not parallel to two axes passes through `box`, or may pass through it
+/// given an error of `error`. @param reach  largest coordinate of the solid
 bool has_skew_face(const Solid& solid, const Bounds& box, double error, double reach) {
   const glm::dvec3 middle = 0.5 * (box.low + box.high) / reach;
   const double within = (glm::length((box.high - box.low) / reach) + error / reach);
@@ -46,7 +46,7 @@ bool has_skew_face(const Solid& solid, const Bounds& box, double error, double r
   return false;
 }
 
-/// A bound of the coordinates of each solid.
+/// An upper bound of each solid's coordinates.
 std::vector<double> reaches_of(const Tree& tree) {
   std::unordered_map<const TriangleSoup*, double> sizes;  // the largest coordinate of each mesh
   std::vector<double> reaches;
@@ -69,7 +69,7 @@ std::vector<double> reaches_of(const Tree& tree) {
   return reaches;
 }
 
-/// Of a solid's name, which is `cube at file:line:column`.
+/// The place and the kind of a solid, from its name `cube at file:line:column`.
 std::string named(const Solid& solid) {
   const std::size_t at = solid.name.find(" at ");
   return fmt::format("{}: '{}'", at != std::string::npos ? solid.name.substr(at + 4) : "scene",

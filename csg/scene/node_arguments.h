@@ -7,13 +7,15 @@
 
 namespace strata::csg {
 
-/// The arguments of a call, by name or by position. Of several with one name the last counts.
+/// The arguments of a call, by name or by position. If a name is repeated, the last argument
+/// counts.
 class NodeArguments {
  public:
   NodeArguments(const Ast& ast, const AstNode& node) : ast_(&ast), node_(&node) {}
 
   [[nodiscard]] ValueRef find(std::string_view name) const;
-  /// By name, or the argument without a name at `position` (counted among those, from 0).
+  /// The argument of this name, else the unnamed argument at `position`, counted from 0 among
+  /// unnamed ones.
   [[nodiscard]] ValueRef find(std::string_view name, std::uint32_t position) const;
 
   [[nodiscard]] double number(std::string_view name, double otherwise) const {
@@ -22,7 +24,7 @@ class NodeArguments {
   [[nodiscard]] bool truth(std::string_view name, bool otherwise) const {
     return find(name).truth(otherwise);
   }
-  /// $fn, $fa and $fs.
+  /// Reads $fn, $fa and $fs.
   [[nodiscard]] Segments segments(bool round_up) const;
 
  private:

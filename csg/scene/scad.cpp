@@ -27,12 +27,12 @@
 namespace strata::csg {
 namespace {
 
-/// Where openscad writes to: memory, which is gone with the last process that has it open.
+/// A file in memory for openscad's output. It vanishes with the last process that has it open.
 class Memory {
  public:
   Memory() {
     const int made = ::memfd_create("strata", MFD_CLOEXEC);
-    // Not among the standard streams, where they are closed.
+    // Its descriptor must not be one of the standard streams, which may be closed.
     descriptor_ = made < 0 ? made : ::fcntl(made, F_DUPFD_CLOEXEC, STDERR_FILENO + 1);
     if (made >= 0) ::close(made);
   }
@@ -53,15 +53,15 @@ class Memory {
   int descriptor_ = -1;
 };
 
-/// What openscad says, line by line as it comes.
+/// Sorts the text that openscad prints, line by line, into errors, warnings and notes.
 class Speech {
  public:
-  /// @param path  of the program, as messages name it
-  /// @param mark  what the line begins with that says where the camera is
+  /// @param path  path of the program, as messages name it
+  /// @param mark  prefix of the line with the camera
   Speech(const std::string& path, std::string mark) : path_(path), mark_(std::move(mark)) {}
 
   void hear(std::string_view bytes) {
-    constexpr std::size_t kMost = 1 << 16;  // its last words are the ones that count
+    constexpr std::size_t kMost = 1 << 16;  // only the last words are kept
     said_.append(bytes);
     if (said_.size() > 2 * kMost) said_.erase(0, said_.size() - kMost);
     line_.append(bytes);
@@ -73,13 +73,13 @@ class Speech {
     line_.erase(0, begin);
     if (line_.size() > kMost) end();
   }
-  /// No more will come.
+  /// The output has ended.
   void end() {
     take(line_);
     line_.clear();
   }
 
-  /// The end of it, on one line.
+  /// The end of the output, on one line.
   [[nodiscard]] std::string last_words() const {
     constexpr std::size_t kMost = 400;
     std::string_view said = said_;
@@ -88,19 +88,19 @@ class Speech {
         plain_line(said.size() > kMost ? said.substr(said.size() - kMost) : said);
     return text.empty() ? "it printed nothing" : text;
   }
-  /// The first error; empty: there was none.
+  /// The first error, or empty.
   [[nodiscard]] const std::string& error() const { return error_; }
   [[nodiscard]] std::size_t further_errors() const { return errors_ > 0 ? errors_ - 1 : 0; }
   [[nodiscard]] std::vector<std::string>& warnings() { return warnings_; }
   [[nodiscard]] std::vector<std::string>& notes() { return notes_; }
   [[nodiscard]] std::size_t further_notes() const { return further_notes_; }
-  /// Whether the program says something of the camera, and what lies behind the mark.
+  /// Whether the program sets the camera, and the text after the mark.
   [[nodiscard]] bool has_view() const { return has_view_; }
   [[nodiscard]] const std::string& view() const { return view_; }
 
  private:
-  static constexpr std::size_t kMostLines = 1000;  // of each kind
-  static constexpr std::size_t kLongest = 4000;    // of a line
+  static constexpr std::size_t kMostLines = 1000;  // for each kind
+  static constexpr std::size_t kLongest = 4000;    // for each line
 
   static std::string plain_line(std::string_view line) {
     std::string text(line);
@@ -116,7 +116,7 @@ class Speech {
       return;
     }
     if (line.starts_with("WARNING: Viewall and autocenter disabled in favor of $vp")) {
-      has_view_ = true;  // said of every picture, and not a fault of the program
+      has_view_ = true;  // printed for every program that sets the camera; not a fault
       return;
     }
     // ERROR, PARSER-ERROR, WARNING, FONT-WARNING, ECHO, TRACE, ...
@@ -137,7 +137,7 @@ class Speech {
                        [](char c) { return (c >= 'A' && c <= 'Z') || c == '-'; });
   }
 
-  /// `WARNING: text in file F, line N` with the place in front, as in messages of our own.
+  /// Rewrites `WARNING: text in file F, line N` with the place first, as in messages of our own.
   [[nodiscard]] std::string placed(std::string line) const {
     constexpr std::string_view kFile = " in file ", kLine = ", line ";
     const std::size_t file = line.rfind(kFile), number = line.rfind(kLine);
@@ -145,7 +145,7 @@ class Speech {
       return fmt::format("{}: openscad: {}", path_, line);
     }
     std::string name = line.substr(file + kFile.size(), number - file - kFile.size());
-    // Its names are relative to the folder of the program.
+    // Relative names refer to the folder of the program.
     const std::filesystem::path program(path_);
     if (name == program.filename().string()) name = path_;
     const std::string at = line.substr(number + kLine.size());
@@ -161,10 +161,11 @@ class Speech {
   bool has_view_ = false;
 };
 
-/// A child process in a group of its own; killed, if it still runs, with this and with the process.
+/// A child process in a process group of its own. It is killed with this object and with this
+/// process.
 class Child {
  public:
-  /// @param kept  descriptors that it inherits @return 0, or the reason why it did not start
+  /// @param kept  descriptors that it inherits @return 0, or the errno of the failed start
   int start(const char* const* arguments, std::initializer_list<int> kept) {
     int ends[2], reasons[2];
     if (::pipe2(ends, O_CLOEXEC) != 0) return errno;
@@ -180,7 +181,7 @@ class Child {
     int reason = process_ < 0 ? errno : 0;
     ::close(ends[1]);
     ::close(reasons[1]);
-    // The pipe ends without a word when the program has begun.
+    // The pipe closes without data once the program has begun.
     while (reason == 0 && ::read(reasons[0], &reason, sizeof reason) < 0 && errno == EINTR) {
     }
     ::close(reasons[0]);
@@ -199,7 +200,7 @@ class Child {
     if (output_ >= 0) ::close(output_);
   }
 
-  /// Reads what it says for up to `milliseconds`. @return whether more may come
+  /// Reads its output for up to `milliseconds`. @return whether more may come
   bool listen(int milliseconds, Speech& said) {
     pollfd waiting{output_, POLLIN, 0};
     const int ready = ::poll(&waiting, 1, milliseconds);
@@ -211,7 +212,7 @@ class Child {
     return true;
   }
 
-  /// @return whether it has ended, with its status
+  /// @return whether it has ended; then `status` is its status
   bool ended(int& status) {
     const pid_t result = ::waitpid(process_, &status, WNOHANG);
     if (result == 0 || (result < 0 && errno == EINTR)) return false;
@@ -220,11 +221,11 @@ class Child {
   }
 
  private:
-  /// In the child: nothing but system calls, since other threads may have held any lock.
+  /// Runs in the child. Only system calls are allowed, since other threads may have held any lock.
   [[noreturn]] static void become(const char* const* arguments, std::initializer_list<int> kept,
                                   pid_t parent, int speech, int reasons) {
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-    if (::getppid() != parent) ::_exit(127);  // it died before that
+    if (::getppid() != parent) ::_exit(127);  // the parent died in the meantime
     ::setpgid(0, 0);
     for (const int descriptor : kept) ::fcntl(descriptor, F_SETFD, 0);
     const int nothing = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
@@ -241,7 +242,7 @@ class Child {
   int output_ = -1;
 };
 
-/// The values of an echo(): `[90, 0, 0], 60` are two.
+/// The values that echo() printed: `[90, 0, 0], 60` is two values.
 std::vector<std::vector<double>> read_values(std::string_view text) {
   std::vector<std::vector<double>> values(1);
   int depth = 0;
@@ -256,7 +257,7 @@ std::vector<std::vector<double>> read_values(std::string_view text) {
     if (*at == '[') ++depth;
     if (*at == ']') --depth;
     if (*at == ',' && depth == 0) values.emplace_back();
-    if (*at == '"') return {};  // no such value is a text
+    if (*at == '"') return {};  // no camera value is a string
     ++at;
   }
   return values;
@@ -266,8 +267,9 @@ bool all_finite(const std::vector<double>& numbers) {
   return std::all_of(numbers.begin(), numbers.end(), [](double n) { return std::isfinite(n); });
 }
 
-/// What the program says of the camera. Its variables have values also where it does not set them.
-/// A value that is not one of those was set; else the text of the program tells.
+/// The camera that the program sets. The camera variables have values even if the program does not
+/// set them: a value other than the default was set, and for a default value the program's text
+/// decides.
 SceneView read_view(const std::string& echoed, const std::vector<FileIdentity>& files) {
   SceneView view;
   const auto values = read_values(echoed);
@@ -290,7 +292,7 @@ SceneView read_view(const std::string& echoed, const std::vector<FileIdentity>& 
   };
   constexpr double kUnsetDistance = 500.0;
   if (const auto r = vector(0); r && (*r != glm::dvec3(0.0) || sets("$vpr"))) view.rotation = r;
-  if (const auto t = vector(1)) view.target = t;  // unset it is 0 in either way
+  if (const auto t = vector(1)) view.target = t;  // the default is 0, which changes nothing
   if (const auto d = number(2); d && *d > 0 && (*d != kUnsetDistance || sets("$vpd"))) {
     view.distance = d;
   }
@@ -298,7 +300,7 @@ SceneView read_view(const std::string& echoed, const std::vector<FileIdentity>& 
   return view;
 }
 
-/// Listens until the child has ended. @return as run_openscad()
+/// Waits until the child has ended. @return as run_openscad()
 Result<void> wait_for(Child& child, Speech& said, const std::string& path, double timeout_s,
                       const Execution& execution) {
   using Clock = std::chrono::steady_clock;
@@ -346,7 +348,8 @@ std::vector<std::string> files_of_rule(std::string_view rule) {
   for (std::size_t i = begin + 2; i < rule.size(); ++i) {
     const char c = rule[i];
     if (c == '\\' && i + 1 < rule.size()) {
-      // Before the end of a line it goes on; before a blank, that is of the name.
+      // A backslash before a line end continues the line; before a blank it makes the blank part of
+      // the name.
       if (rule[++i] == '\n') {
         end_name();
       } else {
@@ -407,9 +410,9 @@ Result<OpenscadRun> run_openscad(const std::string& path, const OpenscadOptions&
   std::vector<std::string> words{"openscad", "-o", output.path(), "--export-format",
                                  "csg",      "-d", rule.path()};
   words.insert(words.end(), options.options.begin(), options.options.end());
-  // Behind the program's own text, where its variables have their values.
+  // The echo() comes after the program's own text, where its variables have their values.
   words.insert(words.end(), {"-D", fmt::format("{0}=echo(\"{0}\",$vpr,$vpt,$vpd,$vpf)0", mark)});
-  // A name that begins with a dash would be an option.
+  // A name that begins with a dash would be taken as an option.
   words.push_back(path.starts_with('-') ? "./" + path : path);
   std::vector<const char*> arguments;
   for (const std::string& word : words) arguments.push_back(word.c_str());

@@ -1,6 +1,7 @@
-// The only file that sees OpenEXR. Deep scanline files of depth lists; the layout is in ldi_io.h.
+// The only file that includes OpenEXR. It writes and reads depth lists as deep scanline files;
+// ldi_io.h describes the layout.
 //
-// Interpretation of the samples: Florian Kainz. Interpreting OpenEXR Deep Pixels. 2013.
+// The samples follow: Florian Kainz. Interpreting OpenEXR Deep Pixels. 2013.
 
 #include <ImfChannelList.h>
 #include <ImfDeepFrameBuffer.h>
@@ -42,7 +43,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "raw chunks are read as they are");
 
-constexpr std::uint32_t kNone = 0xffffffffu;  // strata.depthBack without a back crossing
+constexpr std::uint32_t kNone = 0xffffffffu;  // strata.depthBack if no crossing ends the sample
 constexpr const char* kIntervals = "intervals";
 constexpr const char* kSamples = "samples";
 
@@ -81,7 +82,7 @@ std::span<const Channel> channels_of(bool samples) {
   return kIntervalChannels;
 }
 
-// World length of a lattice step along the rays, or 1: see ldi_io.h.
+// World length of a lattice step along the rays, or 1 (see ldi_io.h).
 double depth_scale(const LayeredDepthImage& image) {
   const glm::dmat4& m = image.world_from_image;
   const bool affine = m[0][3] == 0 && m[1][3] == 0 && m[2][3] == 0 && m[3][3] == 1;
@@ -93,18 +94,18 @@ double depth_scale(const LayeredDepthImage& image) {
 
 float next_float(float x) { return std::nextafter(x, std::numeric_limits<float>::infinity()); }
 
-// Appends the samples of one list. Z rises strictly, so the pixel is tidy.
+// Appends the samples of one list. Z is strictly increasing, so the deep pixel is tidy.
 void append_samples(std::span<const DepthItem> list, bool points, double scale,
                     std::vector<Sample>& out) {
   const std::size_t start = out.size();
   float z = -1;
   std::int64_t winding = 0;
-  bool open = false;  // the last sample ends at the crossing to come
+  bool open = false;  // the next crossing ends the last sample
   for (const DepthItem item : list) {
     z = std::max(static_cast<float>(item.depth() * scale), z < 0 ? 0.0F : next_float(z));
     if (open && out.size() > start) out.back().z_back = z;
     winding += item.exit() ? -1 : 1;
-    if (!points && item.exit() && winding == 0) {  // what it closes is the last sample
+    if (!points && item.exit() && winding == 0) {  // it closes the last sample
       out.back().depth_back = item.depth();
       out.back().payload_back = item.payload();
       open = false;
@@ -124,7 +125,7 @@ void append_samples(std::span<const DepthItem> list, bool points, double scale,
 
 // --- streams ------------------------------------------------------------------------------------
 
-// OpenEXR wants exceptions from its streams; they end in this file.
+// OpenEXR expects exceptions from its streams. They do not leave this file.
 class OutputStream final : public Imf::OStream {
  public:
   OutputStream(SeekableOutput& output, const std::string& name)
@@ -171,8 +172,8 @@ class InputStream final : public Imf::IStream {
   std::uint64_t size_ = 0, position_ = 0;
 };
 
-// OpenEXR compresses on one pool of threads for the whole process. Where the application has not
-// started one, it is started for as long as a file is written.
+// OpenEXR compresses with one thread pool for the whole process. If the application has not started
+// it, this object runs one while a file is written.
 class ThreadPool {
  public:
   explicit ThreadPool(int threads) {
@@ -206,7 +207,7 @@ Imf::Header make_header(const LayeredDepthImage& image, bool samples, double sca
     header.channels().insert(channel.name, Imf::Channel(channel.type));
   }
   Imf::addDeepImageState(header, Imf::DIS_TIDY);
-  Imath::M44d matrix;  // rows of it are columns of GLM's
+  Imath::M44d matrix;  // its rows are the columns of GLM's matrix
   for (int i = 0; i < 4; ++i) {
     for (int j = 0; j < 4; ++j) matrix[i][j] = image.world_from_image[i][j];
   }
@@ -218,7 +219,7 @@ Imf::Header make_header(const LayeredDepthImage& image, bool samples, double sca
   return header;
 }
 
-// A few rows of samples with the tables of pointers that OpenEXR reads them through.
+// A batch of rows: their samples and the pointer tables through which OpenEXR reads them.
 class RowBatch {
  public:
   RowBatch(int width, std::span<const Channel> channels)
@@ -257,7 +258,7 @@ class RowBatch {
   }
 
  private:
-  // Where row 0 would be. An address outside the array, so formed from integers.
+  // The address that row 0 would have. It lies outside the array, so it is computed with integers.
   [[nodiscard]] char* origin(void* data, std::size_t bytes) const {
     return reinterpret_cast<char*>(reinterpret_cast<std::uintptr_t>(data) -
                                    static_cast<std::size_t>(begin_) * width_ * bytes);
@@ -294,7 +295,7 @@ Result<void> write_rows(SeekableOutput& output, const std::string& path,
 
 // --- reading ------------------------------------------------------------------------------------
 
-// zlib cannot make more than this many bytes of one.
+// The most bytes that zlib makes of one byte.
 constexpr std::uint64_t kLargestRatio = 1040;
 constexpr std::uint64_t kChunkHeader = 28;  // [row:i32 | counts:u64 | packed:u64 | unpacked:u64]
 
@@ -302,7 +303,8 @@ tl::unexpected<Error> not_ours(const std::string& path, const std::string& why) 
   return fail(ErrorCode::kInput, "{}: not depth lists written by Strata: {}", path, why);
 }
 
-// Walks over the header, so that OpenEXR is not led to allocate by a length that lies.
+// Walks over the header before OpenEXR does, because OpenEXR allocates as much as a false length
+// demands.
 Result<void> check_header_lengths(InputStream& stream, const std::string& path) {
   constexpr std::uint64_t kLongestAttribute = 1 << 16;
   std::array<char, 8> start{};
@@ -337,7 +339,7 @@ Result<void> check_header_lengths(InputStream& stream, const std::string& path) 
 
 struct Layout {
   bool samples = false;
-  std::uint64_t sample_bytes = 0;  // of all channels in the file
+  std::uint64_t sample_bytes = 0;  // for all channels in the file
 };
 
 Result<Layout> check_channels(const Imf::Header& header, const std::string& path, bool samples) {
@@ -358,10 +360,10 @@ Result<Layout> check_channels(const Imf::Header& header, const std::string& path
   return layout;
 }
 
-// That the file can hold the image, and that the image may be held.
+// Checks that the file is large enough for the image, and that the image fits the limits.
 Result<void> check_size(const LayeredDepthImage& image, const std::string& path,
                         std::uint64_t file_bytes, std::uint64_t memory_limit) {
-  // Every row has a chunk, and its table of counts is compressed at best by zlib's limit.
+  // Every row has a chunk. Its table of counts is compressed at most by zlib's limit.
   const std::uint64_t width = static_cast<std::uint64_t>(image.width);
   const std::uint64_t height = static_cast<std::uint64_t>(image.height);
   if (height * (8 + kChunkHeader + 4 * width / kLargestRatio) > file_bytes) {
@@ -376,7 +378,7 @@ Result<void> check_size(const LayeredDepthImage& image, const std::string& path,
   return {};
 }
 
-// Fills in all of the image but its lists.
+// Fills in the image except its lists.
 Result<Layout> check_header(const Imf::Header& header, const std::string& path,
                             std::uint64_t file_bytes, std::uint64_t memory_limit,
                             LayeredDepthImage& image) {
@@ -441,11 +443,11 @@ class RowReader {
                    Imf::DeepSlice(channels_[c].type, reinterpret_cast<char*>(pointers_[c].data()),
                                   sizeof(char*), 0, sizeof(Sample)));
     }
-    file_.setFrameBuffer(frame);  // every row is read into the same arrays
+    file_.setFrameBuffer(frame);  // all rows are read into the same arrays
   }
 
-  // Appends the crossings of row v and the ends of its lists. Throws. `budget`: samples it may
-  // hold.
+  // Appends the crossings of row v and the ends of its lists. Throws. `budget` is the most samples
+  // it may hold.
   void read(int v, std::uint64_t budget, std::vector<DepthItem>& items,
             std::vector<std::uint64_t>& offsets) {
     const std::uint64_t samples = read_chunk(v);
@@ -476,9 +478,9 @@ class RowReader {
     return DepthItem(std::uint64_t{depth} << 32 | payload);
   }
 
-  // Reads the counts of row v. The lengths in its chunk are checked against each other: OpenEXR
-  // believes them. Its functions that decode such a raw chunk are not used, since they leak when it
-  // is damaged. @return samples of the row
+  // Reads the counts of row v and checks the lengths in its chunk against each other, since OpenEXR
+  // does not. It avoids OpenEXR's functions that decode a raw chunk: they leak when the chunk is
+  // damaged. @return number of samples in the row
   std::uint64_t read_chunk(int v) {
     std::uint64_t bytes = 0;
     file_.rawPixelData(v, nullptr, bytes);
@@ -541,7 +543,7 @@ Result<LayeredDepthImage> read_file(const std::string& path, const Execution& ex
   image.offsets.push_back(0);
   for (int v = 0; v < image.height; ++v) {
     if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "{}: cancelled", path);
-    // A vector that grows holds up to three times its content for a moment.
+    // A growing vector briefly holds up to three times its content.
     const std::uint64_t held = image.items.size() * sizeof(DepthItem) * 3;
     const std::uint64_t budget =
         execution.memory_limit == 0
@@ -576,7 +578,7 @@ Result<void> write_ldi_exr(const std::string& path, const LayeredDepthImage& ima
   } catch (const std::bad_alloc&) {
     return fail(ErrorCode::kLimit, "{}: out of memory", path);
   } catch (const std::exception& error) {
-    // The output's own error is the clearer one.
+    // The output's own error is clearer than OpenEXR's.
     if (!output->status()) return output->status();
     return fail(ErrorCode::kOutput, "{}: {}", path, error.what());
   }

@@ -1,4 +1,4 @@
-// Depth lists as a NumPy archive: a ZIP of .npy arrays. The layout is in ldi_io.h.
+// Depth lists as a NumPy archive: a ZIP of .npy arrays. ldi_io.h describes the layout.
 
 #include <fmt/format.h>
 #include <zip.h>
@@ -35,7 +35,7 @@ constexpr std::size_t kPart = std::size_t{1} << 16;  // elements converted or co
 
 // --- writing ------------------------------------------------------------------------------------
 
-// libzip's view of a SeekableOutput, which is empty before.
+// Presents a SeekableOutput, which is empty at first, to libzip.
 zip_int64_t call_output(void* state, void* data, zip_uint64_t bytes, zip_source_cmd_t command) {
   auto& to = *static_cast<SeekableOutput*>(state);
   zip_error_t error{};
@@ -72,14 +72,15 @@ zip_int64_t call_output(void* state, void* data, zip_uint64_t bytes, zip_source_
   }
 }
 
-// A .npy file that libzip reads, made part by part.
+// A .npy file that is produced part by part while libzip reads it.
 struct ArraySource {
   std::string head;
   std::size_t count = 0, element_bytes = 0;
-  std::function<std::span<const std::byte>(std::size_t, std::size_t)> part;  // elements as bytes
-  std::function<bool(std::size_t)> go_on;  // told the bytes that were made
+  // The bytes of a range of elements.
+  std::function<std::span<const std::byte>(std::size_t, std::size_t)> part;
+  std::function<bool(std::size_t)> go_on;  // called with the number of bytes produced; false stops
   std::size_t next = 0;
-  std::span<const std::byte> left{};  // of the part in hand
+  std::span<const std::byte> left{};  // unread bytes of the current part
 
   zip_int64_t read(std::byte* to, std::size_t bytes) {
     std::size_t done = 0;
@@ -145,7 +146,7 @@ class NpzWriter {
     if (zip_ != nullptr) zip_discard(zip_);
   }
 
-  // Adds array `name` of `count` elements, which part(begin, end) gives as bytes when close() asks.
+  // Adds array `name` of `count` elements. close() calls part(begin, end) for their bytes.
   template <class Part>
   bool add(const char* name, std::string_view type, const std::string& shape, std::size_t count,
            std::size_t element_bytes, Part&& part) {
@@ -162,12 +163,12 @@ class NpzWriter {
       return false;
     }
     const auto entry = static_cast<zip_uint64_t>(index);
-    constexpr zip_uint16_t kFirstDay = 1 << 5 | 1;  // 1980-01-01: the same lists, the same bytes
+    constexpr zip_uint16_t kFirstDay = 1 << 5 | 1;  // 1980-01-01: equal lists give equal bytes
     return zip_set_file_compression(zip_, entry, options_.compress ? ZIP_CM_DEFLATE : ZIP_CM_STORE,
                                     kLevel) == 0 &&
            zip_file_set_dostime(zip_, entry, 0, kFirstDay, 0) == 0;
   }
-  // Writes all of it.
+  // Writes the archive.
   bool close() {
     if (zip_ == nullptr || zip_close(zip_) != 0) return false;
     zip_ = nullptr;
@@ -175,7 +176,7 @@ class NpzWriter {
   }
 
  private:
-  static constexpr zip_uint32_t kLevel = 6;  // zlib's own choice
+  static constexpr zip_uint32_t kLevel = 6;  // zlib's default
 
   bool made(std::size_t bytes) {
     done_ += bytes;
@@ -229,12 +230,12 @@ bool write_arrays(NpzWriter& zip, const LayeredDepthImage& image) {
 
 // --- reading ------------------------------------------------------------------------------------
 
-// deflate cannot make more than this many bytes of one.
+// The most bytes that deflate makes of one byte.
 constexpr std::uint64_t kLargestRatio = 1040;
 
-// Whether the last bytes are a ZIP's closing record, to the very end of the file.
+// Whether a ZIP's closing record ends exactly at the end of the file.
 bool ends_as_archive(const std::string& path) {
-  constexpr std::streamoff kRecord = 22;  // without a comment, as NumPy and we write it
+  constexpr std::streamoff kRecord = 22;  // without a comment, as NumPy and Strata write it
   std::ifstream file(path, std::ios::binary | std::ios::ate);
   if (!file || file.tellg() < kRecord) return false;
   std::array<char, 4> signature{};
@@ -248,14 +249,14 @@ struct ZipCloser {
   void operator()(zip_file_t* file) const { zip_fclose(file); }
 };
 
-// What a .npy head says.
+// The contents of a .npy header.
 struct ArrayHead {
   std::string type;
   std::vector<std::uint64_t> shape;
   std::uint64_t count = 1;
 };
 
-// The text that follows `key` in the dictionary of a head.
+// The text after `key` in the dictionary of a header.
 std::string_view value_of(std::string_view text, std::string_view key) {
   const std::size_t at = text.find(key);
   if (at == std::string_view::npos) return {};
@@ -264,7 +265,7 @@ std::string_view value_of(std::string_view text, std::string_view key) {
   return start == std::string_view::npos ? std::string_view{} : text.substr(start);
 }
 
-// Empty type: malformed.
+// Returns an empty type if the header is malformed.
 ArrayHead parse_head(std::string_view text) {
   ArrayHead head;
   const std::string_view type = value_of(text, "'descr'");
@@ -304,8 +305,8 @@ class NpzReader {
   }
   [[nodiscard]] bool opened() const { return zip_ != nullptr; }
 
-  // Reads a whole array. `shape` is checked, where an entry of kAny takes any length. What the
-  // caller makes of an element, `bytes_beside`, counts for the memory limit too.
+  // Reads a whole array and checks its `shape`; an entry of kAny accepts any length. `bytes_beside`
+  // is what the caller makes of each element. It counts for the memory limit too.
   static constexpr std::uint64_t kAny = ~std::uint64_t{0};
   template <class T>
   Result<std::vector<T>> read(const char* name, const char* type,
@@ -323,7 +324,7 @@ class NpzReader {
         return damaged(name);
       }
     }
-    // Reads the end of the entry and checks its checksum.
+    // Reading to the end of the entry also checks its checksum.
     std::byte beyond;
     if (zip_fread(entry_.get(), &beyond, 1) != 0) return damaged(name);
     entry_.reset();
@@ -394,7 +395,7 @@ class NpzReader {
   const Execution& execution_;
   std::uint64_t file_bytes_ = 0, held_ = 0;
   std::unique_ptr<zip_t, ZipCloser> zip_;
-  std::unique_ptr<zip_file_t, ZipCloser> entry_;  // in work
+  std::unique_ptr<zip_file_t, ZipCloser> entry_;  // the entry being read
 };
 
 Result<LayeredDepthImage> read_arrays(const std::string& path, const Execution& execution) {

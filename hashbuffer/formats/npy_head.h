@@ -7,8 +7,8 @@
 
 namespace strata {
 
-/// The head of a .npy file, version 1.0: [magic:6 | version:2 | length:u16 | dictionary], padded so
-/// that the data starts at a multiple of 64. (Internal to voxelize/.)
+/// The header of a .npy file, version 1.0: [magic:6 | version:2 | length:u16 | dictionary]. It is
+/// padded so that the data starts at a multiple of 64. Private to hashbuffer/ and voxelize/.
 inline std::string npy_head(std::string_view type, bool fortran_order, std::string_view shape) {
   std::string text = fmt::format("{{'descr': '{}', 'fortran_order': {}, 'shape': {}, }}", type,
                                  fortran_order ? "True" : "False", shape);

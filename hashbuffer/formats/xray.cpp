@@ -13,7 +13,7 @@
 namespace strata {
 namespace {
 
-/// Length of a ray inside, in lattice steps; an entry that is never left counts for nothing.
+/// The length of a ray inside the solid, in lattice steps. An entry without an exit does not count.
 std::uint64_t inside_length(std::span<const DepthItem> list) {
   std::uint64_t length = 0;
   int winding = 0;

@@ -13,17 +13,17 @@ constexpr std::size_t kBlock = std::size_t{1} << 16;
 constexpr std::uint64_t kNone = std::numeric_limits<std::uint64_t>::max();
 
 bool finite(const glm::dvec3& p) {
-  // A sum of products with zero is zero unless one factor is NaN or infinite; one compare for
-  // three.
+  // The sum of products with zero is zero unless a coordinate is NaN or infinite. One comparison
+  // serves all three.
   return p.x * 0.0 + p.y * 0.0 + p.z * 0.0 == 0.0;
 }
 
-/// Calls check(begin, end) for blocks of [0, count); true when one of them says true.
+/// Calls check(begin, end) for blocks of [0, count). Returns true when a call returns true.
 template <class Check>
 bool any_block(const Execution& execution, std::size_t count, Check&& check) {
   std::atomic<bool> found = false;
   Execution all = execution;
-  all.stop = {};  // half a check would be none
+  all.stop = {};  // half a check would be worthless
   parallel_for(all, (count + kBlock - 1) / kBlock, [&](std::size_t block, int) {
     if (check(block * kBlock, std::min(count, (block + 1) * kBlock))) found = true;
   });
@@ -51,14 +51,14 @@ bool any_bad_triangle(const Execution& execution, const TriangleSoup& soup) {
   });
 }
 
-/// What the slow way found: the first face of each cause.
+/// The first face dropped for each cause.
 struct Losses {
   std::uint64_t first_out_of_range = kNone, out_of_range_vertex = 0;
   std::uint64_t first_non_finite = kNone, non_finite_vertex = 0;
 };
 
-/// Removes faces that cannot stay. Triangles with two corners at one vertex are left: polygons are
-/// cut anew before.
+/// Removes faces with indices out of range or coordinates that are not finite. Triangles with two
+/// corners at one vertex stay for now, because polygons are cut again first.
 Losses drop_bad_faces(RawMesh& mesh) {
   TriangleSoup& soup = mesh.soup;
   Losses losses;
@@ -107,7 +107,7 @@ Losses drop_bad_faces(RawMesh& mesh) {
   return losses;
 }
 
-/// Removes vertices that are not finite; no triangle uses them any more.
+/// Removes vertices that are not finite. No triangle uses them now.
 void drop_non_finite_vertices(TriangleSoup& soup) {
   std::vector<std::uint32_t> new_index(soup.positions.size());
   std::uint32_t kept = 0;
@@ -122,17 +122,17 @@ void drop_non_finite_vertices(TriangleSoup& soup) {
 /// The polygons that are not flat.
 struct Bent {
   std::uint64_t count = 0, first = kNone;
-  Bend bend;  ///< of the first
+  Bend bend;  ///< the bend of the first one
 };
 
-/// Cuts the polygons that a reader made fans of, where the fan from the first corner is not right.
+/// Cuts polygons again where the reader's fan from the first corner is wrong.
 class PolygonCuts {
  public:
   explicit PolygonCuts(TriangleSoup& soup) : soup_(soup) {}
 
-  /// @param execution  its stop leaves some polygons as they are
+  /// @param execution  after a stop request some polygons keep their fans
   Bent run(const Execution& execution) {
-    const std::size_t count = soup_.face_elements.size();  // none: all faces are triangles
+    const std::size_t count = soup_.face_elements.size();  // 0 if all faces are triangles
     const std::size_t blocks = (count + kBlock - 1) / kBlock;
     std::vector<Bent> bent(blocks);
     parallel_for(execution, blocks, [&](std::size_t block, int) {
@@ -148,11 +148,12 @@ class PolygonCuts {
     }
     return all;
   }
-  /// Whether triangles were left over, all of whose corners are kNoVertex or one and the same.
+  /// Whether surplus triangles are left. All three corners of such a triangle are kNoVertex, or the
+  /// same vertex.
   [[nodiscard]] bool left_over() const { return left_over_; }
 
  private:
-  /// The polygons that begin in [begin, end).
+  /// Cuts the polygons that begin in [begin, end).
   Bent cut_block(std::size_t begin, std::size_t end, const std::stop_token& stop_token) {
     const std::vector<std::uint32_t>& elements = soup_.face_elements;
     Bent bent;
@@ -161,7 +162,7 @@ class PolygonCuts {
     for (std::size_t stop = begin; begin < end; begin = stop) {
       for (stop = begin + 1; stop < elements.size() && elements[stop] == elements[begin];) ++stop;
       if (stop - begin < 2) continue;
-      constexpr std::size_t kMany = 1024;  // corners of a polygon that may take long
+      constexpr std::size_t kMany = 1024;  // corners of a polygon whose cut may take long
       if (stop - begin > kMany && stop_token.stop_requested()) break;
       const Bend bend = stop - begin == 2 ? cut_quad_at(begin) : cut_at(begin, stop, cutter);
       if (bend.large() && bent.count++ == 0) {
@@ -194,7 +195,7 @@ class PolygonCuts {
     for (const std::uint32_t corner : corners) positions.push_back(soup_.positions[corner]);
     const std::span<const glm::uvec3> cut = cutter.cut(positions);
     if (cut.empty()) return cutter.bend();
-    std::size_t twice = 0;  // corners that repeat the one before
+    std::size_t twice = 0;  // corners that repeat the previous one
     for (std::size_t i = 0; i < corners.size(); ++i) {
       twice += corners[i] == corners[i == 0 ? corners.size() - 1 : i - 1] ? 1 : 0;
     }
@@ -214,7 +215,8 @@ class PolygonCuts {
   std::atomic<bool> left_over_ = false;
 };
 
-/// Removes triangles with two corners at one vertex, and counts them unless they hold none.
+/// Removes triangles with two corners at one vertex. Counts them, unless their corners are
+/// kNoVertex.
 void drop_degenerate(RawMesh& mesh) {
   TriangleSoup& soup = mesh.soup;
   std::size_t kept = 0;
@@ -235,8 +237,8 @@ std::string faces_text(std::uint64_t count) {
   return count == 1 ? "1 face was dropped" : fmt::format("{} faces were dropped", count);
 }
 
-/// A warning for each cause that faces were dropped for, with the first of them.
-/// @param vertices  that the file has
+/// Adds a warning for each cause of dropped faces, naming the first face.
+/// @param vertices  number of vertices in the file
 void warn_of_dropped_faces(RawMesh& raw, const Losses& losses, std::size_t vertices,
                            const LocateFace& locate) {
   MeshReadStats& stats = raw.stats;

@@ -13,7 +13,7 @@
 namespace strata::detail {
 namespace {
 
-/// Pages of larger files are left to be read as they are reached.
+/// Pages of larger files are read on first access.
 constexpr std::size_t kPopulateLimit = std::size_t{1} << 30;
 
 std::string reason(int error) { return std::strerror(error); }
@@ -28,7 +28,7 @@ InputBytes& InputBytes::operator=(InputBytes&& other) noexcept {
   std::swap(size_, other.size_);
   std::swap(data_, other.data_);
   std::swap(owned_, other.owned_);
-  // A short string moves with its object.
+  // the bytes of a short string move with the object
   if (mapped_ == 0) data_ = owned_.c_str();
   if (other.mapped_ == 0) other.data_ = other.owned_.c_str();
   return *this;
@@ -43,7 +43,8 @@ Result<InputBytes> InputBytes::open(const std::string& path, std::uint64_t limit
                                     const std::stop_token& stop) {
   if (path == "-") return read_all(STDIN_FILENO, "standard input", limit, stop);
   InputBytes file;
-  // A pipe that nobody writes to is waited for where a stop is heard, not in open().
+  // open() must not wait for the writer of a pipe: the wait happens where a stop request is
+  // noticed.
   struct stat status = {};
   const bool pipe = ::stat(path.c_str(), &status) == 0 && S_ISFIFO(status.st_mode);
   file.descriptor_ = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | (pipe ? O_NONBLOCK : 0));
@@ -52,12 +53,12 @@ Result<InputBytes> InputBytes::open(const std::string& path, std::uint64_t limit
     return fail(ErrorCode::kInput, "{}: {}", path, reason(errno));
   }
   if (!S_ISREG(status.st_mode) || status.st_size == 0) {
-    return read_all(file.descriptor_, path, limit, stop);  // pipes, and /proc files that say 0
+    return read_all(file.descriptor_, path, limit, stop);  // pipes, and /proc files whose size is 0
   }
   const auto size = static_cast<std::size_t>(status.st_size);
   const auto page = static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
-  // One page more than the file needs, anonymous and zero, so that a file that fills its last page
-  // is followed by a zero byte too.
+  // The mapping is one anonymous, zeroed page longer than the file, so that a zero byte follows
+  // even a file that fills its last page.
   const std::size_t span = (size / page + 1) * page;
   void* room = ::mmap(nullptr, span, PROT_READ, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
   if (room == MAP_FAILED) return fail(ErrorCode::kLimit, "{}: {}", path, reason(errno));
@@ -78,8 +79,8 @@ Result<InputBytes> InputBytes::read_all(int descriptor, const std::string& name,
   InputBytes file;
   std::size_t filled = 0;
   for (;;) {
-    // Whoever should write may never do so: look for a stop request meanwhile. It may come a moment
-    // after the signal that interrupts the wait.
+    // The writer may never write, so the wait checks for a stop request now and then. The request
+    // may come a moment after the signal that interrupts the wait.
     constexpr int kLookMilliseconds = 50;
     pollfd waiting = {.fd = descriptor, .events = POLLIN, .revents = 0};
     int ready = 0;

@@ -10,13 +10,13 @@
 
 namespace strata::detail {
 
-/// All bytes of a file, mapped where the system can, else read. One byte past the end is readable
-/// and zero, so that text scanners need no bounds check: it ends every token.
+/// All bytes of a file, mapped if the system allows it, otherwise read. The byte after the end is
+/// readable and zero. It ends every token, so text scanners need no bounds check.
 class InputBytes {
  public:
-  /// @param path  a file; "-" is standard input @param limit  most bytes to hold from a pipe, 0:
-  /// any
-  /// @param stop  ends the waiting for a pipe
+  /// @param path  a file; "-" is standard input
+  /// @param limit  most bytes to hold from a pipe; 0: any number
+  /// @param stop  ends the wait for a pipe
   /// @return kInput naming path and reason; kLimit; kCancelled
   static Result<InputBytes> open(const std::string& path, std::uint64_t limit,
                                  const std::stop_token& stop = {});
@@ -26,7 +26,7 @@ class InputBytes {
   ~InputBytes();
 
   [[nodiscard]] std::string_view view() const { return {data_, size_}; }
-  /// True when the file behind a mapping has another size than when it was opened.
+  /// Whether the size of a mapped file has changed since it was opened.
   [[nodiscard]] bool changed() const;
 
  private:
@@ -35,8 +35,8 @@ class InputBytes {
                                      const std::stop_token& stop);
   const char* data_ = "";
   std::size_t size_ = 0;
-  std::size_t mapped_ = 0;  ///< bytes of the mapping, 0 if none
-  int descriptor_ = -1;     ///< kept to ask for the size again
+  std::size_t mapped_ = 0;  ///< size of the mapping; 0 if there is none
+  int descriptor_ = -1;     ///< kept to check the size again
   std::string owned_;
 };
 

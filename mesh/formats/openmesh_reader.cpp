@@ -1,6 +1,6 @@
 #include "mesh/formats/openmesh_reader.h"
 
-#include <OpenMesh/Core/IO/MeshIO.hh>  // before the meshes: it registers the formats
+#include <OpenMesh/Core/IO/MeshIO.hh>  // must precede the mesh headers: it registers the formats
 #include <exception>
 
 #include "strata/mesh/openmesh_bridge.h"

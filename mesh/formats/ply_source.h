@@ -12,7 +12,7 @@
 
 #include "mesh/formats/text_scanner.h"
 
-/// The values of PLY files, for the reader of this folder.
+/// Sources of the values in PLY files; used by the PLY reader.
 namespace strata::detail::ply {
 
 enum class Type { kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kFloat, kDouble };
@@ -35,8 +35,8 @@ inline std::optional<Type> type_named(std::string_view name) {
 
 struct Property {
   std::string name;
-  Type type = Type::kFloat;       ///< of the value, or of the items of a list
-  std::optional<Type> list_type;  ///< of the list's count; empty: a scalar
+  Type type = Type::kFloat;       ///< type of the value, or of the items of a list
+  std::optional<Type> list_type;  ///< type of the list's count; empty: a scalar
 };
 
 struct Element {
@@ -47,7 +47,7 @@ struct Element {
 
 enum class Encoding { kAscii, kLittle, kBig };
 
-/// Values of an ascii body, one after the other.
+/// The values of an ASCII body, one after another.
 class AsciiSource {
  public:
   static constexpr bool kBinary = false;
@@ -56,11 +56,11 @@ class AsciiSource {
   void begin_element() {
     while (is_space(*p_)) ++p_;
   }
-  /// Past what else the line holds.
+  /// Skips the rest of the line.
   void end_element() {
     while (by_lines_ && p_ < end_ && *p_ != '\n' && *p_ != '\r') ++p_;
   }
-  /// All that fits in a double is read as one: every PLY type does.
+  /// Reads the value as double, which holds every PLY type.
   bool read(Type, double& value) {
     skip_gap();
     const char* stop = parse_double(p_, value);
@@ -91,7 +91,7 @@ class AsciiSource {
   bool by_lines_;
 };
 
-/// Values of a binary body.
+/// The values of a binary body.
 template <std::endian kOrder>
 class BinarySource {
  public:

@@ -82,7 +82,7 @@ class XmlMesh {
   [[nodiscard]] const std::string& path() const { return path_; }
   [[nodiscard]] bool stopped() const { return stop_.stop_requested(); }
 
-  /// A corner of a triangle: an index below `count`.
+  /// Reads a corner of a triangle: an index below `count`.
   Result<std::uint32_t> corner(const pugi::xml_node& node, std::string_view text,
                                std::size_t count) const {
     const auto number = read_number(text);
@@ -124,7 +124,8 @@ class XmlMesh {
   pugi::xml_document document_;
 };
 
-/// Numbers are taken as they are, which makes another size of files in inches or metres.
+/// Warns of a unit that is not the millimetre. Numbers are taken as they are, so such a model has a
+/// different size.
 void note_unit(const XmlMesh& file, std::vector<std::string>& warnings) {
   constexpr std::pair<std::string_view, double> kUnits[] = {
       {"micron", 1e-3}, {"micrometer", 1e-3}, {"centimeter", 10.0}, {"inch", 25.4},
@@ -168,7 +169,7 @@ Result<TriangleSoup> read_object_mesh(const XmlMesh& file, const pugi::xml_node&
   return mesh;
 }
 
-/// "m00 m01 m02 m10 ... m32", for row vectors: the rows are the columns of ours.
+/// Reads "m00 m01 m02 m10 ... m32", a matrix for row vectors. Its rows are the columns of ours.
 Result<glm::dmat4> read_transform(const XmlMesh& file, const pugi::xml_node& node) {
   constexpr std::string_view kSpace = " \t\r\n";
   glm::dmat4 matrix(1.0);
@@ -200,11 +201,11 @@ std::string_view any_attribute(const pugi::xml_node& node, std::string_view name
   return {};
 }
 
-/// An object of a model part. Its mesh is read when it is first asked for.
+/// An object of a model part. Its mesh is read when it is first used.
 struct ModelObject {
   pugi::xml_node node;
   std::optional<TriangleSoup> mesh;
-  bool is_open = false;  ///< on the way from a build item to where we are
+  bool is_open = false;  ///< it encloses the component being read
 };
 
 /// A model part of the archive.
@@ -213,7 +214,7 @@ struct ModelPart {
   std::unordered_map<std::string_view, ModelObject> objects;
 };
 
-/// An object at its place: its mesh goes to the soup.
+/// An object with its place. Its mesh goes to the soup.
 struct Instance {
   const TriangleSoup* mesh = nullptr;
   glm::dmat4 world{1.0};
@@ -229,7 +230,7 @@ struct PlaceHash {
   }
 };
 
-/// Puts the build items of an archive together.
+/// Assembles the build items of an archive.
 class Package {
  public:
   Package(ZipArchive archive, const Execution& execution)
@@ -255,7 +256,7 @@ class Package {
   static constexpr int kMostDepth = 64;
   static constexpr std::size_t kMostInstances = 1'000'000;
 
-  /// The part that the package's relationships call the model.
+  /// The name of the part that the package's relationships declare as the model.
   Result<std::string> root_name() const {
     if (const auto rels = archive_.find("_rels/.rels")) {
       auto text = archive_.read(*rels, execution_);
@@ -292,7 +293,7 @@ class Package {
     return part.get();
   }
 
-  /// A build item or component: the object that it names, at a place.
+  /// Adds the object that a build item or component names, at its place.
   Result<void> add(ModelPart& home, const pugi::xml_node& item, const glm::dmat4& around,
                    int depth) {
     if (execution_.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
@@ -325,7 +326,7 @@ class Package {
     const glm::dmat4 world = around * *matrix;
     std::array<double, 12> place;
     for (int i = 0; i < 12; ++i) place[static_cast<std::size_t>(i)] = world[i / 3][i % 3];
-    if (!placed_.emplace(&object, place).second) return {};  // it stands there already
+    if (!placed_.emplace(&object, place).second) return {};  // the object is already at this place
     if (placed_.size() > kMostInstances) {
       return home.file.refuse(
           item, fmt::format("the model has more than {} objects at their places", kMostInstances),

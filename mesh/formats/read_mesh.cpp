@@ -24,7 +24,7 @@ constexpr NamedFormat kFormats[] = {{MeshFormat::kObj, "obj"},
                                     {MeshFormat::kPly, "ply"},
                                     {MeshFormat::kOff, "off"}};
 
-/// What the first bytes say, for a hint when reading by the extension failed.
+/// The format that the first bytes indicate, for a hint when reading by the extension failed.
 MeshFormat format_by_content(std::string_view text) {
   if (text.starts_with("ply\n") || text.starts_with("ply\r")) return MeshFormat::kPly;
   if (text.starts_with("solid ") || text.starts_with("solid\n")) return MeshFormat::kStl;
@@ -51,11 +51,12 @@ Result<MeshFile> read_as(const detail::ReaderInput& input) {
   return fail(ErrorCode::kUsage, "{}: no format was given", input.name);
 }
 
-/// Reads text that ends in a readable zero byte; keeps exceptions (memory) inside.
+/// Reads text that ends in a readable zero byte. No exception (std::bad_alloc) leaves this
+/// function.
 Result<MeshFile> read_text(std::string_view text, const std::string& name,
                            const MeshReadOptions& options, const Execution& execution) {
   if (text.empty()) return fail(ErrorCode::kInput, "{}: the file is empty", name);
-  // The 80 bytes before the triangles of a binary STL file may be anything.
+  // The first 80 bytes of a binary STL file may be anything.
   const bool anything = options.format == MeshFormat::kStl && detail::is_binary_stl(text);
   if (!anything && detail::is_wide_text(text)) {
     return fail(ErrorCode::kInput, "{}: {}", name, detail::kWideText);
@@ -107,7 +108,7 @@ const char* mesh_format_name(MeshFormat format) {
 Result<MeshFile> parse_mesh(std::string_view bytes, const std::string& name,
                             const MeshReadOptions& options, const Execution& execution) {
   try {
-    const std::string terminated(bytes);  // for the zero byte behind it
+    const std::string terminated(bytes);  // adds the zero byte
     return read_text(terminated, name, options, execution);
   } catch (const std::bad_alloc&) {
     return fail(ErrorCode::kLimit, "{}: not enough memory for {} bytes", name, bytes.size());

@@ -5,14 +5,14 @@
 #include "mesh/formats/text_chunks.h"
 #include "mesh/formats/text_scanner.h"
 
-// The text is cut at line ends into chunks that are parsed on all threads; finished chunks are
-// appended in order. Face indices are absolute in OBJ, so only negative ones, which count back from
-// the last vertex read, need the number of vertices before their chunk.
+// The text is cut at line ends into chunks, which all threads parse. Finished chunks are appended
+// in order. Face indices are absolute in OBJ, except negative ones, which count back from the last
+// vertex read: only these need the number of vertices before their chunk.
 
 namespace strata::detail {
 namespace {
 
-/// Past blanks and continued line ends.
+/// Skips blanks and continued line ends.
 const char* skip_blanks_obj(const char* p) {
   for (;;) {
     if (is_blank(*p)) {
@@ -40,7 +40,8 @@ const char* next_line(const char* p, const char* end) {
   return stop == end ? end : stop + 1;
 }
 
-/// Where a statement that was read to p ends: at its line end, which a backslash may put off.
+/// Returns the end of a statement that was read up to p: its line end, unless a backslash continues
+/// the line.
 const char* skip_statement(const char* p, const char* end) {
   for (;;) {
     if (*p == '\n') return p + 1;
@@ -53,13 +54,13 @@ const char* skip_statement(const char* p, const char* end) {
   }
 }
 
-/// What a chunk holds; reused for later chunks once appended.
+/// The contents of a chunk. The object is reused after its contents were appended.
 struct Chunk {
   std::vector<glm::dvec3> positions;
   std::vector<glm::uvec3> triangles;
-  std::vector<std::uint32_t> elements;  ///< of each triangle, within the chunk; empty: identity
+  std::vector<std::uint32_t> elements;  ///< of each triangle, within the chunk; empty: its index
   std::vector<std::size_t> relative;    ///< triangles with corners counted from the chunk's start
-  std::vector<std::uint8_t> relative_corners;  ///< and which of them: bits 0 to 2
+  std::vector<std::uint8_t> relative_corners;  ///< bits 0 to 2 mark those corners
   std::uint64_t faces = 0, short_faces = 0, first_short_face = 0, ignored = 0;
   std::size_t error_offset = ChunksEnd::kNone;
   std::string error;
@@ -143,7 +144,7 @@ const char* ObjReader::parse_vertex(const char* p, Chunk& chunk) const {
 const char* ObjReader::parse_face(const char* p, Chunk& chunk) const {
   const std::size_t first_triangle = chunk.triangles.size();
   std::uint32_t corners[3] = {};
-  unsigned relative = 0;  // which corners count from the chunk's start
+  unsigned relative = 0;  // the corners that count from the chunk's start
   std::size_t count = 0;
   for (;;) {
     p = skip_blanks_obj(p);
@@ -153,7 +154,7 @@ const char* ObjReader::parse_face(const char* p, Chunk& chunk) const {
     if (next == nullptr || !(ends_token(*next) || *next == '/' || *next == '\\')) {
       return fail_at(p, chunk, describe(p, end_) + " is not a vertex of a face");
     }
-    while (!ends_token(*next) && *next != '\\') ++next;  // texture and normal
+    while (!ends_token(*next) && *next != '\\') ++next;  // skips indices of texture and normal
     if (*next == '\\' && next[1] != '\n' && next[1] != '\r') next = skip_token(next);
     p = next;
 
@@ -162,7 +163,7 @@ const char* ObjReader::parse_face(const char* p, Chunk& chunk) const {
     if (index > 0 && index <= static_cast<std::int64_t>(kMaxVertices)) {
       corner = static_cast<std::uint32_t>(index - 1);
     } else if (index < 0 && index >= std::numeric_limits<std::int32_t>::min()) {
-      // Modulo 2^32; append() adds the vertices before the chunk and looks for a wrap.
+      // Modulo 2^32. append() adds the number of vertices before the chunk and checks for a wrap.
       corner =
           static_cast<std::uint32_t>(static_cast<std::int64_t>(chunk.positions.size()) + index);
       counted_back = true;
@@ -212,13 +213,13 @@ void ObjReader::parse(const char* p, const char* end, Chunk& chunk) const {
       ++chunk.ignored;
       p = skip_statement(p, end);
     } else {
-      // No continuation here: a comment may end in the backslash of a path.
+      // A comment is not continued: it may end in the backslash of a path.
       p = next_line(p, end);
     }
   }
 }
 
-/// Guesses the sizes from samples, so that the vectors need not grow by copying.
+/// Estimates the sizes from samples, so that the vectors are not copied as they grow.
 void ObjReader::reserve() {
   constexpr std::size_t kSamples = 64, kSampleBytes = 2048;
   std::uint64_t vertices = 0, faces = 0, bytes = 0;
@@ -239,7 +240,7 @@ void ObjReader::reserve() {
     return std::min(static_cast<std::size_t>(static_cast<double>(sampled) * scale),
                     input_.text.size() / least);
   };
-  // "v 0 0 0" and "f 1 2 3" with their line ends are 8 bytes.
+  // "v 0 0 0" and "f 1 2 3" with their line ends take 8 bytes.
   const std::size_t vertex_room = room(vertices, 8), face_room = room(faces, 8);
   if (exceeds_limit(input_.execution, vertex_room, face_room)) return;
   reserve_large(mesh_.soup.positions, vertex_room);
@@ -250,7 +251,7 @@ void ObjReader::append(Chunk& chunk) {
   TriangleSoup& soup = mesh_.soup;
   MeshReadStats& stats = mesh_.stats;
   if (chunk.error_offset != ChunksEnd::kNone) {
-    chunks_end_.error_offset = chunk.error_offset;  // the chunk ends in the middle of a statement
+    chunks_end_.error_offset = chunk.error_offset;  // the chunk ends within a statement
     chunks_end_.error = std::move(chunk.error);
     return;
   }
@@ -305,14 +306,14 @@ Result<MeshFile> ObjReader::read() {
                      [this](std::uint32_t element) { return locate(element); });
 }
 
-/// Reads again up to the face: slow, but only for a message.
+/// Reads the file again up to the face. This is slow, but only messages need it.
 FacePlace ObjReader::locate(std::uint32_t element) const {
   Chunk chunk;
   std::uint64_t vertices = 0, faces = 0;
   for (const char* p = begin_; p < end_;) {
     chunk.clear();
     const char* const statement = skip_blanks(p);
-    // One statement: a comment ends with its line, the others may be continued.
+    // A comment ends with its line; the other statements may be continued.
     const bool continued = statement[0] == 'v' || statement[0] == 'f';
     const char* const next = continued ? skip_statement(statement, end_) : next_line(p, end_);
     parse(p, next, chunk);
@@ -345,7 +346,8 @@ Result<MeshFile> read_obj(const ReaderInput& input) {
       input.text.find('\r') == std::string_view::npos) {
     return ObjReader(input).read();
   }
-  // An old Macintosh ended its lines with carriage returns. Rare enough for a copy.
+  // Old Macintosh files end lines with carriage returns. They are rare, so a copy of the text is
+  // acceptable.
   std::string text(input.text);
   std::replace(text.begin(), text.end(), '\r', '\n');
   const ReaderInput copy{text, input.name, input.options, input.execution};

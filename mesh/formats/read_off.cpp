@@ -3,24 +3,24 @@
 #include "mesh/formats/reader_common.h"
 #include "mesh/formats/text_scanner.h"
 
-// [ST][C][N][4][n]OFF, the prefixes in any order, then for nOFF the dimension, then the numbers of
-// vertices, faces and edges; then the vertices and the faces. (Geomview manual, "OFF Files".)
+// [ST][C][N][4][n]OFF, with the prefixes in any order; for nOFF the dimension; the numbers of
+// vertices, faces and edges; the vertices; the faces. (Geomview manual, "OFF Files".)
 //
-// Most files give a line to each vertex and each face, and what the line says beyond coordinates or
-// corners (normals, colours, texture) is skipped, with or without a prefix that announces it. But
-// the format is one of tokens: files in which an element does not fit its line, or that end too
-// early when they are read by lines, are read again token by token. Then a vertex has the values
-// that the prefixes announce, and nothing may be left over: a file that has two meanings is an
-// error. Comments and blank lines may stand anywhere.
+// Most files have one line for each vertex and each face. The rest of a line after the coordinates
+// or corners (normals, colours, texture) is skipped, whether a prefix announces it or not. The
+// format itself, however, is a sequence of tokens. A file in which an element does not fit its
+// line, or which ends too early when read by lines, is read again token by token. Then a vertex has
+// the values that the prefixes announce, and nothing may be left over: a file with two meanings is
+// an error. Comments and blank lines may be anywhere.
 
 namespace strata::detail {
 namespace {
 
-/// How elements are told apart.
+/// How the end of an element is found.
 enum class Layout {
-  kLines,    ///< one a line; the rest of its line is skipped
-  kWrapped,  ///< vertices by tokens; the rest of the line behind a face is skipped
-  kTokens    ///< all by tokens
+  kLines,    ///< one element per line; the rest of the line is skipped
+  kWrapped,  ///< vertices by tokens; the rest of the line after a face is skipped
+  kTokens    ///< all elements by tokens
 };
 
 /// One way to read a file.
@@ -28,7 +28,7 @@ struct Attempt {
   Layout layout = Layout::kLines;
   bool edges_on_line =
       true;               ///< the number of edges, if given, stands in the line of that of faces
-  int colour_values = 4;  ///< of a vertex in COFF
+  int colour_values = 4;  ///< colour values of a vertex in COFF
 };
 
 class OffReader {
@@ -42,12 +42,12 @@ class OffReader {
   Result<void> read_prefixes();
   Result<void> read_header();
   Result<void> read_vertices();
-  /// Reads faces from p_ on; visit(start, corners) returns false to stop.
+  /// Reads faces from p_ on. visit(start, corners) returns false to stop.
   template <class Visit>
   Result<void> read_faces(Visit&& visit);
   FacePlace locate(std::uint32_t element);
 
-  /// Past white space, comments and line ends.
+  /// Skips white space, comments and line ends.
   void skip_gap() {
     for (;;) {
       while (is_space(*p_)) ++p_;
@@ -55,7 +55,7 @@ class OffReader {
       skip_line();
     }
   }
-  /// To a value inside an element.
+  /// Skips to the next value of the same element.
   void skip_inside() {
     if (how_.layout != Layout::kLines) return skip_gap();
     while (is_blank(*p_) && *p_ != '\r') ++p_;
@@ -72,7 +72,7 @@ class OffReader {
     if (at_end()) return "the file ends";
     return *p_ == '#' || *p_ == '\r' ? "found the end of the line" : "found " + describe(p_, end_);
   }
-  /// An integer at p_ that ends its token; false leaves p_ at what stands there.
+  /// Reads an integer that is a whole token. Returns false, with p_ unchanged, if there is none.
   bool take_integer(std::int64_t& value) {
     const char* stop = parse_integer(p_, value);
     if (stop == nullptr || !(ends_token(*stop) || *stop == '#')) return false;
@@ -89,17 +89,17 @@ class OffReader {
   const char* end_;
   const char* p_;
   Attempt how_;
-  bool counts_in_line_ = true;  ///< those of vertices and faces stand in one line
-  bool left_over_ = false;      ///< something follows the last face
-  bool homogeneous_ = false;    ///< four coordinates, the last divides
+  bool counts_in_line_ = true;  ///< the numbers of vertices and faces are on one line
+  bool left_over_ = false;      ///< there is text after the last face
+  bool homogeneous_ = false;    ///< four coordinates, of which the last divides the others
   bool normals_ = false, colours_ = false, texture_ = false, with_dimension_ = false;
   std::uint64_t vertex_count_ = 0, face_count_ = 0;
   const char* faces_begin_ = nullptr;
   RawMesh mesh_;
 };
 
-/// The word OFF and what it is told of; p_ is left behind it, where a count may follow at once, as
-/// in the files of ModelNet40 ("OFF8 6 0").
+/// Reads the word OFF and its prefixes. A count may follow without a blank, as in ModelNet40's
+/// files ("OFF8 6 0").
 Result<void> OffReader::read_prefixes() {
   homogeneous_ = normals_ = colours_ = texture_ = with_dimension_ = false;
   std::string_view word = token_at(p_);
@@ -108,7 +108,7 @@ Result<void> OffReader::read_prefixes() {
   const char behind =
       size == std::string_view::npos || size + 3 >= word.size() ? '0' : word[size + 3];
   if (size == std::string_view::npos || !is_digit(behind)) {
-    if (is_digit(*p_)) return {};  // counts at once
+    if (is_digit(*p_)) return {};  // counts follow without a blank
     return error(fmt::format("expected OFF, {}", found()));
   }
   word = word.substr(0, size);
@@ -159,7 +159,7 @@ Result<void> OffReader::read_header() {
     skip_inside();
     const bool has_edges = !at_line_end();
     skip_line();
-    // The number of edges may have a line of its own, which is too short for a vertex.
+    // The number of edges may be on a line of its own, which is too short for a vertex.
     const char* const next = p_;
     const bool is_number = !has_edges && next_integer(edges);
     skip_inside();
@@ -172,7 +172,7 @@ Result<void> OffReader::read_header() {
   }
   vertex_count_ = static_cast<std::uint64_t>(vertices);
   face_count_ = static_cast<std::uint64_t>(faces);
-  // A vertex is at least "0 0 0\n", a face "0\n".
+  // A vertex takes at least "0 0 0\n", a face "0\n".
   const auto left = static_cast<std::uint64_t>(end_ - p_);
   if (vertex_count_ > left / 6 + 1 || face_count_ > left / 2 + 1) {
     return error(fmt::format("{} vertices and {} faces are claimed, but only {} bytes follow",
@@ -303,7 +303,7 @@ Result<MeshFile> OffReader::read() {
   const auto good = [&](const Attempt& how) {
     auto done = attempt(how);
     if (done) return true;
-    // The way that read most of the file has the error that helps.
+    // The attempt that read most of the file has the most helpful error.
     if (furthest_place == nullptr || p_ > furthest_place ||
         done.error().code != ErrorCode::kInput) {
       furthest = done.error();
@@ -313,7 +313,7 @@ Result<MeshFile> OffReader::read() {
   };
   const bool lines = good({});
   bool read = lines && !left_over_;
-  // Where the counts have a line each, that of edges most likely has one, too.
+  // If the first two counts have a line each, the number of edges most likely has one too.
   const bool first = counts_in_line_;
   for (const bool edges_on_line : {first, !first}) {
     for (const int colour_values : {4, 3}) {
@@ -323,7 +323,7 @@ Result<MeshFile> OffReader::read() {
       }
     }
   }
-  // A file that can be read by lines and in no other way ends in something else.
+  // A file that can be read by lines only has other text after its last face.
   if (!read && lines && furthest.code == ErrorCode::kInput) read = good({});
   if (!read) return tl::unexpected(std::move(furthest));
   return finish_mesh(input_, std::move(mesh_),

@@ -9,29 +9,30 @@
 #include "mesh/formats/reader_common.h"
 #include "mesh/formats/text_scanner.h"
 
-// A text header lists elements, each with a count and properties: scalars, or lists with their own
-// count. Positions are x, y, z of element "vertex"; faces the list vertex_indices (or vertex_index)
-// of element "face", triangles that of element "tristrips", in which -1 begins a new strip. All
-// else is stepped over by its declared type. (G. Turk, The PLY Polygon File Format, 1994.)
+// The text header lists elements. Each has a count and properties: scalars, or lists with their own
+// count. Positions are x, y, z of element "vertex". Faces are the list vertex_indices (or
+// vertex_index) of element "face"; triangles also come from element "tristrips", in which -1 begins
+// a new strip. Other properties are skipped according to their declared types. (G. Turk, The PLY
+// Polygon File Format, 1994.)
 //
-// An ascii element is a line, and the line may hold more than the header declares. A file in which
-// an element does not fit its line is read again token by token; then nothing may be left over.
+// An ASCII element is a line, which may hold more than the header declares. A file in which an
+// element does not fit its line is read again token by token; then nothing may be left over.
 
 namespace strata::detail {
 namespace {
 
 using namespace ply;
 
-/// What the corners of an element make.
+/// Whether an element's corners make a polygon or a triangle strip.
 enum class FaceKind { kPolygon, kStrip };
 
-/// An element that holds faces, for messages about one of them.
+/// An element that holds faces. Messages need it to find a face again.
 template <class Source>
 struct FaceSource {
   const Element* element;
   Source source;
   FaceKind kind;
-  std::uint64_t faces;  ///< how many it made
+  std::uint64_t faces;  ///< number of faces it made
 };
 
 class PlyReader {
@@ -77,7 +78,7 @@ class PlyReader {
   Encoding encoding_ = Encoding::kAscii;
   std::vector<Element> elements_;
   RawMesh mesh_;
-  std::size_t failed_at_ = 0;  ///< where in the text a body ended too early
+  std::size_t failed_at_ = 0;  ///< position in the text where a body ended too early
 };
 
 /// Takes the next word of a line.
@@ -123,7 +124,7 @@ Result<void> PlyReader::read_property_line(std::string_view line) {
 
 Result<void> PlyReader::read_header() {
   bool has_format = false;
-  std::size_t end_size = 0;  // the first line tells how lines end: 1 for \n or \r, 2 for \r\n
+  std::size_t end_size = 0;  // the line end that the first line shows: 1 for \n or \r, 2 for \r\n
   while (p_ < end_) {
     ++line_;
     const char* stop = p_;
@@ -131,7 +132,8 @@ Result<void> PlyReader::read_header() {
     if (stop == end_) break;
     if (end_size == 0) end_size = *stop == '\r' && stop[1] == '\n' ? 2 : 1;
     std::string_view line(p_, static_cast<std::size_t>(stop - p_));
-    // A lone \r\n in a file of \n lines is still one end of line; binary data may follow the last.
+    // A single \r\n in a file of \n lines is one line end. After the last line binary data may
+    // follow.
     p_ = *stop == '\r' && stop[1] == '\n' && (end_size == 2 || line != "end_header") ? stop + 2
                                                                                      : stop + 1;
     const std::string_view word = take_word(line);
@@ -157,7 +159,7 @@ Result<void> PlyReader::read_header() {
       if (!has_format) return header_error("no 'format' line in the header");
       return {};
     } else if (word != "comment" && word != "obj_info" && !word.empty()) {
-      // Some exporters forget the word "comment".
+      // Some exporters leave out the word "comment".
       mesh_.stats.warnings.push_back(fmt::format("{}:{}: header line '{}' is ignored", input_.name,
                                                  line_, word.substr(0, 40)));
     }
@@ -180,7 +182,7 @@ tl::unexpected<Error> PlyReader::cut_short(const Source& source, const Element& 
                                            std::uint64_t index) {
   const char* at = source.position();
   failed_at_ = static_cast<std::size_t>(at - begin_);
-  while (!Source::kBinary && is_space(*at)) ++at;  // in lines, what is missing may be in the next
+  while (!Source::kBinary && is_space(*at)) ++at;  // the value may be on the next line
   if (at < end_ && !Source::kBinary) at = source.position();
   const bool ends = Source::kBinary || at >= end_;
   return fail(ErrorCode::kInput, "{}: {} in element {} {} of {}", place(Source(at, end_)),
@@ -196,11 +198,11 @@ bool PlyReader::skip_property(Source& source, const Property& property) {
          source.skip(property.type, static_cast<std::uint64_t>(count));
 }
 
-/// Where the coordinates stand among the properties of a vertex.
+/// The positions of the coordinates among the properties of a vertex.
 struct VertexLayout {
-  int property[3] = {-1, -1, -1};  ///< by axis; -1: none
-  std::size_t offset[3] = {};      ///< bytes, where there are no lists
-  std::size_t stride = 0;          ///< bytes of a vertex, where there are no lists
+  int property[3] = {-1, -1, -1};  ///< for each axis; -1: none
+  std::size_t offset[3] = {};      ///< in bytes, if the element has no lists
+  std::size_t stride = 0;          ///< bytes per vertex, if the element has no lists
   bool lists = false;
 };
 
@@ -220,7 +222,7 @@ VertexLayout layout_of(const Element& element) {
   return layout;
 }
 
-/// All vertices at once, where each takes as many bytes. @pre source has them all
+/// Reads all vertices at once, if they all have the same size. @pre source has them all
 template <class Source>
 void read_equal_vertices(Source& source, const Element& element, const VertexLayout& layout,
                          const Execution& execution, std::vector<glm::dvec3>& positions) {
@@ -286,10 +288,10 @@ Result<void> PlyReader::read_vertices(Source& source, const Element& element) {
   return {};
 }
 
-/// An index that no vertex has, and that is no -1 either.
+/// An index that no vertex has and that differs from the -1 between strips.
 constexpr std::uint32_t kBadVertex = kMaxVertices;
 
-/// @return kNoVertex for -1, as signed or unsigned type, which parts strips
+/// @return kNoVertex for -1, in a signed or unsigned type, which separates strips
 std::uint32_t vertex_index(double value) {
   if (value == -1.0 || value == static_cast<double>(kNoVertex)) return kNoVertex;
   return value >= 0.0 && value < static_cast<double>(kBadVertex) && value == std::floor(value)
@@ -297,8 +299,8 @@ std::uint32_t vertex_index(double value) {
              : kBadVertex;
 }
 
-/// Calls visit(a, b, c) for the triangles of a strip, turned alike, until it returns false. Those
-/// that only lead on have two corners in one place.
+/// Calls visit(a, b, c) for the triangles of a strip, in equal orientation, until it returns false.
+/// A strip may contain triangles with two corners in one place, which only connect its pieces.
 template <class Visit>
 bool each_strip_triangle(std::span<const std::uint32_t> strip, Visit&& visit) {
   std::size_t begin = 0;
@@ -313,7 +315,7 @@ bool each_strip_triangle(std::span<const std::uint32_t> strip, Visit&& visit) {
   return true;
 }
 
-/// Calls visit(start, corners) for the faces from source on, until it returns false.
+/// Calls visit(start, corners) for the faces from `source` on, until it returns false.
 template <class Source, class Visit>
 Result<void> PlyReader::read_faces(Source& source, const Element& element, Visit&& visit) {
   const Property* indices = nullptr;
@@ -327,7 +329,7 @@ Result<void> PlyReader::read_faces(Source& source, const Element& element, Visit
     return fail(ErrorCode::kInput, "{}: element {} has no list vertex_indices", input_.name,
                 element.name);
   }
-  // Almost all binary files hold a byte and then 32-bit indices.
+  // Almost all binary files have a one-byte count followed by 32-bit indices.
   const bool plain = Source::kBinary && element.properties.size() == 1 &&
                      bytes_of(*indices->list_type) == 1 &&
                      (indices->type == Type::kInt32 || indices->type == Type::kUint32);
@@ -445,8 +447,8 @@ Result<MeshFile> PlyReader::read_body(Source source) {
   for (const Element& element : elements_) {
     std::uint64_t least = 0;
     for (const Property& property : element.properties) least += Source::least_bytes(property);
-    if (least == 0) continue;  // nothing in the body
-    // The last value of an ascii file may lack its blank.
+    if (least == 0) continue;  // takes no bytes in the body
+    // The last value of an ASCII file may lack its blank.
     if (element.count > (source.left() + 1) / least) {
       return fail(ErrorCode::kInput,
                   "{}: {} elements '{}' are claimed, {} bytes or more, but only {} bytes follow",
@@ -495,7 +497,7 @@ Result<MeshFile> PlyReader::read_ascii() {
   mesh_.stats.format = "ply ascii";
   mesh_.stats.warnings = warnings;
   Result<MeshFile> by_tokens = read_body(AsciiSource(p_, end_, false));
-  // The way that read most of the file has the error that helps.
+  // The attempt that read most of the file has the most helpful error.
   return by_tokens || failed_at_ > line_failed_at ? by_tokens : by_lines;
 }
 

@@ -7,11 +7,11 @@
 #include "mesh/formats/text_scanner.h"
 #include "mesh/weld.h"
 
-// Binary: 80 bytes of anything, a count, and 50 bytes a facet: normal, three corners as float, two
-// bytes. Ascii: facet normal x y z, outer loop, vertex x y z ..., endloop, endfacet; numbers are
-// read as double. Exporters also write "end loop", a name glued to "endsolid", and lines of their
-// own between the loops, as of colours. In both, corners become vertices where their positions are
-// equal.
+// Binary: 80 bytes of any content, a count, and 50 bytes per facet (normal, three corners as float,
+// two bytes). ASCII: facet normal x y z, outer loop, vertex x y z ..., endloop, endfacet; numbers
+// are read as double. Exporters also write "end loop", a name glued to "endsolid", and lines of
+// their own, such as colours, between the loops. In both kinds, corners with equal positions become
+// one vertex.
 
 namespace strata::detail {
 namespace {
@@ -24,19 +24,20 @@ std::uint32_t little_endian_32(const char* p) {
   return std::endian::native == std::endian::little ? value : __builtin_bswap32(value);
 }
 
-/// Corner `c` of a binary file, three to a facet.
+/// Corner `c` of a binary file; a facet has three.
 glm::vec3 binary_corner(const char* data, std::size_t c) {
   const char* p = data + kHeaderBytes + c / 3 * kFacetBytes + 12 + c % 3 * 12;
   return {std::bit_cast<float>(little_endian_32(p)), std::bit_cast<float>(little_endian_32(p + 4)),
           std::bit_cast<float>(little_endian_32(p + 8))};
 }
 
-/// How many triangles a binary file has: its size decides, unless it ends in something that is no
-/// triangle. Then what follows the claimed ones may all be that, or the file is cut off.
+/// The number of triangles in a binary file. The file's size decides, unless it is not a whole
+/// number of triangles. Then the claimed number decides: either other data follows those triangles,
+/// or the file is cut off.
 struct BinaryCount {
-  std::uint64_t claimed = 0;  ///< in the head
-  std::uint64_t held = 0;     ///< that the size has room for
-  std::uint64_t count = 0;    ///< to read
+  std::uint64_t claimed = 0;  ///< the number in the header
+  std::uint64_t held = 0;     ///< the number that fits the file's size
+  std::uint64_t count = 0;    ///< the number to read
 };
 
 Result<BinaryCount> count_binary(const ReaderInput& input) {
@@ -52,7 +53,7 @@ Result<BinaryCount> count_binary(const ReaderInput& input) {
   }
   const std::size_t odd = (size - kHeaderBytes) % kFacetBytes;
   found.count = found.claimed == 0 || odd == 0 ? found.held : found.claimed;
-  // Text of any other kind holds no zeros, triangles do.
+  // Text, unlike triangles, contains no zero bytes.
   const bool is_text =
       input.text.substr(kHeaderBytes, 16 * kFacetBytes).find('\0') == std::string_view::npos;
   if (found.count > found.held || (found.count != found.claimed && is_text)) {
@@ -86,7 +87,7 @@ Result<void> read_facets(const ReaderInput& input, std::size_t count, TriangleSo
     return fail(ErrorCode::kCancelled, "{}: reading was stopped", input.name);
   }
   reserve_large(soup.positions, different);
-  // First occurrences become vertices in the order of the file; what follows looks back to them.
+  // First occurrences become vertices in the order of the file; later corners refer back to them.
   for (std::size_t c = 0; c < corners; ++c) {
     if (index[c] == c) {
       index[c] = static_cast<std::uint32_t>(soup.positions.size());
@@ -125,13 +126,13 @@ Result<MeshFile> read_binary(const ReaderInput& input) {
   });
 }
 
-/// Facets of a part of an ascii file.
+/// The facets of a piece of an ASCII file.
 struct Chunk {
   std::vector<glm::dvec3> corners;
-  std::vector<std::uint32_t> sizes;  ///< corners of each loop
+  std::vector<std::uint32_t> sizes;  ///< number of corners of each loop
   std::size_t error_offset = ChunksEnd::kNone;
   std::string error;
-  bool ended = false;  ///< the last solid was closed by endsolid
+  bool ended = false;  ///< endsolid has closed the last solid
   std::uint64_t strange_lines = 0;
   std::size_t first_strange = 0;  ///< offset of the first strange line
 
@@ -181,15 +182,15 @@ const char* skip_line(const char* p) {
   return p;
 }
 
-/// What a token means.
+/// The meaning of a token.
 enum class Word { kSolid, kEndSolid, kFacet, kEndFacet, kLoop, kEndLoop, kNormal, kVertex, kOther };
 
 bool starts_no_case(std::string_view text, std::string_view word) {
   return equals_no_case(text.substr(0, word.size()), word);
 }
 
-/// The meaning of the token at p; `stop` is set behind it. "end" and its word may be parted by
-/// blanks, and the name of a solid may be glued to "solid" and "endsolid".
+/// The meaning of the token at p; `stop` is set to its end. Blanks may separate "end" from its
+/// word, and the name of a solid may be glued to "solid" and "endsolid".
 Word word_at(const char* p, const char*& stop) {
   stop = skip_token(p);
   std::string_view token(p, static_cast<std::size_t>(stop - p));
@@ -230,15 +231,16 @@ Word word_at(const char* p, const char*& stop) {
   return starts_no_case(token, "solid") ? Word::kEndSolid : Word::kOther;
 }
 
-/// Whether a line that begins so tells of looks, which any exporter may add to a facet or a vertex.
+/// Whether a line that begins with this word describes appearance. Exporters add such lines to
+/// facets and vertices.
 bool tells_of_looks(std::string_view word) {
   constexpr std::string_view kWords[] = {"color", "colour", "rgb", "material", "attribute"};
   return std::any_of(std::begin(kWords), std::end(kWords),
                      [&](std::string_view known) { return starts_no_case(word, known); });
 }
 
-/// Chunks end behind an "endfacet" that begins a line, where the grammar starts afresh. (Further to
-/// the right it may be part of a solid's name.)
+/// A chunk ends after an "endfacet" at the start of a line, where the grammar begins anew.
+/// (Elsewhere in a line the word may be part of a solid's name.)
 void AsciiReader::cut() {
   cuts_.push_back(begin_);
   const char* p = begin_;
@@ -297,7 +299,7 @@ void AsciiReader::parse(const char* p, const char* end, Chunk& chunk) const {
     } else if (word == Word::kNormal) {
       p = stop;
       double unused = 0.0;
-      for (const char* q = p; q != nullptr;) {  // not used, so any number of numbers will do
+      for (const char* q = p; q != nullptr;) {  // the values are not used, so any count is accepted
         p = q;
         q = parse_double(skip_spaces(p), unused);
         if (q != nullptr && !ends_token(*q)) q = nullptr;
@@ -315,7 +317,7 @@ void AsciiReader::parse(const char* p, const char* end, Chunk& chunk) const {
     } else if (word == Word::kSolid || word == Word::kEndSolid) {
       if (in_loop) return broken(p, fmt::format("'{}' inside a loop", text));
       chunk.ended = word == Word::kEndSolid;
-      p = skip_line(stop);  // the rest is a name
+      p = skip_line(stop);  // the rest of the line is a name
     } else if (!in_loop || tells_of_looks(text)) {
       p = parse_strange(p, chunk);
     } else {
@@ -325,7 +327,7 @@ void AsciiReader::parse(const char* p, const char* end, Chunk& chunk) const {
   if (in_loop) broken(p, "the file ends inside a facet");
 }
 
-/// Past what no STL file should hold, to the end of the line or a known word.
+/// Skips text that no STL file should hold, to the end of the line or to a known word.
 const char* AsciiReader::parse_strange(const char* p, Chunk& chunk) const {
   const char* stop = skip_token(p);
   if (!tells_of_looks({p, static_cast<std::size_t>(stop - p)}) && chunk.strange_lines++ == 0) {
@@ -402,7 +404,8 @@ Result<MeshFile> AsciiReader::read() {
                      [this](std::uint32_t element) { return locate(element); });
 }
 
-/// Text that begins like an ascii file. Binary headers may begin with "solid" too, but hold zeros.
+/// Whether text begins like an ASCII file. Binary headers may also begin with "solid", but contain
+/// zeros.
 bool looks_ascii(std::string_view text) {
   if (text.substr(0, 512).find('\0') != std::string_view::npos) return false;
   const std::string_view word = token_at(skip_spaces(text.data()));

@@ -11,7 +11,7 @@
 #include "mesh/no_vertex.h"
 #include "strata/mesh/formats/read_mesh.h"
 
-/// What the readers of this folder share; not for others.
+/// Shared by the readers of this folder; private.
 namespace strata::detail {
 
 /// The arguments of a reader. The text ends in a readable zero byte.
@@ -20,26 +20,26 @@ struct ReaderInput {
   const std::string& name;
   const MeshReadOptions& options;
   const Execution& execution;
-  std::size_t skipped = 0;  ///< bytes of the file before the text: a byte order mark
+  std::size_t skipped = 0;  ///< bytes before the text: a byte order mark
 };
 
-/// Tells how far a reader is, and whether it shall go on. Of the thread that made it: others may
-/// ask, and are not told on.
+/// Reports a reader's progress and checks for a stop request. Any thread may call it, but only the
+/// thread that made it reports.
 class ReadWatch {
  public:
   explicit ReadWatch(const ReaderInput& input)
       : input_(input), thread_(std::this_thread::get_id()) {}
 
-  /// @param done  share of the file, in [0, 1]. @return false once a stop is requested
+  /// @param done  share of the file, in [0, 1] @return false after a stop request
   bool at(double done) {
-    constexpr double kOfAll = 0.9;  // the rest is finish_mesh()
+    constexpr double kOfAll = 0.9;  // finish_mesh() takes the rest
     if (input_.execution.progress && std::this_thread::get_id() == thread_ && done >= told_) {
       told_ = done;
       input_.execution.progress(kOfAll * done);
     }
     return !input_.execution.stop.stop_requested();
   }
-  /// The same for loops: looks up every 2^14th time. @param place  in the text
+  /// The same for loops: acts on every 2^14th call. @param place  position in the text
   bool step(std::uint64_t index, const char* place) {
     constexpr std::uint64_t kRarely = (1 << 14) - 1;
     return (index & kRarely) != kRarely || at(static_cast<double>(place - input_.text.data()) /
@@ -49,27 +49,28 @@ class ReadWatch {
  private:
   const ReaderInput& input_;
   std::thread::id thread_;
-  double told_ = 0;  // of that thread
+  double told_ = 0;  // last share reported
 };
 
-/// Everything a file says, unchecked: indices may be out of range, coordinates not finite.
-/// `stats.faces` and the counts a reader alone can know (too_few_vertices, ignored) are set.
+/// The unchecked contents of a file: indices may be out of range, coordinates not finite. The
+/// reader sets `stats.faces` and the counts that only it knows (too_few_vertices, ignored).
 struct RawMesh {
   TriangleSoup soup;
   MeshReadStats stats;
   std::uint64_t first_short_face = 0;  ///< element of the first face with too few vertices
 };
 
-/// Where a face element stands in the file, for messages: "bunny.obj:1204", and as the file writes
-/// it the vertex it should not name (empty: its 0-based index).
+/// The place of a face element in the file, for messages ("bunny.obj:1204"), and its invalid vertex
+/// as the file writes it (empty: the 0-based index).
 struct FacePlace {
   std::string place;
   std::string vertex;
 };
 using LocateFace = std::function<FacePlace(std::uint32_t element)>;
 
-/// Drops and counts what cannot stay in a soup, gathers warnings, and judges the whole: the last
-/// step of every reader. @return kInput when nothing is left, or with `strict` something was lost
+/// The last step of every reader: drops and counts faces and vertices that a soup cannot keep,
+/// collects warnings, and checks the whole. @return kInput when nothing is left, or when `strict`
+/// is set and something was dropped
 Result<MeshFile> finish_mesh(const ReaderInput& input, RawMesh&& raw, const LocateFace& locate);
 
 Result<MeshFile> read_obj(const ReaderInput& input);
@@ -77,11 +78,11 @@ Result<MeshFile> read_stl(const ReaderInput& input);
 Result<MeshFile> read_ply(const ReaderInput& input);
 Result<MeshFile> read_off(const ReaderInput& input);
 
-/// Whether the size of a file is that of a binary STL file of as many triangles as it claims.
+/// Whether a file has the size of a binary STL file with the number of triangles that it claims.
 [[nodiscard]] bool is_binary_stl(std::string_view bytes);
 
-/// Appends polygons as fans, which finish_mesh() cuts anew where that is not right, and keeps count
-/// of their elements, for readers that go face by face.
+/// Appends polygons as fans and keeps the number of their element, for readers that read face by
+/// face. finish_mesh() cuts a polygon again if its fan is wrong.
 class FanBuilder {
  public:
   explicit FanBuilder(RawMesh& mesh) : mesh_(mesh) {}
@@ -111,7 +112,7 @@ class FanBuilder {
   bool identity_ = true;
 };
 
-/// True when the memory limit of the execution forbids a soup of this size.
+/// Whether a soup of this size exceeds the memory limit of the execution.
 [[nodiscard]] inline bool exceeds_limit(const Execution& execution, std::uint64_t vertices,
                                         std::uint64_t triangles) {
   return execution.memory_limit != 0 &&

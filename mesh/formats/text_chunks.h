@@ -16,16 +16,16 @@
 
 namespace strata::detail {
 
-/// Why reading text in pieces came to its end before the end of the text.
+/// The reason why the reading of a text's pieces ended early, if it did.
 struct ChunksEnd {
   static constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
-  std::size_t error_offset = kNone;  ///< in the text
+  std::size_t error_offset = kNone;  ///< position in the text
   std::string error{};
   bool over_limit = false;
-  std::uint32_t most_vertices = kMaxVertices;  ///< that the reader can hold
+  std::uint32_t most_vertices = kMaxVertices;  ///< the most that the reader can hold
 
   [[nodiscard]] bool early() const { return over_limit || error_offset != kNone; }
-  /// @return kCancelled, kLimit, or kInput with the line
+  /// @return kCancelled, kLimit, or kInput naming the line
   [[nodiscard]] Result<void> status(const ReaderInput& input) const {
     if (input.execution.stop.stop_requested()) {
       return fail(ErrorCode::kCancelled, "{}: reading was stopped", input.name);
@@ -42,11 +42,12 @@ struct ChunksEnd {
   }
 };
 
-/// Reads text in pieces, on all threads, and puts them together in the order of the text.
-/// @tparam Chunk  what is read of a piece; clear() makes it as new
+/// Parses pieces of a text on all threads and appends the results in the order of the text.
+/// @tparam Chunk  the result of one piece; clear() resets it for reuse
 /// @param cuts  piece i is [cuts[i], cuts[i + 1])
-/// @param parse  of (begin, end, Chunk&), by several threads at once
-/// @param append  of Chunk&, by one thread at a time; sets `end`, then the rest is not needed
+/// @param parse  parse(begin, end, Chunk&), called by several threads at once
+/// @param append  append(Chunk&), called by one thread at a time. When it sets `end`, the remaining
+/// pieces are skipped
 template <class Chunk, class Parse, class Append>
 void read_chunks(const ReaderInput& input, std::span<const char* const> cuts, const ChunksEnd& end,
                  Parse&& parse, Append&& append) {

@@ -6,15 +6,15 @@ namespace strata::detail {
 
 const char* scanner::parse_double_slowly(const char* text, double& value) {
   const char* begin = text + (*text == '+');
-  // from_chars takes no plus sign, and must not be shown a minus behind one.
+  // from_chars accepts no plus sign, and here no minus may follow one.
   if (begin != text && *begin == '-') return nullptr;
   const char* end = begin + (*begin == '-');
   while (!ends_token(*end) && *end != ',' && *end != ';' && *end != '/') ++end;
   const auto [stop, error] = std::from_chars(begin, end, value);
   if (error == std::errc::invalid_argument) return nullptr;
   if (error == std::errc::result_out_of_range) {
-    // Too large or too small? The value of a decimal with exponent e and n digits before the point
-    // is about 10^(e + n); only the sign of that matters this far from 1.
+    // Is the number too large or too small? A decimal with exponent e and n digits before the point
+    // is about 10^(e + n). Only the sign of e + n matters this far from 1.
     const bool negative = *begin == '-';
     const char* p = begin + negative;
     std::int64_t magnitude = 0;
@@ -34,8 +34,7 @@ const char* scanner::parse_double_slowly(const char* text, double& value) {
     value = magnitude > 0 ? std::numeric_limits<double>::infinity() : 0.0;
     if (negative) value = -value;
   }
-  if (*stop == '#' &&
-      stop[-1] == '.') {  // 1.#INF, -1.#IND, 1.#QNAN of old Microsoft run-time libraries
+  if (*stop == '#' && stop[-1] == '.') {  // 1.#INF, -1.#IND, 1.#QNAN of old Microsoft runtimes
     value = std::numeric_limits<double>::quiet_NaN();
     return skip_token(stop);
   }
@@ -57,7 +56,7 @@ bool is_wide_text(std::string_view text) {
   if (text.starts_with("\0\0\xfe\xff"sv)) return true;
   constexpr std::size_t kLooks = 16;
   if (text.size() < kLooks || (text[0] == '\0') == (text[1] == '\0')) return false;
-  const std::size_t zero = text[0] == '\0' ? 0 : 1;  // big endian, little endian
+  const std::size_t zero = text[0] == '\0' ? 0 : 1;  // big endian : little endian
   for (std::size_t i = 0; i < kLooks; ++i) {
     const char c = text[i];
     if (i % 2 == zero ? c != '\0' : !(is_space(c) || (c >= ' ' && c <= '~'))) return false;

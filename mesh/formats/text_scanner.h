@@ -7,34 +7,35 @@
 #include <string>
 #include <string_view>
 
-/// Scanners for text that ends in a readable zero byte (InputBytes): no bounds are checked, since
-/// zero is neither a digit, nor a letter, nor a blank.
+/// Scanners for text that ends in a readable zero byte (InputBytes). They check no bounds, because
+/// zero is neither a digit nor a letter nor a blank.
 namespace strata::detail {
 
 [[nodiscard]] constexpr bool is_digit(char c) { return static_cast<unsigned char>(c - '0') < 10; }
-/// Blank inside a line. A carriage return is one, so CRLF needs no other care.
+/// A blank inside a line. A carriage return counts as one, so CRLF needs no special case.
 [[nodiscard]] constexpr bool is_blank(char c) {
   return c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f';
 }
 [[nodiscard]] constexpr bool is_space(char c) { return is_blank(c) || c == '\n'; }
-/// What may follow a token: white space or the end.
+/// Whether a character ends a token: white space or the final zero.
 [[nodiscard]] constexpr bool ends_token(char c) { return is_space(c) || c == '\0'; }
 
 namespace scanner {
-// Powers of ten that a double holds exactly.
+// The powers of ten that a double holds exactly.
 inline constexpr double kPowers[23] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
                                        1e8,  1e9,  1e10, 1e11, 1e12, 1e13, 1e14, 1e15,
                                        1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
 
-/// What the short way cannot do: long mantissas, large exponents, nan, inf, 1.#IND.
+/// Reads the numbers that the fast path cannot: long mantissas, large exponents, nan, inf, 1.#IND.
 const char* parse_double_slowly(const char* text, double& value);
 }  // namespace scanner
 
-/// Reads a decimal number at `text`, correctly rounded and free of locales. Not std::from_chars for
-/// all of them: over the coordinates of 11 OBJ files (bunny, teapot, knot, ...) it takes 1.27 to
-/// 1.78 times as long with g++ 12, fast_float 3.9 takes 1.06 to 1.36 times as long. Numbers beyond
-/// the range of double become infinite or zero; nan, inf and Microsoft's 1.#INF are read.
-/// @return past the number, or null when there is none
+/// Reads a decimal number at `text`, correctly rounded and independent of the locale. Numbers
+/// beyond the range of double become infinite or zero; nan, inf and Microsoft's 1.#INF are
+/// accepted. The fast path replaces std::from_chars, which takes 1.27 to 1.78 times as long on the
+/// coordinates of 11 OBJ files (bunny, teapot, knot, ...) with g++ 12; fast_float 3.9 takes 1.06 to
+/// 1.36 times as long.
+/// @return the end of the number, or null if there is none
 inline const char* parse_double(const char* text, double& value) {
   const char* p = text;
   const bool negative = *p == '-';
@@ -49,8 +50,9 @@ inline const char* parse_double(const char* text, double& value) {
     exponent = fraction - p;
     count += p - fraction;
   }
-  // Clinger's fast path (How to Read Floating Point Numbers Accurately, PLDI 1990): mantissa and
-  // power are exact doubles, so the one rounding of the product or quotient is the right one.
+  // Clinger's fast path (How to Read Floating Point Numbers Accurately, PLDI 1990). The mantissa
+  // and the power are exact doubles, so their product or quotient is rounded only once, and
+  // correctly.
   if (count == 0 || count > 19 || (*p == '#' && p[-1] == '.'))
     return scanner::parse_double_slowly(text, value);
   if ((*p | 0x20) == 'e') {
@@ -74,8 +76,8 @@ inline const char* parse_double(const char* text, double& value) {
   return p;
 }
 
-/// Reads a decimal integer with optional sign; values of more than 2^58 may become 2^62.
-/// @return past the number, or null when there is none
+/// Reads a decimal integer with optional sign. Values above 2^58 may become 2^62. @return the end
+/// of the number, or null if there is none
 inline const char* parse_integer(const char* text, std::int64_t& value) {
   const char* p = text;
   const bool negative = *p == '-';
@@ -88,47 +90,47 @@ inline const char* parse_integer(const char* text, std::int64_t& value) {
   return p;
 }
 
-/// Past blanks of this line.
+/// Skips blanks within the line.
 inline const char* skip_blanks(const char* p) {
   while (is_blank(*p)) ++p;
   return p;
 }
 
-/// To the white space or end after a token.
+/// Skips to the white space or zero after a token.
 inline const char* skip_token(const char* p) {
   while (!ends_token(*p)) ++p;
   return p;
 }
 
-/// The token at p, at most 40 characters of it; unprintable characters end it.
+/// The token at p, cut at 40 characters or at an unprintable one.
 [[nodiscard]] inline std::string_view token_at(const char* p) {
   const char* q = p;
   while (!ends_token(*q) && q - p < 40 && *q > ' ' && *q < 127) ++q;
   return {p, static_cast<std::size_t>(q - p)};
 }
 
-/// What stands at p, for messages: "'x1'", "byte 0x10", "the end of the line", "the end of the
-/// file".
+/// Describes the text at p for messages: "'x1'", "byte 0x10", "the end of the line", "the end of
+/// the file".
 [[nodiscard]] std::string describe(const char* p, const char* end);
 
-/// The 1-based line of a position: lines end with \n, \r\n or \r.
+/// The 1-based line of a position. Lines end with \n, \r\n or \r.
 [[nodiscard]] std::uint64_t line_of(std::string_view text, const char* position);
 
-/// The text behind its UTF-8 byte order mark, which editors and exporters of Windows write.
+/// The text after a UTF-8 byte order mark, which editors and exporters on Windows write.
 [[nodiscard]] inline std::string_view without_byte_order_mark(std::string_view text) {
   if (text.starts_with("\xef\xbb\xbf")) text.remove_prefix(3);
   return text;
 }
 
-/// Whether text is UTF-16 or UTF-32: by its byte order mark, or since ascii begins it and every
-/// second of its first bytes is zero.
+/// Whether text is UTF-16 or UTF-32: it has such a byte order mark, or every second of its first
+/// bytes is zero as in wide ASCII text.
 [[nodiscard]] bool is_wide_text(std::string_view text);
 
-/// What is said of such text, behind the name of the file.
+/// The message about such text, after the name of the file.
 inline constexpr std::string_view kWideText =
     "the file is UTF-16 text; save it as UTF-8 (iconv -f UTF-16 -t UTF-8)";
 
-/// Case-insensitive comparison of ascii. @pre `word` is in lower case
+/// Compares ASCII text, ignoring case. @pre `word` is in lower case
 [[nodiscard]] inline bool equals_no_case(std::string_view text, std::string_view word) {
   if (text.size() != word.size()) return false;
   for (std::size_t i = 0; i < text.size(); ++i) {

@@ -59,7 +59,7 @@ void add_floats(std::string& out, const glm::dvec3& v) {
 }
 
 std::string stl_bytes(const TriangleSoup& mesh) {
-  std::string out("binary STL written by strata");  // must not begin with "solid"
+  std::string out("binary STL written by strata");  // the header must not begin with "solid"
   out.resize(80, ' ');
   out.reserve(84 + 50 * mesh.triangles.size());
   add_little_endian(out, static_cast<std::uint32_t>(mesh.triangles.size()));

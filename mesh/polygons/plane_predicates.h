@@ -7,10 +7,10 @@
 
 namespace strata {
 
-/// The sign of twice the area of the triangle (a, b, c), exactly: 1 when it turns to the left, -1
-/// to the right, 0 when the points lie on a line. A floating-point filter first, then an expansion
-/// (J. R. Shewchuk, "Adaptive precision floating-point arithmetic and fast robust geometric
-/// predicates", 1997). @pre finite, no product overflows
+/// The exact sign of twice the area of the triangle (a, b, c): 1 for a left turn, -1 for a right
+/// turn, 0 when the points are on a line. A floating-point filter decides most cases; the others
+/// are computed as an expansion (J. R. Shewchuk, "Adaptive precision floating-point arithmetic and
+/// fast robust geometric predicates", 1997). @pre finite, no product overflows
 [[nodiscard]] inline int orient(const glm::dvec2& a, const glm::dvec2& b, const glm::dvec2& c) {
   const double acx = a.x - c.x, bcy = b.y - c.y, acy = a.y - c.y, bcx = b.x - c.x;
   const double left = acx * bcy, right = acy * bcx;
@@ -18,14 +18,14 @@ namespace strata {
   const double bound = 3.3306690738754716e-16 * (std::abs(left) + std::abs(right));
   if (det > bound) return 1;
   if (-det > bound) return -1;
-  // Points on a line along an axis are common, and differences without rounding too.
+  // Points on a line along an axis are common. Their differences are exact zeros.
   if ((acx == 0 || bcy == 0) && (acy == 0 || bcx == 0)) return 0;
   if (det == 0 && acx + c.x == a.x && bcy + c.y == b.y && acy + c.y == a.y && bcx + c.x == b.x &&
       a.x - acx == c.x && b.y - bcy == c.y && a.y - acy == c.y && b.x - bcx == c.x) {
     const double left_rest = std::fma(acx, bcy, -left), right_rest = std::fma(acy, bcx, -right);
     return left_rest > right_rest ? 1 : left_rest < right_rest ? -1 : 0;
   }
-  // The six products of the determinant as an expansion: parts that do not overlap, smallest first.
+  // The determinant's six products as an expansion: parts that do not overlap, smallest first.
   const std::array<std::array<double, 2>, 6> factors{
       {{a.x, b.y}, {-a.x, c.y}, {-c.x, b.y}, {-a.y, b.x}, {a.y, c.x}, {c.y, b.x}}};
   std::array<double, 12> sum{};
@@ -43,7 +43,7 @@ namespace strata {
       sum[parts++] = carry;
     }
   }
-  // The largest part that is not zero decides.
+  // The largest non-zero part decides the sign.
   for (std::size_t i = parts; i-- > 0;) {
     if (sum[i] != 0) return sum[i] > 0 ? 1 : -1;
   }

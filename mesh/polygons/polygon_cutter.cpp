@@ -16,18 +16,18 @@
 namespace strata {
 namespace {
 
-/// A polygon this flat, in relation to its size, has one surface: how it is cut moves it by less
-/// than voxels and pixels tell.
+/// A polygon this flat, relative to its size, has one surface: the choice of diagonals moves it by
+/// less than voxels and pixels resolve.
 constexpr double kFlat = 1e-6;
-/// So is one that rounding to float could have bent, by 2^-24 of the coordinates a corner, unless
-/// that is much for its size.
+/// A polygon is also flat if rounding its corners to float could have bent it this much (2^-24 of
+/// the coordinates per corner), unless the bend is large for its size.
 constexpr double kFloat = 0x1p-22, kFlatFloat = 1e-4;
 /// See Bend::large().
 constexpr double kLarge = 1e-3;
-/// The square of twice an area must not overflow, nor may the products of coordinates.
+/// Limits that keep the square of twice an area and products of coordinates from overflowing.
 constexpr double kMostSquare = 1e300, kMostCoordinate = 1e150;
 
-/// The view along the longest axis of a normal.
+/// The view along the axis in which a normal is longest.
 struct View {
   int u, v;
   double sign;
@@ -47,10 +47,10 @@ bool least_first(const glm::dvec3& p, const glm::dvec3& q) {
 }
 
 bool left_first(const glm::dvec2& p, const glm::dvec2& q) {
-  return (p.x < q.x) | ((p.x == q.x) & (p.y < q.y));  // no branches: they could not be predicted
+  return (p.x < q.x) | ((p.x == q.x) & (p.y < q.y));  // no branches: they would be mispredicted
 }
 
-/// Whether a quadrilateral turns to the left at all corners, beyond what rounding could do.
+/// Whether a quadrilateral turns to the left at all corners, by more than rounding could explain.
 bool surely_convex(const glm::dvec2 (&p)[4]) {
   constexpr double kRounding = 1e-15;
   bool sure = true;
@@ -62,16 +62,16 @@ bool surely_convex(const glm::dvec2 (&p)[4]) {
   return sure;
 }
 
-/// Whether a quadrilateral is cut from its first corner to the third.
+/// Whether the diagonal of a quadrilateral runs from its first corner to the third.
 bool quad_is_fan(const glm::dvec2 (&p)[4]) {
   if (!surely_convex(p)) {
     const bool fan_fits = orient(p[0], p[1], p[2]) > 0 && orient(p[0], p[2], p[3]) > 0;
     const bool other_fits = orient(p[1], p[2], p[3]) > 0 && orient(p[1], p[3], p[0]) > 0;
     if (fan_fits != other_fits) return fan_fits;
-    if (!fan_fits) return true;  // crosses itself, or has corners in one place
+    if (!fan_fits) return true;  // it crosses itself, or two corners coincide
   }
   if (const int side = detail::delaunay_cut(p[0], p[1], p[2], p[3]); side != 0) return side > 0;
-  // As PolygonSweep cuts it, from the right.
+  // The cut of PolygonSweep, which proceeds from the right.
   int left = 0, right = 0;
   for (int i = 1; i < 4; ++i) {
     left = left_first(p[i], p[left]) ? i : left;
@@ -97,18 +97,18 @@ QuadCut cut_quad(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c,
   const glm::dvec3 normal = glm::cross(ac, bd);  // twice the area vector
   const double square = glm::dot(normal, normal);
   if (!(square > 0.0 && square < kMostSquare)) return result;
-  // a and c are equally high, and so are b and d.
+  // a and c have the same height, and so have b and d.
   const double height = std::abs(glm::dot(normal, ab));
   const glm::dvec3 extent =
       glm::max(glm::max(a, b), glm::max(c, d)) - glm::min(glm::min(a, b), glm::min(c, d));
   const double size_square = glm::dot(extent, extent);
   const double reach = std::max(std::max(std::abs(a.x), std::abs(a.y)), std::abs(a.z));
-  // All squared, and times the square of the normal.
+  // All values are squared and multiplied by the square of the normal.
   const double spread = height * height, whole = square * size_square;
   const bool flat =
       spread <= kFlat * kFlat * whole || (spread <= kFloat * kFloat * reach * reach * square &&
                                           spread <= kFlatFloat * kFlatFloat * whole);
-  // The areas of the four triangles: the cuts from a to c and from b to d.
+  // The areas of the four triangles that the diagonals a-c and b-d make.
   const double abc = glm::dot(normal, glm::cross(ab, ac)),
                bcd = glm::dot(normal, glm::cross(c - b, bd));
   if (flat && abc > 0.0 && abc < square && bcd > 0.0 && bcd < square) return result;
@@ -120,7 +120,7 @@ QuadCut cut_quad(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c,
   return result;
 }
 
-/// @return false when there is no plane to cut in
+/// Measures normal, size and bend. @return false when there is no plane to cut in
 bool PolygonCutter::measure(std::span<const glm::dvec3> corners) {
   bend_ = {};
   normal_ = glm::dvec3(0.0);
@@ -150,7 +150,7 @@ bool PolygonCutter::measure(std::span<const glm::dvec3> corners) {
   return true;
 }
 
-/// Whether points_ turn to the left everywhere, and once around.
+/// Whether points_ turn to the left everywhere and go around once.
 bool PolygonCutter::convex() const {
   const std::size_t count = points_.size();
   int turns_back = 0;
@@ -164,12 +164,13 @@ bool PolygonCutter::convex() const {
   return turns_back == 1;
 }
 
-/// Leaves out corners in the place of the one before, and lets the polygon begin at its least.
+/// Drops corners that repeat the previous one and rotates the polygon to begin at its least corner.
 void PolygonCutter::begin_at_least_corner(std::span<const glm::dvec3> corners) {
   const std::size_t count = corners.size();
   const auto corner = [&](std::size_t i) -> const glm::dvec3& { return corners[i % count]; };
-  // Where several corners are in the least place, what follows decides. Two candidates, of which
-  // the one that loses after k equal corners takes with it the k that follow.
+  // Several corners may be in the least place; then the corners that follow decide. Two candidates
+  // are compared. If they differ after k equal corners, the loser is out, and so are the k
+  // candidates after it.
   std::size_t least = 0;
   for (std::size_t other = 1, k = 0; other < count && k < count;) {
     const glm::dvec3 &p = corner(least + k), &q = corner(other + k);
@@ -196,7 +197,7 @@ void PolygonCutter::begin_at_least_corner(std::span<const glm::dvec3> corners) {
   }
 }
 
-/// Gives the points that are in one place in space one number.
+/// Numbers the points. Points at the same position in space have the same number.
 void PolygonCutter::number_places(std::span<const glm::dvec3> corners) {
   const auto count = static_cast<std::uint32_t>(points_.size());
   const auto at = [&](std::uint32_t i) -> const glm::dvec3& { return corners[corner_[i]]; };
@@ -217,7 +218,7 @@ std::pair<std::uint32_t, std::uint32_t> PolygonCutter::edge(std::uint32_t a,
   return std::minmax({place_[a], place_[b]});
 }
 
-/// Takes out edges that are walked there and back. @return what follows each point then
+/// Removes edges that the polygon follows in both directions. @return the successor of each point
 std::vector<std::uint32_t> PolygonCutter::without_bridges() const {
   const auto count = static_cast<std::uint32_t>(points_.size());
   std::vector<std::uint32_t> next(count), edges(count);
@@ -235,8 +236,8 @@ std::vector<std::uint32_t> PolygonCutter::without_bridges() const {
   return next;
 }
 
-/// Whether the triangles leave each edge of the outline once and use all others as often there as
-/// back.
+/// Whether the triangles use each edge of the outline once in its direction, and every other edge
+/// equally often in both directions.
 bool PolygonCutter::keeps_outline() const {
   struct Use {
     std::pair<std::uint32_t, std::uint32_t> edge;
@@ -260,15 +261,15 @@ bool PolygonCutter::keeps_outline() const {
   return true;
 }
 
-/// Cuts points_ where they cross or touch. Holes that are joined to what surrounds them by an edge
-/// there and back become contours of their own.
-/// @return false when the outline would not be kept in space, as where corners above each other
-/// are one point of the view
+/// Triangulates points_ that cross or touch each other. A hole that is joined to the outline by an
+/// edge in both directions becomes a contour of its own.
+/// @return false when the triangles would not keep the outline in space, for example because
+/// corners above each other coincide in the view
 bool PolygonCutter::cut_by_ears(std::span<const glm::dvec3> corners) {
   number_places(corners);
   const std::vector<std::uint32_t> next = without_bridges();
   std::vector<std::vector<glm::dvec2>> contours;
-  std::vector<std::uint32_t> vertices;  // all contours' points
+  std::vector<std::uint32_t> vertices;  // the points of all contours
   std::vector<bool> seen(points_.size(), false);
   for (std::uint32_t start = 0; start < points_.size(); ++start) {
     std::vector<glm::dvec2> contour;

@@ -12,30 +12,32 @@
 
 namespace strata {
 
-/// How far a polygon is from flat.
+/// The deviation of a polygon from a plane.
 struct Bend {
-  double height = 0.0;  ///< how far its corners lie apart, along its mean normal
-  double size = 0.0;    ///< its diagonal
-  /// More than 1/1000 of the size: the bound is wide enough for coordinates of four digits. Such a
-  /// polygon could mean several surfaces.
+  double height = 0.0;  ///< extent of its corners along its mean normal
+  double size = 0.0;    ///< diagonal of its box
+  /// Whether the height exceeds 1/1000 of the size: such a polygon could mean several surfaces. The
+  /// bound leaves room for coordinates of four digits.
   [[nodiscard]] bool large() const;
   /// "its corners lie 3.99 out of one plane, and it is 14.7 long"
   [[nodiscard]] std::string text() const;
 };
 
-/// Cuts polygons in space into triangles. Of a thread; room is kept from one to the next.
+/// Cuts polygons in space into triangles. One object serves one thread; it keeps its memory between
+/// calls.
 ///
-/// A polygon that is flat and convex becomes a fan from its first corner. Any other is seen along
-/// the longest axis of its normal, where it keeps its shape up to an affine map, and cut into
-/// triangles that cover it there. The ones of a polygon that is not flat are Delaunay triangles in
-/// that view, as in OpenSCAD, and do not depend on which corner is the first.
+/// A polygon that is flat and convex becomes a fan from its first corner. Any other polygon is
+/// projected along the longest axis of its normal, which keeps its shape up to an affine map, and
+/// is triangulated there. A polygon that is not flat gets Delaunay triangles in that view, as in
+/// OpenSCAD. They do not depend on which corner is the first.
 class PolygonCutter {
  public:
-  /// The triangles of a polygon, as indices of its corners; empty for the fan from the first
-  /// corner. At most n - 2, fewer where the polygon touches itself. Valid until the next call.
-  /// @param corners  at least 3; a corner may be given again
+  /// The triangles of a polygon as indices of its corners, or an empty span for the fan from the
+  /// first corner. There are at most n - 2, and fewer where the polygon touches itself. The span is
+  /// valid until the next call.
+  /// @param corners  at least 3; corners may be repeated
   [[nodiscard]] std::span<const glm::uvec3> cut(std::span<const glm::dvec3> corners);
-  /// Of the polygon that was cut last.
+  /// The bend of the last polygon.
   [[nodiscard]] const Bend& bend() const { return bend_; }
 
  private:
@@ -53,16 +55,17 @@ class PolygonCutter {
   glm::dvec3 normal_{0.0};
   bool flat_ = true;
   std::vector<glm::dvec2> points_;     ///< in the view, counter-clockwise as a whole
-  std::vector<std::uint32_t> corner_;  ///< which corner each point is
-  std::vector<std::uint32_t> place_;   ///< of each point; one for those in one place in space
+  std::vector<std::uint32_t> corner_;  ///< the corner of each point
+  std::vector<std::uint32_t> place_;   ///< number of the position in space
   std::vector<glm::uvec3> triangles_;
   detail::PolygonSweep sweep_;
 };
 
-/// The same of a quadrilateral, without memory.
+/// The cut of a quadrilateral, computed without memory allocation.
 struct QuadCut {
-  bool fan = true;  ///< cut from the first corner to the third, else from the second to the fourth
-  Bend bend;        ///< if large
+  bool fan = true;  ///< the diagonal starts at the first corner, else at the second
+                    ///< to the fourth
+  Bend bend;        ///< set if large
 };
 [[nodiscard]] QuadCut cut_quad(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c,
                                const glm::dvec3& d);

@@ -8,12 +8,11 @@
 #include "mesh/polygons/plane_predicates.h"
 
 // This work is based on: M. de Berg, O. Cheong, M. van Kreveld, M. Overmars, "Computational
-// Geometry", 3rd edition, 2008, chapter 3: a sweep parts the polygon by diagonals into pieces that
-// are monotone in x, and each is cut with a stack.
+// Geometry", 3rd edition, 2008, chapter 3. A sweep divides the polygon by diagonals into pieces
+// that are monotone in x. A stack cuts each piece into triangles.
 //
-// We differ: the sweep goes by (x, y), so that no two points are at the same place in it; and
-// pieces are cut from the right to the left, as by libtess2, so that convex polygons are cut as
-// there.
+// We differ: the sweep orders points by (x, y), so that no two points are equal in it. Pieces are
+// cut from the right to the left, like in libtess2, so that convex polygons are cut as there.
 
 namespace strata::detail {
 
@@ -28,8 +27,8 @@ PolygonSweep::Index PolygonSweep::previous(Index i) const {
   return i == 0 ? static_cast<Index>(points_.size()) - 1 : i - 1;
 }
 
-/// The order from below of edges that run to the right and meet the sweep line, each named by the
-/// vertex at its start; and which of them are below a point.
+/// Orders, from below, the edges that run to the right and meet the sweep line. An edge is named by
+/// its start vertex. It also tells which edges are below a point.
 struct PolygonSweep::Below {
   using is_transparent = void;
   struct Point {
@@ -69,19 +68,19 @@ bool PolygonSweep::find_diagonals() {
     if (is_merge[helper[edge]] != 0) diagonals_.emplace_back(vertex, helper[edge]);
   };
   for (const Index v : order_) {
-    const Index in = previous(v);  // the edge that ends here
+    const Index in = previous(v);  // the edge that ends at v
     const bool from_left = before(in, v), to_right = before(v, next(v));
     const int turn = orient(points_[in], points_[v], points_[next(v)]);
     if (from_left != to_right && turn == 0) return false;  // a spike
     if (from_left) {
-      // An edge from the left has the region above it, and ends.
+      // An edge from the left ends here. Edges in `place` have the region above them.
       if (place[in] == status.end()) return false;
       join_merge(v, in);
       status.erase(place[in]);
       place[in] = status.end();
     }
     const bool above_region = from_left != to_right ? turn < 0 : !from_left;
-    if (above_region) {  // split, merge, or a vertex of the upper side
+    if (above_region) {  // a split, a merge, or a vertex of the upper side
       auto edge = status.lower_bound(Below::Point{v});
       if (edge == status.begin()) return false;
       const Index below = *--edge;
@@ -95,14 +94,14 @@ bool PolygonSweep::find_diagonals() {
     }
     if (!to_right) continue;
     const auto [at, entered] = status.insert(v);
-    if (!entered) return false;  // two edges on each other
+    if (!entered) return false;  // two edges coincide
     place[v] = at;
     helper[v] = v;
   }
   return true;
 }
 
-/// Puts edges and diagonals around each vertex in order.
+/// Sorts the edges and diagonals around each vertex.
 void PolygonSweep::sort_slots() {
   const auto count = static_cast<Index>(points_.size());
   first_slot_.assign(count + 1, 1);
@@ -126,8 +125,8 @@ void PolygonSweep::sort_slots() {
       return diagonals_[d].first == v ? diagonals_[d].second : diagonals_[d].first;
     };
     const glm::dvec2 &at = points_[v], &start = points_[next(v)];
-    // In a turn from the edge out: less than half of it, half, more, or along the edge again, where
-    // the polygon touches itself.
+    // The direction relative to the outgoing edge, counter-clockwise: less than half a turn, half,
+    // more than half, or along the edge itself, where the polygon touches itself.
     const auto part = [&](const glm::dvec2& p) {
       const int side = orient(at, start, p);
       if (side != 0) return side > 0 ? 0 : 2;
@@ -168,7 +167,8 @@ void PolygonSweep::cut_along_diagonals(std::vector<glm::uvec3>& triangles) {
         face_.push_back(v);
         const bool edge = slot == first_slot_[v];
         v = slot_target_[slot];
-        // The region is on the left: on with what comes before, clockwise, where we came from.
+        // The region is on the left, so the next edge is the one clockwise before the edge of
+        // arrival.
         slot = (edge ? first_slot_[v + 1] : slot_twin_[slot]) - 1;
       }
       if (face_.size() >= 3) cut_monotone(face_, triangles);
@@ -183,7 +183,7 @@ void PolygonSweep::cut_monotone(std::span<const Index> face, std::vector<glm::uv
   for (std::size_t i = 1; i < count; ++i) {
     if (before(face[right], face[i])) right = i;
   }
-  // From the right to the left: the upper side goes on counter-clockwise.
+  // From the right to the left. The upper side continues counter-clockwise.
   merged_.assign(1, face[right]);
   upper_.assign(1, 1);
   std::size_t up = (right + 1) % count, low = (right + count - 1) % count;
@@ -197,7 +197,7 @@ void PolygonSweep::cut_monotone(std::span<const Index> face, std::vector<glm::uv
     upper ? triangles.emplace_back(older, newer, v) : triangles.emplace_back(newer, older, v);
   };
   stack_.assign({merged_[0], merged_[1]});
-  bool upper = upper_[1] != 0;  // the side of what is on the stack
+  bool upper = upper_[1] != 0;  // the side of the vertices on the stack
   for (std::size_t k = 2; k < count; ++k) {
     const Index v = merged_[k];
     if (k + 1 == count || (upper_[k] != 0) != upper) {
@@ -238,7 +238,7 @@ bool PolygonSweep::cut(std::span<const glm::dvec2> polygon, std::vector<glm::uve
     if (!find_diagonals()) return false;
     cut_along_diagonals(triangles);
   }
-  // What crosses itself shows here.
+  // A polygon that crosses itself fails here.
   return triangles.size() == count - 2 &&
          std::all_of(triangles.begin(), triangles.end(), [this](const glm::uvec3& t) {
            return orient(points_[t.x], points_[t.y], points_[t.z]) >= 0;

@@ -9,12 +9,12 @@
 
 namespace strata::detail {
 
-/// Triangles of simple polygons in the plane in O(n log n). Room is kept from one to the next.
+/// Triangulates simple polygons in the plane in O(n log n). It keeps its memory between calls.
 class PolygonSweep {
  public:
-  /// @param polygon  counter-clockwise; finite, products do not overflow
-  /// @param triangles  gets n - 2 triangles, counter-clockwise, of indices into `polygon`
-  /// @return false when the polygon crosses or touches itself, so that no such triangles were found
+  /// @param polygon  counter-clockwise and finite; products of coordinates do not overflow
+  /// @param triangles  gets n - 2 counter-clockwise triangles of indices into `polygon`
+  /// @return false when the polygon crosses or touches itself; then no triangulation was found
   [[nodiscard]] bool cut(std::span<const glm::dvec2> polygon, std::vector<glm::uvec3>& triangles);
 
  private:
@@ -31,7 +31,7 @@ class PolygonSweep {
 
   std::span<const glm::dvec2> points_;
   std::vector<std::pair<Index, Index>> diagonals_;
-  // At each vertex its edge out and then its diagonals, counter-clockwise: slots.
+  // Slots of a vertex: its outgoing edge, then its diagonals counter-clockwise.
   std::vector<Index> first_slot_, slot_target_, slot_diagonal_, slot_twin_;
   std::vector<Index> order_, face_, stack_, merged_;
   std::vector<std::uint8_t> upper_;

@@ -6,8 +6,8 @@
 
 #include "mesh/polygons/plane_predicates.h"
 
-// Edges are turned one at a time until none is wrong: C. L. Lawson, "Software for C1 surface
-// interpolation", 1977.
+// Flips edges one at a time until all satisfy Delaunay's rule: C. L. Lawson, "Software for C1
+// surface interpolation", 1977.
 
 namespace strata::detail {
 namespace {
@@ -22,7 +22,7 @@ class Refinement {
   }
 
   void run() {
-    // Edges wait as triangle and number: edge k runs from corner k to the next.
+    // An edge in the queue is a triangle and a number. Edge k runs from corner k to the next one.
     for (std::uint32_t t = 0; t < triangles_.size(); ++t) {
       for (std::uint32_t k = 0; k < 3; ++k) {
         if (across_[t][k] != kNone && across_[t][k] / 3 > t) waiting_.push_back(3 * t + k);
@@ -69,7 +69,7 @@ class Refinement {
     if (other != kNone) across_[other / 3][other % 3] = edge;
   }
 
-  /// Turns an edge if it should be.
+  /// Flips an edge if it violates Delaunay's rule.
   bool turn(std::uint32_t edge) {
     const std::uint32_t other = across_[edge / 3][edge % 3];
     if (other == kNone) return false;
@@ -77,7 +77,7 @@ class Refinement {
     const std::uint32_t after = 3 * t + (edge + 1) % 3, before = 3 * t + (edge + 2) % 3;
     const std::uint32_t other_after = 3 * o + (other + 1) % 3,
                         other_before = 3 * o + (other + 2) % 3;
-    // From a to c; b is on the right, d on the left.
+    // The edge runs from a to c; b is on its right, d on its left.
     const std::uint32_t a = corner(edge), c = corner(after), d = corner(before),
                         b = corner(other_before);
     if (delaunay_cut(points_[a], points_[b], points_[c], points_[d]) >= 0 ||
@@ -101,7 +101,7 @@ class Refinement {
 
   std::span<const glm::dvec2> points_;
   std::vector<glm::uvec3>& triangles_;
-  std::vector<std::array<std::uint32_t, 3>> across_;  ///< the same edge, of the neighbour
+  std::vector<std::array<std::uint32_t, 3>> across_;  ///< the edge in the neighbouring triangle
   std::vector<std::uint32_t> waiting_;
 };
 

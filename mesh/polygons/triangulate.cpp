@@ -1,10 +1,10 @@
 #include "mesh/polygons/triangulate.h"
 
-// Ear clipping that adds and drops no vertex. Holes are joined to what surrounds them by bridges,
-// as in D. Eberly, "Triangulation by ear clipping", 2002. Every step keeps the sum of the triangles
-// and the rest of the loop equal to the region, so that the boundary of the result is that of the
-// outline whatever the outline is like; only for outlines that cross themselves some triangles are
-// turned around.
+// Ear clipping that adds and drops no vertex. Bridges join holes to the contours around them, as in
+// D. Eberly, "Triangulation by ear clipping", 2002. After every step the triangles so far and the
+// rest of the loop together still equal the region. The boundary of the result is therefore that of
+// the outline, whatever the outline is like. Only outlines that cross themselves get some reversed
+// triangles.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -26,17 +26,17 @@ constexpr Index kNone = 0xffffffffu;
 
 struct Node {
   glm::dvec2 p{0};
-  Index vertex = 0;  ///< into all contours' points
+  Index vertex = 0;  ///< index into the points of all contours
   Index next = 0, prev = 0;
   bool alive = true;
-  bool waits = false;    ///< in line to be cut
-  bool touched = false;  ///< a neighbour was cut since it came into line
+  bool waits = false;    ///< in the queue for clipping
+  bool touched = false;  ///< a neighbour was clipped since it entered the queue
 };
 
-/// Loops of nodes, bridged and clipped.
+/// Loops of nodes, which are bridged and clipped.
 class Clipping {
  public:
-  /// `turns` quarter turns of the plane: another direction for the bridges.
+  /// @param turns  quarter turns of the plane, which change the direction of the bridges
   Clipping(std::span<const std::vector<glm::dvec2>> contours, int turns) {
     std::size_t total = 0;
     for (const auto& contour : contours) total += contour.size();
@@ -70,9 +70,9 @@ class Clipping {
   }
 
   const std::vector<glm::uvec3>& triangles() const { return triangles_; }
-  /// How much area lies in triangles that are turned around.
+  /// The total area of reversed triangles.
   double turned_area() const { return turned_area_; }
-  /// Whether the search for ears was given up: the outline crosses itself all over.
+  /// Whether the search for ears was given up because the outline crosses itself too often.
   bool gave_up() const { return looks_ > most_looks(); }
 
  private:
@@ -83,8 +83,8 @@ class Clipping {
 
   // --- loops ------------------------------------------------------------------------------------
 
-  /// Where several nodes lie in one place, edges are joined anew, so that each node has a sector of
-  /// the region to itself: what touches there is parted or becomes one loop.
+  /// Reconnects the edges where several nodes are in one place, so that each node has one sector of
+  /// the region. Contours that touch there are separated or merged into one loop.
   void part_touching_points() {
     std::vector<Index> order(nodes_.size());
     std::iota(order.begin(), order.end(), Index{0});
@@ -100,7 +100,7 @@ class Clipping {
     }
   }
 
-  /// `group`: nodes in one place.
+  /// @param group  nodes in one place
   void part(std::span<const Index> group) {
     struct Spoke {
       glm::dvec2 to;
@@ -111,7 +111,7 @@ class Clipping {
     std::vector<Spoke> spokes;
     for (const Index i : group) {
       const glm::dvec2 &before = nodes_[nodes_[i].prev].p, &after = nodes_[nodes_[i].next].p;
-      if (before == hub || after == hub) return;  // no direction; left to the ears
+      if (before == hub || after == hub) return;  // the edge has no direction; the ears settle it
       spokes.push_back({before, i, false});
       spokes.push_back({after, i, true});
     }
@@ -123,8 +123,9 @@ class Clipping {
       if (first != second) return first;
       return orient(hub, a.to, b.to) > 0;
     });
-    // Counter-clockwise, the region lies between an edge out and the next edge in. Where edges lie
-    // on each other or cross, they are matched like brackets; all of them find a partner.
+    // Counter-clockwise around the place, the region lies between an outgoing edge and the next
+    // incoming one. Where edges overlap or cross, they are matched like brackets, so that all of
+    // them find a partner.
     std::size_t start = 0;
     int depth = 0, lowest = 0;
     for (std::size_t i = 0; i < spokes.size(); ++i) {
@@ -132,7 +133,7 @@ class Clipping {
       if (depth < lowest) lowest = depth, start = i + 1;
     }
     std::vector<Index> open;
-    std::vector<std::pair<Index, Index>> pairs;  // the node whose edge goes out, and whose comes in
+    std::vector<std::pair<Index, Index>> pairs;  // the nodes of the outgoing and the incoming edge
     for (std::size_t i = 0; i < spokes.size(); ++i) {
       const Spoke& spoke = spokes[(start + i) % spokes.size()];
       if (spoke.out) {
@@ -142,7 +143,7 @@ class Clipping {
         open.pop_back();
       }
     }
-    // Each pair becomes the node whose edge comes in.
+    // A pair becomes one node: the node of its incoming edge.
     std::vector<Index> next(pairs.size());
     for (std::size_t i = 0; i < pairs.size(); ++i) next[i] = nodes_[pairs[i].first].next;
     for (std::size_t i = 0; i < pairs.size(); ++i) {
@@ -193,8 +194,8 @@ class Clipping {
         2 * static_cast<std::size_t>(std::sqrt(static_cast<double>(nodes_.size()))), 1, 2048));
     const auto edges = static_cast<Index>(nodes_.size());
     for (Index i = 0; i < edges; ++i) add_edge(i);
-    // From each hole's leftmost point a ray to the left meets what surrounds the hole, or a hole
-    // further left, which is joined already.
+    // A ray from a hole's leftmost point to the left meets the contour around the hole, or another
+    // hole further left, which has been joined already.
     std::vector<Index> leftmost;
     for (const Index hole : holes_) {
       Index best = hole;
@@ -212,17 +213,18 @@ class Clipping {
     for (const Index hole : leftmost) {
       const Index bridge = find_bridge(hole);
       if (bridge == kNone) {
-        loops_.push_back(hole);  // nothing surrounds it: a loop of its own, turned around
+        loops_.push_back(hole);  // no contour is around it: it becomes a loop of its own, reversed
         continue;
       }
       join(bridge, hole);
     }
   }
 
-  /// Whether the segment from node `at` to p leaves into the region at `at`.
+  /// Whether the segment from node `at` to p begins inside the region.
   bool opens_to(Index at, const glm::dvec2& p) const {
     const glm::dvec2& b = nodes_[at].p;
-    // Bridges between points in one place have no direction: look past them.
+    // A bridge between points in one place has no direction, so the next point in another place
+    // counts.
     Index before = nodes_[at].prev, after = nodes_[at].next;
     while (nodes_[before].p == b && before != at) before = nodes_[before].prev;
     while (nodes_[after].p == b && after != at) after = nodes_[after].next;
@@ -231,22 +233,23 @@ class Clipping {
     return orient(b, c, p) > 0 || orient(a, b, p) > 0;
   }
 
-  /// The node to which the hole with leftmost node `hole` is joined.
+  /// The node to which the bridge leads from `hole`, the leftmost node of a hole.
   Index find_bridge(Index hole) const {
     const glm::dvec2 h = nodes_[hole].p;
     double best_x = -std::numeric_limits<double>::infinity();
     Index edge = kNone;
     for (const Index i : rows_[row(h.y)]) {
       const glm::dvec2 &p = nodes_[i].p, &q = nodes_[nodes_[i].next].p;
-      // Edges that run down have the region to their right.
+      // Only edges that run down have the region on their right.
       if (!(p.y >= h.y && h.y >= q.y && p.y > q.y)) continue;
       if (orient(q, p, h) > 0 || !joined(i)) continue;
       const double x = std::min(p.x + (h.y - p.y) * (q.x - p.x) / (q.y - p.y), h.x);
       if (x > best_x) best_x = x, edge = i;
     }
     if (edge == kNone) return kNone;
-    // The end of the edge that is further left can be seen, unless something lies in the triangle
-    // between: then the point there that the ray meets first when it is turned towards that end.
+    // The end of the edge that is further left is visible unless points lie in the triangle
+    // between. Then the first such point is visible that the ray meets when it turns towards that
+    // end.
     const Index start = edge, end = nodes_[edge].next;
     Index best = nodes_[start].p.x < nodes_[end].p.x ? start : end;
     if (nodes_[end].p.y == h.y) best = end;
@@ -273,11 +276,11 @@ class Clipping {
     return visible != kNone ? visible : best;
   }
 
-  /// Whether node `i` is part of a loop already: of an outer contour, a bridge or a joined hole.
+  /// Whether node `i` belongs to a loop already: to an outer contour, a bridge or a joined hole.
   bool joined(Index i) const { return i >= hole_of_.size() || hole_of_[i] == kNone; }
 
   void join(Index bridge, Index hole) {
-    // bridge -> hole -> ... -> hole again -> bridge again -> what followed the bridge.
+    // The new loop is: bridge, hole, ..., hole again, bridge again, the bridge's old successor.
     const Index hole_again = static_cast<Index>(nodes_.size()), bridge_again = hole_again + 1;
     nodes_.push_back(nodes_[hole]);
     nodes_.push_back(nodes_[bridge]);
@@ -301,7 +304,7 @@ class Clipping {
 
   // --- ears -------------------------------------------------------------------------------------
 
-  /// The nodes of one loop that are not convex, by place: only they can lie in an ear.
+  /// The nodes of a loop that are not convex, in a grid. Only they can lie in an ear.
   class Reflex {
    public:
     void build(const std::vector<Node>& nodes, const std::vector<Index>& list) {
@@ -335,7 +338,7 @@ class Clipping {
       list_.pop_back();
       where_[i] = kNone;
     }
-    /// Whether `test` holds for a node in the box.
+    /// Whether `test` holds for any node in the box.
     template <class Test>
     bool any(const glm::dvec2& low, const glm::dvec2& high, Test&& test) {
       if (list_.empty()) return false;
@@ -371,18 +374,18 @@ class Clipping {
     int side_ = 1;
   };
 
-  /// How much an ear is asked for; a level is tried when the one before finds none.
+  /// How strict the test for an ear is. A level is tried when the one before finds no ear.
   enum Level { kClear, kTouched, kFlat, kConvex, kAny, kLevels };
 
-  /// Far more than simple outlines take. Those that cross themselves all over have few ears, and
-  /// the search for each would go through all that is left.
+  /// A limit far above the needs of simple outlines. Outlines that cross themselves everywhere have
+  /// few ears, and each search would visit all remaining nodes.
   std::uint64_t most_looks() const { return (std::uint64_t{1} << 22) + 4096 * nodes_.size(); }
 
   bool is_ear(Index b, Level level) {
     ++looks_;
     const Index a = nodes_[b].prev, c = nodes_[b].next;
     const glm::dvec2 &pa = nodes_[a].p, &pb = nodes_[b].p, &pc = nodes_[c].p;
-    // Two points in one place: nothing is cut off.
+    // Two points coincide: the ear has no area.
     if (pa == pb || pb == pc || pa == pc) return true;
     const int side = turn(a, b, c);
     if (level == kAny) return true;
@@ -434,8 +437,8 @@ class Clipping {
       i = nodes_[i].next;
     } while (i != start);
     reflex_.build(nodes_, reflex);
-    // Nodes wait in line. One whose neighbour was cut goes back to the end, once: cutting
-    // neighbours one after another makes a fan of slivers.
+    // Nodes wait in a queue. A node whose neighbour was clipped goes back to the end once, because
+    // clipping neighbours one after another makes a fan of slivers.
     std::deque<Index> line;
     int level = kClear;
     std::size_t cuts = 1;
@@ -481,13 +484,13 @@ class Clipping {
 
   std::vector<Node> nodes_;
   std::vector<Index> loops_, holes_;
-  std::vector<Index> hole_of_;  ///< of each node as made; kNone: not of a hole, or joined
+  std::vector<Index> hole_of_;  ///< the hole of each original node; kNone: no hole, or joined
   std::vector<std::vector<Index>> rows_;
   Reflex reflex_;
   glm::dvec2 low_{0}, high_{0};
   std::vector<glm::uvec3> triangles_;
   double turned_area_ = 0;
-  std::uint64_t looks_ = 0;  ///< at nodes, for ears
+  std::uint64_t looks_ = 0;  ///< number of nodes visited in the search for ears
 };
 
 }  // namespace
@@ -497,7 +500,7 @@ std::vector<glm::uvec3> triangulate(std::span<const std::vector<glm::dvec2>> con
   for (const auto& contour : contours) area += std::abs(signed_area(contour));
   std::vector<glm::uvec3> best;
   double least = std::numeric_limits<double>::infinity();
-  // Outlines that touch themselves within rounding may do better with other bridges.
+  // Outlines that touch themselves within rounding may succeed with other bridges.
   for (int turns = 0; turns < 4; ++turns) {
     Clipping clipping(contours, turns);
     clipping.run();
