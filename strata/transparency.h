@@ -8,5 +8,6 @@
 //     auto rendering = frame->render(*technique->technique, technique->settings);
 
 #include "strata/raster/view.h"
+#include "strata/transparency/media/media.h"
 #include "strata/transparency/stream/frame.h"
 #include "strata/transparency/techniques.h"
