@@ -2,12 +2,20 @@
 
 #include "strata/transparency/techniques.h"
 #include "transparency/lists/list_techniques.h"
+#include "transparency/peeling/peeling_techniques.h"
 
 namespace strata::transparency {
 namespace {
 
 constexpr std::array kAll{
     &kCountScan,
+    // peeling
+    &kFBuffer,
+    &kRBuffer,
+    &kVirtualPixelMaps,
+    &kDepthPeeling,
+    &kDualPeeling,
+    &kReversePeeling,
 };
 
 }  // namespace
