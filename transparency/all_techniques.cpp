@@ -1,6 +1,7 @@
 #include <array>
 
 #include "strata/transparency/techniques.h"
+#include "transparency/bounded/bounded_techniques.h"
 #include "transparency/lists/list_techniques.h"
 #include "transparency/peeling/peeling_techniques.h"
 
@@ -16,6 +17,17 @@ constexpr std::array kAll{
     &kDepthPeeling,
     &kDualPeeling,
     &kReversePeeling,
+    // bounded
+    &kRelaxed,
+    &kMlab,
+    &kMlabPacked,
+    &kHybrid,
+    &kHybridPacked,
+    &kAdaptive,
+    &kAdaptiveLists,
+    &kOpacityMap,
+    &kOccupancyMap,
+    &kFourierMap,
 };
 
 }  // namespace
