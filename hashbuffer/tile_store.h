@@ -27,25 +27,37 @@ struct TileTable {
   int oldest = 0;                      ///< largest age stored since the last clear
   bool mixed = false;                  ///< a record went beyond the planes
   std::uint64_t failures = 0;          ///< records that found no cell: age field or table exhausted
+  unsigned age_limit = Record::kAgeMax;  ///< ages that have offsets
 
   [[nodiscard]] std::size_t offset(int age) const {
     return age <= planes ? static_cast<std::size_t>(age - 1) * kTilePixels
                          : offsets[static_cast<std::size_t>(age)];
   }
 
+  struct Ignore {
+    void operator()(std::uint64_t, unsigned) const {}
+  };
+
   /// Inserts a record, whose age is the first to be tried, into the list of `pixel`.
-  void insert(std::size_t pixel, Bits record) {
+  /// @tparam Concurrency  the kind of maximum @param stored  called with the pixel and the age of
+  /// each record that a cell takes, evicted ones included
+  template <class Concurrency = Exclusive, class Stored = Ignore>
+  void insert(std::size_t pixel, Bits record, Stored&& stored = {}) {
     detail::Flight<Record> flight{record, pixel, Record::age(record)};
     for (;;) {
       const int age = static_cast<int>(flight.age);
       mixed = mixed || age > planes;
       Bits found;
-      const detail::Outcome outcome = detail::propose<Record, Exclusive>(
+      const std::uint64_t proposer = flight.pixel;
+      const detail::Outcome outcome = detail::propose<Record, Concurrency>(
           flight, cells.data(), size, [this](unsigned of) { return offset(static_cast<int>(of)); },
           found);
-      if (outcome != detail::Outcome::kLost) oldest = std::max(oldest, age);
+      if (outcome != detail::Outcome::kLost) {
+        oldest = std::max(oldest, age);
+        stored(proposer, static_cast<unsigned>(age));
+      }
       if (outcome == detail::Outcome::kPlaced) return;
-      if (!flight.grow_older(Record::kAgeMax)) {
+      if (!flight.grow_older(age_limit)) {
         ++failures;
         return;
       }

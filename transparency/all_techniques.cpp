@@ -10,6 +10,22 @@ namespace {
 
 constexpr std::array kAll{
     &kCountScan,
+    // lists
+    &kHash64,
+    &kHash64Cas,
+    &kHash64Grown,
+    &kHash64Fixed,
+    &kHash64Culled,
+    &kHash64Nearest,
+    &kHash32,
+    &kFixedArray,
+    &kFixedArrayBounded,
+    &kLinkedLists,
+    &kLinkedListsGrow,
+    &kMlabABuffer,
+    &kPagedLists,
+    &kPagedListsGrow,
+    &kTransmittanceForm,
     // peeling
     &kFBuffer,
     &kRBuffer,

@@ -1,3 +1,4 @@
+#include "transparency/lists/list_bytes.h"
 #include "transparency/lists/list_techniques.h"
 #include "transparency/stream/sorted_tile.h"
 
@@ -8,9 +9,6 @@
 namespace strata::transparency {
 namespace {
 
-/// A fragment takes the 8 bytes of its record; a pixel its count and its base, 4 each.
-constexpr std::uint64_t kFragmentBytes = 8, kPixelBytes = 8;
-
 Result<TileRenderer> make(const FrameInfo&, const Settings&, const std::shared_ptr<const void>&) {
   return [lists = std::make_shared<SortedTile>()](TileStream& stream,
                                                   TileImage& image) -> Result<void> {
@@ -19,13 +17,44 @@ Result<TileRenderer> make(const FrameInfo&, const Settings&, const std::shared_p
     costs.stored = costs.kept = lists->size();
     costs.most_layers = lists->most_layers();
     costs.formula_bytes = costs.allocated_bytes =
-        kFragmentBytes * lists->size() + kPixelBytes * stream.pixel_count();
+        list_bytes::count_scan(stream.pixel_count(), lists->size());
     for_each_pixel(stream, [&](std::uint32_t pixel) {
       const auto list = lists->list(pixel);
       if (list.empty()) return;
       FrontToBack sum;
       for (const DepthItem item : list) sum.add(stream.shade(item));
       image.pixels[pixel] = sum.result();
+    });
+    return {};
+  };
+}
+
+/// The sum of a_i c_i t(z_i), with t(z) the transmittance strictly in front of z.
+glm::vec4 blend_transmittance(TileStream& stream, std::span<const DepthItem> list) {
+  glm::vec3 colour(0.0f);
+  float in_front = 1.0f, with_group = 1.0f;
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    if (i > 0 && list[i].depth() != list[i - 1].depth()) in_front = with_group;
+    const glm::vec4& fragment = stream.shade(list[i]);
+    colour += in_front * glm::vec3(fragment);
+    with_group *= 1.0f - fragment.a;
+  }
+  return {colour, with_group};
+}
+
+Result<TileRenderer> make_transmittance(const FrameInfo&, const Settings&,
+                                        const std::shared_ptr<const void>&) {
+  return [lists = std::make_shared<SortedTile>()](TileStream& stream,
+                                                  TileImage& image) -> Result<void> {
+    lists->build(stream);
+    Costs& costs = stream.costs();
+    costs.stored = costs.kept = lists->size();
+    costs.most_layers = lists->most_layers();
+    costs.formula_bytes = costs.allocated_bytes =
+        list_bytes::count_scan(stream.pixel_count(), lists->size());
+    for_each_pixel(stream, [&](std::uint32_t pixel) {
+      const auto list = lists->list(pixel);
+      if (!list.empty()) image.pixels[pixel] = blend_transmittance(stream, list);
     });
     return {};
   };
@@ -40,6 +69,15 @@ const Technique kCountScan{
     .memory = "8 bytes a fragment, 8 a pixel",
     .fails = "two geometry passes even where nothing is drawn",
     .make = make,
+};
+const Technique kTransmittanceForm{
+    .name = "transmittance",
+    .title = "Sorted lists in transmittance form: equal depths do not attenuate each other",
+    .paper = "Salvi, Vaidyanathan 2014",
+    .accuracy = Accuracy::kBounded,
+    .memory = kCountScan.memory,
+    .fails = "differs from blending in order where surfaces coincide; the sum may exceed 1 there",
+    .make = make_transmittance,
 };
 
 }  // namespace strata::transparency

@@ -6,6 +6,11 @@
 
 namespace strata::transparency {
 
-extern const Technique kCountScan;
+extern const Technique kHash64, kHash64Cas, kHash64Grown, kHash64Fixed, kHash32;
+extern const Technique kHash64Culled, kHash64Nearest;
+extern const Technique kCountScan, kTransmittanceForm;
+extern const Technique kFixedArray, kFixedArrayBounded;
+extern const Technique kLinkedLists, kLinkedListsGrow, kMlabABuffer;
+extern const Technique kPagedLists, kPagedListsGrow;
 
 }  // namespace strata::transparency

@@ -110,6 +110,11 @@ class TileStream {
     ++costs_->shaded;
     return frame_->colours[face_of(item)];
   }
+  /// The same, to be counted by count_shaded().
+  [[nodiscard]] const glm::vec4& colour(DepthItem item) const {
+    return frame_->colours[face_of(item)];
+  }
+  void count_shaded(std::uint64_t fragments) { costs_->shaded += fragments; }
   /// The nearest opaque fragment of a pixel, or TileFragments::kNothing.
   [[nodiscard]] DepthItem opaque(std::uint32_t pixel) const {
     return fragments_->any_opaque ? fragments_->opaque[pixel] : TileFragments::kNothing;

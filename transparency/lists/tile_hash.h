@@ -1,0 +1,122 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "hashbuffer/tile_store.h"
+#include "strata/hashbuffer/offsets.h"
+#include "transparency/lists/list_bytes.h"
+#include "transparency/stream/tile_stream.h"
+
+namespace strata::transparency {
+
+/// The HA-buffer of a tile (strata/hashbuffer/table_law.h) with the maximum ages of its blocks of
+/// 8 x 8 pixels. Its memory stays from tile to tile; clear() ends a tile.
+template <class Record>
+class TileHash {
+ public:
+  using Bits = typename Record::Word;
+
+  /// An empty table of `cells` cells, at least one a pixel.
+  void begin(const TileStream& stream, std::uint64_t cells, OffsetKind kind, std::uint64_t seed) {
+    width_ = static_cast<std::uint32_t>(stream.width());
+    height_ = static_cast<std::uint32_t>(stream.height());
+    inverse_width_ = (kOne + width_ - 1) / width_;
+    if (table_.cells.size() < cells + table_.kPadding) {
+      table_.cells.resize(cells + cells / 4 + table_.kPadding, Bits{0});
+    }
+    table_.size = cells;
+    const std::uint64_t pixels = stream.pixel_count();
+    const auto offsets = make_offsets(
+        kind,
+        {.pixels = pixels, .cells = cells, .width = width_, .ages = Record::kAgeMax, .seed = seed});
+    table_.offsets.assign(offsets.begin(), offsets.end());
+    table_.age_limit = static_cast<unsigned>(offsets.size()) - 1;
+    table_.planes = 0;
+    if (kind == OffsetKind::kPlaneFirst && pixels == kTilePixels) {
+      table_.planes = static_cast<int>(std::min<std::uint64_t>(cells / pixels, table_.age_limit));
+    }
+    max_ages_.fill(0);
+  }
+
+  /// Inserts a fragment. @param stored  called with (pixel, age) when a cell takes a record
+  template <class Concurrency, class Stored>
+  void insert(std::uint32_t pixel, DepthItem item, Stored&& stored) {
+    table_.template insert<Concurrency>(key(pixel), Record::pack(1, item.depth(), item.payload()),
+                                        [&](std::uint64_t at, unsigned age) {
+                                          std::uint16_t& most =
+                                              max_ages_[block(static_cast<std::uint32_t>(at))];
+                                          most = std::max(most, static_cast<std::uint16_t>(age));
+                                          stored();
+                                        });
+  }
+
+  /// Calls visit(cell, record, age) for the records of a pixel, front to back, while it returns
+  /// true.
+  template <class Visit>
+  void for_each(std::uint32_t pixel, Visit&& visit) const {
+    const std::uint32_t at = key(pixel);
+    const unsigned last = max_ages_[block(at)];
+    for (unsigned age = 1; age <= last; ++age) {
+      std::size_t cell = at + table_.offset(static_cast<int>(age));
+      if (cell >= table_.size) cell -= table_.size;
+      const Bits record = table_.cells[cell];
+      // A record further back would have displaced a younger one here.
+      if (Record::age(record) < age) return;
+      if (Record::age(record) == age && !visit(cell, record, age)) return;
+    }
+  }
+
+  /// Records that found no cell at any age.
+  [[nodiscard]] std::uint64_t failures() const { return table_.failures; }
+  /// Probes of such a record.
+  [[nodiscard]] std::uint64_t age_limit() const { return table_.age_limit; }
+  /// The sum of the ages of all records, which is the number of their probes.
+  [[nodiscard]] std::uint64_t ages() const {
+    std::uint64_t sum = 0;
+    for (std::size_t cell = 0; cell < table_.size; ++cell) sum += Record::age(table_.cells[cell]);
+    return sum;
+  }
+
+  /// Empties the table. @return the records that it held
+  std::uint64_t clear() {
+    std::uint64_t held = 0;
+    const auto wipe = [&](std::size_t cells) {
+      for (std::size_t cell = 0; cell < cells; ++cell) held += table_.cells[cell] != 0 ? 1 : 0;
+      std::fill_n(table_.cells.begin(), cells, Bits{0});
+    };
+    wipe(table_.mixed ? table_.size : static_cast<std::size_t>(table_.oldest) * kTilePixels);
+    table_.oldest = 0;
+    table_.mixed = false;
+    table_.failures = 0;
+    return held;
+  }
+
+  /// Bytes of the table and of the maximum ages; an age of 8 bits takes one.
+  [[nodiscard]] std::uint64_t bytes() const {
+    return table_.size * sizeof(Bits) + blocks() * kAgeBytes;
+  }
+  [[nodiscard]] std::uint64_t blocks() const { return list_bytes::blocks(width_, height_); }
+  static constexpr std::uint64_t kAgeBytes = Record::kAgeBits > 8 ? 2 : 1;
+
+ private:
+  static constexpr std::uint64_t kOne = 1 << 20;  ///< fixed point for divisions of pixels
+
+  /// Pixels are numbered without gaps.
+  [[nodiscard]] std::uint32_t key(std::uint32_t pixel) const {
+    return pixel - pixel / kTileSide * (kTileSide - width_);
+  }
+  [[nodiscard]] std::size_t block(std::uint32_t at) const {
+    const auto v = static_cast<std::uint32_t>(at * inverse_width_ / kOne);
+    return v / 8 * (kTileSide / 8) + (at - v * width_) / 8;
+  }
+
+  TileTable<Record> table_;
+  std::array<std::uint16_t, kTilePixels / 64> max_ages_{};
+  std::uint32_t width_ = 0, height_ = 0;
+  std::uint64_t inverse_width_ = 0;
+};
+
+}  // namespace strata::transparency
