@@ -80,6 +80,12 @@ Result<std::uint64_t> parse_bytes(std::string_view option, std::string_view text
   return static_cast<std::uint64_t>(value * unit);
 }
 
+Result<void> check_stream_format(std::span<const std::string> files, bool given,
+                                 std::string_view formats) {
+  if (given || std::find(files.begin(), files.end(), "-") == files.end()) return {};
+  return fail(ErrorCode::kUsage, "standard input needs --input-format: {}", formats);
+}
+
 std::string empty_value(std::span<const std::string> arguments) {
   for (std::size_t i = 0; i < arguments.size() && arguments[i] != "--"; ++i) {
     const std::string& word = arguments[i];

@@ -27,6 +27,11 @@ Result<double> parse_seconds(std::string_view option, std::string_view text);
 /// A size in bytes: a number and K, M, G or T (powers of 1024), or none.
 Result<std::uint64_t> parse_bytes(std::string_view option, std::string_view text);
 
+/// Checks that the format of standard input is known, which has no name that tells it.
+/// @param given  --input-format is given @param formats  the formats that it may name
+Result<void> check_stream_format(std::span<const std::string> files, bool given,
+                                 std::string_view formats);
+
 /// The mistake of an option with an empty value, `--camera=` or `--expr ""`, which a parser would
 /// take for one that is not given, or whose value is the next word. Empty: there is none.
 [[nodiscard]] std::string empty_value(std::span<const std::string> arguments);

@@ -286,11 +286,17 @@ CommonOptions common_options(const Words& words, Reader& reader) {
   return common;
 }
 
-csg::SceneInput input_options(const Words& words, Reader& reader) {
+csg::SceneInput input_options(const Words& words, bool pictures, Reader& reader) {
   csg::SceneInput input;
+  input.scene_format = pictures && words.input_format == "csg";
   input.files = words.files;
   reader.take(parse_choice("--reader", words.reader, kReaderWords), input.reader);
-  reader.take(parse_choice("--input-format", words.input_format, kMeshFormatWords), input.format);
+  if (!input.scene_format) {
+    reader.take(parse_choice("--input-format", words.input_format, kMeshFormatWords), input.format);
+  }
+  reader.take(check_stream_format(input.files,
+                                  input.scene_format || input.format != MeshFormat::kAuto,
+                                  pictures ? "csg, obj, stl, ply or off" : "obj, stl, ply or off"));
   reader.take(read_scene_options(words.csg.scene, input));
   return input;
 }
@@ -394,7 +400,7 @@ VoxelizeCommand voxelize_command(const Words& words, Reader& reader) {
   command.common = common_options(words, reader);
   command.list_formats = words.list_formats;
   if (command.list_formats) return command;
-  command.input = input_options(words, reader);
+  command.input = input_options(words, false, reader);
   command.output = words.output;
   command.format = words.format;
   command.surface = !words.surface.empty();
@@ -431,7 +437,7 @@ VoxelizeCommand voxelize_command(const Words& words, Reader& reader) {
 InfoCommand info_command(const Words& words, Reader& reader) {
   InfoCommand command;
   command.common = common_options(words, reader);
-  command.input = input_options(words, reader);
+  command.input = input_options(words, false, reader);
   command.gl = words.gl;
   if (!words.json.empty()) command.json = words.json;
   if (command.input.files.empty() && !command.gl) reader.fail_with("no input file is given");
@@ -441,7 +447,7 @@ InfoCommand info_command(const Words& words, Reader& reader) {
 LdiCommand ldi_command(const Words& words, Reader& reader) {
   LdiCommand command;
   command.common = common_options(words, reader);
-  command.input = input_options(words, reader);
+  command.input = input_options(words, false, reader);
   command.output = words.output;
   command.samples = words.samples;
   command.input.keep_orientation = words.keep_orientation;

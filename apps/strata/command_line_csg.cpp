@@ -149,10 +149,7 @@ void define_csg(CLI::App& app, Words& words) {
 CsgCommand csg_command(Words words, Reader& reader) {
   CsgCommand command;
   command.common = common_options(words, reader);
-  const bool scenes = words.input_format == "csg";
-  if (scenes) words.input_format = "auto";
-  command.input = input_options(words, reader);
-  command.input.scene_format = scenes;
+  command.input = input_options(words, true, reader);
   reader.take(parse_choice("--rule", words.rule, kRuleWords), command.input.rule);
   reader.take(parse_choice("--backend", words.backend, kBackendWords), command.backend);
   command.input.keep_orientation = words.keep_orientation;

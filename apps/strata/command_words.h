@@ -62,7 +62,8 @@ void add_common(CLI::App& app, Words& words);
 void add_json(CLI::App& app, Words& words, const char* group);
 void add_backend(CLI::App& app, Words& words, const char* group);
 CommonOptions common_options(const Words& words, Reader& reader);
-csg::SceneInput input_options(const Words& words, Reader& reader);
+/// @param pictures  for strata csg, which reads scenes from standard input too
+csg::SceneInput input_options(const Words& words, bool pictures, Reader& reader);
 
 /// The commands of the tool, and what --help says of each.
 struct CommandSummary {

@@ -54,7 +54,7 @@ class Parser {
     const auto column =
         std::count_if(text_.begin(), text_.begin() + static_cast<std::ptrdiff_t>(at_),
                       [](char c) { return (c & '\xc0') != '\x80'; });
-    error_ = fmt::format("--expr: {}\n  {}\n  {:>{}}", what, text_, '^', column + 1);
+    error_ = fmt::format("the expression: {}\n  {}\n  {:>{}}", what, text_, '^', column + 1);
   }
   void skip_blanks() {
     while (at_ < text_.size() && (text_[at_] == ' ' || text_[at_] == '\t' || text_[at_] == '\n')) {

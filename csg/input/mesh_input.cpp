@@ -85,7 +85,7 @@ void check_closed(const TriangleSoup& soup, const SceneInput& input, const Execu
                              facts.path, facts.orientation.not_orientable));
     return;
   }
-  if (even) text += "; --rule parity treats it as closed";
+  if (even) text += "; the parity rule treats it as closed";
   detail::warn(messages, "open", text);
   facts.open = std::move(text);
 }
@@ -170,13 +170,13 @@ Result<void> check_input_name(const std::string& path, const InputKind& kind, bo
   if (mesh_format_of(path) != MeshFormat::kAuto) return {};
   if (scenes) {
     return fail(ErrorCode::kInput,
-                "{}: the file name must end in .csg, .scad, .obj, .stl, .ply or .off, or "
-                "--input-format must be given",
+                "{}: the file name must end in .csg, .scad, .obj, .stl, .ply or .off, or the input "
+                "format must be given",
                 path);
   }
   return fail(
       ErrorCode::kInput,
-      "{}: the file name must end in .obj, .stl, .ply or .off, or --input-format must be given",
+      "{}: the file name must end in .obj, .stl, .ply or .off, or the input format must be given",
       path);
 }
 

@@ -76,7 +76,7 @@ Result<Scene> load_one(const std::string& path, const SceneInput& input,
   }
   if (input.format == MeshFormat::kAuto && path == "-") {
     return fail(ErrorCode::kUsage,
-                "standard input needs --input-format: csg, obj, stl, ply or off");
+                "standard input: the format must be given: csg, obj, stl, ply or off");
   }
   if (auto named = check_input_name(path, kind, true); !named) {
     return tl::unexpected(named.error());
@@ -139,7 +139,7 @@ class Builder {
       sizes[i] = node.kind == Expression::Kind::kExclusive ? 2 * both : both;
     }
     if (sizes.back() > kMaxNodes) {
-      return fail(ErrorCode::kLimit, "--expr: the tree has {:.3g} nodes; the limit is {}",
+      return fail(ErrorCode::kLimit, "the expression: the tree has {:.3g} nodes; the limit is {}",
                   sizes.back(), kMaxNodes);
     }
     for (const Scene& input : inputs_) {

@@ -114,9 +114,11 @@ bool SolidInput::has_scene() const {
 Result<SolidInput> load_solids(const SceneInput& input, bool as_tree, const InputMessages& messages,
                                const Execution& execution) {
   if (input.format == MeshFormat::kAuto && reads_standard_input(input)) {
-    return fail(ErrorCode::kUsage, "standard input needs --input-format: obj, stl, ply or off");
+    return fail(ErrorCode::kUsage,
+                "standard input: the format must be given: obj, stl, ply or off");
   }
-  if (std::none_of(input.files.begin(), input.files.end(), is_scene_name)) {
+  if (input.expression.empty() &&
+      std::none_of(input.files.begin(), input.files.end(), is_scene_name)) {
     return load_meshes(input, as_tree, messages, execution);
   }
   const detail::Stopwatch watch;
@@ -125,7 +127,8 @@ Result<SolidInput> load_solids(const SceneInput& input, bool as_tree, const Inpu
   if (!scene) return tl::unexpected(scene.error());
   all.bounds = strata::csg::bounds(scene->tree, scene->tree.root());
   if (all.bounds.empty()) {
-    return fail(ErrorCode::kGeometry, "{}: the scene is empty", input.files.front());
+    return fail(ErrorCode::kGeometry, "{}: the {} is empty", input.files.front(),
+                input.expression.empty() ? "scene" : "result of the expression");
   }
   all.set_tree(std::move(scene->tree));
   for (const InputFacts& facts : all.files) all.closed = all.closed && facts.closed;

@@ -30,7 +30,7 @@ struct SceneInput {
   ReadSceneOptions scene;                  ///< for scenes among the files
   InsideRule rule = InsideRule::kWinding;  ///< which winding numbers are inside a mesh
   bool keep_orientation = false;           ///< meshes that are inside out are not reversed
-  /// A Boolean expression over the files, such as "a - b"; empty: their union. load_scene() only.
+  /// A Boolean expression over the files, such as "a - b"; empty: their union.
   std::string expression;
 };
 

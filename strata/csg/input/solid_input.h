@@ -17,7 +17,8 @@ namespace strata::csg {
 struct SolidInput {
   TriangleSoup soup;
   /// For a tree: turns the lists of the soup, which holds all solids, into the lists of the result.
-  /// If has_scene(), area and volume are not known, and the bounds may be larger than the result.
+  /// For a scene or an expression, area and volume are not known, and the bounds may be larger than
+  /// the result.
   std::shared_ptr<SolidLists> tree;
   std::shared_ptr<const Tree> scene;  ///< the tree that `tree` was made from, without meshes
   std::vector<InputFacts> files;
@@ -37,8 +38,10 @@ struct SolidInput {
   Result<void> fit(const VoxelGrid& grid, const Execution& execution = {});
 };
 
-/// Reads the files, meshes as load_mesh() does, and unites them. Several meshes become a tree if
-/// parity is the rule of one of them. @return kInput, kUsage, kLimit, kCancelled
+/// Reads the files, meshes as load_mesh() does, and unites them, or combines them by
+/// input.expression. Several meshes become a tree if parity is the rule of one of them.
+/// @return kInput, kUsage, kLimit, kCancelled; kGeometry if the result of a scene or expression is
+/// empty
 /// @param as_tree  each mesh becomes a solid of a tree
 Result<SolidInput> load_solids(const SceneInput& input, bool as_tree = false,
                                const InputMessages& messages = {}, const Execution& execution = {});

@@ -83,6 +83,47 @@ TEST_F(SceneInputs, AnExpressionSaysWhatIsMadeOfThem) {
   EXPECT_EQ(refused.error().code, ErrorCode::kUsage);
 }
 
+TEST_F(SceneInputs, AnExpressionOfMeshesDecidesTheSolidsToo) {
+  write("far.off", box(5, false));
+  const auto both = load_solids(input({"a.off", "b.off"}, "a * b"));
+  ASSERT_TRUE(both.has_value()) << both.error().message;
+  EXPECT_EQ(both->bounds.low, glm::dvec3(1, 0, 0));
+  EXPECT_EQ(both->bounds.high, glm::dvec3(2, 2, 2));
+  const auto rest = load_solids(input({"a.off", "b.off"}, "b - a"));
+  ASSERT_TRUE(rest.has_value()) << rest.error().message;
+  ASSERT_TRUE(rest->tree && rest->scene);
+  EXPECT_TRUE(rest->closed);
+  EXPECT_EQ(rest->files.size(), 2u);
+  EXPECT_EQ(rest->bounds.low.x, 1);
+  EXPECT_EQ(rest->scene->nodes()[rest->scene->root()].operation, Operation::kDifference);
+  std::size_t subtracted = 0;
+  for (std::uint32_t t = 0; t < rest->soup.triangles.size(); ++t) {
+    subtracted += rest->tree->is_subtracted(t) ? 1 : 0;
+  }
+  EXPECT_EQ(subtracted, 12u);  // the triangles of a
+  const auto nothing = load_solids(input({"a.off", "far.off"}, "a * b"));
+  ASSERT_FALSE(nothing.has_value());
+  EXPECT_EQ(nothing.error().code, ErrorCode::kGeometry);
+  EXPECT_NE(nothing.error().message.find("result of the expression is empty"), std::string::npos);
+  const auto mistake = load_solids(input({"a.off"}, "a -"));
+  ASSERT_FALSE(mistake.has_value());
+  EXPECT_EQ(mistake.error().code, ErrorCode::kUsage);
+}
+
+TEST_F(SceneInputs, ErrorsDoNotNameOptionsOfTheTool) {
+  write("plain.txt", box(0, false));
+  for (const auto& [name, expression] :
+       {std::pair("a.off", "a - nobody"), std::pair("-", ""), std::pair("plain.txt", "")}) {
+    SceneInput given = input({name}, expression);
+    if (given.files[0].ends_with("/-")) given.files[0] = "-";
+    const auto scene = load_scene(given);
+    const auto solids = load_solids(given);
+    ASSERT_TRUE(!scene && !solids) << name;
+    EXPECT_EQ(scene.error().message.find("--"), std::string::npos) << scene.error().message;
+    EXPECT_EQ(solids.error().message.find("--"), std::string::npos) << solids.error().message;
+  }
+}
+
 TEST_F(SceneInputs, AMeshIsInspectedTurnedAndWarnedOf) {
   std::vector<std::string> codes;
   InputMessages messages;
