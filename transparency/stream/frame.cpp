@@ -271,18 +271,22 @@ Result<Rendering> render_tiles(const FragmentSource& source, const FrameOptions&
 Frame::Frame(std::shared_ptr<const FragmentSource> source, const FrameOptions& options)
     : options_(options), source_(std::move(source)) {}
 
-Result<Frame> Frame::make(const Scene& scene, const View& view, const FrameOptions& options,
-                          const Execution& execution) {
-  if (auto good = check_options(options); !good) return tl::unexpected(good.error());
+Result<void> check_frame(const Scene& scene, const View& view, const FrameOptions& options) {
+  if (auto good = check_options(options); !good) return good;
   const SampleGrid grid = sample_grid(options.samples);
   if (auto good = check_size({view.size.x * grid.across, view.size.y * grid.down}); !good) {
-    return tl::unexpected(good.error());
+    return good;
   }
   for (std::size_t i = 0; i < scene.objects.size(); ++i) {
-    auto good = check_colour(scene.objects[i].colour, "object", i);
-    if (!good) return tl::unexpected(good.error());
+    if (auto good = check_colour(scene.objects[i].colour, "object", i); !good) return good;
   }
-  auto source = make_mesh_source(scene, view, options, execution);
+  return {};
+}
+
+Result<Frame> Frame::make(const Scene& scene, const View& view, const FrameOptions& options,
+                          const Execution& execution) {
+  if (auto good = check_frame(scene, view, options); !good) return tl::unexpected(good.error());
+  auto source = make_mesh_source(scene, looks_of(scene, options), view, options.samples, execution);
   if (!source) return tl::unexpected(source.error());
   return Frame(std::move(*source), options);
 }

@@ -11,11 +11,12 @@ namespace {
 
 class MeshSource final : public FragmentSource {
  public:
-  MeshSource(const Scene& scene, const View& view, const FrameOptions& options)
-      : scene_(scene), view_(view), triangles_{part_, view_, scene.object_of, {}, 0} {
-    if (options.opaque_first) {
-      for (const Object& object : scene.objects) any_opaque_ |= object.colour.a >= 1.0f;
-    }
+  MeshSource(const Scene& scene, std::span<const Look> looks, const View& view)
+      : scene_(scene),
+        looks_(looks.begin(), looks.end()),
+        view_(view),
+        triangles_{part_, view_, scene.object_of, {}, 0} {
+    for (const Look& look : looks) any_opaque_ |= look.opaque;
   }
 
   Result<void> prepare(const Execution& execution) {
@@ -56,15 +57,16 @@ class MeshSource final : public FragmentSource {
     const glm::dvec3& a = scene_.mesh.positions[triangle.x];
     const glm::dvec3 normal = eye_from_world * glm::cross(scene_.mesh.positions[triangle.y] - a,
                                                           scene_.mesh.positions[triangle.z] - a);
-    const glm::vec4& base =
-        scene_.objects[scene_.object_of.empty() ? 0 : scene_.object_of[t]].colour;
+    const Look& look = looks_[scene_.object_of.empty() ? 0 : scene_.object_of[t]];
+    const glm::vec4& base = look.colour;
     const glm::vec3 premultiplied = glm::vec3(base) * base.a;
     colours_[2 * t] = glm::vec4(premultiplied * eye_light(normal), base.a);
     colours_[2 * t + 1] = glm::vec4(premultiplied * eye_light(-normal), base.a);
-    if (any_opaque_) opaque_[t] = base.a >= 1.0f ? 1 : 0;
+    if (any_opaque_) opaque_[t] = look.opaque ? 1 : 0;
   }
 
   const Scene& scene_;
+  std::vector<Look> looks_;
   View view_;
   bool any_opaque_ = false;
   ViewPart part_;
@@ -156,12 +158,22 @@ std::unique_ptr<FragmentSource::Worker> MeshSource::worker() const {
 
 }  // namespace
 
-Result<std::shared_ptr<const FragmentSource>> make_mesh_source(const Scene& scene, const View& view,
-                                                               const FrameOptions& options,
+std::vector<Look> looks_of(const Scene& scene, const FrameOptions& options) {
+  std::vector<Look> looks;
+  looks.reserve(scene.objects.size());
+  for (const Object& object : scene.objects) {
+    looks.push_back({object.colour, options.opaque_first && object.colour.a >= 1.0f});
+  }
+  return looks;
+}
+
+Result<std::shared_ptr<const FragmentSource>> make_mesh_source(const Scene& scene,
+                                                               std::span<const Look> looks,
+                                                               const View& view, int samples,
                                                                const Execution& execution) {
-  const SampleGrid grid = sample_grid(options.samples);
-  auto source = std::make_shared<MeshSource>(
-      scene, band_of(view, 0, view.size.y, grid.across, grid.down), options);
+  const SampleGrid grid = sample_grid(samples);
+  auto source = std::make_shared<MeshSource>(scene, looks,
+                                             band_of(view, 0, view.size.y, grid.across, grid.down));
   if (auto done = source->prepare(execution); !done) return tl::unexpected(done.error());
   return source;
 }

@@ -7,6 +7,9 @@
 
 namespace strata::transparency {
 
+/// @return kUsage when samples, size or colours are out of range
+Result<void> check_frame(const Scene& scene, const View& view, const FrameOptions& options);
+
 /// The facts of a frame for techniques.
 [[nodiscard]] FrameInfo frame_info(const FragmentSource& source, const FrameOptions& options);
 

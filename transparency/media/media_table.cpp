@@ -1,0 +1,157 @@
+#include "transparency/media/media_table.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace strata::transparency {
+namespace {
+
+constexpr float kMostExtinction = 1e6f;
+constexpr const char* kChannels[] = {"red", "green", "blue"};
+
+/// "what: the red part of its extinction must be 0 to 1, got 2".
+Result<void> check_part(std::string_view what, std::string_view which, const glm::vec3& value,
+                        float most) {
+  for (int c = 0; c < 3; ++c) {
+    if (value[c] >= 0.0f && value[c] <= most) continue;
+    return fail(ErrorCode::kUsage, "{}: the {} part of the {} must be 0 to {}, got {}", what,
+                kChannels[c], which, most, value[c]);
+  }
+  return {};
+}
+
+Result<void> check_medium(std::string_view what, const glm::vec3& extinction,
+                          const glm::vec3& albedo) {
+  if (auto good = check_part(what, "extinction", extinction, kMostExtinction); !good) return good;
+  return check_part(what, "albedo", albedo, 1.0f);
+}
+
+bool finite(const glm::dvec3& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+Result<void> check_light(const MediaLight& light) {
+  if (!finite(light.at) || (!light.point && !(glm::dot(light.at, light.at) > 0.0))) {
+    return fail(ErrorCode::kUsage, "the light's {} must be finite{}, got {}, {}, {}",
+                light.point ? "place" : "direction", light.point ? "" : " and not 0", light.at.x,
+                light.at.y, light.at.z);
+  }
+  if (light.shadow_size < 1 || light.shadow_size > 8192) {
+    return fail(ErrorCode::kUsage, "the light's shadow size must be 1 to 8192, got {}",
+                light.shadow_size);
+  }
+  if (light.shadow_steps < 0 || light.shadow_steps > 1024) {
+    return fail(ErrorCode::kUsage, "the light's shadow steps must be 0 to 1024, got {}",
+                light.shadow_steps);
+  }
+  return check_part("the light", "radiance", light.radiance, kMostExtinction);
+}
+
+/// The power of two whose multiples extinctions become.
+double unit_of(const MediaSettings& settings, std::size_t solids) {
+  // At most: each solid has the largest extinction of all media. Sums stay below 2^52 units.
+  double most = 0.0, sum = 0.0;
+  for (const NamedMedium& named : settings.media) {
+    for (int c = 0; c < 3; ++c) {
+      most = std::max(most, static_cast<double>(named.medium.extinction[c]));
+    }
+  }
+  sum = most * static_cast<double>(solids);
+  for (const Particle& p : settings.particles) {
+    sum += static_cast<double>(std::max({p.extinction.x, p.extinction.y, p.extinction.z}));
+  }
+  if (!(sum > 0.0)) return 1.0;
+  int exponent = 0;
+  std::frexp(sum, &exponent);
+  // Half a unit for each rounding fits, too: 2^51 leaves room for 2^50 of them.
+  return std::ldexp(1.0, exponent - 51);
+}
+
+MediumTerms terms_of(const glm::vec3& extinction, const glm::vec3& albedo, double unit) {
+  MediumTerms terms;
+  for (int c = 0; c < 3; ++c) {
+    const auto i = static_cast<std::size_t>(c);
+    const double sigma = extinction[c];
+    terms.extinction[i] = std::round(sigma / unit) * unit;
+    terms.scattering[i] = std::round(sigma * static_cast<double>(albedo[c]) / unit) * unit;
+  }
+  return terms;
+}
+
+}  // namespace
+
+Result<void> check_media(const MediaSettings& settings) {
+  for (const NamedMedium& named : settings.media) {
+    const std::string what = fmt::format("the medium of '{}'", named.object);
+    const Medium& medium = named.medium;
+    if (auto good = check_medium(what, medium.extinction, medium.albedo); !good) return good;
+    if (!medium.surface_colour) continue;
+    const glm::vec4& colour = *medium.surface_colour;
+    if (auto good = check_part(what, "surface", glm::vec3(colour), 1.0f); !good) return good;
+    if (!(colour.a >= 0.0f && colour.a <= 1.0f)) {
+      return fail(ErrorCode::kUsage, "{}: the opacity of the surface must be 0 to 1, got {}", what,
+                  colour.a);
+    }
+  }
+  for (std::size_t i = 0; i < settings.particles.size(); ++i) {
+    const Particle& p = settings.particles[i];
+    const std::string what = fmt::format("particle {}", i);
+    if (!finite(p.centre) || !(p.radius > 0.0 && std::isfinite(p.radius))) {
+      return fail(ErrorCode::kUsage,
+                  "{}: the centre must be finite, and the radius finite and above 0; got {}, {}, "
+                  "{} and {}",
+                  what, p.centre.x, p.centre.y, p.centre.z, p.radius);
+    }
+    if (auto good = check_medium(what, p.extinction, p.albedo); !good) return good;
+  }
+  if (auto good = check_part("the media", "ambient light", settings.ambient, kMostExtinction);
+      !good) {
+    return good;
+  }
+  return check_light(settings.light);
+}
+
+Result<MediaTable> make_media_table(const Scene& scene, const MediaSettings& settings,
+                                    const FrameOptions& options) {
+  MediaTable table;
+  table.looks = looks_of(scene, options);
+  table.medium_of.assign(scene.objects.size(), MediaTable::kNone);
+  std::vector<const Medium*> chosen(scene.objects.size(), nullptr);
+  for (const bool all : {true, false}) {
+    for (const NamedMedium& named : settings.media) {
+      if ((named.object == "*") != all) continue;
+      bool found = false;
+      for (std::size_t o = 0; o < chosen.size(); ++o) {
+        if (!all && scene.objects[o].name != named.object) continue;
+        chosen[o] = &named.medium;
+        found = true;
+      }
+      if (!found && !all) {
+        return fail(ErrorCode::kUsage, "a medium is for '{}', but no object has this name",
+                    named.object);
+      }
+    }
+  }
+  const auto count = static_cast<std::size_t>(
+      std::count_if(chosen.begin(), chosen.end(), [](const Medium* m) { return m != nullptr; }));
+  const double unit = unit_of(settings, count);
+  for (std::size_t o = 0; o < chosen.size(); ++o) {
+    if (chosen[o] == nullptr) continue;
+    const Medium& medium = *chosen[o];
+    table.medium_of[o] = static_cast<std::uint32_t>(table.solids.size());
+    table.solids.push_back(terms_of(medium.extinction, medium.albedo, unit));
+    table.objects.push_back(static_cast<std::uint32_t>(o));
+    table.surface.push_back(medium.surface ? 1 : 0);
+    // Never opaque: rays must not lose crossings of a solid that they may begin in.
+    table.looks[o].opaque = false;
+    if (!medium.surface) table.looks[o].colour = glm::vec4(0.0f);
+    if (medium.surface && medium.surface_colour) table.looks[o].colour = *medium.surface_colour;
+  }
+  table.particles.reserve(settings.particles.size());
+  for (const Particle& p : settings.particles) {
+    table.particles.push_back(terms_of(p.extinction, p.albedo, unit));
+  }
+  return table;
+}
+
+}  // namespace strata::transparency

@@ -1,0 +1,223 @@
+#include "transparency/media/media_tile.h"
+
+#include <algorithm>
+#include <cassert>
+#include <limits>
+#include <numbers>
+
+// "Order-independent transparency with per-pixel linked lists" and volumetric attenuation: media of
+// constant extinction and albedo between the crossings of a ray, for which the equation of
+// radiative transfer has a closed form. We differ: the sums of the media at hand are exact and
+// return to 0; surfaces may lie between media; all numbers are kept for red, green and blue.
+
+namespace strata::transparency {
+namespace {
+
+/// The part of a light from a direction that is scattered into a sphere's unit of another one:
+/// Rayleigh's phase function.
+double rayleigh(double cosine) { return 3.0 / (16.0 * std::numbers::pi) * (1.0 + cosine * cosine); }
+
+}  // namespace
+
+MediaTile::MediaTile(const MediaFrame& frame)
+    : frame_(frame),
+      reports_(frame.table.solids.size()),
+      solids_(frame.table.solids.size()),
+      may_hold_eye_(frame.table.solids.size(), 0) {
+  for (const EyeSolid& eye : frame.eye_solids) may_hold_eye_[eye.solid] = 1;
+}
+
+Result<void> MediaTile::render(TileStream& stream, TileImage& image) {
+  stream_ = &stream, image_ = &image;
+  lists_.build(stream);
+  const PixelRect& rect = stream.rect();
+  frame_.particles.tile(rect.u0 / kTileSide, rect.v0 / kTileSide, particles_);
+  Costs& costs = stream.costs();
+  costs.stored = costs.kept = lists_.size() + particles_.events.size();
+  costs.most_layers = lists_.most_layers();
+  costs.formula_bytes = costs.allocated_bytes = 8 * costs.stored + 8 * stream.pixel_count();
+  if (costs.stored == 0 && frame_.eye_solids.empty()) return {};
+  for (int v = 0; v < stream.height(); ++v) {
+    for (int u = 0; u < stream.width(); ++u) {
+      const auto pixel = static_cast<std::uint32_t>(v * kTileSide + u);
+      events_ = particles_.of(pixel);
+      if (lists_.list(pixel).empty() && events_.empty() && frame_.eye_solids.empty()) continue;
+      walk(pixel, rect.u0 + u, rect.v0 + v);
+    }
+  }
+  return {};
+}
+
+/// From the first crossing to the last one in front of the nearest opaque object.
+void MediaTile::walk(std::uint32_t pixel, int u, int v) {
+  const std::span<const DepthItem> list = lists_.list(pixel);
+  const PixelRay view_ray = frame_.rays.ray(u, v);
+  along_ = view_ray.length;
+  Ray ray;
+  ray.light = from(frame_.settings.ambient);
+  if (frame_.lit) {
+    const double cosine = glm::dot(view_ray.direction, frame_.to_light) / along_;
+    ray.light += from(frame_.settings.light.radiance) * splat(static_cast<float>(rayleigh(cosine)));
+  }
+  const DepthItem opaque = stream_->opaque(pixel);
+  if (!walk_back(list)) leave_out_unbalanced(list);
+  if (!frame_.eye_solids.empty()) begin_inside(view_ray, ray);
+  std::size_t i = 0;
+  for (; i < list.size() && !(opaque < list[i]); ++i) {
+    const std::uint32_t solid = crossed_[i];
+    if (solid != MediaTable::kNone || ray.sums.media() > 0 || !events_.empty()) {
+      const float distance = distance_of(list[i]);
+      pass_particles(distance, ray);
+      move_to(distance, ray);
+    }
+    if (solid == MediaTable::kNone || frame_.table.surface[solid] != 0) add_surface(list[i], ray);
+    if (solid != MediaTable::kNone) cross(solid, list[i].exit(), ray);
+  }
+  for (std::size_t k = i; k < list.size(); ++k) {
+    if (crossed_[k] != MediaTable::kNone) solids_[crossed_[k]].inside = 0;
+  }
+  if (opaque != TileFragments::kNothing) {
+    const float distance = distance_of(opaque);
+    pass_particles(distance, ray);
+    move_to(distance, ray);
+  } else {
+    pass_particles(std::numeric_limits<float>::infinity(), ray);
+    assert(ray.sums.vacuum());
+  }
+  finish(pixel, ray);
+}
+
+/// From the far end, where there is vacuum, to the near plane: how often is the ray inside of each
+/// solid there? @return whether it is inside of none
+bool MediaTile::walk_back(std::span<const DepthItem> list) {
+  ++pixels_;
+  crossed_.resize(std::max(crossed_.size(), list.size()));
+  int inside = 0;
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    const std::uint32_t solid = frame_.table.medium_of[stream_->object(list[i])];
+    crossed_[i] = solid;
+    if (solid == MediaTable::kNone) continue;
+    SolidState& state = solids_[solid];
+    const int before = state.inside;
+    state.inside += list[i].exit() ? 1 : -1;
+    inside += (state.inside != 0 ? 1 : 0) - (before != 0 ? 1 : 0);
+    if (state.last != pixels_) {
+      state.last = pixels_;
+      ++reports_[solid].pixels;
+    }
+  }
+  return inside == 0;
+}
+
+/// Where a ray does not enter a solid as often as it leaves it, and cannot begin in it.
+void MediaTile::leave_out_unbalanced(std::span<const DepthItem> list) {
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    const std::uint32_t solid = crossed_[i];
+    if (solid == MediaTable::kNone || solids_[solid].inside == 0 || may_hold_eye_[solid] != 0) {
+      continue;
+    }
+    ++reports_[solid].unbalanced_pixels;
+    solids_[solid].inside = 0;
+    for (std::size_t k = i; k < list.size(); ++k) {
+      if (crossed_[k] == solid) crossed_[k] = MediaTable::kNone;
+    }
+  }
+}
+
+/// From the eye to the near plane. No list has crossings there: the wall of a solid that holds the
+/// eye or the near plane, but not both, is taken to be its nearest triangle's plane.
+void MediaTile::begin_inside(const PixelRay& view_ray, Ray& ray) {
+  starts_.clear();
+  const double near = frame_.view.near;
+  for (const EyeSolid& eye : frame_.eye_solids) {
+    const bool near_inside = solids_[eye.solid].inside != 0;
+    if (!eye.eye_inside && !near_inside) continue;
+    if (eye.eye_inside) starts_.emplace_back(0.0f, eye.solid, true);
+    if (eye.eye_inside && near_inside) continue;
+    const double wall = eye.wall(view_ray.direction, near) * along_;
+    starts_.emplace_back(static_cast<float>(wall), eye.solid, near_inside);
+  }
+  std::sort(starts_.begin(), starts_.end());
+  for (const auto& [distance, solid, enters] : starts_) {
+    pass_particles(distance, ray);
+    move_to(distance, ray);
+    if (enters) {
+      ray.sums.add(frame_.table.solids[solid]);
+    } else {
+      ray.sums.remove(frame_.table.solids[solid]);
+    }
+    change(ray);
+  }
+}
+
+void MediaTile::pass_particles(float until, Ray& ray) {
+  std::size_t passed = 0;
+  for (; passed < events_.size() && events_[passed].distance() <= until; ++passed) {
+    const ParticleEvent event = events_[passed];
+    move_to(event.distance(), ray);
+    const MediumTerms& terms = frame_.table.particles[event.particle()];
+    if (event.exit()) {
+      ray.sums.remove(terms);
+    } else {
+      ray.sums.add(terms);
+    }
+    change(ray);
+  }
+  events_ = events_.subspan(passed);
+}
+
+void MediaTile::cross(std::uint32_t solid, bool exit, Ray& ray) {
+  std::int32_t& inside = solids_[solid].inside;
+  const bool before = inside != 0;
+  inside += exit ? -1 : 1;
+  if (before == (inside != 0)) return;
+  if (before) {
+    ray.sums.remove(frame_.table.solids[solid]);
+  } else {
+    ray.sums.add(frame_.table.solids[solid]);
+  }
+  change(ray);
+}
+
+/// Through the media at hand, which scatter `glow` and let e^-depth through.
+void MediaTile::move_to(float distance, Ray& ray) const {
+  if (ray.sums.media() > 0 && distance > ray.at) {
+    ray.depth += ray.extinction * splat(distance - ray.at);
+    const Float4 through = exp_minus(ray.depth);
+    ray.colour += ray.glow * (splat(ray.surfaces) * (ray.through - through));
+    ray.through = through;
+  }
+  ray.at = distance;
+}
+
+/// After the media at hand have changed.
+void MediaTile::change(Ray& ray) const {
+  ray.extinction = ray.sums.extinction();
+  ray.glow = ray.sums.albedo() * ray.light;
+}
+
+void MediaTile::add_surface(DepthItem item, Ray& ray) {
+  const glm::vec4& colour = stream_->shade(item);
+  ray.colour += splat(ray.surfaces) * ray.through * from(glm::vec3(colour));
+  ray.surfaces *= 1.0f - colour.a;
+}
+
+/// A picture keeps one transmittance: what the three differ by is applied to what lies behind.
+void MediaTile::finish(std::uint32_t pixel, const Ray& ray) {
+  const glm::vec3 through = to_vec3(splat(ray.surfaces) * ray.through);
+  const glm::vec3 colour = to_vec3(ray.colour);
+  glm::vec4& out = image_->pixels[pixel];
+  if (through.x == through.y && through.y == through.z) {
+    out = glm::vec4(colour, through.x);
+    return;
+  }
+  const DepthItem opaque = stream_->opaque(pixel);
+  if (opaque != TileFragments::kNothing) {
+    out = glm::vec4(colour + through * glm::vec3(stream_->shade(opaque)), 0.0f);
+    return;
+  }
+  const float mean = (through.x + through.y + through.z) / 3.0f;
+  out = glm::vec4(colour + (through - mean) * glm::vec3(frame_.background), mean);
+}
+
+}  // namespace strata::transparency

@@ -1,0 +1,91 @@
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+#include <span>
+#include <tuple>
+#include <vector>
+
+#include "strata/transparency/media/media.h"
+#include "transparency/media/eye_state.h"
+#include "transparency/media/media_table.h"
+#include "transparency/media/particle_bins.h"
+#include "transparency/media/pixel_rays.h"
+#include "transparency/stream/sorted_tile.h"
+
+namespace strata::transparency {
+
+/// What all threads know of a picture with media.
+struct MediaFrame {
+  const MediaSettings& settings;
+  const MediaTable& table;
+  const View& view;  ///< of the samples
+  const PixelRays& rays;
+  const ParticleBins& particles;
+  glm::vec4 background{0.0f};  ///< premultiplied
+  bool lit = false;            ///< there is a light
+  glm::dvec3 to_light{0.0};    ///< eye space, of length 1
+  /// Solids in which rays may begin.
+  std::span<const EyeSolid> eye_solids;
+};
+
+/// The walks along the rays of a tile, for one thread.
+class MediaTile {
+ public:
+  explicit MediaTile(const MediaFrame& frame);
+
+  Result<void> render(TileStream& stream, TileImage& image);
+
+  /// What was seen of each solid; `object` is empty.
+  [[nodiscard]] const std::vector<SolidReport>& reports() const { return reports_; }
+
+ private:
+  /// The light that was gathered along a ray, and what of the light from behind comes through.
+  struct Ray {
+    Float4 colour = splat(0.0f);
+    Float4 depth = splat(0.0f);    ///< optical depth of the media
+    Float4 through = splat(1.0f);  ///< transmittance of the media
+    float surfaces = 1.0f;         ///< transmittance of the surfaces
+    float at = 0.0f;               ///< distance along the ray that the walk has reached
+    Float4 light = splat(0.0f);    ///< that media scatter to the eye
+    Float4 glow = splat(0.0f);     ///< of it, with the albedo of the media at hand
+    Float4 extinction = splat(0.0f);
+    MediaSums sums;
+  };
+  struct SolidState {
+    std::int32_t inside = 0;  ///< times that the ray has entered it more than it has left it
+    std::uint32_t last = 0;   ///< the last pixel that crossed it, counted over all tiles
+  };
+
+  void walk(std::uint32_t pixel, int u, int v);
+  bool walk_back(std::span<const DepthItem> list);
+  void begin_inside(const PixelRay& view_ray, Ray& ray);
+  void leave_out_unbalanced(std::span<const DepthItem> list);
+  void pass_particles(float until, Ray& ray);
+  void cross(std::uint32_t solid, bool exit, Ray& ray);
+  void move_to(float distance, Ray& ray) const;
+  void change(Ray& ray) const;
+  void add_surface(DepthItem item, Ray& ray);
+  void finish(std::uint32_t pixel, const Ray& ray);
+  [[nodiscard]] float distance_of(DepthItem item) const {
+    return static_cast<float>(frame_.view.distance(item.depth()) * along_);
+  }
+
+  const MediaFrame& frame_;
+  std::vector<SolidReport> reports_;
+  std::vector<SolidState> solids_;
+  std::vector<std::uint32_t> crossed_;  ///< the solid of each item of a list, or kNone
+  std::uint32_t pixels_ = 0;            ///< that were walked
+  SortedTile lists_;
+  ParticleBins::Tile particles_;
+  /// Crossings before the near plane: distance, solid, whether the ray enters.
+  std::vector<std::tuple<float, std::uint32_t, bool>> starts_;
+  std::vector<std::uint8_t> may_hold_eye_;  ///< of each solid
+  std::span<const ParticleEvent> events_;   ///< of the pixel, those to come
+  TileStream* stream_ = nullptr;
+  TileImage* image_ = nullptr;
+  double along_ = 1.0;  ///< world units along the ray per unit along the view axis
+};
+
+}  // namespace strata::transparency
