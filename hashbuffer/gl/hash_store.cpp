@@ -134,6 +134,9 @@ StoreGlsl HashStore::glsl(int pass) const {
     } else {
       settings.extensions.emplace_back("GL_NV_shader_atomic_int64");
     }
+    if (options_.cull_opacity > 0.0) {
+      settings.defines.emplace_back("STORE_CULL", std::to_string(1.0 - options_.cull_opacity));
+    }
     return store_glsl(glsl::hashbuffer_gl_insert_64, std::move(settings));
   }
   return store_glsl(glsl::hashbuffer_gl_insert_32, std::move(settings));

@@ -41,6 +41,10 @@ struct HashStoreOptions {
   /// For tests on drivers without 64-bit atomics: kAtomic with a plain maximum in place of the
   /// atomic one. Right only if a single invocation inserts everything.
   bool serial = false;
+  /// Above 0: fragments behind this much opacity may be dropped. The caller binds the premultiplied
+  /// colours and opacities of the faces, vec4 by [triangle << 1 | exit], to binding 12 before it
+  /// builds. 64-bit words on the atomic path only.
+  double cull_opacity = 0.0;
   /// Bytes of a table at one binding at most, if smaller than what the driver says; 0: that.
   std::uint64_t binding_bytes = 0;
 };

@@ -18,7 +18,7 @@ constexpr unsigned kVertices = 0, kTriangles = 1;
 /// The state that drawing needs, and back to what was there: a window may have its own.
 class DrawState {
  public:
-  explicit DrawState(unsigned framebuffer) {
+  DrawState(unsigned framebuffer, bool colours) {
     glGetIntegerv(GL_DRAW_FRAMEBUFFER_BINDING, &framebuffer_);
     glGetIntegerv(GL_VIEWPORT, viewport_);
     glGetBooleanv(GL_COLOR_WRITEMASK, colour_mask_);
@@ -27,7 +27,8 @@ class DrawState {
       s.before = glIsEnabled(s.name);
       s.wanted ? glEnable(s.name) : glDisable(s.name);
     }
-    glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
+    const GLboolean written = colours ? GL_TRUE : GL_FALSE;
+    glColorMask(written, written, written, written);
     glDepthMask(GL_FALSE);
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, framebuffer);
   }
@@ -133,31 +134,44 @@ Result<const Program*> HardwareRasterizer::program_for(const StoreGlsl& store) {
   return &programs_.back().second;
 }
 
+std::uint32_t HardwareRasterizer::largest_tile() const {
+  // Positions in a window of 2^14 pixels are exact in floats; half of it is margin (draw_tile).
+  const std::uint32_t window = std::bit_floor(std::min(limits_.viewport_side, 1u << 14));
+  return std::min(limits_.framebuffer_side, window / 2);
+}
+
+void HardwareRasterizer::bind(const Program& program) {
+  const AxisFrame frame(target_.axis);
+  program.set("axis_u", frame.u);
+  program.set("axis_v", frame.v);
+  program.set("axis_w", frame.w);
+  program.set("row_of_screen", v_begin_);
+  program.set("screen_width", width());
+  program.set("depth_limit", target_.depth_limit);
+  program.use();
+  vertices_.bind(kVertices);
+  triangles_.bind(kTriangles);
+}
+
 Result<void> HardwareRasterizer::draw(const StoreGlsl& store, PixelRows rows) {
   const auto program = program_for(store);
   if (!program) return tl::unexpected(program.error());
   if (triangle_count_ == 0) return {};
-  // Positions in a window of 2^14 pixels are exact in floats; half of it is margin (draw_tile).
-  const std::uint32_t window = std::bit_floor(std::min(limits_.viewport_side, 1u << 14));
-  const std::uint32_t side = std::min(limits_.framebuffer_side, window / 2);
-  const AxisFrame frame(target_.axis);
-  const Program& p = **program;
-  p.set("axis_u", frame.u);
-  p.set("axis_v", frame.v);
-  p.set("axis_w", frame.w);
-  p.set("row_of_screen", v_begin_);
-  p.set("screen_width", width());
-  p.set("depth_limit", target_.depth_limit);
-  p.use();
-  vertices_.bind(kVertices);
-  triangles_.bind(kTriangles);
+  const std::uint32_t side = largest_tile();
+  bind(**program);
   {
-    const DrawState state(framebuffer_);
+    const DrawState state(framebuffer_, false);
     glBindVertexArray(vertex_array_);
     const std::uint32_t end = std::min(rows.end, height());
     for (std::uint32_t v = rows.begin; v < end; v += side) {
       for (std::uint32_t u = 0; u < width(); u += side) {
-        draw_tile(p, u, v, std::min(side, width() - u), std::min(side, end - v));
+        const std::uint32_t columns = std::min(side, width() - u), lines = std::min(side, end - v);
+        // A framebuffer without images: nothing but its size.
+        glNamedFramebufferParameteri(framebuffer_, GL_FRAMEBUFFER_DEFAULT_WIDTH,
+                                     static_cast<GLint>(columns));
+        glNamedFramebufferParameteri(framebuffer_, GL_FRAMEBUFFER_DEFAULT_HEIGHT,
+                                     static_cast<GLint>(lines));
+        draw_tile(**program, u, v, columns, lines);
       }
     }
   }
@@ -165,13 +179,32 @@ Result<void> HardwareRasterizer::draw(const StoreGlsl& store, PixelRows rows) {
   return check_errors("hardware rasterizer");
 }
 
+Result<void> HardwareRasterizer::draw_into(unsigned framebuffer, const StoreGlsl& store,
+                                           const std::function<void()>& set_state,
+                                           const std::function<void()>& reset_state) {
+  const auto program = program_for(store);
+  if (!program) return tl::unexpected(program.error());
+  if (std::max(width(), height()) > largest_tile()) {
+    return fail(ErrorCode::kLimit,
+                "hardware rasterizer: a screen with images must be at most {} pixels wide and "
+                "high, got {} x {}",
+                largest_tile(), width(), height());
+  }
+  if (triangle_count_ == 0) return {};
+  bind(**program);
+  {
+    const DrawState state(framebuffer, true);
+    glBindVertexArray(vertex_array_);
+    if (set_state) set_state();
+    draw_tile(**program, 0, 0, width(), height());
+    if (reset_state) reset_state();
+  }
+  storage_barrier();
+  return check_errors("hardware rasterizer");
+}
+
 void HardwareRasterizer::draw_tile(const Program& program, std::uint32_t u, std::uint32_t v,
                                    std::uint32_t width, std::uint32_t height) {
-  // A framebuffer without images: nothing but its size.
-  glNamedFramebufferParameteri(framebuffer_, GL_FRAMEBUFFER_DEFAULT_WIDTH,
-                               static_cast<GLint>(width));
-  glNamedFramebufferParameteri(framebuffer_, GL_FRAMEBUFFER_DEFAULT_HEIGHT,
-                               static_cast<GLint>(height));
   // The viewport is a power of two, so that positions are exact, and reaches half its side beyond
   // the tile: drivers that clip at its border move the edges of what they clip by their rounding.
   const std::uint32_t inner = std::bit_ceil(std::max(width, height));

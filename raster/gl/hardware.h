@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -48,10 +49,20 @@ class HardwareRasterizer final : public Producer {
   }
   /// Payload: [exit:1 | triangle:31]. Binds its own framebuffer, and the one before again.
   [[nodiscard]] Result<void> draw(const StoreGlsl& store, PixelRows rows) override;
+  /// Draws into the images of `framebuffer`, which have the size of the screen and which
+  /// strata_insert may read and write. The triangles come in their order. `set_state` is called
+  /// before them, for blending or stencil tests; what it enables it must disable in `reset_state`.
+  /// @return kLimit where the screen is larger than a viewport allows
+  [[nodiscard]] Result<void> draw_into(unsigned framebuffer, const StoreGlsl& store,
+                                       const std::function<void()>& set_state = {},
+                                       const std::function<void()>& reset_state = {});
 
  private:
   explicit HardwareRasterizer(const Limits& limits) : limits_(limits) {}
   [[nodiscard]] Result<const Program*> program_for(const StoreGlsl& store);
+  /// Pixels along a side of what is drawn at once.
+  [[nodiscard]] std::uint32_t largest_tile() const;
+  void bind(const Program& program);
   void draw_tile(const Program& program, std::uint32_t u, std::uint32_t v, std::uint32_t width,
                  std::uint32_t height);
 

@@ -1,0 +1,2 @@
+// Writes no colour: the stencil is all that counts.
+void main() {}
