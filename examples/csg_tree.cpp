@@ -7,7 +7,7 @@ namespace csg = strata::csg;
 int main() {
   const csg::Tree a(strata::make_box({-10, -10, -10}, {10, 10, 10}));
   const csg::Tree b(strata::make_icosphere(12.5, 5));
-  const csg::Tree c(strata::make_cylinder(4, 30, 64));
+  const csg::Tree c(strata::make_cylinder(4, 30, 64));  // stands on z = 0
   const csg::Tree tree = (a - b) | c;
 
   const auto picture = csg::picture(tree);  // the whole tree in view, 512 x 512

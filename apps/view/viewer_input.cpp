@@ -38,20 +38,20 @@ void section_across(Viewer& viewer, int axis) {
 }
 
 constexpr Key kKeys[] = {
-    {"ctrl+4", [](Viewer& v) { v.look("top"); }, "from the top"},
-    {"ctrl+5", [](Viewer& v) { v.look("bottom"); }, "from below"},
-    {"ctrl+6", [](Viewer& v) { v.look("left"); }, "from the left"},
-    {"ctrl+7", [](Viewer& v) { v.look("right"); }, "from the right"},
-    {"ctrl+8", [](Viewer& v) { v.look("front"); }, "from the front"},
-    {"ctrl+9", [](Viewer& v) { v.look("back"); }, "from behind"},
-    {"ctrl+0", [](Viewer& v) { v.look("diagonal"); }, "diagonally"},
-    {"ctrl+shift+0", [](Viewer& v) { v.look("centre"); }, "the origin in the middle"},
+    {"ctrl+4", [](Viewer& v) { v.look("top"); }, "view from the top"},
+    {"ctrl+5", [](Viewer& v) { v.look("bottom"); }, "view from below"},
+    {"ctrl+6", [](Viewer& v) { v.look("left"); }, "view from the left"},
+    {"ctrl+7", [](Viewer& v) { v.look("right"); }, "view from the right"},
+    {"ctrl+8", [](Viewer& v) { v.look("front"); }, "view from the front"},
+    {"ctrl+9", [](Viewer& v) { v.look("back"); }, "view from behind"},
+    {"ctrl+0", [](Viewer& v) { v.look("diagonal"); }, "view diagonally"},
+    {"ctrl+shift+0", [](Viewer& v) { v.look("centre"); }, "centre the origin"},
     {"ctrl+alt+0", [](Viewer& v) { v.look("reset"); }, "reset the camera"},
-    {"ctrl+shift+v", [](Viewer& v) { v.look("all"); }, "all in view; also f and home"},
+    {"ctrl+shift+v", [](Viewer& v) { v.look("all"); }, "show everything; also f and home"},
     {"f", [](Viewer& v) { v.look("all"); }, ""},
     {"home", [](Viewer& v) { v.look("all"); }, ""},
-    {"ctrl+]", [](Viewer& v) { v.zoom_by(1); }, "nearer; also +"},
-    {"ctrl+[", [](Viewer& v) { v.zoom_by(-1); }, "farther; also -"},
+    {"ctrl+]", [](Viewer& v) { v.zoom_by(1); }, "zoom in; also +"},
+    {"ctrl+[", [](Viewer& v) { v.zoom_by(-1); }, "zoom out; also -"},
     {"+", [](Viewer& v) { v.zoom_by(1); }, ""},
     {"=", [](Viewer& v) { v.zoom_by(1); }, ""},
     {"shift+=", [](Viewer& v) { v.zoom_by(1); }, ""},
@@ -104,18 +104,19 @@ constexpr Key kKeys[] = {
        v.set_camera(camera);
      },
      "perspective or orthographic"},
-    {"ctrl+1", [](Viewer& v) { v.set_edges(!v.picture_options().edges); }, "edges; also e"},
+    {"ctrl+1", [](Viewer& v) { v.set_edges(!v.picture_options().edges); },
+     "edges on or off; also e"},
     {"e", [](Viewer& v) { v.set_edges(!v.picture_options().edges); }, ""},
-    {"ctrl+2", [](Viewer& v) { v.show_axes = !v.show_axes; }, "axes"},
+    {"ctrl+2", [](Viewer& v) { v.show_axes = !v.show_axes; }, "axes on or off"},
     {"g",
      [](Viewer& v) {
        Looks looks = v.looks();
        looks.ghosts = !looks.ghosts;
        v.set_looks(std::move(looks));
      },
-     "show subtracted solids"},
+     "ghosts of subtracted solids on or off"},
     {"s", [](Viewer& v) { v.toggle_section(); }, "section on or off"},
-    {"x", [](Viewer& v) { section_across(v, 0); }, "section across x; so do y and z"},
+    {"x", [](Viewer& v) { section_across(v, 0); }, "section across x; likewise y and z"},
     {"y", [](Viewer& v) { section_across(v, 1); }, ""},
     {"z", [](Viewer& v) { section_across(v, 2); }, ""},
     {"i", [](Viewer& v) { v.flip_section(); }, "flip the section"},
@@ -136,7 +137,8 @@ constexpr Key kKeys[] = {
     {"f5", [](Viewer& v) { v.reload(); }, "load the files again; also F4"},
     {"f4", [](Viewer& v) { v.reload(); }, ""},
     {"tab", [](Viewer& v) { v.show_panels = !v.show_panels; }, "panels on or off"},
-    {"ctrl+s", [](Viewer& v) { v.wants_screenshot = true; }, "screenshot, strata-view-N.png"},
+    {"ctrl+s", [](Viewer& v) { v.wants_screenshot = true; },
+     "save a screenshot, strata-view-N.png"},
     {"escape",
      [](Viewer& v) {
        if (v.loading()) return v.cancel_load();
@@ -151,9 +153,9 @@ struct Gesture {
 };
 constexpr Gesture kGestures[] = {
     {"left drag", "turn; on the section's arrow: move the section"},
-    {"right or middle drag", "move; also shift + left"},
-    {"wheel, ctrl + drag", "zoom"},
-    {"click", "pick: print the solid, triangle and position"},
+    {"right or middle drag", "move; also shift + left drag"},
+    {"wheel, ctrl + drag", "zoom at the cursor"},
+    {"click", "pick: show the solid, triangle and position"},
     {"double click", "pick, and turn about that point"},
 };
 

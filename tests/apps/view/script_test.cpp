@@ -1,8 +1,12 @@
 #include <gtest/gtest.h>
 
+#include <fstream>
+#include <iterator>
 #include <sstream>
+#include <vector>
 
 #include "apps/view/script.h"
+#include "apps/view/viewer.h"
 
 namespace strata::view {
 namespace {
@@ -110,6 +114,32 @@ TEST(Script, TheHelpNamesEveryCommand) {
     }
   }
   EXPECT_GT(count, 25);
+}
+
+/// The lines of a help text as rows of a Markdown table. @param width  of the first column
+std::vector<std::string> rows_of(const std::string& help, std::size_t width, const char* quote) {
+  std::vector<std::string> rows;
+  std::istringstream lines(help);
+  for (std::string line; std::getline(lines, line);) {
+    std::string name = line.substr(2, width);
+    name.erase(name.find_last_not_of(' ') + 1);
+    rows.push_back("| " + (quote + name + quote) + " | " + line.substr(2 + width) + " |");
+  }
+  return rows;
+}
+
+TEST(Script, TheDocumentHasTheKeysAndCommandsOfTheHelp) {
+  std::ifstream file(STRATA_SOURCE_DIR "/docs/view.md");
+  std::string text((std::istreambuf_iterator<char>(file)), {});
+  ASSERT_FALSE(text.empty());
+  for (std::size_t at = 0; (at = text.find("\\|", at)) != std::string::npos;) text.erase(at, 1);
+  std::vector<std::string> rows = rows_of(key_help(), 24, "");
+  const std::vector<std::string> commands = rows_of(script_help(), 34, "`");
+  rows.insert(rows.end(), commands.begin(), commands.end());
+  EXPECT_GT(rows.size(), 60u);
+  for (const std::string& row : rows) {
+    EXPECT_NE(text.find("\n" + row + "\n"), std::string::npos) << row;
+  }
 }
 
 }  // namespace
