@@ -4,6 +4,7 @@
 #include "transparency/bounded/bounded_techniques.h"
 #include "transparency/lists/list_techniques.h"
 #include "transparency/peeling/peeling_techniques.h"
+#include "transparency/slots/slot_techniques.h"
 
 namespace strata::transparency {
 namespace {
@@ -44,6 +45,14 @@ constexpr std::array kAll{
     &kOpacityMap,
     &kOccupancyMap,
     &kFourierMap,
+    // slots
+    &kStencilRouted,
+    &kFreePipeSorted,
+    &kFreePipeCounter,
+    &kBucketSort,
+    &kAdaptiveBucketSort,
+    &kKBuffer,
+    &kZ3,
 };
 
 }  // namespace
