@@ -5,6 +5,7 @@
 #include "transparency/lists/list_techniques.h"
 #include "transparency/peeling/peeling_techniques.h"
 #include "transparency/slots/slot_techniques.h"
+#include "transparency/sums/sum_techniques.h"
 
 namespace strata::transparency {
 namespace {
@@ -53,6 +54,14 @@ constexpr std::array kAll{
     &kAdaptiveBucketSort,
     &kKBuffer,
     &kZ3,
+    // sums
+    &kWeightedSum,
+    &kWeightedAverage,
+    &kWeightedBlended,
+    &kMoments,
+    &kStochastic,
+    &kScreenDoor,
+    &kSilhouetteOpaque,
 };
 
 }  // namespace

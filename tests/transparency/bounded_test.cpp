@@ -4,21 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <optional>
 
-#include "tests/transparency/listed_frames.h"
+#include "tests/transparency/choices.h"
 
 namespace strata::transparency {
 namespace {
-
-Rendering render(const ListedFrame& frame, const std::string& choice, int threads = 2) {
-  const auto chosen = parse_technique(choice);
-  if (!chosen) {
-    ADD_FAILURE() << chosen.error().message;
-    return {};
-  }
-  return render(frame, *chosen->technique, chosen->settings, threads);
-}
 
 const std::vector<std::string> kMetrics = {"transmittance",
                                            "colour",
@@ -27,21 +17,6 @@ const std::vector<std::string> kMetrics = {"transmittance",
                                            "transmittance-depth",
                                            "colour-depth",
                                            "transmittance-colour-depth"};
-
-/// At most one fragment a pixel, of any opacity, 0 and 1 too.
-ListedFrame single_layers() {
-  ListedFrame frame = random_frame("Single", {130, 70}, 0.0, 1 << 24, 31, 0.0f, 1.0f);
-  frame.colours[0].a = 0.0f;
-  frame.colours[1].a = 1.0f;
-  frame.options.background = glm::vec4(0.3f, 0.1f, 0.8f, 0.5f);
-  for (int v = 0; v < 70; ++v) {
-    for (int u = v % 2; u < 130; u += 2) {
-      const auto n = static_cast<std::uint32_t>(v * 130 + u);
-      frame.fragments.push_back({u, v, n * 1789 % (1 << 24), n % 50, n % 3 == 0});
-    }
-  }
-  return frame;
-}
 
 TEST(Bounded, OneLayerIsExact) {
   const ListedFrame frame = single_layers();
@@ -224,18 +199,6 @@ TEST(Bounded, OpaqueFragmentsAreAZBufferForRows) {
   }
 }
 
-double mean_square(const std::string& choice) {
-  double sum = 0.0;
-  for (unsigned seed = 60; seed < 66; ++seed) {
-    const ListedFrame frame = random_frame("Mixed", {66, 40}, 10.0, 1 << 24, seed, 0.1f, 0.6f);
-    const Rendering rendering = render(frame, choice);
-    const Image reference{rendering.image.width, rendering.image.height,
-                          oracle_picture(frame, Blending::kFrontToBack)};
-    sum += std::pow(10.0, -difference(rendering.image, reference).psnr / 10.0);
-  }
-  return sum / 6.0;
-}
-
 TEST(Bounded, ErrorsFallWithMoreRowsNodesAndSlices) {
   const std::vector<std::vector<std::string>> ladders = {
       {"mlab:1", "mlab:2", "mlab:4", "mlab:8", "mlab:16"},
@@ -270,17 +233,6 @@ TEST(Bounded, PackedRowsAreTheFloatOnesRounded) {
   }
 }
 
-/// Fragments of one pixel, by depth.
-ListedFrame one_pixel(const std::vector<glm::vec4>& colours,
-                      const std::vector<std::uint32_t>& depths) {
-  ListedFrame frame;
-  frame.options.size = {1, 1};
-  frame.colours = colours;
-  for (std::uint32_t i = 0; i < depths.size(); ++i)
-    frame.fragments.push_back({0, 0, depths[i], i, false});
-  return frame;
-}
-
 TEST(Bounded, TheTailOfHybridTransparencyIsTheWeightedAverage) {
   const std::vector<glm::vec4> c{
       {1, 0, 0, 0.5f}, {0, 1, 0, 0.25f}, {0, 0, 1, 0.75f}, {1, 1, 0, 0.1f}};
@@ -295,7 +247,7 @@ TEST(Bounded, TheTailOfHybridTransparencyIsTheWeightedAverage) {
   const glm::dvec3 expected = glm::dvec3(0.5, 0, 0) + 0.5 * (1.0 - through) / opacities * sum;
   std::vector<std::uint32_t> depths{10, 20, 30, 40};
   do {
-    const ListedFrame frame = one_pixel(c, depths);
+    const ListedFrame frame = layers(c, depths);
     if (depths[0] != 10) continue;
     const glm::vec4 pixel = render(frame, "ht:2").image.pixels[0];
     for (int i = 0; i < 3; ++i) EXPECT_NEAR(pixel[i], expected[i], 1e-6);
@@ -308,7 +260,7 @@ TEST(Bounded, TheTailOfHybridTransparencyIsTheWeightedAverage) {
 TEST(Bounded, WhatFallsOutOfTheRowsIsMergedAndNotLost) {
   // The printed listings merge a row that they never wrote.
   const ListedFrame frame =
-      one_pixel({{1, 0, 0, 0.5f}, {0, 1, 0, 0.5f}, {0, 0, 1, 0.5f}}, {30, 20, 10});
+      layers({{1, 0, 0, 0.5f}, {0, 1, 0, 0.5f}, {0, 0, 1, 0.5f}}, {30, 20, 10});
   for (const std::string choice : {"mlab:1", "mlab:2"}) {
     const glm::vec4 pixel = render(frame, choice).image.pixels[0];
     EXPECT_EQ(pixel, glm::vec4(0.125f, 0.25f, 0.5f, 0.875f)) << choice;
@@ -321,7 +273,7 @@ TEST(Bounded, WhatFallsOutOfTheRowsIsMergedAndNotLost) {
 TEST(Bounded, AFragmentWithinAMergedSpanIsWrongByTheFormula) {
   // Red and blue are merged; green comes between them and is blended behind both.
   const ListedFrame frame =
-      one_pixel({{1, 0, 0, 0.5f}, {0, 0, 1, 0.5f}, {0, 1, 0, 0.5f}}, {10, 30, 20});
+      layers({{1, 0, 0, 0.5f}, {0, 0, 1, 0.5f}, {0, 1, 0, 0.5f}}, {10, 30, 20});
   EXPECT_EQ(render(frame, "mlab:1").image.pixels[0], glm::vec4(0.5f, 0.125f, 0.25f, 0.875f));
   EXPECT_EQ(render(frame, "mlab:3").image.pixels[0], glm::vec4(0.5f, 0.25f, 0.125f, 0.875f));
 }
@@ -357,7 +309,7 @@ TEST(Bounded, AdaptiveListsGiveTheBitsOfTheNodesAndTheMemoryOfAnABuffer) {
 
 TEST(Bounded, FragmentsOfOneDepthDoNotAttenuateOneAnotherInTwoPassTechniques) {
   const ListedFrame frame =
-      one_pixel({{1, 0, 0, 0.5f}, {0, 1, 0, 0.5f}, {0, 0, 1, 0.5f}}, {10, 10, 20});
+      layers({{1, 0, 0, 0.5f}, {0, 1, 0, 0.5f}, {0, 0, 1, 0.5f}}, {10, 10, 20});
   for (const std::string choice : {"at", "opacity-map:1024:sum"}) {
     const glm::vec4 pixel = render(frame, choice).image.pixels[0];
     EXPECT_EQ(pixel.r, 0.5f) << choice;

@@ -5,7 +5,7 @@
 
 #include <cctype>
 
-#include "tests/transparency/listed_frames.h"
+#include "tests/transparency/choices.h"
 
 namespace strata::transparency {
 
@@ -69,6 +69,15 @@ TEST_P(Techniques, GiveTheSameBitsForAnyNumberOfThreads) {
   for (const int threads : {2, 4}) {
     EXPECT_TRUE(same_bits(render(frame, technique(), {}, threads).image, one.pixels)) << threads;
   }
+}
+
+TEST_P(Techniques, ShowOneLayerExactlyUnlessTheyAreRandom) {
+  if (technique().accuracy == Accuracy::kRandom) return;
+  const ListedFrame frame = single_layers();
+  const auto reference = oracle_picture(frame, Blending::kFrontToBack);
+  const bool bytes = technique().name.find("packed") != std::string_view::npos;
+  EXPECT_LE(largest_difference(render(frame, technique()).image, reference),
+            bytes ? 1.01f / 255.0f : 2e-6f);
 }
 
 TEST_P(Techniques, LeaveTheBackgroundWhereNothingIsDrawn) {
