@@ -47,6 +47,14 @@ function(strata_compile_alone)
   set_source_files_properties(${ARGN} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 endfunction()
 
+# strata_optimize_sanitized(FILES...): sources that tests spend most of their time in. Builds with sanitizers optimize them,
+#   also those that compile all else without, to compile quickly (the preset `sanitized`).
+function(strata_optimize_sanitized)
+  if(STRATA_SANITIZE)
+    set_source_files_properties(${ARGN} PROPERTIES COMPILE_OPTIONS -O1)
+  endif()
+endfunction()
+
 # strata_add_library(NAME [HEADERS...] SOURCES... [PUBLIC targets...] [PRIVATE targets...])
 #   makes strata_NAME, alias strata::NAME. It is installed, and part of the umbrella strata::strata, unless it is INTERNAL.
 #   A BRIDGE is installed but no part of the umbrella: who links it needs a library that others do not.
@@ -147,6 +155,7 @@ function(strata_add_test name)
   if(arg_SANITIZED)
     list(APPEND labels sanitized)
     add_dependencies(sanitized_tests ${name})
+    set_target_properties(${name} PROPERTIES UNITY_BUILD ${STRATA_JOIN_SOURCES})
   endif()
   string(REPLACE "/" "." prefix "${room}.")
   gtest_discover_tests(${name} TEST_PREFIX "${prefix}" DISCOVERY_TIMEOUT 120 PROPERTIES TIMEOUT 600)
@@ -156,11 +165,11 @@ function(strata_add_test name)
   set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES "${CMAKE_CURRENT_BINARY_DIR}/${name}_labels.cmake")
 endfunction()
 
-# strata_add_fuzz(NAME SOURCES... CORPUS folder [LIBRARIES targets...])
+# strata_add_fuzz(NAME [SANITIZED] SOURCES... CORPUS folder [LIBRARIES targets...])
 #   SOURCES define LLVMFuzzerTestOneInput. With STRATA_BUILD_FUZZ this is a libFuzzer executable, NAME; in a build with
-#   tests it is one that replays the saved corpus, with a ctest entry of the same name.
+#   tests it is one that replays the saved corpus, with a ctest entry of the same name. SANITIZED: as for strata_add_test.
 function(strata_add_fuzz name)
-  cmake_parse_arguments(arg "" "CORPUS" "SOURCES;LIBRARIES" ${ARGN})
+  cmake_parse_arguments(arg "SANITIZED" "CORPUS" "SOURCES;LIBRARIES" ${ARGN})
   if(STRATA_BUILD_FUZZ)
     add_executable(${name} ${arg_SOURCES})
     target_link_options(${name} PRIVATE -fsanitize=fuzzer)
@@ -168,8 +177,12 @@ function(strata_add_fuzz name)
   else()
     add_executable(${name} ${arg_SOURCES} "${PROJECT_SOURCE_DIR}/tests/fuzz/replay_main.cpp")
     add_test(NAME fuzz.${name} COMMAND ${name} "${arg_CORPUS}")
-    set_tests_properties(fuzz.${name} PROPERTIES TIMEOUT 600 LABELS "fuzz;sanitized")
-    add_dependencies(sanitized_tests ${name})
+    set(labels fuzz)
+    if(arg_SANITIZED)
+      list(APPEND labels sanitized)
+      add_dependencies(sanitized_tests ${name})
+    endif()
+    set_tests_properties(fuzz.${name} PROPERTIES TIMEOUT 600 LABELS "${labels}")
     strata_tests_of_room(${name})
   endif()
   target_link_libraries(${name} PRIVATE ${arg_LIBRARIES})

@@ -35,7 +35,7 @@ TriangleSoup mixed(TriangleSoup mesh, std::size_t nth) {
 }
 
 /// The same mesh with its triangles, and the corners of each, in another order.
-TriangleSoup shuffled(TriangleSoup mesh, unsigned seed) {
+TriangleSoup in_another_order(TriangleSoup mesh, unsigned seed) {
   std::mt19937 random(seed);
   std::shuffle(mesh.triangles.begin(), mesh.triangles.end(), random);
   for (glm::uvec3& t : mesh.triangles) {
@@ -64,7 +64,7 @@ std::vector<std::array<double, 9>> faces_of(const TriangleSoup& mesh) {
 Orientation expect_becomes(const TriangleSoup& mesh, const TriangleSoup& expected) {
   Orientation first;
   for (unsigned seed = 0; seed < 4; ++seed) {
-    TriangleSoup result = seed == 0 ? mesh : shuffled(mesh, seed);
+    TriangleSoup result = seed == 0 ? mesh : in_another_order(mesh, seed);
     Execution execution;
     execution.threads = static_cast<int>(seed % 3) + 1;
     const Orientation found = orient_parts(result, execution);

@@ -11,6 +11,16 @@
 
 namespace strata::csg::testing {
 
+inline Outline moved(const Outline& outline, double x, double y) {
+  return transform(outline, glm::dmat3({1, 0, 0}, {0, 1, 0}, {x, y, 1}));
+}
+
+inline Segments with_fn(double fn) {
+  Segments segments;
+  segments.fn = fn;
+  return segments;
+}
+
 /// Area of a clean outline.
 inline double area(const Outline& outline) {
   double sum = 0;

@@ -12,20 +12,12 @@ namespace strata::csg {
 namespace {
 
 using testing::area;
-
-Segments with_fn(double fn) {
-  Segments segments;
-  segments.fn = fn;
-  return segments;
-}
+using testing::moved;
+using testing::with_fn;
 
 Outline ring() {
   const std::array nested{make_square({10, 10}, true), make_square({6, 6}, true)};
   return subtract(nested);
-}
-
-Outline moved(const Outline& outline, double x, double y) {
-  return transform(outline, glm::dmat3({1, 0, 0}, {0, 1, 0}, {x, y, 1}));
 }
 
 /// V - E + F of a mesh whose edges are all shared by two triangles.

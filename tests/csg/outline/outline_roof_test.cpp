@@ -11,16 +11,8 @@ namespace strata::csg {
 namespace {
 
 using testing::area;
-
-Segments with_fn(double fn) {
-  Segments segments;
-  segments.fn = fn;
-  return segments;
-}
-
-Outline moved(const Outline& outline, double x, double y) {
-  return transform(outline, glm::dmat3({1, 0, 0}, {0, 1, 0}, {x, y, 1}));
-}
+using testing::moved;
+using testing::with_fn;
 
 double roof_volume(const Outline& outline, const char* method = "straight") {
   const auto roof = make_roof(outline, method, {});

@@ -11,6 +11,7 @@ namespace {
 
 using testing::area;
 using testing::check;
+using testing::moved;
 
 /// Every point a corner, every contour edge used once, nothing turned around.
 void expect_exact(const Outline& outline, std::size_t holes = 0, bool touches = false) {
@@ -30,10 +31,6 @@ void expect_exact(const Outline& outline, std::size_t holes = 0, bool touches = 
   std::vector<bool> used(count, false);
   for (const glm::uvec3& t : triangles) used[t.x] = used[t.y] = used[t.z] = true;
   EXPECT_TRUE(std::all_of(used.begin(), used.end(), [](bool u) { return u; }));
-}
-
-Outline moved(const Outline& outline, double x, double y) {
-  return transform(outline, glm::dmat3({1, 0, 0}, {0, 1, 0}, {x, y, 1}));
 }
 
 std::vector<glm::dvec2> reversed(std::vector<glm::dvec2> contour) {

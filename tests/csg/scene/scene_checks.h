@@ -15,6 +15,12 @@ inline std::string moved(double x, double y, double z) {
   return fmt::format("multmatrix([[1,0,0,{}],[0,1,0,{}],[0,0,1,{}],[0,0,0,1]]) ", x, y, z);
 }
 
+inline std::string repeated(std::string_view text, int count) {
+  std::string all;
+  for (int i = 0; i < count; ++i) all += text;
+  return all;
+}
+
 /// A cube with its middle at the origin, hollow.
 inline const std::string kFrame = "difference() { cube([10,10,10], true); cube([6,6,6], true); }";
 

@@ -8,12 +8,6 @@
 namespace strata::csg {
 namespace {
 
-std::string repeated(std::string_view text, int count) {
-  std::string all;
-  for (int i = 0; i < count; ++i) all += text;
-  return all;
-}
-
 std::string scaled(double x, double y, double z) {
   return fmt::format("multmatrix([[{},0,0,0],[0,{},0,0],[0,0,{},0],[0,0,0,1]]) ", x, y, z);
 }

@@ -175,12 +175,6 @@ TEST(CsgParser, EverySingleByteChangeIsReadOrRefused) {
   }
 }
 
-std::string repeated(std::string_view text, int count) {
-  std::string all;
-  for (int i = 0; i < count; ++i) all += text;
-  return all;
-}
-
 TEST(CsgParser, AHundredThousandLevelsAreFine) {
   constexpr int kLevels = 100'000;
   const Ast nodes = parsed(repeated("group(){", kLevels) + "cube();" + repeated("}", kLevels));

@@ -9,7 +9,6 @@ namespace {
 using namespace testing_mesh;
 constexpr auto kOff = MeshFormat::kOff;
 const std::string kBody = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n";
-const std::vector<glm::uvec3> kTwoTriangles = {{0, 1, 2}, {0, 2, 3}};
 
 TEST(OffReader, HeaderMayStandOnOneLineOrManyOrBeMissing) {
   for (const char* header :

@@ -25,8 +25,6 @@ const std::string kAsciiSquare =
     "property float y\nproperty float z\nelement face 2\nproperty list uchar int vertex_indices\n"
     "end_header\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n";
 
-const std::vector<glm::uvec3> kTwoTriangles = {{0, 1, 2}, {0, 2, 3}};
-
 TEST(PlyReader, ReadsAscii) {
   const MeshFile file = parsed(kPly, kAsciiSquare);
   EXPECT_EQ(file.stats.format, "ply ascii");

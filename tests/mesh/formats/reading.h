@@ -10,6 +10,9 @@
 /// Helpers for the tests of the readers.
 namespace strata::testing_mesh {
 
+/// Triangles of a square.
+inline const std::vector<glm::uvec3> kTwoTriangles = {{0, 1, 2}, {0, 2, 3}};
+
 inline Result<MeshFile> parse(MeshFormat format, std::string_view text, bool strict = false,
                               int threads = 2) {
   MeshReadOptions options;
