@@ -53,14 +53,17 @@ namespace strata {
 struct Fragment {
   std::uint32_t depth = 0;    ///< [0, 2^24); record_depth() makes it, normalized_depth() reads it
   std::uint32_t payload = 0;  ///< as it was inserted; 0 where the lists keep depth alone
+  /// Equal in both members.
   friend bool operator==(const Fragment&, const Fragment&) = default;
 };
 
 /// The first fragment that no list can keep.
 struct RefusedFragment {
-  std::atomic<bool> any = false;
-  int x = 0, y = 0;
-  std::uint32_t depth = 0, payload = 0;
+  std::atomic<bool> any = false;  ///< whether there is one
+  int x = 0;                      ///< pixel, as it was given
+  int y = 0;                      ///< the same
+  std::uint32_t depth = 0;        ///< as it was given
+  std::uint32_t payload = 0;      ///< as it was given, or 0
 };
 
 /// True if `Sink` takes a pixel, a depth and this payload.
@@ -75,6 +78,7 @@ concept TakesFragment = requires(Sink& sink, Payload... payload) {
 template <RecordPolicy Record, class Sink>
 class CheckedSink {
  public:
+  /// For a screen of width x height pixels. Borrows `sink` and `refused`.
   CheckedSink(Sink& sink, int width, int height, RefusedFragment& refused)
       : sink_(sink), width_(width), height_(height), refused_(refused) {}
 
@@ -106,7 +110,8 @@ class CheckedSink {
 template <DepthListStore Store>
 class FragmentLists {
  public:
-  using Record = typename Store::Record;
+  using Record = typename Store::Record;  ///< which bits are kept
+  /// False if the lists keep depth alone.
   static constexpr bool kHasPayload = Record::kPayloadBits > 0;
   /// True if insert() may add fragments at any time, without a generator.
   static constexpr bool kOnePass = requires(Store & store) { store.begin_frame(); };
@@ -127,8 +132,8 @@ class FragmentLists {
     return FragmentLists(*std::move(store));
   }
 
-  [[nodiscard]] int width() const { return store_.width(); }
-  [[nodiscard]] int height() const { return store_.height(); }
+  [[nodiscard]] int width() const { return store_.width(); }    ///< pixels
+  [[nodiscard]] int height() const { return store_.height(); }  ///< pixels
   /// Bytes held.
   [[nodiscard]] std::uint64_t memory_bytes() const { return store_.memory_bytes(); }
 
@@ -165,6 +170,7 @@ class FragmentLists {
   void insert(int x, int y, std::uint32_t depth) noexcept requires(kOnePass && !kHasPayload) {
     checked(store_).insert(x, y, depth);
   }
+  /// The same with a payload.
   void insert(int x, int y, std::uint32_t depth, std::uint32_t payload) noexcept requires kOnePass {
     checked(store_).insert(x, y, depth, payload);
   }

@@ -13,7 +13,9 @@ struct FileIdentity {
   std::uint64_t device = 0;  ///< with the inode: the file, on this machine
   std::uint64_t inode = 0;   ///< 0: there was no file
 
+  /// Whether there was a file of that name.
   [[nodiscard]] bool is_there() const { return inode != 0; }
+  /// Whether both names lead to one file that exists.
   [[nodiscard]] bool is_same_file(const FileIdentity& other) const {
     return is_there() && device == other.device && inode == other.inode;
   }

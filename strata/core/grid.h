@@ -10,8 +10,11 @@ enum class Axis : int { kX = 0, kY = 1, kZ = 2 };
 /// Names the two screen axes of rays along `w`: pixel (u, v) with u before v in x, y, z order. For
 /// kY the frame (u, v, w) = (x, z, y) is left-handed.
 struct AxisFrame {
-  int u = 0, v = 1, w = 2;
+  int u = 0;  ///< axis of the columns of pixels: 0, 1 or 2 for x, y or z
+  int v = 1;  ///< axis of the rows
+  int w = 2;  ///< axis of the rays
 
+  /// The frame of rays along `axis`.
   explicit constexpr AxisFrame(Axis axis)
       : u(axis == Axis::kX ? 1 : 0), v(axis == Axis::kZ ? 1 : 2), w(static_cast<int>(axis)) {}
 };
@@ -26,6 +29,7 @@ struct VoxelGrid {
   glm::dvec3 origin{0.0};      ///< world position of the lower corner of voxel (0, 0, 0)
   glm::dvec3 voxel_size{1.0};  ///< world length of a voxel along x, y, z; each finite and > 0
 
+  /// Equal in all members.
   friend bool operator==(const VoxelGrid&, const VoxelGrid&) = default;
 };
 

@@ -23,8 +23,8 @@ enum class ErrorCode : int {
 /// One sentence that names the culprit and the number: `bunny.obj:1204: face refers to vertex
 /// 98213, the file has 34817`.
 struct Error {
-  ErrorCode code = ErrorCode::kInternal;
-  std::string message;
+  ErrorCode code = ErrorCode::kInternal;  ///< its category
+  std::string message;                    ///< the sentence, without a full stop
 };
 
 /// A value, or the error that prevented it. Functions of the library neither throw nor print.

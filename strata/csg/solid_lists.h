@@ -25,12 +25,16 @@ class SolidLists {
   /// The tree below `root`. Solids that it does not reach are left out of the soup.
   SolidLists(const Tree& tree, Tree::NodeId root);
   ~SolidLists();
+  /// A moved-from object may only be destroyed or assigned to.
   SolidLists(SolidLists&&) noexcept;
+  /// As the constructor.
   SolidLists& operator=(SolidLists&&) noexcept;
 
+  /// All solids, world space.
   [[nodiscard]] const TriangleSoup& soup() const;
   /// Moves the soup out; the filter stays valid.
   [[nodiscard]] TriangleSoup take_soup();
+  /// From the soup's lists to the result's. Borrows this object.
   [[nodiscard]] const TileListFilter& filter() const;
   /// The same, but never labelled.
   [[nodiscard]] const TileListFilter& unlabelled_filter() const;

@@ -45,6 +45,7 @@ inline constexpr glm::vec3 kSchemeColour{-1.0f};
   return colour->r < 0.0f ? glm::vec4(glm::vec3(scheme_colour), colour->a) : *colour;
 }
 
+/// A leaf, or what a node does with its operands.
 enum class Operation : std::uint8_t { kSolid, kUnion, kIntersection, kDifference };
 
 /// A leaf of a tree: a mesh at its place. Many solids may share one mesh.
@@ -70,47 +71,58 @@ struct Solid {
 /// whether a tree keeps these rules.
 class Tree {
  public:
-  using NodeId = std::uint32_t;
-  static constexpr NodeId kNone = 0xffffffffu;
+  using NodeId = std::uint32_t;                 ///< index into nodes()
+  static constexpr NodeId kNone = 0xffffffffu;  ///< no node
 
   /// A node [kind | range of operands]. For a solid `first` is its index into solids().
   struct Node {
-    Operation operation = Operation::kUnion;
-    std::uint32_t first = 0;  ///< index into the operands, or of the solid
-    std::uint32_t count = 0;
+    Operation operation = Operation::kUnion;  ///< kSolid: a leaf
+    std::uint32_t first = 0;                  ///< index into the operands, or of the solid
+    std::uint32_t count = 0;                  ///< of operands
   };
 
   /// The empty set.
   Tree() = default;
   /// One solid.
   explicit Tree(Solid solid);
+  /// One solid of the winding rule, without a name or a colour.
   explicit Tree(TriangleSoup mesh);
 
+  /// A leaf. @return its node
   NodeId add_solid(Solid solid);
   /// A node over `operands`: union (none: empty), intersection (none: empty), difference (the first
   /// minus all others; none: empty). @pre all ids come from this tree
   NodeId add(Operation operation, std::span<const NodeId> operands);
+  /// The same for operands in braces.
   NodeId add(Operation operation, std::initializer_list<NodeId> operands);
   /// Copies the subtrees below nodes of a tree, which may be this one, and moves the copies. Nodes
   /// and solids keep their order; nodes that several of the subtrees share are copied once.
   /// @return the copies of `nodes`
   std::vector<NodeId> append(const Tree& from, std::span<const NodeId> nodes,
                              const glm::dmat4& target_from_source = glm::dmat4(1.0));
+  /// The same for one subtree.
   NodeId append(const Tree& from, NodeId node,
                 const glm::dmat4& target_from_source = glm::dmat4(1.0));
 
   /// The node that is drawn, measured or voxelized; kNone: the empty set.
   void set_root(NodeId root) { root_ = root; }
+  /// The node given to set_root(), else kNone.
   [[nodiscard]] NodeId root() const { return root_; }
 
-  /// Union, intersection and difference of the two roots become the root.
+  /// The union of the two roots becomes the root.
   Tree& operator|=(const Tree& other) { return combine(Operation::kUnion, other); }
+  /// The intersection of the two roots becomes the root.
   Tree& operator&=(const Tree& other) { return combine(Operation::kIntersection, other); }
+  /// The difference of the two roots becomes the root.
   Tree& operator-=(const Tree& other) { return combine(Operation::kDifference, other); }
 
+  /// All leaves, in the order in which they were added.
   [[nodiscard]] std::span<const Solid> solids() const { return solids_; }
+  /// The same, to move or colour them.
   [[nodiscard]] std::span<Solid> solids() { return solids_; }
+  /// All nodes, operands first.
   [[nodiscard]] std::span<const Node> nodes() const { return nodes_; }
+  /// The operands of a node, in order. @pre it is no leaf
   [[nodiscard]] std::span<const NodeId> operands(NodeId node) const {
     return std::span(operands_).subspan(nodes_[node].first, nodes_[node].count);
   }
@@ -124,8 +136,11 @@ class Tree {
   NodeId root_ = kNone;
 };
 
+/// Union.
 [[nodiscard]] inline Tree operator|(Tree a, const Tree& b) { return std::move(a |= b); }
+/// Intersection.
 [[nodiscard]] inline Tree operator&(Tree a, const Tree& b) { return std::move(a &= b); }
+/// Difference: `a` without `b`.
 [[nodiscard]] inline Tree operator-(Tree a, const Tree& b) { return std::move(a -= b); }
 
 /// Moves all solids of a tree. @pre the matrix is affine

@@ -19,40 +19,49 @@ namespace strata::gl {
 
 /// Limits of the driver, queried once.
 struct Limits {
-  std::uint64_t storage_block_bytes = 0;  ///< largest buffer that a shader sees at one binding
-  std::uint32_t storage_bindings = 0;     ///< bindings of such buffers
-  std::uint32_t fragment_storage_blocks = 0, compute_storage_blocks = 0, vertex_storage_blocks = 0;
-  std::uint32_t uniform_block_bytes = 0;
-  std::uint32_t compute_groups[3] = {};      ///< work groups of one dispatch
-  std::uint32_t compute_group_size[3] = {};  ///< invocations of a work group along each axis
-  std::uint32_t compute_invocations = 0;     ///< of a work group in all
-  std::uint32_t compute_shared_bytes = 0;
-  std::uint32_t texture_side = 0, framebuffer_side = 0, viewport_side = 0;
-  std::uint32_t subpixel_bits = 0;  ///< of the hardware rasterizer
+  std::uint64_t storage_block_bytes = 0;      ///< largest buffer that a shader sees at one binding
+  std::uint32_t storage_bindings = 0;         ///< bindings of such buffers
+  std::uint32_t fragment_storage_blocks = 0;  ///< of them in a fragment shader
+  std::uint32_t compute_storage_blocks = 0;   ///< in a compute shader
+  std::uint32_t vertex_storage_blocks = 0;    ///< in a vertex shader; often 0
+  std::uint32_t uniform_block_bytes = 0;      ///< largest block of uniforms
+  std::uint32_t compute_groups[3] = {};       ///< work groups of one dispatch
+  std::uint32_t compute_group_size[3] = {};   ///< invocations of a work group along each axis
+  std::uint32_t compute_invocations = 0;      ///< of a work group in all
+  std::uint32_t compute_shared_bytes = 0;     ///< shared memory of a work group
+  std::uint32_t texture_side = 0;             ///< pixels of the largest texture's side
+  std::uint32_t framebuffer_side = 0;         ///< pixels of the largest framebuffer's side
+  std::uint32_t viewport_side = 0;            ///< pixels of the largest viewport's side
+  std::uint32_t subpixel_bits = 0;            ///< of the hardware rasterizer
 };
 
 /// A driver's fault and what is done about it. Each can be switched by its name:
 /// STRATA_GL_WORKAROUNDS="-name" turns it off, "+name" (or "name") on, "-all" all off; several are
 /// separated by commas.
 struct Workaround {
-  std::string_view name;
+  std::string_view name;   ///< as STRATA_GL_WORKAROUNDS takes it
   std::string_view story;  ///< the fault, where it was seen, and the remedy
-  bool in_force = false;
+  bool in_force = false;   ///< for this context
 };
 
 /// Properties of a context.
 struct Info {
-  std::string window_system;  ///< "EGL surfaceless", "EGL device 0", "GLFW X11"
-  std::string vendor, renderer, version, glsl_version;
+  std::string window_system;            ///< "EGL surfaceless", "EGL device 0", "GLFW X11"
+  std::string vendor;                   ///< GL_VENDOR
+  std::string renderer;                 ///< GL_RENDERER: the device
+  std::string version;                  ///< GL_VERSION: OpenGL and driver
+  std::string glsl_version;             ///< of the shading language
   bool is_software = false;             ///< drawn by the CPU
   std::vector<std::string> extensions;  ///< sorted
-  Limits limits;
-  bool has_int64 = false;            ///< 64-bit integers compile (ARB_gpu_shader_int64)
+  Limits limits;                        ///< of the driver
+  bool has_int64 = false;               ///< 64-bit integers compile (ARB_gpu_shader_int64)
   bool has_int64_atomics = false;    ///< a 64-bit atomic maximum compiles (NV_shader_atomic_int64)
   std::string int64_atomics_reason;  ///< why, or why not
-  std::vector<Workaround> workarounds;
+  std::vector<Workaround> workarounds;  ///< all that Strata knows, in force or not
 
+  /// Whether the driver has an extension, such as "GL_ARB_gpu_shader_int64".
   [[nodiscard]] bool has_extension(std::string_view name) const;
+  /// Whether the workaround of that name is in force.
   [[nodiscard]] bool works_around(std::string_view name) const;
 };
 
@@ -85,6 +94,7 @@ class Context {
   /// Gives the context up, so that another thread may take it.
   virtual void release_current() = 0;
 
+  /// Driver, limits and workarounds; known from the start.
   [[nodiscard]] const Info& info() const { return info_; }
 
   /// The errors since the last call: GL errors, debug messages of high severity, the loss of the

@@ -11,7 +11,7 @@ namespace strata {
 /// published through it. Whoever reads the lists must synchronize with the inserting threads first
 /// (join them).
 struct Concurrent {
-  static constexpr bool kAnyThread = true;
+  static constexpr bool kAnyThread = true;  ///< any thread may insert
 
   /// Raises `cell` to at least `value`; returns what it held before. Reads first, so a probe that
   /// loses costs a plain load.
@@ -26,11 +26,13 @@ struct Concurrent {
     return seen;
   }
 
+  /// Adds 1; returns what `counter` held before.
   template <class Word>
   static Word fetch_increment(Word& counter) noexcept {
     return std::atomic_ref<Word>(counter).fetch_add(1, std::memory_order_relaxed);
   }
 
+  /// Sets `cell`.
   template <class Word>
   static void store(Word& cell, Word value) noexcept {
     std::atomic_ref<Word>(cell).store(value, std::memory_order_relaxed);
@@ -39,8 +41,9 @@ struct Concurrent {
 
 /// One thread inserts; plain loads and stores.
 struct Exclusive {
-  static constexpr bool kAnyThread = false;
+  static constexpr bool kAnyThread = false;  ///< one thread inserts
 
+  /// Raises `cell` to at least `value`; returns what it held before.
   template <class Word>
   static Word fetch_max(Word& cell, Word value) noexcept {
     const Word seen = cell;
@@ -48,11 +51,13 @@ struct Exclusive {
     return seen;
   }
 
+  /// Adds 1; returns what `counter` held before.
   template <class Word>
   static Word fetch_increment(Word& counter) noexcept {
     return counter++;
   }
 
+  /// Sets `cell`.
   template <class Word>
   static void store(Word& cell, Word value) noexcept {
     cell = value;

@@ -32,8 +32,8 @@ namespace strata {
 template <RecordPolicy RecordType, class Concurrency>
 class CountScanStore {
  public:
-  using Record = RecordType;
-  static constexpr bool kAnyThread = Concurrency::kAnyThread;
+  using Record = RecordType;                                   ///< which bits are kept
+  static constexpr bool kAnyThread = Concurrency::kAnyThread;  ///< any thread may insert
 
   /// A screen of width x height pixels, each at least 1 (ErrorCode::kUsage), with empty lists.
   /// ErrorCode::kLimit if memory does not allow it.
@@ -53,11 +53,13 @@ class CountScanStore {
     }
   }
 
-  [[nodiscard]] int width() const { return width_; }
-  [[nodiscard]] int height() const { return height_; }
+  [[nodiscard]] int width() const { return width_; }    ///< pixels
+  [[nodiscard]] int height() const { return height_; }  ///< pixels
+  /// Fragments in the lists.
   [[nodiscard]] std::uint64_t stored() const { return items_.size(); }
   /// Bytes held: 8 a fragment of the largest frame so far, 8 a pixel, and 8.
   [[nodiscard]] std::uint64_t memory_bytes() const { return bytes_of(items_.capacity()); }
+  /// Bytes that a frame of so many fragments needs.
   [[nodiscard]] std::uint64_t bytes_of(std::uint64_t fragments) const {
     return fragments * sizeof(DepthItem) + (pixels() + 1) * sizeof(std::uint64_t);
   }
@@ -65,6 +67,7 @@ class CountScanStore {
   /// Pass 1: counts.
   class Counter : public detail::SinkForms<Counter, Record> {
    public:
+    /// Borrows the store.
     explicit Counter(CountScanStore& store) : store_(&store) {}
 
    private:
@@ -79,6 +82,7 @@ class CountScanStore {
   /// Pass 2: stores.
   class Writer : public detail::SinkForms<Writer, Record> {
    public:
+    /// Borrows the store. @pre the frame was counted
     explicit Writer(CountScanStore& store) : store_(&store) {}
 
    private:

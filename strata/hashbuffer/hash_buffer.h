@@ -58,7 +58,7 @@ struct HashBufferOptions {
   /// fragments you expect. 0: as many as pixels, and build() runs the generator of the first frame
   /// once more, before all else, to count its fragments.
   std::uint64_t cells = 0;
-  OffsetKind offsets = OffsetKind::kPlaneFirst;
+  OffsetKind offsets = OffsetKind::kPlaneFirst;  ///< order in which a pixel probes cells
   /// Seed of the offset table. Frame f uses the generator (seed, f); kFarthestPoint is made once a
   /// table size.
   std::uint64_t seed = 1;
@@ -166,11 +166,12 @@ template <RecordPolicy RecordType, class Concurrency, class Opacity = NoOpacity>
 class HashBuffer
     : public detail::SinkForms<HashBuffer<RecordType, Concurrency, Opacity>, RecordType> {
  public:
-  using Record = RecordType;
-  using Word = typename Record::Word;
+  using Record = RecordType;           ///< how a fragment is packed
+  using Word = typename Record::Word;  ///< a cell of the table
   /// Entry of the max-age table.
   using Age = std::conditional_t<(Record::kAgeBits > 8), std::uint16_t, std::uint8_t>;
-  static constexpr bool kAnyThread = Concurrency::kAnyThread;
+  static constexpr bool kAnyThread = Concurrency::kAnyThread;  ///< any thread may insert
+  /// Whether lists may be cut by opacity.
   static constexpr bool kHasOpacity = !std::is_same_v<Opacity, NoOpacity>;
   static constexpr int kBlockSide = 8;  ///< pixels along one side of a block of the max-age table
 
@@ -190,8 +191,9 @@ class HashBuffer
     return buffer;
   }
 
-  [[nodiscard]] int width() const { return width_; }
-  [[nodiscard]] int height() const { return height_; }
+  [[nodiscard]] int width() const { return width_; }    ///< pixels
+  [[nodiscard]] int height() const { return height_; }  ///< pixels
+  /// The settings given to create().
   [[nodiscard]] const HashBufferOptions& options() const { return options_; }
   /// The raw table, in the order of the cell formula.
   [[nodiscard]] std::span<const Word> cells() const { return table_; }
@@ -216,6 +218,7 @@ class HashBuffer
   /// every interleaving of several insertions.
   class Insertion {
    public:
+    /// Borrows the buffer. @pre 0 <= x < width, 0 <= y < height, Record::payload_fits(payload)
     Insertion(HashBuffer& buffer, int x, int y, std::uint32_t depth, std::uint32_t payload) noexcept
         : buffer_(&buffer),
           table_(buffer.table_.data()),

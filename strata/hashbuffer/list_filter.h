@@ -12,11 +12,14 @@ namespace strata {
 
 /// Voxels first..last of a column that faces of one solid of a mesh pass through.
 struct FaceRun {
-  std::uint32_t solid = 0;
-  int first = 0, last = 0;
+  std::uint32_t solid = 0;  ///< see TileListFilter::solid_of()
+  int first = 0;            ///< index along the column
+  int last = 0;             ///< inclusive
 };
+/// Voxels first..last of a column.
 struct VoxelRun {
-  int first = 0, last = 0;
+  int first = 0;  ///< index along the column
+  int last = 0;   ///< inclusive
 };
 
 /// Transforms the sorted lists of a tile before they are used, e.g. from the lists of a tree's

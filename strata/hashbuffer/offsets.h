@@ -30,7 +30,7 @@ struct OffsetRequest {
   std::uint64_t cells = 0;   ///< of the table, at least `pixels`
   std::uint64_t width = 0;   ///< pixels in a row; gives kFarthestPoint its second dimension
   unsigned ages = 0;         ///< offsets wanted; ages are 1 .. ages
-  std::uint64_t seed = 0;
+  std::uint64_t seed = 0;    ///< of the random draws
 };
 
 /// The offsets by age: element a is the offset of age a, in [0, cells), all different; element 0 is

@@ -45,15 +45,15 @@ inline constexpr std::uint32_t kRecordDepthMax = (1u << 24) - 1;
 /// Of two words the larger one is older, then nearer, then of smaller payload.
 template <class WordType, int age_bits, int payload_bits>
 struct BasicRecord {
-  using Word = WordType;
-  static constexpr int kAgeBits = age_bits;
-  static constexpr int kNearnessBits = 24;
-  static constexpr int kPayloadBits = payload_bits;
+  using Word = WordType;                             ///< unsigned
+  static constexpr int kAgeBits = age_bits;          ///< width of the age
+  static constexpr int kNearnessBits = 24;           ///< width of the nearness
+  static constexpr int kPayloadBits = payload_bits;  ///< width of the payload; may be 0
   static_assert(kAgeBits + kNearnessBits + kPayloadBits == 8 * sizeof(Word));
 
-  static constexpr unsigned kAgeMax = (1u << kAgeBits) - 1;
-  static constexpr std::uint32_t kDepthMax = kRecordDepthMax;
-  static constexpr Word kEmpty = 0;
+  static constexpr unsigned kAgeMax = (1u << kAgeBits) - 1;    ///< layers a pixel, at most
+  static constexpr std::uint32_t kDepthMax = kRecordDepthMax;  ///< largest depth
+  static constexpr Word kEmpty = 0;                            ///< an empty cell
   /// The difference of two words whose ages differ by 1.
   static constexpr Word kAgeUnit = Word{1} << (kNearnessBits + kPayloadBits);
 
@@ -71,9 +71,11 @@ struct BasicRecord {
                              static_cast<Word>(kPayloadMask - narrow(payload)));
   }
 
+  /// The age in a record; 0 in an empty cell.
   [[nodiscard]] static constexpr unsigned age(Word record) {
     return static_cast<unsigned>(record >> (kNearnessBits + kPayloadBits));
   }
+  /// The depth as it was given to pack().
   [[nodiscard]] static constexpr std::uint32_t depth(Word record) {
     return kDepthMax - (static_cast<std::uint32_t>(record >> kPayloadBits) & kDepthMax);
   }
@@ -81,6 +83,7 @@ struct BasicRecord {
   [[nodiscard]] static constexpr std::uint32_t payload(Word record) {
     return widen(static_cast<std::uint32_t>(kPayloadMask - (record & kPayloadMask)));
   }
+  /// The crossing in a record.
   [[nodiscard]] static constexpr DepthItem item(Word record) {
     return DepthItem(std::uint64_t{depth(record)} << 32 | payload(record));
   }
@@ -120,19 +123,25 @@ struct BasicRecord {
 /// [age:8 | nearness:24]: depth only, at most 255 layers a pixel. Equal depths are equal records,
 /// and both stay.
 struct Record32 : BasicRecord<std::uint32_t, 8, 0> {
+  /// For messages.
   static constexpr std::string_view kName = "Record32 [age:8|nearness:24]";
+  /// Advice where lists are too long.
   static constexpr std::string_view kDeeper = "use Record64Deep [age:10|nearness:24|payload:30]";
 };
 
 /// [age:8 | nearness:24 | payload:32]: at most 255 layers a pixel.
 struct Record64 : BasicRecord<std::uint64_t, 8, 32> {
+  /// For messages.
   static constexpr std::string_view kName = "Record64 [age:8|nearness:24|payload:32]";
+  /// Advice where lists are too long.
   static constexpr std::string_view kDeeper = "use Record64Deep [age:10|nearness:24|payload:30]";
 };
 
 /// [age:10 | nearness:24 | payload:30]: at most 1023 layers a pixel; triangles below 2^29.
 struct Record64Deep : BasicRecord<std::uint64_t, 10, 30> {
+  /// For messages.
   static constexpr std::string_view kName = "Record64Deep [age:10|nearness:24|payload:30]";
+  /// Advice where lists are too long.
   static constexpr std::string_view kDeeper = "use CountScanStore, whose lists may have any length";
 };
 

@@ -13,16 +13,17 @@ namespace strata {
 
 /// An edge that is not used equally often in both directions.
 struct UnbalancedEdge {
-  glm::dvec3 from{0.0}, to{0.0};  ///< in the direction of its first triangle
-  std::uint32_t element = 0;      ///< face element of that triangle in the file
-  std::uint32_t forward = 0;      ///< uses from -> to
-  std::uint32_t backward = 0;     ///< uses to -> from
+  glm::dvec3 from{0.0};        ///< world position where its first triangle begins it
+  glm::dvec3 to{0.0};          ///< world position where its first triangle ends it
+  std::uint32_t element = 0;   ///< face element of that triangle in the file
+  std::uint32_t forward = 0;   ///< uses from -> to
+  std::uint32_t backward = 0;  ///< uses to -> from
 };
 
 /// Facts about a mesh. Vertices are equal if their positions are (-0 equals +0), without tolerance.
 /// An edge joins two different positions.
 struct MeshDiagnosis {
-  std::uint64_t triangles = 0;
+  std::uint64_t triangles = 0;        ///< in the soup
   std::uint64_t vertices = 0;         ///< in the soup
   std::uint64_t welded_vertices = 0;  ///< different positions
   std::uint64_t components = 0;       ///< pieces connected through shared positions
@@ -35,7 +36,7 @@ struct MeshDiagnosis {
   std::uint64_t non_finite_faces =
       0;  ///< triangles with NaN or infinite corners (never from read_mesh)
 
-  std::uint64_t edges = 0;
+  std::uint64_t edges = 0;               ///< different ones
   std::uint64_t boundary_edges = 0;      ///< used once
   std::uint64_t non_manifold_edges = 0;  ///< used more than twice
   std::uint64_t misoriented_edges = 0;   ///< used an even number of times, but not balanced
@@ -60,6 +61,7 @@ struct MeshDiagnosis {
 [[nodiscard]] bool is_closed(std::span<const glm::dvec3> positions,
                              std::span<const glm::uvec3> triangles,
                              const Execution& execution = {});
+/// The same for whole numbers.
 [[nodiscard]] bool is_closed(std::span<const glm::ivec3> positions,
                              std::span<const glm::uvec3> triangles,
                              const Execution& execution = {});

@@ -12,11 +12,14 @@
 /// header that includes OpenMesh.
 namespace strata {
 
+/// Meshes of doubles, as soups have them.
 struct OpenMeshTraits : OpenMesh::DefaultTraits {
-  using Point = OpenMesh::Vec3d;
-  using Normal = OpenMesh::Vec3d;
+  using Point = OpenMesh::Vec3d;   ///< positions
+  using Normal = OpenMesh::Vec3d;  ///< normals
 };
+/// A mesh of triangles.
 using OpenMeshTriMesh = OpenMesh::TriMesh_ArrayKernelT<OpenMeshTraits>;
+/// A mesh of polygons.
 using OpenMeshPolyMesh = OpenMesh::PolyMesh_ArrayKernelT<OpenMeshTraits>;
 
 /// What to_openmesh had to do.
@@ -110,7 +113,9 @@ template <class Mesh>
 }
 
 // Compiled once, in strata::openmesh.
+/// @cond
 extern template OpenMeshTriMesh to_openmesh<OpenMeshTriMesh>(const TriangleSoup&, OpenMeshReport*);
 extern template TriangleSoup from_openmesh<OpenMeshTriMesh>(const OpenMeshTriMesh&);
+/// @endcond
 
 }  // namespace strata

@@ -29,11 +29,13 @@ struct Orientation {
   /// that part was reversed as a whole; else 0.
   double turned_open_volume = 0.0;
 
+  /// Whether anything was reversed or removed.
   [[nodiscard]] bool changed() const {
     return turned_parts + turned_triangles + double_faces > 0 || turned_open_volume != 0.0;
   }
 };
 
+/// Settings of orient_parts().
 struct OrientOptions {
   bool change =
       true;  ///< false: only diagnoses; Orientation::closed is then that of the mesh as it is

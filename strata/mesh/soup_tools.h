@@ -12,15 +12,17 @@ namespace strata {
 
 /// A box in world space; empty as made.
 struct Bounds {
-  glm::dvec3 low{std::numeric_limits<double>::infinity()};
-  glm::dvec3 high{-std::numeric_limits<double>::infinity()};
+  glm::dvec3 low{std::numeric_limits<double>::infinity()};    ///< least corner
+  glm::dvec3 high{-std::numeric_limits<double>::infinity()};  ///< largest corner
 
+  /// True if it holds no point.
   [[nodiscard]] bool empty() const { return !(low.x <= high.x); }
   /// Below 0 when it is empty.
   [[nodiscard]] double longest_side() const {
     const glm::dvec3 size = high - low;
     return std::max({size.x, size.y, size.z});
   }
+  /// Grows until it holds `point`.
   void include(const glm::dvec3& point) {
     low = glm::min(low, point);
     high = glm::max(high, point);
@@ -31,6 +33,7 @@ struct Bounds {
     low = glm::min(low, other.low);
     high = glm::max(high, other.high);
   }
+  /// Equal corners.
   friend bool operator==(const Bounds&, const Bounds&) = default;
 };
 

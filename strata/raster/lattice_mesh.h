@@ -15,6 +15,7 @@ namespace strata {
 
 /// Lattice steps along a voxel or pixel: positions are 24.8 fixed point.
 inline constexpr int kLatticeBits = 8;
+/// The same as a number: 256.
 inline constexpr int kLatticeSteps = 1 << kLatticeBits;
 /// Coordinates beyond this many lattice steps (2^20 voxels) are refused.
 inline constexpr std::int32_t kMaxLatticeCoordinate = 1 << 28;

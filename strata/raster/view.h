@@ -9,12 +9,13 @@
 
 namespace strata {
 
+/// How rays leave the eye: from one point, or in parallel.
 enum class Projection { kPerspective, kOrthographic };
 
 /// The camera of a picture, in OpenSCAD's terms.
 struct Camera {
-  Projection projection = Projection::kPerspective;
-  glm::dvec3 target{0.0};                ///< world point in the middle of the picture
+  Projection projection = Projection::kPerspective;  ///< perspective if not said otherwise
+  glm::dvec3 target{0.0};                            ///< world point in the middle of the picture
   glm::dvec3 rotation{55.0, 0.0, 25.0};  ///< $vpr: degrees; 0, 0, 0 looks down from +z, +y up
   double distance = 140.0;               ///< of the eye from the target, > 0
   double field_of_view = 22.5;           ///< degrees, of the picture's height; in (0, 180)
@@ -40,12 +41,13 @@ struct View {
   /// (u w, v w, depth w, w), w = 1 for an orthographic view and the distance along the view axis
   /// for a perspective one.
   glm::dmat4 image_from_world{1.0};
-  glm::dmat4 eye_from_world{1.0};
-  bool perspective = true;
-  /// Distances along the view axis at depth 0 and at the largest depth. Depth is linear in the
-  /// distance for an orthographic view, in its reciprocal for a perspective one.
-  /// Parts nearer than `near` are cut off there; the state of the ray at `near` is kept.
-  double near = 1.0, far = 2.0;
+  glm::dmat4 eye_from_world{1.0};  ///< as eye_from_world() of the camera
+  bool perspective = true;         ///< false: orthographic
+  /// Distance along the view axis at depth 0, in world units. Depth is linear in the distance for
+  /// an orthographic view, in its reciprocal for a perspective one. Parts nearer than `near` are
+  /// cut off there; the state of the ray at `near` is kept.
+  double near = 1.0;
+  double far = 2.0;  ///< distance along the view axis at the largest depth
 
   /// The box that the view was made for reaches behind or beside the eye, or nearer than `near`.
   bool cut_short = false;
@@ -72,7 +74,8 @@ Result<View> make_view(const Camera& camera, const glm::ivec2& size, const Bound
 
 /// How a pixel is divided into samples: `across` x `down`, as square as can be.
 struct SampleGrid {
-  int across = 1, down = 1;
+  int across = 1;  ///< samples in a row
+  int down = 1;    ///< samples in a column
 };
 /// @pre samples is 1, 2, 4, 8, 16, 32 or 64
 [[nodiscard]] SampleGrid sample_grid(int samples);

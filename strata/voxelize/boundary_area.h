@@ -12,6 +12,7 @@ namespace strata {
 /// Counts the faces between the voxels of a set and the rest, slab by slab.
 class BoundaryArea {
  public:
+  /// For slabs of `grid` whose intervals run along `axis`.
   BoundaryArea(const VoxelGrid& grid, Axis axis);
 
   /// Adds the rows of a slab. @pre slabs come in increasing v, without gaps. O(columns + intervals)

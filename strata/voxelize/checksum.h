@@ -19,10 +19,12 @@ namespace strata {
 /// whose sum along an interval is a difference of two prefix sums. Not safe against adversaries.
 class SetChecksum {
  public:
+  /// Of the empty set on `grid`.
   explicit SetChecksum(const VoxelGrid& grid);
   /// Adds the voxels of a slab; the voxels of different calls must be disjoint. O(intervals).
   /// @pre slab.grid() is the grid given above
   void add(const VoxelIntervals& slab, const Execution& execution = {});
+  /// The hash of all that was added.
   [[nodiscard]] std::uint64_t value() const;
 
  private:

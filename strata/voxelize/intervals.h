@@ -16,12 +16,13 @@ namespace strata {
 /// A run of solid voxels along a column, both ends inclusive, so that 16 bits serve the largest
 /// grid. [first:16 | last:16]
 struct Interval {
-  std::uint16_t first = 0;
-  std::uint16_t last = 0;
+  std::uint16_t first = 0;  ///< index of the first voxel
+  std::uint16_t last = 0;   ///< index of the last voxel
 
-  [[nodiscard]] int begin() const { return first; }
-  [[nodiscard]] int end() const { return last + 1; }  ///< one past the last voxel
-  [[nodiscard]] int length() const { return last - first + 1; }
+  [[nodiscard]] int begin() const { return first; }              ///< the first voxel
+  [[nodiscard]] int end() const { return last + 1; }             ///< one past the last voxel
+  [[nodiscard]] int length() const { return last - first + 1; }  ///< voxels, at least 1
+  /// Equal ends.
   friend bool operator==(const Interval&, const Interval&) = default;
 };
 
@@ -34,7 +35,8 @@ struct Interval {
 /// different labels.
 class VoxelIntervals {
  public:
-  static constexpr int kTileSide = 64;
+  static constexpr int kTileSide = 64;  ///< columns along a side of a tile
+  /// Columns of a tile.
   static constexpr std::size_t kTileColumns = std::size_t{kTileSide} * kTileSide;
 
   VoxelIntervals() = default;
@@ -43,13 +45,13 @@ class VoxelIntervals {
   /// All rows of the grid, empty.
   VoxelIntervals(const VoxelGrid& grid, Axis axis);
 
-  [[nodiscard]] const VoxelGrid& grid() const { return grid_; }
-  [[nodiscard]] Axis axis() const { return axis_; }
-  [[nodiscard]] int columns() const { return columns_; }  ///< voxels along u
-  [[nodiscard]] int v_begin() const { return v_begin_; }
-  [[nodiscard]] int v_end() const { return v_end_; }
-  [[nodiscard]] int tiles_u() const { return tiles_u_; }
-  [[nodiscard]] int tiles_v() const { return tiles_v_; }
+  [[nodiscard]] const VoxelGrid& grid() const { return grid_; }  ///< the whole grid
+  [[nodiscard]] Axis axis() const { return axis_; }              ///< of the intervals
+  [[nodiscard]] int columns() const { return columns_; }         ///< voxels along u
+  [[nodiscard]] int v_begin() const { return v_begin_; }         ///< first row
+  [[nodiscard]] int v_end() const { return v_end_; }             ///< one past the last row
+  [[nodiscard]] int tiles_u() const { return tiles_u_; }         ///< tiles along u
+  [[nodiscard]] int tiles_v() const { return tiles_v_; }         ///< tiles along v, of this slab
 
   /// The intervals of column (u, v). @pre 0 <= u < columns(), v_begin() <= v < v_end()
   [[nodiscard]] std::span<const Interval> column(int u, int v) const {
@@ -77,13 +79,15 @@ class VoxelIntervals {
   /// The whole of tile (tu, tv) at once, for loops that column() would slow down: offsets as given
   /// to set_tile (kTileColumns + 1 of them, or none for an empty tile) and the intervals.
   struct TileView {
-    std::span<const std::uint32_t> offsets;
-    std::span<const Interval> items;
-    std::span<const std::uint32_t> labels;  ///< one for each item, or none
+    std::span<const std::uint32_t> offsets;  ///< where the intervals of a column begin
+    std::span<const Interval> items;         ///< the intervals, column by column
+    std::span<const std::uint32_t> labels;   ///< one for each item, or none
+    /// The label of an interval; 1 if there are none.
     [[nodiscard]] std::uint32_t label(std::size_t item) const {
       return labels.empty() ? 1 : labels[item];
     }
   };
+  /// @pre 0 <= tu < tiles_u(), 0 <= tv < tiles_v(). Valid until the tile is set again.
   [[nodiscard]] TileView tile(int tu, int tv) const {
     const Tile& stored = tiles_[static_cast<std::size_t>(tv) * static_cast<std::size_t>(tiles_u_) +
                                 static_cast<std::size_t>(tu)];

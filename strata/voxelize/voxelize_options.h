@@ -32,18 +32,19 @@ enum class SurfaceKind {
   k6              ///< 6-separating: no path of face neighbours crosses it; the thinnest
 };
 
+/// Settings of voxelize().
 struct VoxelizeOptions {
-  InsideRule rule = InsideRule::kWinding;
-  Axis axis = Axis::kZ;  ///< of the rays and of the intervals returned
-  bool solid = true;     ///< voxels whose centre is inside
-  bool surface = false;  ///< voxels of the surface; with solid: the union
-  SurfaceKind surface_kind = SurfaceKind::kConservative;
-  OpenMode open = OpenMode::kVote;
+  InsideRule rule = InsideRule::kWinding;  ///< which winding numbers are inside
+  Axis axis = Axis::kZ;                    ///< of the rays and of the intervals returned
+  bool solid = true;                       ///< voxels whose centre is inside
+  bool surface = false;                    ///< voxels of the surface; with solid: the union
+  SurfaceKind surface_kind = SurfaceKind::kConservative;  ///< which voxels are the surface's
+  OpenMode open = OpenMode::kVote;  ///< what to do where the mesh is not closed
   /// Where the mesh is not closed, `open` decides what its voxels are. With a filter there is no
   /// check, since a tree's lists are closed.
   Closedness closedness = Closedness::kCheck;
-  StoreKind store = StoreKind::kAuto;
-  OffsetKind offsets = OffsetKind::kPlaneFirst;
+  StoreKind store = StoreKind::kAuto;            ///< where crossings wait to be sorted
+  OffsetKind offsets = OffsetKind::kPlaneFirst;  ///< of the HA-buffer
   /// With n > 1, labels give the filled fraction of voxels: the mesh is voxelized at n times the
   /// resolution, so that a voxel has n^3 samples, and its label is the number of solid samples, 1
   /// to n^3. The labels are exact and the same for every axis; intervals end where the label
@@ -64,19 +65,20 @@ struct VoxelizeOptions {
 
 /// Statistics of a voxelization.
 struct VoxelizeReport {
-  std::uint64_t solid_voxels = 0;  ///< with `statistics`
-  std::uint64_t intervals = 0;     ///< with `statistics`
-  std::uint64_t crossings = 0;     ///< fragments stored, along the axis asked for
-  std::uint64_t max_depth_complexity = 0;
+  std::uint64_t solid_voxels = 0;          ///< with `statistics`
+  std::uint64_t intervals = 0;             ///< with `statistics`
+  std::uint64_t crossings = 0;             ///< fragments stored, along the axis asked for
+  std::uint64_t max_depth_complexity = 0;  ///< the longest list
   /// Columns with n crossings, n = 0..; the last entry counts the rest. With `statistics`.
   std::array<std::uint64_t, 65> depth_histogram{};
   std::uint64_t unbalanced_columns = 0;  ///< columns entered and left unequally often: holes
   std::uint64_t negative_columns = 0;    ///< columns where the winding number falls below 0
   std::uint64_t rebuilt_tiles = 0;       ///< tiles built again with a larger table
   std::uint64_t checksum =
-      0;               ///< see set_checksum in strata/voxelize/checksum.h; with `statistics`
-  bool closed = true;  ///< found or assumed to be closed; false: `open` decided
-  double lists_ms = 0, intervals_ms = 0;  ///< mean time per thread of the two phases
+      0;                    ///< see set_checksum in strata/voxelize/checksum.h; with `statistics`
+  bool closed = true;       ///< found or assumed to be closed; false: `open` decided
+  double lists_ms = 0;      ///< mean time per thread until the lists are sorted
+  double intervals_ms = 0;  ///< mean time per thread from lists to intervals
 };
 
 }  // namespace strata

@@ -35,6 +35,7 @@ class Gpu {
   /// required, or for a stop. If none is required, a GPU that fails later leaves the rest to the
   /// CPU. @param execution  for the lists; its memory limit bounds the pixels done at once
   virtual Result<ListSource*> lists(StoreKind store, const Execution& execution = {}) = 0;
+  /// As lists(), for Preview::set_source().
   virtual Result<SurfaceSource*> surfaces() = 0;
 };
 

@@ -21,8 +21,8 @@ namespace strata::csg {
 
 /// The input files, and how they are read.
 struct SceneInput {
-  std::vector<std::string> files;  ///< meshes and scenes; "-": standard input
-  MeshReader reader = MeshReader::kOwn;
+  std::vector<std::string> files;        ///< meshes and scenes; "-": standard input
+  MeshReader reader = MeshReader::kOwn;  ///< of meshes
   /// Format of standard input if it is among the files, else of all files; kAuto: by name and
   /// content.
   MeshFormat format = MeshFormat::kAuto;
@@ -46,7 +46,7 @@ struct InputMessages {
 
 /// How a file is read: as a scene, or as a mesh of a format.
 struct InputKind {
-  bool is_scene = false;
+  bool is_scene = false;                  ///< .csg or .scad
   MeshFormat format = MeshFormat::kAuto;  ///< of a mesh; kAuto: by name and content
 };
 
@@ -55,8 +55,8 @@ struct InputKind {
 
 /// The facts about one input file after its faces were reversed where needed.
 struct InputFacts {
-  std::string path;
-  MeshReadStats stats;
+  std::string path;            ///< as it was given
+  MeshReadStats stats;         ///< of the reader
   bool closed = false;         ///< under the inside rule: every ray enters as often as it leaves
   bool turned_around = false;  ///< all of it was inside out and has been reversed
   Orientation orientation;     ///< which parts were reversed
@@ -64,10 +64,10 @@ struct InputFacts {
   InsideRule rule = InsideRule::kWinding;
   double area = 0.0;    ///< square world units
   double volume = 0.0;  ///< signed, after reversal; an open mesh: about the middle of its bounds
-  double longest_edge = 0.0;
-  Bounds bounds;
-  std::uint64_t zero_area_faces = 0;
-  std::uint64_t unbalanced_edges = 0;
+  double longest_edge = 0.0;           ///< of the triangles, world units
+  Bounds bounds;                       ///< of the triangles
+  std::uint64_t zero_area_faces = 0;   ///< triangles whose area is 0
+  std::uint64_t unbalanced_edges = 0;  ///< as MeshDiagnosis::unbalanced_edges
   std::string open;  ///< a sentence that says what is not closed; empty where all is
   /// True for a scene. Then `stats` has only format, bytes, vertices and triangles, and area,
   /// volume and zero_area_faces are not known.

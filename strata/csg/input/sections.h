@@ -10,8 +10,8 @@ namespace strata::csg {
 
 /// A section: points p with dot(normal, p) > offset are cut away.
 struct SectionPlane {
-  glm::dvec3 normal{0.0};  ///< of length 1
-  double offset = 0;
+  glm::dvec3 normal{0.0};    ///< of length 1
+  double offset = 0;         ///< world units from the origin, along the normal
   bool towards_eye = false;  ///< true: the side of the eye is cut away
 };
 

@@ -15,23 +15,27 @@ namespace strata::csg {
 
 /// All inputs as one soup, for voxels and depth lists.
 struct SolidInput {
-  TriangleSoup soup;
+  TriangleSoup soup;  ///< the triangles of all inputs
   /// For a tree: turns the lists of the soup, which holds all solids, into the lists of the result.
   /// For a scene or an expression, area and volume are not known, and the bounds may be larger than
   /// the result.
   std::shared_ptr<SolidLists> tree;
-  std::shared_ptr<const Tree> scene;  ///< the tree that `tree` was made from, without meshes
-  std::vector<InputFacts> files;
-  Bounds bounds;
+  std::shared_ptr<const Tree> scene;       ///< the tree that `tree` was made from, without meshes
+  std::vector<InputFacts> files;           ///< the facts of each input, in the order given
+  Bounds bounds;                           ///< of the soup
   bool closed = true;                      ///< all files are closed
   InsideRule rule = InsideRule::kWinding;  ///< of the soup; solids of a tree have their own
-  double area = 0.0, volume = 0.0, longest_edge = 0.0;
-  double read_ms = 0.0, diagnose_ms = 0.0;
+  double area = 0.0;                       ///< sum over the files, square world units
+  double volume = 0.0;                     ///< sum over the files, cubic world units
+  double longest_edge = 0.0;               ///< of all files, world units
+  double read_ms = 0.0;                    ///< time that reading took
+  double diagnose_ms = 0.0;                ///< time that inspection took
 
   /// Adds the facts of one more mesh, without its triangles.
   void add(InputFacts facts);
   /// Replaces the soup by a tree.
   void set_tree(Tree tree);
+  /// Whether one of the files is a scene.
   [[nodiscard]] bool has_scene() const;
   /// Clamps parts that do not fit the lattice of a grid; rays through the grid see no difference.
   /// @return kGeometry, kCancelled

@@ -23,7 +23,8 @@ struct Measures {
                           ///< interleaved half grids
   glm::dvec3 centre{0};   ///< centre of mass, world space
   /// Bounds in world space: of the crossings and of the solids' vertices that lie on the result.
-  glm::dvec3 low{0}, high{0};
+  glm::dvec3 low{0};
+  glm::dvec3 high{0};  ///< the other corner
   /// Bound: no side of the result is farther from `low` or `high`. 0 where vertices decide all
   /// sides.
   double bounds_error = 0;
@@ -33,6 +34,7 @@ struct Measures {
   bool empty = true;  ///< no ray met the result: it is empty or smaller than a voxel
 };
 
+/// Settings of measure().
 struct MeasureOptions {
   /// Voxels along each side of the result's box, 1 to 32768. None: 256, then twice as many up to
   /// 1024 while volume_error is more than a thousandth of the volume and the lists are not very

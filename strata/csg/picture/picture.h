@@ -18,36 +18,44 @@
 
 namespace strata::csg {
 
+/// Red, green, blue, alpha; colours are not multiplied by alpha.
 using Rgba = glm::vec<4, std::uint8_t>;
 
 /// An image of 8 bits a channel, rows from the top.
 struct Picture {
-  int width = 0, height = 0;
-  std::vector<Rgba> pixels;
+  int width = 0;             ///< pixels
+  int height = 0;            ///< pixels
+  std::vector<Rgba> pixels;  ///< width * height, row by row
 };
 
 /// Colours of a picture; the names and values are OpenSCAD's.
 struct ColourScheme {
-  std::string_view name;
-  glm::u8vec3 background, face, cut;
+  std::string_view name;   ///< such as "Cornfield"
+  glm::u8vec3 background;  ///< where no solid is
+  glm::u8vec3 face;        ///< of solids without a colour
+  glm::u8vec3 cut;         ///< of faces where a solid without a colour is cut away
 };
+/// All schemes.
 [[nodiscard]] std::span<const ColourScheme> colour_schemes();
 /// Null when there is none of that name (case does not matter).
 [[nodiscard]] const ColourScheme* find_colour_scheme(std::string_view name);
 
 /// A part of the tree that is also shown as a transparent ghost.
 struct Ghost {
-  Tree::NodeId node = Tree::kNone;
+  Tree::NodeId node = Tree::kNone;           ///< the subtree to show
   glm::vec4 colour{0.7f, 0.7f, 0.7f, 0.5f};  ///< red, green, blue, alpha in [0, 1]
 };
+/// The colour of `%` in OpenSCAD.
 inline constexpr glm::vec4 kBackgroundGhost{180 / 255.f, 180 / 255.f, 180 / 255.f, 128 / 255.f};
+/// The colour of `#` in OpenSCAD.
 inline constexpr glm::vec4 kHighlightGhost{255 / 255.f, 81 / 255.f, 81 / 255.f, 128 / 255.f};
 
+/// Settings of a shaded picture.
 struct PictureOptions {
   const ColourScheme* scheme = nullptr;  ///< null: Cornfield
   /// Samples a pixel: 1, 2, 4, 8, 16, 32 or 64, on a regular grid within it.
   int samples = 1;
-  bool transparent_background = false;
+  bool transparent_background = false;  ///< alpha is 0 where no solid is
   bool edges = false;  ///< dark lines where the faces of neighbouring pixels differ
 };
 
@@ -63,7 +71,9 @@ class Preview {
   explicit Preview(Tree tree, std::vector<Ghost> ghosts = {}, double relative_precision = 0.0,
                    const Execution& execution = {});
   ~Preview();
+  /// A moved-from preview may only be destroyed or assigned to.
   Preview(Preview&&) noexcept;
+  /// As the constructor.
   Preview& operator=(Preview&&) noexcept;
 
   /// The box around all drawn solids, which a camera should see. Cutters more than a thousand times
@@ -74,6 +84,7 @@ class Preview {
   /// ones. @return as make_view()
   [[nodiscard]] Result<View> view(const Camera& camera, const glm::ivec2& size,
                                   const Execution& execution = {}) const;
+  /// The tree, with its solids where they were moved to.
   [[nodiscard]] const Tree& tree() const;
 
   /// Lets `source`, such as a GPU, find the surfaces from now on, bit-identical. Borrowed; used by
@@ -86,6 +97,7 @@ class Preview {
   /// Moves a solid and redraws only the tiles it touches, in the view of the last draw().
   Result<const SurfaceImage*> move_solid(std::uint32_t solid, const glm::dmat4& world_from_mesh,
                                          const Execution& execution = {});
+  /// Statistics of the last draw() or move_solid().
   [[nodiscard]] const DrawReport& report() const;
 
   /// The shaded picture of `camera`. @return as draw()

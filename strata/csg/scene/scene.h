@@ -38,8 +38,8 @@ struct Scene {
   /// The node that pictures show in place of the root; empty: the root. It shows highlighted parts
   /// only as ghosts, and shows flat parts among solids, which the root leaves out, as slabs.
   std::vector<Tree::NodeId> shown;
-  std::vector<SceneWarning> warnings;
-  std::vector<std::string> notes;  ///< output of a program's echo() and the like, line by line
+  std::vector<SceneWarning> warnings;  ///< in the order of the file; at most a thousand of a kind
+  std::vector<std::string> notes;      ///< output of a program's echo() and the like, line by line
   /// The top level is flat: its outlines are slabs of thickness 1, z from -0.5 to 0.5.
   bool flat = false;
   /// How far numbers in the file may be off, relative to their size: 5e-6 for six printed digits.
@@ -50,6 +50,7 @@ struct Scene {
   std::vector<FileIdentity> files;
 };
 
+/// Settings of read_scene().
 struct ReadSceneOptions {
   /// Folder in which relative names of imported files are looked up; empty: the folder of the
   /// scene.

@@ -15,14 +15,16 @@ struct DrawReport {
 
 /// The visible surface of each pixel, row by row from the top.
 struct SurfaceImage {
-  static constexpr std::uint32_t kNone = 0xffffffffu;
-  static constexpr std::uint32_t kExit = 0x80000000u;
-  int width = 0, height = 0;
+  static constexpr std::uint32_t kNone = 0xffffffffu;  ///< depth of pixels without a solid
+  static constexpr std::uint32_t kExit = 0x80000000u;  ///< bit of `triangle`
+  int width = 0;                                       ///< pixels
+  int height = 0;                                      ///< pixels
   std::vector<std::uint32_t> depth;  ///< in steps of the view, View::distance(); kNone: nothing
   std::vector<std::uint32_t>
       solid;  ///< index into the tree's solids; undefined where no solid is visible
   std::vector<std::uint32_t> triangle;  ///< [exit:1 | triangle:31] of the solid's mesh; exit: a cut
                                         ///< face, where the ray leaves the solid
+  /// Makes room for a picture of that size; the content is undefined then.
   void resize(int columns, int rows) {
     width = columns, height = rows;
     const std::size_t pixels = static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);

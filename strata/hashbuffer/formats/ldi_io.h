@@ -8,6 +8,7 @@
 
 namespace strata {
 
+/// Settings of write_ldi_exr().
 struct LdiExrOptions {
   /// Every crossing as a point sample; default: solid intervals as volume samples.
   bool samples = false;
@@ -54,6 +55,7 @@ Result<void> write_ldi_exr(const std::string& path, const LayeredDepthImage& ima
 /// @return kInput naming the file and the row, kLimit, kUsage without OpenEXR, kCancelled
 Result<LayeredDepthImage> read_ldi_exr(const std::string& path, const Execution& execution = {});
 
+/// Settings of write_ldi_npz().
 struct LdiNpzOptions {
   bool compress = false;  ///< deflate the arrays (numpy.savez_compressed) instead of storing them
 };

@@ -43,6 +43,7 @@ class Store {
 
   /// Screen of the last begin().
   [[nodiscard]] std::uint32_t width() const { return width_; }
+  /// Its height.
   [[nodiscard]] std::uint32_t height() const { return height_; }
   /// Bytes on the GPU that the lists may take, 0: no limit. From the next begin() on.
   void limit_memory(std::uint64_t bytes) { memory_limit_ = bytes; }
@@ -57,6 +58,7 @@ class Store {
 
   /// Bands of rows to be read apart: for each, bind_for_reading() and dispatch over its rows.
   [[nodiscard]] virtual int bands() const = 0;
+  /// The rows of a band. @pre band < bands()
   [[nodiscard]] virtual PixelRows band_rows(int band) const = 0;
   /// GLSL text for reading, any stage with storage blocks. Bindings as for inserting. It defines
   ///
@@ -66,6 +68,7 @@ class Store {
   ///
   /// strata_next gives the list front to back; false at its end.
   [[nodiscard]] virtual StoreGlsl glsl_read() const = 0;
+  /// Binds what glsl_read() needs for a band.
   virtual void bind_for_reading(int band) const = 0;
 
   /// All lists (depth_limit 2^24, world_from_image left at identity). ErrorCode::kLimit without the
@@ -73,11 +76,13 @@ class Store {
   [[nodiscard]] Result<LayeredDepthImage> download();
 
  protected:
+  /// A store within the limits of a driver.
   explicit Store(const Limits& limits);
 
-  std::uint32_t width_ = 0, height_ = 0;
-  std::uint64_t memory_limit_ = 0;
-  std::uint64_t binding_bytes_;  ///< most bytes that a shader sees at one binding
+  std::uint32_t width_ = 0;         ///< pixels; set by begin()
+  std::uint32_t height_ = 0;        ///< pixels; set by begin()
+  std::uint64_t memory_limit_ = 0;  ///< see limit_memory()
+  std::uint64_t binding_bytes_;     ///< most bytes that a shader sees at one binding
 
  private:
   struct Reader;  ///< the programs and buffers of download()

@@ -29,8 +29,8 @@ enum class MeshReader {
 
 /// How to read.
 struct MeshReadOptions {
-  MeshFormat format = MeshFormat::kAuto;
-  MeshReader reader = MeshReader::kOwn;
+  MeshFormat format = MeshFormat::kAuto;  ///< of the file
+  MeshReader reader = MeshReader::kOwn;   ///< the library that reads it
   /// A face that would be dropped and counted (vertex out of range, not finite, fewer than three
   /// vertices) is ErrorCode::kInput instead.
   bool strict = false;
@@ -65,8 +65,8 @@ struct MeshReadStats {
 
 /// A mesh and how its reading went.
 struct MeshFile {
-  TriangleSoup soup;
-  MeshReadStats stats;
+  TriangleSoup soup;    ///< its triangles
+  MeshReadStats stats;  ///< counts and warnings
 };
 
 /// Reads the triangles of a mesh file. Polygons are cut by PolygonCutter: flat convex ones are fans

@@ -25,9 +25,11 @@ namespace strata::gl {
 struct StoreGlsl {
   std::string name;       ///< for error messages
   GlslSettings settings;  ///< extensions and defines that the text needs
-  std::string text;
+  std::string text;       ///< GLSL
 
+  /// The text as a part of a shader. Borrows this object.
   [[nodiscard]] GlslPiece piece() const { return {name, text}; }
+  /// Equal in all but the name.
   friend bool operator==(const StoreGlsl& a, const StoreGlsl& b) {
     return a.text == b.text && a.settings.extensions == b.settings.extensions &&
            a.settings.defines == b.settings.defines;
@@ -36,7 +38,8 @@ struct StoreGlsl {
 
 /// The rows [begin, end) of the screen.
 struct PixelRows {
-  std::uint32_t begin = 0, end = 0;
+  std::uint32_t begin = 0;  ///< first row
+  std::uint32_t end = 0;    ///< one past the last row
 };
 
 /// A source of fragments: produces the same fragments, in any order, each time it is asked.

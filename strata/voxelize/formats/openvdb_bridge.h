@@ -13,6 +13,7 @@
 /// only header that includes OpenVDB; files are written without it (write_voxels()).
 namespace strata {
 
+/// Settings of to_openvdb().
 struct OpenVdbOptions {
   /// Empty: `solid` for a BoolGrid or MaskGrid, `density` for a FloatGrid, `ids` for a FloatGrid of
   /// ids.
@@ -35,6 +36,7 @@ Result<typename Grid::Ptr> to_openvdb(const VoxelIntervals& set, const OpenVdbOp
                                       const Execution& execution = {});
 
 // Compiled once, in strata::openvdb.
+/// @cond
 extern template Result<openvdb::BoolGrid::Ptr> to_openvdb<openvdb::BoolGrid>(const VoxelIntervals&,
                                                                              const OpenVdbOptions&,
                                                                              const Execution&);
@@ -43,5 +45,6 @@ extern template Result<openvdb::MaskGrid::Ptr> to_openvdb<openvdb::MaskGrid>(con
                                                                              const Execution&);
 extern template Result<openvdb::FloatGrid::Ptr> to_openvdb<openvdb::FloatGrid>(
     const VoxelIntervals&, const OpenVdbOptions&, const Execution&);
+/// @endcond
 
 }  // namespace strata

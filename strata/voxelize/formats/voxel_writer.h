@@ -28,6 +28,7 @@ struct VoxelFormat {
 /// The formats this build can write.
 [[nodiscard]] const std::vector<VoxelFormat>& voxel_formats();
 
+/// Settings of open_voxel_writer().
 struct VoxelWriterOptions {
   /// .vdb: a float fog volume with this many samples per voxel. Labels are the number of solid
   /// samples of a voxel (see VoxelizeOptions::samples) and values the fraction; with 1, slabs
@@ -57,6 +58,7 @@ class VoxelWriter {
   virtual ~VoxelWriter() = default;
   /// Adds the voxels of one slab. Uses the threads of `execution`; same bytes for any number.
   virtual Result<void> add(const VoxelIntervals& slab, const Execution& execution) = 0;
+  /// Completes the file. Call it once, after the last slab. @return kOutput, kLimit, kCancelled
   virtual Result<void> finish(const Execution& execution) = 0;
 };
 
