@@ -118,11 +118,14 @@ void tell_orientation(const SceneInput& input, InputFacts& facts, double volume_
 }  // namespace
 
 std::string describe(const UnbalancedEdge& edge) {
+  const auto times = [](std::uint32_t count) {
+    return count == 1 ? std::string("once") : fmt::format("{} times", count);
+  };
   return fmt::format(
       "the edge from ({:.9g}, {:.9g}, {:.9g}) to ({:.9g}, {:.9g}, {:.9g}) of face {} "
-      "is used {} times in this direction and {} times in the other",
+      "is used {} in this direction and {} in the other",
       edge.from.x, edge.from.y, edge.from.z, edge.to.x, edge.to.y, edge.to.z, edge.element,
-      edge.forward, edge.backward);
+      times(edge.forward), times(edge.backward));
 }
 
 void warn_of_reading(const std::string& path, const MeshReadStats& stats,

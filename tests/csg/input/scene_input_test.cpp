@@ -182,5 +182,15 @@ TEST_F(SceneInputs, ANameTellsTheKindUnlessAFormatIsGiven) {
   EXPECT_EQ(kind_of("-", files).format, MeshFormat::kStl);
 }
 
+TEST(DescribedEdge, IsUsedOnceOrAFewTimes) {
+  const UnbalancedEdge once{{0, 0, 0}, {0, 0, 1}, 7, 1, 0};
+  EXPECT_EQ(describe(once),
+            "the edge from (0, 0, 0) to (0, 0, 1) of face 7 is used once in this direction and 0 "
+            "times in the other");
+  const UnbalancedEdge often{{0, 0, 0}, {0, 0, 1}, 7, 3, 1};
+  EXPECT_NE(describe(often).find("is used 3 times in this direction and once in the other"),
+            std::string::npos);
+}
+
 }  // namespace
 }  // namespace strata::csg
