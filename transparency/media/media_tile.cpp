@@ -21,6 +21,7 @@ double rayleigh(double cosine) { return 3.0 / (16.0 * std::numbers::pi) * (1.0 +
 
 MediaTile::MediaTile(const MediaFrame& frame)
     : frame_(frame),
+      distances_(frame.view),
       reports_(frame.table.solids.size()),
       solids_(frame.table.solids.size()),
       may_hold_eye_(frame.table.solids.size(), 0) {
@@ -48,54 +49,19 @@ Result<void> MediaTile::render(TileStream& stream, TileImage& image) {
   return {};
 }
 
-/// From the first crossing to the last one in front of the nearest opaque object.
-void MediaTile::walk(std::uint32_t pixel, int u, int v) {
-  const std::span<const DepthItem> list = lists_.list(pixel);
-  const PixelRay view_ray = frame_.rays.ray(u, v);
-  along_ = view_ray.length;
-  Ray ray;
-  ray.light = from(frame_.settings.ambient);
-  if (frame_.lit) {
-    const double cosine = glm::dot(view_ray.direction, frame_.to_light) / along_;
-    ray.light += from(frame_.settings.light.radiance) * splat(static_cast<float>(rayleigh(cosine)));
-  }
-  const DepthItem opaque = stream_->opaque(pixel);
-  if (!walk_back(list)) leave_out_unbalanced(list);
-  if (!frame_.eye_solids.empty()) begin_inside(view_ray, ray);
-  std::size_t i = 0;
-  for (; i < list.size() && !(opaque < list[i]); ++i) {
-    const std::uint32_t solid = crossed_[i];
-    if (solid != MediaTable::kNone || ray.sums.media() > 0 || !events_.empty()) {
-      const float distance = distance_of(list[i]);
-      pass_particles(distance, ray);
-      move_to(distance, ray);
-    }
-    if (solid == MediaTable::kNone || frame_.table.surface[solid] != 0) add_surface(list[i], ray);
-    if (solid != MediaTable::kNone) cross(solid, list[i].exit(), ray);
-  }
-  for (std::size_t k = i; k < list.size(); ++k) {
-    if (crossed_[k] != MediaTable::kNone) solids_[crossed_[k]].inside = 0;
-  }
-  if (opaque != TileFragments::kNothing) {
-    const float distance = distance_of(opaque);
-    pass_particles(distance, ray);
-    move_to(distance, ray);
-  } else {
-    pass_particles(std::numeric_limits<float>::infinity(), ray);
-    assert(ray.sums.vacuum());
-  }
-  finish(pixel, ray);
-}
-
 /// From the far end, where there is vacuum, to the near plane: how often is the ray inside of each
 /// solid there? @return whether it is inside of none
-bool MediaTile::walk_back(std::span<const DepthItem> list) {
+inline bool MediaTile::walk_back(std::span<const DepthItem> list) {
   ++pixels_;
-  crossed_.resize(std::max(crossed_.size(), list.size()));
+  if (crossed_.size() < list.size()) {
+    crossed_.resize(2 * list.size());
+    distance_.resize(2 * list.size());
+  }
   int inside = 0;
   for (std::size_t i = 0; i < list.size(); ++i) {
     const std::uint32_t solid = frame_.table.medium_of[stream_->object(list[i])];
     crossed_[i] = solid;
+    distance_[i] = distance_of(list[i]);
     if (solid == MediaTable::kNone) continue;
     SolidState& state = solids_[solid];
     const int before = state.inside;
@@ -166,7 +132,7 @@ void MediaTile::pass_particles(float until, Ray& ray) {
   events_ = events_.subspan(passed);
 }
 
-void MediaTile::cross(std::uint32_t solid, bool exit, Ray& ray) {
+inline void MediaTile::cross(std::uint32_t solid, bool exit, Ray& ray) {
   std::int32_t& inside = solids_[solid].inside;
   const bool before = inside != 0;
   inside += exit ? -1 : 1;
@@ -180,32 +146,37 @@ void MediaTile::cross(std::uint32_t solid, bool exit, Ray& ray) {
 }
 
 /// Through the media at hand, which scatter `glow` and let e^-depth through.
-void MediaTile::move_to(float distance, Ray& ray) const {
+inline void MediaTile::move_to(float distance, Ray& ray) {
   if (ray.sums.media() > 0 && distance > ray.at) {
     ray.depth += ray.extinction * splat(distance - ray.at);
-    const Float4 through = exp_minus(ray.depth);
-    ray.colour += ray.glow * (splat(ray.surfaces) * (ray.through - through));
-    ray.through = through;
+    parts_.push_back({ray.depth, ray.glow, splat(0.0f)});
   }
   ray.at = distance;
 }
 
 /// After the media at hand have changed.
-void MediaTile::change(Ray& ray) const {
+inline void MediaTile::change(Ray& ray) {
   ray.extinction = ray.sums.extinction();
   ray.glow = ray.sums.albedo() * ray.light;
 }
 
-void MediaTile::add_surface(DepthItem item, Ray& ray) {
+inline void MediaTile::add_surface(DepthItem item, const Ray& ray) {
   const glm::vec4& colour = stream_->shade(item);
-  ray.colour += splat(ray.surfaces) * ray.through * from(glm::vec3(colour));
-  ray.surfaces *= 1.0f - colour.a;
+  parts_.push_back({ray.depth, splat(0.0f), Float4{colour.r, colour.g, colour.b, colour.a}});
 }
 
 /// A picture keeps one transmittance: what the three differ by is applied to what lies behind.
-void MediaTile::finish(std::uint32_t pixel, const Ray& ray) {
-  const glm::vec3 through = to_vec3(splat(ray.surfaces) * ray.through);
-  const glm::vec3 colour = to_vec3(ray.colour);
+inline void MediaTile::finish(std::uint32_t pixel) {
+  for (Part& part : parts_) part.depth = exp_minus(part.depth);
+  Float4 gathered = splat(0.0f), media = splat(1.0f);
+  float surfaces = 1.0f;
+  for (const Part& part : parts_) {
+    gathered += splat(surfaces) * (part.glow * (media - part.depth));
+    media = part.depth;
+    gathered += splat(surfaces) * media * part.surface;
+    surfaces *= 1.0f - part.surface[3];
+  }
+  const glm::vec3 through = to_vec3(splat(surfaces) * media), colour = to_vec3(gathered);
   glm::vec4& out = image_->pixels[pixel];
   if (through.x == through.y && through.y == through.z) {
     out = glm::vec4(colour, through.x);
@@ -218,6 +189,45 @@ void MediaTile::finish(std::uint32_t pixel, const Ray& ray) {
   }
   const float mean = (through.x + through.y + through.z) / 3.0f;
   out = glm::vec4(colour + (through - mean) * glm::vec3(frame_.background), mean);
+}
+
+/// From the first crossing to the last one in front of the nearest opaque object.
+void MediaTile::walk(std::uint32_t pixel, int u, int v) {
+  const std::span<const DepthItem> list = lists_.list(pixel);
+  const PixelRay view_ray = frame_.rays.ray(u, v);
+  along_ = view_ray.length;
+  parts_.clear();
+  Ray ray;
+  ray.light = from(frame_.settings.ambient);
+  if (frame_.lit) {
+    const double cosine = glm::dot(view_ray.direction, frame_.to_light) / along_;
+    ray.light += from(frame_.settings.light.radiance) * splat(static_cast<float>(rayleigh(cosine)));
+  }
+  const DepthItem opaque = stream_->opaque(pixel);
+  if (!walk_back(list)) leave_out_unbalanced(list);
+  if (!frame_.eye_solids.empty()) begin_inside(view_ray, ray);
+  std::size_t i = 0;
+  for (; i < list.size() && !(opaque < list[i]); ++i) {
+    const std::uint32_t solid = crossed_[i];
+    if (solid != MediaTable::kNone || ray.sums.media() > 0 || !events_.empty()) {
+      if (!events_.empty()) pass_particles(distance_[i], ray);
+      move_to(distance_[i], ray);
+    }
+    if (solid == MediaTable::kNone || frame_.table.surface[solid] != 0) add_surface(list[i], ray);
+    if (solid != MediaTable::kNone) cross(solid, list[i].exit(), ray);
+  }
+  for (std::size_t k = i; k < list.size(); ++k) {
+    if (crossed_[k] != MediaTable::kNone) solids_[crossed_[k]].inside = 0;
+  }
+  if (opaque != TileFragments::kNothing) {
+    const float distance = distance_of(opaque);
+    pass_particles(distance, ray);
+    move_to(distance, ray);
+  } else {
+    pass_particles(std::numeric_limits<float>::infinity(), ray);
+    assert(ray.sums.vacuum());
+  }
+  finish(pixel);
 }
 
 }  // namespace strata::transparency

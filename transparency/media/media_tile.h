@@ -41,17 +41,21 @@ class MediaTile {
   [[nodiscard]] const std::vector<SolidReport>& reports() const { return reports_; }
 
  private:
-  /// The light that was gathered along a ray, and what of the light from behind comes through.
+  /// What a walk has reached.
   struct Ray {
-    Float4 colour = splat(0.0f);
-    Float4 depth = splat(0.0f);    ///< optical depth of the media
-    Float4 through = splat(1.0f);  ///< transmittance of the media
-    float surfaces = 1.0f;         ///< transmittance of the surfaces
-    float at = 0.0f;               ///< distance along the ray that the walk has reached
-    Float4 light = splat(0.0f);    ///< that media scatter to the eye
-    Float4 glow = splat(0.0f);     ///< of it, with the albedo of the media at hand
-    Float4 extinction = splat(0.0f);
+    Float4 depth = splat(0.0f);       ///< optical depth of the media so far
+    float at = 0.0f;                  ///< distance along the ray
+    Float4 light = splat(0.0f);       ///< that media scatter to the eye
+    Float4 glow = splat(0.0f);        ///< of it, with the albedo of the media at hand
+    Float4 extinction = splat(0.0f);  ///< of the media at hand
     MediaSums sums;
+  };
+  /// A part of a ray: a segment through media, then perhaps a surface. Parts are collected first,
+  /// so that the exponential functions of a ray do not wait for one another.
+  struct Part {
+    Float4 depth;    ///< optical depth from the eye to the end of the segment
+    Float4 glow;     ///< light and albedo
+    Float4 surface;  ///< premultiplied colour, opacity
   };
   struct SolidState {
     std::int32_t inside = 0;  ///< times that the ray has entered it more than it has left it
@@ -64,18 +68,21 @@ class MediaTile {
   void leave_out_unbalanced(std::span<const DepthItem> list);
   void pass_particles(float until, Ray& ray);
   void cross(std::uint32_t solid, bool exit, Ray& ray);
-  void move_to(float distance, Ray& ray) const;
-  void change(Ray& ray) const;
-  void add_surface(DepthItem item, Ray& ray);
-  void finish(std::uint32_t pixel, const Ray& ray);
+  void move_to(float distance, Ray& ray);
+  static void change(Ray& ray);
+  void add_surface(DepthItem item, const Ray& ray);
   [[nodiscard]] float distance_of(DepthItem item) const {
-    return static_cast<float>(frame_.view.distance(item.depth()) * along_);
+    return static_cast<float>(distances_(item.depth()) * along_);
   }
+  void finish(std::uint32_t pixel);
 
   const MediaFrame& frame_;
+  DepthDistances distances_;
+  std::vector<Part> parts_;  ///< of the ray
   std::vector<SolidReport> reports_;
   std::vector<SolidState> solids_;
   std::vector<std::uint32_t> crossed_;  ///< the solid of each item of a list, or kNone
+  std::vector<float> distance_;         ///< of each item, along the ray
   std::uint32_t pixels_ = 0;            ///< that were walked
   SortedTile lists_;
   ParticleBins::Tile particles_;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cmath>
+#include <cstdint>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/mat4x4.hpp>
@@ -17,6 +18,25 @@ struct PixelRay {
   double length = 1.0;  ///< of the direction: world units along the ray per unit of t
 
   [[nodiscard]] glm::dvec3 at(double t) const { return origin + direction * t; }
+};
+
+/// View::distance(), for many depths.
+class DepthDistances {
+ public:
+  explicit DepthDistances(const View& view)
+      : perspective_(view.perspective),
+        first_(view.perspective ? 1.0 / view.near : view.near),
+        step_((view.perspective ? 1.0 / view.far - 1.0 / view.near : view.far - view.near) /
+              kPictureDepthLimit) {}
+
+  [[nodiscard]] double operator()(std::uint32_t depth) const {
+    const double x = first_ + static_cast<double>(depth) * step_;
+    return perspective_ ? 1.0 / x : x;
+  }
+
+ private:
+  bool perspective_;
+  double first_, step_;
 };
 
 /// The rays of a view.
