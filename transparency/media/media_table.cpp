@@ -6,14 +6,13 @@
 namespace strata::transparency {
 namespace {
 
-constexpr float kMostExtinction = 1e6f;
 constexpr const char* kChannels[] = {"red", "green", "blue"};
 
 /// "what: the red part of its extinction must be 0 to 1, got 2".
 Result<void> check_part(std::string_view what, std::string_view which, const glm::vec3& value,
-                        float most) {
+                        double most) {
   for (int c = 0; c < 3; ++c) {
-    if (value[c] >= 0.0f && value[c] <= most) continue;
+    if (value[c] >= 0.0f && static_cast<double>(value[c]) <= most) continue;
     return fail(ErrorCode::kUsage, "{}: the {} part of the {} must be 0 to {}, got {}", what,
                 kChannels[c], which, most, value[c]);
   }
@@ -23,7 +22,7 @@ Result<void> check_part(std::string_view what, std::string_view which, const glm
 Result<void> check_medium(std::string_view what, const glm::vec3& extinction,
                           const glm::vec3& albedo) {
   if (auto good = check_part(what, "extinction", extinction, kMostExtinction); !good) return good;
-  return check_part(what, "albedo", albedo, 1.0f);
+  return check_part(what, "albedo", albedo, 1.0);
 }
 
 bool finite(const glm::dvec3& v) {
@@ -87,7 +86,7 @@ Result<void> check_media(const MediaSettings& settings) {
     if (auto good = check_medium(what, medium.extinction, medium.albedo); !good) return good;
     if (!medium.surface_colour) continue;
     const glm::vec4& colour = *medium.surface_colour;
-    if (auto good = check_part(what, "surface", glm::vec3(colour), 1.0f); !good) return good;
+    if (auto good = check_part(what, "surface", glm::vec3(colour), 1.0); !good) return good;
     if (!(colour.a >= 0.0f && colour.a <= 1.0f)) {
       return fail(ErrorCode::kUsage, "{}: the opacity of the surface must be 0 to 1, got {}", what,
                   colour.a);

@@ -21,8 +21,11 @@
 
 namespace strata::transparency {
 
+/// The largest extinction, and the brightest light.
+inline constexpr double kMostExtinction = 1e6;
+
 struct Medium {
-  glm::vec3 extinction{0.0f};  ///< red, green, blue; per world unit; 0 to 1e6
+  glm::vec3 extinction{0.0f};  ///< red, green, blue; per world unit; 0 to kMostExtinction
   glm::vec3 albedo{1.0f};      ///< red, green, blue; in [0, 1]
   /// The solid's own surface is drawn, too, as without a medium.
   bool surface = false;
