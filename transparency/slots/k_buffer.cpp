@@ -149,7 +149,8 @@ struct Order {
   std::uint64_t comparisons = 0;  ///< that it took
 };
 
-Result<std::shared_ptr<const void>> prepare(const FrameInfo& frame, const Settings&) {
+Result<std::shared_ptr<const void>> prepare(const FrameInfo& frame, const Settings&,
+                                            const Execution&) {
   auto order = std::make_shared<Order>();
   if (frame.triangles != nullptr) {
     order->ranks = ranks_of(triangle_distances(frame).centroid, order->comparisons);

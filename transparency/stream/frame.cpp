@@ -154,6 +154,7 @@ void Costs::add(const Costs& other) {
   lost += other.lost;
   merged += other.merged;
   comparisons += other.comparisons;
+  queries += other.queries;
   formula_bytes += other.formula_bytes;
   allocated_bytes += other.allocated_bytes;
 }
@@ -205,8 +206,8 @@ std::vector<glm::u8vec4> to_bytes(const Image& image) {
 
 FrameInfo frame_info(const FragmentSource& source, const FrameOptions& options) {
   const SampleGrid grid = sample_grid(options.samples);
-  return {source.size(),    grid.across,      grid.down,
-          source.colours(), source.objects(), source.triangles()};
+  return {source.size(),    grid.across,        grid.down, source.colours(),
+          source.objects(), source.triangles(), &source};
 }
 
 Result<Rendering> render_tiles(const FragmentSource& source, const FrameOptions& options,
@@ -316,7 +317,7 @@ Result<Rendering> Frame::render(const Technique& technique, const Settings& sett
   const FrameInfo info = frame_info(*source_, options_);
   std::shared_ptr<const void> prepared;
   if (technique.prepare != nullptr) {
-    auto made = technique.prepare(info, *checked);
+    auto made = technique.prepare(info, *checked, execution);
     if (!made) return tl::unexpected(made.error());
     prepared = std::move(*made);
   }

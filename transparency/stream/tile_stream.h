@@ -58,6 +58,7 @@ struct FrameInfo {
   std::span<const glm::vec4> colours;
   std::span<const std::uint32_t> objects;  ///< of each triangle; empty: all are of object 0
   const FrameTriangles* triangles = nullptr;
+  const FragmentSource* source = nullptr;  ///< for what is prepared before the first tile
 };
 
 /// The fragments of a tile, to be replayed, with the costs that this has.

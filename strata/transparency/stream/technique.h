@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "strata/core/execution.h"
 #include "strata/core/result.h"
 
 // What a technique of order-independent transparency is. WORDS:
@@ -57,6 +58,7 @@ struct Costs {
   std::uint64_t lost = 0;         ///< fragments that do not contribute though they are seen
   std::uint64_t merged = 0;       ///< fragments that were merged with others
   std::uint64_t comparisons = 0;  ///< of depths
+  std::uint64_t queries = 0;      ///< occlusion queries that find an order of objects
   std::uint64_t most_layers = 0;  ///< fragments of the deepest pixel
   /// Bytes of the whole picture by the formula of the technique's paper.
   std::uint64_t formula_bytes = 0;
@@ -88,8 +90,8 @@ struct Technique {
   std::string_view fails = {};     ///< where its picture is wrong, or what it cannot do
   bool needs_triangles = false;    ///< a stream of bare fragments is not enough
   /// Work that is done once a frame, such as an order of the triangles; may be null.
-  Result<std::shared_ptr<const void>> (*prepare)(const FrameInfo& frame,
-                                                 const Settings& settings) = nullptr;
+  Result<std::shared_ptr<const void>> (*prepare)(const FrameInfo& frame, const Settings& settings,
+                                                 const Execution& execution) = nullptr;
   /// Makes the renderer of one thread. @param prepared  what `prepare` gave
   Result<TileRenderer> (*make)(const FrameInfo& frame, const Settings& settings,
                                const std::shared_ptr<const void>& prepared) = nullptr;
