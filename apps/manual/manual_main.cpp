@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
+#include "apps/commands/command_words.h"
 #include "apps/manual/program_text.h"
-#include "apps/strata/command_words.h"
 #include "apps/view/view_options.h"
 #include "strata/csg/picture/picture.h"
 #include "strata/voxelize/formats/voxel_writer.h"

@@ -1,16 +1,16 @@
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 #include <optional>
 #include <utility>
 
+#include "apps/commands/file_uses.h"
 #include "apps/session/file_conflicts.h"
 #include "apps/session/session.h"
 #include "apps/strata/allocation_failures.h"
-#include "apps/strata/commands.h"
 #include "apps/strata/csg_report.h"
-#include "apps/strata/file_uses.h"
 #include "apps/strata/library_session.h"
+#include "apps/strata/run_commands.h"
+#include "apps/strata/scene_camera.h"
 #include "csg/measure/result_bounds.h"
 #include "strata/csg/input/scene_input.h"
 #include "strata/csg/picture/picture.h"
@@ -164,7 +164,6 @@ class CsgRun {
 
  private:
   Result<void> load();
-  void take_scene_view();
   void render_alone();
   Result<void> place_camera();
   Result<void> print_measures();
@@ -217,24 +216,6 @@ Result<void> CsgRun::load() {
   return {};
 }
 
-/// Where the camera stands before it is fitted: as the command says, else as the scene does.
-void CsgRun::take_scene_view() {
-  camera() = command_.camera;
-  if (!command_.default_camera || !scene_.view) return;
-  const csg::SceneView& view = *scene_.view;
-  camera().target = view.target.value_or(camera().target);
-  camera().rotation = view.rotation.value_or(camera().rotation);
-  camera().distance = view.distance.value_or(camera().distance);
-  camera().field_of_view = view.field_of_view.value_or(camera().field_of_view);
-  if (command_.asked_view) {
-    session_.warn("ignored",
-                  fmt::format("{}: the file sets $vpr, $vpt, $vpd or $vpf, so --view-all "
-                              "and --auto-center have no effect",
-                              command_.input.files.front()));
-  }
-  command_.default_camera = command_.view_all = command_.auto_centre = false;
-}
-
 /// --render
 void CsgRun::render_alone() {
   forget_looks(scene_);
@@ -244,31 +225,19 @@ void CsgRun::render_alone() {
   flat_scheme_.face = kFlatFace;
   look_.scheme = &flat_scheme_;
   if (!command_.default_camera) return;
-  camera().rotation = glm::dvec3(0.0);
-  camera().projection = Projection::kOrthographic;
+  command_.camera.rotation = glm::dvec3(0.0);
+  command_.camera.projection = Projection::kOrthographic;
 }
 
 Result<void> CsgRun::place_camera() {
-  take_scene_view();
+  take_scene_view(scene_, session_, command_);
   if (auto strict = session_.check_strict(); !strict) return strict;
   if (command_.render) render_alone();
-  if (command_.auto_centre || command_.view_all) {
-    auto visible = csg::visible_box(scene_, session_.execution("measuring"));
-    if (!visible) return tl::unexpected(visible.error());
-    box_ = *visible;
-    if (from_above_ && !box_.empty())
-      box_.low.z = box_.high.z = 0.0;  // an outline has no thickness
-  }
-  if (command_.auto_centre) centre_camera(camera(), box_);
-  if (command_.view_all) {
-    fit_camera(camera(), box_, static_cast<double>(command_.size.x) / command_.size.y);
-    if (!(camera().distance > 0)) camera().distance = Camera{}.distance;  // nothing to fit
-  }
-  if (std::isfinite(camera().distance)) return {};
-  return fail(ErrorCode::kGeometry,
-              "the scene reaches from ({:.6g}, {:.6g}, {:.6g}) to ({:.6g}, {:.6g}, {:.6g}); "
-              "these coordinates are too large for a picture",
-              box_.low.x, box_.low.y, box_.low.z, box_.high.x, box_.high.y, box_.high.z);
+  auto placed = fitted_camera(command_, scene_, from_above_, session_);
+  if (!placed) return tl::unexpected(placed.error());
+  camera() = placed->camera;
+  box_ = placed->box;
+  return {};
 }
 
 /// The report of a run that makes no picture.

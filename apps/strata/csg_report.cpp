@@ -47,6 +47,8 @@ void write_scene(JsonWriter& json, const CsgOutcome& outcome) {
   json.end_object();
 }
 
+}  // namespace
+
 void write_camera(JsonWriter& json, const Camera& camera) {
   json.key("camera").begin_object();
   json.member("projection",
@@ -57,6 +59,8 @@ void write_camera(JsonWriter& json, const Camera& camera) {
   json.member("field_of_view", camera.field_of_view);
   json.end_object();
 }
+
+namespace {
 
 void write_picture(JsonWriter& json, const CsgCommand& command, const csg::DrawReport& drawn) {
   json.key("picture").begin_object();

@@ -5,8 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "apps/commands/commands.h"
+#include "apps/session/json_writer.h"
 #include "apps/session/session.h"
-#include "apps/strata/commands.h"
 #include "strata/csg/measure/measure.h"
 #include "strata/csg/picture/picture.h"
 
@@ -26,6 +27,9 @@ struct CsgOutcome {
 
 /// The colour that stands for a solid in the picture of --ids: never black, no two alike.
 [[nodiscard]] csg::Rgba colour_of_solid(std::uint32_t solid);
+
+/// The member "camera" of a report.
+void write_camera(JsonWriter& json, const Camera& camera);
 
 /// For people: a line a topic.
 [[nodiscard]] std::string csg_text(const CsgCommand& command, const CsgOutcome& outcome);

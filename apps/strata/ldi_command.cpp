@@ -3,8 +3,8 @@
 
 #include "apps/session/option_values.h"
 #include "apps/session/session.h"
-#include "apps/strata/commands.h"
 #include "apps/strata/library_session.h"
+#include "apps/strata/run_commands.h"
 #include "strata/csg/input/solid_input.h"
 #include "strata/hashbuffer/build_ldi.h"
 #include "strata/hashbuffer/formats/ldi_io.h"

@@ -2,8 +2,8 @@
 
 #include <memory>
 
+#include "apps/commands/commands.h"
 #include "apps/session/session.h"
-#include "apps/strata/commands.h"
 #include "strata/core/result.h"
 #include "strata/csg/gl/gpu.h"
 #include "strata/csg/input/mesh_input.h"

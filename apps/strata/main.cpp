@@ -14,11 +14,11 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include "apps/commands/file_uses.h"
 #include "apps/session/file_conflicts.h"
 #include "apps/session/session.h"
 #include "apps/strata/allocation_failures.h"
-#include "apps/strata/commands.h"
-#include "apps/strata/file_uses.h"
+#include "apps/strata/run_commands.h"
 #include "core/atomic_file.h"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
@@ -75,6 +75,9 @@ Result<void> run_command(const LdiCommand& command, Session& session) {
 }
 Result<void> run_command(const CsgCommand& command, Session& session) {
   return run_csg(command, session);
+}
+Result<void> run_command(const OitCommand& command, Session& session) {
+  return run_oit(command, session);
 }
 
 template <class AnyCommand>
@@ -135,6 +138,8 @@ int strata_main(int argc, char** argv) {
     result = run(*ldi, session);
   } else if (const auto* csg = std::get_if<CsgCommand>(&command)) {
     result = run(*csg, session);
+  } else if (const auto* oit = std::get_if<OitCommand>(&command)) {
+    result = run(*oit, session);
   }
   session.end_progress();
   const int code = exit_code(result, session);

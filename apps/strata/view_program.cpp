@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/strata/commands.h"
+#include "apps/strata/run_commands.h"
 
 namespace strata::apps {
 

@@ -7,11 +7,11 @@
 #include <memory>
 #include <utility>
 
+#include "apps/commands/choice_words.h"
 #include "apps/session/session.h"
 #include "apps/strata/allocation_failures.h"
-#include "apps/strata/choice_words.h"
-#include "apps/strata/commands.h"
 #include "apps/strata/library_session.h"
+#include "apps/strata/run_commands.h"
 #include "apps/strata/voxelize_report.h"
 #include "strata/csg/input/solid_input.h"
 #include "strata/csg/picture/picture.h"

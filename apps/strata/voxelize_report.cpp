@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <numeric>
 
+#include "apps/commands/choice_words.h"
 #include "apps/session/process_memory.h"
 #include "apps/session/report.h"
-#include "apps/strata/choice_words.h"
 #include "core/printable.h"
 
 namespace strata::apps {

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "apps/commands/commands.h"
 #include "apps/session/session.h"
-#include "apps/strata/commands.h"
 #include "strata/core/grid.h"
 #include "strata/csg/input/solid_input.h"
 #include "strata/voxelize/formats/memory_estimate.h"

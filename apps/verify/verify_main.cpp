@@ -15,11 +15,11 @@
 #include <utility>
 #include <vector>
 
+#include "apps/commands/file_uses.h"
 #include "apps/session/file_conflicts.h"
 #include "apps/session/help.h"
 #include "apps/session/json_writer.h"
 #include "apps/session/session.h"
-#include "apps/strata/file_uses.h"
 #include "apps/strata/library_session.h"
 #include "apps/verify/comparison.h"
 #include "apps/verify/verify_options.h"

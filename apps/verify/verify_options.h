@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "apps/strata/commands.h"
+#include "apps/commands/commands.h"
 #include "apps/verify/comparison.h"
 
 namespace CLI {

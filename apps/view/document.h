@@ -9,7 +9,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "apps/strata/commands.h"
+#include "apps/commands/commands.h"
 #include "strata/core/execution.h"
 #include "strata/core/result.h"
 #include "strata/csg/picture/picture.h"

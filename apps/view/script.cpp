@@ -10,8 +10,8 @@
 #include <iterator>
 #include <optional>
 
+#include "apps/commands/csg_options.h"
 #include "apps/session/option_values.h"
-#include "apps/strata/csg_options.h"
 #include "apps/view/camera_control.h"
 #include "mesh/formats/text_scanner.h"
 #include "strata/csg/picture/picture.h"

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "apps/commands/csg_options.h"
 #include "apps/session/json_writer.h"
-#include "apps/strata/csg_options.h"
 
 namespace strata::view {
 namespace {

@@ -9,13 +9,13 @@
 #include <algorithm>
 #include <utility>
 
+#include "apps/commands/choice_words.h"
+#include "apps/commands/csg_options.h"
+#include "apps/commands/file_uses.h"
+#include "apps/commands/scene_options.h"
 #include "apps/session/file_conflicts.h"
 #include "apps/session/help.h"
 #include "apps/session/option_values.h"
-#include "apps/strata/choice_words.h"
-#include "apps/strata/csg_options.h"
-#include "apps/strata/file_uses.h"
-#include "apps/strata/scene_options.h"
 #include "apps/view/script.h"
 #include "apps/view/viewer.h"
 

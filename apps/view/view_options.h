@@ -7,7 +7,7 @@
 #include <variant>
 #include <vector>
 
-#include "apps/strata/commands.h"
+#include "apps/commands/commands.h"
 #include "apps/view/renderer.h"
 #include "apps/view/script.h"
 

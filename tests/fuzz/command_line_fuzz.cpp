@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "apps/strata/commands.h"
+#include "apps/commands/commands.h"
 #include "tests/fuzz/mesh_fuzzing.h"
 
 namespace strata::apps {

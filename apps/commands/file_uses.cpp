@@ -1,8 +1,10 @@
-#include "apps/strata/file_uses.h"
+#include "apps/commands/file_uses.h"
 
 #include <algorithm>
 #include <initializer_list>
 #include <iterator>
+
+#include "apps/commands/oit_options.h"
 
 namespace strata::apps {
 namespace {
@@ -43,6 +45,19 @@ std::vector<FileUse> outputs_of(const CsgCommand& command) {
                   {"--ids", command.ids},
                   {"--depth", command.depth},
                   {"--json", command.json.value_or("")}});
+}
+
+std::vector<FileUse> outputs_of(const OitCommand& command) {
+  std::vector<FileUse> uses = outputs({{"--json", command.json.value_or("")}});
+  if (writes_folder(command)) {
+    uses.push_back({"-o", command.output});
+    return uses;
+  }
+  for (const OitChoice& choice : command.choices) {
+    const std::string picture = picture_of(command, choice);
+    if (!picture.empty()) uses.push_back({"-o", picture});
+  }
+  return uses;
 }
 
 }  // namespace strata::apps

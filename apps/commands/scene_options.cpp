@@ -1,4 +1,4 @@
-#include "apps/strata/scene_options.h"
+#include "apps/commands/scene_options.h"
 
 #include <CLI/App.hpp>
 #include <algorithm>

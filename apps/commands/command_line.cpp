@@ -7,11 +7,11 @@
 #include <array>
 #include <filesystem>
 
+#include "apps/commands/choice_words.h"
+#include "apps/commands/command_words.h"
+#include "apps/commands/scene_options.h"
 #include "apps/session/help.h"
 #include "apps/session/option_values.h"
-#include "apps/strata/choice_words.h"
-#include "apps/strata/command_words.h"
-#include "apps/strata/scene_options.h"
 #include "core/printable.h"
 #include "strata/csg/input/scene_input.h"
 
@@ -27,6 +27,7 @@ constexpr const char* kTopHelp = R"(strata: exact voxels, depth lists and pictur
   strata ldi knot.obj -r 512 -o knot.exr           depth lists as a deep image
   strata csg plate.csg -o plate.png                a picture of a Boolean tree
   strata part.scad -o part.png                     a picture, without naming the command
+  strata oit knot.obj --opacity 0.4 -o knot.png    a transparent picture
   strata view plate.scad --watch                   a window that shows the scene
 )";
 
@@ -248,6 +249,8 @@ bool define_command(std::string_view name, CLI::App& app, Words& words) {
     define_ldi(app, words);
   } else if (name == "csg") {
     define_csg(app, words);
+  } else if (name == "oit") {
+    define_oit(app, words);
   } else {
     return false;
   }
@@ -533,6 +536,7 @@ Command parse_command_line(int argc, const char* const* argv) {
   if (name == "info") command = info_command(words, reader);
   if (name == "ldi") command = ldi_command(words, reader);
   if (name == "csg") command = csg_command(words, reader);
+  if (name == "oit") command = oit_command(words, reader);
   if (reader.error()) return usage_error(name, reader.error()->message);
   return command;
 }

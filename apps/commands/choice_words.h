@@ -5,7 +5,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "apps/strata/commands.h"
+#include "apps/commands/commands.h"
 
 // The words that command lines and reports have for choices, for parse_choice() and word_of().
 

@@ -2,11 +2,11 @@
 
 #include <CLI/App.hpp>
 
+#include "apps/commands/choice_words.h"
+#include "apps/commands/command_words.h"
+#include "apps/commands/scene_options.h"
 #include "apps/session/help.h"
 #include "apps/session/option_values.h"
-#include "apps/strata/choice_words.h"
-#include "apps/strata/command_words.h"
-#include "apps/strata/scene_options.h"
 
 namespace strata::apps {
 namespace {
@@ -30,7 +30,9 @@ and --render are OpenSCAD's as well.
 
 using Group = const char*;
 
-void define_input(CLI::App& app, Words& words) {
+}  // namespace
+
+void define_picture_input(CLI::App& app, Words& words) {
   const Group input = "Input";
   app.add_option("INPUT", words.files,
                  "Scenes (.csg .scad) and meshes (.obj .stl .ply .off); - reads standard input")
@@ -54,6 +56,47 @@ void define_input(CLI::App& app, Words& words) {
                "Do not reverse meshes that are inside out")
       ->group(input);
 }
+
+void define_picture_camera(CLI::App& app, CsgWords& csg) {
+  const Group camera = "Camera (default: OpenSCAD's direction, the whole scene in view)";
+  const auto option = [&](const char* names, std::string& word, const char* what,
+                          const char* value) {
+    app.add_option(names, word, what)->type_name(value)->group(camera);
+  };
+  option("--size,--imgsize", csg.size, "Width and height in pixels (default: 512,512)", "W,H");
+  option("--camera", csg.camera,
+         "Target x,y,z, rotation rx,ry,rz in degrees and distance; or eye x,y,z and target x,y,z",
+         "NUMBERS");
+  app.add_flag("--view-all,--viewall", csg.view_all, "Move back until everything is visible")
+      ->group(camera);
+  app.add_flag("--auto-center,--autocenter", csg.auto_centre, "Look at the centre of the scene")
+      ->group(camera);
+  option("--projection", csg.projection, "Perspective or orthographic (default: p)", "p|o");
+}
+
+void define_picture_quality(CLI::App& app, CsgWords& csg) {
+  app.add_option("--colorscheme", csg.scheme,
+                 "One of OpenSCAD's colour schemes (default: Cornfield)")
+      ->type_name("SCHEME")
+      ->group(kLookGroup);
+  app.add_option("--samples", csg.samples, "Samples per pixel (default: 1)")
+      ->type_name("1|2|4|8|16|32|64")
+      ->group(kLookGroup);
+}
+
+void define_picture_cuts(CLI::App& app, CsgWords& csg) {
+  app.add_flag("--transparent", csg.transparent, "Leave the background transparent")
+      ->group(kLookGroup);
+  app.add_option("--cut", csg.cuts,
+                 "Section plane: x=5 removes the half towards the camera, z<10 keeps z below 10, "
+                 "nx,ny,nz,d keeps nx*x + ny*y + nz*z below d; may be repeated")
+      ->type_name("PLANE")
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
+      ->group(kLookGroup);
+}
+
+namespace {
 
 /// Those that openscad has, too, and that are not among the others.
 void define_openscad(CLI::App& app, CsgWords& csg) {
@@ -84,26 +127,12 @@ void define_openscad(CLI::App& app, CsgWords& csg) {
 
 void define_look(CLI::App& app, Words& words) {
   CsgWords& csg = words.csg;
-  const Group look = "Appearance";
-  app.add_option("--colorscheme", csg.scheme,
-                 "One of OpenSCAD's colour schemes (default: Cornfield)")
-      ->type_name("SCHEME")
-      ->group(look);
-  app.add_option("--samples", csg.samples, "Samples per pixel (default: 1)")
-      ->type_name("1|2|4|8|16|32|64")
-      ->group(look);
+  define_picture_quality(app, csg);
   app.add_flag("--render{-}", csg.render,
                "Draw the result alone: no ghosts, no colours, flat scenes from above")
-      ->group(look);
-  app.add_flag("--edges", csg.edges, "Draw dark lines along the edges of faces")->group(look);
-  app.add_flag("--transparent", csg.transparent, "Leave the background transparent")->group(look);
-  app.add_option("--cut", csg.cuts,
-                 "Section plane: x=5 removes the half towards the camera, z<10 keeps z below 10, "
-                 "nx,ny,nz,d keeps nx*x + ny*y + nz*z below d; may be repeated")
-      ->type_name("PLANE")
-      ->expected(1)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
-      ->group(look);
+      ->group(kLookGroup);
+  app.add_flag("--edges", csg.edges, "Draw dark lines along the edges of faces")->group(kLookGroup);
+  define_picture_cuts(app, csg);
 }
 
 }  // namespace
@@ -111,7 +140,7 @@ void define_look(CLI::App& app, Words& words) {
 void define_csg(CLI::App& app, Words& words) {
   app.description(kCsgExamples);
   CsgWords& csg = words.csg;
-  define_input(app, words);
+  define_picture_input(app, words);
   const auto option = [&app](const char* names, std::string& word, const char* what,
                              const std::string& value, Group group) {
     app.add_option(names, word, what)->type_name(value)->group(group);
@@ -129,32 +158,26 @@ void define_csg(CLI::App& app, Words& words) {
          "Voxels along each side of the box that is measured, 1 to 32768 (default: 256, and up to "
          "1024 where the error of the volume is large)",
          "N", output);
-  const Group camera = "Camera (default: OpenSCAD's direction, the whole scene in view)";
-  option("--size,--imgsize", csg.size, "Width and height in pixels (default: 512,512)", "W,H",
-         camera);
-  option("--camera", csg.camera,
-         "Target x,y,z, rotation rx,ry,rz in degrees and distance; or eye x,y,z and target x,y,z",
-         "NUMBERS", camera);
-  app.add_flag("--view-all,--viewall", csg.view_all, "Move back until everything is visible")
-      ->group(camera);
-  app.add_flag("--auto-center,--autocenter", csg.auto_centre, "Look at the centre of the scene")
-      ->group(camera);
-  option("--projection", csg.projection, "Perspective or orthographic (default: p)", "p|o", camera);
+  define_picture_camera(app, csg);
   define_look(app, words);
   add_backend(app, words, "Running");
   add_common(app, words);
   define_openscad(app, csg);
 }
 
+void picture_request(const Words& words, Reader& reader, PictureRequest& request) {
+  request.common = common_options(words, reader);
+  request.input = input_options(words, true, reader);
+  reader.take(parse_choice("--rule", words.rule, kRuleWords), request.input.rule);
+  request.input.keep_orientation = words.keep_orientation;
+  request.output = words.output;
+  if (!words.json.empty()) request.json = words.json;
+}
+
 CsgCommand csg_command(Words words, Reader& reader) {
   CsgCommand command;
-  command.common = common_options(words, reader);
-  command.input = input_options(words, true, reader);
-  reader.take(parse_choice("--rule", words.rule, kRuleWords), command.input.rule);
+  picture_request(words, reader, command);
   reader.take(parse_choice("--backend", words.backend, kBackendWords), command.backend);
-  command.input.keep_orientation = words.keep_orientation;
-  command.output = words.output;
-  if (!words.json.empty()) command.json = words.json;
   if (!reader.error()) reader.take(read_csg_options(words.csg, command));
   return command;
 }

@@ -4,8 +4,8 @@
 #include <string_view>
 #include <vector>
 
-#include "apps/strata/commands.h"
-#include "apps/strata/scene_options.h"
+#include "apps/commands/commands.h"
+#include "apps/commands/scene_options.h"
 #include "strata/core/result.h"
 
 namespace strata::apps {
@@ -24,7 +24,11 @@ struct CsgWords {
 Result<void> check_picture_name(std::string_view asked_by, const std::string& path,
                                 bool depth = false);
 
-/// Reads the words into `command`, whose common part, inputs, output and report are set.
+/// Reads the words that all commands that draw have in common: camera, look, sections. The common
+/// part, inputs, output and report of `request` are set. @return kUsage
+Result<void> read_picture_options(const CsgWords& words, PictureRequest& request);
+
+/// Reads the words into `command`, as read_picture_options() and those of `strata csg` alone.
 /// @return kUsage
 Result<void> read_csg_options(const CsgWords& words, CsgCommand& command);
 

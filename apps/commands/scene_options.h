@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/strata/commands.h"
+#include "apps/commands/commands.h"
 #include "strata/core/result.h"
 
 namespace CLI {

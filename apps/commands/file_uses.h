@@ -2,8 +2,8 @@
 
 #include <vector>
 
+#include "apps/commands/commands.h"
 #include "apps/session/file_conflicts.h"
-#include "apps/strata/commands.h"
 
 namespace strata::apps {
 
@@ -15,5 +15,6 @@ namespace strata::apps {
 [[nodiscard]] std::vector<FileUse> outputs_of(const InfoCommand& command);
 [[nodiscard]] std::vector<FileUse> outputs_of(const LdiCommand& command);
 [[nodiscard]] std::vector<FileUse> outputs_of(const CsgCommand& command);
+[[nodiscard]] std::vector<FileUse> outputs_of(const OitCommand& command);
 
 }  // namespace strata::apps

@@ -1,4 +1,4 @@
-#include "apps/strata/csg_options.h"
+#include "apps/commands/csg_options.h"
 
 #include <algorithm>
 #include <bit>
@@ -202,7 +202,7 @@ Result<csg::SectionPlane> parse_section(std::string_view text) {
   return plane;
 }
 
-Result<void> read_csg_options(const CsgWords& words, CsgCommand& command) {
+Result<void> read_picture_options(const CsgWords& words, PictureRequest& request) {
   std::optional<Error> error;
   const auto take = [&error](auto value, auto& target) {
     if (value) {
@@ -211,42 +211,51 @@ Result<void> read_csg_options(const CsgWords& words, CsgCommand& command) {
       error = std::move(value.error());
     }
   };
-  command.input.expression = words.expression;
-  if (!words.size.empty()) take(parse_size(words.size), command.size);
-  command.view_all = words.view_all;
-  command.auto_centre = words.auto_centre;
-  command.asked_view = words.view_all || words.auto_centre;
+  request.input.expression = words.expression;
+  if (!words.size.empty()) take(parse_size(words.size), request.size);
+  request.view_all = words.view_all;
+  request.auto_centre = words.auto_centre;
+  request.asked_view = words.view_all || words.auto_centre;
   if (words.camera.empty()) {
-    command.view_all = command.auto_centre = command.default_camera = true;
+    request.view_all = request.auto_centre = request.default_camera = true;
   } else {
-    take(parse_camera(words.camera), command.camera);
+    take(parse_camera(words.camera), request.camera);
   }
   if (!words.projection.empty()) {
-    take(parse_projection(words.projection), command.camera.projection);
+    take(parse_projection(words.projection), request.camera.projection);
   }
-  if (!words.scheme.empty()) take(parse_scheme(words.scheme), command.picture.scheme);
-  if (!words.measure.empty()) {
-    std::int64_t resolution = 0;
-    take(parse_integer("--measure", words.measure), resolution);
-    if (!error && (resolution < 1 || resolution > kMaxGridSide / 2)) {
-      error = Error{ErrorCode::kUsage, fmt::format("--measure must be 1 to {}, got {}",
-                                                   kMaxGridSide / 2, words.measure)};
-    }
-    command.measure_resolution = static_cast<int>(resolution);
-  }
-  if (!words.samples.empty()) take(parse_samples(words.samples), command.picture.samples);
-  command.picture.edges = words.edges;
-  command.picture.transparent_background = words.transparent;
+  if (!words.scheme.empty()) take(parse_scheme(words.scheme), request.picture.scheme);
+  if (!words.samples.empty()) take(parse_samples(words.samples), request.picture.samples);
+  request.picture.transparent_background = words.transparent;
   for (const std::string& cut : words.cuts) {
-    take(parse_section(cut), command.cuts.emplace_back());
+    take(parse_section(cut), request.cuts.emplace_back());
   }
-  command.ids = words.ids;
-  command.depth = words.depth;
   if (error) return tl::unexpected(*error);
-  if (auto read = read_openscad_words(words, command); !read) return read;
-  if (command.input.files.empty()) {
+  if (request.input.files.empty()) {
     return fail(ErrorCode::kUsage, "no input file is given");
   }
+  if (!(request.camera.distance > 0) && !request.view_all) {
+    return fail(ErrorCode::kUsage, "--camera {}: the distance must be above 0, or give --view-all",
+                words.camera);
+  }
+  return {};
+}
+
+Result<void> read_csg_options(const CsgWords& words, CsgCommand& command) {
+  if (auto read = read_picture_options(words, command); !read) return read;
+  if (!words.measure.empty()) {
+    const auto resolution = parse_integer("--measure", words.measure);
+    if (!resolution) return tl::unexpected(resolution.error());
+    if (*resolution < 1 || *resolution > kMaxGridSide / 2) {
+      return fail(ErrorCode::kUsage, "--measure must be 1 to {}, got {}", kMaxGridSide / 2,
+                  words.measure);
+    }
+    command.measure_resolution = static_cast<int>(*resolution);
+  }
+  command.picture.edges = words.edges;
+  command.ids = words.ids;
+  command.depth = words.depth;
+  if (auto read = read_openscad_words(words, command); !read) return read;
   if (command.output.empty() && command.ids.empty() && command.depth.empty() && !command.json) {
     command.summary = true;
   }
@@ -258,10 +267,6 @@ Result<void> read_csg_options(const CsgWords& words, CsgCommand& command) {
         std::tuple("--depth ", &command.depth, true)}) {
     if (path->empty()) continue;
     if (auto named = check_picture_name(asked_by, *path, depth); !named) return named;
-  }
-  if (!(command.camera.distance > 0) && !command.view_all) {
-    return fail(ErrorCode::kUsage, "--camera {}: the distance must be above 0, or give --view-all",
-                words.camera);
   }
   return {};
 }

@@ -6,8 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include "apps/strata/commands.h"
-#include "apps/strata/csg_options.h"
+#include "apps/commands/commands.h"
+#include "apps/commands/csg_options.h"
+#include "apps/commands/oit_options.h"
 
 namespace CLI {
 class App;
@@ -32,6 +33,7 @@ struct Words {
                        offsets = "plane-first", backend = "auto";
   bool stats = false, checksum = false, dry_run = false, list_formats = false, gl = false;
   CsgWords csg;
+  OitWords oit;
 };
 
 /// Reads one option's value into `target`; keeps the first error.
@@ -74,6 +76,7 @@ inline constexpr CommandSummary kCommands[] = {
     {"info", "Report counts, bounds, area, volume and holes"},
     {"ldi", "Write the depth lists of meshes or a scene: a layered depth image"},
     {"csg", "Draw or measure a scene (.csg, .scad) or an expression over meshes"},
+    {"oit", "Draw transparent meshes or scenes, and compare techniques for that"},
     {"view", "Show a scene or meshes in a window: turn, cut, pick, measure, reload"}};
 
 /// Defines the options of a command, with its description and footer. False: there is no command
@@ -83,8 +86,25 @@ bool define_command(std::string_view name, CLI::App& app, Words& words);
 /// The text of `strata --help` above its list of commands.
 [[nodiscard]] std::string_view top_examples();
 
+/// Heading of the options that say how a picture looks.
+inline constexpr const char* kLookGroup = "Appearance";
+
 // command_line_csg.cpp: `strata csg`
 void define_csg(CLI::App& app, Words& words);
 CsgCommand csg_command(Words words, Reader& reader);
+
+// The parts of it that all commands that draw have.
+void define_picture_input(CLI::App& app, Words& words);
+void define_picture_camera(CLI::App& app, CsgWords& csg);
+/// Colours and samples.
+void define_picture_quality(CLI::App& app, CsgWords& csg);
+/// Background and sections.
+void define_picture_cuts(CLI::App& app, CsgWords& csg);
+/// Reads common options, inputs, output and report.
+void picture_request(const Words& words, Reader& reader, PictureRequest& request);
+
+// command_line_oit.cpp: `strata oit`
+void define_oit(CLI::App& app, Words& words);
+OitCommand oit_command(Words words, Reader& reader);
 
 }  // namespace strata::apps

@@ -14,6 +14,7 @@
 #include "strata/csg/input/sections.h"
 #include "strata/csg/picture/picture.h"
 #include "strata/hashbuffer/offsets.h"
+#include "strata/transparency/techniques.h"
 #include "strata/voxelize/grid_fit.h"
 #include "strata/voxelize/voxelize.h"
 
@@ -70,40 +71,51 @@ struct LdiCommand {
   Backend backend = Backend::kAuto;
 };
 
-/// `strata csg`, and what a window shows
-struct CsgCommand {
+/// What commands that draw have in common: a scene, a camera, a look
+struct PictureRequest {
   CommonOptions common;
   csg::SceneInput input;
-  std::string output, ids, depth;  ///< files; empty: none, output "-": standard output
+  std::string output;  ///< a file; empty: none, "-": standard output
   glm::ivec2 size{512};
   Camera camera;
   bool view_all = false, auto_centre = false;
   bool default_camera = false;  ///< none was given
   bool asked_view = false;      ///< --view-all or --auto-center was given
-  int frames = 0;               ///< pictures with $t = 0, 1/frames, ...; 0: one without
-  bool summary = false;         ///< the report as text
-  bool render = false;          ///< the result alone: no ghosts, no colours, flat scenes from above
-  Backend backend = Backend::kAuto;
   csg::PictureOptions picture;
   std::vector<csg::SectionPlane> cuts;
-  std::optional<std::string> json;        ///< "-": standard output
+  std::optional<std::string> json;  ///< "-": standard output
+};
+
+/// `strata csg`, and what a window shows
+struct CsgCommand : PictureRequest {
+  std::string ids, depth;  ///< files; empty: none
+  int frames = 0;          ///< pictures with $t = 0, 1/frames, ...; 0: one without
+  bool summary = false;    ///< the report as text
+  bool render = false;     ///< the result alone: no ghosts, no colours, flat scenes from above
+  Backend backend = Backend::kAuto;
   std::optional<int> measure_resolution;  ///< of the report's measures; none: csg::MeasureOptions'
   std::vector<FileUse> outputs;           ///< of a window: the pictures that it will write
 };
 
-using Command = std::variant<ParseOutcome, VoxelizeCommand, InfoCommand, LdiCommand, CsgCommand>;
+/// A technique of transparency as the command line names it: "mlab:8".
+struct OitChoice {
+  std::string text;
+  transparency::ChosenTechnique chosen;
+};
+
+/// `strata oit`
+struct OitCommand : PictureRequest {
+  std::vector<OitChoice> choices;
+  bool all = false;  ///< all techniques: those that the input does not suit are left out
+  std::optional<float> opacity;  ///< of what has none of its own
+  std::string report;            ///< folder of the page; empty: none
+  bool list = false;             ///< only the list of techniques
+};
+
+using Command =
+    std::variant<ParseOutcome, VoxelizeCommand, InfoCommand, LdiCommand, CsgCommand, OitCommand>;
 
 /// Reads the command line.
 Command parse_command_line(int argc, const char* const* argv);
-
-Result<void> run_voxelize(const VoxelizeCommand& command, Session& session);
-Result<void> run_info(const InfoCommand& command, Session& session);
-Result<void> run_ldi(const LdiCommand& command, Session& session);
-Result<void> run_csg(const CsgCommand& command, Session& session);
-
-/// `strata view`: becomes the program strata-view that lies beside this one, with these arguments.
-/// Returns an exit code when that cannot be, after a sentence on standard error. So this program
-/// needs none of the libraries of a window.
-int run_view_program(char** arguments);
 
 }  // namespace strata::apps
