@@ -21,9 +21,10 @@ include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 set(strata_package_dir "${CMAKE_INSTALL_LIBDIR}/cmake/strata")
 
-# Public headers are those that the libraries list as HEADERS, and those right in strata/. Headers of a library that is not
+# Public headers are those that the libraries list as HEADERS, and these right in strata/. Headers of a library that is not
 # built are not installed: one without its library, or without the package it includes, is a trap.
-file(GLOB strata_umbrella_headers CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/strata/*.h")
+set(strata_umbrella_headers strata/csg.h strata/lists.h strata/transparency.h strata/voxels.h)
+list(TRANSFORM strata_umbrella_headers PREPEND "${PROJECT_SOURCE_DIR}/")
 target_sources(strata_all INTERFACE
   FILE_SET HEADERS BASE_DIRS "${PROJECT_SOURCE_DIR}" FILES ${strata_umbrella_headers})
 install(TARGETS strata_all ${strata_libraries} EXPORT strata FILE_SET HEADERS DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")

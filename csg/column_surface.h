@@ -6,7 +6,7 @@
 
 #include "csg/program.h"
 #include "csg/transition.h"
-#include "strata/hashbuffer/list_filter.h"
+#include "strata/hashbuffer/tile_lists.h"
 
 // Private to csg/.
 

@@ -1,4 +1,4 @@
-#include "strata/csg/solid_labels.h"
+#include "strata/csg/solid_lists.h"
 
 #include <array>
 #include <bit>

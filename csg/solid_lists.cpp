@@ -10,7 +10,6 @@
 #include "csg/program.h"
 #include "csg/transition.h"
 #include "csg/tree_filter.h"
-#include "strata/csg/solid_labels.h"
 #include "strata/raster/lattice_mesh.h"
 
 namespace strata::csg {

@@ -5,7 +5,7 @@
 
 #include "csg/program.h"
 #include "strata/core/inside_rule.h"
-#include "strata/hashbuffer/list_filter.h"
+#include "strata/hashbuffer/tile_lists.h"
 
 // Private to csg/.
 

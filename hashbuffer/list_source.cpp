@@ -1,9 +1,7 @@
-#include "strata/hashbuffer/list_source.h"
+#include "strata/hashbuffer/build_ldi.h"
 
 #include <algorithm>
 #include <utility>
-
-#include "strata/hashbuffer/build_ldi.h"
 
 namespace strata {
 

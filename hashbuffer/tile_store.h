@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "hashbuffer/tile_builder.h"
-#include "strata/hashbuffer/concurrency.h"
+#include "strata/hashbuffer/depth_list_store.h"
 #include "strata/hashbuffer/table_law.h"
 
 namespace strata {

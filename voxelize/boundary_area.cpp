@@ -1,4 +1,4 @@
-#include "strata/voxelize/boundary_area.h"
+#include "strata/voxelize/checksum.h"
 
 #include <algorithm>
 #include <span>

@@ -16,7 +16,7 @@
 #include "strata/core/execution.h"
 #include "strata/core/result.h"
 #include "strata/voxelize/intervals.h"
-#include "strata/voxelize/voxelize_options.h"
+#include "strata/voxelize/voxelize.h"
 #include "voxelize/shell_overlap.h"
 
 namespace strata::shell {

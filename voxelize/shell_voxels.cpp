@@ -1,4 +1,4 @@
-#include "strata/voxelize/shell_voxels.h"
+#include "voxelize/shell_voxels.h"
 
 #include <algorithm>
 #include <new>

@@ -4,10 +4,10 @@
 #include <vector>
 
 #include "raster/tile_bins.h"
-#include "strata/hashbuffer/list_filter.h"
-#include "strata/hashbuffer/list_source.h"
+#include "strata/hashbuffer/build_ldi.h"
+#include "strata/hashbuffer/tile_lists.h"
 #include "strata/voxelize/intervals.h"
-#include "strata/voxelize/voxelize_options.h"
+#include "strata/voxelize/voxelize.h"
 #include "voxelize/open/winding_field.h"
 #include "voxelize/tile_walk.h"
 

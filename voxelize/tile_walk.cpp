@@ -8,7 +8,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-#include "strata/hashbuffer/list_filter.h"
+#include "strata/hashbuffer/tile_lists.h"
 #include "strata/raster/lattice_mesh.h"
 
 HWY_BEFORE_NAMESPACE();

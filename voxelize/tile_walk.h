@@ -6,7 +6,7 @@
 
 #include "hashbuffer/tile_builder.h"
 #include "strata/voxelize/intervals.h"
-#include "strata/voxelize/voxelize_options.h"
+#include "strata/voxelize/voxelize.h"
 #include "voxelize/open/winding_field.h"
 
 // Depth lists of a tile -> runs of solid voxels. Private to voxelize/.

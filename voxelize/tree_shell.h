@@ -4,9 +4,9 @@
 #include <vector>
 
 #include "raster/tile_bins.h"
-#include "strata/hashbuffer/list_filter.h"
+#include "strata/hashbuffer/tile_lists.h"
 #include "strata/voxelize/intervals.h"
-#include "strata/voxelize/voxelize_options.h"
+#include "strata/voxelize/voxelize.h"
 
 // Private to voxelize/.
 

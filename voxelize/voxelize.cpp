@@ -7,15 +7,15 @@
 #include <utility>
 #include <vector>
 
-#include "strata/hashbuffer/list_filter.h"
+#include "strata/hashbuffer/tile_lists.h"
 #include "strata/mesh/diagnose.h"
 #include "strata/raster/lattice_mesh.h"
 #include "strata/voxelize/checksum.h"
 #include "strata/voxelize/grid_fit.h"
-#include "strata/voxelize/shell_voxels.h"
 #include "voxelize/open/boundary_caps.h"
 #include "voxelize/open/winding_field.h"
 #include "voxelize/samples.h"
+#include "voxelize/shell_voxels.h"
 #include "voxelize/solid.h"
 #include "voxelize/tree_shell.h"
 

@@ -14,7 +14,6 @@
 #include "csg/measure/result_bounds.h"
 #include "strata/csg/input/scene_input.h"
 #include "strata/csg/picture/picture.h"
-#include "strata/csg/picture/write_depth.h"
 
 namespace strata::apps {
 namespace {

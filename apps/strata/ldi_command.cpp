@@ -8,7 +8,6 @@
 #include "strata/csg/input/solid_input.h"
 #include "strata/hashbuffer/build_ldi.h"
 #include "strata/hashbuffer/formats/ldi_io.h"
-#include "strata/hashbuffer/formats/xray.h"
 #include "strata/raster/lattice_mesh.h"
 
 namespace strata::apps {

@@ -6,7 +6,7 @@
 #include "apps/session/session.h"
 #include "strata/core/result.h"
 #include "strata/csg/gl/gpu.h"
-#include "strata/csg/input/mesh_input.h"
+#include "strata/csg/input/scene_input.h"
 
 // What the library tells while it works, told to a session.
 

@@ -15,10 +15,8 @@
 #include "apps/strata/voxelize_report.h"
 #include "strata/csg/input/solid_input.h"
 #include "strata/csg/picture/picture.h"
-#include "strata/csg/solid_labels.h"
 #include "strata/csg/solid_lists.h"
-#include "strata/voxelize/boundary_area.h"
-#include "strata/voxelize/formats/memory_estimate.h"
+#include "strata/voxelize/checksum.h"
 #include "strata/voxelize/formats/voxel_writer.h"
 #include "voxelize/open/lost_walls.h"
 

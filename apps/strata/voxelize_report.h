@@ -9,7 +9,6 @@
 #include "apps/session/session.h"
 #include "strata/core/grid.h"
 #include "strata/csg/input/solid_input.h"
-#include "strata/voxelize/formats/memory_estimate.h"
 #include "strata/voxelize/formats/voxel_writer.h"
 #include "strata/voxelize/voxelize.h"
 #include "voxelize/open/lost_walls.h"

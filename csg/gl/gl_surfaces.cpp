@@ -1,4 +1,4 @@
-#include "strata/csg/gl/gl_surfaces.h"
+#include "csg/gl/gl_surfaces.h"
 
 #include <algorithm>
 #include <array>

@@ -7,10 +7,10 @@
 
 #include <fmt/format.h>
 
+#include "csg/gl/gl_surfaces.h"
+#include "csg/gl/result_lists.h"
 #include "hashbuffer/gl/hash_store.h"
 #include "hashbuffer/gl/scan_store.h"
-#include "strata/csg/gl/gl_surfaces.h"
-#include "strata/csg/gl/result_lists.h"
 #include "strata/csg/picture/picture.h"
 #include "strata/csg/solid_lists.h"
 #include "strata/gl/context.h"

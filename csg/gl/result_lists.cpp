@@ -1,4 +1,4 @@
-#include "strata/csg/gl/result_lists.h"
+#include "csg/gl/result_lists.h"
 
 #include <algorithm>
 #include <array>

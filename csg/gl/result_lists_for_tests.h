@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "strata/csg/gl/result_lists.h"
+#include "csg/gl/result_lists.h"
 
 namespace strata::csg {
 

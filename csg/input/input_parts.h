@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "strata/core/execution.h"
-#include "strata/csg/input/mesh_input.h"
+#include "strata/csg/input/scene_input.h"
 
 // What the files of this folder share.
 

@@ -1,4 +1,4 @@
-#include "strata/csg/input/mesh_input.h"
+#include "strata/csg/input/scene_input.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,6 @@
 #include "core/printable.h"
 #include "csg/input/input_parts.h"
 #include "mesh/block_sum.h"
-#include "strata/csg/input/scene_input.h"
 #include "strata/mesh/soup_tools.h"
 
 namespace strata::csg {

@@ -1,4 +1,4 @@
-#include "strata/csg/input/sections.h"
+#include "strata/csg/input/scene_input.h"
 
 #include <algorithm>
 #include <glm/geometric.hpp>

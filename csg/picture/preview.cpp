@@ -11,9 +11,9 @@
 #include "csg/program.h"
 #include "csg/surface/depth_range.h"
 #include "csg/surface/frame_input.h"
+#include "csg/surface/surface_source.h"
 #include "csg/surface/tile_surface.h"
 #include "strata/csg/picture/picture.h"
-#include "strata/csg/surface/surface_source.h"
 
 namespace strata::csg {
 namespace {

@@ -1,6 +1,6 @@
 // The only file of csg/ that sees OpenEXR.
 
-#include "strata/csg/picture/write_depth.h"
+#include "strata/csg/picture/picture.h"
 
 #ifdef STRATA_HAVE_OPENEXR
 #include <ImfChannelList.h>

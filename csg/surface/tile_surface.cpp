@@ -4,7 +4,7 @@
 #include <new>
 #include <numeric>
 
-#include "strata/hashbuffer/list_filter.h"
+#include "strata/hashbuffer/tile_lists.h"
 
 namespace strata::csg {
 

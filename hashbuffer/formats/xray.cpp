@@ -1,4 +1,4 @@
-#include "strata/hashbuffer/formats/xray.h"
+#include "strata/hashbuffer/formats/ldi_io.h"
 
 #include <png.h>
 

@@ -1,4 +1,4 @@
-#include "strata/hashbuffer/gl/compute_lists.h"
+#include "hashbuffer/gl/compute_lists.h"
 
 #include <algorithm>
 #include <utility>

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
 #include <memory>
 #include <vector>
 
@@ -9,8 +10,12 @@
 #include "strata/core/grid.h"
 #include "strata/core/result.h"
 #include "strata/csg/tree.h"
-#include "strata/hashbuffer/list_filter.h"
+#include "strata/hashbuffer/tile_lists.h"
 #include "strata/mesh/triangle_soup.h"
+
+// Labels divide the result of a tree into parts. A point belongs to the first solid of the tree
+// that holds it and is not subtracted. SolidLists::set_labels() makes lists that name the parts by
+// the labels of their solids.
 
 namespace strata::csg {
 
@@ -45,7 +50,7 @@ class SolidLists {
   Result<void> fit(const VoxelGrid& grid, TriangleSoup* taken = nullptr,
                    const Execution& execution = {});
   /// Labels the filter's lists from now on: the label of a crossing is that of the solid behind it,
-  /// see strata/csg/solid_labels.h. The filter must have no workers meanwhile. @param labels one
+  /// see strata/csg/solid_lists.h. The filter must have no workers meanwhile. @param labels one
   /// for each solid of the tree, in [1, 2^31)
   void set_labels(const std::vector<std::uint32_t>& labels);
   /// Whether a triangle's solid is subtracted, so that the triangle faces into the result.
@@ -57,5 +62,23 @@ class SolidLists {
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
+
+/// The solids below `root` that are not subtracted, in the order of the tree's operands.
+[[nodiscard]] std::vector<std::uint32_t> added_solids(const Tree& tree, Tree::NodeId root);
+
+/// Labels that divide a tree into parts of one colour.
+struct ColourLabels {
+  std::vector<std::uint32_t>
+      labels;  ///< one for each solid of the tree; colour n has the label n + 1
+  std::vector<glm::vec4>
+      colours;  ///< of the solids that are not subtracted, in order of appearance
+};
+
+/// @param none  the colour of solids without one
+[[nodiscard]] ColourLabels colour_labels(const Tree& tree, Tree::NodeId root,
+                                         const glm::vec4& none);
+
+/// Labels that divide a tree into its solids: solid n has the label n + 1.
+[[nodiscard]] std::vector<std::uint32_t> id_labels(const Tree& tree);
 
 }  // namespace strata::csg

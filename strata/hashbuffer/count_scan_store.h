@@ -12,7 +12,6 @@
 #include "strata/core/depth_list.h"
 #include "strata/core/execution.h"
 #include "strata/core/result.h"
-#include "strata/hashbuffer/concurrency.h"
 #include "strata/hashbuffer/depth_list_store.h"
 #include "strata/hashbuffer/record.h"
 

@@ -1,7 +1,10 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
+#include <span>
 #include <type_traits>
+#include <vector>
 
 #include "strata/core/depth_list.h"
 #include "strata/hashbuffer/offsets.h"
@@ -58,5 +61,73 @@ struct TileStoreOptions {
   OffsetKind offsets = OffsetKind::kPlaneFirst;  ///< of the HA-buffer
   std::uint64_t seed = 1;                        ///< of its offsets
 };
+
+/// Voxels first..last of a column that faces of one solid of a mesh pass through.
+struct FaceRun {
+  std::uint32_t solid = 0;  ///< see TileListFilter::solid_of()
+  int first = 0;            ///< index along the column
+  int last = 0;             ///< inclusive
+};
+/// Voxels first..last of a column.
+struct VoxelRun {
+  int first = 0;  ///< index along the column
+  int last = 0;   ///< inclusive
+};
+
+/// Transforms the sorted lists of a tile before they are used, e.g. from the lists of a tree's
+/// solids to the lists of its Boolean result. The output must be sorted as well.
+class TileListFilter {
+ public:
+  virtual ~TileListFilter() = default;
+
+  /// The scratch memory of one thread.
+  class Worker {
+   public:
+    virtual ~Worker() = default;
+    /// The filtered lists, as compressed rows; valid until the next call.
+    virtual TileLists<DepthItem> apply(const TileLists<DepthItem>& lists) = 0;
+    /// Appends the voxels of `faces` that the surface of the result may pass through: those in
+    /// which the result depends on the solids with faces in the voxel, while all other solids are
+    /// as at its centre. Appends runs in increasing order that do not touch. A filter that does not
+    /// override solid_of() need not override this: the faces of one solid already are runs of this
+    /// kind.
+    /// @param lists of the tile, as apply() takes them
+    /// @param faces of the column of pixel `pixel`, in any order of their solids
+    virtual void surface(const TileLists<DepthItem>& lists, std::size_t pixel,
+                         std::span<const FaceRun> faces, std::vector<VoxelRun>& kept) {
+      (void)lists, (void)pixel;
+      for (const FaceRun& run : faces) kept.push_back({run.first, run.last});  // knows no solids
+    }
+  };
+  /// May be called by several threads at once.
+  [[nodiscard]] virtual std::unique_ptr<Worker> worker() const = 0;
+  /// True if the output is labelled: each crossing says what lies behind it. Behind an exit() lies
+  /// nothing, behind any other crossing the part with the label triangle(). No list then has two
+  /// crossings at the same depth. Two labels may follow each other without an exit between them.
+  [[nodiscard]] virtual bool labelled() const { return false; }
+  /// The solid of a triangle of the mesh; 0 if there is only one.
+  [[nodiscard]] virtual std::uint32_t solid_of(std::uint32_t triangle) const {
+    (void)triangle;
+    return 0;
+  }
+};
+
+/// Calls body(item) for each crossing of pixel `pixel` of a tile, in order.
+template <class Body>
+void for_each_item(const TileLists<DepthItem>& lists, std::size_t pixel, Body&& body) {
+  if (lists.planes64 == nullptr) {
+    for (std::uint32_t i = lists.offsets[pixel]; i < lists.offsets[pixel + 1]; ++i) {
+      body(lists.keys[i]);
+    }
+    return;
+  }
+  const int row = static_cast<int>(pixel) / kTileSide;
+  if (row < lists.row_begin || row >= lists.row_end) return;
+  for (std::size_t age = 0; age < static_cast<std::size_t>(lists.ages); ++age) {
+    const std::uint64_t record = lists.planes64[age * kTilePixels + pixel];
+    if (record == 0) break;
+    body(tile_key<Record64>(record));
+  }
+}
 
 }  // namespace strata

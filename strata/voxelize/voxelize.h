@@ -1,15 +1,89 @@
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <functional>
 
 #include "strata/core/execution.h"
 #include "strata/core/grid.h"
+#include "strata/core/inside_rule.h"
 #include "strata/core/result.h"
+#include "strata/hashbuffer/tile_lists.h"
 #include "strata/mesh/triangle_soup.h"
 #include "strata/voxelize/intervals.h"
-#include "strata/voxelize/voxelize_options.h"
 
 namespace strata {
+
+class ListSource;  // strata/hashbuffer/build_ldi.h
+
+/// Whether a mesh is known to be closed: every edge is used equally often in both directions
+/// (is_closed(); with InsideRule::kParity an even number of times suffices).
+enum class Closedness {
+  kCheck,         ///< voxelize() checks it, at a small part of its cost
+  kAssumeClosed,  ///< known to be closed; the voxels of an open mesh would be wrong
+  kAssumeOpen     ///< known to be open; for a closed mesh the voxels are the same, but take longer
+};
+/// What to do with a mesh that is not closed.
+enum class OpenMode {
+  kVote,     ///< holes are closed by caps; near doubtful caps winding numbers decide
+  kSurface,  ///< keep only the voxels that the surface touches
+  kFail      ///< ErrorCode::kGeometry
+};
+/// Voxels that represent a surface.
+enum class SurfaceKind {
+  kConservative,  ///< every voxel that the surface touches (closed boxes), exactly
+  k26,            ///< 26-separating: no path of 26-neighbours crosses it
+  k6              ///< 6-separating: no path of face neighbours crosses it; the thinnest
+};
+
+/// Settings of voxelize().
+struct VoxelizeOptions {
+  InsideRule rule = InsideRule::kWinding;  ///< which winding numbers are inside
+  Axis axis = Axis::kZ;                    ///< of the rays and of the intervals returned
+  bool solid = true;                       ///< voxels whose centre is inside
+  bool surface = false;                    ///< voxels of the surface; with solid: the union
+  SurfaceKind surface_kind = SurfaceKind::kConservative;  ///< which voxels are the surface's
+  OpenMode open = OpenMode::kVote;  ///< what to do where the mesh is not closed
+  /// Where the mesh is not closed, `open` decides what its voxels are. With a filter there is no
+  /// check, since a tree's lists are closed.
+  Closedness closedness = Closedness::kCheck;
+  StoreKind store = StoreKind::kAuto;            ///< where crossings wait to be sorted
+  OffsetKind offsets = OffsetKind::kPlaneFirst;  ///< of the HA-buffer
+  /// With n > 1, labels give the filled fraction of voxels: the mesh is voxelized at n times the
+  /// resolution, so that a voxel has n^3 samples, and its label is the number of solid samples, 1
+  /// to n^3. The labels are exact and the same for every axis; intervals end where the label
+  /// changes. Takes n^2 times the columns: time and memory grow with the surface at n times the
+  /// resolution. Not for labelled lists.
+  int samples = 1;
+  bool statistics = false;  ///< count and hash the result
+  /// Transforms the mesh's lists before they are filled, e.g. for a Boolean tree. Borrowed. The
+  /// rule then applies to the transformed lists, and a voxel belongs to the surface when faces of
+  /// solids pass through it and the tree depends on those solids there (with several solids, these
+  /// may be a few more voxels than the surface meets). Labelled lists give labelled intervals.
+  const TileListFilter* filter = nullptr;
+  /// Computes the lists in place of this process's threads, such as on a GPU. Borrowed; used by the
+  /// calling thread alone. `store` and `offsets` are ignored then, and surfaces are still found by
+  /// the CPU.
+  ListSource* source = nullptr;
+};
+
+/// Statistics of a voxelization.
+struct VoxelizeReport {
+  std::uint64_t solid_voxels = 0;          ///< with `statistics`
+  std::uint64_t intervals = 0;             ///< with `statistics`
+  std::uint64_t crossings = 0;             ///< fragments stored, along the axis asked for
+  std::uint64_t max_depth_complexity = 0;  ///< the longest list
+  /// Columns with n crossings, n = 0..; the last entry counts the rest. With `statistics`.
+  std::array<std::uint64_t, 65> depth_histogram{};
+  std::uint64_t unbalanced_columns = 0;  ///< columns entered and left unequally often: holes
+  std::uint64_t negative_columns = 0;    ///< columns where the winding number falls below 0
+  std::uint64_t rebuilt_tiles = 0;       ///< tiles built again with a larger table
+  std::uint64_t checksum =
+      0;                    ///< see set_checksum in strata/voxelize/checksum.h; with `statistics`
+  bool closed = true;       ///< found or assumed to be closed; false: `open` decided
+  double lists_ms = 0;      ///< mean time per thread until the lists are sorted
+  double intervals_ms = 0;  ///< mean time per thread from lists to intervals
+};
 
 /// Receives the slabs in increasing v.
 using SlabSink = std::function<Result<void>(const VoxelIntervals&)>;

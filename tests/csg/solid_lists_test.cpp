@@ -6,7 +6,6 @@
 #include <chrono>
 
 #include "csg/geometry.h"
-#include "strata/csg/solid_labels.h"
 #include "strata/hashbuffer/build_ldi.h"
 #include "strata/mesh/shapes.h"
 #include "strata/voxelize/voxelize.h"

@@ -6,11 +6,10 @@
 #include <set>
 
 #include "csg/column_surface.h"
-#include "strata/csg/solid_labels.h"
 #include "strata/csg/solid_lists.h"
-#include "strata/voxelize/shell_voxels.h"
 #include "strata/voxelize/voxelize.h"
 #include "tests/csg/random_tree.h"
+#include "voxelize/shell_voxels.h"
 
 namespace strata::csg {
 namespace {

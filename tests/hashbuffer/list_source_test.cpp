@@ -1,10 +1,9 @@
 // Lists that come from elsewhere are taken as the tiles' own are.
 
-#include "strata/hashbuffer/list_source.h"
+#include "strata/hashbuffer/build_ldi.h"
 
 #include <gtest/gtest.h>
 
-#include "strata/hashbuffer/build_ldi.h"
 #include "strata/mesh/shapes.h"
 #include "strata/voxelize/voxelize.h"
 #include "tests/support/reference_lists.h"

@@ -11,7 +11,7 @@
 #include <random>
 #include <vector>
 
-#include "strata/voxelize/shell_voxels.h"
+#include "voxelize/shell_voxels.h"
 
 namespace strata::shell_testing {
 

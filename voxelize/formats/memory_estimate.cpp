@@ -1,4 +1,4 @@
-#include "strata/voxelize/formats/memory_estimate.h"
+#include "strata/voxelize/formats/voxel_writer.h"
 
 #include <algorithm>
 #include <cmath>

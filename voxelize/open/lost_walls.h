@@ -9,7 +9,7 @@
 #include "strata/core/grid.h"
 #include "strata/core/inside_rule.h"
 #include "strata/core/result.h"
-#include "strata/hashbuffer/list_filter.h"
+#include "strata/hashbuffer/tile_lists.h"
 #include "strata/mesh/triangle_soup.h"
 
 namespace strata {

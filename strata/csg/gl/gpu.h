@@ -6,7 +6,7 @@
 
 #include "strata/core/execution.h"
 #include "strata/core/result.h"
-#include "strata/hashbuffer/list_source.h"
+#include "strata/hashbuffer/build_ldi.h"
 #include "strata/hashbuffer/tile_lists.h"
 
 namespace strata::csg {

@@ -1,14 +1,114 @@
 #pragma once
 
+#include <cstdint>
+#include <functional>
+#include <glm/vec3.hpp>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "strata/core/execution.h"
+#include "strata/core/file_identity.h"
+#include "strata/core/inside_rule.h"
 #include "strata/core/result.h"
-#include "strata/csg/input/mesh_input.h"
 #include "strata/csg/scene/scene.h"
+#include "strata/mesh/diagnose.h"
+#include "strata/mesh/formats/read_mesh.h"
+#include "strata/mesh/orient.h"
+#include "strata/mesh/triangle_soup.h"
+#include "strata/raster/view.h"
 
 namespace strata::csg {
+
+/// The input files, and how they are read.
+struct SceneInput {
+  std::vector<std::string> files;        ///< meshes and scenes; "-": standard input
+  MeshReader reader = MeshReader::kOwn;  ///< of meshes
+  /// Format of standard input if it is among the files, else of all files; kAuto: by name and
+  /// content.
+  MeshFormat format = MeshFormat::kAuto;
+  bool scene_format = false;               ///< true: that format is .csg
+  ReadSceneOptions scene;                  ///< for scenes among the files
+  InsideRule rule = InsideRule::kWinding;  ///< which winding numbers are inside a mesh
+  bool keep_orientation = false;           ///< meshes that are inside out are not reversed
+  /// A Boolean expression over the files, such as "a - b"; empty: their union.
+  std::string expression;
+};
+
+/// Callbacks for messages while files are read. An empty callback is not called.
+struct InputMessages {
+  /// A fault that does not stop the work. @param code  for machines, see docs/json.md
+  std::function<void(std::string code, std::string message)> warn;
+  std::function<void(std::string_view line)> note;  ///< a sentence about a file that was read
+  std::function<void(std::string_view line)> echo;  ///< a line that a scene's program prints
+  /// The files that a scene has opened; a failure ends the work.
+  std::function<Result<void>(std::span<const FileIdentity> files)> opened;
+};
+
+/// How a file is read: as a scene, or as a mesh of a format.
+struct InputKind {
+  bool is_scene = false;                  ///< .csg or .scad
+  MeshFormat format = MeshFormat::kAuto;  ///< of a mesh; kAuto: by name and content
+};
+
+/// The kind of a file, from the options and from its name.
+[[nodiscard]] InputKind kind_of(const std::string& path, const SceneInput& input);
+
+/// The facts about one input file after its faces were reversed where needed.
+struct InputFacts {
+  std::string path;            ///< as it was given
+  MeshReadStats stats;         ///< of the reader
+  bool closed = false;         ///< under the inside rule: every ray enters as often as it leaves
+  bool turned_around = false;  ///< all of it was inside out and has been reversed
+  Orientation orientation;     ///< which parts were reversed
+  /// The rule that was asked for, or parity where no side of the mesh is its outside.
+  InsideRule rule = InsideRule::kWinding;
+  double area = 0.0;    ///< square world units
+  double volume = 0.0;  ///< signed, after reversal; an open mesh: about the middle of its bounds
+  double longest_edge = 0.0;           ///< of the triangles, world units
+  Bounds bounds;                       ///< of the triangles
+  std::uint64_t zero_area_faces = 0;   ///< triangles whose area is 0
+  std::uint64_t unbalanced_edges = 0;  ///< as MeshDiagnosis::unbalanced_edges
+  std::string open;  ///< a sentence that says what is not closed; empty where all is
+  /// True for a scene. Then `stats` has only format, bytes, vertices and triangles, and area,
+  /// volume and zero_area_faces are not known.
+  bool is_scene = false;
+};
+
+/// Checks whether a mesh is closed and faces outward. Reverses what is inside out, unless
+/// input.keep_orientation. Warns of faults that users should know.
+/// @param path  the mesh's name in messages
+/// @return kCancelled
+Result<InputFacts> inspect_mesh(TriangleSoup& soup, MeshReadStats stats, const std::string& path,
+                                const SceneInput& input, const InputMessages& messages = {},
+                                const Execution& execution = {});
+
+/// Reads one mesh file as the options say. @return as read_mesh(); kInput if neither its name nor
+/// the options give its format
+Result<MeshFile> read_mesh_input(const std::string& path, const InputKind& kind,
+                                 const SceneInput& input, const Execution& execution = {});
+
+/// Reads a mesh file, inspects it, and puts its triangles into `soup`. Adds the time of reading to
+/// `read_ms` if that is not null.
+Result<InputFacts> load_mesh(const std::string& path, const InputKind& kind,
+                             const SceneInput& input, const InputMessages& messages,
+                             const Execution& execution, TriangleSoup& soup,
+                             double* read_ms = nullptr);
+
+/// Whether standard input is among the files.
+[[nodiscard]] bool reads_standard_input(const SceneInput& input);
+
+/// Checks that a file's name or the options give its format. @param scenes  true if scenes may be
+/// read too @return kInput naming the formats that there are
+Result<void> check_input_name(const std::string& path, const InputKind& kind, bool scenes);
+
+/// Warnings of the reader about a file.
+void warn_of_reading(const std::string& path, const MeshReadStats& stats,
+                     const InputMessages& messages);
+
+/// "edge (0, 0, 1) - (0, 1, 1) of face 17 is used once" and the like.
+[[nodiscard]] std::string describe(const UnbalancedEdge& edge);
 
 /// Whether a file is a scene by its name: .csg or .scad.
 [[nodiscard]] bool is_scene_name(const std::string& path);
@@ -23,5 +123,18 @@ Result<Scene> load_scene(const SceneInput& input, const InputMessages& messages 
 
 /// The box that a camera should see: around the result and the ghosts.
 Result<Bounds> visible_box(const Scene& scene, const Execution& execution = {});
+
+/// A section: points p with dot(normal, p) > offset are cut away.
+struct SectionPlane {
+  glm::dvec3 normal{0.0};    ///< of length 1
+  double offset = 0;         ///< world units from the origin, along the normal
+  bool towards_eye = false;  ///< true: the side of the eye is cut away
+};
+
+/// The plane as it cuts for a camera: one that is towards_eye is turned, and stays as it is then.
+[[nodiscard]] SectionPlane facing(SectionPlane plane, const Camera& camera);
+
+/// Cuts the scene and its ghosts by the sections.
+void cut_scene(Scene& scene, std::span<const SectionPlane> cuts, const Camera& camera);
 
 }  // namespace strata::csg

@@ -6,7 +6,7 @@
 #include "strata/core/execution.h"
 #include "strata/core/grid.h"
 #include "strata/core/result.h"
-#include "strata/csg/input/mesh_input.h"
+#include "strata/csg/input/scene_input.h"
 #include "strata/csg/solid_lists.h"
 #include "strata/csg/tree.h"
 #include "strata/mesh/triangle_soup.h"

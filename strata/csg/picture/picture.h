@@ -119,4 +119,9 @@ Result<Picture> picture(const Tree& tree, const std::optional<Camera>& camera = 
 /// Writes a PNG file, or to standard output for "-". @return kOutput naming the file
 Result<void> write_png(const Picture& picture, const std::string& path);
 
+/// Writes the distances of visible surfaces along the view axis, in world units, as an OpenEXR file
+/// with one channel, Z, of 32-bit floats; infinity where no solid is visible.
+/// @return kUsage in builds without OpenEXR and for "-"; kOutput naming the file
+Result<void> write_depth_exr(const SurfaceImage& image, const View& view, const std::string& path);
+
 }  // namespace strata::csg

@@ -1,6 +1,6 @@
 // What the walk of the GPU sees is what the CPU sees, bit for bit.
 
-#include "strata/csg/gl/gl_surfaces.h"
+#include "csg/gl/gl_surfaces.h"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
 // The lists of a tree's result that the GPU makes are those that the CPU's filter makes, bit for
 // bit.
 
-#include "strata/csg/gl/result_lists.h"
+#include "csg/gl/result_lists.h"
 
 #include <gtest/gtest.h>
 
@@ -14,7 +14,6 @@
 #include "csg/gl/result_lists_for_tests.h"
 #include "hashbuffer/gl/hash_store.h"
 #include "hashbuffer/gl/scan_store.h"
-#include "strata/csg/solid_labels.h"
 #include "strata/csg/solid_lists.h"
 #include "strata/hashbuffer/build_ldi.h"
 #include "strata/mesh/soup_tools.h"

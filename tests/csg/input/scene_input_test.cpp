@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "csg/input/input_parts.h"
-#include "strata/csg/input/sections.h"
 #include "strata/csg/input/solid_input.h"
 #include "strata/csg/measure/measure.h"
 

@@ -19,7 +19,6 @@
 
 #include "csg/measure/result_bounds.h"
 #include "strata/csg/picture/picture.h"
-#include "strata/csg/picture/write_depth.h"
 #include "strata/mesh/shapes.h"
 #include "tests/support/temporary_folder.h"
 

@@ -6,11 +6,11 @@
 #include <functional>
 #include <map>
 
+#include "hashbuffer/gl/compute_lists.h"
 #include "hashbuffer/gl/hash_store.h"
 #include "hashbuffer/gl/scan_store.h"
 #include "raster/gl/compute.h"
 #include "strata/hashbuffer/build_ldi.h"
-#include "strata/hashbuffer/gl/compute_lists.h"
 #include "strata/mesh/formats/read_mesh.h"
 #include "strata/mesh/shapes.h"
 #include "tests/gl/gl_testing.h"

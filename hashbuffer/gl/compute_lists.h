@@ -5,8 +5,8 @@
 
 #include "strata/core/execution.h"
 #include "strata/gl/context.h"
+#include "strata/hashbuffer/build_ldi.h"
 #include "strata/hashbuffer/gl/store.h"
-#include "strata/hashbuffer/list_source.h"
 
 namespace strata::gl {
 

@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "strata/csg/surface/surface_source.h"
+#include "csg/surface/surface_source.h"
 #include "strata/gl/context.h"
 #include "strata/hashbuffer/gl/store.h"
 

@@ -5,7 +5,7 @@
 #include "strata/core/result.h"
 #include "strata/raster/lattice_mesh.h"
 #include "strata/voxelize/intervals.h"
-#include "strata/voxelize/voxelize_options.h"
+#include "strata/voxelize/voxelize.h"
 
 namespace strata {
 

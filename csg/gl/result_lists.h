@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <memory>
 
+#include "hashbuffer/gl/compute_lists.h"
 #include "strata/core/execution.h"
-#include "strata/hashbuffer/gl/compute_lists.h"
 
 namespace strata::csg {
 
