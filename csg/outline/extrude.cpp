@@ -1,3 +1,5 @@
+#include "csg/outline/extrude.h"
+
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -6,7 +8,7 @@
 #include <queue>
 #include <utility>
 
-#include "csg/outline/outline.h"
+#include "csg/outline/triangulate_pieces.h"
 #include "mesh/polygons/plane_predicates.h"
 
 namespace strata::csg {
@@ -421,6 +423,60 @@ double step_count(double width, const RotateExtrude& options) {
   return std::max(options.round_up ? std::ceil(steps) : std::floor(steps), 1.0);
 }
 
+/// An outline at the steps of its turn around the axis. What is added is incomplete once the job
+/// has ended.
+struct Turned {
+  const Outline& outline;
+  std::vector<std::uint32_t> vertex;  ///< of each point of the outline at each step
+  std::size_t stride, fragments, rings;
+
+  void add_vertices(double start, double turn, TriangleSoup& mesh, OutlineJob* job) {
+    vertex.resize(rings * stride);
+    for (std::size_t j = 0; j < rings && !(job && job->ended()); ++j) {
+      const double at = start + turn * static_cast<double>(j) / static_cast<double>(fragments);
+      const double cosine = cos_degrees(at), sine = sin_degrees(at);
+      std::size_t i = 0;
+      for (const Contour& contour : outline.contours) {
+        for (const glm::dvec2& p : contour) {
+          // A point on the axis does not move: all steps share one vertex.
+          if (p.x == 0 && j > 0) {
+            vertex[j * stride + i] = vertex[i];
+          } else {
+            vertex[j * stride + i] = static_cast<std::uint32_t>(mesh.positions.size());
+            mesh.positions.emplace_back(p.x * cosine, p.x * sine, p.y);
+          }
+          ++i;
+        }
+      }
+    }
+  }
+  void add_walls(TriangleSoup& mesh, OutlineJob* job) const {
+    const auto add = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
+      if (a != b && b != c && c != a) mesh.triangles.emplace_back(a, b, c);
+    };
+    for (std::size_t j = 0; j < fragments && !(job && job->ended()); ++j) {
+      const std::uint32_t *here = &vertex[j * stride], *there = &vertex[(j + 1) % rings * stride];
+      std::size_t first = 0;
+      for (const Contour& contour : outline.contours) {
+        for (std::size_t i = 0; i < contour.size(); ++i) {
+          const std::size_t a = first + i, b = first + (i + 1) % contour.size();
+          add(here[a], there[a], there[b]);
+          add(here[a], there[b], here[b]);
+        }
+        first += contour.size();
+      }
+    }
+  }
+  void add_ends(TriangleSoup& mesh, OutlineJob* job) const {
+    if (job && job->ended()) return;
+    const std::uint32_t* last = &vertex[fragments * stride];
+    for (const glm::uvec3& t : triangulate_pieces(outline, job)) {
+      mesh.triangles.emplace_back(vertex[t.x], vertex[t.y], vertex[t.z]);
+      mesh.triangles.emplace_back(last[t.x], last[t.z], last[t.y]);
+    }
+  }
+};
+
 }  // namespace
 
 ExtrusionSize size_of(const Outline& outline, const RotateExtrude& options) {
@@ -460,53 +516,12 @@ Result<TriangleSoup> rotate_extrude(const Outline& outline, const RotateExtrude&
   const double walls = static_cast<double>(stride) * static_cast<double>(fragments);
   if (too_large(walls, 2 * walls, "rotate_extrude", job)) return tl::unexpected(*job->error);
 
-  // A point on the axis does not move: all steps share one vertex.
   TriangleSoup mesh;
-  const std::size_t rings = fragments + (full ? 0 : 1);
-  std::vector<std::uint32_t> vertex(rings * stride);
-  for (std::size_t j = 0; j < rings; ++j) {
-    if (job && job->ended()) return tl::unexpected(*job->error);
-    const double at =
-        options.start + turn * static_cast<double>(j) / static_cast<double>(fragments);
-    const double cosine = cos_degrees(at), sine = sin_degrees(at);
-    std::size_t i = 0;
-    for (const Contour& contour : outline.contours) {
-      for (const glm::dvec2& p : contour) {
-        if (p.x == 0 && j > 0) {
-          vertex[j * stride + i] = vertex[i];
-        } else {
-          vertex[j * stride + i] = static_cast<std::uint32_t>(mesh.positions.size());
-          mesh.positions.emplace_back(p.x * cosine, p.x * sine, p.y);
-        }
-        ++i;
-      }
-    }
-  }
-  const auto add = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
-    if (a != b && b != c && c != a) mesh.triangles.emplace_back(a, b, c);
-  };
-  for (std::size_t j = 0; j < fragments; ++j) {
-    if (job && job->ended()) return tl::unexpected(*job->error);
-    const std::uint32_t *here = &vertex[j * stride], *there = &vertex[(j + 1) % rings * stride];
-    std::size_t first = 0;
-    for (const Contour& contour : outline.contours) {
-      for (std::size_t i = 0; i < contour.size(); ++i) {
-        const std::size_t a = first + i, b = first + (i + 1) % contour.size();
-        add(here[a], there[a], there[b]);
-        add(here[a], there[b], here[b]);
-      }
-      first += contour.size();
-    }
-  }
-  if (!full) {
-    const std::uint32_t* last = &vertex[fragments * stride];
-    const std::vector<glm::uvec3> ends = triangulate_pieces(outline, job);
-    if (job && job->ended()) return tl::unexpected(*job->error);
-    for (const glm::uvec3& t : ends) {
-      mesh.triangles.emplace_back(vertex[t.x], vertex[t.y], vertex[t.z]);
-      mesh.triangles.emplace_back(last[t.x], last[t.z], last[t.y]);
-    }
-  }
+  Turned turned{outline, {}, stride, fragments, full ? fragments : fragments + 1};
+  turned.add_vertices(options.start, turn, mesh, job);
+  turned.add_walls(mesh, job);
+  if (!full) turned.add_ends(mesh, job);
+  if (job && job->ended()) return tl::unexpected(*job->error);
   if ((low < 0) != (turn < 0)) {
     for (glm::uvec3& t : mesh.triangles) std::swap(t.y, t.z);
   }

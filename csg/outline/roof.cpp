@@ -1,11 +1,13 @@
+#include "csg/outline/roof.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <glm/common.hpp>
 #include <limits>
 
-#include "csg/outline/outline.h"
 #include "csg/outline/straight_skeleton.h"
+#include "csg/outline/triangulate_pieces.h"
 #include "mesh/polygons/plane_predicates.h"
 #include "strata/mesh/diagnose.h"
 #include "strata/mesh/soup_tools.h"

@@ -1,3 +1,5 @@
+#include "csg/outline/shadow.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -6,7 +8,6 @@
 #include <unordered_map>
 #include <utility>
 
-#include "csg/outline/outline.h"
 #include "mesh/polygons/plane_predicates.h"
 #include "strata/mesh/diagnose.h"
 

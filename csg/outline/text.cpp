@@ -1,7 +1,7 @@
 // Text: fontconfig finds the font, HarfBuzz places the glyphs, FreeType gives their contours.
-#include <fmt/core.h>
+#include "csg/outline/text.h"
 
-#include "csg/outline/outline.h"
+#include <fmt/core.h>
 
 #ifdef STRATA_HAVE_TEXT
 

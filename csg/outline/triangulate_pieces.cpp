@@ -1,5 +1,7 @@
 // Triangulates an outline of many pieces piece by piece. The triangulation of the whole would
 // compare each hole with every edge at its height.
+#include "csg/outline/triangulate_pieces.h"
+
 #include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>
@@ -7,7 +9,6 @@
 #include <optional>
 #include <vector>
 
-#include "csg/outline/outline.h"
 #include "mesh/polygons/plane_predicates.h"
 
 namespace strata::csg {

@@ -3,7 +3,9 @@
 #include <glm/matrix.hpp>
 #include <utility>
 
+#include "csg/outline/extrude.h"
 #include "csg/scene/evaluator.h"
+#include "csg/scene/vast_solids.h"
 
 namespace strata::csg {
 namespace {

@@ -2,6 +2,9 @@
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
 
+#include "csg/outline/extrude.h"
+#include "csg/outline/roof.h"
+#include "csg/outline/shadow.h"
 #include "csg/scene/evaluator.h"
 #include "csg/solids/boundary.h"
 #include "csg/solids/hull.h"
@@ -343,74 +346,77 @@ void Evaluator::rotate_extrude(Frame& frame) {
   add_solid(frame.node, frame.outside, *std::move(mesh));
 }
 
-/// Runs nodes that make flat regions, or roofs of flat regions.
-void Evaluator::flat_operation(Frame& frame) {
+/// The Minkowski sum of the children's regions.
+void Evaluator::flat_minkowski(Frame& frame) {
+  std::vector<Outline> operands;
+  while (operands_.size() > frame.base) {
+    std::size_t first = operands_.size() - 1;
+    while (first > frame.base && operands_[first - 1].child == operands_.back().child) --first;
+    operands.push_back(united(first));
+  }
+  std::reverse(operands.begin(), operands.end());
+  if (operands.empty()) return;
+  add_outline(frame.node, frame.outside,
+              operands.size() == 1 ? std::move(operands[0]) : minkowski_sum(operands, &job_));
+}
+
+void Evaluator::flat_resize(Frame& frame, const Outline& outline) {
+  double size[2] = {0.0, 0.0};
+  read_new_size(frame.node, size);
+  const ValueRef automatic = arguments(frame.node).find("auto", 1);
+  bool follow[2] = {automatic.truth(false), automatic.truth(false)};
+  int axis = 0;
+  for (const ValueRef value : automatic) {
+    if (axis < 2) follow[axis++] = value.truth(false);
+  }
+  add_outline(frame.node, frame.outside, csg::resize(outline, {size[0], size[1]}, follow));
+}
+
+void Evaluator::offset(Frame& frame, const Outline& outline) {
   const NodeArguments given = arguments(frame.node);
-  if (frame.kind == NodeKind::kMinkowski) {
-    std::vector<Outline> operands;
-    while (operands_.size() > frame.base) {
-      std::size_t first = operands_.size() - 1;
-      while (first > frame.base && operands_[first - 1].child == operands_.back().child) --first;
-      operands.push_back(united(first));
-    }
-    std::reverse(operands.begin(), operands.end());
-    if (operands.empty()) return;
-    add_outline(frame.node, frame.outside,
-                operands.size() == 1 ? std::move(operands[0]) : minkowski_sum(operands, &job_));
+  const ValueRef delta = given.find("delta");
+  const double by = number(frame.node, delta.is_number() ? "delta" : "r",
+                           delta.is_number() ? delta : given.find("r", 0), 1.0);
+  if (!(std::abs(by) < kMostCoordinate)) {
+    return warn(frame.node, "geometry",
+                fmt::format("'offset' by {:g}, which must be less than {:g}; it is left out", by,
+                            kMostCoordinate));
+  }
+  if (delta.is_number()) {
+    return add_outline(frame.node, frame.outside,
+                       offset_delta(outline, by, given.truth("chamfer", false), &job_));
+  }
+  const Segments round = segments(frame.node);
+  const double points = offset_point_count(outline, by, round);
+  if (!fits(frame.node, fmt::format("{} segments", round.count(std::abs(by))), points,
+            Made::kPoints)) {
     return;
   }
+  add_outline(frame.node, frame.outside, offset_round(outline, by, round, &job_));
+}
+
+/// Runs nodes that make flat regions, or roofs of flat regions.
+void Evaluator::flat_operation(Frame& frame) {
+  if (frame.kind == NodeKind::kMinkowski) return flat_minkowski(frame);
   Outline outline = united(frame.base);
   switch (frame.kind) {
     case NodeKind::kHull:
-      outline = convex_hull(std::span<const Outline>(&outline, 1));
-      break;
+      return add_outline(frame.node, frame.outside, convex_hull({&outline, 1}));
     case NodeKind::kFill:
-      outline = without_holes(outline, &job_);
-      break;
-    case NodeKind::kResize: {
-      double size[2] = {0.0, 0.0};
-      read_new_size(frame.node, size);
-      bool follow[2] = {false, false};
-      const ValueRef automatic = given.find("auto", 1);
-      follow[0] = follow[1] = automatic.truth(false);
-      int axis = 0;
-      for (const ValueRef value : automatic) {
-        if (axis < 2) follow[axis++] = value.truth(false);
-      }
-      outline = csg::resize(outline, {size[0], size[1]}, follow);
-      break;
-    }
-    case NodeKind::kOffset: {
-      const ValueRef delta = given.find("delta");
-      const double by = number(frame.node, delta.is_number() ? "delta" : "r",
-                               delta.is_number() ? delta : given.find("r", 0), 1.0);
-      if (!(std::abs(by) < kMostCoordinate)) {
-        return warn(frame.node, "geometry",
-                    fmt::format("'offset' by {:g}, which must be less than {:g}; it is left out",
-                                by, kMostCoordinate));
-      }
-      if (!delta.is_number()) {
-        const Segments round = segments(frame.node);
-        const double points = offset_point_count(outline, by, round);
-        if (!fits(frame.node, fmt::format("{} segments", round.count(std::abs(by))), points,
-                  Made::kPoints)) {
-          return;
-        }
-      }
-      outline = delta.is_number() ? offset_delta(outline, by, given.truth("chamfer", false), &job_)
-                                  : offset_round(outline, by, segments(frame.node), &job_);
-      break;
-    }
+      return add_outline(frame.node, frame.outside, without_holes(outline, &job_));
+    case NodeKind::kResize:
+      return flat_resize(frame, outline);
+    case NodeKind::kOffset:
+      return offset(frame, outline);
     case NodeKind::kRoof: {
-      auto roof =
-          make_roof(outline, given.find("method", 0).string("voronoi"), segments(frame.node));
+      auto roof = make_roof(outline, arguments(frame.node).find("method", 0).string("voronoi"),
+                            segments(frame.node));
       if (!roof) return leave_out(frame.node, "not-done", roof.error(), "the roof is left out");
       return add_solid(frame.node, frame.outside, *std::move(roof));
     }
     default:
-      break;
+      return add_outline(frame.node, frame.outside, std::move(outline));
   }
-  add_outline(frame.node, frame.outside, std::move(outline));
 }
 
 }  // namespace strata::csg

@@ -167,6 +167,9 @@ class Evaluator {
   void linear_extrude(Frame& frame);
   void rotate_extrude(Frame& frame);
   void flat_operation(Frame& frame);
+  void flat_minkowski(Frame& frame);
+  void flat_resize(Frame& frame, const Outline& outline);
+  void offset(Frame& frame, const Outline& outline);
   /// Unites all outlines from `base` on into one region.
   [[nodiscard]] Outline united(std::size_t base);
   /// Unites all solids from `base` on into one node.
@@ -226,10 +229,5 @@ class Evaluator {
   };
   std::map<std::pair<std::string, bool>, Imported> imports_;  ///< by path and whether centred
 };
-
-/// Checks the coordinates of all solids. Warns of a solid so large that its faces are too imprecise
-/// for the solids it meets. @return kGeometry naming the first solid that is too large to be
-/// handled
-Result<void> check_coordinates(Scene& scene);
 
 }  // namespace strata::csg

@@ -10,6 +10,7 @@
 #include <optional>
 #include <unordered_map>
 
+#include "csg/outline/triangulate_pieces.h"
 #include "csg/solids/plane_section.h"
 #include "strata/mesh/shapes.h"
 #include "strata/mesh/soup_tools.h"

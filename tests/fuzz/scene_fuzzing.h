@@ -3,6 +3,7 @@
 #include <cmath>
 #include <string_view>
 
+#include "csg/outline/extrude.h"
 #include "csg/outline/outline.h"
 #include "strata/mesh/triangle_soup.h"
 #include "tests/fuzz/mesh_fuzzing.h"

@@ -1,5 +1,6 @@
 // Text: lines for the font, the direction, the script, and what is set.
 #include "csg/outline/outline.h"
+#include "csg/outline/text.h"
 #include "tests/fuzz/scene_fuzzing.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

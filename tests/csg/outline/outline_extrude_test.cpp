@@ -4,7 +4,9 @@
 #include <limits>
 #include <numbers>
 
+#include "csg/outline/extrude.h"
 #include "csg/outline/outline.h"
+#include "csg/outline/shadow.h"
 #include "strata/mesh/diagnose.h"
 #include "tests/csg/outline/outline_checks.h"
 

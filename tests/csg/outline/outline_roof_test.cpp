@@ -4,6 +4,7 @@
 #include <random>
 
 #include "csg/outline/outline.h"
+#include "csg/outline/roof.h"
 #include "strata/mesh/diagnose.h"
 #include "tests/csg/outline/outline_checks.h"
 

@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "csg/outline/extrude.h"
+#include "csg/outline/text.h"
 #include "mesh/polygons/plane_predicates.h"
 #include "tests/csg/outline/outline_checks.h"
 

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "csg/outline/outline.h"
+#include "csg/outline/text.h"
 #include "tests/csg/outline/outline_checks.h"
 
 namespace strata::csg {

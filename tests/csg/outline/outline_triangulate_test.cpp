@@ -4,6 +4,7 @@
 #include <numbers>
 #include <random>
 
+#include "csg/outline/triangulate_pieces.h"
 #include "tests/csg/outline/outline_checks.h"
 
 namespace strata::csg {

@@ -1,3 +1,6 @@
+// Checks and warnings for solids that are far larger than the others.
+#include "csg/scene/vast_solids.h"
+
 #include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>
@@ -5,10 +8,7 @@
 #include <set>
 #include <unordered_map>
 
-#include "csg/scene/evaluator.h"
 #include "mesh/clamp.h"
-
-// Checks and warnings for solids that are far larger than the others.
 
 namespace strata::csg {
 namespace {
