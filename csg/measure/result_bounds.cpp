@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <glm/vector_relational.hpp>
 #include <limits>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -203,24 +204,14 @@ Side value_of(const Tree& tree, Tree::NodeId root, const std::vector<Side>& soli
   return values[root];
 }
 
-}  // namespace
+/// A vertex of a solid that a side of the result may reach.
+struct Candidate {
+  glm::dvec3 point;
+  std::uint32_t solid;
+};
 
-Bounds reached_vertices(const Tree& tree, Tree::NodeId root, const Geometry& geometry,
-                        const Bounds& known, double tolerance) {
-  constexpr std::size_t kMostVertices = 64;             // for each side
-  constexpr std::uint64_t kMostTriangles = 50'000'000;  // visited in total
-  struct Candidate {
-    glm::dvec3 point;
-    std::uint32_t solid;
-  };
-  const auto& parts = geometry.parts();
-  Bounds reached;
-  if (root == Tree::kNone) return reached;
-  tolerance = std::max(tolerance, 1e-9 * glm::length(geometry.box().high - geometry.box().low));
-  const Bounds outer = bounds(tree, root);
-  std::uint64_t looked_at = 0;
-  std::vector<Side> sides(parts.size(), Side::kOutside);
-  // Only vertices that a triangle uses count.
+/// For each solid, the vertices that a triangle uses. Only they count.
+std::vector<std::vector<bool>> used_vertices(std::span<const Geometry::Part> parts) {
   std::vector<std::vector<bool>> used(parts.size());
   for (std::size_t solid = 0; solid < parts.size(); ++solid) {
     used[solid].resize(parts[solid].positions.size(), false);
@@ -228,41 +219,67 @@ Bounds reached_vertices(const Tree& tree, Tree::NodeId root, const Geometry& geo
       for (int k = 0; k < 3; ++k) used[solid][t[k]] = true;
     }
   }
+  return used;
+}
+
+/// Keeps the outermost candidates of a side, the outermost first; equal ones in a fixed order.
+void keep_outermost(std::vector<Candidate>& candidates, std::size_t i) {
+  constexpr std::size_t kMostVertices = 64;
+  const int axis = static_cast<int>(i) % 3;
+  const auto out = [&](const glm::dvec3& p) { return i < 3 ? -p[axis] : p[axis]; };
+  const auto first = [&](const Candidate& a, const Candidate& b) {
+    if (out(a.point) != out(b.point)) return out(a.point) > out(b.point);
+    if (a.solid != b.solid) return a.solid < b.solid;
+    for (int k = 0; k < 3; ++k) {
+      if (a.point[k] != b.point[k]) return a.point[k] < b.point[k];
+    }
+    return false;
+  };
+  const auto middle =
+      candidates.begin() + static_cast<std::ptrdiff_t>(std::min(candidates.size(), kMostVertices));
+  std::partial_sort(candidates.begin(), middle, candidates.end(), first);
+  candidates.erase(middle, candidates.end());
+}
+
+}  // namespace
+
+Bounds reached_vertices(const Tree& tree, Tree::NodeId root, const Geometry& geometry,
+                        const Bounds& known, double tolerance) {
+  constexpr std::uint64_t kMostTriangles = 50'000'000;  // visited in total
+  const auto& parts = geometry.parts();
+  Bounds reached;
+  if (root == Tree::kNone) return reached;
+  tolerance = std::max(tolerance, 1e-9 * glm::length(geometry.box().high - geometry.box().low));
+  const Bounds outer = bounds(tree, root);
+  std::uint64_t looked_at = 0;
+  std::vector<Side> sides(parts.size(), Side::kOutside);
+  const std::vector<std::vector<bool>> used = used_vertices(parts);
   std::vector<Candidate> candidates;
   for (std::size_t i = 0; i < 6; ++i) {
     const int axis = static_cast<int>(i) % 3;
-    const auto out = [&](const glm::dvec3& p) { return i < 3 ? -p[axis] : p[axis]; };
     candidates.clear();
     for (std::uint32_t solid = 0; solid < parts.size(); ++solid) {
       for (std::size_t at = 0; at < used[solid].size(); ++at) {
         const glm::dvec3& p = parts[solid].positions[at];
-        if (-side(known, i) < out(p) && used[solid][at] && inside_closed(p, outer)) {
+        const double out = i < 3 ? -p[axis] : p[axis];
+        if (-side(known, i) < out && used[solid][at] && inside_closed(p, outer)) {
           candidates.push_back({p, solid});
         }
       }
     }
-    const auto first = [&](const Candidate& a, const Candidate& b) {
-      if (out(a.point) != out(b.point)) return out(a.point) > out(b.point);
-      if (a.solid != b.solid) return a.solid < b.solid;
-      for (int k = 0; k < 3; ++k) {
-        if (a.point[k] != b.point[k]) return a.point[k] < b.point[k];
-      }
-      return false;
-    };
-    const auto middle = candidates.begin() +
-                        static_cast<std::ptrdiff_t>(std::min(candidates.size(), kMostVertices));
-    std::partial_sort(candidates.begin(), middle, candidates.end(), first);
-    for (auto at = candidates.begin(); at != middle && looked_at < kMostTriangles; ++at) {
+    keep_outermost(candidates, i);
+    for (const Candidate& candidate : candidates) {
+      if (looked_at >= kMostTriangles) break;
       for (std::size_t solid = 0; solid < parts.size(); ++solid) {
-        if (solid == at->solid) {
+        if (solid == candidate.solid) {
           sides[solid] = Side::kInside;  // some points near the vertex lie inside its own solid
           continue;
         }
-        sides[solid] = side_of(at->point, parts[solid], tolerance);
+        sides[solid] = side_of(candidate.point, parts[solid], tolerance);
         looked_at += parts[solid].triangles.size();
       }
       if (value_of(tree, root, sides) != Side::kInside) continue;
-      reached.include(at->point);
+      reached.include(candidate.point);
       break;
     }
   }

@@ -241,6 +241,22 @@ struct Preview::Impl {
   Result<Picture> picture(const Camera& camera, const glm::ivec2& size,
                           const PictureOptions& options, const Execution& execution);
 
+  /// How a picture is shaded.
+  struct Look {
+    const PictureOptions& options;
+    Shader shader;
+    Rgba background;
+  };
+  /// The report of a picture, and the samples of the band that is drawn.
+  struct Work {
+    DrawReport total;
+    std::vector<Rgba> samples;
+  };
+  Result<void> shade_tiles(const View& view, const Look& look, int width, std::span<Rgba> pixels,
+                           const Execution& execution, Work& work);
+  Result<void> shade_samples(const View& view, const Look& look, int width, std::span<Rgba> pixels,
+                             Execution execution, Work& work);
+
   Tree tree;
   std::vector<Translucent> translucent;
   Tree::NodeId opaque_root;
@@ -269,6 +285,44 @@ Result<View> Preview::Impl::view(const Camera& camera, const glm::ivec2& size,
   return made;
 }
 
+/// Shades the pixels of a band tile by tile, while the tiles are drawn: one sample a pixel.
+Result<void> Preview::Impl::shade_tiles(const View& view, const Look& look, int width,
+                                        std::span<Rgba> pixels, const Execution& execution,
+                                        Work& work) {
+  std::atomic<std::uint64_t> covered{0};
+  const auto on_tile = [&](const SurfaceImage& tile, const PixelRect& rect) {
+    covered += shade_tile(tile, rect, look.shader, look.background, width, pixels);
+  };
+  if (auto done = frame.draw(view, execution, on_tile); !done) return done;
+  work.total.fragments += frame.report().fragments;
+  work.total.resolved += frame.report().resolved;
+  work.total.covered += covered;
+  return {};
+}
+
+/// Draws all samples of a band, then edges and ghosts over them, and averages them to pixels.
+Result<void> Preview::Impl::shade_samples(const View& view, const Look& look, int width,
+                                          std::span<Rgba> pixels, Execution execution, Work& work) {
+  const auto image = draw(view, execution);
+  if (!image) return tl::unexpected(image.error());
+  work.total.fragments += report.fragments;
+  work.total.resolved += report.resolved;
+  execution.progress = {};
+  const auto [across, down] = sample_grid(look.options.samples);
+  work.samples.resize((*image)->depth.size());
+  shade(**image, look.shader, Rgba(0), execution, work.samples);
+  if (look.options.edges) draw_edges(**image, look.shader, across, down, execution, work.samples);
+  if (!painter.empty()) {
+    if (auto done = painter.paint(view, **image, look.shader, execution, work.samples); !done) {
+      return done;
+    }
+    work.total.fragments += painter.fragments();
+  }
+  work.total.covered +=
+      average(work.samples, across, down, look.background, execution, width, pixels);
+  return {};
+}
+
 Result<Picture> Preview::Impl::picture(const Camera& camera, const glm::ivec2& size,
                                        const PictureOptions& options, const Execution& execution) {
   if (options.samples < 1 || options.samples > 64 ||
@@ -286,8 +340,8 @@ Result<Picture> Preview::Impl::picture(const Camera& camera, const glm::ivec2& s
   }
   const ColourScheme& scheme =
       options.scheme != nullptr ? *options.scheme : colour_schemes().front();
-  const Shader shader(tree, geometry, *whole, scheme);
-  const Rgba background = options.transparent_background ? Rgba(0) : Rgba(scheme.background, 255);
+  const Look look{options, Shader(tree, geometry, *whole, scheme),
+                  options.transparent_background ? Rgba(0) : Rgba(scheme.background, 255)};
   Picture result{size.x, size.y, {}};
   const auto width = static_cast<std::size_t>(size.x);
   result.pixels.resize(width * static_cast<std::size_t>(size.y));
@@ -297,8 +351,7 @@ Result<Picture> Preview::Impl::picture(const Camera& camera, const glm::ivec2& s
       kSamplesAtOnce / samples_a_row, std::max(1, kTileSide / down), size.y));
   const bool direct =
       options.samples == 1 && painter.empty() && !options.edges && !frame.has_source();
-  std::vector<Rgba> samples;
-  DrawReport total;
+  Work work;
   for (int first = 0; first < size.y; first += rows_at_once) {
     const int rows = std::min(rows_at_once, size.y - first);
     // Edges look one row down.
@@ -313,35 +366,12 @@ Result<Picture> Preview::Impl::picture(const Camera& camera, const glm::ivec2& s
     const auto pixels = std::span(result.pixels)
                             .subspan(static_cast<std::size_t>(first) * width,
                                      static_cast<std::size_t>(rows) * width);
-    if (direct) {
-      std::atomic<std::uint64_t> covered{0};
-      const auto on_tile = [&](const SurfaceImage& tile, const PixelRect& rect) {
-        covered += shade_tile(tile, rect, shader, background, size.x, pixels);
-      };
-      if (auto done = frame.draw(view, part, on_tile); !done) return tl::unexpected(done.error());
-      total.fragments += frame.report().fragments;
-      total.resolved += frame.report().resolved;
-      total.covered += covered;
-      continue;
-    }
-    const auto image = draw(view, part);
-    if (!image) return tl::unexpected(image.error());
-    total.fragments += report.fragments;
-    total.resolved += report.resolved;
-    part.progress = {};
-    samples.resize((*image)->depth.size());
-    shade(**image, shader, Rgba(0), part, samples);
-    if (options.edges) draw_edges(**image, shader, across, down, part, samples);
-    if (!painter.empty()) {
-      if (auto done = painter.paint(view, **image, shader, part, samples); !done) {
-        return tl::unexpected(done.error());
-      }
-      total.fragments += painter.fragments();
-    }
-    total.covered += average(samples, across, down, background, part, size.x, pixels);
+    const auto done = direct ? shade_tiles(view, look, size.x, pixels, part, work)
+                             : shade_samples(view, look, size.x, pixels, part, work);
+    if (!done) return tl::unexpected(done.error());
   }
   if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
-  report = total;
+  report = work.total;
   report_covers = true;
   return result;
 }

@@ -383,31 +383,32 @@ Result<bool> HashStore::look_at_failures(const std::vector<Counts>& counts) {
   return look_at_layers();
 }
 
-/// Refuses a pixel with more fragments than ages; else gives every band that failed more room.
-Result<bool> HashStore::look_at_layers() {
+/// Reads the number of fragments of each pixel of a band. Refuses a pixel with more than ages.
+Result<void> HashStore::read_layers(Band& band) {
   const unsigned ages =
       options_.age_limit == 0 ? Record32::kAgeMax : std::min(options_.age_limit, Record32::kAgeMax);
+  std::vector<std::uint32_t> layers(band.pixels);
+  band.table.download(std::span(layers));
+  if (auto checked = check_errors("hash store"); !checked) return checked;
+  const auto deepest = std::max_element(layers.begin(), layers.end());
+  band.layers_counted = true;
+  band.deepest = *deepest;
+  band.table.clear();
+  if (*deepest <= ages) return {};
+  const auto pixel = static_cast<std::uint64_t>(deepest - layers.begin());
+  return fail(ErrorCode::kLimit,
+              "hash store: pixel ({}, {}) has {} fragments, but {} counts at most {}; use the "
+              "count/scan store",
+              pixel % width_, band.rows.begin + pixel / width_, *deepest, name_of_words(), ages);
+}
+
+/// Refuses a pixel with more fragments than ages; else gives every band that failed more room.
+Result<bool> HashStore::look_at_layers() {
   const bool counted = mode_ == Mode::kCountLayers;
   for (const std::size_t i : active_) {
     Band& band = bands_[i];
     if (counted) {
-      std::vector<std::uint32_t> layers(band.pixels);
-      band.table.download(std::span(layers));
-      if (auto checked = check_errors("hash store"); !checked) {
-        return tl::unexpected(checked.error());
-      }
-      const auto deepest = std::max_element(layers.begin(), layers.end());
-      band.layers_counted = true;
-      band.deepest = *deepest;
-      band.table.clear();
-      if (*deepest > ages) {
-        const auto pixel = static_cast<std::uint64_t>(deepest - layers.begin());
-        return fail(
-            ErrorCode::kLimit,
-            "hash store: pixel ({}, {}) has {} fragments, but {} counts at most {}; use the "
-            "count/scan store",
-            pixel % width_, band.rows.begin + pixel / width_, *deepest, name_of_words(), ages);
-      }
+      if (auto read = read_layers(band); !read) return tl::unexpected(read.error());
     }
     if (band.offset_kind == OffsetKind::kPlaneFirst && band.pixels * band.deepest <= band.cells) {
       // There was a cell for every fragment: a thread took too many steps. Where bands have fewer

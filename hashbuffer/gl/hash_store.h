@@ -134,6 +134,7 @@ class HashStore final : public Store {
   [[nodiscard]] Result<void> begin_bands();
   [[nodiscard]] Result<std::vector<Counts>> clear_and_count();
   [[nodiscard]] Result<bool> look_at_failures(const std::vector<Counts>& counts);
+  [[nodiscard]] Result<void> read_layers(Band& band);
   [[nodiscard]] Result<bool> look_at_layers();
 
   std::uint64_t expected_ = 0;  ///< fragments of the next frame; 0: not known

@@ -349,18 +349,25 @@ void Panels::waiting(double seconds) const {
   ImGui::Dummy(size);
 }
 
-void Panels::messages(Viewer& viewer, const Area& area) {
-  constexpr ImGuiWindowFlags kBox =
-      ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_AlwaysAutoResize |
-      ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoFocusOnAppearing;
-  const auto at = [&](float x, float y) {
-    return ImVec2(static_cast<float>(area.at.x) + x, static_cast<float>(area.at.y) + y);
-  };
-  const auto width = static_cast<float>(area.size.x), height = static_cast<float>(area.size.y);
-  std::string trouble = viewer.load_error();
-  if (!trouble.empty() && !viewer.draw_error().empty()) trouble += '\n';
-  trouble += viewer.draw_error();
-  const bool wrong = !trouble.empty();
+namespace {
+
+constexpr ImGuiWindowFlags kBox =
+    ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_AlwaysAutoResize |
+    ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoFocusOnAppearing;
+
+ImVec2 place(const Area& area, double x, double y) {
+  return {static_cast<float>(area.at.x) + static_cast<float>(x),
+          static_cast<float>(area.at.y) + static_cast<float>(y)};
+}
+
+}  // namespace
+
+/// Errors of loading and drawing, or the warnings of the scene.
+void Panels::trouble(Viewer& viewer, const Area& area) {
+  std::string errors = viewer.load_error();
+  if (!errors.empty() && !viewer.draw_error().empty()) errors += '\n';
+  errors += viewer.draw_error();
+  const bool wrong = !errors.empty();
   std::vector<std::string> lines;
   if (viewer.model() != nullptr && hidden_warnings_ != viewer.loads()) {
     lines = viewer.model()->warnings;
@@ -371,15 +378,15 @@ void Panels::messages(Viewer& viewer, const Area& area) {
     lines.resize(kMostLines - 1);
     lines.push_back(fmt::format("and {} more", counted(more, "warning")));
   }
-  const float wrap = std::max(80 * scale_, width - 48 * scale_);
+  const float wrap = std::max(80 * scale_, static_cast<float>(area.size.x) - 48 * scale_);
   if (wrong || (viewer.show_panels && !lines.empty())) {
-    ImGui::SetNextWindowPos(at(12 * scale_, 12 * scale_));
+    ImGui::SetNextWindowPos(place(area, 12 * scale_, 12 * scale_));
     ImGui::PushStyleColor(ImGuiCol_WindowBg, wrong ? ImVec4(0.45f, 0.07f, 0.07f, 0.95f)
                                                    : ImVec4(0.36f, 0.27f, 0.05f, 0.93f));
     ImGui::Begin("trouble", nullptr, kBox);
     ImGui::PushTextWrapPos(wrap);
     if (wrong) {
-      text(trouble);
+      text(errors);
       if (viewer.model() != nullptr) faint("The window shows the version before.");
     } else {
       for (const std::string& line : lines) text(line);
@@ -389,32 +396,42 @@ void Panels::messages(Viewer& viewer, const Area& area) {
     ImGui::End();
     ImGui::PopStyleColor();
   }
+}
+
+/// A box with the progress of loading.
+void Panels::loading(Viewer& viewer, const Area& area) {
+  const ImVec2 middle = place(area, area.size.x / 2.0, area.size.y / 2.0);
+  ImGui::SetNextWindowPos(middle, 0, {0.5f, 0.5f});
+  ImGui::Begin("loading", nullptr, kBox);
+  text(fmt::format("Reading {} ... {:.0f} s", viewer.options().command.input.files.front(),
+                   viewer.load_seconds()));
+  const double progress = viewer.load_progress();
+  if (progress > 0) {
+    ImGui::ProgressBar(static_cast<float>(progress), {260 * scale_, 0});
+  } else {
+    waiting(viewer.load_seconds());
+  }
+  ImGui::SameLine();
+  if (ImGui::Button("Cancel")) viewer.cancel_load();
+  ImGui::End();
+}
+
+void Panels::messages(Viewer& viewer, const Area& area) {
+  trouble(viewer, area);
+  const double width = area.size.x, height = area.size.y;
+  const ImVec2 middle = place(area, width / 2, height / 2);
   const bool whole = viewer.frame() != nullptr && viewer.frame()->divisor == 1;
   if (whole && viewer.frame()->report.covered == 0 && !viewer.loading()) {
-    ImGui::SetNextWindowPos(at(width / 2, height / 2), 0, {0.5f, 0.5f});
+    ImGui::SetNextWindowPos(middle, 0, {0.5f, 0.5f});
     ImGui::Begin("empty", nullptr, kBox | ImGuiWindowFlags_NoInputs);
     text(viewer.model() != nullptr && viewer.model()->box.empty()
              ? "This scene is empty."
              : "Nothing is in view. Press f to show everything.");
     ImGui::End();
   }
-  if (viewer.loading() && viewer.load_seconds() > 0.25) {
-    ImGui::SetNextWindowPos(at(width / 2, height / 2), 0, {0.5f, 0.5f});
-    ImGui::Begin("loading", nullptr, kBox);
-    text(fmt::format("Reading {} ... {:.0f} s", viewer.options().command.input.files.front(),
-                     viewer.load_seconds()));
-    const double progress = viewer.load_progress();
-    if (progress > 0) {
-      ImGui::ProgressBar(static_cast<float>(progress), {260 * scale_, 0});
-    } else {
-      waiting(viewer.load_seconds());
-    }
-    ImGui::SameLine();
-    if (ImGui::Button("Cancel")) viewer.cancel_load();
-    ImGui::End();
-  }
+  if (viewer.loading() && viewer.load_seconds() > 0.25) loading(viewer, area);
   if (!told_.empty() && Viewer::Clock::now() - told_at_ < std::chrono::seconds(4)) {
-    ImGui::SetNextWindowPos(at(width / 2, height - 14 * scale_), 0, {0.5f, 1.0f});
+    ImGui::SetNextWindowPos(place(area, width / 2, height - 14 * scale_), 0, {0.5f, 1.0f});
     ImGui::Begin("told", nullptr, kBox | ImGuiWindowFlags_NoInputs);
     text(told_);
     ImGui::End();

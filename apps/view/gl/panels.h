@@ -35,6 +35,8 @@ class Panels {
   void status(const Viewer& viewer, const glm::ivec2& window);
   void waiting(double seconds) const;
   void messages(Viewer& viewer, const Area& area);
+  void trouble(Viewer& viewer, const Area& area);
+  void loading(Viewer& viewer, const Area& area);
   void axes(const Viewer& viewer, const Area& area);
   void handle(const Viewer& viewer, const Area& area);
   void mark(const Viewer& viewer, const Area& area);
