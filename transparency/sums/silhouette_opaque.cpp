@@ -56,7 +56,8 @@ void for_each_tile(const FrameInfo& frame, const TileTriangles& tiles, const glm
   }
 }
 
-Result<std::shared_ptr<const void>> prepare(const FrameInfo& frame, const Settings&) {
+Result<std::shared_ptr<const void>> prepare(const FrameInfo& frame, const Settings&,
+                                            const Execution&) {
   const FrameTriangles& triangles = *frame.triangles;
   auto tiles = std::make_shared<TileTriangles>();
   tiles->tiles_u = (frame.size.x + kTileSide - 1) / kTileSide;
