@@ -17,8 +17,10 @@ class Buffer {
  public:
   Buffer() = default;
   ~Buffer() { reset(); }
+  /// Leaves `other` empty.
   Buffer(Buffer&& other) noexcept
       : id_(std::exchange(other.id_, 0)), bytes_(std::exchange(other.bytes_, 0)) {}
+  /// Deletes the buffer held before; leaves `other` empty.
   Buffer& operator=(Buffer&& other) noexcept {
     if (this != &other) {
       reset();
@@ -39,8 +41,10 @@ class Buffer {
     return buffer;
   }
 
-  [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
+  [[nodiscard]] std::uint64_t bytes() const { return bytes_; }  ///< size, as it was asked for
+  /// The name that OpenGL gave it; 0 if there is none.
   [[nodiscard]] unsigned id() const { return id_; }
+  /// True if there is a buffer.
   [[nodiscard]] explicit operator bool() const { return id_ != 0; }
 
   /// Makes room for `bytes` if there is less; the content is lost then. The old buffer goes first.
@@ -67,6 +71,7 @@ class Buffer {
     static_assert(std::is_trivially_copyable_v<T>);
     download_bytes(data.data(), data.size_bytes(), offset);
   }
+  /// A copy of the content, as download().
   template <class T>
   [[nodiscard]] std::vector<T> download_all() const {
     std::vector<T> data(bytes_ / sizeof(T));

@@ -19,8 +19,8 @@ Result<const Technique*> find_technique(std::string_view name);
 
 /// A technique with its settings, of a text NAME[:K][:VARIANT], such as "mlab:8".
 struct ChosenTechnique {
-  const Technique* technique = nullptr;
-  Settings settings;
+  const Technique* technique = nullptr;  ///< of the table
+  Settings settings;                     ///< k and variant are those of the text
 };
 /// @param settings  what the text does not say @return kUsage naming the text
 Result<ChosenTechnique> parse_technique(std::string_view text, const Settings& settings = {});

@@ -14,6 +14,7 @@
 
 namespace strata::csg {
 
+/// Settings of SeeThrough::make().
 struct SeeThroughOptions {
   /// Opacity, in [0, 1], of all solids whose colour has no alpha. Empty: 1 if the scene has an
   /// alpha below 1 or a ghost, else 0.5.
@@ -38,9 +39,9 @@ class SeeThrough {
                                                   const transparency::FrameOptions& options = {},
                                                   const Execution& execution = {}) const;
 
-  [[nodiscard]] float opacity() const;          ///< of solids whose colour has no alpha
-  [[nodiscard]] std::uint64_t objects() const;  ///< parts with a colour or a tree of their own
-  [[nodiscard]] std::uint64_t triangles() const;
+  [[nodiscard]] float opacity() const;            ///< of solids whose colour has no alpha
+  [[nodiscard]] std::uint64_t objects() const;    ///< parts with a colour or a tree of their own
+  [[nodiscard]] std::uint64_t triangles() const;  ///< of all objects
 
  private:
   struct Impl;

@@ -24,6 +24,7 @@ namespace strata::transparency {
 /// The largest extinction, and the brightest light.
 inline constexpr double kMostExtinction = 1e6;
 
+/// What fills a solid evenly.
 struct Medium {
   glm::vec3 extinction{0.0f};  ///< red, green, blue; per world unit; 0 to kMostExtinction
   glm::vec3 albedo{1.0f};      ///< red, green, blue; in [0, 1]
@@ -33,17 +34,18 @@ struct Medium {
   std::optional<glm::vec4> surface_colour = {};
 };
 
+/// The medium of some objects.
 struct NamedMedium {
   std::string object;  ///< name of the objects of the scene; "*": all that are not named
-  Medium medium;
+  Medium medium;       ///< in each of them
 };
 
 /// A ball of a homogeneous medium. Particles may overlap each other and solids.
 struct Particle {
-  glm::dvec3 centre{0.0};
-  double radius = 1.0;  ///< above 0
-  glm::vec3 extinction{1.0f};
-  glm::vec3 albedo{1.0f};
+  glm::dvec3 centre{0.0};      ///< world
+  double radius = 1.0;         ///< world units, above 0
+  glm::vec3 extinction{1.0f};  ///< as Medium::extinction
+  glm::vec3 albedo{1.0f};      ///< as Medium::albedo
 };
 
 /// A light that is so far away that its rays are parallel, or one at a point.
@@ -62,11 +64,12 @@ struct MediaLight {
   int shadow_steps = 0;
 };
 
+/// The media of a scene, and their light.
 struct MediaSettings {
-  std::vector<NamedMedium> media;
-  glm::vec3 ambient{1.0f};  ///< light from everywhere, that media scatter
-  MediaLight light;
-  std::vector<Particle> particles;
+  std::vector<NamedMedium> media;   ///< of the objects of the scene
+  glm::vec3 ambient{1.0f};          ///< light from everywhere, that media scatter
+  MediaLight light;                 ///< one more light
+  std::vector<Particle> particles;  ///< besides the solids
 };
 
 /// Reads settings from a JSON file; docs/media.md says what it holds. @return kInput naming the
@@ -75,15 +78,16 @@ Result<MediaSettings> read_media(const std::string& path);
 
 /// What a picture showed about a solid that holds a medium.
 struct SolidReport {
-  std::string object;
+  std::string object;        ///< its name
   std::uint64_t pixels = 0;  ///< pixels (samples) whose rays cross it
   /// Pixels where rays do not enter it as often as they leave it: the solid is not closed. Its
   /// medium is left out there.
   std::uint64_t unbalanced_pixels = 0;
 };
 
+/// A picture with media.
 struct MediaRendering {
-  Rendering rendering;
+  Rendering rendering;              ///< the picture, and what it cost
   std::vector<SolidReport> solids;  ///< the objects with a medium, in the order of the scene
 };
 

@@ -18,8 +18,9 @@ namespace strata::transparency {
 
 /// A picture in linear red, green, blue, alpha; premultiplied. Rows from the top.
 struct Image {
-  int width = 0, height = 0;
-  std::vector<glm::vec4> pixels;
+  int width = 0;                  ///< pixels
+  int height = 0;                 ///< pixels
+  std::vector<glm::vec4> pixels;  ///< width * height, row by row
 };
 
 /// To 8 bits a channel, not premultiplied, each rounded once: to nearest, halves up.
@@ -27,12 +28,14 @@ struct Image {
 
 /// A fragment of one's own, instead of triangles.
 struct ListedFragment {
-  int u = 0, v = 0;         ///< pixel, from the top left
+  int u = 0;                ///< column of the pixel, from the left
+  int v = 0;                ///< row of the pixel, from the top
   std::uint32_t depth = 0;  ///< below 2^24
   std::uint32_t face = 0;   ///< of the colours; below 2^31
   bool exit = false;        ///< the ray leaves a solid there
 };
 
+/// Settings of a frame.
 struct FrameOptions {
   glm::ivec2 size{0};  ///< pixels; of a frame of listed fragments
   /// Samples a pixel: 1, 2, 4, 8, 16, 32 or 64, on a regular grid. The picture is their mean.
@@ -45,8 +48,8 @@ struct FrameOptions {
 
 /// The picture of a technique, and what it cost.
 struct Rendering {
-  Image image;
-  Costs costs;
+  Image image;                     ///< the picture
+  Costs costs;                     ///< counted, the same on every machine
   double seconds = 0.0;            ///< wall clock, all of it
   double technique_seconds = 0.0;  ///< of all threads together, without making the stream
   double raster_seconds = 0.0;     ///< of all threads together, for making the stream
@@ -68,7 +71,9 @@ class Frame {
   /// Fragments of a source of this library.
   Frame(std::shared_ptr<const FragmentSource> source, const FrameOptions& options);
 
+  /// The settings given to make().
   [[nodiscard]] const FrameOptions& options() const { return options_; }
+  /// Where the fragments come from; for techniques of this library.
   [[nodiscard]] const FragmentSource& source() const { return *source_; }
 
   /// The picture. Same bits for any number of threads. @return kUsage (settings, a technique that

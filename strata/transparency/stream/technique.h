@@ -38,7 +38,7 @@ enum class Blending : std::uint8_t {
 struct Settings {
   /// Rows, slots, samples, nodes or buckets a pixel; 0: the technique's own number.
   unsigned k = 0;
-  std::uint64_t seed = 1;
+  std::uint64_t seed = 1;  ///< of techniques that draw random numbers
   /// Records over cells that hash tables aim at, in (0, 1].
   double load = 0.5;
   /// Fragments behind this much opacity may be left out, where a technique does so; in (0, 1].
@@ -49,23 +49,24 @@ struct Settings {
 
 /// What a picture cost. Counts are sums over tiles; passes are the most of any tile.
 struct Costs {
-  std::uint64_t geometry_passes = 0;
-  std::uint64_t fragments = 0;    ///< of the stream, once
-  std::uint64_t rasterized = 0;   ///< fragments of all geometry passes together
-  std::uint64_t shaded = 0;       ///< colours that were looked up
-  std::uint64_t stored = 0;       ///< fragments that were written to memory
-  std::uint64_t kept = 0;         ///< fragments that were in memory when the pixel was resolved
-  std::uint64_t lost = 0;         ///< fragments that do not contribute though they are seen
-  std::uint64_t merged = 0;       ///< fragments that were merged with others
-  std::uint64_t comparisons = 0;  ///< of depths
-  std::uint64_t queries = 0;      ///< occlusion queries that find an order of objects
-  std::uint64_t most_layers = 0;  ///< fragments of the deepest pixel
+  std::uint64_t geometry_passes = 0;  ///< walks over the stream
+  std::uint64_t fragments = 0;        ///< of the stream, once
+  std::uint64_t rasterized = 0;       ///< fragments of all geometry passes together
+  std::uint64_t shaded = 0;           ///< colours that were looked up
+  std::uint64_t stored = 0;           ///< fragments that were written to memory
+  std::uint64_t kept = 0;             ///< fragments that were in memory when the pixel was resolved
+  std::uint64_t lost = 0;             ///< fragments that do not contribute though they are seen
+  std::uint64_t merged = 0;           ///< fragments that were merged with others
+  std::uint64_t comparisons = 0;      ///< of depths
+  std::uint64_t queries = 0;          ///< occlusion queries that find an order of objects
+  std::uint64_t most_layers = 0;      ///< fragments of the deepest pixel
   /// Bytes of the whole picture by the formula of the technique's paper.
   std::uint64_t formula_bytes = 0;
   /// Bytes of the technique's arrays for the whole picture, added up over its tiles. Only the tiles
   /// in work are in memory.
   std::uint64_t allocated_bytes = 0;
 
+  /// Adds counts, and takes the larger passes and layers.
   void add(const Costs& other);
 };
 
@@ -78,13 +79,15 @@ using TileRenderer = std::function<Result<void>(TileStream& stream, TileImage& i
 
 /// A technique: a row of the table of techniques.
 struct Technique {
-  std::string_view name;   ///< as options have it: "dual-peeling"
-  std::string_view title;  ///< "Dual depth peeling"
-  std::string_view paper;  ///< authors, title, year
-  Accuracy accuracy = Accuracy::kExact;
+  std::string_view name;                       ///< as options have it: "dual-peeling"
+  std::string_view title;                      ///< "Dual depth peeling"
+  std::string_view paper;                      ///< authors, title, year
+  Accuracy accuracy = Accuracy::kExact;        ///< what its picture can be relied on for
   Blending blending = Blending::kFrontToBack;  ///< of an exact one
-  std::string_view k_means = {};  ///< what Settings::k counts: "rows"; empty: it is ignored
-  unsigned default_k = 0, least_k = 0, most_k = 0;
+  std::string_view k_means = {};   ///< what Settings::k counts: "rows"; empty: it is ignored
+  unsigned default_k = 0;          ///< where Settings::k is 0
+  unsigned least_k = 0;            ///< smallest Settings::k
+  unsigned most_k = 0;             ///< largest Settings::k
   std::string_view variants = {};  ///< separated by spaces, the default first; empty: it has none
   std::string_view memory = {};    ///< bytes, by the paper's formula, in words
   std::string_view fails = {};     ///< where its picture is wrong, or what it cannot do
