@@ -39,6 +39,12 @@ void check(const LdiCommand& command) {
   must(!command.input.files.empty() && !command.output.empty(), "there are an input and an output");
 }
 
+void check(const OitCommand& command) {
+  check(command.common);
+  must(command.list || !command.input.files.empty(), "there is an input");
+  must(command.size.x >= 1 && command.size.y >= 1, "a picture has pixels");
+}
+
 void check(const CsgCommand& command) {
   check(command.common);
   must(!command.input.files.empty(), "there is an input");
