@@ -13,7 +13,9 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include <new>
 #include <optional>
+#include <stdexcept>
 #else
 #include <system_error>
 #include <vector>
@@ -58,14 +60,20 @@ void parallel_for(const Execution& execution, std::size_t count,
     run(0);
   } else {
 #ifdef STRATA_USE_TBB
-    // Left alone, oneTBB never runs more threads than there are processors; who asks for more, to
-    // test what schedules do, gets them.
-    std::optional<tbb::global_control> more;
-    if (workers > allowed_processors()) {
-      more.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(workers));
+    try {
+      // Left alone, oneTBB never runs more threads than there are processors; who asks for more, to
+      // test what schedules do, gets them.
+      std::optional<tbb::global_control> more;
+      if (workers > allowed_processors()) {
+        more.emplace(tbb::global_control::max_allowed_parallelism,
+                     static_cast<std::size_t>(workers));
+      }
+      tbb::task_arena arena(workers);
+      arena.execute([&] { tbb::parallel_for(0, workers, run, tbb::simple_partitioner()); });
+    } catch (const std::runtime_error&) {
+      // Not a body's, which run() keeps: oneTBB reports threads that the system refuses like this.
+      throw std::bad_alloc();
     }
-    tbb::task_arena arena(workers);
-    arena.execute([&] { tbb::parallel_for(0, workers, run, tbb::simple_partitioner()); });
 #else
     std::vector<std::jthread> pool;
     pool.reserve(static_cast<std::size_t>(workers));

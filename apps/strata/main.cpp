@@ -32,6 +32,11 @@
 namespace strata::apps {
 namespace {
 
+/// True if a thread could not be started: oneTBB reports that in words only.
+bool is_refused_thread(const std::runtime_error& failure) {
+  return std::string_view(failure.what()).find("pthread_create") != std::string_view::npos;
+}
+
 /// Where no catch clause can reach, such as in another library's thread: a sentence and a code all
 /// the same.
 [[noreturn]] void on_terminate() {
@@ -44,6 +49,9 @@ namespace {
     what = kNoMemory;
   } catch (const std::system_error& failure) {  // threads that cannot be started, above all
     code = static_cast<int>(ErrorCode::kLimit);
+    what = failure.what();
+  } catch (const std::runtime_error& failure) {  // a thread of oneTBB starts others
+    if (is_refused_thread(failure)) code = static_cast<int>(ErrorCode::kLimit);
     what = failure.what();
   } catch (const std::exception& failure) {
     what = failure.what();
@@ -95,8 +103,7 @@ Result<void> run(const AnyCommand& command, Session& session) {
     // Threads that cannot be started, above all.
     return fail(ErrorCode::kLimit, "the system refused: {}", failure.what());
   } catch (const std::runtime_error& failure) {
-    // oneTBB reports threads that cannot be started like this, in words only.
-    if (std::string_view(failure.what()).find("pthread_create") != std::string_view::npos) {
+    if (is_refused_thread(failure)) {
       return fail(ErrorCode::kLimit, "no thread can be started: {}", failure.what());
     }
     return fail(ErrorCode::kInternal, "internal error: {}", failure.what());
