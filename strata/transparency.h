@@ -9,5 +9,6 @@
 
 #include "strata/raster/view.h"
 #include "strata/transparency/media/media.h"
+#include "strata/transparency/media/shadow_map.h"
 #include "strata/transparency/stream/frame.h"
 #include "strata/transparency/techniques.h"

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 #include <limits>
 #include <numbers>
 
@@ -24,7 +25,11 @@ MediaTile::MediaTile(const MediaFrame& frame)
       distances_(frame.view),
       reports_(frame.table.solids.size()),
       solids_(frame.table.solids.size()),
-      may_hold_eye_(frame.table.solids.size(), 0) {
+      may_hold_eye_(frame.table.solids.size(), 0),
+      light_changes_(frame.light_changes()),
+      relit_(frame.shadows != nullptr),
+      shadow_(!frame.shadow_tiles.empty()),
+      no_surface_(splat(shadow_ ? 1.0f : 0.0f)) {
   for (const EyeSolid& eye : frame.eye_solids) may_hold_eye_[eye.solid] = 1;
 }
 
@@ -37,14 +42,29 @@ Result<void> MediaTile::render(TileStream& stream, TileImage& image) {
   costs.stored = costs.kept = lists_.size() + particles_.events.size();
   costs.most_layers = lists_.most_layers();
   costs.formula_bytes = costs.allocated_bytes = 8 * costs.stored + 8 * stream.pixel_count();
-  if (costs.stored == 0 && frame_.eye_solids.empty()) return {};
+  if (costs.stored == 0 && frame_.eye_solids.empty() && !relit_) return {};
+  if (shadow_) {
+    const int across = (stream.frame().size.x + kTileSide - 1) / kTileSide;
+    const int tile = rect.v0 / kTileSide * across + rect.u0 / kTileSide;
+    shadow_tile_ = &frame_.shadow_tiles[static_cast<std::size_t>(tile)];
+    shadow_tile_->ends.assign(kTilePixels, 0);
+  }
   for (int v = 0; v < stream.height(); ++v) {
     for (int u = 0; u < stream.width(); ++u) {
       const auto pixel = static_cast<std::uint32_t>(v * kTileSide + u);
       events_ = particles_.of(pixel);
-      if (lists_.list(pixel).empty() && events_.empty() && frame_.eye_solids.empty()) continue;
+      if (lists_.list(pixel).empty() && events_.empty() && frame_.eye_solids.empty() &&
+          !(relit_ && stream.opaque(pixel) != TileFragments::kNothing))
+        continue;
       walk(pixel, rect.u0 + u, rect.v0 + v);
+      if (shadow_)
+        shadow_tile_->ends[pixel] = static_cast<std::uint32_t>(shadow_tile_->entries.size());
     }
+  }
+  if (shadow_) {
+    // Pixels without a list end where those before them do.
+    std::uint32_t last = 0;
+    for (std::uint32_t& end : shadow_tile_->ends) last = end = std::max(end, last);
   }
   return {};
 }
@@ -147,26 +167,105 @@ inline void MediaTile::cross(std::uint32_t solid, bool exit, Ray& ray) {
 
 /// Through the media at hand, which scatter `glow` and let e^-depth through.
 inline void MediaTile::move_to(float distance, Ray& ray) {
-  if (ray.sums.media() > 0 && distance > ray.at) {
+  if (distance > ray.at && (ray.sums.media() > 0 || shadow_)) {
+    if (light_changes_) return move_in_changing_light(distance, ray);
     ray.depth += ray.extinction * splat(distance - ray.at);
-    parts_.push_back({ray.depth, ray.glow, splat(0.0f)});
+    parts_.push_back({ray.depth, ray.glow, no_surface_, distance});
   }
   ray.at = distance;
+}
+
+/// In steps, each with the light in its middle.
+void MediaTile::move_in_changing_light(float distance, Ray& ray) {
+  const int steps = frame_.shadows == nullptr ? 1 : std::max(1, frame_.settings.light.shadow_steps);
+  const float from = ray.at, step = (distance - from) / static_cast<float>(steps);
+  const Float4 depth = ray.depth, all = ray.extinction * splat(distance - from);
+  for (int i = 0; i < steps; ++i) {
+    const double middle = static_cast<double>(from) + (i + 0.5) * static_cast<double>(step);
+    const Float4 light = light_at(world_ray_.origin + middle * world_ray_.direction);
+    ray.depth = depth + all * splat(static_cast<float>(i + 1) / static_cast<float>(steps));
+    parts_.push_back({ray.depth, ray.albedo * light, no_surface_, distance});
+  }
+  ray.at = distance;
+}
+
+/// What media at a point scatter to the eye.
+Float4 MediaTile::light_at(const glm::dvec3& point) const {
+  const MediaLight& light = frame_.settings.light;
+  const glm::dvec3 to_light = light.point ? light.at - point : light.at;
+  const double length = glm::length(to_light);
+  const double cosine = length > 0.0 ? glm::dot(to_light, world_ray_.direction) / length : 0.0;
+  Float4 radiance = from(light.radiance) * splat(static_cast<float>(rayleigh(cosine)));
+  if (frame_.shadows != nullptr && light.shadow_steps > 0) {
+    radiance *= from(frame_.shadows->transmittance(point));
+  }
+  return from(frame_.settings.ambient) + radiance;
 }
 
 /// After the media at hand have changed.
 inline void MediaTile::change(Ray& ray) {
   ray.extinction = ray.sums.extinction();
-  ray.glow = ray.sums.albedo() * ray.light;
+  ray.albedo = ray.sums.albedo();
+  ray.glow = ray.albedo * ray.light;
+}
+
+/// The colour of a surface, premultiplied, and its opacity.
+glm::vec4 MediaTile::shade(DepthItem item) const {
+  if (!relit_) return stream_->shade(item);
+  const Scene& scene = *frame_.scene;
+  const glm::uvec3& triangle = scene.mesh.triangles[item.triangle()];
+  const glm::dvec3& corner = scene.mesh.positions[triangle.x];
+  const glm::dvec3 normal = glm::cross(scene.mesh.positions[triangle.y] - corner,
+                                       scene.mesh.positions[triangle.z] - corner);
+  const glm::vec4& base = frame_.table.looks[stream_->object(item)].colour;
+  const auto& [origin, direction] = world_ray_;
+  const double against = glm::dot(normal, direction);
+  double distance = glm::dot(normal, corner - origin) / against;
+  if (!std::isfinite(distance)) distance = static_cast<double>(distance_of(item));
+  const glm::dvec3 point = origin + distance * direction;
+  const MediaLight& light = frame_.settings.light;
+  const glm::dvec3 to_light = light.point ? light.at - point : light.at;
+  const double towards = glm::dot(normal, to_light);
+  const double lengths = glm::length(normal) * glm::length(to_light);
+  double cosine = lengths > 0.0 ? std::abs(towards) / lengths : 0.0;
+  // An opaque surface is dark if the light is behind it.
+  if (base.a >= 1.0f && (towards > 0.0) != (against < 0.0)) cosine = 0.0;
+  glm::vec3 lit = frame_.settings.ambient;
+  if (cosine > 0.0) {
+    const auto part = static_cast<float>(cosine / std::numbers::pi);
+    lit += part * light.radiance * frame_.shadows->transmittance(point, normal);
+  }
+  return {glm::vec3(base) * base.a * lit, base.a};
 }
 
 inline void MediaTile::add_surface(DepthItem item, const Ray& ray) {
-  const glm::vec4& colour = stream_->shade(item);
-  parts_.push_back({ray.depth, splat(0.0f), Float4{colour.r, colour.g, colour.b, colour.a}});
+  Float4 surface;
+  if (shadow_) {
+    const glm::vec4& base = frame_.table.looks[stream_->object(item)].colour;
+    const float rest = 1.0f - base.a;
+    surface = splat(rest) * (splat(rest) + splat(base.a) * from(glm::vec3(base)));
+  } else {
+    const glm::vec4 colour = shade(item);
+    surface = Float4{colour.r, colour.g, colour.b, colour.a};
+  }
+  parts_.push_back({ray.depth, splat(0.0f), surface, ray.at});
+}
+
+/// The parts become a ray of the shadow map.
+void MediaTile::finish_shadow() {
+  ShadowEntry entry;
+  for (const Part& part : parts_) {
+    entry.at = part.at;
+    entry.depth = to_vec3(part.depth);
+    entry.surfaces *= to_vec3(part.surface);
+    shadow_tile_->entries.push_back(entry);
+    if (entry.surfaces == glm::vec3(0.0f)) return;
+  }
 }
 
 /// A picture keeps one transmittance: what the three differ by is applied to what lies behind.
 inline void MediaTile::finish(std::uint32_t pixel) {
+  if (shadow_) return finish_shadow();
   for (Part& part : parts_) part.depth = exp_minus(part.depth);
   Float4 gathered = splat(0.0f), media = splat(1.0f);
   float surfaces = 1.0f;
@@ -178,11 +277,15 @@ inline void MediaTile::finish(std::uint32_t pixel) {
   }
   const glm::vec3 through = to_vec3(splat(surfaces) * media), colour = to_vec3(gathered);
   glm::vec4& out = image_->pixels[pixel];
+  const DepthItem opaque = stream_->opaque(pixel);
+  if (opaque != TileFragments::kNothing && relit_) {
+    out = glm::vec4(colour + through * glm::vec3(shade(opaque)), 0.0f);
+    return;
+  }
   if (through.x == through.y && through.y == through.z) {
     out = glm::vec4(colour, through.x);
     return;
   }
-  const DepthItem opaque = stream_->opaque(pixel);
   if (opaque != TileFragments::kNothing) {
     out = glm::vec4(colour + through * glm::vec3(stream_->shade(opaque)), 0.0f);
     return;
@@ -199,6 +302,11 @@ void MediaTile::walk(std::uint32_t pixel, int u, int v) {
   parts_.clear();
   Ray ray;
   ray.light = from(frame_.settings.ambient);
+  if (light_changes_ || relit_) {
+    const glm::dmat4& world = frame_.rays.world_from_eye();
+    world_ray_ = {glm::dvec3(world * glm::dvec4(view_ray.origin, 1.0)),
+                  glm::dmat3(world) * view_ray.direction / along_};
+  }
   if (frame_.lit) {
     const double cosine = glm::dot(view_ray.direction, frame_.to_light) / along_;
     ray.light += from(frame_.settings.light.radiance) * splat(static_cast<float>(rayleigh(cosine)));
@@ -209,7 +317,7 @@ void MediaTile::walk(std::uint32_t pixel, int u, int v) {
   std::size_t i = 0;
   for (; i < list.size() && !(opaque < list[i]); ++i) {
     const std::uint32_t solid = crossed_[i];
-    if (solid != MediaTable::kNone || ray.sums.media() > 0 || !events_.empty()) {
+    if (solid != MediaTable::kNone || ray.sums.media() > 0 || !events_.empty() || shadow_) {
       if (!events_.empty()) pass_particles(distance_[i], ray);
       move_to(distance_[i], ray);
     }

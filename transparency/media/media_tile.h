@@ -8,10 +8,12 @@
 #include <vector>
 
 #include "strata/transparency/media/media.h"
+#include "strata/transparency/media/shadow_map.h"
 #include "transparency/media/eye_state.h"
 #include "transparency/media/media_table.h"
 #include "transparency/media/particle_bins.h"
 #include "transparency/media/pixel_rays.h"
+#include "transparency/media/shadow_tile.h"
 #include "transparency/stream/sorted_tile.h"
 
 namespace strata::transparency {
@@ -27,7 +29,22 @@ struct MediaFrame {
   bool lit = false;            ///< there is a light
   glm::dvec3 to_light{0.0};    ///< eye space, of length 1
   /// Solids in which rays may begin.
-  std::span<const EyeSolid> eye_solids;
+  std::span<const EyeSolid> eye_solids = {};
+  const Scene* scene = nullptr;
+  /// Shadows of the light that falls on surfaces and, if there are steps, on media; or null.
+  const ShadowMap* shadows = nullptr;
+  /// The tiles of a shadow map, to be filled instead of a picture.
+  std::span<ShadowTile> shadow_tiles = {};
+
+  /// The light that media scatter to the eye is not the same all along a ray.
+  [[nodiscard]] bool light_changes() const {
+    return lit && (settings.light.point || (shadows != nullptr && settings.light.shadow_steps > 0));
+  }
+};
+
+/// A ray of the picture, in world space.
+struct WorldRay {
+  glm::dvec3 origin{0.0}, direction{0.0};  ///< of length 1
 };
 
 /// The walks along the rays of a tile, for one thread.
@@ -47,6 +64,7 @@ class MediaTile {
     float at = 0.0f;                  ///< distance along the ray
     Float4 light = splat(0.0f);       ///< that media scatter to the eye
     Float4 glow = splat(0.0f);        ///< of it, with the albedo of the media at hand
+    Float4 albedo = splat(0.0f);      ///< of the media at hand
     Float4 extinction = splat(0.0f);  ///< of the media at hand
     MediaSums sums;
   };
@@ -55,7 +73,8 @@ class MediaTile {
   struct Part {
     Float4 depth;    ///< optical depth from the eye to the end of the segment
     Float4 glow;     ///< light and albedo
-    Float4 surface;  ///< premultiplied colour, opacity
+    Float4 surface;  ///< premultiplied colour, opacity; in a shadow map what comes through
+    float at;        ///< distance along the ray
   };
   struct SolidState {
     std::int32_t inside = 0;  ///< times that the ray has entered it more than it has left it
@@ -70,11 +89,15 @@ class MediaTile {
   void cross(std::uint32_t solid, bool exit, Ray& ray);
   void move_to(float distance, Ray& ray);
   static void change(Ray& ray);
+  void move_in_changing_light(float distance, Ray& ray);
+  [[nodiscard]] Float4 light_at(const glm::dvec3& point) const;
   void add_surface(DepthItem item, const Ray& ray);
+  [[nodiscard]] glm::vec4 shade(DepthItem item) const;
   [[nodiscard]] float distance_of(DepthItem item) const {
     return static_cast<float>(distances_(item.depth()) * along_);
   }
   void finish(std::uint32_t pixel);
+  void finish_shadow();
 
   const MediaFrame& frame_;
   DepthDistances distances_;
@@ -93,6 +116,10 @@ class MediaTile {
   TileStream* stream_ = nullptr;
   TileImage* image_ = nullptr;
   double along_ = 1.0;  ///< world units along the ray per unit along the view axis
+  WorldRay world_ray_;  ///< where light changes or surfaces are lit by the light
+  const bool light_changes_, relit_, shadow_;
+  const Float4 no_surface_;  ///< of a part
+  ShadowTile* shadow_tile_ = nullptr;
 };
 
 }  // namespace strata::transparency

@@ -1,7 +1,7 @@
 #include "strata/transparency/media/media.h"
 
 #include <memory>
-#include <numeric>
+#include <optional>
 #include <utility>
 
 #include "strata/mesh/diagnose.h"
@@ -23,7 +23,7 @@ Result<MediaRendering> render_media(const Scene& scene, const View& view,
   const FrameTriangles& triangles = *(*source)->triangles();
   const PixelRays rays(triangles.view);
   const ParticleBins particles(settings.particles, triangles.view, rays);
-  MediaFrame frame{settings, *table, triangles.view, rays, particles, {}, false, {}, {}};
+  MediaFrame frame{settings, *table, triangles.view, rays, particles};
   const glm::vec4& b = options.background;
   frame.background = glm::vec4(glm::vec3(b) * b.a, b.a);
   frame.lit = settings.light.radiance != glm::vec3(0.0f);
@@ -32,6 +32,14 @@ Result<MediaRendering> render_media(const Scene& scene, const View& view,
   if (triangles.part.cut) {
     eye_solids = find_eye_solids(scene, *table, triangles.view, execution);
     frame.eye_solids = eye_solids;
+  }
+
+  frame.scene = &scene;
+  std::optional<ShadowMap> shadows;
+  if (frame.lit && settings.light.shadows) {
+    auto map = ShadowMap::make(scene, settings, {execution.threads, execution.stop});
+    if (!map) return tl::unexpected(map.error());
+    frame.shadows = &shadows.emplace(std::move(*map));
   }
 
   std::vector<std::shared_ptr<MediaTile>> tiles;

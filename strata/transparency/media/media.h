@@ -55,12 +55,12 @@ struct MediaLight {
   /// The light that arrives, without shadows. Media scatter 3 / (16 pi) (1 + cos^2) of it to the
   /// eye.
   glm::vec3 radiance{0.0f};
-  /// Surfaces are lit by this light instead of by the lamps at the eye, and cast coloured shadows,
-  /// as media do.
+  /// Surfaces of colour c are lit by this light and the ambient one, c (ambient + radiance cos /
+  /// pi), instead of by the lamps at the eye. Surfaces, media and particles cast coloured shadows.
   bool shadows = false;
   int shadow_size = 1024;  ///< pixels of a side of the shadow map; 1 to 8192
-  /// Parts into which the shadow of the light in media is cut along each ray; 0: light in media
-  /// has no shadows.
+  /// Shadows in media: parts into which a ray is cut between two crossings, each with the light in
+  /// its middle; at most 1024. 0: light in media has no shadows.
   int shadow_steps = 0;
 };
 
