@@ -2,6 +2,7 @@
 //
 // STRATA_FAIL_ALLOCATION=N   the N-th allocation after main() began gives nothing, counted from 1
 // STRATA_FAIL_REST=1         so do all that follow it
+// STRATA_MOST_THREADS=N      no more than N threads are started besides the first
 // STRATA_COUNT_ALLOCATIONS=F the number of allocations is written to the file F when the program
 //                            ends
 //
@@ -10,6 +11,7 @@
 
 #include <dlfcn.h>
 #include <fcntl.h>
+#include <pthread.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -22,6 +24,7 @@ namespace {
 
 std::atomic<bool> began{false};
 std::atomic<long> count{0};
+std::atomic<long> threads{0};
 long failing = 0;
 bool rest = false;
 int (*real_main)(int, char**, char**) = nullptr;
@@ -110,6 +113,13 @@ void* __libc_realloc(void* old, std::size_t size) {
 void* __libc_memalign(std::size_t alignment, std::size_t size) {
   if (fails()) return nullptr;
   return functions()->memalign(alignment, size);
+}
+
+int pthread_create(pthread_t* thread, const pthread_attr_t* attributes, void* (*body)(void*),
+                   void* argument) {
+  const char* const most = std::getenv("STRATA_MOST_THREADS");
+  if (most != nullptr && threads.fetch_add(1) >= std::atol(most)) return EAGAIN;
+  return next<decltype(&pthread_create)>("pthread_create")(thread, attributes, body, argument);
 }
 
 /// The tool ends by _Exit, which calls no handler.

@@ -7,6 +7,7 @@
 #include <png.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -139,6 +140,32 @@ INSTANTIATE_TEST_SUITE_P(
                     Job{"Mesh", {"voxelize", "ball.stl", "-r", "24"}, "out.vdb"},
                     Job{"Lists", {"ldi", "ball.stl", "-r", "24"}, "out.npz"}),
     [](const auto& each) { return each.param.name; });
+
+TEST(ThreadsThatAreRefused, AreCode6AndLeaveNothing) {
+  Workplace place;
+  ASSERT_TRUE(write_mesh(place.path("ball.obj"), make_icosphere(1.0, 4)));
+  const std::vector<std::string> before = place.names();
+  int refused = 0;
+  for (int most = 0; most < 7; ++most) {
+    RunOptions options;
+    options.environment = {"LD_PRELOAD=" STRATA_FAIL_ALLOCATION,
+                           "STRATA_MOST_THREADS=" + std::to_string(most)};
+    for (int round = 0; round < 4; ++round) {  // which thread starts which is chance
+      const RunResult run = place.run(
+          {"voxelize", "ball.obj", "-r", "300", "-o", "out.vdb", "-q", "-j", "8"}, options);
+      EXPECT_EQ(run.signal, 0) << most << " threads: " << run.err;
+      if (run.exit_code == 0) {
+        std::filesystem::remove(place.path("out.vdb"));
+        continue;
+      }
+      ++refused;
+      EXPECT_EQ(run.exit_code, 6) << most << " threads: " << run.err;
+      EXPECT_NE(run.err, "");
+      EXPECT_EQ(place.names(), before) << most << " threads";
+    }
+  }
+  EXPECT_GT(refused, 0);
+}
 
 }  // namespace
 }  // namespace strata
