@@ -8,6 +8,7 @@
 //     auto rendering = frame->render(*technique->technique, technique->settings);
 
 #include "strata/raster/view.h"
+#include "strata/transparency/media/fxaa.h"
 #include "strata/transparency/media/media.h"
 #include "strata/transparency/media/shadow_map.h"
 #include "strata/transparency/stream/frame.h"
