@@ -5,6 +5,7 @@
 
 namespace strata::transparency {
 
+/// Settings of the filter.
 struct FxaaOptions {
   /// An edge is blended if its contrast is this part of the brightest pixel about it; above 0.
   float contrast = 0.125f;
