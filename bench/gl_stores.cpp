@@ -18,6 +18,7 @@
 #include <utility>
 #include <vector>
 
+#include "bench/gl_transparency.h"
 #include "hashbuffer/gl/hash_store.h"
 #include "hashbuffer/gl/scan_store.h"
 #include "raster/gl/compute.h"
@@ -458,6 +459,7 @@ int run(const Settings& settings) {
     rows.push_back(scan_row(info, *scene, true));
     run_table(*context, *scene, rows, machine, budget);
   }
+  transparency_tables(*context, budget / 2, settings.small_only);
   if (auto checked = context->check(); !checked) give_up(checked.error());
   return 0;
 }
