@@ -34,10 +34,10 @@ double seconds_since(Clock::time_point start) {
 
 /// Frames a second that were published for a technique, for the mesh; 0: none.
 double published(std::string_view name) {
-  if (name == "dual-depth-peeling") return 140;
+  if (name == "dual-peeling") return 140;
   if (name == "depth-peeling") return 82;
   if (name == "stencil-routed") return 226;
-  if (name == "paged-lists") return 157;
+  if (name == "paged") return 157;
   if (name == "ha64") return 187;
   return 0;
 }
@@ -174,8 +174,8 @@ oit::Scene quads(int layers, double coverage) {
 }
 
 void quads_table(const gl::Context& context, double budget) {
-  constexpr std::string_view kNames[] = {"fixed-array",  "count-scan", "paged-lists",
-                                         "linked-lists", "ha64",       "depth-peeling"};
+  constexpr std::string_view kNames[] = {"b3d",  "count-scan", "paged",
+                                         "linked", "ha64",       "depth-peeling"};
   std::printf(
       "\n### Quads on %d x %d: frames a second, hardware rasterizer\n\n| layers | coverage |",
       kSide, kSide);

@@ -124,7 +124,7 @@ GlMaker make_gl_mlab(const gl::Context& context, const Settings& settings) {
   return make_rows(context, settings, "mlab", "ROWS_MLAB", 0);
 }
 GlMaker make_gl_hybrid(const gl::Context& context, const Settings& settings) {
-  return make_rows(context, settings, "hybrid", "ROWS_HYBRID", 0);
+  return make_rows(context, settings, "ht", "ROWS_HYBRID", 0);
 }
 GlMaker make_gl_kbuffer(const gl::Context& context, const Settings& settings) {
   return make_rows(context, settings, "k-buffer", "ROWS_KBUFFER", 1);
