@@ -13,9 +13,11 @@
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <cstdio>
+#include <deque>
 #include <filesystem>
 #include <fstream>
 #include <glm/geometric.hpp>
+#include <glm/trigonometric.hpp>
 #include <numbers>
 
 #include "bench/support.h"
@@ -68,6 +70,7 @@ class Papers {
       name_ = name;
       std::fprintf(stderr, "== %s\n", name);
       (this->*table)();
+      scenes_.clear();
     }
     return 0;
   }
@@ -111,7 +114,8 @@ class Papers {
   static std::string ms(double seconds) { return fmt::format("{:.2f}", seconds * 1e3); }
 
   /// A frame of triangles seen along z, which fill the picture.
-  transparency::Frame front_view(const Scene& scene, glm::ivec2 size) const {
+  transparency::Frame front_view(Scene given, glm::ivec2 size) {
+    const Scene& scene = scenes_.emplace_back(std::move(given));  // frames borrow their scenes
     Camera camera;
     camera.projection = Projection::kOrthographic;
     camera.rotation = glm::dvec3(0.0);
@@ -284,7 +288,7 @@ class Papers {
       for (int round = 0; round < 3; ++round) {
         const Outcome now = render(frame, "count-scan");
         const double ratio = like.fragments / static_cast<double>(now.rendering.costs.fragments);
-        size = glm::ivec2(std::lround(size.x * std::sqrt(ratio)));
+        size = glm::ivec2(static_cast<int>(std::lround(size.x * std::sqrt(ratio))));
         frame = front_view(of_mesh(knot, 0.3f), size);
       }
       const Outcome out = render(frame, "ha64");
@@ -516,6 +520,7 @@ class Papers {
 
   Plan plan_;
   Execution execution_;
+  std::deque<Scene> scenes_;  ///< of the table in work
   std::string name_;
 };
 
