@@ -38,7 +38,7 @@ class ReadMedia : public testing::Test {
 const std::string kWhole = R"({
   "ambient": [0.5, 0.25, 1],
   "light": {"direction": [1, 2, 3], "radiance": 8, "shadows": true, "shadow_size": 256,
-            "shadow_steps": 16},
+            "shadow_steps": 16, "visibility": "fourier", "visibility_size": 8},
   "media": [
     {"object": "bottle", "extinction": [0.5, 0.25, 2], "albedo": 0.75, "surface": true},
     {"object": "glass", "surface": [1, 0.5, 0, 0.25]},
@@ -60,6 +60,8 @@ TEST_F(ReadMedia, TakesAllThatTheDocumentNames) {
   EXPECT_TRUE(settings->light.shadows);
   EXPECT_EQ(settings->light.shadow_size, 256);
   EXPECT_EQ(settings->light.shadow_steps, 16);
+  EXPECT_EQ(settings->light.visibility, ShadowVisibility::kFourier);
+  EXPECT_EQ(settings->light.visibility_size, 8);
   ASSERT_EQ(settings->media.size(), 3u);
   EXPECT_EQ(settings->media[0].object, "bottle");
   EXPECT_EQ(settings->media[0].medium.extinction, glm::vec3(0.5f, 0.25f, 2.0f));
@@ -127,6 +129,8 @@ TEST_F(ReadMedia, NamesThePlaceOfAMistake) {
        "fog.json: light.shadow_size must be 1 to 8192, got 9000"},
       {R"({"light": {"direction": [0, 0, 1], "shadow_steps": 1.5}})",
        "fog.json: light.shadow_steps must be a whole number, got 1.5"},
+      {R"({"light": {"direction": [0, 0, 1], "visibility": "list"}})",
+       "fog.json: light.visibility must be lists, slices, occupancy, fourier or nodes, got 'list'"},
       {R"({"particles": [{"radius": 1}]})", "fog.json: particles[0] must have a member 'centre'"},
       {R"({"particles": [{"centre": [0, 0, 0], "radius": 0}]})",
        "fog.json: particles[0].radius must be above 0, got 0"},

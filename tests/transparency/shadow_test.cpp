@@ -217,6 +217,45 @@ TEST(ShadowMap, OfAPointLooksToAllSides) {
   }
 }
 
+TEST(ShadowMap, OfFixedSizeComesNearTheLists) {
+  // Grey panes of one opacity, which occupancy maps can tell, over a floor.
+  Scene scene;
+  for (const double z : {3.1, 2.3, 1.2}) add_object(scene, "pane", pane(z), {1, 1, 1, 0.5f});
+  add_object(scene, "floor", pane(-3.0), {1, 1, 1, 0.5f});
+  Scene fog;
+  add_object(fog, "cloud", make_box({-5, -5, -3}, {5, 5, 3}));
+  struct Kind {
+    ShadowVisibility visibility;
+    int size;
+    double of_panes, of_fog;  // differences from the exact function
+  };
+  const Kind kinds[] = {{ShadowVisibility::kSlices, 64, 1e-3, 0.1},
+                        {ShadowVisibility::kOccupancy, 64, 1e-3, 0.15},
+                        {ShadowVisibility::kFourier, 32, 0.1, 0.05},
+                        {ShadowVisibility::kNodes, 4, 1e-3, 0.35},
+                        {ShadowVisibility::kNodes, 32, 1e-3, 0.1}};
+  for (const Kind& kind : kinds) {
+    MediaSettings settings = light_from({0, 0, 1}, 64);
+    settings.light.visibility = kind.visibility;
+    settings.light.visibility_size = kind.size;
+    const ShadowMap panes = shadows_of(scene, settings);
+    for (int i = 0; i < 5; ++i) {
+      const double z[] = {4.5, 2.7, 1.75, 0.0, -5.0};
+      const glm::vec3 seen = panes.transmittance({0.3, 0.2, z[i]});
+      EXPECT_NEAR(seen.x, std::pow(0.5, i), kind.of_panes) << int(kind.visibility) << " " << z[i];
+      EXPECT_EQ(seen.x, seen.y);
+    }
+    settings.media = {{"cloud", {glm::vec3(0.5f), glm::vec3(1.0f)}}};
+    const ShadowMap media = shadows_of(fog, settings);
+    double largest = 0.0;
+    for (double z = 3.5; z > -3.5; z -= 0.1) {
+      const double right = std::exp(-0.5 * std::clamp(3.0 - z, 0.0, 6.0));
+      largest = std::max(largest, std::abs(media.transmittance({0.3, 0.2, z}).x - right));
+    }
+    EXPECT_LT(largest, kind.of_fog) << int(kind.visibility);
+  }
+}
+
 TEST(Shadows, FallOnSurfacesOfThePicture) {
   Scene scene;
   add_object(scene, "floor", pane(0.0), {0.8f, 0.6f, 0.4f, 1.0f});

@@ -43,6 +43,10 @@ Result<void> check_light(const MediaLight& light) {
     return fail(ErrorCode::kUsage, "the light's shadow steps must be 0 to 1024, got {}",
                 light.shadow_steps);
   }
+  if (light.visibility_size < 1 || light.visibility_size > 64) {
+    return fail(ErrorCode::kUsage, "the light's visibility size must be 1 to 64, got {}",
+                light.visibility_size);
+  }
   return check_part("the light", "radiance", light.radiance, kMostExtinction);
 }
 

@@ -144,9 +144,22 @@ Result<void> read_medium(const Member& from, MediaSettings& settings) {
   return {};
 }
 
+Result<void> read_visibility(const Member& from, ShadowVisibility& visibility) {
+  constexpr std::string_view kWords[] = {"lists", "slices", "occupancy", "fourier", "nodes"};
+  std::string word;
+  if (auto done = from.read(word); !done) return done;
+  const auto* const found = std::find(std::begin(kWords), std::end(kWords), word);
+  if (found == std::end(kWords)) {
+    return from.fault("must be lists, slices, occupancy, fourier or nodes, got '{}'",
+                      printable(word, 60));
+  }
+  visibility = static_cast<ShadowVisibility>(found - std::begin(kWords));
+  return {};
+}
+
 Result<void> read_light(const Member& from, MediaLight& light) {
-  if (auto good = from.expect_object(
-          {"direction", "position", "radiance", "shadows", "shadow_size", "shadow_steps"});
+  if (auto good = from.expect_object({"direction", "position", "radiance", "shadows", "shadow_size",
+                                      "shadow_steps", "visibility", "visibility_size"});
       !good) {
     return good;
   }
@@ -169,8 +182,14 @@ Result<void> read_light(const Member& from, MediaLight& light) {
   if (from.has("shadow_size")) {
     if (auto done = from["shadow_size"].read(light.shadow_size, 1, 8192); !done) return done;
   }
-  if (!from.has("shadow_steps")) return {};
-  return from["shadow_steps"].read(light.shadow_steps, 0, 1024);
+  if (from.has("shadow_steps")) {
+    if (auto done = from["shadow_steps"].read(light.shadow_steps, 0, 1024); !done) return done;
+  }
+  if (from.has("visibility")) {
+    if (auto done = read_visibility(from["visibility"], light.visibility); !done) return done;
+  }
+  if (!from.has("visibility_size")) return {};
+  return from["visibility_size"].read(light.visibility_size, 1, 64);
 }
 
 Result<void> read_particle(const Member& from, std::vector<Particle>& particles) {

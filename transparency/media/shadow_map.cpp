@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "transparency/media/media_tile.h"
+#include "transparency/media/shadow_functions.h"
 #include "transparency/stream/mesh_source.h"
 #include "transparency/stream/render_tiles.h"
 
@@ -32,12 +33,18 @@ struct ShadowFace {
   PixelRays rays;
   int tiles_u;
   std::vector<ShadowTile> tiles;
+  std::unique_ptr<ShadowFunctions> functions;  ///< instead of lists
 
-  [[nodiscard]] std::span<const ShadowEntry> list(int u, int v) const {
+  /// What comes through all that is nearer than `limit` along the ray of a pixel.
+  [[nodiscard]] glm::vec3 through(int u, int v, double limit) const {
     const int tile = v / kTileSide * tiles_u + u / kTileSide;
-    return tiles[static_cast<std::size_t>(tile)].ray(
-        static_cast<std::uint32_t>(v % kTileSide * kTileSide + u % kTileSide));
+    const auto pixel = static_cast<std::uint32_t>(v % kTileSide * kTileSide + u % kTileSide);
+    if (functions) return glm::vec3(functions->through(tile, pixel, static_cast<float>(limit)));
+    return through(tiles[static_cast<std::size_t>(tile)].ray(pixel), limit);
   }
+
+ private:
+  static glm::vec3 through(std::span<const ShadowEntry> list, double limit);
 };
 
 constexpr std::array<glm::dvec3, 6> kSides{glm::dvec3(1, 0, 0), glm::dvec3(-1, 0, 0),
@@ -90,11 +97,19 @@ Result<void> fill(ShadowFace& face, const Scene& scene, const MediaSettings& set
   };
   auto done = render_tiles(**source, {}, make, true, execution);
   if (!done) return tl::unexpected(done.error());
+  if (settings.light.visibility != ShadowVisibility::kLists) {
+    // The corners' rays are the longest. With some room at both ends: what lies in the last slice
+    // shades nothing, and a series goes on at its beginning.
+    const double nearest = face.view.near;
+    const double farthest = face.view.far * face.rays.ray(0, 0).length;
+    const double room = (farthest - nearest) / 16.0;
+    const DepthRange range{static_cast<float>(nearest - room), static_cast<float>(farthest + room)};
+    face.functions = make_shadow_functions(settings.light, face.tiles, range, execution);
+  }
   return {};
 }
 
-/// What comes through all that is nearer than `limit`.
-glm::vec3 through(std::span<const ShadowEntry> list, double limit) {
+glm::vec3 ShadowFace::through(std::span<const ShadowEntry> list, double limit) {
   const auto next = std::lower_bound(
       list.begin(), list.end(), limit,
       [](const ShadowEntry& e, double at) { return static_cast<double>(e.at) < at; });
@@ -185,7 +200,7 @@ glm::vec3 ShadowMap::transmittance(const glm::dvec3& point) const {
   const auto place = data_->find(point);
   if (!place) return glm::vec3(1.0f);
   const double distance = data_->point ? glm::length(place->in_eye) : -place->in_eye.z;
-  return through(place->face->list(place->u, place->v), distance);
+  return place->face->through(place->u, place->v, distance);
 }
 
 // The bias: how much nearer to the light than it is the map may have the surface itself. Vertices
@@ -196,8 +211,6 @@ glm::vec3 ShadowMap::transmittance(const glm::dvec3& point, const glm::dvec3& no
   const auto place = data_->find(point);
   if (!place) return glm::vec3(1.0f);
   const ShadowFace& face = *place->face;
-  const auto list = face.list(place->u, place->v);
-  if (list.empty()) return glm::vec3(1.0f);
   const View& view = face.view;
   const bool perspective = view.perspective;
   const glm::dvec3 in_eye = glm::dmat3(view.eye_from_world) * normal;
@@ -214,7 +227,7 @@ glm::vec3 ShadowMap::transmittance(const glm::dvec3& point, const glm::dvec3& no
   // Along the light there is no such point.
   if (!(along > 0.0 && std::isfinite(along))) return transmittance(point);
   const double distance = along * face.rays.ray(place->u, place->v).length;
-  return through(list, distance * (1.0 - 0x1p-23));
+  return face.through(place->u, place->v, distance * (1.0 - 0x1p-23));
 }
 
 }  // namespace strata::transparency

@@ -48,6 +48,15 @@ struct Particle {
   glm::vec3 albedo{1.0f};      ///< as Medium::albedo
 };
 
+/// How a shadow map keeps what comes through along a ray of the light.
+enum class ShadowVisibility : std::uint8_t {
+  kLists,      ///< all crossings, exact, in colours
+  kSlices,     ///< opacity shadow map: the transmittance behind each of equal slices of depth
+  kOccupancy,  ///< occupancy map: a bit for each slice
+  kFourier,    ///< Fourier opacity map: terms of a series
+  kNodes,      ///< adaptive volumetric shadow map: steps at depths of their own
+};
+
 /// A light that is so far away that its rays are parallel, or one at a point.
 struct MediaLight {
   glm::dvec3 at{0.0, 0.0, 1.0};  ///< the direction to the light, of any length; or its place
@@ -62,6 +71,9 @@ struct MediaLight {
   /// Shadows in media: parts into which a ray is cut between two crossings, each with the light in
   /// its middle; at most 1024. 0: light in media has no shadows.
   int shadow_steps = 0;
+  /// All kinds but lists are grey and of a fixed size.
+  ShadowVisibility visibility = ShadowVisibility::kLists;
+  int visibility_size = 16;  ///< slices, terms or nodes of a ray; 1 to 64
 };
 
 /// The media of a scene, and their light.
