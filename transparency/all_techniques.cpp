@@ -3,6 +3,7 @@
 #include "strata/transparency/techniques.h"
 #include "transparency/bounded/bounded_techniques.h"
 #include "transparency/lists/list_techniques.h"
+#include "transparency/objects/object_techniques.h"
 #include "transparency/peeling/peeling_techniques.h"
 #include "transparency/slots/slot_techniques.h"
 #include "transparency/sums/sum_techniques.h"
@@ -54,6 +55,10 @@ constexpr std::array kAll{
     &kAdaptiveBucketSort,
     &kKBuffer,
     &kZ3,
+    // objects
+    &kObjectSort,
+    &kPrimitiveSort,
+    &kVisibilityQueries,
     // sums
     &kWeightedSum,
     &kWeightedAverage,

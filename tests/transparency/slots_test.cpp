@@ -7,6 +7,7 @@
 
 #include "strata/mesh/shapes.h"
 #include "tests/transparency/listed_frames.h"
+#include "tests/transparency/mesh_frames.h"
 
 namespace strata::transparency {
 namespace {
@@ -326,47 +327,22 @@ TEST(KBuffer, OverflowBlendsTheNearestOrMergesTheTwoNearestInDepth) {
   EXPECT_EQ(merged.costs.kept, 2u);
 }
 
-/// Two squares of 9 that cross in the line x = 0, tilted by their slopes dz/dx.
+/// Two squares that cross in the line x = 0, tilted by their slopes dz/dx; red and blue.
 Scene crossing_planes(double slope) {
   Scene scene;
   for (const double dz : {slope, -slope}) {
-    const auto first = static_cast<std::uint32_t>(scene.mesh.positions.size());
-    for (const glm::dvec2 c :
-         {glm::dvec2(-9, -9), glm::dvec2(9, -9), glm::dvec2(9, 9), glm::dvec2(-9, 9)}) {
-      scene.mesh.positions.emplace_back(c, dz * c.x);
-    }
-    scene.mesh.triangles.emplace_back(first, first + 1, first + 2);
-    scene.mesh.triangles.emplace_back(first, first + 2, first + 3);
-    scene.object_of.insert(scene.object_of.end(), 2,
-                           static_cast<std::uint32_t>(scene.objects.size()));
-    scene.objects.push_back(
-        {"plane", first == 0 ? glm::vec4(1, 0, 0, 0.5f) : glm::vec4(0, 0, 1, 0.5f)});
+    TriangleSoup square = square_at(0);
+    for (glm::dvec3& p : square.positions) p.z = dz * p.x;
+    add_object(scene, square,
+               scene.objects.empty() ? glm::vec4(1, 0, 0, 0.5f) : glm::vec4(0, 0, 1, 0.5f));
   }
   return scene;
-}
-
-Frame frame_of(const Scene& scene, glm::ivec2 size, int samples, glm::dvec3 rotation) {
-  Camera camera;
-  camera.projection = Projection::kOrthographic;
-  camera.rotation = rotation;
-  camera.distance = 10.0;
-  FrameOptions options;
-  options.samples = samples;
-  auto frame = Frame::make(scene, *make_view(camera, size, bounds(scene.mesh)), options);
-  EXPECT_TRUE(frame);
-  return std::move(*frame);
-}
-
-Rendering rendered(const Frame& frame, std::string_view name, const Settings& settings = {}) {
-  auto rendering = frame.render(technique(name), settings);
-  EXPECT_TRUE(rendering) << name;
-  return std::move(*rendering);
 }
 
 TEST(Z3, EqualsThePictureOfAllSamplesWhereSlotsAreEnough) {
   Scene ball{make_icosphere(1.5, 3), {}, {{"ball", {0.9f, 0.4f, 0.1f, 0.4f}}}};
   for (const int samples : {1, 2, 4, 8, 16, 64}) {
-    const Frame frame = frame_of(ball, {37, 29}, samples, {50, 10, 30});
+    const Frame frame = frame_of(ball, flat_camera({50, 10, 30}), {37, 29}, samples);
     const Rendering exact = rendered(frame, "count-scan");
     const Rendering z3 = rendered(frame, "z3", with(256));
     EXPECT_EQ(z3.costs.merged, 0u);
@@ -385,7 +361,7 @@ TEST(Z3, EqualsThePictureOfAllSamplesWhereSlotsAreEnough) {
 TEST(Z3, PartsCrossingPlanesAlongTheirLine) {
   const Scene scene = crossing_planes(0.5);
   // 33 pixels: the line x = 0 goes through the middle of a column.
-  const Frame frame = frame_of(scene, {33, 20}, 16, {0, 0, 0});
+  const Frame frame = frame_of(scene, flat_camera({0, 0, 0}), {33, 20}, 16);
   const Rendering z3 = rendered(frame, "z3");
   EXPECT_TRUE(same_bits(z3.image, rendered(frame, "count-scan").image.pixels));
   const auto red = [&](int u) { return z3.image.pixels[static_cast<std::size_t>(7 * 33 + u)].r; };
@@ -417,7 +393,7 @@ TEST(Z3, MergedPartsKeepTheMeanColourOfTheirSamples) {
     p.z = i < 4 ? 1 : 0;
     if ((i < 4) == (p.x > 0)) p.x = 0;
   }
-  const Frame frame = frame_of(scene, {33, 20}, 16, {0, 0, 0});
+  const Frame frame = frame_of(scene, flat_camera({0, 0, 0}), {33, 20}, 16);
   const Rendering exact = rendered(frame, "count-scan");
   const Rendering z3 = rendered(frame, "z3", with(1));
   EXPECT_GT(z3.costs.merged, 10u);
@@ -432,18 +408,10 @@ TEST(Z3, MergedPartsKeepTheMeanColourOfTheirSamples) {
 TEST(KBuffer, TrianglesComeRoughlySorted) {
   // Squares are submitted from the back to the front: as they come, they would need 11 entries.
   Scene scene;
-  for (std::uint32_t i = 0; i < 12; ++i) {
-    const auto first = static_cast<std::uint32_t>(scene.mesh.positions.size());
-    for (const glm::dvec2 c :
-         {glm::dvec2(-9, -9), glm::dvec2(9, -9), glm::dvec2(9, 9), glm::dvec2(-9, 9)}) {
-      scene.mesh.positions.emplace_back(c, i);
-    }
-    scene.mesh.triangles.emplace_back(first, first + 1, first + 2);
-    scene.mesh.triangles.emplace_back(first, first + 2, first + 3);
-    scene.object_of.insert(scene.object_of.end(), 2, i);
-    scene.objects.push_back({"square", glm::vec4(0.08f * static_cast<float>(i), 0.5f, 0.2f, 0.3f)});
+  for (int i = 0; i < 12; ++i) {
+    add_object(scene, square_at(i), {0.08f * static_cast<float>(i), 0.5f, 0.2f, 0.3f});
   }
-  const Frame frame = frame_of(scene, {66, 20}, 1, {0, 0, 0});
+  const Frame frame = frame_of(scene, flat_camera({0, 0, 0}), {66, 20}, 1);
   const Image exact = rendered(frame, "count-scan").image;
   EXPECT_TRUE(same_bits(rendered(frame, "k-buffer", with(1)).image, exact.pixels));
 }

@@ -51,6 +51,25 @@ TriangleDistances triangle_distances(const FrameInfo& frame) {
   return distances;
 }
 
+std::vector<double> object_distances(const FrameTriangles& triangles) {
+  const std::vector<glm::dvec3> eye = eye_positions(triangles);
+  std::vector<double> areas(triangles.objects, 0.0), distances(triangles.objects, 0.0);
+  std::vector<glm::dvec3> sums(triangles.objects, glm::dvec3(0.0));
+  for (std::uint32_t t = 0; t < triangles.part.mesh.triangles.size(); ++t) {
+    const std::uint32_t source = triangles.part.source(t);
+    const std::size_t object = triangles.object_of.empty() ? 0 : triangles.object_of[source];
+    const glm::uvec3& triangle = triangles.part.mesh.triangles[t];
+    const glm::dvec3 &a = eye[triangle.x], &b = eye[triangle.y], &c = eye[triangle.z];
+    const double area = glm::length(glm::cross(b - a, c - a));
+    areas[object] += area;
+    sums[object] += area * (a + b + c) / 3.0;
+  }
+  for (std::size_t i = 0; i < distances.size(); ++i) {
+    if (areas[i] > 0) distances[i] = eye_distance(triangles.view, sums[i] / areas[i]);
+  }
+  return distances;
+}
+
 std::vector<std::uint32_t> ranks_of(const std::vector<double>& keys, std::uint64_t& comparisons) {
   std::vector<std::uint32_t> order(keys.size()), ranks(keys.size());
   std::iota(order.begin(), order.end(), 0u);

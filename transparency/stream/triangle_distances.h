@@ -21,6 +21,9 @@ struct TriangleDistances {
 /// @pre frame.triangles != nullptr
 [[nodiscard]] TriangleDistances triangle_distances(const FrameInfo& frame);
 
+/// The distances of each object's centroid; 0 where the object has no triangle.
+[[nodiscard]] std::vector<double> object_distances(const FrameTriangles& triangles);
+
 /// The rank of each element when all are sorted by `keys`, equal ones by their place.
 /// @param comparisons  how many pairs were compared is added to it
 [[nodiscard]] std::vector<std::uint32_t> ranks_of(const std::vector<double>& keys,
