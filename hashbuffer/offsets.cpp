@@ -1,23 +1,44 @@
 #include "strata/hashbuffer/offsets.h"
 
 #include <algorithm>
+#include <bit>
 #include <cstddef>
 #include <limits>
-#include <unordered_set>
 
 #include "hashbuffer/random.h"
 
 namespace strata {
 namespace {
 
+/// A set of numbers, of which it is known how many there will be at most.
+class SmallSet {
+ public:
+  explicit SmallSet(std::size_t most) : slots_(std::bit_ceil(4 * most + 4), kFree) {}
+  /// @return whether it was not there yet
+  bool insert(std::uint64_t number) {
+    std::size_t slot = number * 0x9e3779b97f4a7c15u >> 32;
+    for (;; ++slot) {
+      std::uint64_t& at = slots_[slot & (slots_.size() - 1)];
+      if (at == number) return false;
+      if (at != kFree) continue;
+      at = number;
+      return true;
+    }
+  }
+
+ private:
+  static constexpr std::uint64_t kFree = std::numeric_limits<std::uint64_t>::max();
+  std::vector<std::uint64_t> slots_;
+};
+
 void append_random(const OffsetRequest& request, std::size_t count,
                    std::vector<std::uint64_t>& offsets) {
   Random random(request.seed);
-  std::unordered_set<std::uint64_t> used(offsets.begin() + 1, offsets.end());
-  used.reserve(count);
+  SmallSet used(count);
+  for (std::size_t i = 1; i < offsets.size(); ++i) used.insert(offsets[i]);
   while (offsets.size() < count + 1) {
     const std::uint64_t offset = random.below(request.cells);
-    if (used.insert(offset).second) offsets.push_back(offset);
+    if (used.insert(offset)) offsets.push_back(offset);
   }
 }
 

@@ -11,6 +11,17 @@ HWY_BEFORE_NAMESPACE();
 namespace strata {
 namespace HWY_NAMESPACE {
 
+/// Raises the largest ages of blocks of 8 x 8 pixels, if they are kept.
+struct BlockAges {
+  std::uint16_t* ages = nullptr;
+  void operator()(std::uint64_t pixel, unsigned age) const {
+    if (ages == nullptr) return;
+    constexpr std::uint64_t kBlocks = kTileSide / 8;
+    std::uint16_t& most = ages[pixel / kTileSide / 8 * kBlocks + pixel % kTileSide / 8];
+    most = std::max(most, static_cast<std::uint16_t>(age));
+  }
+};
+
 /// All of a record but its age.
 template <class Record>
 inline constexpr typename Record::Word kValueMask = Record::kAgeUnit - 1;
@@ -32,8 +43,9 @@ class TableSink {
   using Bits = typename Record::Word;
   static constexpr bool kKeys = Record::kPayloadBits == 0;
 
-  TableSink(TileTable<Record>& table, const PixelRect& clip)
+  TableSink(TileTable<Record>& table, const PixelRect& clip, BlockAges ages = {})
       : table_(&table),
+        ages_(ages),
         cells_(table.cells.data()),
         planes_(std::min(table.planes, static_cast<int>(Record::kAgeMax))),
         u0_(clip.u0),
@@ -65,13 +77,43 @@ class TableSink {
     const hn::CappedTag<Bits, columns> d;
     for (int row = 0; row < rows; ++row, words += columns) {
       const std::size_t pixel = pixel_at(u, v + row);
-      for (std::size_t i = 0; i < columns; i += hn::Lanes(d)) insert(d, pixel + i, words + i);
+      for (std::size_t i = 0; i < columns; i += hn::Lanes(d)) {
+        insert(d, pixel + i, decode(d, words + i));
+      }
     }
   }
   HWY_INLINE void put_one(int u, int v, std::uint32_t depth) {
     ++result_.fragments;
     const Bits key = bits_of(make_key<Record>(depth, exit_, triangle_));
     table_->insert(pixel_at(u, v), (~key & kValueMask<Record>) | Record::kAgeUnit);
+  }
+  /// Inserts fragments one by one, and neighbours that follow each other at once.
+  void put_all(std::span<const std::uint32_t> pixels, std::span<const DepthItem> items) {
+    const hn::ScalableTag<std::uint64_t> d;
+    const hn::Rebind<std::uint32_t, decltype(d)> d32;
+    const std::size_t lanes = hn::Lanes(d), count = pixels.size();
+    const auto oldest = hn::Set(d, Record::kAgeUnit + kValueMask<Record>);
+    for (std::size_t i = 0; i < count;) {
+      const std::uint32_t pixel = pixels[i];
+      std::size_t run = std::min(lanes, count - i);
+      auto carry = hn::Zero(d);
+      if (run == lanes) {
+        const auto next = hn::Eq(hn::LoadU(d32, pixels.data() + i), hn::Iota(d32, pixel));
+        carry = hn::Sub(oldest, hn::LoadU(d, &items[i].bits));
+        if (!hn::AllTrue(d32, next)) {
+          run = run_length(pixels.data() + i, lanes);
+          carry = hn::IfThenElseZero(hn::FirstN(d, run), carry);
+        }
+      } else {
+        run = 1;
+        carry = hn::IfThenElseZero(hn::FirstN(d, 1), hn::Set(d, nearest_of(items[i])));
+      }
+      const int age = insert(d, pixel, carry);
+      ages_(pixel, static_cast<unsigned>(age));
+      ages_(pixel + run - 1, static_cast<unsigned>(age));
+      i += run;
+      result_.fragments += run;
+    }
   }
   TileRasterResult finish() {
     // The first two planes are not watched: the bound may be 2 where the tile is one layer deep.
@@ -81,6 +123,15 @@ class TableSink {
   }
 
  private:
+  /// Pixels that follow each other from the first on.
+  static std::size_t run_length(const std::uint32_t* pixels, std::size_t most) {
+    std::size_t run = 1;
+    while (run < most && pixels[run] == pixels[0] + run) ++run;
+    return run;
+  }
+  static Bits nearest_of(DepthItem item) {
+    return Record::kAgeUnit + kValueMask<Record> - item.bits;
+  }
   static std::uint32_t bits_of(DepthKey key) { return key; }
   static std::uint64_t bits_of(DepthItem item) { return item.bits; }
   [[nodiscard]] HWY_INLINE std::size_t pixel_at(int u, int v) const {
@@ -100,11 +151,11 @@ class TableSink {
     }
   }
 
-  /// Inserts a vector of neighbours. Only records of the same pixel and age can be smaller than
-  /// what comes to a plane, so that no lane evicts a stranger.
-  template <class D>
-  HWY_INLINE void insert(D d, std::size_t pixel, const std::uint32_t* words) {
-    auto carry = decode(d, words);
+  /// Inserts a vector of neighbours, records of age 1 or 0. Only records of the same pixel and age
+  /// can be smaller than what comes to a plane, so that no lane evicts a stranger.
+  /// @return planes that were looked at
+  template <class D, class V = hn::Vec<D>>
+  HWY_INLINE int insert(D d, std::size_t pixel, V carry) {
     const auto step = hn::Set(d, Record::kAgeUnit);
     Bits* HWY_RESTRICT cell = cells_ + pixel;
     const auto exchange = [&] {  // the larger stays, the smaller is one older
@@ -120,24 +171,25 @@ class TableSink {
     if (planes_ >= 2) {
       // Which of the first two planes a row ends in cannot be predicted: both are always done.
       exchange();
-      if (hn::AllFalse(d, exchange())) return;
+      if (hn::AllFalse(d, exchange())) return 2;
       age = 2;
     }
     while (age < planes_) {
       ++age;
       if (hn::AllFalse(d, exchange())) {
         oldest_ = std::max(oldest_, age);
-        return;
+        return age;
       }
     }
     oldest_ = planes_;
-    overflow(*table_, d, pixel, carry);
+    overflow(*table_, d, pixel, carry, ages_);
+    return age;
   }
   /// The planes are exhausted: each lane goes on by itself. Static, so that the sink's members may
   /// stay in registers.
   template <class D>
   static HWY_NOINLINE void overflow(TileTable<Record>& table, D d, std::size_t pixel,
-                                    hn::Vec<D> carry) {
+                                    hn::Vec<D> carry, BlockAges ages) {
     alignas(64) Bits records[HWY_MAX_BYTES / sizeof(Bits)];
     hn::Store(carry, d, records);
     for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
@@ -146,12 +198,13 @@ class TableSink {
       if (table.planes >= static_cast<int>(Record::kAgeMax)) {
         ++table.failures;
       } else {
-        table.insert(pixel + i, records[i]);
+        table.insert(pixel + i, records[i], ages);
       }
     }
   }
 
   TileTable<Record>* table_;
+  BlockAges ages_;
   Bits* cells_;
   int planes_, oldest_ = 0;
   int u0_, v0_;
@@ -242,6 +295,12 @@ TileRasterResult raster_key_table(const TileInput& input, TileTable<Record32>& t
 TileRasterResult raster_item_table(const TileInput& input, TileTable<Record64>& table) {
   return raster_table(input, table);
 }
+void put_items(std::span<const std::uint32_t> pixels, std::span<const DepthItem> items,
+               TileTable<Record64>& table, std::uint16_t* ages) {
+  TableSink<Record64> sink(table, PixelRect{}, BlockAges{ages});
+  sink.put_all(pixels, items);
+  sink.finish();
+}
 TileRasterResult raster_key_log(const TileInput& input, TileLog<Record32>& log) {
   return raster_log(input, log);
 }
@@ -258,6 +317,7 @@ namespace strata {
 
 HWY_EXPORT(raster_key_table);
 HWY_EXPORT(raster_item_table);
+HWY_EXPORT(put_items);
 HWY_EXPORT(raster_key_log);
 HWY_EXPORT(raster_item_log);
 
@@ -266,6 +326,10 @@ TileRasterResult raster_into(const TileInput& input, TileTable<Record32>& table)
 }
 TileRasterResult raster_into(const TileInput& input, TileTable<Record64>& table) {
   return HWY_DYNAMIC_DISPATCH(raster_item_table)(input, table);
+}
+void insert_into(std::span<const std::uint32_t> pixels, std::span<const DepthItem> items,
+                 TileTable<Record64>& table, std::uint16_t* ages) {
+  HWY_DYNAMIC_DISPATCH(put_items)(pixels, items, table, ages);
 }
 TileRasterResult raster_into(const TileInput& input, TileLog<Record32>& log) {
   return HWY_DYNAMIC_DISPATCH(raster_key_log)(input, log);

@@ -102,6 +102,11 @@ struct TileInput {
 
 TileRasterResult raster_into(const TileInput& input, TileTable<Record32>& table);
 TileRasterResult raster_into(const TileInput& input, TileTable<Record64>& table);
+/// Inserts fragments one by one into a table with planes; neighbours that follow each other at
+/// once.
+/// @param ages  of the 8 x 8 blocks of 8 x 8 pixels: raised to the largest ages there, or higher
+void insert_into(std::span<const std::uint32_t> pixels, std::span<const DepthItem> items,
+                 TileTable<Record64>& table, std::uint16_t* ages);
 TileRasterResult raster_into(const TileInput& input, TileLog<Record32>& log);
 TileRasterResult raster_into(const TileInput& input, TileLog<Record64>& log);
 

@@ -2,42 +2,48 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <cstring>
 #include <span>
 #include <vector>
 
+#include "transparency/stream/short_sort.h"
 #include "transparency/stream/tile_stream.h"
 
 // What techniques do with the fragments of a pixel that they gathered.
 
 namespace strata::transparency {
 
-/// Sorts a list front to back: by insertion if it is short. @return comparisons
-inline std::uint64_t sort_counted(DepthItem* begin, DepthItem* end) {
-  constexpr std::ptrdiff_t kInsertionSortLimit = 32;
-  std::uint64_t comparisons = 0;
-  if (end - begin > kInsertionSortLimit) {
-    std::sort(begin, end, [&comparisons](DepthItem a, DepthItem b) {
-      ++comparisons;
-      return a < b;
-    });
-    return comparisons;
+/// The same numbers as FrontToBack, all channels at once.
+class FrontToBack4 {
+ public:
+  void add(const glm::vec4& fragment) {
+    Lanes c;
+    std::memcpy(&c, &fragment, sizeof c);
+    const float seen = transmittance_;
+    colour_ += Lanes{seen, seen, seen, seen} * c;
+    transmittance_ = seen * (1.0f - c[3]);
   }
-  for (DepthItem* next = begin; next != end; ++next) {
-    const DepthItem item = *next;
-    DepthItem* place = next;
-    for (; place != begin && item < place[-1]; --place) *place = place[-1];
-    comparisons += static_cast<std::uint64_t>(next - place) + (place != begin ? 1 : 0);
-    *place = item;
+  void write(glm::vec4& pixel) const {
+    Lanes c = colour_;
+    c[3] = transmittance_;
+    std::memcpy(&pixel, &c, sizeof c);
   }
-  return comparisons;
-}
 
-/// A sorted list, front to back.
-inline glm::vec4 blend_sorted(TileStream& stream, std::span<const DepthItem> list) {
-  FrontToBack sum;
-  for (const DepthItem item : list) sum.add(stream.colour(item));
-  stream.count_shaded(list.size());
-  return sum.result();
+ private:
+  using Lanes = float __attribute__((vector_size(16)));
+  Lanes colour_{};
+  float transmittance_ = 1.0f;
+};
+
+/// Sorts and blends a list. @return comparisons
+inline std::uint64_t blend_list(const TileStream& stream, DepthItem* list, std::size_t count,
+                                glm::vec4& pixel) {
+  FrontToBack4 sum;
+  const glm::vec4* colours = stream.frame().colours.data();
+  const std::uint64_t comparisons = visit_sorted(
+      list, count, [&](DepthItem item) { sum.add(colours[TileStream::face_of(item)]); });
+  sum.write(pixel);
+  return comparisons;
 }
 
 /// Sorts and blends the lists of a tile's pixels, one after the other.
@@ -52,10 +58,10 @@ class ListBlender {
   void finish(TileStream& stream, TileImage& image, std::uint32_t pixel) {
     if (list_.empty()) return;
     Costs& costs = stream.costs();
-    costs.comparisons += sort_counted(list_.data(), list_.data() + list_.size());
     costs.most_layers = std::max<std::uint64_t>(costs.most_layers, list_.size());
     costs.kept += list_.size();
-    image.pixels[pixel] = blend_sorted(stream, list_);
+    stream.count_shaded(list_.size());
+    costs.comparisons += blend_list(stream, list_.data(), list_.size(), image.pixels[pixel]);
   }
 
  private:

@@ -1,3 +1,4 @@
+#include "transparency/lists/blend_list.h"
 #include "transparency/lists/list_bytes.h"
 #include "transparency/lists/list_techniques.h"
 #include "transparency/stream/sorted_tile.h"
@@ -12,19 +13,21 @@ namespace {
 Result<TileRenderer> make(const FrameInfo&, const Settings&, const std::shared_ptr<const void>&) {
   return [lists = std::make_shared<SortedTile>()](TileStream& stream,
                                                   TileImage& image) -> Result<void> {
-    lists->build(stream);
+    lists->store(stream);
     Costs& costs = stream.costs();
     costs.stored = costs.kept = lists->size();
     costs.most_layers = lists->most_layers();
     costs.formula_bytes = costs.allocated_bytes =
         list_bytes::count_scan(stream.pixel_count(), lists->size());
+    if (lists->size() == 0) return {};
+    std::uint64_t comparisons = 0;
     for_each_pixel(stream, [&](std::uint32_t pixel) {
-      const auto list = lists->list(pixel);
-      if (list.empty()) return;
-      FrontToBack sum;
-      for (const DepthItem item : list) sum.add(stream.shade(item));
-      image.pixels[pixel] = sum.result();
+      const std::uint32_t count = lists->count(pixel);
+      if (count == 0) return;
+      comparisons += blend_list(stream, lists->stored(pixel), count, image.pixels[pixel]);
     });
+    costs.comparisons = comparisons;
+    stream.count_shaded(lists->size());
     return {};
   };
 }

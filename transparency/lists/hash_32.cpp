@@ -26,9 +26,9 @@ class Hash32Renderer {
     Costs& costs = stream.costs();
     for (;;) {
       const std::uint64_t failures = insert(stream, cells);
-      costs.comparisons += table_.ages() + failures * table_.age_limit();
       costs.stored += stream.size() - failures;
       if (failures == 0) break;
+      costs.comparisons += table_.ages() + failures * table_.age_limit();
       table_.clear();
       if (stream.size() < cells / 2) return render_deep(stream, image);
       cells = rebuilt_cells(stream.size(), cells);
@@ -38,7 +38,8 @@ class Hash32Renderer {
     blend(stream, image);
     costs.allocated_bytes = table_.bytes() + cells * sizeof(std::uint32_t);
     costs.formula_bytes = list_bytes::hash_table(cells, table_.blocks(), 32 + 32);
-    costs.kept = table_.clear();
+    costs.kept = stream.size();
+    table_.clear();
     return {};
   }
 
@@ -66,16 +67,17 @@ class Hash32Renderer {
   void blend(TileStream& stream, TileImage& image) {
     std::uint64_t most = 0, shaded = 0;
     for_each_pixel(stream, [&](std::uint32_t pixel) {
-      FrontToBack sum;
+      FrontToBack4 sum;
       std::uint64_t layers = 0;
-      table_.for_each(pixel, [&](std::size_t cell, std::uint32_t record, unsigned) {
+      table_.for_each(pixel, [&](std::size_t cell, std::uint32_t record, unsigned age) {
         const std::uint64_t depth = Record32::depth(record);
         sum.add(stream.colour(DepthItem(depth << 32 | payloads_[cell])));
         ++layers;
+        comparisons_ += age;
         return true;
       });
       if (layers == 0) return;
-      image.pixels[pixel] = sum.result();
+      sum.write(image.pixels[pixel]);
       most = std::max(most, layers);
       shaded += layers;
     });

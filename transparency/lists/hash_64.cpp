@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include "strata/hashbuffer/resize_policy.h"
+#include "transparency/lists/blend_list.h"
 #include "transparency/lists/list_techniques.h"
 #include "transparency/lists/tile_hash.h"
 
@@ -82,50 +83,57 @@ class HashRenderer {
     table.begin(stream, cells, kind_, settings_.seed ^ tile * 0x9e3779b97f4a7c15u);
     Costs& costs = stream.costs();
     std::uint64_t swaps = 0;
-    stream.pass([&](std::uint32_t pixel, DepthItem item) {
-      table.template insert<Concurrency>(pixel, item, [&] { ++swaps; });
-    });
+    table.template insert_all<Concurrency>(stream, [&] { ++swaps; });
     const std::uint64_t failures = table.failures();
-    costs.comparisons += table.ages() + failures * table.age_limit();
     // A losing maximum is a load; each swap is one compare-and-swap more.
-    if (Concurrency::kAnyThread) costs.comparisons += swaps;
+    costs.comparisons += failures * table.age_limit() + (Concurrency::kAnyThread ? swaps : 0);
     costs.stored += stream.size() - failures;
     next_cells_ = failures > 0 ? rebuilt_cells(stream.size(), cells) : cells;
     bool done = failures == 0 || sizing == Sizing::kFixed;
+    if (done) costs.kept = stream.size() - failures;
     if (sizing == Sizing::kGrown && done) {
       next_cells_ = next_frame_cells(cells, stream.pixel_count(), stream.size());
       done = next_cells_ == cells;
     }
     if (done) {
-      blend(table, stream, image);
+      costs.comparisons += blend(table, stream, image);
       costs.lost = failures;
       costs.allocated_bytes = table.bytes();
       costs.formula_bytes = list_bytes::hash_table(cells, table.blocks(), 8 * sizeof(Bits),
                                                    TileHash<Record>::kAgeBytes);
+    } else {
+      costs.comparisons += table.ages();
     }
-    const std::uint64_t held = table.clear();
-    if (done) costs.kept = held;
+    if (sizing == Sizing::kGrown) {
+      costs.kept = table.clear_and_count();
+    } else {
+      table.clear();
+    }
     return done;
   }
 
+  /// @return probes of the records in the table: each came to the cells of all ages up to its own
   template <class Record>
-  static void blend(const TileHash<Record>& table, TileStream& stream, TileImage& image) {
-    std::uint64_t most = 0, shaded = 0;
+  static std::uint64_t blend(const TileHash<Record>& table, TileStream& stream, TileImage& image) {
+    std::uint64_t most = 0, shaded = 0, probes = 0;
+    const glm::vec4* colours = stream.frame().colours.data();
     for_each_pixel(stream, [&](std::uint32_t pixel) {
-      FrontToBack sum;
+      FrontToBack4 sum;
       std::uint64_t layers = 0;
-      table.for_each(pixel, [&](std::size_t, typename Record::Word record, unsigned) {
-        sum.add(stream.colour(Record::item(record)));
+      table.for_each(pixel, [&](std::size_t, typename Record::Word record, unsigned age) {
+        sum.add(colours[TileStream::face_of(Record::item(record))]);
         ++layers;
+        probes += age;
         return true;
       });
       if (layers == 0) return;
-      image.pixels[pixel] = sum.result();
+      sum.write(image.pixels[pixel]);
       most = std::max(most, layers);
       shaded += layers;
     });
     stream.costs().most_layers = most;
     stream.count_shaded(shaded);
+    return probes;
   }
 
   using Bits = Record64::Word;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <type_traits>
 #include <vector>
 
 #include "hashbuffer/tile_store.h"
@@ -53,19 +54,40 @@ class TileHash {
                                         });
   }
 
+  /// Inserts the fragments of a geometry pass.
+  template <class Concurrency, class Stored>
+  void insert_all(TileStream& stream, Stored&& stored) {
+    if constexpr (std::is_same_v<Record, Record64> && !Concurrency::kAnyThread) {
+      if (table_.planes > 0) {
+        stream.count_pass(stream.size());
+        return insert_into(stream.pixels(), stream.items(), table_, max_ages_.data());
+      }
+    }
+    stream.pass(
+        [&](std::uint32_t pixel, DepthItem item) { insert<Concurrency>(pixel, item, stored); });
+  }
+
   /// Calls visit(cell, record, age) for the records of a pixel, front to back, while it returns
   /// true.
   template <class Visit>
   void for_each(std::uint32_t pixel, Visit&& visit) const {
     const std::uint32_t at = key(pixel);
     const unsigned last = max_ages_[block(at)];
-    for (unsigned age = 1; age <= last; ++age) {
-      std::size_t cell = at + table_.offset(static_cast<int>(age));
-      if (cell >= table_.size) cell -= table_.size;
+    const auto go_on = [&](std::size_t cell, unsigned age) {
       const Bits record = table_.cells[cell];
       // A record further back would have displaced a younger one here.
-      if (Record::age(record) < age) return;
-      if (Record::age(record) == age && !visit(cell, record, age)) return;
+      if (Record::age(record) < age) return false;
+      return Record::age(record) != age || visit(cell, record, age);
+    };
+    const unsigned planes = std::min(last, static_cast<unsigned>(table_.planes));
+    unsigned age = 1;
+    for (; age <= planes; ++age) {
+      if (!go_on(at + (age - 1) * std::size_t{kTilePixels}, age)) return;
+    }
+    for (; age <= last; ++age) {
+      std::size_t cell = at + std::size_t{table_.offsets[age]};
+      if (cell >= table_.size) cell -= table_.size;
+      if (!go_on(cell, age)) return;
     }
   }
 
@@ -76,21 +98,24 @@ class TileHash {
   /// The sum of the ages of all records, which is the number of their probes.
   [[nodiscard]] std::uint64_t ages() const {
     std::uint64_t sum = 0;
-    for (std::size_t cell = 0; cell < table_.size; ++cell) sum += Record::age(table_.cells[cell]);
+    for (std::size_t cell = 0; cell < used(); ++cell) sum += Record::age(table_.cells[cell]);
     return sum;
   }
 
-  /// Empties the table. @return the records that it held
-  std::uint64_t clear() {
-    std::uint64_t held = 0;
-    const auto wipe = [&](std::size_t cells) {
-      for (std::size_t cell = 0; cell < cells; ++cell) held += table_.cells[cell] != 0 ? 1 : 0;
-      std::fill_n(table_.cells.begin(), cells, Bits{0});
-    };
-    wipe(table_.mixed ? table_.size : static_cast<std::size_t>(table_.oldest) * kTilePixels);
+  /// Empties the table.
+  void clear() {
+    std::fill_n(table_.cells.begin(), used(), Bits{0});
     table_.oldest = 0;
     table_.mixed = false;
     table_.failures = 0;
+  }
+  /// The same. @return the records that it held
+  std::uint64_t clear_and_count() {
+    const auto held =
+        used() - static_cast<std::size_t>(std::count(
+                     table_.cells.begin(),
+                     table_.cells.begin() + static_cast<std::ptrdiff_t>(used()), Bits{0}));
+    clear();
     return held;
   }
 
@@ -102,6 +127,12 @@ class TileHash {
   static constexpr std::uint64_t kAgeBytes = Record::kAgeBits > 8 ? 2 : 1;
 
  private:
+  /// Cells that may hold records.
+  [[nodiscard]] std::size_t used() const {
+    if (table_.mixed || table_.planes == 0) return table_.size;
+    return std::min(table_.size, static_cast<std::size_t>(table_.oldest) * kTilePixels);
+  }
+
   static constexpr std::uint64_t kOne = 1 << 20;  ///< fixed point for divisions of pixels
 
   /// Pixels are numbered without gaps.

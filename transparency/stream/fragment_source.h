@@ -27,8 +27,20 @@ struct TileFragments {
   std::vector<DepthItem> opaque;  ///< of each pixel: the nearest opaque fragment or kNothing
   std::vector<std::uint64_t> scratch;
 
+  /// In place of the log: fragments that the source keeps.
+  std::span<const std::uint32_t> kept_pixels;
+  std::span<const DepthItem> kept_items;
+
+  [[nodiscard]] std::span<const std::uint32_t> pixels() const {
+    return kept_pixels.empty() ? std::span(log.pixels).first(log.count) : kept_pixels;
+  }
+  [[nodiscard]] std::span<const DepthItem> items() const {
+    return kept_pixels.empty() ? std::span(log.keys).first(log.count) : kept_items;
+  }
   void clear() {
     log.count = 0;
+    kept_pixels = {};
+    kept_items = {};
     any_opaque = false;
   }
   /// Makes room for opaque fragments, none yet.

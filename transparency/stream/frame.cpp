@@ -109,9 +109,26 @@ class FramePass {
     if (item == TileFragments::kNothing) return background_;
     return info_.colours[static_cast<std::size_t>(item.triangle()) << 1 | (item.exit() ? 1 : 0)];
   }
+  /// One sample a pixel, and no opaque objects.
+  void resolve_plain(const Worker& worker, const PixelRect& rect) const {
+    const glm::vec4 background = background_;
+    const auto width = static_cast<std::size_t>(rect.u1 - rect.u0);
+    for (int v = rect.v0; v < rect.v1; ++v) {
+      glm::vec4* out = image_.pixels.data() + rect.u0 +
+                       static_cast<std::size_t>(v) * static_cast<std::size_t>(image_.width);
+      const glm::vec4* seen = worker.image.pixels.data() + (v - rect.v0) * kTileSide;
+      for (std::size_t u = 0; u < width; ++u) {
+        const float through = seen[u].a;
+        glm::vec4 own = seen[u];
+        own.a = 1.0f - through;
+        out[u] = own + through * background;
+      }
+    }
+  }
   /// The mean of the samples of each pixel.
   void resolve(const Worker& worker, const PixelRect& rect) const {
     const int across = info_.across, down = info_.down;
+    if (across * down == 1 && !worker.fragments.any_opaque) return resolve_plain(worker, rect);
     const float share = 1.0f / static_cast<float>(across * down);
     for (int v = rect.v0; v < rect.v1; v += down) {
       glm::vec4* out = image_.pixels.data() +

@@ -45,12 +45,8 @@ class ListedSource final : public FragmentSource {
       out.clear();
       const auto tile = static_cast<std::size_t>(tv * source_->tiles_u_ + tu);
       const std::size_t begin = source_->offsets_[tile], end = source_->offsets_[tile + 1];
-      out.log.reserve(end - begin);
-      for (std::size_t i = begin; i < end; ++i) {
-        out.log.pixels[i - begin] = source_->pixels_[i];
-        out.log.keys[i - begin] = source_->items_[i];
-      }
-      out.log.count = end - begin;
+      out.kept_pixels = std::span(source_->pixels_).subspan(begin, end - begin);
+      out.kept_items = std::span(source_->items_).subspan(begin, end - begin);
       return {};
     }
 

@@ -1,11 +1,12 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
 
-#include "strata/hashbuffer/depth_list_store.h"
+#include "transparency/stream/short_sort.h"
 #include "transparency/stream/tile_stream.h"
 
 namespace strata::transparency {
@@ -16,34 +17,47 @@ class SortedTile {
  public:
   /// Two geometry passes.
   void build(TileStream& stream) {
-    ends_.fill(0);
-    stream.pass([&](std::uint32_t pixel, DepthItem) { ++ends_[pixel + 1]; });
+    store(stream);
+    for (std::size_t pixel = 0; pixel < kTilePixels; ++pixel) {
+      sort_items(items_.data() + ends_[pixel] - counts_[pixel], items_.data() + ends_[pixel]);
+    }
+  }
+  /// The same, but the lists are in submission order.
+  void store(TileStream& stream) {
+    counts_.fill(0);
+    std::uint32_t* counts = counts_.data();
+    stream.pass([counts](std::uint32_t pixel, DepthItem) { ++counts[pixel]; });
     std::uint32_t sum = 0;
     most_layers_ = 0;
-    for (std::uint32_t& end : ends_) {
-      most_layers_ = std::max(most_layers_, end);
-      const std::uint32_t count = end;
-      end = sum;
-      sum += count;
-    }
-    items_.resize(sum);
-    stream.pass([&](std::uint32_t pixel, DepthItem item) { items_[ends_[pixel + 1]++] = item; });
     for (std::size_t pixel = 0; pixel < kTilePixels; ++pixel) {
-      detail::sort_list(items_.data() + ends_[pixel], items_.data() + ends_[pixel + 1]);
+      ends_[pixel] = sum;
+      sum += counts[pixel];
+      most_layers_ = std::max(most_layers_, counts[pixel]);
     }
+    if (items_.size() < sum) items_.resize(sum);
+    size_ = sum;
+    std::uint32_t* ends = ends_.data();
+    DepthItem* items = items_.data();
+    stream.pass([=](std::uint32_t pixel, DepthItem item) { items[ends[pixel]++] = item; });
   }
-
-  /// Front to back.
+  [[nodiscard]] std::uint32_t count(std::uint32_t pixel) const { return counts_[pixel]; }
   [[nodiscard]] std::span<const DepthItem> list(std::uint32_t pixel) const {
-    return std::span(items_).subspan(ends_[pixel], ends_[pixel + 1] - ends_[pixel]);
+    return {items_.data() + begin(pixel), counts_[pixel]};
   }
-  [[nodiscard]] std::uint64_t size() const { return items_.size(); }
+  /// To be sorted by the caller.
+  [[nodiscard]] DepthItem* stored(std::uint32_t pixel) { return items_.data() + begin(pixel); }
+  [[nodiscard]] std::uint64_t size() const { return size_; }
   [[nodiscard]] std::uint32_t most_layers() const { return most_layers_; }
 
  private:
-  /// Element p + 1: the count of pixel p, then the begin of its list, then the end.
-  std::array<std::uint32_t, kTilePixels + 1> ends_{};
+  [[nodiscard]] std::size_t begin(std::uint32_t pixel) const {
+    return ends_[pixel] - counts_[pixel];
+  }
+
+  /// Of each pixel: the fragments, and the begin of its list, which moves to the end.
+  std::array<std::uint32_t, kTilePixels> counts_{}, ends_{};
   std::vector<DepthItem> items_;
+  std::size_t size_ = 0;
   std::uint32_t most_layers_ = 0;
 };
 

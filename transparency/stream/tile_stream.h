@@ -66,7 +66,12 @@ class TileStream {
  public:
   TileStream(const TileFragments& fragments, const FrameInfo& frame, const PixelRect& rect,
              Costs& costs)
-      : fragments_(&fragments), frame_(&frame), rect_(rect), costs_(&costs) {}
+      : fragments_(&fragments),
+        pixels_(fragments.pixels()),
+        items_(fragments.items()),
+        frame_(&frame),
+        rect_(rect),
+        costs_(&costs) {}
 
   /// Pixels (samples) of the tile, at most kTileSide each. The last tiles of a picture are smaller.
   [[nodiscard]] int width() const { return rect_.u1 - rect_.u0; }
@@ -78,7 +83,7 @@ class TileStream {
   [[nodiscard]] const PixelRect& rect() const { return rect_; }
   [[nodiscard]] const FrameInfo& frame() const { return *frame_; }
   [[nodiscard]] Costs& costs() { return *costs_; }
-  [[nodiscard]] std::size_t size() const { return fragments_->log.count; }
+  [[nodiscard]] std::size_t size() const { return pixels_.size(); }
 
   /// A geometry pass: calls body(pixel, item) for each fragment, in submission order; pixel is
   /// v * kTileSide + u.
@@ -86,8 +91,8 @@ class TileStream {
   void pass(Body&& body) {
     ++passes_;
     costs_->rasterized += size();
-    const std::uint32_t* pixels = fragments_->log.pixels.data();
-    const DepthItem* items = fragments_->log.keys.data();
+    const std::uint32_t* pixels = pixels_.data();
+    const DepthItem* items = items_.data();
     for (std::size_t i = 0, count = size(); i < count; ++i) body(pixels[i], items[i]);
   }
   /// Counts a geometry pass of which only `fragments` were rasterized, such as one that a query
@@ -99,11 +104,12 @@ class TileStream {
   [[nodiscard]] std::uint64_t passes() const { return passes_; }
 
   /// The fragments as arrays, for techniques that hand them to a store; count_pass() counts.
-  [[nodiscard]] std::span<const std::uint32_t> pixels() const {
-    return std::span(fragments_->log.pixels).first(size());
-  }
-  [[nodiscard]] std::span<const DepthItem> items() const {
-    return std::span(fragments_->log.keys).first(size());
+  [[nodiscard]] std::span<const std::uint32_t> pixels() const { return pixels_; }
+  [[nodiscard]] std::span<const DepthItem> items() const { return items_; }
+
+  /// The index of a fragment's colour.
+  [[nodiscard]] static std::size_t face_of(DepthItem item) {
+    return static_cast<std::size_t>(item.triangle()) << 1 | (item.exit() ? 1 : 0);
   }
 
   /// The colour of a fragment, premultiplied, and its opacity.
@@ -126,11 +132,9 @@ class TileStream {
   }
 
  private:
-  [[nodiscard]] static std::size_t face_of(DepthItem item) {
-    return static_cast<std::size_t>(item.triangle()) << 1 | (item.exit() ? 1 : 0);
-  }
-
   const TileFragments* fragments_;
+  std::span<const std::uint32_t> pixels_;
+  std::span<const DepthItem> items_;
   const FrameInfo* frame_;
   PixelRect rect_;
   Costs* costs_;
