@@ -29,6 +29,9 @@ constexpr std::array kAll{
     &kPagedLists,
     &kPagedListsGrow,
     &kTransmittanceForm,
+    &kDeepFrameBuffer,
+    &kSBuffer,
+    &kCoverageMasks,
     // peeling
     &kFBuffer,
     &kRBuffer,

@@ -366,6 +366,102 @@ TEST(PagedLists, DoubleAPoolThatIsTooSmall) {
   }
 }
 
+TEST(DeepFrameBuffer, EndsInAnErrorAboveEightFragmentsAPixel) {
+  const auto rendered = [](double layers, int threads) {
+    const ListedFrame frame = random_frame("Mixed", {130, 70}, layers, 1 << 24, 91);
+    Execution execution;
+    execution.threads = threads;
+    auto made = *Frame::make(frame.fragments, frame.colours, frame.options);
+    auto rendering = made.render(technique("dxdfb"), {}, execution);
+    // The room is that of a frame, not of all.
+    EXPECT_EQ(made.render(technique("dxdfb"), {}, execution).has_value(), rendering.has_value());
+    if (rendering) {
+      EXPECT_TRUE(same_bits(rendering->image, oracle_picture(frame, Blending::kFrontToBack)));
+      EXPECT_EQ(rendering->costs.formula_bytes, 130u * 70u * (8u * 8u + 8u));
+    }
+    return rendering ? std::string() : rendering.error().message;
+  };
+  for (const int threads : {1, 2, 4}) {
+    EXPECT_EQ(rendered(8.0, threads), "");
+    EXPECT_NE(rendered(8.01, threads).find("72800 of them"), std::string::npos);
+  }
+}
+
+TEST(SBuffer, TakesTheBytesOfCountAndScanAndItsCounters) {
+  const ListedFrame frame = odd_frame();
+  for (const unsigned k : {1u, 7u, 64u}) {
+    const Rendering rendering = render(frame, "s-buffer", k);
+    EXPECT_TRUE(same_bits(rendering.image, oracle_picture(frame, Blending::kFrontToBack))) << k;
+    expect_bytes(rendering, 8 * frame.fragments.size() + 8 * 133 * 71 + 8 * k * 6, "s-buffer");
+  }
+}
+
+/// The mean of the samples of each pixel, row by row of samples.
+std::vector<glm::vec4> mean_of_samples(const std::vector<glm::vec4>& fine, int width, int height,
+                                       int across, int down) {
+  std::vector<glm::vec4> mean;
+  for (int v = 0; v < height; ++v) {
+    for (int u = 0; u < width; ++u) {
+      glm::vec4 sum(0.0f);
+      for (int i = 0; i < across * down; ++i) {
+        sum += fine[static_cast<std::size_t>((v * down + i / across) * width * across + u * across +
+                                             i % across)];
+      }
+      mean.push_back(sum * (1.0f / static_cast<float>(across * down)));
+    }
+  }
+  return mean;
+}
+
+TEST(CoverageMasks, GiveTheMeanOfTheSamples) {
+  for (const auto [samples, across, down] :
+       {std::array{4, 2, 2}, {16, 4, 4}, {32, 8, 4}, {64, 8, 8}}) {
+    // Few faces and depths, so that samples of a pixel share a face, and faces cross.
+    ListedFrame frame =
+        random_frame("Samples", {20 * across, 9 * down}, 5.0, samples == 4 ? 3 : 1 << 24, 95);
+    for (ListedFragment& f : frame.fragments) f.face %= 4;
+    const auto fine = oracle_picture(frame, Blending::kFrontToBack);
+    frame.options.size = {20, 9};
+    frame.options.samples = samples;
+    const Rendering rendering = render(frame, "a-buffer-masks");
+    EXPECT_TRUE(same_bits(rendering.image, mean_of_samples(fine, 20, 9, across, down))) << samples;
+    EXPECT_EQ(rendering.costs.geometry_passes, 2u);
+    EXPECT_GT(rendering.costs.merged, 0u);
+  }
+}
+
+TEST(CoverageMasks, ShadeAndKeepATriangleOnceAPixel) {
+  // Two squares, one behind the other, and a third that crosses both if `tilted`.
+  for (const bool tilted : {false, true}) {
+    ListedFrame frame;
+    frame.colours = {{1, 0, 0, 0.5f}, {0, 1, 0, 0.5f}, {0, 0, 1, 0.5f}};
+    frame.options.size = {64, 64};
+    for (std::uint32_t face = 0; face < 3; ++face) {
+      for (int i = 0; i < 64 * 64; ++i) {
+        const auto slope = static_cast<std::uint32_t>(face == 2 && tilted ? i % 64 * 10 : 0);
+        frame.fragments.push_back({i % 64, i / 64, 100 + 100 * face + slope, face, false});
+        if (tilted && face == 2) frame.fragments.back().depth -= 150;
+      }
+    }
+    const auto fine = oracle_picture(frame, Blending::kFrontToBack);
+    frame.options.size = {16, 16};
+    frame.options.samples = 16;
+    const Rendering rendering = render(frame, "a-buffer-masks");
+    EXPECT_TRUE(same_bits(rendering.image, mean_of_samples(fine, 16, 16, 4, 4)));
+    EXPECT_EQ(rendering.costs.stored, 3u * 16u * 16u);
+    EXPECT_EQ(rendering.costs.merged, frame.fragments.size() - 3u * 16u * 16u);
+    if (tilted) {
+      // The third crosses the second in one column of pixels, which is shaded by samples.
+      EXPECT_EQ(rendering.costs.geometry_passes, 2u);
+      EXPECT_EQ(rendering.costs.shaded, 3u * 16u * 16u + 16u * 3u * 15u);
+    } else {
+      EXPECT_EQ(rendering.costs.geometry_passes, 1u);
+      EXPECT_EQ(rendering.costs.shaded, 3u * 16u * 16u);
+      expect_bytes(rendering, 24 * 3 * 16 * 16 + 4 * 16 * 16, "a-buffer-masks");
+    }
+  }
+}
+
 /// Red behind blue behind green, each of opacity 0.4, over white.
 ListedFrame example(std::array<std::uint32_t, 3> depths) {
   ListedFrame frame;

@@ -1,3 +1,5 @@
+#include <atomic>
+
 #include "transparency/lists/blend_list.h"
 #include "transparency/lists/list_bytes.h"
 #include "transparency/lists/list_techniques.h"
@@ -63,6 +65,40 @@ Result<TileRenderer> make_transmittance(const FrameInfo&, const Settings&,
   };
 }
 
+/// Room for the fragments of a whole frame.
+struct FixedRoom {
+  std::uint64_t capacity = 0;
+  mutable std::atomic<std::uint64_t> used{0};
+};
+constexpr std::uint64_t kRoomOfPixel = 8;  ///< fragments
+
+Result<std::shared_ptr<const void>> prepare_fixed_room(const FrameInfo& frame, const Settings&,
+                                                       const Execution&) {
+  auto room = std::make_shared<FixedRoom>();
+  room->capacity = kRoomOfPixel * static_cast<std::uint64_t>(frame.size.x) *
+                   static_cast<std::uint64_t>(frame.size.y);
+  return room;
+}
+
+Result<TileRenderer> make_in_fixed_room(const FrameInfo& frame, const Settings& settings,
+                                        const std::shared_ptr<const void>& prepared) {
+  auto inner = make(frame, settings, nullptr);
+  if (!inner) return inner;
+  const auto room = std::static_pointer_cast<const FixedRoom>(prepared);
+  return [renderer = *inner, room](TileStream& stream, TileImage& image) -> Result<void> {
+    if ((room->used += stream.size()) > room->capacity) {
+      return fail(ErrorCode::kLimit,
+                  "dxdfb: the buffer holds {} fragments a pixel on average, {} of them; the frame "
+                  "has more",
+                  kRoomOfPixel, room->capacity);
+    }
+    auto done = renderer(stream, image);
+    stream.costs().formula_bytes =
+        list_bytes::count_scan(stream.pixel_count(), kRoomOfPixel * stream.pixel_count());
+    return done;
+  };
+}
+
 }  // namespace
 
 const Technique kCountScan{
@@ -81,6 +117,16 @@ const Technique kTransmittanceForm{
     .memory = kCountScan.memory,
     .fails = "differs from blending in order where surfaces coincide; the sum may exceed 1 there",
     .make = make_transmittance,
+};
+const Technique kDeepFrameBuffer{
+    .name = "dxdfb",
+    .title = "Deep frame buffer of the DirectX SDK: count and scan in a buffer of fixed size",
+    .paper = "Maule, Comba, Torchelsen, Bastos 2014",
+    .accuracy = Accuracy::kBounded,
+    .memory = "72 bytes a pixel: room for 8 fragments of 8 bytes, and its count and base",
+    .fails = "ends in an error if the frame has more than 8 fragments a pixel on average",
+    .prepare = prepare_fixed_room,
+    .make = make_in_fixed_room,
 };
 
 }  // namespace strata::transparency

@@ -8,7 +8,8 @@ namespace strata::transparency {
 
 extern const Technique kHash64, kHash64Cas, kHash64Grown, kHash64Fixed, kHash32;
 extern const Technique kHash64Culled, kHash64Nearest;
-extern const Technique kCountScan, kTransmittanceForm;
+extern const Technique kCountScan, kTransmittanceForm, kDeepFrameBuffer, kSBuffer;
+extern const Technique kCoverageMasks;
 extern const Technique kFixedArray, kFixedArrayBounded;
 extern const Technique kLinkedLists, kLinkedListsGrow, kMlabABuffer;
 extern const Technique kPagedLists, kPagedListsGrow;
