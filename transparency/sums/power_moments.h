@@ -19,58 +19,84 @@ namespace strata::transparency {
 
 namespace detail {
 
+/// Places of the mass at most; those farther out than kFarthestRoot have next to none.
+inline constexpr double kFarthestRoot = 64.0;
+
 template <std::size_t kSize>
 [[nodiscard]] double polynomial(const std::array<double, kSize>& c, double x) {
   double value = 0.0;
   for (std::size_t i = kSize; i-- > 0;) value = value * x + c[i];
   return value;
 }
+template <std::size_t kSize>
+[[nodiscard]] std::array<double, kSize - 1> derivative(const std::array<double, kSize>& c) {
+  std::array<double, kSize - 1> slope;
+  for (std::size_t i = 1; i < kSize; ++i) slope[i - 1] = static_cast<double>(i) * c[i];
+  return slope;
+}
+
+// The roots of polynomials whose roots are all real. A leading coefficient of next to 0 gives roots
+// that are far out or not finite.
+
+inline std::array<double, 2> real_roots(const std::array<double, 3>& c) {
+  const double root = std::sqrt(std::max(0.0, c[1] * c[1] - 4.0 * c[0] * c[2]));
+  const double q = -0.5 * (c[1] + std::copysign(root, c[1]));
+  return {q / c[2], c[0] / q};
+}
+
+inline std::array<double, 3> real_roots(const std::array<double, 4>& c) {
+  const double a = c[2] / c[3] / 3.0, b = c[1] / c[3], d = c[0] / c[3];
+  const double q = a * a - b / 3.0;
+  if (!(std::abs(a) < 1e7 && q > 0.0)) {
+    const auto two = real_roots(std::array<double, 3>{c[0], c[1], c[2]});
+    return {two[0], two[1], c[2] / c[3] * -1.0};
+  }
+  const double r = a * a * a - 0.5 * a * b + 0.5 * d;
+  const double angle = std::acos(std::clamp(r / (q * std::sqrt(q)), -1.0, 1.0)) / 3.0;
+  const double cosine = std::cos(angle), sine = 0.8660254037844386 * std::sin(angle);
+  const double scale = 2.0 * std::sqrt(q);
+  std::array<double, 3> roots{-scale * cosine - a, scale * (0.5 * cosine + sine) - a,
+                              scale * (0.5 * cosine - sine) - a};
+  const auto slope = derivative(c);
+  for (double& root : roots) {  // cancellation near 0
+    const double better = root - polynomial(c, root) / polynomial(slope, root);
+    if (std::isfinite(better)) root = better;
+  }
+  return roots;
+}
 
 /// The root between two places where the values have different signs: Newton, halving where that
 /// leaves the interval.
-template <std::size_t kSize>
-double root_between(const std::array<double, kSize>& c, double low, double high, bool rising) {
-  std::array<double, kSize - 1> slope;
-  for (std::size_t i = 1; i < kSize; ++i) slope[i - 1] = static_cast<double>(i) * c[i];
+inline double root_between(const std::array<double, 5>& c, const std::array<double, 4>& slope,
+                           double low, double high, bool rising) {
   double x = 0.5 * (low + high);
   for (int step = 0; step < 60; ++step) {
     const double value = polynomial(c, x);
     ((value < 0.0) == rising ? low : high) = x;
     double next = x - value / polynomial(slope, x);
     if (!(next > low && next < high)) next = 0.5 * (low + high);
-    if (std::abs(next - x) < 1e-10) return next;
+    if (std::abs(next - x) < 1e-9) return next;
     x = next;
   }
   return x;
 }
 
-/// Mass farther out is below kFarthestRoot^-4.
-inline constexpr double kFarthestRoot = 64.0;
-
-/// The roots within [-kFarthestRoot, kFarthestRoot] of a polynomial whose roots are all real, in
-/// increasing order. @return how many
-template <std::size_t kSize>
-std::size_t real_roots(const std::array<double, kSize>& c, std::array<double, kSize>& roots) {
-  std::array<double, kSize + 1> ends;
-  std::size_t count = 1;
-  ends[0] = -kFarthestRoot;
-  if constexpr (kSize > 2) {
-    std::array<double, kSize - 1> slope, turns{};
-    for (std::size_t i = 1; i < kSize; ++i) slope[i - 1] = static_cast<double>(i) * c[i];
-    const std::size_t some = real_roots(slope, turns);
-    for (std::size_t i = 0; i < some; ++i) ends[count++] = turns[i];
-  }
-  ends[count++] = kFarthestRoot;
-  std::size_t found = 0;
+inline std::array<double, 4> real_roots(const std::array<double, 5>& c) {
+  const std::array<double, 4> slope = derivative(c);
+  std::array<double, 3> turns = real_roots(slope);
+  for (double& turn : turns) turn = std::clamp(turn, -kFarthestRoot, kFarthestRoot);
+  std::sort(turns.begin(), turns.end());
+  const std::array<double, 5> ends{-kFarthestRoot, turns[0], turns[1], turns[2], kFarthestRoot};
+  std::array<double, 4> roots;
   double before = polynomial(c, ends[0]);
-  for (std::size_t i = 1; i < count; ++i) {
-    const double here = polynomial(c, ends[i]);
-    if ((before < 0.0) != (here < 0.0)) {
-      roots[found++] = root_between(c, ends[i - 1], ends[i], before < 0.0);
-    }
+  for (std::size_t i = 0; i < 4; ++i) {
+    const double here = polynomial(c, ends[i + 1]);
+    roots[i] = (before < 0.0) == (here < 0.0)
+                   ? 2.0 * kFarthestRoot
+                   : root_between(c, slope, ends[i], ends[i + 1], before < 0.0);
     before = here;
   }
-  return found;
+  return roots;
 }
 
 }  // namespace detail
@@ -136,10 +162,9 @@ class PowerMoments {
     for (std::size_t i = kHalf; i-- > 0;) {
       for (std::size_t k = i + 1; k <= kHalf; ++k) y[i] -= low_[k][i] * y[k];
     }
-    Vector roots{};
-    const std::size_t count = detail::real_roots(y, roots);
-    for (std::size_t i = 0; i < count && roots[i] < depth; ++i)
-      shares.least += mass(forward(roots[i]));
+    for (const double root : detail::real_roots(y)) {
+      if (root > -detail::kFarthestRoot && root < depth) shares.least += mass(forward(root));
+    }
     return shares;
   }
   /// The share in front as the paper estimates it: in [0, 1].
