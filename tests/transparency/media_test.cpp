@@ -373,6 +373,141 @@ TEST(Media, AnEyeThatMovesThroughAWallSeesNoJump) {
   EXPECT_GT(total, 0.1f);
 }
 
+/// Where a ray meets a triangle; below 0: nowhere. T. Moeller, B. Trumbore (1997).
+double hit(const glm::dvec3& from, const glm::dvec3& along, const glm::dvec3& a,
+           const glm::dvec3& b, const glm::dvec3& c) {
+  const glm::dvec3 e = b - a, f = c - a, p = glm::cross(along, f);
+  const double det = glm::dot(e, p);
+  if (std::abs(det) < 1e-14) return -1.0;
+  const glm::dvec3 s = (from - a) / det, q = glm::cross(s, e);
+  const double u = glm::dot(s, p), v = glm::dot(along, q);
+  return u < 0 || v < 0 || u + v > 1 ? -1.0 : glm::dot(f, q);
+}
+
+/// A picture's colour by brute force: every ray with every triangle and every ball, in doubles.
+glm::dvec3 traced(const Scene& scene, const MediaSettings& media, const glm::dvec3& from,
+                  const glm::dvec3& along) {
+  struct Event {
+    double at;
+    std::size_t medium;  // solids, then particles
+    std::size_t triangle;
+  };
+  std::vector<Event> events;
+  const std::size_t solids = scene.objects.size();
+  std::vector<bool> inside(solids + media.particles.size(), false);
+  double opaque = 1e9;
+  glm::dvec3 behind = kBehind;
+  for (std::size_t t = 0; t < scene.mesh.triangles.size(); ++t) {
+    const glm::uvec3& of = scene.mesh.triangles[t];
+    const auto& at = scene.mesh.positions;
+    const double distance = hit(from, along, at[of.x], at[of.y], at[of.z]);
+    if (distance <= 0.0) continue;
+    const std::size_t object = scene.object_of[t];
+    if (scene.objects[object].colour.a < 1.0f) {
+      events.push_back({distance, object, t});
+      if (scene.objects[object].name != "pane") inside[object] = !inside[object];
+    } else if (distance < opaque) {
+      opaque = distance;
+      behind = glm::dvec3(scene.objects[object].colour);
+    }
+  }
+  for (std::size_t i = 0; i < media.particles.size(); ++i) {
+    const Particle& ball = media.particles[i];
+    const glm::dvec3 to = from - ball.centre;
+    const double b = glm::dot(to, along);
+    const double root = b * b - glm::dot(to, to) + ball.radius * ball.radius;
+    if (root <= 0.0) continue;
+    for (const double distance : {-b - std::sqrt(root), -b + std::sqrt(root)}) {
+      if (distance > 0.0) events.push_back({distance, solids + i, 0});
+    }
+    inside[solids + i] = -b - std::sqrt(root) <= 0.0 && -b + std::sqrt(root) > 0.0;
+  }
+  std::sort(events.begin(), events.end(),
+            [](const Event& a, const Event& b) { return a.at < b.at; });
+  RayOracle ray;
+  double at = 0.0;
+  const auto move_to = [&](double distance) {
+    glm::dvec3 s(0.0), q(0.0);
+    for (std::size_t i = 0; i < inside.size(); ++i) {
+      if (!inside[i]) continue;
+      const glm::dvec3 of(i < solids ? media.media[i].medium.extinction
+                                     : media.particles[i - solids].extinction);
+      s += of;
+      q += of * glm::dvec3(i < solids ? media.media[i].medium.albedo
+                                      : media.particles[i - solids].albedo);
+    }
+    ray.segment(distance - at, s, q, media.ambient);
+    at = distance;
+  };
+  for (const Event& event : events) {
+    if (event.at > opaque) break;
+    move_to(event.at);
+    if (event.medium < solids && scene.objects[event.medium].name == "pane") {
+      const glm::dvec4 colour(scene.objects[event.medium].colour);
+      ray.surface(glm::dvec3(colour) * colour.a, colour.a);
+    } else {
+      inside[event.medium] = !inside[event.medium];
+    }
+  }
+  if (opaque < 1e9) move_to(opaque);
+  return ray.before(behind);
+}
+
+TEST(Media, EqualWhatIsTracedByBruteForce) {
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> place(-2.0, 2.0), size(0.3, 1.8);
+  std::uniform_real_distribution<float> unit(0.0f, 1.0f);
+  const auto colour = [&] { return glm::vec3(unit(random), unit(random), unit(random)); };
+  for (int round = 0; round < 12; ++round) {
+    Scene scene;
+    MediaSettings media;
+    media.ambient = kAmbient;
+    const auto position = [&] {
+      const double x = place(random), y = place(random);
+      return glm::dvec3(x, y, place(random));
+    };
+    for (int i = 0; i < 5; ++i) {
+      const double r = size(random);
+      const TriangleSoup solid = i % 2 == 0 ? make_icosphere(r, 1) : make_torus(r, 0.3 * r, 12, 7);
+      add_object(scene, "solid" + std::to_string(i), moved(solid, position()));
+      media.media.push_back(medium(scene.objects.back().name, colour(), colour()));
+    }
+    // Surfaces with one brightness from all sides are not to be had: these are black.
+    TriangleSoup pane = make_icosphere(1.0, 0);
+    pane.triangles.resize(7);
+    add_object(scene, "pane", moved(pane, position()), {0, 0, 0, 0.4f});
+    add_object(scene, "opaque", moved(make_icosphere(size(random) * 0.6, 1), position()),
+               {0, 0, 0, 1});
+    for (int i = 0; i < 6; ++i) {
+      media.particles.push_back({position(), size(random) * 0.6, colour(), colour()});
+    }
+    // Outside, and in the midst of it.
+    const glm::dvec3 eye = round % 2 == 0 ? glm::dvec3(6, 4, 3) : 0.5 * position();
+    const glm::dvec3 target = round % 2 == 0 ? glm::dvec3(0.1) : position();
+    constexpr int kSide = 40;
+    const View view = view_from(scene, eye, target, {kSide, kSide});
+    const MediaRendering seen = render(scene, view, media, before_background());
+    for (const SolidReport& report : seen.solids) EXPECT_EQ(report.unbalanced_pixels, 0u);
+    const glm::dmat3 world_from_eye =
+        glm::transpose(glm::dmat3(eye_from_world(look_at(eye, target))));
+    int wrong = 0, filled = 0;
+    for (int i = 0; i < kSide * kSide; ++i) {
+      const double half = std::tan(std::numbers::pi / 6.0) / (kSide / 2.0);
+      const glm::dvec3 along(((i % kSide) + 0.5 - kSide / 2.0) * half,
+                             -((i / kSide) + 0.5 - kSide / 2.0) * half, -1.0);
+      const glm::dvec3 right = traced(scene, media, eye, world_from_eye * glm::normalize(along));
+      const glm::vec4& pixel = seen.rendering.image.pixels[static_cast<std::size_t>(i)];
+      double difference = 0.0;
+      for (int c = 0; c < 3; ++c) difference = std::max(difference, std::abs(pixel[c] - right[c]));
+      wrong += difference > 2e-3 ? 1 : 0;
+      filled += glm::length(right - kBehind) > 0.05 ? 1 : 0;
+    }
+    // Edges are snapped to 1/256 of a pixel, so a ray beside one may fall to its other side.
+    EXPECT_LE(wrong, 8) << "round " << round;
+    EXPECT_GT(filled, 200) << "round " << round;
+  }
+}
+
 TEST(Media, SolidsThatAreNotClosedAreNamed) {
   Scene scene;
   add_object(scene, "whole", slab(3.0, 4.0));

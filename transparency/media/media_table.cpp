@@ -25,15 +25,32 @@ Result<void> check_medium(std::string_view what, const glm::vec3& extinction,
   return check_part(what, "albedo", albedo, 1.0);
 }
 
-bool finite(const glm::dvec3& v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+bool within(const glm::dvec3& v) {
+  return std::abs(v.x) <= kFarthest && std::abs(v.y) <= kFarthest && std::abs(v.z) <= kFarthest;
+}
+
+Result<void> check_particle(const Particle& p, std::size_t index) {
+  if (!within(p.centre)) {
+    return fail(ErrorCode::kUsage, "particle {}: the centre must be {} to {}, got {}, {}, {}",
+                index, -kFarthest, kFarthest, p.centre.x, p.centre.y, p.centre.z);
+  }
+  if (!(p.radius > 0.0 && p.radius <= kFarthest)) {
+    return fail(ErrorCode::kUsage, "particle {}: the radius must be above 0 and at most {}, got {}",
+                index, kFarthest, p.radius);
+  }
+  // Names are made for those that are wrong alone: there are many particles.
+  if (check_medium("", p.extinction, p.albedo)) return {};
+  return check_medium(fmt::format("particle {}", index), p.extinction, p.albedo);
 }
 
 Result<void> check_light(const MediaLight& light) {
-  if (!finite(light.at) || (!light.point && !(glm::dot(light.at, light.at) > 0.0))) {
-    return fail(ErrorCode::kUsage, "the light's {} must be finite{}, got {}, {}, {}",
-                light.point ? "place" : "direction", light.point ? "" : " and not 0", light.at.x,
-                light.at.y, light.at.z);
+  const std::string_view what = light.point ? "place" : "direction";
+  if (!within(light.at)) {
+    return fail(ErrorCode::kUsage, "the light's {} must be {} to {}, got {}, {}, {}", what,
+                -kFarthest, kFarthest, light.at.x, light.at.y, light.at.z);
+  }
+  if (!light.point && light.at == glm::dvec3(0.0)) {
+    return fail(ErrorCode::kUsage, "the light's direction must not be 0, 0, 0");
   }
   if (light.shadow_size < 1 || light.shadow_size > 8192) {
     return fail(ErrorCode::kUsage, "the light's shadow size must be 1 to 8192, got {}",
@@ -97,15 +114,7 @@ Result<void> check_media(const MediaSettings& settings) {
     }
   }
   for (std::size_t i = 0; i < settings.particles.size(); ++i) {
-    const Particle& p = settings.particles[i];
-    const std::string what = fmt::format("particle {}", i);
-    if (!finite(p.centre) || !(p.radius > 0.0 && std::isfinite(p.radius))) {
-      return fail(ErrorCode::kUsage,
-                  "{}: the centre must be finite, and the radius finite and above 0; got {}, {}, "
-                  "{} and {}",
-                  what, p.centre.x, p.centre.y, p.centre.z, p.radius);
-    }
-    if (auto good = check_medium(what, p.extinction, p.albedo); !good) return good;
+    if (auto good = check_particle(settings.particles[i], i); !good) return good;
   }
   if (auto good = check_part("the media", "ambient light", settings.ambient, kMostExtinction);
       !good) {

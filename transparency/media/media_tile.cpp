@@ -307,7 +307,7 @@ void MediaTile::walk(std::uint32_t pixel, int u, int v) {
     world_ray_ = {glm::dvec3(world * glm::dvec4(view_ray.origin, 1.0)),
                   glm::dmat3(world) * view_ray.direction / along_};
   }
-  if (frame_.lit) {
+  if (frame_.lit && !light_changes_) {
     const double cosine = glm::dot(view_ray.direction, frame_.to_light) / along_;
     ray.light += from(frame_.settings.light.radiance) * splat(static_cast<float>(rayleigh(cosine)));
   }

@@ -40,6 +40,7 @@ bool parse(std::string_view text, double& value) {
 /// What is wrong with the value of a column; empty: nothing.
 std::string_view fault_of(std::size_t column, double value) {
   if (column == 3 && !(value > 0.0)) return "must be above 0";
+  if (column < 4 && !(std::abs(value) <= kFarthest)) return "must be at most 1e15";
   if (column >= 4 && column < 7 && !(value >= 0.0 && value <= kMostExtinction)) {
     return "must be 0 to 1e6";
   }

@@ -49,13 +49,14 @@ class PixelRays {
     const glm::dmat4 image_from_eye = view.image_from_world * world_from_eye_;
     const glm::dvec4& shift = image_from_eye[perspective_ ? 2 : 3];
     scale_ = {image_from_eye[0].x, image_from_eye[1].y};
+    unit_ = 1.0 / scale_;
     // A perspective view divides by -z.
     shift_ = perspective_ ? glm::dvec2(shift.x, shift.y) : -glm::dvec2(shift.x, shift.y);
   }
 
   /// The place of pixel (u, v) at distance 1 along the view axis.
   [[nodiscard]] glm::dvec2 place(double u, double v) const {
-    return (glm::dvec2(u, v) + shift_) / scale_;
+    return (glm::dvec2(u, v) + shift_) * unit_;
   }
   [[nodiscard]] PixelRay ray(int u, int v) const {
     const glm::dvec2 at = place(u + 0.5, v + 0.5);
@@ -73,7 +74,7 @@ class PixelRays {
  private:
   glm::dmat4 eye_from_world_, world_from_eye_;
   bool perspective_;
-  glm::dvec2 scale_{1.0}, shift_{0.0};
+  glm::dvec2 scale_{1.0}, unit_{1.0}, shift_{0.0};
 };
 
 }  // namespace strata::transparency

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <initializer_list>
 #include <iterator>
+#include <new>
 #include <nlohmann/json.hpp>
 #include <string_view>
 #include <utility>
@@ -106,8 +107,6 @@ struct Member {
   }
 };
 
-constexpr double kFar = 1e30;
-
 Result<void> read_coefficients(const Member& from, glm::vec3& extinction, glm::vec3& albedo) {
   if (from.has("extinction")) {
     if (auto done = from["extinction"].read_colour(extinction, kMostExtinction); !done) return done;
@@ -168,7 +167,7 @@ Result<void> read_light(const Member& from, MediaLight& light) {
   }
   light.point = from.has("position");
   const Member at = from[light.point ? "position" : "direction"];
-  if (auto done = at.read(light.at, -kFar, kFar); !done) return done;
+  if (auto done = at.read(light.at, -kFarthest, kFarthest); !done) return done;
   if (!light.point && light.at == glm::dvec3(0.0)) return at.fault("must not be 0, 0, 0");
   light.radiance = glm::vec3(1.0f);
   if (from.has("radiance")) {
@@ -200,9 +199,9 @@ Result<void> read_particle(const Member& from, std::vector<Particle>& particles)
     if (!from.has(needed)) return from.fault("must have a member '{}'", needed);
   }
   Particle particle;
-  if (auto done = from["centre"].read(particle.centre, -kFar, kFar); !done) return done;
+  if (auto done = from["centre"].read(particle.centre, -kFarthest, kFarthest); !done) return done;
   const Member radius = from["radius"];
-  if (auto done = radius.read(particle.radius, 0.0, kFar); !done) return done;
+  if (auto done = radius.read(particle.radius, 0.0, kFarthest); !done) return done;
   if (!(particle.radius > 0.0)) return radius.fault("must be above 0, got {}", particle.radius);
   if (auto done = read_coefficients(from, particle.extinction, particle.albedo); !done) return done;
   particles.push_back(particle);
@@ -268,6 +267,8 @@ Result<MediaSettings> read_media(const std::string& path) {
     return read_all({path, json, {}});
   } catch (const Json::exception& fault) {
     return fail(ErrorCode::kInput, "{}: {}", path, printable(plain(fault.what())));
+  } catch (const std::bad_alloc&) {
+    return fail(ErrorCode::kLimit, "{}: out of memory", path);
   } catch (const std::exception& fault) {
     return fail(ErrorCode::kInput, "{}: reading failed: {}", path, printable(fault.what()));
   }

@@ -1,6 +1,7 @@
 #include "strata/transparency/media/media.h"
 
 #include <memory>
+#include <new>
 #include <optional>
 #include <utility>
 
@@ -13,7 +14,7 @@ namespace strata::transparency {
 
 Result<MediaRendering> render_media(const Scene& scene, const View& view,
                                     const MediaSettings& settings, const FrameOptions& options,
-                                    const Execution& execution) {
+                                    const Execution& execution) try {
   if (auto good = check_frame(scene, view, options); !good) return tl::unexpected(good.error());
   if (auto good = check_media(settings); !good) return tl::unexpected(good.error());
   const auto table = make_media_table(scene, settings, options);
@@ -61,6 +62,9 @@ Result<MediaRendering> render_media(const Scene& scene, const View& view,
     }
   }
   return result;
+} catch (const std::bad_alloc&) {
+  return fail(ErrorCode::kLimit, "out of memory for a picture of {} x {} pixels with media",
+              view.size.x, view.size.y);
 }
 
 }  // namespace strata::transparency

@@ -6,6 +6,7 @@
 #include <glm/exponential.hpp>
 #include <glm/geometric.hpp>
 #include <glm/trigonometric.hpp>
+#include <new>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -169,7 +170,7 @@ struct ShadowMapData {
 };
 
 Result<ShadowMap> ShadowMap::make(const Scene& scene, const MediaSettings& settings,
-                                  const Execution& execution) {
+                                  const Execution& execution) try {
   if (auto good = check_media(settings); !good) return tl::unexpected(good.error());
   auto table = make_media_table(scene, settings, {});
   if (!table) return tl::unexpected(table.error());
@@ -194,6 +195,9 @@ Result<ShadowMap> ShadowMap::make(const Scene& scene, const MediaSettings& setti
     }
   }
   return ShadowMap(std::move(data));
+} catch (const std::bad_alloc&) {
+  return fail(ErrorCode::kLimit, "out of memory for a shadow map of {0} x {0} pixels",
+              settings.light.shadow_size);
 }
 
 glm::vec3 ShadowMap::transmittance(const glm::dvec3& point) const {

@@ -23,6 +23,8 @@ namespace strata::transparency {
 
 /// The largest extinction, and the brightest light.
 inline constexpr double kMostExtinction = 1e6;
+/// The largest coordinate and radius of a particle or light.
+inline constexpr double kFarthest = 1e15;
 
 /// What fills a solid evenly.
 struct Medium {
