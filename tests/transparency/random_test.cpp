@@ -242,6 +242,75 @@ TEST(SilhouetteOpaque, ATiltedSurfaceIsMoreOpaque) {
   }
 }
 
+/// A square on the ground, in n x n squares of two triangles, seen from one corner.
+Scene ground(int n) {
+  Scene scene;
+  const double step = 200.0 / n;
+  for (int y = 0; y <= n; ++y) {
+    for (int x = 0; x <= n; ++x) scene.mesh.positions.emplace_back(x * step - 100, y * step, 0);
+  }
+  for (int y = 0; y < n; ++y) {
+    for (int x = 0; x < n; ++x) {
+      const auto a = static_cast<std::uint32_t>(y * (n + 1) + x),
+                 b = a + static_cast<std::uint32_t>(n) + 1;
+      scene.mesh.triangles.emplace_back(a, a + 1, b + 1);
+      scene.mesh.triangles.emplace_back(a, b + 1, b);
+    }
+  }
+  scene.objects = {{"ground", {1, 1, 1, 0.1f}}};
+  return scene;
+}
+
+TEST(SilhouetteOpaque, GroundIsTheMoreOpaqueTheFartherItIsWhateverItsTriangles) {
+  constexpr int kHeight = 96;
+  std::vector<std::vector<double>> rows;
+  for (const int n : {1, 64}) {
+    const Scene scene = ground(n);
+    Camera camera = look_at({0, -1, 2}, {0, 5, 0});
+    camera.field_of_view = 40.0;
+    const auto view = make_view(camera, {130, kHeight}, bounds(scene.mesh));
+    ASSERT_TRUE(view);
+    const auto frame = Frame::make(scene, *view);
+    ASSERT_TRUE(frame);
+    const auto rendering = frame->render(**find_technique("sot"));
+    ASSERT_TRUE(rendering);
+    rows.emplace_back();
+    for (int v = 0; v < kHeight; ++v) {
+      double sum = 0.0;
+      for (int u = 0; u < 130; ++u) {
+        sum +=
+            static_cast<double>(rendering->image.pixels[static_cast<std::size_t>(v * 130 + u)].a);
+      }
+      rows.back().push_back(sum / 130);
+    }
+  }
+  // The view looks down by atan(2 / 6); a row's rays meet the ground at their own angles.
+  const double focal = kHeight / 2.0 / std::tan(20.0 * 3.14159265358979 / 180.0);
+  for (const int v : {20, 35, 50, 65, 80, 94}) {
+    const double down = std::atan2(2.0, 6.0) + std::atan((v + 0.5 - kHeight / 2.0) / focal);
+    const double expected = 1 - std::pow(0.9, 1 / std::sin(down));
+    for (const auto& row : rows) {
+      EXPECT_NEAR(row[static_cast<std::size_t>(v)], expected, 0.1 * expected + 0.01) << v;
+    }
+    EXPECT_NEAR(rows[0][static_cast<std::size_t>(v)], rows[1][static_cast<std::size_t>(v)], 0.05)
+        << v;
+  }
+}
+
+TEST(SilhouetteOpaque, ASurfaceThatIsSeenFromItsEdgeEnds) {
+  const Scene scene = ground(1);
+  const auto view = make_view(look_at({0, -1, 1e-7}, {0, 5, 0}), {130, 70}, bounds(scene.mesh));
+  ASSERT_TRUE(view);
+  const auto frame = Frame::make(scene, *view);
+  ASSERT_TRUE(frame);
+  const auto rendering = frame->render(**find_technique("sot"));
+  ASSERT_TRUE(rendering);
+  int seen = 0;
+  for (const glm::vec4& pixel : rendering->image.pixels) seen += pixel.a > 0.0f ? 1 : 0;
+  EXPECT_LE(seen, 2 * 130);
+  EXPECT_LT(rendering->costs.stored, 2'000'000'000u);
+}
+
 TEST(SilhouetteOpaque, ABallIsMoreOpaqueAtItsRim) {
   Scene scene;
   scene.mesh = make_icosphere(1.0, 4);

@@ -16,6 +16,7 @@ class Distances {
     perspective_ = true;
     nearest_ = static_cast<float>(frame.triangles->view.near);
     farthest_ = static_cast<float>(frame.triangles->view.far);
+    log_scale_ = 2.0f / std::log(farthest_ / nearest_);
   }
 
   /// The depth in [0, 1), as a depth buffer has it.
@@ -32,7 +33,7 @@ class Distances {
   [[nodiscard]] float logarithmic(DepthItem item) const {
     const float d = depth(item);
     if (!perspective_) return 2.0f * d - 1.0f;
-    return 2.0f * std::log(distance(d) / nearest_) / std::log(farthest_ / nearest_) - 1.0f;
+    return std::log(distance(d) / nearest_) * log_scale_ - 1.0f;
   }
 
  private:
@@ -41,7 +42,7 @@ class Distances {
   }
 
   bool perspective_ = false;
-  float nearest_ = 0.0f, farthest_ = 1.0f;
+  float nearest_ = 0.0f, farthest_ = 1.0f, log_scale_ = 0.0f;
 };
 
 }  // namespace strata::transparency

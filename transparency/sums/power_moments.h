@@ -66,16 +66,15 @@ inline std::array<double, 3> real_roots(const std::array<double, 4>& c) {
 }
 
 /// The root between two places where the values have different signs: Newton, halving where that
-/// leaves the interval.
+/// leaves the interval. @param x  where it begins
 inline double root_between(const std::array<double, 5>& c, const std::array<double, 4>& slope,
-                           double low, double high, bool rising) {
-  double x = 0.5 * (low + high);
+                           double low, double high, bool rising, double x) {
   for (int step = 0; step < 60; ++step) {
     const double value = polynomial(c, x);
     ((value < 0.0) == rising ? low : high) = x;
     double next = x - value / polynomial(slope, x);
     if (!(next > low && next < high)) next = 0.5 * (low + high);
-    if (std::abs(next - x) < 1e-9) return next;
+    if (std::abs(next - x) < 1e-8) return next;
     x = next;
   }
   return x;
@@ -84,16 +83,24 @@ inline double root_between(const std::array<double, 5>& c, const std::array<doub
 inline std::array<double, 4> real_roots(const std::array<double, 5>& c) {
   const std::array<double, 4> slope = derivative(c);
   std::array<double, 3> turns = real_roots(slope);
-  for (double& turn : turns) turn = std::clamp(turn, -kFarthestRoot, kFarthestRoot);
-  std::sort(turns.begin(), turns.end());
-  const std::array<double, 5> ends{-kFarthestRoot, turns[0], turns[1], turns[2], kFarthestRoot};
+  // All roots lie within this radius of their mean (P. Samuelson's inequality); Newton's steps from
+  // there fall towards the outermost roots without passing them.
+  const double a = c[3] / c[4], mean = -0.25 * a;
+  const double radius = 0.75 * std::sqrt(std::max(0.0, a * a - 8.0 / 3.0 * c[2] / c[4]));
+  const auto within = [](double x) {
+    return std::isnan(x) ? kFarthestRoot : std::clamp(x, -kFarthestRoot, kFarthestRoot);
+  };
+  std::array<double, 5> ends{within(mean - radius - 1e-9), within(turns[0]), within(turns[1]),
+                             within(turns[2]), within(mean + radius + 1e-9)};
+  std::sort(ends.begin(), ends.end());
   std::array<double, 4> roots;
   double before = polynomial(c, ends[0]);
   for (std::size_t i = 0; i < 4; ++i) {
     const double here = polynomial(c, ends[i + 1]);
+    const double start = i == 0 ? ends[0] : i == 3 ? ends[4] : 0.5 * (ends[i] + ends[i + 1]);
     roots[i] = (before < 0.0) == (here < 0.0)
                    ? 2.0 * kFarthestRoot
-                   : root_between(c, slope, ends[i], ends[i + 1], before < 0.0);
+                   : root_between(c, slope, ends[i], ends[i + 1], before < 0.0, start);
     before = here;
   }
   return roots;

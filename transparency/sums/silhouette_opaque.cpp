@@ -17,8 +17,9 @@
 // is seen at an angle they crowd, and it is more opaque, as matter is when light takes a longer
 // way.
 //
-// We differ: each point stays or goes by itself, so that a tile needs only its own points; where
-// the view has perspective, the turned triangle is projected by the scale at its nearest vertex.
+// We differ: each point stays or goes by itself, so that a tile needs only its own points. Where
+// the view has perspective, the turned triangle is projected by the scale at its nearest vertex,
+// and triangles larger than their distance are split first.
 
 namespace strata::transparency {
 namespace {
@@ -57,7 +58,7 @@ void for_each_tile(const FrameInfo& frame, const TileTriangles& tiles, const glm
 }
 
 Result<std::shared_ptr<const void>> prepare(const FrameInfo& frame, const Settings&,
-                                            const Execution&) {
+                                            const Execution& execution) {
   const FrameTriangles& triangles = *frame.triangles;
   auto tiles = std::make_shared<TileTriangles>();
   tiles->tiles_u = (frame.size.x + kTileSide - 1) / kTileSide;
@@ -67,6 +68,7 @@ Result<std::shared_ptr<const void>> prepare(const FrameInfo& frame, const Settin
   const std::span<const glm::uvec3> all = triangles.part.mesh.triangles;
   const auto each = [&](auto&& body) {
     for (std::uint32_t t = 0; t < all.size(); ++t) {
+      if (t % 65536 == 0 && execution.stop.stop_requested()) return;
       const std::uint32_t source = triangles.part.source(t);
       if (!triangles.opaque.empty() && triangles.opaque[source] != 0) continue;
       for_each_tile(frame, *tiles, all[t], [&](std::size_t tile) { body(t, tile); });
@@ -82,30 +84,25 @@ Result<std::shared_ptr<const void>> prepare(const FrameInfo& frame, const Settin
   tiles->triangles.resize(sum);
   std::vector<std::uint32_t> cursor(offsets.begin(), offsets.end() - 1);
   each([&](std::uint32_t t, std::size_t tile) { tiles->triangles[cursor[tile]++] = t; });
+  if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
   return std::shared_ptr<const void>(std::move(tiles));
 }
+
+using Corners = std::array<glm::dvec3, 3>;
 
 /// A triangle with its points. `weights` are barycentric, in space.
 class PointedTriangle {
  public:
-  /// @param corners  in window space, as the lattice has them @param side  finer pixels of a pixel
-  PointedTriangle(const View& view, const glm::dmat4& world_from_image,
-                  const std::array<glm::ivec3, 3>& corners, int side) {
-    std::array<glm::dvec3, 3> eye;
-    for (int i = 0; i < 3; ++i) {
-      const glm::ivec3& c = corners[static_cast<std::size_t>(i)];
-      const glm::dvec4 image(static_cast<double>(c.x) / kLatticeSteps,
-                             static_cast<double>(c.y) / kLatticeSteps, c.z, 1.0);
-      const glm::dvec4 world = world_from_image * image;
-      clip_[i] = image / world.w;
-      eye[static_cast<std::size_t>(i)] = glm::dvec3(view.eye_from_world * (world / world.w));
-    }
-    turn(view, eye, side);
+  /// @param eye  corners in eye space @param clip  the same times `image_from_eye`
+  /// @param side  finer pixels of a pixel
+  PointedTriangle(bool perspective, const glm::dmat4& image_from_eye, const Corners& eye,
+                  const glm::dmat3x4& clip, int side)
+      : clip_(clip) {
+    turn(perspective, image_from_eye, eye, side);
   }
 
   /// The surface has no area.
   [[nodiscard]] bool empty() const { return empty_; }
-  [[nodiscard]] bool faces_away() const { return away_; }
   /// (u w, v w, depth w, w).
   [[nodiscard]] glm::dvec4 clip(const glm::dvec3& weights) const { return clip_ * weights; }
   /// Where the point lies on the turned triangle, in finer pixels.
@@ -116,22 +113,18 @@ class PointedTriangle {
   }
 
  private:
-  void turn(const View& view, const std::array<glm::dvec3, 3>& eye, int side) {
-    const auto nearness = [&](const glm::dvec3& p) {
-      return view.perspective ? glm::dot(p, p) : -p.z;
-    };
+  void turn(bool perspective, const glm::dmat4& image_from_eye, const Corners& eye, int side) {
+    const auto nearness = [&](const glm::dvec3& p) { return perspective ? glm::dot(p, p) : -p.z; };
     const glm::dvec3& near = *std::min_element(
         eye.begin(), eye.end(), [&](auto& a, auto& b) { return nearness(a) < nearness(b); });
-    const glm::dvec3 to_eye = view.perspective ? glm::normalize(-near) : glm::dvec3(0, 0, 1);
+    const glm::dvec3 to_eye = perspective ? glm::normalize(-near) : glm::dvec3(0, 0, 1);
     glm::dvec3 normal = glm::cross(eye[1] - eye[0], eye[2] - eye[0]);
     const double area = glm::length(normal);
     empty_ = !(area > 0.0);
     if (empty_) return;
     normal /= area;
-    away_ = glm::dot(normal, to_eye) < 0.0;
-    if (away_) normal = -normal;
+    if (glm::dot(normal, to_eye) < 0.0) normal = -normal;
     // u and v change by these for a step in eye space at the nearest vertex.
-    const glm::dmat4 image_from_eye = view.image_from_world * glm::inverse(view.eye_from_world);
     const glm::dvec4 at = image_from_eye * glm::dvec4(near, 1.0);
     const glm::dmat4 rows = glm::transpose(image_from_eye);
     const double scale = side / at.w;
@@ -155,7 +148,7 @@ class PointedTriangle {
   glm::dmat3x4 clip_{0.0};
   glm::dmat3x2 turned_{0.0};
   glm::dmat2 weights_from_turned_{0.0};
-  bool empty_ = false, away_ = false;
+  bool empty_ = false;
 };
 
 /// A convex part of a triangle, by the weights of its corners.
@@ -177,6 +170,23 @@ struct Part {
     corners = kept;
     count = some;
   }
+  /// Keeps what is seen in some pixels. @param clip_of  (u w, v w, depth w, w) of the corners
+  void clip_to(const PixelRect& rect, const glm::dmat3x4& clip_of) {
+    const glm::dmat4x3 rows = glm::transpose(clip_of);
+    clip(rows[0] - static_cast<double>(rect.u0) * rows[3]);
+    clip(static_cast<double>(rect.u1) * rows[3] - rows[0]);
+    clip(rows[1] - static_cast<double>(rect.v0) * rows[3]);
+    clip(static_cast<double>(rect.v1) * rows[3] - rows[1]);
+  }
+};
+
+/// A triangle of the frame, or a piece of one that was split.
+struct Piece {
+  DepthItem face;
+  double opacity = 0.0;
+  std::uint64_t triangle = 0;
+  std::uint64_t path = 1;  ///< a bit a split, after the first one
+  Corners eye{};
 };
 
 class SilhouetteOpaque {
@@ -186,7 +196,9 @@ class SilhouetteOpaque {
       : side_(static_cast<int>(settings.k)),
         seed_(settings.seed),
         tiles_(std::move(tiles)),
-        world_from_image_(glm::inverse(frame.triangles->view.image_from_world)),
+        view_(frame.triangles->view),
+        image_from_eye_(view_.image_from_world * glm::inverse(view_.eye_from_world)),
+        eye_from_image_(glm::inverse(image_from_eye_)),
         nearest_(static_cast<std::size_t>(kTilePixels * side_ * side_)) {}
 
   void render(TileStream& stream, TileImage& image) {
@@ -194,13 +206,8 @@ class SilhouetteOpaque {
     stream.count_pass(stream.size());
     points_ = 0;
     const PixelRect& rect = stream.rect();
-    const FrameTriangles& triangles = *stream.frame().triangles;
     for (const std::uint32_t t : tiles_->tile(rect.u0 / kTileSide, rect.v0 / kTileSide)) {
-      const glm::uvec3& c = triangles.part.mesh.triangles[t];
-      const auto& vertices = triangles.part.mesh.vertices;
-      const PointedTriangle triangle(triangles.view, world_from_image_,
-                                     {vertices[c.x], vertices[c.y], vertices[c.z]}, side_);
-      if (!triangle.empty()) draw(stream, t, triangle);
+      draw_triangle(stream, t);
     }
     for_each_pixel(stream, [&](std::uint32_t pixel) { resolve(stream, image, pixel); });
     Costs& costs = stream.costs();
@@ -210,37 +217,92 @@ class SilhouetteOpaque {
   }
 
  private:
-  void draw(TileStream& stream, std::uint32_t t, const PointedTriangle& triangle) {
-    const FrameTriangles& triangles = *stream.frame().triangles;
-    const DepthItem face(0, triangle.faces_away(), triangles.part.source(t));
-    const double opacity = static_cast<double>(stream.opacity(face));
-    if (opacity == 0.0) return;
+  /// Halves of halves, at most.
+  static constexpr unsigned kMostSplits = 60;
+  /// Of the distance from the eye: then the scale at the nearest vertex serves all of a piece.
+  static constexpr double kLargestEdge = 1.0 / 16.0;
+  /// Points of a triangle for each finer pixel of a tile, at most.
+  static constexpr double kMostCrowding = 64.0;
+
+  void draw_triangle(TileStream& stream, std::uint32_t t) {
+    const ViewPart& part = stream.frame().triangles->part;
+    const glm::uvec3& corners = part.mesh.triangles[t];
+    Piece piece;
+    for (int i = 0; i < 3; ++i) {
+      const glm::ivec3& c = part.mesh.vertices[corners[i]];
+      const glm::dvec4 eye =
+          eye_from_image_ * glm::dvec4(static_cast<double>(c.x) / kLatticeSteps,
+                                       static_cast<double>(c.y) / kLatticeSteps, c.z, 1.0);
+      piece.eye[static_cast<std::size_t>(i)] = glm::dvec3(eye) / eye.w;
+    }
+    const glm::dvec3 &a = piece.eye[0], &b = piece.eye[1], &c = piece.eye[2];
+    const glm::dvec3 to_eye = view_.perspective ? -a : glm::dvec3(0, 0, 1);
+    const bool away = glm::dot(glm::cross(b - a, c - a), to_eye) < 0.0;
+    piece.face = DepthItem(0, away, part.source(t));
+    piece.opacity = static_cast<double>(stream.opacity(piece.face));
+    piece.triangle = t;
+    if (piece.opacity > 0.0) draw(stream, piece);
+  }
+  void draw(TileStream& stream, const Piece& piece) {
+    glm::dmat3x4 clip;
+    for (int i = 0; i < 3; ++i) {
+      clip[i] = image_from_eye_ * glm::dvec4(piece.eye[static_cast<std::size_t>(i)], 1.0);
+    }
     Part part;
-    const glm::dmat3x4 clip(triangle.clip({1, 0, 0}), triangle.clip({0, 1, 0}),
-                            triangle.clip({0, 0, 1}));
-    const glm::dmat4x3 rows = glm::transpose(clip);
-    const PixelRect& rect = stream.rect();
-    part.clip(rows[0] - static_cast<double>(rect.u0) * rows[3]);
-    part.clip(static_cast<double>(rect.u1) * rows[3] - rows[0]);
-    part.clip(rows[1] - static_cast<double>(rect.v0) * rows[3]);
-    part.clip(static_cast<double>(rect.v1) * rows[3] - rows[1]);
-    if (part.count == 0) return;
-    for_each_candidate(triangle, part, [&](std::int64_t i, std::int64_t j) {
-      const glm::dvec3 weights =
-          triangle.weights({static_cast<double>(i) + 0.5, static_cast<double>(j) + 0.5});
+    part.clip_to(stream.rect(), clip);
+    if (part.count == 0 || split(stream, piece)) return;
+    const PointedTriangle triangle(view_.perspective, image_from_eye_, piece.eye, clip, side_);
+    if (triangle.empty()) return;
+    for_each_candidate(triangle, part, [&](std::int64_t i, std::int64_t j, double step) {
+      const glm::dvec3 weights = triangle.weights(
+          step * glm::dvec2(static_cast<double>(i) + 0.5, static_cast<double>(j) + 0.5));
       if (!(weights.x >= 0.0 && weights.y >= 0.0 && weights.z >= 0.0)) return;
-      SeededRandom random{seed_, t, static_cast<std::uint64_t>(i), static_cast<std::uint64_t>(j)};
-      if (random.unit() < opacity) draw_point(stream, triangle.clip(weights), face);
+      SeededRandom random{seed_, piece.triangle, piece.path, static_cast<std::uint64_t>(i),
+                          static_cast<std::uint64_t>(j)};
+      const double opacity =
+          step == 1.0 ? piece.opacity : 1.0 - std::pow(1.0 - piece.opacity, step * step);
+      if (random.unit() < opacity) draw_point(stream, triangle.clip(weights), piece.face);
     });
   }
-  /// Calls body(i, j) for the finer pixels of the turned triangle whose centres lie in a part of
-  /// it, and for some at its rim.
+  /// Draws both halves of a piece that is too large for one scale. @return whether it is
+  bool split(TileStream& stream, const Piece& piece) {
+    if (!view_.perspective || piece.path >> kMostSplits != 0) return false;
+    std::size_t longest = 0;
+    double length = 0.0, distance = 1e300;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double edge = glm::distance(piece.eye[i], piece.eye[(i + 1) % 3]);
+      if (edge > length) length = edge, longest = i;
+      distance = std::min(distance, glm::length(piece.eye[i]));
+    }
+    if (length <= kLargestEdge * distance) return false;
+    const std::size_t next = (longest + 1) % 3;
+    const glm::dvec3 middle = 0.5 * (piece.eye[longest] + piece.eye[next]);
+    for (const std::size_t moved : {longest, next}) {
+      Piece half = piece;
+      half.eye[moved] = middle;
+      half.path = piece.path << 1 | (moved == next ? 1 : 0);
+      draw(stream, half);
+    }
+    return true;
+  }
+  /// Calls body(i, j, step) for the finer pixels of the turned triangle whose centres, step times
+  /// (i
+  /// + 1/2, j + 1/2), lie in a part of it, and for some at its rim. The step is 1 unless points
+  /// would crowd beyond need: then each stands for step x step.
   template <class Body>
-  static void for_each_candidate(const PointedTriangle& triangle, const Part& part, Body&& body) {
+  void for_each_candidate(const PointedTriangle& triangle, const Part& part, Body&& body) const {
     std::array<glm::dvec2, 8> at;
-    double low = 1e300, high = -1e300;
+    double twice_area = 0.0;
     for (std::size_t i = 0; i < part.count; ++i) {
       at[i] = triangle.turned(part.corners[i]);
+      const glm::dvec2 a = at[i == 0 ? 0 : i - 1] - at[0], b = at[i] - at[0];
+      twice_area += a.x * b.y - a.y * b.x;
+    }
+    const double most = kMostCrowding * kTilePixels * side_ * side_;
+    const double step = std::max(1.0, std::ceil(std::sqrt(0.5 * std::abs(twice_area) / most)));
+    double low = 1e300, high = -1e300;
+    for (std::size_t i = 0; i < part.count; ++i) {
+      at[i] /= step;
       low = std::min(low, at[i].y);
       high = std::max(high, at[i].y);
     }
@@ -257,7 +319,7 @@ class SilhouetteOpaque {
       }
       for (auto i = static_cast<std::int64_t>(std::floor(left - 0.5));
            static_cast<double>(i) <= std::ceil(right - 0.5); ++i) {
-        body(i, j);
+        body(i, j, step);
       }
     }
   }
@@ -297,7 +359,8 @@ class SilhouetteOpaque {
   int side_;
   std::uint64_t seed_;
   std::shared_ptr<const TileTriangles> tiles_;
-  glm::dmat4 world_from_image_;
+  View view_;
+  glm::dmat4 image_from_eye_, eye_from_image_;
   std::vector<DepthItem> nearest_;  ///< of each finer pixel
   std::uint64_t points_ = 0;
 };
