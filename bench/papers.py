@@ -3,7 +3,7 @@
 
   papers.py BIN [--quick] [--update-docs]
 
-BIN holds strata, bench_papers and bench_transparency. CSV files, papers.png (plots) and techniques.png (a picture of
+BIN holds strata, bench_papers, bench_transparency and bench_transparency_quality. CSV files, papers.png (plots) and techniques.png (a picture of
 each technique) go to build/bench/papers; --update-docs puts the tables and both pictures into docs/.
 """
 
@@ -192,10 +192,12 @@ def main():
     run(os.path.join(arguments.bin, "bench_papers"), OUT, *quick)
     run(os.path.join(arguments.bin, "bench_transparency"), "--tables", "loads", "--csv", os.path.join(OUT, "loads.csv"),
         *(["--rounds", "3"] if arguments.quick else []))
+    run(os.path.join(arguments.bin, "bench_transparency_quality"), "--csv", os.path.join(OUT, "hair_quality.csv"),
+        *(["--rounds", "1"] if arguments.quick else []))
     rows = techniques(os.path.join(arguments.bin, "strata"), arguments.quick)
     sections["techniques"] = technique_table(rows)
     for name in ("culling", "stacked", "speed", "scenes", "quads", "bunny", "walkthrough", "layers", "model",
-                 "mlab_memory", "artefacts", "loads"):
+                 "mlab_memory", "hair_quality", "artefacts", "loads"):
         sections[name] = markdown(load(name))
     folder = os.path.join(ROOT, "docs") if arguments.update_docs else OUT
     montage(rows, os.path.join(folder, "techniques.png"))
