@@ -12,7 +12,8 @@ using transparency::Technique;
 std::string number_of(const Technique& technique) {
   if (technique.k_means.empty()) return {};
   return fmt::format("{}, {} to {} (default: {})", technique.k_means, technique.least_k,
-                     technique.most_k, technique.default_k);
+                     technique.most_k,
+                     technique.default_k == 0 ? "no limit" : std::to_string(technique.default_k));
 }
 
 void write_technique(JsonWriter& json, const Technique& technique) {
@@ -34,6 +35,7 @@ void write_costs(JsonWriter& json, const transparency::Costs& costs) {
   json.member("lost", costs.lost);
   json.member("merged", costs.merged);
   json.member("comparisons", costs.comparisons);
+  json.member("queries", costs.queries);
   json.member("most_layers", costs.most_layers);
   json.member("formula_bytes", costs.formula_bytes);
   json.member("allocated_bytes", costs.allocated_bytes);
@@ -45,7 +47,7 @@ void write_result(JsonWriter& json, const OitResult& result) {
   json.begin_object();
   json.member("name", technique->name);
   json.key("k");
-  technique->k_means.empty() ? json.null() : json.value(settings.k);
+  settings.k == 0 || technique->k_means.empty() ? json.null() : json.value(settings.k);
   json.key("variant");
   settings.variant.empty() ? json.null() : json.value(settings.variant);
   write_technique(json, *technique);

@@ -24,6 +24,10 @@ std::vector<ListedFrame> frames() {
   all.push_back(random_frame("SomeOpaque", {66, 20}, 5.0, 1 << 24, 6, 0.5f, 1.0f));
   for (std::size_t i = 0; i < 10; ++i) all.back().colours[i].a = 1.0f;
   for (std::size_t i = 10; i < 15; ++i) all.back().colours[i].a = 0.0f;
+  all.push_back(random_frame("DepthExtremes", {66, 20}, 5.0, 6, 11));
+  for (ListedFragment& f : all.back().fragments) {
+    if (f.depth >= 3) f.depth = (1 << 24) - 6 + f.depth;  // 0, 1, 2 and the last three
+  }
   all.push_back(deep_frame(300, 7));
   all.push_back(deep_frame(590, 8));
   all.push_back(random_frame("Background", {66, 20}, 3.0, 1 << 24, 9));

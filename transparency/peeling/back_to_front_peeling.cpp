@@ -23,7 +23,8 @@ constexpr Kind kMaps{2 * 8 + 2 * 16, true}, kReverse{2 * 8 + 16, false};
 
 class BackPeeler {
  public:
-  BackPeeler(const Kind& kind, unsigned most_passes) : kind_(kind), most_passes_(most_passes) {}
+  BackPeeler(const Kind& kind, unsigned most_passes)
+      : kind_(kind), most_passes_(most_passes == 0 ? kMostPasses : most_passes) {}
 
   void render(TileStream& stream, TileImage& image) {
     Costs& costs = stream.costs();
@@ -106,9 +107,8 @@ const Technique kVirtualPixelMaps{
     .paper = "Mammen 1989",
     .blending = Blending::kBackToFront,
     .k_means = "passes",
-    .default_k = kAllPasses,
     .least_k = 1,
-    .most_k = kAllPasses,
+    .most_k = kMostPasses,
     .memory = "48 bytes a pixel",
     .fails = "a geometry pass for each layer and one more; fewer passes lose the nearest layers",
     .make = make<kMaps>,
@@ -120,9 +120,8 @@ const Technique kReversePeeling{
     .paper = "Thibieroz 2008",
     .blending = Blending::kBackToFront,
     .k_means = "passes",
-    .default_k = kAllPasses,
     .least_k = 1,
-    .most_k = kAllPasses,
+    .most_k = kMostPasses,
     .memory = "32 bytes a pixel",
     .fails = "a geometry pass for each layer; fewer passes lose the nearest layers",
     .make = make<kReverse>,

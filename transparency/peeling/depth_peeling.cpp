@@ -18,7 +18,8 @@ constexpr std::uint64_t kFinished = std::numeric_limits<std::uint64_t>::max();
 
 class DepthPeeler {
  public:
-  explicit DepthPeeler(unsigned most_passes) : most_passes_(most_passes) {}
+  explicit DepthPeeler(unsigned most_passes)
+      : most_passes_(most_passes == 0 ? kMostPasses : most_passes) {}
 
   void render(TileStream& stream, TileImage& image) {
     Costs& costs = stream.costs();
@@ -104,9 +105,8 @@ const Technique kDepthPeeling{
     .title = "Depth peeling, front to back",
     .paper = "Everitt 2001",
     .k_means = "passes",
-    .default_k = kAllPasses,
     .least_k = 1,
-    .most_k = kAllPasses,
+    .most_k = kMostPasses,
     .memory = "48 bytes a pixel",
     .fails = "a geometry pass for each layer; fewer passes than layers lose the farthest layers",
     .make = make,

@@ -59,7 +59,8 @@ struct Ends {
 
 class DualPeeler {
  public:
-  explicit DualPeeler(unsigned most_passes) : most_passes_(most_passes) {}
+  explicit DualPeeler(unsigned most_passes)
+      : most_passes_(most_passes == 0 ? kMostPasses : most_passes) {}
 
   void render(TileStream& stream, TileImage& image) {
     Costs& costs = stream.costs();
@@ -146,9 +147,8 @@ const Technique kDualPeeling{
     .paper = "Bavoil, Myers 2008",
     .blending = Blending::kFromBothEnds,
     .k_means = "passes",
-    .default_k = kAllPasses,
     .least_k = 2,
-    .most_k = kAllPasses,
+    .most_k = kMostPasses,
     .memory = "64 bytes a pixel",
     .fails = "a geometry pass for two layers and one more; fewer passes lose the middle layers",
     .make = make,

@@ -14,7 +14,7 @@ extern const Technique kDepthPeeling;
 extern const Technique kDualPeeling;
 extern const Technique kReversePeeling;
 
-/// Passes that no picture needs: the default of techniques that can be stopped earlier.
-inline constexpr unsigned kAllPasses = 1'000'000'000;
+/// No pixel has so many layers.
+inline constexpr unsigned kMostPasses = 1'000'000'000;
 
 }  // namespace strata::transparency

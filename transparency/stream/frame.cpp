@@ -178,7 +178,8 @@ void Costs::add(const Costs& other) {
 
 Result<Settings> checked_settings(const Technique& technique, Settings settings) {
   if (settings.k == 0) settings.k = technique.default_k;
-  if (!technique.k_means.empty() &&
+  const bool without_limit = technique.default_k == 0 && settings.k == 0;
+  if (!technique.k_means.empty() && !without_limit &&
       (settings.k < technique.least_k || settings.k > technique.most_k)) {
     return fail(ErrorCode::kUsage, "{}: {} must be {} to {}, got {}", technique.name,
                 technique.k_means, technique.least_k, technique.most_k, settings.k);
@@ -331,6 +332,7 @@ Result<Rendering> Frame::render(const Technique& technique, const Settings& sett
     return fail(ErrorCode::kUsage, "{} needs triangles; this frame has bare fragments",
                 technique.name);
   }
+  const auto begin = Clock::now();
   const FrameInfo info = frame_info(*source_, options_);
   std::shared_ptr<const void> prepared;
   if (technique.prepare != nullptr) {
@@ -338,9 +340,15 @@ Result<Rendering> Frame::render(const Technique& technique, const Settings& sett
     if (!made) return tl::unexpected(made.error());
     prepared = std::move(*made);
   }
-  return render_tiles(
+  const double prepare_seconds = seconds_since(begin);
+  auto rendering = render_tiles(
       *source_, options_, [&] { return technique.make(info, *checked, prepared); }, false,
       execution);
+  if (rendering) {
+    rendering->seconds += prepare_seconds;
+    rendering->technique_seconds += prepare_seconds;
+  }
+  return rendering;
 }
 
 }  // namespace strata::transparency

@@ -85,7 +85,7 @@ struct Technique {
   Accuracy accuracy = Accuracy::kExact;        ///< what its picture can be relied on for
   Blending blending = Blending::kFrontToBack;  ///< of an exact one
   std::string_view k_means = {};   ///< what Settings::k counts: "rows"; empty: it is ignored
-  unsigned default_k = 0;          ///< where Settings::k is 0
+  unsigned default_k = 0;          ///< where Settings::k is 0; 0: there is no limit
   unsigned least_k = 0;            ///< smallest Settings::k
   unsigned most_k = 0;             ///< largest Settings::k
   std::string_view variants = {};  ///< separated by spaces, the default first; empty: it has none
