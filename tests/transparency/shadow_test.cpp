@@ -256,6 +256,18 @@ TEST(ShadowMap, OfFixedSizeComesNearTheLists) {
   }
 }
 
+TEST(ShadowMap, KeepsToItsMemoryLimit) {
+  Scene scene;
+  for (int i = 0; i < 20; ++i) add_object(scene, "pane", pane(i), {1, 1, 1, 0.5f});
+  Execution execution;
+  execution.memory_limit = 16 << 20;
+  EXPECT_TRUE(ShadowMap::make(scene, light_from({0, 0, 1}, 64), execution));
+  const auto large = ShadowMap::make(scene, light_from({0, 0, 1}, 1024), execution);
+  ASSERT_FALSE(large);
+  EXPECT_EQ(large.error().code, ErrorCode::kLimit);
+  EXPECT_NE(large.error().message.find("16777216"), std::string::npos);
+}
+
 TEST(Shadows, FallOnSurfacesOfThePicture) {
   Scene scene;
   add_object(scene, "floor", pane(0.0), {0.8f, 0.6f, 0.4f, 1.0f});

@@ -61,10 +61,22 @@ Result<void> MediaTile::render(TileStream& stream, TileImage& image) {
         shadow_tile_->ends[pixel] = static_cast<std::uint32_t>(shadow_tile_->entries.size());
     }
   }
-  if (shadow_) {
-    // Pixels without a list end where those before them do.
-    std::uint32_t last = 0;
-    for (std::uint32_t& end : shadow_tile_->ends) last = end = std::max(end, last);
+  return shadow_ ? finish_shadow_tile() : Result<void>();
+}
+
+Result<void> MediaTile::finish_shadow_tile() {
+  // Pixels without a list end where those before them do.
+  std::uint32_t last = 0;
+  for (std::uint32_t& end : shadow_tile_->ends) last = end = std::max(end, last);
+  shadow_tile_->entries.shrink_to_fit();
+  const std::uint64_t bytes = shadow_tile_->entries.size() * sizeof(ShadowEntry) +
+                              shadow_tile_->ends.size() * sizeof(std::uint32_t);
+  const std::uint64_t all = frame_.shadow_bytes->fetch_add(bytes) + bytes;
+  if (frame_.memory_limit != 0 && all > frame_.memory_limit) {
+    return fail(ErrorCode::kLimit,
+                "the shadow map needs more than {} bytes, the memory limit; a smaller shadow size "
+                "needs less",
+                frame_.memory_limit);
   }
   return {};
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
@@ -35,6 +36,8 @@ struct MediaFrame {
   const ShadowMap* shadows = nullptr;
   /// The tiles of a shadow map, to be filled instead of a picture.
   std::span<ShadowTile> shadow_tiles = {};
+  std::uint64_t memory_limit = 0;  ///< bytes of all of them; 0: none
+  std::atomic<std::uint64_t>* shadow_bytes = nullptr;
 
   /// The light that media scatter to the eye is not the same all along a ray.
   [[nodiscard]] bool light_changes() const {
@@ -98,6 +101,7 @@ class MediaTile {
   }
   void finish(std::uint32_t pixel);
   void finish_shadow();
+  Result<void> finish_shadow_tile();
 
   const MediaFrame& frame_;
   DepthDistances distances_;

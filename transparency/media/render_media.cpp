@@ -38,7 +38,8 @@ Result<MediaRendering> render_media(const Scene& scene, const View& view,
   frame.scene = &scene;
   std::optional<ShadowMap> shadows;
   if (frame.lit && settings.light.shadows) {
-    auto map = ShadowMap::make(scene, settings, {execution.threads, execution.stop});
+    auto map = ShadowMap::make(scene, settings,
+                               {execution.threads, execution.stop, {}, execution.memory_limit});
     if (!map) return tl::unexpected(map.error());
     frame.shadows = &shadows.emplace(std::move(*map));
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <glm/exponential.hpp>
 #include <glm/geometric.hpp>
@@ -80,7 +81,8 @@ Result<std::vector<View>> light_views(const MediaLight& light, const Bounds& box
 
 /// The lists of all rays of a face.
 Result<void> fill(ShadowFace& face, const Scene& scene, const MediaSettings& settings,
-                  const MediaTable& table, const Execution& execution) {
+                  const MediaTable& table, std::atomic<std::uint64_t>& bytes,
+                  const Execution& execution) {
   const auto source = make_mesh_source(scene, table.looks, face.view, 1, execution);
   if (!source) return tl::unexpected(source.error());
   const ParticleBins particles(settings.particles, face.view, face.rays);
@@ -91,6 +93,8 @@ Result<void> fill(ShadowFace& face, const Scene& scene, const MediaSettings& set
     frame.eye_solids = eye_solids;
   }
   frame.shadow_tiles = face.tiles;
+  frame.shadow_bytes = &bytes;
+  frame.memory_limit = execution.memory_limit;
   const auto make = [&frame]() -> Result<TileRenderer> {
     return [tile = std::make_shared<MediaTile>(frame)](TileStream& stream, TileImage& image) {
       return tile->render(stream, image);
@@ -187,8 +191,10 @@ Result<ShadowMap> ShadowMap::make(const Scene& scene, const MediaSettings& setti
     const auto views = light_views(settings.light, box);
     if (!views) return tl::unexpected(views.error());
     data->faces.reserve(views->size());
+    std::atomic<std::uint64_t> bytes = 0;
     for (const View& view : *views) {
-      if (auto done = fill(data->faces.emplace_back(view), scene, settings, *table, execution);
+      if (auto done =
+              fill(data->faces.emplace_back(view), scene, settings, *table, bytes, execution);
           !done) {
         return tl::unexpected(done.error());
       }
