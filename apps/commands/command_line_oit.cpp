@@ -16,6 +16,7 @@ constexpr const char* kOitExamples =
   strata oit knot.obj --technique all -o pictures/        a picture each
   strata oit glass.csg --technique mlab:4,mlab:8 --json   costs and errors
   strata oit glass.csg --technique all --report report/   a page that compares
+  strata oit fog.csg --media fog.json --light 1,2,3 -o fog.png
   strata oit --list                                       all techniques
 
 Each technique has a name, some a number such as slots a pixel and a variant:
@@ -43,8 +44,8 @@ void define_oit(CLI::App& app, Words& words) {
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
       ->group(technique);
   option("--opacity", oit.opacity,
-         "Opacity of all that has none of its own, 0 to 1 (default: 0.5, or 1 if the input has "
-         "transparent colours)",
+         "Opacity of all that is opaque by its colour or material, 0 to 1 (default: 0.5, or 1 if "
+         "something is transparent already)",
          "A", technique);
   option("--seed", oit.seed, "Seed of techniques that draw random numbers (default: 1)", "N",
          technique);
@@ -54,6 +55,11 @@ void define_oit(CLI::App& app, Words& words) {
          "Opacity behind which fragments may be left out by techniques that do so, above 0, at "
          "most 1 (default: 0.99)",
          "T", technique);
+  option("--media", oit.media,
+         "Media inside of closed solids and particles to draw, a .json file (docs/media.md)",
+         "FILE", technique);
+  option("--light", oit.light, "With --media: direction to a light, instead of the file's", "X,Y,Z",
+         technique);
   app.add_flag("--list", oit.list,
                "List all techniques with accuracy, memory, papers and where they fail, and exit")
       ->group(technique);
@@ -62,6 +68,10 @@ void define_oit(CLI::App& app, Words& words) {
          "Picture to write, .png, or .exr in linear float; FOLDER/ for a picture each; - for "
          "standard output. Several techniques write FILE-NAME.png",
          "FILE", output);
+  option("--report", oit.report,
+         "Folder for a page, index.html, that compares the techniques by pictures, differences, "
+         "costs and times",
+         "FOLDER", output);
   add_json(app, words, output);
   define_picture_camera(app, csg);
   define_picture_quality(app, csg);

@@ -106,9 +106,11 @@ struct OitChoice {
 struct OitCommand : PictureRequest {
   std::vector<OitChoice> choices;
   bool all = false;  ///< all techniques: those that the input does not suit are left out
-  std::optional<float> opacity;  ///< of what has none of its own
-  std::string report;            ///< folder of the page; empty: none
-  bool list = false;             ///< only the list of techniques
+  std::optional<float> opacity;     ///< of what has none of its own
+  std::string report;               ///< folder of the page; empty: none
+  std::string media;                ///< file of media in solids, drawn instead of techniques
+  std::optional<glm::dvec3> light;  ///< with media: the direction to a light
+  bool list = false;                ///< only the list of techniques
 };
 
 using Command =

@@ -28,6 +28,12 @@ std::vector<FileUse> inputs_of(const csg::SceneInput& input) {
   return uses;
 }
 
+std::vector<FileUse> inputs_of(const OitCommand& command) {
+  std::vector<FileUse> uses = inputs_of(command.input);
+  if (!command.media.empty()) uses.push_back({"--media", command.media});
+  return uses;
+}
+
 std::vector<FileUse> outputs_of(const VoxelizeCommand& command) {
   return outputs({{"-o", command.output}, {"--json", command.json.value_or("")}});
 }
@@ -49,6 +55,7 @@ std::vector<FileUse> outputs_of(const CsgCommand& command) {
 
 std::vector<FileUse> outputs_of(const OitCommand& command) {
   std::vector<FileUse> uses = outputs({{"--json", command.json.value_or("")}});
+  if (!command.report.empty()) uses.push_back({"--report", command.report + "/index.html"});
   if (writes_folder(command)) {
     uses.push_back({"-o", command.output});
     return uses;

@@ -9,6 +9,11 @@ namespace strata::apps {
 
 /// What a command reads: its inputs, and the parameters of programs.
 [[nodiscard]] std::vector<FileUse> inputs_of(const csg::SceneInput& input);
+template <class AnyCommand>
+[[nodiscard]] std::vector<FileUse> inputs_of(const AnyCommand& command) {
+  return inputs_of(command.input);
+}
+[[nodiscard]] std::vector<FileUse> inputs_of(const OitCommand& command);
 
 /// What a command writes.
 [[nodiscard]] std::vector<FileUse> outputs_of(const VoxelizeCommand& command);

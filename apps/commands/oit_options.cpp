@@ -76,6 +76,33 @@ Result<void> read_techniques(const OitWords& words, const transparency::Settings
   return {};
 }
 
+/// --media and --light.
+Result<void> read_media_words(const OitWords& words, OitCommand& command) {
+  command.media = words.media;
+  if (!words.light.empty()) {
+    const auto n = parse_numbers("--light", words.light, 3, 3);
+    if (!n) return tl::unexpected(n.error());
+    const glm::dvec3 light((*n)[0], (*n)[1], (*n)[2]);
+    if (light == glm::dvec3(0.0)) {
+      return fail(ErrorCode::kUsage, "--light must be a direction other than 0,0,0");
+    }
+    command.light = light;
+  }
+  if (command.media.empty()) {
+    if (!command.light) return {};
+    return fail(ErrorCode::kUsage, "--light needs --media");
+  }
+  if (!words.techniques.empty() || !words.report.empty()) {
+    return fail(ErrorCode::kUsage,
+                "--media draws by a way of its own and cannot be combined with {}",
+                words.report.empty() ? "--technique" : "--report");
+  }
+  if (command.output.ends_with('/')) {
+    return fail(ErrorCode::kUsage, "--media makes one picture; -o {} is a folder", command.output);
+  }
+  return {};
+}
+
 Result<void> check_outputs(const OitCommand& command) {
   const std::string& output = command.output;
   if (output.empty() && !command.json && command.report.empty()) {
@@ -132,6 +159,7 @@ Result<void> read_oit_options(const OitWords& words, OitCommand& command) {
     settings.seed = static_cast<std::uint64_t>(*seed);
   }
   command.report = words.report;
+  if (auto read = read_media_words(words, command); !read) return read;
   if (auto read = read_techniques(words, settings, command); !read) return read;
   return check_outputs(command);
 }

@@ -11,7 +11,7 @@ namespace strata::apps {
 /// The options of `strata oit` alone as words. Empty: not given.
 struct OitWords {
   std::vector<std::string> techniques;
-  std::string opacity, seed, load, threshold, report;
+  std::string opacity, seed, load, threshold, report, media, light;
   bool list = false;
 };
 

@@ -93,7 +93,7 @@ Result<void> run(const AnyCommand& command, Session& session) {
   try {
     session.configure(command.common);
     const std::vector<FileUse> written = outputs_of(command);
-    if (auto kept = check_files(inputs_of(command.input), written); !kept) return kept;
+    if (auto kept = check_files(inputs_of(command), written); !kept) return kept;
     session.set_outputs(written, true);
     if (auto done = run_command(command, session); !done) return done;
     return commit_outputs(session);

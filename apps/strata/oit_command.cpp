@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <filesystem>
 #include <optional>
 #include <utility>
 
@@ -6,12 +7,15 @@
 #include "apps/session/session.h"
 #include "apps/strata/allocation_failures.h"
 #include "apps/strata/library_session.h"
+#include "apps/strata/oit_page.h"
 #include "apps/strata/oit_report.h"
 #include "apps/strata/run_commands.h"
 #include "apps/strata/scene_camera.h"
 #include "core/atomic_file.h"
+#include "csg/picture/encode_png.h"
 #include "strata/csg/input/scene_input.h"
 #include "strata/csg/input/see_through.h"
+#include "strata/transparency/media/media.h"
 #include "strata/transparency/write_image.h"
 
 namespace strata::apps {
@@ -27,6 +31,26 @@ bool only_meshes(const OitCommand& command) {
                       [&](const std::string& file) { return csg::kind_of(file, input).is_scene; });
 }
 
+std::vector<std::uint8_t> png_of(const transparency::Image& image) {
+  return csg::encode_png({image.width, image.height, transparency::to_bytes(image)});
+}
+
+/// Writes index.html into a folder, which is made if it is not there.
+Result<void> write_page(const std::string& page, const std::string& folder) {
+  std::error_code ignored;
+  std::optional<AtomicFolder> made;
+  std::string place = folder;
+  if (!std::filesystem::is_directory(folder, ignored)) {
+    auto created = AtomicFolder::create(folder);
+    if (!created) return tl::unexpected(created.error());
+    made = *std::move(created);
+    place = made->temporary_path();
+  }
+  auto written = print_report(page, (std::filesystem::path(place) / "index.html").string(), false);
+  if (!written || !made) return written;
+  return made->commit();
+}
+
 /// The work of one scene and camera.
 class OitRun {
  public:
@@ -34,6 +58,10 @@ class OitRun {
 
   Result<void> run() {
     if (auto done = load(); !done) return done;
+    if (!command_.media.empty()) {
+      if (auto done = draw_media(); !done) return done;
+      return report();
+    }
     if (auto done = open_frame(); !done) return done;
     if (auto done = draw_reference(); !done) return done;
     for (const OitChoice& choice : command_.choices) {
@@ -44,8 +72,12 @@ class OitRun {
 
  private:
   Result<void> load();
+  Result<std::vector<FaceMaterials>> read_materials(const csg::Tree& tree);
+  [[nodiscard]] transparency::FrameOptions frame_options() const;
   Result<void> open_frame();
+  Result<void> draw_media();
   Result<void> draw_reference();
+  Result<void> time_again(const OitChoice& choice, OitResult& result);
   Result<void> draw(const OitChoice& choice);
   Result<void> write(const transparency::Image& image, const std::string& path);
   Result<void> report();
@@ -77,8 +109,15 @@ class OitRun {
 };
 
 Result<void> OitRun::load() {
-  auto scene =
-      csg::load_scene(command_.input, messages_of(session_), session_.execution("reading"));
+  csg::InputMessages messages = messages_of(session_);
+  const bool all_faces = only_meshes(command_);
+  if (all_faces && command_.media.empty()) {
+    // A mesh need not be closed to be seen through.
+    messages.warn = [warn = messages.warn](std::string code, std::string message) {
+      if (code != "open") warn(std::move(code), std::move(message));
+    };
+  }
+  auto scene = csg::load_scene(command_.input, messages, session_.execution("reading"));
   if (!scene) return tl::unexpected(scene.error());
   outcome_.read_ms = session_.milliseconds();
   take_scene_view(*scene, session_, command_);
@@ -90,7 +129,14 @@ Result<void> OitRun::load() {
   csg::SeeThroughOptions options;
   options.opacity = command_.opacity;
   options.scheme = command_.picture.scheme;
-  options.all_faces = only_meshes(command_);
+  options.all_faces = all_faces || !command_.media.empty();
+  if (!command_.media.empty() && !options.opacity) options.opacity = 1.0f;
+  if (options.all_faces) {
+    auto materials = read_materials(scene->tree);
+    if (!materials) return tl::unexpected(materials.error());
+    options.materials = *std::move(materials);
+    if (auto strict = session_.check_strict(); !strict) return strict;
+  }
   auto made =
       csg::SeeThrough::make(*std::move(scene), options, session_.execution("preparing", 0.1));
   if (!made) return with_limit(std::move(made.error()));
@@ -101,7 +147,27 @@ Result<void> OitRun::load() {
   return {};
 }
 
-Result<void> OitRun::open_frame() {
+/// The materials of OBJ files, by solid.
+Result<std::vector<FaceMaterials>> OitRun::read_materials(const csg::Tree& tree) {
+  std::vector<FaceMaterials> all(tree.solids().size());
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const std::string& path = tree.solids()[i].name;
+    const csg::InputKind kind = csg::kind_of(path, command_.input);
+    const bool is_obj = kind.format == MeshFormat::kObj ||
+                        (kind.format == MeshFormat::kAuto && has_extension(path, ".obj"));
+    if (!is_obj || path == "-") continue;
+    auto read = read_obj_materials(path, command_.input.scene.root_folder,
+                                   session_.execution("reading", 0.1));
+    if (!read) return tl::unexpected(read.error());
+    if (auto kept = session_.opened(read->files); !kept) return tl::unexpected(kept.error());
+    for (const std::string& sentence : read->missing) session_.warn("missing-file", sentence);
+    for (const std::string& sentence : read->warnings) session_.warn("reader", sentence);
+    all[i] = *std::move(read);
+  }
+  return all;
+}
+
+transparency::FrameOptions OitRun::frame_options() const {
   const csg::ColourScheme& scheme =
       command_.picture.scheme != nullptr ? *command_.picture.scheme : csg::colour_schemes().front();
   transparency::FrameOptions options;
@@ -110,12 +176,44 @@ Result<void> OitRun::open_frame() {
   if (!command_.picture.transparent_background) {
     options.background = glm::vec4(glm::vec3(scheme.background) / 255.0f, 1.0f);
   }
-  auto frame =
-      scene_->frame(outcome_.camera, command_.size, options, session_.execution("preparing", 0.1));
+  return options;
+}
+
+Result<void> OitRun::open_frame() {
+  auto frame = scene_->frame(outcome_.camera, command_.size, frame_options(),
+                             session_.execution("preparing", 0.1));
   if (!frame) return with_limit(std::move(frame.error()));
   frame_ = *std::move(frame);
   outcome_.prepare_ms = session_.milliseconds() - outcome_.read_ms;
   return {};
+}
+
+/// --media: a picture by a way of its own.
+Result<void> OitRun::draw_media() {
+  auto settings = transparency::read_media(command_.media);
+  if (!settings) return tl::unexpected(settings.error());
+  if (command_.light) {
+    settings->light.at = *command_.light;
+    settings->light.point = false;
+    if (settings->light.radiance == glm::vec3(0.0f)) settings->light.radiance = glm::vec3(1.0f);
+  }
+  const auto view = scene_->view(outcome_.camera, command_.size, session_.execution("preparing"));
+  if (!view) return tl::unexpected(view.error());
+  const double begin = session_.milliseconds();
+  outcome_.prepare_ms = begin - outcome_.read_ms;
+  auto drawn = transparency::render_media(*scene_->faces(), *view, *settings, frame_options(),
+                                          session_.execution("drawing", 1.0));
+  if (!drawn) return with_limit(std::move(drawn.error()));
+  outcome_.draw_ms = session_.milliseconds() - begin;
+  outcome_.media = std::move(drawn->solids);
+  for (const transparency::SolidReport& solid : outcome_.media) {
+    if (solid.unbalanced_pixels == 0) continue;
+    session_.warn("open",
+                  fmt::format("{} is not closed: its medium is left out in {} of {}", solid.object,
+                              solid.unbalanced_pixels, counted(solid.pixels, "sample")));
+  }
+  if (auto strict = session_.check_strict(); !strict) return strict;
+  return write(drawn->rendering.image, command_.output);
 }
 
 Result<void> OitRun::draw_reference() {
@@ -126,6 +224,25 @@ Result<void> OitRun::draw_reference() {
   auto drawn = frame_->render(**found, {}, rendering("the reference"));
   if (!drawn) return with_limit(std::move(drawn.error()));
   reference_ = std::move(drawn->image);
+  if (!command_.report.empty()) outcome_.reference_picture = png_of(reference_);
+  return {};
+}
+
+/// The first picture was a warm-up: times are the medians of three more.
+Result<void> OitRun::time_again(const OitChoice& choice, OitResult& result) {
+  outcome_.runs = 3;
+  std::vector<double> seconds, technique_seconds;
+  for (int run = 0; run < outcome_.runs; ++run) {
+    const auto drawn =
+        frame_->render(*choice.chosen.technique, choice.chosen.settings, rendering(choice.text));
+    if (!drawn) return tl::unexpected(drawn.error());
+    seconds.push_back(drawn->seconds);
+    technique_seconds.push_back(drawn->technique_seconds);
+  }
+  std::sort(seconds.begin(), seconds.end());
+  std::sort(technique_seconds.begin(), technique_seconds.end());
+  result.seconds = seconds[seconds.size() / 2];
+  result.technique_seconds = technique_seconds[technique_seconds.size() / 2];
   return {};
 }
 
@@ -146,6 +263,11 @@ Result<void> OitRun::draw(const OitChoice& choice) {
   result.costs = drawn->costs;
   result.seconds = drawn->seconds;
   result.technique_seconds = drawn->technique_seconds;
+  if (!command_.report.empty()) {
+    if (auto timed = time_again(choice, result); !timed) return with_limit(timed.error());
+    result.picture = png_of(drawn->image);
+    result.heat = csg::encode_png(heat_map(drawn->image, reference_));
+  }
   if (compares()) result.difference = transparency::difference(drawn->image, reference_);
   outcome_.draw_ms += session_.milliseconds() - begin;
   result.path = picture_of(command_, choice);
@@ -185,6 +307,10 @@ Result<void> OitRun::report() {
   }
   if (folder_) {
     if (auto done = folder_->commit(); !done) return done;
+  }
+  if (!command_.report.empty()) {
+    const std::string page = oit_page(command_, outcome_, session_.threads());
+    if (auto done = write_page(page, command_.report); !done) return done;
   }
   if (auto done = commit_outputs(session_); !done) return done;
   if (!command_.json || to_file) return {};

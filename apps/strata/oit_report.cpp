@@ -68,6 +68,18 @@ void write_result(JsonWriter& json, const OitResult& result) {
   json.end_object();
 }
 
+void write_media(JsonWriter& json, const OitOutcome& outcome) {
+  json.key("media").begin_array();
+  for (const transparency::SolidReport& solid : outcome.media) {
+    json.begin_object();
+    json.member("object", solid.object);
+    json.member("pixels", solid.pixels);
+    json.member("unbalanced_pixels", solid.unbalanced_pixels);
+    json.end_object();
+  }
+  json.end_array();
+}
+
 }  // namespace
 
 std::string_view accuracy_word(transparency::Accuracy accuracy) {
@@ -135,7 +147,9 @@ std::string oit_json(const OitCommand& command, const OitOutcome& outcome, const
   json.member("height", command.size.y);
   json.member("samples", command.picture.samples);
   json.end_object();
-  json.member("reference", outcome.reference->name);
+  if (!command.media.empty()) write_media(json, outcome);
+  json.key("reference");
+  outcome.reference == nullptr ? json.null() : json.value(outcome.reference->name);
   json.member("runs", outcome.runs);
   json.key("techniques").begin_array();
   for (const OitResult& result : outcome.results) write_result(json, result);

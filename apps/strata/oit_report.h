@@ -6,6 +6,7 @@
 
 #include "apps/commands/commands.h"
 #include "apps/session/session.h"
+#include "strata/transparency/media/media.h"
 #include "strata/transparency/stream/frame.h"
 #include "strata/transparency/techniques.h"
 
@@ -20,6 +21,8 @@ struct OitResult {
   transparency::Difference difference;  ///< from the exact reference
   double seconds = 0.0;                 ///< wall clock of a picture, the median of several
   double technique_seconds = 0.0;       ///< of all threads, without making the stream
+  /// For the page: PNG files, the picture and its differences from the reference.
+  std::vector<std::uint8_t> picture, heat;
 };
 
 /// All that `strata oit` can tell of a run.
@@ -30,6 +33,8 @@ struct OitOutcome {
   const transparency::Technique* reference = nullptr;
   int runs = 1;  ///< timed
   std::vector<OitResult> results;
+  std::vector<std::uint8_t> reference_picture;   ///< for the page: a PNG file
+  std::vector<transparency::SolidReport> media;  ///< with --media: the solids that hold one
   double read_ms = 0, prepare_ms = 0, draw_ms = 0, write_ms = 0;
 };
 

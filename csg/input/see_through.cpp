@@ -1,9 +1,14 @@
 #include "strata/csg/input/see_through.h"
 
 #include <algorithm>
+#include <bit>
 #include <new>
+#include <set>
 #include <utility>
 
+#include "csg/input/tree_fragments.h"
+#include "csg/picture/shade.h"
+#include "csg/surface/translucent.h"
 #include "strata/mesh/soup_tools.h"
 
 namespace strata::csg {
@@ -11,90 +16,260 @@ namespace {
 
 constexpr float kUsualOpacity = 0.5f;
 
-/// Opacity of what has no alpha of its own.
+/// Opacity of what is not transparent by its own colour.
 float opacity_of(const Scene& scene, const SeeThroughOptions& options) {
   if (options.opacity) return *options.opacity;
   const auto solids = scene.tree.solids();
-  const bool any = !scene.backgrounds.empty() || !scene.highlights.empty() ||
-                   std::any_of(solids.begin(), solids.end(), [](const Solid& solid) {
-                     return solid.colour && solid.colour->a < 1.0f;
-                   });
+  bool any = !scene.backgrounds.empty() || !scene.highlights.empty() ||
+             std::any_of(solids.begin(), solids.end(),
+                         [](const Solid& solid) { return solid.colour && solid.colour->a < 1.0f; });
+  for (const FaceMaterials& of_solid : options.materials) {
+    for (const Material& material : of_solid.materials) {
+      any = any || material.opacity.value_or(1.0f) < 1.0f;
+    }
+  }
   return any ? 1.0f : kUsualOpacity;
 }
 
-/// All triangles of a solid as a part of a scene.
-Result<void> add_faces(const Solid& solid, const glm::vec4& colour, transparency::Scene& scene) {
-  if (!solid.mesh || solid.mesh->triangles.empty()) return {};
-  const std::uint64_t vertices = scene.mesh.positions.size() + solid.mesh->positions.size();
-  const std::uint64_t triangles = scene.mesh.triangles.size() + solid.mesh->triangles.size();
-  if (vertices > 0xfffffffeu || triangles > 0x7fffffffu) {
-    return fail(ErrorCode::kLimit, "the meshes have {} triangles together; the limit is {}",
-                triangles, 0x7fffffffu);
+/// All triangles of meshes, object by object.
+class FaceCollector {
+ public:
+  FaceCollector(const glm::vec4& usual, transparency::Scene& scene)
+      : usual_(usual), scene_(scene) {}
+
+  Result<void> add(const Solid& solid, const FaceMaterials* materials) {
+    if (!solid.mesh || solid.mesh->triangles.empty()) return {};
+    const TriangleSoup& mesh = *solid.mesh;
+    const std::uint64_t vertices = scene_.mesh.positions.size() + mesh.positions.size();
+    const std::uint64_t triangles = scene_.mesh.triangles.size() + mesh.triangles.size();
+    if (vertices > 0xfffffffeu || triangles > 0x7fffffffu) {
+      return fail(ErrorCode::kLimit, "the meshes have {} triangles together; the limit is {}",
+                  triangles, 0x7fffffffu);
+    }
+    const auto first = static_cast<std::uint32_t>(scene_.mesh.positions.size());
+    for (const glm::dvec3& position : mesh.positions) {
+      scene_.mesh.positions.emplace_back(solid.world_from_mesh * glm::dvec4(position, 1.0));
+    }
+    const bool mirrored = glm::determinant(glm::dmat3(solid.world_from_mesh)) < 0.0;
+    for (glm::uvec3 triangle : mesh.triangles) {
+      if (mirrored) std::swap(triangle.y, triangle.z);
+      scene_.mesh.triangles.push_back(triangle + first);
+    }
+    const auto object = static_cast<std::uint32_t>(scene_.objects.size());
+    scene_.objects.push_back({solid.name, seen_through(colour_or(solid.colour, usual_))});
+    scene_.object_of.resize(triangles, object);
+    if (materials != nullptr && !materials->materials.empty()) {
+      add_materials(solid, *materials, triangles - mesh.triangles.size());
+    }
+    return {};
   }
-  const auto first = static_cast<std::uint32_t>(scene.mesh.positions.size());
-  for (const glm::dvec3& position : solid.mesh->positions) {
-    scene.mesh.positions.emplace_back(solid.world_from_mesh * glm::dvec4(position, 1.0));
+
+ private:
+  /// Triangles from `first` on get objects by their materials.
+  void add_materials(const Solid& solid, const FaceMaterials& materials, std::uint64_t first) {
+    const auto base = static_cast<std::uint32_t>(scene_.objects.size());
+    for (const Material& material : materials.materials) {
+      glm::vec4 colour = usual_;
+      if (material.colour) colour = glm::vec4(*material.colour, colour.a);
+      colour.a = material.opacity.value_or(colour.a);
+      scene_.objects.push_back(
+          {fmt::format("{}: {}", solid.name, material.name), seen_through(colour)});
+    }
+    const auto& elements = solid.mesh->face_elements;
+    for (std::size_t t = 0; t < solid.mesh->triangles.size(); ++t) {
+      const std::size_t element = elements.empty() ? t : elements[t];
+      if (const auto material = materials.of_element(element)) {
+        scene_.object_of[first + t] = base + *material;
+      }
+    }
   }
-  for (const glm::uvec3& triangle : solid.mesh->triangles) {
-    scene.mesh.triangles.push_back(triangle + first);
+
+  [[nodiscard]] glm::vec4 seen_through(const glm::vec4& colour) const {
+    return colour.a < 1.0f ? colour : glm::vec4(glm::vec3(colour), usual_.a);
   }
-  scene.object_of.resize(triangles, static_cast<std::uint32_t>(scene.objects.size()));
-  scene.objects.push_back({solid.name, colour});
-  return {};
+
+  glm::vec4 usual_;
+  transparency::Scene& scene_;
+};
+
+/// The solid operands of the unions at the top. @return kUsage naming a part that is none
+Result<std::vector<std::uint32_t>> united_solids(const Tree& tree) {
+  std::vector<std::uint32_t> solids;
+  if (tree.root() == Tree::kNone) return solids;
+  std::vector<Tree::NodeId> stack{tree.root()};
+  while (!stack.empty()) {
+    const Tree::Node& node = tree.nodes()[stack.back()];
+    const Tree::NodeId id = stack.back();
+    stack.pop_back();
+    if (node.operation == Operation::kSolid) {
+      solids.push_back(node.first);
+    } else if (node.operation == Operation::kUnion) {
+      const auto operands = tree.operands(id);
+      stack.insert(stack.end(), operands.rbegin(), operands.rend());
+    } else {
+      return fail(ErrorCode::kUsage,
+                  "a part of the scene is {} of solids; whole solids are needed here",
+                  node.operation == Operation::kDifference ? "a difference" : "an intersection");
+    }
+  }
+  return solids;
 }
+
+/// What is drawn of a scene, ghosts included.
+std::vector<Ghost> ghosts_of(const Scene& scene) {
+  std::vector<Ghost> ghosts;
+  for (const Tree::NodeId node : scene.backgrounds) ghosts.push_back({node, kBackgroundGhost});
+  for (const Tree::NodeId node : scene.highlights) ghosts.push_back({node, kHighlightGhost});
+  return ghosts;
+}
+
+/// A scene with Boolean operations, prepared to be seen from anywhere.
+struct SeenTree {
+  SeenTree(Tree all, const std::vector<Ghost>& ghosts, double relative_precision,
+           const ColourScheme& colours, const Execution& execution)
+      : tree(std::move(all)),
+        preview(tree, ghosts, relative_precision, execution),
+        opaque_root(take_translucent(tree, translucent)),
+        geometry(tree, execution),
+        trees(tree, with_ghosts(ghosts), geometry, geometry.world_error(tree, relative_precision)),
+        scheme(colours) {}
+
+  std::span<const Translucent> with_ghosts(const std::vector<Ghost>& ghosts) {
+    for (const Ghost& ghost : ghosts) translucent.push_back({ghost.node, ghost.colour});
+    return translucent;
+  }
+  [[nodiscard]] bool any_opaque() const {
+    if (opaque_root == Tree::kNone) return false;
+    const Tree::Node& node = tree.nodes()[opaque_root];
+    return node.operation == Operation::kSolid || node.count > 0;
+  }
+
+  Tree tree;
+  Preview preview;
+  std::vector<Translucent> translucent;
+  Tree::NodeId opaque_root;
+  Geometry geometry;
+  TranslucentTrees trees;
+  ColourScheme scheme;
+};
 
 }  // namespace
 
-struct SeeThrough::Impl {
+struct SeeThrough::Parts {
   float opacity = 1.0f;
   std::uint64_t objects = 0, triangles = 0;
-  transparency::Scene faces;
-  Bounds box;
+  Bounds box;  ///< of `faces`
+  std::optional<transparency::Scene> faces;
+  std::shared_ptr<SeenTree> tree;  ///< instead
 
-  Result<void> take_faces(const Scene& scene, const ColourScheme& scheme) {
-    const glm::vec4 face(glm::vec3(scheme.face) / 255.0f, opacity);
-    for (const Solid& solid : scene.tree.solids()) {
-      if (auto done = add_faces(solid, colour_or(solid.colour, face), faces); !done) return done;
+  Result<void> take_faces(const Scene& scene, const SeeThroughOptions& options,
+                          const ColourScheme& scheme) {
+    const auto solids = united_solids(scene.tree);
+    if (!solids) return tl::unexpected(solids.error());
+    faces.emplace();
+    FaceCollector collector(glm::vec4(glm::vec3(scheme.face) / 255.0f, opacity), *faces);
+    for (const std::uint32_t solid : *solids) {
+      const FaceMaterials* materials =
+          solid < options.materials.size() ? &options.materials[solid] : nullptr;
+      auto added = collector.add(scene.tree.solids()[solid], materials);
+      if (!added) return added;
     }
-    box = bounds(faces.mesh);
-    objects = faces.objects.size();
-    triangles = faces.mesh.triangles.size();
+    box = bounds(faces->mesh);
+    objects = std::set<std::uint32_t>(faces->object_of.begin(), faces->object_of.end()).size();
+    triangles = faces->mesh.triangles.size();
     return {};
+  }
+  void take_tree(Scene scene, const ColourScheme& scheme, const Execution& execution) {
+    for (Solid& solid : scene.tree.solids()) {
+      if (opacity < 1.0f) {
+        if (!solid.colour) solid.colour = glm::vec4(kSchemeColour, opacity);
+        if (solid.colour->a >= 1.0f) solid.colour->a = opacity;
+      }
+      if (solid.mesh) triangles += solid.mesh->triangles.size();
+    }
+    if (!scene.shown.empty()) {
+      scene.tree.set_root(scene.tree.add(Operation::kUnion, scene.shown));
+    }
+    const std::vector<Ghost> ghosts = ghosts_of(scene);
+    tree = std::make_shared<SeenTree>(std::move(scene.tree), ghosts, scene.relative_precision,
+                                      scheme, execution);
+    objects = tree->trees.parts().size() + (tree->any_opaque() ? 1 : 0);
+  }
+  Result<transparency::Frame> tree_frame(const View& view,
+                                         const transparency::FrameOptions& options,
+                                         const Execution& execution) const {
+    const auto [across, down] = sample_grid(options.samples);
+    if (view.size.x > kMaxPictureSide / across || view.size.y > kMaxPictureSide / down) {
+      return fail(ErrorCode::kUsage,
+                  "a picture with its samples must be 1 to {} wide and high, got {} x {}",
+                  kMaxPictureSide, std::int64_t{view.size.x} * across,
+                  std::int64_t{view.size.y} * down);
+    }
+    TreeFragmentsInput input{tree->trees, band_of(view, 0, view.size.y, across, down), {}};
+    if (tree->any_opaque()) {
+      const auto drawn = tree->preview.draw(input.view, execution);
+      if (!drawn) return tl::unexpected(drawn.error());
+      input.opaque = **drawn;
+    }
+    const Shader shader(tree->tree, tree->geometry, input.view, tree->scheme);
+    auto source = make_tree_fragments(std::move(input), shader, tree, execution);
+    if (!source) return tl::unexpected(source.error());
+    return transparency::Frame(std::move(*source), options);
   }
 };
 
 Result<SeeThrough> SeeThrough::make(Scene scene, const SeeThroughOptions& options,
-                                    const Execution&) try {
+                                    const Execution& execution) try {
   if (options.opacity && !(*options.opacity >= 0.0f && *options.opacity <= 1.0f)) {
     return fail(ErrorCode::kUsage, "the opacity must be 0 to 1, got {}", *options.opacity);
   }
   const ColourScheme& scheme =
       options.scheme != nullptr ? *options.scheme : colour_schemes().front();
-  auto impl = std::make_shared<Impl>();
-  impl->opacity = opacity_of(scene, options);
-  if (!options.all_faces) {
-    return fail(ErrorCode::kUsage, "scenes with Boolean operations cannot be seen through yet");
-  }
-  if (auto done = impl->take_faces(scene, scheme); !done) return tl::unexpected(done.error());
   SeeThrough result;
-  result.impl_ = std::move(impl);
+  result.parts_ = std::make_shared<Parts>();
+  result.parts_->opacity = opacity_of(scene, options);
+  if (options.all_faces) {
+    auto taken = result.parts_->take_faces(scene, options, scheme);
+    if (!taken) return tl::unexpected(taken.error());
+  } else {
+    result.parts_->take_tree(std::move(scene), scheme, execution);
+  }
+  if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
   return result;
 } catch (const std::bad_alloc&) {
   return fail(ErrorCode::kLimit, "out of memory for the triangles of the scene");
 }
 
+Result<View> SeeThrough::view(const Camera& camera, const glm::ivec2& size,
+                              const Execution& execution) const {
+  if (parts_->tree) return parts_->tree->preview.view(camera, size, execution);
+  auto view = make_view(camera, size, parts_->box);
+  if (!view || !view->cut_short) return view;
+  // The eye is among the faces: the nearest one decides where depths begin.
+  return Preview(Tree(parts_->faces->mesh), {}, 0.0, execution).view(camera, size, execution);
+}
+
 Result<transparency::Frame> SeeThrough::frame(const Camera& camera, const glm::ivec2& size,
                                               const transparency::FrameOptions& options,
                                               const Execution& execution) const try {
-  const auto view = make_view(camera, size, impl_->box);
-  if (!view) return tl::unexpected(view.error());
-  return transparency::Frame::make(impl_->faces, *view, options, execution);
+  if (options.samples < 1 || options.samples > 64 ||
+      !std::has_single_bit(static_cast<unsigned>(options.samples))) {
+    return fail(ErrorCode::kUsage, "samples per pixel must be 1, 2, 4, 8, 16, 32 or 64, got {}",
+                options.samples);
+  }
+  const auto seen = view(camera, size, execution);
+  if (!seen) return tl::unexpected(seen.error());
+  if (parts_->tree) return parts_->tree_frame(*seen, options, execution);
+  return transparency::Frame::make(*parts_->faces, *seen, options, execution);
 } catch (const std::bad_alloc&) {
   return fail(ErrorCode::kLimit, "out of memory for a picture of {} x {} pixels", size.x, size.y);
 }
 
-float SeeThrough::opacity() const { return impl_->opacity; }
-std::uint64_t SeeThrough::objects() const { return impl_->objects; }
-std::uint64_t SeeThrough::triangles() const { return impl_->triangles; }
+const transparency::Scene* SeeThrough::faces() const {
+  return parts_->faces ? &*parts_->faces : nullptr;
+}
+float SeeThrough::opacity() const { return parts_->opacity; }
+std::uint64_t SeeThrough::objects() const { return parts_->objects; }
+std::uint64_t SeeThrough::triangles() const { return parts_->triangles; }
 
 }  // namespace strata::csg

@@ -1,3 +1,5 @@
+#include "csg/picture/encode_png.h"
+
 #include <libdeflate.h>
 
 #include <algorithm>
@@ -141,28 +143,32 @@ std::vector<std::uint8_t> compress(const PngImage& image, int height) {
 
 }  // namespace
 
+std::vector<std::uint8_t> encode_png(const Picture& picture) {
+  const PngImage image = to_png_image(picture);
+  std::vector<std::uint8_t> bytes;
+  PngChunks png(
+      bytes, [](const void* data, std::size_t count) { return libdeflate_crc32(0, data, count); });
+  const auto add_chunk = [&](std::string_view type, std::span<const std::uint8_t> data) {
+    png.begin(type);
+    bytes.insert(bytes.end(), data.begin(), data.end());
+    png.end();
+  };
+  png.header(picture.width, picture.height, image.bits, image.colour_type);
+  if (!image.palette.empty()) add_chunk("PLTE", image.palette);
+  if (!image.alpha.empty()) add_chunk("tRNS", image.alpha);
+  // A chunk's length has 31 bits.
+  constexpr std::size_t kMostBytes = 0x7fffffff;
+  const std::vector<std::uint8_t> data = compress(image, picture.height);
+  for (std::size_t at = 0; at < data.size(); at += kMostBytes) {
+    add_chunk("IDAT", std::span(data).subspan(at, std::min(kMostBytes, data.size() - at)));
+  }
+  add_chunk("IEND", {});
+  return bytes;
+}
+
 Result<void> write_png(const Picture& picture, const std::string& path) {
   try {
-    const PngImage image = to_png_image(picture);
-    std::vector<std::uint8_t> bytes;
-    PngChunks png(bytes, [](const void* data, std::size_t count) {
-      return libdeflate_crc32(0, data, count);
-    });
-    const auto add_chunk = [&](std::string_view type, std::span<const std::uint8_t> data) {
-      png.begin(type);
-      bytes.insert(bytes.end(), data.begin(), data.end());
-      png.end();
-    };
-    png.header(picture.width, picture.height, image.bits, image.colour_type);
-    if (!image.palette.empty()) add_chunk("PLTE", image.palette);
-    if (!image.alpha.empty()) add_chunk("tRNS", image.alpha);
-    // A chunk's length has 31 bits.
-    constexpr std::size_t kMostBytes = 0x7fffffff;
-    const std::vector<std::uint8_t> data = compress(image, picture.height);
-    for (std::size_t at = 0; at < data.size(); at += kMostBytes) {
-      add_chunk("IDAT", std::span(data).subspan(at, std::min(kMostBytes, data.size() - at)));
-    }
-    add_chunk("IEND", {});
+    const std::vector<std::uint8_t> bytes = encode_png(picture);
     auto file = AtomicFile::create(path);
     if (!file) return tl::unexpected(file.error());
     if (auto done = file->write(bytes.data(), bytes.size()); !done) return done;

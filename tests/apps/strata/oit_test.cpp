@@ -116,7 +116,125 @@ TEST_F(Oit, OpenMeshesShowAllTheirFaces) {
   const Colour opaque = middle({"sheets.obj", "--opacity=1"});
   const Colour ground = middle({"sheets.obj", "--opacity=0"});
   const Colour seen = middle({"sheets.obj", "--opacity=0.3"});
+  EXPECT_EQ(run({"sheets.obj", "-o", "out.png", "--strict"}).err, "");
   EXPECT_NEAR(seen[0], blended(opaque[0], ground[0], 0.3, 3), 1.01 / 255);
+}
+
+/// A scene of one block, drilled through, seen along the hole's side: `inside` looks through it.
+constexpr const char* kDrilled =
+    "difference() {\n"
+    "  cube(size = [10, 10, 10], center = false);\n"
+    "  multmatrix([[1, 0, 0, 4], [0, 1, 0, -1], [0, 0, 1, 4]]) cube(size = [2, 12, 2], center = "
+    "false);\n"
+    "}\n";
+
+TEST_F(Oit, ADrilledBlockHasFourLayersWhereItsHoleIs) {
+  place.write("drilled.csg", kDrilled);
+  const Colour opaque = middle({"drilled.csg", "--opacity=1"});
+  const Colour ground = middle({"drilled.csg", "--opacity=0"});
+  const Colour hole = middle({"drilled.csg", "--opacity=0.3"});
+  EXPECT_NEAR(hole[0], blended(opaque[0], ground[0], 0.3, 4), 1.01 / 255);
+  // Beside the hole the block has two.
+  run({"drilled.csg", "-o", "side.png", "--opacity=0.3", "--size=9,9", "--projection=o",
+       "--camera=2,5,5,0,0,0,4"});
+  EXPECT_NEAR(pixel("side.png", 4, 4)[0], blended(opaque[0], ground[0], 0.3, 2), 1.01 / 255);
+}
+
+TEST_F(Oit, FacesThatCoincideLeaveNoLayer) {
+  // The pocket begins in the top face, at the same height.
+  place.write("pocket.csg",
+              "difference() {\n  cube(size = [10, 10, 10], center = false);\n"
+              "  multmatrix([[1, 0, 0, 3], [0, 1, 0, 3], [0, 0, 1, 6]]) cube(size = [4, 4, 4], "
+              "center = false);\n}\n");
+  const Colour opaque = middle({"pocket.csg", "--opacity=1"});
+  const Colour ground = middle({"pocket.csg", "--opacity=0"});
+  const json report = json::parse(run({"pocket.csg", "--opacity=0.3", "--json", "--size=9,9",
+                                       "--projection=o", "--camera=5,5,5,0,0,0,4"})
+                                      .out);
+  EXPECT_EQ(report["techniques"][0]["costs"]["most_layers"], 2);
+  const Colour seen = middle({"pocket.csg", "--opacity=0.3"});
+  // The bottom of a pocket has the light of the top; its colour is the block's, not that of a cut.
+  EXPECT_NEAR(seen[2], blended(opaque[2], ground[2], 0.3, 2), 0.3);
+  EXPECT_EQ(report["scene"]["objects"], 1);
+}
+
+TEST_F(Oit, OpaquePartsHideAndAreSeenThroughWhatIsBefore) {
+  const std::string glass =
+      "color([0, 0, 1, 0.25]) multmatrix([[1,0,0,0],[0,1,0,0],[0,0,1,20]]) "
+      "cube(size = [10, 10, 2], center = false);\n";
+  const std::string hidden =
+      "color([1, 0, 0, 0.5]) multmatrix([[1,0,0,0],[0,1,0,0],[0,0,1,-20]]) "
+      "cube(size = [10, 10, 2], center = false);\n";
+  place.write("opaque.csg", "cube(size = [10, 10, 10], center = false);\n");
+  place.write("scene.csg", glass + hidden + "cube(size = [10, 10, 10], center = false);\n");
+  place.write("glass.csg", glass);
+  const Colour opaque = middle({"opaque.csg", "--opacity=1"});
+  const Colour ground = middle({"opaque.csg", "--opacity=0"});
+  const Colour alone = middle({"glass.csg"});
+  const Colour seen = middle({"scene.csg"});
+  for (std::size_t i = 0; i < 3; ++i) {
+    // Two layers of one colour: what they let through is (1 - 0.25)^2.
+    const double light = alone[i] - 0.5625 * ground[i];
+    EXPECT_NEAR(seen[i], light + 0.5625 * opaque[i], 1.6 / 255);
+  }
+  const json report = json::parse(run({"scene.csg", "--json", "--size=9,9", "--projection=o",
+                                       "--camera=5,5,5,0,0,0,40", "--technique=all"})
+                                      .out);
+  EXPECT_EQ(report["scene"]["opacity"], 1.0);
+  EXPECT_EQ(report["scene"]["objects"], 3);
+  EXPECT_EQ(report["techniques"][0]["costs"]["most_layers"], 2);
+}
+
+TEST_F(Oit, TransparentScenesLookAsStrataCsgDrawsThem) {
+  place.write(
+      "scene.csg",
+      "color([0.9, 0.2, 0.2, 0.4]) difference() {\n sphere(r = 10, $fn = 24);\n"
+      " cylinder(h = 40, r1 = 4, r2 = 4, center = true, $fn = 16);\n}\n"
+      "multmatrix([[1,0,0,-4],[0,1,0,6],[0,0,1,-9],[0,0,0,1]]) cube(size = [14, 10, 6]);\n"
+      "%multmatrix([[1,0,0,0],[0,1,0,-10],[0,0,1,0],[0,0,0,1]]) sphere(r = 4, $fn = 12);\n");
+  run({"scene.csg", "-o", "oit.png", "--size=60,60"});
+  ASSERT_EQ(place.run({"csg", "scene.csg", "-o", "csg.png", "--size=60,60"}).exit_code, 0);
+  int transparent = 0;
+  for (int v = 0; v < 60; ++v) {
+    for (int u = 0; u < 60; ++u) {
+      const Colour a = pixel("oit.png", u, v), b = pixel("csg.png", u, v);
+      for (std::size_t i = 0; i < 3; ++i) ASSERT_NEAR(a[i], b[i], 1.01 / 255) << u << ' ' << v;
+      transparent += a[1] < 0.8 && a[0] > 0.8 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(transparent, 50);
+}
+
+TEST_F(Oit, MaterialsOfAnObjGiveColourAndOpacity) {
+  place.write("two.mtl", "newmtl red\nKd 1 0 0\nd 0.5\nnewmtl blue\nKd 0 0 1\nTr 0.75\n");
+  place.write("two.obj",
+              "mtllib two.mtl\nv 0 0 0\nv 10 0 0\nv 10 10 0\nv 0 10 0\nv 0 0 5\nv 10 0 5\n"
+              "v 10 10 5\nv 0 10 5\nusemtl blue\nf 1 2 3 4\nusemtl red\nf 5 6 7 8\n");
+  const Colour seen = middle({"two.obj", "--keep-orientation", "--transparent"});
+  // Red before blue: alpha 1 - 0.5 * 0.75, red 0.5 of the light, blue 0.5 * 0.25 of it.
+  EXPECT_NEAR(seen[3], 0.625, 1.01 / 255);
+  EXPECT_EQ(seen[1], 0.0);
+  EXPECT_NEAR(seen[0] / seen[2], 0.5 / 0.125, 0.1);
+  std::filesystem::remove(place.path("two.mtl"));
+  const RunResult without = run({"two.obj", "-o", "out.png", "--size=9,9"});
+  EXPECT_NE(without.err.find("two.mtl is not there"), std::string::npos) << without.err;
+  place.write("two.mtl", "newmtl red\nKd 1 zero 0\n");
+  refuses({"two.obj", "-o", "bad.png"}, 3, "two.mtl:2: Kd: 'zero' is not a number");
+  place.write("two.mtl", "newmtl red\n");
+  refuses({"two.obj", "--json=two.mtl", "-o", "bad.png"}, 2, "overwrite");
+}
+
+TEST_F(Oit, MediaInSolidsLetThroughWhatBeerSays) {
+  place.write("fog.json", R"({"ambient": 0, "media": [{"object": "*", "extinction": 0.1}]})");
+  const Colour ground = middle({"box.obj", "--opacity=0"});
+  const Colour seen = middle({"box.obj", "--media=fog.json"});
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_NEAR(seen[i], ground[i] * std::exp(-0.1 * 10), 1.01 / 255);
+  }
+  refuses({"box.obj", "-o", "a.png", "--light=1,2,3"}, 2, "--light needs --media");
+  refuses({"box.obj", "-o", "a.png", "--media=none.json"}, 3, "none.json");
+  refuses({"box.obj", "-o", "a.png", "--media=fog.json", "--technique=all"}, 2, "--technique");
+  refuses({"box.obj", "--json=fog.json", "-o", "a.png", "--media=fog.json"}, 2, "overwrite");
 }
 
 TEST_F(Oit, SeveralTechniquesWriteAPictureEach) {
@@ -164,6 +282,10 @@ TEST_F(Oit, TheReportHasTheNamesThatItsPageHas) {
   const json report = json::parse(run({"box.obj", "--technique=all", "--json", "--size=8,8"}).out);
   testkit::collect(report, "", names);
   testkit::collect(json::parse(run({"--list", "--json"}).out), "", names);
+  place.write("fog.json", R"({"media": [{"object": "*", "extinction": 0.1}]})");
+  testkit::collect(json::parse(run({"box.obj", "--media=fog.json", "--json", "--size=8,8"}).out),
+                   "", names);
+  names.erase("techniques");
   auto documented = testkit::documented("`strata oit`");
   for (const char* only_with_one : {"warnings[].code", "warnings[].message"}) {
     EXPECT_EQ(documented.erase(only_with_one), 1u);

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <memory>
+
+#include "csg/geometry.h"
+#include "csg/picture/shade.h"
+#include "csg/surface/translucent.h"
+#include "strata/core/execution.h"
+#include "strata/core/result.h"
+#include "strata/csg/surface/surface_image.h"
+#include "strata/raster/view.h"
+#include "transparency/stream/fragment_source.h"
+
+// The fragments of translucent trees, for techniques of transparency. Private to csg/input.
+
+namespace strata::csg {
+
+/// Translucent trees in a view.
+struct TreeFragmentsInput {
+  const TranslucentTrees& trees;
+  View view;            ///< of the samples
+  SurfaceImage opaque;  ///< what stands among the translucent trees; no pixels: nothing
+};
+
+/// Surfaces of translucent trees become fragments with the triangle, facing and colour of the solid
+/// that they come from. What lies behind an opaque surface is hidden.
+/// @param shader  gives the colours, in this call only @param owner  what `input` borrows from,
+/// kept
+/// @return kGeometry, kLimit, kCancelled
+Result<std::shared_ptr<const transparency::FragmentSource>> make_tree_fragments(
+    TreeFragmentsInput input, const Shader& shader, std::shared_ptr<const void> owner,
+    const Execution& execution);
+
+}  // namespace strata::csg
