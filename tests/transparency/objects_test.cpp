@@ -264,6 +264,18 @@ TEST(ObjectOrder, GivesTheSameBitsForAnyNumberOfThreads) {
   EXPECT_GE(checked, 3);
 }
 
+TEST(ObjectOrder, NeedsTriangles) {
+  const ListedFrame listed = random_frame("Bare", {4, 4}, 2.0, 9, 1);
+  auto frame = Frame::make(listed.fragments, listed.colours, listed.options);
+  ASSERT_TRUE(frame);
+  for (const char* name : {"object-sort", "primitive-sort", "visibility-queries"}) {
+    const auto refused = frame->render(**find_technique(name));
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::kUsage);
+    EXPECT_NE(refused.error().message.find(name), std::string::npos);
+  }
+}
+
 TEST(PrimitiveSort, SplitSaysWhatIsTooMuch) {
   const Scene scene = random_triangles(40, 3);
   const Frame frame = frame_of(scene, flat_camera(), {90, 75});

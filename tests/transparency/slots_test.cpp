@@ -286,6 +286,23 @@ TEST(BucketSort, LosesAllButTheNearestOfABucketOrMergesThem) {
                over(frame, {0, 2, 3, 1, 4}), "adaptive");
 }
 
+TEST(BucketSort, FurtherPassesRecoverWhatWasLost) {
+  for (const ListedFrame& frame : some_frames()) {
+    for (const unsigned k : {1u, 5u, 32u}) {
+      for (const char* name : {"bucket-sort", "adaptive-bucket-sort"}) {
+        const Rendering rendering = render(frame, technique(name), with(k, "repeat"));
+        EXPECT_TRUE(same_bits(rendering.image, exact_picture(frame))) << name << k << frame.name;
+        EXPECT_EQ(rendering.costs.kept, frame.fragments.size());
+        EXPECT_EQ(rendering.costs.lost, 0u);
+        EXPECT_EQ(rendering.costs.most_layers, deepest(frame));
+      }
+    }
+  }
+  // Three in one of ten buckets: three passes after that for the range.
+  const ListedFrame frame = one_pixel({0, 530, 510, 520, 1000});
+  EXPECT_EQ(render(frame, technique("bucket-sort"), with(10, "repeat")).costs.geometry_passes, 4u);
+}
+
 /// The most fragments behind it that came before a fragment.
 std::size_t most_late(const std::vector<std::uint32_t>& depths) {
   std::size_t most = 0;

@@ -4,6 +4,7 @@
 #include <limits>
 #include <vector>
 
+#include "transparency/slots/counted_sort.h"
 #include "transparency/slots/slot_techniques.h"
 #include "transparency/stream/tile_stream.h"
 
@@ -12,6 +13,7 @@
 // MIN blending keeps the nearest fragment of each; buckets are in order as they are. The adaptive
 // form first marks the occupied of about 1024 bins, and gives each its own bucket while there are
 // enough. The papers draw a bounding box to learn the range; we draw the scene.
+// Further passes recover what was lost: each keeps the nearest behind those that were kept.
 // Where fragments meet in a bucket, the papers lose all but the nearest; the survey by Maule et al.
 // (2011) merges them: the newcomer lies before or behind all that came earlier.
 
@@ -20,6 +22,8 @@ namespace {
 
 constexpr unsigned kMostBuckets = 32, kBins = 1024, kWords = kBins / 64;
 constexpr std::uint64_t kBucketBytes = 8, kMergedBytes = 16, kRangeBytes = 8;
+/// Of repeated passes: where the next begins, how many are equal; a pixel and a key.
+constexpr std::uint64_t kRepeatedBytes = 8 + 4, kKeptBytes = 4 + 8;
 constexpr std::uint64_t kEmpty = std::numeric_limits<std::uint64_t>::max();
 
 struct Range {
@@ -37,30 +41,44 @@ struct Range {
   }
 };
 
+enum class Collisions : std::uint8_t { kLose, kMerge, kRepeat };
+
 class Buckets {
  public:
-  Buckets(unsigned k, bool adaptive, bool merge)
+  Buckets(unsigned k, bool adaptive, Collisions collisions)
       : k_(k),
         bins_(kBins / k * k),
         adaptive_(adaptive),
-        merge_(merge),
+        collisions_(collisions),
         nearest_(std::size_t{k} * kTilePixels) {
-    if (merge) merged_.resize(nearest_.size());
+    if (collisions == Collisions::kMerge) merged_.resize(nearest_.size());
+    if (collisions == Collisions::kRepeat) {
+      begins_.resize(nearest_.size());
+      equal_.resize(nearest_.size());
+    }
     if (adaptive) occupied_.resize(kTilePixels);
   }
 
   void render(TileStream& stream, TileImage& image) {
     Costs& costs = stream.costs();
-    const std::uint64_t bucket_bytes = kBucketBytes + (merge_ ? kMergedBytes : 0);
+    const bool merge = collisions_ == Collisions::kMerge;
+    const bool repeat = collisions_ == Collisions::kRepeat;
+    const std::uint64_t bucket_bytes =
+        kBucketBytes + (merge ? kMergedBytes : 0) + (repeat ? kRepeatedBytes : 0);
     costs.formula_bytes = costs.allocated_bytes =
-        (bucket_bytes * k_ + kRangeBytes + (adaptive_ ? kBins / 8 : 0)) * stream.pixel_count();
+        (bucket_bytes * k_ + kRangeBytes + (adaptive_ ? kBins / 8 : 0)) * stream.pixel_count() +
+        (repeat ? kKeptBytes * stream.size() : 0);
     if (stream.size() == 0) return;
     ranges_.fill({});
     stream.pass([&](std::uint32_t pixel, DepthItem item) { ranges_[pixel].include(item.depth()); });
     if (adaptive_) mark(stream);
-    std::fill_n(nearest_.begin(),
-                std::size_t{k_} * kTileSide * static_cast<std::size_t>(stream.height()), kEmpty);
-    if (merge_) {
+    if (repeat) {
+      route_all(stream);
+      blend_all(stream, image);
+      return;
+    }
+    std::fill_n(nearest_.begin(), used(stream), kEmpty);
+    if (merge) {
       stream.pass([&](std::uint32_t pixel, DepthItem item) { put_merged(stream, pixel, item); });
     } else {
       stream.pass([&](std::uint32_t pixel, DepthItem item) {
@@ -70,10 +88,54 @@ class Buckets {
     }
     for_each_pixel(stream, [&](std::uint32_t pixel) { blend(stream, pixel, image); });
     costs.stored = costs.comparisons = stream.size();
-    (merge_ ? costs.merged : costs.lost) = stream.size() - costs.kept;
+    (merge ? costs.merged : costs.lost) = stream.size() - costs.kept;
   }
 
  private:
+  /// Buckets of the rows of the tile.
+  [[nodiscard]] std::size_t used(const TileStream& stream) const {
+    return std::size_t{k_} * kTileSide * static_cast<std::size_t>(stream.height());
+  }
+  /// Passes until all fragments are kept.
+  void route_all(TileStream& stream) {
+    kept_.clear();
+    std::fill_n(begins_.begin(), used(stream), 0);
+    while (kept_.size() < stream.size()) {
+      std::fill_n(nearest_.begin(), used(stream), kEmpty);
+      stream.pass([&](std::uint32_t pixel, DepthItem item) {
+        const std::size_t at = bucket(pixel, item);
+        if (item.bits < begins_[at] || item.bits > nearest_[at]) return;
+        equal_[at] = item.bits == nearest_[at] ? equal_[at] + 1 : 1;
+        nearest_[at] = item.bits;
+      });
+      stream.costs().comparisons += stream.size();
+      for (std::size_t at = 0, end = used(stream); at < end; ++at) {
+        if (nearest_[at] == kEmpty) continue;
+        begins_[at] = nearest_[at] + 1;
+        kept_.insert(kept_.end(), equal_[at],
+                     {static_cast<std::uint32_t>(at / k_), DepthItem(nearest_[at])});
+      }
+    }
+  }
+  /// Buckets and passes are in order: lists of pixels are sorted but for where passes meet.
+  void blend_all(TileStream& stream, TileImage& image) {
+    std::stable_sort(kept_.begin(), kept_.end(),
+                     [](const Kept& a, const Kept& b) { return a.pixel < b.pixel; });
+    Costs& costs = stream.costs();
+    costs.stored = costs.kept = kept_.size();
+    for (std::size_t begin = 0, end = 0; begin < kept_.size(); begin = end) {
+      list_.clear();
+      for (; end < kept_.size() && kept_[end].pixel == kept_[begin].pixel; ++end) {
+        list_.push_back(kept_[end].item);
+      }
+      costs.comparisons += counted_sort(list_.data(), list_.data() + list_.size());
+      costs.most_layers = std::max<std::uint64_t>(costs.most_layers, list_.size());
+      FrontToBack sum;
+      for (const DepthItem item : list_) sum.add(stream.shade(item));
+      image.pixels[kept_[begin].pixel] = sum.result();
+    }
+  }
+
   /// The bins of each pixel that hold a depth.
   void mark(TileStream& stream) {
     for_each_pixel(stream, [&](std::uint32_t pixel) { occupied_[pixel].fill(0); });
@@ -119,7 +181,7 @@ class Buckets {
     for (std::size_t at = first; at < first + k_; ++at) {
       if (nearest_[at] == kEmpty) continue;
       ++layers;
-      if (merge_) {
+      if (collisions_ == Collisions::kMerge) {
         sum.colour += sum.transmittance * merged_[at].colour;
         sum.transmittance *= merged_[at].transmittance;
       } else {
@@ -132,18 +194,33 @@ class Buckets {
     image.pixels[pixel] = sum.result();
   }
 
+  struct Kept {
+    std::uint32_t pixel;
+    DepthItem item;
+  };
+
   unsigned k_, bins_;
-  bool adaptive_, merge_;
+  bool adaptive_;
+  Collisions collisions_;
   std::array<Range, kTilePixels> ranges_;
-  std::vector<std::uint64_t> nearest_;                       ///< of each bucket, k a pixel
+  std::vector<std::uint64_t> nearest_;  ///< of each bucket, k a pixel
+  std::vector<std::uint64_t> begins_;   ///< the least that is not kept yet, of the same
+  std::vector<std::uint32_t> equal_;    ///< how many are the nearest, of the same
+  std::vector<Kept> kept_;
+  std::vector<DepthItem> list_;
   std::vector<FrontToBack> merged_;                          ///< the same
   std::vector<std::array<std::uint64_t, kWords>> occupied_;  ///< a bit a bin
 };
 
+Collisions collisions_of(const Settings& settings) {
+  if (settings.variant == "merge") return Collisions::kMerge;
+  return settings.variant == "repeat" ? Collisions::kRepeat : Collisions::kLose;
+}
+
 template <bool adaptive>
 Result<TileRenderer> make(const FrameInfo&, const Settings& settings,
                           const std::shared_ptr<const void>&) {
-  return [buckets = std::make_shared<Buckets>(settings.k, adaptive, settings.variant == "merge")](
+  return [buckets = std::make_shared<Buckets>(settings.k, adaptive, collisions_of(settings))](
              TileStream& stream, TileImage& image) -> Result<void> {
     buckets->render(stream, image);
     return {};
@@ -161,8 +238,8 @@ const Technique kBucketSort{
     .default_k = kMostBuckets,
     .least_k = 1,
     .most_k = kMostBuckets,
-    .variants = "lose merge",
-    .memory = "8 bytes a bucket (merge: 24), 8 a pixel",
+    .variants = "lose merge repeat",
+    .memory = "8 bytes a bucket (merge: 24, repeat: 20), 8 a pixel; repeat: 12 a fragment",
     .fails =
         "fragments that meet in a bucket: all but the nearest are lost, or merged as they come",
     .make = make<false>,
@@ -177,8 +254,8 @@ const Technique kAdaptiveBucketSort{
     .default_k = kMostBuckets,
     .least_k = 1,
     .most_k = kMostBuckets,
-    .variants = "lose merge",
-    .memory = "8 bytes a bucket (merge: 24), 136 a pixel",
+    .variants = "lose merge repeat",
+    .memory = "8 bytes a bucket (merge: 24, repeat: 20), 136 a pixel; repeat: 12 a fragment",
     .fails = "fragments of one bin, 1/1024 of a pixel's range; more occupied bins than buckets",
     .make = make<true>,
 };
