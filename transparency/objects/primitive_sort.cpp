@@ -69,7 +69,7 @@ const Technique kPrimitiveSort{
     .accuracy = Accuracy::kBounded,
     .blending = Blending::kBackToFront,
     .k_means = "pieces a triangle",
-    .default_k = 32,
+    .default_k = 64,
     .least_k = 1,
     .most_k = 4096,
     .variants = "centroid max split",
