@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "strata/mesh/diagnose.h"
+#include "transparency/media/pixel_rays.h"
 
 namespace strata::transparency {
 namespace {
@@ -50,15 +51,18 @@ double square_to_triangle(const Corners& t) {
   return std::min(least, along * along / square);
 }
 
-EyeSolid make_eye_solid(const std::vector<Corners>& triangles, std::uint32_t solid) {
+/// The solid around or beside the eye. @param square  of the distance of its nearest triangle
+EyeSolid make_eye_solid(const std::vector<Corners>& triangles, std::uint32_t solid,
+                        double& square) {
   EyeSolid found;
   found.solid = solid;
-  double angle = 0.0, least = std::numeric_limits<double>::infinity();
+  double angle = 0.0;
+  square = std::numeric_limits<double>::infinity();
   for (const Corners& t : triangles) {
     angle += solid_angle(t);
-    const double square = square_to_triangle(t);
-    if (square >= least) continue;
-    least = square;
+    const double of_triangle = square_to_triangle(t);
+    if (of_triangle >= square) continue;
+    square = of_triangle;
     found.normal = glm::cross(t[1] - t[0], t[2] - t[0]);
     found.offset = glm::dot(found.normal, t[0]);
   }
@@ -78,6 +82,8 @@ std::vector<EyeSolid> find_eye_solids(const Scene& scene, const MediaTable& tabl
     if (solid != MediaTable::kNone) triangles[solid].push_back(scene.mesh.triangles[t]);
   }
   std::vector<Corners> seen;  // eye space
+  // From the eye to the corners of the near plane, with a depth step or so.
+  const double reach = 1.001 * view.near * PixelRays(view).ray(-1, -1).length;
   for (std::uint32_t solid = 0; solid < triangles.size(); ++solid) {
     seen.clear();
     double nearest = std::numeric_limits<double>::infinity(), farthest = -nearest;
@@ -92,8 +98,11 @@ std::vector<EyeSolid> find_eye_solids(const Scene& scene, const MediaTable& tabl
       }
     }
     if (!(nearest < view.near && farthest > 0.0)) continue;
-    if (!is_closed(scene.mesh.positions, triangles[solid], execution)) continue;
-    found.push_back(make_eye_solid(seen, solid));
+    double square = 0.0;
+    const EyeSolid eye = make_eye_solid(seen, solid, square);
+    // No ray meets a wall before the near plane, and none begins inside.
+    if (!eye.eye_inside && square > reach * reach) continue;
+    if (is_closed(scene.mesh.positions, triangles[solid], execution)) found.push_back(eye);
   }
   return found;
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <bit>
 #include <cstdint>
 #include <glm/vec3.hpp>
@@ -9,10 +10,16 @@
 namespace strata::transparency {
 
 using Float4 = float __attribute__((vector_size(16)));
+using Double2 = double __attribute__((vector_size(16)));
 using Int4 = std::int32_t __attribute__((vector_size(16)));
 
 inline Float4 splat(float x) { return Float4{x, x, x, x}; }
 inline Float4 from(const glm::vec3& v) { return Float4{v.x, v.y, v.z, 0.0f}; }
+inline Float4 joined(const std::array<Double2, 2>& v) {
+  using Float2 = float __attribute__((vector_size(8)));
+  return __builtin_shufflevector(__builtin_convertvector(v[0], Float2),
+                                 __builtin_convertvector(v[1], Float2), 0, 1, 2, 3);
+}
 inline glm::vec3 to_vec3(Float4 v) { return {v[0], v[1], v[2]}; }
 
 /// e^-x for x >= 0: 1 for 0, at most 2^-22 wrong in proportion; less than 2^-120 is given as

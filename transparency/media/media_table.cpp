@@ -90,10 +90,10 @@ double unit_of(const MediaSettings& settings, std::size_t solids) {
 MediumTerms terms_of(const glm::vec3& extinction, const glm::vec3& albedo, double unit) {
   MediumTerms terms;
   for (int c = 0; c < 3; ++c) {
-    const auto i = static_cast<std::size_t>(c);
+    const auto i = static_cast<std::size_t>(c / 2);
     const double sigma = extinction[c];
-    terms.extinction[i] = std::round(sigma / unit) * unit;
-    terms.scattering[i] = std::round(sigma * static_cast<double>(albedo[c]) / unit) * unit;
+    terms.extinction[i][c % 2] = std::round(sigma / unit) * unit;
+    terms.scattering[i][c % 2] = std::round(sigma * static_cast<double>(albedo[c]) / unit) * unit;
   }
   return terms;
 }

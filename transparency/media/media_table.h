@@ -13,11 +13,11 @@
 
 namespace strata::transparency {
 
-/// What a medium adds to the sums at a point, red, green and blue: extinction, and extinction times
-/// albedo. All are multiples of one power of two and so small that sums of any of them are exact:
-/// what was added and is subtracted again leaves exactly nothing.
+/// What a medium adds to the sums at a point, red, green, blue and nothing: extinction, and
+/// extinction times albedo. All are multiples of one power of two and so small that sums of any of
+/// them are exact: what was added and is subtracted again leaves exactly nothing.
 struct MediumTerms {
-  std::array<double, 3> extinction{}, scattering{};
+  std::array<Double2, 2> extinction{}, scattering{};
 };
 
 /// The media of a scene.
@@ -43,39 +43,37 @@ class MediaSums {
  public:
   void add(const MediumTerms& terms) {
     ++media_;
-    for (std::size_t i = 0; i < 3; ++i) {
-      extinction_[i] += terms.extinction[i];
-      scattering_[i] += terms.scattering[i];
+    for (std::size_t i = 0; i < 2; ++i) {
+      sums_.extinction[i] += terms.extinction[i];
+      sums_.scattering[i] += terms.scattering[i];
     }
   }
   void remove(const MediumTerms& terms) {
     --media_;
-    for (std::size_t i = 0; i < 3; ++i) {
-      extinction_[i] -= terms.extinction[i];
-      scattering_[i] -= terms.scattering[i];
+    for (std::size_t i = 0; i < 2; ++i) {
+      sums_.extinction[i] -= terms.extinction[i];
+      sums_.scattering[i] -= terms.scattering[i];
     }
   }
   [[nodiscard]] int media() const { return media_; }
   /// All sums are exactly 0.
   [[nodiscard]] bool vacuum() const {
-    return media_ == 0 && extinction_ == std::array<double, 3>{} &&
-           scattering_ == std::array<double, 3>{};
+    bool none = media_ == 0;
+    for (int c = 0; c < 3; ++c) {
+      const auto i = static_cast<std::size_t>(c / 2);
+      none = none && sums_.extinction[i][c % 2] == 0.0 && sums_.scattering[i][c % 2] == 0.0;
+    }
+    return none;
   }
-  [[nodiscard]] Float4 extinction() const {
-    return Float4{static_cast<float>(extinction_[0]), static_cast<float>(extinction_[1]),
-                  static_cast<float>(extinction_[2]), 0.0f};
-  }
+  [[nodiscard]] Float4 extinction() const { return joined(sums_.extinction); }
   /// Q / S, the albedo of the media together; 0 without extinction.
   [[nodiscard]] Float4 albedo() const {
-    const Float4 s = extinction();
-    const Float4 q{static_cast<float>(scattering_[0]), static_cast<float>(scattering_[1]),
-                   static_cast<float>(scattering_[2]), 0.0f};
-    const Float4 none = splat(0.0f);
-    return s > none ? q / s : none;
+    const Float4 s = extinction(), none = splat(0.0f);
+    return s > none ? joined(sums_.scattering) / s : none;
   }
 
  private:
-  std::array<double, 3> extinction_{}, scattering_{};
+  MediumTerms sums_;
   int media_ = 0;
 };
 
