@@ -6,6 +6,11 @@
 //     auto frame = strata::transparency::Frame::make(scene, view);
 //     auto technique = strata::transparency::parse_technique("count-scan");
 //     auto rendering = frame->render(*technique->technique, technique->settings);
+//
+// Solids filled with media, particles, coloured shadows:
+//
+//     auto settings = strata::transparency::read_media("fog.json");
+//     auto picture = strata::transparency::render_media(scene, view, *settings);
 
 #include "strata/raster/view.h"
 #include "strata/transparency/media/fxaa.h"

@@ -3,11 +3,10 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <string_view>
 #include <system_error>
-
-#include "core/printable.h"
 
 namespace strata::transparency {
 namespace {
@@ -68,8 +67,9 @@ Result<Line> parse_line(const std::string& path, std::size_t number, std::string
     double& value = line.values[line.count];
     if (!parse(cell, value)) {
       if (number == 1 && !line.numbers) return line;
-      return fail(ErrorCode::kInput, "{}:{}: the {} must be a number, got '{}'", path, number,
-                  kColumns[line.count], printable(trimmed(cell), 60));
+      // The file may be of another kind: its text is not shown.
+      return fail(ErrorCode::kInput, "{}:{}: the {} must be a number", path, number,
+                  kColumns[line.count]);
     }
     line.numbers = true;
     const std::string_view fault = fault_of(line.count, value);
@@ -88,6 +88,10 @@ Result<Line> parse_line(const std::string& path, std::size_t number, std::string
 
 Result<void> read_particles(const std::string& path, const Particle& common,
                             std::vector<Particle>& particles) {
+  std::error_code failure;
+  if (std::filesystem::exists(path, failure) && !std::filesystem::is_regular_file(path, failure)) {
+    return fail(ErrorCode::kInput, "{}: particles are read from regular files", path);
+  }
   std::ifstream in(path, std::ios::binary);
   if (!in) return fail(ErrorCode::kInput, "{}: the file cannot be opened", path);
   std::string text;
