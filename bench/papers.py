@@ -10,6 +10,7 @@ each technique) go to build/bench/papers; --update-docs puts the tables and both
 import argparse
 import csv
 import json
+import math
 import os
 import re
 import subprocess
@@ -42,26 +43,49 @@ def markdown(rows):
     return "\n".join(lines) + "\n"
 
 
-def scene(path, turns=9):
-    """Rings through each other, see-through, with an opaque bar: every class of mistake shows."""
+def scene(path, rings=6, sides=40):
+    """An OBJ file: see-through rings through each other around an opaque bar, so that every class of mistake shows."""
+    points, lines, materials = [], [], []
+
+    def rotated(p, a, b):
+        x, y, z = p
+        y, z = y * math.cos(a) - z * math.sin(a), y * math.sin(a) + z * math.cos(a)
+        return (x * math.cos(b) + z * math.sin(b), y, z * math.cos(b) - x * math.sin(b))
+
+    for i in range(rings):
+        hue = i / (rings - 1)
+        materials.append(f"newmtl ring{i}\nKd {hue:.2f} {1 - hue:.2f} {0.3 + 0.5 * (i % 2):.2f}\nd 0.4\n")
+        lines.append(f"usemtl ring{i}")
+        first = len(points) + 1
+        for k in range(sides):
+            turn = 2 * math.pi * k / sides
+            for radius, z in ((10, -1.5), (10, 1.5), (8, 1.5), (8, -1.5)):
+                points.append(rotated((radius * math.cos(turn), radius * math.sin(turn), z), i * 0.65, i * 0.93))
+        for k in range(sides):
+            at, after = first + 4 * k, first + 4 * ((k + 1) % sides)
+            for j in range(4):
+                lines.append(f"f {at + j} {after + j} {after + (j + 1) % 4} {at + (j + 1) % 4}")
+    materials.append("newmtl bar\nKd 0.25 0.25 0.3\nd 1\n")
+    lines.append("usemtl bar")
+    first = len(points) + 1
+    points += [rotated((x, y, z), 0.4, 1.1) for x in (-2, 2) for y in (-2, 2) for z in (-14, 14)]
+    for face in ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)):
+        lines.append("f " + " ".join(str(first + corner) for corner in face))
+    name = os.path.basename(path)[:-4]
     with open(path, "w") as file:
-        for i in range(turns):
-            hue = i / turns
-            file.write(f"color([{hue:.2f}, {1 - hue:.2f}, {0.3 + 0.5 * (i % 2):.2f}, 0.45]) rotate([{i * 37}, {i * 53}, 0]) "
-                       f"difference() {{ cylinder(h = 6, r = 10, center = true, $fn = 48); "
-                       f"cylinder(h = 7, r = 7, center = true, $fn = 48); }}\n")
-        file.write("color([0.2, 0.2, 0.25]) rotate([20, 70, 0]) cube([4, 4, 30], center = true);\n")
+        file.write(f"mtllib {name}.mtl\n" + "".join("v %.6f %.6f %.6f\n" % p for p in points) + "\n".join(lines) + "\n")
+    with open(path[:-4] + ".mtl", "w") as file:
+        file.write("".join(materials))
 
 
 def techniques(tool, quick):
     """Rows of the table of techniques, and the pictures."""
     pictures = os.path.join(OUT, "pictures")
     os.makedirs(pictures, exist_ok=True)
-    source, compiled = os.path.join(OUT, "rings.scad"), os.path.join(OUT, "rings.csg")
+    source = os.path.join(OUT, "rings.obj")
     scene(source)
-    run("openscad", "-o", compiled, source)
     side = "200,200" if quick else "320,320"
-    report = json.loads(run(tool, "oit", compiled, "--technique", "all", "--size", side, "--json",
+    report = json.loads(run(tool, "oit", source, "--technique", "all", "--size", side, "--json",
                             "-o", os.path.join(pictures, "oit.png")))
     rows = []
     for entry in report["techniques"]:
@@ -95,11 +119,13 @@ def montage(rows, path):
     for axis in axes.flat:
         axis.axis("off")
     for axis, (entry, picture) in zip(axes.flat, shown):
-        axis.imshow(plt.imread(picture))
+        pixels = plt.imread(picture)
+        margin = pixels.shape[0] // 6
+        axis.imshow(pixels[margin:-margin, margin:-margin])
         psnr = entry["difference"]["psnr"]
         axis.set_title(entry["name"] + ("" if psnr is None else f"  {psnr:.0f} dB"), fontsize=8)
     figure.tight_layout(pad=0.4)
-    figure.savefig(path, dpi=100)
+    figure.savefig(path, dpi=72)
 
 
 def plots(path):
