@@ -4,7 +4,7 @@
 #include <array>
 #include <atomic>
 #include <cmath>
-#include <glm/exponential.hpp>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/trigonometric.hpp>
 #include <new>
@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "transparency/media/float4.h"
 #include "transparency/media/media_tile.h"
 #include "transparency/media/shadow_functions.h"
 #include "transparency/stream/mesh_source.h"
@@ -125,7 +126,7 @@ glm::vec3 ShadowFace::through(std::span<const ShadowEntry> list, double limit) {
                         (static_cast<double>(next->at) - static_cast<double>(before.at));
     depth += (next->depth - before.depth) * static_cast<float>(std::clamp(part, 0.0, 1.0));
   }
-  return before.surfaces * glm::exp(-depth);
+  return before.surfaces * to_vec3(exp_minus(from(depth)));
 }
 
 /// What depth is linear in, where a ray of the light meets a plane through `point`: the distance
