@@ -1,12 +1,12 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <utility>
 
 // Visibility functions in a fixed number of words: T(z), the share of light that passes all
 // occluders strictly in front of depth z. Occluders are added in any order.
@@ -222,22 +222,17 @@ class AdaptiveNodes {
       }
       return added;
     }
-    const Word node{depth, through * (place == 0 ? 1.0f : pixel[place - 1].transmittance)};
-    std::array<Word, kMostNodes + 1> all;
-    std::copy_n(pixel, place, all.begin());
-    all[place] = node;
-    unsigned count = place + 1;
-    for (unsigned i = place; i < nodes_ && pixel[i].depth < kUnused; ++i) {
-      all[count++] = {pixel[i].depth, pixel[i].transmittance * through};
+    Word last{depth, through * (place == 0 ? 1.0f : pixel[place - 1].transmittance)};
+    for (unsigned i = place; i < nodes_; ++i) {
+      std::swap(pixel[i], last);
+      if (last.depth == kUnused) {
+        end(pixel, i + 1);
+        added.merged = false;
+        return added;
+      }
+      last.transmittance *= through;
     }
-    if (count > nodes_) {
-      remove_least(all, count);
-      --count;
-    } else {
-      added.merged = false;
-    }
-    std::copy_n(all.begin(), count, pixel);
-    end(pixel, count);
+    remove_least(pixel, last);
     return added;
   }
   void finish(Word*) const {}
@@ -259,18 +254,25 @@ class AdaptiveNodes {
   void end(Word* pixel, unsigned count) const {
     if (count < nodes_) pixel[count].depth = kUnused;
   }
-  static void remove_least(std::array<Word, kMostNodes + 1>& all, unsigned count) {
-    unsigned least = 1;
-    float least_area = kUnused;
-    for (unsigned i = 1; i < count; ++i) {
-      const float area =
-          (all[i].depth - all[i - 1].depth) * (all[i - 1].transmittance - all[i].transmittance);
-      if (!(area < least_area)) continue;
-      least_area = area;
+  /// Makes room for a last node behind all that are full.
+  void remove_least(Word* pixel, const Word& last) const {
+    unsigned least = nodes_;
+    float least_area = area(pixel[nodes_ - 1], last);
+    for (unsigned i = nodes_ - 1; i > 0; --i) {
+      const float here = area(pixel[i - 1], pixel[i]);
+      if (here > least_area) continue;  // of equal ones the nearest goes
+      least_area = here;
       least = i;
     }
-    all[least - 1].transmittance = all[least].transmittance;
-    std::copy(all.begin() + least + 1, all.begin() + count, all.begin() + least);
+    pixel[least - 1].transmittance =
+        least == nodes_ ? last.transmittance : pixel[least].transmittance;
+    if (least == nodes_) return;
+    std::copy(pixel + least + 1, pixel + nodes_, pixel + least);
+    pixel[nodes_ - 1] = last;
+  }
+  /// Under T, that goes if the second of two neighbours is left out.
+  static float area(const Word& node, const Word& next) {
+    return (next.depth - node.depth) * (node.transmittance - next.transmittance);
   }
 
   unsigned nodes_;
