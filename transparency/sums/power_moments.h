@@ -38,13 +38,13 @@ template <std::size_t kSize>
 // The roots of polynomials whose roots are all real. A leading coefficient of next to 0 gives roots
 // that are far out or not finite.
 
-inline std::array<double, 2> real_roots(const std::array<double, 3>& c) {
+inline std::array<double, 2> real_roots(const std::array<double, 3>& c, double = 0.0) {
   const double root = std::sqrt(std::max(0.0, c[1] * c[1] - 4.0 * c[0] * c[2]));
   const double q = -0.5 * (c[1] + std::copysign(root, c[1]));
   return {q / c[2], c[0] / q};
 }
 
-inline std::array<double, 3> real_roots(const std::array<double, 4>& c) {
+inline std::array<double, 3> real_roots(const std::array<double, 4>& c, double = 0.0) {
   const double a = c[2] / c[3] / 3.0, b = c[1] / c[3], d = c[0] / c[3];
   const double q = a * a - b / 3.0;
   if (!(std::abs(a) < 1e7 && q > 0.0)) {
@@ -80,7 +80,8 @@ inline double root_between(const std::array<double, 5>& c, const std::array<doub
   return x;
 }
 
-inline std::array<double, 4> real_roots(const std::array<double, 5>& c) {
+/// @param end  roots from here on are not needed
+inline std::array<double, 4> real_roots(const std::array<double, 5>& c, double end) {
   const std::array<double, 4> slope = derivative(c);
   std::array<double, 3> turns = real_roots(slope);
   // All roots lie within this radius of their mean (P. Samuelson's inequality); Newton's steps from
@@ -94,13 +95,14 @@ inline std::array<double, 4> real_roots(const std::array<double, 5>& c) {
                              within(turns[2]), within(mean + radius + 1e-9)};
   std::sort(ends.begin(), ends.end());
   std::array<double, 4> roots;
+  roots.fill(2.0 * kFarthestRoot);
   double before = polynomial(c, ends[0]);
-  for (std::size_t i = 0; i < 4; ++i) {
+  for (std::size_t i = 0; i < 4 && ends[i] < end; ++i) {
     const double here = polynomial(c, ends[i + 1]);
     const double start = i == 0 ? ends[0] : i == 3 ? ends[4] : 0.5 * (ends[i] + ends[i + 1]);
-    roots[i] = (before < 0.0) == (here < 0.0)
-                   ? 2.0 * kFarthestRoot
-                   : root_between(c, slope, ends[i], ends[i + 1], before < 0.0, start);
+    if ((before < 0.0) != (here < 0.0)) {
+      roots[i] = root_between(c, slope, ends[i], ends[i + 1], before < 0.0, start);
+    }
     before = here;
   }
   return roots;
@@ -169,7 +171,7 @@ class PowerMoments {
     for (std::size_t i = kHalf; i-- > 0;) {
       for (std::size_t k = i + 1; k <= kHalf; ++k) y[i] -= low_[k][i] * y[k];
     }
-    for (const double root : detail::real_roots(y)) {
+    for (const double root : detail::real_roots(y, depth)) {
       if (root > -detail::kFarthestRoot && root < depth) shares.least += mass(forward(root));
     }
     return shares;
