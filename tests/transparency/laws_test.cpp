@@ -32,6 +32,10 @@ std::vector<ListedFrame> frames() {
   all.push_back(deep_frame(590, 8));
   all.push_back(random_frame("Background", {66, 20}, 3.0, 1 << 24, 9));
   all.back().options.background = glm::vec4(0.2f, 0.4f, 0.9f, 0.75f);
+  all.push_back(random_frame("EndsOfDepth", {33, 20}, 4.0, 4, 11));
+  for (ListedFragment& f : all.back().fragments) {
+    if (f.depth >= 2) f.depth += (1u << 24) - 4;
+  }
   ListedFrame twice = random_frame("Duplicates", {33, 17}, 3.0, 64, 10);
   const auto once = twice.fragments;
   twice.fragments.insert(twice.fragments.end(), once.begin(), once.end());
@@ -72,6 +76,26 @@ TEST_P(Techniques, GiveTheSameBitsForAnyNumberOfThreads) {
   const Image one = render(frame, technique(), {}, 1).image;
   for (const int threads : {2, 4}) {
     EXPECT_TRUE(same_bits(render(frame, technique(), {}, threads).image, one.pixels)) << threads;
+  }
+}
+
+TEST_P(Techniques, GiveFiniteColoursWhateverTheFragments) {
+  // The weight of its background may be negative.
+  const float least = technique().name == "weighted-sum" ? -100.0f : -1e-4f;
+  for (const ListedFrame& listed : frames()) {
+    const auto frame = Frame::make(listed.fragments, listed.colours, listed.options);
+    ASSERT_TRUE(frame);
+    const auto rendering = frame->render(technique());
+    if (!rendering) {  // more fragments than it can hold
+      EXPECT_EQ(rendering.error().code, ErrorCode::kLimit) << listed.name;
+      continue;
+    }
+    for (const glm::vec4& pixel : rendering->image.pixels) {
+      for (int c = 0; c < 4; ++c) {
+        ASSERT_GE(pixel[c], least) << listed.name;
+        ASSERT_LT(pixel[c], 100.0f) << listed.name;
+      }
+    }
   }
 }
 

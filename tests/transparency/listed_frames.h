@@ -76,7 +76,8 @@ inline std::vector<glm::vec4> oracle_picture(const ListedFrame& frame, Blending 
   const glm::vec4 b = frame.options.background;
   const glm::vec4 background(b.r * b.a, b.g * b.a, b.b * b.a, b.a);
   std::vector<glm::vec4> image(static_cast<std::size_t>(size.x * size.y), background);
-  for (auto& [place, layers] : pixels) {
+  for (auto& [place, of_place] : pixels) {
+    std::vector<Layer>& layers = of_place;  // clang 14 captures no binding
     std::sort(layers.begin(), layers.end());
     const auto at = [&](std::size_t i) {
       const glm::vec4 c = frame.colours[std::get<2>(layers[i])];

@@ -94,7 +94,7 @@ TEST(Stochastic, PixelsAreIndependent) {
   const ListedFrame frame = layers({{1, 1, 1, 0.3f}}, {5}, {200, 150});
   const auto values = channel(render(frame, "stochastic:8").image, 3);
   const Statistics s = statistics(values);
-  for (const std::size_t step : {1, 2, 64, 200, 201}) {
+  for (const std::size_t step : {1u, 2u, 64u, 200u, 201u}) {
     double sum = 0.0;
     for (std::size_t i = 0; i + step < values.size(); ++i) {
       sum += (values[i] - s.mean) * (values[i + step] - s.mean);
