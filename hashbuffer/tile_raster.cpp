@@ -218,13 +218,17 @@ class TableSink {
 template <class Record>
 class LogSink {
  public:
-  LogSink(TileLog<Record>& log, const PixelRect& clip) : log_(&log), clip_(clip) {}
+  LogSink(TileLog<Record>& log, const PixelRect& clip)
+      : log_(&log), count_(log.count), clip_(clip) {}
   HWY_INLINE void begin(bool exit, std::uint32_t triangle, const PixelRect& box) {
     exit_ = exit;
     triangle_ = triangle;
     result_.add_rows(box.v0 - clip_.v0, box.v1 - clip_.v0);
+    log_->count = count_;
     log_->reserve(static_cast<std::size_t>(box.u1 - box.u0) *
                   static_cast<std::size_t>(box.v1 - box.v0));
+    pixels_ = log_->pixels.data();
+    keys_ = log_->keys.data();
   }
   template <class D, class V = hn::Vec<D>>
   HWY_INLINE V encode(D d, V depth, hn::Mask<D> covered) const {
@@ -235,12 +239,12 @@ class LogSink {
     for (int row = 0; row < rows; ++row) put_row<columns>(u, v + row, words + row * columns);
   }
   HWY_INLINE void put_one(int u, int v, std::uint32_t depth) {
-    log_->pixels[log_->count] =
-        static_cast<std::uint32_t>((v - clip_.v0) * kTileSide + (u - clip_.u0));
-    log_->keys[log_->count++] = make_key<Record>(depth, exit_, triangle_);
+    pixels_[count_] = static_cast<std::uint32_t>((v - clip_.v0) * kTileSide + (u - clip_.u0));
+    keys_[count_++] = make_key<Record>(depth, exit_, triangle_);
   }
   TileRasterResult finish() {
-    result_.fragments = log_->count;
+    log_->count = count_;
+    result_.fragments = count_;
     return result_;
   }
 
@@ -252,23 +256,38 @@ class LogSink {
     for (std::size_t i = 0; i < columns; i += hn::Lanes(d)) {
       const auto lifted = hn::Load(d, words + i);
       const auto covered = hn::Ne(lifted, hn::Zero(d));
-      hn::CompressStore(hn::Iota(d, pixel + static_cast<std::uint32_t>(i)), covered, d,
-                        log_->pixels.data() + log_->count);
-      const auto depth = hn::Sub(lifted, hn::Set(d, 1u));
+      const std::size_t found = hn::CountTrue(d, covered);
+      // Whole vectors are stored: to store a compressed part takes some processors 100 cycles.
+      const auto pixels = hn::Iota(d, pixel + static_cast<std::uint32_t>(i));
+      hn::StoreU(hn::Compress(pixels, covered), d, pixels_ + count_);
+      const auto depth = hn::Compress(hn::Sub(lifted, hn::Set(d, 1u)), covered);
       if constexpr (Record::kPayloadBits == 0) {
         const auto key = hn::Or(hn::ShiftLeft<1>(depth), hn::Set(d, exit_ ? 1u : 0u));
-        log_->count += hn::CompressStore(key, covered, d, log_->keys.data() + log_->count);
+        hn::StoreU(key, d, keys_ + count_);
       } else {
-        alignas(64) std::uint32_t depths[HWY_MAX_BYTES / 4];
-        const std::size_t found = hn::CompressStore(depth, covered, d, depths);
-        for (std::size_t k = 0; k < found; ++k) {
-          log_->keys[log_->count++] = make_key<Record>(depths[k], exit_, triangle_);
-        }
+        put_items(d, depth, found);
       }
+      count_ += found;
+    }
+  }
+  /// The keys of the first `found` depths; beyond them something.
+  template <class D>
+  HWY_INLINE void put_items(D d, hn::Vec<D> depth, std::size_t found) {
+    alignas(64) std::uint32_t depths[2 * HWY_MAX_BYTES / 4];
+    hn::Store(depth, d, depths);
+    const hn::CappedTag<std::uint64_t, HWY_MAX_BYTES / 8> d64;
+    const hn::Rebind<std::uint32_t, decltype(d64)> d32;
+    const auto surface = hn::Set(d64, DepthItem(0, exit_, triangle_).bits);
+    for (std::size_t k = 0; k < found; k += hn::Lanes(d64)) {
+      const auto high = hn::ShiftLeft<32>(hn::PromoteTo(d64, hn::LoadU(d32, depths + k)));
+      hn::StoreU(hn::Or(high, surface), d64, &keys_[count_ + k].bits);
     }
   }
 
   TileLog<Record>* log_;
+  std::size_t count_;
+  std::uint32_t* pixels_ = nullptr;
+  TileKey<Record>* keys_ = nullptr;
   TileRasterResult result_;
   PixelRect clip_;
   std::uint32_t triangle_ = 0;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <cstring>
 #include <span>
 #include <vector>
 
@@ -17,22 +16,20 @@ namespace strata::transparency {
 class FrontToBack4 {
  public:
   void add(const glm::vec4& fragment) {
-    Lanes c;
-    std::memcpy(&c, &fragment, sizeof c);
-    const float seen = transmittance_;
-    colour_ += Lanes{seen, seen, seen, seen} * c;
-    transmittance_ = seen * (1.0f - c[3]);
+    const Lanes c = reinterpret_cast<const Unaligned&>(fragment);
+    colour_ += transmittance_ * c;
+    transmittance_ *= 1.0f - __builtin_shufflevector(c, c, 3, 3, 3, 3);
   }
   void write(glm::vec4& pixel) const {
-    Lanes c = colour_;
-    c[3] = transmittance_;
-    std::memcpy(&pixel, &c, sizeof c);
+    reinterpret_cast<Unaligned&>(pixel) = __builtin_shufflevector(
+        colour_, __builtin_shufflevector(colour_, transmittance_, 2, 2, 7, 7), 0, 1, 4, 6);
   }
 
  private:
   using Lanes = float __attribute__((vector_size(16)));
+  using Unaligned = float __attribute__((vector_size(16), aligned(4), may_alias));
   Lanes colour_{};
-  float transmittance_ = 1.0f;
+  Lanes transmittance_{1.0f, 1.0f, 1.0f, 1.0f};
 };
 
 /// Sorts and blends a list. @return comparisons
