@@ -95,13 +95,13 @@ def main():
         wall, cpu, picture = milliseconds(window)
         width, height = mesh['size']
         own = mesh['picture'].reshape(height, width, 4)[:, :, :3]
-        by = numpy.abs(picture / 255.0 - own).max(axis=2)
+        by = numpy.abs(picture.astype(int) - numpy.rint(own * 255).astype(int)).max(axis=2)
         covered = own.max(axis=2) > 0
-        near = (by <= 1.001 / 255)[covered].mean() * 100
-        print(f'{path}: {len(mesh["triangles"])} triangles, {wall:.0f} ms, {cpu:.0f} ms of CPU time by {window.GetClassName()}, '
-              f'dual depth peeling {renderer.GetLastRenderingUsedDepthPeeling()}; '
-              f'{near:.3f} % of the covered pixels within 1/255, largest difference {by.max() * 255:.1f}/255, '
-              f'mean {by[covered].mean() * 255:.3f}/255', flush=True)
+        same = (picture.max(axis=2) > 0) == covered
+        within = [f'{(by <= step)[covered].mean() * 100:.3f} % within {step}/255' for step in (1, 2, 3)]
+        print(f'{path}: {len(mesh["triangles"])} triangles, {wall:.0f} ms, {cpu:.0f} ms of CPU time, '
+              f'dual depth peeling {renderer.GetLastRenderingUsedDepthPeeling()}; covered pixels: '
+              f'{", ".join(within)}, {(~same).sum()} only in one picture', flush=True)
         window.Finalize()
 
 

@@ -247,6 +247,7 @@ TEST(Hash64, GrowsAndShrinksOnceAndThenStays) {
     EXPECT_LT(load, 0.8) << layers;
     EXPECT_TRUE(cells == 4096 || load >= 0.3) << layers;
     EXPECT_GE(cells, 4096u);
+    EXPECT_EQ(costs.kept, frame.fragments.size());  // counted while the table is cleared
     // A frame that does not fit, and one whose table is then right.
     EXPECT_EQ(costs.geometry_passes, layers < 0.8 ? 1u : 2u) << layers;
     EXPECT_TRUE(same_bits(render(frame, "ha64-grown").image,
@@ -458,6 +459,31 @@ TEST(CoverageMasks, ShadeAndKeepATriangleOnceAPixel) {
       EXPECT_EQ(rendering.costs.geometry_passes, 1u);
       EXPECT_EQ(rendering.costs.shaded, 3u * 16u * 16u);
       expect_bytes(rendering, 24 * 3 * 16 * 16 + 4 * 16 * 16, "a-buffer-masks");
+    }
+  }
+}
+
+// Nearest and farthest depths, equal ones and neighbours, entering and leaving, in one list.
+TEST(Lists, KeepTheOrderAtBothEndsOfTheDepths) {
+  ListedFrame frame;
+  frame.options.size = {3, 2};
+  std::mt19937 random(5);
+  constexpr std::uint32_t kFarthest = (1u << 24) - 1;
+  for (const std::uint32_t depth : {0u, 1u, 1u << 23, (1u << 23) + 1, kFarthest - 1, kFarthest}) {
+    for (const bool exit : {false, true}) {
+      for (int copy = 0; copy < 2; ++copy) {
+        const auto face = static_cast<std::uint32_t>(frame.colours.size());
+        frame.colours.emplace_back(0.03f * static_cast<float>(face), 0.5f, 0.2f, 0.3f);
+        frame.fragments.push_back({1, 1, depth, face, exit});
+      }
+    }
+  }
+  for (int i = 0; i < 3; ++i) {
+    std::shuffle(frame.fragments.begin(), frame.fragments.end(), random);
+    for (const Technique* of : techniques()) {
+      if (of->accuracy != Accuracy::kExact || of->needs_triangles) continue;
+      EXPECT_TRUE(same_bits(render(frame, *of).image, oracle_picture(frame, of->blending)))
+          << of->name;
     }
   }
 }

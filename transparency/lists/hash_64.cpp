@@ -77,10 +77,7 @@ class HashRenderer {
   /// Builds the table and, if all is well, blends. @return whether the tile is done
   template <class Record>
   bool attempt(TileHash<Record>& table, TileStream& stream, TileImage& image, std::uint64_t cells) {
-    const auto& rect = stream.rect();
-    const std::uint64_t tile =
-        static_cast<std::uint64_t>(rect.v0) << 32 | static_cast<std::uint64_t>(rect.u0);
-    table.begin(stream, cells, kind_, settings_.seed ^ tile * 0x9e3779b97f4a7c15u);
+    table.begin(stream, cells, kind_, settings_.seed);
     Costs& costs = stream.costs();
     std::uint64_t swaps = 0;
     table.template insert_all<Concurrency>(stream, [&] { ++swaps; });

@@ -30,11 +30,14 @@ class TileHash {
     }
     table_.size = cells;
     const std::uint64_t pixels = stream.pixel_count();
-    const auto offsets = make_offsets(
-        kind,
-        {.pixels = pixels, .cells = cells, .width = width_, .ages = Record::kAgeMax, .seed = seed});
-    table_.offsets.assign(offsets.begin(), offsets.end());
-    table_.age_limit = static_cast<unsigned>(offsets.size()) - 1;
+    if (kind == OffsetKind::kFarthestPoint) {
+      table_.offsets = farthest_points(pixels, cells, seed);
+    } else {
+      const std::uint64_t tile = static_cast<std::uint64_t>(stream.rect().v0) << 32 |
+                                 static_cast<std::uint64_t>(stream.rect().u0);
+      table_.offsets = offsets_of(kind, pixels, cells, seed ^ tile * 0x9e3779b97f4a7c15u);
+    }
+    table_.age_limit = static_cast<unsigned>(table_.offsets.size()) - 1;
     table_.planes = 0;
     if (kind == OffsetKind::kPlaneFirst && pixels == kTilePixels) {
       table_.planes = static_cast<int>(std::min<std::uint64_t>(cells / pixels, table_.age_limit));
@@ -135,6 +138,29 @@ class TileHash {
 
   static constexpr std::uint64_t kOne = 1 << 20;  ///< fixed point for divisions of pixels
 
+  [[nodiscard]] std::vector<std::uint32_t> offsets_of(OffsetKind kind, std::uint64_t pixels,
+                                                      std::uint64_t cells,
+                                                      std::uint64_t seed) const {
+    const auto offsets = make_offsets(
+        kind,
+        {.pixels = pixels, .cells = cells, .width = width_, .ages = Record::kAgeMax, .seed = seed});
+    return {offsets.begin(), offsets.end()};
+  }
+  /// They take long to make: those of a somewhat smaller table serve, too.
+  const std::vector<std::uint32_t>& farthest_points(std::uint64_t pixels, std::uint64_t cells,
+                                                    std::uint64_t seed) {
+    const std::uint64_t step = std::max<std::uint64_t>(1, pixels / 2);
+    cells = std::max(pixels, cells / step * step);
+    for (const Points& points : points_) {
+      if (points.pixels == pixels && points.cells == cells && points.width == width_) {
+        return points.offsets;
+      }
+    }
+    points_.push_back(
+        {pixels, cells, width_, offsets_of(OffsetKind::kFarthestPoint, pixels, cells, seed)});
+    return points_.back().offsets;
+  }
+
   /// Pixels are numbered without gaps.
   [[nodiscard]] std::uint32_t key(std::uint32_t pixel) const {
     return pixel - pixel / kTileSide * (kTileSide - width_);
@@ -144,7 +170,14 @@ class TileHash {
     return v / 8 * (kTileSide / 8) + (at - v * width_) / 8;
   }
 
+  struct Points {
+    std::uint64_t pixels = 0, cells = 0;
+    std::uint32_t width = 0;
+    std::vector<std::uint32_t> offsets;
+  };
+
   TileTable<Record> table_;
+  std::vector<Points> points_;
   std::array<std::uint16_t, kTilePixels / 64> max_ages_{};
   std::uint32_t width_ = 0, height_ = 0;
   std::uint64_t inverse_width_ = 0;

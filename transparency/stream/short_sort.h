@@ -101,6 +101,20 @@ inline std::uint64_t visit_by_network(const DepthItem* items, Visit&& visit) {
 
 }  // namespace detail
 
+namespace detail {
+
+/// Sorts eight fragments in place. @return comparisons
+inline std::uint64_t sort_eight(DepthItem* items) {
+  std::uint64_t a[8];
+  for (int i = 0; i < 8; ++i) a[i] = items[i].bits;
+  SortingNetwork<8>::sort(a);
+  // Volatile, so that no two are joined to a vector: the processor would wait for both halves.
+  for (int i = 0; i < 8; ++i) *const_cast<volatile std::uint64_t*>(&items[i].bits) = a[i];
+  return SortingNetwork<8>::kComparisons;
+}
+
+}  // namespace detail
+
 /// Sorts a list in place, front to back; by insertion if it is not too long. @return comparisons
 inline std::uint64_t sort_items(DepthItem* begin, DepthItem* end) {
   constexpr std::ptrdiff_t kInsertionSortLimit = 32;
@@ -112,7 +126,12 @@ inline std::uint64_t sort_items(DepthItem* begin, DepthItem* end) {
     });
     return comparisons;
   }
-  for (DepthItem* next = begin; next != end; ++next) {
+  DepthItem* next = begin;
+  if (end - begin > 8) {
+    comparisons = detail::sort_eight(begin);
+    next += 8;
+  }
+  for (; next != end; ++next) {
     const DepthItem item = *next;
     DepthItem* place = next;
     for (; place != begin && item < place[-1]; --place) *place = place[-1];
