@@ -11,6 +11,7 @@ option(STRATA_WITH_OPENEXR "Read and write deep .exr files" ON)
 option(STRATA_WITH_OPENMESH "Build the OpenMesh bridge" ON)
 option(STRATA_WITH_GL "Build the OpenGL part: libepoxy, EGL; the window: GLFW, Dear ImGui" ON)
 option(STRATA_JOIN_SOURCES "Compile several sources of a target as one: a whole build in half the time" OFF)
+option(STRATA_EXACT_NO_FILTERS "Take every exact sign from integers; no result may change" OFF)
 set(STRATA_SANITIZE "" CACHE STRING "Sanitizers, as for -fsanitize=")
 
 if(STRATA_BUILD_TESTS OR STRATA_BUILD_BENCH OR STRATA_BUILD_FUZZ)

@@ -1,0 +1,176 @@
+#include "exact/mesh_sums.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <glm/common.hpp>
+
+#include "tests/exact/exact_oracle.h"
+
+namespace strata::exact {
+namespace {
+
+Whole determinant(const FinePoint& a, const FinePoint& b, const FinePoint& c) {
+  const auto w = [](Int128 x) { return whole(x); };
+  return w(a[0]) * (w(b[1]) * w(c[2]) - w(b[2]) * w(c[1])) -
+         w(a[1]) * (w(b[0]) * w(c[2]) - w(b[2]) * w(c[0])) +
+         w(a[2]) * (w(b[0]) * w(c[1]) - w(b[1]) * w(c[0]));
+}
+
+struct Corners {
+  FinePoint a, b, c;
+};
+
+// The box from `low` to `high`, outside out: the six faces of a cube, two triangles each.
+std::vector<Triangle> box(const LatticePoint& low, const LatticePoint& high) {
+  const auto corner = [&](int bits) {
+    return LatticePoint((bits & 1) != 0 ? high.x : low.x, (bits & 2) != 0 ? high.y : low.y,
+                        (bits & 4) != 0 ? high.z : low.z);
+  };
+  std::vector<Triangle> result;
+  for (const auto& [a, b, c, d] : {std::array{0, 2, 3, 1},
+                                   {4, 5, 7, 6},
+                                   {0, 1, 5, 4},
+                                   {2, 6, 7, 3},
+                                   {0, 4, 6, 2},
+                                   {1, 3, 7, 5}}) {
+    result.push_back({corner(a), corner(b), corner(c)});
+    result.push_back({corner(a), corner(c), corner(d)});
+  }
+  return result;
+}
+
+TEST(VolumeSum, OfABoxIsItsVolumeToTheDigit) {
+  Draw random(Input::kRandom29, 71);
+  for (int i = 0; i < 200; ++i) {
+    const LatticePoint p = random.point(), q = random.point();
+    const LatticePoint low = glm::min(p, q), high = glm::max(p, q);
+    VolumeSum lattice, fine;
+    for (const Triangle& t : box(low, high)) {
+      lattice.add(t.a, t.b, t.c);
+      fine.add(fine_point(t.a), fine_point(t.b), fine_point(t.c));
+    }
+    ASSERT_EQ(lattice.six_volumes(), fine.six_volumes());
+    const Whole volume = Whole(high.x - low.x) * (high.y - low.y) * (high.z - low.z);
+    ASSERT_EQ(whole(lattice.six_volumes()), 6 * volume * (Whole(1) << 192));
+    ASSERT_TRUE(is_nearest(lattice.volume(), Fraction(volume)));
+  }
+}
+
+TEST(VolumeSum, IsTheSumOfDeterminantsInAnyOrder) {
+  for (const Input input : kInputs) {
+    Draw random(input, 72);
+    std::vector<Corners> triangles;
+    Whole sum = 0;
+    for (int i = 0; i < 2000; ++i) {
+      const auto fine = [&] {
+        FinePoint p = fine_point(random.point());
+        for (Int128& x : p) {  // towards the middle, so that the cube holds it
+          const Int128 rest = static_cast<Int128>(random.word());
+          x += x > 0 ? -rest : rest;
+        }
+        return p;
+      };
+      triangles.push_back({fine(), fine(), fine()});
+      sum += determinant(triangles.back().a, triangles.back().b, triangles.back().c);
+    }
+    VolumeSum forward, backward, half;
+    for (const auto& [a, b, c] : triangles) forward.add(a, b, c);
+    std::ranges::reverse(triangles);
+    for (std::size_t i = 0; i < triangles.size(); ++i) {
+      (i % 2 == 0 ? backward : half).add(triangles[i].a, triangles[i].b, triangles[i].c);
+    }
+    backward.add(half);
+    ASSERT_EQ(whole(forward.six_volumes()), sum);
+    ASSERT_EQ(forward.six_volumes(), backward.six_volumes());
+    ASSERT_TRUE(is_nearest(forward.volume(), Fraction(sum, Whole(6) << 192)));
+  }
+}
+
+// 2^32 of the largest triangles.
+TEST(VolumeSum, HasRoomForTheLargestMesh) {
+  const std::int32_t m = 1 << 28;
+  VolumeSum lattice, fine;
+  const LatticePoint a(m, m, -m), b(-m, m, m), c(m, -m, m);
+  lattice.add(a, b, c);
+  fine.add(fine_point(a), fine_point(b), fine_point(c));
+  for (int i = 0; i < 32; ++i) {
+    lattice.add(VolumeSum(lattice));
+    fine.add(VolumeSum(fine));
+  }
+  const Whole sum = determinant(fine_point(a), fine_point(b), fine_point(c)) * (Whole(1) << 32);
+  EXPECT_EQ(bit_length(fine.six_volumes()), 311);
+  EXPECT_EQ(whole(fine.six_volumes()), sum);
+  EXPECT_EQ(whole(lattice.six_volumes()), sum);
+}
+
+TEST(AreaSum, OfABoxIsItsAreaToTheDigit) {
+  Draw random(Input::kRandom26, 73);
+  for (int i = 0; i < 200; ++i) {
+    const LatticePoint p = random.point(), q = random.point() + LatticePoint(1);
+    const LatticePoint low = glm::min(p, q), high = glm::max(p, q);
+    AreaSum sum;
+    for (const Triangle& t : box(low, high)) {
+      if (t.plane().normal == Normal(0)) continue;
+      sum.add(t.plane(), fine_point(t.a), fine_point(t.b), fine_point(t.c));
+    }
+    const Whole x = high.x - low.x, y = high.y - low.y, z = high.z - low.z;
+    ASSERT_TRUE(is_nearest(sum.area(), Fraction(2 * (x * y + y * z + z * x))));
+  }
+}
+
+TEST(AreaSum, IsWithinItsErrorOfTheExactArea) {
+  for (const Input input : kInputs) {
+    Draw random(input, 74);
+    AreaSum sum, other;
+    Whole twice = 0;  // in 2^-200 square step, too small by less than one a triangle
+    double rough = 0;
+    for (int i = 0; i < 500; ++i) {
+      const Triangle t = random.triangle();
+      // A part of the triangle whose corners are rounded, so that they are not quite in its plane.
+      const auto part = [&](Fraction s, Fraction r) {
+        return Vector(vector_of(t.a) + s * (vector_of(t.b) - vector_of(t.a)) +
+                      r * (vector_of(t.c) - vector_of(t.a)));
+      };
+      const auto rounded = [](const Vector& v) {
+        FinePoint result;
+        for (std::size_t k = 0; k < 3; ++k) {
+          const Whole x = floor_of(v[k] * Fraction(Whole(1) << 64) + Fraction(1, 2));
+          result[k] = static_cast<Int128>(x);
+        }
+        return result;
+      };
+      const Fraction third(1, 3 + random.below(5)), rest(2, 7);
+      const Vector b = part(third, 0), c = part(0, rest);
+      (i % 2 == 0 ? sum : other).add(t.plane(), fine_point(t.a), rounded(b), rounded(c));
+      const Vector n = t.normal();
+      const Fraction square = scalar(n, n) * third * third * rest * rest;
+      twice += sqrt(floor_of(square * Fraction(Whole(1) << 400)));
+      rough += std::sqrt(square.convert_to<double>()) / 2;
+    }
+    sum.add(other);
+    const Fraction error =
+        abs(Fraction(fraction_of(sum.area()) - Fraction(twice, Whole(1) << 201)));
+    EXPECT_LE(error, Fraction(fraction_of(sum.error())));
+    EXPECT_NEAR(sum.area() / rough, 1, 1e-12);
+    EXPECT_LT(sum.error(), 1e-14 * rough);
+  }
+}
+
+TEST(AreaSum, SlopeRatiosAreFlooredRoots) {
+  for (const Input input : kInputs) {
+    Draw random(input, 75);
+    for (int i = 0; i < 3000; ++i) {
+      const Normal n = random.triangle().plane().normal;
+      const Whole x = n.x, y = n.y, z = n.z;
+      const Whole most = std::max({Whole(abs(x)), Whole(abs(y)), Whole(abs(z))});
+      const Whole square = (x * x + y * y + z * z) * (Whole(1) << 124);
+      const Whole ratio = slope_ratio(n);
+      ASSERT_LE(Whole(ratio * ratio * most * most), square);
+      ASSERT_GT(Whole((ratio + 1) * (ratio + 1) * most * most), square);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace strata::exact
