@@ -9,8 +9,9 @@
 // Screen-door transparency (H. Fuchs et al., "Fast spheres, shadows, textures, transparencies, and
 // image enhancements in Pixel-Planes", 1985): a fragment is drawn, opaque, in the share of the
 // pixels that its opacity says. The pattern is the ordered dither matrix of 8 x 8. Each triangle
-// shifts it in each block of 8 x 8 pixels by a random number of its own, else two layers of opacity
-// one half would cover the same half.
+// permutes its ranks in each block of 8 x 8 pixels by a random permutation of its own, else two
+// layers of opacity one half would cover the same half. Shifts alone do not do: two shifted
+// matrices cover a block wholly or by half.
 
 namespace strata::transparency {
 namespace {
@@ -32,10 +33,19 @@ constexpr auto kMatrix = [] {
   return matrix;
 }();
 
+/// A permutation of 0 to 63, chosen by the bits of a key: each step can be undone.
+unsigned permuted(unsigned rank, std::uint64_t key) {
+  for (int round = 0; round < 3; ++round, key >>= 18) {
+    rank = ((rank ^ (key & 63)) * ((key >> 6 & 63) | 1) + (key >> 12 & 63)) & 63;
+    rank ^= rank >> 3;
+  }
+  return rank;
+}
+
 class ScreenDoor {
  public:
   explicit ScreenDoor(const Settings& settings)
-      : seed_(settings.seed), shifted_(settings.variant == "shifted"), nearest_(kTilePixels) {}
+      : seed_(settings.seed), permuted_(settings.variant == "permuted"), nearest_(kTilePixels) {}
 
   void render(TileStream& stream, TileImage& image) {
     for_each_pixel(stream, [&](std::uint32_t pixel) { nearest_[pixel] = TileFragments::kNothing; });
@@ -58,21 +68,18 @@ class ScreenDoor {
 
  private:
   [[nodiscard]] bool covers(TileStream& stream, std::uint32_t pixel, DepthItem item) const {
-    unsigned u = static_cast<unsigned>(stream.rect().u0) + pixel % kTileSide;
-    unsigned v = static_cast<unsigned>(stream.rect().v0) + pixel / kTileSide;
-    if (shifted_) {
-      SeededRandom random{seed_, item.payload(), u / kSide, v / kSide};
-      const std::uint64_t shift = random.next();
-      u += shift & 7;
-      v += shift >> 3 & 7;
+    const unsigned u = static_cast<unsigned>(stream.rect().u0) + pixel % kTileSide;
+    const unsigned v = static_cast<unsigned>(stream.rect().v0) + pixel / kTileSide;
+    unsigned rank = kMatrix[v % kSide * kSide + u % kSide];
+    if (permuted_) {
+      rank = permuted(rank, SeededRandom{seed_, item.payload(), u / kSide, v / kSide}.next());
     }
-    const unsigned rank = kMatrix[v % kSide * kSide + u % kSide];
     return stream.opacity(item) * (kSide * kSide) > static_cast<float>(rank) + 0.5f ||
            stream.opacity(item) >= 1.0f;
   }
 
   std::uint64_t seed_;
-  bool shifted_;
+  bool permuted_;
   std::vector<DepthItem> nearest_;
 };
 
@@ -92,7 +99,7 @@ const Technique kScreenDoor{
     .title = "Screen-door transparency: a pattern of pixels",
     .paper = "Fuchs et al. 1985",
     .accuracy = Accuracy::kRandom,
-    .variants = "shifted same-pattern",
+    .variants = "permuted same-pattern",
     .memory = "8 bytes a pixel",
     .fails =
         "each pixel shows one layer: a pattern of pixels; with the same pattern for all, layers "
