@@ -560,6 +560,38 @@ TEST(Media, InsideOutSolidsHoldTheirMediumToo) {
   EXPECT_EQ(image.pixels, inside_out.pixels);
 }
 
+TEST(Media, AreFoundByNamesAndPatterns) {
+  Scene scene;
+  for (const char* name : {"cube at a.csg:1:5", "cube at a.csg:22:5", "ball.obj", "a*b", ""}) {
+    scene.objects.push_back({name, {}});
+  }
+  const auto chosen = [&](std::vector<std::string> patterns) {
+    MediaSettings all;
+    for (std::size_t i = 0; i < patterns.size(); ++i) {
+      all.media.push_back(medium(patterns[i], glm::vec3(static_cast<float>(i + 1))));
+    }
+    const auto table = make_media_table(scene, all, {});
+    std::string found;
+    if (!table) return table.error().message;
+    for (const std::uint32_t solid : table->medium_of) {
+      found += solid == MediaTable::kNone
+                   ? "-"
+                   : std::to_string(static_cast<int>(table->solids[solid].extinction[0][0]));
+    }
+    return found;
+  };
+  EXPECT_EQ(chosen({"*"}), "11111");
+  EXPECT_EQ(chosen({"cube*"}), "11---");
+  EXPECT_EQ(chosen({"*", "cube*", "*:22:*"}), "23111");
+  EXPECT_EQ(chosen({"cube*", "cube at*:22:*"}), "12---");
+  EXPECT_EQ(chosen({"*ball.obj*", "ball.obj"}), "--2--");
+  EXPECT_EQ(chosen({"a*b", "a***b"}), "---1-");
+  EXPECT_EQ(chosen({""}), "----1");
+  EXPECT_EQ(chosen({"*.ob", "*"}).substr(0, 60),
+            "a medium is for '*.ob', but no object has this name; the obj");
+  EXPECT_NE(chosen({"cube"}).find("'cube at a.csg:1:5', 'cube at a.csg:22:5'"), std::string::npos);
+}
+
 TEST(Media, RefuseWhatIsOutOfRange) {
   const Scene scene = slabs({{0.0, 2.0}});
   const View view = view_from_above(scene, {8, 8});

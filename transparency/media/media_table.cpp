@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/printable.h"
+
 namespace strata::transparency {
 namespace {
 
@@ -98,6 +100,62 @@ MediumTerms terms_of(const glm::vec3& extinction, const glm::vec3& albedo, doubl
   return terms;
 }
 
+/// Whether a name is what a pattern says, in which each `*` stands for any text.
+bool matches(std::string_view pattern, std::string_view name) {
+  std::size_t p = 0, n = 0, star = std::string_view::npos, after = 0;
+  while (n < name.size()) {
+    if (p < pattern.size() && pattern[p] == '*') {
+      star = p++;
+      after = n;
+    } else if (p < pattern.size() && pattern[p] == name[n]) {
+      ++p, ++n;
+    } else if (star != std::string_view::npos) {
+      p = star + 1;
+      n = ++after;
+    } else {
+      return false;
+    }
+  }
+  return pattern.find_first_not_of('*', p) == std::string_view::npos;
+}
+
+/// The names of the first objects, for messages.
+std::string names_of(const Scene& scene) {
+  constexpr std::size_t kShown = 5;
+  std::string names;
+  for (std::size_t i = 0; i < std::min(kShown, scene.objects.size()); ++i) {
+    names += (i == 0 ? "'" : ", '") + printable(scene.objects[i].name, 60) + "'";
+  }
+  if (scene.objects.size() > kShown)
+    names += fmt::format(" and {} more", scene.objects.size() - kShown);
+  return names.empty() ? "none" : names;
+}
+
+/// The medium of each object, or null: the one with its name, else the one with the longest
+/// pattern.
+Result<std::vector<const Medium*>> choose_media(const Scene& scene,
+                                                const std::vector<NamedMedium>& media) {
+  std::vector<const Medium*> chosen(scene.objects.size(), nullptr);
+  std::vector<std::size_t> rank(scene.objects.size(), 0);
+  for (const NamedMedium& named : media) {
+    bool fits = named.object == "*";
+    for (std::size_t o = 0; o < chosen.size(); ++o) {
+      if (!matches(named.object, scene.objects[o].name)) continue;
+      fits = true;
+      const bool same = named.object == scene.objects[o].name;
+      const std::size_t of_this = same ? std::string::npos : named.object.size();
+      if (of_this <= rank[o]) continue;
+      rank[o] = of_this;
+      chosen[o] = &named.medium;
+    }
+    if (fits) continue;
+    return fail(ErrorCode::kUsage,
+                "a medium is for '{}', but no object has this name; the objects are {}",
+                printable(named.object, 60), names_of(scene));
+  }
+  return chosen;
+}
+
 }  // namespace
 
 Result<void> check_media(const MediaSettings& settings) {
@@ -128,22 +186,9 @@ Result<MediaTable> make_media_table(const Scene& scene, const MediaSettings& set
   MediaTable table;
   table.looks = looks_of(scene, options);
   table.medium_of.assign(scene.objects.size(), MediaTable::kNone);
-  std::vector<const Medium*> chosen(scene.objects.size(), nullptr);
-  for (const bool all : {true, false}) {
-    for (const NamedMedium& named : settings.media) {
-      if ((named.object == "*") != all) continue;
-      bool found = false;
-      for (std::size_t o = 0; o < chosen.size(); ++o) {
-        if (!all && scene.objects[o].name != named.object) continue;
-        chosen[o] = &named.medium;
-        found = true;
-      }
-      if (!found && !all) {
-        return fail(ErrorCode::kUsage, "a medium is for '{}', but no object has this name",
-                    named.object);
-      }
-    }
-  }
+  auto found = choose_media(scene, settings.media);
+  if (!found) return tl::unexpected(found.error());
+  const std::vector<const Medium*>& chosen = *found;
   const auto count = static_cast<std::size_t>(
       std::count_if(chosen.begin(), chosen.end(), [](const Medium* m) { return m != nullptr; }));
   const double unit = unit_of(settings, count);

@@ -38,8 +38,10 @@ struct Medium {
 
 /// The medium of some objects.
 struct NamedMedium {
-  std::string object;  ///< name of the objects of the scene; "*": all that are not named
-  Medium medium;       ///< in each of them
+  /// Name of the objects of the scene that it fills; each `*` stands for any text. The name of an
+  /// object itself goes before patterns, a longer pattern before a shorter one.
+  std::string object;
+  Medium medium;  ///< in each of them
 };
 
 /// A ball of a homogeneous medium. Particles may overlap each other and solids.
