@@ -15,6 +15,7 @@
 #include "apps/manual/program_text.h"
 #include "apps/view/view_options.h"
 #include "strata/csg/picture/picture.h"
+#include "strata/transparency/techniques.h"
 #include "strata/voxelize/formats/voxel_writer.h"
 #ifdef STRATA_HAVE_VERIFY
 #include "apps/verify/verify_options.h"
@@ -105,12 +106,15 @@ int manual_main(int argc, char** argv) {
     programs.push_back(page);  // `strata view` runs this program
     programs.back().name = "strata-view";
   }
-  Completion completion{programs, {{"FORMAT", {}}, {"SCHEME", {}}}};
+  Completion completion{programs, {{"FORMAT", {}}, {"SCHEME", {}}, {"TECHNIQUE", {"all"}}}};
   for (const VoxelFormat& format : voxel_formats()) {
     completion.values[0].values.emplace_back(format.name);
   }
   for (const csg::ColourScheme& scheme : csg::colour_schemes()) {
     completion.values[1].values.emplace_back(scheme.name);
+  }
+  for (const transparency::Technique* technique : transparency::techniques()) {
+    completion.values[2].values.emplace_back(technique->name);
   }
   for (const ProgramText& program : programs) {
     if (program.name.find(' ') != std::string::npos) continue;

@@ -52,7 +52,7 @@ tbody tr:last-child > * { border-bottom: 0; }
 tbody tr:nth-child(even) > * { background: var(--band); }
 thead th { background: var(--paper); vertical-align: bottom; border-bottom: 2px solid var(--ink); font-weight: 600; }
 .text { text-align: left; }
-td.long { min-width: 15rem; }
+td.long { min-width: 10.5rem; }
 tbody th { text-align: left; font-weight: 600; white-space: nowrap; background: var(--paper); position: sticky; left: 0; }
 thead th:first-child { position: sticky; left: 0; text-align: left; z-index: 1; }
 a { color: var(--accent); text-decoration-thickness: 1px; text-underline-offset: 2px; }
@@ -78,8 +78,8 @@ th[aria-sort="descending"]::after { content: " \25BC"; font-size: .7em; }
   thead th:first-child { position: static; }
   thead { display: table-header-group; } tr { break-inside: avoid; } h2 { break-after: avoid; }
   .reference { grid-template-columns: 90mm 1fr; }
-  .cards { grid-template-columns: repeat(3, 1fr); gap: 4mm; }
-  .card dl { font-size: 7.5pt; }
+  .cards { grid-template-columns: repeat(4, 1fr); gap: 3mm; }
+  .card { padding: 2mm; } .card p, .card dl, .card figcaption { font-size: 6.5pt; line-height: 1.35; }
   a { color: inherit; text-decoration: none; }
 }
 )";
@@ -164,7 +164,7 @@ std::string grouped(std::uint64_t number) {
 std::string full_name(const OitResult& result) {
   const auto& [technique, settings] = result.choice->chosen;
   std::string name(technique->name);
-  if (!technique->k_means.empty()) name += fmt::format(":{}", settings.k);
+  if (settings.k != 0 && !technique->k_means.empty()) name += fmt::format(":{}", settings.k);
   const std::string_view usual = technique->variants.substr(0, technique->variants.find(' '));
   if (settings.variant != usual) name += ":" + settings.variant;
   return name;
@@ -243,10 +243,12 @@ std::string card(const OitCommand& command, const OitResult& result, std::size_t
   if (result.left_out.empty()) {
     text += fmt::format(
         "<div class=\"pair\"><figure>{}<figcaption>Picture</figcaption></figure>"
-        "<figure>{}<figcaption>Difference, {} dB, at most {:.2g}</figcaption></figure></div>\n",
+        "<figure>{}<figcaption>{}</figcaption></figure></div>\n",
         picture(result.picture, command, name),
-        picture(result.heat, command, "differences of " + name), psnr_text(result),
-        result.difference.largest);
+        picture(result.heat, command, "differences of " + name),
+        result.difference.largest > 0.0 ? fmt::format("Difference, {} dB, at most {:.2g}",
+                                                      psnr_text(result), result.difference.largest)
+                                        : std::string("No difference"));
   } else {
     text += fmt::format("<p>Left out: {}</p>\n", escaped(result.left_out));
   }

@@ -8,6 +8,7 @@
 
 #include "csg/input/tree_fragments.h"
 #include "csg/picture/shade.h"
+#include "csg/surface/surface_tiles.h"
 #include "csg/surface/translucent.h"
 #include "strata/mesh/soup_tools.h"
 
@@ -128,9 +129,9 @@ struct SeenTree {
   SeenTree(Tree all, const std::vector<Ghost>& ghosts, double relative_precision,
            const ColourScheme& colours, const Execution& execution)
       : tree(std::move(all)),
-        preview(tree, ghosts, relative_precision, execution),
         opaque_root(take_translucent(tree, translucent)),
         geometry(tree, execution),
+        opaque(compile(tree, opaque_root)),
         trees(tree, with_ghosts(ghosts), geometry, geometry.world_error(tree, relative_precision)),
         scheme(colours) {}
 
@@ -143,12 +144,18 @@ struct SeenTree {
     const Tree::Node& node = tree.nodes()[opaque_root];
     return node.operation == Operation::kSolid || node.count > 0;
   }
+  [[nodiscard]] Result<View> view(const Camera& camera, const glm::ivec2& size,
+                                  const Execution& execution) const {
+    std::vector<Tree::NodeId> shown{tree.root()};
+    for (const Translucent& part : translucent) shown.push_back(part.node);
+    return view_of_tree(tree, geometry, shown, camera, size, execution);
+  }
 
   Tree tree;
-  Preview preview;
   std::vector<Translucent> translucent;
   Tree::NodeId opaque_root;
   Geometry geometry;
+  Program opaque;
   TranslucentTrees trees;
   ColourScheme scheme;
 };
@@ -205,14 +212,10 @@ struct SeeThrough::Parts {
                   kMaxPictureSide, std::int64_t{view.size.x} * across,
                   std::int64_t{view.size.y} * down);
     }
-    TreeFragmentsInput input{tree->trees, band_of(view, 0, view.size.y, across, down), {}};
-    if (tree->any_opaque()) {
-      const auto drawn = tree->preview.draw(input.view, execution);
-      if (!drawn) return tl::unexpected(drawn.error());
-      input.opaque = **drawn;
-    }
+    const TreeFragmentsInput input{tree->trees, band_of(view, 0, view.size.y, across, down),
+                                   tree->any_opaque() ? &tree->opaque : nullptr};
     const Shader shader(tree->tree, tree->geometry, input.view, tree->scheme);
-    auto source = make_tree_fragments(std::move(input), shader, tree, execution);
+    auto source = make_tree_fragments(input, shader, tree, execution);
     if (!source) return tl::unexpected(source.error());
     return transparency::Frame(std::move(*source), options);
   }
@@ -242,7 +245,7 @@ Result<SeeThrough> SeeThrough::make(Scene scene, const SeeThroughOptions& option
 
 Result<View> SeeThrough::view(const Camera& camera, const glm::ivec2& size,
                               const Execution& execution) const {
-  if (parts_->tree) return parts_->tree->preview.view(camera, size, execution);
+  if (parts_->tree) return parts_->tree->view(camera, size, execution);
   auto view = make_view(camera, size, parts_->box);
   if (!view || !view->cut_short) return view;
   // The eye is among the faces: the nearest one decides where depths begin.

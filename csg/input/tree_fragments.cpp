@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "csg/picture/ghosts.h"
+#include "csg/surface/surface_tiles.h"
 #include "hashbuffer/tile_store.h"
 #include "strata/hashbuffer/depth_list_store.h"
 
@@ -31,7 +32,7 @@ class TreeFragments final : public FragmentSource {
  private:
   class TileWorker;
 
-  [[nodiscard]] bool any_opaque() const { return !input_.opaque.depth.empty(); }
+  [[nodiscard]] bool any_opaque() const { return input_.opaque != nullptr; }
   /// The numbers that triangles have as fragments: those of the slots, then those of opaque solids.
   Result<void> number_triangles();
   void colour_slots(const Shader& shader, const Execution& execution);
@@ -43,6 +44,7 @@ class TreeFragments final : public FragmentSource {
   TreeFragmentsInput input_;
   std::shared_ptr<const void> owner_;
   TranslucentView seen_;
+  SurfaceTiles opaque_;  ///< if there is any
   std::vector<std::uint32_t> slot_firsts_, solid_firsts_;
   std::vector<glm::vec4> colours_;
   std::vector<std::uint32_t> objects_;
@@ -107,7 +109,13 @@ Result<void> TreeFragments::prepare(const Shader& shader, const Execution& execu
   if (!seen) return tl::unexpected(seen.error());
   seen_ = std::move(*seen);
   colour_slots(shader, execution);
-  if (any_opaque()) colour_opaque(shader, execution);
+  if (any_opaque()) {
+    const TranslucentTrees& trees = input_.trees;
+    auto done = opaque_.prepare(*input_.opaque, trees.geometry(), trees.world_error(), input_.view,
+                                execution);
+    if (!done) return done;
+    colour_opaque(shader, execution);
+  }
   if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
   return {};
 }
@@ -115,14 +123,21 @@ Result<void> TreeFragments::prepare(const Shader& shader, const Execution& execu
 class TreeFragments::TileWorker final : public Worker {
  public:
   explicit TileWorker(const TreeFragments& source)
-      : source_(&source), walk_(source.input_.trees, source.seen_, source.input_.view) {}
+      : source_(&source), walk_(source.input_.trees, source.seen_, source.input_.view) {
+    if (!source.any_opaque()) return;
+    const SurfaceTiles& opaque = source.opaque_;
+    finder_ = std::make_unique<TileFinder>(*source.input_.opaque, opaque.view_parts,
+                                           source.input_.trees.geometry().parts(), opaque.view,
+                                           opaque.coincidence);
+    image_.resize(kTileSide, kTileSide);
+  }
 
   Result<void> tile(int tu, int tv, bool keep_hidden, TileFragments& out) override {
     const glm::ivec2& size = source_->input_.view.size;
     clip_ = {tu * kTileSide, tv * kTileSide, std::min(size.x, (tu + 1) * kTileSide),
              std::min(size.y, (tv + 1) * kTileSide)};
     out.clear();
-    if (source_->any_opaque()) place_opaque(out);
+    if (finder_) place_opaque(tu, tv, out);
     rasterize();
     sort_lists();
     found_.clear();
@@ -139,18 +154,20 @@ class TreeFragments::TileWorker final : public Worker {
   }
 
  private:
-  void place_opaque(TileFragments& out) const {
-    const SurfaceImage& image = source_->input_.opaque;
+  void place_opaque(int tu, int tv, TileFragments& out) {
+    const SurfaceTiles& tiles = source_->opaque_;
+    const auto tile = static_cast<std::size_t>(tv) * static_cast<std::size_t>(tiles.tiles_u) +
+                      static_cast<std::size_t>(tu);
+    finder_->find(tu, tv, tiles.solids.at(tile), {&image_, clip_.u0, clip_.v0}, {});
     out.begin_opaque();
-    for (int v = clip_.v0; v < clip_.v1; ++v) {
-      for (int u = clip_.u0; u < clip_.u1; ++u) {
-        const std::size_t at = static_cast<std::size_t>(v) * static_cast<std::size_t>(image.width) +
-                               static_cast<std::size_t>(u);
-        if (image.depth[at] == SurfaceImage::kNone) continue;
-        const std::uint32_t triangle = image.triangle[at] & ~SurfaceImage::kExit;
-        out.opaque[static_cast<std::size_t>((v - clip_.v0) * kTileSide + u - clip_.u0)] =
-            DepthItem(image.depth[at], (image.triangle[at] & SurfaceImage::kExit) != 0,
-                      source_->solid_firsts_[image.solid[at]] + triangle);
+    for (int v = 0; v < clip_.v1 - clip_.v0; ++v) {
+      for (int u = 0; u < clip_.u1 - clip_.u0; ++u) {
+        const auto at = static_cast<std::size_t>(v * kTileSide + u);
+        if (image_.depth[at] == SurfaceImage::kNone) continue;
+        const std::uint32_t face = image_.triangle[at];
+        out.opaque[at] =
+            DepthItem(image_.depth[at], (face & SurfaceImage::kExit) != 0,
+                      source_->solid_firsts_[image_.solid[at]] + (face & ~SurfaceImage::kExit));
       }
     }
   }
@@ -218,6 +235,8 @@ class TreeFragments::TileWorker final : public Worker {
 
   const TreeFragments* source_;
   TranslucentWalk walk_;
+  std::unique_ptr<TileFinder> finder_;
+  SurfaceImage image_;  ///< of the opaque surfaces of a tile
   PixelRect clip_;
   TileLog<Record64> log_;
   std::vector<std::uint32_t> triangles_;

@@ -2,12 +2,11 @@
 
 #include <memory>
 
-#include "csg/geometry.h"
 #include "csg/picture/shade.h"
+#include "csg/program.h"
 #include "csg/surface/translucent.h"
 #include "strata/core/execution.h"
 #include "strata/core/result.h"
-#include "strata/csg/surface/surface_image.h"
 #include "strata/raster/view.h"
 #include "transparency/stream/fragment_source.h"
 
@@ -18,8 +17,8 @@ namespace strata::csg {
 /// Translucent trees in a view.
 struct TreeFragmentsInput {
   const TranslucentTrees& trees;
-  View view;            ///< of the samples
-  SurfaceImage opaque;  ///< what stands among the translucent trees; no pixels: nothing
+  View view;                        ///< of the samples
+  const Program* opaque = nullptr;  ///< what stands among the translucent trees; null: nothing
 };
 
 /// Surfaces of translucent trees become fragments with the triangle, facing and colour of the solid

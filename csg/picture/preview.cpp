@@ -9,47 +9,14 @@
 #include "csg/picture/ghosts.h"
 #include "csg/picture/shade.h"
 #include "csg/program.h"
-#include "csg/surface/depth_range.h"
 #include "csg/surface/frame_input.h"
 #include "csg/surface/surface_source.h"
+#include "csg/surface/surface_tiles.h"
 #include "csg/surface/tile_surface.h"
 #include "strata/csg/picture/picture.h"
 
 namespace strata::csg {
 namespace {
-
-/// Solids with more triangles than this are prepared one after another, each by all threads.
-constexpr std::size_t kLargePart = 20000;
-
-/// Which solids may be met in which tile.
-struct TileSolids {
-  std::vector<std::uint32_t> offsets, solids;
-
-  void build(std::span<const ViewPart> parts, int tiles_u, int tiles_v) {
-    offsets.assign(static_cast<std::size_t>(tiles_u) * static_cast<std::size_t>(tiles_v) + 1, 0);
-    const auto for_each = [&](auto&& body) {
-      for (std::uint32_t solid = 0; solid < parts.size(); ++solid) {
-        const PixelRect& rect = parts[solid].rect;
-        if (rect.empty()) continue;
-        for (int tv = rect.v0 / kTileSide; tv <= (rect.v1 - 1) / kTileSide; ++tv) {
-          for (int tu = rect.u0 / kTileSide; tu <= (rect.u1 - 1) / kTileSide; ++tu) {
-            body(static_cast<std::size_t>(tv) * static_cast<std::size_t>(tiles_u) +
-                     static_cast<std::size_t>(tu),
-                 solid);
-          }
-        }
-      }
-    };
-    for_each([&](std::size_t tile, std::uint32_t) { ++offsets[tile + 1]; });
-    std::partial_sum(offsets.begin(), offsets.end(), offsets.begin());
-    solids.resize(offsets.back());
-    std::vector<std::uint32_t> cursor(offsets.begin(), offsets.end() - 1);
-    for_each([&](std::size_t tile, std::uint32_t solid) { solids[cursor[tile]++] = solid; });
-  }
-  [[nodiscard]] std::span<const std::uint32_t> at(std::size_t tile) const {
-    return std::span(solids).subspan(offsets[tile], offsets[tile + 1] - offsets[tile]);
-  }
-};
 
 /// One tree of solids in one view.
 class Frame {
@@ -63,62 +30,30 @@ class Frame {
   /// Finds all surfaces. With `on_tile` they are handed to it, from any thread, and image() is not
   /// kept: memory is slower than the search.
   Result<void> draw(const View& view, const Execution& execution, const OnTile& on_tile = {}) {
-    view_ = view;
-    coincidence_ = Coincidence(view, world_error_);
-    tiles_u_ = (view.size.x + kTileSide - 1) / kTileSide;
-    tiles_v_ = (view.size.y + kTileSide - 1) / kTileSide;
-    const auto& parts = geometry_->parts();
-    view_parts_.clear();
-    view_parts_.resize(parts.size());
-    std::vector<std::uint32_t> small, large;
-    for (std::uint32_t solid = 0; solid < parts.size(); ++solid) {
-      if (program_->leaves[solid].parent == Program::kNone) continue;
-      (parts[solid].triangles.size() > kLargePart ? large : small).push_back(solid);
-    }
-    std::vector<Result<void>> failures(parts.size());
-    const auto prepare = [&](std::uint32_t solid, const Execution& how) {
-      auto part = view_part(parts[solid].placed(), view_, how);
-      if (part) {
-        view_parts_[solid] = std::move(*part);
-      } else {
-        failures[solid] = tl::unexpected(part.error());
-      }
-    };
-    constexpr std::size_t kAtOnce = 16;
-    Execution alone;
-    alone.threads = 1;
-    parallel_for(execution, (small.size() + kAtOnce - 1) / kAtOnce, [&](std::size_t chunk, int) {
-      const std::size_t end = std::min(small.size(), (chunk + 1) * kAtOnce);
-      for (std::size_t i = chunk * kAtOnce; i < end; ++i) prepare(small[i], alone);
-    });
-    for (const std::uint32_t solid : large) prepare(solid, execution);
-    for (const auto& failure : failures) {
-      if (!failure) return failure;
-    }
-    if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+    auto done = tiles_.prepare(*program_, *geometry_, world_error_, view, execution);
+    if (!done) return done;
     report_ = {};
-    solids_.build(view_parts_, tiles_u_, tiles_v_);
     whole_ = false;
     return find_all(execution, on_tile);
   }
 
   Result<void> moved(std::uint32_t solid, const Execution& execution) {
-    const PixelRect before = view_parts_[solid].rect;
-    auto part = view_part(geometry_->parts()[solid].placed(), view_, execution);
+    const PixelRect before = tiles_.view_parts[solid].rect;
+    auto part = view_part(geometry_->parts()[solid].placed(), tiles_.view, execution);
     if (!part) return tl::unexpected(part.error());
-    view_parts_[solid] = std::move(*part);
-    const PixelRect after = view_parts_[solid].rect;
-    solids_.build(view_parts_, tiles_u_, tiles_v_);
+    tiles_.view_parts[solid] = std::move(*part);
+    const PixelRect after = tiles_.view_parts[solid].rect;
+    tiles_.solids.build(tiles_.view_parts, tiles_.tiles_u, tiles_.tiles_v);
     if (!whole_ || source_ != nullptr) return find_all(execution, {});
     std::vector<std::uint32_t> tiles;
-    for (int tv = 0; tv < tiles_v_; ++tv) {
-      for (int tu = 0; tu < tiles_u_; ++tu) {
+    for (int tv = 0; tv < tiles_.tiles_v; ++tv) {
+      for (int tu = 0; tu < tiles_.tiles_u; ++tu) {
         const auto meets = [&](const PixelRect& rect) {
           return !rect.empty() && rect.u0 < (tu + 1) * kTileSide && rect.u1 > tu * kTileSide &&
                  rect.v0 < (tv + 1) * kTileSide && rect.v1 > tv * kTileSide;
         };
         if (meets(before) || meets(after)) {
-          tiles.push_back(static_cast<std::uint32_t>(tv * tiles_u_ + tu));
+          tiles.push_back(static_cast<std::uint32_t>(tv * tiles_.tiles_u + tu));
         }
       }
     }
@@ -130,20 +65,20 @@ class Frame {
   [[nodiscard]] bool has_source() const { return source_ != nullptr; }
 
   [[nodiscard]] const SurfaceImage& image() const { return image_; }
-  [[nodiscard]] const View& view() const { return view_; }
+  [[nodiscard]] const View& view() const { return tiles_.view; }
   [[nodiscard]] const DrawReport& report() const { return report_; }
 
  private:
   Result<void> find_all(const Execution& execution, const OnTile& on_tile) {
-    std::vector<std::uint32_t> tiles(static_cast<std::size_t>(tiles_u_ * tiles_v_));
+    std::vector<std::uint32_t> tiles(static_cast<std::size_t>(tiles_.tiles_u * tiles_.tiles_v));
     std::iota(tiles.begin(), tiles.end(), 0u);
-    if (!on_tile) image_.resize(view_.size.x, view_.size.y);
+    if (!on_tile) image_.resize(tiles_.view.size.x, tiles_.view.size.y);
     if (source_ != nullptr && !on_tile) {
       DrawReport elsewhere;
       tiles.clear();
-      const FrameInput input{*program_, geometry_->parts(), view_parts_,
-                             view_,     coincidence_,       tiles_u_,
-                             tiles_v_,  solids_.offsets,    solids_.solids};
+      const FrameInput input{*program_,      geometry_->parts(),    tiles_.view_parts,
+                             tiles_.view,    tiles_.coincidence,    tiles_.tiles_u,
+                             tiles_.tiles_v, tiles_.solids.offsets, tiles_.solids.solids};
       auto found = source_->find(input, image_, elsewhere, tiles, execution);
       if (found) found = find(tiles, execution, {});
       report_.fragments += elsewhere.fragments;
@@ -160,21 +95,21 @@ class Frame {
                     const OnTile& on_tile) {
     const auto workers = static_cast<std::size_t>(execution.thread_count());
     while (finders_.size() < workers) {
-      finders_.push_back(std::make_unique<TileFinder>(*program_, view_parts_, geometry_->parts(),
-                                                      view_, coincidence_));
+      finders_.push_back(std::make_unique<TileFinder>(
+          *program_, tiles_.view_parts, geometry_->parts(), tiles_.view, tiles_.coincidence));
       tile_images_.emplace_back().resize(kTileSide, kTileSide);
     }
     for (const auto& finder : finders_) finder->reset_counts();
     parallel_for(execution, tiles.size(), [&](std::size_t i, int worker) {
       const auto tile = static_cast<int>(tiles[i]);
-      const int tile_u = tile % tiles_u_, tile_v = tile / tiles_u_;
+      const int tile_u = tile % tiles_.tiles_u, tile_v = tile / tiles_.tiles_u;
       const PixelRect rect{tile_u * kTileSide, tile_v * kTileSide,
-                           std::min(view_.size.x, (tile_u + 1) * kTileSide),
-                           std::min(view_.size.y, (tile_v + 1) * kTileSide)};
+                           std::min(tiles_.view.size.x, (tile_u + 1) * kTileSide),
+                           std::min(tiles_.view.size.y, (tile_v + 1) * kTileSide)};
       SurfacePart part{&image_};
       if (on_tile) part = {&tile_images_[static_cast<std::size_t>(worker)], rect.u0, rect.v0};
       finders_[static_cast<std::size_t>(worker)]->find(
-          tile_u, tile_v, solids_.at(static_cast<std::size_t>(tile)), part, execution.stop);
+          tile_u, tile_v, tiles_.solids.at(static_cast<std::size_t>(tile)), part, execution.stop);
       if (on_tile) on_tile(*part.image, rect);
     });
     report_.fragments = report_.resolved = 0;
@@ -189,14 +124,10 @@ class Frame {
   const Program* program_;
   const Geometry* geometry_;
   double world_error_;
-  View view_;
-  Coincidence coincidence_;
-  int tiles_u_ = 0, tiles_v_ = 0;
-  std::vector<ViewPart> view_parts_;
-  TileSolids solids_;
+  SurfaceTiles tiles_;
   std::vector<std::unique_ptr<TileFinder>> finders_;
   std::vector<SurfaceImage> tile_images_;  ///< of each worker
-  bool whole_ = false;                     ///< image_ shows all of view_
+  bool whole_ = false;                     ///< image_ shows all of tiles_.view
   SurfaceSource* source_ = nullptr;
   SurfaceImage image_;
   DrawReport report_;
@@ -217,11 +148,12 @@ struct Preview::Impl {
         frame(program, geometry, error),
         painter(tree, with_ghosts(given), geometry, error) {}
 
-  [[nodiscard]] Bounds box() const {
-    std::vector<Tree::NodeId> shown{tree.root()};
-    for (const Translucent& part : translucent) shown.push_back(part.node);
-    return picture_box(tree, geometry.boxes(), shown);
+  [[nodiscard]] std::vector<Tree::NodeId> shown() const {
+    std::vector<Tree::NodeId> nodes{tree.root()};
+    for (const Translucent& part : translucent) nodes.push_back(part.node);
+    return nodes;
   }
+  [[nodiscard]] Bounds box() const { return picture_box(tree, geometry.boxes(), shown()); }
   Result<View> view(const Camera& camera, const glm::ivec2& size, const Execution& execution) const;
   std::span<const Translucent> with_ghosts(std::span<const Ghost> given) {
     for (const Ghost& ghost : given) translucent.push_back({ghost.node, ghost.colour});
@@ -271,18 +203,7 @@ struct Preview::Impl {
 
 Result<View> Preview::Impl::view(const Camera& camera, const glm::ivec2& size,
                                  const Execution& execution) const {
-  auto made = make_view(camera, size, box());
-  if (!made || !made->cut_short) return made;
-  const std::vector<Bounds> boxes = geometry.boxes();
-  Bounds seen = bounds(tree, tree.root(), boxes);
-  for (const Translucent& part : translucent) seen.include(bounds(tree, part.node, boxes));
-  const auto distances = seen_distances(geometry, *made, seen, execution);
-  // A face through the eye is cut off all the same: no depth would be left for all others.
-  constexpr double kLeastPart = 1.0 / (1 << 20);
-  if (!distances || distances->x < distances->y * kLeastPart) return made;
-  constexpr double kRoom = 1e-6;  // so that rounding clamps nothing
-  made->set_distances(distances->x * (1 - kRoom), distances->y * (1 + kRoom));
-  return made;
+  return view_of_tree(tree, geometry, shown(), camera, size, execution);
 }
 
 /// Shades the pixels of a band tile by tile, while the tiles are drawn: one sample a pixel.

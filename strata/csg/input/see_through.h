@@ -37,7 +37,7 @@ class SeeThrough {
   static Result<SeeThrough> make(Scene scene, const SeeThroughOptions& options = {},
                                  const Execution& execution = {});
 
-  /// What a camera sees. The frame must not outlive this object. One thread at a time. @return
+  /// What a camera sees. The frame must not outlive this object. Several threads may ask. @return
   /// kUsage (camera, size, samples), kGeometry, kLimit, kCancelled
   [[nodiscard]] Result<transparency::Frame> frame(const Camera& camera, const glm::ivec2& size,
                                                   const transparency::FrameOptions& options = {},
