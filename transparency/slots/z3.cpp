@@ -170,17 +170,50 @@ class Z3 {
     return both;
   }
 
+  /// Whether the order in the middle is that of all samples: the depths of a slot lie before those
+  /// of the next, and none is clamped.
+  [[nodiscard]] bool in_order(const Part* slots, std::uint32_t count) const {
+    constexpr double kRounding = 2.0;
+    double end = 0;
+    for (std::uint32_t i = 0; i < count; ++i) {
+      const Part& part = slots[i];
+      const double reach = kRounding + std::abs(part.along_u) * (across_ - 1) / 2.0 +
+                           std::abs(part.along_v) * (down_ - 1) / 2.0;
+      if (part.depth - reach < end) return false;
+      end = part.depth + reach;
+    }
+    return end < kPictureDepthLimit;
+  }
+  void blend_in_order(const Part* slots, std::uint32_t count, glm::ivec2 first,
+                      TileImage& image) const {
+    for (int sample = 0; sample < across_ * down_; ++sample) {
+      FrontToBack sum;
+      bool any = false;
+      for (std::uint32_t i = 0; i < count; ++i) {
+        if ((slots[i].mask >> sample & 1) == 0) continue;
+        sum.add(slots[i].colour);
+        any = true;
+      }
+      const int u = first.x + sample % across_, v = first.y + sample / across_;
+      if (any) image.pixels[static_cast<std::size_t>(v * kTileSide + u)] = sum.result();
+    }
+  }
+
   void resolve(TileStream& stream, std::uint32_t pixel, TileImage& image) {
     const Part* const slots = slots_.data() + std::size_t{pixel} * (k_ + 1);
     const std::uint32_t count = counts_[pixel];
     stream.costs().kept += count;
     stream.costs().most_layers = std::max<std::uint64_t>(stream.costs().most_layers, count);
+    const glm::ivec2 first = corner(pixel);
+    if (in_order(slots, count)) {
+      blend_in_order(slots, count, first, image);
+      return;
+    }
     planes_.clear();
     for (std::uint32_t i = 0; i < count; ++i) {
       const bool exact = part_ != nullptr && !slots[i].merged;
       planes_.push_back(exact ? plane(slots[i].item.triangle()) : TriangleSetup{});
     }
-    const glm::ivec2 first = corner(pixel);
     for (int sample = 0; sample < across_ * down_; ++sample) {
       const glm::ivec2 at(sample % across_, sample / across_);
       layers_.clear();
