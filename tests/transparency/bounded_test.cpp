@@ -84,6 +84,18 @@ TEST(Bounded, OneRowIsExactForSortedStreams) {
   }
 }
 
+TEST(Bounded, RowsMendAStreamFromBackToFrontThatIsLateByLessThanTheirNumber) {
+  // Groups of four come from back to front, each from front to back within.
+  ListedFrame frame = layers(random_frame("Mixed", {1, 1}, 0, 1, 40).colours, {}, {1, 1});
+  for (std::uint32_t i = 0; i < 40; ++i) {
+    const std::uint32_t group = 9 - i / 4;
+    frame.fragments.push_back({0, 0, 1000 * (4 * group + i % 4), i, i % 3 == 0});
+  }
+  const auto reference = oracle_picture(frame, Blending::kFrontToBack);
+  EXPECT_LE(largest_difference(render(frame, "mlab:4").image, reference), 1e-6f);
+  EXPECT_GT(largest_difference(render(frame, "mlab:3").image, reference), 1e-3f);
+}
+
 TEST(Bounded, MlabWithOneRowIsRelaxedBlending) {
   const ListedFrame frame = random_frame("Mixed", {70, 66}, 6.0, 64, 46, 0.0f, 1.0f);
   const Image relaxed = render(frame, "relaxed").image;
