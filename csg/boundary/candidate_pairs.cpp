@@ -1,0 +1,240 @@
+#include "csg/boundary/candidate_pairs.h"
+
+#include <algorithm>
+#include <bit>
+#include <glm/common.hpp>
+
+namespace strata::csg {
+namespace {
+
+using exact::LatticePoint;
+
+constexpr std::uint32_t kNobody = 0xffffffffu,
+                        kMixed = 0xfffffffeu;  // in a cell instead of a solid
+constexpr std::size_t kFewTriangles = 32;
+constexpr int kMostGridBits = 7;  // 128 cells a side, 8 MiB
+
+struct Box {
+  LatticePoint low, high;  // both belong to it
+
+  bool touches(const Box& other) const {
+    for (int k = 0; k < 3; ++k) {
+      if (low[k] > other.high[k] || other.low[k] > high[k]) return false;
+    }
+    return true;
+  }
+};
+
+class Search {
+ public:
+  Search(const LatticeSolids& solids, const Execution& execution)
+      : solids_(solids), execution_(execution) {
+    for (std::uint32_t s = 0; s < solids.solid_count(); ++s) {
+      solid_of_.resize(solids.first_triangle[s + 1], s);
+    }
+  }
+
+  Result<CandidatePairs> run();
+
+ private:
+  Box box_of(std::uint32_t triangle) const {
+    const glm::uvec3& t = solids_.triangles[triangle];
+    const LatticePoint &a = solids_.vertices[t.x], &b = solids_.vertices[t.y],
+                       &c = solids_.vertices[t.z];
+    return {glm::min(a, glm::min(b, c)), glm::max(a, glm::max(b, c))};
+  }
+
+  void choose_grid();
+  Box cell_box(const LatticePoint& cell) const {
+    const LatticePoint low = low_ + cell * (1 << shift_);
+    return {low, low + ((1 << shift_) - 1)};
+  }
+  bool mark(std::uint32_t triangle);
+  void collect(std::uint32_t triangle);
+  bool search(const std::vector<std::uint32_t>& triangles, const Box& box);
+  bool compare_all(const std::vector<std::uint32_t>& triangles);
+  bool compact();
+
+  // work(index of the cell) for the cells of the first grid that a triangle touches.
+  template <class Work>
+  void for_cells(std::uint32_t triangle, const Work& work) const;
+
+  const LatticeSolids& solids_;
+  const Execution& execution_;
+  std::vector<std::uint32_t> solid_of_;
+  LatticePoint low_{0};
+  int shift_ = 0, bits_ = 0;           // cells of 2^shift steps, 2^bits along each axis
+  std::vector<std::uint32_t> owners_;  // of the cells; then, for mixed ones, their index in lists_
+  std::vector<std::vector<std::uint32_t>> lists_;
+  std::vector<Box> list_boxes_;
+  std::size_t compacted_ = 0;
+  CandidatePairs result_;
+};
+
+// Whether a cell has points on both sides of a plane, or on it: heights are largest and smallest at
+// corners. A cell also has the points between its last lattice points and the next cell, so any
+// point that two triangles share, on the lattice or not, lies in a cell that both touch.
+bool plane_crosses(const exact::Plane& plane, const Box& box) {
+  LatticePoint up, down;
+  for (int k = 0; k < 3; ++k) {
+    const bool rising = plane.normal[k] > 0;
+    up[k] = rising ? box.high[k] + 1 : box.low[k];
+    down[k] = rising ? box.low[k] : box.high[k] + 1;
+  }
+  return exact::height(plane, up) >= 0 && exact::height(plane, down) <= 0;
+}
+
+exact::Plane plane_of(const LatticeSolids& solids, std::uint32_t triangle) {
+  const glm::uvec3& t = solids.triangles[triangle];
+  return exact::plane_through(solids.vertices[t.x], solids.vertices[t.y], solids.vertices[t.z]);
+}
+
+void Search::choose_grid() {
+  Box all = box_of(0);
+  for (std::uint32_t t = 1; t < solids_.triangles.size(); ++t) {
+    const Box box = box_of(t);
+    all = {glm::min(all.low, box.low), glm::max(all.high, box.high)};
+  }
+  low_ = all.low;
+  const LatticePoint size = all.high - all.low;
+  const auto longest = static_cast<std::uint32_t>(std::max({size.x, size.y, size.z}));
+  // A surface of n triangles touches about as many cells of a grid with sqrt(n) cells a side.
+  const int wanted = static_cast<int>(std::bit_width(solids_.triangles.size())) / 2;
+  bits_ = std::clamp(wanted, 1, kMostGridBits);
+  shift_ = std::max(0, static_cast<int>(std::bit_width(longest)) - bits_);
+}
+
+template <class Work>
+void Search::for_cells(std::uint32_t triangle, const Work& work) const {
+  const Box box = box_of(triangle);
+  const LatticePoint first = (box.low - low_) >> shift_, last = (box.high - low_) >> shift_;
+  const LatticePoint count = last - first + 1;
+  const exact::Plane plane = plane_of(solids_, triangle);
+  const bool few = count.x * count.y * count.z <= 8;
+  for (int z = first.z; z <= last.z; ++z) {
+    for (int y = first.y; y <= last.y; ++y) {
+      for (int x = first.x; x <= last.x; ++x) {
+        if (!few && !plane_crosses(plane, cell_box({x, y, z}))) continue;
+        work((static_cast<std::size_t>(z) << bits_ | static_cast<std::size_t>(y)) << bits_ |
+             static_cast<std::size_t>(x));
+      }
+    }
+  }
+}
+
+bool Search::mark(std::uint32_t triangle) {
+  const std::uint32_t solid = solid_of_[triangle];
+  for_cells(triangle, [&](std::size_t cell) {
+    std::uint32_t& owner = owners_[cell];
+    owner = owner == kNobody || owner == solid ? solid : kMixed;
+  });
+  return triangle % 4096 != 0 || !execution_.stop.stop_requested();
+}
+
+void Search::collect(std::uint32_t triangle) {
+  bool mixed = false;
+  for_cells(triangle, [&](std::size_t cell) {
+    if (owners_[cell] == kNobody) return;
+    mixed = true;
+    lists_[owners_[cell]].push_back(triangle);
+  });
+  if (mixed) result_.mixed_triangles.push_back(triangle);
+}
+
+bool Search::compare_all(const std::vector<std::uint32_t>& triangles) {
+  std::vector<Box> boxes;
+  boxes.reserve(triangles.size());
+  for (const std::uint32_t t : triangles) boxes.push_back(box_of(t));
+  for (std::size_t j = 1; j < triangles.size(); ++j) {
+    for (std::size_t i = 0; i < j; ++i) {
+      if (solid_of_[triangles[i]] != solid_of_[triangles[j]] && boxes[i].touches(boxes[j])) {
+        result_.pairs.push_back({triangles[i], triangles[j]});
+      }
+    }
+    if (execution_.stop.stop_requested()) return false;
+  }
+  return result_.pairs.size() < 2 * compacted_ + (std::size_t{1} << 20) || compact();
+}
+
+// Pairs of triangles that share several cells were found several times.
+bool Search::compact() {
+  std::ranges::sort(result_.pairs);
+  result_.pairs.erase(std::unique(result_.pairs.begin(), result_.pairs.end()), result_.pairs.end());
+  compacted_ = result_.pairs.size();
+  return execution_.memory_limit == 0 ||
+         compacted_ * sizeof(TrianglePair) <= execution_.memory_limit;
+}
+
+bool Search::search(const std::vector<std::uint32_t>& triangles, const Box& box) {
+  const std::uint32_t solid = solid_of_[triangles.front()];
+  if (std::ranges::all_of(triangles, [&](std::uint32_t t) { return solid_of_[t] == solid; })) {
+    return true;
+  }
+  const std::int32_t side = box.high.x - box.low.x + 1;
+  if (triangles.size() <= kFewTriangles || side == 1) return compare_all(triangles);
+  std::vector<std::uint32_t> parts[8];
+  Box boxes[8];
+  std::size_t total = 0;
+  for (int part = 0; part < 8; ++part) {
+    const LatticePoint at(part & 1, part >> 1 & 1, part >> 2);
+    boxes[part].low = box.low + at * (side / 2);
+    boxes[part].high = boxes[part].low + (side / 2 - 1);
+  }
+  for (const std::uint32_t t : triangles) {
+    const Box own = box_of(t);
+    const exact::Plane plane = plane_of(solids_, t);
+    for (int part = 0; part < 8; ++part) {
+      if (own.touches(boxes[part]) && plane_crosses(plane, boxes[part])) parts[part].push_back(t);
+    }
+  }
+  for (const auto& part : parts) total += part.size();
+  if (total >= 6 * triangles.size()) return compare_all(triangles);  // division does not help
+  for (int part = 0; part < 8; ++part) {
+    if (!parts[part].empty() && !search(parts[part], boxes[part])) return false;
+  }
+  return true;
+}
+
+Result<CandidatePairs> Search::run() {
+  if (solids_.triangles.empty()) return result_;
+  choose_grid();
+  owners_.assign(std::size_t{1} << 3 * bits_, kNobody);
+  const auto count = static_cast<std::uint32_t>(solids_.triangles.size());
+  for (std::uint32_t t = 0; t < count; ++t) {
+    if (!mark(t)) return fail(ErrorCode::kCancelled, "stopped");
+  }
+  for (std::size_t cell = 0; cell < owners_.size(); ++cell) {
+    if (owners_[cell] != kMixed) {
+      owners_[cell] = kNobody;
+      continue;
+    }
+    owners_[cell] = static_cast<std::uint32_t>(list_boxes_.size());
+    const std::size_t mask = (std::size_t{1} << bits_) - 1;
+    list_boxes_.push_back(
+        cell_box({static_cast<int>(cell & mask), static_cast<int>(cell >> bits_ & mask),
+                  static_cast<int>(cell >> 2 * bits_)}));
+  }
+  result_.mixed_cells = list_boxes_.size();
+  lists_.resize(list_boxes_.size());
+  for (std::uint32_t t = 0; t < count; ++t) collect(t);
+  for (std::size_t i = 0; i < lists_.size(); ++i) {
+    if (search(lists_[i], list_boxes_[i])) continue;
+    if (execution_.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+    return fail(ErrorCode::kLimit, "{} pairs of triangles may meet; the memory limit is {} bytes",
+                result_.pairs.size(), execution_.memory_limit);
+  }
+  if (!compact()) {
+    return fail(ErrorCode::kLimit, "{} pairs of triangles may meet; the memory limit is {} bytes",
+                result_.pairs.size(), execution_.memory_limit);
+  }
+  return std::move(result_);
+}
+
+}  // namespace
+
+Result<CandidatePairs> find_candidate_pairs(const LatticeSolids& solids,
+                                            const Execution& execution) {
+  return Search(solids, execution).run();
+}
+
+}  // namespace strata::csg
