@@ -25,6 +25,7 @@ struct Plan {
   std::vector<std::string> tables{"rates", "loads", "meshes"};
   std::vector<std::string> techniques{"count-scan",  "ha64",   "ha64:random", "ha32",
                                       "ha64-culled", "linked", "paged",       "b3d"};
+  std::vector<std::string> meshes{"69451:2", "69451:5", "328000:2", "328000:5"};
   std::vector<double> depths{1, 4, 10};
   std::vector<double> loads{0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.95, 0.99};
   int side = 1024;
@@ -216,8 +217,9 @@ class Bench {
   /// From the mesh in memory to the picture.
   Result<void> meshes() {
     const Technique* technique = *find_technique("count-scan");
-    for (const auto& [triangles, shells] :
-         {std::pair(69451, 2), {69451, 5}, {328000, 2}, {328000, 5}}) {
+    for (const std::string& text : settings_.meshes) {
+      const std::size_t colon = std::min(text.find(':'), text.size() - 1);
+      const int triangles = std::stoi(text), shells = std::stoi(text.substr(colon + 1));
       const MeshView of = mesh_view(triangles, shells, settings_.side);
       Result<void> status;
       Rendering rendering;
@@ -274,6 +276,7 @@ int main(int argc, char** argv) {
                  "of rates; the first is what others are "
                  "compared with")
       ->delimiter(',');
+  app.add_option("--meshes", settings.meshes, "TRIANGLES:SHELLS")->delimiter(',');
   app.add_option("--depths", settings.depths, "mean layers of the streams")->delimiter(',');
   app.add_option("--loads", settings.loads, "of hash tables")->delimiter(',');
   app.add_option("--side", settings.side, "of the picture, pixels");

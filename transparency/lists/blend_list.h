@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "transparency/stream/lanes.h"
 #include "transparency/stream/short_sort.h"
 #include "transparency/stream/tile_stream.h"
 
@@ -16,18 +17,13 @@ namespace strata::transparency {
 class FrontToBack4 {
  public:
   void add(const glm::vec4& fragment) {
-    const Lanes c = reinterpret_cast<const Unaligned&>(fragment);
+    const Lanes c = load_lanes(fragment);
     colour_ += transmittance_ * c;
-    transmittance_ *= 1.0f - __builtin_shufflevector(c, c, 3, 3, 3, 3);
+    transmittance_ *= 1.0f - last_lane(c);
   }
-  void write(glm::vec4& pixel) const {
-    reinterpret_cast<Unaligned&>(pixel) = __builtin_shufflevector(
-        colour_, __builtin_shufflevector(colour_, transmittance_, 2, 2, 7, 7), 0, 1, 4, 6);
-  }
+  void write(glm::vec4& pixel) const { store_lanes(with_last(colour_, transmittance_), pixel); }
 
  private:
-  using Lanes = float __attribute__((vector_size(16)));
-  using Unaligned = float __attribute__((vector_size(16), aligned(4), may_alias));
   Lanes colour_{};
   Lanes transmittance_{1.0f, 1.0f, 1.0f, 1.0f};
 };

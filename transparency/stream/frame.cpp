@@ -6,6 +6,7 @@
 #include <mutex>
 #include <new>
 
+#include "transparency/stream/lanes.h"
 #include "transparency/stream/listed_source.h"
 #include "transparency/stream/mesh_source.h"
 #include "transparency/stream/render_tiles.h"
@@ -111,17 +112,15 @@ class FramePass {
   }
   /// One sample a pixel, and no opaque objects.
   void resolve_plain(const Worker& worker, const PixelRect& rect) const {
-    const glm::vec4 background = background_;
+    const Lanes background = load_lanes(background_);
     const auto width = static_cast<std::size_t>(rect.u1 - rect.u0);
     for (int v = rect.v0; v < rect.v1; ++v) {
       glm::vec4* out = image_.pixels.data() + rect.u0 +
                        static_cast<std::size_t>(v) * static_cast<std::size_t>(image_.width);
       const glm::vec4* seen = worker.image.pixels.data() + (v - rect.v0) * kTileSide;
       for (std::size_t u = 0; u < width; ++u) {
-        const float through = seen[u].a;
-        glm::vec4 own = seen[u];
-        own.a = 1.0f - through;
-        out[u] = own + through * background;
+        const Lanes own = load_lanes(seen[u]), through = last_lane(own);
+        store_lanes(with_last(own, 1.0f - through) + through * background, out[u]);
       }
     }
   }
