@@ -131,6 +131,22 @@ TEST(Frame, StopsOnRequest) {
   EXPECT_EQ(rendering.error().code, ErrorCode::kCancelled);
 }
 
+TEST(Frame, MemoryThatEndsBeforeTheFirstTileIsAnError) {
+  const Scene scene = squares({{1, 0, 0, 0.5f}});
+  auto frame = Frame::make(scene, from_above(scene, {20, 20}));
+  ASSERT_TRUE(frame);
+  Technique hungry = *techniques().front();
+  hungry.name = "hungry";
+  hungry.prepare = [](const FrameInfo&, const Settings&,
+                      const Execution&) -> Result<std::shared_ptr<const void>> {
+    throw std::bad_alloc();
+  };
+  const auto rendering = frame->render(hungry);
+  ASSERT_FALSE(rendering);
+  EXPECT_EQ(rendering.error().code, ErrorCode::kLimit);
+  EXPECT_NE(rendering.error().message.find("hungry"), std::string::npos);
+}
+
 TEST(Techniques, AreFoundByTheirNames) {
   for (const Technique* technique : techniques()) {
     EXPECT_EQ(*find_technique(technique->name), technique);

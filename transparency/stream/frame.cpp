@@ -334,10 +334,15 @@ Result<Rendering> Frame::render(const Technique& technique, const Settings& sett
   const auto begin = Clock::now();
   const FrameInfo info = frame_info(*source_, options_);
   std::shared_ptr<const void> prepared;
-  if (technique.prepare != nullptr) {
-    auto made = technique.prepare(info, *checked, execution);
-    if (!made) return tl::unexpected(made.error());
-    prepared = std::move(*made);
+  try {
+    if (technique.prepare != nullptr) {
+      auto made = technique.prepare(info, *checked, execution);
+      if (!made) return tl::unexpected(made.error());
+      prepared = std::move(*made);
+    }
+  } catch (const std::bad_alloc&) {
+    return fail(ErrorCode::kLimit, "{}: no memory for its work before the first tile",
+                technique.name);
   }
   const double prepare_seconds = seconds_since(begin);
   auto rendering = render_tiles(
