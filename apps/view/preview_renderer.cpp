@@ -8,6 +8,8 @@
 #include "apps/view/camera_control.h"
 #include "apps/view/renderer.h"
 #include "csg/measure/ray_image.h"
+#include "strata/csg/input/see_through.h"
+#include "strata/transparency/techniques.h"
 
 namespace strata::view {
 namespace {
@@ -34,6 +36,12 @@ class PreviewRenderer final : public Renderer {
     frame.wanted = request.size;
     const auto begin = Clock::now();
     adopt(request.what);
+    if (request.see_through && request.heat == Heat::kOff) {
+      if (auto done = draw_through(request, execution, frame); !done) {
+        return tl::unexpected(done.error());
+      }
+      return frame;
+    }
     if (request.heat == Heat::kOff) {
       open_gpu(execution);
       if (!preview_) {
@@ -103,6 +111,7 @@ class PreviewRenderer final : public Renderer {
     if (what == what_) return;
     preview_.reset();
     meter_.reset();
+    through_.reset();
     what_ = what;
   }
 
@@ -140,6 +149,75 @@ class PreviewRenderer final : public Renderer {
     say_why(error);
   }
   void say_why(const Error& error) { drawn_by_ = "CPU (" + error.message + ")"; }
+
+  /// through_ becomes the arrangement with an opacity.
+  Result<void> see_through(const FrameRequest& request, const Execution& execution) {
+    const float opacity = request.see_through->opacity;
+    if (through_ && through_opacity_ == opacity && through_scheme_ == request.look.scheme) {
+      return {};
+    }
+    csg::Scene scene;
+    scene.tree = what_->tree;
+    scene.relative_precision = what_->relative_precision;
+    for (const csg::Ghost& ghost : what_->ghosts) {
+      const bool red = ghost.colour == csg::kHighlightGhost;
+      (red ? scene.highlights : scene.backgrounds).push_back(ghost.node);
+    }
+    auto made = csg::SeeThrough::make(std::move(scene), {opacity, request.look.scheme}, execution);
+    if (!made) return tl::unexpected(made.error());
+    through_ = *std::move(made);
+    through_opacity_ = opacity;
+    through_scheme_ = request.look.scheme;
+    return {};
+  }
+
+  Result<void> draw_through(const FrameRequest& request, const Execution& execution, Frame& frame) {
+    const auto begin = Clock::now();
+    if (auto done = see_through(request, execution); !done) return done;
+    frame.prepare_ms = ms_since(begin);
+    const auto prepared = Clock::now();
+    const csg::ColourScheme& scheme =
+        request.look.scheme != nullptr ? *request.look.scheme : csg::colour_schemes().front();
+    transparency::FrameOptions options;
+    options.size = request.size;
+    options.samples = request.look.samples;
+    options.background = glm::vec4(glm::vec3(scheme.background) / 255.0f, 1.0f);
+    const auto seen = through_->frame(request.camera, request.size, options, execution);
+    if (!seen) return tl::unexpected(seen.error());
+    const std::string name = request.moving ? kMovingTechnique : request.see_through->technique;
+    const auto chosen = transparency::parse_technique(name);
+    if (!chosen) return tl::unexpected(chosen.error());
+    auto drawn = seen->render(*chosen->technique, chosen->settings, execution);
+    if (!drawn) return tl::unexpected(drawn.error());
+    frame.drawn_by = "CPU, " + name;
+    frame.report.fragments = drawn->costs.fragments;
+    frame.longest_list = drawn->costs.most_layers;
+    frame.picture = {drawn->image.width, drawn->image.height, transparency::to_bytes(drawn->image)};
+    const csg::Rgba ground(scheme.background, 255);
+    for (const csg::Rgba& pixel : frame.picture.pixels) {
+      frame.report.covered += pixel != ground ? 1 : 0;
+    }
+    if (request.see_through->errors && !request.moving) {
+      const auto exact = transparency::find_technique(SeenThrough{}.technique);
+      if (!exact) return tl::unexpected(exact.error());
+      auto reference = seen->render(**exact, {}, execution);
+      if (!reference) return tl::unexpected(reference.error());
+      show_errors(drawn->image, reference->image, frame);
+    }
+    frame.draw_ms = ms_since(prepared);
+    return {};
+  }
+
+  static void show_errors(const transparency::Image& image, const transparency::Image& reference,
+                          Frame& frame) {
+    const double largest = transparency::difference(image, reference).largest;
+    frame.scale = {Heat::kError, 0, largest};
+    for (std::size_t i = 0; i < image.pixels.size(); ++i) {
+      const glm::vec4 by = glm::abs(image.pixels[i] - reference.pixels[i]);
+      const double most = std::max({by.r, by.g, by.b, by.a});
+      frame.picture.pixels[i] = heat_colour(largest > 0.0 ? most / largest : 0.0);
+    }
+  }
 
   Result<void> draw_heat(const FrameRequest& request, const Execution& execution, Frame& frame) {
     const auto begin = Clock::now();
@@ -199,6 +277,9 @@ class PreviewRenderer final : public Renderer {
   std::shared_ptr<const Arrangement> what_;
   std::optional<csg::Preview> preview_;
   std::optional<csg::RayMeter> meter_;
+  std::optional<csg::SeeThrough> through_;
+  float through_opacity_ = 0.0f;
+  const csg::ColourScheme* through_scheme_ = nullptr;
 };
 
 }  // namespace

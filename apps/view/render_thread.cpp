@@ -136,7 +136,7 @@ void RenderThread::run(const std::stop_token& stop) {
       heat_policy_.forget();
       drawn_solids_ = request.what->tree.solids().size();
     }
-    CoarsePolicy& policy = request.heat == Heat::kOff ? policy_ : heat_policy_;
+    CoarsePolicy& policy = policy_of(request);
     const bool changed = drawn_ && (request.what != drawn_ || request.look.edges != drawn_edges_);
     const int divisor = whole ? 1 : policy.divisor(changed);
     drawn_ = request.what;
@@ -172,10 +172,11 @@ void RenderThread::draw_coarse(const FrameRequest& request, int divisor, bool la
                                const std::stop_token& stop) {
   FrameRequest coarse = request;
   coarse.size = coarse_size(request.size, divisor);
+  coarse.moving = !last;
   const auto begin = std::chrono::steady_clock::now();
   auto frame = guarded([&] { return renderer_->draw(coarse, execution(stop)); });
   const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - begin;
-  CoarsePolicy& policy = request.heat == Heat::kOff ? policy_ : heat_policy_;
+  CoarsePolicy& policy = policy_of(request);
   const std::lock_guard lock(mutex_);
   if (frame) {
     frame->wanted = request.size;

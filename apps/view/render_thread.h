@@ -63,6 +63,10 @@ class RenderThread {
 
  private:
   void run(const std::stop_token& stop);
+  /// Heat maps and transparent pictures take another time than shaded ones.
+  [[nodiscard]] CoarsePolicy& policy_of(const FrameRequest& request) {
+    return request.heat == Heat::kOff && !request.see_through ? policy_ : heat_policy_;
+  }
   void draw_coarse(const FrameRequest& request, int divisor, bool last,
                    const std::stop_token& stop);
   [[nodiscard]] Execution execution(const std::stop_token& stop) const;

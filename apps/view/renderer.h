@@ -20,8 +20,19 @@ namespace strata::view {
 enum class Heat : std::uint8_t {
   kOff,
   kThickness,  ///< of the material behind the visible surface, along the ray
-  kDepth       ///< depth complexity: how many crossings the ray has with all solids
+  kDepth,      ///< depth complexity: how many crossings the ray has with all solids
+  kError       ///< how much a picture that is seen through differs from the exact one
 };
+
+/// How a scene is seen through.
+struct SeenThrough {
+  float opacity = 0.5f;                  ///< of what is opaque by its colour
+  std::string technique = "count-scan";  ///< of the picture at rest, as `strata oit` has it
+  bool errors = false;                   ///< at rest, show Heat::kError instead
+  friend bool operator==(const SeenThrough&, const SeenThrough&) = default;
+};
+/// The technique while the picture moves: one pass, no lists.
+inline constexpr const char* kMovingTechnique = "weighted-blended";
 
 /// One picture that is wanted.
 struct FrameRequest {
@@ -31,6 +42,8 @@ struct FrameRequest {
   glm::ivec2 size{1};
   csg::PictureOptions look;
   Heat heat = Heat::kOff;
+  std::optional<SeenThrough> see_through;  ///< unless there is a heat map
+  bool moving = false;                     ///< another picture of this request follows
 };
 
 /// What the colours of a heat map stand for.

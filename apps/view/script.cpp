@@ -15,6 +15,7 @@
 #include "apps/view/camera_control.h"
 #include "mesh/formats/text_scanner.h"
 #include "strata/csg/picture/picture.h"
+#include "strata/transparency/techniques.h"
 
 namespace strata::view {
 namespace {
@@ -60,6 +61,9 @@ constexpr Rule kRules[] = {
     {"axes", Action::kAxes, Form::kOnOff, "on|off", "show the axes in the corner"},
     {"panels", Action::kPanels, Form::kOnOff, "on|off", "show the panels"},
     {"heat", Action::kHeat, Form::kWord, "MAP", "set the heat map: off, thickness or depth"},
+    {"opacity", Action::kOpacity, Form::kWord, "A", "see through everything: 0 to 1, or off"},
+    {"technique", Action::kTechnique, Form::kWord, "NAME",
+     "set the technique of transparent pictures at rest, as strata oit does"},
     {"scheme", Action::kScheme, Form::kWord, "NAME", "set the colour scheme"},
     {"hide", Action::kHide, Form::kWord, "SOLID",
      "hide a solid, given by a part of its name, @index or all"},
@@ -209,7 +213,7 @@ class Line {
     if (!plane) return fail(ErrorCode::kUsage, "{}: {}", where_, plane.error().message);
     return {};
   }
-  Result<void> check_word(const ScriptCommand& command) const {
+  Result<void> check_word(ScriptCommand& command) const {
     const auto one_of = [&](std::initializer_list<std::string_view> names) -> Result<void> {
       if (std::find(names.begin(), names.end(), command.word) != names.end()) return {};
       return fail(ErrorCode::kUsage, "{}: unknown {} '{}'; it must be one of {}", where_,
@@ -232,6 +236,21 @@ class Line {
       case Action::kCamera: {
         const auto camera = apps::parse_camera(command.word);
         if (!camera) return fail(ErrorCode::kUsage, "{}: {}", where_, camera.error().message);
+        return {};
+      }
+      case Action::kOpacity: {
+        if (command.word == "off") return {};
+        const auto opacity = number_of(command.word);
+        if (!opacity || !(*opacity >= 0.0 && *opacity <= 1.0)) {
+          return fail(ErrorCode::kUsage, "{}: the opacity must be 0 to 1 or off, got '{}'", where_,
+                      command.word);
+        }
+        command.numbers = {*opacity};
+        return {};
+      }
+      case Action::kTechnique: {
+        const auto technique = transparency::parse_technique(command.word);
+        if (!technique) return fail(ErrorCode::kUsage, "{}: {}", where_, technique.error().message);
         return {};
       }
       case Action::kScheme:

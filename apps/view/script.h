@@ -25,9 +25,11 @@ enum class Action {
   kEdges,
   kAxes,
   kPanels,
-  kHeat,    ///< word: off, thickness or depth
-  kScheme,  ///< word: a colour scheme
-  kHide,    ///< word: which solids
+  kHeat,       ///< word: off, thickness or depth
+  kOpacity,    ///< word: off, or numbers: 0 to 1
+  kTechnique,  ///< word: as --technique has it
+  kScheme,     ///< word: a colour scheme
+  kHide,       ///< word: which solids
   kShow,
   kColour,  ///< word: which solids; value: #rrggbb, #rrggbbaa or none
   kPick,    ///< x y: prints what is there

@@ -112,6 +112,17 @@ Result<void> ScriptRunner::apply(const ScriptCommand& command, Viewer& viewer) {
                       : command.word == "thickness" ? Heat::kThickness
                                                     : Heat::kDepth);
       return {};
+    case Action::kOpacity:
+    case Action::kTechnique: {
+      SeenThrough how = viewer.see_through().value_or(SeenThrough{});
+      if (command.action == Action::kTechnique) {
+        how.technique = command.word;
+      } else if (!command.numbers.empty()) {
+        how.opacity = static_cast<float>(command.numbers[0]);
+      }
+      viewer.set_see_through(command.word == "off" ? std::nullopt : std::optional(how));
+      return {};
+    }
     case Action::kScheme:
       viewer.set_scheme(csg::find_colour_scheme(command.word));
       return {};

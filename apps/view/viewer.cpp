@@ -144,6 +144,7 @@ void Viewer::tick() {
   request.size = viewport_;
   request.look = picture_;
   request.heat = heat_;
+  request.see_through = see_through_;
   last_asked_ = thread_.submit(std::move(request));
   asked_.push_back(
       {last_asked_, *std::exchange(changed_at_, {}), std::exchange(changed_by_input_, false)});
@@ -291,6 +292,12 @@ void Viewer::set_scheme(const csg::ColourScheme* scheme) {
 
 void Viewer::set_heat(Heat heat) {
   heat_ = heat;
+  change(false);
+}
+
+void Viewer::set_see_through(std::optional<SeenThrough> how) {
+  if (see_through_ == how) return;
+  see_through_ = std::move(how);
   change(false);
 }
 

@@ -98,6 +98,8 @@ class Viewer {
   void set_scheme(const csg::ColourScheme* scheme);
   [[nodiscard]] Heat heat() const { return heat_; }
   void set_heat(Heat heat);
+  [[nodiscard]] const std::optional<SeenThrough>& see_through() const { return see_through_; }
+  void set_see_through(std::optional<SeenThrough> how);  ///< none: opaque
   void reload();
   void cancel_load();
   void pick(const glm::ivec2& pixel);
@@ -142,6 +144,7 @@ class Viewer {
   bool camera_set_ = false;
   csg::PictureOptions picture_;
   Heat heat_ = Heat::kOff;
+  std::optional<SeenThrough> see_through_;
   Looks looks_;
   std::optional<csg::SectionPlane> last_section_;
   std::shared_ptr<const Model> model_;

@@ -104,7 +104,9 @@ void Panels::legend(const Viewer& viewer, const Area& area) {
                       {left + 132 * scale_, top + height + 14 * scale_}, IM_COL32(20, 22, 26, 225),
                       4 * scale_);
   list->AddText({left, top - 26 * scale_}, IM_COL32(255, 255, 255, 255),
-                scale.heat == Heat::kThickness ? "wall thickness" : "crossings");
+                scale.heat == Heat::kThickness ? "wall thickness"
+                : scale.heat == Heat::kError   ? "difference from exact"
+                                               : "crossings");
   for (int i = 0; i < kSteps; ++i) {
     const csg::Rgba colour = heat_colour(1.0 - (i + 0.5) / kSteps);
     const float y = top + height * static_cast<float>(i) / kSteps;

@@ -100,6 +100,7 @@ void Panels::side(Viewer& viewer, const glm::ivec2& window) {
                    ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoBringToFrontOnFocus);
   if (ImGui::CollapsingHeader("Camera", ImGuiTreeNodeFlags_DefaultOpen)) camera(viewer);
   if (ImGui::CollapsingHeader("Appearance", ImGuiTreeNodeFlags_DefaultOpen)) look(viewer);
+  if (ImGui::CollapsingHeader("Transparency", ImGuiTreeNodeFlags_DefaultOpen)) transparency(viewer);
   if (ImGui::CollapsingHeader("Section", ImGuiTreeNodeFlags_DefaultOpen)) section(viewer);
   if (ImGui::CollapsingHeader("Picked", ImGuiTreeNodeFlags_DefaultOpen)) picked(viewer);
   // In a low window the solids need the room.
@@ -173,6 +174,35 @@ void Panels::look(Viewer& viewer) {
     }
     ImGui::EndCombo();
   }
+}
+
+void Panels::transparency(Viewer& viewer) {
+  const float half = share(2);
+  std::optional<SeenThrough> how = viewer.see_through();
+  if (toggle("See through", how.has_value(), half)) {
+    how = how ? std::nullopt : std::optional<SeenThrough>(SeenThrough{});
+  }
+  hint("draw all surfaces, front to back");
+  ImGui::SameLine();
+  SeenThrough set = how.value_or(SeenThrough{});
+  if (toggle("Errors", set.errors && how, half)) set.errors = !set.errors;
+  hint("at rest: how much the technique's picture differs from the exact one");
+  ImGui::SetNextItemWidth(-1);
+  ImGui::SliderFloat("##opacity", &set.opacity, 0.0f, 1.0f, "opacity %.2f");
+  set.opacity = std::clamp(set.opacity, 0.0f, 1.0f);  // a number that is typed may be any
+  hint("of all that is opaque by its colour");
+  ImGui::SetNextItemWidth(-1);
+  if (ImGui::BeginCombo("##technique", set.technique.c_str())) {
+    for (const transparency::Technique* technique : transparency::techniques()) {
+      if (technique->needs_triangles) continue;  // a tree's surfaces are not those of a mesh
+      const std::string name(technique->name);
+      if (ImGui::Selectable(name.c_str(), name == set.technique)) set.technique = name;
+    }
+    ImGui::EndCombo();
+  }
+  hint("of the picture at rest");
+  if (how) how = set;
+  viewer.set_see_through(how);
 }
 
 void Panels::section(Viewer& viewer) {

@@ -27,6 +27,7 @@ class Panels {
   [[nodiscard]] float side_width(const glm::ivec2& window) const;
   void side(Viewer& viewer, const glm::ivec2& window);
   void camera(Viewer& viewer);
+  static void transparency(Viewer& viewer);
   void section(Viewer& viewer);
   void look(Viewer& viewer);
   void picked(Viewer& viewer);

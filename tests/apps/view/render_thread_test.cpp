@@ -327,6 +327,49 @@ TEST(CpuRenderer, HeatMapsSayWhatTheirColoursMean) {
   EXPECT_EQ(frame->picture.pixels[32 * 64 + 32], heat_colour(0.6));
 }
 
+TEST(CpuRenderer, AScenesPartsAreSeenThroughByACheapTechniqueWhileItMoves) {
+  auto what = std::make_shared<Arrangement>();
+  what->tree = ball_and_box();
+  what->model_solids = what->tree.solids().size();
+  FrameRequest request;
+  request.what = what;
+  request.size = {64, 64};
+  request.camera.distance = 60;
+  const auto renderer = make_renderer();
+  const auto solid = renderer->draw(request, {});
+  request.see_through = SeenThrough{};
+  request.see_through->opacity = 0.0f;
+  const auto nothing = renderer->draw(request, {});
+  request.see_through->opacity = 0.4f;
+  const auto exact = renderer->draw(request, {});
+  ASSERT_TRUE(solid && nothing && exact);
+  const csg::Rgba ground(csg::colour_schemes().front().background, 255);
+  for (const csg::Rgba& pixel : nothing->picture.pixels) ASSERT_EQ(pixel, ground);
+  // Slivers at outlines are no opaque surface.
+  EXPECT_NEAR(static_cast<double>(exact->report.covered),
+              static_cast<double>(solid->report.covered), 0.01 * 64 * 64);
+  EXPECT_NE(exact->picture.pixels, solid->picture.pixels);
+  EXPECT_GE(exact->longest_list, 2u);
+  EXPECT_EQ(exact->drawn_by, "CPU, count-scan");
+  request.moving = true;
+  const auto moving = renderer->draw(request, {});
+  ASSERT_TRUE(moving);
+  EXPECT_EQ(moving->drawn_by, std::string("CPU, ") + kMovingTechnique);
+  EXPECT_NE(moving->picture.pixels, exact->picture.pixels);
+  // At rest, errors: none of the exact technique, some of a sum.
+  request.moving = false;
+  request.see_through->errors = true;
+  const auto right = renderer->draw(request, {});
+  request.see_through->technique = "weighted-average";
+  const auto wrong = renderer->draw(request, {});
+  ASSERT_TRUE(right && wrong);
+  EXPECT_EQ(right->scale.heat, Heat::kError);
+  EXPECT_EQ(right->scale.high, 0.0);
+  EXPECT_GT(wrong->scale.high, 0.001);
+  request.see_through->technique = "magic";
+  EXPECT_FALSE(renderer->draw(request, {}));
+}
+
 TEST(CpuRenderer, HeatMapsCountTheScenesSolidsAloneAndWhereTheSectionLeavesThem) {
   Model model;
   model.scene.tree = ball_and_box();

@@ -82,6 +82,12 @@ TEST(Script, MistakesNameFileAndLine) {
     EXPECT_EQ(error_of(std::string("projection ") + word), "none");
   }
   EXPECT_NE(error_of("heat wave").find("off, thickness, depth"), std::string::npos);
+  for (const char* word : {"0", "0.5", "1", "off"}) {
+    EXPECT_EQ(error_of(std::string("opacity ") + word), "none");
+  }
+  EXPECT_NE(error_of("opacity 2").find("must be 0 to 1 or off, got '2'"), std::string::npos);
+  EXPECT_EQ(error_of("technique mlab:8"), "none");
+  EXPECT_NE(error_of("technique magic").find("no technique 'magic'"), std::string::npos);
 }
 
 TEST(Script, NothingIsAScript) {

@@ -284,12 +284,13 @@ TEST_F(Window, HiddenSolidsAndColoursShow) {
       "colour @0 none\npicture none.png\n"
       "ghosts on\npicture ghosts.png\nghosts off\n"
       "heat thickness\npicture thickness.png\nheat depth\npicture depth.png\nheat off\n"
+      "opacity 0.4\npicture glass.png\ntechnique weighted-sum\npicture sum.png\nopacity off\n"
       "picture after.png\nquit\n",
       {"--no-panels", "--size", "300,200"});
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const Image before = image_of(place_, "before.png");
-  for (const char* changed :
-       {"hidden.png", "red.png", "ghosts.png", "thickness.png", "depth.png"}) {
+  for (const char* changed : {"hidden.png", "red.png", "ghosts.png", "thickness.png", "depth.png",
+                              "glass.png", "sum.png"}) {
     EXPECT_GT(different(before, image_of(place_, changed), 300, 200), 200) << changed;
   }
   for (const char* same : {"shown.png", "none.png", "after.png"}) {
