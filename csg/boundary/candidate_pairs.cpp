@@ -11,7 +11,7 @@ using exact::LatticePoint;
 
 constexpr std::uint32_t kNobody = 0xffffffffu,
                         kMixed = 0xfffffffeu;  // in a cell instead of a solid
-constexpr std::size_t kFewTriangles = 32;
+constexpr std::size_t kFewTriangles = 64;
 constexpr int kMostGridBits = 7;  // 128 cells a side, 8 MiB
 
 struct Box {
@@ -23,6 +23,12 @@ struct Box {
     }
     return true;
   }
+};
+
+struct Placed {
+  std::uint32_t triangle;
+  Box box;
+  exact::Plane plane;
 };
 
 class Search {
@@ -52,7 +58,9 @@ class Search {
   bool mark(std::uint32_t triangle);
   void collect(std::uint32_t triangle);
   bool search(const std::vector<std::uint32_t>& triangles, const Box& box);
-  bool compare_all(const std::vector<std::uint32_t>& triangles);
+  bool compare_all(const std::vector<std::uint32_t>& triangles, const Box& within);
+  bool may_meet(const Placed& a, const Placed& b, const Box& within) const;
+  bool reaches(std::uint32_t triangle, const exact::Plane& plane) const;
   bool compact();
 
   // work(index of the cell) for the cells of the first grid that a triangle touches.
@@ -91,17 +99,25 @@ exact::Plane plane_of(const LatticeSolids& solids, std::uint32_t triangle) {
 
 void Search::choose_grid() {
   Box all = box_of(0);
-  for (std::uint32_t t = 1; t < solids_.triangles.size(); ++t) {
+  std::uint64_t extents = 0;
+  const auto extent = [](const Box& box) {
+    const LatticePoint size = box.high - box.low;
+    return static_cast<std::uint32_t>(std::max({size.x, size.y, size.z}));
+  };
+  for (std::uint32_t t = 0; t < solids_.triangles.size(); ++t) {
     const Box box = box_of(t);
     all = {glm::min(all.low, box.low), glm::max(all.high, box.high)};
+    extents += extent(box);
   }
   low_ = all.low;
-  const LatticePoint size = all.high - all.low;
-  const auto longest = static_cast<std::uint32_t>(std::max({size.x, size.y, size.z}));
-  // A surface of n triangles touches about as many cells of a grid with sqrt(n) cells a side.
-  const int wanted = static_cast<int>(std::bit_width(solids_.triangles.size())) / 2;
-  bits_ = std::clamp(wanted, 1, kMostGridBits);
-  shift_ = std::max(0, static_cast<int>(std::bit_width(longest)) - bits_);
+  // Cells about half as large as the triangles: a triangle then touches few, and crowded cells are
+  // divided later. More than sqrt(n) cells a side are not worth their memory.
+  const std::uint64_t mean = extents / solids_.triangles.size();
+  const auto across = static_cast<int>(std::bit_width(extent(all) / (mean + 1) * 2));
+  const int most =
+      std::min(kMostGridBits, static_cast<int>(std::bit_width(solids_.triangles.size())) / 2);
+  bits_ = std::max(1, std::min(across, most));
+  shift_ = std::max(0, static_cast<int>(std::bit_width(extent(all))) - bits_);
 }
 
 template <class Work>
@@ -141,13 +157,32 @@ void Search::collect(std::uint32_t triangle) {
   if (mixed) result_.mixed_triangles.push_back(triangle);
 }
 
-bool Search::compare_all(const std::vector<std::uint32_t>& triangles) {
-  std::vector<Box> boxes;
-  boxes.reserve(triangles.size());
-  for (const std::uint32_t t : triangles) boxes.push_back(box_of(t));
-  for (std::size_t j = 1; j < triangles.size(); ++j) {
+// Whether two triangles may share a point in the cell `within`, as far as boxes and planes tell.
+bool Search::may_meet(const Placed& a, const Placed& b, const Box& within) const {
+  for (int k = 0; k < 3; ++k) {
+    if (std::max({a.box.low[k], b.box.low[k], within.low[k]}) >
+        std::min({a.box.high[k], b.box.high[k], within.high[k]})) {
+      return false;
+    }
+  }
+  return reaches(b.triangle, a.plane) && reaches(a.triangle, b.plane);
+}
+
+bool Search::reaches(std::uint32_t triangle, const exact::Plane& plane) const {
+  const glm::uvec3& t = solids_.triangles[triangle];
+  const auto side = [&](std::uint32_t v) { return exact::height(plane, solids_.vertices[v]); };
+  const exact::Int128 a = side(t.x), b = side(t.y), c = side(t.z);
+  return !(a > 0 && b > 0 && c > 0) && !(a < 0 && b < 0 && c < 0);
+}
+
+bool Search::compare_all(const std::vector<std::uint32_t>& triangles, const Box& within) {
+  std::vector<Placed> placed;
+  placed.reserve(triangles.size());
+  for (const std::uint32_t t : triangles) placed.push_back({t, box_of(t), plane_of(solids_, t)});
+  for (std::size_t j = 1; j < placed.size(); ++j) {
+    const std::uint32_t solid = solid_of_[triangles[j]];
     for (std::size_t i = 0; i < j; ++i) {
-      if (solid_of_[triangles[i]] != solid_of_[triangles[j]] && boxes[i].touches(boxes[j])) {
+      if (solid_of_[triangles[i]] != solid && may_meet(placed[i], placed[j], within)) {
         result_.pairs.push_back({triangles[i], triangles[j]});
       }
     }
@@ -171,7 +206,7 @@ bool Search::search(const std::vector<std::uint32_t>& triangles, const Box& box)
     return true;
   }
   const std::int32_t side = box.high.x - box.low.x + 1;
-  if (triangles.size() <= kFewTriangles || side == 1) return compare_all(triangles);
+  if (triangles.size() <= kFewTriangles || side == 1) return compare_all(triangles, box);
   std::vector<std::uint32_t> parts[8];
   Box boxes[8];
   std::size_t total = 0;
@@ -188,7 +223,7 @@ bool Search::search(const std::vector<std::uint32_t>& triangles, const Box& box)
     }
   }
   for (const auto& part : parts) total += part.size();
-  if (total >= 6 * triangles.size()) return compare_all(triangles);  // division does not help
+  if (total >= 6 * triangles.size()) return compare_all(triangles, box);  // division does not help
   for (int part = 0; part < 8; ++part) {
     if (!parts[part].empty() && !search(parts[part], boxes[part])) return false;
   }

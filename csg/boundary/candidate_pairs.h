@@ -15,7 +15,8 @@ struct TrianglePair {
 };
 
 struct CandidatePairs {
-  /// Each pair once, sorted: all pairs that share a point, and others whose boxes do.
+  /// Each pair once, sorted: all pairs that share a point, and others whose boxes do and of which
+  /// each reaches the plane of the other.
   std::vector<TrianglePair> pairs;
   /// Triangles in a cell that two solids touch, sorted: no other one meets another solid.
   std::vector<std::uint32_t> mixed_triangles;
