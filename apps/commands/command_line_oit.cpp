@@ -60,6 +60,10 @@ void define_oit(CLI::App& app, Words& words) {
          "FILE", technique);
   option("--light", oit.light, "With --media: direction to a light, instead of the file's", "X,Y,Z",
          technique);
+  app.add_flag("--fxaa", oit.fxaa,
+               "Filter pictures before they are written: FXAA blends what looks like the steps of "
+               "an edge")
+      ->group(technique);
   app.add_flag("--list", oit.list,
                "List all techniques with accuracy, memory, papers and where they fail, and exit")
       ->group(technique);

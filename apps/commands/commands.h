@@ -110,6 +110,7 @@ struct OitCommand : PictureRequest {
   std::string report;               ///< folder of the page; empty: none
   std::string media;                ///< file of media in solids, drawn instead of techniques
   std::optional<glm::dvec3> light;  ///< with media: the direction to a light
+  bool fxaa = false;                ///< pictures are filtered before they are written
   bool list = false;                ///< only the list of techniques
 };
 

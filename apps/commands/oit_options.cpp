@@ -158,6 +158,7 @@ Result<void> read_oit_options(const OitWords& words, OitCommand& command) {
     if (*seed < 0) return fail(ErrorCode::kUsage, "--seed must be 0 or more, got {}", *seed);
     settings.seed = static_cast<std::uint64_t>(*seed);
   }
+  command.fxaa = words.fxaa;
   command.report = words.report;
   if (auto read = read_media_words(words, command); !read) return read;
   if (auto read = read_techniques(words, settings, command); !read) return read;

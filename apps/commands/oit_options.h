@@ -12,7 +12,7 @@ namespace strata::apps {
 struct OitWords {
   std::vector<std::string> techniques;
   std::string opacity, seed, load, threshold, report, media, light;
-  bool list = false;
+  bool fxaa = false, list = false;
 };
 
 /// Reads the words into `command`, whose common part, inputs, output, report and picture are set.

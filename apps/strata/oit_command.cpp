@@ -15,6 +15,7 @@
 #include "csg/picture/encode_png.h"
 #include "strata/csg/input/scene_input.h"
 #include "strata/csg/input/see_through.h"
+#include "strata/transparency/media/fxaa.h"
 #include "strata/transparency/media/media.h"
 #include "strata/transparency/write_image.h"
 
@@ -192,6 +193,7 @@ Result<void> OitRun::open_frame() {
 Result<void> OitRun::draw_media() {
   auto settings = transparency::read_media(command_.media);
   if (!settings) return tl::unexpected(settings.error());
+  if (auto kept = session_.opened(settings->files); !kept) return kept;
   if (command_.light) {
     settings->light.at = *command_.light;
     settings->light.point = false;
@@ -289,10 +291,13 @@ Result<void> OitRun::write(const transparency::Image& image, const std::string& 
     place = folder_->temporary_path() + path.substr(command_.output.size() - 1);
   }
   Result<void> done;
+  transparency::Image filtered;
+  if (command_.fxaa) filtered = transparency::fxaa(image, {}, session_.execution("filtering"));
+  const transparency::Image& seen = command_.fxaa ? filtered : image;
   if (has_extension(place, ".exr")) {
-    done = transparency::write_exr(image, place);
+    done = transparency::write_exr(seen, place);
   } else {
-    done = csg::write_png({image.width, image.height, transparency::to_bytes(image)}, place);
+    done = csg::write_png({seen.width, seen.height, transparency::to_bytes(seen)}, place);
   }
   outcome_.write_ms += session_.milliseconds() - begin;
   return done;

@@ -74,7 +74,7 @@ class FaceCollector {
       if (material.colour) colour = glm::vec4(*material.colour, colour.a);
       colour.a = material.opacity.value_or(colour.a);
       scene_.objects.push_back(
-          {fmt::format("{}: {}", solid.name, material.name), seen_through(colour)});
+          {fmt::format("{}: {}", solid.name, material.name), seen_through(colour), base - 1});
     }
     const auto& elements = solid.mesh->face_elements;
     for (std::size_t t = 0; t < solid.mesh->triangles.size(); ++t) {

@@ -92,6 +92,9 @@ TEST_F(ReadMedia, TakesTablesOfParticles) {
   const auto settings =
       read(R"({"particles": {"file": "drops.csv", "extinction": [3, 4, 5], "albedo": 0.5}})");
   ASSERT_TRUE(settings) << settings.error().message;
+  ASSERT_EQ(settings->files.size(), 2u);
+  EXPECT_TRUE(settings->files[0].is_same_file(identify_file(path())));
+  EXPECT_TRUE(settings->files[1].is_same_file(identify_file(folder_.file("drops.csv"))));
   ASSERT_EQ(settings->particles.size(), 2u);
   EXPECT_EQ(settings->particles[0].centre, glm::dvec3(1, 2, 3));
   EXPECT_EQ(settings->particles[0].radius, 0.5);

@@ -140,7 +140,7 @@ Result<std::vector<const Medium*>> choose_media(const Scene& scene,
   for (const NamedMedium& named : media) {
     bool fits = named.object == "*";
     for (std::size_t o = 0; o < chosen.size(); ++o) {
-      if (!matches(named.object, scene.objects[o].name)) continue;
+      if (scene.objects[o].part_of || !matches(named.object, scene.objects[o].name)) continue;
       fits = true;
       const bool same = named.object == scene.objects[o].name;
       const std::size_t of_this = same ? std::string::npos : named.object.size();
@@ -192,17 +192,26 @@ Result<MediaTable> make_media_table(const Scene& scene, const MediaSettings& set
   const auto count = static_cast<std::size_t>(
       std::count_if(chosen.begin(), chosen.end(), [](const Medium* m) { return m != nullptr; }));
   const double unit = unit_of(settings, count);
-  for (std::size_t o = 0; o < chosen.size(); ++o) {
-    if (chosen[o] == nullptr) continue;
-    const Medium& medium = *chosen[o];
-    table.medium_of[o] = static_cast<std::uint32_t>(table.solids.size());
-    table.solids.push_back(terms_of(medium.extinction, medium.albedo, unit));
-    table.objects.push_back(static_cast<std::uint32_t>(o));
-    table.surface.push_back(medium.surface ? 1 : 0);
+  const auto fill = [&](std::size_t o, const Medium& medium) {
     // Never opaque: rays must not lose crossings of a solid that they may begin in.
     table.looks[o].opaque = false;
     if (!medium.surface) table.looks[o].colour = glm::vec4(0.0f);
     if (medium.surface && medium.surface_colour) table.looks[o].colour = *medium.surface_colour;
+  };
+  for (std::size_t o = 0; o < chosen.size(); ++o) {
+    if (chosen[o] == nullptr) continue;
+    const Medium& medium = *chosen[o];
+    fill(o, medium);
+    table.medium_of[o] = static_cast<std::uint32_t>(table.solids.size());
+    table.solids.push_back(terms_of(medium.extinction, medium.albedo, unit));
+    table.objects.push_back(static_cast<std::uint32_t>(o));
+    table.surface.push_back(medium.surface ? 1 : 0);
+  }
+  for (std::size_t o = 0; o < chosen.size(); ++o) {
+    const auto whole = scene.objects[o].part_of;
+    if (!whole || *whole >= chosen.size() || chosen[*whole] == nullptr) continue;
+    table.medium_of[o] = table.medium_of[*whole];
+    fill(o, *chosen[*whole]);
   }
   table.particles.reserve(settings.particles.size());
   for (const Particle& p : settings.particles) {

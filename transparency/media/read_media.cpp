@@ -208,7 +208,8 @@ Result<void> read_particle(const Member& from, std::vector<Particle>& particles)
   return {};
 }
 
-Result<void> read_particles_of(const Member& from, std::vector<Particle>& particles) {
+Result<void> read_particles_of(const Member& from, MediaSettings& settings) {
+  std::vector<Particle>& particles = settings.particles;
   if (from.value.is_array()) {
     for (std::size_t i = 0; i < from.value.size(); ++i) {
       if (auto done = read_particle(from.at(i), particles); !done) return done;
@@ -222,11 +223,13 @@ Result<void> read_particles_of(const Member& from, std::vector<Particle>& partic
   std::string file;
   if (auto done = from["file"].read(file); !done) return done;
   const auto beside = std::filesystem::path(from.path).parent_path() / file;
+  settings.files.push_back(identify_file(beside.string()));
   return read_particles(beside.string(), common, particles);
 }
 
 Result<MediaSettings> read_all(const Member& from) {
   MediaSettings settings;
+  settings.files.push_back(identify_file(from.path));
   if (auto good = from.expect_object({"media", "ambient", "light", "particles"}); !good) {
     return tl::unexpected(good.error());
   }
@@ -241,7 +244,7 @@ Result<MediaSettings> read_all(const Member& from) {
     }
   }
   if (done && from.has("particles")) {
-    done = read_particles_of(from["particles"], settings.particles);
+    done = read_particles_of(from["particles"], settings);
   }
   if (!done) return tl::unexpected(done.error());
   return settings;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "strata/core/execution.h"
+#include "strata/core/file_identity.h"
 #include "strata/core/result.h"
 #include "strata/raster/view.h"
 #include "strata/transparency/stream/frame.h"
@@ -86,6 +87,7 @@ struct MediaSettings {
   glm::vec3 ambient{1.0f};          ///< light from everywhere, that media scatter
   MediaLight light;                 ///< one more light
   std::vector<Particle> particles;  ///< besides the solids
+  std::vector<FileIdentity> files;  ///< that read_media() has read, the media file first
 };
 
 /// Reads settings from a JSON file; docs/media.md says what it holds. @return kInput naming the

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <glm/vec4.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,9 @@ struct Object {
   std::string name;  ///< for messages and reports
   /// Red, green, blue, opacity in [0, 1]; not premultiplied. An opacity of 1 is opaque.
   glm::vec4 colour{0.7f, 0.7f, 0.7f, 0.5f};
+  /// The object that it bounds a solid together with, such as the faces of another material. Media
+  /// fill whole solids. Empty: it bounds one by itself.
+  std::optional<std::uint32_t> part_of = {};
 };
 
 /// Triangles with colours, seen from both sides.

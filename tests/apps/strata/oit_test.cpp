@@ -237,6 +237,46 @@ TEST_F(Oit, MediaInSolidsLetThroughWhatBeerSays) {
   refuses({"box.obj", "--json=fog.json", "-o", "a.png", "--media=fog.json"}, 2, "overwrite");
 }
 
+TEST_F(Oit, AMediumFillsASolidOfSeveralMaterials) {
+  place.write("two.mtl", "newmtl red\nKd 1 0 0\nd 0.5\nnewmtl blue\nKd 0 0 1\nd 0.5\n");
+  std::string obj = "mtllib two.mtl\nusemtl red\n";
+  std::istringstream lines(place.read("box.obj"));
+  int faces = 0;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.rfind("f ", 0) == 0 && ++faces == 7) obj += "usemtl blue\n";
+    obj += line + "\n";
+  }
+  ASSERT_EQ(faces, 12);
+  place.write("two.obj", obj);
+  place.write("fog.json", R"({"ambient": 0, "media": [{"object": "*.obj", "extinction": 0.1}]})");
+  const Colour ground = middle({"box.obj", "--opacity=0"});
+  const Colour seen = middle({"two.obj", "--media=fog.json", "--strict"});
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_NEAR(seen[i], ground[i] * std::exp(-0.1 * 10), 1.01 / 255);
+  }
+}
+
+TEST_F(Oit, TablesOfParticlesAreNotOverwritten) {
+  place.write("drops.csv", "5,5,5,1\n");
+  place.write("fog.json", R"({"particles": {"file": "drops.csv"}})");
+  refuses({"box.obj", "--media=fog.json", "--json=drops.csv", "-o", "a.png"}, 2, "drops.csv");
+  EXPECT_EQ(place.read("drops.csv"), "5,5,5,1\n");
+}
+
+TEST_F(Oit, FxaaBlendsStepsOfEdges) {
+  const auto colours = [&](std::vector<std::string> more) {
+    more.insert(more.end(),
+                {"box.obj", "-o", "out.png", "--size=60,60", "--camera=5,5,5,55,0,25,40"});
+    run(std::move(more));
+    std::set<Colour> all;
+    for (int v = 0; v < 60; ++v) {
+      for (int u = 0; u < 60; ++u) all.insert(pixel("out.png", u, v));
+    }
+    return all.size();
+  };
+  EXPECT_GT(colours({"--fxaa"}), 3 * colours({}));
+}
+
 TEST_F(Oit, SeveralTechniquesWriteAPictureEach) {
   run({"box.obj", "--technique=count-scan,dual-peeling", "-o", "out.png", "--size=20,20"});
   EXPECT_TRUE(place.has("out-count-scan.png"));
