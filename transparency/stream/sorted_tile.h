@@ -25,10 +25,16 @@ class SortedTile {
   /// The same, but the lists are in submission order.
   void store(TileStream& stream) {
     counts_.fill(0);
+    most_layers_ = 0;
+    size_ = 0;
+    if (stream.size() == 0) {
+      ends_.fill(0);
+      stream.count_pass(0);
+      return stream.count_pass(0);
+    }
     std::uint32_t* counts = counts_.data();
     stream.pass([counts](std::uint32_t pixel, DepthItem) { ++counts[pixel]; });
     std::uint32_t sum = 0;
-    most_layers_ = 0;
     for (std::size_t pixel = 0; pixel < kTilePixels; ++pixel) {
       ends_[pixel] = sum;
       sum += counts[pixel];
