@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <glm/ext/matrix_transform.hpp>
 #include <random>
+#include <tuple>
 
 #include "strata/mesh/shapes.h"
 
@@ -138,6 +139,25 @@ TEST(CandidatePairs, HoldAllPairsThatShareAPointAndNoneThatBoxesOrPlanesTellApar
   }
   EXPECT_GT(sharing, 10000u);
   EXPECT_GT(found, sharing);
+}
+
+// Snapping makes segments and points of slivers; they still cut others.
+TEST(CandidatePairs, TrianglesWithoutAreaAreFoundToo) {
+  std::mt19937_64 random(8);
+  for (int round = 0; round < 200; ++round) {
+    Soup soup = random_soup(random, 1, 80);
+    const auto& [vertices, triangles] = std::tie(soup.solids.vertices, soup.solids.triangles);
+    const auto hit = static_cast<std::uint32_t>(random() % 80);
+    const glm::uvec3 t = triangles[hit];
+    const LatticePoint on = vertices[t.x], off = on + LatticePoint(0, 0, 3);
+    soup.add(1, on, off, round % 2 == 0 ? off : on);  // a segment that ends in a corner
+    soup.add(1, on, on, on);
+    soup.solids.first_triangle.push_back(82);
+    const auto result = find_candidate_pairs(soup.solids);
+    ASSERT_TRUE(result.has_value());
+    ASSERT_TRUE(std::ranges::binary_search(result->pairs, TrianglePair{hit, 80})) << round;
+    ASSERT_TRUE(std::ranges::binary_search(result->pairs, TrianglePair{hit, 81})) << round;
+  }
 }
 
 CandidatePairs pairs_of(const Tree& tree) {
