@@ -104,6 +104,81 @@ TEST(VolumeSum, HasRoomForTheLargestMesh) {
   EXPECT_EQ(whole(lattice.six_volumes()), sum);
 }
 
+TEST(MomentSum, OfABoxAreThoseOfTheFormulas) {
+  Draw random(Input::kRandom29, 76);
+  for (int i = 0; i < 200; ++i) {
+    const LatticePoint p = random.point(), q = random.point();
+    const LatticePoint low = glm::min(p, q), high = glm::max(p, q) + LatticePoint(1);
+    MomentSum sum, outside_in;
+    for (const Triangle& t : box(low, high)) {
+      sum.add(fine_point(t.a), fine_point(t.b), fine_point(t.c));
+      outside_in.add(fine_point(t.a), fine_point(t.c), fine_point(t.b));
+    }
+    const LatticePoint size = high - low;
+    const Fraction volume(Whole(size.x) * size.y * size.z);
+    ASSERT_TRUE(is_nearest(sum.volume().volume(), volume));
+    for (int k = 0; k < 3; ++k) {
+      const Fraction middle(Whole(low[k]) + high[k], 2);
+      ASSERT_TRUE(is_nearest(sum.centre(k), middle));
+      ASSERT_TRUE(is_nearest(outside_in.centre(k), middle));
+      for (int j = 0; j < 3; ++j) {
+        const Fraction moment = j == k ? Fraction(volume * size[k] * size[k] / 12) : Fraction(0);
+        ASSERT_TRUE(is_nearest(sum.central_moment(j, k), moment));
+        ASSERT_EQ(outside_in.central_moment(j, k), -sum.central_moment(j, k));
+      }
+    }
+  }
+}
+
+// Of a tetrahedron anywhere: V / 20 times the sum over its corners, about its centre, of v v^T.
+TEST(MomentSum, OfATetrahedronAreThoseOfItsCorners) {
+  for (const Input input : kInputs) {
+    Draw random(input, 77);
+    for (int i = 0; i < 100; ++i) {
+      const LatticePoint p[4] = {random.point(), random.point(), random.point(), random.point()};
+      const int side = orient3d(p[0], p[1], p[2], p[3]);
+      if (side == 0) continue;
+      MomentSum sum, part;
+      int face = 0;
+      for (const auto& [a, b, c] : {std::array{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}}) {
+        (face++ % 2 == 0 ? sum : part).add(fine_point(p[a]), fine_point(p[b]), fine_point(p[c]));
+      }
+      sum.add(part);
+      const Fraction volume = Triangle{p[0], p[1], p[2]}.height(vector_of(p[3])) / 6;
+      ASSERT_TRUE(is_nearest(sum.volume().volume(), volume));
+      Vector corner[4], centre{};
+      for (int k = 0; k < 4; ++k) {
+        corner[k] = vector_of(p[k]);
+        centre = centre + Fraction(1, 4) * corner[k];
+      }
+      for (std::size_t j = 0; j < 3; ++j) {
+        ASSERT_TRUE(is_nearest(sum.centre(static_cast<int>(j)), centre[j]));
+        for (std::size_t k = 0; k < 3; ++k) {
+          Fraction moment = 0;
+          for (const Vector& v : corner) moment += (v[j] - centre[j]) * (v[k] - centre[k]);
+          ASSERT_TRUE(is_nearest(sum.central_moment(static_cast<int>(j), static_cast<int>(k)),
+                                 Fraction(moment * volume / 20)));
+        }
+      }
+    }
+  }
+}
+
+// 2^32 of the largest tetrahedra: the sums are doubled, so the centre stays where it is.
+TEST(MomentSum, HasRoomForTheLargestMesh) {
+  const std::int32_t m = 1 << 28;
+  MomentSum sum;
+  sum.add(fine_point({m, m, m}), fine_point({-m, m, -m}), fine_point({m, -m, -m}));
+  sum.add(fine_point({m, m, m}), fine_point({-m, m, m}), fine_point({m, -m, m}));
+  sum.add(fine_point({m, m, -m}), fine_point({-m, m, m}), fine_point({m, m, m}));
+  const double centre[3] = {sum.centre(0), sum.centre(1), sum.centre(2)};
+  const double moment = sum.central_moment(0, 1), square = sum.central_moment(2, 2);
+  for (int i = 0; i < 30; ++i) sum.add(MomentSum(sum));
+  for (int k = 0; k < 3; ++k) EXPECT_EQ(sum.centre(k), centre[k]);
+  EXPECT_EQ(sum.central_moment(0, 1), std::ldexp(moment, 30));
+  EXPECT_EQ(sum.central_moment(2, 2), std::ldexp(square, 30));
+}
+
 TEST(AreaSum, OfABoxIsItsAreaToTheDigit) {
   Draw random(Input::kRandom26, 73);
   for (int i = 0; i < 200; ++i) {
