@@ -88,7 +88,7 @@ double MomentSum::centre(int k) const {
 }
 
 // S / 120 - (F_i / 24) (F_j / 24) / (D / 6) = (4 S D - 5 F_i F_j) / (480 D). S D has at most
-// 498 + 311 bits, F_i F_j 808; 480 D has 320, one more than Int320 holds.
+// 498 + 311 bits, F_i F_j 808; 480 D has 319, all that an Int320 holds.
 double MomentSum::central_moment(int i, int j) const {
   const auto place = static_cast<std::size_t>(i == j ? i : 6 - i - j);  // yz: 3, zx: 4, xy: 5
   const Wide<6> d(volume_.six_volumes());

@@ -15,9 +15,9 @@ namespace strata::exact {
 /// area * 2^-63 cubic steps.
 class VolumeSum {
  public:
-  /// a . (b x c) of lattice points: at most 4 * 2^84; 2^32 of them: 118 bits.
+  /// a . (b x c) of lattice points: at most 4 * 2^84; 2^32 of them: 119 bits.
   void add(const LatticePoint& a, const LatticePoint& b, const LatticePoint& c);
-  /// The same in fine steps: at most 4 * 2^276; 2^32 of them: 310 bits.
+  /// The same in fine steps: at most 4 * 2^276; 2^32 of them: 311 bits.
   void add(const FinePoint& a, const FinePoint& b, const FinePoint& c);
   void add(const VolumeSum& other);
 
