@@ -90,21 +90,14 @@ class FramePass {
     if (auto made = worker.source->tile(tu, tv, keep_hidden_, worker.fragments); !made) return made;
     worker.raster_seconds += seconds_since(begin);
     const auto made = Clock::now();
+    worker.image.clear();
     Costs costs;
     TileStream stream(worker.fragments, info_, rect, costs);
     costs.fragments = stream.size();
-    const bool plain = info_.across * info_.down == 1 && !worker.fragments.any_opaque;
-    if (!plain || stream.size() > 0) worker.image.clear();
     if (auto done = worker.renderer(stream, worker.image); !done) return done;
     costs.geometry_passes = stream.passes();
     worker.costs.add(costs);
-    if (!plain) {
-      resolve(worker, rect);
-    } else if (stream.size() > 0) {
-      resolve_plain(worker, rect);
-    } else {
-      fill(rect);
-    }
+    resolve(worker, rect);
     worker.technique_seconds += seconds_since(made);
     return {};
   }
@@ -116,14 +109,6 @@ class FramePass {
     const DepthItem item = fragments.opaque[pixel];
     if (item == TileFragments::kNothing) return background_;
     return info_.colours[static_cast<std::size_t>(item.triangle()) << 1 | (item.exit() ? 1 : 0)];
-  }
-  /// One sample a pixel, and nothing in front of the background.
-  void fill(const PixelRect& rect) const {
-    for (int v = rect.v0; v < rect.v1; ++v) {
-      std::fill_n(image_.pixels.data() + rect.u0 +
-                      static_cast<std::size_t>(v) * static_cast<std::size_t>(image_.width),
-                  rect.u1 - rect.u0, background_);
-    }
   }
   /// One sample a pixel, and no opaque objects.
   void resolve_plain(const Worker& worker, const PixelRect& rect) const {
@@ -142,6 +127,7 @@ class FramePass {
   /// The mean of the samples of each pixel.
   void resolve(const Worker& worker, const PixelRect& rect) const {
     const int across = info_.across, down = info_.down;
+    if (across * down == 1 && !worker.fragments.any_opaque) return resolve_plain(worker, rect);
     const float share = 1.0f / static_cast<float>(across * down);
     for (int v = rect.v0; v < rect.v1; v += down) {
       glm::vec4* out = image_.pixels.data() +
