@@ -49,7 +49,7 @@ void each(benchmark::State& state, const Work& work, int bits = 26) {
     for (std::size_t i = 0; i < kCount; ++i) benchmark::DoNotOptimize(work(input, i));
   }
   state.counters["each"] =
-      benchmark::Counter(static_cast<double>(state.iterations() * kCount),
+      benchmark::Counter(static_cast<double>(state.iterations()) * kCount,
                          benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
 }
 
