@@ -105,6 +105,7 @@ std::string list_text() {
     };
     line("number", number_of(*technique));
     line("variants", technique->variants);
+    if (technique->needs_triangles) line("needs", "triangles: meshes without --expr and --cut");
     line("memory", technique->memory);
     line("fails", technique->fails);
     line("paper", technique->paper);
@@ -126,6 +127,7 @@ std::string list_json() {
     json.member("most", technique->most_k);
     json.member("default", technique->default_k);
     json.member("variants", technique->variants);
+    json.member("needs_triangles", technique->needs_triangles);
     json.end_object();
   }
   json.end_array();
