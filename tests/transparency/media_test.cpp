@@ -384,17 +384,37 @@ double hit(const glm::dvec3& from, const glm::dvec3& along, const glm::dvec3& a,
   return u < 0 || v < 0 || u + v > 1 ? -1.0 : glm::dot(f, q);
 }
 
+/// Where a ray meets the triangle or the ball of a medium.
+struct Crossing {
+  double at;
+  std::size_t medium;  // solids, then particles
+};
+
+/// The crossings of a ray with balls. @param inside  of each ball: whether the ray begins there
+std::vector<Crossing> ball_crossings(const MediaSettings& media, std::size_t solids,
+                                     const glm::dvec3& from, const glm::dvec3& along,
+                                     std::vector<bool>& inside) {
+  std::vector<Crossing> found;
+  for (std::size_t i = 0; i < media.particles.size(); ++i) {
+    const Particle& ball = media.particles[i];
+    const glm::dvec3 to = from - ball.centre;
+    const double b = glm::dot(to, along);
+    const double root = b * b - glm::dot(to, to) + ball.radius * ball.radius;
+    if (root <= 0.0) continue;
+    for (const double distance : {-b - std::sqrt(root), -b + std::sqrt(root)}) {
+      if (distance > 0.0) found.push_back({distance, solids + i});
+    }
+    inside[solids + i] = -b - std::sqrt(root) <= 0.0 && -b + std::sqrt(root) > 0.0;
+  }
+  return found;
+}
+
 /// A picture's colour by brute force: every ray with every triangle and every ball, in doubles.
 glm::dvec3 traced(const Scene& scene, const MediaSettings& media, const glm::dvec3& from,
                   const glm::dvec3& along) {
-  struct Event {
-    double at;
-    std::size_t medium;  // solids, then particles
-    std::size_t triangle;
-  };
-  std::vector<Event> events;
   const std::size_t solids = scene.objects.size();
   std::vector<bool> inside(solids + media.particles.size(), false);
+  std::vector<Crossing> events = ball_crossings(media, solids, from, along, inside);
   double opaque = 1e9;
   glm::dvec3 behind = kBehind;
   for (std::size_t t = 0; t < scene.mesh.triangles.size(); ++t) {
@@ -404,26 +424,15 @@ glm::dvec3 traced(const Scene& scene, const MediaSettings& media, const glm::dve
     if (distance <= 0.0) continue;
     const std::size_t object = scene.object_of[t];
     if (scene.objects[object].colour.a < 1.0f) {
-      events.push_back({distance, object, t});
+      events.push_back({distance, object});
       if (scene.objects[object].name != "pane") inside[object] = !inside[object];
     } else if (distance < opaque) {
       opaque = distance;
       behind = glm::dvec3(scene.objects[object].colour);
     }
   }
-  for (std::size_t i = 0; i < media.particles.size(); ++i) {
-    const Particle& ball = media.particles[i];
-    const glm::dvec3 to = from - ball.centre;
-    const double b = glm::dot(to, along);
-    const double root = b * b - glm::dot(to, to) + ball.radius * ball.radius;
-    if (root <= 0.0) continue;
-    for (const double distance : {-b - std::sqrt(root), -b + std::sqrt(root)}) {
-      if (distance > 0.0) events.push_back({distance, solids + i, 0});
-    }
-    inside[solids + i] = -b - std::sqrt(root) <= 0.0 && -b + std::sqrt(root) > 0.0;
-  }
   std::sort(events.begin(), events.end(),
-            [](const Event& a, const Event& b) { return a.at < b.at; });
+            [](const Crossing& a, const Crossing& b) { return a.at < b.at; });
   RayOracle ray;
   double at = 0.0;
   const auto move_to = [&](double distance) {
@@ -439,7 +448,7 @@ glm::dvec3 traced(const Scene& scene, const MediaSettings& media, const glm::dve
     ray.segment(distance - at, s, q, media.ambient);
     at = distance;
   };
-  for (const Event& event : events) {
+  for (const Crossing& event : events) {
     if (event.at > opaque) break;
     move_to(event.at);
     if (event.medium < solids && scene.objects[event.medium].name == "pane") {
