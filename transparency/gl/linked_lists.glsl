@@ -3,7 +3,10 @@
 // pages" (2010). The counter goes on counting where the nodes run out; then the frame is drawn once more.
 layout(std430, binding = 8) coherent buffer store_heads_block { uint store_heads[]; };  // the last node + 1; 0: none
 layout(std430, binding = 9) coherent buffer store_nodes_block { uint store_nodes[]; };
-layout(std430, binding = 10) coherent buffer store_counter_block { uint store_counter; };
+layout(std430, binding = 10) coherent buffer store_counter_block {
+  uint store_counter;  // nodes that were asked for
+  uint store_missed;   // fragments that found no way to a locked pixel: the frame is drawn once more
+};
 #if STORE_PAGE > 1
 layout(std430, binding = 11) coherent buffer store_filled_block { uint store_filled[]; };  // [locked:1 | fragments:31]
 #endif
@@ -17,9 +20,10 @@ void strata_insert(uint pixel, uint depth, uint payload) {
   if (!store_takes(pixel)) return;
   // The holder of a lock gives it back in the same round, so that threads that run in step cannot wait for ever.
   bool done = false;
-  for (uint round = 0u; !done && round < 60000u; ++round) {
-    if ((atomicOr(store_filled[pixel], 0x80000000u) & 0x80000000u) != 0u) continue;
-    uint count = store_filled[pixel] & 0x7fffffffu;
+  for (uint round = 0u; !done && round < 4096u; ++round) {
+    uint count = atomicOr(store_filled[pixel], 0x80000000u);
+    if ((count & 0x80000000u) != 0u) continue;
+    memoryBarrierBuffer();
     uint place = count % uint(STORE_PAGE);
     uint node = store_heads[pixel];
     if (place == 0u) {
@@ -43,6 +47,7 @@ void strata_insert(uint pixel, uint depth, uint payload) {
     atomicExchange(store_filled[pixel], count + 1u);
     done = true;
   }
+  if (!done) atomicAdd(store_missed, 1u);
 }
 #else
 void strata_insert(uint pixel, uint depth, uint payload) {

@@ -127,12 +127,12 @@ class LinkedStore final : public SlotStore {
     if (page_ > 1) filled_.bind(11);
   }
   Result<bool> end() override {
-    std::uint32_t nodes = 0;
-    counter_.download(std::span(&nodes, 1));
+    std::uint32_t counters[2] = {};  // nodes that were asked for, fragments that were missed
+    counter_.download(std::span<std::uint32_t>(counters));
     if (auto good = check_errors("linked lists"); !good) return tl::unexpected(good.error());
-    if (nodes <= nodes_) return true;
+    if (counters[0] <= nodes_ && counters[1] == 0) return true;
     // The counter of single nodes is the exact need; that of pages is too, since it counts on.
-    nodes_ = nodes;
+    nodes_ = std::max(nodes_, counters[0]);
     if (auto done = empty(); !done) return tl::unexpected(done.error());
     return false;
   }
@@ -155,7 +155,7 @@ class LinkedStore final : public SlotStore {
     }
     if (auto room = reserve(heads_, std::uint64_t{pixels_} * 4); !room) return room;
     if (auto room = reserve(nodes_buffer_, nodes_ * node_bytes()); !room) return room;
-    if (auto room = counter_.reserve(4); !room) return room;
+    if (auto room = counter_.reserve(8); !room) return room;
     if (page_ > 1) {
       if (auto room = reserve(filled_, std::uint64_t{pixels_} * 4); !room) return room;
       filled_.clear();
