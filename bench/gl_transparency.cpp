@@ -174,7 +174,7 @@ oit::Scene quads(int layers, double coverage) {
 }
 
 void quads_table(const gl::Context& context, double budget) {
-  constexpr std::string_view kNames[] = {"b3d",  "count-scan", "paged",
+  constexpr std::string_view kNames[] = {"b3d",    "count-scan", "paged",
                                          "linked", "ha64",       "depth-peeling"};
   std::printf(
       "\n### Quads on %d x %d: frames a second, hardware rasterizer\n\n| layers | coverage |",

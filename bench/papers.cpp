@@ -92,7 +92,7 @@ class Papers {
       outcome.error = chosen.error().message;
       return outcome;
     }
-    const int rounds = plan_.quick ? 2 : 5;
+    const int rounds = plan_.quick ? 2 : 3;
     for (int i = 0; i < rounds; ++i) {
       auto rendering = frame.render(*chosen->technique, chosen->settings, execution_);
       if (!rendering) {
@@ -191,7 +191,7 @@ class Papers {
     const double published[] = {0.760, 0.491, 0.248, 0.041};
     const float opacities[] = {0.125f, 0.25f, 0.5f, 1.0f};
     for (int i = 0; i < 4; ++i) {
-      const Scene scene = hairball(plan_.quick ? 4000 : 30000, 40, opacities[i]);
+      const Scene scene = hairball(plan_.quick ? 4000 : 13000, 40, opacities[i]);
       const auto frame = front_view(scene, {1024, 1024});
       const Outcome out = render(frame, "ha64-culled");
       const Costs& costs = out.rendering.costs;
@@ -381,7 +381,7 @@ class Papers {
     // As deep as the power plant of the paper: 590 layers in the middle.
     std::vector<std::array<int, 4>> boxes;
     for (int i = 0; i < 590; ++i) {
-      const int half = 20 + i * 280 / 590;
+      const int half = 4 + i * 56 / 590;
       boxes.push_back({400 - half, 300 - half, 400 + half, 300 + half});
     }
     each("590 layers", rectangles(boxes, {800, 600}, 0.05f));

@@ -160,16 +160,11 @@ def plots(path):
 
     axis = axes[1][0]
     rows = load("loads")
-    if rows:
-        keys = list(rows[0])
-        for name in dict.fromkeys(row[keys[0]] for row in rows):
-            points = [row for row in rows if row[keys[0]] == name]
-            try:
-                axis.plot([number(p["load"]) for p in points], [number(p["Mfragments/s"]) for p in points], "o-",
-                          label=name)
-            except (KeyError, ValueError):
-                pass
-    axis.set(title="HA-buffer over the load of its table", xlabel="load", ylabel="million fragments a second")
+    for name in dict.fromkeys(row["technique"].split()[0] for row in rows):
+        points = [row for row in rows if row["technique"].split()[0] == name]
+        axis.plot([number(p["technique"].split()[1]) for p in points],
+                  [number(p["of cpu time"]) for p in points], "o-", label=name)
+    axis.set(title="HA-buffer over the load of its table", xlabel="load", ylabel="million fragments a second of CPU time")
     axis.legend(fontsize=7)
 
     axis = axes[1][1]
