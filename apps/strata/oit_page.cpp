@@ -155,7 +155,7 @@ std::string picture(const std::vector<std::uint8_t>& png, const OitCommand& comm
 }
 
 /// "1 234 567"
-std::string grouped(std::uint64_t number) {
+std::string page_number(std::uint64_t number) {
   std::string text = std::to_string(number);
   for (std::size_t at = text.size(); at > 3;) text.insert(at -= 3, "\u202f");
   return text;
@@ -216,7 +216,7 @@ std::string row(const OitResult& result, std::size_t index) {
   text += number_cell(d.largest, d.largest > 0.0 ? fmt::format("{:.2g}", d.largest) : "0");
   for (const std::uint64_t count : {d.pixels, costs.geometry_passes, costs.kept, costs.lost,
                                     costs.merged, costs.formula_bytes, costs.allocated_bytes}) {
-    text += number_cell(static_cast<double>(count), grouped(count));
+    text += number_cell(static_cast<double>(count), page_number(count));
   }
   text += number_cell(1000 * result.seconds, fmt::format("{:.1f}", 1000 * result.seconds));
   return text + fmt::format("<td class=\"text long\">{}</td><td class=\"text long\">{}</td></tr>\n",
@@ -302,7 +302,7 @@ std::string head(const OitCommand& command, const OitOutcome& outcome, int threa
   fact("Opacity", fmt::format("{:g} of what is opaque by itself", outcome.opacity));
   for (const OitResult& result : outcome.results) {
     if (!result.left_out.empty()) continue;
-    fact("Fragments", fmt::format("{}, at most {} in a sample", grouped(result.costs.fragments),
+    fact("Fragments", fmt::format("{}, at most {} in a sample", page_number(result.costs.fragments),
                                   counted(result.costs.most_layers, "layer")));
     break;
   }

@@ -208,7 +208,7 @@ class TreeFragments::TileWorker final : public Worker {
     items_.resize(log_.count);
     for (std::size_t i = 0; i < log_.count; ++i) items_[cursors_[log_.pixels[i]]++] = log_.keys[i];
     for (std::size_t pixel = 0; pixel < kTilePixels; ++pixel) {
-      detail::sort_list(items_.data() + ends_[pixel], items_.data() + ends_[pixel + 1]);
+      strata::detail::sort_list(items_.data() + ends_[pixel], items_.data() + ends_[pixel + 1]);
     }
   }
   /// The surfaces of one pixel.

@@ -17,8 +17,8 @@ constexpr std::string_view kVariants = "sum normalized";
 
 bool normalized(const Settings& settings) { return settings.variant == "normalized"; }
 
-Result<TileRenderer> make(const FrameInfo&, const Settings& settings,
-                          const std::shared_ptr<const void>&) {
+Result<TileRenderer> make_adaptive(const FrameInfo&, const Settings& settings,
+                                   const std::shared_ptr<const void>&) {
   return two_pass_renderer(AdaptiveNodes(settings.k), normalized(settings));
 }
 
@@ -107,7 +107,7 @@ const Technique kAdaptive{
     .fails =
         "too dark where a pixel has more fragments than nodes; fragments of equal depth do not "
         "attenuate one another",
-    .make = make,
+    .make = make_adaptive,
 };
 
 const Technique kAdaptiveLists{

@@ -117,8 +117,8 @@ class Hybrid {
 };
 
 template <class Row, class Tail>
-Result<TileRenderer> make(const FrameInfo&, const Settings& settings,
-                          const std::shared_ptr<const void>&) {
+Result<TileRenderer> make_hybrid(const FrameInfo&, const Settings& settings,
+                                 const std::shared_ptr<const void>&) {
   return [hybrid = std::make_shared<Hybrid<Row, Tail>>(settings.k)](
              TileStream& stream, TileImage& image) -> Result<void> {
     hybrid->render(stream, image);
@@ -126,14 +126,14 @@ Result<TileRenderer> make(const FrameInfo&, const Settings& settings,
   };
 }
 
-constexpr std::string_view kPaper = "Maule, Comba, Torchelsen, Bastos 2013";
+constexpr std::string_view kHybridPaper = "Maule, Comba, Torchelsen, Bastos 2013";
 
 }  // namespace
 
 const Technique kHybrid{
     .name = "ht",
     .title = "Hybrid transparency: nearest fragments and an average",
-    .paper = kPaper,
+    .paper = kHybridPaper,
     .accuracy = Accuracy::kBounded,
     .k_means = "rows",
     .default_k = 4,
@@ -142,13 +142,13 @@ const Technique kHybrid{
     .memory = FloatTail::kMemory,
     .fails =
         "where more is seen than the nearest rows - 1: all others share one colour and opacity",
-    .make = make<FloatRow, FloatTail>,
+    .make = make_hybrid<FloatRow, FloatTail>,
 };
 
 const Technique kHybridPacked{
     .name = "ht-packed",
     .title = "Hybrid transparency, 8 bits a channel",
-    .paper = kPaper,
+    .paper = kHybridPaper,
     .accuracy = Accuracy::kBounded,
     .k_means = "rows",
     .default_k = 4,
@@ -158,7 +158,7 @@ const Technique kHybridPacked{
     .fails =
         "as ht; colours are rounded, and the average of very many fragments keeps the colour of "
         "the first ones",
-    .make = make<PackedRow, PackedTail>,
+    .make = make_hybrid<PackedRow, PackedTail>,
 };
 
 }  // namespace strata::transparency

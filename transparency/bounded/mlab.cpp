@@ -117,8 +117,8 @@ class Mlab {
 };
 
 template <class Row>
-Result<TileRenderer> make(const FrameInfo&, const Settings& settings,
-                          const std::shared_ptr<const void>&) {
+Result<TileRenderer> make_mlab(const FrameInfo&, const Settings& settings,
+                               const std::shared_ptr<const void>&) {
   return [mlab = std::make_shared<Mlab<Row>>(settings)](TileStream& stream,
                                                         TileImage& image) -> Result<void> {
     mlab->render(stream, image);
@@ -126,7 +126,7 @@ Result<TileRenderer> make(const FrameInfo&, const Settings& settings,
   };
 }
 
-constexpr std::string_view kPaper = "Salvi, Vaidyanathan 2014";
+constexpr std::string_view kMlabPaper = "Salvi, Vaidyanathan 2014";
 constexpr std::string_view kMetrics =
     "transmittance colour depth transmittance-colour transmittance-depth colour-depth "
     "transmittance-colour-depth";
@@ -136,7 +136,7 @@ constexpr std::string_view kMetrics =
 const Technique kMlab{
     .name = "mlab",
     .title = "Multi-layer alpha blending",
-    .paper = kPaper,
+    .paper = kMlabPaper,
     .accuracy = Accuracy::kBounded,
     .k_means = "rows",
     .default_k = 4,
@@ -147,13 +147,13 @@ const Technique kMlab{
     .fails =
         "where a fragment falls between others that are merged already; the submission order "
         "shows",
-    .make = make<FloatRow>,
+    .make = make_mlab<FloatRow>,
 };
 
 const Technique kMlabPacked{
     .name = "mlab-packed",
     .title = "Multi-layer alpha blending, 8 bits a channel",
-    .paper = kPaper,
+    .paper = kMlabPaper,
     .accuracy = Accuracy::kBounded,
     .k_means = "rows",
     .default_k = 4,
@@ -164,7 +164,7 @@ const Technique kMlabPacked{
     .fails =
         "as mlab; colours and transmittance are rounded at each merge, and fragments at one "
         "depth keep the order of their arrival",
-    .make = make<PackedRow>,
+    .make = make_mlab<PackedRow>,
 };
 
 }  // namespace strata::transparency

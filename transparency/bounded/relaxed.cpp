@@ -9,7 +9,8 @@
 namespace strata::transparency {
 namespace {
 
-Result<TileRenderer> make(const FrameInfo&, const Settings&, const std::shared_ptr<const void>&) {
+Result<TileRenderer> make_relaxed(const FrameInfo&, const Settings&,
+                                  const std::shared_ptr<const void>&) {
   return [rows = std::make_shared<std::vector<FloatRow>>(kTilePixels)](
              TileStream& stream, TileImage& image) -> Result<void> {
     for_each_pixel(stream, [&](std::uint32_t pixel) { (*rows)[pixel] = FloatRow(); });
@@ -47,7 +48,7 @@ const Technique kRelaxed{
     .fails =
         "where a fragment lies between others that are blended already; the submission order "
         "shows",
-    .make = make,
+    .make = make_relaxed,
 };
 
 }  // namespace strata::transparency

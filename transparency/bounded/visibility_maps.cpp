@@ -9,11 +9,11 @@
 namespace strata::transparency {
 namespace {
 
-constexpr std::string_view kVariants = "normalized sum";
+constexpr std::string_view kVisibilityMapsVariants = "normalized sum";
 
 template <class Kind>
-Result<TileRenderer> make(const FrameInfo&, const Settings& settings,
-                          const std::shared_ptr<const void>&) {
+Result<TileRenderer> make_visibility_maps(const FrameInfo&, const Settings& settings,
+                                          const std::shared_ptr<const void>&) {
   return two_pass_renderer(Kind(settings.k), settings.variant == "normalized");
 }
 
@@ -28,10 +28,10 @@ const Technique kOpacityMap{
     .default_k = 16,
     .least_k = 1,
     .most_k = 1024,
-    .variants = kVariants,
+    .variants = kVisibilityMapsVariants,
     .memory = "4 bytes a slice and pixel; 4 more a pixel if normalized",
     .fails = "fragments within a slice do not attenuate one another",
-    .make = make<OpacityShadowMap>,
+    .make = make_visibility_maps<OpacityShadowMap>,
 };
 
 const Technique kOccupancyMap{
@@ -43,11 +43,11 @@ const Technique kOccupancyMap{
     .default_k = 128,
     .least_k = 32,
     .most_k = 1024,
-    .variants = kVariants,
+    .variants = kVisibilityMapsVariants,
     .memory = "4 bytes for 32 slices and 4 more, a pixel; 4 more if normalized",
     .fails =
         "where the fragments of a pixel differ in opacity: all slices with fragments count alike",
-    .make = make<OccupancyMap>,
+    .make = make_visibility_maps<OccupancyMap>,
 };
 
 const Technique kFourierMap{
@@ -59,10 +59,10 @@ const Technique kFourierMap{
     .default_k = 7,
     .least_k = 1,
     .most_k = 64,
-    .variants = kVariants,
+    .variants = kVisibilityMapsVariants,
     .memory = "8 bytes a term and 4 more, a pixel; 4 more if normalized",
     .fails = "visibility rings about surfaces of high opacity",
-    .make = make<FourierOpacityMap>,
+    .make = make_visibility_maps<FourierOpacityMap>,
 };
 
 }  // namespace strata::transparency

@@ -12,7 +12,8 @@
 namespace strata::transparency {
 namespace {
 
-Result<TileRenderer> make(const FrameInfo&, const Settings&, const std::shared_ptr<const void>&) {
+Result<TileRenderer> make_count_scan(const FrameInfo&, const Settings&,
+                                     const std::shared_ptr<const void>&) {
   return [lists = std::make_shared<SortedTile>()](TileStream& stream,
                                                   TileImage& image) -> Result<void> {
     lists->store(stream);
@@ -82,7 +83,7 @@ Result<std::shared_ptr<const void>> prepare_fixed_room(const FrameInfo& frame, c
 
 Result<TileRenderer> make_in_fixed_room(const FrameInfo& frame, const Settings& settings,
                                         const std::shared_ptr<const void>& prepared) {
-  auto inner = make(frame, settings, nullptr);
+  auto inner = make_count_scan(frame, settings, nullptr);
   if (!inner) return inner;
   const auto room = std::static_pointer_cast<const FixedRoom>(prepared);
   return [renderer = *inner, room](TileStream& stream, TileImage& image) -> Result<void> {
@@ -107,7 +108,7 @@ const Technique kCountScan{
     .paper = "Maule, Comba, Torchelsen, Bastos 2014",
     .memory = "8 bytes a fragment, 8 a pixel",
     .fails = "two geometry passes even where nothing is drawn",
-    .make = make,
+    .make = make_count_scan,
 };
 const Technique kTransmittanceForm{
     .name = "transmittance",

@@ -187,7 +187,8 @@ class CoverageMasks {
   std::uint64_t comparisons_ = 0;
 };
 
-Result<TileRenderer> make(const FrameInfo&, const Settings&, const std::shared_ptr<const void>&) {
+Result<TileRenderer> make_coverage_masks(const FrameInfo&, const Settings&,
+                                         const std::shared_ptr<const void>&) {
   return [masks = std::make_shared<CoverageMasks>()](TileStream& stream, TileImage& image) {
     return masks->render(stream, image);
   };
@@ -203,7 +204,7 @@ const Technique kCoverageMasks{
         "24 bytes a triangle's part of a pixel, 4 a pixel; 12 a sample's fragment in pixels "
         "where surfaces cross",
     .fails = "pixels in which surfaces cross need a second geometry pass",
-    .make = make,
+    .make = make_coverage_masks,
 };
 
 }  // namespace strata::transparency

@@ -46,8 +46,8 @@ struct State {
 };
 
 /// settings.k is 0 where the deepest pixel says how many slots there are.
-Result<TileRenderer> make(const FrameInfo&, const Settings& settings,
-                          const std::shared_ptr<const void>&) {
+Result<TileRenderer> make_fixed_array(const FrameInfo&, const Settings& settings,
+                                      const std::shared_ptr<const void>&) {
   return [state = std::make_shared<State>(), k = settings.k](TileStream& stream,
                                                              TileImage& image) -> Result<void> {
     Costs& costs = stream.costs();
@@ -76,7 +76,7 @@ const Technique kFixedArray{
     .paper = "Maule, Comba, Torchelsen, Bastos 2014",
     .memory = "8 bytes a slot, 4 a pixel; k slots a pixel",
     .fails = "slots of shallow and empty pixels are wasted",
-    .make = make,
+    .make = make_fixed_array,
 };
 const Technique kFixedArrayBounded{
     .name = "b3d-k",
@@ -89,7 +89,7 @@ const Technique kFixedArrayBounded{
     .most_k = 1024,
     .memory = "8 bytes a slot, 4 a pixel; k slots a pixel",
     .fails = "loses the fragments of a pixel that come after the k-th, wherever they lie",
-    .make = make,
+    .make = make_fixed_array,
 };
 
 }  // namespace strata::transparency

@@ -105,8 +105,8 @@ class Hash32Renderer {
   TileRenderer deep_;
 };
 
-Result<TileRenderer> make(const FrameInfo&, const Settings& settings,
-                          const std::shared_ptr<const void>&) {
+Result<TileRenderer> make_hash_32(const FrameInfo&, const Settings& settings,
+                                  const std::shared_ptr<const void>&) {
   return [renderer = std::make_shared<Hash32Renderer>(settings)](
              TileStream& stream, TileImage& image) { return renderer->render(stream, image); };
 }
@@ -120,7 +120,7 @@ const Technique kHash32{
     .variants = "plane-first random farthest-point",
     .memory = "4 bytes a cell for depths, 4 for surfaces; 1 byte a 64 pixels",
     .fails = "tiles with more than 255 layers go to ha64",
-    .make = make,
+    .make = make_hash_32,
 };
 
 }  // namespace strata::transparency

@@ -144,8 +144,8 @@ class HashRenderer {
 };
 
 template <class Concurrency, Sizing sizing>
-Result<TileRenderer> make(const FrameInfo&, const Settings& settings,
-                          const std::shared_ptr<const void>&) {
+Result<TileRenderer> make_hash_64(const FrameInfo&, const Settings& settings,
+                                  const std::shared_ptr<const void>&) {
   return [renderer = std::make_shared<HashRenderer<Concurrency, sizing>>(settings)](
              TileStream& stream, TileImage& image) { return renderer->render(stream, image); };
 }
@@ -162,7 +162,7 @@ const Technique kHash64{
     .variants = kOffsets,
     .memory = "8 bytes a cell, one cell a pixel or fragments / load; 1 byte a 64 pixels",
     .fails = "insertion is slow in tables that are more than 80 % full, and for deep pixels",
-    .make = make<Exclusive, Sizing::kByLoad>,
+    .make = make_hash_64<Exclusive, Sizing::kByLoad>,
 };
 const Technique kHash64Cas{
     .name = "ha64-cas",
@@ -171,7 +171,7 @@ const Technique kHash64Cas{
     .variants = kOffsets,
     .memory = kHash64.memory,
     .fails = kHash64.fails,
-    .make = make<Concurrent, Sizing::kByLoad>,
+    .make = make_hash_64<Concurrent, Sizing::kByLoad>,
 };
 const Technique kHash64Grown{
     .name = "ha64-grown",
@@ -180,7 +180,7 @@ const Technique kHash64Grown{
     .variants = kOffsets,
     .memory = kHash64.memory,
     .fails = "the frame is rendered again until the size of the table is right",
-    .make = make<Exclusive, Sizing::kGrown>,
+    .make = make_hash_64<Exclusive, Sizing::kGrown>,
 };
 const Technique kHash64Fixed{
     .name = "ha64-fixed",
@@ -194,7 +194,7 @@ const Technique kHash64Fixed{
     .variants = kOffsets,
     .memory = "8 k bytes a pixel; 1 byte a 64 pixels",
     .fails = "loses the farthest fragments of pixels that meet a full table",
-    .make = make<Exclusive, Sizing::kFixed>,
+    .make = make_hash_64<Exclusive, Sizing::kFixed>,
 };
 
 }  // namespace strata::transparency

@@ -137,7 +137,7 @@ Result<TileRenderer> make_nearest(const FrameInfo&, const Settings& settings,
              TileStream& stream, TileImage& image) { return renderer->render(stream, image); };
 }
 
-constexpr std::string_view kOffsets = "plane-first random farthest-point";
+constexpr std::string_view kHashCulledOffsets = "plane-first random farthest-point";
 
 }  // namespace
 
@@ -146,7 +146,7 @@ const Technique kHash64Culled{
     .title = "HA-buffer that drops fragments behind enough opacity",
     .paper = "Lefebvre, Hornus, Lasram 2013",
     .accuracy = Accuracy::kBounded,
-    .variants = kOffsets,
+    .variants = kHashCulledOffsets,
     .memory = "8 bytes a cell, one cell a pixel or fragments / load; 1 byte a 64 pixels",
     .fails =
         "leaves out what lies behind the opacity threshold; drops little if drawn back to front",
@@ -161,7 +161,7 @@ const Technique kHash64Nearest{
     .default_k = 8,
     .least_k = 1,
     .most_k = 1024,
-    .variants = kOffsets,
+    .variants = kHashCulledOffsets,
     .memory = "8 bytes a cell, one cell a pixel or fragments / load; 1 byte a 64 pixels",
     .fails = "loses all fragments behind the k-th",
     .make = make_nearest,

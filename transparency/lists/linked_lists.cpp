@@ -11,12 +11,12 @@
 namespace strata::transparency {
 namespace {
 
-constexpr std::uint32_t kEnd = 0xffffffffu;
+constexpr std::uint32_t kLinkedListsEnd = 0xffffffffu;
 
 class LinkedLists {
  public:
   void build(TileStream& stream, std::size_t capacity) {
-    heads_.assign(kTilePixels, kEnd);
+    heads_.assign(kTilePixels, kLinkedListsEnd);
     if (items_.size() < capacity) {
       items_.resize(capacity);
       next_.resize(capacity);
@@ -35,7 +35,7 @@ class LinkedLists {
   [[nodiscard]] std::size_t used() const { return used_; }
 
   void gather(std::uint32_t pixel, std::vector<DepthItem>& list) const {
-    for (std::uint32_t node = heads_[pixel]; node != kEnd; node = next_[node]) {
+    for (std::uint32_t node = heads_[pixel]; node != kLinkedListsEnd; node = next_[node]) {
       list.push_back(items_[node]);
     }
   }
@@ -48,8 +48,8 @@ class LinkedLists {
 
 /// @tparam grows  the pool starts with settings.k nodes a pixel
 template <bool grows>
-Result<TileRenderer> make(const FrameInfo&, const Settings& settings,
-                          const std::shared_ptr<const void>&) {
+Result<TileRenderer> make_linked_lists(const FrameInfo&, const Settings& settings,
+                                       const std::shared_ptr<const void>&) {
   struct State {
     LinkedLists lists;
     ListBlender blender;
@@ -86,7 +86,7 @@ const Technique kLinkedLists{
     .paper = "Yang, Hensley, Gruen, Thibieroz 2010",
     .memory = "12 bytes a fragment, 4 a pixel",
     .fails = "loses fragments on a GPU when its pool is too small; here the pool is known to fit",
-    .make = make<false>,
+    .make = make_linked_lists<false>,
 };
 const Technique kLinkedListsGrow{
     .name = "linked-grow",
@@ -98,7 +98,7 @@ const Technique kLinkedListsGrow{
     .most_k = 1024,
     .memory = "12 bytes a node of the last pool, 4 a pixel",
     .fails = "a frame that outgrows the pool is rendered twice",
-    .make = make<true>,
+    .make = make_linked_lists<true>,
 };
 const Technique kMlabABuffer{
     .name = "a-buffer",
@@ -106,7 +106,7 @@ const Technique kMlabABuffer{
     .paper = "Salvi, Vaidyanathan 2014",
     .memory = "12 bytes a fragment, 4 a pixel",
     .fails = "memory has no bound",
-    .make = make<false>,
+    .make = make_linked_lists<false>,
 };
 
 }  // namespace strata::transparency

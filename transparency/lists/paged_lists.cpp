@@ -10,7 +10,7 @@
 namespace strata::transparency {
 namespace {
 
-constexpr std::uint32_t kEnd = 0xffffffffu;
+constexpr std::uint32_t kPagedListsEnd = 0xffffffffu;
 
 class PagedLists {
  public:
@@ -18,7 +18,7 @@ class PagedLists {
 
   /// @param capacity  pages @return fragments that found no page
   std::uint64_t build(TileStream& stream, std::size_t capacity) {
-    heads_.assign(kTilePixels, kEnd);
+    heads_.assign(kTilePixels, kPagedListsEnd);
     counts_.assign(kTilePixels, 0);
     used_ = 0;
     std::uint64_t lost = 0;
@@ -43,7 +43,8 @@ class PagedLists {
   void gather(std::uint32_t pixel, std::vector<DepthItem>& list) const {
     std::uint32_t filled = counts_[pixel] % page_;
     if (filled == 0) filled = page_;
-    for (std::uint32_t page = heads_[pixel]; page != kEnd; page = next_[page], filled = page_) {
+    for (std::uint32_t page = heads_[pixel]; page != kPagedListsEnd;
+         page = next_[page], filled = page_) {
       const DepthItem* first = items_.data() + std::size_t{page} * page_;
       list.insert(list.end(), first, first + filled);
     }
@@ -65,12 +66,12 @@ class PagedLists {
   std::size_t used_ = 0;
 };
 
-struct State {
+struct PagedListsState {
   PagedLists lists;
   ListBlender blender;
 };
 
-void blend(TileStream& stream, TileImage& image, State& state) {
+void blend(TileStream& stream, TileImage& image, PagedListsState& state) {
   if (stream.size() == 0) return;
   for_each_pixel(stream, [&](std::uint32_t pixel) {
     state.lists.gather(pixel, state.blender.begin());
@@ -85,10 +86,10 @@ void count_bytes(TileStream& stream, std::uint64_t pages, std::uint64_t page) {
                           pages * (page * sizeof(DepthItem) + sizeof(std::uint32_t));
 }
 
-Result<TileRenderer> make(const FrameInfo&, const Settings& settings,
-                          const std::shared_ptr<const void>&) {
-  return [state = std::make_shared<State>(State{PagedLists(settings.k), {}}), page = settings.k](
-             TileStream& stream, TileImage& image) -> Result<void> {
+Result<TileRenderer> make_paged_lists(const FrameInfo&, const Settings& settings,
+                                      const std::shared_ptr<const void>&) {
+  return [state = std::make_shared<PagedListsState>(PagedListsState{PagedLists(settings.k), {}}),
+          page = settings.k](TileStream& stream, TileImage& image) -> Result<void> {
     state->lists.build(stream, stream.size());
     stream.costs().stored = stream.size();
     count_bytes(stream, state->lists.used(), page);
@@ -102,8 +103,8 @@ constexpr std::uint32_t kPage = 4;
 
 Result<TileRenderer> make_growing(const FrameInfo&, const Settings& settings,
                                   const std::shared_ptr<const void>&) {
-  return [state = std::make_shared<State>(State{PagedLists(kPage), {}}), k = settings.k](
-             TileStream& stream, TileImage& image) -> Result<void> {
+  return [state = std::make_shared<PagedListsState>(PagedListsState{PagedLists(kPage), {}}),
+          k = settings.k](TileStream& stream, TileImage& image) -> Result<void> {
     std::size_t capacity = (k * stream.pixel_count() + kPage - 1) / kPage;
     for (;; capacity *= 2) {
       const std::uint64_t lost = state->lists.build(stream, capacity);
@@ -128,7 +129,7 @@ const Technique kPagedLists{
     .most_k = 256,
     .memory = "8 k + 4 bytes a page of k fragments, 8 a pixel",
     .fails = "the last page of each pixel is partly empty",
-    .make = make,
+    .make = make_paged_lists,
 };
 const Technique kPagedListsGrow{
     .name = "paged-grow",

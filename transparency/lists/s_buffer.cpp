@@ -55,8 +55,8 @@ class SBuffer {
   std::vector<DepthItem> items_;
 };
 
-Result<TileRenderer> make(const FrameInfo&, const Settings& settings,
-                          const std::shared_ptr<const void>&) {
+Result<TileRenderer> make_s_buffer(const FrameInfo&, const Settings& settings,
+                                   const std::shared_ptr<const void>&) {
   return [buffer = std::make_shared<SBuffer>(settings.k), k = settings.k](
              TileStream& stream, TileImage& image) -> Result<void> {
     buffer->build(stream);
@@ -87,7 +87,7 @@ const Technique kSBuffer{
     .most_k = 64,
     .memory = "8 bytes a fragment, 8 a pixel, 8 a counter",
     .fails = "two geometry passes even where nothing is drawn",
-    .make = make,
+    .make = make_s_buffer,
 };
 
 }  // namespace strata::transparency

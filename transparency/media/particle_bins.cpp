@@ -152,7 +152,8 @@ void ParticleBins::tile(int tu, int tv, Tile& out) const {
     out.events[out.ends[out.pixels[i] + 1]++] = out.unordered[i];
   }
   for (std::size_t pixel = 0; pixel < kTilePixels; ++pixel) {
-    detail::sort_list(out.events.data() + out.ends[pixel], out.events.data() + out.ends[pixel + 1]);
+    strata::detail::sort_list(out.events.data() + out.ends[pixel],
+                              out.events.data() + out.ends[pixel + 1]);
   }
 }
 

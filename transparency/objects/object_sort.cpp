@@ -18,8 +18,8 @@ struct Order {
   std::uint64_t comparisons = 0;
 };
 
-Result<std::shared_ptr<const void>> prepare(const FrameInfo& frame, const Settings&,
-                                            const Execution&) {
+Result<std::shared_ptr<const void>> prepare_object_sort(const FrameInfo& frame, const Settings&,
+                                                        const Execution&) {
   const FrameTriangles& triangles = *frame.triangles;
   const std::vector<double> distances = object_distances(triangles);
   std::vector<double> keys(distances.size());
@@ -29,8 +29,8 @@ Result<std::shared_ptr<const void>> prepare(const FrameInfo& frame, const Settin
   return order;
 }
 
-Result<TileRenderer> make(const FrameInfo&, const Settings&,
-                          const std::shared_ptr<const void>& prepared) {
+Result<TileRenderer> make_object_sort(const FrameInfo&, const Settings&,
+                                      const std::shared_ptr<const void>& prepared) {
   return [order = std::static_pointer_cast<const Order>(prepared),
           blending = std::make_shared<OrderedBlending>()](TileStream& stream,
                                                           TileImage& image) -> Result<void> {
@@ -53,8 +53,8 @@ const Technique kObjectSort{
     .memory = "16 bytes a pixel, 4 an object",
     .fails = "objects that cross or surround each other; the triangles of an object are not sorted",
     .needs_triangles = true,
-    .prepare = prepare,
-    .make = make,
+    .prepare = prepare_object_sort,
+    .make = make_object_sort,
 };
 
 }  // namespace strata::transparency

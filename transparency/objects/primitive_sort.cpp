@@ -15,15 +15,16 @@
 namespace strata::transparency {
 namespace {
 
-struct Order {
+struct PrimitiveSortOrder {
   std::vector<std::uint32_t> ranks;  ///< of each triangle, the farthest first
   std::uint64_t comparisons = 0;
   std::shared_ptr<const SplitOrder> split;  ///< instead of the ranks
 };
 
-Result<std::shared_ptr<const void>> prepare(const FrameInfo& frame, const Settings& settings,
-                                            const Execution& execution) {
-  auto order = std::make_shared<Order>();
+Result<std::shared_ptr<const void>> prepare_primitive_sort(const FrameInfo& frame,
+                                                           const Settings& settings,
+                                                           const Execution& execution) {
+  auto order = std::make_shared<PrimitiveSortOrder>();
   if (settings.variant == "split") {
     auto split = split_order(frame, settings.k, execution);
     if (!split) return tl::unexpected(split.error());
@@ -38,9 +39,9 @@ Result<std::shared_ptr<const void>> prepare(const FrameInfo& frame, const Settin
   return order;
 }
 
-Result<TileRenderer> make(const FrameInfo&, const Settings&,
-                          const std::shared_ptr<const void>& prepared) {
-  return [order = std::static_pointer_cast<const Order>(prepared),
+Result<TileRenderer> make_primitive_sort(const FrameInfo&, const Settings&,
+                                         const std::shared_ptr<const void>& prepared) {
+  return [order = std::static_pointer_cast<const PrimitiveSortOrder>(prepared),
           blending = std::make_shared<OrderedBlending>()](TileStream& stream,
                                                           TileImage& image) -> Result<void> {
     if (is_first_tile(stream)) stream.costs().comparisons += order->comparisons;
@@ -76,8 +77,8 @@ const Technique kPrimitiveSort{
     .memory = "16 bytes a pixel, 4 a triangle (split: a piece)",
     .fails = "triangles that cross, or overlap in a circle; split is exact, and slow for many",
     .needs_triangles = true,
-    .prepare = prepare,
-    .make = make,
+    .prepare = prepare_primitive_sort,
+    .make = make_primitive_sort,
 };
 
 }  // namespace strata::transparency

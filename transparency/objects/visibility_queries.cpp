@@ -90,7 +90,7 @@ Result<std::vector<Occlusion>> find_pairs(const FrameInfo& frame, const Executio
   return all;
 }
 
-struct Order {
+struct VisibilityQueriesOrder {
   std::vector<std::uint32_t> ranks;  ///< of each triangle, the first to be drawn first
   std::uint64_t queries = 0, comparisons = 0;
 };
@@ -115,7 +115,7 @@ std::vector<PixelRect> object_boxes(const FrameTriangles& triangles) {
 class Ordering {
  public:
   Ordering(const FrameInfo& frame, const Execution& execution)
-      : frame_(frame), execution_(execution), out_(std::make_shared<Order>()) {}
+      : frame_(frame), execution_(execution), out_(std::make_shared<VisibilityQueriesOrder>()) {}
 
   Result<std::shared_ptr<const void>> run() {
     if (auto done = order_objects(); !done) return tl::unexpected(done.error());
@@ -207,19 +207,20 @@ class Ordering {
 
   const FrameInfo& frame_;
   const Execution& execution_;
-  std::shared_ptr<Order> out_;
+  std::shared_ptr<VisibilityQueriesOrder> out_;
   std::vector<std::uint8_t> apart_;      ///< of each object: its triangles are ordered
   std::vector<std::uint32_t> group_of_;  ///< of each object
 };
 
-Result<std::shared_ptr<const void>> prepare(const FrameInfo& frame, const Settings&,
-                                            const Execution& execution) {
+Result<std::shared_ptr<const void>> prepare_visibility_queries(const FrameInfo& frame,
+                                                               const Settings&,
+                                                               const Execution& execution) {
   return Ordering(frame, execution).run();
 }
 
-Result<TileRenderer> make(const FrameInfo&, const Settings&,
-                          const std::shared_ptr<const void>& prepared) {
-  return [order = std::static_pointer_cast<const Order>(prepared),
+Result<TileRenderer> make_visibility_queries(const FrameInfo&, const Settings&,
+                                             const std::shared_ptr<const void>& prepared) {
+  return [order = std::static_pointer_cast<const VisibilityQueriesOrder>(prepared),
           blending = std::make_shared<OrderedBlending>()](TileStream& stream,
                                                           TileImage& image) -> Result<void> {
     if (is_first_tile(stream)) {
@@ -243,8 +244,8 @@ const Technique kVisibilityQueries{
     .memory = "16 bytes a pixel, 4 a triangle",
     .fails = "triangles that cross each other, or overlap in a circle",
     .needs_triangles = true,
-    .prepare = prepare,
-    .make = make,
+    .prepare = prepare_visibility_queries,
+    .make = make_visibility_queries,
 };
 
 }  // namespace strata::transparency

@@ -90,8 +90,8 @@ class BackPeeler {
 };
 
 template <const Kind& kind>
-Result<TileRenderer> make(const FrameInfo&, const Settings& settings,
-                          const std::shared_ptr<const void>&) {
+Result<TileRenderer> make_back_to_front_peeling(const FrameInfo&, const Settings& settings,
+                                                const std::shared_ptr<const void>&) {
   return [peeler = std::make_shared<BackPeeler>(kind, settings.k)](
              TileStream& stream, TileImage& image) -> Result<void> {
     peeler->render(stream, image);
@@ -111,7 +111,7 @@ const Technique kVirtualPixelMaps{
     .most_k = kMostPasses,
     .memory = "48 bytes a pixel",
     .fails = "a geometry pass for each layer and one more; fewer passes lose the nearest layers",
-    .make = make<kMaps>,
+    .make = make_back_to_front_peeling<kMaps>,
 };
 
 const Technique kReversePeeling{
@@ -124,7 +124,7 @@ const Technique kReversePeeling{
     .most_k = kMostPasses,
     .memory = "32 bytes a pixel",
     .fails = "a geometry pass for each layer; fewer passes lose the nearest layers",
-    .make = make<kReverse>,
+    .make = make_back_to_front_peeling<kReverse>,
 };
 
 }  // namespace strata::transparency

@@ -89,8 +89,8 @@ class DepthPeeler {
   std::array<FrontToBack, kTilePixels> sum_;
 };
 
-Result<TileRenderer> make(const FrameInfo&, const Settings& settings,
-                          const std::shared_ptr<const void>&) {
+Result<TileRenderer> make_depth_peeling(const FrameInfo&, const Settings& settings,
+                                        const std::shared_ptr<const void>&) {
   return [peeler = std::make_shared<DepthPeeler>(settings.k)](TileStream& stream,
                                                               TileImage& image) -> Result<void> {
     peeler->render(stream, image);
@@ -109,7 +109,7 @@ const Technique kDepthPeeling{
     .most_k = kMostPasses,
     .memory = "48 bytes a pixel",
     .fails = "a geometry pass for each layer; fewer passes than layers lose the farthest layers",
-    .make = make,
+    .make = make_depth_peeling,
 };
 
 }  // namespace strata::transparency

@@ -14,7 +14,7 @@ namespace strata::transparency {
 namespace {
 
 /// Two pairs of depth keys, the sum of the front and that of the back.
-constexpr std::uint64_t kPixelBytes = 2 * 2 * 8 + 2 * 16;
+constexpr std::uint64_t kDualPeelingPixelBytes = 2 * 2 * 8 + 2 * 16;
 constexpr std::uint64_t kNone = std::numeric_limits<std::uint64_t>::max();
 
 /// The first and the last fragment of those in a range, and how many equal each.
@@ -64,7 +64,7 @@ class DualPeeler {
 
   void render(TileStream& stream, TileImage& image) {
     Costs& costs = stream.costs();
-    costs.formula_bytes = costs.allocated_bytes = kPixelBytes * stream.pixel_count();
+    costs.formula_bytes = costs.allocated_bytes = kDualPeelingPixelBytes * stream.pixel_count();
     if (stream.size() == 0) return;
     ends_.fill({});
     layers_.fill(0);
@@ -130,8 +130,8 @@ class DualPeeler {
   std::array<BackToFront, kTilePixels> back_;
 };
 
-Result<TileRenderer> make(const FrameInfo&, const Settings& settings,
-                          const std::shared_ptr<const void>&) {
+Result<TileRenderer> make_dual_peeling(const FrameInfo&, const Settings& settings,
+                                       const std::shared_ptr<const void>&) {
   return [peeler = std::make_shared<DualPeeler>(settings.k)](TileStream& stream,
                                                              TileImage& image) -> Result<void> {
     peeler->render(stream, image);
@@ -151,7 +151,7 @@ const Technique kDualPeeling{
     .most_k = kMostPasses,
     .memory = "64 bytes a pixel",
     .fails = "a geometry pass for two layers and one more; fewer passes lose the middle layers",
-    .make = make,
+    .make = make_dual_peeling,
 };
 
 }  // namespace strata::transparency

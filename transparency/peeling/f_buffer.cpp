@@ -14,15 +14,15 @@ namespace strata::transparency {
 namespace {
 
 /// A record is a pixel and a key; a pixel has two depth maps and the sum of its layers.
-constexpr std::uint64_t kRecordBytes = 4 + 8, kPixelBytes = 2 * 8 + 16;
-constexpr std::uint64_t kNone = std::numeric_limits<std::uint64_t>::max();
+constexpr std::uint64_t kRecordBytes = 4 + 8, kFBufferPixelBytes = 2 * 8 + 16;
+constexpr std::uint64_t kFBufferNone = std::numeric_limits<std::uint64_t>::max();
 
 class FBuffer {
  public:
   void render(TileStream& stream, TileImage& image) {
     Costs& costs = stream.costs();
     costs.formula_bytes = costs.allocated_bytes =
-        kRecordBytes * stream.size() + kPixelBytes * stream.pixel_count();
+        kRecordBytes * stream.size() + kFBufferPixelBytes * stream.pixel_count();
     if (stream.size() == 0) return;
     rasterize(stream);
     sum_.fill({});
@@ -41,7 +41,7 @@ class FBuffer {
     count_ = 0;
     pixels_.resize(std::max(pixels_.size(), stream.size()));
     items_.resize(pixels_.size());
-    next_.fill(kNone);
+    next_.fill(kFBufferNone);
     stream.pass([&](std::uint32_t pixel, DepthItem item) { forward(pixel, item); });
     stream.costs().stored += count_;
     stream.costs().comparisons += count_;
@@ -56,12 +56,12 @@ class FBuffer {
     const std::size_t count = count_;
     count_ = 0;
     nearest_ = next_;
-    next_.fill(kNone);
+    next_.fill(kFBufferNone);
     for (std::size_t i = 0; i < count; ++i) {
       const std::uint32_t pixel = pixels_[i];
       const DepthItem item = items_[i];
       if (item.bits == nearest_[pixel]) {
-        nearest_[pixel] = kNone;  // one a pass, the first of equal ones
+        nearest_[pixel] = kFBufferNone;  // one a pass, the first of equal ones
         sum_[pixel].add(stream.shade(item));
         ++layers_[pixel];
       } else {
@@ -80,7 +80,8 @@ class FBuffer {
   std::array<FrontToBack, kTilePixels> sum_;
 };
 
-Result<TileRenderer> make(const FrameInfo&, const Settings&, const std::shared_ptr<const void>&) {
+Result<TileRenderer> make_f_buffer(const FrameInfo&, const Settings&,
+                                   const std::shared_ptr<const void>&) {
   return
       [buffer = std::make_shared<FBuffer>()](TileStream& stream, TileImage& image) -> Result<void> {
         buffer->render(stream, image);
@@ -96,7 +97,7 @@ const Technique kFBuffer{
     .paper = "Mark, Proudfoot 2001",
     .memory = "12 bytes a fragment, 32 a pixel",
     .fails = "each fragment is read once for each layer before it: time grows with depth squared",
-    .make = make,
+    .make = make_f_buffer,
 };
 
 }  // namespace strata::transparency

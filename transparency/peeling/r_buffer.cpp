@@ -15,17 +15,17 @@ namespace strata::transparency {
 namespace {
 
 /// A record is a pixel and a key; a pixel has the z-buffer, two depth maps and a colour.
-constexpr std::uint64_t kRecordBytes = 4 + 8, kPixelBytes = 3 * 8 + 16;
+constexpr std::uint64_t kRBufferRecordBytes = 4 + 8, kRBufferPixelBytes = 3 * 8 + 16;
 constexpr std::uint64_t kNoOpaque = std::numeric_limits<std::uint64_t>::max();
 
 class RBuffer {
  public:
   void render(TileStream& stream, TileImage& image) {
     Costs& costs = stream.costs();
-    costs.formula_bytes = kPixelBytes * stream.pixel_count();
+    costs.formula_bytes = kRBufferPixelBytes * stream.pixel_count();
     if (stream.size() > 0) {
       rasterize(stream);
-      costs.formula_bytes += kRecordBytes * count_;
+      costs.formula_bytes += kRBufferRecordBytes * count_;
       drop_hidden(stream);
       while (count_ > 0) recirculate(stream);
       for_each_pixel(stream, [&](std::uint32_t pixel) {
@@ -110,7 +110,8 @@ class RBuffer {
   std::array<BackToFront, kTilePixels> sum_;
 };
 
-Result<TileRenderer> make(const FrameInfo&, const Settings&, const std::shared_ptr<const void>&) {
+Result<TileRenderer> make_r_buffer(const FrameInfo&, const Settings&,
+                                   const std::shared_ptr<const void>&) {
   return
       [buffer = std::make_shared<RBuffer>()](TileStream& stream, TileImage& image) -> Result<void> {
         buffer->render(stream, image);
@@ -127,7 +128,7 @@ const Technique kRBuffer{
     .blending = Blending::kBackToFront,
     .memory = "12 bytes a fragment that is not opaque, 40 a pixel",
     .fails = "each fragment is read once for each layer behind it: time grows with depth squared",
-    .make = make,
+    .make = make_r_buffer,
 };
 
 }  // namespace strata::transparency

@@ -234,8 +234,8 @@ Collisions collisions_of(const Settings& settings) {
 }
 
 template <bool adaptive>
-Result<TileRenderer> make(const FrameInfo&, const Settings& settings,
-                          const std::shared_ptr<const void>&) {
+Result<TileRenderer> make_bucket_sort(const FrameInfo&, const Settings& settings,
+                                      const std::shared_ptr<const void>&) {
   return [buckets = std::make_shared<Buckets>(settings.k, adaptive, collisions_of(settings))](
              TileStream& stream, TileImage& image) -> Result<void> {
     buckets->render(stream, image);
@@ -258,7 +258,7 @@ const Technique kBucketSort{
     .memory = "8 bytes a bucket (merge: 24, repeat: 20), 8 a pixel; repeat: 12 a fragment",
     .fails =
         "fragments that meet in a bucket: all but the nearest are lost, or merged as they come",
-    .make = make<false>,
+    .make = make_bucket_sort<false>,
 };
 
 const Technique kAdaptiveBucketSort{
@@ -273,7 +273,7 @@ const Technique kAdaptiveBucketSort{
     .variants = "lose merge repeat",
     .memory = "8 bytes a bucket (merge: 24, repeat: 20), 176 a pixel; repeat: 12 a fragment",
     .fails = "fragments of one bin, 1/1024 of a pixel's range; more occupied bins than buckets",
-    .make = make<true>,
+    .make = make_bucket_sort<true>,
 };
 
 }  // namespace strata::transparency

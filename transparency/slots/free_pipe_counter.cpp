@@ -50,8 +50,8 @@ class CountedSlots {
   std::array<std::uint32_t, kTilePixels> counters_;
 };
 
-Result<TileRenderer> make(const FrameInfo&, const Settings& settings,
-                          const std::shared_ptr<const void>&) {
+Result<TileRenderer> make_free_pipe_counter(const FrameInfo&, const Settings& settings,
+                                            const std::shared_ptr<const void>&) {
   return [slots = std::make_shared<CountedSlots>(settings.k)](TileStream& stream,
                                                               TileImage& image) -> Result<void> {
     slots->render(stream, image);
@@ -72,7 +72,7 @@ const Technique kFreePipeCounter{
     .most_k = 1024,
     .memory = "8 bytes a slot, 4 a pixel",
     .fails = "pixels with more layers than slots lose those that came last, near or far",
-    .make = make,
+    .make = make_free_pipe_counter,
 };
 
 }  // namespace strata::transparency

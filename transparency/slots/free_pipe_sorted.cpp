@@ -13,8 +13,8 @@
 namespace strata::transparency {
 namespace {
 
-constexpr std::uint64_t kSlotBytes = 8;
-constexpr std::uint64_t kEmpty = std::numeric_limits<std::uint64_t>::max();
+constexpr std::uint64_t kFreePipeSortedSlotBytes = 8;
+constexpr std::uint64_t kFreePipeSortedEmpty = std::numeric_limits<std::uint64_t>::max();
 
 class SortedSlots {
  public:
@@ -22,9 +22,11 @@ class SortedSlots {
 
   void render(TileStream& stream, TileImage& image) {
     Costs& costs = stream.costs();
-    costs.formula_bytes = costs.allocated_bytes = kSlotBytes * k_ * stream.pixel_count();
+    costs.formula_bytes = costs.allocated_bytes =
+        kFreePipeSortedSlotBytes * k_ * stream.pixel_count();
     std::fill_n(slots_.begin(),
-                std::size_t{k_} * kTileSide * static_cast<std::size_t>(stream.height()), kEmpty);
+                std::size_t{k_} * kTileSide * static_cast<std::size_t>(stream.height()),
+                kFreePipeSortedEmpty);
     std::uint64_t exchanges = 0;
     stream.pass([&](std::uint32_t pixel, DepthItem item) {
       std::uint64_t carry = item.bits;
@@ -34,7 +36,7 @@ class SortedSlots {
         *slot = std::min(old, carry);  // the paper's atomicMin
         carry = std::max(old, carry);
         ++exchanges;
-        if (old == kEmpty) break;
+        if (old == kFreePipeSortedEmpty) break;
       }
     });
     costs.stored = stream.size();
@@ -46,10 +48,10 @@ class SortedSlots {
  private:
   void blend(TileStream& stream, std::uint32_t pixel, TileImage& image) const {
     const std::uint64_t* const slots = slots_.data() + std::size_t{pixel} * k_;
-    if (slots[0] == kEmpty) return;
+    if (slots[0] == kFreePipeSortedEmpty) return;
     FrontToBack sum;
     std::uint64_t layers = 0;
-    while (layers < k_ && slots[layers] != kEmpty) {
+    while (layers < k_ && slots[layers] != kFreePipeSortedEmpty) {
       sum.add(stream.shade(DepthItem(slots[layers])));
       ++layers;
     }
@@ -62,8 +64,8 @@ class SortedSlots {
   std::vector<std::uint64_t> slots_;  ///< k of each pixel, increasing
 };
 
-Result<TileRenderer> make(const FrameInfo&, const Settings& settings,
-                          const std::shared_ptr<const void>&) {
+Result<TileRenderer> make_free_pipe_sorted(const FrameInfo&, const Settings& settings,
+                                           const std::shared_ptr<const void>&) {
   return [slots = std::make_shared<SortedSlots>(settings.k)](TileStream& stream,
                                                              TileImage& image) -> Result<void> {
     slots->render(stream, image);
@@ -84,7 +86,7 @@ const Technique kFreePipeSorted{
     .most_k = 1024,
     .memory = "8 bytes a slot",
     .fails = "pixels with more layers than slots lose the farthest",
-    .make = make,
+    .make = make_free_pipe_sorted,
 };
 
 }  // namespace strata::transparency

@@ -149,8 +149,8 @@ struct Order {
   std::uint64_t comparisons = 0;  ///< that it took
 };
 
-Result<std::shared_ptr<const void>> prepare(const FrameInfo& frame, const Settings&,
-                                            const Execution&) {
+Result<std::shared_ptr<const void>> prepare_k_buffer(const FrameInfo& frame, const Settings&,
+                                                     const Execution&) {
   auto order = std::make_shared<Order>();
   if (frame.triangles != nullptr) {
     order->ranks = ranks_of(triangle_distances(frame).centroid, order->comparisons);
@@ -183,8 +183,8 @@ Result<TileRenderer> make_of(unsigned k, std::shared_ptr<const Order> order) {
   };
 }
 
-Result<TileRenderer> make(const FrameInfo&, const Settings& settings,
-                          const std::shared_ptr<const void>& prepared) {
+Result<TileRenderer> make_k_buffer(const FrameInfo&, const Settings& settings,
+                                   const std::shared_ptr<const void>& prepared) {
   auto order = std::static_pointer_cast<const Order>(prepared);
   if (settings.variant == "merge") return make_of<MergedEntries>(settings.k, std::move(order));
   return make_of<LeavingEntries>(settings.k, std::move(order));
@@ -204,8 +204,8 @@ const Technique kKBuffer{
     .variants = "nearest merge",
     .memory = "8 bytes an entry (merge: 24), 20 a pixel",
     .fails = "a fragment that comes after more than k that lie behind it is blended too late",
-    .prepare = prepare,
-    .make = make,
+    .prepare = prepare_k_buffer,
+    .make = make_k_buffer,
 };
 
 }  // namespace strata::transparency

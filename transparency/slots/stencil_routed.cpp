@@ -96,8 +96,8 @@ class RoutedSamples {
   std::vector<DepthItem> list_;
 };
 
-Result<TileRenderer> make(const FrameInfo&, const Settings& settings,
-                          const std::shared_ptr<const void>&) {
+Result<TileRenderer> make_stencil_routed(const FrameInfo&, const Settings& settings,
+                                         const std::shared_ptr<const void>&) {
   return [samples = std::make_shared<RoutedSamples>(settings.k)](TileStream& stream,
                                                                  TileImage& image) -> Result<void> {
     samples->render(stream, image);
@@ -117,7 +117,7 @@ const Technique kStencilRouted{
     .most_k = 32,
     .memory = "9 bytes a sample of the first chunk, 8 of the others; layers / k chunks, rounded up",
     .fails = "every pixel has as many chunks as the deepest; beyond 254 layers the stream is cut",
-    .make = make,
+    .make = make_stencil_routed,
 };
 
 }  // namespace strata::transparency

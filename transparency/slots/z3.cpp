@@ -29,7 +29,7 @@ struct Part {
 };
 
 static_assert(sizeof(Part) == 64);
-constexpr std::uint64_t kPixelBytes = 4;
+constexpr std::uint64_t kZ3PixelBytes = 4;
 
 class Z3 {
  public:
@@ -51,7 +51,7 @@ class Z3 {
     const auto samples = static_cast<std::uint64_t>(across_ * down_);
     Costs& costs = stream.costs();
     costs.formula_bytes = costs.allocated_bytes =
-        (sizeof(Part) * k_ + kPixelBytes) * (stream.pixel_count() / samples);
+        (sizeof(Part) * k_ + kZ3PixelBytes) * (stream.pixel_count() / samples);
     std::fill(counts_.begin(), counts_.end(), 0u);
     std::uint32_t triangle = 0;
     stream.pass([&](std::uint32_t at, DepthItem item) {
@@ -261,8 +261,8 @@ class Z3 {
   std::vector<Layer> layers_;
 };
 
-Result<TileRenderer> make(const FrameInfo& frame, const Settings& settings,
-                          const std::shared_ptr<const void>&) {
+Result<TileRenderer> make_z3(const FrameInfo& frame, const Settings& settings,
+                             const std::shared_ptr<const void>&) {
   return [z3 = std::make_shared<Z3>(frame, settings.k)](TileStream& stream,
                                                         TileImage& image) -> Result<void> {
     z3->render(stream, image);
@@ -283,7 +283,7 @@ const Technique kZ3{
     .most_k = 256,
     .memory = "64 bytes a slot, 4 a pixel, whatever its samples",
     .fails = "pixels with more triangles than slots: the two nearest in depth become one",
-    .make = make,
+    .make = make_z3,
 };
 
 }  // namespace strata::transparency

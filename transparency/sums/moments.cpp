@@ -77,8 +77,8 @@ TileRenderer renderer(const FrameInfo& frame) {
   };
 }
 
-Result<TileRenderer> make(const FrameInfo& frame, const Settings& settings,
-                          const std::shared_ptr<const void>&) {
+Result<TileRenderer> make_moments(const FrameInfo& frame, const Settings& settings,
+                                  const std::shared_ptr<const void>&) {
   switch (settings.k) {
     case 4:
       return renderer<2>(frame);
@@ -104,7 +104,7 @@ const Technique kMoments{
     .most_k = 8,
     .memory = "4 bytes a moment and 8 more, a pixel",
     .fails = "where opacity rises in more steps than half the moments: they are smoothed",
-    .make = make,
+    .make = make_moments,
 };
 
 }  // namespace strata::transparency

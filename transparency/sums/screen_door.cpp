@@ -83,8 +83,8 @@ class ScreenDoor {
   std::vector<DepthItem> nearest_;
 };
 
-Result<TileRenderer> make(const FrameInfo&, const Settings& settings,
-                          const std::shared_ptr<const void>&) {
+Result<TileRenderer> make_screen_door(const FrameInfo&, const Settings& settings,
+                                      const std::shared_ptr<const void>&) {
   return [door = std::make_shared<ScreenDoor>(settings)](TileStream& stream,
                                                          TileImage& image) -> Result<void> {
     door->render(stream, image);
@@ -104,7 +104,7 @@ const Technique kScreenDoor{
     .fails =
         "each pixel shows one layer: a pattern of pixels; with the same pattern for all, layers "
         "hide each other wholly or not at all",
-    .make = make,
+    .make = make_screen_door,
 };
 
 }  // namespace strata::transparency

@@ -57,8 +57,9 @@ void for_each_tile(const FrameInfo& frame, const TileTriangles& tiles, const glm
   }
 }
 
-Result<std::shared_ptr<const void>> prepare(const FrameInfo& frame, const Settings&,
-                                            const Execution& execution) {
+Result<std::shared_ptr<const void>> prepare_silhouette_opaque(const FrameInfo& frame,
+                                                              const Settings&,
+                                                              const Execution& execution) {
   const FrameTriangles& triangles = *frame.triangles;
   auto tiles = std::make_shared<TileTriangles>();
   tiles->tiles_u = (frame.size.x + kTileSide - 1) / kTileSide;
@@ -365,8 +366,8 @@ class SilhouetteOpaque {
   std::uint64_t points_ = 0;
 };
 
-Result<TileRenderer> make(const FrameInfo& frame, const Settings& settings,
-                          const std::shared_ptr<const void>& prepared) {
+Result<TileRenderer> make_silhouette_opaque(const FrameInfo& frame, const Settings& settings,
+                                            const std::shared_ptr<const void>& prepared) {
   auto points = std::make_shared<SilhouetteOpaque>(
       frame, settings, std::static_pointer_cast<const TileTriangles>(prepared));
   return [points](TileStream& stream, TileImage& image) -> Result<void> {
@@ -389,8 +390,8 @@ const Technique kSilhouetteOpaque{
     .memory = "8 bytes a finer pixel",
     .fails = "noise; surfaces that are seen at an angle are more opaque, as intended",
     .needs_triangles = true,
-    .prepare = prepare,
-    .make = make,
+    .prepare = prepare_silhouette_opaque,
+    .make = make_silhouette_opaque,
 };
 
 }  // namespace strata::transparency

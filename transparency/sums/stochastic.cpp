@@ -149,8 +149,8 @@ class Stochastic {
   std::vector<float> weights_;
 };
 
-Result<TileRenderer> make(const FrameInfo&, const Settings& settings,
-                          const std::shared_ptr<const void>&) {
+Result<TileRenderer> make_stochastic(const FrameInfo&, const Settings& settings,
+                                     const std::shared_ptr<const void>&) {
   return [stochastic = std::make_shared<Stochastic>(settings)](TileStream& stream,
                                                                TileImage& image) -> Result<void> {
     stochastic->render(stream, image);
@@ -172,7 +172,7 @@ const Technique kStochastic{
     .variants = "basic alpha-corrected depth-based",
     .memory = "8 bytes a sample and 4 more, a pixel; 8 more if alpha-corrected, 4 if depth-based",
     .fails = "noise, which falls with the root of the samples",
-    .make = make,
+    .make = make_stochastic,
 };
 
 }  // namespace strata::transparency

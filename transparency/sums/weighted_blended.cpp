@@ -46,7 +46,7 @@ struct ByDepth {
 };
 
 template <class Weight>
-TileRenderer renderer(const Weight& weight) {
+TileRenderer renderer_weighted_blended(const Weight& weight) {
   return [weight, sums = std::make_shared<std::vector<glm::vec4>>(kTilePixels)](
              TileStream& stream, TileImage& image) -> Result<void> {
     for_each_pixel(stream, [&](std::uint32_t pixel) { (*sums)[pixel] = glm::vec4(0.0f); });
@@ -69,13 +69,16 @@ TileRenderer renderer(const Weight& weight) {
   };
 }
 
-Result<TileRenderer> make(const FrameInfo& frame, const Settings& settings,
-                          const std::shared_ptr<const void>&) {
+Result<TileRenderer> make_weighted_blended(const FrameInfo& frame, const Settings& settings,
+                                           const std::shared_ptr<const void>&) {
   const Distances distances(frame);
-  if (settings.variant == "equation-7") return renderer(ByDistance<Equation7>{distances});
-  if (settings.variant == "equation-8") return renderer(ByDistance<Equation8>{distances});
-  if (settings.variant == "equation-9") return renderer(ByDistance<Equation9>{distances});
-  return renderer(ByDepth());
+  if (settings.variant == "equation-7")
+    return renderer_weighted_blended(ByDistance<Equation7>{distances});
+  if (settings.variant == "equation-8")
+    return renderer_weighted_blended(ByDistance<Equation8>{distances});
+  if (settings.variant == "equation-9")
+    return renderer_weighted_blended(ByDistance<Equation9>{distances});
+  return renderer_weighted_blended(ByDepth());
 }
 
 }  // namespace
@@ -88,7 +91,7 @@ const Technique kWeightedBlended{
     .variants = "equation-10 equation-7 equation-8 equation-9",
     .memory = "20 bytes a pixel",
     .fails = "where layers of unlike colours have high opacity: what lies behind shines through",
-    .make = make,
+    .make = make_weighted_blended,
 };
 
 }  // namespace strata::transparency
