@@ -153,7 +153,9 @@ class PreviewRenderer final : public Renderer {
   /// through_ becomes the arrangement with an opacity.
   Result<void> see_through(const FrameRequest& request, const Execution& execution) {
     const float opacity = request.see_through->opacity;
-    if (through_ && through_opacity_ == opacity && through_scheme_ == request.look.scheme) {
+    const bool faces = request.see_through->media != nullptr;  // media need whole solids
+    if (through_ && through_opacity_ == opacity && through_scheme_ == request.look.scheme &&
+        (through_->faces() != nullptr) == faces) {
       return {};
     }
     csg::Scene scene;
@@ -163,7 +165,9 @@ class PreviewRenderer final : public Renderer {
       const bool red = ghost.colour == csg::kHighlightGhost;
       (red ? scene.highlights : scene.backgrounds).push_back(ghost.node);
     }
-    auto made = csg::SeeThrough::make(std::move(scene), {opacity, request.look.scheme}, execution);
+    csg::SeeThroughOptions options{opacity, request.look.scheme};
+    options.all_faces = faces;
+    auto made = csg::SeeThrough::make(std::move(scene), options, execution);
     if (!made) return tl::unexpected(made.error());
     through_ = *std::move(made);
     through_opacity_ = opacity;
@@ -182,6 +186,11 @@ class PreviewRenderer final : public Renderer {
     options.size = request.size;
     options.samples = request.look.samples;
     options.background = glm::vec4(glm::vec3(scheme.background) / 255.0f, 1.0f);
+    if (request.see_through->media != nullptr && !request.moving) {
+      auto done = draw_media(request, options, execution, frame);
+      frame.draw_ms = ms_since(prepared);
+      return done;
+    }
     const auto seen = through_->frame(request.camera, request.size, options, execution);
     if (!seen) return tl::unexpected(seen.error());
     const std::string name = request.moving ? kMovingTechnique : request.see_through->technique;
@@ -189,14 +198,7 @@ class PreviewRenderer final : public Renderer {
     if (!chosen) return tl::unexpected(chosen.error());
     auto drawn = seen->render(*chosen->technique, chosen->settings, execution);
     if (!drawn) return tl::unexpected(drawn.error());
-    frame.drawn_by = "CPU, " + name;
-    frame.report.fragments = drawn->costs.fragments;
-    frame.longest_list = drawn->costs.most_layers;
-    frame.picture = {drawn->image.width, drawn->image.height, transparency::to_bytes(drawn->image)};
-    const csg::Rgba ground(scheme.background, 255);
-    for (const csg::Rgba& pixel : frame.picture.pixels) {
-      frame.report.covered += pixel != ground ? 1 : 0;
-    }
+    show(*drawn, name, csg::Rgba(scheme.background, 255), frame);
     if (request.see_through->errors && !request.moving) {
       const auto exact = transparency::find_technique(SeenThrough{}.technique);
       if (!exact) return tl::unexpected(exact.error());
@@ -205,6 +207,29 @@ class PreviewRenderer final : public Renderer {
       show_errors(drawn->image, reference->image, frame);
     }
     frame.draw_ms = ms_since(prepared);
+    return {};
+  }
+
+  static void show(const transparency::Rendering& drawn, const std::string& by,
+                   const csg::Rgba& ground, Frame& frame) {
+    frame.drawn_by = "CPU, " + by;
+    frame.report.fragments = drawn.costs.fragments;
+    frame.longest_list = drawn.costs.most_layers;
+    frame.picture = {drawn.image.width, drawn.image.height, transparency::to_bytes(drawn.image)};
+    for (const csg::Rgba& pixel : frame.picture.pixels) {
+      frame.report.covered += pixel != ground ? 1 : 0;
+    }
+  }
+
+  Result<void> draw_media(const FrameRequest& request, const transparency::FrameOptions& options,
+                          const Execution& execution, Frame& frame) {
+    const auto view = through_->view(request.camera, request.size, execution);
+    if (!view) return tl::unexpected(view.error());
+    const auto drawn = transparency::render_media(*through_->faces(), *view,
+                                                  *request.see_through->media, options, execution);
+    if (!drawn) return tl::unexpected(drawn.error());
+    const csg::Rgba ground(glm::vec4(options.background) * 255.0f + 0.5f);
+    show(drawn->rendering, "media", ground, frame);
     return {};
   }
 

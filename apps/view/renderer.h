@@ -12,6 +12,7 @@
 #include "strata/core/execution.h"
 #include "strata/core/result.h"
 #include "strata/csg/picture/picture.h"
+#include "strata/transparency/media/media.h"
 
 // The seam between the window and what draws its pictures.
 
@@ -29,6 +30,8 @@ struct SeenThrough {
   float opacity = 0.5f;                  ///< of what is opaque by its colour
   std::string technique = "count-scan";  ///< of the picture at rest, as `strata oit` has it
   bool errors = false;                   ///< at rest, show Heat::kError instead
+  /// At rest, light through these media inside the solids instead; null: none.
+  std::shared_ptr<const transparency::MediaSettings> media = {};
   friend bool operator==(const SeenThrough&, const SeenThrough&) = default;
 };
 /// The technique while the picture moves: one pass, no lists.

@@ -62,6 +62,7 @@ constexpr Rule kRules[] = {
     {"panels", Action::kPanels, Form::kOnOff, "on|off", "show the panels"},
     {"heat", Action::kHeat, Form::kWord, "MAP", "set the heat map: off, thickness or depth"},
     {"opacity", Action::kOpacity, Form::kWord, "A", "see through everything: 0 to 1, or off"},
+    {"media", Action::kMedia, Form::kOnOff, "on|off", "light through the media of --media"},
     {"technique", Action::kTechnique, Form::kWord, "NAME",
      "set the technique of transparent pictures at rest, as strata oit does"},
     {"scheme", Action::kScheme, Form::kWord, "NAME", "set the colour scheme"},

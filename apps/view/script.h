@@ -28,6 +28,7 @@ enum class Action {
   kHeat,       ///< word: off, thickness or depth
   kOpacity,    ///< word: off, or numbers: 0 to 1
   kTechnique,  ///< word: as --technique has it
+  kMedia,      ///< on: whether those of --media are shown
   kScheme,     ///< word: a colour scheme
   kHide,       ///< word: which solids
   kShow,

@@ -64,6 +64,23 @@ Result<void> ScriptRunner::step(Viewer& viewer, Stage& stage) {
   return {};
 }
 
+/// How the scene is seen through.
+Result<void> ScriptRunner::see_through(const ScriptCommand& command, Viewer& viewer) {
+  SeenThrough how = viewer.see_through().value_or(SeenThrough{});
+  if (command.action == Action::kMedia) {
+    if (viewer.media() == nullptr) {
+      return fail(ErrorCode::kUsage, "there are no media: give --media FILE");
+    }
+    how.media = command.on ? viewer.media() : nullptr;
+  } else if (command.action == Action::kTechnique) {
+    how.technique = command.word;
+  } else if (!command.numbers.empty()) {
+    how.opacity = static_cast<float>(command.numbers[0]);
+  }
+  viewer.set_see_through(command.word == "off" ? std::nullopt : std::optional(std::move(how)));
+  return {};
+}
+
 /// What is done at once: the camera, and how the scene is shown.
 Result<void> ScriptRunner::apply(const ScriptCommand& command, Viewer& viewer) {
   const auto& n = command.numbers;
@@ -113,16 +130,9 @@ Result<void> ScriptRunner::apply(const ScriptCommand& command, Viewer& viewer) {
                                                     : Heat::kDepth);
       return {};
     case Action::kOpacity:
-    case Action::kTechnique: {
-      SeenThrough how = viewer.see_through().value_or(SeenThrough{});
-      if (command.action == Action::kTechnique) {
-        how.technique = command.word;
-      } else if (!command.numbers.empty()) {
-        how.opacity = static_cast<float>(command.numbers[0]);
-      }
-      viewer.set_see_through(command.word == "off" ? std::nullopt : std::optional(how));
-      return {};
-    }
+    case Action::kTechnique:
+    case Action::kMedia:
+      return see_through(command, viewer);
     case Action::kScheme:
       viewer.set_scheme(csg::find_colour_scheme(command.word));
       return {};

@@ -44,6 +44,7 @@ class ScriptRunner {
   static Result<void> apply(const ScriptCommand& command, Viewer& viewer);
   bool drag(const ScriptCommand& command, Viewer& viewer);
   bool wait(const ScriptCommand& command, const Viewer& viewer);
+  static Result<void> see_through(const ScriptCommand& command, Viewer& viewer);
   static Result<void> section(const ScriptCommand& command, Viewer& viewer);
   static Result<void> solids(const ScriptCommand& command, Viewer& viewer);
 

@@ -86,6 +86,10 @@ void define(CLI::App& app, Words& words, ViewOptions& options) {
   option("--heat", words.heat,
          "Colour by thickness or by depth complexity instead of the scene's colours (default: off)",
          apps::choices(kHeats), look);
+  option("--media", options.media,
+         "Light through media inside solids, as FILE (.json) says; the panel Transparency turns it "
+         "off and on",
+         "FILE", look);
   flag("--no-panels", words.no_panels, "Show the picture without panels", look);
   apps::define_scene_options(app, csg.scene);
   const char* drive = "Unattended";
@@ -205,6 +209,7 @@ Result<void> check_files(ViewOptions& options, const std::vector<ScriptCommand>&
   if (!options.screenshot.empty()) written.push_back({"--screenshot", options.screenshot});
   std::vector<apps::FileUse> read = apps::inputs_of(options.command.input);
   if (!options.script.empty()) read.push_back({"--script", options.script});
+  if (!options.media.empty()) read.push_back({"--media", options.media});
   options.command.outputs = written;
   return apps::check_files(read, written);
 }

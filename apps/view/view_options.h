@@ -25,6 +25,7 @@ struct ViewOptions {
   bool ghosts = false;
   bool panels = true;
   Heat heat = Heat::kOff;
+  std::string media;   ///< a file of media; empty: none
   std::string script;  ///< a file, "-": standard input; empty: none
   std::string
       screenshot;  ///< taken when all is drawn and the script is done; then the window closes

@@ -295,6 +295,14 @@ void Viewer::set_heat(Heat heat) {
   change(false);
 }
 
+void Viewer::set_media(std::shared_ptr<const transparency::MediaSettings> media) {
+  media_ = std::move(media);
+  SeenThrough how;
+  how.opacity = 1.0f;  // what has no medium stays as it is
+  how.media = media_;
+  set_see_through(std::move(how));
+}
+
 void Viewer::set_see_through(std::optional<SeenThrough> how) {
   if (see_through_ == how) return;
   see_through_ = std::move(how);

@@ -100,6 +100,12 @@ class Viewer {
   void set_heat(Heat heat);
   [[nodiscard]] const std::optional<SeenThrough>& see_through() const { return see_through_; }
   void set_see_through(std::optional<SeenThrough> how);  ///< none: opaque
+  /// What media the scene has, whether they are shown or not; null: none.
+  [[nodiscard]] const std::shared_ptr<const transparency::MediaSettings>& media() const {
+    return media_;
+  }
+  /// Sets the media and shows them.
+  void set_media(std::shared_ptr<const transparency::MediaSettings> media);
   void reload();
   void cancel_load();
   void pick(const glm::ivec2& pixel);
@@ -145,6 +151,7 @@ class Viewer {
   csg::PictureOptions picture_;
   Heat heat_ = Heat::kOff;
   std::optional<SeenThrough> see_through_;
+  std::shared_ptr<const transparency::MediaSettings> media_;
   Looks looks_;
   std::optional<csg::SectionPlane> last_section_;
   std::shared_ptr<const Model> model_;

@@ -187,6 +187,13 @@ void Panels::transparency(Viewer& viewer) {
   SeenThrough set = how.value_or(SeenThrough{});
   if (toggle("Errors", set.errors && how, half)) set.errors = !set.errors;
   hint("at rest: how much the technique's picture differs from the exact one");
+  if (viewer.media() != nullptr) {
+    if (toggle("Media", set.media != nullptr && how, half)) {
+      set.media = set.media ? nullptr : viewer.media();
+      if (!how) how = set;
+    }
+    hint("at rest: light through the media inside the solids");
+  }
   ImGui::SetNextItemWidth(-1);
   ImGui::SliderFloat("##opacity", &set.opacity, 0.0f, 1.0f, "opacity %.2f");
   set.opacity = std::clamp(set.opacity, 0.0f, 1.0f);  // a number that is typed may be any

@@ -71,8 +71,13 @@ void complain(const Error& error) {
 /// The window, what is in it, and its loop.
 class Program final : public Stage {
  public:
-  Program(ViewOptions options, std::unique_ptr<gl::Window> window, ScriptRunner script)
-      : options_(std::move(options)), window_(std::move(window)), script_(std::move(script)) {}
+  /// @param media  null: none
+  Program(ViewOptions options, std::unique_ptr<gl::Window> window, ScriptRunner script,
+          std::shared_ptr<const transparency::MediaSettings> media)
+      : options_(std::move(options)),
+        window_(std::move(window)),
+        script_(std::move(script)),
+        media_(std::move(media)) {}
 
   Result<void> run() {
     start();
@@ -123,6 +128,7 @@ class Program final : public Stage {
   void start() {
     viewer_.emplace(options_, make_renderer(options_.command.backend),
                     [] { glfwPostEmptyEvent(); });
+    if (media_ != nullptr) viewer_->set_media(media_);
     canvas_.emplace();
     canvas_->warm_up();
     GLFWwindow* glfw = window_->glfw();
@@ -295,6 +301,7 @@ class Program final : public Stage {
   ViewOptions options_;
   std::unique_ptr<gl::Window> window_;
   ScriptRunner script_;
+  std::shared_ptr<const transparency::MediaSettings> media_;
   std::optional<Panels> panels_;
   std::optional<Canvas> canvas_;
   std::optional<Viewer> viewer_;  ///< last: its threads wake the window
@@ -314,6 +321,15 @@ Result<void> run(ViewOptions options) {
     commands = *std::move(read);
   }
   if (auto kept = check_files(options, commands); !kept) return kept;
+  std::shared_ptr<const transparency::MediaSettings> media;
+  if (!options.media.empty()) {
+    auto read = transparency::read_media(options.media);
+    if (!read) return tl::unexpected(read.error());
+    for (const FileIdentity& file : read->files) {
+      if (auto kept = apps::check_opened(file, options.command.outputs); !kept) return kept;
+    }
+    media = std::make_shared<transparency::MediaSettings>(*std::move(read));
+  }
   gl::WindowOptions wish;
   const auto& files = options.command.input.files;
   wish.title = std::filesystem::path(files.front()).filename().string() +
@@ -326,7 +342,8 @@ Result<void> run(ViewOptions options) {
     return tl::unexpected(std::move(error));
   }
   const std::string name = options.script == "-" ? "standard input" : options.script;
-  Program program(std::move(options), *std::move(window), {std::move(commands), name});
+  Program program(std::move(options), *std::move(window), {std::move(commands), name},
+                  std::move(media));
   return program.run();
 }
 

@@ -3,12 +3,14 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <cmath>
 #include <future>
 #include <mutex>
 #include <tuple>
 #include <vector>
 
 #include "strata/csg/picture/picture.h"
+#include "strata/mesh/shapes.h"
 
 namespace strata::view {
 namespace {
@@ -368,6 +370,35 @@ TEST(CpuRenderer, AScenesPartsAreSeenThroughByACheapTechniqueWhileItMoves) {
   EXPECT_GT(wrong->scale.high, 0.001);
   request.see_through->technique = "magic";
   EXPECT_FALSE(renderer->draw(request, {}));
+}
+
+TEST(CpuRenderer, MediaFillSolidsAtRest) {
+  Model model;
+  model.scene.tree = csg::Tree(make_box(glm::dvec3(-10), glm::dvec3(10)));
+  FrameRequest request;
+  request.what = arrange(model, {});
+  request.size = {64, 64};
+  request.camera.projection = Projection::kOrthographic;
+  request.camera.rotation = {0, 0, 0};
+  request.camera.distance = 60;
+  request.see_through = SeenThrough{};
+  auto media = std::make_shared<transparency::MediaSettings>();
+  media->media.push_back({"*", {glm::vec3(0.1f), glm::vec3(0.0f)}});
+  media->ambient = glm::vec3(0.0f);
+  request.see_through->media = media;
+  const auto renderer = make_renderer();
+  const auto frame = renderer->draw(request, {});
+  ASSERT_TRUE(frame) << frame.error().message;
+  EXPECT_EQ(frame->drawn_by, "CPU, media");
+  // Nothing is scattered: exp(-0.1 * 20) of the background comes through.
+  const glm::vec3 ground(csg::colour_schemes().front().background);
+  const csg::Rgba middle = frame->picture.pixels[32 * 64 + 32];
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(middle[c], ground[c] * std::exp(-2.0f), 1.0f);
+  EXPECT_EQ(frame->picture.pixels[0], csg::Rgba(csg::colour_schemes().front().background, 255));
+  request.moving = true;
+  const auto moving = renderer->draw(request, {});
+  ASSERT_TRUE(moving);
+  EXPECT_EQ(moving->drawn_by, std::string("CPU, ") + kMovingTechnique);
 }
 
 TEST(CpuRenderer, HeatMapsCountTheScenesSolidsAloneAndWhereTheSectionLeavesThem) {

@@ -87,6 +87,8 @@ TEST(Script, MistakesNameFileAndLine) {
   }
   EXPECT_NE(error_of("opacity 2").find("must be 0 to 1 or off, got '2'"), std::string::npos);
   EXPECT_EQ(error_of("technique mlab:8"), "none");
+  EXPECT_EQ(error_of("media on"), "none");
+  EXPECT_NE(error_of("media perhaps"), "none");
   EXPECT_NE(error_of("technique magic").find("no technique 'magic'"), std::string::npos);
 }
 
