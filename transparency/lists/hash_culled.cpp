@@ -87,7 +87,7 @@ class CulledRenderer {
                                                    64, sizeof(buffer.max_ages()[0]));
     costs.formula_bytes =
         list_bytes::hash_table(options_.cells, list_bytes::blocks(stream.width(), stream.height()),
-                               64, Record::kAgeBits > 8 ? 2 : 1);
+                               64, Record::kAgeBits > 8 ? 2u : 1u);
     blend(buffer, stream, image);
     costs.lost = stream.size() - visible_;
     return true;

@@ -68,11 +68,7 @@ class FramePass {
  public:
   FramePass(const FragmentSource& source, const FrameOptions& options, bool keep_hidden,
             Image& image)
-      : source_(source),
-        options_(options),
-        info_(frame_info(source, options)),
-        keep_hidden_(keep_hidden),
-        image_(image) {
+      : info_(frame_info(source, options)), keep_hidden_(keep_hidden), image_(image) {
     const glm::vec4& b = options.background;
     background_ = glm::vec4(glm::vec3(b) * b.a, b.a);
   }
@@ -149,8 +145,6 @@ class FramePass {
     }
   }
 
-  const FragmentSource& source_;
-  const FrameOptions& options_;
   FrameInfo info_;
   bool keep_hidden_;
   Image& image_;
