@@ -82,12 +82,9 @@ class Papers {
     std::fflush(stdout);
   }
 
-  Outcome render(const transparency::Frame& frame, const std::string& technique,
-                 double opacity_threshold = 0.99) const {
+  Outcome render(const transparency::Frame& frame, const std::string& technique) const {
     Outcome outcome;
-    Settings settings;
-    settings.opacity_threshold = opacity_threshold;
-    const auto chosen = parse_technique(technique, settings);
+    const auto chosen = parse_technique(technique);
     if (!chosen) {
       outcome.error = chosen.error().message;
       return outcome;
@@ -191,8 +188,8 @@ class Papers {
     const double published[] = {0.760, 0.491, 0.248, 0.041};
     const float opacities[] = {0.125f, 0.25f, 0.5f, 1.0f};
     for (int i = 0; i < 4; ++i) {
-      const Scene scene = hairball(plan_.quick ? 4000 : 13000, 40, opacities[i]);
-      const auto frame = front_view(scene, {1024, 1024});
+      const auto frame =
+          front_view(hairball(plan_.quick ? 4000 : 13000, 40, opacities[i]), {1024, 1024});
       const Outcome out = render(frame, "ha64-culled");
       const Costs& costs = out.rendering.costs;
       table.add({fmt::format("{}", opacities[i]), mega(static_cast<double>(costs.fragments)),

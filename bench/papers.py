@@ -18,7 +18,6 @@ import sys
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 OUT = os.path.join(ROOT, "build", "bench", "papers")
-WORDS = {"exact": "exact", "bounded": "bounded", "random": "random"}
 
 
 def run(*command):
@@ -103,7 +102,7 @@ def technique_table(rows):
         psnr = entry.get("difference", {}).get("psnr")
         quality = "" if path is None else "same" if psnr is None else f"{psnr:.0f}"
         lines.append("| `{}` | {} | {} | {} | {} | {} | {} | {} |".format(
-            entry["name"], entry["title"], entry["paper"], WORDS[entry["accuracy"]],
+            entry["name"], entry["title"], entry["paper"], entry["accuracy"],
             costs.get("geometry_passes", ""), entry["memory"] or "", entry["fails"] or "", quality))
     return "\n".join(lines) + "\n"
 

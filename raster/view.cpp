@@ -152,6 +152,14 @@ View band_of(const View& view, int first, int rows, int across, int down) {
   return band;
 }
 
+Result<void> check_samples(int samples) {
+  if (samples < 1 || samples > 64 || !std::has_single_bit(static_cast<unsigned>(samples))) {
+    return fail(ErrorCode::kUsage, "samples per pixel must be 1, 2, 4, 8, 16, 32 or 64, got {}",
+                samples);
+  }
+  return {};
+}
+
 SampleGrid sample_grid(int samples) {
   const int bits = std::countr_zero(static_cast<unsigned>(samples));
   return {1 << ((bits + 1) / 2), 1 << (bits / 2)};

@@ -1,7 +1,6 @@
 #include "strata/csg/input/see_through.h"
 
 #include <algorithm>
-#include <bit>
 #include <new>
 #include <set>
 #include <utility>
@@ -255,11 +254,7 @@ Result<View> SeeThrough::view(const Camera& camera, const glm::ivec2& size,
 Result<transparency::Frame> SeeThrough::frame(const Camera& camera, const glm::ivec2& size,
                                               const transparency::FrameOptions& options,
                                               const Execution& execution) const try {
-  if (options.samples < 1 || options.samples > 64 ||
-      !std::has_single_bit(static_cast<unsigned>(options.samples))) {
-    return fail(ErrorCode::kUsage, "samples per pixel must be 1, 2, 4, 8, 16, 32 or 64, got {}",
-                options.samples);
-  }
+  if (auto good = check_samples(options.samples); !good) return tl::unexpected(good.error());
   const auto seen = view(camera, size, execution);
   if (!seen) return tl::unexpected(seen.error());
   if (parts_->tree) return parts_->tree_frame(*seen, options, execution);

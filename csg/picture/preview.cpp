@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <atomic>
-#include <bit>
 #include <functional>
 #include <glm/geometric.hpp>
 #include <new>
@@ -246,11 +245,7 @@ Result<void> Preview::Impl::shade_samples(const View& view, const Look& look, in
 
 Result<Picture> Preview::Impl::picture(const Camera& camera, const glm::ivec2& size,
                                        const PictureOptions& options, const Execution& execution) {
-  if (options.samples < 1 || options.samples > 64 ||
-      !std::has_single_bit(static_cast<unsigned>(options.samples))) {
-    return fail(ErrorCode::kUsage, "samples per pixel must be 1, 2, 4, 8, 16, 32 or 64, got {}",
-                options.samples);
-  }
+  if (auto good = check_samples(options.samples); !good) return tl::unexpected(good.error());
   const auto [across, down] = sample_grid(options.samples);
   const auto whole = view(camera, size, execution);
   if (!whole) return tl::unexpected(whole.error());

@@ -77,7 +77,9 @@ struct SampleGrid {
   int across = 1;  ///< samples in a row
   int down = 1;    ///< samples in a column
 };
-/// @pre samples is 1, 2, 4, 8, 16, 32 or 64
+/// @return kUsage unless it is a number of samples a pixel: 1, 2, 4, 8, 16, 32 or 64
+Result<void> check_samples(int samples);
+/// @pre check_samples(samples)
 [[nodiscard]] SampleGrid sample_grid(int samples);
 
 /// How bright a flat face is, in [0, 1]: two directional lights of the eye, and what comes from

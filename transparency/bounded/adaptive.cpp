@@ -84,11 +84,7 @@ class ListedNodes {
 
 Result<TileRenderer> make_listed(const FrameInfo&, const Settings& settings,
                                  const std::shared_ptr<const void>&) {
-  return [lists = std::make_shared<ListedNodes>(settings)](TileStream& stream,
-                                                           TileImage& image) -> Result<void> {
-    lists->render(stream, image);
-    return {};
-  };
+  return renderer_of<ListedNodes>(settings);
 }
 
 }  // namespace

@@ -119,11 +119,7 @@ class Hybrid {
 template <class Row, class Tail>
 Result<TileRenderer> make_hybrid(const FrameInfo&, const Settings& settings,
                                  const std::shared_ptr<const void>&) {
-  return [hybrid = std::make_shared<Hybrid<Row, Tail>>(settings.k)](
-             TileStream& stream, TileImage& image) -> Result<void> {
-    hybrid->render(stream, image);
-    return {};
-  };
+  return renderer_of<Hybrid<Row, Tail>>(settings.k);
 }
 
 constexpr std::string_view kHybridPaper = "Maule, Comba, Torchelsen, Bastos 2013";

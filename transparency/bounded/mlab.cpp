@@ -119,11 +119,7 @@ class Mlab {
 template <class Row>
 Result<TileRenderer> make_mlab(const FrameInfo&, const Settings& settings,
                                const std::shared_ptr<const void>&) {
-  return [mlab = std::make_shared<Mlab<Row>>(settings)](TileStream& stream,
-                                                        TileImage& image) -> Result<void> {
-    mlab->render(stream, image);
-    return {};
-  };
+  return renderer_of<Mlab<Row>>(settings);
 }
 
 constexpr std::string_view kMlabPaper = "Salvi, Vaidyanathan 2014";

@@ -3,6 +3,11 @@
 #include <chrono>
 
 #include "strata/raster/view.h"
+#include "transparency/stream/tile_stream.h"
+
+namespace strata::glsl {
+extern const gl::GlslPiece transparency_gl_repeat_rows_comp;
+}  // namespace strata::glsl
 
 namespace strata::transparency {
 
@@ -54,9 +59,34 @@ Result<std::unique_ptr<GlFrame>> GlFrame::make(const gl::Context& context,
   return frame;
 }
 
-Result<void> GlFrame::clear(gl::Buffer& image) const {
-  const std::vector<glm::vec4> nothing(pixels(), glm::vec4(0, 0, 0, 1));
-  return image.assign(std::span<const glm::vec4>(nothing));
+void run_for_pixels(const gl::Program& program, std::uint32_t pixels) {
+  constexpr std::uint32_t kPixelsOfGroup = 64;
+  program.set("pixels", pixels);
+  const gl::Groups groups = gl::groups_for(pixels, kPixelsOfGroup);
+  program.dispatch(groups.x, groups.y);
+  gl::storage_barrier();
+}
+
+Result<void> GlFrame::clear(gl::Buffer& image) {
+  const glm::vec4 nothing(0, 0, 0, 1);
+  return fill(image, std::span(&nothing, 1));
+}
+
+Result<void> GlFrame::fill(gl::Buffer& image, std::span<const glm::vec4> rows) {
+  if (!repeat_) {
+    const gl::GlslPiece piece = glsl::transparency_gl_repeat_rows_comp;
+    auto made = gl::Program::compute({&piece, 1});
+    if (!made) return tl::unexpected(made.error());
+    repeat_ = std::move(*made);
+  }
+  const auto count = static_cast<std::uint32_t>(rows.size());
+  if (auto room = image.reserve(std::uint64_t{pixels()} * rows.size_bytes()); !room) return room;
+  if (auto done = rows_.assign(rows); !done) return done;
+  rows_.bind(0);
+  image.bind(1);
+  repeat_.set("count", count);
+  run_for_pixels(repeat_, pixels() * count);
+  return {};
 }
 
 Result<Rendering> GlFrame::render(GlRenderer& renderer, const glm::vec4& background,
@@ -84,8 +114,7 @@ Result<Rendering> GlFrame::render(GlRenderer& renderer, const glm::vec4& backgro
   if (auto good = gl::check_errors("transparency"); !good) return tl::unexpected(good.error());
   const glm::vec4 behind(glm::vec3(background) * background.a, background.a);
   for (glm::vec4& pixel : rendering.image.pixels) {
-    pixel = glm::vec4(glm::vec3(pixel) + pixel.a * glm::vec3(behind),
-                      (1.0f - pixel.a) + pixel.a * behind.a);
+    pixel = over(pixel, behind);
   }
   rendering.seconds = seconds_since(begin);
   return rendering;

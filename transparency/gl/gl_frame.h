@@ -11,6 +11,7 @@
 #include "strata/core/result.h"
 #include "strata/gl/buffer.h"
 #include "strata/gl/context.h"
+#include "strata/gl/shader_program.h"
 #include "strata/transparency/stream/frame.h"
 #include "transparency/stream/fragment_source.h"
 
@@ -78,7 +79,9 @@ class GlFrame {
   /// vec4 image[]: colour and transmittance.
   [[nodiscard]] gl::Buffer& image() { return image_; }
   /// Makes every pixel of an image nothing: no colour, all light comes through.
-  [[nodiscard]] Result<void> clear(gl::Buffer& image) const;
+  [[nodiscard]] Result<void> clear(gl::Buffer& image);
+  /// Makes an image of copies of a few rows for each pixel.
+  [[nodiscard]] Result<void> fill(gl::Buffer& image, std::span<const glm::vec4> rows);
 
  private:
   GlFrame() = default;
@@ -86,7 +89,12 @@ class GlFrame {
   std::unique_ptr<gl::ComputeRasterizer> compute_;
   std::unique_ptr<gl::HardwareRasterizer> hardware_;
   gl::Producer* producer_ = nullptr;
-  gl::Buffer faces_, image_;
+  gl::Buffer faces_, image_, rows_;
+  gl::Program repeat_;  ///< of fill(), made when it is first called
 };
+
+/// Runs a compute shader with an invocation for each of `pixels` pixels, in groups of 64, and makes
+/// what it wrote visible.
+void run_for_pixels(const gl::Program& program, std::uint32_t pixels);
 
 }  // namespace strata::transparency

@@ -14,7 +14,6 @@ extern const gl::GlslPiece transparency_gl_composite_lists_comp;
 namespace strata::transparency {
 namespace {
 
-constexpr std::uint32_t kPixelsOfGroup = 64;
 constexpr unsigned kFaces = 0, kImage = 1, kCulledFaces = 12;
 
 /// Builds the lists in a store and blends them.
@@ -48,11 +47,8 @@ class ListRenderer final : public GlRenderer {
       store_->bind_for_reading(band);
       const std::uint32_t pixels = (rows.end - rows.begin) * frame.width();
       composite_.set("first_pixel", rows.begin * frame.width());
-      composite_.set("pixels", pixels);
-      const gl::Groups groups = gl::groups_for(pixels, kPixelsOfGroup);
-      composite_.dispatch(groups.x, groups.y);
+      run_for_pixels(composite_, pixels);
     }
-    gl::storage_barrier();
     return gl::check_errors("transparency: lists");
   }
 

@@ -17,7 +17,6 @@ extern const gl::GlslPiece transparency_gl_ordered_resolve_comp;
 namespace strata::transparency {
 namespace {
 
-constexpr std::uint32_t kPixelsOfGroup = 64;
 constexpr float kFar = 33554432.0f;  // of ordered_rows.glsl
 
 /// Rows a pixel that fragments read and write in the order of the triangles.
@@ -49,11 +48,8 @@ class OrderedRows final : public GlRenderer {
     } else {
       images_.bind_as_texture(0);
     }
-    resolve_.set("pixels", frame.pixels());
     resolve_.set("width", frame.width());
-    const gl::Groups groups = gl::groups_for(frame.pixels(), kPixelsOfGroup);
-    resolve_.dispatch(groups.x, groups.y);
-    gl::storage_barrier();
+    run_for_pixels(resolve_, frame.pixels());
     return gl::check_errors("transparency: rows");
   }
 
@@ -82,11 +78,8 @@ class OrderedRows final : public GlRenderer {
   }
   Result<void> draw_to_buffer(GlFrame& frame, const gl::StoreGlsl& insert) {
     std::vector<glm::vec4> empty;
-    empty.reserve(std::size_t{frame.pixels()} * static_cast<std::size_t>(rows_ + 1));
-    for (std::uint32_t pixel = 0; pixel < frame.pixels(); ++pixel) {
-      for (int i = 0; i <= rows_; ++i) empty.push_back(empty_row(i));
-    }
-    if (auto done = buffer_.assign(std::span<const glm::vec4>(empty)); !done) return done;
+    for (int i = 0; i <= rows_; ++i) empty.push_back(empty_row(i));
+    if (auto done = frame.fill(buffer_, empty); !done) return done;
     buffer_.bind(8);
     return frame.producer().draw(insert, {0, frame.height()});
   }

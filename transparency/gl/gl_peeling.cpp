@@ -8,12 +8,12 @@
 namespace strata::glsl {
 extern const gl::GlslPiece transparency_gl_peel;
 extern const gl::GlslPiece transparency_gl_peel_blend_comp;
+extern const gl::GlslPiece transparency_gl_peel_join_comp;
 }  // namespace strata::glsl
 
 namespace strata::transparency {
 namespace {
 
-constexpr std::uint32_t kPixelsOfGroup = 64;
 constexpr std::uint32_t kNone = 0xffffffffu;
 
 /// Peels a layer from the front, and with `dual` one from the back, until nothing is left. A layer
@@ -35,17 +35,16 @@ class PeelingRenderer final : public GlRenderer {
         bind(frame);
       }
       found_.clear();
-      blend_.set("pixels", frame.pixels());
-      const gl::Groups groups = gl::groups_for(frame.pixels(), kPixelsOfGroup);
-      blend_.dispatch(groups.x, groups.y);
-      gl::storage_barrier();
+      run_for_pixels(blend_, frame.pixels());
       std::uint32_t found = 0;
       found_.download(std::span(&found, 1));
       if (auto good = gl::check_errors("transparency: peeling"); !good) return good;
       if (found == 0) break;
     }
     if (!dual_) return {};
-    return join(frame);
+    bind(frame);
+    run_for_pixels(join_, frame.pixels());
+    return gl::check_errors("transparency: peeling");
   }
 
  private:
@@ -65,6 +64,12 @@ class PeelingRenderer final : public GlRenderer {
       auto made = gl::Program::compute({&piece, 1}, settings());
       if (!made) return tl::unexpected(made.error());
       blend_ = std::move(*made);
+    }
+    if (dual_ && !join_) {
+      const gl::GlslPiece piece = glsl::transparency_gl_peel_join_comp;
+      auto made = gl::Program::compute({&piece, 1});
+      if (!made) return tl::unexpected(made.error());
+      join_ = std::move(*made);
     }
     const std::uint64_t bytes = std::uint64_t{frame.pixels()} * 8;
     for (gl::Buffer* buffer : {&near_, &next_, &far_, &next_far_}) {
@@ -99,20 +104,9 @@ class PeelingRenderer final : public GlRenderer {
     }
     params_.bind_uniform(8);
   }
-  /// Puts what was peeled from the back behind what was peeled from the front.
-  Result<void> join(GlFrame& frame) {
-    std::vector<glm::vec4> front(frame.pixels()), back(frame.pixels());
-    frame.image().download(std::span(front));
-    back_.download(std::span(back));
-    for (std::size_t i = 0; i < front.size(); ++i) {
-      front[i] =
-          glm::vec4(glm::vec3(front[i]) + front[i].a * glm::vec3(back[i]), front[i].a * back[i].a);
-    }
-    return frame.image().assign(std::span<const glm::vec4>(front));
-  }
 
   bool dual_;
-  gl::Program blend_;
+  gl::Program blend_, join_;
   gl::Buffer near_, next_, far_, next_far_, back_, found_, params_;
 };
 

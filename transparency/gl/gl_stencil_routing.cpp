@@ -26,7 +26,6 @@ extern const gl::GlslPiece transparency_gl_nothing_frag;
 namespace strata::transparency {
 namespace {
 
-constexpr std::uint32_t kPixelsOfGroup = 64;
 /// The stencil value at which a sample takes a fragment.
 constexpr int kTakes = 2;
 /// Fragments of a pixel that an 8-bit stencil can count.
@@ -246,13 +245,10 @@ class StencilRouted final : public GlRenderer {
     slots_.bind(9);
     glTextureBarrier();
     glBindTextureUnit(0, images_.texture());
-    gather_.set("pixels", pixels_of(hardware));
     gather_.set("width", hardware.width());
     gather_.set("sample_count", static_cast<std::uint32_t>(samples_));
     gather_.set("slots", slots);
-    const gl::Groups groups = gl::groups_for(pixels_of(hardware), kPixelsOfGroup);
-    gather_.dispatch(groups.x, groups.y);
-    gl::storage_barrier();
+    run_for_pixels(gather_, pixels_of(hardware));
     std::uint32_t found = 0;
     found_.download(std::span(&found, 1));
     if (auto good = gl::check_errors("stencil routing"); !good) return tl::unexpected(good.error());
@@ -266,10 +262,7 @@ class StencilRouted final : public GlRenderer {
     slots_.bind(9);
     params_.bind_uniform(8);
     composite_.set("first_pixel", 0u);
-    composite_.set("pixels", frame.pixels());
-    const gl::Groups groups = gl::groups_for(frame.pixels(), kPixelsOfGroup);
-    composite_.dispatch(groups.x, groups.y);
-    gl::storage_barrier();
+    run_for_pixels(composite_, frame.pixels());
     return gl::check_errors("stencil routing");
   }
 

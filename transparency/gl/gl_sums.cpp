@@ -12,8 +12,6 @@ extern const gl::GlslPiece transparency_gl_sums_resolve_comp;
 namespace strata::transparency {
 namespace {
 
-constexpr std::uint32_t kPixelsOfGroup = 64;
-
 class SumRenderer final : public GlRenderer {
  public:
   explicit SumRenderer(bool average) : average_(average) {}
@@ -41,10 +39,7 @@ class SumRenderer final : public GlRenderer {
     costs.allocated_bytes += sums_.bytes();
     sums_.bind(8);
     frame.image().bind(1);
-    resolve_.set("pixels", frame.pixels());
-    const gl::Groups groups = gl::groups_for(frame.pixels(), kPixelsOfGroup);
-    resolve_.dispatch(groups.x, groups.y);
-    gl::storage_barrier();
+    run_for_pixels(resolve_, frame.pixels());
     return gl::check_errors("transparency: sums");
   }
 

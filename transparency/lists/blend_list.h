@@ -33,8 +33,8 @@ inline std::uint64_t blend_list(const TileStream& stream, DepthItem* list, std::
                                 glm::vec4& pixel) {
   FrontToBack4 sum;
   const glm::vec4* colours = stream.frame().colours.data();
-  const std::uint64_t comparisons = visit_sorted(
-      list, count, [&](DepthItem item) { sum.add(colours[TileStream::face_of(item)]); });
+  const std::uint64_t comparisons =
+      visit_sorted(list, count, [&](DepthItem item) { sum.add(colours[face_of(item)]); });
   sum.write(pixel);
   return comparisons;
 }

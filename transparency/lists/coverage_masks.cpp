@@ -189,9 +189,7 @@ class CoverageMasks {
 
 Result<TileRenderer> make_coverage_masks(const FrameInfo&, const Settings&,
                                          const std::shared_ptr<const void>&) {
-  return [masks = std::make_shared<CoverageMasks>()](TileStream& stream, TileImage& image) {
-    return masks->render(stream, image);
-  };
+  return renderer_of<CoverageMasks>();
 }
 
 }  // namespace

@@ -107,8 +107,7 @@ class Hash32Renderer {
 
 Result<TileRenderer> make_hash_32(const FrameInfo&, const Settings& settings,
                                   const std::shared_ptr<const void>&) {
-  return [renderer = std::make_shared<Hash32Renderer>(settings)](
-             TileStream& stream, TileImage& image) { return renderer->render(stream, image); };
+  return renderer_of<Hash32Renderer>(settings);
 }
 
 }  // namespace

@@ -118,7 +118,7 @@ class HashRenderer {
       FrontToBack4 sum;
       std::uint64_t layers = 0;
       table.for_each(pixel, [&](std::size_t, typename Record::Word record, unsigned age) {
-        sum.add(colours[TileStream::face_of(Record::item(record))]);
+        sum.add(colours[face_of(Record::item(record))]);
         ++layers;
         probes += age;
         return true;
@@ -146,8 +146,7 @@ class HashRenderer {
 template <class Concurrency, Sizing sizing>
 Result<TileRenderer> make_hash_64(const FrameInfo&, const Settings& settings,
                                   const std::shared_ptr<const void>&) {
-  return [renderer = std::make_shared<HashRenderer<Concurrency, sizing>>(settings)](
-             TileStream& stream, TileImage& image) { return renderer->render(stream, image); };
+  return renderer_of<HashRenderer<Concurrency, sizing>>(settings);
 }
 
 constexpr std::string_view kPaper = "Lefebvre, Hornus, Lasram 2013";

@@ -126,15 +126,12 @@ Result<TileRenderer> make_culled(const FrameInfo& frame, const Settings& setting
                                  const std::shared_ptr<const void>&) {
   Settings unbounded = settings;
   unbounded.k = 0;
-  return [renderer = std::make_shared<CulledRenderer<OpacityOfFace>>(
-              unbounded, OpacityOfFace{frame.colours.data()})](
-             TileStream& stream, TileImage& image) { return renderer->render(stream, image); };
+  return renderer_of<CulledRenderer<OpacityOfFace>>(unbounded, OpacityOfFace{frame.colours.data()});
 }
 
 Result<TileRenderer> make_nearest(const FrameInfo&, const Settings& settings,
                                   const std::shared_ptr<const void>&) {
-  return [renderer = std::make_shared<CulledRenderer<NoOpacity>>(settings, NoOpacity{})](
-             TileStream& stream, TileImage& image) { return renderer->render(stream, image); };
+  return renderer_of<CulledRenderer<NoOpacity>>(settings, NoOpacity{});
 }
 
 constexpr std::string_view kHashCulledOffsets = "plane-first random farthest-point";

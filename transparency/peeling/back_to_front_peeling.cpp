@@ -92,11 +92,7 @@ class BackPeeler {
 template <const Kind& kind>
 Result<TileRenderer> make_back_to_front_peeling(const FrameInfo&, const Settings& settings,
                                                 const std::shared_ptr<const void>&) {
-  return [peeler = std::make_shared<BackPeeler>(kind, settings.k)](
-             TileStream& stream, TileImage& image) -> Result<void> {
-    peeler->render(stream, image);
-    return {};
-  };
+  return renderer_of<BackPeeler>(kind, settings.k);
 }
 
 }  // namespace

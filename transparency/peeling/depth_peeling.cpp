@@ -91,11 +91,7 @@ class DepthPeeler {
 
 Result<TileRenderer> make_depth_peeling(const FrameInfo&, const Settings& settings,
                                         const std::shared_ptr<const void>&) {
-  return [peeler = std::make_shared<DepthPeeler>(settings.k)](TileStream& stream,
-                                                              TileImage& image) -> Result<void> {
-    peeler->render(stream, image);
-    return {};
-  };
+  return renderer_of<DepthPeeler>(settings.k);
 }
 
 }  // namespace

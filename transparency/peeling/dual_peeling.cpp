@@ -132,11 +132,7 @@ class DualPeeler {
 
 Result<TileRenderer> make_dual_peeling(const FrameInfo&, const Settings& settings,
                                        const std::shared_ptr<const void>&) {
-  return [peeler = std::make_shared<DualPeeler>(settings.k)](TileStream& stream,
-                                                             TileImage& image) -> Result<void> {
-    peeler->render(stream, image);
-    return {};
-  };
+  return renderer_of<DualPeeler>(settings.k);
 }
 
 }  // namespace

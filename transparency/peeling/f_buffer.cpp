@@ -82,11 +82,7 @@ class FBuffer {
 
 Result<TileRenderer> make_f_buffer(const FrameInfo&, const Settings&,
                                    const std::shared_ptr<const void>&) {
-  return
-      [buffer = std::make_shared<FBuffer>()](TileStream& stream, TileImage& image) -> Result<void> {
-        buffer->render(stream, image);
-        return {};
-      };
+  return renderer_of<FBuffer>();
 }
 
 }  // namespace

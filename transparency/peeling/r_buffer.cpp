@@ -112,11 +112,7 @@ class RBuffer {
 
 Result<TileRenderer> make_r_buffer(const FrameInfo&, const Settings&,
                                    const std::shared_ptr<const void>&) {
-  return
-      [buffer = std::make_shared<RBuffer>()](TileStream& stream, TileImage& image) -> Result<void> {
-        buffer->render(stream, image);
-        return {};
-      };
+  return renderer_of<RBuffer>();
 }
 
 }  // namespace

@@ -236,11 +236,7 @@ Collisions collisions_of(const Settings& settings) {
 template <bool adaptive>
 Result<TileRenderer> make_bucket_sort(const FrameInfo&, const Settings& settings,
                                       const std::shared_ptr<const void>&) {
-  return [buckets = std::make_shared<Buckets>(settings.k, adaptive, collisions_of(settings))](
-             TileStream& stream, TileImage& image) -> Result<void> {
-    buckets->render(stream, image);
-    return {};
-  };
+  return renderer_of<Buckets>(settings.k, adaptive, collisions_of(settings));
 }
 
 }  // namespace

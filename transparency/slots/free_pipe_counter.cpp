@@ -52,11 +52,7 @@ class CountedSlots {
 
 Result<TileRenderer> make_free_pipe_counter(const FrameInfo&, const Settings& settings,
                                             const std::shared_ptr<const void>&) {
-  return [slots = std::make_shared<CountedSlots>(settings.k)](TileStream& stream,
-                                                              TileImage& image) -> Result<void> {
-    slots->render(stream, image);
-    return {};
-  };
+  return renderer_of<CountedSlots>(settings.k);
 }
 
 }  // namespace

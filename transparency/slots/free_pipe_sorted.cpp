@@ -66,11 +66,7 @@ class SortedSlots {
 
 Result<TileRenderer> make_free_pipe_sorted(const FrameInfo&, const Settings& settings,
                                            const std::shared_ptr<const void>&) {
-  return [slots = std::make_shared<SortedSlots>(settings.k)](TileStream& stream,
-                                                             TileImage& image) -> Result<void> {
-    slots->render(stream, image);
-    return {};
-  };
+  return renderer_of<SortedSlots>(settings.k);
 }
 
 }  // namespace

@@ -98,11 +98,7 @@ class RoutedSamples {
 
 Result<TileRenderer> make_stencil_routed(const FrameInfo&, const Settings& settings,
                                          const std::shared_ptr<const void>&) {
-  return [samples = std::make_shared<RoutedSamples>(settings.k)](TileStream& stream,
-                                                                 TileImage& image) -> Result<void> {
-    samples->render(stream, image);
-    return {};
-  };
+  return renderer_of<RoutedSamples>(settings.k);
 }
 
 }  // namespace

@@ -263,11 +263,7 @@ class Z3 {
 
 Result<TileRenderer> make_z3(const FrameInfo& frame, const Settings& settings,
                              const std::shared_ptr<const void>&) {
-  return [z3 = std::make_shared<Z3>(frame, settings.k)](TileStream& stream,
-                                                        TileImage& image) -> Result<void> {
-    z3->render(stream, image);
-    return {};
-  };
+  return renderer_of<Z3>(frame, settings.k);
 }
 
 }  // namespace

@@ -18,6 +18,11 @@
 
 namespace strata::transparency {
 
+/// The face of a fragment, [triangle << 1 | exit].
+[[nodiscard]] inline std::size_t face_of(DepthItem item) {
+  return static_cast<std::size_t>(item.triangle()) << 1 | (item.exit() ? 1 : 0);
+}
+
 /// The fragments of one tile. A pixel is v * kTileSide + u within the tile.
 struct TileFragments {
   static constexpr DepthItem kNothing{std::numeric_limits<std::uint64_t>::max()};
@@ -25,7 +30,6 @@ struct TileFragments {
   TileLog<Record64> log;          ///< in submission order; hidden ones are left out
   bool any_opaque = false;        ///< the two arrays are filled
   std::vector<DepthItem> opaque;  ///< of each pixel: the nearest opaque fragment or kNothing
-  std::vector<std::uint64_t> scratch;
 
   /// In place of the log: fragments that the source keeps.
   std::span<const std::uint32_t> kept_pixels;

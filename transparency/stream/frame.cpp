@@ -1,6 +1,5 @@
 #include "strata/transparency/stream/frame.h"
 
-#include <bit>
 #include <chrono>
 #include <cmath>
 #include <mutex>
@@ -20,11 +19,7 @@ double seconds_since(Clock::time_point begin) {
 }
 
 Result<void> check_options(const FrameOptions& options) {
-  if (options.samples < 1 || options.samples > 64 ||
-      !std::has_single_bit(static_cast<unsigned>(options.samples))) {
-    return fail(ErrorCode::kUsage, "samples per pixel must be 1, 2, 4, 8, 16, 32 or 64, got {}",
-                options.samples);
-  }
+  if (auto good = check_samples(options.samples); !good) return good;
   for (int i = 0; i < 4; ++i) {
     if (!(options.background[i] >= 0.0f && options.background[i] <= 1.0f)) {
       return fail(ErrorCode::kUsage, "the background's components must be 0 to 1, got {}",
@@ -104,7 +99,7 @@ class FramePass {
     if (!fragments.any_opaque) return background_;
     const DepthItem item = fragments.opaque[pixel];
     if (item == TileFragments::kNothing) return background_;
-    return info_.colours[static_cast<std::size_t>(item.triangle()) << 1 | (item.exit() ? 1 : 0)];
+    return info_.colours[face_of(item)];
   }
   /// One sample a pixel, and no opaque objects.
   void resolve_plain(const Worker& worker, const PixelRect& rect) const {
@@ -134,10 +129,7 @@ class FramePass {
           for (int du = 0; du < across; ++du) {
             const auto at =
                 static_cast<std::size_t>((v - rect.v0 + dv) * kTileSide + (u - rect.u0 + du));
-            const glm::vec4& seen = worker.image.pixels[at];
-            const glm::vec4 back = behind(worker.fragments, at);
-            sum += glm::vec4(glm::vec3(seen) + seen.a * glm::vec3(back),
-                             (1.0f - seen.a) + seen.a * back.a);
+            sum += over(worker.image.pixels[at], behind(worker.fragments, at));
           }
         }
         out[u / across] = share == 1.0f ? sum : sum * share;

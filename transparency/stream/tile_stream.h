@@ -5,7 +5,10 @@
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
+#include <memory>
 #include <span>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "strata/core/depth_list.h"
@@ -41,6 +44,11 @@ struct BackToFront {
   }
   [[nodiscard]] glm::vec4 result() const { return {colour, transmittance}; }
 };
+
+/// What is seen through `seen`, a colour and a transmittance: with `behind`, premultiplied.
+[[nodiscard]] inline glm::vec4 over(const glm::vec4& seen, const glm::vec4& behind) {
+  return {glm::vec3(seen) + seen.a * glm::vec3(behind), (1.0f - seen.a) + seen.a * behind.a};
+}
 
 /// What a technique makes of a tile: for each pixel, at v * kTileSide + u, the premultiplied colour
 /// of what is seen through, and the transmittance for what lies behind it. Techniques write pixels
@@ -108,9 +116,6 @@ class TileStream {
   [[nodiscard]] std::span<const DepthItem> items() const { return items_; }
 
   /// The index of a fragment's colour.
-  [[nodiscard]] static std::size_t face_of(DepthItem item) {
-    return static_cast<std::size_t>(item.triangle()) << 1 | (item.exit() ? 1 : 0);
-  }
 
   /// The colour of a fragment, premultiplied, and its opacity.
   [[nodiscard]] const glm::vec4& shade(DepthItem item) {
@@ -149,6 +154,20 @@ void for_each_pixel(const TileStream& stream, Body&& body) {
       body(static_cast<std::uint32_t>(v * kTileSide + u));
     }
   }
+}
+
+/// The renderer that calls render(stream, image) of an `Object` of its own, made of `arguments`.
+template <class Object, class... Arguments>
+[[nodiscard]] TileRenderer renderer_of(Arguments&&... arguments) {
+  return [object = std::make_shared<Object>(std::forward<Arguments>(arguments)...)](
+             TileStream& stream, TileImage& image) -> Result<void> {
+    if constexpr (std::is_void_v<decltype(object->render(stream, image))>) {
+      object->render(stream, image);
+      return {};
+    } else {
+      return object->render(stream, image);
+    }
+  };
 }
 
 }  // namespace strata::transparency

@@ -70,11 +70,7 @@ class MomentSums {
 
 template <std::size_t kHalf>
 TileRenderer renderer(const FrameInfo& frame) {
-  return [sums = std::make_shared<MomentSums<kHalf>>(frame)](TileStream& stream,
-                                                             TileImage& image) -> Result<void> {
-    sums->render(stream, image);
-    return {};
-  };
+  return renderer_of<MomentSums<kHalf>>(frame);
 }
 
 Result<TileRenderer> make_moments(const FrameInfo& frame, const Settings& settings,

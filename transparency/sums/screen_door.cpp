@@ -85,11 +85,7 @@ class ScreenDoor {
 
 Result<TileRenderer> make_screen_door(const FrameInfo&, const Settings& settings,
                                       const std::shared_ptr<const void>&) {
-  return [door = std::make_shared<ScreenDoor>(settings)](TileStream& stream,
-                                                         TileImage& image) -> Result<void> {
-    door->render(stream, image);
-    return {};
-  };
+  return renderer_of<ScreenDoor>(settings);
 }
 
 }  // namespace

@@ -368,12 +368,8 @@ class SilhouetteOpaque {
 
 Result<TileRenderer> make_silhouette_opaque(const FrameInfo& frame, const Settings& settings,
                                             const std::shared_ptr<const void>& prepared) {
-  auto points = std::make_shared<SilhouetteOpaque>(
-      frame, settings, std::static_pointer_cast<const TileTriangles>(prepared));
-  return [points](TileStream& stream, TileImage& image) -> Result<void> {
-    points->render(stream, image);
-    return {};
-  };
+  return renderer_of<SilhouetteOpaque>(frame, settings,
+                                       std::static_pointer_cast<const TileTriangles>(prepared));
 }
 
 }  // namespace

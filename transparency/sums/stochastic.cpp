@@ -151,11 +151,7 @@ class Stochastic {
 
 Result<TileRenderer> make_stochastic(const FrameInfo&, const Settings& settings,
                                      const std::shared_ptr<const void>&) {
-  return [stochastic = std::make_shared<Stochastic>(settings)](TileStream& stream,
-                                                               TileImage& image) -> Result<void> {
-    stochastic->render(stream, image);
-    return {};
-  };
+  return renderer_of<Stochastic>(settings);
 }
 
 }  // namespace
