@@ -1,0 +1,92 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <utility>
+#include <vector>
+
+#include "exact/cut_points.h"
+
+namespace strata::csg {
+
+/// The points of a boundary: lattice points, points of an edge and a plane, points of three planes.
+/// A point has one index, whichever triangles meet there.
+class BoundaryPoints {
+ public:
+  enum class Kind : std::uint8_t { kLattice, kEdgePlane, kEdgeEdge, kThreePlanes };
+  /// How a point is made, of vertices() and triangles().
+  struct Recipe {
+    Kind kind = Kind::kLattice;
+    /// kLattice: [vertex]; kEdgePlane: [vertex, vertex, triangle]; kEdgeEdge: [vertex, vertex,
+    /// vertex, vertex] of two edges of one plane; kThreePlanes: [triangle, triangle, triangle].
+    std::array<std::uint32_t, 4> from{};
+  };
+
+  BoundaryPoints() = default;
+  BoundaryPoints(std::vector<exact::LatticePoint> vertices, std::vector<glm::uvec3> triangles)
+      : vertices_(std::move(vertices)), triangles_(std::move(triangles)) {}
+
+  const std::vector<exact::LatticePoint>& vertices() const { return vertices_; }
+  const std::vector<glm::uvec3>& triangles() const { return triangles_; }
+  std::size_t size() const { return rounded_.size(); }
+  /// In 2^-24 step: the point itself when it is a lattice point.
+  const exact::FilePoint& rounded(std::uint32_t point) const { return rounded_[point]; }
+  const Recipe& recipe(std::uint32_t point) const { return recipes_[point]; }
+  /// Whether rounding moved nothing.
+  bool on_lattice(std::uint32_t point) const { return recipes_[point].kind == Kind::kLattice; }
+  exact::Plane plane_of(std::uint32_t triangle) const {
+    const glm::uvec3& t = triangles_[triangle];
+    return exact::plane_through(vertices_[t.x], vertices_[t.y], vertices_[t.z]);
+  }
+  /// The point itself.
+  exact::RationalPoint rational(std::uint32_t point) const;
+
+  std::uint32_t add(const Recipe& recipe, const exact::FilePoint& rounded) {
+    recipes_.push_back(recipe);
+    rounded_.push_back(rounded);
+    return static_cast<std::uint32_t>(rounded_.size() - 1);
+  }
+
+ private:
+  std::vector<exact::LatticePoint> vertices_;
+  std::vector<glm::uvec3> triangles_;
+  std::vector<exact::FilePoint> rounded_;
+  std::vector<Recipe> recipes_;
+};
+
+/// An edge of a face, with the face on its left as seen from outside of the solid.
+struct BoundaryEdge {
+  std::uint32_t from, to;  ///< points
+  /// 0 where the undirected edge has two faces. Where it has more, the two faces that bound the
+  /// same inside of the solid have edges in opposite directions with the same number.
+  std::uint32_t wedge = 0;
+};
+
+/// All faces of one plane that have the same outside and the same label: polygons with holes, which
+/// may touch each other and themselves in points. Their edges are the boundary of the region on
+/// their left; none lies within the region.
+struct BoundaryPlane {
+  exact::Plane plane;  ///< its normal points to the outside of the solid
+  std::uint32_t label = 0;
+  std::uint32_t first_edge = 0, edge_count = 0;    ///< in edges
+  std::uint32_t first_touch = 0, touch_count = 0;  ///< in touches
+};
+
+/// The exact boundary of a tree's result. Orders mean nothing.
+struct BoundaryFaces {
+  BoundaryPoints points;
+  /// Triangles that nothing cuts and that lie in no plane with a neighbour: faces by themselves.
+  struct Whole {
+    glm::uvec3 points;  ///< counter-clockwise from outside
+    std::uint32_t label = 0;
+  };
+  std::vector<Whole> wholes;  ///< each of their edges has two faces
+  std::vector<BoundaryPlane> planes;
+  std::vector<BoundaryEdge> edges;
+  /// Points inside of faces of a plane that are vertices of the mesh elsewhere: the solid touches
+  /// itself there, and the face must have a vertex.
+  std::vector<std::uint32_t> touches;
+};
+
+}  // namespace strata::csg
