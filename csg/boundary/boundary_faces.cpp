@@ -4,8 +4,8 @@
 
 namespace strata::csg {
 
-exact::RationalPoint BoundaryPoints::rational(std::uint32_t point) const {
-  const auto& [kind, from] = recipes_[point];
+exact::RationalPoint BoundaryPoints::rational(const Recipe& recipe) const {
+  const auto& [kind, from] = recipe;
   switch (kind) {
     case Kind::kLattice:
       break;

@@ -11,7 +11,8 @@
 namespace strata::csg {
 
 /// The points of a boundary: lattice points, points of an edge and a plane, points of three planes.
-/// A point has one index, whichever triangles meet there.
+/// A point has one index, whichever triangles meet there. The first vertices().size() points are
+/// the vertices; all others are no vertices.
 class BoundaryPoints {
  public:
   enum class Kind : std::uint8_t { kLattice, kEdgePlane, kEdgeEdge, kThreePlanes };
@@ -29,23 +30,29 @@ class BoundaryPoints {
 
   const std::vector<exact::LatticePoint>& vertices() const { return vertices_; }
   const std::vector<glm::uvec3>& triangles() const { return triangles_; }
-  std::size_t size() const { return rounded_.size(); }
-  /// In 2^-24 step: the point itself when it is a lattice point.
-  const exact::FilePoint& rounded(std::uint32_t point) const { return rounded_[point]; }
-  const Recipe& recipe(std::uint32_t point) const { return recipes_[point]; }
-  /// Whether rounding moved nothing.
-  bool on_lattice(std::uint32_t point) const { return recipes_[point].kind == Kind::kLattice; }
+  std::size_t size() const { return vertices_.size() + rounded_.size(); }
+  /// Whether the point is one of vertices(): rounding moves nothing.
+  bool on_lattice(std::uint32_t point) const { return point < vertices_.size(); }
+  /// In 2^-24 step.
+  exact::FilePoint rounded(std::uint32_t point) const {
+    return on_lattice(point) ? exact::file_point(vertices_[point])
+                             : rounded_[point - vertices_.size()];
+  }
+  Recipe recipe(std::uint32_t point) const {
+    return on_lattice(point) ? Recipe{Kind::kLattice, {point}} : recipes_[point - vertices_.size()];
+  }
   exact::Plane plane_of(std::uint32_t triangle) const {
     const glm::uvec3& t = triangles_[triangle];
     return exact::plane_through(vertices_[t.x], vertices_[t.y], vertices_[t.z]);
   }
   /// The point itself.
-  exact::RationalPoint rational(std::uint32_t point) const;
+  exact::RationalPoint rational(std::uint32_t point) const { return rational(recipe(point)); }
+  exact::RationalPoint rational(const Recipe& recipe) const;
 
   std::uint32_t add(const Recipe& recipe, const exact::FilePoint& rounded) {
     recipes_.push_back(recipe);
     rounded_.push_back(rounded);
-    return static_cast<std::uint32_t>(rounded_.size() - 1);
+    return static_cast<std::uint32_t>(size() - 1);
   }
 
  private:
@@ -84,8 +91,8 @@ struct BoundaryFaces {
   std::vector<Whole> wholes;  ///< each of their edges has two faces
   std::vector<BoundaryPlane> planes;
   std::vector<BoundaryEdge> edges;
-  /// Points inside of faces of a plane that are vertices of the mesh elsewhere: the solid touches
-  /// itself there, and the face must have a vertex.
+  /// Points of a plane that are vertices of the mesh elsewhere: where they lie inside of a face,
+  /// the solid touches itself, and the face must have a vertex. Others are to be ignored.
   std::vector<std::uint32_t> touches;
 };
 
