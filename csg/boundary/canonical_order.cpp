@@ -1,0 +1,205 @@
+#include "csg/boundary/canonical_order.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <map>
+#include <span>
+#include <tuple>
+#include <utility>
+
+namespace strata::csg {
+namespace {
+
+using exact::FilePoint;
+using Index = std::uint32_t;
+using Keyed = std::uint64_t;  // [key:32 | vertex:32]
+
+bool before(const FilePoint& a, const FilePoint& b) {
+  return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y < b.y : a.z < b.z;
+}
+
+// Sorts vertices by position: by radix along an axis, then what is equal there along the next one.
+class PositionSort {
+ public:
+  explicit PositionSort(const std::vector<FilePoint>& positions) : positions_(positions) {}
+
+  void run(std::span<Keyed> vertices) {
+    spare_.resize(vertices.size());
+    sort(vertices, 0);
+  }
+
+ private:
+  static constexpr std::size_t kFew = 256;
+  static constexpr int kDigit = 11;
+
+  const FilePoint& at(Keyed vertex) const { return positions_[vertex & 0xffffffffu]; }
+
+  void sort(std::span<Keyed> vertices, int axis) {
+    if (vertices.size() <= kFew) {
+      std::sort(vertices.begin(), vertices.end(),
+                [this](Keyed a, Keyed b) { return before(at(a), at(b)); });
+      return;
+    }
+    std::int64_t low = at(vertices[0])[axis], high = low;
+    for (const Keyed vertex : vertices) {
+      low = std::min(low, at(vertex)[axis]);
+      high = std::max(high, at(vertex)[axis]);
+    }
+    if (low == high) {
+      if (axis < 2) sort(vertices, axis + 1);
+      return;
+    }
+    const auto range = static_cast<std::uint64_t>(high - low);
+    const int shift = std::max(0, static_cast<int>(std::bit_width(range)) - 32);
+    for (Keyed& vertex : vertices) {
+      const auto key = static_cast<std::uint64_t>(at(vertex)[axis] - low) >> shift;
+      vertex = key << 32 | (vertex & 0xffffffffu);
+    }
+    radix_sort(vertices);
+    for (std::size_t begin = 0, end = 0; begin < vertices.size(); begin = end) {
+      while (end < vertices.size() && vertices[end] >> 32 == vertices[begin] >> 32) ++end;
+      if (end - begin > 1) sort(vertices.subspan(begin, end - begin), axis);
+    }
+  }
+
+  void radix_sort(std::span<Keyed> vertices) {
+    for (int bit = 32; bit < 64; bit += kDigit) {
+      std::array<Index, (1 << kDigit) + 1> place{};
+      const auto digit = [bit](Keyed vertex) { return vertex >> bit & ((1 << kDigit) - 1); };
+      for (const Keyed vertex : vertices) ++place[digit(vertex) + 1];
+      if (place[digit(vertices[0]) + 1] == vertices.size()) continue;
+      for (std::size_t i = 1; i < place.size(); ++i) place[i] += place[i - 1];
+      for (const Keyed vertex : vertices) spare_[place[digit(vertex)]++] = vertex;
+      std::copy_n(spare_.begin(), vertices.size(), vertices.begin());
+    }
+  }
+
+  const std::vector<FilePoint>& positions_;
+  std::vector<Keyed> spare_;
+};
+
+class Ordering {
+ public:
+  Ordering(const std::vector<FilePoint>& positions, const std::vector<glm::uvec3>& triangles,
+           const std::vector<Index>& labels)
+      : positions_(positions), triangles_(triangles), labels_(labels) {}
+
+  OrderedMesh run() {
+    sort_vertices();
+    sort_equal_positions();
+    OrderedMesh result;
+    result.points.reserve(order_.size());
+    for (const Keyed vertex : order_) result.points.push_back(positions_[vertex & 0xffffffffu]);
+    sort_triangles(result);
+    return result;
+  }
+
+ private:
+  void sort_vertices();
+  void sort_equal_positions();
+  void sort_triangles(OrderedMesh& result) const;
+
+  const std::vector<FilePoint>& positions_;
+  const std::vector<glm::uvec3>& triangles_;
+  const std::vector<Index>& labels_;
+  std::vector<Keyed> order_;
+  std::vector<Index> rank_;  // of a vertex
+};
+
+void Ordering::sort_vertices() {
+  rank_.assign(positions_.size(), 0);
+  for (const glm::uvec3& t : triangles_) rank_[t.x] = rank_[t.y] = rank_[t.z] = 1;
+  for (Index v = 0; v < rank_.size(); ++v) {
+    if (rank_[v] != 0) order_.push_back(v);
+  }
+  PositionSort(positions_).run(order_);
+  for (Index i = 0; i < order_.size(); ++i) rank_[order_[i] & 0xffffffffu] = i;
+}
+
+void Ordering::sort_equal_positions() {
+  const auto at = [this](std::size_t i) -> const FilePoint& {
+    return positions_[order_[i] & 0xffffffffu];
+  };
+  // The other corners, as ranks of their positions, of the least triangle at a vertex.
+  using Corners = std::pair<Index, Index>;
+  std::map<Index, Corners> least;  // of vertices that share their position
+  std::vector<Index> place(order_.size());
+  for (std::size_t i = 0; i < order_.size(); ++i) {
+    const bool shared = i > 0 && at(i - 1) == at(i);
+    place[i] = shared ? place[i - 1] : static_cast<Index>(i);
+    if (!shared) continue;
+    for (const std::size_t k : {i - 1, i})
+      least[static_cast<Index>(k)] = {0xffffffffu, 0xffffffffu};
+  }
+  if (least.empty()) return;
+  for (const glm::uvec3& t : triangles_) {
+    for (int k = 0; k < 3; ++k) {
+      const auto found = least.find(rank_[t[k]]);
+      if (found == least.end()) continue;
+      found->second = std::min(found->second,
+                               Corners(place[rank_[t[(k + 1) % 3]]], place[rank_[t[(k + 2) % 3]]]));
+    }
+  }
+  std::vector<std::tuple<Index, Corners, Keyed>> run;
+  for (const auto& [rank, corners] : least) run.emplace_back(place[rank], corners, order_[rank]);
+  std::sort(run.begin(), run.end());
+  std::size_t next = 0;
+  for (const auto& [rank, corners] : least) {
+    order_[rank] = std::get<2>(run[next++]);
+    rank_[order_[rank] & 0xffffffffu] = rank;
+  }
+}
+
+// Sorts triangles [begin, end), whose first vertex is the same, by the second one.
+void sort_bucket(OrderedMesh& mesh, std::size_t begin, std::size_t end) {
+  const auto second = [&mesh](std::size_t t) { return mesh.triangles[t].y; };
+  if (end - begin <= 12) {
+    for (std::size_t i = begin + 1; i < end; ++i) {
+      for (std::size_t k = i; k > begin && second(k) < second(k - 1); --k) {
+        std::swap(mesh.triangles[k], mesh.triangles[k - 1]);
+        std::swap(mesh.labels[k], mesh.labels[k - 1]);
+      }
+    }
+    return;
+  }
+  std::vector<std::pair<glm::uvec3, Index>> bucket;
+  for (std::size_t t = begin; t < end; ++t) bucket.emplace_back(mesh.triangles[t], mesh.labels[t]);
+  std::sort(bucket.begin(), bucket.end(),
+            [](const auto& a, const auto& b) { return a.first.y < b.first.y; });
+  for (std::size_t t = begin; t < end; ++t) {
+    std::tie(mesh.triangles[t], mesh.labels[t]) = bucket[t - begin];
+  }
+}
+
+void Ordering::sort_triangles(OrderedMesh& result) const {
+  std::vector<Index> first(order_.size() + 1, 0);
+  const auto turned = [this](const glm::uvec3& t) {
+    const glm::uvec3 r(rank_[t.x], rank_[t.y], rank_[t.z]);
+    if (r.x < r.y && r.x < r.z) return r;
+    return r.y < r.z ? glm::uvec3(r.y, r.z, r.x) : glm::uvec3(r.z, r.x, r.y);
+  };
+  for (const glm::uvec3& t : triangles_) ++first[std::min({rank_[t.x], rank_[t.y], rank_[t.z]})];
+  Index sum = 0;
+  for (Index& count : first) count = sum += count;
+  result.triangles.resize(triangles_.size());
+  result.labels.resize(triangles_.size());
+  for (std::size_t t = triangles_.size(); t-- > 0;) {
+    const glm::uvec3 corners = turned(triangles_[t]);
+    const Index to = --first[corners.x];
+    result.triangles[to] = corners;
+    result.labels[to] = labels_[t];
+  }
+  // A vertex has few triangles of which it is the least; an edge has one on its left.
+  for (std::size_t v = 0; v + 1 < first.size(); ++v) sort_bucket(result, first[v], first[v + 1]);
+}
+
+}  // namespace
+
+OrderedMesh canonical_order(const std::vector<FilePoint>& positions,
+                            const std::vector<glm::uvec3>& triangles,
+                            const std::vector<std::uint32_t>& labels) {
+  return Ordering(positions, triangles, labels).run();
+}
+
+}  // namespace strata::csg

@@ -1,0 +1,69 @@
+#include "csg/boundary/delaunay_mesh.h"
+
+#include <algorithm>
+
+namespace strata::csg {
+
+bool DelaunayMesh::delaunay(const Quad& quad) const {
+  const auto& [a, b, c, d] = quad;
+  const int inside = exact::incircle(points_[a], points_[c], points_[d], points_[b]);
+  // Points are numbered in lexicographic order.
+  return inside != 0 ? inside < 0 : std::min(a, c) < std::min(b, d);
+}
+
+void DelaunayMesh::flip(Side half_edge, const Quad& quad) {
+  const Side other = across_[half_edge];
+  const Side after = next(half_edge), other_after = next(other);
+  const Side ab = across_[other_after], bc = across_[next(other_after)], cd = across_[after],
+             da = across_[next(after)];
+  const std::uint32_t t = half_edge / 3, o = other / 3;
+  corners_[t] = {quad.a, quad.b, quad.d};
+  corners_[o] = {quad.b, quad.c, quad.d};
+  // An outer edge may be the other side of another one: of a slit that is not joined yet.
+  join(3 * t, ab);
+  join(3 * t + 2, da);
+  join(3 * o, bc);
+  join(3 * o + 1, cd);
+  join(3 * t + 1, 3 * o + 2);
+  for (const Side side : {3 * t, 3 * t + 2, 3 * o, 3 * o + 1}) waiting_.push_back(side);
+}
+
+void DelaunayMesh::legalize() {
+  while (!waiting_.empty()) {
+    const Side half_edge = waiting_.back();
+    waiting_.pop_back();
+    if (!is_half_edge(across_[half_edge])) continue;
+    const Quad around = quad(half_edge);
+    // The quadrilateral of an edge that is not Delaunay is convex.
+    if (!delaunay(around)) flip(half_edge, around);
+  }
+}
+
+std::size_t DelaunayMesh::straighten() {
+  const auto left = [this](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
+    return turn(a, b, c) > 0 ? 1 : 0;
+  };
+  for (Side side = 0; side < across_.size(); ++side) waiting_.push_back(side);
+  // Flips for more left turns end; those for Delaunay edges need a bound, since they may undo each
+  // other where triangles overlap.
+  std::size_t most = 64 * corners_.size();
+  while (!waiting_.empty() && most > 0) {
+    const Side half_edge = waiting_.back();
+    waiting_.pop_back();
+    if (!is_half_edge(across_[half_edge])) continue;
+    const Quad around = quad(half_edge);
+    const auto& [a, b, c, d] = around;
+    if (b == d) continue;
+    const int before = left(a, c, d) + left(a, b, c), after = left(a, b, d) + left(b, c, d);
+    if (after > before || (after == 2 && before == 2 && !delaunay(around))) {
+      flip(half_edge, around);
+      --most;
+    }
+  }
+  waiting_.clear();
+  return static_cast<std::size_t>(
+      std::count_if(corners_.begin(), corners_.end(),
+                    [&](const auto& t) { return left(t[0], t[1], t[2]) == 0; }));
+}
+
+}  // namespace strata::csg

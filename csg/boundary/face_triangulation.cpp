@@ -1,0 +1,135 @@
+#include "csg/boundary/face_triangulation.h"
+
+#include "exact/directions.h"
+
+namespace strata::csg {
+namespace {
+
+using exact::RationalPoint;
+
+const exact::Int256& coordinate(const RationalPoint& point, int axis) {
+  return axis == 0 ? point.x : axis == 1 ? point.y : point.z;
+}
+
+// -1, 0, 1: the order along an axis. Numerators times weights: 7b + 4 + 6b + 3 bits; 384 for b
+// = 29.
+int order_along(const RationalPoint& a, const RationalPoint& b, int axis) {
+  return exact::sign_of(exact::product<exact::Wide<7>>(coordinate(a, axis), b.w) -
+                        exact::product<exact::Wide<7>>(coordinate(b, axis), a.w));
+}
+
+}  // namespace
+
+// Most faces that were cut are triangles still.
+bool FaceTriangulation::append_triangle(const BoundaryPlane& plane, FaceTriangles& out) const {
+  const BoundaryEdge* e = faces_.edges.data() + plane.first_edge;
+  const int second = e[1].from == e[0].to ? 1 : 2;
+  const BoundaryEdge &p = e[0], &q = e[second], &r = e[3 - second];
+  if (p.to != q.from || q.to != r.from || r.to != p.from) return false;
+  const auto flat = [this](Index point) {
+    return exact::FlatPoint(positions_[point][u_], positions_[point][v_]);
+  };
+  if (exact::orient2d(flat(p.from), flat(q.from), flat(r.from)) <= 0) return false;
+  const auto triangle = static_cast<Index>(out.triangles.size());
+  out.triangles.emplace_back(p.from, q.from, r.from);
+  out.labels.push_back(plane.label);
+  if (p.wedge != 0) out.wedges.push_back({triangle, 0, p.wedge});
+  if (q.wedge != 0) out.wedges.push_back({triangle, 1, q.wedge});
+  if (r.wedge != 0) out.wedges.push_back({triangle, 2, r.wedge});
+  return true;
+}
+
+void FaceTriangulation::collect(const BoundaryPlane& plane) {
+  corners_.clear();
+  const auto add = [this](Index point) {
+    const exact::FilePoint& at = positions_[point];
+    corners_.push_back({{at[u_], at[v_]}, point});
+  };
+  for (Index i = 0; i < plane.edge_count; ++i) add(faces_.edges[plane.first_edge + i].from);
+  for (Index i = 0; i < plane.touch_count; ++i) add(faces_.touches[plane.first_touch + i]);
+}
+
+// Numbers the corners in lexicographic order. @return false when two of them coincide
+bool FaceTriangulation::number_points() {
+  std::sort(corners_.begin(), corners_.end());
+  std::size_t count = 0;
+  bool distinct = true;
+  for (const Corner& corner : corners_) {
+    if (count > 0 && corners_[count - 1].point == corner.point) continue;
+    if (count > 0 && corners_[count - 1].at == corner.at) distinct = false;
+    corners_[count++] = corner;
+  }
+  corners_.resize(count);
+  return distinct;
+}
+
+void FaceTriangulation::number_edges(const BoundaryPlane& plane) {
+  if (!number_of_) number_of_.reset(new Index[positions_.size()]);
+  flat_.clear();
+  for (const Corner& corner : corners_) {
+    number_of_[corner.point] = static_cast<Index>(flat_.size());
+    flat_.push_back(corner.at);
+  }
+  edges_.clear();
+  for (Index i = 0; i < plane.edge_count; ++i) {
+    const BoundaryEdge& edge = faces_.edges[plane.first_edge + i];
+    edges_.push_back({number_of_[edge.from], number_of_[edge.to]});
+  }
+}
+
+bool FaceTriangulation::cut_exactly(const BoundaryPlane& plane) {
+  std::vector<std::pair<RationalPoint, Corner>> points;
+  points.reserve(corners_.size());
+  for (const Corner& corner : corners_) {
+    points.emplace_back(faces_.points.rational(corner.point), corner);
+  }
+  std::sort(points.begin(), points.end(), [this](const auto& a, const auto& b) {
+    const int order = order_along(a.first, b.first, u_);
+    return (order != 0 ? order : order_along(a.first, b.first, v_)) < 0;
+  });
+  std::vector<RationalPoint> rational;
+  rational.reserve(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    rational.push_back(points[i].first);
+    corners_[i] = points[i].second;
+  }
+  number_edges(plane);
+  mesh_.begin(flat_);
+  if (!sweep_.cut(FaceSweep::ExactView{rational, u_, v_}, edges_, mesh_)) return false;
+  mesh_.straighten();
+  return true;
+}
+
+void FaceTriangulation::append_mesh(const BoundaryPlane& plane, FaceTriangles& out) const {
+  const std::size_t before = out.triangles.size();
+  out.triangles.reserve(before + mesh_.triangle_count());
+  for (Index t = 0; t < mesh_.triangle_count(); ++t) {
+    const auto& [a, b, c] = mesh_.triangle(t);
+    out.triangles.emplace_back(corners_[a].point, corners_[b].point, corners_[c].point);
+    for (Index k = 0; k < 3; ++k) {
+      const DelaunayMesh::Side side = mesh_.across(3 * t + k);
+      if (!DelaunayMesh::is_outline(side)) continue;
+      const Index wedge = faces_.edges[plane.first_edge + DelaunayMesh::number(side)].wedge;
+      if (wedge != 0) out.wedges.push_back({static_cast<Index>(before) + t, k, wedge});
+    }
+  }
+  out.labels.resize(out.triangles.size(), plane.label);
+}
+
+bool FaceTriangulation::append(const BoundaryPlane& plane, FaceTriangles& out) {
+  const exact::PlaneView view(plane.plane);
+  u_ = view.u();
+  v_ = view.v();
+  if (plane.edge_count == 3 && plane.touch_count == 0 && append_triangle(plane, out)) return true;
+  collect(plane);
+  const bool distinct = number_points();
+  if (distinct) number_edges(plane);
+  if (!distinct || !sweep_.cut(flat_, edges_, mesh_)) {
+    ++out.not_simple;
+    if (!cut_exactly(plane)) return false;
+  }
+  append_mesh(plane, out);
+  return true;
+}
+
+}  // namespace strata::csg

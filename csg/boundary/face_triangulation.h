@@ -1,0 +1,71 @@
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "csg/boundary/boundary_faces.h"
+#include "csg/boundary/face_sweep.h"
+
+namespace strata::csg {
+
+/// A half-edge of a triangle at an undirected edge that more than two faces share.
+struct WedgeEdge {
+  std::uint32_t triangle, corner;  ///< from this corner to the next one
+  std::uint32_t wedge;             ///< as BoundaryEdge::wedge, not 0
+};
+
+/// Triangles of some planes.
+struct FaceTriangles {
+  std::vector<glm::uvec3> triangles;  ///< points, counter-clockwise from outside
+  std::vector<std::uint32_t> labels;  ///< of the triangles
+  std::vector<WedgeEdge> wedges;
+  std::size_t not_simple = 0;  ///< planes whose edges meet once they are rounded
+};
+
+/// Triangulates the faces of planes of a boundary. One object serves one thread.
+class FaceTriangulation {
+ public:
+  /// @param positions  rounded, of all points; both are borrowed
+  FaceTriangulation(const BoundaryFaces& faces, const std::vector<exact::FilePoint>& positions)
+      : faces_(faces), positions_(positions) {}
+
+  /// Appends the constrained Delaunay triangulation of the rounded points of a plane, which does
+  /// not depend on orders. Where rounding makes edges meet, the exact points make the
+  /// triangulation, so that each edge has its triangle.
+  /// @return false when the plane's edges do not bound a region: a fault of whoever made them
+  bool append(const BoundaryPlane& plane, FaceTriangles& out);
+
+ private:
+  using Index = std::uint32_t;
+
+  bool append_triangle(const BoundaryPlane& plane, FaceTriangles& out) const;
+  void collect(const BoundaryPlane& plane);
+  bool number_points();
+  void number_edges(const BoundaryPlane& plane);
+  bool cut_exactly(const BoundaryPlane& plane);
+  void append_mesh(const BoundaryPlane& plane, FaceTriangles& out) const;
+
+  struct Corner {
+    exact::FlatPoint at;
+    Index point;
+
+    friend bool operator<(const Corner& a, const Corner& b) {
+      return a.at.x != b.at.x   ? a.at.x < b.at.x
+             : a.at.y != b.at.y ? a.at.y < b.at.y
+                                : a.point < b.point;
+    }
+  };
+
+  const BoundaryFaces& faces_;
+  const std::vector<exact::FilePoint>& positions_;
+  int u_ = 0, v_ = 1;
+  std::unique_ptr<Index[]> number_of_;  // of a point of the plane; the others are not set
+  std::vector<Corner> corners_;         // by number
+  std::vector<exact::FlatPoint> flat_;
+  std::vector<FlatEdge> edges_;
+  FaceSweep sweep_;
+  DelaunayMesh mesh_;
+};
+
+}  // namespace strata::csg

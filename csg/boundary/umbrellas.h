@@ -1,0 +1,22 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "csg/boundary/face_triangulation.h"
+#include "strata/core/result.h"
+
+namespace strata::csg {
+
+/// Gives each fan of triangles around a point a vertex of its own, so that edges have two triangles
+/// and the triangles at a vertex are one fan. Vertices are first the points, then the additional
+/// ones; points without triangles are vertices without triangles.
+/// @param triangles  of points; becomes triangles of vertices
+/// @param wedges     where edges have more than two triangles: which of them belong together
+/// @return the points of the additional vertices; an error (kInternal) when the triangles are not
+/// the boundary of a solid
+Result<std::vector<std::uint32_t>> split_umbrellas(std::vector<glm::uvec3>& triangles,
+                                                   std::size_t point_count,
+                                                   std::span<const WedgeEdge> wedges);
+
+}  // namespace strata::csg

@@ -1,0 +1,30 @@
+#pragma once
+
+#include "csg/boundary/lattice_solids.h"
+#include "exact/cut_points.h"
+
+namespace strata::csg {
+
+/// Where points are once their world positions are written as double or float. Positions are whole
+/// multiples of 2^-24 step, and rounding them to fewer bits gives such multiples again, since the
+/// origin is one too. So everything about written positions can be decided in integers.
+class WrittenPositions {
+ public:
+  /// @return kGeometry when such numbers cannot tell points of the lattice apart: it is too far
+  /// from the origin
+  static Result<WrittenPositions> make(const Lattice& lattice, bool as_float);
+
+  /// The nearest point that can be written.
+  exact::FilePoint round(const exact::FilePoint& point) const;
+  /// Whether round() may move points.
+  bool rounds() const { return rounds_; }
+  /// World space; exact for points that can be written.
+  glm::dvec3 world(const exact::FilePoint& point) const;
+
+ private:
+  std::array<exact::Int128, 3> offset_{};  // of the lattice's origin, in 2^-24 step
+  double unit_ = 1;                        // 2^-24 step, in world units
+  bool as_float_ = false, rounds_ = false;
+};
+
+}  // namespace strata::csg

@@ -1,0 +1,147 @@
+#include "csg/boundary/triangulate_boundary.h"
+
+#include <gtest/gtest.h>
+
+#include <boost/multiprecision/cpp_int.hpp>
+#include <numeric>
+
+#include "tests/csg/boundary/plane_grid.h"
+
+namespace strata::csg {
+namespace {
+
+using boost::multiprecision::cpp_int;
+using exact::FilePoint;
+using test::PlaneGrid;
+
+const Lattice kUnit;
+
+TriangulatedBoundary triangulated(const BoundaryFaces& faces, int threads = 1,
+                                  bool float_positions = false) {
+  Execution execution;
+  execution.threads = threads;
+  auto result = triangulate_boundary(faces, kUnit, float_positions, execution);
+  EXPECT_TRUE(result.has_value()) << (result ? "" : result.error().message);
+  return result ? *std::move(result) : TriangulatedBoundary{};
+}
+
+cpp_int six_volumes(const TriangulatedBoundary& mesh) {
+  cpp_int sum = 0;
+  for (const glm::uvec3& t : mesh.triangles) {
+    const FilePoint &a = mesh.points[t.x], &b = mesh.points[t.y], &c = mesh.points[t.z];
+    sum += cpp_int(a.x) * (cpp_int(b.y) * c.z - cpp_int(b.z) * c.y) +
+           cpp_int(a.y) * (cpp_int(b.z) * c.x - cpp_int(b.x) * c.z) +
+           cpp_int(a.z) * (cpp_int(b.x) * c.y - cpp_int(b.y) * c.x);
+  }
+  return sum;
+}
+
+// Each directed edge has its opposite exactly once, and the triangles at a vertex are one fan.
+testing::AssertionResult is_manifold(const TriangulatedBoundary& mesh) {
+  std::map<std::pair<std::uint32_t, std::uint32_t>, int> edges;
+  std::vector<std::map<std::uint32_t, std::uint32_t>> links(mesh.points.size());
+  for (const glm::uvec3& t : mesh.triangles) {
+    for (int k = 0; k < 3; ++k) {
+      ++edges[{t[k], t[(k + 1) % 3]}];
+      links[t[k]][t[(k + 1) % 3]] = t[(k + 2) % 3];
+    }
+  }
+  for (const auto& [edge, count] : edges) {
+    const auto opposite = edges.find({edge.second, edge.first});
+    if (count != 1 || opposite == edges.end() || opposite->second != 1) {
+      return testing::AssertionFailure() << "edge " << edge.first << " to " << edge.second;
+    }
+  }
+  for (std::size_t v = 0; v < links.size(); ++v) {
+    if (links[v].empty()) return testing::AssertionFailure() << "lonely vertex " << v;
+    std::size_t steps = 0;
+    auto at = links[v].begin()->first;
+    do {
+      at = links[v].at(at);
+    } while (++steps <= links[v].size() && at != links[v].begin()->first);
+    if (steps != links[v].size()) return testing::AssertionFailure() << "fans at vertex " << v;
+  }
+  return testing::AssertionSuccess();
+}
+
+bool in_canonical_order(const TriangulatedBoundary& mesh) {
+  const auto key = [](const FilePoint& p) { return std::array{p.x, p.y, p.z}; };
+  for (std::size_t v = 1; v < mesh.points.size(); ++v) {
+    if (key(mesh.points[v]) < key(mesh.points[v - 1])) return false;
+  }
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const glm::uvec3& c = mesh.triangles[t];
+    if (c.x > c.y || c.x > c.z) return false;
+    if (t == 0) continue;
+    const glm::uvec3& d = mesh.triangles[t - 1];
+    if (std::array{c.x, c.y, c.z} < std::array{d.x, d.y, d.z}) return false;
+  }
+  return true;
+}
+
+bool equal(const TriangulatedBoundary& a, const TriangulatedBoundary& b) {
+  return a.points == b.points && a.positions == b.positions && a.triangles == b.triangles &&
+         a.labels == b.labels && a.shells == b.shells && a.vertices_split == b.vertices_split;
+}
+
+TEST(TriangulateBoundary, ACubeHasTwelveTriangles) {
+  std::mt19937 random(1);
+  PlaneGrid grid(1, 5, 0, random);
+  grid.set_cells({{0, 0, 0}});
+  const TriangulatedBoundary mesh = triangulated(grid.faces);
+  EXPECT_EQ(mesh.triangles.size(), 12u);
+  EXPECT_EQ(mesh.points.size(), 8u);
+  EXPECT_EQ(mesh.shells, 1u);
+  EXPECT_EQ(mesh.vertices_split, 0u);
+  EXPECT_EQ(mesh.positions.back(), glm::dvec3(5));
+  EXPECT_TRUE(is_manifold(mesh));
+  EXPECT_EQ(six_volumes(mesh), cpp_int(6 * 125) << 72);
+}
+
+TEST(TriangulateBoundary, CubesThatTouchInAnEdgeAreTwo) {
+  std::mt19937 random(1);
+  PlaneGrid grid(2, 5, 0, random);
+  grid.set_cells({{0, 0, 0}, {1, 1, 0}});
+  const TriangulatedBoundary mesh = triangulated(grid.faces);
+  EXPECT_EQ(mesh.triangles.size(), 24u);
+  EXPECT_EQ(mesh.points.size(), 16u);
+  EXPECT_EQ(mesh.vertices_split, 2u);
+  EXPECT_EQ(mesh.shells, 2u);
+  EXPECT_TRUE(is_manifold(mesh));
+}
+
+TEST(TriangulateBoundary, RandomCellsGiveClosedManifoldsOfTheirVolume) {
+  for (unsigned seed = 0; seed < 300; ++seed) {
+    SCOPED_TRACE(seed);
+    std::mt19937 random(seed);
+    const int size = 1 + static_cast<int>(seed % 7);
+    PlaneGrid grid(size, 3, 0, random);
+    const std::set<test::Cell> cells =
+        test::random_cells(size, 0.1 + 0.8 * (seed % 11) / 10, random);
+    grid.set_cells(cells);
+    const TriangulatedBoundary mesh = triangulated(grid.faces);
+    ASSERT_TRUE(is_manifold(mesh));
+    ASSERT_TRUE(in_canonical_order(mesh));
+    ASSERT_EQ(six_volumes(mesh), cpp_int(6 * 27 * cells.size()) << 72);
+    ASSERT_TRUE(equal(mesh, triangulated(test::shuffled(grid.faces, random), 3)));
+  }
+}
+
+TEST(TriangulateBoundary, TiltedPlanesWithRationalPointsGiveClosedManifolds) {
+  for (unsigned seed = 0; seed < 200; ++seed) {
+    SCOPED_TRACE(seed);
+    std::mt19937 random(seed);
+    const int size = 1 + static_cast<int>(seed % 6);
+    PlaneGrid grid(size, 1000, 150, random);
+    grid.set_cells(test::random_cells(size, 0.1 + 0.8 * (seed % 11) / 10, random));
+    if (grid.faces.planes.empty()) continue;
+    const TriangulatedBoundary mesh = triangulated(grid.faces);
+    ASSERT_TRUE(is_manifold(mesh));
+    ASSERT_TRUE(in_canonical_order(mesh));
+    ASSERT_GT(six_volumes(mesh), 0);
+    ASSERT_TRUE(equal(mesh, triangulated(test::shuffled(grid.faces, random), 3)));
+  }
+}
+
+}  // namespace
+}  // namespace strata::csg
