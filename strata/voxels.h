@@ -12,8 +12,10 @@
 /// the mesh is closed: see VoxelizeOptions::open. Sets are runs of voxels along an axis: their
 /// memory grows with the surface. VoxelIntervals::contains(), for_each_run() and to_dense() read a
 /// set; voxelize_slabs() and open_voxel_writer() never hold a whole set.
-/// strata/voxelize/formats/openvdb_bridge.h passes a set to OpenVDB.
+/// strata/voxelize/formats/openvdb_bridge.h passes a set to OpenVDB. contour() makes a closed mesh
+/// whose voxels are the same.
 
+#include "strata/contour/contour.h"
 #include "strata/mesh/formats/read_mesh.h"
 #include "strata/mesh/soup_tools.h"
 #include "strata/voxelize/checksum.h"

@@ -1,0 +1,157 @@
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <memory>
+#include <vector>
+
+#include "contour/cell_cycles.h"
+#include "contour/grid_crossings.h"
+
+// Blocks of 32 x 32 x 32 cells, and the numbers of all vertices. Private to contour/.
+//
+// Cell (i, j, k) has the corners (voxels) i - 1, i and so on, and belongs to the block of its upper
+// corner, as the edges between i - 1 and i do. Places in a block are local: 0 to 31, or -1 for what
+// the block below owns.
+
+namespace strata::contouring {
+
+/// A cell, edge or voxel in its own block.
+struct LocalPlace {
+  int i = 0, j = 0, k = 0;
+};
+
+/// A vertex of a contour in the order of its block: cut edges along x, y, z, cells, further
+/// vertices of cells, middles of faces.
+class CellBlock {
+ public:
+  /// Of one cut edge: how far beyond the lower centre, and the triangle there.
+  struct Crossing {
+    std::uint32_t triangle = CutEdge::kNoTriangle;
+    std::uint8_t offset = CutEdge::kMiddle;
+  };
+  /// A cell with several vertices.
+  struct SplitCell {
+    std::uint16_t cell = 0;   ///< (i * 32 + j) * 32 + k
+    std::uint32_t first = 0;  ///< of its further vertices in the block
+  };
+
+  static constexpr int kWords = kBlockSide + 1;
+
+  /// Bit k + 1 is set where voxel (i, j, k) is inside; i, j, k from -1.
+  [[nodiscard]] std::uint64_t word(int i, int j) const {
+    return words[static_cast<std::size_t>((i + 1) * kWords + j + 1)];
+  }
+  /// Bit k is set where the edge along `axis` below voxel (i, j, k) is cut; from 0.
+  [[nodiscard]] std::uint32_t cut(int axis, int i, int j) const {
+    const std::uint64_t here = word(i, j);
+    const std::uint64_t below = axis == 0 ? word(i - 1, j) : axis == 1 ? word(i, j - 1) : here << 1;
+    return static_cast<std::uint32_t>((here ^ below) >> 1);
+  }
+  /// Which of the corners of a cell are inside; see contour/cell_cycles.h.
+  [[nodiscard]] unsigned corners(int i, int j, int k) const {
+    const auto two = [&](int a, int b) {
+      return static_cast<unsigned>(word(a, b) >> static_cast<unsigned>(k)) & 3u;
+    };
+    const unsigned a = two(i - 1, j - 1), b = two(i, j - 1), c = two(i - 1, j), d = two(i, j);
+    return (a & 1) | (b & 1) << 1 | (c & 1) << 2 | (d & 1) << 3 | (a >> 1) << 4 | (b >> 1) << 5 |
+           (c >> 1) << 6 | (d >> 1) << 7;
+  }
+  static std::size_t column(int i, int j) { return static_cast<std::size_t>(i * kBlockSide + j); }
+  /// The number of a cut edge in `crossings`. @pre it is cut and its place is not below 0
+  [[nodiscard]] std::uint32_t crossing(int axis, const LocalPlace& at) const {
+    const std::uint32_t below = (std::uint32_t{1} << at.k) - 1;
+    return first_crossing[static_cast<std::size_t>(axis)] +
+           before[static_cast<std::size_t>(axis)][column(at.i, at.j)] +
+           static_cast<std::uint32_t>(std::popcount(cut(axis, at.i, at.j) & below));
+  }
+  /// The number of a cell among the block's cells. @pre the surface passes it
+  [[nodiscard]] std::uint32_t cell(const LocalPlace& at) const {
+    const std::uint32_t below = (std::uint32_t{1} << at.k) - 1;
+    const std::size_t c = column(at.i, at.j);
+    return before[3][c] + static_cast<std::uint32_t>(std::popcount(active[c] & below));
+  }
+  /// The number of the vertex of a cycle of a cell in the block.
+  [[nodiscard]] std::uint32_t cell_vertex(const LocalPlace& at, unsigned cycle) const;
+
+  std::array<std::uint64_t, kWords * kWords> words{};
+  std::array<std::uint32_t, kBlockSide * kBlockSide> active{};  ///< bit k: cells passed
+  /// By column: cut edges along x, y, z and cells that come before it.
+  std::array<std::array<std::uint16_t, kBlockSide * kBlockSide>, 4> before{};
+  std::array<std::uint32_t, 4> first_crossing{};  ///< by axis, and their number
+  std::vector<Crossing> crossings;
+  std::vector<SplitCell> split;  ///< increasing
+  std::uint32_t cells = 0, split_vertices = 0, middles = 0;
+  std::uint64_t triangles = 0;
+  std::uint64_t ambiguous = 0, guessed = 0;            ///< counted for the report
+  bool special = false;                                ///< some cell is
+  std::uint64_t first_vertex = 0, first_triangle = 0;  ///< of the mesh
+
+  [[nodiscard]] std::uint32_t vertices() const {
+    return first_crossing[3] + cells + split_vertices + middles;
+  }
+};
+
+/// A block and the seven below it.
+class BlockNeighbours {
+ public:
+  [[nodiscard]] const CellBlock& own() const { return *blocks_[0]; }
+  /// The block of a place from -1, which becomes local there.
+  [[nodiscard]] const CellBlock& of(LocalPlace& at) const {
+    const unsigned which = (at.i < 0 ? 1u : 0u) | (at.j < 0 ? 2u : 0u) | (at.k < 0 ? 4u : 0u);
+    at = {at.i & (kBlockSide - 1), at.j & (kBlockSide - 1), at.k & (kBlockSide - 1)};
+    return *blocks_[which];
+  }
+  /// Whether a cell of one of the blocks is special.
+  [[nodiscard]] bool special() const { return special_; }
+
+ private:
+  friend class CellBlocks;
+  std::array<const CellBlock*, 8> blocks_{};  ///< null where there is none
+  bool special_ = false;
+};
+
+/// All blocks that the surface passes, sorted by place.
+class CellBlocks {
+ public:
+  /// Finds the cells. @return kLimit, kCancelled
+  static Result<CellBlocks> create(const GridCrossings& crossings, const Execution& execution,
+                                   std::uint64_t memory_left);
+
+  [[nodiscard]] std::size_t count() const { return with_cells_.size(); }
+  [[nodiscard]] CellBlock& block(std::size_t n) { return *places_[with_cells_[n]].block; }
+  /// Blocks from the first one along each axis.
+  [[nodiscard]] glm::ivec3 place(std::size_t n) const {
+    return unpacked(places_[with_cells_[n]].key);
+  }
+  [[nodiscard]] BlockNeighbours neighbours(std::size_t n) const;
+  [[nodiscard]] std::uint64_t memory_bytes() const { return bytes_; }
+
+ private:
+  using Key = std::uint64_t;  ///< [x:20 | y:20 | z:20]
+  struct Place {
+    Key key = 0;
+    std::array<std::uint32_t, kBlockSide> start{};  ///< by u, bit v: inside below the block
+    std::unique_ptr<CellBlock> block;
+  };
+  static Key packed(const glm::ivec3& at) {
+    return static_cast<Key>(at.x) << 40 | static_cast<Key>(at.y) << 20 | static_cast<Key>(at.z);
+  }
+  static glm::ivec3 unpacked(Key key) {
+    constexpr Key kMask = (Key{1} << 20) - 1;
+    return {static_cast<int>(key >> 40), static_cast<int>(key >> 20 & kMask),
+            static_cast<int>(key & kMask)};
+  }
+  [[nodiscard]] const Place* find(const glm::ivec3& at) const;
+  void find_places(const GridCrossings& crossings);
+  void find_starts(const GridCrossings& crossings, const Execution& execution);
+  void fill(const GridCrossings& crossings, Place& place) const;
+
+  std::vector<Place> places_;  ///< sorted by key
+  std::vector<std::uint32_t> with_cells_;
+  std::uint64_t bytes_ = 0;
+};
+
+}  // namespace strata::contouring

@@ -1,0 +1,214 @@
+#include "strata/contour/contour.h"
+
+#include <atomic>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <memory>
+#include <new>
+#include <utility>
+#include <vector>
+
+#include "contour/block_mesh.h"
+#include "contour/cell_blocks.h"
+#include "contour/grid_crossings.h"
+#include "strata/mesh/diagnose.h"
+#include "strata/raster/lattice_mesh.h"
+#include "strata/voxelize/grid_fit.h"
+#include "voxelize/open/boundary_caps.h"
+#include "voxelize/open/winding_field.h"
+
+namespace strata {
+namespace {
+
+using namespace contouring;
+
+/// A mesh that is closed by caps, and where its winding numbers are other than those of the caps.
+struct Capped {
+  Capped(const LatticeMesh& mesh, BoundaryCaps&& caps, const VoxelGrid& grid,
+         const std::stop_token& stop)
+      : triangles(mesh.triangles.begin(), mesh.triangles.end()),
+        field(mesh, std::span(caps.triangles).first(caps.doubtful), grid, stop) {
+    triangles.insert(triangles.end(), caps.triangles.begin(), caps.triangles.end());
+    whole = {mesh.vertices, triangles};
+  }
+  std::vector<glm::uvec3> triangles;  ///< the mesh's and the caps
+  LatticeMesh whole;
+  WindingField field;
+};
+
+Result<void> check_options(const VoxelGrid& grid, const ContourOptions& options) {
+  if (auto valid = check_grid(grid); !valid) return valid;
+  if (options.open == OpenMode::kSurface) {
+    return fail(ErrorCode::kUsage, "a contour is of a solid; OpenMode::kSurface has none");
+  }
+  if (options.filter != nullptr && options.closedness == Closedness::kAssumeOpen) {
+    return fail(ErrorCode::kUsage,
+                "the lists of a Boolean tree are closed; OpenMode::kVote does not apply");
+  }
+  if (options.filter != nullptr && options.filter->labelled()) {
+    return fail(ErrorCode::kUsage, "a contour takes lists without labels");
+  }
+  return {};
+}
+
+/// What is assumed of the mesh, or found out.
+bool counts_as_closed(const TriangleSoup& mesh, const ContourOptions& options,
+                      const Execution& execution) {
+  if (options.closedness != Closedness::kCheck || options.filter != nullptr) {
+    return options.closedness != Closedness::kAssumeOpen;
+  }
+  if (is_closed(mesh, execution)) return true;
+  return options.rule == InsideRule::kParity && diagnose(mesh, execution).even;
+}
+
+std::vector<Plane> planes_of(const LatticeMesh& mesh, const Execution& execution) {
+  std::vector<Plane> planes(mesh.triangles.size());
+  constexpr std::size_t kChunk = 1 << 14;
+  parallel_for(execution, (planes.size() + kChunk - 1) / kChunk, [&](std::size_t chunk, int) {
+    for (std::size_t t = chunk * kChunk; t < std::min(planes.size(), (chunk + 1) * kChunk); ++t) {
+      const glm::dvec3 a(mesh.vertices[mesh.triangles[t].x]);
+      const glm::dvec3 normal = glm::cross(glm::dvec3(mesh.vertices[mesh.triangles[t].y]) - a,
+                                           glm::dvec3(mesh.vertices[mesh.triangles[t].z]) - a);
+      const double length = glm::length(normal);
+      if (!(length > 0.0)) continue;
+      planes[t].normal = normal / length;
+      planes[t].offset = glm::dot(planes[t].normal, a);
+    }
+  });
+  return planes;
+}
+
+/// Reports a part of the work as a part of the whole.
+Execution part_of(const Execution& execution, double from, double to) {
+  Execution part = execution;
+  if (execution.progress) {
+    part.progress = [&progress = execution.progress, from, to](double done) {
+      progress(from + (to - from) * done);
+    };
+  }
+  return part;
+}
+
+/// Numbers all vertices and triangles. @return their numbers
+Result<std::pair<std::uint64_t, std::uint64_t>> number(CellBlocks& blocks,
+                                                       const Execution& execution) {
+  parallel_for(execution, blocks.count(),
+               [&](std::size_t n, int) { count_block(blocks.block(n), blocks.neighbours(n)); });
+  std::uint64_t vertices = 0, triangles = 0;
+  for (std::size_t n = 0; n < blocks.count(); ++n) {
+    CellBlock& block = blocks.block(n);
+    block.first_vertex = vertices;
+    block.first_triangle = triangles;
+    vertices += block.vertices();
+    triangles += block.triangles;
+  }
+  if (vertices > std::numeric_limits<std::uint32_t>::max()) {
+    return fail(ErrorCode::kLimit,
+                "the contour needs {} vertices, but a mesh may have {}; a coarser grid needs fewer",
+                vertices, std::numeric_limits<std::uint32_t>::max());
+  }
+  return std::pair(vertices, triangles);
+}
+
+void add_counts(CellBlocks& blocks, ContourReport& report) {
+  for (std::size_t n = 0; n < blocks.count(); ++n) {
+    const CellBlock& block = blocks.block(n);
+    report.crossings += block.crossings.size();
+    report.cells += block.cells;
+    report.ambiguous_cells += block.ambiguous;
+    report.middle_vertices += block.middles;
+    report.guessed_crossings += block.guessed;
+  }
+}
+
+/// From the lists of a closed mesh, or of one with a field, to triangles.
+Result<ContourMesh> contour_lattice(const LatticeMesh& mesh, const VoxelGrid& grid,
+                                    const GridCrossings::Settings& settings,
+                                    const Execution& execution) {
+  const auto crossings = GridCrossings::collect(mesh, grid, settings, part_of(execution, 0.0, 0.6));
+  if (!crossings) return tl::unexpected(crossings.error());
+  const auto left = [&](std::uint64_t held) {
+    if (execution.memory_limit == 0) return std::numeric_limits<std::uint64_t>::max();
+    return execution.memory_limit - std::min(execution.memory_limit, held);
+  };
+  Execution quiet = execution;
+  quiet.progress = {};
+  const std::uint64_t lists = crossings->memory_bytes();
+  auto blocks = CellBlocks::create(*crossings, quiet, left(lists));
+  if (!blocks) return tl::unexpected(blocks.error());
+  const auto counted = number(*blocks, quiet);
+  if (!counted) return tl::unexpected(counted.error());
+  const auto [vertices, triangles] = *counted;
+  ContourMesh result;
+  result.report.lost_crossings = crossings->lost();
+  add_counts(*blocks, result.report);
+
+  const std::uint64_t held =
+      lists + blocks->memory_bytes() + result.report.crossings * sizeof(CellBlock::Crossing);
+  const std::uint64_t needed = vertices * sizeof(glm::dvec3) + triangles * sizeof(glm::uvec3) +
+                               mesh.triangles.size() * sizeof(Plane);
+  if (needed > left(held)) {
+    return fail(ErrorCode::kLimit,
+                "the contour has {} triangles, which need {} bytes, but the memory limit of {} "
+                "bytes leaves {}",
+                triangles, needed, execution.memory_limit, left(held));
+  }
+  const std::vector<Plane> planes = planes_of(mesh, quiet);
+  result.mesh.positions.resize(vertices);
+  result.mesh.triangles.resize(triangles);
+  std::atomic<std::uint64_t> clamped{0};
+  const Execution last = part_of(execution, 0.6, 1.0);
+  parallel_for(execution, blocks->count(), [&](std::size_t n, int worker) {
+    const BlockNeighbours neighbours = blocks->neighbours(n);
+    clamped += BlockMesh(neighbours, blocks->place(n), grid, planes)
+                   .write(result.mesh.positions, result.mesh.triangles);
+    if (last.progress && worker == 0) {
+      last.progress(static_cast<double>(n) / static_cast<double>(blocks->count()));
+    }
+  });
+  if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+  result.report.clamped_vertices = clamped;
+  if (triangles > 0) result.mesh.parts.emplace_back();
+  return result;
+}
+
+Result<ContourMesh> run(const TriangleSoup& mesh, const VoxelGrid& grid,
+                        const ContourOptions& options, const Execution& execution) {
+  if (auto valid = check_options(grid, options); !valid) return tl::unexpected(valid.error());
+  Execution quiet = execution;
+  quiet.progress = {};
+  const auto lattice = snap_to_lattice(mesh, grid, quiet);
+  if (!lattice) return tl::unexpected(lattice.error());
+  const bool closed = counts_as_closed(mesh, options, quiet);
+  if (!closed && options.open == OpenMode::kFail) {
+    return fail(ErrorCode::kGeometry, "the mesh is not closed");
+  }
+  std::unique_ptr<Capped> capped;
+  if (!closed) {
+    if (auto caps = boundary_caps(*lattice, quiet); !caps.triangles.empty()) {
+      capped = std::make_unique<Capped>(*lattice, std::move(caps), grid, execution.stop);
+    }
+  }
+  if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+  auto result =
+      contour_lattice(capped ? capped->whole : *lattice, grid,
+                      {options.rule, options.filter, capped ? &capped->field : nullptr}, execution);
+  if (result) result->report.closed = closed;
+  if (result && execution.progress) execution.progress(1.0);
+  return result;
+}
+
+}  // namespace
+
+Result<ContourMesh> contour(const TriangleSoup& mesh, const VoxelGrid& grid,
+                            const ContourOptions& options, const Execution& execution) {
+  try {
+    return run(mesh, grid, options, execution);
+  } catch (const std::bad_alloc&) {
+    return fail(ErrorCode::kLimit, "out of memory for the contour on a grid of {} x {} x {}",
+                grid.dims.x, grid.dims.y, grid.dims.z);
+  }
+}
+
+}  // namespace strata
