@@ -33,12 +33,8 @@ struct Placed {
 
 class Search {
  public:
-  Search(const LatticeSolids& solids, const Execution& execution)
-      : solids_(solids), execution_(execution) {
-    for (std::uint32_t s = 0; s < solids.solid_count(); ++s) {
-      solid_of_.resize(solids.first_triangle[s + 1], s);
-    }
-  }
+  Search(const WeldedSolids& solids, const std::vector<bool>& embedded, const Execution& execution)
+      : solids_(solids), embedded_(embedded), execution_(execution) {}
 
   Result<CandidatePairs> run();
 
@@ -50,6 +46,10 @@ class Search {
     return {glm::min(a, glm::min(b, c)), glm::max(a, glm::max(b, c))};
   }
 
+  // Of a content: whether its triangles need not be compared with each other.
+  bool embedded(std::uint32_t content) const {
+    return content < embedded_.size() && embedded_[content];
+  }
   void choose_grid();
   Box cell_box(const LatticePoint& cell) const {
     const LatticePoint low = low_ + cell * (1 << shift_);
@@ -60,16 +60,16 @@ class Search {
   bool search(const std::vector<std::uint32_t>& triangles, const Box& box);
   bool compare_all(const std::vector<std::uint32_t>& triangles, const Box& within);
   bool may_meet(const Placed& a, const Placed& b, const Box& within) const;
-  bool reaches(std::uint32_t triangle, const exact::Plane& plane) const;
+  bool reaches(std::uint32_t triangle, const Placed& other) const;
   bool compact();
 
   // work(index of the cell) for the cells of the first grid that a triangle touches.
   template <class Work>
   void for_cells(std::uint32_t triangle, const Work& work) const;
 
-  const LatticeSolids& solids_;
+  const WeldedSolids& solids_;
+  const std::vector<bool>& embedded_;
   const Execution& execution_;
-  std::vector<std::uint32_t> solid_of_;
   LatticePoint low_{0};
   int shift_ = 0, bits_ = 0;           // cells of 2^shift steps, 2^bits along each axis
   std::vector<std::uint32_t> owners_;  // of the cells; then, for mixed ones, their index in lists_
@@ -92,7 +92,7 @@ bool plane_crosses(const exact::Plane& plane, const Box& box) {
   return exact::height(plane, up) >= 0 && exact::height(plane, down) <= 0;
 }
 
-exact::Plane plane_of(const LatticeSolids& solids, std::uint32_t triangle) {
+exact::Plane plane_of(const WeldedSolids& solids, std::uint32_t triangle) {
   const glm::uvec3& t = solids.triangles[triangle];
   return exact::plane_through(solids.vertices[t.x], solids.vertices[t.y], solids.vertices[t.z]);
 }
@@ -139,22 +139,18 @@ void Search::for_cells(std::uint32_t triangle, const Work& work) const {
 }
 
 bool Search::mark(std::uint32_t triangle) {
-  const std::uint32_t solid = solid_of_[triangle];
+  const std::uint32_t solid = solids_.content_of[triangle];
   for_cells(triangle, [&](std::size_t cell) {
     std::uint32_t& owner = owners_[cell];
-    owner = owner == kNobody || owner == solid ? solid : kMixed;
+    owner = owner == kNobody || (owner == solid && embedded(solid)) ? solid : kMixed;
   });
   return triangle % 4096 != 0 || !execution_.stop.stop_requested();
 }
 
 void Search::collect(std::uint32_t triangle) {
-  bool mixed = false;
   for_cells(triangle, [&](std::size_t cell) {
-    if (owners_[cell] == kNobody) return;
-    mixed = true;
-    lists_[owners_[cell]].push_back(triangle);
+    if (owners_[cell] != kNobody) lists_[owners_[cell]].push_back(triangle);
   });
-  if (mixed) result_.mixed_triangles.push_back(triangle);
 }
 
 // Whether two triangles may share a point in the cell `within`, as far as boxes and planes tell.
@@ -165,14 +161,25 @@ bool Search::may_meet(const Placed& a, const Placed& b, const Box& within) const
       return false;
     }
   }
-  return reaches(b.triangle, a.plane) && reaches(a.triangle, b.plane);
+  return reaches(b.triangle, a) && reaches(a.triangle, b);
 }
 
-bool Search::reaches(std::uint32_t triangle, const exact::Plane& plane) const {
+// Whether a triangle has points in the plane of another, other than a corner or an edge that both
+// have. Corners of both are equal vertices.
+bool Search::reaches(std::uint32_t triangle, const Placed& other) const {
   const glm::uvec3& t = solids_.triangles[triangle];
-  const auto side = [&](std::uint32_t v) { return exact::height(plane, solids_.vertices[v]); };
-  const exact::Int128 a = side(t.x), b = side(t.y), c = side(t.z);
-  return !(a > 0 && b > 0 && c > 0) && !(a < 0 && b < 0 && c < 0);
+  const glm::uvec3& o = solids_.triangles[other.triangle];
+  int above = 0, below = 0, shared = 0;
+  for (int k = 0; k < 3; ++k) {
+    if (t[k] == o.x || t[k] == o.y || t[k] == o.z) {
+      ++shared;
+      continue;
+    }
+    const exact::Int128 height = exact::height(other.plane, solids_.vertices[t[k]]);
+    above += height > 0;
+    below += height < 0;
+  }
+  return above + below == 0 || (above + shared < 3 && below + shared < 3);
 }
 
 bool Search::compare_all(const std::vector<std::uint32_t>& triangles, const Box& within) {
@@ -180,9 +187,10 @@ bool Search::compare_all(const std::vector<std::uint32_t>& triangles, const Box&
   placed.reserve(triangles.size());
   for (const std::uint32_t t : triangles) placed.push_back({t, box_of(t), plane_of(solids_, t)});
   for (std::size_t j = 1; j < placed.size(); ++j) {
-    const std::uint32_t solid = solid_of_[triangles[j]];
+    const std::uint32_t solid = solids_.content_of[triangles[j]];
     for (std::size_t i = 0; i < j; ++i) {
-      if (solid_of_[triangles[i]] != solid && may_meet(placed[i], placed[j], within)) {
+      if ((solids_.content_of[triangles[i]] != solid || !embedded(solid)) &&
+          may_meet(placed[i], placed[j], within)) {
         result_.pairs.push_back({triangles[i], triangles[j]});
       }
     }
@@ -201,8 +209,10 @@ bool Search::compact() {
 }
 
 bool Search::search(const std::vector<std::uint32_t>& triangles, const Box& box) {
-  const std::uint32_t solid = solid_of_[triangles.front()];
-  if (std::ranges::all_of(triangles, [&](std::uint32_t t) { return solid_of_[t] == solid; })) {
+  const std::uint32_t solid = solids_.content_of[triangles.front()];
+  if (embedded(solid) && std::ranges::all_of(triangles, [&](std::uint32_t t) {
+        return solids_.content_of[t] == solid;
+      })) {
     return true;
   }
   const std::int32_t side = box.high.x - box.low.x + 1;
@@ -267,9 +277,10 @@ Result<CandidatePairs> Search::run() {
 
 }  // namespace
 
-Result<CandidatePairs> find_candidate_pairs(const LatticeSolids& solids,
+Result<CandidatePairs> find_candidate_pairs(const WeldedSolids& solids,
+                                            const std::vector<bool>& embedded,
                                             const Execution& execution) {
-  return Search(solids, execution).run();
+  return Search(solids, embedded, execution).run();
 }
 
 }  // namespace strata::csg

@@ -1,0 +1,110 @@
+#include "csg/boundary/boundary_arrangement.h"
+
+#include "csg/boundary/find_faces.h"
+#include "csg/boundary/open_edges.h"
+
+namespace strata::csg {
+namespace {
+
+// The label of each solid, so that equal colours have equal labels.
+std::vector<std::uint32_t> labels_of(const Tree& tree, BoundaryParts parts) {
+  std::vector<std::uint32_t> labels;
+  if (parts == BoundaryParts::kOne) return labels;
+  for (std::uint32_t s = 0; s < tree.solids().size(); ++s) {
+    labels.push_back(s);
+    for (std::uint32_t earlier = 0; parts == BoundaryParts::kColours && earlier < s; ++earlier) {
+      if (tree.solids()[earlier].colour != tree.solids()[s].colour) continue;
+      labels[s] = earlier;
+      break;
+    }
+  }
+  return labels;
+}
+
+// Solids that get caps may meet themselves.
+Result<std::vector<BoundaryCap>> close(LatticeSolids& solids, OpenSolids policy, const Tree& tree,
+                                       const Execution& execution) {
+  const std::vector<std::uint32_t> before = solids.first_triangle;
+  auto caps = close_solids(solids, policy, tree, execution);
+  for (std::size_t s = 0; s < solids.solid_count(); ++s) {
+    if (solids.first_triangle[s + 1] - solids.first_triangle[s] != before[s + 1] - before[s]) {
+      solids.embedded[s] = false;
+    }
+  }
+  return caps;
+}
+
+}  // namespace
+
+Result<BoundaryFaces> arrange_solids(LatticeSolids solids, const Tree& tree, Tree::NodeId root,
+                                     const std::vector<InsideRule>& rules,
+                                     const BoundaryOptions& options, const Execution& execution,
+                                     BoundaryReport& report) {
+  const std::vector<bool> embedded = std::move(solids.embedded);
+  auto welded = weld_solids(std::move(solids), execution);
+  if (!welded) return tl::unexpected(welded.error());
+  if (welded->triangles.empty()) return BoundaryFaces{};
+  const auto found = find_candidate_pairs(*welded, embedded, execution);
+  if (!found) return tl::unexpected(found.error());
+  const MeshEdges edges = find_mesh_edges(welded->triangles, welded->vertices.size());
+  PointTable table(BoundaryPoints(std::move(welded->vertices), std::move(welded->triangles)));
+  const BoundaryPoints& points = table.points();
+  const ArrangementInput input{points.vertices(), points.triangles(), *welded, edges};
+  CutLines lines;
+  meet_pairs(input, found->pairs, table, lines);
+  if (auto crossed = cross_lines(input, table, lines, execution); !crossed) {
+    return tl::unexpected(crossed.error());
+  }
+  const SortedLines sorted = sort_lines(input, points, lines);
+  const auto pieces = find_pieces(input, points, lines, sorted, execution);
+  if (!pieces) return tl::unexpected(pieces.error());
+  const auto lists = find_radial_lists(input, lines, *pieces, execution);
+  if (!lists) return tl::unexpected(lists.error());
+  const FaceRules face_rules{options.faces == BoundaryFaceKind::kCanonical,
+                             labels_of(tree, options.parts)};
+  const auto values = find_cell_values(input, *pieces, *lists, compile(tree, root), rules,
+                                       !face_rules.label_of_solid.empty(), execution);
+  if (!values) return tl::unexpected(values.error());
+  report.pairs = found->pairs.size();
+  report.points = points.size() - points.vertices().size();
+  report.pieces = pieces->triangle_of.size();
+  report.cells = lists->cell_count;
+  BoundaryFaces faces = find_faces(input, points, lines, *pieces, *lists, *values, face_rules);
+  faces.points = table.take();
+  return faces;
+}
+
+Result<ExactBoundary> find_exact_boundary(const Tree& tree, Tree::NodeId root,
+                                          const BoundaryOptions& options,
+                                          const Execution& execution) {
+  if (options.bits < 10 || options.bits > 28) {
+    return fail(ErrorCode::kUsage, "bits must be 10 to 28, got {}", options.bits);
+  }
+  if (auto checked = check_tree(tree, root); !checked) return tl::unexpected(checked.error());
+  const Geometry geometry(tree, execution);
+  if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+  auto solids = snap_solids(tree, root, geometry, options.bits, execution);
+  if (!solids) return tl::unexpected(solids.error());
+  ExactBoundary result;
+  result.lattice = solids->lattice;
+  BoundaryReport& report = result.report;
+  report.step = solids->lattice.step;
+  report.coarsened = solids->coarsened;
+  for (std::size_t s = 0; s < solids->solid_count(); ++s) {
+    report.solids += solids->first_triangle[s] < solids->first_triangle[s + 1];
+  }
+  report.triangles = solids->triangles.size();
+  if (auto closed = close(*solids, options.open, tree, execution); closed) {
+    report.caps = std::move(*closed);
+  } else {
+    return tl::unexpected(closed.error());
+  }
+  std::vector<InsideRule> rules;
+  for (const Geometry::Part& part : geometry.parts()) rules.push_back(part.rule);
+  auto faces = arrange_solids(std::move(*solids), tree, root, rules, options, execution, report);
+  if (!faces) return tl::unexpected(faces.error());
+  result.faces = std::move(*faces);
+  return result;
+}
+
+}  // namespace strata::csg

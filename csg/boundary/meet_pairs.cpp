@@ -1,0 +1,294 @@
+#include <algorithm>
+#include <array>
+
+#include "csg/boundary/cut_lines.h"
+#include "exact/directions.h"
+
+namespace strata::csg {
+namespace {
+
+using exact::EdgePoint;
+using exact::Int128;
+using exact::LatticePoint;
+using exact::Plane;
+using Recipe = BoundaryPoints::Recipe;
+
+constexpr int kNone = -1;
+
+// What of a triangle a point lies on: a corner, a side, or neither.
+struct Place {
+  int corner = kNone, side = kNone;
+};
+
+int next(int k) { return k == 2 ? 0 : k + 1; }
+
+// One end of the piece of a line that lies in a triangle.
+struct End {
+  Place place;
+  EdgePoint at;  // on an edge that crosses the other plane
+};
+
+struct Ends {
+  End low, high;
+  int side = kNone;  // along which the piece lies
+};
+
+class PairMeeter {
+ public:
+  PairMeeter(const ArrangementInput& input, PointTable& points, CutLines& lines)
+      : input_(input), points_(points), lines_(lines) {}
+
+  void meet(const TrianglePair& pair) {
+    const Side a = side_of(pair.first), b = side_of(pair.second);
+    const std::array<Int128, 3> a_heights = heights(a, b.plane), b_heights = heights(b, a.plane);
+    if (one_side(a_heights) || one_side(b_heights)) return;
+    if (a_heights == std::array<Int128, 3>{}) {
+      meet_flat(a, b);
+      meet_flat(b, a);
+    } else {
+      meet_across(a, b, ends_of(a, a_heights, false), ends_of(b, b_heights, true));
+    }
+  }
+
+ private:
+  struct Side {
+    std::uint32_t triangle;
+    glm::uvec3 corners;
+    Plane plane;
+  };
+
+  const LatticePoint& at(std::uint32_t vertex) const { return input_.vertices[vertex]; }
+  Side side_of(std::uint32_t triangle) const {
+    return {triangle, input_.triangles[triangle], input_.plane_of(triangle)};
+  }
+  std::array<Int128, 3> heights(const Side& of, const Plane& plane) const {
+    return {height(plane, at(of.corners.x)), height(plane, at(of.corners.y)),
+            height(plane, at(of.corners.z))};
+  }
+  static bool one_side(const std::array<Int128, 3>& h) {
+    return (h[0] > 0 && h[1] > 0 && h[2] > 0) || (h[0] < 0 && h[1] < 0 && h[2] < 0);
+  }
+  std::uint32_t edge(const Side& t, int side) const {
+    return input_.edges.edge_of[3 * t.triangle + static_cast<std::uint32_t>(side)];
+  }
+
+  Ends ends_of(const Side& t, const std::array<Int128, 3>& heights, bool second) const;
+  void meet_across(const Side& a, const Side& b, const Ends& ends_a, const Ends& ends_b);
+  std::uint32_t point_of(const Side& a, const Place& on_a, const Side& b, const Place& on_b);
+  void put(const Side& t, const Place& place, std::uint32_t point, bool end_of_cut);
+  void put_on_edge(std::uint32_t edge, std::uint32_t point);
+  void meet_flat(const Side& a, const Side& b);
+  void clip_edge(const Side& a, int side, const Side& b);
+
+  const ArrangementInput& input_;
+  PointTable& points_;
+  CutLines& lines_;
+};
+
+// The piece of the line of two planes that lies in the triangle t, whose corners have these heights
+// over the other plane. Seen from above t, with the other plane's upper side on the right, the line
+// runs up: cross(n_t, n_other). An edge that goes from right to left crosses it at the upper end,
+// since triangles turn counter-clockwise. For the second triangle of a pair the line runs the other
+// way round: `second`.
+Ends PairMeeter::ends_of(const Side& t, const std::array<Int128, 3>& heights, bool second) const {
+  Ends ends;
+  bool have_low = false, have_high = false;
+  const auto take = [&](const End& end, bool high) {
+    (high ? ends.high : ends.low) = end;
+    (high ? have_high : have_low) = true;
+  };
+  const auto sign = [&](int k) { return exact::sign_of(heights[static_cast<std::size_t>(k)]); };
+  const auto edge_point = [&](int from, int to) {
+    return EdgePoint{at(t.corners[from]), at(t.corners[to]),
+                     heights[static_cast<std::size_t>(from)],
+                     heights[static_cast<std::size_t>(to)]};
+  };
+  for (int k = 0; k < 3; ++k) {
+    const int after = next(k), before = next(after);
+    if (sign(k) == 0) {
+      const int apart = sign(after) != 0 ? after : before;  // a corner off the plane
+      const End end{{k, kNone}, edge_point(k, apart)};
+      if (sign(after) == 0) {  // the side from k to after lies in the plane
+        ends.side = k;
+        take(end, sign(before) > 0);
+      } else if (sign(before) == 0) {
+        take(end, sign(after) < 0);
+      } else if (sign(after) == sign(before)) {
+        take(end, true);
+        take(end, false);
+      } else {
+        take(end, sign(before) > 0);
+      }
+    } else if (sign(after) != 0 && sign(after) != sign(k)) {
+      take({{kNone, k}, edge_point(k, after)}, sign(k) > 0);
+    }
+  }
+  assert(have_low && have_high);
+  if (second) std::swap(ends.low, ends.high);
+  return ends;
+}
+
+void PairMeeter::meet_across(const Side& a, const Side& b, const Ends& ends_a, const Ends& ends_b) {
+  const auto order = [](const End& of_a, const End& of_b) {
+    return exact::order_on_common_line(of_a.at, of_b.at);
+  };
+  const int over = order(ends_a.high, ends_b.low), under = order(ends_a.low, ends_b.high);
+  if (over < 0 || under > 0) return;
+  const Place inside_a{kNone, ends_a.side}, inside_b{kNone, ends_b.side};
+  Place low_a, low_b, high_a, high_b;
+  const int low = order(ends_a.low, ends_b.low), high = order(ends_a.high, ends_b.high);
+  low_a = low >= 0 ? ends_a.low.place : inside_a;
+  low_b = low <= 0 ? ends_b.low.place : inside_b;
+  high_a = high <= 0 ? ends_a.high.place : inside_a;
+  high_b = high >= 0 ? ends_b.high.place : inside_b;
+  if (over == 0) low_a = high_a = ends_a.high.place, low_b = high_b = ends_b.low.place;
+  if (under == 0) low_a = high_a = ends_a.low.place, low_b = high_b = ends_b.high.place;
+  const std::uint32_t from = point_of(a, low_a, b, low_b), to = point_of(a, high_a, b, high_b);
+  const bool is_point = from == to;
+  put(a, low_a, from, !is_point);
+  put(b, low_b, from, !is_point);
+  if (is_point) return;
+  put(a, high_a, to, true);
+  put(b, high_b, to, true);
+  if (ends_a.side != kNone) lines_.touched[edge(a, ends_a.side)] = true;
+  if (ends_b.side != kNone) lines_.touched[edge(b, ends_b.side)] = true;
+  if (ends_a.side != kNone && ends_b.side != kNone) return;
+  if (ends_a.side != kNone) {
+    lines_.cuts.push_back({b.triangle, edge(a, ends_a.side), from, to});
+  } else if (ends_b.side != kNone) {
+    lines_.cuts.push_back({a.triangle, edge(b, ends_b.side), from, to});
+  } else {
+    const auto line = static_cast<std::uint32_t>(input_.edges.size() + lines_.crossings.size());
+    lines_.crossings.push_back({a.triangle, b.triangle, from, to});
+    lines_.cuts.push_back({a.triangle, line, from, to});
+    lines_.cuts.push_back({b.triangle, line, from, to});
+  }
+}
+
+std::uint32_t PairMeeter::point_of(const Side& a, const Place& on_a, const Side& b,
+                                   const Place& on_b) {
+  if (on_a.corner != kNone) return a.corners[on_a.corner];
+  if (on_b.corner != kNone) return b.corners[on_b.corner];
+  // One of the two sides crosses the other plane. A side in the plane says nothing.
+  const auto crossing = [&](const Side& t, int side, const Side& other) {
+    const std::uint32_t p = t.corners[side], q = t.corners[next(side)];
+    return points_.find_or_add(
+        {BoundaryPoints::Kind::kEdgePlane, {std::min(p, q), std::max(p, q), other.triangle, 0}});
+  };
+  const auto crosses = [&](const Side& t, int side, const Side& other) {
+    return side != kNone && height(other.plane, at(t.corners[side])) != 0;
+  };
+  return crosses(a, on_a.side, b) ? crossing(a, on_a.side, b) : crossing(b, on_b.side, a);
+}
+
+void PairMeeter::put_on_edge(std::uint32_t edge, std::uint32_t point) {
+  if (point == input_.edge_from(edge) || point == input_.edge_to(edge)) return;
+  lines_.line_points.push_back({edge, point});
+  lines_.touched[edge] = true;
+}
+
+void PairMeeter::put(const Side& t, const Place& place, std::uint32_t point, bool end_of_cut) {
+  if (place.corner != kNone) return;
+  if (place.side != kNone) {
+    put_on_edge(edge(t, place.side), point);
+  } else if (!end_of_cut) {
+    lines_.contacts.push_back({t.triangle, point});
+  }
+}
+
+void PairMeeter::meet_flat(const Side& a, const Side& b) {
+  for (int side = 0; side < 3; ++side) {
+    if (std::ranges::any_of(std::array{0, 1, 2},
+                            [&](int k) { return edge(b, k) == edge(a, side); })) {
+      continue;
+    }
+    clip_edge(a, side, b);
+  }
+}
+
+// The piece of a side of `a` that lies in b, which has the same plane. Along the side p + t (q -
+// p), the heights over b's sides change linearly; all are areas below 2^60.
+void PairMeeter::clip_edge(const Side& a, int side, const Side& b) {
+  const exact::PlaneView view(b.plane);
+  const std::uint32_t p = a.corners[side], q = a.corners[next(side)];
+  const auto area = [&](std::uint32_t from, std::uint32_t to, std::uint32_t x) {
+    const LatticePoint u = at(to) - at(from), v = at(x) - at(from);
+    return std::int64_t{u[view.u()]} * v[view.v()] - std::int64_t{u[view.v()]} * v[view.u()];
+  };
+  struct Fraction {
+    std::int64_t part = 0, whole = 1;
+    Place place;  // of b
+  };
+  const auto less = [](const Fraction& x, const Fraction& y) {
+    return Int128{x.part} * y.whole < Int128{y.part} * x.whole;
+  };
+  Fraction low{0, 1, {}}, high{1, 1, {}};
+  std::int64_t of_p[3], of_q[3];
+  int along = kNone;
+  for (int k = 0; k < 3; ++k) {
+    of_p[k] = area(b.corners[k], b.corners[next(k)], p);
+    of_q[k] = area(b.corners[k], b.corners[next(k)], q);
+    if (of_p[k] == 0 && of_q[k] == 0) along = k;
+    if (of_p[k] < 0 && of_q[k] < 0) return;
+    if (of_p[k] < 0) {  // enters at part / whole
+      const Fraction enter{-of_p[k], of_q[k] - of_p[k], {kNone, k}};
+      if (less(low, enter)) low = enter;
+    } else if (of_q[k] < 0) {
+      const Fraction leave{of_p[k], of_p[k] - of_q[k], {kNone, k}};
+      if (less(leave, high)) high = leave;
+    }
+  }
+  if (less(high, low)) return;
+  // The point at a fraction: an end of the side, a corner of b, or where two sides cross.
+  const auto point_at = [&](Fraction& f) {
+    if (f.part == 0 || f.part == f.whole) {
+      const bool end = f.part != 0;
+      const std::uint32_t vertex = end ? q : p;
+      f.place = {};
+      for (int k = 0; k < 3; ++k) {
+        if (b.corners[k] == vertex) f.place.corner = k;
+        if ((end ? of_q : of_p)[k] == 0) f.place.side = k;
+      }
+      return vertex;
+    }
+    const int k = f.place.side;
+    for (const int corner : {k, next(k)}) {
+      if (area(p, q, b.corners[corner]) != 0) continue;
+      f.place = {corner, kNone};
+      return b.corners[corner];
+    }
+    const std::uint32_t r = b.corners[k], s = b.corners[next(k)];
+    const auto [p0, q0] = std::minmax(p, q);
+    const auto [r0, s0] = std::minmax(r, s);
+    return points_.find_or_add({BoundaryPoints::Kind::kEdgeEdge, {p0, q0, r0, s0}});
+  };
+  const std::uint32_t from = point_at(low), to = point_at(high);
+  const std::uint32_t line = edge(a, side);
+  for (const auto& [point, place] : {std::pair{from, low.place}, std::pair{to, high.place}}) {
+    put_on_edge(line, point);
+    put(b, place, point, from != to);
+  }
+  if (from == to) return;
+  lines_.touched[line] = true;
+  if (along != kNone) {
+    lines_.touched[edge(b, along)] = true;
+  } else {
+    lines_.cuts.push_back({b.triangle, line, from, to});
+  }
+}
+
+}  // namespace
+
+void meet_pairs(const ArrangementInput& input, std::span<const TrianglePair> pairs,
+                PointTable& points, CutLines& lines) {
+  lines.touched.assign(input.edges.size(), false);
+  for (const auto& [first, second] : pairs) {  // before any other point may be made there
+    for (const std::uint32_t t : {first, second}) {
+      for (int k = 0; k < 3; ++k) points.insert_vertex(input.triangles[t][k]);
+    }
+  }
+  PairMeeter meeter(input, points, lines);
+  for (const TrianglePair& pair : pairs) meeter.meet(pair);
+}
+
+}  // namespace strata::csg

@@ -1,0 +1,302 @@
+#include "csg/boundary/pieces.h"
+
+#include <algorithm>
+
+#include "csg/boundary/buckets.h"
+#include "exact/directions.h"
+
+namespace strata::csg {
+namespace {
+
+using exact::LatticePoint;
+using exact::PlanarDirection;
+
+struct Record {
+  std::uint32_t a, b;
+  EdgeUse use;
+};
+
+// Collects the atomic edges and which triangles have them.
+class EdgeCollector {
+ public:
+  EdgeCollector(const ArrangementInput& input, const BoundaryPoints& points, const CutLines& lines,
+                const SortedLines& sorted)
+      : input_(input), points_(points), lines_(lines), sorted_(sorted) {}
+
+  void run(Pieces& pieces, std::vector<bool>& cut) {
+    find_cut_triangles(cut);
+    list_edges(pieces, cut);
+    for (const CutLines::Cut& c : lines_.cuts) add_cut(c);
+    sort_records(pieces);
+  }
+
+ private:
+  void find_cut_triangles(std::vector<bool>& cut) const {
+    cut.assign(input_.triangles.size(), false);
+    for (const CutLines::Cut& c : lines_.cuts) cut[c.triangle] = true;
+    for (std::uint32_t edge = 0; edge < input_.edges.size(); ++edge) {
+      if (sorted_.of(edge).size() <= 2) continue;
+      for (const std::uint32_t use : input_.edges.uses_of(edge)) cut[use / 3] = true;
+    }
+  }
+
+  // Whether two triangles of the same solids continue each other across a mesh edge.
+  bool continues(std::span<const std::uint32_t> uses) const {
+    return uses.size() == 2 &&
+           input_.solids.content_of[uses[0] / 3] == input_.solids.content_of[uses[1] / 3] &&
+           input_.corner(uses[0], 0) == input_.corner(uses[1], 1);
+  }
+
+  void list_edges(Pieces& pieces, const std::vector<bool>& cut) {
+    pieces.edge_listed.assign(input_.edges.size(), false);
+    for (std::uint32_t edge = 0; edge < input_.edges.size(); ++edge) {
+      const auto uses = input_.edges.uses_of(edge);
+      const bool listed = lines_.touched[edge] || !continues(uses) ||
+                          std::ranges::any_of(uses, [&](std::uint32_t u) { return cut[u / 3]; });
+      if (!listed) continue;
+      pieces.edge_listed[edge] = true;
+      for (const std::uint32_t use : uses) {
+        const std::uint32_t ends[2] = {input_.edge_from(edge), input_.edge_to(edge)};
+        const auto list = sorted_.of(edge);
+        add_chain(list.empty() ? std::span<const std::uint32_t>(ends) : list, edge, use / 3,
+                  static_cast<std::uint8_t>(use % 3));
+      }
+    }
+  }
+
+  void add_chain(std::span<const std::uint32_t> list, std::uint32_t line, std::uint32_t triangle,
+                 std::uint8_t side) {
+    for (std::size_t i = 1; i < list.size(); ++i) {
+      const bool forward = list[i - 1] < list[i];
+      const auto [a, b] = std::minmax(list[i - 1], list[i]);
+      records_.push_back(
+          {a, b, {triangle, line, EdgeUse::kNoPiece, EdgeUse::kNoPiece, side, forward}});
+    }
+  }
+
+  void add_cut(const CutLines::Cut& cut) {
+    const auto list = sorted_.of(cut.line);
+    const auto [axis, rising] = axis_of(input_, lines_, cut.line);
+    const int up = rising ? -1 : 1;
+    const auto at = [&](std::uint32_t point) {
+      const auto found =
+          std::ranges::lower_bound(list, point, [&](std::uint32_t x, std::uint32_t y) {
+            return x != y && order_along(points_, x, y, axis) == up;
+          });
+      assert(found != list.end() && *found == point);
+      return static_cast<std::size_t>(found - list.begin());
+    };
+    const std::size_t from = at(cut.from), to = at(cut.to);
+    const auto [first, last] = std::minmax(from, to);
+    add_chain(list.subspan(first, last - first + 1), cut.line, cut.triangle, EdgeUse::kInside);
+  }
+
+  // Edges in the order of their points, with their triangles in order; each triangle once.
+  void sort_records(Pieces& pieces) {
+    const Buckets buckets =
+        bucket(records_.size(), points_.size(), [&](std::size_t i) { return records_[i].a; });
+    std::vector<std::uint32_t> order;
+    for (std::size_t a = 0; a < points_.size(); ++a) {
+      order.assign(buckets.items.begin() + buckets.first[a],
+                   buckets.items.begin() + buckets.first[a + 1]);
+      std::ranges::sort(order, [&](std::uint32_t i, std::uint32_t j) {
+        const Record &x = records_[i], &y = records_[j];
+        return std::tie(x.b, x.use.triangle, x.use.side, x.use.line) <
+               std::tie(y.b, y.use.triangle, y.use.side, y.use.line);
+      });
+      for (const std::uint32_t i : order) add_use(pieces, records_[i]);
+    }
+    records_ = {};
+  }
+
+  static void add_use(Pieces& pieces, const Record& record) {
+    auto& edges = pieces.edges;
+    const bool same_edge =
+        !edges.empty() && edges.back().a == record.a && edges.back().b == record.b;
+    if (!same_edge) {
+      edges.push_back({record.a, record.b, static_cast<std::uint32_t>(pieces.uses.size()), 0});
+    } else if (pieces.uses.back().triangle == record.use.triangle &&
+               pieces.uses.back().side == record.use.side) {
+      return;
+    }
+    ++edges.back().use_count;
+    pieces.uses.push_back(record.use);
+  }
+
+  const ArrangementInput& input_;
+  const BoundaryPoints& points_;
+  const CutLines& lines_;
+  const SortedLines& sorted_;
+  std::vector<Record> records_;
+};
+
+// Walks around the pieces of one triangle.
+class Subdivider {
+ public:
+  Subdivider(const ArrangementInput& input, const CutLines& lines, Pieces& pieces,
+             const std::vector<std::uint32_t>& edge_of_use)
+      : input_(input), lines_(lines), pieces_(pieces), edge_of_use_(edge_of_use) {}
+
+  void run(std::uint32_t triangle, std::span<const std::uint32_t> uses) {
+    triangle_ = triangle;
+    spokes_.clear();
+    for (const std::uint32_t use : uses) {
+      const AtomicEdge& edge = pieces_.edges[edge_of_use_[use]];
+      const bool inside = pieces_.uses[use].side == EdgeUse::kInside;
+      const bool leaves_a = inside || runs_with_triangle(use);
+      spokes_.push_back({edge.a, use, true, leaves_a, kOpen});
+      spokes_.push_back({edge.b, use, false, inside || !leaves_a, kOpen});
+    }
+    sort_spokes();
+    first_piece_ = true;
+    for (std::uint32_t s = 0; s < spokes_.size(); ++s) {
+      if (spokes_[s].leaves && spokes_[s].piece == kOpen) walk(s);
+    }
+  }
+
+ private:
+  static constexpr std::uint32_t kOpen = EdgeUse::kNoPiece;
+
+  // An edge at one of its points.
+  struct Spoke {
+    std::uint32_t point, use;
+    bool at_a;
+    bool leaves;          // a half-edge with the triangle on its left begins here
+    std::uint32_t piece;  // on the left of that half-edge
+  };
+
+  // Whether the side of the triangle that the edge lies along runs from a to b.
+  bool runs_with_triangle(std::uint32_t use) const {
+    const EdgeUse& u = pieces_.uses[use];
+    const std::uint32_t from = input_.corner(3 * u.triangle + u.side, 0);
+    return u.forward == (from == input_.edge_from(input_.edges.edge_of[3 * u.triangle + u.side]));
+  }
+
+  PlanarDirection direction(const exact::PlaneView& view, const Spoke& spoke) const;
+  void sort_spokes();
+  void sort_around(std::uint32_t begin, std::uint32_t end);
+  void walk(std::uint32_t start);
+
+  const ArrangementInput& input_;
+  const CutLines& lines_;
+  Pieces& pieces_;
+  const std::vector<std::uint32_t>& edge_of_use_;
+  std::uint32_t triangle_ = 0;
+  bool first_piece_ = true;
+  std::vector<Spoke> spokes_;
+  std::vector<std::uint32_t> other_;        // the spoke at the other end
+  std::vector<std::uint32_t> begin_, end_;  // of the spokes at the same point
+};
+
+PlanarDirection Subdivider::direction(const exact::PlaneView& view, const Spoke& spoke) const {
+  const EdgeUse& use = pieces_.uses[spoke.use];
+  bool along = spoke.at_a == use.forward;  // whether the line runs away from the point
+  PlanarDirection result;
+  if (use.line < input_.edges.size()) {
+    result = view.of(input_.vertices[input_.edge_to(use.line)] -
+                     input_.vertices[input_.edge_from(use.line)]);
+  } else {
+    const CrossingLine& crossing = lines_.crossings[use.line - input_.edges.size()];
+    const bool is_first = crossing.first == triangle_;
+    result = view.of(input_.plane_of(is_first ? crossing.second : crossing.first));
+    along = along == is_first;
+  }
+  return along ? result : PlanarDirection{-result.u, -result.v};
+}
+
+void Subdivider::sort_spokes() {
+  std::ranges::sort(spokes_, [](const Spoke& x, const Spoke& y) {
+    return std::tie(x.point, x.use) < std::tie(y.point, y.use);
+  });
+  const auto count = static_cast<std::uint32_t>(spokes_.size());
+  begin_.resize(count);
+  end_.resize(count);
+  for (std::uint32_t begin = 0; begin < count;) {
+    std::uint32_t end = begin + 1;
+    while (end < count && spokes_[end].point == spokes_[begin].point) ++end;
+    if (end - begin > 2) sort_around(begin, end);
+    for (std::uint32_t s = begin; s < end; ++s) begin_[s] = begin, end_[s] = end;
+    begin = end;
+  }
+  other_.assign(count, 0);
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> by_use(count);
+  for (std::uint32_t s = 0; s < count; ++s) by_use[s] = {spokes_[s].use, s};
+  std::ranges::sort(by_use);
+  for (std::uint32_t i = 0; i + 1 < count; i += 2) {
+    other_[by_use[i].second] = by_use[i + 1].second;
+    other_[by_use[i + 1].second] = by_use[i].second;
+  }
+}
+
+// Counter-clockwise, as seen from the front of the triangle.
+void Subdivider::sort_around(std::uint32_t begin, std::uint32_t end) {
+  const exact::PlaneView view(input_.plane_of(triangle_));
+  std::vector<std::pair<PlanarDirection, Spoke>> around;
+  for (std::uint32_t s = begin; s < end; ++s) {
+    around.emplace_back(direction(view, spokes_[s]), spokes_[s]);
+  }
+  const PlanarDirection from = around.front().first;
+  std::ranges::stable_sort(around, [&](const auto& x, const auto& y) {
+    return exact::order_in_plane(from, x.first, y.first) < 0;
+  });
+  for (std::uint32_t s = begin; s < end; ++s) spokes_[s] = around[s - begin].second;
+}
+
+// Along the half-edge that leaves at a spoke, then at each point to the next spoke clockwise.
+void Subdivider::walk(std::uint32_t start) {
+  std::uint32_t piece = triangle_;
+  if (!first_piece_) {
+    piece = static_cast<std::uint32_t>(pieces_.triangle_of.size());
+    pieces_.triangle_of.push_back(triangle_);
+  }
+  first_piece_ = false;
+  for (std::uint32_t s = start; spokes_[s].piece == kOpen;) {
+    spokes_[s].piece = piece;
+    EdgeUse& use = pieces_.uses[spokes_[s].use];
+    (spokes_[s].at_a ? use.left : use.right) = piece;
+    const std::uint32_t arrived = other_[s];
+    s = arrived == begin_[arrived] ? end_[arrived] - 1 : arrived - 1;
+    if (!spokes_[s].leaves) return;  // only where a line ends within a triangle: it is open
+  }
+}
+
+}  // namespace
+
+Result<Pieces> find_pieces(const ArrangementInput& input, const BoundaryPoints& points,
+                           const CutLines& lines, const SortedLines& sorted,
+                           const Execution& execution) {
+  Pieces pieces;
+  std::vector<bool> cut;
+  EdgeCollector(input, points, lines, sorted).run(pieces, cut);
+  const std::size_t triangle_count = input.triangles.size();
+  pieces.triangle_of.resize(triangle_count);
+  std::iota(pieces.triangle_of.begin(), pieces.triangle_of.end(), std::uint32_t{0});
+  std::vector<std::uint32_t> edge_of_use(pieces.uses.size());
+  for (std::uint32_t e = 0; e < pieces.edges.size(); ++e) {
+    const AtomicEdge& edge = pieces.edges[e];
+    std::fill_n(edge_of_use.begin() + edge.first_use, edge.use_count, e);
+  }
+  const Buckets by_triangle = bucket(pieces.uses.size(), triangle_count,
+                                     [&](std::size_t u) { return pieces.uses[u].triangle; });
+  Subdivider subdivider(input, lines, pieces, edge_of_use);
+  for (std::uint32_t t = 0; t < triangle_count; ++t) {
+    const std::uint32_t begin = by_triangle.first[t], end = by_triangle.first[t + 1];
+    if (begin == end) continue;
+    if (t % 1024 == 0 && execution.stop.stop_requested()) {
+      return fail(ErrorCode::kCancelled, "stopped");
+    }
+    const auto uses = std::span(by_triangle.items).subspan(begin, end - begin);
+    if (cut[t]) {
+      subdivider.run(t, uses);
+      continue;
+    }
+    for (const std::uint32_t u : uses) {  // sides of a triangle that is one piece
+      EdgeUse& use = pieces.uses[u];
+      const bool forward = input.corner(3 * t + use.side, 0) == pieces.edges[edge_of_use[u]].a;
+      (forward ? use.left : use.right) = t;
+    }
+  }
+  return pieces;
+}
+
+}  // namespace strata::csg

@@ -1,0 +1,116 @@
+#include "csg/boundary/point_table.h"
+
+#include <bit>
+#include <cmath>
+
+namespace strata::csg {
+namespace {
+
+using exact::FilePoint;
+using exact::Int192;
+using exact::Int256;
+using exact::RationalPoint;
+
+const Int256& coordinate(const RationalPoint& point, int axis) {
+  return axis == 0 ? point.x : axis == 1 ? point.y : point.z;
+}
+
+// x_a / w_a - x_b / w_b has the numerator x_a w_b - x_b w_a: 7b + 4 + 6b + 3 bits; 384 for b = 29.
+int compare(const RationalPoint& a, const RationalPoint& b, int axis) {
+  using Product = exact::Wide<7>;
+  return sign_of(exact::product<Product>(coordinate(a, axis), b.w) -
+                 exact::product<Product>(coordinate(b, axis), a.w));
+}
+
+bool equal(const RationalPoint& a, const RationalPoint& b) {
+  return compare(a, b, 0) == 0 && compare(a, b, 1) == 0 && compare(a, b, 2) == 0;
+}
+
+std::uint64_t hash(const FilePoint& p) {
+  std::uint64_t h = static_cast<std::uint64_t>(p.x) * 0x9e3779b97f4a7c15u;
+  h = (std::rotl(h, 29) ^ static_cast<std::uint64_t>(p.y)) * 0xbf58476d1ce4e5b9u;
+  h = (std::rotl(h, 31) ^ static_cast<std::uint64_t>(p.z)) * 0x94d049bb133111ebu;
+  return h ^ h >> 32;
+}
+
+}  // namespace
+
+PointTable::PointTable(BoundaryPoints points)
+    : points_(std::move(points)), slots_(1024, 0), inserted_(points_.vertices().size(), false) {}
+
+std::size_t PointTable::slot_of(const FilePoint& rounded) const {
+  return hash(rounded) & (slots_.size() - 1);
+}
+
+void PointTable::insert(std::uint32_t point) {
+  if (2 * ++used_ > slots_.size()) grow();
+  std::size_t at = slot_of(points_.rounded(point));
+  while (slots_[at] != 0) at = (at + 1) & (slots_.size() - 1);
+  slots_[at] = point + 1;
+}
+
+void PointTable::grow() {
+  std::vector<std::uint32_t> old(2 * slots_.size(), 0);
+  old.swap(slots_);
+  for (const std::uint32_t value : old) {
+    if (value == 0) continue;
+    std::size_t at = slot_of(points_.rounded(value - 1));
+    while (slots_[at] != 0) at = (at + 1) & (slots_.size() - 1);
+    slots_[at] = value;
+  }
+}
+
+void PointTable::insert_vertex(std::uint32_t vertex) {
+  if (inserted_[vertex]) return;
+  inserted_[vertex] = true;
+  insert(vertex);
+}
+
+std::uint32_t PointTable::find_or_add(const BoundaryPoints::Recipe& recipe) {
+  const RationalPoint exact = points_.rational(recipe);
+  const FilePoint rounded = exact::round_for_file(exact);
+  for (std::size_t at = slot_of(rounded); slots_[at] != 0; at = (at + 1) & (slots_.size() - 1)) {
+    const std::uint32_t point = slots_[at] - 1;
+    if (points_.rounded(point) == rounded && equal(points_.rational(point), exact)) return point;
+  }
+  const std::uint32_t added = points_.add(recipe, rounded);
+  insert(added);
+  return added;
+}
+
+int order_along(const BoundaryPoints& points, std::uint32_t a, std::uint32_t b, int axis) {
+  const std::int64_t x = points.rounded(a)[axis], y = points.rounded(b)[axis];
+  if (x != y) return x < y ? -1 : 1;  // rounding keeps orders
+  if (a == b || (points.on_lattice(a) && points.on_lattice(b))) return 0;
+  return compare(points.rational(a), points.rational(b), axis);
+}
+
+int side_of(const BoundaryPoints& points, std::uint32_t point, const exact::Plane& plane) {
+  if (points.on_lattice(point)) {
+    return exact::sign_of(exact::height(plane, points.vertices()[point]));
+  }
+  if constexpr (exact::kFilters) {
+    // Heights of the rounded point: it was moved by at most 2^-25 along each axis. Four roundings
+    // a term, of the normal's component, of the difference, of the product and in the sum.
+    using Real = exact::filters::RealNormal;
+    const Real n(plane.normal);
+    const Real v = (Real(points.rounded(point)) * 0x1p-24) - Real(plane.base);
+    const Real terms = n * v, size(std::abs(n.x), std::abs(n.y), std::abs(n.z));
+    const double value = terms.x + terms.y + terms.z;
+    const double permanent = std::abs(terms.x) + std::abs(terms.y) + std::abs(terms.z);
+    const double bound = 0x1.1p-25 * (size.x + size.y + size.z) + 0x1p-49 * permanent;
+    if (value > bound) return 1;
+    if (value < -bound) return -1;
+  }
+  const BoundaryPoints::Recipe recipe = points.recipe(point);
+  if (recipe.kind == BoundaryPoints::Kind::kEdgePlane) {
+    const auto& [kind, from] = recipe;
+    return exact::side_of_plane(
+        exact::edge_plane_point(points.vertices()[from[0]], points.vertices()[from[1]],
+                                points.plane_of(from[2])),
+        plane);
+  }
+  return exact::side_of_plane(points.rational(point), plane);
+}
+
+}  // namespace strata::csg

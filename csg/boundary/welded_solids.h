@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "csg/boundary/lattice_solids.h"
+
+namespace strata::csg {
+
+/// How often a triangle belongs to a solid: 1, or more where the solid has it several times, or
+/// less than 0 where the solid has it the other way around.
+struct SolidCount {
+  std::uint32_t solid;
+  std::int32_t count;
+
+  friend bool operator==(const SolidCount&, const SolidCount&) = default;
+};
+
+/// Solids of which equal points are one vertex and equal triangles one triangle. Triangles that one
+/// solid has in both directions equally often are gone, and those without area: corners of their
+/// neighbours lie on edges of other neighbours, as such corners do anywhere.
+struct WeldedSolids {
+  std::vector<exact::LatticePoint> vertices;  ///< all different
+  std::vector<glm::uvec3> triangles;          ///< with area, all different
+  /// The index into contents() of each triangle.
+  std::vector<std::uint32_t> content_of;
+
+  /// The solids of a triangle, sorted, and how it faces.
+  std::span<const SolidCount> content(std::uint32_t triangle) const {
+    const std::uint32_t c = content_of[triangle];
+    return std::span(counts).subspan(first_count[c], first_count[c + 1] - first_count[c]);
+  }
+  /// Content s for s < solid count is {s, 1}; others follow.
+  std::vector<SolidCount> counts;
+  std::vector<std::uint32_t> first_count;
+};
+
+/// Welds. @return kCancelled
+Result<WeldedSolids> weld_solids(LatticeSolids solids, const Execution& execution);
+
+/// The edges of a mesh's triangles, each with all its triangles.
+struct MeshEdges {
+  /// The edge of each side: [3 * triangle + side].
+  std::vector<std::uint32_t> edge_of;
+  std::vector<std::uint32_t> first_use;  ///< of each edge; one more than edges
+  std::vector<std::uint32_t> uses;       ///< 3 * triangle + side
+
+  std::size_t size() const { return first_use.size() - 1; }
+  std::span<const std::uint32_t> uses_of(std::uint32_t edge) const {
+    return std::span(uses).subspan(first_use[edge], first_use[edge + 1] - first_use[edge]);
+  }
+};
+
+MeshEdges find_mesh_edges(std::span<const glm::uvec3> triangles, std::size_t vertex_count);
+
+}  // namespace strata::csg
