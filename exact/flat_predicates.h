@@ -41,12 +41,12 @@ constexpr Int256 incircle_value(const FlatPoint& a, const FlatPoint& b, const Fl
 
 namespace filters {
 
-/// Seven roundings: two of the square, two of the area, of their product, of two sums.
-inline int incircle(const FlatPoint& a, const FlatPoint& b, const FlatPoint& c,
-                    const FlatPoint& d) {
-  using Real = glm::vec<2, double, glm::defaultp>;
-  const Real u(a - d), v(b - d), w(c - d);
-  const auto lift = [](const Real& p) { return p.x * p.x + p.y * p.y; };
+using RealFlat = glm::vec<2, double, glm::defaultp>;
+
+/// For the differences of a, b and c from d. Seven roundings: two of the square, two of the area,
+/// of their product, of two sums.
+inline int incircle(const RealFlat& u, const RealFlat& v, const RealFlat& w) {
+  const auto lift = [](const RealFlat& p) { return p.x * p.x + p.y * p.y; };
   const Bounded vw = minor(v.x, v.y, w.x, w.y), wu = minor(w.x, w.y, u.x, u.y),
                 uv = minor(u.x, u.y, v.x, v.y);
   const double up = lift(u), vp = lift(v), wp = lift(w);
@@ -67,7 +67,9 @@ inline int orient3d(const FilePoint& a, const FilePoint& b, const FilePoint& c,
 inline int incircle(const FlatPoint& a, const FlatPoint& b, const FlatPoint& c,
                     const FlatPoint& d) {
   if constexpr (kFilters) {
-    if (const int sign = filters::incircle(a, b, c, d); sign != 0) return sign;
+    using filters::RealFlat;
+    const int sign = filters::incircle(RealFlat(a - d), RealFlat(b - d), RealFlat(c - d));
+    if (sign != 0) return sign;
   }
   return sign_of(incircle_value(a, b, c, d));
 }

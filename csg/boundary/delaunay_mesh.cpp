@@ -4,10 +4,25 @@
 
 namespace strata::csg {
 
+void DelaunayMesh::begin(std::span<const exact::FlatPoint> points) {
+  points_ = points;
+  corners_.clear();
+  across_.clear();
+  beneath_.clear();
+  waiting_.clear();
+  real_.clear();
+  real_.reserve(points.size());
+  for (const exact::FlatPoint& point : points) real_.emplace_back(point - points.front());
+}
+
 bool DelaunayMesh::delaunay(const Quad& quad) const {
   const auto& [a, b, c, d] = quad;
-  const int inside = exact::incircle(points_[a], points_[c], points_[d], points_[b]);
-  // Points are numbered in lexicographic order.
+  int inside = 0;
+  if constexpr (exact::kFilters) {
+    inside =
+        exact::filters::incircle(real_[a] - real_[b], real_[c] - real_[b], real_[d] - real_[b]);
+  }
+  if (inside == 0) inside = exact::incircle(points_[a], points_[c], points_[d], points_[b]);
   return inside != 0 ? inside < 0 : std::min(a, c) < std::min(b, d);
 }
 
@@ -25,7 +40,6 @@ void DelaunayMesh::flip(Side half_edge, const Quad& quad) {
   join(3 * o, bc);
   join(3 * o + 1, cd);
   join(3 * t + 1, 3 * o + 2);
-  for (const Side side : {3 * t, 3 * t + 2, 3 * o, 3 * o + 1}) waiting_.push_back(side);
 }
 
 void DelaunayMesh::legalize() {
@@ -35,7 +49,11 @@ void DelaunayMesh::legalize() {
     if (!is_half_edge(across_[half_edge])) continue;
     const Quad around = quad(half_edge);
     // The quadrilateral of an edge that is not Delaunay is convex.
-    if (!delaunay(around)) flip(half_edge, around);
+    if (delaunay(around)) continue;
+    const Side t = half_edge / 3, o = across_[half_edge] / 3;
+    flip(half_edge, around);
+    waiting_.push_back(3 * t);
+    waiting_.push_back(3 * o);
   }
 }
 
@@ -56,7 +74,9 @@ std::size_t DelaunayMesh::straighten() {
     if (b == d) continue;
     const int before = left(a, c, d) + left(a, b, c), after = left(a, b, d) + left(b, c, d);
     if (after > before || (after == 2 && before == 2 && !delaunay(around))) {
+      const Side t = half_edge / 3, o = across_[half_edge] / 3;
       flip(half_edge, around);
+      for (const Side side : {3 * t, 3 * t + 2, 3 * o, 3 * o + 1}) waiting_.push_back(side);
       --most;
     }
   }

@@ -9,15 +9,16 @@
 
 namespace strata::csg {
 
-/// Triangles in the plane that know their neighbours, and that are made Delaunay by flips.
+/// Triangles in the plane that know their neighbours, and that are made Delaunay by flips as points
+/// are added.
 ///
 /// A Side says what lies across an edge: a half-edge 3 t + k of triangle t, from its corner k to
 /// the next one; a link of the front at which the mesh still grows; or an edge of the outline.
 ///
 /// This work is based on: C. L. Lawson, "Software for C1 surface interpolation", 1977. We differ:
-/// where four points are on one circle, the diagonal with the least of them is taken. That is the
-/// limit of lowering the points on the paraboloid, the least one most, so the triangulation is
-/// unique, and depends on the points and the outline alone.
+/// where four points are on one circle, the diagonal with the first of them is taken. That is the
+/// limit of lowering the points on the paraboloid, the first one most, so the triangulation is
+/// unique, and depends on the order of the points and the outline alone.
 class DelaunayMesh {
  public:
   using Side = std::uint32_t;
@@ -29,14 +30,8 @@ class DelaunayMesh {
   /// Points and edges that a mesh can have: their numbers, those of links and of half-edges fit.
   static constexpr std::size_t kMostPoints = std::size_t{1} << 27;
 
-  /// @param points  in lexicographic order; borrowed
-  void begin(std::span<const exact::FlatPoint> points) {
-    points_ = points;
-    corners_.clear();
-    across_.clear();
-    beneath_.clear();
-    waiting_.clear();
-  }
+  /// @param points  coordinates differ by at most 2^53; borrowed
+  void begin(std::span<const exact::FlatPoint> points);
   std::size_t triangle_count() const { return corners_.size(); }
   const std::array<std::uint32_t, 3>& triangle(std::size_t t) const { return corners_[t]; }
   Side across(Side half_edge) const { return across_[half_edge]; }
@@ -56,10 +51,11 @@ class DelaunayMesh {
     set(a, b);
     set(b, a);
   }
-  /// Makes legalize() look at an edge.
+  /// Makes legalize() look at an edge that a new point sees.
+  /// @param half_edge  of the triangle that the point makes with the edge
   void suspect(Side half_edge) { waiting_.push_back(half_edge); }
-  /// Flips suspected edges, and those that this affects, until all are locally Delaunay.
-  /// @pre all triangles turn left
+  /// Flips suspected edges, and those that the point sees then, until all are locally Delaunay, if
+  /// they were so without the point. @pre all triangles turn left
   void legalize();
   /// Flips all edges where that makes triangles turn left, or Delaunay: for triangles of which
   /// rounding turned some over. @return how many do not turn left in the end
@@ -92,6 +88,7 @@ class DelaunayMesh {
   }
 
   std::span<const exact::FlatPoint> points_;
+  std::vector<exact::filters::RealFlat> real_;  // the points about the first one; exact
   std::vector<std::array<std::uint32_t, 3>> corners_;
   std::vector<Side> across_;   // of the half-edges
   std::vector<Side> beneath_;  // of the links: the half-edge of the mesh, on their left

@@ -47,8 +47,9 @@ FaceSweep::Index FaceSweep::add_node(Index point) {
   return mesh_->add_link();
 }
 
-// Makes the triangle of a node of the front and its two neighbours, if these see each other.
-bool FaceSweep::cut_off(Index node) {
+// Makes the triangle of a node of the front and its two neighbours, if these see each other. The
+// point that is added sees its edge `seen`.
+bool FaceSweep::cut_off(Index node, DelaunayMesh::Side seen) {
   FrontNode& middle = front_[node];
   FrontNode &low = front_[middle.previous], &high = front_[middle.next];
   if (turn(low.point, high.point, middle.point) <= 0) return false;
@@ -56,19 +57,18 @@ bool FaceSweep::cut_off(Index node) {
   mesh_->join(side + 1, mesh_->beneath(node));
   mesh_->join(side + 2, mesh_->beneath(middle.previous));
   mesh_->join(side, DelaunayMesh::link(middle.previous));
-  mesh_->suspect(side + 1);
-  mesh_->suspect(side + 2);
+  mesh_->suspect(side + seen);
   low.next = middle.next;
   high.previous = middle.previous;
   return true;
 }
 
 void FaceSweep::advance_up(Index node) {
-  while (front_[front_[node].next].next != kNone && cut_off(front_[node].next)) {
+  while (front_[front_[node].next].next != kNone && cut_off(front_[node].next, 1)) {
   }
 }
 void FaceSweep::advance_down(Index node) {
-  while (front_[front_[node].previous].previous != kNone && cut_off(front_[node].previous)) {
+  while (front_[front_[node].previous].previous != kNone && cut_off(front_[node].previous, 2)) {
   }
 }
 

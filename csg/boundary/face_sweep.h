@@ -27,7 +27,9 @@ class FaceSweep {
   };
 
   /// Puts the constrained Delaunay triangulation into `mesh`.
-  /// @param points  in lexicographic order, each once
+  /// @param points  each once, in the order in which a straight line that sweeps to the right meets
+  ///                them, and from below on that line: (x, y) does. One that is not in line with
+  ///                rows of holes is faster: it meets them one at a time.
   /// @return false when edges cross or touch each other, or do not bound a region
   bool cut(std::span<const exact::FlatPoint> points, std::span<const FlatEdge> edges,
            DelaunayMesh& mesh);
@@ -71,7 +73,7 @@ class FaceSweep {
   void merge(Interval below, Interval above);
 
   Index add_node(Index point);
-  bool cut_off(Index node);
+  bool cut_off(Index node, DelaunayMesh::Side seen);
   void advance_up(Index node);
   void advance_down(Index node);
   Index extend_low(Interval interval, Index point);

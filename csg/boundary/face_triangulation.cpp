@@ -1,5 +1,7 @@
 #include "csg/boundary/face_triangulation.h"
 
+#include <algorithm>
+
 #include "exact/directions.h"
 
 namespace strata::csg {
@@ -11,11 +13,25 @@ const exact::Int256& coordinate(const RationalPoint& point, int axis) {
   return axis == 0 ? point.x : axis == 1 ? point.y : point.z;
 }
 
-// -1, 0, 1: the order along an axis. Numerators times weights: 7b + 4 + 6b + 3 bits; 384 for b
-// = 29.
-int order_along(const RationalPoint& a, const RationalPoint& b, int axis) {
-  return exact::sign_of(exact::product<exact::Wide<7>>(coordinate(a, axis), b.w) -
-                        exact::product<exact::Wide<7>>(coordinate(b, axis), a.w));
+// The sweep goes to the right and a little up, so that rows of holes along the axes are met one
+// hole at a time. Coordinates differ by at most 2^53, so keys of their differences are below 2^63.
+constexpr std::int64_t kRight = 509, kUp = 197;
+
+struct ExactCorner {
+  RationalPoint point;
+  exact::Int256 key;  // along the sweep, over point.w: at most 12 S^7 * 706, 217 bits for b = 29
+
+  ExactCorner(const RationalPoint& p, int u, int v)
+      : point(p),
+        key(exact::product<exact::Int256>(coordinate(p, u), kRight) +
+            exact::product<exact::Int256>(coordinate(p, v), kUp)) {}
+};
+
+// The sign of a / a_weight - b / b_weight. Products: 217 + 178 bits for b = 29.
+int compare(const exact::Int256& a, const exact::Int192& a_weight, const exact::Int256& b,
+            const exact::Int192& b_weight) {
+  return exact::sign_of(exact::product<exact::Wide<7>>(a, b_weight) -
+                        exact::product<exact::Wide<7>>(b, a_weight));
 }
 
 }  // namespace
@@ -41,16 +57,19 @@ bool FaceTriangulation::append_triangle(const BoundaryPlane& plane, FaceTriangle
 
 void FaceTriangulation::collect(const BoundaryPlane& plane) {
   corners_.clear();
-  const auto add = [this](Index point) {
+  exact::FlatPoint first(0);
+  const auto add = [&](Index point) {
     const exact::FilePoint& at = positions_[point];
-    corners_.push_back({{at[u_], at[v_]}, point});
+    const exact::FlatPoint flat(at[u_], at[v_]);
+    if (corners_.empty()) first = flat;
+    corners_.push_back({kRight * (flat.x - first.x) + kUp * (flat.y - first.y), flat, point});
   };
   for (Index i = 0; i < plane.edge_count; ++i) add(faces_.edges[plane.first_edge + i].from);
   for (Index i = 0; i < plane.touch_count; ++i) add(faces_.touches[plane.first_touch + i]);
 }
 
-// Numbers the corners in lexicographic order. @return false when two of them coincide
-bool FaceTriangulation::number_points() {
+// Sorts the corners. @return false when two of them coincide
+bool FaceTriangulation::sort_corners() {
   std::sort(corners_.begin(), corners_.end());
   std::size_t count = 0;
   bool distinct = true;
@@ -78,20 +97,21 @@ void FaceTriangulation::number_edges(const BoundaryPlane& plane) {
 }
 
 bool FaceTriangulation::cut_exactly(const BoundaryPlane& plane) {
-  std::vector<std::pair<RationalPoint, Corner>> points;
-  points.reserve(corners_.size());
+  std::vector<std::pair<ExactCorner, Corner>> corners;
+  corners.reserve(corners_.size());
   for (const Corner& corner : corners_) {
-    points.emplace_back(faces_.points.rational(corner.point), corner);
+    corners.emplace_back(ExactCorner(faces_.points.rational(corner.point), u_, v_), corner);
   }
-  std::sort(points.begin(), points.end(), [this](const auto& a, const auto& b) {
-    const int order = order_along(a.first, b.first, u_);
-    return (order != 0 ? order : order_along(a.first, b.first, v_)) < 0;
+  std::sort(corners.begin(), corners.end(), [this](const auto& a, const auto& b) {
+    const RationalPoint &p = a.first.point, &q = b.first.point;
+    const int order = compare(a.first.key, p.w, b.first.key, q.w);
+    return (order != 0 ? order : compare(coordinate(p, v_), p.w, coordinate(q, v_), q.w)) < 0;
   });
   std::vector<RationalPoint> rational;
-  rational.reserve(points.size());
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    rational.push_back(points[i].first);
-    corners_[i] = points[i].second;
+  rational.reserve(corners.size());
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    rational.push_back(corners[i].first.point);
+    corners_[i] = corners[i].second;
   }
   number_edges(plane);
   mesh_.begin(flat_);
@@ -122,7 +142,7 @@ bool FaceTriangulation::append(const BoundaryPlane& plane, FaceTriangles& out) {
   v_ = view.v();
   if (plane.edge_count == 3 && plane.touch_count == 0 && append_triangle(plane, out)) return true;
   collect(plane);
-  const bool distinct = number_points();
+  const bool distinct = sort_corners();
   if (distinct) number_edges(plane);
   if (!distinct || !sweep_.cut(flat_, edges_, mesh_)) {
     ++out.not_simple;

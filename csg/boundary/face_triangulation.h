@@ -31,7 +31,8 @@ class FaceTriangulation {
       : faces_(faces), positions_(positions) {}
 
   /// Appends the constrained Delaunay triangulation of the rounded points of a plane, which does
-  /// not depend on orders. Where rounding makes edges meet, the exact points make the
+  /// not depend on orders: of four points of a circle, the one that the sweep meets first has the
+  /// diagonal. Where rounding makes edges meet, the exact points make the
   /// triangulation, so that each edge has its triangle.
   /// @return false when the plane's edges do not bound a region: a fault of whoever made them
   bool append(const BoundaryPlane& plane, FaceTriangles& out);
@@ -41,17 +42,18 @@ class FaceTriangulation {
 
   bool append_triangle(const BoundaryPlane& plane, FaceTriangles& out) const;
   void collect(const BoundaryPlane& plane);
-  bool number_points();
+  bool sort_corners();
   void number_edges(const BoundaryPlane& plane);
   bool cut_exactly(const BoundaryPlane& plane);
   void append_mesh(const BoundaryPlane& plane, FaceTriangles& out) const;
 
   struct Corner {
+    std::int64_t key;  // how far along the sweep
     exact::FlatPoint at;
     Index point;
 
     friend bool operator<(const Corner& a, const Corner& b) {
-      return a.at.x != b.at.x   ? a.at.x < b.at.x
+      return a.key != b.key     ? a.key < b.key
              : a.at.y != b.at.y ? a.at.y < b.at.y
                                 : a.point < b.point;
     }
@@ -61,7 +63,7 @@ class FaceTriangulation {
   const std::vector<exact::FilePoint>& positions_;
   int u_ = 0, v_ = 1;
   std::unique_ptr<Index[]> number_of_;  // of a point of the plane; the others are not set
-  std::vector<Corner> corners_;         // by number
+  std::vector<Corner> corners_;         // in the order of the sweep
   std::vector<exact::FlatPoint> flat_;
   std::vector<FlatEdge> edges_;
   FaceSweep sweep_;
