@@ -1,6 +1,6 @@
 #include "csg/boundary/boundary_arrangement.h"
 
-#include "csg/boundary/find_faces.h"
+#include "csg/arrangement/find_faces.h"
 #include "csg/boundary/open_edges.h"
 
 namespace strata::csg {

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "csg/boundary/boundary_faces.h"
-#include "csg/boundary/lattice_solids.h"
+#include "csg/arrangement/boundary_faces.h"
+#include "csg/arrangement/lattice_solids.h"
 #include "strata/csg/boundary/boundary_mesh.h"
 
 namespace strata::csg {

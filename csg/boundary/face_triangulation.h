@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "csg/boundary/boundary_faces.h"
+#include "csg/arrangement/boundary_faces.h"
 #include "csg/boundary/face_sweep.h"
 
 namespace strata::csg {

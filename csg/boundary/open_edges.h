@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "csg/boundary/lattice_solids.h"
+#include "csg/arrangement/lattice_solids.h"
 #include "strata/csg/boundary/boundary_mesh.h"
 
 namespace strata::csg {

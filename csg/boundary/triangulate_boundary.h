@@ -4,8 +4,8 @@
 #include <glm/vec3.hpp>
 #include <vector>
 
-#include "csg/boundary/boundary_faces.h"
-#include "csg/boundary/lattice_solids.h"
+#include "csg/arrangement/boundary_faces.h"
+#include "csg/arrangement/lattice_solids.h"
 #include "strata/core/execution.h"
 #include "strata/core/result.h"
 

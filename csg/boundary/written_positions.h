@@ -1,6 +1,6 @@
 #pragma once
 
-#include "csg/boundary/lattice_solids.h"
+#include "csg/arrangement/lattice_solids.h"
 #include "exact/cut_points.h"
 
 namespace strata::csg {

@@ -11,7 +11,7 @@
 #include <set>
 #include <vector>
 
-#include "csg/boundary/boundary_faces.h"
+#include "csg/arrangement/boundary_faces.h"
 
 namespace strata::csg::test {
 

@@ -1,4 +1,4 @@
-#include "csg/boundary/candidate_pairs.h"
+#include "csg/arrangement/candidate_pairs.h"
 
 #include <algorithm>
 #include <bit>

@@ -1,4 +1,4 @@
-#include "csg/boundary/winding_rays.h"
+#include "csg/arrangement/winding_rays.h"
 
 #include <algorithm>
 #include <cmath>

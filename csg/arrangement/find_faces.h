@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "csg/boundary/boundary_faces.h"
-#include "csg/boundary/cell_values.h"
+#include "csg/arrangement/boundary_faces.h"
+#include "csg/arrangement/cell_values.h"
 
 namespace strata::csg {
 

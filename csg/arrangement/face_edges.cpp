@@ -1,4 +1,4 @@
-#include "csg/boundary/face_edges.h"
+#include "csg/arrangement/face_edges.h"
 
 #include <algorithm>
 #include <array>

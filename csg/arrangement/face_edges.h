@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "csg/boundary/boundary_faces.h"
-#include "csg/boundary/cut_lines.h"
+#include "csg/arrangement/boundary_faces.h"
+#include "csg/arrangement/cut_lines.h"
 
 namespace strata::csg {
 

@@ -1,4 +1,4 @@
-#include "csg/boundary/lattice_solids.h"
+#include "csg/arrangement/lattice_solids.h"
 
 #include <algorithm>
 #include <cmath>

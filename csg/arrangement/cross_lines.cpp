@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "csg/boundary/cut_lines.h"
+#include "csg/arrangement/cut_lines.h"
 #include "exact/directions.h"
 
 namespace strata::csg {

@@ -1,9 +1,9 @@
-#include "csg/boundary/find_faces.h"
+#include "csg/arrangement/find_faces.h"
 
 #include <algorithm>
 #include <tuple>
 
-#include "csg/boundary/face_edges.h"
+#include "csg/arrangement/face_edges.h"
 #include "exact/determinants.h"
 #include "mesh/disjoint_sets.h"
 

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "csg/boundary/radial_lists.h"
+#include "csg/arrangement/radial_lists.h"
 #include "csg/program.h"
 #include "strata/core/inside_rule.h"
 

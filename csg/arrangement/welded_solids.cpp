@@ -1,9 +1,9 @@
-#include "csg/boundary/welded_solids.h"
+#include "csg/arrangement/welded_solids.h"
 
 #include <algorithm>
 #include <tuple>
 
-#include "csg/boundary/buckets.h"
+#include "csg/arrangement/buckets.h"
 #include "mesh/weld.h"
 
 namespace strata::csg {

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "csg/boundary/pieces.h"
+#include "csg/arrangement/pieces.h"
 
 namespace strata::csg {
 

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <array>
 
-#include "csg/boundary/cut_lines.h"
+#include "csg/arrangement/cut_lines.h"
 #include "exact/directions.h"
 
 namespace strata::csg {

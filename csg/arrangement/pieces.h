@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "csg/boundary/cut_lines.h"
+#include "csg/arrangement/cut_lines.h"
 
 namespace strata::csg {
 

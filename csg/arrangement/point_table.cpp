@@ -1,4 +1,4 @@
-#include "csg/boundary/point_table.h"
+#include "csg/arrangement/point_table.h"
 
 #include <bit>
 #include <cmath>

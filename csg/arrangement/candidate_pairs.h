@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "csg/boundary/welded_solids.h"
+#include "csg/arrangement/welded_solids.h"
 
 namespace strata::csg {
 

@@ -1,9 +1,9 @@
-#include "csg/boundary/cell_values.h"
+#include "csg/arrangement/cell_values.h"
 
 #include <algorithm>
 
-#include "csg/boundary/buckets.h"
-#include "csg/boundary/winding_rays.h"
+#include "csg/arrangement/buckets.h"
+#include "csg/arrangement/winding_rays.h"
 
 namespace strata::csg {
 namespace {

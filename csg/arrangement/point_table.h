@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "csg/boundary/boundary_faces.h"
+#include "csg/arrangement/boundary_faces.h"
 
 namespace strata::csg {
 

@@ -1,4 +1,4 @@
-#include "csg/boundary/boundary_faces.h"
+#include "csg/arrangement/boundary_faces.h"
 
 #include "exact/directions.h"
 

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "csg/boundary/cut_lines.h"
+#include "csg/arrangement/cut_lines.h"
 
 namespace strata::csg {
 

@@ -1,8 +1,8 @@
-#include "csg/boundary/pieces.h"
+#include "csg/arrangement/pieces.h"
 
 #include <algorithm>
 
-#include "csg/boundary/buckets.h"
+#include "csg/arrangement/buckets.h"
 #include "exact/directions.h"
 
 namespace strata::csg {

@@ -4,9 +4,9 @@
 #include <span>
 #include <vector>
 
-#include "csg/boundary/candidate_pairs.h"
-#include "csg/boundary/point_table.h"
-#include "csg/boundary/welded_solids.h"
+#include "csg/arrangement/candidate_pairs.h"
+#include "csg/arrangement/point_table.h"
+#include "csg/arrangement/welded_solids.h"
 
 namespace strata::csg {
 

@@ -1,4 +1,4 @@
-#include "csg/boundary/radial_lists.h"
+#include "csg/arrangement/radial_lists.h"
 
 #include <algorithm>
 
