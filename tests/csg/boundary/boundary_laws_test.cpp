@@ -1,0 +1,611 @@
+// The laws of boundary meshes on a lattice so small that everything coincides. STRATA_LONG_TESTS=N
+// runs N times as many trees, from other seeds.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <glm/ext/matrix_transform.hpp>
+#include <glm/geometric.hpp>
+#include <map>
+#include <numeric>
+#include <set>
+#include <string>
+#include <tuple>
+
+#include "csg/boundary/open_edges.h"
+#include "strata/csg/boundary/boundary_mesh.h"
+#include "strata/csg/solid_lists.h"
+#include "tests/csg/boundary/convex_volume.h"
+#include "tests/csg/boundary/tiny_trees.h"
+#include "tests/csg/random_tree.h"
+#include "tests/support/voxelized.h"
+
+namespace strata::csg {
+namespace {
+
+using exact::Fraction;
+constexpr BoundaryOptions kTiny{.bits = 10};
+
+int rounds(int usual) {
+  const char* const text = std::getenv("STRATA_LONG_TESTS");
+  return usual * (text != nullptr ? std::max(1, std::atoi(text)) : 1);
+}
+
+SolidMesh mesh_of(const Tree& tree, const BoundaryOptions& options = kTiny,
+                  const Execution& execution = {}) {
+  auto made = boundary_mesh(tree, tree.root(), options, execution);
+  EXPECT_TRUE(made.has_value()) << made.error().message;
+  return made ? std::move(made->mesh) : SolidMesh{};
+}
+
+SolidMesh framed(const Tree& tree) { return mesh_of(tree | tiny_frame()); }
+
+ExactMeasures measures_of(const Tree& tree) {
+  const auto made = exact_measures(tree, tree.root(), kTiny);
+  EXPECT_TRUE(made.has_value()) << made.error().message;
+  return made.value_or(ExactMeasures{});
+}
+
+bool same_bytes(const SolidMesh& a, const SolidMesh& b) {
+  return a.positions == b.positions && a.triangles == b.triangles && a.part_of == b.part_of;
+}
+
+std::string size_of(const SolidMesh& mesh) {
+  return std::to_string(mesh.positions.size()) + " vertices, " +
+         std::to_string(mesh.triangles.size()) + " triangles";
+}
+
+// Law L1, by index: each directed edge once and its opposite once, one fan around each vertex, an
+// even Euler characteristic of each shell. @return what is wrong
+std::string broken(const SolidMesh& mesh) {
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> across;  // edge -> third corner
+  for (const glm::uvec3& t : mesh.triangles) {
+    for (int k = 0; k < 3; ++k) {
+      if (t[k] >= mesh.positions.size()) return "index out of range";
+      if (t[k] == t[(k + 1) % 3]) return "two equal corners";
+      if (!across.try_emplace({t[k], t[(k + 1) % 3]}, t[(k + 2) % 3]).second) return "edge twice";
+    }
+  }
+  std::vector<std::uint32_t> degree(mesh.positions.size(), 0), shell(mesh.positions.size());
+  std::iota(shell.begin(), shell.end(), 0u);
+  const auto find = [&](std::uint32_t v) {
+    while (shell[v] != v) v = shell[v] = shell[shell[v]];
+    return v;
+  };
+  for (const auto& [edge, corner] : across) {
+    if (!across.contains({edge.second, edge.first})) return "edge without its opposite";
+    ++degree[edge.first];
+    shell[find(edge.first)] = find(edge.second);
+  }
+  for (const auto& [edge, corner] : across) {  // around edge.first
+    std::uint32_t steps = 0, at = edge.second;
+    do {
+      at = across.at({edge.first, at});
+    } while (++steps <= degree[edge.first] && at != edge.second);
+    if (steps != degree[edge.first]) return "a vertex of several fans";
+  }
+  std::map<std::uint32_t, int> euler;
+  for (std::uint32_t v = 0; v < mesh.positions.size(); ++v) {
+    if (degree[v] == 0) return "a vertex without triangles";
+    euler[find(v)] += 2 - static_cast<int>(degree[v]);
+  }
+  for (const glm::uvec3& t : mesh.triangles) euler[find(t.x)] += 2;
+  for (const auto& [root, twice] : euler) {
+    if (twice % 4 != 0) return "an odd Euler characteristic";
+  }
+  return "";
+}
+
+// The tree's value at a point by the windings of its solids; nothing where one cannot tell.
+class TreeOracle {
+ public:
+  explicit TreeOracle(const Tree& tree) : tree_(tree) {
+    for (const Solid& solid : tree.solids()) {
+      solids_.emplace_back(transform(*solid.mesh, solid.world_from_mesh));
+    }
+  }
+  std::optional<bool> at(const glm::dvec3& point) const {
+    std::vector<char> inside;
+    for (std::size_t s = 0; s < solids_.size(); ++s) {
+      const auto winding = solids_[s].at(point);
+      if (!winding) return std::nullopt;
+      inside.push_back(is_inside(tree_.solids()[s].rule, *winding));
+    }
+    return evaluate(tree_, tree_.root(), [&](std::uint32_t s) { return inside[s] != 0; });
+  }
+
+ private:
+  const Tree& tree_;
+  std::vector<ExactWinding> solids_;
+};
+
+// The same solids, with triangles, vertices, operands and solids in another order.
+class Shuffler {
+ public:
+  Shuffler(const Tree& from, std::mt19937_64& random) : from_(from), random_(random) {
+    if (from.root() != Tree::kNone) result.set_root(copy(from.root()));
+  }
+  Tree result;
+
+ private:
+  Tree::NodeId copy(Tree::NodeId node) {
+    const Tree::Node& what = from_.nodes()[node];
+    if (what.operation == Operation::kSolid) {
+      Solid solid = from_.solids()[what.first];
+      solid.mesh = std::make_shared<const TriangleSoup>(shuffled(*solid.mesh));
+      return result.add_solid(solid);
+    }
+    const auto operands = from_.operands(node);
+    std::vector<std::size_t> order(operands.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::shuffle(order.begin(), order.end(), random_);
+    std::vector<Tree::NodeId> copies(operands.size());
+    for (const std::size_t i : order) copies[i] = copy(operands[i]);
+    const auto first = copies.begin() + (what.operation == Operation::kDifference ? 1 : 0);
+    if (!copies.empty()) std::shuffle(first, copies.end(), random_);
+    return result.add(what.operation, copies);
+  }
+
+  TriangleSoup shuffled(const TriangleSoup& mesh) {
+    TriangleSoup result_mesh = mesh;
+    std::vector<std::uint32_t> place(mesh.positions.size());
+    std::iota(place.begin(), place.end(), 0u);
+    std::shuffle(place.begin(), place.end(), random_);
+    for (std::size_t v = 0; v < place.size(); ++v) {
+      result_mesh.positions[place[v]] = mesh.positions[v];
+    }
+    std::shuffle(result_mesh.triangles.begin(), result_mesh.triangles.end(), random_);
+    for (glm::uvec3& t : result_mesh.triangles) {
+      const auto turn = static_cast<int>(random_() % 3);
+      const glm::uvec3 old = t;
+      for (int k = 0; k < 3; ++k) t[k] = place[old[(k + turn) % 3]];
+    }
+    return result_mesh;
+  }
+
+  const Tree& from_;
+  std::mt19937_64& random_;
+};
+
+// Random trees of all kinds and depths, by seed.
+template <class Check>
+void for_random_trees(int first_seed, int count, int depth, TinyKind kind, const Check& check) {
+  for (int i = 0; i < rounds(count); ++i) {
+    const int seed = first_seed + i;
+    TinyTrees trees(static_cast<std::uint64_t>(seed));
+    const Tree tree = trees.tree(trees.pick(0, depth), kind);
+    SCOPED_TRACE("seed " + std::to_string(seed) + ", depth " + std::to_string(depth) + ", kind " +
+                 std::to_string(static_cast<int>(kind)));
+    check(tree, trees);
+    if (testing::Test::HasFailure()) return;
+  }
+}
+
+// Laws L1, L9.
+
+TEST(BoundaryLaws, EveryMeshIsClosedAndManifold) {
+  std::size_t triangles = 0;
+  for (const TinyKind kind : {TinyKind::kBoxes, TinyKind::kConvex, TinyKind::kAny}) {
+    for_random_trees(100000, 100, 6, kind, [&](const Tree& tree, TinyTrees&) {
+      const SolidMesh mesh = framed(tree);
+      ASSERT_EQ(broken(mesh), "") << size_of(mesh);
+      triangles += mesh.triangles.size() - 24;
+    });
+  }
+  EXPECT_GT(triangles, 10000u);
+}
+
+TEST(BoundaryLaws, PointsAreInsideWhereTheTreeSaysSo) {
+  int inside = 0, outside = 0;
+  for_random_trees(200000, 200, 6, TinyKind::kAny, [&](const Tree& tree, TinyTrees& trees) {
+    const SolidMesh mesh = framed(tree);
+    const ExactWinding result(mesh.positions, mesh.triangles);
+    ASSERT_TRUE(result.all_exact());
+    const TreeOracle oracle(tree);
+    for (int i = 0; i < 100; ++i) {
+      glm::dvec3 point;
+      for (int k = 0; k < 3; ++k) point[k] = trees.pick(-64, 8 * 1024 + 64) / 1024.0;
+      const auto expected = oracle.at(point);
+      const auto winding = result.at(point);
+      if (!expected || !winding) continue;
+      ASSERT_EQ(*winding, *expected ? 1 : 0) << point.x << " " << point.y << " " << point.z;
+      ++(*expected ? inside : outside);
+    }
+  });
+  EXPECT_GT(inside, 500);
+  EXPECT_GT(outside, 5000);
+}
+
+// The winding number by doubles; nothing where they may be wrong.
+std::optional<int> rounded_winding(std::span<const glm::dvec3> positions,
+                                   std::span<const glm::uvec3> triangles, const glm::dvec3& point) {
+  int winding = 0;
+  for (const glm::uvec3& t : triangles) {
+    const glm::dvec3 a = positions[t.x] - point, b = positions[t.y] - point,
+                     c = positions[t.z] - point;
+    const auto side = [](const glm::dvec3& p, const glm::dvec3& q) {
+      return p.y * q.z - p.z * q.y;
+    };
+    const double sides[] = {side(a, b), side(b, c), side(c, a)};
+    const double least = *std::min_element(sides, sides + 3);
+    const double most = *std::max_element(sides, sides + 3);
+    if (least < -1e-9 && most > 1e-9) continue;
+    if (std::max({a.x, b.x, c.x}) < 0) continue;
+    if (std::max({a.y, b.y, c.y}) < 0 || std::min({a.y, b.y, c.y}) > 0) continue;
+    if (std::max({a.z, b.z, c.z}) < 0 || std::min({a.z, b.z, c.z}) > 0) continue;
+    const double height = glm::dot(a, glm::cross(b, c));
+    if (std::min(std::abs(least), std::abs(most)) < 1e-9 || std::abs(height) < 1e-9) return {};
+    if ((height > 0) == (most > 0)) winding += most > 0 ? 1 : -1;
+  }
+  return winding;
+}
+
+TEST(BoundaryLaws, SolidsInGeneralPositionKeepThem) {
+  int inside = 0;
+  for (int i = 0; i < rounds(60); ++i) {
+    SCOPED_TRACE("seed " + std::to_string(i));
+    RandomTree trees(static_cast<std::uint64_t>(i));
+    Tree tree, other;
+    tree.set_root(trees.grow(tree, trees.pick(1, 9), i % 4 == 3));
+    other.set_root(trees.grow(other, trees.pick(1, 4), i % 4 == 3));
+    const SolidMesh mesh = mesh_of(tree, {});
+    ASSERT_EQ(broken(mesh), "") << size_of(mesh);
+    for (int k = 0; k < 50; ++k) {
+      const glm::dvec3 point(trees.real(-9, 9), trees.real(-9, 9), trees.real(-9, 9));
+      bool sure = true;
+      const bool expected = evaluate(tree, tree.root(), [&](std::uint32_t s) {
+        const TriangleSoup solid =
+            transform(*tree.solids()[s].mesh, tree.solids()[s].world_from_mesh);
+        const auto winding = rounded_winding(solid.positions, solid.triangles, point);
+        sure = sure && winding;
+        return winding.value_or(0) > 0;
+      });
+      const auto winding = rounded_winding(mesh.positions, mesh.triangles, point);
+      if (!sure || !winding) continue;
+      ASSERT_EQ(*winding, expected ? 1 : 0);
+      inside += *winding;
+    }
+    const auto exact_volume = [&](const Tree& part) {
+      const auto made = exact_measures(part, part.root());
+      EXPECT_TRUE(made.has_value());
+      return made ? made->volume : 0;
+    };
+    const double a = exact_volume(tree), b = exact_volume(other);
+    // The lattices differ, as the boxes do: each moves surfaces by half a step.
+    ASSERT_NEAR(a + b, exact_volume(tree | other) + exact_volume(tree & other), 1e-3);
+    ASSERT_NEAR(a, exact_volume(tree - other) + exact_volume(tree & other), 1e-3);
+  }
+  EXPECT_GT(inside, 50);
+}
+
+// Law L9 through the mesh, for results whose vertices are lattice points.
+TEST(BoundaryLaws, VoxelsOfTheMeshAreThoseOfTheTree) {
+  for_random_trees(250000, 60, 5, TinyKind::kBoxes, [&](const Tree& part, TinyTrees& trees) {
+    const Tree tree = part | tiny_frame();
+    VoxelGrid grid;
+    grid.origin = glm::dvec3(-5);
+    const int dims = trees.pick(17, 60);
+    grid.dims = glm::ivec3(dims);
+    grid.voxel_size = glm::dvec3(18.0 / dims);
+    SolidLists lists(tree, tree.root());
+    ASSERT_TRUE(lists.fit(grid, nullptr).has_value());
+    VoxelizeOptions options;
+    options.filter = &lists.filter();
+    const auto voxels = voxelize(lists.soup(), grid, options);
+    const SolidMesh mesh = mesh_of(tree);
+    TriangleSoup soup;
+    soup.positions = mesh.positions;
+    soup.triangles = mesh.triangles;
+    const auto of_mesh = voxelize(soup, grid);
+    ASSERT_TRUE(voxels.has_value() && of_mesh.has_value());
+    ASSERT_TRUE(testkit::same_intervals(*voxels, *of_mesh));
+  });
+}
+
+// Laws L3, L8.
+
+TEST(BoundaryLaws, BytesDoNotDependOnAnyOrderOrThreads) {
+  for_random_trees(300000, 100, 5, TinyKind::kAny, [&](const Tree& tree, TinyTrees& trees) {
+    const SolidMesh mesh = framed(tree);
+    const Tree other = Shuffler(tree | tiny_frame(), trees.random()).result;
+    const SolidMesh shuffled = mesh_of(other, kTiny, {.threads = trees.pick(1, 8)});
+    ASSERT_TRUE(same_bytes(mesh, shuffled)) << size_of(mesh) << "; " << size_of(shuffled);
+  });
+}
+
+TEST(BoundaryLaws, BytesOfLargerMeshesDoNotDependOnThreads) {
+  const Tree tree =
+      Tree(make_icosphere(1, 5)) -
+      transform(glm::translate(glm::dmat4(1), {0.5, 0.25, 0}), Tree(make_torus(1, 0.4, 90, 40)));
+  const SolidMesh mesh = mesh_of(tree, {}, {.threads = 1});
+  EXPECT_EQ(broken(mesh), "");
+  EXPECT_GT(mesh.triangles.size(), 15000u);
+  for (const int threads : {2, 3, 8}) {
+    EXPECT_TRUE(same_bytes(mesh, mesh_of(tree, {}, {.threads = threads}))) << threads;
+  }
+}
+
+TEST(BoundaryLaws, SolidsWithoutEffectChangeNothing) {
+  for_random_trees(400000, 60, 4, TinyKind::kAny, [&](const Tree& tree, TinyTrees& trees) {
+    const Tree beside(make_box({-2, -2, -2}, {-1, 9, 9}));
+    const Tree other = trees.tree(2, TinyKind::kAny);
+    const SolidMesh mesh = framed(tree);
+    ASSERT_TRUE(same_bytes(mesh, framed(tree - beside)));
+    ASSERT_TRUE(same_bytes(mesh, framed(tree | (beside & other))));
+    ASSERT_TRUE(same_bytes(mesh, framed((tree & tree) | ((other & beside) - tree))));
+  });
+}
+
+// Laws L4.
+
+TEST(BoundaryLaws, EqualSetsHaveEqualBytes) {
+  const SolidMesh nothing = mesh_of(tiny_frame());
+  const Tree all(make_box(glm::dvec3(0), glm::dvec3(kTinySide)));
+  ASSERT_EQ(nothing.triangles.size(), 24u);
+  for (int i = 0; i < rounds(40); ++i) {
+    TinyTrees trees(static_cast<std::uint64_t>(500000 + i));
+    SCOPED_TRACE("seed " + std::to_string(500000 + i));
+    const int depth = i % 3;
+    const Tree a = trees.tree(depth, TinyKind::kAny), b = trees.tree(depth, TinyKind::kAny),
+               c = trees.tree(depth, TinyKind::kAny), half(trees.box());
+    const auto equal = [&](const Tree& one, const Tree& other, const char* law) {
+      const SolidMesh mesh = framed(one), same = framed(other);
+      EXPECT_TRUE(same_bytes(mesh, same)) << law << ": " << size_of(mesh) << "; " << size_of(same);
+    };
+    EXPECT_TRUE(same_bytes(framed(a - a), nothing));
+    equal(a & a, a, "a & a = a");
+    equal(a | a, a, "a | a = a");
+    equal(a | b, b | a, "a | b = b | a");
+    equal(a & b, b & a, "a & b = b & a");
+    equal((a | b) | c, a | (b | c), "(a | b) | c = a | (b | c)");
+    equal((a - b) - c, a - (b | c), "(a - b) - c = a - (b | c)");
+    equal(all - (a | b), (all - a) & (all - b), "De Morgan");
+    equal(all - (a & b), (all - a) | (all - b), "De Morgan");
+    equal(a | (a & b), a, "absorption");
+    equal(a & (a | b), a, "absorption");
+    equal(a & (b | c), (a & b) | (a & c), "distribution");
+    equal(a | (b & c), (a | b) & (a | c), "distribution");
+    equal((a - b) | (a & b), a, "a cut in two");
+    equal((a & half) | (a - half), a, "a cut by a box");
+    equal((a | b) - (a & b), (a - b) | (b - a), "symmetric difference");
+    equal(all - (all - a), a, "complement of the complement");
+    if (HasFailure()) return;
+  }
+}
+
+TEST(BoundaryLaws, ABoxIsItsEighthsHoweverTriangulated) {
+  TinyTrees trees(1);
+  for (int i = 0; i < rounds(40); ++i) {
+    const TriangleSoup box = trees.box();
+    const SolidMesh mesh = framed(Tree(box));
+    ASSERT_EQ(mesh.triangles.size(), 36u);
+    const Bounds bounds_of_box = bounds(box);
+    Tree eighths;
+    const glm::dvec3 at[] = {bounds_of_box.low, (bounds_of_box.low + bounds_of_box.high) / 2.0,
+                             bounds_of_box.high};
+    for (int k = 0; k < 8; ++k) {
+      const int x = k % 2, y = k / 2 % 2, z = k / 4;
+      eighths |=
+          Tree(make_box({at[x].x, at[y].y, at[z].z}, {at[x + 1].x, at[y + 1].y, at[z + 1].z}));
+    }
+    ASSERT_TRUE(same_bytes(mesh, framed(eighths)));
+    ASSERT_TRUE(same_bytes(mesh, framed(Tree(subdivide(box)))));
+  }
+  // A cube turned onto itself.
+  const Tree cube(make_box(glm::dvec3(2), glm::dvec3(6)));
+  glm::dmat4 turn(0);
+  turn[0][1] = turn[1][2] = turn[2][0] = turn[3][3] = 1;
+  EXPECT_TRUE(same_bytes(framed(cube), framed(cube | transform(turn, cube))));
+}
+
+// Laws L5, L6.
+
+// From the low corner of a cell to a point of it that lies on no diagonal of a side of a tiny box.
+const glm::dvec3 kOffCentre(0.5, 433.0 / 1024, 359.0 / 1024);
+
+TEST(BoundaryLaws, TheOraclesOfVolumesAgree) {
+  for_random_trees(600000, 20, 2, TinyKind::kBoxes, [&](const Tree& tree, TinyTrees&) {
+    if (tree.solids().size() > 6) return;
+    const TreeOracle oracle(tree);
+    int cells = 0;
+    for (int i = 0; i < 512; ++i) {
+      const auto inside = oracle.at(glm::dvec3(i % 8, i / 8 % 8, i / 64) + kOffCentre);
+      ASSERT_TRUE(inside.has_value());
+      cells += *inside;
+    }
+    ASSERT_EQ(convex_volume(tree), cells);
+  });
+}
+
+TEST(BoundaryLaws, VolumesAreExact) {
+  int volumes = 0, fractions = 0;
+  for_random_trees(610000, 80, 3, TinyKind::kConvex, [&](const Tree& tree, TinyTrees&) {
+    if (tree.solids().size() > 6) return;
+    const Fraction volume = convex_volume(tree);
+    const ExactMeasures measures = measures_of(tree | tiny_frame());
+    ASSERT_TRUE(exact::is_nearest(measures.volume, Fraction(volume + 2)))
+        << measures.volume - 2 << " is not " << volume;
+    ++volumes;
+    fractions += denominator(volume) > 6;
+  });
+  EXPECT_GT(volumes, 50);
+  EXPECT_GT(fractions, 8);
+}
+
+TEST(BoundaryLaws, VolumesOfBoxesAreCounts) {
+  for_random_trees(620000, 100, 6, TinyKind::kBoxes, [&](const Tree& tree, TinyTrees&) {
+    const TreeOracle oracle(tree);
+    int cells = 0;
+    for (int i = 0; i < 512; ++i) {
+      cells += *oracle.at(glm::dvec3(i % 8, i / 8 % 8, i / 64) + kOffCentre);
+    }
+    ASSERT_EQ(measures_of(tree | tiny_frame()).volume, cells + 2);
+  });
+}
+
+TEST(BoundaryLaws, MeasuresAddUpAndAreThoseOfTheMesh) {
+  for (int i = 0; i < rounds(50); ++i) {
+    TinyTrees trees(static_cast<std::uint64_t>(630000 + i));
+    SCOPED_TRACE("seed " + std::to_string(630000 + i));
+    const Tree a = trees.tree(2, TinyKind::kAny), b = trees.tree(2, TinyKind::kAny);
+    const auto volume = [](const Tree& tree) {
+      return measures_of(tree | tiny_frame()).volume - 2;
+    };
+    ASSERT_NEAR(volume(a) + volume(b), volume(a | b) + volume(a & b), 1e-11);
+    ASSERT_NEAR(volume(a), volume(a - b) + volume(a & b), 1e-11);
+    const Tree all = a | b | tiny_frame();
+    const SolidMesh mesh = mesh_of(all);
+    const ExactMeasures measures = measures_of(all);
+    double six = 0, area = 0;
+    Bounds box;
+    glm::dvec3 moment(0);
+    for (const glm::uvec3& t : mesh.triangles) {
+      const glm::dvec3 &p = mesh.positions[t.x], &q = mesh.positions[t.y], &r = mesh.positions[t.z];
+      const double d = glm::dot(p, glm::cross(q, r));
+      six += d;
+      moment += d / 24 * (p + q + r);
+      area += glm::length(glm::cross(q - p, r - p)) / 2;
+      for (const glm::dvec3& v : {p, q, r}) box.include(v);
+    }
+    ASSERT_NEAR(measures.volume, six / 6, 1e-6);
+    ASSERT_NEAR(measures.area, area, 1e-6);
+    ASSERT_LT(glm::length(measures.centre - moment / (six / 6)), 1e-6);
+    ASSERT_LT(glm::length(measures.low - box.low) + glm::length(measures.high - box.high), 1e-8);
+    ASSERT_FALSE(measures.empty);
+  }
+}
+
+// Laws L7.
+
+std::vector<std::tuple<double, double, double>> sorted_positions(const SolidMesh& mesh,
+                                                                 const glm::dmat4& place) {
+  std::vector<std::tuple<double, double, double>> result;
+  for (const glm::dvec3& p : mesh.positions) {
+    const glm::dvec3 q(place * glm::dvec4(p, 1));
+    result.emplace_back(q.x + 0.0, q.y + 0.0, q.z + 0.0);
+  }
+  std::sort(result.begin(), result.end());
+  return result;
+}
+
+TEST(BoundaryLaws, MovedScaledTurnedAndMirroredTreesMoveAlong) {
+  for_random_trees(700000, 50, 3, TinyKind::kAny, [&](const Tree& part, TinyTrees& trees) {
+    const Tree tree = part | tiny_frame();
+    const SolidMesh mesh = mesh_of(tree);
+    const double volume = measures_of(tree).volume;
+    // The frame's middle is 4.
+    const glm::dmat4 middle = glm::translate(glm::dmat4(1), glm::dvec3(4));
+    glm::dmat4 turn(0);
+    std::array<int, 3> axes{0, 1, 2};
+    std::shuffle(axes.begin(), axes.end(), trees.random());
+    for (int k = 0; k < 3; ++k)
+      turn[k][axes[static_cast<std::size_t>(k)]] = trees.pick(0, 1) == 0 ? 1 : -1;
+    turn[3][3] = 1;
+    turn = middle * turn * glm::inverse(middle);
+    const glm::dmat4 move =
+        glm::translate(glm::dmat4(1), glm::dvec3(trees.pick(-9, 9), 0.5, -1.25));
+    const glm::dmat4 twice = glm::scale(glm::dmat4(1), glm::dvec3(2));
+    for (const auto& place : {turn, move, twice}) {
+      const Tree moved = transform(place, tree);
+      const SolidMesh other = mesh_of(moved);
+      ASSERT_EQ(sorted_positions(mesh, place), sorted_positions(other, glm::dmat4(1)));
+      ASSERT_EQ(mesh.triangles.size(), other.triangles.size());
+      ASSERT_EQ(measures_of(moved).volume, place == twice ? 8 * volume : volume);
+      if (place != turn) {  // order and diagonals stay too
+        ASSERT_EQ(mesh.triangles, other.triangles);
+      }
+    }
+  });
+}
+
+// Laws L12, L15, L16.
+
+Tree tree_of(const SolidMesh& mesh) {
+  TriangleSoup soup;
+  soup.positions = mesh.positions;
+  soup.triangles = mesh.triangles;
+  return Tree(std::move(soup));
+}
+
+TEST(BoundaryLaws, TheMeshOfAMeshIsItself) {
+  for_random_trees(800000, 100, 5, TinyKind::kBoxes, [&](const Tree& tree, TinyTrees&) {
+    const SolidMesh mesh = framed(tree);
+    ASSERT_TRUE(same_bytes(mesh, mesh_of(tree_of(mesh))));
+  });
+  // A single mesh without cuts.
+  const Tree ball(make_icosphere(1, 3));
+  const SolidMesh mesh = mesh_of(ball, {});
+  EXPECT_EQ(mesh.triangles.size(), 1280u);
+  EXPECT_TRUE(same_bytes(mesh, mesh_of(tree_of(mesh), {})));
+}
+
+TEST(BoundaryLaws, CapsThatAreThereAlreadyChangeNothing) {
+  int with_holes = 0;
+  for_random_trees(900000, 100, 3, TinyKind::kAny, [&](const Tree& closed, TinyTrees& trees) {
+    Tree open = closed | tiny_frame(), capped = open;
+    const std::size_t frame = open.solids().size() - 2;
+    for (std::size_t s = 0; s < frame; ++s) {
+      TriangleSoup mesh = *open.solids()[s].mesh;
+      for (int i = trees.pick(0, 3); i > 0 && !mesh.triangles.empty(); --i) {
+        mesh.triangles.erase(mesh.triangles.begin() +
+                             trees.pick(0, static_cast<int>(mesh.triangles.size()) - 1));
+      }
+      open.solids()[s].mesh = std::make_shared<const TriangleSoup>(std::move(mesh));
+    }
+    auto solids = snap_solids(open, open.root(), Geometry(open), kTiny.bits);
+    ASSERT_TRUE(solids.has_value());
+    const auto caps = close_solids(*solids, OpenSolids::kCap, open);
+    ASSERT_TRUE(caps.has_value());
+    with_holes += !caps->empty();
+    for (std::size_t s = 0; s < frame; ++s) {
+      TriangleSoup mesh;
+      for (const auto& p : solids->vertices) {
+        mesh.positions.push_back(solids->lattice.origin + solids->lattice.step * glm::dvec3(p));
+      }
+      mesh.triangles.assign(solids->triangles.begin() + solids->first_triangle[s],
+                            solids->triangles.begin() + solids->first_triangle[s + 1]);
+      capped.solids()[s].mesh = std::make_shared<const TriangleSoup>(std::move(mesh));
+    }
+    const SolidMesh mesh = mesh_of(open), other = mesh_of(capped);
+    ASSERT_TRUE(same_bytes(mesh, other)) << size_of(mesh) << "; " << size_of(other);
+    ASSERT_EQ(broken(mesh), "");
+  });
+  EXPECT_GT(with_holes, 30);
+}
+
+TEST(BoundaryLaws, NothingGivesNothing) {
+  const Tree a(make_box({0, 0, 0}, {1, 1, 1})), b(make_box({1, 0, 0}, {2, 1, 1}));
+  for (const Tree& tree : {Tree(), a - a, a & b, (a | b) - (b | a)}) {
+    EXPECT_TRUE(mesh_of(tree).triangles.empty());
+    EXPECT_TRUE(measures_of(tree).empty);
+    EXPECT_EQ(measures_of(tree).volume, 0);
+  }
+}
+
+TEST(BoundaryLaws, StopsLimitsAndOptionsAreKept) {
+  const Tree tree = Tree(make_icosphere(1, 4)) | Tree(make_torus(1, 0.3, 40, 20));
+  std::stop_source stop;
+  stop.request_stop();
+  const auto stopped = boundary_mesh(tree, tree.root(), {}, {.stop = stop.get_token()});
+  ASSERT_FALSE(stopped.has_value());
+  EXPECT_EQ(stopped.error().code, ErrorCode::kCancelled);
+  const auto limited = boundary_mesh(tree, tree.root(), {}, {.memory_limit = 1000});
+  ASSERT_FALSE(limited.has_value());
+  EXPECT_EQ(limited.error().code, ErrorCode::kLimit);
+  for (const int bits : {-1, 9, 29}) {
+    const auto refused = boundary_mesh(tree, tree.root(), {.bits = bits});
+    ASSERT_FALSE(refused.has_value());
+    EXPECT_EQ(refused.error().code, ErrorCode::kUsage);
+  }
+  TriangleSoup open = make_icosphere(1, 2);
+  open.triangles.pop_back();
+  const Tree with_hole = tree - Tree(open);
+  const auto failed = exact_measures(with_hole, with_hole.root(), {.open = OpenSolids::kFail});
+  ASSERT_FALSE(failed.has_value());
+  EXPECT_EQ(failed.error().code, ErrorCode::kGeometry);
+  EXPECT_TRUE(exact_measures(with_hole, with_hole.root()).has_value());
+}
+
+}  // namespace
+}  // namespace strata::csg
