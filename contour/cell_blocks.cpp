@@ -30,10 +30,10 @@ void count_columns(CellBlock& block) {
       block.active[c] = static_cast<std::uint32_t>((any | any >> 1) & ~(all & all >> 1));
       for (int axis = 0; axis < 3; ++axis) {
         block.before[size(axis)][c] = static_cast<std::uint16_t>(sum[size(axis)]);
-        sum[size(axis)] += static_cast<std::uint32_t>(std::popcount(block.cut(axis, i, j)));
+        sum[size(axis)] += bit_count(block.cut(axis, i, j));
       }
       block.before[3][c] = static_cast<std::uint16_t>(sum[3]);
-      sum[3] += static_cast<std::uint32_t>(std::popcount(block.active[c]));
+      sum[3] += bit_count(block.active[c]);
     }
   }
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -66,14 +66,13 @@ void find_special(CellBlock& block) {
 
 }  // namespace
 
-std::uint32_t CellBlock::cell_vertex(const LocalPlace& at, unsigned cycle) const {
-  if (cycle == 0) return first_crossing[3] + cell(at);
+std::uint32_t CellBlock::split_point(const LocalPlace& at, unsigned cycle) const {
   const auto place =
       static_cast<std::uint16_t>(column(at.i, at.j) * kBlockSide + static_cast<std::size_t>(at.k));
   const auto found = std::lower_bound(
       split.begin(), split.end(), place,
       [](const SplitCell& one, std::uint16_t wanted) { return one.cell < wanted; });
-  return first_crossing[3] + cells + found->first + cycle - 1;
+  return cells + found->first + cycle - 1;
 }
 
 const CellBlocks::Place* CellBlocks::find(const glm::ivec3& at) const {
@@ -176,7 +175,7 @@ void CellBlocks::fill(const GridCrossings& crossings, Place& place) const {
       at[frame.u] = edge.u(), at[frame.v] = edge.v(), at[frame.w] = edge.k();
       if ((block.cut(axis, at.x, at.y) >> at.z & 1) == 0) continue;  // the axes disagree
       block.crossings[block.crossing(axis, {at.x, at.y, at.z})] = {
-          edge.triangle(), static_cast<std::uint8_t>(edge.offset())};
+          edge.triangle(), static_cast<std::uint8_t>(edge.offset()), EdgeShape::kFan};
       ++found;
     }
   }
@@ -202,6 +201,11 @@ Result<CellBlocks> CellBlocks::create(const GridCrossings& crossings, const Exec
     result.fill(crossings, place);
   });
   if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+  for (const std::uint32_t n : result.with_cells_) {
+    const CellBlock& block = *result.places_[n].block;
+    result.bytes_ += block.crossings.size() * sizeof(CellBlock::Crossing) +
+                     (block.cells + block.split_vertices) * sizeof(CellBlock::CellPoint);
+  }
   return result;
 }
 
@@ -215,6 +219,7 @@ BlockNeighbours CellBlocks::neighbours(std::size_t n) const {
     if (found == nullptr || !found->block) continue;
     result.blocks_[static_cast<std::size_t>(which)] = found->block.get();
     result.special_ = result.special_ || found->block->special;
+    result.fans_ = result.fans_ || found->block->fans > 0;
   }
   return result;
 }

@@ -23,15 +23,29 @@ struct LocalPlace {
   int i = 0, j = 0, k = 0;
 };
 
-/// A vertex of a contour in the order of its block: cut edges along x, y, z, cells, further
-/// vertices of cells, middles of faces.
+/// Bits that are set; without the call that std::popcount is where no instruction may be assumed.
+inline std::uint32_t bit_count(std::uint32_t bits) {
+  bits -= bits >> 1 & 0x55555555u;
+  bits = (bits & 0x33333333u) + (bits >> 2 & 0x33333333u);
+  return ((bits + (bits >> 4)) & 0x0f0f0f0fu) * 0x01010101u >> 24;
+}
+
+/// The triangles around a cut edge: about the point where it is cut, or two between the four cells
+/// there, which are numbered around the edge.
+enum class EdgeShape : std::uint8_t { kFan, kDiagonal02, kDiagonal13 };
+
+/// The vertices of a block's part of a contour come in this order: fans, cells, further vertices of
+/// cells, middles of faces.
 class CellBlock {
  public:
   /// Of one cut edge: how far beyond the lower centre, and the triangle there.
   struct Crossing {
-    std::uint32_t triangle = CutEdge::kNoTriangle;
+    std::uint32_t triangle = CutEdge::kNoTriangle;  ///< later the vertex in the block, of a fan
     std::uint8_t offset = CutEdge::kMiddle;
+    EdgeShape shape = EdgeShape::kFan;
   };
+  /// Lattice steps from a cell's lower corner.
+  using CellPoint = std::array<std::uint8_t, 3>;
   /// A cell with several vertices.
   struct SplitCell {
     std::uint16_t cell = 0;   ///< (i * 32 + j) * 32 + k
@@ -65,16 +79,22 @@ class CellBlock {
     const std::uint32_t below = (std::uint32_t{1} << at.k) - 1;
     return first_crossing[static_cast<std::size_t>(axis)] +
            before[static_cast<std::size_t>(axis)][column(at.i, at.j)] +
-           static_cast<std::uint32_t>(std::popcount(cut(axis, at.i, at.j) & below));
+           bit_count(cut(axis, at.i, at.j) & below);
   }
   /// The number of a cell among the block's cells. @pre the surface passes it
   [[nodiscard]] std::uint32_t cell(const LocalPlace& at) const {
     const std::uint32_t below = (std::uint32_t{1} << at.k) - 1;
     const std::size_t c = column(at.i, at.j);
-    return before[3][c] + static_cast<std::uint32_t>(std::popcount(active[c] & below));
+    return before[3][c] + bit_count(active[c] & below);
   }
-  /// The number of the vertex of a cycle of a cell in the block.
-  [[nodiscard]] std::uint32_t cell_vertex(const LocalPlace& at, unsigned cycle) const;
+  /// The vertex of a cycle of a cell, in `points`.
+  [[nodiscard]] std::uint32_t cell_point(const LocalPlace& at, unsigned cycle) const {
+    return cycle == 0 ? cell(at) : split_point(at, cycle);
+  }
+  /// The same in the mesh.
+  [[nodiscard]] std::uint32_t cell_vertex(const LocalPlace& at, unsigned cycle) const {
+    return static_cast<std::uint32_t>(first_vertex) + fans + cell_point(at, cycle);
+  }
 
   std::array<std::uint64_t, kWords * kWords> words{};
   std::array<std::uint32_t, kBlockSide * kBlockSide> active{};  ///< bit k: cells passed
@@ -82,16 +102,18 @@ class CellBlock {
   std::array<std::array<std::uint16_t, kBlockSide * kBlockSide>, 4> before{};
   std::array<std::uint32_t, 4> first_crossing{};  ///< by axis, and their number
   std::vector<Crossing> crossings;
-  std::vector<SplitCell> split;  ///< increasing
-  std::uint32_t cells = 0, split_vertices = 0, middles = 0;
+  std::vector<SplitCell> split;   ///< increasing
+  std::vector<CellPoint> points;  ///< the vertices of cells, then the further ones
+  std::uint32_t fans = 0, cells = 0, split_vertices = 0, middles = 0;
   std::uint64_t triangles = 0;
   std::uint64_t ambiguous = 0, guessed = 0;            ///< counted for the report
   bool special = false;                                ///< some cell is
   std::uint64_t first_vertex = 0, first_triangle = 0;  ///< of the mesh
 
-  [[nodiscard]] std::uint32_t vertices() const {
-    return first_crossing[3] + cells + split_vertices + middles;
-  }
+  [[nodiscard]] std::uint32_t vertices() const { return fans + cells + split_vertices + middles; }
+
+ private:
+  [[nodiscard]] std::uint32_t split_point(const LocalPlace& at, unsigned cycle) const;
 };
 
 /// A block and the seven below it.
@@ -99,18 +121,23 @@ class BlockNeighbours {
  public:
   [[nodiscard]] const CellBlock& own() const { return *blocks_[0]; }
   /// The block of a place from -1, which becomes local there.
-  [[nodiscard]] const CellBlock& of(LocalPlace& at) const {
-    const unsigned which = (at.i < 0 ? 1u : 0u) | (at.j < 0 ? 2u : 0u) | (at.k < 0 ? 4u : 0u);
-    at = {at.i & (kBlockSide - 1), at.j & (kBlockSide - 1), at.k & (kBlockSide - 1)};
-    return *blocks_[which];
-  }
+  [[nodiscard]] const CellBlock& of(LocalPlace& at) const { return *blocks_[which(at)]; }
+  /// The same, to change an edge there.
+  [[nodiscard]] CellBlock& changeable(LocalPlace& at) const { return *blocks_[which(at)]; }
   /// Whether a cell of one of the blocks is special.
   [[nodiscard]] bool special() const { return special_; }
+  /// Whether one of the blocks has fans.
+  [[nodiscard]] bool fans() const { return fans_; }
 
  private:
   friend class CellBlocks;
-  std::array<const CellBlock*, 8> blocks_{};  ///< null where there is none
-  bool special_ = false;
+  static unsigned which(LocalPlace& at) {
+    const unsigned result = (at.i < 0 ? 1u : 0u) | (at.j < 0 ? 2u : 0u) | (at.k < 0 ? 4u : 0u);
+    at = {at.i & (kBlockSide - 1), at.j & (kBlockSide - 1), at.k & (kBlockSide - 1)};
+    return result;
+  }
+  std::array<CellBlock*, 8> blocks_{};  ///< null where there is none
+  bool special_ = false, fans_ = false;
 };
 
 /// All blocks that the surface passes, sorted by place.

@@ -5,15 +5,13 @@ namespace {
 
 CellCase make_case(unsigned corners) {
   CellCase result;
+  result.low_inside = (corners & 1) != 0;
   std::array<std::array<std::uint8_t, 2>, 12> neighbours{};  // along the lines
   std::array<std::uint8_t, 12> degree{};
   for (unsigned axis = 0; axis < 3; ++axis) {
     for (unsigned side = 0; side < 2; ++side) {
       const unsigned face = face_corners(corners, axis, side);
-      if (side == 0) {
-        result.low_face[axis] = static_cast<std::uint8_t>(face);
-        result.segments = static_cast<std::uint8_t>(result.segments + kFaceSegments[face].count);
-      }
+      if (side == 0) result.low_face[axis] = static_cast<std::uint8_t>(face);
       result.special = result.special || is_ambiguous(face);
       for (unsigned i = 0; i < kFaceSegments[face].count; ++i) {
         const FaceSegment segment = kFaceSegments[face].at[i];

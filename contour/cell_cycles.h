@@ -72,7 +72,7 @@ struct CellCase {
   std::uint16_t cut = 0;                   ///< bit e: edge e is cut
   std::uint8_t cycles = 0;                 ///< closed lines on the cell's faces; each gets a vertex
   bool special = false;                    ///< several cycles, or an ambiguous face
-  std::uint8_t segments = 0;               ///< on the cell's three lower faces
+  bool low_inside = false;                 ///< corner 0 is inside
   std::array<std::uint8_t, 3> low_face{};  ///< corners of its lower face across each axis
   std::array<std::uint8_t, 12> cycle{};    ///< of each edge; kNoCycle if it is not cut
 };

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <glm/geometric.hpp>
 
 // After: T. Ju, F. Losasso, S. Schaefer, J. Warren: Dual contouring of Hermite data, 2002. We
@@ -28,10 +27,9 @@ glm::dvec3 mean_of(std::span<const CellCut> cuts) {
 CellVertex rounded(const glm::dvec3& place, const CellBounds& bounds) {
   CellVertex result;
   for (int axis = 0; axis < 3; ++axis) {
-    // Not yet an int: it may be far away.
-    const double step = std::floor(place[axis] + 0.5);
-    const double kept = std::clamp<double>(step, bounds.low[axis], bounds.high[axis]);
-    result.clamped = result.clamped || kept != step;
+    const double step = place[axis] + 0.5;
+    const double kept = std::clamp<double>(step, bounds.low[axis], bounds.high[axis] + 0.5);
+    result.clamped = result.clamped || step < bounds.low[axis] || step >= bounds.high[axis] + 1;
     result.at[axis] = static_cast<int>(kept);
   }
   return result;

@@ -1,15 +1,17 @@
 #include "strata/contour/contour.h"
 
+#include <algorithm>
 #include <atomic>
-#include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <memory>
 #include <new>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "contour/block_mesh.h"
+#include "contour/block_points.h"
 #include "contour/cell_blocks.h"
 #include "contour/grid_crossings.h"
 #include "strata/mesh/diagnose.h"
@@ -90,25 +92,41 @@ Execution part_of(const Execution& execution, double from, double to) {
   return part;
 }
 
-/// Numbers all vertices and triangles. @return their numbers
-Result<std::pair<std::uint64_t, std::uint64_t>> number(CellBlocks& blocks,
-                                                       const Execution& execution) {
+/// The sizes of a mesh.
+struct MeshSizes {
+  std::uint64_t vertices = 0, triangles = 0;
+};
+
+/// Places the vertices of all cells, and numbers all vertices and triangles.
+Result<MeshSizes> number(CellBlocks& blocks, const LatticeMesh& mesh, const VoxelGrid& grid,
+                         const Execution& execution, ContourReport& report) {
+  const std::vector<Plane> planes = planes_of(mesh, execution);
+  std::atomic<std::uint64_t> clamped{0};
+  parallel_for(execution, blocks.count(), [&](std::size_t n, int) {
+    clamped += place_points(blocks.block(n), blocks.neighbours(n), blocks.place(n), grid, planes);
+  });
+  report.clamped_vertices = clamped;
+  parallel_for(execution, blocks.count(),
+               [&](std::size_t n, int) { choose_shapes(blocks.neighbours(n)); });
+  parallel_for(execution, blocks.count(),
+               [&](std::size_t n, int) { number_fans(blocks.block(n)); });
   parallel_for(execution, blocks.count(),
                [&](std::size_t n, int) { count_block(blocks.block(n), blocks.neighbours(n)); });
-  std::uint64_t vertices = 0, triangles = 0;
+  if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+  MeshSizes sizes;
   for (std::size_t n = 0; n < blocks.count(); ++n) {
     CellBlock& block = blocks.block(n);
-    block.first_vertex = vertices;
-    block.first_triangle = triangles;
-    vertices += block.vertices();
-    triangles += block.triangles;
+    block.first_vertex = sizes.vertices;
+    block.first_triangle = sizes.triangles;
+    sizes.vertices += block.vertices();
+    sizes.triangles += block.triangles;
   }
-  if (vertices > std::numeric_limits<std::uint32_t>::max()) {
+  if (sizes.vertices > std::numeric_limits<std::uint32_t>::max()) {
     return fail(ErrorCode::kLimit,
                 "the contour needs {} vertices, but a mesh may have {}; a coarser grid needs fewer",
-                vertices, std::numeric_limits<std::uint32_t>::max());
+                sizes.vertices, std::numeric_limits<std::uint32_t>::max());
   }
-  return std::pair(vertices, triangles);
+  return sizes;
 }
 
 void add_counts(CellBlocks& blocks, ContourReport& report) {
@@ -118,58 +136,60 @@ void add_counts(CellBlocks& blocks, ContourReport& report) {
     report.cells += block.cells;
     report.ambiguous_cells += block.ambiguous;
     report.middle_vertices += block.middles;
+    report.fans += block.fans;
     report.guessed_crossings += block.guessed;
   }
+}
+
+/// What is left of a memory limit.
+std::uint64_t memory_left(const Execution& execution, std::uint64_t held) {
+  if (execution.memory_limit == 0) return std::numeric_limits<std::uint64_t>::max();
+  return execution.memory_limit - std::min(execution.memory_limit, held);
 }
 
 /// From the lists of a closed mesh, or of one with a field, to triangles.
 Result<ContourMesh> contour_lattice(const LatticeMesh& mesh, const VoxelGrid& grid,
                                     const GridCrossings::Settings& settings,
                                     const Execution& execution) {
-  const auto crossings = GridCrossings::collect(mesh, grid, settings, part_of(execution, 0.0, 0.6));
-  if (!crossings) return tl::unexpected(crossings.error());
-  const auto left = [&](std::uint64_t held) {
-    if (execution.memory_limit == 0) return std::numeric_limits<std::uint64_t>::max();
-    return execution.memory_limit - std::min(execution.memory_limit, held);
-  };
   Execution quiet = execution;
   quiet.progress = {};
-  const std::uint64_t lists = crossings->memory_bytes();
-  auto blocks = CellBlocks::create(*crossings, quiet, left(lists));
-  if (!blocks) return tl::unexpected(blocks.error());
-  const auto counted = number(*blocks, quiet);
-  if (!counted) return tl::unexpected(counted.error());
-  const auto [vertices, triangles] = *counted;
   ContourMesh result;
-  result.report.lost_crossings = crossings->lost();
+  std::optional<CellBlocks> blocks;
+  {
+    const auto crossings =
+        GridCrossings::collect(mesh, grid, settings, part_of(execution, 0.0, 0.5));
+    if (!crossings) return tl::unexpected(crossings.error());
+    result.report.lost_crossings = crossings->lost();
+    const std::uint64_t held = crossings->memory_bytes() + mesh.triangles.size() * sizeof(Plane);
+    auto made = CellBlocks::create(*crossings, quiet, memory_left(execution, held));
+    if (!made) return tl::unexpected(made.error());
+    blocks = *std::move(made);
+  }
+  const auto sizes = number(*blocks, mesh, grid, quiet, result.report);
+  if (!sizes) return tl::unexpected(sizes.error());
   add_counts(*blocks, result.report);
-
-  const std::uint64_t held =
-      lists + blocks->memory_bytes() + result.report.crossings * sizeof(CellBlock::Crossing);
-  const std::uint64_t needed = vertices * sizeof(glm::dvec3) + triangles * sizeof(glm::uvec3) +
-                               mesh.triangles.size() * sizeof(Plane);
-  if (needed > left(held)) {
+  const std::uint64_t needed =
+      sizes->vertices * sizeof(glm::dvec3) + sizes->triangles * sizeof(glm::uvec3);
+  const std::uint64_t left = memory_left(execution, blocks->memory_bytes());
+  if (needed > left) {
     return fail(ErrorCode::kLimit,
                 "the contour has {} triangles, which need {} bytes, but the memory limit of {} "
                 "bytes leaves {}",
-                triangles, needed, execution.memory_limit, left(held));
+                sizes->triangles, needed, execution.memory_limit, left);
   }
-  const std::vector<Plane> planes = planes_of(mesh, quiet);
-  result.mesh.positions.resize(vertices);
-  result.mesh.triangles.resize(triangles);
-  std::atomic<std::uint64_t> clamped{0};
-  const Execution last = part_of(execution, 0.6, 1.0);
+  result.mesh.positions.resize(sizes->vertices);
+  result.mesh.triangles.resize(sizes->triangles);
+  const Execution last = part_of(execution, 0.5, 1.0);
   parallel_for(execution, blocks->count(), [&](std::size_t n, int worker) {
     const BlockNeighbours neighbours = blocks->neighbours(n);
-    clamped += BlockMesh(neighbours, blocks->place(n), grid, planes)
-                   .write(result.mesh.positions, result.mesh.triangles);
+    BlockMesh(neighbours, blocks->place(n), grid)
+        .write(result.mesh.positions, result.mesh.triangles);
     if (last.progress && worker == 0) {
       last.progress(static_cast<double>(n) / static_cast<double>(blocks->count()));
     }
   });
   if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
-  result.report.clamped_vertices = clamped;
-  if (triangles > 0) result.mesh.parts.emplace_back();
+  if (sizes->triangles > 0) result.mesh.parts.emplace_back();
   return result;
 }
 

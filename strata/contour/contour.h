@@ -31,6 +31,7 @@ struct ContourReport {
   std::uint64_t crossings = 0;  ///< edges between neighbouring voxel centres that the surface cuts
   std::uint64_t cells = 0;      ///< cubes between eight voxel centres that the surface passes
   std::uint64_t ambiguous_cells = 0;   ///< cells with several vertices or a face cut four times
+  std::uint64_t fans = 0;              ///< cut edges with a vertex; the others have two triangles
   std::uint64_t middle_vertices = 0;   ///< added on faces between cells
   std::uint64_t clamped_vertices = 0;  ///< whose best place lay outside their cell
   /// Edges that the surface cuts, but both ends lie on the same side of it: there walls or gaps

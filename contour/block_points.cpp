@@ -1,0 +1,142 @@
+#include "contour/block_points.h"
+
+#include <array>
+#include <glm/geometric.hpp>
+
+#include "contour/block_walk.h"
+#include "contour/edge_shape.h"
+
+namespace strata::contouring {
+namespace {
+
+/// The lower end of an edge, in lattice steps from the cell's lower corner.
+glm::ivec3 edge_start(unsigned edge) {
+  const int d = static_cast<int>(edge & 1) * kLatticeSteps;
+  const int e = static_cast<int>(edge >> 1 & 1) * kLatticeSteps;
+  switch (edge / 4) {
+    case 0:
+      return {0, d, e};
+    case 1:
+      return {d, 0, e};
+    default:
+      return {d, e, 0};
+  }
+}
+
+/// The cuts of a cycle of a cell.
+class CellCuts {
+ public:
+  CellCuts(const BlockNeighbours& blocks, const glm::ivec3& low, std::span<const Plane> planes)
+      : blocks_(blocks), low_(low), planes_(planes) {}
+
+  std::span<const CellCut> of(const Cell& cell, unsigned cycle) {
+    count_ = 0;
+    for (unsigned left = cell.kind->cut; left != 0; left &= left - 1) {
+      const auto edge = static_cast<unsigned>(std::countr_zero(left));
+      if (cell.kind->cycle[edge] == cycle) add(cell.at, edge);
+    }
+    return std::span(cuts_).first(count_);
+  }
+
+ private:
+  void add(const LocalPlace& cell, unsigned edge) {
+    const CellBlock::Crossing& found = crossing_at(blocks_, cell, edge);
+    const int axis = static_cast<int>(edge / 4);
+    CellCut& cut = cuts_[count_];
+    cut = {};
+    cut.point = edge_start(edge);
+    cut.point[axis] = found.offset;
+    triangles_[count_] = found.triangle;
+    bool again = found.triangle == CutEdge::kNoTriangle;
+    if (found.triangle == CutEdge::kGridFace) {
+      cut.plane.normal[axis] = 1.0;
+      cut.plane.offset = found.offset;
+      again = true;
+    }
+    for (std::size_t i = 0; i < count_ && !again; ++i) again = triangles_[i] == found.triangle;
+    if (!again) {
+      cut.plane = planes_[found.triangle];
+      cut.plane.offset -= glm::dot(cut.plane.normal, glm::dvec3(lower_corner(low_, cell)));
+    }
+    ++count_;
+  }
+
+  const BlockNeighbours& blocks_;
+  glm::ivec3 low_;
+  std::span<const Plane> planes_;
+  std::array<CellCut, 12> cuts_;
+  std::array<std::uint32_t, 12> triangles_{};
+  std::size_t count_ = 0;
+};
+
+CellBounds bounds_of(const glm::ivec3& voxel, const VoxelGrid& grid) {
+  CellBounds bounds;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (voxel[axis] == 0) bounds.low[axis] = kLatticeSteps / 2;
+    if (voxel[axis] == grid.dims[axis]) bounds.high[axis] = kLatticeSteps / 2;
+  }
+  return bounds;
+}
+
+/// Where the vertex of a cell with one lies, from the lower corner of `from`.
+glm::ivec3 point_at(const BlockNeighbours& blocks, LocalPlace cell, const LocalPlace& from) {
+  const glm::ivec3 step(cell.i - from.i, cell.j - from.j, cell.k - from.k);
+  const CellBlock& block = blocks.of(cell);
+  const CellBlock::CellPoint& point = block.points[block.cell(cell)];
+  return step * kLatticeSteps + glm::ivec3(point[0], point[1], point[2]);
+}
+
+/// The frame of edge_shape(): the edge along z.
+glm::ivec3 along(const glm::ivec3& p, int axis) {
+  return {p[(axis + 1) % 3], p[(axis + 2) % 3], p[axis]};
+}
+
+}  // namespace
+
+std::uint64_t place_points(CellBlock& block, const BlockNeighbours& blocks, const glm::ivec3& place,
+                           const VoxelGrid& grid, std::span<const Plane> planes) {
+  const glm::ivec3 low = place * kBlockSide;
+  std::uint64_t clamped = 0;
+  std::size_t next = 0, next_split = block.cells;
+  block.points.resize(block.cells + block.split_vertices);
+  CellCuts cuts(blocks, low, planes);
+  for_each_cell(block, [&](const Cell& cell) {
+    const CellBounds bounds = bounds_of(low + glm::ivec3(cell.at.i, cell.at.j, cell.at.k), grid);
+    for (unsigned cycle = 0; cycle < cell.kind->cycles; ++cycle) {
+      const auto used = cuts.of(cell, cycle);
+      const CellVertex vertex =
+          cell.kind->cycles == 1 ? feature_vertex(used, bounds) : mean_vertex(used, bounds);
+      clamped += vertex.clamped ? 1 : 0;
+      CellBlock::CellPoint& point = block.points[cycle == 0 ? next++ : next_split++];
+      for (int axis = 0; axis < 3; ++axis) {
+        point[static_cast<std::size_t>(axis)] = static_cast<std::uint8_t>(vertex.at[axis]);
+      }
+    }
+  });
+  return clamped;
+}
+
+void choose_shapes(const BlockNeighbours& blocks) {
+  for_each_cell(blocks.own(), [&](const Cell& cell) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto edge = static_cast<unsigned>(axis) * 4;
+      if ((cell.kind->cut >> edge & 1) == 0) continue;
+      const auto ring = ring_of(cell.at, axis);
+      bool special = false;
+      for (std::size_t n = 0; n < 4 && blocks.special() && !special; ++n) {
+        special = case_at(blocks, ring[n]).special;
+      }
+      if (special) continue;
+      LocalPlace at = edge_place(cell.at, edge);
+      CellBlock& block = blocks.changeable(at);
+      CellBlock::Crossing& crossing = block.crossings[block.crossing(axis, at)];
+      std::array<glm::ivec3, 4> points;
+      for (std::size_t n = 0; n < 4; ++n) {
+        points[n] = along(point_at(blocks, ring[n], cell.at), axis);
+      }
+      crossing.shape = edge_shape(points, crossing.offset);
+    }
+  });
+}
+
+}  // namespace strata::contouring

@@ -1,0 +1,57 @@
+#include "contour/edge_shape.h"
+
+#include <cstdint>
+#include <cstdlib>
+#include <optional>
+
+// After: T. Ju, T. Udeshi: Intersection-free contouring on an octree grid, 2006.
+//
+// In a cell all is seen from its vertex. The faces of the cell are divided among its edges: the
+// line between the vertices of two cells meets the face between them in a point, and the triangles
+// of that point and the face's edges fill the face. So each edge has a part of space of its own,
+// the envelope: the tetrahedra of the edge and two cells that follow each other around it. What
+// lies in its envelope meets nothing of other edges.
+
+namespace strata::contouring {
+namespace {
+
+constexpr std::int64_t kLength = 256;
+/// Two triangles may miss the point where the edge is cut by this many steps, 1/32 voxel.
+constexpr double kMostOff = 8.0;
+
+std::int64_t turn(const glm::ivec3& a, const glm::ivec3& b) {
+  return std::int64_t{a.x} * b.y - std::int64_t{a.y} * b.x;
+}
+
+/// How far from the cut the triangles (a, b, c) and (a, c, d) meet the edge; nothing if they leave
+/// the envelope.
+std::optional<double> miss(const glm::ivec3& a, const glm::ivec3& b, const glm::ivec3& c,
+                           const glm::ivec3& d, int cut) {
+  // The diagonal from a to c passes the edge on b's side or d's, or meets it.
+  const std::int64_t side = turn(a, c);
+  const glm::ivec3& near = side >= 0 ? b : d;  // the corner on that side
+  const glm::ivec3& far = side >= 0 ? d : b;
+  // near_a a + near_c c lies on the half plane of the edge and the near corner, over their sum.
+  const std::int64_t near_c = std::abs(turn(a, near)), near_a = std::abs(turn(near, c));
+  const std::int64_t sum = near_a + near_c, beyond = std::abs(side);
+  // The diagonal must pass between the edge and the corner, within their triangle.
+  const std::int64_t height = near_a * a.z + near_c * c.z - beyond * near.z;
+  if (beyond >= sum || height <= 0 || height >= kLength * (sum - beyond)) return std::nullopt;
+  // The other triangle meets the edge.
+  const std::int64_t far_c = std::abs(turn(a, far)), far_a = std::abs(turn(far, c));
+  const std::int64_t all = far_a + far_c + beyond;
+  const std::int64_t met = far_a * a.z + far_c * c.z + beyond * far.z;
+  return static_cast<double>(std::abs(met - cut * all)) / static_cast<double>(all);
+}
+
+}  // namespace
+
+EdgeShape edge_shape(const std::array<glm::ivec3, 4>& v, int cut) {
+  const auto even = miss(v[0], v[1], v[2], v[3], cut);
+  const auto odd = miss(v[1], v[2], v[3], v[0], cut);
+  const double even_off = even.value_or(kLength), odd_off = odd.value_or(kLength);
+  if (even_off <= odd_off) return even_off <= kMostOff ? EdgeShape::kDiagonal02 : EdgeShape::kFan;
+  return odd_off <= kMostOff ? EdgeShape::kDiagonal13 : EdgeShape::kFan;
+}
+
+}  // namespace strata::contouring
