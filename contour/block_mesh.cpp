@@ -1,6 +1,9 @@
 #include "contour/block_mesh.h"
 
 #include <algorithm>
+#include <utility>
+
+#include "contour/edge_strips.h"
 
 namespace strata::contouring {
 namespace {
@@ -9,23 +12,36 @@ std::size_t size(int value) { return static_cast<std::size_t>(value); }
 
 /// A vertex that no edge with two triangles has.
 constexpr std::uint32_t kNone = 0xffffffffu;
+/// The edges at a cell's lower sides.
+constexpr unsigned kLowEdges = 1u << 0 | 1u << 4 | 1u << 8;
+
+bool at_fan(const CellBlock& block, const Cell& cell) {
+  return (block.at_fan[CellBlock::column(cell.at.i, cell.at.j)] >> cell.at.k & 1) != 0;
+}
 
 }  // namespace
 
-void number_fans(CellBlock& block) {
+void number_vertices(CellBlock& block) {
   for (CellBlock::Crossing& crossing : block.crossings) {
     if (crossing.shape == EdgeShape::kFan) crossing.triangle = block.fans++;
+  }
+  for (std::size_t c = 0; c < block.kept.size(); ++c) {
+    block.kept[c] |= block.kept_by_others[c];
+    block.kept_before[c] = static_cast<std::uint16_t>(block.kept_cells);
+    block.kept_cells += bit_count(block.kept[c]);
   }
 }
 
 void count_block(CellBlock& block, const BlockNeighbours& blocks) {
   for_each_cell(block, [&](const Cell& cell) {
+    block.triangles += 2 * bit_count(cell.kind->cut & kLowEdges);
+    if (!at_fan(block, cell)) return;
     for (int axis = 0; axis < 3; ++axis) {
       const auto edge = static_cast<unsigned>(axis) * 4;
       const bool cut = (cell.kind->cut >> edge & 1) != 0;
-      if (cut && crossing_at(blocks, cell.at, edge).shape != EdgeShape::kFan) block.triangles += 2;
+      if (cut && crossing_at(blocks, cell.at, edge).shape == EdgeShape::kFan) block.triangles -= 2;
       const FaceSegments& lines = kFaceSegments[cell.kind->low_face[size(axis)]];
-      if (lines.count == 0 || !blocks.fans()) continue;
+      if (lines.count == 0) continue;
       const bool middles = blocks.special() && has_middles(blocks, cell, axis);
       if (middles) block.middles += lines.count;
       for (std::size_t n = 0; n < lines.count; ++n) {
@@ -38,6 +54,10 @@ void count_block(CellBlock& block, const BlockNeighbours& blocks) {
       }
     }
   });
+  for (const Strip& strip : block.strips) {
+    block.triangles -= 2u * strip.length;
+    block.triangles += StripRails(blocks, strip).triangles();
+  }
 }
 
 std::uint32_t BlockMesh::fan_vertex(const Cell& cell, unsigned edge) const {
@@ -68,13 +88,14 @@ void BlockMesh::write_fans(std::span<glm::dvec3> positions) const {
 
 void BlockMesh::write_points(std::span<glm::dvec3> positions) const {
   std::size_t n = 0, n_split = block_.cells;
-  const std::size_t first = block_.first_vertex + block_.fans;
+  std::size_t next = block_.first_vertex + block_.fans, next_split = next + block_.kept_cells;
   for_each_cell(block_, [&](const Cell& cell) {
     const glm::ivec3 corner = lower_corner(low_, cell.at);
     for (unsigned cycle = 0; cycle < cell.kind->cycles; ++cycle) {
-      const std::size_t at = cycle == 0 ? n++ : n_split++;
-      const CellBlock::CellPoint& point = block_.points[at];
-      positions[first + at] = world(corner + glm::ivec3(point[0], point[1], point[2]));
+      const CellBlock::CellPoint& point = block_.points[cycle == 0 ? n++ : n_split++];
+      if (cycle == 0 && !block_.is_kept(cell.at)) continue;
+      positions[cycle == 0 ? next++ : next_split++] =
+          world(corner + glm::ivec3(point[0], point[1], point[2]));
     }
   });
 }
@@ -85,7 +106,7 @@ void BlockMesh::write_pairs(const Cell& cell, std::span<glm::uvec3> triangles) {
     const auto edge = static_cast<unsigned>(axis) * 4;
     if ((cell.kind->cut >> edge & 1) == 0) continue;
     const EdgeShape shape = crossing_at(blocks_, cell.at, edge).shape;
-    if (shape == EdgeShape::kFan) continue;
+    if (shape == EdgeShape::kFan || shape == EdgeShape::kStrip) continue;
     std::array<std::uint32_t, 4> v;
     const auto ring = ring_of(cell.at, axis);
     for (std::size_t n = 0; n < 4; ++n) {
@@ -98,6 +119,27 @@ void BlockMesh::write_pairs(const Cell& cell, std::span<glm::uvec3> triangles) {
     if (!cell.kind->low_inside) std::swap(v[1], v[3]);
     triangles[next_triangle_++] = {v[0], v[1], v[2]};
     triangles[next_triangle_++] = {v[0], v[2], v[3]};
+  }
+}
+
+/// Goes along both rails at once.
+void BlockMesh::write_strip(const Strip& strip, std::span<glm::uvec3> triangles) {
+  const StripRails rails(blocks_, strip);
+  const bool outward = case_at(blocks_, strip.cell).low_inside;
+  const auto add = [&](std::uint32_t x, std::uint32_t y, std::uint32_t z) {
+    triangles[next_triangle_++] = outward ? glm::uvec3(x, y, z) : glm::uvec3(x, z, y);
+  };
+  for (std::size_t f = 0, b = 0; f + 1 < rails.forward_count || b + 1 < rails.back_count;) {
+    const bool forward =
+        b + 1 == rails.back_count ||
+        (f + 1 < rails.forward_count && rails.forward_at[f + 1] <= rails.back_at[b + 1]);
+    if (forward) {
+      add(rails.forward[f], rails.forward[f + 1], rails.back[b]);
+      ++f;
+    } else {
+      add(rails.forward[f], rails.back[b + 1], rails.back[b]);
+      ++b;
+    }
   }
 }
 
@@ -169,9 +211,10 @@ void BlockMesh::write(std::span<glm::dvec3> positions, std::span<glm::uvec3> tri
   next_middle_ = block_.vertices() - block_.middles;
   for_each_cell(block_, [&](const Cell& cell) {
     write_pairs(cell, triangles);
-    if (!blocks_.fans()) return;
+    if (!at_fan(block_, cell)) return;
     for (int axis = 0; axis < 3; ++axis) write_face(cell, axis, positions, triangles);
   });
+  for (const Strip& strip : block_.strips) write_strip(strip, triangles);
 }
 
 }  // namespace strata::contouring

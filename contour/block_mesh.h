@@ -17,14 +17,15 @@
 // The lines on faces do not meet, since where two of them cross a face both run straight through a
 // vertex in their middle; so one cone does not meet itself. Several cones in a cell end in the
 // means of their cuts, and all faces of such a cell get middle vertices, so that each cone stays
-// within the hull of its cuts, and these do not meet. Where edge_shape() allows it, two triangles
-// stand in for a fan.
+// within the hull of its cuts, and these do not meet. Where edge_shape()
+// allows it, two triangles stand in for a fan, and those in one plane are joined to strips
+// (contour/edge_strips.h).
 
 namespace strata::contouring {
 
-/// Numbers the vertices of a block's fans. @pre the shapes are chosen
-void number_fans(CellBlock& block);
-/// Counts the triangles and the middle vertices of a block. @pre all fans are numbered
+/// Numbers the vertices of a block's fans and cells. @pre all shapes are chosen
+void number_vertices(CellBlock& block);
+/// Counts the triangles and the middle vertices of a block. @pre all blocks' vertices are numbered
 void count_block(CellBlock& block, const BlockNeighbours& blocks);
 
 /// Writes what a block gives to a mesh.
@@ -41,6 +42,7 @@ class BlockMesh {
   void write_fans(std::span<glm::dvec3> positions) const;
   void write_points(std::span<glm::dvec3> positions) const;
   void write_pairs(const Cell& cell, std::span<glm::uvec3> triangles);
+  void write_strip(const Strip& strip, std::span<glm::uvec3> triangles);
   void write_face(const Cell& cell, int axis, std::span<glm::dvec3> positions,
                   std::span<glm::uvec3> triangles);
   [[nodiscard]] glm::dvec3 middle(const Cell& cell, unsigned axis, const FaceSegment& line) const;

@@ -1,6 +1,8 @@
 #include "contour/block_points.h"
 
+#include <algorithm>
 #include <array>
+#include <atomic>
 #include <glm/geometric.hpp>
 
 #include "contour/block_walk.h"
@@ -86,6 +88,17 @@ glm::ivec3 point_at(const BlockNeighbours& blocks, LocalPlace cell, const LocalP
   return step * kLatticeSteps + glm::ivec3(point[0], point[1], point[2]);
 }
 
+/// Marks the cells whose lower faces lie at an edge: all but the lowest. Other threads may mark
+/// cells of the same column.
+void mark_fan(const BlockNeighbours& blocks, const std::array<LocalPlace, 4>& ring) {
+  for (std::size_t n = 1; n < 4; ++n) {
+    LocalPlace at = ring[n];
+    CellBlock& block = blocks.changeable(at);
+    std::atomic_ref(block.at_fan[CellBlock::column(at.i, at.j)])
+        .fetch_or(std::uint32_t{1} << at.k, std::memory_order_relaxed);
+  }
+}
+
 /// The frame of edge_shape(): the edge along z.
 glm::ivec3 along(const glm::ivec3& p, int axis) {
   return {p[(axis + 1) % 3], p[(axis + 2) % 3], p[axis]};
@@ -116,27 +129,32 @@ std::uint64_t place_points(CellBlock& block, const BlockNeighbours& blocks, cons
   return clamped;
 }
 
-void choose_shapes(const BlockNeighbours& blocks) {
+void choose_shapes(const BlockNeighbours& blocks, StripFinder& strips) {
   for_each_cell(blocks.own(), [&](const Cell& cell) {
     for (int axis = 0; axis < 3; ++axis) {
       const auto edge = static_cast<unsigned>(axis) * 4;
       if ((cell.kind->cut >> edge & 1) == 0) continue;
       const auto ring = ring_of(cell.at, axis);
-      bool special = false;
-      for (std::size_t n = 0; n < 4 && blocks.special() && !special; ++n) {
-        special = case_at(blocks, ring[n]).special;
-      }
-      if (special) continue;
       LocalPlace at = edge_place(cell.at, edge);
       CellBlock& block = blocks.changeable(at);
       CellBlock::Crossing& crossing = block.crossings[block.crossing(axis, at)];
-      std::array<glm::ivec3, 4> points;
-      for (std::size_t n = 0; n < 4; ++n) {
-        points[n] = along(point_at(blocks, ring[n], cell.at), axis);
+      const bool special =
+          blocks.special() && std::any_of(ring.begin(), ring.end(), [&](const LocalPlace& one) {
+            return case_at(blocks, one).special;
+          });
+      if (!special) {
+        std::array<glm::ivec3, 4> points;
+        for (std::size_t n = 0; n < 4; ++n) {
+          points[n] = along(point_at(blocks, ring[n], cell.at), axis);
+        }
+        crossing.shape = edge_shape(points, crossing.offset);
+        if (crossing.shape != EdgeShape::kFan) strips.add(cell.at, axis, points);
       }
-      crossing.shape = edge_shape(points, crossing.offset);
+      if (crossing.shape == EdgeShape::kFan) mark_fan(blocks, ring);
     }
   });
+  strips.find(blocks);
+  mark_kept(blocks);
 }
 
 }  // namespace strata::contouring

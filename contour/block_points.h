@@ -6,6 +6,7 @@
 
 #include "contour/cell_blocks.h"
 #include "contour/cell_vertex.h"
+#include "contour/edge_strips.h"
 #include "strata/core/grid.h"
 
 // The vertices of a block's cells, and the shapes around its edges. Private to contour/.
@@ -17,8 +18,8 @@ namespace strata::contouring {
 std::uint64_t place_points(CellBlock& block, const BlockNeighbours& blocks, const glm::ivec3& place,
                            const VoxelGrid& grid, std::span<const Plane> planes);
 
-/// Chooses the shape around each edge at the lower side of a cell of the block.
-/// @pre the points of the blocks are there
-void choose_shapes(const BlockNeighbours& blocks);
+/// Chooses the shape around each edge at the lower side of a cell of the block, and marks the cells
+/// whose vertices are needed. @pre the points of the blocks are there
+void choose_shapes(const BlockNeighbours& blocks, StripFinder& strips);
 
 }  // namespace strata::contouring

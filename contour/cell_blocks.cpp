@@ -219,7 +219,6 @@ BlockNeighbours CellBlocks::neighbours(std::size_t n) const {
     if (found == nullptr || !found->block) continue;
     result.blocks_[static_cast<std::size_t>(which)] = found->block.get();
     result.special_ = result.special_ || found->block->special;
-    result.fans_ = result.fans_ || found->block->fans > 0;
   }
   return result;
 }

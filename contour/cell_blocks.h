@@ -31,8 +31,14 @@ inline std::uint32_t bit_count(std::uint32_t bits) {
 }
 
 /// The triangles around a cut edge: about the point where it is cut, or two between the four cells
-/// there, which are numbered around the edge.
-enum class EdgeShape : std::uint8_t { kFan, kDiagonal02, kDiagonal13 };
+/// there, which are numbered around the edge; or the edge is part of a strip.
+enum class EdgeShape : std::uint8_t { kFan, kDiagonal02, kDiagonal13, kStrip };
+
+/// Cut edges along `axis` in a row: those at the lower sides of cells of a block, from `cell` on.
+struct Strip {
+  LocalPlace cell;
+  std::uint8_t axis = 0, along = 0, length = 0;
+};
 
 /// The vertices of a block's part of a contour come in this order: fans, cells, further vertices of
 /// cells, middles of faces.
@@ -87,30 +93,43 @@ class CellBlock {
     const std::size_t c = column(at.i, at.j);
     return before[3][c] + bit_count(active[c] & below);
   }
-  /// The vertex of a cycle of a cell, in `points`.
-  [[nodiscard]] std::uint32_t cell_point(const LocalPlace& at, unsigned cycle) const {
-    return cycle == 0 ? cell(at) : split_point(at, cycle);
+  /// Whether the vertex of a cell is needed.
+  [[nodiscard]] bool is_kept(const LocalPlace& at) const {
+    return (kept[column(at.i, at.j)] >> at.k & 1) != 0;
   }
-  /// The same in the mesh.
+  /// The vertex of a cycle of a cell, in the mesh. @pre it is kept
   [[nodiscard]] std::uint32_t cell_vertex(const LocalPlace& at, unsigned cycle) const {
-    return static_cast<std::uint32_t>(first_vertex) + fans + cell_point(at, cycle);
+    const std::uint32_t first = static_cast<std::uint32_t>(first_vertex) + fans;
+    if (cycle != 0) return first + kept_cells + split_point(at, cycle) - cells;
+    const std::uint32_t below = (std::uint32_t{1} << at.k) - 1;
+    const std::size_t c = column(at.i, at.j);
+    return first + kept_before[c] + bit_count(kept[c] & below);
   }
 
   std::array<std::uint64_t, kWords * kWords> words{};
   std::array<std::uint32_t, kBlockSide * kBlockSide> active{};  ///< bit k: cells passed
+  /// Bit k: lower faces of the cell lie at a fan.
+  std::array<std::uint32_t, kBlockSide * kBlockSide> at_fan{};
+  /// Bit k: the vertex of the cell is needed, as its own block knows and as blocks above it know.
+  /// number_vertices() joins them.
+  std::array<std::uint32_t, kBlockSide * kBlockSide> kept{}, kept_by_others{};
+  std::array<std::uint16_t, kBlockSide * kBlockSide> kept_before{};  ///< in the columns before
   /// By column: cut edges along x, y, z and cells that come before it.
   std::array<std::array<std::uint16_t, kBlockSide * kBlockSide>, 4> before{};
   std::array<std::uint32_t, 4> first_crossing{};  ///< by axis, and their number
   std::vector<Crossing> crossings;
-  std::vector<SplitCell> split;   ///< increasing
+  std::vector<SplitCell> split;  ///< increasing
+  std::vector<Strip> strips;
   std::vector<CellPoint> points;  ///< the vertices of cells, then the further ones
-  std::uint32_t fans = 0, cells = 0, split_vertices = 0, middles = 0;
+  std::uint32_t fans = 0, cells = 0, kept_cells = 0, split_vertices = 0, middles = 0;
   std::uint64_t triangles = 0;
   std::uint64_t ambiguous = 0, guessed = 0;            ///< counted for the report
   bool special = false;                                ///< some cell is
   std::uint64_t first_vertex = 0, first_triangle = 0;  ///< of the mesh
 
-  [[nodiscard]] std::uint32_t vertices() const { return fans + cells + split_vertices + middles; }
+  [[nodiscard]] std::uint32_t vertices() const {
+    return fans + kept_cells + split_vertices + middles;
+  }
 
  private:
   [[nodiscard]] std::uint32_t split_point(const LocalPlace& at, unsigned cycle) const;
@@ -119,15 +138,13 @@ class CellBlock {
 /// A block and the seven below it.
 class BlockNeighbours {
  public:
-  [[nodiscard]] const CellBlock& own() const { return *blocks_[0]; }
+  [[nodiscard]] CellBlock& own() const { return *blocks_[0]; }
   /// The block of a place from -1, which becomes local there.
   [[nodiscard]] const CellBlock& of(LocalPlace& at) const { return *blocks_[which(at)]; }
-  /// The same, to change an edge there.
+  /// The same, to change an edge or a cell there.
   [[nodiscard]] CellBlock& changeable(LocalPlace& at) const { return *blocks_[which(at)]; }
   /// Whether a cell of one of the blocks is special.
   [[nodiscard]] bool special() const { return special_; }
-  /// Whether one of the blocks has fans.
-  [[nodiscard]] bool fans() const { return fans_; }
 
  private:
   friend class CellBlocks;
@@ -137,7 +154,7 @@ class BlockNeighbours {
     return result;
   }
   std::array<CellBlock*, 8> blocks_{};  ///< null where there is none
-  bool special_ = false, fans_ = false;
+  bool special_ = false;
 };
 
 /// All blocks that the surface passes, sorted by place.

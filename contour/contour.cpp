@@ -106,10 +106,15 @@ Result<MeshSizes> number(CellBlocks& blocks, const LatticeMesh& mesh, const Voxe
     clamped += place_points(blocks.block(n), blocks.neighbours(n), blocks.place(n), grid, planes);
   });
   report.clamped_vertices = clamped;
+  std::vector<std::unique_ptr<StripFinder>> strips(
+      static_cast<std::size_t>(execution.thread_count()));
+  parallel_for(execution, blocks.count(), [&](std::size_t n, int worker) {
+    auto& finder = strips[static_cast<std::size_t>(worker)];
+    if (!finder) finder = std::make_unique<StripFinder>();
+    choose_shapes(blocks.neighbours(n), *finder);
+  });
   parallel_for(execution, blocks.count(),
-               [&](std::size_t n, int) { choose_shapes(blocks.neighbours(n)); });
-  parallel_for(execution, blocks.count(),
-               [&](std::size_t n, int) { number_fans(blocks.block(n)); });
+               [&](std::size_t n, int) { number_vertices(blocks.block(n)); });
   parallel_for(execution, blocks.count(),
                [&](std::size_t n, int) { count_block(blocks.block(n), blocks.neighbours(n)); });
   if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
@@ -137,6 +142,7 @@ void add_counts(CellBlocks& blocks, ContourReport& report) {
     report.ambiguous_cells += block.ambiguous;
     report.middle_vertices += block.middles;
     report.fans += block.fans;
+    for (const Strip& strip : block.strips) report.merged_crossings += strip.length;
     report.guessed_crossings += block.guessed;
   }
 }

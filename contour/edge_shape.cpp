@@ -1,6 +1,5 @@
 #include "contour/edge_shape.h"
 
-#include <cstdint>
 #include <cstdlib>
 #include <optional>
 
@@ -15,32 +14,31 @@
 namespace strata::contouring {
 namespace {
 
-constexpr std::int64_t kLength = 256;
+constexpr int kLength = 256;
 /// Two triangles may miss the point where the edge is cut by this many steps, 1/32 voxel.
 constexpr double kMostOff = 8.0;
 
-std::int64_t turn(const glm::ivec3& a, const glm::ivec3& b) {
-  return std::int64_t{a.x} * b.y - std::int64_t{a.y} * b.x;
-}
+/// Coordinates are below 2^8, so this is below 2^17, and no sum below exceeds 2^28.
+int turn(const glm::ivec3& a, const glm::ivec3& b) { return a.x * b.y - a.y * b.x; }
 
 /// How far from the cut the triangles (a, b, c) and (a, c, d) meet the edge; nothing if they leave
 /// the envelope.
 std::optional<double> miss(const glm::ivec3& a, const glm::ivec3& b, const glm::ivec3& c,
                            const glm::ivec3& d, int cut) {
   // The diagonal from a to c passes the edge on b's side or d's, or meets it.
-  const std::int64_t side = turn(a, c);
+  const int side = turn(a, c);
   const glm::ivec3& near = side >= 0 ? b : d;  // the corner on that side
   const glm::ivec3& far = side >= 0 ? d : b;
   // near_a a + near_c c lies on the half plane of the edge and the near corner, over their sum.
-  const std::int64_t near_c = std::abs(turn(a, near)), near_a = std::abs(turn(near, c));
-  const std::int64_t sum = near_a + near_c, beyond = std::abs(side);
+  const int near_c = std::abs(turn(a, near)), near_a = std::abs(turn(near, c));
+  const int sum = near_a + near_c, beyond = std::abs(side);
   // The diagonal must pass between the edge and the corner, within their triangle.
-  const std::int64_t height = near_a * a.z + near_c * c.z - beyond * near.z;
+  const int height = near_a * a.z + near_c * c.z - beyond * near.z;
   if (beyond >= sum || height <= 0 || height >= kLength * (sum - beyond)) return std::nullopt;
   // The other triangle meets the edge.
-  const std::int64_t far_c = std::abs(turn(a, far)), far_a = std::abs(turn(far, c));
-  const std::int64_t all = far_a + far_c + beyond;
-  const std::int64_t met = far_a * a.z + far_c * c.z + beyond * far.z;
+  const int far_c = std::abs(turn(a, far)), far_a = std::abs(turn(far, c));
+  const int all = far_a + far_c + beyond;
+  const int met = far_a * a.z + far_c * c.z + beyond * far.z;
   return static_cast<double>(std::abs(met - cut * all)) / static_cast<double>(all);
 }
 

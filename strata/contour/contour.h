@@ -32,6 +32,7 @@ struct ContourReport {
   std::uint64_t cells = 0;      ///< cubes between eight voxel centres that the surface passes
   std::uint64_t ambiguous_cells = 0;   ///< cells with several vertices or a face cut four times
   std::uint64_t fans = 0;              ///< cut edges with a vertex; the others have two triangles
+  std::uint64_t merged_crossings = 0;  ///< cut edges whose triangles became part of larger ones
   std::uint64_t middle_vertices = 0;   ///< added on faces between cells
   std::uint64_t clamped_vertices = 0;  ///< whose best place lay outside their cell
   /// Edges that the surface cuts, but both ends lie on the same side of it: there walls or gaps
@@ -52,6 +53,7 @@ struct ContourMesh {
 /// z. A cube between eight voxel centres (a cell) that the surface passes gets a vertex where the
 /// planes of the triangles meet that cut the cell's edges, so corners and creases stay sharp: where
 /// three planes cut the edges of a cell and meet in it, the vertex is that corner of the solid.
+/// Flat parts along an axis, such as the sides of prisms, become long triangles.
 ///
 /// Promised for any input: the mesh is closed, each edge has two triangles, each vertex one fan of
 /// triangles, no two triangles meet but in common vertices and edges, and voxelized on the same

@@ -70,6 +70,21 @@ TEST(ContourShapes, ReproduceTheCornersOfACube) {
   EXPECT_NEAR(signed_volume(soup_of(mesh)), size.x * size.y * size.z, 1e-6);
 }
 
+TEST(ContourShapes, HaveLongTrianglesWhereTheyAreFlat) {
+  // Prisms along each axis: their ends are flat, and their sides straight along the axis.
+  const TriangleSoup prism = make_cylinder(0.35, 1.0, 7);
+  for (int axis = 0; axis < 3; ++axis) {
+    glm::dmat4 turn(0.0);
+    for (int from = 0; from < 3; ++from) turn[from][(from + axis) % 3] = 1.0;
+    turn[3][3] = 1.0;
+    ContourReport report;
+    const TriangleSoup mesh = transform(prism, turn);
+    const SolidMesh made = checked_contour(mesh, grid_for(mesh, 50), {}, &report);
+    EXPECT_GT(report.merged_crossings, report.crossings * 8 / 10);
+    EXPECT_LT(made.triangles.size(), report.crossings / 4);  // of 2 to 4 for each crossing
+  }
+}
+
 TEST(ContourShapes, ReproduceTheCornersOfATurnedCube) {
   const TriangleSoup cube = transform(make_box(glm::dvec3(-1.0), glm::dvec3(1.0)), turned());
   const VoxelGrid grid = grid_for(cube, 40, 1);
