@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "exact/directions.h"
+#include "exact/flat_predicates.h"
 
 namespace strata::exact {
 namespace {
@@ -98,6 +99,28 @@ double MomentSum::central_moment(int i, int j) const {
   const Wide<14> top = (product<Wide<14>>(second_[place], d) << 2) - ((products << 2) + products);
   const Wide<6> bottom = product<Wide<6>>(magnitude(d), std::int64_t{480});
   return std::ldexp(ratio_to_double(d.negative() ? -top : top, bottom), -5 * kFineBits);
+}
+
+void FileSum::add(const FilePoint& origin, const FilePoint& a, const FilePoint& b,
+                  const FilePoint& c) {
+  const Int192 d = orient3d_value(origin, a, b, c);
+  six_volumes_ += Int256(d);
+  for (int k = 0; k < 3; ++k) {
+    const std::int64_t sum = (a[k] - origin[k]) + (b[k] - origin[k]) + (c[k] - origin[k]);
+    first_[static_cast<std::size_t>(k)] += product<Int256>(d, sum);
+  }
+}
+
+void FileSum::add(const FileSum& other) {
+  six_volumes_ += other.six_volumes_;
+  for (std::size_t k = 0; k < 3; ++k) first_[k] += other.first_[k];
+}
+
+double FileSum::volume() const { return ratio_to_double(six_volumes_, Wide<1>(6)); }
+
+double FileSum::centre(int k) const {  // as MomentSum
+  const Int256& first = first_[static_cast<std::size_t>(k)];
+  return ratio_to_double(six_volumes_.negative() ? -first : first, magnitude(six_volumes_) << 2);
 }
 
 void AreaSum::add(const Plane& plane, const FinePoint& a, const FinePoint& b, const FinePoint& c) {

@@ -57,6 +57,26 @@ class MomentSum {
   std::array<Wide<8>, 6> second_;  // 120 times, in 2^-320 step^5: xx, yy, zz, yz, zx, xy
 };
 
+/// The volume and centre of mass of a closed mesh of at most 2^32 triangles of rounded points. As
+/// MomentSum, but without second moments, and about an origin near the points. Coordinates differ
+/// from the origin by at most T = 2^53.
+class FileSum {
+ public:
+  void add(const FilePoint& origin, const FilePoint& a, const FilePoint& b, const FilePoint& c);
+  void add(const FileSum& other);
+
+  /// Of six times the volume. At most 2 T^3 each; 2^32 of them: 193 bits.
+  const Int256& six_volumes() const { return six_volumes_; }
+  /// The double nearest to the volume, in cubic units of the points.
+  double volume() const;
+  /// The coordinate k of the centre of mass about the origin. @pre the volume is not 0
+  double centre(int k) const;
+
+ private:
+  Int256 six_volumes_;
+  std::array<Int256, 3> first_;  // 24 times the integrals: 3 T times as large, 248 bits
+};
+
 /// The area of at most 2^32 triangles of exact planes: a triangle's area is that of its shadow
 /// along the axis k in which the normal n is largest, times |n| / |n_k|. Shadows that overlap
 /// because rounding turned a sliver over cancel.

@@ -7,14 +7,17 @@
 #include <glm/common.hpp>
 #include <utility>
 
-// The division is an octree's whose leaves are compared by brute force; leaving boxes that cover a
-// cell at the cell is what segment trees do (Zomorodian, Edelsbrunner: Fast software for box
-// intersections, 2000).
+// The division is an octree's. That a pair is compared only in the cell of its least shared point,
+// by classes of boxes that begin in a cell or before it, is from Tsitsigkos, Lampropoulos, Bouros,
+// Mamoulis, Terrovitis: A two-layer partitioning for non-point spatial data, 2021; that boxes which
+// cover a cell stay there, as in segment trees, from Zomorodian, Edelsbrunner: Fast software for
+// box intersections, 2000.
 
 namespace strata {
 namespace {
 
-constexpr std::size_t kFewBoxes = 32;      // compared by brute force; faster than 16 and 64
+constexpr std::size_t kFewBoxes = 40;      // in a cell that is not divided
+constexpr std::size_t kCopyCost = 12;      // to pass a box on costs as much as so many comparisons
 constexpr std::size_t kBatch = 512;        // pairs a visit
 constexpr std::size_t kTaskBoxes = 20000;  // a cell with more is divided by all threads
 
@@ -28,9 +31,18 @@ struct Cell {
   int bits;  // 2^bits points a side
 };
 
+// The boxes of a cell are in 16 classes. Bits 0 to 2: the box begins in the cell along x, y, z, not
+// before it. Bit 3: it covers the cell. Two boxes have their least shared point in the cell only if
+// one of them begins there along each axis.
+constexpr unsigned kClasses = 16, kCovers = 8, kBegins = 7;
+
+// Where the boxes of each class begin in a list; the last is the end.
+using ClassBegins = std::array<std::size_t, kClasses + 1>;
+
 struct Task {
   std::vector<Entry> entries;
-  Cell cell;
+  ClassBegins begins{};
+  Cell cell{};
 };
 
 // The search of one thread. Lists of boxes lie one behind the other: those of a cell, then those of
@@ -39,35 +51,35 @@ class Search {
  public:
   Search(bool grouped, const BoxPairVisit& visit, int worker, const Execution& execution)
       : grouped_(grouped), visit_(visit), worker_(worker), execution_(execution) {
-    found_.reserve(kBatch + kFewBoxes);
+    found_.reserve(kBatch);
   }
 
-  void run(std::vector<Entry> entries, const Cell& cell) {
-    entries_ = std::move(entries);
-    search(0, cell);
+  void run(Task task) {
+    entries_ = std::move(task.entries);
+    search(task.begins, task.cell);
     flush();
   }
 
   // Divides a cell once. The parts are left to the caller, if there are any.
-  std::vector<Task> divide(std::vector<Entry> entries, const Cell& cell) {
-    entries_ = std::move(entries);
+  std::vector<Task> divide(Task task) {
+    entries_ = std::move(task.entries);
     std::vector<Task> tasks;
-    std::array<std::size_t, 9> begin{};
-    if (prepare(0, cell, begin)) {
+    std::array<ClassBegins, 8> parts;
+    if (prepare(task.begins, task.cell, parts)) {
       for (unsigned part = 0; part < 8; ++part) {
-        if (begin[part] == begin[part + 1]) continue;
-        tasks.push_back({{entries_.begin() + static_cast<std::ptrdiff_t>(begin[part]),
-                          entries_.begin() + static_cast<std::ptrdiff_t>(begin[part + 1])},
-                         part_of(cell, part)});
+        const std::size_t first = parts[part].front(), end = parts[part].back();
+        if (end - first < 2) continue;
+        for (std::size_t& begin : parts[part]) begin -= first;
+        const auto at = [&](std::size_t i) {
+          return entries_.begin() + static_cast<std::ptrdiff_t>(i);
+        };
+        tasks.push_back({{at(first), at(end)}, parts[part], part_of(task.cell, part)});
       }
     }
     flush();
     entries_ = {};
     return tasks;
   }
-
-  // Bytes of the lists in use when they were longest.
-  [[nodiscard]] std::size_t bytes() const { return most_ * sizeof(Entry); }
 
  private:
   static Cell part_of(const Cell& cell, unsigned part) {
@@ -78,126 +90,152 @@ class Search {
     return result;
   }
 
-  void search(std::size_t first, const Cell& cell) {
-    std::array<std::size_t, 9> begin{};
-    if (!prepare(first, cell, begin)) return;
-    const std::size_t end = entries_.size();
-    // The last part lies at the end of the lists: it is searched in place, then removed.
+  void search(const ClassBegins& begins, const Cell& cell) {
+    std::array<ClassBegins, 8> parts;
+    if (!prepare(begins, cell, parts)) return;
+    // The last part lies at the end of the lists: it is searched there, then removed.
     for (unsigned part = 8; part-- > 0;) {
-      entries_.resize(begin[part + 1]);
-      search(begin[part], part_of(cell, part));
+      entries_.resize(parts[part].back());
+      search(parts[part], part_of(cell, part));
     }
-    most_ = std::max(most_, end);
-    entries_.resize(begin[0]);
   }
 
-  // Compares the boxes from `first` on, or appends them by parts of the cell.
+  // Compares the boxes of a cell, or appends them by the parts of the cell.
   // @return whether parts are left to be searched
-  bool prepare(std::size_t first, const Cell& cell, std::array<std::size_t, 9>& begin) {
-    if (entries_.size() - first < 2 || one_group(first)) return false;
+  bool prepare(const ClassBegins& begins, const Cell& cell, std::array<ClassBegins, 8>& parts) {
+    if (begins.back() - begins.front() < 2 || one_group(begins)) return false;
     if (execution_.stop.stop_requested()) return false;
-    if (entries_.size() - first <= kFewBoxes) {
-      compare_all(first, cell);
-      return false;
-    }
-    take_covering(first, cell);
-    if (entries_.size() - first < 2) return false;
-    if (!distribute(first, cell, begin)) {
-      sweep(first, cell);
-      return false;
-    }
-    return true;
-  }
-
-  [[nodiscard]] bool one_group(std::size_t first) const {
-    if (!grouped_) return false;
-    for (std::size_t i = first + 1; i < entries_.size(); ++i) {
-      if (entries_[i].group != entries_[first].group) return false;
-    }
-    return true;
-  }
-
-  // Boxes that cover the cell share a point of it with all others there.
-  void take_covering(std::size_t first, const Cell& cell) {
-    const std::int64_t last = (std::int64_t{1} << cell.bits) - 1;
-    const auto covers = [&](const Entry& entry) {
-      for (int k = 0; k < 3; ++k) {
-        const std::int64_t low = cell.low[static_cast<std::size_t>(k)];
-        if (entry.low[k] > low || entry.high[k] < low + last) return false;
-      }
+    compare_covering(begins);
+    entries_.resize(begins[kCovers]);
+    const std::size_t boxes = begins[kCovers] - begins.front();
+    const std::uint64_t comparisons = comparisons_of(begins);
+    if (comparisons == 0) return false;
+    if (boxes > kFewBoxes && cell.bits > 0 && comparisons > kCopyCost * boxes &&
+        distribute(begins, cell, comparisons, parts)) {
       return true;
-    };
-    for (std::size_t i = first; i < entries_.size();) {
-      if (!covers(entries_[i])) {
-        ++i;
-        continue;
+    }
+    if (comparisons < 64 * boxes) {
+      compare_classes(begins);
+    } else {
+      sweep(begins, cell);
+    }
+    return false;
+  }
+
+  [[nodiscard]] bool one_group(const ClassBegins& begins) const {
+    if (!grouped_) return false;
+    for (std::size_t i = begins.front() + 1; i < begins.back(); ++i) {
+      if (entries_[i].group != entries_[begins.front()].group) return false;
+    }
+    return true;
+  }
+
+  // Between boxes that do not cover the cell.
+  static std::uint64_t comparisons_of(const ClassBegins& begins) {
+    std::uint64_t count = 0;
+    for (unsigned a = 0; a < kBegins; ++a) {
+      for (unsigned b = a + 1; b <= kBegins; ++b) {
+        if ((a | b) == kBegins) count += (begins[a + 1] - begins[a]) * (begins[b + 1] - begins[b]);
       }
-      const Entry large = entries_[i];
-      entries_[i] = entries_.back();
-      entries_.pop_back();
-      for (std::size_t j = first; j < entries_.size(); ++j) compare(large, entries_[j], cell);
-      if (execution_.stop.stop_requested()) return;
+    }
+    const std::uint64_t all = begins[kBegins + 1] - begins[kBegins];
+    return count + all * (all - (all > 0)) / 2;
+  }
+
+  void compare_covering(const ClassBegins& begins) {
+    for (unsigned a = kCovers; a < kClasses; ++a) {
+      for (std::size_t i = begins[a]; i < begins[a + 1]; ++i) {
+        if (i % 64 == 0 && execution_.stop.stop_requested()) return;
+        const Entry box = entries_[i];
+        for (unsigned b = 0; b < a; ++b) {
+          if (((a | b) & kBegins) != kBegins) continue;
+          for (std::size_t j = begins[b]; j < begins[b + 1]; ++j) compare(box, entries_[j]);
+        }
+        if (a != kClasses - 1) continue;
+        for (std::size_t j = begins[a]; j < i; ++j) compare(box, entries_[j]);
+      }
     }
   }
 
-  // Appends the boxes of each of the eight parts. Nothing is appended when that does not help.
-  bool distribute(std::size_t first, const Cell& cell, std::array<std::size_t, 9>& begin) {
-    if (cell.bits == 0) return false;
-    const std::size_t end = entries_.size();
+  // The parts that a box touches, each with the class that the box has there.
+  template <class Visit>
+  static void for_parts(const Entry& entry, const Cell& cell, const Visit& visit) {
+    constexpr unsigned kLower[3] = {0x55, 0x33, 0x0f};  // the parts in the lower half of an axis
     const std::int64_t half = std::int64_t{1} << (cell.bits - 1);
-    glm::ivec3 middle;  // the first point of the upper half; it fits, since a box reaches it
-    for (int k = 0; k < 3; ++k) {
-      middle[k] = static_cast<std::int32_t>(cell.low[static_cast<std::size_t>(k)] + half);
+    unsigned parts = 0xff, begins_below = 0, begins_above = 0;
+    bool may_cover = true;
+    for (unsigned k = 0; k < 3; ++k) {
+      const std::int64_t low = entry.low[static_cast<int>(k)],
+                         high = entry.high[static_cast<int>(k)];
+      const std::int64_t from = cell.low[k], middle = from + half;
+      parts &= (low < middle ? kLower[k] : 0) | (high >= middle ? ~kLower[k] : 0);
+      begins_below |= static_cast<unsigned>(low >= from) << k;
+      begins_above |= static_cast<unsigned>(low >= middle) << k;
+      may_cover = may_cover && high - low >= half - 1;
     }
-    const auto parts_of = [&](const Entry& entry) {
-      constexpr unsigned kLower[3] = {0x55, 0x33, 0x0f};  // the parts in the lower half of an axis
-      unsigned parts = 0xff;
-      for (int k = 0; k < 3; ++k) {
-        parts &= (entry.low[k] < middle[k] ? kLower[k] : 0) |
-                 (entry.high[k] >= middle[k] ? ~kLower[k] : 0);
-      }
-      return parts & 0xff;
-    };
-    std::array<std::size_t, 8> counts{};
-    for (std::size_t i = first; i < end; ++i) {
-      for (unsigned parts = parts_of(entries_[i]); parts != 0; parts &= parts - 1) {
-        ++counts[static_cast<std::size_t>(std::countr_zero(parts))];
-      }
+    for (; parts != 0; parts &= parts - 1) {
+      const auto part = static_cast<unsigned>(std::countr_zero(parts));
+      const unsigned begins = (begins_below & ~part) | (begins_above & part);
+      const bool covers = may_cover && covers_cell(entry, part_of(cell, part));
+      visit(part, begins | (covers ? kCovers : 0));
     }
-    begin[0] = end;
-    for (std::size_t part = 0; part < 8; ++part) begin[part + 1] = begin[part] + counts[part];
-    if (begin[8] - end >= 4 * (end - first)) return false;
-    entries_.resize(begin[8]);
-    most_ = std::max(most_, entries_.size());
-    std::array<std::size_t, 9> at = begin;
-    for (std::size_t i = first; i < end; ++i) {
-      for (unsigned parts = parts_of(entries_[i]); parts != 0; parts &= parts - 1) {
-        entries_[at[static_cast<std::size_t>(std::countr_zero(parts))]++] = entries_[i];
-      }
+  }
+
+  static bool covers_cell(const Entry& entry, const Cell& cell) {
+    const std::int64_t last = (std::int64_t{1} << cell.bits) - 1;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto axis = static_cast<int>(k);
+      if (entry.low[axis] > cell.low[k] || entry.high[axis] < cell.low[k] + last) return false;
     }
     return true;
   }
 
-  // Whether the least point that two boxes share lies in the cell. Both touch the cell, so it does
-  // not lie beyond its upper sides.
-  static bool meet(const Entry& a, const Entry& b, const Cell& cell) {
-    for (int k = 0; k < 3; ++k) {
-      const std::int32_t low = std::max(a.low[k], b.low[k]);
-      if (low > std::min(a.high[k], b.high[k]) || low < cell.low[static_cast<std::size_t>(k)]) {
-        return false;
-      }
+  // Appends the boxes of each of the eight parts, unless comparing all is cheaper. Boxes that are
+  // crowded in one part are always passed on: they may be apart there.
+  bool distribute(const ClassBegins& begins, const Cell& cell, std::uint64_t comparisons,
+                  std::array<ClassBegins, 8>& parts) {
+    const std::size_t first = begins.front(), end = begins[kCovers], boxes = end - first;
+    std::array<std::array<std::uint32_t, kClasses>, 8> counts{};
+    for (std::size_t i = first; i < end; ++i) {
+      for_parts(entries_[i], cell,
+                [&](unsigned part, unsigned box_class) { ++counts[part][box_class]; });
+    }
+    std::size_t at = end, most = 0;
+    std::uint64_t later = 0;
+    for (unsigned part = 0; part < 8; ++part) {
+      parts[part].front() = at;
+      for (unsigned c = 0; c < kClasses; ++c) parts[part][c + 1] = at += counts[part][c];
+      most = std::max(most, at - parts[part].front());
+      later += comparisons_of(parts[part]);
+    }
+    const std::size_t copies = at - end;
+    if (later + kCopyCost * copies >= comparisons && (most < boxes / 8 * 7 || copies > 2 * boxes)) {
+      return false;
+    }
+    entries_.resize(at);
+    std::array<std::array<std::size_t, kClasses>, 8> next{};
+    for (unsigned part = 0; part < 8; ++part) {
+      std::copy_n(parts[part].begin(), kClasses, next[part].begin());
+    }
+    for (std::size_t i = first; i < end; ++i) {
+      for_parts(entries_[i], cell, [&](unsigned part, unsigned box_class) {
+        entries_[next[part][box_class]++] = entries_[i];
+      });
     }
     return true;
   }
 
-  void compare(const Entry& a, const Entry& b, const Cell& cell) {
-    if (meet(a, b, cell)) keep(a, b);
+  void compare(const Entry& a, const Entry& b) {
+    // One jump instead of six, which are hard to predict.
+    const bool apart = (a.low.x > b.high.x) | (b.low.x > a.high.x) | (a.low.y > b.high.y) |
+                       (b.low.y > a.high.y) | (a.low.z > b.high.z) | (b.low.z > a.high.z);
+    if (!apart) keep(a, b);
   }
 
   void keep(const Entry& a, const Entry& b) {
     if (grouped_ && a.group == b.group) return;
     found_.push_back({std::min(a.box, b.box), std::max(a.box, b.box)});
-    if (found_.size() >= kBatch) flush();
+    if (found_.size() == kBatch) flush();
   }
 
   void flush() {
@@ -205,16 +243,24 @@ class Search {
     found_.clear();
   }
 
-  void compare_all(std::size_t first, const Cell& cell) {
-    const std::span<const Entry> boxes = std::span(entries_).subspan(first);
-    for (std::size_t j = 1; j < boxes.size(); ++j) {
-      for (std::size_t i = 0; i < j; ++i) compare(boxes[i], boxes[j], cell);
+  void compare_classes(const ClassBegins& begins) {
+    for (unsigned a = 0; a <= kBegins; ++a) {
+      for (std::size_t i = begins[a]; i < begins[a + 1]; ++i) {
+        const Entry box = entries_[i];
+        for (unsigned b = a + 1; b <= kBegins; ++b) {
+          if ((a | b) != kBegins) continue;
+          for (std::size_t j = begins[b]; j < begins[b + 1]; ++j) compare(box, entries_[j]);
+        }
+        if (a != kBegins) continue;
+        for (std::size_t j = begins[a]; j < i; ++j) compare(box, entries_[j]);
+      }
     }
   }
 
-  // Sorts along the axis in which the boxes are shortest.
-  void sweep(std::size_t first, const Cell& cell) {
-    const std::span<Entry> boxes = std::span(entries_).subspan(first);
+  // For many boxes: sorts along the axis in which they are shortest.
+  void sweep(const ClassBegins& begins, const Cell& cell) {
+    const std::span<Entry> boxes =
+        std::span(entries_).subspan(begins.front(), begins[kCovers] - begins.front());
     std::array<std::int64_t, 3> extents{};
     for (const Entry& box : boxes) {
       for (std::size_t k = 0; k < 3; ++k) {
@@ -226,10 +272,16 @@ class Search {
     }
     const auto axis = static_cast<int>(std::ranges::min_element(extents) - extents.begin());
     std::ranges::sort(boxes, {}, [axis](const Entry& box) { return box.low[axis]; });
+    const auto here = [&](const Entry& a, const Entry& b) {
+      for (int k = 0; k < 3; ++k) {
+        if (std::max(a.low[k], b.low[k]) < cell.low[static_cast<std::size_t>(k)]) return false;
+      }
+      return true;
+    };
     for (std::size_t i = 0; i < boxes.size(); ++i) {
       for (std::size_t j = i + 1; j < boxes.size() && boxes[j].low[axis] <= boxes[i].high[axis];
            ++j) {
-        compare(boxes[i], boxes[j], cell);
+        if (here(boxes[i], boxes[j])) compare(boxes[i], boxes[j]);
       }
       if (i % 64 == 0 && execution_.stop.stop_requested()) return;
     }
@@ -241,7 +293,6 @@ class Search {
   const Execution& execution_;
   std::vector<Entry> entries_;
   std::vector<BoxPair> found_;
-  std::size_t most_ = 0;
 };
 
 Task whole_task(std::span<const LatticeBox> boxes, std::span<const std::uint32_t> groups) {
@@ -261,6 +312,7 @@ Task whole_task(std::span<const LatticeBox> boxes, std::span<const std::uint32_t
     most = std::max(most, static_cast<std::uint64_t>(std::int64_t{high[k]} - low[k]));
   }
   task.cell.bits = static_cast<int>(std::bit_width(most));
+  for (unsigned c = kBegins + 1; c <= kClasses; ++c) task.begins[c] = task.entries.size();
   return task;
 }
 
@@ -294,8 +346,7 @@ Result<void> for_box_pairs(std::span<const LatticeBox> boxes, std::span<const st
     std::vector<std::vector<Task>> parts(large.size());
     parallel_for(execution, large.size(), [&](std::size_t i, int worker) {
       Search search(grouped, visit, worker, execution);
-      const Cell cell = large[i].cell;
-      parts[i] = search.divide(std::exchange(large[i].entries, {}), cell);
+      parts[i] = search.divide(std::exchange(large[i], {}));
     });
     large.clear();
     for (std::vector<Task>& some : parts) {
@@ -310,8 +361,7 @@ Result<void> for_box_pairs(std::span<const LatticeBox> boxes, std::span<const st
   }
   parallel_for(execution, small.size(), [&](std::size_t i, int worker) {
     Search search(grouped, visit, worker, execution);
-    const Cell cell = small[i].cell;
-    search.run(std::exchange(small[i].entries, {}), cell);
+    search.run(std::exchange(small[i], {}));
   });
   if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
   return {};

@@ -29,11 +29,10 @@ using BoxPairVisit = std::function<void(std::span<const BoxPair> pairs, int work
 /// Calls visit() for all pairs of boxes that share a point, each pair once. Their order means
 /// nothing; the set depends on the boxes alone. A cube around all boxes is divided in eight,
 /// recursively. A pair is found in the cell that has the least point which both boxes share, so
-/// none is found twice. A box that covers a whole cell is compared with all others there and not
-/// passed on, so large boxes cost what they find. Boxes that no division separates are sorted and
-/// swept.
+/// none is found twice. A box that covers a whole cell is compared there and not passed on, so
+/// large boxes cost what they find. Boxes that no division separates are sorted and swept.
 ///
-/// Cost: 0.1 to 0.2 us a box and a few ns a pair, for boxes like those of a mesh's triangles.
+/// Cost: 0.3 us a box and 3 ns a pair, for boxes like those of a mesh's triangles, on one thread.
 /// @param groups  empty, or a number for each box: pairs of one group are not found, and cells that
 /// boxes of one group touch cost nothing
 /// @return kCancelled; kLimit when the boxes in cells take more than the memory limit

@@ -179,6 +179,55 @@ TEST(MomentSum, HasRoomForTheLargestMesh) {
   EXPECT_EQ(sum.central_moment(2, 2), std::ldexp(square, 30));
 }
 
+// MomentSum takes 2^-64 steps for what FileSum takes for whole ones.
+TEST(FileSum, IsAsMomentSum) {
+  for (const Input input : kInputs) {
+    Draw random(input, 78);
+    const auto point = [&] {  // with all bits down to the last
+      const FilePoint p = file_point(random.point());
+      const auto rest = static_cast<std::int64_t>(random.word() >> 40);
+      return FilePoint(p.x, p.y > 0 ? p.y - rest : p.y + rest, p.z);
+    };
+    const auto fine = [](const FilePoint& p) { return FinePoint{p.x, p.y, p.z}; };
+    for (int i = 0; i < 200; ++i) {
+      const FilePoint p[4] = {point(), point(), point(), point()};
+      if (orient3d(p[0], p[1], p[2], p[3]) == 0) continue;
+      MomentSum moments;
+      FileSum about_zero, about_corner;
+      int face = 0;
+      for (const auto& [a, b, c] : {std::array{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}}) {
+        moments.add(fine(p[a]), fine(p[b]), fine(p[c]));
+        about_zero.add(FilePoint(0), p[a], p[b], p[c]);
+        FileSum part;
+        part.add(p[0], p[a], p[b], p[c]);
+        (face++ % 2 == 0 ? about_corner.add(part) : about_corner.add(p[0], p[a], p[b], p[c]));
+      }
+      ASSERT_EQ(whole(about_zero.six_volumes()), whole(moments.volume().six_volumes()));
+      ASSERT_EQ(about_zero.six_volumes(), about_corner.six_volumes());
+      ASSERT_EQ(std::ldexp(about_zero.volume(), -192), moments.volume().volume());
+      for (int k = 0; k < 3; ++k) {
+        ASSERT_EQ(std::ldexp(about_zero.centre(k), -kFineBits), moments.centre(k));
+        Whole mean = 0;
+        for (const FilePoint& corner : p) mean += Whole(corner[k]) - p[0][k];
+        ASSERT_TRUE(is_nearest(about_corner.centre(k), Fraction(mean, 4)));
+      }
+    }
+  }
+}
+
+// 2^32 of the largest tetrahedra.
+TEST(FileSum, HasRoomForTheLargestMesh) {
+  const std::int64_t t = std::int64_t{1} << 53;
+  FileSum sum;
+  sum.add(FilePoint(0), {t, t, 0}, {0, t, t}, {t, 0, t});
+  const double volume = sum.volume(), centre = sum.centre(1);
+  EXPECT_EQ(volume, std::ldexp(1.0, 160) / 6);
+  EXPECT_EQ(centre, 0.5 * std::ldexp(1.0, 53));
+  for (int i = 0; i < 32; ++i) sum.add(FileSum(sum));
+  EXPECT_EQ(sum.volume(), std::ldexp(volume, 32));
+  EXPECT_EQ(sum.centre(1), centre);
+}
+
 TEST(AreaSum, OfABoxIsItsAreaToTheDigit) {
   Draw random(Input::kRandom26, 73);
   for (int i = 0; i < 200; ++i) {
