@@ -48,7 +48,6 @@ bool FaceTriangulation::append_triangle(const BoundaryPlane& plane, FaceTriangle
   if (exact::orient2d(flat(p.from), flat(q.from), flat(r.from)) <= 0) return false;
   const auto triangle = static_cast<Index>(out.triangles.size());
   out.triangles.emplace_back(p.from, q.from, r.from);
-  out.labels.push_back(plane.label);
   if (p.wedge != 0) out.wedges.push_back({triangle, 0, p.wedge});
   if (q.wedge != 0) out.wedges.push_back({triangle, 1, q.wedge});
   if (r.wedge != 0) out.wedges.push_back({triangle, 2, r.wedge});
@@ -133,22 +132,24 @@ void FaceTriangulation::append_mesh(const BoundaryPlane& plane, FaceTriangles& o
       if (wedge != 0) out.wedges.push_back({static_cast<Index>(before) + t, k, wedge});
     }
   }
-  out.labels.resize(out.triangles.size(), plane.label);
 }
 
-bool FaceTriangulation::append(const BoundaryPlane& plane, FaceTriangles& out) {
+bool FaceTriangulation::append(std::uint32_t index, FaceTriangles& out) {
+  const BoundaryPlane& plane = faces_.planes[index];
   const exact::PlaneView view(plane.plane);
   u_ = view.u();
   v_ = view.v();
-  if (plane.edge_count == 3 && plane.touch_count == 0 && append_triangle(plane, out)) return true;
-  collect(plane);
-  const bool distinct = sort_corners();
-  if (distinct) number_edges(plane);
-  if (!distinct || !sweep_.cut(flat_, edges_, mesh_)) {
-    ++out.not_simple;
-    if (!cut_exactly(plane)) return false;
+  bool simple = true;
+  if (plane.edge_count != 3 || plane.touch_count != 0 || !append_triangle(plane, out)) {
+    collect(plane);
+    const bool distinct = sort_corners();
+    if (distinct) number_edges(plane);
+    simple = distinct && sweep_.cut(flat_, edges_, mesh_);
+    if (!simple && !cut_exactly(plane)) return false;
+    append_mesh(plane, out);
   }
-  append_mesh(plane, out);
+  out.labels.resize(out.triangles.size(), plane.label);
+  out.planes.resize(out.triangles.size(), simple ? index : FaceTriangles::kNotSimple);
   return true;
 }
 

@@ -5,22 +5,20 @@
 #include <vector>
 
 #include "csg/arrangement/boundary_faces.h"
-#include "csg/boundary/face_sweep.h"
+#include "mesh/polygons/face_sweep.h"
+#include "mesh/repair/umbrellas.h"
 
 namespace strata::csg {
-
-/// A half-edge of a triangle at an undirected edge that more than two faces share.
-struct WedgeEdge {
-  std::uint32_t triangle, corner;  ///< from this corner to the next one
-  std::uint32_t wedge;             ///< as BoundaryEdge::wedge, not 0
-};
 
 /// Triangles of some planes.
 struct FaceTriangles {
   std::vector<glm::uvec3> triangles;  ///< points, counter-clockwise from outside
   std::vector<std::uint32_t> labels;  ///< of the triangles
   std::vector<WedgeEdge> wedges;
-  std::size_t not_simple = 0;  ///< planes whose edges meet once they are rounded
+  /// Of the triangles: the index of their plane, or kNotSimple where edges meet once they are
+  /// rounded.
+  std::vector<std::uint32_t> planes;
+  static constexpr std::uint32_t kNotSimple = 0xffffffffu;
 };
 
 /// Triangulates the faces of planes of a boundary. One object serves one thread.
@@ -35,7 +33,7 @@ class FaceTriangulation {
   /// diagonal. Where rounding makes edges meet, the exact points make the
   /// triangulation, so that each edge has its triangle.
   /// @return false when the plane's edges do not bound a region: a fault of whoever made them
-  bool append(const BoundaryPlane& plane, FaceTriangles& out);
+  bool append(std::uint32_t plane, FaceTriangles& out);
 
  private:
   using Index = std::uint32_t;

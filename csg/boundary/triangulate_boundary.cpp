@@ -4,12 +4,13 @@
 #include <atomic>
 #include <numeric>
 
-#include "csg/boundary/canonical_order.h"
-#include "csg/boundary/double_edges.h"
 #include "csg/boundary/face_triangulation.h"
-#include "csg/boundary/umbrellas.h"
-#include "csg/boundary/written_positions.h"
 #include "mesh/disjoint_sets.h"
+#include "mesh/repair/canonical_order.h"
+#include "mesh/repair/double_edges.h"
+#include "mesh/repair/mesh_repair.h"
+#include "mesh/repair/umbrellas.h"
+#include "mesh/repair/written_positions.h"
 
 namespace strata::csg {
 namespace {
@@ -32,25 +33,29 @@ class Triangulation {
   std::vector<std::vector<Index>> make_tasks() const;
   bool triangulate_planes();
   void collect(std::vector<FaceTriangles>& parts);
+  Index group_of(const glm::uvec3& triangle, Index plane) const;
   TriangulatedBoundary finish() const;
 
   const BoundaryFaces& faces_;
   const WrittenPositions& written_;
   const Execution& execution_;
-  std::vector<FilePoint> positions_;  // of points, then of additional vertices
-  std::vector<glm::uvec3> triangles_;
-  std::vector<Index> labels_;
+  std::vector<std::uint8_t> moved_;  // the points, by rounding
+  RoundedMesh mesh_;                 // its vertices are the points, then the additional ones
   std::vector<WedgeEdge> wedges_;
   std::uint64_t split_ = 0;
 };
 
 void Triangulation::place_points() {
-  positions_.resize(faces_.points.size());
+  mesh_.positions.resize(faces_.points.size());
+  moved_.resize(faces_.points.size());
   constexpr std::size_t kRange = 1 << 16;
-  parallel_for(execution_, (positions_.size() + kRange - 1) / kRange, [&](std::size_t r, int) {
-    const std::size_t end = std::min(positions_.size(), (r + 1) * kRange);
+  parallel_for(execution_, (mesh_.positions.size() + kRange - 1) / kRange, [&](std::size_t r, int) {
+    const std::size_t end = std::min(mesh_.positions.size(), (r + 1) * kRange);
     for (std::size_t i = r * kRange; i < end; ++i) {
-      positions_[i] = written_.round(faces_.points.rounded(static_cast<Index>(i)));
+      const auto point = static_cast<Index>(i);
+      const FilePoint exact = faces_.points.rounded(point);
+      mesh_.positions[i] = written_.round(exact);
+      moved_[i] = !faces_.points.on_lattice(point) || mesh_.positions[i] != exact ? 1 : 0;
     }
   });
 }
@@ -90,9 +95,10 @@ bool Triangulation::triangulate_planes() {
   std::atomic<bool> good = true;
   parallel_for(execution_, tasks.size(), [&](std::size_t task, int worker) {
     auto& triangulation = workers[static_cast<std::size_t>(worker)];
-    if (!triangulation) triangulation = std::make_unique<FaceTriangulation>(faces_, positions_);
+    if (!triangulation)
+      triangulation = std::make_unique<FaceTriangulation>(faces_, mesh_.positions);
     for (const Index plane : tasks[task]) {
-      if (!triangulation->append(faces_.planes[plane], parts[task])) good = false;
+      if (!triangulation->append(plane, parts[task])) good = false;
       if (!good || execution_.stop.stop_requested()) return;
     }
   });
@@ -103,16 +109,21 @@ bool Triangulation::triangulate_planes() {
 void Triangulation::collect(std::vector<FaceTriangles>& parts) {
   std::size_t count = faces_.wholes.size();
   for (const FaceTriangles& part : parts) count += part.triangles.size();
-  triangles_.reserve(count);
-  labels_.reserve(count);
+  mesh_.triangles.reserve(count);
+  mesh_.labels.reserve(count);
+  mesh_.groups.reserve(count);
   for (const BoundaryFaces::Whole& whole : faces_.wholes) {
-    triangles_.push_back(whole.points);
-    labels_.push_back(whole.label);
+    mesh_.triangles.push_back(whole.points);
+    mesh_.labels.push_back(whole.label);
+    mesh_.groups.push_back(group_of(whole.points, FaceTriangles::kNotSimple));
   }
   for (FaceTriangles& part : parts) {
-    const auto before = static_cast<Index>(triangles_.size());
-    triangles_.insert(triangles_.end(), part.triangles.begin(), part.triangles.end());
-    labels_.insert(labels_.end(), part.labels.begin(), part.labels.end());
+    const auto before = static_cast<Index>(mesh_.triangles.size());
+    mesh_.triangles.insert(mesh_.triangles.end(), part.triangles.begin(), part.triangles.end());
+    mesh_.labels.insert(mesh_.labels.end(), part.labels.begin(), part.labels.end());
+    for (std::size_t t = 0; t < part.triangles.size(); ++t) {
+      mesh_.groups.push_back(group_of(part.triangles[t], part.planes[t]));
+    }
     for (const WedgeEdge& edge : part.wedges) {
       wedges_.push_back({before + edge.triangle, edge.corner, edge.wedge});
     }
@@ -120,8 +131,14 @@ void Triangulation::collect(std::vector<FaceTriangles>& parts) {
   }
 }
 
+// Triangles of exact points do not meet; nor do those of a plane whose edges do not.
+Index Triangulation::group_of(const glm::uvec3& t, Index plane) const {
+  if (moved_[t.x] + moved_[t.y] + moved_[t.z] == 0) return RoundedMesh::kUnmoved;
+  return plane == FaceTriangles::kNotSimple ? RoundedMesh::kNoGroup : plane + 1;
+}
+
 TriangulatedBoundary Triangulation::finish() const {
-  OrderedMesh ordered = canonical_order(positions_, triangles_, labels_);
+  OrderedMesh ordered = canonical_order(mesh_.positions, mesh_.triangles, mesh_.labels);
   TriangulatedBoundary result;
   result.points = std::move(ordered.points);
   result.triangles = std::move(ordered.triangles);
@@ -149,13 +166,20 @@ Result<TriangulatedBoundary> Triangulation::run() {
     return fail(ErrorCode::kInternal, "edges of a face of the boundary do not bound a region");
   }
   const Result<std::vector<Index>> additional =
-      split_umbrellas(triangles_, faces_.points.size(), wedges_);
+      split_umbrellas(mesh_.triangles, faces_.points.size(), wedges_);
   if (!additional) return tl::unexpected(additional.error());
   split_ = additional->size();
-  for (const Index point : *additional) positions_.push_back(FilePoint(positions_[point]));
-  split_ += divide_double_edges(triangles_, labels_, positions_, wedges_, written_);
+  for (const Index point : *additional)
+    mesh_.positions.push_back(FilePoint(mesh_.positions[point]));
+  split_ += divide_double_edges(mesh_, wedges_, written_);
   if (cancelled()) return stop();
-  return finish();
+  const Result<MeshRepair> repair = repair_mesh(mesh_, written_, execution_);
+  if (!repair) return tl::unexpected(repair.error());
+  if (cancelled()) return stop();
+  TriangulatedBoundary result = finish();
+  result.repaired = repair->places;
+  result.repair_rounds = repair->rounds;
+  return result;
 }
 
 }  // namespace
@@ -163,7 +187,8 @@ Result<TriangulatedBoundary> Triangulation::run() {
 Result<TriangulatedBoundary> triangulate_boundary(const BoundaryFaces& faces,
                                                   const Lattice& lattice, bool float_positions,
                                                   const Execution& execution) {
-  const Result<WrittenPositions> written = WrittenPositions::make(lattice, float_positions);
+  const Result<WrittenPositions> written =
+      WrittenPositions::make(lattice.origin, lattice.step, float_positions);
   if (!written) return tl::unexpected(written.error());
   return Triangulation(faces, *written, execution).run();
 }

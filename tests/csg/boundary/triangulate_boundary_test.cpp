@@ -5,6 +5,7 @@
 #include <boost/multiprecision/cpp_int.hpp>
 #include <numeric>
 
+#include "mesh/check/triangles_meet.h"
 #include "tests/csg/boundary/plane_grid.h"
 
 namespace strata::csg {
@@ -140,6 +141,47 @@ TEST(TriangulateBoundary, TiltedPlanesWithRationalPointsGiveClosedManifolds) {
     ASSERT_TRUE(in_canonical_order(mesh));
     ASSERT_GT(six_volumes(mesh), 0);
     ASSERT_TRUE(equal(mesh, triangulated(test::shuffled(grid.faces, random), 3)));
+  }
+}
+
+// Whether no two triangles meet but in vertices and edges of both.
+testing::AssertionResult is_clean_mesh(const TriangulatedBoundary& mesh) {
+  const auto corners = [&](const glm::uvec3& t) {
+    return TriangleCorners{mesh.points[t.x], mesh.points[t.y], mesh.points[t.z]};
+  };
+  for (std::size_t s = 0; s < mesh.triangles.size(); ++s) {
+    const TriangleCorners a = corners(mesh.triangles[s]);
+    if (a[0] == a[1] || a[1] == a[2] || a[2] == a[0]) {
+      return testing::AssertionFailure() << "triangle " << s << " has two equal corners";
+    }
+    for (std::size_t t = 0; t < s; ++t) {
+      if (!is_clean(triangles_meet(a, corners(mesh.triangles[t])))) {
+        return testing::AssertionFailure() << "triangles " << t << " and " << s << " meet";
+      }
+    }
+  }
+  return testing::AssertionSuccess();
+}
+
+TEST(TriangulateBoundary, FloatPositionsAreCleanAndExact) {
+  for (unsigned seed = 0; seed < 60; ++seed) {
+    SCOPED_TRACE(seed);
+    std::mt19937 random(seed);
+    const int size = 1 + static_cast<int>(seed % 4);
+    PlaneGrid grid(size, 1000, 150, random);
+    grid.set_cells(test::random_cells(size, 0.1 + 0.8 * (seed % 11) / 10, random));
+    if (grid.faces.planes.empty()) continue;
+    // Distances of floats: 32 to 256 steps.
+    const Lattice lattice{glm::dvec3(std::ldexp(1.0, 28 + static_cast<int>(seed % 4))), 1.0};
+    const auto mesh = triangulate_boundary(grid.faces, lattice, true);
+    ASSERT_TRUE(mesh.has_value());
+    for (const glm::dvec3& p : mesh->positions) ASSERT_EQ(glm::dvec3(glm::vec3(p)), p);
+    ASSERT_TRUE(is_manifold(*mesh));
+    ASSERT_TRUE(in_canonical_order(*mesh));
+    ASSERT_TRUE(is_clean_mesh(*mesh));
+    const auto again = triangulate_boundary(test::shuffled(grid.faces, random), lattice, true);
+    ASSERT_TRUE(again.has_value());
+    ASSERT_TRUE(equal(*mesh, *again));
   }
 }
 

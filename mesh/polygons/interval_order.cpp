@@ -1,6 +1,6 @@
-#include "csg/boundary/interval_order.h"
+#include "mesh/polygons/interval_order.h"
 
-namespace strata::csg {
+namespace strata {
 
 void IntervalOrder::replace_child(Id parent, Id child, Id by) {
   if (parent == kNone) {
@@ -62,4 +62,4 @@ void IntervalOrder::erase(Id id) {
   (node.previous == kNone ? first_ : nodes_[node.previous].next) = node.next;
 }
 
-}  // namespace strata::csg
+}  // namespace strata

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace strata::csg {
+namespace strata {
 
 /// The intervals of a sweep line from the lowest to the highest: a search tree whose order the
 /// caller makes, so that a new interval beside a known one costs no comparison.
@@ -58,4 +58,4 @@ class IntervalOrder {
   std::uint32_t random_ = 1;
 };
 
-}  // namespace strata::csg
+}  // namespace strata

@@ -1,9 +1,9 @@
-#include "csg/boundary/umbrellas.h"
+#include "mesh/repair/umbrellas.h"
 
 #include <algorithm>
 #include <array>
 
-namespace strata::csg {
+namespace strata {
 namespace {
 
 using Index = std::uint32_t;
@@ -164,4 +164,4 @@ Result<std::vector<Index>> split_umbrellas(std::vector<glm::uvec3>& triangles,
   return Umbrellas(triangles, point_count, wedges).run();
 }
 
-}  // namespace strata::csg
+}  // namespace strata

@@ -6,7 +6,7 @@
 
 #include "exact/cut_points.h"
 
-namespace strata::csg {
+namespace strata {
 
 /// A mesh whose order depends on its geometry alone.
 struct OrderedMesh {
@@ -24,4 +24,4 @@ OrderedMesh canonical_order(const std::vector<exact::FilePoint>& positions,
                             const std::vector<glm::uvec3>& triangles,
                             const std::vector<std::uint32_t>& labels);
 
-}  // namespace strata::csg
+}  // namespace strata

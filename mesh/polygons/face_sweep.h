@@ -4,10 +4,10 @@
 #include <span>
 #include <vector>
 
-#include "csg/boundary/delaunay_mesh.h"
-#include "csg/boundary/interval_order.h"
+#include "mesh/polygons/delaunay_mesh.h"
+#include "mesh/polygons/interval_order.h"
 
-namespace strata::csg {
+namespace strata {
 
 /// A directed edge of a region in the plane, with the region on its left.
 struct FlatEdge {
@@ -101,4 +101,4 @@ class FaceSweep {
   Around around_;
 };
 
-}  // namespace strata::csg
+}  // namespace strata

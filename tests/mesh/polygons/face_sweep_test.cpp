@@ -1,4 +1,4 @@
-#include "csg/boundary/face_sweep.h"
+#include "mesh/polygons/face_sweep.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <random>
 #include <set>
 
-namespace strata::csg {
+namespace strata {
 namespace {
 
 using boost::multiprecision::cpp_int;
@@ -360,4 +360,4 @@ TEST(FaceSweep, TimeGrowsAsTheCornersDo) {
 }
 
 }  // namespace
-}  // namespace strata::csg
+}  // namespace strata

@@ -1,4 +1,4 @@
-#include "csg/boundary/face_sweep.h"
+#include "mesh/polygons/face_sweep.h"
 
 #include <algorithm>
 
@@ -11,7 +11,7 @@
 // We differ: the triangulation is made Delaunay as it grows, which takes fewer flips than
 // afterwards, since long triangles never pile up.
 
-namespace strata::csg {
+namespace strata {
 
 int FaceSweep::turn(Index a, Index b, Index c) const {
   if (view_.points.empty()) return exact::orient2d(points_[a], points_[b], points_[c]);
@@ -301,4 +301,4 @@ bool FaceSweep::cut(const ExactView& view, std::span<const FlatEdge> edges, Dela
   return sweep(view.points.size(), edges);
 }
 
-}  // namespace strata::csg
+}  // namespace strata

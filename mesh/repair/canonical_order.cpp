@@ -1,4 +1,4 @@
-#include "csg/boundary/canonical_order.h"
+#include "mesh/repair/canonical_order.h"
 
 #include <algorithm>
 #include <array>
@@ -8,7 +8,7 @@
 #include <tuple>
 #include <utility>
 
-namespace strata::csg {
+namespace strata {
 namespace {
 
 using exact::FilePoint;
@@ -202,4 +202,4 @@ OrderedMesh canonical_order(const std::vector<FilePoint>& positions,
   return Ordering(positions, triangles, labels).run();
 }
 
-}  // namespace strata::csg
+}  // namespace strata

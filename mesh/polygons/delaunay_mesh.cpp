@@ -1,8 +1,8 @@
-#include "csg/boundary/delaunay_mesh.h"
+#include "mesh/polygons/delaunay_mesh.h"
 
 #include <algorithm>
 
-namespace strata::csg {
+namespace strata {
 
 void DelaunayMesh::begin(std::span<const exact::FlatPoint> points) {
   points_ = points;
@@ -86,4 +86,4 @@ std::size_t DelaunayMesh::straighten() {
                     [&](const auto& t) { return left(t[0], t[1], t[2]) == 0; }));
 }
 
-}  // namespace strata::csg
+}  // namespace strata

@@ -7,7 +7,7 @@
 
 #include "exact/flat_predicates.h"
 
-namespace strata::csg {
+namespace strata {
 
 /// Triangles in the plane that know their neighbours, and that are made Delaunay by flips as points
 /// are added.
@@ -95,4 +95,4 @@ class DelaunayMesh {
   std::vector<Side> waiting_;
 };
 
-}  // namespace strata::csg
+}  // namespace strata

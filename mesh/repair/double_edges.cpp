@@ -1,11 +1,11 @@
-#include "csg/boundary/double_edges.h"
+#include "mesh/repair/double_edges.h"
 
 #include <algorithm>
 #include <array>
 #include <map>
 #include <tuple>
 
-namespace strata::csg {
+namespace strata {
 namespace {
 
 using Index = std::uint32_t;
@@ -19,9 +19,8 @@ struct Use {
 };
 
 // Divides a triangle whose edges k have the middle vertex middle[k], or kNone.
-void divide(std::vector<glm::uvec3>& triangles, std::vector<Index>& labels, Index triangle,
-            const std::array<Index, 3>& middle, const std::vector<exact::FilePoint>& positions) {
-  const glm::uvec3 t = triangles[triangle];
+void divide(RoundedMesh& mesh, Index triangle, const std::array<Index, 3>& middle) {
+  const glm::uvec3 t = mesh.triangles[triangle];
   std::vector<glm::uvec3> parts;
   const auto is_middle = [&middle](Index vertex) {
     return std::find(middle.begin(), middle.end(), vertex) != middle.end();
@@ -41,16 +40,18 @@ void divide(std::vector<glm::uvec3>& triangles, std::vector<Index>& labels, Inde
   // lies on a line with its neighbours, and else from the least.
   const auto least = std::min_element(rest.begin(), rest.end(), [&](Index a, Index b) {
     if (parts.empty() && (is_middle(a) || is_middle(b))) return is_middle(a);
-    const exact::FilePoint &p = positions[a], &q = positions[b];
+    const exact::FilePoint &p = mesh.positions[a], &q = mesh.positions[b];
     return std::tie(p.x, p.y, p.z) < std::tie(q.x, q.y, q.z);
   });
   std::rotate(rest.begin(), least, rest.end());
   for (std::size_t i = 2; i < rest.size(); ++i) {
     parts.emplace_back(rest[0], rest[i - 1], rest[i]);
   }
-  triangles[triangle] = parts.front();
-  triangles.insert(triangles.end(), parts.begin() + 1, parts.end());
-  labels.resize(triangles.size(), Index(labels[triangle]));
+  mesh.triangles[triangle] = parts.front();
+  mesh.triangles.insert(mesh.triangles.end(), parts.begin() + 1, parts.end());
+  mesh.labels.resize(mesh.triangles.size(), Index(mesh.labels[triangle]));
+  mesh.groups[triangle] = RoundedMesh::kNoGroup;
+  mesh.groups.resize(mesh.triangles.size(), RoundedMesh::kNoGroup);
 }
 
 std::vector<Use> sorted_uses(const std::vector<glm::uvec3>& triangles,
@@ -70,11 +71,10 @@ std::vector<Use> sorted_uses(const std::vector<glm::uvec3>& triangles,
 
 }  // namespace
 
-std::size_t divide_double_edges(std::vector<glm::uvec3>& triangles, std::vector<Index>& labels,
-                                std::vector<exact::FilePoint>& positions,
-                                std::span<const WedgeEdge> wedges,
+std::size_t divide_double_edges(RoundedMesh& mesh, std::span<const WedgeEdge> wedges,
                                 const WrittenPositions& written) {
-  const std::vector<Use> uses = sorted_uses(triangles, wedges);
+  const std::vector<Use> uses = sorted_uses(mesh.triangles, wedges);
+  std::vector<exact::FilePoint>& positions = mesh.positions;
   const std::size_t count = positions.size();
   std::map<Index, std::array<Index, 3>> middles;  // of the edges of triangles
   for (std::size_t begin = 0, end = 0; begin < uses.size(); begin = end) {
@@ -91,10 +91,8 @@ std::size_t divide_double_edges(std::vector<glm::uvec3>& triangles, std::vector<
       middle[uses[i].corner] = static_cast<Index>(positions.size() - 1);
     }
   }
-  for (const auto& [triangle, middle] : middles) {
-    divide(triangles, labels, triangle, middle, positions);
-  }
+  for (const auto& [triangle, middle] : middles) divide(mesh, triangle, middle);
   return positions.size() - count;
 }
 
-}  // namespace strata::csg
+}  // namespace strata

@@ -1,0 +1,161 @@
+#include "mesh/repair/changing_mesh.h"
+
+#include <algorithm>
+
+namespace strata {
+
+using exact::FilePoint;
+using Index = ChangingMesh::Index;
+
+namespace {
+
+constexpr glm::uvec3 kNoTriangle(0);
+
+}  // namespace
+
+ChangingMesh::ChangingMesh(RoundedMesh& mesh) : mesh_(mesh), first_(mesh.positions.size() + 1, 0) {
+  for (const glm::uvec3& t : mesh.triangles) ++first_[t.x], ++first_[t.y], ++first_[t.z];
+  Index sum = 0;
+  for (Index& first : first_) first = sum += first;
+  at_.resize(3 * mesh.triangles.size());
+  for (Index t = 0; t < mesh.triangles.size(); ++t) {
+    for (int k = 0; k < 3; ++k) at_[--first_[mesh.triangles[t][k]]] = t;
+  }
+}
+
+std::span<const Index> ChangingMesh::around(Index vertex) const {
+  const auto found = fans_.find(vertex);
+  if (found != fans_.end()) return found->second;
+  return std::span(at_).subspan(first_[vertex], first_[vertex + 1] - first_[vertex]);
+}
+
+std::vector<Index>& ChangingMesh::fan(Index vertex) {
+  const auto [found, added] = fans_.try_emplace(vertex);
+  if (added) {
+    found->second.assign(at_.begin() + first_[vertex], at_.begin() + first_[vertex + 1]);
+  }
+  return found->second;
+}
+
+// Keeps the fans of its corners up to date.
+void ChangingMesh::set_triangle(Index t, const glm::uvec3& corners) {
+  glm::uvec3& triangle = mesh_.triangles[t];
+  if (alive(t)) {
+    for (int k = 0; k < 3; ++k) std::erase(fan(triangle[k]), t);
+  }
+  triangle = corners;
+  if (alive(t)) {
+    for (int k = 0; k < 3; ++k) fan(triangle[k]).push_back(t);
+  }
+  mesh_.groups[t] = RoundedMesh::kNoGroup;
+}
+
+Index ChangingMesh::triangle_of(Index a, Index b) const {
+  for (const Index t : around(a)) {
+    const glm::uvec3& c = mesh_.triangles[t];
+    if ((c.x == a && c.y == b) || (c.y == a && c.z == b) || (c.z == a && c.x == b)) return t;
+  }
+  return kNone;
+}
+
+Index ChangingMesh::opposite(Index t, Index a, Index b) const {
+  const glm::uvec3& c = mesh_.triangles[t];
+  return c.x != a && c.x != b ? c.x : c.y != a && c.y != b ? c.y : c.z;
+}
+
+std::vector<Index> ChangingMesh::neighbours(Index vertex) const {
+  std::vector<Index> result;
+  for (const Index t : around(vertex)) {
+    for (int k = 0; k < 3; ++k) {
+      if (mesh_.triangles[t][k] != vertex) result.push_back(mesh_.triangles[t][k]);
+    }
+  }
+  std::sort(result.begin(), result.end());
+  result.erase(std::unique(result.begin(), result.end()), result.end());
+  return result;
+}
+
+void ChangingMesh::move(Index vertex, const FilePoint& to) {
+  old_positions_.emplace_back(vertex, mesh_.positions[vertex]);
+  mesh_.positions[vertex] = to;
+  for (const Index t : around(vertex)) {
+    old_triangles_.emplace_back(t, mesh_.triangles[t]);
+    mesh_.groups[t] = RoundedMesh::kNoGroup;
+    changed_.push_back(t);
+  }
+}
+
+bool ChangingMesh::contract(Index from, Index to) {
+  const Index left = triangle_of(from, to), right = triangle_of(to, from);
+  if (left == kNone || right == kNone) return false;
+  // The link condition: only the two triangles at the edge join neighbours of both ends.
+  const std::vector<Index> here = neighbours(from), there = neighbours(to);
+  std::vector<Index> both;
+  std::set_intersection(here.begin(), here.end(), there.begin(), there.end(),
+                        std::back_inserter(both));
+  if (both.size() != 2 || here.size() + there.size() <= 6) return false;
+  const std::span<const Index> view = around(from);
+  const std::vector<Index> triangles(view.begin(), view.end());
+  for (const Index t : triangles) {
+    glm::uvec3 corners = mesh_.triangles[t];
+    old_triangles_.emplace_back(t, corners);
+    for (int k = 0; k < 3; ++k) {
+      if (corners[k] == from) corners[k] = to;
+    }
+    set_triangle(t, t == left || t == right ? kNoTriangle : corners);
+    changed_.push_back(t);
+  }
+  return true;
+}
+
+bool ChangingMesh::flip(Index a, Index b) {
+  const Index left = triangle_of(a, b), right = triangle_of(b, a);
+  if (left == kNone || right == kNone) return false;
+  const Index c = opposite(left, a, b), d = opposite(right, a, b);
+  if (c == d || triangle_of(c, d) != kNone || triangle_of(d, c) != kNone) return false;
+  for (const Index t : {left, right}) {
+    old_triangles_.emplace_back(t, mesh_.triangles[t]);
+    changed_.push_back(t);
+  }
+  set_triangle(left, {a, d, c});
+  set_triangle(right, {d, b, c});
+  return true;
+}
+
+bool ChangingMesh::take_out_tetrahedron(Index t) {
+  const glm::uvec3 corners = mesh_.triangles[t];
+  for (int k = 0; k < 3; ++k) {
+    if (around(corners[k]).size() != 3) return false;
+  }
+  const Index next = triangle_of(corners.y, corners.x);
+  const Index apex = opposite(next, corners.x, corners.y);
+  if (around(apex).size() != 3) return false;
+  std::vector<Index> all(around(apex).begin(), around(apex).end());
+  all.push_back(t);
+  for (const Index part : all) {
+    old_triangles_.emplace_back(part, mesh_.triangles[part]);
+    set_triangle(part, kNoTriangle);
+    changed_.push_back(part);
+  }
+  return true;
+}
+
+void ChangingMesh::keep() {
+  changed_.clear();
+  old_triangles_.clear();
+  old_positions_.clear();
+}
+
+void ChangingMesh::take_back() {
+  for (std::size_t i = old_triangles_.size(); i-- > 0;) {
+    if (mesh_.triangles[old_triangles_[i].first] != old_triangles_[i].second) {
+      set_triangle(old_triangles_[i].first, old_triangles_[i].second);
+    }
+  }
+  for (std::size_t i = old_positions_.size(); i-- > 0;) {
+    mesh_.positions[old_positions_[i].first] = old_positions_[i].second;
+  }
+  keep();
+}
+
+}  // namespace strata

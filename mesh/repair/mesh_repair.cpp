@@ -1,0 +1,265 @@
+#include "mesh/repair/mesh_repair.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <tuple>
+
+#include "mesh/check/triangles_meet.h"
+#include "mesh/repair/changing_mesh.h"
+#include "mesh/repair/near_triangles.h"
+
+namespace strata {
+namespace {
+
+using exact::FilePoint;
+using Index = std::uint32_t;
+
+constexpr int kMostRounds = 5;
+// Edges are short, and vertices near, up to so many distances between neighbouring positions.
+constexpr double kNear = 16;
+
+using Key = std::array<std::int64_t, 3>;
+Key key(const FilePoint& p) { return {p.x, p.y, p.z}; }
+
+class Repair {
+ public:
+  Repair(RoundedMesh& mesh, const WrittenPositions& written)
+      : written_(written), mesh_(mesh), near_(mesh) {}
+
+  /// Mends what it can. @return how many changes were kept
+  std::size_t run(std::vector<MeshConflict> conflicts, const std::stop_token& stop);
+
+ private:
+  // The edge from a to b of a triangle, and its third corner.
+  struct Edge {
+    Index a, b, c;
+  };
+
+  std::array<Key, 3> sorted_corners(Index t) const;
+  double unit(Index vertex) const;
+  bool mend(const MeshConflict& conflict);
+  void try_contractions(const std::vector<Edge>& edges);
+  void try_flips(const std::vector<Edge>& edges);
+  void try_moves(std::vector<Index> vertices);
+  bool has_conflict(const MeshConflict& conflict) const;
+  std::vector<Edge> edges_of(const MeshConflict& conflict) const;
+  template <class Step>
+  void try_step(const std::vector<Index>& ends, const Step& step);
+
+  const WrittenPositions& written_;
+  ChangingMesh mesh_;
+  NearTriangles near_;
+  bool done_ = false;                // the conflict at hand is mended
+  std::size_t best_gain_ = 0;        // conflicts that the best step took away
+  std::function<bool()> best_step_;  // to be made again
+};
+
+std::array<Key, 3> Repair::sorted_corners(Index t) const {
+  std::array<Key, 3> keys;
+  for (int k = 0; k < 3; ++k) {
+    keys[static_cast<std::size_t>(k)] = key(mesh_.position(mesh_.triangle(t)[k]));
+  }
+  std::sort(keys.begin(), keys.end());
+  return keys;
+}
+
+// The largest distance from a position to the next ones.
+double Repair::unit(Index vertex) const {
+  const FilePoint& at = mesh_.position(vertex);
+  std::int64_t result = 1;
+  for (int k = 0; k < 3; ++k) {
+    result = std::max(result, written_.neighbour(at, k, true)[k] - at[k]);
+    result = std::max(result, at[k] - written_.neighbour(at, k, false)[k]);
+  }
+  return static_cast<double>(result);
+}
+
+bool Repair::has_conflict(const MeshConflict& conflict) const {
+  const auto corners = [this](Index t) {
+    const glm::uvec3& c = mesh_.triangle(t);
+    return TriangleCorners{mesh_.position(c.x), mesh_.position(c.y), mesh_.position(c.z)};
+  };
+  if (!mesh_.alive(conflict.first) || !mesh_.alive(conflict.second)) return false;
+  const TriangleCorners a = corners(conflict.first);
+  if (conflict.first == conflict.second) return !has_area(a[0], a[1], a[2]);
+  return !is_clean(triangles_meet(a, corners(conflict.second)));
+}
+
+// Makes a step, counts the conflicts of the triangles around it before and after, and takes it
+// back.
+template <class Step>
+void Repair::try_step(const std::vector<Index>& ends, const Step& step) {
+  if (done_) return;
+  std::vector<Index> triangles;
+  for (const Index vertex : ends) {
+    const auto around = mesh_.around(vertex);
+    triangles.insert(triangles.end(), around.begin(), around.end());
+  }
+  if (!step()) return;
+  const std::size_t after = near_.count_conflicts(triangles);
+  mesh_.take_back();
+  const std::size_t before = near_.count_conflicts(triangles);
+  if (before < after + best_gain_ + 1) return;
+  best_gain_ = before - after;
+  best_step_ = step;
+  done_ = after == 0;
+}
+
+std::vector<Repair::Edge> Repair::edges_of(const MeshConflict& conflict) const {
+  std::vector<Edge> edges;
+  for (const Index t : {conflict.first, conflict.second}) {
+    const glm::uvec3& c = mesh_.triangle(t);
+    for (int k = 0; k < 3; ++k) edges.push_back({c[k], c[(k + 1) % 3], c[(k + 2) % 3]});
+    if (conflict.first == conflict.second) break;
+  }
+  const auto order = [this](const Edge& edge) {
+    const Key a = key(mesh_.position(edge.a)), b = key(mesh_.position(edge.b));
+    const glm::dvec3 along(mesh_.position(edge.b) - mesh_.position(edge.a));
+    return std::tuple(glm::dot(along, along), std::min(a, b), std::max(a, b),
+                      key(mesh_.position(edge.c)));
+  };
+  std::sort(edges.begin(), edges.end(),
+            [&](const Edge& x, const Edge& y) { return order(x) < order(y); });
+  return edges;
+}
+
+// The shortest edges first; onto the end that is less.
+void Repair::try_contractions(const std::vector<Edge>& edges) {
+  for (const Edge& edge : edges) {
+    const FilePoint &a = mesh_.position(edge.a), &b = mesh_.position(edge.b);
+    if (glm::length(glm::dvec3(b - a)) > kNear * std::max(unit(edge.a), unit(edge.b))) continue;
+    const bool a_first = key(a) < key(b);
+    const Index least = a_first ? edge.a : edge.b, other = a_first ? edge.b : edge.a;
+    try_step({edge.a, edge.b}, [this, least, other] { return mesh_.contract(other, least); });
+    try_step({edge.a, edge.b}, [this, least, other] { return mesh_.contract(least, other); });
+  }
+}
+
+// Edges that the third corner lies on, nearly.
+void Repair::try_flips(const std::vector<Edge>& edges) {
+  for (auto edge = edges.rbegin(); edge != edges.rend(); ++edge) {
+    const Index a = edge->a, b = edge->b;
+    const glm::dvec3 along(mesh_.position(b) - mesh_.position(a)),
+        to(mesh_.position(edge->c) - mesh_.position(a));
+    const double length = glm::length(along);
+    if (glm::length(glm::cross(along, to)) > kNear * unit(edge->c) * length) continue;
+    std::vector<Index> ends = {a, b, edge->c};
+    for (const Index t : mesh_.around(a)) {  // the triangle on the other side
+      const glm::uvec3& c = mesh_.triangle(t);
+      for (int k = 0; k < 3; ++k) {
+        if (c[k] == b && c[(k + 1) % 3] == a) ends.push_back(c[(k + 2) % 3]);
+      }
+    }
+    try_step(ends, [this, a, b] { return mesh_.flip(a, b); });
+  }
+}
+
+// To the 26 positions around, then to farther ones.
+void Repair::try_moves(std::vector<Index> vertices) {
+  std::sort(vertices.begin(), vertices.end(),
+            [this](Index a, Index b) { return key(mesh_.position(a)) < key(mesh_.position(b)); });
+  vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+  for (int distance = 1; distance <= 4; distance *= 2) {
+    for (const Index vertex : vertices) {
+      for (int direction = 0; direction < 27; ++direction) {
+        if (direction == 13) continue;  // no move
+        FilePoint to = mesh_.position(vertex);
+        for (int k = 0, rest = direction; k < 3; ++k, rest /= 3) {
+          if (rest % 3 == 1) continue;
+          for (int i = 0; i < distance; ++i) to = written_.neighbour(to, k, rest % 3 == 2);
+        }
+        try_step({vertex}, [this, vertex, to] {
+          mesh_.move(vertex, to);
+          return true;
+        });
+        if (done_) return;
+      }
+    }
+  }
+}
+
+bool Repair::mend(const MeshConflict& conflict) {
+  done_ = false;
+  best_gain_ = 0;
+  const std::vector<Edge> edges = edges_of(conflict);
+  std::vector<Index> vertices;
+  for (const Edge& edge : edges) vertices.push_back(edge.a);
+  for (const Index t : {conflict.first, conflict.second}) {
+    try_step(vertices, [this, t] { return mesh_.take_out_tetrahedron(t); });
+  }
+  try_contractions(edges);
+  try_flips(edges);
+  try_moves(vertices);
+  if (best_gain_ == 0) return false;
+  best_step_();
+  near_.enter(mesh_.changed());
+  mesh_.keep();
+  return true;
+}
+
+std::size_t Repair::run(std::vector<MeshConflict> conflicts, const std::stop_token& stop) {
+  const auto order = [this](const MeshConflict& conflict) {
+    const auto a = sorted_corners(conflict.first), b = sorted_corners(conflict.second);
+    return std::pair(std::min(a, b), std::max(a, b));
+  };
+  std::sort(conflicts.begin(), conflicts.end(),
+            [&](const MeshConflict& a, const MeshConflict& b) { return order(a) < order(b); });
+  std::size_t count = 0;
+  for (const MeshConflict& conflict : conflicts) {
+    // A step may leave the conflict, and take others away.
+    for (int i = 0; i < 4 && has_conflict(conflict) && !stop.stop_requested(); ++i) {
+      if (!mend(conflict)) break;
+      ++count;
+    }
+  }
+  return count;
+}
+
+void remove_dead(RoundedMesh& mesh) {
+  std::size_t count = 0;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    if (mesh.triangles[t].x == mesh.triangles[t].y) continue;
+    mesh.triangles[count] = mesh.triangles[t];
+    mesh.labels[count] = mesh.labels[t];
+    mesh.groups[count++] = mesh.groups[t];
+  }
+  mesh.triangles.resize(count);
+  mesh.labels.resize(count);
+  mesh.groups.resize(count);
+}
+
+tl::unexpected<Error> too_many(const RoundedMesh& mesh, const WrittenPositions& written,
+                               const std::vector<MeshConflict>& conflicts) {
+  const glm::dvec3 at = written.world(mesh.positions[mesh.triangles[conflicts.front().first].x]);
+  return fail(ErrorCode::kGeometry,
+              "rounding positions to {} makes {} pairs of triangles meet, one near ({}, {}, {}), "
+              "which small changes do not mend; {}",
+              written.as_float() ? "float" : "double", conflicts.size(), at.x, at.y, at.z,
+              written.as_float() ? "a format with double positions or fewer --bits may help"
+                                 : "fewer --bits may help");
+}
+
+}  // namespace
+
+Result<MeshRepair> repair_mesh(RoundedMesh& mesh, const WrittenPositions& written,
+                               const Execution& execution) {
+  MeshRepair result;
+  while (true) {
+    Result<std::vector<MeshConflict>> conflicts = find_conflicts(mesh, execution);
+    if (!conflicts) return tl::unexpected(conflicts.error());
+    if (conflicts->empty()) return result;
+    const std::size_t mended =
+        result.rounds < kMostRounds ? Repair(mesh, written).run(*conflicts, execution.stop) : 0;
+    if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+    if (mended == 0) return too_many(mesh, written, *conflicts);
+    result.places += mended;
+    ++result.rounds;
+    remove_dead(mesh);
+  }
+}
+
+}  // namespace strata
