@@ -37,6 +37,24 @@ inline constexpr std::pair<std::string_view, MeshFormat> kMeshFormatWords[] = {
     {"stl", MeshFormat::kStl},
     {"ply", MeshFormat::kPly},
     {"off", MeshFormat::kOff}};
+inline constexpr std::pair<std::string_view, SolidFormat> kSolidFormatWords[] = {
+    {"3mf", SolidFormat::k3mf},
+    {"stl", SolidFormat::kStl},
+    {"obj", SolidFormat::kObj},
+    {"ply", SolidFormat::kPly},
+    {"off", SolidFormat::kOff}};
+/// As a 3MF spells them.
+inline constexpr std::pair<std::string_view, LengthUnit> kUnitWords[] = {
+    {"micron", LengthUnit::kMicron},
+    {"millimeter", LengthUnit::kMillimetre},
+    {"centimeter", LengthUnit::kCentimetre},
+    {"meter", LengthUnit::kMetre},
+    {"inch", LengthUnit::kInch},
+    {"foot", LengthUnit::kFoot}};
+inline constexpr std::pair<std::string_view, MeshMethod> kMeshMethodWords[] = {
+    {"exact", MeshMethod::kExact}, {"contour", MeshMethod::kContour}};
+inline constexpr std::pair<std::string_view, csg::BoundaryFaceKind> kFaceKindWords[] = {
+    {"canonical", csg::BoundaryFaceKind::kCanonical}, {"input", csg::BoundaryFaceKind::kInput}};
 inline constexpr std::pair<std::string_view, std::optional<Axis>> kAxisWords[] = {
     {"x", Axis::kX}, {"y", Axis::kY}, {"z", Axis::kZ}, {"auto", std::nullopt}};
 

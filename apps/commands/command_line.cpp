@@ -25,6 +25,7 @@ constexpr const char* kTopHelp = R"(strata: exact voxels, depth lists and pictur
   strata voxelize scan.ply -r 1024 --stats --json  statistics for a program
   strata info scan.ply                             size, volume, holes
   strata ldi knot.obj -r 512 -o knot.exr           depth lists as a deep image
+  strata mesh plate.csg -o plate.3mf               the exact mesh of a Boolean tree
   strata csg plate.csg -o plate.png                a picture of a Boolean tree
   strata part.scad -o part.png                     a picture, without naming the command
   strata oit knot.obj --opacity 0.4 -o knot.png    a transparent picture
@@ -243,6 +244,8 @@ bool define_command(std::string_view name, CLI::App& app, Words& words) {
   app.footer("`strata --help` lists the commands and the exit codes.");
   if (name == "voxelize") {
     define_voxelize(app, words);
+  } else if (name == "mesh") {
+    define_mesh(app, words);
   } else if (name == "info") {
     define_info(app, words);
   } else if (name == "ldi") {
@@ -533,6 +536,7 @@ Command parse_command_line(int argc, const char* const* argv) {
   Reader reader;
   Command command;
   if (name == "voxelize") command = voxelize_command(words, reader);
+  if (name == "mesh") command = mesh_command(words, reader);
   if (name == "info") command = info_command(words, reader);
   if (name == "ldi") command = ldi_command(words, reader);
   if (name == "csg") command = csg_command(words, reader);

@@ -18,6 +18,12 @@ class App;
 
 namespace strata::apps {
 
+/// The options of `strata mesh` alone, as words. Empty: not given.
+struct MeshWords {
+  std::string method = "exact", faces, bits, unit, open;
+  bool colours = false;
+};
+
 /// The words of the command line before they are read as numbers and choices. Empty: not given.
 struct Words {
   std::vector<std::string> files;
@@ -34,6 +40,7 @@ struct Words {
   bool stats = false, checksum = false, dry_run = false, list_formats = false, gl = false;
   CsgWords csg;
   OitWords oit;
+  MeshWords mesh;
 };
 
 /// Reads one option's value into `target`; keeps the first error.
@@ -73,6 +80,7 @@ struct CommandSummary {
 };
 inline constexpr CommandSummary kCommands[] = {
     {"voxelize", "Turn meshes and scenes into a voxel file or statistics"},
+    {"mesh", "Write the boundary of a scene or of meshes: 3MF, STL, OBJ, PLY, OFF"},
     {"info", "Report counts, bounds, area, volume and holes"},
     {"ldi", "Write the depth lists of meshes or a scene: a layered depth image"},
     {"csg", "Draw or measure a scene (.csg, .scad) or an expression over meshes"},
@@ -102,6 +110,10 @@ void define_picture_quality(CLI::App& app, CsgWords& csg);
 void define_picture_cuts(CLI::App& app, CsgWords& csg);
 /// Reads common options, inputs, output and report.
 void picture_request(const Words& words, Reader& reader, PictureRequest& request);
+
+// command_line_mesh.cpp: `strata mesh`
+void define_mesh(CLI::App& app, Words& words);
+MeshCommand mesh_command(const Words& words, Reader& reader);
 
 // command_line_oit.cpp: `strata oit`
 void define_oit(CLI::App& app, Words& words);

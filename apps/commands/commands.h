@@ -10,9 +10,11 @@
 #include "apps/session/help.h"
 #include "apps/session/session.h"
 #include "hashbuffer/tile_builder.h"
+#include "strata/csg/boundary/boundary_mesh.h"
 #include "strata/csg/input/scene_input.h"
 #include "strata/csg/picture/picture.h"
 #include "strata/hashbuffer/offsets.h"
+#include "strata/mesh/writers/write_solid.h"
 #include "strata/transparency/techniques.h"
 #include "strata/voxelize/grid_fit.h"
 #include "strata/voxelize/voxelize.h"
@@ -70,6 +72,27 @@ struct LdiCommand {
   Backend backend = Backend::kAuto;
 };
 
+/// What makes a mesh of a tree.
+enum class MeshMethod {
+  kExact,   ///< the arrangement of all triangles: csg::boundary_mesh()
+  kContour  ///< depth lists on a grid
+};
+
+/// `strata mesh`
+struct MeshCommand {
+  CommonOptions common;
+  csg::SceneInput input;
+  std::string output;                         ///< empty: none, "-": standard output
+  SolidFormat format = SolidFormat::kAuto;    ///< of the output; kAuto: there is none
+  std::string materials;                      ///< a file beside an OBJ, for colours; empty: none
+  LengthUnit unit = LengthUnit::kMillimetre;  ///< of a 3MF
+  MeshMethod method = MeshMethod::kExact;
+  csg::BoundaryOptions boundary;    ///< of the exact method
+  std::int64_t resolution = 0;      ///< of the contour: voxels along the longest side
+  OpenMode open = OpenMode::kVote;  ///< of the contour
+  std::optional<std::string> json;  ///< "-": standard output
+};
+
 /// What commands that draw have in common: a scene, a camera, a look
 struct PictureRequest {
   CommonOptions common;
@@ -114,8 +137,8 @@ struct OitCommand : PictureRequest {
   bool list = false;                ///< only the list of techniques
 };
 
-using Command =
-    std::variant<ParseOutcome, VoxelizeCommand, InfoCommand, LdiCommand, CsgCommand, OitCommand>;
+using Command = std::variant<ParseOutcome, VoxelizeCommand, MeshCommand, InfoCommand, LdiCommand,
+                             CsgCommand, OitCommand>;
 
 /// Reads the command line.
 Command parse_command_line(int argc, const char* const* argv);

@@ -38,6 +38,12 @@ std::vector<FileUse> outputs_of(const VoxelizeCommand& command) {
   return outputs({{"-o", command.output}, {"--json", command.json.value_or("")}});
 }
 
+std::vector<FileUse> outputs_of(const MeshCommand& command) {
+  return outputs({{"-o", command.output},
+                  {"the materials of -o", command.materials},
+                  {"--json", command.json.value_or("")}});
+}
+
 std::vector<FileUse> outputs_of(const InfoCommand& command) {
   return outputs({{"--json", command.json.value_or("")}});
 }

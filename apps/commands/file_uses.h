@@ -17,6 +17,7 @@ template <class AnyCommand>
 
 /// What a command writes.
 [[nodiscard]] std::vector<FileUse> outputs_of(const VoxelizeCommand& command);
+[[nodiscard]] std::vector<FileUse> outputs_of(const MeshCommand& command);
 [[nodiscard]] std::vector<FileUse> outputs_of(const InfoCommand& command);
 [[nodiscard]] std::vector<FileUse> outputs_of(const LdiCommand& command);
 [[nodiscard]] std::vector<FileUse> outputs_of(const CsgCommand& command);

@@ -75,6 +75,9 @@ int exit_code(const Result<void>& result, Session& session) {
 Result<void> run_command(const VoxelizeCommand& command, Session& session) {
   return run_voxelize(command, session);
 }
+Result<void> run_command(const MeshCommand& command, Session& session) {
+  return run_mesh(command, session);
+}
 Result<void> run_command(const InfoCommand& command, Session& session) {
   return run_info(command, session);
 }
@@ -139,6 +142,8 @@ int strata_main(int argc, char** argv) {
   Result<void> result;
   if (const auto* voxelize = std::get_if<VoxelizeCommand>(&command)) {
     result = run(*voxelize, session);
+  } else if (const auto* mesh = std::get_if<MeshCommand>(&command)) {
+    result = run(*mesh, session);
   } else if (const auto* info = std::get_if<InfoCommand>(&command)) {
     result = run(*info, session);
   } else if (const auto* ldi = std::get_if<LdiCommand>(&command)) {

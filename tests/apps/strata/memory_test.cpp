@@ -138,6 +138,8 @@ INSTANTIATE_TEST_SUITE_P(
                     Job{"Minkowski", {"csg", "sum.csg", "--size", "40,40"}, "out.png"},
                     Job{"Imports", {"csg", "imports.csg", "--size", "40,40"}, "out.png"},
                     Job{"Mesh", {"voxelize", "ball.stl", "-r", "24"}, "out.vdb"},
+                    Job{"Boundary", {"mesh", "hull.csg", "--colours"}, "out.3mf"},
+                    Job{"Groups", {"mesh", "flat.csg", "ball.stl", "--ids"}, "out.ply"},
                     Job{"Lists", {"ldi", "ball.stl", "-r", "24"}, "out.npz"}),
     [](const auto& each) { return each.param.name; });
 

@@ -52,7 +52,7 @@ TEST_F(Usage, HelpBeginsWithExamplesAndEndsWithTheExitCodes) {
 }
 
 TEST_F(Usage, EveryCommandHasHelpThatBeginsWithExamples) {
-  for (const char* command : {"voxelize", "info", "ldi"}) {
+  for (const char* command : {"voxelize", "mesh", "info", "ldi"}) {
     const RunResult run = place.run({command, "--help"});
     EXPECT_EQ(run.exit_code, 0);
     EXPECT_EQ(run.err, "");
@@ -80,7 +80,7 @@ TEST_F(Usage, HelpLeavesOutWhatHelpAllShowsToDevelopers) {
 }
 
 TEST_F(Usage, HelpIsTidy) {
-  for (const char* command : {"voxelize", "ldi", "info", "csg"}) {
+  for (const char* command : {"voxelize", "mesh", "ldi", "info", "csg"}) {
     const std::string help = place.run({command, "--help-all"}).out;
     EXPECT_EQ(help.find("\n\n\n"), std::string::npos) << help;
     EXPECT_EQ(help.find_first_of("{}"), std::string::npos) << help;

@@ -1,0 +1,292 @@
+// `strata mesh`: meshes through the tool, its options, and what it says of mistakes.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "mesh/formats/read_3mf_amf.h"
+#include "strata/mesh/diagnose.h"
+#include "strata/mesh/formats/read_mesh.h"
+#include "strata/mesh/formats/write_mesh.h"
+#include "strata/mesh/shapes.h"
+#include "tests/apps/strata/json_names.h"
+#include "tests/apps/strata/run_tool.h"
+
+namespace strata {
+namespace {
+
+using nlohmann::json;
+using testkit::collect;
+using testkit::documented;
+using testkit::RunOptions;
+using testkit::RunResult;
+using testkit::Workplace;
+
+constexpr const char* kDrilled =
+    "difference() {\n"
+    "  color([1, 0, 0, 1]) cube(size = [10, 10, 10], center = true);\n"
+    "  color([0, 0, 1, 1]) cube(size = [4, 4, 20], center = true);\n"
+    "}\n";
+constexpr double kDrilledVolume = 1000 - 160;
+
+bool has(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+class MeshTool : public testing::Test {
+ protected:
+  MeshTool() {
+    place.write("drilled.csg", kDrilled);
+    place.write("apart.csg",
+                "cube(size = [1, 1, 1], center = false);\n"
+                "multmatrix([[1, 0, 0, 5], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]) "
+                "color([0, 0.5, 0, 1]) cube(size = [2, 2, 2], center = false);\n");
+    EXPECT_TRUE(write_mesh(place.path("box.obj"), make_box({0, 0, 0}, {4, 4, 4})));
+    EXPECT_TRUE(write_mesh(place.path("hole.stl"), make_box({1, 1, -1}, {3, 3, 5})));
+  }
+  /// The mesh of a file that the tool wrote; empty for a build that does not read it.
+  [[nodiscard]] TriangleSoup read(const std::string& name) const {
+    if (name.ends_with(".3mf")) {
+      auto soup = csg::read_3mf(place.path(name));
+      if (!soup && soup.error().code == ErrorCode::kUsage) return {};
+      EXPECT_TRUE(soup) << soup.error().message;
+      return soup ? *std::move(soup) : TriangleSoup();
+    }
+    auto file = read_mesh(place.path(name));
+    EXPECT_TRUE(file) << file.error().message;
+    return file ? std::move(file->soup) : TriangleSoup();
+  }
+  /// Expects a mistake with this code and a sentence that has `part`, and that nothing is left.
+  void refuses(std::vector<std::string> arguments, int code, const std::string& part) const {
+    const auto before = place.names();
+    arguments.insert(arguments.begin(), "mesh");
+    const RunResult run = place.run(arguments);
+    EXPECT_EQ(run.exit_code, code) << run.err;
+    EXPECT_EQ(run.out, "");
+    EXPECT_TRUE(has(run.err, part)) << part << "\n" << run.err;
+    EXPECT_EQ(place.names(), before);
+  }
+  Workplace place;
+};
+
+TEST_F(MeshTool, EachFormatIsTheClosedBoundaryOfTheScene) {
+  for (const char* name : {"a.3mf", "a.stl", "a.obj", "a.ply", "a.off"}) {
+    const RunResult run = place.run({"mesh", "drilled.csg", "-o", name});
+    ASSERT_EQ(run.exit_code, 0) << run.err;
+    EXPECT_EQ(run.out, "");
+    EXPECT_TRUE(has(run.err, name)) << run.err;
+    EXPECT_TRUE(has(run.err, "closed, manifold")) << run.err;
+    const TriangleSoup soup = read(name);
+    if (soup.triangles.empty() && std::string(name) == "a.3mf") continue;
+    const MeshDiagnosis found = diagnose(soup);
+    EXPECT_TRUE(found.closed) << name;
+    EXPECT_EQ(found.non_manifold_edges, 0u);
+    EXPECT_NEAR(found.volume, kDrilledVolume, 1e-6) << name;
+    EXPECT_EQ(found.triangles, 32u) << "a plate with a hole has no more";
+  }
+}
+
+TEST_F(MeshTool, AnExpressionTakesMeshesByPlaceAndByName) {
+  for (const char* expression : {"a - b", "box - hole"}) {
+    const RunResult run =
+        place.run({"mesh", "box.obj", "hole.stl", "--expr", expression, "-o", "c.stl", "-q"});
+    ASSERT_EQ(run.exit_code, 0) << run.err;
+    EXPECT_EQ(run.err, "");
+    EXPECT_NEAR(diagnose(read("c.stl")).volume, 64 - 16, 1e-6);
+  }
+}
+
+TEST_F(MeshTool, BytesAreTheSameOnStandardOutputAndForAnyThreads) {
+  ASSERT_EQ(place.run({"mesh", "drilled.csg", "-o", "a.3mf", "-j", "1"}).exit_code, 0);
+  for (const char* threads : {"2", "5"}) {
+    const RunResult run =
+        place.run({"mesh", "drilled.csg", "-o", "-", "--format", "3mf", "-j", threads});
+    ASSERT_EQ(run.exit_code, 0) << run.err;
+    EXPECT_TRUE(run.out == place.read("a.3mf")) << threads;
+  }
+}
+
+TEST_F(MeshTool, TheDocumentationNamesExactlyWhatJsonPrints) {
+  TriangleSoup open = make_box({0, 0, 0}, {4, 4, 4});
+  open.triangles.pop_back();
+  open.triangles.pop_back();
+  ASSERT_TRUE(write_mesh(place.path("open.obj"), open));
+  std::set<std::string> names;
+  const RunResult without = place.run({"mesh", "drilled.csg", "--json", "-q"});
+  ASSERT_EQ(without.exit_code, 0) << without.err;
+  EXPECT_EQ(without.err, "");
+  EXPECT_TRUE(json::parse(without.out)["output"].is_null());
+  collect(json::parse(without.out), "", names);
+  const RunResult run = place.run({"mesh", "open.obj", "--ids", "-o", "a.ply", "--json"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const json report = json::parse(run.out);
+  collect(report, "", names);
+  const RunResult contour =
+      place.run({"mesh", "open.obj", "--method", "contour", "-r", "8", "--json", "-q"});
+  ASSERT_EQ(contour.exit_code, 0) << contour.err;
+  collect(json::parse(contour.out), "", names);
+  names.erase("warnings"), names.erase("boundary.caps");  // of a run without any
+  EXPECT_EQ(names, documented("`strata mesh`"));
+  EXPECT_EQ(report["output"]["bytes"], place.read("a.ply").size());
+  ASSERT_EQ(report["boundary"]["caps"].size(), 1u);
+  EXPECT_EQ(report["boundary"]["caps"][0]["edges"], 4);
+  EXPECT_NEAR(report["boundary"]["caps"][0]["area"].get<double>(), 16, 1e-5);
+  EXPECT_TRUE(has(run.err, "1 hole with 4 edges")) << run.err;
+  EXPECT_NEAR(diagnose(read("a.ply")).volume, 64, 1e-5);
+}
+
+TEST_F(MeshTool, ColoursAndIdsMakeParts) {
+  RunResult run = place.run({"mesh", "drilled.csg", "--colours", "-o", "a.obj", "--json", "-q"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  std::set<std::string> colours;
+  std::uint64_t triangles = 0;
+  const json drilled = json::parse(run.out)["mesh"];
+  for (const json& part : drilled["parts"]) {
+    colours.insert(part["colour"]);
+    triangles += part["triangles"].get<std::uint64_t>();
+  }
+  EXPECT_EQ(colours, (std::set<std::string>{"#0000ffff", "#ff0000ff"}));
+  EXPECT_EQ(triangles, drilled["triangles"]);
+  EXPECT_TRUE(has(place.read("a.mtl"), "newmtl rgba_0000ffff\nKd 0 0 1\n"));
+  EXPECT_TRUE(has(place.read("a.obj"), "mtllib a.mtl\n"));
+  EXPECT_NEAR(diagnose(read("a.obj")).volume, kDrilledVolume, 1e-6);
+
+  run = place.run({"mesh", "apart.csg", "--ids", "-o", "b.ply", "--json", "-q"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const json apart = json::parse(run.out)["mesh"]["parts"];
+  ASSERT_EQ(apart.size(), 2u) << apart;
+  EXPECT_EQ(apart[0]["triangles"], 12);
+  EXPECT_TRUE(has(apart[0]["name"].get<std::string>(), "cube at apart.csg:1:"));
+  EXPECT_FALSE(apart[0]["colour"].is_null()) << "parts without a colour get one";
+  EXPECT_EQ(apart[1]["colour"], "#008000ff");
+}
+
+TEST_F(MeshTool, AContourIsClosedAndKeepsEdges) {
+  for (const auto& input : {std::vector<std::string>{"drilled.csg"},
+                            std::vector<std::string>{"box.obj", "hole.stl", "--expr", "a - b"}}) {
+    std::vector<std::string> words = {"mesh", "--method", "contour", "-r", "20", "-o", "c.ply"};
+    words.insert(words.end(), input.begin(), input.end());
+    const RunResult run = place.run(words);
+    ASSERT_EQ(run.exit_code, 0) << run.err;
+    EXPECT_TRUE(has(run.err, "20 x 20 x 20 voxels")) << run.err;
+    const MeshDiagnosis found = diagnose(read("c.ply"));
+    EXPECT_TRUE(found.closed);
+    const double volume = input.size() == 1 ? kDrilledVolume : 64 - 16;
+    EXPECT_NEAR(found.volume, volume, 0.02 * volume);
+  }
+  TriangleSoup open = make_icosphere(10, 4);
+  open.triangles.resize(open.triangles.size() - 3);
+  ASSERT_TRUE(write_mesh(place.path("ball.off"), open));
+  const RunResult run =
+      place.run({"mesh", "ball.off", "--method", "contour", "-r", "32", "-o", "c.stl", "-q"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_TRUE(diagnose(read("c.stl")).closed);
+  EXPECT_NEAR(diagnose(read("c.stl")).volume, 4188.8, 50);
+  refuses({"ball.off", "--method", "contour", "-r", "32", "-o", "d.stl", "--open", "fail"}, 5,
+          "--open fail");
+}
+
+TEST_F(MeshTool, MistakesOnTheCommandLineAreNamed) {
+  const auto usage = [this](std::vector<std::string> options, const std::string& part) {
+    options.insert(options.begin(), "drilled.csg");
+    refuses(options, 2, part);
+  };
+  refuses({"-o", "a.stl"}, 2, "no input file is given");
+  usage({}, "nothing to do: give -o FILE or --json");
+  usage({"-o", "a.amf"}, "a.amf: meshes are written as .3mf, .stl, .obj, .ply or .off");
+  usage({"-o", "-"}, "-: meshes are written as");
+  usage({"-o", "a.x", "--format", "step"}, "'step'");
+  usage({"-o", "a.stl", "--unit", "inch"}, "--unit needs a 3MF file");
+  usage({"-o", "a.3mf", "--unit", "mile"}, "'mile'");
+  usage({"-o", "a.stl", "--colours"}, "--colours cannot be written as STL");
+  usage({"-o", "a.stl", "--ids"}, "--ids cannot be written as STL");
+  usage({"-o", "a.ply", "--ids", "--colours"}, "--ids and --colours cannot be combined");
+  usage({"-o", "-", "--format", "obj", "--colours"}, "--colours needs an OBJ file with a name");
+  usage({"--json", "--unit", "inch"}, "--unit needs -o");
+  usage({"--json", "--ids"}, "--ids needs -o");
+  usage({"-o", "a.ply", "--bits", "9"}, "--bits must be 10 to 28, got 9");
+  usage({"-o", "a.ply", "--bits", "29"}, "--bits must be 10 to 28, got 29");
+  usage({"-o", "a.ply", "--bits", "x"}, "'x'");
+  usage({"-o", "a.ply", "--faces", "big"}, "'big'");
+  usage({"-o", "a.ply", "--open", "maybe"}, "'maybe'");
+  usage({"-o", "a.ply", "--open", "vote"}, "--open vote needs --method contour");
+  usage({"-o", "a.ply", "-r", "64"}, "-r needs --method contour");
+  usage({"-o", "a.ply", "--method", "contour"}, "--method contour needs -r");
+  usage({"-o", "a.ply", "--method", "contour", "-r", "8", "--bits", "20"},
+        "--bits needs --method exact");
+  usage({"-o", "a.ply", "--method", "contour", "-r", "8", "--open", "cap"},
+        "--open cap needs --method exact");
+  usage({"-o", "a.ply", "--method", "guess"}, "'guess'");
+}
+
+TEST_F(MeshTool, NoInputIsOverwritten) {
+  EXPECT_TRUE(write_mesh(place.path("c.mtl"), make_box({0, 0, 0}, {1, 1, 1}), MeshFormat::kObj));
+  place.write("scene.csg", "import(file = \"hole.stl\");\n");
+  refuses({"box.obj", "-o", "./box.obj"}, 2, "-o ./box.obj would overwrite the input box.obj");
+  refuses({"scene.csg", "-o", "hole.stl"}, 2, "would overwrite a file of the scene, hole.stl");
+  refuses({"c.mtl", "--input-format", "obj", "--ids", "-o", "c.obj"}, 2,
+          "the materials of -o c.mtl would overwrite the input c.mtl");
+  refuses({"box.obj", "-o", "a.ply", "--json=a.ply"}, 2, "a.ply");
+}
+
+TEST_F(MeshTool, AnEmptyResultIsNoFile) {
+  refuses({"box.obj", "hole.stl", "--expr", "(a - b) * b", "-o", "a.3mf"}, 5,
+          "the result is empty, so there is no mesh to write");
+  const RunResult run =
+      place.run({"mesh", "box.obj", "hole.stl", "--expr", "(a - b) * b", "--json", "-q"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(json::parse(run.out)["mesh"]["triangles"], 0);
+}
+
+TEST_F(MeshTool, OpenMeshesAreCappedWithAWarningOrRefused) {
+  TriangleSoup open = make_box({0, 0, 0}, {4, 4, 4});
+  open.triangles.pop_back();
+  ASSERT_TRUE(write_mesh(place.path("open.off"), open));
+  refuses({"open.off", "-o", "a.3mf", "--open", "fail"}, 5, "open.off");
+  refuses({"open.off", "-o", "a.3mf", "--strict"}, 5, "open.off");
+  const RunResult run = place.run({"mesh", "open.off", "-o", "a.off"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_TRUE(has(run.err, "warning: open.off: 1 hole with 3 edges closed")) << run.err;
+  EXPECT_NEAR(diagnose(read("a.off")).volume, 64, 1e-5);
+}
+
+TEST_F(MeshTool, AFullDiskLeavesNoFile) {
+  RunOptions options;
+  options.file_size = 100;
+  const auto before = place.names();
+  for (const char* name : {"a.3mf", "a.stl", "a.obj", "a.ply", "a.off"}) {
+    const RunResult run = place.run({"mesh", "drilled.csg", "-o", name, "-q"}, options);
+    EXPECT_EQ(run.exit_code, 4) << run.err;
+    EXPECT_TRUE(has(run.err, name)) << run.err;
+    EXPECT_EQ(place.names(), before);
+  }
+  // The file of materials would fit; without its OBJ it must not be there.
+  const RunResult run = place.run({"mesh", "drilled.csg", "--ids", "-o", "a.obj", "-q"}, options);
+  EXPECT_EQ(run.exit_code, 4) << run.err;
+  EXPECT_EQ(place.names(), before);
+}
+
+TEST_F(MeshTool, OpenscadImportsWhatIsWritten) {
+  if (std::system("openscad --version > /dev/null 2>&1") != 0) {
+    GTEST_SKIP() << "openscad is not installed";
+  }
+  for (const char* name : {"a.3mf", "a.stl", "a.off"}) {
+    ASSERT_EQ(place.run({"mesh", "drilled.csg", "-o", name, "-q"}).exit_code, 0);
+    place.write("back.scad", std::string("render() union() { import(\"") + name +
+                                 "\"); translate([20, 0, 0]) cube(1); }");
+    const std::string call = "cd '" + place.path("") +
+                             "' && QT_QPA_PLATFORM=offscreen openscad -o back.off back.scad "
+                             "> /dev/null 2>&1";
+    if (std::system(call.c_str()) != 0) {
+      if (std::string(name) == "a.3mf") continue;  // openscad may be without lib3mf
+      FAIL() << name;
+    }
+    EXPECT_NEAR(diagnose(read("back.off")).volume, kDrilledVolume + 1, 1e-4) << name;
+  }
+}
+
+}  // namespace
+}  // namespace strata
