@@ -15,27 +15,30 @@ constexpr std::uint32_t kNone = 0xffffffffu;
 /// The edges at a cell's lower sides.
 constexpr unsigned kLowEdges = 1u << 0 | 1u << 4 | 1u << 8;
 
-bool at_fan(const CellBlock& block, const Cell& cell) {
-  return (block.at_fan[CellBlock::column(cell.at.i, cell.at.j)] >> cell.at.k & 1) != 0;
-}
-
 }  // namespace
 
 void number_vertices(CellBlock& block) {
   for (CellBlock::Crossing& crossing : block.crossings) {
     if (crossing.shape == EdgeShape::kFan) crossing.triangle = block.fans++;
   }
-  for (std::size_t c = 0; c < block.kept.size(); ++c) {
-    block.kept[c] |= block.kept_by_others[c];
-    block.kept_before[c] = static_cast<std::uint16_t>(block.kept_cells);
-    block.kept_cells += bit_count(block.kept[c]);
+  block.kept_cells = block.cells;
+  if (std::all_of(block.strip_uses.begin(), block.strip_uses.end(),
+                  [](std::uint8_t uses) { return uses == 0; })) {
+    return;
+  }
+  const auto& cases = cell_cases();
+  block.kept_cells = 0;
+  block.kept_number.assign(block.cells, CellBlock::kDropped);
+  for (std::size_t n = 0; n < block.cells; ++n) {
+    if (block.strip_uses[n] == bit_count(cases[block.corners[n]].cut)) continue;
+    block.kept_number[n] = static_cast<std::uint16_t>(block.kept_cells++);
   }
 }
 
 void count_block(CellBlock& block, const BlockNeighbours& blocks) {
   for_each_cell(block, [&](const Cell& cell) {
     block.triangles += 2 * bit_count(cell.kind->cut & kLowEdges);
-    if (!at_fan(block, cell)) return;
+    if (block.at_fan[cell.number] == 0) return;
     for (int axis = 0; axis < 3; ++axis) {
       const auto edge = static_cast<unsigned>(axis) * 4;
       const bool cut = (cell.kind->cut >> edge & 1) != 0;
@@ -87,13 +90,13 @@ void BlockMesh::write_fans(std::span<glm::dvec3> positions) const {
 }
 
 void BlockMesh::write_points(std::span<glm::dvec3> positions) const {
-  std::size_t n = 0, n_split = block_.cells;
+  std::size_t n_split = block_.cells;
   std::size_t next = block_.first_vertex + block_.fans, next_split = next + block_.kept_cells;
   for_each_cell(block_, [&](const Cell& cell) {
     const glm::ivec3 corner = lower_corner(low_, cell.at);
     for (unsigned cycle = 0; cycle < cell.kind->cycles; ++cycle) {
-      const CellBlock::CellPoint& point = block_.points[cycle == 0 ? n++ : n_split++];
-      if (cycle == 0 && !block_.is_kept(cell.at)) continue;
+      const CellBlock::CellPoint& point = block_.points[cycle == 0 ? cell.number : n_split++];
+      if (cycle == 0 && !block_.is_kept(cell.number)) continue;
       positions[cycle == 0 ? next++ : next_split++] =
           world(corner + glm::ivec3(point[0], point[1], point[2]));
     }
@@ -211,7 +214,7 @@ void BlockMesh::write(std::span<glm::dvec3> positions, std::span<glm::uvec3> tri
   next_middle_ = block_.vertices() - block_.middles;
   for_each_cell(block_, [&](const Cell& cell) {
     write_pairs(cell, triangles);
-    if (!at_fan(block_, cell)) return;
+    if (block_.at_fan[cell.number] == 0) return;
     for (int axis = 0; axis < 3; ++axis) write_face(cell, axis, positions, triangles);
   });
   for (const Strip& strip : block_.strips) write_strip(strip, triangles);

@@ -89,13 +89,12 @@ glm::ivec3 point_at(const BlockNeighbours& blocks, LocalPlace cell, const LocalP
 }
 
 /// Marks the cells whose lower faces lie at an edge: all but the lowest. Other threads may mark
-/// cells of the same column.
+/// the same ones.
 void mark_fan(const BlockNeighbours& blocks, const std::array<LocalPlace, 4>& ring) {
   for (std::size_t n = 1; n < 4; ++n) {
     LocalPlace at = ring[n];
     CellBlock& block = blocks.changeable(at);
-    std::atomic_ref(block.at_fan[CellBlock::column(at.i, at.j)])
-        .fetch_or(std::uint32_t{1} << at.k, std::memory_order_relaxed);
+    std::atomic_ref(block.at_fan[block.cell(at)]).store(1, std::memory_order_relaxed);
   }
 }
 
@@ -154,7 +153,6 @@ void choose_shapes(const BlockNeighbours& blocks, StripFinder& strips) {
     }
   });
   strips.find(blocks);
-  mark_kept(blocks);
 }
 
 }  // namespace strata::contouring

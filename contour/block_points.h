@@ -18,8 +18,8 @@ namespace strata::contouring {
 std::uint64_t place_points(CellBlock& block, const BlockNeighbours& blocks, const glm::ivec3& place,
                            const VoxelGrid& grid, std::span<const Plane> planes);
 
-/// Chooses the shape around each edge at the lower side of a cell of the block, and marks the cells
-/// whose vertices are needed. @pre the points of the blocks are there
+/// Chooses the shape around each edge at the lower side of a cell of the block.
+/// @pre the points of the blocks are there
 void choose_shapes(const BlockNeighbours& blocks, StripFinder& strips);
 
 }  // namespace strata::contouring

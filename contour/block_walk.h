@@ -13,22 +13,20 @@ namespace strata::contouring {
 /// A cell that the surface passes.
 struct Cell {
   LocalPlace at;
+  std::uint32_t number = 0;  ///< in its block
   const CellCase* kind = nullptr;
 };
 
-/// Calls visit(cell) for the cells of a block that the surface passes, in the order of their
-/// numbers.
+/// Calls visit(cell) for the cells of a block that the surface passes, by number.
 template <class Visit>
 void for_each_cell(const CellBlock& block, Visit&& visit) {
   const auto& cases = cell_cases();
-  for (int i = 0; i < kBlockSide; ++i) {
-    for (int j = 0; j < kBlockSide; ++j) {
-      for (std::uint32_t left = block.active[CellBlock::column(i, j)]; left != 0;
-           left &= left - 1) {
-        const int k = std::countr_zero(left);
-        visit(Cell{{i, j, k}, &cases[block.corners(i, j, k)]});
-      }
-    }
+  for (std::uint32_t n = 0; n < block.cells; ++n) {
+    const int place = block.places[n];
+    visit(Cell{
+        {place / (kBlockSide * kBlockSide), place / kBlockSide % kBlockSide, place % kBlockSide},
+        n,
+        &cases[block.corners[n]]});
   }
 }
 
@@ -41,7 +39,7 @@ inline LocalPlace lowered(LocalPlace at, int axis) {
 /// What is known of a cell of a block or of the blocks below it.
 inline const CellCase& case_at(const BlockNeighbours& blocks, LocalPlace at) {
   const CellBlock& block = blocks.of(at);
-  return cell_cases()[block.corners(at.i, at.j, at.k)];
+  return cell_cases()[block.corners_at(at.i, at.j, at.k)];
 }
 
 /// Whether the lines through a cell's lower face get vertices in their middles.

@@ -42,36 +42,39 @@ void count_columns(CellBlock& block) {
   block.cells = sum[3];
 }
 
-/// Finds the cells that have several vertices or are ambiguous.
-void find_special(CellBlock& block) {
+/// Lists the cells, and those that have several vertices.
+void list_cells(CellBlock& block) {
   const auto& cases = cell_cases();
+  block.places.reserve(block.cells);
+  block.corners.reserve(block.cells);
   for (int i = 0; i < kBlockSide; ++i) {
     for (int j = 0; j < kBlockSide; ++j) {
-      for (std::uint32_t left = block.active[CellBlock::column(i, j)]; left != 0;
-           left &= left - 1) {
+      const std::size_t column = CellBlock::column(i, j);
+      for (std::uint32_t left = block.active[column]; left != 0; left &= left - 1) {
         const int k = std::countr_zero(left);
-        const CellCase& cell = cases[block.corners(i, j, k)];
-        if (!cell.special) continue;
+        const unsigned corners = block.corners_at(i, j, k);
+        const auto n = static_cast<std::uint32_t>(block.places.size());
+        block.places.push_back(static_cast<std::uint16_t>(column * kBlockSide + size(k)));
+        block.corners.push_back(static_cast<std::uint8_t>(corners));
+        if (!cases[corners].special) continue;
         block.special = true;
         ++block.ambiguous;
-        if (cell.cycles < 2) continue;
-        block.split.push_back({static_cast<std::uint16_t>(CellBlock::column(i, j) * kBlockSide +
-                                                          static_cast<std::size_t>(k)),
-                               block.split_vertices});
-        block.split_vertices += cell.cycles - 1u;
+        if (cases[corners].cycles < 2) continue;
+        block.split.push_back({n, block.split_vertices});
+        block.split_vertices += cases[corners].cycles - 1u;
       }
     }
   }
+  block.at_fan.resize(block.cells);
+  block.strip_uses.resize(block.cells);
 }
 
 }  // namespace
 
-std::uint32_t CellBlock::split_point(const LocalPlace& at, unsigned cycle) const {
-  const auto place =
-      static_cast<std::uint16_t>(column(at.i, at.j) * kBlockSide + static_cast<std::size_t>(at.k));
+std::uint32_t CellBlock::split_point(std::uint32_t n, unsigned cycle) const {
   const auto found = std::lower_bound(
-      split.begin(), split.end(), place,
-      [](const SplitCell& one, std::uint16_t wanted) { return one.cell < wanted; });
+      split.begin(), split.end(), n,
+      [](const SplitCell& one, std::uint32_t wanted) { return one.cell < wanted; });
   return cells + found->first + cycle - 1;
 }
 
@@ -165,7 +168,7 @@ void CellBlocks::fill(const GridCrossings& crossings, Place& place) const {
     }
   }
   count_columns(block);
-  find_special(block);
+  list_cells(block);
   block.crossings.resize(block.first_crossing[3]);
   std::uint64_t found = 0;
   for (int axis = 0; axis < 3; ++axis) {
@@ -204,6 +207,7 @@ Result<CellBlocks> CellBlocks::create(const GridCrossings& crossings, const Exec
   for (const std::uint32_t n : result.with_cells_) {
     const CellBlock& block = *result.places_[n].block;
     result.bytes_ += block.crossings.size() * sizeof(CellBlock::Crossing) +
+                     block.cells * (2 * sizeof(std::uint16_t) + 3) +
                      (block.cells + block.split_vertices) * sizeof(CellBlock::CellPoint);
   }
   return result;

@@ -54,7 +54,7 @@ class CellBlock {
   using CellPoint = std::array<std::uint8_t, 3>;
   /// A cell with several vertices.
   struct SplitCell {
-    std::uint16_t cell = 0;   ///< (i * 32 + j) * 32 + k
+    std::uint32_t cell = 0;   ///< its number
     std::uint32_t first = 0;  ///< of its further vertices in the block
   };
 
@@ -71,7 +71,7 @@ class CellBlock {
     return static_cast<std::uint32_t>((here ^ below) >> 1);
   }
   /// Which of the corners of a cell are inside; see contour/cell_cycles.h.
-  [[nodiscard]] unsigned corners(int i, int j, int k) const {
+  [[nodiscard]] unsigned corners_at(int i, int j, int k) const {
     const auto two = [&](int a, int b) {
       return static_cast<unsigned>(word(a, b) >> static_cast<unsigned>(k)) & 3u;
     };
@@ -93,34 +93,36 @@ class CellBlock {
     const std::size_t c = column(at.i, at.j);
     return before[3][c] + bit_count(active[c] & below);
   }
-  /// Whether the vertex of a cell is needed.
-  [[nodiscard]] bool is_kept(const LocalPlace& at) const {
-    return (kept[column(at.i, at.j)] >> at.k & 1) != 0;
+  /// Whether the vertex of a cell is needed. @param n  number of the cell
+  [[nodiscard]] bool is_kept(std::uint32_t n) const {
+    return kept_number.empty() || kept_number[n] != kDropped;
   }
   /// The vertex of a cycle of a cell, in the mesh. @pre it is kept
   [[nodiscard]] std::uint32_t cell_vertex(const LocalPlace& at, unsigned cycle) const {
-    const std::uint32_t first = static_cast<std::uint32_t>(first_vertex) + fans;
-    if (cycle != 0) return first + kept_cells + split_point(at, cycle) - cells;
-    const std::uint32_t below = (std::uint32_t{1} << at.k) - 1;
-    const std::size_t c = column(at.i, at.j);
-    return first + kept_before[c] + bit_count(kept[c] & below);
+    const std::uint32_t first = static_cast<std::uint32_t>(first_vertex) + fans, n = cell(at);
+    if (cycle != 0) return first + kept_cells + split_point(n, cycle) - cells;
+    return first + (kept_number.empty() ? n : kept_number[n]);
   }
+
+  static constexpr std::uint16_t kDropped = 0xffff;
 
   std::array<std::uint64_t, kWords * kWords> words{};
   std::array<std::uint32_t, kBlockSide * kBlockSide> active{};  ///< bit k: cells passed
-  /// Bit k: lower faces of the cell lie at a fan.
-  std::array<std::uint32_t, kBlockSide * kBlockSide> at_fan{};
-  /// Bit k: the vertex of the cell is needed, as its own block knows and as blocks above it know.
-  /// number_vertices() joins them.
-  std::array<std::uint32_t, kBlockSide * kBlockSide> kept{}, kept_by_others{};
-  std::array<std::uint16_t, kBlockSide * kBlockSide> kept_before{};  ///< in the columns before
   /// By column: cut edges along x, y, z and cells that come before it.
   std::array<std::array<std::uint16_t, kBlockSide * kBlockSide>, 4> before{};
   std::array<std::uint32_t, 4> first_crossing{};  ///< by axis, and their number
   std::vector<Crossing> crossings;
   std::vector<SplitCell> split;  ///< increasing
   std::vector<Strip> strips;
-  std::vector<CellPoint> points;  ///< the vertices of cells, then the further ones
+  // By the number of a cell:
+  std::vector<std::uint16_t> places;  ///< (i * 32 + j) * 32 + k
+  std::vector<std::uint8_t> corners;  ///< which are inside
+  std::vector<std::uint8_t> at_fan;   ///< whether its lower faces lie at a fan
+  /// Cut edges of the cell in strips that do not end at it: without all others its vertex is not
+  /// needed.
+  std::vector<std::uint8_t> strip_uses;
+  std::vector<std::uint16_t> kept_number;  ///< among the kept ones; none if all are kept
+  std::vector<CellPoint> points;           ///< the vertices of cells, then the further ones
   std::uint32_t fans = 0, cells = 0, kept_cells = 0, split_vertices = 0, middles = 0;
   std::uint64_t triangles = 0;
   std::uint64_t ambiguous = 0, guessed = 0;            ///< counted for the report
@@ -132,7 +134,7 @@ class CellBlock {
   }
 
  private:
-  [[nodiscard]] std::uint32_t split_point(const LocalPlace& at, unsigned cycle) const;
+  [[nodiscard]] std::uint32_t split_point(std::uint32_t n, unsigned cycle) const;
 };
 
 /// A block and the seven below it.

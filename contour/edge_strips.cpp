@@ -31,17 +31,6 @@ CellBlock::Crossing& edge_of(const BlockNeighbours& blocks, const LocalPlace& ce
   return block.crossings[block.crossing(axis, at)];
 }
 
-/// Of a cell of the own block, or of one that other threads may mark at the same time.
-void keep(const BlockNeighbours& blocks, CellBlock& own, LocalPlace cell) {
-  if ((cell.i | cell.j | cell.k) >= 0) {
-    own.kept[CellBlock::column(cell.i, cell.j)] |= std::uint32_t{1} << cell.k;
-    return;
-  }
-  CellBlock& block = blocks.changeable(cell);
-  std::atomic_ref(block.kept_by_others[CellBlock::column(cell.i, cell.j)])
-      .fetch_or(std::uint32_t{1} << cell.k, std::memory_order_relaxed);
-}
-
 /// The four cells at the ends of a strip: the beginning of the rail that is gone forward, its end,
 /// the end of the other rail and its beginning.
 std::array<LocalPlace, 4> ends_of(const Strip& strip) {
@@ -69,7 +58,6 @@ void StripFinder::add(const LocalPlace& cell, int axis, const std::array<glm::iv
 }
 
 void StripFinder::find(const BlockNeighbours& blocks) {
-  CellBlock& own = blocks.own();
   for (int axis = 0; axis < 3; ++axis) {
     auto& ways = straight_[size(axis)];
     std::array<std::uint32_t, 2> total{};
@@ -87,11 +75,11 @@ void StripFinder::find(const BlockNeighbours& blocks) {
           const std::uint64_t gone = ((std::uint64_t{1} << length) - 1) << first;
           bits &= ~static_cast<std::uint32_t>(gone);
           if (length < 2) continue;
-          own.strips.push_back({place_of(column, run, first), static_cast<std::uint8_t>(axis),
-                                static_cast<std::uint8_t>(run), static_cast<std::uint8_t>(length)});
+          const Strip strip{place_of(column, run, first), static_cast<std::uint8_t>(axis),
+                            static_cast<std::uint8_t>(run), static_cast<std::uint8_t>(length)};
+          add_strip(blocks, strip);
           for (int n = 0; n < length; ++n) {
-            const LocalPlace cell = place_of(column, run, first + n);
-            edge_of(blocks, cell, axis).shape = EdgeShape::kStrip;
+            const LocalPlace cell = moved(strip.cell, run, n);
             ways[1 - way][column_of(cell, other)] &= ~(std::uint32_t{1} << along(cell, other));
           }
         }
@@ -101,17 +89,19 @@ void StripFinder::find(const BlockNeighbours& blocks) {
   straight_ = {};
 }
 
-void mark_kept(const BlockNeighbours& blocks) {
-  CellBlock& own = blocks.own();
-  for_each_cell(own, [&](const Cell& cell) {
-    for (int axis = 0; axis < 3; ++axis) {
-      if ((cell.kind->cut >> axis * 4 & 1) == 0) continue;
-      if (edge_of(blocks, cell.at, axis).shape == EdgeShape::kStrip) continue;
-      for (const LocalPlace& at : ring_of(cell.at, axis)) keep(blocks, own, at);
+void StripFinder::add_strip(const BlockNeighbours& blocks, const Strip& strip) {
+  blocks.own().strips.push_back(strip);
+  for (int n = 0; n < strip.length; ++n) {
+    edge_of(blocks, moved(strip.cell, strip.along, n), strip.axis).shape = EdgeShape::kStrip;
+  }
+  const auto ends = ends_of(strip);
+  for (const LocalPlace& begin : {ends[0], ends[3]}) {
+    for (int n = 1; n < strip.length; ++n) {
+      LocalPlace at = moved(begin, strip.along, n);
+      CellBlock& block = blocks.changeable(at);
+      // Other threads may do so at the same time. Two edges of the strip meet here.
+      std::atomic_ref(block.strip_uses[block.cell(at)]).fetch_add(2, std::memory_order_relaxed);
     }
-  });
-  for (const Strip& strip : own.strips) {
-    for (const LocalPlace& at : ends_of(strip)) keep(blocks, own, at);
   }
 }
 
@@ -120,12 +110,12 @@ StripRails::StripRails(const BlockNeighbours& blocks, const Strip& strip) {
   for (int n = 0; n <= strip.length; ++n) {
     LocalPlace right = moved(ends[0], strip.along, n), left = moved(ends[3], strip.along, n);
     const CellBlock& right_block = blocks.of(right);
-    if (right_block.is_kept(right)) {
+    if (right_block.is_kept(right_block.cell(right))) {
       forward_at[forward_count] = static_cast<std::uint8_t>(n);
       forward[forward_count++] = right_block.cell_vertex(right, 0);
     }
     const CellBlock& left_block = blocks.of(left);
-    if (left_block.is_kept(left)) {
+    if (left_block.is_kept(left_block.cell(left))) {
       back_at[back_count] = static_cast<std::uint8_t>(n);
       back[back_count++] = left_block.cell_vertex(left, 0);
     }

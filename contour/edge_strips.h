@@ -22,18 +22,18 @@ class StripFinder {
   /// Adds the edge along `axis` at the lower side of a cell. @param points  of the cells around it,
   /// as edge_shape() takes them
   void add(const LocalPlace& cell, int axis, const std::array<glm::ivec3, 4>& points);
-  /// Sets CellBlock::strips and EdgeShape::kStrip of their edges. Forgets what was added.
+  /// Sets CellBlock::strips, EdgeShape::kStrip of their edges, and CellBlock::strip_uses. Forgets
+  /// what was added.
   void find(const BlockNeighbours& blocks);
 
  private:
+  void add_strip(const BlockNeighbours& blocks, const Strip& strip);
+
   using Columns = std::array<std::uint32_t, kBlockSide * kBlockSide>;
   /// By axis of the edge, and whether the run is along the second axis after it; then by the cell's
   /// place along the axes that the run is not along. Bit: the place along the run.
   std::array<std::array<Columns, 2>, 3> straight_{};
 };
-
-/// Marks the cells whose vertices are needed. @pre the shapes around the block's edges are chosen
-void mark_kept(const BlockNeighbours& blocks);
 
 /// The vertices of the mesh along both rails of a strip, from its beginning. Seen from the end of
 /// its edges, the strip lies to the left of the rail that its outline goes forward along.
