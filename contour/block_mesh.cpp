@@ -105,11 +105,11 @@ void BlockMesh::write_points(std::span<glm::dvec3> positions) const {
 
 /// The edges with two triangles at the lower side of a cell.
 void BlockMesh::write_pairs(const Cell& cell, std::span<glm::uvec3> triangles) {
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto edge = static_cast<unsigned>(axis) * 4;
-    if ((cell.kind->cut >> edge & 1) == 0) continue;
-    const EdgeShape shape = crossing_at(blocks_, cell.at, edge).shape;
-    if (shape == EdgeShape::kFan || shape == EdgeShape::kStrip) continue;
+  for_each_axis([&](auto axis) {
+    constexpr unsigned kEdge = 4 * axis;
+    if ((cell.kind->cut >> kEdge & 1) == 0) return;
+    const EdgeShape shape = crossing_at(blocks_, cell.at, kEdge).shape;
+    if (shape == EdgeShape::kFan || shape == EdgeShape::kStrip) return;
     std::array<std::uint32_t, 4> v;
     const auto ring = ring_of(cell.at, axis);
     for (std::size_t n = 0; n < 4; ++n) {
@@ -122,7 +122,7 @@ void BlockMesh::write_pairs(const Cell& cell, std::span<glm::uvec3> triangles) {
     if (!cell.kind->low_inside) std::swap(v[1], v[3]);
     triangles[next_triangle_++] = {v[0], v[1], v[2]};
     triangles[next_triangle_++] = {v[0], v[2], v[3]};
-  }
+  });
 }
 
 /// Goes along both rails at once.

@@ -11,20 +11,6 @@
 namespace strata::contouring {
 namespace {
 
-/// The lower end of an edge, in lattice steps from the cell's lower corner.
-glm::ivec3 edge_start(unsigned edge) {
-  const int d = static_cast<int>(edge & 1) * kLatticeSteps;
-  const int e = static_cast<int>(edge >> 1 & 1) * kLatticeSteps;
-  switch (edge / 4) {
-    case 0:
-      return {0, d, e};
-    case 1:
-      return {d, 0, e};
-    default:
-      return {d, e, 0};
-  }
-}
-
 /// The cuts of a cycle of a cell.
 class CellCuts {
  public:
@@ -33,21 +19,27 @@ class CellCuts {
 
   std::span<const CellCut> of(const Cell& cell, unsigned cycle) {
     count_ = 0;
-    for (unsigned left = cell.kind->cut; left != 0; left &= left - 1) {
-      const auto edge = static_cast<unsigned>(std::countr_zero(left));
-      if (cell.kind->cycle[edge] == cycle) add(cell.at, edge);
-    }
+    corner_ = lower_corner(low_, cell.at);
+    for_each_axis([&](auto axis) {
+      for (unsigned left = cell.kind->cut >> 4 * axis & 15u; left != 0; left &= left - 1) {
+        const auto place = static_cast<unsigned>(std::countr_zero(left));
+        if (cell.kind->cycle[4 * axis + place] == cycle) add<axis>(cell.at, place);
+      }
+    });
     return std::span(cuts_).first(count_);
   }
 
  private:
-  void add(const LocalPlace& cell, unsigned edge) {
-    const CellBlock::Crossing& found = crossing_at(blocks_, cell, edge);
-    const int axis = static_cast<int>(edge / 4);
+  /// @param place  of the edge along the axis: 0 to 3
+  template <int axis>
+  void add(const LocalPlace& cell, unsigned place) {
+    const CellBlock::Crossing& found = crossing_at(blocks_, cell, 4u * axis + place);
+    constexpr int kFirst = axis == 0 ? 1 : 0, kSecond = axis == 2 ? 1 : 2;
     CellCut& cut = cuts_[count_];
-    cut = {};
-    cut.point = edge_start(edge);
     cut.point[axis] = found.offset;
+    cut.point[kFirst] = static_cast<int>(place & 1) * kLatticeSteps;
+    cut.point[kSecond] = static_cast<int>(place >> 1) * kLatticeSteps;
+    cut.plane.normal = glm::dvec3(0.0);
     triangles_[count_] = found.triangle;
     bool again = found.triangle == CutEdge::kNoTriangle;
     if (found.triangle == CutEdge::kGridFace) {
@@ -58,13 +50,14 @@ class CellCuts {
     for (std::size_t i = 0; i < count_ && !again; ++i) again = triangles_[i] == found.triangle;
     if (!again) {
       cut.plane = planes_[found.triangle];
-      cut.plane.offset -= glm::dot(cut.plane.normal, glm::dvec3(lower_corner(low_, cell)));
+      cut.plane.offset -= glm::dot(cut.plane.normal, corner_);
     }
     ++count_;
   }
 
   const BlockNeighbours& blocks_;
   glm::ivec3 low_;
+  glm::dvec3 corner_{0.0};  ///< of the cell
   std::span<const Plane> planes_;
   std::array<CellCut, 12> cuts_;
   std::array<std::uint32_t, 12> triangles_{};
@@ -99,7 +92,8 @@ void mark_fan(const BlockNeighbours& blocks, const std::array<LocalPlace, 4>& ri
 }
 
 /// The frame of edge_shape(): the edge along z.
-glm::ivec3 along(const glm::ivec3& p, int axis) {
+template <int axis>
+glm::ivec3 along(const glm::ivec3& p) {
   return {p[(axis + 1) % 3], p[(axis + 2) % 3], p[axis]};
 }
 
@@ -120,9 +114,8 @@ std::uint64_t place_points(CellBlock& block, const BlockNeighbours& blocks, cons
           cell.kind->cycles == 1 ? feature_vertex(used, bounds) : mean_vertex(used, bounds);
       clamped += vertex.clamped ? 1 : 0;
       CellBlock::CellPoint& point = block.points[cycle == 0 ? next++ : next_split++];
-      for (int axis = 0; axis < 3; ++axis) {
-        point[static_cast<std::size_t>(axis)] = static_cast<std::uint8_t>(vertex.at[axis]);
-      }
+      point = {static_cast<std::uint8_t>(vertex.at.x), static_cast<std::uint8_t>(vertex.at.y),
+               static_cast<std::uint8_t>(vertex.at.z)};
     }
   });
   return clamped;
@@ -130,11 +123,11 @@ std::uint64_t place_points(CellBlock& block, const BlockNeighbours& blocks, cons
 
 void choose_shapes(const BlockNeighbours& blocks, StripFinder& strips) {
   for_each_cell(blocks.own(), [&](const Cell& cell) {
-    for (int axis = 0; axis < 3; ++axis) {
-      const auto edge = static_cast<unsigned>(axis) * 4;
-      if ((cell.kind->cut >> edge & 1) == 0) continue;
+    for_each_axis([&](auto axis) {
+      constexpr unsigned kEdge = 4 * axis;
+      if ((cell.kind->cut >> kEdge & 1) == 0) return;
       const auto ring = ring_of(cell.at, axis);
-      LocalPlace at = edge_place(cell.at, edge);
+      LocalPlace at = edge_place(cell.at, kEdge);
       CellBlock& block = blocks.changeable(at);
       CellBlock::Crossing& crossing = block.crossings[block.crossing(axis, at)];
       const bool special =
@@ -144,13 +137,13 @@ void choose_shapes(const BlockNeighbours& blocks, StripFinder& strips) {
       if (!special) {
         std::array<glm::ivec3, 4> points;
         for (std::size_t n = 0; n < 4; ++n) {
-          points[n] = along(point_at(blocks, ring[n], cell.at), axis);
+          points[n] = along<axis>(point_at(blocks, ring[n], cell.at));
         }
         crossing.shape = edge_shape(points, crossing.offset);
         if (crossing.shape != EdgeShape::kFan) strips.add(cell.at, axis, points);
       }
       if (crossing.shape == EdgeShape::kFan) mark_fan(blocks, ring);
-    }
+    });
   });
   strips.find(blocks);
 }

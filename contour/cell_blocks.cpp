@@ -171,17 +171,17 @@ void CellBlocks::fill(const GridCrossings& crossings, Place& place) const {
   list_cells(block);
   block.crossings.resize(block.first_crossing[3]);
   std::uint64_t found = 0;
-  for (int axis = 0; axis < 3; ++axis) {
-    const AxisFrame frame(static_cast<Axis>(axis));
+  for_each_axis([&](auto axis) {
     for (const CutEdge edge : crossings.block(axis, here)) {
-      glm::ivec3 at;
-      at[frame.u] = edge.u(), at[frame.v] = edge.v(), at[frame.w] = edge.k();
-      if ((block.cut(axis, at.x, at.y) >> at.z & 1) == 0) continue;  // the axes disagree
-      block.crossings[block.crossing(axis, {at.x, at.y, at.z})] = {
+      const LocalPlace at = axis == 0   ? LocalPlace{edge.k(), edge.u(), edge.v()}
+                            : axis == 1 ? LocalPlace{edge.u(), edge.k(), edge.v()}
+                                        : LocalPlace{edge.u(), edge.v(), edge.k()};
+      if ((block.cut(axis, at.i, at.j) >> at.k & 1) == 0) continue;  // the axes disagree
+      block.crossings[block.crossing(axis, at)] = {
           edge.triangle(), static_cast<std::uint8_t>(edge.offset()), EdgeShape::kFan};
       ++found;
     }
-  }
+  });
   block.guessed = block.crossings.size() - found;
 }
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <memory>
+#include <type_traits>
 #include <vector>
 
 #include "contour/cell_cycles.h"
@@ -28,6 +29,14 @@ inline std::uint32_t bit_count(std::uint32_t bits) {
   bits -= bits >> 1 & 0x55555555u;
   bits = (bits & 0x33333333u) + (bits >> 2 & 0x33333333u);
   return ((bits + (bits >> 4)) & 0x0f0f0f0fu) * 0x01010101u >> 24;
+}
+
+/// Calls visit(axis) for 0, 1 and 2 as constants, which the code for each axis is made with.
+template <class Visit>
+void for_each_axis(Visit&& visit) {
+  visit(std::integral_constant<int, 0>{});
+  visit(std::integral_constant<int, 1>{});
+  visit(std::integral_constant<int, 2>{});
 }
 
 /// The triangles around a cut edge: about the point where it is cut, or two between the four cells

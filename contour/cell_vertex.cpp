@@ -24,14 +24,18 @@ glm::dvec3 mean_of(std::span<const CellCut> cuts) {
   return sum / static_cast<double>(cuts.size());
 }
 
+/// The nearest step to a coordinate, within bounds.
+int rounded(double place, int low, int high, bool& clamped) {
+  const double step = place + 0.5;
+  if (step >= low && step < high + 1) return static_cast<int>(step);
+  clamped = true;
+  return step < low ? low : high;
+}
 CellVertex rounded(const glm::dvec3& place, const CellBounds& bounds) {
   CellVertex result;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double step = place[axis] + 0.5;
-    const double kept = std::clamp<double>(step, bounds.low[axis], bounds.high[axis] + 0.5);
-    result.clamped = result.clamped || step < bounds.low[axis] || step >= bounds.high[axis] + 1;
-    result.at[axis] = static_cast<int>(kept);
-  }
+  result.at = {rounded(place.x, bounds.low.x, bounds.high.x, result.clamped),
+               rounded(place.y, bounds.low.y, bounds.high.y, result.clamped),
+               rounded(place.z, bounds.low.z, bounds.high.z, result.clamped)};
   return result;
 }
 
@@ -43,10 +47,8 @@ struct Planes {
   void add(const Plane& plane) {
     if (plane.normal == glm::dvec3(0.0)) return;
     for (std::size_t i = 0; i < count; ++i) {
-      const glm::dvec3 apart = glm::abs(at[i].normal - plane.normal);
-      if (std::max({apart.x, apart.y, apart.z}) < kSameNormal) return;
-      const glm::dvec3 opposite = glm::abs(at[i].normal + plane.normal);
-      if (std::max({opposite.x, opposite.y, opposite.z}) < kSameNormal) return;
+      const glm::dvec3 apart = glm::cross(at[i].normal, plane.normal);
+      if (glm::dot(apart, apart) < kSameNormal * kSameNormal) return;
     }
     at[count++] = plane;
   }
