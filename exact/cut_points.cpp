@@ -59,6 +59,12 @@ FilePoint round_for_file(const RationalPoint& point) {
   return {coordinate(point.x), coordinate(point.y), coordinate(point.z)};
 }
 
+bool is_file_point(const RationalPoint& point, const FilePoint& rounded) {
+  return point.x << kFileBits == product<Int256>(point.w, rounded.x) &&
+         point.y << kFileBits == product<Int256>(point.w, rounded.y) &&
+         point.z << kFileBits == product<Int256>(point.w, rounded.z);
+}
+
 FinePoint round_fine(const RationalPoint& point) {
   const auto coordinate = [&](const Int256& numerator) {
     return narrow<Int128>(rounded<5>(numerator, point.w, kFineBits));

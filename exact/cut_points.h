@@ -89,6 +89,9 @@ int side_of_plane(const RationalPoint& point, const Plane& plane);
 inline constexpr int kFileBits = 24;
 using FilePoint = glm::vec<3, std::int64_t, glm::defaultp>;  ///< in 2^-24 step
 FilePoint round_for_file(const RationalPoint& point);
+/// Whether rounding did not move the point. Both sides of the comparison have at most 231 bits.
+/// @param rounded  round_for_file() of the point
+bool is_file_point(const RationalPoint& point, const FilePoint& rounded);
 constexpr FilePoint file_point(const LatticePoint& p) {
   return FilePoint(p) << FilePoint(kFileBits);
 }

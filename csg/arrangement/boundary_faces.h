@@ -49,9 +49,15 @@ class BoundaryPoints {
   exact::RationalPoint rational(std::uint32_t point) const { return rational(recipe(point)); }
   exact::RationalPoint rational(const Recipe& recipe) const;
 
-  std::uint32_t add(const Recipe& recipe, const exact::FilePoint& rounded) {
+  /// Whether rounding moves the point. Many points of parts with faces along the axes stay.
+  bool moved(std::uint32_t point) const {
+    return !on_lattice(point) && moved_[point - vertices_.size()];
+  }
+
+  std::uint32_t add(const Recipe& recipe, const exact::FilePoint& rounded, bool moved = true) {
     recipes_.push_back(recipe);
     rounded_.push_back(rounded);
+    moved_.push_back(moved);
     return static_cast<std::uint32_t>(size() - 1);
   }
 
@@ -60,6 +66,7 @@ class BoundaryPoints {
   std::vector<glm::uvec3> triangles_;
   std::vector<exact::FilePoint> rounded_;
   std::vector<Recipe> recipes_;
+  std::vector<bool> moved_;
 };
 
 /// An edge of a face, with the face on its left as seen from outside of the solid.

@@ -73,7 +73,7 @@ std::uint32_t PointTable::find_or_add(const BoundaryPoints::Recipe& recipe) {
     const std::uint32_t point = slots_[at] - 1;
     if (points_.rounded(point) == rounded && equal(points_.rational(point), exact)) return point;
   }
-  const std::uint32_t added = points_.add(recipe, rounded);
+  const std::uint32_t added = points_.add(recipe, rounded, !exact::is_file_point(exact, rounded));
   insert(added);
   return added;
 }

@@ -55,7 +55,7 @@ void Triangulation::place_points() {
       const auto point = static_cast<Index>(i);
       const FilePoint exact = faces_.points.rounded(point);
       mesh_.positions[i] = written_.round(exact);
-      moved_[i] = !faces_.points.on_lattice(point) || mesh_.positions[i] != exact ? 1 : 0;
+      moved_[i] = faces_.points.moved(point) || mesh_.positions[i] != exact ? 1 : 0;
     }
   });
 }

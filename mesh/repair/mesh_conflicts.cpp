@@ -74,12 +74,16 @@ class Search {
             glm::ivec3((glm::max(a, glm::max(b, c)) + kRest) >> FilePoint(exact::kFileBits))};
   }
   void choose();
+  void prepare();
+  bool surely_clean(std::size_t first, std::size_t second) const;
 
   const RoundedMesh& mesh_;
   const Execution& execution_;
   std::vector<Index> chosen_;  // triangles that may be in conflicts
   std::vector<LatticeBox> boxes_;
   std::vector<Index> groups_;
+  // The double area vectors of chosen triangles, in double, with the bounds that filters need.
+  std::vector<exact::filters::BoundedCross> normals_;
 };
 
 // Chooses the triangles that were moved and those that are near.
@@ -109,11 +113,41 @@ void Search::choose() {
   }
 }
 
+void Search::prepare() {
+  normals_.resize(chosen_.size());
+  constexpr std::size_t kRange = 4096;
+  parallel_for(execution_, (chosen_.size() + kRange - 1) / kRange, [this](std::size_t r, int) {
+    for (std::size_t i = r * kRange; i < std::min(chosen_.size(), (r + 1) * kRange); ++i) {
+      const auto [a, b, c] = corners(chosen_[i]);
+      normals_[i] = exact::filters::cross(exact::filters::RealNormal(b - a),
+                                          exact::filters::RealNormal(c - a));
+    }
+  });
+}
+
+// Most pairs: all vertices of the second triangle that the first one does not have lie on one side
+// of its plane. Vertices with the same position but another number leave the pair undecided.
+bool Search::surely_clean(std::size_t first, std::size_t second) const {
+  if constexpr (!exact::kFilters) return false;
+  const glm::uvec3 &s = mesh_.triangles[chosen_[first]], &t = mesh_.triangles[chosen_[second]];
+  const FilePoint& base = mesh_.positions[s.x];
+  int sum = 0, count = 0;
+  for (int k = 0; k < 3; ++k) {
+    if (t[k] == s.x || t[k] == s.y || t[k] == s.z) continue;
+    const exact::filters::RealNormal along(mesh_.positions[t[k]] - base);
+    sum += exact::filters::dot(along, normals_[first]).sign();
+    ++count;
+  }
+  return count > 0 && (sum == count || sum == -count);
+}
+
 Result<std::vector<MeshConflict>> Search::run() {
   choose();
+  prepare();
   std::vector<std::vector<MeshConflict>> found(static_cast<std::size_t>(execution_.thread_count()));
   const auto visit = [&](std::span<const BoxPair> pairs, int worker) {
     for (const BoxPair& pair : pairs) {
+      if (surely_clean(pair.first, pair.second) || surely_clean(pair.second, pair.first)) continue;
       const Index s = chosen_[pair.first], t = chosen_[pair.second];
       if (is_clean(triangles_meet(corners(s), corners(t)))) continue;
       found[static_cast<std::size_t>(worker)].push_back({std::min(s, t), std::max(s, t)});

@@ -182,6 +182,7 @@ TEST_P(ByInput, RoundingIsToTheNearestStepAndTiesGoUp) {
           vector_of(p) + Fraction(whole(part), 1 << 25) * (vector_of(q) - vector_of(p)));
     ASSERT_EQ(vector_of(rational(p)), vector_of(p));
     ASSERT_EQ(round_for_file(rational(p)), file_point(p));
+    ASSERT_TRUE(is_file_point(rational(p), file_point(p)));
     ASSERT_EQ(round_fine(rational(p)), fine_point(p));
   }
 }
