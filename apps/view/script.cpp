@@ -13,7 +13,9 @@
 #include "apps/commands/csg_options.h"
 #include "apps/session/option_values.h"
 #include "apps/view/camera_control.h"
+#include "apps/view/exporter.h"
 #include "mesh/formats/text_scanner.h"
+#include "strata/core/grid.h"
 #include "strata/csg/picture/picture.h"
 #include "strata/transparency/techniques.h"
 
@@ -30,6 +32,7 @@ enum class Form {
   kSection,
   kColour,
   kWait,
+  kExport,
   kText
 };
 
@@ -81,6 +84,8 @@ constexpr Rule kRules[] = {
      "write a picture of the whole window"},
     {"picture", Action::kPicture, Form::kWord, "FILE.png",
      "write the picture without panels and overlays"},
+    {"export", Action::kExport, Form::kExport, "FILE [N]",
+     "write what is seen: a mesh, voxels (N along the longest side) or a picture"},
     {"print", Action::kPrint, Form::kText, "TEXT", "print to standard output"},
     {"stats", Action::kStats, Form::kNone, "", "print times and list statistics as JSON"},
     {"reset-stats", Action::kResetStats, Form::kNone, "", "forget the largest times"},
@@ -163,6 +168,8 @@ class Line {
           return {};
         }
         return numbers(1, 1, 1, command);
+      case Form::kExport:
+        return exported(command);
       case Form::kText:
         for (std::size_t i = 1; i < words_.size(); ++i) {
           command.word += (i > 1 ? " " : "") + words_[i];
@@ -213,6 +220,19 @@ class Line {
     const auto plane = apps::parse_section(command.word);
     if (!plane) return fail(ErrorCode::kUsage, "{}: {}", where_, plane.error().message);
     return {};
+  }
+  Result<void> exported(ScriptCommand& command) const {
+    if (auto counted = expect(2, 3); !counted) return counted;
+    command.word = words_[1];
+    const auto kind = export_kind(command.word);
+    if (!kind) return fail(ErrorCode::kUsage, "{}: {}", where_, kind.error().message);
+    if (words_.size() == 2) return {};
+    if (*kind != ExportKind::kVoxels) return usage();
+    if (auto read = numbers(2, 1, 1, command); !read) return read;
+    const double voxels = command.numbers[0];
+    if (voxels >= 1 && voxels <= kMaxGridSide && voxels == std::floor(voxels)) return {};
+    return fail(ErrorCode::kUsage, "{}: the voxels must be 1 to {}, got {}", where_, kMaxGridSide,
+                words_[2]);
   }
   Result<void> check_word(ScriptCommand& command) const {
     const auto one_of = [&](std::initializer_list<std::string_view> names) -> Result<void> {

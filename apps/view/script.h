@@ -41,6 +41,7 @@ enum class Action {
             ///< has changed and is loaded
   kScreenshot,  ///< word: the file; of the whole window
   kPicture,     ///< word: the file; of the picture alone
+  kExport,      ///< word: the file; numbers: voxels along the longest side
   kPrint,       ///< word: to standard output
   kStats,       ///< a line of JSON to standard output
   kResetStats,

@@ -22,6 +22,7 @@ bool looks_at_screen(const ScriptCommand& command) {
     case Action::kClick:
     case Action::kScreenshot:
     case Action::kPicture:
+    case Action::kExport:
     case Action::kStats:
       return true;
     default:
@@ -210,6 +211,8 @@ Result<bool> ScriptRunner::run(const ScriptCommand& command, Viewer& viewer, Sta
       return done(stage.screenshot(command.word, false));
     case Action::kPicture:
       return done(stage.screenshot(command.word, true));
+    case Action::kExport:
+      return export_file(command, viewer, stage);
     case Action::kPrint:
       stage.print(command.word);
       return true;
@@ -222,6 +225,25 @@ Result<bool> ScriptRunner::run(const ScriptCommand& command, Viewer& viewer, Sta
     default:
       return done(apply(command, viewer));
   }
+}
+
+Result<bool> ScriptRunner::export_file(const ScriptCommand& command, Viewer& viewer, Stage& stage) {
+  if (!begun_) {
+    const int voxels =
+        command.numbers.empty() ? kExportVoxels : static_cast<int>(command.numbers[0]);
+    if (auto started = viewer.start_export(command.word, voxels); !started) {
+      return tl::unexpected(started.error());
+    }
+    if (viewer.exporting()) return false;
+    viewer.wants_picture.clear();
+    auto drawn = stage.screenshot(command.word, true);
+    if (!drawn) return tl::unexpected(drawn.error());
+    return true;
+  }
+  if (viewer.exporting()) return false;
+  if (!viewer.exported()) return tl::unexpected(viewer.exported().error());
+  stage.print("export " + *viewer.exported());
+  return true;
 }
 
 bool ScriptRunner::drag(const ScriptCommand& command, Viewer& viewer) {

@@ -42,6 +42,7 @@ class ScriptRunner {
   /// True when the command is done, false when it wants another turn.
   Result<bool> run(const ScriptCommand& command, Viewer& viewer, Stage& stage);
   static Result<void> apply(const ScriptCommand& command, Viewer& viewer);
+  Result<bool> export_file(const ScriptCommand& command, Viewer& viewer, Stage& stage);
   bool drag(const ScriptCommand& command, Viewer& viewer);
   bool wait(const ScriptCommand& command, const Viewer& viewer);
   static Result<void> see_through(const ScriptCommand& command, Viewer& viewer);

@@ -16,6 +16,7 @@
 #include "apps/session/file_conflicts.h"
 #include "apps/session/help.h"
 #include "apps/session/option_values.h"
+#include "apps/view/exporter.h"
 #include "apps/view/script.h"
 #include "apps/view/viewer.h"
 
@@ -200,11 +201,20 @@ std::variant<apps::ParseOutcome, ViewOptions> parse_view_options(int argc,
 Result<void> check_files(ViewOptions& options, const std::vector<ScriptCommand>& commands) {
   std::vector<apps::FileUse> written;
   for (const ScriptCommand& command : commands) {
-    if (command.action != Action::kScreenshot && command.action != Action::kPicture) continue;
-    written.push_back(
-        {fmt::format("{}:{}: {}", options.script == "-" ? "standard input" : options.script,
-                     command.line, command.action == Action::kPicture ? "picture" : "screenshot"),
-         command.word});
+    const bool exported = command.action == Action::kExport;
+    if (!exported && command.action != Action::kScreenshot && command.action != Action::kPicture) {
+      continue;
+    }
+    const std::string asked_by = fmt::format(
+        "{}:{}: {}", options.script == "-" ? "standard input" : options.script, command.line,
+        exported                             ? "export"
+        : command.action == Action::kPicture ? "picture"
+                                             : "screenshot");
+    if (!exported) written.push_back({asked_by, command.word});
+    if (!exported) continue;
+    for (std::string& file : export_files(command.word)) {
+      written.push_back({asked_by, std::move(file)});
+    }
   }
   if (!options.screenshot.empty()) written.push_back({"--screenshot", options.screenshot});
   std::vector<apps::FileUse> read = apps::inputs_of(options.command.input);

@@ -4,6 +4,8 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
+#include "apps/commands/file_uses.h"
+#include "apps/session/file_conflicts.h"
 #include "apps/session/session.h"
 
 namespace strata::view {
@@ -25,6 +27,7 @@ Viewer::Viewer(const ViewOptions& options, std::unique_ptr<Renderer> renderer,
       camera_(options.command.camera),
       picture_(options.command.picture),
       heat_(options.heat),
+      exporter_(wake),
       loader_(wake),
       thread_(std::move(renderer), options.command.common.threads, wake) {
   looks_.ghosts = options.ghosts;
@@ -36,6 +39,30 @@ Viewer::Viewer(const ViewOptions& options, std::unique_ptr<Renderer> renderer,
 void Viewer::reload() { loader_.start(options_.command, options_.command.common.threads); }
 
 void Viewer::cancel_load() { loader_.cancel(); }
+
+Result<void> Viewer::start_export(const std::string& path, int resolution) {
+  if (!model_) return fail(ErrorCode::kUsage, "nothing is loaded");
+  if (exporting_) return fail(ErrorCode::kUsage, "{}: another export is under way", path);
+  const auto kind = export_kind(path);
+  if (!kind) return tl::unexpected(kind.error());
+  std::vector<apps::FileUse> written;
+  for (const std::string& file : export_files(path)) written.push_back({"export", file});
+  const auto kept = apps::check_files(apps::inputs_of(options_.command.input), written);
+  if (!kept) return kept;
+  for (const FileIdentity& file : model_->scene.files) {
+    if (auto opened = apps::check_opened(file, written); !opened) return opened;
+  }
+  if (*kind == ExportKind::kPicture) {
+    wants_picture = path;
+    return {};
+  }
+  Looks looks = looks_;
+  looks.selected.reset();  // its tint is no colour of the scene
+  looks.ghosts = false;
+  exporter_.start({arrange(*model_, looks), path, resolution}, options_.command.common.threads);
+  exporting_ = true;
+  return {};
+}
 
 void Viewer::change(bool looks, bool input) {
   due_ = true;
@@ -101,6 +128,11 @@ void Viewer::tick() {
                                                               : loaded->error().message;
     }
     if (watch_) watch_->refresh(model_ ? model_->scene.files : std::vector<FileIdentity>());
+  }
+  if (auto done = exporter_.take()) {
+    exporting_ = false;
+    ++exports_;
+    exported_ = *std::move(done);
   }
   if (options_.watch) {
     if (!watch_) {

@@ -12,6 +12,7 @@
 
 #include "apps/view/camera_control.h"
 #include "apps/view/document.h"
+#include "apps/view/exporter.h"
 #include "apps/view/file_watch.h"
 #include "apps/view/loader.h"
 #include "apps/view/render_thread.h"
@@ -108,6 +109,11 @@ class Viewer {
   void set_media(std::shared_ptr<const transparency::MediaSettings> media);
   void reload();
   void cancel_load();
+  /// Begins to write what is seen to a file: a mesh or voxels; of a picture wants_picture becomes
+  /// the name. @return kUsage: nothing is loaded, an export is under way, an unknown format, or the
+  /// file is one that was read
+  Result<void> start_export(const std::string& path, int resolution);
+  void cancel_export() { exporter_.cancel(); }
   void pick(const glm::ivec2& pixel);
   /// Tints a solid, or none; the last pick is forgotten unless it is to be kept.
   void select(std::optional<std::uint32_t> solid, bool keep_pick = false);
@@ -115,6 +121,7 @@ class Viewer {
   // What panels show.
   bool show_axes = true, show_panels = true;
   bool wants_quit = false, wants_screenshot = false;  ///< by keys
+  std::string wants_picture;                          ///< a file; empty: none
   [[nodiscard]] const Model* model() const { return model_.get(); }
   [[nodiscard]] const ViewOptions& options() const { return options_; }
   [[nodiscard]] const Statistics& statistics() const { return statistics_; }
@@ -122,6 +129,11 @@ class Viewer {
   [[nodiscard]] bool loading() const { return loader_.busy(); }
   [[nodiscard]] double load_progress() const { return loader_.progress(); }
   [[nodiscard]] double load_seconds() const { return loader_.seconds(); }
+  [[nodiscard]] bool exporting() const { return exporting_; }
+  [[nodiscard]] double export_progress() const { return exporter_.progress(); }
+  [[nodiscard]] std::uint64_t exports() const { return exports_; }  ///< that ended, well or not
+  /// What the last one says. @pre there was one
+  [[nodiscard]] const Result<std::string>& exported() const { return exported_; }
   [[nodiscard]] const std::string& load_error() const { return load_error_; }
   [[nodiscard]] ErrorCode load_error_code() const { return load_error_code_; }
   [[nodiscard]] const std::string& draw_error() const { return draw_error_; }
@@ -134,7 +146,7 @@ class Viewer {
   /// What drew the last picture, and why not something better.
   [[nodiscard]] const std::string& drawn_by() const { return drawn_by_; }
   /// Anything between the mouse and the screen: the window should look often.
-  [[nodiscard]] bool busy() const { return !settled() || loading(); }
+  [[nodiscard]] bool busy() const { return !settled() || loading() || exporting_; }
 
  private:
   enum class Drag : std::uint8_t { kNone, kOrbit, kPan, kZoom, kSection };
@@ -189,6 +201,10 @@ class Viewer {
 
   std::unique_ptr<FileWatch> watch_;
   Clock::time_point looked_{};
+  bool exporting_ = false;
+  std::uint64_t exports_ = 0;
+  Result<std::string> exported_;
+  Exporter exporter_;
   Loader loader_;
   RenderThread thread_;
 };

@@ -142,9 +142,10 @@ constexpr Key kKeys[] = {
     {"escape",
      [](Viewer& v) {
        if (v.loading()) return v.cancel_load();
+       if (v.exporting()) return v.cancel_export();
        v.select({});
      },
-     "stop loading; clear the pick"},
+     "stop loading or an export; clear the pick"},
     {"ctrl+q", [](Viewer& v) { v.wants_quit = true; }, "close the window"},
 };
 

@@ -5,12 +5,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <glm/geometric.hpp>
 #include <utility>
 #include <vector>
 
 #include "apps/session/session.h"
 #include "apps/view/gl/theme.h"
+#include "strata/core/grid.h"
 
 namespace strata::view {
 namespace {
@@ -103,6 +105,7 @@ void Panels::side(Viewer& viewer, const glm::ivec2& window) {
   if (ImGui::CollapsingHeader("Transparency", ImGuiTreeNodeFlags_DefaultOpen)) transparency(viewer);
   if (ImGui::CollapsingHeader("Section", ImGuiTreeNodeFlags_DefaultOpen)) section(viewer);
   if (ImGui::CollapsingHeader("Picked", ImGuiTreeNodeFlags_DefaultOpen)) picked(viewer);
+  if (ImGui::CollapsingHeader("Export")) exports(viewer);
   // In a low window the solids need the room.
   constexpr int kHighEnough = 740;
   ImGui::SetNextItemOpen(static_cast<float>(window.y) >= kHighEnough * scale_,
@@ -306,6 +309,33 @@ void Panels::solids(Viewer& viewer) {
     }
   }
   ImGui::EndChild();
+}
+
+void Panels::exports(Viewer& viewer) {
+  if (viewer.exporting()) {
+    ImGui::ProgressBar(static_cast<float>(viewer.export_progress()), {-80 * scale_, 0});
+    ImGui::SameLine();
+    if (ImGui::Button("Cancel")) viewer.cancel_export();
+    return;
+  }
+  ImGui::SetNextItemWidth(-1);
+  ImGui::InputText("##export", export_name_.data(), export_name_.size());
+  hint(".3mf .stl .obj .ply .off: mesh; .vdb .npy .nrrd ...: voxels; .png: picture");
+  const std::string path(export_name_.data());
+  const auto kind = export_kind(path);
+  if (!kind) return faint("unknown format");
+  if (*kind == ExportKind::kVoxels) {
+    ImGui::SetNextItemWidth(share(2));
+    ImGui::InputInt("voxels", &export_voxels_, 0);
+    hint("along the longest side");
+    export_voxels_ = std::clamp(export_voxels_, 1, kMaxGridSide);
+  }
+  std::error_code ignored;
+  const char* label = std::filesystem::exists(path, ignored) ? "Replace the file" : "Export";
+  if (!ImGui::Button(label, {-1, 0})) return;
+  if (auto started = viewer.start_export(path, export_voxels_); !started) {
+    tell(started.error().message);
+  }
 }
 
 void Panels::statistics(const Viewer& viewer) {

@@ -32,6 +32,7 @@ class Panels {
   void look(Viewer& viewer);
   void picked(Viewer& viewer);
   void solids(Viewer& viewer);
+  void exports(Viewer& viewer);
   void statistics(const Viewer& viewer);
   void status(const Viewer& viewer, const glm::ivec2& window);
   void waiting(double seconds) const;
@@ -46,6 +47,8 @@ class Panels {
   float scale_;
   std::string gl_renderer_;
   std::array<char, 128> filter_{};
+  std::array<char, 512> export_name_{"part.3mf"};
+  int export_voxels_ = kExportVoxels;
   std::string told_;
   Viewer::Clock::time_point told_at_{};
   std::uint64_t hidden_warnings_ = 0;  ///< of the load of that number

@@ -182,6 +182,7 @@ class Program final : public Stage {
         if (auto checked = window_->check(); !checked) return checked;
       }
       if (std::exchange(viewer_->wants_screenshot, false)) keep_screenshot();
+      tell_export();
       const std::size_t before = script_.position();
       if (auto done = script_.step(*viewer_, *this); !done) return done;
       if (script_.position() != before) touch();
@@ -202,6 +203,21 @@ class Program final : public Stage {
     complain({viewer_->load_error_code(), viewer_->load_error()});
   }
 
+  /// Writes a picture that the panel asked for, and says how an export ended.
+  void tell_export() {
+    const std::string path = std::exchange(viewer_->wants_picture, "");
+    if (!path.empty() && viewer_->frame() != nullptr) {
+      const auto done = screenshot(path, true);
+      panels_->tell(done ? "written: " + path : done.error().message);
+      touch();
+    }
+    if (viewer_->exports() == exports_told_) return;
+    exports_told_ = viewer_->exports();
+    const Result<std::string>& result = viewer_->exported();
+    panels_->tell(result ? "written: " + *result : result.error().message);
+    touch();
+  }
+
   /// Something that panels show may have changed. They take some turns to follow: what is below
   /// the mouse is known in the next one.
   void touch() { turns_to_draw_ = 3; }
@@ -214,7 +230,8 @@ class Program final : public Stage {
     was_settled_ = whole;
     constexpr std::chrono::milliseconds kProgress{100}, kAtLeast{1000};
     const auto since = Clock::now() - drawn_at_;
-    if ((viewer_->loading() && since > kProgress) || since > kAtLeast) return true;
+    if (((viewer_->loading() || viewer_->exporting()) && since > kProgress) || since > kAtLeast)
+      return true;
     if (viewer_->frame_serial() != uploaded_) return true;
     if (turns_to_draw_ == 0) return false;
     --turns_to_draw_;
@@ -307,7 +324,7 @@ class Program final : public Stage {
   std::optional<Viewer> viewer_;  ///< last: its threads wake the window
   glm::ivec2 window_size_{0};
   Area area_;
-  std::uint64_t uploaded_ = 0, loads_told_ = 0;
+  std::uint64_t uploaded_ = 0, loads_told_ = 0, exports_told_ = 0;
   int settled_turns_ = 0, turns_to_draw_ = 3;
   bool was_settled_ = false;
   Clock::time_point drawn_at_{};

@@ -64,6 +64,12 @@ TEST(Script, MistakesNameFileAndLine) {
   EXPECT_EQ(error_of("orbit 1 x\n"), "drive.txt:1: 'x' is not a number; usage: orbit DX DY");
   EXPECT_EQ(error_of("orbit 1 nan\n"), "drive.txt:1: 'nan' is not a number; usage: orbit DX DY");
   EXPECT_EQ(error_of("\n\nhide \"cube\n"), "drive.txt:3: a quote is not closed");
+  EXPECT_EQ(error_of("export"), "drive.txt:1: usage: export FILE [N]");
+  EXPECT_EQ(error_of("export a.3mf 9"), "drive.txt:1: usage: export FILE [N]");
+  EXPECT_EQ(error_of("export a.npy 0"), "drive.txt:1: the voxels must be 1 to 65536, got 0");
+  EXPECT_EQ(error_of("export a.npy 1.5"), "drive.txt:1: the voxels must be 1 to 65536, got 1.5");
+  EXPECT_NE(error_of("export a.step").find("drive.txt:1: a.step: the name must end as"),
+            std::string::npos);
   EXPECT_EQ(error_of("edges maybe"), "drive.txt:1: usage: edges on|off");
   EXPECT_EQ(error_of("zoom 1 2"), "drive.txt:1: usage: zoom STEPS [X Y]");
   EXPECT_EQ(error_of("resize 0 5"),

@@ -9,13 +9,16 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <glm/geometric.hpp>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "strata/mesh/formats/read_mesh.h"
 #include "tests/apps/strata/run_tool.h"
 
 namespace strata::testkit {
@@ -368,6 +371,38 @@ TEST_F(Window, AMessageOfTheWindowIsOnStandardErrorWhileItIsOpen) {
   const std::size_t first = run.err.find("part.csg:1:");
   EXPECT_NE(first, std::string::npos) << run.err;
   EXPECT_EQ(run.err.find("part.csg:1:", first + 1), std::string::npos) << run.err;  // once
+}
+
+TEST_F(Window, WhatIsSeenIsExported) {
+  const RunResult run = view(
+      "hide sphere\nsection z=1\nexport part.ply\nexport part.npy 20\nsection off\n"
+      "axes off\nexport shown.png\npicture expected.png\nquit\n",
+      {"--size", "300,200", "--no-panels"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_NE(run.out.find("export part.ply: "), std::string::npos) << run.out;
+  EXPECT_NE(run.out.find("export part.npy: 20 x 20 x 4 voxels, "), std::string::npos) << run.out;
+  EXPECT_EQ(image_of(place_, "shown.png"), image_of(place_, "expected.png"));
+  const auto mesh = read_mesh(place_.path("part.ply"));
+  ASSERT_TRUE(mesh) << mesh.error().message;
+  double volume = 0;
+  for (const glm::uvec3& t : mesh->soup.triangles) {
+    const auto& p = mesh->soup.positions;
+    volume += glm::dot(p[t.x], glm::cross(p[t.y], p[t.z])) / 6;
+  }
+  const double hole = 12 * 9 * std::sin(2 * 3.14159265358979 / 24);  // 24 corners, radius 3
+  EXPECT_NEAR(volume, 4 * (400 - hole), 1e-3);
+}
+
+TEST_F(Window, AnExportDoesNotOverwriteWhatIsRead) {
+  place_.write("box.off",
+               "OFF\n4 4 0\n0 0 0\n9 0 0\n0 9 0\n0 0 9\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n");
+  const std::string before = place_.read("box.off");
+  place_.write("part.csg", "import(file = \"box.off\");");
+  const RunResult run = view("export box.off\nquit\n");
+  EXPECT_EQ(run.exit_code, 2) << run.err;
+  EXPECT_NE(run.err.find("would overwrite a file of the scene, box.off"), std::string::npos)
+      << run.err;
+  EXPECT_EQ(place_.read("box.off"), before);
 }
 
 TEST_F(Window, MistakesOfScriptsNameFileAndLine) {

@@ -1,0 +1,147 @@
+#include "apps/view/exporter.h"
+
+#include <algorithm>
+#include <exception>
+#include <filesystem>
+#include <new>
+#include <utility>
+
+#include "core/printable.h"
+#include "csg/measure/result_bounds.h"
+#include "strata/core/file_identity.h"
+#include "strata/csg/boundary/boundary_mesh.h"
+#include "strata/csg/solid_lists.h"
+#include "strata/mesh/writers/write_solid.h"
+#include "strata/voxelize/formats/voxel_writer.h"
+#include "strata/voxelize/grid_fit.h"
+#include "strata/voxelize/voxelize.h"
+
+namespace strata::view {
+namespace {
+
+std::string materials_of(const std::string& path) {
+  return std::filesystem::path(path).replace_extension(".mtl").string();
+}
+
+Result<std::string> export_mesh(const ExportRequest& request, const Execution& execution) {
+  const csg::Tree& tree = request.what->tree;
+  const SolidFormat format = solid_format_of(request.path);
+  csg::BoundaryOptions options;
+  options.float_positions = format == SolidFormat::kStl;
+  const bool coloured =
+      std::any_of(tree.solids().begin(), tree.solids().end(),
+                  [](const csg::Solid& solid) { return solid.colour.has_value(); });
+  if (coloured && format != SolidFormat::kStl) options.parts = csg::BoundaryParts::kColours;
+  auto made = csg::boundary_mesh(tree, tree.root(), options, execution);
+  if (!made) return tl::unexpected(made.error());
+  if (made->mesh.triangles.empty()) {
+    return fail(ErrorCode::kGeometry, "{}: nothing is left to write", request.path);
+  }
+  SolidWriteOptions writing;
+  writing.format = format;
+  if (coloured && format == SolidFormat::kObj) writing.materials = materials_of(request.path);
+  Execution quiet = execution;
+  quiet.progress = {};
+  auto written = write_solid(request.path, made->mesh, writing, quiet);
+  if (!written) return tl::unexpected(written.error());
+  std::string told =
+      fmt::format("{}: {}", request.path, counted(made->mesh.triangles.size(), "triangle"));
+  if (!made->report.caps.empty()) {
+    told += fmt::format(", {} closed", counted(made->report.caps.size(), "hole"));
+  }
+  return told;
+}
+
+Result<std::string> export_voxels(const ExportRequest& request, const Execution& execution) {
+  const csg::Tree& tree = request.what->tree;
+  const auto format = voxel_format_for(request.path, "");
+  if (!format) return tl::unexpected(format.error());
+  Execution quiet = execution;
+  quiet.progress = {};
+  const auto box = csg::result_bounds(tree, tree.root(), 0, quiet);
+  if (!box) return tl::unexpected(box.error());
+  GridRequest wanted;
+  wanted.resolution = request.resolution;
+  if (box->empty()) {
+    return fail(ErrorCode::kGeometry, "{}: nothing is left to write", request.path);
+  }
+  const auto grid = fit_grid(*box, wanted);
+  if (!grid) return tl::unexpected(grid.error());
+  csg::SolidLists lists(tree, tree.root());
+  if (auto fitted = lists.fit(*grid, nullptr, quiet); !fitted)
+    return tl::unexpected(fitted.error());
+  VoxelizeOptions options;
+  options.axis = format->axis;
+  options.closedness = Closedness::kAssumeClosed;  // the filter makes closed lists
+  options.filter = &lists.filter();
+  const auto set = voxelize(lists.soup(), *grid, options, execution);
+  if (!set) return tl::unexpected(set.error());
+  if (auto written = write_voxels(*set, request.path, {}, quiet); !written) {
+    return tl::unexpected(written.error());
+  }
+  return fmt::format("{}: {} x {} x {} voxels, {} solid", request.path, grid->dims.x, grid->dims.y,
+                     grid->dims.z, set->solid_voxels());
+}
+
+Result<std::string> export_safely(const ExportRequest& request, const Execution& execution) {
+  try {
+    return export_what_is_seen(request, execution);
+  } catch (const std::bad_alloc&) {
+    return fail(ErrorCode::kLimit, "{}: out of memory", request.path);
+  } catch (const std::exception& failure) {
+    return fail(ErrorCode::kInternal, "internal error: {}", failure.what());
+  }
+}
+
+}  // namespace
+
+Result<ExportKind> export_kind(const std::string& path) {
+  if (has_extension(path, ".png")) return ExportKind::kPicture;
+  if (solid_format_of(path) != SolidFormat::kAuto) return ExportKind::kMesh;
+  if (voxel_format_for(path, "")) return ExportKind::kVoxels;
+  return fail(ErrorCode::kUsage,
+              "{}: the name must end as a mesh (.3mf .stl .obj .ply .off), as voxels (.vdb .npy "
+              ".nrrd ...) or as a picture (.png)",
+              path);
+}
+
+std::vector<std::string> export_files(const std::string& path) {
+  std::vector<std::string> files{path};
+  if (solid_format_of(path) == SolidFormat::kObj) files.push_back(materials_of(path));
+  return files;
+}
+
+Result<std::string> export_what_is_seen(const ExportRequest& request, const Execution& execution) {
+  const auto kind = export_kind(request.path);
+  if (!kind) return tl::unexpected(kind.error());
+  if (*kind == ExportKind::kPicture) {
+    return fail(ErrorCode::kUsage, "{}: the window writes pictures", request.path);
+  }
+  return *kind == ExportKind::kMesh ? export_mesh(request, execution)
+                                    : export_voxels(request, execution);
+}
+
+void Exporter::start(ExportRequest request, int threads) {
+  busy_ = true;
+  progress_ = 0;
+  thread_ = std::jthread([this, request = std::move(request), threads](std::stop_token stop) {
+    Execution execution;
+    execution.threads = threads;
+    execution.stop = std::move(stop);
+    execution.progress = [this](double fraction) { progress_ = fraction; };
+    auto result = export_safely(request, execution);
+    {
+      const std::lock_guard lock(mutex_);
+      done_ = std::move(result);
+    }
+    busy_ = false;
+    wake_();
+  });
+}
+
+std::optional<Result<std::string>> Exporter::take() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(done_, {});
+}
+
+}  // namespace strata::view
