@@ -92,7 +92,9 @@ const auto incircle_exact = [](const Input& in, std::size_t i) {
 };
 const auto incircle_filter = [](const Input& in, std::size_t i) {
   const auto flat = [&](std::size_t k) { return FlatPoint(in.rounded[k].x, in.rounded[k].y); };
-  return filters::incircle(flat(i), flat(i + 1), flat(i + 2), flat(i + 3));
+  const FlatPoint d = flat(i + 3);
+  return filters::incircle(filters::RealFlat(flat(i) - d), filters::RealFlat(flat(i + 1) - d),
+                           filters::RealFlat(flat(i + 2) - d));
 };
 const auto rounded_exact = [](const Input& in, std::size_t i) {
   return sign_of(

@@ -85,7 +85,8 @@ TEST_P(FlatByInput, Orient3dOfRoundedPointsIsTheDeterminant) {
 TEST_P(FlatByInput, FiltersThatDecideAreExact) {
   for (int i = 0; i < 150000; ++i) {
     const FlatPoint a = point(), b = point(), c = point(), d = point();
-    const int sign = filters::incircle(a, b, c, d);
+    const int sign = filters::incircle(filters::RealFlat(a - d), filters::RealFlat(b - d),
+                                       filters::RealFlat(c - d));
     ASSERT_TRUE(sign == 0 || sign == sign_of(incircle_value(a, b, c, d)));
     const FilePoint p = point3(), q = point3(), r = point3(), s = point3();
     const int side = filters::orient3d(p, q, r, s);
