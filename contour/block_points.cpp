@@ -15,10 +15,12 @@ namespace {
 class CellCuts {
  public:
   CellCuts(const BlockNeighbours& blocks, const glm::ivec3& low, std::span<const Plane> planes)
-      : blocks_(blocks), low_(low), planes_(planes) {}
+      : blocks_(blocks), low_(low), all_planes_(planes) {}
 
-  std::span<const CellCut> of(const Cell& cell, unsigned cycle) {
+  void gather(const Cell& cell, unsigned cycle) {
+    sum_ = glm::ivec3(0);
     count_ = 0;
+    planes_.clear();
     corner_ = lower_corner(low_, cell.at);
     for_each_axis([&](auto axis) {
       for (unsigned left = cell.kind->cut >> 4 * axis & 15u; left != 0; left &= left - 1) {
@@ -26,8 +28,10 @@ class CellCuts {
         if (cell.kind->cycle[4 * axis + place] == cycle) add<axis>(cell.at, place);
       }
     });
-    return std::span(cuts_).first(count_);
   }
+  /// From the cell's lower corner.
+  [[nodiscard]] glm::dvec3 mean() const { return glm::dvec3(sum_) / static_cast<double>(count_); }
+  [[nodiscard]] const CellPlanes& planes() const { return planes_; }
 
  private:
   /// @param place  of the edge along the axis: 0 to 3
@@ -35,31 +39,31 @@ class CellCuts {
   void add(const LocalPlace& cell, unsigned place) {
     const CellBlock::Crossing& found = crossing_at(blocks_, cell, 4u * axis + place);
     constexpr int kFirst = axis == 0 ? 1 : 0, kSecond = axis == 2 ? 1 : 2;
-    CellCut& cut = cuts_[count_];
-    cut.point[axis] = found.offset;
-    cut.point[kFirst] = static_cast<int>(place & 1) * kLatticeSteps;
-    cut.point[kSecond] = static_cast<int>(place >> 1) * kLatticeSteps;
-    cut.plane.normal = glm::dvec3(0.0);
-    triangles_[count_] = found.triangle;
-    bool again = found.triangle == CutEdge::kNoTriangle;
-    if (found.triangle == CutEdge::kGridFace) {
-      cut.plane.normal[axis] = 1.0;
-      cut.plane.offset = found.offset;
-      again = true;
+    sum_[axis] += found.offset;
+    sum_[kFirst] += static_cast<int>(place & 1) * kLatticeSteps;
+    sum_[kSecond] += static_cast<int>(place >> 1) * kLatticeSteps;
+    const std::uint32_t triangle = found.triangle;
+    bool again = triangle == CutEdge::kNoTriangle;
+    for (std::size_t i = 0; i < count_ && !again; ++i) again = triangles_[i] == triangle;
+    triangles_[count_++] = triangle == CutEdge::kGridFace ? CutEdge::kNoTriangle : triangle;
+    if (again) return;
+    Plane plane;
+    if (triangle == CutEdge::kGridFace) {
+      plane.normal[axis] = 1.0;
+      plane.offset = found.offset;
+    } else {
+      plane = all_planes_[triangle];
+      plane.offset -= glm::dot(plane.normal, corner_);
     }
-    for (std::size_t i = 0; i < count_ && !again; ++i) again = triangles_[i] == found.triangle;
-    if (!again) {
-      cut.plane = planes_[found.triangle];
-      cut.plane.offset -= glm::dot(cut.plane.normal, corner_);
-    }
-    ++count_;
+    planes_.add(plane);
   }
 
   const BlockNeighbours& blocks_;
   glm::ivec3 low_;
-  glm::dvec3 corner_{0.0};  ///< of the cell
-  std::span<const Plane> planes_;
-  std::array<CellCut, 12> cuts_;
+  std::span<const Plane> all_planes_;
+  glm::dvec3 corner_{0.0};
+  glm::ivec3 sum_{0};
+  CellPlanes planes_;
   std::array<std::uint32_t, 12> triangles_{};
   std::size_t count_ = 0;
 };
@@ -109,9 +113,10 @@ std::uint64_t place_points(CellBlock& block, const BlockNeighbours& blocks, cons
   for_each_cell(block, [&](const Cell& cell) {
     const CellBounds bounds = bounds_of(low + glm::ivec3(cell.at.i, cell.at.j, cell.at.k), grid);
     for (unsigned cycle = 0; cycle < cell.kind->cycles; ++cycle) {
-      const auto used = cuts.of(cell, cycle);
-      const CellVertex vertex =
-          cell.kind->cycles == 1 ? feature_vertex(used, bounds) : mean_vertex(used, bounds);
+      cuts.gather(cell, cycle);
+      const CellVertex vertex = cell.kind->cycles == 1
+                                    ? feature_vertex(cuts.mean(), cuts.planes(), bounds)
+                                    : mean_vertex(cuts.mean(), bounds);
       clamped += vertex.clamped ? 1 : 0;
       CellBlock::CellPoint& point = block.points[cycle == 0 ? next++ : next_split++];
       point = {static_cast<std::uint8_t>(vertex.at.x), static_cast<std::uint8_t>(vertex.at.y),

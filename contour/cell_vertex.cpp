@@ -1,12 +1,14 @@
 #include "contour/cell_vertex.h"
 
 #include <algorithm>
-#include <array>
+#include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 // After: T. Ju, F. Losasso, S. Schaefer, J. Warren: Dual contouring of Hermite data, 2002. We
 // differ: planes are those of triangles, without the error of samples, so that small angles between
-// them count; a best place outside the cell is replaced by one that small angles count less for.
+// them count. Where the best place lies outside the cell, small angles count less, as long as the
+// vertex stays at the planes; else it is the best place at the cell's sides.
 
 namespace strata::contouring {
 namespace {
@@ -15,14 +17,10 @@ namespace {
 /// planes 1 degree apart by 1/30 of a cell's side times 1e-3, far below half a step; with the
 /// second, planes less than about 8 degrees apart are nearly one.
 constexpr double kSharp = 1e-7, kBlunt = 0.02;
+/// The blunt place may be this many steps from a plane, 1/128 voxel.
+constexpr double kMostOff = 2.0;
 /// Normals this close are one plane: doubles of coordinates below 2^24 steps know them to 2^-48.
 constexpr double kSameNormal = 1e-9;
-
-glm::dvec3 mean_of(std::span<const CellCut> cuts) {
-  glm::dvec3 sum(0.0);
-  for (const CellCut& cut : cuts) sum += cut.point;
-  return sum / static_cast<double>(cuts.size());
-}
 
 /// The nearest step to a coordinate, within bounds.
 int rounded(double place, int low, int high, bool& clamped) {
@@ -39,63 +37,100 @@ CellVertex rounded(const glm::dvec3& place, const CellBounds& bounds) {
   return result;
 }
 
-/// The different planes of a cell.
-struct Planes {
-  std::array<Plane, 12> at;
-  std::size_t count = 0;
-
-  void add(const Plane& plane) {
-    if (plane.normal == glm::dvec3(0.0)) return;
-    for (std::size_t i = 0; i < count; ++i) {
-      const glm::dvec3 apart = glm::cross(at[i].normal, plane.normal);
-      if (glm::dot(apart, apart) < kSameNormal * kSameNormal) return;
+/// The step x from the mean with the least sum of squared distances from planes, plus weight x^2:
+/// (sum of n n^T + weight) x = sum of n (d - n . mean).
+class LeastSquares {
+ public:
+  LeastSquares(std::span<const Plane> planes, const glm::dvec3& mean) {
+    for (const Plane& plane : planes) {
+      const glm::dvec3& n = plane.normal;
+      diagonal_ += n * n;
+      xy_ += n.x * n.y, xz_ += n.x * n.z, yz_ += n.y * n.z;
+      right_ += n * (plane.offset - glm::dot(n, mean));
     }
-    at[count++] = plane;
   }
+  void add_weight(double weight) { diagonal_ += weight; }
+  /// Makes a coordinate of the step known.
+  void fix(int axis, double value) {
+    if (axis == 0) right_ -= glm::dvec3(0.0, xy_, xz_) * value, xy_ = xz_ = 0.0;
+    if (axis == 1) right_ -= glm::dvec3(xy_, 0.0, yz_) * value, xy_ = yz_ = 0.0;
+    if (axis == 2) right_ -= glm::dvec3(xz_, yz_, 0.0) * value, xz_ = yz_ = 0.0;
+    diagonal_[axis] = 1.0;
+    right_[axis] = value;
+  }
+  /// By L D L^T.
+  [[nodiscard]] glm::dvec3 solved() const {
+    const double l21 = xy_ / diagonal_.x, l31 = xz_ / diagonal_.x;
+    const double d2 = diagonal_.y - l21 * xy_;
+    const double l32 = (yz_ - l31 * xy_) / d2;
+    const double d3 = diagonal_.z - l31 * xz_ - l32 * l32 * d2;
+    const double y2 = right_.y - l21 * right_.x;
+    const double z = (right_.z - l31 * right_.x - l32 * y2) / d3, y = y2 / d2 - l32 * z;
+    return {right_.x / diagonal_.x - l21 * y - l31 * z, y, z};
+  }
+
+ private:
+  glm::dvec3 diagonal_{0.0}, right_{0.0};
+  double xy_ = 0.0, xz_ = 0.0, yz_ = 0.0;
 };
 
-/// Solves (sum of n n^T + weight) x = sum of n (d - n . mean), by L D L^T, for the step from the
-/// mean.
-glm::dvec3 least_squares(const Planes& planes, const glm::dvec3& mean, double weight) {
-  double xx = weight, yy = weight, zz = weight, xy = 0, xz = 0, yz = 0;
-  glm::dvec3 right(0.0);
-  for (std::size_t i = 0; i < planes.count; ++i) {
-    const glm::dvec3& n = planes.at[i].normal;
-    xx += n.x * n.x, yy += n.y * n.y, zz += n.z * n.z;
-    xy += n.x * n.y, xz += n.x * n.z, yz += n.y * n.z;
-    right += n * (planes.at[i].offset - glm::dot(n, mean));
+bool lies_at(std::span<const Plane> planes, const CellVertex& vertex) {
+  return std::all_of(planes.begin(), planes.end(), [&](const Plane& plane) {
+    return std::abs(glm::dot(plane.normal, glm::dvec3(vertex.at)) - plane.offset) <= kMostOff;
+  });
+}
+
+/// The best place within bounds: whichever coordinate is farthest out is set to its bound, and the
+/// others follow.
+CellVertex bounded(LeastSquares squares, const glm::dvec3& mean, const CellBounds& bounds) {
+  for (int fixed = 0; fixed < 3; ++fixed) {
+    const glm::dvec3 place = mean + squares.solved();
+    const glm::dvec3 kept = glm::clamp(place, glm::dvec3(bounds.low), glm::dvec3(bounds.high));
+    const glm::dvec3 out = glm::abs(place - kept);
+    const int axis = out.x >= out.y && out.x >= out.z ? 0 : out.y >= out.z ? 1 : 2;
+    if (!(out[axis] > 0.0)) break;
+    squares.fix(axis, kept[axis] - mean[axis]);
   }
-  const double l21 = xy / xx, l31 = xz / xx;
-  const double d2 = yy - l21 * xy;
-  const double l32 = (yz - l31 * xy) / d2;
-  const double d3 = zz - l31 * xz - l32 * l32 * d2;
-  const double y1 = right.x, y2 = right.y - l21 * y1, y3 = right.z - l31 * y1 - l32 * y2;
-  const double z = y3 / d3, y = y2 / d2 - l32 * z;
-  return {y1 / xx - l21 * y - l31 * z, y, z};
+  return rounded(mean + squares.solved(), bounds);
 }
 
 }  // namespace
 
-CellVertex mean_vertex(std::span<const CellCut> cuts, const CellBounds& bounds) {
-  CellVertex result = rounded(mean_of(cuts), bounds);
+void CellPlanes::add(const Plane& plane) {
+  if (plane.normal == glm::dvec3(0.0)) return;
+  for (const Plane& other : all()) {
+    const glm::dvec3 apart = glm::cross(other.normal, plane.normal);
+    if (glm::dot(apart, apart) < kSameNormal * kSameNormal) return;
+  }
+  planes_[count_++] = plane;
+}
+
+CellVertex mean_vertex(const glm::dvec3& mean, const CellBounds& bounds) {
+  CellVertex result = rounded(mean, bounds);
   result.clamped = false;
   return result;
 }
 
-CellVertex feature_vertex(std::span<const CellCut> cuts, const CellBounds& bounds) {
-  const glm::dvec3 mean = mean_of(cuts);
-  Planes planes;
-  for (const CellCut& cut : cuts) planes.add(cut.plane);
-  if (planes.count == 0) return mean_vertex(cuts, bounds);
-  if (planes.count == 1) {
-    const glm::dvec3& n = planes.at[0].normal;
-    return rounded(mean + n * (planes.at[0].offset - glm::dot(n, mean)), bounds);
+CellVertex feature_vertex(const glm::dvec3& mean, const CellPlanes& planes,
+                          const CellBounds& bounds) {
+  const auto all = planes.all();
+  if (all.empty()) return mean_vertex(mean, bounds);
+  if (all.size() == 1) {  // the most usual case
+    const glm::dvec3& n = all.front().normal;
+    const CellVertex on_plane =
+        rounded(mean + n * (all.front().offset - glm::dot(n, mean)), bounds);
+    if (!on_plane.clamped) return on_plane;
   }
-  const CellVertex sharp = rounded(mean + least_squares(planes, mean, kSharp), bounds);
+  LeastSquares squares(all, mean);
+  squares.add_weight(kSharp);
+  const CellVertex sharp = rounded(mean + squares.solved(), bounds);
   if (!sharp.clamped) return sharp;
-  CellVertex blunt = rounded(mean + least_squares(planes, mean, kBlunt), bounds);
-  blunt.clamped = true;
-  return blunt;
+  LeastSquares blunter = squares;
+  blunter.add_weight(kBlunt);
+  CellVertex result = rounded(mean + blunter.solved(), bounds);
+  if (result.clamped || !lies_at(all, result)) result = bounded(squares, mean, bounds);
+  result.clamped = true;
+  return result;
 }
 
 }  // namespace strata::contouring

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <glm/vec3.hpp>
 #include <span>
 
@@ -13,15 +14,17 @@ struct Plane {
   double offset = 0.0;
 };
 
-/// Where the surface cuts an edge of a cell, in lattice steps from the cell's lower corner.
-struct CellCut {
-  glm::dvec3 point{0.0};
-  Plane plane;  ///< normal 0: not known
-};
+/// The different planes of a cell.
+class CellPlanes {
+ public:
+  void clear() { count_ = 0; }
+  /// Takes a plane that has a normal, and is not the same as one before.
+  void add(const Plane& plane);
+  [[nodiscard]] std::span<const Plane> all() const { return std::span(planes_).first(count_); }
 
-struct CellVertex {
-  glm::ivec3 at{0};      ///< lattice steps from the lower corner
-  bool clamped = false;  ///< the best place lay outside the bounds
+ private:
+  std::array<Plane, 12> planes_;
+  std::size_t count_ = 0;
 };
 
 /// Where the vertex may lie: inside the cell and inside the grid.
@@ -29,11 +32,16 @@ struct CellBounds {
   glm::ivec3 low{1}, high{255};
 };
 
-/// The mean of the points, rounded.
-[[nodiscard]] CellVertex mean_vertex(std::span<const CellCut> cuts, const CellBounds& bounds = {});
-/// The point of the cell with the least sum of squared distances from the planes; of several, the
-/// one nearest to the mean of the points. Where three planes meet in the cell, that point.
-[[nodiscard]] CellVertex feature_vertex(std::span<const CellCut> cuts,
+struct CellVertex {
+  glm::ivec3 at{0};      ///< lattice steps from the lower corner
+  bool clamped = false;  ///< the best place lay outside the bounds
+};
+
+/// The lattice point nearest to the mean of the points where a cell's edges are cut.
+[[nodiscard]] CellVertex mean_vertex(const glm::dvec3& mean, const CellBounds& bounds = {});
+/// The lattice point nearest to that with the least sum of squared distances from the planes; of
+/// several, the one nearest to the mean. Where three planes meet in the cell, it is that point.
+[[nodiscard]] CellVertex feature_vertex(const glm::dvec3& mean, const CellPlanes& planes,
                                         const CellBounds& bounds = {});
 
 }  // namespace strata::contouring

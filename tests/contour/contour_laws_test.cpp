@@ -2,10 +2,13 @@
 
 #include <random>
 
+#include "strata/mesh/check/mesh_check.h"
 #include "strata/mesh/shapes.h"
 #include "strata/mesh/soup_tools.h"
+#include "strata/voxelize/checksum.h"
 #include "strata/voxelize/grid_fit.h"
 #include "tests/contour/contour_testing.h"
+#include "tests/support/voxelized.h"
 
 namespace strata {
 namespace {
@@ -93,6 +96,37 @@ TEST(ContourLaws, HoldAcrossBlocks) {  // of 32 x 32 x 32 cells
     noise.add(soup, voxel, false);
   }
   checked_contour(soup, unit_grid(dims), {.rule = InsideRule::kWinding});
+}
+
+/// What a brute-force search would take too long for.
+void expect_sound(const TriangleSoup& soup, const VoxelGrid& grid) {
+  const auto made = contour(soup, grid);
+  ASSERT_TRUE(made.has_value());
+  const auto check = check_mesh(made->mesh.positions, made->mesh.triangles);
+  ASSERT_TRUE(check.has_value());
+  EXPECT_TRUE(check->sound());
+  EXPECT_TRUE(check->by_index);
+  EXPECT_EQ(check->meeting_pairs(), 0u);
+  EXPECT_GT(check->triangles, 10'000u);
+  const auto wanted = testkit::voxelized(soup, grid);
+  const auto given = testkit::voxelized(testkit::soup_of(made->mesh), grid);
+  EXPECT_EQ(set_checksum(given), set_checksum(wanted));
+}
+
+TEST(ContourLaws, HoldForLargeMeshes) {
+  Noise noise(77);
+  TriangleSoup soup;
+  const glm::ivec3 dims(40, 36, 70);
+  for (int x = 0; x < dims.x; ++x) {
+    for (int y = 0; y < dims.y; ++y) {
+      for (int z = 0; z < dims.z; ++z) {
+        if (noise.chance(x % 20 == 7 ? 0.95 : 0.1)) noise.add(soup, {x, y, z}, y > 20);
+      }
+    }
+  }
+  expect_sound(soup, unit_grid(dims));
+  const TriangleSoup knot = make_torus_knot(3, 5, 0.15, 300, 24);
+  expect_sound(knot, *fit_grid(bounds(knot), {.resolution = 150}));
 }
 
 TEST(ContourLaws, HoldForOverlappingBalls) {
