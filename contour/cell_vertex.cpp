@@ -19,6 +19,8 @@ namespace {
 constexpr double kSharp = 1e-7, kBlunt = 0.02;
 /// The blunt place may be this many steps from a plane, 1/128 voxel.
 constexpr double kMostOff = 2.0;
+/// Steps from a triangle, half a cell, times its corners' greatest error by rounding.
+constexpr double kUnknown = 128.0 * 0.7;
 /// Normals this close are one plane: doubles of coordinates below 2^24 steps know them to 2^-48.
 constexpr double kSameNormal = 1e-9;
 
@@ -37,16 +39,18 @@ CellVertex rounded(const glm::dvec3& place, const CellBounds& bounds) {
   return result;
 }
 
-/// The step x from the mean with the least sum of squared distances from planes, plus weight x^2:
-/// (sum of n n^T + weight) x = sum of n (d - n . mean).
+/// The step x from the mean with the least weighted sum of squared distances from planes, plus
+/// weight x^2: (sum of w n n^T + weight) x = sum of w n (d - n . mean).
 class LeastSquares {
  public:
   LeastSquares(std::span<const Plane> planes, const glm::dvec3& mean) {
+    double most = 0.0;  // of the weights
+    for (const Plane& plane : planes) most = std::max(most, plane.weight);
     for (const Plane& plane : planes) {
-      const glm::dvec3& n = plane.normal;
-      diagonal_ += n * n;
-      xy_ += n.x * n.y, xz_ += n.x * n.z, yz_ += n.y * n.z;
-      right_ += n * (plane.offset - glm::dot(n, mean));
+      const glm::dvec3 n = plane.normal, weighted = n * (plane.weight / most);
+      diagonal_ += weighted * n;
+      xy_ += weighted.x * n.y, xz_ += weighted.x * n.z, yz_ += weighted.y * n.z;
+      right_ += weighted * (plane.offset - glm::dot(n, mean));
     }
   }
   void add_weight(double weight) { diagonal_ += weight; }
@@ -76,7 +80,8 @@ class LeastSquares {
 
 bool lies_at(std::span<const Plane> planes, const CellVertex& vertex) {
   return std::all_of(planes.begin(), planes.end(), [&](const Plane& plane) {
-    return std::abs(glm::dot(plane.normal, glm::dvec3(vertex.at)) - plane.offset) <= kMostOff;
+    const double off = glm::dot(plane.normal, glm::dvec3(vertex.at)) - plane.offset;
+    return off * off * plane.weight <= kMostOff * kMostOff;
   });
 }
 
@@ -96,11 +101,26 @@ CellVertex bounded(LeastSquares squares, const glm::dvec3& mean, const CellBound
 
 }  // namespace
 
+Plane plane_of(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) {
+  Plane plane;
+  const glm::dvec3 u = b - a, v = c - a, w = c - b, normal = glm::cross(u, v);
+  const double squared = glm::dot(normal, normal);
+  if (!(squared > 0.0)) return plane;
+  plane.normal = normal / std::sqrt(squared);
+  plane.offset = glm::dot(plane.normal, a);
+  const double height_squared =
+      squared / std::max({glm::dot(u, u), glm::dot(v, v), glm::dot(w, w)});
+  plane.weight = height_squared / (height_squared + kUnknown * kUnknown);
+  return plane;
+}
+
 void CellPlanes::add(const Plane& plane) {
   if (plane.normal == glm::dvec3(0.0)) return;
-  for (const Plane& other : all()) {
+  for (Plane& other : std::span(planes_).first(count_)) {
     const glm::dvec3 apart = glm::cross(other.normal, plane.normal);
-    if (glm::dot(apart, apart) < kSameNormal * kSameNormal) return;
+    if (!(glm::dot(apart, apart) < kSameNormal * kSameNormal)) continue;
+    if (plane.weight > other.weight) other = plane;
+    return;
   }
   planes_[count_++] = plane;
 }

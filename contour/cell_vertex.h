@@ -12,13 +12,19 @@ namespace strata::contouring {
 struct Plane {
   glm::dvec3 normal{0.0};  ///< of length 1; 0 if the triangle has no area
   double offset = 0.0;
+  /// How well it is known, up to 1: its triangle's corners were rounded, by half a step, so at
+  /// the other side of a cell the plane of a triangle of height h is off by about 90 / h steps.
+  double weight = 1.0;
 };
+
+/// The plane of a triangle; normal 0 if it has no area.
+[[nodiscard]] Plane plane_of(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c);
 
 /// The different planes of a cell.
 class CellPlanes {
  public:
   void clear() { count_ = 0; }
-  /// Takes a plane that has a normal, and is not the same as one before.
+  /// Takes a plane that has a normal. Of planes with the same normal, the best known one counts.
   void add(const Plane& plane);
   [[nodiscard]] std::span<const Plane> all() const { return std::span(planes_).first(count_); }
 

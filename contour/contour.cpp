@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <glm/geometric.hpp>
 #include <limits>
 #include <memory>
 #include <new>
@@ -69,13 +68,10 @@ std::vector<Plane> planes_of(const LatticeMesh& mesh, const Execution& execution
   constexpr std::size_t kChunk = 1 << 14;
   parallel_for(execution, (planes.size() + kChunk - 1) / kChunk, [&](std::size_t chunk, int) {
     for (std::size_t t = chunk * kChunk; t < std::min(planes.size(), (chunk + 1) * kChunk); ++t) {
-      const glm::dvec3 a(mesh.vertices[mesh.triangles[t].x]);
-      const glm::dvec3 normal = glm::cross(glm::dvec3(mesh.vertices[mesh.triangles[t].y]) - a,
-                                           glm::dvec3(mesh.vertices[mesh.triangles[t].z]) - a);
-      const double length = glm::length(normal);
-      if (!(length > 0.0)) continue;
-      planes[t].normal = normal / length;
-      planes[t].offset = glm::dot(planes[t].normal, a);
+      const glm::uvec3& corners = mesh.triangles[t];
+      planes[t] =
+          plane_of(glm::dvec3(mesh.vertices[corners.x]), glm::dvec3(mesh.vertices[corners.y]),
+                   glm::dvec3(mesh.vertices[corners.z]));
     }
   });
   return planes;
