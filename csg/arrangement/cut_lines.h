@@ -67,8 +67,8 @@ struct LineAxis {
 LineAxis axis_of(const ArrangementInput& input, const CutLines& lines, std::uint32_t line);
 
 /// Finds where pairs of triangles meet.
-void meet_pairs(const ArrangementInput& input, std::span<const TrianglePair> pairs,
-                PointTable& points, CutLines& lines);
+void meet_pairs(const ArrangementInput& input, std::span<const BoxPair> pairs, PointTable& points,
+                CutLines& lines);
 
 /// Finds where lines meet within a triangle, for all triangles. Points are added to the lines.
 /// @return kCancelled

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <glm/geometric.hpp>
 
 namespace strata::csg {
 namespace {
@@ -86,25 +85,12 @@ void snap_part(const Geometry::Part& part, LatticeSolids& solids) {
   for (const glm::uvec3& triangle : part.triangles) solids.triangles.push_back(triangle + base);
 }
 
-// A convex solid does not meet itself, and does not after its vertices have moved by less than a
-// step either where each of its triangles is several steps high.
-bool stays_convex(const LatticeSolids& solids, std::uint32_t first) {
-  constexpr double kHigh = 8.0;
-  const std::vector<glm::uvec3>& triangles = solids.triangles;
-  return std::all_of(triangles.begin() + first, triangles.end(), [&](const glm::uvec3& t) {
-    const glm::dvec3 a(solids.vertices[t.x]), b(solids.vertices[t.y]), c(solids.vertices[t.z]);
-    const double longest = std::max({glm::length(b - a), glm::length(c - b), glm::length(a - c)});
-    return glm::length(glm::cross(b - a, c - a)) >= kHigh * longest;
-  });
-}
-
 }  // namespace
 
 Result<LatticeSolids> snap_solids(const Tree& tree, Tree::NodeId root, const Geometry& geometry,
                                   int bits, const Execution& execution) {
   LatticeSolids solids;
   solids.first_triangle.assign(tree.solids().size() + 1, 0);
-  solids.embedded.assign(tree.solids().size(), false);
   if (root == Tree::kNone) return solids;
   const Bounds result = bounds(tree, root, geometry.boxes());
   if (result.empty() || result.longest_side() == 0) return solids;
@@ -125,8 +111,6 @@ Result<LatticeSolids> snap_solids(const Tree& tree, Tree::NodeId root, const Geo
   for (std::size_t s = 0; s < used.size(); ++s) {
     if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
     if (used[s]) snap_part(geometry.parts()[s], solids);
-    solids.embedded[s] =
-        geometry.parts()[s].convex && stays_convex(solids, solids.first_triangle[s]);
     solids.first_triangle[s + 1] = static_cast<std::uint32_t>(solids.triangles.size());
   }
   return solids;

@@ -35,8 +35,6 @@ struct LatticeSolids {
   /// Solid s has the triangles [first_triangle[s], first_triangle[s + 1]); none when it is not
   /// below the root.
   std::vector<std::uint32_t> first_triangle{0};
-  /// Of each solid: whether its triangles are known to meet in shared edges and vertices alone.
-  std::vector<bool> embedded;
 
   std::size_t solid_count() const { return first_triangle.size() - 1; }
 };

@@ -38,7 +38,7 @@ class PairMeeter {
   PairMeeter(const ArrangementInput& input, PointTable& points, CutLines& lines)
       : input_(input), points_(points), lines_(lines) {}
 
-  void meet(const TrianglePair& pair) {
+  void meet(const BoxPair& pair) {
     const Side a = side_of(pair.first), b = side_of(pair.second);
     const std::array<Int128, 3> a_heights = heights(a, b.plane), b_heights = heights(b, a.plane);
     if (one_side(a_heights) || one_side(b_heights)) return;
@@ -279,8 +279,8 @@ void PairMeeter::clip_edge(const Side& a, int side, const Side& b) {
 
 }  // namespace
 
-void meet_pairs(const ArrangementInput& input, std::span<const TrianglePair> pairs,
-                PointTable& points, CutLines& lines) {
+void meet_pairs(const ArrangementInput& input, std::span<const BoxPair> pairs, PointTable& points,
+                CutLines& lines) {
   lines.touched.assign(input.edges.size(), false);
   for (const auto& [first, second] : pairs) {  // before any other point may be made there
     for (const std::uint32_t t : {first, second}) {
@@ -288,7 +288,7 @@ void meet_pairs(const ArrangementInput& input, std::span<const TrianglePair> pai
     }
   }
   PairMeeter meeter(input, points, lines);
-  for (const TrianglePair& pair : pairs) meeter.meet(pair);
+  for (const BoxPair& pair : pairs) meeter.meet(pair);
 }
 
 }  // namespace strata::csg

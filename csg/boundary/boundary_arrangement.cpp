@@ -21,37 +21,24 @@ std::vector<std::uint32_t> labels_of(const Tree& tree, BoundaryParts parts) {
   return labels;
 }
 
-// Solids that get caps may meet themselves.
-Result<std::vector<BoundaryCap>> close(LatticeSolids& solids, OpenSolids policy, const Tree& tree,
-                                       const Execution& execution) {
-  const std::vector<std::uint32_t> before = solids.first_triangle;
-  auto caps = close_solids(solids, policy, tree, execution);
-  for (std::size_t s = 0; s < solids.solid_count(); ++s) {
-    if (solids.first_triangle[s + 1] - solids.first_triangle[s] != before[s + 1] - before[s]) {
-      solids.embedded[s] = false;
-    }
-  }
-  return caps;
-}
-
 }  // namespace
 
 Result<BoundaryFaces> arrange_solids(LatticeSolids solids, const Tree& tree, Tree::NodeId root,
                                      const std::vector<InsideRule>& rules,
                                      const BoundaryOptions& options, const Execution& execution,
                                      BoundaryReport& report) {
-  const std::vector<bool> embedded = std::move(solids.embedded);
   auto welded = weld_solids(std::move(solids), execution);
   if (!welded) return tl::unexpected(welded.error());
   if (welded->triangles.empty()) return BoundaryFaces{};
-  const auto found = find_candidate_pairs(*welded, embedded, execution);
-  if (!found) return tl::unexpected(found.error());
   const MeshEdges edges = find_mesh_edges(welded->triangles, welded->vertices.size());
+  const auto pairs =
+      find_candidate_pairs(*welded, find_embedded(*welded, edges, tree.solids().size()), execution);
+  if (!pairs) return tl::unexpected(pairs.error());
   PointTable table(BoundaryPoints(std::move(welded->vertices), std::move(welded->triangles)));
   const BoundaryPoints& points = table.points();
   const ArrangementInput input{points.vertices(), points.triangles(), *welded, edges};
   CutLines lines;
-  meet_pairs(input, found->pairs, table, lines);
+  meet_pairs(input, *pairs, table, lines);
   if (auto crossed = cross_lines(input, table, lines, execution); !crossed) {
     return tl::unexpected(crossed.error());
   }
@@ -65,7 +52,7 @@ Result<BoundaryFaces> arrange_solids(LatticeSolids solids, const Tree& tree, Tre
   const auto values = find_cell_values(input, *pieces, *lists, compile(tree, root), rules,
                                        !face_rules.label_of_solid.empty(), execution);
   if (!values) return tl::unexpected(values.error());
-  report.pairs = found->pairs.size();
+  report.pairs = pairs->size();
   report.points = points.size() - points.vertices().size();
   report.pieces = pieces->triangle_of.size();
   report.cells = lists->cell_count;
@@ -94,7 +81,7 @@ Result<ExactBoundary> find_exact_boundary(const Tree& tree, Tree::NodeId root,
     report.solids += solids->first_triangle[s] < solids->first_triangle[s + 1];
   }
   report.triangles = solids->triangles.size();
-  if (auto closed = close(*solids, options.open, tree, execution); closed) {
+  if (auto closed = close_solids(*solids, options.open, tree, execution); closed) {
     report.caps = std::move(*closed);
   } else {
     return tl::unexpected(closed.error());

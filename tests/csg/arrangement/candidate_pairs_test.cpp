@@ -101,9 +101,9 @@ TEST(CandidatePairs, HoldAllPairsThatShareAPointAndNoneThatBoxesOrPlanesTellApar
     const auto& [solids, solid_of] = soup;
     const auto result = find_candidate_pairs(solids, kEmbedded);
     ASSERT_TRUE(result.has_value());
-    ASSERT_TRUE(std::ranges::is_sorted(result->pairs));
-    ASSERT_EQ(std::ranges::adjacent_find(result->pairs), result->pairs.end());
-    found += result->pairs.size();
+    ASSERT_TRUE(std::ranges::is_sorted(*result));
+    ASSERT_EQ(std::ranges::adjacent_find(*result), result->end());
+    found += result->size();
     std::size_t checked = 0;
     const auto corners = [&](std::uint32_t t, Vec(&out)[3]) {
       const LatticePoint base = solids.vertices[0];
@@ -124,7 +124,7 @@ TEST(CandidatePairs, HoldAllPairsThatShareAPointAndNoneThatBoxesOrPlanesTellApar
           const auto [from, to] = std::minmax({b[0][k], b[1][k], b[2][k]});
           boxes = boxes && low <= to && from <= high;
         }
-        const bool listed = std::ranges::binary_search(result->pairs, TrianglePair{i, j});
+        const bool listed = std::ranges::binary_search(*result, BoxPair{i, j});
         checked += listed;
         const bool planes = reaches_plane(a, b) && reaches_plane(b, a);
         if (solid_of[i] == solid_of[j] || !boxes || !planes) {
@@ -135,17 +135,18 @@ TEST(CandidatePairs, HoldAllPairsThatShareAPointAndNoneThatBoxesOrPlanesTellApar
         }
       }
     }
-    ASSERT_EQ(checked, result->pairs.size());
+    ASSERT_EQ(checked, result->size());
   }
   EXPECT_GT(sharing, 10000u);
   EXPECT_GT(found, sharing);
 }
 
-CandidatePairs pairs_of(const Tree& tree) {
+std::vector<BoxPair> pairs_of(const Tree& tree) {
   auto solids = snap_solids(tree, tree.root(), Geometry(tree));
   EXPECT_TRUE(solids.has_value());
-  const std::vector<bool> embedded = solids->embedded;
-  auto result = find_candidate_pairs(*weld_solids(std::move(*solids), {}), embedded);
+  const WeldedSolids welded = *weld_solids(std::move(*solids), {});
+  const MeshEdges edges = find_mesh_edges(welded.triangles, welded.vertices.size());
+  auto result = find_candidate_pairs(welded, find_embedded(welded, edges, tree.solids().size()));
   EXPECT_TRUE(result.has_value());
   return *std::move(result);
 }
@@ -156,17 +157,17 @@ Tree moved(const TriangleSoup& mesh, const glm::dvec3& by) {
 
 TEST(CandidatePairs, SolidsThatAreApartHaveNone) {
   const TriangleSoup ball = make_icosphere(1, 5);
-  const CandidatePairs beside = pairs_of(Tree(ball) | moved(ball, {2.5, 0, 0}));
-  EXPECT_EQ(beside.pairs.size(), 0u);
-  const CandidatePairs nested = pairs_of(Tree(ball) - Tree(make_icosphere(0.5, 5)));
-  EXPECT_EQ(nested.pairs.size(), 0u);
+  const std::vector<BoxPair> beside = pairs_of(Tree(ball) | moved(ball, {2.5, 0, 0}));
+  EXPECT_EQ(beside.size(), 0u);
+  const std::vector<BoxPair> nested = pairs_of(Tree(ball) - Tree(make_icosphere(0.5, 5)));
+  EXPECT_EQ(nested.size(), 0u);
 }
 
 TEST(CandidatePairs, OfTwoBallsAreFewerThanTheirTriangles) {
   const TriangleSoup ball = make_icosphere(1, 6);
-  const CandidatePairs result = pairs_of(Tree(ball) | moved(ball, {0.7, 0.3, 0.1}));
-  EXPECT_GT(result.pairs.size(), 500u);
-  EXPECT_LT(result.pairs.size(), ball.triangles.size() / 2);
+  const std::vector<BoxPair> result = pairs_of(Tree(ball) | moved(ball, {0.7, 0.3, 0.1}));
+  EXPECT_GT(result.size(), 500u);
+  EXPECT_LT(result.size(), ball.triangles.size() / 2);
 }
 
 // The two large triangles of each side of a plate meet every hole, and each hole only them.
@@ -176,8 +177,8 @@ TEST(CandidatePairs, OfHolesInAPlateGrowWithTheHoles) {
     const TriangleSoup hole = make_cylinder(0.3, 2, 24);
     for (int i = 0; i < side * side; ++i)
       tree -= moved(hole, {i % side + 0.5, i / side + 0.4, -0.5});
-    const CandidatePairs result = pairs_of(tree);
-    return static_cast<double>(result.pairs.size()) / (side * side);
+    const std::vector<BoxPair> result = pairs_of(tree);
+    return static_cast<double>(result.size()) / (side * side);
   };
   const double few = pairs_a_hole(5), many = pairs_a_hole(20);
   EXPECT_GE(few, 2 * 48);  // the sides of a hole are 48 triangles; both faces of the plate cut them
@@ -194,10 +195,10 @@ TEST(CandidatePairs, DoNotDependOnTheOrderOfTriangles) {
   const auto other = find_candidate_pairs(turned.solids, kEmbedded);
   ASSERT_TRUE(other.has_value());
   const auto last = static_cast<std::uint32_t>(soup.solids.triangles.size() - 1);
-  std::vector<TrianglePair> back;
-  for (const auto& [i, j] : other->pairs) back.push_back({last - j, last - i});
+  std::vector<BoxPair> back;
+  for (const auto& [i, j] : *other) back.push_back({last - j, last - i});
   std::ranges::sort(back);
-  EXPECT_EQ(back, result->pairs);
+  EXPECT_EQ(back, *result);
   EXPECT_GT(back.size(), 100u);
 }
 
@@ -214,7 +215,7 @@ TEST(CandidatePairs, LimitsAndStopsAreKept) {
   const auto stopped = find_candidate_pairs(soup.solids, kEmbedded, {.stop = stop.get_token()});
   ASSERT_FALSE(stopped.has_value());
   EXPECT_EQ(stopped.error().code, ErrorCode::kCancelled);
-  EXPECT_TRUE(find_candidate_pairs(WeldedSolids{}, {})->pairs.empty());
+  EXPECT_TRUE(find_candidate_pairs(WeldedSolids{}, {})->empty());
 }
 
 }  // namespace
