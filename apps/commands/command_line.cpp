@@ -64,6 +64,7 @@ constexpr const char* kInfoExamples =
 
   strata info scan.ply
   strata info --json *.stl
+  strata info part.stl --check         is it a solid? which triangles meet?
   strata info plate.csg                measured by rays, with error bounds
   strata info --gl                     OpenGL: what is found and how it is used
 )";
@@ -213,6 +214,10 @@ void define_voxelize(CLI::App& app, Words& words) {
 void define_info(CLI::App& app, Words& words) {
   app.description(kInfoExamples);
   add_inputs(app, words);
+  flag(app, "Output", "--check", words.check,
+       "Check that each mesh is the boundary of a solid: closed, 2-manifold, no triangles that "
+       "meet; "
+       "with --strict a mesh that fails ends with exit code 5");
   flag(app, "Output", "--gl", words.gl,
        "Report the OpenGL that is found and how it is used; needs no input");
   add_json(app, words, "Output");
@@ -444,6 +449,7 @@ InfoCommand info_command(const Words& words, Reader& reader) {
   InfoCommand command;
   command.common = common_options(words, reader);
   command.input = input_options(words, false, reader);
+  command.check = words.check;
   command.gl = words.gl;
   if (!words.json.empty()) command.json = words.json;
   if (command.input.files.empty() && !command.gl) reader.fail_with("no input file is given");

@@ -37,7 +37,8 @@ struct Words {
   std::string fog, name;
   std::string surface, rule = "winding", open = "vote", axis = "auto", store = "auto",
                        offsets = "plane-first", backend = "auto";
-  bool stats = false, checksum = false, dry_run = false, list_formats = false, gl = false;
+  bool stats = false, checksum = false, dry_run = false, list_formats = false, gl = false,
+       check = false;
   CsgWords csg;
   OitWords oit;
   MeshWords mesh;

@@ -55,7 +55,8 @@ struct VoxelizeCommand {
 struct InfoCommand {
   CommonOptions common;
   csg::SceneInput input;
-  bool gl = false;  ///< also what OpenGL there is
+  bool check = false;  ///< also whether each mesh is the boundary of a solid
+  bool gl = false;     ///< also what OpenGL there is
   std::optional<std::string> json;
 };
 

@@ -5,6 +5,7 @@
 #include "apps/session/report.h"
 #include "apps/session/session.h"
 #include "apps/strata/allocation_failures.h"
+#include "apps/strata/check_report.h"
 #include "apps/strata/csg_report.h"
 #include "apps/strata/gl_info.h"
 #include "apps/strata/library_session.h"
@@ -25,6 +26,7 @@ struct FileInfo {
   MeshReadStats stats;
   MeshDiagnosis found;
   Orientation orientation;
+  std::optional<FileCheck> check;  ///< with --check
 };
 
 std::string info_text(const FileInfo& info) {
@@ -76,6 +78,9 @@ std::string info_text(const FileInfo& info) {
   defect(info.stats.non_planar, "non-planar", "that are non-planar polygons");
   if (info.stats.ignored > 0) {
     line("ignored", counted(info.stats.ignored, "element") + " that are not faces");
+  }
+  if (info.check) {
+    for (const auto& [topic, rest] : check_lines(*info.check)) line(topic, rest);
   }
   return text;
 }
@@ -136,6 +141,7 @@ void write_info(JsonWriter& json, const FileInfo& info) {
   json.member("non_planar", info.stats.non_planar);
   json.member("ignored", info.stats.ignored);
   json.end_object();
+  if (info.check) write_check(json, *info.check);
   json.end_object();
 }
 
@@ -144,6 +150,7 @@ struct SceneInfo {
   csg::InputFacts facts;
   std::uint64_t solids = 0, nodes = 0;
   csg::Measures result;
+  std::optional<SceneCheck> check;  ///< with --check
 };
 
 std::string info_text(const SceneInfo& info) {
@@ -155,11 +162,16 @@ std::string info_text(const SceneInfo& info) {
     return fmt::format("({:.9g}, {:.9g}, {:.9g})", v.x, v.y, v.z);
   };
   const csg::Measures& m = info.result;
+  const auto check = [&] {
+    if (!info.check) return;
+    for (const auto& [topic, rest] : check_lines(*info.check)) line(topic, rest);
+  };
   line("format", fmt::format("{}, {} bytes", info.facts.stats.format, info.facts.stats.bytes));
   line("solids", fmt::format("{} in {}", info.solids, counted(info.nodes, "node")));
   line("triangles", fmt::format("{} of all solids", info.facts.stats.triangles));
   if (m.empty) {
     line("result", "empty, or smaller than a voxel of the measuring grid");
+    check();
     return text;
   }
   line("bounds", fmt::format("{} to {}, error at most {:.2g}", triple(m.low), triple(m.high),
@@ -168,6 +180,7 @@ std::string info_text(const SceneInfo& info) {
   line("volume", fmt::format("{:.6g}, error at most {:.2g}", m.volume, m.volume_error));
   line("closed", info.facts.closed ? "yes, all meshes of the result"
                                    : fmt::format("no, {}", printable(info.facts.open)));
+  check();
   return text;
 }
 
@@ -192,6 +205,7 @@ void write_info(JsonWriter& json, const SceneInfo& info) {
   json.member("volume", m.volume);
   json.member("volume_error", m.volume_error);
   json.member("closed", info.facts.closed);
+  if (info.check) write_check(json, *info.check);
   json.end_object();
 }
 
@@ -209,10 +223,22 @@ Result<SceneInfo> look_at_scene(const std::string& path, const InfoCommand& comm
       csg::measure(scene->tree, scene->tree.root(),
                    {.resolution = {}, .relative_precision = scene->relative_precision}, execution);
   if (!measures) return tl::unexpected(measures.error());
-  SceneInfo info{path, std::move(facts.front()), scene->tree.solids().size(),
-                 scene->tree.nodes().size(), *measures};
+  SceneInfo info{path,
+                 std::move(facts.front()),
+                 scene->tree.solids().size(),
+                 scene->tree.nodes().size(),
+                 *measures,
+                 {}};
   if (command.common.strict && !info.facts.closed) {
     session.warn("open", fmt::format("{}: {}", path, info.facts.open));
+  }
+  if (command.check) {
+    auto check = check_solids(scene->tree, execution);
+    if (!check) {
+      return fail(check.error().code, "{}: {}", printable(path), check.error().message);
+    }
+    info.check = std::move(*check);
+    warn_of_check(path, *info.check, session);
   }
   return info;
 }
@@ -226,12 +252,24 @@ Result<FileInfo> look_at(const std::string& path, const csg::InputKind& kind,
   csg::warn_of_reading(path, file->stats, messages_of(session));
   Execution execution = session.execution("checking");
   execution.progress = {};
-  FileInfo info{path, std::move(file->stats), diagnose(file->soup, execution),
-                orient_parts(file->soup, execution, {.change = false})};
+  FileInfo info{path,
+                std::move(file->stats),
+                diagnose(file->soup, execution),
+                orient_parts(file->soup, execution, {.change = false}),
+                {}};
   if (session.interrupted()) return fail(ErrorCode::kCancelled, "stopped");
   if (command.common.strict && !info.found.closed) {
     session.warn("open", fmt::format("{}: the mesh is not closed: {} of {} edges are unbalanced",
                                      path, info.found.unbalanced_edges, info.found.edges));
+  }
+  if (command.check) {
+    const auto check = check_mesh(file->soup, session.execution("checking", share));
+    if (!check) {
+      return fail(check.error().code, "{}: {}", printable(path), check.error().message);
+    }
+    info.check =
+        FileCheck{*check, info.orientation, info.stats.dropped_faces() + info.stats.degenerate};
+    warn_of_check(path, *info.check, session);
   }
   return info;
 }

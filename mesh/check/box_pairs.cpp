@@ -5,6 +5,7 @@
 #include <atomic>
 #include <bit>
 #include <glm/common.hpp>
+#include <thread>
 #include <utility>
 
 // The division is an octree's. That a pair is compared only in the cell of its least shared point,
@@ -359,9 +360,15 @@ Result<void> for_box_pairs(std::span<const LatticeBox> boxes, std::span<const st
       return over_limit(bytes);
     }
   }
+  const std::thread::id caller = std::this_thread::get_id();
+  std::atomic<std::size_t> finished = 0;
   parallel_for(execution, small.size(), [&](std::size_t i, int worker) {
     Search search(grouped, visit, worker, execution);
     search.run(std::exchange(small[i], {}));
+    const std::size_t done = ++finished;
+    if (execution.progress && std::this_thread::get_id() == caller) {
+      execution.progress(static_cast<double>(done) / static_cast<double>(small.size()));
+    }
   });
   if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
   return {};

@@ -88,6 +88,83 @@ TEST(Info, LooksAtTheOtherFilesWhenOneCannotBeRead) {
   EXPECT_EQ(json::parse(place.read("report.json"))["files"].size(), 1u);
 }
 
+TriangleSoup two_boxes(double second) {
+  TriangleSoup mesh = make_box(glm::dvec3(0), glm::dvec3(2));
+  append(mesh, make_box(glm::dvec3(second), glm::dvec3(second + 2)));
+  return mesh;
+}
+
+TEST(Info, ChecksThatAMeshIsTheBoundaryOfASolid) {
+  const Workplace place;
+  for (const char* name : {"sound.obj", "sound.stl", "sound.ply", "sound.off"}) {
+    put(place, name, two_boxes(3));
+    const RunResult run = place.run({"info", "--check", "--strict", name});
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    EXPECT_NE(run.out.find("passed: closed, 2-manifold, no two triangles meet"), std::string::npos)
+        << run.out;
+    EXPECT_NE(run.out.find("exact volume 16\n"), std::string::npos) << run.out;
+    EXPECT_NE(run.out.find("(2.5, 2.5, 2.5), of mass"), std::string::npos) << run.out;
+    EXPECT_NE(run.out.find("shells       2\n"), std::string::npos) << run.out;
+  }
+  EXPECT_EQ(place.run({"info", "sound.obj"}).out.find("check"), std::string::npos);
+}
+
+TEST(Info, TellsWhichTrianglesMeetAndFailsUnderStrict) {
+  const Workplace place;
+  put(place, "crossing.obj", two_boxes(1));
+  const RunResult run = place.run({"info", "--check", "crossing.obj"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_NE(run.err.find("crossing.obj: the mesh is not the boundary of a solid: "),
+            std::string::npos)
+      << run.err;
+  EXPECT_NE(run.out.find("pairs of triangles cross"), std::string::npos) << run.out;
+  EXPECT_NE(run.out.find(" cross at ("), std::string::npos) << run.out;
+  const RunResult strict = place.run({"info", "--check", "--strict", "--json", "crossing.obj"});
+  EXPECT_EQ(strict.exit_code, 5);
+  const json check = json::parse(strict.out)["files"][0]["check"];
+  EXPECT_EQ(check["passed"], false);
+  EXPECT_EQ(check["closed"], true);
+  EXPECT_EQ(check["manifold"], true);
+  EXPECT_GT(check["meetings"]["crossing"], 0);
+  EXPECT_EQ(check["meetings"]["examples"].size(), 8u);
+  EXPECT_EQ(check["volume"], 16.0);
+  EXPECT_EQ(place.run({"info", "--strict", "crossing.obj"}).exit_code, 0);
+}
+
+TEST(Info, ChecksOrientationAndFacesThatTheReaderDrops) {
+  const Workplace place;
+  TriangleSoup turned = two_boxes(3);
+  for (std::size_t t = 12; t < 24; ++t) std::swap(turned.triangles[t].x, turned.triangles[t].y);
+  turned.positions.front() = glm::dvec3(-1);  // the first box is the larger one
+  put(place, "turned.obj", turned);
+  const RunResult run = place.run({"info", "--check", "--strict", "turned.obj"});
+  EXPECT_EQ(run.exit_code, 5);
+  EXPECT_NE(run.out.find("1 part inside out"), std::string::npos) << run.out;
+  place.write("sliver.obj",
+              "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\n"
+              "f 3 1 4\nf 1 1 2\n");
+  const RunResult sliver = place.run({"info", "--check", "--strict", "sliver.obj"});
+  EXPECT_EQ(sliver.exit_code, 5);
+  EXPECT_NE(sliver.out.find("1 face without area"), std::string::npos) << sliver.out;
+}
+
+TEST(Info, ChecksTheMeshesOfAScene) {
+  const Workplace place;
+  put(place, "crossing.stl", two_boxes(1));
+  place.write("scene.csg", "cube();\nsphere(3);\nimport(file = \"crossing.stl\");\n");
+  const RunResult run = place.run({"info", "--check", "scene.csg", "--json"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  const json check = json::parse(run.out)["files"][0]["check"];
+  EXPECT_EQ(check["passed"], false);
+  EXPECT_EQ(check["meshes"], 3);
+  ASSERT_EQ(check["faulty"].size(), 1u);
+  EXPECT_EQ(place.run({"info", "--check", "--strict", "scene.csg"}).exit_code, 5);
+  place.write("sound.csg", "cube(); sphere(3); multmatrix([[1, 0, 0, 9]]) cube();\n");
+  const RunResult sound = place.run({"info", "--check", "--strict", "sound.csg"});
+  EXPECT_EQ(sound.exit_code, 0) << sound.err;
+  EXPECT_NE(sound.out.find("passed by"), std::string::npos) << sound.out;
+}
+
 TEST(Info, TellsWhatOpenGlThereIsOrSaysWhyNot) {
   const Workplace place;
   const RunResult run = place.run({"info", "--gl"});
@@ -123,11 +200,15 @@ TEST(Info, WithoutAContextIsASentenceAndAnExitCode) {
 
 TEST(Json, TheDocumentationNamesExactlyWhatInfoPrints) {
   const Workplace place;
-  put(place, "open.obj", open_box());
-  place.write("scene.csg", "cube();\n");
   std::set<std::string> names;
-  collect(json::parse(place.run({"info", "scene.csg", "--json"}).out), "", names);
-  collect(json::parse(place.run({"info", "open.obj", "--json"}).out), "", names);
+  put(place, "crossing.stl", two_boxes(1));
+  place.write("scene.csg", "cube(); import(file = \"crossing.stl\");\n");
+  TriangleSoup crossing = two_boxes(1);
+  crossing.triangles.pop_back();
+  put(place, "open.obj", crossing);
+  for (const char* name : {"scene.csg", "open.obj"}) {
+    collect(json::parse(place.run({"info", name, "--check", "--json"}).out), "", names);
+  }
   names.erase("warnings");  // empty here
   names.insert({"warnings[].code", "warnings[].message"});
   std::set<std::string> told = documented("`strata info`"), of_gl;
