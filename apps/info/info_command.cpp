@@ -1,19 +1,20 @@
 #include <algorithm>
 #include <utility>
 
+#include "apps/info/check_report.h"
+#include "apps/info/gl_info.h"
 #include "apps/session/file_conflicts.h"
+#include "apps/session/json_writer.h"
 #include "apps/session/report.h"
 #include "apps/session/session.h"
 #include "apps/strata/allocation_failures.h"
-#include "apps/strata/check_report.h"
-#include "apps/strata/csg_report.h"
-#include "apps/strata/gl_info.h"
 #include "apps/strata/library_session.h"
 #include "apps/strata/run_commands.h"
 #include "core/printable.h"
 #include "strata/core/file_identity.h"
 #include "strata/csg/input/scene_input.h"
 #include "strata/csg/input/solid_input.h"
+#include "strata/csg/measure/measure.h"
 #include "strata/csg/solid_lists.h"
 #include "strata/mesh/diagnose.h"
 #include "strata/mesh/orient.h"

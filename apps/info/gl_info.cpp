@@ -1,4 +1,4 @@
-#include "apps/strata/gl_info.h"
+#include "apps/info/gl_info.h"
 
 #ifdef STRATA_HAVE_GL
 #include <array>

@@ -1,4 +1,4 @@
-#include "apps/strata/check_report.h"
+#include "apps/info/check_report.h"
 
 #include <fmt/format.h>
 
