@@ -1,5 +1,6 @@
 #pragma once
 
+#include "strata/contour/contour.h"
 #include "strata/csg/measure/measure.h"
 #include "strata/csg/picture/picture.h"
 #include "strata/csg/scene/scene.h"
@@ -29,6 +30,19 @@ inline Result<VoxelIntervals> voxelize(const Tree& tree, const VoxelGrid& grid,
   if (auto done = lists.fit(grid, nullptr, execution); !done) return tl::unexpected(done.error());
   options.filter = &lists.filter();
   return strata::voxelize(lists.soup(), grid, options, execution, report);
+}
+
+/// The surface of a tree's result, like strata::contour() of a mesh. The options' `filter` is
+/// ignored. @return also kUsage for a tree that check_tree() refuses
+inline Result<ContourMesh> contour(const Tree& tree, const VoxelGrid& grid,
+                                   ContourOptions options = {}, const Execution& execution = {}) {
+  if (auto checked = check_tree(tree, tree.root()); !checked) {
+    return tl::unexpected(checked.error());
+  }
+  SolidLists lists(tree, tree.root());
+  if (auto done = lists.fit(grid, nullptr, execution); !done) return tl::unexpected(done.error());
+  options.filter = &lists.filter();
+  return strata::contour(lists.soup(), grid, options, execution);
 }
 
 }  // namespace strata::csg

@@ -17,6 +17,7 @@
 #include "strata/csg/input/solid_input.h"
 #include "strata/csg/solid_lists.h"
 #include "strata/voxelize/grid_fit.h"
+#include "voxelize/open/lost_walls.h"
 
 namespace strata::apps {
 namespace {
@@ -102,6 +103,7 @@ class MeshRun {
   }
   Result<void> make_exact();
   Result<void> make_contour();
+  Result<void> warn_of_lost_walls(const csg::SolidInput& input, const ContourOptions& options);
   Result<void> write();
   Result<void> report();
 
@@ -167,6 +169,27 @@ Result<void> check_open(const MeshCommand& command, const csg::SolidInput& input
   return {};
 }
 
+/// Tells of walls that lie between voxel centres, as `strata voxelize` does.
+Result<void> MeshRun::warn_of_lost_walls(const csg::SolidInput& input,
+                                         const ContourOptions& options) {
+  LostWallOptions search;
+  search.rule = options.rule;
+  search.filter = options.filter;
+  if (!input.has_scene()) search.longest_edge = input.longest_edge;
+  if (input.tree) {
+    search.taken_away = [&](std::uint32_t t) { return input.tree->is_subtracted(t); };
+  }
+  const auto lost = find_lost_walls(input.soup, outcome_.grid, search, session_.execution("walls"));
+  if (!lost) return tl::unexpected(lost.error());
+  if (lost->count == 0) return {};
+  session_.warn("thin", fmt::format("{} thinner than a voxel fell between voxel centres; {} {:.3g} "
+                                    "voxels thick; a larger -r keeps more of them",
+                                    counted(lost->count, "wall"),
+                                    lost->count == 1 ? "it is" : "the largest is",
+                                    lost->largest.front().thickness));
+  return {};
+}
+
 Result<void> MeshRun::make_contour() {
   auto input = csg::load_solids(command_.input, false, messages_of(session_),
                                 session_.execution("reading", 0.3));
@@ -199,12 +222,7 @@ Result<void> MeshRun::make_contour() {
   outcome_.mesh = std::move(made->mesh);
   outcome_.contour = made->report;
   outcome_.mesh_ms = session_.milliseconds() - outcome_.read_ms;
-  if (made->report.lost_crossings > 0) {
-    session_.warn("thin", fmt::format("walls or gaps thinner than a voxel vanish in {}; a larger "
-                                      "-r keeps more of them",
-                                      counted(made->report.lost_crossings, "place")));
-  }
-  return {};
+  return input->closed ? warn_of_lost_walls(*input, options) : Result<void>();
 }
 
 Result<void> MeshRun::write() {

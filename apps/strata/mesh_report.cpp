@@ -73,6 +73,8 @@ void write_contour(JsonWriter& json, const ContourReport& report, const VoxelGri
   json.member("crossings", report.crossings);
   json.member("cells", report.cells);
   json.member("ambiguous_cells", report.ambiguous_cells);
+  json.member("fans", report.fans);
+  json.member("merged_crossings", report.merged_crossings);
   json.member("middle_vertices", report.middle_vertices);
   json.member("clamped_vertices", report.clamped_vertices);
   json.member("lost_crossings", report.lost_crossings);
@@ -116,9 +118,9 @@ std::string mesh_text(const MeshCommand& command, const MeshOutcome& outcome) {
   }
   if (outcome.contour) {
     const glm::ivec3& dims = outcome.grid.dims;
-    line("grid", fmt::format("{} x {} x {} voxels, {} cut, {} smoothed because it is ambiguous",
-                             dims.x, dims.y, dims.z, counted(outcome.contour->cells, "cell"),
-                             outcome.contour->ambiguous_cells));
+    line("grid",
+         fmt::format("{} x {} x {} voxels, {} cut, {} of them ambiguous", dims.x, dims.y, dims.z,
+                     counted(outcome.contour->cells, "cell"), outcome.contour->ambiguous_cells));
   }
   return text;
 }

@@ -36,7 +36,7 @@ struct ContourReport {
   std::uint64_t middle_vertices = 0;   ///< added on faces between cells
   std::uint64_t clamped_vertices = 0;  ///< whose best place lay outside their cell
   /// Edges that the surface cuts, but both ends lie on the same side of it: there walls or gaps
-  /// thinner than a voxel vanish.
+  /// thinner than a voxel vanish, or a round part only grazes the edge.
   std::uint64_t lost_crossings = 0;
   /// Cut edges for which the lists along x or y hold no crossing. Above 0 only where a solid of a
   /// tree is open; there the middle of the edge is taken.
