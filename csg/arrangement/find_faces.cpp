@@ -27,7 +27,7 @@ class FaceFinder {
         dropped_(pieces.triangle_of.size(), false),
         flat_(input.triangles.size(), false) {}
 
-  void run(FaceEdges& out);
+  void run(const CutLines& lines, FaceEdges& out);
 
  private:
   bool inside(std::uint32_t patch, bool back) const {
@@ -191,7 +191,8 @@ void FaceFinder::add_radial(FaceEdges& out, const AtomicEdge& edge,
   }
 }
 
-void FaceFinder::run(FaceEdges& out) {
+void FaceFinder::run(const CutLines& lines, FaceEdges& out) {
+  for (const CutLines::Contact& contact : lines.contacts) flat_[contact.triangle] = true;
   drop_repeated();
   add_unlisted(out);
   auto radial = lists_.edges.begin();
@@ -212,7 +213,7 @@ BoundaryFaces find_faces(const ArrangementInput& input, const BoundaryPoints& po
                          const CutLines& lines, const Pieces& pieces, const RadialLists& lists,
                          const CellValues& values, const FaceRules& rules) {
   FaceEdges edges;
-  FaceFinder(input, pieces, lists, values, rules).run(edges);
+  FaceFinder(input, pieces, lists, values, rules).run(lines, edges);
   for (const CutLines::Contact& contact : lines.contacts) {
     edges.inner_points.push_back({contact.triangle, contact.point});
   }

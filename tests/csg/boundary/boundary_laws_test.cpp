@@ -374,6 +374,26 @@ TEST(BoundaryLaws, EqualSetsHaveEqualBytes) {
   }
 }
 
+// A tip touches a triangle that nothing cuts.
+TEST(BoundaryLaws, APointOfContactIsAVertexOfBothFaces) {
+  TriangleSoup tip;
+  tip.positions = {{3, 2, 8}, {2, 3, 4}, {1, 1, 8}, {4, 5, 8}};
+  tip.triangles = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}};
+  TriangleSoup corner = tip;
+  corner.positions = {{0, 0, 4}, {8, 0, 4}, {0, 8, 4}, {0, 0, 0}};
+  for (TriangleSoup* const mesh : {&tip, &corner}) {
+    if (signed_volume(*mesh) < 0) reverse_orientation(*mesh);
+  }
+  const Tree body(corner), with_tip = body | Tree(tip);
+  const auto made = boundary_mesh(with_tip, with_tip.root(), kTiny);
+  ASSERT_TRUE(made.has_value());
+  EXPECT_EQ(broken(made->mesh), "");
+  EXPECT_EQ(made->report.vertices_split, 1u);
+  EXPECT_EQ(made->report.repaired, 0u);
+  EXPECT_EQ(std::ranges::count(made->mesh.positions, glm::dvec3(2, 3, 4)), 2);
+  EXPECT_TRUE(same_bytes(made->mesh, mesh_of((body & body) | Tree(tip))));
+}
+
 TEST(BoundaryLaws, ABoxIsItsEighthsHoweverTriangulated) {
   TinyTrees trees(1);
   for (int i = 0; i < rounds(40); ++i) {
