@@ -4,6 +4,7 @@
 #include <atomic>
 #include <numeric>
 
+#include "csg/arrangement/point_table.h"
 #include "csg/boundary/face_triangulation.h"
 #include "mesh/disjoint_sets.h"
 #include "mesh/repair/canonical_order.h"
@@ -34,7 +35,9 @@ class Triangulation {
   bool triangulate_planes();
   void collect(std::vector<FaceTriangles>& parts);
   Index group_of(const glm::uvec3& triangle, Index plane) const;
-  TriangulatedBoundary finish() const;
+  int compare_exactly(Index a, Index b) const;
+  Result<MeshRepair> check_and_sort();
+  TriangulatedBoundary finish();
 
   const BoundaryFaces& faces_;
   const WrittenPositions& written_;
@@ -42,6 +45,7 @@ class Triangulation {
   std::vector<std::uint8_t> moved_;  // the points, by rounding
   RoundedMesh mesh_;                 // its vertices are the points, then the additional ones
   std::vector<WedgeEdge> wedges_;
+  std::vector<Index> additional_;  // the points of the vertices after those of the points
   std::uint64_t split_ = 0;
 };
 
@@ -137,12 +141,41 @@ Index Triangulation::group_of(const glm::uvec3& t, Index plane) const {
   return plane == FaceTriangles::kNotSimple ? RoundedMesh::kNoGroup : plane + 1;
 }
 
-TriangulatedBoundary Triangulation::finish() const {
-  OrderedMesh ordered = canonical_order(mesh_.positions, mesh_.triangles, mesh_.labels);
+// The order of vertices of one written position.
+int Triangulation::compare_exactly(Index a, Index b) const {
+  const auto point_of = [this](Index vertex) {  // none for those in the middle of an edge
+    const std::size_t count = faces_.points.size(), other = vertex - count;
+    return vertex < count ? vertex : other < additional_.size() ? additional_[other] : 0xffffffffu;
+  };
+  const Index p = point_of(a), q = point_of(b);
+  if (p == q) return 0;
+  if (p == 0xffffffffu || q == 0xffffffffu) return p < q ? -1 : 1;
+  for (int axis = 0; axis < 3; ++axis) {
+    const int order = order_along(faces_.points, p, q, axis);
+    if (order != 0) return order;
+  }
+  return 0;
+}
+
+// Checks the written positions, repairs what meets there, and puts all in order.
+Result<MeshRepair> Triangulation::check_and_sort() {
+  Result<MeshRepair> repair;
+  const auto conflicts = find_conflicts(mesh_, execution_);
+  if (!conflicts) return tl::unexpected(conflicts.error());
+  canonical_order(mesh_, [this](Index a, Index b) { return compare_exactly(a, b); });
+  if (conflicts->empty()) return repair;
+  repair = repair_mesh(mesh_, written_, execution_);
+  if (repair) {
+    canonical_order(mesh_, [](Index a, Index b) { return a < b ? -1 : a > b ? 1 : 0; });
+  }
+  return repair;
+}
+
+TriangulatedBoundary Triangulation::finish() {
   TriangulatedBoundary result;
-  result.points = std::move(ordered.points);
-  result.triangles = std::move(ordered.triangles);
-  result.labels = std::move(ordered.labels);
+  result.points = std::move(mesh_.positions);
+  result.triangles = std::move(mesh_.triangles);
+  result.labels = std::move(mesh_.labels);
   result.positions.reserve(result.points.size());
   for (const FilePoint& point : result.points) result.positions.push_back(written_.world(point));
   result.vertices_split = split_;
@@ -165,15 +198,15 @@ Result<TriangulatedBoundary> Triangulation::run() {
   if (!good) {
     return fail(ErrorCode::kInternal, "edges of a face of the boundary do not bound a region");
   }
-  const Result<std::vector<Index>> additional =
+  Result<std::vector<Index>> additional =
       split_umbrellas(mesh_.triangles, faces_.points.size(), wedges_);
   if (!additional) return tl::unexpected(additional.error());
-  split_ = additional->size();
-  for (const Index point : *additional)
+  additional_ = *std::move(additional);
+  for (const Index point : additional_)
     mesh_.positions.push_back(FilePoint(mesh_.positions[point]));
-  split_ += divide_double_edges(mesh_, wedges_, written_);
+  split_ = additional_.size() + divide_double_edges(mesh_, wedges_, written_);
   if (cancelled()) return stop();
-  const Result<MeshRepair> repair = repair_mesh(mesh_, written_, execution_);
+  const Result<MeshRepair> repair = check_and_sort();
   if (!repair) return tl::unexpected(repair.error());
   if (cancelled()) return stop();
   TriangulatedBoundary result = finish();

@@ -81,28 +81,32 @@ class PositionSort {
 
 class Ordering {
  public:
-  Ordering(const std::vector<FilePoint>& positions, const std::vector<glm::uvec3>& triangles,
-           const std::vector<Index>& labels)
-      : positions_(positions), triangles_(triangles), labels_(labels) {}
+  using Compare = std::function<int(Index, Index)>;
 
-  OrderedMesh run() {
+  Ordering(const RoundedMesh& mesh, const Compare& compare)
+      : positions_(mesh.positions), triangles_(mesh.triangles), mesh_(mesh), compare_(compare) {}
+
+  RoundedMesh run() {
     sort_vertices();
     sort_equal_positions();
-    OrderedMesh result;
-    result.points.reserve(order_.size());
-    for (const Keyed vertex : order_) result.points.push_back(positions_[vertex & 0xffffffffu]);
+    RoundedMesh result;
+    result.positions.reserve(order_.size());
+    for (const Keyed vertex : order_) result.positions.push_back(positions_[vertex_of(vertex)]);
     sort_triangles(result);
     return result;
   }
 
  private:
+  static Index vertex_of(Keyed vertex) { return static_cast<Index>(vertex & 0xffffffffu); }
   void sort_vertices();
   void sort_equal_positions();
-  void sort_triangles(OrderedMesh& result) const;
+  void sort_runs(std::vector<Index>& place);
+  void sort_triangles(RoundedMesh& result) const;
 
   const std::vector<FilePoint>& positions_;
   const std::vector<glm::uvec3>& triangles_;
-  const std::vector<Index>& labels_;
+  const RoundedMesh& mesh_;
+  const Compare& compare_;
   std::vector<Keyed> order_;
   std::vector<Index> rank_;  // of a vertex
 };
@@ -117,18 +121,35 @@ void Ordering::sort_vertices() {
   for (Index i = 0; i < order_.size(); ++i) rank_[order_[i] & 0xffffffffu] = i;
 }
 
+// Sorts vertices of equal positions by compare_. @param place  gets the number of the first vertex
+// that is equal in all, by rank
+void Ordering::sort_runs(std::vector<Index>& place) {
+  place.resize(order_.size());
+  for (std::size_t begin = 0, end = 0; begin < order_.size(); begin = end) {
+    const FilePoint& at = positions_[vertex_of(order_[begin])];
+    while (end < order_.size() && positions_[vertex_of(order_[end])] == at) ++end;
+    if (end - begin > 1 && compare_) {
+      std::sort(order_.begin() + static_cast<std::ptrdiff_t>(begin),
+                order_.begin() + static_cast<std::ptrdiff_t>(end),
+                [this](Keyed a, Keyed b) { return compare_(vertex_of(a), vertex_of(b)) < 0; });
+    }
+    for (std::size_t i = begin; i < end; ++i) {
+      const bool same =
+          i > begin && (!compare_ || compare_(vertex_of(order_[i - 1]), vertex_of(order_[i])) == 0);
+      place[i] = same ? place[i - 1] : static_cast<Index>(i);
+      rank_[vertex_of(order_[i])] = static_cast<Index>(i);
+    }
+  }
+}
+
 void Ordering::sort_equal_positions() {
-  const auto at = [this](std::size_t i) -> const FilePoint& {
-    return positions_[order_[i] & 0xffffffffu];
-  };
-  // The other corners, as ranks of their positions, of the least triangle at a vertex.
+  std::vector<Index> place;
+  sort_runs(place);
+  // The other corners, as places, of the least triangle at a vertex.
   using Corners = std::pair<Index, Index>;
-  std::map<Index, Corners> least;  // of vertices that share their position
-  std::vector<Index> place(order_.size());
-  for (std::size_t i = 0; i < order_.size(); ++i) {
-    const bool shared = i > 0 && at(i - 1) == at(i);
-    place[i] = shared ? place[i - 1] : static_cast<Index>(i);
-    if (!shared) continue;
+  std::map<Index, Corners> least;  // of vertices that share their place
+  for (std::size_t i = 1; i < order_.size(); ++i) {
+    if (place[i] != place[i - 1]) continue;
     for (const std::size_t k : {i - 1, i})
       least[static_cast<Index>(k)] = {0xffffffffu, 0xffffffffu};
   }
@@ -147,12 +168,12 @@ void Ordering::sort_equal_positions() {
   std::size_t next = 0;
   for (const auto& [rank, corners] : least) {
     order_[rank] = std::get<2>(run[next++]);
-    rank_[order_[rank] & 0xffffffffu] = rank;
+    rank_[vertex_of(order_[rank])] = rank;
   }
 }
 
 // Sorts triangles [begin, end), whose first vertex is the same, by the second one.
-void sort_bucket(OrderedMesh& mesh, std::size_t begin, std::size_t end) {
+void sort_bucket(RoundedMesh& mesh, std::size_t begin, std::size_t end) {
   const auto second = [&mesh](std::size_t t) { return mesh.triangles[t].y; };
   if (end - begin <= 12) {
     for (std::size_t i = begin + 1; i < end; ++i) {
@@ -172,7 +193,7 @@ void sort_bucket(OrderedMesh& mesh, std::size_t begin, std::size_t end) {
   }
 }
 
-void Ordering::sort_triangles(OrderedMesh& result) const {
+void Ordering::sort_triangles(RoundedMesh& result) const {
   std::vector<Index> first(order_.size() + 1, 0);
   const auto turned = [this](const glm::uvec3& t) {
     const glm::uvec3 r(rank_[t.x], rank_[t.y], rank_[t.z]);
@@ -188,18 +209,22 @@ void Ordering::sort_triangles(OrderedMesh& result) const {
     const glm::uvec3 corners = turned(triangles_[t]);
     const Index to = --first[corners.x];
     result.triangles[to] = corners;
-    result.labels[to] = labels_[t];
+    result.labels[to] = static_cast<Index>(t);  // for now
   }
   // A vertex has few triangles of which it is the least; an edge has one on its left.
   for (std::size_t v = 0; v + 1 < first.size(); ++v) sort_bucket(result, first[v], first[v + 1]);
+  result.groups.resize(triangles_.size());
+  for (std::size_t t = 0; t < triangles_.size(); ++t) {
+    const Index from = result.labels[t];
+    result.labels[t] = mesh_.labels[from];
+    result.groups[t] = mesh_.groups[from];
+  }
 }
 
 }  // namespace
 
-OrderedMesh canonical_order(const std::vector<FilePoint>& positions,
-                            const std::vector<glm::uvec3>& triangles,
-                            const std::vector<std::uint32_t>& labels) {
-  return Ordering(positions, triangles, labels).run();
+void canonical_order(RoundedMesh& mesh, const std::function<int(Index, Index)>& compare) {
+  mesh = Ordering(mesh, compare).run();
 }
 
 }  // namespace strata

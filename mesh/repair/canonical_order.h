@@ -1,27 +1,20 @@
 #pragma once
 
 #include <cstdint>
-#include <glm/vec3.hpp>
-#include <vector>
+#include <functional>
 
-#include "exact/cut_points.h"
+#include "mesh/repair/mesh_conflicts.h"
 
 namespace strata {
 
-/// A mesh whose order depends on its geometry alone.
-struct OrderedMesh {
-  std::vector<exact::FilePoint> points;
-  std::vector<glm::uvec3> triangles;
-  std::vector<std::uint32_t> labels;  ///< of the triangles
-};
-
-/// Sorts vertices by (x, y, z), and those of equal positions by the least of their triangles; turns
-/// each triangle until its least vertex is the first; sorts the triangles. Vertices without
-/// triangles are left out.
-/// @param positions  of the vertices
-/// @pre no two triangles have the same positions in the same order
-OrderedMesh canonical_order(const std::vector<exact::FilePoint>& positions,
-                            const std::vector<glm::uvec3>& triangles,
-                            const std::vector<std::uint32_t>& labels);
+/// Puts a mesh into an order that depends on its geometry alone. Sorts vertices by (x, y, z), those
+/// of equal positions by `compare`, and those that are equal in that too by the least of their
+/// triangles; turns each triangle until its least vertex is the first; sorts the triangles.
+/// Vertices without triangles are left out.
+/// @param compare  the order of two vertices of one position, of which rounding may have taken the
+///                 difference: below 0, 0, above 0; may be empty
+/// @pre no two triangles have the same vertices in the same order
+void canonical_order(RoundedMesh& mesh,
+                     const std::function<int(std::uint32_t, std::uint32_t)>& compare = {});
 
 }  // namespace strata

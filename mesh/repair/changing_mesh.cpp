@@ -21,6 +21,7 @@ ChangingMesh::ChangingMesh(RoundedMesh& mesh) : mesh_(mesh), first_(mesh.positio
   for (Index t = 0; t < mesh.triangles.size(); ++t) {
     for (int k = 0; k < 3; ++k) at_[--first_[mesh.triangles[t][k]]] = t;
   }
+  keep();
 }
 
 std::span<const Index> ChangingMesh::around(Index vertex) const {
@@ -31,7 +32,7 @@ std::span<const Index> ChangingMesh::around(Index vertex) const {
 
 std::vector<Index>& ChangingMesh::fan(Index vertex) {
   const auto [found, added] = fans_.try_emplace(vertex);
-  if (added) {
+  if (added && vertex + 1 < first_.size()) {
     found->second.assign(at_.begin() + first_[vertex], at_.begin() + first_[vertex + 1]);
   }
   return found->second;
@@ -48,6 +49,20 @@ void ChangingMesh::set_triangle(Index t, const glm::uvec3& corners) {
     for (int k = 0; k < 3; ++k) fan(triangle[k]).push_back(t);
   }
   mesh_.groups[t] = RoundedMesh::kNoGroup;
+}
+
+// A change that is taken back.
+void ChangingMesh::change_triangle(Index t, const glm::uvec3& corners) {
+  old_triangles_.emplace_back(t, mesh_.triangles[t]);
+  set_triangle(t, corners);
+  changed_.push_back(t);
+}
+
+void ChangingMesh::add_triangle(const glm::uvec3& corners, Index like) {
+  mesh_.triangles.push_back(kNoTriangle);
+  mesh_.labels.push_back(Index(mesh_.labels[like]));
+  mesh_.groups.push_back(RoundedMesh::kNoGroup);
+  change_triangle(static_cast<Index>(mesh_.triangles.size() - 1), corners);
 }
 
 Index ChangingMesh::triangle_of(Index a, Index b) const {
@@ -98,12 +113,10 @@ bool ChangingMesh::contract(Index from, Index to) {
   const std::vector<Index> triangles(view.begin(), view.end());
   for (const Index t : triangles) {
     glm::uvec3 corners = mesh_.triangles[t];
-    old_triangles_.emplace_back(t, corners);
     for (int k = 0; k < 3; ++k) {
       if (corners[k] == from) corners[k] = to;
     }
-    set_triangle(t, t == left || t == right ? kNoTriangle : corners);
-    changed_.push_back(t);
+    change_triangle(t, t == left || t == right ? kNoTriangle : corners);
   }
   return true;
 }
@@ -113,12 +126,8 @@ bool ChangingMesh::flip(Index a, Index b) {
   if (left == kNone || right == kNone) return false;
   const Index c = opposite(left, a, b), d = opposite(right, a, b);
   if (c == d || triangle_of(c, d) != kNone || triangle_of(d, c) != kNone) return false;
-  for (const Index t : {left, right}) {
-    old_triangles_.emplace_back(t, mesh_.triangles[t]);
-    changed_.push_back(t);
-  }
-  set_triangle(left, {a, d, c});
-  set_triangle(right, {d, b, c});
+  change_triangle(left, {a, d, c});
+  change_triangle(right, {d, b, c});
   return true;
 }
 
@@ -132,15 +141,35 @@ bool ChangingMesh::take_out_tetrahedron(Index t) {
   if (around(apex).size() != 3) return false;
   std::vector<Index> all(around(apex).begin(), around(apex).end());
   all.push_back(t);
-  for (const Index part : all) {
-    old_triangles_.emplace_back(part, mesh_.triangles[part]);
-    set_triangle(part, kNoTriangle);
-    changed_.push_back(part);
-  }
+  for (const Index part : all) change_triangle(part, kNoTriangle);
   return true;
 }
 
+bool ChangingMesh::divide_edge(Index a, Index b, const FilePoint& at) {
+  const Index left = triangle_of(a, b), right = triangle_of(b, a);
+  if (left == kNone || right == kNone) return false;
+  const Index c = opposite(left, a, b), d = opposite(right, a, b);
+  const auto v = static_cast<Index>(mesh_.positions.size());
+  mesh_.positions.push_back(at);
+  change_triangle(left, {a, v, c});
+  change_triangle(right, {v, a, d});
+  add_triangle({v, b, c}, left);
+  add_triangle({b, v, d}, right);
+  return true;
+}
+
+void ChangingMesh::divide_triangle(Index t, const FilePoint& at) {
+  const glm::uvec3 corners = mesh_.triangles[t];
+  const auto v = static_cast<Index>(mesh_.positions.size());
+  mesh_.positions.push_back(at);
+  change_triangle(t, {corners.x, corners.y, v});
+  add_triangle({corners.y, corners.z, v}, t);
+  add_triangle({corners.z, corners.x, v}, t);
+}
+
 void ChangingMesh::keep() {
+  old_triangle_count_ = mesh_.triangles.size();
+  old_vertex_count_ = mesh_.positions.size();
   changed_.clear();
   old_triangles_.clear();
   old_positions_.clear();
@@ -155,6 +184,13 @@ void ChangingMesh::take_back() {
   for (std::size_t i = old_positions_.size(); i-- > 0;) {
     mesh_.positions[old_positions_[i].first] = old_positions_[i].second;
   }
+  for (std::size_t v = old_vertex_count_; v < mesh_.positions.size(); ++v) {
+    fans_.erase(static_cast<Index>(v));
+  }
+  mesh_.triangles.resize(old_triangle_count_);
+  mesh_.labels.resize(old_triangle_count_);
+  mesh_.groups.resize(old_triangle_count_);
+  mesh_.positions.resize(old_vertex_count_);
   keep();
 }
 

@@ -34,6 +34,11 @@ class ChangingMesh {
   /// Takes out the four triangles that a triangle hangs together with, if they are no more.
   bool take_out_tetrahedron(Index t);
 
+  /// Puts a new vertex into the edge from a to b. @return false where there is no such edge
+  bool divide_edge(Index a, Index b, const exact::FilePoint& at);
+  /// Puts a new vertex into a triangle.
+  void divide_triangle(Index t, const exact::FilePoint& at);
+
   /// The triangles that were changed since the last keep() or take_back().
   const std::vector<Index>& changed() const { return changed_; }
   void keep();
@@ -42,6 +47,8 @@ class ChangingMesh {
  private:
   std::vector<Index>& fan(Index vertex);
   void set_triangle(Index t, const glm::uvec3& corners);
+  void change_triangle(Index t, const glm::uvec3& corners);
+  void add_triangle(const glm::uvec3& corners, Index like);
   Index triangle_of(Index a, Index b) const;
   Index opposite(Index t, Index a, Index b) const;
   std::vector<Index> neighbours(Index vertex) const;
@@ -53,6 +60,7 @@ class ChangingMesh {
   // What steps have replaced since the last keep() or take_back(), in order.
   std::vector<std::pair<Index, glm::uvec3>> old_triangles_;
   std::vector<std::pair<Index, exact::FilePoint>> old_positions_;
+  std::size_t old_triangle_count_ = 0, old_vertex_count_ = 0;
 };
 
 }  // namespace strata

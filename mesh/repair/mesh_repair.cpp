@@ -6,6 +6,7 @@
 #include <functional>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <optional>
 #include <tuple>
 
 #include "mesh/check/triangles_meet.h"
@@ -27,8 +28,9 @@ Key key(const FilePoint& p) { return {p.x, p.y, p.z}; }
 
 class Repair {
  public:
-  Repair(RoundedMesh& mesh, const WrittenPositions& written)
-      : written_(written), mesh_(mesh), near_(mesh) {}
+  /// @param thorough  whether all steps are tried before one is chosen
+  Repair(RoundedMesh& mesh, const WrittenPositions& written, bool thorough)
+      : written_(written), thorough_(thorough), mesh_(mesh), near_(mesh) {}
 
   /// Mends what it can. @return how many changes were kept
   std::size_t run(std::vector<MeshConflict> conflicts, const std::stop_token& stop);
@@ -42,20 +44,27 @@ class Repair {
   std::array<Key, 3> sorted_corners(Index t) const;
   double unit(Index vertex) const;
   bool mend(const MeshConflict& conflict);
+  bool contract_points(const std::vector<Edge>& edges);
+  void accept();
   void try_contractions(const std::vector<Edge>& edges);
   void try_flips(const std::vector<Edge>& edges);
-  void try_moves(std::vector<Index> vertices);
+  void try_snaps(const MeshConflict& conflict);
+  void try_moves(const std::vector<Index>& vertices, int distance);
   bool has_conflict(const MeshConflict& conflict) const;
   std::vector<Edge> edges_of(const MeshConflict& conflict) const;
   template <class Step>
   void try_step(const std::vector<Index>& ends, const Step& step);
 
   const WrittenPositions& written_;
+  bool thorough_;
   ChangingMesh mesh_;
   NearTriangles near_;
   bool done_ = false;                // the conflict at hand is mended
   std::size_t best_gain_ = 0;        // conflicts that the best step took away
   std::function<bool()> best_step_;  // to be made again
+  std::vector<Index> ends_;          // of the last step that was tried
+  std::vector<Index> triangles_;     // around them
+  std::size_t before_ = 0;           // conflicts of these
 };
 
 std::array<Key, 3> Repair::sorted_corners(Index t) const {
@@ -89,22 +98,27 @@ bool Repair::has_conflict(const MeshConflict& conflict) const {
   return !is_clean(triangles_meet(a, corners(conflict.second)));
 }
 
-// Makes a step, counts the conflicts of the triangles around it before and after, and takes it
-// back.
+// Makes a step, counts the conflicts of the triangles around it, which before_ tells for the mesh
+// as it is, and takes the step back.
 template <class Step>
 void Repair::try_step(const std::vector<Index>& ends, const Step& step) {
   if (done_) return;
-  std::vector<Index> triangles;
-  for (const Index vertex : ends) {
-    const auto around = mesh_.around(vertex);
-    triangles.insert(triangles.end(), around.begin(), around.end());
+  if (ends != ends_) {
+    ends_ = ends;
+    triangles_.clear();
+    for (const Index vertex : ends) {
+      const auto around = mesh_.around(vertex);
+      triangles_.insert(triangles_.end(), around.begin(), around.end());
+    }
+    before_ = near_.count_conflicts(triangles_);
   }
-  if (!step()) return;
-  const std::size_t after = near_.count_conflicts(triangles);
+  if (before_ <= best_gain_ || !step()) return;
+  std::vector<Index> changed = triangles_;
+  changed.insert(changed.end(), mesh_.changed().begin(), mesh_.changed().end());
+  const std::size_t after = near_.count_conflicts(std::move(changed));
   mesh_.take_back();
-  const std::size_t before = near_.count_conflicts(triangles);
-  if (before < after + best_gain_ + 1) return;
-  best_gain_ = before - after;
+  if (before_ < after + best_gain_ + 1) return;
+  best_gain_ = before_ - after;
   best_step_ = step;
   done_ = after == 0;
 }
@@ -158,46 +172,115 @@ void Repair::try_flips(const std::vector<Edge>& edges) {
   }
 }
 
-// To the 26 positions around, then to farther ones.
-void Repair::try_moves(std::vector<Index> vertices) {
-  std::sort(vertices.begin(), vertices.end(),
-            [this](Index a, Index b) { return key(mesh_.position(a)) < key(mesh_.position(b)); });
-  vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
-  for (int distance = 1; distance <= 4; distance *= 2) {
-    for (const Index vertex : vertices) {
-      for (int direction = 0; direction < 27; ++direction) {
-        if (direction == 13) continue;  // no move
-        FilePoint to = mesh_.position(vertex);
-        for (int k = 0, rest = direction; k < 3; ++k, rest /= 3) {
-          if (rest % 3 == 1) continue;
-          for (int i = 0; i < distance; ++i) to = written_.neighbour(to, k, rest % 3 == 2);
-        }
-        try_step({vertex}, [this, vertex, to] {
-          mesh_.move(vertex, to);
+// A vertex of one triangle is near the other one: an equal position is put into that one's nearest
+// vertex, edge, or inside.
+void Repair::try_snaps(const MeshConflict& conflict) {
+  if (conflict.first == conflict.second) return;
+  for (const auto& [s, t] :
+       {std::pair(conflict.first, conflict.second), std::pair(conflict.second, conflict.first)}) {
+    const glm::uvec3 corners = mesh_.triangle(t);
+    const std::vector<Index> ends = {corners.x, corners.y, corners.z};
+    for (int k = 0; k < 3; ++k) {
+      const Index vertex = mesh_.triangle(s)[k];
+      const FilePoint at = mesh_.position(vertex);
+      const double near = kNear * unit(vertex);
+      bool known = false;
+      for (const Index end : ends) {
+        known = known || mesh_.position(end) == at;
+        if (glm::length(glm::dvec3(mesh_.position(end) - at)) > near) continue;
+        try_step({end}, [this, end, at] {
+          mesh_.move(end, at);
           return true;
         });
-        if (done_) return;
       }
+      if (known) continue;
+      bool inside = true;
+      for (int i = 0; i < 3; ++i) {
+        const Index a = corners[i], b = corners[(i + 1) % 3];
+        const glm::dvec3 along(mesh_.position(b) - mesh_.position(a)), to(at - mesh_.position(a));
+        const double length = glm::length(along), share = glm::dot(along, to);
+        if (share <= 0 || share >= length * length ||
+            glm::length(glm::cross(along, to)) > near * length) {
+          continue;
+        }
+        inside = false;
+        try_step({a, b}, [this, a, b, at] { return mesh_.divide_edge(a, b, at); });
+      }
+      if (!inside) continue;
+      const glm::dvec3 u(mesh_.position(corners.y) - mesh_.position(corners.x)),
+          v(mesh_.position(corners.z) - mesh_.position(corners.x)),
+          to(at - mesh_.position(corners.x)), normal = glm::cross(u, v);
+      if (std::abs(glm::dot(normal, to)) > near * glm::length(normal)) continue;
+      try_step(ends, [this, t = t, at] {
+        mesh_.divide_triangle(t, at);
+        return true;
+      });
     }
   }
+}
+
+// To the 26 positions around, or to farther ones.
+void Repair::try_moves(const std::vector<Index>& vertices, int distance) {
+  for (const Index vertex : vertices) {
+    for (int direction = 0; direction < 27; ++direction) {
+      if (direction == 13) continue;  // no move
+      FilePoint to = mesh_.position(vertex);
+      for (int k = 0, rest = direction; k < 3; ++k, rest /= 3) {
+        if (rest % 3 == 1) continue;
+        for (int i = 0; i < distance; ++i) to = written_.neighbour(to, k, rest % 3 == 2);
+      }
+      try_step({vertex}, [this, vertex, to] {
+        mesh_.move(vertex, to);
+        return true;
+      });
+      if (done_) return;
+    }
+  }
+}
+
+// Edges whose ends have one position are contracted if the mesh stays a manifold: no point of it
+// moves.
+bool Repair::contract_points(const std::vector<Edge>& edges) {
+  for (const Edge& edge : edges) {
+    if (mesh_.position(edge.a) != mesh_.position(edge.b)) continue;
+    if (mesh_.contract(std::max(edge.a, edge.b), std::min(edge.a, edge.b))) {
+      accept();
+      return true;
+    }
+  }
+  return false;
+}
+
+void Repair::accept() {
+  near_.enter(mesh_.changed());
+  mesh_.keep();
+  ends_.clear();
 }
 
 bool Repair::mend(const MeshConflict& conflict) {
   done_ = false;
   best_gain_ = 0;
+  ends_.clear();
   const std::vector<Edge> edges = edges_of(conflict);
+  if (contract_points(edges)) return true;
   std::vector<Index> vertices;
   for (const Edge& edge : edges) vertices.push_back(edge.a);
   for (const Index t : {conflict.first, conflict.second}) {
     try_step(vertices, [this, t] { return mesh_.take_out_tetrahedron(t); });
   }
   try_contractions(edges);
-  try_flips(edges);
-  try_moves(vertices);
+  const auto go_on = [this] { return best_gain_ == 0 || thorough_; };
+  if (go_on()) try_flips(edges);
+  if (go_on()) try_snaps(conflict);
+  std::sort(vertices.begin(), vertices.end(),
+            [this](Index a, Index b) { return key(mesh_.position(a)) < key(mesh_.position(b)); });
+  vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+  for (int distance = 1; distance <= (thorough_ ? 16 : 4) && go_on(); distance *= 2) {
+    try_moves(vertices, distance);
+  }
   if (best_gain_ == 0) return false;
   best_step_();
-  near_.enter(mesh_.changed());
-  mesh_.keep();
+  accept();
   return true;
 }
 
@@ -248,17 +331,27 @@ tl::unexpected<Error> too_many(const RoundedMesh& mesh, const WrittenPositions& 
 Result<MeshRepair> repair_mesh(RoundedMesh& mesh, const WrittenPositions& written,
                                const Execution& execution) {
   MeshRepair result;
+  std::optional<RoundedMesh> original;  // for a second try, which takes longer
+  bool thorough = false;
   while (true) {
     Result<std::vector<MeshConflict>> conflicts = find_conflicts(mesh, execution);
     if (!conflicts) return tl::unexpected(conflicts.error());
     if (conflicts->empty()) return result;
-    const std::size_t mended =
-        result.rounds < kMostRounds ? Repair(mesh, written).run(*conflicts, execution.stop) : 0;
+    if (!original) original = mesh;
+    const std::size_t mended = result.rounds < kMostRounds
+                                   ? Repair(mesh, written, thorough).run(*conflicts, execution.stop)
+                                   : 0;
     if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
-    if (mended == 0) return too_many(mesh, written, *conflicts);
-    result.places += mended;
-    ++result.rounds;
-    remove_dead(mesh);
+    if (mended > 0) {
+      result.places += mended;
+      ++result.rounds;
+      remove_dead(mesh);
+      continue;
+    }
+    if (thorough) return too_many(mesh, written, *conflicts);
+    thorough = true;
+    mesh = *original;
+    result = {};
   }
 }
 

@@ -105,6 +105,7 @@ std::size_t NearTriangles::count_conflicts(std::vector<Index> triangles) {
   std::sort(triangles.begin(), triangles.end());
   triangles.erase(std::unique(triangles.begin(), triangles.end()), triangles.end());
   std::erase_if(triangles, [&](Index t) { return !alive(t); });
+  visited_.resize(mesh_.triangles.size(), 0);
   std::size_t count = 0;
   for (const Index t : triangles) {
     const glm::uvec3& c = mesh_.triangles[t];

