@@ -7,6 +7,7 @@
 #include <optional>
 #include <random>
 
+#include "apps/verify/snapped_volume.h"
 #include "csg/geometry.h"
 #include "strata/csg/measure/measure.h"
 #include "strata/csg/solid_lists.h"
@@ -210,6 +211,28 @@ class Comparer {
 
 }  // namespace
 
+namespace {
+
+/// Volumes of `tree` by csg/boundary and of its snapped solids by CGAL.
+Result<SnapCheck> compare_snapped(const csg::Tree& tree, const Execution& execution) {
+  SnapCheck check;
+  const auto ours = snapped_volume(tree, execution);
+  if (!ours) return tl::unexpected(ours.error());
+  const auto exact = ExactSolid::evaluate(ours->snapped, ours->snapped.root(), execution);
+  if (!exact && exact.error().code != ErrorCode::kGeometry) return tl::unexpected(exact.error());
+  if (!exact) {  // faces of a solid may meet once it is snapped
+    check.reason = exact.error().message;
+    return check;
+  }
+  check.compared = true;
+  check.boundary = ours->volume;
+  check.exact = exact->volume() * std::pow(ours->step, 3);
+  check.equal = ours->six_volumes == exact->six_volumes();
+  return check;
+}
+
+}  // namespace
+
 double SizeCheck::difference() const { return std::abs(lists - exact); }
 
 Result<Verification> verify(const csg::Tree& tree, const csg::Tree& other,
@@ -236,6 +259,13 @@ Result<Verification> verify(const csg::Tree& tree, const csg::Tree& other,
   auto points = comparer.points();
   if (!points) return tl::unexpected(points.error());
   found.points = std::move(*points);
+  if (&tree == &other) {
+    auto snapped = compare_snapped(tree, execution);
+    if (!snapped) return tl::unexpected(snapped.error());
+    found.snapped = *std::move(snapped);
+  } else {
+    found.snapped.reason = "two trees were given";
+  }
   return found;
 }
 

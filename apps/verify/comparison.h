@@ -42,14 +42,24 @@ struct PointCheck {
   std::vector<Example> examples;  ///< the first wrong ones
 };
 
+/// Exact volumes of the same snapped solids, by csg/boundary and by CGAL, compared as fractions.
+struct SnapCheck {
+  bool compared = false;
+  std::string reason;              ///< why they were not compared
+  double boundary = 0, exact = 0;  ///< about
+  bool equal = true;               ///< as fractions
+};
+
 /// What a comparison found.
 struct Verification {
   SizeCheck volume;  ///< bound: area * length of a voxel (invariant I18)
   SizeCheck area;    ///< bound: edges of faces cross cells, ExactSolid::creases()
   PointCheck voxels, points;
+  SnapCheck snapped;
   ExactSolid::Facts exact;
   [[nodiscard]] bool agrees() const {
-    return volume.within() && area.within() && voxels.wrong == 0 && points.wrong == 0;
+    return volume.within() && area.within() && voxels.wrong == 0 && points.wrong == 0 &&
+           snapped.equal;
   }
 };
 

@@ -32,6 +32,7 @@
 #include <utility>
 #include <vector>
 
+#include "apps/verify/fraction_sum.h"
 #include "csg/geometry.h"
 
 namespace strata::apps {
@@ -392,6 +393,18 @@ ExactSolid& ExactSolid::operator=(ExactSolid&&) noexcept = default;
 bool ExactSolid::empty() const { return impl_->mesh.is_empty(); }
 double ExactSolid::volume() const { return impl_->volume; }
 double ExactSolid::area() const { return impl_->area; }
+std::string ExactSolid::six_volumes() const {
+  FractionSum sum;
+  const Mesh& mesh = impl_->mesh;
+  for (const auto face : mesh.faces()) {
+    const auto edge = mesh.halfedge(face);
+    const auto six =
+        6 * CGAL::volume(Point(0, 0, 0), mesh.point(mesh.source(edge)),
+                         mesh.point(mesh.target(edge)), mesh.point(mesh.target(mesh.next(edge))));
+    sum.add(Fraction(rational(CGAL::exact(six))));
+  }
+  return sum.total().str();
+}
 double ExactSolid::creases() const { return impl_->creases; }
 const ExactSolid::Facts& ExactSolid::facts() const { return impl_->facts; }
 

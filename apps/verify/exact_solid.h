@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <memory>
+#include <string>
 
 #include "strata/core/execution.h"
 #include "strata/core/result.h"
@@ -37,6 +38,8 @@ class ExactSolid {
   [[nodiscard]] bool empty() const;
   [[nodiscard]] double volume() const;  ///< cubic world units
   [[nodiscard]] double area() const;    ///< square world units
+  /// Six times the volume, exactly: a fraction in lowest terms, `2/3` or `2`.
+  [[nodiscard]] std::string six_volumes() const;
   /// Over all edges: length * how much the normal changes there (1-norm), in world units. Half of
   /// it times the distance of rays bounds what counting rays through a face gets its area wrong by.
   [[nodiscard]] double creases() const;

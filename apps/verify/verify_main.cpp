@@ -46,6 +46,25 @@ std::string point_lines(const char* name, const PointCheck& check) {
   return text;
 }
 
+std::string snapped_line(const SnapCheck& check) {
+  if (!check.compared) return fmt::format("snapped  not compared: {}\n", check.reason);
+  return fmt::format("snapped  {:>16.9g}  CGAL {:>16.9g}  {}\n", check.boundary, check.exact,
+                     check.equal ? "equal as fractions" : "NOT EQUAL as fractions");
+}
+
+void write(JsonWriter& json, const SnapCheck& check) {
+  json.key("snapped").begin_object();
+  json.member("compared", check.compared);
+  if (check.compared) {
+    json.member("boundary", check.boundary);
+    json.member("exact", check.exact);
+    json.member("equal", check.equal);
+  } else {
+    json.member("reason", check.reason);
+  }
+  json.end_object();
+}
+
 void write(JsonWriter& json, const char* name, const SizeCheck& check) {
   json.key(name).begin_object();
   json.member("lists", check.lists);
@@ -82,6 +101,7 @@ std::string report(const Verification& found, double milliseconds) {
   write(json, "area", found.area);
   write(json, "voxels", found.voxels);
   write(json, "points", found.points);
+  write(json, found.snapped);
   json.key("exact").begin_object();
   json.member("solids", found.exact.solids);
   json.member("corefinements", found.exact.corefinements);
@@ -129,7 +149,7 @@ Result<void> run(const VerifyWords& words, Session& session) {
   if (!words.command.common.quiet && !(words.has_json && words.json == "-")) {
     const std::string text = size_line("volume", found->volume) + size_line("area", found->area) +
                              point_lines("voxels", found->voxels) +
-                             point_lines("points", found->points);
+                             point_lines("points", found->points) + snapped_line(found->snapped);
     auto printed = write_text(STDOUT_FILENO, text, "standard output");
     if (!printed) return printed;
   }

@@ -20,7 +20,8 @@ constexpr const char* kExamples =
 
 Compares volume, area, and inside or outside at voxel centres and random points.
 A difference within the bounds of the method is allowed: the area times the
-length of a voxel for volumes, 1/256 voxel from a surface for points.
+length of a voxel for volumes, 1/256 voxel from a surface for points. Volumes of
+the solids on a lattice, as `strata mesh` makes them, must be equal as fractions.
 
 Exit code 0: they agree, 7: they differ, 5: CGAL cannot process a solid.
 )";

@@ -46,6 +46,10 @@ Verification agreement(const Tree& tree, const VerifyOptions& options = coarse()
   EXPECT_TRUE(found->area.within()) << found->area.lists << " " << found->area.exact;
   EXPECT_EQ(found->voxels.wrong, 0u) << "of " << found->voxels.compared;
   EXPECT_EQ(found->points.wrong, 0u) << "of " << found->points.compared;
+  EXPECT_TRUE(found->snapped.equal) << found->snapped.boundary << " " << found->snapped.exact;
+  if (found->voxels.compared > 0) {  // volumes as fractions, of the same snapped solids
+    EXPECT_TRUE(found->snapped.compared) << found->snapped.reason;
+  }
   return *found;
 }
 Verification agreement(const std::string& text, const VerifyOptions& options = coarse()) {
@@ -212,6 +216,7 @@ TEST(Verify, NoticesAnotherSolid) {
   EXPECT_GT(found->points.wrong, 0u);
   ASSERT_FALSE(found->points.examples.empty());
   EXPECT_TRUE(found->points.examples.front().inside);
+  EXPECT_FALSE(found->snapped.compared);
 
   Tree dented;
   const auto whole = add_box(dented, {0, 0, 0}, {10, 10, 10});
@@ -296,6 +301,8 @@ TEST(VerifyTool, AgreementIsCode0) {
   EXPECT_EQ(run.exit_code, 0) << run.err;
   EXPECT_NE(run.out.find("volume"), std::string::npos);
   EXPECT_EQ(run.out.find("OUTSIDE"), std::string::npos);
+  EXPECT_NE(run.out.find("equal as fractions"), std::string::npos) << run.out;
+  EXPECT_EQ(run.out.find("NOT EQUAL"), std::string::npos);
   EXPECT_EQ(run.err, "");
 }
 
