@@ -58,8 +58,8 @@ void count_block(CellBlock& block, const BlockNeighbours& blocks) {
     }
   });
   for (const Strip& strip : block.strips) {
-    block.triangles -= 2u * strip.length;
-    block.triangles += StripRails(blocks, strip).triangles();
+    block.triangles -= 2u * strip.length * strip.width;
+    block.triangles += StripOutline(blocks, strip).triangles();
   }
 }
 
@@ -125,25 +125,11 @@ void BlockMesh::write_pairs(const Cell& cell, std::span<glm::uvec3> triangles) {
   });
 }
 
-/// Goes along both rails at once.
 void BlockMesh::write_strip(const Strip& strip, std::span<glm::uvec3> triangles) {
-  const StripRails rails(blocks_, strip);
   const bool outward = case_at(blocks_, strip.cell).low_inside;
-  const auto add = [&](std::uint32_t x, std::uint32_t y, std::uint32_t z) {
+  StripOutline(blocks_, strip).triangulate([&](std::uint32_t x, std::uint32_t y, std::uint32_t z) {
     triangles[next_triangle_++] = outward ? glm::uvec3(x, y, z) : glm::uvec3(x, z, y);
-  };
-  for (std::size_t f = 0, b = 0; f + 1 < rails.forward_count || b + 1 < rails.back_count;) {
-    const bool forward =
-        b + 1 == rails.back_count ||
-        (f + 1 < rails.forward_count && rails.forward_at[f + 1] <= rails.back_at[b + 1]);
-    if (forward) {
-      add(rails.forward[f], rails.forward[f + 1], rails.back[b]);
-      ++f;
-    } else {
-      add(rails.forward[f], rails.back[b + 1], rails.back[b]);
-      ++b;
-    }
-  }
+  });
 }
 
 // The middle of a line through a cell's lower face. Where it cuts off a corner of the face it lies

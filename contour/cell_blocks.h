@@ -43,10 +43,11 @@ void for_each_axis(Visit&& visit) {
 /// there, which are numbered around the edge; or the edge is part of a strip.
 enum class EdgeShape : std::uint8_t { kFan, kDiagonal02, kDiagonal13, kStrip };
 
-/// Cut edges along `axis` in a row: those at the lower sides of cells of a block, from `cell` on.
+/// Cut edges along `axis` side by side: those at the lower sides of cells of a block, from `cell`
+/// on, `length` along one axis and `width` along the other.
 struct Strip {
   LocalPlace cell;
-  std::uint8_t axis = 0, along = 0, length = 0;
+  std::uint8_t axis = 0, along = 0, length = 1, width = 1;
 };
 
 /// The vertices of a block's part of a contour come in this order: fans, cells, further vertices of

@@ -138,7 +138,7 @@ void add_counts(CellBlocks& blocks, ContourReport& report) {
     report.ambiguous_cells += block.ambiguous;
     report.middle_vertices += block.middles;
     report.fans += block.fans;
-    for (const Strip& strip : block.strips) report.merged_crossings += strip.length;
+    for (const Strip& strip : block.strips) report.merged_crossings += strip.length * strip.width;
     report.guessed_crossings += block.guessed;
   }
 }

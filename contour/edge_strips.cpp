@@ -1,7 +1,9 @@
 #include "contour/edge_strips.h"
 
+#include <algorithm>
 #include <atomic>
 #include <bit>
+#include <utility>
 
 namespace strata::contouring {
 namespace {
@@ -31,17 +33,19 @@ CellBlock::Crossing& edge_of(const BlockNeighbours& blocks, const LocalPlace& ce
   return block.crossings[block.crossing(axis, at)];
 }
 
-/// The four cells at the ends of a strip: the beginning of the rail that is gone forward, its end,
-/// the end of the other rail and its beginning.
-std::array<LocalPlace, 4> ends_of(const Strip& strip) {
-  const auto first = ring_of(strip.cell, strip.axis);
-  const int length = strip.length;
-  if (strip.along == (strip.axis + 1) % 3) {
-    return {first[0], moved(first[0], strip.along, length), moved(first[3], strip.along, length),
-            first[3]};
-  }
-  return {first[1], moved(first[1], strip.along, length), moved(first[0], strip.along, length),
-          first[0]};
+/// The axis that the runs of a strip lie side by side along.
+int across(const Strip& strip) { return 3 - strip.axis - strip.along; }
+
+/// The cell at a corner of a strip from which both axes go up.
+LocalPlace low_corner(const Strip& strip) { return ring_of(strip.cell, strip.axis)[0]; }
+
+Strip make_strip(const LocalPlace& cell, int axis, int along, int length) {
+  Strip strip;
+  strip.cell = cell;
+  strip.axis = static_cast<std::uint8_t>(axis);
+  strip.along = static_cast<std::uint8_t>(along);
+  strip.length = static_cast<std::uint8_t>(length);
+  return strip;
 }
 
 }  // namespace
@@ -59,28 +63,23 @@ void StripFinder::add(const LocalPlace& cell, int axis, const std::array<glm::iv
 
 void StripFinder::find(const BlockNeighbours& blocks) {
   for (int axis = 0; axis < 3; ++axis) {
-    auto& ways = straight_[size(axis)];
     std::array<std::uint32_t, 2> total{};
     for (std::size_t way = 0; way < 2; ++way) {
-      for (const std::uint32_t bits : ways[way]) total[way] += bit_count(bits);
+      for (const std::uint32_t bits : straight_[size(axis)][way]) total[way] += bit_count(bits);
     }
     // First along the axis that more edges are straight along.
-    for (const std::size_t way : {total[1] > total[0] ? 1u : 0u, total[1] > total[0] ? 0u : 1u}) {
-      const int run = (axis + 1 + static_cast<int>(way)) % 3;
-      const int other = (axis + 2 - static_cast<int>(way)) % 3;
-      for (std::size_t column = 0; column < ways[way].size(); ++column) {
-        for (std::uint32_t bits = ways[way][column]; bits != 0;) {
-          const int first = std::countr_zero(bits);
-          const int length = std::countr_one(bits >> first);
-          const std::uint64_t gone = ((std::uint64_t{1} << length) - 1) << first;
-          bits &= ~static_cast<std::uint32_t>(gone);
-          if (length < 2) continue;
-          const Strip strip{place_of(column, run, first), static_cast<std::uint8_t>(axis),
-                            static_cast<std::uint8_t>(run), static_cast<std::uint8_t>(length)};
-          add_strip(blocks, strip);
-          for (int n = 0; n < length; ++n) {
-            const LocalPlace cell = moved(strip.cell, run, n);
-            ways[1 - way][column_of(cell, other)] &= ~(std::uint32_t{1} << along(cell, other));
+    const std::size_t better = total[1] > total[0] ? 1 : 0;
+    for (const std::size_t way : {better, 1 - better}) {
+      if (total[way] == 0) continue;
+      find_runs(axis, way);
+      for (const Strip& strip : found_) {
+        add_strip(blocks, strip);
+        auto& rest = straight_[size(axis)][1 - way];
+        for (int w = 0; w < strip.width; ++w) {
+          for (int n = 0; n < strip.length; ++n) {
+            const LocalPlace cell = moved(moved(strip.cell, strip.along, n), across(strip), w);
+            rest[column_of(cell, across(strip))] &=
+                ~(std::uint32_t{1} << along(cell, across(strip)));
           }
         }
       }
@@ -89,37 +88,97 @@ void StripFinder::find(const BlockNeighbours& blocks) {
   straight_ = {};
 }
 
-void StripFinder::add_strip(const BlockNeighbours& blocks, const Strip& strip) {
-  blocks.own().strips.push_back(strip);
-  for (int n = 0; n < strip.length; ++n) {
-    edge_of(blocks, moved(strip.cell, strip.along, n), strip.axis).shape = EdgeShape::kStrip;
+/// Whether all edges of a line are straight along the other axis as well.
+bool StripFinder::is_flat(const Strip& line, int other) const {
+  const int axis = line.axis;
+  const Columns& columns = straight_[size(axis)][other == (axis + 1) % 3 ? 0 : 1];
+  for (int n = 0; n < line.length; ++n) {
+    const LocalPlace cell = moved(line.cell, line.along, n);
+    if ((columns[column_of(cell, other)] >> along(cell, other) & 1) == 0) return false;
   }
-  const auto ends = ends_of(strip);
-  for (const LocalPlace& begin : {ends[0], ends[3]}) {
-    for (int n = 1; n < strip.length; ++n) {
-      LocalPlace at = moved(begin, strip.along, n);
+  return true;
+}
+
+/// The runs of edges along one axis, and those of equal length side by side as one.
+void StripFinder::find_runs(int axis, std::size_t way) {
+  const int run = (axis + 1 + static_cast<int>(way)) % 3, other = 3 - axis - run;
+  found_.clear();
+  for (int at = 0; at < kBlockSide; ++at) {
+    open_.clear();  // of the line before; they may be widened
+    for (int line = 0; line < kBlockSide; ++line) {
+      next_.clear();
+      const std::size_t column =
+          axis < other ? CellBlock::column(at, line) : CellBlock::column(line, at);
+      for (std::uint32_t bits = straight_[size(axis)][way][column]; bits != 0;) {
+        const int first = std::countr_zero(bits);
+        const int length = std::countr_one(bits >> first);
+        bits &= ~static_cast<std::uint32_t>(((std::uint64_t{1} << length) - 1) << first);
+        if (length < 2) continue;
+        const Strip strip = make_strip(place_of(column, run, first), axis, run, length);
+        if (!is_flat(strip, other)) {
+          found_.push_back(strip);
+          continue;
+        }
+        const auto before = std::find_if(open_.begin(), open_.end(), [&](const Strip& one) {
+          return along(one.cell, run) == first && one.length == length;
+        });
+        next_.push_back(before == open_.end() ? strip : *before);
+        if (before == open_.end()) continue;
+        ++next_.back().width;
+        open_.erase(before);
+      }
+      found_.insert(found_.end(), open_.begin(), open_.end());
+      std::swap(open_, next_);
+    }
+    found_.insert(found_.end(), open_.begin(), open_.end());
+  }
+}
+
+void StripFinder::add_strip(const BlockNeighbours& blocks, const Strip& strip) const {
+  blocks.own().strips.push_back(strip);
+  const LocalPlace begin = low_corner(strip);
+  for (int w = 0; w <= strip.width; ++w) {
+    for (int n = 0; n <= strip.length; ++n) {
+      const bool side = w == 0 || w == strip.width, end = n == 0 || n == strip.length;
+      if (w < strip.width && n < strip.length) {
+        edge_of(blocks, moved(moved(strip.cell, strip.along, n), across(strip), w), strip.axis)
+            .shape = EdgeShape::kStrip;
+      }
+      if (side && end) continue;  // a corner is needed
+      LocalPlace at = moved(moved(begin, strip.along, n), across(strip), w);
       CellBlock& block = blocks.changeable(at);
-      // Other threads may do so at the same time. Two edges of the strip meet here.
-      std::atomic_ref(block.strip_uses[block.cell(at)]).fetch_add(2, std::memory_order_relaxed);
+      const auto edges = static_cast<std::uint8_t>(side || end ? 2 : 4);  // that meet here
+      // Other threads may do so at the same time.
+      std::atomic_ref(block.strip_uses[block.cell(at)]).fetch_add(edges, std::memory_order_relaxed);
     }
   }
 }
 
-StripRails::StripRails(const BlockNeighbours& blocks, const Strip& strip) {
-  const auto ends = ends_of(strip);
-  for (int n = 0; n <= strip.length; ++n) {
-    LocalPlace right = moved(ends[0], strip.along, n), left = moved(ends[3], strip.along, n);
-    const CellBlock& right_block = blocks.of(right);
-    if (right_block.is_kept(right_block.cell(right))) {
-      forward_at[forward_count] = static_cast<std::uint8_t>(n);
-      forward[forward_count++] = right_block.cell_vertex(right, 0);
+StripOutline::StripOutline(const BlockNeighbours& blocks, const Strip& strip) {
+  // The run goes up along the first side, so it is counter-clockwise if the other axis follows.
+  const bool follows = strip.along == (strip.axis + 1) % 3;
+  LocalPlace at = low_corner(strip);
+  if (!follows) at = moved(at, across(strip), strip.width);
+  const int up = follows ? 1 : -1;  // along the other axis, at the end of the run
+  int place = 0;
+  const auto go = [&](std::size_t side, int axis, int step, int cells) {
+    corners_[side] = count_;
+    for (int n = 0; n < cells; ++n) {
+      LocalPlace cell = at;
+      const CellBlock& block = blocks.of(cell);
+      if (block.is_kept(block.cell(cell))) {
+        along_[count_] = static_cast<std::uint8_t>(place);
+        vertices_[count_++] = block.cell_vertex(cell, 0);
+      }
+      at = moved(at, axis, step);
+      if (axis == strip.along) place += step;
     }
-    const CellBlock& left_block = blocks.of(left);
-    if (left_block.is_kept(left_block.cell(left))) {
-      back_at[back_count] = static_cast<std::uint8_t>(n);
-      back[back_count++] = left_block.cell_vertex(left, 0);
-    }
-  }
+  };
+  go(0, strip.along, 1, strip.length);
+  go(1, across(strip), up, strip.width);
+  go(2, strip.along, -1, strip.length);
+  go(3, across(strip), -up, strip.width);
+  vertices_[count_] = vertices_[0];
 }
 
 }  // namespace strata::contouring
