@@ -162,7 +162,8 @@ Result<MeshRepair> Triangulation::check_and_sort() {
   Result<MeshRepair> repair;
   const auto conflicts = find_conflicts(mesh_, execution_);
   if (!conflicts) return tl::unexpected(conflicts.error());
-  canonical_order(mesh_, [this](Index a, Index b) { return compare_exactly(a, b); });
+  canonical_order(
+      mesh_, [this](Index a, Index b) { return compare_exactly(a, b); }, execution_);
   if (conflicts->empty()) return repair;
   repair = repair_mesh(mesh_, written_, execution_);
   if (repair) {
@@ -199,7 +200,7 @@ Result<TriangulatedBoundary> Triangulation::run() {
     return fail(ErrorCode::kInternal, "edges of a face of the boundary do not bound a region");
   }
   Result<std::vector<Index>> additional =
-      split_umbrellas(mesh_.triangles, faces_.points.size(), wedges_);
+      split_umbrellas(mesh_.triangles, faces_.points.size(), wedges_, execution_);
   if (!additional) return tl::unexpected(additional.error());
   additional_ = *std::move(additional);
   for (const Index point : additional_)

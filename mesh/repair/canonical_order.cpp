@@ -83,8 +83,12 @@ class Ordering {
  public:
   using Compare = std::function<int(Index, Index)>;
 
-  Ordering(const RoundedMesh& mesh, const Compare& compare)
-      : positions_(mesh.positions), triangles_(mesh.triangles), mesh_(mesh), compare_(compare) {}
+  Ordering(const RoundedMesh& mesh, const Compare& compare, const Execution& execution)
+      : positions_(mesh.positions),
+        triangles_(mesh.triangles),
+        mesh_(mesh),
+        compare_(compare),
+        execution_(execution) {}
 
   RoundedMesh run() {
     sort_vertices();
@@ -102,11 +106,18 @@ class Ordering {
   void sort_equal_positions();
   void sort_runs(std::vector<Index>& place);
   void sort_triangles(RoundedMesh& result) const;
+  template <class Work>
+  void in_ranges(std::size_t count, const Work& work) const {
+    constexpr std::size_t kRange = 1 << 15;
+    parallel_for(execution_, (count + kRange - 1) / kRange,
+                 [&](std::size_t r, int) { work(r * kRange, std::min(count, (r + 1) * kRange)); });
+  }
 
   const std::vector<FilePoint>& positions_;
   const std::vector<glm::uvec3>& triangles_;
   const RoundedMesh& mesh_;
   const Compare& compare_;
+  const Execution& execution_;
   std::vector<Keyed> order_;
   std::vector<Index> rank_;  // of a vertex
 };
@@ -194,37 +205,48 @@ void sort_bucket(RoundedMesh& mesh, std::size_t begin, std::size_t end) {
 }
 
 void Ordering::sort_triangles(RoundedMesh& result) const {
+  const std::size_t count = triangles_.size();
+  std::vector<glm::uvec3> turned(count);
+  in_ranges(count, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t < end; ++t) {
+      const glm::uvec3 r(rank_[triangles_[t].x], rank_[triangles_[t].y], rank_[triangles_[t].z]);
+      turned[t] = r.x < r.y && r.x < r.z ? r
+                  : r.y < r.z            ? glm::uvec3(r.y, r.z, r.x)
+                                         : glm::uvec3(r.z, r.x, r.y);
+    }
+  });
   std::vector<Index> first(order_.size() + 1, 0);
-  const auto turned = [this](const glm::uvec3& t) {
-    const glm::uvec3 r(rank_[t.x], rank_[t.y], rank_[t.z]);
-    if (r.x < r.y && r.x < r.z) return r;
-    return r.y < r.z ? glm::uvec3(r.y, r.z, r.x) : glm::uvec3(r.z, r.x, r.y);
-  };
-  for (const glm::uvec3& t : triangles_) ++first[std::min({rank_[t.x], rank_[t.y], rank_[t.z]})];
+  for (const glm::uvec3& t : turned) ++first[t.x];
   Index sum = 0;
-  for (Index& count : first) count = sum += count;
-  result.triangles.resize(triangles_.size());
-  result.labels.resize(triangles_.size());
-  for (std::size_t t = triangles_.size(); t-- > 0;) {
-    const glm::uvec3 corners = turned(triangles_[t]);
-    const Index to = --first[corners.x];
-    result.triangles[to] = corners;
+  for (Index& begin : first) begin = sum += begin;
+  result.triangles.resize(count);
+  result.labels.resize(count);
+  result.groups.resize(count);
+  for (std::size_t t = count; t-- > 0;) {
+    const Index to = --first[turned[t].x];
+    result.triangles[to] = turned[t];
     result.labels[to] = static_cast<Index>(t);  // for now
   }
   // A vertex has few triangles of which it is the least; an edge has one on its left.
-  for (std::size_t v = 0; v + 1 < first.size(); ++v) sort_bucket(result, first[v], first[v + 1]);
-  result.groups.resize(triangles_.size());
-  for (std::size_t t = 0; t < triangles_.size(); ++t) {
-    const Index from = result.labels[t];
-    result.labels[t] = mesh_.labels[from];
-    result.groups[t] = mesh_.groups[from];
-  }
+  in_ranges(order_.size(), [&](std::size_t begin, std::size_t end) {
+    for (std::size_t v = begin; v < end; ++v) sort_bucket(result, first[v], first[v + 1]);
+  });
+  in_ranges(count, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t < end; ++t) {
+      const Index from = result.labels[t];
+      result.labels[t] = mesh_.labels[from];
+      result.groups[t] = mesh_.groups[from];
+    }
+  });
 }
 
 }  // namespace
 
-void canonical_order(RoundedMesh& mesh, const std::function<int(Index, Index)>& compare) {
-  mesh = Ordering(mesh, compare).run();
+void canonical_order(RoundedMesh& mesh, const std::function<int(Index, Index)>& compare,
+                     const Execution& execution) {
+  Execution all = execution;
+  all.stop = {};  // half an order is none
+  mesh = Ordering(mesh, compare, all).run();
 }
 
 }  // namespace strata

@@ -15,6 +15,7 @@ namespace strata {
 ///                 difference: below 0, 0, above 0; may be empty
 /// @pre no two triangles have the same vertices in the same order
 void canonical_order(RoundedMesh& mesh,
-                     const std::function<int(std::uint32_t, std::uint32_t)>& compare = {});
+                     const std::function<int(std::uint32_t, std::uint32_t)>& compare = {},
+                     const Execution& execution = {});
 
 }  // namespace strata

@@ -20,8 +20,8 @@ struct Corner {
 class Umbrellas {
  public:
   Umbrellas(std::vector<glm::uvec3>& triangles, std::size_t point_count,
-            std::span<const WedgeEdge> wedges)
-      : triangles_(triangles), point_count_(point_count) {
+            std::span<const WedgeEdge> wedges, const Execution& execution)
+      : triangles_(triangles), point_count_(point_count), execution_(execution) {
     for (const WedgeEdge& edge : wedges) {
       wedges_.emplace_back(3 * edge.triangle + edge.corner, edge.wedge);
     }
@@ -43,6 +43,7 @@ class Umbrellas {
 
   std::vector<glm::uvec3>& triangles_;
   std::size_t point_count_;
+  const Execution& execution_;
   std::vector<std::pair<Index, Index>> wedges_;  // half-edge, number
   std::vector<Index> first_, at_;                // the corners at each point
   std::vector<Corner> around_;                   // a point, by (next, next_wedge)
@@ -142,12 +143,23 @@ Result<std::vector<Index>> Umbrellas::run() {
     has_wedge[t[static_cast<int>(half_edge % 3)]] = 1;
     has_wedge[t[static_cast<int>(half_edge % 3 == 2 ? 0 : half_edge % 3 + 1)]] = 1;
   }
-  for (Index point = 0; point < point_count_; ++point) {
-    const Index count = first_[point + 1] - first_[point];
-    if (count == 0 || (has_wedge[point] == 0 && count <= kFew && one_fan(point))) continue;
-    if (!split(point)) {
-      return fail(ErrorCode::kInternal, "the triangles around the boundary's point {} do not close",
-                  point);
+  constexpr std::size_t kRange = 1 << 14;
+  std::vector<std::vector<Index>> several((point_count_ + kRange - 1) / kRange);
+  parallel_for(execution_, several.size(), [&](std::size_t r, int) {
+    const std::size_t end = std::min(point_count_, (r + 1) * kRange);
+    for (auto point = static_cast<Index>(r * kRange); point < end; ++point) {
+      const Index count = first_[point + 1] - first_[point];
+      if (count == 0 || (has_wedge[point] == 0 && count <= kFew && one_fan(point))) continue;
+      several[r].push_back(point);
+    }
+  });
+  if (execution_.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+  for (const std::vector<Index>& points : several) {
+    for (const Index point : points) {
+      if (!split(point)) {
+        return fail(ErrorCode::kInternal,
+                    "the triangles around the boundary's point {} do not close", point);
+      }
     }
   }
   for (const auto& [half_edge, vertex] : changed_) {
@@ -160,8 +172,9 @@ Result<std::vector<Index>> Umbrellas::run() {
 
 Result<std::vector<Index>> split_umbrellas(std::vector<glm::uvec3>& triangles,
                                            std::size_t point_count,
-                                           std::span<const WedgeEdge> wedges) {
-  return Umbrellas(triangles, point_count, wedges).run();
+                                           std::span<const WedgeEdge> wedges,
+                                           const Execution& execution) {
+  return Umbrellas(triangles, point_count, wedges, execution).run();
 }
 
 }  // namespace strata

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "strata/core/execution.h"
 #include "strata/core/result.h"
 
 namespace strata {
@@ -23,9 +24,10 @@ struct WedgeEdge {
 /// @param triangles  of points; becomes triangles of vertices
 /// @param wedges     where edges have more than two triangles: which of them belong together
 /// @return the points of the additional vertices; an error (kInternal) when the triangles are not
-/// the boundary of a solid
+/// the boundary of a solid, kCancelled
 Result<std::vector<std::uint32_t>> split_umbrellas(std::vector<glm::uvec3>& triangles,
                                                    std::size_t point_count,
-                                                   std::span<const WedgeEdge> wedges);
+                                                   std::span<const WedgeEdge> wedges,
+                                                   const Execution& execution = {});
 
 }  // namespace strata
