@@ -22,6 +22,8 @@ using Index = std::uint32_t;
 constexpr int kMostRounds = 5;
 // Edges are short, and vertices near, up to so many distances between neighbouring positions.
 constexpr double kNear = 16;
+constexpr std::size_t kMostConflicts =
+    1000;  // of the triangles around a step: more are not told apart
 
 using Key = std::array<std::int64_t, 3>;
 Key key(const FilePoint& p) { return {p.x, p.y, p.z}; }
@@ -110,14 +112,14 @@ void Repair::try_step(const std::vector<Index>& ends, const Step& step) {
       const auto around = mesh_.around(vertex);
       triangles_.insert(triangles_.end(), around.begin(), around.end());
     }
-    before_ = near_.count_conflicts(triangles_);
+    before_ = near_.count_conflicts(triangles_, kMostConflicts);
   }
   if (before_ <= best_gain_ || !step()) return;
   std::vector<Index> changed = triangles_;
   changed.insert(changed.end(), mesh_.changed().begin(), mesh_.changed().end());
-  const std::size_t after = near_.count_conflicts(std::move(changed));
+  const std::size_t after = near_.count_conflicts(std::move(changed), before_ - best_gain_);
   mesh_.take_back();
-  if (before_ < after + best_gain_ + 1) return;
+  if (after + best_gain_ >= before_) return;
   best_gain_ = before_ - after;
   best_step_ = step;
   done_ = after == 0;
@@ -275,7 +277,7 @@ bool Repair::mend(const MeshConflict& conflict) {
   std::sort(vertices.begin(), vertices.end(),
             [this](Index a, Index b) { return key(mesh_.position(a)) < key(mesh_.position(b)); });
   vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
-  for (int distance = 1; distance <= (thorough_ ? 16 : 4) && go_on(); distance *= 2) {
+  for (int distance = 1; distance <= (best_gain_ > 0 ? 1 : 16) && go_on(); distance *= 2) {
     try_moves(vertices, distance);
   }
   if (best_gain_ == 0) return false;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <glm/common.hpp>
+#include <utility>
 
 #include "mesh/check/triangles_meet.h"
 
@@ -10,8 +11,8 @@ namespace {
 
 using exact::FilePoint;
 
-constexpr int kMostSide = 128;   // cells
-constexpr int kMostCells = 512;  // that a triangle is entered in
+constexpr int kMostSide = 64;     // cells
+constexpr int kMostCells = 4096;  // that a triangle is entered in
 
 }  // namespace
 
@@ -53,11 +54,10 @@ NearTriangles::NearTriangles(const RoundedMesh& mesh) : mesh_(mesh) {
   const std::size_t count = mesh.triangles.size();
   visited_.assign(count, 0);
   if (count == 0) return;
-  std::vector<Box> boxes;
-  boxes.reserve(count);
-  for (Index t = 0; t < count; ++t) boxes.push_back(box(t));
-  all_ = boxes.front();
-  for (const Box& b : boxes) all_ = {glm::min(all_.low, b.low), glm::max(all_.high, b.high)};
+  boxes_.reserve(count);
+  for (Index t = 0; t < count; ++t) boxes_.push_back(box(t));
+  all_ = boxes_.front();
+  for (const Box& b : boxes_) all_ = {glm::min(all_.low, b.low), glm::max(all_.high, b.high)};
   const glm::ivec3 extent = all_.high - all_.low;
   // A surface touches about as many cells as it has triangles.
   int side = 1;
@@ -66,24 +66,25 @@ NearTriangles::NearTriangles(const RoundedMesh& mesh) : mesh_(mesh) {
   size_ = (extent >> shift_) + 1;
   first_.assign(std::size_t(size_.x) * std::size_t(size_.y) * std::size_t(size_.z) + 1, 0);
   for (Index t = 0; t < count; ++t) {
-    if (is_large(boxes[t])) {
+    if (is_large(boxes_[t])) {
       large_.push_back(t);
     } else {
-      for_cells(boxes[t], [this](std::size_t cell) { ++first_[cell]; });
+      for_cells(boxes_[t], [this](std::size_t cell) { ++first_[cell]; });
     }
   }
   Index sum = 0;
   for (Index& first : first_) first = sum += first;
   in_cells_.resize(sum);
   for (Index t = 0; t < count; ++t) {
-    if (is_large(boxes[t])) continue;
-    for_cells(boxes[t], [this, t](std::size_t cell) { in_cells_[--first_[cell]] = t; });
+    if (is_large(boxes_[t])) continue;
+    for_cells(boxes_[t], [this, t](std::size_t cell) { in_cells_[--first_[cell]] = t; });
   }
 }
 
 void NearTriangles::enter(const std::vector<Index>& triangles) {
+  boxes_.resize(mesh_.triangles.size());
   for (const Index t : triangles) {
-    const Box around = box(t);
+    const Box around = boxes_[t] = box(t);
     if (is_large(around)) {
       large_.push_back(t);
     } else {
@@ -100,34 +101,38 @@ bool NearTriangles::conflict(Index a, Index b) const {
   return !is_clean(triangles_meet(corners(a), corners(b)));
 }
 
-std::size_t NearTriangles::count_conflicts(std::vector<Index> triangles) {
+std::size_t NearTriangles::count_conflicts(std::vector<Index> triangles, std::size_t most) {
   const auto alive = [this](Index t) { return mesh_.triangles[t].x != mesh_.triangles[t].y; };
-  std::sort(triangles.begin(), triangles.end());
-  triangles.erase(std::unique(triangles.begin(), triangles.end()), triangles.end());
-  std::erase_if(triangles, [&](Index t) { return !alive(t); });
   visited_.resize(mesh_.triangles.size(), 0);
+  counted_.resize(mesh_.triangles.size(), 0);
+  ++count_;
+  std::erase_if(triangles,
+                [&](Index t) { return !alive(t) || std::exchange(counted_[t], count_) == count_; });
+  std::vector<Box> boxes;  // their own may have changed
+  for (const Index t : triangles) boxes.push_back(box(t));
   std::size_t count = 0;
-  for (const Index t : triangles) {
+  for (std::size_t i = 0; i < triangles.size() && count < most; ++i) {
+    const Index t = triangles[i];
+    const Box& around = boxes[i];
     const glm::uvec3& c = mesh_.triangles[t];
     count += has_area(mesh_.positions[c.x], mesh_.positions[c.y], mesh_.positions[c.z]) ? 0 : 1;
-    const Box around = box(t);
+    for (std::size_t k = 0; k < i; ++k) {
+      if (around.touches(boxes[k]) && conflict(t, triangles[k])) ++count;
+    }
     ++visit_;
     const auto look = [&](Index other) {
-      if (visited_[other] == visit_ || other == t || !alive(other)) return;
+      if (count >= most || visited_[other] == visit_) return;
       visited_[other] = visit_;
-      if (!around.touches(box(other))) return;
-      // Two of the triangles are compared once.
-      if (other < t && std::binary_search(triangles.begin(), triangles.end(), other)) return;
+      if (counted_[other] == count_ || !around.touches(boxes_[other]) || !alive(other)) return;
       count += conflict(t, other) ? 1 : 0;
     };
     for_cells(around, [&](std::size_t cell) {
-      for (Index i = first_[cell]; i < first_[cell + 1]; ++i) look(in_cells_[i]);
+      for (Index n = first_[cell]; n < first_[cell + 1]; ++n) look(in_cells_[n]);
       const auto found = entered_.find(cell);
       if (found == entered_.end()) return;
       for (const Index other : found->second) look(other);
     });
     for (const Index other : large_) look(other);
-    for (const Index other : triangles) look(other);
   }
   return count;
 }

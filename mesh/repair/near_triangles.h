@@ -17,7 +17,8 @@ class NearTriangles {
   void enter(const std::vector<std::uint32_t>& triangles);
   /// How many conflicts the triangles have, with each other and with all others. Only they may have
   /// changed since enter(). Triangles of which two corners are one vertex are not there.
-  std::size_t count_conflicts(std::vector<std::uint32_t> triangles);
+  /// @param most  counting ends there
+  std::size_t count_conflicts(std::vector<std::uint32_t> triangles, std::size_t most);
 
  private:
   using Index = std::uint32_t;
@@ -39,8 +40,9 @@ class NearTriangles {
   std::vector<Index> first_, in_cells_;  // triangles in the cells of a grid, as they were at first
   std::unordered_map<std::size_t, std::vector<Index>> entered_;  // in cells, later
   std::vector<Index> large_;
-  std::vector<Index> visited_;  // the visit in which a triangle was seen last
-  Index visit_ = 0;
+  std::vector<Box> boxes_;                // of the triangles, as they were entered
+  std::vector<Index> visited_, counted_;  // the visit, and the count, that saw a triangle last
+  Index visit_ = 0, count_ = 0;
 };
 
 }  // namespace strata
