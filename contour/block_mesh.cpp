@@ -111,11 +111,9 @@ void BlockMesh::write_pairs(const Cell& cell, std::span<glm::uvec3> triangles) {
     const EdgeShape shape = crossing_at(blocks_, cell.at, kEdge).shape;
     if (shape == EdgeShape::kFan || shape == EdgeShape::kStrip) return;
     std::array<std::uint32_t, 4> v;
-    const auto ring = ring_of(cell.at, axis);
     for (std::size_t n = 0; n < 4; ++n) {
-      LocalPlace at = ring[n];
-      const CellBlock& block = blocks_.of(at);
-      v[n] = block.cell_vertex(at, 0);
+      const auto found = columns_.below(kRingBelow<axis>[n]);
+      v[n] = found.block->cell_vertex(found.number, 0);
     }
     if (shape == EdgeShape::kDiagonal13) v = {v[1], v[2], v[3], v[0]};
     // Seen from the end of the edge they are counter-clockwise; the end is outside or inside.
@@ -173,9 +171,9 @@ void BlockMesh::write_face(const Cell& cell, int axis, std::span<glm::dvec3> pos
     const std::uint32_t from = fan_vertex(cell, edge);
     const std::uint32_t to = fan_vertex(cell, face_edge(a, 0, line.to));
     if (from == kNone && to == kNone) continue;
-    const std::uint32_t low =
-        block.cell_vertex(below, kind != nullptr ? kind->cycle[face_edge(a, 1, line.from)] : 0);
-    const std::uint32_t high = block_.cell_vertex(cell.at, cell.kind->cycle[edge]);
+    const std::uint32_t low = block.cell_vertex(
+        block.cell(below), kind != nullptr ? kind->cycle[face_edge(a, 1, line.from)] : 0);
+    const std::uint32_t high = block_.cell_vertex(cell.number, cell.kind->cycle[edge]);
     const auto add = [&](std::uint32_t x, std::uint32_t y, std::uint32_t z) {
       if (x != kNone) triangles[next_triangle_++] = {x, y, z};
     };
@@ -199,6 +197,7 @@ void BlockMesh::write(std::span<glm::dvec3> positions, std::span<glm::uvec3> tri
   next_triangle_ = block_.first_triangle;
   next_middle_ = block_.vertices() - block_.middles;
   for_each_cell(block_, [&](const Cell& cell) {
+    columns_.go_to(cell.at);
     write_pairs(cell, triangles);
     if (block_.at_fan[cell.number] == 0) return;
     for (int axis = 0; axis < 3; ++axis) write_face(cell, axis, positions, triangles);

@@ -33,7 +33,11 @@ class BlockMesh {
  public:
   /// @param place  of the block
   BlockMesh(const BlockNeighbours& blocks, const glm::ivec3& place, const VoxelGrid& grid)
-      : blocks_(blocks), block_(blocks.own()), low_(place * kBlockSide), grid_(grid) {}
+      : blocks_(blocks),
+        columns_(blocks),
+        block_(blocks.own()),
+        low_(place * kBlockSide),
+        grid_(grid) {}
 
   /// @param positions, triangles of the whole mesh
   void write(std::span<glm::dvec3> positions, std::span<glm::uvec3> triangles);
@@ -53,6 +57,7 @@ class BlockMesh {
   }
 
   const BlockNeighbours& blocks_;
+  CellColumns columns_;
   const CellBlock& block_;
   glm::ivec3 low_;  ///< voxel
   const VoxelGrid& grid_;

@@ -15,17 +15,18 @@ namespace {
 class CellCuts {
  public:
   CellCuts(const BlockNeighbours& blocks, const glm::ivec3& low, std::span<const Plane> planes)
-      : blocks_(blocks), low_(low), all_planes_(planes) {}
+      : edges_(blocks), low_(low), all_planes_(planes) {}
 
   void gather(const Cell& cell, unsigned cycle) {
     sum_ = glm::ivec3(0);
     count_ = 0;
     planes_.clear();
     corner_ = lower_corner(low_, cell.at);
+    edges_.go_to(cell.at);
     for_each_axis([&](auto axis) {
       for (unsigned left = cell.kind->cut >> 4 * axis & 15u; left != 0; left &= left - 1) {
         const auto place = static_cast<unsigned>(std::countr_zero(left));
-        if (cell.kind->cycle[4 * axis + place] == cycle) add<axis>(cell.at, place);
+        if (cell.kind->cycle[4 * axis + place] == cycle) add<axis>(place);
       }
     });
   }
@@ -36,8 +37,8 @@ class CellCuts {
  private:
   /// @param place  of the edge along the axis: 0 to 3
   template <int axis>
-  void add(const LocalPlace& cell, unsigned place) {
-    const CellBlock::Crossing& found = crossing_at(blocks_, cell, 4u * axis + place);
+  void add(unsigned place) {
+    const CellBlock::Crossing& found = edges_.at<axis>(place);
     constexpr int kFirst = axis == 0 ? 1 : 0, kSecond = axis == 2 ? 1 : 2;
     sum_[axis] += found.offset;
     sum_[kFirst] += static_cast<int>(place & 1) * kLatticeSteps;
@@ -58,7 +59,7 @@ class CellCuts {
     planes_.add(plane);
   }
 
-  const BlockNeighbours& blocks_;
+  EdgeColumns edges_;
   glm::ivec3 low_;
   std::span<const Plane> all_planes_;
   glm::dvec3 corner_{0.0};
@@ -77,12 +78,14 @@ CellBounds bounds_of(const glm::ivec3& voxel, const VoxelGrid& grid) {
   return bounds;
 }
 
-/// Where the vertex of a cell with one lies, from the lower corner of `from`.
-glm::ivec3 point_at(const BlockNeighbours& blocks, LocalPlace cell, const LocalPlace& from) {
-  const glm::ivec3 step(cell.i - from.i, cell.j - from.j, cell.k - from.k);
-  const CellBlock& block = blocks.of(cell);
-  const CellBlock::CellPoint& point = block.points[block.cell(cell)];
-  return step * kLatticeSteps + glm::ivec3(point[0], point[1], point[2]);
+/// Where the vertex of a cell with one lies, in the frame of edge_shape(): the edge along z.
+template <int axis>
+glm::ivec3 point_of(const CellColumns::Numbered& cell, unsigned below) {
+  const CellBlock::CellPoint& point = cell.block->points[cell.number];
+  const auto along = [&](std::size_t c) {
+    return static_cast<int>(point[c]) - static_cast<int>(below >> c & 1) * kLatticeSteps;
+  };
+  return {along((axis + 1) % 3), along((axis + 2) % 3), along(axis)};
 }
 
 /// Marks the cells whose lower faces lie at an edge: all but the lowest. Other threads may mark
@@ -93,12 +96,6 @@ void mark_fan(const BlockNeighbours& blocks, const std::array<LocalPlace, 4>& ri
     CellBlock& block = blocks.changeable(at);
     std::atomic_ref(block.at_fan[block.cell(at)]).store(1, std::memory_order_relaxed);
   }
-}
-
-/// The frame of edge_shape(): the edge along z.
-template <int axis>
-glm::ivec3 along(const glm::ivec3& p) {
-  return {p[(axis + 1) % 3], p[(axis + 2) % 3], p[axis]};
 }
 
 }  // namespace
@@ -127,27 +124,29 @@ std::uint64_t place_points(CellBlock& block, const BlockNeighbours& blocks, cons
 }
 
 void choose_shapes(const BlockNeighbours& blocks, StripFinder& strips) {
+  CellColumns columns(blocks);
   for_each_cell(blocks.own(), [&](const Cell& cell) {
+    columns.go_to(cell.at);
     for_each_axis([&](auto axis) {
       constexpr unsigned kEdge = 4 * axis;
       if ((cell.kind->cut >> kEdge & 1) == 0) return;
-      const auto ring = ring_of(cell.at, axis);
       LocalPlace at = edge_place(cell.at, kEdge);
       CellBlock& block = blocks.changeable(at);
       CellBlock::Crossing& crossing = block.crossings[block.crossing(axis, at)];
-      const bool special =
-          blocks.special() && std::any_of(ring.begin(), ring.end(), [&](const LocalPlace& one) {
-            return case_at(blocks, one).special;
-          });
+      std::array<glm::ivec3, 4> points;
+      bool special = false;
+      for (std::size_t n = 0; n < 4; ++n) {
+        const unsigned below = kRingBelow<axis>[n];
+        const auto found = columns.below(below);
+        points[n] = point_of<axis>(found, below);
+        special = special || (found.block->special &&
+                              cell_cases()[found.block->corners[found.number]].special);
+      }
       if (!special) {
-        std::array<glm::ivec3, 4> points;
-        for (std::size_t n = 0; n < 4; ++n) {
-          points[n] = along<axis>(point_at(blocks, ring[n], cell.at));
-        }
         crossing.shape = edge_shape(points, crossing.offset);
         if (crossing.shape != EdgeShape::kFan) strips.add(cell.at, axis, points);
       }
-      if (crossing.shape == EdgeShape::kFan) mark_fan(blocks, ring);
+      if (crossing.shape == EdgeShape::kFan) mark_fan(blocks, ring_of(cell.at, axis));
     });
   });
   strips.find(blocks);

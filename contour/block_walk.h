@@ -82,4 +82,97 @@ inline std::array<LocalPlace, 4> ring_of(const LocalPlace& cell, int axis) {
   return {lowered(left, q), lowered(cell, q), cell, left};
 }
 
+/// The axes along which the cells of ring_of() lie below the last but one: bit 0 for x and so on.
+template <int axis>
+inline constexpr std::array<unsigned, 4> kRingBelow = {7u & ~(1u << axis), 1u << (axis + 2) % 3, 0u,
+                                                       1u << (axis + 1) % 3};
+
+/// The numbers of the cells around those of one column after another.
+class CellColumns {
+ public:
+  explicit CellColumns(const BlockNeighbours& blocks) : blocks_(blocks) {}
+
+  struct Numbered {
+    const CellBlock* block = nullptr;
+    std::uint32_t number = 0;
+  };
+  void go_to(const LocalPlace& cell) {
+    at_.k = cell.k;
+    if (cell.i == at_.i && cell.j == at_.j) return;
+    at_ = cell;
+    for (unsigned below = 0; below < 4; ++below) {
+      LocalPlace at = {cell.i - static_cast<int>(below & 1), cell.j - static_cast<int>(below >> 1),
+                       0};
+      Column& column = columns_[below];
+      column.block = blocks_.find(at);
+      if (column.block == nullptr) continue;
+      const std::size_t c = CellBlock::column(at.i, at.j);
+      column.passed = column.block->active[c];
+      column.before = column.block->before[3][c];
+    }
+  }
+  /// The cell below the one gone to, along some axes. @pre the surface passes it
+  [[nodiscard]] Numbered below(unsigned axes) const {
+    const Column& column = columns_[axes & 3];
+    const int k = at_.k - static_cast<int>(axes >> 2);
+    if (k >= 0) {
+      const std::uint32_t lower = (std::uint32_t{1} << k) - 1;
+      return {column.block, column.before + bit_count(column.passed & lower)};
+    }
+    LocalPlace at = {at_.i - static_cast<int>(axes & 1), at_.j - static_cast<int>(axes >> 1 & 1),
+                     -1};
+    const CellBlock& block = blocks_.of(at);
+    return {&block, block.cell(at)};
+  }
+
+ private:
+  struct Column {
+    const CellBlock* block = nullptr;
+    std::uint32_t passed = 0, before = 0;
+  };
+  const BlockNeighbours& blocks_;
+  LocalPlace at_{-1, -1, -1};
+  std::array<Column, 4> columns_;  ///< by whether they lie below along x and y
+};
+
+/// The cuts of the edges of cells of one column after another.
+class EdgeColumns {
+ public:
+  explicit EdgeColumns(const BlockNeighbours& blocks) : blocks_(blocks) {}
+
+  void go_to(const LocalPlace& cell) {
+    at_.k = cell.k;
+    if (cell.i == at_.i && cell.j == at_.j) return;
+    at_ = cell;
+    for_each_axis([&](auto axis) {
+      for (unsigned n = 0; n < (axis == 2 ? 4u : 2u); ++n) {
+        LocalPlace at = edge_place({cell.i, cell.j, 1}, 4 * axis + n);
+        Column& column = columns_[axis][n];
+        const CellBlock* block = blocks_.find(at);
+        if (block == nullptr) continue;
+        column.cut = block->cut(axis, at.i, at.j);
+        column.first = block->crossings.data() + block->first_crossing[axis] +
+                       block->before[axis][CellBlock::column(at.i, at.j)];
+      }
+    });
+  }
+  /// The cut of an edge of the cell gone to: edge 4 axis + n. @pre it is cut
+  template <int axis>
+  [[nodiscard]] const CellBlock::Crossing& at(unsigned n) const {
+    const int k = axis == 2 ? at_.k : at_.k - 1 + static_cast<int>(n >> 1);
+    if (k < 0) return crossing_at(blocks_, at_, 4 * axis + n);
+    const Column& column = columns_[axis][axis == 2 ? n : n & 1];
+    return column.first[bit_count(column.cut & ((std::uint32_t{1} << k) - 1))];
+  }
+
+ private:
+  struct Column {
+    const CellBlock::Crossing* first = nullptr;
+    std::uint32_t cut = 0;
+  };
+  const BlockNeighbours& blocks_;
+  LocalPlace at_{-1, -1, -1};
+  std::array<std::array<Column, 4>, 3> columns_;  ///< by axis and place of the edge
+};
+
 }  // namespace strata::contouring

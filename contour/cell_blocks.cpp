@@ -28,11 +28,9 @@ void count_columns(CellBlock& block) {
                                   block.word(i - 1, j), block.word(i, j)};
       const std::uint64_t all = w[0] & w[1] & w[2] & w[3], any = w[0] | w[1] | w[2] | w[3];
       block.active[c] = static_cast<std::uint32_t>((any | any >> 1) & ~(all & all >> 1));
-      for (int axis = 0; axis < 3; ++axis) {
-        block.before[size(axis)][c] = static_cast<std::uint16_t>(sum[size(axis)]);
-        sum[size(axis)] += bit_count(block.cut(axis, i, j));
-      }
-      block.before[3][c] = static_cast<std::uint16_t>(sum[3]);
+      for (std::size_t n = 0; n < 4; ++n) block.before[n][c] = static_cast<std::uint16_t>(sum[n]);
+      if (block.active[c] == 0) continue;  // no edge of the column is cut either
+      for_each_axis([&](auto axis) { sum[axis] += bit_count(block.cut(axis, i, j)); });
       sum[3] += bit_count(block.active[c]);
     }
   }

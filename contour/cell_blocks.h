@@ -107,9 +107,9 @@ class CellBlock {
   [[nodiscard]] bool is_kept(std::uint32_t n) const {
     return kept_number.empty() || kept_number[n] != kDropped;
   }
-  /// The vertex of a cycle of a cell, in the mesh. @pre it is kept
-  [[nodiscard]] std::uint32_t cell_vertex(const LocalPlace& at, unsigned cycle) const {
-    const std::uint32_t first = static_cast<std::uint32_t>(first_vertex) + fans, n = cell(at);
+  /// The vertex of a cycle of a cell, in the mesh. @param n  number of the cell @pre it is kept
+  [[nodiscard]] std::uint32_t cell_vertex(std::uint32_t n, unsigned cycle) const {
+    const std::uint32_t first = static_cast<std::uint32_t>(first_vertex) + fans;
     if (cycle != 0) return first + kept_cells + split_point(n, cycle) - cells;
     return first + (kept_number.empty() ? n : kept_number[n]);
   }
@@ -153,6 +153,8 @@ class BlockNeighbours {
   [[nodiscard]] CellBlock& own() const { return *blocks_[0]; }
   /// The block of a place from -1, which becomes local there.
   [[nodiscard]] const CellBlock& of(LocalPlace& at) const { return *blocks_[which(at)]; }
+  /// The same; null where there is no block.
+  [[nodiscard]] const CellBlock* find(LocalPlace& at) const { return blocks_[which(at)]; }
   /// The same, to change an edge or a cell there.
   [[nodiscard]] CellBlock& changeable(LocalPlace& at) const { return *blocks_[which(at)]; }
   /// Whether a cell of one of the blocks is special.

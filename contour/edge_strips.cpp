@@ -163,12 +163,12 @@ StripOutline::StripOutline(const BlockNeighbours& blocks, const Strip& strip) {
   int place = 0;
   const auto go = [&](std::size_t side, int axis, int step, int cells) {
     corners_[side] = count_;
-    for (int n = 0; n < cells; ++n) {
+    for (int step_count = 0; step_count < cells; ++step_count) {
       LocalPlace cell = at;
       const CellBlock& block = blocks.of(cell);
-      if (block.is_kept(block.cell(cell))) {
+      if (const std::uint32_t n = block.cell(cell); block.is_kept(n)) {
         along_[count_] = static_cast<std::uint8_t>(place);
-        vertices_[count_++] = block.cell_vertex(cell, 0);
+        vertices_[count_++] = block.cell_vertex(n, 0);
       }
       at = moved(at, axis, step);
       if (axis == strip.along) place += step;
