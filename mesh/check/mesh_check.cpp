@@ -183,13 +183,20 @@ Result<MeshCheck> check_mesh(std::span<const glm::dvec3> positions,
   check.step = lattice->step;
   check.moved_vertices = lattice->moved;
   if (stopped()) return cancelled();
-  {
-    const MeshLinks links = mesh_links(lattice->points, triangles, execution);
-    if (stopped()) return cancelled();
-    add_links(links, positions, check);
-    add_sums(*lattice, triangles, links, execution, check);
+  MeshLinks links = mesh_links(lattice->points, triangles, execution);
+  if (stopped()) return cancelled();
+  add_links(links, positions, check);
+  add_sums(*lattice, triangles, links, execution, check);
+  links.shell_of = {};
+  std::vector<glm::uvec3> welded;  // where vertices are told apart by position
+  if (!links.by_index) {
+    welded.reserve(triangles.size());
+    for (const glm::uvec3& t : triangles) {
+      welded.emplace_back(links.vertex[t.x], links.vertex[t.y], links.vertex[t.z]);
+    }
   }
-  const auto meetings = find_self_meetings(lattice->points, triangles, kExamples, execution);
+  const auto meetings = find_self_meetings(lattice->points, links.by_index ? triangles : welded,
+                                           check.closed(), kExamples, execution);
   if (!meetings) return tl::unexpected(meetings.error());
   add_meetings(*meetings, *lattice, triangles, check);
   if (check.overlapping > 0) {  // else there are none

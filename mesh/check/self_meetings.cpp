@@ -4,6 +4,7 @@
 #include <glm/common.hpp>
 
 #include "mesh/check/box_pairs.h"
+#include "mesh/check/plain_stars.h"
 
 namespace strata {
 namespace {
@@ -32,17 +33,19 @@ std::vector<LatticeBox> boxes_of(std::span<const FilePoint> points,
 
 class Tester {
  public:
-  Tester(std::span<const FilePoint> points, std::span<const glm::uvec3> triangles, std::size_t most,
-         int threads)
+  // `plain` is of plain_stars(), or empty.
+  Tester(std::span<const FilePoint> points, std::span<const glm::uvec3> triangles,
+         std::span<const std::uint8_t> plain, std::size_t most, int threads)
       : points_(points),
         triangles_(triangles),
+        plain_(plain),
         most_(most),
         found_(static_cast<std::size_t>(threads)) {}
 
   void test(std::span<const BoxPair> pairs, int worker) {
     SelfMeetings& found = found_[static_cast<std::size_t>(worker)];
-    found.box_pairs += pairs.size();
     for (const BoxPair& pair : pairs) {
+      if (in_plain_star(triangles_[pair.first], triangles_[pair.second])) continue;
       const Meeting meeting = triangles_meet(corners(pair.first), corners(pair.second));
       if (is_clean(meeting)) continue;
       found.touching += meeting == Meeting::kTouch;
@@ -58,13 +61,20 @@ class Tester {
       all.touching += found.touching;
       all.crossing += found.crossing;
       all.overlapping += found.overlapping;
-      all.box_pairs += found.box_pairs;
       for (const SelfMeetings::Pair& pair : found.first) keep(pair, all.first);
     }
     return all;
   }
 
  private:
+  [[nodiscard]] bool in_plain_star(const glm::uvec3& s, const glm::uvec3& t) const {
+    if (plain_.empty()) return false;
+    for (int k = 0; k < 3; ++k) {
+      if ((s[k] == t.x || s[k] == t.y || s[k] == t.z) && plain_[s[k]] != 0) return true;
+    }
+    return false;
+  }
+
   [[nodiscard]] TriangleCorners corners(std::uint32_t t) const {
     const glm::uvec3& at = triangles_[t];
     return {points_[at.x], points_[at.y], points_[at.z]};
@@ -78,6 +88,7 @@ class Tester {
 
   std::span<const FilePoint> points_;
   std::span<const glm::uvec3> triangles_;
+  std::span<const std::uint8_t> plain_;
   std::size_t most_;
   std::vector<SelfMeetings> found_;  // of each worker
 };
@@ -85,10 +96,12 @@ class Tester {
 }  // namespace
 
 Result<SelfMeetings> find_self_meetings(std::span<const FilePoint> points,
-                                        std::span<const glm::uvec3> triangles, std::size_t most,
-                                        const Execution& execution) {
+                                        std::span<const glm::uvec3> triangles, bool closed,
+                                        std::size_t most, const Execution& execution) {
   const std::vector<LatticeBox> boxes = boxes_of(points, triangles, execution);
-  Tester tester(points, triangles, most, execution.thread_count());
+  std::vector<std::uint8_t> plain;
+  if (closed && exact::kFilters) plain = plain_stars(points, triangles, execution);
+  Tester tester(points, triangles, plain, most, execution.thread_count());
   const auto done = for_box_pairs(
       boxes, {}, [&](std::span<const BoxPair> pairs, int worker) { tester.test(pairs, worker); },
       execution);

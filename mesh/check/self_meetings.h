@@ -20,15 +20,16 @@ struct SelfMeetings {
   };
 
   std::uint64_t touching = 0, crossing = 0, overlapping = 0;
-  std::vector<Pair> first;      ///< the least ones, sorted
-  std::uint64_t box_pairs = 0;  ///< pairs that were tested
+  std::vector<Pair> first;  ///< the least ones, sorted
 };
 
+/// @param closed  each directed edge is there as often as its opposite, by index: then neighbours
+/// are settled a vertex at a time, by plain_stars()
 /// @param most  pairs to return
 /// @pre points from 0 to 2^53
 /// @return as for_box_pairs()
 Result<SelfMeetings> find_self_meetings(std::span<const exact::FilePoint> points,
-                                        std::span<const glm::uvec3> triangles, std::size_t most,
-                                        const Execution& execution = {});
+                                        std::span<const glm::uvec3> triangles, bool closed,
+                                        std::size_t most, const Execution& execution = {});
 
 }  // namespace strata

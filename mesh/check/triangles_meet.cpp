@@ -46,12 +46,27 @@ struct Common {
   }
 };
 
-Sides sides(const TriangleCorners& t, const Common& common, const TriangleCorners& plane) {
+// The signs that evaluation in double proves; 0 for the others. Roundings as in
+// filters::orient3d().
+Sides quick_sides(const TriangleCorners& t, const Common& common, const TriangleCorners& plane) {
   Sides result;
+  if constexpr (!exact::kFilters) return result;
+  using exact::filters::RealNormal;
+  const exact::filters::BoundedCross normal =
+      exact::filters::cross(RealNormal(plane[1] - plane[0]), RealNormal(plane[2] - plane[0]));
   for (std::size_t i = 0; i < 3; ++i) {
-    if (!common.is_common[i]) result.sign[i] = exact::orient3d(plane[0], plane[1], plane[2], t[i]);
+    if (common.is_common[i]) continue;
+    result.sign[i] = exact::filters::dot(RealNormal(t[i] - plane[0]), normal).sign();
   }
   return result;
+}
+
+void complete(const TriangleCorners& t, const Common& common, const TriangleCorners& plane,
+              Sides& sides) {
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (common.is_common[i] || sides.sign[i] != 0) continue;
+    sides.sign[i] = exact::sign_of(exact::orient3d_value(plane[0], plane[1], plane[2], t[i]));
+  }
 }
 
 Meeting shared(int positions) {
@@ -308,11 +323,14 @@ void add_crossings(const Segment& s, const Segment& t, Mean& mean) {
 }  // namespace
 
 Meeting triangles_meet(const TriangleCorners& a, const TriangleCorners& b) {
-  const Common common_a(a, b);
-  const Sides side_a = sides(a, common_a, b);
+  const Common common_a(a, b), common_b(b, a);
+  Sides side_a = quick_sides(a, common_a, b);
   if (settled(side_a, common_a)) return shared(common_a.positions);
-  const Common common_b(b, a);
-  const Sides side_b = sides(b, common_b, a);
+  Sides side_b = quick_sides(b, common_b, a);
+  if (settled(side_b, common_b)) return shared(common_b.positions);
+  complete(a, common_a, b, side_a);
+  if (settled(side_a, common_a)) return shared(common_a.positions);
+  complete(b, common_b, a, side_b);
   if (settled(side_b, common_b)) return shared(common_b.positions);
   if (side_a.on() == 3 || side_b.on() == 3) return flat(a, b, common_a.positions);
   return in_two_planes(a, side_a, b, side_b, common_a.positions);
