@@ -14,6 +14,21 @@ Wide<kWords> rounded(const Int256& numerator, const Int192& w, int bits) {
   return divide_round(Wide<kWords>(numerator) << bits, w);
 }
 
+// The whole number nearest to quotient + remainder / w, ties up, for a quotient that is nearly
+// right.
+template <class Integer>
+std::int64_t corrected(Integer remainder, const Integer& w, std::int64_t quotient) {
+  while (remainder < Integer(0)) {
+    remainder = remainder + w;
+    --quotient;
+  }
+  while (remainder >= w) {
+    remainder = remainder - w;
+    ++quotient;
+  }
+  return quotient + (remainder >= w - remainder ? 1 : 0);
+}
+
 }  // namespace
 
 RationalPoint rational(const LatticePoint& p) { return {p.x, p.y, p.z, 1}; }
@@ -53,10 +68,35 @@ int side_of_plane(const RationalPoint& point, const Plane& plane) {
 }
 
 FilePoint round_for_file(const RationalPoint& point) {
+  // The quotient in doubles is off by less than 4, since it is below 2^53 and was rounded four
+  // times; its remainder tells by how much.
+  const double w = to_double(point.w);
   const auto coordinate = [&](const Int256& numerator) {
-    return narrow<std::int64_t>(rounded<4>(numerator, point.w, kFileBits));
+    auto quotient = static_cast<std::int64_t>(to_double(numerator) / w * (1 << kFileBits));
+    return corrected((Int256(numerator) << kFileBits) - product<Int256>(quotient, point.w),
+                     Int256(point.w), quotient);
   };
   return {coordinate(point.x), coordinate(point.y), coordinate(point.z)};
+}
+
+FilePoint round_for_file(const EdgePoint& point) {
+  // p + (q - p) s_p / w. The product of the difference and s_p has 118 bits, 142 with 24 more; the
+  // remainder has 94, so what is lost above 128 bits is not needed.
+  const Int128 s = point.weight() < 0 ? -point.s_p : point.s_p;
+  const Int128 w = point.weight() < 0 ? -point.weight() : point.weight();
+  const double ratio = static_cast<double>(s) / static_cast<double>(w) * (1 << kFileBits);
+  const auto coordinate = [&](std::int32_t p, std::int32_t q) {
+    const std::int32_t along = q - p;
+    if (along == 0) return std::int64_t{p} << kFileBits;
+    const auto quotient = static_cast<std::int64_t>(ratio * along);
+    const UInt128 whole = static_cast<UInt128>(s) * static_cast<UInt128>(Int128{along})
+                          << kFileBits;
+    const auto left = static_cast<Int128>(whole - static_cast<UInt128>(Int128{quotient}) *
+                                                      static_cast<UInt128>(w));
+    return (std::int64_t{p} << kFileBits) + corrected(left, w, quotient);
+  };
+  return {coordinate(point.p.x, point.q.x), coordinate(point.p.y, point.q.y),
+          coordinate(point.p.z, point.q.z)};
 }
 
 bool is_file_point(const RationalPoint& point, const FilePoint& rounded) {

@@ -89,6 +89,8 @@ int side_of_plane(const RationalPoint& point, const Plane& plane);
 inline constexpr int kFileBits = 24;
 using FilePoint = glm::vec<3, std::int64_t, glm::defaultp>;  ///< in 2^-24 step
 FilePoint round_for_file(const RationalPoint& point);
+/// The same, faster. @pre the point lies between p and q
+FilePoint round_for_file(const EdgePoint& point);
 /// Whether rounding did not move the point. Both sides of the comparison have at most 231 bits.
 /// @param rounded  round_for_file() of the point
 bool is_file_point(const RationalPoint& point, const FilePoint& rounded);

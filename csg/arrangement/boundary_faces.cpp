@@ -10,8 +10,7 @@ exact::RationalPoint BoundaryPoints::rational(const Recipe& recipe) const {
     case Kind::kLattice:
       break;
     case Kind::kEdgePlane:
-      return exact::rational(
-          exact::edge_plane_point(vertices_[from[0]], vertices_[from[1]], plane_of(from[2])));
+      return exact::rational(edge_plane(recipe));
     case Kind::kThreePlanes:
       return exact::rational(plane_of(from[0]), plane_of(from[1]), plane_of(from[2]));
     case Kind::kEdgeEdge: {

@@ -22,6 +22,8 @@ class BoundaryPoints {
     /// kLattice: [vertex]; kEdgePlane: [vertex, vertex, triangle]; kEdgeEdge: [vertex, vertex,
     /// vertex, vertex] of two edges of one plane; kThreePlanes: [triangle, triangle, triangle].
     std::array<std::uint32_t, 4> from{};
+
+    friend bool operator==(const Recipe&, const Recipe&) = default;
   };
 
   BoundaryPoints() = default;
@@ -44,6 +46,11 @@ class BoundaryPoints {
   exact::Plane plane_of(std::uint32_t triangle) const {
     const glm::uvec3& t = triangles_[triangle];
     return exact::plane_through(vertices_[t.x], vertices_[t.y], vertices_[t.z]);
+  }
+  /// @pre the recipe is of kEdgePlane
+  exact::EdgePoint edge_plane(const Recipe& recipe) const {
+    return exact::edge_plane_point(vertices_[recipe.from[0]], vertices_[recipe.from[1]],
+                                   plane_of(recipe.from[2]));
   }
   /// The point itself.
   exact::RationalPoint rational(std::uint32_t point) const { return rational(recipe(point)); }

@@ -107,7 +107,7 @@ class Walk {
   void label(std::uint32_t patch) {
     if (wants_label(patch)) result_.solid_of_patch[patch] = state_.decider();
   }
-  bool consistent();
+  bool consistent() const;
 
   const bool labels_;
   const ArrangementInput& input_;
@@ -263,11 +263,14 @@ void Walk::walk_from(std::uint32_t start) {
   }
 }
 
-bool Walk::consistent() {
+bool Walk::consistent() const {
   for (const RadialLists::Group& group : lists_.groups) {
-    changes_of(group);
     Fingerprint behind = fingerprints_[lists_.cell_before(group)];
-    for (const auto& [solid, count] : changes_) behind.change(rules_[solid], solid, count);
+    for (const RadialLists::Sheet& sheet : lists_.sheets_of(group)) {
+      for (const auto& [solid, count] : input_.solids.content(pieces_.triangle_of[sheet.piece])) {
+        behind.change(rules_[solid], solid, sheet.left ? -count : count);
+      }
+    }
     if (!(behind == fingerprints_[lists_.cell_behind(group)])) return false;
   }
   return true;

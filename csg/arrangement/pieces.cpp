@@ -184,8 +184,10 @@ class Subdivider {
   std::uint32_t triangle_ = 0;
   bool first_piece_ = true;
   std::vector<Spoke> spokes_;
-  std::vector<std::uint32_t> other_;        // the spoke at the other end
-  std::vector<std::uint32_t> begin_, end_;  // of the spokes at the same point
+  std::vector<std::uint64_t> order_;        // point << 32 | spoke, sorted; then around each point
+  std::vector<std::uint32_t> place_;        // of each spoke in the order
+  std::vector<std::uint32_t> begin_, end_;  // at each place, of those at the same point
+  std::vector<std::pair<PlanarDirection, std::uint64_t>> around_;
 };
 
 PlanarDirection Subdivider::direction(const exact::PlaneView& view, const Spoke& spoke) const {
@@ -204,42 +206,54 @@ PlanarDirection Subdivider::direction(const exact::PlaneView& view, const Spoke&
   return along ? result : PlanarDirection{-result.u, -result.v};
 }
 
+// Spokes come in pairs, one for each end of an edge: 2 i and 2 i + 1 before they are sorted.
 void Subdivider::sort_spokes() {
-  std::ranges::sort(spokes_, [](const Spoke& x, const Spoke& y) {
-    return std::tie(x.point, x.use) < std::tie(y.point, y.use);
-  });
   const auto count = static_cast<std::uint32_t>(spokes_.size());
+  order_.resize(count);
+  for (std::uint32_t s = 0; s < count; ++s) {
+    order_[s] = std::uint64_t{spokes_[s].point} << 32 | s;
+  }
+  std::ranges::sort(order_);
+  place_.resize(count);
   begin_.resize(count);
   end_.resize(count);
   for (std::uint32_t begin = 0; begin < count;) {
     std::uint32_t end = begin + 1;
-    while (end < count && spokes_[end].point == spokes_[begin].point) ++end;
+    while (end < count && order_[end] >> 32 == order_[begin] >> 32) ++end;
     if (end - begin > 2) sort_around(begin, end);
-    for (std::uint32_t s = begin; s < end; ++s) begin_[s] = begin, end_[s] = end;
+    for (std::uint32_t at = begin; at < end; ++at) {
+      place_[static_cast<std::uint32_t>(order_[at])] = at;
+      begin_[at] = begin;
+      end_[at] = end;
+    }
     begin = end;
-  }
-  other_.assign(count, 0);
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> by_use(count);
-  for (std::uint32_t s = 0; s < count; ++s) by_use[s] = {spokes_[s].use, s};
-  std::ranges::sort(by_use);
-  for (std::uint32_t i = 0; i + 1 < count; i += 2) {
-    other_[by_use[i].second] = by_use[i + 1].second;
-    other_[by_use[i + 1].second] = by_use[i].second;
   }
 }
 
-// Counter-clockwise, as seen from the front of the triangle.
+// Counter-clockwise, as seen from the front of the triangle: from the side that leaves, if there is
+// one, over those inside to the side that arrives.
 void Subdivider::sort_around(std::uint32_t begin, std::uint32_t end) {
+  const auto rank = [&](std::uint64_t at) {
+    const Spoke& spoke = spokes_[static_cast<std::uint32_t>(at)];
+    if (pieces_.uses[spoke.use].side == EdgeUse::kInside) return 1;
+    return spoke.leaves ? 0 : 2;
+  };
+  const auto first = order_.begin() + begin, last = order_.begin() + end;
+  std::stable_sort(first, last, [&](auto x, auto y) { return rank(x) < rank(y); });
+  const auto inside = std::find_if(first, last, [&](auto at) { return rank(at) > 0; });
+  const auto arriving = std::find_if(inside, last, [&](auto at) { return rank(at) > 1; });
+  if (arriving - inside < 2) return;
   const exact::PlaneView view(input_.plane_of(triangle_));
-  std::vector<std::pair<PlanarDirection, Spoke>> around;
-  for (std::uint32_t s = begin; s < end; ++s) {
-    around.emplace_back(direction(view, spokes_[s]), spokes_[s]);
+  around_.clear();
+  for (auto at = first; at != arriving; ++at) {
+    around_.emplace_back(direction(view, spokes_[static_cast<std::uint32_t>(*at)]), *at);
   }
-  const PlanarDirection from = around.front().first;
-  std::ranges::stable_sort(around, [&](const auto& x, const auto& y) {
+  const PlanarDirection from = around_.front().first;
+  std::sort(around_.begin() + (inside - first), around_.end(), [&](const auto& x, const auto& y) {
     return exact::order_in_plane(from, x.first, y.first) < 0;
   });
-  for (std::uint32_t s = begin; s < end; ++s) spokes_[s] = around[s - begin].second;
+  for (std::size_t i = 0; i < around_.size(); ++i)
+    first[static_cast<std::ptrdiff_t>(i)] = around_[i].second;
 }
 
 // Along the half-edge that leaves at a spoke, then at each point to the next spoke clockwise.
@@ -254,8 +268,9 @@ void Subdivider::walk(std::uint32_t start) {
     spokes_[s].piece = piece;
     EdgeUse& use = pieces_.uses[spokes_[s].use];
     (spokes_[s].at_a ? use.left : use.right) = piece;
-    const std::uint32_t arrived = other_[s];
-    s = arrived == begin_[arrived] ? end_[arrived] - 1 : arrived - 1;
+    const std::uint32_t arrived = place_[s ^ 1];
+    const std::uint32_t next = (arrived == begin_[arrived] ? end_[arrived] : arrived) - 1;
+    s = static_cast<std::uint32_t>(order_[next]);
     if (!spokes_[s].leaves) return;  // only where a line ends within a triangle: it is open
   }
 }

@@ -67,13 +67,16 @@ void PointTable::insert_vertex(std::uint32_t vertex) {
 }
 
 std::uint32_t PointTable::find_or_add(const BoundaryPoints::Recipe& recipe) {
-  const RationalPoint exact = points_.rational(recipe);
-  const FilePoint rounded = exact::round_for_file(exact);
+  const FilePoint rounded = recipe.kind == BoundaryPoints::Kind::kEdgePlane
+                                ? exact::round_for_file(points_.edge_plane(recipe))
+                                : exact::round_for_file(points_.rational(recipe));
   for (std::size_t at = slot_of(rounded); slots_[at] != 0; at = (at + 1) & (slots_.size() - 1)) {
     const std::uint32_t point = slots_[at] - 1;
-    if (points_.rounded(point) == rounded && equal(points_.rational(point), exact)) return point;
+    if (points_.rounded(point) != rounded) continue;
+    if (points_.recipe(point) == recipe) return point;
+    if (equal(points_.rational(point), points_.rational(recipe))) return point;
   }
-  const std::uint32_t added = points_.add(recipe, rounded, !exact::is_file_point(exact, rounded));
+  const std::uint32_t added = points_.add(recipe, rounded, !exact::is_file_point(points_.rational(recipe), rounded));
   insert(added);
   return added;
 }
@@ -104,11 +107,7 @@ int side_of(const BoundaryPoints& points, std::uint32_t point, const exact::Plan
   }
   const BoundaryPoints::Recipe recipe = points.recipe(point);
   if (recipe.kind == BoundaryPoints::Kind::kEdgePlane) {
-    const auto& [kind, from] = recipe;
-    return exact::side_of_plane(
-        exact::edge_plane_point(points.vertices()[from[0]], points.vertices()[from[1]],
-                                points.plane_of(from[2])),
-        plane);
+    return exact::side_of_plane(points.edge_plane(recipe), plane);
   }
   return exact::side_of_plane(points.rational(point), plane);
 }

@@ -20,39 +20,61 @@ int turn(const LatticePoint& edge, const Normal& v) {
 }  // namespace
 
 WindingRays::WindingRays(const ArrangementInput& input, std::size_t rays) : input_(input) {
-  const double triangles = static_cast<double>(input.triangles.size());
-  // More cells than rays cost more than they save.
-  const double cells = std::min(triangles, static_cast<double>(rays) * 16);
-  build(rays < 4 ? 1 : std::clamp(static_cast<int>(std::sqrt(cells)), 1, 1024));
+  if (rays >= 4 && !input.triangles.empty()) build(rays);
 }
 
-std::size_t WindingRays::cell(std::int32_t x, int k) const {
-  const std::int64_t size = std::int64_t{high_[k]} - low_[k] + 1;
-  return static_cast<std::size_t>((std::int64_t{x} - low_[k]) * across_ / size);
+std::size_t WindingRays::cell(const LatticePoint& p) const {
+  return (static_cast<std::size_t>(p.z) - static_cast<std::size_t>(low_.z)) / size_[1] * across_ +
+         (static_cast<std::size_t>(p.y) - static_cast<std::size_t>(low_.y)) / size_[0];
 }
 
-void WindingRays::build(int across) {
-  across_ = across;
+// Cells about as large as the triangles seen along x, and not many more than there are rays.
+void WindingRays::build(std::size_t rays) {
   const auto& vertices = input_.vertices;
-  if (vertices.empty()) return;
-  low_ = high_ = vertices.front();
+  const auto count = static_cast<std::uint32_t>(input_.triangles.size());
+  LatticePoint high = vertices.front();
+  low_ = high;
   for (const LatticePoint& p : vertices) {
     low_ = glm::min(low_, p);
-    high_ = glm::max(high_, p);
+    high = glm::max(high, p);
   }
-  if (across_ == 1) return;
-  const auto for_cells = [&](std::uint32_t t, const auto& work) {
+  struct Shadow {
+    LatticePoint low, high;
+    bool seen;
+  };
+  const auto shadow = [&](std::uint32_t t) {
     const glm::uvec3& c = input_.triangles[t];
     const LatticePoint &p = vertices[c.x], &q = vertices[c.y], &r = vertices[c.z];
-    const LatticePoint low = glm::min(p, glm::min(q, r)), high = glm::max(p, glm::max(q, r));
-    for (std::size_t z = cell(low.z, 2); z <= cell(high.z, 2); ++z) {
-      for (std::size_t y = cell(low.y, 1); y <= cell(high.y, 1); ++y) {
-        work(z * static_cast<std::size_t>(across_) + y);
-      }
+    return Shadow{glm::min(p, glm::min(q, r)), glm::max(p, glm::max(q, r)),
+                  exact::normal_of(p, q, r).x != 0};
+  };
+  double extents[2] = {0, 0};
+  std::uint32_t seen = 0;
+  for (std::uint32_t t = 0; t < count; ++t) {
+    const Shadow s = shadow(t);
+    if (!s.seen) continue;
+    ++seen;
+    for (int k = 0; k < 2; ++k) extents[k] += static_cast<double>(s.high[k + 1]) - s.low[k + 1] + 1;
+  }
+  std::size_t cells[2];
+  const double most = std::sqrt(16.0 * static_cast<double>(rays));
+  for (int k = 0; k < 2; ++k) {
+    const double whole = static_cast<double>(high[k + 1]) - low_[k + 1] + 1;
+    const double wanted = std::clamp(whole * seen / std::max(extents[k], 1.0), 1.0, most);
+    size_[k] = static_cast<std::size_t>(whole / wanted) + 1;
+    cells[k] = static_cast<std::size_t>(whole) / size_[k] + 1;
+  }
+  across_ = cells[0];
+  const auto for_cells = [&](std::uint32_t t, const auto& work) {
+    const Shadow s = shadow(t);
+    if (!s.seen) return;
+    const std::size_t first = cell(s.low), last = cell(s.high);
+    const std::size_t columns = last % across_ - first % across_ + 1;
+    for (std::size_t row = first; row <= last; row += across_) {
+      for (std::size_t c = row; c < row + columns; ++c) work(c);
     }
   };
-  const auto count = static_cast<std::uint32_t>(input_.triangles.size());
-  first_.assign(static_cast<std::size_t>(across_) * static_cast<std::size_t>(across_) + 1, 0);
+  first_.assign(cells[0] * cells[1] + 1, 0);
   for (std::uint32_t t = 0; t < count; ++t) for_cells(t, [&](std::size_t c) { ++first_[c + 1]; });
   for (std::size_t c = 1; c < first_.size(); ++c) first_[c] += first_[c - 1];
   std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
@@ -64,13 +86,13 @@ void WindingRays::build(int across) {
 
 void WindingRays::count(const Nearby& place, std::vector<std::int32_t>& windings) const {
   const Normal normal = input_.plane_of(place.triangle).normal;
-  if (across_ == 1) {
+  if (first_.empty()) {
     const auto count = static_cast<std::uint32_t>(input_.triangles.size());
     for (std::uint32_t t = 0; t < count; ++t) cross(t, place, normal, windings);
     return;
   }
   const LatticePoint& v = input_.vertices[place.v];
-  const std::size_t c = cell(v.z, 2) * static_cast<std::size_t>(across_) + cell(v.y, 1);
+  const std::size_t c = cell(v);
   for (std::uint32_t i = first_[c]; i < first_[c + 1]; ++i) {
     cross(triangles_[i], place, normal, windings);
   }

@@ -24,15 +24,15 @@ class WindingRays {
   void count(const Nearby& place, std::vector<std::int32_t>& windings) const;
 
  private:
-  void build(int across);
-  std::size_t cell(std::int32_t x, int k) const;
+  void build(std::size_t rays);
+  std::size_t cell(const exact::LatticePoint& p) const;
   void cross(std::uint32_t triangle, const Nearby& place, const exact::Normal& normal,
              std::vector<std::int32_t>& windings) const;
 
   const ArrangementInput& input_;
-  // Cells over y and z; one when there are few rays.
-  int across_ = 1;
-  exact::LatticePoint low_{0}, high_{0};
+  // Cells over y and z; none when there are few rays.
+  std::size_t across_ = 1, size_[2] = {1, 1};
+  exact::LatticePoint low_{0};
   std::vector<std::uint32_t> first_, triangles_;
 };
 
