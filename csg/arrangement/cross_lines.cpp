@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
+#include <utility>
 
 #include "csg/arrangement/cut_lines.h"
 #include "exact/directions.h"
@@ -54,6 +56,7 @@ class Crosser {
   int u_ = 0, v_ = 1;
   std::vector<Item> items_;
   std::vector<std::uint32_t> first_, next_, cell_items_;
+  std::vector<std::uint32_t> compared_;  // of each item, the last one that it was compared with
 };
 
 Plane Crosser::wall_of(std::uint32_t line) const {
@@ -197,12 +200,15 @@ void Crosser::compare_in_cells() {
   for (std::uint32_t i = 0; i < items_.size(); ++i) {
     for_cells(items_[i], [&](std::size_t c) { cell_items_[next_[c]++] = i; });
   }
-  for (std::size_t c = 0; c + 1 < first_.size(); ++c) {
-    for (std::uint32_t j = first_[c]; j < first_[c + 1]; ++j) {
-      for (std::uint32_t i = first_[c]; i < j; ++i) {
-        compare(items_[cell_items_[i]], items_[cell_items_[j]]);
+  // Each pair once, however many cells both run through. Items of a cell are in order.
+  compared_.assign(items_.size(), kNoLine);
+  for (std::uint32_t i = 0; i < items_.size(); ++i) {
+    for_cells(items_[i], [&](std::size_t c) {
+      for (std::uint32_t at = first_[c]; cell_items_[at] < i; ++at) {
+        const std::uint32_t j = cell_items_[at];
+        if (std::exchange(compared_[j], i) != i) compare(items_[j], items_[i]);
       }
-    }
+    });
   }
 }
 
@@ -225,17 +231,7 @@ void Crosser::run(std::uint32_t triangle, std::span<const CutLines::Cut> cuts,
 
 }  // namespace
 
-LineAxis axis_of(const ArrangementInput& input, const CutLines& lines, std::uint32_t line) {
-  exact::Cross direction;
-  if (line < input.edges.size()) {
-    const LatticePoint along =
-        input.vertices[input.edge_to(line)] - input.vertices[input.edge_from(line)];
-    direction = {along.x, along.y, along.z};
-  } else {
-    const CrossingLine& crossing = lines.crossings[line - input.edges.size()];
-    direction =
-        exact::cross(input.plane_of(crossing.first).normal, input.plane_of(crossing.second).normal);
-  }
+LineAxis axis_of(const exact::Cross& direction) {
   const auto size = [&](int k) {
     const exact::Int128 x = direction[static_cast<std::size_t>(k)];
     return x < 0 ? -x : x;
@@ -243,6 +239,16 @@ LineAxis axis_of(const ArrangementInput& input, const CutLines& lines, std::uint
   int axis = size(1) > size(0) ? 1 : 0;
   if (size(2) > size(axis)) axis = 2;
   return {axis, direction[static_cast<std::size_t>(axis)] > 0};
+}
+
+LineAxis axis_of(const ArrangementInput& input, const CutLines& lines, std::uint32_t line) {
+  if (line >= input.edges.size()) return lines.crossings[line - input.edges.size()].axis;
+  const LatticePoint along =
+      input.vertices[input.edge_to(line)] - input.vertices[input.edge_from(line)];
+  const LatticePoint size = glm::abs(along);
+  int axis = size.y > size.x ? 1 : 0;
+  if (size.z > size[axis]) axis = 2;
+  return {axis, along[axis] > 0};
 }
 
 Result<void> cross_lines(const ArrangementInput& input, PointTable& points, CutLines& lines,
@@ -271,6 +277,39 @@ Result<void> cross_lines(const ArrangementInput& input, PointTable& points, CutL
   return {};
 }
 
+namespace {
+
+// Rounding keeps orders, so exact ones are needed only where rounded points are equal.
+void sort_points(const BoundaryPoints& points, const LineAxis& along, std::span<std::uint32_t> line,
+                 std::vector<std::pair<std::int64_t, std::uint32_t>>& keys) {
+  const auto [axis, rising] = along;
+  keys.clear();
+  for (const std::uint32_t point : line) {
+    const std::int64_t x = points.rounded(point)[axis];
+    keys.emplace_back(rising ? x : -x, point);
+  }
+  std::ranges::sort(keys);
+  for (std::size_t i = 0; i < keys.size(); ++i) line[i] = keys[i].second;
+  for (std::size_t i = 0; i < keys.size();) {
+    std::size_t j = i + 1;
+    bool differ = false;
+    for (; j < keys.size() && keys[j].first == keys[i].first; ++j) {
+      differ = differ || keys[j].second != keys[i].second;
+    }
+    if (differ) {
+      const int up = rising ? -1 : 1;
+      std::sort(line.begin() + static_cast<std::ptrdiff_t>(i),
+                line.begin() + static_cast<std::ptrdiff_t>(j),
+                [&](std::uint32_t x, std::uint32_t y) {
+                  return x != y && order_along(points, x, y, axis) == up;
+                });
+    }
+    i = j;
+  }
+}
+
+}  // namespace
+
 SortedLines sort_lines(const ArrangementInput& input, const BoundaryPoints& points,
                        const CutLines& lines) {
   SortedLines result;
@@ -296,17 +335,14 @@ SortedLines sort_lines(const ArrangementInput& input, const BoundaryPoints& poin
   }
   for (const auto& [line, point] : lines.line_points) all[next[line]++] = point;
   // Sorted, each point once.
+  std::vector<std::pair<std::int64_t, std::uint32_t>> keys;
   std::size_t kept = 0;
   for (std::uint32_t line = 0; line < count; ++line) {
     const auto begin = all.begin() + result.first[line], end = all.begin() + next[line];
     result.first[line] = static_cast<std::uint32_t>(kept);
     if (begin == end) continue;
-    const auto [axis, rising] = axis_of(input, lines, line);
-    const int up = rising ? -1 : 1;
     if (end - begin > 2) {
-      std::sort(begin, end, [&](std::uint32_t x, std::uint32_t y) {
-        return order_along(points, x, y, axis) == up;
-      });
+      sort_points(points, axis_of(input, lines, line), {begin, end}, keys);
     }
     for (auto at = begin; at != end; ++at) {
       if (at == begin || *at != *(at - 1)) result.points.push_back(*at);

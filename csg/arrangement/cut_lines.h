@@ -7,14 +7,24 @@
 #include "csg/arrangement/candidate_pairs.h"
 #include "csg/arrangement/point_table.h"
 #include "csg/arrangement/welded_solids.h"
+#include "exact/determinants.h"
 
 namespace strata::csg {
+
+/// How a line runs: the coordinate that changes most along it, and whether it rises.
+struct LineAxis {
+  int axis;
+  bool rising;
+};
+/// @pre the direction is not zero
+LineAxis axis_of(const exact::Cross& direction);
 
 /// Where two triangles cross: the piece of the line of their planes that both contain, from one
 /// point to the other in the direction cross(n_first, n_second).
 struct CrossingLine {
   std::uint32_t first, second;  ///< triangles
   std::uint32_t from, to;       ///< points
+  LineAxis axis;
 };
 
 /// The lines that cut triangles. A *line* is a mesh edge or a CrossingLine; its number is that of
@@ -59,11 +69,6 @@ struct ArrangementInput {
   }
 };
 
-/// How a line runs: the coordinate that changes most along it, and whether it rises.
-struct LineAxis {
-  int axis;
-  bool rising;
-};
 LineAxis axis_of(const ArrangementInput& input, const CutLines& lines, std::uint32_t line);
 
 /// Finds where pairs of triangles meet.

@@ -159,7 +159,8 @@ void PairMeeter::meet_across(const Side& a, const Side& b, const Ends& ends_a, c
     lines_.cuts.push_back({a.triangle, edge(b, ends_b.side), from, to});
   } else {
     const auto line = static_cast<std::uint32_t>(input_.edges.size() + lines_.crossings.size());
-    lines_.crossings.push_back({a.triangle, b.triangle, from, to});
+    lines_.crossings.push_back(
+        {a.triangle, b.triangle, from, to, axis_of(exact::cross(a.plane.normal, b.plane.normal))});
     lines_.cuts.push_back({a.triangle, line, from, to});
     lines_.cuts.push_back({b.triangle, line, from, to});
   }

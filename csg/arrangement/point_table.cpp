@@ -76,7 +76,8 @@ std::uint32_t PointTable::find_or_add(const BoundaryPoints::Recipe& recipe) {
     if (points_.recipe(point) == recipe) return point;
     if (equal(points_.rational(point), points_.rational(recipe))) return point;
   }
-  const std::uint32_t added = points_.add(recipe, rounded, !exact::is_file_point(points_.rational(recipe), rounded));
+  const std::uint32_t added =
+      points_.add(recipe, rounded, !exact::is_file_point(points_.rational(recipe), rounded));
   insert(added);
   return added;
 }
