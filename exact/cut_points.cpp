@@ -79,12 +79,13 @@ FilePoint round_for_file(const RationalPoint& point) {
   return {coordinate(point.x), coordinate(point.y), coordinate(point.z)};
 }
 
-FilePoint round_for_file(const EdgePoint& point) {
+FilePoint round_for_file(const EdgePoint& point, bool& moved) {
   // p + (q - p) s_p / w. The product of the difference and s_p has 118 bits, 142 with 24 more; the
   // remainder has 94, so what is lost above 128 bits is not needed.
   const Int128 s = point.weight() < 0 ? -point.s_p : point.s_p;
   const Int128 w = point.weight() < 0 ? -point.weight() : point.weight();
   const double ratio = static_cast<double>(s) / static_cast<double>(w) * (1 << kFileBits);
+  moved = false;
   const auto coordinate = [&](std::int32_t p, std::int32_t q) {
     const std::int32_t along = q - p;
     if (along == 0) return std::int64_t{p} << kFileBits;
@@ -93,7 +94,9 @@ FilePoint round_for_file(const EdgePoint& point) {
                           << kFileBits;
     const auto left = static_cast<Int128>(whole - static_cast<UInt128>(Int128{quotient}) *
                                                       static_cast<UInt128>(w));
-    return (std::int64_t{p} << kFileBits) + corrected(left, w, quotient);
+    const std::int64_t rounded = corrected(left, w, quotient);
+    moved = moved || left != (Int128{rounded} - quotient) * w;
+    return (std::int64_t{p} << kFileBits) + rounded;
   };
   return {coordinate(point.p.x, point.q.x), coordinate(point.p.y, point.q.y),
           coordinate(point.p.z, point.q.z)};

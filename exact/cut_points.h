@@ -89,8 +89,9 @@ int side_of_plane(const RationalPoint& point, const Plane& plane);
 inline constexpr int kFileBits = 24;
 using FilePoint = glm::vec<3, std::int64_t, glm::defaultp>;  ///< in 2^-24 step
 FilePoint round_for_file(const RationalPoint& point);
-/// The same, faster. @pre the point lies between p and q
-FilePoint round_for_file(const EdgePoint& point);
+/// The same, faster. @param moved  whether rounding moved the point
+/// @pre the point lies between p and q
+FilePoint round_for_file(const EdgePoint& point, bool& moved);
 /// Whether rounding did not move the point. Both sides of the comparison have at most 231 bits.
 /// @param rounded  round_for_file() of the point
 bool is_file_point(const RationalPoint& point, const FilePoint& rounded);

@@ -30,8 +30,9 @@ constexpr std::uint32_t kNoLine = 0xffffffffu;
 
 class Crosser {
  public:
-  Crosser(const ArrangementInput& input, PointTable& points, CutLines& lines)
-      : input_(input), points_(points), lines_(lines) {}
+  Crosser(const ArrangementInput& input, const BoundaryPoints& points, const CutLines& lines,
+          CutLinesPart& out)
+      : input_(input), points_(points), lines_(lines), out_(out) {}
 
   void run(std::uint32_t triangle, std::span<const CutLines::Cut> cuts,
            std::span<const CutLines::Contact> contacts);
@@ -43,15 +44,16 @@ class Crosser {
   void compare_aligned(const Item& a, const Item& b);
   void put(const Item& item, std::uint32_t point) {
     if (item.line == kNoLine || point == item.from || point == item.to) return;
-    lines_.line_points.push_back({item.line, point});
+    out_.line_points.push_back({item.line, point});
   }
   bool is_edge(std::uint32_t line) const { return line < input_.edges.size(); }
   std::uint32_t cross(const Item& a, const Item& b);
   void compare_in_cells();
 
   const ArrangementInput& input_;
-  PointTable& points_;
-  CutLines& lines_;
+  const BoundaryPoints& points_;
+  const CutLines& lines_;
+  CutLinesPart& out_;
   std::uint32_t triangle_ = 0;
   int u_ = 0, v_ = 1;
   std::vector<Item> items_;
@@ -73,7 +75,7 @@ Plane Crosser::wall_of(std::uint32_t line) const {
 
 Item Crosser::item(std::uint32_t line, std::uint32_t from, std::uint32_t to) const {
   Item result{line, from, to, {}, {}, {}};
-  const exact::FilePoint a = points_.points().rounded(from), b = points_.points().rounded(to);
+  const exact::FilePoint a = points_.rounded(from), b = points_.rounded(to);
   const int axes[2] = {u_, v_};
   for (int k = 0; k < 2; ++k) {
     const auto [low, high] = std::minmax(a[axes[k]], b[axes[k]]);
@@ -98,21 +100,21 @@ std::uint32_t Crosser::cross(const Item& a, const Item& b) {
   if (is_edge(a.line) && is_edge(b.line)) {
     const auto [p, q] = ends(a);
     const auto [r, s] = ends(b);
-    return points_.find_or_add({Kind::kEdgeEdge, {p, q, r, s}});
+    return out_.add_point(points_, {Kind::kEdgeEdge, {p, q, r, s}});
   }
   if (is_edge(a.line) || is_edge(b.line)) {
     const auto [p, q] = ends(is_edge(a.line) ? a : b);
-    return points_.find_or_add({Kind::kEdgePlane, {p, q, other(is_edge(a.line) ? b : a), 0}});
+    return out_.add_point(points_, {Kind::kEdgePlane, {p, q, other(is_edge(a.line) ? b : a), 0}});
   }
   std::array<std::uint32_t, 3> planes{triangle_, other(a), other(b)};
   std::ranges::sort(planes);
-  return points_.find_or_add({Kind::kThreePlanes, {planes[0], planes[1], planes[2], 0}});
+  return out_.add_point(points_, {Kind::kThreePlanes, {planes[0], planes[1], planes[2], 0}});
 }
 
 void Crosser::compare(const Item& a, const Item& b) {
   if (a.line == b.line || !a.touches(b)) return;
   const auto side = [&](std::uint32_t point, const Item& of) {
-    return point == of.from || point == of.to ? 0 : side_of(points_.points(), point, of.wall);
+    return point == of.from || point == of.to ? 0 : side_of(points_, point, of.wall);
   };
   if (a.line == kNoLine || b.line == kNoLine) {
     const Item &contact = a.line == kNoLine ? a : b, &cut = a.line == kNoLine ? b : a;
@@ -135,11 +137,10 @@ void Crosser::compare(const Item& a, const Item& b) {
 
 // Both lie on one line; a may be a contact.
 void Crosser::compare_aligned(const Item& a, const Item& b) {
-  const BoundaryPoints& points = points_.points();
   const int axis = axis_of(input_, lines_, b.line).axis;
   const auto within = [&](std::uint32_t point, const Item& of) {
-    const int x = order_along(points, point, of.from, axis),
-              y = order_along(points, point, of.to, axis);
+    const int x = order_along(points_, point, of.from, axis),
+              y = order_along(points_, point, of.to, axis);
     return x * y < 0;
   };
   for (const std::uint32_t point : {a.from, a.to}) {
@@ -169,8 +170,7 @@ void Crosser::compare_in_cells() {
   };
   const auto for_cells = [&](const Item& item, const auto& work) {
     const int first_row = cell(item.low[1], 1), last_row = cell(item.high[1], 1);
-    const exact::FilePoint a = points_.points().rounded(item.from),
-                           b = points_.points().rounded(item.to);
+    const exact::FilePoint a = points_.rounded(item.from), b = points_.rounded(item.to);
     const double ax = static_cast<double>(a[u_]) * 0x1p-24,
                  ay = static_cast<double>(a[v_]) * 0x1p-24,
                  bx = static_cast<double>(b[u_]) * 0x1p-24,
@@ -259,7 +259,11 @@ Result<void> cross_lines(const ArrangementInput& input, PointTable& points, CutL
   std::ranges::sort(lines.contacts, [](const CutLines::Contact& x, const CutLines::Contact& y) {
     return std::tie(x.triangle, x.point) < std::tie(y.triangle, y.point);
   });
-  Crosser crosser(input, points, lines);
+  struct Task {
+    std::span<const CutLines::Cut> cuts;
+    std::span<const CutLines::Contact> contacts;
+  };
+  std::vector<Task> tasks;
   auto contact = lines.contacts.begin();
   for (auto cut = lines.cuts.begin(); cut != lines.cuts.end();) {
     const std::uint32_t triangle = cut->triangle;
@@ -269,11 +273,29 @@ Result<void> cross_lines(const ArrangementInput& input, PointTable& points, CutL
     while (contact != lines.contacts.end() && contact->triangle < triangle) ++contact;
     auto last = contact;
     while (last != lines.contacts.end() && last->triangle == triangle) ++last;
-    if (end - cut + (last - contact) > 1) crosser.run(triangle, {cut, end}, {contact, last});
-    if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+    if (end - cut + (last - contact) > 1) tasks.push_back({{cut, end}, {contact, last}});
     cut = end;
     contact = last;
   }
+  // Blocks of about as many lines: some triangles are cut by thousands.
+  constexpr std::size_t kBlock = 2048;
+  std::vector<std::size_t> first{0};
+  std::size_t size = 0;
+  for (std::size_t i = 0; i < tasks.size(); ++i) {
+    size += tasks[i].cuts.size();
+    if (size < kBlock && i + 1 < tasks.size()) continue;
+    first.push_back(i + 1);
+    size = 0;
+  }
+  std::vector<CutLinesPart> parts(first.size() - 1);
+  parallel_for(execution, parts.size(), [&](std::size_t part, int) {
+    Crosser crosser(input, points.points(), lines, parts[part]);
+    for (std::size_t i = first[part]; i < first[part + 1]; ++i) {
+      crosser.run(tasks[i].cuts.front().triangle, tasks[i].cuts, tasks[i].contacts);
+    }
+  });
+  if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+  join_parts(input, std::move(parts), points, lines);
   return {};
 }
 

@@ -71,9 +71,25 @@ struct ArrangementInput {
 
 LineAxis axis_of(const ArrangementInput& input, const CutLines& lines, std::uint32_t line);
 
-/// Finds where pairs of triangles meet.
-void meet_pairs(const ArrangementInput& input, std::span<const BoxPair> pairs, PointTable& points,
+/// What one thread finds. Numbers of points and lines from kOwn on are those of its own.
+struct CutLinesPart : CutLines {
+  static constexpr std::uint32_t kOwn = 0x80000000u;
+
+  std::vector<NewPoint> points;
+  std::vector<std::uint32_t> touched_edges;
+
+  std::uint32_t add_point(const BoundaryPoints& known, const BoundaryPoints::Recipe& recipe) {
+    points.push_back(make_point(known, recipe));
+    return kOwn + static_cast<std::uint32_t>(points.size() - 1);
+  }
+};
+/// Appends what threads found, in the order of the parts.
+void join_parts(const ArrangementInput& input, std::vector<CutLinesPart> parts, PointTable& points,
                 CutLines& lines);
+
+/// Finds where pairs of triangles meet. @return kCancelled
+Result<void> meet_pairs(const ArrangementInput& input, std::span<const BoxPair> pairs,
+                        PointTable& points, CutLines& lines, const Execution& execution);
 
 /// Finds where lines meet within a triangle, for all triangles. Points are added to the lines.
 /// @return kCancelled

@@ -35,7 +35,7 @@ struct Ends {
 
 class PairMeeter {
  public:
-  PairMeeter(const ArrangementInput& input, PointTable& points, CutLines& lines)
+  PairMeeter(const ArrangementInput& input, const BoundaryPoints& points, CutLinesPart& lines)
       : input_(input), points_(points), lines_(lines) {}
 
   void meet(const BoxPair& pair) {
@@ -81,8 +81,8 @@ class PairMeeter {
   void clip_edge(const Side& a, int side, const Side& b);
 
   const ArrangementInput& input_;
-  PointTable& points_;
-  CutLines& lines_;
+  const BoundaryPoints& points_;
+  CutLinesPart& lines_;
 };
 
 // The piece of the line of two planes that lies in the triangle t, whose corners have these heights
@@ -143,22 +143,24 @@ void PairMeeter::meet_across(const Side& a, const Side& b, const Ends& ends_a, c
   high_b = high >= 0 ? ends_b.high.place : inside_b;
   if (over == 0) low_a = high_a = ends_a.high.place, low_b = high_b = ends_b.low.place;
   if (under == 0) low_a = high_a = ends_a.low.place, low_b = high_b = ends_b.high.place;
-  const std::uint32_t from = point_of(a, low_a, b, low_b), to = point_of(a, high_a, b, high_b);
+  const std::uint32_t from = point_of(a, low_a, b, low_b);
+  const bool touch = over == 0 || under == 0;
+  const std::uint32_t to = touch ? from : point_of(a, high_a, b, high_b);
   const bool is_point = from == to;
   put(a, low_a, from, !is_point);
   put(b, low_b, from, !is_point);
   if (is_point) return;
   put(a, high_a, to, true);
   put(b, high_b, to, true);
-  if (ends_a.side != kNone) lines_.touched[edge(a, ends_a.side)] = true;
-  if (ends_b.side != kNone) lines_.touched[edge(b, ends_b.side)] = true;
+  if (ends_a.side != kNone) lines_.touched_edges.push_back(edge(a, ends_a.side));
+  if (ends_b.side != kNone) lines_.touched_edges.push_back(edge(b, ends_b.side));
   if (ends_a.side != kNone && ends_b.side != kNone) return;
   if (ends_a.side != kNone) {
     lines_.cuts.push_back({b.triangle, edge(a, ends_a.side), from, to});
   } else if (ends_b.side != kNone) {
     lines_.cuts.push_back({a.triangle, edge(b, ends_b.side), from, to});
   } else {
-    const auto line = static_cast<std::uint32_t>(input_.edges.size() + lines_.crossings.size());
+    const auto line = CutLinesPart::kOwn + static_cast<std::uint32_t>(lines_.crossings.size());
     lines_.crossings.push_back(
         {a.triangle, b.triangle, from, to, axis_of(exact::cross(a.plane.normal, b.plane.normal))});
     lines_.cuts.push_back({a.triangle, line, from, to});
@@ -173,8 +175,8 @@ std::uint32_t PairMeeter::point_of(const Side& a, const Place& on_a, const Side&
   // One of the two sides crosses the other plane. A side in the plane says nothing.
   const auto crossing = [&](const Side& t, int side, const Side& other) {
     const std::uint32_t p = t.corners[side], q = t.corners[next(side)];
-    return points_.find_or_add(
-        {BoundaryPoints::Kind::kEdgePlane, {std::min(p, q), std::max(p, q), other.triangle, 0}});
+    return lines_.add_point(points_, {BoundaryPoints::Kind::kEdgePlane,
+                                      {std::min(p, q), std::max(p, q), other.triangle, 0}});
   };
   const auto crosses = [&](const Side& t, int side, const Side& other) {
     return side != kNone && height(other.plane, at(t.corners[side])) != 0;
@@ -185,7 +187,7 @@ std::uint32_t PairMeeter::point_of(const Side& a, const Place& on_a, const Side&
 void PairMeeter::put_on_edge(std::uint32_t edge, std::uint32_t point) {
   if (point == input_.edge_from(edge) || point == input_.edge_to(edge)) return;
   lines_.line_points.push_back({edge, point});
-  lines_.touched[edge] = true;
+  lines_.touched_edges.push_back(edge);
 }
 
 void PairMeeter::put(const Side& t, const Place& place, std::uint32_t point, bool end_of_cut) {
@@ -261,18 +263,19 @@ void PairMeeter::clip_edge(const Side& a, int side, const Side& b) {
     const std::uint32_t r = b.corners[k], s = b.corners[next(k)];
     const auto [p0, q0] = std::minmax(p, q);
     const auto [r0, s0] = std::minmax(r, s);
-    return points_.find_or_add({BoundaryPoints::Kind::kEdgeEdge, {p0, q0, r0, s0}});
+    return lines_.add_point(points_, {BoundaryPoints::Kind::kEdgeEdge, {p0, q0, r0, s0}});
   };
-  const std::uint32_t from = point_at(low), to = point_at(high);
+  const bool is_point = !less(low, high);
+  const std::uint32_t from = point_at(low), to = is_point ? from : point_at(high);
   const std::uint32_t line = edge(a, side);
   for (const auto& [point, place] : {std::pair{from, low.place}, std::pair{to, high.place}}) {
     put_on_edge(line, point);
-    put(b, place, point, from != to);
+    put(b, place, point, !is_point);
+    if (is_point) return;
   }
-  if (from == to) return;
-  lines_.touched[line] = true;
+  lines_.touched_edges.push_back(line);
   if (along != kNone) {
-    lines_.touched[edge(b, along)] = true;
+    lines_.touched_edges.push_back(edge(b, along));
   } else {
     lines_.cuts.push_back({b.triangle, line, from, to});
   }
@@ -280,16 +283,65 @@ void PairMeeter::clip_edge(const Side& a, int side, const Side& b) {
 
 }  // namespace
 
-void meet_pairs(const ArrangementInput& input, std::span<const BoxPair> pairs, PointTable& points,
+void join_parts(const ArrangementInput& input, std::vector<CutLinesPart> parts, PointTable& points,
                 CutLines& lines) {
+  std::vector<std::uint32_t> point_of;
+  for (CutLinesPart& part : parts) {
+    point_of.clear();
+    for (const NewPoint& point : part.points) point_of.push_back(points.find_or_add(point));
+    const auto lines_before =
+        static_cast<std::uint32_t>(input.edges.size() + lines.crossings.size());
+    const auto fix_point = [&](std::uint32_t& point) {
+      if (point >= CutLinesPart::kOwn) point = point_of[point - CutLinesPart::kOwn];
+    };
+    const auto fix_line = [&](std::uint32_t& line) {
+      if (line >= CutLinesPart::kOwn) line = line - CutLinesPart::kOwn + lines_before;
+    };
+    for (CrossingLine& crossing : part.crossings) {
+      fix_point(crossing.from);
+      fix_point(crossing.to);
+      lines.crossings.push_back(crossing);
+    }
+    for (CutLines::Cut& cut : part.cuts) {
+      fix_line(cut.line);
+      fix_point(cut.from);
+      fix_point(cut.to);
+      lines.cuts.push_back(cut);
+    }
+    for (CutLines::Contact& contact : part.contacts) {
+      fix_point(contact.point);
+      lines.contacts.push_back(contact);
+    }
+    for (CutLines::LinePoint& put : part.line_points) {
+      fix_line(put.line);
+      fix_point(put.point);
+      lines.line_points.push_back(put);
+    }
+    for (const std::uint32_t edge : part.touched_edges) lines.touched[edge] = true;
+    part = {};
+  }
+}
+
+Result<void> meet_pairs(const ArrangementInput& input, std::span<const BoxPair> pairs,
+                        PointTable& points, CutLines& lines, const Execution& execution) {
+  constexpr std::size_t kBlock = 4096;
   lines.touched.assign(input.edges.size(), false);
   for (const auto& [first, second] : pairs) {  // before any other point may be made there
     for (const std::uint32_t t : {first, second}) {
       for (int k = 0; k < 3; ++k) points.insert_vertex(input.triangles[t][k]);
     }
   }
-  PairMeeter meeter(input, points, lines);
-  for (const BoxPair& pair : pairs) meeter.meet(pair);
+  std::vector<CutLinesPart> parts((pairs.size() + kBlock - 1) / kBlock);
+  parallel_for(execution, parts.size(), [&](std::size_t part, int) {
+    PairMeeter meeter(input, points.points(), parts[part]);
+    const std::size_t begin = part * kBlock;
+    for (const BoxPair& pair : pairs.subspan(begin, std::min(kBlock, pairs.size() - begin))) {
+      meeter.meet(pair);
+    }
+  });
+  if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+  join_parts(input, std::move(parts), points, lines);
+  return {};
 }
 
 }  // namespace strata::csg

@@ -66,20 +66,30 @@ void PointTable::insert_vertex(std::uint32_t vertex) {
   insert(vertex);
 }
 
-std::uint32_t PointTable::find_or_add(const BoundaryPoints::Recipe& recipe) {
-  const FilePoint rounded = recipe.kind == BoundaryPoints::Kind::kEdgePlane
-                                ? exact::round_for_file(points_.edge_plane(recipe))
-                                : exact::round_for_file(points_.rational(recipe));
+NewPoint make_point(const BoundaryPoints& points, const BoundaryPoints::Recipe& recipe) {
+  NewPoint result{recipe, {}, false};
+  if (recipe.kind == BoundaryPoints::Kind::kEdgePlane) {
+    result.rounded = exact::round_for_file(points.edge_plane(recipe), result.moved);
+  } else {
+    const RationalPoint exact = points.rational(recipe);
+    result.rounded = exact::round_for_file(exact);
+    result.moved = !exact::is_file_point(exact, result.rounded);
+  }
+  return result;
+}
+
+std::uint32_t PointTable::find_or_add(const NewPoint& added) {
+  const auto& [recipe, rounded, moved] = added;
   for (std::size_t at = slot_of(rounded); slots_[at] != 0; at = (at + 1) & (slots_.size() - 1)) {
     const std::uint32_t point = slots_[at] - 1;
     if (points_.rounded(point) != rounded) continue;
     if (points_.recipe(point) == recipe) return point;
+    if (!moved && !points_.moved(point)) return point;
     if (equal(points_.rational(point), points_.rational(recipe))) return point;
   }
-  const std::uint32_t added =
-      points_.add(recipe, rounded, !exact::is_file_point(points_.rational(recipe), rounded));
-  insert(added);
-  return added;
+  const std::uint32_t point = points_.add(recipe, rounded, moved);
+  insert(point);
+  return point;
 }
 
 int order_along(const BoundaryPoints& points, std::uint32_t a, std::uint32_t b, int axis) {

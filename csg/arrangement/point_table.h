@@ -7,6 +7,14 @@
 
 namespace strata::csg {
 
+/// A point that a thread found; it may be known already.
+struct NewPoint {
+  BoundaryPoints::Recipe recipe;
+  exact::FilePoint rounded;
+  bool moved;
+};
+NewPoint make_point(const BoundaryPoints& points, const BoundaryPoints::Recipe& recipe);
+
 /// Finds points by where they are, so that a point has one index however it is made. Points that
 /// are equal are rounded alike: a hash table over rounded points holds few candidates, which are
 /// compared exactly.
@@ -17,7 +25,7 @@ class PointTable {
   /// Lets a vertex be found.
   void insert_vertex(std::uint32_t vertex);
   /// The point that a recipe makes.
-  std::uint32_t find_or_add(const BoundaryPoints::Recipe& recipe);
+  std::uint32_t find_or_add(const NewPoint& point);
 
   const BoundaryPoints& points() const { return points_; }
   BoundaryPoints take() { return std::move(points_); }

@@ -38,7 +38,9 @@ Result<BoundaryFaces> arrange_solids(LatticeSolids solids, const Tree& tree, Tre
   const BoundaryPoints& points = table.points();
   const ArrangementInput input{points.vertices(), points.triangles(), *welded, edges};
   CutLines lines;
-  meet_pairs(input, *pairs, table, lines);
+  if (auto met = meet_pairs(input, *pairs, table, lines, execution); !met) {
+    return tl::unexpected(met.error());
+  }
   if (auto crossed = cross_lines(input, table, lines, execution); !crossed) {
     return tl::unexpected(crossed.error());
   }
