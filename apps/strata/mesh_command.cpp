@@ -16,6 +16,7 @@
 #include "strata/csg/input/scene_input.h"
 #include "strata/csg/input/solid_input.h"
 #include "strata/csg/solid_lists.h"
+#include "strata/mesh/check/mesh_check.h"
 #include "strata/voxelize/grid_fit.h"
 #include "voxelize/open/lost_walls.h"
 
@@ -190,6 +191,26 @@ Result<void> MeshRun::warn_of_lost_walls(const csg::SolidInput& input,
   return {};
 }
 
+/// The floats of an STL may make triangles of a contour meet: its vertices are only a lattice
+/// apart.
+Result<void> check_floats(const MeshCommand& command, SolidMesh& mesh, const Execution& execution) {
+  for (glm::dvec3& p : mesh.positions) {
+    for (int k = 0; k < 3; ++k) {
+      const volatile float rounded =
+          static_cast<float>(p[k]);  // else g++ 12 leaves the rounding out
+      p[k] = rounded;
+    }
+  }
+  const auto checked = check_mesh(mesh.positions, mesh.triangles, execution);
+  if (!checked) return tl::unexpected(checked.error());
+  const std::uint64_t wrong = checked->meeting_pairs() + checked->degenerate + checked->duplicates;
+  if (wrong == 0) return {};
+  return fail(ErrorCode::kGeometry,
+              "{}: at the floats of an STL {} of triangles meet or have no area; 3mf and ply hold "
+              "doubles, and a smaller -r leaves more room",
+              command.output, counted(wrong, "pair"));
+}
+
 Result<void> MeshRun::make_contour() {
   auto input = csg::load_solids(command_.input, false, messages_of(session_),
                                 session_.execution("reading", 0.3));
@@ -221,6 +242,10 @@ Result<void> MeshRun::make_contour() {
   if (!made) return tl::unexpected(made.error());
   outcome_.mesh = std::move(made->mesh);
   outcome_.contour = made->report;
+  if (command_.format == SolidFormat::kStl) {
+    auto sound = check_floats(command_, outcome_.mesh, session_.execution("checking", 0.5));
+    if (!sound) return sound;
+  }
   outcome_.mesh_ms = session_.milliseconds() - outcome_.read_ms;
   return input->closed ? warn_of_lost_walls(*input, options) : Result<void>();
 }

@@ -171,15 +171,17 @@ Result<void> check_input_name(const std::string& path, const InputKind& kind, bo
   }
   if (mesh_format_of(path) != MeshFormat::kAuto) return {};
   if (scenes) {
-    return fail(ErrorCode::kInput,
-                "{}: the file name must end in .csg, .scad, .obj, .stl, .ply or .off, or the input "
-                "format must be given",
-                path);
+    return fail(
+        ErrorCode::kInput,
+        "{}: the file name must end in .csg, .scad, .obj, .stl, .ply, .off, .3mf or .amf, or "
+        "the input format must be given",
+        path);
   }
-  return fail(
-      ErrorCode::kInput,
-      "{}: the file name must end in .obj, .stl, .ply or .off, or the input format must be given",
-      path);
+  return fail(ErrorCode::kInput,
+              "{}: the file name must end in .obj, .stl, .ply, .off, .3mf or .amf, or the input "
+              "format must "
+              "be given",
+              path);
 }
 
 Result<InputFacts> inspect_mesh(TriangleSoup& soup, MeshReadStats stats, const std::string& path,

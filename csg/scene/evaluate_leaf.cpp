@@ -10,7 +10,6 @@
 #include "csg/scene/evaluator.h"
 #include "csg/solids/height_map.h"
 #include "csg/solids/primitives.h"
-#include "mesh/formats/read_3mf_amf.h"
 #include "strata/mesh/formats/read_mesh.h"
 #include "strata/mesh/soup_tools.h"
 
@@ -72,18 +71,6 @@ std::string extension_of(const std::string& path) {
   std::string extension = fs::path(path).extension().string();
   for (char& c : extension) c = static_cast<char>(c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c);
   return extension;
-}
-
-Result<MeshFile> read_any_mesh(const std::string& path, const std::string& extension,
-                               const Execution& execution) {
-  if (extension == ".3mf" || extension == ".amf") {
-    MeshFile file;
-    auto soup = (extension == ".3mf" ? read_3mf : read_amf)(path, execution, &file.stats.warnings);
-    if (!soup) return tl::unexpected(soup.error());
-    file.soup = *std::move(soup);
-    return file;
-  }
-  return read_mesh(path, {}, execution);
 }
 
 void move_to_middle(TriangleSoup& mesh) {
@@ -350,8 +337,7 @@ void Evaluator::import(std::uint32_t node, const Context& context) {
   if (file.empty()) return;
   const std::string extension = extension_of(file);
   const bool flat = extension == ".svg" || extension == ".dxf";
-  const bool solid =
-      extension == ".3mf" || extension == ".amf" || mesh_format_of(file) != MeshFormat::kAuto;
+  const bool solid = mesh_format_of(file) != MeshFormat::kAuto;
   const auto path = asset(node, file);
   if (!path) return;
   if (flat) return add_outline(node, context, import_outline(node, *path));
@@ -366,7 +352,7 @@ void Evaluator::import(std::uint32_t node, const Context& context) {
   if (!imported.mesh) {
     Execution execution = execution_;
     execution.progress = {};
-    auto mesh = read_any_mesh(*path, extension, execution);
+    auto mesh = read_mesh(*path, {}, execution);
     if (!mesh) {
       leave_out(node, "geometry", mesh.error(), "it is left out");
       if (error_) return;

@@ -10,7 +10,8 @@ namespace strata {
 Result<MeshFile> read_with_openmesh(const std::string& path, const MeshReadOptions& options,
                                     const Execution& execution) {
   const MeshFormat format = mesh_format_of(path);
-  if (path == "-" || format == MeshFormat::kAuto ||
+  if (path == "-" || format == MeshFormat::kAuto || format == MeshFormat::k3mf ||
+      format == MeshFormat::kAmf ||
       (options.format != MeshFormat::kAuto && options.format != format)) {
     return fail(ErrorCode::kUsage, "{}: OpenMesh takes the format from the extension of a file",
                 path);

@@ -1,9 +1,12 @@
 #include "strata/mesh/formats/read_mesh.h"
 
+#include <filesystem>
 #include <new>
 #include <stdexcept>
+#include <system_error>
 
 #include "mesh/formats/input_bytes.h"
+#include "mesh/formats/read_3mf_amf.h"
 #include "mesh/formats/reader_common.h"
 #include "mesh/formats/text_scanner.h"
 #ifdef STRATA_HAVE_OPENMESH
@@ -19,10 +22,9 @@ struct NamedFormat {
   MeshFormat format;
   const char* name;
 };
-constexpr NamedFormat kFormats[] = {{MeshFormat::kObj, "obj"},
-                                    {MeshFormat::kStl, "stl"},
-                                    {MeshFormat::kPly, "ply"},
-                                    {MeshFormat::kOff, "off"}};
+constexpr NamedFormat kFormats[] = {{MeshFormat::kObj, "obj"}, {MeshFormat::kStl, "stl"},
+                                    {MeshFormat::kPly, "ply"}, {MeshFormat::kOff, "off"},
+                                    {MeshFormat::k3mf, "3mf"}, {MeshFormat::kAmf, "amf"}};
 
 /// The format that the first bytes indicate, for a hint when reading by the extension failed.
 MeshFormat format_by_content(std::string_view text) {
@@ -45,10 +47,35 @@ Result<MeshFile> read_as(const detail::ReaderInput& input) {
       return detail::read_ply(input);
     case MeshFormat::kOff:
       return detail::read_off(input);
+    case MeshFormat::k3mf:
+    case MeshFormat::kAmf:
+      return fail(ErrorCode::kUsage, "{}: {} is read from files only", input.name,
+                  mesh_format_name(input.options.format));
     case MeshFormat::kAuto:
       break;
   }
   return fail(ErrorCode::kUsage, "{}: no format was given", input.name);
+}
+
+/// 3MF and AMF.
+Result<MeshFile> read_archive(const std::string& path, const MeshReadOptions& options,
+                              const Execution& execution) {
+  if (path == "-") {
+    return fail(ErrorCode::kUsage, "standard input: {} is read from files only",
+                mesh_format_name(options.format));
+  }
+  MeshFile file;
+  auto soup = (options.format == MeshFormat::k3mf ? csg::read_3mf : csg::read_amf)(
+      path, execution, &file.stats.warnings);
+  if (!soup) return tl::unexpected(soup.error());
+  file.soup = *std::move(soup);
+  file.stats.format = mesh_format_name(options.format);
+  std::error_code unknown;
+  const auto bytes = std::filesystem::file_size(path, unknown);
+  if (!unknown) file.stats.bytes = bytes;
+  file.stats.vertices = file.soup.positions.size();
+  file.stats.faces = file.stats.triangles = file.soup.triangles.size();
+  return file;
 }
 
 /// Reads text that ends in a readable zero byte. No exception (std::bad_alloc) leaves this
@@ -124,10 +151,11 @@ Result<MeshFile> read_mesh(const std::string& path, const MeshReadOptions& optio
     }
     known.format = mesh_format_of(path);
     if (known.format == MeshFormat::kAuto) {
-      return fail(
-          ErrorCode::kInput,
-          "{}: the file name must end in .obj, .stl, .ply or .off, or the format must be given",
-          path);
+      return fail(ErrorCode::kInput,
+                  "{}: the file name must end in .obj, .stl, .ply, .off, .3mf or .amf, or the "
+                  "format must be "
+                  "given",
+                  path);
     }
   }
   if (known.reader == MeshReader::kOpenMesh) {
@@ -136,6 +164,9 @@ Result<MeshFile> read_mesh(const std::string& path, const MeshReadOptions& optio
 #else
     return fail(ErrorCode::kUsage, "{}: this build has no OpenMesh", path);
 #endif
+  }
+  if (known.format == MeshFormat::k3mf || known.format == MeshFormat::kAmf) {
+    return read_archive(path, known, execution);
   }
   try {
     const auto file = detail::InputBytes::open(path, execution.memory_limit, execution.stop);

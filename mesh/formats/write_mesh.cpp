@@ -103,6 +103,8 @@ std::string mesh_to_bytes(const TriangleSoup& mesh, MeshFormat format) {
       out = stl_bytes(mesh);
       break;
     case MeshFormat::kAuto:
+    case MeshFormat::k3mf:
+    case MeshFormat::kAmf:
       break;
   }
   return out;
@@ -110,7 +112,7 @@ std::string mesh_to_bytes(const TriangleSoup& mesh, MeshFormat format) {
 
 Result<void> write_mesh(const std::string& path, const TriangleSoup& mesh, MeshFormat format) {
   if (format == MeshFormat::kAuto) format = mesh_format_of(path);
-  if (format == MeshFormat::kAuto) {
+  if (format == MeshFormat::kAuto || format == MeshFormat::k3mf || format == MeshFormat::kAmf) {
     return fail(ErrorCode::kUsage, "{}: the format must be obj, stl, ply or off", path);
   }
   if (format == MeshFormat::kStl &&

@@ -18,7 +18,9 @@ enum class MeshFormat {
   kObj,   ///< Wavefront OBJ: v and f statements; all else is skipped
   kStl,   ///< STL, ascii or binary, distinguished by size; the size overrules a wrong count
   kPly,   ///< PLY 1.0, ascii or binary of either byte order: faces and triangle strips
-  kOff    ///< Object File Format, ascii, with the prefixes ST, C, N, 4 in any order
+  kOff,   ///< Object File Format, ascii, with the prefixes ST, C, N, 4 in any order
+  k3mf,   ///< 3MF, all objects of the build; not from memory or standard input, nor written here
+  kAmf    ///< AMF, plain or zipped; likewise
 };
 
 /// Who reads the file.
@@ -78,20 +80,20 @@ struct MeshFile {
 /// @param path  a file, or "-" for standard input, which needs options.format
 /// @return kInput, with line or byte: no such file, unknown format, empty, malformed, truncated,
 /// UTF-16 text, no vertices, no usable face, or with `strict` a face that had to be dropped;
-/// kUsage: "-" without a format, OpenMesh not in this build; kLimit: more than 2^32 - 2 vertices,
-/// memory; kCancelled. The file must not be changed by others meanwhile.
+/// kUsage: "-" without a format or with an archive's, a library not in this build; kLimit: more
+/// than 2^32 - 2 vertices, memory; kCancelled. The file must not be changed by others meanwhile.
 Result<MeshFile> read_mesh(const std::string& path, const MeshReadOptions& options = {},
                            const Execution& execution = {});
 
 /// The same for bytes in memory. @param name  stands for the path in messages
-/// @pre options.format is not kAuto; options.reader is kOwn
+/// @pre options.format is not kAuto, k3mf or kAmf; options.reader is kOwn
 Result<MeshFile> parse_mesh(std::string_view bytes, const std::string& name,
                             const MeshReadOptions& options, const Execution& execution = {});
 
 /// The format for a path's extension, in any letter case; kAuto when it names none.
 [[nodiscard]] MeshFormat mesh_format_of(std::string_view path);
 
-/// "obj", "stl", "ply", "off"; kAuto for any other name.
+/// "obj", "stl", "ply", "off", "3mf", "amf"; kAuto for any other name.
 [[nodiscard]] MeshFormat mesh_format_named(std::string_view name);
 
 /// The inverse of mesh_format_named; "auto" for kAuto.

@@ -41,6 +41,8 @@ const std::map<std::string, std::string> kRefused = {
     {"cgal/kitten.off", "no faces"},
     {"cgal/oni.ply", "no faces"},
     {"cgal/spheres.ply", "no faces"},
+    {"openscad/3mf-export-expected.3mf", "not a zip archive"},  // its text alone
+    {"openscad/amf_broken.amf", ":7: a vertex has no valid y"},
     {"openscad/empty.stl", "empty"},
     {"openscad/empty2.stl", "no vertices"},
     {"openscad/invalidvertex.stl", ":89: 'blah' is not a number"},
@@ -101,6 +103,7 @@ TEST(Corpus, EveryPublicFileIsReadOrRefusedAsKnown) {
     const auto file = read_mesh(entry.path);
     const auto known = kRefused.find(entry.name);
     if (!file) {
+      if (file.error().code == ErrorCode::kUsage) continue;  // a build without libzip or pugixml
       EXPECT_EQ(file.error().code, ErrorCode::kInput);
       ASSERT_NE(known, kRefused.end()) << file.error().message;
       EXPECT_NE(file.error().message.find(known->second), std::string::npos)

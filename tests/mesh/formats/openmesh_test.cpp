@@ -168,6 +168,7 @@ TEST(OpenMeshReader, AgreesWithOursOnPublicFilesButForKnownDifferences) {
     SCOPED_TRACE(entry.name);
     const auto own = read_mesh(entry.path);
     if (!own) continue;  // mesh_corpus_test.cpp lists these
+    if (own->stats.format == "3mf" || own->stats.format == "amf") continue;
     const auto other = read_with_openmesh(entry.path);
     const long triangles = other ? static_cast<long>(other->stats.triangles) : -1;
     if (const auto known = kKnown.find(entry.name); known != kKnown.end()) {

@@ -151,7 +151,8 @@ TEST_F(ReadMesh, FormatMayBeNamed) {
   options.format = MeshFormat::kOff;
   EXPECT_TRUE(read_mesh(path, options).has_value());
   EXPECT_EQ(mesh_format_named("PLY"), MeshFormat::kPly);
-  EXPECT_EQ(mesh_format_named("3mf"), MeshFormat::kAuto);
+  EXPECT_EQ(mesh_format_named("3mf"), MeshFormat::k3mf);
+  EXPECT_EQ(mesh_format_named("step"), MeshFormat::kAuto);
   EXPECT_EQ(mesh_format_of("folder.obj/file"), MeshFormat::kAuto);
 }
 
@@ -258,8 +259,33 @@ TEST_F(ReadMesh, WriteThenReadGivesTheSameMesh) {
   }
 }
 
+TEST_F(ReadMesh, ArchivesAreReadFromFilesOnly) {
+  const std::string path =
+      write("a.amf",
+            "<?xml version=\"1.0\"?>\n<amf><object id=\"1\"><mesh><vertices>"
+            "<vertex><coordinates><x>0</x><y>0</y><z>0</z></coordinates></vertex>"
+            "<vertex><coordinates><x>1</x><y>0</y><z>0</z></coordinates></vertex>"
+            "<vertex><coordinates><x>0</x><y>1</y><z>0</z></coordinates></vertex>"
+            "</vertices><volume><triangle><v1>0</v1><v2>1</v2><v3>2</v3>"
+            "</triangle></volume></mesh></object></amf>");
+  const auto file = read_mesh(path);
+  if (!file && file.error().code == ErrorCode::kUsage) GTEST_SKIP() << file.error().message;
+  ASSERT_TRUE(file.has_value()) << file.error().message;
+  EXPECT_EQ(file->soup.triangles.size(), 1u);
+  EXPECT_EQ(file->stats.format, "amf");
+  EXPECT_EQ(file->stats.triangles, 1u);
+  EXPECT_EQ(file->stats.bytes, std::filesystem::file_size(path));
+  EXPECT_EQ(read_mesh(write("b.3mf", "no archive")).error().code, ErrorCode::kInput);
+  MeshReadOptions options;
+  options.format = MeshFormat::k3mf;
+  EXPECT_EQ(read_mesh("-", options).error().message, "standard input: 3mf is read from files only");
+  EXPECT_EQ(parse_mesh("PK", "bytes", options).error().message,
+            "bytes: 3mf is read from files only");
+}
+
 TEST_F(ReadMesh, WritingSaysWhyItCannot) {
   EXPECT_EQ(write_mesh(folder_ / "a.xyz", ball()).error().code, ErrorCode::kUsage);
+  EXPECT_EQ(write_mesh(folder_ / "a.3mf", ball()).error().code, ErrorCode::kUsage);
   EXPECT_EQ(write_mesh(folder_ / "none" / "a.obj", ball()).error().code, ErrorCode::kOutput);
 }
 
