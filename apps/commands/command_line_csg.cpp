@@ -156,8 +156,8 @@ void define_csg(CLI::App& app, Words& words) {
          output);
   add_json(app, words, output);
   option("--measure", csg.measure,
-         "Voxels along each side of the box that is measured, 1 to 32768 (default: 256, and up to "
-         "1024 where the error of the volume is large)",
+         "Measure by rays, with N voxels along each side of the box, 1 to 32768 (default: exactly; "
+         "where a solid is not closed, 256, and up to 1024 where the error of the volume is large)",
          "N", output);
   define_picture_camera(app, csg);
   define_look(app, words);

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <optional>
 #include <utility>
@@ -170,6 +171,7 @@ class CsgRun {
   Result<void> draw();
   Result<void> check_covered();
   Result<void> draw_numbers();
+  Result<void> measure_tree(const csg::Tree& tree, csg::Tree::NodeId root);
   Result<void> measure();
   Result<void> write();
   Result<void> report();
@@ -242,10 +244,7 @@ Result<void> CsgRun::place_camera() {
 /// The report of a run that makes no picture.
 Result<void> CsgRun::print_measures() {
   csg::cut_scene(scene_, command_.cuts, camera());
-  auto measures = csg::measure(scene_.tree, scene_.tree.root(), measure_options(),
-                               session_.execution("measuring", 1.0));
-  if (!measures) return tl::unexpected(with_limit(std::move(measures.error()), session_));
-  outcome_.measures = *measures;
+  if (auto done = measure_tree(scene_.tree, scene_.tree.root()); !done) return done;
   session_.end_progress();
   return print_report(csg_text(command_, outcome_), "-", false);
 }
@@ -317,13 +316,35 @@ Result<void> CsgRun::draw_numbers() {
   return {};
 }
 
+/// Measures exactly. By rays where --measure asks for them, and where exact measures cannot be had:
+/// of solids that are not closed or too large.
+Result<void> CsgRun::measure_tree(const csg::Tree& tree, csg::Tree::NodeId root) {
+  if (command_.measure_resolution) {
+    outcome_.why_not_exact = "--measure is given";
+  } else {
+    csg::BoundaryOptions options;
+    options.open = csg::OpenSolids::kFail;
+    auto exact = csg::exact_measures(tree, root, options, session_.execution("measuring"));
+    if (exact && std::isfinite(exact->volume) && std::isfinite(exact->area)) {
+      outcome_.exact = *std::move(exact);
+      return {};
+    }
+    if (!exact && exact.error().code != ErrorCode::kGeometry &&
+        exact.error().code != ErrorCode::kLimit) {
+      return tl::unexpected(exact.error());
+    }
+    outcome_.why_not_exact = exact ? "the volume is too large for a double" : exact.error().message;
+  }
+  auto measured = csg::measure(tree, root, measure_options(), session_.execution("measuring", 1.0));
+  if (!measured) return tl::unexpected(with_limit(std::move(measured.error()), session_));
+  outcome_.measures = *measured;
+  return {};
+}
+
 Result<void> CsgRun::measure() {
   if (!measures()) return {};
   const double begin = session_.milliseconds();
-  auto measured =
-      csg::measure(preview_->tree(), result_, measure_options(), session_.execution("measuring"));
-  if (!measured) return tl::unexpected(measured.error());
-  outcome_.measures = *measured;
+  if (auto done = measure_tree(preview_->tree(), result_); !done) return done;
   outcome_.measure_ms = session_.milliseconds() - begin;
   return {};
 }

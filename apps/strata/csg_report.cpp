@@ -23,8 +23,22 @@ std::string csg_text(const CsgCommand& command, const CsgOutcome& outcome) {
   line("scene", fmt::format("{} in {}, {}{}", counted(outcome.solids, "solid"),
                             counted(outcome.nodes, "node"), counted(outcome.triangles, "triangle"),
                             outcome.flat ? "; flat, as slabs of thickness 1" : ""));
-  if (!outcome.measures || outcome.measures->empty) {
-    line("result", "empty, or smaller than a voxel of the measuring grid");
+  const bool empty =
+      outcome.exact ? outcome.exact->empty : !outcome.measures || outcome.measures->empty;
+  if (empty) {
+    line("result",
+         outcome.exact ? "empty" : "empty, or smaller than a voxel of the measuring grid");
+    return text;
+  }
+  if (outcome.exact) {
+    const csg::ExactMeasures& m = *outcome.exact;
+    line("bounds", fmt::format("{} to {}", triple(m.low), triple(m.high)));
+    line("volume",
+         fmt::format("{:.12g}, exact after moving vertices to a lattice, which changes it "
+                     "by at most {:.2g}",
+                     m.volume, m.volume_snap_error));
+    line("area", fmt::format("{:.12g}", m.area));
+    line("centre of mass", triple(m.centre));
     return text;
   }
   const csg::Measures& m = *outcome.measures;
@@ -33,6 +47,7 @@ std::string csg_text(const CsgCommand& command, const CsgOutcome& outcome) {
   line("volume", fmt::format("{:.6g}, error at most {:.2g}", m.volume, m.volume_error));
   line("area", fmt::format("{:.6g}, error about {:.2g}", m.area, m.area_error));
   line("centre of mass", triple(m.centre));
+  line("measured", fmt::format("by rays, not exactly: {}", printable(outcome.why_not_exact)));
   return text;
 }
 
@@ -73,20 +88,47 @@ void write_picture(JsonWriter& json, const CsgCommand& command, const csg::DrawR
   json.end_object();
 }
 
-void write_measures(JsonWriter& json, const csg::Measures& m) {
+void write_measures(JsonWriter& json, const csg::Measures& m, const std::string& why_not_exact) {
   json.key("result").begin_object();
+  json.member("exact", false);
+  json.member("why_not_exact", why_not_exact);
   json.member("empty", m.empty);
   json.member("resolution", m.resolution);
+  json.key("lattice_step").null();
   json.member("volume", m.volume);
   json.member("volume_error", m.volume_error);
   json.member("area", m.area);
   json.member("area_error", m.area_error);
   json.member("centre_of_mass", m.centre);
+  json.key("inertia").null();
   json.member("low", m.low);
   json.member("high", m.high);
   json.member("bounds_error", m.bounds_error);
   json.member("crossings", m.result_crossings);
   json.member("max_depth_complexity", m.max_depth_complexity);
+  json.end_object();
+}
+
+void write_exact(JsonWriter& json, const csg::ExactMeasures& m) {
+  json.key("result").begin_object();
+  json.member("exact", true);
+  json.key("why_not_exact").null();
+  json.member("empty", m.empty);
+  json.key("resolution").null();
+  json.member("lattice_step", m.report.step);
+  json.member("volume", m.volume);
+  json.member("volume_error", m.volume_snap_error);
+  json.member("area", m.area);
+  json.member("area_error", m.area_error);
+  json.member("centre_of_mass", m.centre);
+  json.key("inertia").begin_array();
+  for (const double moment : m.inertia) json.value(moment);
+  json.end_array();
+  json.member("low", m.low);
+  json.member("high", m.high);
+  json.member("bounds_error", m.empty ? 0.0 : 0.5 * m.report.step);
+  json.key("crossings").null();
+  json.key("max_depth_complexity").null();
   json.end_object();
 }
 
@@ -111,7 +153,8 @@ std::string csg_json(const CsgCommand& command, const CsgOutcome& outcome, const
   write_scene(json, outcome);
   write_camera(json, outcome.camera);
   write_picture(json, command, outcome.drawn);
-  if (outcome.measures) write_measures(json, *outcome.measures);
+  if (outcome.exact) write_exact(json, *outcome.exact);
+  if (outcome.measures) write_measures(json, *outcome.measures, outcome.why_not_exact);
   if (!command.ids.empty()) write_seen_ids(json, outcome);
   write_timings(json, session,
                 {{"read", outcome.read_ms},

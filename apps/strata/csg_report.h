@@ -8,6 +8,7 @@
 #include "apps/commands/commands.h"
 #include "apps/session/json_writer.h"
 #include "apps/session/session.h"
+#include "strata/csg/boundary/boundary_mesh.h"
 #include "strata/csg/measure/measure.h"
 #include "strata/csg/picture/picture.h"
 
@@ -19,9 +20,12 @@ struct CsgOutcome {
   bool flat = false;
   Camera camera;
   csg::DrawReport drawn;
-  std::optional<csg::Measures> measures;  ///< with --json
-  std::vector<std::uint32_t> seen;        ///< solids in the picture of --ids, increasing
-  std::vector<std::string> names;         ///< of those
+  /// With --json or --summary one of the two.
+  std::optional<csg::ExactMeasures> exact;
+  std::optional<csg::Measures> measures;
+  std::string why_not_exact;        ///< a sentence, with `measures`
+  std::vector<std::uint32_t> seen;  ///< solids in the picture of --ids, increasing
+  std::vector<std::string> names;   ///< of those
   double read_ms = 0, prepare_ms = 0, draw_ms = 0, write_ms = 0, measure_ms = 0;
 };
 

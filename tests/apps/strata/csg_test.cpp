@@ -284,7 +284,7 @@ TEST_F(Csg, FilesThatAreNoScenesAreSaidToBeWhatTheyAre) {
   EXPECT_EQ(info.exit_code, 0) << info.err;
   EXPECT_TRUE(has(info.out, "volume       1000, error at most")) << info.out;
   for (const char* command : {"voxelize", "ldi", "info"}) {
-    EXPECT_TRUE(has(place.run({command, "--help"}).out, "scenes (.csg .scad)")) << command;
+    EXPECT_TRUE(has(place.run({command, "--help"}).out, "(.csg .scad)")) << command;
   }
 }
 
@@ -466,6 +466,49 @@ TEST_F(Csg, DepthIsAnOpenExrFileOrRefused) {
   ASSERT_EQ(run.exit_code, 0) << run.err;
   EXPECT_EQ(place.read("z.exr").substr(0, 4), "\x76\x2f\x31\x01");
   EXPECT_EQ(place.run({"csg", "scene.csg", "--depth", "-"}).exit_code, 2);
+}
+
+TEST_F(Csg, MeasuresAreExactWhereAllSolidsAreClosed) {
+  place.write("scene.csg", kDrilled);
+  const RunResult run = place.run({"csg", "scene.csg", "--json", "--size=8,8"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const json result = json::parse(run.out)["result"];
+  EXPECT_EQ(result["exact"], true);
+  EXPECT_TRUE(result["why_not_exact"].is_null());
+  EXPECT_EQ(result["volume"], 1000 - 160);
+  EXPECT_LT(result["volume_error"], 1e-3);
+  EXPECT_EQ(result["area"], 600 - 2 * 16 + 4 * 40);
+  EXPECT_EQ(result["centre_of_mass"], (std::array{0.0, 0.0, 0.0}));
+  EXPECT_EQ(result["low"], (std::array{-5.0, -5.0, -5.0}));
+  EXPECT_EQ(result["high"], (std::array{5.0, 5.0, 5.0}));
+  // A box of mass m and sides a, b, c has m (b b + c c) / 12 about its axis along a.
+  const double across = 1000 * 200 / 12.0 - 160 * 116 / 12.0;
+  const double along = 1000 * 200 / 12.0 - 160 * 32 / 12.0;
+  const double expected[] = {across, across, along, 0, 0, 0};
+  for (std::size_t i = 0; i < 6; ++i) {
+    EXPECT_DOUBLE_EQ(result["inertia"][i].get<double>(), expected[i]) << i;
+  }
+  EXPECT_TRUE(has(place.run({"csg", "scene.csg"}).out, "volume           840, exact"));
+}
+
+TEST_F(Csg, MeasuresByRaysSayWhyTheyAreNotExact) {
+  place.write("scene.csg", kDrilled);
+  RunResult run = place.run({"csg", "scene.csg", "--json", "--size=8,8", "--measure=64"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  json result = json::parse(run.out)["result"];
+  EXPECT_EQ(result["exact"], false);
+  EXPECT_EQ(result["why_not_exact"], "--measure is given");
+  EXPECT_EQ(result["resolution"], 64);
+  EXPECT_NEAR(result["volume"].get<double>(), 840, result["volume_error"].get<double>());
+  TriangleSoup open = make_box({0, 0, 0}, {10, 10, 10});
+  open.triangles.pop_back();
+  put(place, "open.off", open);
+  run = place.run({"csg", "open.off", "--json", "--size=8,8"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  result = json::parse(run.out)["result"];
+  EXPECT_EQ(result["exact"], false);
+  EXPECT_TRUE(has(result["why_not_exact"].get<std::string>(), "open.off")) << result;
+  EXPECT_TRUE(has(place.run({"csg", "open.off"}).out, "by rays, not exactly: "));
 }
 
 TEST_F(Csg, TheDocumentationNamesExactlyWhatJsonPrints) {

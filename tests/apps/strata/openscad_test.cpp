@@ -75,7 +75,7 @@ TEST_F(Openscad, WithoutAnOutputTheReportIsPrinted) {
   const RunResult run = place.run({"csg", "part.csg"});
   EXPECT_EQ(run.exit_code, 0) << run.err;
   EXPECT_EQ(run.err, "");
-  EXPECT_NE(run.out.find("volume           1000, error at most"), std::string::npos) << run.out;
+  EXPECT_NE(run.out.find("volume           1000, exact"), std::string::npos) << run.out;
   EXPECT_EQ(place.run({"part.csg", "--summary"}).out, run.out);
   EXPECT_EQ(place.run({"part.csg", "--summary=all", "-o", "a.png"}).out, run.out);
   EXPECT_TRUE(place.has("a.png"));
