@@ -52,7 +52,8 @@ void define(CLI::App& app, Words& words, ViewOptions& options) {
     app.add_flag(names, target, what)->group(group);
   };
   const char* input = "Input";
-  app.add_option("INPUT", words.files, "Scenes (.csg .scad) and meshes (.obj .stl .ply .off .3mf .amf)")
+  app.add_option("INPUT", words.files,
+                 "Scenes (.csg .scad) and meshes (.obj .stl .ply .off .3mf .amf)")
       ->type_name("")
       ->group(input);
   option("--expr", csg.expression,
