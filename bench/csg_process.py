@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 """Whole processes, from a .csg to a picture of 1024 x 1024: `strata csg` in pairs with `openscad`, its preview
 and its render. Medians of wall time. A display is needed (xvfb-run does), and the programs openscad and strata.
+With --stl to a mesh instead: `strata mesh` against `openscad -o x.stl`, without a display.
 
-usage: csg_process.py STRATA FOLDER... [--rounds N] [--render-limit SECONDS] [--csv FILE]
+usage: csg_process.py STRATA FOLDER... [--stl] [--rounds N] [--render-limit SECONDS] [--csv FILE]
 """
 
 import argparse
@@ -36,6 +37,30 @@ def cell(value, limit):
     return "fails" if value is None else f"> {limit * 1e3:.0f}" if value == float("inf") else f"{value * 1e3:.0f}"
 
 
+def stl_rows(options, scenes):
+    """Rows of whole processes to STL, and the ratios of scenes of which both make one."""
+    rows, ratios = [], []
+    with tempfile.TemporaryDirectory(prefix="strata_bench_") as folder:
+        mesh = os.path.join(folder, "a.stl")
+        for scene in scenes:
+            ours, theirs = [], []
+            for _ in range(options.rounds + 1):
+                ours.append(seconds([options.strata, "mesh", str(scene), "-o", mesh], options.limit))
+                # One slow render is enough; it does not become faster than its limit.
+                if not theirs or (theirs[-1] is not None and theirs[-1] < 5):
+                    theirs.append(seconds(["openscad", "-o", mesh, str(scene)], options.render_limit))
+            mine = None if None in ours else statistics.median(ours[1:])  # the first warms the disk
+            other = None if None in theirs else statistics.median(theirs[1:] or theirs)
+            ratio = "-"
+            if None not in (mine, other) and mine != float("inf"):
+                bound = min(other, options.render_limit)
+                ratios.append(bound / mine)
+                ratio = f"{'> ' if other != bound else ''}{bound / mine:.1f}"
+            rows.append([scene.stem, cell(mine, options.limit), cell(other, options.render_limit), ratio])
+            print("| " + " | ".join(rows[-1]) + " |", flush=True)
+    return rows, ratios
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("strata")
@@ -43,12 +68,21 @@ def main():
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--render-limit", type=float, default=20, help="seconds; 0: no render")
     parser.add_argument("--limit", type=float, default=10, help="seconds for strata and for a preview")
+    parser.add_argument("--stl", action="store_true", help="meshes instead of pictures")
     parser.add_argument("--csv")
     options = parser.parse_args()
+    scenes = sorted(path for folder in options.folders for path in pathlib.Path(folder).rglob("*.csg"))
+    if options.stl:
+        rows, ratios = stl_rows(options, scenes)
+        if options.csv:
+            tables.save(options.csv, ["scene", "strata ms", "openscad ms", "openscad / strata"], rows)
+        if ratios:
+            print(f"{len(rows)} scenes, {len(ratios)} by both; openscad / strata at least {min(ratios):.1f}, "
+                  f"median {statistics.median(ratios):.1f}")
+        return
     if "DISPLAY" not in os.environ:
         sys.exit("csg_process: openscad needs a display: xvfb-run -s '-screen 0 1280x1024x24' " + sys.argv[0])
 
-    scenes = sorted(path for folder in options.folders for path in pathlib.Path(folder).rglob("*.csg"))
     columns = ["scene", "strata ms", "preview ms", "render ms", "preview / strata", "render / strata"]
     rows, previews, renders = [], [], []
     with tempfile.TemporaryDirectory(prefix="strata_bench_") as folder:

@@ -153,7 +153,7 @@ class Goals:
 
 def sections(folder):
     result = {}
-    for name in ("machine", "stores"):
+    for name in ("machine", "stores", "boundary_machine"):
         path = os.path.join(folder, name + ".md")
         if os.path.exists(path):
             with open(path) as file:
@@ -162,7 +162,8 @@ def sections(folder):
     if voxelizers:
         result["goals"] = Goals(folder).collect()
         result["voxelizers"] = voxelizers_section(voxelizers)
-    for name in ("growth", "reading", "whole_process", "csg_frames", "csg_laws", "csg_process"):
+    for name in ("growth", "reading", "whole_process", "csg_frames", "csg_laws", "csg_process", "boundary", "boundary_laws",
+                 "boundary_process"):
         rows = load(folder, name)
         if rows:
             result[name] = all_columns(rows)
