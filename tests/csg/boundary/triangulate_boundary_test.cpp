@@ -163,6 +163,100 @@ testing::AssertionResult is_clean_mesh(const TriangulatedBoundary& mesh) {
   return testing::AssertionSuccess();
 }
 
+// A double cone over a polygon of lattice points: two vertices with `corners` triangles each.
+BoundaryFaces double_cone(std::uint32_t corners, std::vector<exact::LatticePoint>& vertices) {
+  const auto base = static_cast<std::uint32_t>(vertices.size());
+  for (std::uint32_t i = 0; i < corners; ++i) {
+    const double angle = 6.283185307179586 * i / corners;
+    vertices.emplace_back(std::llround(1e6 * std::cos(angle)), std::llround(1e6 * std::sin(angle)),
+                          0);
+  }
+  vertices.emplace_back(0, 0, 1000000);
+  vertices.emplace_back(0, 0, -1000000);
+  BoundaryFaces faces;
+  for (std::uint32_t i = 0; i < corners; ++i) {
+    const std::uint32_t a = base + i, b = base + (i + 1) % corners;
+    faces.wholes.push_back({{a, b, base + corners}, 1});
+    faces.wholes.push_back({{b, a, base + corners + 1}, 2});
+  }
+  return faces;
+}
+
+TEST(TriangulateBoundary, WholeTrianglesAreTakenAsTheyAre) {
+  std::vector<exact::LatticePoint> vertices;
+  BoundaryFaces faces = double_cone(1000, vertices);
+  faces.points = BoundaryPoints(vertices, {});
+  const TriangulatedBoundary mesh = triangulated(faces);
+  EXPECT_EQ(mesh.triangles.size(), 2000u);
+  EXPECT_EQ(mesh.points.size(), 1002u);
+  EXPECT_EQ(mesh.shells, 1u);
+  EXPECT_EQ(std::accumulate(mesh.labels.begin(), mesh.labels.end(), 0u), 3000u);
+  EXPECT_TRUE(is_manifold(mesh));
+  EXPECT_TRUE(in_canonical_order(mesh));
+  std::mt19937 random(1);
+  EXPECT_TRUE(equal(mesh, triangulated(test::shuffled(faces, random), 3)));
+}
+
+TEST(TriangulateBoundary, SolidsThatShareAVertexBecomeShells) {
+  // Ten double cones from one vertex on, along the axis and mirrored.
+  std::vector<exact::LatticePoint> vertices;
+  BoundaryFaces faces = double_cone(100, vertices);
+  for (int i = 1; i < 10; ++i) {
+    const auto base = static_cast<std::uint32_t>(vertices.size());
+    const BoundaryFaces next = double_cone(100, vertices);
+    for (std::size_t v = base; v < vertices.size(); ++v) vertices[v].z += 2000000 * i;
+    for (BoundaryFaces::Whole whole : next.wholes) {
+      for (int k = 0; k < 3; ++k) {  // its lower tip is the upper tip below
+        if (whole.points[k] == base + 101) whole.points[k] = base - 2;
+      }
+      faces.wholes.push_back(whole);
+    }
+  }
+  faces.points = BoundaryPoints(vertices, {});
+  const TriangulatedBoundary mesh = triangulated(faces);
+  EXPECT_EQ(mesh.shells, 10u);
+  EXPECT_EQ(mesh.vertices_split, 9u);
+  EXPECT_EQ(mesh.points.size(), 10 * 102u);
+  EXPECT_TRUE(is_manifold(mesh));
+  EXPECT_TRUE(in_canonical_order(mesh));
+  std::mt19937 random(1);
+  EXPECT_TRUE(equal(mesh, triangulated(test::shuffled(faces, random), 3)));
+}
+
+TEST(TriangulateBoundary, WhereASolidTouchesAFaceTheFaceHasAVertex) {
+  std::mt19937 random(1);
+  PlaneGrid grid(1, 1000, 0, random);
+  grid.set_cells({{0, 0, 0}});
+  BoundaryFaces faces = grid.faces;
+  ASSERT_EQ(faces.planes.size(), 6u);
+  // The first plane is at x = 0.
+  const auto middle = faces.points.add({BoundaryPoints::Kind::kThreePlanes, {0, 0, 0}},
+                                       exact::file_point({0, 300, 400}));
+  const auto outside = faces.points.add({BoundaryPoints::Kind::kThreePlanes, {0, 0, 0}},
+                                        exact::file_point({0, 3000, 400}));
+  const auto corner = faces.edges[faces.planes[0].first_edge].from;
+  faces.touches = {outside, middle, corner, middle};
+  faces.planes[0].touch_count = 4;
+  const TriangulatedBoundary mesh = triangulated(faces);
+  EXPECT_EQ(mesh.triangles.size(), 14u);
+  EXPECT_EQ(mesh.points.size(), 9u);
+  EXPECT_TRUE(is_manifold(mesh));
+  EXPECT_EQ(six_volumes(mesh), cpp_int(6'000'000'000) << 72);
+}
+
+TEST(TriangulateBoundary, StopsOnRequest) {
+  std::mt19937 random(1);
+  PlaneGrid grid(5, 1000, 100, random);
+  grid.set_cells(test::random_cells(5, 0.5, random));
+  std::stop_source source;
+  source.request_stop();
+  Execution execution;
+  execution.stop = source.get_token();
+  const auto mesh = triangulate_boundary(grid.faces, kUnit, false, execution);
+  ASSERT_FALSE(mesh.has_value());
+  EXPECT_EQ(mesh.error().code, ErrorCode::kCancelled);
+}
+
 TEST(TriangulateBoundary, FloatPositionsAreCleanAndExact) {
   for (unsigned seed = 0; seed < 60; ++seed) {
     SCOPED_TRACE(seed);
