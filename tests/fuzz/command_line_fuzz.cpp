@@ -32,6 +32,14 @@ void check(const VoxelizeCommand& command) {
   must(command.list_formats || !command.input.files.empty(), "there is an input");
 }
 
+void check(const MeshCommand& command) {
+  check(command.common);
+  must(!command.input.files.empty(), "there is an input");
+  must(command.json || !command.output.empty(), "something comes out");
+  must(command.output.empty() == (command.format == SolidFormat::kAuto), "an output has a format");
+  must(command.boundary.bits >= 10 && command.boundary.bits <= 28, "bits are in range");
+}
+
 void check(const InfoCommand& command) { check(command.common); }
 
 void check(const LdiCommand& command) {
