@@ -1,6 +1,7 @@
 #include "mesh/check/triangles_meet.h"
 
 #include <algorithm>
+#include <cmath>
 #include <tuple>
 
 #include "exact/flat_predicates.h"
@@ -21,6 +22,9 @@ enum class Extent : std::uint8_t { kEmpty, kPoint, kSegment };
 bool before(const FilePoint& p, const FilePoint& q) {
   return std::tie(p.x, p.y, p.z) < std::tie(q.x, q.y, q.z);
 }
+
+// As seen along an axis.
+FlatPoint without(const FilePoint& p, int axis) { return {p[(axis + 1) % 3], p[(axis + 2) % 3]}; }
 
 // The signs of the heights of a triangle's vertices over a plane.
 struct Sides {
@@ -61,14 +65,6 @@ Sides quick_sides(const TriangleCorners& t, const Common& common, const Triangle
   return result;
 }
 
-void complete(const TriangleCorners& t, const Common& common, const TriangleCorners& plane,
-              Sides& sides) {
-  for (std::size_t i = 0; i < 3; ++i) {
-    if (common.is_common[i] || sides.sign[i] != 0) continue;
-    sides.sign[i] = exact::sign_of(exact::orient3d_value(plane[0], plane[1], plane[2], t[i]));
-  }
-}
-
 Meeting shared(int positions) {
   return positions == 0   ? Meeting::kDisjoint
          : positions == 1 ? Meeting::kSharedVertex
@@ -82,6 +78,47 @@ bool settled(const Sides& side, const Common& common) {
     if (side.sign[i] == 0 && !common.is_common[i]) return false;
   }
   return true;
+}
+
+// The axis along which a triangle has its largest shadow, nearly.
+int widest_axis(const TriangleCorners& t) {
+  using exact::filters::RealNormal;
+  const exact::filters::BoundedCross n =
+      exact::filters::cross(RealNormal(t[1] - t[0]), RealNormal(t[2] - t[0]));
+  const double x = std::abs(n.x.value), y = std::abs(n.y.value), z = std::abs(n.z.value);
+  return x >= y ? (x >= z ? 0 : 2) : (y >= z ? 1 : 2);
+}
+
+// For pairs in one plane, or nearly. Seen along an axis, the line of an edge of `t` has `t` on one
+// side and `other` on the other one, but for vertices that are ends of the edge: so does a plane
+// through the edge.
+bool quickly_apart(const TriangleCorners& t, const TriangleCorners& other, const Common& common) {
+  using Real = glm::vec<2, double, glm::defaultp>;
+  const int axis = widest_axis(t);
+  const auto turn = [axis](const FilePoint& p, const FilePoint& q, const FilePoint& r) {
+    const Real u(without(q - p, axis)), v(without(r - p, axis));
+    return exact::filters::minor(u.x, u.y, v.x, v.y).sign();
+  };
+  const int inside = turn(t[0], t[1], t[2]);
+  if (inside == 0) return false;
+  const auto apart = [&](const FilePoint& p, const FilePoint& q) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (common.is_common[k] ? other[k] != p && other[k] != q
+                              : inside * turn(p, q, other[k]) >= 0) {
+        return false;
+      }
+    }
+    return common.positions < 3;
+  };
+  return apart(t[0], t[1]) || apart(t[1], t[2]) || apart(t[2], t[0]);
+}
+
+void complete(const TriangleCorners& t, const Common& common, const TriangleCorners& plane,
+              Sides& sides) {
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (common.is_common[i] || sides.sign[i] != 0) continue;
+    sides.sign[i] = exact::sign_of(exact::orient3d_value(plane[0], plane[1], plane[2], t[i]));
+  }
 }
 
 // The shared points are known to be a point or a segment, and a segment that has two common
@@ -133,8 +170,6 @@ Meeting in_two_planes(const TriangleCorners& a, const Sides& side_a, const Trian
 }
 
 // --- one plane -------------------------------------------------------------------------------
-
-FlatPoint without(const FilePoint& p, int axis) { return {p[(axis + 1) % 3], p[(axis + 2) % 3]}; }
 
 // An axis along which three points are seen with an area, -1 if they are on one line.
 int axis_of(const FilePoint& a, const FilePoint& b, const FilePoint& c) {
@@ -328,6 +363,10 @@ Meeting triangles_meet(const TriangleCorners& a, const TriangleCorners& b) {
   if (settled(side_a, common_a)) return shared(common_a.positions);
   Sides side_b = quick_sides(b, common_b, a);
   if (settled(side_b, common_b)) return shared(common_b.positions);
+  if (exact::kFilters && side_a.on() == 3 &&
+      (quickly_apart(a, b, common_b) || quickly_apart(b, a, common_a))) {
+    return shared(common_a.positions);
+  }
   complete(a, common_a, b, side_a);
   if (settled(side_a, common_a)) return shared(common_a.positions);
   complete(b, common_b, a, side_b);
