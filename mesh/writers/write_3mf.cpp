@@ -158,6 +158,18 @@ Palette palette_of(const SolidMesh& mesh) {
   return palette;
 }
 
+/// The extruder of each colour, as PrusaSlicer marks triangles that were painted: its splits of a
+/// triangle, of which there are none, and the number of the extruder in hexadecimal digits, the
+/// lowest first. Empty: one colour, or more than it has extruders.
+std::string painted(const Palette& palette, std::uint32_t part) {
+  constexpr std::size_t kMostExtruders = 16;
+  if (palette.colours.size() < 2 || palette.colours.size() > kMostExtruders) return "";
+  const std::uint32_t extruder = palette.colour_of[part] + 1;
+  return fmt::format(" slic3rpe:mmu_segmentation=\"{}\"", extruder < 3
+                                                              ? fmt::format("{}", 4 * extruder)
+                                                              : fmt::format("{:X}C", extruder - 3));
+}
+
 constexpr int kPalette = 1;      ///< id of the group of colours
 constexpr int kFirstObject = 2;  ///< ids of objects follow
 
@@ -171,7 +183,8 @@ std::string model_head(const Palette& palette, LengthUnit unit) {
       kUnits[static_cast<std::size_t>(unit)],
       palette.colours.empty()
           ? ""
-          : " xmlns:m=\"http://schemas.microsoft.com/3dmanufacturing/material/2015/02\"");
+          : " xmlns:m=\"http://schemas.microsoft.com/3dmanufacturing/material/2015/02\" "
+            "xmlns:slic3rpe=\"http://schemas.slic3r.org/3mf/2017/06\"");
   if (palette.colours.empty()) return text;
   text += fmt::format("<m:colorgroup id=\"{}\">\n", kPalette);
   for (const Colour& c : palette.colours) {
@@ -203,8 +216,12 @@ void add_object(Blocks& blocks, const SolidMesh& mesh, const Object& object, int
              });
   add_text(blocks, "</vertices>\n<triangles>\n");
   std::vector<std::string> ends(mesh.parts.size(), "\"/>\n");  // of a triangle, for each part
-  for (std::size_t part = 0; object.mixed && part < palette.colour_of.size(); ++part) {
-    ends[part] = fmt::format("\" pid=\"{}\" p1=\"{}\"/>\n", kPalette, palette.colour_of[part]);
+  for (std::uint32_t part = 0; part < palette.colour_of.size(); ++part) {
+    ends[part] = "\"";
+    if (object.mixed) {
+      ends[part] += fmt::format(" pid=\"{}\" p1=\"{}\"", kPalette, palette.colour_of[part]);
+    }
+    ends[part] += painted(palette, part) + "/>\n";
   }
   const auto shared = std::make_shared<const std::vector<std::string>>(std::move(ends));
   add_ranges(

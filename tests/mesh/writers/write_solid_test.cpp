@@ -301,8 +301,12 @@ TEST_F(ThreeMfWriter, AnObjectIsAClosedPartAndTheOtherPartsAreOne) {
   EXPECT_NE(text.find("<m:color color=\"#FF0000FF\"/>"), std::string::npos);
   EXPECT_NE(text.find("<m:color color=\"#00800040\"/>"), std::string::npos);
   EXPECT_NE(text.find("<m:color color=\"#F9D72CFF\"/>"), std::string::npos) << "no colour given";
-  EXPECT_EQ(count(text, "\" pid=\"1\" p1=\"2\"/>"), 6u);
-  EXPECT_EQ(count(text, "\" pid=\"1\" p1=\"3\"/>"), 6u);
+  EXPECT_EQ(count(text, " p1=\"2\" "), 6u);
+  EXPECT_EQ(count(text, " p1=\"3\" "), 6u);
+  EXPECT_EQ(count(text, "slic3rpe:mmu_segmentation=\"4\"/>"), 80u) << "the first colour";
+  EXPECT_EQ(count(text, "slic3rpe:mmu_segmentation=\"8\"/>"), 12u) << "the second";
+  EXPECT_EQ(count(text, "slic3rpe:mmu_segmentation=\"0C\"/>"), 6u) << "the third";
+  EXPECT_EQ(count(text, "slic3rpe:mmu_segmentation=\"1C\"/>"), 6u) << "the fourth";
   EXPECT_EQ(count(text, "<vertex "), 42u + 8u + 8u) << "an object has its own vertices only";
 }
 
