@@ -135,7 +135,8 @@ void StripFinder::find_runs(int axis, std::size_t way) {
 }
 
 void StripFinder::add_strip(const BlockNeighbours& blocks, const Strip& strip) const {
-  blocks.own().strips.push_back(strip);
+  CellBlock& own = blocks.own();
+  own.strips.push_back(strip);
   const LocalPlace begin = low_corner(strip);
   for (int w = 0; w <= strip.width; ++w) {
     for (int n = 0; n <= strip.length; ++n) {
@@ -146,10 +147,14 @@ void StripFinder::add_strip(const BlockNeighbours& blocks, const Strip& strip) c
       }
       if (side && end) continue;  // a corner is needed
       LocalPlace at = moved(moved(begin, strip.along, n), across(strip), w);
-      CellBlock& block = blocks.changeable(at);
       const auto edges = static_cast<std::uint8_t>(side || end ? 2 : 4);  // that meet here
-      // Other threads may do so at the same time.
-      std::atomic_ref(block.strip_uses[block.cell(at)]).fetch_add(edges, std::memory_order_relaxed);
+      CellBlock& block = blocks.changeable(at);
+      std::uint8_t& uses = block.strip_uses[block.cell(at)];
+      if (&block == &own && std::max({at.i, at.j, at.k}) < kBlockSide - 1) {
+        uses = static_cast<std::uint8_t>(uses + edges);
+      } else {  // threads of other blocks may do so at the same time
+        std::atomic_ref(uses).fetch_add(edges, std::memory_order_relaxed);
+      }
     }
   }
 }
