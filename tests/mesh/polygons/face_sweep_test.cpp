@@ -129,7 +129,8 @@ Triangles checked(const Region& region, bool outline_only = false) {
 template <class Place>
 Region cells_outline(int size, const std::set<std::pair<int, int>>& cells, const Place& place) {
   Region region;
-  for (const auto& [x, y] : cells) {
+  for (const auto& cell : cells) {
+    const int x = cell.first, y = cell.second;
     const auto add = [&](int dx, int dy, int x0, int y0, int x1, int y1) {
       if (cells.count({x + dx, y + dy}) == 0) {
         region.edges.emplace_back(place(x + x0, y + y0), place(x + x1, y + y1));
