@@ -13,7 +13,29 @@ namespace strata::detail {
 static_assert(std::endian::native == std::endian::little, "add_bytes() copies numbers");
 
 void add_text(Blocks& blocks, std::string text) {
-  blocks.push_back([text = std::move(text)](std::string& out) { out += text; });
+  constexpr std::size_t kElementBytes = 32;
+  const std::size_t elements = text.size() / kElementBytes;
+  blocks.push_back({[text = std::move(text)](std::string& out) { out += text; }, elements});
+}
+
+Blocks joined(Blocks blocks) {
+  Blocks result;
+  for (std::size_t first = 0, last = 0; first < blocks.size(); first = last) {
+    std::size_t elements = 0;
+    do elements += blocks[last++].elements;
+    while (last < blocks.size() && elements + blocks[last].elements <= kBlockElements);
+    if (last == first + 1) {
+      result.push_back(std::move(blocks[first]));
+      continue;
+    }
+    std::vector<MakeBlock> makes;
+    for (std::size_t i = first; i < last; ++i) makes.push_back(std::move(blocks[i].make));
+    const auto all = [makes = std::move(makes)](std::string& out) {
+      for (const MakeBlock& make : makes) make(out);
+    };
+    result.push_back({all, elements});
+  }
+  return result;
 }
 
 Result<void> make_in_order(const Blocks& blocks, const Execution& execution,
@@ -24,7 +46,7 @@ Result<void> make_in_order(const Blocks& blocks, const Execution& execution,
     const std::size_t count = std::min(made.size(), blocks.size() - first);
     parallel_for(execution, count, [&](std::size_t i, int) {
       made[i].clear();
-      blocks[first + i](made[i]);
+      blocks[first + i].make(made[i]);
     });
     for (std::size_t i = 0; i < count; ++i) {
       if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
@@ -37,8 +59,8 @@ Result<void> make_in_order(const Blocks& blocks, const Execution& execution,
   return {};
 }
 
-Result<void> write_blocks(const std::string& path, const Blocks& blocks,
-                          const Execution& execution) {
+Result<void> write_blocks(const std::string& path, Blocks blocks, const Execution& execution) {
+  blocks = joined(std::move(blocks));
   auto file = AtomicFile::create(path);
   if (!file) return tl::unexpected(file.error());
   auto written = make_in_order(blocks, execution, [&](std::string& bytes) {

@@ -21,7 +21,11 @@ namespace strata::detail {
 
 /// Appends the bytes of a block to `out`. Several threads call blocks at once.
 using MakeBlock = std::function<void(std::string& out)>;
-using Blocks = std::vector<MakeBlock>;
+struct Block {
+  MakeBlock make;
+  std::size_t elements = 0;  ///< vertices or triangles, or as much text
+};
+using Blocks = std::vector<Block>;
 
 /// Adds a block of given bytes.
 void add_text(Blocks& blocks, std::string text);
@@ -31,12 +35,17 @@ template <class Make>
 void add_ranges(Blocks& blocks, std::size_t count, std::size_t per_block, const Make& make) {
   for (std::size_t first = 0; first < count; first += per_block) {
     const std::size_t last = std::min(count, first + per_block);
-    blocks.push_back([make, first, last](std::string& out) { make(first, last, out); });
+    blocks.push_back(
+        {[make, first, last](std::string& out) { make(first, last, out); }, last - first});
   }
 }
 
 /// Elements of a block: about half a megabyte of text.
 inline constexpr std::size_t kBlockElements = 1 << 14;
+
+/// The same bytes in blocks of about kBlockElements: a file of many small parts has many small
+/// blocks.
+[[nodiscard]] Blocks joined(Blocks blocks);
 
 /// Makes the blocks on all threads, some of them at a time, and gives their bytes to `take` in
 /// their order. @return what `take` returns when it fails; kCancelled
@@ -44,8 +53,7 @@ Result<void> make_in_order(const Blocks& blocks, const Execution& execution,
                            const std::function<Result<void>(std::string& bytes)>& take);
 
 /// Writes the blocks to a file, which appears when all is written.
-Result<void> write_blocks(const std::string& path, const Blocks& blocks,
-                          const Execution& execution);
+Result<void> write_blocks(const std::string& path, Blocks blocks, const Execution& execution);
 
 void add_number(std::string& out, double value);          ///< the shortest text that gives it back
 void add_integer(std::string& out, std::uint64_t value);  ///< decimal
@@ -61,6 +69,9 @@ void add_bytes(std::string& out, T value) {
 
 /// Red, green, blue, alpha.
 using Colour = glm::u8vec4;
+inline std::uint32_t packed(const Colour& c) {
+  return std::uint32_t{c.r} << 24 | std::uint32_t{c.g} << 16 | std::uint32_t{c.b} << 8 | c.a;
+}
 
 /// The colour of each part; empty if no part has one.
 std::vector<Colour> part_colours(const SolidMesh& mesh);

@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <cstdint>
 #include <limits>
-#include <memory>
 #include <string>
 #include <string_view>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -150,10 +150,12 @@ struct Palette {
 
 Palette palette_of(const SolidMesh& mesh) {
   Palette palette;
+  std::unordered_map<std::uint32_t, std::uint32_t> places;
   for (const Colour& colour : part_colours(mesh)) {
-    const auto known = std::find(palette.colours.begin(), palette.colours.end(), colour);
-    palette.colour_of.push_back(static_cast<std::uint32_t>(known - palette.colours.begin()));
-    if (known == palette.colours.end()) palette.colours.push_back(colour);
+    const auto [known, is_new] =
+        places.try_emplace(packed(colour), static_cast<std::uint32_t>(palette.colours.size()));
+    palette.colour_of.push_back(known->second);
+    if (is_new) palette.colours.push_back(colour);
   }
   return palette;
 }
@@ -161,10 +163,10 @@ Palette palette_of(const SolidMesh& mesh) {
 /// The extruder of each colour, as PrusaSlicer marks triangles that were painted: its splits of a
 /// triangle, of which there are none, and the number of the extruder in hexadecimal digits, the
 /// lowest first. Empty: one colour, or more than it has extruders.
-std::string painted(const Palette& palette, std::uint32_t part) {
+std::string painted(const Palette& palette, std::uint32_t colour) {
   constexpr std::size_t kMostExtruders = 16;
   if (palette.colours.size() < 2 || palette.colours.size() > kMostExtruders) return "";
-  const std::uint32_t extruder = palette.colour_of[part] + 1;
+  const std::uint32_t extruder = colour + 1;
   return fmt::format(" slic3rpe:mmu_segmentation=\"{}\"", extruder < 3
                                                               ? fmt::format("{}", 4 * extruder)
                                                               : fmt::format("{:X}C", extruder - 3));
@@ -193,8 +195,28 @@ std::string model_head(const Palette& palette, LengthUnit unit) {
   return text + "</m:colorgroup>\n";
 }
 
+/// What stands behind the corners of a triangle, for each colour of the palette.
+class TriangleEnds {
+ public:
+  explicit TriangleEnds(const Palette& palette) : colour_of_(palette.colour_of) {
+    for (std::uint32_t colour = 0; colour < palette.colours.size(); ++colour) {
+      const std::string paint = painted(palette, colour);
+      plain_.push_back(fmt::format("\"{}/>\n", paint));
+      mixed_.push_back(fmt::format("\" pid=\"{}\" p1=\"{}\"{}/>\n", kPalette, colour, paint));
+    }
+  }
+  [[nodiscard]] std::string_view of(const Object& object, std::uint32_t part) const {
+    if (colour_of_.empty()) return "\"/>\n";
+    return (object.mixed ? mixed_ : plain_)[colour_of_[part]];
+  }
+
+ private:
+  const std::vector<std::uint32_t>& colour_of_;
+  std::vector<std::string> plain_, mixed_;
+};
+
 void add_object(Blocks& blocks, const SolidMesh& mesh, const Object& object, int id,
-                const Palette& palette) {
+                const Palette& palette, const TriangleEnds& ends) {
   std::string head = fmt::format("<object id=\"{}\" type=\"model\"", id);
   if (!object.name.empty()) head += fmt::format(" name=\"{}\"", xml(object.name));
   if (!palette.colours.empty()) {
@@ -215,29 +237,19 @@ void add_object(Blocks& blocks, const SolidMesh& mesh, const Object& object, int
                }
              });
   add_text(blocks, "</vertices>\n<triangles>\n");
-  std::vector<std::string> ends(mesh.parts.size(), "\"/>\n");  // of a triangle, for each part
-  for (std::uint32_t part = 0; part < palette.colour_of.size(); ++part) {
-    ends[part] = "\"";
-    if (object.mixed) {
-      ends[part] += fmt::format(" pid=\"{}\" p1=\"{}\"", kPalette, palette.colour_of[part]);
-    }
-    ends[part] += painted(palette, part) + "/>\n";
-  }
-  const auto shared = std::make_shared<const std::vector<std::string>>(std::move(ends));
-  add_ranges(
-      blocks, object.sources.size(), kBlockElements,
-      [&mesh, &object, whole, shared](std::size_t first, std::size_t last, std::string& out) {
-        constexpr const char* kCorners[] = {"<triangle v1=\"", "\" v2=\"", "\" v3=\""};
-        for (std::size_t i = first; i < last; ++i) {
-          const std::uint32_t source = object.sources[i];
-          const glm::uvec3& t = whole ? mesh.triangles[source] : object.triangles[i];
-          for (int k = 0; k < 3; ++k) {
-            out += kCorners[k];
-            add_integer(out, t[k]);
-          }
-          out += (*shared)[part_of(mesh, source)];
-        }
-      });
+  add_ranges(blocks, object.sources.size(), kBlockElements,
+             [&mesh, &object, &ends, whole](std::size_t first, std::size_t last, std::string& out) {
+               constexpr const char* kCorners[] = {"<triangle v1=\"", "\" v2=\"", "\" v3=\""};
+               for (std::size_t i = first; i < last; ++i) {
+                 const std::uint32_t source = object.sources[i];
+                 const glm::uvec3& t = whole ? mesh.triangles[source] : object.triangles[i];
+                 for (int k = 0; k < 3; ++k) {
+                   out += kCorners[k];
+                   add_integer(out, t[k]);
+                 }
+                 out += ends.of(object, part_of(mesh, source));
+               }
+             });
   add_text(blocks, "</triangles>\n</mesh>\n</object>\n");
 }
 
@@ -264,6 +276,7 @@ Result<void> write_solid_3mf(const std::string& path, const SolidMesh& mesh,
   std::vector<Object> objects = objects_of(mesh);
   if (objects.size() > 1) number_vertices(mesh, objects);
   const Palette palette = palette_of(mesh);
+  const TriangleEnds ends(palette);
   std::vector<ZipMember> members(3);
   members[0].name = "[Content_Types].xml";
   add_text(members[0].blocks, kContentTypes);
@@ -273,10 +286,10 @@ Result<void> write_solid_3mf(const std::string& path, const SolidMesh& mesh,
   Blocks& model = members[2].blocks;
   add_text(model, model_head(palette, options.unit));
   for (std::size_t o = 0; o < objects.size(); ++o) {
-    add_object(model, mesh, objects[o], kFirstObject + static_cast<int>(o), palette);
+    add_object(model, mesh, objects[o], kFirstObject + static_cast<int>(o), palette, ends);
   }
   add_text(model, model_end(objects.size()));
-  return write_zip(path, members, execution);
+  return write_zip(path, std::move(members), execution);
 }
 
 }  // namespace strata::detail

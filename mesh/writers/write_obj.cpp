@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <memory>
 #include <numeric>
+#include <unordered_set>
 #include <utility>
 
 #include "mesh/writers/mesh_blocks.h"
@@ -29,12 +29,9 @@ std::string channel(std::uint8_t value) { return fmt::format("{:.4g}", value / 2
 
 std::string materials_text(const std::vector<Colour>& colours) {
   std::string text = "# written by strata\n";
-  for (std::size_t i = 0; i < colours.size(); ++i) {
-    const Colour& c = colours[i];
-    if (std::find(colours.begin(), colours.begin() + static_cast<std::ptrdiff_t>(i), c) !=
-        colours.begin() + static_cast<std::ptrdiff_t>(i)) {
-      continue;
-    }
+  std::unordered_set<std::uint32_t> told;
+  for (const Colour& c : colours) {
+    if (!told.insert(packed(c)).second) continue;
     text += fmt::format("newmtl {}\nKd {} {} {}\n", material_name(c), channel(c.r), channel(c.g),
                         channel(c.b));
     if (c.a != 255) text += fmt::format("d {}\n", channel(c.a));
@@ -74,7 +71,8 @@ Result<void> write_solid_obj(const std::string& path, const SolidMesh& mesh,
         fmt::format("mtllib {}\n", std::filesystem::path(options.materials).filename().string());
     Blocks materials;
     add_text(materials, materials_text(colours));
-    if (auto written = write_blocks(options.materials, materials, {}); !written) return written;
+    if (auto written = write_blocks(options.materials, std::move(materials), {}); !written)
+      return written;
   }
   add_text(blocks, std::move(head));
   add_ranges(blocks, mesh.positions.size(), kBlockElements,
@@ -109,7 +107,7 @@ Result<void> write_solid_obj(const std::string& path, const SolidMesh& mesh,
                  }
                });
   }
-  return write_blocks(path, blocks, execution);
+  return write_blocks(path, std::move(blocks), execution);
 }
 
 }  // namespace strata::detail

@@ -9,6 +9,7 @@
 #include <new>
 #include <optional>
 #include <stdexcept>
+#include <utility>
 
 #include "mesh/writers/mesh_blocks.h"
 
@@ -91,7 +92,7 @@ Result<void> write_stl(const std::string& path, const SolidMesh& mesh, const Exe
                  add_bytes(out, std::uint16_t{0});
                }
              });
-  return write_blocks(path, blocks, execution);
+  return write_blocks(path, std::move(blocks), execution);
 }
 
 Result<void> write_ply(const std::string& path, const SolidMesh& mesh, const Execution& execution) {
@@ -129,7 +130,7 @@ Result<void> write_ply(const std::string& path, const SolidMesh& mesh, const Exe
                  if (in_parts) add_bytes(out, part);
                }
              });
-  return write_blocks(path, blocks, execution);
+  return write_blocks(path, std::move(blocks), execution);
 }
 
 Result<void> write_off(const std::string& path, const SolidMesh& mesh, const Execution& execution) {
@@ -160,7 +161,7 @@ Result<void> write_off(const std::string& path, const SolidMesh& mesh, const Exe
                  out += ends[part_of(mesh, t)];
                }
              });
-  return write_blocks(path, blocks, execution);
+  return write_blocks(path, std::move(blocks), execution);
 }
 
 Result<void> write_as(SolidFormat format, const std::string& path, const SolidMesh& mesh,

@@ -95,14 +95,15 @@ Result<std::string> deflate_member(const std::string& path, const ZipMember& mem
   std::vector<Piece> pieces(member.blocks.size());
   Blocks deflated;
   for (std::size_t i = 0; i < member.blocks.size(); ++i) {
-    deflated.push_back([&, i](std::string& out) {
+    const auto deflate_block = [&, i](std::string& out) {
       std::string text;
-      member.blocks[i](text);
+      member.blocks[i].make(text);
       pieces[i].checksum = static_cast<std::uint32_t>(
           crc32(0, reinterpret_cast<const Bytef*>(text.data()), static_cast<uInt>(text.size())));
       pieces[i].size = text.size();
       add_deflated(out, text, i + 1 == member.blocks.size());
-    });
+    };
+    deflated.push_back({deflate_block, member.blocks[i].elements});
   }
   std::string all;
   std::size_t next = 0;
@@ -131,13 +132,14 @@ Result<std::string> deflate_member(const std::string& path, const ZipMember& mem
 
 }  // namespace
 
-Result<void> write_zip(const std::string& path, const std::vector<ZipMember>& members,
+Result<void> write_zip(const std::string& path, std::vector<ZipMember> members,
                        const Execution& execution) {
   auto file = AtomicFile::create(path);
   if (!file) return tl::unexpected(file.error());
   std::vector<MemberFacts> facts;
   std::uint64_t offset = 0;
-  for (const ZipMember& member : members) {
+  for (ZipMember& member : members) {
+    member.blocks = joined(std::move(member.blocks));
     MemberFacts& known = facts.emplace_back();
     known.name = member.name;
     known.offset = offset;

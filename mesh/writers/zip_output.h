@@ -17,7 +17,7 @@ struct ZipMember {
 /// not depend on the number of threads; their time is the first of the year 1980. Holds the
 /// deflated bytes of a member. @return kOutput; kLimit: the memory limit, or a member of 4 GiB;
 /// kCancelled
-Result<void> write_zip(const std::string& path, const std::vector<ZipMember>& members,
+Result<void> write_zip(const std::string& path, std::vector<ZipMember> members,
                        const Execution& execution);
 
 }  // namespace strata::detail

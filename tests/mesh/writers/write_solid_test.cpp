@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <csignal>
+#include <ctime>
 #include <filesystem>
 #include <limits>
 #include <stop_token>
@@ -159,6 +160,29 @@ TEST_P(SolidWriter, BytesDoNotDependOnThreads) {
     EXPECT_EQ(seen.back(), 1.0);
   }
   EXPECT_GT(first.size(), mesh.triangles.size());
+}
+
+TEST_P(SolidWriter, TimeGrowsWithTheNumberOfParts) {
+  const auto seconds = [&](std::uint32_t count) {
+    SolidMesh mesh;
+    for (std::uint32_t i = 0; i < count; ++i) {
+      append(mesh, make_box({2.0 * i, 0, 0}, {2.0 * i + 1, 1, 1}), i);
+      mesh.parts.push_back({"box", glm::vec4(i % 256, i / 256 % 256, i / 65536, 255) / 255.0f});
+    }
+    double least = 1e9;
+    for (int round = 0; round < 3; ++round) {
+      const std::clock_t begin = std::clock();
+      Execution execution;
+      execution.threads = 1;
+      SolidWriteOptions options;
+      options.materials = folder_.file("a.mtl");
+      EXPECT_TRUE(write_solid(path(), mesh, options, execution));
+      least = std::min(least, static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC);
+    }
+    return least;
+  };
+  const double few = seconds(2000), many = seconds(16000);
+  EXPECT_LT(many, 8 * 4 * few + 0.02) << few << " s for an eighth of the parts";
 }
 
 TEST_P(SolidWriter, SaysWhatNoFileMayHave) {
