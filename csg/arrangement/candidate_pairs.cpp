@@ -6,6 +6,8 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "csg/arrangement/buckets.h"
+#include "exact/determinants.h"
 #include "mesh/disjoint_sets.h"
 
 namespace strata::csg {
@@ -13,13 +15,158 @@ namespace {
 
 using exact::LatticePoint;
 
+// Of each solid, whether it is known not to meet itself.
+//
+// A surface of the topology of a sphere that is convex at each edge is convex. Snapping moves
+// corners by less than a step; the angles by which edges are bent inwards, in sum, stay so small
+// that the surface is far from meeting itself as long as its triangles are several steps high.
+std::vector<bool> find_embedded(const WeldedSolids& solids, const MeshEdges& edges,
+                                std::size_t solid_count) {
+  constexpr double kHigh = 8.0, kMostBend = 0.1;
+  struct Facts {
+    bool possible = true;
+    std::int64_t vertices = 0, edges = 0, triangles = 0;
+    double bend = 0;  // radians
+    std::uint32_t last_root = 0xffffffffu;
+  };
+  std::vector<Facts> facts(solid_count);
+  const auto& vertices = solids.vertices;
+  detail::DisjointSets pieces(solids.triangles.size());
+  for (std::uint32_t e = 0; e < edges.size(); ++e) {
+    const auto uses = edges.uses_of(e);
+    const std::uint32_t s = uses[0] / 3, t = uses[uses.size() - 1] / 3;
+    const std::uint32_t content = solids.content_of[s];
+    if (content < solid_count && !facts[content].possible && uses.size() == 2 &&
+        solids.content_of[t] == content) {
+      continue;
+    }
+    const auto corner = [&](std::uint32_t use, std::uint32_t next) {
+      return solids.triangles[use / 3][static_cast<int>((use % 3 + next) % 3)];
+    };
+    const bool simple = uses.size() == 2 && solids.content_of[t] == content &&
+                        content < solid_count && corner(uses[0], 0) == corner(uses[1], 1);
+    if (!simple) {
+      for (const std::uint32_t use : uses) {
+        for (const SolidCount& count : solids.content(use / 3)) facts[count.solid].possible = false;
+      }
+      continue;
+    }
+    Facts& fact = facts[content];
+    ++fact.edges;
+    pieces.join(s, t);
+    const glm::dvec3 a(vertices[corner(uses[0], 0)]), b(vertices[corner(uses[0], 1)]),
+        c(vertices[corner(uses[0], 2)]), d(vertices[corner(uses[1], 2)]);
+    const glm::dvec3 normal = glm::cross(b - a, c - a);
+    const double area = glm::length(normal), length = glm::length(b - a);
+    const double height = glm::dot(normal, d - a);
+    const double high = glm::length(glm::cross(b - a, d - a));
+    if (area < kHigh * length || high < kHigh * length) fact.possible = false;
+    if (height > 0) fact.bend += height / area / (high / length);
+    if (!(fact.bend < kMostBend)) fact.possible = false;
+  }
+  std::vector<std::uint32_t> owner(vertices.size(), 0xffffffffu);  // vertices of two are nobody's
+  for (std::uint32_t t = 0; t < solids.triangles.size(); ++t) {
+    for (const SolidCount& count : solids.content(t)) {
+      Facts& fact = facts[count.solid];
+      if (!fact.possible) continue;
+      ++fact.triangles;
+      const std::uint32_t root = pieces.find(t);
+      if (fact.last_root != 0xffffffffu && fact.last_root != root) fact.possible = false;
+      fact.last_root = root;
+      for (int k = 0; k < 3; ++k) {
+        std::uint32_t& own = owner[solids.triangles[t][k]];
+        if (own == count.solid) continue;
+        if (own != 0xffffffffu) fact.possible = false;
+        own = count.solid;
+        ++fact.vertices;
+      }
+    }
+  }
+  std::vector<bool> result;
+  for (const Facts& fact : facts) {
+    result.push_back(fact.possible && fact.vertices - fact.edges + fact.triangles == 2 &&
+                     fact.bend < kMostBend);
+  }
+  return result;
+}
+
+// Whether the triangles around a vertex are one fan that looks one way: seen along the sum of their
+// normals, none is turned over and they go around once. Such a fan does not meet itself.
+class Stars {
+ public:
+  Stars(const WeldedSolids& solids, const MeshEdges& edges, const std::vector<bool>& embedded,
+        const Execution& execution)
+      : solids_(solids), edges_(edges), plain_(solids.vertices.size(), 0) {
+    if (std::ranges::find(embedded, false) == embedded.end()) return;
+    around_ = bucket(3 * solids.triangles.size(), solids.vertices.size(), [&](std::size_t i) {
+      return solids.triangles[i / 3][static_cast<int>(i % 3)];
+    });
+    constexpr std::size_t kBlock = 8192;
+    const std::size_t count = solids.vertices.size();
+    parallel_for(execution, (count + kBlock - 1) / kBlock, [&](std::size_t block, int) {
+      for (std::size_t v = block * kBlock; v < std::min(count, (block + 1) * kBlock); ++v) {
+        plain_[v] = is_plain(static_cast<std::uint32_t>(v)) ? 1 : 0;
+      }
+    });
+  }
+
+  bool plain(std::uint32_t vertex) const { return plain_[vertex] != 0; }
+
+ private:
+  // Two triangles of one solid that continue each other.
+  bool simple(std::uint32_t edge) const {
+    const auto uses = edges_.uses_of(edge);
+    return uses.size() == 2 && solids_.content_of[uses[0] / 3] == solids_.content_of[uses[1] / 3] &&
+           solids_.triangles[uses[0] / 3][static_cast<int>(uses[0] % 3)] !=
+               solids_.triangles[uses[1] / 3][static_cast<int>(uses[1] % 3)];
+  }
+
+  bool is_plain(std::uint32_t v) const {
+    const auto uses =
+        std::span(around_.items).subspan(around_.first[v], around_.first[v + 1] - around_.first[v]);
+    const auto corner = [&](std::uint32_t use, std::uint32_t next) {
+      const std::uint32_t k = use % 3 + next;
+      return glm::dvec3(
+          solids_.vertices[solids_.triangles[use / 3][static_cast<int>(k > 2 ? k - 3 : k)]] -
+          solids_.vertices[v]);
+    };
+    glm::dvec3 sum(0.0);
+    for (const std::uint32_t use : uses) {
+      if (!simple(edges_.edge_of[use])) return false;
+      sum += glm::cross(corner(use, 1), corner(use, 2));
+    }
+    const double size = glm::length(sum);
+    if (!(size > 0)) return false;
+    const glm::dvec3 along = sum / size;
+    const glm::dvec3 right =
+        glm::cross(along, std::abs(along.x) < 0.6 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0));
+    const glm::dvec3 up = glm::cross(along, right);
+    int turns = 0;  // triangles that hold the direction `right`: one for each time around
+    for (const std::uint32_t use : uses) {
+      const glm::dvec3 a = corner(use, 1), b = corner(use, 2), normal = glm::cross(a, b);
+      if (!(glm::dot(normal, along) > 1e-6 * glm::length(normal))) return false;
+      turns += glm::dot(a, up) < 0 && glm::dot(b, up) >= 0;
+    }
+    return turns == 1;
+  }
+
+  const WeldedSolids& solids_;
+  const MeshEdges& edges_;
+  Buckets around_;
+  std::vector<std::uint8_t> plain_;
+};
+
 class PairFilter {
  public:
-  explicit PairFilter(const WeldedSolids& solids) : solids_(solids) {}
+  PairFilter(const WeldedSolids& solids, const Stars& stars) : solids_(solids), stars_(stars) {}
 
   // Whether each of two triangles has points in the plane of the other, not counting a corner or an
   // edge that both have. Corners of both are equal vertices.
   bool may_meet(const BoxPair& pair) const {
+    const glm::uvec3 &t = solids_.triangles[pair.first], &o = solids_.triangles[pair.second];
+    for (int k = 0; k < 3; ++k) {
+      if ((t[k] == o.x || t[k] == o.y || t[k] == o.z) && stars_.plain(t[k])) return false;
+    }
     return reaches(pair.first, pair.second) && reaches(pair.second, pair.first);
   }
 
@@ -28,20 +175,26 @@ class PairFilter {
     const glm::uvec3 &t = solids_.triangles[triangle], &o = solids_.triangles[other];
     const auto& vertices = solids_.vertices;
     const exact::Plane plane = exact::plane_through(vertices[o.x], vertices[o.y], vertices[o.z]);
+    const exact::filters::RealNormal normal(plane.normal);
     int above = 0, below = 0, shared = 0;
     for (int k = 0; k < 3; ++k) {
       if (t[k] == o.x || t[k] == o.y || t[k] == o.z) {
         ++shared;
         continue;
       }
-      const exact::Int128 height = exact::height(plane, vertices[t[k]]);
-      above += height > 0;
-      below += height < 0;
+      int side = 0;
+      if constexpr (exact::kFilters) {
+        side = exact::filters::offset(normal, vertices[t[k]] - plane.base).sign();
+      }
+      if (side == 0) side = exact::sign_of(exact::height(plane, vertices[t[k]]));
+      above += side > 0;
+      below += side < 0;
     }
     return above + below == 0 || (above + shared < 3 && below + shared < 3);
   }
 
   const WeldedSolids& solids_;
+  const Stars& stars_;
 };
 
 LatticeBox box_of(const WeldedSolids& solids, const glm::uvec3& t) {
@@ -53,8 +206,9 @@ LatticeBox box_of(const WeldedSolids& solids, const glm::uvec3& t) {
 }  // namespace
 
 Result<std::vector<BoxPair>> find_candidate_pairs(const WeldedSolids& solids,
-                                                  const std::vector<bool>& embedded,
+                                                  const MeshEdges& edges, std::size_t solid_count,
                                                   const Execution& execution) {
+  const std::vector<bool> embedded = find_embedded(solids, edges, solid_count);
   const auto count = static_cast<std::uint32_t>(solids.triangles.size());
   std::vector<LatticeBox> boxes;
   std::vector<std::uint32_t> groups;
@@ -67,7 +221,8 @@ Result<std::vector<BoxPair>> find_candidate_pairs(const WeldedSolids& solids,
     // A group of its own: its pairs with all others are wanted.
     groups.push_back(one_group ? content : static_cast<std::uint32_t>(embedded.size()) + t);
   }
-  const PairFilter filter(solids);
+  const Stars stars(solids, edges, embedded, execution);
+  const PairFilter filter(solids, stars);
   std::vector<std::vector<BoxPair>> found(static_cast<std::size_t>(execution.thread_count()));
   std::atomic<std::uint64_t> bytes = 0;
   const auto too_many = [&] {
@@ -95,74 +250,6 @@ Result<std::vector<BoxPair>> find_candidate_pairs(const WeldedSolids& solids,
     result.insert(result.end(), found[i].begin(), found[i].end());
   }
   std::ranges::sort(result);
-  return result;
-}
-
-// A surface of the topology of a sphere that is convex at each edge is convex. Snapping moves
-// corners by less than a step; the angles by which edges are bent inwards, in sum, stay so small
-// that the surface is far from meeting itself as long as its triangles are several steps high.
-std::vector<bool> find_embedded(const WeldedSolids& solids, const MeshEdges& edges,
-                                std::size_t solid_count) {
-  constexpr double kHigh = 8.0, kMostBend = 0.1;
-  struct Facts {
-    bool possible = true;
-    std::int64_t vertices = 0, edges = 0, triangles = 0;
-    double bend = 0;  // radians
-    std::uint32_t last_root = 0xffffffffu;
-  };
-  std::vector<Facts> facts(solid_count);
-  const auto& vertices = solids.vertices;
-  detail::DisjointSets pieces(solids.triangles.size());
-  for (std::uint32_t e = 0; e < edges.size(); ++e) {
-    const auto uses = edges.uses_of(e);
-    const std::uint32_t s = uses[0] / 3, t = uses[uses.size() - 1] / 3;
-    const std::uint32_t content = solids.content_of[s];
-    const auto corner = [&](std::uint32_t use, std::uint32_t next) {
-      return solids.triangles[use / 3][static_cast<int>((use % 3 + next) % 3)];
-    };
-    const bool simple = uses.size() == 2 && solids.content_of[t] == content &&
-                        content < solid_count && corner(uses[0], 0) == corner(uses[1], 1);
-    if (!simple) {
-      for (const std::uint32_t use : uses) {
-        for (const SolidCount& count : solids.content(use / 3)) facts[count.solid].possible = false;
-      }
-      continue;
-    }
-    Facts& fact = facts[content];
-    if (!fact.possible) continue;
-    ++fact.edges;
-    pieces.join(s, t);
-    const glm::dvec3 a(vertices[corner(uses[0], 0)]), b(vertices[corner(uses[0], 1)]),
-        c(vertices[corner(uses[0], 2)]), d(vertices[corner(uses[1], 2)]);
-    const glm::dvec3 normal = glm::cross(b - a, c - a);
-    const double area = glm::length(normal), length = glm::length(b - a);
-    const double height = glm::dot(normal, d - a);
-    const double high = glm::length(glm::cross(b - a, d - a));
-    if (area < kHigh * length || high < kHigh * length) fact.possible = false;
-    if (height > 0) fact.bend += height / area / (high / length);
-  }
-  std::vector<std::uint32_t> owner(vertices.size(), 0xffffffffu);  // vertices of two are nobody's
-  for (std::uint32_t t = 0; t < solids.triangles.size(); ++t) {
-    for (const SolidCount& count : solids.content(t)) {
-      Facts& fact = facts[count.solid];
-      ++fact.triangles;
-      const std::uint32_t root = pieces.find(t);
-      if (fact.last_root != 0xffffffffu && fact.last_root != root) fact.possible = false;
-      fact.last_root = root;
-      for (int k = 0; k < 3; ++k) {
-        std::uint32_t& own = owner[solids.triangles[t][k]];
-        if (own == count.solid) continue;
-        if (own != 0xffffffffu) fact.possible = false;
-        own = count.solid;
-        ++fact.vertices;
-      }
-    }
-  }
-  std::vector<bool> result;
-  for (const Facts& fact : facts) {
-    result.push_back(fact.possible && fact.vertices - fact.edges + fact.triangles == 2 &&
-                     fact.bend < kMostBend);
-  }
   return result;
 }
 

@@ -8,17 +8,10 @@
 namespace strata::csg {
 
 /// Finds the triangles that may meet other than in a corner or an edge that they share: all pairs
-/// that do, and others whose boxes touch and of which each reaches the plane of the other. Pairs of
-/// an embedded solid are not among them.
-/// @param embedded  of each solid: its triangles meet in shared corners and edges alone
+/// that do, and others whose boxes touch and of which each reaches the plane of the other.
 /// @return each pair once, sorted; kCancelled; kLimit when they take more than the memory limit
 Result<std::vector<BoxPair>> find_candidate_pairs(const WeldedSolids& solids,
-                                                  const std::vector<bool>& embedded,
+                                                  const MeshEdges& edges, std::size_t solid_count,
                                                   const Execution& execution = {});
-
-/// Whether solids are known not to meet themselves: closed surfaces of the topology of a sphere
-/// that are convex but for what snapping did.
-std::vector<bool> find_embedded(const WeldedSolids& solids, const MeshEdges& edges,
-                                std::size_t solid_count);
 
 }  // namespace strata::csg

@@ -36,7 +36,6 @@ class Weld {
     if (execution_.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
     start_contents();
     keep_areas();
-    merge_equal();
     return std::move(result_);
   }
 
@@ -83,16 +82,29 @@ class Weld {
     solids_ = {};
   }
 
+  LatticeSolids solids_;
+  const Execution& execution_;
+  WeldedSolids result_;
+};
+
+// Gives equal triangles one content.
+class Merge {
+ public:
+  explicit Merge(WeldedSolids& solids) : solids_(solids) {}
+
+  void run() { merge_equal(); }
+
+ private:
   // Equal triangles lie in one bucket of their least corner.
   void merge_equal() {
-    const std::vector<glm::uvec3>& triangles = result_.triangles;
-    const Buckets buckets = bucket(triangles.size(), result_.vertices.size(), [&](std::size_t i) {
+    const std::vector<glm::uvec3>& triangles = solids_.triangles;
+    const Buckets buckets = bucket(triangles.size(), solids_.vertices.size(), [&](std::size_t i) {
       return std::min({triangles[i].x, triangles[i].y, triangles[i].z});
     });
     std::vector<bool> gone(triangles.size(), false);
     bool any = false;
     std::vector<std::pair<Sorted, std::uint32_t>> keys;
-    for (std::size_t v = 0; v < result_.vertices.size(); ++v) {
+    for (std::size_t v = 0; v < solids_.vertices.size(); ++v) {
       const std::uint32_t begin = buckets.first[v], end = buckets.first[v + 1];
       if (end - begin < 2) continue;
       keys.clear();
@@ -120,7 +132,7 @@ class Weld {
     std::vector<SolidCount> sum;
     const bool turned = equal.front().first.turned;
     for (const auto& [corners, triangle] : equal) {
-      const std::uint32_t solid = result_.content_of[triangle];
+      const std::uint32_t solid = solids_.content_of[triangle];
       sum.push_back({solid, corners.turned == turned ? 1 : -1});
       gone[triangle] = true;
     }
@@ -137,25 +149,23 @@ class Weld {
     if (content.empty()) return;
     const std::uint32_t kept = equal.front().second;
     gone[kept] = false;
-    result_.content_of[kept] = static_cast<std::uint32_t>(result_.first_count.size() - 1);
-    result_.counts.insert(result_.counts.end(), content.begin(), content.end());
-    result_.first_count.push_back(static_cast<std::uint32_t>(result_.counts.size()));
+    solids_.content_of[kept] = static_cast<std::uint32_t>(solids_.first_count.size() - 1);
+    solids_.counts.insert(solids_.counts.end(), content.begin(), content.end());
+    solids_.first_count.push_back(static_cast<std::uint32_t>(solids_.counts.size()));
   }
 
   void drop(const std::vector<bool>& gone) {
     std::size_t kept = 0;
     for (std::size_t i = 0; i < gone.size(); ++i) {
       if (gone[i]) continue;
-      result_.triangles[kept] = result_.triangles[i];
-      result_.content_of[kept++] = result_.content_of[i];
+      solids_.triangles[kept] = solids_.triangles[i];
+      solids_.content_of[kept++] = solids_.content_of[i];
     }
-    result_.triangles.resize(kept);
-    result_.content_of.resize(kept);
+    solids_.triangles.resize(kept);
+    solids_.content_of.resize(kept);
   }
 
-  LatticeSolids solids_;
-  const Execution& execution_;
-  WeldedSolids result_;
+  WeldedSolids& solids_;
 };
 
 }  // namespace
@@ -164,32 +174,41 @@ Result<WeldedSolids> weld_solids(LatticeSolids solids, const Execution& executio
   return Weld(std::move(solids), execution).run();
 }
 
+void merge_equal_triangles(WeldedSolids& solids) { Merge(solids).run(); }
+
 MeshEdges find_mesh_edges(std::span<const glm::uvec3> triangles, std::size_t vertex_count) {
-  const auto ends = [&](std::uint32_t use) {
+  struct Key {
+    std::uint32_t far, use, third;
+  };
+  const auto key_of = [&](std::uint32_t use) {
     const glm::uvec3& t = triangles[use / 3];
     const int side = static_cast<int>(use % 3);
     const std::uint32_t from = t[side], to = t[side == 2 ? 0 : side + 1];
-    return std::pair(std::min(from, to), std::max(from, to));
+    return std::pair(std::min(from, to), Key{std::max(from, to), use, t[side == 0 ? 2 : side - 1]});
   };
   MeshEdges result;
   Buckets buckets = bucket(3 * triangles.size(), vertex_count, [&](std::size_t i) {
-    return ends(static_cast<std::uint32_t>(i)).first;
+    return key_of(static_cast<std::uint32_t>(i)).first;
   });
   result.uses = std::move(buckets.items);
   result.edge_of.resize(result.uses.size());
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> keys;
+  result.first_use.reserve(result.uses.size() / 2 + 1);
+  std::vector<Key> keys;
   for (std::size_t v = 0; v < vertex_count; ++v) {
     const std::uint32_t begin = buckets.first[v], end = buckets.first[v + 1];
     keys.clear();
+    for (std::uint32_t i = begin; i < end; ++i) keys.push_back(key_of(result.uses[i]).second);
+    std::ranges::sort(keys, [](const Key& x, const Key& y) {
+      return std::tie(x.far, x.use) < std::tie(y.far, y.use);
+    });
     for (std::uint32_t i = begin; i < end; ++i) {
-      keys.emplace_back(ends(result.uses[i]).second, result.uses[i]);
-    }
-    std::ranges::sort(keys);
-    for (std::uint32_t i = begin; i < end; ++i) {
-      const auto& [far, use] = keys[i - begin];
-      if (i == begin || far != keys[i - begin - 1].first) result.first_use.push_back(i);
-      result.uses[i] = use;
-      result.edge_of[use] = static_cast<std::uint32_t>(result.first_use.size() - 1);
+      const Key& key = keys[i - begin];
+      if (i == begin || key.far != keys[i - begin - 1].far) result.first_use.push_back(i);
+      result.uses[i] = key.use;
+      result.edge_of[key.use] = static_cast<std::uint32_t>(result.first_use.size() - 1);
+      for (std::uint32_t other = result.first_use.back(); other < i; ++other) {
+        result.equal_triangles = result.equal_triangles || keys[other - begin].third == key.third;
+      }
     }
   }
   result.first_use.push_back(static_cast<std::uint32_t>(result.uses.size()));

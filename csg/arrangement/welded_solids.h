@@ -17,12 +17,11 @@ struct SolidCount {
   friend bool operator==(const SolidCount&, const SolidCount&) = default;
 };
 
-/// Solids of which equal points are one vertex and equal triangles one triangle. Triangles that one
-/// solid has in both directions equally often are gone, and those without area: corners of their
+/// Solids of which equal points are one vertex. Triangles without area are gone: corners of their
 /// neighbours lie on edges of other neighbours, as such corners do anywhere.
 struct WeldedSolids {
   std::vector<exact::LatticePoint> vertices;  ///< all different
-  std::vector<glm::uvec3> triangles;          ///< with area, all different
+  std::vector<glm::uvec3> triangles;          ///< with area
   /// The index into contents() of each triangle.
   std::vector<std::uint32_t> content_of;
 
@@ -45,12 +44,17 @@ struct MeshEdges {
   std::vector<std::uint32_t> edge_of;
   std::vector<std::uint32_t> first_use;  ///< of each edge; one more than edges
   std::vector<std::uint32_t> uses;       ///< 3 * triangle + side
+  bool equal_triangles = false;          ///< some triangles have the same corners
 
   std::size_t size() const { return first_use.size() - 1; }
   std::span<const std::uint32_t> uses_of(std::uint32_t edge) const {
     return std::span(uses).subspan(first_use[edge], first_use[edge + 1] - first_use[edge]);
   }
 };
+
+/// Makes one triangle of equal ones, which have several solids in their content then. Triangles
+/// that a solid has in both directions equally often are gone.
+void merge_equal_triangles(WeldedSolids& solids);
 
 MeshEdges find_mesh_edges(std::span<const glm::uvec3> triangles, std::size_t vertex_count);
 

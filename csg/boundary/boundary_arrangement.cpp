@@ -30,9 +30,13 @@ Result<BoundaryFaces> arrange_solids(LatticeSolids solids, const Tree& tree, Tre
   auto welded = weld_solids(std::move(solids), execution);
   if (!welded) return tl::unexpected(welded.error());
   if (welded->triangles.empty()) return BoundaryFaces{};
-  const MeshEdges edges = find_mesh_edges(welded->triangles, welded->vertices.size());
-  const auto pairs =
-      find_candidate_pairs(*welded, find_embedded(*welded, edges, tree.solids().size()), execution);
+  MeshEdges edges = find_mesh_edges(welded->triangles, welded->vertices.size());
+  if (edges.equal_triangles) {
+    merge_equal_triangles(*welded);
+    if (welded->triangles.empty()) return BoundaryFaces{};
+    edges = find_mesh_edges(welded->triangles, welded->vertices.size());
+  }
+  const auto pairs = find_candidate_pairs(*welded, edges, tree.solids().size(), execution);
   if (!pairs) return tl::unexpected(pairs.error());
   PointTable table(BoundaryPoints(std::move(welded->vertices), std::move(welded->triangles)));
   const BoundaryPoints& points = table.points();

@@ -53,7 +53,11 @@ bool reaches_plane(const Vec (&t)[3], const Vec (&plane)[3]) {
   return low <= 0 && high >= 0;
 }
 
-const std::vector<bool> kEmbedded(10, true);  // pairs of one solid are left out
+auto find_pairs(const WeldedSolids& solids, const Execution& execution = {}) {
+  const MeshEdges edges = find_mesh_edges(solids.triangles, solids.vertices.size());
+  return find_candidate_pairs(
+      solids, edges, solids.first_count.empty() ? 0 : solids.first_count.size() - 1, execution);
+}
 
 struct Soup {
   WeldedSolids solids;
@@ -65,6 +69,11 @@ struct Soup {
     solids.vertices.insert(solids.vertices.end(), {a, b, c});
     solids.triangles.emplace_back(base, base + 1, base + 2);
     solids.content_of.push_back(solid);
+    if (solids.first_count.empty()) solids.first_count.push_back(0);
+    while (solids.counts.size() <= solid) {
+      solids.counts.push_back({static_cast<std::uint32_t>(solids.counts.size()), 1});
+      solids.first_count.push_back(static_cast<std::uint32_t>(solids.counts.size()));
+    }
     solid_of.push_back(solid);
   }
 };
@@ -99,7 +108,7 @@ TEST(CandidatePairs, HoldAllPairsThatShareAPointAndNoneThatBoxesOrPlanesTellApar
   for (int round = 0; round < 60; ++round) {
     const Soup soup = random_soup(random, 2 + round % 3, 120);
     const auto& [solids, solid_of] = soup;
-    const auto result = find_candidate_pairs(solids, kEmbedded);
+    const auto result = find_pairs(solids);
     ASSERT_TRUE(result.has_value());
     ASSERT_TRUE(std::ranges::is_sorted(*result));
     ASSERT_EQ(std::ranges::adjacent_find(*result), result->end());
@@ -127,7 +136,7 @@ TEST(CandidatePairs, HoldAllPairsThatShareAPointAndNoneThatBoxesOrPlanesTellApar
         const bool listed = std::ranges::binary_search(*result, BoxPair{i, j});
         checked += listed;
         const bool planes = reaches_plane(a, b) && reaches_plane(b, a);
-        if (solid_of[i] == solid_of[j] || !boxes || !planes) {
+        if (!boxes || !planes) {
           ASSERT_FALSE(listed) << round << ": " << i << " " << j;
         } else if (share_a_point(a, b)) {
           ASSERT_TRUE(listed) << round << ": " << i << " " << j;
@@ -145,8 +154,7 @@ std::vector<BoxPair> pairs_of(const Tree& tree) {
   auto solids = snap_solids(tree, tree.root(), Geometry(tree));
   EXPECT_TRUE(solids.has_value());
   const WeldedSolids welded = *weld_solids(std::move(*solids), {});
-  const MeshEdges edges = find_mesh_edges(welded.triangles, welded.vertices.size());
-  auto result = find_candidate_pairs(welded, find_embedded(welded, edges, tree.solids().size()));
+  auto result = find_pairs(welded);
   EXPECT_TRUE(result.has_value());
   return *std::move(result);
 }
@@ -188,11 +196,11 @@ TEST(CandidatePairs, OfHolesInAPlateGrowWithTheHoles) {
 TEST(CandidatePairs, DoNotDependOnTheOrderOfTriangles) {
   std::mt19937_64 random(6);
   const Soup soup = random_soup(random, 2, 200);
-  const auto result = find_candidate_pairs(soup.solids, kEmbedded);
+  const auto result = find_pairs(soup.solids);
   ASSERT_TRUE(result.has_value());
   Soup turned = soup;
   std::reverse(turned.solids.triangles.begin(), turned.solids.triangles.end());
-  const auto other = find_candidate_pairs(turned.solids, kEmbedded);
+  const auto other = find_pairs(turned.solids);
   ASSERT_TRUE(other.has_value());
   const auto last = static_cast<std::uint32_t>(soup.solids.triangles.size() - 1);
   std::vector<BoxPair> back;
@@ -207,15 +215,15 @@ TEST(CandidatePairs, LimitsAndStopsAreKept) {
   const Soup soup = random_soup(random, 2, 200);
   Execution execution;
   execution.memory_limit = 100;
-  const auto refused = find_candidate_pairs(soup.solids, kEmbedded, execution);
+  const auto refused = find_pairs(soup.solids, execution);
   ASSERT_FALSE(refused.has_value());
   EXPECT_EQ(refused.error().code, ErrorCode::kLimit);
   std::stop_source stop;
   stop.request_stop();
-  const auto stopped = find_candidate_pairs(soup.solids, kEmbedded, {.stop = stop.get_token()});
+  const auto stopped = find_pairs(soup.solids, {.stop = stop.get_token()});
   ASSERT_FALSE(stopped.has_value());
   EXPECT_EQ(stopped.error().code, ErrorCode::kCancelled);
-  EXPECT_TRUE(find_candidate_pairs(WeldedSolids{}, {})->empty());
+  EXPECT_TRUE(find_pairs(WeldedSolids{})->empty());
 }
 
 }  // namespace
