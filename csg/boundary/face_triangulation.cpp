@@ -1,6 +1,8 @@
 #include "csg/boundary/face_triangulation.h"
 
 #include <algorithm>
+#include <array>
+#include <utility>
 
 #include "exact/directions.h"
 
@@ -51,6 +53,46 @@ bool FaceTriangulation::append_triangle(const BoundaryPlane& plane, FaceTriangle
   if (p.wedge != 0) out.wedges.push_back({triangle, 0, p.wedge});
   if (q.wedge != 0) out.wedges.push_back({triangle, 1, q.wedge});
   if (r.wedge != 0) out.wedges.push_back({triangle, 2, r.wedge});
+  return true;
+}
+
+// Most others are convex quadrilaterals. @return false for whatever is none
+bool FaceTriangulation::append_quad(const BoundaryPlane& plane, FaceTriangles& out) const {
+  std::array<BoundaryEdge, 4> e;
+  std::copy_n(faces_.edges.data() + plane.first_edge, 4, e.begin());
+  for (std::size_t i = 0; i < 3; ++i) {
+    std::size_t next = i + 1;
+    while (next < 4 && e[next].from != e[i].to) ++next;
+    if (next == 4) return false;
+    std::swap(e[i + 1], e[next]);
+  }
+  if (e[3].to != e[0].from) return false;
+  std::array<exact::FlatPoint, 4> at;
+  for (std::size_t i = 0; i < 4; ++i) {
+    at[i] = {positions_[e[i].from][u_], positions_[e[i].from][v_]};
+  }
+  const auto key = [&](std::size_t i) {
+    const exact::FlatPoint along = at[i] - at[0];
+    return std::pair(kRight * along.x + kUp * along.y, along.y);
+  };
+  std::size_t first = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    if (exact::orient2d(at[i], at[(i + 1) % 4], at[(i + 2) % 4]) <= 0) return false;
+    if (key(i) < key(first)) first = i;
+  }
+  // The four turns are left and add up to one turn: a quadrilateral cannot turn twice.
+  const int inside = exact::incircle(at[0], at[1], at[2], at[3]);
+  const std::size_t a = inside != 0 ? (inside > 0 ? 1 : 0) : first % 2;  // an end of the diagonal
+  const auto triangle = static_cast<Index>(out.triangles.size());
+  for (const std::size_t i : {a, a + 2}) {
+    out.triangles.emplace_back(e[i].from, e[(i + 1) % 4].from, e[(i + 2) % 4].from);
+  }
+  for (std::size_t i = 0; i < 4; ++i) {
+    const std::size_t place = (i + 4 - a) % 4;
+    if (e[i].wedge == 0) continue;
+    out.wedges.push_back(
+        {triangle + static_cast<Index>(place / 2), static_cast<Index>(place % 2), e[i].wedge});
+  }
   return true;
 }
 
@@ -121,7 +163,6 @@ bool FaceTriangulation::cut_exactly(const BoundaryPlane& plane) {
 
 void FaceTriangulation::append_mesh(const BoundaryPlane& plane, FaceTriangles& out) const {
   const std::size_t before = out.triangles.size();
-  out.triangles.reserve(before + mesh_.triangle_count());
   for (Index t = 0; t < mesh_.triangle_count(); ++t) {
     const auto& [a, b, c] = mesh_.triangle(t);
     out.triangles.emplace_back(corners_[a].point, corners_[b].point, corners_[c].point);
@@ -140,7 +181,8 @@ bool FaceTriangulation::append(std::uint32_t index, FaceTriangles& out) {
   u_ = view.u();
   v_ = view.v();
   bool simple = true;
-  if (plane.edge_count != 3 || plane.touch_count != 0 || !append_triangle(plane, out)) {
+  const Index few = plane.touch_count == 0 ? plane.edge_count : 0;
+  if (!(few == 3 && append_triangle(plane, out)) && !(few == 4 && append_quad(plane, out))) {
     collect(plane);
     const bool distinct = sort_corners();
     if (distinct) number_edges(plane);

@@ -39,6 +39,7 @@ class FaceTriangulation {
   using Index = std::uint32_t;
 
   bool append_triangle(const BoundaryPlane& plane, FaceTriangles& out) const;
+  bool append_quad(const BoundaryPlane& plane, FaceTriangles& out) const;
   void collect(const BoundaryPlane& plane);
   bool sort_corners();
   void number_edges(const BoundaryPlane& plane);

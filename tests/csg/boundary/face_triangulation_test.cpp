@@ -64,6 +64,53 @@ TEST(FaceTriangulation, EveryEdgeKeepsItsTriangleHoweverCoarselyPointsAreRounded
   EXPECT_GT(others, 300);
 }
 
+std::multiset<std::array<std::uint32_t, 3>> turned_triangles(const FaceTriangles& out) {
+  std::multiset<std::array<std::uint32_t, 3>> result;
+  for (const glm::uvec3& t : out.triangles) {
+    std::array corners{t.x, t.y, t.z};
+    std::rotate(corners.begin(), std::min_element(corners.begin(), corners.end()), corners.end());
+    result.insert(corners);
+  }
+  return result;
+}
+std::multiset<std::array<std::uint32_t, 3>> wedge_edges(const FaceTriangles& out) {
+  std::multiset<std::array<std::uint32_t, 3>> result;
+  for (const WedgeEdge& edge : out.wedges) {
+    const glm::uvec3& t = out.triangles[edge.triangle];
+    const int k = static_cast<int>(edge.corner);
+    result.insert({t[k], t[(k + 1) % 3], edge.wedge});
+  }
+  return result;
+}
+
+TEST(FaceTriangulation, SmallFacesAreCutAsAllOthers) {
+  int compared = 0;
+  for (unsigned seed = 0; seed < 100; ++seed) {
+    SCOPED_TRACE(seed);
+    std::mt19937 random(seed);
+    PlaneGrid grid(2 + static_cast<int>(seed % 2), 1000, seed % 3 == 0 ? 0 : 150, random);
+    grid.set_cells(test::random_cells(grid.size(), 0.4, random));
+    const auto positions = rounded_positions(grid.faces, 1);
+    // A corner as a touch changes nothing, but the face is not taken for a small one.
+    BoundaryFaces others = grid.faces;
+    for (BoundaryPlane& plane : others.planes) {
+      plane.first_touch = static_cast<std::uint32_t>(others.touches.size());
+      plane.touch_count = 1;
+      others.touches.push_back(others.edges[plane.first_edge].from);
+    }
+    FaceTriangulation small(grid.faces, positions), large(others, positions);
+    for (std::uint32_t p = 0; p < grid.faces.planes.size(); ++p) {
+      FaceTriangles out, other;
+      ASSERT_TRUE(small.append(p, out));
+      ASSERT_TRUE(large.append(p, other));
+      ASSERT_EQ(turned_triangles(out), turned_triangles(other));
+      ASSERT_EQ(wedge_edges(out), wedge_edges(other));
+      compared += grid.faces.planes[p].edge_count == 4 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(compared, 200);
+}
+
 TEST(FaceTriangulation, RefusesEdgesThatBoundNoRegion) {
   std::mt19937 random(1);
   PlaneGrid grid(1, 1000, 0, random);
