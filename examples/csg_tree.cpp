@@ -17,6 +17,10 @@ int main() {
   const auto measures = csg::measure(tree);
   std::printf("volume %.0f, area %.0f\n", measures->volume, measures->area);
 
+  const auto boundary = csg::boundary_mesh(tree, tree.root());  // exact, closed, 2-manifold
+  if (!boundary) return std::fprintf(stderr, "%s\n", boundary.error().message.c_str()), 1;
+  if (!strata::write_solid("csg_tree.3mf", boundary->mesh)) return 1;
+
   strata::GridRequest request;
   request.resolution = 256;  // voxels along the longest side
   const auto grid = strata::fit_grid(csg::bounds(tree), request);

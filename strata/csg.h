@@ -1,19 +1,22 @@
 #pragma once
 
 #include "strata/contour/contour.h"
+#include "strata/csg/boundary/boundary_mesh.h"
 #include "strata/csg/measure/measure.h"
 #include "strata/csg/picture/picture.h"
 #include "strata/csg/scene/scene.h"
 #include "strata/csg/solid_lists.h"
 #include "strata/csg/tree.h"
 #include "strata/mesh/shapes.h"
+#include "strata/mesh/writers/write_solid.h"
 #include "strata/raster/view.h"
 #include "strata/voxelize/grid_fit.h"
 #include "strata/voxelize/voxelize.h"
 
 /// Everything for Boolean trees of solids. Build a tree from meshes with operators (csg::Tree) or
 /// read it (csg::read_scene); then draw it (csg::picture), measure its volume and area
-/// (csg::measure) or voxelize it (csg::voxelize). examples/csg_tree.cpp shows each.
+/// (csg::measure, csg::exact_measures), make a mesh of it (csg::boundary_mesh, write_solid) or
+/// voxelize it (csg::voxelize). examples/csg_tree.cpp shows each.
 namespace strata::csg {
 
 /// The voxels of a tree's result, like strata::voxelize() of a mesh: a voxel is solid when its
