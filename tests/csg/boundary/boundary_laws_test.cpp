@@ -16,6 +16,7 @@
 #include "csg/boundary/open_edges.h"
 #include "strata/csg/boundary/boundary_mesh.h"
 #include "strata/csg/solid_lists.h"
+#include "tests/csg/boundary/brute_meeting.h"
 #include "tests/csg/boundary/convex_volume.h"
 #include "tests/csg/boundary/tiny_trees.h"
 #include "tests/csg/random_tree.h"
@@ -194,6 +195,44 @@ TEST(BoundaryLaws, EveryMeshIsClosedAndManifold) {
     });
   }
   EXPECT_GT(triangles, 10000u);
+}
+
+// Law L2, at the positions of the mesh.
+TEST(BoundaryLaws, TrianglesMeetInVerticesAndEdgesOnly) {
+  int touching = 0;
+  for_random_trees(150000, 100, 5, TinyKind::kAny, [&](const Tree& part, TinyTrees&) {
+    const Tree tree = part | tiny_frame();
+    const auto made = boundary_mesh(tree, tree.root(), kTiny);
+    ASSERT_TRUE(made.has_value());
+    const auto found = BruteMeeting::find(made->mesh);
+    ASSERT_FALSE(found) << found->first << " " << found->second;
+    touching += made->report.vertices_split > 0;
+  });
+  EXPECT_GT(touching, 5);
+}
+
+TEST(BoundaryLaws, TheBruteCheckSeesTrianglesThatMeet) {
+  const auto pair = [](const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c,
+                       const glm::dvec3& d, const glm::dvec3& e, const glm::dvec3& f) {
+    SolidMesh mesh;
+    mesh.positions = {a, b, c, d, e, f};
+    mesh.triangles = {{0, 1, 2}, {3, 4, 5}};
+    return BruteMeeting::find(mesh).has_value();
+  };
+  const glm::dvec3 a(0, 0, 0), b(4, 0, 0), c(0, 4, 0);
+  EXPECT_TRUE(pair(a, b, c, {1, 1, -1}, {1, 1, 1}, {5, 5, 1}));   // pierced
+  EXPECT_TRUE(pair(a, b, c, {1, 1, 0}, {1, 1, 1}, {5, 5, 1}));    // touched within
+  EXPECT_TRUE(pair(a, b, c, {2, 0, 0}, {1, -1, 1}, {3, -1, 1}));  // touched in an edge
+  EXPECT_TRUE(pair(a, b, c, {1, 1, 0}, {5, 1, 0}, {1, 5, 0}));    // overlap in a plane
+  EXPECT_TRUE(pair(a, b, c, a, {4, 1, 0}, {1, 4, 0}));            // the same, with a common corner
+  EXPECT_TRUE(pair(a, b, c, a, b, {1, 1, 0}));                    // on the same side of an edge
+  EXPECT_TRUE(pair(a, b, c, c, b, a));                            // the same place
+  EXPECT_TRUE(pair(a, b, c, a, {2, 2, 1}, {2, 2, -1}));           // from a common corner through
+  EXPECT_FALSE(pair(a, b, c, a, b, {1, -1, 0}));
+  EXPECT_FALSE(pair(a, b, c, a, b, {1, 1, 1}));
+  EXPECT_FALSE(pair(a, b, c, a, {-1, -1, 0}, {-1, 0, 1}));
+  EXPECT_FALSE(pair(a, b, c, {5, 5, 0}, {6, 5, 0}, {5, 6, 0}));
+  EXPECT_FALSE(pair(a, b, c, {5, 0, 0}, {6, 0, 0}, {5, -1, 3}));
 }
 
 TEST(BoundaryLaws, PointsAreInsideWhereTheTreeSaysSo) {
