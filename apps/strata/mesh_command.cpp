@@ -12,6 +12,7 @@
 #include "apps/strata/library_session.h"
 #include "apps/strata/mesh_report.h"
 #include "apps/strata/run_commands.h"
+#include "core/atomic_file.h"
 #include "core/printable.h"
 #include "strata/csg/input/scene_input.h"
 #include "strata/csg/input/solid_input.h"
@@ -29,6 +30,10 @@ Result<void> check_output(const MeshCommand& command) {
   if (command.output == "-" && binary && isatty(STDOUT_FILENO) != 0) {
     return fail(ErrorCode::kUsage, "standard output is a terminal, but {} files are binary",
                 solid_format_name(command.format));
+  }
+  for (const std::string* path : {&command.output, &command.materials}) {
+    if (path->empty() || is_stream(*path)) continue;
+    if (auto file = AtomicFile::create(*path); !file) return tl::unexpected(file.error());
   }
   return {};
 }

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <filesystem>
 #include <glm/mat4x4.hpp>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -234,6 +235,24 @@ TEST_F(MeshTool, NoInputIsOverwritten) {
   refuses({"c.mtl", "--input-format", "obj", "--ids", "-o", "c.obj"}, 2,
           "the materials of -o c.mtl would overwrite the input c.mtl");
   refuses({"box.obj", "-o", "a.ply", "--json=a.ply"}, 2, "a.ply");
+}
+
+TEST_F(MeshTool, AnOutputThatCannotBeWrittenIsToldBeforeTheWork) {
+  place.write("missing.csg", "import(file = \"no.stl\");");
+  refuses({"missing.csg", "-o", "none/a.3mf"}, 4, "none/a.3mf");
+  std::filesystem::create_directories(place.path("b.mtl"));
+  refuses({"drilled.csg", "--colours", "-o", "b.obj"}, 4, "b.mtl");
+  refuses({"drilled.csg", "--colours", "--format", "obj", "-o", "c.mtl"}, 2, "c.mtl");
+}
+
+TEST_F(MeshTool, ScenesComeThroughStandardInputToo) {
+  RunOptions options;
+  options.input = kDrilled;
+  const RunResult run = place.run(
+      {"mesh", "-", "--input-format", "csg", "-o", "-", "--format", "off", "-q"}, options);
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  place.write("piped.off", run.out);
+  EXPECT_NEAR(diagnose(read("piped.off")).volume, kDrilledVolume, 1e-6);
 }
 
 TEST_F(MeshTool, AnEmptyResultIsNoFile) {
