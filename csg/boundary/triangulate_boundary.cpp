@@ -162,6 +162,7 @@ Result<MeshRepair> Triangulation::check_and_sort() {
   Result<MeshRepair> repair;
   const auto conflicts = find_conflicts(mesh_, execution_);
   if (!conflicts) return tl::unexpected(conflicts.error());
+  set_groups(mesh_, *conflicts);
   canonical_order(
       mesh_, [this](Index a, Index b) { return compare_exactly(a, b); }, execution_);
   if (conflicts->empty()) return repair;

@@ -176,6 +176,13 @@ bool has_area(const FilePoint& a, const FilePoint& b, const FilePoint& c) {
   return normal[0] != 0 || normal[1] != 0 || normal[2] != 0;
 }
 
+void set_groups(RoundedMesh& mesh, const std::vector<MeshConflict>& conflicts) {
+  mesh.groups.assign(mesh.triangles.size(), RoundedMesh::kUnmoved);
+  for (const MeshConflict& conflict : conflicts) {
+    mesh.groups[conflict.first] = mesh.groups[conflict.second] = RoundedMesh::kNoGroup;
+  }
+}
+
 Result<std::vector<MeshConflict>> find_conflicts(const RoundedMesh& mesh,
                                                  const Execution& execution) {
   return Search(mesh, execution).run();

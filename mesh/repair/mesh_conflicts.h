@@ -16,8 +16,8 @@ struct RoundedMesh {
   std::vector<glm::uvec3> triangles;
   std::vector<std::uint32_t> labels;  ///< of the triangles
   /// Of the triangles: those of one group are known to have an area, and not to meet each other but
-  /// in vertices and edges of both. kUnmoved for those that rounding did not change, kNoGroup for
-  /// those of which nothing is known.
+  /// in vertices and edges of both. kUnmoved is the group of those that rounding did not change, or
+  /// that were found to be clean; kNoGroup is for those of which nothing is known.
   std::vector<std::uint32_t> groups;
   static constexpr std::uint32_t kUnmoved = 0, kNoGroup = 0xffffffffu;
 };
@@ -37,5 +37,8 @@ bool has_area(const exact::FilePoint& a, const exact::FilePoint& b, const exact:
 /// are near. @return sorted; kCancelled, kLimit
 Result<std::vector<MeshConflict>> find_conflicts(const RoundedMesh& mesh,
                                                  const Execution& execution = {});
+
+/// Sets the groups to what find_conflicts() has told: triangles without conflicts become kUnmoved.
+void set_groups(RoundedMesh& mesh, const std::vector<MeshConflict>& conflicts);
 
 }  // namespace strata

@@ -339,6 +339,7 @@ Result<MeshRepair> repair_mesh(RoundedMesh& mesh, const WrittenPositions& writte
     Result<std::vector<MeshConflict>> conflicts = find_conflicts(mesh, execution);
     if (!conflicts) return tl::unexpected(conflicts.error());
     if (conflicts->empty()) return result;
+    set_groups(mesh, *conflicts);  // what is changed from here on is searched again
     if (!original) original = mesh;
     const std::size_t mended = result.rounds < kMostRounds
                                    ? Repair(mesh, written, thorough).run(*conflicts, execution.stop)

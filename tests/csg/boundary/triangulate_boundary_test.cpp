@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <boost/multiprecision/cpp_int.hpp>
 #include <numeric>
 
@@ -83,6 +84,16 @@ bool in_canonical_order(const TriangulatedBoundary& mesh) {
 bool equal(const TriangulatedBoundary& a, const TriangulatedBoundary& b) {
   return a.points == b.points && a.positions == b.positions && a.triangles == b.triangles &&
          a.labels == b.labels && a.shells == b.shells && a.vertices_split == b.vertices_split;
+}
+
+// By bits, since g++ 12 may leave out a conversion to float and back.
+bool all_are_floats(const TriangulatedBoundary& mesh) {
+  constexpr std::uint64_t kBeyondFloat = (std::uint64_t{1} << 29) - 1;
+  return std::all_of(mesh.positions.begin(), mesh.positions.end(), [](const glm::dvec3& p) {
+    return ((std::bit_cast<std::uint64_t>(p.x) | std::bit_cast<std::uint64_t>(p.y) |
+             std::bit_cast<std::uint64_t>(p.z)) &
+            kBeyondFloat) == 0;
+  });
 }
 
 TEST(TriangulateBoundary, ACubeHasTwelveTriangles) {
@@ -269,7 +280,7 @@ TEST(TriangulateBoundary, FloatPositionsAreCleanAndExact) {
     const Lattice lattice{glm::dvec3(std::ldexp(1.0, 28 + static_cast<int>(seed % 4))), 1.0};
     const auto mesh = triangulate_boundary(grid.faces, lattice, true);
     ASSERT_TRUE(mesh.has_value());
-    for (const glm::dvec3& p : mesh->positions) ASSERT_EQ(glm::dvec3(glm::vec3(p)), p);
+    ASSERT_TRUE(all_are_floats(*mesh));
     ASSERT_TRUE(is_manifold(*mesh));
     ASSERT_TRUE(in_canonical_order(*mesh));
     ASSERT_TRUE(is_clean_mesh(*mesh));
@@ -299,7 +310,7 @@ TEST(TriangulateBoundary, FloatsAsCoarseAsTheSolidAreRepairedOrRefused) {
       continue;
     }
     repaired += mesh->repaired != 0 ? 1 : 0;
-    for (const glm::dvec3& p : mesh->positions) ASSERT_EQ(glm::dvec3(glm::vec3(p)), p);
+    ASSERT_TRUE(all_are_floats(*mesh));
     ASSERT_TRUE(is_manifold(*mesh));
     ASSERT_TRUE(in_canonical_order(*mesh));
     ASSERT_TRUE(is_clean_mesh(*mesh));
