@@ -133,12 +133,15 @@ class EdgeCollector {
   std::vector<Record> records_;
 };
 
-// Walks around the pieces of one triangle.
+// Walks around the pieces of one triangle after the other.
 class Subdivider {
  public:
+  // Numbers of pieces from kOwn on are those in `added`, which has their triangles.
+  static constexpr std::uint32_t kOwn = 0x80000000u;
+
   Subdivider(const ArrangementInput& input, const CutLines& lines, Pieces& pieces,
-             const std::vector<std::uint32_t>& edge_of_use)
-      : input_(input), lines_(lines), pieces_(pieces), edge_of_use_(edge_of_use) {}
+             const std::vector<std::uint32_t>& edge_of_use, std::vector<std::uint32_t>& added)
+      : input_(input), lines_(lines), pieces_(pieces), edge_of_use_(edge_of_use), added_(added) {}
 
   void run(std::uint32_t triangle, std::span<const std::uint32_t> uses) {
     triangle_ = triangle;
@@ -184,6 +187,7 @@ class Subdivider {
   const CutLines& lines_;
   Pieces& pieces_;
   const std::vector<std::uint32_t>& edge_of_use_;
+  std::vector<std::uint32_t>& added_;
   std::uint32_t triangle_ = 0;
   bool first_piece_ = true;
   std::vector<Spoke> spokes_;
@@ -263,8 +267,8 @@ void Subdivider::sort_around(std::uint32_t begin, std::uint32_t end) {
 void Subdivider::walk(std::uint32_t start) {
   std::uint32_t piece = triangle_;
   if (!first_piece_) {
-    piece = static_cast<std::uint32_t>(pieces_.triangle_of.size());
-    pieces_.triangle_of.push_back(triangle_);
+    piece = kOwn + static_cast<std::uint32_t>(added_.size());
+    added_.push_back(triangle_);
   }
   first_piece_ = false;
   for (std::uint32_t s = start; spokes_[s].piece == kOpen;) {
@@ -296,24 +300,51 @@ Result<Pieces> find_pieces(const ArrangementInput& input, const BoundaryPoints& 
   }
   const Buckets by_triangle = bucket(pieces.uses.size(), triangle_count,
                                      [&](std::size_t u) { return pieces.uses[u].triangle; });
-  Subdivider subdivider(input, lines, pieces, edge_of_use);
+  const auto uses_of = [&](std::uint32_t t) {
+    return std::span(by_triangle.items)
+        .subspan(by_triangle.first[t], by_triangle.first[t + 1] - by_triangle.first[t]);
+  };
+  std::vector<std::uint32_t> cut_triangles;
   for (std::uint32_t t = 0; t < triangle_count; ++t) {
-    const std::uint32_t begin = by_triangle.first[t], end = by_triangle.first[t + 1];
-    if (begin == end) continue;
-    if (t % 1024 == 0 && execution.stop.stop_requested()) {
-      return fail(ErrorCode::kCancelled, "stopped");
-    }
-    const auto uses = std::span(by_triangle.items).subspan(begin, end - begin);
     if (cut[t]) {
-      subdivider.run(t, uses);
+      cut_triangles.push_back(t);
       continue;
     }
-    for (const std::uint32_t u : uses) {  // sides of a triangle that is one piece
+    for (const std::uint32_t u : uses_of(t)) {  // sides of a triangle that is one piece
       EdgeUse& use = pieces.uses[u];
       const bool forward = input.corner(3 * t + use.side, 0) == pieces.edges[edge_of_use[u]].a;
       (forward ? use.left : use.right) = t;
     }
   }
+  constexpr std::size_t kBlock = 512;
+  const std::size_t blocks = (cut_triangles.size() + kBlock - 1) / kBlock;
+  std::vector<std::vector<std::uint32_t>> added(blocks);  // triangles of further pieces
+  const auto block_of = [&](std::size_t block) {
+    const std::size_t begin = block * kBlock;
+    return std::span(cut_triangles).subspan(begin, std::min(kBlock, cut_triangles.size() - begin));
+  };
+  parallel_for(execution, blocks, [&](std::size_t block, int) {
+    Subdivider subdivider(input, lines, pieces, edge_of_use, added[block]);
+    for (const std::uint32_t t : block_of(block)) subdivider.run(t, uses_of(t));
+  });
+  if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+  std::vector<std::uint32_t> before;
+  for (const std::vector<std::uint32_t>& some : added) {
+    before.push_back(static_cast<std::uint32_t>(pieces.triangle_of.size()));
+    pieces.triangle_of.insert(pieces.triangle_of.end(), some.begin(), some.end());
+  }
+  parallel_for(execution, blocks, [&](std::size_t block, int) {
+    for (const std::uint32_t t : block_of(block)) {
+      for (const std::uint32_t u : uses_of(t)) {
+        for (std::uint32_t* piece : {&pieces.uses[u].left, &pieces.uses[u].right}) {
+          if (*piece != EdgeUse::kNoPiece && *piece >= Subdivider::kOwn) {
+            *piece = *piece - Subdivider::kOwn + before[block];
+          }
+        }
+      }
+    }
+  });
+  if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
   return pieces;
 }
 
