@@ -23,6 +23,13 @@ class BoundaryPoints {
     /// vertex, vertex] of two edges of one plane; kThreePlanes: [triangle, triangle, triangle].
     std::array<std::uint32_t, 4> from{};
 
+    /// Of two edges, in any order.
+    static Recipe of_edges(std::array<std::uint32_t, 2> a, std::array<std::uint32_t, 2> b) {
+      if (a[0] > a[1]) std::swap(a[0], a[1]);
+      if (b[0] > b[1]) std::swap(b[0], b[1]);
+      if (b < a) std::swap(a, b);
+      return {Kind::kEdgeEdge, {a[0], a[1], b[0], b[1]}};
+    }
     friend bool operator==(const Recipe&, const Recipe&) = default;
   };
 
@@ -52,6 +59,8 @@ class BoundaryPoints {
     return exact::edge_plane_point(vertices_[recipe.from[0]], vertices_[recipe.from[1]],
                                    plane_of(recipe.from[2]));
   }
+  /// @pre the recipe is of kEdgeEdge
+  exact::EdgePoint edge_edge(const Recipe& recipe) const;
   /// The point itself.
   exact::RationalPoint rational(std::uint32_t point) const { return rational(recipe(point)); }
   exact::RationalPoint rational(const Recipe& recipe) const;

@@ -100,7 +100,7 @@ std::uint32_t Crosser::cross(const Item& a, const Item& b) {
   if (is_edge(a.line) && is_edge(b.line)) {
     const auto [p, q] = ends(a);
     const auto [r, s] = ends(b);
-    return out_.add_point(points_, {Kind::kEdgeEdge, {p, q, r, s}});
+    return out_.add_point(points_, BoundaryPoints::Recipe::of_edges({p, q}, {r, s}));
   }
   if (is_edge(a.line) || is_edge(b.line)) {
     const auto [p, q] = ends(is_edge(a.line) ? a : b);

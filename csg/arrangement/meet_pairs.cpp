@@ -261,9 +261,7 @@ void PairMeeter::clip_edge(const Side& a, int side, const Side& b) {
       return b.corners[corner];
     }
     const std::uint32_t r = b.corners[k], s = b.corners[next(k)];
-    const auto [p0, q0] = std::minmax(p, q);
-    const auto [r0, s0] = std::minmax(r, s);
-    return lines_.add_point(points_, {BoundaryPoints::Kind::kEdgeEdge, {p0, q0, r0, s0}});
+    return lines_.add_point(points_, Recipe::of_edges({p, q}, {r, s}));
   };
   const bool is_point = !less(low, high);
   const std::uint32_t from = point_at(low), to = is_point ? from : point_at(high);

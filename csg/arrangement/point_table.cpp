@@ -70,6 +70,8 @@ NewPoint make_point(const BoundaryPoints& points, const BoundaryPoints::Recipe& 
   NewPoint result{recipe, {}, false};
   if (recipe.kind == BoundaryPoints::Kind::kEdgePlane) {
     result.rounded = exact::round_for_file(points.edge_plane(recipe), result.moved);
+  } else if (recipe.kind == BoundaryPoints::Kind::kEdgeEdge) {
+    result.rounded = exact::round_for_file(points.edge_edge(recipe), result.moved);
   } else {
     const RationalPoint exact = points.rational(recipe);
     result.rounded = exact::round_for_file(exact);
