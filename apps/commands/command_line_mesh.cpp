@@ -3,6 +3,7 @@
 #include <CLI/App.hpp>
 
 #include <filesystem>
+#include <vector>
 
 #include "apps/commands/choice_words.h"
 #include "apps/commands/command_words.h"
@@ -92,6 +93,7 @@ void read_exact(const Words& words, MeshCommand& command, Reader& reader) {
   csg::BoundaryOptions& options = command.boundary;
   const MeshWords& mesh = words.mesh;
   if (!words.resolution.empty()) reader.fail_with("-r needs --method contour");
+  if (!words.voxel_size.empty()) reader.fail_with("--voxel-size needs --method contour");
   if (mesh.open == "vote") {
     reader.fail_with("--open vote needs --method contour, which winding numbers can decide");
   }
@@ -125,11 +127,20 @@ void read_contour(const Words& words, MeshCommand& command, Reader& reader) {
   if (!mesh.open.empty()) {
     reader.take(parse_choice("--open", mesh.open, kContourOpenWords), command.open);
   }
-  if (words.resolution.empty()) {
-    reader.fail_with("--method contour needs -r, the voxels along the longest side");
+  if (words.resolution.empty() == words.voxel_size.empty()) {
+    reader.fail_with(fmt::format(
+        "--method contour needs -r, the voxels along the longest side, or --voxel-size, got {}",
+        words.resolution.empty() ? "neither" : "both"));
     return;
   }
-  reader.take(parse_integer("--resolution", words.resolution), command.resolution);
+  if (!words.resolution.empty()) {
+    return reader.take(parse_integer("--resolution", words.resolution), command.grid.resolution);
+  }
+  std::vector<double> numbers;
+  reader.take(parse_numbers("--voxel-size", words.voxel_size, 1, 3), numbers);
+  if (reader.error()) return;
+  numbers.resize(3, numbers[0]);
+  command.grid.voxel_size = glm::dvec3(numbers[0], numbers[1], numbers[2]);
 }
 
 }  // namespace
@@ -174,6 +185,8 @@ void define_mesh(CLI::App& app, Words& words) {
   option("-r,--resolution", words.resolution,
          "With --method contour: voxels along the longest side of the input, 1 to 65536", "N",
          surface);
+  option("--voxel-size", words.voxel_size,
+         "With --method contour: length of a voxel, or three along x, y, z", "S|SX,SY,SZ", surface);
   option("--open", mesh.open,
          "Meshes with holes: cap closes each hole by triangles (default), vote lets winding "
          "numbers decide (default and only with --method contour), fail ends the command",

@@ -89,7 +89,7 @@ struct MeshCommand {
   LengthUnit unit = LengthUnit::kMillimetre;  ///< of a 3MF
   MeshMethod method = MeshMethod::kExact;
   csg::BoundaryOptions boundary;    ///< of the exact method
-  std::int64_t resolution = 0;      ///< of the contour: voxels along the longest side
+  GridRequest grid;                 ///< of the contour: its resolution or voxel size
   OpenMode open = OpenMode::kVote;  ///< of the contour
   std::optional<std::string> json;  ///< "-": standard output
 };

@@ -226,9 +226,7 @@ Result<void> MeshRun::make_contour() {
   outcome_.triangles = input->soup.triangles.size();
   outcome_.solids = input->scene ? input->scene->solids().size() : input->files.size();
   outcome_.nodes = input->scene ? input->scene->nodes().size() : outcome_.solids;
-  GridRequest request;
-  request.resolution = command_.resolution;
-  const auto grid = fit_grid(input->bounds, request);
+  const auto grid = fit_grid(input->bounds, command_.grid);
   if (!grid) {
     return fail(grid.error().code, "{}: {}", command_.input.files.front(), grid.error().message);
   }

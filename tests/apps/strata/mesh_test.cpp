@@ -220,6 +220,10 @@ TEST_F(MeshTool, MistakesOnTheCommandLineAreNamed) {
   usage({"-o", "a.ply", "--open", "vote"}, "--open vote needs --method contour");
   usage({"-o", "a.ply", "-r", "64"}, "-r needs --method contour");
   usage({"-o", "a.ply", "--method", "contour"}, "--method contour needs -r");
+  usage({"-o", "a.ply", "--voxel-size", "1"}, "--voxel-size needs --method contour");
+  usage({"-o", "a.ply", "--method", "contour", "-r", "8", "--voxel-size", "1"}, "got both");
+  usage({"-o", "a.ply", "--method", "contour", "--voxel-size", "1,2"}, "--voxel-size");
+  usage({"-o", "a.ply", "--method", "contour", "--voxel-size", "0"}, "voxel size");
   usage({"-o", "a.ply", "--method", "contour", "-r", "8", "--bits", "20"},
         "--bits needs --method exact");
   usage({"-o", "a.ply", "--method", "contour", "-r", "8", "--open", "cap"},
