@@ -46,7 +46,7 @@ struct ContourReport {
 /// A contour and how it was made.
 struct ContourMesh {
   SolidMesh mesh;  ///< one part without a name
-  ContourReport report;
+  ContourReport report;  ///< counts
 };
 
 /// The surface of a mesh's or a tree's solid by dual contouring of its depth lists along x, y and
