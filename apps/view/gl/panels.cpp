@@ -331,7 +331,8 @@ void Panels::exports(Viewer& viewer) {
     export_voxels_ = std::clamp(export_voxels_, 1, kMaxGridSide);
   }
   std::error_code ignored;
-  const char* label = std::filesystem::exists(path, ignored) ? "Replace the file" : "Export";
+  const char* label =
+      std::filesystem::exists(path, ignored) ? "Replace the file###write" : "Export###write";
   if (!ImGui::Button(label, {-1, 0})) return;
   if (auto started = viewer.start_export(path, export_voxels_); !started) {
     tell(started.error().message);
