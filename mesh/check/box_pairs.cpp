@@ -7,6 +7,9 @@
 #include <glm/common.hpp>
 #include <thread>
 #include <utility>
+#ifdef __SSE2__
+#include <emmintrin.h>
+#endif
 
 // The division is an octree's. That a pair is compared only in the cell of its least shared point,
 // by classes of boxes that begin in a cell or before it, is from Tsitsigkos, Lampropoulos, Bouros,
@@ -17,14 +20,16 @@
 namespace strata {
 namespace {
 
-constexpr std::size_t kFewBoxes = 40;      // in a cell that is not divided
-constexpr std::size_t kCopyCost = 12;      // to pass a box on costs as much as so many comparisons
+constexpr std::size_t kFewBoxes = 100;     // in a cell that is not divided
+constexpr std::size_t kCopyCost = 24;      // to pass a box on costs as much as so many comparisons
 constexpr std::size_t kBatch = 512;        // pairs a visit
 constexpr std::size_t kTaskBoxes = 20000;  // a cell with more is divided by all threads
 
-struct Entry {
-  glm::ivec3 low, high;
-  std::uint32_t box, group;
+struct alignas(16) Entry {  // as two vectors of four
+  glm::ivec3 low;
+  std::uint32_t box;
+  glm::ivec3 high;
+  std::uint32_t group;
 };
 
 struct Cell {
@@ -38,7 +43,7 @@ struct Cell {
 constexpr unsigned kClasses = 16, kCovers = 8, kBegins = 7;
 
 // Where the boxes of each class begin in a list; the last is the end.
-using ClassBegins = std::array<std::size_t, kClasses + 1>;
+using ClassBegins = std::array<std::uint32_t, kClasses + 1>;
 
 struct Task {
   std::vector<Entry> entries;
@@ -65,62 +70,70 @@ class Search {
   std::vector<Task> divide(Task task) {
     entries_ = std::move(task.entries);
     std::vector<Task> tasks;
-    std::array<ClassBegins, 8> parts;
-    if (prepare(task.begins, task.cell, parts)) {
-      for (unsigned part = 0; part < 8; ++part) {
-        const std::size_t first = parts[part].front(), end = parts[part].back();
-        if (end - first < 2) continue;
-        for (std::size_t& begin : parts[part]) begin -= first;
-        const auto at = [&](std::size_t i) {
-          return entries_.begin() + static_cast<std::ptrdiff_t>(i);
-        };
-        tasks.push_back({{at(first), at(end)}, parts[part], part_of(task.cell, part)});
-      }
+    const int bits = prepare(task.begins, task.cell);
+    for (std::size_t part = 0; part < parts_.size(); ++part) {
+      ClassBegins begins = parts_[part];
+      const std::uint32_t first = begins.front(), end = begins.back();
+      if (end - first < 2) continue;
+      for (std::uint32_t& begin : begins) begin -= first;
+      tasks.push_back({{entries_.begin() + first, entries_.begin() + end},
+                       begins,
+                       part_of(task.cell, part, bits)});
     }
     flush();
     entries_ = {};
+    parts_ = {};
     return tasks;
   }
 
  private:
-  static Cell part_of(const Cell& cell, unsigned part) {
-    Cell result{cell.low, cell.bits - 1};
-    for (unsigned k = 0; k < 3; ++k) {
-      if ((part >> k & 1) != 0) result.low[k] += std::int64_t{1} << result.bits;
+  // Parts are numbered by `bits` bits for each axis.
+  static Cell part_of(const Cell& cell, std::size_t part, int bits) {
+    Cell result{cell.low, cell.bits - bits};
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::size_t along =
+          part >> k * static_cast<std::size_t>(bits) & ((std::size_t{1} << bits) - 1);
+      result.low[k] += static_cast<std::int64_t>(along) << result.bits;
     }
     return result;
   }
 
   void search(const ClassBegins& begins, const Cell& cell) {
-    std::array<ClassBegins, 8> parts;
-    if (!prepare(begins, cell, parts)) return;
+    const std::size_t first = parts_.size();
+    const int bits = prepare(begins, cell);
     // The last part lies at the end of the lists: it is searched there, then removed.
-    for (unsigned part = 8; part-- > 0;) {
-      entries_.resize(parts[part].back());
-      search(parts[part], part_of(cell, part));
+    for (std::size_t part = parts_.size(); part-- > first;) {
+      const ClassBegins own = parts_[part];
+      if (own.back() - own.front() < 2) continue;
+      entries_.resize(own.back());
+      search(own, part_of(cell, part - first, bits));
     }
+    parts_.resize(first);
   }
 
-  // Compares the boxes of a cell, or appends them by the parts of the cell.
-  // @return whether parts are left to be searched
-  bool prepare(const ClassBegins& begins, const Cell& cell, std::array<ClassBegins, 8>& parts) {
-    if (begins.back() - begins.front() < 2 || one_group(begins)) return false;
-    if (execution_.stop.stop_requested()) return false;
+  // Compares the boxes of a cell, or appends its parts and the boxes of each.
+  // @return the bits of the parts' numbers along each axis; 0: there are none
+  int prepare(const ClassBegins& begins, const Cell& cell) {
+    if (begins.back() - begins.front() < 2 || one_group(begins)) return 0;
+    if (execution_.stop.stop_requested()) return 0;
     compare_covering(begins);
     entries_.resize(begins[kCovers]);
     const std::size_t boxes = begins[kCovers] - begins.front();
     const std::uint64_t comparisons = comparisons_of(begins);
-    if (comparisons == 0) return false;
-    if (boxes > kFewBoxes && cell.bits > 0 && comparisons > kCopyCost * boxes &&
-        distribute(begins, cell, comparisons, parts)) {
-      return true;
+    if (comparisons == 0) return 0;
+    if (boxes > kFewBoxes && comparisons > kCopyCost * boxes) {
+      // Many parts at once if that makes few copies.
+      const int many = boxes > 4000 ? 3 : boxes > 300 ? 2 : 1;
+      for (int bits = std::min(many, cell.bits); bits > 0; bits = std::min(bits - 1, 1)) {
+        if (distribute(begins, cell, bits, comparisons)) return bits;
+      }
     }
     if (comparisons < 64 * boxes) {
       compare_classes(begins);
     } else {
       sweep(begins, cell);
     }
-    return false;
+    return 0;
   }
 
   [[nodiscard]] bool one_group(const ClassBegins& begins) const {
@@ -133,14 +146,16 @@ class Search {
 
   // Between boxes that do not cover the cell.
   static std::uint64_t comparisons_of(const ClassBegins& begins) {
-    std::uint64_t count = 0;
+    const auto size = [&](unsigned c) { return std::uint64_t{begins[c + 1]} - begins[c]; };
+    const std::uint64_t all = size(kBegins);
+    std::uint64_t count = all * (all - (all > 0)) / 2;
     for (unsigned a = 0; a < kBegins; ++a) {
+      if (size(a) == 0) continue;
       for (unsigned b = a + 1; b <= kBegins; ++b) {
-        if ((a | b) == kBegins) count += (begins[a + 1] - begins[a]) * (begins[b + 1] - begins[b]);
+        if ((a | b) == kBegins) count += size(a) * size(b);
       }
     }
-    const std::uint64_t all = begins[kBegins + 1] - begins[kBegins];
-    return count + all * (all - (all > 0)) / 2;
+    return count;
   }
 
   void compare_covering(const ClassBegins& begins) {
@@ -158,79 +173,108 @@ class Search {
     }
   }
 
-  // The parts that a box touches, each with the class that the box has there.
+  // The parts that a box touches along an axis, from first to last.
+  struct Along {
+    std::uint32_t first, last;
+    bool begins, covers_first, covers_last;
+
+    [[nodiscard]] bool covers(std::uint32_t at) const {
+      return (at != first || covers_first) && (at != last || covers_last);
+    }
+  };
+  static Along along(std::int64_t low, std::int64_t high, std::int64_t from, int bits, int shift) {
+    const std::int64_t size = std::int64_t{1} << shift, most = (std::int64_t{1} << bits) - 1;
+    const std::int64_t first = std::max<std::int64_t>((low - from) >> shift, 0);
+    const std::int64_t last = std::min((high - from) >> shift, most);
+    return {static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last), low >= from,
+            low <= from + first * size, high >= from + (last + 1) * size - 1};
+  }
+
+  // Calls visit(part, class) for the parts that a box touches.
   template <class Visit>
-  static void for_parts(const Entry& entry, const Cell& cell, const Visit& visit) {
-    constexpr unsigned kLower[3] = {0x55, 0x33, 0x0f};  // the parts in the lower half of an axis
-    const std::int64_t half = std::int64_t{1} << (cell.bits - 1);
-    unsigned parts = 0xff, begins_below = 0, begins_above = 0;
-    bool may_cover = true;
-    for (unsigned k = 0; k < 3; ++k) {
-      const std::int64_t low = entry.low[static_cast<int>(k)],
-                         high = entry.high[static_cast<int>(k)];
-      const std::int64_t from = cell.low[k], middle = from + half;
-      parts &= (low < middle ? kLower[k] : 0) | (high >= middle ? ~kLower[k] : 0);
-      begins_below |= static_cast<unsigned>(low >= from) << k;
-      begins_above |= static_cast<unsigned>(low >= middle) << k;
-      may_cover = may_cover && high - low >= half - 1;
-    }
-    for (; parts != 0; parts &= parts - 1) {
-      const auto part = static_cast<unsigned>(std::countr_zero(parts));
-      const unsigned begins = (begins_below & ~part) | (begins_above & part);
-      const bool covers = may_cover && covers_cell(entry, part_of(cell, part));
-      visit(part, begins | (covers ? kCovers : 0));
+  static void for_parts(const Entry& entry, const Cell& cell, int bits, const Visit& visit) {
+    const int shift = cell.bits - bits;
+    const Along x = along(entry.low.x, entry.high.x, cell.low[0], bits, shift),
+                y = along(entry.low.y, entry.high.y, cell.low[1], bits, shift),
+                z = along(entry.low.z, entry.high.z, cell.low[2], bits, shift);
+    for (std::uint32_t k = z.first; k <= z.last; ++k) {
+      const unsigned in_z = static_cast<unsigned>(z.begins && k == z.first) << 2;
+      for (std::uint32_t j = y.first; j <= y.last; ++j) {
+        const unsigned in_yz = in_z | static_cast<unsigned>(y.begins && j == y.first) << 1;
+        const bool covers = z.covers(k) && y.covers(j);
+        for (std::uint32_t i = x.first; i <= x.last; ++i) {
+          const unsigned begins = in_yz | static_cast<unsigned>(x.begins && i == x.first);
+          visit((k << bits | j) << bits | i, begins | (covers && x.covers(i) ? kCovers : 0));
+        }
+      }
     }
   }
 
-  static bool covers_cell(const Entry& entry, const Cell& cell) {
-    const std::int64_t last = (std::int64_t{1} << cell.bits) - 1;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const auto axis = static_cast<int>(k);
-      if (entry.low[axis] > cell.low[k] || entry.high[axis] < cell.low[k] + last) return false;
-    }
-    return true;
-  }
-
-  // Appends the boxes of each of the eight parts, unless comparing all is cheaper. Boxes that are
-  // crowded in one part are always passed on: they may be apart there.
-  bool distribute(const ClassBegins& begins, const Cell& cell, std::uint64_t comparisons,
-                  std::array<ClassBegins, 8>& parts) {
+  // Appends the parts and the boxes of each, unless comparing all is cheaper. Boxes that are
+  // crowded in one of eight parts are always passed on: they may be apart there.
+  bool distribute(const ClassBegins& begins, const Cell& cell, int bits,
+                  std::uint64_t comparisons) {
     const std::size_t first = begins.front(), end = begins[kCovers], boxes = end - first;
-    std::array<std::array<std::uint32_t, kClasses>, 8> counts{};
-    for (std::size_t i = first; i < end; ++i) {
-      for_parts(entries_[i], cell,
-                [&](unsigned part, unsigned box_class) { ++counts[part][box_class]; });
+    const std::size_t before = parts_.size(), count = std::size_t{1} << 3 * bits;
+    parts_.resize(before + count);  // filled with zeros
+    ClassBegins* const parts = parts_.data() + before;
+    std::size_t copies = 0;
+    const std::size_t most_copies = bits > 1 ? 2 * boxes : ~std::size_t{0};
+    for (std::size_t i = first; i < end && copies <= most_copies; ++i) {
+      for_parts(entries_[i], cell, bits, [&](std::uint32_t part, unsigned box_class) {
+        ++parts[part][box_class];
+        ++copies;
+      });
     }
-    std::size_t at = end, most = 0;
+    if (copies > most_copies || end + copies > 0xffffffffu) {
+      parts_.resize(before);
+      return false;
+    }
+    std::size_t most = 0;
     std::uint64_t later = 0;
-    for (unsigned part = 0; part < 8; ++part) {
-      parts[part].front() = at;
-      for (unsigned c = 0; c < kClasses; ++c) parts[part][c + 1] = at += counts[part][c];
-      most = std::max(most, at - parts[part].front());
-      later += comparisons_of(parts[part]);
+    auto at = static_cast<std::uint32_t>(end);
+    for (std::size_t part = 0; part < count; ++part) {
+      const std::uint32_t from = at;
+      for (std::uint32_t& begin : parts[part]) at += std::exchange(begin, at);
+      most = std::max<std::size_t>(most, at - from);
+      if (at - from > 1) later += comparisons_of(parts[part]);
     }
-    const std::size_t copies = at - end;
-    if (later + kCopyCost * copies >= comparisons && (most < boxes / 8 * 7 || copies > 2 * boxes)) {
+    const bool crowded = bits == 1 && most >= boxes / 8 * 7 && copies <= 2 * boxes;
+    if (later + kCopyCost * copies >= comparisons && !crowded) {
+      parts_.resize(before);
       return false;
     }
     entries_.resize(at);
-    std::array<std::array<std::size_t, kClasses>, 8> next{};
-    for (unsigned part = 0; part < 8; ++part) {
-      std::copy_n(parts[part].begin(), kClasses, next[part].begin());
-    }
     for (std::size_t i = first; i < end; ++i) {
-      for_parts(entries_[i], cell, [&](unsigned part, unsigned box_class) {
-        entries_[next[part][box_class]++] = entries_[i];
+      for_parts(entries_[i], cell, bits, [&](std::uint32_t part, unsigned box_class) {
+        entries_[parts[part][box_class]++] = entries_[i];
       });
+    }
+    // Each begin is now where the next class begins.
+    for (std::size_t part = count; part-- > 0;) {
+      for (std::size_t c = kClasses; c-- > 0;) parts[part][c + 1] = parts[part][c];
+      parts[part][0] = part > 0 ? parts[part - 1][kClasses - 1] : static_cast<std::uint32_t>(end);
     }
     return true;
   }
 
-  void compare(const Entry& a, const Entry& b) {
+  static bool apart(const Entry& a, const Entry& b) {
+#ifdef __SSE2__
+    const auto load = [](const glm::ivec3& v) {
+      return _mm_load_si128(reinterpret_cast<const __m128i*>(&v));
+    };
+    const __m128i above = _mm_or_si128(_mm_cmpgt_epi32(load(a.low), load(b.high)),
+                                       _mm_cmpgt_epi32(load(b.low), load(a.high)));
+    return (_mm_movemask_ps(_mm_castsi128_ps(above)) & 7) != 0;
+#else
     // One jump instead of six, which are hard to predict.
-    const bool apart = (a.low.x > b.high.x) | (b.low.x > a.high.x) | (a.low.y > b.high.y) |
-                       (b.low.y > a.high.y) | (a.low.z > b.high.z) | (b.low.z > a.high.z);
-    if (!apart) keep(a, b);
+    return (a.low.x > b.high.x) | (b.low.x > a.high.x) | (a.low.y > b.high.y) |
+           (b.low.y > a.high.y) | (a.low.z > b.high.z) | (b.low.z > a.high.z);
+#endif
+  }
+
+  void compare(const Entry& a, const Entry& b) {
+    if (!apart(a, b)) keep(a, b);
   }
 
   void keep(const Entry& a, const Entry& b) {
@@ -293,6 +337,7 @@ class Search {
   int worker_;
   const Execution& execution_;
   std::vector<Entry> entries_;
+  std::vector<ClassBegins> parts_;  // of the cells that are being searched
   std::vector<BoxPair> found_;
 };
 
@@ -303,7 +348,7 @@ Task whole_task(std::span<const LatticeBox> boxes, std::span<const std::uint32_t
   for (std::size_t i = 0; i < boxes.size(); ++i) {
     const LatticeBox& box = boxes[i];
     task.entries.push_back(
-        {box.low, box.high, static_cast<std::uint32_t>(i), groups.empty() ? 0 : groups[i]});
+        {box.low, static_cast<std::uint32_t>(i), box.high, groups.empty() ? 0 : groups[i]});
     low = glm::min(low, box.low);
     high = glm::max(high, box.high);
   }
@@ -313,7 +358,9 @@ Task whole_task(std::span<const LatticeBox> boxes, std::span<const std::uint32_t
     most = std::max(most, static_cast<std::uint64_t>(std::int64_t{high[k]} - low[k]));
   }
   task.cell.bits = static_cast<int>(std::bit_width(most));
-  for (unsigned c = kBegins + 1; c <= kClasses; ++c) task.begins[c] = task.entries.size();
+  for (unsigned c = kBegins + 1; c <= kClasses; ++c) {
+    task.begins[c] = static_cast<std::uint32_t>(task.entries.size());
+  }
   return task;
 }
 

@@ -66,8 +66,8 @@ class BoxPairs : public testing::TestWithParam<Kind> {
 };
 INSTANTIATE_TEST_SUITE_P(
     Kinds, BoxPairs,
-    testing::Values(Kind{"Few", 20, 1000, 300, 0}, Kind{"Small", 3000, 1 << 20, 1 << 16, 0},
-                    Kind{"SmallAndLarge", 3000, 1 << 28, 1 << 23, 30},
+    testing::Values(Kind{"Few", 20, 1000, 300, 0}, Kind{"Small", 9000, 1 << 20, 1 << 16, 0},
+                    Kind{"SmallAndLarge", 9000, 1 << 28, 1 << 23, 30},
                     Kind{"AllLarge", 1000, 1 << 20, 1 << 20, 0}, Kind{"Crowded", 2000, 8, 1, 0},
                     Kind{"OnePoint", 500, 1, 0, 0}, Kind{"Points", 5000, 16, 0, 5},
                     Kind{"WholeRange", 2000, std::numeric_limits<std::int32_t>::max(), 1 << 28, 9}),
