@@ -6,8 +6,8 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
-#include "csg/arrangement/buckets.h"
 #include "exact/determinants.h"
+#include "mesh/check/plain_stars.h"
 #include "mesh/disjoint_sets.h"
 
 namespace strata::csg {
@@ -90,82 +90,33 @@ std::vector<bool> find_embedded(const WeldedSolids& solids, const MeshEdges& edg
   return result;
 }
 
-// Whether the triangles around a vertex are one fan that looks one way: seen along the sum of their
-// normals, none is turned over and they go around once. Such a fan does not meet itself.
-class Stars {
- public:
-  Stars(const WeldedSolids& solids, const MeshEdges& edges, const std::vector<bool>& embedded,
-        const Execution& execution)
-      : solids_(solids), edges_(edges), plain_(solids.vertices.size(), 0) {
-    if (std::ranges::find(embedded, false) == embedded.end()) return;
-    around_ = bucket(3 * solids.triangles.size(), solids.vertices.size(), [&](std::size_t i) {
-      return solids.triangles[i / 3][static_cast<int>(i % 3)];
-    });
-    constexpr std::size_t kBlock = 8192;
-    const std::size_t count = solids.vertices.size();
-    parallel_for(execution, (count + kBlock - 1) / kBlock, [&](std::size_t block, int) {
-      for (std::size_t v = block * kBlock; v < std::min(count, (block + 1) * kBlock); ++v) {
-        plain_[v] = is_plain(static_cast<std::uint32_t>(v)) ? 1 : 0;
-      }
-    });
+// Vertices whose triangles are known to meet in vertices and edges of both alone.
+std::vector<std::uint8_t> find_plain(const WeldedSolids& solids, const MeshEdges& edges,
+                                     const Execution& execution) {
+  std::vector<std::uint8_t> plain =
+      plain_stars(std::span<const LatticePoint>(solids.vertices), solids.triangles, execution);
+  const auto corner = [&](std::uint32_t use, std::uint32_t next) {
+    return solids.triangles[use / 3][static_cast<int>((use % 3 + next) % 3)];
+  };
+  for (std::uint32_t e = 0; e < edges.size(); ++e) {  // a fan has no other edges
+    const auto uses = edges.uses_of(e);
+    if (uses.size() == 2 && corner(uses[0], 0) == corner(uses[1], 1)) continue;
+    plain[corner(uses[0], 0)] = plain[corner(uses[0], 1)] = 0;
   }
-
-  bool plain(std::uint32_t vertex) const { return plain_[vertex] != 0; }
-
- private:
-  // Two triangles of one solid that continue each other.
-  bool simple(std::uint32_t edge) const {
-    const auto uses = edges_.uses_of(edge);
-    return uses.size() == 2 && solids_.content_of[uses[0] / 3] == solids_.content_of[uses[1] / 3] &&
-           solids_.triangles[uses[0] / 3][static_cast<int>(uses[0] % 3)] !=
-               solids_.triangles[uses[1] / 3][static_cast<int>(uses[1] % 3)];
-  }
-
-  bool is_plain(std::uint32_t v) const {
-    const auto uses =
-        std::span(around_.items).subspan(around_.first[v], around_.first[v + 1] - around_.first[v]);
-    const auto corner = [&](std::uint32_t use, std::uint32_t next) {
-      const std::uint32_t k = use % 3 + next;
-      return glm::dvec3(
-          solids_.vertices[solids_.triangles[use / 3][static_cast<int>(k > 2 ? k - 3 : k)]] -
-          solids_.vertices[v]);
-    };
-    glm::dvec3 sum(0.0);
-    for (const std::uint32_t use : uses) {
-      if (!simple(edges_.edge_of[use])) return false;
-      sum += glm::cross(corner(use, 1), corner(use, 2));
-    }
-    const double size = glm::length(sum);
-    if (!(size > 0)) return false;
-    const glm::dvec3 along = sum / size;
-    const glm::dvec3 right =
-        glm::cross(along, std::abs(along.x) < 0.6 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0));
-    const glm::dvec3 up = glm::cross(along, right);
-    int turns = 0;  // triangles that hold the direction `right`: one for each time around
-    for (const std::uint32_t use : uses) {
-      const glm::dvec3 a = corner(use, 1), b = corner(use, 2), normal = glm::cross(a, b);
-      if (!(glm::dot(normal, along) > 1e-6 * glm::length(normal))) return false;
-      turns += glm::dot(a, up) < 0 && glm::dot(b, up) >= 0;
-    }
-    return turns == 1;
-  }
-
-  const WeldedSolids& solids_;
-  const MeshEdges& edges_;
-  Buckets around_;
-  std::vector<std::uint8_t> plain_;
-};
+  return plain;
+}
 
 class PairFilter {
  public:
-  PairFilter(const WeldedSolids& solids, const Stars& stars) : solids_(solids), stars_(stars) {}
+  PairFilter(const WeldedSolids& solids, std::vector<std::uint8_t> plain)
+      : solids_(solids), plain_(std::move(plain)) {}
 
   // Whether each of two triangles has points in the plane of the other, not counting a corner or an
   // edge that both have. Corners of both are equal vertices.
   bool may_meet(const BoxPair& pair) const {
     const glm::uvec3 &t = solids_.triangles[pair.first], &o = solids_.triangles[pair.second];
     for (int k = 0; k < 3; ++k) {
-      if ((t[k] == o.x || t[k] == o.y || t[k] == o.z) && stars_.plain(t[k])) return false;
+      if ((t[k] == o.x || t[k] == o.y || t[k] == o.z) && plain_[t[k]] != 0) return false;
     }
     return reaches(pair.first, pair.second) && reaches(pair.second, pair.first);
   }
@@ -194,7 +145,7 @@ class PairFilter {
   }
 
   const WeldedSolids& solids_;
-  const Stars& stars_;
+  std::vector<std::uint8_t> plain_;
 };
 
 LatticeBox box_of(const WeldedSolids& solids, const glm::uvec3& t) {
@@ -221,8 +172,10 @@ Result<std::vector<BoxPair>> find_candidate_pairs(const WeldedSolids& solids,
     // A group of its own: its pairs with all others are wanted.
     groups.push_back(one_group ? content : static_cast<std::uint32_t>(embedded.size()) + t);
   }
-  const Stars stars(solids, edges, embedded, execution);
-  const PairFilter filter(solids, stars);
+  const bool all_embedded = std::ranges::find(embedded, false) == embedded.end();
+  const PairFilter filter(solids, all_embedded
+                                      ? std::vector<std::uint8_t>(solids.vertices.size(), 0)
+                                      : find_plain(solids, edges, execution));
   std::vector<std::vector<BoxPair>> found(static_cast<std::size_t>(execution.thread_count()));
   std::atomic<std::uint64_t> bytes = 0;
   const auto too_many = [&] {

@@ -22,7 +22,8 @@ struct View {
 
 // The sum of the triangles' normals, as whole numbers up to 2^30; the half-plane lies in no
 // direction that is likely in a mesh.
-std::vector<View> views(std::span<const FilePoint> points, std::span<const glm::uvec3> triangles) {
+template <class Point>
+std::vector<View> views(std::span<const Point> points, std::span<const glm::uvec3> triangles) {
   std::vector<View> result(points.size());
   for (const glm::uvec3& t : triangles) {
     const RealNormal u(points[t.y] - points[t.x]), v(points[t.z] - points[t.x]);
@@ -49,7 +50,8 @@ int side_of(const View& view, const RealNormal& v) {
 
 }  // namespace
 
-std::vector<std::uint8_t> plain_stars(std::span<const FilePoint> points,
+template <class Point>
+std::vector<std::uint8_t> plain_stars(std::span<const Point> points,
                                       std::span<const glm::uvec3> triangles,
                                       const Execution& execution) {
   const std::vector<View> view = views(points, triangles);
@@ -67,7 +69,7 @@ std::vector<std::uint8_t> plain_stars(std::span<const FilePoint> points,
       const exact::filters::BoundedCross normal = exact::filters::cross(u, v);
       for (int k = 0; k < 3; ++k) {
         const std::uint32_t at = t[k];
-        const FilePoint &a = points[t[(k + 1) % 3]], &b = points[t[(k + 2) % 3]];
+        const Point &a = points[t[(k + 1) % 3]], &b = points[t[(k + 2) % 3]];
         const int first = side_of(view[at], RealNormal(a - points[at])),
                   last = side_of(view[at], RealNormal(b - points[at]));
         if (first * last == 0 || exact::filters::dot(view[at].direction, normal).sign() <= 0) {
@@ -81,5 +83,10 @@ std::vector<std::uint8_t> plain_stars(std::span<const FilePoint> points,
   for (std::size_t v = 0; v < points.size(); ++v) plain[v] = plain[v] != 0 && turns[v] == 1;
   return plain;
 }
+
+template std::vector<std::uint8_t> plain_stars(std::span<const FilePoint>,
+                                               std::span<const glm::uvec3>, const Execution&);
+template std::vector<std::uint8_t> plain_stars(std::span<const exact::LatticePoint>,
+                                               std::span<const glm::uvec3>, const Execution&);
 
 }  // namespace strata

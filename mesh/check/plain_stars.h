@@ -19,7 +19,9 @@ namespace strata {
 /// right to the left of a half-plane that n bounds. So no two of them are seen one behind the
 /// other, and two that are neighbours in the turn have the edge between them in common.
 /// @pre each directed edge is there as often as its opposite, by index
-std::vector<std::uint8_t> plain_stars(std::span<const exact::FilePoint> points,
+/// @tparam Point  exact::FilePoint or exact::LatticePoint
+template <class Point>
+std::vector<std::uint8_t> plain_stars(std::span<const Point> points,
                                       std::span<const glm::uvec3> triangles,
                                       const Execution& execution);
 

@@ -23,7 +23,7 @@ struct FileMesh {
     return {points[triangles[t].x], points[triangles[t].y], points[triangles[t].z]};
   }
   [[nodiscard]] std::vector<std::uint8_t> plain(int threads = 0) const {
-    return plain_stars(points, triangles, {.threads = threads});
+    return plain_stars(std::span<const FilePoint>(points), triangles, {.threads = threads});
   }
 };
 
