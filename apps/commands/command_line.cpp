@@ -64,7 +64,7 @@ constexpr const char* kInfoExamples =
 
   strata info scan.ply
   strata info --json *.stl
-  strata info part.stl --check         is it a solid? which triangles meet?
+  strata info part.3mf --check         is it a solid? which triangles meet?
   strata info plate.csg                measured by rays, with error bounds
   strata info --gl                     OpenGL: what is found and how it is used
 )";

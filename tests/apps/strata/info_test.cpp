@@ -171,10 +171,11 @@ TEST(Info, WhatStrataMeshWritesPassesTheCheck) {
               "difference() { cube(size = [3, 3, 3], center = true); sphere(r = 1.9, $fn = 30); "
               "multmatrix([[0.8, -0.6, 0, 0], [0.6, 0.8, 0, 0]]) cylinder(h = 4, r1 = 1, r2 = 1.2, "
               "center = true, $fn = 40); }\n");
-  for (const std::string name : {"a.obj", "a.stl", "a.ply", "a.off"}) {
+  for (const std::string name : {"a.obj", "a.stl", "a.ply", "a.off", "a.3mf"}) {
     const RunResult made = place.run({"mesh", "scene.csg", "-o", name});
     ASSERT_EQ(made.exit_code, 0) << made.err;
     const RunResult run = place.run({"info", "--check", "--strict", "--json", name});
+    if (name == "a.3mf" && run.exit_code == 2) continue;  // built without libzip or pugixml
     EXPECT_EQ(run.exit_code, 0) << run.err;
     const json check = json::parse(run.out)["files"][0]["check"];
     EXPECT_EQ(check["passed"], true) << run.out;
