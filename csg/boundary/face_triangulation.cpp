@@ -191,7 +191,7 @@ bool FaceTriangulation::append(std::uint32_t index, FaceTriangles& out) {
     append_mesh(plane, out);
   }
   out.labels.resize(out.triangles.size(), plane.label);
-  out.planes.resize(out.triangles.size(), simple ? index : FaceTriangles::kNotSimple);
+  out.planes.resize(out.triangles.size(), simple ? index : index | FaceTriangles::kNotSimple);
   return true;
 }
 

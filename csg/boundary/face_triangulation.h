@@ -15,10 +15,10 @@ struct FaceTriangles {
   std::vector<glm::uvec3> triangles;  ///< points, counter-clockwise from outside
   std::vector<std::uint32_t> labels;  ///< of the triangles
   std::vector<WedgeEdge> wedges;
-  /// Of the triangles: the index of their plane, or kNotSimple where edges meet once they are
+  /// Of the triangles: the index of their plane, with kNotSimple where edges meet once they are
   /// rounded.
   std::vector<std::uint32_t> planes;
-  static constexpr std::uint32_t kNotSimple = 0xffffffffu;
+  static constexpr std::uint32_t kNotSimple = 0x80000000u;
 };
 
 /// Triangulates the faces of planes of a boundary. One object serves one thread.

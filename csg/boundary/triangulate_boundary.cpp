@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
-#include <numeric>
+#include <map>
 
 #include "csg/arrangement/point_table.h"
 #include "csg/boundary/face_triangulation.h"
@@ -35,6 +35,8 @@ class Triangulation {
   bool triangulate_planes();
   void collect(std::vector<FaceTriangles>& parts);
   Index group_of(const glm::uvec3& triangle, Index plane) const;
+  std::vector<WedgeEdge> all_half_edges() const;
+  Result<void> split_vertices();
   int compare_exactly(Index a, Index b) const;
   Result<MeshRepair> check_and_sort();
   TriangulatedBoundary finish();
@@ -44,6 +46,7 @@ class Triangulation {
   const Execution& execution_;
   std::vector<std::uint8_t> moved_;  // the points, by rounding
   RoundedMesh mesh_;                 // its vertices are the points, then the additional ones
+  std::vector<Index> planes_;        // of the triangles after the wholes, as in FaceTriangles
   std::vector<WedgeEdge> wedges_;
   std::vector<Index> additional_;  // the points of the vertices after those of the points
   std::uint64_t split_ = 0;
@@ -128,6 +131,7 @@ void Triangulation::collect(std::vector<FaceTriangles>& parts) {
     for (std::size_t t = 0; t < part.triangles.size(); ++t) {
       mesh_.groups.push_back(group_of(part.triangles[t], part.planes[t]));
     }
+    planes_.insert(planes_.end(), part.planes.begin(), part.planes.end());
     for (const WedgeEdge& edge : part.wedges) {
       wedges_.push_back({before + edge.triangle, edge.corner, edge.wedge});
     }
@@ -138,7 +142,56 @@ void Triangulation::collect(std::vector<FaceTriangles>& parts) {
 // Triangles of exact points do not meet; nor do those of a plane whose edges do not.
 Index Triangulation::group_of(const glm::uvec3& t, Index plane) const {
   if (moved_[t.x] + moved_[t.y] + moved_[t.z] == 0) return RoundedMesh::kUnmoved;
-  return plane == FaceTriangles::kNotSimple ? RoundedMesh::kNoGroup : plane + 1;
+  return (plane & FaceTriangles::kNotSimple) != 0 ? RoundedMesh::kNoGroup : plane + 1;
+}
+
+// All half-edges, numbered so that those of opposite directions with the same number belong
+// together. Rounding may lead diagonals of several planes along one line.
+std::vector<WedgeEdge> Triangulation::all_half_edges() const {
+  constexpr Index kTwoFaces = 0x7fffffffu;   // edges of faces, which two have
+  constexpr Index kDiagonals = 0x80000000u;  // and the plane
+  std::vector<WedgeEdge> result;
+  std::map<std::pair<Index, Index>, Index> edges;  // of a plane
+  Index plane_of_edges = 0xffffffffu;
+  for (Index t = 0; t < mesh_.triangles.size(); ++t) {
+    const std::size_t wholes = faces_.wholes.size();
+    const Index index = t < wholes ? 0 : planes_[t - wholes] & ~FaceTriangles::kNotSimple;
+    if (t >= wholes && index != plane_of_edges) {
+      plane_of_edges = index;
+      edges.clear();
+      const BoundaryPlane& plane = faces_.planes[index];
+      for (Index i = 0; i < plane.edge_count; ++i) {
+        const BoundaryEdge& edge = faces_.edges[plane.first_edge + i];
+        edges[{edge.from, edge.to}] = edge.wedge != 0 ? edge.wedge : kTwoFaces;
+      }
+    }
+    const glm::uvec3& corners = mesh_.triangles[t];
+    for (Index k = 0; k < 3; ++k) {
+      const auto found =
+          edges.find({corners[static_cast<int>(k)], corners[static_cast<int>(k == 2 ? 0 : k + 1)]});
+      const Index number = t < wholes             ? kTwoFaces
+                           : found != edges.end() ? found->second
+                                                  : kDiagonals | index;
+      result.push_back({t, k, number});
+    }
+  }
+  return result;
+}
+
+// Gives each fan a vertex of its own, and each edge two triangles.
+Result<void> Triangulation::split_vertices() {
+  const std::size_t points = faces_.points.size();
+  auto additional = split_umbrellas(mesh_.triangles, points, wedges_, execution_);
+  if (!additional && additional.error().code == ErrorCode::kInternal) {
+    wedges_ = all_half_edges();
+    additional = split_umbrellas(mesh_.triangles, points, wedges_, execution_);
+  }
+  if (!additional) return tl::unexpected(additional.error());
+  additional_ = *std::move(additional);
+  for (const Index point : additional_)
+    mesh_.positions.push_back(FilePoint(mesh_.positions[point]));
+  split_ = additional_.size() + divide_double_edges(mesh_, wedges_, written_);
+  return {};
 }
 
 // The order of vertices of one written position.
@@ -200,13 +253,8 @@ Result<TriangulatedBoundary> Triangulation::run() {
   if (!good) {
     return fail(ErrorCode::kInternal, "edges of a face of the boundary do not bound a region");
   }
-  Result<std::vector<Index>> additional =
-      split_umbrellas(mesh_.triangles, faces_.points.size(), wedges_, execution_);
-  if (!additional) return tl::unexpected(additional.error());
-  additional_ = *std::move(additional);
-  for (const Index point : additional_)
-    mesh_.positions.push_back(FilePoint(mesh_.positions[point]));
-  split_ = additional_.size() + divide_double_edges(mesh_, wedges_, written_);
+  const Result<void> split = split_vertices();
+  if (!split) return tl::unexpected(split.error());
   if (cancelled()) return stop();
   const Result<MeshRepair> repair = check_and_sort();
   if (!repair) return tl::unexpected(repair.error());

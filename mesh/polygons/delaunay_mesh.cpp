@@ -1,6 +1,7 @@
 #include "mesh/polygons/delaunay_mesh.h"
 
 #include <algorithm>
+#include <unordered_set>
 
 namespace strata {
 
@@ -61,7 +62,14 @@ std::size_t DelaunayMesh::straighten() {
   const auto left = [this](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
     return turn(a, b, c) > 0 ? 1 : 0;
   };
-  for (Side side = 0; side < across_.size(); ++side) waiting_.push_back(side);
+  const auto key = [](std::uint32_t a, std::uint32_t b) {
+    return std::uint64_t{std::min(a, b)} << 32 | std::max(a, b);
+  };
+  std::unordered_set<std::uint64_t> edges;  // there must not be two with the same ends
+  for (Side side = 0; side < across_.size(); ++side) {
+    waiting_.push_back(side);
+    edges.insert(key(start(side), start(next(side))));
+  }
   // Flips for more left turns end; those for Delaunay edges need a bound, since they may undo each
   // other where triangles overlap.
   std::size_t most = 64 * corners_.size();
@@ -71,10 +79,12 @@ std::size_t DelaunayMesh::straighten() {
     if (!is_half_edge(across_[half_edge])) continue;
     const Quad around = quad(half_edge);
     const auto& [a, b, c, d] = around;
-    if (b == d) continue;
+    if (b == d || edges.count(key(b, d)) != 0) continue;
     const int before = left(a, c, d) + left(a, b, c), after = left(a, b, d) + left(b, c, d);
     if (after > before || (after == 2 && before == 2 && !delaunay(around))) {
       const Side t = half_edge / 3, o = across_[half_edge] / 3;
+      edges.erase(key(a, c));
+      edges.insert(key(b, d));
       flip(half_edge, around);
       for (const Side side : {3 * t, 3 * t + 2, 3 * o, 3 * o + 1}) waiting_.push_back(side);
       --most;

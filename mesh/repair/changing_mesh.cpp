@@ -104,11 +104,9 @@ bool ChangingMesh::contract(Index from, Index to) {
   const Index left = triangle_of(from, to), right = triangle_of(to, from);
   if (left == kNone || right == kNone) return false;
   // The link condition: only the two triangles at the edge join neighbours of both ends.
-  const std::vector<Index> here = neighbours(from), there = neighbours(to);
-  std::vector<Index> both;
-  std::set_intersection(here.begin(), here.end(), there.begin(), there.end(),
-                        std::back_inserter(both));
-  if (both.size() != 2 || here.size() + there.size() <= 6) return false;
+  if (common_neighbours(from, to).size() != 2 || around(from).size() + around(to).size() <= 6) {
+    return false;
+  }
   const std::span<const Index> view = around(from);
   const std::vector<Index> triangles(view.begin(), view.end());
   for (const Index t : triangles) {
@@ -118,6 +116,71 @@ bool ChangingMesh::contract(Index from, Index to) {
     }
     change_triangle(t, t == left || t == right ? kNoTriangle : corners);
   }
+  return true;
+}
+
+std::vector<Index> ChangingMesh::common_neighbours(Index a, Index b) const {
+  const std::vector<Index> here = neighbours(a), there = neighbours(b);
+  std::vector<Index> both;
+  std::set_intersection(here.begin(), here.end(), there.begin(), there.end(),
+                        std::back_inserter(both));
+  return both;
+}
+
+// Collects the triangles around a vertex counter-clockwise, from the edge to one neighbour to that
+// to another.
+bool ChangingMesh::walk_around(Index centre, Index from, Index to,
+                               std::vector<Index>& triangles) const {
+  std::size_t steps = around(centre).size();
+  for (Index at = from; at != to; --steps) {
+    const Index t = triangle_of(centre, at);
+    if (t == kNone || steps == 0) return false;
+    triangles.push_back(t);
+    at = opposite(t, centre, at);
+  }
+  return true;
+}
+
+void ChangingMesh::replace(const std::vector<Index>& triangles, Index vertex, Index by) {
+  for (const Index t : triangles) {
+    glm::uvec3 corners = mesh_.triangles[t];
+    for (int k = 0; k < 3; ++k) {
+      if (corners[k] == vertex) corners[k] = by;
+    }
+    if (corners != mesh_.triangles[t]) change_triangle(t, corners);
+  }
+}
+
+bool ChangingMesh::contract_and_cut(Index from, Index to) {
+  const Index left = triangle_of(from, to), right = triangle_of(to, from);
+  if (left == kNone || right == kNone) return false;
+  const Index l = opposite(left, from, to), r = opposite(right, from, to);
+  std::vector<Index> both = common_neighbours(from, to);
+  std::erase_if(both, [&](Index v) { return v == l || v == r; });
+  if (l == r || both.size() != 1) return false;
+  const Index x = both.front();
+  // One side has the triangles around `from` that go from l to x, those around `to` that go from x
+  // to l, and those around x in between. The other one has the rest.
+  std::vector<Index> here, there, between;
+  if (!walk_around(from, l, x, here) || !walk_around(to, x, l, there) ||
+      !walk_around(x, from, to, between)) {
+    return false;
+  }
+  const std::size_t ring = here.size() + there.size(),
+                    all = around(from).size() + around(to).size() - 4;
+  if (ring < 3 || all < ring + 3 || between.size() < 3 || around(x).size() < between.size() + 3) {
+    return false;
+  }
+  const auto copy = static_cast<Index>(mesh_.positions.size());
+  mesh_.positions.push_back(FilePoint(mesh_.positions[to]));
+  mesh_.positions.push_back(FilePoint(mesh_.positions[x]));
+  change_triangle(left, kNoTriangle);
+  change_triangle(right, kNoTriangle);
+  replace(here, from, copy);
+  replace(there, to, copy);
+  replace(between, x, copy + 1);
+  const std::span<const Index> rest = around(from);
+  replace({rest.begin(), rest.end()}, from, to);
   return true;
 }
 

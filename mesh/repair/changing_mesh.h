@@ -29,6 +29,10 @@ class ChangingMesh {
   /// Puts `from` onto `to`, at the other end of an edge. Each of these steps returns false, and
   /// changes nothing, where the mesh would not stay a manifold.
   bool contract(Index from, Index to);
+  /// The same where the ends have three neighbours in common: the mesh is cut along the ends and
+  /// the third one, x, and closed again on both sides, where each gets copies of its own of `to`
+  /// and x.
+  bool contract_and_cut(Index from, Index to);
   /// Replaces the edge from a to b by the other diagonal of its two triangles.
   bool flip(Index a, Index b);
   /// Takes out the four triangles that a triangle hangs together with, if they are no more.
@@ -52,6 +56,9 @@ class ChangingMesh {
   Index triangle_of(Index a, Index b) const;
   Index opposite(Index t, Index a, Index b) const;
   std::vector<Index> neighbours(Index vertex) const;
+  std::vector<Index> common_neighbours(Index a, Index b) const;
+  bool walk_around(Index centre, Index from, Index to, std::vector<Index>& triangles) const;
+  void replace(const std::vector<Index>& triangles, Index vertex, Index by);
 
   RoundedMesh& mesh_;
   std::vector<Index> first_, at_;                       // the triangles at each vertex at first

@@ -47,6 +47,8 @@ class Repair {
   double unit(Index vertex) const;
   bool mend(const MeshConflict& conflict);
   bool contract_points(const std::vector<Edge>& edges);
+  bool join(Index a, Index b);
+  bool close_flap(const MeshConflict& conflict);
   void accept();
   void try_contractions(const std::vector<Edge>& edges);
   void try_flips(const std::vector<Edge>& edges);
@@ -114,7 +116,11 @@ void Repair::try_step(const std::vector<Index>& ends, const Step& step) {
     }
     before_ = near_.count_conflicts(triangles_, kMostConflicts);
   }
-  if (before_ <= best_gain_ || !step()) return;
+  if (before_ <= best_gain_) return;
+  if (!step()) {
+    mesh_.take_back();
+    return;
+  }
   std::vector<Index> changed = triangles_;
   changed.insert(changed.end(), mesh_.changed().begin(), mesh_.changed().end());
   const std::size_t after = near_.count_conflicts(std::move(changed), before_ - best_gain_);
@@ -240,14 +246,38 @@ void Repair::try_moves(const std::vector<Index>& vertices, int distance) {
   }
 }
 
+// Contracts an edge whose ends have one position.
+bool Repair::join(Index a, Index b) {
+  const Index from = std::max(a, b), to = std::min(a, b);
+  return mesh_.contract(from, to) || mesh_.contract_and_cut(from, to);
+}
+
 // Edges whose ends have one position are contracted if the mesh stays a manifold: no point of it
 // moves.
 bool Repair::contract_points(const std::vector<Edge>& edges) {
   for (const Edge& edge : edges) {
     if (mesh_.position(edge.a) != mesh_.position(edge.b)) continue;
-    if (mesh_.contract(std::max(edge.a, edge.b), std::min(edge.a, edge.b))) {
+    if (join(edge.a, edge.b)) {
       accept();
       return true;
+    }
+  }
+  return false;
+}
+
+// Two triangles at an edge that have the same positions, and no room between them: both are taken
+// out, and the other edges of one are joined to those of the other.
+bool Repair::close_flap(const MeshConflict& conflict) {
+  const glm::uvec3 s = mesh_.triangle(conflict.first), t = mesh_.triangle(conflict.second);
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      const Index a = s[i], b = s[(i + 1) % 3], c = s[(i + 2) % 3], d = t[(k + 2) % 3];
+      if (t[k] != b || t[(k + 1) % 3] != a || mesh_.position(c) != mesh_.position(d)) continue;
+      if (mesh_.flip(a, b) && join(c, d)) {
+        accept();
+        return true;
+      }
+      mesh_.take_back();
     }
   }
   return false;
@@ -264,7 +294,7 @@ bool Repair::mend(const MeshConflict& conflict) {
   best_gain_ = 0;
   ends_.clear();
   const std::vector<Edge> edges = edges_of(conflict);
-  if (contract_points(edges)) return true;
+  if (contract_points(edges) || close_flap(conflict)) return true;
   std::vector<Index> vertices;
   for (const Edge& edge : edges) vertices.push_back(edge.a);
   for (const Index t : {conflict.first, conflict.second}) {
