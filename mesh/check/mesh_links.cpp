@@ -46,8 +46,11 @@ class Links {
     result.unbalanced_edges = facts.unbalanced;
     result.non_manifold_edges = facts.non_manifold;
     result.edge_examples = facts.examples;
-    count_fans(result);
-    find_shells(facts.joined, result);
+    Execution both = execution_;
+    both.stop = {};
+    parallel_for(both, 2, [&](std::size_t part, int) {
+      part == 0 ? count_fans(result) : find_shells(facts.joined, result);
+    });
   }
 
  private:

@@ -76,8 +76,8 @@ struct MeshCheck {
   }
 };
 
-/// Computes all of MeshCheck. Nothing is required of the mesh. Cost: about 0.6 us a triangle and
-/// thread, and 100 bytes a triangle; more where boxes of many triangles overlap.
+/// Computes all of MeshCheck. Nothing is required of the mesh. Cost: about 0.6 us of CPU and
+/// 110 bytes a triangle; more time where boxes of many triangles overlap.
 /// @pre indices < positions.size()
 /// @return kGeometry for a coordinate that is not finite; kLimit for 2^30 triangles or more, or
 /// more than the memory limit allows; kCancelled
