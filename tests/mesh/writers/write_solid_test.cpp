@@ -19,6 +19,7 @@
 #include "strata/mesh/formats/read_mesh.h"
 #include "strata/mesh/shapes.h"
 #include "tests/mesh/formats/reading.h"
+#include "tests/support/sanitized.h"
 #include "tests/support/temporary_folder.h"
 
 namespace strata {
@@ -163,6 +164,7 @@ TEST_P(SolidWriter, BytesDoNotDependOnThreads) {
 }
 
 TEST_P(SolidWriter, TimeGrowsWithTheNumberOfParts) {
+  if (testkit::kSanitized) GTEST_SKIP() << "sanitizers make it slow";
   const auto seconds = [&](std::uint32_t count) {
     SolidMesh mesh;
     for (std::uint32_t i = 0; i < count; ++i) {
