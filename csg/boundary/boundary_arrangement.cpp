@@ -1,5 +1,7 @@
 #include "csg/boundary/boundary_arrangement.h"
 
+#include <optional>
+
 #include "csg/arrangement/find_faces.h"
 #include "csg/boundary/open_edges.h"
 
@@ -74,9 +76,9 @@ Result<ExactBoundary> find_exact_boundary(const Tree& tree, Tree::NodeId root,
     return fail(ErrorCode::kUsage, "bits must be 10 to 28, got {}", options.bits);
   }
   if (auto checked = check_tree(tree, root); !checked) return tl::unexpected(checked.error());
-  const Geometry geometry(tree, execution);
+  std::optional<Geometry> geometry(std::in_place, tree, execution);
   if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
-  auto solids = snap_solids(tree, root, geometry, options.bits, execution);
+  auto solids = snap_solids(tree, root, *geometry, options.bits, execution);
   if (!solids) return tl::unexpected(solids.error());
   ExactBoundary result;
   result.lattice = solids->lattice;
@@ -93,7 +95,8 @@ Result<ExactBoundary> find_exact_boundary(const Tree& tree, Tree::NodeId root,
     return tl::unexpected(closed.error());
   }
   std::vector<InsideRule> rules;
-  for (const Geometry::Part& part : geometry.parts()) rules.push_back(part.rule);
+  for (const Geometry::Part& part : geometry->parts()) rules.push_back(part.rule);
+  geometry.reset();  // the solids are on the lattice
   auto faces = arrange_solids(std::move(*solids), tree, root, rules, options, execution, report);
   if (!faces) return tl::unexpected(faces.error());
   result.faces = std::move(*faces);
