@@ -13,6 +13,7 @@
 #include "contour/block_points.h"
 #include "contour/cell_blocks.h"
 #include "contour/grid_crossings.h"
+#include "core/share_of.h"
 #include "strata/mesh/diagnose.h"
 #include "strata/raster/lattice_mesh.h"
 #include "strata/voxelize/grid_fit.h"
@@ -75,17 +76,6 @@ std::vector<Plane> planes_of(const LatticeMesh& mesh, const Execution& execution
     }
   });
   return planes;
-}
-
-/// Reports a part of the work as a part of the whole.
-Execution part_of(const Execution& execution, double from, double to) {
-  Execution part = execution;
-  if (execution.progress) {
-    part.progress = [&progress = execution.progress, from, to](double done) {
-      progress(from + (to - from) * done);
-    };
-  }
-  return part;
 }
 
 /// The sizes of a mesh.
@@ -159,7 +149,7 @@ Result<ContourMesh> contour_lattice(const LatticeMesh& mesh, const VoxelGrid& gr
   std::optional<CellBlocks> blocks;
   {
     const auto crossings =
-        GridCrossings::collect(mesh, grid, settings, part_of(execution, 0.0, 0.5));
+        GridCrossings::collect(mesh, grid, settings, detail::share_of(execution, 0.0, 0.5));
     if (!crossings) return tl::unexpected(crossings.error());
     result.report.lost_crossings = crossings->lost();
     const std::uint64_t held = crossings->memory_bytes() + mesh.triangles.size() * sizeof(Plane);
@@ -181,7 +171,7 @@ Result<ContourMesh> contour_lattice(const LatticeMesh& mesh, const VoxelGrid& gr
   }
   result.mesh.positions.resize(sizes->vertices);
   result.mesh.triangles.resize(sizes->triangles);
-  const Execution last = part_of(execution, 0.5, 1.0);
+  const Execution last = detail::share_of(execution, 0.5, 1.0);
   parallel_for(execution, blocks->count(), [&](std::size_t n, int worker) {
     const BlockNeighbours neighbours = blocks->neighbours(n);
     BlockMesh(neighbours, blocks->place(n), grid)

@@ -2,6 +2,7 @@
 
 #include <optional>
 
+#include "core/share_of.h"
 #include "csg/arrangement/find_faces.h"
 #include "csg/boundary/open_edges.h"
 
@@ -38,7 +39,11 @@ Result<BoundaryFaces> arrange_solids(LatticeSolids solids, const Tree& tree, Tre
     if (welded->triangles.empty()) return BoundaryFaces{};
     edges = find_mesh_edges(welded->triangles, welded->vertices.size());
   }
-  const auto pairs = find_candidate_pairs(*welded, edges, tree.solids().size(), execution);
+  const auto report_done = [&](double done) {
+    if (execution.progress) execution.progress(done);
+  };
+  const auto pairs = find_candidate_pairs(*welded, edges, tree.solids().size(),
+                                          detail::share_of(execution, 0.1, 0.4));
   if (!pairs) return tl::unexpected(pairs.error());
   PointTable table(BoundaryPoints(std::move(welded->vertices), std::move(welded->triangles)));
   const BoundaryPoints& points = table.points();
@@ -47,12 +52,15 @@ Result<BoundaryFaces> arrange_solids(LatticeSolids solids, const Tree& tree, Tre
   if (auto met = meet_pairs(input, *pairs, table, lines, execution); !met) {
     return tl::unexpected(met.error());
   }
+  report_done(0.6);
   if (auto crossed = cross_lines(input, table, lines, execution); !crossed) {
     return tl::unexpected(crossed.error());
   }
+  report_done(0.7);
   const SortedLines sorted = sort_lines(input, points, lines);
   const auto pieces = find_pieces(input, points, lines, sorted, execution);
   if (!pieces) return tl::unexpected(pieces.error());
+  report_done(0.85);
   const auto lists = find_radial_lists(input, lines, *pieces, execution);
   if (!lists) return tl::unexpected(lists.error());
   const FaceRules face_rules{options.faces == BoundaryFaceKind::kCanonical,
@@ -60,6 +68,7 @@ Result<BoundaryFaces> arrange_solids(LatticeSolids solids, const Tree& tree, Tre
   const auto values = find_cell_values(input, *pieces, *lists, compile(tree, root), rules,
                                        !face_rules.label_of_solid.empty(), execution);
   if (!values) return tl::unexpected(values.error());
+  report_done(0.95);
   report.pairs = pairs->size();
   report.points = points.size() - points.vertices().size();
   report.pieces = pieces->triangle_of.size();

@@ -1,5 +1,8 @@
 #include "strata/csg/boundary/boundary_mesh.h"
 
+#include <new>
+
+#include "core/share_of.h"
 #include "csg/boundary/boundary_arrangement.h"
 #include "csg/boundary/triangulate_boundary.h"
 
@@ -30,11 +33,12 @@ void name_parts(const Tree& tree, BoundaryParts parts, std::vector<std::uint32_t
 }  // namespace
 
 Result<BoundaryMesh> boundary_mesh(const Tree& tree, Tree::NodeId root,
-                                   const BoundaryOptions& options, const Execution& execution) {
-  auto boundary = find_exact_boundary(tree, root, options, execution);
+                                   const BoundaryOptions& options, const Execution& execution) try {
+  auto boundary = find_exact_boundary(tree, root, options, detail::share_of(execution, 0.0, 0.6));
   if (!boundary) return tl::unexpected(boundary.error());
   auto triangulated =
-      triangulate_boundary(boundary->faces, boundary->lattice, options.float_positions, execution);
+      triangulate_boundary(boundary->faces, boundary->lattice, options.float_positions,
+                           detail::share_of(execution, 0.6, 1.0));
   if (!triangulated) return tl::unexpected(triangulated.error());
   BoundaryMesh result;
   result.report = std::move(boundary->report);
@@ -45,7 +49,10 @@ Result<BoundaryMesh> boundary_mesh(const Tree& tree, Tree::NodeId root,
   result.mesh.positions = std::move(triangulated->positions);
   result.mesh.triangles = std::move(triangulated->triangles);
   name_parts(tree, options.parts, std::move(triangulated->labels), result.mesh);
+  if (execution.progress) execution.progress(1.0);
   return result;
+} catch (const std::bad_alloc&) {
+  return fail(ErrorCode::kLimit, "out of memory for the boundary of the tree");
 }
 
 }  // namespace strata::csg

@@ -1,6 +1,7 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <limits>
+#include <new>
 
 #include "csg/boundary/boundary_arrangement.h"
 #include "exact/mesh_sums.h"
@@ -61,7 +62,8 @@ class Summer {
 }  // namespace
 
 Result<ExactMeasures> exact_measures(const Tree& tree, Tree::NodeId root,
-                                     const BoundaryOptions& options, const Execution& execution) {
+                                     const BoundaryOptions& options,
+                                     const Execution& execution) try {
   BoundaryOptions plain = options;
   plain.parts = BoundaryParts::kOne;
   plain.faces = BoundaryFaceKind::kCanonical;
@@ -97,6 +99,8 @@ Result<ExactMeasures> exact_measures(const Tree& tree, Tree::NodeId root,
         boundary->lattice.origin[k] + static_cast<double>(sums.high[k]) * 0x1p-24 * step;
   }
   return result;
+} catch (const std::bad_alloc&) {
+  return fail(ErrorCode::kLimit, "out of memory for the boundary of the tree");
 }
 
 }  // namespace strata::csg
