@@ -96,8 +96,8 @@ void FaceFinder::add(FaceEdges& out, std::uint32_t piece, std::uint32_t from, st
 
 bool FaceFinder::melts(std::uint32_t piece, std::uint32_t other) const {
   const std::uint32_t s = pieces_.triangle_of[piece], t = pieces_.triangle_of[other];
-  if (s == t) return true;
-  return rules_.melt && parallel(normal(piece), normal(other)) && label(piece) == label(other);
+  if (label(piece) != label(other)) return false;  // part of a triangle may lie on another solid
+  return s == t || (rules_.melt && parallel(normal(piece), normal(other)));
 }
 
 void FaceFinder::join_plane(FaceEdges& out, std::uint32_t piece, std::uint32_t other,

@@ -342,6 +342,30 @@ TEST(BoundaryLaws, VoxelsOfTheMeshAreThoseOfTheTree) {
   });
 }
 
+// Law L1 holds for parts and for the faces of the input too.
+TEST(BoundaryLaws, PartsDivideTheSameSurface) {
+  int parts = 0;
+  for_random_trees(170000, 120, 4, TinyKind::kAny, [&](const Tree& part, TinyTrees& trees) {
+    const Tree tree = part | tiny_frame();
+    BoundaryOptions options = kTiny;
+    options.parts = BoundaryParts::kSolids;
+    options.faces = trees.pick(0, 1) == 0 ? BoundaryFaceKind::kCanonical : BoundaryFaceKind::kInput;
+    const SolidMesh mesh = mesh_of(tree, options), whole = mesh_of(tree);
+    ASSERT_EQ(broken(mesh), "") << size_of(mesh);
+    ASSERT_EQ(mesh.part_of.size(), mesh.triangles.size());
+    parts += static_cast<int>(mesh.parts.size()) - 2;
+    const auto six_volumes = [](const SolidMesh& of) {
+      double sum = 0;
+      for (const glm::uvec3& t : of.triangles) {
+        sum += glm::dot(of.positions[t.x], glm::cross(of.positions[t.y], of.positions[t.z]));
+      }
+      return sum;
+    };
+    ASSERT_NEAR(six_volumes(mesh), six_volumes(whole), 1e-5);
+  });
+  EXPECT_GT(parts, 100);
+}
+
 // Laws L3, L8.
 
 TEST(BoundaryLaws, BytesDoNotDependOnAnyOrderOrThreads) {
