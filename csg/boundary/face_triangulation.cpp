@@ -123,7 +123,8 @@ bool FaceTriangulation::sort_corners() {
   return distinct;
 }
 
-void FaceTriangulation::number_edges(const BoundaryPlane& plane) {
+// @return false when an edge ends in a point at which none starts
+bool FaceTriangulation::number_edges(const BoundaryPlane& plane) {
   if (!number_of_) number_of_.reset(new Index[positions_.size()]);
   flat_.clear();
   for (const Corner& corner : corners_) {
@@ -133,8 +134,11 @@ void FaceTriangulation::number_edges(const BoundaryPlane& plane) {
   edges_.clear();
   for (Index i = 0; i < plane.edge_count; ++i) {
     const BoundaryEdge& edge = faces_.edges[plane.first_edge + i];
-    edges_.push_back({number_of_[edge.from], number_of_[edge.to]});
+    const Index to = number_of_[edge.to];  // anything, if the point is none of the plane
+    if (to >= corners_.size() || corners_[to].point != edge.to) return false;
+    edges_.push_back({number_of_[edge.from], to});
   }
+  return true;
 }
 
 bool FaceTriangulation::cut_exactly(const BoundaryPlane& plane) {
@@ -154,7 +158,7 @@ bool FaceTriangulation::cut_exactly(const BoundaryPlane& plane) {
     rational.push_back(corners[i].first.point);
     corners_[i] = corners[i].second;
   }
-  number_edges(plane);
+  if (!number_edges(plane)) return false;
   mesh_.begin(flat_);
   if (!sweep_.cut(FaceSweep::ExactView{rational, u_, v_}, edges_, mesh_)) return false;
   mesh_.straighten();
@@ -184,9 +188,7 @@ bool FaceTriangulation::append(std::uint32_t index, FaceTriangles& out) {
   const Index few = plane.touch_count == 0 ? plane.edge_count : 0;
   if (!(few == 3 && append_triangle(plane, out)) && !(few == 4 && append_quad(plane, out))) {
     collect(plane);
-    const bool distinct = sort_corners();
-    if (distinct) number_edges(plane);
-    simple = distinct && sweep_.cut(flat_, edges_, mesh_);
+    simple = sort_corners() && number_edges(plane) && sweep_.cut(flat_, edges_, mesh_);
     if (!simple && !cut_exactly(plane)) return false;
     append_mesh(plane, out);
   }

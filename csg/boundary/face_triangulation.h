@@ -42,7 +42,7 @@ class FaceTriangulation {
   bool append_quad(const BoundaryPlane& plane, FaceTriangles& out) const;
   void collect(const BoundaryPlane& plane);
   bool sort_corners();
-  void number_edges(const BoundaryPlane& plane);
+  bool number_edges(const BoundaryPlane& plane);
   bool cut_exactly(const BoundaryPlane& plane);
   void append_mesh(const BoundaryPlane& plane, FaceTriangles& out) const;
 
