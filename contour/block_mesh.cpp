@@ -8,8 +8,6 @@
 namespace strata::contouring {
 namespace {
 
-std::size_t size(int value) { return static_cast<std::size_t>(value); }
-
 /// A vertex that no edge with two triangles has.
 constexpr std::uint32_t kNone = 0xffffffffu;
 /// The edges at a cell's lower sides.

@@ -7,8 +7,6 @@ namespace {
 
 constexpr std::uint64_t kAll = (std::uint64_t{1} << CellBlock::kWords) - 1;
 
-std::size_t size(int value) { return static_cast<std::size_t>(value); }
-
 /// Columns of a block's words from a block: those of its own places, or its last ones.
 struct ColumnPart {
   int from = 0, to = 0;  ///< of the source

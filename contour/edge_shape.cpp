@@ -16,7 +16,7 @@ namespace {
 
 constexpr int kLength = 256;
 /// Two triangles may miss the point where the edge is cut by this many steps, 1/32 voxel.
-constexpr int kMostOff = 8;
+constexpr int kMostOver = 8;
 
 /// Coordinates are below 2^8, so this is below 2^17, and no sum below exceeds 2^28.
 int turn(const glm::ivec3& a, const glm::ivec3& b) { return a.x * b.y - a.y * b.x; }
@@ -57,7 +57,7 @@ EdgeShape edge_shape(const std::array<glm::ivec3, 4>& v, int cut) {
   const Fraction odd = miss(v[1], v[2], v[3], v[0], cut);
   const bool first = even.under != 0 && (odd.under == 0 || !is_less(odd, even));
   const Fraction& least = first ? even : odd;
-  if (least.under == 0 || least.over > kMostOff * least.under) return EdgeShape::kFan;
+  if (least.under == 0 || least.over > kMostOver * least.under) return EdgeShape::kFan;
   return first ? EdgeShape::kDiagonal02 : EdgeShape::kDiagonal13;
 }
 

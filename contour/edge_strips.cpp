@@ -8,8 +8,6 @@
 namespace strata::contouring {
 namespace {
 
-std::size_t size(int value) { return static_cast<std::size_t>(value); }
-
 int along(const LocalPlace& at, int axis) { return axis == 0 ? at.i : axis == 1 ? at.j : at.k; }
 
 /// Where a run's cells are kept: their places along the two other axes.

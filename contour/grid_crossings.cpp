@@ -12,8 +12,6 @@
 namespace strata::contouring {
 namespace {
 
-std::size_t size(int value) { return static_cast<std::size_t>(value); }
-
 /// Where a change of the winding number lies: a crossing, or a step of a winding field.
 struct Change {
   int edge = 0, change = 0;

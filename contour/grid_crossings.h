@@ -20,6 +20,9 @@
 
 namespace strata::contouring {
 
+/// A number of things as a size. @pre value >= 0
+inline std::size_t size(int value) { return static_cast<std::size_t>(value); }
+
 /// Voxels along the side of a block. Edge k of a column joins voxels k - 1 and k, and belongs to
 /// the block of k; voxels outside the grid are outside.
 inline constexpr int kBlockSide = 32;

@@ -11,11 +11,11 @@ namespace {
 
 using Edge = FaceEdges::Edge;
 
-constexpr std::uint32_t kNone = 0xffffffffu;
+constexpr std::uint32_t kNoPoint = 0xffffffffu;
 
 // The edges of the result at a point, as far as they matter.
 struct PointEdges {
-  std::array<std::uint32_t, 2> neighbour{kNone, kNone};
+  std::array<std::uint32_t, 2> neighbour{kNoPoint, kNoPoint};
   std::array<std::uint32_t, 2> line{};
   bool corner = false;  // more than two edges meet here
 };
@@ -59,7 +59,7 @@ void EdgeJoiner::add_neighbour(std::uint32_t point, std::uint32_t neighbour, std
   for (int k = 0; k < 2; ++k) {
     const auto i = static_cast<std::size_t>(k);
     if (at.neighbour[i] == neighbour) return;
-    if (at.neighbour[i] != kNone) continue;
+    if (at.neighbour[i] != kNoPoint) continue;
     at.neighbour[i] = neighbour;
     at.line[i] = line;
     return;
@@ -80,7 +80,7 @@ exact::Cross EdgeJoiner::direction(std::uint32_t line) const {
 
 // Products of two components of directions: 2 (4b + 2) bits; 236 for b = 29.
 bool EdgeJoiner::straight(const PointEdges& point) const {
-  if (point.corner || point.neighbour[1] == kNone) return false;
+  if (point.corner || point.neighbour[1] == kNoPoint) return false;
   if (point.line[0] == point.line[1]) return true;
   const exact::Cross d = direction(point.line[0]), e = direction(point.line[1]);
   for (std::size_t i = 0; i < 3; ++i) {
@@ -176,7 +176,7 @@ void EdgeJoiner::add_chains(std::span<const Edge> edges) {
 void EdgeJoiner::add_touches() {
   auto& inner = edges_.inner_points;
   std::erase_if(inner, [&](const FaceEdges::InnerPoint& p) {
-    return dropped_[p.point] || (!at_[p.point].corner && at_[p.point].neighbour[0] == kNone);
+    return dropped_[p.point] || (!at_[p.point].corner && at_[p.point].neighbour[0] == kNoPoint);
   });
   for (auto& p : inner) p.triangle = edges_.plane_of[p.triangle];
   const auto key = [](const FaceEdges::InnerPoint& p) { return std::tie(p.triangle, p.point); };

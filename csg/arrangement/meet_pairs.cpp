@@ -13,11 +13,11 @@ using exact::LatticePoint;
 using exact::Plane;
 using Recipe = BoundaryPoints::Recipe;
 
-constexpr int kNone = -1;
+constexpr int kNowhere = -1;
 
 // What of a triangle a point lies on: a corner, a side, or neither.
 struct Place {
-  int corner = kNone, side = kNone;
+  int corner = kNowhere, side = kNowhere;
 };
 
 int next(int k) { return k == 2 ? 0 : k + 1; }
@@ -30,7 +30,7 @@ struct End {
 
 struct Ends {
   End low, high;
-  int side = kNone;  // along which the piece lies
+  int side = kNowhere;  // along which the piece lies
 };
 
 class PairMeeter {
@@ -107,7 +107,7 @@ Ends PairMeeter::ends_of(const Side& t, const std::array<Int128, 3>& heights, bo
     const int after = next(k), before = next(after);
     if (sign(k) == 0) {
       const int apart = sign(after) != 0 ? after : before;  // a corner off the plane
-      const End end{{k, kNone}, edge_point(k, apart)};
+      const End end{{k, kNowhere}, edge_point(k, apart)};
       if (sign(after) == 0) {  // the side from k to after lies in the plane
         ends.side = k;
         take(end, sign(before) > 0);
@@ -120,7 +120,7 @@ Ends PairMeeter::ends_of(const Side& t, const std::array<Int128, 3>& heights, bo
         take(end, sign(before) > 0);
       }
     } else if (sign(after) != 0 && sign(after) != sign(k)) {
-      take({{kNone, k}, edge_point(k, after)}, sign(k) > 0);
+      take({{kNowhere, k}, edge_point(k, after)}, sign(k) > 0);
     }
   }
   assert(have_low && have_high);
@@ -134,7 +134,7 @@ void PairMeeter::meet_across(const Side& a, const Side& b, const Ends& ends_a, c
   };
   const int over = order(ends_a.high, ends_b.low), under = order(ends_a.low, ends_b.high);
   if (over < 0 || under > 0) return;
-  const Place inside_a{kNone, ends_a.side}, inside_b{kNone, ends_b.side};
+  const Place inside_a{kNowhere, ends_a.side}, inside_b{kNowhere, ends_b.side};
   Place low_a, low_b, high_a, high_b;
   const int low = order(ends_a.low, ends_b.low), high = order(ends_a.high, ends_b.high);
   low_a = low >= 0 ? ends_a.low.place : inside_a;
@@ -152,12 +152,12 @@ void PairMeeter::meet_across(const Side& a, const Side& b, const Ends& ends_a, c
   if (is_point) return;
   put(a, high_a, to, true);
   put(b, high_b, to, true);
-  if (ends_a.side != kNone) lines_.touched_edges.push_back(edge(a, ends_a.side));
-  if (ends_b.side != kNone) lines_.touched_edges.push_back(edge(b, ends_b.side));
-  if (ends_a.side != kNone && ends_b.side != kNone) return;
-  if (ends_a.side != kNone) {
+  if (ends_a.side != kNowhere) lines_.touched_edges.push_back(edge(a, ends_a.side));
+  if (ends_b.side != kNowhere) lines_.touched_edges.push_back(edge(b, ends_b.side));
+  if (ends_a.side != kNowhere && ends_b.side != kNowhere) return;
+  if (ends_a.side != kNowhere) {
     lines_.cuts.push_back({b.triangle, edge(a, ends_a.side), from, to});
-  } else if (ends_b.side != kNone) {
+  } else if (ends_b.side != kNowhere) {
     lines_.cuts.push_back({a.triangle, edge(b, ends_b.side), from, to});
   } else {
     const auto line = CutLinesPart::kOwn + static_cast<std::uint32_t>(lines_.crossings.size());
@@ -170,8 +170,8 @@ void PairMeeter::meet_across(const Side& a, const Side& b, const Ends& ends_a, c
 
 std::uint32_t PairMeeter::point_of(const Side& a, const Place& on_a, const Side& b,
                                    const Place& on_b) {
-  if (on_a.corner != kNone) return a.corners[on_a.corner];
-  if (on_b.corner != kNone) return b.corners[on_b.corner];
+  if (on_a.corner != kNowhere) return a.corners[on_a.corner];
+  if (on_b.corner != kNowhere) return b.corners[on_b.corner];
   // One of the two sides crosses the other plane. A side in the plane says nothing.
   const auto crossing = [&](const Side& t, int side, const Side& other) {
     const std::uint32_t p = t.corners[side], q = t.corners[next(side)];
@@ -179,7 +179,7 @@ std::uint32_t PairMeeter::point_of(const Side& a, const Place& on_a, const Side&
                                       {std::min(p, q), std::max(p, q), other.triangle, 0}});
   };
   const auto crosses = [&](const Side& t, int side, const Side& other) {
-    return side != kNone && height(other.plane, at(t.corners[side])) != 0;
+    return side != kNowhere && height(other.plane, at(t.corners[side])) != 0;
   };
   return crosses(a, on_a.side, b) ? crossing(a, on_a.side, b) : crossing(b, on_b.side, a);
 }
@@ -191,8 +191,8 @@ void PairMeeter::put_on_edge(std::uint32_t edge, std::uint32_t point) {
 }
 
 void PairMeeter::put(const Side& t, const Place& place, std::uint32_t point, bool end_of_cut) {
-  if (place.corner != kNone) return;
-  if (place.side != kNone) {
+  if (place.corner != kNowhere) return;
+  if (place.side != kNowhere) {
     put_on_edge(edge(t, place.side), point);
   } else if (!end_of_cut) {
     lines_.contacts.push_back({t.triangle, point});
@@ -227,17 +227,17 @@ void PairMeeter::clip_edge(const Side& a, int side, const Side& b) {
   };
   Fraction low{0, 1, {}}, high{1, 1, {}};
   std::int64_t of_p[3], of_q[3];
-  int along = kNone;
+  int along = kNowhere;
   for (int k = 0; k < 3; ++k) {
     of_p[k] = area(b.corners[k], b.corners[next(k)], p);
     of_q[k] = area(b.corners[k], b.corners[next(k)], q);
     if (of_p[k] == 0 && of_q[k] == 0) along = k;
     if (of_p[k] < 0 && of_q[k] < 0) return;
     if (of_p[k] < 0) {  // enters at part / whole
-      const Fraction enter{-of_p[k], of_q[k] - of_p[k], {kNone, k}};
+      const Fraction enter{-of_p[k], of_q[k] - of_p[k], {kNowhere, k}};
       if (less(low, enter)) low = enter;
     } else if (of_q[k] < 0) {
-      const Fraction leave{of_p[k], of_p[k] - of_q[k], {kNone, k}};
+      const Fraction leave{of_p[k], of_p[k] - of_q[k], {kNowhere, k}};
       if (less(leave, high)) high = leave;
     }
   }
@@ -257,7 +257,7 @@ void PairMeeter::clip_edge(const Side& a, int side, const Side& b) {
     const int k = f.place.side;
     for (const int corner : {k, next(k)}) {
       if (area(p, q, b.corners[corner]) != 0) continue;
-      f.place = {corner, kNone};
+      f.place = {corner, kNowhere};
       return b.corners[corner];
     }
     const std::uint32_t r = b.corners[k], s = b.corners[next(k)];
@@ -272,7 +272,7 @@ void PairMeeter::clip_edge(const Side& a, int side, const Side& b) {
     if (is_point) return;
   }
   lines_.touched_edges.push_back(line);
-  if (along != kNone) {
+  if (along != kNowhere) {
     lines_.touched_edges.push_back(edge(b, along));
   } else {
     lines_.cuts.push_back({b.triangle, line, from, to});

@@ -11,17 +11,17 @@
 namespace strata {
 namespace {
 
-constexpr std::size_t kNone = ~std::size_t{0};
+constexpr std::size_t kAllFinite = ~std::size_t{0};
 
-struct Extent {
+struct Reach {
   Bounds box;
-  std::size_t not_finite = kNone;
+  std::size_t not_finite = kAllFinite;
 };
 
-Extent extent_of(std::span<const glm::dvec3> positions, const Execution& execution) {
-  return detail::fold_blocks<Extent>(
+Reach extent_of(std::span<const glm::dvec3> positions, const Execution& execution) {
+  return detail::fold_blocks<Reach>(
       execution, positions.size(),
-      [&](Extent& extent, std::size_t i) {
+      [&](Reach& extent, std::size_t i) {
         const glm::dvec3& p = positions[i];
         if (std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z)) {
           extent.box.include(p);
@@ -29,7 +29,7 @@ Extent extent_of(std::span<const glm::dvec3> positions, const Execution& executi
           extent.not_finite = std::min(extent.not_finite, i);
         }
       },
-      [](Extent& total, const Extent& part) {
+      [](Reach& total, const Reach& part) {
         total.box.include(part.box);
         total.not_finite = std::min(total.not_finite, part.not_finite);
       });
@@ -62,8 +62,8 @@ Result<CheckLattice> check_lattice(std::span<const glm::dvec3> positions,
                                    const Execution& execution) {
   CheckLattice lattice;
   if (positions.empty()) return lattice;
-  const Extent extent = extent_of(positions, execution);
-  if (extent.not_finite != kNone) {
+  const Reach extent = extent_of(positions, execution);
+  if (extent.not_finite != kAllFinite) {
     return fail(ErrorCode::kGeometry, "vertex {} of the mesh has a coordinate that is not finite",
                 extent.not_finite);
   }

@@ -12,7 +12,7 @@
 namespace strata {
 namespace {
 
-constexpr std::uint32_t kNone = 0xffffffffu;
+constexpr std::uint32_t kNoHalf = 0xffffffffu;
 
 struct EdgeFacts {
   std::uint64_t edges = 0, unbalanced = 0, non_manifold = 0;
@@ -40,7 +40,7 @@ class Links {
       : triangles_(triangles), vertex_(vertex), execution_(execution) {}
 
   void find(MeshLinks& result) {
-    opposite_.assign(3 * triangles_.size(), kNone);
+    opposite_.assign(3 * triangles_.size(), kNoHalf);
     const EdgeFacts facts = pair_edges();
     result.edges = facts.edges;
     result.unbalanced_edges = facts.unbalanced;
@@ -105,7 +105,7 @@ class Links {
   // Triangles at an edge need not have the same orientation.
   void walk(std::uint32_t corner, std::uint32_t edge, std::vector<bool>& visited) const {
     const std::uint32_t v = vertex_at(corner);
-    while (opposite_[edge] != kNone) {
+    while (opposite_[edge] != kNoHalf) {
       const std::uint32_t across = opposite_[edge];
       const bool begins = vertex_at(across) == v;
       corner = begins ? across : next_of(across);
@@ -139,7 +139,7 @@ class Links {
   void find_shells(const std::vector<std::array<std::uint32_t, 2>>& joined, MeshLinks& result) {
     detail::DisjointSets sets(triangles_.size());
     for (std::uint32_t half = 0; half < opposite_.size(); ++half) {
-      if (opposite_[half] != kNone && opposite_[half] < half) {
+      if (opposite_[half] != kNoHalf && opposite_[half] < half) {
         sets.join(opposite_[half] / 3, half / 3);
       }
     }
