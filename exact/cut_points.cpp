@@ -103,9 +103,9 @@ FilePoint round_for_file(const EdgePoint& point, bool& moved) {
 }
 
 bool is_file_point(const RationalPoint& point, const FilePoint& rounded) {
-  return point.x << kFileBits == product<Int256>(point.w, rounded.x) &&
-         point.y << kFileBits == product<Int256>(point.w, rounded.y) &&
-         point.z << kFileBits == product<Int256>(point.w, rounded.z);
+  return (point.x << kFileBits) == product<Int256>(point.w, rounded.x) &&
+         (point.y << kFileBits) == product<Int256>(point.w, rounded.y) &&
+         (point.z << kFileBits) == product<Int256>(point.w, rounded.z);
 }
 
 FinePoint round_fine(const RationalPoint& point) {

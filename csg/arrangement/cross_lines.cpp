@@ -322,7 +322,7 @@ void sort_points(const BoundaryPoints& points, const LineAxis& along, std::span<
       const int up = rising ? -1 : 1;
       std::sort(line.begin() + static_cast<std::ptrdiff_t>(i),
                 line.begin() + static_cast<std::ptrdiff_t>(j),
-                [&](std::uint32_t x, std::uint32_t y) {
+                [&points, axis = along.axis, up](std::uint32_t x, std::uint32_t y) {
                   return x != y && order_along(points, x, y, axis) == up;
                 });
     }

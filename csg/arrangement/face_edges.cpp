@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <span>
 #include <tuple>
 
 #include "exact/determinants.h"
@@ -187,8 +188,13 @@ void EdgeJoiner::add_touches() {
   for (std::size_t i = 0; i < result_.planes.size(); ++i) {
     BoundaryPlane& plane = result_.planes[i];
     plane.first_touch = static_cast<std::uint32_t>(result_.touches.size());
-    const auto points =
-        std::ranges::equal_range(inner, plane_root_[i], {}, &FaceEdges::InnerPoint::triangle);
+    const auto first = std::lower_bound(
+        inner.begin(), inner.end(), plane_root_[i],
+        [](const FaceEdges::InnerPoint& p, std::uint32_t root) { return p.triangle < root; });
+    const auto last = std::find_if(first, inner.end(), [&](const FaceEdges::InnerPoint& p) {
+      return p.triangle != plane_root_[i];
+    });
+    const std::span points(first, last);
     if (points.empty()) continue;
     ++plane_number_;
     for (std::uint32_t e = plane.first_edge; e < plane.first_edge + plane.edge_count; ++e) {

@@ -76,15 +76,15 @@ class EdgeCollector {
 
   void add_cut(const CutLines::Cut& cut) {
     const auto list = sorted_.of(cut.line);
-    const auto [axis, rising] = axis_of(input_, lines_, cut.line);
-    const int up = rising ? -1 : 1;
+    const LineAxis along = axis_of(input_, lines_, cut.line);
+    const int up = along.rising ? -1 : 1;
     const auto at = [&](std::uint32_t point) {
       if (list.size() < 32) {
         return static_cast<std::size_t>(std::ranges::find(list, point) - list.begin());
       }
       const auto found =
           std::ranges::lower_bound(list, point, [&](std::uint32_t x, std::uint32_t y) {
-            return x != y && order_along(points_, x, y, axis) == up;
+            return x != y && order_along(points_, x, y, along.axis) == up;
           });
       assert(found != list.end() && *found == point);
       return static_cast<std::size_t>(found - list.begin());

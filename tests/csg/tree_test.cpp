@@ -42,9 +42,10 @@ TEST(TreeValue, ATreeMayBeUsedAnyNumberOfTimes) {
   EXPECT_EQ(voxels_of(both | both), voxels_of(both));
   EXPECT_EQ(voxels_of(both - both), 0u);
   Tree grown = a;
-  grown |= grown;
+  const Tree& same = grown;
+  grown |= same;
   grown -= b;
-  grown &= grown;
+  grown &= same;
   EXPECT_EQ(voxels_of(grown), cube(6) - cube(2));
   // The meshes are shared.
   for (const Solid& solid : grown.solids()) {

@@ -86,7 +86,9 @@ class CulledRenderer {
     costs.allocated_bytes = list_bytes::hash_table(buffer.cells().size(), buffer.max_ages().size(),
                                                    64, sizeof(buffer.max_ages()[0]));
     costs.formula_bytes =
-        list_bytes::hash_table(options_.cells, list_bytes::blocks(stream.width(), stream.height()),
+        list_bytes::hash_table(options_.cells,
+                               list_bytes::blocks(static_cast<std::uint64_t>(stream.width()),
+                                                  static_cast<std::uint64_t>(stream.height())),
                                64, Record::kAgeBits > 8 ? 2u : 1u);
     blend(buffer, stream, image);
     costs.lost = stream.size() - visible_;
