@@ -106,8 +106,9 @@ TEST(CandidatePairs, HoldAllPairsThatShareAPointAndNoneThatBoxesOrPlanesTellApar
   std::mt19937_64 random(5);
   std::size_t sharing = 0, found = 0;
   for (int round = 0; round < 60; ++round) {
-    const Soup soup = random_soup(random, 2 + round % 3, 120);
-    const auto& [solids, solid_of] = soup;
+    const Soup soup = random_soup(random, 2 + static_cast<std::uint32_t>(round) % 3, 120);
+    const WeldedSolids& solids = soup.solids;
+    const std::vector<std::uint32_t>& solid_of = soup.solid_of;
     const auto result = find_pairs(solids);
     ASSERT_TRUE(result.has_value());
     ASSERT_TRUE(std::ranges::is_sorted(*result));
