@@ -45,7 +45,7 @@ struct ContourReport {
 
 /// A contour and how it was made.
 struct ContourMesh {
-  SolidMesh mesh;  ///< one part without a name
+  SolidMesh mesh;        ///< one part without a name
   ContourReport report;  ///< counts
 };
 
