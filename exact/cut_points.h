@@ -71,6 +71,19 @@ struct RationalPoint {
   Int192 w;
 };
 
+/// The numerator along an axis, 0 to 2.
+constexpr const Int256& numerator(const RationalPoint& point, int axis) {
+  return axis == 0 ? point.x : axis == 1 ? point.y : point.z;
+}
+
+/// The order of a / a_weight and b / b_weight: -1, 0, 1. Products of an Int256 and an Int192 wrap
+/// beyond 448 bits; those of numerators and weights have 7b + 4 + 6b + 3 bits, 384 for b = 29.
+/// @pre the weights are above 0
+constexpr int compare_fractions(const Int256& a, const Int192& a_weight, const Int256& b,
+                                const Int192& b_weight) {
+  return sign_of(product<Wide<7>>(a, b_weight) - product<Wide<7>>(b, a_weight));
+}
+
 RationalPoint rational(const LatticePoint& p);
 RationalPoint rational(const EdgePoint& point);
 /// @pre det3 of the normals is not 0

@@ -3,15 +3,11 @@
 namespace strata::exact {
 namespace {
 
-const Int256& coordinate(const RationalPoint& point, int axis) {
-  return axis == 0 ? point.x : axis == 1 ? point.y : point.z;
-}
-
 // Eight roundings: of a leaf and three in a minor, of a leaf and two products, of two sums.
 int filtered_orient2d(const RationalPoint& a, const RationalPoint& b, const RationalPoint& c, int u,
                       int v) {
   const auto real = [&](const RationalPoint& p) {
-    return filters::RealNormal(to_double(coordinate(p, u)), to_double(coordinate(p, v)),
+    return filters::RealNormal(to_double(numerator(p, u)), to_double(numerator(p, v)),
                                to_double(p.w));
   };
   return filters::dot(real(c), filters::cross(real(a), real(b))).sign();
@@ -25,10 +21,10 @@ Int640 orient2d_value(const RationalPoint& a, const RationalPoint& b, const Rati
   const auto minor = [](const auto& p, const auto& q, const auto& r, const auto& s) {
     return product<Wide<7>>(p, s) - product<Wide<7>>(q, r);
   };
-  const Int256 &au = coordinate(a, u), &av = coordinate(a, v), &bu = coordinate(b, u),
-               &bv = coordinate(b, v);
-  return product<Int640>(coordinate(c, u), minor(av, a.w, bv, b.w)) +
-         product<Int640>(coordinate(c, v), minor(a.w, au, b.w, bu)) +
+  const Int256 &au = numerator(a, u), &av = numerator(a, v), &bu = numerator(b, u),
+               &bv = numerator(b, v);
+  return product<Int640>(numerator(c, u), minor(av, a.w, bv, b.w)) +
+         product<Int640>(numerator(c, v), minor(a.w, au, b.w, bu)) +
          product<Int640>(c.w, minor(au, av, bu, bv));
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/markup.h"
 #include "core/printable.h"
 
 namespace strata::apps {
@@ -109,28 +110,7 @@ for (const head of document.querySelectorAll('thead th')) {
 }
 )";
 
-std::string escaped(std::string_view text) {
-  std::string out;
-  for (const char c : printable(text)) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        out += c;
-    }
-  }
-  return out;
-}
+std::string escaped(std::string_view text) { return escape_markup(printable(text)); }
 
 std::string data_uri(const std::vector<std::uint8_t>& png) {
   constexpr std::string_view kDigits =

@@ -41,7 +41,7 @@ std::vector<bool> find_embedded(const WeldedSolids& solids, const MeshEdges& edg
       continue;
     }
     const auto corner = [&](std::uint32_t use, std::uint32_t next) {
-      return solids.triangles[use / 3][static_cast<int>((use % 3 + next) % 3)];
+      return corner_of(solids.triangles, use, next);
     };
     const bool simple = uses.size() == 2 && solids.content_of[t] == content &&
                         content < solid_count && corner(uses[0], 0) == corner(uses[1], 1);
@@ -96,7 +96,7 @@ std::vector<std::uint8_t> find_plain(const WeldedSolids& solids, const MeshEdges
   std::vector<std::uint8_t> plain =
       plain_stars(std::span<const LatticePoint>(solids.vertices), solids.triangles, execution);
   const auto corner = [&](std::uint32_t use, std::uint32_t next) {
-    return solids.triangles[use / 3][static_cast<int>((use % 3 + next) % 3)];
+    return corner_of(solids.triangles, use, next);
   };
   for (std::uint32_t e = 0; e < edges.size(); ++e) {  // a fan has no other edges
     const auto uses = edges.uses_of(e);

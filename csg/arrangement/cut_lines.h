@@ -65,7 +65,7 @@ struct ArrangementInput {
   std::uint32_t edge_from(std::uint32_t edge) const { return corner(edges.uses_of(edge)[0], 0); }
   std::uint32_t edge_to(std::uint32_t edge) const { return corner(edges.uses_of(edge)[0], 1); }
   std::uint32_t corner(std::uint32_t use, std::uint32_t next) const {
-    return triangles[use / 3][static_cast<int>((use % 3 + next) % 3)];
+    return corner_of(triangles, use, next);
   }
 };
 

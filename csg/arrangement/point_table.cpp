@@ -1,36 +1,21 @@
 #include "csg/arrangement/point_table.h"
 
-#include <bit>
 #include <cmath>
+
+#include "mesh/weld.h"
 
 namespace strata::csg {
 namespace {
 
 using exact::FilePoint;
-using exact::Int192;
-using exact::Int256;
 using exact::RationalPoint;
 
-const Int256& coordinate(const RationalPoint& point, int axis) {
-  return axis == 0 ? point.x : axis == 1 ? point.y : point.z;
-}
-
-// x_a / w_a - x_b / w_b has the numerator x_a w_b - x_b w_a: 7b + 4 + 6b + 3 bits; 384 for b = 29.
 int compare(const RationalPoint& a, const RationalPoint& b, int axis) {
-  using Product = exact::Wide<7>;
-  return sign_of(exact::product<Product>(coordinate(a, axis), b.w) -
-                 exact::product<Product>(coordinate(b, axis), a.w));
+  return exact::compare_fractions(exact::numerator(a, axis), a.w, exact::numerator(b, axis), b.w);
 }
 
 bool equal(const RationalPoint& a, const RationalPoint& b) {
   return compare(a, b, 0) == 0 && compare(a, b, 1) == 0 && compare(a, b, 2) == 0;
-}
-
-std::uint64_t hash(const FilePoint& p) {
-  std::uint64_t h = static_cast<std::uint64_t>(p.x) * 0x9e3779b97f4a7c15u;
-  h = (std::rotl(h, 29) ^ static_cast<std::uint64_t>(p.y)) * 0xbf58476d1ce4e5b9u;
-  h = (std::rotl(h, 31) ^ static_cast<std::uint64_t>(p.z)) * 0x94d049bb133111ebu;
-  return h ^ h >> 32;
 }
 
 }  // namespace
@@ -39,7 +24,7 @@ PointTable::PointTable(BoundaryPoints points)
     : points_(std::move(points)), slots_(1024, 0), inserted_(points_.vertices().size(), false) {}
 
 std::size_t PointTable::slot_of(const FilePoint& rounded) const {
-  return hash(rounded) & (slots_.size() - 1);
+  return detail::WeldTable<std::int64_t>::hash(rounded) & (slots_.size() - 1);
 }
 
 void PointTable::insert(std::uint32_t point) {

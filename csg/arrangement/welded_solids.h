@@ -38,6 +38,12 @@ struct WeldedSolids {
 /// Welds. @return kCancelled
 Result<WeldedSolids> weld_solids(LatticeSolids solids, const Execution& execution);
 
+/// The corner `next` places after that where a side begins. @param use  3 * triangle + side
+inline std::uint32_t corner_of(std::span<const glm::uvec3> triangles, std::uint32_t use,
+                               std::uint32_t next) {
+  return triangles[use / 3][static_cast<int>((use % 3 + next) % 3)];
+}
+
 /// The edges of a mesh's triangles, each with all its triangles.
 struct MeshEdges {
   /// The edge of each side: [3 * triangle + side].

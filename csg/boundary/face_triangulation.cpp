@@ -11,10 +11,6 @@ namespace {
 
 using exact::RationalPoint;
 
-const exact::Int256& coordinate(const RationalPoint& point, int axis) {
-  return axis == 0 ? point.x : axis == 1 ? point.y : point.z;
-}
-
 // The sweep goes to the right and a little up, so that rows of holes along the axes are met one
 // hole at a time. Coordinates differ by at most 2^53, so keys of their differences are below 2^63.
 constexpr std::int64_t kRight = 509, kUp = 197;
@@ -25,17 +21,11 @@ struct ExactCorner {
 
   ExactCorner(const RationalPoint& p, int u, int v)
       : point(p),
-        key(exact::product<exact::Int256>(coordinate(p, u), kRight) +
-            exact::product<exact::Int256>(coordinate(p, v), kUp)) {}
+        key(exact::product<exact::Int256>(exact::numerator(p, u), kRight) +
+            exact::product<exact::Int256>(exact::numerator(p, v), kUp)) {}
 };
 
 // The sign of a / a_weight - b / b_weight. Products: 217 + 178 bits for b = 29.
-int compare(const exact::Int256& a, const exact::Int192& a_weight, const exact::Int256& b,
-            const exact::Int192& b_weight) {
-  return exact::sign_of(exact::product<exact::Wide<7>>(a, b_weight) -
-                        exact::product<exact::Wide<7>>(b, a_weight));
-}
-
 }  // namespace
 
 // Most faces that were cut are triangles still.
@@ -149,8 +139,10 @@ bool FaceTriangulation::cut_exactly(const BoundaryPlane& plane) {
   }
   std::sort(corners.begin(), corners.end(), [this](const auto& a, const auto& b) {
     const RationalPoint &p = a.first.point, &q = b.first.point;
-    const int order = compare(a.first.key, p.w, b.first.key, q.w);
-    return (order != 0 ? order : compare(coordinate(p, v_), p.w, coordinate(q, v_), q.w)) < 0;
+    const int order = exact::compare_fractions(a.first.key, p.w, b.first.key, q.w);
+    return (order != 0 ? order
+                       : exact::compare_fractions(exact::numerator(p, v_), p.w,
+                                                  exact::numerator(q, v_), q.w)) < 0;
   });
   std::vector<RationalPoint> rational;
   rational.reserve(corners.size());

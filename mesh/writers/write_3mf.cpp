@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/markup.h"
 #include "mesh/writers/mesh_blocks.h"
 #include "mesh/writers/zip_output.h"
 
@@ -34,29 +35,6 @@ constexpr const char* kRelationships =
 )";
 
 constexpr const char* kUnits[] = {"micron", "millimeter", "centimeter", "meter", "inch", "foot"};
-
-std::string xml(std::string_view text) {
-  std::string out;
-  for (const char letter : one_line(text)) {
-    switch (letter) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        out += letter;
-    }
-  }
-  return out;
-}
 
 /// Which parts are closed by themselves: each edge is used as often in one direction as in the
 /// other. Edges are summed as numbers that a hash makes of them, added in one direction and
@@ -218,7 +196,8 @@ class TriangleEnds {
 void add_object(Blocks& blocks, const SolidMesh& mesh, const Object& object, int id,
                 const Palette& palette, const TriangleEnds& ends) {
   std::string head = fmt::format("<object id=\"{}\" type=\"model\"", id);
-  if (!object.name.empty()) head += fmt::format(" name=\"{}\"", xml(object.name));
+  if (!object.name.empty())
+    head += fmt::format(" name=\"{}\"", escape_markup(one_line(object.name)));
   if (!palette.colours.empty()) {
     head += fmt::format(" pid=\"{}\" pindex=\"{}\"", kPalette, palette.colour_of[object.part]);
   }
