@@ -12,7 +12,7 @@
 #include "apps/strata/run_commands.h"
 #include "apps/strata/scene_camera.h"
 #include "core/atomic_file.h"
-#include "csg/picture/encode_png.h"
+#include "picture/encode_png.h"
 #include "strata/csg/input/scene_input.h"
 #include "strata/csg/input/see_through.h"
 #include "strata/transparency/media/fxaa.h"
@@ -33,7 +33,7 @@ bool only_meshes(const OitCommand& command) {
 }
 
 std::vector<std::uint8_t> png_of(const transparency::Image& image) {
-  return csg::encode_png({image.width, image.height, transparency::to_bytes(image)});
+  return encode_png({image.width, image.height, transparency::to_bytes(image)});
 }
 
 /// Writes index.html into a folder, which is made if it is not there.
@@ -268,7 +268,7 @@ Result<void> OitRun::draw(const OitChoice& choice) {
   if (!command_.report.empty()) {
     if (auto timed = time_again(choice, result); !timed) return with_limit(timed.error());
     result.picture = png_of(drawn->image);
-    result.heat = csg::encode_png(heat_map(drawn->image, reference_));
+    result.heat = encode_png(heat_map(drawn->image, reference_));
   }
   if (compares()) result.difference = transparency::difference(drawn->image, reference_);
   outcome_.draw_ms += session_.milliseconds() - begin;

@@ -14,19 +14,14 @@
 #include "strata/core/result.h"
 #include "strata/csg/surface/surface_image.h"
 #include "strata/csg/tree.h"
+#include "strata/picture/pixels.h"
 #include "strata/raster/view.h"
 
 namespace strata::csg {
 
-/// Red, green, blue, alpha; colours are not multiplied by alpha.
-using Rgba = glm::vec<4, std::uint8_t>;
-
-/// An image of 8 bits a channel, rows from the top.
-struct Picture {
-  int width = 0;             ///< pixels
-  int height = 0;            ///< pixels
-  std::vector<Rgba> pixels;  ///< width * height, row by row
-};
+using strata::Picture;
+using strata::Rgba;
+using strata::write_png;
 
 /// Colours of a picture; the names and values are OpenSCAD's.
 struct ColourScheme {
@@ -115,9 +110,6 @@ class Preview {
 Result<Picture> picture(const Tree& tree, const std::optional<Camera>& camera = {},
                         const glm::ivec2& size = {512, 512}, const PictureOptions& options = {},
                         const Execution& execution = {});
-
-/// Writes a PNG file, or to standard output for "-". @return kOutput naming the file
-Result<void> write_png(const Picture& picture, const std::string& path);
 
 /// Writes the distances of visible surfaces along the view axis, in world units, as an OpenEXR file
 /// with one channel, Z, of 32-bit floats; infinity where no solid is visible.

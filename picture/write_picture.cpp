@@ -1,18 +1,21 @@
-#include "csg/picture/encode_png.h"
+#include "picture/encode_png.h"
 
 #include <libdeflate.h>
 
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <memory>
 #include <new>
 #include <optional>
+#include <span>
+#include <string_view>
 
 #include "core/atomic_file.h"
 #include "core/png_chunks.h"
-#include "strata/csg/picture/picture.h"
+#include "strata/picture/pixels.h"
 
-namespace strata::csg {
+namespace strata {
 namespace {
 
 /// The colours of a picture of at most 256, as flat faces have.
@@ -179,4 +182,4 @@ Result<void> write_png(const Picture& picture, const std::string& path) {
   }
 }
 
-}  // namespace strata::csg
+}  // namespace strata
