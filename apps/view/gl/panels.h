@@ -24,6 +24,8 @@ class Panels {
   void tell(std::string text);
 
  private:
+  static constexpr float kStatusHeight = 26;
+
   [[nodiscard]] float side_width(const glm::ivec2& window) const;
   void side(Viewer& viewer, const glm::ivec2& window);
   void camera(Viewer& viewer);
