@@ -5,21 +5,24 @@
 #include <cmath>
 #include <limits>
 
+#include "core/did_you_mean.h"
 #include "strata/transparency/techniques.h"
 
 namespace strata::transparency {
 
 Result<const Technique*> find_technique(std::string_view name) {
   std::string similar;
+  std::vector<std::string_view> names;
   for (const Technique* technique : techniques()) {
     if (technique->name == name) return technique;
+    names.push_back(technique->name);
     const bool alike = technique->name.find(name) != std::string_view::npos ||
                        name.find(technique->name) != std::string_view::npos;
     if (alike && !name.empty())
       similar += fmt::format("{}{}", similar.empty() ? "" : ", ", technique->name);
   }
   return fail(ErrorCode::kUsage, "there is no technique '{}'{}{}", name,
-              similar.empty() ? "" : "; similar names: ", similar);
+              similar.empty() ? did_you_mean(name, names) : "; similar names: ", similar);
 }
 
 Result<ChosenTechnique> parse_technique(std::string_view text, const Settings& settings) {

@@ -12,11 +12,27 @@
 #include "apps/commands/scene_options.h"
 #include "apps/session/help.h"
 #include "apps/session/option_values.h"
+#include "core/did_you_mean.h"
 #include "core/printable.h"
 #include "strata/csg/input/scene_input.h"
 
 namespace strata::apps {
 namespace {
+
+/// Without arguments. The files are those of data/.
+constexpr const char* kFirstHelp = R"(strata: exact voxels, meshes and pictures of solids
+
+Five commands to try in the folder of the project:
+
+  strata view data/plate.csg                          look at a scene in a window
+  strata voxelize data/knot.obj -o knot.vdb           voxels, 256 along the longest side
+  strata csg data/plate.csg --cut y=0 -o plate.png    a picture of a scene, cut open
+  strata mesh data/plate.csg -o plate.3mf             the exact mesh, for a slicer
+  strata info data/open_sphere.off                    sizes, volume and holes of a mesh
+
+`strata FILE` measures a mesh or a scene. `strata --help` lists all commands, and
+`strata COMMAND --help` lists the options of a command.
+)";
 
 constexpr const char* kTopHelp = R"(strata: exact voxels, depth lists and pictures of solids
 
@@ -134,7 +150,7 @@ void add_json(CLI::App& app, Words& words, const char* group) {
 namespace {
 
 void add_grid(CLI::App& app, Words& words) {
-  const char* group = "Grid (exactly one of -r, --voxel-size and --grid is needed)";
+  const char* group = "Grid (one of -r, --voxel-size and --grid; default: -r 256)";
   option(app, group, "-r,--resolution", words.resolution, "N",
          "Voxels along the longest side of the input, 1 to 65536");
   option(app, group, "--voxel-size", words.voxel_size, "S",
@@ -319,13 +335,12 @@ GridRequest grid_request(const Words& words, Reader& reader) {
   GridRequest grid;
   const int sizes =
       int{!words.resolution.empty()} + int{!words.voxel_size.empty()} + int{!words.grid.empty()};
-  if (sizes != 1) {
-    reader.fail_with(fmt::format("exactly one of -r, --voxel-size and --grid must be given, got {}",
-                                 sizes == 0   ? "none"
-                                 : sizes == 2 ? "two"
-                                              : "all"));
+  if (sizes > 1) {
+    reader.fail_with(fmt::format("only one of -r, --voxel-size and --grid can be given, got {}",
+                                 sizes == 2 ? "two" : "all"));
     return grid;
   }
+  if (sizes == 0) grid.resolution = kDefaultResolution;
   if (!words.resolution.empty()) {
     reader.take(parse_integer("--resolution", words.resolution), grid.resolution);
   }
@@ -433,6 +448,7 @@ VoxelizeCommand voxelize_command(const Words& words, Reader& reader) {
   if (!words.json.empty()) command.json = words.json;
   if (command.input.files.empty()) reader.fail_with("no input file is given");
   command.grid = grid_request(words, reader);
+  command.default_size = words.resolution.empty() && words.voxel_size.empty() && words.grid.empty();
   read_values(words, command, reader);
   if (command.backend == Backend::kGl && !command.solid) {
     reader.fail_with(
@@ -483,6 +499,44 @@ ParseOutcome usage_error(std::string_view command, std::string_view message) {
           true, static_cast<int>(ErrorCode::kUsage)};
 }
 
+/// What other programs call what the commands do.
+constexpr std::pair<std::string_view, std::string_view> kOtherNames[] = {
+    {"check", "info"},     {"contour", "mesh"}, {"convert", "mesh"},   {"draw", "csg"},
+    {"export", "mesh"},    {"layers", "ldi"},   {"lists", "ldi"},      {"measure", "csg"},
+    {"open", "view"},      {"raster", "ldi"},   {"render", "csg"},     {"repair", "mesh"},
+    {"scene", "csg"},      {"show", "view"},    {"slice", "voxelize"}, {"stats", "info"},
+    {"transparent", "oit"}};
+
+ParseOutcome no_such_command(std::string_view name) {
+  if (name.starts_with('-')) {
+    return usage_error("", fmt::format("unknown option {}; the command comes first", name));
+  }
+  std::error_code ignored;
+  if (std::filesystem::is_directory(name, ignored)) {
+    return usage_error("", fmt::format("{}: it is a folder, not a file or a command", name));
+  }
+  if (name.find_first_of("./") != std::string_view::npos) {
+    return usage_error("", fmt::format("{}: there is no such file or command", name));
+  }
+  std::vector<std::string_view> names;
+  for (const auto& [command, what] : kCommands) names.push_back(command);
+  std::string meant = did_you_mean(name, names);
+  for (const auto& [other, command] : kOtherNames) {
+    if (name == other) meant = fmt::format("; did you mean {}?", command);
+  }
+  return usage_error("", fmt::format("no such command '{}'{}", name, meant));
+}
+
+/// `strata help COMMAND`
+ParseOutcome help_on(std::string_view name) {
+  Words words;
+  CLI::App app("", "strata " + std::string(name));
+  if (name == "view")
+    return {"`strata view --help` lists the options, the mouse and the keys.\n", false, 0};
+  if (!define_command(name, app, words)) return no_such_command(name);
+  return {help_text(app, false), false, 0};
+}
+
 /// Whether a command line is one of openscad: no command, but a file, or options and a scene.
 bool begins_with_a_file(const std::vector<std::string>& words) {
   const std::string& first = words.front();
@@ -498,9 +552,11 @@ bool begins_with_a_file(const std::vector<std::string>& words) {
 }  // namespace
 
 Command parse_command_line(int argc, const char* const* argv) {
-  if (argc < 2) return ParseOutcome{kTopHelp, true, static_cast<int>(ErrorCode::kUsage)};
+  if (argc < 2) return ParseOutcome{kFirstHelp, true, static_cast<int>(ErrorCode::kUsage)};
   std::string_view name = argv[1];
   int first = 2;
+  bool alone = false;  // a file without anything else
+  if (name == "help" && argc == 3) return help_on(argv[2]);
   if (name == "-h" || name == "--help" || name == "help") {
     return ParseOutcome{top_help(), false, 0};
   }
@@ -517,14 +573,13 @@ Command parse_command_line(int argc, const char* const* argv) {
   if (begins_with_a_file({argv + 1, argv + argc})) {
     name = "csg";
     first = 1;
+    alone = argc == 2;
   }
-  // Only the options of the command asked for are built: that is most of the time CLI11 takes.
+  // Only the options of the command that was named are built: that is most of the time CLI11 takes.
   Words words;
   CLI::App app("", "strata " + std::string(name));
   if (!define_command(name, app, words)) {
-    return usage_error("", name.starts_with('-')
-                               ? fmt::format("unknown option {}; the command comes first", name)
-                               : fmt::format("unknown command '{}'", name));
+    return no_such_command(name);
   }
   try {
     std::vector<std::string> arguments(argv + first, argv + argc);
@@ -549,6 +604,7 @@ Command parse_command_line(int argc, const char* const* argv) {
   if (name == "csg") command = csg_command(words, reader);
   if (name == "oit") command = oit_command(words, reader);
   if (reader.error()) return usage_error(name, reader.error()->message);
+  if (auto* csg = std::get_if<CsgCommand>(&command)) csg->alone = alone;
   return command;
 }
 

@@ -63,8 +63,8 @@ void read_output(const Words& words, MeshCommand& command, Reader& reader) {
     if (command.format == SolidFormat::kAuto) {
       reader.fail_with(fmt::format(
           "{}: meshes are written as .3mf, .stl, .obj, .ply or .off; --format chooses for other "
-          "names",
-          command.output));
+          "names{}",
+          command.output, other_writer(command.output)));
     }
   }
   if (!words.mesh.unit.empty()) {
@@ -127,10 +127,11 @@ void read_contour(const Words& words, MeshCommand& command, Reader& reader) {
   if (!mesh.open.empty()) {
     reader.take(parse_choice("--open", mesh.open, kContourOpenWords), command.open);
   }
-  if (words.resolution.empty() == words.voxel_size.empty()) {
-    reader.fail_with(fmt::format(
-        "--method contour needs -r, the voxels along the longest side, or --voxel-size, got {}",
-        words.resolution.empty() ? "neither" : "both"));
+  if (!words.resolution.empty() && !words.voxel_size.empty()) {
+    return reader.fail_with("only one of -r and --voxel-size can be given, got both");
+  }
+  if (words.resolution.empty() && words.voxel_size.empty()) {
+    command.grid.resolution = kDefaultResolution;
     return;
   }
   if (!words.resolution.empty()) {
@@ -183,8 +184,9 @@ void define_mesh(CLI::App& app, Words& words) {
          "Lattice steps along the longest side of the result, 2^N, 10 to 28 (default: 26)", "N",
          surface);
   option("-r,--resolution", words.resolution,
-         "With --method contour: voxels along the longest side of the input, 1 to 65536", "N",
-         surface);
+         "With --method contour: voxels along the longest side of the input, 1 to 65536 (default: "
+         "256)",
+         "N", surface);
   option("--voxel-size", words.voxel_size,
          "With --method contour: length of a voxel, or three along x, y, z", "S|SX,SY,SZ", surface);
   option("--open", mesh.open,

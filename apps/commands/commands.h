@@ -28,6 +28,9 @@ enum class Backend {
   kGl  ///< OpenGL 4.5, a software renderer too
 };
 
+/// Voxels along the longest side where no size is given.
+inline constexpr int kDefaultResolution = 256;
+
 /// `strata voxelize`
 struct VoxelizeCommand {
   CommonOptions common;
@@ -40,6 +43,7 @@ struct VoxelizeCommand {
   bool ids = false;                 ///< values say which solid
   std::optional<std::string> name;  ///< of the grid in the file
   GridRequest grid;
+  bool default_size = false;  ///< the grid has kDefaultResolution, since no size was given
   bool solid = true, surface = false;
   SurfaceKind surface_kind = SurfaceKind::kConservative;
   OpenMode open = OpenMode::kVote;
@@ -114,6 +118,7 @@ struct CsgCommand : PictureRequest {
   std::string ids, depth;  ///< files; empty: none
   int frames = 0;          ///< pictures with $t = 0, 1/frames, ...; 0: one without
   bool summary = false;    ///< the report as text
+  bool alone = false;      ///< nothing but a file was given: `strata part.stl`
   bool render = false;     ///< the result alone: no ghosts, no colours, flat scenes from above
   Backend backend = Backend::kAuto;
   std::optional<int> measure_resolution;  ///< of the report's measures; none: csg::MeasureOptions'

@@ -8,6 +8,7 @@
 
 #include "apps/session/file_conflicts.h"
 #include "apps/session/option_values.h"
+#include "strata/voxelize/formats/voxel_writer.h"
 
 namespace strata::apps {
 namespace {
@@ -143,10 +144,18 @@ Result<void> read_openscad_words(const CsgWords& words, CsgCommand& command) {
 
 }  // namespace
 
+std::string other_writer(const std::string& path) {
+  if (solid_format_of(path) != SolidFormat::kAuto) return "; strata mesh writes meshes";
+  if (has_extension(path, ".png")) return "; strata csg writes pictures";
+  if (voxel_format_for(path, "")) return "; strata voxelize writes voxels";
+  return {};
+}
+
 Result<void> check_picture_name(std::string_view asked_by, const std::string& path, bool depth) {
   if (is_stream(path) || has_extension(path, depth ? ".exr" : ".png")) return {};
-  return fail(ErrorCode::kUsage, "{}{}: {}", asked_by, path,
-              depth ? "distances are written as .exr" : "pictures are written as .png");
+  return fail(ErrorCode::kUsage, "{}{}: {}{}", asked_by, path,
+              depth ? "distances are written as .exr" : "pictures are written as .png",
+              other_writer(path));
 }
 
 Result<Projection> parse_projection(std::string_view text) {

@@ -19,6 +19,10 @@ struct CsgWords {
   bool view_all = false, auto_centre = false, edges = false, transparent = false;
 };
 
+/// What to say at the end of a message about the name of an output that the command does not write:
+/// "; strata mesh writes meshes". Empty: no command writes such files.
+[[nodiscard]] std::string other_writer(const std::string& path);
+
 /// Whether a picture, or with `depth` a file of distances, can be written under a name: .png, .exr
 /// or a stream. @param asked_by what the sentence begins with: "--ids " @return kUsage
 Result<void> check_picture_name(std::string_view asked_by, const std::string& path,

@@ -41,8 +41,9 @@ Result<void> add_choice(std::string_view text, const transparency::Settings& set
                         OitCommand& command) {
   const auto chosen = transparency::parse_technique(text, settings);
   if (!chosen) {
-    return fail(ErrorCode::kUsage, "--technique: {}; strata oit --list lists all",
-                chosen.error().message);
+    const std::string& what = chosen.error().message;
+    return fail(ErrorCode::kUsage, "--technique: {}{}", what,
+                what.ends_with('?') ? "" : "; strata oit --list lists all");
   }
   command.choices.push_back({std::string(text), *chosen});
   return {};

@@ -5,6 +5,8 @@
 
 #include <fmt/format.h>
 
+#include "core/did_you_mean.h"
+
 namespace strata::apps {
 namespace {
 
@@ -15,6 +17,17 @@ OptionGroup& group_of(std::vector<OptionGroup>& groups, const std::string& headi
   const auto found = std::find_if(groups.begin(), groups.end(),
                                   [&](const auto& group) { return group.heading == heading; });
   return found != groups.end() ? *found : groups.emplace_back(OptionGroup{heading, {}});
+}
+
+/// The sentence about an option that a command has not. `--axes=x` is about `--axes`.
+std::string unknown_option(const CLI::App& app, const std::string& given) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : app.get_options()) {
+    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+  }
+  const std::vector<std::string_view> known(names.begin(), names.end());
+  const std::string word = given.substr(0, given.find('='));
+  return "unknown option " + given + did_you_mean(word, known);
 }
 
 /// Appends an entry: its label, and its text in the column beside or below it.
@@ -116,7 +129,7 @@ std::string parse_mistake(const CLI::App& app, const CLI::ParseError& error) {
   const std::string text = error.what();
   if (dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr) {
     const std::vector<std::string> unknown = app.remaining();
-    if (!unknown.empty()) return "unknown option " + unknown.front();
+    if (!unknown.empty()) return unknown_option(app, unknown.front());
   }
   // CLI11's texts begin with the option: `--threads: 1 required N missing`.
   const std::string name = text.substr(0, text.find_first_of(": "));

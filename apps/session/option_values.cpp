@@ -4,6 +4,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "core/did_you_mean.h"
+
 namespace strata::apps {
 namespace {
 
@@ -107,7 +109,8 @@ tl::unexpected<Error> no_such_choice(std::string_view option, std::string_view t
     list += i == 0 ? "" : i + 1 == names.size() ? " or " : ", ";
     list += names[i];
   }
-  return fail(ErrorCode::kUsage, "{} must be {}, got '{}'", option, list, text);
+  return fail(ErrorCode::kUsage, "{} must be {}, got '{}'{}", option, list, text,
+              did_you_mean(text, names));
 }
 
 }  // namespace strata::apps

@@ -1,3 +1,5 @@
+#include <unistd.h>
+
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -246,7 +248,11 @@ Result<void> CsgRun::print_measures() {
   csg::cut_scene(scene_, command_.cuts, camera());
   if (auto done = measure_tree(scene_.tree, scene_.tree.root()); !done) return done;
   session_.end_progress();
-  return print_report(csg_text(command_, outcome_), "-", false);
+  std::string text = csg_text(command_, outcome_);
+  if (command_.alone && isatty(STDOUT_FILENO) != 0) {
+    text += next_steps(command_.input.files.front());
+  }
+  return print_report(text, "-", false);
 }
 
 Result<void> CsgRun::open_preview() {

@@ -1,5 +1,9 @@
 #include "apps/strata/csg_report.h"
 
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+
 #include "apps/session/report.h"
 #include "core/printable.h"
 
@@ -146,6 +150,28 @@ void write_seen_ids(JsonWriter& json, const CsgOutcome& outcome) {
 }
 
 }  // namespace
+
+std::string next_steps(const std::string& file) {
+  const bool plain = std::all_of(file.begin(), file.end(), [](unsigned char letter) {
+    return std::isalnum(letter) != 0 ||
+           std::string_view("._-/+").find(static_cast<char>(letter)) != std::string_view::npos;
+  });
+  // A quote within quotes ends them, is escaped, and begins them again.
+  std::string word = plain ? file : "'";
+  if (!plain) {
+    for (const char letter : printable(file))
+      word += letter == '\'' ? "'\\''" : std::string(1, letter);
+    word += '\'';
+  }
+  const std::string stem = plain ? std::filesystem::path(file).stem().string() : "out";
+  return fmt::format(
+      "next\n"
+      "  strata view {0}\n"
+      "  strata {0} -o {1}.png\n"
+      "  strata voxelize {0} -o {1}.vdb\n"
+      "  strata mesh {0} -o {1}.3mf\n",
+      word, stem);
+}
 
 std::string csg_json(const CsgCommand& command, const CsgOutcome& outcome, const Session& session) {
   JsonWriter json;

@@ -38,6 +38,9 @@ void write_camera(JsonWriter& json, const Camera& camera);
 /// For people: a line a topic.
 [[nodiscard]] std::string csg_text(const CsgCommand& command, const CsgOutcome& outcome);
 
+/// What else can be done with a file, as commands: for a person who gave nothing but its name.
+[[nodiscard]] std::string next_steps(const std::string& file);
+
 /// For programs, as docs/json.md says.
 [[nodiscard]] std::string csg_json(const CsgCommand& command, const CsgOutcome& outcome,
                                    const Session& session);

@@ -8,8 +8,10 @@
 #include <utility>
 
 #include "apps/commands/choice_words.h"
+#include "apps/commands/csg_options.h"
 #include "apps/session/session.h"
 #include "apps/strata/allocation_failures.h"
+#include "apps/strata/file_size.h"
 #include "apps/strata/library_session.h"
 #include "apps/strata/run_commands.h"
 #include "apps/strata/voxelize_report.h"
@@ -38,7 +40,11 @@ Result<std::optional<VoxelFormat>> output_format(const VoxelizeCommand& command)
     return fail(ErrorCode::kUsage, "standard output is a terminal, but voxel files are binary");
   }
   const auto format = voxel_format_for(command.output, command.format);
-  if (!format) return tl::unexpected(format.error());
+  if (!format) {
+    const Error& error = format.error();
+    return fail(error.code, "{}{}", error.message,
+                command.format.empty() ? other_writer(command.output) : "");
+  }
   if ((command.fog != 0 || command.mask) && format->name != "vdb") {
     return fail(ErrorCode::kUsage, "{} needs a .vdb file; format {} cannot store a {}",
                 command.mask ? "--mask" : "--fog", format->name,
@@ -428,8 +434,8 @@ Result<void> VoxelizeRun::finish() {
 }
 
 /// What decides how much the job will hold.
-MemoryEstimate estimate(const VoxelizeCommand& command, const VoxelizeOutcome& outcome, int samples,
-                        const Session& session) {
+MemoryFactors memory_factors(const VoxelizeCommand& command, const VoxelizeOutcome& outcome,
+                             int samples, const Session& session) {
   const csg::SolidInput& input = outcome.input;
   MemoryFactors factors;
   factors.mesh = &input.soup;
@@ -446,7 +452,18 @@ MemoryEstimate estimate(const VoxelizeCommand& command, const VoxelizeOutcome& o
   factors.fog = command.fog != 0;
   factors.threads = session.threads();
   factors.limit = session.memory_limit();
-  return estimate_memory(outcome.grid, factors);
+  return factors;
+}
+
+/// Of a file that will not be written.
+void estimate_file(const VoxelizeCommand& command, VoxelizeOutcome& outcome, int samples,
+                   Session& session) {
+  if (!outcome.format) return;
+  MemoryFactors factors = memory_factors(command, outcome, samples, session);
+  if (is_surface_alone(command, outcome.input)) factors.solid = false, factors.surface = true;
+  outcome.file_size =
+      file_size(outcome.grid, factors, outcome.input.closed,
+                writer_options(command, outcome, samples, session), session.execution("file size"));
 }
 
 /// Refuses what will not fit the memory limit.
@@ -488,9 +505,13 @@ Result<void> run_voxelize(const VoxelizeCommand& command, Session& session) {
   outcome.axis = choose_axis(command, outcome.format, outcome.grid);
   const int samples = fog_samples(command, outcome.input);
   if (const auto valid = check_samples(samples, outcome.grid); !valid) return valid;
-  outcome.estimate = estimate(command, outcome, samples, session);
+  outcome.estimate =
+      estimate_memory(outcome.grid, memory_factors(command, outcome, samples, session));
   if (auto valid = check_memory(command, outcome, session); !valid) return valid;
-  if (!command.dry_run) {
+  if (command.dry_run) {
+    estimate_file(command, outcome, samples, session);
+    if (session.interrupted()) return fail(ErrorCode::kCancelled, "stopped");
+  } else {
     if (auto done = VoxelizeRun(command, outcome, session).run(); !done) return done;
   }
   session.end_progress();

@@ -162,7 +162,7 @@ class Lines {
   std::string text_;
 };
 
-void tell_input(Lines& line, const VoxelizeOutcome& outcome) {
+void tell_input(Lines& line, const VoxelizeCommand& command, const VoxelizeOutcome& outcome) {
   for (const csg::InputFacts& file : outcome.input.files) {
     line("input",
          fmt::format("{}: {} triangles, {} vertices, {}{}", printable(file.path),
@@ -182,7 +182,8 @@ void tell_input(Lines& line, const VoxelizeOutcome& outcome) {
   line("grid",
        fmt::format("{} x {} x {} voxels of {}, origin {}, rays along {}", grid.dims.x, grid.dims.y,
                    grid.dims.z, s.x == s.y && s.y == s.z ? fmt::format("{:.6g}", s.x) : triple(s),
-                   triple(grid.origin), word_of(kAxisWords, outcome.axis)));
+                   triple(grid.origin), word_of(kAxisWords, outcome.axis)) +
+           (command.default_size ? fmt::format("; -r {} by default", kDefaultResolution) : ""));
 }
 
 void tell_results(Lines& line, const VoxelizeCommand& command, const VoxelizeOutcome& outcome,
@@ -263,13 +264,18 @@ void write_output(JsonWriter& json, const VoxelizeCommand& command,
 std::string voxelize_text(const VoxelizeCommand& command, const VoxelizeOutcome& outcome,
                           const Session& session) {
   Lines line;
-  tell_input(line, outcome);
+  tell_input(line, command, outcome);
   if (outcome.measured) {
     tell_results(line, command, outcome, session);
   } else {
     line("memory", fmt::format("about {} would be needed; the limit is {}",
                                readable_bytes(outcome.estimate.total()),
                                readable_bytes(session.memory_limit())));
+  }
+  if (outcome.file_size) {
+    line("output", fmt::format("{}: {}, {}{}", printable(command.output), outcome.format->name,
+                               outcome.file_size->exact ? "" : "at most ",
+                               readable_bytes(outcome.file_size->bytes)));
   }
   if (outcome.output_bytes) {
     line("output", fmt::format("{}: {}, {} bytes", command.output, outcome.format->name,
@@ -288,6 +294,7 @@ std::string voxelize_json(const VoxelizeCommand& command, const VoxelizeOutcome&
   json.member("dims", outcome.grid.dims);
   json.member("origin", outcome.grid.origin);
   json.member("voxel_size", outcome.grid.voxel_size);
+  json.member("by_default", command.default_size);
   json.end_object();
 
   write_options(json, command, outcome, session);
@@ -303,6 +310,12 @@ std::string voxelize_json(const VoxelizeCommand& command, const VoxelizeOutcome&
                  {"write", outcome.write_ms}});
   write_memory(json, {{"estimated_bytes", outcome.estimate.total()},
                       {"limit_bytes", session.memory_limit()}});
+  if (outcome.file_size) {
+    json.key("file_size").begin_object();
+    json.member("bytes", outcome.file_size->bytes);
+    json.member("exact", outcome.file_size->exact);
+    json.end_object();
+  }
   write_warnings(json, session);
   json.end_object();
   return json.take();

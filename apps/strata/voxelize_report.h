@@ -7,6 +7,7 @@
 
 #include "apps/commands/commands.h"
 #include "apps/session/session.h"
+#include "apps/strata/file_size.h"
 #include "strata/core/grid.h"
 #include "strata/csg/input/solid_input.h"
 #include "strata/voxelize/formats/voxel_writer.h"
@@ -27,6 +28,7 @@ struct VoxelizeOutcome {
   double area_estimate = 0.0;         ///< of the set's boundary, square world units
   std::optional<VoxelFormat> format;  ///< of the output; none without one
   std::optional<std::uint64_t> output_bytes;
+  std::optional<FileSize> file_size;     ///< of a dry run
   std::vector<std::uint64_t> id_voxels;  ///< of solid n of the scene, with --ids
   double write_ms = 0.0;
 };

@@ -14,6 +14,7 @@
 #include "apps/session/option_values.h"
 #include "apps/view/camera_control.h"
 #include "apps/view/exporter.h"
+#include "core/did_you_mean.h"
 #include "mesh/formats/text_scanner.h"
 #include "strata/core/grid.h"
 #include "strata/csg/picture/picture.h"
@@ -127,6 +128,12 @@ std::optional<double> number_of(std::string_view word) {
 }
 
 /// Reads one line.
+std::string meant_scheme(std::string_view word) {
+  std::vector<std::string_view> names;
+  for (const csg::ColourScheme& scheme : csg::colour_schemes()) names.push_back(scheme.name);
+  return did_you_mean(word, names);
+}
+
 class Line {
  public:
   Line(const Rule& rule, const std::string& where, std::vector<std::string> words)
@@ -237,8 +244,9 @@ class Line {
   Result<void> check_word(ScriptCommand& command) const {
     const auto one_of = [&](std::initializer_list<std::string_view> names) -> Result<void> {
       if (std::find(names.begin(), names.end(), command.word) != names.end()) return {};
-      return fail(ErrorCode::kUsage, "{}: unknown {} '{}'; it must be one of {}", where_,
-                  rule_.name, command.word, fmt::join(names, ", "));
+      return fail(ErrorCode::kUsage, "{}: unknown {} '{}'; it must be one of {}{}", where_,
+                  rule_.name, command.word, fmt::join(names, ", "),
+                  did_you_mean(command.word, {names.begin(), names.size()}));
     };
     switch (command.action) {
       case Action::kView:
@@ -276,7 +284,8 @@ class Line {
       }
       case Action::kScheme:
         if (csg::find_colour_scheme(command.word) != nullptr) return {};
-        return fail(ErrorCode::kUsage, "{}: unknown colour scheme '{}'", where_, command.word);
+        return fail(ErrorCode::kUsage, "{}: unknown colour scheme '{}'{}", where_, command.word,
+                    meant_scheme(command.word));
       default:
         return {};
     }
@@ -312,7 +321,10 @@ Result<std::vector<ScriptCommand>> parse_script(std::string_view text, const std
     const auto* rule = std::find_if(std::begin(kRules), std::end(kRules),
                                     [&](const Rule& one) { return one.name == words->front(); });
     if (rule == std::end(kRules)) {
-      return fail(ErrorCode::kUsage, "{}: unknown command '{}'", where, words->front());
+      std::vector<std::string_view> names;
+      for (const Rule& one : kRules) names.push_back(one.name);
+      return fail(ErrorCode::kUsage, "{}: unknown command '{}'{}", where, words->front(),
+                  did_you_mean(words->front(), names));
     }
     ScriptCommand command;
     command.line = number;

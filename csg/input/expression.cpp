@@ -4,6 +4,8 @@
 #include <filesystem>
 #include <optional>
 
+#include "core/did_you_mean.h"
+
 namespace strata::csg {
 namespace {
 
@@ -132,6 +134,7 @@ class Parser {
       return add({Kind::kInput, static_cast<std::size_t>(word[0] - 'a'), 0, 0});
     }
     at_ = begin;
+    const std::vector<std::string_view> stems(stems_.begin(), stems_.end());
     if (many > 1) {
       complain(fmt::format("{} files are called {}: name one by its letter, a for the first", many,
                            word));
@@ -139,7 +142,8 @@ class Parser {
       complain(fmt::format("{} would be file {}, but there {} only {}", word, word[0] - 'a' + 1,
                            stems_.size() == 1 ? "is" : "are", stems_.size()));
     } else {
-      complain(fmt::format("no file is called {}{}", word, by_position()));
+      complain(
+          fmt::format("no file is called {}{}{}", word, did_you_mean(word, stems), by_position()));
     }
     return {};
   }

@@ -7,6 +7,7 @@
 #include <new>
 #include <set>
 
+#include "core/did_you_mean.h"
 #include "core/printable.h"
 #include "mesh/formats/input_bytes.h"
 #include "mesh/formats/obj_lines.h"
@@ -154,8 +155,11 @@ class ObjMaterialReader {
     } else if (auto done = scan(text); !done) {
       return tl::unexpected(done.error());
     }
+    std::vector<std::string_view> known;
+    for (const auto& [name, number] : numbers_) known.push_back(name);
     for (const std::string& name : unknown_) {
-      out_.warnings.push_back(fmt::format("{}: there is no material '{}'", path_, name));
+      out_.warnings.push_back(
+          fmt::format("{}: there is no material '{}'{}", path_, name, did_you_mean(name, known)));
       if (out_.missing.size() + out_.warnings.size() > 8) break;
     }
     return std::move(out_);

@@ -12,6 +12,7 @@
 #include <string_view>
 #include <utility>
 
+#include "core/did_you_mean.h"
 #include "core/printable.h"
 #include "transparency/media/particle_file.h"
 
@@ -54,7 +55,8 @@ struct Member {
       for (const std::string_view word : known) {
         all += (all.empty() ? "" : ", ") + std::string(word);
       }
-      return fault("has a member '{}', which must be one of {}", printable(key, 60), all);
+      return fault("has a member '{}', which must be one of {}{}", printable(key, 60), all,
+                   did_you_mean(key, {known.begin(), known.size()}));
     }
     return {};
   }

@@ -5,6 +5,7 @@
 #include <mutex>
 #include <new>
 
+#include "core/did_you_mean.h"
 #include "transparency/stream/lanes.h"
 #include "transparency/stream/listed_source.h"
 #include "transparency/stream/mesh_source.h"
@@ -183,17 +184,19 @@ Result<Settings> checked_settings(const Technique& technique, Settings settings)
     settings.variant = rest.substr(0, rest.find(' '));
     return settings;
   }
+  std::vector<std::string_view> variants;
   while (!rest.empty()) {
     const std::size_t end = rest.find(' ');
-    if (rest.substr(0, end) == settings.variant) return settings;
+    variants.push_back(rest.substr(0, end));
+    if (variants.back() == settings.variant) return settings;
     rest = end == std::string_view::npos ? std::string_view() : rest.substr(end + 1);
   }
   if (technique.variants.empty()) {
     return fail(ErrorCode::kUsage, "{} has no variants, got '{}'", technique.name,
                 settings.variant);
   }
-  return fail(ErrorCode::kUsage, "{}: the variant must be one of {}, got '{}'", technique.name,
-              technique.variants, settings.variant);
+  return fail(ErrorCode::kUsage, "{}: the variant must be one of {}, got '{}'{}", technique.name,
+              technique.variants, settings.variant, did_you_mean(settings.variant, variants));
 }
 
 std::vector<glm::u8vec4> to_bytes(const Image& image) {

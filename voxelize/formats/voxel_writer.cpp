@@ -5,6 +5,7 @@
 #include <exception>
 #include <string_view>
 
+#include "core/did_you_mean.h"
 #include "strata/voxelize/grid_fit.h"
 #include "voxelize/formats/writers.h"
 
@@ -19,6 +20,12 @@ std::string lower_case(std::string_view text) {
 }
 
 bool is_folder(const VoxelFormat& format) { return format.extension.ends_with('/'); }
+
+std::string meant_format(std::string_view text) {
+  std::vector<std::string_view> names;
+  for (const VoxelFormat& format : voxel_formats()) names.push_back(format.name);
+  return did_you_mean(text, names);
+}
 
 std::string format_names() {
   std::string names;
@@ -81,8 +88,8 @@ Result<VoxelFormat> voxel_format_for(const std::string& path, const std::string&
     for (const VoxelFormat& candidate : voxel_formats()) {
       if (candidate.name == lower_case(format)) return checked(candidate);
     }
-    return fail(ErrorCode::kUsage, "unknown voxel format '{}'; it must be one of {}", format,
-                format_names());
+    return fail(ErrorCode::kUsage, "unknown voxel format '{}'; it must be one of {}{}", format,
+                format_names(), meant_format(format));
   }
   if (path == "-") {
     return fail(ErrorCode::kUsage, "standard output needs a format: {}", format_names());
@@ -101,9 +108,10 @@ Result<VoxelFormat> voxel_format_for(const std::string& path, const std::string&
     if ((!slash || is_folder(candidate)) && name.ends_with(extension)) return checked(candidate);
   }
   if (slash && plain_folder != nullptr) return checked(*plain_folder);
-  return fail(ErrorCode::kUsage,
-              "{}: the extension must be that of a voxel format: {} (a folder's name ends with /)",
-              path, format_names());
+  return fail(
+      ErrorCode::kUsage,
+      "{}: the extension must be that of a voxel format: {} (a folder's name ends with /){}", path,
+      format_names(), meant_format(name.substr(name.rfind('.') + 1)));
 }
 
 Result<void> check_ids(const VoxelFormat& format, std::uint32_t largest) {

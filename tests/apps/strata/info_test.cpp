@@ -254,7 +254,8 @@ TEST(Json, TheDocumentationNamesExactlyWhatVoxelizePrints) {
            {"open.obj", "--stats", "--json=report.json"},
            {"open.obj", "-o", "a.vdb", "--json=report.json"},
            {"plate.obj", "--json=report.json"},
-           {"box.obj", "-o", "a.npy", "--ids", "--json=report.json"}}) {
+           {"box.obj", "-o", "a.npy", "--ids", "--json=report.json"},
+           {"box.obj", "-o", "a.npy", "--dry-run", "--json=report.json"}}) {
     std::vector<std::string> arguments = {"voxelize", "-r", "8", "--checksum"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     const RunResult run = place.run(arguments);

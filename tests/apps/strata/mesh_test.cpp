@@ -219,7 +219,8 @@ TEST_F(MeshTool, MistakesOnTheCommandLineAreNamed) {
   usage({"-o", "a.ply", "--open", "maybe"}, "'maybe'");
   usage({"-o", "a.ply", "--open", "vote"}, "--open vote needs --method contour");
   usage({"-o", "a.ply", "-r", "64"}, "-r needs --method contour");
-  usage({"-o", "a.ply", "--method", "contour"}, "--method contour needs -r");
+  usage({"-o", "a.ply", "--method", "contour", "-r", "9", "--voxel-size", "1"},
+        "only one of -r and --voxel-size can be given");
   usage({"-o", "a.ply", "--voxel-size", "1"}, "--voxel-size needs --method contour");
   usage({"-o", "a.ply", "--method", "contour", "-r", "8", "--voxel-size", "1"}, "got both");
   usage({"-o", "a.ply", "--method", "contour", "--voxel-size", "1,2"}, "--voxel-size");

@@ -67,7 +67,7 @@ TEST_F(Openscad, AFileInThePlaceOfACommandMeansCsg) {
   EXPECT_FALSE(place.read("a.png").empty());
   EXPECT_EQ(place.read("a.png"), place.read("b.png"));
   EXPECT_EQ(place.run({"missing.csg", "-o", "c.png"}).exit_code, 3);
-  refuses({"no_command", "-o", "c.png"}, "unknown command 'no_command'");
+  refuses({"no_command", "-o", "c.png"}, "no such command 'no_command'");
   refuses({"-o", "c.png"}, "the command comes first");
 }
 

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstdlib>
 #include <sstream>
 
 #include "strata/mesh/formats/write_mesh.h"
@@ -31,11 +33,50 @@ class Usage : public testing::Test {
   Workplace place;
 };
 
-TEST_F(Usage, NoArgumentsPrintsShortHelpOnStandardError) {
+TEST_F(Usage, NoArgumentsPrintsAScreenOfCommandsOnStandardError) {
   const RunResult run = place.run({});
   EXPECT_EQ(run.exit_code, 2);
   EXPECT_EQ(run.out, "");
-  EXPECT_NE(run.err.find("strata voxelize knot.obj"), std::string::npos);
+  EXPECT_NE(run.err.find("strata voxelize data/knot.obj -o knot.vdb"), std::string::npos);
+  EXPECT_NE(run.err.find("`strata --help`"), std::string::npos);
+  EXPECT_LT(std::count(run.err.begin(), run.err.end(), '\n'), 20);
+}
+
+TEST_F(Usage, HelpTakesACommand) {
+  const RunResult run = place.run({"help", "voxelize"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(run.out, place.run({"voxelize", "--help"}).out);
+  EXPECT_EQ(place.run({"help"}).out, place.run({"--help"}).out);
+  refuses({"help", "voxelise"}, "no such command 'voxelise'; did you mean voxelize?");
+}
+
+TEST_F(Usage, WordsThatAreNearlyRightAreNamed) {
+  refuses({"voxelise", "box.obj"}, "no such command 'voxelise'; did you mean voxelize?");
+  refuses({"vox", "box.obj"}, "did you mean voxelize?");
+  refuses({"render", "box.obj"}, "no such command 'render'; did you mean csg?");
+  refuses({"hello"}, "no such command 'hello'\n");
+  refuses({"none.vdb"}, "none.vdb: there is no such file or command");
+  refuses({"voxelize", "box.obj", "--resoluton", "20", "--stats"},
+          "unknown option --resoluton; did you mean --resolution?");
+  refuses({"voxelize", "box.obj", "--resoluton=20", "--stats"}, "did you mean --resolution?");
+  refuses({"voxelize", "box.obj", "--stats", "--rule", "windign"}, "did you mean winding?");
+  refuses({"voxelize", "box.obj", "-o", "a.vbd"}, "did you mean vdb?");
+  refuses({"voxelize", "box.obj", "-o", "a.x", "--format", "nrd"}, "did you mean nrrd?");
+  refuses({"csg", "box.obj", "-o", "a.png", "--colorscheme", "cornfeild"},
+          "did you mean Cornfield?");
+  refuses({"oit", "box.obj", "-o", "a.png", "--technique", "dual-peling"},
+          "did you mean dual-peeling?");
+  refuses({"csg", "box.obj", "--expr", "bax - b"}, "no file is called bax; did you mean box?");
+  refuses({"mesh", "box.obj", "-o", "a.3mf", "--unit", "milimeter"}, "did you mean millimeter?");
+}
+
+TEST_F(Usage, ANameThatAnotherCommandWritesIsSaidToBe) {
+  refuses({"csg", "box.obj", "-o", "a.stl"}, "; strata mesh writes meshes");
+  refuses({"csg", "box.obj", "-o", "a.vdb"}, "; strata voxelize writes voxels");
+  refuses({"voxelize", "box.obj", "-o", "a.stl"}, "; strata mesh writes meshes");
+  refuses({"voxelize", "box.obj", "-o", "a.png"}, "; strata csg writes pictures");
+  refuses({"mesh", "box.obj", "-o", "a.png"}, "; strata csg writes pictures");
+  refuses({"mesh", "box.obj", "-o", "a.npy"}, "; strata voxelize writes voxels");
 }
 
 TEST_F(Usage, HelpBeginsWithExamplesAndEndsWithTheExitCodes) {
@@ -126,12 +167,32 @@ TEST_F(Usage, UnknownWordsAreNamed) {
   refuses({"voxelize", "box.obj", "-r", "4", "--axis", "x", "-o", "box.vdb"}, "along z");
 }
 
-TEST_F(Usage, ExactlyOneSizeIsNeeded) {
-  refuses({"voxelize", "box.obj", "--stats"}, "must be given, got none");
+TEST_F(Usage, AFileAloneIsMeasuredAndOnATerminalTheNextStepsAreNamed) {
+  const RunResult run = place.run({"box.obj"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_NE(run.out.find("volume           1,"), std::string::npos) << run.out;
+  EXPECT_EQ(run.out.find("next"), std::string::npos) << run.out;
+  if (std::system("command -v script >/dev/null") != 0) GTEST_SKIP() << "needs script(1)";
+  const std::string shown = place.path("shown");
+  const std::string command = "script -qec '" STRATA_TOOL " " + place.path("box.obj") +
+                              "' /dev/null >" + shown + " </dev/null";
+  ASSERT_EQ(std::system(command.c_str()), 0);
+  EXPECT_NE(place.read("shown").find("strata voxelize " + place.path("box.obj") + " -o box.vdb"),
+            std::string::npos)
+      << place.read("shown");
+}
+
+TEST_F(Usage, ThereIsOneSizeAtMostAndOneByDefault) {
+  const RunResult run = place.run({"voxelize", "box.obj", "--stats"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_NE(run.out.find("256 x 256 x 256 voxels"), std::string::npos) << run.out;
+  EXPECT_NE(run.out.find("; -r 256 by default\n"), std::string::npos) << run.out;
+  const RunResult told = place.run({"voxelize", "box.obj", "--stats", "-r", "256"});
+  EXPECT_EQ(told.out.find("by default"), std::string::npos) << told.out;
   refuses({"voxelize", "box.obj", "--stats", "-r", "4", "--voxel-size", "1"},
-          "must be given, got two");
+          "can be given, got two");
   refuses({"voxelize", "box.obj", "--stats", "-r", "4", "--voxel-size", "1", "--grid", "1,1,1"},
-          "must be given, got all");
+          "can be given, got all");
 }
 
 TEST_F(Usage, NumbersThatAreNoneAreNamed) {

@@ -59,7 +59,8 @@ TEST(Script, ReadsCommandsWithTheirLines) {
 }
 
 TEST(Script, MistakesNameFileAndLine) {
-  EXPECT_EQ(error_of("wait\norbitt 1 2\n"), "drive.txt:2: unknown command 'orbitt'");
+  EXPECT_EQ(error_of("wait\norbitt 1 2\n"),
+            "drive.txt:2: unknown command 'orbitt'; did you mean orbit?");
   EXPECT_EQ(error_of("orbit 1\n"), "drive.txt:1: usage: orbit DX DY");
   EXPECT_EQ(error_of("orbit 1 x\n"), "drive.txt:1: 'x' is not a number; usage: orbit DX DY");
   EXPECT_EQ(error_of("orbit 1 nan\n"), "drive.txt:1: 'nan' is not a number; usage: orbit DX DY");

@@ -1,0 +1,238 @@
+// The sizes of voxel files follow from the writers in voxelize/formats. What those write for a run
+// is known; how many runs there can be follows from the triangles: rays change between inside and
+// outside only where they cross one, and a leaf of an OpenVDB tree, or a chunk of a Zarr array, is
+// even unless it meets one.
+
+#include "apps/strata/file_size.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/vector_relational.hpp>
+#include <vector>
+
+#include "voxelize/formats/dense_rows.h"
+
+namespace strata::apps {
+namespace {
+
+constexpr double kHeads = 2048;      // of a file, without names
+constexpr double kBlockBytes = 180;  // the codes and the end of a block of RunDeflater
+
+/// Counts boxes of a grid that triangles may meet. Of a grid that is not too large a box counts
+/// once, else once for each triangle.
+class BoxCount {
+ public:
+  /// @param side   of a box, in voxels @param along  an axis along which boxes are endless: they
+  ///               are the rays through voxel centres, and count once for each triangle; 3: none
+  BoxCount(const VoxelGrid& grid, int side, int along)
+      : grid_(grid), side_(side), along_(along), boxes_((grid.dims + side - 1) / side) {
+    constexpr double kMostMarks = 1 << 27;  // 16 MiB
+    const double all = static_cast<double>(boxes_.x) * boxes_.y * boxes_.z;
+    if (along == 3 && all <= kMostMarks) marks_.resize(static_cast<std::size_t>(all));
+  }
+
+  double operator()(const TriangleSoup& soup, const Execution& execution) {
+    // Large triangles are cut into pieces, which meet fewer boxes than the box around them.
+    constexpr double kMostPieces = 1 << 20;
+    const auto count = static_cast<double>(std::max<std::size_t>(1, soup.triangles.size()));
+    const int cuts = std::clamp(static_cast<int>(std::log2(kMostPieces / count)), 0, 16);
+    double boxes = 0;
+    std::size_t done = 0;
+    for (const glm::uvec3& t : soup.triangles) {
+      if ((++done & 0xfff) == 0 && execution.stop.stop_requested()) break;
+      boxes += met(place(soup.positions[t.x]), place(soup.positions[t.y]),
+                   place(soup.positions[t.z]), cuts);
+    }
+    return boxes;
+  }
+
+ private:
+  [[nodiscard]] glm::dvec3 place(const glm::dvec3& p) const {
+    return (p - grid_.origin) / grid_.voxel_size;
+  }
+  double met(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, int cuts) {
+    constexpr double kMoved = 1.0 / 16;  // by the lattice, and where faces that coincide act
+    const glm::dvec3 low = glm::min(a, glm::min(b, c)) - kMoved;
+    const glm::dvec3 high = glm::max(a, glm::max(b, c)) + kMoved;
+    const bool rays = along_ < 3;
+    const glm::dvec3 first =
+        glm::max(rays ? glm::ceil(low - 0.5) : glm::floor(low / side_), glm::dvec3(0.0));
+    const glm::dvec3 last =
+        glm::min(rays ? glm::floor(high - 0.5) : glm::floor(high / side_), glm::dvec3(boxes_ - 1));
+    double boxes = 1;
+    for (int axis = 0; axis < 3; ++axis) {
+      if (axis != along_) boxes *= std::max(0.0, last[axis] - first[axis] + 1);
+    }
+    if (cuts == 0 || boxes <= 4) return boxes == 0 || marks_.empty() ? boxes : mark(first, last);
+    const double ab = glm::distance(a, b), bc = glm::distance(b, c), ca = glm::distance(c, a);
+    if (ab >= bc && ab >= ca) return cut(a, b, c, cuts - 1);
+    return bc >= ca ? cut(b, c, a, cuts - 1) : cut(c, a, b, cuts - 1);
+  }
+  /// Of two halves, the edge from a to b cut.
+  double cut(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, int cuts) {
+    const glm::dvec3 middle = 0.5 * (a + b);
+    return met(a, middle, c, cuts) + met(middle, b, c, cuts);
+  }
+  /// @return how many boxes were not marked
+  double mark(const glm::ivec3& first, const glm::ivec3& last) {
+    double count = 0;
+    for (int z = first.z; z <= last.z; ++z) {
+      for (int y = first.y; y <= last.y; ++y) {
+        for (int x = first.x; x <= last.x; ++x) {
+          const auto at = static_cast<std::size_t>((z * boxes_.y + y) * boxes_.x + x);
+          if (marks_[at]) continue;
+          marks_[at] = true;
+          ++count;
+        }
+      }
+    }
+    return count;
+  }
+
+  const VoxelGrid& grid_;
+  double side_;
+  int along_;
+  glm::ivec3 boxes_;         // along x, y, z
+  std::vector<bool> marks_;  // of the boxes, x fastest; or none
+};
+
+double parts(int voxels, int side) { return std::ceil(static_cast<double>(voxels) / side); }
+
+/// Bounds of what the file of a set holds.
+class SizeBound {
+ public:
+  SizeBound(const VoxelGrid& grid, const MemoryFactors& factors, bool closed,
+            const VoxelWriterOptions& file, const Execution& execution)
+      : grid_(grid),
+        factors_(factors),
+        closed_(closed),
+        file_(file),
+        execution_(execution),
+        values_(file.ids),
+        cells_(static_cast<double>(grid.dims.x) * grid.dims.y * grid.dims.z) {}
+
+  [[nodiscard]] double bytes() const {
+    const std::string_view format = factors_.format;
+    if (format == "vdb") return vdb();
+    if (format == "binvox") return binvox();
+    if (format == "vox") return vox();
+    if (format == "png") return png();
+    if (format == "zarr") return zarr();
+    return layers(values_.kind, cells_);  // npz, nrrd, vti
+  }
+  [[nodiscard]] double dense() const { return cells_ * static_cast<double>(values_.bytes); }
+
+ private:
+  /// Boxes that are neither empty nor solid.
+  [[nodiscard]] double mixed(int side) const {
+    const glm::ivec3 n = (grid_.dims + side - 1) / side;
+    const double all = static_cast<double>(n.x) * n.y * n.z;
+    if (factors_.votes) return all;
+    // Those at the sides of the grid, too, where a solid that goes on beyond is cut off.
+    const double sides = goes_beyond()
+                             ? static_cast<double>(n.x) * n.y + static_cast<double>(n.y) * n.z +
+                                   static_cast<double>(n.z) * n.x
+                             : 0.0;
+    return std::min(all, sides + BoxCount(grid_, side, 3)(*factors_.mesh, execution_));
+  }
+  [[nodiscard]] bool goes_beyond() const {
+    const glm::dvec3 margin = grid_.voxel_size / 16.0, low = grid_.origin - margin;
+    const glm::dvec3 high = grid_.origin + glm::dvec3(grid_.dims) * grid_.voxel_size + margin;
+    return std::any_of(
+        factors_.mesh->positions.begin(), factors_.mesh->positions.end(), [&](const glm::dvec3& p) {
+          return glm::any(glm::lessThan(p, low)) || glm::any(glm::greaterThan(p, high));
+        });
+  }
+  /// Changes of the value along the rays of an axis.
+  [[nodiscard]] double changes(Axis axis) const {
+    if (factors_.votes) return cells_;
+    double count = 0;
+    if (factors_.solid) {
+      const double crossings =
+          BoxCount(grid_, 1, static_cast<int>(axis))(*factors_.mesh, execution_);
+      count += closed_ ? crossings : 2 * crossings;  // a face without a partner is a thin sheet
+    }
+    if (factors_.surface) count += 2 * touched();
+    return std::min(count, cells_);
+  }
+  [[nodiscard]] double touched() const { return BoxCount(grid_, 1, 3)(*factors_.mesh, execution_); }
+  /// Of runs of elements that RunDeflater writes as blocks. The bits are those of its codes.
+  [[nodiscard]] double deflated(RunBytes kind, double runs, double elements, double blocks) const {
+    const auto e = static_cast<double>(values_.bytes);
+    const double bits = kind == RunBytes::kFlags  ? 14 * runs + 3 * elements / 258
+                        : kind == RunBytes::kBits ? 28 * runs + 5 * elements / 8 / 258
+                                                  : (10 * e + 20) * runs + 5 * elements * e / 258;
+    return bits / 8 + kBlockBytes * blocks;
+  }
+  [[nodiscard]] double layers(RunBytes kind, double elements) const {
+    const double count = grid_.dims.z + 2;  // with what stands before and after
+    return kHeads + 8 * count + deflated(kind, changes(Axis::kX) + count, elements, count);
+  }
+  [[nodiscard]] double png() const {
+    const bool flags = values_.kind == RunBytes::kFlags;
+    constexpr double kChunks = 57 + 6;  // signature, heads, sums
+    const double row = flags ? 8 * parts(grid_.dims.x, 8) + 8 : grid_.dims.x + 1.0;
+    return kChunks * grid_.dims.z + (flags ? 0.0 : cells_ / grid_.dims.x * 4) +
+           layers(flags ? RunBytes::kBits : RunBytes::kIds, row * grid_.dims.y * grid_.dims.z);
+  }
+  [[nodiscard]] double zarr() const {
+    constexpr int kSide = 64;
+    const double chunks =
+        parts(grid_.dims.x, kSide) * parts(grid_.dims.y, kSide) * parts(grid_.dims.z, kSide);
+    const double columns = mixed(kSide) * kSide * kSide;  // each may end otherwise than the next
+    const double runs =
+        changes(Axis::kZ) + columns + chunks * (values_.kind == RunBytes::kIds ? kSide * kSide : 1);
+    return kHeads + 6 * chunks +
+           deflated(values_.kind, runs, chunks * kSide * kSide * kSide, chunks);
+  }
+  [[nodiscard]] double vdb() const {
+    const bool floats = file_.ids != 0 || file_.fog != 0;
+    const double leaves = parts(grid_.dims.x, 8) * parts(grid_.dims.y, 8) * parts(grid_.dims.z, 8);
+    const double lowers =
+        parts(grid_.dims.x, 128) * parts(grid_.dims.y, 128) * parts(grid_.dims.z, 128);
+    const double uppers =
+        parts(grid_.dims.x, 4096) * parts(grid_.dims.y, 4096) * parts(grid_.dims.z, 4096);
+    const double value = floats ? 4 : 1, list = floats ? 8 : 0;
+    const double leaf = floats ? 64 + 64 + 1 + 8 + 2048 : file_.mask ? 64 + 76 : 64 + 140;
+    return kHeads + 3 * static_cast<double>(file_.name.size()) + uppers * (8205 + list + 17) +
+           lowers * (1025 + list + value) + leaves * value + mixed(8) * leaf;
+  }
+  [[nodiscard]] double binvox() const {
+    const double side = std::max({grid_.dims.x, grid_.dims.y, grid_.dims.z});
+    const double pieces = side * (parts(static_cast<int>(side), 64) + 2);
+    return kHeads + 2 * (changes(Axis::kY) + 2 * pieces + side * side * side / 255);
+  }
+  [[nodiscard]] double vox() const {
+    const double models =
+        parts(grid_.dims.x, 256) * parts(grid_.dims.y, 256) * parts(grid_.dims.z, 256);
+    const double voxels = factors_.solid ? cells_ : std::min(cells_, touched());
+    return kHeads + 4 * voxels + 160 * models;
+  }
+
+  const VoxelGrid& grid_;
+  const MemoryFactors& factors_;
+  bool closed_;
+  const VoxelWriterOptions& file_;
+  const Execution& execution_;
+  DenseValues values_;
+  double cells_;
+};
+
+}  // namespace
+
+FileSize file_size(const VoxelGrid& grid, const MemoryFactors& factors, bool closed,
+                   const VoxelWriterOptions& file, const Execution& execution) {
+  const SizeBound bound(grid, factors, closed, file, execution);
+  if (factors.format == "npy") {
+    const std::string head = npy_head(DenseValues(file.ids), grid.dims);
+    return {static_cast<std::uint64_t>(bound.dense()) + head.size(), true};
+  }
+  const double most = bound.bytes() + 6.0 * static_cast<double>(file.name.size());
+  return {
+      most < 1e19 ? static_cast<std::uint64_t>(most) : std::uint64_t{10'000'000'000'000'000'000u},
+      false};
+}
+
+}  // namespace strata::apps
