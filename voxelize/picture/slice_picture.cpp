@@ -1,0 +1,197 @@
+#include "voxelize/picture/slice_picture.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <limits>
+
+#include "voxelize/picture/isolines.h"
+#include "voxelize/picture/voxel_shader.h"
+
+namespace strata {
+namespace {
+
+/// The share of the picture that the slice may fill.
+constexpr double kFill = 0.94;
+/// The part of the grid without solid voxels.
+constexpr glm::vec3 kEmpty{0.955f, 0.955f, 0.96f};
+
+/// Where the voxels of a slice lie in a picture.
+class SlicePlace {
+ public:
+  SlicePlace(const VoxelGrid& grid, const VoxelSlice& slice, const glm::ivec2& size)
+      : slice_(slice),
+        frame_(slice.axis),
+        columns_(grid.dims[frame_.u]),
+        rows_(grid.dims[frame_.v]) {
+    const double width = columns_ * grid.voxel_size[frame_.u];
+    const double height = rows_ * grid.voxel_size[frame_.v];
+    const double scale = kFill * std::min(size.x / width, size.y / height);
+    pixels_ = glm::dvec2(scale * grid.voxel_size[frame_.u], scale * grid.voxel_size[frame_.v]);
+    corner_ = (glm::dvec2(size) - pixels_ * glm::dvec2(columns_, rows_)) * 0.5;
+  }
+  /// In voxels from the lower left corner of the slice; v goes up.
+  [[nodiscard]] glm::dvec2 voxels(const glm::dvec2& pixel) const {
+    const glm::dvec2 at = (pixel - corner_) / pixels_;
+    return {at.x, rows_ - at.y};
+  }
+  [[nodiscard]] bool holds(const glm::dvec2& at) const {
+    return at.x >= 0 && at.y >= 0 && at.x < columns_ && at.y < rows_;
+  }
+  [[nodiscard]] glm::ivec3 voxel(int a, int b) const {
+    glm::ivec3 at;
+    at[frame_.u] = std::clamp(a, 0, columns_ - 1);
+    at[frame_.v] = std::clamp(b, 0, rows_ - 1);
+    at[frame_.w] = slice_.index;
+    return at;
+  }
+  /// Pixels a voxel.
+  [[nodiscard]] const glm::dvec2& pixels() const { return pixels_; }
+
+ private:
+  VoxelSlice slice_;
+  AxisFrame frame_;
+  int columns_, rows_;
+  glm::dvec2 pixels_{1.0}, corner_{0.0};
+};
+
+/// The label of a voxel, or RayHit::kNothing.
+std::uint32_t label_at(const VoxelIntervals& set, const glm::ivec3& voxel) {
+  const AxisFrame frame(set.axis());
+  const int u = voxel[frame.u], v = voxel[frame.v], w = voxel[frame.w];
+  if (v < set.v_begin() || v >= set.v_end()) return RayHit::kNothing;
+  const auto runs = set.column(u, v);
+  const auto run =
+      std::partition_point(runs.begin(), runs.end(), [w](Interval one) { return one.last < w; });
+  if (run == runs.end() || run->first > w) return RayHit::kNothing;
+  const auto labels = set.column_labels(u, v);
+  return labels.empty() ? 1 : labels[static_cast<std::size_t>(run - runs.begin())];
+}
+
+class SliceDrawing {
+ public:
+  SliceDrawing(const VoxelIntervals& set, const VoxelLook& look, const VoxelSlice& slice,
+               const glm::ivec2& size, const VoxelPictureOptions& options)
+      : set_(set),
+        look_(look),
+        place_(set.grid(), slice, size),
+        options_(options),
+        labels_(set.has_labels()),
+        picture_{size.x, size.y, {}} {
+    picture_.pixels.assign(static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y),
+                           options.background);
+  }
+
+  Picture draw(const Execution& execution) {
+    if (look_.value) {
+      values(execution);
+    } else {
+      for_rows(execution, [&](int u, int v) { return solids(u, v); });
+    }
+    return std::move(picture_);
+  }
+
+ private:
+  template <class Colour>
+  void for_rows(const Execution& execution, Colour&& colour) {
+    parallel_for(execution, static_cast<std::size_t>(picture_.height), [&](std::size_t row, int) {
+      Rgba* pixels = picture_.pixels.data() + row * static_cast<std::size_t>(picture_.width);
+      for (int u = 0; u < picture_.width; ++u) pixels[u] = colour(u, static_cast<int>(row));
+    });
+  }
+
+  /// The mean of a pixel's samples: colours of labels.
+  [[nodiscard]] Rgba solids(int u, int v) const {
+    const auto [across, down] = sample_grid(options_.samples);
+    glm::vec4 sum(0.0f);
+    for (int y = 0; y < down; ++y) {
+      for (int x = 0; x < across; ++x) {
+        const glm::dvec2 at = place_.voxels({u + (x + 0.5) / across, v + (y + 0.5) / down});
+        sum += glm::vec4(colour_at(at));
+      }
+    }
+    return Rgba(sum / static_cast<float>(options_.samples) + 0.5f);
+  }
+  [[nodiscard]] Rgba colour_at(const glm::dvec2& at) const {
+    if (!place_.holds(at)) return options_.background;
+    const std::uint32_t label =
+        label_at(set_, place_.voxel(static_cast<int>(at.x), static_cast<int>(at.y)));
+    if (label == RayHit::kNothing) return Rgba(glm::u8vec3(kEmpty * 255.0f + 0.5f), 255);
+    return label_colour(look_, labels_, label);
+  }
+
+  /// Values between the centres of voxels, or of the nearest voxel where voxels are large.
+  void values(const Execution& execution) {
+    ValueImage image{picture_.width, picture_.height, {}};
+    image.values.assign(picture_.pixels.size(), std::numeric_limits<float>::quiet_NaN());
+    parallel_for(execution, static_cast<std::size_t>(image.height), [&](std::size_t row, int) {
+      float* to = image.values.data() + row * static_cast<std::size_t>(image.width);
+      for (int u = 0; u < image.width; ++u) {
+        const glm::dvec2 at = place_.voxels({u + 0.5, static_cast<double>(row) + 0.5});
+        if (place_.holds(at)) to[u] = look_.distances ? between(at) : nearest(at);
+      }
+    });
+    if (execution.stop.stop_requested()) return;
+    if (look_.distances) {
+      draw_isolines(image, isoline_step(image), picture_, execution);
+    } else {
+      greys(image, execution);
+    }
+  }
+  [[nodiscard]] float nearest(const glm::dvec2& at) const {
+    return look_.value(place_.voxel(static_cast<int>(at.x), static_cast<int>(at.y)));
+  }
+  [[nodiscard]] float between(const glm::dvec2& at) const {
+    const glm::dvec2 from = glm::floor(at - 0.5);
+    const auto part = glm::vec2(at - 0.5 - from);
+    const int a = static_cast<int>(from.x), b = static_cast<int>(from.y);
+    const auto value = [&](int i, int j) { return look_.value(place_.voxel(a + i, b + j)); };
+    return glm::mix(glm::mix(value(0, 0), value(1, 0), part.x),
+                    glm::mix(value(0, 1), value(1, 1), part.x), part.y);
+  }
+  /// From the least value, black, to the largest, white.
+  void greys(const ValueImage& image, const Execution& execution) {
+    float low = std::numeric_limits<float>::infinity(), high = -low;
+    for (const float value : image.values) {
+      if (!std::isfinite(value)) continue;
+      low = std::min(low, value);
+      high = std::max(high, value);
+    }
+    for_rows(execution, [&](int u, int v) {
+      const float value =
+          image.values[static_cast<std::size_t>(v) * static_cast<std::size_t>(image.width) +
+                       static_cast<std::size_t>(u)];
+      if (!std::isfinite(value)) return options_.background;
+      const float part = high > low ? (value - low) / (high - low) : 0.5f;
+      return Rgba(glm::u8vec3(static_cast<std::uint8_t>(part * 255.0f + 0.5f)), 255);
+    });
+  }
+
+  const VoxelIntervals& set_;
+  const VoxelLook& look_;
+  SlicePlace place_;
+  const VoxelPictureOptions& options_;
+  bool labels_;
+  Picture picture_;
+};
+
+}  // namespace
+
+Result<Picture> slice_picture(const VoxelIntervals& set, const VoxelLook& look,
+                              const VoxelSlice& slice, const glm::ivec2& size,
+                              const VoxelPictureOptions& options, const Execution& execution) {
+  if (size.x < 1 || size.y < 1 || size.x > kMaxPictureSide || size.y > kMaxPictureSide) {
+    return fail(ErrorCode::kUsage, "a picture of {} x {} pixels: each side must be 1 to {}", size.x,
+                size.y, kMaxPictureSide);
+  }
+  const int axis = static_cast<int>(slice.axis), count = set.grid().dims[axis];
+  if (slice.index < 0 || slice.index >= count) {
+    return fail(ErrorCode::kUsage, "a slice must be 0 to {} along {}, got {}", count - 1,
+                "xyz"[axis], slice.index);
+  }
+  Picture picture = SliceDrawing(set, look, slice, size, options).draw(execution);
+  if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+  return picture;
+}
+
+}  // namespace strata
