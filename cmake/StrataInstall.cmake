@@ -89,6 +89,7 @@ strata_depends(PkgConfig::text "${pc_modules}(text REQUIRED QUIET IMPORTED_TARGE
   "freetype2 harfbuzz fontconfig" "")
 strata_depends(PkgConfig::libzip "${pc_modules}(libzip REQUIRED QUIET IMPORTED_TARGET libzip)" libzip "")
 strata_depends(PkgConfig::epoxy "${pc_modules}(epoxy REQUIRED QUIET IMPORTED_TARGET epoxy)" epoxy "")
+strata_depends(PkgConfig::blosc "${pc_modules}(blosc REQUIRED QUIET IMPORTED_TARGET blosc)" blosc "")
 strata_depends(pugixml::pugixml "find_dependency(pugixml CONFIG)" pugixml "")
 strata_depends(OpenEXR::OpenEXR "find_dependency(OpenEXR CONFIG)" OpenEXR "")
 strata_depends(OpenMeshCore "find_dependency(OpenMesh CONFIG)" "" "-lOpenMeshCore")  # Debian has no module of it

@@ -1,0 +1,190 @@
+// What the writers write, the readers read: the same voxels, labels and place, for every format.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "strata/voxelize/formats/voxel_writer.h"
+#include "strata/voxelize/readers/read_voxels.h"
+#include "tests/voxelize/voxel_samples.h"
+
+namespace strata::testing {
+namespace {
+
+std::uint32_t label_at(const VoxelIntervals& set, glm::ivec3 at) {
+  const AxisFrame frame(set.axis());
+  if (!set.contains(at.x, at.y, at.z)) return 0;
+  std::uint32_t label = 0;
+  for_each_labelled(set, at[frame.u], at[frame.v], [&](const Interval& run, std::uint32_t value) {
+    if (at[frame.w] >= run.begin() && at[frame.w] < run.end()) label = value;
+  });
+  return label;
+}
+
+class RoundTrip : public ::testing::TestWithParam<VoxelFormat> {
+ protected:
+  [[nodiscard]] const VoxelFormat& format() const { return GetParam(); }
+  [[nodiscard]] bool is_folder() const { return format().extension.ends_with('/'); }
+
+  std::string write(const VoxelIntervals& set, const VoxelWriterOptions& options = {}) {
+    const std::string path =
+        folder_.file(std::to_string(files_++) + (is_folder() ? "" : format().extension));
+    auto writer = open_voxel_writer(path, format().name, set.grid(), options);
+    EXPECT_TRUE(writer) << writer.error().message;
+    EXPECT_TRUE((*writer)->add(set, {}) && (*writer)->finish({}));
+    return path;
+  }
+  VoxelVolume round_trip(const VoxelIntervals& set, const VoxelWriterOptions& options = {}) {
+    const std::string path = write(set, options);
+    EXPECT_TRUE(is_voxel_file(path));
+    Result<VoxelVolume> read = read_voxels(path);
+    EXPECT_TRUE(read) << read.error().message;
+    if (!read) return {};
+    EXPECT_EQ(read->format, format().name);
+    return std::move(*read);
+  }
+  /// Where the writer put voxel (0, 0, 0) of its grid: .vox files have their middle at 0.
+  [[nodiscard]] glm::ivec3 first_index(const VoxelVolume& volume, const VoxelGrid& grid) const {
+    return format().name == "vox" ? volume.first_index + grid.dims / 2 : volume.first_index;
+  }
+  /// Voxels that differ from label(i, j, k).
+  template <class Label>
+  int wrong(const VoxelVolume& volume, const VoxelGrid& grid, Label&& label) const {
+    int count = 0;
+    std::uint64_t solid = 0;
+    const glm::ivec3 first = first_index(volume, grid);
+    for (int k = 0; k < grid.dims.z; ++k) {
+      for (int j = 0; j < grid.dims.y; ++j) {
+        for (int i = 0; i < grid.dims.x; ++i) {
+          const std::uint32_t expected = label(i, j, k);
+          solid += expected != 0 ? 1 : 0;
+          count += label_at(volume.set, glm::ivec3(i, j, k) - first) != expected;
+        }
+      }
+    }
+    EXPECT_EQ(volume.set.solid_voxels(), solid) << "some lie beyond the grid";
+    return count;
+  }
+  /// The grid is the one that was written, or what the format makes of it.
+  void expect_grid(const VoxelVolume& volume, const VoxelGrid& grid) const {
+    const bool holds = format().name != "npy" && format().name != "vox";
+    EXPECT_EQ(volume.placed, holds);
+    for (int axis = 0; axis < 3 && holds; ++axis) {
+      const double size = grid.voxel_size[axis];
+      EXPECT_NEAR(volume.grid().voxel_size[axis], size, 1e-15);
+      EXPECT_NEAR(volume.grid().origin[axis], grid.origin[axis] + volume.first_index[axis] * size,
+                  1e-9);
+    }
+    if (format().name == "binvox") {
+      EXPECT_EQ(volume.grid().dims, glm::ivec3(std::max({grid.dims.x, grid.dims.y, grid.dims.z})));
+    } else if (format().name != "vdb" && format().name != "vox") {
+      EXPECT_EQ(volume.grid().dims, grid.dims);
+    }
+  }
+
+  TemporaryFolder folder_;
+  int files_ = 0;
+};
+
+/// Those that can be read, and of them those that hold ids.
+std::vector<VoxelFormat> readable(bool with_ids) {
+  std::vector<VoxelFormat> formats = voxel_formats();
+  std::erase_if(formats, [&](const VoxelFormat& format) {
+    const auto names = readable_voxel_formats();
+    return std::find(names.begin(), names.end(), format.name) == names.end() ||
+           (with_ids && format.ids == 0);
+  });
+  return formats;
+}
+std::string format_name(const ::testing::TestParamInfo<VoxelFormat>& info) {
+  return info.param.name;
+}
+INSTANTIATE_TEST_SUITE_P(Formats, RoundTrip, ::testing::ValuesIn(readable(false)), format_name);
+class IdsRoundTrip : public RoundTrip {};
+INSTANTIATE_TEST_SUITE_P(Formats, IdsRoundTrip, ::testing::ValuesIn(readable(true)), format_name);
+
+TEST_P(RoundTrip, GivesTheSameVoxelsAndGrid) {
+  for (const Sample& sample : small_samples()) {
+    SCOPED_TRACE(sample.name);
+    const VoxelVolume volume = round_trip(intervals_of(sample, format().axis));
+    EXPECT_EQ(wrong(volume, sample.grid,
+                    [&](int i, int j, int k) { return sample.solid(i, j, k) ? 1u : 0u; }),
+              0);
+    EXPECT_EQ(volume.kind, VoxelKind::kMask);
+    expect_grid(volume, sample.grid);
+  }
+}
+
+TEST_P(RoundTrip, KeepsAnyPlaceInTheWorld) {
+  Sample sample = small_samples().front();
+  sample.grid.origin = {1.0 / 3, -12345.875, 2e-5};
+  if (format().name != "binvox") sample.grid.voxel_size = {0.1, 1.0 / 7, 3.0};
+  expect_grid(round_trip(intervals_of(sample, format().axis)), sample.grid);
+}
+
+TEST_P(IdsRoundTrip, GivesTheSameIds) {
+  for (const std::uint32_t largest : {3u, 255u, 300u, 70000u}) {
+    if (largest > format().ids) continue;
+    SCOPED_TRACE(largest);
+    const VoxelGrid grid = make_grid({37, 70, 91});
+    VoxelWriterOptions options;
+    options.ids = largest;
+    const VoxelVolume volume =
+        round_trip(labelled(grid, format().axis, some_ids(largest)), options);
+    EXPECT_EQ(wrong(volume, grid, some_ids(largest)), 0);
+    EXPECT_EQ(volume.kind, format().name == "vox" ? VoxelKind::kColours : VoxelKind::kIds);
+    expect_grid(volume, grid);
+  }
+}
+
+TEST_P(RoundTrip, IsTheSameForAnyNumberOfThreads) {
+  const std::string path = write(intervals_of(small_samples().front(), format().axis));
+  Execution one, many;
+  one.threads = 1;
+  many.threads = 7;
+  const Result<VoxelVolume> a = read_voxels(path, {}, one), b = read_voxels(path, {}, many);
+  ASSERT_TRUE(a && b);
+  EXPECT_EQ(a->set.axis(), b->set.axis());
+  EXPECT_EQ(a->set.interval_count(), b->set.interval_count());
+  EXPECT_EQ(a->set.memory_bytes(), b->set.memory_bytes());
+  EXPECT_GT(a->set.interval_count(), 10000u);
+}
+
+TEST_P(RoundTrip, EveryCutOffFileIsRefused) {
+  if (is_folder()) GTEST_SKIP() << "a folder";
+  const Sample sample{"small", make_grid({9, 5, 11}),
+                      [](int i, int j, int k) { return random_voxel(i, j, k, 300); }};
+  const std::string bytes = testkit::bytes_of(write(intervals_of(sample, format().axis)));
+  // The last bytes of some formats hold no voxels.
+  const std::size_t needless = format().name == "vti" ? 50 : format().name == "nrrd" ? 13 : 0;
+  for (std::size_t length = 0; length + needless < bytes.size(); length += length < 400 ? 1 : 37) {
+    const std::string cut = folder_.write("cut" + format().extension, bytes.substr(0, length));
+    const Result<VoxelVolume> read = read_voxels(cut);
+    ASSERT_FALSE(read) << "the first " << length << " of " << bytes.size() << " bytes";
+    EXPECT_EQ(read.error().code, ErrorCode::kInput) << read.error().message;
+    EXPECT_NE(read.error().message.find(cut), std::string::npos) << read.error().message;
+  }
+}
+
+TEST_P(RoundTrip, TheMemoryLimitHolds) {
+  const std::string path = write(intervals_of(small_samples().front(), format().axis));
+  Execution execution;
+  execution.memory_limit = 100000;
+  const Result<VoxelVolume> read = read_voxels(path, {}, execution);
+  ASSERT_FALSE(read);
+  EXPECT_EQ(read.error().code, ErrorCode::kLimit) << read.error().message;
+}
+
+TEST_P(RoundTrip, AStopEndsTheWork) {
+  const std::string path = write(intervals_of(small_samples().front(), format().axis));
+  std::stop_source source;
+  source.request_stop();
+  Execution execution;
+  execution.stop = source.get_token();
+  const Result<VoxelVolume> read = read_voxels(path, {}, execution);
+  ASSERT_FALSE(read);
+  EXPECT_EQ(read.error().code, ErrorCode::kCancelled) << read.error().message;
+}
+
+}  // namespace
+}  // namespace strata::testing

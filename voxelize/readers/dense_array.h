@@ -1,0 +1,53 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <string_view>
+
+#include "strata/core/grid.h"
+#include "voxelize/readers/read_context.h"
+
+namespace strata {
+
+/// The type of a number in a file. (Internal to voxelize/readers.)
+enum class NumberType { kBool, kU8, kI8, kU16, kI16, kU32, kI32, kU64, kI64, kF16, kF32, kF64 };
+[[nodiscard]] std::size_t bytes_of(NumberType type);
+/// "bool", "uint8", ..., "float", "double".
+[[nodiscard]] std::string_view name_of(NumberType type);
+[[nodiscard]] bool is_float(NumberType type);
+
+/// How the numbers of an array stand in a file.
+struct DenseLayout {
+  VoxelGrid grid;
+  NumberType type = NumberType::kU8;
+  bool big_endian = false;
+  std::array<int, 3> axes{0, 1, 2};  ///< x, y or z: the file's fastest axis first
+  std::array<bool, 3> flipped{};     ///< by the file's axes: the greatest index comes first
+  [[nodiscard]] std::uint64_t bytes() const {
+    return static_cast<std::uint64_t>(grid.dims.x) * static_cast<std::uint64_t>(grid.dims.y) *
+           static_cast<std::uint64_t>(grid.dims.z) * bytes_of(type);
+  }
+};
+
+/// The numbers: in memory, or one piece after the other.
+struct DenseData {
+  std::string_view all{};
+  /// Fills `to` with the bytes that follow; used where `all` is empty.
+  std::function<Result<void>(std::byte* to, std::size_t bytes)> next{};
+};
+
+/// Reads an array in rows, never as a whole: booleans and ids become runs, other numbers a field,
+/// whose kind depends on them.
+/// @pre check_dims; data.all, if not empty, is layout.bytes() long
+Result<VoxelVolume> read_dense(ReadContext& context, const DenseLayout& layout,
+                               const DenseData& data);
+
+/// The set, kind and threshold of `volume` from its values. The kind stays if it is kFog,
+/// kDistances or kIds; kMask means that it is unknown.
+Result<void> settle_values(ReadContext& context, VoxelVolume& volume, const VoxelGrid& grid);
+/// Takes ids that are all 1, or all the largest value of their type, for a mask.
+void settle_ids(VoxelVolume& volume, std::uint32_t largest_of_type);
+
+}  // namespace strata

@@ -1,0 +1,301 @@
+// NumPy's .npy, versions 1 to 3 (numpy/lib/format.py), and .npz: a ZIP of them, as savez and
+// savez_compressed write it. Of an .npz the array `voxels` is read, or the only one of three
+// dimensions; `origin` and `spacing` say where it lies.
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "voxelize/readers/dense_array.h"
+#include "voxelize/readers/inflate_stream.h"
+#include "voxelize/readers/readers.h"
+#include "voxelize/readers/zip_directory.h"
+
+namespace strata {
+namespace {
+
+/// What the head of a .npy file says.
+struct NpyHead {
+  NumberType type = NumberType::kU8;
+  bool big_endian = false, fortran = false;
+  std::vector<std::int64_t> shape;
+  std::size_t bytes = 0;  // of the head
+};
+
+// The text after 'key': in the dictionary.
+std::string_view value_of(std::string_view text, std::string_view key) {
+  for (const char quote : {'\'', '"'}) {
+    const std::string quoted = quote + std::string(key) + quote;
+    const std::size_t at = text.find(quoted);
+    if (at == std::string_view::npos) continue;
+    std::string_view rest = text.substr(at + quoted.size());
+    const std::size_t start = rest.find_first_not_of(" :");
+    return start == std::string_view::npos ? std::string_view() : rest.substr(start);
+  }
+  return {};
+}
+
+std::optional<NumberType> type_of(std::string_view letters) {
+  constexpr std::pair<std::string_view, NumberType> kTypes[] = {
+      {"b1", NumberType::kBool}, {"?", NumberType::kBool}, {"u1", NumberType::kU8},
+      {"i1", NumberType::kI8},   {"u2", NumberType::kU16}, {"i2", NumberType::kI16},
+      {"u4", NumberType::kU32},  {"i4", NumberType::kI32}, {"u8", NumberType::kU64},
+      {"i8", NumberType::kI64},  {"f2", NumberType::kF16}, {"f4", NumberType::kF32},
+      {"f8", NumberType::kF64}};
+  for (const auto& [name, type] : kTypes) {
+    if (name == letters) return type;
+  }
+  return std::nullopt;
+}
+
+bool parse_shape(std::string_view text, std::vector<std::int64_t>& shape) {
+  const std::size_t end = text.find(')');
+  if (!text.starts_with('(') || end == std::string_view::npos) return false;
+  text = text.substr(1, end - 1);
+  while (true) {
+    const std::size_t start = text.find_first_not_of(" ,");
+    if (start == std::string_view::npos) return true;
+    text.remove_prefix(start);
+    std::int64_t length = 0;
+    const auto [rest, error] = std::from_chars(text.data(), text.data() + text.size(), length);
+    if (error != std::errc() || length < 0 || shape.size() == 32) return false;
+    if (rest != text.data() + text.size() && *rest == 'L') {  // of Python 2
+      text.remove_prefix(1);
+    }
+    text.remove_prefix(static_cast<std::size_t>(rest - text.data()));
+    shape.push_back(length);
+  }
+}
+
+/// @param name  of the file, and of the array in it
+Result<NpyHead> parse_npy_head(std::string_view bytes, const std::string& name) {
+  ByteCursor cursor(bytes);
+  NpyHead head;
+  if (cursor.take(6) != "\x93NUMPY") {
+    return fail(ErrorCode::kInput, "{}: byte 0: no .npy file: it does not begin with \\x93NUMPY",
+                name);
+  }
+  const int version = cursor.get<std::uint8_t>();
+  cursor.get<std::uint8_t>();
+  if (version < 1 || version > 3) {
+    return fail(ErrorCode::kInput, "{}: byte 6: version {} of .npy; 1 to 3 are read", name,
+                version);
+  }
+  const std::uint32_t length =
+      version == 1 ? cursor.get<std::uint16_t>() : cursor.get<std::uint32_t>();
+  const std::string_view text = cursor.take(length);
+  if (cursor.failed()) {
+    return fail(ErrorCode::kInput, "{}: byte 8: the head has {} bytes, the file has {}", name,
+                length, bytes.size());
+  }
+  head.bytes = cursor.at();
+  const std::string_view descr = value_of(text, "descr"), shape = value_of(text, "shape");
+  const std::string_view order = value_of(text, "fortran_order");
+  if (!descr.starts_with('\'') && !descr.starts_with('"')) {
+    return fail(ErrorCode::kInput, "{}: descr of the head must be one number type, such as '|b1'",
+                name);
+  }
+  const std::string_view type = descr.substr(1, descr.find(descr[0], 1) - 1);
+  const bool marked =
+      !type.empty() && std::string_view("<>|=").find(type[0]) != std::string_view::npos;
+  const std::optional<NumberType> found = type_of(type.substr(marked ? 1 : 0));
+  if (!found) {
+    return fail(ErrorCode::kInput,
+                "{}: descr of the head is '{}'; read are b1, u1 to u8, i1 to i8 and f2 to f8", name,
+                type.substr(0, 40));
+  }
+  head.type = *found;
+  head.big_endian = marked && type[0] == '>';
+  head.fortran = order.starts_with("True");
+  if (!head.fortran && !order.starts_with("False")) {
+    return fail(ErrorCode::kInput, "{}: fortran_order of the head must be True or False", name);
+  }
+  if (!parse_shape(shape, head.shape)) {
+    return fail(ErrorCode::kInput, "{}: shape of the head must be (nx, ny, nz)", name);
+  }
+  return head;
+}
+
+Result<DenseLayout> layout_of(const ReadContext& context, const NpyHead& head) {
+  std::vector<std::int64_t> shape = head.shape;
+  if (shape.size() == 2) shape.push_back(1);  // a picture is a layer
+  if (shape.size() != 3) {
+    return fail(ErrorCode::kInput, "{}: an array of {} dimensions; voxels have 3", context.path,
+                head.shape.size());
+  }
+  if (auto fits = check_dims(context, shape[0], shape[1], shape[2]); !fits) {
+    return tl::unexpected(fits.error());
+  }
+  DenseLayout layout;
+  for (int axis = 0; axis < 3; ++axis) {
+    layout.grid.dims[axis] = static_cast<int>(shape[static_cast<std::size_t>(axis)]);
+  }
+  layout.type = head.type;
+  layout.big_endian = head.big_endian;
+  if (!head.fortran) layout.axes = {2, 1, 0};
+  return layout;
+}
+
+std::string array_name(const ZipMember& member) {
+  std::string name = member.name;
+  if (name.ends_with(".npy")) name.resize(name.size() - 4);
+  return name;
+}
+
+/// A .npz file and its arrays.
+class NpzFile {
+ public:
+  NpzFile(ReadContext& context, std::vector<ZipMember> members)
+      : context_(context), members_(std::move(members)) {}
+
+  [[nodiscard]] const ZipMember* find(std::string_view name) const {
+    for (const ZipMember& member : members_) {
+      if (array_name(member) == name) return &member;
+    }
+    return nullptr;
+  }
+  [[nodiscard]] std::vector<std::string> names() const {
+    std::vector<std::string> names;
+    for (const ZipMember& member : members_) names.push_back(array_name(member));
+    return names;
+  }
+  [[nodiscard]] std::string name_of(const ZipMember& member) const {
+    return context_.path + ": " + member.name;
+  }
+  [[nodiscard]] Result<std::string> head_bytes(const ZipMember& member, std::uint64_t most) const {
+    const std::uint64_t bytes = std::min(member.bytes, most);
+    if (!member.deflated) return std::string(member.packed.substr(0, bytes));
+    std::string unpacked(bytes, '\0');
+    InflateStream stream(member.packed, InflateStream::kBare, name_of(member));
+    auto read = stream.read(reinterpret_cast<std::byte*>(unpacked.data()), unpacked.size());
+    if (!read) return tl::unexpected(read.error());
+    return unpacked;
+  }
+  [[nodiscard]] Result<NpyHead> head(const ZipMember& member) const {
+    constexpr std::uint64_t kLongestHead = 1 << 16;
+    const Result<std::string> bytes = head_bytes(member, kLongestHead);
+    if (!bytes) return tl::unexpected(bytes.error());
+    return parse_npy_head(*bytes, name_of(member));
+  }
+  /// Three numbers; nothing if there is no such array.
+  [[nodiscard]] Result<std::optional<glm::dvec3>> vector(std::string_view name) const;
+  [[nodiscard]] Result<const ZipMember*> voxels() const;
+  [[nodiscard]] Result<VoxelVolume> read(const ZipMember& member, const DenseLayout& layout,
+                                         std::size_t head_bytes) const;
+
+ private:
+  ReadContext& context_;
+  std::vector<ZipMember> members_;
+};
+
+Result<std::optional<glm::dvec3>> NpzFile::vector(std::string_view name) const {
+  const ZipMember* member = find(name);
+  if (member == nullptr) return std::nullopt;
+  constexpr std::uint64_t kMost = 4096;
+  const Result<std::string> bytes = head_bytes(*member, kMost);
+  if (!bytes) return tl::unexpected(bytes.error());
+  const Result<NpyHead> head = parse_npy_head(*bytes, name_of(*member));
+  if (!head) return tl::unexpected(head.error());
+  const bool fits = head->type == NumberType::kF64 && !head->big_endian &&
+                    head->shape == std::vector<std::int64_t>{3} &&
+                    bytes->size() >= head->bytes + 3 * sizeof(double);
+  if (!fits) return fail(ErrorCode::kInput, "{}: must be 3 numbers of type <f8", name_of(*member));
+  glm::dvec3 value;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::memcpy(&value[axis],
+                bytes->data() + head->bytes + sizeof(double) * static_cast<std::size_t>(axis),
+                sizeof(double));
+  }
+  return value;
+}
+
+Result<const ZipMember*> NpzFile::voxels() const {
+  const std::string& wanted = context_.options.grid;
+  const ZipMember* found = find(wanted.empty() ? "voxels" : wanted);
+  if (found == nullptr && wanted.empty()) {
+    for (const ZipMember& member : members_) {
+      if (!member.name.ends_with(".npy")) continue;
+      const Result<NpyHead> read = head(member);
+      if (!read || read->shape.size() != 3) continue;
+      found = &member;
+      break;
+    }
+  }
+  if (found != nullptr) return found;
+  std::string names;
+  for (const std::string& name : this->names()) names += (names.empty() ? "" : ", ") + name;
+  return fail(wanted.empty() ? ErrorCode::kInput : ErrorCode::kUsage, "{}: no array {}; it has {}",
+              context_.path, wanted.empty() ? "of three dimensions" : "'" + wanted + "'",
+              names.empty() ? "none" : names);
+}
+
+Result<VoxelVolume> NpzFile::read(const ZipMember& member, const DenseLayout& layout,
+                                  std::size_t head_bytes) const {
+  if (member.bytes - std::min<std::uint64_t>(member.bytes, head_bytes) < layout.bytes()) {
+    return fail(ErrorCode::kInput, "{}: {} bytes of voxels; {} x {} x {} of type {} need {}",
+                name_of(member), member.bytes - head_bytes, layout.grid.dims.x, layout.grid.dims.y,
+                layout.grid.dims.z, strata::name_of(layout.type), layout.bytes());
+  }
+  if (!member.deflated) {
+    return read_dense(context_, layout, {member.packed.substr(head_bytes, layout.bytes()), {}});
+  }
+  InflateStream stream(member.packed, InflateStream::kBare, name_of(member));
+  std::vector<std::byte> head(head_bytes);
+  if (auto read = stream.read(head.data(), head.size()); !read) return tl::unexpected(read.error());
+  return read_dense(context_, layout,
+                    {{}, [&](std::byte* to, std::size_t bytes) { return stream.read(to, bytes); }});
+}
+
+}  // namespace
+
+Result<VoxelVolume> read_npy_voxels(ReadContext& context) {
+  const Result<NpyHead> head = parse_npy_head(context.bytes, context.path);
+  if (!head) return tl::unexpected(head.error());
+  const Result<DenseLayout> layout = layout_of(context, *head);
+  if (!layout) return tl::unexpected(layout.error());
+  if (context.bytes.size() - head->bytes < layout->bytes()) {
+    return fail(ErrorCode::kInput, "{}: {} bytes of voxels; {} x {} x {} of type {} need {}",
+                context.path, context.bytes.size() - head->bytes, layout->grid.dims.x,
+                layout->grid.dims.y, layout->grid.dims.z, name_of(layout->type), layout->bytes());
+  }
+  Result<VoxelVolume> volume =
+      read_dense(context, *layout, {context.bytes.substr(head->bytes, layout->bytes()), {}});
+  if (!volume) return volume;
+  volume->placed = false;
+  return volume;
+}
+
+Result<VoxelVolume> read_npz_voxels(ReadContext& context) {
+  Result<std::vector<ZipMember>> members = zip_members(context.bytes, context.path);
+  if (!members) return tl::unexpected(members.error());
+  const NpzFile file(context, std::move(*members));
+  if (file.find("voxels") == nullptr && file.find("offsets") != nullptr &&
+      file.find("world_from_image") != nullptr) {
+    return read_list_voxels(context, false);
+  }
+  const Result<const ZipMember*> member = file.voxels();
+  if (!member) return tl::unexpected(member.error());
+  const Result<NpyHead> head = file.head(**member);
+  if (!head) return tl::unexpected(head.error());
+  Result<DenseLayout> layout = layout_of(context, *head);
+  if (!layout) return tl::unexpected(layout.error());
+  const auto origin = file.vector("origin"), spacing = file.vector("spacing");
+  if (!origin) return tl::unexpected(origin.error());
+  if (!spacing) return tl::unexpected(spacing.error());
+  layout->grid.origin = origin->value_or(glm::dvec3(0.0));
+  layout->grid.voxel_size = spacing->value_or(glm::dvec3(1.0));
+  if (auto place = check_place(context, layout->grid); !place) return tl::unexpected(place.error());
+  Result<VoxelVolume> volume = file.read(**member, *layout, head->bytes);
+  if (!volume) return volume;
+  volume->placed = origin->has_value() && spacing->has_value();
+  volume->name = array_name(**member);
+  volume->grids = file.names();
+  return volume;
+}
+
+}  // namespace strata

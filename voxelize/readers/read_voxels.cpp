@@ -1,0 +1,178 @@
+#include "strata/voxelize/readers/read_voxels.h"
+
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <new>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "mesh/formats/input_bytes.h"
+#include "voxelize/readers/readers.h"
+
+namespace strata {
+namespace {
+
+using Reader = Result<VoxelVolume> (*)(ReadContext&);
+
+Result<VoxelVolume> read_exr(ReadContext& context) { return read_list_voxels(context, true); }
+
+struct Format {
+  std::string_view name;       // as VoxelFormat::name
+  std::string_view extension;  // empty: a folder, by its contents
+  Reader read;
+  bool folder = false;
+  std::string_view content = {};  // of a folder: a file that it has
+};
+constexpr std::array kFormats = {
+    Format{"vdb", ".vdb", read_vdb_voxels},
+    Format{"npy", ".npy", read_npy_voxels},
+    Format{"npz", ".npz", read_npz_voxels},
+    Format{"ldi", ".exr", read_exr},
+};
+constexpr std::array<std::string_view, kFormats.size()> kNames = [] {
+  std::array<std::string_view, kFormats.size()> names;
+  for (std::size_t i = 0; i < kFormats.size(); ++i) names[i] = kFormats[i].name;
+  return names;
+}();
+
+std::string lower(std::string text) {
+  for (char& letter : text) {
+    if (letter >= 'A' && letter <= 'Z') letter = static_cast<char>(letter - 'A' + 'a');
+  }
+  return text;
+}
+
+bool is_folder(const std::string& path) {
+  struct stat status = {};
+  return ::stat(path.c_str(), &status) == 0 && S_ISDIR(status.st_mode);
+}
+
+const Format* format_of(const std::string& path, const std::string& name) {
+  const bool folder = is_folder(path);
+  const std::string file = lower(path);
+  for (const Format& format : kFormats) {
+    if (!name.empty()) {
+      if (format.name == name) return &format;
+    } else if (folder != format.folder) {
+      continue;
+    } else if (folder) {
+      const std::string inside = path + "/" + std::string(format.content);
+      if (::access(inside.c_str(), F_OK) == 0) return &format;
+    } else if (file.ends_with(format.extension)) {
+      return &format;
+    }
+  }
+  return nullptr;
+}
+
+std::uint64_t memory_limit(const Execution& execution) {
+  if (execution.memory_limit != 0) return execution.memory_limit;
+  const long pages = ::sysconf(_SC_PHYS_PAGES), page = ::sysconf(_SC_PAGE_SIZE);
+  if (pages <= 0 || page <= 0) return std::uint64_t{4} << 30;
+  return static_cast<std::uint64_t>(pages) * static_cast<std::uint64_t>(page) / 2;
+}
+
+Result<VoxelVolume> read_as(const Format& format, std::string_view bytes, const std::string& path,
+                            const ReadVoxelsOptions& options, const Execution& execution) {
+  bool as_values = options.integers == IntegerVoxels::kValues;
+  while (true) {
+    MemoryBudget budget(memory_limit(execution));
+    ReadContext context{path, bytes, options, execution, budget};
+    context.integers_as_values = as_values;
+    try {
+      Result<VoxelVolume> volume = format.read(context);
+      if (!volume && context.wants_values && !as_values &&
+          options.integers != IntegerVoxels::kIds) {
+        as_values = true;
+        continue;
+      }
+      if (volume && volume->format.empty()) volume->format = format.name;
+      return volume;
+    } catch (const std::bad_alloc&) {
+      return fail(ErrorCode::kLimit, "{}: no memory for its voxels", path);
+    } catch (const std::length_error&) {
+      return fail(ErrorCode::kLimit, "{}: no memory for its voxels", path);
+    }
+  }
+}
+
+std::string list_of_formats() {
+  std::string list;
+  for (const Format& format : kFormats) {
+    list += (list.empty() ? "" : ", ") + std::string(format.name);
+  }
+  return list;
+}
+
+}  // namespace
+
+Result<void> check_dims(const ReadContext& context, std::int64_t x, std::int64_t y,
+                        std::int64_t z) {
+  const auto fits = [](std::int64_t side) { return side >= 1 && side <= kMaxGridSide; };
+  if (fits(x) && fits(y) && fits(z)) return {};
+  return fail(ErrorCode::kInput, "{}: {} x {} x {} voxels; each side must be 1 to {}", context.path,
+              x, y, z, kMaxGridSide);
+}
+
+Result<void> check_place(const ReadContext& context, const VoxelGrid& grid) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const double size = grid.voxel_size[axis], origin = grid.origin[axis];
+    if (!(size > 0.0) || !std::isfinite(size)) {
+      return fail(ErrorCode::kInput, "{}: voxels of {} along {}; their size must be above 0",
+                  context.path, size, "xyz"[axis]);
+    }
+    if (!std::isfinite(origin)) {
+      return fail(ErrorCode::kInput, "{}: the origin is {} along {}", context.path, origin,
+                  "xyz"[axis]);
+    }
+  }
+  return {};
+}
+
+std::string_view name_of(VoxelKind kind) {
+  constexpr std::string_view kKinds[] = {"mask",      "ids",    "colours", "fog",
+                                         "distances", "values", "lists"};
+  return kKinds[static_cast<std::size_t>(kind)];
+}
+
+std::span<const std::string_view> readable_voxel_formats() { return kNames; }
+
+bool is_voxel_file(const std::string& path) { return format_of(path, "") != nullptr; }
+
+Result<VoxelVolume> parse_voxels(std::string_view bytes, const std::string& format,
+                                 const std::string& name, const ReadVoxelsOptions& options,
+                                 const Execution& execution) {
+  const Format* found = format_of(name, format);
+  if (found == nullptr) return fail(ErrorCode::kUsage, "no format {}", format);
+  return read_as(*found, bytes, name, options, execution);
+}
+
+Result<VoxelVolume> read_voxels(const std::string& path, const ReadVoxelsOptions& options,
+                                const Execution& execution) {
+  const Format* format = format_of(path, options.format);
+  if (format == nullptr) {
+    if (!options.format.empty()) {
+      return fail(ErrorCode::kUsage, "{}: format '{}' is none of {}", path, options.format,
+                  list_of_formats());
+    }
+    return fail(ErrorCode::kUsage,
+                "{}: no file of voxels by its name; the formats are {}, and --format names one",
+                path, list_of_formats());
+  }
+  if (format->folder) return read_as(*format, {}, path, options, execution);
+  const Result<detail::InputBytes> file =
+      detail::InputBytes::open(path, execution.memory_limit, execution.stop);
+  if (!file) return tl::unexpected(file.error());
+  Result<VoxelVolume> volume = read_as(*format, file->view(), path, options, execution);
+  if (volume && file->changed()) {
+    return fail(ErrorCode::kInput, "{}: the file changed while it was read", path);
+  }
+  return volume;
+}
+
+}  // namespace strata

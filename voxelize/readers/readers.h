@@ -1,0 +1,29 @@
+#pragma once
+
+#include <string_view>
+
+#include "voxelize/readers/read_context.h"
+
+namespace strata {
+
+/// Readers of single formats, called by read_voxels() (internal to voxelize/readers). Each reads
+/// context.bytes, or where it says so the folder context.path; format and name of the volume are
+/// filled in by the caller unless they are known here.
+Result<VoxelVolume> read_npy_voxels(ReadContext& context);
+Result<VoxelVolume> read_npz_voxels(ReadContext& context);
+Result<VoxelVolume> read_vdb_voxels(ReadContext& context);
+Result<VoxelVolume> read_nrrd_voxels(ReadContext& context);
+Result<VoxelVolume> read_vti_voxels(ReadContext& context);
+Result<VoxelVolume> read_binvox_voxels(ReadContext& context);
+Result<VoxelVolume> read_vox_voxels(ReadContext& context);
+Result<VoxelVolume> read_zarr_voxels(ReadContext& context);   ///< a folder
+Result<VoxelVolume> read_slice_voxels(ReadContext& context);  ///< a folder
+/// The voxels of depth lists: .npz or .exr, as `strata ldi` writes them.
+Result<VoxelVolume> read_list_voxels(ReadContext& context, bool exr);
+
+/// Reads bytes as a file of a format that is one file, as read_voxels() does.
+Result<VoxelVolume> parse_voxels(std::string_view bytes, const std::string& format,
+                                 const std::string& name, const ReadVoxelsOptions& options = {},
+                                 const Execution& execution = {});
+
+}  // namespace strata

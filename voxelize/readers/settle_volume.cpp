@@ -1,0 +1,100 @@
+// What numbers mean: distances, densities or ids; and which voxels are solid.
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <span>
+#include <vector>
+
+#include "voxelize/readers/dense_array.h"
+
+namespace strata {
+namespace {
+
+// Whether neighbours differ by hardly more than a voxel, in world units or in voxels.
+bool looks_like_distances(const ScalarField& field, const VoxelGrid& grid) {
+  constexpr std::uint64_t kSeldom = 100;
+  const double step = 1.01 * std::max(1.0, grid.voxel_size.z);
+  std::uint64_t pairs = 0, far = 0;
+  const glm::ivec3 blocks = field.blocks();
+  for (int bi = 0; bi < blocks.x; ++bi) {
+    for (int bj = 0; bj < blocks.y; ++bj) {
+      for (int bk = 0; bk < blocks.z;) {
+        const float* values = field.block(bi, bj, bk).values;
+        if (values == nullptr) {
+          bk += field.equal_blocks_along_z(bi, bj, bk);
+          continue;
+        }
+        ++bk;
+        if (bk == blocks.z) continue;  // may be filled up beyond the grid
+        for (std::size_t i = 1; i < ScalarField::kBlockVoxels; ++i) {
+          if (i % 8 == 0) continue;
+          ++pairs;
+          if (!(std::abs(values[i] - values[i - 1]) <= step)) ++far;
+        }
+      }
+    }
+  }
+  return far * kSeldom <= pairs;
+}
+
+}  // namespace
+
+Result<void> settle_values(ReadContext& context, VoxelVolume& volume, const VoxelGrid& grid) {
+  const ScalarField::Range range = volume.values.range();
+  if (volume.kind == VoxelKind::kMask) {
+    const bool signs = range.least < 0.0f && range.greatest > 0.0f;
+    volume.kind = signs && looks_like_distances(volume.values, grid) ? VoxelKind::kDistances
+                  : range.least >= 0.0f && range.greatest <= 1.0f    ? VoxelKind::kFog
+                                                                     : VoxelKind::kValues;
+  }
+  const SolidRule rule = volume.kind == VoxelKind::kIds         ? SolidRule::kIds
+                         : volume.kind == VoxelKind::kDistances ? SolidRule::kBelow
+                                                                : SolidRule::kAbove;
+  volume.threshold =
+      context.options.threshold.value_or(rule == SolidRule::kAbove ? range.greatest / 2.0f : 0.0f);
+  volume.set = solid_voxels(volume.values, grid, rule, volume.threshold, context.execution);
+  if (context.stopped()) return context.cancelled();
+  if (!context.budget.take(volume.set.memory_bytes())) {
+    return context.too_large("the runs of voxels");
+  }
+  if (volume.kind == VoxelKind::kIds) {
+    volume.values = ScalarField();
+    settle_ids(volume, 1);
+  }
+  return {};
+}
+
+void settle_ids(VoxelVolume& volume, std::uint32_t largest_of_type) {
+  VoxelIntervals& set = volume.set;
+  std::uint32_t only = 0;
+  for (int pass = 0; pass < 2; ++pass) {  // look; then drop the labels
+    for (int tv = 0; tv < set.tiles_v(); ++tv) {
+      for (int tu = 0; tu < set.tiles_u(); ++tu) {
+        const VoxelIntervals::TileView view = set.tile(tu, tv);
+        if (view.items.empty()) continue;
+        if (pass == 0) {
+          for (const std::uint32_t label : view.labels) {
+            if (only == 0) only = label;
+            if (label != only || (label != 1 && label != largest_of_type)) return;
+          }
+          continue;
+        }
+        const std::vector<std::uint32_t> offsets(view.offsets.begin(), view.offsets.end());
+        const std::vector<Interval> items(view.items.begin(), view.items.end());
+        set.set_tile(tu, tv, offsets, items);
+      }
+    }
+  }
+  volume.kind = VoxelKind::kMask;
+}
+
+void set_threshold(VoxelVolume& volume, float threshold, const Execution& execution) {
+  const VoxelGrid grid = volume.grid();
+  const SolidRule rule =
+      volume.kind == VoxelKind::kDistances ? SolidRule::kBelow : SolidRule::kAbove;
+  volume.threshold = threshold;
+  volume.set = solid_voxels(volume.values, grid, rule, threshold, execution);
+}
+
+}  // namespace strata
