@@ -8,7 +8,6 @@
 #include <utility>
 #include <vector>
 
-#include "voxelize/readers/half_float.h"
 #include "voxelize/readers/tile_runs.h"
 
 namespace strata {
@@ -20,88 +19,6 @@ constexpr std::uint64_t kLongSlab = 1u << 20;  // runs of a slab from which ids 
 constexpr double kIdRun = 1.5;                 // voxels of a run of ids in the mean, at least
 
 std::size_t size(int value) { return static_cast<std::size_t>(value); }
-
-template <class T>
-T swapped(T value) {
-  std::array<std::byte, sizeof(T)> bytes;
-  std::memcpy(bytes.data(), &value, sizeof value);
-  std::reverse(bytes.begin(), bytes.end());
-  std::memcpy(&value, bytes.data(), sizeof value);
-  return value;
-}
-
-/// Calls with a zero of the type's C++ type; halves are uint16_t.
-template <class Call>
-auto with_type(NumberType type, Call&& call) {
-  switch (type) {
-    case NumberType::kBool:
-    case NumberType::kU8:
-      return call(std::uint8_t{});
-    case NumberType::kI8:
-      return call(std::int8_t{});
-    case NumberType::kU16:
-    case NumberType::kF16:
-      return call(std::uint16_t{});
-    case NumberType::kI16:
-      return call(std::int16_t{});
-    case NumberType::kU32:
-      return call(std::uint32_t{});
-    case NumberType::kI32:
-      return call(std::int32_t{});
-    case NumberType::kU64:
-      return call(std::uint64_t{});
-    case NumberType::kI64:
-      return call(std::int64_t{});
-    case NumberType::kF32:
-      return call(float{});
-    case NumberType::kF64:
-      break;
-  }
-  return call(double{});
-}
-
-/// Turns a row of a file into numbers.
-class RowConverter {
- public:
-  explicit RowConverter(const DenseLayout& layout) : layout_(layout) {}
-
-  void to_floats(const std::byte* from, std::size_t count, float* to) const {
-    with_type(layout_.type, [&](auto zero) {
-      using T = decltype(zero);
-      for (std::size_t i = 0; i < count; ++i) {
-        const T value = read<T>(from + i * sizeof(T));
-        if constexpr (std::is_same_v<T, std::uint16_t>) {
-          to[i] = layout_.type == NumberType::kF16 ? float_of_half(value) : value;
-        } else {
-          to[i] = static_cast<float>(value);
-        }
-      }
-    });
-  }
-  /// @return false if a number is negative or above 2^32 - 1
-  [[nodiscard]] bool to_ids(const std::byte* from, std::size_t count, std::uint32_t* to) const {
-    return with_type(layout_.type, [&](auto zero) {
-      using T = decltype(zero);
-      bool ids = true;
-      for (std::size_t i = 0; i < count; ++i) {
-        const T value = read<T>(from + i * sizeof(T));
-        to[i] = static_cast<std::uint32_t>(value);
-        if constexpr (std::is_signed_v<T>) ids = ids && value >= 0;
-        if constexpr (sizeof(T) == 8 && std::is_integral_v<T>) ids = ids && value <= 0xffffffff;
-      }
-      return ids;
-    });
-  }
-
- private:
-  template <class T>
-  [[nodiscard]] T read(const std::byte* from) const {
-    T value;
-    std::memcpy(&value, from, sizeof value);
-    return layout_.big_endian ? swapped(value) : value;
-  }
-  const DenseLayout& layout_;
-};
 
 /// Calls run(first, last, label) for the runs of equal labels that are not 0.
 template <class T, class Run>
@@ -290,7 +207,6 @@ class FieldReader {
   Result<ScalarField> read();
 
  private:
-  void put_row(const float* row, int count, glm::ivec3 at);
   void settle_layer(int layer);
   ReadContext& context_;
   const DenseLayout& layout_;
@@ -298,26 +214,6 @@ class FieldReader {
   RowConverter converter_;
   ScalarField field_;
 };
-
-// `at` is the row's first voxel, its index along the row's axis 0.
-void FieldReader::put_row(const float* row, int count, glm::ivec3 at) {
-  constexpr int kSide = ScalarField::kBlockSide;
-  const int axis = layout_.axes[0];
-  glm::ivec3 step(0);
-  step[axis] = 1;
-  const std::size_t stride = ScalarField::offset(step.x, step.y, step.z);
-  glm::ivec3 inside(at.x & 7, at.y & 7, at.z & 7);
-  const std::size_t first = ScalarField::offset(inside.x, inside.y, inside.z);
-  glm::ivec3 block(at.x >> 3, at.y >> 3, at.z >> 3);
-  for (int i = 0; i < count; i += kSide, ++block[axis]) {
-    const int length = std::min(kSide, count - i);
-    const ScalarField::Block there = field_.block(block.x, block.y, block.z);
-    const auto equal = [&](float value) { return value == there.constant; };
-    if (there.values == nullptr && std::all_of(row + i, row + i + length, equal)) continue;
-    float* to = field_.edit_block(block.x, block.y, block.z) + first;
-    for (int k = 0; k < length; ++k) to[size(k) * stride] = row[i + k];
-  }
-}
 
 // Blocks of 8 layers are complete; those that are of one value need no room.
 void FieldReader::settle_layer(int layer) {
@@ -355,7 +251,7 @@ Result<ScalarField> FieldReader::read() {
       glm::ivec3 at(0);
       at[layout_.axes[1]] = layout_.flipped[1] ? rows - 1 - r : r;
       at[layout_.axes[2]] = layer;
-      put_row(values.data(), row, at);
+      put_row(field_, layout_.axes[0], values.data(), row, at);
     }
     const bool complete = layout_.flipped[2] ? layer % 8 == 0 : layer % 8 == 7 || f + 1 == layers;
     if (complete) settle_layer(layer);
@@ -371,8 +267,28 @@ Result<ScalarField> FieldReader::read() {
 
 }  // namespace
 
+void put_row(ScalarField& field, int axis, const float* row, int count, const glm::ivec3& at) {
+  constexpr int kSide = ScalarField::kBlockSide;
+  glm::ivec3 step(0);
+  step[axis] = 1;
+  const std::size_t stride = ScalarField::offset(step.x, step.y, step.z);
+  const std::size_t first = ScalarField::offset(at.x & 7, at.y & 7, at.z & 7);
+  glm::ivec3 block(at.x >> 3, at.y >> 3, at.z >> 3);
+  int length = 0;
+  for (int i = 0; i < count; i += length, ++block[axis]) {
+    length = std::min(kSide - ((at[axis] + i) & 7), count - i);
+    const ScalarField::Block there = field.block(block.x, block.y, block.z);
+    const auto equal = [&](float value) { return value == there.constant; };
+    if (there.values == nullptr && std::all_of(row + i, row + i + length, equal)) continue;
+    const std::size_t begin = first - stride * size(i == 0 ? 0 : at[axis] & 7);
+    float* to = field.edit_block(block.x, block.y, block.z) + begin;
+    for (int k = 0; k < length; ++k) to[size(k) * stride] = row[i + k];
+  }
+}
+
 std::size_t bytes_of(NumberType type) {
-  return with_type(type, [](auto zero) { return sizeof zero; });
+  constexpr std::size_t kBytes[] = {1, 1, 1, 2, 2, 4, 4, 8, 8, 2, 4, 8};
+  return kBytes[static_cast<std::size_t>(type)];
 }
 
 bool is_float(NumberType type) {

@@ -38,6 +38,24 @@ struct DenseData {
   std::function<Result<void>(std::byte* to, std::size_t bytes)> next{};
 };
 
+/// Turns numbers of a file into floats or ids.
+class RowConverter {
+ public:
+  explicit RowConverter(const DenseLayout& layout)
+      : type_(layout.type), big_endian_(layout.big_endian) {}
+  void to_floats(const std::byte* from, std::size_t count, float* to) const;
+  /// @return false if a number is negative or above 2^32 - 1
+  [[nodiscard]] bool to_ids(const std::byte* from, std::size_t count, std::uint32_t* to) const;
+
+ private:
+  NumberType type_;
+  bool big_endian_;
+};
+
+/// Puts a row of values along `axis` into a field without a shift; `at` is its first voxel. A block
+/// that has the values already takes no room.
+void put_row(ScalarField& field, int axis, const float* row, int count, const glm::ivec3& at);
+
 /// Reads an array in rows, never as a whole: booleans and ids become runs, other numbers a field,
 /// whose kind depends on them.
 /// @pre check_dims; data.all, if not empty, is layout.bytes() long

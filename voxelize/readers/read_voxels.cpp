@@ -32,6 +32,12 @@ constexpr std::array kFormats = {
     Format{"vdb", ".vdb", read_vdb_voxels},
     Format{"npy", ".npy", read_npy_voxels},
     Format{"npz", ".npz", read_npz_voxels},
+    Format{"nrrd", ".nrrd", read_nrrd_voxels},
+    Format{"vti", ".vti", read_vti_voxels},
+    Format{"binvox", ".binvox", read_binvox_voxels},
+    Format{"vox", ".vox", read_vox_voxels},
+    Format{"zarr", "", read_zarr_voxels, true, ".zarray"},
+    Format{"png", "", read_slice_voxels, true, "slices.json"},
     Format{"ldi", ".exr", read_exr},
 };
 constexpr std::array<std::string_view, kFormats.size()> kNames = [] {

@@ -1,0 +1,114 @@
+// PNG, second edition (ISO/IEC 15948:2004): grey pictures as write_slices.cpp and scanners make
+// them. Not by libpng, whose errors jump over C++'s destructors.
+
+#include "voxelize/readers/grey_png.h"
+
+#include <cstdlib>
+
+#include "strata/core/grid.h"
+#include "voxelize/readers/inflate_stream.h"
+#include "voxelize/readers/read_context.h"
+
+namespace strata {
+namespace {
+
+std::uint32_t big_endian(ByteCursor& cursor) {
+  const auto value = cursor.get<std::uint32_t>();
+  return value >> 24 | (value >> 8 & 0xff00) | (value << 8 & 0xff0000) | value << 24;
+}
+
+unsigned paeth(int left, int up, int corner) {
+  const int guess = left + up - corner;
+  const int a = std::abs(guess - left), b = std::abs(guess - up), c = std::abs(guess - corner);
+  return static_cast<unsigned>(a <= b && a <= c ? left : b <= c ? up : corner);
+}
+
+// Undoes the filter of a row. @return false for a filter that PNG does not have
+bool unfilter(unsigned filter, std::size_t step, const std::vector<std::uint8_t>& above,
+              std::uint8_t* row, std::size_t bytes) {
+  for (std::size_t i = 0; i < bytes; ++i) {
+    const int left = i < step ? 0 : row[i - step], up = above[i];
+    const int corner = i < step ? 0 : above[i - step];
+    unsigned add = 0;
+    if (filter == 1) add = static_cast<unsigned>(left);
+    if (filter == 2) add = static_cast<unsigned>(up);
+    if (filter == 3) add = static_cast<unsigned>((left + up) / 2);
+    if (filter == 4) add = paeth(left, up, corner);
+    row[i] = static_cast<std::uint8_t>(row[i] + add);
+  }
+  return filter <= 4;
+}
+
+}  // namespace
+
+Result<GreyPng> GreyPng::open(std::string_view bytes, const std::string& path) {
+  ByteCursor cursor(bytes);
+  if (cursor.take(8) != "\x89PNG\r\n\x1a\n") {
+    return fail(ErrorCode::kInput, "{}: byte 0: no PNG file", path);
+  }
+  GreyPng png;
+  png.path_ = path;
+  while (!cursor.failed()) {
+    const std::uint64_t at = cursor.at();
+    const std::uint32_t length = big_endian(cursor);
+    const std::string_view id = cursor.take(4);
+    const std::string_view content = cursor.take(length);
+    cursor.take(4);  // CRC: zlib's own sum guards the pixels
+    if (cursor.failed()) break;
+    if (id == "IHDR") {
+      ByteCursor head(content);
+      const std::uint32_t width = big_endian(head), height = big_endian(head);
+      png.bits_ = head.get<std::uint8_t>();
+      const int colour = head.get<std::uint8_t>();
+      head.take(2);
+      const int interlace = head.get<std::uint8_t>();
+      const bool fits =
+          width >= 1 && height >= 1 && width <= kMaxGridSide && height <= kMaxGridSide;
+      if (!fits || colour != 0 || interlace != 0 ||
+          (png.bits_ != 1 && png.bits_ != 8 && png.bits_ != 16)) {
+        return fail(
+            ErrorCode::kInput,
+            "{}: byte {}: {} x {} pixels, {} bits, colour type {}, interlace {}; grey of 1, "
+            "8 or 16 bits up to {} a side is read",
+            path, at, width, height, png.bits_, colour, interlace, kMaxGridSide);
+      }
+      png.width_ = static_cast<int>(width);
+      png.height_ = static_cast<int>(height);
+    } else if (id == "IDAT") {
+      png.packed_ += content;
+    } else if (id == "IEND") {
+      if (png.width_ == 0) break;
+      return png;
+    }
+  }
+  return fail(ErrorCode::kInput, "{}: the file of {} bytes ends before its last chunk", path,
+              bytes.size());
+}
+
+Result<std::vector<std::uint16_t>> GreyPng::pixels() const {
+  const auto width = static_cast<std::size_t>(width_), height = static_cast<std::size_t>(height_);
+  const std::size_t bytes = (width * static_cast<std::size_t>(bits_) + 7) / 8;
+  const std::size_t step = bits_ == 16 ? 2 : 1;
+  std::vector<std::uint16_t> values(width * height);
+  std::vector<std::uint8_t> row(bytes + 1), above(bytes, 0);
+  InflateStream stream(packed_, InflateStream::kZlib, path_);
+  for (std::size_t y = 0; y < height; ++y) {
+    if (auto got = stream.read(reinterpret_cast<std::byte*>(row.data()), row.size()); !got) {
+      return tl::unexpected(got.error());
+    }
+    if (!unfilter(row[0], step, above, row.data() + 1, bytes)) {
+      return fail(ErrorCode::kInput, "{}: row {} has filter {}; 0 to 4 exist", path_, y, row[0]);
+    }
+    const std::uint8_t* from = row.data() + 1;
+    std::uint16_t* to = values.data() + y * width;
+    for (std::size_t x = 0; x < width; ++x) {
+      to[x] = bits_ == 1   ? from[x / 8] >> (7 - x % 8) & 1
+              : bits_ == 8 ? from[x]
+                           : static_cast<std::uint16_t>(from[2 * x] << 8 | from[2 * x + 1]);
+    }
+    above.assign(row.begin() + 1, row.end());
+  }
+  return values;
+}
+
+}  // namespace strata

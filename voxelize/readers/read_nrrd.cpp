@@ -1,0 +1,296 @@
+// NRRD, versions 1 to 5 (Kindlmann, teem.sourceforge.net/nrrd/format.html): an attached header,
+// three axes, raw or gzip. The first axis is fastest. Space directions that run along the axes of
+// the world in any order and sign are followed; others are shown along the grid's own axes.
+
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "voxelize/readers/dense_array.h"
+#include "voxelize/readers/inflate_stream.h"
+#include "voxelize/readers/readers.h"
+
+namespace strata {
+namespace {
+
+using Fields = std::map<std::string, std::string, std::less<>>;
+
+std::string trimmed(std::string_view text) {
+  const std::size_t first = text.find_first_not_of(" \t\r");
+  if (first == std::string_view::npos) return {};
+  return std::string(text.substr(first, text.find_last_not_of(" \t\r") - first + 1));
+}
+
+std::string lower(std::string text) {
+  for (char& letter : text) {
+    if (letter >= 'A' && letter <= 'Z') letter = static_cast<char>(letter - 'A' + 'a');
+  }
+  return text;
+}
+
+/// The fields by name, and where the data begin.
+struct NrrdHead {
+  Fields fields;
+  std::size_t data = 0;
+  [[nodiscard]] std::string_view get(std::string_view name, std::string_view other = {}) const {
+    auto found = fields.find(name);
+    if (found == fields.end() && !other.empty()) found = fields.find(other);
+    return found == fields.end() ? std::string_view() : std::string_view(found->second);
+  }
+};
+
+Result<NrrdHead> parse_head(const ReadContext& context) {
+  NrrdHead head;
+  const std::string_view bytes = context.bytes;
+  if (!bytes.starts_with("NRRD000")) {
+    return fail(ErrorCode::kInput, "{}:1: no NRRD file: it does not begin with NRRD000",
+                context.path);
+  }
+  int number = 0;
+  for (std::size_t at = 0; at < bytes.size();) {
+    const std::size_t end = bytes.find('\n', at);
+    if (end == std::string_view::npos) break;
+    const std::string line = trimmed(bytes.substr(at, end - at));
+    at = end + 1;
+    if (++number == 1 || line.starts_with('#')) continue;
+    if (line.empty()) {
+      head.data = at;
+      return head;
+    }
+    const std::size_t colon = line.find(':');
+    if (colon == std::string::npos) {
+      return fail(ErrorCode::kInput, "{}:{}: must be 'field: value'", context.path, number);
+    }
+    if (line.compare(colon, 2, ":=") == 0) continue;  // keys of the user
+    head.fields[lower(line.substr(0, colon))] = trimmed(std::string_view(line).substr(colon + 1));
+  }
+  return fail(ErrorCode::kInput, "{}: the header has no empty line at its end", context.path);
+}
+
+/// The numbers of a text; what is between them does not matter. NaN for `none`.
+std::vector<double> numbers(std::string_view text) {
+  std::vector<double> list;
+  for (std::size_t at = 0; at < text.size();) {
+    if (text.substr(at).starts_with("none")) {
+      list.insert(list.end(), 3, std::nan(""));
+      at += 4;
+      continue;
+    }
+    double value = 0.0;
+    const auto [rest, error] = std::from_chars(text.data() + at, text.data() + text.size(), value);
+    if (error != std::errc()) {
+      ++at;
+      continue;
+    }
+    list.push_back(value);
+    at = static_cast<std::size_t>(rest - text.data());
+  }
+  return list;
+}
+
+std::optional<NumberType> type_of(std::string_view name) {
+  constexpr std::pair<std::string_view, NumberType> kTypes[] = {
+      {"signed char", NumberType::kI8},
+      {"int8", NumberType::kI8},
+      {"int8_t", NumberType::kI8},
+      {"char", NumberType::kI8},
+      {"uchar", NumberType::kU8},
+      {"unsigned char", NumberType::kU8},
+      {"uint8", NumberType::kU8},
+      {"uint8_t", NumberType::kU8},
+      {"short", NumberType::kI16},
+      {"short int", NumberType::kI16},
+      {"signed short", NumberType::kI16},
+      {"signed short int", NumberType::kI16},
+      {"int16", NumberType::kI16},
+      {"int16_t", NumberType::kI16},
+      {"ushort", NumberType::kU16},
+      {"unsigned short", NumberType::kU16},
+      {"unsigned short int", NumberType::kU16},
+      {"uint16", NumberType::kU16},
+      {"uint16_t", NumberType::kU16},
+      {"int", NumberType::kI32},
+      {"signed int", NumberType::kI32},
+      {"int32", NumberType::kI32},
+      {"int32_t", NumberType::kI32},
+      {"uint", NumberType::kU32},
+      {"unsigned int", NumberType::kU32},
+      {"uint32", NumberType::kU32},
+      {"uint32_t", NumberType::kU32},
+      {"longlong", NumberType::kI64},
+      {"long long", NumberType::kI64},
+      {"long long int", NumberType::kI64},
+      {"signed long long", NumberType::kI64},
+      {"int64", NumberType::kI64},
+      {"int64_t", NumberType::kI64},
+      {"ulonglong", NumberType::kU64},
+      {"unsigned long long", NumberType::kU64},
+      {"uint64", NumberType::kU64},
+      {"unsigned long long int", NumberType::kU64},
+      {"uint64_t", NumberType::kU64},
+      {"float", NumberType::kF32},
+      {"double", NumberType::kF64}};
+  for (const auto& [text, type] : kTypes) {
+    if (text == name) return type;
+  }
+  return std::nullopt;
+}
+
+/// Spacing, origin, order and direction of the axes.
+class Placement {
+ public:
+  Placement(const NrrdHead& head, const std::array<int, 3>& sizes, DenseLayout& layout)
+      : head_(head), sizes_(sizes), layout_(layout) {}
+
+  /// @return a note where the axes are turned
+  std::string place() {
+    const std::vector<double> d = numbers(head_.get("space directions"));
+    if (d.size() == 9) return by_directions(d);
+    const std::vector<double> spacing = numbers(head_.get("spacings"));
+    const std::vector<double> mins = numbers(head_.get("axis mins", "axismins"));
+    const std::vector<double> origin = numbers(head_.get("space origin"));
+    const bool node = head_.get("centers", "centerings").find("node") != std::string_view::npos;
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto i = static_cast<std::size_t>(axis);
+      double& size = layout_.grid.voxel_size[axis];
+      double& low = layout_.grid.origin[axis];
+      if (spacing.size() == 3 && std::isfinite(spacing[i]) && spacing[i] != 0.0) {
+        size = std::abs(spacing[i]);
+        placed_ = true;
+      }
+      if (mins.size() == 3 && std::isfinite(mins[i])) low = mins[i] - (node ? size / 2 : 0.0);
+      if (origin.size() == 3) low = origin[i] - size / 2;
+    }
+    set_dims({0, 1, 2});
+    return "";
+  }
+  [[nodiscard]] bool placed() const { return placed_; }
+
+ private:
+  void set_dims(const std::array<int, 3>& axes) {
+    layout_.axes = axes;
+    for (std::size_t a = 0; a < 3; ++a) layout_.grid.dims[axes[a]] = sizes_[a];
+  }
+  std::string by_directions(const std::vector<double>& d) {
+    std::array<int, 3> axes{-1, -1, -1};
+    bool straight = true;
+    for (std::size_t a = 0; a < 3; ++a) {
+      for (int c = 0; c < 3; ++c) {
+        if (d[3 * a + static_cast<std::size_t>(c)] == 0.0) continue;
+        straight = straight && axes[a] == -1;
+        axes[a] = c;
+      }
+    }
+    straight = straight && axes[0] + axes[1] + axes[2] == 3 && axes[0] != axes[1] &&
+               axes[1] != axes[2] && axes[0] != axes[2] && axes[0] >= 0 && axes[1] >= 0;
+    if (!straight) axes = {0, 1, 2};
+    const std::vector<double> origin = numbers(head_.get("space origin"));
+    for (std::size_t a = 0; a < 3; ++a) {
+      const double* v = d.data() + 3 * a;
+      const double length = std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+      const int axis = axes[a];
+      layout_.grid.voxel_size[axis] = length;
+      layout_.flipped[a] = straight && v[axis] < 0.0;
+      if (origin.size() != 3) continue;
+      const double first = origin[static_cast<std::size_t>(axis)];
+      layout_.grid.origin[axis] =
+          first - length * (layout_.flipped[a] ? static_cast<double>(sizes_[a]) - 0.5 : 0.5);
+    }
+    set_dims(axes);
+    placed_ = origin.size() == 3;
+    return straight ? "" : "the space directions turn the grid; it is shown along its own axes";
+  }
+
+  const NrrdHead& head_;
+  const std::array<int, 3>& sizes_;
+  DenseLayout& layout_;
+  bool placed_ = false;
+};
+
+Result<std::string_view> data_bytes(const ReadContext& context, const NrrdHead& head) {
+  std::string_view data = context.bytes.substr(head.data);
+  for (const std::string_view field : {"data file", "datafile"}) {
+    if (head.fields.contains(field)) {
+      return fail(ErrorCode::kInput,
+                  "{}: the data are in another file, {}; only headers with their "
+                  "data are read",
+                  context.path, head.get(field));
+    }
+  }
+  const std::vector<double> lines = numbers(head.get("line skip", "lineskip"));
+  for (double left = lines.empty() ? 0.0 : lines[0]; left >= 1.0; left -= 1.0) {
+    const std::size_t end = data.find('\n');
+    if (end == std::string_view::npos) break;
+    data.remove_prefix(end + 1);
+  }
+  return data;
+}
+
+}  // namespace
+
+Result<VoxelVolume> read_nrrd_voxels(ReadContext& context) {
+  const Result<NrrdHead> head = parse_head(context);
+  if (!head) return tl::unexpected(head.error());
+  DenseLayout layout;
+  const std::vector<double> sizes = numbers(head->get("sizes"));
+  if (sizes.size() != 3 || head->get("dimension") != "3") {
+    return fail(ErrorCode::kInput, "{}: dimension is '{}' and sizes '{}'; voxels have 3",
+                context.path, head->get("dimension"), head->get("sizes").substr(0, 40));
+  }
+  std::array<int, 3> sides{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    const bool fits =
+        sizes[a] >= 1.0 && sizes[a] <= kMaxGridSide && std::floor(sizes[a]) == sizes[a];
+    if (!fits) {
+      return fail(ErrorCode::kInput, "{}: sizes '{}'; each must be 1 to {}", context.path,
+                  head->get("sizes").substr(0, 40), kMaxGridSide);
+    }
+    sides[a] = static_cast<int>(sizes[a]);
+  }
+  const std::optional<NumberType> type = type_of(lower(std::string(head->get("type"))));
+  if (!type) {
+    return fail(ErrorCode::kInput, "{}: type '{}' is not read; integers, float and double are",
+                context.path, head->get("type").substr(0, 40));
+  }
+  layout.type = *type;
+  layout.big_endian = lower(std::string(head->get("endian"))) == "big";
+  Placement placement(*head, sides, layout);
+  const std::string note = placement.place();
+  if (auto place = check_place(context, layout.grid); !place) return tl::unexpected(place.error());
+
+  const std::string encoding = lower(std::string(head->get("encoding")));
+  Result<std::string_view> data = data_bytes(context, *head);
+  if (!data) return tl::unexpected(data.error());
+  Result<VoxelVolume> volume =
+      fail(ErrorCode::kInput, "{}: encoding '{}' is not read; raw and gzip are", context.path,
+           std::string_view(encoding).substr(0, 40));
+  if (encoding == "raw") {
+    const std::vector<double> skip = numbers(head->get("byte skip", "byteskip"));
+    const double first = skip.empty() ? 0.0 : skip[0];
+    const std::uint64_t size = data->size();
+    const std::uint64_t at = first < 0.0 ? size - std::min(size, layout.bytes())
+                                         : static_cast<std::uint64_t>(std::min(first, 1e15));
+    if (at > size || size - at < layout.bytes()) {
+      return fail(ErrorCode::kInput, "{}: {} bytes of voxels; {} x {} x {} of type {} need {}",
+                  context.path, size - std::min(at, size), sides[0], sides[1], sides[2],
+                  name_of(layout.type), layout.bytes());
+    }
+    volume = read_dense(context, layout, {data->substr(at, layout.bytes()), {}});
+  } else if (encoding == "gzip" || encoding == "gz") {
+    InflateStream stream(*data, InflateStream::kGzip, context.path);
+    volume =
+        read_dense(context, layout,
+                   {{}, [&](std::byte* to, std::size_t bytes) { return stream.read(to, bytes); }});
+  }
+  if (!volume) return volume;
+  volume->name = head->get("content");
+  volume->placed = placement.placed();
+  if (!note.empty()) volume->notes.push_back(note);
+  return volume;
+}
+
+}  // namespace strata

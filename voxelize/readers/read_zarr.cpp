@@ -1,0 +1,382 @@
+// Zarr version 2 arrays (zarr.readthedocs.io/en/stable/spec/v2.html): three axes, C or Fortran
+// order, chunks of any size, plain or packed by zlib, gzip or Blosc. A chunk that is not there
+// holds the fill value. `.zattrs` may say origin and voxel_size, as write_zarr.cpp does.
+
+#ifdef STRATA_HAVE_BLOSC
+#include <blosc.h>
+#endif
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/vec2.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "mesh/formats/input_bytes.h"
+#include "voxelize/readers/dense_array.h"
+#include "voxelize/readers/inflate_stream.h"
+#include "voxelize/readers/json_text.h"
+#include "voxelize/readers/readers.h"
+#include "voxelize/readers/tile_runs.h"
+
+namespace strata {
+namespace {
+
+constexpr int kTileSide = VoxelIntervals::kTileSide;
+
+enum class Packing { kNone, kZlib, kGzip, kBlosc };
+
+struct ZarrHead {
+  VoxelGrid grid;
+  glm::ivec3 chunk{0}, chunks{0};  // voxels of a chunk; chunks along each axis
+  NumberType type = NumberType::kU8;
+  bool big_endian = false, fortran = false, placed = false;
+  Packing packing = Packing::kNone;
+  double fill = 0.0;
+  char separator = '.';
+
+  [[nodiscard]] std::size_t chunk_bytes() const {
+    return static_cast<std::size_t>(chunk.x) * static_cast<std::size_t>(chunk.y) *
+           static_cast<std::size_t>(chunk.z) * bytes_of(type);
+  }
+};
+
+std::optional<NumberType> type_of(std::string_view name) {
+  constexpr std::pair<std::string_view, NumberType> kTypes[] = {
+      {"b1", NumberType::kBool}, {"u1", NumberType::kU8},  {"i1", NumberType::kI8},
+      {"u2", NumberType::kU16},  {"i2", NumberType::kI16}, {"u4", NumberType::kU32},
+      {"i4", NumberType::kI32},  {"u8", NumberType::kU64}, {"i8", NumberType::kI64},
+      {"f2", NumberType::kF16},  {"f4", NumberType::kF32}, {"f8", NumberType::kF64}};
+  for (const auto& [text, type] : kTypes) {
+    if (text == name) return type;
+  }
+  return std::nullopt;
+}
+
+Result<JsonValue> read_json(const ReadContext& context, const std::string& path) {
+  const auto file = detail::InputBytes::open(path, context.execution.memory_limit);
+  if (!file) return tl::unexpected(file.error());
+  return parse_json(file->view(), path);
+}
+
+Result<void> take_type(const JsonValue& json, const std::string& path, ZarrHead& head) {
+  const JsonValue* type = json.find("dtype");
+  const std::string text = type == nullptr ? "" : type->text;
+  const std::optional<NumberType> found =
+      text.size() == 3 ? type_of(std::string_view(text).substr(1)) : std::nullopt;
+  if (!found)
+    return fail(ErrorCode::kInput, "{}: dtype '{}' is not read", path, text.substr(0, 40));
+  head.type = *found;
+  head.big_endian = text[0] == '>';
+  const JsonValue* order = json.find("order");
+  head.fortran = order != nullptr && order->text == "F";
+  const JsonValue* fill = json.find("fill_value");
+  if (fill != nullptr && fill->kind == JsonValue::kNumber) head.fill = fill->number;
+  if (fill != nullptr && fill->kind == JsonValue::kBool) head.fill = fill->truth ? 1.0 : 0.0;
+  const JsonValue* separator = json.find("dimension_separator");
+  if (separator != nullptr && separator->text == "/") head.separator = '/';
+  const JsonValue* filters = json.find("filters");
+  if (filters != nullptr && !filters->items.empty()) {
+    return fail(ErrorCode::kInput, "{}: filters are not read", path);
+  }
+  const JsonValue* compressor = json.find("compressor");
+  if (compressor == nullptr || compressor->kind == JsonValue::kNull) return {};
+  const JsonValue* id = compressor->find("id");
+  const std::string name = id == nullptr ? "" : id->text;
+  head.packing = name == "zlib"    ? Packing::kZlib
+                 : name == "gzip"  ? Packing::kGzip
+                 : name == "blosc" ? Packing::kBlosc
+                                   : Packing::kNone;
+  if (head.packing == Packing::kNone) {
+    return fail(ErrorCode::kInput, "{}: compressor '{}' is not read; zlib, gzip and blosc are",
+                path, name.substr(0, 40));
+  }
+  return {};
+}
+
+Result<ZarrHead> read_head(const ReadContext& context) {
+  const std::string path = context.path + "/.zarray";
+  const Result<JsonValue> json = read_json(context, path);
+  if (!json) return tl::unexpected(json.error());
+  ZarrHead head;
+  const JsonValue* version = json->find("zarr_format");
+  const auto shape = json->numbers("shape", 3), chunks = json->numbers("chunks", 3);
+  if (version == nullptr || version->number != 2.0 || !shape || !chunks) {
+    return fail(ErrorCode::kInput, "{}: zarr_format must be 2, shape and chunks 3 numbers each",
+                path);
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto i = static_cast<std::size_t>(axis);
+    for (const double side : {(*shape)[i], (*chunks)[i]}) {
+      if (!(side >= 1.0 && side <= kMaxGridSide)) {
+        return fail(ErrorCode::kInput, "{}: a side of {}; each must be 1 to {}", path, side,
+                    kMaxGridSide);
+      }
+    }
+    head.grid.dims[axis] = static_cast<int>((*shape)[i]);
+    head.chunk[axis] = static_cast<int>((*chunks)[i]);
+    head.chunks[axis] = (head.grid.dims[axis] + head.chunk[axis] - 1) / head.chunk[axis];
+  }
+  if (auto taken = take_type(*json, path, head); !taken) return tl::unexpected(taken.error());
+  const std::string attributes = context.path + "/.zattrs";
+  if (::access(attributes.c_str(), R_OK) == 0) {
+    const Result<JsonValue> placed = read_json(context, attributes);
+    if (!placed) return tl::unexpected(placed.error());
+    const auto origin = placed->numbers("origin", 3), size = placed->numbers("voxel_size", 3);
+    head.placed = origin.has_value() && size.has_value();
+    for (int axis = 0; axis < 3 && head.placed; ++axis) {
+      head.grid.origin[axis] = (*origin)[static_cast<std::size_t>(axis)];
+      head.grid.voxel_size[axis] = (*size)[static_cast<std::size_t>(axis)];
+    }
+  }
+  if (auto place = check_place(context, head.grid); !place) return tl::unexpected(place.error());
+  return head;
+}
+
+Result<void> unblosc(std::string_view packed, const std::string& path, std::vector<std::byte>& to) {
+#ifdef STRATA_HAVE_BLOSC
+  std::size_t unpacked = 0;
+  if (blosc_cbuffer_validate(packed.data(), packed.size(), &unpacked) != 0 ||
+      unpacked != to.size() ||
+      blosc_decompress_ctx(packed.data(), to.data(), to.size(), 1) != static_cast<int>(to.size())) {
+    return fail(ErrorCode::kInput, "{}: damaged data (Blosc)", path);
+  }
+  return {};
+#else
+  static_cast<void>(packed), static_cast<void>(to);
+  return fail(ErrorCode::kUsage,
+              "{}: packed by Blosc, which this build of Strata lacks: it needs "
+              "libblosc-dev",
+              path);
+#endif
+}
+
+/// A chunk after the other, of a column of chunks along z.
+class ChunkReader {
+ public:
+  ChunkReader(ReadContext& context, const ZarrHead& head) : context_(context), head_(head) {}
+
+  /// The numbers of a chunk in the order of the file; empty if there is no such file.
+  Result<std::span<const std::byte>> read(const glm::ivec3& at) {
+    const std::string path = fmt::format("{}/{}{}{}{}{}", context_.path, at.x, head_.separator,
+                                         at.y, head_.separator, at.z);
+    if (::access(path.c_str(), F_OK) != 0) return std::span<const std::byte>();
+    const auto file = detail::InputBytes::open(path, context_.execution.memory_limit);
+    if (!file) return tl::unexpected(file.error());
+    const std::string_view packed = file->view();
+    bytes_.resize(head_.chunk_bytes());
+    if (head_.packing == Packing::kNone) {
+      if (packed.size() != bytes_.size()) {
+        return fail(ErrorCode::kInput, "{}: {} bytes; a chunk has {}", path, packed.size(),
+                    bytes_.size());
+      }
+      std::copy_n(reinterpret_cast<const std::byte*>(packed.data()), bytes_.size(), bytes_.begin());
+      return std::span<const std::byte>(bytes_);
+    }
+    if (head_.packing == Packing::kBlosc) {
+      if (auto done = unblosc(packed, path, bytes_); !done) return tl::unexpected(done.error());
+      return std::span<const std::byte>(bytes_);
+    }
+    InflateStream stream(
+        packed, head_.packing == Packing::kZlib ? InflateStream::kZlib : InflateStream::kGzip,
+        path);
+    if (auto done = stream.read(bytes_.data(), bytes_.size()); !done) {
+      return tl::unexpected(done.error());
+    }
+    return std::span<const std::byte>(bytes_);
+  }
+
+ private:
+  ReadContext& context_;
+  const ZarrHead& head_;
+  std::vector<std::byte> bytes_;
+};
+
+/// Ids and booleans: the tiles above which a column of chunks lies.
+class ChunkRuns {
+ public:
+  ChunkRuns(ReadContext& context, const ZarrHead& head, VoxelIntervals& set)
+      : context_(context), head_(head), set_(set), chunks_(context, head), convert_(layout(head)) {}
+
+  /// All chunks of a square of tiles. `square` has whole chunks and whole tiles.
+  Result<void> read(const glm::ivec2& first_chunk, const glm::ivec2& chunks) {
+    begin_ = first_chunk * glm::ivec2(head_.chunk);
+    const glm::ivec2 end =
+        glm::min((first_chunk + chunks) * glm::ivec2(head_.chunk), glm::ivec2(head_.grid.dims));
+    tiles_u_ = (end.x - begin_.x + kTileSide - 1) / kTileSide;
+    const int tiles_v = (end.y - begin_.y + kTileSide - 1) / kTileSide;
+    tiles_.resize(static_cast<std::size_t>(tiles_u_) * static_cast<std::size_t>(tiles_v));
+    for (int z = 0; z < head_.chunks.z; ++z) {
+      for (int y = first_chunk.y; y < std::min(first_chunk.y + chunks.y, head_.chunks.y); ++y) {
+        for (int x = first_chunk.x; x < std::min(first_chunk.x + chunks.x, head_.chunks.x); ++x) {
+          if (context_.stopped()) return context_.cancelled();
+          if (auto taken = take({x, y, z}); !taken) return taken;
+        }
+      }
+    }
+    const bool labels = head_.type != NumberType::kBool;
+    for (std::size_t i = 0; i < tiles_.size(); ++i) {
+      if (tiles_[i].empty()) continue;
+      if (!context_.budget.take(tiles_[i].pieces() * (labels ? 8 : 4) +
+                                VoxelIntervals::kTileColumns * sizeof(std::uint32_t))) {
+        return context_.too_large("the runs of voxels");
+      }
+      const int tile = static_cast<int>(i);
+      tiles_[i].store(set_, begin_.x / kTileSide + tile % tiles_u_,
+                      begin_.y / kTileSide + tile / tiles_u_, labels);
+    }
+    return {};
+  }
+
+  static DenseLayout layout(const ZarrHead& head) {
+    DenseLayout layout;
+    layout.type = head.type;
+    layout.big_endian = head.big_endian;
+    return layout;
+  }
+
+ private:
+  Result<void> take(const glm::ivec3& chunk) {
+    const Result<std::span<const std::byte>> bytes = chunks_.read(chunk);
+    if (!bytes) return tl::unexpected(bytes.error());
+    if (bytes->empty()) return {};  // a fill value other than 0 is read as values
+    const auto voxels = head_.chunk_bytes() / bytes_of(head_.type);
+    ids_.resize(voxels);
+    if (!convert_.to_ids(bytes->data(), voxels, ids_.data())) {
+      context_.wants_values = true;
+      return fail(ErrorCode::kInput,
+                  "{}: chunk {}.{}.{} has a number that is no id: an id is 0 to "
+                  "4294967295",
+                  context_.path, chunk.x, chunk.y, chunk.z);
+    }
+    const glm::ivec3 first = chunk * head_.chunk;
+    const glm::ivec3 end = glm::min(head_.chunk, head_.grid.dims - first);
+    const auto s = [](int value) { return static_cast<std::size_t>(value); };
+    const std::size_t step_z = head_.fortran ? s(head_.chunk.x) * s(head_.chunk.y) : 1;
+    const std::size_t step_y = head_.fortran ? s(head_.chunk.x) : s(head_.chunk.z);
+    const std::size_t step_x = head_.fortran ? 1 : s(head_.chunk.y) * s(head_.chunk.z);
+    for (int x = 0; x < end.x; ++x) {
+      for (int y = 0; y < end.y; ++y) {
+        const std::uint32_t* column = ids_.data() + s(x) * step_x + s(y) * step_y;
+        const int u = first.x + x, v = first.y + y;
+        TileRuns& tile =
+            tiles_[s((v - begin_.y) / kTileSide) * s(tiles_u_) + s((u - begin_.x) / kTileSide)];
+        const auto local = static_cast<unsigned>(v % kTileSide * kTileSide + u % kTileSide);
+        for (int z = 0; z < end.z;) {
+          const std::uint32_t label = column[s(z) * step_z];
+          int past = z + 1;
+          while (past < end.z && column[s(past) * step_z] == label) ++past;
+          if (label != 0) {
+            tile.add(local, first.z + z, first.z + past - 1,
+                     head_.type == NumberType::kBool ? 1 : label);
+          }
+          z = past;
+        }
+      }
+    }
+    return {};
+  }
+
+  ReadContext& context_;
+  const ZarrHead& head_;
+  VoxelIntervals& set_;
+  ChunkReader chunks_;
+  RowConverter convert_;
+  glm::ivec2 begin_{0};
+  int tiles_u_ = 0;
+  std::vector<TileRuns> tiles_;
+  std::vector<std::uint32_t> ids_;
+};
+
+Result<VoxelIntervals> read_runs(ReadContext& context, const ZarrHead& head) {
+  VoxelIntervals set(head.grid, Axis::kZ);
+  if (!context.budget.take(set.memory_bytes())) return context.too_large("the grid");
+  // Squares of whole chunks that are whole tiles, or else everything at once.
+  glm::ivec2 square(head.chunks);
+  if (head.chunk.x % kTileSide == 0 && head.chunk.y % kTileSide == 0) square = glm::ivec2(1);
+  const glm::ivec2 squares((head.chunks.x + square.x - 1) / square.x,
+                           (head.chunks.y + square.y - 1) / square.y);
+  const auto count = static_cast<std::size_t>(squares.x) * static_cast<std::size_t>(squares.y);
+  std::vector<Result<void>> results(count);
+  parallel_for(context.execution, count, [&](std::size_t index, int) {
+    const int i = static_cast<int>(index);
+    const glm::ivec2 at(i % squares.x * square.x, i / squares.x * square.y);
+    results[index] = ChunkRuns(context, head, set).read(at, square);
+  });
+  if (context.stopped()) return context.cancelled();
+  for (const Result<void>& result : results) {
+    if (!result) return tl::unexpected(result.error());
+  }
+  return set;
+}
+
+Result<ScalarField> read_field(ReadContext& context, const ZarrHead& head) {
+  ScalarField field(head.grid.dims, static_cast<float>(head.fill));
+  ChunkReader chunks(context, head);
+  const RowConverter convert(ChunkRuns::layout(head));
+  std::vector<float> values(head.chunk_bytes() / bytes_of(head.type));
+  const auto s = [](int value) { return static_cast<std::size_t>(value); };
+  const int axis = head.fortran ? 0 : 2;  // of a row
+  const int middle = 1, slow = 2 - axis;
+  for (int x = 0; x < head.chunks.x; ++x) {
+    for (int y = 0; y < head.chunks.y; ++y) {
+      for (int z = 0; z < head.chunks.z; ++z) {
+        if (context.stopped()) return context.cancelled();
+        const Result<std::span<const std::byte>> bytes = chunks.read({x, y, z});
+        if (!bytes) return tl::unexpected(bytes.error());
+        if (bytes->empty()) continue;
+        convert.to_floats(bytes->data(), values.size(), values.data());
+        const glm::ivec3 first = glm::ivec3(x, y, z) * head.chunk;
+        const glm::ivec3 end = glm::min(head.chunk, head.grid.dims - first);
+        for (int a = 0; a < end[slow]; ++a) {
+          for (int b = 0; b < end[middle]; ++b) {
+            glm::ivec3 at = first;
+            at[slow] += a;
+            at[middle] += b;
+            const std::size_t row = (s(a) * s(head.chunk[middle]) + s(b)) * s(head.chunk[axis]);
+            put_row(field, axis, values.data() + row, end[axis], at);
+          }
+        }
+        if (field.memory_bytes() > context.budget.limit()) return context.too_large("the values");
+      }
+    }
+  }
+  return field;
+}
+
+}  // namespace
+
+Result<VoxelVolume> read_zarr_voxels(ReadContext& context) {
+  const Result<ZarrHead> head = read_head(context);
+  if (!head) return tl::unexpected(head.error());
+  if (!context.budget.take(head->chunk_bytes() * 2)) return context.too_large("a chunk");
+  VoxelVolume volume;
+  const bool ids = !is_float(head->type) && head->fill == 0.0 &&
+                   (head->type == NumberType::kBool || !context.integers_as_values);
+  if (ids) {
+    Result<VoxelIntervals> set = read_runs(context, *head);
+    if (!set) return tl::unexpected(set.error());
+    volume.set = std::move(*set);
+    if (head->type != NumberType::kBool) {
+      volume.kind = VoxelKind::kIds;
+      settle_ids(volume, head->type == NumberType::kU8 ? 255 : 1);
+    }
+  } else {
+    Result<ScalarField> field = read_field(context, *head);
+    if (!field) return tl::unexpected(field.error());
+    volume.values = std::move(*field);
+    volume.kind = is_float(head->type) ? VoxelKind::kMask : VoxelKind::kValues;
+    if (auto settled = settle_values(context, volume, head->grid); !settled) {
+      return tl::unexpected(settled.error());
+    }
+  }
+  volume.placed = head->placed;
+  volume.type = name_of(head->type);
+  return volume;
+}
+
+}  // namespace strata
