@@ -6,10 +6,10 @@
 #include <memory>
 
 #include "apps/verify/fraction_sum.h"
-#include "csg/arrangement/lattice_solids.h"
 #include "csg/boundary/boundary_arrangement.h"
 #include "csg/boundary/open_edges.h"
 #include "csg/geometry.h"
+#include "csg/lattice/lattice_solids.h"
 
 namespace strata::apps {
 namespace {

@@ -158,15 +158,17 @@ LatticeBox box_of(const WeldedSolids& solids, const glm::uvec3& t) {
 
 Result<std::vector<BoxPair>> find_candidate_pairs(const WeldedSolids& solids,
                                                   const MeshEdges& edges, std::size_t solid_count,
+                                                  const LiveZone& zone,
                                                   const Execution& execution) {
   const std::vector<bool> embedded = find_embedded(solids, edges, solid_count);
   const auto count = static_cast<std::uint32_t>(solids.triangles.size());
   std::vector<LatticeBox> boxes;
-  std::vector<std::uint32_t> groups;
-  boxes.reserve(count);
-  groups.reserve(count);
+  std::vector<std::uint32_t> groups, triangles;
   for (std::uint32_t t = 0; t < count; ++t) {
-    boxes.push_back(box_of(solids, solids.triangles[t]));
+    const LatticeBox box = box_of(solids, solids.triangles[t]);
+    if (!zone.touches(box)) continue;
+    triangles.push_back(t);
+    boxes.push_back(box);
     const std::uint32_t content = solids.content_of[t];
     const bool one_group = content < embedded.size() && embedded[content];
     // A group of its own: its pairs with all others are wanted.
@@ -185,8 +187,13 @@ Result<std::vector<BoxPair>> find_candidate_pairs(const WeldedSolids& solids,
     if (too_many()) return;
     std::vector<BoxPair>& mine = found[static_cast<std::size_t>(worker)];
     const std::size_t before = mine.size();
-    for (const BoxPair& pair : pairs) {
-      if (filter.may_meet(pair)) mine.push_back(pair);
+    for (const auto& [first, second] : pairs) {
+      const BoxPair pair{triangles[first], triangles[second]};
+      const LatticeBox &a = boxes[first], &b = boxes[second];
+      if (zone.touches({glm::max(a.low, b.low), glm::min(a.high, b.high)}) &&
+          filter.may_meet(pair)) {
+        mine.push_back(pair);
+      }
     }
     bytes += (mine.size() - before) * sizeof(BoxPair);
   };

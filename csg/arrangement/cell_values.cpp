@@ -2,8 +2,9 @@
 
 #include <algorithm>
 
-#include "csg/arrangement/buckets.h"
+#include "core/buckets.h"
 #include "csg/arrangement/winding_rays.h"
+#include "exact/directions.h"
 
 namespace strata::csg {
 namespace {
@@ -70,15 +71,17 @@ class State {
 
 class Walk {
  public:
-  Walk(const ArrangementInput& input, const Pieces& pieces, const RadialLists& lists,
-       const Program& program, const std::vector<InsideRule>& rules, bool labels)
+  Walk(const ArrangementInput& input, const BoundaryPoints& points, const CutLines& lines_of_cuts,
+       const Pieces& pieces, const RadialLists& lists, const Program& program,
+       const std::vector<InsideRule>& rules, bool labels)
       : labels_(labels),
         input_(input),
+        points_(points),
+        lines_of_cuts_(lines_of_cuts),
         pieces_(pieces),
         lists_(lists),
         rules_(rules),
-        state_(program, rules),
-        windings_(rules.size(), 0) {
+        state_(program, rules) {
     result_.inside.assign(lists.cell_count, false);
     result_.solid_of_patch.assign(lists.patch_count, kNone);
     fingerprints_.resize(lists.cell_count);
@@ -95,45 +98,51 @@ class Walk {
   void find_groups();
   void find_neighbours();
   void find_seeds();
+  Nearby place_at(std::uint32_t triangle) const;
+  Nearby place_at(const AtomicEdge& edge, const EdgeUse& use, bool left) const;
   void changes_of(std::uint32_t patch);
   void changes_of(const RadialLists::Group& group);
-  void merge_changes();
   void walk_from(std::uint32_t cell);
   void enter(std::uint32_t cell);
   bool wants_label(std::uint32_t patch) const {
     return labels_ && result_.solid_of_patch[patch] == kNone;
   }
-  // The tree's value has just changed in going through a patch.
-  void label(std::uint32_t patch) {
-    if (wants_label(patch)) result_.solid_of_patch[patch] = state_.decider();
+  // The tree's value has just changed by changes_, times `sign`, in going through a patch. The
+  // solid is looked for on the inside, wherever the walk comes from.
+  void label(std::uint32_t patch, int sign) {
+    if (!wants_label(patch)) return;
+    const bool left = !state_.value();
+    if (left) state_.add(changes_, -sign);
+    result_.solid_of_patch[patch] = state_.decider();
+    if (left) state_.add(changes_, sign);
   }
   bool consistent() const;
 
   const bool labels_;
   const ArrangementInput& input_;
+  const BoundaryPoints& points_;
+  const CutLines& lines_of_cuts_;
   const Pieces& pieces_;
   const RadialLists& lists_;
   const std::vector<InsideRule>& rules_;
   State state_;
-  std::vector<std::int32_t> windings_;
   CellValues result_;
   std::vector<Fingerprint> fingerprints_;
   std::vector<bool> seen_;
   std::vector<std::uint32_t> piece_of_;  // of each patch, one of its pieces
   std::vector<std::uint32_t> group_of_;  // of each patch, one that it is in
   std::vector<bool> left_in_group_;      // whether the patch is on the left there
-  Buckets neighbours_;                   // of each cell: 2 * patch + (0: seen from its front)
-  struct Seed {
-    Nearby place;
-    std::uint32_t cell = kNone;
-  };
-  std::vector<Seed> seeds_;  // of each component
+  detail::Buckets neighbours_;           // of each cell: 2 * patch + (0: seen from its front)
+  std::vector<std::uint32_t> seeds_;     // of each component, a cell
+  std::vector<Nearby> places_;           // in these cells
   std::vector<SolidCount> changes_;
 };
 
 void Walk::find_groups() {
   piece_of_.resize(lists_.patch_count);
-  for (std::uint32_t p = 0; p < lists_.patch_of.size(); ++p) piece_of_[lists_.patch_of[p]] = p;
+  for (std::uint32_t p = 0; p < lists_.patch_of.size(); ++p) {
+    if (!pieces_.is_dead(p)) piece_of_[lists_.patch_of[p]] = p;
+  }
   group_of_.assign(lists_.patch_count, kNone);
   left_in_group_.assign(lists_.patch_count, false);
   for (std::uint32_t g = 0; g < lists_.groups.size(); ++g) {
@@ -147,54 +156,67 @@ void Walk::find_groups() {
 }
 
 void Walk::find_neighbours() {
-  neighbours_ = bucket(std::size_t{2} * lists_.patch_count, lists_.cell_count,
-                       [&](std::size_t side) { return lists_.cell_of[side]; });
+  neighbours_ = detail::bucket(std::size_t{2} * lists_.patch_count, lists_.cell_count,
+                               [&](std::size_t side) { return lists_.cell_of[side]; });
 }
 
-// A component has a side of a triangle that begins or ends at a corner: its edges go on until they
-// do.
+// Each component has a triangle that nothing cuts or an edge. Places at vertices are the simplest.
 void Walk::find_seeds() {
-  seeds_.resize(lists_.component_count);
-  const auto offer = [&](std::uint32_t piece, const Nearby& place) {
+  seeds_.assign(lists_.component_count, kNone);
+  places_.resize(lists_.component_count);
+  std::size_t missing = seeds_.size();
+  const auto offer = [&](std::uint32_t piece, const auto& place) {
     const std::uint32_t patch = lists_.patch_of[piece];
-    Seed& seed = seeds_[lists_.component_of[patch]];
-    if (seed.cell == kNone) seed = {place, cell(patch, false)};
+    const std::uint32_t component = lists_.component_of[patch];
+    if (seeds_[component] != kNone) return;
+    seeds_[component] = cell(patch, false);
+    places_[component] = place();
+    --missing;
   };
-  for (std::uint32_t t = 0; t < input_.triangles.size(); ++t) {
+  for (std::uint32_t t = 0; t < input_.triangles.size() && missing > 0; ++t) {
     const std::uint32_t* edges = &input_.edges.edge_of[3 * t];
-    if (pieces_.edge_listed[edges[0]] || pieces_.edge_listed[edges[1]] ||
+    if (pieces_.is_dead(t) || pieces_.edge_listed[edges[0]] || pieces_.edge_listed[edges[1]] ||
         pieces_.edge_listed[edges[2]]) {
       continue;
     }
-    const glm::uvec3& c = input_.triangles[t];
-    offer(t, {t, c.x, c.y, c.z});
+    offer(t, [&] { return place_at(t); });
   }
-  for (const AtomicEdge& edge : pieces_.edges) {
-    for (std::uint32_t u = edge.first_use; u < edge.first_use + edge.use_count; ++u) {
-      const EdgeUse& use = pieces_.uses[u];
-      if (use.side == EdgeUse::kInside) continue;
-      const std::uint32_t side = 3 * use.triangle + use.side;
-      const std::uint32_t v = input_.corner(side, 0), w = input_.corner(side, 1),
-                          third = input_.corner(side, 2);
-      const std::uint32_t piece = use.left != EdgeUse::kNoPiece ? use.left : use.right;
-      if (edge.a == v || edge.b == v) offer(piece, {use.triangle, v, w, third});
-      if (edge.a == w || edge.b == w) offer(piece, {use.triangle, w, v, third});
+  for (const bool all : {false, true}) {
+    for (const AtomicEdge& edge : pieces_.edges) {
+      if (missing == 0) break;
+      if (edge.a >= input_.vertices.size() && !all) continue;
+      for (std::uint32_t u = edge.first_use; u < edge.first_use + edge.use_count; ++u) {
+        const EdgeUse& use = pieces_.uses[u];
+        const bool left = use.left != EdgeUse::kNoPiece;
+        offer(left ? use.left : use.right, [&] { return place_at(edge, use, left); });
+      }
     }
   }
 }
 
-void Walk::merge_changes() {
-  if (changes_.size() < 2) return;
-  std::ranges::sort(changes_, {}, &SolidCount::solid);
-  std::size_t kept = 0;
-  for (std::size_t i = 1; i < changes_.size(); ++i) {
-    if (changes_[i].solid == changes_[kept].solid) {
-      changes_[kept].count += changes_[i].count;
-    } else {
-      changes_[++kept] = changes_[i];
-    }
+Nearby Walk::place_at(std::uint32_t t) const {
+  const glm::uvec3& c = input_.triangles[t];
+  const auto& vertices = input_.vertices;
+  const exact::LatticePoint along = vertices[c.y] - vertices[c.x];
+  return {t, c.x, {along.x, along.y, along.z}, vertices[c.z] - vertices[c.x]};
+}
+
+// At the first end of an edge, on the left or on the right of it.
+Nearby Walk::place_at(const AtomicEdge& edge, const EdgeUse& use, bool left) const {
+  Nearby place{use.triangle, edge.a, direction_of(input_, lines_of_cuts_, use.line), {}};
+  if (!use.forward) place.along = {-place.along[0], -place.along[1], -place.along[2]};
+  const exact::PlaneView view(input_.plane_of(use.triangle));
+  const exact::PlanarDirection along{place.along[static_cast<std::size_t>(view.u())],
+                                     place.along[static_cast<std::size_t>(view.v())]};
+  const glm::uvec3& c = input_.triangles[use.triangle];
+  for (int k = 0; k < 2; ++k) {  // two sides of the triangle are not parallel to the edge
+    place.across = input_.vertices[c[k + 1]] - input_.vertices[c[k]];
+    const int turn = exact::turn_in_plane(along, view.of(place.across));
+    if (turn == 0) continue;
+    if ((turn > 0) != left) place.across = -place.across;
+    break;
   }
-  changes_.resize(kept + 1);
+  return place;
 }
 
 // Counter-clockwise through a group: out of what has its front behind.
@@ -206,7 +228,7 @@ void Walk::changes_of(const RadialLists::Group& group) {
       changes_.push_back({solid, sign * count});
     }
   }
-  merge_changes();
+  if (changes_.size() > 1) merge_counts(changes_);
 }
 
 // From the back of a patch to its front.
@@ -252,10 +274,11 @@ void Walk::walk_from(std::uint32_t start) {
     const std::uint32_t to = cell(patch, at_front);
     if (seen_[to] && !wants_label(patch)) continue;
     changes_of(patch);
-    state_.add(changes_, at_front ? -1 : 1);
-    if (state_.value() != result_.inside[step.cell]) label(patch);
+    const int sign = at_front ? -1 : 1;
+    state_.add(changes_, sign);
+    if (state_.value() != result_.inside[step.cell]) label(patch, sign);
     if (seen_[to]) {
-      state_.add(changes_, at_front ? 1 : -1);
+      state_.add(changes_, -sign);
       continue;
     }
     enter(to);
@@ -280,20 +303,14 @@ Result<CellValues> Walk::run(const Execution& execution) {
   find_groups();
   find_neighbours();
   find_seeds();
-  const WindingRays rays(input_, lists_.component_count);
-  std::vector<SolidCount> start;
-  for (const Seed& seed : seeds_) {
+  const auto windings = count_windings(input_, points_, places_, execution);
+  if (!windings) return tl::unexpected(windings.error());
+  for (std::size_t i = 0; i < seeds_.size(); ++i) {
     if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
-    assert(seed.cell != kNone);
-    std::ranges::fill(windings_, 0);
-    rays.count(seed.place, windings_);
-    start.clear();
-    for (std::uint32_t s = 0; s < windings_.size(); ++s) {
-      if (windings_[s] != 0) start.push_back({s, windings_[s]});
-    }
-    state_.add(start, 1);
-    walk_from(seed.cell);
-    state_.add(start, -1);
+    assert(seeds_[i] != kNone);
+    state_.add((*windings)[i], 1);
+    walk_from(seeds_[i]);
+    state_.add((*windings)[i], -1);
   }
   if (!consistent()) {
     return fail(ErrorCode::kGeometry,
@@ -304,11 +321,12 @@ Result<CellValues> Walk::run(const Execution& execution) {
 
 }  // namespace
 
-Result<CellValues> find_cell_values(const ArrangementInput& input, const Pieces& pieces,
+Result<CellValues> find_cell_values(const ArrangementInput& input, const BoundaryPoints& points,
+                                    const CutLines& lines_of_cuts, const Pieces& pieces,
                                     const RadialLists& lists, const Program& program,
                                     const std::vector<InsideRule>& rules, bool labels,
                                     const Execution& execution) {
-  return Walk(input, pieces, lists, program, rules, labels).run(execution);
+  return Walk(input, points, lines_of_cuts, pieces, lists, program, rules, labels).run(execution);
 }
 
 }  // namespace strata::csg

@@ -20,7 +20,8 @@ struct CellValues {
 /// a component begin is counted along a ray.
 /// @param rules  of each solid
 /// @return kGeometry: winding numbers contradict each other, which open solids lead to; kCancelled
-Result<CellValues> find_cell_values(const ArrangementInput& input, const Pieces& pieces,
+Result<CellValues> find_cell_values(const ArrangementInput& input, const BoundaryPoints& points,
+                                    const CutLines& lines_of_cuts, const Pieces& pieces,
                                     const RadialLists& lists, const Program& program,
                                     const std::vector<InsideRule>& rules, bool labels,
                                     const Execution& execution);

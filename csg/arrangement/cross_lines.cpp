@@ -18,6 +18,7 @@ constexpr std::size_t kFewCuts = 24;
 struct Item {
   std::uint32_t line, from, to;  // a contact: no line, from == to
   double low[2], high[2];        // the box, in steps
+  LatticeBox box;                // the same along all axes
   Plane wall;                    // contains the line and not the triangle
 
   bool touches(const Item& other) const {
@@ -74,8 +75,8 @@ Plane Crosser::wall_of(std::uint32_t line) const {
 }
 
 Item Crosser::item(std::uint32_t line, std::uint32_t from, std::uint32_t to) const {
-  Item result{line, from, to, {}, {}, {}};
   const exact::FilePoint a = points_.rounded(from), b = points_.rounded(to);
+  Item result{line, from, to, {}, {}, box_around(a, b), {}};
   const int axes[2] = {u_, v_};
   for (int k = 0; k < 2; ++k) {
     const auto [low, high] = std::minmax(a[axes[k]], b[axes[k]]);
@@ -113,6 +114,9 @@ std::uint32_t Crosser::cross(const Item& a, const Item& b) {
 
 void Crosser::compare(const Item& a, const Item& b) {
   if (a.line == b.line || !a.touches(b)) return;
+  if (!input_.zone.touches({glm::max(a.box.low, b.box.low), glm::min(a.box.high, b.box.high)})) {
+    return;
+  }
   const auto side = [&](std::uint32_t point, const Item& of) {
     return point == of.from || point == of.to ? 0 : side_of(points_, point, of.wall);
   };
@@ -219,7 +223,10 @@ void Crosser::run(std::uint32_t triangle, std::span<const CutLines::Cut> cuts,
   u_ = view.u();
   v_ = view.v();
   items_.clear();
-  for (const CutLines::Cut& cut : cuts) items_.push_back(item(cut.line, cut.from, cut.to));
+  for (const CutLines::Cut& cut : cuts) {
+    items_.push_back(item(cut.line, cut.from, cut.to));
+    if (!input_.zone.touches(items_.back().box)) items_.pop_back();
+  }
   for (const CutLines::Contact& contact : contacts) {
     items_.push_back(item(kNoLine, contact.point, contact.point));
   }
@@ -249,6 +256,18 @@ LineAxis axis_of(const ArrangementInput& input, const CutLines& lines, std::uint
   int axis = size.y > size.x ? 1 : 0;
   if (size.z > size[axis]) axis = 2;
   return {axis, along[axis] > 0};
+}
+
+exact::Cross direction_of(const ArrangementInput& input, const CutLines& lines,
+                          std::uint32_t line) {
+  if (line < input.edges.size()) {
+    const LatticePoint along =
+        input.vertices[input.edge_to(line)] - input.vertices[input.edge_from(line)];
+    return {along.x, along.y, along.z};
+  }
+  const CrossingLine& crossing = lines.crossings[line - input.edges.size()];
+  return exact::cross(input.plane_of(crossing.first).normal,
+                      input.plane_of(crossing.second).normal);
 }
 
 Result<void> cross_lines(const ArrangementInput& input, PointTable& points, CutLines& lines,

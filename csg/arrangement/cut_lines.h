@@ -57,6 +57,7 @@ struct ArrangementInput {
   const std::vector<glm::uvec3>& triangles;
   const WeldedSolids& solids;  ///< their contents; vertices and triangles have moved out
   const MeshEdges& edges;
+  const LiveZone& zone;  ///< where the arrangement is wanted; elsewhere cuts may be missing
 
   exact::Plane plane_of(std::uint32_t triangle) const {
     const glm::uvec3& t = triangles[triangle];
@@ -70,6 +71,8 @@ struct ArrangementInput {
 };
 
 LineAxis axis_of(const ArrangementInput& input, const CutLines& lines, std::uint32_t line);
+/// The direction in which a line runs.
+exact::Cross direction_of(const ArrangementInput& input, const CutLines& lines, std::uint32_t line);
 
 /// What one thread finds. Numbers of points and lines from kOwn on are those of its own.
 struct CutLinesPart : CutLines {

@@ -35,7 +35,6 @@ class EdgeJoiner {
 
  private:
   void add_neighbour(std::uint32_t point, std::uint32_t neighbour, std::uint32_t line);
-  exact::Cross direction(std::uint32_t line) const;
   bool straight(const PointEdges& point) const;
   void find_straight();
   void add_planes();
@@ -68,22 +67,12 @@ void EdgeJoiner::add_neighbour(std::uint32_t point, std::uint32_t neighbour, std
   at.corner = true;
 }
 
-exact::Cross EdgeJoiner::direction(std::uint32_t line) const {
-  if (line < input_.edges.size()) {
-    const exact::LatticePoint along =
-        input_.vertices[input_.edge_to(line)] - input_.vertices[input_.edge_from(line)];
-    return {along.x, along.y, along.z};
-  }
-  const CrossingLine& crossing = lines_.crossings[line - input_.edges.size()];
-  return exact::cross(input_.plane_of(crossing.first).normal,
-                      input_.plane_of(crossing.second).normal);
-}
-
 // Products of two components of directions: 2 (4b + 2) bits; 236 for b = 29.
 bool EdgeJoiner::straight(const PointEdges& point) const {
   if (point.corner || point.neighbour[1] == kNoPoint) return false;
   if (point.line[0] == point.line[1]) return true;
-  const exact::Cross d = direction(point.line[0]), e = direction(point.line[1]);
+  const exact::Cross d = direction_of(input_, lines_, point.line[0]),
+                     e = direction_of(input_, lines_, point.line[1]);
   for (std::size_t i = 0; i < 3; ++i) {
     const std::size_t j = (i + 1) % 3;
     if (exact::product<exact::Int256>(d[i], e[j]) != exact::product<exact::Int256>(d[j], e[i])) {

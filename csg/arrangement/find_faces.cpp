@@ -34,6 +34,7 @@ class FaceFinder {
     return values_.inside[lists_.cell_of[2 * patch + (back ? 1 : 0)]];
   }
   bool kept(std::uint32_t piece) const {
+    if (pieces_.is_dead(piece)) return false;
     const std::uint32_t patch = lists_.patch_of[piece];
     return inside(patch, false) != inside(patch, true) && !dropped_[piece];
   }

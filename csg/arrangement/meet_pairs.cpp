@@ -75,6 +75,7 @@ class PairMeeter {
   Ends ends_of(const Side& t, const std::array<Int128, 3>& heights, bool second) const;
   void meet_across(const Side& a, const Side& b, const Ends& ends_a, const Ends& ends_b);
   std::uint32_t point_of(const Side& a, const Place& on_a, const Side& b, const Place& on_b);
+  bool wanted(std::uint32_t from, std::uint32_t to) const;
   void put(const Side& t, const Place& place, std::uint32_t point, bool end_of_cut);
   void put_on_edge(std::uint32_t edge, std::uint32_t point);
   void meet_flat(const Side& a, const Side& b);
@@ -143,9 +144,11 @@ void PairMeeter::meet_across(const Side& a, const Side& b, const Ends& ends_a, c
   high_b = high >= 0 ? ends_b.high.place : inside_b;
   if (over == 0) low_a = high_a = ends_a.high.place, low_b = high_b = ends_b.low.place;
   if (under == 0) low_a = high_a = ends_a.low.place, low_b = high_b = ends_b.high.place;
+  const std::size_t points_before = lines_.points.size();
   const std::uint32_t from = point_of(a, low_a, b, low_b);
   const bool touch = over == 0 || under == 0;
   const std::uint32_t to = touch ? from : point_of(a, high_a, b, high_b);
+  if (!wanted(from, to)) return lines_.points.resize(points_before);
   const bool is_point = from == to;
   put(a, low_a, from, !is_point);
   put(b, low_b, from, !is_point);
@@ -166,6 +169,15 @@ void PairMeeter::meet_across(const Side& a, const Side& b, const Ends& ends_a, c
     lines_.cuts.push_back({a.triangle, line, from, to});
     lines_.cuts.push_back({b.triangle, line, from, to});
   }
+}
+
+bool PairMeeter::wanted(std::uint32_t from, std::uint32_t to) const {
+  if (input_.zone.everywhere()) return true;
+  const auto place = [&](std::uint32_t point) {
+    return point < CutLinesPart::kOwn ? points_.rounded(point)
+                                      : lines_.points[point - CutLinesPart::kOwn].rounded;
+  };
+  return input_.zone.touches(box_around(place(from), place(to)));
 }
 
 std::uint32_t PairMeeter::point_of(const Side& a, const Place& on_a, const Side& b,

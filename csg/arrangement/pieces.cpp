@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "csg/arrangement/buckets.h"
+#include "core/buckets.h"
 #include "exact/directions.h"
 
 namespace strata::csg {
@@ -96,8 +96,8 @@ class EdgeCollector {
 
   // Edges in the order of their points, with their triangles in order; each triangle once.
   void sort_records(Pieces& pieces) {
-    const Buckets buckets =
-        bucket(records_.size(), points_.size(), [&](std::size_t i) { return records_[i].a; });
+    const detail::Buckets buckets = detail::bucket(records_.size(), points_.size(),
+                                                   [&](std::size_t i) { return records_[i].a; });
     std::vector<std::uint32_t> order;
     for (std::size_t a = 0; a < points_.size(); ++a) {
       order.assign(buckets.items.begin() + buckets.first[a],
@@ -282,6 +282,88 @@ void Subdivider::walk(std::uint32_t start) {
   }
 }
 
+// Leaves of the pieces what lies in the zone.
+class DeadPieces {
+ public:
+  DeadPieces(const ArrangementInput& input, const BoundaryPoints& points, Pieces& pieces)
+      : input_(input), points_(points), pieces_(pieces) {}
+
+  void drop(const Execution& execution) {
+    pieces_.dead.assign(pieces_.triangle_of.size(), 0);
+    const std::vector<std::uint8_t> edge_dead = dead_edges(execution);
+    for (std::uint32_t e = 0; e < pieces_.edges.size(); ++e) {
+      if (edge_dead[e] == 0) continue;
+      const AtomicEdge& edge = pieces_.edges[e];
+      for (std::uint32_t u = edge.first_use; u < edge.first_use + edge.use_count; ++u) {
+        mark(pieces_.uses[u].left);
+        mark(pieces_.uses[u].right);
+      }
+    }
+    mark_uncut();
+    keep_edges(edge_dead);
+  }
+
+ private:
+  void mark(std::uint32_t piece) {
+    if (piece != EdgeUse::kNoPiece) pieces_.dead[piece] = 1;
+  }
+
+  std::vector<std::uint8_t> dead_edges(const Execution& execution) const {
+    constexpr std::size_t kBlock = 4096;
+    std::vector<std::uint8_t> result(pieces_.edges.size());
+    parallel_for(execution, (result.size() + kBlock - 1) / kBlock, [&](std::size_t block, int) {
+      const std::size_t end = std::min(result.size(), (block + 1) * kBlock);
+      for (std::size_t e = block * kBlock; e < end; ++e) {
+        const AtomicEdge& edge = pieces_.edges[e];
+        result[e] = !input_.zone.contains(points_.rounded(edge.a), points_.rounded(edge.b));
+      }
+    });
+    return result;
+  }
+
+  void mark_uncut() {
+    for (std::uint32_t edge = 0; edge < input_.edges.size(); ++edge) {
+      if (pieces_.edge_listed[edge]) continue;
+      const auto uses = input_.edges.uses_of(edge);
+      std::uint8_t &s = pieces_.dead[uses[0] / 3], &t = pieces_.dead[uses[1] / 3];
+      if ((s & t) != 0) continue;
+      if (!input_.zone.contains(points_.rounded(input_.edge_from(edge)),
+                                points_.rounded(input_.edge_to(edge)))) {
+        s = t = 1;
+      }
+    }
+  }
+
+  void keep_edges(const std::vector<std::uint8_t>& edge_dead) {
+    std::size_t edges = 0;
+    std::uint32_t uses = 0;
+    const auto own_piece = [&](std::uint32_t piece) {
+      if (piece == EdgeUse::kNoPiece || !pieces_.is_dead(piece)) return piece;
+      pieces_.triangle_of.push_back(std::uint32_t{pieces_.triangle_of[piece]});
+      pieces_.dead.push_back(0);
+      return static_cast<std::uint32_t>(pieces_.triangle_of.size() - 1);
+    };
+    for (std::size_t e = 0; e < edge_dead.size(); ++e) {
+      if (edge_dead[e] != 0) continue;
+      AtomicEdge edge = pieces_.edges[e];
+      const std::uint32_t first = std::exchange(edge.first_use, uses);
+      for (std::uint32_t u = first; u < first + edge.use_count; ++u) {
+        EdgeUse use = pieces_.uses[u];
+        use.left = own_piece(use.left);
+        use.right = own_piece(use.right);
+        pieces_.uses[uses++] = use;
+      }
+      pieces_.edges[edges++] = edge;
+    }
+    pieces_.edges.resize(edges);
+    pieces_.uses.resize(uses);
+  }
+
+  const ArrangementInput& input_;
+  const BoundaryPoints& points_;
+  Pieces& pieces_;
+};
+
 }  // namespace
 
 Result<Pieces> find_pieces(const ArrangementInput& input, const BoundaryPoints& points,
@@ -298,8 +380,8 @@ Result<Pieces> find_pieces(const ArrangementInput& input, const BoundaryPoints& 
     const AtomicEdge& edge = pieces.edges[e];
     std::fill_n(edge_of_use.begin() + edge.first_use, edge.use_count, e);
   }
-  const Buckets by_triangle = bucket(pieces.uses.size(), triangle_count,
-                                     [&](std::size_t u) { return pieces.uses[u].triangle; });
+  const detail::Buckets by_triangle = detail::bucket(
+      pieces.uses.size(), triangle_count, [&](std::size_t u) { return pieces.uses[u].triangle; });
   const auto uses_of = [&](std::uint32_t t) {
     return std::span(by_triangle.items)
         .subspan(by_triangle.first[t], by_triangle.first[t + 1] - by_triangle.first[t]);
@@ -344,6 +426,7 @@ Result<Pieces> find_pieces(const ArrangementInput& input, const BoundaryPoints& 
       }
     }
   });
+  if (!input.zone.everywhere()) DeadPieces(input, points, pieces).drop(execution);
   if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
   return pieces;
 }

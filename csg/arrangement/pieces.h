@@ -38,8 +38,16 @@ struct Pieces {
   /// The triangle of each piece. A triangle that is not cut is the piece of its own number; so is
   /// the first piece of a triangle that is cut.
   std::vector<std::uint32_t> triangle_of;
+  /// Of each piece, whether it reaches out of the zone: no use and no edge refers to it. Empty
+  /// where the zone is everywhere.
+  std::vector<std::uint8_t> dead;
+
+  bool is_dead(std::uint32_t piece) const { return !dead.empty() && dead[piece] != 0; }
 };
 
+/// Where the zone is not everywhere, edges that reach out of it are dropped, and so are the pieces
+/// at them. At each of its other edges such a piece is a piece of its own: what lies on its two
+/// sides is known there alone.
 /// @return kCancelled, kLimit
 Result<Pieces> find_pieces(const ArrangementInput& input, const BoundaryPoints& points,
                            const CutLines& lines, const SortedLines& sorted,

@@ -131,7 +131,8 @@ class RadialSorter {
     for (std::uint32_t edge = 0; edge < input_.edges.size(); ++edge) {
       if (pieces_.edge_listed[edge]) continue;
       const auto uses = input_.edges.uses_of(edge);
-      patches_.join(uses[0] / 3, uses[1] / 3);
+      const std::uint32_t s = uses[0] / 3, t = uses[1] / 3;
+      if (!pieces_.is_dead(s) && !pieces_.is_dead(t)) patches_.join(s, t);
     }
   }
 
@@ -145,12 +146,14 @@ class RadialSorter {
   RadialLists result_;
 };
 
-// Numbers the sets of items from 0.
+// Numbers the sets of items from 0; items that are skipped have sets of their own.
+template <class Skip>
 std::uint32_t number_sets(detail::DisjointSets& sets, std::size_t count,
-                          std::vector<std::uint32_t>& number_of) {
+                          std::vector<std::uint32_t>& number_of, const Skip& skip) {
   number_of.resize(count);
   std::uint32_t next = 0;
   for (std::uint32_t i = 0; i < count; ++i) {  // the least item represents its set
+    if (skip(i)) continue;
     const std::uint32_t root = sets.find(i);
     number_of[i] = root == i ? next++ : number_of[root];
   }
@@ -158,7 +161,8 @@ std::uint32_t number_sets(detail::DisjointSets& sets, std::size_t count,
 }
 
 void RadialSorter::number_patches() {
-  result_.patch_count = number_sets(patches_, pieces_.triangle_of.size(), result_.patch_of);
+  result_.patch_count = number_sets(patches_, pieces_.triangle_of.size(), result_.patch_of,
+                                    [&](std::uint32_t p) { return pieces_.is_dead(p); });
 }
 
 void RadialSorter::join_cells() {
@@ -181,8 +185,11 @@ void RadialSorter::join_cells() {
       components.join(result_.patch_of[sheets[0].piece], result_.patch_of[following.piece]);
     }
   }
-  result_.component_count = number_sets(components, result_.patch_count, result_.component_of);
-  result_.cell_count = number_sets(cells, std::size_t{2} * result_.patch_count, result_.cell_of);
+  const auto none = [](std::uint32_t) { return false; };
+  result_.component_count =
+      number_sets(components, result_.patch_count, result_.component_of, none);
+  result_.cell_count =
+      number_sets(cells, std::size_t{2} * result_.patch_count, result_.cell_of, none);
 }
 
 }  // namespace

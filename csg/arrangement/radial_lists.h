@@ -33,7 +33,7 @@ struct RadialLists {
   std::vector<Sheet> sheets;
 
   /// Pieces that continue each other are a patch: they have the same cells on their two sides.
-  std::vector<std::uint32_t> patch_of;  ///< of each piece
+  std::vector<std::uint32_t> patch_of;  ///< of each piece that is not dead
   std::uint32_t patch_count = 0;
   std::vector<std::uint32_t> component_of;  ///< of each patch: patches that share edges
   std::uint32_t component_count = 0;

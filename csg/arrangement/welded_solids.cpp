@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <tuple>
 
-#include "csg/arrangement/buckets.h"
+#include "core/buckets.h"
 #include "mesh/weld.h"
 
 namespace strata::csg {
@@ -98,9 +98,10 @@ class Merge {
   // Equal triangles lie in one bucket of their least corner.
   void merge_equal() {
     const std::vector<glm::uvec3>& triangles = solids_.triangles;
-    const Buckets buckets = bucket(triangles.size(), solids_.vertices.size(), [&](std::size_t i) {
-      return std::min({triangles[i].x, triangles[i].y, triangles[i].z});
-    });
+    const detail::Buckets buckets =
+        detail::bucket(triangles.size(), solids_.vertices.size(), [&](std::size_t i) {
+          return std::min({triangles[i].x, triangles[i].y, triangles[i].z});
+        });
     std::vector<bool> gone(triangles.size(), false);
     bool any = false;
     std::vector<std::pair<Sorted, std::uint32_t>> keys;
@@ -187,7 +188,7 @@ MeshEdges find_mesh_edges(std::span<const glm::uvec3> triangles, std::size_t ver
     return std::pair(std::min(from, to), Key{std::max(from, to), use, t[side == 0 ? 2 : side - 1]});
   };
   MeshEdges result;
-  Buckets buckets = bucket(3 * triangles.size(), vertex_count, [&](std::size_t i) {
+  detail::Buckets buckets = detail::bucket(3 * triangles.size(), vertex_count, [&](std::size_t i) {
     return key_of(static_cast<std::uint32_t>(i)).first;
   });
   result.uses = std::move(buckets.items);

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "csg/arrangement/lattice_solids.h"
+#include "csg/lattice/lattice_solids.h"
 
 namespace strata::csg {
 

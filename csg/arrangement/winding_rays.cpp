@@ -4,6 +4,8 @@
 #include <cmath>
 #include <glm/common.hpp>
 
+#include "core/buckets.h"
+
 namespace strata::csg {
 namespace {
 
@@ -17,119 +19,155 @@ int turn(const LatticePoint& edge, const Normal& v) {
   return sign_of(Int128{edge.y} * v.z - Int128{edge.z} * v.y);
 }
 
-}  // namespace
-
-WindingRays::WindingRays(const ArrangementInput& input, std::size_t rays) : input_(input) {
-  if (rays >= 4 && !input.triangles.empty()) build(rays);
+// 30 and 118 bits.
+int turn(const LatticePoint& edge, const exact::Cross& v) {
+  return sign_of(exact::product<exact::Int192>(v[2], edge.y) -
+                 exact::product<exact::Int192>(v[1], edge.z));
 }
 
-std::size_t WindingRays::cell(const LatticePoint& p) const {
-  return (static_cast<std::size_t>(p.z) - static_cast<std::size_t>(low_.z)) / size_[1] * across_ +
-         (static_cast<std::size_t>(p.y) - static_cast<std::size_t>(low_.y)) / size_[0];
+class Rays {
+ public:
+  Rays(const ArrangementInput& input, const BoundaryPoints& points, std::span<const Nearby> places);
+
+  struct Passed {
+    std::uint32_t place;
+    SolidCount count;
+  };
+  // Appends the rays that pass through a triangle.
+  void add(std::uint32_t triangle, std::vector<Passed>& out) const;
+
+ private:
+  // Rounding leaves a point within the bounds of whole steps that it lies in.
+  LatticePoint steps(const Nearby& place) const {
+    return LatticePoint(points_.rounded(place.point) >> exact::FilePoint(exact::kFileBits));
+  }
+  int column(int axis, std::int32_t at) const {
+    return static_cast<int>((std::int64_t{at} - low_[axis]) / size_[axis]);
+  }
+  int cross(std::uint32_t triangle, const Nearby& place) const;
+
+  const ArrangementInput& input_;
+  const BoundaryPoints& points_;
+  const std::span<const Nearby> places_;
+  // Places in cells over y and z.
+  LatticePoint low_, high_;
+  int across_ = 1;
+  glm::i64vec3 size_{1};
+  detail::Buckets cells_;
+};
+
+Rays::Rays(const ArrangementInput& input, const BoundaryPoints& points,
+           std::span<const Nearby> places)
+    : input_(input), points_(points), places_(places), low_(steps(places[0])), high_(low_) {
+  for (const Nearby& place : places) {
+    low_ = glm::min(low_, steps(place));
+    high_ = glm::max(high_, steps(place));
+  }
+  across_ = std::clamp(static_cast<int>(std::sqrt(static_cast<double>(places.size()))), 1, 256);
+  size_ = (glm::i64vec3(high_) - glm::i64vec3(low_)) / std::int64_t{across_} + std::int64_t{1};
+  const auto cells = static_cast<std::size_t>(across_) * static_cast<std::size_t>(across_);
+  cells_ = detail::bucket(places.size(), cells, [&](std::size_t i) {
+    const LatticePoint p = steps(places[i]);
+    return static_cast<std::size_t>(column(2, p.z) * across_ + column(1, p.y));
+  });
 }
 
-// Cells about as large as the triangles seen along x, and not many more than there are rays.
-void WindingRays::build(std::size_t rays) {
-  const auto& vertices = input_.vertices;
-  const auto count = static_cast<std::uint32_t>(input_.triangles.size());
-  LatticePoint high = vertices.front();
-  low_ = high;
-  for (const LatticePoint& p : vertices) {
-    low_ = glm::min(low_, p);
-    high = glm::max(high, p);
+void Rays::add(std::uint32_t triangle, std::vector<Passed>& out) const {
+  const glm::uvec3& t = input_.triangles[triangle];
+  const LatticePoint &a = input_.vertices[t.x], &b = input_.vertices[t.y],
+                     &c = input_.vertices[t.z];
+  LatticePoint low = glm::min(a, glm::min(b, c)), high = glm::max(a, glm::max(b, c));
+  for (int k = 0; k < 3; ++k) {
+    if (low[k] > high_[k] || (k > 0 && high[k] < low_[k])) return;
   }
-  struct Shadow {
-    LatticePoint low, high;
-    bool seen;
-  };
-  const auto shadow = [&](std::uint32_t t) {
-    const glm::uvec3& c = input_.triangles[t];
-    const LatticePoint &p = vertices[c.x], &q = vertices[c.y], &r = vertices[c.z];
-    return Shadow{glm::min(p, glm::min(q, r)), glm::max(p, glm::max(q, r)),
-                  exact::normal_of(p, q, r).x != 0};
-  };
-  double extents[2] = {0, 0};
-  std::uint32_t seen = 0;
-  for (std::uint32_t t = 0; t < count; ++t) {
-    const Shadow s = shadow(t);
-    if (!s.seen) continue;
-    ++seen;
-    for (int k = 0; k < 2; ++k) extents[k] += static_cast<double>(s.high[k + 1]) - s.low[k + 1] + 1;
-  }
-  std::size_t cells[2];
-  const double most = std::sqrt(16.0 * static_cast<double>(rays));
-  for (int k = 0; k < 2; ++k) {
-    const double whole = static_cast<double>(high[k + 1]) - low_[k + 1] + 1;
-    const double wanted = std::clamp(whole * seen / std::max(extents[k], 1.0), 1.0, most);
-    size_[k] = static_cast<std::size_t>(whole / wanted) + 1;
-    cells[k] = static_cast<std::size_t>(whole) / size_[k] + 1;
-  }
-  across_ = cells[0];
-  const auto for_cells = [&](std::uint32_t t, const auto& work) {
-    const Shadow s = shadow(t);
-    if (!s.seen) return;
-    const std::size_t first = cell(s.low), last = cell(s.high);
-    const std::size_t columns = last % across_ - first % across_ + 1;
-    for (std::size_t row = first; row <= last; row += across_) {
-      for (std::size_t c = row; c < row + columns; ++c) work(c);
+  low = glm::max(low, low_);
+  high = glm::min(high, high_);
+  for (int row = column(2, low.z); row <= column(2, high.z); ++row) {
+    const std::uint32_t
+        first = cells_.first[static_cast<std::size_t>(row * across_ + column(1, low.y))],
+        end = cells_.first[static_cast<std::size_t>(row * across_ + column(1, high.y) + 1)];
+    for (std::uint32_t i = first; i < end; ++i) {
+      const int winding = cross(triangle, places_[cells_.items[i]]);
+      if (winding == 0) continue;
+      for (const auto& [solid, count] : input_.solids.content(triangle)) {
+        out.push_back({cells_.items[i], {solid, winding * count}});
+      }
     }
-  };
-  first_.assign(cells[0] * cells[1] + 1, 0);
-  for (std::uint32_t t = 0; t < count; ++t) for_cells(t, [&](std::size_t c) { ++first_[c + 1]; });
-  for (std::size_t c = 1; c < first_.size(); ++c) first_[c] += first_[c - 1];
-  std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
-  triangles_.resize(first_.back());
-  for (std::uint32_t t = 0; t < count; ++t) {
-    for_cells(t, [&](std::size_t c) { triangles_[next[c]++] = t; });
   }
 }
 
-void WindingRays::count(const Nearby& place, std::vector<std::int32_t>& windings) const {
-  const Normal normal = input_.plane_of(place.triangle).normal;
-  if (first_.empty()) {
-    const auto count = static_cast<std::uint32_t>(input_.triangles.size());
-    for (std::uint32_t t = 0; t < count; ++t) cross(t, place, normal, windings);
-    return;
-  }
-  const LatticePoint& v = input_.vertices[place.v];
-  const std::size_t c = cell(v);
-  for (std::uint32_t i = first_[c]; i < first_[c + 1]; ++i) {
-    cross(triangles_[i], place, normal, windings);
-  }
-}
-
-// Of each quantity the value at v decides, else its change along u, w and the normal, in this
-// order. These three are independent, so one of them does.
-void WindingRays::cross(std::uint32_t triangle, const Nearby& place, const Normal& normal,
-                        std::vector<std::int32_t>& windings) const {
+// Of each quantity the value at the point decides, else its change along the edge, across it and
+// along the normal, in this order. These three are independent, so one of them does.
+int Rays::cross(std::uint32_t triangle, const Nearby& place) const {
   const auto& vertices = input_.vertices;
   const glm::uvec3& t = input_.triangles[triangle];
   const LatticePoint corners[3] = {vertices[t.x], vertices[t.y], vertices[t.z]};
-  const LatticePoint& v = vertices[place.v];
-  const auto [y0, y1] = std::minmax({corners[0].y, corners[1].y, corners[2].y});
-  const auto [z0, z1] = std::minmax({corners[0].z, corners[1].z, corners[2].z});
-  if (v.y < y0 || v.y > y1 || v.z < z0 || v.z > z1) return;
-  if (v.x < std::min({corners[0].x, corners[1].x, corners[2].x})) return;
+  const exact::FilePoint at = points_.rounded(place.point);
+  for (int k = 0; k < 3; ++k) {
+    const auto [low, high] = std::minmax({corners[0][k], corners[1][k], corners[2][k]});
+    if (at[k] < std::int64_t{low} << exact::kFileBits) return 0;
+    if (k > 0 && at[k] > std::int64_t{high} << exact::kFileBits) return 0;
+  }
   const exact::Plane plane = exact::plane_through(corners[0], corners[1], corners[2]);
   const int facing = sign_of(plane.normal.x);
-  if (facing == 0) return;  // seen from its edge
-  const LatticePoint along = vertices[place.u] - v, across = vertices[place.w] - v;
+  if (facing == 0) return 0;  // seen from its edge
+  const Normal normal = input_.plane_of(place.triangle).normal;
   for (int k = 0; k < 3; ++k) {
     const LatticePoint edge = corners[k == 2 ? 0 : k + 1] - corners[k];
-    int side = turn(edge, Normal(v - corners[k]));
-    if (side == 0) side = turn(edge, Normal(along));
-    if (side == 0) side = turn(edge, Normal(across));
-    if (side == 0) side = turn(edge, normal);
-    if (side != facing) return;
+    const exact::Plane wall{Normal(0, -std::int64_t{edge.z}, edge.y), corners[k]};  // along x
+    int left = side_of(points_, place.point, wall);
+    if (left == 0) left = turn(edge, place.along);
+    if (left == 0) left = turn(edge, Normal(place.across));
+    if (left == 0) left = turn(edge, normal);
+    if (left != facing) return 0;
   }
-  int above = sign_of(exact::height(plane, v));
-  if (above == 0) above = sign_of(exact::dot(plane.normal, along));
-  if (above == 0) above = sign_of(exact::dot(plane.normal, across));
+  int above = side_of(points_, place.point, plane);
+  if (above == 0) above = sign_of(exact::dot(plane.normal, place.along));
+  if (above == 0) above = sign_of(exact::dot(plane.normal, place.across));
   if (above == 0) above = sign_of(exact::dot(plane.normal, normal));
-  if (above != facing) return;  // it lies towards +x
-  for (const auto& [solid, count] : input_.solids.content(triangle)) {
-    windings[solid] -= facing * count;
+  if (above != facing) return 0;  // it lies towards +x
+  return -facing;
+}
+
+}  // namespace
+
+void merge_counts(std::vector<SolidCount>& counts) {
+  std::ranges::sort(counts, {}, &SolidCount::solid);
+  std::size_t kept = 0;
+  for (const SolidCount& one : counts) {
+    if (kept > 0 && counts[kept - 1].solid == one.solid) {
+      counts[kept - 1].count += one.count;
+    } else {
+      counts[kept++] = one;
+    }
   }
+  counts.resize(kept);
+}
+
+Result<std::vector<std::vector<SolidCount>>> count_windings(const ArrangementInput& input,
+                                                            const BoundaryPoints& points,
+                                                            std::span<const Nearby> places,
+                                                            const Execution& execution) {
+  std::vector<std::vector<SolidCount>> result(places.size());
+  if (places.empty()) return result;
+  constexpr std::size_t kBlock = 8192;
+  const Rays rays(input, points, places);
+  std::vector<std::vector<Rays::Passed>> passed((input.triangles.size() + kBlock - 1) / kBlock);
+  parallel_for(execution, passed.size(), [&](std::size_t block, int) {
+    const std::size_t end = std::min(input.triangles.size(), (block + 1) * kBlock);
+    for (std::size_t t = block * kBlock; t < end; ++t) {
+      rays.add(static_cast<std::uint32_t>(t), passed[block]);
+    }
+  });
+  if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+  for (const auto& some : passed) {
+    for (const auto& [place, count] : some) result[place].push_back(count);
+  }
+  for (std::vector<SolidCount>& counts : result) {
+    merge_counts(counts);
+    std::erase_if(counts, [](const SolidCount& c) { return c.count == 0; });
+  }
+  return result;
 }
 
 }  // namespace strata::csg

@@ -1,39 +1,31 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "csg/arrangement/cut_lines.h"
 
 namespace strata::csg {
 
-/// A place next to the front of a triangle: so near to the corner v that nothing is closer than the
-/// triangle's own side, v + d (u - v) + d^2 (w - v) + d^3 n for all d that are small enough.
+/// A place next to the front of a triangle: so near to a point that nothing is closer than the
+/// triangle's own piece, p + d along + d^2 across + d^3 normal for all d that are small enough.
 struct Nearby {
   std::uint32_t triangle;
-  std::uint32_t v, u, w;  ///< its corners, in any order
+  std::uint32_t point;
+  exact::Cross along;          ///< an edge of the piece
+  exact::LatticePoint across;  ///< into the piece, in the plane of the triangle
 };
 
-/// Counts winding numbers along rays towards -x. All comparisons are exact.
-class WindingRays {
- public:
-  /// @param rays  how many will be asked for, about
-  WindingRays(const ArrangementInput& input, std::size_t rays);
+/// Counts winding numbers along rays towards -x from places, through all triangles. All comparisons
+/// are exact.
+/// @return for each place the solids whose winding number is not 0, sorted; kCancelled
+Result<std::vector<std::vector<SolidCount>>> count_windings(const ArrangementInput& input,
+                                                            const BoundaryPoints& points,
+                                                            std::span<const Nearby> places,
+                                                            const Execution& execution);
 
-  /// Adds the winding numbers at a place to `windings`, of each solid.
-  void count(const Nearby& place, std::vector<std::int32_t>& windings) const;
-
- private:
-  void build(std::size_t rays);
-  std::size_t cell(const exact::LatticePoint& p) const;
-  void cross(std::uint32_t triangle, const Nearby& place, const exact::Normal& normal,
-             std::vector<std::int32_t>& windings) const;
-
-  const ArrangementInput& input_;
-  // Cells over y and z; none when there are few rays.
-  std::size_t across_ = 1, size_[2] = {1, 1};
-  exact::LatticePoint low_{0};
-  std::vector<std::uint32_t> first_, triangles_;
-};
+/// Sorts by solids and adds up what is of the same solid.
+void merge_counts(std::vector<SolidCount>& counts);
 
 }  // namespace strata::csg

@@ -5,6 +5,7 @@
 #include "core/share_of.h"
 #include "csg/arrangement/find_faces.h"
 #include "csg/boundary/open_edges.h"
+#include "csg/lattice/live_zone.h"
 
 namespace strata::csg {
 namespace {
@@ -29,7 +30,8 @@ std::vector<std::uint32_t> labels_of(const Tree& tree, BoundaryParts parts) {
 Result<BoundaryFaces> arrange_solids(LatticeSolids solids, const Tree& tree, Tree::NodeId root,
                                      const std::vector<InsideRule>& rules,
                                      const BoundaryOptions& options, const Execution& execution,
-                                     BoundaryReport& report) {
+                                     BoundaryReport& report, std::uint64_t most_rows) {
+  const LiveZone zone = LiveZone::find(solids, tree, root, rules, most_rows, execution);
   auto welded = weld_solids(std::move(solids), execution);
   if (!welded) return tl::unexpected(welded.error());
   if (welded->triangles.empty()) return BoundaryFaces{};
@@ -42,12 +44,12 @@ Result<BoundaryFaces> arrange_solids(LatticeSolids solids, const Tree& tree, Tre
   const auto report_done = [&](double done) {
     if (execution.progress) execution.progress(done);
   };
-  const auto pairs = find_candidate_pairs(*welded, edges, tree.solids().size(),
+  const auto pairs = find_candidate_pairs(*welded, edges, tree.solids().size(), zone,
                                           detail::share_of(execution, 0.1, 0.4));
   if (!pairs) return tl::unexpected(pairs.error());
   PointTable table(BoundaryPoints(std::move(welded->vertices), std::move(welded->triangles)));
   const BoundaryPoints& points = table.points();
-  const ArrangementInput input{points.vertices(), points.triangles(), *welded, edges};
+  const ArrangementInput input{points.vertices(), points.triangles(), *welded, edges, zone};
   CutLines lines;
   if (auto met = meet_pairs(input, *pairs, table, lines, execution); !met) {
     return tl::unexpected(met.error());
@@ -65,8 +67,8 @@ Result<BoundaryFaces> arrange_solids(LatticeSolids solids, const Tree& tree, Tre
   if (!lists) return tl::unexpected(lists.error());
   const FaceRules face_rules{options.faces == BoundaryFaceKind::kCanonical,
                              labels_of(tree, options.parts)};
-  const auto values = find_cell_values(input, *pieces, *lists, compile(tree, root), rules,
-                                       !face_rules.label_of_solid.empty(), execution);
+  const auto values = find_cell_values(input, points, lines, *pieces, *lists, compile(tree, root),
+                                       rules, !face_rules.label_of_solid.empty(), execution);
   if (!values) return tl::unexpected(values.error());
   report_done(0.95);
   report.pairs = pairs->size();
@@ -106,7 +108,9 @@ Result<ExactBoundary> find_exact_boundary(const Tree& tree, Tree::NodeId root,
   std::vector<InsideRule> rules;
   for (const Geometry::Part& part : geometry->parts()) rules.push_back(part.rule);
   geometry.reset();  // the solids are on the lattice
-  auto faces = arrange_solids(std::move(*solids), tree, root, rules, options, execution, report);
+  const std::uint64_t rows = LiveZone::usual_rows(*solids);
+  auto faces =
+      arrange_solids(std::move(*solids), tree, root, rules, options, execution, report, rows);
   if (!faces) return tl::unexpected(faces.error());
   result.faces = std::move(*faces);
   return result;

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "csg/arrangement/boundary_faces.h"
-#include "csg/arrangement/lattice_solids.h"
+#include "csg/lattice/lattice_solids.h"
 #include "strata/csg/boundary/boundary_mesh.h"
 
 namespace strata::csg {
@@ -20,9 +20,10 @@ Result<ExactBoundary> find_exact_boundary(const Tree& tree, Tree::NodeId root,
                                           const Execution& execution);
 
 /// The same for solids that are on a lattice already.
+/// @param most_rows  as LiveZone::find(): 0 arranges all space
 Result<BoundaryFaces> arrange_solids(LatticeSolids solids, const Tree& tree, Tree::NodeId root,
                                      const std::vector<InsideRule>& rules,
                                      const BoundaryOptions& options, const Execution& execution,
-                                     BoundaryReport& report);
+                                     BoundaryReport& report, std::uint64_t most_rows);
 
 }  // namespace strata::csg

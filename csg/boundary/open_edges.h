@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "csg/arrangement/lattice_solids.h"
+#include "csg/lattice/lattice_solids.h"
 #include "strata/csg/boundary/boundary_mesh.h"
 
 namespace strata::csg {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "csg/arrangement/boundary_faces.h"
-#include "csg/arrangement/lattice_solids.h"
+#include "csg/lattice/lattice_solids.h"
 #include "strata/core/execution.h"
 #include "strata/core/result.h"
 

@@ -55,8 +55,9 @@ bool reaches_plane(const Vec (&t)[3], const Vec (&plane)[3]) {
 
 auto find_pairs(const WeldedSolids& solids, const Execution& execution = {}) {
   const MeshEdges edges = find_mesh_edges(solids.triangles, solids.vertices.size());
-  return find_candidate_pairs(
-      solids, edges, solids.first_count.empty() ? 0 : solids.first_count.size() - 1, execution);
+  return find_candidate_pairs(solids, edges,
+                              solids.first_count.empty() ? 0 : solids.first_count.size() - 1,
+                              LiveZone(), execution);
 }
 
 struct Soup {

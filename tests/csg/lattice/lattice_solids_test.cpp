@@ -1,4 +1,4 @@
-#include "csg/arrangement/lattice_solids.h"
+#include "csg/lattice/lattice_solids.h"
 
 #include <gtest/gtest.h>
 

@@ -4,7 +4,7 @@
 #include <numeric>
 #include <vector>
 
-namespace strata::csg {
+namespace strata::detail {
 
 /// Items sorted by a key, in their own order where keys are equal.
 struct Buckets {
@@ -27,4 +27,4 @@ Buckets bucket(std::size_t items, std::size_t keys, const Key& key) {
   return result;
 }
 
-}  // namespace strata::csg
+}  // namespace strata::detail
