@@ -13,6 +13,7 @@ namespace strata::gl {
 struct WindowOptions {
   std::string title = "Strata";
   int width = 1024, height = 768;  ///< in the window system's units
+  bool scale_to_monitor = false;   ///< the size grows with the monitor's scale
   bool visible = true;
   bool vsync = true;
   bool debug = false;  ///< as ContextOptions::debug; also on with STRATA_GL_DEBUG=1

@@ -12,8 +12,9 @@
 
 #include "apps/commands/csg_options.h"
 #include "apps/session/option_values.h"
-#include "apps/view/camera_control.h"
-#include "apps/view/exporter.h"
+#include "apps/view/scene/camera_control.h"
+#include "apps/view/scene/exporter.h"
+#include "apps/view/scene/part_numbers.h"
 #include "core/did_you_mean.h"
 #include "mesh/formats/text_scanner.h"
 #include "strata/core/grid.h"
@@ -34,6 +35,9 @@ enum class Form {
   kColour,
   kWait,
   kExport,
+  kParameter,
+  kParameters,
+  kScroll,
   kText
 };
 
@@ -87,6 +91,24 @@ constexpr Rule kRules[] = {
      "write the picture without panels and overlays"},
     {"export", Action::kExport, Form::kExport, "FILE [N]",
      "write what is seen: a mesh, voxels (N along the longest side) or a picture"},
+    {"open", Action::kOpen, Form::kWord, "FILE", "open a file in a tab of its own, and wait"},
+    {"tab", Action::kTab, Form::kWord, "WHICH", "show a tab: next, previous or 1, 2, ...; close"},
+    {"undo", Action::kUndo, Form::kNone, "", "undo the last change of camera, section or hiding"},
+    {"redo", Action::kRedo, Form::kNone, "", "redo it"},
+    {"parameter", Action::kParameter, Form::kParameter, "NAME VALUE",
+     "set a parameter of a .scad, and wait"},
+    {"parameters", Action::kParameters, Form::kParameters, "reset|load|save FILE SET",
+     "reset all parameters, or load or save a set of them"},
+    {"numbers", Action::kNumbers, Form::kNone, "", "print size, volume, area and weight as JSON"},
+    {"material", Action::kMaterial, Form::kWord, "NAME", "choose the material of the weight"},
+    {"edit", Action::kEdit, Form::kNone, "", "open the picked solid in the editor"},
+    {"look", Action::kLook, Form::kWord, "dark|light", "set the colours of the panels"},
+    {"console", Action::kConsole, Form::kOnOff, "on|off", "show warnings and what programs print"},
+    {"keys", Action::kKeys, Form::kOnOff, "on|off", "show all keys"},
+    {"dialog", Action::kDialog, Form::kWord, "FOLDER|off", "show the dialog that opens files"},
+    {"messages", Action::kMessages, Form::kNone, "", "print what the console shows"},
+    {"scroll", Action::kScroll, Form::kScroll, "DX DY [shift]",
+     "turn the wheel in the middle of the picture by DX, DY steps"},
     {"print", Action::kPrint, Form::kText, "TEXT", "print to standard output"},
     {"stats", Action::kStats, Form::kNone, "", "print times and list statistics as JSON"},
     {"reset-stats", Action::kResetStats, Form::kNone, "", "forget the largest times"},
@@ -177,6 +199,19 @@ class Line {
         return numbers(1, 1, 1, command);
       case Form::kExport:
         return exported(command);
+      case Form::kParameter:
+        if (auto counted = expect(3, 3); !counted) return counted;
+        command.word = words_[1];
+        command.value = words_[2];
+        return {};
+      case Form::kParameters:
+        return parameters(command);
+      case Form::kScroll:
+        if (words_.size() == 4 && words_.back() == "shift") {
+          command.word = words_.back();
+          words_.pop_back();
+        }
+        return numbers(1, 2, 2, command);
       case Form::kText:
         for (std::size_t i = 1; i < words_.size(); ++i) {
           command.word += (i > 1 ? " " : "") + words_[i];
@@ -228,6 +263,16 @@ class Line {
     if (!plane) return fail(ErrorCode::kUsage, "{}: {}", where_, plane.error().message);
     return {};
   }
+  Result<void> parameters(ScriptCommand& command) const {
+    if (words_.size() < 2) return usage();
+    command.word = words_[1];
+    if (command.word == "reset") return expect(2, 2);
+    if (command.word != "load" && command.word != "save") return usage();
+    if (auto counted = expect(4, 4); !counted) return counted;
+    command.value = words_[2];
+    command.more = words_[3];
+    return {};
+  }
   Result<void> exported(ScriptCommand& command) const {
     if (auto counted = expect(2, 3); !counted) return counted;
     command.word = words_[1];
@@ -262,6 +307,18 @@ class Line {
         return apps::check_picture_name(fmt::format("{}: ", where_), command.word);
       case Action::kHeat:
         return one_of({"off", "thickness", "depth"});
+      case Action::kLook:
+        return one_of({"dark", "light"});
+      case Action::kTab: {
+        const auto number = number_of(command.word);
+        if (!number) return one_of({"next", "previous", "close"});
+        if (!(*number >= 1 && *number <= 10'000 && *number == std::floor(*number))) return usage();
+        command.numbers = {*number};
+        return {};
+      }
+      case Action::kMaterial:
+        if (find_material(command.word) != nullptr) return {};
+        return fail(ErrorCode::kUsage, "{}: unknown material '{}'", where_, command.word);
       case Action::kCamera: {
         const auto camera = apps::parse_camera(command.word);
         if (!camera) return fail(ErrorCode::kUsage, "{}: {}", where_, camera.error().message);

@@ -42,6 +42,21 @@ enum class Action {
   kScreenshot,  ///< word: the file; of the whole window
   kPicture,     ///< word: the file; of the picture alone
   kExport,      ///< word: the file; numbers: voxels along the longest side
+  kOpen,        ///< word: a file that gets a tab of its own
+  kTab,         ///< word: next, previous, close or a number from 1
+  kUndo,
+  kRedo,
+  kParameter,   ///< word: the parameter's name; value
+  kParameters,  ///< word: reset, load or save; value: the file; more: the set
+  kNumbers,     ///< a line of JSON to standard output
+  kMaterial,    ///< word: a material
+  kEdit,        ///< opens the picked solid in the editor
+  kLook,        ///< word: dark or light
+  kConsole,     ///< on
+  kKeys,        ///< on: the overlay of all keys
+  kDialog,      ///< word: a folder, or off
+  kMessages,    ///< to standard output
+  kScroll,      ///< x y, and word "shift"
   kPrint,       ///< word: to standard output
   kStats,       ///< a line of JSON to standard output
   kResetStats,
@@ -52,7 +67,7 @@ struct ScriptCommand {
   int line = 0;
   Action action = Action::kWait;
   std::vector<double> numbers;
-  std::string word, value;
+  std::string word, value, more;
   bool on = false;
 };
 

@@ -148,7 +148,7 @@ Result<void> ScriptRunner::apply(const ScriptCommand& command, Viewer& viewer) {
       viewer.reset_statistics();
       return {};
     default:
-      return fail(ErrorCode::kInternal, "unknown command");
+      return window(command, viewer);
   }
 }
 
@@ -190,13 +190,8 @@ Result<bool> ScriptRunner::run(const ScriptCommand& command, Viewer& viewer, Sta
                               viewer.picked() ? viewer.describe(*viewer.picked()) : "nothing"));
       return true;
     case Action::kReload:
-      if (!begun_) {
-        viewer.reload();
-        return false;
-      }
-      if (!viewer.loaded()) return false;
-      loads_seen_ = viewer.loads();
-      return true;
+      if (!begun_) viewer.reload();
+      return begun_ && done_loading(viewer);
     case Action::kResize:
       if (!begun_) {
         stage.resize({static_cast<int>(n[0]), static_cast<int>(n[1])});
@@ -223,7 +218,8 @@ Result<bool> ScriptRunner::run(const ScriptCommand& command, Viewer& viewer, Sta
       quit_ = true;
       return true;
     default:
-      return done(apply(command, viewer));
+      return is_of_document(command.action) ? document(command, viewer, stage)
+                                            : done(apply(command, viewer));
   }
 }
 
@@ -336,6 +332,8 @@ std::string statistics_json(const Viewer& viewer) {
   json.member("coarse_ms", s.coarse_ms, 2);
   json.member("divisor", s.divisor);
   json.member("whole_ms", s.whole_ms, 2);
+  json.member("smooth_ms", s.smooth_ms, 2);
+  json.member("samples", s.samples);
   json.member("whole_latency_ms", s.whole_latency_ms, 1);
   json.member("reaction_ms", s.reaction_ms, 1);
   json.member("largest_reaction_ms", s.largest_reaction_ms, 1);

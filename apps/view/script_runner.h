@@ -42,7 +42,14 @@ class ScriptRunner {
   /// True when the command is done, false when it wants another turn.
   Result<bool> run(const ScriptCommand& command, Viewer& viewer, Stage& stage);
   static Result<void> apply(const ScriptCommand& command, Viewer& viewer);
+  /// What panels and history show, at once.
+  static Result<void> window(const ScriptCommand& command, Viewer& viewer);
+  /// What opens, sets and tells, but for pictures.
+  [[nodiscard]] static bool is_of_document(Action action);
+  Result<bool> document(const ScriptCommand& command, Viewer& viewer, Stage& stage);
   Result<bool> export_file(const ScriptCommand& command, Viewer& viewer, Stage& stage);
+  /// @return whether what was to be read is; a change of its files from now on is new
+  bool done_loading(const Viewer& viewer);
   bool drag(const ScriptCommand& command, Viewer& viewer);
   bool wait(const ScriptCommand& command, const Viewer& viewer);
   static Result<void> see_through(const ScriptCommand& command, Viewer& viewer);
@@ -59,6 +66,9 @@ class ScriptRunner {
   Clock::time_point since_{};
   std::uint64_t loads_seen_ = 1;  ///< loads that were waited for; the first one always is
 };
+
+/// The numbers of the part as one line of JSON. @pre they have been measured
+[[nodiscard]] std::string numbers_json(const Viewer& viewer);
 
 /// The statistics as one line of JSON.
 [[nodiscard]] std::string statistics_json(const Viewer& viewer);

@@ -16,7 +16,8 @@
 #include "apps/session/file_conflicts.h"
 #include "apps/session/help.h"
 #include "apps/session/option_values.h"
-#include "apps/view/exporter.h"
+#include "apps/view/files/editor.h"
+#include "apps/view/scene/exporter.h"
 #include "apps/view/script.h"
 #include "apps/view/viewer.h"
 
@@ -26,6 +27,7 @@ namespace {
 constexpr const char* kExamples =
     R"(Show a scene, the union of meshes or an expression over them in a window.
 
+  strata view                           an empty window: drop files into it, or press ctrl+o
   strata view plate.csg                 turn, cut, pick, measure
   strata view part.scad --watch         draw again whenever the file is saved
   strata view plate.stl holes.stl --expr 'plate - holes' --ghosts
@@ -35,9 +37,11 @@ constexpr const char* kExamples =
 constexpr std::pair<std::string_view, Heat> kHeats[] = {
     {"off", Heat::kOff}, {"thickness", Heat::kThickness}, {"depth", Heat::kDepth}};
 
+constexpr std::pair<std::string_view, bool> kLooks[] = {{"dark", false}, {"light", true}};
+
 struct Words {
   std::vector<std::string> files;
-  std::string rule = "winding", format = "auto", heat = "off", backend = "auto", threads;
+  std::string rule = "winding", format = "auto", heat = "off", backend = "auto", threads, look;
   bool no_panels = false;
   apps::CsgWords csg;
 };
@@ -92,6 +96,12 @@ void define(CLI::App& app, Words& words, ViewOptions& options) {
          "Light through media inside solids, as FILE (.json) says; the panel Transparency turns it "
          "off and on",
          "FILE", look);
+  option("--look", words.look, "Colours of the panels (default: as they were left, else dark)",
+         apps::choices(kLooks), look);
+  option("--editor", options.editor,
+         "Command that opens a scene at a line from the panel Picked; %f is the file, %l the line "
+         "(default: $VISUAL or $EDITOR, if it has a window)",
+         "COMMAND", look);
   flag("--no-panels", words.no_panels, "Show the picture without panels", look);
   apps::define_scene_options(app, csg.scene);
   const char* drive = "Unattended";
@@ -148,11 +158,28 @@ Result<void> read(Words& words, ViewOptions& options) {
       return fail(ErrorCode::kUsage, "strata view cannot read standard input; give files");
     }
   }
-  if (words.csg.size.empty()) words.csg.size = "1280,800";
-  command.output = "window.png";  // strata csg asks for some output
+  if (!words.look.empty()) {
+    const auto look = apps::parse_choice("--look", words.look, kLooks);
+    if (!look) return tl::unexpected(look.error());
+    options.look = words.look;
+  }
+  if (!options.editor.empty()) {
+    const auto command_words = split_command(options.editor);
+    if (!command_words) return tl::unexpected(command_words.error());
+  }
+  options.default_size = words.csg.size.empty();
+  if (options.default_size) words.csg.size = "1280,800";
+  if (words.csg.samples.empty()) words.csg.samples = "8";
+  const bool empty = words.files.empty();
+  if (empty && !words.csg.expression.empty()) {
+    return fail(ErrorCode::kUsage, "--expr needs input files");
+  }
+  command.output = "window.png";                     // strata csg asks for some output
+  if (empty) command.input.files = {"nothing.csg"};  // and for some input
   if (auto done = apps::read_scene_options(words.csg.scene, command.input); !done) return done;
   if (auto done = apps::read_csg_options(words.csg, command); !done) return done;
   command.output.clear();
+  if (empty) command.input.files.clear();
   if (options.screenshot.empty()) return {};
   return apps::check_picture_name("--screenshot ", options.screenshot);
 }

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "apps/commands/commands.h"
-#include "apps/view/renderer.h"
+#include "apps/view/scene/renderer.h"
 #include "apps/view/script.h"
 
 namespace CLI {
@@ -25,8 +25,11 @@ struct ViewOptions {
   bool ghosts = false;
   bool panels = true;
   Heat heat = Heat::kOff;
-  std::string media;   ///< a file of media; empty: none
-  std::string script;  ///< a file, "-": standard input; empty: none
+  std::string editor;         ///< a command that opens a file at a line; empty: none
+  std::string look;           ///< "dark", "light"; empty: the one that was chosen last
+  bool default_size = false;  ///< the window's size was not given
+  std::string media;          ///< a file of media; empty: none
+  std::string script;         ///< a file, "-": standard input; empty: none
   std::string
       screenshot;  ///< taken when all is drawn and the script is done; then the window closes
 };

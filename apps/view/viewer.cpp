@@ -1,6 +1,7 @@
 #include "apps/view/viewer.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <glm/geometric.hpp>
 #include <utility>
 
@@ -28,17 +29,44 @@ Viewer::Viewer(const ViewOptions& options, std::unique_ptr<Renderer> renderer,
       picture_(options.command.picture),
       heat_(options.heat),
       exporter_(wake),
+      measurer_(wake),
       loader_(wake),
       thread_(std::move(renderer), options.command.common.threads, wake) {
   looks_.ghosts = options.ghosts;
+  light_look =
+      options.look == "light" || (options.look.empty() && remembered_look(folders_) == "light");
+  editor_ = editor_command(options.editor, std::getenv("VISUAL"), std::getenv("EDITOR"));
+  definitions_ = options.command.input.scene.openscad_options;
+  if (options.command.input.files.empty()) return;
+  add_tab(options.command.input);
   reload();
 }
 
 // --- what is under way --------------------------------------------------------------------------
 
-void Viewer::reload() { loader_.start(options_.command, options_.command.common.threads); }
+void Viewer::start_load(const csg::SceneInput& input) {
+  apps::CsgCommand command = options_.command;
+  command.input = input;
+  quiet_cancel_ = false;
+  loader_.start(command, options_.command.common.threads);
+}
 
-void Viewer::cancel_load() { loader_.cancel(); }
+void Viewer::reload() {
+  if (tabs_.empty()) return;
+  load_due_.reset();
+  opening_.reset();
+  csg::SceneInput& input = options_.command.input;
+  input.scene.openscad_options = definitions_;
+  const auto more = definitions_of(values_);
+  auto& words = input.scene.openscad_options;
+  words.insert(words.end(), more.begin(), more.end());
+  start_load(input);
+}
+
+void Viewer::cancel_load() {
+  to_open_.clear();
+  loader_.cancel();
+}
 
 Result<void> Viewer::start_export(const std::string& path, int resolution) {
   if (!model_) return fail(ErrorCode::kUsage, "nothing is loaded");
@@ -47,10 +75,18 @@ Result<void> Viewer::start_export(const std::string& path, int resolution) {
   if (!kind) return tl::unexpected(kind.error());
   std::vector<apps::FileUse> written;
   for (const std::string& file : export_files(path)) written.push_back({"export", file});
-  const auto kept = apps::check_files(apps::inputs_of(options_.command.input), written);
-  if (!kept) return kept;
-  for (const FileIdentity& file : model_->scene.files) {
-    if (auto opened = apps::check_opened(file, written); !opened) return opened;
+  const auto keeps = [&written](const csg::SceneInput& input, const Model* model) -> Result<void> {
+    if (auto kept = apps::check_files(apps::inputs_of(input), written); !kept) return kept;
+    if (model == nullptr) return {};
+    for (const FileIdentity& file : model->scene.files) {
+      if (auto opened = apps::check_opened(file, written); !opened) return opened;
+    }
+    return {};
+  };
+  if (auto kept = keeps(options_.command.input, model_.get()); !kept) return kept;
+  for (std::size_t i = 0; i < tabs_.size(); ++i) {
+    if (i == tab_) continue;
+    if (auto kept = keeps(tabs_[i].input, tabs_[i].model.get()); !kept) return kept;
   }
   if (*kind == ExportKind::kPicture) {
     wants_picture = path;
@@ -68,7 +104,9 @@ void Viewer::change(bool looks, bool input) {
   due_ = true;
   arrange_due_ = arrange_due_ || looks;
   changed_by_input_ = changed_by_input_ || input;
-  if (!changed_at_) changed_at_ = Clock::now();
+  const auto now = Clock::now();
+  if (!changed_at_) changed_at_ = now;
+  last_change_ = now;
 }
 
 void Viewer::set_viewport(const glm::ivec2& size) {
@@ -86,7 +124,10 @@ void Viewer::first_camera() {
   }
   start_camera_ = camera_;
   camera_set_ = true;
-  if (!command.cuts.empty()) looks_.section = csg::facing(command.cuts.front(), camera_);
+  if (!command.cuts.empty() && tab_ == 0) {
+    looks_.section = csg::facing(command.cuts.front(), camera_);
+  }
+  history_.rest(state());
 }
 
 void Viewer::take_model(std::shared_ptr<const Model> model) {
@@ -94,7 +135,11 @@ void Viewer::take_model(std::shared_ptr<const Model> model) {
     looks_ = carry_over(looks_, *model_, *model);
   }
   model_ = std::move(model);
+  tabs_[tab_].model = model_;
   picked_.reset();
+  first_parameters();
+  numbers_.reset();
+  numbers_due_ = true;
   change(true, false);
 }
 
@@ -104,6 +149,9 @@ void Viewer::take_frame(Frame frame) {
   if (frame.divisor > 1) {
     statistics_.coarse_ms = frame.draw_ms;
     statistics_.divisor = frame.divisor;
+  } else if (frame.samples > 1) {
+    statistics_.smooth_ms = frame.draw_ms;
+    statistics_.samples = frame.samples;
   } else {
     statistics_.whole_ms = frame.draw_ms;
     statistics_.report = frame.report;
@@ -116,30 +164,66 @@ void Viewer::take_frame(Frame frame) {
   frame_presented_ = false;
 }
 
-void Viewer::tick() {
-  if (auto loaded = loader_.take()) {
-    ++loads_;
-    if (*loaded) {
-      load_error_.clear();
-      take_model(**std::move(loaded));
-    } else {
-      load_error_code_ = loaded->error().code;
-      load_error_ = load_error_code_ == ErrorCode::kCancelled ? "loading was cancelled"
-                                                              : loaded->error().message;
+/// Another load follows the one that is under way, or nobody waits for it.
+void Viewer::drop_load() {
+  quiet_cancel_ = loader_.busy();
+  loader_.cancel();
+}
+
+void Viewer::take_load(Result<std::shared_ptr<const Model>> loaded) {
+  const bool cancelled = !loaded && loaded.error().code == ErrorCode::kCancelled;
+  if (std::exchange(quiet_cancel_, false) && cancelled) return;
+  ++loads_;
+  if (loaded) {
+    load_error_.clear();
+    if (opening_) add_tab(*std::exchange(opening_, {}));
+    if (tabs_.empty()) return;  // it was closed in the meantime
+    if (!model_ && options_.screenshot.empty()) {
+      for (const std::string& file : options_.command.input.files) remember_file(folders_, file);
     }
-    if (watch_) watch_->refresh(model_ ? model_->scene.files : std::vector<FileIdentity>());
+    take_model(*std::move(loaded));
+  } else {
+    opening_.reset();
+    load_error_code_ = loaded.error().code;
+    load_error_ = load_error_code_ == ErrorCode::kCancelled ? "loading was cancelled"
+                                                            : loaded.error().message;
   }
+  if (watch_) watch_->refresh(model_ ? model_->scene.files : std::vector<FileIdentity>());
+  say_all();
+}
+
+void Viewer::take_pick(Result<Picked> picked) {
+  picking_ = false;
+  if (!picked) {
+    draw_error_ = picked.error().message;
+    return;
+  }
+  picked_ = *picked;
+  if (picked_->hit && std::exchange(centre_on_pick_, false)) {
+    camera_.target = picked_->where;
+    change(false);
+  }
+  const bool own = picked_->hit && model_ && picked_->solid < model_->scene.tree.solids().size();
+  select(own ? std::optional(picked_->solid) : std::nullopt, true);
+}
+
+void Viewer::tick() {
+  if (auto loaded = loader_.take()) take_load(*std::move(loaded));
+  open_next();
+  constexpr std::chrono::milliseconds kStill{250};
+  const auto now = Clock::now();
+  if (load_due_ && now - *load_due_ > kStill) reload();
+  if (now - last_change_ > 2 * kStill && !dragging() && camera_set_) history_.rest(state());
   if (auto done = exporter_.take()) {
     exporting_ = false;
     ++exports_;
     exported_ = *std::move(done);
   }
-  if (options_.watch) {
+  if (options_.watch && !tabs_.empty()) {
     if (!watch_) {
       watch_ = std::make_unique<FileWatch>(options_.command.input.files,
                                            options_.command.input.scene.asset_folder);
     }
-    const auto now = Clock::now();
     if (now - looked_ >= kLookAtFiles) {
       looked_ = now;
       if (watch_->changed()) reload();
@@ -151,21 +235,8 @@ void Viewer::tick() {
     asked_.clear();
     whole_asked_.reset();
   }
-  if (auto picked = thread_.take_pick()) {
-    picking_ = false;
-    if (*picked) {
-      picked_ = **picked;
-      if (picked_->hit && std::exchange(centre_on_pick_, false)) {
-        camera_.target = picked_->where;
-        change(false);
-      }
-      const bool own =
-          picked_->hit && model_ && picked_->solid < model_->scene.tree.solids().size();
-      select(own ? std::optional(picked_->solid) : std::nullopt, true);
-    } else {
-      draw_error_ = picked->error().message;
-    }
-  }
+  if (auto picked = thread_.take_pick()) take_pick(*std::move(picked));
+  tick_numbers();
   if (!due_ || !model_ || viewport_.x < 1 || viewport_.y < 1) return;
   if (!camera_set_) first_camera();
   if (arrange_due_ || !arrangement_) arrangement_ = arrange(*model_, looks_);
@@ -210,8 +281,7 @@ bool Viewer::settled() const {
   if (!model_) return true;  // there is nothing to show
   if (viewport_.x < 1 || viewport_.y < 1) return true;
   return !due_ && frame_presented_ &&
-         (!draw_error_.empty() ||
-          (frame_ && frame_->number == last_asked_ && frame_->divisor == 1));
+         (!draw_error_.empty() || (frame_ && frame_->number == last_asked_ && frame_->last));
 }
 
 void Viewer::reset_statistics() {
@@ -227,6 +297,7 @@ void Viewer::set_camera(const Camera& camera) {
 }
 
 void Viewer::look(std::string_view name) {
+  if (camera_set_) history_.rest(state());
   if (const auto named = find_named_view(name)) {
     look_from(camera_, *named);
   } else if (name == "centre") {
@@ -258,6 +329,7 @@ void Viewer::zoom_by(double steps, std::optional<glm::dvec2> at) {
 
 void Viewer::set_looks(Looks looks) {
   if (looks == looks_) return;
+  if (looks.hidden != looks_.hidden && camera_set_) history_.rest(state());
   looks_ = std::move(looks);
   change(true);
 }
@@ -265,11 +337,13 @@ void Viewer::set_looks(Looks looks) {
 void Viewer::set_hidden(std::uint32_t solid, bool hidden) {
   if (!model_ || solid >= model_->scene.tree.solids().size()) return;
   looks_.hidden.resize(model_->scene.tree.solids().size(), 0);
+  history_.rest(state());
   looks_.hidden[solid] = hidden ? 1 : 0;
   change(true);
 }
 
 void Viewer::set_section(std::optional<csg::SectionPlane> plane) {
+  if (camera_set_) history_.rest(state());
   if (looks_.section) last_section_ = looks_.section;
   if (plane) plane = csg::facing(*plane, camera_);
   looks_.section = plane;
@@ -278,6 +352,7 @@ void Viewer::set_section(std::optional<csg::SectionPlane> plane) {
 
 void Viewer::flip_section() {
   if (!looks_.section) return;
+  history_.rest(state());
   looks_.section->normal = -looks_.section->normal;
   looks_.section->offset = -looks_.section->offset;
   change(true);

@@ -10,12 +10,17 @@
 #include <string>
 #include <string_view>
 
-#include "apps/view/camera_control.h"
-#include "apps/view/document.h"
-#include "apps/view/exporter.h"
-#include "apps/view/file_watch.h"
-#include "apps/view/loader.h"
-#include "apps/view/render_thread.h"
+#include "apps/view/console.h"
+#include "apps/view/files/file_watch.h"
+#include "apps/view/files/parameter_sets.h"
+#include "apps/view/files/user_files.h"
+#include "apps/view/scene/camera_control.h"
+#include "apps/view/scene/document.h"
+#include "apps/view/scene/exporter.h"
+#include "apps/view/scene/loader.h"
+#include "apps/view/scene/part_numbers.h"
+#include "apps/view/scene/render_thread.h"
+#include "apps/view/scene/view_history.h"
 #include "apps/view/view_options.h"
 
 // All of the window that is not pixels: what is shown, what the mouse and keys do, what is under
@@ -30,7 +35,9 @@ struct Statistics {
   std::uint64_t frames = 0;  ///< pictures shown
   double coarse_ms = 0;      ///< of the last coarse picture
   int divisor = 1;           ///< how coarse it was
-  double whole_ms = 0;       ///< of the last whole picture
+  double whole_ms = 0;       ///< of the last whole picture with one sample a pixel
+  double smooth_ms = 0;      ///< of the last one with more
+  int samples = 1;           ///< of that
   double prepare_ms = 0;     ///< of the last time the tree changed
   double reaction_ms = 0;    ///< from the last input to its (coarse) picture on the screen
   double largest_reaction_ms = 0;
@@ -39,6 +46,21 @@ struct Statistics {
   double present_ms = 0;        ///< of drawing panels and handing the window over
   csg::DrawReport report;       ///< of the last whole picture
   std::uint64_t longest_list = 0;
+};
+
+/// One scene of the window, and how it is looked at. Kept here while another one is shown.
+struct Tab {
+  csg::SceneInput input;
+  std::string title;
+  std::shared_ptr<const Model> model;
+  Looks looks;
+  std::optional<csg::SectionPlane> last_section;
+  Camera camera, start_camera;
+  bool camera_set = false;
+  ViewHistory history;
+  ParameterValues values;                ///< that differ from the program's
+  std::vector<std::string> definitions;  ///< openscad's options without those of the values
+  std::unique_ptr<FileWatch> watch;
 };
 
 class Viewer {
@@ -58,7 +80,7 @@ class Viewer {
   /// What was taken by tick() is on the screen now. @param present_ms of drawing the window
   void presented(double present_ms);
   /// Nothing is loading.
-  [[nodiscard]] bool loaded() const { return !loader_.busy() && !load_due_; }
+  [[nodiscard]] bool loaded() const { return !loader_.busy() && !load_due_ && to_open_.empty(); }
   /// Nothing is under way at all, and the screen shows the whole picture.
   [[nodiscard]] bool settled() const;
 
@@ -69,7 +91,8 @@ class Viewer {
   // Input. Pixels of the picture.
   void mouse_button(MouseButton button, bool down, const glm::dvec2& at, bool shift, bool control);
   void mouse_move(const glm::dvec2& at);
-  void wheel(double steps, const glm::dvec2& at);
+  /// A wheel, or two fingers on a touch pad: zooms; with shift or sideways it moves.
+  void scroll(const glm::dvec2& steps, const glm::dvec2& at, bool shift);
   /// A key by its name, `ctrl+shift+v`, `p`, `escape`. False: it means nothing here.
   bool key(std::string_view name);
   [[nodiscard]] bool dragging() const { return drag_ != Drag::kNone; }
@@ -109,6 +132,48 @@ class Viewer {
   void set_media(std::shared_ptr<const transparency::MediaSettings> media);
   void reload();
   void cancel_load();
+  /// Back to where the view was before its last change, and forth again. False: there is none.
+  bool undo();
+  bool redo();
+  [[nodiscard]] const ViewHistory& history() const { return history_; }
+
+  // Files. Each that is opened here has a tab of its own; those of the command line share one.
+  /// Opens files one after the other. A folder becomes the one that the dialog shows.
+  void open_files(const std::vector<std::string>& paths);
+  [[nodiscard]] const std::vector<Tab>& tabs() const { return tabs_; }
+  [[nodiscard]] std::size_t tab() const { return tab_; }
+  void show_tab(std::size_t index);
+  void next_tab(int by);
+  void close_tab(std::size_t index);
+  /// The file that is being read, or what the window is called; empty: nothing is open.
+  [[nodiscard]] std::string loading_name() const;
+  [[nodiscard]] std::string title() const;
+  [[nodiscard]] const UserFolders& folders() const { return folders_; }
+
+  // The parameters of a program (see customizer.h). A change is read in after a short while.
+  [[nodiscard]] const std::vector<Parameter>& parameters() const;
+  [[nodiscard]] const ParameterValues& parameter_values() const { return values_; }
+  void set_parameter(const Parameter& parameter, ParameterValue value);
+  void reset_parameters();
+  Result<void> load_parameters(const std::string& file, const std::string& set);
+  Result<void> save_parameters(const std::string& file, const std::string& set) const;
+
+  // Numbers of the part, measured in the background: without hidden solids, whatever the section.
+  [[nodiscard]] const std::optional<Result<PartNumbers>>& numbers() const { return numbers_; }
+  [[nodiscard]] bool measuring() const { return measurer_.busy() || numbers_due_; }
+  /// Large scenes are measured when asked. True: this one waits for that.
+  [[nodiscard]] bool measuring_waits() const { return numbers_wait_; }
+  void measure_now();
+  [[nodiscard]] const Material& material() const { return *material_; }
+  void set_material(const Material& material) { material_ = &material; }
+
+  /// What the scene and errors said.
+  [[nodiscard]] const std::vector<ConsoleLine>& console() const { return console_; }
+  /// Opens a place in the user's editor. @return kUsage: there is none, or it cannot be started
+  Result<void> edit(const TextPlace& place) const;
+  [[nodiscard]] bool can_edit() const { return !editor_.empty(); }
+  /// The file and line of the picked solid.
+  [[nodiscard]] std::optional<TextPlace> picked_place() const;
   /// Begins to write what is seen to a file: a mesh or voxels; of a picture wants_picture becomes
   /// the name. @return kUsage: nothing is loaded, an export is under way, an unknown format, or the
   /// file is one that was read
@@ -119,7 +184,9 @@ class Viewer {
   void select(std::optional<std::uint32_t> solid, bool keep_pick = false);
 
   // What panels show.
-  bool show_axes = true, show_panels = true;
+  bool show_axes = true, show_panels = true, show_console = false, show_keys = false;
+  bool light_look = false;
+  std::optional<std::string> dialog;  ///< the folder that the file dialog shows; none: it is closed
   bool wants_quit = false, wants_screenshot = false;  ///< by keys
   std::string wants_picture;                          ///< a file; empty: none
   [[nodiscard]] const Model* model() const { return model_.get(); }
@@ -135,6 +202,11 @@ class Viewer {
   /// What the last one says. @pre there was one
   [[nodiscard]] const Result<std::string>& exported() const { return exported_; }
   [[nodiscard]] const std::string& load_error() const { return load_error_; }
+  /// Takes the errors off the picture.
+  void forget_errors() {
+    load_error_.clear();
+    draw_error_.clear();
+  }
   [[nodiscard]] ErrorCode load_error_code() const { return load_error_code_; }
   [[nodiscard]] const std::string& draw_error() const { return draw_error_; }
   [[nodiscard]] std::uint64_t loads() const { return loads_; }  ///< that ended, well or not
@@ -155,7 +227,20 @@ class Viewer {
   void change(bool looks, bool input = true);
   void take_model(std::shared_ptr<const Model> model);
   void take_frame(Frame frame);
+  void take_load(Result<std::shared_ptr<const Model>> loaded);
+  void take_pick(Result<Picked> picked);
+  void drop_load();
   void first_camera();
+  void start_load(const csg::SceneInput& input);
+  void open_next();
+  void add_tab(csg::SceneInput input);
+  void store_tab();
+  void restore_tab(std::size_t index);
+  void say_all();
+  void tick_numbers();
+  void first_parameters();
+  [[nodiscard]] ViewState state() const { return {camera_, looks_.section, looks_.hidden}; }
+  void take_state(const ViewState& state);
 
   ViewOptions options_;
   Camera camera_, start_camera_;
@@ -170,7 +255,24 @@ class Viewer {
   std::shared_ptr<const Arrangement> arrangement_;
   glm::ivec2 viewport_{0};
 
-  bool load_due_ = false, due_ = false, arrange_due_ = false;
+  bool due_ = false, arrange_due_ = false;
+  std::optional<Clock::time_point> load_due_;  ///< parameters have changed
+  std::deque<std::string> to_open_;
+  std::optional<csg::SceneInput> opening_;  ///< is being read, and becomes a tab if it can be
+  std::vector<Tab> tabs_;                   ///< the one that is shown is stored when it is left
+  std::size_t tab_ = 0;
+  ViewHistory history_;
+  Clock::time_point last_change_{};
+  ParameterValues values_;
+  std::vector<std::string> definitions_;
+  UserFolders folders_ = user_folders();
+  std::string editor_;
+  std::vector<ConsoleLine> console_;
+  bool quiet_cancel_ = false;  ///< of the load that is under way nothing is told
+  bool numbers_due_ = false, numbers_wait_ = false;
+  std::vector<std::uint8_t> measured_hidden_;
+  std::optional<Result<PartNumbers>> numbers_;
+  const Material* material_ = materials().data();
   std::optional<Clock::time_point> changed_at_;  ///< the first change not yet asked for
   bool changed_by_input_ = false;
   struct Asked {
@@ -205,11 +307,18 @@ class Viewer {
   std::uint64_t exports_ = 0;
   Result<std::string> exported_;
   Exporter exporter_;
+  PartMeasurer measurer_;
   Loader loader_;
   RenderThread thread_;
 };
 
-/// Keys and mouse, a line each, for --help.
+/// A key or a gesture, and what it does.
+struct KeyHelp {
+  std::string_view name, what;
+};
+/// Keys and mouse, for people.
+[[nodiscard]] std::vector<KeyHelp> key_list();
+/// The same, a line each, for --help.
 [[nodiscard]] std::string key_help();
 
 }  // namespace strata::view

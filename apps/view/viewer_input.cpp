@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <glm/geometric.hpp>
 #include <utility>
 
@@ -137,25 +138,41 @@ constexpr Key kKeys[] = {
     {"f5", [](Viewer& v) { v.reload(); }, "load the files again; also F4"},
     {"f4", [](Viewer& v) { v.reload(); }, ""},
     {"tab", [](Viewer& v) { v.show_panels = !v.show_panels; }, "panels on or off"},
+    {"ctrl+z", [](Viewer& v) { v.undo(); }, "undo the last change of camera, section or hiding"},
+    {"ctrl+shift+z", [](Viewer& v) { v.redo(); }, "redo it; also ctrl+y"},
+    {"ctrl+y", [](Viewer& v) { v.redo(); }, ""},
+    {"ctrl+o",
+     [](Viewer& v) {
+       v.dialog = v.dialog ? std::nullopt : std::optional<std::string>(std::string());
+     },
+     "open a file"},
+    {"ctrl+tab", [](Viewer& v) { v.next_tab(1); }, "next tab; also ctrl+page down"},
+    {"ctrl+page down", [](Viewer& v) { v.next_tab(1); }, ""},
+    {"ctrl+shift+tab", [](Viewer& v) { v.next_tab(-1); }, "tab before; also ctrl+page up"},
+    {"ctrl+page up", [](Viewer& v) { v.next_tab(-1); }, ""},
+    {"ctrl+w", [](Viewer& v) { v.close_tab(v.tab()); }, "close the tab"},
+    {"c", [](Viewer& v) { v.show_console = !v.show_console; }, "console on or off"},
+    {"?", [](Viewer& v) { v.show_keys = !v.show_keys; }, "these keys; also F1"},
+    {"f1", [](Viewer& v) { v.show_keys = !v.show_keys; }, ""},
     {"ctrl+s", [](Viewer& v) { v.wants_screenshot = true; },
      "save a screenshot, strata-view-N.png"},
     {"escape",
      [](Viewer& v) {
+       if (v.show_keys) return void(v.show_keys = false);
+       if (v.dialog) return v.dialog.reset();
        if (v.loading()) return v.cancel_load();
        if (v.exporting()) return v.cancel_export();
        v.select({});
      },
-     "stop loading or an export; clear the pick"},
+     "close what is open; stop loading or an export; clear the pick"},
     {"ctrl+q", [](Viewer& v) { v.wants_quit = true; }, "close the window"},
 };
 
-struct Gesture {
-  std::string_view name, what;
-};
-constexpr Gesture kGestures[] = {
+constexpr KeyHelp kGestures[] = {
     {"left drag", "turn; on the section's arrow: move the section"},
     {"right or middle drag", "move; also shift + left drag"},
     {"wheel, ctrl + drag", "zoom at the cursor"},
+    {"shift + wheel", "move; also two fingers sideways"},
     {"click", "pick: show the solid, triangle and position"},
     {"double click", "pick, and turn about that point"},
 };
@@ -177,6 +194,7 @@ void Viewer::mouse_button(MouseButton button, bool down, const glm::dvec2& at, b
     return;
   }
   if (drag_ != Drag::kNone) return;
+  if (camera_set_) history_.rest(state());
   button_ = button;
   mouse_ = pressed_at_ = at;
   moved_ = false;
@@ -221,7 +239,13 @@ void Viewer::mouse_move(const glm::dvec2& at) {
   }
 }
 
-void Viewer::wheel(double steps, const glm::dvec2& at) { zoom_by(steps, at); }
+void Viewer::scroll(const glm::dvec2& steps, const glm::dvec2& at, bool shift) {
+  constexpr double kStepPixels = 30.0;
+  if (shift) return pan_by(steps * kStepPixels);
+  // Fingers that go sideways wander up and down a little.
+  if (std::abs(steps.x) > std::abs(steps.y)) return pan_by({steps.x * kStepPixels, 0});
+  zoom_by(steps.y, at);
+}
 
 bool Viewer::key(std::string_view name) {
   for (const Key& key : kKeys) {
@@ -232,12 +256,17 @@ bool Viewer::key(std::string_view name) {
   return false;
 }
 
+std::vector<KeyHelp> key_list() {
+  std::vector<KeyHelp> list(std::begin(kGestures), std::end(kGestures));
+  for (const Key& key : kKeys) {
+    if (!key.what.empty()) list.push_back({key.name, key.what});
+  }
+  return list;
+}
+
 std::string key_help() {
   std::string text;
-  for (const Gesture& one : kGestures) text += fmt::format("  {:<24}{}\n", one.name, one.what);
-  for (const Key& key : kKeys) {
-    if (!key.what.empty()) text += fmt::format("  {:<24}{}\n", key.name, key.what);
-  }
+  for (const KeyHelp& one : key_list()) text += fmt::format("  {:<24}{}\n", one.name, one.what);
   return text;
 }
 

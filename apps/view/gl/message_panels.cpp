@@ -83,7 +83,7 @@ void Panels::trouble(Viewer& viewer, const Area& area) {
   errors += viewer.draw_error();
   const bool wrong = !errors.empty();
   std::vector<std::string> lines;
-  if (viewer.model() != nullptr && hidden_warnings_ != viewer.loads()) {
+  if (viewer.model() != nullptr && hidden_warnings_ != viewer.loads() && !viewer.show_console) {
     lines = viewer.model()->warnings;
   }
   constexpr std::size_t kMostLines = 4;
@@ -92,24 +92,32 @@ void Panels::trouble(Viewer& viewer, const Area& area) {
     lines.resize(kMostLines - 1);
     lines.push_back(fmt::format("and {} more", counted(more, "warning")));
   }
+  if (!wrong && (!viewer.show_panels || lines.empty())) return;
   const float wrap = std::max(80 * scale_, static_cast<float>(area.size.x) - 48 * scale_);
-  if (wrong || (viewer.show_panels && !lines.empty())) {
-    ImGui::SetNextWindowPos(place(area, 12 * scale_, 12 * scale_));
-    ImGui::PushStyleColor(ImGuiCol_WindowBg, wrong ? ImVec4(0.45f, 0.07f, 0.07f, 0.95f)
-                                                   : ImVec4(0.36f, 0.27f, 0.05f, 0.93f));
-    ImGui::Begin("trouble", nullptr, kBox);
-    ImGui::PushTextWrapPos(wrap);
-    if (wrong) {
-      text(errors);
-      if (viewer.model() != nullptr) faint("The window shows the version before.");
-    } else {
-      for (const std::string& line : lines) text(line);
-      if (ImGui::SmallButton("Hide warnings")) hidden_warnings_ = viewer.loads();
-    }
-    ImGui::PopTextWrapPos();
-    ImGui::End();
-    ImGui::PopStyleColor();
+  ImGui::SetNextWindowPos(place(area, 12 * scale_, 12 * scale_));
+  ImGui::PushStyleColor(ImGuiCol_WindowBg, wrong ? ImVec4(0.45f, 0.07f, 0.07f, 0.95f)
+                                                 : ImVec4(0.36f, 0.27f, 0.05f, 0.93f));
+  // The same in both looks: light on dark.
+  ImGui::PushStyleColor(ImGuiCol_Text, ImVec4(0.97f, 0.97f, 0.97f, 1));
+  ImGui::PushStyleColor(ImGuiCol_TextDisabled, ImVec4(0.85f, 0.82f, 0.8f, 1));
+  ImGui::PushStyleColor(ImGuiCol_Button, ImVec4(1, 1, 1, 0.15f));
+  ImGui::Begin("trouble", nullptr, kBox);
+  ImGui::PushTextWrapPos(wrap);
+  if (wrong) {
+    text(errors);
+    if (viewer.model() != nullptr) faint("The window shows what was there before.");
+    if (ImGui::SmallButton("Copy")) ImGui::SetClipboardText(errors.c_str());
+    ImGui::SameLine();
+    if (ImGui::SmallButton("Hide")) viewer.forget_errors();
+  } else {
+    for (const std::string& line : lines) text(line);
+    if (ImGui::SmallButton("Hide warnings")) hidden_warnings_ = viewer.loads();
+    ImGui::SameLine();
+    if (ImGui::SmallButton("Console")) viewer.show_console = true;
   }
+  ImGui::PopTextWrapPos();
+  ImGui::End();
+  ImGui::PopStyleColor(4);
 }
 
 /// A box with the progress of loading.
@@ -117,8 +125,7 @@ void Panels::loading(Viewer& viewer, const Area& area) {
   const ImVec2 middle = place(area, area.size.x / 2.0, area.size.y / 2.0);
   ImGui::SetNextWindowPos(middle, 0, {0.5f, 0.5f});
   ImGui::Begin("loading", nullptr, kBox);
-  text(fmt::format("Reading {} ... {:.0f} s", viewer.options().command.input.files.front(),
-                   viewer.load_seconds()));
+  text(fmt::format("Reading {} ... {:.0f} s", viewer.loading_name(), viewer.load_seconds()));
   const double progress = viewer.load_progress();
   if (progress > 0) {
     ImGui::ProgressBar(static_cast<float>(progress), {260 * scale_, 0});

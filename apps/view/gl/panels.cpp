@@ -16,14 +16,26 @@ constexpr float kSideWidth = 300;
 
 Panels::Panels(float scale, std::string gl_renderer)
     : scale_(scale), gl_renderer_(std::move(gl_renderer)) {
-  apply_theme(scale);
+  load_font(scale);
+  apply_theme(scale, light_);
 }
 
-Area Panels::picture_area(const glm::ivec2& window, bool with_panels) const {
-  if (!with_panels) return {{0, 0}, window};
+Area Panels::picture_area(const glm::ivec2& window, const Viewer& viewer) const {
+  if (!viewer.show_panels) return {{0, 0}, window};
   const auto side = static_cast<int>(side_width(window));
   const auto status = static_cast<int>(kStatusHeight * scale_);
-  return {{0, 0}, glm::max(window - glm::ivec2(side, status), glm::ivec2(1))};
+  const int above = tabs_height(viewer), below = console_height(viewer) + status;
+  return {{0, above}, glm::max(window - glm::ivec2(side, above + below), glm::ivec2(1))};
+}
+
+int Panels::tabs_height(const Viewer& viewer) const {
+  constexpr float kHeight = 30;
+  return viewer.show_panels && viewer.tabs().size() > 1 ? static_cast<int>(kHeight * scale_) : 0;
+}
+
+int Panels::console_height(const Viewer& viewer) const {
+  constexpr float kHeight = 150;
+  return viewer.show_panels && viewer.show_console ? static_cast<int>(kHeight * scale_) : 0;
 }
 
 float Panels::side_width(const glm::ivec2& window) const {
@@ -36,6 +48,10 @@ void Panels::tell(std::string words) {
 }
 
 void Panels::draw(Viewer& viewer, const glm::ivec2& window, const Area& area) {
+  if (light_ != viewer.light_look) {
+    light_ = viewer.light_look;
+    apply_theme(scale_, light_);
+  }
   if (viewer.frame() != nullptr) {
     if (viewer.show_axes) axes(viewer, area);
     handle(viewer, area);
@@ -45,8 +61,13 @@ void Panels::draw(Viewer& viewer, const glm::ivec2& window, const Area& area) {
   if (viewer.show_panels) {
     side(viewer, window);
     status(viewer, window);
+    tab_bar(viewer, area);
+    console(viewer, area);
   }
+  start(viewer, area);
   messages(viewer, area);
+  dialog_.draw(viewer, scale_);
+  keys(viewer, window);
 }
 
 // --- the side panel -----------------------------------------------------------------------------
@@ -59,18 +80,20 @@ void Panels::side(Viewer& viewer, const glm::ivec2& window) {
                ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize |
                    ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoMove |
                    ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoBringToFrontOnFocus);
-  if (ImGui::CollapsingHeader("Camera", ImGuiTreeNodeFlags_DefaultOpen)) camera(viewer);
-  if (ImGui::CollapsingHeader("Appearance", ImGuiTreeNodeFlags_DefaultOpen)) look(viewer);
-  if (ImGui::CollapsingHeader("Transparency", ImGuiTreeNodeFlags_DefaultOpen)) transparency(viewer);
-  if (ImGui::CollapsingHeader("Section", ImGuiTreeNodeFlags_DefaultOpen)) section(viewer);
-  if (ImGui::CollapsingHeader("Picked", ImGuiTreeNodeFlags_DefaultOpen)) picked(viewer);
+  files(viewer);
+  const auto open = ImGuiTreeNodeFlags_DefaultOpen;
+  if (!viewer.parameters().empty() && ImGui::CollapsingHeader("Parameters", open)) {
+    parameters(viewer);
+  }
+  if (ImGui::CollapsingHeader("Part", open)) numbers(viewer);
+  if (ImGui::CollapsingHeader("Camera", open)) camera(viewer);
+  if (ImGui::CollapsingHeader("Appearance", open)) look(viewer);
+  if (ImGui::CollapsingHeader("Section", open)) section(viewer);
+  if (ImGui::CollapsingHeader("Picked", open)) picked(viewer);
   if (ImGui::CollapsingHeader("Export")) exports(viewer);
-  // In a low window the solids need the room.
-  constexpr int kHighEnough = 740;
-  ImGui::SetNextItemOpen(static_cast<float>(window.y) >= kHighEnough * scale_,
-                         ImGuiCond_FirstUseEver);
-  if (ImGui::CollapsingHeader("Statistics")) statistics(viewer);
-  if (ImGui::CollapsingHeader("Solids", ImGuiTreeNodeFlags_DefaultOpen)) solids(viewer);
+  if (ImGui::CollapsingHeader("Transparency")) transparency(viewer);
+  if (ImGui::CollapsingHeader("Times and lists")) statistics(viewer);
+  if (ImGui::CollapsingHeader("Solids", open)) solids(viewer);
   ImGui::End();
 }
 

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "apps/view/gl/canvas.h"
+#include "apps/view/gl/file_dialog.h"
 #include "apps/view/viewer.h"
 
 namespace strata::view {
@@ -15,7 +16,7 @@ class Panels {
   Panels(float scale, std::string gl_renderer);
 
   /// Where the picture goes in a window of that size.
-  [[nodiscard]] Area picture_area(const glm::ivec2& window, bool with_panels) const;
+  [[nodiscard]] Area picture_area(const glm::ivec2& window, const Viewer& viewer) const;
 
   /// @pre ImGui::NewFrame() was called
   void draw(Viewer& viewer, const glm::ivec2& window, const Area& area);
@@ -28,6 +29,19 @@ class Panels {
 
   [[nodiscard]] float side_width(const glm::ivec2& window) const;
   void side(Viewer& viewer, const glm::ivec2& window);
+  /// Pixels; 0: there are no tabs, or no console.
+  [[nodiscard]] int tabs_height(const Viewer& viewer) const;
+  [[nodiscard]] int console_height(const Viewer& viewer) const;
+  static void recent(Viewer& viewer);
+  static void files(Viewer& viewer);
+  void tab_bar(Viewer& viewer, const Area& area);
+  void start(Viewer& viewer, const Area& area);
+  static void numbers(Viewer& viewer);
+  void parameters(Viewer& viewer);
+  void parameter_files(Viewer& viewer);
+  void console(Viewer& viewer, const Area& area);
+  void keys(Viewer& viewer, const glm::ivec2& window) const;
+  void open_editor(const Viewer& viewer, const TextPlace& place);
   void camera(Viewer& viewer);
   static void transparency(Viewer& viewer);
   void section(Viewer& viewer);
@@ -47,6 +61,10 @@ class Panels {
   void legend(const Viewer& viewer, const Area& area);
 
   float scale_;
+  bool light_ = false;
+  FileDialog dialog_;
+  std::size_t drawn_tab_ = 0;
+  std::array<char, 128> set_name_{};
   std::string gl_renderer_;
   std::array<char, 128> filter_{};
   std::array<char, 512> export_name_{"part.3mf"};

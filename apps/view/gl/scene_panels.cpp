@@ -26,6 +26,9 @@ void Panels::picked(Viewer& viewer) {
   ImGui::PopTextWrapPos();
   text(fmt::format("triangle {}{}", picked->triangle, picked->cut ? ", a cut face" : ""));
   text(fmt::format("at {:.5g}, {:.5g}, {:.5g}", picked->where.x, picked->where.y, picked->where.z));
+  const auto place = viewer.can_edit() ? viewer.picked_place() : std::nullopt;
+  if (place && ImGui::Button("Open in the editor", {-1, 0})) open_editor(viewer, *place);
+  if (place) hint(fmt::format("{}:{}", place->file, place->line).c_str());
 }
 
 void Panels::solids(Viewer& viewer) {

@@ -2,7 +2,10 @@
 
 namespace strata::view {
 
-/// Colours, spaces and a font for panels. @pre ImGui has a context, and no font yet
-void apply_theme(float scale);
+/// A font for panels. @pre ImGui has a context, and no font yet
+void load_font(float scale);
+
+/// Colours and spaces for panels. @pre ImGui has a context
+void apply_theme(float scale, bool light);
 
 }  // namespace strata::view

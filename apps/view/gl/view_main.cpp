@@ -18,9 +18,11 @@
 #include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "apps/session/session.h"
 #include "apps/view/gl/canvas.h"
+#include "apps/view/gl/key_names.h"
 #include "apps/view/gl/panels.h"
 #include "apps/view/script_runner.h"
 #include "apps/view/view_options.h"
@@ -33,39 +35,17 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// GLFW's name of a key as Viewer::key() has it; empty for those that mean nothing.
-std::string key_name(int key, int modifiers) {
-  std::string name;
-  if ((modifiers & GLFW_MOD_CONTROL) != 0) name += "ctrl+";
-  if ((modifiers & GLFW_MOD_ALT) != 0) name += "alt+";
-  if ((modifiers & GLFW_MOD_SHIFT) != 0) name += "shift+";
-  if (key >= GLFW_KEY_A && key <= GLFW_KEY_Z)
-    return name + static_cast<char>('a' + key - GLFW_KEY_A);
-  if (key >= GLFW_KEY_0 && key <= GLFW_KEY_9)
-    return name + static_cast<char>('0' + key - GLFW_KEY_0);
-  if (key >= GLFW_KEY_KP_0 && key <= GLFW_KEY_KP_9) {
-    return name + static_cast<char>('0' + key - GLFW_KEY_KP_0);
-  }
-  if (key >= GLFW_KEY_F1 && key <= GLFW_KEY_F12)
-    return fmt::format("{}f{}", name, key - GLFW_KEY_F1 + 1);
-  constexpr std::pair<int, const char*> kOthers[] = {
-      {GLFW_KEY_LEFT, "left"},     {GLFW_KEY_RIGHT, "right"},    {GLFW_KEY_UP, "up"},
-      {GLFW_KEY_DOWN, "down"},     {GLFW_KEY_HOME, "home"},      {GLFW_KEY_TAB, "tab"},
-      {GLFW_KEY_ESCAPE, "escape"}, {GLFW_KEY_LEFT_BRACKET, "["}, {GLFW_KEY_RIGHT_BRACKET, "]"},
-      {GLFW_KEY_EQUAL, "="},       {GLFW_KEY_MINUS, "-"},        {GLFW_KEY_KP_ADD, "+"},
-      {GLFW_KEY_KP_SUBTRACT, "-"}};
-  for (const auto& [code, word] : kOthers) {
-    if (code == key) return name + word;
-  }
-  return {};
-}
-
 /// Says it on standard error; what was said last is not said again.
 void complain(const Error& error) {
   static std::string last;
   if (error.message == last) return;
   last = error.message;
   std::fprintf(stderr, "strata view: error: %s\n", error.message.c_str());
+}
+
+/// What a window is called that shows something of that name.
+std::string title_of(const std::string& name) {
+  return name.empty() ? "Strata" : name + " - Strata";
 }
 
 /// The window, what is in it, and its loop.
@@ -142,17 +122,28 @@ class Program final : public Stage {
       if (!program.viewer_->dragging()) return program.touch();
       program.viewer_->mouse_move(program.mouse());
     });
-    glfwSetScrollCallback(glfw, [](GLFWwindow* w, double, double y) {
+    glfwSetScrollCallback(glfw, [](GLFWwindow* w, double x, double y) {
       Program& program = self(w);
       program.touch();
-      if (!ImGui::GetIO().WantCaptureMouse) program.viewer_->wheel(y, program.mouse());
+      if (ImGui::GetIO().WantCaptureMouse) return;
+      const bool shift = glfwGetKey(w, GLFW_KEY_LEFT_SHIFT) == GLFW_PRESS ||
+                         glfwGetKey(w, GLFW_KEY_RIGHT_SHIFT) == GLFW_PRESS;
+      program.viewer_->scroll({x, y}, program.mouse(), shift);
+    });
+    glfwSetDropCallback(glfw, [](GLFWwindow* w, int count, const char** paths) {
+      self(w).touch();
+      self(w).viewer_->open_files(std::vector<std::string>(paths, paths + count));
     });
     glfwSetKeyCallback(glfw, [](GLFWwindow* w, int key, int, int action, int modifiers) {
       self(w).touch();
       if (action == GLFW_RELEASE || ImGui::GetIO().WantTextInput) return;
       self(w).viewer_->key(key_name(key, modifiers));
     });
-    glfwSetCharCallback(glfw, [](GLFWwindow* w, unsigned) { self(w).touch(); });
+    glfwSetCharCallback(glfw, [](GLFWwindow* w, unsigned letter) {
+      self(w).touch();
+      // Where it lies on the keyboard depends on the country.
+      if (letter == '?' && !ImGui::GetIO().WantTextInput) self(w).viewer_->key("?");
+    });
     glfwSetCursorEnterCallback(glfw, [](GLFWwindow* w, int) { self(w).touch(); });
     glfwSetWindowRefreshCallback(glfw, [](GLFWwindow* w) { self(w).touch(); });
     glfwSetFramebufferSizeCallback(glfw, [](GLFWwindow* w, int, int) { self(w).touch(); });
@@ -171,6 +162,7 @@ class Program final : public Stage {
       glfwWaitEventsTimeout(hurried ? 0.008 : options_.watch ? 0.1 : 0.5);
       lay_out();
       viewer_->tick();
+      name_window();
       tell_load_error();
       if (draw_due()) {
         const auto begin = Clock::now();
@@ -192,6 +184,14 @@ class Program final : public Stage {
       }
     }
     return {};
+  }
+
+  void name_window() {
+    const std::string title = viewer_->title();
+    if (title == titled_) return;
+    titled_ = title;
+    glfwSetWindowTitle(window_->glfw(), title_of(title).c_str());
+    touch();
   }
 
   /// What the window says of a scene that cannot be read, for who does not look at it.
@@ -245,7 +245,7 @@ class Program final : public Stage {
     const gl::Window::Size size = window_->framebuffer_size();
     window_size_ = {size.width, size.height};
     if (size.width < 1 || size.height < 1) return;  // minimized
-    area_ = panels_->picture_area(window_size_, viewer_->show_panels);
+    area_ = panels_->picture_area(window_size_, *viewer_);
     viewer_->set_viewport(area_.size);
   }
 
@@ -265,7 +265,7 @@ class Program final : public Stage {
           std::lround(static_cast<double>(area_.size.y) * frame->wanted.x / frame->wanted.y));
       shown.at.x += (area_.size.x - shown.size.x) / 2;
     }
-    canvas_->draw(shown, window_size_, scheme->background);
+    canvas_->draw(frame != nullptr ? shown : Area{}, window_size_, scheme->background);
     if (picture_only) return;
     ImGui_ImplOpenGL3_NewFrame();
     ImGui_ImplGlfw_NewFrame();
@@ -324,6 +324,7 @@ class Program final : public Stage {
   std::optional<Viewer> viewer_;  ///< last: its threads wake the window
   glm::ivec2 window_size_{0};
   Area area_;
+  std::string titled_;
   std::uint64_t uploaded_ = 0, loads_told_ = 0, exports_told_ = 0;
   int settled_turns_ = 0, turns_to_draw_ = 3;
   bool was_settled_ = false;
@@ -348,9 +349,8 @@ Result<void> run(ViewOptions options) {
     media = std::make_shared<transparency::MediaSettings>(*std::move(read));
   }
   gl::WindowOptions wish;
-  const auto& files = options.command.input.files;
-  wish.title = std::filesystem::path(files.front()).filename().string() +
-               (files.size() > 1 ? " ... - Strata" : " - Strata");
+  wish.title = title_of("");
+  wish.scale_to_monitor = options.default_size;
   wish.width = options.command.size.x, wish.height = options.command.size.y;
   auto window = gl::Window::open(wish);
   if (!window) {

@@ -2,7 +2,7 @@
 
 #include <glm/geometric.hpp>
 
-#include "apps/view/camera_control.h"
+#include "apps/view/scene/camera_control.h"
 
 namespace strata::view {
 namespace {

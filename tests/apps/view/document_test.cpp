@@ -1,4 +1,4 @@
-#include "apps/view/document.h"
+#include "apps/view/scene/document.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -8,9 +8,9 @@
 #include <fstream>
 #include <thread>
 
-#include "apps/view/file_watch.h"
-#include "apps/view/loader.h"
-#include "apps/view/scene_files.h"
+#include "apps/view/files/file_watch.h"
+#include "apps/view/files/scene_files.h"
+#include "apps/view/scene/loader.h"
 #include "csg/measure/ray_image.h"
 #include "strata/csg/measure/measure.h"
 #include "tests/support/temporary_folder.h"

@@ -1,4 +1,4 @@
-#include "apps/view/render_thread.h"
+#include "apps/view/scene/render_thread.h"
 
 #include <gtest/gtest.h>
 
@@ -44,6 +44,7 @@ class SlowRenderer final : public Renderer {
     Frame frame;
     frame.number = request.number;
     frame.wanted = request.size;
+    frame.samples = request.look.samples;
     frame.picture.width = request.size.x, frame.picture.height = request.size.y;
     return frame;
   }
@@ -80,8 +81,9 @@ class RenderThreadTest : public testing::Test {
   void await_rest() {
     while (!thread_->resting()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
-  static FrameRequest request(int width = 800) {
+  static FrameRequest request(int width = 800, int samples = 1) {
     FrameRequest result;
+    result.look.samples = samples;
     result.what = std::make_shared<Arrangement>();
     result.size = {width, 600};
     return result;
@@ -110,6 +112,56 @@ TEST_F(RenderThreadTest, ACoarsePictureComesBeforeTheWholeOne) {
   EXPECT_EQ(whole->divisor, 1);
   EXPECT_EQ(whole->picture.width, 800);
   EXPECT_FALSE(thread_->take_frame());
+}
+
+TEST_F(RenderThreadTest, APictureWithAllSamplesComesLast) {
+  thread_->submit(request(800, 8));
+  allow(2);
+  await_begun(3);  // coarse, whole, and with all samples
+  const auto whole = thread_->take_frame();
+  ASSERT_TRUE(whole);
+  EXPECT_EQ(whole->divisor, 1);
+  EXPECT_EQ(whole->samples, 1);
+  EXPECT_FALSE(whole->last);
+  EXPECT_FALSE(thread_->resting());
+  allow(1);
+  await_rest();
+  const auto smooth = thread_->take_frame();
+  ASSERT_TRUE(smooth);
+  EXPECT_EQ(smooth->samples, 8);
+  EXPECT_TRUE(smooth->last);
+  EXPECT_EQ(log_.begun.back(), glm::ivec2(800, 600));
+}
+
+TEST_F(RenderThreadTest, NothingWaitsForAllSamples) {
+  thread_->submit(request(800, 8));
+  allow(2);
+  await_begun(3);  // the last one hangs
+  thread_->pick({5, 6});
+  while (!thread_->take_pick()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  EXPECT_EQ(log_.cancelled, 1);
+  await_begun(4);  // it begins again
+  const std::uint64_t number = thread_->submit(request(800, 8));
+  await_begun(5);
+  EXPECT_EQ(log_.cancelled, 2);
+  allow(3);
+  await_rest();
+  const auto smooth = thread_->take_frame();
+  ASSERT_TRUE(smooth);
+  EXPECT_EQ(smooth->number, number);
+  EXPECT_EQ(smooth->samples, 8);
+}
+
+TEST_F(RenderThreadTest, HeatMapsHaveOneSample) {
+  FrameRequest heat = request(800, 8);
+  heat.heat = Heat::kDepth;
+  EXPECT_EQ(samples_at_rest(heat), 1);
+  EXPECT_EQ(samples_at_rest(request(800, 8)), 8);
+  allow(2);
+  thread_->submit(heat);
+  await_rest();
+  EXPECT_EQ(log_.begun.size(), 2u);
+  EXPECT_TRUE(thread_->take_frame()->last);
 }
 
 TEST_F(RenderThreadTest, ANewRequestStopsAWholePictureAtOnce) {

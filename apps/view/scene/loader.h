@@ -9,7 +9,7 @@
 #include <thread>
 #include <vector>
 
-#include "apps/view/document.h"
+#include "apps/view/scene/document.h"
 
 namespace strata::view {
 

@@ -10,7 +10,7 @@
 #include <string>
 #include <thread>
 
-#include "apps/view/renderer.h"
+#include "apps/view/scene/renderer.h"
 
 namespace strata::view {
 
@@ -37,8 +37,11 @@ class CoarsePolicy {
 /// The size of a picture that is `divisor` times as coarse.
 [[nodiscard]] glm::ivec2 coarse_size(const glm::ivec2& size, int divisor);
 
+/// Samples a pixel of the picture at rest; while the picture moves there is one.
+[[nodiscard]] int samples_at_rest(const FrameRequest& request);
+
 /// Draws what is asked for last, on a thread of its own: a coarse picture at once, then, when no
-/// other has been asked for in the meantime, the whole one.
+/// other has been asked for in the meantime, the whole one, and then the one with all samples.
 class RenderThread {
  public:
   /// @param wake called from the drawing thread when there is something to take
@@ -67,8 +70,14 @@ class RenderThread {
   [[nodiscard]] CoarsePolicy& policy_of(const FrameRequest& request) {
     return request.heat == Heat::kOff && !request.see_through ? policy_ : heat_policy_;
   }
-  void draw_coarse(const FrameRequest& request, int divisor, bool last,
-                   const std::stop_token& stop);
+  void draw_coarse(const FrameRequest& request, int divisor, const std::stop_token& stop);
+  /// Waits for a while. @return whether nothing new is wanted
+  bool rests(std::unique_lock<std::mutex>& lock, const std::stop_token& stop);
+  /// @param lock held before and after, not while it draws
+  /// @param last  with all samples, and no other picture follows
+  void draw_whole(FrameRequest request, bool last, const std::stop_token& newer,
+                  std::unique_lock<std::mutex>& lock);
+  void draw_smooth(std::unique_lock<std::mutex>& lock);
   [[nodiscard]] Execution execution(const std::stop_token& stop) const;
 
   /// No new request for so long, and the hand rests.
@@ -89,7 +98,8 @@ class RenderThread {
   bool wanted_whole_ = false;
   std::optional<FrameRequest> current_;  ///< given last
   std::optional<glm::ivec2> wanted_pick_;
-  bool working_ = false;
+  std::optional<FrameRequest> smooth_;  ///< to be drawn with all samples when the hand rests
+  bool working_ = false, smoothing_ = false;
   std::stop_source whole_stop_;  ///< of the whole picture that is being drawn
   std::optional<Frame> frame_;
   std::optional<Result<Picked>> picked_;

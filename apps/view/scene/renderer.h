@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/view/document.h"
+#include "apps/view/scene/document.h"
 #include "strata/core/execution.h"
 #include "strata/core/result.h"
 #include "strata/csg/picture/picture.h"
@@ -46,7 +46,7 @@ struct FrameRequest {
   csg::PictureOptions look;
   Heat heat = Heat::kOff;
   std::optional<SeenThrough> see_through;  ///< unless there is a heat map
-  bool moving = false;                     ///< another picture of this request follows
+  bool moving = false;                     ///< a whole picture of this request follows
 };
 
 /// What the colours of a heat map stand for.
@@ -62,6 +62,8 @@ struct Frame {
   Camera camera;
   glm::ivec2 wanted{1};  ///< the size that was asked for
   int divisor = 1;       ///< 1: whole; n: a pixel stands for n x n
+  int samples = 1;       ///< a pixel
+  bool last = true;      ///< no other picture of this request follows
   std::string drawn_by;  ///< the CPU or a GPU, and why not something better
   csg::DrawReport report;
   HeatScale scale;

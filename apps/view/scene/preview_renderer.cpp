@@ -5,8 +5,8 @@
 
 #include "apps/session/session.h"
 #include "apps/strata/library_session.h"
-#include "apps/view/camera_control.h"
-#include "apps/view/renderer.h"
+#include "apps/view/scene/camera_control.h"
+#include "apps/view/scene/renderer.h"
 #include "csg/measure/ray_image.h"
 #include "strata/csg/input/see_through.h"
 #include "strata/transparency/techniques.h"
@@ -34,6 +34,7 @@ class PreviewRenderer final : public Renderer {
     frame.number = request.number;
     frame.camera = request.camera;
     frame.wanted = request.size;
+    frame.samples = request.look.samples;
     const auto begin = Clock::now();
     adopt(request.what);
     if (request.see_through && request.heat == Heat::kOff) {

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <thread>
 
-#include "apps/view/document.h"
+#include "apps/view/scene/document.h"
 #include "strata/core/execution.h"
 #include "strata/core/result.h"
 

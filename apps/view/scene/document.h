@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "apps/commands/commands.h"
+#include "apps/view/files/customizer.h"
 #include "strata/core/execution.h"
 #include "strata/core/result.h"
 #include "strata/csg/picture/picture.h"
@@ -24,6 +25,7 @@ struct Model {
   csg::Scene scene;
   Bounds box;  ///< of what can be seen, as `strata csg` fits it into a picture
   std::vector<std::string> warnings;
+  std::vector<Parameter> parameters;  ///< of a single .scad
   std::uint64_t triangles = 0;
   double load_ms = 0;
 };

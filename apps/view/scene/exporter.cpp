@@ -1,4 +1,4 @@
-#include "apps/view/exporter.h"
+#include "apps/view/scene/exporter.h"
 
 #include <algorithm>
 #include <exception>

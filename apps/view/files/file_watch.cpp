@@ -1,11 +1,11 @@
-#include "apps/view/file_watch.h"
+#include "apps/view/files/file_watch.h"
 
 #include <sys/stat.h>
 
 #include <algorithm>
 #include <utility>
 
-#include "apps/view/scene_files.h"
+#include "apps/view/files/scene_files.h"
 
 namespace strata::view {
 FileWatch::FileWatch(std::vector<std::string> files, std::string asset_folder)

@@ -1,4 +1,4 @@
-#include "apps/view/scene_files.h"
+#include "apps/view/files/scene_files.h"
 
 #include <filesystem>
 #include <fstream>

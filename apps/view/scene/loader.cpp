@@ -1,4 +1,4 @@
-#include "apps/view/loader.h"
+#include "apps/view/scene/loader.h"
 
 #include <algorithm>
 #include <exception>

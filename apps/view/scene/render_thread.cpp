@@ -1,4 +1,4 @@
-#include "apps/view/render_thread.h"
+#include "apps/view/scene/render_thread.h"
 
 #include <algorithm>
 #include <chrono>
@@ -25,6 +25,13 @@ auto guarded(Call&& call) -> decltype(call()) {
 
 glm::ivec2 coarse_size(const glm::ivec2& size, int divisor) {
   return glm::max(glm::ivec2(1), (size + divisor - 1) / divisor);
+}
+
+int samples_at_rest(const FrameRequest& request) {
+  if (request.heat != Heat::kOff) return 1;
+  const auto& how = request.see_through;
+  // Errors are told pixel by pixel, and light through media takes its time with one sample.
+  return how && (how->errors || how->media != nullptr) ? 1 : request.look.samples;
 }
 
 int CoarsePolicy::divisor(bool changed) const {
@@ -80,6 +87,7 @@ void RenderThread::pick(const glm::ivec2& pixel) {
   const std::lock_guard lock(mutex_);
   if (!current_) return;
   wanted_pick_ = pixel;
+  if (smoothing_) whole_stop_.request_stop();
   changed_.notify_all();
 }
 
@@ -97,7 +105,7 @@ std::optional<Error> RenderThread::take_error() {
 }
 bool RenderThread::resting() const {
   const std::lock_guard lock(mutex_);
-  return !working_ && !wanted_ && !wanted_pick_;
+  return !working_ && !wanted_ && !wanted_pick_ && !smooth_;
 }
 
 Execution RenderThread::execution(const std::stop_token& stop) const {
@@ -110,9 +118,20 @@ Execution RenderThread::execution(const std::stop_token& stop) const {
 void RenderThread::run(const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
   while (!stop.stop_requested()) {
-    changed_.wait(lock, stop, [this] { return wanted_ || wanted_pick_; });
+    const auto asked = [this] { return wanted_ || wanted_pick_; };
+    if (smooth_) {
+      changed_.wait_for(lock, stop, std::chrono::milliseconds(kRestMs), asked);
+    } else {
+      changed_.wait(lock, stop, asked);
+    }
     if (stop.stop_requested()) return;
     working_ = true;
+    if (!asked()) {
+      draw_smooth(lock);
+      working_ = false;
+      wake_();
+      continue;
+    }
     if (wanted_pick_ && !wanted_) {
       const glm::ivec2 pixel = *std::exchange(wanted_pick_, {});
       const FrameRequest request = *current_;
@@ -126,6 +145,7 @@ void RenderThread::run(const std::stop_token& stop) {
     }
     const FrameRequest request = *std::exchange(wanted_, {});
     const bool whole = std::exchange(wanted_whole_, false);
+    smooth_.reset();
     whole_stop_ = {};
     const std::stop_token newer = whole_stop_.get_token();
     lock.unlock();
@@ -143,36 +163,60 @@ void RenderThread::run(const std::stop_token& stop) {
     drawn_edges_ = request.look.edges;
     // A coarse picture is finished even when a newer one is wanted, or a moving hand would never
     // see any.
-    draw_coarse(request, divisor, divisor == 1, stop);
+    draw_coarse(request, divisor, stop);
+    const bool smooth = samples_at_rest(request) > 1;
     lock.lock();
-    if (divisor > 1 && !error_) {
-      const auto superseded = [this] { return wanted_.has_value(); };
-      changed_.wait_for(lock, stop, std::chrono::milliseconds(kRestMs), superseded);
-      if (!superseded() && !stop.stop_requested()) {
-        lock.unlock();
-        const auto begin = std::chrono::steady_clock::now();
-        auto frame = guarded([&] { return renderer_->draw(request, execution(newer)); });
-        const std::chrono::duration<double, std::milli> took =
-            std::chrono::steady_clock::now() - begin;
-        if (frame) policy.learn(1, took.count() - frame->prepare_ms, false);
-        lock.lock();
-        if (frame) {
-          frame_ = *std::move(frame);
-        } else if (frame.error().code != ErrorCode::kCancelled) {
-          error_ = std::move(frame.error());
-        }
-      }
-    }
+    if (divisor > 1 && rests(lock, stop)) draw_whole(request, !smooth, newer, lock);
+    if (smooth && !error_ && !wanted_) smooth_ = request;
     working_ = false;
     wake_();
   }
 }
 
-void RenderThread::draw_coarse(const FrameRequest& request, int divisor, bool last,
+bool RenderThread::rests(std::unique_lock<std::mutex>& lock, const std::stop_token& stop) {
+  if (error_) return false;
+  const auto superseded = [this] { return wanted_.has_value(); };
+  changed_.wait_for(lock, stop, std::chrono::milliseconds(kRestMs), superseded);
+  return !superseded() && !stop.stop_requested();
+}
+
+void RenderThread::draw_whole(FrameRequest request, bool last, const std::stop_token& newer,
+                              std::unique_lock<std::mutex>& lock) {
+  lock.unlock();
+  request.look.samples = last ? samples_at_rest(request) : 1;
+  const auto begin = std::chrono::steady_clock::now();
+  auto frame = guarded([&] { return renderer_->draw(request, execution(newer)); });
+  const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - begin;
+  if (frame && request.look.samples == 1) {
+    policy_of(request).learn(1, took.count() - frame->prepare_ms, false);
+  }
+  lock.lock();
+  if (frame) {
+    frame->last = last;
+    frame_ = *std::move(frame);
+    if (!last) wake_();
+  } else if (frame.error().code != ErrorCode::kCancelled) {
+    error_ = std::move(frame.error());
+  }
+}
+
+void RenderThread::draw_smooth(std::unique_lock<std::mutex>& lock) {
+  FrameRequest request = *std::exchange(smooth_, {});
+  whole_stop_ = {};
+  const std::stop_token newer = whole_stop_.get_token();
+  smoothing_ = true;
+  draw_whole(request, true, newer, lock);
+  smoothing_ = false;
+  // A pick has stopped it, and it begins again afterwards.
+  if (newer.stop_requested() && !wanted_) smooth_ = std::move(request);
+}
+
+void RenderThread::draw_coarse(const FrameRequest& request, int divisor,
                                const std::stop_token& stop) {
   FrameRequest coarse = request;
   coarse.size = coarse_size(request.size, divisor);
-  coarse.moving = !last;
+  coarse.moving = divisor > 1;
+  coarse.look.samples = 1;
   const auto begin = std::chrono::steady_clock::now();
   auto frame = guarded([&] { return renderer_->draw(coarse, execution(stop)); });
   const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - begin;
@@ -181,12 +225,13 @@ void RenderThread::draw_coarse(const FrameRequest& request, int divisor, bool la
   if (frame) {
     frame->wanted = request.size;
     frame->divisor = divisor;
+    frame->last = divisor == 1 && samples_at_rest(request) == 1;
     policy.learn(divisor, took.count() - frame->prepare_ms, true);
     frame_ = *std::move(frame);
   } else {
     error_ = std::move(frame.error());
   }
-  if (!last) wake_();
+  wake_();
 }
 
 }  // namespace strata::view

@@ -1,7 +1,9 @@
-#include "apps/view/document.h"
+#include "apps/view/scene/document.h"
 
 #include <algorithm>
 #include <chrono>
+#include <fstream>
+#include <iterator>
 #include <map>
 #include <utility>
 
@@ -90,6 +92,14 @@ class Copier {
   std::vector<Tree::NodeId> made_;
 };
 
+/// The parameters of the input's program, if it is one.
+std::vector<Parameter> parameters_of(const csg::SceneInput& input) {
+  if (input.files.size() != 1 || !has_extension(input.files.front(), ".scad")) return {};
+  std::ifstream in(input.files.front(), std::ios::binary);
+  const std::string program{std::istreambuf_iterator<char>(in), {}};
+  return parse_parameters(program);
+}
+
 }  // namespace
 
 bool operator==(const Looks& a, const Looks& b) {
@@ -118,6 +128,7 @@ Result<std::shared_ptr<const Model>> load_model(const apps::CsgCommand& command,
     model->warnings.push_back(warning.message);
   }
   model->scene = *std::move(scene);
+  model->parameters = parameters_of(command.input);
   model->load_ms = session.milliseconds();
   return model;
 }

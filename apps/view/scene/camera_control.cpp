@@ -1,4 +1,4 @@
-#include "apps/view/camera_control.h"
+#include "apps/view/scene/camera_control.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <glm/vec3.hpp>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <vector>
+
+#include "apps/view/scene/document.h"
+#include "strata/core/result.h"
+
+// What a user wants to know of a part: size, volume, area, weight, and whether it is closed.
+
+namespace strata::view {
+
+/// A material by its usual name.
+struct Material {
+  std::string_view name;
+  double density;  ///< g/cm3
+};
+[[nodiscard]] std::span<const Material> materials();
+/// Null when there is none of that name (case does not matter).
+[[nodiscard]] const Material* find_material(std::string_view name);
+
+/// The numbers of a part, exact on the lattice of csg::exact_measures(). World units are
+/// millimetres where weights are given.
+struct PartNumbers {
+  bool empty = true;
+  glm::dvec3 size{0};
+  double volume = 0, area = 0;   ///< of the result
+  glm::dvec3 centre{0};          ///< of mass
+  std::uint64_t open_holes = 0;  ///< of the solids: closed to measure
+};
+/// In grams.
+[[nodiscard]] double weight_of(const PartNumbers& numbers, const Material& material);
+
+/// Measures the result of an arrangement's tree. @return as csg::exact_measures()
+Result<PartNumbers> measure_part(const Arrangement& what, const Execution& execution);
+
+/// Measures on a thread of low priority, so that the picture keeps the processors.
+class PartMeasurer {
+ public:
+  /// @param wake called from the measuring thread when there is something to take()
+  explicit PartMeasurer(std::function<void()> wake) : wake_(std::move(wake)) {}
+  PartMeasurer(const PartMeasurer&) = delete;
+  PartMeasurer& operator=(const PartMeasurer&) = delete;
+  ~PartMeasurer() { cancel(); }
+
+  /// Begins; what is under way is cancelled and its result forgotten.
+  void start(std::shared_ptr<const Arrangement> what);
+  void cancel();
+  [[nodiscard]] bool busy() const;
+  /// The result of a measurement that has ended; once.
+  std::optional<Result<PartNumbers>> take();
+
+ private:
+  std::function<void()> wake_;
+  mutable std::mutex mutex_;
+  std::uint64_t current_ = 0;
+  bool busy_ = false;
+  std::optional<Result<PartNumbers>> done_;
+  struct Job {
+    std::shared_ptr<std::atomic<bool>> ended;
+    std::jthread thread;
+  };
+  std::vector<Job> jobs_;  ///< the last one is the current one; others are on their way out
+};
+
+}  // namespace strata::view
