@@ -27,6 +27,8 @@ namespace {
 enum class Form {
   kNone,
   kTwoNumbers,
+  kFourNumbers,
+  kRange,
   kZoom,
   kDrag,
   kOnOff,
@@ -68,7 +70,22 @@ constexpr Rule kRules[] = {
     {"edges", Action::kEdges, Form::kOnOff, "on|off", "show dark lines along edges"},
     {"axes", Action::kAxes, Form::kOnOff, "on|off", "show the axes in the corner"},
     {"panels", Action::kPanels, Form::kOnOff, "on|off", "show the panels"},
-    {"heat", Action::kHeat, Form::kWord, "MAP", "set the heat map: off, thickness or depth"},
+    {"heat", Action::kHeat, Form::kWord, "MAP",
+     "set the heat map: off, wall (along the normal), ray (also thickness) or depth"},
+    {"heat-range", Action::kHeatRange, Form::kRange, "LOW HIGH|auto",
+     "set the thicknesses of the first and the last colour"},
+    {"distance", Action::kDistance, Form::kFourNumbers, "X Y X Y",
+     "measure the distance of two picks"},
+    {"angle", Action::kAngle, Form::kFourNumbers, "X Y X Y", "measure the angle of two faces"},
+    {"radius", Action::kRadius, Form::kTwoNumbers, "X Y", "measure a cylinder, sphere or circle"},
+    {"thickness", Action::kThickness, Form::kTwoNumbers, "X Y",
+     "measure a wall along its normal and along the ray"},
+    {"size", Action::kSize, Form::kTwoNumbers, "X Y", "measure size and volume of a solid"},
+    {"clear", Action::kClear, Form::kNone, "", "clear all measurements"},
+    {"box", Action::kBox, Form::kOnOff, "on|off", "show the box around the result"},
+    {"grid", Action::kGrid, Form::kOnOff, "on|off", "show a grid of the plane z = 0"},
+    {"scale-bar", Action::kScaleBar, Form::kOnOff, "on|off", "show a bar of a round length"},
+    {"ticks", Action::kTicks, Form::kOnOff, "on|off", "show the axes with numbers"},
     {"opacity", Action::kOpacity, Form::kWord, "A", "see through everything: 0 to 1, or off"},
     {"media", Action::kMedia, Form::kOnOff, "on|off", "light through the media of --media"},
     {"technique", Action::kTechnique, Form::kWord, "NAME",
@@ -167,6 +184,14 @@ class Line {
         return expect(1, 1);
       case Form::kTwoNumbers:
         return numbers(1, 2, 2, command);
+      case Form::kFourNumbers:
+        return numbers(1, 4, 4, command);
+      case Form::kRange:
+        if (words_.size() == 2 && words_[1] == "auto") return {};
+        if (auto read = numbers(1, 2, 2, command); !read) return read;
+        if (command.numbers[0] >= 0 && command.numbers[0] < command.numbers[1]) return {};
+        return fail(ErrorCode::kUsage, "{}: the range must begin at 0 or more and rise, got {} {}",
+                    where_, words_[1], words_[2]);
       case Form::kZoom:
         if (words_.size() == 3) return usage();
         return numbers(1, 1, 3, command);
@@ -306,7 +331,7 @@ class Line {
       case Action::kPicture:
         return apps::check_picture_name(fmt::format("{}: ", where_), command.word);
       case Action::kHeat:
-        return one_of({"off", "thickness", "depth"});
+        return one_of({"off", "wall", "ray", "thickness", "depth"});
       case Action::kLook:
         return one_of({"dark", "light"});
       case Action::kTab: {

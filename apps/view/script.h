@@ -25,7 +25,18 @@ enum class Action {
   kEdges,
   kAxes,
   kPanels,
-  kHeat,       ///< word: off, thickness or depth
+  kHeat,       ///< word: off, wall, ray (or thickness) or depth
+  kHeatRange,  ///< numbers: low, high; none: from the values
+  kDistance,   ///< x y x y: prints it
+  kAngle,
+  kRadius,  ///< x y
+  kThickness,
+  kSize,
+  kClear,     ///< all measurements
+  kBox,       ///< on: prints its size
+  kGrid,      ///< on: prints its spacing
+  kScaleBar,  ///< on: prints its length
+  kTicks,
   kOpacity,    ///< word: off, or numbers: 0 to 1
   kTechnique,  ///< word: as --technique has it
   kMedia,      ///< on: whether those of --media are shown

@@ -26,7 +26,7 @@ bool looks_at_screen(const ScriptCommand& command) {
     case Action::kStats:
       return true;
     default:
-      return false;
+      return ScriptRunner::measures(command.action);
   }
 }
 
@@ -126,9 +126,16 @@ Result<void> ScriptRunner::apply(const ScriptCommand& command, Viewer& viewer) {
       viewer.show_axes = command.on;
       return {};
     case Action::kHeat:
-      viewer.set_heat(command.word == "off"         ? Heat::kOff
-                      : command.word == "thickness" ? Heat::kThickness
-                                                    : Heat::kDepth);
+      viewer.set_heat(command.word == "off"     ? Heat::kOff
+                      : command.word == "wall"  ? Heat::kWall
+                      : command.word == "depth" ? Heat::kDepth
+                                                : Heat::kThickness);
+      return {};
+    case Action::kHeatRange:
+      viewer.set_heat_range(n.empty() ? std::nullopt : std::optional(glm::dvec2(n[0], n[1])));
+      return {};
+    case Action::kClear:
+      viewer.board().clear();
       return {};
     case Action::kOpacity:
     case Action::kTechnique:
@@ -218,8 +225,10 @@ Result<bool> ScriptRunner::run(const ScriptCommand& command, Viewer& viewer, Sta
       quit_ = true;
       return true;
     default:
-      return is_of_document(command.action) ? document(command, viewer, stage)
-                                            : done(apply(command, viewer));
+      if (is_of_document(command.action)) return document(command, viewer, stage);
+      if (measures(command.action)) return measure(command, viewer, stage);
+      if (is_guide(command.action)) return guide(command, viewer, stage);
+      return done(apply(command, viewer));
   }
 }
 

@@ -36,6 +36,8 @@ class ScriptRunner {
   /// Commands done so far.
   [[nodiscard]] std::size_t position() const { return next_; }
   [[nodiscard]] bool quit() const { return quit_; }
+  /// Whether a command picks, and prints a measurement.
+  [[nodiscard]] static bool measures(Action action);
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -50,6 +52,9 @@ class ScriptRunner {
   Result<bool> export_file(const ScriptCommand& command, Viewer& viewer, Stage& stage);
   /// @return whether what was to be read is; a change of its files from now on is new
   bool done_loading(const Viewer& viewer);
+  [[nodiscard]] static bool is_guide(Action action);
+  Result<bool> measure(const ScriptCommand& command, Viewer& viewer, Stage& stage);
+  Result<bool> guide(const ScriptCommand& command, Viewer& viewer, Stage& stage);
   bool drag(const ScriptCommand& command, Viewer& viewer);
   bool wait(const ScriptCommand& command, const Viewer& viewer);
   static Result<void> see_through(const ScriptCommand& command, Viewer& viewer);
@@ -63,6 +68,7 @@ class ScriptRunner {
   bool acted_ = false;  ///< something may have changed that a tick has not seen
   bool quit_ = false;
   int moves_ = 0;
+  std::uint64_t measured_ = 0;  ///< before the command that measures
   Clock::time_point since_{};
   std::uint64_t loads_seen_ = 1;  ///< loads that were waited for; the first one always is
 };

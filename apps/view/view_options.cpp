@@ -34,8 +34,11 @@ constexpr const char* kExamples =
   strata view part.csg --screenshot part.png --script tour.txt    unattended
 )";
 
-constexpr std::pair<std::string_view, Heat> kHeats[] = {
-    {"off", Heat::kOff}, {"thickness", Heat::kThickness}, {"depth", Heat::kDepth}};
+constexpr std::pair<std::string_view, Heat> kHeats[] = {{"off", Heat::kOff},
+                                                        {"wall", Heat::kWall},
+                                                        {"ray", Heat::kThickness},
+                                                        {"thickness", Heat::kThickness},
+                                                        {"depth", Heat::kDepth}};
 
 constexpr std::pair<std::string_view, bool> kLooks[] = {{"dark", false}, {"light", true}};
 
@@ -90,7 +93,8 @@ void define(CLI::App& app, Words& words, ViewOptions& options) {
   flag("--edges", csg.edges, "Draw dark lines along the edges of faces", look);
   flag("--ghosts", options.ghosts, "Show subtracted solids, transparent", look);
   option("--heat", words.heat,
-         "Colour by thickness or by depth complexity instead of the scene's colours (default: off)",
+         "Colour by the thickness of walls, by that along the ray (ray or thickness) or by depth "
+         "complexity instead of the scene's colours (default: off)",
          apps::choices(kHeats), look);
   option("--media", options.media,
          "Light through media inside solids, as FILE (.json) says; the panel Transparency turns it "

@@ -140,6 +140,7 @@ void Viewer::take_model(std::shared_ptr<const Model> model) {
   first_parameters();
   numbers_.reset();
   numbers_due_ = true;
+  board_.clear();
   change(true, false);
 }
 
@@ -198,6 +199,10 @@ void Viewer::take_pick(Result<Picked> picked) {
     draw_error_ = picked.error().message;
     return;
   }
+  if (picked->probe) {
+    board_.take(*std::move(picked->probe));
+    return;
+  }
   picked_ = *picked;
   if (picked_->hit && std::exchange(centre_on_pick_, false)) {
     camera_.target = picked_->where;
@@ -237,6 +242,7 @@ void Viewer::tick() {
   }
   if (auto picked = thread_.take_pick()) take_pick(*std::move(picked));
   tick_numbers();
+  if (board_.shows() && !guides_asked_) change(false, false);
   if (!due_ || !model_ || viewport_.x < 1 || viewport_.y < 1) return;
   if (!camera_set_) first_camera();
   if (arrange_due_ || !arrangement_) arrangement_ = arrange(*model_, looks_);
@@ -247,6 +253,8 @@ void Viewer::tick() {
   request.size = viewport_;
   request.look = picture_;
   request.heat = heat_;
+  request.heat_range = heat_range_;
+  request.guides = guides_asked_ = board_.shows();
   request.see_through = see_through_;
   last_asked_ = thread_.submit(std::move(request));
   asked_.push_back(
@@ -443,9 +451,11 @@ std::string Viewer::solid_name(std::uint32_t solid) const {
 
 std::string Viewer::describe(const Picked& picked) const {
   if (!picked.hit) return "nothing";
-  return fmt::format("{}, triangle {}{}, at {:.6g} {:.6g} {:.6g}", solid_name(picked.solid),
-                     picked.triangle, picked.cut ? " from within" : "", picked.where.x,
-                     picked.where.y, picked.where.z);
+  std::string text = fmt::format(
+      "{}, triangle {}{}, at {:.6g} {:.6g} {:.6g}", solid_name(picked.solid), picked.triangle,
+      picked.cut ? " from within" : "", picked.where.x, picked.where.y, picked.where.z);
+  if (picked.thickness) text += fmt::format(", thickness {:.6g}", *picked.thickness);
+  return text;
 }
 
 }  // namespace strata::view

@@ -14,6 +14,7 @@
 #include "apps/view/files/file_watch.h"
 #include "apps/view/files/parameter_sets.h"
 #include "apps/view/files/user_files.h"
+#include "apps/view/measure/measurements.h"
 #include "apps/view/scene/camera_control.h"
 #include "apps/view/scene/document.h"
 #include "apps/view/scene/exporter.h"
@@ -180,6 +181,15 @@ class Viewer {
   Result<void> start_export(const std::string& path, int resolution);
   void cancel_export() { exporter_.cancel(); }
   void pick(const glm::ivec2& pixel);
+  /// Measures below a pixel with the board's tool; picking() until that is done.
+  void measure_at(const glm::ivec2& pixel);
+  /// Chooses a tool; the same one again puts it away.
+  void take_up(Tool tool);
+  [[nodiscard]] MeasureBoard& board() { return board_; }
+  [[nodiscard]] const MeasureBoard& board() const { return board_; }
+  /// The range of the colours of thicknesses; none: from the values.
+  [[nodiscard]] const std::optional<glm::dvec2>& heat_range() const { return heat_range_; }
+  void set_heat_range(std::optional<glm::dvec2> range);
   /// Tints a solid, or none; the last pick is forgotten unless it is to be kept.
   void select(std::optional<std::uint32_t> solid, bool keep_pick = false);
 
@@ -247,6 +257,9 @@ class Viewer {
   bool camera_set_ = false;
   csg::PictureOptions picture_;
   Heat heat_ = Heat::kOff;
+  std::optional<glm::dvec2> heat_range_;
+  MeasureBoard board_;
+  bool guides_asked_ = false;  ///< by the last request
   std::optional<SeenThrough> see_through_;
   std::shared_ptr<const transparency::MediaSettings> media_;
   Looks looks_;

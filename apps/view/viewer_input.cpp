@@ -121,8 +121,24 @@ constexpr Key kKeys[] = {
     {"y", [](Viewer& v) { section_across(v, 1); }, ""},
     {"z", [](Viewer& v) { section_across(v, 2); }, ""},
     {"i", [](Viewer& v) { v.flip_section(); }, "flip the section"},
-    {"t", [](Viewer& v) { toggle_heat(v, Heat::kThickness); }, "heat map of the thickness"},
+    {"t", [](Viewer& v) { toggle_heat(v, Heat::kWall); },
+     "heat map of the thickness along the normal"},
+    {"shift+t", [](Viewer& v) { toggle_heat(v, Heat::kThickness); },
+     "heat map of the thickness along the ray"},
     {"d", [](Viewer& v) { toggle_heat(v, Heat::kDepth); }, "heat map of the depth complexity"},
+    {"m", [](Viewer& v) { v.take_up(Tool::kDistance); }, "measure the distance of two picks"},
+    {"a", [](Viewer& v) { v.take_up(Tool::kAngle); }, "measure the angle of two faces"},
+    {"r", [](Viewer& v) { v.take_up(Tool::kRadius); },
+     "measure the radius of a cylinder, sphere or circle"},
+    {"w", [](Viewer& v) { v.take_up(Tool::kThickness); }, "measure the thickness of a wall"},
+    {"v", [](Viewer& v) { v.take_up(Tool::kSize); }, "measure size and volume of a solid"},
+    {"b", [](Viewer& v) { v.board().box = !v.board().box; }, "box around the result on or off"},
+    {"shift+g", [](Viewer& v) { v.board().grid = !v.board().grid; },
+     "grid of the plane z = 0 on or off"},
+    {"shift+b", [](Viewer& v) { v.board().scale_bar = !v.board().scale_bar; },
+     "scale bar on or off"},
+    {"ctrl+3", [](Viewer& v) { v.board().ticks = !v.board().ticks; },
+     "axes with numbers on or off"},
     {"h",
      [](Viewer& v) {
        if (v.looks().selected) v.set_hidden(*v.looks().selected, true);
@@ -162,9 +178,12 @@ constexpr Key kKeys[] = {
        if (v.dialog) return v.dialog.reset();
        if (v.loading()) return v.cancel_load();
        if (v.exporting()) return v.cancel_export();
+       if (v.board().tool() != Tool::kNone) return v.board().take_up(Tool::kNone);
+       v.board().clear();
        v.select({});
      },
-     "close what is open; stop loading or an export; clear the pick"},
+     "close what is open; stop loading or an export; put a tool away; clear picks and "
+     "measurements"},
     {"ctrl+q", [](Viewer& v) { v.wants_quit = true; }, "close the window"},
 };
 
@@ -190,7 +209,8 @@ void Viewer::mouse_button(MouseButton button, bool down, const glm::dvec2& at, b
         now - last_click_ < kDoubleClick && glm::distance(at, last_click_at_) < 2 * kClickPixels;
     last_click_ = now;
     last_click_at_ = at;
-    pick(glm::ivec2(glm::floor(at)));
+    const glm::ivec2 pixel(glm::floor(at));
+    board_.tool() == Tool::kNone ? pick(pixel) : measure_at(pixel);
     return;
   }
   if (drag_ != Drag::kNone) return;

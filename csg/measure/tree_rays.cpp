@@ -267,11 +267,14 @@ SurfacePoint TreeRays::point(const View& view, const glm::dmat4& world_from_imag
 }
 
 Result<std::vector<float>> TreeRays::wall_image(const View& view, const SurfaceImage& image,
-                                                const Execution& execution) const {
+                                                const Execution& execution,
+                                                std::vector<float>* light) const {
   const auto width = static_cast<std::size_t>(image.width);
   const auto height = static_cast<std::size_t>(image.height);
   std::vector<float> found(width * height, 0.0f);
+  if (light != nullptr) light->assign(width * height, 0.0f);
   const glm::dmat4 world_from_image = glm::inverse(view.image_from_world);
+  const glm::dmat3 eye_from_world(view.eye_from_world);
   std::vector<std::unique_ptr<Scratch>> scratch(static_cast<std::size_t>(execution.thread_count()));
   parallel_for(execution, height, [&](std::size_t v, int worker) {
     auto& own = scratch[static_cast<std::size_t>(worker)];
@@ -281,6 +284,7 @@ Result<std::vector<float>> TreeRays::wall_image(const View& view, const SurfaceI
       const SurfacePoint at =
           point(view, world_from_image, image, static_cast<int>(u), static_cast<int>(v));
       found[v * width + u] = static_cast<float>(thickness(at.inner, -at.normal, *own));
+      if (light != nullptr) (*light)[v * width + u] = eye_light(eye_from_world * at.normal);
     }
   });
   if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");

@@ -51,9 +51,11 @@ class TreeRays {
   [[nodiscard]] SurfacePoint point(const View& view, const SurfaceImage& image, int u, int v) const;
 
   /// For each pixel the thickness from the visible surface inwards, against its normal; 0 where
-  /// nothing is visible. @return kCancelled
+  /// nothing is visible. @param light  becomes eye_light() of each pixel's face; null: not wanted
+  /// @return kCancelled
   Result<std::vector<float>> wall_image(const View& view, const SurfaceImage& image,
-                                        const Execution& execution = {}) const;
+                                        const Execution& execution = {},
+                                        std::vector<float>* light = nullptr) const;
 
   /// Lengths up to this one are nothing.
   [[nodiscard]] double slack() const { return slack_; }

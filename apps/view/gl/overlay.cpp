@@ -89,6 +89,10 @@ void Panels::mark(const Viewer& viewer, const Area& area) {
   const ImVec2 at = to_window(area, *pixel);
   list->AddCircle(at, 6 * scale_, IM_COL32(0, 0, 0, 200), 0, 4 * scale_);
   list->AddCircle(at, 6 * scale_, IM_COL32(255, 255, 255, 255), 0, 2 * scale_);
+  if (picked->thickness) {
+    outlined(list, {at.x + 12 * scale_, at.y - ImGui::GetFontSize() / 2},
+             IM_COL32(255, 255, 255, 255), fmt::format("{:.4g}", *picked->thickness));
+  }
 }
 
 void Panels::legend(const Viewer& viewer, const Area& area) {
@@ -97,14 +101,15 @@ void Panels::legend(const Viewer& viewer, const Area& area) {
   constexpr int kSteps = 48;
   const float width = 18 * scale_,
               height = std::min(220 * scale_, static_cast<float>(area.size.y) * 0.5f);
-  const float left = static_cast<float>(area.at.x + area.size.x) - 142 * scale_;
+  const float left = static_cast<float>(area.at.x + area.size.x) - 172 * scale_;
   const float top = static_cast<float>(area.at.y) + 44 * scale_;
   ImDrawList* list = ImGui::GetBackgroundDrawList();
   list->AddRectFilled({left - 8 * scale_, top - 34 * scale_},
-                      {left + 132 * scale_, top + height + 14 * scale_}, IM_COL32(20, 22, 26, 225),
+                      {left + 162 * scale_, top + height + 14 * scale_}, IM_COL32(20, 22, 26, 225),
                       4 * scale_);
   list->AddText({left, top - 26 * scale_}, IM_COL32(255, 255, 255, 255),
-                scale.heat == Heat::kThickness ? "wall thickness"
+                scale.heat == Heat::kThickness ? "thickness along the ray"
+                : scale.heat == Heat::kWall    ? "thickness along the normal"
                 : scale.heat == Heat::kError   ? "difference from exact"
                                                : "crossings");
   for (int i = 0; i < kSteps; ++i) {
@@ -126,9 +131,10 @@ void Panels::legend(const Viewer& viewer, const Area& area) {
     const auto part = static_cast<float>(i) / static_cast<float>(marks);
     const double value = scale.low + (scale.high - scale.low) * (1.0 - double{part});
     const float y = top + height * part;
+    const char* beyond = i == 0 && scale.above ? "> " : i == marks && scale.below ? "< " : "";
     list->AddLine({left + width, y}, {left + width + 4 * scale_, y}, IM_COL32(255, 255, 255, 255));
     list->AddText({left + width + 8 * scale_, y - ImGui::GetFontSize() / 2},
-                  IM_COL32(255, 255, 255, 255), fmt::format("{:.4g}", value).c_str());
+                  IM_COL32(255, 255, 255, 255), fmt::format("{}{:.4g}", beyond, value).c_str());
   }
 }
 

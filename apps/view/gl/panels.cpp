@@ -56,6 +56,7 @@ void Panels::draw(Viewer& viewer, const glm::ivec2& window, const Area& area) {
     if (viewer.show_axes) axes(viewer, area);
     handle(viewer, area);
     mark(viewer, area);
+    guides(viewer, area);
     legend(viewer, area);
   }
   if (viewer.show_panels) {
@@ -90,6 +91,7 @@ void Panels::side(Viewer& viewer, const glm::ivec2& window) {
   if (ImGui::CollapsingHeader("Appearance", open)) look(viewer);
   if (ImGui::CollapsingHeader("Section", open)) section(viewer);
   if (ImGui::CollapsingHeader("Picked", open)) picked(viewer);
+  if (ImGui::CollapsingHeader("Measure", open)) measure(viewer);
   if (ImGui::CollapsingHeader("Export")) exports(viewer);
   if (ImGui::CollapsingHeader("Transparency")) transparency(viewer);
   if (ImGui::CollapsingHeader("Times and lists")) statistics(viewer);

@@ -59,6 +59,9 @@ class Panels {
   void handle(const Viewer& viewer, const Area& area);
   void mark(const Viewer& viewer, const Area& area);
   void legend(const Viewer& viewer, const Area& area);
+  void guides(const Viewer& viewer, const Area& area);
+  static void measure(Viewer& viewer);
+  static void heat_range(Viewer& viewer);
 
   float scale_;
   bool light_ = false;

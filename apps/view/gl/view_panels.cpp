@@ -57,15 +57,19 @@ void Panels::look(Viewer& viewer) {
   ImGui::SameLine();
   if (toggle("Axes", viewer.show_axes, third)) viewer.show_axes = !viewer.show_axes;
   hint("ctrl+2");
+  const float fourth = share(4);
   const auto heat = [&](const char* label, Heat map, const char* keys) {
-    if (toggle(label, viewer.heat() == map, third)) viewer.set_heat(map);
+    if (toggle(label, viewer.heat() == map, fourth)) viewer.set_heat(map);
     hint(keys);
   };
   heat("Shaded", Heat::kOff, "the scene's colours");
   ImGui::SameLine();
-  heat("Thickness", Heat::kThickness, "thickness of the first wall along the ray; t");
+  heat("Wall", Heat::kWall, "thickness along the normal; t");
+  ImGui::SameLine();
+  heat("Ray", Heat::kThickness, "thickness of the first wall along the ray; shift+t");
   ImGui::SameLine();
   heat("Depth", Heat::kDepth, "depth complexity: crossings of all solids; d");
+  heat_range(viewer);
   const csg::ColourScheme* scheme = viewer.picture_options().scheme;
   if (scheme == nullptr) scheme = csg::colour_schemes().data();
   ImGui::SetNextItemWidth(-1);

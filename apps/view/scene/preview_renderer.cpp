@@ -8,6 +8,7 @@
 #include "apps/view/scene/camera_control.h"
 #include "apps/view/scene/renderer.h"
 #include "csg/measure/ray_image.h"
+#include "csg/measure/result_bounds.h"
 #include "strata/csg/input/see_through.h"
 #include "strata/transparency/techniques.h"
 
@@ -19,17 +20,64 @@ double ms_since(Clock::time_point begin) {
   return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
 }
 
-/// Samples of the colour map viridis (S. van der Walt, N. Smith, 2015): as even to the eye as to
-/// the colour-blind eye.
-constexpr glm::vec3 kHeat[] = {{68, 1, 84},    {72, 40, 120},  {62, 74, 137},  {49, 104, 142},
-                               {38, 130, 142}, {31, 158, 137}, {53, 183, 121}, {109, 205, 89},
-                               {180, 222, 44}, {253, 231, 37}};
-
 class PreviewRenderer final : public Renderer {
  public:
   explicit PreviewRenderer(apps::Backend backend) : backend_(backend) {}
 
   Result<Frame> draw(const FrameRequest& request, const Execution& execution) override {
+    auto frame = draw_picture(request, execution);
+    if (!frame || !request.guides) return frame;
+    const auto image = surface_of(request, execution);
+    if (!image) return tl::unexpected(image.error());
+    frame->depth = depth_image(image->first, *image->second);
+    if (!box_) {
+      const auto box =
+          csg::result_bounds(what_->tree, what_->tree.root(), what_->relative_precision, execution);
+      if (!box) return tl::unexpected(box.error());
+      box_ = *box;
+    }
+    frame->box = *box_;
+    return frame;
+  }
+
+  Result<Picked> pick(const FrameRequest& request, const glm::ivec2& pixel,
+                      const Execution& execution) override {
+    Picked picked;
+    picked.pixel = pixel;
+    adopt(request.what);
+    if (!preview_) prepare(execution);
+    const auto whole = preview_->view(request.camera, request.size, execution);
+    if (!whole) return tl::unexpected(whole.error());
+    ProbeWish wish = request.probe.value_or(ProbeWish{});
+    const bool mapped = request.heat == Heat::kThickness || request.heat == Heat::kWall;
+    wish.thickness = wish.thickness || mapped;
+    if (request.probe || mapped) {
+      auto probed = probe(*preview_, rays(execution), *whole, pixel, wish, execution);
+      if (!probed && fell_back(probed.error())) {
+        probed = probe(*preview_, rays(execution), *whole, pixel, wish, execution);
+      }
+      if (!probed) return tl::unexpected(probed.error());
+      if (mapped && probed->hit) {
+        picked.thickness = request.heat == Heat::kWall ? probed->along_normal : probed->along_ray;
+      }
+      if (request.probe) picked.probe = *std::move(probed);
+    }
+    const auto image = surface(part_of(*whole, pixel, {1, 1}), execution);
+    if (!image) return tl::unexpected(image.error());
+    const csg::SurfaceImage& at = **image;
+    const std::uint32_t depth = at.depth.front();
+    if (depth == csg::SurfaceImage::kNone) return picked;
+    picked.hit = true;
+    picked.solid = at.solid.front();
+    picked.triangle = at.triangle.front() & ~csg::SurfaceImage::kExit;
+    picked.cut = (at.triangle.front() & csg::SurfaceImage::kExit) != 0;
+    picked.where = world_of(*whole, glm::dvec2(pixel) + 0.5, depth + 0.5);
+    picked.distance = whole->distance(depth + 0.5);
+    return picked;
+  }
+
+ private:
+  Result<Frame> draw_picture(const FrameRequest& request, const Execution& execution) {
     Frame frame;
     frame.number = request.number;
     frame.camera = request.camera;
@@ -62,63 +110,57 @@ class PreviewRenderer final : public Renderer {
       frame.draw_ms = ms_since(drawn);
       return frame;
     }
-    frame.drawn_by = "CPU";
-    if (!meter_) {
-      meter_.emplace(what_->tree, what_->tree.root(), what_->relative_precision, execution,
-                     what_->model_solids);
-      frame.prepare_ms = ms_since(begin);
-    }
     if (auto done = draw_heat(request, execution, frame); !done)
       return tl::unexpected(done.error());
     return frame;
   }
 
-  Result<Picked> pick(const FrameRequest& request, const glm::ivec2& pixel,
-                      const Execution& execution) override {
-    Picked picked;
-    picked.pixel = pixel;
-    adopt(request.what);
-    if (!preview_) prepare(execution);
-    const auto whole = preview_->view(request.camera, request.size, execution);
-    if (!whole) return tl::unexpected(whole.error());
-    // The picture's lattice, moved by whole pixels: the same bits.
-    View view = *whole;
-    view.size = {1, 1};
-    for (int column = 0; column < 4; ++column) {
-      glm::dvec4& m = view.image_from_world[column];
-      m.x -= pixel.x * m.w;
-      m.y -= pixel.y * m.w;
-    }
-    auto image = preview_->draw(view, execution);
-    if (!image && surfaces_ != nullptr && image.error().code != ErrorCode::kCancelled) {
-      give_up_gpu(image.error());
-      image = preview_->draw(view, execution);
-    }
-    if (!image) return tl::unexpected(image.error());
-    const csg::SurfaceImage& surface = **image;
-    const std::uint32_t depth = surface.depth.front();
-    if (depth == csg::SurfaceImage::kNone) return picked;
-    picked.hit = true;
-    picked.solid = surface.solid.front();
-    picked.triangle = surface.triangle.front() & ~csg::SurfaceImage::kExit;
-    picked.cut = (surface.triangle.front() & csg::SurfaceImage::kExit) != 0;
-    picked.where = world_of(*whole, glm::dvec2(pixel) + 0.5, depth + 0.5);
-    picked.distance = whole->distance(depth + 0.5);
-    return picked;
-  }
-
- private:
   void adopt(const std::shared_ptr<const Arrangement>& what) {
     if (what == what_) return;
     preview_.reset();
     meter_.reset();
     through_.reset();
+    box_.reset();
+    if (rays_) former_rays_ = std::move(rays_);
     what_ = what;
   }
 
   void prepare(const Execution& execution) {
     preview_.emplace(what_->tree, what_->ghosts, what_->relative_precision, execution);
     preview_->set_source(surfaces_);
+  }
+
+  const csg::TreeRays& rays(const Execution& execution) {
+    if (!rays_) {
+      Execution whole = execution;
+      whole.stop = {};  // half of it would be of no use
+      rays_ = std::make_unique<csg::TreeRays>(what_->tree, what_->tree.root(),
+                                              what_->relative_precision, whole, former_rays_.get());
+      former_rays_.reset();
+    }
+    return *rays_;
+  }
+
+  /// Whether a failure of the GPU is one, and the CPU may do it.
+  bool fell_back(const Error& error) {
+    if (surfaces_ == nullptr || error.code == ErrorCode::kCancelled) return false;
+    give_up_gpu(error);
+    return true;
+  }
+  Result<const csg::SurfaceImage*> surface(const View& view, const Execution& execution) {
+    auto image = preview_->draw(view, execution);
+    if (!image && fell_back(image.error())) image = preview_->draw(view, execution);
+    return image;
+  }
+  /// What a request shows, with one sample a pixel.
+  Result<std::pair<View, const csg::SurfaceImage*>> surface_of(const FrameRequest& request,
+                                                               const Execution& execution) {
+    if (!preview_) prepare(execution);
+    const auto view = preview_->view(request.camera, request.size, execution);
+    if (!view) return tl::unexpected(view.error());
+    const auto image = surface(*view, execution);
+    if (!image) return tl::unexpected(image.error());
+    return std::pair(*view, *image);
   }
 
   /// Once, on the thread that draws: a context belongs to a thread.
@@ -245,53 +287,77 @@ class PreviewRenderer final : public Renderer {
     }
   }
 
-  Result<void> draw_heat(const FrameRequest& request, const Execution& execution, Frame& frame) {
-    const auto begin = Clock::now();
+  /// The values of a heat map, and how bright its faces are, if it says that.
+  struct HeatValues {
+    std::vector<float> values, light;
+  };
+  Result<HeatValues> heat_values(const FrameRequest& request, const Execution& execution,
+                                 Frame& frame) {
+    HeatValues result;
+    if (request.heat == Heat::kWall) {
+      const auto image = surface_of(request, execution);
+      if (!image) return tl::unexpected(image.error());
+      auto walls =
+          rays(execution).wall_image(image->first, *image->second, execution, &result.light);
+      if (!walls) return tl::unexpected(walls.error());
+      result.values = *std::move(walls);
+      frame.report = preview_->report();
+      return result;
+    }
+    if (!meter_) {
+      meter_.emplace(what_->tree, what_->tree.root(), what_->relative_precision, execution,
+                     what_->model_solids);
+    }
     std::vector<Bounds> boxes;
     for (const csg::Solid& solid : what_->tree.solids()) boxes.push_back(csg::bounds(solid));
     const csg::Tree::NodeId root = what_->tree.root();
     const Bounds box = csg::picture_box(what_->tree, boxes, std::span(&root, 1));
     const auto view = make_view(request.camera, request.size, box);
     if (!view) return tl::unexpected(view.error());
-    const auto rays = meter_->measure(*view, execution);
-    if (!rays) return tl::unexpected(rays.error());
-    const bool thickness = request.heat == Heat::kThickness;
-    const double diagonal = box.empty() ? 1.0 : glm::length(box.high - box.low);
-    const auto value_at = [&](std::size_t i) {
-      return thickness ? static_cast<double>(rays->thickness[i])
-                       : static_cast<double>(rays->crossings[i]);
-    };
-    double high = 0;
-    for (std::size_t i = 0; i < rays->crossings.size(); ++i) {
-      frame.longest_list = std::max<std::uint64_t>(frame.longest_list, rays->crossings[i]);
-      const double value = value_at(i);
-      if (std::isfinite(value)) high = std::max(high, value);
+    auto met = meter_->measure(*view, execution);
+    if (!met) return tl::unexpected(met.error());
+    for (const std::uint32_t count : met->crossings) {
+      frame.longest_list = std::max<std::uint64_t>(frame.longest_list, count);
     }
-    frame.scale = {request.heat, 0, thickness ? round_up(std::min(high, diagonal)) : high};
-    const csg::ColourScheme& scheme =
-        request.look.scheme != nullptr ? *request.look.scheme : csg::colour_schemes().front();
-    const csg::Rgba background(scheme.background, 255);
-    frame.picture = {rays->width, rays->height, {}};
-    frame.picture.pixels.resize(rays->crossings.size(), background);
-    for (std::size_t i = 0; i < rays->crossings.size(); ++i) {
-      const double value = value_at(i);
-      if (!(value > 0)) continue;
-      ++frame.report.covered;
-      frame.picture.pixels[i] = heat_colour(frame.scale.high > 0 ? value / frame.scale.high : 0);
-    }
-    frame.report.fragments = rays->fragments;
-    frame.draw_ms = ms_since(begin);
-    return {};
+    frame.report.fragments = met->fragments;
+    result.values = std::move(met->thickness);
+    if (request.heat == Heat::kDepth)
+      result.values.assign(met->crossings.begin(), met->crossings.end());
+    return result;
   }
 
-  /// To 1, 1.5, 2, 3, 5 or 7 times a power of ten: scales that do not flicker.
-  static double round_up(double value) {
-    if (!(value > 0)) return 0;
-    const double power = std::pow(10.0, std::floor(std::log10(value)));
-    for (const double step : {1.0, 1.5, 2.0, 3.0, 5.0, 7.0}) {
-      if (value <= step * power * (1 + 1e-9)) return step * power;
+  Result<void> draw_heat(const FrameRequest& request, const Execution& execution, Frame& frame) {
+    const auto begin = Clock::now();
+    frame.drawn_by = "CPU";
+    auto map = heat_values(request, execution, frame);
+    if (!map) return tl::unexpected(map.error());
+    ValueRange range;
+    if (request.heat == Heat::kDepth) {
+      range.high = static_cast<double>(frame.longest_list);
+    } else if (request.heat_range) {
+      range = given_range(request.heat_range->x, request.heat_range->y, map->values);
+    } else {
+      range = percentile_range(map->values);
     }
-    return 10 * power;
+    frame.scale = {request.heat, range.low, range.high, range.below, range.above};
+    const csg::ColourScheme& scheme =
+        request.look.scheme != nullptr ? *request.look.scheme : csg::colour_schemes().front();
+    frame.picture = {request.size.x, request.size.y, {}};
+    frame.picture.pixels.resize(map->values.size(), csg::Rgba(scheme.background, 255));
+    for (std::size_t i = 0; i < map->values.size(); ++i) {
+      const double value = static_cast<double>(map->values[i]);
+      if (!(value > 0)) continue;
+      ++frame.report.covered;
+      csg::Rgba& pixel = frame.picture.pixels[i];
+      pixel = heat_colour(range.high > range.low ? (value - range.low) / (range.high - range.low)
+                                                 : 0.0);
+      // Faces of one value are told apart by their light.
+      if (!map->light.empty()) {
+        pixel = csg::Rgba(glm::u8vec3(glm::vec3(pixel) * (0.7f + 0.3f * map->light[i])), 255);
+      }
+    }
+    frame.draw_ms = ms_since(begin);
+    return {};
   }
 
   apps::Backend backend_;
@@ -303,6 +369,8 @@ class PreviewRenderer final : public Renderer {
   std::shared_ptr<const Arrangement> what_;
   std::optional<csg::Preview> preview_;
   std::optional<csg::RayMeter> meter_;
+  std::unique_ptr<csg::TreeRays> rays_, former_rays_;
+  std::optional<Bounds> box_;  ///< around the result
   std::optional<csg::SeeThrough> through_;
   float through_opacity_ = 0.0f;
   const csg::ColourScheme* through_scheme_ = nullptr;
@@ -312,15 +380,6 @@ class PreviewRenderer final : public Renderer {
 
 std::unique_ptr<Renderer> make_renderer(apps::Backend backend) {
   return std::make_unique<PreviewRenderer>(backend);
-}
-
-csg::Rgba heat_colour(double part) {
-  constexpr int kLast = static_cast<int>(std::size(kHeat)) - 1;
-  const double at = std::clamp(part, 0.0, 1.0) * kLast;
-  const int below = std::min(static_cast<int>(at), kLast - 1);
-  const auto rest = static_cast<float>(at - below);
-  const glm::vec3 colour = kHeat[below] * (1 - rest) + kHeat[below + 1] * rest;
-  return csg::Rgba(glm::u8vec3(colour + 0.5f), 255);
 }
 
 }  // namespace strata::view

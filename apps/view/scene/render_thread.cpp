@@ -83,11 +83,12 @@ std::uint64_t RenderThread::submit(FrameRequest request, bool whole) {
   return last_number_;
 }
 
-void RenderThread::pick(const glm::ivec2& pixel) {
+void RenderThread::pick(const glm::ivec2& pixel, std::optional<ProbeWish> probe) {
   const std::lock_guard lock(mutex_);
   if (!current_) return;
   wanted_pick_ = pixel;
   if (smoothing_) whole_stop_.request_stop();
+  wanted_probe_ = probe;
   changed_.notify_all();
 }
 
@@ -134,7 +135,8 @@ void RenderThread::run(const std::stop_token& stop) {
     }
     if (wanted_pick_ && !wanted_) {
       const glm::ivec2 pixel = *std::exchange(wanted_pick_, {});
-      const FrameRequest request = *current_;
+      FrameRequest request = *current_;
+      request.probe = std::exchange(wanted_probe_, {});
       lock.unlock();
       auto picked = guarded([&] { return renderer_->pick(request, pixel, execution(stop)); });
       lock.lock();
@@ -143,7 +145,8 @@ void RenderThread::run(const std::stop_token& stop) {
       wake_();
       continue;
     }
-    const FrameRequest request = *std::exchange(wanted_, {});
+    const FrameRequest request = *std::move(wanted_);
+    wanted_.reset();
     const bool whole = std::exchange(wanted_whole_, false);
     smooth_.reset();
     whole_stop_ = {};

@@ -53,8 +53,9 @@ class RenderThread {
 
   /// Replaces what was asked for before. Gives its number. With `whole`, no coarse picture.
   std::uint64_t submit(FrameRequest request, bool whole = false);
-  /// Asks for a pick in the request given last. Replaces one that waits.
-  void pick(const glm::ivec2& pixel);
+  /// Asks for a pick in the request given last. Replaces one that waits. @param probe  what is to
+  /// be measured there
+  void pick(const glm::ivec2& pixel, std::optional<ProbeWish> probe = {});
 
   /// The newest picture since the last call.
   std::optional<Frame> take_frame();
@@ -98,7 +99,8 @@ class RenderThread {
   bool wanted_whole_ = false;
   std::optional<FrameRequest> current_;  ///< given last
   std::optional<glm::ivec2> wanted_pick_;
-  std::optional<FrameRequest> smooth_;  ///< to be drawn with all samples when the hand rests
+  std::optional<ProbeWish> wanted_probe_;  ///< of the pick
+  std::optional<FrameRequest> smooth_;     ///< to be drawn with all samples when the hand rests
   bool working_ = false, smoothing_ = false;
   std::stop_source whole_stop_;  ///< of the whole picture that is being drawn
   std::optional<Frame> frame_;

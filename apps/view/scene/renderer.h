@@ -8,6 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "apps/view/measure/guides.h"
+#include "apps/view/measure/probe.h"
+#include "apps/view/measure/value_range.h"
 #include "apps/view/scene/document.h"
 #include "strata/core/execution.h"
 #include "strata/core/result.h"
@@ -21,6 +24,7 @@ namespace strata::view {
 enum class Heat : std::uint8_t {
   kOff,
   kThickness,  ///< of the material behind the visible surface, along the ray
+  kWall,       ///< of the same, along the inward normal of the surface
   kDepth,      ///< depth complexity: how many crossings the ray has with all solids
   kError       ///< how much a picture that is seen through differs from the exact one
 };
@@ -46,13 +50,17 @@ struct FrameRequest {
   csg::PictureOptions look;
   Heat heat = Heat::kOff;
   std::optional<SeenThrough> see_through;  ///< unless there is a heat map
+  std::optional<glm::dvec2> heat_range;    ///< of a thickness; none: from its values
+  bool guides = false;                     ///< the frame's depth and box are wanted
+  std::optional<ProbeWish> probe;          ///< what a pick measures
   bool moving = false;                     ///< a whole picture of this request follows
 };
 
 /// What the colours of a heat map stand for.
 struct HeatScale {
   Heat heat = Heat::kOff;
-  double low = 0, high = 0;  ///< values of the first and the last colour
+  double low = 0, high = 0;           ///< values of the first and the last colour
+  bool below = false, above = false;  ///< there are values outside
 };
 
 /// One picture that was drawn.
@@ -67,6 +75,8 @@ struct Frame {
   std::string drawn_by;  ///< the CPU or a GPU, and why not something better
   csg::DrawReport report;
   HeatScale scale;
+  DepthImage depth;                ///< of the size of the picture; empty unless wanted
+  Bounds box;                      ///< around the result that is shown; empty unless wanted
   std::uint64_t longest_list = 0;  ///< heat maps only
   double prepare_ms = 0;           ///< of the tree, when it changed
   double draw_ms = 0;
@@ -80,6 +90,8 @@ struct Picked {
   bool cut = false;                       ///< a face that a subtracted solid or a section leaves
   glm::dvec3 where{0};                    ///< world space
   double distance = 0;                    ///< from the eye, along the view axis
+  std::optional<double> thickness;        ///< what the heat map has here, if it has one
+  std::optional<Probe> probe;             ///< what was measured, if it was wanted
 };
 
 /// Draws pictures. One thread at a time.
@@ -97,8 +109,5 @@ class Renderer {
 /// are found there, in a context of the drawing thread's own; what the GPU cannot do or fails at is
 /// the CPU's work. Heat maps always are.
 [[nodiscard]] std::unique_ptr<Renderer> make_renderer(apps::Backend backend = apps::Backend::kCpu);
-
-/// The colour of a part of a heat map's range, in [0, 1]: dark blue, green, yellow.
-[[nodiscard]] csg::Rgba heat_colour(double part);
 
 }  // namespace strata::view

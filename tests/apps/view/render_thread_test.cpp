@@ -376,9 +376,25 @@ TEST(CpuRenderer, HeatMapsSayWhatTheirColoursMean) {
   request.heat = Heat::kThickness;
   frame = renderer->draw(request, {});
   ASSERT_TRUE(frame);
-  EXPECT_EQ(frame->scale.high, 10);
   // Below the hole there are 6 of 10 left.
-  EXPECT_EQ(frame->picture.pixels[32 * 64 + 32], heat_colour(0.6));
+  EXPECT_EQ(frame->scale.low, 6);
+  EXPECT_EQ(frame->scale.high, 10);
+  EXPECT_EQ(frame->picture.pixels[32 * 64 + 32], heat_colour(0.0));
+  request.heat_range = glm::dvec2(0, 12);
+  frame = renderer->draw(request, {});
+  ASSERT_TRUE(frame);
+  EXPECT_EQ(frame->scale.high, 12);
+  EXPECT_FALSE(frame->scale.above);
+  EXPECT_EQ(frame->picture.pixels[32 * 64 + 32], heat_colour(0.5));
+  // Along the normal the wall below the hole is as thick, and a pick says so.
+  request.heat = Heat::kWall;
+  frame = renderer->draw(request, {});
+  ASSERT_TRUE(frame);
+  EXPECT_GT(frame->report.covered, 1000u);
+  const auto picked = renderer->pick(request, {32, 32}, {});
+  ASSERT_TRUE(picked);
+  ASSERT_TRUE(picked->thickness);
+  EXPECT_NEAR(*picked->thickness, 6, 1e-3);
 }
 
 TEST(CpuRenderer, AScenesPartsAreSeenThroughByACheapTechniqueWhileItMoves) {

@@ -88,7 +88,13 @@ TEST(Script, MistakesNameFileAndLine) {
   for (const char* word : {"o", "p", "ortho", "orthographic", "perspective"}) {
     EXPECT_EQ(error_of(std::string("projection ") + word), "none");
   }
-  EXPECT_NE(error_of("heat wave").find("off, thickness, depth"), std::string::npos);
+  EXPECT_NE(error_of("heat wave").find("off, wall, ray, thickness, depth"), std::string::npos);
+  for (const char* word : {"wall", "ray", "thickness"}) {
+    EXPECT_EQ(error_of(std::string("heat ") + word), "none");
+  }
+  EXPECT_NE(error_of("heat-range 3 2").find("must begin at 0 or more and rise, got 3 2"),
+            std::string::npos);
+  EXPECT_NE(error_of("distance 1 2 3").find("usage: distance X Y X Y"), std::string::npos);
   for (const char* word : {"0", "0.5", "1", "off"}) {
     EXPECT_EQ(error_of(std::string("opacity ") + word), "none");
   }
