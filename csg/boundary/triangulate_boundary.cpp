@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <atomic>
+#include <glm/geometric.hpp>
 #include <map>
 
 #include "csg/arrangement/point_table.h"
 #include "csg/boundary/face_triangulation.h"
+#include "csg/boundary/turned_shells.h"
 #include "mesh/disjoint_sets.h"
 #include "mesh/repair/canonical_order.h"
 #include "mesh/repair/double_edges.h"
@@ -37,6 +39,9 @@ class Triangulation {
   Index group_of(const glm::uvec3& triangle, Index plane) const;
   std::vector<WedgeEdge> all_half_edges() const;
   Result<void> split_vertices();
+  Index point_of(Index vertex) const;
+  exact::FinePoint exact_point(Index vertex) const;
+  double most_moved() const;
   int compare_exactly(Index a, Index b) const;
   Result<MeshRepair> check_and_sort();
   TriangulatedBoundary finish();
@@ -194,12 +199,37 @@ Result<void> Triangulation::split_vertices() {
   return {};
 }
 
+// None for vertices in the middle of an edge.
+Index Triangulation::point_of(Index vertex) const {
+  const std::size_t count = faces_.points.size(), other = vertex - count;
+  return vertex < count ? vertex : other < additional_.size() ? additional_[other] : 0xffffffffu;
+}
+
+exact::FinePoint Triangulation::exact_point(Index vertex) const {
+  const Index point = point_of(vertex);
+  if (point == 0xffffffffu) {
+    constexpr int kMore = exact::kFineBits - exact::kFileBits;
+    const FilePoint& at = mesh_.positions[vertex];
+    return {exact::Int128{at.x} << kMore, exact::Int128{at.y} << kMore,
+            exact::Int128{at.z} << kMore};
+  }
+  return faces_.points.on_lattice(point) ? exact::fine_point(faces_.points.vertices()[point])
+                                         : exact::round_fine(faces_.points.rational(point));
+}
+
+// By rounding to written positions, in 2^-24 step.
+double Triangulation::most_moved() const {
+  double most = 0;
+  if (!written_.rounds()) return most;
+  for (Index p = 0; p < faces_.points.size(); ++p) {
+    const glm::dvec3 by(mesh_.positions[p] - faces_.points.rounded(p));
+    most = std::max(most, glm::length(by));
+  }
+  return most;
+}
+
 // The order of vertices of one written position.
 int Triangulation::compare_exactly(Index a, Index b) const {
-  const auto point_of = [this](Index vertex) {  // none for those in the middle of an edge
-    const std::size_t count = faces_.points.size(), other = vertex - count;
-    return vertex < count ? vertex : other < additional_.size() ? additional_[other] : 0xffffffffu;
-  };
   const Index p = point_of(a), q = point_of(b);
   if (p == q) return 0;
   if (p == 0xffffffffu || q == 0xffffffffu) return p < q ? -1 : 1;
@@ -213,6 +243,9 @@ int Triangulation::compare_exactly(Index a, Index b) const {
 // Checks the written positions, repairs what meets there, and puts all in order.
 Result<MeshRepair> Triangulation::check_and_sort() {
   Result<MeshRepair> repair;
+  const std::uint64_t turned =
+      drop_turned_shells(mesh_, most_moved(), [this](Index vertex) { return exact_point(vertex); });
+  repair->places = turned;
   const auto conflicts = find_conflicts(mesh_, execution_);
   if (!conflicts) return tl::unexpected(conflicts.error());
   set_groups(mesh_, *conflicts);
@@ -221,6 +254,7 @@ Result<MeshRepair> Triangulation::check_and_sort() {
   if (conflicts->empty()) return repair;
   repair = repair_mesh(mesh_, written_, execution_);
   if (repair) {
+    repair->places += turned + drop_loose_voids(mesh_);
     canonical_order(mesh_, [](Index a, Index b) { return a < b ? -1 : a > b ? 1 : 0; });
   }
   return repair;

@@ -778,6 +778,60 @@ TEST(BoundaryLaws, CapsThatAreThereAlreadyChangeNothing) {
   EXPECT_GT(with_holes, 30);
 }
 
+// Slivers thinner than floats are: a body that rounding turns inside out is no body.
+TEST(BoundaryLaws, RoundingTurnsNoBodyInsideOut) {
+  std::mt19937_64 random(1);
+  std::uniform_real_distribution<double> real(-1, 1);
+  Tree tree;
+  for (int i = 0; i < 400; ++i) {
+    TriangleSoup mesh;
+    mesh.triangles = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}};
+    const glm::dvec3 middle(700 + 3 * (i % 20), 500 + 3 * (i / 20), 300);
+    for (int k = 0; k < 3; ++k) {
+      mesh.positions.push_back(middle + glm::dvec3(real(random), real(random), real(random)));
+    }
+    const auto& p = mesh.positions;
+    const glm::dvec3 normal = glm::normalize(glm::cross(p[1] - p[0], p[2] - p[0]));
+    const double far = i % 2 == 0 ? 1.7 : 0.3;  // beyond an edge or over the triangle
+    mesh.positions.push_back(p[0] + 0.4 * (p[1] - p[0]) + far * (p[2] - p[0]) + 1.5e-5 * normal);
+    if (signed_volume(mesh) < 0) reverse_orientation(mesh);
+    tree |= Tree(std::move(mesh));
+  }
+  const auto made = boundary_mesh(tree, tree.root(), {.float_positions = true});
+  ASSERT_TRUE(made.has_value()) << made.error().message;
+  const SolidMesh& mesh = made->mesh;
+  ASSERT_EQ(broken(mesh), "");
+  EXPECT_GT(made->report.repaired, 50u);
+  EXPECT_GT(made->report.shells, 50u);
+  // Positions are floats from 256 to 1024: multiples of 2^-15.
+  std::map<std::uint32_t, exact::Int128> six_volumes;
+  std::vector<std::uint32_t> shell(mesh.positions.size());
+  std::iota(shell.begin(), shell.end(), 0u);
+  const auto find = [&](std::uint32_t v) {
+    while (shell[v] != v) v = shell[v];
+    return v;
+  };
+  for (const glm::uvec3& t : mesh.triangles) {
+    shell[find(t.x)] = find(t.y);
+    shell[find(t.y)] = find(t.z);
+  }
+  for (const glm::uvec3& t : mesh.triangles) {
+    exact::Int128 p[3][3];
+    for (int k = 0; k < 3; ++k) {
+      for (int axis = 0; axis < 3; ++axis) {
+        const double whole = std::ldexp(mesh.positions[t[k]][axis], 15);
+        ASSERT_EQ(whole, std::floor(whole));
+        p[k][axis] = static_cast<std::int64_t>(whole);
+      }
+    }
+    six_volumes[find(t.x)] += p[0][0] * (p[1][1] * p[2][2] - p[1][2] * p[2][1]) +
+                              p[0][1] * (p[1][2] * p[2][0] - p[1][0] * p[2][2]) +
+                              p[0][2] * (p[1][0] * p[2][1] - p[1][1] * p[2][0]);
+  }
+  EXPECT_EQ(six_volumes.size(), made->report.shells);
+  for (const auto& [root, volume] : six_volumes) EXPECT_GT(volume, 0) << root;
+}
+
 TEST(BoundaryLaws, NothingGivesNothing) {
   const Tree a(make_box({0, 0, 0}, {1, 1, 1})), b(make_box({1, 0, 0}, {2, 1, 1}));
   for (const Tree& tree : {Tree(), a - a, a & b, (a | b) - (b | a)}) {
