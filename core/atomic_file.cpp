@@ -106,6 +106,17 @@ void remove_folder(const char* name) noexcept {
 std::string reason_text(int reason) { return std::generic_category().message(reason); }
 
 tl::unexpected<Error> cannot_create(const std::string& path, int reason) {
+  if (reason == ENOTEMPTY) {
+    return fail(ErrorCode::kOutput,
+                "{}: the folder is not empty; remove it, or choose another name", path);
+  }
+  const std::size_t slash = path.find_last_not_of('/') == std::string::npos
+                                ? std::string::npos
+                                : path.rfind('/', path.find_last_not_of('/'));
+  if (reason == ENOENT && slash != std::string::npos) {
+    return fail(ErrorCode::kOutput, "{}: cannot create: there is no folder {}", path,
+                path.substr(0, slash));
+  }
   return fail(ErrorCode::kOutput, "{}: cannot create: {}", path, reason_text(reason));
 }
 

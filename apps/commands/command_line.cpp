@@ -15,6 +15,7 @@
 #include "core/did_you_mean.h"
 #include "core/printable.h"
 #include "strata/csg/input/scene_input.h"
+#include "strata/voxelize/formats/voxel_writer.h"
 
 namespace strata::apps {
 namespace {
@@ -455,10 +456,11 @@ VoxelizeCommand voxelize_command(const Words& words, Reader& reader) {
         "--backend gl cannot be combined with --surface alone, which needs no depth lists");
   }
   if (command.output.empty() && !words.format.empty()) reader.fail_with("--format needs -o");
-  if (command.output.empty() && !command.stats && !command.json && !command.checksum &&
-      !command.dry_run) {
-    reader.fail_with("nothing to do: give -o FILE, --stats, --json, --checksum or --dry-run");
-  }
+  if (!command.output.empty()) return command;
+  refuse_bare_outputs(
+      command.input.files,
+      [](const std::string& file) { return voxel_format_for(file, "").has_value(); }, reader);
+  if (!command.json && !command.checksum && !command.dry_run) command.stats = true;
   return command;
 }
 
@@ -509,7 +511,10 @@ constexpr std::pair<std::string_view, std::string_view> kOtherNames[] = {
 
 ParseOutcome no_such_command(std::string_view name) {
   if (name.starts_with('-')) {
-    return usage_error("", fmt::format("unknown option {}; the command comes first", name));
+    constexpr std::string_view kOptions[] = {"--help", "--help-all", "--version"};
+    const std::string meant = did_you_mean(name, kOptions);
+    return usage_error("", fmt::format("unknown option {}{}", name,
+                                       meant.empty() ? "; the command comes first" : meant));
   }
   std::error_code ignored;
   if (std::filesystem::is_directory(name, ignored)) {
@@ -549,14 +554,36 @@ bool begins_with_a_file(const std::vector<std::string>& words) {
          std::filesystem::is_regular_file(first, ignored);
 }
 
+/// A command that stands behind a file: `strata knot.obj voxelize`.
+std::optional<std::string_view> late_command(const std::vector<std::string>& words) {
+  std::error_code ignored;
+  for (const auto& [command, what] : kCommands) {
+    if (words.front() != command && std::find(words.begin(), words.end(), command) != words.end() &&
+        !std::filesystem::exists(command, ignored)) {
+      return command;
+    }
+  }
+  return std::nullopt;
+}
+
 }  // namespace
+
+void refuse_bare_outputs(const std::vector<std::string>& files, bool (*writes)(const std::string&),
+                         Reader& reader) {
+  if (files.size() < 2) return;
+  std::error_code ignored;
+  const std::string& last = files.back();
+  if (last == "-" || std::filesystem::exists(last, ignored) || !writes(last)) return;
+  reader.fail_with(
+      fmt::format("{}: there is no such file to read; to write it, give -o {}", last, last));
+}
 
 Command parse_command_line(int argc, const char* const* argv) {
   if (argc < 2) return ParseOutcome{kFirstHelp, true, static_cast<int>(ErrorCode::kUsage)};
   std::string_view name = argv[1];
   int first = 2;
   bool alone = false;  // a file without anything else
-  if (name == "help" && argc == 3) return help_on(argv[2]);
+  if ((name == "help" || name == "-h" || name == "--help") && argc == 3) return help_on(argv[2]);
   if (name == "-h" || name == "--help" || name == "help") {
     return ParseOutcome{top_help(), false, 0};
   }
@@ -567,10 +594,14 @@ Command parse_command_line(int argc, const char* const* argv) {
     }
     return ParseOutcome{std::move(text), false, 0};
   }
-  if (name == "-V" || name == "--version") {
+  if (name == "-V" || name == "--version" || name == "version") {
     return ParseOutcome{"strata " STRATA_VERSION "\n", false, 0};
   }
   if (begins_with_a_file({argv + 1, argv + argc})) {
+    if (const auto command = late_command({argv + 1, argv + argc})) {
+      return usage_error(
+          *command, fmt::format("the command comes first: strata {} {} ...", *command, argv[1]));
+    }
     name = "csg";
     first = 1;
     alone = argc == 2;

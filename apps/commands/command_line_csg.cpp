@@ -5,6 +5,7 @@
 #include "apps/commands/choice_words.h"
 #include "apps/commands/command_words.h"
 #include "apps/commands/scene_options.h"
+#include "apps/session/file_conflicts.h"
 #include "apps/session/help.h"
 #include "apps/session/option_values.h"
 
@@ -173,6 +174,9 @@ void picture_request(const Words& words, Reader& reader, PictureRequest& request
   request.input.keep_orientation = words.keep_orientation;
   request.output = words.output;
   if (!words.json.empty()) request.json = words.json;
+  if (!words.output.empty()) return;
+  refuse_bare_outputs(
+      words.files, [](const std::string& file) { return has_extension(file, ".png"); }, reader);
 }
 
 CsgCommand csg_command(Words words, Reader& reader) {

@@ -47,6 +47,10 @@ void read_output(const Words& words, MeshCommand& command, Reader& reader) {
   command.output = words.output;
   if (!words.json.empty()) command.json = words.json;
   if (command.output.empty()) {
+    refuse_bare_outputs(
+        words.files,
+        [](const std::string& file) { return solid_format_of(file) != SolidFormat::kAuto; },
+        reader);
     if (!command.json) reader.fail_with("nothing to do: give -o FILE or --json");
     for (const auto& [given, name] :
          {std::pair(!words.format.empty(), "--format"),

@@ -75,6 +75,12 @@ CommonOptions common_options(const Words& words, Reader& reader);
 /// @param pictures  for strata csg, which reads scenes from standard input too
 csg::SceneInput input_options(const Words& words, bool pictures, Reader& reader);
 
+/// Where no output is given: refuses a last input that does not exist and has the name of an
+/// output, `strata voxelize knot.obj knot.vdb`.
+/// @param writes whether the command writes files of this name
+void refuse_bare_outputs(const std::vector<std::string>& files, bool (*writes)(const std::string&),
+                         Reader& reader);
+
 /// The commands of the tool, and what --help says of each.
 struct CommandSummary {
   std::string_view name, what;

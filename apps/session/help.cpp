@@ -24,6 +24,10 @@ std::string unknown_option(const CLI::App& app, const std::string& given) {
   std::vector<std::string> names;
   for (const CLI::Option* option : app.get_options()) {
     for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+    for (const std::string& name : option->get_snames()) {
+      const bool other_case = given.size() == 2 && name.size() == 1 && (given[1] ^ name[0]) == 0x20;
+      if (other_case) return fmt::format("unknown option {}; did you mean -{}?", given, name);
+    }
   }
   const std::vector<std::string_view> known(names.begin(), names.end());
   const std::string word = given.substr(0, given.find('='));

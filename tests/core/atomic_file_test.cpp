@@ -168,7 +168,7 @@ TEST_F(AtomicFileTest, TheErrorNamesThePathAndTheReason) {
   const struct {
     std::string path, reason;
   } cases[] = {
-      {at("missing/a.bin"), "No such file or directory"},
+      {at("missing/a.bin"), "there is no folder " + at("missing")},
       {folder_.string(), "Is a directory"},
       {at(std::string(300, 'n')), "File name too long"},
       {at(std::string(5000, 'n')), "File name too long"},
@@ -406,7 +406,8 @@ TEST_F(AtomicFolderTest, ReplacesAnEmptyFolderButNotOneWithContent) {
   const auto refused = AtomicFolder::create(at("slices"));
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::kOutput);
-  EXPECT_EQ(refused.error().message, at("slices") + ": cannot create: Directory not empty");
+  EXPECT_EQ(refused.error().message,
+            at("slices") + ": the folder is not empty; remove it, or choose another name");
   EXPECT_EQ(entries(), 1u);
 }
 

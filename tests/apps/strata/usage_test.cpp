@@ -70,6 +70,23 @@ TEST_F(Usage, WordsThatAreNearlyRightAreNamed) {
   refuses({"mesh", "box.obj", "-o", "a.3mf", "--unit", "milimeter"}, "did you mean millimeter?");
 }
 
+TEST_F(Usage, TheCommandComesFirstAndAnOutputBehindItsOption) {
+  refuses({"box.obj", "voxelize"}, "the command comes first: strata voxelize box.obj");
+  refuses({"voxelize", "box.obj", "a.vdb"}, "to write it, give -o a.vdb");
+  refuses({"mesh", "box.obj", "a.stl"}, "to write it, give -o a.stl");
+  refuses({"csg", "box.obj", "a.png"}, "to write it, give -o a.png");
+  refuses({"--verison"}, "unknown option --verison; did you mean --version?");
+  refuses({"voxelize", "box.obj", "-R", "4"}, "unknown option -R; did you mean -r?");
+  EXPECT_EQ(place.run({"version"}).out, place.run({"--version"}).out);
+  EXPECT_EQ(place.run({"-h", "mesh"}).out, place.run({"mesh", "--help"}).out);
+}
+
+TEST_F(Usage, VoxelsWithoutAnOutputAreStatistics) {
+  const RunResult run = place.run({"voxelize", "box.obj", "-r", "4"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_NE(run.out.find("solid     64 voxels"), std::string::npos) << run.out;
+}
+
 TEST_F(Usage, ANameThatAnotherCommandWritesIsSaidToBe) {
   refuses({"csg", "box.obj", "-o", "a.stl"}, "; strata mesh writes meshes");
   refuses({"csg", "box.obj", "-o", "a.vdb"}, "; strata voxelize writes voxels");
@@ -253,7 +270,7 @@ TEST_F(Usage, OptionsThatWouldHaveNoEffectAreRefused) {
 }
 
 TEST_F(Usage, SomethingMustComeOut) {
-  refuses({"voxelize", "box.obj", "-r", "4"}, "-o FILE");
+  refuses({"mesh", "box.obj"}, "-o FILE");
   refuses({"voxelize", "-r", "4", "--stats"}, "no input file is given");
   refuses({"info"}, "no input file is given");
   refuses({"voxelize", "box.obj", "-r", "4", "-o", "-"}, "format");
