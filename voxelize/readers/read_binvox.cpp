@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "voxelize/readers/readers.h"
-#include "voxelize/readers/tile_runs.h"
+#include "voxelize/volume/tile_runs.h"
 
 namespace strata {
 namespace {

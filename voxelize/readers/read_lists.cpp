@@ -10,7 +10,7 @@
 #include "strata/core/depth_list.h"
 #include "strata/hashbuffer/formats/ldi_io.h"
 #include "voxelize/readers/readers.h"
-#include "voxelize/readers/tile_runs.h"
+#include "voxelize/volume/tile_runs.h"
 
 namespace strata {
 namespace {

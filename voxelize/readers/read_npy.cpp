@@ -11,10 +11,10 @@
 #include <string>
 #include <vector>
 
-#include "voxelize/readers/dense_array.h"
-#include "voxelize/readers/inflate_stream.h"
 #include "voxelize/readers/readers.h"
-#include "voxelize/readers/zip_directory.h"
+#include "voxelize/volume/dense_array.h"
+#include "voxelize/volume/inflate_stream.h"
+#include "voxelize/volume/zip_directory.h"
 
 namespace strata {
 namespace {

@@ -7,11 +7,11 @@
 #include <vector>
 
 #include "mesh/formats/input_bytes.h"
-#include "voxelize/readers/dense_array.h"
-#include "voxelize/readers/grey_png.h"
-#include "voxelize/readers/json_text.h"
 #include "voxelize/readers/readers.h"
-#include "voxelize/readers/tile_runs.h"
+#include "voxelize/volume/dense_array.h"
+#include "voxelize/volume/grey_png.h"
+#include "voxelize/volume/json_text.h"
+#include "voxelize/volume/tile_runs.h"
 
 namespace strata {
 namespace {

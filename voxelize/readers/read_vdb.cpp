@@ -16,10 +16,10 @@
 #include <string>
 #include <vector>
 
-#include "voxelize/readers/dense_array.h"
 #include "voxelize/readers/readers.h"
-#include "voxelize/readers/tile_runs.h"
 #include "voxelize/readers/vdb_tree.h"
+#include "voxelize/volume/dense_array.h"
+#include "voxelize/volume/tile_runs.h"
 
 namespace strata {
 namespace {
@@ -49,6 +49,14 @@ class VdbReader {
     return found == head_.metadata.end() ? std::string() : found->second;
   }
   Result<void> take_bools();
+  /// A leaf or a box that meets a tile of columns.
+  struct Item {
+    int z = 0;
+    std::uint32_t index = 0;
+    bool box = false;
+  };
+  using Items = std::vector<std::vector<Item>>;
+  Result<Items> items_of_tiles(const VoxelIntervals& set) const;
   Result<VoxelIntervals> make_runs(const VoxelGrid& grid);
   void add_leaf(std::size_t leaf, const glm::ivec3& tile, TileRuns& runs) const;
   void add_box(const VdbTile& box, const glm::ivec3& tile, TileRuns& runs) const;
@@ -133,56 +141,56 @@ void VdbReader::add_box(const VdbTile& box, const glm::ivec3& tile, TileRuns& ru
   }
 }
 
-Result<VoxelIntervals> VdbReader::make_runs(const VoxelGrid& grid) {
-  VoxelIntervals set(grid, Axis::kZ);
-  if (!context_.budget.take(set.memory_bytes())) return context_.too_large("the grid");
-  const auto tiles = size(set.tiles_u()) * size(set.tiles_v());
-  // What meets a tile of columns, along z: leaves, then boxes.
-  struct Item {
-    int z = 0;
-    std::uint32_t index = 0;
-    bool box = false;
-  };
-  std::vector<std::vector<Item>> items(tiles);
+// What meets each tile of columns, along z.
+Result<VdbReader::Items> VdbReader::items_of_tiles(const VoxelIntervals& set) const {
+  Items items(size(set.tiles_u()) * size(set.tiles_v()));
+  const glm::ivec3 dims = set.grid().dims;
   std::uint64_t held = 0;
-  const auto enter = [&](const glm::ivec3& first, const glm::ivec3& last, std::uint32_t index,
+  const auto enter = [&](const glm::ivec3& first, const glm::ivec3& last, std::size_t index,
                          bool box) {
     const glm::ivec3 from = first - tree_.lower, to = last - tree_.lower;
-    for (int tv = std::max(from.y, 0) / kTileSide;
-         tv <= std::min(to.y, grid.dims.y - 1) / kTileSide; ++tv) {
-      for (int tu = std::max(from.x, 0) / kTileSide;
-           tu <= std::min(to.x, grid.dims.x - 1) / kTileSide; ++tu) {
-        items[size(tv) * size(set.tiles_u()) + size(tu)].push_back({first.z, index, box});
+    for (int tv = std::max(from.y, 0) / kTileSide; tv <= std::min(to.y, dims.y - 1) / kTileSide;
+         ++tv) {
+      for (int tu = std::max(from.x, 0) / kTileSide; tu <= std::min(to.x, dims.x - 1) / kTileSide;
+           ++tu) {
+        items[size(tv) * size(set.tiles_u()) + size(tu)].push_back(
+            {first.z, static_cast<std::uint32_t>(index), box});
         ++held;
       }
     }
     return held % 65536 != 0 || context_.budget.take(65536 * sizeof(Item));
   };
   for (std::size_t i = 0; i < tree_.leaves.size(); ++i) {
-    if (tree_.leaves[i].x > tree_.upper.x || tree_.leaves[i].y > tree_.upper.y) continue;
     const glm::ivec3 at = tree_.leaves[i];
-    if (!enter(at, at + (kLeafSide - 1), static_cast<std::uint32_t>(i), false)) {
+    if (!enter(at, at + (kLeafSide - 1), i, false)) {
       return context_.too_large("the leaves of the tree");
     }
   }
   for (std::size_t i = 0; i < tree_.tiles.size(); ++i) {
     const VdbTile& tile = tree_.tiles[i];
-    if (!tile.active) continue;
-    if (!enter(tile.first, tile.last, static_cast<std::uint32_t>(i), true)) {
+    if (tile.active && !enter(tile.first, tile.last, i, true)) {
       return context_.too_large("the tiles of the tree");
     }
   }
+  return items;
+}
+
+Result<VoxelIntervals> VdbReader::make_runs(const VoxelGrid& grid) {
+  VoxelIntervals set(grid, Axis::kZ);
+  if (!context_.budget.take(set.memory_bytes())) return context_.too_large("the grid");
+  Result<Items> items = items_of_tiles(set);
+  if (!items) return tl::unexpected(items.error());
   std::vector<TileRuns> runs(size(context_.execution.thread_count()));
   std::atomic<bool> full{false};
-  parallel_for(context_.execution, tiles, [&](std::size_t index, int worker) {
-    if (items[index].empty() || full) return;
+  parallel_for(context_.execution, items->size(), [&](std::size_t index, int worker) {
+    std::vector<Item>& here = (*items)[index];
+    if (here.empty() || full) return;
     const int tu = static_cast<int>(index) % set.tiles_u();
     const int tv = static_cast<int>(index) / set.tiles_u();
-    std::sort(items[index].begin(), items[index].end(),
-              [](const Item& a, const Item& b) { return a.z < b.z; });
+    std::sort(here.begin(), here.end(), [](const Item& a, const Item& b) { return a.z < b.z; });
     const glm::ivec3 tile = tree_.lower + glm::ivec3(tu, tv, 0) * kTileSide;
     TileRuns& mine = runs[size(worker)];
-    for (const Item& item : items[index]) {
+    for (const Item& item : here) {
       if (item.box) {
         add_box(tree_.tiles[item.index], tile, mine);
       } else {

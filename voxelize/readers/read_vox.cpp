@@ -12,9 +12,9 @@
 #include <string>
 #include <vector>
 
-#include "voxelize/readers/dense_array.h"
 #include "voxelize/readers/readers.h"
-#include "voxelize/readers/tile_runs.h"
+#include "voxelize/volume/dense_array.h"
+#include "voxelize/volume/tile_runs.h"
 
 namespace strata {
 namespace {

@@ -10,9 +10,9 @@
 #include <string>
 #include <vector>
 
-#include "voxelize/readers/dense_array.h"
-#include "voxelize/readers/inflate_stream.h"
 #include "voxelize/readers/readers.h"
+#include "voxelize/volume/dense_array.h"
+#include "voxelize/volume/inflate_stream.h"
 
 namespace strata {
 namespace {

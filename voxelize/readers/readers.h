@@ -2,7 +2,7 @@
 
 #include <string_view>
 
-#include "voxelize/readers/read_context.h"
+#include "voxelize/volume/read_context.h"
 
 namespace strata {
 

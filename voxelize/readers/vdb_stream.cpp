@@ -10,7 +10,7 @@
 #include <cstring>
 #include <memory>
 
-#include "voxelize/readers/half_float.h"
+#include "voxelize/volume/half_float.h"
 
 namespace strata {
 namespace {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "strata/core/grid.h"
-#include "voxelize/readers/read_context.h"
+#include "voxelize/volume/read_context.h"
 
 namespace strata {
 

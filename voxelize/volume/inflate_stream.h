@@ -12,7 +12,7 @@
 
 namespace strata {
 
-/// Bytes that zlib unpacks, piece by piece. (Internal to voxelize/readers.)
+/// Bytes that zlib unpacks, piece by piece. (Internal to voxelize/.)
 class InflateStream {
  public:
   static constexpr int kZlib = 15, kGzip = 31, kBare = -15;  ///< what the packed bytes are

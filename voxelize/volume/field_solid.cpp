@@ -5,8 +5,8 @@
 #include <array>
 #include <vector>
 
-#include "strata/voxelize/readers/scalar_field.h"
-#include "voxelize/readers/tile_runs.h"
+#include "strata/voxelize/volume/scalar_field.h"
+#include "voxelize/volume/tile_runs.h"
 
 namespace strata {
 namespace {

@@ -1,4 +1,4 @@
-#include "voxelize/readers/dense_array.h"
+#include "voxelize/volume/dense_array.h"
 
 #include <algorithm>
 #include <bit>
@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "voxelize/readers/tile_runs.h"
+#include "voxelize/volume/tile_runs.h"
 
 namespace strata {
 namespace {

@@ -9,7 +9,7 @@
 
 namespace strata {
 
-/// A file in a ZIP archive. (Internal to voxelize/readers.)
+/// A file in a ZIP archive. (Internal to voxelize/.)
 struct ZipMember {
   std::string name;
   bool deflated = false;

@@ -1,13 +1,13 @@
 // PNG, second edition (ISO/IEC 15948:2004): grey pictures as write_slices.cpp and scanners make
 // them. Not by libpng, whose errors jump over C++'s destructors.
 
-#include "voxelize/readers/grey_png.h"
+#include "voxelize/volume/grey_png.h"
 
 #include <cstdlib>
 
 #include "strata/core/grid.h"
-#include "voxelize/readers/inflate_stream.h"
-#include "voxelize/readers/read_context.h"
+#include "voxelize/volume/inflate_stream.h"
+#include "voxelize/volume/read_context.h"
 
 namespace strata {
 namespace {

@@ -9,7 +9,7 @@
 namespace strata {
 
 /// Collects runs of the 64 x 64 columns of a tile, in any order, and stores them as intervals. One
-/// at a time for each thread; it may be used again. (Internal to voxelize/readers.)
+/// at a time for each thread; it may be used again. (Internal to voxelize/.)
 class TileRuns {
  public:
   /// Voxels first..last of the column, both inclusive. A voxel that is given twice has the label of

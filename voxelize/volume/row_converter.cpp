@@ -5,8 +5,8 @@
 #include <cstring>
 #include <type_traits>
 
-#include "voxelize/readers/dense_array.h"
-#include "voxelize/readers/half_float.h"
+#include "voxelize/volume/dense_array.h"
+#include "voxelize/volume/half_float.h"
 
 namespace strata {
 namespace {

@@ -10,7 +10,7 @@
 
 #include "strata/core/execution.h"
 #include "strata/core/result.h"
-#include "strata/voxelize/readers/read_voxels.h"
+#include "strata/voxelize/volume/voxel_volume.h"
 
 namespace strata {
 

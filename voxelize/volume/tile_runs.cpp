@@ -1,4 +1,4 @@
-#include "voxelize/readers/tile_runs.h"
+#include "voxelize/volume/tile_runs.h"
 
 #include <algorithm>
 

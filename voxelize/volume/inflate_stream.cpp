@@ -1,4 +1,4 @@
-#include "voxelize/readers/inflate_stream.h"
+#include "voxelize/volume/inflate_stream.h"
 
 #include <algorithm>
 #include <utility>

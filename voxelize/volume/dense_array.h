@@ -7,11 +7,11 @@
 #include <string_view>
 
 #include "strata/core/grid.h"
-#include "voxelize/readers/read_context.h"
+#include "voxelize/volume/read_context.h"
 
 namespace strata {
 
-/// The type of a number in a file. (Internal to voxelize/readers.)
+/// The type of a number in a file. (Internal to voxelize/.)
 enum class NumberType { kBool, kU8, kI8, kU16, kI16, kU32, kI32, kU64, kI64, kF16, kF32, kF64 };
 [[nodiscard]] std::size_t bytes_of(NumberType type);
 /// "bool", "uint8", ..., "float", "double".

@@ -10,7 +10,7 @@
 namespace strata {
 
 /// Calls row(y, values, width) for the rows of a grey PNG of 1, 8 or 16 bits without interlacing,
-/// from the top. (Internal to voxelize/readers.)
+/// from the top. (Internal to voxelize/.)
 class GreyPng {
  public:
   /// @return kInput naming the file and the place

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "voxelize/readers/dense_array.h"
+#include "voxelize/volume/dense_array.h"
 
 namespace strata {
 namespace {

@@ -1,4 +1,4 @@
-#include "voxelize/readers/json_text.h"
+#include "voxelize/volume/json_text.h"
 
 #include <algorithm>
 #include <charconv>

@@ -1,11 +1,11 @@
 // ZIP (PKWARE, APPNOTE.TXT 6.3), from the end: the directory names all files. Not by libzip, which
 // the build can do without: voxels need no more than this.
 
-#include "voxelize/readers/zip_directory.h"
+#include "voxelize/volume/zip_directory.h"
 
 #include <algorithm>
 
-#include "voxelize/readers/read_context.h"
+#include "voxelize/volume/read_context.h"
 
 namespace strata {
 namespace {

@@ -10,7 +10,7 @@
 
 namespace strata {
 
-/// A JSON value (RFC 8259) of a small file. (Internal to voxelize/readers, which the build makes
+/// A JSON value (RFC 8259) of a small file. (Internal to voxelize/, which the build makes
 /// without nlohmann-json.)
 struct JsonValue {
   enum Kind { kNull, kBool, kNumber, kText, kList, kObject } kind = kNull;
