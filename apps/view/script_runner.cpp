@@ -5,6 +5,7 @@
 
 #include "apps/commands/csg_options.h"
 #include "apps/session/json_writer.h"
+#include "core/did_you_mean.h"
 
 namespace strata::view {
 namespace {
@@ -12,6 +13,13 @@ namespace {
 /// Moves of a drag: as often as a mouse reports them, more or less.
 constexpr std::chrono::milliseconds kMoveEvery{16};
 constexpr int kMoves = 12;
+
+tl::unexpected<Error> no_such_key(std::string_view word) {
+  const std::vector<KeyHelp> keys = key_list();
+  std::vector<std::string_view> names;
+  for (const KeyHelp& key : keys) names.push_back(key.name);
+  return fail(ErrorCode::kUsage, "unknown key '{}'{}", word, did_you_mean(word, names));
+}
 
 /// Whether a command looks at what is on the screen.
 bool looks_at_screen(const ScriptCommand& command) {
@@ -179,7 +187,7 @@ Result<bool> ScriptRunner::run(const ScriptCommand& command, Viewer& viewer, Sta
     case Action::kKey:
       if (begun_) return !viewer.wants_screenshot;
       if (!viewer.key(command.word)) {
-        return fail(ErrorCode::kUsage, "unknown key '{}'", command.word);
+        return no_such_key(command.word);
       }
       return !viewer.wants_screenshot;  // else the window's next turn takes it
     case Action::kPanels:
