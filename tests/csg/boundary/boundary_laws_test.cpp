@@ -13,12 +13,14 @@
 #include <string>
 #include <tuple>
 
+#include "csg/arrangement/cell_values.h"
 #include "csg/boundary/boundary_arrangement.h"
 #include "csg/boundary/open_edges.h"
 #include "csg/boundary/triangulate_boundary.h"
 #include "csg/lattice/live_zone.h"
 #include "strata/csg/boundary/boundary_mesh.h"
 #include "strata/csg/solid_lists.h"
+#include "strata/hashbuffer/build_ldi.h"
 #include "tests/csg/boundary/brute_meeting.h"
 #include "tests/csg/boundary/convex_volume.h"
 #include "tests/csg/boundary/tiny_trees.h"
@@ -343,6 +345,126 @@ TEST(BoundaryLaws, VoxelsOfTheMeshAreThoseOfTheTree) {
     ASSERT_TRUE(voxels.has_value() && of_mesh.has_value());
     ASSERT_TRUE(testkit::same_intervals(*voxels, *of_mesh));
   });
+}
+
+// Law L10, for results whose vertices are lattice points: along every ray the mesh has the tree's
+// crossings, in the same planes.
+using RayCrossings = std::vector<std::tuple<std::uint32_t, bool, int, double>>;
+
+RayCrossings crossings_of(const Tree& tree, const VoxelGrid& grid, Axis axis) {
+  const SolidLists lists(tree, tree.root());
+  const auto mesh = snap_to_lattice(lists.soup(), grid);
+  EXPECT_TRUE(mesh.has_value());
+  const auto image = build_ldi(*mesh, raster_target(grid, axis), {}, {}, &lists.filter());
+  EXPECT_TRUE(image.has_value());
+  RayCrossings result;
+  for (int v = 0; v < image->height; ++v) {
+    for (int u = 0; u < image->width; ++u) {
+      for (const DepthItem item : image->list(u, v)) {
+        const glm::uvec3& t = lists.soup().triangles[item.triangle()];
+        const glm::dvec3& p = lists.soup().positions[t.x];
+        const glm::dvec3 normal =
+            glm::abs(glm::cross(lists.soup().positions[t.y] - p, lists.soup().positions[t.z] - p));
+        const int facing = normal.x > 0 ? 0 : normal.y > 0 ? 1 : 2;
+        result.emplace_back(item.depth(), item.exit(), facing, p[facing]);
+      }
+      result.emplace_back(0, false, -1, 0.0);  // the next ray
+    }
+  }
+  return result;
+}
+
+TEST(BoundaryLaws, AlongEveryRayTheMeshHasTheCrossingsOfTheTree) {
+  std::size_t crossings = 0;
+  for_random_trees(260000, 60, 5, TinyKind::kBoxes, [&](const Tree& part, TinyTrees&) {
+    const Tree tree = part | tiny_frame();
+    const VoxelGrid grid{glm::ivec3(36), glm::dvec3(-5), glm::dvec3(0.5)};
+    const SolidMesh mesh = mesh_of(tree);
+    TriangleSoup soup;
+    soup.positions = mesh.positions;
+    soup.triangles = mesh.triangles;
+    const Tree of_mesh{soup};
+    for (const Axis axis : {Axis::kX, Axis::kY, Axis::kZ}) {
+      const RayCrossings expected = crossings_of(tree, grid, axis);
+      ASSERT_EQ(crossings_of(of_mesh, grid, axis), expected);
+      crossings += expected.size() - 36 * 36;
+    }
+  });
+  EXPECT_GT(crossings, 20000u);
+}
+
+// Law L13: from sheet to sheet around every edge the winding numbers of all solids add up to what
+// the cells have on every other way, and cells of equal winding numbers have equal values.
+TEST(BoundaryLaws, WindingNumbersAgreeAroundEveryEdge) {
+  std::size_t groups = 0;
+  for_random_trees(270000, 60, 4, TinyKind::kAny, [&](const Tree& tree, TinyTrees&) {
+    auto solids = snap_solids(tree, tree.root(), Geometry(tree), 12);
+    ASSERT_TRUE(solids.has_value());
+    std::vector<InsideRule> rules;
+    for (const Solid& solid : tree.solids()) rules.push_back(solid.rule);
+    auto welded = weld_solids(*std::move(solids), {});
+    ASSERT_TRUE(welded.has_value());
+    merge_equal_triangles(*welded);
+    if (welded->triangles.empty()) return;
+    const MeshEdges edges = find_mesh_edges(welded->triangles, welded->vertices.size());
+    const LiveZone all;
+    const auto pairs = find_candidate_pairs(*welded, edges, tree.solids().size(), all);
+    ASSERT_TRUE(pairs.has_value());
+    PointTable table(BoundaryPoints(std::move(welded->vertices), std::move(welded->triangles)));
+    const BoundaryPoints& points = table.points();
+    const ArrangementInput input{points.vertices(), points.triangles(), *welded, edges, all};
+    CutLines lines;
+    ASSERT_TRUE(meet_pairs(input, *pairs, table, lines, {}).has_value());
+    ASSERT_TRUE(cross_lines(input, table, lines, {}).has_value());
+    const auto pieces = find_pieces(input, points, lines, sort_lines(input, points, lines), {});
+    ASSERT_TRUE(pieces.has_value());
+    const auto lists = find_radial_lists(input, lines, *pieces, {});
+    ASSERT_TRUE(lists.has_value());
+    const auto values = find_cell_values(input, points, lines, *pieces, *lists,
+                                         compile(tree, tree.root()), rules, false, {});
+    ASSERT_TRUE(values.has_value()) << values.error().message;
+    // From cell to cell until nothing changes; the first cell of a component counts as outside.
+    using Windings = std::vector<int>;
+    std::vector<Windings> windings(lists->cell_count);
+    std::vector<std::uint32_t> start(lists->cell_count);
+    const auto behind = [&](const RadialLists::Group& group) {
+      Windings result = windings[lists->cell_before(group)];
+      for (const RadialLists::Sheet& sheet : lists->sheets_of(group)) {
+        for (const auto& [solid, count] : welded->content(pieces->triangle_of[sheet.piece])) {
+          result[solid] += sheet.left ? -count : count;
+        }
+      }
+      return result;
+    };
+    std::map<std::pair<std::uint32_t, Windings>, bool> value_of;
+    for (std::uint32_t first = 0; first < lists->cell_count; ++first) {
+      if (!windings[first].empty()) continue;
+      windings[first].assign(rules.size(), 0);
+      start[first] = first;
+      for (bool changed = true; std::exchange(changed, false);) {
+        for (const RadialLists::Edge& edge : lists->edges) {  // once around, from any known cell
+          for (std::uint32_t i = 0; i < 2 * edge.group_count; ++i) {
+            const auto& group = lists->groups[edge.first_group + i % edge.group_count];
+            const std::uint32_t to = lists->cell_behind(group);
+            if (windings[lists->cell_before(group)].empty() || !windings[to].empty()) continue;
+            windings[to] = behind(group);
+            start[to] = first;
+            changed = true;
+          }
+        }
+      }
+    }
+    for (const RadialLists::Group& group : lists->groups) {
+      ASSERT_EQ(behind(group), windings[lists->cell_behind(group)]);
+      ++groups;
+    }
+    for (std::uint32_t cell = 0; cell < lists->cell_count; ++cell) {
+      const auto [at, added] =
+          value_of.try_emplace({start[cell], windings[cell]}, values->inside[cell]);
+      ASSERT_EQ(at->second, values->inside[cell]);
+    }
+  });
+  EXPECT_GT(groups, 20000u);
 }
 
 // Law L1 holds for parts and for the faces of the input too.
