@@ -5,6 +5,7 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <numeric>
 
 #include "exact/determinants.h"
 #include "mesh/check/plain_stars.h"
@@ -154,6 +155,27 @@ LatticeBox box_of(const WeldedSolids& solids, const glm::uvec3& t) {
   return {glm::min(a, glm::min(b, c)), glm::max(a, glm::max(b, c))};
 }
 
+// Puts lists together. @param count  of triangles
+std::vector<BoxPair> sorted_pairs(std::vector<std::vector<BoxPair>>& lists, std::size_t count) {
+  std::vector<std::uint32_t> next(count + 1, 0);
+  for (const auto& list : lists) {
+    for (const BoxPair& pair : list) ++next[pair.first + 1];
+  }
+  std::partial_sum(next.begin(), next.end(), next.begin());
+  std::vector<BoxPair> result(next.back());
+  for (auto& list : lists) {
+    for (const BoxPair& pair : list) result[next[pair.first]++] = pair;
+    list = {};
+  }
+  for (auto begin = result.begin(); begin != result.end();) {
+    auto end = begin + 1;
+    while (end != result.end() && end->first == begin->first) ++end;
+    std::sort(begin, end);
+    begin = end;
+  }
+  return result;
+}
+
 }  // namespace
 
 Result<std::vector<BoxPair>> find_candidate_pairs(const WeldedSolids& solids,
@@ -205,12 +227,7 @@ Result<std::vector<BoxPair>> find_candidate_pairs(const WeldedSolids& solids,
                 "{} pairs of triangles or more may meet; the memory limit is {} bytes",
                 bytes.load() / sizeof(BoxPair), execution.memory_limit);
   }
-  std::vector<BoxPair> result = std::move(found.front());
-  for (std::size_t i = 1; i < found.size(); ++i) {
-    result.insert(result.end(), found[i].begin(), found[i].end());
-  }
-  std::ranges::sort(result);
-  return result;
+  return sorted_pairs(found, count);
 }
 
 }  // namespace strata::csg

@@ -3,6 +3,7 @@
 #include <glm/common.hpp>
 #include <utility>
 
+#include "core/buckets.h"
 #include "csg/arrangement/cut_lines.h"
 #include "exact/directions.h"
 
@@ -270,11 +271,30 @@ exact::Cross direction_of(const ArrangementInput& input, const CutLines& lines,
                       input.plane_of(crossing.second).normal);
 }
 
+namespace {
+
+// By triangles; those of one triangle by lines.
+void sort_cuts(std::vector<CutLines::Cut>& cuts, std::size_t triangles) {
+  const detail::Buckets buckets =
+      detail::bucket(cuts.size(), triangles, [&](std::size_t i) { return cuts[i].triangle; });
+  std::vector<CutLines::Cut> sorted;
+  sorted.reserve(cuts.size());
+  for (const std::uint32_t i : buckets.items) sorted.push_back(cuts[i]);
+  for (std::size_t t = 0; t < triangles; ++t) {
+    if (buckets.first[t + 1] - buckets.first[t] < 2) continue;
+    std::sort(sorted.begin() + buckets.first[t], sorted.begin() + buckets.first[t + 1],
+              [](const CutLines::Cut& x, const CutLines::Cut& y) {
+                return std::tie(x.line, x.from, x.to) < std::tie(y.line, y.from, y.to);
+              });
+  }
+  cuts = std::move(sorted);
+}
+
+}  // namespace
+
 Result<void> cross_lines(const ArrangementInput& input, PointTable& points, CutLines& lines,
                          const Execution& execution) {
-  std::ranges::sort(lines.cuts, [](const CutLines::Cut& x, const CutLines::Cut& y) {
-    return std::tie(x.triangle, x.line, x.from, x.to) < std::tie(y.triangle, y.line, y.from, y.to);
-  });
+  sort_cuts(lines.cuts, input.triangles.size());
   std::ranges::sort(lines.contacts, [](const CutLines::Contact& x, const CutLines::Contact& y) {
     return std::tie(x.triangle, x.point) < std::tie(y.triangle, y.point);
   });

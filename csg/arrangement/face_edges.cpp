@@ -5,6 +5,7 @@
 #include <span>
 #include <tuple>
 
+#include "core/buckets.h"
 #include "exact/determinants.h"
 
 namespace strata::csg {
@@ -104,28 +105,39 @@ bool EdgeJoiner::outward_positive(const Edge& edge) const {
 }
 
 void EdgeJoiner::add_planes() {
+  const std::vector<Edge>& edges = edges_.edges;
+  const detail::Buckets planes =
+      detail::bucket(edges.size(), edges_.plane_of.size(),
+                     [&](std::size_t i) { return edges_.plane_of[edges[i].triangle]; });
   struct Keyed {
-    std::uint32_t plane, label;
+    std::uint32_t label;
     bool positive;
     std::uint32_t edge;
+    bool operator==(const Keyed& other) const {
+      return label == other.label && positive == other.positive;
+    }
+    bool operator<(const Keyed& other) const {
+      return std::tie(positive, label) < std::tie(other.positive, other.label);
+    }
   };
   std::vector<Keyed> keyed;
-  keyed.reserve(edges_.edges.size());
-  for (std::uint32_t i = 0; i < edges_.edges.size(); ++i) {
-    const Edge& edge = edges_.edges[i];
-    keyed.push_back({edges_.plane_of[edge.triangle], edge.label, outward_positive(edge), i});
-  }
-  const auto key = [](const Keyed& k) { return std::tie(k.plane, k.positive, k.label); };
-  std::ranges::sort(keyed, [&](const Keyed& x, const Keyed& y) { return key(x) < key(y); });
   std::vector<Edge> group;
-  for (std::size_t i = 0; i < keyed.size();) {
-    group.clear();
-    const std::size_t first = i;
-    for (; i < keyed.size() && key(keyed[i]) == key(keyed[first]); ++i) {
-      group.push_back(edges_.edges[keyed[i].edge]);
+  for (std::uint32_t plane = 0; plane + 1 < planes.first.size(); ++plane) {
+    keyed.clear();
+    for (std::uint32_t i = planes.first[plane]; i < planes.first[plane + 1]; ++i) {
+      const Edge& edge = edges[planes.items[i]];
+      keyed.push_back({edge.label, outward_positive(edge), planes.items[i]});
     }
-    add_plane(group);
-    plane_root_.push_back(keyed[first].plane);
+    if (!std::ranges::is_sorted(keyed, std::less())) std::ranges::sort(keyed, std::less());
+    for (std::size_t i = 0; i < keyed.size();) {
+      group.clear();
+      const std::size_t first = i;
+      for (; i < keyed.size() && keyed[i] == keyed[first]; ++i) {
+        group.push_back(edges[keyed[i].edge]);
+      }
+      add_plane(group);
+      plane_root_.push_back(plane);
+    }
   }
 }
 

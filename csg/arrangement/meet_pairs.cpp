@@ -295,6 +295,9 @@ void PairMeeter::clip_edge(const Side& a, int side, const Side& b) {
 
 void join_parts(const ArrangementInput& input, std::vector<CutLinesPart> parts, PointTable& points,
                 CutLines& lines) {
+  std::size_t most_points = 0;
+  for (const CutLinesPart& part : parts) most_points += part.points.size();
+  points.reserve(most_points / 2);  // most are found twice
   std::vector<std::uint32_t> point_of;
   for (CutLinesPart& part : parts) {
     point_of.clear();

@@ -23,11 +23,12 @@ class EdgeCollector {
                 const SortedLines& sorted)
       : input_(input), points_(points), lines_(lines), sorted_(sorted) {}
 
-  void run(Pieces& pieces, std::vector<bool>& cut) {
+  void run(Pieces& pieces, std::vector<bool>& cut, const Execution& execution) {
     find_cut_triangles(cut);
+    records_.reserve(sorted_.points.size() + 2 * lines_.cuts.size());
     list_edges(pieces, cut);
     for (const CutLines::Cut& c : lines_.cuts) add_cut(c);
-    sort_records(pieces);
+    sort_records(pieces, execution);
   }
 
  private:
@@ -76,12 +77,12 @@ class EdgeCollector {
 
   void add_cut(const CutLines::Cut& cut) {
     const auto list = sorted_.of(cut.line);
-    const LineAxis along = axis_of(input_, lines_, cut.line);
-    const int up = along.rising ? -1 : 1;
     const auto at = [&](std::uint32_t point) {
       if (list.size() < 32) {
         return static_cast<std::size_t>(std::ranges::find(list, point) - list.begin());
       }
+      const LineAxis along = axis_of(input_, lines_, cut.line);
+      const int up = along.rising ? -1 : 1;
       const auto found =
           std::ranges::lower_bound(list, point, [&](std::uint32_t x, std::uint32_t y) {
             return x != y && order_along(points_, x, y, along.axis) == up;
@@ -94,36 +95,62 @@ class EdgeCollector {
     add_chain(list.subspan(first, last - first + 1), cut.line, cut.triangle, EdgeUse::kInside);
   }
 
+  // What one thread makes of the records of some points.
+  struct Part {
+    std::vector<AtomicEdge> edges;
+    std::vector<EdgeUse> uses;
+  };
+
   // Edges in the order of their points, with their triangles in order; each triangle once.
-  void sort_records(Pieces& pieces) {
+  void sort_records(Pieces& pieces, const Execution& execution) {
+    constexpr std::size_t kBlock = 4096;
     const detail::Buckets buckets = detail::bucket(records_.size(), points_.size(),
                                                    [&](std::size_t i) { return records_[i].a; });
-    std::vector<std::uint32_t> order;
-    for (std::size_t a = 0; a < points_.size(); ++a) {
-      order.assign(buckets.items.begin() + buckets.first[a],
-                   buckets.items.begin() + buckets.first[a + 1]);
-      std::ranges::sort(order, [&](std::uint32_t i, std::uint32_t j) {
-        const Record &x = records_[i], &y = records_[j];
-        return std::tie(x.b, x.use.triangle, x.use.side, x.use.line) <
-               std::tie(y.b, y.use.triangle, y.use.side, y.use.line);
-      });
-      for (const std::uint32_t i : order) add_use(pieces, records_[i]);
-    }
+    std::vector<Part> parts((points_.size() + kBlock - 1) / kBlock);
+    parallel_for(execution, parts.size(), [&](std::size_t block, int) {
+      std::vector<Record> around;
+      const std::size_t end = std::min(points_.size(), (block + 1) * kBlock);
+      for (std::size_t a = block * kBlock; a < end; ++a) {
+        around.clear();
+        for (std::uint32_t i = buckets.first[a]; i < buckets.first[a + 1]; ++i) {
+          around.push_back(records_[buckets.items[i]]);
+        }
+        std::ranges::sort(around, [](const Record& x, const Record& y) {
+          return std::tie(x.b, x.use.triangle, x.use.side, x.use.line) <
+                 std::tie(y.b, y.use.triangle, y.use.side, y.use.line);
+        });
+        for (const Record& record : around) add_use(parts[block], record);
+      }
+    });
     records_ = {};
+    std::size_t edges = 0, uses = 0;
+    for (const Part& part : parts) {
+      edges += part.edges.size();
+      uses += part.uses.size();
+    }
+    pieces.edges.reserve(edges);
+    pieces.uses.reserve(uses);
+    for (Part& part : parts) {
+      const auto before = static_cast<std::uint32_t>(pieces.uses.size());
+      for (AtomicEdge& edge : part.edges) edge.first_use += before;
+      pieces.edges.insert(pieces.edges.end(), part.edges.begin(), part.edges.end());
+      pieces.uses.insert(pieces.uses.end(), part.uses.begin(), part.uses.end());
+      part = {};
+    }
   }
 
-  static void add_use(Pieces& pieces, const Record& record) {
-    auto& edges = pieces.edges;
+  static void add_use(Part& part, const Record& record) {
+    auto& edges = part.edges;
     const bool same_edge =
         !edges.empty() && edges.back().a == record.a && edges.back().b == record.b;
     if (!same_edge) {
-      edges.push_back({record.a, record.b, static_cast<std::uint32_t>(pieces.uses.size()), 0});
-    } else if (pieces.uses.back().triangle == record.use.triangle &&
-               pieces.uses.back().side == record.use.side) {
+      edges.push_back({record.a, record.b, static_cast<std::uint32_t>(part.uses.size()), 0});
+    } else if (part.uses.back().triangle == record.use.triangle &&
+               part.uses.back().side == record.use.side) {
       return;
     }
     ++edges.back().use_count;
-    pieces.uses.push_back(record.use);
+    part.uses.push_back(record.use);
   }
 
   const ArrangementInput& input_;
@@ -371,7 +398,7 @@ Result<Pieces> find_pieces(const ArrangementInput& input, const BoundaryPoints& 
                            const Execution& execution) {
   Pieces pieces;
   std::vector<bool> cut;
-  EdgeCollector(input, points, lines, sorted).run(pieces, cut);
+  EdgeCollector(input, points, lines, sorted).run(pieces, cut, execution);
   const std::size_t triangle_count = input.triangles.size();
   pieces.triangle_of.resize(triangle_count);
   std::iota(pieces.triangle_of.begin(), pieces.triangle_of.end(), std::uint32_t{0});

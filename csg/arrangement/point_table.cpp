@@ -28,14 +28,20 @@ std::size_t PointTable::slot_of(const FilePoint& rounded) const {
 }
 
 void PointTable::insert(std::uint32_t point) {
-  if (2 * ++used_ > slots_.size()) grow();
+  if (2 * ++used_ > slots_.size()) grow(2 * slots_.size());
   std::size_t at = slot_of(points_.rounded(point));
   while (slots_[at] != 0) at = (at + 1) & (slots_.size() - 1);
   slots_[at] = point + 1;
 }
 
-void PointTable::grow() {
-  std::vector<std::uint32_t> old(2 * slots_.size(), 0);
+void PointTable::reserve(std::size_t points) {
+  std::size_t slots = slots_.size();
+  while (slots < 2 * (used_ + points)) slots *= 2;
+  if (slots > slots_.size()) grow(slots);
+}
+
+void PointTable::grow(std::size_t slots) {
+  std::vector<std::uint32_t> old(slots, 0);
   old.swap(slots_);
   for (const std::uint32_t value : old) {
     if (value == 0) continue;

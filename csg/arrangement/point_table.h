@@ -24,6 +24,8 @@ class PointTable {
 
   /// Lets a vertex be found.
   void insert_vertex(std::uint32_t vertex);
+  /// Makes room for points to come.
+  void reserve(std::size_t points);
   /// The point that a recipe makes.
   std::uint32_t find_or_add(const NewPoint& point);
 
@@ -33,7 +35,7 @@ class PointTable {
  private:
   std::size_t slot_of(const exact::FilePoint& rounded) const;
   void insert(std::uint32_t point);
-  void grow();
+  void grow(std::size_t slots);
 
   BoundaryPoints points_;
   std::vector<std::uint32_t> slots_;  // point + 1; 0: empty
