@@ -16,6 +16,7 @@ constexpr int kMostBlocks = 512;
 /// What is counted for the blocks above one block of columns; entry i is the change at block i.
 struct OccupiedBlocks::Columns {
   std::vector<int> some, full;
+  glm::ivec3 low{std::numeric_limits<int>::max()}, high{0};  ///< around all solid voxels so far
 };
 
 /// The blocks above columns [bu, bu + 1) x [bv, bv + 1) << shift_.
@@ -27,6 +28,9 @@ void OccupiedBlocks::add_columns(const VoxelIntervals& set, int bu, int bv, Colu
   for (int v = bv * side; v < v_end; ++v) {
     for (int u = bu * side; u < u_end; ++u) {
       const std::span<const Interval> runs = set.column(u, v + set.v_begin());
+      if (runs.empty()) continue;
+      scratch.low = glm::min(scratch.low, glm::ivec3(u, v, runs.front().begin()));
+      scratch.high = glm::max(scratch.high, glm::ivec3(u + 1, v + 1, runs.back().end()));
       for (std::size_t i = 0; i < runs.size();) {
         const int begin = runs[i].begin();
         int end = runs[i].end();
@@ -94,27 +98,13 @@ Result<OccupiedBlocks> OccupiedBlocks::make(const VoxelIntervals& set, const Exe
     }
   });
   if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
-  return made;
-}
-
-OccupiedBlocks::Box OccupiedBlocks::box() const {
   Box box{glm::ivec3(std::numeric_limits<int>::max()), glm::ivec3(0)};
-  const int side = 1 << shift_;
-  for (int v = 0; v < bricks_a_side_.y; ++v) {
-    for (int u = 0; u < bricks_a_side_.x; ++u) {
-      for (int w = 0; w < bricks_a_side_.z; ++w) {
-        std::uint64_t some = bricks_[index(u, v, w)].some;
-        for (; some != 0; some &= some - 1) {
-          const int b = std::countr_zero(some);
-          const glm::ivec3 at(u * 4 + (b >> 2 & 3), v * 4 + (b >> 4), w * 4 + (b & 3));
-          box.low = glm::min(box.low, at * side);
-          box.high = glm::max(box.high, (at + 1) * side);
-        }
-      }
-    }
+  for (const Columns& one : scratch) {
+    box.low = glm::min(box.low, one.low);
+    box.high = glm::max(box.high, one.high);
   }
-  if (box.low.x > box.high.x) box.low = box.high;
-  return box;
+  if (box.low.x < box.high.x) made.box_ = box;
+  return made;
 }
 
 }  // namespace strata

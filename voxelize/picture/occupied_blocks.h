@@ -38,11 +38,12 @@ class OccupiedBlocks {
   [[nodiscard]] unsigned bit_of(const glm::ivec3& voxel) const {
     return bit((voxel.x >> shift_) & 3, (voxel.y >> shift_) & 3, (voxel.z >> shift_) & 3);
   }
-  /// The box of solid voxels, [low, high), to whole blocks; empty where there is none.
+  /// A box of voxels, [low, high).
   struct Box {
     glm::ivec3 low{0}, high{0};
   };
-  [[nodiscard]] Box box() const;
+  /// Around the solid voxels; empty where there are none.
+  [[nodiscard]] const Box& box() const { return box_; }
 
  private:
   [[nodiscard]] static unsigned bit(int u, int v, int w) {
@@ -60,6 +61,7 @@ class OccupiedBlocks {
   int shift_ = 2;
   glm::ivec3 bricks_a_side_{0};
   std::vector<Brick> bricks_;
+  Box box_;
 };
 
 }  // namespace strata

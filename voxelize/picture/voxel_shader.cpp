@@ -40,8 +40,10 @@ constexpr double kLineWidth = 1.1;  // pixels
 }  // namespace
 
 Rgba label_colour(const VoxelLook& look, bool labels, std::uint32_t label) {
-  if (label > 0 && label <= look.colours.size()) return look.colours[label - 1];
-  return labels ? palette_colour(label) : kPlainFace;
+  if (look.source == VoxelColours::kFile && label > 0 && label <= look.colours.size()) {
+    return look.colours[label - 1];
+  }
+  return labels && look.source != VoxelColours::kPlain ? palette_colour(label) : kPlainFace;
 }
 
 VoxelShader::VoxelShader(const VoxelIntervals& set, const VoxelLook& look, const View& view,
@@ -78,7 +80,7 @@ glm::dvec3 VoxelShader::normal_of(const RayHit& hit, const glm::dvec3& point) co
 
 glm::vec3 VoxelShader::base_of(const RayHit& hit) const {
   Rgba colour = label_colour(*look_, labels_, hit.label);
-  if (hit.face >= RayHit::kSection && !labels_ && look_->colours.empty()) colour = kPlainCut;
+  if (hit.face >= RayHit::kSection && colour == kPlainFace) colour = kPlainCut;
   return glm::vec3(colour) / 255.0f;
 }
 

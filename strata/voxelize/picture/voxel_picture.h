@@ -32,10 +32,17 @@ struct VoxelSection {
   double offset = 0.0;     ///< dot(normal, p) on the plane
 };
 
+/// Where the colours of voxels come from.
+enum class VoxelColours {
+  kFile,    ///< VoxelLook::colours where a label has one, else as kLabels
+  kLabels,  ///< a palette for the labels; one colour where there are none
+  kPlain    ///< one colour
+};
+
 /// What a set's voxels look like.
 struct VoxelLook {
-  /// Label n has the colour colours[n - 1]; other labels have colours of a palette. A set without
-  /// labels and colours is of one colour.
+  VoxelColours source = VoxelColours::kFile;  ///< of colours
+  /// Label n has the colour colours[n - 1]. May be empty.
   std::vector<Rgba> colours;
   /// The value of voxel (x, y, z), for slices. Called from several threads at once. Empty: none.
   std::function<float(const glm::ivec3& voxel)> value;
@@ -87,7 +94,7 @@ class VoxelPicture {
   VoxelPicture& operator=(VoxelPicture&&) noexcept;
 
   [[nodiscard]] const VoxelIntervals& set() const;  ///< as given to create()
-  /// The box of the solid voxels, in world space, to a few voxels; empty without solid voxels.
+  /// The box of the solid voxels, in world space; empty without solid voxels.
   [[nodiscard]] Bounds box() const;
   /// The view of `camera` on box(). @return as make_view()
   [[nodiscard]] Result<View> view(const Camera& camera, const glm::ivec2& size) const;

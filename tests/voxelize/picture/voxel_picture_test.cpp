@@ -165,6 +165,20 @@ TEST(VoxelPicture, TheBackgroundIsWhereNothingIsAndMayBeTransparent) {
   EXPECT_EQ(covered(*nothing, options.background), 0u);
 }
 
+TEST(VoxelPicture, TheBoxIsThatOfTheSolidVoxels) {
+  VoxelGrid grid = cube(100);
+  const auto set = std::make_shared<VoxelIntervals>(
+      intervals_from_predicate(grid, Axis::kX, [](int i, int j, int k) {
+        return (i == 13 && j == 71 && k == 40) || (i == 90 && j == 70 && k == 99);
+      }));
+  const Bounds box = made(set).box();
+  for (const auto& [got, wanted] :
+       {std::pair(box.low, glm::dvec3(13, 70, 40)), std::pair(box.high, glm::dvec3(91, 72, 100))}) {
+    const glm::dvec3 at = grid.origin + wanted * grid.voxel_size;
+    for (int a = 0; a < 3; ++a) EXPECT_NEAR(got[a], at[a], 1e-12);
+  }
+}
+
 TEST(VoxelPicture, ASliceShowsEachVoxelOfItsPlane) {
   VoxelPictureOptions options;
   options.samples = 1;
