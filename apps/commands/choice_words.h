@@ -56,6 +56,16 @@ inline constexpr std::pair<std::string_view, csg::BoundaryFaceKind> kFaceKindWor
 inline constexpr std::pair<std::string_view, std::optional<Axis>> kAxisWords[] = {
     {"x", Axis::kX}, {"y", Axis::kY}, {"z", Axis::kZ}, {"auto", std::nullopt}};
 
+inline constexpr std::pair<std::string_view, VoxelStyle> kStyleWords[] = {
+    {"auto", VoxelStyle::kAuto},
+    {"blocks", VoxelStyle::kBlocks},
+    {"smooth", VoxelStyle::kSmooth},
+    {"xray", VoxelStyle::kXray}};
+inline constexpr std::pair<std::string_view, VoxelColours> kVoxelColourWords[] = {
+    {"file", VoxelColours::kFile},
+    {"labels", VoxelColours::kLabels},
+    {"plain", VoxelColours::kPlain}};
+
 /// The word of a choice. @pre the table has it
 template <class T, std::size_t n>
 [[nodiscard]] constexpr std::string_view word_of(const std::pair<std::string_view, T> (&words)[n],

@@ -206,6 +206,7 @@ void define_voxelize(CLI::App& app, Words& words) {
   flag(app, output, "--stats", words.stats, "Print statistics");
   add_json(app, words, output);
   flag(app, output, "--checksum", words.checksum, "Print a hash of the solid voxels and the grid");
+  flag(app, output, "--show", words.show, "Open the file in a window, as strata view does");
   flag(app, output, "--dry-run", words.dry_run,
        "Print the grid and the memory that the command would take, and exit");
   add_grid(app, words);
@@ -275,6 +276,8 @@ bool define_command(std::string_view name, CLI::App& app, Words& words) {
     define_ldi(app, words);
   } else if (name == "csg") {
     define_csg(app, words);
+  } else if (name == "picture") {
+    define_picture(app, words);
   } else if (name == "oit") {
     define_oit(app, words);
   } else {
@@ -446,6 +449,7 @@ VoxelizeCommand voxelize_command(const Words& words, Reader& reader) {
   command.stats = words.stats;
   command.checksum = words.checksum;
   command.dry_run = words.dry_run;
+  command.show = words.show;
   if (!words.json.empty()) command.json = words.json;
   if (command.input.files.empty()) reader.fail_with("no input file is given");
   command.grid = grid_request(words, reader);
@@ -456,6 +460,10 @@ VoxelizeCommand voxelize_command(const Words& words, Reader& reader) {
         "--backend gl cannot be combined with --surface alone, which needs no depth lists");
   }
   if (command.output.empty() && !words.format.empty()) reader.fail_with("--format needs -o");
+  if (command.show && (command.output.empty() || command.output == "-" || command.dry_run)) {
+    reader.fail_with(command.dry_run ? "--show and --dry-run cannot be combined"
+                                     : "--show needs -o FILE, which it opens");
+  }
   if (!command.output.empty()) return command;
   refuse_bare_outputs(
       command.input.files,
@@ -542,6 +550,19 @@ ParseOutcome help_on(std::string_view name) {
   return {help_text(app, false), false, 0};
 }
 
+/// Whether a command line without a command is about a file of voxels.
+bool holds_voxels(const std::vector<std::string>& words) {
+  return !words.front().starts_with('-') && is_voxel_file(words.front());
+}
+
+/// For commands that draw scenes and meshes.
+void refuse_voxels(const std::vector<std::string>& files, Reader& reader) {
+  const auto voxels = std::find_if(files.begin(), files.end(), is_voxel_file);
+  if (voxels == files.end()) return;
+  reader.fail_with(fmt::format(
+      "{}: it holds voxels; `strata picture` draws them, `strata view` shows them", *voxels));
+}
+
 /// Whether a command line is one of openscad: no command, but a file, or options and a scene.
 bool begins_with_a_file(const std::vector<std::string>& words) {
   const std::string& first = words.front();
@@ -551,6 +572,7 @@ bool begins_with_a_file(const std::vector<std::string>& words) {
   if (first.starts_with('-')) return std::any_of(words.begin(), words.end(), csg::is_scene_name);
   std::error_code ignored;
   return csg::is_scene_name(first) || mesh_format_of(first) != MeshFormat::kAuto ||
+         (is_voxel_file(first) && std::filesystem::exists(first, ignored)) ||
          std::filesystem::is_regular_file(first, ignored);
 }
 
@@ -602,7 +624,7 @@ Command parse_command_line(int argc, const char* const* argv) {
       return usage_error(
           *command, fmt::format("the command comes first: strata {} {} ...", *command, argv[1]));
     }
-    name = "csg";
+    name = holds_voxels({argv + 1, argv + argc}) ? "picture" : "csg";
     first = 1;
     alone = argc == 2;
   }
@@ -633,7 +655,9 @@ Command parse_command_line(int argc, const char* const* argv) {
   if (name == "info") command = info_command(words, reader);
   if (name == "ldi") command = ldi_command(words, reader);
   if (name == "csg") command = csg_command(words, reader);
+  if (name == "picture") command = picture_command(words, reader);
   if (name == "oit") command = oit_command(words, reader);
+  if (name == "csg" || name == "oit") refuse_voxels(words.files, reader);
   if (reader.error()) return usage_error(name, reader.error()->message);
   if (auto* csg = std::get_if<CsgCommand>(&command)) csg->alone = alone;
   return command;

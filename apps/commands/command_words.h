@@ -24,6 +24,11 @@ struct MeshWords {
   bool colours = false;
 };
 
+/// The options of `strata picture` for voxels alone, as words. Empty: not given.
+struct VoxelWords {
+  std::string style, slice, colours, threshold;
+};
+
 /// The words of the command line before they are read as numbers and choices. Empty: not given.
 struct Words {
   std::vector<std::string> files;
@@ -37,11 +42,12 @@ struct Words {
   std::string fog, name;
   std::string surface, rule = "winding", open = "vote", axis = "auto", store = "auto",
                        offsets = "plane-first", backend = "auto";
-  bool stats = false, checksum = false, dry_run = false, list_formats = false, gl = false,
-       check = false;
+  bool stats = false, checksum = false, dry_run = false, show = false, list_formats = false,
+       gl = false, check = false;
   CsgWords csg;
   OitWords oit;
   MeshWords mesh;
+  VoxelWords voxels;
 };
 
 /// Reads one option's value into `target`; keeps the first error.
@@ -91,6 +97,7 @@ inline constexpr CommandSummary kCommands[] = {
     {"info", "Report counts, bounds, area, volume and holes"},
     {"ldi", "Write the depth lists of meshes or a scene: a layered depth image"},
     {"csg", "Draw or measure a scene (.csg, .scad) or an expression over meshes"},
+    {"picture", "Draw a voxel file (.vdb, .npy, .nrrd ...), a scene or meshes"},
     {"oit", "Draw transparent meshes or scenes, and compare techniques for that"},
     {"view", "Show a scene or meshes in a window: turn, cut, pick, measure, reload"}};
 
@@ -121,6 +128,10 @@ void picture_request(const Words& words, Reader& reader, PictureRequest& request
 // command_line_mesh.cpp: `strata mesh`
 void define_mesh(CLI::App& app, Words& words);
 MeshCommand mesh_command(const Words& words, Reader& reader);
+
+// command_line_picture.cpp: `strata picture`
+void define_picture(CLI::App& app, Words& words);
+PictureCommand picture_command(Words words, Reader& reader);
 
 // command_line_oit.cpp: `strata oit`
 void define_oit(CLI::App& app, Words& words);

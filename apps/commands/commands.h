@@ -17,6 +17,8 @@
 #include "strata/mesh/writers/write_solid.h"
 #include "strata/transparency/techniques.h"
 #include "strata/voxelize/grid_fit.h"
+#include "strata/voxelize/picture/voxel_picture.h"
+#include "strata/voxelize/readers/read_voxels.h"
 #include "strata/voxelize/voxelize.h"
 
 namespace strata::apps {
@@ -52,6 +54,7 @@ struct VoxelizeCommand {
   OffsetKind offsets = OffsetKind::kPlaneFirst;
   Backend backend = Backend::kAuto;
   bool stats = false, checksum = false, dry_run = false, list_formats = false;
+  bool show = false;                ///< the output, in a window
   std::optional<std::string> json;  ///< "-": standard output
 };
 
@@ -125,6 +128,21 @@ struct CsgCommand : PictureRequest {
   std::vector<FileUse> outputs;           ///< of a window: the pictures that it will write
 };
 
+/// `strata picture`: voxels, or what `strata csg` draws
+struct PictureCommand : CsgCommand {
+  bool voxels = false;  ///< the input is a file of voxels; else all that follows is as made
+  VoxelStyle style = VoxelStyle::kAuto;
+  VoxelColours colours = VoxelColours::kFile;
+  ReadVoxelsOptions reading;
+  /// A plane to draw flat: by index, or by the place of a point in it.
+  struct Slice {
+    Axis axis = Axis::kZ;
+    bool by_index = false;
+    double at = 0.0;
+  };
+  std::optional<Slice> slice;
+};
+
 /// A technique of transparency as the command line names it: "mlab:8".
 struct OitChoice {
   std::string text;
@@ -144,7 +162,7 @@ struct OitCommand : PictureRequest {
 };
 
 using Command = std::variant<ParseOutcome, VoxelizeCommand, MeshCommand, InfoCommand, LdiCommand,
-                             CsgCommand, OitCommand>;
+                             CsgCommand, PictureCommand, OitCommand>;
 
 /// Reads the command line.
 Command parse_command_line(int argc, const char* const* argv);

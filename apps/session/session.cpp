@@ -131,6 +131,10 @@ void Session::echo(std::string_view line) {
   if (!options_.quiet) print(line);
 }
 
+void Session::tell(std::string_view line) {
+  if (!options_.quiet && isatty(STDERR_FILENO) != 0) print(line);
+}
+
 void Session::print(std::string_view text) {
   if (bar_) bar_->clear();
   // Names in it may come from files, which are not to drive the terminal.

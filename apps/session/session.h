@@ -85,6 +85,8 @@ class Session {
   void warn(std::string code, std::string message);
   /// A line that a scene's program prints itself.
   void echo(std::string_view line);
+  /// A line for a person: on a terminal alone, and not with --quiet.
+  void tell(std::string_view line);
   /// Something for --verbose.
   void note(std::string_view message);
   /// @return kGeometry with the first warning's text under --strict

@@ -87,6 +87,9 @@ Result<void> run_command(const LdiCommand& command, Session& session) {
 Result<void> run_command(const CsgCommand& command, Session& session) {
   return run_csg(command, session);
 }
+Result<void> run_command(const PictureCommand& command, Session& session) {
+  return command.voxels ? run_picture(command, session) : run_csg(command, session);
+}
 Result<void> run_command(const OitCommand& command, Session& session) {
   return run_oit(command, session);
 }
@@ -150,6 +153,8 @@ int strata_main(int argc, char** argv) {
     result = run(*ldi, session);
   } else if (const auto* csg = std::get_if<CsgCommand>(&command)) {
     result = run(*csg, session);
+  } else if (const auto* picture = std::get_if<PictureCommand>(&command)) {
+    result = run(*picture, session);
   } else if (const auto* oit = std::get_if<OitCommand>(&command)) {
     result = run(*oit, session);
   }

@@ -2,20 +2,51 @@
 
 #include <cerrno>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <string>
+#include <string_view>
+#include <system_error>
 #include <vector>
 
 #include "apps/strata/run_commands.h"
 
 namespace strata::apps {
 
-int run_view_program(char** arguments) {
+namespace {
+
+/// Where the program of the window lies.
+std::string view_program() {
   std::error_code error;
   const std::filesystem::path own = std::filesystem::read_symlink("/proc/self/exe", error);
-  const std::string program =
-      error ? std::string("strata-view") : (own.parent_path() / "strata-view").string();
+  return error ? std::string("strata-view") : (own.parent_path() / "strata-view").string();
+}
+
+bool is_set(const char* variable) {
+  const char* value = std::getenv(variable);
+  return value != nullptr && *value != '\0';
+}
+
+}  // namespace
+
+Result<void> check_view_program(std::string_view asked_by) {
+  if (!is_set("DISPLAY") && !is_set("WAYLAND_DISPLAY")) {
+    return fail(ErrorCode::kUsage,
+                "{} needs a display, but neither DISPLAY nor WAYLAND_DISPLAY is set; `strata "
+                "picture` draws without one",
+                asked_by);
+  }
+  const std::string program = view_program();
+  if (access(program.c_str(), X_OK) == 0) return {};
+  return fail(ErrorCode::kUsage,
+              "{} needs the program strata-view, but there is no {}; a build makes it when "
+              "libepoxy-dev, libglfw3-dev and libimgui-dev are installed",
+              asked_by, program);
+}
+
+int run_view_program(char** arguments) {
+  const std::string program = view_program();
   std::vector<char*> words;
   std::string name = program;
   words.push_back(name.data());

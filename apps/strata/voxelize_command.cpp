@@ -1,3 +1,4 @@
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -188,6 +189,9 @@ Result<void> print_reports(const VoxelizeCommand& command, const VoxelizeOutcome
     if (auto done = print_report(text, *command.json, false); !done) return done;
   }
   if (auto done = commit_outputs(session); !done) return done;
+  if (!command.output.empty() && command.output != "-" && !command.dry_run && !command.stats) {
+    session.tell(made_line(command, outcome, session.milliseconds() / 1000));
+  }
   if (command.checksum && !command.stats && !command.json && !command.dry_run) {
     const std::string line = fmt::format("{:016x}\n", outcome.report.checksum);
     if (auto done = print_report(line, "-", file_on_stdout); !done) return done;
@@ -483,8 +487,9 @@ Result<void> check_memory(const VoxelizeCommand& command, const VoxelizeOutcome&
 
 }  // namespace
 
-Result<void> run_voxelize(const VoxelizeCommand& command, Session& session) {
-  if (command.list_formats) return print_report(format_list(), "-", false);
+namespace {
+
+Result<void> make_voxels(const VoxelizeCommand& command, Session& session) {
   VoxelizeOutcome outcome;
   auto format = output_format(command);
   if (!format) return tl::unexpected(format.error());
@@ -516,6 +521,25 @@ Result<void> run_voxelize(const VoxelizeCommand& command, Session& session) {
   }
   session.end_progress();
   return print_reports(command, outcome, session);
+}
+
+}  // namespace
+
+Result<void> run_voxelize(const VoxelizeCommand& command, Session& session) {
+  if (command.list_formats) return print_report(format_list(), "-", false);
+  if (!command.show) return make_voxels(command, session);
+  if (auto shown = check_view_program("--show"); !shown) return shown;
+  if (auto done = make_voxels(command, session); !done) return done;
+  // The window has its own limits; this process's wall would be inherited.
+  rlimit memory{};
+  if (getrlimit(RLIMIT_DATA, &memory) == 0) {
+    memory.rlim_cur = memory.rlim_max;
+    setrlimit(RLIMIT_DATA, &memory);
+  }
+  std::string path = command.output;
+  char* arguments[] = {path.data(), nullptr};
+  return fail(static_cast<ErrorCode>(run_view_program(arguments)), "{} is complete, but not shown",
+              command.output);
 }
 
 }  // namespace strata::apps

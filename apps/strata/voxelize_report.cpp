@@ -162,6 +162,16 @@ class Lines {
   std::string text_;
 };
 
+/// "490 x 512 x 227 voxels of 0.0128"
+std::string size_of(const VoxelGrid& grid, int digits) {
+  const glm::dvec3 s = grid.voxel_size;
+  const auto one = [&](double length) { return fmt::format("{:.{}g}", length, digits); };
+  return fmt::format("{} x {} x {} voxels of {}", grid.dims.x, grid.dims.y, grid.dims.z,
+                     s.x == s.y && s.y == s.z
+                         ? one(s.x)
+                         : fmt::format("({}, {}, {})", one(s.x), one(s.y), one(s.z)));
+}
+
 void tell_input(Lines& line, const VoxelizeCommand& command, const VoxelizeOutcome& outcome) {
   for (const csg::InputFacts& file : outcome.input.files) {
     line("input",
@@ -177,12 +187,9 @@ void tell_input(Lines& line, const VoxelizeCommand& command, const VoxelizeOutco
     line("mesh", fmt::format("{}, area {:.6g}, volume {:.6g}", bounds, outcome.input.area,
                              outcome.input.volume));
   }
-  const VoxelGrid& grid = outcome.grid;
-  const glm::dvec3 s = grid.voxel_size;
   line("grid",
-       fmt::format("{} x {} x {} voxels of {}, origin {}, rays along {}", grid.dims.x, grid.dims.y,
-                   grid.dims.z, s.x == s.y && s.y == s.z ? fmt::format("{:.6g}", s.x) : triple(s),
-                   triple(grid.origin), word_of(kAxisWords, outcome.axis)) +
+       fmt::format("{}, origin {}, rays along {}", size_of(outcome.grid, 6),
+                   triple(outcome.grid.origin), word_of(kAxisWords, outcome.axis)) +
            (command.default_size ? fmt::format("; -r {} by default", kDefaultResolution) : ""));
 }
 
@@ -282,6 +289,14 @@ std::string voxelize_text(const VoxelizeCommand& command, const VoxelizeOutcome&
                                grouped(*outcome.output_bytes)));
   }
   return line.take();
+}
+
+std::string made_line(const VoxelizeCommand& command, const VoxelizeOutcome& outcome,
+                      double seconds) {
+  const std::string bytes =
+      outcome.output_bytes ? ", " + readable_bytes(*outcome.output_bytes) : std::string();
+  return fmt::format("{}: {}, {} solid{}, {:.2f} s", command.output, size_of(outcome.grid, 3),
+                     grouped(outcome.report.solid_voxels), bytes, seconds);
 }
 
 std::string voxelize_json(const VoxelizeCommand& command, const VoxelizeOutcome& outcome,

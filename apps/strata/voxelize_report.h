@@ -40,6 +40,11 @@ struct VoxelizeOutcome {
 [[nodiscard]] std::string voxelize_text(const VoxelizeCommand& command,
                                         const VoxelizeOutcome& outcome, const Session& session);
 
+/// What was made, as one line: "knot.vdb: 490 x 512 x 227 voxels of 0.0128, 9 096 600 solid,
+/// 1.6 MB, 0.12 s".
+[[nodiscard]] std::string made_line(const VoxelizeCommand& command, const VoxelizeOutcome& outcome,
+                                    double seconds);
+
 /// For programs, as docs/json.md says.
 [[nodiscard]] std::string voxelize_json(const VoxelizeCommand& command,
                                         const VoxelizeOutcome& outcome, const Session& session);

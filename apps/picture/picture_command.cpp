@@ -1,0 +1,126 @@
+// `strata picture`
+
+#include <algorithm>
+#include <cmath>
+#include <glm/vec3.hpp>
+#include <memory>
+#include <utility>
+
+#include "apps/session/session.h"
+#include "apps/strata/run_commands.h"
+#include "strata/csg/input/scene_input.h"
+#include "strata/csg/picture/picture.h"
+#include "strata/picture/pixels.h"
+#include "strata/voxelize/picture/voxel_picture.h"
+#include "strata/voxelize/readers/read_voxels.h"
+#include "strata/voxelize/volume/voxel_volume.h"
+
+namespace strata::apps {
+namespace {
+
+/// The plane of voxels that --slice means. Indices are those of the file.
+Result<VoxelSlice> slice_of(const PictureCommand::Slice& asked, const VoxelGrid& grid,
+                            const glm::ivec3& first_index, const std::string& file) {
+  const int axis = static_cast<int>(asked.axis);
+  if (asked.by_index) {
+    const double first = first_index[axis], last = first + grid.dims[axis] - 1;
+    if (asked.at >= first && asked.at <= last) {
+      return VoxelSlice{asked.axis, static_cast<int>(asked.at - first)};
+    }
+    return fail(ErrorCode::kUsage, "--slice {0}={1}: {2} has voxels {0}={3} to {0}={4}",
+                "ijk"[axis], asked.at, file, first, last);
+  }
+  const double low = grid.origin[axis], side = grid.voxel_size[axis];
+  const double index = std::floor((asked.at - low) / side);
+  if (index >= 0 && index < grid.dims[axis]) {
+    return VoxelSlice{asked.axis, static_cast<int>(index)};
+  }
+  return fail(ErrorCode::kUsage,
+              "--slice {0}={1}: the voxels of {2} lie from {0}={3:.6g} to {4:.6g}", "xyz"[axis],
+              asked.at, file, low, low + grid.dims[axis] * side);
+}
+
+/// A picture of a file of voxels.
+class VoxelRun {
+ public:
+  VoxelRun(const PictureCommand& command, Session& session)
+      : command_(command), session_(session) {}
+
+  Result<void> run() {
+    auto volume = read_voxels(file(), command_.reading, session_.execution("reading"));
+    if (!volume) return tl::unexpected(volume.error());
+    for (const std::string& note : volume->notes) session_.note(note);
+    first_index_ = volume->first_index;
+    if (auto done = prepare(*std::move(volume)); !done) return done;
+    auto picture = command_.slice ? slice() : view();
+    if (!picture) return tl::unexpected(picture.error());
+    session_.end_progress();
+    return write_png(*picture, command_.output);
+  }
+
+ private:
+  [[nodiscard]] const std::string& file() const { return command_.input.files.front(); }
+
+  Result<void> prepare(VoxelVolume volume) {
+    VoxelLook look;
+    look.source = command_.colours;
+    look.colours.assign(volume.colours.begin(), volume.colours.end());
+    look.distances = volume.kind == VoxelKind::kDistances;
+    if (!volume.values.empty()) {
+      const auto values = std::make_shared<const ScalarField>(std::move(volume.values));
+      look.value = [values](const glm::ivec3& at) { return values->value(at.x, at.y, at.z); };
+    }
+    auto made = VoxelPicture::create(std::make_shared<const VoxelIntervals>(std::move(volume.set)),
+                                     std::move(look), session_.execution("preparing", 0.2));
+    if (!made) return tl::unexpected(made.error());
+    drawing_.emplace(*std::move(made));
+    return {};
+  }
+
+  /// What the options of a scene say for voxels.
+  [[nodiscard]] VoxelPictureOptions options() const {
+    VoxelPictureOptions options;
+    options.style = command_.style;
+    options.samples = command_.picture.samples;
+    return options;
+  }
+
+  Result<Picture> slice() {
+    const auto plane = slice_of(*command_.slice, drawing_->set().grid(), first_index_, file());
+    if (!plane) return tl::unexpected(plane.error());
+    return drawing_->draw_slice(*plane, command_.size, options(), session_.execution("drawing", 1));
+  }
+
+  Result<Picture> view() {
+    const Bounds box = drawing_->box();
+    if (box.empty()) {
+      session_.warn("empty", fmt::format("{}: the picture is empty: no voxel is solid", file()));
+      if (auto strict = session_.check_strict(); !strict) return tl::unexpected(strict.error());
+    }
+    Camera camera = command_.camera;
+    if (command_.auto_centre) centre_camera(camera, box);
+    if (command_.view_all) {
+      fit_camera(camera, box, static_cast<double>(command_.size.x) / command_.size.y);
+      if (!(camera.distance > 0)) camera.distance = Camera{}.distance;
+    }
+    VoxelPictureOptions drawn = options();
+    for (const csg::SectionPlane& cut : command_.cuts) {
+      const csg::SectionPlane plane = csg::facing(cut, camera);
+      drawn.sections.push_back({plane.normal, plane.offset});
+    }
+    return drawing_->draw(camera, command_.size, drawn, session_.execution("drawing", 1));
+  }
+
+  const PictureCommand& command_;
+  Session& session_;
+  glm::ivec3 first_index_{0};
+  std::optional<VoxelPicture> drawing_;
+};
+
+}  // namespace
+
+Result<void> run_picture(const PictureCommand& command, Session& session) {
+  return VoxelRun(command, session).run();
+}
+
+}  // namespace strata::apps
