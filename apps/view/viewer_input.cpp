@@ -164,7 +164,7 @@ constexpr Key kKeys[] = {
      "open a file"},
     {"ctrl+tab", [](Viewer& v) { v.next_tab(1); }, "next tab; also ctrl+page down"},
     {"ctrl+page down", [](Viewer& v) { v.next_tab(1); }, ""},
-    {"ctrl+shift+tab", [](Viewer& v) { v.next_tab(-1); }, "tab before; also ctrl+page up"},
+    {"ctrl+shift+tab", [](Viewer& v) { v.next_tab(-1); }, "previous tab; also ctrl+page up"},
     {"ctrl+page up", [](Viewer& v) { v.next_tab(-1); }, ""},
     {"ctrl+w", [](Viewer& v) { v.close_tab(v.tab()); }, "close the tab"},
     {"c", [](Viewer& v) { v.show_console = !v.show_console; }, "console on or off"},

@@ -92,6 +92,7 @@ void Panels::keys(Viewer& viewer, const glm::ivec2& window) const {
   ImGui::SetNextWindowPos({screen.x / 2, screen.y / 2}, 0, {0.5f, 0.5f});
   ImGui::SetNextWindowSizeConstraints({100, 60}, {screen.x * 0.96f, screen.y * 0.94f});
   bool stays = true;
+  ImGui::PushStyleVar(ImGuiStyleVar_WindowBorderSize, 1.0f);
   ImGui::Begin("Mouse and keys", &stays,
                ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoMove |
                    ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoSavedSettings |
@@ -115,6 +116,7 @@ void Panels::keys(Viewer& viewer, const glm::ivec2& window) const {
     ImGui::EndTable();
   }
   ImGui::End();
+  ImGui::PopStyleVar();
   if (!stays) viewer.show_keys = false;
 }
 

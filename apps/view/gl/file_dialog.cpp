@@ -95,6 +95,7 @@ void FileDialog::draw(Viewer& viewer, float scale) {
       {std::min(620 * scale, screen.x * 0.95f), std::min(520 * scale, screen.y * 0.95f)});
   if (first) ImGui::SetNextWindowFocus();
   bool stays = true;
+  ImGui::PushStyleVar(ImGuiStyleVar_WindowBorderSize, 1.0f);
   ImGui::Begin("Open a file", &stays,
                ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse |
                    ImGuiWindowFlags_NoSavedSettings);
@@ -122,6 +123,7 @@ void FileDialog::draw(Viewer& viewer, float scale) {
   }
   if (ImGui::Button("Cancel", {110 * scale, 0}) || !stays) viewer.dialog.reset();
   ImGui::End();
+  ImGui::PopStyleVar();
 }
 
 }  // namespace strata::view

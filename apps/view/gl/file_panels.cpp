@@ -25,7 +25,7 @@ void Panels::recent(Viewer& viewer) {
 }
 
 void Panels::files(Viewer& viewer) {
-  const float third = share(3), quarter = share(4);
+  const float third = share(3), fifth = share(5);
   if (ImGui::Button("Open ...", {third, 0})) viewer.key("ctrl+o");
   hint("ctrl+o; or drop files into the window");
   ImGui::SameLine();
@@ -35,28 +35,33 @@ void Panels::files(Viewer& viewer) {
     ImGui::EndPopup();
   }
   ImGui::SameLine();
-  const std::size_t lines = viewer.console().size();
-  const std::string label =
-      lines == 0 ? "Console###console" : fmt::format("Console ({})###console", lines);
-  if (toggle(label.c_str(), viewer.show_console, third)) viewer.key("c");
-  hint("warnings and what programs print; c");
+  ImGui::BeginDisabled(viewer.model() == nullptr);
+  if (ImGui::Button("Export ...", {third, 0})) ImGui::OpenPopup("export");
+  ImGui::EndDisabled();
+  hint("write a mesh, voxels, slices or a picture of what is seen");
+  ImGui::SetNextWindowSize({330 * scale_, 0});
+  if (ImGui::BeginPopup("export")) {
+    exports(viewer);
+    ImGui::EndPopup();
+  }
   const auto step = [&](const char* name, bool can, const char* keys, const char* what) {
     ImGui::BeginDisabled(!can);
-    if (ImGui::Button(name, {quarter, 0})) viewer.key(keys);
+    if (ImGui::Button(name, {fifth, 0})) viewer.key(keys);
     ImGui::EndDisabled();
     hint(what);
     ImGui::SameLine();
   };
   step("Undo", viewer.history().can_undo(), "ctrl+z", "camera, section and hidden solids; ctrl+z");
   step("Redo", viewer.history().can_redo(), "ctrl+shift+z", "ctrl+shift+z");
-  if (toggle("Keys", viewer.show_keys, quarter)) viewer.key("?");
-  hint("all keys; ? or F1");
+  const std::size_t lines = viewer.console().size();
+  const std::string label =
+      lines == 0 ? "Console###console" : fmt::format("Console ({})###console", lines);
+  if (toggle(label.c_str(), viewer.show_console, 2 * fifth + ImGui::GetStyle().ItemSpacing.x))
+    viewer.key("c");
+  hint("console: warnings and what programs print; c");
   ImGui::SameLine();
-  if (ImGui::Button(viewer.light_look ? "Dark###look" : "Light###look", {quarter, 0})) {
-    viewer.light_look = !viewer.light_look;
-    remember_look(viewer.folders(), viewer.light_look ? "light" : "dark");
-  }
-  hint("colours of the panels");
+  if (toggle("Keys", viewer.show_keys, fifth)) viewer.key("?");
+  hint("all keys; ? or F1");
 }
 
 void Panels::tab_bar(Viewer& viewer, const Area& area) {

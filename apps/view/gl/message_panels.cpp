@@ -29,8 +29,10 @@ void Panels::status(const Viewer& viewer, const glm::ivec2& window) {
   std::string left = files.empty() ? std::string() : files.front();
   if (files.size() > 1) left += fmt::format(" and {} more", files.size() - 1);
   const Camera& c = viewer.camera();
-  left += fmt::format("     rotation {:.0f}, {:.0f}, {:.0f}   distance {:.4g}", c.rotation.x,
-                      c.rotation.y, c.rotation.z, c.distance);
+  if (!files.empty()) {
+    left += fmt::format("     rotation {:.0f}, {:.0f}, {:.0f}   distance {:.4g}", c.rotation.x,
+                        c.rotation.y, c.rotation.z, c.distance);
+  }
   text(left);
   const bool whole = viewer.frame() != nullptr && viewer.frame()->divisor == 1;
   const std::string state = viewer.loading()    ? "loading"

@@ -82,6 +82,7 @@ void Panels::side(Viewer& viewer, const glm::ivec2& window) {
                    ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoMove |
                    ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoBringToFrontOnFocus);
   files(viewer);
+  if (viewer.tabs().empty()) return ImGui::End();
   const auto open = ImGuiTreeNodeFlags_DefaultOpen;
   if (!viewer.parameters().empty() && ImGui::CollapsingHeader("Parameters", open)) {
     parameters(viewer);

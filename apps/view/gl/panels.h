@@ -33,7 +33,7 @@ class Panels {
   [[nodiscard]] int tabs_height(const Viewer& viewer) const;
   [[nodiscard]] int console_height(const Viewer& viewer) const;
   static void recent(Viewer& viewer);
-  static void files(Viewer& viewer);
+  void files(Viewer& viewer);
   void tab_bar(Viewer& viewer, const Area& area);
   void start(Viewer& viewer, const Area& area);
   static void numbers(Viewer& viewer);

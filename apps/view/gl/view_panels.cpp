@@ -72,13 +72,20 @@ void Panels::look(Viewer& viewer) {
   heat_range(viewer);
   const csg::ColourScheme* scheme = viewer.picture_options().scheme;
   if (scheme == nullptr) scheme = csg::colour_schemes().data();
-  ImGui::SetNextItemWidth(-1);
+  ImGui::SetNextItemWidth(share(3) * 2 + ImGui::GetStyle().ItemSpacing.x);
   if (ImGui::BeginCombo("##scheme", scheme->name.data())) {
     for (const csg::ColourScheme& one : csg::colour_schemes()) {
       if (ImGui::Selectable(one.name.data(), &one == scheme)) viewer.set_scheme(&one);
     }
     ImGui::EndCombo();
   }
+  hint("colours of the picture");
+  ImGui::SameLine();
+  if (ImGui::Button(viewer.light_look ? "Dark###look" : "Light###look", {third, 0})) {
+    viewer.light_look = !viewer.light_look;
+    remember_look(viewer.folders(), viewer.light_look ? "light" : "dark");
+  }
+  hint("colours of the panels");
 }
 
 void Panels::transparency(Viewer& viewer) {

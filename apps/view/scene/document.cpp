@@ -79,7 +79,8 @@ class Copier {
     if (const auto found = looks_.colours.find(index); found != looks_.colours.end()) {
       copy.colour = found->second;
     }
-    if (looks_.selected == index) {
+    // Of a single solid the tint would say nothing.
+    if (looks_.selected == index && from_.solids().size() > 1) {
       copy.colour = glm::vec4(kSelected, copy.colour ? copy.colour->a : 1.0f);
     }
     const Tree::NodeId node = tree_.add_solid(std::move(copy));
