@@ -234,7 +234,8 @@ void Viewer::tick() {
       if (watch_->changed()) reload();
     }
   }
-  if (auto frame = thread_.take_frame()) take_frame(*std::move(frame));
+  // One that comes when all tabs are closed is of no use.
+  if (auto frame = thread_.take_frame(); frame && model_) take_frame(*std::move(frame));
   if (auto error = thread_.take_error()) {
     draw_error_ = error->message;
     asked_.clear();

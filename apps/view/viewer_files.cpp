@@ -163,6 +163,7 @@ void Viewer::close_tab(std::size_t index) {
   ++frame_serial_;
   picked_.reset();
   watch_.reset();
+  history_ = {};
   values_.clear();
   definitions_.clear();
   measurer_.cancel();

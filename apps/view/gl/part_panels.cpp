@@ -99,8 +99,7 @@ bool edit_number(const char* id, double& number, const Parameter& parameter) {
     if (by > 0) number = std::clamp(least + std::round((number - least) / by) * by, least, most);
     return true;
   }
-  return ImGui::InputDouble(id, &number, step > 0 ? step : 1.0, 0.0, "%.6g",
-                            ImGuiInputTextFlags_EnterReturnsTrue);
+  return ImGui::InputDouble(id, &number, step > 0 ? step : 1.0, 0.0, "%.6g");
 }
 
 bool edit_value(ParameterValue& value, const Parameter& parameter) {
@@ -136,23 +135,19 @@ bool edit_value(ParameterValue& value, const Parameter& parameter) {
       if (parameter.least) {
         changed |= edit_number("##value", (*vector)[i], parameter);
       } else {
-        changed |= ImGui::InputDouble("##value", &(*vector)[i], 0, 0, "%.6g",
-                                      ImGuiInputTextFlags_EnterReturnsTrue);
+        changed |= ImGui::InputDouble("##value", &(*vector)[i], 0, 0, "%.6g");
       }
       ImGui::PopID();
     }
     return changed;
   }
   auto& words = std::get<std::string>(value);
+  // What is longer than its comment allows can still be seen, and made shorter.
   constexpr std::size_t kLongest = 1000;
-  std::vector<char> buffer(
-      std::min(parameter.longest == 0 ? kLongest : parameter.longest, kLongest) + words.size() + 1);
-  if (parameter.longest > 0) buffer.resize(std::max(words.size(), parameter.longest) + 1);
+  const std::size_t longest = parameter.longest == 0 ? kLongest : parameter.longest;
+  std::vector<char> buffer(std::max(std::min(longest, kLongest), words.size()) + 1);
   std::memcpy(buffer.data(), words.data(), words.size());
-  if (!ImGui::InputText("##value", buffer.data(), buffer.size(),
-                        ImGuiInputTextFlags_EnterReturnsTrue)) {
-    return false;
-  }
+  if (!ImGui::InputText("##value", buffer.data(), buffer.size())) return false;
   words = buffer.data();
   return true;
 }
