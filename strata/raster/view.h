@@ -31,6 +31,11 @@ void centre_camera(Camera& camera, const Bounds& box);
 /// narrow pictures lose their sides
 void fit_camera(Camera& camera, const Bounds& box, double aspect = 1.0);
 
+/// Moves the target and the distance so that `box` fills the picture up to a margin of 1/24 of its
+/// sides. The rotation stays. Nothing happens for an empty box.
+/// @param aspect the picture's width / height
+void frame_camera(Camera& camera, const Bounds& box, double aspect = 1.0);
+
 /// Eye space: x right, y up, the camera looks along -z.
 [[nodiscard]] glm::dmat4 eye_from_world(const Camera& camera);
 
