@@ -17,11 +17,12 @@ constexpr const char* kCsgExamples =
 
   strata csg plate.csg                      measures as text
   strata csg plate.csg -o plate.png         from OpenSCAD's direction
-  strata csg part.scad -o part.png --size 1920,1080 --samples 16
+  strata csg part.scad -o part.png --size 1920,1080 --quality high
   strata csg part.scad -D 'width=40' -o wide.png            set a variable
   strata csg plate.stl holes.stl --expr 'plate - holes' -o part.png
   strata csg a.stl b.stl c.stl --expr '(a + b) * c' -o part.png    by position
   strata csg part.csg -o part.png --camera=0,0,5,60,0,30,140 --cut 'y>0'
+  strata csg part.csg -o part.webp --turntable 60
 
 In --expr, + and | unite, - subtracts, * and & intersect and bind first, and ^
 is exclusive or. A .scad file that sets $vpr, $vpt, $vpd or $vpf places the
@@ -60,7 +61,7 @@ void define_picture_input(CLI::App& app, Words& words) {
 }
 
 void define_picture_camera(CLI::App& app, CsgWords& csg) {
-  const Group camera = "Camera (default: OpenSCAD's direction, the whole scene in view)";
+  const Group camera = "Camera (default: OpenSCAD's direction, the result fills the picture)";
   const auto option = [&](const char* names, std::string& word, const char* what,
                           const char* value) {
     app.add_option(names, word, what)->type_name(value)->group(camera);
@@ -69,11 +70,27 @@ void define_picture_camera(CLI::App& app, CsgWords& csg) {
   option("--camera", csg.camera,
          "Target x,y,z, rotation rx,ry,rz in degrees and distance; or eye x,y,z and target x,y,z",
          "NUMBERS");
-  app.add_flag("--view-all,--viewall", csg.view_all, "Move back until everything is visible")
+  app.add_flag("--view-all,--viewall", csg.view_all,
+               "Move back until everything is visible, as OpenSCAD does: a ball fits")
       ->group(camera);
   app.add_flag("--auto-center,--autocenter", csg.auto_centre, "Look at the centre of the scene")
       ->group(camera);
   option("--projection", csg.projection, "Perspective or orthographic (default: p)", "p|o");
+}
+
+void define_films(CLI::App& app, CsgWords& csg) {
+  const Group films = "Films (-o FILE.gif, .webp, .apng, or FOLDER/ of PNG files)";
+  const auto option = [&](const char* names, std::string& word, const char* what,
+                          const char* value) {
+    app.add_option(names, word, what)->type_name(value)->group(films);
+  };
+  option("--turntable", csg.turntable,
+         "Draw N pictures of one turn about the vertical axis, 1 to 99999", "N");
+  option("--camera-file", csg.camera_file,
+         "Camera as a file, such as the window saves; with times also the path of a film", "FILE");
+  option("--frames", csg.path_frames, "Draw N pictures along the path of --camera-file", "N");
+  option("--fps", csg.fps, "Pictures a second, 0.1 to 100, of a .gif to 50 (default: 25)",
+         "NUMBER");
 }
 
 void define_picture_quality(CLI::App& app, CsgWords& csg) {
@@ -81,13 +98,21 @@ void define_picture_quality(CLI::App& app, CsgWords& csg) {
                  "One of OpenSCAD's colour schemes (default: Cornfield)")
       ->type_name("SCHEME")
       ->group(kLookGroup);
-  app.add_option("--samples", csg.samples, "Samples per pixel (default: 1)")
+  app.add_option("--quality", csg.quality, "Samples per pixel: 1, 8 or 16 (default: normal)")
+      ->type_name("draft|normal|high")
+      ->group(kLookGroup);
+  app.add_option("--samples", csg.samples, "Samples per pixel (default: those of --quality)")
       ->type_name("1|2|4|8|16|32|64")
       ->group(kLookGroup);
 }
 
 void define_picture_cuts(CLI::App& app, CsgWords& csg) {
-  app.add_flag("--transparent", csg.transparent, "Leave the background transparent")
+  app.add_option("--background", csg.background,
+                 "Background: a gradient, transparent, or a colour such as white or #f0f4f8 "
+                 "(default: that of the colour scheme)")
+      ->type_name("gradient|transparent|COLOUR")
+      ->group(kLookGroup);
+  app.add_flag("--transparent", csg.transparent, "The same as --background transparent")
       ->group(kLookGroup);
   app.add_option("--cut", csg.cuts,
                  "Section plane: x=5 removes the half towards the camera, z<10 keeps z below 10, "
@@ -111,7 +136,7 @@ void define_openscad(CLI::App& app, CsgWords& csg) {
       ->group(kOpenscadGroup);
   app.add_option("--animate", csg.frames,
                  "Draw N pictures with $t = 0, 1/N, ..., 1 to 99999: -o a.png writes a00000.png, "
-                 "a00001.png, ...")
+                 "a00001.png, ..., other names a film")
       ->type_name("N")
       ->group(kOpenscadGroup);
   app.add_option("--export-format", csg.export_format, "Format of -o; png is the only one")
@@ -161,6 +186,7 @@ void define_csg(CLI::App& app, Words& words) {
          "where a solid is not closed, 256, and up to 1024 where the error of the volume is large)",
          "N", output);
   define_picture_camera(app, csg);
+  define_films(app, csg);
   define_look(app, words);
   add_backend(app, words, "Running");
   add_common(app, words);

@@ -95,6 +95,13 @@ OitCommand oit_command(Words words, Reader& reader) {
   picture_request(words, reader, command);
   if (!reader.error()) reader.take(read_picture_options(words.csg, command));
   if (!reader.error()) reader.take(read_oit_options(words.oit, command));
+  if (words.csg.background == "gradient") {
+    reader.fail_with(
+        "--background gradient: strata oit draws one colour; give that, or transparent");
+  }
+  // Comparisons are of one sample unless told: their costs grow with the samples.
+  const bool compares = command.all || command.choices.size() > 1 || !command.report.empty();
+  if (compares && !command.asked_samples) command.picture.samples = 1;
   return command;
 }
 

@@ -15,6 +15,7 @@
 #include "strata/csg/picture/picture.h"
 #include "strata/hashbuffer/offsets.h"
 #include "strata/mesh/writers/write_solid.h"
+#include "strata/raster/camera_file.h"
 #include "strata/transparency/techniques.h"
 #include "strata/voxelize/grid_fit.h"
 #include "strata/voxelize/picture/voxel_picture.h"
@@ -111,6 +112,8 @@ struct PictureRequest {
   bool view_all = false, auto_centre = false;
   bool default_camera = false;  ///< none was given
   bool asked_view = false;      ///< --view-all or --auto-center was given
+  int turntable = 0;            ///< pictures of one turn; 0: one picture
+  bool asked_samples = false;   ///< --samples or --quality was given
   csg::PictureOptions picture;
   std::vector<csg::SectionPlane> cuts;
   std::optional<std::string> json;  ///< "-": standard output
@@ -118,11 +121,15 @@ struct PictureRequest {
 
 /// `strata csg`, and what a window shows
 struct CsgCommand : PictureRequest {
-  std::string ids, depth;  ///< files; empty: none
-  int frames = 0;          ///< pictures with $t = 0, 1/frames, ...; 0: one without
-  bool summary = false;    ///< the report as text
-  bool alone = false;      ///< nothing but a file was given: `strata part.stl`
-  bool render = false;     ///< the result alone: no ghosts, no colours, flat scenes from above
+  std::string ids, depth;         ///< files; empty: none
+  int frames = 0;                 ///< pictures with $t = 0, 1/frames, ...; 0: one without
+  int path_frames = 0;            ///< pictures along `path`; 0: one, of its first camera
+  std::string camera_file;        ///< --camera-file
+  std::vector<TimedCamera> path;  ///< of --camera-file; empty: none was given
+  double fps = 25;                ///< pictures a second of a film
+  bool summary = false;           ///< the report as text
+  bool alone = false;             ///< nothing but a file was given: `strata part.stl`
+  bool render = false;  ///< the result alone: no ghosts, no colours, flat scenes from above
   Backend backend = Backend::kAuto;
   std::optional<int> measure_resolution;  ///< of the report's measures; none: csg::MeasureOptions'
   std::vector<FileUse> outputs;           ///< of a window: the pictures that it will write

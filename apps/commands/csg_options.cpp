@@ -2,12 +2,15 @@
 
 #include <algorithm>
 #include <bit>
+#include <charconv>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <tuple>
 
+#include "apps/commands/film_options.h"
 #include "apps/session/file_conflicts.h"
 #include "apps/session/option_values.h"
+#include "strata/picture/animation.h"
 #include "strata/voxelize/formats/voxel_writer.h"
 
 namespace strata::apps {
@@ -51,6 +54,73 @@ Result<int> parse_samples(std::string_view text) {
     return fail(ErrorCode::kUsage, "--samples must be 1, 2, 4, 8, 16, 32 or 64, got '{}'", text);
   }
   return static_cast<int>(*count);
+}
+
+constexpr std::pair<std::string_view, int> kQualities[] = {
+    {"draft", 1}, {"normal", 8}, {"high", 16}};
+
+/// --samples, or as many as --quality takes.
+Result<int> read_samples(const CsgWords& words) {
+  const auto quality =
+      parse_choice("--quality", words.quality.empty() ? "normal" : words.quality, kQualities);
+  return quality && !words.samples.empty() ? parse_samples(words.samples) : quality;
+}
+
+struct NamedColour {
+  std::string_view name;
+  glm::u8vec3 colour;
+};
+/// The names of CSS 2, in its order.
+constexpr NamedColour kColours[] = {
+    {"black", {0, 0, 0}},       {"silver", {192, 192, 192}}, {"gray", {128, 128, 128}},
+    {"white", {255, 255, 255}}, {"maroon", {128, 0, 0}},     {"red", {255, 0, 0}},
+    {"purple", {128, 0, 128}},  {"fuchsia", {255, 0, 255}},  {"green", {0, 128, 0}},
+    {"lime", {0, 255, 0}},      {"olive", {128, 128, 0}},    {"yellow", {255, 255, 0}},
+    {"navy", {0, 0, 128}},      {"blue", {0, 0, 255}},       {"teal", {0, 128, 128}},
+    {"aqua", {0, 255, 255}},    {"orange", {255, 165, 0}}};
+
+/// `white`, `#ffffff` or `#fff`.
+Result<glm::u8vec3> parse_background_colour(std::string_view text) {
+  for (const NamedColour& one : kColours) {
+    if (one.name == text) return one.colour;
+  }
+  const bool hex = !text.empty() && text.front() == '#' &&
+                   text.find_first_not_of("0123456789abcdefABCDEF", 1) == std::string_view::npos;
+  if (hex && (text.size() == 7 || text.size() == 4)) {
+    const std::size_t digits = (text.size() - 1) / 3;
+    glm::u8vec3 colour;
+    for (int c = 0; c < 3; ++c) {
+      unsigned value = 0;
+      const auto part = text.substr(1 + static_cast<std::size_t>(c) * digits, digits);
+      std::from_chars(part.data(), part.data() + part.size(), value, 16);
+      colour[c] = static_cast<std::uint8_t>(digits == 1 ? value * 17 : value);
+    }
+    return colour;
+  }
+  std::string names;
+  for (const NamedColour& one : kColours) names += fmt::format(", {}", one.name);
+  return fail(ErrorCode::kUsage,
+              "--background must be gradient, transparent or a colour, got '{}'; a colour is "
+              "#rrggbb or one of{}",
+              text, names.substr(1));
+}
+
+/// --background and --transparent; nothing: the colour scheme's.
+Result<std::optional<Backdrop>> read_background(const CsgWords& words,
+                                                const csg::ColourScheme* scheme) {
+  const std::string& text = words.background;
+  if (words.transparent && !text.empty() && text != "transparent") {
+    return fail(ErrorCode::kUsage, "--transparent and --background {} cannot be combined", text);
+  }
+  if (words.transparent || text == "transparent") return Backdrop{};
+  if (text.empty()) return std::nullopt;
+  if (text == "gradient") {
+    return gradient_backdrop(
+        (scheme != nullptr ? *scheme : csg::colour_schemes().front()).background);
+  }
+  const auto colour = parse_background_colour(text);
+  if (!colour) return tl::unexpected(colour.error());
+  return plain_backdrop(*colour);
 }
 
 /// `--view edges,axes`: what openscad shows beside the scene.
@@ -137,7 +207,8 @@ Result<void> read_openscad_words(const CsgWords& words, CsgCommand& command) {
   }
   if (command.output.empty() || command.json || command.summary) {
     return fail(ErrorCode::kUsage,
-                "--animate needs -o FILE.png and cannot be combined with --json or --summary");
+                "--animate needs -o FILE.png, or a film, and cannot be combined with --json or "
+                "--summary");
   }
   return {};
 }
@@ -153,6 +224,12 @@ std::string other_writer(const std::string& path) {
 
 Result<void> check_picture_name(std::string_view asked_by, const std::string& path, bool depth) {
   if (is_stream(path) || has_extension(path, depth ? ".exr" : ".png")) return {};
+  if (!depth && check_animation_name(path)) {
+    return fail(ErrorCode::kUsage,
+                "{}{}: pictures are written as .png; films, of --turntable, --animate or --frames, "
+                "also as .gif, .webp, .apng or FOLDER/",
+                asked_by, path);
+  }
   return fail(ErrorCode::kUsage, "{}{}: {}{}", asked_by, path,
               depth ? "distances are written as .exr" : "pictures are written as .png",
               other_writer(path));
@@ -234,8 +311,9 @@ Result<void> read_picture_options(const CsgWords& words, PictureRequest& request
     take(parse_projection(words.projection), request.camera.projection);
   }
   if (!words.scheme.empty()) take(parse_scheme(words.scheme), request.picture.scheme);
-  if (!words.samples.empty()) take(parse_samples(words.samples), request.picture.samples);
-  request.picture.transparent_background = words.transparent;
+  request.asked_samples = !words.samples.empty() || !words.quality.empty();
+  take(read_samples(words), request.picture.samples);
+  take(read_background(words, request.picture.scheme), request.picture.backdrop);
   for (const std::string& cut : words.cuts) {
     take(parse_section(cut), request.cuts.emplace_back());
   }
@@ -265,6 +343,7 @@ Result<void> read_csg_options(const CsgWords& words, CsgCommand& command) {
   command.ids = words.ids;
   command.depth = words.depth;
   if (auto read = read_openscad_words(words, command); !read) return read;
+  if (auto read = read_film_options(words, command); !read) return read;
   if (command.output.empty() && command.ids.empty() && command.depth.empty() && !command.json) {
     command.summary = true;
   }
@@ -274,7 +353,7 @@ Result<void> read_csg_options(const CsgWords& words, CsgCommand& command) {
   for (const auto& [asked_by, path, depth] :
        {std::tuple("", &command.output, false), std::tuple("--ids ", &command.ids, false),
         std::tuple("--depth ", &command.depth, true)}) {
-    if (path->empty()) continue;
+    if (path->empty() || (path == &command.output && writes_film(command))) continue;
     if (auto named = check_picture_name(asked_by, *path, depth); !named) return named;
   }
   return {};

@@ -13,7 +13,8 @@ namespace strata::apps {
 /// The options of `strata csg` as words. Empty: not given.
 struct CsgWords {
   SceneWords scene;
-  std::string expression, size, camera, projection, scheme, samples, ids, depth, measure;
+  std::string expression, size, camera, projection, scheme, samples, quality, background, ids,
+      turntable, path_frames, fps, camera_file, depth, measure;
   std::string preview, render, shown, frames, export_format, summary, summary_file, csg_limit;
   std::vector<std::string> cuts;
   bool view_all = false, auto_centre = false, edges = false, transparent = false;

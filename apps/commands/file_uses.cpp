@@ -28,6 +28,12 @@ std::vector<FileUse> inputs_of(const csg::SceneInput& input) {
   return uses;
 }
 
+std::vector<FileUse> inputs_of(const CsgCommand& command) {
+  std::vector<FileUse> uses = inputs_of(command.input);
+  if (!command.camera_file.empty()) uses.push_back({"--camera-file", command.camera_file});
+  return uses;
+}
+
 std::vector<FileUse> inputs_of(const OitCommand& command) {
   std::vector<FileUse> uses = inputs_of(command.input);
   if (!command.media.empty()) uses.push_back({"--media", command.media});

@@ -13,6 +13,7 @@ template <class AnyCommand>
 [[nodiscard]] std::vector<FileUse> inputs_of(const AnyCommand& command) {
   return inputs_of(command.input);
 }
+[[nodiscard]] std::vector<FileUse> inputs_of(const CsgCommand& command);
 [[nodiscard]] std::vector<FileUse> inputs_of(const OitCommand& command);
 
 /// What a command writes.

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "apps/commands/file_uses.h"
+#include "apps/commands/film_options.h"
 #include "apps/session/file_conflicts.h"
 #include "apps/session/session.h"
 #include "apps/strata/allocation_failures.h"
@@ -17,6 +18,8 @@
 #include "csg/measure/result_bounds.h"
 #include "strata/csg/input/scene_input.h"
 #include "strata/csg/picture/picture.h"
+#include "strata/picture/animation.h"
+#include "strata/raster/camera_file.h"
 
 namespace strata::apps {
 namespace {
@@ -36,17 +39,17 @@ std::vector<csg::Ghost> ghosts_of(const csg::Scene& scene) {
 constexpr glm::u8vec3 kFlatFace{0, 247, 199};
 
 /// Red lines where the picture's outlines are, one pixel to each side, as OpenSCAD draws them.
-void draw_outlines(csg::Picture& picture, const csg::Rgba& background) {
+void draw_outlines(csg::Picture& picture, const Backdrop& backdrop) {
   const csg::Picture drawn = picture;
-  const auto at = [&](int u, int v) -> const csg::Rgba& {
+  const auto covered = [&](int u, int v) {
     return drawn.pixels[static_cast<std::size_t>(v) * static_cast<std::size_t>(drawn.width) +
-                        static_cast<std::size_t>(u)];
+                        static_cast<std::size_t>(u)] != backdrop.at(v, drawn.height);
   };
   for (int v = 0; v < drawn.height; ++v) {
     for (int u = 0; u < drawn.width; ++u) {
-      const bool inside = at(u, v) != background;
-      const bool border = (u > 0 && (at(u - 1, v) != background) != inside) ||
-                          (v > 0 && (at(u, v - 1) != background) != inside);
+      const bool inside = covered(u, v);
+      const bool border =
+          (u > 0 && covered(u - 1, v) != inside) || (v > 0 && covered(u, v - 1) != inside);
       // The line runs on the last pixel before the change and lies on both sides in turn.
       if (border) {
         picture.pixels[static_cast<std::size_t>(v) * static_cast<std::size_t>(drawn.width) +
@@ -146,8 +149,9 @@ csg::Picture picture_of_ids(const csg::SurfaceImage& surfaces, const csg::Tree& 
 /// The work of one picture, or of one report.
 class CsgRun {
  public:
-  CsgRun(CsgCommand command, Session& session)
-      : command_(std::move(command)), session_(session), look_(command_.picture) {}
+  /// @param film  gets the pictures, instead of a file; borrowed; null: there is none
+  CsgRun(CsgCommand command, Session& session, AnimationWriter* film = nullptr)
+      : command_(std::move(command)), session_(session), film_(film), look_(command_.picture) {}
 
   Result<void> run() {
     if (auto done = load(); !done) return done;
@@ -156,6 +160,9 @@ class CsgRun {
         !command_.output.empty() || !command_.ids.empty() || !command_.depth.empty();
     if (!pictures && !command_.json) return print_measures();
     if (auto done = open_preview(); !done) return done;
+    if (const int shots = command_.turntable + command_.path_frames; shots > 0) {
+      return draw_shots(shots);
+    }
     if (auto done = draw(); !done) return done;
     if (auto done = draw_numbers(); !done) return done;
     if (auto done = measure(); !done) return done;
@@ -171,6 +178,7 @@ class CsgRun {
   Result<void> print_measures();
   Result<void> open_preview();
   Result<void> draw();
+  Result<void> draw_shots(int count);
   Result<void> check_covered();
   Result<void> draw_numbers();
   Result<void> measure_tree(const csg::Tree& tree, csg::Tree::NodeId root);
@@ -190,6 +198,7 @@ class CsgRun {
 
   CsgCommand command_;
   Session& session_;
+  AnimationWriter* film_;
   CsgOutcome outcome_;
   csg::Scene scene_;
   csg::PictureOptions look_;
@@ -227,6 +236,8 @@ void CsgRun::render_alone() {
   flat_scheme_ = look_.scheme != nullptr ? *look_.scheme : csg::colour_schemes().front();
   flat_scheme_.face = kFlatFace;
   look_.scheme = &flat_scheme_;
+  // Its outlines are drawn pixel by pixel.
+  if (!command_.asked_samples) look_.samples = command_.picture.samples = 1;
   if (!command_.default_camera) return;
   command_.camera.rotation = glm::dvec3(0.0);
   command_.camera.projection = Projection::kOrthographic;
@@ -283,8 +294,7 @@ Result<void> CsgRun::draw() {
   if (!picture) return tl::unexpected(picture.error());
   picture_ = *std::move(picture);
   if (from_above_) {
-    const glm::u8vec3 ground = look_.scheme->background;
-    draw_outlines(picture_, {ground, look_.transparent_background ? 0 : 255});
+    draw_outlines(picture_, look_.backdrop.value_or(plain_backdrop(look_.scheme->background)));
   }
   outcome_.drawn = preview_->report();
   outcome_.draw_ms = session_.milliseconds() - begin;
@@ -292,6 +302,23 @@ Result<void> CsgRun::draw() {
   session_.note(fmt::format("{}, {}, {} of {} covered", counted(outcome_.solids, "solid"),
                             counted(outcome_.drawn.fragments, "crossing"), outcome_.drawn.covered,
                             counted(picture_.pixels.size(), "pixel")));
+  return {};
+}
+
+/// The pictures of a film of one scene.
+Result<void> CsgRun::draw_shots(int count) {
+  const Camera first = camera();
+  for (int shot = 0; shot < count; ++shot) {
+    if (command_.turntable > 0) {
+      camera() = turned_camera(first, shot, count);
+    } else {
+      const double begin = command_.path.front().time, end = command_.path.back().time;
+      camera() = camera_at(command_.path, begin + (end - begin) * shot / std::max(1, count - 1));
+    }
+    drawing_ = session_.execution("drawing", 1.0 / (count - shot));
+    if (auto done = draw(); !done) return done;
+    if (auto done = film_->add(picture_); !done) return done;
+  }
   return {};
 }
 
@@ -358,7 +385,8 @@ Result<void> CsgRun::measure() {
 Result<void> CsgRun::write() {
   const double begin = session_.milliseconds();
   if (!command_.output.empty()) {
-    if (auto done = csg::write_png(picture_, command_.output); !done) return done;
+    auto done = film_ != nullptr ? film_->add(picture_) : csg::write_png(picture_, command_.output);
+    if (!done) return done;
   }
   if (!command_.depth.empty()) {
     if (auto done = csg::write_depth_exr(*surfaces_, *view_, command_.depth); !done) return done;
@@ -398,16 +426,41 @@ std::string numbered(const std::string& path, int frame) {
       .string();
 }
 
+/// One of the pictures of --animate.
+CsgCommand at_time(const CsgCommand& command, int frame) {
+  CsgCommand one = command;
+  one.input.scene.openscad_options.insert(
+      one.input.scene.openscad_options.end(),
+      {"-D", fmt::format("$t={}", static_cast<double>(frame) / command.frames)});
+  return one;
+}
+
+/// --turntable, --frames, and --animate into one file or folder.
+Result<void> run_film(const CsgCommand& command, Session& session) {
+  const int count = command.frames + command.turntable + command.path_frames;
+  const auto& backdrop = command.picture.backdrop;
+  auto film =
+      create_animation(command.output, {count, command.fps, backdrop && backdrop->transparent()});
+  if (!film) return tl::unexpected(film.error());
+  if (command.frames == 0) {
+    if (auto done = CsgRun(command, session, film->get()).run(); !done) return done;
+  }
+  for (int frame = 0; frame < command.frames; ++frame) {
+    if (auto done = CsgRun(at_time(command, frame), session, film->get()).run(); !done) return done;
+  }
+  if (auto done = (*film)->finish(); !done) return done;
+  session.end_progress();
+  return commit_outputs(session);
+}
+
 }  // namespace
 
 Result<void> run_csg(const CsgCommand& command, Session& session) {
+  if (writes_film(command)) return run_film(command, session);
   if (command.frames == 0) return CsgRun(command, session).run();
   for (int frame = 0; frame < command.frames; ++frame) {
-    CsgCommand one = command;
+    CsgCommand one = at_time(command, frame);
     for (std::string* path : {&one.output, &one.ids, &one.depth}) *path = numbered(*path, frame);
-    one.input.scene.openscad_options.insert(
-        one.input.scene.openscad_options.end(),
-        {"-D", fmt::format("$t={}", static_cast<double>(frame) / command.frames)});
     const std::vector<FileUse> written = outputs_of(one);
     if (auto kept = check_files(inputs_of(one.input), written); !kept) return kept;
     session.set_outputs(written, true);

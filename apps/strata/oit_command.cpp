@@ -174,9 +174,8 @@ transparency::FrameOptions OitRun::frame_options() const {
   transparency::FrameOptions options;
   options.size = command_.size;
   options.samples = command_.picture.samples;
-  if (!command_.picture.transparent_background) {
-    options.background = glm::vec4(glm::vec3(scheme.background) / 255.0f, 1.0f);
-  }
+  const Rgba ground = command_.picture.backdrop.value_or(plain_backdrop(scheme.background)).top;
+  if (ground.a != 0) options.background = glm::vec4(ground) / 255.0f;
   return options;
 }
 

@@ -17,6 +17,9 @@ struct FittedCamera {
   Bounds box;  ///< of what can be seen; empty: it was not needed
 };
 
+/// The camera after `turn` of `turns` equal parts of a turn about the vertical axis.
+[[nodiscard]] Camera turned_camera(Camera camera, int turn, int turns);
+
 /// The camera of a picture: moved to the centre of the scene and back until all is seen, where the
 /// request asks for that. @param from_above  only outlines are seen, at z = 0
 /// @return kGeometry if the coordinates are too large; as csg::visible_box()

@@ -19,6 +19,8 @@ enum class Action {
   kKey,         ///< word: a key with its modifiers, such as ctrl+4
   kView,        ///< word: a named view, centre, all or reset
   kCamera,      ///< word: as --camera
+  kSaveCamera,  ///< word: the file
+  kLoadCamera,  ///< word: the file
   kProjection,  ///< word: as --projection
   kSection,     ///< word: off, flip, or a plane as --cut
   kGhosts,      ///< on

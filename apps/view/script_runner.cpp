@@ -6,6 +6,7 @@
 #include "apps/commands/csg_options.h"
 #include "apps/session/json_writer.h"
 #include "core/did_you_mean.h"
+#include "strata/raster/camera_file.h"
 
 namespace strata::view {
 namespace {
@@ -48,6 +49,26 @@ MouseButton button_of(const std::string& word) {
   return word == "left"    ? MouseButton::kLeft
          : word == "right" ? MouseButton::kRight
                            : MouseButton::kMiddle;
+}
+
+/// Sets, saves or loads the camera.
+Result<void> run_camera(const ScriptCommand& command, Viewer& viewer) {
+  Camera camera = viewer.camera();
+  if (command.action == Action::kSaveCamera) return write_camera(camera, command.word);
+  if (command.action == Action::kLoadCamera) {
+    const auto cameras = read_cameras(command.word);
+    if (!cameras) return tl::unexpected(cameras.error());
+    camera = cameras->front().camera;
+  } else if (command.action == Action::kProjection) {
+    camera.projection = apps::parse_projection(command.word).value_or(camera.projection);
+  } else {
+    const auto asked = apps::parse_camera(command.word);
+    if (!asked) return tl::unexpected(asked.error());
+    camera = *asked;
+    camera.projection = viewer.camera().projection;
+  }
+  viewer.set_camera(camera);
+  return {};
 }
 
 }  // namespace
@@ -106,19 +127,11 @@ Result<void> ScriptRunner::apply(const ScriptCommand& command, Viewer& viewer) {
     case Action::kView:
       viewer.look(command.word);
       return {};
-    case Action::kCamera: {
-      auto camera = apps::parse_camera(command.word);
-      if (!camera) return tl::unexpected(camera.error());
-      camera->projection = viewer.camera().projection;
-      viewer.set_camera(*camera);
-      return {};
-    }
-    case Action::kProjection: {
-      Camera camera = viewer.camera();
-      camera.projection = apps::parse_projection(command.word).value_or(camera.projection);
-      viewer.set_camera(camera);
-      return {};
-    }
+    case Action::kCamera:
+    case Action::kSaveCamera:
+    case Action::kLoadCamera:
+    case Action::kProjection:
+      return run_camera(command, viewer);
     case Action::kSection:
       return section(command, viewer);
     case Action::kGhosts: {

@@ -233,6 +233,11 @@ std::variant<apps::ParseOutcome, ViewOptions> parse_view_options(int argc,
 Result<void> check_files(ViewOptions& options, const std::vector<ScriptCommand>& commands) {
   std::vector<apps::FileUse> written;
   for (const ScriptCommand& command : commands) {
+    if (command.action == Action::kSaveCamera) {
+      written.push_back(
+          {fmt::format("{}:{}: save-camera", options.script, command.line), command.word});
+      continue;
+    }
     const bool exported = command.action == Action::kExport;
     if (!exported && command.action != Action::kScreenshot && command.action != Action::kPicture) {
       continue;

@@ -8,6 +8,7 @@
 #include "apps/commands/file_uses.h"
 #include "apps/session/file_conflicts.h"
 #include "apps/session/session.h"
+#include "csg/input/frame_scene.h"
 
 namespace strata::view {
 namespace {
@@ -117,9 +118,14 @@ void Viewer::set_viewport(const glm::ivec2& size) {
 
 void Viewer::first_camera() {
   const apps::CsgCommand& command = options_.command;
+  const double aspect = static_cast<double>(viewport_.x) / viewport_.y;
+  const bool framed = command.default_camera && !command.asked_view;
   if (command.auto_centre) centre_camera(camera_, model_->box);
-  if (command.view_all) {
-    fit_camera(camera_, model_->box, static_cast<double>(viewport_.x) / viewport_.y);
+  if (framed) {
+    // Without a stop it does not fail.
+    (void)csg::frame_scene(model_->scene, model_->box, command.cuts, {}, aspect, camera_);
+  } else if (command.view_all) {
+    fit_camera(camera_, model_->box, aspect);
     if (!(camera_.distance > 0)) camera_.distance = Camera{}.distance;  // nothing to fit
   }
   start_camera_ = camera_;

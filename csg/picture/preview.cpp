@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <functional>
 #include <glm/geometric.hpp>
@@ -12,6 +13,7 @@
 #include "csg/surface/surface_source.h"
 #include "csg/surface/surface_tiles.h"
 #include "csg/surface/tile_surface.h"
+#include "picture/average.h"
 #include "strata/csg/picture/picture.h"
 
 namespace strata::csg {
@@ -134,6 +136,8 @@ class Frame {
 
 /// Samples of a picture that are drawn at once: memory stays bounded.
 constexpr std::int64_t kSamplesAtOnce = std::int64_t{1} << 22;
+/// The same where they become pixels tile by tile and only the triangles' tiles are held.
+constexpr std::int64_t kDirectSamplesAtOnce = std::int64_t{1} << 26;
 
 }  // namespace
 
@@ -176,17 +180,25 @@ struct Preview::Impl {
   struct Look {
     const PictureOptions& options;
     Shader shader;
-    Rgba background;
+    Backdrop backdrop;
+    int height;  ///< rows of the whole picture
+    [[nodiscard]] Ground ground(int first) const { return {backdrop, first, height}; }
   };
   /// The report of a picture, and the samples of the band that is drawn.
   struct Work {
     DrawReport total;
     std::vector<Rgba> samples;
   };
-  Result<void> shade_tiles(const View& view, const Look& look, int width, std::span<Rgba> pixels,
-                           const Execution& execution, Work& work);
-  Result<void> shade_samples(const View& view, const Look& look, int width, std::span<Rgba> pixels,
-                             Execution execution, Work& work);
+  /// Rows of a picture that are drawn at once.
+  struct Band {
+    View view;      ///< of their samples
+    int first = 0;  ///< row
+    int width = 0;  ///< pixels a row
+    std::span<Rgba> pixels;
+  };
+  Result<void> shade_tiles(const Band& band, const Look& look, const Execution& execution,
+                           Work& work);
+  Result<void> shade_samples(const Band& band, const Look& look, Execution execution, Work& work);
 
   Tree tree;
   std::vector<Translucent> translucent;
@@ -205,15 +217,38 @@ Result<View> Preview::Impl::view(const Camera& camera, const glm::ivec2& size,
   return view_of_tree(tree, geometry, shown(), camera, size, execution);
 }
 
-/// Shades the pixels of a band tile by tile, while the tiles are drawn: one sample a pixel.
-Result<void> Preview::Impl::shade_tiles(const View& view, const Look& look, int width,
-                                        std::span<Rgba> pixels, const Execution& execution,
-                                        Work& work) {
+/// The pixels of one tile of samples, which begins and ends with pixels.
+std::uint64_t average_tile(const SurfaceImage& tile, const PixelRect& rect, const Shader& shader,
+                           const SampleGrid& grid, const Ground& ground, int width,
+                           std::span<Rgba> pixels) {
+  thread_local std::array<Rgba, static_cast<std::size_t>(kTilePixels)> samples;
+  const int columns = rect.u1 - rect.u0, rows = rect.v1 - rect.v0;
+  shade_tile(tile, {0, 0, columns, rows}, shader, {}, kTileSide, samples);
+  std::uint64_t covered = 0;
+  for (int v = 0; v < rows; v += grid.down) {
+    const int row = (rect.v0 + v) / grid.down;
+    const std::size_t at = static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
+                           static_cast<std::size_t>(rect.u0 / grid.across);
+    covered += average_row(samples.data() + v * kTileSide, kTileSide, grid.across, grid.down,
+                           ground.at(row),
+                           pixels.subspan(at, static_cast<std::size_t>(columns / grid.across)));
+  }
+  return covered;
+}
+
+/// Shades the pixels of a band tile by tile, while the tiles are drawn: all that memory holds of
+/// the samples are the tiles at work.
+Result<void> Preview::Impl::shade_tiles(const Band& band, const Look& look,
+                                        const Execution& execution, Work& work) {
   std::atomic<std::uint64_t> covered{0};
+  const SampleGrid grid = sample_grid(look.options.samples);
+  const Ground ground = look.ground(band.first);
   const auto on_tile = [&](const SurfaceImage& tile, const PixelRect& rect) {
-    covered += shade_tile(tile, rect, look.shader, look.background, width, pixels);
+    covered += look.options.samples == 1
+                   ? shade_tile(tile, rect, look.shader, ground, band.width, band.pixels)
+                   : average_tile(tile, rect, look.shader, grid, ground, band.width, band.pixels);
   };
-  if (auto done = frame.draw(view, execution, on_tile); !done) return done;
+  if (auto done = frame.draw(band.view, execution, on_tile); !done) return done;
   work.total.fragments += frame.report().fragments;
   work.total.resolved += frame.report().resolved;
   work.total.covered += covered;
@@ -221,9 +256,9 @@ Result<void> Preview::Impl::shade_tiles(const View& view, const Look& look, int 
 }
 
 /// Draws all samples of a band, then edges and ghosts over them, and averages them to pixels.
-Result<void> Preview::Impl::shade_samples(const View& view, const Look& look, int width,
-                                          std::span<Rgba> pixels, Execution execution, Work& work) {
-  const auto image = draw(view, execution);
+Result<void> Preview::Impl::shade_samples(const Band& band, const Look& look, Execution execution,
+                                          Work& work) {
+  const auto image = draw(band.view, execution);
   if (!image) return tl::unexpected(image.error());
   work.total.fragments += report.fragments;
   work.total.resolved += report.resolved;
@@ -233,13 +268,14 @@ Result<void> Preview::Impl::shade_samples(const View& view, const Look& look, in
   shade(**image, look.shader, Rgba(0), execution, work.samples);
   if (look.options.edges) draw_edges(**image, look.shader, across, down, execution, work.samples);
   if (!painter.empty()) {
-    if (auto done = painter.paint(view, **image, look.shader, execution, work.samples); !done) {
+    if (auto done = painter.paint(band.view, **image, look.shader, execution, work.samples);
+        !done) {
       return done;
     }
     work.total.fragments += painter.fragments();
   }
-  work.total.covered +=
-      average(work.samples, across, down, look.background, execution, width, pixels);
+  work.total.covered += average(work.samples, across, down, look.ground(band.first), execution,
+                                band.width, band.pixels);
   return {};
 }
 
@@ -257,16 +293,17 @@ Result<Picture> Preview::Impl::picture(const Camera& camera, const glm::ivec2& s
   const ColourScheme& scheme =
       options.scheme != nullptr ? *options.scheme : colour_schemes().front();
   const Look look{options, Shader(tree, geometry, *whole, scheme),
-                  options.transparent_background ? Rgba(0) : Rgba(scheme.background, 255)};
+                  options.backdrop.value_or(plain_backdrop(scheme.background)), size.y};
   Picture result{size.x, size.y, {}};
   const auto width = static_cast<std::size_t>(size.x);
   result.pixels.resize(width * static_cast<std::size_t>(size.y));
   // One row of tiles at least.
   const std::int64_t samples_a_row = std::int64_t{size.x} * across * down;
-  const int rows_at_once = static_cast<int>(std::clamp<std::int64_t>(
-      kSamplesAtOnce / samples_a_row, std::max(1, kTileSide / down), size.y));
-  const bool direct =
-      options.samples == 1 && painter.empty() && !options.edges && !frame.has_source();
+  const bool direct = painter.empty() && !options.edges && !frame.has_source();
+  const std::int64_t most = direct ? kDirectSamplesAtOnce : kSamplesAtOnce;
+  const int rows_at_once = static_cast<int>(
+      std::min<std::int64_t>(std::max<std::int64_t>(most / samples_a_row, kTileSide / down),
+                             std::min(size.y, kMaxPictureSide / down)));
   Work work;
   for (int first = 0; first < size.y; first += rows_at_once) {
     const int rows = std::min(rows_at_once, size.y - first);
@@ -278,12 +315,12 @@ Result<Picture> Preview::Impl::picture(const Camera& camera, const glm::ivec2& s
         execution.progress((first + done * rows) / static_cast<double>(size.y));
       };
     }
-    const View view = band_of(*whole, first, drawn, across, down);
-    const auto pixels = std::span(result.pixels)
-                            .subspan(static_cast<std::size_t>(first) * width,
-                                     static_cast<std::size_t>(rows) * width);
-    const auto done = direct ? shade_tiles(view, look, size.x, pixels, part, work)
-                             : shade_samples(view, look, size.x, pixels, part, work);
+    const Band band{band_of(*whole, first, drawn, across, down), first, size.x,
+                    std::span(result.pixels)
+                        .subspan(static_cast<std::size_t>(first) * width,
+                                 static_cast<std::size_t>(rows) * width)};
+    const auto done =
+        direct ? shade_tiles(band, look, part, work) : shade_samples(band, look, part, work);
     if (!done) return tl::unexpected(done.error());
   }
   if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");

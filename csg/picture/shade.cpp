@@ -3,10 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <bit>
 #include <cctype>
 #include <cmath>
 #include <glm/geometric.hpp>
+
+#include "picture/average.h"
 
 namespace strata::csg {
 namespace {
@@ -109,6 +110,7 @@ class RowShader {
   RowShader(const SurfaceImage& image, const Shader& shader, Rgba background)
       : image_(&image), shader_(&shader), background_(background) {}
 
+  void set_background(Rgba background) { background_ = background; }
   /// Colours `count` pixels from `begin` on.
   void shade(std::size_t begin, std::size_t count, Rgba* colours) {
     const std::uint32_t* depths = image_->depth.data() + begin;
@@ -194,9 +196,10 @@ std::uint64_t shade(const SurfaceImage& image, const Shader& shader, Rgba backgr
 }
 
 std::uint64_t shade_tile(const SurfaceImage& tile, const PixelRect& rect, const Shader& shader,
-                         Rgba background, int width, std::span<Rgba> colours) {
-  RowShader rows(tile, shader, background);
+                         const Ground& ground, int width, std::span<Rgba> colours) {
+  RowShader rows(tile, shader, ground.at(rect.v0));
   for (int v = rect.v0; v < rect.v1; ++v) {
+    rows.set_background(ground.at(v));
     const std::size_t at = static_cast<std::size_t>(v) * static_cast<std::size_t>(width) +
                            static_cast<std::size_t>(rect.u0);
     rows.shade(static_cast<std::size_t>(v - rect.v0) * static_cast<std::size_t>(tile.width),
@@ -241,38 +244,17 @@ void draw_edges(const SurfaceImage& image, const Shader& shader, int step_u, int
   });
 }
 
-std::uint64_t average(std::span<const Rgba> samples, int across, int down, Rgba background,
+std::uint64_t average(std::span<const Rgba> samples, int across, int down, const Ground& ground,
                       const Execution& execution, int width, std::span<Rgba> pixels) {
   const auto columns = static_cast<std::size_t>(width);
-  const auto step_u = static_cast<std::size_t>(across), step_v = static_cast<std::size_t>(down);
-  const std::size_t stride = columns * step_u;
-  const auto count = static_cast<unsigned>(across * down);
-  const int shift = std::countr_zero(count);
+  const std::size_t stride = columns * static_cast<std::size_t>(across);
   std::atomic<std::uint64_t> covered{0};
-  const auto mean = [&](const glm::uvec4& sum) {
-    if (sum.a == 0) return background;
-    if (sum.a == 255 * count) return Rgba((sum + count / 2) >> static_cast<unsigned>(shift));
-    const glm::uvec3 colour(sum);
-    if (background.a == 0) {
-      const glm::uvec3 straight = (colour * 255u + sum.a / 2) / sum.a;
-      return Rgba(glm::u8vec3(glm::min(straight, glm::uvec3(255))), (sum.a + count / 2) / count);
-    }
-    const glm::uvec3 behind = (255 * count - sum.a) * glm::uvec3(background);
-    return Rgba(glm::u8vec3((colour * 255u + behind + 255 * count / 2) / (255 * count)), 255);
-  };
   for_each_band(static_cast<int>(pixels.size() / columns), execution, [&](int first, int end) {
     std::uint64_t seen = 0;
-    for (auto v = static_cast<std::size_t>(first); v < static_cast<std::size_t>(end); ++v) {
-      for (std::size_t u = 0; u < columns; ++u) {
-        glm::uvec4 sum(0);
-        for (std::size_t y = v * step_v; y < (v + 1) * step_v; ++y) {
-          for (std::size_t x = u * step_u; x < (u + 1) * step_u; ++x) {
-            sum += glm::uvec4(samples[y * stride + x]);
-          }
-        }
-        seen += sum.a > 0 ? 1 : 0;
-        pixels[v * columns + u] = mean(sum);
-      }
+    for (int row = first; row < end; ++row) {
+      const auto v = static_cast<std::size_t>(row);
+      seen += average_row(samples.data() + v * static_cast<std::size_t>(down) * stride, stride,
+                          across, down, ground.at(row), pixels.subspan(v * columns, columns));
     }
     covered += seen;
   });

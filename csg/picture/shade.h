@@ -50,18 +50,25 @@ class Shader {
 std::uint64_t shade(const SurfaceImage& image, const Shader& shader, Rgba background,
                     const Execution& execution, std::span<Rgba> colours);
 
+/// The backdrop of some rows of a picture.
+struct Ground {
+  Backdrop backdrop;
+  int first = 0;   ///< the picture's row that is row 0 here
+  int height = 1;  ///< rows of the picture
+  [[nodiscard]] Rgba at(int row) const { return backdrop.at(first + row, height); }
+};
+
 /// The same for the pixels `rect` of an image `width` pixels wide; `tile` begins there.
 std::uint64_t shade_tile(const SurfaceImage& tile, const PixelRect& rect, const Shader& shader,
-                         Rgba background, int width, std::span<Rgba> colours);
+                         const Ground& ground, int width, std::span<Rgba> colours);
 
 /// Darkens the colours where the faces of neighbours, `step_u` and `step_v` samples apart, differ.
 void draw_edges(const SurfaceImage& image, const Shader& shader, int step_u, int step_v,
                 const Execution& execution, std::span<Rgba> colours);
 
-/// The mean of across x down samples for each pixel of a picture, over `background` (alpha 0: none;
-/// the result has straight alpha). Samples are premultiplied. @pre across * down is a power of two
+/// The mean of across x down samples for each pixel of rows `width` pixels wide, as average_row().
 /// Gives how many pixels show something.
-std::uint64_t average(std::span<const Rgba> samples, int across, int down, Rgba background,
+std::uint64_t average(std::span<const Rgba> samples, int across, int down, const Ground& ground,
                       const Execution& execution, int width, std::span<Rgba> pixels);
 
 }  // namespace strata::csg

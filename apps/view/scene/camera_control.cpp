@@ -84,7 +84,7 @@ void zoom(Camera& camera, double steps, const glm::dvec2& cursor, const glm::ive
 void view_all(Camera& camera, const Bounds& box, const glm::ivec2& size) {
   if (box.empty()) return;
   centre_camera(camera, box);
-  fit_camera(camera, box, static_cast<double>(size.x) / std::max(1, size.y));
+  frame_camera(camera, box, static_cast<double>(size.x) / std::max(1, size.y));
   // A point has no size to fit.
   if (!(camera.distance > 0)) camera.distance = Camera{}.distance;
 }

@@ -14,6 +14,7 @@
 #include "strata/core/result.h"
 #include "strata/csg/surface/surface_image.h"
 #include "strata/csg/tree.h"
+#include "strata/picture/backdrop.h"
 #include "strata/picture/pixels.h"
 #include "strata/raster/view.h"
 
@@ -50,8 +51,8 @@ struct PictureOptions {
   const ColourScheme* scheme = nullptr;  ///< null: Cornfield
   /// Samples a pixel: 1, 2, 4, 8, 16, 32 or 64, on a regular grid within it.
   int samples = 1;
-  bool transparent_background = false;  ///< alpha is 0 where no solid is
-  bool edges = false;  ///< dark lines where the faces of neighbouring pixels differ
+  std::optional<Backdrop> backdrop;  ///< what no solid covers; empty: the scheme's background
+  bool edges = false;                ///< dark lines where the faces of neighbouring pixels differ
 };
 
 class SurfaceSource;

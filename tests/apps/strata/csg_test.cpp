@@ -127,12 +127,139 @@ TEST_F(Csg, EyeAndTargetGiveThePictureOfTargetRotationAndDistance) {
   EXPECT_EQ(eye, apart);
 }
 
-TEST_F(Csg, NoCameraIsViewAllAndAutoCenterFromTheUsualSide) {
-  const Image none = draw(kCube, {"--size=100,100"});
-  EXPECT_EQ(none, draw(kCube, {"--size=100,100", "--camera=7,7,7,55,0,25,1", "--viewall",
-                               "--autocenter"}));
-  EXPECT_EQ(none, draw(kCube, {"--size=100,100", "--camera=0,0,0,55,0,25,0", "--view-all",
-                               "--auto-center"}));
+TEST_F(Csg, ViewAllAndAutoCenterFrameAsOpenScadDoesFromTheUsualSide) {
+  const Image all = draw(kCube, {"--size=100,100", "--viewall"});
+  EXPECT_EQ(all, draw(kCube, {"--size=100,100", "--autocenter"}));
+  EXPECT_EQ(all, draw(kCube,
+                      {"--size=100,100", "--camera=7,7,7,55,0,25,1", "--viewall", "--autocenter"}));
+  EXPECT_EQ(all, draw(kCube, {"--size=100,100", "--camera=0,0,0,55,0,25,0", "--view-all",
+                              "--auto-center"}));
+  EXPECT_NE(all, draw(kCube, {"--size=100,100"}));
+}
+
+/// The pixels that are not background: the first column, row, and those after the last.
+std::array<int, 4> extent(const Image& image) {
+  std::array<int, 4> box{image.width, image.height, 0, 0};
+  for (int v = 0; v < image.height; ++v) {
+    for (int u = 0; u < image.width; ++u) {
+      if (image.at(u, v) == kBackground) continue;
+      box = {std::min(box[0], u), std::min(box[1], v), std::max(box[2], u + 1),
+             std::max(box[3], v + 1)};
+    }
+  }
+  return box;
+}
+
+/// The longer side is filled up to the margin, and nothing is nearer to one border than to the
+/// opposite one.
+void expect_framed(const Image& image, const std::string& what) {
+  const auto [left, top, right, bottom] = extent(image);
+  const double across = static_cast<double>(right - left) / image.width;
+  const double down = static_cast<double>(bottom - top) / image.height;
+  const double pixels = 2.0 / std::min(image.width, image.height);
+  EXPECT_NEAR(std::max(across, down), 1 - 2 / 24.0, pixels + 0.005) << what;
+  EXPECT_NEAR(left, image.width - right, 2 + 0.005 * image.width) << what;
+  EXPECT_NEAR(top, image.height - bottom, 2 + 0.005 * image.height) << what;
+}
+
+TEST_F(Csg, TheResultFillsThePicture) {
+  const std::string ball = "sphere($fn = 64, r = 10);\n";
+  const std::string rod =
+      "multmatrix([[1, 0, 0, 40], [0, 1, 0, -7], [0, 0, 1, 3], [0, 0, 0, 1]])"
+      " { cube(size = [1, 1, 90], center = true); }\n";
+  for (const char* size : {"--size=200,200", "--size=300,120", "--size=90,240"}) {
+    for (const char* projection : {"--projection=p", "--projection=o"}) {
+      for (const std::string& scene : {std::string(kDrilled), ball, rod}) {
+        expect_framed(draw(scene, {size, projection}), scene + size + projection);
+      }
+    }
+  }
+}
+
+TEST_F(Csg, WhatIsTakenAwayDoesNotCountForTheFrame) {
+  const std::string cutter =
+      "multmatrix([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 300], [0, 0, 0, 1]])"
+      " { cube(size = [2, 2, 700], center = true); }\n";
+  const Image drilled =
+      draw("difference() {\n  cube(size = [10, 10, 10], center = true);\n" + cutter + "}\n",
+           {"--size=200,200"});
+  expect_framed(drilled, "a long drill");
+  EXPECT_EQ(extent(drilled),
+            extent(draw("cube(size = [10, 10, 10], center = true);\n", {"--size=200,200"})));
+  const std::string both = "intersection() {\n  sphere($fn = 64, r = 10);\n" + cutter + "}\n";
+  expect_framed(draw(both, {"--size=200,200"}), "an intersection");
+  const std::string bar = "cube(size = [100, 10, 10], center = true);\n";
+  expect_framed(draw(bar, {"--size=200,200", "--cut=x<-30"}), "one section");
+  expect_framed(draw(bar, {"--size=200,200", "--cut=x<-30", "--cut=1,1,1,-40"}), "two sections");
+  expect_framed(draw("sphere($fn = 64, r = 10);\n",
+                     {"--size=200,200", "--cut=x>0", "--cut=y<0", "--cut=z>0"}),
+                "an eighth of a ball");
+}
+
+TEST_F(Csg, ThinTwigsAreWholeInADefaultPicture) {
+  // A rod of 0.03 pixels: one sample a pixel meets it here and there.
+  const std::string twig =
+      "multmatrix([[1, 0, 0, 50.3], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])"
+      " { cube(size = [0.3, 0.3, 100]); }\ncube(size = [1, 1, 100]);\n"
+      "multmatrix([[1, 0, 0, 99], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])"
+      " { cube(size = [1, 1, 100]); }\n";
+  const auto rows_with_twig = [](const Image& image) {
+    int rows = 0;
+    for (int v = 20; v < 80; ++v) {
+      bool seen = false;
+      for (int u = 35; u < 65; ++u) seen = seen || image.at(u, v) != kBackground;
+      rows += seen ? 1 : 0;
+    }
+    return rows;
+  };
+  const std::vector<std::string> front{"--camera=50,0,50,90,20,0,300", "--size=100,100"};
+  const int all = rows_with_twig(draw(twig, front));
+  EXPECT_EQ(all, 60);
+  EXPECT_LT(rows_with_twig(draw(twig, {front[0], front[1], "--quality=draft"})), all);
+}
+
+TEST_F(Csg, QualitiesAreNumbersOfSamples) {
+  const std::vector<std::pair<const char*, const char*>> same{{"--quality=draft", "--samples=1"},
+                                                              {"--quality=normal", "--samples=8"},
+                                                              {"--quality=high", "--samples=16"}};
+  std::vector<Image> drawn;
+  for (const auto& [quality, samples] : same) {
+    drawn.push_back(draw(kDrilled, {"--size=60,60", quality}));
+    EXPECT_EQ(drawn.back(), draw(kDrilled, {"--size=60,60", samples})) << quality;
+    EXPECT_EQ(draw(kDrilled, {"--size=60,60", quality, "--samples=2"}),
+              draw(kDrilled, {"--size=60,60", "--samples=2"}));
+  }
+  EXPECT_EQ(drawn[1], draw(kDrilled, {"--size=60,60"}));
+  EXPECT_NE(drawn[0], drawn[1]);
+  EXPECT_NE(drawn[1], drawn[2]);
+}
+
+TEST_F(Csg, BackgroundsLieBehindThePicture) {
+  const std::vector<std::string> small{"--size=40,40"};
+  const Image clear = draw(kCube, {"--size=40,40", "--background=transparent"});
+  EXPECT_EQ(clear, draw(kCube, {"--size=40,40", "--transparent"}));
+  for (const auto& [name, colour] :
+       {std::pair("white", Pixel{255, 255, 255, 255}), std::pair("#102030", Pixel{16, 32, 48, 255}),
+        std::pair("#fA0", Pixel{255, 170, 0, 255})}) {
+    const Image image = draw(kCube, {"--size=40,40", std::string("--background=") + name});
+    EXPECT_EQ(image.at(0, 0), colour) << name;
+    EXPECT_EQ(image.at(39, 39), colour) << name;
+    // Between the two: what covers a pixel in part is blended with it.
+    for (std::size_t i = 0; i < image.pixels.size(); ++i) {
+      const int alpha = clear.pixels[i][3];
+      for (std::size_t c = 0; c < 3; ++c) {
+        const double blended = (clear.pixels[i][c] * alpha + colour[c] * (255.0 - alpha)) / 255.0;
+        ASSERT_NEAR(image.pixels[i][c], blended, 2.0) << name << ' ' << i;
+      }
+    }
+  }
+  const Image gradient = draw(kCube, {"--size=40,40", "--background=gradient"});
+  for (int v = 1; v < 40; ++v) {
+    EXPECT_EQ(gradient.at(0, v), gradient.at(39, v));
+    EXPECT_LE(gradient.at(0, v)[0], gradient.at(0, v - 1)[0]);
+  }
+  EXPECT_GT(gradient.at(0, 0)[0], gradient.at(0, 39)[0] + 20);
+  EXPECT_EQ(gradient.at(20, 20), draw(kCube, small).at(20, 20));
 }
 
 TEST_F(Csg, ProjectionsHaveOpenScadsNames) {
@@ -216,6 +343,12 @@ TEST_F(Csg, MistakesInOptionsAreNamed) {
   EXPECT_TRUE(has(says("--projection=fisheye"), "--projection must be"));
   EXPECT_TRUE(has(says("--colorscheme=pink"), "Cornfield"));
   EXPECT_TRUE(has(says("--samples=3"), "--samples must be 1, 2, 4, 8, 16, 32 or 64"));
+  EXPECT_TRUE(has(says("--quality=best"), "--quality must be draft, normal or high"));
+  EXPECT_TRUE(has(says("--background=mauve"), "--background must be gradient, transparent or a"));
+  EXPECT_TRUE(
+      has(says("--background=#12345"), "got '#12345'; a colour is #rrggbb or one of black"));
+  EXPECT_TRUE(has(refused({"scene.csg", "-o", "out.png", "--transparent", "--background=red"}, 2),
+                  "--transparent and --background red cannot be combined"));
   EXPECT_TRUE(has(says("--cut=w=3"), "--cut must be a plane"));
   EXPECT_TRUE(has(says("--cut=x=far"), "--cut must be a plane"));
   EXPECT_TRUE(has(says("--cut=0,0,0,1"), "must be finite and not 0"));
@@ -414,7 +547,8 @@ TEST_F(Csg, GhostsAreSeenAndRenderLeavesThemOut) {
 }
 
 TEST_F(Csg, IdsAreColoursThatTheReportExplains) {
-  const Image shaded = draw(kDrilled, {"--ids=ids.png", "--json", "--size=100,100"});
+  const Image shaded =
+      draw(kDrilled, {"--ids=ids.png", "--json", "--size=100,100", "--quality=draft"});
   const json report = json::parse(last.out);
   std::set<std::string> legend;
   for (const json& entry : report["ids"]) legend.insert(entry["colour"].get<std::string>());
@@ -442,9 +576,9 @@ TEST_F(Csg, TransparentBackgroundsAndSchemes) {
 }
 
 TEST_F(Csg, SamplesAndEdgesChangeOnlyWhatTheySay) {
-  const Image plain = draw(kCube, {"--size=100,100"});
+  const Image plain = draw(kCube, {"--size=100,100", "--samples=1"});
   const Image smooth = draw(kCube, {"--size=100,100", "--samples=16"});
-  const Image edges = draw(kCube, {"--size=100,100", "--edges"});
+  const Image edges = draw(kCube, {"--size=100,100", "--samples=1", "--edges"});
   std::size_t changed = 0, dark = 0;
   for (std::size_t i = 0; i < plain.pixels.size(); ++i) {
     changed += plain.pixels[i] != smooth.pixels[i] ? 1 : 0;
@@ -523,6 +657,143 @@ TEST_F(Csg, TheDocumentationNamesExactlyWhatJsonPrints) {
 TEST_F(Csg, ThePictureDoesNotDependOnThreads) {
   const Image one = draw(kDrilled, {"-j1", "--samples=4", "--edges"});
   EXPECT_EQ(one, draw(kDrilled, {"-j3", "--samples=4", "--edges"}));
+}
+
+std::size_t count_of(const std::string& text, const std::string& part) {
+  std::size_t count = 0;
+  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) {
+    ++count;
+  }
+  return count;
+}
+
+TEST_F(Csg, ATurntableIsPicturesOfTurnedCameras) {
+  place.write("scene.csg", kDrilled);
+  const auto run = place.run({"csg", "scene.csg", "--turntable=4", "-o", "turn/", "--size=60,40",
+                              "--camera=1,2,3,60,0,20,60"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(run.err + run.out, "");
+  for (int i = 0; i < 4; ++i) {
+    const std::string camera = "--camera=1,2,3,60,0," + std::to_string(20 + 90 * i) + ",60";
+    EXPECT_EQ(decode(place.read("turn/000" + std::to_string(i) + ".png")),
+              draw(kDrilled, {"--size=60,40", camera}))
+        << i;
+  }
+  EXPECT_FALSE(place.has("turn/0004.png"));
+}
+
+TEST_F(Csg, ATurntableKeepsTheResultInViewFromAllSides) {
+  place.write("scene.csg", "cube(size = [30, 3, 8], center = false);\n");
+  const auto run = place.run({"csg", "scene.csg", "--turntable=12", "-o", "turn/", "--size=90,60"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  double widest = 0;
+  for (int i = 0; i < 12; ++i) {
+    const Image image = decode(
+        place.read(std::string("turn/00") + (i < 10 ? "0" : "") + std::to_string(i) + ".png"));
+    const auto [left, top, right, bottom] = extent(image);
+    EXPECT_GT(left, 0);
+    EXPECT_GT(top, 0);
+    EXPECT_LT(right, 90);
+    EXPECT_LT(bottom, 60);
+    widest = std::max({widest, (right - left) / 90.0, (bottom - top) / 60.0});
+  }
+  EXPECT_GT(widest, 0.8);
+}
+
+TEST_F(Csg, FilmsAreFilesOfTheirKinds) {
+  place.write("scene.csg", kDrilled);
+  const std::vector<std::string> film{"csg", "scene.csg", "--turntable=3", "--size=40,30", "-o"};
+  const auto write = [&](const std::string& name) {
+    std::vector<std::string> words = film;
+    words.push_back(name);
+    return place.run(words);
+  };
+  ASSERT_EQ(write("a.apng").exit_code, 0);
+  EXPECT_EQ(count_of(place.read("a.apng"), "fcTL"), 3u);
+  for (const auto& [name, head] : {std::pair("a.gif", "GIF89a"), std::pair("a.webp", "RIFF")}) {
+    const auto run = write(name);
+    if (run.exit_code == 2) {
+      EXPECT_TRUE(has(run.err, "this build has no lib") || has(run.err, "this build has no gif"));
+      EXPECT_FALSE(place.has(name));
+      continue;
+    }
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    EXPECT_EQ(place.read(name).substr(0, std::string(head).size()), head);
+  }
+}
+
+TEST_F(Csg, CameraFilesPlaceTheCamera) {
+  const std::string file = "target 5 5 5 # the middle\n\nrotation 70 0 15\ndistance 50\nfov 30\n";
+  place.write("camera.txt", file + "projection orthographic\n");
+  const Image image = draw(kCube, {"--size=60,60", "--camera-file=camera.txt", "--projection=p"});
+  place.write("eye.txt", "eye 5 -45 5\ntarget 5 5 5\n");
+  EXPECT_EQ(draw(kCube, {"--size=60,60", "--camera-file=eye.txt"}),
+            draw(kCube, {"--size=60,60", "--camera=5,-45,5,5,5,5"}));
+  place.write("same.txt", file);
+  EXPECT_EQ(image, draw(kCube, {"--size=60,60", "--camera-file=same.txt"}));
+  EXPECT_NE(image, draw(kCube, {"--size=60,60", "--camera-file=camera.txt"}));
+  const auto wrong = [&](const std::string& text, const std::string& says) {
+    place.write("camera.txt", text);
+    last = place.run({"csg", "scene.csg", "-o", "no.png", "--camera-file=camera.txt"});
+    EXPECT_EQ(last.exit_code, 2);
+    EXPECT_TRUE(has(last.err, says)) << last.err;
+    EXPECT_FALSE(place.has("no.png"));
+  };
+  wrong("target 1 2\n", "camera.txt:1: target needs 3 numbers, got 2");
+  wrong("\ndistance x\n", "camera.txt:2: distance must be a finite number, got 'x'");
+  wrong("distance -1\n", "camera.txt:1: the distance must be above 0, got -1");
+  wrong("fov 180\n", "camera.txt:1: fov must be between 0 and 180 degrees, got 180");
+  wrong("zoom 2\n", "camera.txt:1: 'zoom' is none of target");
+  wrong("time 1\ntime 1\n", "camera.txt:2: the time 1 must be above the one before it, 1");
+  wrong("eye 1 2 3\ntarget 1 2 3\n", "eye and target must differ");
+  wrong("# nothing\n", "camera.txt: there is no camera in it");
+  wrong("projection fisheye\n", "camera.txt:1: projection must be perspective or orthographic");
+  const auto none = place.run({"csg", "scene.csg", "-o", "no.png", "--camera-file=none.txt"});
+  EXPECT_EQ(none.exit_code, 2);
+  EXPECT_TRUE(has(none.err, "none.txt: the file cannot be opened")) << none.err;
+}
+
+TEST_F(Csg, AFilmAlongAPathGoesThroughItsCameras) {
+  place.write("scene.csg", kDrilled);
+  place.write("path.txt",
+              "eye 40 0 10\ntarget 0 0 0\ntime 1\neye 0 40 20\ntime 3\neye -40 0 5\nfov 40\n");
+  const auto run = place.run(
+      {"csg", "scene.csg", "--camera-file=path.txt", "--frames=4", "-o", "path/", "--size=40,40"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(decode(place.read("path/0000.png")),
+            draw(kDrilled, {"--size=40,40", "--camera=40,0,10,0,0,0"}));
+  EXPECT_EQ(decode(place.read("path/0001.png")),
+            draw(kDrilled, {"--size=40,40", "--camera=0,40,20,0,0,0"}));
+  EXPECT_NE(place.read("path/0002.png"), place.read("path/0003.png"));
+}
+
+TEST_F(Csg, MistakesInFilmsAreNamed) {
+  place.write("scene.csg", kCube);
+  place.write("one.txt", "distance 50\n");
+  const auto says = [&](std::vector<std::string> options) {
+    options.insert(options.begin(), "scene.csg");
+    return refused(options, 2);
+  };
+  EXPECT_TRUE(
+      has(says({"--turntable=0", "-o", "a.apng"}), "--turntable must be 1 to 99999, got 0"));
+  EXPECT_TRUE(has(says({"--turntable=3", "-o", "a.png"}), "written as .gif, .webp or .apng"));
+  EXPECT_TRUE(has(says({"--turntable=3", "-o", "-"}), "--turntable cannot write to the stream -"));
+  EXPECT_TRUE(has(says({"--turntable=3"}), "--turntable needs -o FILE.gif"));
+  EXPECT_TRUE(has(says({"--turntable=3", "-o", "a.apng", "--json"}), "cannot be combined with"));
+  EXPECT_TRUE(has(says({"-o", "a.gif"}), "pictures are written as .png; films"));
+  EXPECT_TRUE(has(says({"-o", "a.png", "--fps=3"}), "--fps needs --turntable"));
+  EXPECT_TRUE(has(says({"-o", "a.apng", "--turntable=3", "--fps=200"}),
+                  "--fps must be 0.1 to 100, got 200"));
+  EXPECT_TRUE(has(says({"-o", "a.gif", "--turntable=3", "--fps=60"}),
+                  "--fps must be 0.1 to 50 for a .gif, got 60"));
+  EXPECT_TRUE(has(says({"-o", "a.apng", "--frames=3"}), "--frames needs --camera-file"));
+  EXPECT_TRUE(has(says({"-o", "a.apng", "--frames=3", "--camera-file=one.txt"}),
+                  "--frames needs several cameras, and one.txt has 1"));
+  EXPECT_TRUE(has(says({"-o", "a.png", "--camera-file=one.txt", "--camera=0,0,0,0,0,0,5"}),
+                  "--camera and --camera-file cannot be combined"));
+  EXPECT_TRUE(has(says({"-o", "one.txt", "--camera-file=one.txt"}), "one.txt"));
+  EXPECT_FALSE(place.has("a.apng"));
+  EXPECT_FALSE(place.has("a.gif"));
 }
 
 }  // namespace

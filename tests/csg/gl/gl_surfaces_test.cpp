@@ -367,7 +367,7 @@ TEST_F(GlSurface, PicturesOfAllKindsAreTheCpus) {
         PictureOptions options;
         options.samples = samples;
         options.edges = edges;
-        options.transparent_background = samples == 4;
+        if (samples == 4) options.backdrop.emplace();
         Preview own(tree, ghosts, 0), other(tree, ghosts, 0);
         other.set_source(source_.get());
         const auto expected = own.picture(camera, {150, 90}, options);

@@ -208,7 +208,7 @@ TEST(Picture, SamplesGiveTheShareOfAPixelThatIsCovered) {
     Preview preview(std::move(tree), {}, 0);
     PictureOptions options;
     options.samples = samples;
-    options.transparent_background = true;
+    options.backdrop.emplace();
     const int side = 16;
     const Picture picture = draw(preview, from_above(4, side), {side, side}, options);
     double worst = 0, sum = 0;
@@ -288,7 +288,7 @@ TEST(Picture, ATransparentBackgroundHasStraightAlpha) {
   Preview preview(std::move(tree), {}, 0);
   PictureOptions options;
   options.samples = 4;
-  options.transparent_background = true;
+  options.backdrop.emplace();
   const Picture picture = draw(preview, from_above(1, 8), {8, 8}, options);
   EXPECT_EQ(at(picture, 6, 4), Rgba(0));
   EXPECT_LE(difference(at(picture, 4, 4), Rgba(glm::u8vec3(lit(kYellow)), 128)), 1);
