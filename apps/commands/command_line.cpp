@@ -27,11 +27,11 @@ Five commands to try in the folder of the project:
 
   strata view data/plate.csg                          look at a scene in a window
   strata voxelize data/knot.obj -o knot.vdb           voxels, 256 along the longest side
+  strata picture knot.vdb -o knot.png                 a picture of the voxels
   strata csg data/plate.csg --cut y=0 -o plate.png    a picture of a scene, cut open
   strata mesh data/plate.csg -o plate.3mf             the exact mesh, for a slicer
-  strata info data/open_sphere.off                    sizes, volume and holes of a mesh
 
-`strata FILE` measures a mesh or a scene. `strata --help` lists all commands, and
+`strata FILE` says what a file holds and measures it. `strata --help` lists all commands, and
 `strata COMMAND --help` lists the options of a command.
 )";
 
@@ -628,6 +628,7 @@ Command parse_command_line(int argc, const char* const* argv) {
     first = 1;
     alone = argc == 2;
   }
+  if (name == "info" && argc == 3 && is_voxel_file(argv[2])) name = "picture";  // without an output
   // Only the options of the command that was named are built: that is most of the time CLI11 takes.
   Words words;
   CLI::App app("", "strata " + std::string(name));

@@ -148,7 +148,9 @@ PictureCommand picture_command(Words words, Reader& reader) {
             : fmt::format("{} is for voxels, but {} is not a file of voxels", option,
                           files.front()));
   }
-  if (command.output.empty()) reader.fail_with("no output is given: give -o FILE.png");
+  if (command.output.empty() && !command.voxels) {
+    reader.fail_with("no output is given: give -o FILE.png");
+  }
   return command;
 }
 
