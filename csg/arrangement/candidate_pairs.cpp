@@ -44,8 +44,8 @@ std::vector<bool> find_embedded(const WeldedSolids& solids, const MeshEdges& edg
     const auto corner = [&](std::uint32_t use, std::uint32_t next) {
       return corner_of(solids.triangles, use, next);
     };
-    const bool simple = uses.size() == 2 && solids.content_of[t] == content &&
-                        content < solid_count && corner(uses[0], 0) == corner(uses[1], 1);
+    const bool simple = solids.content_of[t] == content && content < solid_count &&
+                        to_and_fro(solids.triangles, uses);
     if (!simple) {
       for (const std::uint32_t use : uses) {
         for (const SolidCount& count : solids.content(use / 3)) facts[count.solid].possible = false;
@@ -96,13 +96,11 @@ std::vector<std::uint8_t> find_plain(const WeldedSolids& solids, const MeshEdges
                                      const Execution& execution) {
   std::vector<std::uint8_t> plain =
       plain_stars(std::span<const LatticePoint>(solids.vertices), solids.triangles, execution);
-  const auto corner = [&](std::uint32_t use, std::uint32_t next) {
-    return corner_of(solids.triangles, use, next);
-  };
   for (std::uint32_t e = 0; e < edges.size(); ++e) {  // a fan has no other edges
     const auto uses = edges.uses_of(e);
-    if (uses.size() == 2 && corner(uses[0], 0) == corner(uses[1], 1)) continue;
-    plain[corner(uses[0], 0)] = plain[corner(uses[0], 1)] = 0;
+    if (to_and_fro(solids.triangles, uses)) continue;
+    plain[corner_of(solids.triangles, uses[0], 0)] = 0;
+    plain[corner_of(solids.triangles, uses[0], 1)] = 0;
   }
   return plain;
 }

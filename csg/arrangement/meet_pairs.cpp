@@ -337,23 +337,29 @@ void join_parts(const ArrangementInput& input, std::vector<CutLinesPart> parts, 
 
 Result<void> meet_pairs(const ArrangementInput& input, std::span<const BoxPair> pairs,
                         PointTable& points, CutLines& lines, const Execution& execution) {
-  constexpr std::size_t kBlock = 4096;
+  constexpr std::size_t kBlock = 1024;
   lines.touched.assign(input.edges.size(), false);
   for (const auto& [first, second] : pairs) {  // before any other point may be made there
     for (const std::uint32_t t : {first, second}) {
       for (int k = 0; k < 3; ++k) points.insert_vertex(input.triangles[t][k]);
     }
   }
-  std::vector<CutLinesPart> parts((pairs.size() + kBlock - 1) / kBlock);
-  parallel_for(execution, parts.size(), [&](std::size_t part, int) {
-    PairMeeter meeter(input, points.points(), parts[part]);
-    const std::size_t begin = part * kBlock;
-    for (const BoxPair& pair : pairs.subspan(begin, std::min(kBlock, pairs.size() - begin))) {
-      meeter.meet(pair);
-    }
-  });
-  if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
-  join_parts(input, std::move(parts), points, lines);
+  // Some blocks at a time, so that few points wait for their numbers.
+  const std::size_t batch =
+      kBlock * std::max<std::size_t>(16, 4 * static_cast<std::size_t>(execution.thread_count()));
+  for (std::size_t first = 0; first < pairs.size(); first += batch) {
+    const auto some = pairs.subspan(first, std::min(batch, pairs.size() - first));
+    std::vector<CutLinesPart> parts((some.size() + kBlock - 1) / kBlock);
+    parallel_for(execution, parts.size(), [&](std::size_t part, int) {
+      PairMeeter meeter(input, points.points(), parts[part]);
+      const std::size_t begin = part * kBlock;
+      for (const BoxPair& pair : some.subspan(begin, std::min(kBlock, some.size() - begin))) {
+        meeter.meet(pair);
+      }
+    });
+    if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+    join_parts(input, std::move(parts), points, lines);
+  }
   return {};
 }
 

@@ -43,9 +43,8 @@ class EdgeCollector {
 
   // Whether two triangles of the same solids continue each other across a mesh edge.
   bool continues(std::span<const std::uint32_t> uses) const {
-    return uses.size() == 2 &&
-           input_.solids.content_of[uses[0] / 3] == input_.solids.content_of[uses[1] / 3] &&
-           input_.corner(uses[0], 0) == input_.corner(uses[1], 1);
+    return to_and_fro(input_.triangles, uses) &&
+           input_.solids.content_of[uses[0] / 3] == input_.solids.content_of[uses[1] / 3];
   }
 
   void list_edges(Pieces& pieces, const std::vector<bool>& cut) {

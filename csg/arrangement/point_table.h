@@ -29,6 +29,12 @@ class PointTable {
   /// The point that a recipe makes.
   std::uint32_t find_or_add(const NewPoint& point);
 
+  /// No more points are looked for.
+  void stop_finding() {
+    slots_ = {};
+    inserted_ = {};
+  }
+
   const BoundaryPoints& points() const { return points_; }
   BoundaryPoints take() { return std::move(points_); }
 

@@ -44,6 +44,12 @@ inline std::uint32_t corner_of(std::span<const glm::uvec3> triangles, std::uint3
   return triangles[use / 3][static_cast<int>((use % 3 + next) % 3)];
 }
 
+/// Whether an edge has two triangles that continue each other: it runs to and fro. @param uses of
+/// it
+inline bool to_and_fro(std::span<const glm::uvec3> triangles, std::span<const std::uint32_t> uses) {
+  return uses.size() == 2 && corner_of(triangles, uses[0], 0) == corner_of(triangles, uses[1], 1);
+}
+
 /// The edges of a mesh's triangles, each with all its triangles.
 struct MeshEdges {
   /// The edge of each side: [3 * triangle + side].

@@ -44,8 +44,8 @@ Result<BoundaryFaces> arrange_solids(LatticeSolids solids, const Tree& tree, Tre
   const auto report_done = [&](double done) {
     if (execution.progress) execution.progress(done);
   };
-  const auto pairs = find_candidate_pairs(*welded, edges, tree.solids().size(), zone,
-                                          detail::share_of(execution, 0.1, 0.4));
+  auto pairs = find_candidate_pairs(*welded, edges, tree.solids().size(), zone,
+                                    detail::share_of(execution, 0.1, 0.4));
   if (!pairs) return tl::unexpected(pairs.error());
   PointTable table(BoundaryPoints(std::move(welded->vertices), std::move(welded->triangles)));
   const BoundaryPoints& points = table.points();
@@ -54,14 +54,20 @@ Result<BoundaryFaces> arrange_solids(LatticeSolids solids, const Tree& tree, Tre
   if (auto met = meet_pairs(input, *pairs, table, lines, execution); !met) {
     return tl::unexpected(met.error());
   }
+  report.pairs = pairs->size();
+  *pairs = {};  // here and below: memory goes as soon as it can
   report_done(0.6);
   if (auto crossed = cross_lines(input, table, lines, execution); !crossed) {
     return tl::unexpected(crossed.error());
   }
   report_done(0.7);
-  const SortedLines sorted = sort_lines(input, points, lines);
-  const auto pieces = find_pieces(input, points, lines, sorted, execution);
+  table.stop_finding();
+  std::optional<SortedLines> sorted = sort_lines(input, points, lines);
+  lines.line_points = {};
+  const auto pieces = find_pieces(input, points, lines, *sorted, execution);
   if (!pieces) return tl::unexpected(pieces.error());
+  sorted.reset();
+  lines.cuts = {};
   report_done(0.85);
   const auto lists = find_radial_lists(input, lines, *pieces, execution);
   if (!lists) return tl::unexpected(lists.error());
@@ -71,7 +77,6 @@ Result<BoundaryFaces> arrange_solids(LatticeSolids solids, const Tree& tree, Tre
                                        rules, !face_rules.label_of_solid.empty(), execution);
   if (!values) return tl::unexpected(values.error());
   report_done(0.95);
-  report.pairs = pairs->size();
   report.points = points.size() - points.vertices().size();
   report.pieces = pieces->triangle_of.size();
   report.cells = lists->cell_count;
