@@ -79,7 +79,7 @@ def passes_openscad_rule(ours, expected):
 
 def compare(strata, scene, expected, output):
     run = subprocess.run([strata, "csg", scene, "-o", output, "--size", "512,512", "-j", "1", "--render", "--viewall",
-                          "--autocenter", "--quality", "draft"],
+                          "--autocenter", "--quality", "draft", "--colorscheme", "Cornfield"],
                          capture_output=True, text=True, timeout=600)
     target = load(expected)
     ours = load(output) if run.returncode == 0 else np.broadcast_to(BACKGROUND, target.shape)

@@ -90,7 +90,7 @@ def main():
         openscad = ["openscad", "-o", picture, "--imgsize=1024,1024"]
         for scene in scenes:
             ours, theirs = [], []
-            strata = [options.strata, "csg", str(scene), "-o", picture, "--size", "1024,1024"]
+            strata = [options.strata, "csg", str(scene), "-o", picture, "--size", "1024,1024", "--colorscheme", "Cornfield"]
             for i in range(options.rounds + 1):
                 ours.append(seconds(strata, options.limit))
                 if float("inf") not in theirs:

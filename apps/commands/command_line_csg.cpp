@@ -95,7 +95,8 @@ void define_films(CLI::App& app, CsgWords& csg) {
 
 void define_picture_quality(CLI::App& app, CsgWords& csg) {
   app.add_option("--colorscheme", csg.scheme,
-                 "One of OpenSCAD's colour schemes (default: Cornfield)")
+                 "Neutral, or one of OpenSCAD's, with its lights and facets (default: Neutral; of "
+                 "strata oit Cornfield)")
       ->type_name("SCHEME")
       ->group(kLookGroup);
   app.add_option("--quality", csg.quality, "Samples per pixel: 1, 8 or 16 (default: normal)")
@@ -159,6 +160,19 @@ void define_look(CLI::App& app, Words& words) {
                "Draw the result alone: no ghosts, no colours, flat scenes from above")
       ->group(kLookGroup);
   app.add_flag("--edges", csg.edges, "Draw dark lines along the edges of faces")->group(kLookGroup);
+  app.add_option("--crease", csg.crease,
+                 "Draw faces that meet at less than this as one curved surface, 0 to 180; 0: as "
+                 "facets (default: 30; under OpenSCAD's schemes 0)")
+      ->type_name("DEGREES")
+      ->group(kLookGroup);
+  app.add_option("--occlusion", csg.occlusion,
+                 "Darken corners and holes, which see little around them (default: on; under "
+                 "OpenSCAD's schemes off)")
+      ->type_name("on|off")
+      ->group(kLookGroup);
+  app.add_option("--caps", csg.caps, "Faces of --cut under the scheme Neutral (default: hatched)")
+      ->type_name("plain|hatched")
+      ->group(kLookGroup);
   define_picture_cuts(app, csg);
 }
 

@@ -21,6 +21,9 @@ constexpr std::pair<std::string_view, Projection> kProjections[] = {
     {"o", Projection::kOrthographic},          {"ortho", Projection::kOrthographic},
     {"orthogonal", Projection::kOrthographic}, {"orthographic", Projection::kOrthographic}};
 
+constexpr std::pair<std::string_view, bool> kOnOff[] = {{"on", true}, {"off", false}};
+constexpr std::pair<std::string_view, bool> kHatched[] = {{"hatched", true}, {"plain", false}};
+
 /// `512,512`, and `512x512` as people write it.
 Result<glm::ivec2> parse_size(std::string_view text) {
   const std::size_t mark = text.find_first_of(",x");
@@ -115,12 +118,34 @@ Result<std::optional<Backdrop>> read_background(const CsgWords& words,
   if (words.transparent || text == "transparent") return Backdrop{};
   if (text.empty()) return std::nullopt;
   if (text == "gradient") {
-    return gradient_backdrop(
-        (scheme != nullptr ? *scheme : csg::colour_schemes().front()).background);
+    return gradient_backdrop((scheme != nullptr ? *scheme : csg::default_scheme()).background);
   }
   const auto colour = parse_background_colour(text);
   if (!colour) return tl::unexpected(colour.error());
   return plain_backdrop(*colour);
+}
+
+/// How faces look: --crease, --occlusion, --caps.
+Result<void> read_shading(const CsgWords& words, csg::PictureOptions& picture) {
+  if (!words.crease.empty()) {
+    const auto degrees = parse_numbers("--crease", words.crease, 1, 1);
+    if (!degrees) return tl::unexpected(degrees.error());
+    if (!(degrees->front() >= 0.0 && degrees->front() <= 180.0)) {
+      return fail(ErrorCode::kUsage, "--crease must be 0 to 180 degrees, got {}", words.crease);
+    }
+    picture.crease = degrees->front();
+  }
+  if (!words.occlusion.empty()) {
+    const auto on = parse_choice("--occlusion", words.occlusion, kOnOff);
+    if (!on) return tl::unexpected(on.error());
+    picture.occlusion = *on;
+  }
+  if (!words.caps.empty()) {
+    const auto hatched = parse_choice("--caps", words.caps, kHatched);
+    if (!hatched) return tl::unexpected(hatched.error());
+    picture.hatched_caps = *hatched;
+  }
+  return {};
 }
 
 /// `--view edges,axes`: what openscad shows beside the scene.
@@ -340,6 +365,7 @@ Result<void> read_csg_options(const CsgWords& words, CsgCommand& command) {
     command.measure_resolution = static_cast<int>(*resolution);
   }
   command.picture.edges = words.edges;
+  if (auto read = read_shading(words, command.picture); !read) return read;
   command.ids = words.ids;
   command.depth = words.depth;
   if (auto read = read_openscad_words(words, command); !read) return read;

@@ -15,6 +15,7 @@ struct CsgWords {
   SceneWords scene;
   std::string expression, size, camera, projection, scheme, samples, quality, background, ids,
       turntable, path_frames, fps, camera_file, depth, measure;
+  std::string crease, occlusion, caps;
   std::string preview, render, shown, frames, export_format, summary, summary_file, csg_limit;
   std::vector<std::string> cuts;
   bool view_all = false, auto_centre = false, edges = false, transparent = false;

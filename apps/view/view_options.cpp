@@ -82,8 +82,8 @@ void define(CLI::App& app, Words& words, ViewOptions& options) {
          "Target x,y,z, rotation rx,ry,rz in degrees and distance; or eye x,y,z and target x,y,z",
          "NUMBERS", look);
   option("--projection", csg.projection, "Perspective or orthographic (default: p)", "p|o", look);
-  option("--colorscheme", csg.scheme, "One of OpenSCAD's colour schemes (default: Cornfield)",
-         "SCHEME", look);
+  option("--colorscheme", csg.scheme,
+         "Neutral, or one of OpenSCAD's, with its lights (default: Neutral)", "SCHEME", look);
   app.add_option("--cut", csg.cuts,
                  "Section plane: x=5 removes the half towards the camera, z<10 keeps z below 10, "
                  "nx,ny,nz,d keeps nx*x + ny*y + nz*z below d")

@@ -10,6 +10,7 @@
 
 #include <fmt/format.h>
 
+#include "strata/csg/picture/picture.h"
 #include "strata/mesh/shapes.h"
 
 namespace strata::csg {
@@ -78,7 +79,7 @@ void cut_scene(Scene& scene, std::span<const SectionPlane> cuts, const Camera& c
     const auto cut = [&](Tree::NodeId node, const std::string& of) {
       Solid solid;
       solid.mesh = mesh;
-      solid.name = fmt::format("section {}{}", i + 1, of);
+      solid.name = fmt::format("{}{}{}", kSectionName, i + 1, of);
       const Tree::NodeId half = scene.tree.add_solid(std::move(solid));
       return scene.tree.add(Operation::kDifference, {node, half});
     };

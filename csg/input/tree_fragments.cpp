@@ -95,9 +95,8 @@ void TreeFragments::colour_opaque(const Shader& shader, const Execution& executi
         static_cast<std::uint32_t>(input_.trees.geometry().parts()[i].triangles.size());
     for (std::uint32_t t = 0; t < count; ++t) {
       for (const bool exit : {false, true}) {
-        const float light = shader.light(solid, t, exit);
         const glm::vec3 base(shader.base(solid, exit));
-        set_colour(solid_firsts_[i] + t, exit, glm::vec4(base * light, 1.0f));
+        set_colour(solid_firsts_[i] + t, exit, glm::vec4(shader.lit(solid, t, exit, base), 1.0f));
       }
     }
   });

@@ -50,7 +50,7 @@ glm::vec4 translucent_colour(const TranslucentTrees& trees, std::uint32_t slot,
   // The far wall of a translucent solid is no cut.
   const bool cut = exit && shader.base(one.solid, false).a == 1.0f;
   const glm::vec4 base = colour ? *colour : shader.base(one.solid, cut);
-  return {glm::vec3(base) * shader.light(one.solid, source, exit), base.a};
+  return {shader.lit(one.solid, source, exit, glm::vec3(base)), base.a};
 }
 
 Result<void> GhostPainter::paint(const View& view, const SurfaceImage& opaque, const Shader& shader,

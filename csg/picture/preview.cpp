@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <functional>
 #include <glm/geometric.hpp>
@@ -13,7 +12,6 @@
 #include "csg/surface/surface_source.h"
 #include "csg/surface/surface_tiles.h"
 #include "csg/surface/tile_surface.h"
-#include "picture/average.h"
 #include "strata/csg/picture/picture.h"
 
 namespace strata::csg {
@@ -138,6 +136,8 @@ class Frame {
 constexpr std::int64_t kSamplesAtOnce = std::int64_t{1} << 22;
 /// The same where they become pixels tile by tile and only the triangles' tiles are held.
 constexpr std::int64_t kDirectSamplesAtOnce = std::int64_t{1} << 26;
+/// Degrees, of pictures under studio lights.
+constexpr double kStudioCrease = 30.0;
 
 }  // namespace
 
@@ -179,6 +179,7 @@ struct Preview::Impl {
   /// How a picture is shaded.
   struct Look {
     const PictureOptions& options;
+    SampleGrid samples;
     Shader shader;
     Backdrop backdrop;
     int height;  ///< rows of the whole picture
@@ -196,6 +197,8 @@ struct Preview::Impl {
     int width = 0;  ///< pixels a row
     std::span<Rgba> pixels;
   };
+  Result<void> look_around(const View& whole, const ColourScheme& scheme,
+                           const PictureOptions& options, const Execution& execution);
   Result<void> shade_tiles(const Band& band, const Look& look, const Execution& execution,
                            Work& work);
   Result<void> shade_samples(const Band& band, const Look& look, Execution execution, Work& work);
@@ -207,6 +210,8 @@ struct Preview::Impl {
   Program program;
   double error;
   Frame frame;
+  SolidNormals normals{geometry};
+  ViewOpenness openness;  ///< of the picture that is drawn
   GhostPainter painter;
   DrawReport report;
   bool report_covers = false;  ///< report.covered is known
@@ -217,36 +222,42 @@ Result<View> Preview::Impl::view(const Camera& camera, const glm::ivec2& size,
   return view_of_tree(tree, geometry, shown(), camera, size, execution);
 }
 
-/// The pixels of one tile of samples, which begins and ends with pixels.
-std::uint64_t average_tile(const SurfaceImage& tile, const PixelRect& rect, const Shader& shader,
-                           const SampleGrid& grid, const Ground& ground, int width,
-                           std::span<Rgba> pixels) {
-  thread_local std::array<Rgba, static_cast<std::size_t>(kTilePixels)> samples;
-  const int columns = rect.u1 - rect.u0, rows = rect.v1 - rect.v0;
-  shade_tile(tile, {0, 0, columns, rows}, shader, {}, kTileSide, samples);
-  std::uint64_t covered = 0;
-  for (int v = 0; v < rows; v += grid.down) {
-    const int row = (rect.v0 + v) / grid.down;
-    const std::size_t at = static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
-                           static_cast<std::size_t>(rect.u0 / grid.across);
-    covered += average_row(samples.data() + v * kTileSide, kTileSide, grid.across, grid.down,
-                           ground.at(row),
-                           pixels.subspan(at, static_cast<std::size_t>(columns / grid.across)));
+/// Looks at the picture once at a lower resolution: which solids need normals, what is in whose
+/// way.
+Result<void> Preview::Impl::look_around(const View& whole, const ColourScheme& scheme,
+                                        const PictureOptions& options, const Execution& execution) {
+  const double crease = options.crease.value_or(scheme.studio_lights ? kStudioCrease : 0.0);
+  const bool occlusion = options.occlusion.value_or(scheme.studio_lights);
+  openness = {};
+  normals.make({}, crease, execution);
+  Execution quiet = execution;
+  quiet.progress = {};
+  if (!occlusion) {  // without another look at the picture
+    normals.make(std::vector<std::uint8_t>(geometry.parts().size(), 1), crease, quiet);
+    return {};
   }
-  return covered;
+  const auto drawn = frame.draw(ViewOpenness::reduced(whole), quiet);
+  if (!drawn) return drawn;
+  const SurfaceImage& image = frame.image();
+  if (crease > 0) {
+    std::vector<std::uint8_t> seen(geometry.parts().size(), 0);
+    for (std::size_t i = 0; i < image.depth.size(); ++i) {
+      if (image.depth[i] != SurfaceImage::kNone) seen[image.solid[i]] = 1;
+    }
+    normals.make(seen, crease, quiet);
+  }
+  openness = ViewOpenness(whole, image, geometry, quiet);
+  if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+  return {};
 }
 
-/// Shades the pixels of a band tile by tile, while the tiles are drawn: all that memory holds of
-/// the samples are the tiles at work.
+/// Shades the pixels of a band tile by tile, while the tiles are drawn.
 Result<void> Preview::Impl::shade_tiles(const Band& band, const Look& look,
                                         const Execution& execution, Work& work) {
   std::atomic<std::uint64_t> covered{0};
-  const SampleGrid grid = sample_grid(look.options.samples);
-  const Ground ground = look.ground(band.first);
+  const SampleRows rows{look.samples.across, look.samples.down, look.ground(band.first)};
   const auto on_tile = [&](const SurfaceImage& tile, const PixelRect& rect) {
-    covered += look.options.samples == 1
-                   ? shade_tile(tile, rect, look.shader, ground, band.width, band.pixels)
-                   : average_tile(tile, rect, look.shader, grid, ground, band.width, band.pixels);
+    covered += shade_tile(tile, rect, rows, look.shader, band.width, band.pixels);
   };
   if (auto done = frame.draw(band.view, execution, on_tile); !done) return done;
   work.total.fragments += frame.report().fragments;
@@ -263,9 +274,9 @@ Result<void> Preview::Impl::shade_samples(const Band& band, const Look& look, Ex
   work.total.fragments += report.fragments;
   work.total.resolved += report.resolved;
   execution.progress = {};
-  const auto [across, down] = sample_grid(look.options.samples);
+  const auto [across, down] = look.samples;
   work.samples.resize((*image)->depth.size());
-  shade(**image, look.shader, Rgba(0), execution, work.samples);
+  shade(**image, {across, down, look.ground(band.first)}, look.shader, execution, work.samples);
   if (look.options.edges) draw_edges(**image, look.shader, across, down, execution, work.samples);
   if (!painter.empty()) {
     if (auto done = painter.paint(band.view, **image, look.shader, execution, work.samples);
@@ -290,10 +301,16 @@ Result<Picture> Preview::Impl::picture(const Camera& camera, const glm::ivec2& s
                 "a row of {} pixels with {} samples each exceeds the limit of {} samples", size.x,
                 across, kMaxPictureSide);
   }
-  const ColourScheme& scheme =
-      options.scheme != nullptr ? *options.scheme : colour_schemes().front();
-  const Look look{options, Shader(tree, geometry, *whole, scheme),
-                  options.backdrop.value_or(plain_backdrop(scheme.background)), size.y};
+  const ColourScheme& scheme = options.scheme != nullptr ? *options.scheme : default_scheme();
+  if (auto done = look_around(*whole, scheme, options, execution); !done) {
+    return tl::unexpected(done.error());
+  }
+  const Look look{options,
+                  {across, down},
+                  Shader(tree, geometry, *whole, scheme,
+                         {normals.empty() ? nullptr : &normals, &openness, options.hatched_caps}),
+                  options.backdrop.value_or(plain_backdrop(scheme.background)),
+                  size.y};
   Picture result{size.x, size.y, {}};
   const auto width = static_cast<std::size_t>(size.x);
   result.pixels.resize(width * static_cast<std::size_t>(size.y));
@@ -366,6 +383,7 @@ Result<const SurfaceImage*> Preview::move_solid(std::uint32_t solid,
                                                 const glm::dmat4& world_from_mesh,
                                                 const Execution& execution) {
   const bool others = impl_->geometry.move_solid(impl_->tree, solid, world_from_mesh);
+  impl_->normals.forget(solid, others);
   auto done = others ? impl_->frame.draw(impl_->frame.view(), execution)
                      : impl_->frame.moved(solid, execution);
   if (!done) return tl::unexpected(done.error());

@@ -3,32 +3,22 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <cctype>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+#include "picture/average.h"
 
 #include "picture/average.h"
 
 namespace strata::csg {
 namespace {
 
-constexpr ColourScheme kSchemes[] = {
-    {"Cornfield", {0xff, 0xff, 0xe5}, {0xf9, 0xd7, 0x2c}, {0x9d, 0xcb, 0x51}},
-    {"Metallic", {0xaa, 0xaa, 0xff}, {0xdd, 0xdd, 0xff}, {0xdd, 0x22, 0xdd}},
-    {"Sunset", {0xaa, 0x44, 0x44}, {0xff, 0xaa, 0xaa}, {0x88, 0x22, 0x33}},
-    {"Starnight", {0x00, 0x00, 0x00}, {0xff, 0xff, 0xe0}, {0x00, 0xff, 0xff}},
-    {"BeforeDawn", {0x33, 0x33, 0x33}, {0xcc, 0xcc, 0xcc}, {0x55, 0x63, 0xdd}},
-    {"Nature", {0xfa, 0xfa, 0xfa}, {0x16, 0xa0, 0x85}, {0xdb, 0xf4, 0xda}},
-    {"DeepOcean", {0x33, 0x33, 0x33}, {0xee, 0xee, 0xee}, {0x0b, 0xab, 0xc8}},
-    {"Solarized", {0xfd, 0xf6, 0xe3}, {0xb5, 0x88, 0x00}, {0x88, 0x22, 0x33}},
-    {"Tomorrow", {0xf8, 0xf8, 0xf8}, {0x42, 0x71, 0xae}, {0xf5, 0x87, 0x1f}},
-    {"Tomorrow Night", {0x1d, 0x1f, 0x21}, {0x81, 0xa2, 0xbe}, {0xde, 0x93, 0x5f}},
-    {"Monotone", {0xff, 0xff, 0xe5}, {0xf9, 0xd7, 0x2c}, {0xf9, 0xd7, 0x2c}},
-};
-
 constexpr int kRowsAtOnce = 16;
 /// What is left of a colour on an edge.
 constexpr float kEdgeLight = 0.2f;
+/// Lines of a hatch: pixels from one to the next, half the width of one, what is left of a colour.
+constexpr float kHatchStep = 7.0f, kHatchHalf = 0.75f, kHatchLight = 0.80f;
 
 /// Calls body(first row, end row) for bands of an image, on all threads.
 template <class Body>
@@ -40,30 +30,28 @@ void for_each_band(int height, const Execution& execution, Body&& body) {
                });
 }
 
-}  // namespace
-
-std::span<const ColourScheme> colour_schemes() { return kSchemes; }
-
-const ColourScheme* find_colour_scheme(std::string_view name) {
-  const auto same = [](char a, char b) {
-    return std::tolower(static_cast<unsigned char>(a)) ==
-           std::tolower(static_cast<unsigned char>(b));
-  };
-  for (const ColourScheme& scheme : kSchemes) {
-    if (std::equal(scheme.name.begin(), scheme.name.end(), name.begin(), name.end(), same)) {
-      return &scheme;
-    }
-  }
-  return nullptr;
+/// What is left of the colour of a hatched face at a pixel: lines at 45 degrees, with soft borders.
+float hatch(int u, int v) {
+  const float at = static_cast<float>(u + v) / kHatchStep;
+  const float from_line = std::abs(at - std::floor(at + 0.5f)) * kHatchStep * 0.70710678f;
+  const float line = std::clamp(kHatchHalf + 0.5f - from_line, 0.0f, 1.0f);
+  return 1.0f - (1.0f - kHatchLight) * line;
 }
 
+}  // namespace
+
 Shader::Shader(const Tree& tree, const Geometry& geometry, const View& view,
-               const ColourScheme& scheme)
+               const ColourScheme& scheme, const ShadeLook& look)
     : tree_(&tree),
       geometry_(&geometry),
+      image_from_world_(view.image_from_world),
       eye_from_world_(view.eye_from_world),
       face_(glm::vec3(scheme.face) / 255.0f, 1.0f),
       cut_(glm::vec3(scheme.cut) / 255.0f, 1.0f),
+      cap_(glm::vec3(scheme.cap) / 255.0f, 1.0f),
+      studio_(scheme.studio_lights),
+      lights_(glm::vec3(view.eye_from_world[2])),
+      look_(look),
       size_(geometry.box().empty() ? 0.0 : glm::length(geometry.box().high - geometry.box().low)) {}
 
 glm::dvec3 Shader::across(std::uint32_t solid, std::uint32_t triangle) const {
@@ -73,13 +61,99 @@ glm::dvec3 Shader::across(std::uint32_t solid, std::uint32_t triangle) const {
   return glm::cross(part.positions[t.y] - a, part.positions[t.z] - a);
 }
 
-float Shader::light(std::uint32_t solid, std::uint32_t triangle, bool exit) const {
-  const glm::dvec3 in_eye = eye_from_world_ * across(solid, triangle);
-  return eye_light(exit ? -in_eye : in_eye);
+Lit Shader::light_on(const glm::dvec3& normal) const {
+  if (studio_) return lights_.on(glm::vec3(normal));
+  return {0.0f, eye_light(normal), 0.0f};
+}
+
+glm::vec3 Shader::in_light(const glm::vec3& base, const Lit& light, float open) const {
+  if (studio_) return shaded(base, light, open);
+  return base * (light.ambient * open);
+}
+
+glm::vec3 Shader::lit(std::uint32_t solid, std::uint32_t triangle, bool exit,
+                      const glm::vec3& base) const {
+  const glm::dvec3 in_eye = glm::dmat3(eye_from_world_) * across(solid, triangle);
+  const double length = studio_ ? glm::length(in_eye) : 1.0;
+  if (!(length > 0)) return base;
+  return in_light(base, light_on((exit ? -in_eye : in_eye) / length), 1.0f);
 }
 
 glm::vec4 Shader::base(std::uint32_t solid, bool exit) const {
-  return colour_or(tree_->solids()[solid].colour, exit ? cut_ : face_);
+  const Solid& of = tree_->solids()[solid];
+  return colour_or(of.colour, !exit ? face_ : is_section(of) ? cap_ : cut_);
+}
+
+void Shader::set_corners(Face& face, std::uint32_t solid, std::uint32_t triangle, bool exit) const {
+  const CornerNormals* normals = look_.normals != nullptr ? look_.normals->of(solid) : nullptr;
+  if (normals == nullptr || normals->flat(triangle)) return;
+  face.curved = true;
+  const Geometry::Part& part = geometry_->parts()[solid];
+  std::array<glm::dvec3, 3> corners;
+  for (int c = 0; c < 3; ++c) {
+    const auto at = static_cast<std::size_t>(c);
+    const glm::dvec3& p = part.positions[part.triangles[triangle][c]];
+    const glm::dvec4 h = image_from_world_ * glm::dvec4(p, 1.0);
+    corners[at] = {h.x, h.y, h.w};
+    const glm::dvec3 normal = glm::dmat3(eye_from_world_) * normals->at(triangle, c);
+    face.normals[at] = exit ? -normal : normal;
+  }
+  // Homogeneous coordinates of the picture: shares are linear, and right in perspective (M. Olano
+  // and T. Greer, "Triangle scan conversion using 2D homogeneous coordinates", 1997).
+  const double area = glm::dot(corners[0], glm::cross(corners[1], corners[2]));
+  for (std::size_t c = 0; c < 3; ++c) {
+    face.shares[c] =
+        glm::cross(corners[(c + 1) % 3], corners[(c + 2) % 3]) * (area < 0 ? -1.0 : 1.0);
+  }
+}
+
+Shader::Face Shader::face(std::uint32_t solid, std::uint32_t tagged) const {
+  Face face;
+  const bool exit = (tagged & SurfaceImage::kExit) != 0;
+  const std::uint32_t triangle = tagged & ~SurfaceImage::kExit;
+  face.base = glm::vec3(base(solid, exit));
+  if (studio_ && is_section(tree_->solids()[solid])) {
+    face.hatched = look_.hatched_caps;
+    face.uniform = !face.hatched;
+    face.colour = to_bytes(glm::vec4(face.base, 1.0f));
+    return face;
+  }
+  glm::dvec3 normal = glm::dmat3(eye_from_world_) * across(solid, triangle);
+  if (exit) normal = -normal;
+  const bool openness = look_.openness != nullptr && !look_.openness->all_open();
+  if (studio_ || openness || look_.normals != nullptr) {
+    const double length = glm::length(normal);
+    normal = length > 0 ? normal / length : glm::dvec3(0, 0, 1);
+    set_corners(face, solid, triangle, exit);
+  }
+  face.light = light_on(normal);
+  face.colour = to_bytes(glm::vec4(in_light(face.base, face.light, 1.0f), 1.0f));
+  if (openness) {
+    const Geometry::Part& part = geometry_->parts()[solid];
+    const glm::dvec4 corner(part.positions[part.triangles[triangle].x], 1.0);
+    face.plane = look_.openness->plane(normal, glm::dvec3(eye_from_world_ * corner));
+    face.open = false;
+  }
+  face.uniform = face.open && !face.curved;
+  return face;
+}
+
+Rgba Shader::colour(const Face& face, int u, int v) const {
+  if (face.hatched) return to_bytes(glm::vec4(face.base * hatch(u, v), 1.0f));
+  const float open = face.open ? 1.0f : look_.openness->at(u, v, face.plane);
+  if (!face.curved) {
+    if (open == 1.0f) return face.colour;
+    return to_bytes(glm::vec4(in_light(face.base, face.light, open), 1.0f));
+  }
+  // Where the pixel's centre is outside of the triangle, the nearest point of it counts.
+  const glm::dvec3 at(u + 0.5, v + 0.5, 1.0);
+  glm::dvec3 normal(0.0);
+  for (std::size_t c = 0; c < 3; ++c) {
+    normal += std::max(0.0, glm::dot(face.shares[c], at)) * face.normals[c];
+  }
+  const double length = glm::length(normal);
+  const Lit light = length > 0 ? light_on(normal / length) : face.light;
+  return to_bytes(glm::vec4(in_light(face.base, light, open), 1.0f));
 }
 
 bool Shader::same_plane(std::uint32_t solid_a, std::uint32_t face_a, std::uint32_t solid_b,
@@ -104,108 +178,187 @@ bool Shader::same_plane(std::uint32_t solid_a, std::uint32_t face_a, std::uint32
 
 namespace {
 
-/// Colours rows of surfaces one after another.
-class RowShader {
- public:
-  RowShader(const SurfaceImage& image, const Shader& shader, Rgba background)
-      : image_(&image), shader_(&shader), background_(background) {}
+/// Whether samples show one face, or nothing.
+struct Alike {
+  std::uint32_t solid, face;
+  std::uint32_t other = 0, present = 0, absent = 0;
 
-  void set_background(Rgba background) { background_ = background; }
-  /// Colours `count` pixels from `begin` on.
-  void shade(std::size_t begin, std::size_t count, Rgba* colours) {
-    const std::uint32_t* depths = image_->depth.data() + begin;
-    const std::uint32_t* solids = image_->solid.data() + begin;
-    const std::uint32_t* faces = image_->triangle.data() + begin;
-    std::size_t i = 0;
-    for (; i + kAtOnce <= count; i += kAtOnce) {
-      // Most blocks show one face, or nothing.
-      std::uint32_t other = 0, present = 0, absent = 0;
-      for (std::size_t j = i; j < i + kAtOnce; ++j) {
-        other |= (solids[j] ^ solids[i]) | (faces[j] ^ faces[i]);
-        const std::uint32_t inverse = ~depths[j];  // 0: nothing
-        present |= inverse;
-        absent |= inverse == 0 ? 1u : 0u;
-      }
-      if (present == 0) {
-        std::fill_n(colours + i, kAtOnce, background_);
-      } else if ((other | absent) == 0) {
-        if (solids[i] != solid_ || faces[i] != face_) meet(solids[i], faces[i]);
-        std::fill_n(colours + i, kAtOnce, colour_);
-        covered_ += kAtOnce;
+  Alike(const SurfaceImage& image, std::size_t at)
+      : solid(image.solid[at]), face(image.triangle[at]) {}
+  void add(const SurfaceImage& image, std::size_t begin, std::size_t count) {
+    const std::uint32_t* depths = image.depth.data() + begin;
+    const std::uint32_t* solids = image.solid.data() + begin;
+    const std::uint32_t* faces = image.triangle.data() + begin;
+    for (std::size_t i = 0; i < count; ++i) {
+      other |= (solids[i] ^ solid) | (faces[i] ^ face);
+      const std::uint32_t inverse = ~depths[i];  // 0: nothing
+      present |= inverse;
+      absent |= inverse == 0 ? 1u : 0u;
+    }
+  }
+  [[nodiscard]] bool nothing() const { return present == 0; }
+  [[nodiscard]] bool one_face() const { return (other | absent) == 0; }
+};
+
+/// Samples that are looked at together: most show one face, or nothing.
+constexpr std::size_t kAtOnce = 16;
+
+/// Colours samples one after another.
+class SampleShader {
+ public:
+  explicit SampleShader(const Shader& shader) : shader_(&shader), kept_(kKept) {}
+
+  /// Colours `count` samples from `begin` on, which are those of row `v` of the picture from its
+  /// left border on, `across` a pixel.
+  void row(const SurfaceImage& image, std::size_t begin, std::size_t count, int across, int v,
+           Rgba* colours) {
+    for (std::size_t block = 0; block < count; block += kAtOnce) {
+      const std::size_t end = std::min(count, block + kAtOnce);
+      Alike alike(image, begin + block);
+      alike.add(image, begin + block, end - block);
+      if (alike.nothing()) {
+        std::fill(colours + block, colours + end, Rgba(0));
+      } else if (alike.one_face() && uniform(alike.solid, alike.face)) {
+        std::fill(colours + block, colours + end, last_->colour);
       } else {
-        for (std::size_t j = i; j < i + kAtOnce; ++j)
-          one(depths[j], solids[j], faces[j], colours[j]);
+        for (std::size_t i = block; i < end; ++i) {
+          const std::size_t from = begin + i;
+          colours[i] =
+              image.depth[from] == SurfaceImage::kNone
+                  ? Rgba(0)
+                  : at(image.solid[from], image.triangle[from], static_cast<int>(i) / across, v);
+        }
       }
     }
-    for (; i < count; ++i) one(depths[i], solids[i], faces[i], colours[i]);
   }
-  [[nodiscard]] std::uint64_t covered() const { return covered_; }
+  /// The colour of a face at pixel (u, v).
+  Rgba at(std::uint32_t solid, std::uint32_t face, int u, int v) {
+    return uniform(solid, face) ? last_->colour : shader_->colour(*last_, u, v);
+  }
+  /// Whether a face has one colour, colour() then.
+  bool uniform(std::uint32_t solid, std::uint32_t face) {
+    if (solid != solid_ || face != face_) {
+      solid_ = solid, face_ = face;
+      Kept& kept = kept_[(solid * 5 + face) % kKept];
+      if (kept.solid != solid || kept.tagged != face)
+        kept = {solid, face, shader_->face(solid, face)};
+      last_ = &kept.face;
+    }
+    return last_->uniform;
+  }
+  [[nodiscard]] Rgba colour() const { return last_->colour; }
 
  private:
-  static constexpr std::size_t kAtOnce = 16;
-  /// Faces met before whose colours are kept.
+  /// Faces met before that are kept.
   static constexpr std::size_t kKept = 32;
   struct Kept {
-    std::uint32_t solid = SurfaceImage::kNone, face = 0;
-    Rgba colour{0};
+    std::uint32_t solid = SurfaceImage::kNone, tagged = 0;
+    Shader::Face face;
   };
 
-  void one(std::uint32_t depth, std::uint32_t solid, std::uint32_t face, Rgba& colour) {
-    if (depth == SurfaceImage::kNone) {
-      colour = background_;
-      return;
-    }
-    ++covered_;
-    if (solid != solid_ || face != face_) meet(solid, face);
-    colour = colour_;
-  }
-  void meet(std::uint32_t solid, std::uint32_t face) {
-    solid_ = solid;
-    face_ = face;
-    Kept& kept = kept_[(solid * 5 + face) % kKept];
-    if (kept.solid != solid || kept.face != face) kept = {solid, face, colour_of(solid, face)};
-    colour_ = kept.colour;
-  }
-  [[nodiscard]] Rgba colour_of(std::uint32_t solid, std::uint32_t face) const {
-    const bool exit = (face & SurfaceImage::kExit) != 0;
-    const float light = shader_->light(solid, face & ~SurfaceImage::kExit, exit);
-    return to_bytes(glm::vec4(glm::vec3(shader_->base(solid, exit)) * light, 1.0f));
-  }
-
-  const SurfaceImage* image_;
   const Shader* shader_;
-  Rgba background_, colour_{0};
   std::uint32_t solid_ = SurfaceImage::kNone, face_ = 0;
-  std::uint64_t covered_ = 0;
-  std::array<Kept, kKept> kept_;
+  const Shader::Face* last_ = nullptr;
+  std::vector<Kept> kept_;
 };
 
 }  // namespace
 
-std::uint64_t shade(const SurfaceImage& image, const Shader& shader, Rgba background,
-                    const Execution& execution, std::span<Rgba> colours) {
+void shade(const SurfaceImage& image, const SampleRows& rows, const Shader& shader,
+           const Execution& execution, std::span<Rgba> colours) {
   const auto width = static_cast<std::size_t>(image.width);
-  std::atomic<std::uint64_t> covered{0};
   for_each_band(image.height, execution, [&](int first, int end) {
-    RowShader rows(image, shader, background);
-    const std::size_t begin = static_cast<std::size_t>(first) * width;
-    rows.shade(begin, static_cast<std::size_t>(end - first) * width, colours.data() + begin);
-    covered += rows.covered();
+    SampleShader samples(shader);
+    for (int row = first; row < end; ++row) {
+      const std::size_t begin = static_cast<std::size_t>(row) * width;
+      samples.row(image, begin, width, rows.across, rows.ground.first + row / rows.down,
+                  colours.data() + begin);
+    }
   });
-  return covered;
 }
 
-std::uint64_t shade_tile(const SurfaceImage& tile, const PixelRect& rect, const Shader& shader,
-                         const Ground& ground, int width, std::span<Rgba> colours) {
-  RowShader rows(tile, shader, ground.at(rect.v0));
-  for (int v = rect.v0; v < rect.v1; ++v) {
-    rows.set_background(ground.at(v));
-    const std::size_t at = static_cast<std::size_t>(v) * static_cast<std::size_t>(width) +
-                           static_cast<std::size_t>(rect.u0);
-    rows.shade(static_cast<std::size_t>(v - rect.v0) * static_cast<std::size_t>(tile.width),
-               static_cast<std::size_t>(rect.u1 - rect.u0), colours.data() + at);
+namespace {
+
+/// The pixels of a tile.
+class TileShader {
+ public:
+  TileShader(const SurfaceImage& tile, const SampleRows& rows, const Shader& shader)
+      : tile_(&tile), rows_(rows), samples_(shader) {}
+
+  /// Colours pixels of row `v` of the picture from `u` on; their first sample is at `begin`.
+  void row(std::size_t begin, int u, int v, Rgba background, std::size_t count, Rgba* colours) {
+    background_ = background;
+    const auto across = static_cast<std::size_t>(rows_.across);
+    const std::size_t at_once = kAtOnce / across, width = static_cast<std::size_t>(tile_->width);
+    for (std::size_t block = 0; block < count; block += at_once) {
+      const std::size_t pixels = std::min(at_once, count - block), first = begin + block * across;
+      Alike alike(*tile_, first);
+      for (int y = 0; y < rows_.down; ++y) {
+        alike.add(*tile_, first + static_cast<std::size_t>(y) * width, pixels * across);
+      }
+      if (alike.nothing()) {
+        std::fill_n(colours + block, pixels, background_);
+      } else if (alike.one_face() && samples_.uniform(alike.solid, alike.face)) {
+        std::fill_n(colours + block, pixels, samples_.colour());
+        covered_ += pixels;
+      } else {
+        for (std::size_t i = 0; i < pixels; ++i) {
+          colours[block + i] = pixel(first + i * across, u + static_cast<int>(block + i), v);
+        }
+      }
+    }
   }
-  return rows.covered();
+  [[nodiscard]] std::uint64_t covered() const { return covered_; }
+
+ private:
+  /// Pixel (u, v) of the picture, whose first sample is at `begin`.
+  Rgba pixel(std::size_t begin, int u, int v) {
+    const auto across = static_cast<std::size_t>(rows_.across);
+    const auto width = static_cast<std::size_t>(tile_->width);
+    std::size_t last = begin;
+    Rgba colour(0), pixel;
+    auto sample = colours_.begin();
+    for (int y = 0; y < rows_.down; ++y) {
+      const std::size_t first = begin + static_cast<std::size_t>(y) * width;
+      for (std::size_t at = first; at < first + across; ++at, ++sample) {
+        *sample = Rgba(0);
+        if (tile_->depth[at] == SurfaceImage::kNone) continue;
+        if (colour.a == 0 || tile_->solid[at] != tile_->solid[last] ||
+            tile_->triangle[at] != tile_->triangle[last]) {
+          colour = samples_.at(tile_->solid[at], tile_->triangle[at], u, v);
+          last = at;
+        }
+        *sample = colour;
+      }
+    }
+    covered_ += average_row(colours_.data(), across, rows_.across, rows_.down, background_,
+                            std::span(&pixel, 1));
+    return pixel;
+  }
+
+  const SurfaceImage* tile_;
+  SampleRows rows_;
+  SampleShader samples_;
+  Rgba background_{0};
+  std::array<Rgba, 64> colours_;  ///< of the samples of a pixel
+  std::uint64_t covered_ = 0;
+};
+
+}  // namespace
+
+std::uint64_t shade_tile(const SurfaceImage& tile, const PixelRect& rect, const SampleRows& rows,
+                         const Shader& shader, int width, std::span<Rgba> pixels) {
+  TileShader shaded(tile, rows, shader);
+  const int left = rect.u0 / rows.across, right = rect.u1 / rows.across;
+  for (int v = rect.v0 / rows.down; v < rect.v1 / rows.down; ++v) {
+    const std::size_t row = static_cast<std::size_t>(v) * static_cast<std::size_t>(width);
+    const std::size_t begin =
+        static_cast<std::size_t>(v * rows.down - rect.v0) * static_cast<std::size_t>(tile.width);
+    shaded.row(begin, left, rows.ground.first + v, rows.ground.at(v),
+               static_cast<std::size_t>(right - left),
+               pixels.data() + row + static_cast<std::size_t>(left));
+  }
+  return shaded.covered();
 }
 
 void draw_edges(const SurfaceImage& image, const Shader& shader, int step_u, int step_v,

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
@@ -8,6 +9,9 @@
 #include <vector>
 
 #include "csg/geometry.h"
+#include "csg/picture/solid_normals.h"
+#include "csg/picture/view_openness.h"
+#include "picture/studio_lights.h"
 #include "strata/core/execution.h"
 #include "strata/csg/picture/picture.h"
 
@@ -15,13 +19,23 @@
 
 namespace strata::csg {
 
-/// Light on a flat face: two directional lights of the eye, and what comes from everywhere.
+/// What a picture adds to colours and lights. Null, false: nothing.
+struct ShadeLook {
+  const SolidNormals* normals = nullptr;   ///< of curved surfaces
+  const ViewOpenness* openness = nullptr;  ///< of the picture
+  bool hatched_caps = false;               ///< caps have lines
+};
+
+/// Light on faces, by the lights of the scheme.
 class Shader {
  public:
-  Shader(const Tree& tree, const Geometry& geometry, const View& view, const ColourScheme& scheme);
+  /// @param view  of the whole picture, one sample a pixel. Keeps references to all but the scheme.
+  Shader(const Tree& tree, const Geometry& geometry, const View& view, const ColourScheme& scheme,
+         const ShadeLook& look = {});
 
-  /// How bright the face is, in [0, 1]; it is seen from its other side at an exit.
-  [[nodiscard]] float light(std::uint32_t solid, std::uint32_t triangle, bool exit) const;
+  /// The colour of a flat face in its light; it is seen from its other side at an exit.
+  [[nodiscard]] glm::vec3 lit(std::uint32_t solid, std::uint32_t triangle, bool exit,
+                              const glm::vec3& base) const;
   /// The colour of a face before light.
   [[nodiscard]] glm::vec4 base(std::uint32_t solid, bool exit) const;
   /// Whether two faces, [exit:1 | triangle:31] of a solid, are parts of one plane seen from the
@@ -29,14 +43,38 @@ class Shader {
   [[nodiscard]] bool same_plane(std::uint32_t solid_a, std::uint32_t face_a, std::uint32_t solid_b,
                                 std::uint32_t face_b) const;
 
+  /// A face of the picture, prepared for its pixels.
+  struct Face {
+    bool uniform = true;  ///< `colour` is that of all its pixels
+    bool open = true;     ///< nothing can be in the way
+    bool curved = false, hatched = false;
+    Rgba colour{0};        ///< where all is open
+    glm::vec3 base{0.0f};  ///< before light
+    Lit light;             ///< where it is flat
+    ViewOpenness::Plane plane;
+    /// Share of a corner at (u, v, 1), not scaled; its normal in eye space.
+    std::array<glm::dvec3, 3> shares, normals;
+  };
+  /// @param face  [exit:1 | triangle:31]
+  [[nodiscard]] Face face(std::uint32_t solid, std::uint32_t face) const;
+  /// The colour of a face at pixel (u, v) of the picture.
+  [[nodiscard]] Rgba colour(const Face& face, int u, int v) const;
+
  private:
   /// In world space, not of length 1.
   [[nodiscard]] glm::dvec3 across(std::uint32_t solid, std::uint32_t triangle) const;
+  /// @param normal  in eye space, of length 1
+  [[nodiscard]] Lit light_on(const glm::dvec3& normal) const;
+  [[nodiscard]] glm::vec3 in_light(const glm::vec3& base, const Lit& light, float open) const;
+  void set_corners(Face& face, std::uint32_t solid, std::uint32_t triangle, bool exit) const;
 
   const Tree* tree_;
   const Geometry* geometry_;
-  glm::dmat3 eye_from_world_;
-  glm::vec4 face_, cut_;
+  glm::dmat4 image_from_world_, eye_from_world_;
+  glm::vec4 face_, cut_, cap_;
+  bool studio_;
+  StudioLights lights_;
+  ShadeLook look_;
   double size_;  ///< of the scene, for what counts as one plane
 };
 
@@ -44,11 +82,6 @@ class Shader {
 [[nodiscard]] inline Rgba to_bytes(const glm::vec4& colour) {
   return Rgba(glm::clamp(colour, 0.0f, 1.0f) * 255.0f + 0.5f);
 }
-
-/// The colours of a surface image, alpha 255 where something is seen and `background` elsewhere.
-/// `colours` has as many elements as the image. Gives how many of them show something.
-std::uint64_t shade(const SurfaceImage& image, const Shader& shader, Rgba background,
-                    const Execution& execution, std::span<Rgba> colours);
 
 /// The backdrop of some rows of a picture.
 struct Ground {
@@ -58,9 +91,22 @@ struct Ground {
   [[nodiscard]] Rgba at(int row) const { return backdrop.at(first + row, height); }
 };
 
-/// The same for the pixels `rect` of an image `width` pixels wide; `tile` begins there.
-std::uint64_t shade_tile(const SurfaceImage& tile, const PixelRect& rect, const Shader& shader,
-                         const Ground& ground, int width, std::span<Rgba> colours);
+/// The samples of rows of pixels: `across` x `down` each.
+struct SampleRows {
+  int across = 1, down = 1;
+  Ground ground;
+};
+
+/// The colours of the samples of a surface image: alpha 255 where something is seen, else 0.
+/// `colours` has as many elements as the image.
+void shade(const SurfaceImage& image, const SampleRows& rows, const Shader& shader,
+           const Execution& execution, std::span<Rgba> colours);
+
+/// The same for the samples `rect` of an image; `tile` begins there. Averages them at once, as
+/// average() does. @param pixels  `width` wide, from the first row of rows.ground on
+/// @return how many pixels show something
+std::uint64_t shade_tile(const SurfaceImage& tile, const PixelRect& rect, const SampleRows& rows,
+                         const Shader& shader, int width, std::span<Rgba> pixels);
 
 /// Darkens the colours where the faces of neighbours, `step_u` and `step_v` samples apart, differ.
 void draw_edges(const SurfaceImage& image, const Shader& shader, int step_u, int step_v,

@@ -300,7 +300,7 @@ void Panels::guides(const Viewer& viewer, const Area& area) {
       make_view(frame.camera, frame.wanted, frame.box.empty() ? viewer.model()->box : frame.box);
   if (!view) return;
   const csg::ColourScheme* scheme = viewer.picture_options().scheme;
-  if (scheme == nullptr) scheme = csg::colour_schemes().data();
+  if (scheme == nullptr) scheme = &csg::default_scheme();
   const Inks inks = inks_on(scheme->background);
   Drawing to(area, *view, frame.depth, scale_);
   const double pixel = world_per_pixel(frame.camera, frame.wanted);

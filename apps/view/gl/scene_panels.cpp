@@ -59,7 +59,7 @@ void Panels::solids(Viewer& viewer) {
       if (ImGui::Checkbox("##shown", &shown)) viewer.set_hidden(solid, !shown);
       ImGui::SameLine();
       const csg::ColourScheme* scheme = viewer.picture_options().scheme;
-      if (scheme == nullptr) scheme = csg::colour_schemes().data();
+      if (scheme == nullptr) scheme = &csg::default_scheme();
       glm::vec4 colour(glm::vec3(scheme->face) / 255.0f, 1.0f);
       colour = csg::colour_or(all[solid].colour, colour);
       if (const auto own = looks.colours.find(solid); own != looks.colours.end()) {

@@ -257,7 +257,7 @@ class Program final : public Stage {
       uploaded_ = viewer_->frame_serial();
     }
     const csg::ColourScheme* scheme = viewer_->picture_options().scheme;
-    if (scheme == nullptr) scheme = csg::colour_schemes().data();
+    if (scheme == nullptr) scheme = &csg::default_scheme();
     Area shown = area_;
     if (frame != nullptr && frame->wanted != area_.size) {
       // The window has just changed its size: the old picture is as high as the new one will be.

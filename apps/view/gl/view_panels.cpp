@@ -71,7 +71,7 @@ void Panels::look(Viewer& viewer) {
   heat("Depth", Heat::kDepth, "depth complexity: crossings of all solids; d");
   heat_range(viewer);
   const csg::ColourScheme* scheme = viewer.picture_options().scheme;
-  if (scheme == nullptr) scheme = csg::colour_schemes().data();
+  if (scheme == nullptr) scheme = &csg::default_scheme();
   ImGui::SetNextItemWidth(share(3) * 2 + ImGui::GetStyle().ItemSpacing.x);
   if (ImGui::BeginCombo("##scheme", scheme->name.data())) {
     for (const csg::ColourScheme& one : csg::colour_schemes()) {

@@ -98,10 +98,12 @@ class PreviewRenderer final : public Renderer {
         frame.prepare_ms = ms_since(begin);
       }
       const auto drawn = Clock::now();
-      auto picture = preview_->picture(request.camera, request.size, request.look, execution);
+      csg::PictureOptions look = request.look;
+      if (request.moving) look.occlusion = false;
+      auto picture = preview_->picture(request.camera, request.size, look, execution);
       if (!picture && surfaces_ != nullptr && picture.error().code != ErrorCode::kCancelled) {
         give_up_gpu(picture.error());
-        picture = preview_->picture(request.camera, request.size, request.look, execution);
+        picture = preview_->picture(request.camera, request.size, look, execution);
       }
       if (!picture) return tl::unexpected(picture.error());
       frame.picture = *std::move(picture);
@@ -208,7 +210,8 @@ class PreviewRenderer final : public Renderer {
       const bool red = ghost.colour == csg::kHighlightGhost;
       (red ? scene.highlights : scene.backgrounds).push_back(ghost.node);
     }
-    csg::SeeThroughOptions options{opacity, request.look.scheme};
+    csg::SeeThroughOptions options{
+        opacity, request.look.scheme != nullptr ? request.look.scheme : &csg::default_scheme()};
     options.all_faces = faces;
     auto made = csg::SeeThrough::make(std::move(scene), options, execution);
     if (!made) return tl::unexpected(made.error());
@@ -224,7 +227,7 @@ class PreviewRenderer final : public Renderer {
     frame.prepare_ms = ms_since(begin);
     const auto prepared = Clock::now();
     const csg::ColourScheme& scheme =
-        request.look.scheme != nullptr ? *request.look.scheme : csg::colour_schemes().front();
+        request.look.scheme != nullptr ? *request.look.scheme : csg::default_scheme();
     transparency::FrameOptions options;
     options.size = request.size;
     options.samples = request.look.samples;
@@ -341,7 +344,7 @@ class PreviewRenderer final : public Renderer {
     }
     frame.scale = {request.heat, range.low, range.high, range.below, range.above};
     const csg::ColourScheme& scheme =
-        request.look.scheme != nullptr ? *request.look.scheme : csg::colour_schemes().front();
+        request.look.scheme != nullptr ? *request.look.scheme : csg::default_scheme();
     frame.picture = {request.size.x, request.size.y, {}};
     frame.picture.pixels.resize(map->values.size(), csg::Rgba(scheme.background, 255));
     for (std::size_t i = 0; i < map->values.size(); ++i) {

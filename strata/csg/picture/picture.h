@@ -24,17 +24,32 @@ using strata::Picture;
 using strata::Rgba;
 using strata::write_png;
 
-/// Colours of a picture; the names and values are OpenSCAD's.
+/// Colours of a picture; the names and values are OpenSCAD's, but for "Neutral".
 struct ColourScheme {
   std::string_view name;   ///< such as "Cornfield"
   glm::u8vec3 background;  ///< where no solid is
   glm::u8vec3 face;        ///< of solids without a colour
   glm::u8vec3 cut;         ///< of faces where a solid without a colour is cut away
+  glm::u8vec3 cap = cut;   ///< of faces where a section cuts
+  /// Three lights and a sky, and pictures are soft unless told otherwise: see PictureOptions.
+  /// False: OpenSCAD's two lights.
+  bool studio_lights = false;
 };
+/// What the names of solids begin with that a section cuts away: the faces that they leave are
+/// caps.
+inline constexpr std::string_view kSectionName = "section ";
+/// Whether a solid is one of those.
+[[nodiscard]] inline bool is_section(const Solid& solid) {
+  return solid.name.starts_with(kSectionName);
+}
+
 /// All schemes.
 [[nodiscard]] std::span<const ColourScheme> colour_schemes();
 /// Null when there is none of that name (case does not matter).
 [[nodiscard]] const ColourScheme* find_colour_scheme(std::string_view name);
+
+/// The scheme of pictures for which none is chosen: "Neutral".
+[[nodiscard]] const ColourScheme& default_scheme();
 
 /// A part of the tree that is also shown as a transparent ghost.
 struct Ghost {
@@ -48,11 +63,18 @@ inline constexpr glm::vec4 kHighlightGhost{255 / 255.f, 81 / 255.f, 81 / 255.f, 
 
 /// Settings of a shaded picture.
 struct PictureOptions {
-  const ColourScheme* scheme = nullptr;  ///< null: Cornfield
+  const ColourScheme* scheme = nullptr;  ///< null: default_scheme()
   /// Samples a pixel: 1, 2, 4, 8, 16, 32 or 64, on a regular grid within it.
   int samples = 1;
   std::optional<Backdrop> backdrop;  ///< what no solid covers; empty: the scheme's background
   bool edges = false;                ///< dark lines where the faces of neighbouring pixels differ
+  /// Faces of a solid that meet at less than this many degrees are drawn as one curved surface; 0:
+  /// as facets. Empty: 30 under studio lights, else 0.
+  std::optional<double> crease;
+  /// Corners and holes, which see less of their surroundings, are darker. Empty: under studio
+  /// lights only. Of what is seen, with steps of one or two pixels.
+  std::optional<bool> occlusion;
+  bool hatched_caps = true;  ///< lines on the faces of sections, under studio lights
 };
 
 class SurfaceSource;

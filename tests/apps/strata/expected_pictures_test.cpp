@@ -92,9 +92,9 @@ TEST(ExpectedPictures, OfOpenScadsTestsAreOurs) {
     SCOPED_TRACE(scene.name);
     const auto expected = silhouette(picture);
     if (expected.size() != 512 * 512) continue;
-    const auto run =
-        place.run({"csg", scene.file, "--assets", scene.assets, "-o", "a.png", "--size", "512,512",
-                   "--render", "--viewall", "--autocenter", "--quality", "draft", "-j", "1"});
+    const auto run = place.run({"csg", scene.file, "--assets", scene.assets, "-o", "a.png",
+                                "--size", "512,512", "--render", "--viewall", "--autocenter",
+                                "--quality", "draft", "--colorscheme", "Cornfield", "-j", "1"});
     ASSERT_EQ(run.exit_code, 0) << run.err;
     // What examples import comes with the package openscad, which may be missing.
     if (run.err.find(", which is missing") != std::string::npos) continue;

@@ -193,7 +193,10 @@ TEST_F(Oit, TransparentScenesLookAsStrataCsgDrawsThem) {
       "multmatrix([[1,0,0,-4],[0,1,0,6],[0,0,1,-9],[0,0,0,1]]) cube(size = [14, 10, 6]);\n"
       "%multmatrix([[1,0,0,0],[0,1,0,-10],[0,0,1,0],[0,0,0,1]]) sphere(r = 4, $fn = 12);\n");
   run({"scene.csg", "-o", "oit.png", "--size=60,60"});
-  ASSERT_EQ(place.run({"csg", "scene.csg", "-o", "csg.png", "--size=60,60"}).exit_code, 0);
+  ASSERT_EQ(
+      place.run({"csg", "scene.csg", "-o", "csg.png", "--size=60,60", "--colorscheme=Cornfield"})
+          .exit_code,
+      0);
   int transparent = 0;
   for (int v = 0; v < 60; ++v) {
     for (int u = 0; u < 60; ++u) {

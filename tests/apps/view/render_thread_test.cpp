@@ -413,7 +413,7 @@ TEST(CpuRenderer, AScenesPartsAreSeenThroughByACheapTechniqueWhileItMoves) {
   request.see_through->opacity = 0.4f;
   const auto exact = renderer->draw(request, {});
   ASSERT_TRUE(solid && nothing && exact);
-  const csg::Rgba ground(csg::colour_schemes().front().background, 255);
+  const csg::Rgba ground(csg::default_scheme().background, 255);
   for (const csg::Rgba& pixel : nothing->picture.pixels) ASSERT_EQ(pixel, ground);
   // Slivers at outlines are no opaque surface.
   EXPECT_NEAR(static_cast<double>(exact->report.covered),
@@ -459,10 +459,10 @@ TEST(CpuRenderer, MediaFillSolidsAtRest) {
   ASSERT_TRUE(frame) << frame.error().message;
   EXPECT_EQ(frame->drawn_by, "CPU, media");
   // Nothing is scattered: exp(-0.1 * 20) of the background comes through.
-  const glm::vec3 ground(csg::colour_schemes().front().background);
+  const glm::vec3 ground(csg::default_scheme().background);
   const csg::Rgba middle = frame->picture.pixels[32 * 64 + 32];
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(middle[c], ground[c] * std::exp(-2.0f), 1.0f);
-  EXPECT_EQ(frame->picture.pixels[0], csg::Rgba(csg::colour_schemes().front().background, 255));
+  EXPECT_EQ(frame->picture.pixels[0], csg::Rgba(csg::default_scheme().background, 255));
   request.moving = true;
   const auto moving = renderer->draw(request, {});
   ASSERT_TRUE(moving);

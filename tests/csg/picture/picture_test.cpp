@@ -43,8 +43,15 @@ Camera from_above(double pixels_a_unit, int height) {
   return camera;
 }
 
+/// OpenSCAD's colours and lights: pixels of a face are equal, and known.
+PictureOptions openscad_look() {
+  PictureOptions options;
+  options.scheme = find_colour_scheme("Cornfield");
+  return options;
+}
+
 Picture draw(Preview& preview, const Camera& camera, const glm::ivec2& size,
-             const PictureOptions& options = {}) {
+             const PictureOptions& options = openscad_look()) {
   auto picture = preview.picture(camera, size, options);
   EXPECT_TRUE(picture.has_value()) << picture.error().message;
   return picture ? *picture : Picture{};
@@ -206,7 +213,7 @@ TEST(Picture, SamplesGiveTheShareOfAPixelThatIsCovered) {
     Tree tree;
     tree.set_root(tree.add_solid(solid));
     Preview preview(std::move(tree), {}, 0);
-    PictureOptions options;
+    PictureOptions options = openscad_look();
     options.samples = samples;
     options.backdrop.emplace();
     const int side = 16;
@@ -241,7 +248,7 @@ TEST(Picture, AnEdgeAlongTheSamplesIsAveragedExactly) {
   Tree tree;
   tree.set_root(tree.add_solid(box({-10, -10, 0}, {0.625, 10, 1})));
   Preview preview(std::move(tree), {}, 0);
-  PictureOptions options;
+  PictureOptions options = openscad_look();
   options.samples = 64;
   const Picture picture = draw(preview, from_above(1, 8), {8, 8}, options);
   const glm::vec3 face(lit(kYellow)), ground(kBackground);
@@ -261,7 +268,7 @@ TEST(Picture, BandsDoNotShow) {
   Preview preview(std::move(tree), {}, 0);
   Camera camera;
   fit_camera(camera, preview.box());
-  PictureOptions options;
+  PictureOptions options = openscad_look();
   const Picture one = draw(preview, camera, {300, 300}, options);
   options.samples = 64;
   const Picture many = draw(preview, camera, {300, 300}, options);
@@ -286,7 +293,7 @@ TEST(Picture, ATransparentBackgroundHasStraightAlpha) {
   Tree tree;
   tree.set_root(tree.add_solid(box({-10, -10, 0}, {0.5, 10, 1})));
   Preview preview(std::move(tree), {}, 0);
-  PictureOptions options;
+  PictureOptions options = openscad_look();
   options.samples = 4;
   options.backdrop.emplace();
   const Picture picture = draw(preview, from_above(1, 8), {8, 8}, options);
@@ -327,7 +334,7 @@ TEST(Picture, EdgesAreDarkBetweenFacesAndNotWithinOne) {
   Preview preview(std::move(tree), {}, 0);
   Camera camera;
   fit_camera(camera, preview.box());
-  PictureOptions options;
+  PictureOptions options = openscad_look();
   const Picture plain = draw(preview, camera, {200, 200}, options);
   options.edges = true;
   const Picture dark = draw(preview, camera, {200, 200}, options);
@@ -477,6 +484,7 @@ TEST(ColourScheme, IsFoundWhateverTheCase) {
   EXPECT_EQ(find_colour_scheme("TOMORROW night")->name, "Tomorrow Night");
   EXPECT_EQ(find_colour_scheme("Tomorrow Nigh"), nullptr);
   EXPECT_EQ(colour_schemes().front().name, "Cornfield");
+  EXPECT_EQ(default_scheme().name, "Neutral");
 }
 
 // --- PNG ----------------------------------------------------------------------------------------

@@ -1,0 +1,145 @@
+#include "csg/picture/view_openness.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+namespace strata::csg {
+namespace {
+
+/// How far around it a point looks, as a part of the diagonal of what is seen.
+constexpr double kReach = 0.15;
+
+double step_of(const glm::ivec2& size) {
+  constexpr int kSmall = 384, kMost = 1024;
+  const int longest = std::max(size.x, size.y);
+  if (longest <= kSmall) return 1.0;
+  return std::min(0.5, static_cast<double>(kMost) / longest);
+}
+
+/// The diagonal of the box around all visible points.
+double extent(const EyeSurfaces& seen, const Execution& execution) {
+  const auto width = static_cast<std::size_t>(seen.width);
+  const auto rows = static_cast<std::size_t>(seen.height);
+  std::vector<glm::vec3> lows(rows, glm::vec3(3e38f)), highs(rows, glm::vec3(-3e38f));
+  parallel_for(execution, rows, [&](std::size_t row, int) {
+    for (std::size_t i = row * width; i < (row + 1) * width; ++i) {
+      if (seen.positions[i].z <= EyeSurfaces::kNowhere.z) continue;
+      lows[row] = glm::min(lows[row], seen.positions[i]);
+      highs[row] = glm::max(highs[row], seen.positions[i]);
+    }
+  });
+  glm::vec3 low(3e38f), high(-3e38f);
+  for (std::size_t row = 0; row < rows; ++row) {
+    low = glm::min(low, lows[row]);
+    high = glm::max(high, highs[row]);
+  }
+  return high.x >= low.x ? glm::length(glm::dvec3(high) - glm::dvec3(low)) : 0.0;
+}
+
+}  // namespace
+
+View ViewOpenness::reduced(const View& whole) {
+  const double step = step_of(whole.size);
+  View view = whole;
+  view.size = glm::max(glm::ivec2(glm::ceil(glm::dvec2(whole.size) * step)), glm::ivec2(1));
+  for (int column = 0; column < 4; ++column) {
+    view.image_from_world[column].x *= step;
+    view.image_from_world[column].y *= step;
+  }
+  return view;
+}
+
+ViewOpenness::ViewOpenness(const View& whole, const SurfaceImage& image, const Geometry& geometry,
+                           const Execution& execution)
+    : step_(static_cast<float>(step_of(whole.size))) {
+  const View view = reduced(whole);
+  const glm::dmat4 image_from_eye = view.image_from_world * glm::inverse(view.eye_from_world);
+  const glm::dvec4& axis = image_from_eye[view.perspective ? 2 : 3];
+  surfaces_.perspective = view.perspective;
+  surfaces_.scale = image_from_eye[0][0];
+  surfaces_.centre = glm::dvec2(axis) / axis.w;
+  surfaces_.origin_distance = 0.5 * (view.near + view.far);
+  surfaces_.resize(image.width, image.height);
+  const auto width = static_cast<std::size_t>(image.width);
+  const glm::dmat3 eye_from_world(view.eye_from_world);
+  parallel_for(execution, static_cast<std::size_t>(image.height), [&](std::size_t v, int) {
+    std::uint32_t solid = SurfaceImage::kNone, face = 0;
+    glm::vec3 normal(0.0f, 0.0f, 1.0f);
+    for (std::size_t u = 0; u < width; ++u) {
+      const std::size_t i = v * width + u;
+      surfaces_.positions[i] = EyeSurfaces::kNowhere;
+      surfaces_.normals[i] = {0.0f, 0.0f, 1.0f};
+      if (image.depth[i] == SurfaceImage::kNone) continue;
+      if (image.solid[i] != solid || image.triangle[i] != face) {
+        solid = image.solid[i], face = image.triangle[i];
+        const Geometry::Part& part = geometry.parts()[solid];
+        const glm::uvec3& t = part.triangles[face & ~SurfaceImage::kExit];
+        const glm::dvec3& a = part.positions[t.x];
+        glm::dvec3 across =
+            eye_from_world * glm::cross(part.positions[t.y] - a, part.positions[t.z] - a);
+        if ((face & SurfaceImage::kExit) != 0) across = -across;
+        const double length = glm::length(across);
+        normal = length > 0 ? glm::vec3(across / length) : glm::vec3(0, 0, 1);
+      }
+      const double distance = view.distance(image.depth[i] + 0.5);
+      const double wide = (view.perspective ? distance : 1.0) / surfaces_.scale;
+      surfaces_.positions[i] = {(static_cast<double>(u) + 0.5 - surfaces_.centre.x) * wide,
+                                (surfaces_.centre.y - static_cast<double>(v) - 0.5) * wide,
+                                surfaces_.origin_distance - distance};
+      surfaces_.normals[i] = normal;
+    }
+  });
+  const double reach = kReach * extent(surfaces_, execution);
+  if (reach > 0) open_ = openness(surfaces_, reach, execution);
+}
+
+ViewOpenness::Plane ViewOpenness::plane(const glm::dvec3& normal, const glm::dvec3& point) const {
+  const glm::dvec3 from_origin = point + glm::dvec3(0, 0, surfaces_.origin_distance);
+  return {glm::vec3(normal), static_cast<float>(glm::dot(normal, from_origin))};
+}
+
+float ViewOpenness::at(int u, int v, const Plane& plane) const {
+  if (open_.empty()) return 1.0f;
+  const float x = (static_cast<float>(u) + 0.5f) * step_ - 0.5f;
+  const float y = (static_cast<float>(v) + 0.5f) * step_ - 0.5f;
+  const int left = std::max(0, static_cast<int>(std::floor(x)));
+  const int top = std::max(0, static_cast<int>(std::floor(y)));
+  const int right = std::min(left + 1, surfaces_.width - 1);
+  const int bottom = std::min(top + 1, surfaces_.height - 1);
+  const auto index = [&](int column, int row) {
+    return static_cast<std::size_t>(row) * static_cast<std::size_t>(surfaces_.width) +
+           static_cast<std::size_t>(column);
+  };
+  const std::size_t around[] = {index(left, top), index(right, top), index(left, bottom),
+                                index(right, bottom)};
+  if ((open_[around[0]] & open_[around[1]] & open_[around[2]] & open_[around[3]]) == 255) {
+    return 1.0f;
+  }
+  const float to_right = std::clamp(x - static_cast<float>(left), 0.0f, 1.0f);
+  const float down = std::clamp(y - static_cast<float>(top), 0.0f, 1.0f);
+  const float shares[] = {(1 - to_right) * (1 - down), to_right * (1 - down), (1 - to_right) * down,
+                          to_right * down};
+  float sum = 0.0f, weights = 0.0f;
+  for (int k = 0; k < 4; ++k) {
+    const glm::vec3& there = surfaces_.positions[around[k]];
+    if (there.z <= EyeSurfaces::kNowhere.z) continue;
+    const auto distance =
+        static_cast<float>(surfaces_.origin_distance - static_cast<double>(there.z));
+    const float pixel =
+        (surfaces_.perspective ? distance : 1.0f) / static_cast<float>(surfaces_.scale);
+    const float off = std::abs(glm::dot(plane.normal, there) - plane.offset);
+    const float same = glm::dot(plane.normal, surfaces_.normals[around[k]]);
+    // Others count a little, for where there is no point of the face.
+    const float like =
+        std::max(0.0f, 1.0f - off / (2.0f * pixel)) * std::max(0.0f, 4.0f * same - 3.0f);
+    const float weight = (shares[k] + 0.02f) * (like + 0.002f);
+    sum += weight * static_cast<float>(open_[around[k]]);
+    weights += weight;
+  }
+  return weights > 0.0f ? sum / (255.0f * weights) : 1.0f;
+}
+
+}  // namespace strata::csg
