@@ -5,6 +5,7 @@
 
 #include "apps/commands/choice_words.h"
 #include "apps/commands/command_words.h"
+#include "apps/commands/film_options.h"
 #include "apps/session/help.h"
 #include "apps/session/option_values.h"
 
@@ -147,6 +148,9 @@ PictureCommand picture_command(Words words, Reader& reader) {
             ? fmt::format("{} is for scenes and meshes, but {} holds voxels", option, files.front())
             : fmt::format("{} is for voxels, but {} is not a file of voxels", option,
                           files.front()));
+  }
+  if (command.slice && writes_film(command)) {
+    reader.fail_with("--slice draws one picture, not a film");
   }
   if (command.output.empty() && !command.voxels) {
     reader.fail_with("no output is given: give -o FILE.png");

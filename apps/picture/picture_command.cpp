@@ -6,18 +6,26 @@
 #include <memory>
 #include <utility>
 
+#include "apps/commands/film_options.h"
 #include "apps/session/session.h"
 #include "apps/strata/run_commands.h"
+#include "apps/strata/scene_camera.h"
 #include "core/printable.h"
 #include "strata/csg/input/scene_input.h"
 #include "strata/csg/picture/picture.h"
+#include "strata/picture/animation.h"
+#include "strata/picture/backdrop.h"
 #include "strata/picture/pixels.h"
+#include "strata/raster/camera_file.h"
 #include "strata/voxelize/picture/voxel_picture.h"
 #include "strata/voxelize/readers/read_voxels.h"
 #include "strata/voxelize/volume/voxel_volume.h"
 
 namespace strata::apps {
 namespace {
+
+/// The colour of the usual backdrop.
+constexpr glm::u8vec3 kGround{0xf4, 0xf5, 0xf7};
 
 /// The plane of voxels that --slice means. Indices are those of the file.
 Result<VoxelSlice> slice_of(const PictureCommand::Slice& asked, const VoxelGrid& grid,
@@ -80,7 +88,8 @@ class VoxelRun {
     }
     first_index_ = volume->first_index;
     if (auto done = prepare(*std::move(volume)); !done) return done;
-    auto picture = command_.slice ? slice() : view();
+    if (writes_film(command_)) return film();
+    auto picture = command_.slice ? slice() : view(placed_camera());
     if (!picture) return tl::unexpected(picture.error());
     session_.end_progress();
     return write_png(*picture, command_.output);
@@ -110,33 +119,95 @@ class VoxelRun {
     VoxelPictureOptions options;
     options.style = command_.style;
     options.samples = command_.picture.samples;
+    options.background = Rgba(0);  // the backdrop is laid under the picture
     return options;
+  }
+  [[nodiscard]] Result<Picture> on_backdrop(Result<Picture> picture) const {
+    if (!picture) return picture;
+    const csg::ColourScheme* scheme = command_.picture.scheme;
+    const Backdrop usual = gradient_backdrop(scheme != nullptr ? scheme->background : kGround);
+    lay_over(*picture, command_.picture.backdrop.value_or(usual));
+    return picture;
   }
 
   Result<Picture> slice() {
     const auto plane = slice_of(*command_.slice, drawing_->set().grid(), first_index_, file());
     if (!plane) return tl::unexpected(plane.error());
-    return drawing_->draw_slice(*plane, command_.size, options(), session_.execution("drawing", 1));
+    return on_backdrop(
+        drawing_->draw_slice(*plane, command_.size, options(), session_.execution("drawing", 1)));
   }
 
-  Result<Picture> view() {
+  /// What sections between voxels leave of the box of the solid voxels.
+  [[nodiscard]] Bounds kept_box(const Camera& camera) const {
+    Bounds box = drawing_->box();
+    for (const csg::SectionPlane& cut : command_.cuts) {
+      const csg::SectionPlane plane = csg::facing(cut, camera);
+      for (int axis = 0; axis < 3 && !box.empty(); ++axis) {
+        if (std::abs(plane.normal[axis]) != 1.0) continue;
+        double& side = plane.normal[axis] > 0 ? box.high[axis] : box.low[axis];
+        const double at = plane.offset * plane.normal[axis];
+        if (at > box.low[axis] && at < box.high[axis]) side = at;
+      }
+    }
+    return box;
+  }
+
+  [[nodiscard]] Camera placed_camera() const {
+    Camera camera = command_.camera;
     const Bounds box = drawing_->box();
-    if (box.empty()) {
+    const double aspect = static_cast<double>(command_.size.x) / command_.size.y;
+    if (command_.default_camera && !command_.asked_view) {
+      // The box of all turns of a turntable is that of a ball.
+      if (command_.turntable > 0) {
+        centre_camera(camera, box);
+        fit_camera(camera, box, aspect);
+      } else {
+        frame_camera(camera, kept_box(camera), aspect);
+      }
+      return camera;
+    }
+    if (command_.auto_centre) centre_camera(camera, box);
+    if (command_.view_all) fit_camera(camera, box, aspect);
+    if (!(camera.distance > 0)) camera.distance = Camera{}.distance;
+    return camera;
+  }
+
+  /// --turntable and --frames
+  Result<void> film() {
+    const int count = command_.turntable + command_.path_frames;
+    const auto& backdrop = command_.picture.backdrop;
+    auto film = create_animation(command_.output,
+                                 {count, command_.fps, backdrop && backdrop->transparent()});
+    if (!film) return tl::unexpected(film.error());
+    const Camera first = placed_camera();
+    for (int shot = 0; shot < count; ++shot) {
+      Camera camera = first;
+      if (command_.turntable > 0) {
+        camera = turned_camera(first, shot, count);
+      } else {
+        const double begin = command_.path.front().time, end = command_.path.back().time;
+        camera = camera_at(command_.path, begin + (end - begin) * shot / std::max(1, count - 1));
+      }
+      auto picture = view(camera);
+      if (!picture) return tl::unexpected(picture.error());
+      if (auto done = (*film)->add(*picture); !done) return done;
+    }
+    session_.end_progress();
+    return (*film)->finish();
+  }
+
+  Result<Picture> view(const Camera& camera) {
+    if (drawing_->box().empty()) {
       session_.warn("empty", fmt::format("{}: the picture is empty: no voxel is solid", file()));
       if (auto strict = session_.check_strict(); !strict) return tl::unexpected(strict.error());
-    }
-    Camera camera = command_.camera;
-    if (command_.auto_centre) centre_camera(camera, box);
-    if (command_.view_all) {
-      fit_camera(camera, box, static_cast<double>(command_.size.x) / command_.size.y);
-      if (!(camera.distance > 0)) camera.distance = Camera{}.distance;
     }
     VoxelPictureOptions drawn = options();
     for (const csg::SectionPlane& cut : command_.cuts) {
       const csg::SectionPlane plane = csg::facing(cut, camera);
       drawn.sections.push_back({plane.normal, plane.offset});
     }
-    return drawing_->draw(camera, command_.size, drawn, session_.execution("drawing", 1));
+    return on_backdrop(
+        drawing_->draw(camera, command_.size, drawn, session_.execution("drawing", 0.5)));
   }
 
   const PictureCommand& command_;

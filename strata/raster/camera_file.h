@@ -12,7 +12,7 @@ namespace strata {
 /// A camera at a time of a film.
 struct TimedCamera {
   double time = 0;  ///< seconds
-  Camera camera;    ///< at that time
+  Camera camera;
 };
 
 /// Reads a camera file: lines of text, `#` begins a comment.

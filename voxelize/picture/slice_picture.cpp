@@ -103,21 +103,30 @@ class SliceDrawing {
   /// The mean of a pixel's samples: colours of labels.
   [[nodiscard]] Rgba solids(int u, int v) const {
     const auto [across, down] = sample_grid(options_.samples);
-    glm::vec4 sum(0.0f);
+    glm::vec3 sum(0.0f);
+    int found = 0;
     for (int y = 0; y < down; ++y) {
       for (int x = 0; x < across; ++x) {
         const glm::dvec2 at = place_.voxels({u + (x + 0.5) / across, v + (y + 0.5) / down});
-        sum += glm::vec4(colour_at(at));
+        if (!place_.holds(at)) continue;
+        sum += colour_at(at);
+        ++found;
       }
     }
-    return Rgba(sum / static_cast<float>(options_.samples) + 0.5f);
+    if (found == 0) return options_.background;
+    const auto count = static_cast<float>(options_.samples), some = static_cast<float>(found);
+    if (options_.background.a == 0) {
+      return {glm::u8vec3(sum / some + 0.5f), static_cast<std::uint8_t>(255 * some / count + 0.5f)};
+    }
+    sum += (count - some) * glm::vec3(options_.background);
+    return {glm::u8vec3(sum / count + 0.5f), 255};
   }
-  [[nodiscard]] Rgba colour_at(const glm::dvec2& at) const {
-    if (!place_.holds(at)) return options_.background;
+  /// Of a place in the grid, 0 to 255.
+  [[nodiscard]] glm::vec3 colour_at(const glm::dvec2& at) const {
     const std::uint32_t label =
         label_at(set_, place_.voxel(static_cast<int>(at.x), static_cast<int>(at.y)));
-    if (label == RayHit::kNothing) return Rgba(glm::u8vec3(kEmpty * 255.0f + 0.5f), 255);
-    return label_colour(look_, labels_, label);
+    if (label == RayHit::kNothing) return kEmpty * 255.0f;
+    return glm::vec3(label_colour(look_, labels_, label));
   }
 
   /// Values between the centres of voxels, or of the nearest voxel where voxels are large.

@@ -8,6 +8,7 @@
 
 #include "voxelize/picture/occupied_blocks.h"
 #include "voxelize/picture/patch_depths.h"
+#include "voxelize/picture/seen_openness.h"
 #include "voxelize/picture/slice_picture.h"
 #include "voxelize/picture/view_rays.h"
 #include "voxelize/picture/voxel_ray.h"
@@ -20,8 +21,13 @@ namespace {
 constexpr double kBlockPixels = 3.0;
 /// A square of pixels that a thread draws at once.
 constexpr int kPatch = 32;
-/// Neighbours whose colours differ by more, of 255, get all samples.
-constexpr float kContrast = 24.0f / 255.0f;
+/// Depths of neighbours on one surface differ by less, in widths of a pixel.
+constexpr double kSameSurface = 16.0;
+/// How far things darken each other, of the diagonal of the set's box.
+constexpr double kReach = 0.12;
+/// Neighbours whose colours differ by more get all samples: faces of blocks have sharp edges,
+/// smooth shading has none but outlines.
+constexpr float kBlockContrast = 24.0f / 255.0f, kSmoothContrast = 48.0f / 255.0f;
 constexpr float kMissing = -1.0f;  ///< red of a pixel that shows the background
 
 /// X-rays: the share of light that is left where `part` of the set's diagonal is solid.
@@ -68,9 +74,11 @@ class Frame {
         rays_(view, set.grid(), options.sections),
         depths_(set, blocks, view, execution),
         shader_(set, look, view, rays_, options, style),
+        view_(view),
         size_(view.size),
         whole_length_(box.empty() ? 1.0 : glm::length(box.high - box.low)) {
     const std::size_t count = static_cast<std::size_t>(size_.x) * static_cast<std::size_t>(size_.y);
+    seen_.resize(count);
     plain_.resize(count);
     picture_ = {size_.x, size_.y, std::vector<Rgba>(count)};
   }
@@ -89,10 +97,17 @@ class Frame {
       });
     };
     for_patches([&](VoxelRays& rays, int u, int v) {
+      seen_[index(u, v)] = sample(rays, {u + 0.5, v + 0.5});
+    });
+    if (options_.occlusion && style_ != VoxelStyle::kXray) {
+      openness_ = SeenOpenness(view_, seen_, kReach * whole_length_, execution);
+    }
+    for_patches([&](VoxelRays&, int u, int v) {
       const std::size_t at = index(u, v);
-      const auto seen = sample(rays, {u + 0.5, v + 0.5});
-      plain_[at] = seen ? seen->plain : glm::vec3(kMissing);
-      picture_.pixels[at] = seen ? to_pixel(seen->drawn) : options_.background;
+      const SeenVoxel& seen = seen_[at];
+      const glm::dvec2 place(u + 0.5, v + 0.5);
+      plain_[at] = seen.found() ? lit(place, seen, false) : glm::vec3(kMissing);
+      picture_.pixels[at] = seen.found() ? pixel_of(lit(place, seen, true)) : options_.background;
     });
     if (options_.samples > 1) {
       for_patches([&](VoxelRays& rays, int u, int v) {
@@ -109,35 +124,89 @@ class Frame {
            static_cast<std::size_t>(u);
   }
 
-  /// Nothing: the background.
-  [[nodiscard]] std::optional<VoxelShader::Seen> sample(VoxelRays& rays,
-                                                        const glm::dvec2& at) const {
+  [[nodiscard]] glm::vec3 lit(const glm::dvec2& at, const SeenVoxel& seen, bool lines) const {
+    if (style_ == VoxelStyle::kXray) return seen.colour;
+    return shader_.lit(seen, openness_.at(at, seen), lines);
+  }
+
+  /// The part of a ray that may meet something. False: none.
+  [[nodiscard]] bool narrowed(const glm::dvec2& at, ViewRay& ray) const {
     const PatchDepths::Range& range = depths_.at(static_cast<int>(at.x), static_cast<int>(at.y));
-    if (range.empty()) return std::nullopt;
-    ViewRay ray = rays_.at(at);
+    if (range.empty()) return false;
+    ray = rays_.at(at);
     if (range.nearest > ray.start.t) ray.start = {range.nearest, -1};
     ray.end = std::min(ray.end, range.farthest);
-    if (style_ == VoxelStyle::kXray) {
-      const double length = rays.solid_length(ray.origin, ray.direction, ray.start, ray.end) *
-                            glm::length(ray.direction * set_.grid().voxel_size);
-      if (!(length > 0)) return std::nullopt;
-      const glm::vec3 behind =
-          options_.background.a == 0 ? glm::vec3(1.0f) : glm::vec3(options_.background) / 255.0f;
-      const glm::vec3 colour = glm::mix(kXrayDark, behind, xray_light(length / whole_length_));
-      return VoxelShader::Seen{colour, colour};
+    return true;
+  }
+
+  [[nodiscard]] SeenVoxel sample(VoxelRays& rays, const glm::dvec2& at) const {
+    ViewRay ray;
+    if (!narrowed(at, ray)) return {};
+    if (style_ == VoxelStyle::kXray) return xray(rays, ray);
+    const RayHit hit = rays.first(ray.origin, ray.direction, ray.start, ray.end);
+    return hit.found() ? shader_.look(ray, hit) : SeenVoxel{};
+  }
+
+  /// The colour of one of several samples of a pixel; nothing: the background.
+  [[nodiscard]] std::optional<glm::vec3> colour_at(VoxelRays& rays, int u, int v,
+                                                   const glm::dvec2& place) const {
+    if (style_ != VoxelStyle::kSmooth) {
+      const SeenVoxel seen = sample(rays, place);
+      return seen.found() ? std::optional(lit(place, seen, true)) : std::nullopt;
     }
+    ViewRay ray;
+    if (!narrowed(place, ray)) return std::nullopt;
     const RayHit hit = rays.first(ray.origin, ray.direction, ray.start, ray.end);
     if (!hit.found()) return std::nullopt;
-    return shader_.shade(ray, hit);
+    // Slopes take as long as rays, and change little within a pixel: a pixel beside this one that
+    // shows the same surface knows the colour.
+    const SeenVoxel bare = shader_.unlit(hit);
+    const glm::vec3* near = nullptr;
+    double least = kSameSurface * (rays_.perspective() ? hit.t : 1.0) / rays_.scale();
+    for (int y = std::max(0, v - 1); y <= std::min(size_.y - 1, v + 1); ++y) {
+      for (int x = std::max(0, u - 1); x <= std::min(size_.x - 1, u + 1); ++x) {
+        const SeenVoxel& one = seen_[index(x, y)];
+        const double away = std::abs(double{one.distance} - double{bare.distance});
+        if (!(away < least) || one.cut != bare.cut || one.colour != bare.colour) continue;
+        least = away;
+        near = &plain_[index(x, y)];
+      }
+    }
+    return near != nullptr ? *near : lit(place, shader_.look(ray, hit), true);
+  }
+
+  [[nodiscard]] SeenVoxel xray(VoxelRays& rays, const ViewRay& ray) const {
+    SeenVoxel seen;
+    const double length = rays.solid_length(ray.origin, ray.direction, ray.start, ray.end) *
+                          glm::length(ray.direction * set_.grid().voxel_size);
+    if (!(length > 0)) return seen;
+    const glm::vec3 behind =
+        options_.background.a == 0 ? glm::vec3(1.0f) : glm::vec3(options_.background) / 255.0f;
+    seen.distance = 0.0f;
+    seen.colour = glm::mix(kXrayDark, behind, xray_light(length / whole_length_));
+    return seen;
+  }
+
+  /// A colour, or of an X-ray the light that is left.
+  [[nodiscard]] Rgba pixel_of(const glm::vec3& colour) const {
+    if (style_ != VoxelStyle::kXray) return to_pixel(colour);
+    if (options_.background.a != 0) {
+      return to_pixel(glm::mix(kXrayDark, glm::vec3(options_.background) / 255.0f, colour.x));
+    }
+    Rgba pixel = to_pixel(kXrayDark);
+    pixel.a = static_cast<std::uint8_t>(std::lround(255 * (1 - colour.x)));
+    return pixel;
   }
 
   /// Whether a pixel needs more samples than one: its neighbours show something else.
   [[nodiscard]] bool differs(int u, int v) const {
+    if (depths_.at(u, v).empty()) return false;
+    const float contrast = style_ == VoxelStyle::kBlocks ? kBlockContrast : kSmoothContrast;
     const glm::vec3& own = plain_[index(u, v)];
     for (int y = std::max(0, v - 1); y <= std::min(size_.y - 1, v + 1); ++y) {
       for (int x = std::max(0, u - 1); x <= std::min(size_.x - 1, u + 1); ++x) {
         const glm::vec3 change = glm::abs(plain_[index(x, y)] - own);
-        if (std::max({change.x, change.y, change.z}) > kContrast) return true;
+        if (std::max({change.x, change.y, change.z}) > contrast) return true;
       }
     }
     return false;
@@ -149,13 +218,18 @@ class Frame {
     int found = 0;
     for (int y = 0; y < down; ++y) {
       for (int x = 0; x < across; ++x) {
-        const auto seen = sample(rays, {u + (x + 0.5) / across, v + (y + 0.5) / down});
-        if (!seen) continue;
-        sum += seen->drawn;
+        const glm::dvec2 place(u + (x + 0.5) / across, v + (y + 0.5) / down);
+        const auto colour = colour_at(rays, u, v, place);
+        if (!colour) continue;
+        sum += *colour;
         ++found;
       }
     }
     if (found == 0) return options_.background;
+    if (style_ == VoxelStyle::kXray) {
+      const auto missing = static_cast<float>(options_.samples - found);
+      return pixel_of((sum + missing) / static_cast<float>(options_.samples));
+    }
     const auto count = static_cast<float>(options_.samples), some = static_cast<float>(found);
     if (options_.background.a == 0) {
       Rgba pixel = to_pixel(sum / some);
@@ -172,8 +246,11 @@ class Frame {
   ViewRays rays_;
   PatchDepths depths_;
   VoxelShader shader_;
+  const View& view_;
   glm::ivec2 size_;
   double whole_length_;
+  std::vector<SeenVoxel> seen_;
+  SeenOpenness openness_;
   std::vector<glm::vec3> plain_;  ///< colours by which samples are chosen
   Picture picture_;
 };
@@ -197,7 +274,7 @@ Result<VoxelPicture> VoxelPicture::create(std::shared_ptr<const VoxelIntervals> 
   impl->set = std::move(set);
   impl->look = std::move(look);
   impl->blocks = *std::move(blocks);
-  const OccupiedBlocks::Box solid = impl->blocks.box();
+  const OccupiedBlocks::Box& solid = impl->blocks.box();
   const VoxelGrid& grid = impl->set->grid();
   if (solid.low.x < solid.high.x) {
     const AxisFrame frame(impl->set->axis());
@@ -206,7 +283,6 @@ Result<VoxelPicture> VoxelPicture::create(std::shared_ptr<const VoxelIntervals> 
     low[frame.v] = solid.low.y + impl->set->v_begin();
     high[frame.v] = solid.high.y + impl->set->v_begin();
     low[frame.w] = solid.low.z, high[frame.w] = solid.high.z;
-    high = glm::min(high, grid.dims);
     impl->box = {grid.origin + glm::dvec3(low) * grid.voxel_size,
                  grid.origin + glm::dvec3(high) * grid.voxel_size};
   }

@@ -12,30 +12,21 @@ namespace strata {
 namespace {
 
 /// Of sets without labels: their faces, and where a section cuts them.
-constexpr Rgba kPlainFace{150, 190, 232, 255};
-constexpr Rgba kPlainCut{250, 172, 84, 255};
+constexpr Rgba kPlainFace{116, 166, 222, 255};
+constexpr Rgba kPlainCut{0xf6, 0xa8, 0x45, 255};
 
 /// A face shows where its own direction leaves the slope without one: thin walls have slopes of 0.
 constexpr double kFaceShare = 0.15;
 
-/// Light of three lamps that move with the eye, and of the surroundings, brighter above.
-float three_lights(const glm::dvec3& n) {
-  const glm::dvec3 key = glm::normalize(glm::dvec3(-0.35, 0.75, 0.56));
-  const glm::dvec3 fill = glm::normalize(glm::dvec3(-0.80, -0.15, 0.58));
-  const glm::dvec3 back = glm::normalize(glm::dvec3(0.55, 0.45, -0.70));
-  const double light = 0.40 + 0.10 * n.y + 0.56 * std::max(0.0, glm::dot(n, key)) +
-                       0.36 * std::max(0.0, glm::dot(n, fill)) +
-                       0.18 * std::max(0.0, glm::dot(n, back));
-  return static_cast<float>(std::clamp(light, 0.0, 1.15));
-}
-
 /// Light at a corner of a face by how many of the three voxels around it stand in front.
-constexpr float kCornerLight[] = {1.0f, 0.82f, 0.68f, 0.56f};
+constexpr float kCornerLight[] = {1.0f, 0.70f, 0.46f, 0.28f};
 
 /// Lines along voxels: from this many pixels a voxel on they show, and from the second on fully.
 constexpr double kLinesFrom = 6.0, kLinesFull = 16.0;
 constexpr float kLineLight = 0.66f;
 constexpr double kLineWidth = 1.1;  // pixels
+/// Planes that do not cross the borders along an axis move less than this along it, by rounding.
+constexpr double kNoSpeed = 1e-9;
 
 }  // namespace
 
@@ -54,7 +45,8 @@ VoxelShader::VoxelShader(const VoxelIntervals& set, const VoxelLook& look, const
       options_(&options),
       style_(style),
       labels_(set.has_labels()),
-      eye_from_world_(view.eye_from_world) {}
+      eye_from_world_(view.eye_from_world),
+      lights_(glm::normalize(glm::vec3(eye_from_world_[2]))) {}
 
 bool VoxelShader::solid(const glm::ivec3& voxel) const {
   const RayBox& box = rays_->box();
@@ -114,21 +106,28 @@ float VoxelShader::corner_light(const RayHit& hit, const glm::dvec3& point) cons
                   y);
 }
 
-/// Less light along the sides of a face, a pixel wide.
+/// Less light along the sides of a voxel on its face, or on the cut of a section; a pixel wide.
 float VoxelShader::line_light(const ViewRay& ray, const RayHit& hit,
                               const glm::dvec3& point) const {
-  const int axis = hit.face / 2;
+  // Of the plane, in voxels.
+  glm::dvec3 normal(0.0);
+  if (hit.face < RayHit::kSection) {
+    normal[hit.face / 2] = 1.0;
+  } else {
+    normal = options_->sections[static_cast<std::size_t>(hit.face - RayHit::kSection)].normal *
+             set_->grid().voxel_size;
+  }
+  const double towards = glm::dot(normal, ray.direction);
   float light = 1.0f;
   for (int c = 0; c < 3; ++c) {
-    if (c == axis) continue;
-    // How far the point on the face's plane moves along c for a pixel to the right and down.
+    // How far the point on the plane moves along c for a pixel to the right and down.
     double speed = 0.0;
     for (const glm::dvec3* change : {&rays_->across(), &rays_->down()}) {
-      const double moved = (*change)[c] - ray.direction[c] * (*change)[axis] / ray.direction[axis];
+      const double moved = (*change)[c] - ray.direction[c] * glm::dot(normal, *change) / towards;
       speed += moved * moved;
     }
     speed = std::sqrt(speed) * (rays_->perspective() ? hit.t : 1.0);
-    if (!(speed > 0)) continue;
+    if (!(speed > kNoSpeed)) continue;
     const double fade = std::clamp((1 / speed - kLinesFrom) / (kLinesFull - kLinesFrom), 0.0, 1.0);
     if (fade == 0) continue;
     const double part = std::clamp(point[c] - hit.voxel[c], 0.0, 1.0);
@@ -139,23 +138,32 @@ float VoxelShader::line_light(const ViewRay& ray, const RayHit& hit,
   return light;
 }
 
-VoxelShader::Seen VoxelShader::shade(const ViewRay& ray, const RayHit& hit) const {
-  const glm::dvec3 point = ray.origin + ray.direction * hit.t;
-  glm::dvec3 normal = eye_from_world_ * normal_of(hit, point);
-  const double length = glm::length(normal);
-  normal = length > 0 ? normal / length : glm::dvec3(0, 0, 1);
-  float light = three_lights(normal);
-  const bool cut = hit.face >= RayHit::kSection;
-  if (cut) light = std::max(light, 0.92f);
-  if (options_->occlusion && !cut && style_ == VoxelStyle::kBlocks) {
-    light *= corner_light(hit, point);
-  }
-  const glm::vec3 colour = glm::min(base_of(hit) * light, glm::vec3(1.0f));
-  Seen seen{colour, colour};
-  if (options_->edges && !cut && style_ == VoxelStyle::kBlocks) {
-    seen.drawn *= line_light(ray, hit, point);
-  }
+SeenVoxel VoxelShader::unlit(const RayHit& hit) const {
+  SeenVoxel seen;
+  seen.distance = static_cast<float>(hit.t);
+  seen.colour = base_of(hit);
+  seen.cut = hit.face >= RayHit::kSection;
   return seen;
+}
+
+SeenVoxel VoxelShader::look(const ViewRay& ray, const RayHit& hit) const {
+  const glm::dvec3 point = ray.origin + ray.direction * hit.t;
+  const glm::dvec3 normal = eye_from_world_ * normal_of(hit, point);
+  const double length = glm::length(normal);
+  SeenVoxel seen = unlit(hit);
+  if (length > 0) seen.normal = glm::vec3(normal / length);
+  seen.face = seen.normal;
+  if (style_ != VoxelStyle::kBlocks) return seen;
+  if (options_->occlusion && !seen.cut) seen.corner = corner_light(hit, point);
+  if (options_->edges) seen.line = line_light(ray, hit, point);
+  return seen;
+}
+
+glm::vec3 VoxelShader::lit(const SeenVoxel& seen, float open, bool lines) const {
+  if (seen.cut) return seen.colour * (lines ? seen.line : 1.0f);
+  const Lit light = lights_.on(seen.normal);
+  const glm::vec3 colour = shaded(seen.colour, light, std::min(open, seen.corner));
+  return glm::clamp(colour, 0.0f, 1.0f) * (lines ? seen.line : 1.0f);
 }
 
 }  // namespace strata

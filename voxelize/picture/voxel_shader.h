@@ -4,7 +4,9 @@
 #include <glm/vec3.hpp>
 #include <vector>
 
+#include "picture/studio_lights.h"
 #include "strata/voxelize/picture/voxel_picture.h"
+#include "voxelize/picture/seen_openness.h"
 #include "voxelize/picture/view_rays.h"
 #include "voxelize/picture/voxel_ray.h"
 
@@ -17,11 +19,11 @@ class VoxelShader {
   VoxelShader(const VoxelIntervals& set, const VoxelLook& look, const View& view,
               const ViewRays& rays, const VoxelPictureOptions& options, VoxelStyle style);
 
-  /// What is seen: colour before what a neighbouring pixel should not count (lines), and with it.
-  struct Seen {
-    glm::vec3 plain{0.0f}, drawn{0.0f};  ///< 0 to 1
-  };
-  [[nodiscard]] Seen shade(const ViewRay& ray, const RayHit& hit) const;
+  /// Colour and distance alone.
+  [[nodiscard]] SeenVoxel unlit(const RayHit& hit) const;
+  [[nodiscard]] SeenVoxel look(const ViewRay& ray, const RayHit& hit) const;
+  /// In light. @param open  as SeenOpenness::at() @param lines  whether lines along voxels count
+  [[nodiscard]] glm::vec3 lit(const SeenVoxel& seen, float open, bool lines) const;
   /// Whether a voxel is solid and in the box of the rays.
   [[nodiscard]] bool solid(const glm::ivec3& voxel) const;
 
@@ -39,6 +41,7 @@ class VoxelShader {
   VoxelStyle style_;
   bool labels_;
   glm::dmat3 eye_from_world_;
+  StudioLights lights_;
 };
 
 /// The colour of a label: the look's own, else the palette's. @param labels  the set has labels

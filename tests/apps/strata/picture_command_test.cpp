@@ -64,6 +64,28 @@ TEST_F(PictureCommand, DrawsVoxelsAndTheFileMayComeWithoutACommand) {
   }
 }
 
+TEST_F(PictureCommand, BackgroundsAndFilmsAreThoseOfCsg) {
+  // The first pixel is background: the same as csg's.
+  const auto corner = [&](const std::string& bytes) {
+    png_image png{};
+    png.version = PNG_IMAGE_VERSION;
+    EXPECT_NE(png_image_begin_read_from_memory(&png, bytes.data(), bytes.size()), 0);
+    png.format = PNG_FORMAT_RGBA;
+    std::vector<std::uint32_t> pixels(std::size_t{png.width} * png.height);
+    EXPECT_NE(png_image_finish_read(&png, nullptr, pixels.data(), 0, nullptr), 0);
+    return pixels.front();
+  };
+  for (const char* background : {"white", "#204060", "transparent"}) {
+    EXPECT_EQ(corner(drawn({"picture", "ball.npz", "--background", background})),
+              corner(drawn({"csg", "ball.stl", "--background", background})))
+        << background;
+  }
+  const RunResult film =
+      place_.run({"picture", "ball.npz", "--turntable", "3", "--size", "80,80", "-o", "turn/"});
+  EXPECT_EQ(film.exit_code, 0) << film.err;
+  EXPECT_GT(covered(place_.read("turn/0002.png"), 80), 500u);
+}
+
 TEST_F(PictureCommand, CutsTakeAwayTheHalfOfTheCamera) {
   const auto whole = covered(drawn({"picture", "ball.vdb", "--camera=0,0,0,0,0,0,9"}), 512);
   const auto half =
@@ -88,10 +110,12 @@ TEST_F(PictureCommand, DrawsScenesAsCsgDoes) {
 }
 
 TEST_F(PictureCommand, MistakesAreNamed) {
-  EXPECT_EQ(mistake({"picture", "ball.npz"}),
+  EXPECT_EQ(mistake({"picture", "ball.stl"}),
             "strata: error: no output is given: give -o FILE.png");
   EXPECT_EQ(mistake({"picture", "ball.npz", "-o", "x.png", "--slice", "q=1"}),
             "strata: error: --slice must be a plane such as z=0.5 or k=12, got 'q=1'");
+  EXPECT_EQ(mistake({"picture", "ball.npz", "-o", "x.gif", "--slice", "k=4", "--turntable", "3"}),
+            "strata: error: --slice draws one picture, not a film");
   EXPECT_EQ(mistake({"picture", "ball.npz", "-o", "x.png", "--slice", "k=40"}),
             "strata: error: --slice k=40: ball.npz has voxels k=0 to k=39");
   EXPECT_EQ(mistake({"picture", "ball.npz", "-o", "x.png", "--slice", "z=3"}),
