@@ -39,7 +39,7 @@ class PictureCommand : public testing::Test {
   Workplace place_;
 };
 
-/// How many pixels differ from the first one.
+/// How many pixels differ from the first one of their row, which is background.
 std::size_t covered(const std::string& bytes, png_uint_32 width) {
   png_image png{};
   png.version = PNG_IMAGE_VERSION;
@@ -49,7 +49,9 @@ std::size_t covered(const std::string& bytes, png_uint_32 width) {
   std::vector<std::uint32_t> pixels(std::size_t{png.width} * png.height);
   EXPECT_NE(png_image_finish_read(&png, nullptr, pixels.data(), 0, nullptr), 0);
   std::size_t count = 0;
-  for (const std::uint32_t pixel : pixels) count += pixel != pixels.front() ? 1 : 0;
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    count += pixels[i] != pixels[i - i % png.width] ? 1 : 0;
+  }
   return count;
 }
 
