@@ -81,6 +81,8 @@ void Viewer::add_tab(csg::SceneInput input) {
   tabs_.push_back(std::move(tab));
   if (!first) {
     options_.command.view_all = options_.command.auto_centre = true;
+    options_.command.default_camera = true;
+    options_.command.asked_view = false;
     options_.command.cuts.clear();
   }
   restore_tab(tabs_.size() - 1);

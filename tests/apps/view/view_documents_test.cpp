@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <string>
 #include <vector>
@@ -59,7 +60,8 @@ TEST_F(Documents, FilesAreOpenedAsTabsThatKeepTheirViews) {
       "tab previous\npicture again.png\nstats\n"
       "key ctrl+tab\npicture forth.png\n"
       "open part.csg\npicture reloaded.png\n"  // is there already
-      "tab close\npicture left.png\ntab 1\ntab close\npicture nothing.png\nstats\nquit\n");
+      "tab close\npicture left.png\ntab 1\ntab close\nwait 0.5\npicture "
+      "nothing.png\nstats\nquit\n");
   ASSERT_EQ(run.exit_code, 0) << run.err;
   EXPECT_EQ(image_of(place_, "part.png"), csg({"--size", "900,600"}));
   EXPECT_EQ(image_of(place_, "again.png"), image_of(place_, "cut.png"));
@@ -70,6 +72,10 @@ TEST_F(Documents, FilesAreOpenedAsTabsThatKeepTheirViews) {
   EXPECT_GT(different(cut, image_of(place_, "other.png"), 900, 600), 5000);
   EXPECT_GT(different(image_of(place_, "other.png"), image_of(place_, "nothing.png"), 900, 600),
             5000);
+  const Image nothing = image_of(place_, "nothing.png");
+  EXPECT_EQ(std::count(nothing.rgb.begin(), nothing.rgb.end(), nothing.rgb.front()) +
+                std::count(nothing.rgb.begin(), nothing.rgb.end(), nothing.rgb[2]),
+            900 * 600 * 3);  // the background alone, of which two channels are alike
   EXPECT_EQ(member(run.out, "solids"), "1");
   EXPECT_EQ(member(run.out, "solids", run.out.find('\n')), "4");
   EXPECT_EQ(member(run.out, "solids", run.out.rfind("renderer")), "0");

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <glm/geometric.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "strata/mesh/formats/read_mesh.h"
@@ -22,8 +23,8 @@ TEST_F(Window, ShowsThePicturesOfStrataCsg) {
       "axes off\n"
       "screenshot plain.png\n"
       "edges on\npicture edges.png\nedges off\n"
-      "section z=1\npicture section.png\nsection off\n"
       "camera 1,2,0,70,0,200,60\npicture camera.png\n"
+      "section z=1\npicture section.png\nsection off\n"
       "projection orthographic\nscheme Nature\npicture ortho.png\n"
       "quit\n",
       {"--size", "403,301", "--no-panels"});
@@ -31,8 +32,8 @@ TEST_F(Window, ShowsThePicturesOfStrataCsg) {
   const std::string size = "403,301";
   EXPECT_EQ(image_of(place_, "plain.png"), csg({"--size", size}));
   EXPECT_EQ(image_of(place_, "edges.png"), csg({"--size", size, "--edges"}));
-  EXPECT_EQ(image_of(place_, "section.png"), csg({"--size", size, "--cut", "z=1"}));
   const std::string camera = "--camera=1,2,0,70,0,200,60";
+  EXPECT_EQ(image_of(place_, "section.png"), csg({"--size", size, camera, "--cut", "z=1"}));
   EXPECT_EQ(image_of(place_, "camera.png"), csg({"--size", size, camera}));
   EXPECT_EQ(image_of(place_, "ortho.png"),
             csg({"--size", size, camera, "--projection", "o", "--colorscheme", "Nature"}));
@@ -301,6 +302,13 @@ TEST(WithoutDisplay, HelpAndMistakesNeedNone) {
   }
   run = place.run({"view"}, options);
   EXPECT_EQ(run.exit_code, 2);
+  for (const auto& [option, value] :
+       {std::pair("--look", "pink"), std::pair("--editor", "'open"), std::pair("--editor", " ")}) {
+    run = place.run({"view", "a.csg", option, value}, options);
+    EXPECT_EQ(run.exit_code, 2) << option;
+    EXPECT_NE(run.err.find(option), std::string::npos) << run.err;
+    EXPECT_EQ(run.err.find("no window"), std::string::npos) << run.err;
+  }
   run = place.run({"view", "a.csg", "--size", "x"}, options);
   EXPECT_EQ(run.exit_code, 2);
   EXPECT_EQ(run.err.find("strata view: error: "), 0u) << run.err;
