@@ -111,7 +111,7 @@ constexpr Rule kRules[] = {
     {"picture", Action::kPicture, Form::kWord, "FILE.png",
      "write the picture without panels and overlays"},
     {"export", Action::kExport, Form::kExport, "FILE [N]",
-     "write what is seen: a mesh, voxels (N along the longest side) or a picture"},
+     "write what is seen: a mesh, voxels (N along the longest side), folder/ of slices, a picture"},
     {"open", Action::kOpen, Form::kWord, "FILE", "open a file in a tab of its own, and wait"},
     {"tab", Action::kTab, Form::kWord, "WHICH", "show a tab: next, previous or 1, 2, ...; close"},
     {"undo", Action::kUndo, Form::kNone, "", "undo the last change of camera, section or hiding"},

@@ -25,9 +25,12 @@ Tool tool_of(Action action) {
 std::string box_text(const Bounds& box) {
   if (box.empty()) return "nothing is left";
   const double scale = box.longest_side();
-  const glm::dvec3 size = box.high - box.low;
-  return fmt::format("{} x {} x {}, from {} to {}", number(size.x, scale), number(size.y, scale),
-                     number(size.z, scale), numbers(box.low, scale), numbers(box.high, scale));
+  const auto tidied = [&](const glm::dvec3& p) {
+    return glm::dvec3(tidy(p.x, scale), tidy(p.y, scale), tidy(p.z, scale)) + 0.0;  // no -0
+  };
+  const glm::dvec3 size = tidied(box.high - box.low);
+  return fmt::format("{} x {} x {}, from {} to {}", number(size.x), number(size.y), number(size.z),
+                     numbers(tidied(box.low)), numbers(tidied(box.high)));
 }
 
 }  // namespace

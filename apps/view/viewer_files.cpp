@@ -118,6 +118,8 @@ void Viewer::restore_tab(std::size_t index) {
   definitions_ = tab.definitions;
   watch_ = std::move(tab.watch);
   picked_.reset();
+  board_.take_up(Tool::kNone);
+  board_.clear();
   arrangement_.reset();
   measurer_.cancel();
   numbers_.reset();

@@ -44,6 +44,7 @@ class Drawing {
     return pixel_of(view_, world);
   }
   [[nodiscard]] const View& view() const { return view_; }
+  [[nodiscard]] const DepthImage& depth() const { return depth_; }
 
   void stroke(const glm::dvec2& a, const glm::dvec2& b, ImU32 colour, float width,
               bool rim = true) {
@@ -270,9 +271,11 @@ void draw_ticks(Drawing& to, const TicksGuide& ticks, const Inks& inks) {
     for (const GuideLabel& mark : ticks.marks[axis]) {
       const auto at = to.pixel(mark.at);
       if (!at) continue;
+      const float shown = is_hidden(to.view(), to.depth(), mark.at) ? 0.45f : 1.0f;
       to.stroke(*at - across * (4.0 * to.scale()), *at + across * (4.0 * to.scale()),
-                kColours[axis], 1.5f, false);
-      to.plain(*at + across * (15.0 * to.scale()), mark.text, kColours[axis], inks.rim);
+                faded(kColours[axis], shown), 1.5f, false);
+      to.plain(*at + across * (15.0 * to.scale()), mark.text, faded(kColours[axis], shown),
+               faded(inks.rim, shown * shown));
     }
   }
 }

@@ -89,7 +89,8 @@ void Panels::mark(const Viewer& viewer, const Area& area) {
   const ImVec2 at = to_window(area, *pixel);
   list->AddCircle(at, 6 * scale_, IM_COL32(0, 0, 0, 200), 0, 4 * scale_);
   list->AddCircle(at, 6 * scale_, IM_COL32(255, 255, 255, 255), 0, 2 * scale_);
-  if (picked->thickness) {
+  const bool mapped = viewer.heat() == Heat::kWall || viewer.heat() == Heat::kThickness;
+  if (picked->thickness && mapped) {
     outlined(list, {at.x + 12 * scale_, at.y - ImGui::GetFontSize() / 2},
              IM_COL32(255, 255, 255, 255), fmt::format("{:.4g}", *picked->thickness));
   }

@@ -26,6 +26,7 @@ void Panels::picked(Viewer& viewer) {
   ImGui::PopTextWrapPos();
   text(fmt::format("triangle {}{}", picked->triangle, picked->cut ? ", a cut face" : ""));
   text(fmt::format("at {:.5g}, {:.5g}, {:.5g}", picked->where.x, picked->where.y, picked->where.z));
+  if (picked->thickness) text(fmt::format("thickness {:.5g}", *picked->thickness));
   const auto place = viewer.can_edit() ? viewer.picked_place() : std::nullopt;
   if (place && ImGui::Button("Open in the editor", {-1, 0})) open_editor(viewer, *place);
   if (place) hint(fmt::format("{}:{}", place->file, place->line).c_str());
@@ -93,7 +94,9 @@ void Panels::exports(Viewer& viewer) {
   }
   ImGui::SetNextItemWidth(-1);
   ImGui::InputText("##export", export_name_.data(), export_name_.size());
-  hint(".3mf .stl .obj .ply .off: mesh; .vdb .npy .nrrd ...: voxels; .png: picture");
+  hint(
+      ".3mf .stl .obj .ply .off: mesh; .vdb .npy .nrrd ...: voxels; folder/: slices; .png: "
+      "picture");
   const std::string path(export_name_.data());
   const auto kind = export_kind(path);
   if (!kind) return faint("unknown format");

@@ -85,6 +85,11 @@ std::optional<glm::dvec2> pixel_of(const View& view, const glm::dvec3& world) {
   return glm::dvec2(image) / image.w;
 }
 
+bool is_hidden(const View& view, const DepthImage& depth, const glm::dvec3& world) {
+  const auto pixel = pixel_of(view, world);
+  return pixel && HiddenTest(view, depth)(*pixel, -in_eye(view, world).z);
+}
+
 std::vector<Stretch> stretches(const View& view, const DepthImage& depth, const glm::dvec3& from,
                                const glm::dvec3& to) {
   glm::dvec3 a = from, b = to;
@@ -116,11 +121,11 @@ std::vector<Stretch> stretches(const View& view, const DepthImage& depth, const 
   for (int i = 0; i < steps; ++i) {
     const double t0 = low + (high - low) * i / steps, t1 = low + (high - low) * (i + 1) / steps;
     const double middle = 0.5 * (t0 + t1);
-    const bool is_hidden = hidden(*pa + along * middle, distance(middle));
-    if (!result.empty() && result.back().hidden == is_hidden) {
+    const bool behind = hidden(*pa + along * middle, distance(middle));
+    if (!result.empty() && result.back().hidden == behind) {
       result.back().to = *pa + along * t1;
     } else {
-      result.push_back({*pa + along * t0, *pa + along * t1, is_hidden});
+      result.push_back({*pa + along * t0, *pa + along * t1, behind});
     }
   }
   return result;
@@ -133,7 +138,7 @@ BoxGuide box_guide(const View& view, const Bounds& box) {
   for (int axis = 0; axis < 3; ++axis) {
     const int u = (axis + 1) % 3, v = (axis + 2) % 3;
     double farthest = -1e300;
-    guide.sizes[axis].text = number(size[axis], size[axis] + box.longest_side());
+    guide.sizes[axis].text = number(tidy(size[axis], box.longest_side()));
     for (int corner = 0; corner < 4; ++corner) {
       glm::dvec3 from = box.low, to = box.low;
       from[u] = to[u] = (corner & 1) != 0 ? box.high[u] : box.low[u];

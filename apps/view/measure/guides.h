@@ -33,6 +33,9 @@ struct Stretch {
 /// Where a view shows a point. Empty behind the eye.
 [[nodiscard]] std::optional<glm::dvec2> pixel_of(const View& view, const glm::dvec3& world);
 
+/// Whether a face lies more than two pixels before a point.
+[[nodiscard]] bool is_hidden(const View& view, const DepthImage& depth, const glm::dvec3& world);
+
 /// What the picture has of a line, in order. @param depth  of the same view, which may be coarser;
 /// without one nothing is hidden
 [[nodiscard]] std::vector<Stretch> stretches(const View& view, const DepthImage& depth,

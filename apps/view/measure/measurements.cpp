@@ -87,9 +87,11 @@ void radius(Measured& m) {
     m.text +=
         fmt::format("circle around {}, axis {}", numbers(fit.centre, scale), numbers(fit.axis));
   } else {
-    m.text +=
-        fmt::format("{} along {} through {}, {} long{}", fit.hollow ? "hole" : "cylinder",
-                    numbers(fit.axis), numbers(fit.centre, scale), number(fit.length, scale), arc);
+    // Some of the length of what is taken away may be air.
+    const bool cut = m.at[0].point.cut;
+    m.text += fmt::format("{} along {} through {}{}{}", fit.hollow ? "hole" : "cylinder",
+                          numbers(fit.axis), numbers(fit.centre, scale),
+                          cut ? "" : ", " + number(fit.length, scale) + " long", arc);
   }
   if (fit.deviation > 1e-4 * fit.radius) {
     m.text += fmt::format(", vertices up to {} off", number(fit.deviation, scale));
@@ -123,6 +125,12 @@ const ToolFacts& facts_of(Tool tool) {
 std::string number(double value, double scale) {
   if (std::abs(value) < 1e-9 * scale) value = 0;
   return fmt::format("{:.6g}", value);
+}
+
+double tidy(double value, double whole) {
+  if (!(whole > 0.0)) return value;
+  const double unit = std::pow(10.0, std::ceil(std::log10(whole)) - 6.0);
+  return std::round(value / unit) * unit;
 }
 
 std::string numbers(const glm::dvec3& value, double scale) {

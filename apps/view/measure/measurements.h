@@ -35,6 +35,8 @@ struct Measured {
 
 /// A number for people: six digits, and what is nothing beside `scale` is 0.
 [[nodiscard]] std::string number(double value, double scale = 1.0);
+/// A size that may be off by a millionth of `whole`: digits beyond that are no digits.
+[[nodiscard]] double tidy(double value, double whole);
 /// Three of them.
 [[nodiscard]] std::string numbers(const glm::dvec3& value, double scale = 1.0);
 

@@ -101,7 +101,7 @@ Result<ExportKind> export_kind(const std::string& path) {
   if (voxel_format_for(path, "")) return ExportKind::kVoxels;
   return fail(ErrorCode::kUsage,
               "{}: the name must end as a mesh (.3mf .stl .obj .ply .off), as voxels (.vdb .npy "
-              ".nrrd ...) or as a picture (.png)",
+              ".nrrd ..., / for a folder of slices) or as a picture (.png)",
               path);
 }
 
