@@ -46,6 +46,16 @@ Result<void> check_sections(std::span<const VoxelSection> sections) {
   return {};
 }
 
+/// What a picture holds while it is drawn must fit the limit.
+Result<void> check_memory(const glm::ivec2& size, const Execution& execution) {
+  const auto bytes = static_cast<std::uint64_t>(size.x) * static_cast<std::uint64_t>(size.y) *
+                     (sizeof(SeenVoxel) + sizeof(glm::vec3) + 2 * sizeof(Rgba));
+  if (execution.memory_limit == 0 || bytes <= execution.memory_limit) return {};
+  return fail(ErrorCode::kLimit,
+              "a picture of {} x {} pixels needs about {} bytes; the memory limit is {}", size.x,
+              size.y, bytes, execution.memory_limit);
+}
+
 Rgba to_pixel(const glm::vec3& colour) {
   return Rgba(glm::vec<4, int>(glm::clamp(glm::vec4(colour, 1.0f), 0.0f, 1.0f) * 255.0f + 0.5f));
 }
@@ -302,6 +312,7 @@ Result<Picture> VoxelPicture::draw(const Camera& camera, const glm::ivec2& size,
   if (auto good = check_sections(options.sections); !good) return tl::unexpected(good.error());
   const auto made = view(camera, size);
   if (!made) return tl::unexpected(made.error());
+  if (auto fits = check_memory(size, execution); !fits) return tl::unexpected(fits.error());
   VoxelStyle style = options.style;
   if (style == VoxelStyle::kAuto) {
     // As wide as a voxel is in the middle of the set.

@@ -240,6 +240,11 @@ TEST(VoxelPicture, RefusesWhatCannotBeDrawnWithTheNumber) {
   ASSERT_FALSE(slice.has_value());
   EXPECT_EQ(slice.error().message, "a slice must be 0 to 7 along y, got 8");
   EXPECT_FALSE(VoxelPicture::create(nullptr).has_value());
+  Execution small;
+  small.memory_limit = 1'000'000;
+  const auto large = picture.draw(Camera{}, {20'000, 20'000}, {}, small);
+  ASSERT_FALSE(large.has_value());
+  EXPECT_EQ(large.error().code, ErrorCode::kLimit);
   std::stop_source stop;
   stop.request_stop();
   Execution execution;
