@@ -11,9 +11,9 @@
 /// mesh, whose vertices are rounded to 1/256 voxel; all else is exact. voxelize() checks whether
 /// the mesh is closed: see VoxelizeOptions::open. Sets are runs of voxels along an axis: their
 /// memory grows with the surface. VoxelIntervals::contains(), for_each_run() and to_dense() read a
-/// set; voxelize_slabs() and open_voxel_writer() never hold a whole set.
-/// strata/voxelize/formats/openvdb_bridge.h passes a set to OpenVDB. contour() makes a closed mesh
-/// whose voxels are the same.
+/// set; read_voxels() reads one from a file; voxelize_slabs() and open_voxel_writer() never hold a
+/// whole set. strata/voxelize/formats/openvdb_bridge.h passes a set to OpenVDB. contour() makes a
+/// closed mesh whose voxels are the same.
 
 #include "strata/contour/contour.h"
 #include "strata/mesh/formats/read_mesh.h"
@@ -22,4 +22,5 @@
 #include "strata/voxelize/formats/voxel_writer.h"
 #include "strata/voxelize/grid_fit.h"
 #include "strata/voxelize/intervals.h"
+#include "strata/voxelize/readers/read_voxels.h"
 #include "strata/voxelize/voxelize.h"

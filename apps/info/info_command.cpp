@@ -1,4 +1,6 @@
 #include <algorithm>
+#include <filesystem>
+#include <system_error>
 #include <utility>
 
 #include "apps/info/check_report.h"
@@ -18,6 +20,8 @@
 #include "strata/csg/solid_lists.h"
 #include "strata/mesh/diagnose.h"
 #include "strata/mesh/orient.h"
+#include "strata/voxelize/readers/read_voxels.h"
+#include "voxelize/volume/voxel_facts.h"
 
 namespace strata::apps {
 namespace {
@@ -275,6 +279,57 @@ Result<FileInfo> look_at(const std::string& path, const csg::InputKind& kind,
   return info;
 }
 
+struct VoxelInfo {
+  std::string path;
+  std::uint64_t bytes = 0;
+  VoxelVolume volume;
+};
+
+std::string info_text(const VoxelInfo& info) {
+  std::string text = printable(info.path) + "\n";
+  for (const auto& [topic, rest] : voxel_facts(info.volume)) {
+    text += fmt::format("  {:<12} {}\n", topic, printable(rest));
+  }
+  if (info.volume.grids.size() > 1) {
+    std::string names;
+    for (const std::string& name : info.volume.grids) {
+      names += (names.empty() ? "" : ", ") + printable(name);
+    }
+    text += fmt::format("  {:<12} {}\n", "grids", names);
+  }
+  for (const std::string& note : info.volume.notes) {
+    text += fmt::format("  {:<12} {}\n", "note", printable(note));
+  }
+  return text;
+}
+
+void write_info(JsonWriter& json, const VoxelInfo& info) {
+  const VoxelVolume& volume = info.volume;
+  json.begin_object();
+  json.member("path", info.path);
+  json.member("format", volume.format);
+  json.member("bytes", info.bytes);
+  json.member("kind", std::string(name_of(volume.kind)));
+  json.member("type", volume.type);
+  json.member("name", volume.name);
+  json.member("dims", volume.grid().dims);
+  json.member("origin", volume.grid().origin);
+  json.member("voxel_size", volume.grid().voxel_size);
+  json.member("placed", volume.placed);
+  json.member("solid", volume.set.solid_voxels());
+  json.member("threshold", static_cast<double>(volume.threshold));
+  json.end_object();
+}
+
+Result<VoxelInfo> look_at_voxels(const std::string& path, Session& session) {
+  auto volume = read_voxels(path, {}, session.execution("reading"));
+  if (!volume) return tl::unexpected(volume.error());
+  std::error_code none;
+  const std::uintmax_t bytes =
+      std::filesystem::is_directory(path, none) ? 0 : std::filesystem::file_size(path, none);
+  return VoxelInfo{path, none ? 0 : bytes, *std::move(volume)};
+}
+
 /// --gl, which says what it can beside files that failed.
 void add_gl(JsonWriter& json, std::string& text, std::optional<Error>& first_error,
             Session& session) {
@@ -302,8 +357,9 @@ Result<void> run_info(const InfoCommand& command, Session& session) {
       return {};
     };
     const csg::InputKind kind = csg::kind_of(path, command.input);
-    const auto told = kind.is_scene ? tell(look_at_scene(path, command, session))
-                                    : tell(look_at(path, kind, command, session));
+    const auto told = is_voxel_file(path) ? tell(look_at_voxels(path, session))
+                      : kind.is_scene     ? tell(look_at_scene(path, command, session))
+                                          : tell(look_at(path, kind, command, session));
     if (told) continue;
     if (session.interrupted()) return told;
     if (first_error) session.complain(*first_error);

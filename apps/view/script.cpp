@@ -70,6 +70,12 @@ constexpr Rule kRules[] = {
      "set the projection, as --projection does"},
     {"section", Action::kSection, Form::kSection, "PLANE",
      "set the section: z=3.5 or z 3.5, y>0, nx,ny,nz,d; off; flip"},
+    {"slice", Action::kSlice, Form::kWord, "PLANE",
+     "show a slice of voxels: k=12 (a voxel), z=3.5 (a place) or off"},
+    {"threshold", Action::kThreshold, Form::kWord, "T",
+     "set the value that voxels must have to be solid, or file"},
+    {"voxels", Action::kVoxels, Form::kWord, "STYLE",
+     "draw voxels as auto, blocks, smooth or xray"},
     {"ghosts", Action::kGhosts, Form::kOnOff, "on|off", "show subtracted solids"},
     {"edges", Action::kEdges, Form::kOnOff, "on|off", "show dark lines along edges"},
     {"axes", Action::kAxes, Form::kOnOff, "on|off", "show the axes in the corner"},
@@ -338,6 +344,15 @@ class Line {
         return one_of({"off", "wall", "ray", "thickness", "depth"});
       case Action::kLook:
         return one_of({"dark", "light"});
+      case Action::kVoxels:
+        return one_of({"auto", "blocks", "smooth", "xray"});
+      case Action::kThreshold: {
+        if (command.word == "file") return {};
+        const auto number = number_of(command.word);
+        if (!number) return usage();
+        command.numbers = {*number};
+        return {};
+      }
       case Action::kTab: {
         const auto number = number_of(command.word);
         if (!number) return one_of({"next", "previous", "close"});

@@ -23,6 +23,9 @@ enum class Action {
   kLoadCamera,  ///< word: the file
   kProjection,  ///< word: as --projection
   kSection,     ///< word: off, flip, or a plane as --cut
+  kSlice,       ///< word: off, or as VoxelScene::slice_of() has it
+  kThreshold,   ///< word: file, or numbers: one
+  kVoxels,      ///< word: a style of voxels
   kGhosts,      ///< on
   kEdges,
   kAxes,

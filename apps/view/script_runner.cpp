@@ -134,6 +134,10 @@ Result<void> ScriptRunner::apply(const ScriptCommand& command, Viewer& viewer) {
       return run_camera(command, viewer);
     case Action::kSection:
       return section(command, viewer);
+    case Action::kSlice:
+    case Action::kThreshold:
+    case Action::kVoxels:
+      return voxels(command, viewer);
     case Action::kGhosts: {
       Looks looks = viewer.looks();
       looks.ghosts = command.on;

@@ -59,6 +59,7 @@ class ScriptRunner {
   bool wait(const ScriptCommand& command, const Viewer& viewer);
   static Result<void> see_through(const ScriptCommand& command, Viewer& viewer);
   static Result<void> section(const ScriptCommand& command, Viewer& viewer);
+  static Result<void> voxels(const ScriptCommand& command, Viewer& viewer);
   static Result<void> solids(const ScriptCommand& command, Viewer& viewer);
 
   std::vector<ScriptCommand> commands_;

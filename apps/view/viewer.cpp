@@ -458,6 +458,10 @@ std::string Viewer::solid_name(std::uint32_t solid) const {
 
 std::string Viewer::describe(const Picked& picked) const {
   if (!picked.hit) return "nothing";
+  if (!picked.what.empty()) {
+    return fmt::format("{}, at {:.6g} {:.6g} {:.6g}", picked.what, picked.where.x, picked.where.y,
+                       picked.where.z);
+  }
   std::string text = fmt::format(
       "{}, triangle {}{}, at {:.6g} {:.6g} {:.6g}", solid_name(picked.solid), picked.triangle,
       picked.cut ? " from within" : "", picked.where.x, picked.where.y, picked.where.z);

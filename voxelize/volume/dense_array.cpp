@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kTileSide = VoxelIntervals::kTileSide;
 constexpr std::size_t kBatchBytes = std::size_t{1} << 20;
-constexpr std::uint64_t kLongSlab = 1u << 20;  // runs of a slab from which ids may be noise
+constexpr std::uint64_t kLongSlab = 1u << 16;  // runs of a slab from which ids may be noise
 constexpr double kIdRun = 1.5;                 // voxels of a run of ids in the mean, at least
 
 std::size_t size(int value) { return static_cast<std::size_t>(value); }

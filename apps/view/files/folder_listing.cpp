@@ -7,11 +7,13 @@
 
 #include "strata/csg/input/scene_input.h"
 #include "strata/mesh/formats/read_mesh.h"
+#include "strata/voxelize/readers/read_voxels.h"
 
 namespace strata::view {
 
 bool can_open(const std::string& name) {
-  return csg::is_scene_name(name) || mesh_format_of(name) != MeshFormat::kAuto;
+  return csg::is_scene_name(name) || mesh_format_of(name) != MeshFormat::kAuto ||
+         is_voxel_file(name);
 }
 
 Result<std::vector<FolderEntry>> list_folder(const std::string& path) {

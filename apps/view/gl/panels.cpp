@@ -53,7 +53,7 @@ void Panels::draw(Viewer& viewer, const glm::ivec2& window, const Area& area) {
     apply_theme(scale_, light_);
   }
   if (viewer.frame() != nullptr) {
-    if (viewer.show_axes) axes(viewer, area);
+    if (viewer.show_axes && !viewer.looks().voxels.slice) axes(viewer, area);
     handle(viewer, area);
     mark(viewer, area);
     guides(viewer, area);
@@ -87,16 +87,21 @@ void Panels::side(Viewer& viewer, const glm::ivec2& window) {
   if (!viewer.parameters().empty() && ImGui::CollapsingHeader("Parameters", open)) {
     parameters(viewer);
   }
-  if (ImGui::CollapsingHeader("Part", open)) numbers(viewer);
+  const bool voxel_file = viewer.model() != nullptr && viewer.model()->voxels != nullptr;
+  if (voxel_file) {
+    if (ImGui::CollapsingHeader("Voxels", open)) voxels(viewer);
+  } else if (ImGui::CollapsingHeader("Part", open)) {
+    numbers(viewer);
+  }
   if (ImGui::CollapsingHeader("Camera", open)) camera(viewer);
   if (ImGui::CollapsingHeader("Appearance", open)) look(viewer);
   if (ImGui::CollapsingHeader("Section", open)) section(viewer);
   if (ImGui::CollapsingHeader("Picked", open)) picked(viewer);
   if (ImGui::CollapsingHeader("Measure", open)) measure(viewer);
   if (ImGui::CollapsingHeader("Export")) exports(viewer);
-  if (ImGui::CollapsingHeader("Transparency")) transparency(viewer);
+  if (!voxel_file && ImGui::CollapsingHeader("Transparency")) transparency(viewer);
   if (ImGui::CollapsingHeader("Times and lists")) statistics(viewer);
-  if (ImGui::CollapsingHeader("Solids", open)) solids(viewer);
+  if (!voxel_file && ImGui::CollapsingHeader("Solids", open)) solids(viewer);
   ImGui::End();
 }
 

@@ -42,6 +42,7 @@ class Panels {
   void console(Viewer& viewer, const Area& area);
   void keys(Viewer& viewer, const glm::ivec2& window) const;
   void open_editor(const Viewer& viewer, const TextPlace& place);
+  static void voxels(Viewer& viewer);
   void camera(Viewer& viewer);
   static void transparency(Viewer& viewer);
   void section(Viewer& viewer);

@@ -22,8 +22,12 @@ void Panels::picked(Viewer& viewer) {
   if (!picked) return faint("click on a face");
   if (!picked->hit) return faint("nothing there");
   ImGui::PushTextWrapPos(0.0f);
-  text(short_name(viewer.solid_name(picked->solid)));
+  text(picked->what.empty() ? short_name(viewer.solid_name(picked->solid)) : picked->what);
   ImGui::PopTextWrapPos();
+  if (!picked->what.empty()) {  // a voxel
+    return text(fmt::format("at {:.5g}, {:.5g}, {:.5g}", picked->where.x, picked->where.y,
+                            picked->where.z));
+  }
   text(fmt::format("triangle {}{}", picked->triangle, picked->cut ? ", a cut face" : ""));
   text(fmt::format("at {:.5g}, {:.5g}, {:.5g}", picked->where.x, picked->where.y, picked->where.z));
   if (picked->thickness) text(fmt::format("thickness {:.5g}", *picked->thickness));

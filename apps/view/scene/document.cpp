@@ -101,6 +101,20 @@ std::vector<Parameter> parameters_of(const csg::SceneInput& input) {
   return parse_parameters(program);
 }
 
+Result<std::shared_ptr<const Model>> load_voxel_model(const std::string& path,
+                                                      const apps::Session& session,
+                                                      const Execution& execution) {
+  auto voxels = VoxelScene::load(path, execution);
+  if (!voxels) return tl::unexpected(voxels.error());
+  auto model = std::make_shared<Model>();
+  model->voxels = *std::move(voxels);
+  model->box = model->voxels->box();
+  model->warnings = model->voxels->volume().notes;
+  model->scene.files.push_back(identify_file(path));
+  model->load_ms = session.milliseconds();
+  return model;
+}
+
 }  // namespace
 
 bool operator==(const Looks& a, const Looks& b) {
@@ -109,13 +123,17 @@ bool operator==(const Looks& a, const Looks& b) {
     return a.section->normal == b.section->normal && a.section->offset == b.section->offset;
   };
   return a.hidden == b.hidden && a.colours == b.colours && a.ghosts == b.ghosts &&
-         a.selected == b.selected && same_plane();
+         a.selected == b.selected && a.voxels == b.voxels && same_plane();
 }
 
 Result<std::shared_ptr<const Model>> load_model(const apps::CsgCommand& command,
                                                 const Execution& execution) {
   apps::Session session(apps::Session::Clock::now(), execution);
   session.set_outputs(command.outputs);
+  const std::vector<std::string>& files = command.input.files;
+  if (files.size() == 1 && is_voxel_file(files.front())) {
+    return load_voxel_model(files.front(), session, execution);
+  }
   auto scene = csg::load_scene(command.input, apps::messages_of(session), execution);
   if (!scene) return tl::unexpected(scene.error());
   auto model = std::make_shared<Model>();
@@ -135,6 +153,13 @@ Result<std::shared_ptr<const Model>> load_model(const apps::CsgCommand& command,
 }
 
 std::shared_ptr<const Arrangement> arrange(const Model& model, const Looks& looks) {
+  if (model.voxels) {
+    auto result = std::make_shared<Arrangement>();
+    result->voxels = model.voxels;
+    result->voxel_looks = looks.voxels;
+    result->section = looks.section;
+    return result;
+  }
   const csg::Scene& scene = model.scene;
   Copier copier(scene.tree, looks);
   if (!scene.shown.empty()) {
@@ -231,6 +256,11 @@ Looks carry_over(const Looks& looks, const Model& before, const Model& after) {
   Looks result;
   result.section = looks.section;
   result.ghosts = looks.ghosts;
+  result.voxels = looks.voxels;
+  if (before.voxels && after.voxels &&
+      before.voxels->volume().grid().dims != after.voxels->volume().grid().dims) {
+    result.voxels.slice.reset();
+  }
   for (std::uint32_t i = 0; i < new_keys.size(); ++i) {
     const auto found = where.find(new_keys[i]);
     if (found == where.end()) continue;

@@ -11,6 +11,7 @@
 
 #include "apps/commands/commands.h"
 #include "apps/view/files/customizer.h"
+#include "apps/view/voxels/voxel_scene.h"
 #include "strata/core/execution.h"
 #include "strata/core/result.h"
 #include "strata/csg/picture/picture.h"
@@ -28,6 +29,7 @@ struct Model {
   std::vector<Parameter> parameters;  ///< of a single .scad
   std::uint64_t triangles = 0;
   double load_ms = 0;
+  std::shared_ptr<const VoxelScene> voxels;  ///< a file of voxels; the scene is empty then
 };
 
 /// Reads the inputs of a command as `strata csg` does. @return as load_scene(), result_bounds()
@@ -41,6 +43,7 @@ struct Looks {
   std::optional<csg::SectionPlane> section;              ///< not towards_eye: see facing()
   bool ghosts = false;                                   ///< of what is subtracted
   std::optional<std::uint32_t> selected;                 ///< its faces are tinted
+  VoxelLooks voxels;                                     ///< of a file of voxels
   friend bool operator==(const Looks& a, const Looks& b);
 };
 
@@ -51,6 +54,9 @@ struct Arrangement {
   double relative_precision = 0;
   std::size_t model_solids = 0;  ///< those behind were added: sections, ghosts
   bool flat = false;
+  std::shared_ptr<const VoxelScene> voxels;  ///< drawn instead of a tree
+  VoxelLooks voxel_looks;
+  std::optional<csg::SectionPlane> section;  ///< of voxels
 };
 
 /// A hidden solid counts as not written: a union and an intersection go on without it, a difference

@@ -83,6 +83,30 @@ Result<std::string> export_voxels(const ExportRequest& request, const Execution&
                      grid->dims.z, set->solid_voxels());
 }
 
+/// The voxels of a file in another format, or with another threshold.
+Result<std::string> export_read_voxels(const ExportRequest& request, ExportKind kind,
+                                       const Execution& execution) {
+  if (kind == ExportKind::kMesh) {
+    return fail(ErrorCode::kUsage, "{}: meshes are made of meshes and scenes, these are voxels",
+                request.path);
+  }
+  const auto set = request.what->voxels->solid(request.what->voxel_looks.threshold, execution);
+  VoxelWriterOptions options;
+  for (int tv = 0; set->has_labels() && tv < set->tiles_v(); ++tv) {
+    for (int tu = 0; tu < set->tiles_u(); ++tu) {
+      for (const std::uint32_t label : set->tile(tu, tv).labels) {
+        options.ids = std::max(options.ids, label);
+      }
+    }
+  }
+  if (auto written = write_voxels(*set, request.path, options, execution); !written) {
+    return tl::unexpected(written.error());
+  }
+  const glm::ivec3 dims = set->grid().dims;
+  return fmt::format("{}: {} x {} x {} voxels, {} solid", request.path, dims.x, dims.y, dims.z,
+                     set->solid_voxels());
+}
+
 Result<std::string> export_safely(const ExportRequest& request, const Execution& execution) {
   try {
     return export_what_is_seen(request, execution);
@@ -117,6 +141,7 @@ Result<std::string> export_what_is_seen(const ExportRequest& request, const Exec
   if (*kind == ExportKind::kPicture) {
     return fail(ErrorCode::kUsage, "{}: the window writes pictures", request.path);
   }
+  if (request.what->voxels) return export_read_voxels(request, *kind, execution);
   return *kind == ExportKind::kMesh ? export_mesh(request, execution)
                                     : export_voxels(request, execution);
 }

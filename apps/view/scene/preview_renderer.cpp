@@ -7,6 +7,7 @@
 #include "apps/strata/library_session.h"
 #include "apps/view/scene/camera_control.h"
 #include "apps/view/scene/renderer.h"
+#include "apps/view/scene/voxel_renderer.h"
 #include "csg/measure/ray_image.h"
 #include "csg/measure/result_bounds.h"
 #include "strata/csg/input/see_through.h"
@@ -25,6 +26,7 @@ class PreviewRenderer final : public Renderer {
   explicit PreviewRenderer(apps::Backend backend) : backend_(backend) {}
 
   Result<Frame> draw(const FrameRequest& request, const Execution& execution) override {
+    if (request.what->voxels) return voxels_.draw(request, execution);
     auto frame = draw_picture(request, execution);
     if (!frame || !request.guides) return frame;
     const auto image = surface_of(request, execution);
@@ -42,6 +44,7 @@ class PreviewRenderer final : public Renderer {
 
   Result<Picked> pick(const FrameRequest& request, const glm::ivec2& pixel,
                       const Execution& execution) override {
+    if (request.what->voxels) return voxels_.pick(request, pixel, execution);
     Picked picked;
     picked.pixel = pixel;
     adopt(request.what);
@@ -363,6 +366,7 @@ class PreviewRenderer final : public Renderer {
     return {};
   }
 
+  VoxelRenderer voxels_;
   apps::Backend backend_;
   bool looked_for_gpu_ = false;
   std::string drawn_by_ = "CPU";

@@ -92,6 +92,7 @@ struct Picked {
   double distance = 0;                    ///< from the eye, along the view axis
   std::optional<double> thickness;        ///< what the heat map has here, if it has one
   std::optional<Probe> probe;             ///< what was measured, if it was wanted
+  std::string what;                       ///< of voxels: says what it is, without the place
 };
 
 /// Draws pictures. One thread at a time.
