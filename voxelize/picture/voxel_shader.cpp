@@ -23,8 +23,8 @@ constexpr float kCornerLight[] = {1.0f, 0.70f, 0.46f, 0.28f};
 
 /// Lines along voxels: from this many pixels a voxel on they show, and from the second on fully.
 constexpr double kLinesFrom = 6.0, kLinesFull = 16.0;
-constexpr float kLineLight = 0.66f;
-constexpr double kLineWidth = 1.1;  // pixels
+constexpr float kBorderLight = 0.66f;
+constexpr double kBorderWidth = 1.1;  // pixels
 /// Planes that do not cross the borders along an axis move less than this along it, by rounding.
 constexpr double kNoSpeed = 1e-9;
 
@@ -132,8 +132,8 @@ float VoxelShader::line_light(const ViewRay& ray, const RayHit& hit,
     if (fade == 0) continue;
     const double part = std::clamp(point[c] - hit.voxel[c], 0.0, 1.0);
     const double away = std::min(part, 1 - part) / speed;  // pixels; half of the line is ours
-    const double cover = std::clamp(kLineWidth / 2 + 0.5 - away, 0.0, 1.0);
-    light = std::min(light, static_cast<float>(1 - (1 - kLineLight) * fade * cover));
+    const double cover = std::clamp(kBorderWidth / 2 + 0.5 - away, 0.0, 1.0);
+    light = std::min(light, static_cast<float>(1 - (1 - kBorderLight) * fade * cover));
   }
   return light;
 }
