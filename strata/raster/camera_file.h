@@ -12,7 +12,7 @@ namespace strata {
 /// A camera at a time of a film.
 struct TimedCamera {
   double time = 0;  ///< seconds
-  Camera camera;
+  Camera camera;    ///< at that time
 };
 
 /// Reads a camera file: lines of text, `#` begins a comment.

@@ -35,9 +35,9 @@ enum class BoundaryParts : std::uint8_t {
 /// Settings of boundary_mesh() and exact_measures().
 struct BoundaryOptions {
   int bits = 26;  ///< lattice steps along the longest side of the result's box: 2^bits; 10 to 28
-  OpenSolids open = OpenSolids::kCap;
-  BoundaryFaceKind faces = BoundaryFaceKind::kCanonical;
-  BoundaryParts parts = BoundaryParts::kOne;
+  OpenSolids open = OpenSolids::kCap;                     ///< solids with holes
+  BoundaryFaceKind faces = BoundaryFaceKind::kCanonical;  ///< how large they are
+  BoundaryParts parts = BoundaryParts::kOne;              ///< of the mesh
   /// Positions will be written as float: they are rounded to float, and checked there.
   bool float_positions = false;
 };
@@ -52,24 +52,25 @@ struct BoundaryCap {
 
 /// How a boundary was made.
 struct BoundaryReport {
-  double step = 0;    ///< of the lattice that all solids were snapped to, world units
-  int coarsened = 0;  ///< bits that were given up because solids reach far out
-  std::uint64_t solids = 0, triangles = 0;  ///< below the root
-  std::uint64_t pairs = 0;                  ///< of triangles that may meet
-  std::uint64_t points = 0;                 ///< where triangles cut each other
-  std::uint64_t pieces = 0;                 ///< of triangles
-  std::uint64_t cells = 0;                  ///< of space, between the triangles
-  std::uint64_t shells = 0;                 ///< of the mesh
-  std::uint64_t repaired = 0;               ///< places where rounding made faces meet
-  int repair_rounds = 0;
+  double step = 0;              ///< of the lattice that all solids were snapped to, world units
+  int coarsened = 0;            ///< bits that were given up because solids reach far out
+  std::uint64_t solids = 0;     ///< below the root
+  std::uint64_t triangles = 0;  ///< of those
+  std::uint64_t pairs = 0;      ///< of triangles that may meet
+  std::uint64_t points = 0;     ///< where triangles cut each other
+  std::uint64_t pieces = 0;     ///< of triangles
+  std::uint64_t cells = 0;      ///< of space, between the triangles
+  std::uint64_t shells = 0;     ///< of the mesh
+  std::uint64_t repaired = 0;   ///< places where rounding made faces meet
+  int repair_rounds = 0;        ///< until no faces met any more
   std::uint64_t vertices_split = 0;  ///< where the result touches itself
-  std::vector<BoundaryCap> caps;
+  std::vector<BoundaryCap> caps;     ///< that closed holes of solids
 };
 
 /// A mesh and how it was made.
 struct BoundaryMesh {
-  SolidMesh mesh;
-  BoundaryReport report;
+  SolidMesh mesh;         ///< closed, and checked
+  BoundaryReport report;  ///< how it was made
 };
 
 /// The boundary of the result of `root`, exact on a lattice to which all solids are snapped once.
@@ -98,9 +99,10 @@ struct ExactMeasures {
   glm::dvec3 centre{0};   ///< of mass, world space
   /// The tensor of inertia about the centre for the density 1, as xx, yy, zz, yz, zx, xy.
   std::array<double, 6> inertia{};
-  glm::dvec3 low{0}, high{0};  ///< the box around the result, world space
-  bool empty = true;           ///< the result has no inside
-  BoundaryReport report;
+  glm::dvec3 low{0};      ///< lower corner of the box around the result, world space
+  glm::dvec3 high{0};     ///< its upper corner
+  bool empty = true;      ///< the result has no inside
+  BoundaryReport report;  ///< how they were found
 };
 
 /// Measures without making a mesh. Errors as for boundary_mesh().

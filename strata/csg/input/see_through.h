@@ -16,6 +16,7 @@
 
 namespace strata::csg {
 
+/// What is seen through, and how much.
 struct SeeThroughOptions {
   /// Opacity, in [0, 1], of all solids that are not transparent by an alpha below 1. Empty: 1 if
   /// the scene has such an alpha or a ghost, else 0.5.
@@ -48,9 +49,9 @@ class SeeThrough {
 
   /// All triangles with their colours; null without SeeThroughOptions::all_faces.
   [[nodiscard]] const transparency::Scene* faces() const;
-  [[nodiscard]] float opacity() const;          ///< of solids without an alpha below 1
-  [[nodiscard]] std::uint64_t objects() const;  ///< parts with a colour or a tree of their own
-  [[nodiscard]] std::uint64_t triangles() const;
+  [[nodiscard]] float opacity() const;            ///< of solids without an alpha below 1
+  [[nodiscard]] std::uint64_t objects() const;    ///< parts with a colour or a tree of their own
+  [[nodiscard]] std::uint64_t triangles() const;  ///< of all parts
 
  private:
   struct Parts;

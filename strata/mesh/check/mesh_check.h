@@ -21,9 +21,10 @@ enum class MeetingKind : std::uint8_t {
 
 /// Two triangles that share more than vertices and edges of both.
 struct MeetingTriangles {
-  std::uint32_t first = 0, second = 0;  ///< face elements in the file; first triangle < second
-  MeetingKind kind = MeetingKind::kTouches;
-  glm::dvec3 place{0.0};  ///< a point that both share, world space
+  std::uint32_t first = 0;                   ///< face element in the file, of the first triangle
+  std::uint32_t second = 0;                  ///< that of the second one, which comes later
+  MeetingKind kind = MeetingKind::kTouches;  ///< how they meet
+  glm::dvec3 place{0.0};                     ///< a point that both share, world space
 };
 
 /// Whether a mesh is the boundary of a solid, and how large that is. Exact, for vertices on a
@@ -33,8 +34,8 @@ struct MeetingTriangles {
 /// Vertices are told apart by index if the mesh is closed that way, so that a solid may touch
 /// itself in an edge or vertex that is there twice; else by position.
 struct MeshCheck {
-  std::uint64_t triangles = 0;
-  bool by_index = false;  ///< vertices are told apart by index
+  std::uint64_t triangles = 0;  ///< of the mesh
+  bool by_index = false;        ///< vertices are told apart by index
 
   std::uint64_t edges = 0;                  ///< different ones
   std::uint64_t unbalanced_edges = 0;       ///< not used equally often in both directions
@@ -46,7 +47,9 @@ struct MeshCheck {
   std::uint64_t degenerate = 0;  ///< triangles without area
   std::uint64_t duplicates = 0;  ///< triangles with the vertices of an earlier one, however turned
 
-  std::uint64_t touching = 0, crossing = 0, overlapping = 0;  ///< pairs of triangles
+  std::uint64_t touching = 0;              ///< pairs of triangles that touch
+  std::uint64_t crossing = 0;              ///< pairs that cross
+  std::uint64_t overlapping = 0;           ///< pairs that overlap in a plane
   std::vector<MeetingTriangles> meetings;  ///< those of the first triangles, at most 8
 
   std::uint64_t shells = 0;  ///< pieces connected through edges

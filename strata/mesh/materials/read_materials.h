@@ -16,7 +16,7 @@ namespace strata {
 
 /// A material of a Wavefront .mtl file.
 struct Material {
-  std::string name;
+  std::string name;                 ///< after `newmtl`
   std::optional<glm::vec3> colour;  ///< Kd, in [0, 1]
   std::optional<float> opacity;     ///< d, or 1 - Tr where there is no d; in [0, 1]
 };
@@ -25,11 +25,11 @@ struct Material {
 struct FaceMaterials {
   /// Faces from `first` to the next group's have a material.
   struct Group {
-    static constexpr std::uint32_t kNone = 0xffffffffu;
-    std::uint64_t first = 0;         ///< face element of the file, from 0
+    static constexpr std::uint32_t kNone = 0xffffffffu;  ///< no material
+    std::uint64_t first = 0;                             ///< face element of the file, from 0
     std::uint32_t material = kNone;  ///< index; kNone: the name is not that of a material
   };
-  std::vector<Material> materials;
+  std::vector<Material> materials;    ///< in the order of the files
   std::vector<Group> groups;          ///< increasing
   std::vector<FileIdentity> files;    ///< the .mtl files that were read
   std::vector<std::string> missing;   ///< sentences: files that are not there

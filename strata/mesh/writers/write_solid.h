@@ -23,9 +23,10 @@ enum class SolidFormat : std::uint8_t {
 /// The length of a world unit, for formats that hold it (3MF).
 enum class LengthUnit : std::uint8_t { kMicron, kMillimetre, kCentimetre, kMetre, kInch, kFoot };
 
+/// Settings of write_solid().
 struct SolidWriteOptions {
-  SolidFormat format = SolidFormat::kAuto;
-  LengthUnit unit = LengthUnit::kMillimetre;
+  SolidFormat format = SolidFormat::kAuto;    ///< kAuto: by the name of the file
+  LengthUnit unit = LengthUnit::kMillimetre;  ///< of the mesh, for a 3MF
   /// OBJ: the file of materials (.mtl) that is written too if a part has a colour. Empty: an OBJ
   /// without colours.
   std::string materials;
