@@ -7,6 +7,8 @@
 #include <optional>
 #include <utility>
 
+#include "strata/mesh/shapes.h"
+
 namespace strata::csg {
 namespace {
 
@@ -220,6 +222,10 @@ double TreeRays::thickness(const glm::dvec3& from, const glm::dvec3& along,
   if (any && end >= 0.0) result = end;
   for (const std::uint32_t solid : scratch.toggled) state.toggle(solid);
   return result;
+}
+
+TriangleSoup TreeRays::solid_mesh(std::uint32_t solid) const {
+  return meshes_[solid] ? transform(*meshes_[solid], places_[solid]) : TriangleSoup{};
 }
 
 double TreeRays::thickness(const glm::dvec3& from, const glm::dvec3& along) const {

@@ -60,6 +60,8 @@ class TreeRays {
   /// Lengths up to this one are nothing.
   [[nodiscard]] double slack() const { return slack_; }
   [[nodiscard]] const Geometry& geometry() const { return geometry_; }
+  /// A whole solid in world space, also where it is vast.
+  [[nodiscard]] TriangleSoup solid_mesh(std::uint32_t solid) const;
   /// Calls body(solid, triangle) for all triangles whose box meets `box`.
   template <class Body>
   void near(const Bounds& box, const Body& body) const {

@@ -84,11 +84,10 @@ class Snapper {
 };
 
 /// Exact, unless that would take long: then as if the mesh did not overlap itself.
-Result<SolidSize> size_of(const csg::Geometry::Part& part, const Execution& execution) {
+Result<SolidSize> size_of(TriangleSoup mesh, InsideRule rule, const Execution& execution) {
   constexpr std::size_t kMany = 300'000;
   SolidSize size;
-  size.box = part.whole;
-  TriangleSoup mesh{part.positions, {part.triangles.begin(), part.triangles.end()}, {}};
+  size.box = bounds(mesh);
   if (mesh.triangles.size() > kMany) {
     size.volume = std::abs(signed_volume(mesh, execution));
     for (const glm::uvec3& t : mesh.triangles) {
@@ -98,7 +97,7 @@ Result<SolidSize> size_of(const csg::Geometry::Part& part, const Execution& exec
     return size;
   }
   const csg::Tree tree(
-      csg::Solid{std::make_shared<TriangleSoup>(std::move(mesh)), glm::dmat4(1.0), {}, part.rule});
+      csg::Solid{std::make_shared<TriangleSoup>(std::move(mesh)), glm::dmat4(1.0), {}, rule});
   const auto exact = csg::exact_measures(tree, tree.root(), {}, execution);
   if (!exact) return tl::unexpected(exact.error());
   size.volume = exact->volume;
@@ -146,15 +145,17 @@ Result<Probe> probe(csg::Preview& preview, const csg::TreeRays& rays, const View
     result.along_normal = rays.thickness(result.point.inner, -result.point.normal);
     result.along_ray = rays.thickness(result.point.inner, glm::normalize(along));
   }
-  if (wish.round) {
-    const csg::Geometry::Part& solid = rays.geometry().parts()[result.point.solid];
+  const csg::Geometry::Part& solid = rays.geometry().parts()[result.point.solid];
+  // A distance does not wait for the facets of large meshes to be sorted.
+  constexpr std::size_t kMany = 200'000;
+  if (wish.round && (!wish.snap || solid.triangles.size() <= kMany)) {
     result.round =
         csg::fit_round(solid.positions, solid.triangles, result.point.triangle, result.where);
     // What is taken away leaves a hole.
     if (result.point.cut) result.round.hollow = !result.round.hollow;
   }
   if (wish.size) {
-    auto size = size_of(rays.geometry().parts()[result.point.solid], execution);
+    auto size = size_of(rays.solid_mesh(result.point.solid), solid.rule, execution);
     if (!size) return tl::unexpected(size.error());
     result.size = *size;
   }

@@ -259,6 +259,13 @@ TEST(Probe, AHoleHasTheRadiusOfItsCutterAndASolidItsOwnSize) {
   EXPECT_TRUE(wall.round.hollow);
   EXPECT_EQ(
       measured(Tool::kRadius, {wall}).text.find("4, diameter 8, hole along 0 0 1 through 0 0"), 0u);
+  // A vast cutter too, though it is cut off around what it cuts.
+  const csg::Tree half = solid(make_box({-20, -20, 0}, {20, 20, 2})) -
+                         solid(make_box({-1e6, -1e6, -1e6}, {1e6, 0, 1e6}));
+  const Probe cutter = probed(half, camera, {1, 0, 1}, {.size = true});
+  EXPECT_TRUE(cutter.point.cut);
+  EXPECT_EQ(measured(Tool::kSize, {cutter}).text,
+            "2e+06 x 1e+06 x 2e+06, volume 4e+18, area 1.6e+13");
   const Probe body = probed(plate, camera, {10, 10, 2}, {.size = true});
   EXPECT_EQ(measured(Tool::kSize, {body}).text, "40 x 40 x 2, volume 3200, area 3520");
 }
