@@ -624,11 +624,11 @@ Command parse_command_line(int argc, const char* const* argv) {
       return usage_error(
           *command, fmt::format("the command comes first: strata {} {} ...", *command, argv[1]));
     }
-    name = holds_voxels({argv + 1, argv + argc}) ? "picture" : "csg";
-    first = 1;
     alone = argc == 2;
+    const bool voxels = holds_voxels({argv + 1, argv + argc});
+    name = !voxels ? "csg" : alone ? "info" : "picture";
+    first = 1;
   }
-  if (name == "info" && argc == 3 && is_voxel_file(argv[2])) name = "picture";  // without an output
   // Only the options of the command that was named are built: that is most of the time CLI11 takes.
   Words words;
   CLI::App app("", "strata " + std::string(name));

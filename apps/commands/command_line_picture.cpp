@@ -152,9 +152,7 @@ PictureCommand picture_command(Words words, Reader& reader) {
   if (command.slice && writes_film(command)) {
     reader.fail_with("--slice draws one picture, not a film");
   }
-  if (command.output.empty() && !command.voxels) {
-    reader.fail_with("no output is given: give -o FILE.png");
-  }
+  if (command.output.empty()) reader.fail_with("no output is given: give -o FILE.png");
   return command;
 }
 

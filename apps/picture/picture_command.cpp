@@ -10,7 +10,6 @@
 #include "apps/session/session.h"
 #include "apps/strata/run_commands.h"
 #include "apps/strata/scene_camera.h"
-#include "core/printable.h"
 #include "strata/csg/input/scene_input.h"
 #include "strata/csg/picture/picture.h"
 #include "strata/picture/animation.h"
@@ -49,29 +48,6 @@ Result<VoxelSlice> slice_of(const PictureCommand::Slice& asked, const VoxelGrid&
               asked.at, file, low, low + grid.dims[axis] * side);
 }
 
-/// What a file holds, for people: a line a topic.
-std::string summary_of(const VoxelVolume& volume, const std::string& file) {
-  const VoxelGrid& grid = volume.grid();
-  const glm::dvec3 s = grid.voxel_size, end = grid.origin + glm::dvec3(grid.dims) * s;
-  const std::uint64_t solid = volume.set.solid_voxels();
-  const double all = static_cast<double>(grid.dims.x) * grid.dims.y * grid.dims.z;
-  const bool cubes = s.x == s.y && s.y == s.z;
-  return fmt::format(
-      "{}\n"
-      "  format           {}: {}, {}{}\n"
-      "  voxels           {} x {} x {} of {}{}\n"
-      "  box              ({:.6g}, {:.6g}, {:.6g}) to ({:.6g}, {:.6g}, {:.6g})\n"
-      "  solid            {} ({:.4g} %), volume {:.6g}\n",
-      printable(file), volume.format, name_of(volume.kind), volume.type,
-      volume.name.empty() ? "" : fmt::format(", grid '{}'", printable(volume.name, 60)),
-      grid.dims.x, grid.dims.y, grid.dims.z,
-      cubes ? fmt::format("{:.6g}", s.x) : fmt::format("{:.6g} x {:.6g} x {:.6g}", s.x, s.y, s.z),
-      volume.placed ? "" : "; the file does not say where they lie", grid.origin.x, grid.origin.y,
-      grid.origin.z, end.x, end.y, end.z, solid,
-      100 * static_cast<double>(solid) / std::max(all, 1.0),
-      static_cast<double>(solid) * s.x * s.y * s.z);
-}
-
 /// A picture of a file of voxels.
 class VoxelRun {
  public:
@@ -82,10 +58,6 @@ class VoxelRun {
     auto volume = read_voxels(file(), command_.reading, session_.execution("reading"));
     if (!volume) return tl::unexpected(volume.error());
     for (const std::string& note : volume->notes) session_.note(note);
-    if (command_.output.empty()) {
-      session_.end_progress();
-      return print_report(summary_of(*volume, file()), "-", false);
-    }
     first_index_ = volume->first_index;
     if (auto done = prepare(*std::move(volume)); !done) return done;
     if (writes_film(command_)) return film();
