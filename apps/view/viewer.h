@@ -81,7 +81,7 @@ class Viewer {
   /// What was taken by tick() is on the screen now. @param present_ms of drawing the window
   void presented(double present_ms);
   /// Nothing is loading.
-  [[nodiscard]] bool loaded() const { return !loader_.busy() && !load_due_ && to_open_.empty(); }
+  [[nodiscard]] bool loaded() const { return loader_.idle() && !load_due_ && to_open_.empty(); }
   /// Nothing is under way at all, and the screen shows the whole picture.
   [[nodiscard]] bool settled() const;
 

@@ -26,6 +26,11 @@ class Loader {
   void start(const apps::CsgCommand& command, int threads);
   void cancel();
   [[nodiscard]] bool busy() const;
+  /// Nothing is under way, and there is nothing to take().
+  [[nodiscard]] bool idle() const {
+    const std::lock_guard lock(mutex_);
+    return !busy_ && !done_;
+  }
   /// Of the phase that is under way, in [0, 1].
   [[nodiscard]] double progress() const { return progress_.load(); }
   [[nodiscard]] double seconds() const;  ///< since start()
