@@ -88,7 +88,7 @@ TEST_F(Voxels, AreExportedInAnotherFormatAndThresholdsDecide) {
   EXPECT_NE(half, any);
   const RunResult told = place_.run({"info", "half.npy"});
   EXPECT_EQ(told.exit_code, 0);
-  EXPECT_NE(told.out.find("npy: mask, bool"), std::string::npos) << told.out;
+  EXPECT_NE(told.out.find("npy, mask of bool"), std::string::npos) << told.out;
   EXPECT_EQ(window("fog.vdb", "export a.stl\n").exit_code, 2);
 }
 
