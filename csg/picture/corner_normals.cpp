@@ -22,13 +22,16 @@ constexpr std::uint32_t kNone = 0xffffffffu;
 constexpr double kFarthestCreases = 2.5;
 /// From the cosine on, a corner's normal is that of its face: 0.05 degrees.
 constexpr double kSame = 1.0 - 4e-7;
-constexpr std::size_t kAtOnce = 4096;
+constexpr std::size_t kVerticesAtOnce = 4096;
 
 template <class Body>
 void for_ranges(const Execution& execution, std::size_t count, Body&& body) {
-  parallel_for(execution, (count + kAtOnce - 1) / kAtOnce, [&](std::size_t range, int) {
-    for (std::size_t i = range * kAtOnce; i < std::min(count, (range + 1) * kAtOnce); ++i) body(i);
-  });
+  parallel_for(execution, (count + kVerticesAtOnce - 1) / kVerticesAtOnce,
+               [&](std::size_t range, int) {
+                 for (std::size_t i = range * kVerticesAtOnce;
+                      i < std::min(count, (range + 1) * kVerticesAtOnce); ++i)
+                   body(i);
+               });
 }
 
 /// The first vertex at the position of each.
@@ -257,11 +260,12 @@ CornerNormals::CornerNormals(std::span<const glm::dvec3> positions,
       packed_[corners[i]] = flat ? kFlat : pack(normals[i]);
     }
   };
-  parallel_for(execution, (positions.size() + kAtOnce - 1) / kAtOnce, [&](std::size_t range, int) {
-    Fan fan(smooth, farthest);
-    const std::size_t end = std::min(positions.size(), (range + 1) * kAtOnce);
-    for (std::size_t v = range * kAtOnce; v < end; ++v) vertex(v, fan);
-  });
+  parallel_for(execution, (positions.size() + kVerticesAtOnce - 1) / kVerticesAtOnce,
+               [&](std::size_t range, int) {
+                 Fan fan(smooth, farthest);
+                 const std::size_t end = std::min(positions.size(), (range + 1) * kVerticesAtOnce);
+                 for (std::size_t v = range * kVerticesAtOnce; v < end; ++v) vertex(v, fan);
+               });
   for_ranges(execution, triangles.size(), [&](std::size_t t) {
     std::uint32_t* corners = packed_.data() + t * 3;
     if (std::all_of(corners, corners + 3, [](std::uint32_t p) { return p == kFlat; })) return;
