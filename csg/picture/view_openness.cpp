@@ -41,6 +41,35 @@ double extent(const EyeSurfaces& seen, const Execution& execution) {
 
 }  // namespace
 
+namespace {
+
+/// Distances along the view axis, finer than the steps of depth are where a scene is vast.
+class FaceDistance {
+ public:
+  explicit FaceDistance(const View& view) : view_(&view) {
+    const double range = view.perspective ? 1.0 / view.near - 1.0 / view.far : view.far - view.near;
+    step_ = range / kPictureDepthLimit;
+  }
+  /// Of the plane of a face where the ray through (x, y) meets it, at most two steps from `depth`.
+  /// (x, y) is in world units, for a perspective view at distance 1.
+  [[nodiscard]] double at(double depth, double x, double y, const glm::dvec3& normal,
+                          double offset) const {
+    const double distance = view_->distance(depth + 0.5);
+    const double reach = 2.0 * step_ * (view_->perspective ? distance * distance : 1.0);
+    const double sideways = normal.x * x + normal.y * y;
+    const double exact =
+        view_->perspective ? offset / (sideways - normal.z) : (sideways - offset) / normal.z;
+    if (!std::isfinite(exact)) return distance;
+    return std::clamp(exact, distance - reach, distance + reach);
+  }
+
+ private:
+  const View* view_;
+  double step_;  ///< of the distance, or of its reciprocal
+};
+
+}  // namespace
+
 View ViewOpenness::reduced(const View& whole) {
   const double step = step_of(whole.size);
   View view = whole;
@@ -61,13 +90,17 @@ ViewOpenness::ViewOpenness(const View& whole, const SurfaceImage& image, const G
   surfaces_.perspective = view.perspective;
   surfaces_.scale = image_from_eye[0][0];
   surfaces_.centre = glm::dvec2(axis) / axis.w;
-  surfaces_.origin_distance = 0.5 * (view.near + view.far);
+  // Floats are finest near the origin, and pixels where surfaces are nearest.
+  const auto nearest = std::min_element(image.depth.begin(), image.depth.end());
+  surfaces_.origin_distance = nearest != image.depth.end() ? view.distance(*nearest) : view.near;
   surfaces_.resize(image.width, image.height);
   const auto width = static_cast<std::size_t>(image.width);
   const glm::dmat3 eye_from_world(view.eye_from_world);
+  const FaceDistance face_distance(view);
   parallel_for(execution, static_cast<std::size_t>(image.height), [&](std::size_t v, int) {
     std::uint32_t solid = SurfaceImage::kNone, face = 0;
-    glm::vec3 normal(0.0f, 0.0f, 1.0f);
+    glm::dvec3 normal(0.0, 0.0, 1.0);
+    double offset = 0.0;  // of the face's plane
     for (std::size_t u = 0; u < width; ++u) {
       const std::size_t i = v * width + u;
       surfaces_.positions[i] = EyeSurfaces::kNowhere;
@@ -82,13 +115,14 @@ ViewOpenness::ViewOpenness(const View& whole, const SurfaceImage& image, const G
             eye_from_world * glm::cross(part.positions[t.y] - a, part.positions[t.z] - a);
         if ((face & SurfaceImage::kExit) != 0) across = -across;
         const double length = glm::length(across);
-        normal = length > 0 ? glm::vec3(across / length) : glm::vec3(0, 0, 1);
+        normal = length > 0 ? across / length : glm::dvec3(0, 0, 1);
+        offset = glm::dot(normal, glm::dvec3(view.eye_from_world * glm::dvec4(a, 1.0)));
       }
-      const double distance = view.distance(image.depth[i] + 0.5);
-      const double wide = (view.perspective ? distance : 1.0) / surfaces_.scale;
-      surfaces_.positions[i] = {(static_cast<double>(u) + 0.5 - surfaces_.centre.x) * wide,
-                                (surfaces_.centre.y - static_cast<double>(v) - 0.5) * wide,
-                                surfaces_.origin_distance - distance};
+      const double x = (static_cast<double>(u) + 0.5 - surfaces_.centre.x) / surfaces_.scale;
+      const double y = (surfaces_.centre.y - static_cast<double>(v) - 0.5) / surfaces_.scale;
+      const double distance = face_distance.at(image.depth[i], x, y, normal, offset);
+      const double wide = view.perspective ? distance : 1.0;
+      surfaces_.positions[i] = {x * wide, y * wide, surfaces_.origin_distance - distance};
       surfaces_.normals[i] = normal;
     }
   });

@@ -228,6 +228,8 @@ TEST(Json, TheDocumentationNamesExactlyWhatInfoPrints) {
   for (const char* name : {"scene.csg", "open.obj"}) {
     collect(json::parse(place.run({"info", name, "--check", "--json"}).out), "", names);
   }
+  place.run({"voxelize", "open.obj", "-r", "8", "-o", "voxels.vdb"});
+  collect(json::parse(place.run({"info", "voxels.vdb", "--json"}).out), "", names);
   names.erase("warnings");  // empty here
   names.insert({"warnings[].code", "warnings[].message"});
   std::set<std::string> told = documented("`strata info`"), of_gl;
