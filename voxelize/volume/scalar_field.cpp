@@ -9,7 +9,6 @@ namespace strata {
 namespace {
 
 constexpr int kNodeBlocks = 8;      // blocks along a side of a node
-constexpr int kBranchNodes = 16;    // nodes along a side of a branch
 constexpr int kBranchBlocks = 128;  // blocks along a side of a branch
 
 std::size_t slot(int x, int y, int z, int bits) {
