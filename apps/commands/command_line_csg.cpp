@@ -173,6 +173,8 @@ void define_look(CLI::App& app, Words& words) {
   app.add_option("--caps", csg.caps, "Faces of --cut under the scheme Neutral (default: hatched)")
       ->type_name("plain|hatched")
       ->group(kLookGroup);
+  app.add_flag("--shadow", csg.shadow, "Draw a soft shadow on the plane below the result")
+      ->group(kLookGroup);
   define_picture_cuts(app, csg);
 }
 

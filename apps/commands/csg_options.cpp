@@ -365,6 +365,7 @@ Result<void> read_csg_options(const CsgWords& words, CsgCommand& command) {
     command.measure_resolution = static_cast<int>(*resolution);
   }
   command.picture.edges = words.edges;
+  command.picture.ground_shadow = words.shadow;
   if (auto read = read_shading(words, command.picture); !read) return read;
   command.ids = words.ids;
   command.depth = words.depth;

@@ -18,7 +18,7 @@ struct CsgWords {
   std::string crease, occlusion, caps;
   std::string preview, render, shown, frames, export_format, summary, summary_file, csg_limit;
   std::vector<std::string> cuts;
-  bool view_all = false, auto_centre = false, edges = false, transparent = false;
+  bool view_all = false, auto_centre = false, edges = false, transparent = false, shadow = false;
 };
 
 /// What to say at the end of a message about the name of an output that the command does not write:

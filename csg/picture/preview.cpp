@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "csg/picture/ghosts.h"
+#include "csg/picture/ground_shadow.h"
 #include "csg/picture/shade.h"
 #include "csg/program.h"
 #include "csg/surface/frame_input.h"
@@ -199,6 +200,8 @@ struct Preview::Impl {
   };
   Result<void> look_around(const View& whole, const ColourScheme& scheme,
                            const PictureOptions& options, const Execution& execution);
+  Result<void> lay_shadow(const View& whole, const Backdrop& backdrop, const Execution& execution,
+                          Picture& picture);
   Result<void> shade_tiles(const Band& band, const Look& look, const Execution& execution,
                            Work& work);
   Result<void> shade_samples(const Band& band, const Look& look, Execution execution, Work& work);
@@ -248,6 +251,22 @@ Result<void> Preview::Impl::look_around(const View& whole, const ColourScheme& s
   }
   openness = ViewOpenness(whole, image, geometry, quiet);
   if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+  return {};
+}
+
+/// Puts a shadow and a backdrop behind a picture that has none.
+Result<void> Preview::Impl::lay_shadow(const View& whole, const Backdrop& backdrop,
+                                       const Execution& execution, Picture& picture) {
+  Execution quiet = execution;
+  quiet.progress = {};
+  const auto draw = [&](const View& view) -> Result<const SurfaceImage*> {
+    if (auto done = frame.draw(view, quiet); !done) return tl::unexpected(done.error());
+    return &frame.image();
+  };
+  const auto shadow = GroundShadow::make(box(), draw, quiet);
+  if (!shadow) return tl::unexpected(shadow.error());
+  shadow->lay_under(picture, whole, quiet);
+  if (!backdrop.transparent()) lay_over(picture, backdrop);
   return {};
 }
 
@@ -305,11 +324,12 @@ Result<Picture> Preview::Impl::picture(const Camera& camera, const glm::ivec2& s
   if (auto done = look_around(*whole, scheme, options, execution); !done) {
     return tl::unexpected(done.error());
   }
+  const Backdrop backdrop = options.backdrop.value_or(plain_backdrop(scheme.background));
   const Look look{options,
                   {across, down},
                   Shader(tree, geometry, *whole, scheme,
                          {normals.empty() ? nullptr : &normals, &openness, options.hatched_caps}),
-                  options.backdrop.value_or(plain_backdrop(scheme.background)),
+                  options.ground_shadow ? Backdrop{} : backdrop,
                   size.y};
   Picture result{size.x, size.y, {}};
   const auto width = static_cast<std::size_t>(size.x);
@@ -339,6 +359,11 @@ Result<Picture> Preview::Impl::picture(const Camera& camera, const glm::ivec2& s
     const auto done =
         direct ? shade_tiles(band, look, part, work) : shade_samples(band, look, part, work);
     if (!done) return tl::unexpected(done.error());
+  }
+  if (options.ground_shadow) {
+    if (auto done = lay_shadow(*whole, backdrop, execution, result); !done) {
+      return tl::unexpected(done.error());
+    }
   }
   if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
   report = work.total;

@@ -74,6 +74,9 @@ struct PictureOptions {
   /// Corners and holes, which see less of their surroundings, are darker. Empty: under studio
   /// lights only. Of what is seen, with steps of one or two pixels.
   std::optional<bool> occlusion;
+  /// A soft shadow on the plane that the result stands on, seen from above. A transparent backdrop
+  /// gets it as alpha.
+  bool ground_shadow = false;
   bool hatched_caps = true;  ///< lines on the faces of sections, under studio lights
 };
 

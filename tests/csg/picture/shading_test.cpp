@@ -370,6 +370,53 @@ TEST(Shading, TheBottomOfAHoleIsDarkerThanThePlateAroundIt) {
   EXPECT_GT(soft.pixels[bottom].g, plain.pixels[bottom].g * 0.3);
 }
 
+TEST(Shading, AGroundShadowIsDarkBeneathAndFadesAndHidesNothing) {
+  Tree tree;
+  const NodeId low = tree.add_solid(solid_of(make_box({-10, -10, 0}, {10, 10, 6})));
+  const NodeId far = tree.add_solid(solid_of(make_box({-400, 0, 0}, {-390, 10, 10})));
+  tree.set_root(tree.add(Operation::kDifference, {low, far}));  // a cutter far away
+  Preview preview(std::move(tree));
+  Camera camera;
+  camera.distance = 200;
+  PictureOptions options;
+  options.backdrop = Backdrop{};
+  const Picture plain = draw(preview, camera, {240, 240}, options);
+  options.ground_shadow = true;
+  const Picture shadow = draw(preview, camera, {240, 240}, options, 1);
+  EXPECT_EQ(shadow.pixels, draw(preview, camera, {240, 240}, options, 3).pixels);
+  int darkest = 0;
+  std::size_t soft = 0;
+  for (std::size_t i = 0; i < plain.pixels.size(); ++i) {
+    if (plain.pixels[i].a == 255) {
+      ASSERT_EQ(plain.pixels[i], shadow.pixels[i]);
+    } else {
+      ASSERT_GE(shadow.pixels[i].a, plain.pixels[i].a);
+      if (plain.pixels[i].a == 0) darkest = std::max<int>(darkest, shadow.pixels[i].a);
+      soft += plain.pixels[i].a == 0 && shadow.pixels[i].a > 3 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(darkest, 50);
+  EXPECT_LT(darkest, 160);
+  EXPECT_GT(soft, 500u);
+  EXPECT_EQ(shadow.pixels[0].a, 0);
+  // On a backdrop it darkens; from below the plane it is not seen.
+  options.backdrop = plain_backdrop({200, 100, 50});
+  const Picture coloured = draw(preview, camera, {240, 240}, options);
+  EXPECT_EQ(coloured.pixels[0], Rgba(200, 100, 50, 255));
+  EXPECT_TRUE(std::any_of(coloured.pixels.begin(), coloured.pixels.end(), [](const Rgba& pixel) {
+    return pixel.r < 170 && std::abs(pixel.r - 2 * pixel.g) <= 2 && pixel.a == 255;
+  }));
+  camera.rotation.x = 130;
+  const Picture below = draw(preview, camera, {240, 240}, options);
+  options.ground_shadow = false;
+  std::size_t differ = 0;
+  const Picture bare = draw(preview, camera, {240, 240}, options);
+  for (std::size_t i = 0; i < bare.pixels.size(); ++i) {
+    for (int c = 0; c < 3; ++c) differ += std::abs(bare.pixels[i][c] - below.pixels[i][c]) > 1;
+  }
+  EXPECT_EQ(differ, 0u);
+}
+
 TEST(Shading, CapsAreBrightAndHatchedAndCutsOfOtherSolidsAreNot) {
   Scene scene;
   const NodeId block = scene.tree.add_solid(solid_of(make_box({-10, -10, -10}, {10, 10, 10})));
