@@ -113,7 +113,8 @@ tl::unexpected<Error> cannot_create(const std::string& path, int reason) {
   const std::size_t slash = path.find_last_not_of('/') == std::string::npos
                                 ? std::string::npos
                                 : path.rfind('/', path.find_last_not_of('/'));
-  if (reason == ENOENT && slash != std::string::npos) {
+  if (reason == ENOENT && slash != std::string::npos &&
+      access(path.substr(0, std::max<std::size_t>(slash, 1)).c_str(), F_OK) != 0) {
     return fail(ErrorCode::kOutput, "{}: cannot create: there is no folder {}", path,
                 path.substr(0, slash));
   }

@@ -555,12 +555,13 @@ bool holds_voxels(const std::vector<std::string>& words) {
   return !words.front().starts_with('-') && is_voxel_file(words.front());
 }
 
-/// For commands that draw scenes and meshes.
+/// For commands that read scenes and meshes alone.
 void refuse_voxels(const std::vector<std::string>& files, Reader& reader) {
   const auto voxels = std::find_if(files.begin(), files.end(), is_voxel_file);
   if (voxels == files.end()) return;
   reader.fail_with(fmt::format(
-      "{}: it holds voxels; `strata picture` draws them, `strata view` shows them", *voxels));
+      "{}: it holds voxels; `strata picture` draws them, `strata view` shows and exports them",
+      *voxels));
 }
 
 /// Whether a command line is one of openscad: no command, but a file, or options and a scene.
@@ -658,7 +659,7 @@ Command parse_command_line(int argc, const char* const* argv) {
   if (name == "csg") command = csg_command(words, reader);
   if (name == "picture") command = picture_command(words, reader);
   if (name == "oit") command = oit_command(words, reader);
-  if (name == "csg" || name == "oit") refuse_voxels(words.files, reader);
+  if (name != "info" && name != "picture") refuse_voxels(words.files, reader);
   if (reader.error()) return usage_error(name, reader.error()->message);
   if (auto* csg = std::get_if<CsgCommand>(&command)) csg->alone = alone;
   return command;

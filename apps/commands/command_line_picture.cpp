@@ -152,6 +152,12 @@ PictureCommand picture_command(Words words, Reader& reader) {
   if (command.slice && writes_film(command)) {
     reader.fail_with("--slice draws one picture, not a film");
   }
+  if (command.slice && !command.cuts.empty()) {
+    reader.fail_with("--slice draws a plane of voxels, of which --cut takes nothing away");
+  }
+  if (command.slice && !words.voxels.style.empty()) {
+    reader.fail_with("--slice draws a plane of voxels, which has no --style");
+  }
   if (command.output.empty()) reader.fail_with("no output is given: give -o FILE.png");
   return command;
 }

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
+#include <glm/vector_relational.hpp>
 #include <memory>
 #include <utility>
 
@@ -168,6 +170,16 @@ class VoxelRun {
     return (*film)->finish();
   }
 
+  /// Whether one section alone keeps nothing of the box.
+  [[nodiscard]] bool all_cut(const std::vector<VoxelSection>& sections) const {
+    const Bounds box = drawing_->box();
+    return std::any_of(sections.begin(), sections.end(), [&](const VoxelSection& section) {
+      const glm::dvec3 least =
+          glm::mix(box.low, box.high, glm::lessThan(section.normal, glm::dvec3(0.0)));
+      return glm::dot(section.normal, least) >= section.offset;
+    });
+  }
+
   Result<Picture> view(const Camera& camera) {
     if (drawing_->box().empty()) {
       session_.warn("empty", fmt::format("{}: the picture is empty: no voxel is solid", file()));
@@ -177,6 +189,10 @@ class VoxelRun {
     for (const csg::SectionPlane& cut : command_.cuts) {
       const csg::SectionPlane plane = csg::facing(cut, camera);
       drawn.sections.push_back({plane.normal, plane.offset});
+    }
+    if (!drawing_->box().empty() && all_cut(drawn.sections)) {
+      session_.warn("empty", fmt::format("{}: the picture is empty: --cut takes all away", file()));
+      if (auto strict = session_.check_strict(); !strict) return tl::unexpected(strict.error());
     }
     return on_backdrop(
         drawing_->draw(camera, command_.size, drawn, session_.execution("drawing", 0.5)));

@@ -453,7 +453,7 @@ Result<std::vector<ScriptCommand>> read_script(const std::string& path) {
 std::string script_help() {
   std::string text;
   for (const Rule& rule : kRules) {
-    text += fmt::format("  {:<34}{}\n", fmt::format("{} {}", rule.name, rule.usage), rule.what);
+    text += fmt::format("  {:<36}{}\n", fmt::format("{} {}", rule.name, rule.usage), rule.what);
   }
   return text;
 }

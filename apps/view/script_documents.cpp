@@ -42,7 +42,8 @@ Result<void> change_tab(const ScriptCommand& command, Viewer& viewer) {
   } else if (command.word == "close") {
     viewer.close_tab(viewer.tab());
   } else if (command.numbers[0] > static_cast<double>(viewer.tabs().size())) {
-    return fail(ErrorCode::kUsage, "there are {} tabs, got {}", viewer.tabs().size(), command.word);
+    return fail(ErrorCode::kUsage, "tab must be 1 to {}, got {}", viewer.tabs().size(),
+                command.word);
   } else {
     viewer.show_tab(static_cast<std::size_t>(command.numbers[0]) - 1);
   }

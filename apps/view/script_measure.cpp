@@ -58,9 +58,10 @@ Result<bool> ScriptRunner::measure(const ScriptCommand& command, Viewer& viewer,
   const auto made = static_cast<std::size_t>(moves_);
   const std::string words = fmt::format("{} {:.6g}", facts.name, fmt::join(n, " "));
   if (made > 0 && board.missed()) {
+    const char* what = board.on_section() ? "a section, which is no solid," : "nothing";
     board.take_up(Tool::kNone);
     const double* at = n.data() + 2 * (made - 1);
-    stage.print(fmt::format("{}: nothing at {:.6g} {:.6g}", words, at[0], at[1]));
+    stage.print(fmt::format("{}: {} at {:.6g} {:.6g}", words, what, at[0], at[1]));
     return true;
   }
   if (made == facts.picks) {

@@ -47,7 +47,7 @@ Result<NrrdHead> parse_head(const ReadContext& context) {
   NrrdHead head;
   const std::string_view bytes = context.bytes;
   if (!bytes.starts_with("NRRD000")) {
-    return fail(ErrorCode::kInput, "{}:1: no NRRD file: it does not begin with NRRD000",
+    return fail(ErrorCode::kInput, "{}:1: not an NRRD file: it does not begin with NRRD000",
                 context.path);
   }
   int number = 0;

@@ -171,7 +171,7 @@ VdbTreeType vdb_tree_type(std::string_view name) {
 Result<std::vector<VdbGridEntry>> read_vdb_entries(const ReadContext& context) {
   ByteCursor cursor(context.bytes);
   if (cursor.get<std::uint64_t>() != kMagic) {
-    return fail(ErrorCode::kInput, "{}: byte 0: no OpenVDB file", context.path);
+    return fail(ErrorCode::kInput, "{}: byte 0: not an OpenVDB file", context.path);
   }
   const auto version = cursor.get<std::uint32_t>();
   if (!cursor.failed() && (version < kOldestVersion || version > kNewestVersion)) {

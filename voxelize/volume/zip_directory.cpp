@@ -46,7 +46,7 @@ Result<Directory> find_directory(std::string_view bytes, const std::string& path
     found.offset = wide.get<std::uint64_t>();
     return found;
   }
-  return fail(ErrorCode::kInput, "{}: no ZIP archive: it has no directory at its end", path);
+  return fail(ErrorCode::kInput, "{}: not a ZIP archive: it has no directory at its end", path);
 }
 
 // Takes 64-bit numbers from the extra field, in the order in which the entry lacks them.

@@ -116,8 +116,9 @@ void Panels::start(Viewer& viewer, const Area& area) {
                ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove |
                    ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoSavedSettings |
                    ImGuiWindowFlags_NoFocusOnAppearing);
-  text("Drop a scene or a mesh into this window, or press ctrl+o to open one.");
-  faint("Scenes: .csg, .scad (needs openscad). Meshes: .obj .stl .ply .off .3mf .amf. Keys: F1.");
+  text("Drop a scene, a mesh or a file of voxels into this window, or press ctrl+o to open one.");
+  faint("Scenes: .csg, .scad (needs openscad). Meshes: .obj .stl .ply .off .3mf .amf.");
+  faint("Voxels: .vdb .npy .npz .nrrd .vti .binvox .vox. Keys: F1.");
   ImGui::Dummy({0, 6 * scale_});
   if (ImGui::Button("Open ...", {140 * scale_, 0})) viewer.key("ctrl+o");
   const auto files = recent_files(viewer.folders());

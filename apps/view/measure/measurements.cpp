@@ -167,18 +167,23 @@ Measured measured(Tool tool, std::vector<Probe> at) {
 void MeasureBoard::take_up(Tool tool) {
   tool_ = tool;
   pending_.clear();
-  missed_ = false;
+  missed_ = on_section_ = false;
 }
 
 std::string MeasureBoard::advice() const {
   if (tool_ == Tool::kNone) return {};
   const std::string_view next = facts_of(tool_).next[pending_.size() % 2];
-  return fmt::format("{}{}; esc ends", missed_ ? "there is no face; " : "", next);
+  return fmt::format("{}{}; esc ends",
+                     on_section_ ? "a section is no solid; "
+                     : missed_   ? "there is no face; "
+                                 : "",
+                     next);
 }
 
 const Measured* MeasureBoard::take(Probe probe) {
-  missed_ = !probe.hit;
-  if (!probe.hit || tool_ == Tool::kNone) return nullptr;
+  on_section_ = probe.hit && probe.section && tool_ == Tool::kSize;
+  missed_ = !probe.hit || on_section_;
+  if (missed_ || tool_ == Tool::kNone) return nullptr;
   pending_.push_back(std::move(probe));
   if (pending_.size() < facts_of(tool_).picks) return nullptr;
   ++completed_;

@@ -64,6 +64,8 @@ class MeasureBoard {
   void clear();
   /// The last pick met no face.
   [[nodiscard]] bool missed() const { return missed_; }
+  /// The last pick was of a section's face, which has no size.
+  [[nodiscard]] bool on_section() const { return on_section_; }
   /// How many measurements have been completed, cleared ones too.
   [[nodiscard]] std::uint64_t completed() const { return completed_; }
   /// Something is drawn that faces may hide, or the box.
@@ -76,7 +78,7 @@ class MeasureBoard {
   Tool tool_ = Tool::kNone;
   std::vector<Probe> pending_;
   std::vector<Measured> done_;
-  bool missed_ = false;
+  bool missed_ = false, on_section_ = false;
   std::uint64_t completed_ = 0;
 };
 

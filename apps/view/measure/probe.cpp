@@ -135,6 +135,7 @@ Result<Probe> probe(csg::Preview& preview, const csg::TreeRays& rays, const View
   result.hit = true;
   result.point = rays.point(part, image, at.x, at.y);
   result.where = result.point.where;
+  result.section = csg::is_section(preview.tree().solids()[result.point.solid]);
   if (wish.snap) Snapper(rays, part, image).snap(result, at);
   if (wish.thickness) {
     const glm::dmat4& eye = view.eye_from_world;
@@ -154,7 +155,7 @@ Result<Probe> probe(csg::Preview& preview, const csg::TreeRays& rays, const View
     // What is taken away leaves a hole.
     if (result.point.cut) result.round.hollow = !result.round.hollow;
   }
-  if (wish.size) {
+  if (wish.size && !result.section) {
     auto size = size_of(rays.solid_mesh(result.point.solid), solid.rule, execution);
     if (!size) return tl::unexpected(size.error());
     result.size = *size;

@@ -33,6 +33,7 @@ struct SolidSize {
 struct Probe {
   glm::ivec2 pixel{0};
   bool hit = false;         ///< there is a face
+  bool section = false;     ///< the face is a section's: it belongs to no solid
   csg::SurfacePoint point;  ///< where the ray meets it
   csg::Snap snap = csg::Snap::kFace;
   glm::dvec3 where{0.0};                   ///< the point, or what it was moved to

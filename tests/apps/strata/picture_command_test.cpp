@@ -128,7 +128,19 @@ TEST_F(PictureCommand, MistakesAreNamed) {
             "strata: error: --expr is for scenes and meshes, but ball.npz holds voxels");
   EXPECT_EQ(mistake({"csg", "ball.vdb", "-o", "x.png"}),
             "strata: error: ball.vdb: it holds voxels; `strata picture` draws them, `strata view` "
-            "shows them");
+            "shows and exports them");
+  EXPECT_EQ(mistake({"voxelize", "ball.vdb", "-o", "x.npy"}),
+            mistake({"mesh", "ball.vdb", "-o", "x.stl"}));
+  EXPECT_EQ(mistake({"voxelize", "ball.vdb", "-o", "x.npy"}),
+            mistake({"csg", "ball.vdb", "-o", "x.png"}));
+  EXPECT_EQ(mistake({"picture", "ball.vdb", "-o", "x.png", "--slice", "k=2", "--cut", "y=0"}),
+            "strata: error: --slice draws a plane of voxels, of which --cut takes nothing away");
+  EXPECT_EQ(mistake({"picture", "ball.vdb", "-o", "x.png", "--slice", "k=2", "--style", "xray"}),
+            "strata: error: --slice draws a plane of voxels, which has no --style");
+  const RunResult nothing =
+      place_.run({"picture", "ball.vdb", "-o", "x.png", "--cut", "x>100", "--strict"});
+  EXPECT_EQ(nothing.exit_code, 5);
+  EXPECT_NE(nothing.err.find("the picture is empty: --cut takes all away"), std::string::npos);
   EXPECT_EQ(mistake({"picture", "ball.vdb", "ball.npz", "-o", "x.png"}),
             "strata: error: ball.vdb holds voxels, which are drawn alone, but 2 inputs are given");
   EXPECT_FALSE(place_.has("x.png"));

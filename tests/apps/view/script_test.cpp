@@ -155,7 +155,7 @@ TEST(Script, TheDocumentHasTheKeysAndCommandsOfTheHelp) {
   ASSERT_FALSE(text.empty());
   for (std::size_t at = 0; (at = text.find("\\|", at)) != std::string::npos;) text.erase(at, 1);
   std::vector<std::string> rows = rows_of(key_help(), 24, "");
-  const std::vector<std::string> commands = rows_of(script_help(), 34, "`");
+  const std::vector<std::string> commands = rows_of(script_help(), 36, "`");
   rows.insert(rows.end(), commands.begin(), commands.end());
   EXPECT_GT(rows.size(), 60u);
   for (const std::string& row : rows) {
