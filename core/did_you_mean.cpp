@@ -8,20 +8,16 @@
 #include <array>
 #include <cstddef>
 
+#include "core/letters.h"
+
 namespace strata {
 namespace {
 
 constexpr std::size_t kLongest = 64;    // words beyond are not compared
 constexpr std::size_t kLeastBegin = 3;  // letters that may stand for a whole word
 
-char lower(char letter) {
-  return letter >= 'A' && letter <= 'Z' ? static_cast<char>(letter - 'A' + 'a') : letter;
-}
-
 bool begins_with(std::string_view word, std::string_view begin) {
-  return word.size() >= begin.size() &&
-         std::equal(begin.begin(), begin.end(), word.begin(),
-                    [](char a, char b) { return lower(a) == lower(b); });
+  return same_word(word.substr(0, begin.size()), begin);
 }
 
 std::size_t distance(std::string_view a, std::string_view b) {
@@ -33,10 +29,10 @@ std::size_t distance(std::string_view a, std::string_view b) {
     last = row;
     row[0] = i;
     for (std::size_t j = 1; j <= b.size(); ++j) {
-      const bool same = lower(a[i - 1]) == lower(b[j - 1]);
+      const bool same = lower_case(a[i - 1]) == lower_case(b[j - 1]);
       row[j] = std::min({last[j] + 1, row[j - 1] + 1, last[j - 1] + (same ? 0 : 1)});
-      if (i > 1 && j > 1 && lower(a[i - 1]) == lower(b[j - 2]) &&
-          lower(a[i - 2]) == lower(b[j - 1])) {
+      if (i > 1 && j > 1 && lower_case(a[i - 1]) == lower_case(b[j - 2]) &&
+          lower_case(a[i - 2]) == lower_case(b[j - 1])) {
         row[j] = std::min(row[j], before[j - 2] + 1);
       }
     }

@@ -1,6 +1,4 @@
-#include <algorithm>
-#include <cctype>
-
+#include "core/letters.h"
 #include "strata/csg/picture/picture.h"
 
 namespace strata::csg {
@@ -31,14 +29,8 @@ constexpr ColourScheme kSchemes[] = {
 std::span<const ColourScheme> colour_schemes() { return kSchemes; }
 
 const ColourScheme* find_colour_scheme(std::string_view name) {
-  const auto same = [](char a, char b) {
-    return std::tolower(static_cast<unsigned char>(a)) ==
-           std::tolower(static_cast<unsigned char>(b));
-  };
   for (const ColourScheme& scheme : kSchemes) {
-    if (std::equal(scheme.name.begin(), scheme.name.end(), name.begin(), name.end(), same)) {
-      return &scheme;
-    }
+    if (same_word(scheme.name, name)) return &scheme;
   }
   return nullptr;
 }

@@ -8,10 +8,10 @@
 #include <charconv>
 #include <new>
 
+#include "core/letters.h"
+
 namespace strata::csg {
 namespace {
-
-char lower(char c) { return static_cast<char>(c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c); }
 
 std::string_view without_slash(std::string_view name) {
   return name.starts_with('/') ? name.substr(1) : name;
@@ -22,11 +22,7 @@ std::string_view without_slash(std::string_view name) {
 std::optional<std::string> ZipArchive::find(std::string_view name) const {
   const auto look = [&](std::string_view wanted) -> std::optional<std::string> {
     for (const std::string& known : names_) {
-      const std::string_view other = without_slash(known);
-      if (std::equal(wanted.begin(), wanted.end(), other.begin(), other.end(),
-                     [](char a, char b) { return lower(a) == lower(b); })) {
-        return known;
-      }
+      if (same_word(wanted, without_slash(known))) return known;
     }
     return std::nullopt;
   };

@@ -1,23 +1,16 @@
 #include "strata/voxelize/formats/voxel_writer.h"
 
 #include <algorithm>
-#include <cctype>
 #include <exception>
 #include <string_view>
 
 #include "core/did_you_mean.h"
+#include "core/letters.h"
 #include "strata/voxelize/grid_fit.h"
 #include "voxelize/formats/writers.h"
 
 namespace strata {
 namespace {
-
-std::string lower_case(std::string_view text) {
-  std::string lower(text);
-  std::transform(lower.begin(), lower.end(), lower.begin(),
-                 [](unsigned char letter) { return static_cast<char>(std::tolower(letter)); });
-  return lower;
-}
 
 bool is_folder(const VoxelFormat& format) { return format.extension.ends_with('/'); }
 
@@ -86,7 +79,7 @@ Result<VoxelFormat> voxel_format_for(const std::string& path, const std::string&
   };
   if (!format.empty()) {
     for (const VoxelFormat& candidate : voxel_formats()) {
-      if (candidate.name == lower_case(format)) return checked(candidate);
+      if (same_word(candidate.name, format)) return checked(candidate);
     }
     return fail(ErrorCode::kUsage, "unknown voxel format '{}'; it must be one of {}{}", format,
                 format_names(), meant_format(format));

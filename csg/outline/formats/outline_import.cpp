@@ -1,20 +1,18 @@
 #include "csg/outline/formats/outline_import.h"
 
 #include <algorithm>
-#include <cctype>
 #include <filesystem>
 #include <glm/common.hpp>
 #include <limits>
 
+#include "core/letters.h"
 #include "mesh/formats/input_bytes.h"
 
 namespace strata::csg {
 
 Result<Outline> read_outline(const std::string& path, const OutlineImport& options,
                              const Execution& execution, std::vector<std::string>* warnings) {
-  std::string extension = std::filesystem::path(path).extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string extension = lower_case(std::filesystem::path(path).extension().string());
   if (extension != ".svg" && extension != ".dxf") {
     return fail(ErrorCode::kInput, "{}: outlines are read from .svg and .dxf files, not '{}'", path,
                 extension);
