@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 #include <span>
 #include <vector>
@@ -32,6 +33,12 @@ class Geometry {
     bool convex = false;  ///< known to be; a hint that only speed depends on
 
     [[nodiscard]] PlacedMesh placed() const { return {positions, triangles, box}; }
+    /// Along the normal of a triangle, outwards; twice as long as its area is large.
+    [[nodiscard]] glm::dvec3 across(std::uint32_t triangle) const {
+      const glm::uvec3& t = triangles[triangle];
+      const glm::dvec3& a = positions[t.x];
+      return glm::cross(positions[t.y] - a, positions[t.z] - a);
+    }
   };
 
   /// Keeps the meshes of `tree` alive.

@@ -26,18 +26,10 @@ constexpr float kPi = 3.14159265f;
 /// Pixel (x, y) of a square: an order in which neighbours are far apart.
 constexpr std::array<std::uint8_t, 16> kOrder{0, 8, 2, 10, 12, 4, 14, 6, 3, 11, 1, 9, 15, 7, 13, 5};
 
-/// The directions of all planes of a square: half a circle.
+/// The directions of all planes of a square: half a circle, by pi / 32.
 std::array<glm::vec2, kPlanes * kTurns> make_directions() {
-  // The sine and cosine of pi / 32, written out: the same on every machine.
-  constexpr double kCos = 0.99518472667219688624, kSin = 0.09801714032956060199;
   static_assert(kPlanes * kTurns == 32);
-  std::array<glm::vec2, kPlanes * kTurns> directions;
-  glm::dvec2 at(1, 0);
-  for (glm::vec2& direction : directions) {
-    direction = at;
-    at = {at.x * kCos - at.y * kSin, at.x * kSin + at.y * kCos};
-  }
-  return directions;
+  return turned_directions<kPlanes * kTurns>(0.99518472667219688624, 0.09801714032956060199);
 }
 
 /// The angle of a cosine, off by less than 1e-4 (M. Abramowitz and I. Stegun, 4.4.45), from

@@ -1,8 +1,14 @@
 #pragma once
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
 #include <cstdint>
+#include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <span>
 #include <vector>
 
 #include "strata/core/execution.h"
@@ -33,5 +39,55 @@ struct EyeSurfaces {
 /// exactly, and facets of a curved surface do not darken each other.
 [[nodiscard]] std::vector<std::uint8_t> openness(const EyeSurfaces& surfaces, double radius,
                                                  const Execution& execution = {});
+
+/// The openness of a face at a place between pixels, in pixels of `surfaces`, (0, 0) the middle of
+/// the first, in [0, 1]: the mean of the four pixels around, of those most that lie on the face.
+/// @param open  as openness() gives it @param normal  of the face
+/// @param away  float(const glm::vec3& position): how far from the plane, 1: of no use
+template <class Away>
+[[nodiscard]] float openness_between(const EyeSurfaces& surfaces,
+                                     std::span<const std::uint8_t> open, const glm::dvec2& place,
+                                     const glm::vec3& normal, Away&& away) {
+  const int left = std::clamp(static_cast<int>(std::floor(place.x)), 0, surfaces.width - 1);
+  const int top = std::clamp(static_cast<int>(std::floor(place.y)), 0, surfaces.height - 1);
+  const int right = std::min(left + 1, surfaces.width - 1);
+  const int bottom = std::min(top + 1, surfaces.height - 1);
+  const auto index = [&](int column, int row) {
+    return static_cast<std::size_t>(row) * static_cast<std::size_t>(surfaces.width) +
+           static_cast<std::size_t>(column);
+  };
+  const std::size_t around[] = {index(left, top), index(right, top), index(left, bottom),
+                                index(right, bottom)};
+  if ((open[around[0]] & open[around[1]] & open[around[2]] & open[around[3]]) == 255) return 1.0f;
+  const auto to_right = static_cast<float>(std::clamp(place.x - left, 0.0, 1.0));
+  const auto down = static_cast<float>(std::clamp(place.y - top, 0.0, 1.0));
+  const float shares[] = {(1 - to_right) * (1 - down), to_right * (1 - down), (1 - to_right) * down,
+                          to_right * down};
+  float sum = 0.0f, weights = 0.0f;
+  for (int k = 0; k < 4; ++k) {
+    const glm::vec3& there = surfaces.positions[around[k]];
+    if (there.z <= EyeSurfaces::kNowhere.z) continue;
+    const float same = glm::dot(normal, surfaces.normals[around[k]]);
+    // Others count a little, for where there is no point of the face.
+    const float like = std::max(0.0f, 1.0f - away(there)) * std::max(0.0f, 4.0f * same - 3.0f);
+    const float weight = (shares[k] + 0.02f) * (like + 0.002f);
+    sum += weight * static_cast<float>(open[around[k]]);
+    weights += weight;
+  }
+  return weights > 0.0f ? sum / (255.0f * weights) : 1.0f;
+}
+
+/// Directions, each turned from the last by an angle that is given by its cosine and sine: the same
+/// on every machine. The first is (1, 0).
+template <std::size_t kCount>
+[[nodiscard]] std::array<glm::vec2, kCount> turned_directions(double cosine, double sine) {
+  std::array<glm::vec2, kCount> directions;
+  glm::dvec2 at(1, 0);
+  for (glm::vec2& direction : directions) {
+    direction = at;
+    at = {at.x * cosine - at.y * sine, at.x * sine + at.y * cosine};
+  }
+  return directions;
+}
 
 }  // namespace strata

@@ -10,6 +10,8 @@
 #include <glm/trigonometric.hpp>
 #include <limits>
 
+#include "picture/occlusion.h"
+
 namespace strata::csg {
 namespace {
 
@@ -28,16 +30,8 @@ constexpr int kRings = 32;
 
 /// A point looks in 16 directions, its neighbours in a square of 4 x 4 in others: 256 in all.
 constexpr int kDirections = 16, kTurns = 16;
-std::array<glm::vec2, kDirections * kTurns> make_directions() {
-  // The cosine and sine of 2 pi / 256, written out: the same on every machine.
-  constexpr double kCos = 0.99969881869620425, kSin = 0.024541228522912288;
-  std::array<glm::vec2, kDirections * kTurns> directions;
-  glm::dvec2 at(1, 0);
-  for (glm::vec2& direction : directions) {
-    direction = at;
-    at = {at.x * kCos - at.y * kSin, at.x * kSin + at.y * kCos};
-  }
-  return directions;
+std::array<glm::vec2, kDirections * kTurns> make_directions() {  // by 2 pi / 256
+  return turned_directions<kDirections * kTurns>(0.99969881869620425, 0.024541228522912288);
 }
 
 /// Looks at a square of the plane.
@@ -51,11 +45,13 @@ Result<View> square_view(const glm::dvec2& middle, double half, bool from_below,
   return make_view(camera, {kSide, kSide}, box);
 }
 
-/// From (x, y, 1) to pixels of the map, of a view from below.
-glm::dmat3 ground_map(const View& view) {
+/// From (x, y, 1) on the plane z = height to (u w, v w, w) of a view's pixels.
+glm::dmat3 image_from_ground(const View& view, double height) {
   const glm::dmat4& m = view.image_from_world;
-  return {glm::dvec3(m[0].x, m[0].y, m[0].w), glm::dvec3(m[1].x, m[1].y, m[1].w),
-          glm::dvec3(m[3].x, m[3].y, 1.0)};
+  const auto row = [](const glm::dvec4& column) {
+    return glm::dvec3(column.x, column.y, column.w);
+  };
+  return {row(m[0]), row(m[1]), row(m[2]) * height + row(m[3])};
 }
 
 /// Heights of a view from above or below, z; not a number where nothing is seen.
@@ -173,6 +169,7 @@ Result<GroundShadow> GroundShadow::make(const Bounds& box, const Draw& draw,
   const double pixel = 2 * half / kSide;
   middle += pixel * 0.5 * glm::dvec2(low + high) - half;
   half = 0.95 * pixel * std::max(high.x - low.x, high.y - low.y) + pixel;
+  View below;
   std::vector<double> heights[2];  // of the lowest and of the highest surface
   for (const bool from_below : {true, false}) {
     const auto view = square_view(middle, half, from_below, box);
@@ -180,9 +177,10 @@ Result<GroundShadow> GroundShadow::make(const Bounds& box, const Draw& draw,
     const auto seen = draw(*view);
     if (!seen) return tl::unexpected(seen.error());
     heights[from_below ? 0 : 1] = heights_of(*view, **seen, from_below);
-    if (from_below) shadow.map_from_ground_ = ground_map(*view);
+    if (from_below) below = *view;
   }
   shadow.add_columns(heights[0], heights[1], kSide / (2 * half), execution);
+  shadow.map_from_ground_ = image_from_ground(below, shadow.height_);
   return shadow;
 }
 
@@ -232,11 +230,8 @@ void GroundShadow::lay_under(Picture& picture, const View& view, const Execution
   const bool from_above =
       view.perspective ? world_from_eye[3].z > height_ : world_from_eye[2].z > 0;
   if (dark_.empty() || !from_above) return;
-  const glm::dmat4& m = view.image_from_world;
-  const glm::dmat3 image_from_ground(
-      glm::dvec3(m[0].x, m[0].y, m[0].w), glm::dvec3(m[1].x, m[1].y, m[1].w),
-      glm::dvec3(m[2].x * height_ + m[3].x, m[2].y * height_ + m[3].y, m[2].w * height_ + m[3].w));
-  const glm::dmat3 map_from_image = map_from_ground_ * glm::inverse(image_from_ground);
+  const glm::dmat3 map_from_image =
+      map_from_ground_ * glm::inverse(image_from_ground(view, height_));
   parallel_for(execution, static_cast<std::size_t>(picture.height), [&](std::size_t v, int) {
     Rgba* row = picture.pixels.data() + v * static_cast<std::size_t>(picture.width);
     for (int u = 0; u < picture.width; ++u) {

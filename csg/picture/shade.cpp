@@ -54,13 +54,6 @@ Shader::Shader(const Tree& tree, const Geometry& geometry, const View& view,
       look_(look),
       size_(geometry.box().empty() ? 0.0 : glm::length(geometry.box().high - geometry.box().low)) {}
 
-glm::dvec3 Shader::across(std::uint32_t solid, std::uint32_t triangle) const {
-  const Geometry::Part& part = geometry_->parts()[solid];
-  const glm::uvec3& t = part.triangles[triangle];
-  const glm::dvec3& a = part.positions[t.x];
-  return glm::cross(part.positions[t.y] - a, part.positions[t.z] - a);
-}
-
 Lit Shader::light_on(const glm::dvec3& normal) const {
   if (studio_) return lights_.on(glm::vec3(normal));
   return {0.0f, eye_light(normal), 0.0f};

@@ -62,7 +62,9 @@ class Shader {
 
  private:
   /// In world space, not of length 1.
-  [[nodiscard]] glm::dvec3 across(std::uint32_t solid, std::uint32_t triangle) const;
+  [[nodiscard]] glm::dvec3 across(std::uint32_t solid, std::uint32_t triangle) const {
+    return geometry_->parts()[solid].across(triangle);
+  }
   /// @param normal  in eye space, of length 1
   [[nodiscard]] Lit light_on(const glm::dvec3& normal) const;
   [[nodiscard]] glm::vec3 in_light(const glm::vec3& base, const Lit& light, float open) const;

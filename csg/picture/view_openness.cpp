@@ -39,10 +39,6 @@ double extent(const EyeSurfaces& seen, const Execution& execution) {
   return high.x >= low.x ? glm::length(glm::dvec3(high) - glm::dvec3(low)) : 0.0;
 }
 
-}  // namespace
-
-namespace {
-
 /// Distances along the view axis, finer than the steps of depth are where a scene is vast.
 class FaceDistance {
  public:
@@ -111,8 +107,7 @@ ViewOpenness::ViewOpenness(const View& whole, const SurfaceImage& image, const G
         const Geometry::Part& part = geometry.parts()[solid];
         const glm::uvec3& t = part.triangles[face & ~SurfaceImage::kExit];
         const glm::dvec3& a = part.positions[t.x];
-        glm::dvec3 across =
-            eye_from_world * glm::cross(part.positions[t.y] - a, part.positions[t.z] - a);
+        glm::dvec3 across = eye_from_world * part.across(face & ~SurfaceImage::kExit);
         if ((face & SurfaceImage::kExit) != 0) across = -across;
         const double length = glm::length(across);
         normal = length > 0 ? across / length : glm::dvec3(0, 0, 1);
@@ -139,41 +134,13 @@ float ViewOpenness::at(int u, int v, const Plane& plane) const {
   if (open_.empty()) return 1.0f;
   const float x = (static_cast<float>(u) + 0.5f) * step_ - 0.5f;
   const float y = (static_cast<float>(v) + 0.5f) * step_ - 0.5f;
-  const int left = std::max(0, static_cast<int>(std::floor(x)));
-  const int top = std::max(0, static_cast<int>(std::floor(y)));
-  const int right = std::min(left + 1, surfaces_.width - 1);
-  const int bottom = std::min(top + 1, surfaces_.height - 1);
-  const auto index = [&](int column, int row) {
-    return static_cast<std::size_t>(row) * static_cast<std::size_t>(surfaces_.width) +
-           static_cast<std::size_t>(column);
-  };
-  const std::size_t around[] = {index(left, top), index(right, top), index(left, bottom),
-                                index(right, bottom)};
-  if ((open_[around[0]] & open_[around[1]] & open_[around[2]] & open_[around[3]]) == 255) {
-    return 1.0f;
-  }
-  const float to_right = std::clamp(x - static_cast<float>(left), 0.0f, 1.0f);
-  const float down = std::clamp(y - static_cast<float>(top), 0.0f, 1.0f);
-  const float shares[] = {(1 - to_right) * (1 - down), to_right * (1 - down), (1 - to_right) * down,
-                          to_right * down};
-  float sum = 0.0f, weights = 0.0f;
-  for (int k = 0; k < 4; ++k) {
-    const glm::vec3& there = surfaces_.positions[around[k]];
-    if (there.z <= EyeSurfaces::kNowhere.z) continue;
+  return openness_between(surfaces_, open_, {x, y}, plane.normal, [&](const glm::vec3& there) {
     const auto distance =
         static_cast<float>(surfaces_.origin_distance - static_cast<double>(there.z));
     const float pixel =
         (surfaces_.perspective ? distance : 1.0f) / static_cast<float>(surfaces_.scale);
-    const float off = std::abs(glm::dot(plane.normal, there) - plane.offset);
-    const float same = glm::dot(plane.normal, surfaces_.normals[around[k]]);
-    // Others count a little, for where there is no point of the face.
-    const float like =
-        std::max(0.0f, 1.0f - off / (2.0f * pixel)) * std::max(0.0f, 4.0f * same - 3.0f);
-    const float weight = (shares[k] + 0.02f) * (like + 0.002f);
-    sum += weight * static_cast<float>(open_[around[k]]);
-    weights += weight;
-  }
-  return weights > 0.0f ? sum / (255.0f * weights) : 1.0f;
+    return std::abs(glm::dot(plane.normal, there) - plane.offset) / (2.0f * pixel);
+  });
 }
 
 }  // namespace strata::csg

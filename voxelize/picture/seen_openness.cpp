@@ -52,40 +52,12 @@ SeenOpenness::SeenOpenness(const View& view, const std::vector<SeenVoxel>& seen,
 float SeenOpenness::at(const glm::dvec2& pixel, const SeenVoxel& seen) const {
   if (open_.empty()) return 1.0f;
   const glm::dvec2 place = (pixel - 0.5) / static_cast<double>(step_);
-  const int left = std::clamp(static_cast<int>(place.x), 0, surfaces_.width - 1);
-  const int top = std::clamp(static_cast<int>(place.y), 0, surfaces_.height - 1);
-  const int right = std::min(left + 1, surfaces_.width - 1);
-  const int bottom = std::min(top + 1, surfaces_.height - 1);
-  const auto index = [&](int column, int row) {
-    return static_cast<std::size_t>(row) * static_cast<std::size_t>(surfaces_.width) +
-           static_cast<std::size_t>(column);
-  };
-  const std::size_t around[] = {index(left, top), index(right, top), index(left, bottom),
-                                index(right, bottom)};
-  if ((open_[around[0]] & open_[around[1]] & open_[around[2]] & open_[around[3]]) == 255) {
-    return 1.0f;
-  }
-  const auto to_right = static_cast<float>(std::clamp(place.x - left, 0.0, 1.0));
-  const auto down = static_cast<float>(std::clamp(place.y - top, 0.0, 1.0));
-  const float shares[] = {(1 - to_right) * (1 - down), to_right * (1 - down), (1 - to_right) * down,
-                          to_right * down};
   const glm::vec3 here = position(pixel, double{seen.distance});
   const auto pixel_width =
       static_cast<float>((surfaces_.perspective ? double{seen.distance} : 1.0) / surfaces_.scale);
-  float sum = 0.0f, weights = 0.0f;
-  for (int k = 0; k < 4; ++k) {
-    const glm::vec3& there = surfaces_.positions[around[k]];
-    if (there.z <= EyeSurfaces::kNowhere.z) continue;
-    const float off = std::abs(glm::dot(seen.face, there - here));
-    const float same = glm::dot(seen.face, surfaces_.normals[around[k]]);
-    // Others count a little, for where there is no point of the face.
-    const float like =
-        std::max(0.0f, 1.0f - off / (2.0f * pixel_width)) * std::max(0.0f, 4.0f * same - 3.0f);
-    const float weight = (shares[k] + 0.02f) * (like + 0.002f);
-    sum += weight * static_cast<float>(open_[around[k]]);
-    weights += weight;
-  }
-  return weights > 0.0f ? sum / (255.0f * weights) : 1.0f;
+  return openness_between(surfaces_, open_, place, seen.face, [&](const glm::vec3& there) {
+    return std::abs(glm::dot(seen.face, there - here)) / (2.0f * pixel_width);
+  });
 }
 
 }  // namespace strata
