@@ -4,12 +4,11 @@
 #include <chrono>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <optional>
-#include <thread>
-#include <vector>
+#include <utility>
 
 #include "apps/view/scene/document.h"
+#include "apps/view/scene/latest_job.h"
 
 namespace strata::view {
 
@@ -17,39 +16,24 @@ namespace strata::view {
 class Loader {
  public:
   /// @param wake called from the loading thread when there is something to take()
-  explicit Loader(std::function<void()> wake) : wake_(std::move(wake)) {}
-  Loader(const Loader&) = delete;
-  Loader& operator=(const Loader&) = delete;
-  ~Loader();  ///< cancels and waits
+  explicit Loader(std::function<void()> wake) : job_(std::move(wake)) {}
 
   /// Begins; what is under way is cancelled and its result forgotten.
   void start(const apps::CsgCommand& command, int threads);
-  void cancel();
-  [[nodiscard]] bool busy() const;
+  void cancel() { job_.stop(); }
+  [[nodiscard]] bool busy() const { return job_.busy(); }
   /// Nothing is under way, and there is nothing to take().
-  [[nodiscard]] bool idle() const {
-    const std::lock_guard lock(mutex_);
-    return !busy_ && !done_;
-  }
+  [[nodiscard]] bool idle() const { return job_.idle(); }
   /// Of the phase that is under way, in [0, 1].
   [[nodiscard]] double progress() const { return progress_.load(); }
   [[nodiscard]] double seconds() const;  ///< since start()
   /// The result of a load that has ended; once.
-  std::optional<Result<std::shared_ptr<const Model>>> take();
+  std::optional<Result<std::shared_ptr<const Model>>> take() { return job_.take(); }
 
  private:
-  std::function<void()> wake_;
   std::atomic<double> progress_{0};
-  mutable std::mutex mutex_;
-  std::uint64_t current_ = 0;
-  bool busy_ = false;
-  std::optional<Result<std::shared_ptr<const Model>>> done_;
   std::chrono::steady_clock::time_point begin_;
-  struct Job {
-    std::shared_ptr<std::atomic<bool>> ended;
-    std::jthread thread;
-  };
-  std::vector<Job> jobs_;  ///< the last one is the current one
+  LatestJob<std::shared_ptr<const Model>> job_;  ///< last: it uses the others
 };
 
 }  // namespace strata::view

@@ -3,10 +3,9 @@
 #include <sys/resource.h>
 
 #include <algorithm>
-#include <exception>
-#include <new>
 #include <utility>
 
+#include "core/letters.h"
 #include "strata/csg/boundary/boundary_mesh.h"
 
 namespace strata::view {
@@ -19,27 +18,13 @@ constexpr Material kMaterials[] = {
     {"stainless", 8.00}, {"brass", 8.50}, {"copper", 8.96}, {"titanium", 4.43},  {"concrete", 2.40},
     {"wood", 0.70},      {"glass", 2.50}, {"water", 1.00}};
 
-Result<PartNumbers> measure_safely(const Arrangement& what, const Execution& execution) {
-  try {
-    return measure_part(what, execution);
-  } catch (const std::bad_alloc&) {
-    return fail(ErrorCode::kLimit, "out of memory while measuring");
-  } catch (const std::exception& failure) {
-    return fail(ErrorCode::kInternal, "internal error: {}", failure.what());
-  }
-}
-
 }  // namespace
 
 std::span<const Material> materials() { return kMaterials; }
 
 const Material* find_material(std::string_view name) {
-  const auto lower = [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; };
-  const auto* found =
-      std::find_if(std::begin(kMaterials), std::end(kMaterials), [&](const Material& one) {
-        return std::equal(one.name.begin(), one.name.end(), name.begin(), name.end(),
-                          [&](char a, char b) { return lower(a) == lower(b); });
-      });
+  const auto* found = std::find_if(std::begin(kMaterials), std::end(kMaterials),
+                                   [&](const Material& one) { return same_word(one.name, name); });
   return found == std::end(kMaterials) ? nullptr : found;
 }
 
@@ -61,48 +46,14 @@ Result<PartNumbers> measure_part(const Arrangement& what, const Execution& execu
 }
 
 void PartMeasurer::start(std::shared_ptr<const Arrangement> what) {
-  cancel();
-  const std::lock_guard lock(mutex_);
-  const std::uint64_t number = ++current_;
-  busy_ = true;
-  std::erase_if(jobs_, [](const Job& job) { return job.ended->load(); });
-  auto ended = std::make_shared<std::atomic<bool>>(false);
-  auto work = [this, what = std::move(what), number, ended](const std::stop_token& stop) {
+  job_.start("measuring", [what = std::move(what)](const std::stop_token& stop) {
     constexpr int kLow = 10;
     ::setpriority(PRIO_PROCESS, 0, kLow);  // on Linux, of this thread
     Execution execution;
     execution.threads = 1;
     execution.stop = stop;
-    auto result = measure_safely(*what, execution);
-    {
-      const std::lock_guard inner(mutex_);
-      if (number == current_) {
-        busy_ = false;
-        done_ = std::move(result);
-      }
-    }
-    wake_();
-    ended->store(true);
-  };
-  jobs_.push_back({ended, std::jthread(std::move(work))});
-}
-
-void PartMeasurer::cancel() {
-  const std::lock_guard lock(mutex_);
-  ++current_;
-  busy_ = false;
-  done_.reset();
-  if (!jobs_.empty()) jobs_.back().thread.request_stop();
-}
-
-bool PartMeasurer::busy() const {
-  const std::lock_guard lock(mutex_);
-  return busy_;
-}
-
-std::optional<Result<PartNumbers>> PartMeasurer::take() {
-  const std::lock_guard lock(mutex_);
-  return std::exchange(done_, {});
+    return measure_part(*what, execution);
+  });
 }
 
 }  // namespace strata::view

@@ -1,19 +1,17 @@
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <glm/vec3.hpp>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
-#include <thread>
-#include <vector>
+#include <utility>
 
 #include "apps/view/scene/document.h"
+#include "apps/view/scene/latest_job.h"
 #include "strata/core/result.h"
 
 // What a user wants to know of a part: size, volume, area, weight, and whether it is closed.
@@ -48,29 +46,17 @@ Result<PartNumbers> measure_part(const Arrangement& what, const Execution& execu
 class PartMeasurer {
  public:
   /// @param wake called from the measuring thread when there is something to take()
-  explicit PartMeasurer(std::function<void()> wake) : wake_(std::move(wake)) {}
-  PartMeasurer(const PartMeasurer&) = delete;
-  PartMeasurer& operator=(const PartMeasurer&) = delete;
-  ~PartMeasurer() { cancel(); }
+  explicit PartMeasurer(std::function<void()> wake) : job_(std::move(wake)) {}
 
   /// Begins; what is under way is cancelled and its result forgotten.
   void start(std::shared_ptr<const Arrangement> what);
-  void cancel();
-  [[nodiscard]] bool busy() const;
+  void cancel() { job_.forget(); }
+  [[nodiscard]] bool busy() const { return job_.busy(); }
   /// The result of a measurement that has ended; once.
-  std::optional<Result<PartNumbers>> take();
+  std::optional<Result<PartNumbers>> take() { return job_.take(); }
 
  private:
-  std::function<void()> wake_;
-  mutable std::mutex mutex_;
-  std::uint64_t current_ = 0;
-  bool busy_ = false;
-  std::optional<Result<PartNumbers>> done_;
-  struct Job {
-    std::shared_ptr<std::atomic<bool>> ended;
-    std::jthread thread;
-  };
-  std::vector<Job> jobs_;  ///< the last one is the current one; others are on their way out
+  LatestJob<PartNumbers> job_;
 };
 
 }  // namespace strata::view
