@@ -12,8 +12,6 @@
 namespace strata {
 namespace {
 
-constexpr int kTileSide = VoxelIntervals::kTileSide;
-
 /// What stands before `data`.
 struct BinvoxHead {
   VoxelGrid grid;
@@ -34,7 +32,7 @@ bool numbers(std::string_view text, std::size_t count, double* to) {
   return true;
 }
 
-Result<BinvoxHead> parse_head(const ReadContext& context) {
+Result<BinvoxHead> parse_binvox_head(const ReadContext& context) {
   BinvoxHead head;
   double dims[3] = {}, translate[3] = {}, scale = 1.0;
   bool has_dims = false, has_translate = false, has_scale = false;
@@ -81,7 +79,7 @@ Result<BinvoxHead> parse_head(const ReadContext& context) {
 }  // namespace
 
 Result<VoxelVolume> read_binvox_voxels(ReadContext& context) {
-  const Result<BinvoxHead> head = parse_head(context);
+  const Result<BinvoxHead> head = parse_binvox_head(context);
   if (!head) return tl::unexpected(head.error());
   if (auto place = check_place(context, head->grid); !place) return tl::unexpected(place.error());
   const glm::ivec3 dims = head->grid.dims;

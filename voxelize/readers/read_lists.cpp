@@ -15,7 +15,6 @@
 namespace strata {
 namespace {
 
-constexpr int kTileSide = VoxelIntervals::kTileSide;
 constexpr int kSteps = 256;  // of depth, a voxel
 
 /// How an image lies in the world.

@@ -40,19 +40,6 @@ std::string_view value_of(std::string_view text, std::string_view key) {
   return {};
 }
 
-std::optional<NumberType> type_of(std::string_view letters) {
-  constexpr std::pair<std::string_view, NumberType> kTypes[] = {
-      {"b1", NumberType::kBool}, {"?", NumberType::kBool}, {"u1", NumberType::kU8},
-      {"i1", NumberType::kI8},   {"u2", NumberType::kU16}, {"i2", NumberType::kI16},
-      {"u4", NumberType::kU32},  {"i4", NumberType::kI32}, {"u8", NumberType::kU64},
-      {"i8", NumberType::kI64},  {"f2", NumberType::kF16}, {"f4", NumberType::kF32},
-      {"f8", NumberType::kF64}};
-  for (const auto& [name, type] : kTypes) {
-    if (name == letters) return type;
-  }
-  return std::nullopt;
-}
-
 bool parse_shape(std::string_view text, std::vector<std::int64_t>& shape) {
   const std::size_t end = text.find(')');
   if (!text.starts_with('(') || end == std::string_view::npos) return false;
@@ -103,7 +90,7 @@ Result<NpyHead> parse_npy_head(std::string_view bytes, const std::string& name) 
   const std::string_view type = descr.substr(1, descr.find(descr[0], 1) - 1);
   const bool marked =
       !type.empty() && std::string_view("<>|=").find(type[0]) != std::string_view::npos;
-  const std::optional<NumberType> found = type_of(type.substr(marked ? 1 : 0));
+  const std::optional<NumberType> found = numpy_type(type.substr(marked ? 1 : 0));
   if (!found) {
     return fail(ErrorCode::kInput,
                 "{}: descr of the head is '{}'; read are b1, u1 to u8, i1 to i8 and f2 to f8", name,

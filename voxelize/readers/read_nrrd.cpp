@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "core/letters.h"
 #include "voxelize/readers/readers.h"
 #include "voxelize/volume/dense_array.h"
 #include "voxelize/volume/inflate_stream.h"
@@ -25,13 +26,6 @@ std::string trimmed(std::string_view text) {
   return std::string(text.substr(first, text.find_last_not_of(" \t\r") - first + 1));
 }
 
-std::string lower(std::string text) {
-  for (char& letter : text) {
-    if (letter >= 'A' && letter <= 'Z') letter = static_cast<char>(letter - 'A' + 'a');
-  }
-  return text;
-}
-
 /// The fields by name, and where the data begin.
 struct NrrdHead {
   Fields fields;
@@ -43,7 +37,7 @@ struct NrrdHead {
   }
 };
 
-Result<NrrdHead> parse_head(const ReadContext& context) {
+Result<NrrdHead> parse_nrrd_head(const ReadContext& context) {
   NrrdHead head;
   const std::string_view bytes = context.bytes;
   if (!bytes.starts_with("NRRD000")) {
@@ -66,7 +60,8 @@ Result<NrrdHead> parse_head(const ReadContext& context) {
       return fail(ErrorCode::kInput, "{}:{}: must be 'field: value'", context.path, number);
     }
     if (line.compare(colon, 2, ":=") == 0) continue;  // keys of the user
-    head.fields[lower(line.substr(0, colon))] = trimmed(std::string_view(line).substr(colon + 1));
+    head.fields[lower_case(line.substr(0, colon))] =
+        trimmed(std::string_view(line).substr(colon + 1));
   }
   return fail(ErrorCode::kInput, "{}: the header has no empty line at its end", context.path);
 }
@@ -92,7 +87,7 @@ std::vector<double> numbers(std::string_view text) {
   return list;
 }
 
-std::optional<NumberType> type_of(std::string_view name) {
+std::optional<NumberType> nrrd_type(std::string_view name) {
   constexpr std::pair<std::string_view, NumberType> kTypes[] = {
       {"signed char", NumberType::kI8},
       {"int8", NumberType::kI8},
@@ -233,7 +228,7 @@ Result<std::string_view> data_bytes(const ReadContext& context, const NrrdHead& 
 }  // namespace
 
 Result<VoxelVolume> read_nrrd_voxels(ReadContext& context) {
-  const Result<NrrdHead> head = parse_head(context);
+  const Result<NrrdHead> head = parse_nrrd_head(context);
   if (!head) return tl::unexpected(head.error());
   DenseLayout layout;
   const std::vector<double> sizes = numbers(head->get("sizes"));
@@ -251,18 +246,18 @@ Result<VoxelVolume> read_nrrd_voxels(ReadContext& context) {
     }
     sides[a] = static_cast<int>(sizes[a]);
   }
-  const std::optional<NumberType> type = type_of(lower(std::string(head->get("type"))));
+  const std::optional<NumberType> type = nrrd_type(lower_case(std::string(head->get("type"))));
   if (!type) {
     return fail(ErrorCode::kInput, "{}: type '{}' is not read; integers, float and double are",
                 context.path, head->get("type").substr(0, 40));
   }
   layout.type = *type;
-  layout.big_endian = lower(std::string(head->get("endian"))) == "big";
+  layout.big_endian = lower_case(std::string(head->get("endian"))) == "big";
   Placement placement(*head, sides, layout);
   const std::string note = placement.place();
   if (auto place = check_place(context, layout.grid); !place) return tl::unexpected(place.error());
 
-  const std::string encoding = lower(std::string(head->get("encoding")));
+  const std::string encoding = lower_case(std::string(head->get("encoding")));
   Result<std::string_view> data = data_bytes(context, *head);
   if (!data) return tl::unexpected(data.error());
   Result<VoxelVolume> volume =

@@ -16,8 +16,6 @@
 namespace strata {
 namespace {
 
-constexpr int kTileSide = VoxelIntervals::kTileSide;
-
 struct SliceFolder {
   VoxelGrid grid;
   bool descending = true;     // rows

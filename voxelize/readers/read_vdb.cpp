@@ -24,8 +24,6 @@
 namespace strata {
 namespace {
 
-constexpr int kTileSide = VoxelIntervals::kTileSide;
-constexpr int kLeafSide = 8;
 constexpr std::size_t kBoolLeafBytes = 64 + 12 + 64;  // mask, origin, values
 
 std::size_t size(int value) { return static_cast<std::size_t>(value); }

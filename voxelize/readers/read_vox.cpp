@@ -19,10 +19,9 @@
 namespace strata {
 namespace {
 
-constexpr int kTileSide = VoxelIntervals::kTileSide;
 constexpr int kDeepest = 64;                   // of the scene graph
 constexpr std::size_t kMostPlaced = 1u << 20;  // nodes, with repetitions
-constexpr int kFarthest = 1 << 20;             // of a translation
+constexpr int kFarthestMove = 1 << 20;         // of a translation
 
 struct Model {
   glm::ivec3 size{0};
@@ -124,7 +123,7 @@ void VoxReader::take_transform(ByteCursor& content) {
       while (from < end && *from == ' ') ++from;
       int value = 0;
       from = std::from_chars(from, end, value).ptr;
-      node.placing.move[axis] = std::clamp(value, -kFarthest, kFarthest);
+      node.placing.move[axis] = std::clamp(value, -kFarthestMove, kFarthestMove);
     }
   }
   if (const auto turn = frame.find("_r"); turn != frame.end()) {

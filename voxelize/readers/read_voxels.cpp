@@ -11,6 +11,7 @@
 #include <string>
 #include <utility>
 
+#include "core/letters.h"
 #include "mesh/formats/input_bytes.h"
 #include "voxelize/readers/readers.h"
 
@@ -46,13 +47,6 @@ constexpr std::array<std::string_view, kFormats.size()> kNames = [] {
   return names;
 }();
 
-std::string lower(std::string text) {
-  for (char& letter : text) {
-    if (letter >= 'A' && letter <= 'Z') letter = static_cast<char>(letter - 'A' + 'a');
-  }
-  return text;
-}
-
 bool is_folder(const std::string& path) {
   struct stat status = {};
   return ::stat(path.c_str(), &status) == 0 && S_ISDIR(status.st_mode);
@@ -60,7 +54,7 @@ bool is_folder(const std::string& path) {
 
 const Format* format_of(const std::string& path, const std::string& name) {
   const bool folder = is_folder(path);
-  const std::string file = lower(path);
+  const std::string file = lower_case(path);
   for (const Format& format : kFormats) {
     if (!name.empty()) {
       if (format.name == name) return &format;

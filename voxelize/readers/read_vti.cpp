@@ -92,7 +92,7 @@ std::optional<std::array<T, Count>> numbers(std::string_view text) {
   return values;
 }
 
-std::optional<NumberType> type_of(std::string_view name) {
+std::optional<NumberType> vti_type(std::string_view name) {
   constexpr std::pair<std::string_view, NumberType> kTypes[] = {
       {"UInt8", NumberType::kU8},   {"Int8", NumberType::kI8},    {"UInt16", NumberType::kU16},
       {"Int16", NumberType::kI16},  {"UInt32", NumberType::kU32}, {"Int32", NumberType::kI32},
@@ -321,7 +321,7 @@ Result<VoxelVolume> VtiReader::read() {
   if (array == nullptr) {
     return fail(ErrorCode::kUsage, "{}: no array '{}'; it has {}", context_.path, wanted, names);
   }
-  const std::optional<NumberType> type = type_of(array->type);
+  const std::optional<NumberType> type = vti_type(array->type);
   if (!type) return fault("array '" + array->name + "' is of type " + array->type.substr(0, 40));
   layout_.type = *type;
   if (auto placed = place(*array); !placed) return tl::unexpected(placed.error());

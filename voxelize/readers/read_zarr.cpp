@@ -2,9 +2,6 @@
 // order, chunks of any size, plain or packed by zlib, gzip or Blosc. A chunk that is not there
 // holds the fill value. `.zattrs` may say origin and voxel_size, as write_zarr.cpp does.
 
-#ifdef STRATA_HAVE_BLOSC
-#include <blosc.h>
-#endif
 #include <unistd.h>
 
 #include <algorithm>
@@ -18,6 +15,7 @@
 
 #include "mesh/formats/input_bytes.h"
 #include "voxelize/readers/readers.h"
+#include "voxelize/readers/unblosc.h"
 #include "voxelize/volume/dense_array.h"
 #include "voxelize/volume/inflate_stream.h"
 #include "voxelize/volume/json_text.h"
@@ -25,8 +23,6 @@
 
 namespace strata {
 namespace {
-
-constexpr int kTileSide = VoxelIntervals::kTileSide;
 
 enum class Packing { kNone, kZlib, kGzip, kBlosc };
 
@@ -45,18 +41,6 @@ struct ZarrHead {
   }
 };
 
-std::optional<NumberType> type_of(std::string_view name) {
-  constexpr std::pair<std::string_view, NumberType> kTypes[] = {
-      {"b1", NumberType::kBool}, {"u1", NumberType::kU8},  {"i1", NumberType::kI8},
-      {"u2", NumberType::kU16},  {"i2", NumberType::kI16}, {"u4", NumberType::kU32},
-      {"i4", NumberType::kI32},  {"u8", NumberType::kU64}, {"i8", NumberType::kI64},
-      {"f2", NumberType::kF16},  {"f4", NumberType::kF32}, {"f8", NumberType::kF64}};
-  for (const auto& [text, type] : kTypes) {
-    if (text == name) return type;
-  }
-  return std::nullopt;
-}
-
 Result<JsonValue> read_json(const ReadContext& context, const std::string& path) {
   const auto file = detail::InputBytes::open(path, context.execution.memory_limit);
   if (!file) return tl::unexpected(file.error());
@@ -67,7 +51,7 @@ Result<void> take_type(const JsonValue& json, const std::string& path, ZarrHead&
   const JsonValue* type = json.find("dtype");
   const std::string text = type == nullptr ? "" : type->text;
   const std::optional<NumberType> found =
-      text.size() == 3 ? type_of(std::string_view(text).substr(1)) : std::nullopt;
+      text.size() == 3 ? numpy_type(std::string_view(text).substr(1)) : std::nullopt;
   if (!found)
     return fail(ErrorCode::kInput, "{}: dtype '{}' is not read", path, text.substr(0, 40));
   head.type = *found;
@@ -137,22 +121,15 @@ Result<ZarrHead> read_head(const ReadContext& context) {
   return head;
 }
 
-Result<void> unblosc(std::string_view packed, const std::string& path, std::vector<std::byte>& to) {
-#ifdef STRATA_HAVE_BLOSC
-  std::size_t unpacked = 0;
-  if (blosc_cbuffer_validate(packed.data(), packed.size(), &unpacked) != 0 ||
-      unpacked != to.size() ||
-      blosc_decompress_ctx(packed.data(), to.data(), to.size(), 1) != static_cast<int>(to.size())) {
-    return fail(ErrorCode::kInput, "{}: damaged data (Blosc)", path);
+Result<void> unpack_chunk(std::string_view packed, const std::string& path,
+                          std::vector<std::byte>& to) {
+  if (!kHaveBlosc) {
+    return fail(ErrorCode::kUsage,
+                "{}: packed by Blosc, which this build of Strata lacks: it needs libblosc-dev",
+                path);
   }
+  if (!unblosc(packed, to)) return fail(ErrorCode::kInput, "{}: damaged data (Blosc)", path);
   return {};
-#else
-  static_cast<void>(packed), static_cast<void>(to);
-  return fail(ErrorCode::kUsage,
-              "{}: packed by Blosc, which this build of Strata lacks: it needs "
-              "libblosc-dev",
-              path);
-#endif
 }
 
 /// A chunk after the other, of a column of chunks along z.
@@ -178,7 +155,8 @@ class ChunkReader {
       return std::span<const std::byte>(bytes_);
     }
     if (head_.packing == Packing::kBlosc) {
-      if (auto done = unblosc(packed, path, bytes_); !done) return tl::unexpected(done.error());
+      if (auto done = unpack_chunk(packed, path, bytes_); !done)
+        return tl::unexpected(done.error());
       return std::span<const std::byte>(bytes_);
     }
     InflateStream stream(

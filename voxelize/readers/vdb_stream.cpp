@@ -1,8 +1,5 @@
 #include "voxelize/readers/vdb_stream.h"
 
-#ifdef STRATA_HAVE_BLOSC
-#include <blosc.h>
-#endif
 #include <libdeflate.h>
 
 #include <bit>
@@ -10,6 +7,7 @@
 #include <cstring>
 #include <memory>
 
+#include "voxelize/readers/unblosc.h"
 #include "voxelize/volume/half_float.h"
 
 namespace strata {
@@ -114,18 +112,11 @@ std::string unzip(std::string_view packed, std::byte* to, std::size_t bytes) {
   return result == LIBDEFLATE_SUCCESS ? "" : "damaged values (zlib)";
 }
 
-std::string unblosc(std::string_view packed, std::byte* to, std::size_t bytes) {
-#ifdef STRATA_HAVE_BLOSC
-  std::size_t unpacked = 0;
-  if (blosc_cbuffer_validate(packed.data(), packed.size(), &unpacked) != 0 || unpacked != bytes ||
-      blosc_decompress_ctx(packed.data(), to, bytes, 1) != static_cast<int>(bytes)) {
-    return "damaged values (Blosc)";
+std::string unpack_blosc(std::string_view packed, std::byte* to, std::size_t bytes) {
+  if (!kHaveBlosc) {
+    return "values packed by Blosc, which this build of Strata lacks: it needs libblosc-dev";
   }
-  return "";
-#else
-  static_cast<void>(packed), static_cast<void>(to), static_cast<void>(bytes);
-  return "values packed by Blosc, which this build of Strata lacks: it needs libblosc-dev";
-#endif
+  return unblosc(packed, {to, bytes}) ? "" : "damaged values (Blosc)";
 }
 
 }  // namespace
@@ -320,7 +311,7 @@ std::string VdbValueLists::read(ByteCursor& cursor, std::span<const std::uint64_
       if (cursor.failed()) return "the end of the file";
       unpacked.resize(bytes);
       const std::string fault = (compression_ & kBlosc) != 0
-                                    ? unblosc(packed, unpacked.data(), bytes)
+                                    ? unpack_blosc(packed, unpacked.data(), bytes)
                                     : unzip(packed, unpacked.data(), bytes);
       if (!fault.empty()) return fault;
       from = unpacked.data();

@@ -13,8 +13,8 @@
 namespace strata {
 namespace {
 
-constexpr int kLeafSide = 8, kLowerSide = 128, kUpperSide = 4096;
-constexpr int kFarthest = 1 << 29;  // of an index, so that sums fit
+constexpr int kLowerSide = 128, kUpperSide = 4096;
+constexpr int kFarthestIndex = 1 << 29;  // of an index, so that sums fit
 
 class TreeReader {
  public:
@@ -55,7 +55,7 @@ Result<glm::ivec3> TreeReader::origin(int side) {
   for (int axis = 0; axis < 3; ++axis) at[axis] = cursor_.get<std::int32_t>();
   if (cursor_.failed()) return fault("the file ends within the tree");
   for (int axis = 0; axis < 3; ++axis) {
-    if (std::abs(static_cast<std::int64_t>(at[axis])) > kFarthest || at[axis] % side != 0) {
+    if (std::abs(static_cast<std::int64_t>(at[axis])) > kFarthestIndex || at[axis] % side != 0) {
       return fault(fmt::format("a node at index ({}, {}, {}); nodes lie at multiples of {}", at.x,
                                at.y, at.z, side));
     }

@@ -16,6 +16,8 @@ struct VdbTile {
   bool active = false;
 };
 
+inline constexpr int kLeafSide = 8;  ///< voxels along a side of a leaf
+
 /// The 512 active bits of a leaf: word x, bit 8 y + z.
 using VdbMask = std::array<std::uint64_t, 8>;
 

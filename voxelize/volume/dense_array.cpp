@@ -13,7 +13,6 @@
 namespace strata {
 namespace {
 
-constexpr int kTileSide = VoxelIntervals::kTileSide;
 constexpr std::size_t kBatchBytes = std::size_t{1} << 20;
 constexpr std::uint64_t kLongSlab = 1u << 16;  // runs of a slab from which ids may be noise
 constexpr double kIdRun = 1.5;                 // voxels of a run of ids in the mean, at least
@@ -266,6 +265,19 @@ Result<ScalarField> FieldReader::read() {
 }
 
 }  // namespace
+
+std::optional<NumberType> numpy_type(std::string_view letters) {
+  constexpr std::pair<std::string_view, NumberType> kTypes[] = {
+      {"b1", NumberType::kBool}, {"?", NumberType::kBool}, {"u1", NumberType::kU8},
+      {"i1", NumberType::kI8},   {"u2", NumberType::kU16}, {"i2", NumberType::kI16},
+      {"u4", NumberType::kU32},  {"i4", NumberType::kI32}, {"u8", NumberType::kU64},
+      {"i8", NumberType::kI64},  {"f2", NumberType::kF16}, {"f4", NumberType::kF32},
+      {"f8", NumberType::kF64}};
+  for (const auto& [name, type] : kTypes) {
+    if (name == letters) return type;
+  }
+  return std::nullopt;
+}
 
 void put_row(ScalarField& field, int axis, const float* row, int count, const glm::ivec3& at) {
   constexpr int kSide = ScalarField::kBlockSide;

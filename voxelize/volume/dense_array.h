@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string_view>
 
 #include "strata/core/grid.h"
@@ -17,6 +18,8 @@ enum class NumberType { kBool, kU8, kI8, kU16, kI16, kU32, kI32, kU64, kI64, kF1
 /// "bool", "uint8", ..., "float", "double".
 [[nodiscard]] std::string_view name_of(NumberType type);
 [[nodiscard]] bool is_float(NumberType type);
+/// Of NumPy's code without its byte order, such as "f4".
+[[nodiscard]] std::optional<NumberType> numpy_type(std::string_view letters);
 
 /// How the numbers of an array stand in a file.
 struct DenseLayout {

@@ -11,7 +11,6 @@
 namespace strata {
 namespace {
 
-constexpr int kTileSide = VoxelIntervals::kTileSide;
 constexpr int kSide = ScalarField::kBlockSide;
 
 /// Labels of values; 0 is empty.

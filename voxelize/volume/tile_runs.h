@@ -8,6 +8,8 @@
 
 namespace strata {
 
+inline constexpr int kTileSide = VoxelIntervals::kTileSide;
+
 /// Collects runs of the 64 x 64 columns of a tile, in any order, and stores them as intervals. One
 /// at a time for each thread; it may be used again. (Internal to voxelize/.)
 class TileRuns {
