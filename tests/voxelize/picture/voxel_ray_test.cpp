@@ -183,19 +183,31 @@ VoxelPicture drawn(const Setting& setting, Axis axis) {
   return *std::move(picture);
 }
 
+/// A random set, its picture by intervals along each axis in turn, and a view of it.
+struct Shot {
+  Setting setting;
+  VoxelPictureOptions options;
+  VoxelPicture picture;
+  Result<View> view;
+};
+Shot random_shot(std::mt19937& random, int round, const glm::ivec2& size) {
+  Setting setting = random_setting(random);
+  const VoxelGrid& grid = setting.grid;
+  const Camera camera = random_camera(random, grid);
+  VoxelPictureOptions options;
+  options.sections = random_sections(random, grid);
+  VoxelPicture picture = drawn(setting, static_cast<Axis>(round % 3));
+  const Bounds whole{grid.origin, grid.origin + glm::dvec3(grid.dims) * grid.voxel_size};
+  auto view = make_view(camera, size, whole);
+  return {std::move(setting), std::move(options), std::move(picture), std::move(view)};
+}
+
 TEST(VoxelRays, EachPixelShowsTheVoxelAndFaceThatTryingAllVoxelsFinds) {
   std::mt19937 random(20261129);
   const glm::ivec2 size(12, 9);
   int seen = 0, cuts = 0, nothing = 0;
   for (int round = 0; round < 150; ++round) {
-    const Setting setting = random_setting(random);
-    const Camera camera = random_camera(random, setting.grid);
-    VoxelPictureOptions options;
-    options.sections = random_sections(random, setting.grid);
-    const VoxelPicture picture = drawn(setting, static_cast<Axis>(round % 3));
-    const Bounds whole{setting.grid.origin, setting.grid.origin + glm::dvec3(setting.grid.dims) *
-                                                                      setting.grid.voxel_size};
-    const auto view = make_view(camera, size, whole);
+    const auto [setting, options, picture, view] = random_shot(random, round, size);
     ASSERT_TRUE(view.has_value());
     for (int v = 0; v < size.y; ++v) {
       for (int u = 0; u < size.x; ++u) {
@@ -233,14 +245,7 @@ TEST(VoxelRays, SolidLengthIsTheSumOverAllVoxels) {
   const glm::ivec2 size(10, 8);
   double total = 0.0;
   for (int round = 0; round < 120; ++round) {
-    const Setting setting = random_setting(random);
-    const Camera camera = random_camera(random, setting.grid);
-    VoxelPictureOptions options;
-    options.sections = random_sections(random, setting.grid);
-    const VoxelPicture picture = drawn(setting, static_cast<Axis>(round % 3));
-    const Bounds whole{setting.grid.origin, setting.grid.origin + glm::dvec3(setting.grid.dims) *
-                                                                      setting.grid.voxel_size};
-    const auto view = make_view(camera, size, whole);
+    const auto [setting, options, picture, view] = random_shot(random, round, size);
     ASSERT_TRUE(view.has_value());
     for (int v = 0; v < size.y; ++v) {
       for (int u = 0; u < size.x; ++u) {
