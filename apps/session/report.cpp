@@ -4,6 +4,10 @@
 
 namespace strata::apps {
 
+std::string triple(const glm::dvec3& v) {
+  return fmt::format("({:.6g}, {:.6g}, {:.6g})", v.x, v.y, v.z);
+}
+
 void begin_report(JsonWriter& json, std::string_view command) {
   json.begin_object();
   json.member("strata", STRATA_VERSION);

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <cstdint>
+#include <glm/vec3.hpp>
 #include <initializer_list>
+#include <string>
 #include <string_view>
 #include <utility>
 
@@ -11,6 +13,9 @@
 // What the reports of all commands have in common, as docs/json.md says.
 
 namespace strata::apps {
+
+/// "(1, 2.5, 3)"
+[[nodiscard]] std::string triple(const glm::dvec3& v);
 
 /// Begins the report's object: version and command.
 void begin_report(JsonWriter& json, std::string_view command);

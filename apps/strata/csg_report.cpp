@@ -21,9 +21,6 @@ std::string csg_text(const CsgCommand& command, const CsgOutcome& outcome) {
   const auto line = [&](std::string_view topic, const std::string& rest) {
     text += fmt::format("  {:<16} {}\n", topic, rest);
   };
-  const auto triple = [](const glm::dvec3& v) {
-    return fmt::format("({:.6g}, {:.6g}, {:.6g})", v.x, v.y, v.z);
-  };
   line("scene", fmt::format("{} in {}, {}{}", counted(outcome.solids, "solid"),
                             counted(outcome.nodes, "node"), counted(outcome.triangles, "triangle"),
                             outcome.flat ? "; flat, as slabs of thickness 1" : ""));

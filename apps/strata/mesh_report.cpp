@@ -98,9 +98,6 @@ std::string mesh_text(const MeshCommand& command, const MeshOutcome& outcome) {
   line("mesh", command.output.empty() || command.output == "-"
                    ? counts
                    : fmt::format("{}: {}", printable(command.output), counts));
-  const auto triple = [](const glm::dvec3& v) {
-    return fmt::format("({:.9g}, {:.9g}, {:.9g})", v.x, v.y, v.z);
-  };
   if (!mesh.triangles.empty()) {
     line("bounds", fmt::format("{} to {}", triple(outcome.box.low), triple(outcome.box.high)));
   }

@@ -313,7 +313,10 @@ Result<MeshFile> finish_mesh(const ReaderInput& input, RawMesh&& raw, const Loca
   if (identity) soup.face_elements = {};
   stats.vertices = soup.positions.size();
   stats.triangles = soup.triangles.size();
-  return MeshFile{std::move(soup), std::move(stats)};
+  MeshFile file;
+  file.soup = std::move(soup);
+  file.stats = std::move(stats);
+  return file;
 }
 
 }  // namespace strata::detail

@@ -123,6 +123,10 @@ Result<void> check_ids(const VoxelFormat& format, std::uint32_t largest) {
               format.ids, largest, names);
 }
 
+Result<void> VoxelWriter::add_distances(const ScalarField&, int, const Execution&) {
+  return fail(ErrorCode::kUsage, "the format holds no distances");
+}
+
 Result<std::unique_ptr<VoxelWriter>> open_voxel_writer(const std::string& path,
                                                        const std::string& format,
                                                        const VoxelGrid& grid,

@@ -5,7 +5,7 @@
 #include <array>
 #include <vector>
 
-#include "strata/voxelize/volume/scalar_field.h"
+#include "strata/voxelize/volume/voxel_volume.h"
 #include "voxelize/volume/tile_runs.h"
 
 namespace strata {

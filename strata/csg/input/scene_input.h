@@ -21,6 +21,23 @@
 
 namespace strata::csg {
 
+/// Where meshes come to lie in the world: p becomes move + scale * turn(unit * p).
+struct MeshPlacement {
+  /// World unit, in metres. Files that say their unit are converted to it; the numbers of others
+  /// are taken as they are. 0: the millimetre where a file is 3MF or AMF, else the metre where one
+  /// is glTF, else unknown, and nothing is converted.
+  double unit_metres = 0.0;
+  /// Whether y is up in the files: they are turned by 90 degrees about x, so that z is up.
+  enum class Up {
+    kFile,  ///< as the format says: y in glTF, else z
+    kY,     ///< y in all files
+    kZ      ///< z in all files: nothing is turned
+  };
+  Up up = Up::kFile;          ///< axis that is up in the files
+  glm::dvec3 scale{1.0};      ///< factors along x, y, z; not 0
+  glm::dvec3 translate{0.0};  ///< world units
+};
+
 /// The input files, and how they are read.
 struct SceneInput {
   std::vector<std::string> files;        ///< meshes and scenes; "-": standard input
@@ -32,6 +49,9 @@ struct SceneInput {
   ReadSceneOptions scene;                  ///< for scenes among the files
   InsideRule rule = InsideRule::kWinding;  ///< which winding numbers are inside a mesh
   bool keep_orientation = false;           ///< meshes that are inside out are not reversed
+  MeshPlacement placement;                 ///< of meshes, and of scenes but for their unit
+  std::vector<std::string> parts;          ///< names of the parts of meshes to keep; empty: all
+  bool attributes = false;                 ///< read parts, materials and colours of meshes
   /// A Boolean expression over the files, such as "a - b"; empty: their union.
   std::string expression;
 };
@@ -74,6 +94,7 @@ struct InputFacts {
   /// True for a scene. Then `stats` has only format, bytes, vertices and triangles, and area,
   /// volume and zero_area_faces are not known.
   bool is_scene = false;
+  MeshAttributes attributes;  ///< with SceneInput::attributes
 };
 
 /// Checks whether a mesh is closed and faces outward. Reverses what is inside out, unless

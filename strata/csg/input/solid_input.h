@@ -20,9 +20,11 @@ struct SolidInput {
   /// For a scene or an expression, area and volume are not known, and the bounds may be larger than
   /// the result.
   std::shared_ptr<SolidLists> tree;
-  std::shared_ptr<const Tree> scene;       ///< the tree that `tree` was made from, without meshes
-  std::vector<InputFacts> files;           ///< the facts of each input, in the order given
-  Bounds bounds;                           ///< of the soup
+  std::shared_ptr<const Tree> scene;  ///< the tree that `tree` was made from, without meshes
+  std::vector<InputFacts> files;      ///< the facts of each input, in the order given
+  Bounds bounds;                      ///< of the soup
+  /// With SceneInput::attributes, where there is no tree: of the soup, all files as one.
+  MeshAttributes attributes;
   bool closed = true;                      ///< all files are closed
   InsideRule rule = InsideRule::kWinding;  ///< of the soup; solids of a tree have their own
   double area = 0.0;                       ///< sum over the files, square world units

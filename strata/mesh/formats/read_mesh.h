@@ -7,7 +7,9 @@
 #include <vector>
 
 #include "strata/core/execution.h"
+#include "strata/core/file_identity.h"
 #include "strata/core/result.h"
+#include "strata/mesh/mesh_attributes.h"
 #include "strata/mesh/triangle_soup.h"
 
 namespace strata {
@@ -39,6 +41,13 @@ struct MeshReadOptions {
   /// Text of OBJ and ascii STL is parsed in pieces of about this many bytes, on all threads. The
   /// mesh does not depend on it; tests make it small.
   std::size_t chunk_bytes = std::size_t{1} << 19;
+  /// Parts, materials and colours are read too, into MeshFile::attributes.
+  bool attributes = false;
+  /// Names of the parts to keep; empty: all. Parts of OBJ, STL, 3MF, AMF and glTF files have names.
+  std::vector<std::string> parts{};
+  /// Files that a mesh names (materials, textures, buffers) must lie in this folder, links
+  /// followed; empty: any folder.
+  std::string root{};
 };
 
 /// Statistics of the reader. Dropped faces are counted by cause, one cause per face, in the order
@@ -58,6 +67,8 @@ struct MeshReadStats {
   std::uint64_t non_planar =
       0;  ///< polygons that deviate from a plane by more than 1/1000 of their size
   std::vector<std::string> warnings;  ///< sentences with places, for the user
+  double unit_metres = 0.0;  ///< length of the file's unit in metres; 0: the file does not say
+  bool y_up = false;         ///< the format says that y is up: glTF
 
   /// Faces of the file that are missing in the soup, wholly or in part, because of bad data.
   [[nodiscard]] std::uint64_t dropped_faces() const {
@@ -67,8 +78,10 @@ struct MeshReadStats {
 
 /// A mesh and how its reading went.
 struct MeshFile {
-  TriangleSoup soup;    ///< its triangles
-  MeshReadStats stats;  ///< counts and warnings
+  TriangleSoup soup;                 ///< its triangles
+  MeshReadStats stats;               ///< counts and warnings
+  MeshAttributes attributes;         ///< with MeshReadOptions::attributes
+  std::vector<FileIdentity> opened;  ///< other files that were read: materials, textures, buffers
 };
 
 /// Reads the triangles of a mesh file. Polygons are cut by PolygonCutter: flat convex ones are fans

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <glm/mat3x3.hpp>
 #include <glm/vec4.hpp>
 #include <memory>
 #include <string>
@@ -12,6 +13,7 @@
 #include "strata/core/result.h"
 #include "strata/mesh/triangle_soup.h"
 #include "strata/voxelize/intervals.h"
+#include "strata/voxelize/scalar_field.h"
 
 namespace strata {
 
@@ -32,12 +34,27 @@ struct VoxelFormat {
 /// The formats this build can write.
 [[nodiscard]] const std::vector<VoxelFormat>& voxel_formats();
 
+/// How a grid lies in the world beyond VoxelGrid: a point p of VoxelGrid's space is at
+/// direction * p.
+struct GridFrame {
+  glm::dmat3 direction{1.0};  ///< orthonormal; a reflection is allowed
+  std::string space{};       ///< NRRD's name of the world's axes, such as "left-posterior-superior"
+  double unit_metres = 0.0;  ///< length of the world's unit in metres; 0: unknown
+};
+
 /// Settings of open_voxel_writer().
 struct VoxelWriterOptions {
-  /// .vdb: a float fog volume with this many samples per voxel. Labels are the number of solid
-  /// samples of a voxel (see VoxelizeOptions::samples) and values the fraction; with 1, slabs
-  /// without labels have the value 1 inside. 0: no fog volume. Not with ids.
+  /// Labels say how much of a voxel is filled: label / fog. A .vdb is a float fog volume. Slabs
+  /// without labels are filled. 0: labels say something else. Not with ids.
   std::uint32_t fog = 0;
+  /// With fog: values are floats from 0 to 1; false: whole numbers from 0 to 255.
+  bool fog_floats = true;
+  /// Labels are colours: red + 2^8 green + 2^16 blue + 2^24 alpha, each 0 to 255, sRGB. Alpha is
+  /// not 0. Not with ids, fog or `colours`.
+  bool rgba = false;
+  /// Values are signed distances in world units, which come by add_distances() instead of add();
+  /// those beyond +-band are +-band. 0: no distances.
+  float band = 0.0f;
   /// .vdb: a MaskGrid, which is smaller; not all programs can read it. Otherwise a BoolGrid.
   bool mask = false;
   /// .vdb, .vti, .nrrd: name of the grid. Empty: `density` of a fog volume, `ids` with ids, else
@@ -50,6 +67,7 @@ struct VoxelWriterOptions {
   /// Label n has the colour colours[n - 1]: red, green, blue, alpha. Empty: one colour. Not with
   /// ids.
   std::vector<glm::u8vec4> colours{};
+  GridFrame frame{};  ///< of the grid in the world
 };
 
 /// Writes a voxel set slab by slab: every slab of one axis, in increasing v, then finish(). Any
@@ -62,6 +80,10 @@ class VoxelWriter {
   virtual ~VoxelWriter() = default;
   /// Adds the voxels of one slab. Uses the threads of `execution`; same bytes for any number.
   virtual Result<void> add(const VoxelIntervals& slab, const Execution& execution) = 0;
+  /// Adds the distances of layers z_begin, z_begin + 1, ... of the grid, of all x and y, in
+  /// increasing z. @return kUsage if the format holds no distances
+  virtual Result<void> add_distances(const ScalarField& layers, int z_begin,
+                                     const Execution& execution);
   /// Completes the file. Call it once, after the last slab. @return kOutput, kLimit, kCancelled
   virtual Result<void> finish(const Execution& execution) = 0;
 };

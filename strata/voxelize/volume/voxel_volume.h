@@ -11,9 +11,24 @@
 #include "strata/core/execution.h"
 #include "strata/core/grid.h"
 #include "strata/voxelize/intervals.h"
-#include "strata/voxelize/volume/scalar_field.h"
+#include "strata/voxelize/scalar_field.h"
 
 namespace strata {
+
+/// Which voxels of a field are solid.
+enum class SolidRule {
+  kAbove,  ///< value > threshold
+  kBelow,  ///< value < threshold
+  kIds,    ///< value > 0, which becomes the label: ids as floats
+};
+
+/// The solid voxels of a field as intervals along z. Work grows with the blocks that are not
+/// constant, and with the columns. The same for any number of threads. After a stop the result is
+/// not complete.
+/// @pre field.dims() == grid.dims; kIds: values are below 2^32
+[[nodiscard]] VoxelIntervals solid_voxels(const ScalarField& field, const VoxelGrid& grid,
+                                          SolidRule rule, float threshold,
+                                          const Execution& execution = {});
 
 /// What the voxels of a file hold.
 enum class VoxelKind {

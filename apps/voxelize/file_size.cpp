@@ -3,7 +3,7 @@
 // outside only where they cross one, and a leaf of an OpenVDB tree, or a chunk of a Zarr array, is
 // even unless it meets one.
 
-#include "apps/strata/file_size.h"
+#include "apps/voxelize/file_size.h"
 
 #include <algorithm>
 #include <cmath>

@@ -8,10 +8,6 @@
 #include <span>
 #include <vector>
 
-#include "strata/core/execution.h"
-#include "strata/core/grid.h"
-#include "strata/voxelize/intervals.h"
-
 namespace strata {
 
 /// A number for each voxel of a grid: densities, distances. Blocks of 8 x 8 x 8 voxels that are all
@@ -103,20 +99,5 @@ class ScalarField {
   std::vector<std::unique_ptr<Values>> values_;
   std::vector<std::uint32_t> free_values_;  // of blocks that turned out to be constant
 };
-
-/// Which voxels of a field are solid.
-enum class SolidRule {
-  kAbove,  ///< value > threshold
-  kBelow,  ///< value < threshold
-  kIds,    ///< value > 0, which becomes the label: ids as floats
-};
-
-/// The solid voxels of a field as intervals along z. Work grows with the blocks that are not
-/// constant, and with the columns. The same for any number of threads. After a stop the result is
-/// not complete.
-/// @pre field.dims() == grid.dims; kIds: values are below 2^32
-[[nodiscard]] VoxelIntervals solid_voxels(const ScalarField& field, const VoxelGrid& grid,
-                                          SolidRule rule, float threshold,
-                                          const Execution& execution = {});
 
 }  // namespace strata

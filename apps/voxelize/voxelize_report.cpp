@@ -1,4 +1,4 @@
-#include "apps/strata/voxelize_report.h"
+#include "apps/voxelize/voxelize_report.h"
 
 #include <algorithm>
 #include <numeric>
@@ -141,14 +141,6 @@ void write_ids(JsonWriter& json, const VoxelizeOutcome& outcome) {
   }
   json.end_array();
 }
-
-}  // namespace
-
-std::string triple(const glm::dvec3& v) {
-  return fmt::format("({:.6g}, {:.6g}, {:.6g})", v.x, v.y, v.z);
-}
-
-namespace {
 
 /// Lines of a topic each.
 class Lines {

@@ -1,4 +1,4 @@
-#include "strata/voxelize/volume/scalar_field.h"
+#include "strata/voxelize/scalar_field.h"
 
 #include <algorithm>
 #include <cmath>

@@ -7,7 +7,7 @@
 
 #include "apps/commands/commands.h"
 #include "apps/session/session.h"
-#include "apps/strata/file_size.h"
+#include "apps/voxelize/file_size.h"
 #include "strata/core/grid.h"
 #include "strata/csg/input/solid_input.h"
 #include "strata/voxelize/formats/voxel_writer.h"
@@ -32,9 +32,6 @@ struct VoxelizeOutcome {
   std::vector<std::uint64_t> id_voxels;  ///< of solid n of the scene, with --ids
   double write_ms = 0.0;
 };
-
-/// "(1, 2.5, 3)"
-[[nodiscard]] std::string triple(const glm::dvec3& v);
 
 /// For people: a line a topic.
 [[nodiscard]] std::string voxelize_text(const VoxelizeCommand& command,

@@ -1,0 +1,244 @@
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <utility>
+
+#include "apps/commands/choice_words.h"
+#include "apps/commands/csg_options.h"
+#include "apps/session/session.h"
+#include "apps/strata/allocation_failures.h"
+#include "apps/strata/library_session.h"
+#include "apps/strata/run_commands.h"
+#include "apps/voxelize/file_size.h"
+#include "apps/voxelize/voxelize_report.h"
+#include "apps/voxelize/voxelize_run.h"
+#include "strata/csg/input/solid_input.h"
+#include "strata/voxelize/formats/voxel_writer.h"
+
+namespace strata::apps {
+namespace {
+
+std::string format_list() {
+  std::string text;
+  for (const VoxelFormat& format : voxel_formats()) {
+    text += fmt::format("{:<8} {:<8} {}\n", format.name, format.extension, format.description);
+  }
+  return text;
+}
+
+/// The format of the output, if there is one. Refuses what would be found out only after the work.
+Result<std::optional<VoxelFormat>> output_format(const VoxelizeCommand& command) {
+  if (command.output.empty()) return std::optional<VoxelFormat>();
+  if (command.output == "-" && isatty(STDOUT_FILENO) != 0) {
+    return fail(ErrorCode::kUsage, "standard output is a terminal, but voxel files are binary");
+  }
+  const auto format = voxel_format_for(command.output, command.format);
+  if (!format) {
+    const Error& error = format.error();
+    return fail(error.code, "{}{}", error.message,
+                command.format.empty() ? other_writer(command.output) : "");
+  }
+  if ((command.fog != 0 || command.mask) && format->name != "vdb") {
+    return fail(ErrorCode::kUsage, "{} needs a .vdb file; format {} cannot store a {}",
+                command.mask ? "--mask" : "--fog", format->name,
+                command.mask ? "mask" : "fog volume");
+  }
+  if (command.name && !format->named) {
+    return fail(ErrorCode::kUsage,
+                "--name needs a .vdb, .nrrd or .vti file; format {} cannot store a name",
+                format->name);
+  }
+  if (command.ids) {
+    if (auto held = check_ids(*format, 1); !held) return tl::unexpected(held.error());
+  }
+  if (command.axis && *command.axis != format->axis) {
+    return fail(ErrorCode::kUsage,
+                "--axis {}: format {} needs rays along {}; without --axis the voxels are the same",
+                "xyz"[static_cast<int>(*command.axis)], format -> name,
+                "xyz"[static_cast<int>(format->axis)]);
+  }
+  return std::optional(*format);
+}
+
+/// What --open says of meshes that are not closed: refuses, or says who decides where no vote can.
+Result<void> check_open(const VoxelizeCommand& command, const csg::SolidInput& input,
+                        Session& session) {
+  if (input.closed || !command.solid) return {};
+  const csg::InputFacts& file =
+      *std::find_if(input.files.begin(), input.files.end(),
+                    [](const csg::InputFacts& facts) { return !facts.open.empty(); });
+  if (command.open == OpenMode::kFail) {
+    return fail(ErrorCode::kGeometry, "{} (--open fail)", file.open);
+  }
+  if (command.ids && command.open == OpenMode::kSurface) {
+    return fail(ErrorCode::kUsage,
+                "--ids needs solids, but --open surface keeps only the surface: {}", file.open);
+  }
+  if (command.ids && !input.has_scene()) {
+    return fail(ErrorCode::kUsage,
+                "--ids needs closed meshes: in open ones winding numbers decide, and they do not "
+                "tell solids apart; close {}, or remove --ids",
+                file.path);
+  }
+  if (input.has_scene() && command.open == OpenMode::kVote) {
+    session.warn("open",
+                 fmt::format("{}: scenes do not use winding numbers: each ray pairs the faces "
+                             "it meets, and a face without a partner becomes a thin sheet",
+                             file.path));
+  }
+  return {};
+}
+
+/// The axis the format is written from, or the one with the fewest columns.
+Axis choose_axis(const VoxelizeCommand& command, const std::optional<VoxelFormat>& format,
+                 const VoxelGrid& grid) {
+  if (command.axis) return *command.axis;
+  if (format) return format->axis;
+  // The longest side has the smallest cross-section.
+  if (grid.dims.z >= grid.dims.x && grid.dims.z >= grid.dims.y) return Axis::kZ;
+  return grid.dims.y >= grid.dims.x ? Axis::kY : Axis::kX;
+}
+
+Result<void> print_reports(const VoxelizeCommand& command, const VoxelizeOutcome& outcome,
+                           Session& session) {
+  const bool json_on_stdout = command.json == "-";
+  const bool file_on_stdout = command.output == "-" && !command.dry_run;
+  // All files are there before a reader of standard output goes on.
+  if (command.json && !json_on_stdout) {
+    const std::string text = voxelize_json(command, outcome, session);
+    if (auto done = print_report(text, *command.json, false); !done) return done;
+  }
+  if (auto done = commit_outputs(session); !done) return done;
+  if (!command.output.empty() && command.output != "-" && !command.dry_run && !command.stats) {
+    session.tell(made_line(command, outcome, session.milliseconds() / 1000));
+  }
+  if (command.checksum && !command.stats && !command.json && !command.dry_run) {
+    const std::string line = fmt::format("{:016x}\n", outcome.report.checksum);
+    if (auto done = print_report(line, "-", file_on_stdout); !done) return done;
+  }
+  if (command.stats || (command.dry_run && !command.json)) {
+    const std::string text = voxelize_text(command, outcome, session);
+    if (auto done = print_report(text, "-", file_on_stdout || json_on_stdout); !done) return done;
+  }
+  if (!json_on_stdout) return {};
+  return print_report(voxelize_json(command, outcome, session), "-", file_on_stdout);
+}
+
+Result<void> check_samples(int samples, const VoxelGrid& grid) {
+  const int longest = std::max({grid.dims.x, grid.dims.y, grid.dims.z});
+  if (samples * longest <= kMaxGridSide) return {};
+  return fail(ErrorCode::kLimit,
+              "--fog: {} samples per side on a grid of {} x {} x {} voxels exceed {}; give a "
+              "smaller --fog=N",
+              samples, grid.dims.x, grid.dims.y, grid.dims.z, kMaxGridSide);
+}
+
+/// What decides how much the job will hold.
+MemoryFactors memory_factors(const VoxelizeCommand& command, const VoxelizeOutcome& outcome,
+                             int samples, const Session& session) {
+  const csg::SolidInput& input = outcome.input;
+  MemoryFactors factors;
+  factors.mesh = &input.soup;
+  factors.is_tree = input.tree != nullptr;
+  factors.area = input.area;
+  factors.votes = !input.closed && !input.tree && command.solid && command.open == OpenMode::kVote;
+  for (const csg::InputFacts& file : input.files) factors.open_edges += file.unbalanced_edges;
+  factors.axis = outcome.axis;
+  factors.samples = samples;
+  factors.solid = command.solid;
+  factors.surface = command.surface;
+  if (outcome.format) factors.format = outcome.format->name;
+  factors.ids = command.ids;
+  factors.fog = command.fog != 0;
+  factors.threads = session.threads();
+  factors.limit = session.memory_limit();
+  return factors;
+}
+
+/// Of a file that will not be written.
+void estimate_file(const VoxelizeCommand& command, VoxelizeOutcome& outcome, int samples,
+                   Session& session) {
+  if (!outcome.format) return;
+  MemoryFactors factors = memory_factors(command, outcome, samples, session);
+  if (is_surface_alone(command, outcome.input)) factors.solid = false, factors.surface = true;
+  outcome.file_size =
+      file_size(outcome.grid, factors, outcome.input.closed,
+                writer_options(command, outcome, samples, session), session.execution("file size"));
+}
+
+/// Refuses what will not fit the memory limit.
+Result<void> check_memory(const VoxelizeCommand& command, const VoxelizeOutcome& outcome,
+                          Session& session) {
+  const glm::ivec3 dims = outcome.grid.dims;
+  const std::uint64_t bytes = outcome.estimate.total();
+  session.note(fmt::format("grid {} x {} x {}, about {} of memory", dims.x, dims.y, dims.z,
+                           readable_bytes(bytes)));
+  if (session.memory_limit() == 0 || bytes <= session.memory_limit() || command.dry_run) return {};
+  return fail(ErrorCode::kLimit,
+              "a grid of {} x {} x {} voxels needs about {} for this mesh; the limit is {} "
+              "(--memory-limit)",
+              dims.x, dims.y, dims.z, readable_bytes(bytes),
+              readable_bytes(session.memory_limit()));
+}
+
+}  // namespace
+
+namespace {
+
+Result<void> make_voxels(const VoxelizeCommand& command, Session& session) {
+  VoxelizeOutcome outcome;
+  auto format = output_format(command);
+  if (!format) return tl::unexpected(format.error());
+  outcome.format = *std::move(format);
+
+  auto input = csg::load_solids(command.input, command.ids, messages_of(session),
+                                session.execution("reading"));
+  if (!input) return tl::unexpected(input.error());
+  outcome.input = *std::move(input);
+  if (auto valid = check_open(command, outcome.input, session); !valid) return valid;
+  if (auto strict = session.check_strict(); !strict) return strict;
+
+  auto grid = fit_grid(outcome.input.bounds, command.grid);
+  if (!grid) {
+    return fail(grid.error().code, "{}: {}", command.input.files.front(), grid.error().message);
+  }
+  outcome.grid = *grid;
+  outcome.axis = choose_axis(command, outcome.format, outcome.grid);
+  const int samples = fog_samples(command, outcome.input);
+  if (const auto valid = check_samples(samples, outcome.grid); !valid) return valid;
+  outcome.estimate =
+      estimate_memory(outcome.grid, memory_factors(command, outcome, samples, session));
+  if (auto valid = check_memory(command, outcome, session); !valid) return valid;
+  if (command.dry_run) {
+    estimate_file(command, outcome, samples, session);
+    if (session.interrupted()) return fail(ErrorCode::kCancelled, "stopped");
+  } else {
+    if (auto done = make_voxel_file(command, outcome, session); !done) return done;
+  }
+  session.end_progress();
+  return print_reports(command, outcome, session);
+}
+
+}  // namespace
+
+Result<void> run_voxelize(const VoxelizeCommand& command, Session& session) {
+  if (command.list_formats) return print_report(format_list(), "-", false);
+  if (!command.show) return make_voxels(command, session);
+  if (auto shown = check_view_program("--show"); !shown) return shown;
+  if (auto done = make_voxels(command, session); !done) return done;
+  // The window has its own limits; this process's wall would be inherited.
+  rlimit memory{};
+  if (getrlimit(RLIMIT_DATA, &memory) == 0) {
+    memory.rlim_cur = memory.rlim_max;
+    setrlimit(RLIMIT_DATA, &memory);
+  }
+  std::string path = command.output;
+  char* arguments[] = {path.data(), nullptr};
+  return fail(static_cast<ErrorCode>(run_view_program(arguments)), "{} is complete, but not shown",
+              command.output);
+}
+
+}  // namespace strata::apps
