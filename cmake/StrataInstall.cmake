@@ -87,6 +87,7 @@ strata_depends(PkgConfig::polyclipping
 strata_depends(PkgConfig::qhull_r "${pc_modules}(qhull_r REQUIRED QUIET IMPORTED_TARGET qhull_r)" qhull_r "")
 strata_depends(PkgConfig::text "${pc_modules}(text REQUIRED QUIET IMPORTED_TARGET freetype2 harfbuzz fontconfig)"
   "freetype2 harfbuzz fontconfig" "")
+strata_depends(PkgConfig::jpeg "${pc_modules}(jpeg REQUIRED QUIET IMPORTED_TARGET libjpeg)" libjpeg "")
 strata_depends(PkgConfig::gif "${pc_modules}(gif REQUIRED QUIET IMPORTED_TARGET libgif)" libgif "")
 strata_depends(PkgConfig::webp "${pc_modules}(webp REQUIRED QUIET IMPORTED_TARGET libwebp libwebpmux)" "libwebp libwebpmux" "")
 strata_depends(PkgConfig::libzip "${pc_modules}(libzip REQUIRED QUIET IMPORTED_TARGET libzip)" libzip "")
