@@ -12,7 +12,7 @@
 #include <glm/vector_relational.hpp>
 #include <vector>
 
-#include "voxelize/formats/dense_rows.h"
+#include "voxelize/output/dense_rows.h"
 
 namespace strata::apps {
 namespace {

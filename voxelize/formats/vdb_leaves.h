@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "strata/voxelize/intervals.h"
-#include "voxelize/formats/run_deflate.h"
+#include "voxelize/output/run_deflate.h"
 
 namespace strata {
 

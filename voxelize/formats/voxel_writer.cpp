@@ -7,7 +7,7 @@
 #include "core/did_you_mean.h"
 #include "core/letters.h"
 #include "strata/voxelize/grid_fit.h"
-#include "voxelize/formats/writers.h"
+#include "voxelize/output/writers.h"
 
 namespace strata {
 namespace {
@@ -121,10 +121,6 @@ Result<void> check_ids(const VoxelFormat& format, std::uint32_t largest) {
   return fail(ErrorCode::kUsage,
               "format {} stores ids up to {}, but they reach {}; {} can store them", format.name,
               format.ids, largest, names);
-}
-
-Result<void> VoxelWriter::add_distances(const ScalarField&, int, const Execution&) {
-  return fail(ErrorCode::kUsage, "the format holds no distances");
 }
 
 Result<std::unique_ptr<VoxelWriter>> open_voxel_writer(const std::string& path,

@@ -21,11 +21,11 @@
 #include <utility>
 #include <vector>
 
-#include "voxelize/formats/block_output.h"
-#include "voxelize/formats/slab_writer.h"
 #include "voxelize/formats/vdb_header.h"
 #include "voxelize/formats/vdb_leaves.h"
-#include "voxelize/formats/writers.h"
+#include "voxelize/output/block_output.h"
+#include "voxelize/output/slab_writer.h"
+#include "voxelize/output/writers.h"
 
 namespace strata {
 namespace {

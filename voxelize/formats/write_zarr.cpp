@@ -11,11 +11,11 @@
 #include <utility>
 #include <vector>
 
-#include "voxelize/formats/dense_rows.h"
-#include "voxelize/formats/folder_output.h"
-#include "voxelize/formats/run_deflate.h"
-#include "voxelize/formats/slab_writer.h"
-#include "voxelize/formats/writers.h"
+#include "voxelize/output/dense_rows.h"
+#include "voxelize/output/folder_output.h"
+#include "voxelize/output/run_deflate.h"
+#include "voxelize/output/slab_writer.h"
+#include "voxelize/output/writers.h"
 
 namespace strata {
 namespace {

@@ -1,8 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <glm/mat3x3.hpp>
-#include <glm/vec4.hpp>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -13,7 +11,7 @@
 #include "strata/core/result.h"
 #include "strata/mesh/triangle_soup.h"
 #include "strata/voxelize/intervals.h"
-#include "strata/voxelize/scalar_field.h"
+#include "strata/voxelize/output/voxel_output.h"
 
 namespace strata {
 
@@ -33,60 +31,6 @@ struct VoxelFormat {
 
 /// The formats this build can write.
 [[nodiscard]] const std::vector<VoxelFormat>& voxel_formats();
-
-/// How a grid lies in the world beyond VoxelGrid: a point p of VoxelGrid's space is at
-/// direction * p.
-struct GridFrame {
-  glm::dmat3 direction{1.0};  ///< orthonormal; a reflection is allowed
-  std::string space{};       ///< NRRD's name of the world's axes, such as "left-posterior-superior"
-  double unit_metres = 0.0;  ///< length of the world's unit in metres; 0: unknown
-};
-
-/// Settings of open_voxel_writer().
-struct VoxelWriterOptions {
-  /// Labels say how much of a voxel is filled: label / fog. A .vdb is a float fog volume. Slabs
-  /// without labels are filled. 0: labels say something else. Not with ids.
-  std::uint32_t fog = 0;
-  /// With fog: values are floats from 0 to 1; false: whole numbers from 0 to 255.
-  bool fog_floats = true;
-  /// Labels are colours: red + 2^8 green + 2^16 blue + 2^24 alpha, each 0 to 255, sRGB. Alpha is
-  /// not 0. Not with ids, fog or `colours`.
-  bool rgba = false;
-  /// Values are signed distances in world units, which come by add_distances() instead of add();
-  /// those beyond +-band are +-band. 0: no distances.
-  float band = 0.0f;
-  /// .vdb: a MaskGrid, which is smaller; not all programs can read it. Otherwise a BoolGrid.
-  bool mask = false;
-  /// .vdb, .vti, .nrrd: name of the grid. Empty: `density` of a fog volume, `ids` with ids, else
-  /// `solid`.
-  std::string name{};
-  /// The largest label of the slabs. Labels become the values of voxels, in the narrowest unsigned
-  /// type that holds the largest (.vdb: float). 0: a voxel is solid or not. Slabs have labels with
-  /// ids, fog or colours only.
-  std::uint32_t ids = 0;
-  /// Label n has the colour colours[n - 1]: red, green, blue, alpha. Empty: one colour. Not with
-  /// ids.
-  std::vector<glm::u8vec4> colours{};
-  GridFrame frame{};  ///< of the grid in the world
-};
-
-/// Writes a voxel set slab by slab: every slab of one axis, in increasing v, then finish(). Any
-/// axis is accepted. The file appears under its name only when finish() succeeds; a writer
-/// destroyed before leaves nothing behind. The writer holds one slab and the data that the format
-/// itself must hold. For slabs of another axis than VoxelFormat::axis it holds the intervals of the
-/// whole set, twice; they grow with the surface.
-class VoxelWriter {
- public:
-  virtual ~VoxelWriter() = default;
-  /// Adds the voxels of one slab. Uses the threads of `execution`; same bytes for any number.
-  virtual Result<void> add(const VoxelIntervals& slab, const Execution& execution) = 0;
-  /// Adds the distances of layers z_begin, z_begin + 1, ... of the grid, of all x and y, in
-  /// increasing z. @return kUsage if the format holds no distances
-  virtual Result<void> add_distances(const ScalarField& layers, int z_begin,
-                                     const Execution& execution);
-  /// Completes the file. Call it once, after the last slab. @return kOutput, kLimit, kCancelled
-  virtual Result<void> finish(const Execution& execution) = 0;
-};
 
 /// Opens a writer for `path` ("-": standard output). The format is `format`, or if that is empty
 /// the path's extension. @return kUsage: unknown format, unknown extension, a folder format on

@@ -1,4 +1,4 @@
-#include "voxelize/formats/run_deflate.h"
+#include "voxelize/output/run_deflate.h"
 
 #include <gtest/gtest.h>
 

@@ -7,7 +7,7 @@
 #include "core/atomic_file.h"
 #include "strata/core/execution.h"
 #include "strata/core/result.h"
-#include "voxelize/formats/block_output.h"
+#include "voxelize/output/block_output.h"
 
 namespace strata {
 

@@ -1,4 +1,4 @@
-#include "voxelize/formats/block_output.h"
+#include "voxelize/output/block_output.h"
 
 #include <algorithm>
 #include <atomic>

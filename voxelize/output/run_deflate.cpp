@@ -1,6 +1,6 @@
 // DEFLATE: RFC 1951 (Deutsch, 1996). Block type 2, codes that do not depend on the data.
 
-#include "voxelize/formats/run_deflate.h"
+#include "voxelize/output/run_deflate.h"
 
 #include <algorithm>
 #include <bit>

@@ -8,10 +8,10 @@
 #include <utility>
 
 #include "hashbuffer/formats/npy_head.h"
-#include "voxelize/formats/block_output.h"
-#include "voxelize/formats/dense_rows.h"
-#include "voxelize/formats/slab_writer.h"
-#include "voxelize/formats/writers.h"
+#include "voxelize/output/block_output.h"
+#include "voxelize/output/dense_rows.h"
+#include "voxelize/output/slab_writer.h"
+#include "voxelize/output/writers.h"
 
 namespace strata {
 namespace {

@@ -3,7 +3,7 @@
 #include <memory>
 #include <string>
 
-#include "strata/voxelize/formats/voxel_writer.h"
+#include "strata/voxelize/output/voxel_output.h"
 
 namespace strata {
 

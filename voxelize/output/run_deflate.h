@@ -3,7 +3,7 @@
 #include <array>
 #include <cstdint>
 
-#include "voxelize/formats/block_output.h"
+#include "voxelize/output/block_output.h"
 
 namespace strata {
 

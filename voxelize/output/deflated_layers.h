@@ -9,9 +9,9 @@
 #include <string_view>
 #include <vector>
 
-#include "voxelize/formats/block_output.h"
-#include "voxelize/formats/dense_rows.h"
-#include "voxelize/formats/run_deflate.h"
+#include "voxelize/output/block_output.h"
+#include "voxelize/output/dense_rows.h"
+#include "voxelize/output/run_deflate.h"
 
 namespace strata {
 

@@ -1,4 +1,4 @@
-#include "voxelize/formats/slab_writer.h"
+#include "voxelize/output/slab_writer.h"
 
 #include <exception>
 #include <new>
@@ -7,6 +7,10 @@
 #include "voxelize/transposed.h"
 
 namespace strata {
+
+Result<void> VoxelWriter::add_distances(const ScalarField&, int, const Execution&) {
+  return fail(ErrorCode::kUsage, "the format holds no distances");
+}
 
 SlabWriter::SlabWriter(std::string path, const VoxelGrid& grid, Axis axis)
     : path_(std::move(path)), grid_(grid), axis_(axis), given_axis_(axis) {}

@@ -1,4 +1,4 @@
-#include "voxelize/formats/folder_output.h"
+#include "voxelize/output/folder_output.h"
 
 #include <fcntl.h>
 #include <unistd.h>

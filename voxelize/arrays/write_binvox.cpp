@@ -12,9 +12,9 @@
 #include <utility>
 #include <vector>
 
-#include "voxelize/formats/block_output.h"
-#include "voxelize/formats/slab_writer.h"
-#include "voxelize/formats/writers.h"
+#include "voxelize/output/block_output.h"
+#include "voxelize/output/slab_writer.h"
+#include "voxelize/output/writers.h"
 
 namespace strata {
 namespace {

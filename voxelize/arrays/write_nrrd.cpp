@@ -10,11 +10,11 @@
 #include <utility>
 #include <vector>
 
-#include "voxelize/formats/block_output.h"
-#include "voxelize/formats/deflated_layers.h"
-#include "voxelize/formats/dense_rows.h"
-#include "voxelize/formats/slab_writer.h"
-#include "voxelize/formats/writers.h"
+#include "voxelize/output/block_output.h"
+#include "voxelize/output/deflated_layers.h"
+#include "voxelize/output/dense_rows.h"
+#include "voxelize/output/slab_writer.h"
+#include "voxelize/output/writers.h"
 
 namespace strata {
 namespace {

@@ -7,8 +7,8 @@
 
 #include "hashbuffer/formats/npy_head.h"
 #include "strata/voxelize/intervals.h"
-#include "voxelize/formats/block_output.h"
-#include "voxelize/formats/run_deflate.h"
+#include "voxelize/output/block_output.h"
+#include "voxelize/output/run_deflate.h"
 
 namespace strata {
 

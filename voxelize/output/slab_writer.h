@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "strata/voxelize/formats/voxel_writer.h"
+#include "strata/voxelize/output/voxel_output.h"
 
 namespace strata {
 

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstdint>
+#include <glm/vec4.hpp>
+#include <string>
+#include <vector>
+
+#include "strata/core/execution.h"
+#include "strata/core/result.h"
+#include "strata/voxelize/grid_frame.h"
+#include "strata/voxelize/intervals.h"
+#include "strata/voxelize/scalar_field.h"
+
+namespace strata {
+
+/// Settings of open_voxel_writer().
+struct VoxelWriterOptions {
+  /// Labels say how much of a voxel is filled: label / fog. A .vdb is a float fog volume. Slabs
+  /// without labels are filled. 0: labels say something else. Not with ids.
+  std::uint32_t fog = 0;
+  /// With fog: values are floats from 0 to 1; false: whole numbers from 0 to 255.
+  bool fog_floats = true;
+  /// Labels are colours: red + 2^8 green + 2^16 blue + 2^24 alpha, each 0 to 255, sRGB. Alpha is
+  /// not 0. Not with ids, fog or `colours`.
+  bool rgba = false;
+  /// Values are signed distances in world units, which come by add_distances() instead of add();
+  /// those beyond +-band are +-band. 0: no distances.
+  float band = 0.0f;
+  /// .vdb: a MaskGrid, which is smaller; not all programs can read it. Otherwise a BoolGrid.
+  bool mask = false;
+  /// .vdb, .vti, .nrrd: name of the grid. Empty: `density` of a fog volume, `ids` with ids, else
+  /// `solid`.
+  std::string name{};
+  /// The largest label of the slabs. Labels become the values of voxels, in the narrowest unsigned
+  /// type that holds the largest (.vdb: float). 0: a voxel is solid or not. Slabs have labels with
+  /// ids, fog or colours only.
+  std::uint32_t ids = 0;
+  /// Label n has the colour colours[n - 1]: red, green, blue, alpha. Empty: one colour. Not with
+  /// ids.
+  std::vector<glm::u8vec4> colours{};
+  GridFrame frame{};  ///< of the grid in the world
+};
+
+/// Writes a voxel set slab by slab: every slab of one axis, in increasing v, then finish(). Any
+/// axis is accepted. The file appears under its name only when finish() succeeds; a writer
+/// destroyed before leaves nothing behind. The writer holds one slab and the data that the format
+/// itself must hold. For slabs of another axis than VoxelFormat::axis it holds the intervals of the
+/// whole set, twice; they grow with the surface.
+class VoxelWriter {
+ public:
+  virtual ~VoxelWriter() = default;
+  /// Adds the voxels of one slab. Uses the threads of `execution`; same bytes for any number.
+  virtual Result<void> add(const VoxelIntervals& slab, const Execution& execution) = 0;
+  /// Adds the distances of layers z_begin, z_begin + 1, ... of the grid, of all x and y, in
+  /// increasing z. @return kUsage if the format holds no distances
+  virtual Result<void> add_distances(const ScalarField& layers, int z_begin,
+                                     const Execution& execution);
+  /// Completes the file. Call it once, after the last slab. @return kOutput, kLimit, kCancelled
+  virtual Result<void> finish(const Execution& execution) = 0;
+};
+
+}  // namespace strata
