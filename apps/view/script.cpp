@@ -16,7 +16,7 @@
 #include "apps/view/scene/exporter.h"
 #include "apps/view/scene/part_numbers.h"
 #include "core/did_you_mean.h"
-#include "mesh/formats/text_scanner.h"
+#include "mesh/text/text_scanner.h"
 #include "strata/core/grid.h"
 #include "strata/csg/picture/picture.h"
 #include "strata/transparency/techniques.h"

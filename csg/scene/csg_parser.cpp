@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "core/printable.h"
-#include "mesh/formats/text_scanner.h"
+#include "mesh/text/text_scanner.h"
 
 namespace strata::csg {
 namespace {

@@ -22,7 +22,7 @@
 #include <vector>
 
 #include "core/printable.h"
-#include "mesh/formats/input_bytes.h"
+#include "mesh/text/input_bytes.h"
 
 namespace strata::csg {
 namespace {

@@ -10,7 +10,7 @@
 #include "csg/scene/csg_parser.h"
 #include "csg/scene/evaluator.h"
 #include "csg/scene/scad.h"
-#include "mesh/formats/input_bytes.h"
+#include "mesh/text/input_bytes.h"
 
 namespace strata::csg {
 namespace {

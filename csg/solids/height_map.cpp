@@ -12,8 +12,8 @@
 #include <string_view>
 #include <vector>
 
-#include "mesh/formats/input_bytes.h"
-#include "mesh/formats/text_scanner.h"
+#include "mesh/text/input_bytes.h"
+#include "mesh/text/text_scanner.h"
 
 namespace strata::csg {
 namespace {

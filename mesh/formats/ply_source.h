@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "mesh/formats/text_scanner.h"
+#include "mesh/text/text_scanner.h"
 
 /// Sources of the values in PLY files; used by the PLY reader.
 namespace strata::detail::ply {

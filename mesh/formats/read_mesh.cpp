@@ -5,10 +5,10 @@
 #include <stdexcept>
 #include <system_error>
 
-#include "mesh/formats/input_bytes.h"
-#include "mesh/formats/read_3mf_amf.h"
+#include "mesh/archives/read_3mf_amf.h"
 #include "mesh/formats/reader_common.h"
-#include "mesh/formats/text_scanner.h"
+#include "mesh/text/input_bytes.h"
+#include "mesh/text/text_scanner.h"
 #ifdef STRATA_HAVE_OPENMESH
 #include "mesh/formats/openmesh_reader.h"
 #endif
@@ -65,8 +65,8 @@ Result<MeshFile> read_archive(const std::string& path, const MeshReadOptions& op
                 mesh_format_name(options.format));
   }
   MeshFile file;
-  auto soup = (options.format == MeshFormat::k3mf ? csg::read_3mf : csg::read_amf)(
-      path, execution, &file.stats.warnings);
+  auto soup = (options.format == MeshFormat::k3mf ? read_3mf : read_amf)(path, execution,
+                                                                         &file.stats.warnings);
   if (!soup) return tl::unexpected(soup.error());
   file.soup = *std::move(soup);
   file.stats.format = mesh_format_name(options.format);

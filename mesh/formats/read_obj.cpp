@@ -1,10 +1,10 @@
 #include <algorithm>
 #include <limits>
 
-#include "mesh/formats/obj_lines.h"
 #include "mesh/formats/reader_common.h"
-#include "mesh/formats/text_chunks.h"
-#include "mesh/formats/text_scanner.h"
+#include "mesh/text/obj_lines.h"
+#include "mesh/text/text_chunks.h"
+#include "mesh/text/text_scanner.h"
 
 // The text is cut at line ends into chunks, which all threads parse. Finished chunks are appended
 // in order. Face indices are absolute in OBJ, except negative ones, which count back from the last

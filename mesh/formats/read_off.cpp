@@ -1,7 +1,7 @@
 #include <algorithm>
 
 #include "mesh/formats/reader_common.h"
-#include "mesh/formats/text_scanner.h"
+#include "mesh/text/text_scanner.h"
 
 // [ST][C][N][4][n]OFF, with the prefixes in any order; for nOFF the dimension; the numbers of
 // vertices, faces and edges; the vertices; the faces. (Geomview manual, "OFF Files".)

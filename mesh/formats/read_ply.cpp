@@ -7,7 +7,7 @@
 
 #include "mesh/formats/ply_source.h"
 #include "mesh/formats/reader_common.h"
-#include "mesh/formats/text_scanner.h"
+#include "mesh/text/text_scanner.h"
 
 // The text header lists elements. Each has a count and properties: scalars, or lists with their own
 // count. Positions are x, y, z of element "vertex". Faces are the list vertex_indices (or

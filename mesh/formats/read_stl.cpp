@@ -3,8 +3,8 @@
 #include <memory>
 
 #include "mesh/formats/reader_common.h"
-#include "mesh/formats/text_chunks.h"
-#include "mesh/formats/text_scanner.h"
+#include "mesh/text/text_chunks.h"
+#include "mesh/text/text_scanner.h"
 #include "mesh/weld.h"
 
 // Binary: 80 bytes of any content, a count, and 50 bytes per facet (normal, three corners as float,

@@ -9,9 +9,9 @@
 
 #include "core/did_you_mean.h"
 #include "core/printable.h"
-#include "mesh/formats/input_bytes.h"
-#include "mesh/formats/obj_lines.h"
-#include "mesh/formats/text_scanner.h"
+#include "mesh/text/input_bytes.h"
+#include "mesh/text/obj_lines.h"
+#include "mesh/text/text_scanner.h"
 
 namespace strata {
 namespace {

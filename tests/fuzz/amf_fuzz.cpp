@@ -1,4 +1,4 @@
-#include "mesh/formats/read_3mf_amf.h"
+#include "mesh/archives/read_3mf_amf.h"
 #include "tests/fuzz/input_file.h"
 #include "tests/fuzz/scene_fuzzing.h"
 
@@ -7,7 +7,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const InputFile file({reinterpret_cast<const char*>(data), size}, ".amf");
   Execution execution;
   execution.memory_limit = std::uint64_t{1} << 28;
-  const auto mesh = csg::read_amf(file.path(), execution);
+  const auto mesh = read_amf(file.path(), execution);
   if (mesh) {
     check_soup(*mesh);
   } else if (mesh.error().code != ErrorCode::kUsage) {  // a build without the libraries

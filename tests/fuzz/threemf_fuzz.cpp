@@ -3,7 +3,7 @@
 #include <utility>
 #include <vector>
 
-#include "mesh/formats/read_3mf_amf.h"
+#include "mesh/archives/read_3mf_amf.h"
 #include "tests/csg/scene/zip_files.h"
 #include "tests/fuzz/input_file.h"
 #include "tests/fuzz/scene_fuzzing.h"
@@ -33,7 +33,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const InputFile file(text.starts_with("PK") ? std::string(text) : archive_of(text), ".3mf");
   Execution execution;
   execution.memory_limit = std::uint64_t{1} << 28;
-  const auto mesh = csg::read_3mf(file.path(), execution);
+  const auto mesh = read_3mf(file.path(), execution);
   if (mesh) {
     check_soup(*mesh);
   } else if (mesh.error().code != ErrorCode::kUsage) {  // a build without the libraries

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "mesh/formats/input_bytes.h"
+#include "mesh/text/input_bytes.h"
 #include "voxelize/readers/readers.h"
 #include "voxelize/volume/dense_array.h"
 #include "voxelize/volume/grey_png.h"

@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "core/letters.h"
-#include "mesh/formats/input_bytes.h"
+#include "mesh/text/input_bytes.h"
 #include "voxelize/readers/readers.h"
 
 namespace strata {

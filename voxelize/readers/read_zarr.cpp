@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "mesh/formats/input_bytes.h"
+#include "mesh/text/input_bytes.h"
 #include "voxelize/readers/readers.h"
 #include "voxelize/readers/unblosc.h"
 #include "voxelize/volume/dense_array.h"

@@ -3,7 +3,7 @@
 #include <charconv>
 #include <cmath>
 
-#include "mesh/formats/text_scanner.h"
+#include "mesh/text/text_scanner.h"
 
 namespace strata::csg {
 namespace {

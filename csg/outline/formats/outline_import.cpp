@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "core/letters.h"
-#include "mesh/formats/input_bytes.h"
+#include "mesh/text/input_bytes.h"
 
 namespace strata::csg {
 

@@ -3,7 +3,7 @@
 #include <utility>
 #include <vector>
 
-#include "mesh/formats/read_3mf_amf.h"
+#include "mesh/archives/read_3mf_amf.h"
 #include "strata/mesh/diagnose.h"
 #include "tests/csg/scene/scene_checks.h"
 #include "tests/csg/scene/scene_inputs.h"

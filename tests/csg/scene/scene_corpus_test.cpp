@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "csg/scene/csg_parser.h"
-#include "mesh/formats/input_bytes.h"
+#include "mesh/text/input_bytes.h"
 #include "tests/csg/scene/scene_checks.h"
 #include "tests/support/corpus.h"
 

@@ -10,7 +10,7 @@
 
 #include "csg/scene/scad.h"
 #include "csg/solids/height_map.h"
-#include "mesh/formats/read_3mf_amf.h"
+#include "mesh/archives/read_3mf_amf.h"
 #include "strata/mesh/diagnose.h"
 #include "strata/mesh/formats/write_mesh.h"
 #include "strata/mesh/shapes.h"

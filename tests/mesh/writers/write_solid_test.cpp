@@ -13,8 +13,8 @@
 #include <string>
 #include <vector>
 
-#include "mesh/formats/read_3mf_amf.h"
-#include "mesh/formats/zip_entry.h"
+#include "mesh/archives/read_3mf_amf.h"
+#include "mesh/archives/zip_entry.h"
 #include "strata/mesh/diagnose.h"
 #include "strata/mesh/formats/read_mesh.h"
 #include "strata/mesh/shapes.h"
@@ -94,7 +94,7 @@ constexpr Case kCases[] = {{"3mf", SolidFormat::k3mf},
 
 /// The soup of a file, by the readers of scenes for a 3MF.
 Result<TriangleSoup> read_back(const std::string& path) {
-  if (path.ends_with(".3mf")) return csg::read_3mf(path);
+  if (path.ends_with(".3mf")) return read_3mf(path);
   auto file = read_mesh(path);
   if (!file) return tl::unexpected(file.error());
   EXPECT_TRUE(file->stats.warnings.empty()) << path << ": " << file->stats.warnings.front();
@@ -110,7 +110,7 @@ class SolidWriter : public testing::TestWithParam<Case> {
   /// True for a build that cannot read it.
   [[nodiscard]] bool unread() const {
     if (GetParam().format != SolidFormat::k3mf) return false;
-    const auto read = csg::read_3mf(folder_.write("no.3mf", "no archive"));
+    const auto read = read_3mf(folder_.write("no.3mf", "no archive"));
     return read.error().code == ErrorCode::kUsage;
   }
   TemporaryFolder folder_;
@@ -300,7 +300,7 @@ class ThreeMfWriter : public testing::Test {
   std::string model(const SolidMesh& mesh, const SolidWriteOptions& options = {}) {
     const auto written = write_solid(folder_.file("a.3mf"), mesh, options);
     EXPECT_TRUE(written);
-    const auto archive = csg::ZipArchive::open(folder_.file("a.3mf"));
+    const auto archive = ZipArchive::open(folder_.file("a.3mf"));
     if (!archive) return "";  // a build without libzip
     EXPECT_EQ(archive->names().size(), 3u);
     EXPECT_EQ(archive->names()[0], "[Content_Types].xml");

@@ -1,4 +1,4 @@
-#include "mesh/formats/text_scanner.h"
+#include "mesh/text/text_scanner.h"
 
 #include <gtest/gtest.h>
 

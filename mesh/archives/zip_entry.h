@@ -10,7 +10,7 @@
 #include "strata/core/execution.h"
 #include "strata/core/result.h"
 
-namespace strata::csg {
+namespace strata {
 
 /// A zip archive opened for reading.
 class ZipArchive {
@@ -34,4 +34,4 @@ class ZipArchive {
   std::shared_ptr<void> archive_;
 };
 
-}  // namespace strata::csg
+}  // namespace strata

@@ -1,4 +1,4 @@
-#include "mesh/formats/zip_entry.h"
+#include "mesh/archives/zip_entry.h"
 
 #ifdef STRATA_HAVE_LIBZIP
 #include <zip.h>
@@ -10,7 +10,7 @@
 
 #include "core/letters.h"
 
-namespace strata::csg {
+namespace strata {
 namespace {
 
 std::string_view without_slash(std::string_view name) {
@@ -117,4 +117,4 @@ Result<std::string> ZipArchive::read(const std::string& name, const Execution&) 
 
 #endif
 
-}  // namespace strata::csg
+}  // namespace strata

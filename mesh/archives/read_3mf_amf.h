@@ -7,7 +7,7 @@
 #include "strata/core/result.h"
 #include "strata/mesh/triangle_soup.h"
 
-namespace strata::csg {
+namespace strata {
 
 /// The mesh of a 3MF file as one soup. It supports the core specification 1.2 and the components of
 /// the production extension 1.1, which may lie in other model parts of the archive (Bambu Studio
@@ -26,4 +26,4 @@ Result<TriangleSoup> read_3mf(const std::string& path, const Execution& executio
 Result<TriangleSoup> read_amf(const std::string& path, const Execution& execution = {},
                               std::vector<std::string>* warnings = nullptr);
 
-}  // namespace strata::csg
+}  // namespace strata

@@ -1,4 +1,4 @@
-#include "mesh/formats/input_bytes.h"
+#include "mesh/text/input_bytes.h"
 
 #include <fcntl.h>
 #include <poll.h>

@@ -2,10 +2,9 @@
 
 #include <cstring>
 
-#include "mesh/formats/text_scanner.h"
+#include "mesh/text/text_scanner.h"
 
-// Lines and statements of OBJ and MTL text, which ends in a readable zero byte. Private to
-// mesh/formats.
+// Lines and statements of OBJ and MTL text, which ends in a readable zero byte.
 
 namespace strata::detail {
 

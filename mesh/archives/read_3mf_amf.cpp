@@ -1,4 +1,4 @@
-#include "mesh/formats/read_3mf_amf.h"
+#include "mesh/archives/read_3mf_amf.h"
 
 #include <algorithm>
 #include <array>
@@ -16,8 +16,8 @@
 #include <utility>
 #include <vector>
 
-#include "mesh/formats/input_bytes.h"
-#include "mesh/formats/zip_entry.h"
+#include "mesh/archives/zip_entry.h"
+#include "mesh/text/input_bytes.h"
 #include "strata/mesh/shapes.h"
 #include "strata/mesh/soup_tools.h"
 
@@ -25,7 +25,7 @@
 #include <pugixml.hpp>
 #endif
 
-namespace strata::csg {
+namespace strata {
 
 #ifdef STRATA_HAVE_PUGIXML
 
@@ -491,4 +491,4 @@ Result<TriangleSoup> read_amf(const std::string& path, const Execution&,
 
 #endif
 
-}  // namespace strata::csg
+}  // namespace strata

@@ -11,8 +11,10 @@
 #include <utility>
 #include <vector>
 
-#include "mesh/formats/reader_common.h"
-#include "mesh/formats/text_scanner.h"
+#include "mesh/no_vertex.h"
+#include "mesh/text/reader_input.h"
+#include "mesh/text/text_scanner.h"
+#include "strata/core/result.h"
 
 namespace strata::detail {
 
