@@ -3,14 +3,27 @@
 #include <glm/mat3x3.hpp>
 #include <string>
 
+#include "strata/core/grid.h"
+
 namespace strata {
 
 /// How a grid lies in the world beyond VoxelGrid: a point p of VoxelGrid's space is at
 /// direction * p.
 struct GridFrame {
-  glm::dmat3 direction{1.0};  ///< orthonormal; a reflection is allowed
+  glm::dmat3 direction{1.0};  ///< columns: where x, y, z of the grid point; of length 1 and at
+                              ///< right angles; a reflection is allowed
   std::string space{};       ///< NRRD's name of the world's axes, such as "left-posterior-superior"
   double unit_metres = 0.0;  ///< length of the world's unit in metres; 0: unknown
+
+  /// Whether the axes of the grid are not those of the world.
+  [[nodiscard]] bool turned() const { return direction != glm::dmat3(1.0); }
+};
+
+/// The grid of a file, as the file states it: voxel (i, j, k) is the file's, and the world is the
+/// file's, without a change between LPS and RAS.
+struct VoxelFileGrid {
+  VoxelGrid grid;   ///< in the space that `frame` turns
+  GridFrame frame;  ///< its direction, space and unit
 };
 
 }  // namespace strata

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "voxelize/heads/grid_axes.h"
 #include "voxelize/readers/readers.h"
 #include "voxelize/volume/dense_array.h"
 #include "voxelize/volume/inflate_stream.h"
@@ -169,6 +170,9 @@ class NpzFile {
     if (!bytes) return tl::unexpected(bytes.error());
     return parse_npy_head(*bytes, name_of(member));
   }
+  /// Numbers of an array of that shape, the last index fastest; none if there is no such array.
+  [[nodiscard]] Result<std::vector<double>> numbers(std::string_view name,
+                                                    const std::vector<std::int64_t>& shape) const;
   /// Three numbers; nothing if there is no such array.
   [[nodiscard]] Result<std::optional<glm::dvec3>> vector(std::string_view name) const;
   [[nodiscard]] Result<const ZipMember*> voxels() const;
@@ -180,25 +184,40 @@ class NpzFile {
   std::vector<ZipMember> members_;
 };
 
-Result<std::optional<glm::dvec3>> NpzFile::vector(std::string_view name) const {
+Result<std::vector<double>> NpzFile::numbers(std::string_view name,
+                                             const std::vector<std::int64_t>& shape) const {
   const ZipMember* member = find(name);
-  if (member == nullptr) return std::nullopt;
+  if (member == nullptr) return std::vector<double>();
   constexpr std::uint64_t kMost = 4096;
   const Result<std::string> bytes = head_bytes(*member, kMost);
   if (!bytes) return tl::unexpected(bytes.error());
   const Result<NpyHead> head = parse_npy_head(*bytes, name_of(*member));
   if (!head) return tl::unexpected(head.error());
-  const bool fits = head->type == NumberType::kF64 && !head->big_endian &&
-                    head->shape == std::vector<std::int64_t>{3} &&
-                    bytes->size() >= head->bytes + 3 * sizeof(double);
-  if (!fits) return fail(ErrorCode::kInput, "{}: must be 3 numbers of type <f8", name_of(*member));
-  glm::dvec3 value;
-  for (int axis = 0; axis < 3; ++axis) {
-    std::memcpy(&value[axis],
-                bytes->data() + head->bytes + sizeof(double) * static_cast<std::size_t>(axis),
-                sizeof(double));
+  std::size_t count = 1;
+  for (const std::int64_t side : shape) count *= static_cast<std::size_t>(side);
+  const bool fits = head->type == NumberType::kF64 && !head->big_endian && head->shape == shape &&
+                    bytes->size() >= head->bytes + count * sizeof(double);
+  if (!fits) {
+    return fail(ErrorCode::kInput, "{}: must be {} numbers of type <f8", name_of(*member),
+                shape.size() == 1 ? "3" : "3 x 3");
   }
-  return value;
+  std::vector<double> values(count);
+  std::memcpy(values.data(), bytes->data() + head->bytes, count * sizeof(double));
+  if (head->fortran && shape.size() == 2) {
+    for (std::size_t row = 0; row < 3; ++row) {
+      for (std::size_t column = 0; column < row; ++column) {
+        std::swap(values[3 * row + column], values[3 * column + row]);
+      }
+    }
+  }
+  return values;
+}
+
+Result<std::optional<glm::dvec3>> NpzFile::vector(std::string_view name) const {
+  const auto list = numbers(name, {3});
+  if (!list) return tl::unexpected(list.error());
+  if (list->empty()) return std::nullopt;
+  return glm::dvec3((*list)[0], (*list)[1], (*list)[2]);
 }
 
 Result<const ZipMember*> NpzFile::voxels() const {
@@ -283,6 +302,42 @@ Result<VoxelVolume> read_npz_voxels(ReadContext& context) {
   volume->name = array_name(**member);
   volume->grids = file.names();
   return volume;
+}
+
+Result<std::array<double, 3>> npy_sizes(ReadContext& context) {
+  const Result<NpyHead> head = parse_npy_head(context.bytes, context.path);
+  if (!head) return tl::unexpected(head.error());
+  const Result<DenseLayout> layout = layout_of(context, *head);
+  if (!layout) return tl::unexpected(layout.error());
+  const glm::dvec3 dims(layout->grid.dims);
+  return std::array<double, 3>{dims.x, dims.y, dims.z};
+}
+
+Result<VoxelFileGrid> npz_grid(ReadContext& context) {
+  Result<std::vector<ZipMember>> members = zip_members(context.bytes, context.path);
+  if (!members) return tl::unexpected(members.error());
+  const NpzFile file(context, std::move(*members));
+  const Result<const ZipMember*> member = file.voxels();
+  if (!member) return tl::unexpected(member.error());
+  const Result<NpyHead> head = file.head(**member);
+  if (!head) return tl::unexpected(head.error());
+  const Result<DenseLayout> layout = layout_of(context, *head);
+  if (!layout) return tl::unexpected(layout.error());
+  const auto origin = file.vector("origin"), spacing = file.vector("spacing");
+  const auto direction = file.numbers("direction", {3, 3});
+  if (!origin) return tl::unexpected(origin.error());
+  if (!spacing) return tl::unexpected(spacing.error());
+  if (!direction) return tl::unexpected(direction.error());
+  if (!*origin || !*spacing) {
+    return fail(ErrorCode::kInput, "{}: array {} is missing, which says where the voxels lie",
+                context.path, *origin ? "spacing" : "origin");
+  }
+  glm::dmat3 turn(1.0);
+  for (std::size_t i = 0; i < direction->size(); ++i) {
+    turn[static_cast<int>(i % 3)][static_cast<int>(i / 3)] = (*direction)[i];
+  }
+  const glm::dvec3 dims(layout->grid.dims);
+  return grid_of_frame(context.path, {dims.x, dims.y, dims.z}, **origin, **spacing, turn);
 }
 
 }  // namespace strata

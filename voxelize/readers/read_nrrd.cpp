@@ -3,89 +3,19 @@
 // the world in any order and sign are followed; others are shown along the grid's own axes.
 
 #include <array>
-#include <charconv>
 #include <cmath>
-#include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "core/letters.h"
+#include "voxelize/heads/nrrd_head.h"
 #include "voxelize/readers/readers.h"
 #include "voxelize/volume/dense_array.h"
 #include "voxelize/volume/inflate_stream.h"
 
 namespace strata {
 namespace {
-
-using Fields = std::map<std::string, std::string, std::less<>>;
-
-std::string trimmed(std::string_view text) {
-  const std::size_t first = text.find_first_not_of(" \t\r");
-  if (first == std::string_view::npos) return {};
-  return std::string(text.substr(first, text.find_last_not_of(" \t\r") - first + 1));
-}
-
-/// The fields by name, and where the data begin.
-struct NrrdHead {
-  Fields fields;
-  std::size_t data = 0;
-  [[nodiscard]] std::string_view get(std::string_view name, std::string_view other = {}) const {
-    auto found = fields.find(name);
-    if (found == fields.end() && !other.empty()) found = fields.find(other);
-    return found == fields.end() ? std::string_view() : std::string_view(found->second);
-  }
-};
-
-Result<NrrdHead> parse_nrrd_head(const ReadContext& context) {
-  NrrdHead head;
-  const std::string_view bytes = context.bytes;
-  if (!bytes.starts_with("NRRD000")) {
-    return fail(ErrorCode::kInput, "{}:1: not an NRRD file: it does not begin with NRRD000",
-                context.path);
-  }
-  int number = 0;
-  for (std::size_t at = 0; at < bytes.size();) {
-    const std::size_t end = bytes.find('\n', at);
-    if (end == std::string_view::npos) break;
-    const std::string line = trimmed(bytes.substr(at, end - at));
-    at = end + 1;
-    if (++number == 1 || line.starts_with('#')) continue;
-    if (line.empty()) {
-      head.data = at;
-      return head;
-    }
-    const std::size_t colon = line.find(':');
-    if (colon == std::string::npos) {
-      return fail(ErrorCode::kInput, "{}:{}: must be 'field: value'", context.path, number);
-    }
-    if (line.compare(colon, 2, ":=") == 0) continue;  // keys of the user
-    head.fields[lower_case(line.substr(0, colon))] =
-        trimmed(std::string_view(line).substr(colon + 1));
-  }
-  return fail(ErrorCode::kInput, "{}: the header has no empty line at its end", context.path);
-}
-
-/// The numbers of a text; what is between them does not matter. NaN for `none`.
-std::vector<double> numbers(std::string_view text) {
-  std::vector<double> list;
-  for (std::size_t at = 0; at < text.size();) {
-    if (text.substr(at).starts_with("none")) {
-      list.insert(list.end(), 3, std::nan(""));
-      at += 4;
-      continue;
-    }
-    double value = 0.0;
-    const auto [rest, error] = std::from_chars(text.data() + at, text.data() + text.size(), value);
-    if (error != std::errc()) {
-      ++at;
-      continue;
-    }
-    list.push_back(value);
-    at = static_cast<std::size_t>(rest - text.data());
-  }
-  return list;
-}
 
 std::optional<NumberType> nrrd_type(std::string_view name) {
   constexpr std::pair<std::string_view, NumberType> kTypes[] = {
@@ -143,11 +73,11 @@ class Placement {
 
   /// @return a note where the axes are turned
   std::string place() {
-    const std::vector<double> d = numbers(head_.get("space directions"));
+    const std::vector<double> d = numbers_of(head_.get("space directions"));
     if (d.size() == 9) return by_directions(d);
-    const std::vector<double> spacing = numbers(head_.get("spacings"));
-    const std::vector<double> mins = numbers(head_.get("axis mins", "axismins"));
-    const std::vector<double> origin = numbers(head_.get("space origin"));
+    const std::vector<double> spacing = numbers_of(head_.get("spacings"));
+    const std::vector<double> mins = numbers_of(head_.get("axis mins", "axismins"));
+    const std::vector<double> origin = numbers_of(head_.get("space origin"));
     const bool node = head_.get("centers", "centerings").find("node") != std::string_view::npos;
     for (int axis = 0; axis < 3; ++axis) {
       const auto i = static_cast<std::size_t>(axis);
@@ -183,7 +113,7 @@ class Placement {
     straight = straight && axes[0] + axes[1] + axes[2] == 3 && axes[0] != axes[1] &&
                axes[1] != axes[2] && axes[0] != axes[2] && axes[0] >= 0 && axes[1] >= 0;
     if (!straight) axes = {0, 1, 2};
-    const std::vector<double> origin = numbers(head_.get("space origin"));
+    const std::vector<double> origin = numbers_of(head_.get("space origin"));
     for (std::size_t a = 0; a < 3; ++a) {
       const double* v = d.data() + 3 * a;
       const double length = std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
@@ -216,7 +146,7 @@ Result<std::string_view> data_bytes(const ReadContext& context, const NrrdHead& 
                   context.path, head.get(field));
     }
   }
-  const std::vector<double> lines = numbers(head.get("line skip", "lineskip"));
+  const std::vector<double> lines = numbers_of(head.get("line skip", "lineskip"));
   for (double left = lines.empty() ? 0.0 : lines[0]; left >= 1.0; left -= 1.0) {
     const std::size_t end = data.find('\n');
     if (end == std::string_view::npos) break;
@@ -228,10 +158,10 @@ Result<std::string_view> data_bytes(const ReadContext& context, const NrrdHead& 
 }  // namespace
 
 Result<VoxelVolume> read_nrrd_voxels(ReadContext& context) {
-  const Result<NrrdHead> head = parse_nrrd_head(context);
+  const Result<NrrdHead> head = parse_nrrd_head(context.bytes, context.path);
   if (!head) return tl::unexpected(head.error());
   DenseLayout layout;
-  const std::vector<double> sizes = numbers(head->get("sizes"));
+  const std::vector<double> sizes = numbers_of(head->get("sizes"));
   if (sizes.size() != 3 || head->get("dimension") != "3") {
     return fail(ErrorCode::kInput, "{}: dimension is '{}' and sizes '{}'; voxels have 3",
                 context.path, head->get("dimension"), head->get("sizes").substr(0, 40));
@@ -264,7 +194,7 @@ Result<VoxelVolume> read_nrrd_voxels(ReadContext& context) {
       fail(ErrorCode::kInput, "{}: encoding '{}' is not read; raw and gzip are", context.path,
            std::string_view(encoding).substr(0, 40));
   if (encoding == "raw") {
-    const std::vector<double> skip = numbers(head->get("byte skip", "byteskip"));
+    const std::vector<double> skip = numbers_of(head->get("byte skip", "byteskip"));
     const double first = skip.empty() ? 0.0 : skip[0];
     const std::uint64_t size = data->size();
     const std::uint64_t at = first < 0.0 ? size - std::min(size, layout.bytes())

@@ -16,6 +16,7 @@
 #include <string>
 #include <vector>
 
+#include "voxelize/heads/grid_axes.h"
 #include "voxelize/readers/readers.h"
 #include "voxelize/readers/vdb_tree.h"
 #include "voxelize/volume/dense_array.h"
@@ -369,6 +370,42 @@ Result<VoxelVolume> read_vdb_voxels(ReadContext& context) {
   volume->name = (*entry)->name;
   for (const VdbGridEntry& each : *entries) volume->grids.push_back(each.name);
   return volume;
+}
+
+Result<VoxelFileGrid> vdb_grid(ReadContext& context) {
+  const Result<std::vector<VdbGridEntry>> entries = read_vdb_entries(context);
+  if (!entries) return tl::unexpected(entries.error());
+  const Result<const VdbGridEntry*> entry = choose(context, *entries);
+  if (!entry) return tl::unexpected(entry.error());
+  const Result<VdbGridHead> head = read_vdb_head(context, **entry);
+  if (!head) return tl::unexpected(head.error());
+  const auto corner = [&](const char* name) -> std::optional<glm::ivec3> {
+    const auto found = head->metadata.find(name);
+    if (found == head->metadata.end() || found->second.size() != 12) return std::nullopt;
+    ByteCursor cursor(found->second);
+    glm::ivec3 at;
+    for (int axis = 0; axis < 3; ++axis) at[axis] = cursor.get<std::int32_t>();
+    return at;
+  };
+  std::optional<glm::ivec3> lower = corner("file_bbox_min"), upper = corner("file_bbox_max");
+  if ((!lower || !upper) && (*entry)->parent.empty()) {
+    VdbValueLists lists(vdb_tree_type((*entry)->tree_type), head->compression);
+    const Result<VdbTree> tree = read_vdb_tree(context, head->tree_at, lists);
+    if (!tree) return tl::unexpected(tree.error());
+    lower = tree->lower, upper = tree->upper;
+  }
+  if (!lower || !upper || upper->x < lower->x) {
+    return fail(ErrorCode::kInput, "{}: no voxel of the grid is active, so it has no box",
+                context.path);
+  }
+  GridAxes axes;
+  axes.steps = head->steps;
+  axes.place = head->centre + head->steps * glm::dvec3(*lower);
+  for (int axis = 0; axis < 3; ++axis) {
+    axes.sizes[static_cast<std::size_t>(axis)] =
+        static_cast<double>((*upper)[axis]) - static_cast<double>((*lower)[axis]) + 1.0;
+  }
+  return grid_of_axes(context.path, axes);
 }
 
 }  // namespace strata

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "voxelize/heads/grid_axes.h"
 #include "voxelize/readers/readers.h"
 #include "voxelize/volume/dense_array.h"
 #include "voxelize/volume/inflate_stream.h"
@@ -139,6 +140,7 @@ class VtiReader {
  public:
   explicit VtiReader(ReadContext& context) : context_(context) {}
   Result<VoxelVolume> read();
+  Result<VoxelFileGrid> grid();
 
  private:
   [[nodiscard]] tl::unexpected<Error> fault(std::string_view what) const {
@@ -345,8 +347,36 @@ Result<VoxelVolume> VtiReader::read() {
   return volume;
 }
 
+Result<VoxelFileGrid> VtiReader::grid() {
+  if (auto head = read_head(); !head) return tl::unexpected(head.error());
+  const bool points = find_arrays().has_value() && arrays_.front().points;
+  const auto extent = numbers<std::int64_t, 6>(piece_.get("Extent"));
+  const auto origin = numbers<double, 3>(image_.get("Origin"));
+  const auto spacing = numbers<double, 3>(image_.get("Spacing"));
+  const auto direction = numbers<double, 9>(image_.get("Direction"));
+  if (!extent || !origin || !spacing) {
+    return fault("Extent must have 6 numbers, Origin and Spacing 3");
+  }
+  GridAxes axes;
+  axes.corner = !points;
+  axes.place = {(*origin)[0], (*origin)[1], (*origin)[2]};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto a = static_cast<int>(axis);
+    const auto first = static_cast<double>((*extent)[2 * axis]);
+    axes.sizes[axis] = static_cast<double>((*extent)[2 * axis + 1]) - first + (points ? 1 : 0);
+    for (std::size_t row = 0; row < 3; ++row) {
+      const double along = direction ? (*direction)[3 * row + axis] : row == axis ? 1.0 : 0.0;
+      axes.steps[a][static_cast<int>(row)] = along * (*spacing)[axis];
+    }
+    axes.place += first * axes.steps[a];
+  }
+  return grid_of_axes(context_.path, axes);
+}
+
 }  // namespace
 
 Result<VoxelVolume> read_vti_voxels(ReadContext& context) { return VtiReader(context).read(); }
+
+Result<VoxelFileGrid> vti_grid(ReadContext& context) { return VtiReader(context).grid(); }
 
 }  // namespace strata

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <array>
 #include <string_view>
 
+#include "strata/voxelize/grid_frame.h"
 #include "voxelize/volume/read_context.h"
 
 namespace strata {
@@ -20,6 +22,13 @@ Result<VoxelVolume> read_zarr_voxels(ReadContext& context);   ///< a folder
 Result<VoxelVolume> read_slice_voxels(ReadContext& context);  ///< a folder
 /// The voxels of depth lists: .npz or .exr, as `strata ldi` writes them.
 Result<VoxelVolume> read_list_voxels(ReadContext& context, bool exr);
+
+/// Where the voxels of a file lie, from its head: see read_voxel_grid().
+Result<VoxelFileGrid> npz_grid(ReadContext& context);
+Result<VoxelFileGrid> vti_grid(ReadContext& context);
+Result<VoxelFileGrid> vdb_grid(ReadContext& context);
+/// Voxels along x, y, z of a .npy.
+Result<std::array<double, 3>> npy_sizes(ReadContext& context);
 
 /// Reads bytes as a file of a format that is one file, as read_voxels() does.
 Result<VoxelVolume> parse_voxels(std::string_view bytes, const std::string& format,

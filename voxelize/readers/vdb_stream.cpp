@@ -67,6 +67,7 @@ void read_matrix(ByteCursor& cursor, VdbGridHead& head) {
       head.centre = v;
       continue;
     }
+    head.steps[row] = v;
     head.voxel_size[row] = std::sqrt(v.x * v.x + v.y * v.y + v.z * v.z);
     turned = turned || std::abs(v[row]) != head.voxel_size[row] || v[row] < 0.0;
   }
@@ -91,6 +92,7 @@ bool read_transform(ByteCursor& cursor, const std::string& type, VdbGridHead& he
   head.voxel_size = vector(cursor);
   for (int i = 0; i < 4; ++i) vector(cursor);  // lengths and inverses
   for (int axis = 0; axis < 3; ++axis) {
+    head.steps[axis][axis] = head.voxel_size[axis];
     if (head.voxel_size[axis] >= 0.0) continue;
     head.voxel_size[axis] = -head.voxel_size[axis];
     head.note = "the transform mirrors the grid; it is shown along its own axes";

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 #include <map>
 #include <span>
@@ -35,6 +36,7 @@ struct VdbGridHead {
   std::uint32_t compression = 0;
   std::map<std::string, std::string> metadata;  ///< by name: the bytes of the value
   glm::dvec3 voxel_size{1.0}, centre{0.0};      ///< of index (0, 0, 0): its voxel's centre
+  glm::dmat3 steps{1.0};                        ///< columns: from an index to the next
   std::string note;                             ///< where the transform is more than that
   std::uint64_t tree_at = 0;
 };

@@ -1,0 +1,298 @@
+#include "strata/voxelize/readers/read_voxel_grid.h"
+
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <new>
+#include <string>
+#include <vector>
+
+#include "core/letters.h"
+#include "mesh/text/input_bytes.h"
+#include "strata/voxelize/readers/read_voxels.h"
+#include "voxelize/heads/grid_axes.h"
+#include "voxelize/heads/metaimage_head.h"
+#include "voxelize/heads/nifti_head.h"
+#include "voxelize/heads/nrrd_head.h"
+#include "voxelize/readers/readers.h"
+#include "voxelize/volume/inflate_stream.h"
+#include "voxelize/volume/json_text.h"
+
+namespace strata {
+namespace {
+
+bool is_there(const std::string& path) { return ::access(path.c_str(), F_OK) == 0; }
+
+Result<JsonValue> read_json_file(const std::string& path, const Execution& execution) {
+  const auto file = detail::InputBytes::open(path, execution.memory_limit, execution.stop);
+  if (!file) return tl::unexpected(file.error());
+  return parse_json(file->view(), path);
+}
+
+/// Three numbers. @return kInput if the member is there and is not that
+Result<std::optional<glm::dvec3>> vector_of(const JsonValue& json, std::string_view name,
+                                            const std::string& path) {
+  if (json.find(name) == nullptr) return std::nullopt;
+  const auto numbers = json.numbers(name, 3);
+  if (!numbers) return fail(ErrorCode::kInput, "{}: {} must be 3 numbers", path, name);
+  return glm::dvec3((*numbers)[0], (*numbers)[1], (*numbers)[2]);
+}
+
+/// Three rows of three numbers.
+Result<glm::dmat3> direction_of(const JsonValue& json, const std::string& path) {
+  glm::dmat3 direction(1.0);
+  const JsonValue* rows = json.find("direction");
+  if (rows == nullptr) return direction;
+  bool whole = rows->items.size() == 3;
+  for (std::size_t row = 0; row < 3 && whole; ++row) {
+    const std::vector<JsonValue>& items = rows->items[row].items;
+    whole = items.size() == 3;
+    for (std::size_t column = 0; column < 3 && whole; ++column) {
+      whole = items[column].kind == JsonValue::kNumber;
+      direction[static_cast<int>(column)][static_cast<int>(row)] = items[column].number;
+    }
+  }
+  if (!whole) return fail(ErrorCode::kInput, "{}: direction must be 3 rows of 3 numbers", path);
+  return direction;
+}
+
+/// `origin`, `voxel_size` or `spacing`, `direction`, `space`, `unit` of our own JSON files.
+Result<VoxelFileGrid> grid_of_json(const JsonValue& json, const std::array<double, 3>& sizes,
+                                   const std::string& path) {
+  const auto origin = vector_of(json, "origin", path);
+  const auto spacing =
+      vector_of(json, json.find("spacing") != nullptr ? "spacing" : "voxel_size", path);
+  const auto direction = direction_of(json, path);
+  if (!origin) return tl::unexpected(origin.error());
+  if (!spacing) return tl::unexpected(spacing.error());
+  if (!direction) return tl::unexpected(direction.error());
+  if (!*origin || !*spacing) {
+    return fail(ErrorCode::kInput, "{}: {} is missing, which says where the voxels lie", path,
+                *origin ? "spacing" : "origin");
+  }
+  auto result = grid_of_frame(path, sizes, **origin, **spacing, *direction);
+  if (!result) return result;
+  const JsonValue *space = json.find("space"), *unit = json.find("unit");
+  if (space != nullptr) result->frame.space = space->text;
+  if (unit != nullptr) result->frame.unit_metres = unit_named(unit->text);
+  return result;
+}
+
+Result<VoxelFileGrid> npy_file_grid(ReadContext& context) {
+  const auto sizes = npy_sizes(context);
+  if (!sizes) return tl::unexpected(sizes.error());
+  const std::string beside = context.path + ".json";
+  if (!is_there(beside)) {
+    return fail(ErrorCode::kInput,
+                "{}: a .npy does not say where its voxels lie; a file {} with origin and spacing "
+                "would",
+                context.path, beside);
+  }
+  const auto json = read_json_file(beside, context.execution);
+  if (!json) return tl::unexpected(json.error());
+  return grid_of_json(*json, *sizes, beside);
+}
+
+Result<VoxelFileGrid> nifti_file_grid(ReadContext& context) {
+  std::string head(context.bytes.substr(0, kNiftiHeadBytes));
+  if (head.starts_with("\x1f\x8b")) {
+    std::string unpacked(348, '\0');
+    InflateStream stream(context.bytes, InflateStream::kGzip, context.path);
+    const auto read = [&](std::size_t from) {
+      return stream.read(reinterpret_cast<std::byte*>(unpacked.data()) + from,
+                         unpacked.size() - from);
+    };
+    if (auto done = read(0); !done) return tl::unexpected(done.error());
+    const bool second = unpacked.compare(4, 3, "n+2") == 0 || unpacked.compare(4, 3, "ni2") == 0;
+    if (second) {
+      unpacked.resize(540);
+      if (auto done = read(348); !done) return tl::unexpected(done.error());
+    }
+    head = std::move(unpacked);
+  }
+  const auto parsed = parse_nifti_head(head, context.path);
+  if (!parsed) return tl::unexpected(parsed.error());
+  return nifti_grid(*parsed, context.path);
+}
+
+Result<VoxelFileGrid> metaimage_file_grid(ReadContext& context) {
+  const auto head = parse_metaimage_head(context.bytes, context.path);
+  if (!head) return tl::unexpected(head.error());
+  return metaimage_grid(*head, context.path);
+}
+
+Result<VoxelFileGrid> nrrd_file_grid(ReadContext& context) {
+  const auto head = parse_nrrd_head(context.bytes, context.path);
+  if (!head) return tl::unexpected(head.error());
+  return nrrd_grid(*head, context.path);
+}
+
+/// Scale and translation of OME-Zarr 0.4, of one axis after the other.
+struct OmePlace {
+  std::vector<double> scale, translation;
+};
+void add_transforms(const JsonValue* list, OmePlace& place) {
+  if (list == nullptr) return;
+  for (const JsonValue& step : list->items) {
+    const JsonValue *type = step.find("type"), *scale = step.find("scale");
+    const JsonValue* translation = step.find("translation");
+    if (type == nullptr) continue;
+    for (std::size_t axis = 0; axis < place.scale.size(); ++axis) {
+      if (type->text == "scale" && scale != nullptr && axis < scale->items.size()) {
+        place.scale[axis] *= scale->items[axis].number;
+        place.translation[axis] *= scale->items[axis].number;
+      }
+      if (type->text == "translation" && translation != nullptr &&
+          axis < translation->items.size()) {
+        place.translation[axis] += translation->items[axis].number;
+      }
+    }
+  }
+}
+
+/// @param shape  of the array; empty: it is in the first data set of the group
+Result<VoxelFileGrid> ome_grid(const std::string& folder, const JsonValue& attributes,
+                               std::vector<double> shape, const Execution& execution) {
+  const std::string path = folder + "/.zattrs";
+  const JsonValue* scales = attributes.find("multiscales");
+  if (scales == nullptr || scales->items.empty()) {
+    return fail(ErrorCode::kInput, "{}: neither origin and voxel_size nor multiscales are there",
+                path);
+  }
+  const JsonValue& scale = scales->items.front();
+  const JsonValue *sets = scale.find("datasets"), *axes = scale.find("axes");
+  if (sets == nullptr || sets->items.empty() || axes == nullptr) {
+    return fail(ErrorCode::kInput, "{}: multiscales must have axes and datasets", path);
+  }
+  const JsonValue& first = sets->items.front();
+  if (shape.empty()) {
+    const JsonValue* name = first.find("path");
+    const std::string array = folder + "/" + (name == nullptr ? "0" : name->text) + "/.zarray";
+    const auto json = read_json_file(array, execution);
+    if (!json) return tl::unexpected(json.error());
+    if (const JsonValue* list = json->find("shape")) {
+      for (const JsonValue& item : list->items) shape.push_back(item.number);
+    }
+  }
+  OmePlace place{std::vector<double>(axes->items.size(), 1.0),
+                 std::vector<double>(axes->items.size(), 0.0)};
+  add_transforms(first.find("coordinateTransformations"), place);
+  add_transforms(scale.find("coordinateTransformations"), place);
+  GridAxes grid;
+  double unit = 0.0;
+  int found = 0;
+  for (std::size_t axis = 0; axis < axes->items.size() && axis < shape.size(); ++axis) {
+    const JsonValue &item = axes->items[axis], *name = item.find("name"),
+                    *given = item.find("unit");
+    const std::string letter = name == nullptr ? item.text : name->text;
+    const std::size_t to = std::string_view("xyz").find(letter);
+    if (letter.size() != 1 || to == std::string_view::npos) continue;
+    const auto t = static_cast<int>(to);
+    grid.sizes[to] = shape[axis];
+    grid.steps[t][t] = place.scale[axis];
+    grid.place[t] = place.translation[axis];
+    if (given != nullptr) unit = unit_named(given->text);
+    ++found;
+  }
+  if (found != 3) return fail(ErrorCode::kInput, "{}: no axes x, y and z", path);
+  auto result = grid_of_axes(path, grid);
+  if (result) result->frame.unit_metres = unit;
+  return result;
+}
+
+Result<VoxelFileGrid> zarr_file_grid(ReadContext& context) {
+  const std::string attributes = context.path + "/.zattrs", array = context.path + "/.zarray";
+  std::vector<double> shape;
+  if (is_there(array)) {
+    const auto json = read_json_file(array, context.execution);
+    if (!json) return tl::unexpected(json.error());
+    if (const JsonValue* list = json->find("shape")) {
+      for (const JsonValue& item : list->items) shape.push_back(item.number);
+    }
+    if (shape.empty()) return fail(ErrorCode::kInput, "{}: shape is missing", array);
+  }
+  if (!is_there(attributes)) {
+    return fail(ErrorCode::kInput, "{}: it is missing, and would say where the voxels lie",
+                attributes);
+  }
+  const auto json = read_json_file(attributes, context.execution);
+  if (!json) return tl::unexpected(json.error());
+  if (shape.size() == 3 && json->find("voxel_size") != nullptr) {
+    return grid_of_json(*json, {shape[0], shape[1], shape[2]}, attributes);
+  }
+  return ome_grid(context.path, *json, std::move(shape), context.execution);
+}
+
+Result<VoxelFileGrid> slices_grid(ReadContext& context) {
+  const std::string path = context.path + "/slices.json";
+  const auto json = read_json_file(path, context.execution);
+  if (!json) return tl::unexpected(json.error());
+  const auto dims = json->numbers("dims", 3);
+  if (!dims) return fail(ErrorCode::kInput, "{}: dims must be 3 numbers", path);
+  return grid_of_json(*json, {(*dims)[0], (*dims)[1], (*dims)[2]}, path);
+}
+
+/// Of formats whose head alone does not say it.
+Result<VoxelFileGrid> grid_of_voxels(const std::string& path, const Execution& execution) {
+  const auto volume = read_voxels(path, {}, execution);
+  if (!volume) return tl::unexpected(volume.error());
+  if (!volume->placed) {
+    return fail(ErrorCode::kInput, "{}: a .{} does not say where its voxels lie", path,
+                volume->format);
+  }
+  return VoxelFileGrid{volume->grid(), {}};
+}
+
+using GridReader = Result<VoxelFileGrid> (*)(ReadContext&);
+
+GridReader reader_of(const std::string& path) {
+  constexpr std::pair<std::string_view, GridReader> kReaders[] = {{".npy", npy_file_grid},
+                                                                  {".npz", npz_grid},
+                                                                  {".nrrd", nrrd_file_grid},
+                                                                  {".nhdr", nrrd_file_grid},
+                                                                  {".mha", metaimage_file_grid},
+                                                                  {".mhd", metaimage_file_grid},
+                                                                  {".nii", nifti_file_grid},
+                                                                  {".nii.gz", nifti_file_grid},
+                                                                  {".vti", vti_grid},
+                                                                  {".vdb", vdb_grid}};
+  const std::string name = lower_case(path);
+  for (const auto& [extension, reader] : kReaders) {
+    if (name.ends_with(extension)) return reader;
+  }
+  return nullptr;
+}
+
+bool is_a_folder(const std::string& path) {
+  struct stat status = {};
+  return ::stat(path.c_str(), &status) == 0 && S_ISDIR(status.st_mode);
+}
+
+}  // namespace
+
+Result<VoxelFileGrid> read_voxel_grid(const std::string& path, const Execution& execution) {
+  const ReadVoxelsOptions options;
+  MemoryBudget budget(execution.memory_limit != 0 ? execution.memory_limit : ~std::uint64_t{0});
+  try {
+    if (is_a_folder(path)) {
+      ReadContext context{path, {}, options, execution, budget};
+      if (is_there(path + "/slices.json")) return slices_grid(context);
+      if (is_there(path + "/.zarray") || is_there(path + "/.zattrs")) {
+        return zarr_file_grid(context);
+      }
+      return fail(ErrorCode::kInput, "{}: the folder holds neither a Zarr array nor slices.json",
+                  path);
+    }
+    const GridReader reader = reader_of(path);
+    if (reader == nullptr) return grid_of_voxels(path, execution);
+    const auto file = detail::InputBytes::open(path, execution.memory_limit, execution.stop);
+    if (!file) return tl::unexpected(file.error());
+    ReadContext context{path, file->view(), options, execution, budget};
+    return reader(context);
+  } catch (const std::bad_alloc&) {
+    return fail(ErrorCode::kLimit, "{}: no memory for its head", path);
+  }
+}
+
+}  // namespace strata
