@@ -14,10 +14,33 @@ struct Reference {
   std::uint32_t tile, triangle;
 };
 
+// The voxels along an axis that are no farther than `margin` lattice steps from the triangle's box.
+Range bounds_with(const Triangle& t, int axis, int margin) {
+  const auto index = static_cast<std::size_t>(axis);
+  const auto [low, high] = std::minmax({t[0][index], t[1][index], t[2][index]});
+  return {static_cast<std::int32_t>((low - 1 - margin) >> kLatticeBits),
+          static_cast<std::int32_t>((high + margin) >> kLatticeBits)};
+}
+
+// The tiles along u that the triangle meets in rows of tiles v0..v1.
+std::vector<Range> tile_rows(const Triangle& t, int v0, int v1, int margin) {
+  const int more = margin > 0 ? 1 : 0;
+  std::vector<Range> rows(static_cast<std::size_t>(v1 - v0 + 1 + 2 * more));
+  strip_ranges(t, 1, 0, kTileBits, v0 - more, v1 + 1 + more, rows.data());
+  if (more == 0) return rows;
+  std::vector<Range> wider(rows.size() - 2);  // a margin is less than a tile
+  for (std::size_t i = 0; i < wider.size(); ++i) {
+    for (std::size_t j = i; j <= i + 2; ++j) {
+      if (rows[j].first <= rows[j].last) wider[i].include(rows[j].first - 1, rows[j].last + 1);
+    }
+  }
+  return wider;
+}
+
 void bin_triangle(const Triangle& t, std::uint32_t index, const VoxelIntervals& slab, int depth,
-                  std::vector<Reference>& out) {
-  const Range u = voxel_bounds(t, 0), v = voxel_bounds(t, 1);
-  const Range w = voxel_bounds(t, 2);
+                  int margin, std::vector<Reference>& out) {
+  const Range u = bounds_with(t, 0, margin), v = bounds_with(t, 1, margin);
+  const Range w = bounds_with(t, 2, margin);
   if (u.last < 0 || u.first >= slab.columns() || v.last < slab.v_begin() ||
       v.first >= slab.v_end() || w.last < 0 || w.first >= depth) {
     return;
@@ -29,10 +52,7 @@ void bin_triangle(const Triangle& t, std::uint32_t index, const VoxelIntervals& 
   const int v1 = std::min(v.last, slab.v_end() - 1) / kSide;
   // Tiles are cells of a coarser lattice: a large triangle enters only those it touches.
   std::vector<Range> rows;
-  if (u0 != u1 && v0 != v1) {
-    rows.resize(static_cast<std::size_t>(v1 - v0 + 1));
-    strip_ranges(t, 1, 0, kTileBits, v0, v1 + 1, rows.data());
-  }
+  if (u0 != u1 && v0 != v1) rows = tile_rows(t, v0, v1, margin);
   for (int tv = v0; tv <= v1; ++tv) {
     const Range row = rows.empty() ? Range{u0, u1} : rows[static_cast<std::size_t>(tv - v0)];
     for (int tu = std::max(u0, row.first); tu <= std::min(u1, row.last); ++tu) {
@@ -53,7 +73,7 @@ Triangle corners(const LatticeMesh& mesh, std::size_t index, AxisFrame frame) {
 }
 
 Result<Bins> bin_by_tile(const LatticeMesh& mesh, const VoxelIntervals& slab,
-                         const Execution& execution, Budget& budget) {
+                         const Execution& execution, Budget& budget, int margin) {
   constexpr std::size_t kChunk = 8192;
   const AxisFrame frame(slab.axis());
   const int depth = slab.grid().dims[frame.w];
@@ -65,7 +85,7 @@ Result<Bins> bin_by_tile(const LatticeMesh& mesh, const VoxelIntervals& slab,
       for_each_tile(quiet, chunks.size(), budget.limit(), [&](std::size_t chunk, int) {
         const std::size_t end = std::min(count, (chunk + 1) * kChunk);
         for (std::size_t i = chunk * kChunk; i < end; ++i) {
-          bin_triangle(corners(mesh, i, frame), static_cast<std::uint32_t>(i), slab, depth,
+          bin_triangle(corners(mesh, i, frame), static_cast<std::uint32_t>(i), slab, depth, margin,
                        chunks[chunk]);
         }
         return budget.add(chunks[chunk].size() * (sizeof(Reference) + sizeof(std::uint32_t)));

@@ -80,9 +80,10 @@ struct Bins {
   std::vector<std::uint32_t> triangles;
 };
 
-/// In each tile the triangles come in their order.
+/// In each tile the triangles come in their order. @param margin  triangles within this many
+/// lattice steps of a tile are its own, too, and some others
 Result<Bins> bin_by_tile(const LatticeMesh& mesh, const VoxelIntervals& slab,
-                         const Execution& execution, Budget& budget);
+                         const Execution& execution, Budget& budget, int margin = 0);
 
 /// Collects the runs of one tile in any order and makes intervals of them.
 class RunCollector {

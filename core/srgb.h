@@ -1,0 +1,65 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+
+// Colours of 8 bits as sRGB has them (IEC 61966-2-1), and their light, 0 to 1. Means and products
+// of colours are those of their light.
+
+namespace strata {
+
+/// The light of each value.
+[[nodiscard]] inline const std::array<float, 256>& linear_light() {
+  static const std::array<float, 256> kLight = [] {
+    std::array<float, 256> light{};
+    for (std::size_t i = 0; i < 256; ++i) {
+      const double value = static_cast<double>(i) / 255.0;
+      light[i] = static_cast<float>(value <= 0.04045 ? value / 12.92
+                                                     : std::pow((value + 0.055) / 1.055, 2.4));
+    }
+    return light;
+  }();
+  return kLight;
+}
+
+/// Light to the nearest value. Built once; a look-up is two or three steps.
+class SrgbOfLight {
+ public:
+  SrgbOfLight() {
+    const auto value_of = [](double light) {
+      return 255.0 *
+             (light <= 0.0031308 ? 12.92 * light : 1.055 * std::pow(light, 1.0 / 2.4) - 0.055);
+    };
+    for (std::size_t i = 0; i < 255; ++i) {  // from the middle between two values on
+      const double middle = (static_cast<double>(i) + 0.5) / 255.0;
+      begins_[i] = static_cast<float>(middle <= 0.04045 ? middle / 12.92
+                                                        : std::pow((middle + 0.055) / 1.055, 2.4));
+    }
+    for (std::size_t i = 0; i <= kSteps; ++i) {
+      const double value = value_of(static_cast<double>(i) / kSteps);
+      guess_[i] = static_cast<std::uint8_t>(std::clamp(std::floor(value - 0.5), 0.0, 255.0));
+    }
+  }
+  [[nodiscard]] std::uint8_t operator()(float light) const {
+    if (!(light > 0.0f)) return 0;
+    if (light >= 1.0f) return 255;
+    std::size_t value = guess_[static_cast<std::size_t>(light * kSteps)];
+    while (value < 255 && light >= begins_[value]) ++value;
+    return static_cast<std::uint8_t>(value);
+  }
+
+ private:
+  static constexpr std::size_t kSteps = 4096;
+  std::array<float, 255> begins_{};
+  std::array<std::uint8_t, kSteps + 1> guess_{};
+};
+
+/// The nearest value of light.
+[[nodiscard]] inline const SrgbOfLight& srgb_of_light() {
+  static const SrgbOfLight kSrgb;
+  return kSrgb;
+}
+
+}  // namespace strata

@@ -1,0 +1,66 @@
+#pragma once
+
+#include <cstdint>
+#include <glm/vec4.hpp>
+#include <memory>
+
+#include "strata/core/execution.h"
+#include "strata/core/grid.h"
+#include "strata/core/result.h"
+#include "strata/mesh/colours/surface_colours.h"
+#include "strata/mesh/triangle_soup.h"
+#include "strata/voxelize/intervals.h"
+
+namespace strata {
+
+/// A colour as a label of VoxelIntervals: red + 2^8 green + 2^16 blue + 2^24 alpha.
+[[nodiscard]] constexpr std::uint32_t packed_colour(const glm::u8vec4& colour) {
+  return std::uint32_t{colour.x} | std::uint32_t{colour.y} << 8 | std::uint32_t{colour.z} << 16 |
+         std::uint32_t{colour.w} << 24;
+}
+/// The inverse.
+[[nodiscard]] constexpr glm::u8vec4 unpacked_colour(std::uint32_t label) {
+  return {static_cast<std::uint8_t>(label), static_cast<std::uint8_t>(label >> 8),
+          static_cast<std::uint8_t>(label >> 16), static_cast<std::uint8_t>(label >> 24)};
+}
+
+/// Settings of VoxelColours.
+struct VoxelColourOptions {
+  /// The voxels are a solid: those farther than one voxel from the surface have the colour
+  /// `inside`. False: the voxels of a surface, all of which have its colours; those whose colour is
+  /// fully transparent are left out.
+  bool solid = false;
+  glm::u8vec4 inside{128, 128, 128, 255};  ///< sRGB; alpha not 0
+};
+
+/// Gives voxels the colour of the surface point that is nearest to their centre, in units of voxels
+/// along each axis. The surface is the snapped mesh. Of triangles that are equally near, the one
+/// with the lowest number counts. A voxel of a solid has a colour of the surface if that point is
+/// no farther than one voxel: so have all that the surface touches and all that can be seen from
+/// outside.
+///
+/// Distances are compared as multiples of 2^-31 square voxels.
+class VoxelColours {
+ public:
+  /// Snaps the mesh. Keeps references to `mesh` and `colours`, whose triangles have the same
+  /// numbers. @return as snap_to_lattice()
+  static Result<VoxelColours> create(const TriangleSoup& mesh, const VoxelGrid& grid,
+                                     const SurfaceColours& colours,
+                                     const VoxelColourOptions& options = {},
+                                     const Execution& execution = {});
+  VoxelColours(VoxelColours&&) noexcept;
+  VoxelColours& operator=(VoxelColours&&) noexcept;
+  ~VoxelColours();
+
+  /// The voxels of a slab with their colours as labels: packed_colour(). Labels of the slab do not
+  /// count. Memory grows with the voxels that have a colour of the surface. @pre slab.grid() is the
+  /// grid above @return kLimit, kCancelled
+  Result<VoxelIntervals> colour(const VoxelIntervals& slab, const Execution& execution = {});
+
+ private:
+  struct Impl;
+  explicit VoxelColours(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace strata

@@ -1,0 +1,261 @@
+#include "strata/voxelize/colours/voxel_colours.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <new>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "strata/raster/lattice_mesh.h"
+#include "voxelize/colours/near_triangle.h"
+#include "voxelize/shell_tiles.h"
+
+namespace strata {
+namespace {
+
+constexpr int kSide = VoxelIntervals::kTileSide;
+constexpr double kHalfDiagonal = 0.8660254037844387;  // of a voxel: the farthest that it touches
+constexpr double kSolidReach = 1.0;                   // between centres of voxels that share a face
+constexpr std::uint64_t kFar = ~std::uint64_t{0};
+
+/// A tile's voxels that may have a colour of the surface, and what is nearest to them.
+struct NearVoxels {
+  std::span<const std::uint32_t> offsets;  // of runs, by column
+  std::span<const Interval> runs;
+  std::vector<std::uint32_t> first;  // the first voxel of each run, and how many there are
+  /// [square of the distance:32 | place of the triangle in the tile:32]
+  std::vector<std::uint64_t> keys;
+
+  /// @return false if there are too many
+  bool reset(std::span<const std::uint32_t> offsets_of, std::span<const Interval> runs_of) {
+    offsets = offsets_of, runs = runs_of;
+    first.resize(runs.size() + 1);
+    std::uint64_t count = 0;
+    for (std::size_t i = 0; i < runs.size(); ++i) {
+      first[i] = static_cast<std::uint32_t>(count);
+      count += static_cast<std::uint64_t>(runs[i].length());
+    }
+    if (count > 0xffffffffu) return false;
+    first[runs.size()] = static_cast<std::uint32_t>(count);
+    keys.assign(count, kFar);
+    return true;
+  }
+};
+
+struct Worker {
+  explicit Worker(SurfaceColours::Probe asks) : probe(std::move(asks)) {}
+
+  [[nodiscard]] std::uint64_t bytes() const {
+    return triangles.capacity() * sizeof(NearTriangle) + collector.bytes() +
+           near_items.capacity() * sizeof(Interval) + near.keys.capacity() * sizeof(std::uint64_t) +
+           items.capacity() * (sizeof(Interval) + sizeof(std::uint32_t));
+  }
+
+  SurfaceColours::Probe probe;
+  std::vector<NearTriangle> triangles;  // of a tile
+  shell::RunCollector collector;
+  std::vector<std::uint32_t> near_offsets;
+  std::vector<Interval> near_items;
+  NearVoxels near;
+  // The result.
+  std::vector<std::uint32_t> offsets, labels;
+  std::vector<Interval> items;
+};
+
+/// Appends the voxels that two columns have in common.
+void append_common(std::span<const Interval> a, std::span<const Interval> b,
+                   std::vector<Interval>& out) {
+  for (std::size_t i = 0, j = 0; i < a.size() && j < b.size();) {
+    const std::uint16_t first = std::max(a[i].first, b[j].first);
+    const std::uint16_t last = std::min(a[i].last, b[j].last);
+    if (first <= last) out.push_back({first, last});
+    a[i].last < b[j].last ? ++i : ++j;
+  }
+}
+
+}  // namespace
+
+struct VoxelColours::Impl {
+  VoxelGrid grid;
+  VoxelColourOptions options;
+  LatticeMesh mesh;
+  const SurfaceColours* colours = nullptr;
+  std::vector<Worker> workers;
+
+  [[nodiscard]] double reach() const { return options.solid ? kSolidReach : kHalfDiagonal; }
+  bool find_near(const VoxelIntervals::TileView& tile, const glm::ivec3& size,
+                 Worker& worker) const;
+  void find_nearest(const glm::ivec3& size, Worker& worker) const;
+  void colour_tile(const VoxelIntervals::TileView& tile, std::span<const std::uint32_t> numbers,
+                   Worker& worker) const;
+  void append(int first, int last, std::uint32_t label, Worker& worker) const;
+};
+
+/// Of a surface all voxels are near it; of a solid those are looked for.
+bool VoxelColours::Impl::find_near(const VoxelIntervals::TileView& tile, const glm::ivec3& size,
+                                   Worker& worker) const {
+  if (!options.solid) return worker.near.reset(tile.offsets, tile.items);
+  worker.collector.clear();
+  for (const NearTriangle& triangle : worker.triangles) {
+    triangle.columns_within(reach(), size, [&](int u, int v, int first, int last) {
+      worker.collector.add(v * kSide + u, first, last);
+    });
+    worker.collector.compact_if_large();
+  }
+  worker.collector.finish();
+  const auto offsets = worker.collector.offsets();
+  worker.near_offsets.assign(1, 0);
+  worker.near_items.clear();
+  for (std::size_t local = 0; local < VoxelIntervals::kTileColumns; ++local) {
+    append_common(
+        tile.items.subspan(tile.offsets[local], tile.offsets[local + 1] - tile.offsets[local]),
+        worker.collector.items().subspan(offsets[local], offsets[local + 1] - offsets[local]),
+        worker.near_items);
+    worker.near_offsets.push_back(static_cast<std::uint32_t>(worker.near_items.size()));
+  }
+  return worker.near.reset(worker.near_offsets, worker.near_items);
+}
+
+void VoxelColours::Impl::find_nearest(const glm::ivec3& size, Worker& worker) const {
+  constexpr double kScale = 2147483648.0;  // the square of the farthest is 1
+  const double most = reach() * reach() + 1e-9;
+  NearVoxels& near = worker.near;
+  for (std::size_t number = 0; number < worker.triangles.size(); ++number) {
+    const NearTriangle& triangle = worker.triangles[number];
+    triangle.columns_within(reach(), size, [&](int u, int v, int first, int last) {
+      const auto local = static_cast<std::size_t>(v * kSide + u);
+      for (std::uint32_t i = near.offsets[local]; i < near.offsets[local + 1]; ++i) {
+        const Interval run = near.runs[i];
+        if (run.last < first) continue;
+        if (run.first > last) break;
+        const int begin = std::max<int>(first, run.first), end = std::min<int>(last, run.last);
+        std::uint64_t* key = near.keys.data() + near.first[i] + (begin - run.first);
+        for (int w = begin; w <= end; ++w, ++key) {
+          const double d = triangle.distance2({u + 0.5, v + 0.5, w + 0.5});
+          if (d > most) continue;
+          *key = std::min(*key, static_cast<std::uint64_t>(d * kScale + 0.5) << 32 | number);
+        }
+      }
+    });
+  }
+}
+
+void VoxelColours::Impl::append(int first, int last, std::uint32_t label, Worker& worker) const {
+  const bool starts = worker.items.size() == worker.offsets.back();
+  if (!starts && worker.labels.back() == label && worker.items.back().last + 1 == first) {
+    worker.items.back().last = static_cast<std::uint16_t>(last);
+    return;
+  }
+  worker.items.push_back({static_cast<std::uint16_t>(first), static_cast<std::uint16_t>(last)});
+  worker.labels.push_back(label);
+}
+
+void VoxelColours::Impl::colour_tile(const VoxelIntervals::TileView& tile,
+                                     std::span<const std::uint32_t> numbers, Worker& worker) const {
+  const NearVoxels& near = worker.near;
+  const std::uint32_t inside = packed_colour(options.inside);
+  worker.offsets.assign(1, 0);
+  worker.items.clear();
+  worker.labels.clear();
+  for (std::size_t local = 0; local < VoxelIntervals::kTileColumns; ++local) {
+    const double u = static_cast<double>(local % kSide) + 0.5;
+    const double v = static_cast<double>(local / kSide) + 0.5;
+    std::uint32_t run = near.offsets[local];
+    for (std::uint32_t i = tile.offsets[local]; i < tile.offsets[local + 1]; ++i) {
+      const Interval interval = tile.items[i];
+      int at = interval.begin();
+      for (; run < near.offsets[local + 1] && near.runs[run].begin() < interval.end(); ++run) {
+        if (near.runs[run].begin() > at) {
+          append(at, near.runs[run].begin() - 1, inside, worker);
+        }
+        const std::uint64_t* key = near.keys.data() + near.first[run];
+        for (at = near.runs[run].begin(); at < near.runs[run].end(); ++at, ++key) {
+          std::uint32_t label = 0;
+          if (*key != kFar) {
+            const auto place = static_cast<std::uint32_t>(*key);
+            const glm::dvec3 weights = worker.triangles[place].nearest({u, v, at + 0.5});
+            label = packed_colour(worker.probe.colour(numbers[place], weights));
+          }
+          if (label == 0 && options.solid) label = inside;
+          if (label != 0) append(at, at, label, worker);
+        }
+      }
+      if (at < interval.end()) append(at, interval.end() - 1, inside, worker);
+    }
+    worker.offsets.push_back(static_cast<std::uint32_t>(worker.items.size()));
+  }
+}
+
+VoxelColours::VoxelColours(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+VoxelColours::VoxelColours(VoxelColours&&) noexcept = default;
+VoxelColours& VoxelColours::operator=(VoxelColours&&) noexcept = default;
+VoxelColours::~VoxelColours() = default;
+
+Result<VoxelColours> VoxelColours::create(const TriangleSoup& mesh, const VoxelGrid& grid,
+                                          const SurfaceColours& colours,
+                                          const VoxelColourOptions& options,
+                                          const Execution& execution) {
+  auto lattice = snap_to_lattice(mesh, grid, execution);
+  if (!lattice) return tl::unexpected(lattice.error());
+  auto impl = std::make_unique<Impl>();
+  impl->grid = grid;
+  impl->options = options;
+  impl->mesh = *std::move(lattice);
+  impl->colours = &colours;
+  return VoxelColours(std::move(impl));
+}
+
+Result<VoxelIntervals> VoxelColours::colour(const VoxelIntervals& slab,
+                                            const Execution& execution) {
+  try {
+    const AxisFrame frame(slab.axis());
+    VoxelIntervals result(slab.grid(), slab.axis(), slab.v_begin(), slab.v_end());
+    shell::Budget budget(execution.memory_limit);
+    const auto margin = static_cast<int>(std::ceil(impl_->reach() * kLatticeSteps)) + 1;
+    const auto bins = shell::bin_by_tile(impl_->mesh, slab, execution, budget, margin);
+    if (!bins) return tl::unexpected(bins.error());
+    auto& workers = impl_->workers;
+    while (workers.size() < static_cast<std::size_t>(execution.thread_count())) {
+      workers.emplace_back(impl_->colours->probe());
+    }
+    const auto make_tile = [&](std::size_t tile, int worker_index) {
+      Worker& worker = workers[static_cast<std::size_t>(worker_index)];
+      const int tu = static_cast<int>(tile) % slab.tiles_u();
+      const int tv = static_cast<int>(tile) / slab.tiles_u();
+      if (slab.tile_empty(tu, tv)) return true;
+      const std::uint64_t held = worker.bytes();
+      const auto numbers =
+          std::span(bins->triangles)
+              .subspan(bins->offsets[tile], bins->offsets[tile + 1] - bins->offsets[tile]);
+      const shell::Window window = shell::window_of(slab, tu, tv);
+      const glm::ivec3 size(window.u_end - window.u_begin, window.v_end - window.v_begin,
+                            window.w_end);
+      worker.triangles.clear();
+      for (const std::uint32_t number : numbers) {
+        worker.triangles.emplace_back(shell::corners(impl_->mesh, number, frame),
+                                      shell::Vector{window.u_begin, window.v_begin, 0});
+      }
+      const VoxelIntervals::TileView view = slab.tile(tu, tv);
+      if (!impl_->find_near(view, size, worker)) return false;
+      impl_->find_nearest(size, worker);
+      impl_->colour_tile(view, numbers, worker);
+      if (!worker.items.empty()) {
+        result.set_tile(tu, tv, worker.offsets, worker.items, worker.labels);
+      }
+      const std::uint64_t now = worker.bytes();
+      return budget.add((now > held ? now - held : 0) +
+                        worker.items.size() * (sizeof(Interval) + sizeof(std::uint32_t)) +
+                        worker.offsets.size() * sizeof(std::uint32_t));
+    };
+    const auto done = shell::for_each_tile(execution, bins->offsets.size() - 1, budget.limit(),
+                                           make_tile, "colours of voxels");
+    if (!done) return tl::unexpected(done.error());
+    return result;
+  } catch (const std::bad_alloc&) {
+    return fail(ErrorCode::kLimit, "colours of voxels: out of memory");
+  }
+}
+
+}  // namespace strata
