@@ -12,7 +12,7 @@
 #include <glm/vector_relational.hpp>
 #include <vector>
 
-#include "voxelize/output/dense_rows.h"
+#include "voxelize/arrays/npy_voxels.h"
 
 namespace strata::apps {
 namespace {
@@ -110,7 +110,7 @@ class SizeBound {
         closed_(closed),
         file_(file),
         execution_(execution),
-        values_(file.ids),
+        values_(file),
         cells_(static_cast<double>(grid.dims.x) * grid.dims.y * grid.dims.z) {}
 
   [[nodiscard]] double bytes() const {
@@ -120,7 +120,7 @@ class SizeBound {
     if (format == "vox") return vox();
     if (format == "png") return png();
     if (format == "zarr") return zarr();
-    return layers(values_.kind, cells_);  // npz, nrrd, vti
+    return layers(values_.codes, cells_);  // npz, nrrd, vti
   }
   [[nodiscard]] double dense() const { return cells_ * static_cast<double>(values_.bytes); }
 
@@ -171,7 +171,7 @@ class SizeBound {
     return kHeads + 8 * count + deflated(kind, changes(Axis::kX) + count, elements, count);
   }
   [[nodiscard]] double png() const {
-    const bool flags = values_.kind == RunBytes::kFlags;
+    const bool flags = values_.codes == RunBytes::kFlags;
     constexpr double kChunks = 57 + 6;  // signature, heads, sums
     const double row = flags ? 8 * parts(grid_.dims.x, 8) + 8 : grid_.dims.x + 1.0;
     return kChunks * grid_.dims.z + (flags ? 0.0 : cells_ / grid_.dims.x * 4) +
@@ -182,10 +182,10 @@ class SizeBound {
     const double chunks =
         parts(grid_.dims.x, kSide) * parts(grid_.dims.y, kSide) * parts(grid_.dims.z, kSide);
     const double columns = mixed(kSide) * kSide * kSide;  // each may end otherwise than the next
-    const double runs =
-        changes(Axis::kZ) + columns + chunks * (values_.kind == RunBytes::kIds ? kSide * kSide : 1);
+    const double runs = changes(Axis::kZ) + columns +
+                        chunks * (values_.codes == RunBytes::kIds ? kSide * kSide : 1);
     return kHeads + 6 * chunks +
-           deflated(values_.kind, runs, chunks * kSide * kSide * kSide, chunks);
+           deflated(values_.codes, runs, chunks * kSide * kSide * kSide, chunks);
   }
   [[nodiscard]] double vdb() const {
     const bool floats = file_.ids != 0 || file_.fog != 0;
@@ -226,7 +226,7 @@ FileSize file_size(const VoxelGrid& grid, const MemoryFactors& factors, bool clo
                    const VoxelWriterOptions& file, const Execution& execution) {
   const SizeBound bound(grid, factors, closed, file, execution);
   if (factors.format == "npy") {
-    const std::string head = npy_head(DenseValues(file.ids), grid.dims);
+    const std::string head = npy_head(DenseValues(file), grid.dims);
     return {static_cast<std::uint64_t>(bound.dense()) + head.size(), true};
   }
   const double most = bound.bytes() + 6.0 * static_cast<double>(file.name.size());

@@ -1,13 +1,14 @@
 // NumPy's .npy, version 1.0 (numpy/lib/format.py). Shape (nx, ny, nz), so that a[i, j, k] is voxel
 // (i, j, k); fortran_order, so that x is fastest and the slabs follow one another: C order would
-// need the whole array, or seeking, which pipes cannot. numpy.load treats both alike. The format
+// need the whole array, or seeking, which pipes cannot. numpy.load treats both alike. Colours are
+// a[c, i, j, k], c = 0 to 3: red, green, blue, alpha. The format
 // has no place for the world transform; .npz has (write_npz.cpp).
 
 #include <memory>
 #include <string>
 #include <utility>
 
-#include "hashbuffer/formats/npy_head.h"
+#include "voxelize/arrays/npy_voxels.h"
 #include "voxelize/output/block_output.h"
 #include "voxelize/output/dense_rows.h"
 #include "voxelize/output/slab_writer.h"
@@ -18,14 +19,15 @@ namespace {
 
 class NpyWriter final : public SlabWriter {
  public:
-  NpyWriter(const std::string& path, const VoxelGrid& grid, std::uint32_t ids, BlockOutput output)
-      : SlabWriter(path, grid, Axis::kX), values_(ids), output_(std::move(output)) {}
+  NpyWriter(const std::string& path, const VoxelGrid& grid, const VoxelWriterOptions& options,
+            BlockOutput output)
+      : SlabWriter(path, grid, Axis::kX), values_(options), output_(std::move(output)) {}
 
   Result<void> begin() { return output_.append(npy_head(values_, dims())); }
 
  private:
   Result<void> add_slab(const VoxelIntervals& slab, const Execution& execution) override {
-    const RowBlocks blocks(slab, values_.bytes);
+    const RowBlocks blocks(slab, values_);
     return output_.append_blocks(
         execution, blocks.count(),
         [&](std::size_t index, Bytes& out, int) { blocks.make(index, out); });
@@ -42,7 +44,7 @@ VoxelWriterResult open_npy_writer(const std::string& path, const VoxelGrid& grid
                                   const VoxelWriterOptions& options) {
   Result<BlockOutput> output = BlockOutput::create(path);
   if (!output) return tl::unexpected(output.error());
-  auto writer = std::make_unique<NpyWriter>(path, grid, options.ids, std::move(*output));
+  auto writer = std::make_unique<NpyWriter>(path, grid, options, std::move(*output));
   if (Result<void> begun = writer->begin(); !begun) return tl::unexpected(begun.error());
   return writer;
 }

@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "hashbuffer/formats/npy_head.h"
+#include "voxelize/arrays/npy_voxels.h"
 #include "voxelize/output/block_output.h"
 #include "voxelize/output/deflated_layers.h"
 #include "voxelize/output/dense_rows.h"
@@ -103,9 +104,10 @@ struct Entry {
 
 class NpzWriter final : public SlabWriter {
  public:
-  NpzWriter(const std::string& path, const VoxelGrid& grid, std::uint32_t ids, BlockOutput output)
+  NpzWriter(const std::string& path, const VoxelGrid& grid, const VoxelWriterOptions& options,
+            BlockOutput output)
       : SlabWriter(path, grid, Axis::kX),
-        values_(ids),
+        values_(options),
         output_(std::move(output)),
         layers_(grid, values_) {}
 
@@ -133,7 +135,7 @@ class NpzWriter final : public SlabWriter {
     voxels.wide = voxels.bytes >= std::uint64_t{1} << 31;  // ten bits a byte at the most
     voxels.offset = output_.position();
     Bytes deflated;
-    RunDeflater deflater(values_.kind, values_.bytes);
+    RunDeflater deflater(values_.codes, values_.bytes);
     deflater.begin(deflated, false);
     for (const char letter : head) deflater.byte(static_cast<std::uint8_t>(letter));
     deflater.end();
@@ -203,7 +205,7 @@ VoxelWriterResult open_npz_writer(const std::string& path, const VoxelGrid& grid
                                   const VoxelWriterOptions& options) {
   Result<BlockOutput> output = BlockOutput::create(path);
   if (!output) return tl::unexpected(output.error());
-  auto writer = std::make_unique<NpzWriter>(path, grid, options.ids, std::move(*output));
+  auto writer = std::make_unique<NpzWriter>(path, grid, options, std::move(*output));
   if (Result<void> begun = writer->begin(); !begun) return tl::unexpected(begun.error());
   return writer;
 }

@@ -1,5 +1,5 @@
-// NRRD, version 4 (Kindlmann, teem.sourceforge.net/nrrd/format.html): attached header, unsigned, x
-// fastest, gzip. Voxels are cells; "space origin" is the centre of the first one, as the format
+// NRRD, version 4 (Kindlmann, teem.sourceforge.net/nrrd/format.html): attached header, x fastest,
+// gzip. Voxels are cells; "space origin" is the centre of the first one, as the format
 // has it. The gzip stream is one member, made of pieces that threads deflate apart, a layer each.
 
 #include <fmt/core.h>
@@ -26,26 +26,34 @@ std::string one_line(std::string text) {
   return text;
 }
 
+std::string type_name(const DenseValues& values) {
+  if (values.is_float()) return "float";
+  return fmt::format("uint{}", values.number_bits());
+}
+
 class NrrdWriter final : public SlabWriter {
  public:
-  NrrdWriter(const std::string& path, const VoxelGrid& grid, std::uint32_t ids, BlockOutput output)
+  NrrdWriter(const std::string& path, const VoxelGrid& grid, const VoxelWriterOptions& options,
+             BlockOutput output)
       : SlabWriter(path, grid, Axis::kX),
-        values_(ids),
+        values_(options),
         output_(std::move(output)),
         layers_(grid, values_) {}
 
   Result<void> begin(const std::string& name) {
     const VoxelGrid& g = grid();
     const glm::dvec3 centre = g.origin + 0.5 * g.voxel_size;
+    const bool colours = values_.kind == DenseValues::Kind::kColours;  // the fastest axis
     std::string header = fmt::format(
         "NRRD0004\n# Complete NRRD file format specification at:\n"
         "# http://teem.sourceforge.net/nrrd/format.html\n"
-        "content: {}\ntype: uint{}\n{}dimension: 3\nspace dimension: 3\nsizes: {} {} {}\n"
-        "space directions: ({},0,0) (0,{},0) (0,0,{})\nspace origin: ({},{},{})\n"
-        "centers: cell cell cell\nkinds: domain domain domain\nencoding: gzip\n\n",
-        one_line(name), 8 * values_.bytes, values_.bytes == 1 ? "" : "endian: little\n", g.dims.x,
-        g.dims.y, g.dims.z, g.voxel_size.x, g.voxel_size.y, g.voxel_size.z, centre.x, centre.y,
-        centre.z);
+        "content: {}\ntype: {}\n{}dimension: {}\nspace dimension: 3\nsizes: {}{} {} {}\n"
+        "space directions: {}({},0,0) (0,{},0) (0,0,{})\nspace origin: ({},{},{})\n"
+        "centers: {}cell cell cell\nkinds: {}domain domain domain\nencoding: gzip\n\n",
+        one_line(name), type_name(values_), values_.number_bits() == 8 ? "" : "endian: little\n",
+        colours ? 4 : 3, colours ? "4 " : "", g.dims.x, g.dims.y, g.dims.z, colours ? "none " : "",
+        g.voxel_size.x, g.voxel_size.y, g.voxel_size.z, centre.x, centre.y, centre.z,
+        colours ? "??? " : "", colours ? "RGBA-color " : "");
     // Magic, deflate, no flags, no time stamp, fastest, Unix (RFC 1952).
     header.append("\x1f\x8b\x08\x00\x00\x00\x00\x00\x04\x03", 10);
     return output_.append(header);
@@ -80,7 +88,7 @@ VoxelWriterResult open_nrrd_writer(const std::string& path, const VoxelGrid& gri
                                    const VoxelWriterOptions& options) {
   Result<BlockOutput> output = BlockOutput::create(path);
   if (!output) return tl::unexpected(output.error());
-  auto writer = std::make_unique<NrrdWriter>(path, grid, options.ids, std::move(*output));
+  auto writer = std::make_unique<NrrdWriter>(path, grid, options, std::move(*output));
   if (Result<void> begun = writer->begin(options.name); !begun) {
     return tl::unexpected(begun.error());
   }

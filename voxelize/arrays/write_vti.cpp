@@ -1,4 +1,5 @@
-// VTK XML image data (vtkXMLImageDataWriter), appended raw, one unsigned number a cell, x fastest.
+// VTK XML image data (vtkXMLImageDataWriter), appended raw, one number a cell (four of colours), x
+// fastest.
 // Cells, so that a voxel is a box: extent 0..n, origin at the corner of the grid. A layer is a zlib
 // block of vtkZLibDataCompressor; the table of their sizes stands before them and is filled in at
 // the end. A pipe cannot be filled in later, and gets the bytes as they are.
@@ -44,8 +45,9 @@ std::string xml_text(const std::string& text) {
 
 class VtiWriter final : public SlabWriter {
  public:
-  VtiWriter(const std::string& path, const VoxelGrid& grid, std::uint32_t ids, BlockOutput output)
-      : SlabWriter(path, grid, Axis::kX), values_(ids), output_(std::move(output)) {}
+  VtiWriter(const std::string& path, const VoxelGrid& grid, const VoxelWriterOptions& options,
+            BlockOutput output)
+      : SlabWriter(path, grid, Axis::kX), values_(options), output_(std::move(output)) {}
 
   Result<void> begin(const std::string& name) {
     const VoxelGrid& g = grid();
@@ -59,11 +61,12 @@ class VtiWriter final : public SlabWriter {
         "    <Piece Extent=\"{}\">\n"
         "      <PointData/>\n"
         "      <CellData Scalars=\"{}\">\n"
-        "        <DataArray type=\"UInt{}\" Name=\"{}\" format=\"appended\" offset=\"0\"/>\n"
+        "        <DataArray type=\"{}{}\" Name=\"{}\"{} format=\"appended\" offset=\"0\"/>\n"
         "      </CellData>\n    </Piece>\n  </ImageData>\n  <AppendedData encoding=\"raw\">\n_",
         compressed() ? " compressor=\"vtkZLibDataCompressor\"" : "", extent, g.origin.x, g.origin.y,
         g.origin.z, g.voxel_size.x, g.voxel_size.y, g.voxel_size.z, extent, title,
-        8 * values_.bytes, title);
+        values_.is_float() ? "Float" : "UInt", values_.number_bits(), title,
+        values_.components == 1 ? "" : " NumberOfComponents=\"4\"");
     if (Result<void> written = output_.append(header); !written) return written;
     table_position_ = output_.position();
     const std::uint64_t layer =
@@ -84,7 +87,7 @@ class VtiWriter final : public SlabWriter {
 
   Result<void> add_slab(const VoxelIntervals& slab, const Execution& execution) override {
     if (!compressed()) {
-      const RowBlocks blocks(slab, values_.bytes);
+      const RowBlocks blocks(slab, values_);
       return output_.append_blocks(
           execution, blocks.count(),
           [&](std::size_t index, Bytes& out, int) { blocks.make(index, out); });
@@ -93,9 +96,9 @@ class VtiWriter final : public SlabWriter {
     return output_.append_blocks(execution, layers, [&](std::size_t index, Bytes& out, int) {
       const int z = slab.v_begin() + static_cast<int>(index);
       out.clear();
-      RunDeflater deflater(values_.kind, values_.bytes);
+      RunDeflater deflater(values_.codes, values_.bytes);
       append_zlib_stream(deflater, out, [&](RunDeflater& to) {
-        emit_layer(slab, z, [&](std::uint32_t value, int length) {
+        emit_layer(slab, values_, z, [&](std::uint32_t value, int length) {
           to.run(value, static_cast<std::uint64_t>(length));
         });
       });
@@ -127,7 +130,7 @@ VoxelWriterResult open_vti_writer(const std::string& path, const VoxelGrid& grid
                                   const VoxelWriterOptions& options) {
   Result<BlockOutput> output = BlockOutput::create(path);
   if (!output) return tl::unexpected(output.error());
-  auto writer = std::make_unique<VtiWriter>(path, grid, options.ids, std::move(*output));
+  auto writer = std::make_unique<VtiWriter>(path, grid, options, std::move(*output));
   if (Result<void> begun = writer->begin(options.name); !begun) {
     return tl::unexpected(begun.error());
   }

@@ -20,13 +20,26 @@ std::string meant_format(std::string_view text) {
   return did_you_mean(text, names);
 }
 
-std::string format_names() {
+template <class Holds>
+std::string names_of_those_that(Holds&& holds) {
   std::string names;
   for (const VoxelFormat& format : voxel_formats()) {
+    if (!holds(format)) continue;
     names += names.empty() ? "" : ", ";
     names += format.name;
   }
   return names;
+}
+
+std::string format_names() {
+  return names_of_those_that([](const VoxelFormat&) { return true; });
+}
+
+std::string_view default_name(const VoxelWriterOptions& options) {
+  if (options.band != 0) return "distance";
+  if (options.rgba) return "colours";
+  if (options.fog != 0) return "density";
+  return options.ids != 0 ? "ids" : "solid";
 }
 
 VoxelWriterResult open_format(const std::string& path, const std::string& name,
@@ -49,22 +62,64 @@ const std::vector<VoxelFormat>& voxel_formats() {
   constexpr std::uint32_t kAnyId = 0x7fffffff;
   constexpr std::uint32_t kFloatIds = 1 << 24;  // that a float counts
   static const std::vector<VoxelFormat> kFormats = {
-      {"vdb", ".vdb", "OpenVDB: bool, or float (fog volume, ids); world transform", Axis::kZ, 0,
-       kFloatIds, true},
-      {"npy", ".npy", "NumPy: bool array indexed [x, y, z]; ids", Axis::kX, 0, kAnyId},
-      {"npz", ".npz", "NumPy: arrays voxels (as .npy, deflated), origin, spacing; ids", Axis::kX, 0,
-       kAnyId},
-      {"nrrd", ".nrrd", "NRRD: uint8, gzip; world transform; ids", Axis::kX, 0, kAnyId, true},
-      {"vti", ".vti", "VTK image data: uint8 cells, zlib; world transform; ids", Axis::kX, 0,
-       kAnyId, true},
-      {"binvox", ".binvox", "binvox: run lengths; cubic voxels in a cube, world transform",
-       Axis::kY},
-      {"vox", ".vox", "MagicaVoxel: up to 2000 voxels a side; colours of scenes, ids", Axis::kZ,
-       kVoxColours, kVoxColours},
-      {"png", "/", "folder of 1-bit PNG slices, one per layer of z, and slices.json; ids", Axis::kX,
-       0, 0xffff},
-      {"zarr", ".zarr/", "folder: Zarr 2 array, uint8, zlib; world transform; ids", Axis::kZ, 0,
-       kAnyId},
+      {.name = "vdb",
+       .extension = ".vdb",
+       .description = "OpenVDB: bool, or float (fog volume, ids); world transform",
+       .ids = kFloatIds,
+       .named = true,
+       .shares = true},
+      {.name = "npy",
+       .extension = ".npy",
+       .description = "NumPy: bool array indexed [x, y, z]; ids",
+       .axis = Axis::kX,
+       .ids = kAnyId,
+       .shares = true,
+       .rgba = true},
+      {.name = "npz",
+       .extension = ".npz",
+       .description = "NumPy: arrays voxels (as .npy, deflated), origin, spacing; ids",
+       .axis = Axis::kX,
+       .ids = kAnyId,
+       .shares = true,
+       .rgba = true},
+      {.name = "nrrd",
+       .extension = ".nrrd",
+       .description = "NRRD: uint8, gzip; world transform; ids",
+       .axis = Axis::kX,
+       .ids = kAnyId,
+       .named = true,
+       .shares = true,
+       .rgba = true},
+      {.name = "vti",
+       .extension = ".vti",
+       .description = "VTK image data: uint8 cells, zlib; world transform; ids",
+       .axis = Axis::kX,
+       .ids = kAnyId,
+       .named = true,
+       .shares = true,
+       .rgba = true},
+      {.name = "binvox",
+       .extension = ".binvox",
+       .description = "binvox: run lengths; cubic voxels in a cube, world transform",
+       .axis = Axis::kY},
+      {.name = "vox",
+       .extension = ".vox",
+       .description = "MagicaVoxel: up to 2000 voxels a side; colours of scenes, ids",
+       .colours = kVoxColours,
+       .ids = kVoxColours},
+      {.name = "png",
+       .extension = "/",
+       .description = "folder of 1-bit PNG slices, one per layer of z, and slices.json; ids",
+       .axis = Axis::kX,
+       .ids = 0xffff,
+       .shares = true,
+       .rgba = true},
+      {.name = "zarr",
+       .extension = ".zarr/",
+       .description = "folder: Zarr 2 array, uint8, zlib; world transform; ids",
+       .ids = kAnyId,
+       .shares = true,
+       .rgba = true},
   };
   return kFormats;
 }
@@ -109,18 +164,48 @@ Result<VoxelFormat> voxel_format_for(const std::string& path, const std::string&
 
 Result<void> check_ids(const VoxelFormat& format, std::uint32_t largest) {
   if (largest <= format.ids) return {};
-  std::string names;
-  for (const VoxelFormat& candidate : voxel_formats()) {
-    if (candidate.ids < largest) continue;
-    names += names.empty() ? "" : ", ";
-    names += candidate.name;
-  }
+  const std::string names =
+      names_of_those_that([&](const VoxelFormat& other) { return other.ids >= largest; });
   if (format.ids == 0) {
     return fail(ErrorCode::kUsage, "format {} cannot store ids; {} can", format.name, names);
   }
   return fail(ErrorCode::kUsage,
               "format {} stores ids up to {}, but they reach {}; {} can store them", format.name,
               format.ids, largest, names);
+}
+
+Result<void> check_values(const VoxelFormat& format, const VoxelWriterOptions& options) {
+  if (Result<void> held = check_ids(format, options.ids); !held) return held;
+  struct Values {
+    bool asked, held;
+    bool VoxelFormat::*member;
+    std::string_view name;
+  };
+  const Values kinds[] = {
+      {options.fog != 0, format.shares, &VoxelFormat::shares, "filled shares of voxels (fog)"},
+      {options.rgba, format.rgba, &VoxelFormat::rgba, "colours of single voxels"},
+      {options.band != 0, format.distances, &VoxelFormat::distances, "distances"}};
+  int asked = int{options.ids != 0} + int{options.mask};
+  for (const Values& kind : kinds) {
+    asked += int{kind.asked};
+    if (!kind.asked || kind.held) continue;
+    return fail(ErrorCode::kUsage, "format {} holds no {}; {} can", format.name, kind.name,
+                names_of_those_that([&](const VoxelFormat& other) { return other.*kind.member; }));
+  }
+  if (options.mask && format.name != "vdb") {
+    return fail(ErrorCode::kUsage, "a mask needs format vdb, got {}", format.name);
+  }
+  if (asked > 1) {
+    return fail(ErrorCode::kUsage,
+                "values of voxels are ids, shares (fog), colours, distances or a mask, got {} of "
+                "these",
+                asked);
+  }
+  if (options.colours.size() > format.colours) {
+    return fail(ErrorCode::kUsage, "{} colours; format {} stores {}", options.colours.size(),
+                format.name, format.colours);
+  }
+  return {};
 }
 
 Result<std::unique_ptr<VoxelWriter>> open_voxel_writer(const std::string& path,
@@ -130,25 +215,12 @@ Result<std::unique_ptr<VoxelWriter>> open_voxel_writer(const std::string& path,
   const Result<VoxelFormat> chosen = voxel_format_for(path, format);
   if (!chosen) return tl::unexpected(chosen.error());
   if (Result<void> valid = check_grid(grid); !valid) return tl::unexpected(valid.error());
-  if (Result<void> held = check_ids(*chosen, options.ids); !held) {
-    return tl::unexpected(held.error());
-  }
-  const bool fog = options.fog != 0;
-  if ((fog || options.mask) && chosen->name != "vdb") {
-    return fail(ErrorCode::kUsage, "{}: a {} needs format vdb, got {}", path,
-                fog ? "fog volume" : "mask", chosen->name);
-  }
-  if (int{options.ids != 0} + int{fog} + int{options.mask} > 1) {
-    return fail(ErrorCode::kUsage, "{}: a {} cannot store {}", path, fog ? "fog volume" : "mask",
-                options.ids != 0 ? "ids" : "numbers");
-  }
-  if (options.colours.size() > chosen->colours) {
-    return fail(ErrorCode::kUsage, "{}: {} colours; format {} stores {}", path,
-                options.colours.size(), chosen->name, chosen->colours);
+  if (Result<void> held = check_values(*chosen, options); !held) {
+    return fail(held.error().code, "{}: {}", path, held.error().message);
   }
   try {
     VoxelWriterOptions named = options;
-    if (named.name.empty()) named.name = fog ? "density" : options.ids != 0 ? "ids" : "solid";
+    if (named.name.empty()) named.name = std::string(default_name(options));
     return open_format(path, chosen->name, grid, named);
   } catch (const std::bad_alloc&) {
     return fail(ErrorCode::kLimit, "{}: out of memory for a grid of {} x {} x {}", path,

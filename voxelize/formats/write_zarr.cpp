@@ -1,7 +1,7 @@
-// A Zarr version 2 array (zarr.readthedocs.io/en/stable/spec/v2.html): shape (nx, ny, nz), C order,
-// unsigned, chunks of 64^3 that zlib reads, a file each and none for an empty chunk. Chunks at the
-// border are whole, as the format wants it; what lies outside is 0. The world transform stands in
-// the attributes.
+// A Zarr version 2 array (zarr.readthedocs.io/en/stable/spec/v2.html): shape (nx, ny, nz), of
+// colours (nx, ny, nz, 4), C order, chunks of 64^3 that zlib reads, a file each and none for an
+// empty chunk. Chunks at the border are whole, as the format wants it; what lies outside is 0. The
+// world transform stands in the attributes.
 
 #include <fmt/core.h>
 
@@ -25,8 +25,9 @@ constexpr std::uint32_t kChunkVoxels = std::uint32_t{kChunkSide} * kChunkSide * 
 
 class ZarrWriter final : public SlabWriter {
  public:
-  ZarrWriter(const std::string& path, const VoxelGrid& grid, std::uint32_t ids, FolderOutput folder)
-      : SlabWriter(path, grid, Axis::kZ), values_(ids), folder_(std::move(folder)) {
+  ZarrWriter(const std::string& path, const VoxelGrid& grid, const VoxelWriterOptions& options,
+             FolderOutput folder)
+      : SlabWriter(path, grid, Axis::kZ), values_(options), folder_(std::move(folder)) {
     RunDeflater deflater(RunBytes::kFlags);
     append_zlib_stream(deflater, full_chunk_, [](RunDeflater& to) { to.run(1, kChunkVoxels); });
   }
@@ -70,12 +71,13 @@ class ZarrWriter final : public SlabWriter {
       const std::uint32_t voxels = scratch.voxels[static_cast<std::size_t>(chunk)];
       if (voxels == 0) continue;
       const Bytes* bytes = &full_chunk_;
-      if (voxels != kChunkVoxels || values_.kind != RunBytes::kFlags) {
+      if (voxels != kChunkVoxels || values_.kind != DenseValues::Kind::kFlags) {
         make_chunk(tile, chunk, scratch);
         bytes = &scratch.bytes;
       }
-      Result<void> written = folder_.write(fmt::format("{}.{}.{}", chunk_x, chunk_y, chunk),
-                                           bytes->data(), bytes->size());
+      Result<void> written = folder_.write(
+          fmt::format("{}.{}.{}{}", chunk_x, chunk_y, chunk, values_.components == 1 ? "" : ".0"),
+          bytes->data(), bytes->size());
       if (!written) return written;
     }
     return {};
@@ -84,7 +86,7 @@ class ZarrWriter final : public SlabWriter {
   void make_chunk(const VoxelIntervals::TileView& tile, int chunk, Scratch& scratch) const {
     const int begin = chunk * kChunkSide, end = begin + kChunkSide;
     scratch.bytes.clear();
-    RunDeflater deflater(values_.kind, values_.bytes);
+    RunDeflater deflater(values_.codes, values_.bytes);
     append_zlib_stream(deflater, scratch.bytes, [&](RunDeflater& to) {
       const auto run = [&to](std::uint32_t value, int length) {
         if (length > 0) to.run(value, static_cast<std::uint64_t>(length));
@@ -100,7 +102,8 @@ class ZarrWriter final : public SlabWriter {
             const int last = std::min(tile.items[next].end(), end);
             if (last > first) {
               run(0, first - done);
-              run(tile.label(next), last - first);
+              run(tile.labels.empty() ? values_.unlabelled() : values_.bits_of(tile.labels[next]),
+                  last - first);
               done = last;
             }
             if (tile.items[next].end() > end) break;  // goes on in the next chunk
@@ -115,19 +118,21 @@ class ZarrWriter final : public SlabWriter {
     const VoxelGrid& g = grid();
     const glm::dvec3 size = g.voxel_size, centre = g.origin + 0.5 * size;
     const std::string array = fmt::format(
-        "{{\n  \"chunks\": [{0}, {0}, {0}],\n  \"compressor\": {{\"id\": \"zlib\", \"level\": "
+        "{{\n  \"chunks\": [{0}, {0}, {0}{7}],\n  \"compressor\": {{\"id\": \"zlib\", \"level\": "
         "1}},\n"
-        "  \"dtype\": \"{4}u{5}\",\n  \"fill_value\": 0,\n  \"filters\": null,\n  \"order\": "
+        "  \"dtype\": \"{4}{6}{5}\",\n  \"fill_value\": 0,\n  \"filters\": null,\n  \"order\": "
         "\"C\",\n"
-        "  \"shape\": [{1}, {2}, {3}],\n  \"zarr_format\": 2\n}}\n",
-        kChunkSide, g.dims.x, g.dims.y, g.dims.z, values_.bytes == 1 ? '|' : '<', values_.bytes);
+        "  \"shape\": [{1}, {2}, {3}{7}],\n  \"zarr_format\": 2\n}}\n",
+        kChunkSide, g.dims.x, g.dims.y, g.dims.z, values_.number_bits() == 8 ? '|' : '<',
+        values_.number_bits() / 8, values_.is_float() ? 'f' : 'u',
+        values_.components == 1 ? "" : ", 4");
     const std::string attributes = fmt::format(
-        "{{\n  \"axes\": [\"x\", \"y\", \"z\"],\n  \"origin\": [{}, {}, {}],\n"
+        "{{\n  \"axes\": [\"x\", \"y\", \"z\"{}],\n  \"origin\": [{}, {}, {}],\n"
         "  \"voxel_size\": [{}, {}, {}],\n"
         "  \"world_from_index\": [[{}, 0, 0, {}], [0, {}, 0, {}], [0, 0, {}, {}], [0, 0, 0, 1]]\n"
         "}}\n",
-        g.origin.x, g.origin.y, g.origin.z, size.x, size.y, size.z, size.x, centre.x, size.y,
-        centre.y, size.z, centre.z);
+        values_.components == 1 ? "" : ", \"c\"", g.origin.x, g.origin.y, g.origin.z, size.x,
+        size.y, size.z, size.x, centre.x, size.y, centre.y, size.z, centre.z);
     for (const auto& [name, text] : {std::pair{".zarray", &array}, {".zattrs", &attributes}}) {
       if (Result<void> written = folder_.write(name, text->data(), text->size()); !written) {
         return written;
@@ -148,7 +153,7 @@ VoxelWriterResult open_zarr_writer(const std::string& path, const VoxelGrid& gri
                                    const VoxelWriterOptions& options) {
   Result<FolderOutput> folder = FolderOutput::create(path);
   if (!folder) return tl::unexpected(folder.error());
-  return std::make_unique<ZarrWriter>(path, grid, options.ids, std::move(*folder));
+  return std::make_unique<ZarrWriter>(path, grid, options, std::move(*folder));
 }
 
 }  // namespace strata

@@ -1,8 +1,8 @@
 // A folder of PNG slices (PNG, second edition, ISO/IEC 15948:2004), one 1-bit grey picture a layer
-// of z, of 8 or 16 bits for ids. The first row is the greatest y, so that a picture shows the layer
-// as seen from above (+z), upright and not mirrored. Made from the runs: libpng, whose deflate
-// looks at every byte, takes 0.4 ms a layer of 1024 x 1024 at its fastest setting, this a tenth of
-// it and less.
+// of z, of 8 or 16 bits for ids, 8 for shares, RGBA for colours. The first row is the greatest y,
+// so that a picture shows the layer as seen from above (+z), upright and not mirrored. Made from
+// the runs: libpng, whose deflate looks at every byte, takes 0.4 ms a layer of 1024 x 1024 at its
+// fastest setting, this a tenth of it and less.
 
 #include <zlib.h>
 
@@ -53,22 +53,33 @@ void emit_row(RunDeflater& deflater, std::span<const Interval> row, int row_byte
 }
 
 // A pixel a value; 16 bits have the higher byte first.
-void emit_ids(RunDeflater& deflater, const VoxelIntervals& slab, int y, int z, bool wide) {
+void emit_values(RunDeflater& deflater, const VoxelIntervals& slab, const DenseValues& values,
+                 int y, int z) {
   deflater.byte(kNoFilter);
   int done = 0;
-  for_each_labelled(slab, y, z, [&](const Interval& interval, std::uint32_t id) {
+  const bool wide = values.bytes == 2;
+  for_each_value(slab, values, y, z, [&](const Interval& interval, std::uint32_t value) {
     deflater.run(0, static_cast<std::uint64_t>(interval.begin() - done));
-    deflater.run(wide ? (id >> 8 | (id & 0xff) << 8) : id,
+    deflater.run(wide ? (value >> 8 | (value & 0xff) << 8) : value,
                  static_cast<std::uint64_t>(interval.length()));
     done = interval.end();
   });
   deflater.run(0, static_cast<std::uint64_t>(slab.grid().dims.x - done));
 }
 
+// Pictures hold no floats.
+VoxelWriterOptions bytes_of_shares(VoxelWriterOptions options) {
+  options.fog_floats = false;
+  return options;
+}
+
 class PngWriter final : public SlabWriter {
  public:
-  PngWriter(const std::string& path, const VoxelGrid& grid, std::uint32_t ids, FolderOutput folder)
-      : SlabWriter(path, grid, Axis::kX), values_(ids), folder_(std::move(folder)) {}
+  PngWriter(const std::string& path, const VoxelGrid& grid, const VoxelWriterOptions& options,
+            FolderOutput folder)
+      : SlabWriter(path, grid, Axis::kX),
+        values_(bytes_of_shares(options)),
+        folder_(std::move(folder)) {}
 
  private:
   Result<void> add_slab(const VoxelIntervals& slab, const Execution& execution) override {
@@ -86,9 +97,10 @@ class PngWriter final : public SlabWriter {
     PngChunks png(out, [](const void* data, std::size_t bytes) {
       return static_cast<std::uint32_t>(crc32_z(0, static_cast<const Bytef*>(data), bytes));
     });
-    const bool flags = values_.kind == RunBytes::kFlags;
-    constexpr unsigned kGrey = 0;
-    png.header(dims().x, dims().y, flags ? 1 : 8 * static_cast<unsigned>(values_.bytes), kGrey);
+    const bool flags = values_.kind == DenseValues::Kind::kFlags;
+    constexpr unsigned kGrey = 0, kRgba = 6;
+    png.header(dims().x, dims().y, flags ? 1 : static_cast<unsigned>(values_.number_bits()),
+               values_.kind == DenseValues::Kind::kColours ? kRgba : kGrey);
     png.begin("IDAT");
     RunDeflater deflater(flags ? RunBytes::kBits : RunBytes::kIds, values_.bytes);
     append_zlib_stream(deflater, out, [&](RunDeflater& to) {
@@ -97,7 +109,7 @@ class PngWriter final : public SlabWriter {
         if (flags) {
           emit_row(to, slab.column(y, z), row_bytes);
         } else {
-          emit_ids(to, slab, y, z, values_.bytes == 2);
+          emit_values(to, slab, values_, y, z);
         }
       }
     });
@@ -117,7 +129,7 @@ class PngWriter final : public SlabWriter {
         "  {}\n}}\n",
         g.dims.x, g.dims.y, g.dims.z, g.origin.x, g.origin.y, g.origin.z, g.voxel_size.x,
         g.voxel_size.y, g.voxel_size.z,
-        values_.kind == RunBytes::kFlags ? "\"solid\": 1" : "\"outside\": 0");
+        values_.kind == DenseValues::Kind::kFlags ? "\"solid\": 1" : "\"outside\": 0");
     if (Result<void> written = folder_.write("slices.json", json.data(), json.size()); !written) {
       return written;
     }
@@ -135,7 +147,7 @@ VoxelWriterResult open_png_writer(const std::string& path, const VoxelGrid& grid
                                   const VoxelWriterOptions& options) {
   Result<FolderOutput> folder = FolderOutput::create(path);
   if (!folder) return tl::unexpected(folder.error());
-  return std::make_unique<PngWriter>(path, grid, options.ids, std::move(*folder));
+  return std::make_unique<PngWriter>(path, grid, options, std::move(*folder));
 }
 
 }  // namespace strata

@@ -22,7 +22,7 @@ namespace strata {
 class LayerCrc {
  public:
   LayerCrc(int length, int rows, const DenseValues& values)
-      : length_(static_cast<std::size_t>(length)) {
+      : values_(values), length_(static_cast<std::size_t>(length)) {
     uLong zeros = 0;
     for (int bit = 0; bit < values.bits; ++bit) {
       const std::uint32_t zero = 0, one = std::uint32_t{1} << bit;
@@ -52,7 +52,7 @@ class LayerCrc {
     for (int y = 0; y < slab.columns(); ++y) {
       sum = next_row_[0][sum & 0xff] ^ next_row_[1][sum >> 8 & 0xff] ^
             next_row_[2][sum >> 16 & 0xff] ^ next_row_[3][sum >> 24];
-      for_each_labelled(slab, y, z, [&](const Interval& interval, std::uint32_t value) {
+      for_each_value(slab, values_, y, z, [&](const Interval& interval, std::uint32_t value) {
         const std::size_t from = length_ - static_cast<std::size_t>(interval.begin());
         const std::size_t to = length_ - static_cast<std::size_t>(interval.end());
         for (; value != 0; value &= value - 1) {
@@ -65,6 +65,7 @@ class LayerCrc {
   }
 
  private:
+  DenseValues values_;
   std::size_t length_;
   std::vector<std::vector<std::uint32_t>> tails_;  // by bit: of so many ones at the end of a row
   std::array<std::array<std::uint32_t, 256>, 4> next_row_;
@@ -91,9 +92,9 @@ class DeflatedLayers {
         output.append_blocks(execution, crcs.size(), [&](std::size_t index, Bytes& out, int) {
           const int z = slab.v_begin() + static_cast<int>(index);
           out.clear();
-          RunDeflater deflater(values_.kind, values_.bytes);
+          RunDeflater deflater(values_.codes, values_.bytes);
           deflater.begin(out, false);
-          emit_layer(slab, z, [&](std::uint32_t value, int length) {
+          emit_layer(slab, values_, z, [&](std::uint32_t value, int length) {
             deflater.run(value, static_cast<std::uint64_t>(length));
           });
           deflater.end();

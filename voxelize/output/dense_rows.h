@@ -1,41 +1,25 @@
 #pragma once
 
 #include <algorithm>
-#include <bit>
 #include <cstdint>
 #include <cstring>
 
-#include "hashbuffer/formats/npy_head.h"
 #include "strata/voxelize/intervals.h"
 #include "voxelize/output/block_output.h"
-#include "voxelize/output/run_deflate.h"
+#include "voxelize/output/dense_values.h"
 
 namespace strata {
 
 /// Slabs of x intervals as one value a voxel, 0 outside, x fastest, then y, then z: the order of
 /// .npy, .nrrd and .vti. A layer is one z. (Internal to voxelize/.)
 
-/// What stands for a voxel: flags in a byte, or the ids up to a largest one, little-endian.
-struct DenseValues {
-  explicit DenseValues(std::uint32_t largest_id)
-      : bytes(largest_id <= 0xff     ? 1
-              : largest_id <= 0xffff ? 2
-                                     : 4),
-        bits(largest_id == 0 ? 1 : static_cast<int>(std::bit_width(largest_id))),
-        kind(largest_id == 0 ? RunBytes::kFlags : RunBytes::kIds) {}
-  std::size_t bytes;
-  int bits;  ///< of the largest value
-  RunBytes kind;
-};
-
-static_assert(std::endian::native == std::endian::little, "values are copied as they are");
-
 /// The rows of a slab in blocks of about a megabyte.
 class RowBlocks {
  public:
-  RowBlocks(const VoxelIntervals& slab, std::size_t value_bytes)
+  RowBlocks(const VoxelIntervals& slab, const DenseValues& values)
       : slab_(slab),
-        bytes_(value_bytes),
+        values_(values),
+        bytes_(values.bytes),
         length_(static_cast<std::size_t>(slab.grid().dims.x)),
         rows_(static_cast<std::size_t>(slab.columns()) *
               static_cast<std::size_t>(slab.v_end() - slab.v_begin())),
@@ -51,8 +35,9 @@ class RowBlocks {
     std::byte* to = out.data();
     const auto columns = static_cast<std::size_t>(slab_.columns());
     for (std::size_t row = first; row < last; ++row, to += length_ * bytes_) {
-      for_each_labelled(
-          slab_, static_cast<int>(row % columns), slab_.v_begin() + static_cast<int>(row / columns),
+      for_each_value(
+          slab_, values_, static_cast<int>(row % columns),
+          slab_.v_begin() + static_cast<int>(row / columns),
           [&](const Interval& interval, std::uint32_t value) { fill(to, interval, value); });
     }
   }
@@ -72,31 +57,23 @@ class RowBlocks {
   }
 
   const VoxelIntervals& slab_;
+  const DenseValues& values_;
   std::size_t bytes_, length_, rows_, rows_a_block_;
 };
 
 /// Gives the values of layer z of a slab as runs: run(value, length), row by row.
 template <class Run>
-void emit_layer(const VoxelIntervals& slab, int z, Run&& run) {
+void emit_layer(const VoxelIntervals& slab, const DenseValues& values, int z, Run&& run) {
   const int length = slab.grid().dims.x;
   for (int y = 0; y < slab.columns(); ++y) {
     int done = 0;
-    for_each_labelled(slab, y, z, [&](const Interval& interval, std::uint32_t value) {
+    for_each_value(slab, values, y, z, [&](const Interval& interval, std::uint32_t value) {
       if (interval.begin() > done) run(std::uint32_t{0}, interval.begin() - done);
       run(value, interval.length());
       done = interval.end();
     });
     if (length > done) run(std::uint32_t{0}, length - done);
   }
-}
-
-/// The head of a .npy file of voxels, x fastest.
-inline std::string npy_head(const DenseValues& values, const glm::ivec3& dims) {
-  const char* type = values.kind == RunBytes::kFlags ? "|b1"
-                     : values.bytes == 1             ? "|u1"
-                     : values.bytes == 2             ? "<u2"
-                                                     : "<u4";
-  return npy_head(type, true, fmt::format("({}, {}, {})", dims.x, dims.y, dims.z));
 }
 
 }  // namespace strata

@@ -27,6 +27,9 @@ struct VoxelFormat {
   std::size_t colours = 0;  ///< most colours in a file, one per voxel; 0: none
   std::uint32_t ids = 0;    ///< the largest id that a voxel can have; 0: no ids
   bool named = false;       ///< holds the name of the grid
+  bool shares = false;      ///< holds VoxelWriterOptions::fog
+  bool rgba = false;        ///< holds VoxelWriterOptions::rgba
+  bool distances = false;   ///< holds VoxelWriterOptions::band
 };
 
 /// The formats this build can write.
@@ -34,7 +37,7 @@ struct VoxelFormat {
 
 /// Opens a writer for `path` ("-": standard output). The format is `format`, or if that is empty
 /// the path's extension. @return kUsage: unknown format, unknown extension, a folder format on
-/// standard output, a grid, ids or colours the format cannot hold, fog, mask and ids together;
+/// standard output, a grid or values that the format cannot hold, values of two kinds;
 /// kOutput: the file or folder cannot be made.
 Result<std::unique_ptr<VoxelWriter>> open_voxel_writer(const std::string& path,
                                                        const std::string& format,
@@ -52,6 +55,9 @@ Result<VoxelFormat> voxel_format_for(const std::string& path, const std::string&
 
 /// Checks that a format can store ids up to `largest`. @return kUsage naming those that can
 Result<void> check_ids(const VoxelFormat& format, std::uint32_t largest);
+/// Checks that a format holds what `options` say the values are. @return kUsage naming the formats
+/// that do
+Result<void> check_values(const VoxelFormat& format, const VoxelWriterOptions& options);
 
 /// The largest memory that a job is expected to hold, in bytes.
 struct MemoryEstimate {

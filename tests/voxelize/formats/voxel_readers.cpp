@@ -54,6 +54,20 @@ Vector vector_of(std::string text) {
   return value;
 }
 
+/// The sizes along x, y, z; of colours a 4 stands before or after them.
+glm::ivec3 sizes_of(std::string text, bool colours, bool colours_first = true) {
+  if (!colours) return vector_of<glm::ivec3>(text);
+  for (char& letter : text) {
+    if (letter == ',') letter = ' ';
+  }
+  std::istringstream stream(text);
+  std::vector<int> sizes;
+  for (int size = 0; stream >> size;) sizes.push_back(size);
+  require(sizes.size() == 4 && sizes[colours_first ? 0 : 3] == 4, "sizes of colours: " + text);
+  const std::size_t x = colours_first ? 1 : 0;
+  return {sizes[x], sizes[x + 1], sizes[x + 2]};
+}
+
 template <class T>
 T number_at(const std::string& data, std::size_t position) {
   require(position + sizeof(T) <= data.size(), "truncated");
@@ -107,10 +121,14 @@ ReadVoxels parse_npy(const std::string& data) {
   const std::string header = data.substr(10, length);
   require(header.ends_with('\n'), "end of header");
   const std::string type = match(header, "'descr': '([^']*)'");
-  require(type == "|b1" || type == "|u1" || type == "<u2" || type == "<u4", "type");
+  require(type == "|b1" || type == "|u1" || type == "<u2" || type == "<u4" || type == "<f4",
+          "type");
   require(match(header, "'fortran_order': (\\w+)") == "True", "order");
-  auto voxels = of_size(vector_of<glm::ivec3>(match(header, "'shape': \\(([^)]*)\\)")));
-  voxels.id_bits = 8 * (type[2] - '0');
+  const std::string shape = match(header, "'shape': \\(([^)]*)\\)");
+  const bool colours = shape.starts_with("4, ") && std::count(shape.begin(), shape.end(), ',') == 3;
+  auto voxels = of_size(sizes_of(shape, colours));
+  voxels.id_bits = 8 * (type[2] - '0') * (colours ? 4 : 1);
+  voxels.floats = type == "<f4";
   if (type == "|b1") voxels.id_bits = 8;
   take_dense(voxels, data.substr(10 + std::size_t{length}));
   return voxels;
@@ -195,19 +213,25 @@ ReadVoxels read_nrrd(const std::string& path) {
   const std::size_t end = data.find("\n\n");
   require(end != std::string::npos, "end of header");
   const std::string header = data.substr(0, end + 1);
-  const std::string type = match(header, "\ntype: uint(.*)\n");
-  require(type == "8" || match(header, "\nendian: (.*)\n") == "little", "endian");
+  const std::string type = match(header, "\ntype: (.*)\n");
+  require(type == "uint8" || match(header, "\nendian: (.*)\n") == "little", "endian");
   require(match(header, "\nencoding: (.*)\n") == "gzip", "encoding");
-  auto voxels = of_size(vector_of<glm::ivec3>(match(header, "\nsizes: (.*)\n")));
+  const bool colours = match(header, "\ndimension: (.*)\n") == "4";
+  auto voxels = of_size(sizes_of(match(header, "\nsizes: (.*)\n"), colours));
+  require(match(header, "\nkinds: (.*)\n") ==
+              (colours ? "RGBA-color domain domain domain" : "domain domain domain"),
+          "kinds");
   std::smatch axes;
-  require(std::regex_search(header, axes,
-                            std::regex("space directions: \\(([^,]*),0,0\\) \\(0,([^,]*),0\\) "
-                                       "\\(0,0,([^)]*)\\)\n")),
+  require(std::regex_search(
+              header, axes,
+              std::regex("space directions: (?:none )?\\(([^,]*),0,0\\) \\(0,([^,]*),0\\) "
+                         "\\(0,0,([^)]*)\\)\n")),
           "space directions");
   voxels.voxel_size = glm::dvec3(std::stod(axes[1]), std::stod(axes[2]), std::stod(axes[3]));
   voxels.origin =
       vector_of<glm::dvec3>(match(header, "space origin: \\((.*)\\)")) - 0.5 * *voxels.voxel_size;
-  voxels.id_bits = std::stoi(type);
+  voxels.floats = type == "float";
+  voxels.id_bits = (voxels.floats ? 32 : std::stoi(match(type, "uint(.*)"))) * (colours ? 4 : 1);
   const std::size_t bytes = voxels.solid.size() * static_cast<std::size_t>(voxels.id_bits / 8);
   take_dense(voxels, inflate_all(data.substr(end + 2), 31, bytes));
   return voxels;
@@ -220,13 +244,15 @@ ReadVoxels read_vti(const std::string& path) {
   require(begin != std::string::npos, "appended data");
   const std::string header = data.substr(0, begin);
   require(match(header, "header_type=\"(\\w+)\"") == "UInt64", "header type");
-  const std::string type = match(header, "DataArray type=\"UInt(\\w+)\"");
+  const std::string type = match(header, "DataArray type=\"(\\w+)\"");
   std::istringstream extent(match(header, "WholeExtent=\"([^\"]*)\""));
   glm::ivec3 low, high;
   extent >> low.x >> high.x >> low.y >> high.y >> low.z >> high.z;
   require(extent && low == glm::ivec3(0), "extent");
   auto voxels = of_size(high);
-  voxels.id_bits = std::stoi(type);
+  voxels.floats = type == "Float32";
+  voxels.id_bits = std::stoi(match(type, "(?:UInt|Float)(.*)"));
+  if (header.find("NumberOfComponents=\"4\"") != std::string::npos) voxels.id_bits *= 4;
   voxels.origin = vector_of<glm::dvec3>(match(header, "Origin=\"([^\"]*)\""));
   voxels.voxel_size = vector_of<glm::dvec3>(match(header, "Spacing=\"([^\"]*)\""));
 
@@ -431,10 +457,13 @@ ReadVoxels read_vox(const std::string& path, glm::ivec3 dims) {
 
 namespace {
 
-// The values of an unfiltered grey picture of 8 or 16 bits, by hand: libpng may convert.
-void take_grey(const std::string& file, int k, ReadVoxels& voxels) {
+// The values of an unfiltered picture of grey of 8 or 16 bits, or RGBA, by hand: libpng may
+// convert.
+void take_values(const std::string& file, int k, ReadVoxels& voxels) {
   voxels.id_bits = file[24];
-  require(voxels.id_bits == 8 || voxels.id_bits == 16, "bits of grey");
+  const bool colours = file[25] == 6;
+  require(voxels.id_bits == 8 || (voxels.id_bits == 16 && !colours), "bits of a channel");
+  if (colours) voxels.id_bits = 32;
   const std::size_t data = file.find("IDAT");
   const auto byte = [&](std::size_t at) {
     return static_cast<std::uint32_t>(static_cast<unsigned char>(file[at]));
@@ -451,7 +480,8 @@ void take_grey(const std::string& file, int k, ReadVoxels& voxels) {
     for (int i = 0; i < voxels.dims.x; ++i) {
       std::uint32_t value = 0;
       for (std::size_t b = 0; b < bytes; ++b, ++at) {
-        value = value << 8 | static_cast<unsigned char>(rows[at]);
+        const std::uint32_t one = static_cast<unsigned char>(rows[at]);
+        value = colours ? value | one << 8 * b : value << 8 | one;
       }
       voxels.ids[voxels.index(i, j, k)] = value;
       voxels.solid[voxels.index(i, j, k)] = value != 0;
@@ -488,9 +518,9 @@ ReadVoxels read_png_folder(const std::string& path) {
     std::vector<png_byte> pixels(PNG_IMAGE_SIZE(image));
     require(png_image_finish_read(&image, nullptr, pixels.data(), 0, nullptr) != 0, image.message);
     require(image.warning_or_error == 0, image.message);
-    require(file[25] == 0, "grey");
+    require(file[25] == 0 || file[25] == 6, "grey or RGBA");
     if (file[24] != 1) {
-      take_grey(file, k, voxels);
+      take_values(file, k, voxels);
       continue;
     }
     for (int j = 0; j < voxels.dims.y; ++j) {
@@ -509,19 +539,23 @@ ReadVoxels read_zarr(const std::string& path) {
   const std::string array = testkit::bytes_of(path + "/.zarray");
   const std::string attributes = testkit::bytes_of(path + "/.zattrs");
   const std::string type = match(array, "\"dtype\": \"([^\"]*)\"");
-  require(type == "|u1" || type == "<u2" || type == "<u4", "type");
+  require(type == "|u1" || type == "<u2" || type == "<u4" || type == "<f4", "type");
   require(match(array, "\"order\": \"(.)\"") == "C", "order");
   require(match(array, "\"id\": \"(\\w+)\"") == "zlib", "compressor");
   require(match(array, "\"zarr_format\": (\\d)") == "2", "version");
-  auto voxels = of_size(vector_of<glm::ivec3>(match(array, "\"shape\": \\[([^\\]]*)\\]")));
-  voxels.id_bits = 8 * (type[2] - '0');
+  const std::string shape = match(array, "\"shape\": \\[([^\\]]*)\\]");
+  const bool colours = std::count(shape.begin(), shape.end(), ',') == 3;
+  auto voxels = of_size(sizes_of(shape, colours, false));
+  voxels.id_bits = 8 * (type[2] - '0') * (colours ? 4 : 1);
+  voxels.floats = type == "<f4";
   const std::size_t value_bytes = static_cast<std::size_t>(voxels.id_bits / 8);
-  const auto chunks = vector_of<glm::ivec3>(match(array, "\"chunks\": \\[([^\\]]*)\\]"));
+  const glm::ivec3 chunks = sizes_of(match(array, "\"chunks\": \\[([^\\]]*)\\]"), colours, false);
   voxels.origin = vector_of<glm::dvec3>(match(attributes, "\"origin\": \\[([^\\]]*)\\]"));
   voxels.voxel_size = vector_of<glm::dvec3>(match(attributes, "\"voxel_size\": \\[([^\\]]*)\\]"));
   for (const auto& entry : std::filesystem::directory_iterator(path)) {
     std::string name = entry.path().filename().string();
     if (name.starts_with('.')) continue;
+    require(!colours || name.ends_with(".0"), "name of a chunk of colours");
     std::replace(name.begin(), name.end(), '.', ' ');
     const glm::ivec3 corner = vector_of<glm::ivec3>(name) * chunks;
     const std::size_t bytes = volume(chunks) * value_bytes;

@@ -15,6 +15,7 @@ struct ReadVoxels {
   std::vector<std::uint8_t> solid;   // 0 or 1; x fastest, then y, then z
   std::vector<std::uint32_t> ids;    // the values, of files with ids and colours
   int id_bits = 0;                   // of such a value
+  bool floats = false;               // these bits are a float
   std::optional<glm::dvec3> origin;  // lower corner of the grid, if the format holds it
   std::optional<glm::dvec3> voxel_size;
 
