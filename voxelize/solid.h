@@ -27,18 +27,24 @@ class SolidVoxelizer {
   /// The intervals of rows [v_begin, v_end). v_begin is a multiple of kTileSide. Adds to `report`.
   Result<VoxelIntervals> slab(int v_begin, int v_end, const Execution& execution,
                               VoxelizeReport& report);
+  /// The filled part of voxels with options.rays x options.rays of the columns each, as labels.
+  /// @param voxels their grid @param v_begin of columns, as v_end; a multiple of kTileSide * rays
+  Result<VoxelIntervals> covered_slab(const VoxelGrid& voxels, int v_begin, int v_end,
+                                      const Execution& execution, VoxelizeReport& report);
 
   [[nodiscard]] const RasterTarget& target() const { return target_; }
 
  private:
   struct Worker;
+  struct Output;
   template <class Builder>
-  Result<void> run_tile(Builder& builder, Worker& worker, int tu, int tv, int v_begin,
-                        VoxelIntervals& out, const Execution& execution) const;
+  Result<void> run_tile(Builder& builder, Worker& worker, int tu, int tv, Output& out,
+                        const Execution& execution) const;
   template <class Key>
-  void walk(const TileLists<Key>& lists, Worker& worker, int tu, int tv, int v_begin,
-            VoxelIntervals& out, const Execution& execution) const;
-  Result<void> run_source(int v_begin, const Execution& execution, VoxelIntervals& out) const;
+  void walk(const TileLists<Key>& lists, Worker& worker, int tu, int tv, Output& out,
+            const Execution& execution) const;
+  Result<void> run_source(const Execution& execution, Output& out) const;
+  Result<void> run(Output& out, const Execution& execution, VoxelizeReport& report);
 
   const LatticeMesh* mesh_ = nullptr;
   const VoxelGrid* grid_ = nullptr;

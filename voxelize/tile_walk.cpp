@@ -10,26 +10,12 @@
 
 #include "strata/hashbuffer/tile_lists.h"
 #include "strata/raster/lattice_mesh.h"
+#include "voxelize/winding_walk-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace strata {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
-
-using Lane = hn::ScalableTag<std::uint32_t>;
-using LaneInt = hn::RebindToSigned<Lane>;
-using Vec = hn::Vec<Lane>;
-using VecInt = hn::Vec<LaneInt>;
-using Mask = hn::Mask<Lane>;
-constexpr std::size_t kMaxLanes = HWY_MAX_BYTES / 4;
-
-template <InsideRule rule>
-HWY_INLINE hn::Mask<LaneInt> inside(VecInt winding) {
-  const LaneInt di;
-  if constexpr (rule == InsideRule::kWinding) return hn::Gt(winding, hn::Zero(di));
-  if constexpr (rule == InsideRule::kNonzero) return hn::Ne(winding, hn::Zero(di));
-  return hn::TestBit(winding, hn::Set(di, 1));
-}
 
 /// Finished intervals of a vector of columns, in the order in which the walk meets them.
 struct Finished {
@@ -45,13 +31,12 @@ struct Finished {
   }
 };
 
-/// Walks the lists of a vector of columns, the first of which is that of `cell`. `winding` is left
-/// as it is behind the last crossing. @return the length of the longest list
+/// Walks the lists of a vector of columns, the first of which is that of `cell`. @return the length
+/// of the longest list
 template <InsideRule rule>
 HWY_INLINE int walk_columns(const std::uint32_t* cell, int ages, bool histogram, Finished& finished,
-                            VecInt& winding, VecInt& lowest, Vec& list_length) {
+                            WindingWalk& walk) {
   const Lane d;
-  const LaneInt di;
   Vec begin = hn::Zero(d);  // of the interval being walked
   Vec pending_begin = hn::Zero(d),
       pending_end = hn::Zero(d);  // the last one, not yet handed out
@@ -60,20 +45,10 @@ HWY_INLINE int walk_columns(const std::uint32_t* cell, int ages, bool histogram,
     const Vec record = hn::LoadU(d, cell);
     const Mask present = hn::Ne(record, hn::Zero(d));
     if (hn::AllFalse(d, present)) break;
-    const Vec key = hn::AndNot(record, hn::Set(d, 0xffffffu));
-    const Vec exit = hn::And(key, hn::Set(d, 1u));
-    const Vec voxel = hn::ShiftRight<kLatticeBits>(
-        hn::Add(hn::ShiftRight<1>(key), hn::Set(d, std::uint32_t{kLatticeSteps / 2})));
-    // +1 on entering, -1 on leaving, 0 where the list has ended.
-    const VecInt change =
-        hn::BitCast(di, hn::IfThenElseZero(present, hn::Sub(hn::Set(d, 1u), hn::Add(exit, exit))));
-    const auto was = inside<rule>(winding);
-    winding = hn::Add(winding, change);
-    lowest = hn::Min(lowest, winding);
-    const auto now = inside<rule>(winding);
-    const Mask starts = hn::RebindMask(d, hn::AndNot(was, now));
-    const Mask ends = hn::RebindMask(d, hn::AndNot(now, was));
-    if (histogram) list_length = hn::Sub(list_length, hn::VecFromMask(d, present));
+    const Vec voxel =
+        hn::ShiftRight<kLatticeBits>(hn::Add(walk.cross<rule>(record, present, histogram),
+                                             hn::Set(d, std::uint32_t{kLatticeSteps / 2})));
+    const Mask starts = walk.starts;
     if (!hn::AllFalse(d, starts)) {
       // A start on the end of the last interval carries that one on.
       const Mask has_pending = hn::Gt(pending_end, pending_begin);
@@ -83,7 +58,7 @@ HWY_INLINE int walk_columns(const std::uint32_t* cell, int ages, bool histogram,
       begin = hn::IfThenElse(starts, hn::IfThenElse(joins, pending_begin, voxel), begin);
       pending_end = hn::IfThenElse(hand_out, pending_begin, pending_end);
     }
-    const Mask closes = hn::And(ends, hn::Gt(voxel, begin));
+    const Mask closes = hn::And(walk.ends, hn::Gt(voxel, begin));
     pending_begin = hn::IfThenElse(closes, begin, pending_begin);
     pending_end = hn::IfThenElse(closes, voxel, pending_end);
   }
@@ -91,31 +66,6 @@ HWY_INLINE int walk_columns(const std::uint32_t* cell, int ages, bool histogram,
   const Mask has_pending = hn::Gt(pending_end, pending_begin);
   if (!hn::AllFalse(d, has_pending)) finished.add(has_pending, pending_begin, pending_end);
   return age;
-}
-
-/// What the report counts of a vector of columns.
-HWY_INLINE void count_columns(VecInt winding, VecInt lowest, Vec list_length, bool histogram,
-                              TileIntervals& out) {
-  const Lane d;
-  const LaneInt di;
-  const std::size_t lanes = hn::Lanes(d);
-  // Columns whose winding number is not 0 again, or was negative, are rare.
-  const auto unbalanced = hn::Ne(winding, hn::Zero(di));
-  const auto negative = hn::Lt(lowest, hn::Zero(di));
-  if (!hn::AllFalse(di, hn::Or(unbalanced, negative))) {
-    std::int32_t windings[kMaxLanes];
-    hn::StoreU(winding, di, windings);
-    for (std::size_t lane = 0; lane < lanes; ++lane) {
-      if (windings[lane] != 0) ++out.unbalanced;
-    }
-    out.negative += hn::CountTrue(di, negative);
-  }
-  if (!histogram) return;
-  std::uint32_t depths[kMaxLanes];
-  hn::StoreU(list_length, d, depths);
-  for (std::size_t lane = 0; lane < lanes; ++lane) {
-    if (depths[lane] > 0) ++out.histogram[std::min<std::uint32_t>(depths[lane], 64)];
-  }
 }
 
 /// Hands intervals out column by column. @return their number, with the `count` that were there
@@ -156,25 +106,23 @@ HWY_INLINE std::uint32_t hand_out_columns(const Finished& finished, std::size_t 
 
 template <InsideRule rule>
 void walk_planes(const TileLists<DepthKey>& lists, bool histogram, TileIntervals& out) {
-  const Lane d;
-  const LaneInt di;
-  const std::size_t lanes = hn::Lanes(d);
+  const std::size_t lanes = hn::Lanes(Lane());
   std::uint32_t count = 0;
   Finished finished;
   for (int row = lists.row_begin; row < lists.row_end; ++row) {
     for (std::size_t u = 0; u < kTileSide; u += lanes) {
       const std::size_t pixel = static_cast<std::size_t>(row) * kTileSide + u;
-      VecInt winding = hn::Zero(di), lowest = hn::Zero(di);
-      Vec list_length = hn::Zero(d);
+      WindingWalk walk;
       finished.rounds = 0;
-      const int age = walk_columns<rule>(lists.planes32 + pixel, lists.ages, histogram, finished,
-                                         winding, lowest, list_length);
-      out.max_depth = std::max<std::uint64_t>(out.max_depth, static_cast<std::uint64_t>(age));
+      const int age =
+          walk_columns<rule>(lists.planes32 + pixel, lists.ages, histogram, finished, walk);
+      out.counts.max_depth =
+          std::max<std::uint64_t>(out.counts.max_depth, static_cast<std::uint64_t>(age));
       if (age == 0) {
         for (std::size_t lane = 0; lane < lanes; ++lane) out.offsets[pixel + lane] = count;
         continue;
       }
-      count_columns(winding, lowest, list_length, histogram, out);
+      walk.count(histogram, out.counts);
       count = hand_out_columns(finished, pixel, count, out);
     }
   }
@@ -204,11 +152,6 @@ namespace {
 
 HWY_EXPORT(walk_key_planes);
 
-std::uint32_t depth_of(DepthKey key) { return key >> 1; }
-std::uint32_t depth_of(DepthItem item) { return item.depth(); }
-bool exit_of(DepthKey key) { return (key & 1) != 0; }
-bool exit_of(DepthItem item) { return item.exit(); }
-
 /// The walk written plainly, one column at a time: for the form of lists that is not planar, and
 /// the yardstick of the other.
 template <class Key>
@@ -232,10 +175,7 @@ void walk_column(std::span<const Key> list, InsideRule rule, bool histogram, Til
       }
     }
   }
-  if (winding != 0) ++out.unbalanced;
-  if (lowest < 0) ++out.negative;
-  out.max_depth = std::max<std::uint64_t>(out.max_depth, list.size());
-  if (histogram && !list.empty()) ++out.histogram[std::min<std::size_t>(list.size(), 64)];
+  out.counts.add(winding, lowest, list.size(), histogram);
 }
 
 template <class Key>
@@ -268,8 +208,7 @@ void walk_rows(const TileLists<Key>& lists, InsideRule rule, bool histogram, Til
 void begin_walk(TileIntervals& out) {
   out.offsets.resize(kTilePixels + 1);
   out.labels.clear();
-  std::fill(std::begin(out.histogram), std::end(out.histogram), 0);
-  out.unbalanced = out.negative = out.max_depth = 0;
+  out.counts.clear();
 }
 
 }  // namespace
@@ -313,34 +252,10 @@ void walk_labelled_tile(const TileLists<DepthItem>& lists, bool histogram, TileI
       label = next;
       begin = voxel;
     });
-    if (label != 0) ++out.unbalanced;
-    out.max_depth = std::max<std::uint64_t>(out.max_depth, length);
-    if (histogram && length > 0) ++out.histogram[std::min<std::size_t>(length, 64)];
+    out.counts.add(label != 0 ? 1 : 0, 0, length, histogram);
   }
   out.offsets[kTilePixels] = static_cast<std::uint32_t>(out.items.size());
 }
-
-namespace {
-
-/// Calls body(key) for the sorted list of a pixel.
-template <class Key, class Body>
-void for_each_key(const TileLists<Key>& lists, std::size_t pixel, Body&& body) {
-  if constexpr (std::is_same_v<Key, DepthItem>) {
-    for_each_item(lists, pixel, body);
-  } else if (lists.planes32 == nullptr) {
-    std::for_each(lists.keys + lists.offsets[pixel], lists.keys + lists.offsets[pixel + 1], body);
-  } else {
-    const int row = static_cast<int>(pixel) / kTileSide;
-    if (row < lists.row_begin || row >= lists.row_end) return;
-    for (std::size_t age = 0; age < static_cast<std::size_t>(lists.ages); ++age) {
-      const std::uint32_t record = lists.planes32[age * kTilePixels + pixel];
-      if (record == 0) return;
-      body(tile_key<Record32>(record));
-    }
-  }
-}
-
-}  // namespace
 
 template <class Key>
 void add_winding_steps(const TileLists<Key>& lists, InsideRule rule,

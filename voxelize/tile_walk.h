@@ -1,7 +1,9 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 #include "hashbuffer/tile_builder.h"
@@ -13,17 +15,56 @@
 
 namespace strata {
 
-/// The intervals of one tile, as VoxelIntervals::set_tile() takes them, and what the walk saw.
+/// What a walk saw of the columns of a tile.
+struct TileCounts {
+  std::uint64_t unbalanced = 0;  ///< columns whose winding number does not return to 0
+  std::uint64_t negative = 0;    ///< columns whose winding number falls below 0
+  std::uint64_t max_depth = 0;
+  /// Columns with n = 1..63 fragments at [n], the deeper ones at [64]; filled when asked for.
+  std::uint64_t histogram[65] = {};
+
+  void clear() { *this = {}; }
+  /// Counts a column.
+  /// @param winding behind its last crossing, `lowest` anywhere
+  void add(int winding, int lowest, std::size_t depth, bool with_histogram) {
+    if (winding != 0) ++unbalanced;
+    if (lowest < 0) ++negative;
+    max_depth = std::max<std::uint64_t>(max_depth, depth);
+    if (with_histogram && depth > 0) ++histogram[std::min<std::size_t>(depth, 64)];
+  }
+};
+
+/// The intervals of one tile, as VoxelIntervals::set_tile() takes them.
 struct TileIntervals {
   std::vector<std::uint32_t> offsets;  ///< kTilePixels + 1
   std::vector<Interval> items;         ///< the first offsets.back() are valid
   std::vector<std::uint32_t> labels;   ///< of those items, or none
-  std::uint64_t unbalanced = 0;        ///< columns whose winding number does not return to 0
-  std::uint64_t negative = 0;          ///< columns whose winding number falls below 0
-  std::uint64_t max_depth = 0;
-  /// Columns with n = 1..63 fragments at [n], the deeper ones at [64]; filled when asked for.
-  std::uint64_t histogram[65];
+  TileCounts counts;
 };
+
+/// The crossing in a list of either kind.
+inline std::uint32_t depth_of(DepthKey key) { return key >> 1; }
+inline std::uint32_t depth_of(DepthItem item) { return item.depth(); }
+inline bool exit_of(DepthKey key) { return (key & 1) != 0; }
+inline bool exit_of(DepthItem item) { return item.exit(); }
+
+/// Calls body(key) for the sorted list of a pixel.
+template <class Key, class Body>
+void for_each_key(const TileLists<Key>& lists, std::size_t pixel, Body&& body) {
+  if constexpr (std::is_same_v<Key, DepthItem>) {
+    for_each_item(lists, pixel, body);
+  } else if (lists.planes32 == nullptr) {
+    std::for_each(lists.keys + lists.offsets[pixel], lists.keys + lists.offsets[pixel + 1], body);
+  } else {
+    const int row = static_cast<int>(pixel) / kTileSide;
+    if (row < lists.row_begin || row >= lists.row_end) return;
+    for (std::size_t age = 0; age < static_cast<std::size_t>(lists.ages); ++age) {
+      const std::uint32_t record = lists.planes32[age * kTilePixels + pixel];
+      if (record == 0) return;
+      body(tile_key<Record32>(record));
+    }
+  }
+}
 
 /// Walks the lists of a tile along the ray. A voxel k lies beyond a crossing when its centre, at
 /// 256 k + 128 lattice steps, is above the floor of the crossing. An interval that is entered and

@@ -1,6 +1,7 @@
 #include "strata/voxelize/voxelize.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <memory>
 #include <optional>
@@ -22,21 +23,49 @@
 namespace strata {
 namespace {
 
+/// Columns walked along the side of a voxel.
+int fine(const VoxelizeOptions& options) { return std::max(options.samples, options.rays); }
+
 /// Rows of a slab whose intervals are expected to stay within an eighth of the memory limit.
-/// With samples of voxels, whole tiles of those.
-int slab_rows(const VoxelGrid& grid, Axis axis, int samples, const Execution& execution) {
-  const AxisFrame frame(axis);
-  constexpr std::uint64_t kBytesPerColumn = 16;  // offset, and two intervals with their copies
+/// With several columns a voxel, whole tiles of voxels.
+int slab_rows(const VoxelGrid& grid, const VoxelizeOptions& options, const Execution& execution) {
+  const AxisFrame frame(options.axis);
+  const int samples = fine(options);
+  // Offset, and two intervals with their copies; the same of voxels, with labels, where only those
+  // are made.
+  const std::uint64_t bytes_a_column =
+      options.rays > 0 ? 1 + 128 / static_cast<std::uint64_t>(samples * samples) : 16;
   constexpr std::uint64_t kDefaultSlabBytes = std::uint64_t{512} << 20;
   const std::uint64_t budget = execution.memory_limit > 0
                                    ? std::min(kDefaultSlabBytes, execution.memory_limit / 8)
                                    : kDefaultSlabBytes;
   const std::uint64_t rows =
-      budget / (kBytesPerColumn * static_cast<std::uint64_t>(grid.dims[frame.u]));
+      budget / (bytes_a_column * static_cast<std::uint64_t>(grid.dims[frame.u]));
   const auto unit = static_cast<std::uint64_t>(kTileSide) * static_cast<std::uint64_t>(samples);
   const std::uint64_t units = std::max<std::uint64_t>(1, rows / unit);
   const std::uint64_t most = std::max<std::uint64_t>(1, kMaxGridSide / unit);
   return static_cast<int>(std::min(units, most) * unit);
+}
+
+Result<void> check_rays(int longest, const VoxelizeOptions& options) {
+  const int rays = options.rays;
+  if (rays == 0) return {};
+  if (rays < 0 || rays > kTileSide || !std::has_single_bit(static_cast<unsigned>(rays))) {
+    return fail(ErrorCode::kUsage,
+                "rays per side of a voxel must be a power of two from 1 to {}, got {}", kTileSide,
+                rays);
+  }
+  if (rays > kMaxGridSide / longest) {
+    return fail(ErrorCode::kUsage, "{} rays per side of a voxel on a grid of {} voxels exceed {}",
+                rays, longest, kMaxGridSide);
+  }
+  if (options.samples > 1) {
+    return fail(ErrorCode::kUsage, "samples and rays of voxels cannot be combined");
+  }
+  if (options.surface || !options.solid) {
+    return fail(ErrorCode::kUsage, "rays of voxels need a solid voxelization without its surface");
+  }
+  return {};
 }
 
 Result<void> check_samples(const VoxelGrid& grid, const VoxelizeOptions& options) {
@@ -47,10 +76,11 @@ Result<void> check_samples(const VoxelGrid& grid, const VoxelizeOptions& options
                 "samples per side of a voxel must be 1 to {} on a grid of {} x {} x {}, got {}",
                 kMaxGridSide / longest, grid.dims.x, grid.dims.y, grid.dims.z, samples);
   }
-  if (samples > 1 && options.filter != nullptr && options.filter->labelled()) {
+  if ((samples > 1 || options.rays > 0) && options.filter != nullptr &&
+      options.filter->labelled()) {
     return fail(ErrorCode::kUsage, "labels cannot be combined with samples");
   }
-  return {};
+  return check_rays(longest, options);
 }
 
 /// The solid of a mesh, slab by slab along options.axis. An open mesh is closed by caps, and what
@@ -71,6 +101,7 @@ class SolidSlabs {
         VoxelizeOptions counting = options;
         counting.source = nullptr;
         counting.statistics = false;
+        counting.rays = 0;
         auto made =
             SolidVoxelizer::create(result.open_->caps, grid, options.axis, counting, execution);
         if (!made) return tl::unexpected(made.error());
@@ -84,9 +115,12 @@ class SolidSlabs {
     return result;
   }
 
-  Result<VoxelIntervals> slab(int v_begin, int v_end, const Execution& execution,
-                              VoxelizeReport& report) {
-    auto result = solid_.slab(v_begin, v_end, execution, report);
+  /// @param voxels their grid, where options.rays are asked for
+  Result<VoxelIntervals> slab(const VoxelGrid* voxels, int v_begin, int v_end,
+                              const Execution& execution, VoxelizeReport& report) {
+    auto result = voxels != nullptr
+                      ? solid_.covered_slab(*voxels, v_begin, v_end, execution, report)
+                      : solid_.slab(v_begin, v_end, execution, report);
     if (!result || !open_) return result;
     // The caps are missing where the mesh's columns are unbalanced, and their crossings are not
     // its.
@@ -123,9 +157,6 @@ class SolidSlabs {
   std::unique_ptr<Open> open_;
   SolidVoxelizer solid_;
 };
-
-/// Takes a finished slab over.
-using OwningSink = std::function<Result<void>(VoxelIntervals&&)>;
 
 /// Options that no mesh could be voxelized with.
 Result<void> check_options(const VoxelGrid& grid, const VoxelizeOptions& options) {
@@ -205,9 +236,9 @@ class Slabs {
     return result;
   }
 
-  Result<VoxelIntervals> slab(int v_begin, int v_end, const Execution& execution,
-                              VoxelizeReport& report) {
-    auto solid = solid_ ? solid_->slab(v_begin, v_end, execution, report)
+  Result<VoxelIntervals> slab(const VoxelGrid* voxels, int v_begin, int v_end,
+                              const Execution& execution, VoxelizeReport& report) {
+    auto solid = solid_ ? solid_->slab(voxels, v_begin, v_end, execution, report)
                         : VoxelIntervals(*grid_, axis_, v_begin, v_end);
     if (!solid || !shell_) return solid;
     auto shell = shell_->slab(v_begin, v_end, execution);
@@ -232,7 +263,7 @@ Result<VoxelizeReport> run(const TriangleSoup& mesh, const VoxelGrid& asked,
                            const VoxelizeOptions& options, const Execution& execution,
                            bool in_slabs, const OwningSink& sink) {
   if (auto valid = check_options(asked, options); !valid) return tl::unexpected(valid.error());
-  const VoxelGrid grid = refined(asked, options.samples);
+  const VoxelGrid grid = refined(asked, fine(options));
   const auto lattice = snap_to_lattice(mesh, grid, execution);
   if (!lattice) return tl::unexpected(lattice.error());
   Execution quiet = execution;  // inner phases do not report progress of their own
@@ -242,15 +273,19 @@ Result<VoxelizeReport> run(const TriangleSoup& mesh, const VoxelGrid& asked,
   if (!report.closed && options.open == OpenMode::kFail) {
     return fail(ErrorCode::kGeometry, "the mesh is not closed");
   }
+  if (!report.closed && options.open == OpenMode::kSurface && options.rays > 0) {
+    return fail(ErrorCode::kGeometry,
+                "the mesh is not closed, and its surface alone has no filled fraction");
+  }
   auto slabs = Slabs::create(*lattice, grid, report.closed, options, quiet);
   if (!slabs) return tl::unexpected(slabs.error());
 
   SetChecksum checksum(asked);
   const int rows = grid.dims[AxisFrame(options.axis).v];
-  const int step = in_slabs ? slab_rows(grid, options.axis, options.samples, execution) : rows;
+  const int step = in_slabs ? slab_rows(grid, options, execution) : rows;
   for (int v = 0; v < rows; v += step) {
     const int end = std::min(rows, v + step);
-    auto slab = slabs->slab(v, end, quiet, report);
+    auto slab = slabs->slab(options.rays > 0 ? &asked : nullptr, v, end, quiet, report);
     if (!slab) return tl::unexpected(slab.error());
     if (options.samples > 1) *slab = count_samples(*slab, asked, options.samples, quiet);
     if (options.statistics) {

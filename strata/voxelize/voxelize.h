@@ -55,6 +55,14 @@ struct VoxelizeOptions {
   /// changes. Takes n^2 times the columns: time and memory grow with the surface at n times the
   /// resolution. Not for labelled lists.
   int samples = 1;
+  /// With n > 0, labels give the filled fraction of voxels, n x n rays a voxel, each of which
+  /// counts the length inside the solid exactly: a label is the number of lattice steps of a grid
+  /// that is n times finer, 1 to 256 n^3. Exact along `axis`, so that the labels depend on it; a
+  /// wall along the axis is off by 1 / 2n at most. 0, or a power of two up to 64. Where winding
+  /// numbers decide (open meshes), a ray counts whole voxels of the finer grid. Takes n^2 times the
+  /// columns; memory grows with the surface in voxels. Not for labelled lists, surfaces, or with
+  /// samples.
+  int rays = 0;
   bool statistics = false;  ///< count and hash the result
   /// Transforms the mesh's lists before they are filled, e.g. for a Boolean tree. Borrowed. The
   /// rule then applies to the transformed lists, and a voxel belongs to the surface when faces of
@@ -71,6 +79,7 @@ struct VoxelizeOptions {
 struct VoxelizeReport {
   std::uint64_t solid_voxels = 0;          ///< with `statistics`
   std::uint64_t intervals = 0;             ///< with `statistics`
+  std::uint64_t filled_steps = 0;          ///< sum of the labels of all voxels, with `rays`
   std::uint64_t crossings = 0;             ///< fragments stored, along the axis asked for
   std::uint64_t max_depth_complexity = 0;  ///< the longest list
   /// Columns with n crossings, n = 0..; the last entry counts the rest. With `statistics`.
