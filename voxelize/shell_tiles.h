@@ -17,7 +17,7 @@
 #include "strata/core/result.h"
 #include "strata/voxelize/intervals.h"
 #include "strata/voxelize/voxelize.h"
-#include "voxelize/shell_overlap.h"
+#include "voxelize/overlap/shell_overlap.h"
 
 namespace strata::shell {
 

@@ -13,7 +13,7 @@
 
 #include "tests/support/predicate_intervals.h"
 #include "tests/voxelize/shell_testing.h"
-#include "voxelize/shell_overlap.h"
+#include "voxelize/overlap/shell_overlap.h"
 
 namespace strata {
 namespace {

@@ -11,7 +11,7 @@
 #include <glm/vec3.hpp>
 #include <limits>
 
-#include "voxelize/shell_overlap.h"
+#include "voxelize/overlap/shell_overlap.h"
 
 namespace strata {
 

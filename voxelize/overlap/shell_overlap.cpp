@@ -1,4 +1,4 @@
-#include "voxelize/shell_overlap.h"
+#include "voxelize/overlap/shell_overlap.h"
 
 #include <cstdlib>
 
