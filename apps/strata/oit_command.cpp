@@ -52,6 +52,18 @@ Result<void> write_page(const std::string& page, const std::string& folder) {
   return made->commit();
 }
 
+/// The attributes of the meshes that are solids of a tree, by solid.
+std::vector<MeshAttributes> attributes_of(const csg::Tree& tree,
+                                          const std::vector<csg::InputFacts>& files) {
+  std::vector<MeshAttributes> all(tree.solids().size());
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    for (const csg::InputFacts& file : files) {
+      if (!file.is_scene && file.path == tree.solids()[i].name) all[i] = file.attributes;
+    }
+  }
+  return all;
+}
+
 /// The work of one scene and camera.
 class OitRun {
  public:
@@ -73,7 +85,6 @@ class OitRun {
 
  private:
   Result<void> load();
-  Result<std::vector<FaceMaterials>> read_materials(const csg::Tree& tree);
   [[nodiscard]] transparency::FrameOptions frame_options() const;
   Result<void> open_frame();
   Result<void> draw_media();
@@ -118,7 +129,11 @@ Result<void> OitRun::load() {
       if (code != "open") warn(std::move(code), std::move(message));
     };
   }
-  auto scene = csg::load_scene(command_.input, messages, session_.execution("reading"));
+  csg::SceneInput input = command_.input;
+  input.attributes = all_faces || !command_.media.empty();
+  input.textures = false;
+  std::vector<csg::InputFacts> files;
+  auto scene = csg::load_scene(input, messages, session_.execution("reading"), &files);
   if (!scene) return tl::unexpected(scene.error());
   outcome_.read_ms = session_.milliseconds();
   take_scene_view(*scene, session_, command_);
@@ -132,12 +147,7 @@ Result<void> OitRun::load() {
   options.scheme = command_.picture.scheme;
   options.all_faces = all_faces || !command_.media.empty();
   if (!command_.media.empty() && !options.opacity) options.opacity = 1.0f;
-  if (options.all_faces) {
-    auto materials = read_materials(scene->tree);
-    if (!materials) return tl::unexpected(materials.error());
-    options.materials = *std::move(materials);
-    if (auto strict = session_.check_strict(); !strict) return strict;
-  }
+  if (options.all_faces) options.attributes = attributes_of(scene->tree, files);
   auto made =
       csg::SeeThrough::make(*std::move(scene), options, session_.execution("preparing", 0.1));
   if (!made) return with_limit(std::move(made.error()));
@@ -146,26 +156,6 @@ Result<void> OitRun::load() {
   outcome_.triangles = scene_->triangles();
   outcome_.opacity = scene_->opacity();
   return {};
-}
-
-/// The materials of OBJ files, by solid.
-Result<std::vector<FaceMaterials>> OitRun::read_materials(const csg::Tree& tree) {
-  std::vector<FaceMaterials> all(tree.solids().size());
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    const std::string& path = tree.solids()[i].name;
-    const csg::InputKind kind = csg::kind_of(path, command_.input);
-    const bool is_obj = kind.format == MeshFormat::kObj ||
-                        (kind.format == MeshFormat::kAuto && has_extension(path, ".obj"));
-    if (!is_obj || path == "-") continue;
-    auto read = read_obj_materials(path, command_.input.scene.root_folder,
-                                   session_.execution("reading", 0.1));
-    if (!read) return tl::unexpected(read.error());
-    if (auto kept = session_.opened(read->files); !kept) return tl::unexpected(kept.error());
-    for (const std::string& sentence : read->missing) session_.warn("missing-file", sentence);
-    for (const std::string& sentence : read->warnings) session_.warn("reader", sentence);
-    all[i] = *std::move(read);
-  }
-  return all;
 }
 
 transparency::FrameOptions OitRun::frame_options() const {

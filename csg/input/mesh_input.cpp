@@ -145,6 +145,7 @@ void warn_of_reading(const std::string& path, const MeshReadStats& stats,
     detail::warn(messages, "non-planar",
                  fmt::format("{}: {} not flat", path, counted(stats.non_planar, "polygon")));
   }
+  for (const std::string& text : stats.missing) detail::warn(messages, "missing-file", text);
   for (const std::string& text : stats.warnings) detail::warn(messages, "reader", text);
 }
 
@@ -222,6 +223,10 @@ Result<MeshFile> read_mesh_input(const std::string& path, const InputKind& kind,
   MeshReadOptions options;
   options.format = kind.format;
   options.reader = input.reader;
+  options.attributes = input.attributes;
+  options.textures = input.textures;
+  options.parts = input.parts;
+  options.root = input.scene.root_folder;
   return read_mesh(path, options, execution);
 }
 
@@ -232,11 +237,15 @@ Result<InputFacts> load_mesh(const std::string& path, const InputKind& kind,
   auto file = read_mesh_input(path, kind, input, execution);
   if (!file) return tl::unexpected(file.error());
   if (read_ms != nullptr) *read_ms += watch.milliseconds();
+  if (messages.opened && !file->opened.empty()) {
+    if (auto kept = messages.opened(file->opened); !kept) return tl::unexpected(kept.error());
+  }
   soup = std::move(file->soup);
   Execution quiet = execution;
   quiet.progress = {};
   auto facts = inspect_mesh(soup, std::move(file->stats), path, input, messages, quiet);
   if (!facts) return facts;
+  facts->attributes = std::move(file->attributes);
   detail::note(messages,
                fmt::format("{}: {}, {}", path, counted(facts->stats.triangles, "triangle"),
                            facts->closed ? "closed" : "open"));

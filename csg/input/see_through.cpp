@@ -23,9 +23,9 @@ float opacity_of(const Scene& scene, const SeeThroughOptions& options) {
   bool any = !scene.backgrounds.empty() || !scene.highlights.empty() ||
              std::any_of(solids.begin(), solids.end(),
                          [](const Solid& solid) { return solid.colour && solid.colour->a < 1.0f; });
-  for (const FaceMaterials& of_solid : options.materials) {
-    for (const Material& material : of_solid.materials) {
-      any = any || material.opacity.value_or(1.0f) < 1.0f;
+  for (const MeshAttributes& of_solid : options.attributes) {
+    for (const SurfaceMaterial& material : of_solid.materials) {
+      any = any || material.colour.a < 1.0f;
     }
   }
   return any ? 1.0f : kUsualOpacity;
@@ -37,7 +37,7 @@ class FaceCollector {
   FaceCollector(const glm::vec4& usual, transparency::Scene& scene)
       : usual_(usual), scene_(scene) {}
 
-  Result<void> add(const Solid& solid, const FaceMaterials* materials) {
+  Result<void> add(const Solid& solid, const MeshAttributes* attributes) {
     if (!solid.mesh || solid.mesh->triangles.empty()) return {};
     const TriangleSoup& mesh = *solid.mesh;
     const std::uint64_t vertices = scene_.mesh.positions.size() + mesh.positions.size();
@@ -58,29 +58,26 @@ class FaceCollector {
     const auto object = static_cast<std::uint32_t>(scene_.objects.size());
     scene_.objects.push_back({solid.name, seen_through(colour_or(solid.colour, usual_))});
     scene_.object_of.resize(triangles, object);
-    if (materials != nullptr && !materials->materials.empty()) {
-      add_materials(solid, *materials, triangles - mesh.triangles.size());
+    if (attributes != nullptr && !attributes->materials.empty()) {
+      add_materials(solid, *attributes, triangles - mesh.triangles.size());
     }
     return {};
   }
 
  private:
   /// Triangles from `first` on get objects by their materials.
-  void add_materials(const Solid& solid, const FaceMaterials& materials, std::uint64_t first) {
+  void add_materials(const Solid& solid, const MeshAttributes& attributes, std::uint64_t first) {
     const auto base = static_cast<std::uint32_t>(scene_.objects.size());
-    for (const Material& material : materials.materials) {
-      glm::vec4 colour = usual_;
-      if (material.colour) colour = glm::vec4(*material.colour, colour.a);
-      colour.a = material.opacity.value_or(colour.a);
-      scene_.objects.push_back(
-          {fmt::format("{}: {}", solid.name, material.name), seen_through(colour), base - 1});
+    for (const SurfaceMaterial& material : attributes.materials) {
+      const glm::vec3 colour(material.coloured ? material.colour : usual_);
+      const float alpha = material.colour.a < 1.0f ? material.colour.a : usual_.a;
+      scene_.objects.push_back({fmt::format("{}: {}", solid.name, material.name),
+                                seen_through(glm::vec4(colour, alpha)), base - 1});
     }
     const auto& elements = solid.mesh->face_elements;
     for (std::size_t t = 0; t < solid.mesh->triangles.size(); ++t) {
-      const std::size_t element = elements.empty() ? t : elements[t];
-      if (const auto material = materials.of_element(element)) {
-        scene_.object_of[first + t] = base + *material;
-      }
+      const std::uint32_t material = attributes.material_of(elements.empty() ? t : elements[t]);
+      if (material != MeshAttributes::kNone) scene_.object_of[first + t] = base + material;
     }
   }
 
@@ -175,9 +172,9 @@ struct SeeThrough::Parts {
     faces.emplace();
     FaceCollector collector(glm::vec4(glm::vec3(scheme.face) / 255.0f, opacity), *faces);
     for (const std::uint32_t solid : *solids) {
-      const FaceMaterials* materials =
-          solid < options.materials.size() ? &options.materials[solid] : nullptr;
-      auto added = collector.add(scene.tree.solids()[solid], materials);
+      const MeshAttributes* attributes =
+          solid < options.attributes.size() ? &options.attributes[solid] : nullptr;
+      auto added = collector.add(scene.tree.solids()[solid], attributes);
       if (!added) return added;
     }
     box = bounds(faces->mesh);

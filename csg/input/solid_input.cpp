@@ -31,17 +31,30 @@ void set_union(SolidInput& all, std::vector<Solid> solids) {
 }
 
 /// Appends a mesh to the one soup of those that share a rule.
-Result<void> append_mesh(TriangleSoup& all, TriangleSoup soup, const std::string& path) {
-  if (all.triangles.empty()) {
-    all = std::move(soup);
+/// @param elements  face elements of its file
+Result<void> append_mesh(SolidInput& all, TriangleSoup soup, MeshAttributes attributes,
+                         std::uint64_t elements, const std::string& path) {
+  if (all.soup.triangles.empty()) {
+    all.soup = std::move(soup);
+    all.attributes = std::move(attributes);
     return {};
   }
-  if (all.positions.size() + soup.positions.size() > 0xfffffffeu) {
+  const std::size_t before = all.soup.positions.size();
+  if (before + soup.positions.size() > 0xfffffffeu ||
+      all.attributes.corners.size() + attributes.corners.size() > 0xffffffffu) {
     return fail(ErrorCode::kLimit, "{}: the inputs up to this one have more than 2^32 - 2 vertices",
                 path);
   }
-  append(all, soup);
+  append(all.soup, all.attributes, soup, std::move(attributes), elements);
   return {};
+}
+
+/// The attributes of a file, of which the facts keep the parts.
+MeshAttributes take_attributes(InputFacts& facts) {
+  MeshAttributes attributes = std::move(facts.attributes);
+  facts.attributes = {};
+  facts.attributes.parts = attributes.parts;
+  return attributes;
 }
 
 /// Meshes as one soup, or as a tree where they have several rules or are to stay apart.
@@ -60,20 +73,26 @@ Result<SolidInput> load_meshes(const SceneInput& input, bool as_tree, const Inpu
     if (!facts) return tl::unexpected(facts.error());
     all.read_ms += read_ms;
     const InsideRule rule = facts->rule;
+    const std::uint64_t elements = facts->stats.faces;
+    MeshAttributes attributes = take_attributes(*facts);
     all.add(*std::move(facts));
     if (as_tree) {
       apart.push_back(solid_of(std::move(soup), rule, path));
     } else if (input.files.size() == 1) {
       all.soup = std::move(soup);
+      all.attributes = std::move(attributes);
       all.rule = rule;
     } else if (rule != input.rule) {
       apart.push_back(solid_of(std::move(soup), rule, path));
-    } else if (auto added = append_mesh(all.soup, std::move(soup), path); !added) {
+    } else if (auto added =
+                   append_mesh(all, std::move(soup), std::move(attributes), elements, path);
+               !added) {
       return tl::unexpected(added.error());
     }
     all.diagnose_ms += watch.milliseconds() - read_ms;
   }
   if (apart.empty() && !as_tree) return all;
+  all.attributes = {};
   if (!all.soup.triangles.empty()) {
     apart.push_back(solid_of(std::move(all.soup), input.rule, input.files.front()));
   }

@@ -108,12 +108,16 @@ Losses drop_bad_faces(RawMesh& mesh) {
 }
 
 /// Removes vertices that are not finite. No triangle uses them now.
-void drop_non_finite_vertices(TriangleSoup& soup) {
+void drop_non_finite_vertices(TriangleSoup& soup, DroppedVertices* dropped) {
   std::vector<std::uint32_t> new_index(soup.positions.size());
   std::uint32_t kept = 0;
   for (std::size_t v = 0; v < soup.positions.size(); ++v) {
     new_index[v] = kept;
-    if (finite(soup.positions[v])) soup.positions[kept++] = soup.positions[v];
+    if (finite(soup.positions[v])) {
+      soup.positions[kept++] = soup.positions[v];
+    } else if (dropped != nullptr) {
+      dropped->all.push_back(static_cast<std::uint32_t>(v));
+    }
   }
   soup.positions.resize(kept);
   for (glm::uvec3& t : soup.triangles) t = {new_index[t.x], new_index[t.y], new_index[t.z]};
@@ -299,7 +303,7 @@ Result<MeshFile> finish_mesh(const ReaderInput& input, RawMesh&& raw, const Loca
                 stats.faces, stats.warnings.empty() ? "" : ", first: ",
                 stats.warnings.empty() ? std::string() : stats.warnings.front());
   }
-  if (non_finite) drop_non_finite_vertices(soup);
+  if (non_finite) drop_non_finite_vertices(soup, input.dropped);
   stats.non_planar = bent.count;
   if (bent.count != 0) {
     stats.warnings.push_back(fmt::format(

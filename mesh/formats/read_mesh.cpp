@@ -6,6 +6,7 @@
 #include <system_error>
 
 #include "mesh/archives/read_3mf_amf.h"
+#include "mesh/attributes/select_parts.h"
 #include "mesh/formats/reader_common.h"
 #include "mesh/text/input_bytes.h"
 #include "mesh/text/text_scanner.h"
@@ -80,7 +81,8 @@ Result<MeshFile> read_archive(const std::string& path, const MeshReadOptions& op
 
 /// Reads text that ends in a readable zero byte. No exception (std::bad_alloc) leaves this
 /// function.
-Result<MeshFile> read_text(std::string_view text, const std::string& name,
+/// @param path  of the file; empty where there is none
+Result<MeshFile> read_text(std::string_view text, const std::string& name, const std::string& path,
                            const MeshReadOptions& options, const Execution& execution) {
   if (text.empty()) return fail(ErrorCode::kInput, "{}: the file is empty", name);
   // The first 80 bytes of a binary STL file may be anything.
@@ -91,7 +93,9 @@ Result<MeshFile> read_text(std::string_view text, const std::string& name,
   const std::size_t size = text.size();
   if (!anything) text = detail::without_byte_order_mark(text);
   try {
-    Result<MeshFile> result = read_as({text, name, options, execution, size - text.size()});
+    detail::DroppedVertices dropped;
+    Result<MeshFile> result =
+        read_as({text, name, options, execution, size - text.size(), path, &dropped});
     if (result) result->stats.bytes = size;
     const MeshFormat looks_like = format_by_content(text);
     if (!result && result.error().code == ErrorCode::kInput && looks_like != MeshFormat::kAuto &&
@@ -108,6 +112,15 @@ Result<MeshFile> read_text(std::string_view text, const std::string& name,
     return fail(ErrorCode::kLimit, "{}: not enough memory for the mesh of {} bytes", name,
                 text.size());
   }
+}
+
+/// Keeps the parts that the options name.
+Result<MeshFile> selected(Result<MeshFile> read, const std::string& name,
+                          const MeshReadOptions& options) {
+  if (!read || options.parts.empty()) return read;
+  const auto done = detail::select_parts(options.parts, name, *read);
+  if (!done) return tl::unexpected(done.error());
+  return read;
 }
 
 }  // namespace
@@ -136,7 +149,7 @@ Result<MeshFile> parse_mesh(std::string_view bytes, const std::string& name,
                             const MeshReadOptions& options, const Execution& execution) {
   try {
     const std::string terminated(bytes);  // adds the zero byte
-    return read_text(terminated, name, options, execution);
+    return selected(read_text(terminated, name, {}, options, execution), name, options);
   } catch (const std::bad_alloc&) {
     return fail(ErrorCode::kLimit, "{}: not enough memory for {} bytes", name, bytes.size());
   }
@@ -159,6 +172,9 @@ Result<MeshFile> read_mesh(const std::string& path, const MeshReadOptions& optio
     }
   }
   if (known.reader == MeshReader::kOpenMesh) {
+    if (!known.parts.empty()) {
+      return fail(ErrorCode::kUsage, "{}: OpenMesh reads no parts", path);
+    }
 #ifdef STRATA_HAVE_OPENMESH
     return read_with_openmesh(path, known, execution);
 #else
@@ -166,17 +182,17 @@ Result<MeshFile> read_mesh(const std::string& path, const MeshReadOptions& optio
 #endif
   }
   if (known.format == MeshFormat::k3mf || known.format == MeshFormat::kAmf) {
-    return read_archive(path, known, execution);
+    return selected(read_archive(path, known, execution), path, known);
   }
   try {
     const auto file = detail::InputBytes::open(path, execution.memory_limit, execution.stop);
     if (!file) return tl::unexpected(file.error());
-    Result<MeshFile> result =
-        read_text(file->view(), path == "-" ? "standard input" : path, known, execution);
+    Result<MeshFile> result = read_text(file->view(), path == "-" ? "standard input" : path,
+                                        path == "-" ? "" : path, known, execution);
     if (file->changed()) {
       return fail(ErrorCode::kInput, "{}: the file changed while it was read", path);
     }
-    return result;
+    return selected(std::move(result), path, known);
   } catch (const std::bad_alloc&) {
     return fail(ErrorCode::kLimit, "{}: not enough memory to read the file", path);
   }

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "mesh/attributes/obj_attributes.h"
 #include "mesh/formats/reader_common.h"
 #include "mesh/text/obj_lines.h"
 #include "mesh/text/text_chunks.h"
@@ -42,7 +43,6 @@ class ObjReader {
   Result<MeshFile> read();
 
  private:
-  void cut();
   void parse(const char* p, const char* end, Chunk& chunk) const;
   const char* parse_vertex(const char* p, Chunk& chunk) const;
   const char* parse_face(const char* p, Chunk& chunk) const;
@@ -60,23 +60,6 @@ class ObjReader {
   ChunksEnd chunks_end_;
   std::int64_t vertex_total_ = 0;
 };
-
-void ObjReader::cut() {
-  cuts_.push_back(begin_);
-  const char* p = begin_;
-  while (static_cast<std::size_t>(end_ - p) > input_.options.chunk_bytes) {
-    p += input_.options.chunk_bytes;
-    for (;;) {
-      const char* stop = find_line_end(p, end_);
-      p = stop == end_ ? end_ : stop + 1;
-      if (stop == end_) break;
-      while (stop > begin_ && stop[-1] == '\r') --stop;
-      if (stop == begin_ || stop[-1] != '\\') break;
-    }
-    if (p < end_) cuts_.push_back(p);
-  }
-  cuts_.push_back(end_);
-}
 
 const char* ObjReader::fail_at(const char* p, Chunk& chunk, std::string message) const {
   chunk.error_offset = static_cast<std::size_t>(p - begin_);
@@ -252,7 +235,7 @@ void ObjReader::append(Chunk& chunk) {
 }
 
 Result<MeshFile> ObjReader::read() {
-  cut();
+  cuts_ = cut_statements(input_.text, input_.options.chunk_bytes);
   reserve();
   read_chunks<Chunk>(
       input_, cuts_, chunks_end_,
@@ -261,8 +244,11 @@ Result<MeshFile> ObjReader::read() {
   if (auto status = chunks_end_.status(input_); !status) return tl::unexpected(status.error());
   mesh_.stats.format = "obj";
   vertex_total_ = static_cast<std::int64_t>(mesh_.soup.positions.size());
-  return finish_mesh(input_, std::move(mesh_),
-                     [this](std::uint32_t element) { return locate(element); });
+  auto file = finish_mesh(input_, std::move(mesh_),
+                          [this](std::uint32_t element) { return locate(element); });
+  if (!file || !input_.options.wants_parts()) return file;
+  if (auto done = read_obj_attributes(input_, *file); !done) return tl::unexpected(done.error());
+  return file;
 }
 
 /// Reads the file again up to the face. This is slow, but only messages need it.
@@ -309,7 +295,9 @@ Result<MeshFile> read_obj(const ReaderInput& input) {
   // acceptable.
   std::string text(input.text);
   std::replace(text.begin(), text.end(), '\r', '\n');
-  const ReaderInput copy{text, input.name, input.options, input.execution};
+  ReaderInput copy{text, input.name, input.options, input.execution};
+  copy.path = input.path;
+  copy.dropped = input.dropped;
   return ObjReader(copy).read();
 }
 

@@ -1,14 +1,41 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <string>
 #include <string_view>
 #include <thread>
+#include <vector>
 
 #include "strata/core/execution.h"
 #include "strata/mesh/mesh_file.h"
 
 namespace strata::detail {
+
+/// The vertices of a file that its soup has not: those that are not finite.
+class DroppedVertices {
+ public:
+  std::vector<std::uint32_t> all;  ///< increasing
+
+  /// The index in the soup of a vertex that is there.
+  [[nodiscard]] std::uint32_t index_of(std::uint32_t vertex) const {
+    if (all.empty()) return vertex;
+    const auto before = std::lower_bound(all.begin(), all.end(), vertex) - all.begin();
+    return vertex - static_cast<std::uint32_t>(before);
+  }
+  /// Removes what belongs to them.
+  template <class T>
+  void remove_from(std::vector<T>& of_vertices) const {
+    std::size_t kept = 0, next = 0;
+    if (all.empty()) return;
+    for (std::size_t v = 0; v < of_vertices.size(); ++v) {
+      const bool dropped = next < all.size() && all[next] == v;
+      next += dropped ? 1 : 0;
+      if (!dropped) of_vertices[kept++] = of_vertices[v];
+    }
+    of_vertices.resize(kept);
+  }
+};
 
 /// The arguments of a reader. The text ends in a readable zero byte.
 struct ReaderInput {
@@ -17,6 +44,9 @@ struct ReaderInput {
   const MeshReadOptions& options;
   const Execution& execution;
   std::size_t skipped = 0;  ///< bytes before the text: a byte order mark
+  std::string path{};       ///< of the file; empty where there is none
+  DroppedVertices* dropped =
+      nullptr;  ///< finish_mesh() fills it; not null where attributes are read
 };
 
 /// Reports a reader's progress and checks for a stop request. Any thread may call it, but only the

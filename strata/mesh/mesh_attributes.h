@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "strata/mesh/solid_mesh.h"
+#include "strata/mesh/triangle_soup.h"
 
 namespace strata {
 
@@ -30,7 +31,8 @@ struct Texture {
   TextureWrap wrap_v = TextureWrap::kRepeat;  ///< across rows
 };
 
-/// What a face looks like: `colour`, times the texture if there is one, in linear light.
+/// What a face looks like: `colour`, times the texture if there is one, in linear light. Colours of
+/// vertices, corners and faces are factors as well.
 struct SurfaceMaterial {
   static constexpr std::uint32_t kNoTexture = 0xffffffffu;  ///< colour alone
   std::string name;                                         ///< of the file; may be empty
@@ -58,7 +60,7 @@ struct MeshAttributes {
   };
 
   /// STL solids, OBJ objects and groups, 3MF objects, glTF nodes. Names are unique: a name that the
-  /// file gives again gets " (2)".
+  /// file gives again gets " (2)"; in OBJ it is the same part. Each has a face.
   std::vector<MeshPart> parts;
   std::vector<Range> part_ranges;             ///< increasing; empty: one part
   std::vector<SurfaceMaterial> materials;     ///< in the order of the files
@@ -79,5 +81,23 @@ struct MeshAttributes {
   /// The corners of a face element; none where the file gives none.
   [[nodiscard]] std::span<const Corner> corners_of(std::uint64_t element) const;
 };
+
+/// What the attributes of a mesh are counted by.
+struct MeshExtent {
+  std::uint64_t elements = 0;  ///< face elements
+  std::size_t vertices = 0;    ///< positions
+};
+
+/// Adds the attributes of a mesh that append() adds to another. What only one of them has is none,
+/// white or without a texture in the other. Parts whose names are there already get " (2)".
+/// @param size  of the mesh before, elements as append() counts them: those beyond are given up
+/// @param added  size of `other`
+void append(MeshAttributes& attributes, const MeshExtent& size, MeshAttributes other,
+            const MeshExtent& added);
+
+/// Adds a mesh to another by append() of both. @param elements  face elements of the file of
+/// `other`
+void append(TriangleSoup& soup, MeshAttributes& attributes, const TriangleSoup& other,
+            MeshAttributes other_attributes, std::uint64_t elements);
 
 }  // namespace strata

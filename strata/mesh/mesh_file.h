@@ -40,11 +40,17 @@ struct MeshReadOptions {
   std::size_t chunk_bytes = std::size_t{1} << 19;
   /// Parts, materials and colours are read too, into MeshFile::attributes.
   bool attributes = false;
+  bool list_parts = false;  ///< parts are read, with or without the other attributes
+  bool textures = true;     ///< with `attributes`: pictures are read; else materials have none
   /// Names of the parts to keep; empty: all. Parts of OBJ, STL, 3MF, AMF and glTF files have names.
+  /// A name also keeps the parts whose names begin with it and "/": the groups of an OBJ object.
   std::vector<std::string> parts{};
   /// Files that a mesh names (materials, textures, buffers) must lie in this folder, links
   /// followed; empty: any folder.
   std::string root{};
+
+  /// Whether a reader fills MeshAttributes::parts and part_ranges.
+  [[nodiscard]] bool wants_parts() const { return attributes || list_parts || !parts.empty(); }
 };
 
 /// Statistics of the reader. Dropped faces are counted by cause, one cause per face, in the order
@@ -64,6 +70,7 @@ struct MeshReadStats {
   std::uint64_t non_planar =
       0;  ///< polygons that deviate from a plane by more than 1/1000 of their size
   std::vector<std::string> warnings;  ///< sentences with places, for the user
+  std::vector<std::string> missing;   ///< sentences: files that it names and that are not there
   double unit_metres = 0.0;  ///< length of the file's unit in metres; 0: the file does not say
   bool y_up = false;         ///< the format says that y is up: glTF
 
@@ -77,7 +84,7 @@ struct MeshReadStats {
 struct MeshFile {
   TriangleSoup soup;                 ///< its triangles
   MeshReadStats stats;               ///< counts and warnings
-  MeshAttributes attributes;         ///< with MeshReadOptions::attributes
+  MeshAttributes attributes;         ///< as MeshReadOptions asks
   std::vector<FileIdentity> opened;  ///< other files that were read: materials, textures, buffers
 };
 

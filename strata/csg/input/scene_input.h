@@ -52,6 +52,7 @@ struct SceneInput {
   MeshPlacement placement;                 ///< of meshes, and of scenes but for their unit
   std::vector<std::string> parts;          ///< names of the parts of meshes to keep; empty: all
   bool attributes = false;                 ///< read parts, materials and colours of meshes
+  bool textures = true;                    ///< with `attributes`: and their pictures
   /// A Boolean expression over the files, such as "a - b"; empty: their union.
   std::string expression;
 };
@@ -62,7 +63,7 @@ struct InputMessages {
   std::function<void(std::string code, std::string message)> warn;
   std::function<void(std::string_view line)> note;  ///< a sentence about a file that was read
   std::function<void(std::string_view line)> echo;  ///< a line that a scene's program prints
-  /// The files that a scene has opened; a failure ends the work.
+  /// The files that a scene or a mesh has opened; a failure ends the work.
   std::function<Result<void>(std::span<const FileIdentity> files)> opened;
 };
 
@@ -94,7 +95,8 @@ struct InputFacts {
   /// True for a scene. Then `stats` has only format, bytes, vertices and triangles, and area,
   /// volume and zero_area_faces are not known.
   bool is_scene = false;
-  MeshAttributes attributes;  ///< with SceneInput::attributes
+  /// With SceneInput::attributes; of load_solids() only the parts, and SolidInput has the rest.
+  MeshAttributes attributes;
 };
 
 /// Checks whether a mesh is closed and faces outward. Reverses what is inside out, unless

@@ -10,7 +10,7 @@
 #include "strata/core/result.h"
 #include "strata/csg/picture/picture.h"
 #include "strata/csg/scene/scene.h"
-#include "strata/mesh/materials/read_materials.h"
+#include "strata/mesh/mesh_attributes.h"
 #include "strata/raster/view.h"
 #include "strata/transparency/stream/frame.h"
 
@@ -26,8 +26,9 @@ struct SeeThroughOptions {
   /// that are not closed. False: what is seen are the surfaces of the operands of the unions at the
   /// top, as the pictures of Preview show them.
   bool all_faces = false;
-  /// With all_faces: the materials of the first solids of the tree.
-  std::vector<FaceMaterials> materials = {};
+  /// With all_faces: those of the meshes of the first solids of the tree. Materials count, their
+  /// textures do not.
+  std::vector<MeshAttributes> attributes = {};
 };
 
 /// A scene whose parts are seen through, for techniques of order-independent transparency.
