@@ -19,63 +19,6 @@ bool finite(const glm::dvec3& p) {
   return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
 }
 
-Result<void> check_request(const GridRequest& request) {
-  const int sizes = int{request.resolution.has_value()} + int{request.voxel_size.has_value()} +
-                    int{request.dims.has_value()};
-  if (sizes != 1) {
-    return fail(ErrorCode::kUsage,
-                "exactly one of resolution, voxel size and grid must be given, got {}", sizes);
-  }
-  if (request.resolution && *request.resolution < 1) {
-    return fail(ErrorCode::kUsage, "the resolution must be at least 1 voxel, got {}",
-                *request.resolution);
-  }
-  if (request.padding < 0) {
-    return fail(ErrorCode::kUsage, "the padding must be at least 0 voxels, got {}",
-                request.padding);
-  }
-  if (request.padding >= kMaxGridSide / 2) {
-    return fail(ErrorCode::kLimit,
-                "a padding of {} voxels is too large: a grid has at most {} along a side",
-                request.padding, kMaxGridSide);
-  }
-  for (int axis = 0; axis < 3; ++axis) {
-    if (request.voxel_size && !((*request.voxel_size)[axis] > 0.0)) {
-      return fail(ErrorCode::kUsage, "the voxel size along {1} must be above 0, got {0}",
-                  (*request.voxel_size)[axis], kAxisNames[axis]);
-    }
-    if (request.voxel_size && !std::isfinite((*request.voxel_size)[axis])) {
-      return fail(ErrorCode::kUsage, "the voxel size along {1} must be finite, got {0}",
-                  (*request.voxel_size)[axis], kAxisNames[axis]);
-    }
-    if (!request.dims) continue;
-    const std::int64_t count = (*request.dims)[static_cast<std::size_t>(axis)];
-    if (count < 1) {
-      return fail(ErrorCode::kUsage, "the grid must have at least 1 voxel along {1}, got {0}",
-                  count, kAxisNames[axis]);
-    }
-    if (count <= 2 * request.padding) {
-      return fail(ErrorCode::kUsage, "the {} voxels of the grid along {} are all padding", count,
-                  kAxisNames[axis]);
-    }
-    if (count > kMaxGridSide) {
-      return fail(ErrorCode::kLimit, "the grid must have at most {2} voxels along {1}, got {0}",
-                  count, kAxisNames[axis], kMaxGridSide);
-    }
-  }
-  if (request.align && request.dims) {
-    return fail(ErrorCode::kUsage, "a grid of fixed size cannot be aligned; give the voxel size");
-  }
-  if (request.align && request.origin) {
-    return fail(ErrorCode::kUsage, "an origin and alignment cannot be combined");
-  }
-  if (request.origin && !finite(*request.origin)) {
-    return fail(ErrorCode::kUsage, "the origin ({}, {}, {}) must be finite", request.origin->x,
-                request.origin->y, request.origin->z);
-  }
-  return {};
-}
-
 /// The box that the grid shall cover.
 Result<Bounds> covered_box(const Bounds& mesh_bounds, const GridRequest& request) {
   const bool given = request.bounds.has_value();
@@ -145,8 +88,65 @@ Result<glm::dvec3> voxel_size_for(const Bounds& box, const GridRequest& request)
 
 }  // namespace
 
+Result<void> check_grid_request(const GridRequest& request) {
+  const int sizes = int{request.resolution.has_value()} + int{request.voxel_size.has_value()} +
+                    int{request.dims.has_value()};
+  if (sizes != 1) {
+    return fail(ErrorCode::kUsage,
+                "exactly one of resolution, voxel size and grid must be given, got {}", sizes);
+  }
+  if (request.resolution && *request.resolution < 1) {
+    return fail(ErrorCode::kUsage, "the resolution must be at least 1 voxel, got {}",
+                *request.resolution);
+  }
+  if (request.padding < 0) {
+    return fail(ErrorCode::kUsage, "the padding must be at least 0 voxels, got {}",
+                request.padding);
+  }
+  if (request.padding >= kMaxGridSide / 2) {
+    return fail(ErrorCode::kLimit,
+                "a padding of {} voxels is too large: a grid has at most {} along a side",
+                request.padding, kMaxGridSide);
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    if (request.voxel_size && !((*request.voxel_size)[axis] > 0.0)) {
+      return fail(ErrorCode::kUsage, "the voxel size along {1} must be above 0, got {0}",
+                  (*request.voxel_size)[axis], kAxisNames[axis]);
+    }
+    if (request.voxel_size && !std::isfinite((*request.voxel_size)[axis])) {
+      return fail(ErrorCode::kUsage, "the voxel size along {1} must be finite, got {0}",
+                  (*request.voxel_size)[axis], kAxisNames[axis]);
+    }
+    if (!request.dims) continue;
+    const std::int64_t count = (*request.dims)[static_cast<std::size_t>(axis)];
+    if (count < 1) {
+      return fail(ErrorCode::kUsage, "the grid must have at least 1 voxel along {1}, got {0}",
+                  count, kAxisNames[axis]);
+    }
+    if (count <= 2 * request.padding) {
+      return fail(ErrorCode::kUsage, "the {} voxels of the grid along {} are all padding", count,
+                  kAxisNames[axis]);
+    }
+    if (count > kMaxGridSide) {
+      return fail(ErrorCode::kLimit, "the grid must have at most {2} voxels along {1}, got {0}",
+                  count, kAxisNames[axis], kMaxGridSide);
+    }
+  }
+  if (request.align && request.dims) {
+    return fail(ErrorCode::kUsage, "a grid of fixed size cannot be aligned; give the voxel size");
+  }
+  if (request.align && request.origin) {
+    return fail(ErrorCode::kUsage, "an origin and alignment cannot be combined");
+  }
+  if (request.origin && !finite(*request.origin)) {
+    return fail(ErrorCode::kUsage, "the origin ({}, {}, {}) must be finite", request.origin->x,
+                request.origin->y, request.origin->z);
+  }
+  return {};
+}
+
 Result<VoxelGrid> fit_grid(const Bounds& mesh_bounds, const GridRequest& request) {
-  if (auto valid = check_request(request); !valid) return tl::unexpected(valid.error());
+  if (auto valid = check_grid_request(request); !valid) return tl::unexpected(valid.error());
   const auto box = covered_box(mesh_bounds, request);
   if (!box) return tl::unexpected(box.error());
   const auto size = voxel_size_for(*box, request);

@@ -387,6 +387,9 @@ GridRequest grid_request(const Words& words, Reader& reader) {
     reader.take(parse_integer("--padding", words.padding), grid.padding);
   }
   grid.align = words.align;
+  // Limits are no mistakes of the command line, and have another exit code.
+  const auto valid = check_grid_request(grid);
+  if (!valid && valid.error().code == ErrorCode::kUsage) reader.fail_with(valid.error().message);
   return grid;
 }
 

@@ -105,7 +105,7 @@ constexpr Rule kRules[] = {
      "hide a solid, given by a part of its name, @index or all"},
     {"show", Action::kShow, Form::kWord, "SOLID", "show a hidden solid again, named as for hide"},
     {"colour", Action::kColour, Form::kColour, "SOLID COLOUR",
-     "colour a solid: #rrggbb, #rrggbbaa or none"},
+     "colour a solid: #rgb, #rrggbb, #rrggbbaa or none"},
     {"pick", Action::kPick, Form::kTwoNumbers, "X Y", "print the solid, triangle and position"},
     {"reload", Action::kReload, Form::kNone, "", "load the files again, and wait"},
     {"cancel", Action::kCancel, Form::kNone, "", "stop loading"},
@@ -392,12 +392,9 @@ class Line {
     }
   }
   Result<void> check_colour(const std::string& word) const {
-    if (word == "none") return {};
-    const bool hex = (word.size() == 7 || word.size() == 9) && word[0] == '#' &&
-                     word.find_first_not_of("0123456789abcdefABCDEF", 1) == std::string::npos;
-    if (hex) return {};
-    return fail(ErrorCode::kUsage, "{}: the colour must be #rrggbb, #rrggbbaa or none, got '{}'",
-                where_, word);
+    if (word == "none" || parse_colour(word)) return {};
+    return fail(ErrorCode::kUsage,
+                "{}: the colour must be #rgb, #rrggbb, #rrggbbaa or none, got '{}'", where_, word);
   }
 
   const Rule& rule_;

@@ -152,12 +152,16 @@ std::string numbers_json(const Viewer& viewer) {
   json.member("empty", numbers.empty);
   for (const auto& [name, value] :
        {std::pair("size_x", numbers.size.x), std::pair("size_y", numbers.size.y),
-        std::pair("size_z", numbers.size.z), std::pair("volume", numbers.volume),
-        std::pair("area", numbers.area)}) {
+        std::pair("size_z", numbers.size.z), std::pair("volume", numbers.volume)}) {
     json.member(name, value);
   }
-  json.member("open_holes", numbers.open_holes);
-  json.member("triangles", viewer.model()->triangles);
+  if (viewer.model()->voxels) {
+    json.member("voxels", numbers.voxels);
+  } else {
+    json.member("area", numbers.area);
+    json.member("open_holes", numbers.open_holes);
+    json.member("triangles", viewer.model()->triangles);
+  }
   json.member("material", viewer.material().name);
   json.member("weight_g", weight_of(numbers, viewer.material()));
   json.end_object();

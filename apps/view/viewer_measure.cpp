@@ -6,7 +6,10 @@
 
 namespace strata::view {
 
-void Viewer::take_up(Tool tool) { board_.take_up(board_.tool() == tool ? Tool::kNone : tool); }
+void Viewer::take_up(Tool tool) {
+  const bool voxel_file = model_ != nullptr && model_->voxels != nullptr;  // it has no surfaces
+  board_.take_up(voxel_file || board_.tool() == tool ? Tool::kNone : tool);
+}
 
 void Viewer::measure_at(const glm::ivec2& pixel) {
   const bool outside =

@@ -29,6 +29,9 @@ struct GridRequest {
   bool align = false;        ///< the origin becomes a multiple of the voxel size, at most one lower
 };
 
+/// Checks what can be told of a request without a mesh. @return kUsage or kLimit, as fit_grid()
+Result<void> check_grid_request(const GridRequest& request);
+
 /// The grid for a request. Its cells cover the box from the lower corner on, each side with the
 /// least whole number of voxels; a part that reaches less than half a lattice step (1/512 voxel)
 /// into a further voxel is snapped onto its border and needs no voxel. A side without length gets

@@ -97,7 +97,7 @@ void Panels::side(Viewer& viewer, const glm::ivec2& window) {
   if (ImGui::CollapsingHeader("Appearance", open)) look(viewer);
   if (ImGui::CollapsingHeader("Section", open)) section(viewer);
   if (ImGui::CollapsingHeader("Picked", open)) picked(viewer);
-  if (ImGui::CollapsingHeader("Measure", open)) measure(viewer);
+  if (!voxel_file && ImGui::CollapsingHeader("Measure", open)) measure(viewer);
   if (ImGui::CollapsingHeader("Export")) exports(viewer);
   if (!voxel_file && ImGui::CollapsingHeader("Transparency")) transparency(viewer);
   if (ImGui::CollapsingHeader("Times and lists")) statistics(viewer);

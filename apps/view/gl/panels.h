@@ -47,6 +47,7 @@ class Panels {
   static void transparency(Viewer& viewer);
   void section(Viewer& viewer);
   void look(Viewer& viewer);
+  void surfaces(Viewer& viewer);
   void picked(Viewer& viewer);
   void solids(Viewer& viewer);
   void exports(Viewer& viewer);

@@ -43,20 +43,41 @@ void Panels::camera(Viewer& viewer) {
 
 void Panels::look(Viewer& viewer) {
   const float third = share(3);
+  const bool voxel_file = viewer.model() != nullptr && viewer.model()->voxels != nullptr;
+  if (!voxel_file) surfaces(viewer);
+  if (toggle("Axes", viewer.show_axes, third)) viewer.show_axes = !viewer.show_axes;
+  hint("ctrl+2");
+  ImGui::SameLine();
+  if (ImGui::Button(viewer.light_look ? "Dark###look" : "Light###look", {third, 0})) {
+    viewer.light_look = !viewer.light_look;
+    remember_look(viewer.folders(), viewer.light_look ? "light" : "dark");
+  }
+  hint("colours of the panels");
+  const csg::ColourScheme* scheme = viewer.picture_options().scheme;
+  if (scheme == nullptr) scheme = &csg::default_scheme();
+  ImGui::SetNextItemWidth(-1);
+  if (ImGui::BeginCombo("##scheme", scheme->name.data())) {
+    for (const csg::ColourScheme& one : csg::colour_schemes()) {
+      if (ImGui::Selectable(one.name.data(), &one == scheme)) viewer.set_scheme(&one);
+    }
+    ImGui::EndCombo();
+  }
+  hint("colours of the picture");
+}
+
+void Panels::surfaces(Viewer& viewer) {
+  const float half = share(2);
   Looks looks = viewer.looks();
-  if (toggle("Edges", viewer.picture_options().edges, third)) {
+  if (toggle("Edges", viewer.picture_options().edges, half)) {
     viewer.set_edges(!viewer.picture_options().edges);
   }
   hint("e");
   ImGui::SameLine();
-  if (toggle("Ghosts", looks.ghosts, third)) {
+  if (toggle("Ghosts", looks.ghosts, half)) {
     looks.ghosts = !looks.ghosts;
     viewer.set_looks(looks);
   }
   hint("show subtracted solids; g");
-  ImGui::SameLine();
-  if (toggle("Axes", viewer.show_axes, third)) viewer.show_axes = !viewer.show_axes;
-  hint("ctrl+2");
   const float fourth = share(4);
   const auto heat = [&](const char* label, Heat map, const char* keys) {
     if (toggle(label, viewer.heat() == map, fourth)) viewer.set_heat(map);
@@ -70,22 +91,6 @@ void Panels::look(Viewer& viewer) {
   ImGui::SameLine();
   heat("Depth", Heat::kDepth, "depth complexity: crossings of all solids; d");
   heat_range(viewer);
-  const csg::ColourScheme* scheme = viewer.picture_options().scheme;
-  if (scheme == nullptr) scheme = &csg::default_scheme();
-  ImGui::SetNextItemWidth(share(3) * 2 + ImGui::GetStyle().ItemSpacing.x);
-  if (ImGui::BeginCombo("##scheme", scheme->name.data())) {
-    for (const csg::ColourScheme& one : csg::colour_schemes()) {
-      if (ImGui::Selectable(one.name.data(), &one == scheme)) viewer.set_scheme(&one);
-    }
-    ImGui::EndCombo();
-  }
-  hint("colours of the picture");
-  ImGui::SameLine();
-  if (ImGui::Button(viewer.light_look ? "Dark###look" : "Light###look", {third, 0})) {
-    viewer.light_look = !viewer.light_look;
-    remember_look(viewer.folders(), viewer.light_look ? "light" : "dark");
-  }
-  hint("colours of the panels");
 }
 
 void Panels::transparency(Viewer& viewer) {

@@ -278,6 +278,10 @@ Looks carry_over(const Looks& looks, const Model& before, const Model& after) {
 }
 
 std::optional<glm::vec4> parse_colour(std::string_view text) {
+  if (text.size() == 4 && text[0] == '#') {
+    const std::string twice = {'#', text[1], text[1], text[2], text[2], text[3], text[3]};
+    return parse_colour(twice);
+  }
   if ((text.size() != 7 && text.size() != 9) || text[0] != '#') return {};
   glm::vec4 colour(1.0f);
   for (std::size_t i = 1; i < text.size(); i += 2) {

@@ -33,6 +33,16 @@ double weight_of(const PartNumbers& numbers, const Material& material) {
 }
 
 Result<PartNumbers> measure_part(const Arrangement& what, const Execution& execution) {
+  if (what.voxels) {
+    const auto set = what.voxels->solid(what.voxel_looks.threshold, execution);
+    const glm::dvec3 side = set->grid().voxel_size;
+    PartNumbers numbers;
+    numbers.voxels = set->solid_voxels();
+    numbers.empty = numbers.voxels == 0;
+    numbers.volume = static_cast<double>(numbers.voxels) * side.x * side.y * side.z;
+    if (!numbers.empty) numbers.size = what.voxels->box().high - what.voxels->box().low;
+    return numbers;
+  }
   const auto measured = csg::exact_measures(what.tree, what.tree.root(), {}, execution);
   if (!measured) return tl::unexpected(measured.error());
   PartNumbers numbers;

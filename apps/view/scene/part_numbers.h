@@ -27,14 +27,15 @@ struct Material {
 /// Null when there is none of that name (case does not matter).
 [[nodiscard]] const Material* find_material(std::string_view name);
 
-/// The numbers of a part, exact on the lattice of csg::exact_measures(). World units are
-/// millimetres where weights are given.
+/// The numbers of a part, exact on the lattice of csg::exact_measures(), or of voxels. World units
+/// are millimetres where weights are given.
 struct PartNumbers {
   bool empty = true;
   glm::dvec3 size{0};
   double volume = 0, area = 0;   ///< of the result
   glm::dvec3 centre{0};          ///< of mass
   std::uint64_t open_holes = 0;  ///< of the solids: closed to measure
+  std::uint64_t voxels = 0;  ///< solid ones of a file of voxels, which has no area and no centre
 };
 /// In grams.
 [[nodiscard]] double weight_of(const PartNumbers& numbers, const Material& material);

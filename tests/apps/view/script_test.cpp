@@ -76,7 +76,7 @@ TEST(Script, MistakesNameFileAndLine) {
   EXPECT_EQ(error_of("resize 0 5"),
             "drive.txt:1: the window must be 1 to 16384 pixels wide and high, got 0 x 5");
   EXPECT_EQ(error_of("colour @1 red"),
-            "drive.txt:1: the colour must be #rrggbb, #rrggbbaa or none, got 'red'");
+            "drive.txt:1: the colour must be #rgb, #rrggbb, #rrggbbaa or none, got 'red'");
   EXPECT_NE(error_of("view sideways").find("drive.txt:1: unknown view 'sideways'"),
             std::string::npos);
   EXPECT_NE(error_of("section q=1").find("drive.txt:1: "), std::string::npos);

@@ -65,6 +65,9 @@ TEST_F(Voxels, MistakesSayWhatMustBe) {
   EXPECT_EQ(run.exit_code, 2);
   EXPECT_NE(run.err.find("these voxels have no values, but are mask"), std::string::npos)
       << run.err;
+  run = window("l.vdb", "distance 300 300 310 310\n");
+  EXPECT_EQ(run.exit_code, 2);
+  EXPECT_NE(run.err.find("distance measures surfaces"), std::string::npos) << run.err;
   run = window("part.csg", "slice k=1\n");
   EXPECT_EQ(run.exit_code, 2);
   EXPECT_NE(run.err.find("no file of voxels"), std::string::npos) << run.err;
