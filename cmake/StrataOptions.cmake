@@ -10,6 +10,7 @@ option(STRATA_WITH_OPENVDB "A bridge to OpenVDB; comparisons in tests and benchm
 option(STRATA_WITH_OPENEXR "Read and write deep .exr files" ON)
 option(STRATA_WITH_OPENMESH "Build the OpenMesh bridge" ON)
 option(STRATA_WITH_GL "Build the OpenGL part: libepoxy, EGL; the window: GLFW, Dear ImGui" ON)
+option(STRATA_WITH_PYTHON "Build the Python package" ${STRATA_BUILD_TESTS})
 option(STRATA_JOIN_SOURCES "Compile several sources of a target as one: a whole build in half the time" OFF)
 option(STRATA_EXACT_NO_FILTERS "Take every exact sign from integers; no result may change" OFF)
 set(STRATA_SANITIZE "" CACHE STRING "Sanitizers, as for -fsanitize=")
