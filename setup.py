@@ -1,6 +1,7 @@
 """Builds the Python package by CMake; pyproject.toml says the rest.
 
 STRATA_BUILD_FOLDER names a build folder to use again, such as build/wheel. STRATA_CMAKE_ARGUMENTS are added to CMake's.
+STRATA_PYTHON_MODULE names a native part that is built already; nothing is compiled then.
 """
 import os
 import re
@@ -25,6 +26,15 @@ class BuildByCMake(build_ext):
     """The native part of the package, from the libraries' sources."""
 
     def build_extension(self, extension):
+        target = os.path.abspath(self.get_ext_fullpath(extension.name))
+        os.makedirs(os.path.dirname(target), exist_ok=True)
+        shutil.copyfile(os.environ.get("STRATA_PYTHON_MODULE") or self.built(os.path.basename(target)), target)
+        strip = shutil.which("strip")
+        if strip:
+            subprocess.run([strip, "--strip-unneeded", target], check=True)
+
+    def built(self, name):
+        """The native part, compiled."""
         folder = os.environ.get("STRATA_BUILD_FOLDER") or os.path.join(os.path.abspath(self.build_temp), "strata")
         jobs = os.environ.get("STRATA_JOBS") or str(os.cpu_count() or 1)
         generator = ["-G", "Ninja"] if shutil.which("ninja") else []
@@ -44,15 +54,10 @@ class BuildByCMake(build_ext):
         words += shlex.split(os.environ.get("STRATA_CMAKE_ARGUMENTS", ""))
         subprocess.run(["cmake", "-S", ROOT, "-B", folder, *generator, *words], check=True)
         subprocess.run(["cmake", "--build", folder, "-j", jobs, "--target", "strata_python"], check=True)
-        target = os.path.abspath(self.get_ext_fullpath(extension.name))
-        os.makedirs(os.path.dirname(target), exist_ok=True)
-        made = os.path.join(folder, "python", "strata", os.path.basename(target))
+        made = os.path.join(folder, "python", "strata", name)
         if not os.path.exists(made):
             raise RuntimeError(f"{made} was not built: pybind11-dev, python3-dev and python3-numpy are needed")
-        shutil.copyfile(made, target)
-        strip = shutil.which("strip")
-        if strip:
-            subprocess.run([strip, "--strip-unneeded", target], check=True)
+        return made
 
 
 setup(

@@ -3,201 +3,50 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/matrix.hpp>
-#include <limits>
+#include <map>
 
-#include "core/printable.h"
 #include "picture/encode_png.h"
 #include "python/call.h"
 #include "python/data.h"
-#include "strata/csg/solid_lists.h"
-#include "strata/raster/lattice_mesh.h"
 #include "strata/voxelize/checksum.h"
 #include "strata/voxelize/formats/voxel_writer.h"
 #include "strata/voxelize/picture/voxel_picture.h"
 #include "strata/voxelize/readers/read_voxels.h"
-#include "strata/voxelize/voxelize.h"
-#include "voxelize/open/lost_walls.h"
 
 namespace strata::python {
 
-// --- made from meshes and trees ------------------------------------------------------------------
-
-namespace {
-
-/// What voxelize() takes beside the mesh and the grid.
-struct VoxelChoice {
-  bool solid = true, surface = false, ids = false;
-  std::string open, surface_kind;
-};
-
-VoxelizeOptions options_of(const VoxelChoice& choice) {
-  VoxelizeOptions options;
-  options.solid = choice.solid;
-  options.surface = choice.surface;
-  if (!choice.solid && !choice.surface) {
-    refuse(ErrorCode::kUsage, "solid and surface must not both be False");
-  }
-  constexpr std::pair<const char*, OpenMode> kModes[] = {
-      {"vote", OpenMode::kVote}, {"surface", OpenMode::kSurface}, {"fail", OpenMode::kFail}};
-  const auto mode = std::find_if(std::begin(kModes), std::end(kModes),
-                                 [&](const auto& m) { return choice.open == m.first; });
-  if (mode == std::end(kModes)) {
-    refuse(ErrorCode::kUsage,
-           fmt::format("open must be 'vote', 'surface' or 'fail', got '{}'", choice.open));
-  }
-  options.open = mode->second;
-  constexpr std::pair<const char*, SurfaceKind> kKinds[] = {
-      {"conservative", SurfaceKind::kConservative},
-      {"26", SurfaceKind::k26},
-      {"6", SurfaceKind::k6}};
-  const auto kind = std::find_if(std::begin(kKinds), std::end(kKinds),
-                                 [&](const auto& k) { return choice.surface_kind == k.first; });
-  if (kind == std::end(kKinds)) {
-    refuse(ErrorCode::kUsage, fmt::format("surface_kind must be 'conservative', '26' or '6', got "
-                                          "'{}'",
-                                          choice.surface_kind));
-  }
-  options.surface_kind = kind->second;
-  return options;
-}
-
-/// Whether a mesh fits the lattice of a grid without clamping.
-bool fits_lattice(const Bounds& box, const VoxelGrid& grid) {
-  constexpr double kMost = kMaxLatticeCoordinate - 1.0;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double scale = kLatticeSteps / grid.voxel_size[axis];
-    if (!((box.high[axis] - grid.origin[axis]) * scale < kMost)) return false;
-    if (!((box.low[axis] - grid.origin[axis]) * scale > -kMost)) return false;
-  }
-  return true;
-}
-
-/// Keeps the slabs of a large set as long as they fit the memory.
-Result<VoxelIntervals> voxelize_large(const TriangleSoup& soup, const VoxelGrid& grid,
-                                      const VoxelizeOptions& options, const Execution& execution) {
-  VoxelIntervals all(grid, options.axis);
-  std::uint64_t bytes = 0;
-  const auto keep = [&](const VoxelIntervals& slab) -> Result<void> {
-    bytes += slab.memory_bytes();
-    if (bytes > execution.memory_limit) {
-      return fail(ErrorCode::kLimit,
-                  "the runs of the first {} of {} rows of voxels take {} bytes, the limit is {}",
-                  slab.v_end(), all.v_end(), bytes, execution.memory_limit);
-    }
-    const int first = slab.v_begin() / VoxelIntervals::kTileSide;
-    for (int tv = 0; tv < slab.tiles_v(); ++tv) {
-      for (int tu = 0; tu < slab.tiles_u(); ++tu) {
-        const VoxelIntervals::TileView tile = slab.tile(tu, tv);
-        if (!tile.offsets.empty()) {
-          all.set_tile(tu, first + tv, tile.offsets, tile.items, tile.labels);
+VoxelIntervals relabelled(const VoxelIntervals& set,
+                          const std::function<std::uint32_t(std::uint32_t)>& label,
+                          const Execution& execution) {
+  VoxelIntervals made(set.grid(), set.axis());
+  const auto tiles_u = static_cast<std::size_t>(set.tiles_u());
+  const auto one = [&](std::size_t index, int) {
+    const int tu = static_cast<int>(index % tiles_u), tv = static_cast<int>(index / tiles_u);
+    const VoxelIntervals::TileView tile = set.tile(tu, tv);
+    if (tile.items.empty()) return;
+    std::vector<std::uint32_t> offsets{0}, labels;
+    std::vector<Interval> items;
+    for (std::size_t local = 0; local < VoxelIntervals::kTileColumns; ++local) {
+      for (std::uint32_t i = tile.offsets[local]; i < tile.offsets[local + 1]; ++i) {
+        const std::uint32_t given = label(tile.label(i));
+        if (items.size() > offsets.back() && labels.back() == given &&
+            items.back().end() == tile.items[i].begin()) {
+          items.back().last = tile.items[i].last;
+          continue;
         }
+        items.push_back(tile.items[i]);
+        labels.push_back(given);
       }
+      offsets.push_back(static_cast<std::uint32_t>(items.size()));
     }
-    return {};
+    made.set_tile(tu, tv, offsets, items, labels);
   };
-  const auto done = voxelize_slabs(soup, grid, options, execution, keep);
-  if (!done) return tl::unexpected(done.error());
-  return all;
-}
-
-/// All voxels in one piece. The library's own voxelize() does not ask how large that becomes.
-Result<VoxelIntervals> voxelize_all(const TriangleSoup& soup, const VoxelGrid& grid,
-                                    const VoxelizeOptions& options, const Execution& execution) {
-  constexpr std::uint64_t kBytesOfColumn = 64;  // far more than most have
-  const auto columns =
-      static_cast<std::uint64_t>(grid.dims.x) * static_cast<std::uint64_t>(grid.dims.y);
-  if (columns * kBytesOfColumn > execution.memory_limit) {
-    return voxelize_large(soup, grid, options, execution);
-  }
-  return voxelize(soup, grid, options, execution);
-}
-
-std::string place(const glm::dvec3& p) {
-  return fmt::format("({:.6g}, {:.6g}, {:.6g})", p.x, p.y, p.z);
-}
-
-/// Tells of walls between voxel centres, as the tool does.
-Result<void> warn_of_walls(const TriangleSoup& soup, const VoxelGrid& grid,
-                           const LostWallOptions& search, const VoxelIntervals& set,
-                           Warnings& warnings, const Execution& execution) {
-  const auto lost = find_lost_walls(soup, grid, search, execution);
-  if (!lost) return tl::unexpected(lost.error());
-  if (lost->count > 0) {
-    const LostWall& wall = lost->largest.front();
-    warnings.push_back(fmt::format(
-        "{} thinner than a voxel fell between voxel centres; {} {:.3g} voxels thick along {}, from "
-        "{} to {}; surface=True keeps all of it",
-        counted(lost->count, "wall"), lost->count == 1 ? "it is" : "the largest is", wall.thickness,
-        "xyz"[static_cast<int>(wall.axis)], place(wall.low), place(wall.high)));
-  } else if (set.solid_voxels() == 0) {
-    warnings.push_back(
-        "no voxel is solid: the mesh lies outside the grid, or is thinner than a voxel");
-  }
-  return {};
-}
-
-}  // namespace
-
-// The mesh's own soup is not copied unless it has to be clamped.
-static std::pair<VoxelsPtr, Warnings> voxelize_mesh(const MeshData& mesh, const VoxelGrid& grid,
-                                                    const VoxelChoice& choice,
-                                                    const Limits& limits) {
-  VoxelizeOptions options = options_of(choice);
-  const csg::SolidInput& input = mesh.input;
-  options.rule = input.rule;
-  options.closedness = input.closed ? Closedness::kAssumeClosed : Closedness::kAssumeOpen;
-  Warnings warnings;
-  auto voxels = std::make_shared<VoxelsData>();
-  run(limits, [&](const Execution& execution) -> Result<void> {
-    TriangleSoup moved;
-    const TriangleSoup* soup = &input.soup;
-    if (!fits_lattice(input.bounds, grid)) {
-      moved = input.soup, soup = &moved;
-      if (auto done = fit_lattice(moved, input.bounds, grid, execution); !done) {
-        return tl::unexpected(done.error());
-      }
-    }
-    auto set = voxelize_all(*soup, grid, options, execution);
-    if (!set) return tl::unexpected(set.error());
-    voxels->volume.set = *std::move(set);
-    if (!input.closed || !choice.solid || choice.surface) return {};
-    LostWallOptions search;
-    search.rule = input.rule;
-    search.longest_edge = input.longest_edge;
-    return warn_of_walls(*soup, grid, search, voxels->volume.set, warnings, execution);
-  });
-  return {voxels, warnings};
-}
-
-static std::pair<VoxelsPtr, Warnings> voxelize_solid(const SolidData& solid, const VoxelGrid& grid,
-                                                     const VoxelChoice& choice,
-                                                     const Limits& limits) {
-  VoxelizeOptions options = options_of(choice);
-  const csg::Tree& tree = solid.scene.tree;
-  Warnings warnings;
-  auto voxels = std::make_shared<VoxelsData>();
-  run(limits, [&](const Execution& execution) -> Result<void> {
-    csg::SolidLists lists(tree, tree.root());
-    if (choice.ids) {
-      lists.set_labels(csg::id_labels(tree));
-      voxels->volume.kind = VoxelKind::kIds;
-    }
-    if (auto done = lists.fit(grid, nullptr, execution); !done) return done;
-    options.filter = &lists.filter();
-    options.closedness = Closedness::kAssumeClosed;
-    auto set = voxelize_all(lists.soup(), grid, options, execution);
-    if (!set) return tl::unexpected(set.error());
-    voxels->volume.set = *std::move(set);
-    if (!choice.solid || choice.surface) return {};
-    LostWallOptions search;
-    search.filter = &lists.unlabelled_filter();
-    search.taken_away = [&](std::uint32_t t) { return lists.is_subtracted(t); };
-    return warn_of_walls(lists.soup(), grid, search, voxels->volume.set, warnings, execution);
-  });
-  return {voxels, warnings};
+  parallel_for(execution, tiles_u * static_cast<std::size_t>(set.tiles_v()), one);
+  return made;
 }
 
 // --- made from arrays and files ------------------------------------------------------------------
@@ -326,25 +175,49 @@ py::array dense_values(const VoxelsData& voxels, const Limits& limits) {
   return column_major(std::move(values), py::dtype::of<float>(), grid.dims);
 }
 
-py::array dense(const VoxelsData& voxels, bool labels, const Limits& limits) {
+/// Labels as what they mean: fractions as floats, colours as four bytes. The bits stay in place.
+void give_meaning(const VoxelsData& voxels, std::vector<std::uint32_t>& labels,
+                  const Execution& execution) {
+  if (voxels.full == 0) return;
+  const double full = voxels.full;
+  constexpr std::size_t kBlock = std::size_t{1} << 20;
+  parallel_for(execution, (labels.size() + kBlock - 1) / kBlock, [&](std::size_t block, int) {
+    const std::size_t end = std::min(labels.size(), (block + 1) * kBlock);
+    for (std::size_t i = block * kBlock; i < end; ++i) {
+      labels[i] = std::bit_cast<std::uint32_t>(static_cast<float>(labels[i] / full));
+    }
+  });
+}
+
+py::array dense_mask(const VoxelsData& voxels, const Limits& limits) {
   const VoxelIntervals& set = voxels.volume.set;
-  const auto each = labels ? sizeof(std::uint32_t) : 1;
-  const auto checked = [&](const Execution& execution) {
-    return check_memory(set.grid(), each, execution.memory_limit);
-  };
-  if (labels) {
-    auto values =
-        run(limits, [&](const Execution& execution) -> Result<std::vector<std::uint32_t>> {
-          if (auto fits = checked(execution); !fits) return tl::unexpected(fits.error());
-          return to_dense_labels(set, execution);
-        });
-    return column_major(std::move(values), py::dtype::of<std::uint32_t>(), set.grid().dims);
-  }
   auto values = run(limits, [&](const Execution& execution) -> Result<std::vector<std::uint8_t>> {
-    if (auto fits = checked(execution); !fits) return tl::unexpected(fits.error());
+    if (auto fits = check_memory(set.grid(), 1, execution.memory_limit); !fits) {
+      return tl::unexpected(fits.error());
+    }
     return to_dense(set, execution);
   });
   return column_major(std::move(values), py::dtype::of<bool>(), set.grid().dims);
+}
+
+py::array dense_labels(const VoxelsData& voxels, const Limits& limits) {
+  const VoxelIntervals& set = voxels.volume.set;
+  const VoxelGrid& grid = set.grid();
+  auto values = run(limits, [&](const Execution& execution) -> Result<std::vector<std::uint32_t>> {
+    if (auto fits = check_memory(grid, sizeof(float), execution.memory_limit); !fits) {
+      return tl::unexpected(fits.error());
+    }
+    auto labels = to_dense_labels(set, execution);
+    if (labels) give_meaning(voxels, *labels, execution);
+    return labels;
+  });
+  if (voxels.rgba) {
+    const py::ssize_t x = grid.dims.x, y = grid.dims.y, z = grid.dims.z;
+    return array_of(std::move(values), py::dtype::of<std::uint8_t>(), {x, y, z, 4},
+                    {4, 4 * x, 4 * x * y, 1});
+  }
+  const py::dtype type = voxels.full != 0 ? py::dtype::of<float>() : py::dtype::of<std::uint32_t>();
+  return column_major(std::move(values), type, grid.dims);
 }
 
 /// A run of voxels: the first one, and how many.
@@ -405,6 +278,10 @@ py::array contains(const VoxelsData& voxels, const Values<double>& points, const
 
 // --- slices and pictures -------------------------------------------------------------------------
 
+Rgba unpacked(std::uint32_t label) {
+  return {label & 255, label >> 8 & 255, label >> 16 & 255, label >> 24};
+}
+
 void check_slice(const VoxelGrid& grid, int axis, std::int64_t index) {
   if (index < 0 || index >= grid.dims[axis]) {
     refuse(ErrorCode::kUsage, fmt::format("index must be 0 to {} along {}, got {}",
@@ -444,7 +321,15 @@ py::array slice_labels(const VoxelsData& voxels, int axis, int index, bool label
   }
   const std::vector<py::ssize_t> shape{static_cast<py::ssize_t>(width),
                                        static_cast<py::ssize_t>(height)};
-  if (labels) return array_of(std::move(ids), py::dtype::of<std::uint32_t>(), shape);
+  if (labels && voxels.rgba) {
+    return array_of(std::move(ids), py::dtype::of<std::uint8_t>(), {shape[0], shape[1], 4});
+  }
+  if (labels) {
+    give_meaning(voxels, ids, {.threads = 1});
+    const bool shares = voxels.full != 0;
+    return array_of(std::move(ids),
+                    shares ? py::dtype::of<float>() : py::dtype::of<std::uint32_t>(), shape);
+  }
   return array_of(std::move(mask), py::dtype::of<bool>(), shape);
 }
 
@@ -462,16 +347,51 @@ py::array slice_values(const VoxelsData& voxels, int axis, int index) {
   return array_of(std::move(values), py::dtype::of<float>(), {dims[plane.u], dims[plane.v]});
 }
 
-VoxelLook look_of(const VoxelsPtr& voxels) {
+/// The label of a voxel; 0: it is empty.
+std::uint32_t label_at(const VoxelIntervals& set, const glm::ivec3& at) {
+  const AxisFrame frame(set.axis());
+  std::uint32_t found = 0;
+  for_each_labelled(set, at[frame.u], at[frame.v],
+                    [&](const Interval& interval, std::uint32_t label) {
+                      if (interval.first <= at[frame.w] && at[frame.w] <= interval.last) {
+                        found = label;
+                      }
+                    });
+  return found;
+}
+
+/// The set as pictures take it, and its look. Colours become entries of a palette.
+std::pair<std::shared_ptr<const VoxelIntervals>, VoxelLook> shown(const VoxelsPtr& voxels,
+                                                                  const Execution& execution) {
   VoxelLook look;
+  std::shared_ptr<const VoxelIntervals> set(voxels, &voxels->volume.set);  // lives as long
+  if (voxels->rgba) {
+    std::map<std::uint32_t, std::uint32_t> entries;
+    for_each_run(*set, [&](const glm::ivec3&, const glm::ivec3&, std::uint32_t label) {
+      entries.try_emplace(label, 0);
+    });
+    for (auto& [colour, entry] : entries) {
+      look.colours.emplace_back(unpacked(colour));
+      entry = static_cast<std::uint32_t>(look.colours.size());
+    }
+    set = std::make_shared<const VoxelIntervals>(relabelled(
+        *set, [&](std::uint32_t label) { return entries.at(label); }, execution));
+    return {set, look};
+  }
   for (const glm::u8vec4& colour : voxels->volume.colours) look.colours.emplace_back(colour);
   if (!voxels->volume.values.empty()) {
     look.value = [voxels](const glm::ivec3& at) {
       return voxels->volume.values.value(at.x, at.y, at.z);
     };
     look.distances = voxels->volume.kind == VoxelKind::kDistances;
+  } else if (voxels->full != 0) {
+    look.source = VoxelColours::kPlain;
+    look.value = [voxels](const glm::ivec3& at) {
+      return static_cast<float>(label_at(voxels->volume.set, at)) /
+             static_cast<float>(voxels->full);
+    };
   }
-  return look;
+  return {set, look};
 }
 
 Picture voxel_picture(const VoxelsPtr& voxels, std::optional<std::pair<int, std::int64_t>> slice,
@@ -481,8 +401,8 @@ Picture voxel_picture(const VoxelsPtr& voxels, std::optional<std::pair<int, std:
   return run(limits, [&](const Execution& execution) -> Result<Picture> {
     const auto pixels = size_of(size[0], size[1]);
     if (!pixels) return tl::unexpected(pixels.error());
-    // The set lives as long as the voxels.
-    auto drawer = VoxelPicture::create({voxels, &voxels->volume.set}, look_of(voxels), execution);
+    auto [set, look] = shown(voxels, execution);
+    auto drawer = VoxelPicture::create(std::move(set), std::move(look), execution);
     if (!drawer) return tl::unexpected(drawer.error());
     VoxelPictureOptions options;
     options.samples = samples;
@@ -509,7 +429,11 @@ void save_voxels(const VoxelsData& voxels, const std::string& path, const Limits
       return fail(ErrorCode::kUsage,
                   "{}: voxels with numbers that were read from a file cannot be saved", path);
     }
-    if (set.has_labels()) {
+    if (voxels.full != 0) {
+      options.fog = voxels.full;
+    } else if (voxels.rgba) {
+      options.rgba = true;
+    } else if (set.has_labels()) {
       if (voxels.volume.kind == VoxelKind::kColours && !voxels.volume.colours.empty()) {
         options.colours = voxels.volume.colours;
       } else {
@@ -549,8 +473,8 @@ void bind_voxel_class(py::class_<VoxelsData, VoxelsPtr>& type) {
                return set_checksum(v.volume.set, execution);
              });
            })
-      .def("mask", [](const VoxelsData& v, const Limits& l) { return dense(v, false, l); })
-      .def("labels", [](const VoxelsData& v, const Limits& l) { return dense(v, true, l); })
+      .def("mask", &dense_mask)
+      .def("labels", &dense_labels)
       .def("values", &dense_values)
       .def("runs", &runs_of)
       .def("contains", &contains, py::arg("points"), py::arg("limits"))
@@ -619,12 +543,6 @@ void bind_choices(py::module_& module) {
            }),
            py::arg("eye"), py::arg("target"), py::arg("rotation"), py::arg("distance"),
            py::arg("fov"), py::arg("orthographic"));
-  py::class_<VoxelChoice>(module, "VoxelChoice")
-      .def(py::init([](bool solid, bool surface, bool ids, std::string open, std::string kind) {
-             return VoxelChoice{solid, surface, ids, std::move(open), std::move(kind)};
-           }),
-           py::arg("solid"), py::arg("surface"), py::arg("ids"), py::arg("open"),
-           py::arg("surface_kind"));
 }
 
 }  // namespace
@@ -634,9 +552,6 @@ void bind_voxels(py::module_& module) {
   bind_choices(module);
   py::class_<VoxelsData, VoxelsPtr> type(module, "Voxels");
   bind_voxel_class(type);
-  module.def("voxelize_mesh", &voxelize_mesh);
-  py::class_<SolidData, SolidPtr>(module, "Solid");
-  module.def("voxelize_solid", &voxelize_solid);
   module.def("voxels_of_mask", &voxels_of<bool>);
   module.def("voxels_of_labels", &voxels_of<std::uint32_t>);
   module.def("read_voxels", &read_voxel_file, py::arg("path"), py::arg("grid"),

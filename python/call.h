@@ -98,6 +98,7 @@ using Values = py::array_t<T, py::array::c_style>;
 
 void bind_meshes(py::module_& module);
 void bind_voxels(py::module_& module);
+void bind_voxelize(py::module_& module);
 void bind_lists(py::module_& module);
 void bind_solids(py::module_& module);
 

@@ -45,8 +45,16 @@ using SolidPtr = std::shared_ptr<SolidData>;
 struct VoxelsData {
   VoxelVolume volume;
   GridFrame frame;
+  /// Labels are filled fractions: label / full. 0: they are not.
+  std::uint32_t full = 0;
+  bool rgba = false;  ///< labels are packed colours
 };
 using VoxelsPtr = std::shared_ptr<VoxelsData>;
+
+/// The labels of a set, made anew; runs that then touch and are alike become one.
+[[nodiscard]] VoxelIntervals relabelled(const VoxelIntervals& set,
+                                        const std::function<std::uint32_t(std::uint32_t)>& label,
+                                        const Execution& execution);
 
 /// A camera as Python gives it; what is not given is found from what is to be seen.
 struct CameraChoice {

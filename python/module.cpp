@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "python/call.h"
+#include "python/data.h"
 
 namespace strata::python {
 
@@ -119,8 +120,10 @@ PYBIND11_MODULE(_strata, module) {
   module.attr("version") = STRATA_VERSION;
   py::class_<strata::python::Limits>(module, "Limits")
       .def(py::init<int, std::uint64_t>(), py::arg("threads"), py::arg("memory"));
+  py::class_<strata::python::SolidData, strata::python::SolidPtr>(module, "Solid");
   strata::python::bind_meshes(module);
   strata::python::bind_voxels(module);
+  strata::python::bind_voxelize(module);
   strata::python::bind_lists(module);
   strata::python::bind_solids(module);
 }

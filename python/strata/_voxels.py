@@ -176,7 +176,7 @@ class Voxels:
         Returns
         -------
         (nx, ny, nz) array
-            bool; uint32 for labels (0 is empty); float32 for values. x is next to x in memory (Fortran's order), as VTK
+            bool; uint32 for labels (0 is empty); float32 for values, which are 0 to 1 for fractions. x is next to x in memory (Fortran's order), as VTK
             and NRRD have it.
 
         Raises
@@ -387,6 +387,7 @@ def voxelize(
     surface: bool = False,
     surface_kind: Union[str, int] = "conservative",
     ids: bool = False,
+    coverage: Union[bool, int] = False,
     open: str = "vote",
     threads: int = 0,
     memory_limit: Optional[int] = None,
@@ -422,6 +423,9 @@ def voxelize(
         Every voxel that the surface touches; 26-separating; 6-separating, the thinnest.
     ids : bool
         Solids only: the label of a voxel is the number of the solid that it belongs to, from 1.
+    coverage : bool or {1, 2, 4, 8, 16}
+        Each voxel has the fraction of it that is filled, above 0: the mean over so many times so many rays, each of which
+        counts the length inside exactly. True: 8. `numpy` gives float32.
     open : {"vote", "surface", "fail"}
         What to do with a mesh that is not closed: caps and winding numbers decide; surface only; GeometryError.
     threads : int
@@ -450,6 +454,7 @@ def voxelize(
     from .csg import Solid
 
     limits = limits_of(threads, memory_limit)
+    rays = 8 * coverage if isinstance(coverage, (bool, np.bool_)) else integer_of(coverage, "coverage")
     if isinstance(mesh, Solid):
         shape, make = mesh, _strata.voxelize_solid
     else:
@@ -467,7 +472,7 @@ def voxelize(
         padding=padding,
         align=align,
     )
-    choice = _strata.VoxelChoice(bool(solid), bool(surface), bool(ids), str(open), str(surface_kind))
+    choice = _strata.VoxelChoice(bool(solid), bool(surface), bool(ids), rays, str(open), str(surface_kind))
     native, told = make(shape._native, grid, choice, limits)
     warn_of(told)
     return Voxels._of(native)

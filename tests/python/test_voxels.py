@@ -100,6 +100,33 @@ def test_pictures_are_pngs_of_what_is_there(knot_voxels):
         knot_voxels.picture(10, samples=3)
 
 
+def test_coverage_is_the_filled_fraction_of_each_voxel():
+    box = (CUBE_VERTICES * (2.5, 3.25, 1.5) + (0.5, 0, 0), cube_triangles())
+    voxels = strata.voxelize(box, like=strata.Grid((4, 4, 3)), coverage=True)
+    share = voxels.numpy()
+    assert share.dtype == np.float32 and voxels.kind == "fog"
+    along = [np.clip(np.minimum(np.arange(n) + 1, high) - np.maximum(np.arange(n), low), 0, 1)
+             for n, low, high in ((4, 0.5, 3), (4, 0, 3.25), (3, 0, 1.5))]
+    assert np.allclose(share, np.einsum("i,j,k->ijk", *along), atol=1e-6)
+    assert np.array_equal(voxels.slice("x", 1).numpy(), share[1])
+    assert np.array_equal(voxels.slice("z", 1).numpy(), share[:, :, 1])
+    assert voxels.picture(64).shape == (64, 64, 4) and voxels.slice("z", 1).picture(64).shape == (64, 64, 4)
+    fine = strata.voxelize(box, like=strata.Grid((4, 4, 3)), coverage=16).numpy()
+    assert np.allclose(fine, share, atol=1e-6)
+
+
+def test_coverage_is_saved_as_a_density(tmp_path, knot):
+    voxels = strata.voxelize(knot, resolution=40, coverage=4)
+    voxels.save(tmp_path / "fog.nrrd")
+    again = strata.read_voxels(tmp_path / "fog.nrrd", integers="values")
+    assert np.allclose(again.numpy() / again.numpy().max(), voxels.numpy(), atol=1 / 255)
+    assert voxels.numpy().sum() * np.prod(voxels.spacing) == pytest.approx(knot.volume, rel=1e-3)
+    with pytest.raises(strata.UsageError, match="coverage must be 1, 2, 4, 8 or 16 rays, got 3"):
+        strata.voxelize(knot, resolution=40, coverage=3)
+    with pytest.raises(strata.UsageError, match="ids and surface must be False"):
+        strata.voxelize(knot, resolution=40, coverage=True, surface=True)
+
+
 def test_like_gives_the_same_grid(knot_voxels):
     box = strata.voxelize((CUBE_VERTICES, cube_triangles()), like=knot_voxels)
     assert box.dims == knot_voxels.dims and np.array_equal(box.affine, knot_voxels.affine)
