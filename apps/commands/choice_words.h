@@ -41,14 +41,24 @@ inline constexpr std::pair<std::string_view, SolidFormat> kSolidFormatWords[] = 
     {"obj", SolidFormat::kObj},
     {"ply", SolidFormat::kPly},
     {"off", SolidFormat::kOff}};
-/// As a 3MF spells them.
-inline constexpr std::pair<std::string_view, LengthUnit> kUnitWords[] = {
+/// The words of --unit, and as a 3MF spells them.
+inline constexpr std::pair<std::string_view, LengthUnit> kLengthWords[] = {
+    {"um", LengthUnit::kMicron},
+    {"mm", LengthUnit::kMillimetre},
+    {"cm", LengthUnit::kCentimetre},
+    {"m", LengthUnit::kMetre},
+    {"in", LengthUnit::kInch},
+    {"ft", LengthUnit::kFoot},
     {"micron", LengthUnit::kMicron},
     {"millimeter", LengthUnit::kMillimetre},
     {"centimeter", LengthUnit::kCentimetre},
     {"meter", LengthUnit::kMetre},
     {"inch", LengthUnit::kInch},
     {"foot", LengthUnit::kFoot}};
+[[nodiscard]] constexpr double metres_of(LengthUnit unit) {
+  constexpr double kMetres[] = {1e-6, 1e-3, 1e-2, 1.0, 0.0254, 0.3048};
+  return kMetres[static_cast<int>(unit)];
+}
 inline constexpr std::pair<std::string_view, MeshMethod> kMeshMethodWords[] = {
     {"exact", MeshMethod::kExact}, {"contour", MeshMethod::kContour}};
 inline constexpr std::pair<std::string_view, csg::BoundaryFaceKind> kFaceKindWords[] = {

@@ -53,8 +53,7 @@ void read_output(const Words& words, MeshCommand& command, Reader& reader) {
         reader);
     if (!command.json) reader.fail_with("nothing to do: give -o FILE or --json");
     for (const auto& [given, name] :
-         {std::pair(!words.format.empty(), "--format"),
-          std::pair(!words.mesh.unit.empty(), "--unit"), std::pair(words.ids, "--ids"),
+         {std::pair(!words.format.empty(), "--format"), std::pair(words.ids, "--ids"),
           std::pair(words.mesh.colours, "--colours")}) {
       if (given) reader.fail_with(fmt::format("{} needs -o", name));
     }
@@ -69,12 +68,6 @@ void read_output(const Words& words, MeshCommand& command, Reader& reader) {
           "{}: meshes are written as .3mf, .stl, .obj, .ply or .off; --format chooses for other "
           "names{}",
           command.output, other_writer(command.output)));
-    }
-  }
-  if (!words.mesh.unit.empty()) {
-    reader.take(parse_choice("--unit", words.mesh.unit, kUnitWords), command.unit);
-    if (command.format != SolidFormat::k3mf) {
-      reader.fail_with("--unit needs a 3MF file; other formats hold no unit");
     }
   }
   const bool in_parts = words.ids || words.mesh.colours;
@@ -165,8 +158,6 @@ void define_mesh(CLI::App& app, Words& words) {
          "FILE", output);
   option("--format", words.format, "Format of the output (default: by the file's name)",
          choices(kSolidFormatWords), output);
-  option("--unit", mesh.unit, "Length of a unit of the input, for a 3MF (default: millimeter)",
-         choices(kUnitWords), output);
   app.add_flag("--colours,--colors", mesh.colours,
                "Give each face the colour of the solid it comes from: not in STL; an OBJ gets a "
                "second file, .mtl")

@@ -111,6 +111,7 @@ std::string_view meaningless(const Words& words, const PictureCommand& command) 
   if (command.frames > 0) return "--animate";
   if (command.measure_resolution) return "--measure";
   if (!command.input.scene.openscad_options.empty()) return "-D, -p and -P";
+  if (!words.csg.scene.placement.given().empty()) return words.csg.scene.placement.given();
   return words.csg.summary.empty() ? "" : "--summary";
 }
 

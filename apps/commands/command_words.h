@@ -20,7 +20,7 @@ namespace strata::apps {
 
 /// The options of `strata mesh` alone, as words. Empty: not given.
 struct MeshWords {
-  std::string method = "exact", faces, bits, unit, open;
+  std::string method = "exact", faces, bits, open;
   bool colours = false;
 };
 

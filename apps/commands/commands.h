@@ -91,10 +91,9 @@ enum class MeshMethod {
 struct MeshCommand {
   CommonOptions common;
   csg::SceneInput input;
-  std::string output;                         ///< empty: none, "-": standard output
-  SolidFormat format = SolidFormat::kAuto;    ///< of the output; kAuto: there is none
-  std::string materials;                      ///< a file beside an OBJ, for colours; empty: none
-  LengthUnit unit = LengthUnit::kMillimetre;  ///< of a 3MF
+  std::string output;                       ///< empty: none, "-": standard output
+  SolidFormat format = SolidFormat::kAuto;  ///< of the output; kAuto: there is none
+  std::string materials;                    ///< a file beside an OBJ, for colours; empty: none
   MeshMethod method = MeshMethod::kExact;
   csg::BoundaryOptions boundary;    ///< of the exact method
   GridRequest grid;                 ///< of the contour: its resolution or voxel size

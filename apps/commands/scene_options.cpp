@@ -68,6 +68,7 @@ void define_scene_options(CLI::App& app, SceneWords& words) {
                              const char* type, const char* group) {
     app.add_option(names, word, what)->type_name(type)->group(group);
   };
+  define_placement_options(app, words.placement);
   const char* input = "Input";
   option("--assets", words.assets,
          "Folder in which scenes look for files (default: the scene's own)", "FOLDER", input);
@@ -93,6 +94,9 @@ void define_scene_options(CLI::App& app, SceneWords& words) {
 }
 
 Result<void> read_scene_options(const SceneWords& words, csg::SceneInput& input) {
+  if (auto placed = read_placement_options(words.placement, input.placement); !placed) {
+    return placed;
+  }
   csg::ReadSceneOptions& scene = input.scene;
   scene.asset_folder = words.assets;
   scene.root_folder = words.root;

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "apps/commands/commands.h"
+#include "apps/commands/placement_options.h"
 #include "strata/core/result.h"
 
 namespace CLI {
@@ -17,9 +18,10 @@ struct SceneWords {
   std::string assets, root, scad_timeout;
   std::vector<std::string> definitions;  ///< -D
   std::string parameter_file, parameter_set, check_parameters, check_ranges;
+  PlacementWords placement;
 };
 
-/// Defines them, OpenSCAD's own in a group that says so.
+/// Defines them and those of the placement, OpenSCAD's own in a group that says so.
 void define_scene_options(CLI::App& app, SceneWords& words);
 
 /// Reads the words into `input`, whose files and format are set. @return kUsage

@@ -31,6 +31,8 @@ struct FileInfo {
   MeshReadStats stats;
   MeshDiagnosis found;
   Orientation orientation;
+  double world_metres = 0.0;       ///< length of the world's unit; 0: unknown
+  std::string unit_doubt;          ///< as csg::unit_doubt()
   std::optional<FileCheck> check;  ///< with --check
 };
 
@@ -49,6 +51,9 @@ std::string info_text(const FileInfo& info) {
        fmt::format("{}, {} different positions", found.vertices, found.welded_vertices));
   line("components", std::to_string(found.components));
   line("bounds", fmt::format("{} to {}", triple(found.bounds.low), triple(found.bounds.high)));
+  const std::string unit =
+      csg::describe_unit(info.stats.unit_metres, info.world_metres, info.unit_doubt);
+  if (!unit.empty()) line("unit", unit);
   line("area", fmt::format("{:.9g}", found.area));
   line("volume", fmt::format("{:.9g}{}", found.volume, found.closed ? "" : " (the mesh is open)"));
   line("orientation", !found.closed      ? "not known: the mesh is open"
@@ -115,6 +120,8 @@ void write_info(JsonWriter& json, const FileInfo& info) {
   json.member("low", found.bounds.low);
   json.member("high", found.bounds.high);
   json.end_object();
+  write_unit(json, info.stats.unit_metres, info.world_metres,
+             csg::unit_factor(info.stats.unit_metres, info.world_metres), info.unit_doubt);
   json.member("area", found.area);
   json.member("volume", found.volume);
   json.member("closed", found.closed);
@@ -252,7 +259,9 @@ Result<FileInfo> look_at(const std::string& path, const csg::InputKind& kind,
                          const InfoCommand& command, Session& session) {
   const double share =
       0.5 / static_cast<double>(std::max<std::size_t>(command.input.files.size(), 1));
-  auto file = csg::read_mesh_input(path, kind, command.input, session.execution("reading", share));
+  csg::SceneInput one = command.input;  // a file by itself
+  one.files = {path};
+  auto file = csg::read_mesh_input(path, kind, one, session.execution("reading", share));
   if (!file) return tl::unexpected(file.error());
   csg::warn_of_reading(path, file->stats, messages_of(session));
   Execution execution = session.execution("checking");
@@ -261,7 +270,10 @@ Result<FileInfo> look_at(const std::string& path, const csg::InputKind& kind,
                 std::move(file->stats),
                 diagnose(file->soup, execution),
                 orient_parts(file->soup, execution, {.change = false}),
+                csg::world_unit(one),
+                {},
                 {}};
+  info.unit_doubt = csg::unit_doubt(info.stats, one, info.found.bounds);
   if (session.interrupted()) return fail(ErrorCode::kCancelled, "stopped");
   if (command.common.strict && !info.found.closed) {
     session.warn("open", fmt::format("{}: the mesh is not closed: {} of {} edges are unbalanced",

@@ -30,6 +30,22 @@ void write_memory(JsonWriter& json,
   json.end_object();
 }
 
+void write_length(JsonWriter& json, std::string_view name, double metres) {
+  json.key(name);
+  metres > 0.0 ? json.value(metres) : json.null();
+}
+
+void write_unit(JsonWriter& json, double file_metres, double world_metres, double factor,
+                const std::string& doubt) {
+  json.key("unit").begin_object();
+  write_length(json, "file_metres", file_metres);
+  write_length(json, "world_metres", world_metres);
+  json.member("factor", factor);
+  json.key("doubt");
+  doubt.empty() ? json.null() : json.value(doubt);
+  json.end_object();
+}
+
 void write_warnings(JsonWriter& json, const Session& session) {
   json.key("warnings").begin_array();
   for (const Warning& warning : session.warnings()) {

@@ -28,6 +28,14 @@ void write_timings(JsonWriter& json, const Session& session,
 void write_memory(JsonWriter& json,
                   std::initializer_list<std::pair<std::string_view, std::uint64_t>> more = {});
 
+/// A length in metres; null where it is 0, not known.
+void write_length(JsonWriter& json, std::string_view name, double metres);
+
+/// "unit": of a mesh file, of the world, and what its numbers were multiplied by. @param doubt  of
+/// its size, or empty
+void write_unit(JsonWriter& json, double file_metres, double world_metres, double factor,
+                const std::string& doubt);
+
 /// "warnings": those of the session, in their order.
 void write_warnings(JsonWriter& json, const Session& session);
 

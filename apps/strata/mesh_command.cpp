@@ -6,6 +6,7 @@
 #include <map>
 #include <utility>
 
+#include "apps/commands/choice_words.h"
 #include "apps/session/file_conflicts.h"
 #include "apps/session/session.h"
 #include "apps/strata/allocation_failures.h"
@@ -253,6 +254,15 @@ Result<void> MeshRun::make_contour() {
   return input->closed ? warn_of_lost_walls(*input, options) : Result<void>();
 }
 
+/// The world's unit, which a 3MF states; the millimetre where it is not known.
+LengthUnit unit_of_output(const csg::SceneInput& input) {
+  const double metres = csg::world_unit(input);
+  for (const auto& [word, unit] : kLengthWords) {
+    if (metres_of(unit) == metres) return unit;
+  }
+  return LengthUnit::kMillimetre;
+}
+
 Result<void> MeshRun::write() {
   if (command_.output.empty()) return {};
   if (outcome_.mesh.triangles.empty()) {
@@ -262,7 +272,7 @@ Result<void> MeshRun::write() {
   const double begin = session_.milliseconds();
   SolidWriteOptions options;
   options.format = command_.format;
-  options.unit = command_.unit;
+  options.unit = unit_of_output(command_.input);
   options.materials = command_.materials;
   auto written =
       write_solid(command_.output, outcome_.mesh, options, session_.execution("writing", 1.0));

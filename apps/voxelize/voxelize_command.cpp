@@ -92,6 +92,14 @@ Result<void> check_open(const VoxelizeCommand& command, const csg::SolidInput& i
   return {};
 }
 
+/// Where lengths were given, says which files may be in another unit. With -r units do not matter.
+void tell_units(const VoxelizeCommand& command, const csg::SolidInput& input, Session& session) {
+  if (!command.grid.voxel_size && !command.grid.bounds && !command.grid.origin) return;
+  for (const csg::InputFacts& file : input.files) {
+    if (!file.unit_doubt.empty()) session.tell(fmt::format("{}: {}", file.path, file.unit_doubt));
+  }
+}
+
 /// The axis the format is written from, or the one with the fewest columns.
 Axis choose_axis(const VoxelizeCommand& command, const std::optional<VoxelFormat>& format,
                  const VoxelGrid& grid) {
@@ -198,6 +206,7 @@ Result<void> make_voxels(const VoxelizeCommand& command, Session& session) {
                                 session.execution("reading"));
   if (!input) return tl::unexpected(input.error());
   outcome.input = *std::move(input);
+  tell_units(command, outcome.input, session);
   if (auto valid = check_open(command, outcome.input, session); !valid) return valid;
   if (auto strict = session.check_strict(); !strict) return strict;
 

@@ -60,6 +60,7 @@ void write_input(JsonWriter& json, const csg::SolidInput& input) {
   json.member("low", input.bounds.low);
   json.member("high", input.bounds.high);
   json.end_object();
+  write_length(json, "unit_metres", input.unit_metres);
   json.key("files").begin_array();
   for (const csg::InputFacts& file : input.files) {
     json.begin_object();
@@ -81,6 +82,8 @@ void write_input(JsonWriter& json, const csg::SolidInput& input) {
       json.member("rule", word_of(kRuleWords, file.rule));
       json.member("area", file.area);
       json.member("volume", file.volume);
+      write_unit(json, file.stats.unit_metres, input.unit_metres,
+                 csg::unit_factor(file.stats.unit_metres, input.unit_metres), file.unit_doubt);
     }
     json.end_object();
   }
@@ -170,6 +173,9 @@ void tell_input(Lines& line, const VoxelizeCommand& command, const VoxelizeOutco
          fmt::format("{}: {} triangles, {} vertices, {}{}", printable(file.path),
                      grouped(file.stats.triangles), grouped(file.stats.vertices),
                      file.closed ? "closed" : "open", file.turned_around ? ", reversed" : ""));
+    const std::string unit =
+        csg::describe_unit(file.stats.unit_metres, outcome.input.unit_metres, file.unit_doubt);
+    if (!unit.empty()) line("unit", unit);
   }
   const std::string bounds =
       fmt::format("{} to {}", triple(outcome.input.bounds.low), triple(outcome.input.bounds.high));

@@ -193,6 +193,7 @@ Result<InputFacts> inspect_mesh(TriangleSoup& soup, MeshReadStats stats, const s
   facts.stats = std::move(stats);
   warn_of_reading(path, facts.stats, messages);
   facts.bounds = strata::bounds(soup, execution);
+  facts.unit_doubt = unit_doubt(facts.stats, input, facts.bounds);
   const auto take_measures = [&] {
     const SoupSums measures =
         sums_of(soup, 0.5 * facts.bounds.low + 0.5 * facts.bounds.high, execution);
@@ -227,7 +228,12 @@ Result<MeshFile> read_mesh_input(const std::string& path, const InputKind& kind,
   options.textures = input.textures;
   options.parts = input.parts;
   options.root = input.scene.root_folder;
-  return read_mesh(path, options, execution);
+  auto file = read_mesh(path, options, execution);
+  if (!file) return file;
+  if (auto placed = place_mesh(path, file->stats, input, file->soup, execution); !placed) {
+    return tl::unexpected(placed.error());
+  }
+  return file;
 }
 
 Result<InputFacts> load_mesh(const std::string& path, const InputKind& kind,

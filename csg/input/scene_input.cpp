@@ -71,7 +71,11 @@ Result<Scene> load_one(const std::string& path, const SceneInput& input,
   if (kind.is_scene) {
     auto scene = read_scene(path, input.scene, execution);
     execution.progress = {};
-    if (scene && told != nullptr) told->push_back(facts_of(path, *scene, input, execution));
+    if (!scene) return scene;
+    if (auto placed = place_scene(path, input, *scene); !placed) {
+      return tl::unexpected(placed.error());
+    }
+    if (told != nullptr) told->push_back(facts_of(path, *scene, input, execution));
     return scene;
   }
   if (input.format == MeshFormat::kAuto && path == "-") {

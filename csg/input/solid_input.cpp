@@ -61,6 +61,7 @@ MeshAttributes take_attributes(InputFacts& facts) {
 Result<SolidInput> load_meshes(const SceneInput& input, bool as_tree, const InputMessages& messages,
                                const Execution& execution) {
   SolidInput all;
+  all.unit_metres = world_unit(input);
   if (!as_tree) all.rule = input.rule;  // solids of a tree have their own
   std::vector<Solid> apart;             // those with a rule of their own, or all
   for (std::size_t i = 0; i < input.files.size(); ++i) {
@@ -142,6 +143,7 @@ Result<SolidInput> load_solids(const SceneInput& input, bool as_tree, const Inpu
   }
   const detail::Stopwatch watch;
   SolidInput all;
+  all.unit_metres = world_unit(input);
   auto scene = load_scene(input, messages, execution, &all.files);
   if (!scene) return tl::unexpected(scene.error());
   all.bounds = strata::csg::bounds(scene->tree, scene->tree.root());

@@ -92,6 +92,8 @@ struct InputFacts {
   std::uint64_t zero_area_faces = 0;   ///< triangles whose area is 0
   std::uint64_t unbalanced_edges = 0;  ///< as MeshDiagnosis::unbalanced_edges
   std::string open;  ///< a sentence that says what is not closed; empty where all is
+  /// A sentence where the mesh has an unlikely size and its unit is not known; see unit_doubt().
+  std::string unit_doubt;
   /// True for a scene. Then `stats` has only format, bytes, vertices and triangles, and area,
   /// volume and zero_area_faces are not known.
   bool is_scene = false;
@@ -107,8 +109,41 @@ Result<InputFacts> inspect_mesh(TriangleSoup& soup, MeshReadStats stats, const s
                                 const SceneInput& input, const InputMessages& messages = {},
                                 const Execution& execution = {});
 
-/// Reads one mesh file as the options say. @return as read_mesh(); kInput if neither its name nor
-/// the options give its format
+/// Length of the world's unit in metres, as MeshPlacement::unit_metres says; 0: unknown.
+[[nodiscard]] double world_unit(const SceneInput& input);
+
+/// How many of a unit another is, rounded once: 25.4 for inch and millimetre.
+[[nodiscard]] double unit_ratio(double from_metres, double to_metres);
+
+/// What the numbers of a file are multiplied by: unit_ratio(), or 1 where one of the two is not
+/// known.
+[[nodiscard]] double unit_factor(double file_metres, double world_metres);
+
+/// "um", "mm", "cm", "m", "in", "ft"; empty for other lengths.
+[[nodiscard]] std::string_view unit_symbol(double metres);
+
+/// Moves a mesh from its file's space to the world. A power of two and a turn are exact. Without a
+/// placement and where units agree, nothing changes.
+/// @return kGeometry naming `path`: beyond the range of double; kCancelled
+Result<void> place_mesh(const std::string& path, const MeshReadStats& stats,
+                        const SceneInput& input, TriangleSoup& soup,
+                        const Execution& execution = {});
+
+/// The same for a scene, whose numbers are in the world's unit.
+Result<void> place_scene(const std::string& path, const SceneInput& input, Scene& scene);
+
+/// A sentence where a mesh is too small or too large for millimetres, and nothing says its unit or
+/// scales it: "0.021 long; the file says nothing about units; if it is in metres, give ...". Else
+/// empty. @param bounds  of the mesh in the world
+[[nodiscard]] std::string unit_doubt(const MeshReadStats& stats, const SceneInput& input,
+                                     const Bounds& bounds);
+
+/// For reports: the world's unit, and whether a file was converted to it. Empty: nothing is known.
+[[nodiscard]] std::string describe_unit(double file_metres, double world_metres,
+                                        const std::string& doubt);
+
+/// Reads one mesh file as the options say, and moves it to its place. @return as read_mesh();
+/// kInput if neither its name nor the options give its format
 Result<MeshFile> read_mesh_input(const std::string& path, const InputKind& kind,
                                  const SceneInput& input, const Execution& execution = {});
 

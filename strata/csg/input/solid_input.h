@@ -30,6 +30,7 @@ struct SolidInput {
   double area = 0.0;                       ///< sum over the files, square world units
   double volume = 0.0;                     ///< sum over the files, cubic world units
   double longest_edge = 0.0;               ///< of all files, world units
+  double unit_metres = 0.0;                ///< length of the world's unit; 0: unknown
   double read_ms = 0.0;                    ///< time that reading took
   double diagnose_ms = 0.0;                ///< time that inspection took
 

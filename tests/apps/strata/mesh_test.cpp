@@ -204,13 +204,11 @@ TEST_F(MeshTool, MistakesOnTheCommandLineAreNamed) {
   usage({"-o", "a.amf"}, "a.amf: meshes are written as .3mf, .stl, .obj, .ply or .off");
   usage({"-o", "-"}, "-: meshes are written as");
   usage({"-o", "a.x", "--format", "step"}, "'step'");
-  usage({"-o", "a.stl", "--unit", "inch"}, "--unit needs a 3MF file");
   usage({"-o", "a.3mf", "--unit", "mile"}, "'mile'");
   usage({"-o", "a.stl", "--colours"}, "--colours cannot be written as STL");
   usage({"-o", "a.stl", "--ids"}, "--ids cannot be written as STL");
   usage({"-o", "a.ply", "--ids", "--colours"}, "--ids and --colours cannot be combined");
   usage({"-o", "-", "--format", "obj", "--colours"}, "--colours needs an OBJ file with a name");
-  usage({"--json", "--unit", "inch"}, "--unit needs -o");
   usage({"--json", "--ids"}, "--ids needs -o");
   usage({"-o", "a.ply", "--bits", "9"}, "--bits must be 10 to 28, got 9");
   usage({"-o", "a.ply", "--bits", "29"}, "--bits must be 10 to 28, got 29");
