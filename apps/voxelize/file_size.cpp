@@ -120,7 +120,8 @@ class SizeBound {
     if (format == "vox") return vox();
     if (format == "png") return png();
     if (format == "zarr") return zarr();
-    return layers(values_.codes, cells_);  // npz, nrrd, vti
+    if (format == "tif") return layers(RunBytes::kIds, cells_) + 512.0 * grid_.dims.z;
+    return layers(values_.codes, cells_);  // npz, nrrd, vti, nii.gz, mha
   }
   [[nodiscard]] double dense() const { return cells_ * static_cast<double>(values_.bytes); }
 
@@ -228,6 +229,11 @@ FileSize file_size(const VoxelGrid& grid, const MemoryFactors& factors, bool clo
   if (factors.format == "npy") {
     const std::string head = npy_head(DenseValues(file), grid.dims);
     return {static_cast<std::uint64_t>(bound.dense()) + head.size(), true};
+  }
+  if (factors.format == "nii" || factors.format == "raw") {
+    const bool second = std::max({grid.dims.x, grid.dims.y, grid.dims.z}) > 32767;
+    const std::uint64_t head = factors.format == "raw" ? 0 : second ? 544 : 352;
+    return {static_cast<std::uint64_t>(bound.dense()) + head, true};
   }
   const double most = bound.bytes() + 6.0 * static_cast<double>(file.name.size());
   return {

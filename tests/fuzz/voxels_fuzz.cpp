@@ -7,7 +7,8 @@
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using strata::must;
-  constexpr const char* kFormats[] = {"vdb", "npy", "npz", "nrrd", "vti", "binvox", "vox"};
+  constexpr const char* kFormats[] = {"vdb",    "npy", "npz", "nrrd", "vti",
+                                      "binvox", "vox", "nii", "mha",  "tif"};
   if (size == 0) return 0;
   const char* format = kFormats[data[0] % std::size(kFormats)];
   const std::string_view bytes(reinterpret_cast<const char*>(data) + 1, size - 1);

@@ -52,77 +52,16 @@ VoxelWriterResult open_format(const std::string& path, const std::string& name,
   if (name == "vti") return open_vti_writer(path, grid, options);
   if (name == "binvox") return open_binvox_writer(path, grid);
   if (name == "vox") return open_vox_writer(path, grid, options);
+  if (name == "raw") return open_raw_writer(path, grid, options);
+  if (name == "mha") return open_metaimage_writer(path, grid, options);
+  if (name == "nii") return open_nifti_writer(path, grid, options, false);
+  if (name == "nii.gz") return open_nifti_writer(path, grid, options, true);
+  if (name == "tif") return open_tiff_writer(path, grid, options);
   if (name == "zarr") return open_zarr_writer(path, grid, options);
   return fail(ErrorCode::kInternal, "format {} has no writer", name);
 }
 
 }  // namespace
-
-const std::vector<VoxelFormat>& voxel_formats() {
-  constexpr std::uint32_t kAnyId = 0x7fffffff;
-  constexpr std::uint32_t kFloatIds = 1 << 24;  // that a float counts
-  static const std::vector<VoxelFormat> kFormats = {
-      {.name = "vdb",
-       .extension = ".vdb",
-       .description = "OpenVDB: bool, or float (fog volume, ids); world transform",
-       .ids = kFloatIds,
-       .named = true,
-       .shares = true},
-      {.name = "npy",
-       .extension = ".npy",
-       .description = "NumPy: bool array indexed [x, y, z]; ids",
-       .axis = Axis::kX,
-       .ids = kAnyId,
-       .shares = true,
-       .rgba = true},
-      {.name = "npz",
-       .extension = ".npz",
-       .description = "NumPy: arrays voxels (as .npy, deflated), origin, spacing; ids",
-       .axis = Axis::kX,
-       .ids = kAnyId,
-       .shares = true,
-       .rgba = true},
-      {.name = "nrrd",
-       .extension = ".nrrd",
-       .description = "NRRD: uint8, gzip; world transform; ids",
-       .axis = Axis::kX,
-       .ids = kAnyId,
-       .named = true,
-       .shares = true,
-       .rgba = true},
-      {.name = "vti",
-       .extension = ".vti",
-       .description = "VTK image data: uint8 cells, zlib; world transform; ids",
-       .axis = Axis::kX,
-       .ids = kAnyId,
-       .named = true,
-       .shares = true,
-       .rgba = true},
-      {.name = "binvox",
-       .extension = ".binvox",
-       .description = "binvox: run lengths; cubic voxels in a cube, world transform",
-       .axis = Axis::kY},
-      {.name = "vox",
-       .extension = ".vox",
-       .description = "MagicaVoxel: up to 2000 voxels a side; colours of scenes, ids",
-       .colours = kVoxColours,
-       .ids = kVoxColours},
-      {.name = "png",
-       .extension = "/",
-       .description = "folder of 1-bit PNG slices, one per layer of z, and slices.json; ids",
-       .axis = Axis::kX,
-       .ids = 0xffff,
-       .shares = true,
-       .rgba = true},
-      {.name = "zarr",
-       .extension = ".zarr/",
-       .description = "folder: Zarr 2 array, uint8, zlib; world transform; ids",
-       .ids = kAnyId,
-       .shares = true,
-       .rgba = true},
-  };
-  return kFormats;
-}
 
 Result<VoxelFormat> voxel_format_for(const std::string& path, const std::string& format) {
   const auto checked = [&](const VoxelFormat& found) -> Result<VoxelFormat> {
@@ -153,7 +92,10 @@ Result<VoxelFormat> voxel_format_for(const std::string& path, const std::string&
       plain_folder = &candidate;
       continue;
     }
-    if ((!slash || is_folder(candidate)) && name.ends_with(extension)) return checked(candidate);
+    const bool also = !candidate.also.empty() && name.ends_with(candidate.also);
+    if ((!slash || is_folder(candidate)) && (also || name.ends_with(extension))) {
+      return checked(candidate);
+    }
   }
   if (slash && plain_folder != nullptr) return checked(*plain_folder);
   return fail(

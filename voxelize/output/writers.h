@@ -28,6 +28,15 @@ VoxelWriterResult open_vti_writer(const std::string& path, const VoxelGrid& grid
 VoxelWriterResult open_binvox_writer(const std::string& path, const VoxelGrid& grid);
 VoxelWriterResult open_vox_writer(const std::string& path, const VoxelGrid& grid,
                                   const VoxelWriterOptions& options);
+VoxelWriterResult open_raw_writer(const std::string& path, const VoxelGrid& grid,
+                                  const VoxelWriterOptions& options);
+VoxelWriterResult open_metaimage_writer(const std::string& path, const VoxelGrid& grid,
+                                        const VoxelWriterOptions& options);
+/// @param packed  by gzip, as it is for a path that ends with .gz
+VoxelWriterResult open_nifti_writer(const std::string& path, const VoxelGrid& grid,
+                                    const VoxelWriterOptions& options, bool packed);
+VoxelWriterResult open_tiff_writer(const std::string& path, const VoxelGrid& grid,
+                                   const VoxelWriterOptions& options);
 VoxelWriterResult open_zarr_writer(const std::string& path, const VoxelGrid& grid,
                                    const VoxelWriterOptions& options);
 

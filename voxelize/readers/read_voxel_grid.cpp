@@ -16,6 +16,7 @@
 #include "voxelize/heads/nifti_head.h"
 #include "voxelize/heads/nrrd_head.h"
 #include "voxelize/readers/readers.h"
+#include "voxelize/scans/scan_readers.h"
 #include "voxelize/volume/inflate_stream.h"
 #include "voxelize/volume/json_text.h"
 
@@ -251,6 +252,9 @@ GridReader reader_of(const std::string& path) {
                                                                   {".npz", npz_grid},
                                                                   {".nrrd", nrrd_file_grid},
                                                                   {".nhdr", nrrd_file_grid},
+                                                                  {".raw", raw_grid},
+                                                                  {".tif", tiff_grid},
+                                                                  {".tiff", tiff_grid},
                                                                   {".mha", metaimage_file_grid},
                                                                   {".mhd", metaimage_file_grid},
                                                                   {".nii", nifti_file_grid},

@@ -14,6 +14,7 @@
 #include "core/letters.h"
 #include "mesh/text/input_bytes.h"
 #include "voxelize/readers/readers.h"
+#include "voxelize/scans/scan_readers.h"
 
 namespace strata {
 namespace {
@@ -34,6 +35,14 @@ constexpr std::array kFormats = {
     Format{"npy", ".npy", read_npy_voxels},
     Format{"npz", ".npz", read_npz_voxels},
     Format{"nrrd", ".nrrd", read_nrrd_voxels},
+    Format{"raw", ".raw", read_raw_voxels},
+    Format{"raw", ".nhdr", read_nrrd_voxels},
+    Format{"nii.gz", ".nii.gz", read_nifti_voxels},
+    Format{"nii", ".nii", read_nifti_voxels},
+    Format{"mha", ".mha", read_metaimage_voxels},
+    Format{"mha", ".mhd", read_metaimage_voxels},
+    Format{"tif", ".tif", read_tiff_voxels},
+    Format{"tif", ".tiff", read_tiff_voxels},
     Format{"vti", ".vti", read_vti_voxels},
     Format{"binvox", ".binvox", read_binvox_voxels},
     Format{"vox", ".vox", read_vox_voxels},

@@ -14,7 +14,6 @@ namespace strata {
 Result<VoxelVolume> read_npy_voxels(ReadContext& context);
 Result<VoxelVolume> read_npz_voxels(ReadContext& context);
 Result<VoxelVolume> read_vdb_voxels(ReadContext& context);
-Result<VoxelVolume> read_nrrd_voxels(ReadContext& context);
 Result<VoxelVolume> read_vti_voxels(ReadContext& context);
 Result<VoxelVolume> read_binvox_voxels(ReadContext& context);
 Result<VoxelVolume> read_vox_voxels(ReadContext& context);

@@ -21,6 +21,7 @@ struct VoxelFormat {
                      ///< "png", "zarr"
   std::string extension;    ///< with the dot; that of a folder format ends with a slash
   std::string description;  ///< one line for --list-formats
+  std::string also = {};    ///< another extension of the format; empty: none
   /// Intervals along this axis are written as they come. Intervals along another axis are
   /// transposed first (voxelize/transposed.h).
   Axis axis = Axis::kZ;

@@ -173,7 +173,8 @@ TEST_F(Usage, VersionIsPrintedWithoutAnythingElse) {
 TEST_F(Usage, FormatsAreListedWithoutAnInput) {
   const RunResult run = place.run({"voxelize", "--list-formats"});
   EXPECT_EQ(run.exit_code, 0) << run.err;
-  for (const char* name : {"vdb", "npy", "npz", "nrrd", "vti", "binvox", "vox", "png", "zarr"}) {
+  for (const char* name : {"vdb", "npy", "npz", "nrrd", "vti", "nii", "nii.gz", "mha", "raw", "tif",
+                           "binvox", "vox", "png", "zarr"}) {
     EXPECT_NE(run.out.find(std::string(name) + " "), std::string::npos) << name;
   }
 }

@@ -16,6 +16,10 @@ ReadVoxels read(const std::string& path, const std::string& format, glm::ivec3 d
   if (format == "vti") return read_vti(path);
   if (format == "vox") return read_vox(path, dims);
   if (format == "png") return read_png_folder(path);
+  if (format == "nii" || format == "nii.gz") return read_nii(path);
+  if (format == "mha") return read_mha(path);
+  if (format == "raw") return read_raw(path);
+  if (format == "tif") return read_tif(path);
   return read_zarr(path);
 }
 
@@ -43,7 +47,11 @@ class Ids : public ::testing::TestWithParam<VoxelFormat> {
   }
   TemporaryFolder folder_;
 };
-std::string name_of(const ::testing::TestParamInfo<VoxelFormat>& info) { return info.param.name; }
+std::string name_of(const ::testing::TestParamInfo<VoxelFormat>& info) {
+  std::string name = info.param.name;
+  std::replace(name.begin(), name.end(), '.', '_');
+  return name;
+}
 INSTANTIATE_TEST_SUITE_P(Formats, Ids, ::testing::ValuesIn(formats_with_ids()), name_of);
 
 /// write_vdb_test.cpp reads those of .vdb, with OpenVDB.

@@ -20,6 +20,10 @@ ReadVoxels read(const std::string& path, const std::string& format) {
   if (format == "nrrd") return read_nrrd(path);
   if (format == "vti") return read_vti(path);
   if (format == "png") return read_png_folder(path);
+  if (format == "nii" || format == "nii.gz") return read_nii(path);
+  if (format == "mha") return read_mha(path);
+  if (format == "raw") return read_raw(path);
+  if (format == "tif") return read_tif(path);
   return read_zarr(path);
 }
 
@@ -82,7 +86,11 @@ class Values : public ::testing::TestWithParam<VoxelFormat> {
   }
   TemporaryFolder folder_;
 };
-std::string name_of(const ::testing::TestParamInfo<VoxelFormat>& info) { return info.param.name; }
+std::string name_of(const ::testing::TestParamInfo<VoxelFormat>& info) {
+  std::string name = info.param.name;
+  std::replace(name.begin(), name.end(), '.', '_');
+  return name;
+}
 INSTANTIATE_TEST_SUITE_P(Formats, Values, ::testing::ValuesIn(dense_formats()), name_of);
 
 TEST_P(Values, SharesAreBytesRounded) {

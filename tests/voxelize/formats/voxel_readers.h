@@ -37,6 +37,10 @@ ReadVoxels read_binvox(const std::string& path, glm::ivec3 dims);
 ReadVoxels read_vox(const std::string& path, glm::ivec3 dims);
 ReadVoxels read_png_folder(const std::string& path);
 ReadVoxels read_zarr(const std::string& path);
+ReadVoxels read_nii(const std::string& path);  // or .nii.gz
+ReadVoxels read_mha(const std::string& path);
+ReadVoxels read_raw(const std::string& path);  // with the header path.nhdr
+ReadVoxels read_tif(const std::string& path);
 
 /// zlib's inflate: 15 for a zlib stream, 31 for gzip, -15 for bare deflate.
 std::string inflate_all(const std::string& data, int window_bits, std::size_t expected);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <map>
 
 #include "strata/voxelize/formats/voxel_writer.h"
 #include "strata/voxelize/readers/read_voxels.h"
@@ -73,9 +74,10 @@ class RoundTrip : public ::testing::TestWithParam<VoxelFormat> {
     EXPECT_EQ(volume.placed, holds);
     for (int axis = 0; axis < 3 && holds; ++axis) {
       const double size = grid.voxel_size[axis];
-      EXPECT_NEAR(volume.grid().voxel_size[axis], size, 1e-15);
-      EXPECT_NEAR(volume.grid().origin[axis], grid.origin[axis] + volume.first_index[axis] * size,
-                  1e-9);
+      const bool floats = format().name.starts_with("nii");  // numbers of NIfTI-1
+      const double origin = grid.origin[axis] + volume.first_index[axis] * size;
+      EXPECT_NEAR(volume.grid().voxel_size[axis], size, floats ? 1e-6 : 1e-15);
+      EXPECT_NEAR(volume.grid().origin[axis], origin, floats ? 1e-3 : 1e-9);
     }
     if (format().name == "binvox") {
       EXPECT_EQ(volume.grid().dims, glm::ivec3(std::max({grid.dims.x, grid.dims.y, grid.dims.z})));
@@ -99,7 +101,9 @@ std::vector<VoxelFormat> readable(bool with_ids) {
   return formats;
 }
 std::string format_name(const ::testing::TestParamInfo<VoxelFormat>& info) {
-  return info.param.name;
+  std::string name = info.param.name;
+  std::replace(name.begin(), name.end(), '.', '_');
+  return name;
 }
 TEST(Readers, ReadEveryFormatThatIsWritten) {
   EXPECT_EQ(readable(false).size(), voxel_formats().size());
@@ -156,12 +160,15 @@ TEST_P(RoundTrip, IsTheSameForAnyNumberOfThreads) {
 }
 
 TEST_P(RoundTrip, EveryCutOffFileIsRefused) {
-  if (is_folder()) GTEST_SKIP() << "a folder";
+  if (is_folder() || format().name == "raw") GTEST_SKIP() << "several files";
   const Sample sample{"small", make_grid({9, 5, 11}),
                       [](int i, int j, int k) { return random_voxel(i, j, k, 300); }};
   const std::string bytes = testkit::bytes_of(write(intervals_of(sample, format().axis)));
   // The last bytes of some formats hold no voxels.
-  const std::size_t needless = format().name == "vti" ? 50 : format().name == "nrrd" ? 13 : 0;
+  const std::map<std::string, std::size_t> ends = {
+      {"vti", 50}, {"nrrd", 13}, {"nii.gz", 16}, {"mha", 9}};
+  const auto end = ends.find(format().name);
+  const std::size_t needless = end == ends.end() ? 0 : end->second;
   for (std::size_t length = 0; length + needless < bytes.size(); length += length < 400 ? 1 : 37) {
     const std::string cut = folder_.write("cut" + format().extension, bytes.substr(0, length));
     const Result<VoxelVolume> read = read_voxels(cut);

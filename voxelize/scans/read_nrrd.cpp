@@ -1,6 +1,7 @@
-// NRRD, versions 1 to 5 (Kindlmann, teem.sourceforge.net/nrrd/format.html): an attached header,
-// three axes, raw or gzip. The first axis is fastest. Space directions that run along the axes of
-// the world in any order and sign are followed; others are shown along the grid's own axes.
+// NRRD, versions 1 to 5 (Kindlmann, teem.sourceforge.net/nrrd/format.html): the data in the file or
+// in one beside it, three axes, raw or gzip. The first axis is fastest. Space directions that run
+// along the axes of the world in any order and sign are followed; others are shown along the grid's
+// own axes.
 
 #include <array>
 #include <cmath>
@@ -10,7 +11,7 @@
 
 #include "core/letters.h"
 #include "voxelize/heads/nrrd_head.h"
-#include "voxelize/readers/readers.h"
+#include "voxelize/scans/scan_readers.h"
 #include "voxelize/volume/dense_array.h"
 #include "voxelize/volume/inflate_stream.h"
 
@@ -136,16 +137,14 @@ class Placement {
   bool placed_ = false;
 };
 
-Result<std::string_view> data_bytes(const ReadContext& context, const NrrdHead& head) {
-  std::string_view data = context.bytes.substr(head.data);
-  for (const std::string_view field : {"data file", "datafile"}) {
-    if (head.fields.contains(field)) {
-      return fail(ErrorCode::kInput,
-                  "{}: the data are in another file, {}; only headers with their "
-                  "data are read",
-                  context.path, head.get(field));
-    }
-  }
+/// The name of the file that has the data; empty: they follow the head.
+std::string data_file(const NrrdHead& head) {
+  return std::string(head.get("data file", "datafile"));
+}
+
+std::string_view data_bytes(const ReadContext& context, const NrrdHead& head,
+                            const std::optional<detail::InputBytes>& beside) {
+  std::string_view data = beside ? beside->view() : context.bytes.substr(head.data);
   const std::vector<double> lines = numbers_of(head.get("line skip", "lineskip"));
   for (double left = lines.empty() ? 0.0 : lines[0]; left >= 1.0; left -= 1.0) {
     const std::size_t end = data.find('\n');
@@ -188,15 +187,20 @@ Result<VoxelVolume> read_nrrd_voxels(ReadContext& context) {
   if (auto place = check_place(context, layout.grid); !place) return tl::unexpected(place.error());
 
   const std::string encoding = lower_case(std::string(head->get("encoding")));
-  Result<std::string_view> data = data_bytes(context, *head);
-  if (!data) return tl::unexpected(data.error());
+  std::optional<detail::InputBytes> beside;
+  if (const std::string file = data_file(*head); !file.empty()) {
+    auto opened = open_data_file(context, file);
+    if (!opened) return tl::unexpected(opened.error());
+    beside = std::move(*opened);
+  }
+  const std::string_view data = data_bytes(context, *head, beside);
   Result<VoxelVolume> volume =
       fail(ErrorCode::kInput, "{}: encoding '{}' is not read; raw and gzip are", context.path,
            std::string_view(encoding).substr(0, 40));
   if (encoding == "raw") {
     const std::vector<double> skip = numbers_of(head->get("byte skip", "byteskip"));
     const double first = skip.empty() ? 0.0 : skip[0];
-    const std::uint64_t size = data->size();
+    const std::uint64_t size = data.size();
     const std::uint64_t at = first < 0.0 ? size - std::min(size, layout.bytes())
                                          : static_cast<std::uint64_t>(std::min(first, 1e15));
     if (at > size || size - at < layout.bytes()) {
@@ -204,9 +208,9 @@ Result<VoxelVolume> read_nrrd_voxels(ReadContext& context) {
                   context.path, size - std::min(at, size), sides[0], sides[1], sides[2],
                   name_of(layout.type), layout.bytes());
     }
-    volume = read_dense(context, layout, {data->substr(at, layout.bytes()), {}});
+    volume = read_dense(context, layout, {data.substr(at, layout.bytes()), {}});
   } else if (encoding == "gzip" || encoding == "gz") {
-    InflateStream stream(*data, InflateStream::kGzip, context.path);
+    InflateStream stream(data, InflateStream::kGzip, context.path);
     volume =
         read_dense(context, layout,
                    {{}, [&](std::byte* to, std::size_t bytes) { return stream.read(to, bytes); }});
@@ -216,6 +220,42 @@ Result<VoxelVolume> read_nrrd_voxels(ReadContext& context) {
   volume->placed = placement.placed();
   if (!note.empty()) volume->notes.push_back(note);
   return volume;
+}
+
+namespace {
+
+/// Reads `part.nhdr` or `part.raw.nhdr`, which says what part.raw holds, by a reader of heads.
+template <class Read>
+auto with_head(ReadContext& context, Read&& read) -> decltype(read(context)) {
+  std::string stem = context.path;
+  if (lower_case(stem).ends_with(".raw")) stem.resize(stem.size() - 4);
+  for (const std::string& path : {stem + ".nhdr", context.path + ".nhdr"}) {
+    auto head =
+        detail::InputBytes::open(path, context.execution.memory_limit, context.execution.stop);
+    if (!head) continue;
+    ReadContext beside{path, head->view(), context.options, context.execution, context.budget};
+    beside.integers_as_values = context.integers_as_values;
+    auto result = read(beside);
+    context.wants_values = beside.wants_values.load();
+    return result;
+  }
+  return fail(ErrorCode::kInput,
+              "{}: the header {}.nhdr, which would say what it holds, is missing", context.path,
+              stem);
+}
+
+}  // namespace
+
+Result<VoxelVolume> read_raw_voxels(ReadContext& context) {
+  return with_head(context, read_nrrd_voxels);
+}
+
+Result<VoxelFileGrid> raw_grid(ReadContext& context) {
+  return with_head(context, [](ReadContext& beside) -> Result<VoxelFileGrid> {
+    const auto head = parse_nrrd_head(beside.bytes, beside.path);
+    if (!head) return tl::unexpected(head.error());
+    return nrrd_grid(*head, beside.path);
+  });
 }
 
 }  // namespace strata

@@ -1,0 +1,81 @@
+// The table of formats; voxel_writer.cpp opens their writers.
+
+#include <utility>
+
+#include "strata/voxelize/formats/voxel_writer.h"
+#include "voxelize/output/writers.h"
+
+namespace strata {
+namespace {
+
+constexpr std::uint32_t kAnyId = 0x7fffffff;
+constexpr std::uint32_t kFloatIds = 1 << 24;  // that a float counts
+
+/// An array, x fastest, of any values.
+VoxelFormat dense(std::string name, std::string extension, std::string description,
+                  std::string also = {}) {
+  return {.name = std::move(name),
+          .extension = std::move(extension),
+          .description = std::move(description),
+          .also = std::move(also),
+          .axis = Axis::kX,
+          .ids = kAnyId,
+          .shares = true,
+          .rgba = true};
+}
+VoxelFormat named(VoxelFormat format) {
+  format.named = true;
+  return format;
+}
+
+std::vector<VoxelFormat> all_formats() {
+  return {
+      {.name = "vdb",
+       .extension = ".vdb",
+       .description = "OpenVDB: bool, or float (fog volume, ids); world transform",
+       .ids = kFloatIds,
+       .named = true,
+       .shares = true},
+      dense("npy", ".npy", "NumPy: bool array indexed [x, y, z]; ids"),
+      dense("npz", ".npz", "NumPy: arrays voxels (as .npy, deflated), origin, spacing; ids"),
+      named(dense("nrrd", ".nrrd", "NRRD: uint8, gzip; world transform; ids")),
+      named(dense("vti", ".vti", "VTK image data: uint8 cells, zlib; world transform; ids")),
+      dense("nii", ".nii", "NIfTI: uint8; world transform; ids"),
+      dense("nii.gz", ".nii.gz", "NIfTI, gzip"),
+      dense("mha", ".mha", "MetaImage: uint8, zlib; world transform; ids; .mhd: two files", ".mhd"),
+      named(dense("raw", ".raw", "uint8, and beside it a NRRD header, .nhdr; ids", ".nhdr")),
+      dense("tif", ".tif", "TIFF: a page a layer of z, uint8, zlib; place for ImageJ; ids",
+            ".tiff"),
+      {.name = "binvox",
+       .extension = ".binvox",
+       .description = "binvox: run lengths; cubic voxels in a cube, world transform",
+       .axis = Axis::kY},
+      {.name = "vox",
+       .extension = ".vox",
+       .description = "MagicaVoxel: up to 2000 voxels a side; colours of scenes, ids",
+       .colours = kVoxColours,
+       .ids = kVoxColours},
+      {.name = "png",
+       .extension = "/",
+       .description = "folder of 1-bit PNG slices, one per layer of z, and slices.json; ids",
+       .axis = Axis::kX,
+       .ids = 0xffff,
+       .shares = true,
+       .rgba = true},
+      {.name = "zarr",
+       .extension = ".zarr/",
+       .description = "folder: Zarr 2 array, uint8, zlib; world transform; ids",
+       .ids = kAnyId,
+       .shares = true,
+       .rgba = true},
+  };
+}
+
+}  // namespace
+
+const std::vector<VoxelFormat>& voxel_formats() {
+  static const std::vector<VoxelFormat> kFormats = all_formats();
+  return kFormats;
+}
+
+}  // namespace strata

@@ -1,0 +1,54 @@
+// MetaImage: `.mha`, and `.mhd` with its voxels in a file beside it; plain or zlib, both byte
+// orders (voxelize/heads/metaimage_head.h).
+
+#include <optional>
+#include <string>
+
+#include "voxelize/heads/metaimage_head.h"
+#include "voxelize/scans/scan_readers.h"
+#include "voxelize/volume/inflate_stream.h"
+
+namespace strata {
+
+Result<VoxelVolume> read_metaimage_voxels(ReadContext& context) {
+  const auto head = parse_metaimage_head(context.bytes, context.path);
+  if (!head) return tl::unexpected(head.error());
+  if (head->channels != 1) {
+    return fail(ErrorCode::kInput, "{}: {} numbers a voxel; one is read", context.path,
+                head->channels);
+  }
+  auto placed = placed_layout(context, head->axes);
+  if (!placed) return tl::unexpected(placed.error());
+  DenseLayout& layout = placed->layout;
+  layout.type = head->type;
+  layout.big_endian = head->big_endian;
+
+  std::string_view data = context.bytes.substr(head->data_at);
+  std::optional<detail::InputBytes> beside;
+  if (head->data_file != "LOCAL") {
+    auto opened = open_data_file(context, head->data_file);
+    if (!opened) return tl::unexpected(opened.error());
+    beside = std::move(*opened);
+    data = beside->view();
+  }
+  Result<VoxelVolume> volume = VoxelVolume{};
+  if (head->compressed) {
+    InflateStream stream(data, InflateStream::kZlib, context.path);
+    volume =
+        read_dense(context, layout,
+                   {{}, [&](std::byte* to, std::size_t bytes) { return stream.read(to, bytes); }});
+  } else {
+    const std::uint64_t at = head->skip >= 0                ? static_cast<std::uint64_t>(head->skip)
+                             : data.size() > layout.bytes() ? data.size() - layout.bytes()
+                                                            : 0;
+    const auto all = voxel_bytes(context, data, at, layout);
+    if (!all) return tl::unexpected(all.error());
+    volume = read_dense(context, layout, {*all, {}});
+  }
+  if (!volume) return volume;
+  volume->placed = head->placed;
+  if (!placed->note.empty()) volume->notes.push_back(placed->note);
+  return volume;
+}
+
+}  // namespace strata
