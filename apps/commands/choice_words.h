@@ -32,9 +32,9 @@ inline constexpr std::pair<std::string_view, ProgressMode> kProgressWords[] = {
 inline constexpr std::pair<std::string_view, MeshReader> kReaderWords[] = {
     {"own", MeshReader::kOwn}, {"openmesh", MeshReader::kOpenMesh}};
 inline constexpr std::pair<std::string_view, MeshFormat> kMeshFormatWords[] = {
-    {"auto", MeshFormat::kAuto}, {"obj", MeshFormat::kObj}, {"stl", MeshFormat::kStl},
-    {"ply", MeshFormat::kPly},   {"off", MeshFormat::kOff}, {"3mf", MeshFormat::k3mf},
-    {"amf", MeshFormat::kAmf}};
+    {"auto", MeshFormat::kAuto}, {"obj", MeshFormat::kObj},   {"stl", MeshFormat::kStl},
+    {"ply", MeshFormat::kPly},   {"off", MeshFormat::kOff},   {"3mf", MeshFormat::k3mf},
+    {"amf", MeshFormat::kAmf},   {"gltf", MeshFormat::kGltf}, {"glb", MeshFormat::kGltf}};
 inline constexpr std::pair<std::string_view, SolidFormat> kSolidFormatWords[] = {
     {"3mf", SolidFormat::k3mf},
     {"stl", SolidFormat::kStl},

@@ -109,10 +109,10 @@ void flag(CLI::App& app, const char* group, const char* names, T& target, const 
 
 void add_inputs(CLI::App& app, Words& words) {
   const char* group = "Input";
-  app.add_option(
-         "INPUT", words.files,
-         "Meshes (.obj .stl .ply .off .3mf .amf) and scenes (.csg .scad); - reads a mesh from "
-         "standard input")
+  app.add_option("INPUT", words.files,
+                 "Meshes (.obj .stl .ply .off .3mf .amf .gltf .glb) and scenes (.csg .scad); - "
+                 "reads a mesh from "
+                 "standard input")
       ->type_name("")
       ->group(group);
   option(app, group, "--input-format", words.input_format, choices(kMeshFormatWords),

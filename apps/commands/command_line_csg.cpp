@@ -36,9 +36,9 @@ using Group = const char*;
 
 void define_picture_input(CLI::App& app, Words& words) {
   const Group input = "Input";
-  app.add_option(
-         "INPUT", words.files,
-         "Scenes (.csg .scad) and meshes (.obj .stl .ply .off .3mf .amf); - reads standard input")
+  app.add_option("INPUT", words.files,
+                 "Scenes (.csg .scad) and meshes (.obj .stl .ply .off .3mf .amf .gltf .glb); - "
+                 "reads standard input")
       ->type_name("")
       ->group(input);
   app.add_option("--expr", words.csg.expression,

@@ -124,7 +124,8 @@ void define_picture(CLI::App& app, Words& words) {
     if (option->get_group().starts_with("Output")) option->group("Output");
     if (option->get_positional() && option->get_name(true) == "INPUT") {
       option->description(
-          "A file of voxels; or scenes (.csg .scad) and meshes (.obj .stl .ply .off .3mf .amf); - "
+          "A file of voxels; or scenes (.csg .scad) and meshes (.obj .stl .ply .off .3mf .amf "
+          ".gltf .glb); - "
           "reads standard input");
     }
   }

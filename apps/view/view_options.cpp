@@ -60,7 +60,7 @@ void define(CLI::App& app, Words& words, ViewOptions& options) {
   };
   const char* input = "Input";
   app.add_option("INPUT", words.files,
-                 "Scenes (.csg .scad) and meshes (.obj .stl .ply .off .3mf .amf)")
+                 "Scenes (.csg .scad) and meshes (.obj .stl .ply .off .3mf .amf .gltf .glb)")
       ->type_name("")
       ->group(input);
   option("--expr", csg.expression,

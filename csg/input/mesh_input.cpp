@@ -174,14 +174,13 @@ Result<void> check_input_name(const std::string& path, const InputKind& kind, bo
   if (scenes) {
     return fail(
         ErrorCode::kInput,
-        "{}: the file name must end in .csg, .scad, .obj, .stl, .ply, .off, .3mf or .amf, or "
-        "the input format must be given",
+        "{}: the file name must end in .csg, .scad, .obj, .stl, .ply, .off, .3mf, .amf, .gltf or "
+        ".glb, or the input format must be given",
         path);
   }
   return fail(ErrorCode::kInput,
-              "{}: the file name must end in .obj, .stl, .ply, .off, .3mf or .amf, or the input "
-              "format must "
-              "be given",
+              "{}: the file name must end in .obj, .stl, .ply, .off, .3mf, .amf, .gltf or .glb, or "
+              "the input format must be given",
               path);
 }
 

@@ -11,7 +11,7 @@ Result<MeshFile> read_with_openmesh(const std::string& path, const MeshReadOptio
                                     const Execution& execution) {
   const MeshFormat format = mesh_format_of(path);
   if (path == "-" || format == MeshFormat::kAuto || format == MeshFormat::k3mf ||
-      format == MeshFormat::kAmf ||
+      format == MeshFormat::kAmf || format == MeshFormat::kGltf ||
       (options.format != MeshFormat::kAuto && options.format != format)) {
     return fail(ErrorCode::kUsage, "{}: OpenMesh takes the format from the extension of a file",
                 path);

@@ -8,6 +8,7 @@
 #include "mesh/archives/read_3mf_amf.h"
 #include "mesh/attributes/select_parts.h"
 #include "mesh/formats/reader_common.h"
+#include "mesh/gltf/read_gltf.h"
 #include "mesh/text/input_bytes.h"
 #include "mesh/text/text_scanner.h"
 #ifdef STRATA_HAVE_OPENMESH
@@ -23,12 +24,14 @@ struct NamedFormat {
   MeshFormat format;
   const char* name;
 };
-constexpr NamedFormat kFormats[] = {{MeshFormat::kObj, "obj"}, {MeshFormat::kStl, "stl"},
-                                    {MeshFormat::kPly, "ply"}, {MeshFormat::kOff, "off"},
-                                    {MeshFormat::k3mf, "3mf"}, {MeshFormat::kAmf, "amf"}};
+constexpr NamedFormat kFormats[] = {{MeshFormat::kObj, "obj"},   {MeshFormat::kStl, "stl"},
+                                    {MeshFormat::kPly, "ply"},   {MeshFormat::kOff, "off"},
+                                    {MeshFormat::k3mf, "3mf"},   {MeshFormat::kAmf, "amf"},
+                                    {MeshFormat::kGltf, "gltf"}, {MeshFormat::kGltf, "glb"}};
 
 /// The format that the first bytes indicate, for a hint when reading by the extension failed.
 MeshFormat format_by_content(std::string_view text) {
+  if (is_glb(text)) return MeshFormat::kGltf;
   if (text.starts_with("ply\n") || text.starts_with("ply\r")) return MeshFormat::kPly;
   if (text.starts_with("solid ") || text.starts_with("solid\n")) return MeshFormat::kStl;
   if (text.starts_with("OFF\n") || text.starts_with("OFF\r") || text.starts_with("OFF ") ||
@@ -48,6 +51,8 @@ Result<MeshFile> read_as(const detail::ReaderInput& input) {
       return detail::read_ply(input);
     case MeshFormat::kOff:
       return detail::read_off(input);
+    case MeshFormat::kGltf:
+      return detail::read_gltf_mesh(input);
     case MeshFormat::k3mf:
     case MeshFormat::kAmf:
       return fail(ErrorCode::kUsage, "{}: {} is read from files only", input.name,
@@ -86,7 +91,8 @@ Result<MeshFile> read_text(std::string_view text, const std::string& name, const
                            const MeshReadOptions& options, const Execution& execution) {
   if (text.empty()) return fail(ErrorCode::kInput, "{}: the file is empty", name);
   // The first 80 bytes of a binary STL file may be anything.
-  const bool anything = options.format == MeshFormat::kStl && detail::is_binary_stl(text);
+  const bool anything = (options.format == MeshFormat::kStl && detail::is_binary_stl(text)) ||
+                        (options.format == MeshFormat::kGltf && is_glb(text));
   if (!anything && detail::is_wide_text(text)) {
     return fail(ErrorCode::kInput, "{}: {}", name, detail::kWideText);
   }
@@ -160,15 +166,15 @@ Result<MeshFile> read_mesh(const std::string& path, const MeshReadOptions& optio
   MeshReadOptions known = options;
   if (known.format == MeshFormat::kAuto) {
     if (path == "-") {
-      return fail(ErrorCode::kUsage, "standard input needs a format: obj, stl, ply or off");
+      return fail(ErrorCode::kUsage, "standard input needs a format: obj, stl, ply, off or glb");
     }
     known.format = mesh_format_of(path);
     if (known.format == MeshFormat::kAuto) {
-      return fail(ErrorCode::kInput,
-                  "{}: the file name must end in .obj, .stl, .ply, .off, .3mf or .amf, or the "
-                  "format must be "
-                  "given",
-                  path);
+      return fail(
+          ErrorCode::kInput,
+          "{}: the file name must end in .obj, .stl, .ply, .off, .3mf, .amf, .gltf or .glb, or "
+          "the format must be given",
+          path);
     }
   }
   if (known.reader == MeshReader::kOpenMesh) {

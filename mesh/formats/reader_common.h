@@ -39,6 +39,7 @@ Result<MeshFile> read_obj(const ReaderInput& input);
 Result<MeshFile> read_stl(const ReaderInput& input);
 Result<MeshFile> read_ply(const ReaderInput& input);
 Result<MeshFile> read_off(const ReaderInput& input);
+Result<MeshFile> read_gltf_mesh(const ReaderInput& input);
 
 /// Whether a file has the size of a binary STL file with the number of triangles that it claims.
 [[nodiscard]] bool is_binary_stl(std::string_view bytes);

@@ -105,6 +105,7 @@ std::string mesh_to_bytes(const TriangleSoup& mesh, MeshFormat format) {
     case MeshFormat::kAuto:
     case MeshFormat::k3mf:
     case MeshFormat::kAmf:
+    case MeshFormat::kGltf:
       break;
   }
   return out;
@@ -112,7 +113,8 @@ std::string mesh_to_bytes(const TriangleSoup& mesh, MeshFormat format) {
 
 Result<void> write_mesh(const std::string& path, const TriangleSoup& mesh, MeshFormat format) {
   if (format == MeshFormat::kAuto) format = mesh_format_of(path);
-  if (format == MeshFormat::kAuto || format == MeshFormat::k3mf || format == MeshFormat::kAmf) {
+  if (format == MeshFormat::kAuto || format == MeshFormat::k3mf || format == MeshFormat::kAmf ||
+      format == MeshFormat::kGltf) {
     return fail(ErrorCode::kUsage, "{}: the format must be obj, stl, ply or off", path);
   }
   if (format == MeshFormat::kStl &&

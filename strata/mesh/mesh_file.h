@@ -19,7 +19,8 @@ enum class MeshFormat {
   kPly,   ///< PLY 1.0, ascii or binary of either byte order: faces and triangle strips
   kOff,   ///< Object File Format, ascii, with the prefixes ST, C, N, 4 in any order
   k3mf,   ///< 3MF, all objects of the build; not from memory or standard input, nor written here
-  kAmf    ///< AMF, plain or zipped; likewise
+  kAmf,   ///< AMF, plain or zipped; likewise
+  kGltf   ///< glTF 2.0, .gltf or .glb by content; not written
 };
 
 /// Who reads the file.

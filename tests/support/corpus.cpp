@@ -42,7 +42,8 @@ const std::vector<CorpusFile>& mesh_files() {
       for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end;
            it.increment(error)) {
         if (!it->is_regular_file(error)) continue;
-        if (mesh_format_of(it->path().string()) == MeshFormat::kAuto) continue;
+        const MeshFormat format = mesh_format_of(it->path().string());
+        if (format == MeshFormat::kAuto || format == MeshFormat::kGltf) continue;
         found.push_back({source + "/" + it->path().filename().string(), it->path()});
       }
     }
@@ -52,6 +53,18 @@ const std::vector<CorpusFile>& mesh_files() {
     return found;
   }();
   return files;
+}
+
+std::vector<CorpusFile> gltf_files() {
+  std::vector<CorpusFile> found;
+  const fs::path folder = "/usr/share/assimp/models";
+  std::error_code error;
+  for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end;
+       it.increment(error)) {
+    if (mesh_format_of(it->path().string()) != MeshFormat::kGltf) continue;
+    found.push_back({it->path().lexically_relative(folder).string(), it->path()});
+  }
+  return found;
 }
 
 const std::vector<CorpusScene>& scene_files() {

@@ -27,7 +27,10 @@ struct CorpusFile {
 /// sorted by name. The archive of libcgal-demo is unpacked for as long as the process lives.
 [[nodiscard]] const std::vector<CorpusFile>& mesh_files();
 
-/// Those of them that the readers take and that have at most `max_triangles`.
+/// glTF files of assimp-testmodels, named by their paths below its folder.
+[[nodiscard]] std::vector<CorpusFile> gltf_files();
+
+/// Those of mesh_files() that the readers take and that have at most `max_triangles`.
 [[nodiscard]] std::vector<NamedMesh> real_meshes(std::size_t max_triangles);
 
 /// Meshes of libcgal-demo by their stems ("bunny00"), those that are there.

@@ -117,7 +117,7 @@ void FileDialog::draw(Viewer& viewer, float scale) {
   }
   entries(viewer, scale);
   if (error_.empty()) {
-    faint("scenes .csg .scad; meshes .obj .stl .ply .off .3mf .amf");
+    faint("scenes .csg .scad; meshes .obj .stl .ply .off .3mf .amf .gltf .glb");
   } else {
     text(error_);
   }

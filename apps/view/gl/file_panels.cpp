@@ -117,7 +117,7 @@ void Panels::start(Viewer& viewer, const Area& area) {
                    ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoSavedSettings |
                    ImGuiWindowFlags_NoFocusOnAppearing);
   text("Drop a scene, a mesh or a file of voxels into this window, or press ctrl+o to open one.");
-  faint("Scenes: .csg, .scad (needs openscad). Meshes: .obj .stl .ply .off .3mf .amf.");
+  faint("Scenes: .csg, .scad (needs openscad). Meshes: .obj .stl .ply .off .3mf .amf .gltf .glb.");
   faint("Voxels: .vdb .npy .npz .nrrd .vti .binvox .vox. Keys: F1.");
   ImGui::Dummy({0, 6 * scale_});
   if (ImGui::Button("Open ...", {140 * scale_, 0})) viewer.key("ctrl+o");

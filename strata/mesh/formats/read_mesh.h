@@ -31,7 +31,7 @@ Result<MeshFile> parse_mesh(std::string_view bytes, const std::string& name,
 /// The format for a path's extension, in any letter case; kAuto when it names none.
 [[nodiscard]] MeshFormat mesh_format_of(std::string_view path);
 
-/// "obj", "stl", "ply", "off", "3mf", "amf"; kAuto for any other name.
+/// "obj", "stl", "ply", "off", "3mf", "amf", "gltf", "glb"; kAuto for any other name.
 [[nodiscard]] MeshFormat mesh_format_named(std::string_view name);
 
 /// The inverse of mesh_format_named; "auto" for kAuto.

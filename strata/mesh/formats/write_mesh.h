@@ -17,7 +17,7 @@ namespace strata {
 Result<void> write_mesh(const std::string& path, const TriangleSoup& mesh,
                         MeshFormat format = MeshFormat::kAuto);
 
-/// The bytes that write_mesh would write. @pre format is not kAuto, k3mf or kAmf
+/// The bytes that write_mesh would write. @pre format is not kAuto, k3mf, kAmf or kGltf
 [[nodiscard]] std::string mesh_to_bytes(const TriangleSoup& mesh, MeshFormat format);
 
 }  // namespace strata

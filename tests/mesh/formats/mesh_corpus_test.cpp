@@ -49,6 +49,24 @@ const std::map<std::string, std::string> kRefused = {
     {"openscad/unparseable.stl", ":4: byte 0x10 is not a number"},
 };
 
+/// The same of glTF files, by the path of the file or of its folder.
+const std::map<std::string, std::string> kRefusedGltf = {
+    {"glTF", "1"},  // glTF 1.0
+    {"glTF/CesiumMilkTruck", "no asset.version"},
+    {"glTF2/BoxTextured-glTF-techniqueWebGL", "it requires the extension KHR_technique_webgl"},
+    {"glTF2/BoxWithInfinites-glTF-Binary", "a vertex at (-inf, -0.5, 0.5), which is not finite"},
+    {"glTF2/IndexOutOfRange/AllIndicesOutOfRange.gltf", "an index is 65535"},
+    {"glTF2/IndexOutOfRange/IndexOutOfRange.gltf", "an index is 255, but there are 24 vertices"},
+    {"glTF2/MissingBin", "No such file"},
+    {"glTF2/RecursiveNodes", "nodes[0] lies within a circle of children"},
+    {"glTF2/SchemaFailures", "scene must be an index of scenes, which has 1 element"},
+    {"glTF2/TestNoRootNode/NoScene.gltf", "scene must be an index of scenes, which has 0 elements"},
+    {"glTF2/TestNoRootNode/SceneWithoutNodes.gltf", "the scene has no triangles"},
+    {"glTF2/draco", "it requires the extension KHR_draco_mesh_compression"},
+    {"glTF2/wrongTypes/badArray.gltf", "meshes[0] has no list of primitives"},
+    {"glTF2/wrongTypes/badUint.gltf", "must be an index of textures, which has 1 element, got -1"},
+};
+
 /// Whether every edge is used as often one way as the other, corners at equal positions being one:
 /// counted in a map, without the tables of mesh/.
 bool closed_by_counting(const TriangleSoup& soup) {
@@ -115,6 +133,36 @@ TEST(Corpus, EveryPublicFileIsReadOrRefusedAsKnown) {
     ++read;
   }
   EXPECT_GT(read, mesh_files().size() / 2);
+}
+
+TEST(Corpus, EveryPublicGltfIsReadOrRefusedAsKnown) {
+  const std::vector<CorpusFile> files = testkit::gltf_files();
+  if (files.empty()) GTEST_SKIP() << testkit::kNoMeshes;
+  std::size_t read = 0;
+  MeshReadOptions options;
+  options.attributes = true;
+  for (const CorpusFile& entry : files) {
+    SCOPED_TRACE(entry.name);
+    const auto file = read_mesh(entry.path, options);
+    auto known = kRefusedGltf.end();
+    for (auto one = kRefusedGltf.begin(); one != kRefusedGltf.end(); ++one) {
+      if (entry.name == one->first || entry.name.starts_with(one->first + "/")) known = one;
+    }
+    if (file) {
+      EXPECT_EQ(known, kRefusedGltf.end()) << "can be read now";
+      expect_whole(entry, *file);
+      EXPECT_FALSE(file->attributes.parts.empty());
+      ++read;
+    } else if (file.error().code != ErrorCode::kUsage) {  // a build without nlohmann-json
+      EXPECT_EQ(file.error().code, ErrorCode::kInput);
+      if (file.error().message.find("no triangles; points and lines") != std::string::npos)
+        continue;
+      ASSERT_NE(known, kRefusedGltf.end()) << file.error().message;
+      EXPECT_NE(file.error().message.find(known->second), std::string::npos)
+          << file.error().message;
+    }
+  }
+  EXPECT_GT(read, files.size() / 3);
 }
 
 }  // namespace
