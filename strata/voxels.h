@@ -12,13 +12,15 @@
 /// the mesh is closed: see VoxelizeOptions::open. Sets are runs of voxels along an axis: their
 /// memory grows with the surface. VoxelIntervals::contains(), for_each_run() and to_dense() read a
 /// set; read_voxels() reads one from a file; voxelize_slabs() and open_voxel_writer() never hold a
-/// whole set. strata/voxelize/formats/openvdb_bridge.h passes a set to OpenVDB. contour() makes a
-/// closed mesh whose voxels are the same.
+/// whole set. signed_distance() gives distances to the surface.
+/// strata/voxelize/formats/openvdb_bridge.h passes a set to OpenVDB. contour() makes a closed mesh
+/// whose voxels are the same.
 
 #include "strata/contour/contour.h"
 #include "strata/mesh/formats/read_mesh.h"
 #include "strata/mesh/soup_tools.h"
 #include "strata/voxelize/checksum.h"
+#include "strata/voxelize/distance/signed_distance.h"
 #include "strata/voxelize/formats/voxel_writer.h"
 #include "strata/voxelize/grid_fit.h"
 #include "strata/voxelize/intervals.h"

@@ -91,7 +91,7 @@ float* ScalarField::edit_block(int bi, int bj, int bk) {
   if (entry.child == kNone) {
     if (free_values_.empty()) {
       entry.child = static_cast<std::uint32_t>(values_.size());
-      values_.push_back(std::make_unique<Values>());
+      values_.push_back(std::make_unique_for_overwrite<Values>());
     } else {
       entry.child = free_values_.back();
       free_values_.pop_back();
