@@ -69,6 +69,37 @@ double slab_bytes(const VoxelGrid& grid, const MemoryFactors& factors) {
   return slab + kWorkerBytes * factors.threads;
 }
 
+/// What the distances in a band of `band` voxels take.
+struct DistanceBytes {
+  double voxels = 0;  ///< in the band
+  double bins = 0;    ///< triangles of each row of tiles, and the mesh on the lattice again
+  double layers = 0;  ///< blocks of the layers that are held at once
+  double output = 0;  ///< of a level set
+};
+
+DistanceBytes distance_bytes(const VoxelGrid& grid, const MemoryFactors& factors, double area) {
+  DistanceBytes bytes;
+  if (factors.band <= 0) return bytes;
+  const auto triangles = static_cast<double>(factors.mesh->triangles.size());
+  const double cells = static_cast<double>(grid.dims.x) * grid.dims.y * grid.dims.z;
+  bytes.voxels = factors.everywhere ? cells : std::min(area * 2 * factors.band, cells);
+  const double side = triangles > 0 ? std::sqrt(2 * area / triangles) : 0;
+  const double across = 1 + (side + 2 * factors.band) / 32;
+  const double rows = (grid.dims.y / 32.0 + 1) * (grid.dims.z / 32.0 + 1);
+  bytes.bins = static_cast<double>(factors.mesh->positions.size()) * 12 + rows * 8 +
+               triangles * 4 * std::min(across * across, rows);
+  // Blocks of 8 voxels a side reach as far beyond the band as they are wide.
+  const double most = cells / 512 + 1;
+  const double blocks =
+      factors.everywhere ? most : std::min(area * (2 * factors.band + 8) / 512, most);
+  constexpr double kTreeBytes = 300;  // a triangle and its share of boxes
+  if (factors.everywhere) bytes.bins += triangles * kTreeBytes;
+  const double held = std::min(1.0, (factors.everywhere ? 1.0 : 4.0) * 64 / grid.dims.z);
+  bytes.layers = blocks * held * 2100 + factors.threads * 1e6;
+  bytes.output = blocks * 150 + bytes.voxels * 4;
+  return bytes;
+}
+
 double output_bytes(const VoxelGrid& voxels, const VoxelGrid& grid, const MemoryFactors& factors,
                     double area) {
   if (factors.format.empty()) return 0;
@@ -100,13 +131,23 @@ MemoryEstimate estimate_memory(const VoxelGrid& voxels, const MemoryFactors& fac
   const auto triangles = static_cast<double>(factors.mesh->triangles.size());
   const double owners = factors.is_tree ? triangles * 4 : 0.0;
   const double area = faces_of(factors, grid);
+  const DistanceBytes distances = distance_bytes(grid, factors, area);
   MemoryEstimate estimate;
   estimate.mesh =
       rounded(static_cast<double>(factors.mesh->positions.size()) * (24 + 12) + triangles * 12 +
               static_cast<double>(factors.mesh->face_elements.size()) * 4 + owners);
-  estimate.bins = rounded(bin_bytes(grid, factors, area));
-  estimate.slabs = rounded(slab_bytes(grid, factors));
-  estimate.output = rounded(output_bytes(voxels, grid, factors, area));
+  estimate.bins = rounded(bin_bytes(grid, factors, area) + distances.bins);
+  estimate.slabs = rounded(slab_bytes(grid, factors) + distances.layers);
+  double output = output_bytes(voxels, grid, factors, area);
+  if (factors.band > 0) {
+    // Other formats than .vdb take runs of a value and a label; of .zarr all are kept, twice.
+    const double runs = distances.voxels * 8;
+    const double slab = std::min(1.0, (factors.everywhere ? 1.0 : 4.0) * 64 / grid.dims.z);
+    output = factors.format == "vdb"    ? distances.output
+             : factors.format == "zarr" ? output + 2 * runs
+                                        : output + runs * slab;
+  }
+  estimate.output = rounded(factors.format.empty() ? 0 : output);
   return estimate;
 }
 

@@ -55,6 +55,7 @@ std::string metadata(const VdbHeader& header, const std::string& compression) {
     ++count;
   };
   if (header.fog) put_meta("class", "string", "fog volume");
+  if (header.level_set) put_meta("class", "string", "level set");
   put_meta("creator", "string", "strata");
   put_meta("file_bbox_max", "vec3i", raw(upper));
   put_meta("file_bbox_min", "vec3i", raw(lower));
@@ -97,7 +98,7 @@ std::string vdb_header_bytes(const VdbHeader& header) {
                                                       : "Tree_float_5_4_3");
   put_text(bytes, "");  // not an instance of another grid
 
-  const bool zip = header.values == VdbValues::kFloat;
+  const bool zip = header.values == VdbValues::kFloat && !header.level_set;
   std::string grid = raw(kCompressActiveMask | (zip ? kCompressZip : 0));
   grid += metadata(header, zip ? "zip + active values" : "active values");
   grid += transform(header.grid);

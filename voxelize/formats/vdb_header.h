@@ -18,6 +18,7 @@ struct VdbHeader {
   VoxelGrid grid;
   VdbValues values = VdbValues::kBool;
   bool fog = false;               ///< the class of the grid is fog volume
+  bool level_set = false;         ///< it is level set; the numbers are not compressed
   std::uint64_t voxels = 0;       ///< active ones
   glm::ivec3 lower{0}, upper{0};  ///< bounds of the active voxels, inclusive, if there are any
   std::uint64_t hash = 0;         ///< of the content; becomes the file's UUID

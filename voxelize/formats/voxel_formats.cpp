@@ -21,7 +21,8 @@ VoxelFormat dense(std::string name, std::string extension, std::string descripti
           .axis = Axis::kX,
           .ids = kAnyId,
           .shares = true,
-          .rgba = true};
+          .rgba = true,
+          .distances = true};
 }
 VoxelFormat named(VoxelFormat format) {
   format.named = true;
@@ -32,10 +33,11 @@ std::vector<VoxelFormat> all_formats() {
   return {
       {.name = "vdb",
        .extension = ".vdb",
-       .description = "OpenVDB: bool, or float (fog volume, ids); world transform",
+       .description = "OpenVDB: bool, or float (fog volume, ids, level set); world transform",
        .ids = kFloatIds,
        .named = true,
-       .shares = true},
+       .shares = true,
+       .distances = true},
       dense("npy", ".npy", "NumPy: bool array indexed [x, y, z]; ids"),
       dense("npz", ".npz", "NumPy: arrays voxels (as .npy, deflated), origin, spacing; ids"),
       named(dense("nrrd", ".nrrd", "NRRD: uint8, gzip; world transform; ids")),
@@ -67,7 +69,8 @@ std::vector<VoxelFormat> all_formats() {
        .description = "folder: Zarr 2 array, uint8, zlib; world transform; ids",
        .ids = kAnyId,
        .shares = true,
-       .rgba = true},
+       .rgba = true,
+       .distances = true},
   };
 }
 

@@ -7,6 +7,7 @@
 #include "core/did_you_mean.h"
 #include "core/letters.h"
 #include "strata/voxelize/grid_fit.h"
+#include "voxelize/formats/labelled_distances.h"
 #include "voxelize/output/writers.h"
 
 namespace strata {
@@ -35,8 +36,8 @@ std::string format_names() {
   return names_of_those_that([](const VoxelFormat&) { return true; });
 }
 
-std::string_view default_name(const VoxelWriterOptions& options) {
-  if (options.band != 0) return "distance";
+std::string_view default_name(const VoxelWriterOptions& options, const VoxelFormat& format) {
+  if (options.band != 0) return format.name == "vdb" ? "surface" : "distance";
   if (options.rgba) return "colours";
   if (options.fog != 0) return "density";
   return options.ids != 0 ? "ids" : "solid";
@@ -162,8 +163,12 @@ Result<std::unique_ptr<VoxelWriter>> open_voxel_writer(const std::string& path,
   }
   try {
     VoxelWriterOptions named = options;
-    if (named.name.empty()) named.name = std::string(default_name(options));
-    return open_format(path, chosen->name, grid, named);
+    if (named.name.empty()) named.name = std::string(default_name(options, *chosen));
+    VoxelWriterResult writer = open_format(path, chosen->name, grid, named);
+    if (writer && options.band != 0 && chosen->name != "vdb") {
+      return by_labels(*std::move(writer), grid);
+    }
+    return writer;
   } catch (const std::bad_alloc&) {
     return fail(ErrorCode::kLimit, "{}: out of memory for a grid of {} x {} x {}", path,
                 grid.dims.x, grid.dims.y, grid.dims.z);

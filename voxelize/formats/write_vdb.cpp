@@ -21,6 +21,7 @@
 #include <utility>
 #include <vector>
 
+#include "voxelize/formats/level_set.h"
 #include "voxelize/formats/vdb_header.h"
 #include "voxelize/formats/vdb_leaves.h"
 #include "voxelize/output/block_output.h"
@@ -520,6 +521,7 @@ VoxelWriterResult open_vdb_writer(const std::string& path, const VoxelGrid& grid
                 "scale the mesh, or write another format",
                 path, s.x, s.y, s.z, volume);
   }
+  if (options.band != 0) return open_level_set_writer(path, grid, options);
   Result<BlockOutput> output = BlockOutput::create(path);
   if (!output) return tl::unexpected(output.error());
   return std::make_unique<VdbWriter>(path, grid, options, std::move(*output));

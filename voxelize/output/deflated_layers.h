@@ -2,6 +2,7 @@
 
 #include <zlib.h>
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstddef>
@@ -48,6 +49,7 @@ class LayerCrc {
   }
 
   [[nodiscard]] uLong of(const VoxelIntervals& slab, int z) const {
+    if (values_.kind == DenseValues::Kind::kDistances) return of_floats(slab, z);
     std::uint32_t sum = 0;
     for (int y = 0; y < slab.columns(); ++y) {
       sum = next_row_[0][sum & 0xff] ^ next_row_[1][sum >> 8 & 0xff] ^
@@ -65,6 +67,20 @@ class LayerCrc {
   }
 
  private:
+  /// Of rows where runs are as short as a voxel.
+  [[nodiscard]] uLong of_floats(const VoxelIntervals& slab, int z) const {
+    std::vector<std::uint32_t> row(length_);
+    uLong crc = crc32(0, nullptr, 0);
+    for (int y = 0; y < slab.columns(); ++y) {
+      std::fill(row.begin(), row.end(), 0);
+      for_each_value(slab, values_, y, z, [&](const Interval& interval, std::uint32_t value) {
+        std::fill_n(row.begin() + interval.begin(), interval.length(), value);
+      });
+      crc = crc32_z(crc, reinterpret_cast<const Bytef*>(row.data()), length_ * sizeof row[0]);
+    }
+    return crc;
+  }
+
   DenseValues values_;
   std::size_t length_;
   std::vector<std::vector<std::uint32_t>> tails_;  // by bit: of so many ones at the end of a row

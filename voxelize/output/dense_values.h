@@ -36,7 +36,7 @@ class DenseValues {
       bits = 8;
     } else {
       bytes = 4;
-      bits = kind == Kind::kColours ? 32 : 30;  // 1.0f is the largest share
+      bits = kind == Kind::kFloatShares ? 30 : 32;  // 1.0f is the largest share
     }
     components = kind == Kind::kColours ? 4 : 1;
   }

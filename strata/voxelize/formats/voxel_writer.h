@@ -87,6 +87,8 @@ struct MemoryFactors {
   std::string_view format;  ///< name of the output format; empty: none
   bool ids = false;         ///< voxels have ids
   bool fog = false;         ///< a fog volume
+  double band = 0.0;        ///< of distances, in voxels; 0: none
+  bool everywhere = false;  ///< distances go beyond the band
   // The machine.
   int threads = 1;          ///< as Execution::thread_count()
   std::uint64_t limit = 0;  ///< bytes, 0: none; slabs are cut to fit it

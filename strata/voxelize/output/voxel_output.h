@@ -52,7 +52,7 @@ class VoxelWriter {
   /// Adds the voxels of one slab. Uses the threads of `execution`; same bytes for any number.
   virtual Result<void> add(const VoxelIntervals& slab, const Execution& execution) = 0;
   /// Adds the distances of layers z_begin, z_begin + 1, ... of the grid, of all x and y, in
-  /// increasing z. @return kUsage if the format holds no distances
+  /// increasing z. z_begin is a multiple of 64. @return kUsage if the format holds no distances
   virtual Result<void> add_distances(const ScalarField& layers, int z_begin,
                                      const Execution& execution);
   /// Completes the file. Call it once, after the last slab. @return kOutput, kLimit, kCancelled
