@@ -5,6 +5,7 @@
 #include <CLI/Formatter.hpp>
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <filesystem>
 
 #include "apps/commands/choice_words.h"
@@ -15,6 +16,7 @@
 #include "core/did_you_mean.h"
 #include "core/printable.h"
 #include "strata/csg/input/scene_input.h"
+#include "strata/voxelize/distance/signed_distance.h"
 #include "strata/voxelize/formats/voxel_writer.h"
 
 namespace strata::apps {
@@ -201,6 +203,12 @@ void define_voxelize(CLI::App& app, Words& words) {
        "Write a mask grid to a .vdb: smaller, but fewer programs read it");
   flag(app, output, "--ids", words.ids,
        "Label each voxel with its solid or file: 1, 2, ...; --json lists the names");
+  flag(app, output, "--sdf", words.sdf,
+       "Write signed distances to the surface, negative inside: a level set in a .vdb, floats in "
+       "other formats; the grid gets a padding as wide as the band");
+  option(app, output, "--band", words.band, "N|all",
+         "With --sdf: voxels to each side of the surface that have their distance, 0.5 to 1024; "
+         "others have the band's (default: 3). all: every voxel has its own, not in a .vdb");
   option(app, output, "--name", words.name, "NAME",
          "Name of the grid in a .vdb, .nrrd or .vti (default: density, ids, surface or solid)");
   flag(app, output, "--stats", words.stats, "Print statistics");
@@ -393,6 +401,36 @@ GridRequest grid_request(const Words& words, Reader& reader) {
   return grid;
 }
 
+/// --sdf and --band.
+void read_distances(const Words& words, VoxelizeCommand& command, Reader& reader) {
+  command.sdf = words.sdf;
+  if (!words.band.empty()) {
+    if (!command.sdf) reader.fail_with("--band needs --sdf");
+    command.band_all = words.band == "all";
+    std::vector<double> band;
+    if (!command.band_all) reader.take(parse_numbers("--band", words.band, 1, 1), band);
+    if (!band.empty()) command.band = band[0];
+    if (!(command.band >= 0.5 && command.band <= kMaxDistanceBand)) {
+      reader.fail_with(
+          fmt::format("--band must be 0.5 to {}, or all, got {}", kMaxDistanceBand, words.band));
+    }
+  }
+  if (!command.sdf) return;
+  // Otherwise the band would be cut off where the mesh reaches the sides of the grid.
+  if (words.padding.empty() && words.grid.empty() && words.bounds.empty() && words.origin.empty()) {
+    command.grid.padding = static_cast<std::int64_t>(std::ceil(command.band));
+  }
+  const char* other = command.ids        ? "--ids"
+                      : command.fog != 0 ? "--fog"
+                      : command.mask     ? "--mask"
+                      : command.surface  ? "--surface"
+                                         : nullptr;
+  if (other != nullptr) reader.fail_with(fmt::format("--sdf cannot be combined with {}", other));
+  if (command.axis && *command.axis != Axis::kX) {
+    reader.fail_with("--sdf needs rays along x; without --axis the distances are the same");
+  }
+}
+
 /// --fog and what else says what a voxel of the file is.
 void read_values(const Words& words, VoxelizeCommand& command, Reader& reader) {
   constexpr std::int64_t kFogSamples = 4, kMostFogSamples = 16;
@@ -423,6 +461,7 @@ void read_values(const Words& words, VoxelizeCommand& command, Reader& reader) {
   if (command.fog != 0 && command.mask) {
     reader.fail_with("--fog and --mask cannot be combined");
   }
+  read_distances(words, command, reader);
   const bool named = command.name.has_value();
   if (command.output.empty() && (command.fog != 0 || command.mask || named)) {
     reader.fail_with(fmt::format("{} needs -o", named ? "--name" : fog_or_mask));

@@ -44,6 +44,9 @@ struct VoxelizeCommand {
   bool fog_by_default = false;  ///< of which no number was given
   bool mask = false;
   bool ids = false;                 ///< values say which solid
+  bool sdf = false;                 ///< values are signed distances
+  double band = 3.0;                ///< of those, in voxels to each side of the surface
+  bool band_all = false;            ///< all voxels have their distance
   std::optional<std::string> name;  ///< of the grid in the file
   GridRequest grid;
   bool default_size = false;  ///< the grid has kDefaultResolution, since no size was given

@@ -26,8 +26,13 @@ class BoxCount {
  public:
   /// @param side   of a box, in voxels @param along  an axis along which boxes are endless: they
   ///               are the rays through voxel centres, and count once for each triangle; 3: none
-  BoxCount(const VoxelGrid& grid, int side, int along)
-      : grid_(grid), side_(side), along_(along), boxes_((grid.dims + side - 1) / side) {
+  /// @param reach  of triangles beyond themselves, in voxels
+  BoxCount(const VoxelGrid& grid, int side, int along, const glm::dvec3& reach = glm::dvec3(0.0))
+      : grid_(grid),
+        side_(side),
+        along_(along),
+        reach_(reach),
+        boxes_((grid.dims + side - 1) / side) {
     constexpr double kMostMarks = 1 << 27;  // 16 MiB
     const double all = static_cast<double>(boxes_.x) * boxes_.y * boxes_.z;
     if (along == 3 && all <= kMostMarks) marks_.resize(static_cast<std::size_t>(all));
@@ -54,8 +59,8 @@ class BoxCount {
   }
   double met(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, int cuts) {
     constexpr double kMoved = 1.0 / 16;  // by the lattice, and where faces that coincide act
-    const glm::dvec3 low = glm::min(a, glm::min(b, c)) - kMoved;
-    const glm::dvec3 high = glm::max(a, glm::max(b, c)) + kMoved;
+    const glm::dvec3 low = glm::min(a, glm::min(b, c)) - kMoved - reach_;
+    const glm::dvec3 high = glm::max(a, glm::max(b, c)) + kMoved + reach_;
     const bool rays = along_ < 3;
     const glm::dvec3 first =
         glm::max(rays ? glm::ceil(low - 0.5) : glm::floor(low / side_), glm::dvec3(0.0));
@@ -94,6 +99,7 @@ class BoxCount {
   const VoxelGrid& grid_;
   double side_;
   int along_;
+  glm::dvec3 reach_;
   glm::ivec3 boxes_;         // along x, y, z
   std::vector<bool> marks_;  // of the boxes, x fastest; or none
 };
@@ -136,7 +142,12 @@ class SizeBound {
                              ? static_cast<double>(n.x) * n.y + static_cast<double>(n.y) * n.z +
                                    static_cast<double>(n.z) * n.x
                              : 0.0;
-    return std::min(all, sides + BoxCount(grid_, side, 3)(*factors_.mesh, execution_));
+    return std::min(all, sides + BoxCount(grid_, side, 3, reach())(*factors_.mesh, execution_));
+  }
+  /// Of the band of distances, in voxels.
+  [[nodiscard]] glm::dvec3 reach() const {
+    const glm::dvec3 s = grid_.voxel_size;
+    return factors_.band * std::max({s.x, s.y, s.z}) / s;
   }
   [[nodiscard]] bool goes_beyond() const {
     const glm::dvec3 margin = grid_.voxel_size / 16.0, low = grid_.origin - margin;
@@ -149,6 +160,10 @@ class SizeBound {
   /// Changes of the value along the rays of an axis.
   [[nodiscard]] double changes(Axis axis) const {
     if (factors_.votes) return cells_;
+    if (factors_.everywhere) return cells_;
+    if (factors_.band > 0) {  // all voxels of blocks that the band meets, and what lies between
+      return std::min(cells_, mixed(ScalarField::kBlockSide) * (ScalarField::kBlockVoxels + 64));
+    }
     double count = 0;
     if (factors_.solid) {
       const double crossings =
@@ -189,16 +204,19 @@ class SizeBound {
            deflated(values_.codes, runs, chunks * kSide * kSide * kSide, chunks);
   }
   [[nodiscard]] double vdb() const {
-    const bool floats = file_.ids != 0 || file_.fog != 0;
+    const bool level_set = factors_.band > 0;
+    const bool floats = file_.ids != 0 || file_.fog != 0 || level_set;
     const double leaves = parts(grid_.dims.x, 8) * parts(grid_.dims.y, 8) * parts(grid_.dims.z, 8);
     const double lowers =
         parts(grid_.dims.x, 128) * parts(grid_.dims.y, 128) * parts(grid_.dims.z, 128);
     const double uppers =
         parts(grid_.dims.x, 4096) * parts(grid_.dims.y, 4096) * parts(grid_.dims.z, 4096);
     const double value = floats ? 4 : 1, list = floats ? 8 : 0;
-    const double leaf = floats ? 64 + 64 + 1 + 8 + 2048 : file_.mask ? 64 + 76 : 64 + 140;
-    return kHeads + 3 * static_cast<double>(file_.name.size()) + uppers * (8205 + list + 17) +
-           lowers * (1025 + list + value) + leaves * value + mixed(8) * leaf;
+    const double leaf = floats ? 64 + 64 + 1 + 64 + 2048 : file_.mask ? 64 + 76 : 64 + 140;
+    const double masks = level_set ? 1.0 : 0.0;  // of what lies inside
+    return kHeads + 3 * static_cast<double>(file_.name.size()) +
+           uppers * (8205 + list + 17 + masks * 4096) +
+           lowers * (1025 + list + value + masks * 512) + leaves * value + mixed(8) * leaf;
   }
   [[nodiscard]] double binvox() const {
     const double side = std::max({grid_.dims.x, grid_.dims.y, grid_.dims.z});

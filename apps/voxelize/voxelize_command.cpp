@@ -54,7 +54,18 @@ Result<std::optional<VoxelFormat>> output_format(const VoxelizeCommand& command)
   if (command.ids) {
     if (auto held = check_ids(*format, 1); !held) return tl::unexpected(held.error());
   }
-  if (command.axis && *command.axis != format->axis) {
+  if (command.sdf) {
+    VoxelWriterOptions distances;
+    distances.band = 1.0f;
+    if (auto held = check_values(*format, distances); !held) return tl::unexpected(held.error());
+    if (command.band_all && format->name == "vdb") {
+      return fail(
+          ErrorCode::kUsage,
+          "--band all: a level set in a .vdb has a band; write .npz, .nrrd, .vti or another "
+          "format of arrays, or give a number");
+    }
+  }
+  if (command.axis && *command.axis != format->axis && !command.sdf) {
     return fail(ErrorCode::kUsage,
                 "--axis {}: format {} needs rays along {}; without --axis the voxels are the same",
                 "xyz"[static_cast<int>(*command.axis)], format -> name,
@@ -103,6 +114,7 @@ void tell_units(const VoxelizeCommand& command, const csg::SolidInput& input, Se
 /// The axis the format is written from, or the one with the fewest columns.
 Axis choose_axis(const VoxelizeCommand& command, const std::optional<VoxelFormat>& format,
                  const VoxelGrid& grid) {
+  if (command.sdf) return Axis::kX;
   if (command.axis) return *command.axis;
   if (format) return format->axis;
   // The longest side has the smallest cross-section.
@@ -161,6 +173,8 @@ MemoryFactors memory_factors(const VoxelizeCommand& command, const VoxelizeOutco
   if (outcome.format) factors.format = outcome.format->name;
   factors.ids = command.ids;
   factors.fog = command.fog != 0;
+  if (command.sdf) factors.band = command.band;
+  factors.everywhere = command.band_all;
   factors.threads = session.threads();
   factors.limit = session.memory_limit();
   return factors;

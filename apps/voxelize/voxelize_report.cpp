@@ -91,6 +91,18 @@ void write_input(JsonWriter& json, const csg::SolidInput& input) {
   json.end_object();
 }
 
+void write_distances(JsonWriter& json, const VoxelizeOutcome& outcome) {
+  const DistanceReport& found = *outcome.distances;
+  json.key("distances").begin_object();
+  json.member("band", found.band);
+  json.member("surface", outcome.exact_boundary ? "boundary" : "mesh");
+  json.member("band_voxels", found.band_voxels);
+  json.member("inside_voxels", found.inside_voxels);
+  json.member("least", double{found.least});
+  json.member("greatest", double{found.greatest});
+  json.end_object();
+}
+
 void write_results(JsonWriter& json, const VoxelizeCommand& command,
                    const VoxelizeOutcome& outcome) {
   const VoxelizeReport& report = outcome.report;
@@ -102,6 +114,8 @@ void write_results(JsonWriter& json, const VoxelizeCommand& command,
   json.member("intervals", report.intervals);
   if (command.checksum) json.member("checksum", fmt::format("{:016x}", report.checksum));
   json.end_object();
+
+  if (outcome.distances) write_distances(json, outcome);
 
   json.key("lost_walls").begin_object();
   json.member("count", outcome.lost_walls.count);
@@ -204,6 +218,13 @@ void tell_results(Lines& line, const VoxelizeCommand& command, const VoxelizeOut
                    grouped(report.solid_voxels), 100 * solid / cells,
                    solid * voxel_volume(outcome.grid), outcome.area_estimate,
                    grouped(report.intervals)));
+  if (outcome.distances) {
+    const DistanceReport& found = *outcome.distances;
+    const std::string within = found.band > 0 ? fmt::format(" within {:.6g}", found.band) : "";
+    line("sdf",
+         fmt::format("{} voxels{} of the {}, {:.6g} to {:.6g}", grouped(found.band_voxels), within,
+                     outcome.exact_boundary ? "boundary" : "surface", found.least, found.greatest));
+  }
   if (command.checksum) line("checksum", fmt::format("{:016x}", report.checksum));
   line("lists", fmt::format("{} crossings, at most {} in a column", grouped(report.crossings),
                             report.max_depth_complexity));

@@ -10,6 +10,7 @@
 #include "apps/voxelize/file_size.h"
 #include "strata/core/grid.h"
 #include "strata/csg/input/solid_input.h"
+#include "strata/voxelize/distance/signed_distance.h"
 #include "strata/voxelize/formats/voxel_writer.h"
 #include "strata/voxelize/voxelize.h"
 #include "voxelize/open/lost_walls.h"
@@ -25,7 +26,9 @@ struct VoxelizeOutcome {
   VoxelizeReport report;
   bool measured = false;  ///< the report's statistics are filled
   LostWalls lost_walls;
-  double area_estimate = 0.0;         ///< of the set's boundary, square world units
+  std::optional<DistanceReport> distances;  ///< with --sdf
+  bool exact_boundary = false;  ///< they are those to the boundary of a tree, not to all faces
+  double area_estimate = 0.0;   ///< of the set's boundary, square world units
   std::optional<VoxelFormat> format;  ///< of the output; none without one
   std::optional<std::uint64_t> output_bytes;
   std::optional<FileSize> file_size;     ///< of a dry run

@@ -3,6 +3,7 @@
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <cmath>
 #include <glm/common.hpp>
 #include <memory>
 #include <utility>
@@ -10,10 +11,12 @@
 #include "apps/commands/choice_words.h"
 #include "apps/session/report.h"
 #include "apps/strata/library_session.h"
+#include "apps/voxelize/distance_surface.h"
 #include "strata/csg/input/solid_input.h"
 #include "strata/csg/picture/picture.h"
 #include "strata/csg/solid_lists.h"
 #include "strata/voxelize/checksum.h"
+#include "strata/voxelize/distance/signed_distance.h"
 #include "voxelize/open/lost_walls.h"
 
 namespace strata::apps {
@@ -31,8 +34,9 @@ Result<void> check_thin(const VoxelizeCommand& command, VoxelizeOutcome& outcome
     options.taken_away = [&](std::uint32_t t) { return input.tree->is_subtracted(t); };
   }
   const std::uint64_t solid = outcome.report.solid_voxels;
-  const char* remedy =
-      command.ids ? "; --surface, without --ids, keeps all of it" : "; --surface keeps all of it";
+  const char* remedy = command.sdf   ? "; smaller voxels keep more of it"
+                       : command.ids ? "; --surface, without --ids, keeps all of it"
+                                     : "; --surface keeps all of it";
   if (input.closed) {
     auto found = find_lost_walls(input.soup, outcome.grid, options, execution);
     if (!found) return tl::unexpected(found.error());
@@ -104,7 +108,7 @@ void label_solids(const VoxelizeCommand& command, VoxelizeOutcome& outcome,
     return outcome.input.tree->set_labels(csg::id_labels(scene));
   }
   const bool surface = command.surface || is_surface_alone(command, outcome.input);
-  if (command.output.empty() || surface) return;
+  if (command.output.empty() || surface || command.sdf) return;
   const std::size_t most = outcome.format->colours;
   if (most == 0) return;
   const glm::vec4 none(glm::vec3(csg::colour_schemes().front().face) / 255.0f, 1.0f);
@@ -176,7 +180,7 @@ class VoxelizeRun {
 
   Result<void> run() {
     if (auto done = open(); !done) return done;
-    if (auto done = voxelize(); !done) return done;
+    if (auto done = command_.sdf ? distances() : voxelize(); !done) return done;
     if (auto done = check_voxels(command_, outcome_, quiet_, session_); !done) return done;
     if (!writer_) return {};
     if (auto done = write_samples(); !done) return done;
@@ -187,9 +191,12 @@ class VoxelizeRun {
   Result<void> open();
   Result<void> open_source();
   Result<void> voxelize();
+  Result<void> distances();
   Result<void> write_samples();
   Result<void> finish();
-  Result<void> write(const VoxelIntervals& slab);
+  template <class Add>
+  Result<void> write(Add&& add);
+  void tell(const VoxelizeReport& report, const std::optional<BoundaryArea>& boundary);
 
   const VoxelizeCommand& command_;
   VoxelizeOutcome& outcome_;
@@ -235,10 +242,11 @@ Result<void> VoxelizeRun::open_source() {
   return {};
 }
 
-Result<void> VoxelizeRun::write(const VoxelIntervals& slab) {
+template <class Add>
+Result<void> VoxelizeRun::write(Add&& add) {
   if (!writer_) return {};
   const double start = session_.milliseconds();
-  auto done = writer_->add(slab, quiet_);
+  auto done = add(*writer_);
   write_ms_ += session_.milliseconds() - start;
   return done;
 }
@@ -251,7 +259,8 @@ Result<void> VoxelizeRun::voxelize() {
     if (!options_.statistics) solid_voxels += slab.solid_voxels();
     if (boundary) boundary->add(slab, quiet_);
     if (command_.ids) count_ids(slab, outcome_.id_voxels);
-    return samples_ > 1 ? Result<void>() : write(slab);
+    if (samples_ > 1) return {};
+    return write([&](VoxelWriter& writer) { return writer.add(slab, quiet_); });
   };
   VoxelGrid finest = outcome_.grid;
   finest.dims *= std::max(1, samples_), finest.voxel_size /= std::max(1, samples_);
@@ -259,10 +268,44 @@ Result<void> VoxelizeRun::voxelize() {
   auto report = voxelize_slabs(outcome_.input.soup, outcome_.grid, options_, execution_, sink);
   if (!report) return tl::unexpected(report.error());
   if (session_.interrupted()) return fail(ErrorCode::kCancelled, "stopped");
-  outcome_.report = *report;
+  if (!options_.statistics) report->solid_voxels = solid_voxels;
+  tell(*report, boundary);
+  return {};
+}
+
+void VoxelizeRun::tell(const VoxelizeReport& report, const std::optional<BoundaryArea>& boundary) {
+  outcome_.report = report;
   outcome_.measured = true;
-  if (!options_.statistics) outcome_.report.solid_voxels = solid_voxels;
   if (boundary) outcome_.area_estimate = boundary->estimate();
+}
+
+/// Of --sdf.
+Result<void> VoxelizeRun::distances() {
+  if (auto done = outcome_.input.fit(outcome_.grid, quiet_); !done) return done;
+  auto surface = distance_surface(command_, outcome_, options_, session_);
+  if (!surface) return tl::unexpected(surface.error());
+  outcome_.exact_boundary = surface->has_value();
+  std::optional<BoundaryArea> boundary;
+  if (command_.stats || command_.json) boundary.emplace(outcome_.grid, Axis::kX);
+  DistanceOptions options;
+  options.band = command_.band;
+  options.everywhere = command_.band_all;
+  options.solid = options_;
+  if (*surface) options.surface = &**surface;
+  options.inside = [&](const VoxelIntervals& slab) -> Result<void> {
+    if (boundary) boundary->add(slab, quiet_);
+    return {};
+  };
+  execution_ = session_.execution("distances", 1.0);
+  const auto report = signed_distance_slabs(
+      outcome_.input.soup, outcome_.grid, options, execution_,
+      [&](const ScalarField& layers, int z) {
+        return write([&](VoxelWriter& to) { return to.add_distances(layers, z, quiet_); });
+      });
+  if (!report) return tl::unexpected(report.error());
+  if (session_.interrupted()) return fail(ErrorCode::kCancelled, "stopped");
+  outcome_.distances = *report;
+  tell(report->solid, boundary);
   return {};
 }
 
@@ -274,8 +317,10 @@ Result<void> VoxelizeRun::write_samples() {
   options_.statistics = false;
   Execution fine = session_.execution("sampling", 1.0);
   fine.memory_limit = execution_.memory_limit;
-  const auto done = voxelize_slabs(outcome_.input.soup, outcome_.grid, options_, fine,
-                                   [this](const VoxelIntervals& slab) { return write(slab); });
+  const auto done = voxelize_slabs(
+      outcome_.input.soup, outcome_.grid, options_, fine, [this](const VoxelIntervals& slab) {
+        return write([&](VoxelWriter& to) { return to.add(slab, quiet_); });
+      });
   if (!done) return tl::unexpected(done.error());
   if (session_.interrupted()) return fail(ErrorCode::kCancelled, "stopped");
   return {};
@@ -306,6 +351,10 @@ VoxelWriterOptions writer_options(const VoxelizeCommand& command, VoxelizeOutcom
   VoxelWriterOptions file;
   file.fog = static_cast<std::uint32_t>(samples * samples * samples);
   file.mask = command.mask;
+  if (command.sdf) {
+    const double band = band_in_world(outcome.grid, command.band);
+    file.band = command.band_all ? INFINITY : static_cast<float>(band);
+  }
   if (!command.solid && samples == 0) file.name = "surface";
   if (command.name) file.name = *command.name;
   label_solids(command, outcome, file, session);
