@@ -296,9 +296,10 @@ Result<void> VoxelizeRun::distances() {
     if (boundary) boundary->add(slab, quiet_);
     return {};
   };
-  execution_ = session_.execution("distances", 1.0);
+  Execution execution = session_.execution("distances", 1.0);
+  execution.memory_limit = execution_.memory_limit;
   const auto report = signed_distance_slabs(
-      outcome_.input.soup, outcome_.grid, options, execution_,
+      outcome_.input.soup, outcome_.grid, options, execution,
       [&](const ScalarField& layers, int z) {
         return write([&](VoxelWriter& to) { return to.add_distances(layers, z, quiet_); });
       });

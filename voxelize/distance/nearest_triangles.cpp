@@ -174,8 +174,11 @@ namespace {
 /// Builds the tree from the top: halves along the longest side of the middles' box.
 class TreeBuilder {
  public:
-  TreeBuilder(const LatticeMesh& mesh, const glm::dvec3& scale)
-      : mesh_(mesh), step_(scale / double{kLatticeSteps}), order_(mesh.triangles.size()) {
+  TreeBuilder(const LatticeMesh& mesh, const glm::dvec3& scale, const std::stop_token& stop)
+      : mesh_(mesh),
+        step_(scale / double{kLatticeSteps}),
+        stop_(stop),
+        order_(mesh.triangles.size()) {
     std::iota(order_.begin(), order_.end(), 0);
     for (const glm::uvec3& t : mesh.triangles) {
       const glm::ivec3 a = mesh.vertices[t.x], b = mesh.vertices[t.y], c = mesh.vertices[t.z];
@@ -184,6 +187,7 @@ class TreeBuilder {
   }
 
   void build(std::uint32_t begin, std::uint32_t end) {
+    if (stop_.stop_requested()) return;
     const std::size_t at = nodes.size();
     nodes.push_back(box(begin, end));
     if (end - begin <= NearestTriangles::kLeafTriangles) {
@@ -244,16 +248,19 @@ class TreeBuilder {
 
   const LatticeMesh& mesh_;
   glm::dvec3 step_;
+  const std::stop_token& stop_;
   std::vector<std::uint32_t> order_;
   std::vector<glm::ivec3> middles_;
 };
 
 }  // namespace
 
-NearestTriangles::NearestTriangles(const LatticeMesh& mesh, const glm::dvec3& scale) {
+NearestTriangles::NearestTriangles(const LatticeMesh& mesh, const glm::dvec3& scale,
+                                   const std::stop_token& stop) {
   if (mesh.triangles.empty()) return;
-  TreeBuilder builder(mesh, scale);
+  TreeBuilder builder(mesh, scale, stop);
   builder.build(0, static_cast<std::uint32_t>(mesh.triangles.size()));
+  if (stop.stop_requested()) return;
   nodes_ = std::move(builder.nodes);
   triangles_ = builder.triangles(scale);
 }

@@ -17,7 +17,8 @@ class NearestTriangles {
  public:
   NearestTriangles() = default;
   /// @param scale  sides of a voxel in units of the longest one
-  NearestTriangles(const LatticeMesh& mesh, const glm::dvec3& scale);
+  /// After a stop it is not complete.
+  NearestTriangles(const LatticeMesh& mesh, const glm::dvec3& scale, const std::stop_token& stop);
 
   /// True for a mesh without triangles.
   [[nodiscard]] bool empty() const { return triangles_.empty(); }

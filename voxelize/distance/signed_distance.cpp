@@ -126,7 +126,7 @@ class DistanceField {
     scale_.band_square = static_cast<float>(band * band);
     scale_.unit = static_cast<float>(unit);
     scale_.band = static_cast<float>(band * unit);
-    if (everywhere_) nearest_ = NearestTriangles(mesh, tile_.scale);
+    if (everywhere_) nearest_ = NearestTriangles(mesh, tile_.scale, execution.stop);
     bins_ = TriangleBins(mesh, grid, (band + 0.01) / tile_.scale, execution);
   }
 

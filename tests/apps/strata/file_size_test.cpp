@@ -78,6 +78,10 @@ TEST_F(FileSize, HoldsForEveryFormatAndKindOfSolid) {
     holds({input, "-r", "65"}, "slices/");
     holds({input, "-r", "130", "--fog"}, "a.vdb");
     holds({input, "-r", "130", "--mask"}, "a.vdb");
+    for (const char* output : {"a.vdb", "a.npy", "a.npz", "a.nrrd", "a.vti", "a.zarr"}) {
+      holds({input, "-r", "37", "--sdf"}, output);
+    }
+    holds({input, "-r", "20", "--sdf", "--band", "all"}, "a.npz");
   }
 }
 

@@ -42,6 +42,20 @@ def read_vdb(path, shape):
     return grid, values
 
 
+def check_distances(files, size):
+    """A level set has the values of the array and the signs of the solid."""
+    sizes = ("--voxel-size", str(size), "--padding", "3")
+    strata(*files, *sizes, "-o", "solid.npz")
+    strata(*files, *sizes, "--sdf", "-o", "distances.npz")
+    strata(*files, *sizes, "--sdf", "-o", "surface.vdb")
+    solid, array = numpy.load("solid.npz")["voxels"], numpy.load("distances.npz")["voxels"]
+    grid, values = read_vdb("surface.vdb", array.shape)
+    assert array.dtype == numpy.float32 and ((array < 0) == solid).all() and solid.any()
+    assert grid.name == "surface" and grid.gridClass == "level set"
+    assert numpy.isclose(grid.background, 3 * size) and (values.astype(numpy.float32) == array).all()
+    assert grid.activeVoxelCount() == (abs(array) < array.max()).sum()
+
+
 def check_fog(files, size):
     """A value is the mean of the 4 x 4 x 4 voxels of a finer grid."""
     strata(*files, "--voxel-size", str(size), "-o", "coarse.npz")
@@ -99,6 +113,7 @@ def main():
         out.write("difference() { sphere(r = 5, $fn = 20); cube([3, 9, 4]); }")
     check_fog(["a.obj", "b.obj"], size)
     check_fog(["c.csg"], size)
+    check_distances(["a.obj", "b.obj"], size)
     print("read", solid.sum(), "voxels")
 
 
