@@ -64,6 +64,22 @@ class IndexReader {
 
 namespace fs = std::filesystem;
 
+/// A sentence about a unit that is not the millimetre; empty where there is none to tell. Numbers
+/// are taken as they are, so such a model has a different size.
+std::string unit_note(const std::string& path, const MeshReadStats& stats) {
+  constexpr std::pair<double, std::string_view> kUnits[] = {
+      {1e-6, "micron"}, {1e-2, "centimeter"}, {0.0254, "inch"}, {0.3048, "foot"}, {1.0, "meter"}};
+  for (const auto& [metres, name] : kUnits) {
+    if (stats.unit_metres != metres) continue;
+    return fmt::format(
+        "{}: its unit is the {}{}; the numbers are taken as they are{}; scale({:g}) makes them "
+        "millimetres",
+        path, name, stats.y_up ? " and y is up" : "", stats.y_up ? "" : ", as OpenSCAD does",
+        metres * 1000);
+  }
+  return {};
+}
+
 /// A file's name as messages show it.
 std::string shown(std::string_view name) { return printable(name, 120); }
 
@@ -363,6 +379,9 @@ void Evaluator::import(std::uint32_t node, const Context& context) {
                          mesh->stats.dropped_faces(), mesh->stats.faces));
       }
       for (const std::string& text : mesh->stats.warnings) warn(node, "geometry", text);
+      if (const std::string text = unit_note(*path, mesh->stats); !text.empty()) {
+        warn(node, "geometry", text);
+      }
       if (centre) move_to_middle(mesh->soup);
       if (!mesh->soup.triangles.empty()) imported.rule = inspect(node, mesh->soup);
     }

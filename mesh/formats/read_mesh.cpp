@@ -70,11 +70,15 @@ Result<MeshFile> read_archive(const std::string& path, const MeshReadOptions& op
     return fail(ErrorCode::kUsage, "standard input: {} is read from files only",
                 mesh_format_name(options.format));
   }
+  const ArchiveOptions wanted{options.attributes, options.textures, options.wants_parts()};
+  auto model = (options.format == MeshFormat::k3mf ? read_3mf_model : read_amf_model)(path, wanted,
+                                                                                      execution);
+  if (!model) return tl::unexpected(model.error());
   MeshFile file;
-  auto soup = (options.format == MeshFormat::k3mf ? read_3mf : read_amf)(path, execution,
-                                                                         &file.stats.warnings);
-  if (!soup) return tl::unexpected(soup.error());
-  file.soup = *std::move(soup);
+  file.soup = std::move(model->soup);
+  file.attributes = std::move(model->attributes);
+  file.stats.warnings = std::move(model->warnings);
+  file.stats.unit_metres = model->unit_metres;
   file.stats.format = mesh_format_name(options.format);
   std::error_code unknown;
   const auto bytes = std::filesystem::file_size(path, unknown);

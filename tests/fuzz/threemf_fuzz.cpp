@@ -33,9 +33,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const InputFile file(text.starts_with("PK") ? std::string(text) : archive_of(text), ".3mf");
   Execution execution;
   execution.memory_limit = std::uint64_t{1} << 28;
-  const auto mesh = read_3mf(file.path(), execution);
+  const auto mesh = read_3mf_model(file.path(), {.attributes = true}, execution);
   if (mesh) {
-    check_soup(*mesh);
+    check_soup(mesh->soup);
   } else if (mesh.error().code != ErrorCode::kUsage) {  // a build without the libraries
     check_refusal(mesh.error(), file.path());
   }

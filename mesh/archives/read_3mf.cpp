@@ -1,0 +1,429 @@
+#include "mesh/archives/read_3mf_amf.h"
+
+#ifdef STRATA_HAVE_PUGIXML
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <glm/mat4x4.hpp>
+#include <memory>
+#include <new>
+#include <optional>
+#include <string_view>
+#include <unordered_map>
+#include <unordered_set>
+#include <utility>
+#include <vector>
+
+#include "core/printable.h"
+#include "mesh/archives/model_looks.h"
+#include "mesh/archives/model_properties.h"
+#include "mesh/archives/xml_mesh.h"
+#include "mesh/archives/zip_entry.h"
+#include "mesh/textures/read_texture.h"
+#include "strata/mesh/shapes.h"
+#include "strata/mesh/soup_tools.h"
+
+namespace strata {
+namespace {
+
+using namespace detail;
+
+/// The mesh of an object, and what its triangles look like if that is asked.
+struct ObjectMesh {
+  TriangleSoup soup;
+  std::vector<TriangleLook> looks;
+};
+
+/// Finds the properties that triangles name.
+class LookFinder {
+ public:
+  LookFinder(const pugi::xml_node& object, const PropertyGroups& groups) : groups_(groups) {
+    own_ = group_of(object.attribute("pid").value());
+    own_index_ = index_of(object.attribute("pindex").value());
+  }
+  TriangleLook look(const pugi::xml_node& triangle) {
+    const std::string_view pid = triangle.attribute("pid").value();
+    const std::string_view p1 = triangle.attribute("p1").value();
+    const PropertyGroup* const group = pid.empty() ? own_ : pid == last_id_ ? last_ : group_of(pid);
+    if (!pid.empty()) {
+      last_id_ = pid;
+      last_ = group;
+    }
+    if (group == nullptr) return {};
+    if (p1.empty()) return group->look({own_index_, own_index_, own_index_});
+    const std::uint32_t first = index_of(p1);
+    const auto or_first = [&](const char* name) {
+      const std::string_view text = triangle.attribute(name).value();
+      return text.empty() ? first : index_of(text);
+    };
+    return group->look({first, or_first("p2"), or_first("p3")});
+  }
+
+ private:
+  [[nodiscard]] const PropertyGroup* group_of(std::string_view id) const {
+    const auto found = groups_.find(id);
+    return found == groups_.end() ? nullptr : &found->second;
+  }
+  static std::uint32_t index_of(std::string_view text) {
+    const auto number = read_number(text);
+    return number && *number >= 0.0 && *number < 4e9 ? static_cast<std::uint32_t>(*number)
+                                                     : MeshAttributes::kNone;
+  }
+
+  const PropertyGroups& groups_;
+  const PropertyGroup* own_ = nullptr;
+  std::uint32_t own_index_ = MeshAttributes::kNone;
+  std::string_view last_id_;
+  const PropertyGroup* last_ = nullptr;
+};
+
+/// @param finder  null: looks are not asked
+Result<ObjectMesh> read_object_mesh(const XmlMesh& file, const pugi::xml_node& node,
+                                    LookFinder* finder) {
+  ObjectMesh mesh;
+  for (const pugi::xml_node& vertex : child(node, "vertices").children()) {
+    if (vertex.type() != pugi::node_element) continue;
+    if (file.stopped()) return fail(ErrorCode::kCancelled, "stopped");
+    glm::dvec3 p;
+    const char* const axes[] = {"x", "y", "z"};
+    for (int i = 0; i < 3; ++i) {
+      const auto number = read_number(vertex.attribute(axes[i]).value());
+      if (!number) return file.refuse(vertex, fmt::format("a vertex has no valid {}", axes[i]));
+      p[i] = *number;
+    }
+    mesh.soup.positions.push_back(p);
+  }
+  for (const pugi::xml_node& triangle : child(node, "triangles").children()) {
+    if (local_name(triangle) != "triangle") continue;
+    const std::string_view texts[] = {triangle.attribute("v1").value(),
+                                      triangle.attribute("v2").value(),
+                                      triangle.attribute("v3").value()};
+    const auto added = file.add_triangle(mesh.soup, triangle, texts, 0);
+    if (!added) return tl::unexpected(added.error());
+    if (*added && finder) mesh.looks.push_back(finder->look(triangle));
+  }
+  return mesh;
+}
+
+/// Reads "m00 m01 m02 m10 ... m32", a matrix for row vectors. Its rows are the columns of ours.
+Result<glm::dmat4> read_transform(const XmlMesh& file, const pugi::xml_node& node) {
+  constexpr std::string_view kSpace = " \t\r\n";
+  glm::dmat4 matrix(1.0);
+  std::string_view text = node.attribute("transform").value();
+  if (text.find_first_not_of(kSpace) == std::string_view::npos) return matrix;
+  for (int i = 0; i < 12; ++i) {
+    text.remove_prefix(std::min(text.find_first_not_of(kSpace), text.size()));
+    const std::size_t space = std::min(text.find_first_of(kSpace), text.size());
+    const auto number = read_number(text.substr(0, space));
+    if (!number) return file.refuse(node, "a transform must have 12 numbers");
+    matrix[i / 3][i % 3] = *number;
+    text.remove_prefix(space);
+  }
+  if (text.find_first_not_of(kSpace) != std::string_view::npos) {
+    return file.refuse(node, "a transform must have 12 numbers, got more");
+  }
+  return matrix;
+}
+
+/// The value of the attribute with this name, whatever the prefix of its namespace.
+std::string_view any_attribute(const pugi::xml_node& node, std::string_view name) {
+  for (const pugi::xml_attribute& attribute : node.attributes()) {
+    const std::string_view full = attribute.name();
+    const std::size_t colon = full.find(':');
+    if ((colon == std::string_view::npos ? full : full.substr(colon + 1)) == name) {
+      return attribute.value();
+    }
+  }
+  return {};
+}
+
+/// An object of a model part. Its mesh is read when it is first used.
+struct ModelObject {
+  pugi::xml_node node;
+  std::optional<ObjectMesh> mesh;
+  bool is_open = false;  ///< it encloses the component being read
+};
+
+/// A model part of the archive.
+struct ModelPart {
+  XmlMesh file;
+  std::unordered_map<std::string_view, ModelObject> objects;
+  PropertyGroups properties;
+};
+
+/// An object with its place. Its mesh goes to the soup.
+struct Instance {
+  const ObjectMesh* mesh = nullptr;
+  glm::dmat4 world{1.0};
+  std::string name;
+};
+
+struct PlaceHash {
+  std::size_t operator()(const std::pair<const ModelObject*, std::array<double, 12>>& key) const {
+    std::size_t hash = std::hash<const void*>()(key.first);
+    for (const double number : key.second) {
+      hash = hash * 0x9e3779b97f4a7c15u + std::hash<double>()(number);
+    }
+    return hash ^ (hash >> 29);
+  }
+};
+
+/// Assembles the build items of an archive.
+class Package {
+ public:
+  Package(ZipArchive archive, const ArchiveOptions& options, const Execution& execution)
+      : archive_(std::move(archive)), options_(options), execution_(execution) {}
+
+  Result<ArchiveModel> assemble() {
+    auto name = root_name();
+    if (!name) return tl::unexpected(name.error());
+    auto root = part(*name);
+    if (!root) return tl::unexpected(root.error());
+    const XmlMesh& file = (*root)->file;
+    model_.unit_metres = unit_of(file);
+    for (const pugi::xml_node& item : child(file.root(), "build").children()) {
+      if (local_name(item) != "item") continue;
+      if (auto added = add(**root, item, glm::dmat4(1.0), 0, ""); !added) {
+        return tl::unexpected(added.error());
+      }
+    }
+    return gather();
+  }
+
+ private:
+  static constexpr int kMostDepth = 64;
+  static constexpr std::size_t kMostInstances = 1'000'000;
+
+  /// The name of the part that the package's relationships declare as the model.
+  Result<std::string> root_name() const {
+    if (const auto rels = archive_.find("_rels/.rels")) {
+      auto text = archive_.read(*rels, execution_);
+      if (!text) return tl::unexpected(text.error());
+      XmlMesh file(archive_.path() + "/" + *rels, *std::move(text));
+      if (auto parsed = file.parse(); !parsed) return tl::unexpected(parsed.error());
+      for (const pugi::xml_node& relation : file.root().children()) {
+        if (!std::string_view(relation.attribute("Type").value()).ends_with("/3dmodel")) continue;
+        const std::string_view target = relation.attribute("Target").value();
+        if (const auto name = archive_.find(target)) return *name;
+        return file.refuse(relation, fmt::format("there is no part '{}'", target));
+      }
+    }
+    if (const auto name = archive_.find("3D/3dmodel.model")) return *name;
+    for (const std::string& name : archive_.names()) {
+      if (name.ends_with(".model")) return name;
+    }
+    return fail(ErrorCode::kInput, "{}: the archive has no model", archive_.path());
+  }
+
+  Result<ModelPart*> part(const std::string& name) {
+    std::unique_ptr<ModelPart>& part = parts_[name];
+    if (part) return part.get();
+    auto text = archive_.read(name, execution_);
+    if (!text) return tl::unexpected(text.error());
+    auto made = std::make_unique<ModelPart>(ModelPart{
+        XmlMesh(archive_.path() + "/" + name, *std::move(text), execution_.stop), {}, {}});
+    if (auto parsed = made->file.parse(); !parsed) return tl::unexpected(parsed.error());
+    const pugi::xml_node resources = child(made->file.root(), "resources");
+    if (options_.attributes) {
+      auto groups =
+          read_properties(made->file, resources, pictures(), looks_.attributes, model_.warnings);
+      if (!groups) return tl::unexpected(groups.error());
+      made->properties = *std::move(groups);
+    }
+    for (const pugi::xml_node& object : resources.children()) {
+      if (local_name(object) != "object") continue;
+      made->objects.try_emplace(object.attribute("id").value(), ModelObject{object, {}, false});
+    }
+    part = std::move(made);
+    return part.get();
+  }
+
+  /// Reads pictures of the archive; empty where none are asked.
+  ReadPicture pictures() {
+    if (!options_.textures) return {};
+    return [this](std::string_view path) -> Result<Texture> {
+      const auto name = archive_.find(path);
+      if (!name) {
+        return fail(ErrorCode::kInput, "{}: there is no picture '{}'", archive_.path(),
+                    printable(path, 80));
+      }
+      auto bytes = archive_.read(*name, execution_);
+      if (!bytes) return tl::unexpected(bytes.error());
+      return read_texture(archive_.path() + "/" + *name, *bytes, execution_);
+    };
+  }
+
+  /// Adds the object that a build item or component names, at its place. @param name  of the object
+  /// around it
+  Result<void> add(ModelPart& home, const pugi::xml_node& item, const glm::dmat4& around, int depth,
+                   const std::string& name) {
+    if (execution_.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+    auto matrix = read_transform(home.file, item);
+    if (!matrix) return tl::unexpected(matrix.error());
+    ModelPart* where = &home;
+    if (const std::string_view path = any_attribute(item, "path"); !path.empty()) {
+      const auto other_name = archive_.find(path);
+      if (!other_name) return home.file.refuse(item, fmt::format("there is no part '{}'", path));
+      auto other = part(*other_name);
+      if (!other) return tl::unexpected(other.error());
+      where = *other;
+    }
+    const std::string_view id = item.attribute("objectid").value();
+    const auto found = where->objects.find(id);
+    if (found == where->objects.end()) {
+      return home.file.refuse(item, where == &home
+                                        ? fmt::format("there is no object '{}'", id)
+                                        : fmt::format("there is no object '{}' in part '{}'", id,
+                                                      any_attribute(item, "path")));
+    }
+    ModelObject& object = found->second;
+    if (object.is_open) {
+      return home.file.refuse(item, fmt::format("object '{}' is a component of itself", id));
+    }
+    if (depth > kMostDepth) {
+      return home.file.refuse(item,
+                              fmt::format("components are nested more than {} deep", kMostDepth));
+    }
+    const glm::dmat4 world = around * *matrix;
+    std::array<double, 12> place;
+    for (int i = 0; i < 12; ++i) place[static_cast<std::size_t>(i)] = world[i / 3][i % 3];
+    if (!placed_.emplace(&object, place).second) return {};  // the object is already at this place
+    if (placed_.size() > kMostInstances) {
+      return home.file.refuse(
+          item, fmt::format("the model has more than {} objects at their places", kMostInstances),
+          ErrorCode::kLimit);
+    }
+    const std::string_view own = object.node.attribute("name").value();
+    return add_object(*where, object, world, depth, own.empty() ? name : std::string(own));
+  }
+
+  Result<void> add_object(ModelPart& home, ModelObject& object, const glm::dmat4& world, int depth,
+                          const std::string& name) {
+    for (const pugi::xml_node& content : object.node.children()) {
+      if (local_name(content) == "mesh") {
+        if (!object.mesh) {
+          LookFinder finder(object.node, home.properties);
+          auto read = read_object_mesh(home.file, content, options_.attributes ? &finder : nullptr);
+          if (!read) return tl::unexpected(read.error());
+          object.mesh = *std::move(read);
+        }
+        instances_.push_back(
+            {&*object.mesh, world,
+             name.empty() ? fmt::format("object {}", object.node.attribute("id").value()) : name});
+      } else if (local_name(content) == "components") {
+        object.is_open = true;
+        for (const pugi::xml_node& component : content.children()) {
+          if (local_name(component) != "component") continue;
+          if (auto added = add(home, component, world, depth + 1, name); !added) {
+            return added;
+          }
+        }
+        object.is_open = false;
+      }
+    }
+    return {};
+  }
+
+  Result<ArchiveModel> gather() {
+    std::size_t positions = 0, triangles = 0;
+    for (const Instance& instance : instances_) {
+      positions += instance.mesh->soup.positions.size();
+      triangles += instance.mesh->soup.triangles.size();
+    }
+    constexpr std::size_t kMostTriangles = 100'000'000;
+    if (triangles > kMostTriangles || positions > kMostTriangles) {
+      return fail(ErrorCode::kLimit,
+                  "{}: the model has {} triangles and {} vertices in {} objects; the limit is {}",
+                  archive_.path(), triangles, positions, instances_.size(), kMostTriangles);
+    }
+    if (triangles == 0) {
+      return fail(ErrorCode::kInput, "{}: no build item has a triangle", archive_.path());
+    }
+    const std::size_t bytes = positions * sizeof(glm::dvec3) + triangles * sizeof(glm::uvec3);
+    if (execution_.memory_limit != 0 && bytes > execution_.memory_limit) {
+      return fail(ErrorCode::kLimit, "{}: the model needs {} bytes, but the memory limit is {}",
+                  archive_.path(), bytes, execution_.memory_limit);
+    }
+    TriangleSoup& all = model_.soup;
+    all.positions.reserve(positions);
+    all.triangles.reserve(triangles);
+    for (const Instance& instance : instances_) {
+      if (execution_.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+      append(all, transform(instance.mesh->soup, instance.world));
+      add_looks(instance);
+    }
+    for (const glm::dvec3& p : all.positions) {
+      if (std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z)) continue;
+      return fail(ErrorCode::kInput, "{}: its transforms give coordinates that are not finite",
+                  archive_.path());
+    }
+    model_.attributes = looks_.finish();
+    return std::move(model_);
+  }
+
+  /// Says what the triangles look like that were added last.
+  void add_looks(const Instance& instance) {
+    if (!options_.attributes && !options_.parts) return;
+    looks_.begin_part(instance.name);
+    const std::vector<glm::uvec3>& before = instance.mesh->soup.triangles;
+    const std::vector<glm::uvec3>& after = model_.soup.triangles;
+    if (!options_.attributes) return looks_.skip(before.size());
+    const std::size_t first = after.size() - before.size();
+    const auto base = static_cast<std::uint32_t>(model_.soup.positions.size() -
+                                                 instance.mesh->soup.positions.size());
+    for (std::size_t t = 0; t < before.size(); ++t) {
+      looks_.add(instance.mesh->looks[t], after[first + t],
+                 after[first + t].y != before[t].y + base);
+    }
+  }
+
+  ZipArchive archive_;
+  const ArchiveOptions& options_;
+  const Execution& execution_;
+  ArchiveModel model_;
+  ModelLooks looks_;
+  std::unordered_map<std::string, std::unique_ptr<ModelPart>> parts_;
+  std::unordered_set<std::pair<const ModelObject*, std::array<double, 12>>, PlaceHash> placed_;
+  std::vector<Instance> instances_;
+};
+
+}  // namespace
+
+Result<ArchiveModel> read_3mf_model(const std::string& path, const ArchiveOptions& options,
+                                    const Execution& execution) try {
+  auto archive = ZipArchive::open(path);
+  if (!archive) return tl::unexpected(archive.error());
+  return Package(*std::move(archive), options, execution).assemble();
+} catch (const std::bad_alloc&) {
+  return fail(ErrorCode::kLimit, "{}: out of memory", path);
+}
+
+}  // namespace strata
+
+#else
+
+namespace strata {
+
+Result<ArchiveModel> read_3mf_model(const std::string& path, const ArchiveOptions&,
+                                    const Execution&) {
+  return fail(ErrorCode::kUsage, "{}: this build cannot read it (libpugixml-dev was missing)",
+              path);
+}
+
+}  // namespace strata
+
+#endif
+
+namespace strata {
+
+Result<TriangleSoup> read_3mf(const std::string& path, const Execution& execution) {
+  auto model = read_3mf_model(path, {}, execution);
+  if (!model) return tl::unexpected(model.error());
+  return std::move(model->soup);
+}
+
+}  // namespace strata
