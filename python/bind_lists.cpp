@@ -8,6 +8,7 @@
 #include "strata/hashbuffer/build_ldi.h"
 #include "strata/lists.h"
 #include "strata/raster/lattice_mesh.h"
+#include "strata/voxelize/grid_frame.h"
 
 namespace strata::python {
 namespace {
@@ -32,15 +33,25 @@ Result<LayeredDepthImage> lists_of(TriangleSoup& soup, const Bounds& box, const 
   return build_ldi(*lattice, raster_target(grid, axis), {}, execution, filter);
 }
 
-py::tuple mesh_lists(const MeshData& mesh, const VoxelGrid& grid, int axis, const Limits& limits) {
+const VoxelGrid& straight(const VoxelFileGrid& grid) {
+  if (grid.frame.turned()) {
+    refuse(ErrorCode::kUsage, "depth lists need a grid along the axes of the world");
+  }
+  return grid.grid;
+}
+
+py::tuple mesh_lists(const MeshData& mesh, const VoxelFileGrid& placed, int axis,
+                     const Limits& limits) {
+  const VoxelGrid& grid = straight(placed);
   return arrays_of(run(limits, [&](const Execution& execution) {
     TriangleSoup soup = mesh.input.soup;
     return lists_of(soup, mesh.input.bounds, grid, static_cast<Axis>(axis), nullptr, execution);
   }));
 }
 
-py::tuple solid_lists(const SolidData& solid, const VoxelGrid& grid, int axis,
+py::tuple solid_lists(const SolidData& solid, const VoxelFileGrid& placed, int axis,
                       const Limits& limits) {
+  const VoxelGrid& grid = straight(placed);
   return arrays_of(run(limits, [&](const Execution& execution) -> Result<LayeredDepthImage> {
     csg::SolidLists lists(solid.scene.tree, solid.scene.tree.root());
     if (auto done = lists.fit(grid, nullptr, execution); !done) {

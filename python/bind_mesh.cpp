@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <glm/matrix.hpp>
+
 #include "csg/solids/primitives.h"
 #include "python/call.h"
 #include "python/data.h"
@@ -11,6 +13,7 @@
 #include "strata/mesh/formats/write_mesh.h"
 #include "strata/mesh/writers/write_solid.h"
 #include "strata/voxelize/grid_fit.h"
+#include "strata/voxelize/readers/read_voxel_grid.h"
 
 namespace strata::python {
 
@@ -57,11 +60,31 @@ InsideRule rule_of(const std::string& word) {
 
 const char* word_of(InsideRule rule) { return kRules[static_cast<int>(rule)].first; }
 
+/// Where a file's mesh comes to lie.
+csg::MeshPlacement placement_of(double unit_metres, const std::string& up,
+                                const std::array<double, 3>& scale,
+                                const std::array<double, 3>& translate) {
+  csg::MeshPlacement made;
+  made.unit_metres = unit_metres;
+  if (up == "y") {
+    made.up = csg::MeshPlacement::Up::kY;
+  } else if (up == "z") {
+    made.up = csg::MeshPlacement::Up::kZ;
+  } else if (up != "file") {
+    refuse(ErrorCode::kUsage, fmt::format("up must be 'file', 'y' or 'z', got '{}'", up));
+  }
+  made.scale = vec_of(scale);
+  made.translate = vec_of(translate);
+  return made;
+}
+
 std::pair<MeshPtr, Warnings> read_mesh_file(const std::string& path, const std::string& rule,
                                             bool keep_orientation,
                                             const std::vector<std::string>& parts,
+                                            const csg::MeshPlacement& placement,
                                             const Limits& limits) {
   csg::SceneInput input;
+  input.placement = placement;
   input.files = {path};
   input.rule = rule_of(rule);
   input.keep_orientation = keep_orientation;
@@ -105,6 +128,8 @@ TriangleSoup soup_of(const Values<double>& vertices, const Values<std::int64_t>&
 std::pair<MeshPtr, Warnings> make_mesh(const Values<double>& vertices,
                                        const Values<std::int64_t>& corners,
                                        const std::optional<Values<std::int64_t>>& offsets,
+                                       const std::optional<Values<std::uint8_t>>& vertex_colours,
+                                       const std::optional<Values<std::uint8_t>>& face_colours,
                                        const std::string& name, const std::string& rule,
                                        bool keep_orientation, const Limits& limits) {
   const InsideRule inside = rule_of(rule);
@@ -113,6 +138,16 @@ std::pair<MeshPtr, Warnings> make_mesh(const Values<double>& vertices,
     return mesh_of(soup_of(vertices, corners, offsets), name, inside, keep_orientation, warnings,
                    execution);
   });
+  const auto take = [](const std::optional<Values<std::uint8_t>>& from) {
+    std::vector<glm::u8vec4> colours;
+    for (py::ssize_t i = 0; from && i < from->size(); i += 4) {
+      const std::uint8_t* c = from->data() + i;
+      colours.emplace_back(c[0], c[1], c[2], c[3]);
+    }
+    return colours;
+  };
+  mesh->input.attributes.vertex_colours = take(vertex_colours);
+  mesh->input.attributes.element_colours = take(face_colours);
   return {mesh, warnings};
 }
 
@@ -147,6 +182,7 @@ py::dict info_of(const MeshData& mesh, const Limits& limits) {
   std::vector<std::string> parts;
   for (const MeshPart& part : mesh.input.attributes.parts) parts.push_back(part.name);
   info["parts"] = parts;
+  info["coloured"] = mesh.input.attributes.coloured();
   return info;
 }
 
@@ -173,29 +209,33 @@ MeshPtr contour_mesh(const MeshData& mesh, const VoxelGrid& grid, Warnings& warn
   });
 }
 
-VoxelGrid make_grid(const std::array<std::int64_t, 3>& dims, const std::array<double, 3>& origin,
-                    const std::array<double, 3>& spacing) {
+VoxelFileGrid make_grid(const std::array<std::int64_t, 3>& dims,
+                        const std::array<double, 3>& origin, const std::array<double, 3>& spacing,
+                        const std::optional<std::array<std::array<double, 3>, 3>>& direction) {
   for (const std::int64_t side : dims) {
     if (side < 1 || side > kMaxGridSide) {
       refuse(ErrorCode::kUsage, fmt::format("dims must be 1 to {} along each axis, got {}, {}, {}",
                                             kMaxGridSide, dims[0], dims[1], dims[2]));
     }
   }
-  VoxelGrid grid;
-  grid.dims = glm::ivec3(glm::vec<3, std::int64_t>(dims[0], dims[1], dims[2]));
-  grid.origin = vec_of(origin);
-  grid.voxel_size = vec_of(spacing);
-  value_of(check_grid(grid));
-  return grid;
+  VoxelFileGrid made;
+  made.grid.dims = glm::ivec3(glm::vec<3, std::int64_t>(dims[0], dims[1], dims[2]));
+  made.grid.origin = vec_of(origin);
+  made.grid.voxel_size = vec_of(spacing);
+  value_of(check_grid(made.grid));
+  if (direction)
+    made.frame.direction = glm::transpose(
+        glm::dmat3(vec_of((*direction)[0]), vec_of((*direction)[1]), vec_of((*direction)[2])));
+  return made;
 }
 
-VoxelGrid fitted_grid(const std::array<double, 3>& low, const std::array<double, 3>& high,
-                      std::optional<std::int64_t> resolution,
-                      const std::optional<std::array<double, 3>>& voxel_size,
-                      const std::optional<std::array<std::int64_t, 3>>& dims,
-                      const std::optional<std::array<std::array<double, 3>, 2>>& bounds,
-                      const std::optional<std::array<double, 3>>& origin, std::int64_t padding,
-                      bool align) {
+VoxelFileGrid fitted_grid(const std::array<double, 3>& low, const std::array<double, 3>& high,
+                          std::optional<std::int64_t> resolution,
+                          const std::optional<std::array<double, 3>>& voxel_size,
+                          const std::optional<std::array<std::int64_t, 3>>& dims,
+                          const std::optional<std::array<std::array<double, 3>, 2>>& bounds,
+                          const std::optional<std::array<double, 3>>& origin, std::int64_t padding,
+                          bool align) {
   GridRequest request;
   request.resolution = resolution;
   if (voxel_size) request.voxel_size = vec_of(*voxel_size);
@@ -204,19 +244,31 @@ VoxelGrid fitted_grid(const std::array<double, 3>& low, const std::array<double,
   if (origin) request.origin = vec_of(*origin);
   request.padding = padding;
   request.align = align;
-  return value_of(fit_grid({vec_of(low), vec_of(high)}, request));
+  return {value_of(fit_grid({vec_of(low), vec_of(high)}, request)), {}};
 }
 
-py::tuple dims_of(const VoxelGrid& grid) {
-  return py::make_tuple(grid.dims.x, grid.dims.y, grid.dims.z);
+VoxelFileGrid grid_of_file(const std::string& path, const Limits& limits) {
+  return run(limits, [&](const Execution& execution) { return read_voxel_grid(path, execution); });
 }
 
 void bind_grid(py::module_& module) {
-  py::class_<VoxelGrid>(module, "Grid")
-      .def(py::init(&make_grid), py::arg("dims"), py::arg("origin"), py::arg("spacing"))
-      .def_property_readonly("dims", &dims_of)
-      .def_property_readonly("origin", [](const VoxelGrid& g) { return tuple_of(g.origin); })
-      .def_property_readonly("spacing", [](const VoxelGrid& g) { return tuple_of(g.voxel_size); });
+  py::class_<VoxelFileGrid>(module, "Grid")
+      .def(py::init(&make_grid), py::arg("dims"), py::arg("origin"), py::arg("spacing"),
+           py::arg("direction"))
+      .def_property_readonly("dims",
+                             [](const VoxelFileGrid& g) {
+                               const glm::ivec3& d = g.grid.dims;
+                               return py::make_tuple(d.x, d.y, d.z);
+                             })
+      .def_property_readonly("origin",
+                             [](const VoxelFileGrid& g) { return tuple_of(g.grid.origin); })
+      .def_property_readonly("spacing",
+                             [](const VoxelFileGrid& g) { return tuple_of(g.grid.voxel_size); })
+      .def_property_readonly("direction", [](const VoxelFileGrid& g) {
+        const glm::dmat3 rows = glm::transpose(g.frame.direction);
+        return py::make_tuple(tuple_of(rows[0]), tuple_of(rows[1]), tuple_of(rows[2]));
+      });
+  module.def("grid_of_file", &grid_of_file, py::arg("path"), py::arg("limits"));
   module.def("fit_grid", &fitted_grid, py::arg("low"), py::arg("high"), py::arg("resolution"),
              py::arg("voxel_size"), py::arg("dims"), py::arg("bounds"), py::arg("origin"),
              py::arg("padding"), py::arg("align"));
@@ -226,6 +278,9 @@ void bind_grid(py::module_& module) {
 
 void bind_meshes(py::module_& module) {
   bind_grid(module);
+  py::class_<csg::MeshPlacement>(module, "Placement")
+      .def(py::init(&placement_of), py::arg("unit_metres"), py::arg("up"), py::arg("scale"),
+           py::arg("translate"));
   py::class_<MeshData, MeshPtr>(module, "Mesh")
       .def_property_readonly("vertices",
                              [](const MeshPtr& mesh) {
@@ -251,16 +306,21 @@ void bind_meshes(py::module_& module) {
       .def("save", &save_mesh, py::arg("path"), py::arg("limits"))
       .def(
           "contour",
-          [](const MeshData& mesh, const VoxelGrid& grid, const Limits& limits) {
+          [](const MeshData& mesh, const VoxelFileGrid& grid, const Limits& limits) {
             Warnings warnings;
-            MeshPtr made = contour_mesh(mesh, grid, warnings, limits);
+            if (grid.frame.turned()) {
+              refuse(ErrorCode::kUsage, "contour() needs a grid along the axes of the world");
+            }
+            MeshPtr made = contour_mesh(mesh, grid.grid, warnings, limits);
             return std::pair(std::move(made), std::move(warnings));
           },
           py::arg("grid"), py::arg("limits"));
   module.def("read_mesh", &read_mesh_file, py::arg("path"), py::arg("rule"),
-             py::arg("keep_orientation"), py::arg("parts"), py::arg("limits"));
+             py::arg("keep_orientation"), py::arg("parts"), py::arg("placement"),
+             py::arg("limits"));
   module.def("make_mesh", &make_mesh, py::arg("vertices"), py::arg("corners"), py::arg("offsets"),
-             py::arg("name"), py::arg("rule"), py::arg("keep_orientation"), py::arg("limits"));
+             py::arg("vertex_colours"), py::arg("face_colours"), py::arg("name"), py::arg("rule"),
+             py::arg("keep_orientation"), py::arg("limits"));
 }
 
 }  // namespace strata::python

@@ -4,11 +4,16 @@
 
 #include <algorithm>
 #include <bit>
+#include <glm/matrix.hpp>
 
 #include "core/printable.h"
 #include "python/call.h"
 #include "python/data.h"
+#include "python/voxel_values.h"
+#include "strata/csg/boundary/boundary_mesh.h"
+#include "strata/csg/picture/picture.h"
 #include "strata/csg/solid_lists.h"
+#include "strata/mesh/shapes.h"
 #include "strata/raster/lattice_mesh.h"
 #include "strata/voxelize/voxelize.h"
 #include "voxelize/open/lost_walls.h"
@@ -22,6 +27,10 @@ namespace {
 struct VoxelChoice {
   bool solid = true, surface = false, ids = false;
   std::int64_t coverage = 0;  ///< rays along a voxel's side; 0: none
+  bool colours = false;
+  std::optional<std::array<std::uint8_t, 3>> fill;  ///< colour of what is deep inside
+  bool sdf = false;
+  double band = 0;  ///< of distances, in voxels; 0: everywhere
   std::string open, surface_kind;
 };
 
@@ -41,6 +50,12 @@ VoxelizeOptions options_of(const VoxelChoice& choice) {
   options.rays = static_cast<int>(choice.coverage);
   if (options.rays != 0 && (choice.ids || choice.surface)) {
     refuse(ErrorCode::kUsage, "coverage is of solid voxels: ids and surface must be False");
+  }
+  if (int{choice.ids} + int{options.rays != 0} + int{choice.colours} + int{choice.sdf} > 1) {
+    refuse(ErrorCode::kUsage, "a voxel holds one of ids, coverage, colours and sdf");
+  }
+  if (choice.sdf && (choice.surface || !choice.solid)) {
+    refuse(ErrorCode::kUsage, "distances are those of a solid: surface must be False");
   }
   constexpr std::pair<const char*, OpenMode> kModes[] = {
       {"vote", OpenMode::kVote}, {"surface", OpenMode::kSurface}, {"fail", OpenMode::kFail}};
@@ -77,6 +92,21 @@ bool fits_lattice(const Bounds& box, const VoxelGrid& grid) {
   return true;
 }
 
+}  // namespace
+
+void add_slab(VoxelIntervals& set, const VoxelIntervals& slab) {
+  const int first = slab.v_begin() / VoxelIntervals::kTileSide;
+  for (int tv = 0; tv < slab.tiles_v(); ++tv) {
+    for (int tu = 0; tu < slab.tiles_u(); ++tu) {
+      const VoxelIntervals::TileView tile = slab.tile(tu, tv);
+      if (tile.offsets.empty()) continue;
+      set.set_tile(tu, first + tv, tile.offsets, tile.items, tile.labels);
+    }
+  }
+}
+
+namespace {
+
 /// Keeps the slabs of a large set as long as they fit the memory.
 Result<VoxelIntervals> voxelize_large(const TriangleSoup& soup, const VoxelGrid& grid,
                                       const VoxelizeOptions& options, const Execution& execution) {
@@ -89,15 +119,7 @@ Result<VoxelIntervals> voxelize_large(const TriangleSoup& soup, const VoxelGrid&
                   "the runs of the first {} of {} rows of voxels take {} bytes, the limit is {}",
                   slab.v_end(), all.v_end(), bytes, execution.memory_limit);
     }
-    const int first = slab.v_begin() / VoxelIntervals::kTileSide;
-    for (int tv = 0; tv < slab.tiles_v(); ++tv) {
-      for (int tu = 0; tu < slab.tiles_u(); ++tu) {
-        const VoxelIntervals::TileView tile = slab.tile(tu, tv);
-        if (!tile.offsets.empty()) {
-          all.set_tile(tu, first + tv, tile.offsets, tile.items, tile.labels);
-        }
-      }
-    }
+    add_slab(all, slab);
     return {};
   };
   const auto done = voxelize_slabs(soup, grid, options, execution, keep);
@@ -165,64 +187,131 @@ void mark_shares(const VoxelizeOptions& options, VoxelsData& voxels) {
   voxels.full = kLatticeSteps * n * n * n;
 }
 
-// The mesh's own soup is not copied unless it has to be clamped.
-std::pair<VoxelsPtr, Warnings> voxelize_mesh(const MeshData& mesh, const VoxelGrid& grid,
+/// A mesh as a grid sees it: turned into the grid's space, and clamped where it does not fit.
+class SeenMesh {
+ public:
+  Result<void> see(const TriangleSoup& soup, const Bounds& box, const VoxelGrid& finest,
+                   const GridFrame& frame, const Execution& execution) {
+    soup_ = &soup;
+    Bounds seen = box;
+    if (frame.turned()) {
+      moved_ = transform(soup, glm::dmat4(glm::transpose(frame.direction)));
+      soup_ = &moved_, seen = bounds(moved_, execution);
+    }
+    if (fits_lattice(seen, finest)) return {};
+    if (soup_ != &moved_) moved_ = soup, soup_ = &moved_;
+    auto done = fit_lattice(moved_, seen, finest, execution);
+    if (!done) return tl::unexpected(done.error());
+    clamped_ = !done->empty();
+    return {};
+  }
+  [[nodiscard]] const TriangleSoup& soup() const { return *soup_; }
+  [[nodiscard]] bool clamped() const { return clamped_; }
+
+ private:
+  const TriangleSoup* soup_ = nullptr;
+  TriangleSoup moved_;
+  bool clamped_ = false;
+};
+
+std::pair<VoxelsPtr, Warnings> voxelize_mesh(const MeshData& mesh, const VoxelFileGrid& placed,
                                              const VoxelChoice& choice, const Limits& limits) {
   VoxelizeOptions options = options_of(choice);
   const csg::SolidInput& input = mesh.input;
+  const VoxelGrid& grid = placed.grid;
   options.rule = input.rule;
   options.closedness = input.closed ? Closedness::kAssumeClosed : Closedness::kAssumeOpen;
   Warnings warnings;
+  if (choice.colours && !input.attributes.coloured()) {
+    warnings.push_back(fmt::format("{}: no colours are given; all voxels are light grey",
+                                   input.files.front().path));
+  }
   auto voxels = std::make_shared<VoxelsData>();
+  voxels->frame = placed.frame;
   run(limits, [&](const Execution& execution) -> Result<void> {
     if (auto fits = check_rays(grid, options); !fits) return fits;
-    const VoxelGrid finest = finest_of(grid, options);
-    TriangleSoup moved;
-    const TriangleSoup* soup = &input.soup;
-    if (!fits_lattice(input.bounds, finest)) {
-      moved = input.soup, soup = &moved;
-      if (auto done = fit_lattice(moved, input.bounds, finest, execution); !done) {
-        return tl::unexpected(done.error());
-      }
+    SeenMesh seen;
+    if (auto done =
+            seen.see(input.soup, input.bounds, finest_of(grid, options), placed.frame, execution);
+        !done) {
+      return done;
     }
-    auto set = voxelize_all(*soup, grid, options, execution);
+    if (choice.sdf) {
+      return distances(seen.soup(), grid, options, nullptr, choice.band, *voxels, execution);
+    }
+    auto set = voxelize_all(seen.soup(), grid, options, execution);
     if (!set) return tl::unexpected(set.error());
     voxels->volume.set = *std::move(set);
     mark_shares(options, *voxels);
-    if (!input.closed || options.rays != 0 || !choice.solid || choice.surface) return {};
-    LostWallOptions search;
-    search.rule = input.rule;
-    search.longest_edge = input.longest_edge;
-    return warn_of_walls(*soup, grid, search, voxels->volume.set, warnings, execution);
+    if (input.closed && options.rays == 0 && choice.solid && !choice.surface) {
+      LostWallOptions search;
+      search.rule = input.rule;
+      search.longest_edge = input.longest_edge;
+      auto told = warn_of_walls(seen.soup(), grid, search, voxels->volume.set, warnings, execution);
+      if (!told) return told;
+    }
+    if (!choice.colours) return {};
+    if (seen.clamped()) {
+      return fail(ErrorCode::kGeometry, "colours need a mesh within 2^20 voxels of the grid");
+    }
+    const bool solid = choice.solid && (input.closed || options.open != OpenMode::kSurface);
+    std::optional<glm::u8vec3> fill;
+    if (choice.fill) fill.emplace((*choice.fill)[0], (*choice.fill)[1], (*choice.fill)[2]);
+    return colour_of_mesh(mesh, seen.soup(), solid, fill, *voxels, execution);
   });
   return {voxels, warnings};
 }
 
-std::pair<VoxelsPtr, Warnings> voxelize_solid(const SolidData& solid, const VoxelGrid& grid,
+/// The exact boundary of a tree, turned into the space of a grid.
+Result<TriangleSoup> boundary_of(const csg::Tree& tree, const Execution& execution) {
+  auto made = csg::boundary_mesh(tree, tree.root(), {}, execution);
+  if (!made) return tl::unexpected(made.error());
+  return TriangleSoup{std::move(made->mesh.positions), std::move(made->mesh.triangles), {}};
+}
+
+std::pair<VoxelsPtr, Warnings> voxelize_solid(const SolidData& solid, const VoxelFileGrid& placed,
                                               const VoxelChoice& choice, const Limits& limits) {
   VoxelizeOptions options = options_of(choice);
-  const csg::Tree& tree = solid.scene.tree;
+  const VoxelGrid& grid = placed.grid;
+  csg::Tree tree = solid.scene.tree;
+  if (placed.frame.turned()) {
+    tree = csg::transform(glm::dmat4(glm::transpose(placed.frame.direction)), std::move(tree));
+  }
   Warnings warnings;
   auto voxels = std::make_shared<VoxelsData>();
+  voxels->frame = placed.frame;
   run(limits, [&](const Execution& execution) -> Result<void> {
     if (auto fits = check_rays(grid, options); !fits) return fits;
     csg::SolidLists lists(tree, tree.root());
+    const glm::vec4 none(glm::vec3(csg::colour_schemes().front().face) / 255.0f, 1.0f);
+    const csg::ColourLabels colours = csg::colour_labels(tree, tree.root(), none);
     if (choice.ids) {
       lists.set_labels(csg::id_labels(tree));
       voxels->volume.kind = VoxelKind::kIds;
+    } else if (choice.colours) {
+      lists.set_labels(colours.labels);
     }
     if (auto done = lists.fit(finest_of(grid, options), nullptr, execution); !done) return done;
     options.filter = &lists.filter();
     options.closedness = Closedness::kAssumeClosed;
+    if (choice.sdf) {
+      const auto surface = boundary_of(tree, execution);
+      if (!surface) return tl::unexpected(surface.error());
+      return distances(lists.soup(), grid, options, &*surface, choice.band, *voxels, execution);
+    }
     auto set = voxelize_all(lists.soup(), grid, options, execution);
     if (!set) return tl::unexpected(set.error());
     voxels->volume.set = *std::move(set);
     mark_shares(options, *voxels);
-    if (options.rays != 0 || !choice.solid || choice.surface) return {};
-    LostWallOptions search;
-    search.filter = &lists.unlabelled_filter();
-    search.taken_away = [&](std::uint32_t t) { return lists.is_subtracted(t); };
-    return warn_of_walls(lists.soup(), grid, search, voxels->volume.set, warnings, execution);
+    if (options.rays == 0 && choice.solid && !choice.surface) {
+      LostWallOptions search;
+      search.filter = &lists.unlabelled_filter();
+      search.taken_away = [&](std::uint32_t t) { return lists.is_subtracted(t); };
+      auto told =
+          warn_of_walls(lists.soup(), grid, search, voxels->volume.set, warnings, execution);
+      if (!told) return told;
+    }
+    return choice.colours ? colour_of_solids(colours.colours, *voxels, execution) : Result<void>();
   });
   return {voxels, warnings};
 }
@@ -231,12 +320,15 @@ std::pair<VoxelsPtr, Warnings> voxelize_solid(const SolidData& solid, const Voxe
 
 void bind_voxelize(py::module_& module) {
   py::class_<VoxelChoice>(module, "VoxelChoice")
-      .def(py::init([](bool solid, bool surface, bool ids, std::int64_t coverage, std::string open,
-                       std::string kind) {
-             return VoxelChoice{solid, surface, ids, coverage, std::move(open), std::move(kind)};
+      .def(py::init([](bool solid, bool surface, bool ids, std::int64_t coverage, bool colours,
+                       std::optional<std::array<std::uint8_t, 3>> fill, bool sdf, double band,
+                       std::string open, std::string kind) {
+             return VoxelChoice{solid, surface, ids,  coverage,        colours,
+                                fill,  sdf,     band, std::move(open), std::move(kind)};
            }),
            py::arg("solid"), py::arg("surface"), py::arg("ids"), py::arg("coverage"),
-           py::arg("open"), py::arg("surface_kind"));
+           py::arg("colours"), py::arg("fill"), py::arg("sdf"), py::arg("band"), py::arg("open"),
+           py::arg("surface_kind"));
   module.def("voxelize_mesh", &voxelize_mesh);
   module.def("voxelize_solid", &voxelize_solid);
 }

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/matrix.hpp>
+#include <limits>
 #include <map>
 
 #include "picture/encode_png.h"
@@ -82,12 +83,13 @@ void set_tile_of(VoxelIntervals& set, const Value* values, int tu, int tv, bool 
 }
 
 template <class Value>
-VoxelsPtr voxels_of(const Values<Value>& values, const VoxelGrid& grid, const Limits& limits) {
+VoxelsPtr voxels_of(const Values<Value>& values, const VoxelFileGrid& grid, const Limits& limits) {
   constexpr bool kLabelled = !std::is_same_v<Value, bool>;
   return run(limits, [&](const Execution& execution) -> Result<VoxelsPtr> {
     auto voxels = std::make_shared<VoxelsData>();
     voxels->volume.kind = kLabelled ? VoxelKind::kIds : VoxelKind::kMask;
-    VoxelIntervals set(grid, Axis::kZ);
+    voxels->frame = grid.frame;
+    VoxelIntervals set(grid.grid, Axis::kZ);
     const auto tiles =
         static_cast<std::size_t>(set.tiles_u()) * static_cast<std::size_t>(set.tiles_v());
     parallel_for(execution, tiles, [&](std::size_t tile, int) {
@@ -425,6 +427,14 @@ void save_voxels(const VoxelsData& voxels, const std::string& path, const Limits
     VoxelWriterOptions options;
     options.frame = voxels.frame;
     const VoxelIntervals& set = voxels.volume.set;
+    if (voxels.volume.kind == VoxelKind::kDistances && voxels.made) {
+      options.band = voxels.band == 0 ? std::numeric_limits<float>::infinity()
+                                      : static_cast<float>(voxels.band);
+      auto writer = open_voxel_writer(path, {}, set.grid(), options);
+      if (!writer) return tl::unexpected(writer.error());
+      auto added = (*writer)->add_distances(voxels.volume.values, 0, execution);
+      return added ? (*writer)->finish(execution) : added;
+    }
     if (!voxels.volume.values.empty()) {
       return fail(ErrorCode::kUsage,
                   "{}: voxels with numbers that were read from a file cannot be saved", path);
@@ -447,7 +457,10 @@ void save_voxels(const VoxelsData& voxels, const std::string& path, const Limits
 // --- bindings ------------------------------------------------------------------------------------
 
 void bind_voxel_class(py::class_<VoxelsData, VoxelsPtr>& type) {
-  type.def_property_readonly("grid", [](const VoxelsData& v) { return v.volume.grid(); })
+  type.def_property_readonly("grid",
+                             [](const VoxelsData& v) {
+                               return VoxelFileGrid{v.volume.grid(), v.frame};
+                             })
       .def_property_readonly(
           "axis", [](const VoxelsData& v) { return static_cast<int>(v.volume.set.axis()); })
       .def_property_readonly(

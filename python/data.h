@@ -48,9 +48,13 @@ struct VoxelsData {
   /// Labels are filled fractions: label / full. 0: they are not.
   std::uint32_t full = 0;
   bool rgba = false;  ///< labels are packed colours
+  bool made = false;  ///< values were found here, not read from a file
+  double band = 0.0;  ///< of distances, world units; 0: they go on beyond it
 };
 using VoxelsPtr = std::shared_ptr<VoxelsData>;
 
+/// Adds the tiles of a slab to a set of the same grid and axis.
+void add_slab(VoxelIntervals& set, const VoxelIntervals& slab);
 /// The labels of a set, made anew; runs that then touch and are alike become one.
 [[nodiscard]] VoxelIntervals relabelled(const VoxelIntervals& set,
                                         const std::function<std::uint32_t(std::uint32_t)>& label,

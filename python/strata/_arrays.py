@@ -143,6 +143,25 @@ def check_corners(corners: np.ndarray, offsets: Optional[np.ndarray], vertices: 
     return np.ascontiguousarray(corners, dtype=np.int64)
 
 
+def colours_of(colours: Any, count: int, name: str) -> Optional[np.ndarray]:
+    """(count, 4) bytes, contiguous; None where none are given."""
+    if colours is None:
+        return None
+    array = _numeric(colours, name)
+    if array.ndim != 2 or array.shape[0] != count or array.shape[1] not in (3, 4):
+        raise InputError(f"{name} must have the shape ({count}, 3) or ({count}, 4), got {array.shape}")
+    most = 1.0 if array.dtype.kind == "f" else 255
+    bad = ~((array >= 0) & (array <= most)).all(axis=1)
+    if bad.any():
+        row = int(np.argmax(bad))
+        raise InputError(f"{name}[{row}] must be 0 to {most:g}, got {', '.join(f'{x:g}' for x in array[row])}")
+    if array.dtype.kind == "f":
+        array = np.rint(array * 255)
+    made = np.full((count, 4), 255, np.uint8)
+    made[:, : array.shape[1]] = array
+    return made
+
+
 def warn_of(sentences: Iterable[str]) -> None:
     """Python's warnings; they name the line that called Strata."""
     for sentence in sentences:

@@ -10,7 +10,7 @@ from . import _strata
 from ._arrays import axis_of, integer_of, limits_of, whole_of
 from ._errors import InputError, UsageError
 from ._mesh import mesh_of
-from ._voxels import Grid, Voxels, grid_of
+from ._voxels import Grid, grid_of
 
 _MOST_DEPTH = 2**24 - 1
 _STEPS = 256  # of depth, a voxel
@@ -99,7 +99,7 @@ def depth_lists(
     resolution: Optional[int] = None,
     voxel_size: Any = None,
     dims: Optional[Sequence[int]] = None,
-    like: Optional[Union[Voxels, Grid]] = None,
+    like: Any = None,
     bounds: Optional[Sequence[Sequence[float]]] = None,
     origin: Optional[Sequence[float]] = None,
     padding: int = 0,
@@ -151,7 +151,7 @@ def depth_lists(
         align=align,
     )
     offsets, items = make(shape._native, grid, along, limits)
-    return DepthLists(offsets, items, Grid(grid.dims, grid.origin, grid.spacing), along)
+    return DepthLists(offsets, items, Grid._of(grid), along)
 
 
 class FragmentLists:

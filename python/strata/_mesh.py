@@ -8,8 +8,10 @@ from typing import Any, Dict, Optional, Sequence, Tuple
 import numpy as np
 
 from . import _strata
-from ._arrays import PathLike, check_corners, limits_of, points_of, text_of_path, triangles_of, warn_of
-from ._errors import InputError
+from ._arrays import PathLike, check_corners, colours_of, limits_of, number_of, numbers_of, points_of, text_of_path, triangles_of, warn_of
+from ._errors import InputError, UsageError
+
+_METRES = {"": 0.0, "um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254, "ft": 0.3048}
 
 
 class Mesh:
@@ -25,6 +27,8 @@ class Mesh:
         ``(vertices, faces)``.
     faces : (m, 3) or (m, k) array_like, or a list of lists, optional
         Indices of vertices, from 0. Polygons are cut into triangles.
+    vertex_colours, face_colours : (n, 3) or (n, 4) array_like, optional
+        Of each vertex, of each face, sRGB and alpha: uint8, or floats from 0 to 1. For `voxelize`'s `colours`.
     rule : {"winding", "nonzero", "parity"}
         Which winding numbers are inside: above 0, not 0, odd.
     keep_orientation : bool
@@ -47,6 +51,8 @@ class Mesh:
         vertices: Any,
         faces: Any = None,
         *,
+        vertex_colours: Any = None,
+        face_colours: Any = None,
         rule: str = "winding",
         keep_orientation: bool = False,
         name: str = "the mesh",
@@ -58,7 +64,11 @@ class Mesh:
         else:
             points = points_of(vertices, "vertices")
             corners, offsets = triangles_of(faces, len(points))
-        self._native, told = _strata.make_mesh(points, corners, offsets, str(name), str(rule), bool(keep_orientation), limits)
+        count = len(corners) // 3 if offsets is None else len(offsets) - 1
+        colours = (colours_of(vertex_colours, len(points), "vertex_colours"), colours_of(face_colours, count, "face_colours"))
+        self._native, told = _strata.make_mesh(
+            points, corners, offsets, *colours, str(name), str(rule), bool(keep_orientation), limits
+        )
         warn_of(told)
 
     @classmethod
@@ -117,7 +127,7 @@ class Mesh:
             ``faces`` (of the file), ``components``, ``closed``, ``rule``, ``area``, ``volume``, ``low``, ``high``,
             ``edges``, ``boundary_edges`` (used once), ``non_manifold_edges`` (more than twice), ``misoriented_edges``,
             ``unbalanced_edges`` (not used equally often in both directions), ``degenerate_faces`` (without area),
-            ``duplicate_faces``, ``dropped_faces``, ``turned_around`` and ``parts`` (names).
+            ``duplicate_faces``, ``dropped_faces``, ``turned_around``, ``parts`` (names) and ``coloured``.
         """
         return self._native.info(limits_of(threads, None))
 
@@ -162,9 +172,13 @@ def read_mesh(
     rule: str = "winding",
     keep_orientation: bool = False,
     parts: Sequence[str] = (),
+    unit: str = "",
+    up: str = "file",
+    scale: Any = 1.0,
+    translate: Sequence[float] = (0, 0, 0),
     threads: int = 0,
 ) -> Mesh:
-    """Reads a mesh file: .obj, .stl, .ply, .off, .3mf, .amf.
+    """Reads a mesh file: .obj, .stl, .ply, .off, .3mf, .amf, .gltf, .glb, with parts, materials and colours.
 
     Parameters
     ----------
@@ -176,6 +190,14 @@ def read_mesh(
         Parts that are inside out are left as they are.
     parts : sequence of str
         Names of the parts to keep; empty: all.
+    unit : {"", "um", "mm", "cm", "m", "in", "ft"}
+        Unit of the world. Files that say their unit (3MF, AMF, glTF) are converted to it; empty: they are taken as they are.
+    up : {"file", "y", "z"}
+        The axis that is up in the file: y is turned to z. "file": y in glTF, else z.
+    scale : float or (float, float, float)
+        Factors along x, y, z, after the unit and the turn; not 0.
+    translate : (float, float, float)
+        World units, after the scale.
     threads : int
         0: one for each processor.
 
@@ -185,7 +207,14 @@ def read_mesh(
         There is no such file, or it is malformed; with the line or the byte.
     """
     names = [parts] if isinstance(parts, str) else [str(part) for part in parts]
-    native, told = _strata.read_mesh(text_of_path(path), str(rule), bool(keep_orientation), names, limits_of(threads, None))
+    if unit not in _METRES:
+        raise UsageError(f"unit must be one of {', '.join(repr(name) for name in _METRES)}, got {unit!r}")
+    factors = (number_of(scale, "scale"),) * 3 if np.ndim(scale) == 0 else numbers_of(scale, 3, "scale")
+    if 0 in factors:
+        raise UsageError(f"scale must not be 0, got {scale}")
+    place = _strata.Placement(_METRES[unit], str(up), factors, numbers_of(translate, 3, "translate"))
+    limits = limits_of(threads, None)
+    native, told = _strata.read_mesh(text_of_path(path), str(rule), bool(keep_orientation), names, place, limits)
     warn_of(told)
     return Mesh._of(native)
 

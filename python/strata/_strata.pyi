@@ -12,13 +12,15 @@ class Limits:
     def __init__(self, threads: int, memory: int) -> None: ...
 
 class Grid:
-    def __init__(self, dims: Tuple[int, int, int], origin: _Triple, spacing: _Triple) -> None: ...
+    def __init__(self, dims: Tuple[int, int, int], origin: _Triple, spacing: _Triple, direction: Tuple[_Triple, _Triple, _Triple]) -> None: ...
     @property
     def dims(self) -> Tuple[int, int, int]: ...
     @property
     def origin(self) -> _Triple: ...
     @property
     def spacing(self) -> _Triple: ...
+    @property
+    def direction(self) -> Tuple[_Triple, _Triple, _Triple]: ...
 
 class Camera:
     def __init__(
@@ -31,8 +33,14 @@ class Camera:
         orthographic: bool,
     ) -> None: ...
 
+class Placement:
+    def __init__(self, unit_metres: float, up: str, scale: _Triple, translate: _Triple) -> None: ...
+
 class VoxelChoice:
-    def __init__(self, solid: bool, surface: bool, ids: bool, coverage: int, open: str, surface_kind: str) -> None: ...
+    def __init__(
+        self, solid: bool, surface: bool, ids: bool, coverage: int, colours: bool,
+        fill: Optional[Tuple[int, int, int]], sdf: bool, band: float, open: str, surface_kind: str,
+    ) -> None: ...
 
 class Look:
     def __init__(
@@ -93,16 +101,21 @@ class Voxels:
         self, slice: Optional[Tuple[int, int]], camera: Camera, size: Tuple[int, int], samples: int, limits: Limits
     ) -> np.ndarray: ...
 
-def read_mesh(path: str, rule: str, keep_orientation: bool, parts: List[str], limits: Limits) -> Tuple[Mesh, _Told]: ...
+def read_mesh(
+    path: str, rule: str, keep_orientation: bool, parts: List[str], placement: Placement, limits: Limits
+) -> Tuple[Mesh, _Told]: ...
 def make_mesh(
     vertices: np.ndarray,
     corners: np.ndarray,
     offsets: Optional[np.ndarray],
+    vertex_colours: Optional[np.ndarray],
+    face_colours: Optional[np.ndarray],
     name: str,
     rule: str,
     keep_orientation: bool,
     limits: Limits,
 ) -> Tuple[Mesh, _Told]: ...
+def grid_of_file(path: str, limits: Limits) -> Grid: ...
 def fit_grid(
     low: _Triple,
     high: _Triple,

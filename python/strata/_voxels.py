@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from typing import Any, Optional, Sequence, Tuple, Union
 
@@ -26,17 +27,53 @@ class Grid:
         World position of the lower corner of voxel (0, 0, 0).
     spacing : float or (float, float, float)
         World length of a voxel along x, y, z.
+    direction : 3 x 3 array_like
+        Its columns are the directions of the axes in the world, of length 1 and at right angles; `origin` is then a point of
+        the grid's own axes: the world's is ``direction @ origin``.
     """
 
     dims: Tuple[int, int, int]
     origin: Tuple[float, float, float] = (0.0, 0.0, 0.0)
     spacing: Union[float, Tuple[float, float, float]] = (1.0, 1.0, 1.0)
+    direction: Tuple[Tuple[float, float, float], ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
     def __post_init__(self) -> None:
-        native = _grid(self.dims, self.origin, self.spacing)
-        object.__setattr__(self, "dims", native.dims)
-        object.__setattr__(self, "origin", native.origin)
-        object.__setattr__(self, "spacing", native.spacing)
+        native = self._native()
+        for name in ("dims", "origin", "spacing", "direction"):
+            object.__setattr__(self, name, getattr(native, name))
+
+    @classmethod
+    def of_affine(cls, shape: Sequence[int], affine: Any) -> "Grid":
+        """The grid whose voxel (i, j, k) has its centre at ``affine @ (i, j, k, 1)``, as NIfTI's.
+
+        Parameters
+        ----------
+        shape : (int, int, int)
+            Voxels along the axes.
+        affine : (4, 4) array_like
+            Without shear: its first three columns are at right angles.
+        """
+        matrix = np.asarray(affine, dtype=np.float64)
+        if matrix.shape != (4, 4) or not np.isfinite(matrix).all() or not np.array_equal(matrix[3], [0, 0, 0, 1]):
+            raise UsageError("affine must be a finite 4 x 4 matrix with the last row 0, 0, 0, 1")
+        spacing = np.linalg.norm(matrix[:3, :3], axis=0)
+        if not (spacing > 0).all():
+            raise UsageError("affine must not flatten voxels: a column is 0")
+        direction = matrix[:3, :3] / spacing
+        direction[np.abs(direction) < 1e-12] = 0  # of axes that are the world's
+        corner = direction.T @ matrix[:3, 3] - 0.5 * spacing
+        return cls(tuple(shape)[:3], tuple(corner), tuple(spacing), tuple(map(tuple, direction)))
+
+    def _native(self) -> Any:
+        direction = np.asarray(self.direction, dtype=np.float64)
+        if direction.shape != (3, 3) or not np.allclose(direction.T @ direction, np.eye(3), atol=1e-6):
+            raise UsageError("direction must be 3 x 3 numbers with columns of length 1 and at right angles")
+        rows = tuple(tuple(float(x) for x in row) for row in direction)
+        return _strata.Grid(_whole_three(self.dims, "dims"), numbers_of(self.origin, 3, "origin"), _three(self.spacing, "spacing"), rows)
+
+    @classmethod
+    def _of(cls, native: Any) -> "Grid":
+        return cls(native.dims, native.origin, native.spacing, native.direction)
 
 
 class Voxels:
@@ -124,8 +161,7 @@ class Voxels:
     @property
     def grid(self) -> Grid:
         """The grid, for `voxelize`'s `like`."""
-        native = self._native.grid
-        return Grid(native.dims, native.origin, native.spacing)
+        return Grid._of(self._native.grid)
 
     # --- what they are ----------------------------------------------------------------------------------------------
 
@@ -176,7 +212,8 @@ class Voxels:
         Returns
         -------
         (nx, ny, nz) array
-            bool; uint32 for labels (0 is empty); float32 for values, which are 0 to 1 for fractions. x is next to x in memory (Fortran's order), as VTK
+            bool; uint32 for labels (0 is empty); float32 for values, which are 0 to 1 for fractions; for colours uint8, with a
+            fourth axis of red, green, blue, alpha. x is next to x in memory (Fortran's order), as VTK
             and NRRD have it.
 
         Raises
@@ -293,12 +330,13 @@ class Voxels:
         values = self.numpy()
         if values.dtype == np.bool_:
             values = values.view(np.uint8)
+        colours = values.ndim == 4
         image = vtkImageData()
         image.SetDimensions(*(side + 1 for side in self.dims))
         image.SetOrigin(*self.origin)
         image.SetSpacing(*self.spacing)
         image.SetDirectionMatrix(*self.direction.reshape(-1))
-        data = numpy_to_vtk(values.reshape(-1, order="F"))
+        data = numpy_to_vtk(np.ascontiguousarray(values.transpose(2, 1, 0, 3).reshape(-1, 4)) if colours else values.reshape(-1, order="F"))
         data.SetName(name)
         image.GetCellData().SetScalars(data)
         return image
@@ -311,7 +349,9 @@ class Voxels:
             import pyopenvdb as vdb
 
         values = self.numpy()
-        if values.dtype == np.bool_:
+        if values.ndim == 4:
+            grid, values = vdb.Vec3SGrid(), values[..., :3].astype(np.float32) / 255
+        elif values.dtype == np.bool_:
             grid = vdb.BoolGrid()
         else:
             grid, values = vdb.FloatGrid(), values.astype(np.float32)
@@ -378,7 +418,7 @@ def voxelize(
     resolution: Optional[int] = None,
     voxel_size: Optional[Union[float, Sequence[float]]] = None,
     dims: Optional[Sequence[int]] = None,
-    like: Optional[Union[Voxels, Grid]] = None,
+    like: Any = None,
     bounds: Optional[Sequence[Sequence[float]]] = None,
     origin: Optional[Sequence[float]] = None,
     padding: int = 0,
@@ -388,6 +428,10 @@ def voxelize(
     surface_kind: Union[str, int] = "conservative",
     ids: bool = False,
     coverage: Union[bool, int] = False,
+    colours: bool = False,
+    fill_colour: Any = None,
+    sdf: bool = False,
+    band: Optional[float] = 3.0,
     open: str = "vote",
     threads: int = 0,
     memory_limit: Optional[int] = None,
@@ -407,8 +451,8 @@ def voxelize(
         World length of a voxel along x, y, z.
     dims : (int, int, int)
         Voxels along x, y, z, padding included; voxels are stretched to fit the box.
-    like : Voxels or Grid
-        The same grid.
+    like : Voxels, Grid, path, or an image with ``affine`` and ``shape``
+        The same grid: of other voxels, of a file of voxels, of an image of nibabel. Its axes may be turned.
     bounds : ((float, float, float), (float, float, float))
         The box to cover, instead of the mesh's.
     origin : (float, float, float)
@@ -426,6 +470,17 @@ def voxelize(
     coverage : bool or {1, 2, 4, 8, 16}
         Each voxel has the fraction of it that is filled, above 0: the mean over so many times so many rays, each of which
         counts the length inside exactly. True: 8. `numpy` gives float32.
+    colours : bool
+        Each voxel has the colour of the nearest point of the surface, textures filtered, or of the solid that it belongs
+        to. `numpy` gives uint8 ``[x, y, z, rgba]``; alpha is 0 where nothing is solid.
+    fill_colour : colour, optional
+        With `colours`, of meshes: of the voxels deep inside, as `csg.Solid.colour` takes it. Default: grey.
+    sdf : bool
+        Each voxel has its signed distance to the surface in world units, negative inside. `numpy` gives float32. Faces of a
+        mesh that lie inside of it count too; those of a solid do not.
+    band : float or None
+        With `sdf`: half the width of the band around the surface, in voxels; beyond it distances are plus or minus the
+        band. None: all voxels have their distance.
     open : {"vote", "surface", "fail"}
         What to do with a mesh that is not closed: caps and winding numbers decide; surface only; GeometryError.
     threads : int
@@ -472,7 +527,9 @@ def voxelize(
         padding=padding,
         align=align,
     )
-    choice = _strata.VoxelChoice(bool(solid), bool(surface), bool(ids), rays, str(open), str(surface_kind))
+    choice = _strata.VoxelChoice(
+        bool(solid), bool(surface), bool(ids), rays, bool(colours), _fill(fill_colour), bool(sdf), _band(sdf, band), str(open), str(surface_kind)
+    )
     native, told = make(shape._native, grid, choice, limits)
     warn_of(told)
     return Voxels._of(native)
@@ -537,11 +594,7 @@ def grid_of(
     if like is not None:
         if bounds is not None or origin is not None or padding or align:
             raise UsageError("like gives the whole grid; bounds, origin, padding and align must not be given")
-        if isinstance(like, Voxels):
-            return like._native.grid
-        if isinstance(like, Grid):
-            return _grid(like.dims, like.origin, like.spacing)
-        raise TypeError(f"like must be Voxels or a Grid, got {type(like).__name__}")
+        return _grid_like(like)
     return _strata.fit_grid(
         low=tuple(box[0]),
         high=tuple(box[1]),
@@ -553,6 +606,36 @@ def grid_of(
         padding=integer_of(padding, "padding"),
         align=bool(align),
     )
+
+
+def _grid_like(like: Any) -> Any:
+    if isinstance(like, Voxels):
+        return like._native.grid
+    if isinstance(like, Grid):
+        return like._native()
+    if isinstance(like, (str, os.PathLike)):
+        return _strata.grid_of_file(text_of_path(like), limits_of(0, None))
+    if hasattr(like, "affine") and hasattr(like, "shape"):
+        return Grid.of_affine(like.shape, like.affine)._native()
+    raise TypeError(f"like must be Voxels, a Grid, a path, or an image with affine and shape, got {type(like).__name__}")
+
+
+def _fill(colour: Any) -> Optional[Tuple[int, int, int]]:
+    if colour is None:
+        return None
+    from .csg import colour_of
+
+    red, green, blue = (int(round(255 * part)) for part in colour_of(colour, None, None, 1.0)[:3])
+    return red, green, blue
+
+
+def _band(sdf: bool, band: Optional[float]) -> float:
+    if not sdf or band is None:
+        return 0.0
+    width = number_of(band, "band")
+    if not 0.5 <= width <= 1024:
+        raise UsageError(f"band must be 0.5 to 1024 voxels, or None, got {width:g}")
+    return width
 
 
 def _two(bounds: Any) -> Tuple[Any, Any]:
@@ -576,4 +659,5 @@ def _whole_three(value: Any, name: str) -> Tuple[int, ...]:
 
 
 def _grid(dims: Any, origin: Any, spacing: Any) -> Any:
-    return _strata.Grid(_whole_three(dims, "dims"), numbers_of(origin, 3, "origin"), _three(spacing, "spacing"))
+    straight = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    return _strata.Grid(_whole_three(dims, "dims"), numbers_of(origin, 3, "origin"), _three(spacing, "spacing"), straight)

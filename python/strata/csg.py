@@ -167,7 +167,7 @@ class Solid:
 
         ``colour(red, green, blue, alpha)``, ``colour((red, green, blue))`` with numbers from 0 to 1, or ``colour("#f9d72c")``.
         """
-        return Solid._of(_strata.coloured(self._native, _colour(red, green, blue, alpha)))
+        return Solid._of(_strata.coloured(self._native, colour_of(red, green, blue, alpha)))
 
     color = colour
 
@@ -246,7 +246,7 @@ class Solid:
         if isinstance(background, str) and background == "transparent":
             behind = (0, 0, 0, 0)
         elif background is not None:
-            behind = tuple(int(round(255 * part)) for part in _colour(background, None, None, 1.0))
+            behind = tuple(int(round(255 * part)) for part in colour_of(background, None, None, 1.0))
         look = _strata.Look(integer_of(samples, "samples"), bool(edges), bool(ground_shadow), str(scheme), behind)
         native = None if camera is None else camera._native()
         return _strata.solid_picture(self._native, native, size_of(size), look, limits_of(threads, memory_limit))
@@ -492,7 +492,8 @@ def _rotation(axis: int, degrees: float) -> np.ndarray:
     return matrix
 
 
-def _colour(red: Any, green: Any, blue: Any, alpha: float) -> Tuple[float, ...]:
+def colour_of(red: Any, green: Any, blue: Any, alpha: float) -> Tuple[float, ...]:
+    """Red, green, blue, alpha from 0 to 1, however they are given."""
     if isinstance(red, str):
         digits = red[1:]
         if not red.startswith("#") or len(digits) not in (6, 8) or any(c not in "0123456789abcdefABCDEF" for c in digits):

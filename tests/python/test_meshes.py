@@ -153,6 +153,15 @@ def test_files_that_cannot_be_read_or_written_are_errors_with_the_tools_sentence
     assert os.listdir(tmp_path) == ["bad.off"]
 
 
+def test_a_file_is_placed_as_the_tool_places_it(tmp_path):
+    strata.Mesh(CUBE_VERTICES * (1, 2, 3), cube_triangles()).save(tmp_path / "box.obj")
+    placed = strata.read_mesh(tmp_path / "box.obj", unit="mm", up="y", scale=(1, 2, 1), translate=(1, 0, 0))
+    assert np.allclose(placed.bounds, [[1, -6, 0], [2, 0, 2]])
+    for options in ({"unit": "mile"}, {"up": "x"}, {"scale": 0}, {"translate": (1, 2)}):
+        with pytest.raises(strata.Error):
+            strata.read_mesh(tmp_path / "box.obj", **options)
+
+
 @pytest.mark.parametrize("threads", [-1, 4097])
 def test_threads_out_of_range_are_refused(threads):
     with pytest.raises(strata.UsageError, match=f"threads must be 0 to 4096, got {threads}"):

@@ -3,7 +3,7 @@ import time
 
 import numpy as np
 import pytest
-from conftest import CUBE_VERTICES, cube_triangles, data, tool, torus
+from conftest import CUBE_QUADS, CUBE_VERTICES, cube_triangles, data, tool, torus
 
 import strata
 
@@ -225,7 +225,7 @@ def test_openvdb_gets_the_same_voxels(knot_voxels):
         ({"resolution": 8, "surface_kind": 5}, strata.UsageError, "surface_kind must be"),
         ({"resolution": 8, "solid": False}, strata.UsageError, "must not both be False"),
         ({"resolution": 8, "ids": True}, strata.UsageError, "ids"),
-        ({"like": "x"}, TypeError, "like must be Voxels or a Grid"),
+        ({"like": 3}, TypeError, "like must be Voxels, a Grid, a path"),
         ({"resolution": 8, "bounds": ((0, 0, 0), (1, 1, 1), (2, 2, 2))}, strata.UsageError, "got 3 rows"),
     ],
 )
@@ -302,3 +302,104 @@ def by_vtk(vertices, faces, like):
     image.SetOutsideValue(0)
     image.Update()
     return vtk_to_numpy(image.GetOutput().GetPointData().GetScalars()).reshape(like.dims, order="F").astype(bool)
+
+
+def turned(degrees):
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+
+
+def test_a_turned_grid_sees_the_turned_mesh():
+    turn = turned(30)
+    straight = strata.voxelize((CUBE_VERTICES, cube_triangles()), like=strata.Grid((12, 13, 14), (-0.1, -0.1, -0.1), 0.1))
+    affine = straight.affine.copy()
+    affine[:3] = turn @ affine[:3]
+
+    class Image:  # such as nibabel's
+        shape = (12, 13, 14)
+
+    Image.affine = affine
+    moved = strata.voxelize((CUBE_VERTICES @ turn.T, cube_triangles()), like=Image())
+    assert np.array_equal(moved.numpy(), straight.numpy()) and np.allclose(moved.affine, affine)
+    solid = strata.csg.cube(1).rotate(0, 0, 30).voxelize(like=Image())
+    assert np.array_equal(solid.numpy(), straight.numpy())
+    inside = (affine @ (5, 5, 5, 1))[:3]
+    assert moved.contains([inside, -inside]).tolist() == [True, False]
+    again = strata.voxelize((CUBE_VERTICES @ turn.T, cube_triangles()), like=moved)
+    assert np.array_equal(again.numpy(), straight.numpy())
+    with pytest.raises(strata.UsageError, match="at right angles"):
+        strata.Grid((2, 2, 2), direction=((1, 1, 0), (0, 1, 0), (0, 0, 1)))
+    with pytest.raises(strata.UsageError, match="along the axes of the world"):
+        strata.depth_lists((CUBE_VERTICES, cube_triangles()), like=moved)
+
+
+def test_the_grid_of_a_file_is_that_of_its_voxels(tmp_path, knot, knot_voxels):
+    for name in ("knot.nrrd", "knot.vti"):
+        knot_voxels.save(tmp_path / name)
+        assert strata.voxelize(knot, like=tmp_path / name).checksum() == knot_voxels.checksum()
+    with pytest.raises(strata.InputError):
+        strata.voxelize(knot, like=tmp_path / "missing.nrrd")
+
+
+def test_colours_of_vertices_and_faces_come_to_the_voxels(tmp_path):
+    red_below = [[255, 0, 0] if z == 0 else [0, 0, 255] for z in CUBE_VERTICES[:, 2]]
+    mesh = strata.Mesh(CUBE_VERTICES, cube_triangles(), vertex_colours=red_below)
+    assert mesh.info()["coloured"]
+    voxels = strata.voxelize(mesh, resolution=8, colours=True, fill_colour="#00ff00")
+    array = voxels.numpy()
+    assert array.shape == (8, 8, 8, 4) and array.dtype == np.uint8 and voxels.kind == "colours"
+    assert array[3, 3, 0].tolist() == [255, 0, 0, 255] and array[3, 3, 7].tolist() == [0, 0, 255, 255]
+    assert array[4, 4, 4].tolist() == [0, 255, 0, 255]
+    assert np.array_equal(voxels.slice("z", 7).numpy(), array[:, :, 7])
+    assert voxels.picture(64).shape == (64, 64, 4) and voxels._repr_png_()
+    faces = strata.Mesh(CUBE_VERTICES, CUBE_QUADS, face_colours=np.eye(6)[:, :3])
+    sides = strata.voxelize(faces, resolution=8, colours=True).numpy()
+    assert sides[0, 4, 4, :3].tolist() == [255, 0, 0] and sides[7, 4, 4, :3].tolist() == [0, 255, 0]
+    voxels.save(tmp_path / "colours.nrrd")
+    with pytest.raises(strata.UsageError):
+        voxels.save(tmp_path / "colours.binvox")
+    with pytest.warns(strata.StrataWarning, match="no colours are given"):
+        strata.voxelize((CUBE_VERTICES, cube_triangles()), resolution=4, colours=True)
+    with pytest.raises(strata.InputError, match=r"vertex_colours must have the shape \(8, 3\)"):
+        strata.Mesh(CUBE_VERTICES, cube_triangles(), vertex_colours=[[0, 0, 0]])
+    with pytest.raises(strata.InputError, match=r"face_colours\[0\] must be 0 to 255, got 256"):
+        strata.Mesh(CUBE_VERTICES, CUBE_QUADS, face_colours=[[256, 0, 0]] * 6)
+
+
+def test_voxels_of_a_solid_have_its_colours():
+    part = strata.csg.cube(4).colour(1, 0, 0) | strata.csg.cube(4).translate(4, 0, 0).colour("#0000ff80")
+    array = part.voxelize(resolution=8, colours=True).numpy()
+    assert array.shape == (8, 4, 4, 4)
+    assert (array[:4] == (255, 0, 0, 255)).all() and (array[4:] == (0, 0, 255, 128)).all()
+
+
+def test_distances_are_those_to_the_box():
+    box = (CUBE_VERTICES * 4 + 2, cube_triangles())
+    grid = strata.Grid((8, 8, 8))
+    voxels = strata.voxelize(box, like=grid, sdf=True, band=None)
+    distance = voxels.numpy()
+    assert distance.dtype == np.float32 and voxels.kind == "distances"
+    centres = np.stack(np.meshgrid(*[np.arange(8) + 0.5] * 3, indexing="ij"), axis=-1)
+    away = np.abs(centres - 4) - 2
+    expected = np.linalg.norm(np.maximum(away, 0), axis=-1) + np.minimum(away.max(axis=-1), 0)
+    assert np.allclose(distance, expected, atol=1e-6)
+    assert np.array_equal(voxels.numpy(mask=True), distance < 0) and voxels.count == 64
+    assert np.array_equal(voxels.slice("y", 2).numpy(), distance[:, 2]) and voxels.slice("y", 2)._repr_png_()
+    narrow = strata.voxelize(box, like=grid, sdf=True, band=1).numpy()
+    assert np.allclose(narrow, np.clip(expected, -1, 1), atol=1e-6)
+    solid = strata.csg.solid(box) | strata.csg.cube(2).translate(3, 3, 3)  # its faces lie inside
+    assert np.allclose(solid.voxelize(like=grid, sdf=True, band=None).numpy(), expected, atol=1e-4)
+    with pytest.raises(strata.UsageError, match="band must be 0.5 to 1024 voxels, or None, got 0"):
+        strata.voxelize(box, like=grid, sdf=True, band=0)
+    with pytest.raises(strata.UsageError, match="a voxel holds one of"):
+        strata.voxelize(box, like=grid, sdf=True, colours=True)
+
+
+@pytest.mark.parametrize("name, band", [("d.vdb", 3), ("d.nrrd", None), ("d.npy", 3)])
+def test_distances_are_saved_and_read_again(tmp_path, knot, name, band):
+    voxels = strata.voxelize(knot, resolution=40, padding=4, sdf=True, band=band)
+    voxels.save(tmp_path / name)
+    again = strata.read_voxels(tmp_path / name, threshold=0)
+    assert again.kind in ("distances", "values")
+    ours, theirs = np.sort(voxels.numpy().ravel()), np.sort(again.numpy().ravel())
+    assert ours[0] == theirs[0] and np.array_equal(ours[ours < 0], theirs[theirs < 0])
