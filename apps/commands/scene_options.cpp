@@ -70,10 +70,18 @@ void define_scene_options(CLI::App& app, SceneWords& words) {
   };
   define_placement_options(app, words.placement);
   const char* input = "Input";
+  app.add_option("--part", words.parts,
+                 "Keep this part of meshes alone: an OBJ object or group, an STL solid, a 3MF "
+                 "object; may be repeated")
+      ->type_name("NAME")
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
+      ->group(input);
   option("--assets", words.assets,
          "Folder in which scenes look for files (default: the scene's own)", "FOLDER", input);
   option("--root", words.root,
-         "Folder outside of which scenes may not read files (default: no limit)", "FOLDER", input);
+         "Folder outside of which scenes and meshes may not read other files (default: no limit)",
+         "FOLDER", input);
   option("--scad-timeout", words.scad_timeout,
          "Longest time that openscad may take for a .scad (default: 300)", "SECONDS", input);
   app.add_option("-D", words.definitions,
@@ -100,6 +108,7 @@ Result<void> read_scene_options(const SceneWords& words, csg::SceneInput& input)
   csg::ReadSceneOptions& scene = input.scene;
   scene.asset_folder = words.assets;
   scene.root_folder = words.root;
+  input.parts = words.parts;
   std::error_code ignored;
   if (!words.root.empty() && !fs::is_directory(words.root, ignored)) {
     return fail(ErrorCode::kUsage, "--root {}: there is no such folder", words.root);

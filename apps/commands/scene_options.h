@@ -16,6 +16,7 @@ namespace strata::apps {
 /// The options of every command that reads scenes, as words. Empty: not given.
 struct SceneWords {
   std::string assets, root, scad_timeout;
+  std::vector<std::string> parts;        ///< --part
   std::vector<std::string> definitions;  ///< -D
   std::string parameter_file, parameter_set, check_parameters, check_ranges;
   PlacementWords placement;

@@ -3,6 +3,7 @@
 #include <system_error>
 #include <utility>
 
+#include "apps/info/attribute_report.h"
 #include "apps/info/check_report.h"
 #include "apps/info/gl_info.h"
 #include "apps/session/file_conflicts.h"
@@ -31,8 +32,9 @@ struct FileInfo {
   MeshReadStats stats;
   MeshDiagnosis found;
   Orientation orientation;
-  double world_metres = 0.0;       ///< length of the world's unit; 0: unknown
-  std::string unit_doubt;          ///< as csg::unit_doubt()
+  double world_metres = 0.0;  ///< length of the world's unit; 0: unknown
+  std::string unit_doubt;     ///< as csg::unit_doubt()
+  AttributeFacts attributes;
   std::optional<FileCheck> check;  ///< with --check
 };
 
@@ -89,6 +91,7 @@ std::string info_text(const FileInfo& info) {
   if (info.stats.ignored > 0) {
     line("ignored", counted(info.stats.ignored, "element") + " that are not faces");
   }
+  for (const auto& [topic, rest] : attribute_lines(info.attributes)) line(topic, rest);
   if (info.check) {
     for (const auto& [topic, rest] : check_lines(*info.check)) line(topic, rest);
   }
@@ -153,6 +156,7 @@ void write_info(JsonWriter& json, const FileInfo& info) {
   json.member("non_planar", info.stats.non_planar);
   json.member("ignored", info.stats.ignored);
   json.end_object();
+  write_attributes(json, info.attributes);
   if (info.check) write_check(json, *info.check);
   json.end_object();
 }
@@ -255,25 +259,43 @@ Result<SceneInfo> look_at_scene(const std::string& path, const InfoCommand& comm
   return info;
 }
 
+/// Reads a mesh with its attributes. If these are wrong, a warning says so, and the mesh counts.
+Result<MeshFile> read_with_attributes(const std::string& path, const csg::InputKind& kind,
+                                      csg::SceneInput input, const Execution& execution,
+                                      Session& session) {
+  input.attributes = true;
+  auto file = csg::read_mesh_input(path, kind, input, execution);
+  if (file || path == "-" || session.interrupted()) return file;
+  input.attributes = false;
+  auto plain = csg::read_mesh_input(path, kind, input, execution);
+  if (plain) session.warn("reader", file.error().message);
+  return plain;
+}
+
 Result<FileInfo> look_at(const std::string& path, const csg::InputKind& kind,
                          const InfoCommand& command, Session& session) {
   const double share =
       0.5 / static_cast<double>(std::max<std::size_t>(command.input.files.size(), 1));
   csg::SceneInput one = command.input;  // a file by itself
   one.files = {path};
-  auto file = csg::read_mesh_input(path, kind, one, session.execution("reading", share));
+  auto file = read_with_attributes(path, kind, one, session.execution("reading", share), session);
   if (!file) return tl::unexpected(file.error());
-  csg::warn_of_reading(path, file->stats, messages_of(session));
+  if (auto kept = session.opened(file->opened); !kept) return tl::unexpected(kept.error());
+  MeshReadStats told = file->stats;
+  told.missing.clear();  // the report says that
+  csg::warn_of_reading(path, told, messages_of(session));
   Execution execution = session.execution("checking");
   execution.progress = {};
   FileInfo info{path,
-                std::move(file->stats),
+                file->stats,
                 diagnose(file->soup, execution),
                 orient_parts(file->soup, execution, {.change = false}),
                 csg::world_unit(one),
                 {},
+                {},
                 {}};
   info.unit_doubt = csg::unit_doubt(info.stats, one, info.found.bounds);
+  info.attributes = look_at_attributes(*file, info.found.closed, execution);
   if (session.interrupted()) return fail(ErrorCode::kCancelled, "stopped");
   if (command.common.strict && !info.found.closed) {
     session.warn("open", fmt::format("{}: the mesh is not closed: {} of {} edges are unbalanced",

@@ -15,6 +15,7 @@
 #include "apps/voxelize/file_size.h"
 #include "apps/voxelize/voxelize_report.h"
 #include "apps/voxelize/voxelize_run.h"
+#include "core/printable.h"
 #include "strata/csg/input/solid_input.h"
 #include "strata/voxelize/formats/voxel_writer.h"
 
@@ -91,7 +92,10 @@ Result<void> check_open(const VoxelizeCommand& command, const csg::SolidInput& i
   if (command.ids && !input.has_scene()) {
     return fail(ErrorCode::kUsage,
                 "--ids needs closed meshes: in open ones winding numbers decide, and they do not "
-                "tell solids apart; close {}, or remove --ids",
+                "tell solids apart; close {}{}, or remove --ids",
+                file.open_part.empty()
+                    ? std::string()
+                    : fmt::format("part '{}' of ", printable(file.open_part, 200)),
                 file.path);
   }
   if (input.has_scene() && command.open == OpenMode::kVote) {

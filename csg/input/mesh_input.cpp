@@ -9,6 +9,7 @@
 #include "core/printable.h"
 #include "csg/input/input_parts.h"
 #include "mesh/block_sum.h"
+#include "mesh/split_parts.h"
 #include "strata/mesh/soup_tools.h"
 
 namespace strata::csg {
@@ -225,6 +226,7 @@ Result<MeshFile> read_mesh_input(const std::string& path, const InputKind& kind,
   options.reader = input.reader;
   options.attributes = input.attributes;
   options.textures = input.textures;
+  options.list_parts = input.split_parts;
   options.parts = input.parts;
   options.root = input.scene.root_folder;
   auto file = read_mesh(path, options, execution);
@@ -235,26 +237,103 @@ Result<MeshFile> read_mesh_input(const std::string& path, const InputKind& kind,
   return file;
 }
 
-Result<InputFacts> load_mesh(const std::string& path, const InputKind& kind,
-                             const SceneInput& input, const InputMessages& messages,
-                             const Execution& execution, TriangleSoup& soup, double* read_ms) {
+namespace {
+
+/// Reads a mesh file, and hands on the files that it names.
+Result<MeshFile> read_for(const std::string& path, const InputKind& kind, const SceneInput& input,
+                          const InputMessages& messages, const Execution& execution,
+                          double* read_ms) {
   const detail::Stopwatch watch;
   auto file = read_mesh_input(path, kind, input, execution);
-  if (!file) return tl::unexpected(file.error());
+  if (!file) return file;
   if (read_ms != nullptr) *read_ms += watch.milliseconds();
   if (messages.opened && !file->opened.empty()) {
     if (auto kept = messages.opened(file->opened); !kept) return tl::unexpected(kept.error());
   }
-  soup = std::move(file->soup);
+  return file;
+}
+
+void note_mesh(const InputFacts& facts, const InputMessages& messages) {
+  detail::note(messages,
+               fmt::format("{}: {}, {}", facts.path, counted(facts.stats.triangles, "triangle"),
+                           facts.closed ? "closed" : "open"));
+}
+
+/// Adds what is known of a part to what is known of its file.
+void add_part(InputFacts& all, const InputFacts& part, const std::string& name) {
+  all.closed = all.closed && part.closed;
+  all.turned_around = all.turned_around || part.turned_around;
+  all.orientation.closed = all.orientation.closed && part.orientation.closed;
+  all.orientation.parts += part.orientation.parts;
+  all.orientation.turned_parts += part.orientation.turned_parts;
+  all.orientation.turned_triangles += part.orientation.turned_triangles;
+  all.orientation.mixed_parts += part.orientation.mixed_parts;
+  all.orientation.not_orientable += part.orientation.not_orientable;
+  all.orientation.double_faces += part.orientation.double_faces;
+  all.area += part.area;
+  all.volume += part.volume;
+  all.longest_edge = std::max(all.longest_edge, part.longest_edge);
+  all.bounds.include(part.bounds);
+  all.zero_area_faces += part.zero_area_faces;
+  all.unbalanced_edges += part.unbalanced_edges;
+  if (!all.open.empty() || part.open.empty()) return;
+  all.open = part.open;
+  all.open_part = name;
+}
+
+}  // namespace
+
+Result<InputFacts> load_mesh(const std::string& path, const InputKind& kind,
+                             const SceneInput& input, const InputMessages& messages,
+                             const Execution& execution, TriangleSoup& soup, double* read_ms) {
+  std::vector<MeshSolid> one;
+  SceneInput whole = input;
+  whole.split_parts = false;
+  auto facts = load_mesh_solids(path, kind, whole, messages, execution, one, read_ms);
+  if (facts) soup = std::move(one.front().soup);
+  return facts;
+}
+
+Result<InputFacts> load_mesh_solids(const std::string& path, const InputKind& kind,
+                                    const SceneInput& input, const InputMessages& messages,
+                                    const Execution& execution, std::vector<MeshSolid>& solids,
+                                    double* read_ms) {
+  auto file = read_for(path, kind, input, messages, execution, read_ms);
+  if (!file) return tl::unexpected(file.error());
   Execution quiet = execution;
   quiet.progress = {};
-  auto facts = inspect_mesh(soup, std::move(file->stats), path, input, messages, quiet);
-  if (!facts) return facts;
-  facts->attributes = std::move(file->attributes);
-  detail::note(messages,
-               fmt::format("{}: {}, {}", path, counted(facts->stats.triangles, "triangle"),
-                           facts->closed ? "closed" : "open"));
-  return facts;
+  const std::vector<MeshPart>& parts = file->attributes.parts;
+  if (!input.split_parts || parts.size() < 2) {
+    auto facts = inspect_mesh(file->soup, std::move(file->stats), path, input, messages, quiet);
+    if (!facts) return facts;
+    facts->attributes = std::move(file->attributes);
+    solids.push_back({std::move(file->soup), facts->rule, path, false});
+    note_mesh(*facts, messages);
+    return facts;
+  }
+  InputFacts all;
+  all.path = path;
+  all.rule = input.rule;
+  all.closed = all.orientation.closed = true;
+  warn_of_reading(path, file->stats, messages);
+  all.stats = std::move(file->stats);
+  std::vector<TriangleSoup> split = strata::detail::split_parts(file->soup, file->attributes);
+  file->soup = {};
+  for (std::size_t i = 0; i < split.size(); ++i) {
+    if (split[i].triangles.empty()) continue;  // all its faces were dropped
+    const bool named = i < parts.size();
+    const std::string name = named ? parts[i].name : path;
+    auto facts = inspect_mesh(
+        split[i], {}, named ? fmt::format("{}: part '{}'", path, printable(name, 200)) : path,
+        input, messages, quiet);
+    if (!facts) return facts;
+    add_part(all, *facts, named ? name : std::string());
+    solids.push_back({std::move(split[i]), facts->rule, name, named});
+  }
+  all.unit_doubt = unit_doubt(all.stats, input, all.bounds);
+  all.attributes = std::move(file->attributes);
+  note_mesh(all, messages);
+  return all;
 }
 
 }  // namespace strata::csg

@@ -11,6 +11,7 @@
 
 #include <fmt/format.h>
 
+#include "core/printable.h"
 #include "csg/input/expression.h"
 #include "csg/input/input_parts.h"
 #include "csg/measure/result_bounds.h"
@@ -69,6 +70,10 @@ Result<Scene> load_one(const std::string& path, const SceneInput& input,
                        std::vector<InputFacts>* told) {
   const InputKind kind = kind_of(path, input);
   if (kind.is_scene) {
+    if (!input.parts.empty()) {
+      return fail(ErrorCode::kUsage, "{}: a scene has no parts to choose from, got '{}'", path,
+                  printable(input.parts.front(), 100));
+    }
     auto scene = read_scene(path, input.scene, execution);
     execution.progress = {};
     if (!scene) return scene;
@@ -86,14 +91,18 @@ Result<Scene> load_one(const std::string& path, const SceneInput& input,
     return tl::unexpected(named.error());
   }
   Scene scene;
-  TriangleSoup soup;
-  auto facts = load_mesh(path, kind, input, messages, execution, soup);
+  std::vector<MeshSolid> solids;
+  auto facts = load_mesh_solids(path, kind, input, messages, execution, solids);
   if (!facts) return tl::unexpected(facts.error());
-  Solid solid;
-  solid.mesh = std::make_shared<const TriangleSoup>(std::move(soup));
-  solid.rule = facts->rule;
-  solid.name = path;
-  scene.tree.set_root(scene.tree.add_solid(std::move(solid)));
+  std::vector<Tree::NodeId> nodes;
+  for (MeshSolid& one : solids) {
+    Solid solid;
+    solid.mesh = std::make_shared<const TriangleSoup>(std::move(one.soup));
+    solid.rule = one.rule;
+    solid.name = std::move(one.name);
+    nodes.push_back(scene.tree.add_solid(std::move(solid)));
+  }
+  scene.tree.set_root(nodes.size() == 1 ? nodes.front() : scene.tree.add(Operation::kUnion, nodes));
   if (told != nullptr) told->push_back(*std::move(facts));
   return scene;
 }

@@ -1,6 +1,7 @@
 #include "strata/csg/input/solid_input.h"
 
 #include <algorithm>
+#include <map>
 #include <utility>
 
 #include <fmt/format.h>
@@ -57,13 +58,55 @@ MeshAttributes take_attributes(InputFacts& facts) {
   return attributes;
 }
 
-/// Meshes as one soup, or as a tree where they have several rules or are to stay apart.
-Result<SolidInput> load_meshes(const SceneInput& input, bool as_tree, const InputMessages& messages,
+/// Names of parts that several files have get the file's name before them.
+void name_apart(std::vector<Solid>& solids, const std::vector<std::string>& files) {
+  std::map<std::string, std::size_t> times;
+  for (const Solid& solid : solids) ++times[solid.name];
+  for (std::size_t i = 0; i < solids.size(); ++i) {
+    if (!files[i].empty() && times[solids[i].name] > 1) {
+      solids[i].name = files[i] + ":" + solids[i].name;
+    }
+  }
+}
+
+/// Meshes, or their parts, as solids of a tree.
+Result<SolidInput> load_apart(SceneInput input, const InputMessages& messages,
+                              const Execution& execution) {
+  input.split_parts = true;
+  SolidInput all;
+  all.unit_metres = world_unit(input);
+  std::vector<Solid> apart;
+  std::vector<std::string> files;  // of each that is a part
+  for (std::size_t i = 0; i < input.files.size(); ++i) {
+    const std::string& path = input.files[i];
+    const detail::Stopwatch watch;
+    std::vector<MeshSolid> solids;
+    double read_ms = 0;
+    auto facts =
+        load_mesh_solids(path, kind_of(path, input), input, messages,
+                         detail::part_of(execution, i, input.files.size()), solids, &read_ms);
+    if (!facts) return tl::unexpected(facts.error());
+    all.read_ms += read_ms;
+    (void)take_attributes(*facts);
+    all.add(*std::move(facts));
+    for (MeshSolid& one : solids) {
+      apart.push_back(solid_of(std::move(one.soup), one.rule, one.name));
+      files.push_back(one.is_part ? path : std::string());
+    }
+    all.diagnose_ms += watch.milliseconds() - read_ms;
+  }
+  if (input.files.size() > 1) name_apart(apart, files);
+  set_union(all, std::move(apart));
+  return all;
+}
+
+/// Meshes as one soup, or as a tree where they have several rules.
+Result<SolidInput> load_meshes(const SceneInput& input, const InputMessages& messages,
                                const Execution& execution) {
   SolidInput all;
   all.unit_metres = world_unit(input);
-  if (!as_tree) all.rule = input.rule;  // solids of a tree have their own
-  std::vector<Solid> apart;             // those with a rule of their own, or all
+  all.rule = input.rule;     // solids of a tree have their own
+  std::vector<Solid> apart;  // those with a rule of their own
   for (std::size_t i = 0; i < input.files.size(); ++i) {
     const std::string& path = input.files[i];
     const detail::Stopwatch watch;
@@ -77,9 +120,7 @@ Result<SolidInput> load_meshes(const SceneInput& input, bool as_tree, const Inpu
     const std::uint64_t elements = facts->stats.faces;
     MeshAttributes attributes = take_attributes(*facts);
     all.add(*std::move(facts));
-    if (as_tree) {
-      apart.push_back(solid_of(std::move(soup), rule, path));
-    } else if (input.files.size() == 1) {
+    if (input.files.size() == 1) {
       all.soup = std::move(soup);
       all.attributes = std::move(attributes);
       all.rule = rule;
@@ -92,7 +133,7 @@ Result<SolidInput> load_meshes(const SceneInput& input, bool as_tree, const Inpu
     }
     all.diagnose_ms += watch.milliseconds() - read_ms;
   }
-  if (apart.empty() && !as_tree) return all;
+  if (apart.empty()) return all;
   all.attributes = {};
   if (!all.soup.triangles.empty()) {
     apart.push_back(solid_of(std::move(all.soup), input.rule, input.files.front()));
@@ -139,12 +180,15 @@ Result<SolidInput> load_solids(const SceneInput& input, bool as_tree, const Inpu
   }
   if (input.expression.empty() &&
       std::none_of(input.files.begin(), input.files.end(), is_scene_name)) {
-    return load_meshes(input, as_tree, messages, execution);
+    return as_tree ? load_apart(input, messages, execution)
+                   : load_meshes(input, messages, execution);
   }
   const detail::Stopwatch watch;
   SolidInput all;
   all.unit_metres = world_unit(input);
-  auto scene = load_scene(input, messages, execution, &all.files);
+  SceneInput apart = input;
+  apart.split_parts = as_tree;
+  auto scene = load_scene(apart, messages, execution, &all.files);
   if (!scene) return tl::unexpected(scene.error());
   all.bounds = strata::csg::bounds(scene->tree, scene->tree.root());
   if (all.bounds.empty()) {

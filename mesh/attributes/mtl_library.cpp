@@ -106,6 +106,7 @@ std::uint32_t MtlLibrary::number_of(std::string_view name) {
 }
 
 void MtlLibrary::warn_of_unknown() {
+  if (materials_.empty() && !file_.stats.missing.empty()) return;  // that says it all
   std::vector<std::string_view> known;
   for (const auto& [name, number] : numbers_) known.push_back(name);
   std::size_t said = file_.stats.missing.size();

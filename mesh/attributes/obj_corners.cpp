@@ -5,6 +5,7 @@
 #include <glm/vec2.hpp>
 #include <limits>
 
+#include "core/reserve_large.h"
 #include "mesh/no_vertex.h"
 #include "mesh/text/obj_lines.h"
 #include "mesh/text/text_chunks.h"
@@ -54,6 +55,7 @@ class CornerReader {
     points_.resize(starts_.back().texture_points);
     all_.corner_offsets.reserve(starts_.back().faces + 1);
     all_.corner_offsets.push_back(0);
+    reserve();
     ChunksEnd chunks_end;
     read_chunks<CornerChunk>(
         input_, cuts, chunks_end,
@@ -74,6 +76,7 @@ class CornerReader {
   }
 
  private:
+  void reserve();
   void parse(const char* p, const char* end, ObjChunkStart at, CornerChunk& chunk);
   const char* parse_point(const char* p, glm::vec2& point) const;
   const char* parse_corners(const char* p, const ObjChunkStart& at, CornerChunk& chunk);
@@ -94,6 +97,19 @@ class CornerReader {
   std::uint64_t bad_ = 0;
   const char* first_bad_ = nullptr;
 };
+
+/// Most faces are triangles.
+void CornerReader::reserve() {
+  std::uint64_t faces = 0;
+  const std::vector<MeshAttributes::Range>& ranges = all_.material_ranges;
+  for (std::size_t i = 0; i < ranges.size(); ++i) {
+    const std::uint64_t end = i + 1 < ranges.size() ? ranges[i + 1].first : starts_.back().faces;
+    if (is_textured(ranges[i].index) && end > ranges[i].first) faces += end - ranges[i].first;
+  }
+  const std::uint64_t corners = std::min<std::uint64_t>(3 * faces, input_.text.size() / 4);
+  reserve_large(all_.corners, corners);
+  reserve_large(point_of_, corners);
+}
 
 const char* CornerReader::parse_point(const char* p, glm::vec2& point) const {
   for (int i = 0; i < 2; ++i) {

@@ -1,5 +1,6 @@
 #include <algorithm>
 
+#include "mesh/attributes/colour_values.h"
 #include "mesh/formats/reader_common.h"
 #include "mesh/text/text_scanner.h"
 
@@ -46,6 +47,9 @@ class OffReader {
   template <class Visit>
   Result<void> read_faces(Visit&& visit);
   FacePlace locate(std::uint32_t element);
+  bool read_colour(glm::vec4& colour);
+  void read_vertex_colours(MeshAttributes& attributes);
+  void read_face_colours(MeshAttributes& attributes);
 
   /// Skips white space, comments and line ends.
   void skip_gap() {
@@ -94,7 +98,9 @@ class OffReader {
   bool homogeneous_ = false;    ///< four coordinates, of which the last divides the others
   bool normals_ = false, colours_ = false, texture_ = false, with_dimension_ = false;
   std::uint64_t vertex_count_ = 0, face_count_ = 0;
+  const char* vertices_begin_ = nullptr;
   const char* faces_begin_ = nullptr;
+  const char* corners_end_ = nullptr;  ///< of the face that is visited
   RawMesh mesh_;
 };
 
@@ -237,6 +243,7 @@ Result<void> OffReader::read_faces(Visit&& visit) {
                             ? static_cast<std::uint32_t>(index)
                             : kNoVertex);
     }
+    corners_end_ = p_;
     if (how_.layout != Layout::kTokens) skip_line();
     if (!visit(start, corners)) break;
   }
@@ -265,10 +272,97 @@ FacePlace OffReader::locate(std::uint32_t element) {
   return result;
 }
 
+/// Reads the three or four values of a colour. @return false if there are fewer before the line
+/// ends; the fourth is below 0 if it is not there
+bool OffReader::read_colour(glm::vec4& colour) {
+  const bool by_tokens = how_.layout != Layout::kLines;
+  colour = glm::vec4(0.0f, 0.0f, 0.0f, -1.0f);
+  for (int i = 0; i < (by_tokens ? how_.colour_values : 4); ++i) {
+    skip_inside();
+    double value = 0.0;
+    const char* stop = parse_double(p_, value);
+    if (stop == nullptr || !(ends_token(*stop) || *stop == '#')) return i == 3;
+    colour[i] = value > 0.0 ? static_cast<float>(value) : 0.0f;
+    p_ = stop;
+  }
+  return true;
+}
+
+/// Colours of which the largest value decides whether they are 0 to 1 or 0 to 255.
+/// @param colours  below 0 in all: there is none
+std::vector<glm::u8vec4> bytes_of_colours(const std::vector<glm::vec4>& colours) {
+  float most = 0.0f;
+  for (const glm::vec4& c : colours) most = std::max({most, c.r, c.g, c.b, c.a});
+  const float scale = colour_scale(most);
+  std::vector<glm::u8vec4> result;
+  for (const glm::vec4& c : colours) {
+    glm::u8vec4 bytes(255);
+    for (int i = 0; i < 4; ++i) {
+      if (c[i] >= 0.0f) bytes[i] = colour_byte(scale * c[i]);
+    }
+    result.push_back(bytes);
+  }
+  return result;
+}
+
+void OffReader::read_vertex_colours(MeshAttributes& attributes) {
+  std::vector<glm::vec4> colours(vertex_count_, glm::vec4(-1.0f));
+  p_ = vertices_begin_;
+  const int before = (homogeneous_ ? 4 : 3) + (normals_ ? 3 : 0);
+  for (std::uint64_t v = 0; v < vertex_count_; ++v) {
+    skip_gap();
+    double skipped = 0.0;
+    for (int i = 0; i < before; ++i) {
+      if (i > 0) skip_inside();
+      const char* stop = parse_double(p_, skipped);
+      if (stop == nullptr) break;  // a line without the normal that the prefix announces
+      p_ = stop;
+    }
+    if (glm::vec4 colour; read_colour(colour)) colours[v] = colour;
+    if (how_.layout == Layout::kLines) {
+      skip_line();
+      continue;
+    }
+    for (int i = 0; i < (texture_ ? 2 : 0); ++i) {
+      skip_inside();
+      const char* stop = parse_double(p_, skipped);
+      p_ = stop == nullptr ? p_ : stop;
+    }
+  }
+  attributes.vertex_colours = bytes_of_colours(colours);
+  input_.dropped->remove_from(attributes.vertex_colours);
+}
+
+/// `4 0 1 2 3 255 0 0`: what stands behind the corners in their line. One value is an index of a
+/// table that Geomview has, and is skipped.
+void OffReader::read_face_colours(MeshAttributes& attributes) {
+  std::vector<glm::vec4> colours(face_count_, glm::vec4(-1.0f));
+  const Attempt before = how_;
+  bool any = false;
+  std::uint64_t face = 0;
+  p_ = faces_begin_;
+  (void)read_faces([&](const char*, const std::vector<std::uint32_t>&) {
+    const char* const next = p_;
+    p_ = corners_end_;
+    how_ = {};  // to the end of the line
+    glm::vec4 colour;
+    if (read_colour(colour)) {
+      any = true;
+      colours[face] = colour;
+    }
+    how_ = before;
+    p_ = next;
+    ++face;
+    return !input_.execution.stop.stop_requested();
+  });
+  if (any) attributes.element_colours = bytes_of_colours(colours);
+}
+
 Result<void> OffReader::attempt(const Attempt& attempt) {
   how_ = attempt;
   mesh_ = {};
   if (auto header = read_header(); !header) return tl::unexpected(header.error());
+  vertices_begin_ = p_;
   if (auto vertices = read_vertices(); !vertices) return tl::unexpected(vertices.error());
   if (input_.execution.stop.stop_requested()) {
     return fail(ErrorCode::kCancelled, "{}: reading was stopped", input_.name);
@@ -326,8 +420,15 @@ Result<MeshFile> OffReader::read() {
   // A file that can be read by lines only has other text after its last face.
   if (!read && lines && furthest.code == ErrorCode::kInput) read = good({});
   if (!read) return tl::unexpected(std::move(furthest));
-  return finish_mesh(input_, std::move(mesh_),
-                     [this](std::uint32_t element) { return locate(element); });
+  auto file = finish_mesh(input_, std::move(mesh_),
+                          [this](std::uint32_t element) { return locate(element); });
+  if (!file || !input_.options.attributes) return file;
+  if (colours_) read_vertex_colours(file->attributes);
+  if (how_.layout != Layout::kTokens) read_face_colours(file->attributes);
+  if (input_.execution.stop.stop_requested()) {
+    return fail(ErrorCode::kCancelled, "{}: reading was stopped", input_.name);
+  }
+  return file;
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <span>
 #include <utility>
 
+#include "mesh/formats/ply_colours.h"
 #include "mesh/formats/ply_source.h"
 #include "mesh/formats/reader_common.h"
 #include "mesh/text/text_scanner.h"
@@ -59,6 +60,9 @@ class PlyReader {
   Result<void> skip_element(Source& source, const Element& element);
   template <class Source>
   bool skip_property(Source& source, const Property& property);
+  template <class Source>
+  Result<void> read_colours(const std::optional<FaceSource<Source>>& vertices,
+                            std::span<const FaceSource<Source>> faces, MeshFile& file) const;
   template <class Source>
   std::string place(const Source& source) const;
   template <class Source>
@@ -440,10 +444,36 @@ Result<void> PlyReader::read_face_element(Source& source, const Element& element
                     });
 }
 
+/// Reads the elements that have colours a second time.
+template <class Source>
+Result<void> PlyReader::read_colours(const std::optional<FaceSource<Source>>& vertices,
+                                     std::span<const FaceSource<Source>> faces,
+                                     MeshFile& file) const {
+  const std::stop_token& stop = input_.execution.stop;
+  if (vertices && colours_of(*vertices->element).given()) {
+    std::vector<glm::u8vec4>& colours = file.attributes.vertex_colours;
+    colours.resize(vertices->element->count, glm::u8vec4(255));
+    read_ply_colours(vertices->source, *vertices->element, 0, stop, colours);
+    input_.dropped->remove_from(colours);
+  }
+  std::uint64_t first = 0;
+  for (const FaceSource<Source>& one : faces) {
+    // Strips are several triangles each; nobody gives them colours.
+    if (one.kind == FaceKind::kPolygon && colours_of(*one.element).given()) {
+      file.attributes.element_colours.resize(file.stats.faces, glm::u8vec4(255));
+      read_ply_colours(one.source, *one.element, first, stop, file.attributes.element_colours);
+    }
+    first += one.faces;
+  }
+  if (!stop.stop_requested()) return {};
+  return fail(ErrorCode::kCancelled, "{}: reading was stopped", input_.name);
+}
+
 template <class Source>
 Result<MeshFile> PlyReader::read_body(Source source) {
   FanBuilder fans(mesh_);
   std::vector<FaceSource<Source>> sources;
+  std::optional<FaceSource<Source>> vertices;
   for (const Element& element : elements_) {
     std::uint64_t least = 0;
     for (const Property& property : element.properties) least += Source::least_bytes(property);
@@ -461,6 +491,7 @@ Result<MeshFile> PlyReader::read_body(Source source) {
         return fail(ErrorCode::kLimit, "{}: {} vertices are more than the memory limit",
                     input_.name, element.count);
       }
+      vertices = {&element, source, FaceKind::kPolygon, 0};
       done = read_vertices(source, element);
     } else if (element.name == "face" || element.name == "tristrips") {
       const FaceKind kind = element.name == "face" ? FaceKind::kPolygon : FaceKind::kStrip;
@@ -483,9 +514,12 @@ Result<MeshFile> PlyReader::read_body(Source source) {
       return fail(ErrorCode::kInput, "{}: text follows the last element", place(source));
     }
   }
-  return finish_mesh(input_, std::move(mesh_), [&](std::uint32_t face) {
-    return locate(std::span<const FaceSource<Source>>(sources), face);
-  });
+  const std::span<const FaceSource<Source>> faces(sources);
+  auto file = finish_mesh(input_, std::move(mesh_),
+                          [&](std::uint32_t face) { return locate(faces, face); });
+  if (!file || !input_.options.attributes) return file;
+  if (auto done = read_colours(vertices, faces, *file); !done) return tl::unexpected(done.error());
+  return file;
 }
 
 Result<MeshFile> PlyReader::read_ascii() {

@@ -2,6 +2,7 @@
 #include <limits>
 #include <memory>
 
+#include "mesh/attributes/stl_attributes.h"
 #include "mesh/formats/reader_common.h"
 #include "mesh/text/text_chunks.h"
 #include "mesh/text/text_scanner.h"
@@ -119,17 +120,20 @@ Result<MeshFile> read_binary(const ReaderInput& input) {
         fmt::format("{}: {} bytes after the {} triangles are ignored", input.name, rest, count));
   }
   if (auto done = read_facets(input, count, mesh.soup); !done) return tl::unexpected(done.error());
-  return finish_mesh(input, std::move(mesh), [&input](std::uint32_t element) {
+  auto file = finish_mesh(input, std::move(mesh), [&input](std::uint32_t element) {
     return FacePlace{fmt::format("{}: triangle {} (byte {})", input.name, element,
                                  kHeaderBytes + kFacetBytes * element),
                      {}};
   });
+  if (file && input.options.attributes) read_stl_colours(input.text, count, file->attributes);
+  return file;
 }
 
 /// The facets of a piece of an ASCII file.
 struct Chunk {
   std::vector<glm::dvec3> corners;
   std::vector<std::uint32_t> sizes;  ///< number of corners of each loop
+  std::vector<StlSolid> solids;      ///< counted from the chunk's first loop
   std::size_t error_offset = ChunksEnd::kNone;
   std::string error;
   bool ended = false;  ///< endsolid has closed the last solid
@@ -139,6 +143,7 @@ struct Chunk {
   void clear() {
     corners.clear();
     sizes.clear();
+    solids.clear();
     ended = false;
     strange_lines = first_strange = 0;
   }
@@ -166,6 +171,7 @@ class AsciiReader {
   FanBuilder fans_{mesh_};
   WeldTable<double> table_{1024};
   std::vector<std::uint32_t> loop_;
+  std::vector<StlSolid> solids_;
   bool ended_ = false;
   ChunksEnd chunks_end_{.most_vertices = kMaxVertices - 0x10000000u};
   std::uint64_t strange_lines_ = 0;
@@ -184,6 +190,12 @@ const char* skip_line(const char* p) {
 
 /// The meaning of a token.
 enum class Word { kSolid, kEndSolid, kFacet, kEndFacet, kLoop, kEndLoop, kNormal, kVertex, kOther };
+
+std::string_view trimmed(const char* begin, const char* end) {
+  while (begin < end && is_blank(*begin)) ++begin;
+  while (begin < end && is_blank(end[-1])) --end;
+  return {begin, static_cast<std::size_t>(end - begin)};
+}
 
 bool starts_no_case(std::string_view text, std::string_view word) {
   return equals_no_case(text.substr(0, word.size()), word);
@@ -317,7 +329,9 @@ void AsciiReader::parse(const char* p, const char* end, Chunk& chunk) const {
     } else if (word == Word::kSolid || word == Word::kEndSolid) {
       if (in_loop) return broken(p, fmt::format("'{}' inside a loop", text));
       chunk.ended = word == Word::kEndSolid;
-      p = skip_line(stop);  // the rest of the line is a name
+      const char* const name = p + 5;  // it may be glued to the word
+      p = skip_line(stop);             // the rest of the line is a name
+      if (word == Word::kSolid) chunk.solids.push_back({chunk.sizes.size(), trimmed(name, p)});
     } else if (!in_loop || tells_of_looks(text)) {
       p = parse_strange(p, chunk);
     } else {
@@ -345,6 +359,9 @@ const char* AsciiReader::parse_strange(const char* p, Chunk& chunk) const {
 void AsciiReader::append(const Chunk& chunk) {
   std::size_t corner = 0;
   std::vector<glm::dvec3>& positions = mesh_.soup.positions;
+  for (const StlSolid& solid : chunk.solids) {
+    solids_.push_back({mesh_.stats.faces + solid.first, solid.name});
+  }
   for (const std::uint32_t size : chunk.sizes) {
     loop_.clear();
     for (std::uint32_t i = 0; i < size; ++i) {
@@ -400,8 +417,11 @@ Result<MeshFile> AsciiReader::read() {
         "{}: no 'endsolid' after the last facet; the file may be cut short", input_.name));
   }
   mesh_.stats.format = "stl ascii";
-  return finish_mesh(input_, std::move(mesh_),
-                     [this](std::uint32_t element) { return locate(element); });
+  const std::uint64_t facets = mesh_.stats.faces;
+  auto file = finish_mesh(input_, std::move(mesh_),
+                          [this](std::uint32_t element) { return locate(element); });
+  if (file && input_.options.wants_parts()) set_stl_parts(solids_, facets, file->attributes);
+  return file;
 }
 
 /// Whether text begins like an ASCII file. Binary headers may also begin with "solid", but contain

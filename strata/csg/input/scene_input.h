@@ -51,6 +51,7 @@ struct SceneInput {
   bool keep_orientation = false;           ///< meshes that are inside out are not reversed
   MeshPlacement placement;                 ///< of meshes, and of scenes but for their unit
   std::vector<std::string> parts;          ///< names of the parts of meshes to keep; empty: all
+  bool split_parts = false;                ///< parts of meshes become solids of their own, united
   bool attributes = false;                 ///< read parts, materials and colours of meshes
   bool textures = true;                    ///< with `attributes`: and their pictures
   /// A Boolean expression over the files, such as "a - b"; empty: their union.
@@ -91,7 +92,8 @@ struct InputFacts {
   Bounds bounds;                       ///< of the triangles
   std::uint64_t zero_area_faces = 0;   ///< triangles whose area is 0
   std::uint64_t unbalanced_edges = 0;  ///< as MeshDiagnosis::unbalanced_edges
-  std::string open;  ///< a sentence that says what is not closed; empty where all is
+  std::string open;       ///< a sentence that says what is not closed; empty where all is
+  std::string open_part;  ///< the part that it speaks of, if parts were split
   /// A sentence where the mesh has an unlikely size and its unit is not known; see unit_doubt().
   std::string unit_doubt;
   /// True for a scene. Then `stats` has only format, bytes, vertices and triangles, and area,
@@ -153,6 +155,21 @@ Result<InputFacts> load_mesh(const std::string& path, const InputKind& kind,
                              const SceneInput& input, const InputMessages& messages,
                              const Execution& execution, TriangleSoup& soup,
                              double* read_ms = nullptr);
+
+/// A part of a mesh, or all of one.
+struct MeshSolid {
+  TriangleSoup soup;
+  InsideRule rule = InsideRule::kWinding;
+  std::string name;      ///< of the file, or of its part
+  bool is_part = false;  ///< one of several
+};
+
+/// The same, in parts that are inspected one by one, where input.split_parts asks for that and the
+/// file has at least two. Triangles of no part are one more, named after the file.
+Result<InputFacts> load_mesh_solids(const std::string& path, const InputKind& kind,
+                                    const SceneInput& input, const InputMessages& messages,
+                                    const Execution& execution, std::vector<MeshSolid>& solids,
+                                    double* read_ms = nullptr);
 
 /// Whether standard input is among the files.
 [[nodiscard]] bool reads_standard_input(const SceneInput& input);

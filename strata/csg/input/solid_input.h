@@ -49,7 +49,8 @@ struct SolidInput {
 /// input.expression. Several meshes become a tree if parity is the rule of one of them.
 /// @return kInput, kUsage, kLimit, kCancelled; kGeometry if the result of a scene or expression is
 /// empty
-/// @param as_tree  each mesh becomes a solid of a tree
+/// @param as_tree  each mesh becomes a solid of a tree; one of several parts as many as it has.
+/// Names of parts that several files have are "FILE:PART"
 Result<SolidInput> load_solids(const SceneInput& input, bool as_tree = false,
                                const InputMessages& messages = {}, const Execution& execution = {});
 

@@ -16,6 +16,7 @@
 #include "strata/mesh/soup_tools.h"
 #include "tests/apps/strata/json_names.h"
 #include "tests/apps/strata/run_tool.h"
+#include "tests/mesh/textures/picture_bytes.h"
 
 namespace strata {
 namespace {
@@ -184,6 +185,39 @@ TEST(Info, WhatStrataMeshWritesPassesTheCheck) {
   }
 }
 
+TEST(Info, TellsPartsMaterialsAndPictures) {
+  const Workplace place;
+  place.write("a.mtl", "newmtl red\nKd 1 0 0\nd 0.5\nnewmtl wood\nmap_Kd wood.png\n");
+  place.write("wood.png", testing_textures::rgba_png(2, 1, "abcdefgh"));
+  place.write("a.obj",
+              "mtllib a.mtl gone.mtl\nv 0 0 0 1 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 0\n"
+              "o shell\nusemtl red\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\ng fl\x1b[2Jap\n"
+              "usemtl wood\nf 1/1 2/1 3/1\n");
+  const RunResult text = place.run({"info", "a.obj", "--strict"});
+  EXPECT_EQ(text.err.find("gone.mtl"), std::string::npos) << text.err;
+  for (const char* line :
+       {"parts        2", "'shell': 4 triangles, (0, 0, 0) to (1, 1, 1), closed",
+        "'shell/fl\\x1b[2Jap': 1 triangle, (0, 0, 0) to (1, 1, 0), open", "materials    2",
+        "'red', 1 0 0, opacity 0.5", "'wood', texture 1", "textures     1", "wood.png: 2 x 1",
+        "colours      of vertices", "gone.mtl is not there"}) {
+    EXPECT_NE(text.out.find(line), std::string::npos) << line << "\n" << text.out;
+  }
+  EXPECT_EQ(text.out.find('\x1b'), std::string::npos);
+  const json file = json::parse(place.run({"info", "a.obj", "--json"}).out)["files"][0];
+  EXPECT_EQ(file["parts"][0]["triangles"], 4);
+  EXPECT_EQ(file["parts"][0]["closed"], true);
+  EXPECT_EQ(file["materials"][0]["opacity"], 0.5);
+  EXPECT_EQ(file["materials"][1]["texture"], 0);
+  EXPECT_EQ(file["textures"][0]["width"], 2);
+  EXPECT_EQ(file["missing"].size(), 1u);
+  // Materials that are wrong do not keep the mesh from being looked at.
+  place.write("a.mtl", "newmtl red\nKd x\n");
+  const RunResult wrong = place.run({"info", "a.obj", "--json"});
+  EXPECT_EQ(wrong.exit_code, 0) << wrong.err;
+  EXPECT_NE(wrong.err.find("a.mtl:2: Kd: 'x' is not a number"), std::string::npos) << wrong.err;
+  EXPECT_EQ(json::parse(wrong.out)["files"][0]["triangles"], 5);
+}
+
 TEST(Info, TellsWhatOpenGlThereIsOrSaysWhyNot) {
   const Workplace place;
   const RunResult run = place.run({"info", "--gl"});
@@ -225,7 +259,12 @@ TEST(Json, TheDocumentationNamesExactlyWhatInfoPrints) {
   TriangleSoup crossing = two_boxes(1);
   crossing.triangles.pop_back();
   put(place, "open.obj", crossing);
-  for (const char* name : {"scene.csg", "open.obj"}) {
+  place.write("a.mtl", "newmtl a\nmap_Kd a.png\n");
+  place.write("a.png", testing_textures::rgba_png(1, 1, "abcd"));
+  place.write("a.obj",
+              "mtllib a.mtl none.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\ng a\n"
+              "usemtl a\nf 1/1 2/1 3/1\n");
+  for (const char* name : {"scene.csg", "open.obj", "a.obj"}) {
     collect(json::parse(place.run({"info", name, "--check", "--json"}).out), "", names);
   }
   place.run({"voxelize", "open.obj", "-r", "8", "-o", "voxels.vdb"});

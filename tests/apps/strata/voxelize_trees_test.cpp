@@ -332,6 +332,74 @@ TEST_F(VoxelizeTrees, IdsSayWhichFileAVoxelIsOf) {
   for (std::size_t i = 0; i < swapped.size(); ++i) EXPECT_EQ(swapped[i], i % 8 < 2 ? 2u : 1u);
 }
 
+/// A cube from `low` to `low + size`, as OBJ statements whose vertices count back.
+std::string cube_statements(const glm::dvec3& low, double size) {
+  std::string text;
+  const TriangleSoup box = make_box(low, low + size);
+  for (const glm::dvec3& p : box.positions) text += fmt::format("v {} {} {}\n", p.x, p.y, p.z);
+  for (const glm::uvec3& t : box.triangles) {
+    text += "f";
+    for (int i = 0; i < 3; ++i) text += fmt::format(" {}", int(t[i]) - int(box.positions.size()));
+    text += "\n";
+  }
+  return text;
+}
+
+TEST_F(VoxelizeTrees, IdsOfOneFileAreThoseOfItsParts) {
+  // The parts overlap: the first one has what both hold.
+  const std::string two =
+      "o left\n" + cube_statements({0, 0, 0}, 2) + "o right\n" + cube_statements({1, 0, 0}, 2);
+  place.write("two.obj", two);
+  const json found = report({"two.obj", "--voxel-size", "1", "--ids", "-o", "a.npy"});
+  EXPECT_EQ(found["ids"], (json{{{"id", 1}, {"solid", 0}, {"name", "left"}, {"voxels", 8}},
+                                {{"id", 2}, {"solid", 1}, {"name", "right"}, {"voxels", 4}}}));
+  EXPECT_EQ(found["input"]["files"].size(), 1u);
+  EXPECT_EQ(found["input"]["files"][0]["triangles"], 24);
+  const auto values = npy_values(place.read("a.npy")).second;
+  for (std::size_t i = 0; i < values.size(); ++i) EXPECT_EQ(values[i], i % 3 < 2 ? 1u : 2u);
+  // Without --ids the file is one solid, and one part of it alone can be taken.
+  EXPECT_EQ(report({"two.obj", "--voxel-size", "1"})["voxels"]["solid"], 12);
+  EXPECT_EQ(report({"two.obj", "--voxel-size", "1", "--part", "right"})["voxels"]["solid"], 8);
+  const RunResult wrong = place.run({"voxelize", "two.obj", "--part", "rihgt", "--stats"});
+  EXPECT_EQ(wrong.exit_code, 3);
+  EXPECT_NE(wrong.err.find("two.obj: there is no part 'rihgt'; did you mean right?; its parts are "
+                           "'left', 'right'"),
+            std::string::npos)
+      << wrong.err;
+
+  // Names that two files have are told apart.
+  place.write("more.obj", "o right\n" + cube_statements({4, 0, 0}, 1) + "o far\n" +
+                              cube_statements({6, 0, 0}, 1));
+  put("ball.obj", make_box({8, 0, 0}, {9, 1, 1}));
+  const json all =
+      report({"two.obj", "more.obj", "ball.obj", "--voxel-size", "1", "--ids", "-o", "b.npy"});
+  std::vector<std::string> names;
+  for (const json& id : all["ids"]) names.push_back(id["name"]);
+  EXPECT_EQ(names, (std::vector<std::string>{"left", "two.obj:right", "more.obj:right", "far",
+                                             "ball.obj"}));
+}
+
+TEST_F(VoxelizeTrees, AnOpenPartIsNamedInTheRefusalOfIds) {
+  const std::string box = cube_statements({0, 0, 0}, 2);
+  std::string open = cube_statements({3, 0, 0}, 2);
+  open.resize(open.rfind('f'));
+  place.write("parts.obj", "o good\n" + box + "o bad\n" + open);
+  const RunResult refused = place.run({"voxelize", "parts.obj", "-r", "8", "--ids", "-o", "a.npy"});
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_NE(refused.err.find("close part 'bad' of parts.obj"), std::string::npos) << refused.err;
+  EXPECT_EQ(
+      place.run({"voxelize", "parts.obj", "-r", "8", "--ids", "-o", "a.npy", "--part", "good"})
+          .exit_code,
+      0);
+}
+
+TEST_F(VoxelizeTrees, ScenesHaveNoPartsToChoose) {
+  place.write("a.csg", "cube();\n");
+  const RunResult refused = place.run({"voxelize", "a.csg", "--part", "x", "--stats"});
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_NE(refused.err.find("a.csg: a scene has no parts"), std::string::npos) << refused.err;
+}
+
 TEST_F(VoxelizeTrees, IdsOf300Solids) {
   std::string scene = "difference() { union() {\n";
   for (int i = 0; i < 300; ++i) {
