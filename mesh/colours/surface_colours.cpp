@@ -36,14 +36,14 @@ glm::u8vec4 rounded(const glm::vec4& colour) {
   return glm::u8vec4(glm::clamp(colour, 0.0f, 1.0f) * 255.0f + 0.5f);
 }
 
-/// What a triangle looks like.
+/// What a triangle looks like: a colour, or the product of a light, a texture if there is one, and
+/// the interpolated light of its corners.
 struct Look {
   std::uint32_t triangle = 0xffffffffu;
-  enum class Kind { kFlat, kBlend, kTexture } kind = Kind::kFlat;
+  bool is_flat = true, has_texture = false, has_blend = false;
   glm::u8vec4 flat{0};
-  std::array<glm::vec4, 3> lights{};  // kBlend: of the corners
-  // kTexture
-  glm::vec4 factor{1.0f};  // light and alpha that texels are multiplied by
+  glm::vec4 factor{1.0f};
+  std::array<glm::vec4, 3> lights{};  // of the corners
   std::uint32_t texture = 0;
   std::array<glm::dvec2, 3> at{};  // of the corners; (0, 0) is the upper left corner
   float level = 0.0f;
@@ -103,9 +103,11 @@ struct SurfaceColours::Impl {
   using Corners = std::array<const MeshAttributes::Corner*, 3>;
   [[nodiscard]] bool find_corners(std::uint64_t element, const glm::uvec3& t,
                                   Corners& corners) const;
+  /// @return whether any colour is given
+  bool set_colours(Look& look, std::uint64_t element, const glm::uvec3& t,
+                   const SurfaceMaterial* material, const Corners* corners) const;
   void set_texture(Look& look, const SurfaceMaterial& material, const glm::uvec3& t,
                    const Corners& corners) const;
-  static void set_blend(Look& look, const std::array<glm::u8vec4, 3>& colours);
 };
 
 bool SurfaceColours::Impl::find_corners(std::uint64_t element, const glm::uvec3& t,
@@ -124,7 +126,7 @@ bool SurfaceColours::Impl::find_corners(std::uint64_t element, const glm::uvec3&
 
 void SurfaceColours::Impl::set_texture(Look& look, const SurfaceMaterial& material,
                                        const glm::uvec3& t, const Corners& corners) const {
-  look.kind = Look::Kind::kTexture;
+  look.has_texture = true;
   look.texture = material.texture;
   const MipMap& map = textures[material.texture];
   const glm::dvec2 size(map.width(), map.height());
@@ -137,12 +139,6 @@ void SurfaceColours::Impl::set_texture(Look& look, const SurfaceMaterial& materi
     texels[i] = look.at[i] * size;
     points[i] = mesh->positions[t[static_cast<int>(i)]] / options.footprint;
   }
-  // A plain colour is of 8 bits, as it is without a texture.
-  const glm::u8vec4 colour = rounded(material.colour);
-  const std::array<float, 256>& light = linear_light();
-  const float alpha = static_cast<float>(colour.w) / 255.0f;
-  look.factor = glm::vec4(light[colour.x], light[colour.y], light[colour.z], 1.0f) * alpha;
-
   const Stretch stretch = stretch_of(points, texels);
   const double most = std::min(stretch.most, std::max(size.x, size.y));
   const double least = std::max(std::min(stretch.least, most), 1.0);
@@ -152,20 +148,42 @@ void SurfaceColours::Impl::set_texture(Look& look, const SurfaceMaterial& materi
   look.step = stretch.direction * (most / look.probes) / size;
 }
 
-void SurfaceColours::Impl::set_blend(Look& look, const std::array<glm::u8vec4, 3>& colours) {
-  look.flat = colours[0];
-  if (look.flat.w == 0) look.flat = glm::u8vec4(0);
-  if (colours[0] == colours[1] && colours[1] == colours[2]) return;
-  look.kind = Look::Kind::kBlend;
-  for (std::size_t i = 0; i < 3; ++i) look.lights[i] = light_of(colours[i]);
+bool SurfaceColours::Impl::set_colours(Look& look, std::uint64_t element, const glm::uvec3& t,
+                                       const SurfaceMaterial* material,
+                                       const Corners* corners) const {
+  bool given = false;
+  if (material != nullptr && material->coloured) {
+    look.factor = light_of(rounded(material->colour));
+    given = true;
+  }
+  if (element < attributes->element_colours.size()) {
+    look.factor *= light_of(attributes->element_colours[element]);
+    given = true;
+  }
+  look.lights.fill(look.factor);
+  const auto& of_vertices = attributes->vertex_colours;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::uint32_t vertex = t[static_cast<int>(i)];
+    if (vertex < of_vertices.size()) {
+      look.lights[i] *= light_of(of_vertices[vertex]);
+      given = true;
+    }
+    if (corners != nullptr && attributes->corner_colours) {
+      look.lights[i] *= light_of((*corners)[i]->colour);
+      given = true;
+    }
+  }
+  look.factor = look.lights[0];
+  look.has_blend = look.lights[0] != look.lights[1] || look.lights[1] != look.lights[2];
+  return given;
 }
 
 Look SurfaceColours::Impl::look(std::uint32_t triangle) const {
   Look look;
   look.triangle = triangle;
   if (!triangle_colours.empty()) {
-    set_blend(look,
-              {triangle_colours[triangle], triangle_colours[triangle], triangle_colours[triangle]});
+    look.flat = triangle_colours[triangle];
+    if (look.flat.w == 0) look.flat = glm::u8vec4(0);
     return look;
   }
   const glm::uvec3 t = mesh->triangles[triangle];
@@ -177,29 +195,19 @@ Look SurfaceColours::Impl::look(std::uint32_t triangle) const {
                                         : nullptr;
   Corners corners{};
   const bool has_corners = !attributes->corners.empty() && find_corners(element, t, corners);
+  bool given = set_colours(look, element, t, material, has_corners ? &corners : nullptr);
   if (has_corners && material != nullptr && material->texture < textures.size()) {
     set_texture(look, *material, t, corners);
-    return look;
+    given = true;
   }
-  glm::u8vec4 flat = options.none;
+  look.is_flat = !look.has_texture && !look.has_blend;
+  if (!look.is_flat) return look;
+  look.flat = colour_of(look.factor);
+  if (given) return look;
   const std::uint32_t part = attributes->part_of(element);
-  if (has_corners && attributes->corner_colours) {
-    set_blend(look, {corners[0]->colour, corners[1]->colour, corners[2]->colour});
-    return look;
-  }
-  const auto& of_vertices = attributes->vertex_colours;
-  if (t.x < of_vertices.size() && t.y < of_vertices.size() && t.z < of_vertices.size()) {
-    set_blend(look, {of_vertices[t.x], of_vertices[t.y], of_vertices[t.z]});
-    return look;
-  }
-  if (element < attributes->element_colours.size()) {
-    flat = attributes->element_colours[element];
-  } else if (material != nullptr && material->coloured) {
-    flat = rounded(material->colour);
-  } else if (part < attributes->parts.size() && attributes->parts[part].colour) {
-    flat = rounded(*attributes->parts[part].colour);
-  }
-  set_blend(look, {flat, flat, flat});
+  const bool has_part = part < attributes->parts.size() && attributes->parts[part].colour;
+  look.flat = has_part ? rounded(*attributes->parts[part].colour) : options.none;
+  if (look.flat.w == 0) look.flat = glm::u8vec4(0);
   return look;
 }
 
@@ -219,22 +227,24 @@ SurfaceColours::Probe::~Probe() = default;
 glm::u8vec4 SurfaceColours::Probe::colour(std::uint32_t triangle, const glm::dvec3& weights) {
   Look& look = cache_->looks[triangle & (Cache::kLooks - 1)];
   if (look.triangle != triangle) look = cache_->impl->look(triangle);
-  if (look.kind == Look::Kind::kFlat) return look.flat;
-  if (look.kind == Look::Kind::kBlend) {
+  if (look.is_flat) return look.flat;
+  glm::vec4 light = look.factor;
+  if (look.has_blend) {
+    light = look.lights[0] * static_cast<float>(weights.x) +
+            look.lights[1] * static_cast<float>(weights.y) +
+            look.lights[2] * static_cast<float>(weights.z);
+  }
+  if (look.has_texture) {
+    const MipMap& map = cache_->impl->textures[look.texture];
+    const glm::dvec2 middle =
+        look.at[0] * weights.x + look.at[1] * weights.y + look.at[2] * weights.z;
     glm::vec4 sum(0.0f);
-    for (std::size_t i = 0; i < 3; ++i) {
-      sum += look.lights[i] * static_cast<float>(weights[static_cast<int>(i)]);
+    for (int i = 0; i < look.probes; ++i) {
+      sum += map.sample(middle + look.step * (i + 0.5 - 0.5 * look.probes), look.level);
     }
-    return colour_of(sum);
+    light *= sum * (1.0f / static_cast<float>(look.probes));
   }
-  const MipMap& map = cache_->impl->textures[look.texture];
-  const glm::dvec2 middle =
-      look.at[0] * weights.x + look.at[1] * weights.y + look.at[2] * weights.z;
-  glm::vec4 sum(0.0f);
-  for (int i = 0; i < look.probes; ++i) {
-    sum += map.sample(middle + look.step * (i + 0.5 - 0.5 * look.probes), look.level);
-  }
-  return colour_of(sum * (1.0f / static_cast<float>(look.probes)) * look.factor);
+  return colour_of(light);
 }
 
 SurfaceColours::SurfaceColours(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}

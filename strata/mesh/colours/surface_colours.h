@@ -14,20 +14,21 @@
 
 namespace strata {
 
-/// The colour of any point of a surface. The first of these that is given counts: the texture of
-/// the face's material, times the material's colour; the colours of the face's corners, of its
-/// vertices, of the face; the colour of its material, of its part; SurfaceColourOptions::none.
-/// Colours of vertices are interpolated, and textures are filtered, in linear light and weighted by
-/// alpha.
-///
-/// Textures are filtered by box-filtered mip maps, trilinear, with up to 16 probes where a texture
-/// is stretched: a colour is the mean over a box of about the footprint's size.
+/// Settings of SurfaceColours.
 struct SurfaceColourOptions {
   glm::u8vec4 none{204, 204, 204, 255};  ///< where no colour is given; sRGB, straight alpha
   /// World lengths of the box along x, y, z whose mean is asked for, such as a voxel.
   glm::dvec3 footprint{1.0};
 };
 
+/// The colour of any point of a surface: the product, in linear light, of all that a file gives for
+/// it: the texture and the colour of the face's material, the colours of the face, of its vertices
+/// and of its corners. Without any of them it is the colour of the part, or
+/// SurfaceColourOptions::none. Colours of vertices and corners are interpolated, and textures are
+/// filtered, in linear light and weighted by alpha.
+///
+/// Textures are filtered by box-filtered mip maps, trilinear, with up to 16 probes where a texture
+/// is stretched: a colour is the mean over a box of about the footprint's size.
 class SurfaceColours {
  public:
   /// Makes the mip maps of the textures. The mesh and the attributes must outlive this object.

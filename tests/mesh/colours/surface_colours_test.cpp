@@ -140,7 +140,7 @@ TEST(SurfaceColours, ColoursOfVerticesAreInterpolatedInLight) {
   expect_near(probe.colour(0, {0, 0.5, 0.5}), {255, 188, 188, 255}, 0);
 }
 
-TEST(SurfaceColours, TheMoreSpecialColourCounts) {
+TEST(SurfaceColours, AllThatIsGivenIsMultipliedAndElseThePartCounts) {
   TriangleSoup soup;
   soup.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
   soup.triangles = {{0, 2, 1}};  // reversed: the element is still number 5
@@ -157,17 +157,21 @@ TEST(SurfaceColours, TheMoreSpecialColourCounts) {
   attributes.material_ranges = {{3, 0}};
   EXPECT_EQ(colour(), text(kBlue)) << "the material has no colour";
   attributes.materials[0].coloured = true;
-  attributes.materials[0].colour = glm::vec4(0, 1, 0, 1);
-  EXPECT_EQ(colour(), text(kGreen));
-  attributes.element_colours.assign(6, kWhite);
-  attributes.element_colours[5] = kYellow;
+  attributes.materials[0].colour = glm::vec4(1, 1, 0, 1);
   EXPECT_EQ(colour(), text(kYellow));
-  attributes.vertex_colours.assign(3, kBlack);
-  EXPECT_EQ(colour(), text(kBlack));
+  attributes.element_colours.assign(6, kBlack);
+  attributes.element_colours[5] = glm::u8vec4(188, 255, 255, 255);
+  EXPECT_EQ(colour(), "188 255 0 255");
+  attributes.vertex_colours.assign(3, glm::u8vec4(188, 255, 255, 255));
+  EXPECT_EQ(colour(), "138 255 0 255") << "a quarter of the light";
   attributes.corner_colours = true;
   attributes.corner_offsets = {0, 0, 0, 0, 0, 0, 3};
   attributes.corners = {{0, {}, kRed}, {1, {}, kRed}, {2, {}, kRed}};
-  EXPECT_EQ(colour(), text(kRed));
+  EXPECT_EQ(colour(), "138 0 0 255");
+  attributes.element_colours.clear();
+  attributes.vertex_colours.clear();
+  attributes.corners[1].colour = kGreen;  // its weight is 1/2, since corners are found by vertex
+  EXPECT_EQ(colour(), "188 188 0 255");
 }
 
 TEST(SurfaceColours, PlainColoursOf8BitsStayAsTheyAre) {
