@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "voxelize/output/block_output.h"
+#include "voxelize/output/palette.h"
 #include "voxelize/output/slab_writer.h"
 #include "voxelize/output/writers.h"
 
@@ -57,11 +58,12 @@ struct Model {
 
 class VoxWriter final : public SlabWriter {
  public:
-  VoxWriter(const std::string& path, const VoxelGrid& grid, std::vector<glm::u8vec4> palette,
+  VoxWriter(const std::string& path, const VoxelGrid& grid, const VoxelWriterOptions& options,
             BlockOutput output)
       : SlabWriter(path, grid, Axis::kZ),
         output_(std::move(output)),
-        palette_(std::move(palette)),
+        rgba_(options.rgba),
+        palette_(options.colours),
         models_along_((grid.dims + kModelSide - 1) / kModelSide) {
     for (int y = 0; y < models_along_.y; ++y) {
       for (int x = 0; x < models_along_.x; ++x) {
@@ -80,6 +82,7 @@ class VoxWriter final : public SlabWriter {
     std::vector<std::uint32_t> offsets;
     std::vector<Interval> items;
     std::vector<std::uint8_t> colours;  // of the items, or none
+    std::vector<std::uint32_t> rgba;    // of the items, until there is a palette
   };
 
   [[nodiscard]] Model& model_of(const Tile& tile, int z) {
@@ -88,28 +91,28 @@ class VoxWriter final : public SlabWriter {
                                             z / kModelSide)];
   }
 
-  Result<void> add_slab(const VoxelIntervals& slab, const Execution&) override {
+  Result<void> add_slab(const VoxelIntervals& slab, const Execution& execution) override {
+    counts_.resize(std::max(counts_.size(), static_cast<std::size_t>(execution.thread_count())));
+    const std::size_t before = tiles_.size();
     for (int tv = 0; tv < slab.tiles_v(); ++tv) {
       for (int tu = 0; tu < slab.tiles_u(); ++tu) {
-        const VoxelIntervals::TileView view = slab.tile(tu, tv);
-        if (view.items.empty()) continue;
-        Tile tile{tu,
-                  slab.v_begin() / VoxelIntervals::kTileSide + tv,
-                  {view.offsets.begin(), view.offsets.end()},
-                  {view.items.begin(), view.items.end()},
-                  {}};
-        for (const std::uint32_t label : view.labels) {
-          tile.colours.push_back(static_cast<std::uint8_t>(label));
+        if (slab.tile_empty(tu, tv)) continue;
+        tiles_.push_back({tu, slab.v_begin() / VoxelIntervals::kTileSide + tv, {}, {}, {}, {}});
+      }
+    }
+    parallel_for(execution, tiles_.size() - before, [&](std::size_t index, int worker) {
+      Tile& tile = tiles_[before + index];
+      keep(slab.tile(tile.u, tile.v - slab.v_begin() / VoxelIntervals::kTileSide), tile,
+           counts_[static_cast<std::size_t>(worker)]);
+    });
+    for (std::size_t i = before; i < tiles_.size(); ++i) {
+      for (const Interval& interval : tiles_[i].items) {
+        total_ += static_cast<std::uint64_t>(interval.length());
+        for (int z = interval.begin(); z < interval.end();) {
+          const int end = std::min(interval.end(), (z / kModelSide + 1) * kModelSide);
+          model_of(tiles_[i], z).voxels += static_cast<std::uint64_t>(end - z);
+          z = end;
         }
-        for (const Interval& interval : view.items) {
-          total_ += static_cast<std::uint64_t>(interval.length());
-          for (int z = interval.begin(); z < interval.end();) {
-            const int end = std::min(interval.end(), (z / kModelSide + 1) * kModelSide);
-            model_of(tile, z).voxels += static_cast<std::uint64_t>(end - z);
-            z = end;
-          }
-        }
-        tiles_.push_back(std::move(tile));
       }
     }
     if (total_ * 4 > kLargestFile) {
@@ -119,7 +122,42 @@ class VoxWriter final : public SlabWriter {
     return {};
   }
 
+  void keep(const VoxelIntervals::TileView& view, Tile& tile, ColourCounts& counts) const {
+    tile.offsets.assign(view.offsets.begin(), view.offsets.end());
+    tile.items.assign(view.items.begin(), view.items.end());
+    if (rgba_) {
+      tile.rgba.assign(view.labels.begin(), view.labels.end());
+      for (std::size_t i = 0; i < tile.rgba.size(); ++i) {
+        counts.add(tile.rgba[i], static_cast<std::uint64_t>(tile.items[i].length()));
+      }
+      return;
+    }
+    tile.colours.reserve(view.labels.size());
+    for (const std::uint32_t label : view.labels) {
+      tile.colours.push_back(static_cast<std::uint8_t>(label));
+    }
+  }
+
+  /// Few colours for those of the voxels.
+  void choose_palette(const Execution& execution) {
+    ColourCounts all;
+    for (const ColourCounts& counts : counts_) all.add(counts);
+    counts_.clear();
+    const Palette chosen = all.palette(kVoxColours, execution);
+    palette_ = chosen.colours();
+    parallel_for(execution, tiles_.size(), [&](std::size_t index, int) {
+      Tile& tile = tiles_[index];
+      tile.colours.reserve(tile.rgba.size());
+      for (const std::uint32_t colour : tile.rgba) {
+        tile.colours.push_back(static_cast<std::uint8_t>(chosen.index_of(colour) + 1));
+      }
+      tile.rgba = {};
+    });
+  }
+
   Result<void> finish_output(const Execution& execution) override {
+    if (rgba_) choose_palette(execution);
+    if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
     const bool one = models_.size() == 1;
     std::vector<Model> kept;
     for (const Model& model : models_) {
@@ -184,7 +222,14 @@ class VoxWriter final : public SlabWriter {
   // x, y, z within the model, colour: a byte each.
   static void make_voxels(const Tile& tile, const Model& model, Bytes& out) {
     constexpr int kSide = VoxelIntervals::kTileSide;
-    out.clear();
+    std::size_t voxels = 0;
+    for (const Interval& interval : tile.items) {
+      const int begin = std::max(interval.begin() - model.begin.z, 0);
+      const int end = std::min(interval.end() - model.begin.z, kModelSide);
+      voxels += static_cast<std::size_t>(std::max(end - begin, 0));
+    }
+    out.resize(4 * voxels);
+    std::byte* to = out.data();
     for (int local = 0; local < kSide * kSide; ++local) {
       const int x = tile.u * kSide + local % kSide - model.begin.x;
       const int y = tile.v * kSide + local / kSide - model.begin.y;
@@ -194,7 +239,8 @@ class VoxWriter final : public SlabWriter {
         const int end = std::min(tile.items[i].end() - model.begin.z, kModelSide);
         const int colour = tile.colours.empty() ? kColour : tile.colours[i];
         for (int z = begin; z < end; ++z) {
-          for (const int byte : {x, y, z, colour}) out.push_back(static_cast<std::byte>(byte));
+          const int bytes[4] = {x, y, z, colour};
+          for (const int byte : bytes) *to++ = static_cast<std::byte>(byte);
         }
       }
     }
@@ -235,6 +281,8 @@ class VoxWriter final : public SlabWriter {
   }
 
   BlockOutput output_;
+  bool rgba_;                         // labels are colours
+  std::vector<ColourCounts> counts_;  // of them, by worker
   std::vector<glm::u8vec4> palette_;  // none: MagicaVoxel's
   glm::ivec3 models_along_;
   std::vector<Model> models_;
@@ -254,7 +302,7 @@ VoxelWriterResult open_vox_writer(const std::string& path, const VoxelGrid& grid
   }
   Result<BlockOutput> output = BlockOutput::create(path);
   if (!output) return tl::unexpected(output.error());
-  return std::make_unique<VoxWriter>(path, grid, options.colours, std::move(*output));
+  return std::make_unique<VoxWriter>(path, grid, options, std::move(*output));
 }
 
 }  // namespace strata
