@@ -209,6 +209,13 @@ void define_voxelize(CLI::App& app, Words& words) {
   option(app, output, "--band", words.band, "N|all",
          "With --sdf: voxels to each side of the surface that have their distance, 0.5 to 1024; "
          "others have the band's (default: 3). all: every voxel has its own, not in a .vdb");
+  flag(app, output, "--colours,--colors", words.voxel_colours,
+       "Give each voxel the colour of the nearest point of the surface: textures, materials, "
+       "vertices; in a scene the colour of its solid");
+  option(
+      app, output, "--fill-colour,--fill-color", words.fill_colour, "COLOUR",
+      "Colour of what lies deeper in a solid than a voxel: white, #8080ff ... (default: #808080, "
+      "in a scene the colour of the solid)");
   option(app, output, "--name", words.name, "NAME",
          "Name of the grid in a .vdb, .nrrd or .vti (default: density, ids, surface or solid)");
   flag(app, output, "--stats", words.stats, "Print statistics");
@@ -423,6 +430,7 @@ void read_distances(const Words& words, VoxelizeCommand& command, Reader& reader
   const char* other = command.ids        ? "--ids"
                       : command.fog != 0 ? "--fog"
                       : command.mask     ? "--mask"
+                      : command.colours  ? "--colours"
                       : command.surface  ? "--surface"
                                          : nullptr;
   if (other != nullptr) reader.fail_with(fmt::format("--sdf cannot be combined with {}", other));
@@ -453,6 +461,19 @@ void read_values(const Words& words, VoxelizeCommand& command, Reader& reader) {
     }
     command.fog = static_cast<int>(samples);
   }
+  command.colours = words.voxel_colours;
+  command.input.attributes = command.colours;
+  if (!words.fill_colour.empty()) {
+    reader.take(parse_colour("--fill-colour must be", words.fill_colour), command.fill_colour);
+    if (!command.colours) reader.fail_with("--fill-colour needs --colours");
+    if (!command.solid) reader.fail_with("--fill-colour needs a solid; remove --surface");
+  }
+  if (command.colours && (command.ids || command.fog != 0 || command.mask)) {
+    reader.fail_with(fmt::format("--colours cannot be combined with {}", command.ids ? "--ids"
+                                                                         : command.fog != 0
+                                                                             ? "--fog"
+                                                                             : "--mask"));
+  }
   const char* fog_or_mask = command.fog != 0 ? "--fog" : "--mask";
   if (command.ids && (command.surface || command.fog != 0 || command.mask)) {
     reader.fail_with(fmt::format("--ids cannot be combined with {}",
@@ -463,8 +484,10 @@ void read_values(const Words& words, VoxelizeCommand& command, Reader& reader) {
   }
   read_distances(words, command, reader);
   const bool named = command.name.has_value();
-  if (command.output.empty() && (command.fog != 0 || command.mask || named)) {
-    reader.fail_with(fmt::format("{} needs -o", named ? "--name" : fog_or_mask));
+  if (command.output.empty() && (command.fog != 0 || command.mask || named || command.colours)) {
+    reader.fail_with(fmt::format("{} needs -o", named             ? "--name"
+                                                : command.colours ? "--colours"
+                                                                  : fog_or_mask));
   }
 }
 

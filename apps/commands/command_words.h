@@ -37,9 +37,9 @@ struct Words {
   bool quiet = false, verbose = false, strict = false;
   std::string output, format, json;
   std::string resolution, voxel_size, grid, bounds, origin, padding;
-  bool align = false, solid = false, mask = false, ids = false, sdf = false,
+  bool align = false, solid = false, mask = false, ids = false, sdf = false, voxel_colours = false,
        keep_orientation = false, samples = false;
-  std::string fog, name, band;
+  std::string fog, name, band, fill_colour;
   std::string surface, rule = "winding", open = "vote", axis = "auto", store = "auto",
                        offsets = "plane-first", backend = "auto";
   bool stats = false, checksum = false, dry_run = false, show = false, list_formats = false,

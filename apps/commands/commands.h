@@ -43,11 +43,13 @@ struct VoxelizeCommand {
   int fog = 0;                  ///< samples along a voxel's side of a fog volume; 0: none
   bool fog_by_default = false;  ///< of which no number was given
   bool mask = false;
-  bool ids = false;                 ///< values say which solid
-  bool sdf = false;                 ///< values are signed distances
-  double band = 3.0;                ///< of those, in voxels to each side of the surface
-  bool band_all = false;            ///< all voxels have their distance
-  std::optional<std::string> name;  ///< of the grid in the file
+  bool ids = false;                        ///< values say which solid
+  bool sdf = false;                        ///< values are signed distances
+  double band = 3.0;                       ///< of those, in voxels to each side of the surface
+  bool band_all = false;                   ///< all voxels have their distance
+  bool colours = false;                    ///< values are colours of the surface
+  std::optional<glm::u8vec3> fill_colour;  ///< of what is not near the surface; sRGB
+  std::optional<std::string> name;         ///< of the grid in the file
   GridRequest grid;
   bool default_size = false;  ///< the grid has kDefaultResolution, since no size was given
   bool solid = true, surface = false;

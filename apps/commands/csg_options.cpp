@@ -82,8 +82,9 @@ constexpr NamedColour kColours[] = {
     {"navy", {0, 0, 128}},      {"blue", {0, 0, 255}},       {"teal", {0, 128, 128}},
     {"aqua", {0, 255, 255}},    {"orange", {255, 165, 0}}};
 
-/// `white`, `#ffffff` or `#fff`.
-Result<glm::u8vec3> parse_background_colour(std::string_view text) {
+}  // namespace
+
+Result<glm::u8vec3> parse_colour(std::string_view must, std::string_view text) {
   for (const NamedColour& one : kColours) {
     if (one.name == text) return one.colour;
   }
@@ -102,11 +103,11 @@ Result<glm::u8vec3> parse_background_colour(std::string_view text) {
   }
   std::string names;
   for (const NamedColour& one : kColours) names += fmt::format(", {}", one.name);
-  return fail(ErrorCode::kUsage,
-              "--background must be gradient, transparent or a colour, got '{}'; a colour is "
-              "#rrggbb or one of{}",
+  return fail(ErrorCode::kUsage, "{} a colour, got '{}'; a colour is #rrggbb or one of{}", must,
               text, names.substr(1));
 }
+
+namespace {
 
 /// --background and --transparent; nothing: the colour scheme's.
 Result<std::optional<Backdrop>> read_background(const CsgWords& words,
@@ -120,7 +121,7 @@ Result<std::optional<Backdrop>> read_background(const CsgWords& words,
   if (text == "gradient") {
     return gradient_backdrop((scheme != nullptr ? *scheme : csg::default_scheme()).background);
   }
-  const auto colour = parse_background_colour(text);
+  const auto colour = parse_colour("--background must be gradient, transparent or", text);
   if (!colour) return tl::unexpected(colour.error());
   return plain_backdrop(*colour);
 }

@@ -38,6 +38,10 @@ Result<void> read_picture_options(const CsgWords& words, PictureRequest& request
 /// @return kUsage
 Result<void> read_csg_options(const CsgWords& words, CsgCommand& command);
 
+/// `white`, `#ffffff` or `#fff`, sRGB. @param must begins the message: "--background must be"
+/// @return kUsage
+Result<glm::u8vec3> parse_colour(std::string_view must, std::string_view text);
+
 /// A camera as OpenSCAD's --camera has it: seven numbers, target, rotation and distance, or six,
 /// eye and target. @return kUsage
 Result<Camera> parse_camera(std::string_view text);

@@ -55,6 +55,11 @@ Result<std::optional<VoxelFormat>> output_format(const VoxelizeCommand& command)
   if (command.ids) {
     if (auto held = check_ids(*format, 1); !held) return tl::unexpected(held.error());
   }
+  if (command.colours) {
+    VoxelWriterOptions colours;
+    colours.rgba = true;
+    if (auto held = check_values(*format, colours); !held) return tl::unexpected(held.error());
+  }
   if (command.sdf) {
     VoxelWriterOptions distances;
     distances.band = 1.0f;

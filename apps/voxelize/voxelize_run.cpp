@@ -11,6 +11,7 @@
 #include "apps/commands/choice_words.h"
 #include "apps/session/report.h"
 #include "apps/strata/library_session.h"
+#include "apps/voxelize/colouring.h"
 #include "apps/voxelize/distance_surface.h"
 #include "strata/csg/input/solid_input.h"
 #include "strata/csg/picture/picture.h"
@@ -98,7 +99,7 @@ std::optional<std::uint64_t> size_of_file(const std::string& path) {
 /// Has the solids of a scene labelled, by number or by colour, when the format is to hold that.
 void label_solids(const VoxelizeCommand& command, VoxelizeOutcome& outcome,
                   VoxelWriterOptions& options, Session& session) {
-  if (!outcome.input.tree) return;
+  if (!outcome.input.tree || command.colours) return;
   const csg::Tree& scene = *outcome.input.scene;
   if (command.ids) {
     // Solids that are taken away have numbers, too, but no voxel has them.
@@ -196,6 +197,8 @@ class VoxelizeRun {
   Result<void> finish();
   template <class Add>
   Result<void> write(Add&& add);
+  Result<void> take(const VoxelIntervals& slab);
+  Result<void> take_coloured(const VoxelIntervals& slab);
   void tell(const VoxelizeReport& report, const std::optional<BoundaryArea>& boundary);
 
   const VoxelizeCommand& command_;
@@ -204,9 +207,19 @@ class VoxelizeRun {
   int samples_;  ///< along a voxel's side
   std::unique_ptr<VoxelWriter> writer_;
   std::unique_ptr<csg::Gpu> gpu_;
+  std::optional<Colouring> colouring_;
   VoxelizeOptions options_;
   Execution execution_, quiet_;  ///< of the voxels; without progress
   double write_ms_ = 0;
+  std::uint64_t solid_voxels_ = 0;
+  std::optional<BoundaryArea> boundary_;
+  /// Statistics of coloured slabs that may have lost voxels.
+  struct Left {
+    explicit Left(const VoxelGrid& grid) : checksum(grid) {}
+    std::uint64_t voxels = 0, intervals = 0;
+    SetChecksum checksum;
+  };
+  std::optional<Left> left_out_;
 };
 
 Result<void> VoxelizeRun::open() {
@@ -251,25 +264,47 @@ Result<void> VoxelizeRun::write(Add&& add) {
   return done;
 }
 
+Result<void> VoxelizeRun::take(const VoxelIntervals& slab) {
+  if (!options_.statistics) solid_voxels_ += slab.solid_voxels();
+  if (boundary_) boundary_->add(slab, quiet_);
+  if (command_.ids) count_ids(slab, outcome_.id_voxels);
+  if (samples_ > 1) return {};
+  return write([&](VoxelWriter& writer) { return writer.add(slab, quiet_); });
+}
+
+Result<void> VoxelizeRun::take_coloured(const VoxelIntervals& slab) {
+  const auto coloured = colouring_->colour(slab, quiet_);
+  if (!coloured) return tl::unexpected(coloured.error());
+  if (!left_out_) return take(*coloured);
+  left_out_->voxels += coloured->solid_voxels();
+  left_out_->intervals += coloured->interval_count();
+  left_out_->checksum.add(*coloured, quiet_);
+  return take(*coloured);
+}
+
 Result<void> VoxelizeRun::voxelize() {
-  std::uint64_t solid_voxels = 0;
-  std::optional<BoundaryArea> boundary;
-  if (command_.stats || command_.json) boundary.emplace(outcome_.grid, outcome_.axis);
-  const auto sink = [&](const VoxelIntervals& slab) -> Result<void> {
-    if (!options_.statistics) solid_voxels += slab.solid_voxels();
-    if (boundary) boundary->add(slab, quiet_);
-    if (command_.ids) count_ids(slab, outcome_.id_voxels);
-    if (samples_ > 1) return {};
-    return write([&](VoxelWriter& writer) { return writer.add(slab, quiet_); });
-  };
+  if (command_.stats || command_.json) boundary_.emplace(outcome_.grid, outcome_.axis);
   VoxelGrid finest = outcome_.grid;
   finest.dims *= std::max(1, samples_), finest.voxel_size /= std::max(1, samples_);
+  if (command_.colours) {
+    auto made = Colouring::create(command_, outcome_, quiet_, session_);
+    if (!made) return tl::unexpected(made.error());
+    colouring_ = *std::move(made);
+    if (options_.statistics && colouring_->leaves_out()) left_out_.emplace(outcome_.grid);
+  }
   if (auto done = outcome_.input.fit(finest, quiet_); !done) return done;
-  auto report = voxelize_slabs(outcome_.input.soup, outcome_.grid, options_, execution_, sink);
+  auto report = voxelize_slabs(
+      outcome_.input.soup, outcome_.grid, options_, execution_,
+      [this](const VoxelIntervals& slab) { return colouring_ ? take_coloured(slab) : take(slab); });
   if (!report) return tl::unexpected(report.error());
   if (session_.interrupted()) return fail(ErrorCode::kCancelled, "stopped");
-  if (!options_.statistics) report->solid_voxels = solid_voxels;
-  tell(*report, boundary);
+  if (!options_.statistics) report->solid_voxels = solid_voxels_;
+  if (left_out_) {
+    report->solid_voxels = left_out_->voxels;
+    report->intervals = left_out_->intervals;
+    report->checksum = left_out_->checksum.value();
+  }
+  tell(*report, boundary_);
   return {};
 }
 
@@ -356,7 +391,8 @@ VoxelWriterOptions writer_options(const VoxelizeCommand& command, VoxelizeOutcom
     const double band = band_in_world(outcome.grid, command.band);
     file.band = command.band_all ? INFINITY : static_cast<float>(band);
   }
-  if (!command.solid && samples == 0) file.name = "surface";
+  file.rgba = command.colours;
+  if (!command.solid && samples == 0 && !command.colours) file.name = "surface";
   if (command.name) file.name = *command.name;
   label_solids(command, outcome, file, session);
   return file;

@@ -77,7 +77,7 @@ void append_common(std::span<const Interval> a, std::span<const Interval> b,
 
 }  // namespace
 
-struct VoxelColours::Impl {
+struct VoxelColouring::Impl {
   VoxelGrid grid;
   VoxelColourOptions options;
   LatticeMesh mesh;
@@ -94,7 +94,7 @@ struct VoxelColours::Impl {
 };
 
 /// Of a surface all voxels are near it; of a solid those are looked for.
-bool VoxelColours::Impl::find_near(const VoxelIntervals::TileView& tile, const glm::ivec3& size,
+bool VoxelColouring::Impl::find_near(const VoxelIntervals::TileView& tile, const glm::ivec3& size,
                                    Worker& worker) const {
   if (!options.solid) return worker.near.reset(tile.offsets, tile.items);
   worker.collector.clear();
@@ -118,7 +118,7 @@ bool VoxelColours::Impl::find_near(const VoxelIntervals::TileView& tile, const g
   return worker.near.reset(worker.near_offsets, worker.near_items);
 }
 
-void VoxelColours::Impl::find_nearest(const glm::ivec3& size, Worker& worker) const {
+void VoxelColouring::Impl::find_nearest(const glm::ivec3& size, Worker& worker) const {
   constexpr double kScale = 2147483648.0;  // the square of the farthest is 1
   const double most = reach() * reach() + 1e-9;
   NearVoxels& near = worker.near;
@@ -142,7 +142,7 @@ void VoxelColours::Impl::find_nearest(const glm::ivec3& size, Worker& worker) co
   }
 }
 
-void VoxelColours::Impl::append(int first, int last, std::uint32_t label, Worker& worker) const {
+void VoxelColouring::Impl::append(int first, int last, std::uint32_t label, Worker& worker) const {
   const bool starts = worker.items.size() == worker.offsets.back();
   if (!starts && worker.labels.back() == label && worker.items.back().last + 1 == first) {
     worker.items.back().last = static_cast<std::uint16_t>(last);
@@ -152,7 +152,7 @@ void VoxelColours::Impl::append(int first, int last, std::uint32_t label, Worker
   worker.labels.push_back(label);
 }
 
-void VoxelColours::Impl::colour_tile(const VoxelIntervals::TileView& tile,
+void VoxelColouring::Impl::colour_tile(const VoxelIntervals::TileView& tile,
                                      std::span<const std::uint32_t> numbers, Worker& worker) const {
   const NearVoxels& near = worker.near;
   const std::uint32_t inside = packed_colour(options.inside);
@@ -188,12 +188,12 @@ void VoxelColours::Impl::colour_tile(const VoxelIntervals::TileView& tile,
   }
 }
 
-VoxelColours::VoxelColours(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
-VoxelColours::VoxelColours(VoxelColours&&) noexcept = default;
-VoxelColours& VoxelColours::operator=(VoxelColours&&) noexcept = default;
-VoxelColours::~VoxelColours() = default;
+VoxelColouring::VoxelColouring(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+VoxelColouring::VoxelColouring(VoxelColouring&&) noexcept = default;
+VoxelColouring& VoxelColouring::operator=(VoxelColouring&&) noexcept = default;
+VoxelColouring::~VoxelColouring() = default;
 
-Result<VoxelColours> VoxelColours::create(const TriangleSoup& mesh, const VoxelGrid& grid,
+Result<VoxelColouring> VoxelColouring::create(const TriangleSoup& mesh, const VoxelGrid& grid,
                                           const SurfaceColours& colours,
                                           const VoxelColourOptions& options,
                                           const Execution& execution) {
@@ -204,10 +204,10 @@ Result<VoxelColours> VoxelColours::create(const TriangleSoup& mesh, const VoxelG
   impl->options = options;
   impl->mesh = *std::move(lattice);
   impl->colours = &colours;
-  return VoxelColours(std::move(impl));
+  return VoxelColouring(std::move(impl));
 }
 
-Result<VoxelIntervals> VoxelColours::colour(const VoxelIntervals& slab,
+Result<VoxelIntervals> VoxelColouring::colour(const VoxelIntervals& slab,
                                             const Execution& execution) {
   try {
     const AxisFrame frame(slab.axis());

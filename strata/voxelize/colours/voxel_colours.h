@@ -24,7 +24,7 @@ namespace strata {
           static_cast<std::uint8_t>(label >> 16), static_cast<std::uint8_t>(label >> 24)};
 }
 
-/// Settings of VoxelColours.
+/// Settings of VoxelColouring.
 struct VoxelColourOptions {
   /// The voxels are a solid: those farther than one voxel from the surface have the colour
   /// `inside`. False: the voxels of a surface, all of which have its colours; those whose colour is
@@ -40,17 +40,17 @@ struct VoxelColourOptions {
 /// outside.
 ///
 /// Distances are compared as multiples of 2^-31 square voxels.
-class VoxelColours {
+class VoxelColouring {
  public:
   /// Snaps the mesh. Keeps references to `mesh` and `colours`, whose triangles have the same
   /// numbers. @return as snap_to_lattice()
-  static Result<VoxelColours> create(const TriangleSoup& mesh, const VoxelGrid& grid,
+  static Result<VoxelColouring> create(const TriangleSoup& mesh, const VoxelGrid& grid,
                                      const SurfaceColours& colours,
                                      const VoxelColourOptions& options = {},
                                      const Execution& execution = {});
-  VoxelColours(VoxelColours&&) noexcept;
-  VoxelColours& operator=(VoxelColours&&) noexcept;
-  ~VoxelColours();
+  VoxelColouring(VoxelColouring&&) noexcept;
+  VoxelColouring& operator=(VoxelColouring&&) noexcept;
+  ~VoxelColouring();
 
   /// The voxels of a slab with their colours as labels: packed_colour(). Labels of the slab do not
   /// count. Memory grows with the voxels that have a colour of the surface. @pre slab.grid() is the
@@ -59,7 +59,7 @@ class VoxelColours {
 
  private:
   struct Impl;
-  explicit VoxelColours(std::unique_ptr<Impl> impl);
+  explicit VoxelColouring(std::unique_ptr<Impl> impl);
   std::unique_ptr<Impl> impl_;
 };
 

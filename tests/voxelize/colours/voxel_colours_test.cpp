@@ -53,7 +53,7 @@ VoxelIntervals coloured(const Case& c, const SurfaceColours& colours) {
   execution.threads = c.threads;
   const auto set = voxelize(c.mesh, c.grid, c.how, execution);
   EXPECT_TRUE(set) << set.error().message;
-  auto engine = VoxelColours::create(c.mesh, c.grid, colours, c.options, execution);
+  auto engine = VoxelColouring::create(c.mesh, c.grid, colours, c.options, execution);
   EXPECT_TRUE(engine) << engine.error().message;
   auto result = engine->colour(*set, execution);
   EXPECT_TRUE(result) << result.error().message;
@@ -109,7 +109,7 @@ class Distances {
   LatticeMesh mesh_;
 };
 
-TEST(VoxelColours, EachVoxelOfASurfaceHasTheColourOfTheNearestTriangle) {
+TEST(VoxelColouring, EachVoxelOfASurfaceHasTheColourOfTheNearestTriangle) {
   Case c;
   c.mesh = transform(make_icosphere(1, 1), glm::dmat4(1.0));  // 80 triangles
   for (auto& p : c.mesh.positions) p = {p.x, 0.7 * p.y + 0.2 * p.x, p.z + 0.1 * p.y};
@@ -131,7 +131,7 @@ TEST(VoxelColours, EachVoxelOfASurfaceHasTheColourOfTheNearestTriangle) {
   }
 }
 
-TEST(VoxelColours, OfEquallyNearTrianglesTheFirstCounts) {
+TEST(VoxelColouring, OfEquallyNearTrianglesTheFirstCounts) {
   Case c;
   c.mesh = make_box({0, 0, 0}, {4, 4, 4});
   c.grid = {{4, 4, 4}, glm::dvec3(0.0), glm::dvec3(1.0)};
@@ -150,7 +150,7 @@ TEST(VoxelColours, OfEquallyNearTrianglesTheFirstCounts) {
   }
 }
 
-TEST(VoxelColours, SixFacesOfABoxHaveTheirColours) {
+TEST(VoxelColouring, SixFacesOfABoxHaveTheirColours) {
   Case c;
   c.mesh = make_box({0, 0, 0}, {20, 20, 20});
   c.grid = {{20, 20, 20}, glm::dvec3(0.0), glm::dvec3(1.0)};
@@ -179,7 +179,7 @@ TEST(VoxelColours, SixFacesOfABoxHaveTheirColours) {
 }
 
 // The voxels of a solid that share a face with the outside are all in the shell.
-TEST(VoxelColours, WhatCanBeSeenOfASolidHasAColourOfItsSurface) {
+TEST(VoxelColouring, WhatCanBeSeenOfASolidHasAColourOfItsSurface) {
   Case c;
   c.mesh = make_torus_knot(2, 3, 0.4, 200, 24);
   c.grid = grid_of(c.mesh, 70);
@@ -212,7 +212,7 @@ TEST(VoxelColours, WhatCanBeSeenOfASolidHasAColourOfItsSurface) {
   EXPECT_GT(inner, 1000u);
 }
 
-TEST(VoxelColours, ThreadsSlabsAndAxesMakeNoDifference) {
+TEST(VoxelColouring, ThreadsSlabsAndAxesMakeNoDifference) {
   Case c;
   c.mesh = make_torus_knot(2, 3, 0.4, 300, 40);
   c.grid = grid_of(c.mesh, 150);
@@ -228,7 +228,7 @@ TEST(VoxelColours, ThreadsSlabsAndAxesMakeNoDifference) {
       c.threads = 3;
       EXPECT_EQ(voxels_of(coloured(c, colours)), one);
     }
-    auto engine = VoxelColours::create(c.mesh, c.grid, colours, c.options);
+    auto engine = VoxelColouring::create(c.mesh, c.grid, colours, c.options);
     Voxels slabs;
     Execution small;
     small.memory_limit = 24 << 20;  // several slabs
@@ -242,7 +242,7 @@ TEST(VoxelColours, ThreadsSlabsAndAxesMakeNoDifference) {
   }
 }
 
-TEST(VoxelColours, RandomTrianglesOfAllSizesAreFound) {
+TEST(VoxelColouring, RandomTrianglesOfAllSizesAreFound) {
   std::mt19937 random(1729);
   std::uniform_real_distribution<double> anywhere(-3.0, 11.0), small(-0.4, 0.4);
   for (int round = 0; round < 40; ++round) {
@@ -272,7 +272,7 @@ TEST(VoxelColours, RandomTrianglesOfAllSizesAreFound) {
   }
 }
 
-TEST(VoxelColours, TransparentVoxelsOfASurfaceAreLeftOut) {
+TEST(VoxelColouring, TransparentVoxelsOfASurfaceAreLeftOut) {
   Case c;
   c.mesh = make_box({0, 0, 0}, {6, 6, 6});
   c.grid = {{8, 8, 8}, glm::dvec3(-1.0), glm::dvec3(1.0)};
@@ -296,13 +296,13 @@ TEST(VoxelColours, TransparentVoxelsOfASurfaceAreLeftOut) {
   EXPECT_EQ(filled.size(), 216u);
 }
 
-TEST(VoxelColours, TheMemoryLimitIsKept) {
+TEST(VoxelColouring, TheMemoryLimitIsKept) {
   Case c;
   c.mesh = make_icosphere(1, 4);
   c.grid = grid_of(c.mesh, 200);
   c.how.solid = false, c.how.surface = true;
   const auto colours = SurfaceColours::of_triangles(number_colours(c.mesh.triangles.size()));
-  auto engine = VoxelColours::create(c.mesh, c.grid, colours, c.options);
+  auto engine = VoxelColouring::create(c.mesh, c.grid, colours, c.options);
   const auto set = voxelize(c.mesh, c.grid, c.how);
   Execution execution;
   execution.memory_limit = 300000;

@@ -1,0 +1,138 @@
+#include "apps/voxelize/colouring.h"
+
+#include <algorithm>
+#include <glm/common.hpp>
+#include <utility>
+
+#include "apps/voxelize/voxelize_run.h"
+#include "strata/csg/picture/picture.h"
+#include "strata/csg/solid_lists.h"
+#include "strata/raster/lattice_mesh.h"
+
+namespace strata::apps {
+namespace {
+
+constexpr std::size_t kSide = VoxelIntervals::kTileSide;
+
+glm::u8vec4 bytes_of(const glm::vec4& colour) {
+  glm::u8vec4 bytes(glm::clamp(colour, 0.0f, 1.0f) * 255.0f + 0.5f);
+  bytes.w = std::max<std::uint8_t>(bytes.w, 1);  // a solid is there even where it is transparent
+  return bytes;
+}
+
+/// Of solids that have none.
+glm::vec4 solid_colour() { return {glm::vec3(csg::colour_schemes().front().face) / 255.0f, 1.0f}; }
+
+/// The colour of each triangle of a tree: that of its solid.
+std::vector<glm::u8vec4> triangle_colours(const csg::SolidInput& input) {
+  std::vector<glm::u8vec4> of_solids, colours;
+  for (const csg::Solid& solid : input.scene->solids()) {
+    of_solids.push_back(bytes_of(csg::colour_or(solid.colour, solid_colour())));
+  }
+  colours.reserve(input.soup.triangles.size());
+  for (std::uint32_t t = 0; t < input.soup.triangles.size(); ++t) {
+    colours.push_back(of_solids[input.tree->solid_of(t)]);
+  }
+  return colours;
+}
+
+/// Parts of a mesh that does not fit the lattice are moved, and colours with them.
+Result<void> check_fit(const csg::SolidInput& input, const VoxelGrid& grid) {
+  if (!input.attributes.coloured()) return {};
+  for (const glm::dvec3& corner : {input.bounds.low, input.bounds.high}) {
+    const glm::dvec3 steps = glm::abs((corner - grid.origin) / grid.voxel_size) * 256.0 + 1.0;
+    if (glm::max(steps.x, glm::max(steps.y, steps.z)) < kMaxLatticeCoordinate) continue;
+    return fail(ErrorCode::kGeometry,
+                "{}: --colours needs a mesh within {} voxels of the grid's origin",
+                input.files.front().path, kMaxLatticeCoordinate / kLatticeSteps);
+  }
+  return {};
+}
+
+void warn_of_no_colours(const csg::SolidInput& input, Session& session) {
+  if (!input.tree && !input.attributes.coloured()) {
+    session.warn("no-colours", fmt::format("{}: no colours are given; all voxels are light grey",
+                                           input.files.front().path));
+  }
+  for (const csg::InputFacts& file : input.files) {
+    if (!input.tree || !file.attributes.coloured()) continue;
+    session.warn("no-colours",
+                 fmt::format("{}: colours of a mesh are not used in a Boolean tree; its solid has "
+                             "one colour",
+                             file.path));
+  }
+}
+
+}  // namespace
+
+Result<Colouring> Colouring::create(const VoxelizeCommand& command, VoxelizeOutcome& outcome,
+                                    const Execution& execution, Session& session) {
+  Colouring made;
+  csg::SolidInput& input = outcome.input;
+  warn_of_no_colours(input, session);
+  if (auto fits = check_fit(input, outcome.grid); !fits) return tl::unexpected(fits.error());
+  made.solid_ = !is_surface_alone(command, input);
+  const bool surface = command.surface || !made.solid_;
+  if (input.tree && !surface && !command.fill_colour) {
+    const auto parts = csg::colour_labels(*input.scene, input.scene->root(), solid_colour());
+    for (const glm::vec4& colour : parts.colours) {
+      made.colour_of_label_.push_back(packed_colour(bytes_of(colour)));
+    }
+    if (!parts.colours.empty()) input.tree->set_labels(parts.labels);
+    return made;
+  }
+  if (input.tree) {
+    made.surface_ =
+        std::make_unique<SurfaceColours>(SurfaceColours::of_triangles(triangle_colours(input)));
+  } else {
+    SurfaceColourOptions options;
+    options.footprint = outcome.grid.voxel_size;
+    auto surface_colours = SurfaceColours::make(input.soup, input.attributes, options, execution);
+    if (!surface_colours) return tl::unexpected(surface_colours.error());
+    made.surface_ = std::make_unique<SurfaceColours>(*std::move(surface_colours));
+  }
+  VoxelColourOptions options;
+  options.solid = made.solid_;
+  if (command.fill_colour) options.inside = glm::u8vec4(*command.fill_colour, 255);
+  auto voxels =
+      VoxelColouring::create(input.soup, outcome.grid, *made.surface_, options, execution);
+  if (!voxels) return tl::unexpected(voxels.error());
+  made.voxels_ = *std::move(voxels);
+  return made;
+}
+
+Result<VoxelIntervals> Colouring::colour(const VoxelIntervals& slab, const Execution& execution) {
+  if (voxels_) return voxels_->colour(slab, execution);
+  return of_labels(slab, execution);
+}
+
+VoxelIntervals Colouring::of_labels(const VoxelIntervals& slab, const Execution& execution) const {
+  VoxelIntervals result(slab.grid(), slab.axis(), slab.v_begin(), slab.v_end());
+  const auto tiles_u = static_cast<std::size_t>(slab.tiles_u());
+  parallel_for(
+      execution, tiles_u * static_cast<std::size_t>(slab.tiles_v()), [&](std::size_t index, int) {
+        const int tu = static_cast<int>(index % tiles_u), tv = static_cast<int>(index / tiles_u);
+        const VoxelIntervals::TileView tile = slab.tile(tu, tv);
+        if (tile.items.empty()) return;
+        std::vector<std::uint32_t> offsets{0}, labels;
+        std::vector<Interval> items;
+        for (std::size_t local = 0; local < kSide * kSide; ++local) {
+          for (std::uint32_t i = tile.offsets[local]; i < tile.offsets[local + 1]; ++i) {
+            const std::uint32_t colour = colour_of_label_[tile.label(i) - 1];
+            const bool joins = items.size() > offsets.back() && labels.back() == colour &&
+                               items.back().end() == tile.items[i].begin();
+            if (joins) {
+              items.back().last = tile.items[i].last;
+            } else {
+              items.push_back(tile.items[i]);
+              labels.push_back(colour);
+            }
+          }
+          offsets.push_back(static_cast<std::uint32_t>(items.size()));
+        }
+        result.set_tile(tu, tv, offsets, items, labels);
+      });
+  return result;
+}
+
+}  // namespace strata::apps
