@@ -59,6 +59,9 @@ VoxelWriterResult open_format(const std::string& path, const std::string& name,
   if (name == "nii.gz") return open_nifti_writer(path, grid, options, true);
   if (name == "tif") return open_tiff_writer(path, grid, options);
   if (name == "zarr") return open_zarr_writer(path, grid, options);
+  if (name == "ply") return open_ply_writer(path, grid, options);
+  if (name == "xyz") return open_xyz_writer(path, grid, options);
+  if (name == "schem") return open_schem_writer(path, grid, options);
   return fail(ErrorCode::kInternal, "format {} has no writer", name);
 }
 

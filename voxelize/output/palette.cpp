@@ -6,24 +6,12 @@
 #include <glm/vec3.hpp>
 
 #include "core/srgb.h"
+#include "voxelize/output/oklab.h"
 
 namespace strata {
 namespace {
 
 constexpr double kOne = 65535.0;  // light 1
-
-/// Where colours that look equally different are equally far from each other.
-glm::vec3 oklab(const glm::dvec3& light) {
-  const double l =
-      std::cbrt(0.4122214708 * light.x + 0.5363325363 * light.y + 0.0514459929 * light.z);
-  const double m =
-      std::cbrt(0.2119034982 * light.x + 0.6806995451 * light.y + 0.1073969566 * light.z);
-  const double s =
-      std::cbrt(0.0883024619 * light.x + 0.2817188376 * light.y + 0.6299787005 * light.z);
-  return {static_cast<float>(0.2104542553 * l + 0.7936177850 * m - 0.0040720468 * s),
-          static_cast<float>(1.9779984951 * l - 2.4285922050 * m + 0.4505937099 * s),
-          static_cast<float>(0.0259040371 * l + 0.7827717662 * m - 0.8086757660 * s)};
-}
 
 /// The mean colour of a cell.
 struct Shade {

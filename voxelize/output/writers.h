@@ -15,6 +15,12 @@ inline constexpr std::size_t kVoxColours = 255;
 
 VoxelWriterResult open_vdb_writer(const std::string& path, const VoxelGrid& grid,
                                   const VoxelWriterOptions& options);
+VoxelWriterResult open_ply_writer(const std::string& path, const VoxelGrid& grid,
+                                  const VoxelWriterOptions& options);
+VoxelWriterResult open_xyz_writer(const std::string& path, const VoxelGrid& grid,
+                                  const VoxelWriterOptions& options);
+VoxelWriterResult open_schem_writer(const std::string& path, const VoxelGrid& grid,
+                                    const VoxelWriterOptions& options);
 VoxelWriterResult open_png_writer(const std::string& path, const VoxelGrid& grid,
                                   const VoxelWriterOptions& options);
 VoxelWriterResult open_npy_writer(const std::string& path, const VoxelGrid& grid,
