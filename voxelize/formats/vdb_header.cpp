@@ -93,12 +93,15 @@ std::string vdb_header_bytes(const VdbHeader& header) {
   put(bytes, std::uint32_t{1});  // grids
 
   put_text(bytes, header.name);
-  put_text(bytes, header.values == VdbValues::kMask   ? "Tree_mask_5_4_3"
-                  : header.values == VdbValues::kBool ? "Tree_bool_5_4_3"
-                                                      : "Tree_float_5_4_3");
+  put_text(bytes, header.values == VdbValues::kMask    ? "Tree_mask_5_4_3"
+                  : header.values == VdbValues::kBool  ? "Tree_bool_5_4_3"
+                  : header.values == VdbValues::kFloat ? "Tree_float_5_4_3"
+                                                       : "Tree_vec3s_5_4_3");
   put_text(bytes, "");  // not an instance of another grid
 
-  const bool zip = header.values == VdbValues::kFloat && !header.level_set;
+  const bool numbers =
+      header.values == VdbValues::kFloat || header.values == VdbValues::kColour;
+  const bool zip = numbers && !header.level_set;
   std::string grid = raw(kCompressActiveMask | (zip ? kCompressZip : 0));
   grid += metadata(header, zip ? "zip + active values" : "active values");
   grid += transform(header.grid);

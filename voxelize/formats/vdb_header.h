@@ -9,8 +9,9 @@
 namespace strata {
 
 /// What the voxels of an OpenVDB file hold: nothing, they are active (MaskGrid); true (BoolGrid);
-/// numbers (FloatGrid), which are compressed by zlib.
-enum class VdbValues { kMask, kBool, kFloat };
+/// numbers (FloatGrid) or colours (Vec3SGrid: light of red, green and blue), which are compressed
+/// by zlib.
+enum class VdbValues { kMask, kBool, kFloat, kColour };
 
 /// What stands in an OpenVDB file before the tree (internal to voxelize/).
 struct VdbHeader {

@@ -1,9 +1,13 @@
 #include "voxelize/formats/vdb_leaves.h"
 
+#include <zlib.h>
+
 #include <algorithm>
 #include <climits>
 #include <cstring>
 #include <utility>
+
+#include "core/srgb.h"
 
 namespace strata {
 namespace {
@@ -47,9 +51,15 @@ std::unique_ptr<T[]> exact_copy(const std::vector<T>& items) {
 
 }  // namespace
 
-VdbLeafBuilder::VdbLeafBuilder(int depth, std::uint32_t divisor)
+std::array<float, 3> VdbLeafBuilder::light_of(std::uint32_t value) {
+  const std::array<float, 256>& light = linear_light();
+  return {light[value & 0xff], light[value >> 8 & 0xff], light[value >> 16 & 0xff]};
+}
+
+VdbLeafBuilder::VdbLeafBuilder(int depth, std::uint32_t divisor, bool colours)
     : leaves_z_((depth + 7) / 8),
       divisor_(divisor),
+      colours_(colours),
       // One more than leaves: an interval may cease at the very end.
       events_(static_cast<std::size_t>(leaves_z_) + 1),
       has_event_((events_.size() + 7) / 8 * 8) {}
@@ -260,6 +270,38 @@ std::uint64_t VdbLeafBuilder::put_values(int z, std::size_t voxels) {
   return hash;
 }
 
+// The same of colours, three floats each. Those of a texture hardly compress, so they are packed
+// only where they come in runs.
+std::uint64_t VdbLeafBuilder::put_colours(int z, std::size_t voxels) {
+  constexpr std::size_t kLongRuns = 4;
+  std::uint64_t hash = 0;
+  std::size_t runs = 0;
+  lights_.clear();
+  for_each_value(z, [&](std::uint32_t value, int length) {
+    ++runs;
+    lights_.insert(lights_.end(), static_cast<std::size_t>(length), light_of(value));
+    hash = (hash ^ value) * 0x9e3779b97f4a7c15u + static_cast<std::uint64_t>(length);
+  });
+  const std::size_t begin = values_.size(), plain = lights_.size() * sizeof lights_[0];
+  uLongf packed = compressBound(plain);
+  values_.resize(begin + sizeof(std::int64_t) + std::max<std::size_t>(packed, plain));
+  std::byte* to = values_.data() + begin + sizeof(std::int64_t);
+  auto count = -static_cast<std::int64_t>(plain);
+  const bool pack = runs * kLongRuns < voxels &&
+                    compress2(reinterpret_cast<Bytef*>(to), &packed,
+                              reinterpret_cast<const Bytef*>(lights_.data()), plain, 1) == Z_OK &&
+                    packed < plain;
+  if (pack) {
+    count = static_cast<std::int64_t>(packed);
+  } else {
+    std::memcpy(to, lights_.data(), plain);
+  }
+  std::memcpy(values_.data() + begin, &count, sizeof count);
+  values_.resize(begin + sizeof count + (pack ? packed : plain));
+  first_value_.push_back(static_cast<std::uint32_t>(values_.size()));
+  return hash;
+}
+
 void VdbLeafBuilder::put_leaf(int z, const VdbLeaf& leaf, std::uint64_t place) {
   leaves_.push_back(leaf);
   leaf_z_.push_back(static_cast<std::uint16_t>(z));
@@ -268,7 +310,10 @@ void VdbLeafBuilder::put_leaf(int z, const VdbLeaf& leaf, std::uint64_t place) {
     // Odd factors, one a word, so that swapped words differ.
     sum += (leaf.words[i] ^ leaf.words[i] >> 32) * (0x9e3779b97f4a7c15u + 2 * i);
   }
-  if (divisor_ != 0) sum += put_values(z, static_cast<std::size_t>(leaf.count()));
+  if (divisor_ != 0) {
+    const auto voxels = static_cast<std::size_t>(leaf.count());
+    sum += colours_ ? put_colours(z, voxels) : put_values(z, voxels);
+  }
   hash_ += mix(sum ^ mix(place + static_cast<std::uint64_t>(z)));
 }
 

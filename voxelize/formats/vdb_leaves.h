@@ -72,9 +72,12 @@ struct VdbLeafTile {
 /// partly solid leaves, never with the solid voxels. One builder a thread; it may be used again.
 class VdbLeafBuilder {
  public:
+  /// Light of red, green and blue of a value that is a colour.
+  [[nodiscard]] static std::array<float, 3> light_of(std::uint32_t value);
   /// @param depth voxels along z
   /// @param divisor the value of a voxel is its label divided by that; 0: voxels have no values
-  VdbLeafBuilder(int depth, std::uint32_t divisor);
+  /// @param colours labels are packed colours, and so are values, without alpha; divisor is 1
+  VdbLeafBuilder(int depth, std::uint32_t divisor, bool colours = false);
   /// @param slab intervals along z
   /// @return null for a tile without solid voxels
   std::unique_ptr<VdbLeafTile> build(const VoxelIntervals& slab, int tile_u, int tile_v);
@@ -94,7 +97,9 @@ class VdbLeafBuilder {
   template <class Run>
   void for_each_value(int z, Run&& run);
   [[nodiscard]] std::uint64_t put_values(int z, std::size_t voxels);
+  [[nodiscard]] std::uint64_t put_colours(int z, std::size_t voxels);
   [[nodiscard]] std::uint32_t value_of(std::uint32_t label) const {
+    if (colours_) return (label & 0xffffff) | 0x1000000;  // not 0
     return std::bit_cast<std::uint32_t>(
         static_cast<float>(static_cast<double>(label) / static_cast<double>(divisor_)));
   }
@@ -108,6 +113,7 @@ class VdbLeafBuilder {
 
   int leaves_z_;
   std::uint32_t divisor_;
+  bool colours_;
   // Of the leaf column in work, by z / 8. All zero between two leaf columns.
   std::vector<Event> events_;
   std::vector<std::uint8_t> has_event_;  // a multiple of 8 long
@@ -120,6 +126,7 @@ class VdbLeafBuilder {
   std::array<Column, 64> columns_;  // of the leaf column; with values only, as all that follows
   std::vector<std::uint32_t> run_values_, first_value_;
   Bytes values_;
+  std::vector<std::array<float, 3>> lights_;  // of a leaf
   RunDeflater deflater_{RunBytes::kIds, sizeof(std::uint32_t)};
   std::uint64_t hash_ = 0;
 };

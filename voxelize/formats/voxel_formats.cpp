@@ -33,10 +33,12 @@ std::vector<VoxelFormat> all_formats() {
   return {
       {.name = "vdb",
        .extension = ".vdb",
-       .description = "OpenVDB: bool, or float (fog volume, ids, level set); world transform",
+       .description =
+           "OpenVDB: bool, float (fog volume, ids, level set), vec3s (colours); world transform",
        .ids = kFloatIds,
        .named = true,
        .shares = true,
+       .rgba = true,
        .distances = true},
       dense("npy", ".npy", "NumPy: bool array indexed [x, y, z]; ids"),
       dense("npz", ".npz", "NumPy: arrays voxels (as .npy, deflated), origin, spacing; ids"),

@@ -4,7 +4,7 @@
 // LeafNode.h and io/Compression.h of OpenVDB 10.0), topology and then buffers, both depth first:
 //   topology  root, upper node (32^3 lower nodes), lower node (16^3 leaves), mask of a leaf
 //   buffers   mask of a leaf again, then its origin (mask), its origin and the mask once more as
-//             values (bool), or its active values (float: a fog volume, ids)
+//             values (bool), or its active values (float: a fog volume, ids; three floats: colours)
 // Not with the library itself: loading libopenvdb takes 45 ms, several times what a whole 1024^3
 // solid takes here, and a lower node of its tree is 33 KB to be filled and freed. The tests read
 // the files back with OpenVDB and compare the bytes of the tree with those that OpenVDB writes.
@@ -93,27 +93,46 @@ struct Block {
   int x = 0, y = 0;       // in lower nodes of the whole grid
 };
 
-/// The active values of an inner node as they stand in a file: true, or floats. Tiles are few, so
-/// floats stand as they are: [minus their bytes:64 | floats].
+/// The active values of an inner node as they stand in a file: true, or numbers. Tiles are few, so
+/// numbers stand as they are: [minus their bytes:64 | floats, one or three a value].
 class TileValues {
  public:
-  explicit TileValues(VdbValues values) : floats_(values == VdbValues::kFloat) {}
-  [[nodiscard]] std::size_t bytes(std::size_t n) const {
-    return floats_ ? sizeof(std::int64_t) + n * sizeof(float) : n;
+  explicit TileValues(VdbValues values) : values_(values) {}
+  [[nodiscard]] bool numbers() const {
+    return values_ == VdbValues::kFloat || values_ == VdbValues::kColour;
   }
-  /// Writes the list of n values. `values`, the bits of floats, count with floats only.
+  /// Of one value.
+  [[nodiscard]] std::size_t value_bytes() const {
+    return values_ == VdbValues::kColour  ? 3 * sizeof(float)
+           : values_ == VdbValues::kFloat ? sizeof(float)
+                                          : 1;
+  }
+  [[nodiscard]] std::size_t bytes(std::size_t n) const {
+    return (numbers() ? sizeof(std::int64_t) : 0) + n * value_bytes();
+  }
+  /// Writes the list of n values. `values`, the bits of floats or colours, count with numbers only.
   void copy(std::size_t n, std::byte* to, std::span<const std::uint32_t> values) const {
-    if (!floats_) {
+    if (!numbers()) {
       std::memset(to, 1, n);
       return;
     }
-    const std::int64_t count = -static_cast<std::int64_t>(values.size_bytes());
+    const std::int64_t count = -static_cast<std::int64_t>(n * value_bytes());
     std::memcpy(to, &count, sizeof count);
-    if (n != 0) std::memcpy(to + sizeof count, values.data(), values.size_bytes());
+    to += sizeof count;
+    for (std::size_t i = 0; i < n; ++i, to += value_bytes()) put(values[i], to);
+  }
+  /// Writes one value. @param value 0: the background
+  void put(std::uint32_t value, std::byte* to) const {
+    if (values_ == VdbValues::kColour) {
+      const std::array<float, 3> light = VdbLeafBuilder::light_of(value);
+      std::memcpy(to, light.data(), sizeof light);
+    } else {
+      std::memcpy(to, &value, value_bytes());
+    }
   }
 
  private:
-  bool floats_;
+  VdbValues values_;
 };
 
 class VdbWriter final : public SlabWriter {
@@ -121,12 +140,13 @@ class VdbWriter final : public SlabWriter {
   VdbWriter(const std::string& path, const VoxelGrid& grid, const VoxelWriterOptions& options,
             BlockOutput output)
       : SlabWriter(path, grid, Axis::kZ),
-        divisor_(options.ids != 0 ? 1 : options.fog),
-        kind_(divisor_ != 0  ? VdbValues::kFloat
-              : options.mask ? VdbValues::kMask
-                             : VdbValues::kBool),
+        divisor_(options.ids != 0 || options.rgba ? 1 : options.fog),
+        kind_(options.rgba    ? VdbValues::kColour
+              : divisor_ != 0 ? VdbValues::kFloat
+              : options.mask  ? VdbValues::kMask
+                              : VdbValues::kBool),
         fog_(options.fog != 0),
-        name_(options.name),
+        name_(options.rgba && options.name == "colours" ? "Cd" : options.name),
         output_(std::move(output)),
         tiles_x_(parts(grid.dims.x, kTileSide)),
         tiles_y_(parts(grid.dims.y, kTileSide)),
@@ -194,7 +214,8 @@ Result<void> VdbWriter::add_slab(const VoxelIntervals& slab, const Execution& ex
     const int tv = static_cast<int>(index) / slab.tiles_u();
     if (slab.tile_empty(tu, tv)) return;
     std::unique_ptr<VdbLeafBuilder>& builder = builders_[size(worker)];
-    if (!builder) builder = std::make_unique<VdbLeafBuilder>(dims().z, divisor_);
+    if (!builder)
+      builder = std::make_unique<VdbLeafBuilder>(dims().z, divisor_, kind_ == VdbValues::kColour);
     tiles_[first + index] = builder->build(slab, tu, tv);
   });
   return {};
@@ -301,8 +322,9 @@ std::string VdbWriter::root() const {
     bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
   };
   const auto put_value = [&](std::uint32_t value) {
-    if (kind_ == VdbValues::kFloat) return put(value);
-    put(static_cast<std::uint8_t>(value));
+    std::array<std::byte, 3 * sizeof(float)> of_value{};
+    values_.put(value, of_value.data());
+    bytes.append(reinterpret_cast<const char*>(of_value.data()), values_.value_bytes());
   };
   put(std::uint32_t{1});  // one buffer a leaf
   put_value(0);           // background
@@ -359,7 +381,7 @@ void VdbWriter::make_topology(const Block& block, Bytes& out) {
   }
   out.resize(bytes);
   std::byte* to = out.data();
-  const bool with_values = kind_ == VdbValues::kFloat;
+  const bool with_values = values_.numbers();
   std::vector<std::uint32_t> values;
   LeafColumnArray columns = leaf_columns(block.x, block.y, z_begin * kLowerSide);
   for (int z = z_begin; z < z_end; ++z) {
@@ -413,9 +435,7 @@ void VdbWriter::make_buffers(const Block& block, Bytes& out) {
   for (int z = z_begin; z < z_end; ++z) leaves += nodes[z].leaves;
   glm::ivec3 origin;
   const std::size_t largest =
-      kind_ == VdbValues::kFloat
-          ? sizeof(VdbLeaf) + 1 + sizeof(std::int64_t) + kLeafVoxels * sizeof(float)
-          : leaf_buffer_bytes();
+      values_.numbers() ? sizeof(VdbLeaf) + 1 + values_.bytes(kLeafVoxels) : leaf_buffer_bytes();
   out.resize(leaves * largest);
   std::byte* to = out.data();
   LeafColumnArray columns = leaf_columns(block.x, block.y, z_begin * kLowerSide);
@@ -432,7 +452,7 @@ void VdbWriter::make_buffers(const Block& block, Bytes& out) {
         const VdbLeaf& leaf = column.tile->leaves[column.leaf];
         std::memcpy(to, &leaf, sizeof leaf);
         to += sizeof leaf;
-        if (kind_ == VdbValues::kFloat) {
+        if (values_.numbers()) {
           *to++ = std::byte{kActiveValuesOnly};
           const std::span<const std::byte> list = column.tile->leaf_values(column.leaf);
           std::memcpy(to, list.data(), list.size());
@@ -469,8 +489,8 @@ VdbHeader VdbWriter::header(std::uint64_t topology_bytes) const {
     header.upper = glm::max(header.upper, tile->upper);
   }
   header.topology_bytes = topology_bytes;
-  header.buffers_bytes = kind_ == VdbValues::kFloat ? leaves_ * (sizeof(VdbLeaf) + 1) + value_bytes
-                                                    : leaves_ * leaf_buffer_bytes();
+  header.buffers_bytes = values_.numbers() ? leaves_ * (sizeof(VdbLeaf) + 1) + value_bytes
+                                           : leaves_ * leaf_buffer_bytes();
   return header;
 }
 

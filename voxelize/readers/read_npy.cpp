@@ -109,8 +109,17 @@ Result<NpyHead> parse_npy_head(std::string_view bytes, const std::string& name) 
   return head;
 }
 
-Result<DenseLayout> layout_of(const ReadContext& context, const NpyHead& head) {
+/// Whether numbers are red, green, blue and alpha of voxels, side by side in the file: the first of
+/// four axes in Fortran order, the last in C order.
+bool has_colours(const NpyHead& head) {
+  return head.shape.size() == 4 && head.type == NumberType::kU8 &&
+         (head.fortran ? head.shape.front() : head.shape.back()) == 4;
+}
+
+Result<DenseLayout> layout_of(ReadContext& context, const NpyHead& head) {
   std::vector<std::int64_t> shape = head.shape;
+  context.colours = has_colours(head);
+  if (context.colours) shape.erase(head.fortran ? shape.begin() : shape.end() - 1);
   if (shape.size() == 2) shape.push_back(1);  // a picture is a layer
   if (shape.size() != 3) {
     return fail(ErrorCode::kInput, "{}: an array of {} dimensions; voxels have 3", context.path,
@@ -123,7 +132,7 @@ Result<DenseLayout> layout_of(const ReadContext& context, const NpyHead& head) {
   for (int axis = 0; axis < 3; ++axis) {
     layout.grid.dims[axis] = static_cast<int>(shape[static_cast<std::size_t>(axis)]);
   }
-  layout.type = head.type;
+  layout.type = context.colours ? NumberType::kU32 : head.type;
   layout.big_endian = head.big_endian;
   if (!head.fortran) layout.axes = {2, 1, 0};
   return layout;
@@ -227,7 +236,7 @@ Result<const ZipMember*> NpzFile::voxels() const {
     for (const ZipMember& member : members_) {
       if (!member.name.ends_with(".npy")) continue;
       const Result<NpyHead> read = head(member);
-      if (!read || read->shape.size() != 3) continue;
+      if (!read || (read->shape.size() != 3 && !has_colours(*read))) continue;
       found = &member;
       break;
     }

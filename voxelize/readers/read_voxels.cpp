@@ -15,6 +15,7 @@
 #include "mesh/text/input_bytes.h"
 #include "voxelize/readers/readers.h"
 #include "voxelize/scans/scan_readers.h"
+#include "voxelize/volume/dense_array.h"
 
 namespace strata {
 namespace {
@@ -99,6 +100,10 @@ Result<VoxelVolume> read_as(const Format& format, std::string_view bytes, const 
           options.integers != IntegerVoxels::kIds) {
         as_values = true;
         continue;
+      }
+      if (volume && context.colours) {
+        settle_colours(*volume);
+        volume->type = "rgba";
       }
       if (volume && volume->format.empty()) volume->format = format.name;
       return volume;

@@ -154,7 +154,7 @@ Result<void> IdReader::store_slab(int slab, Worker& worker) {
   }
   const bool noise =
       runs > kLongSlab && static_cast<double>(voxels) < kIdRun * static_cast<double>(runs);
-  if (noise && context_.options.integers == IntegerVoxels::kAuto) {
+  if (noise && !context_.colours && context_.options.integers == IntegerVoxels::kAuto) {
     context_.wants_values = true;
     return fail(ErrorCode::kInput, "{}: {} voxels in {} runs are no ids", context_.path, voxels,
                 runs);
@@ -316,8 +316,8 @@ std::string_view name_of(NumberType type) {
 Result<VoxelVolume> read_dense(ReadContext& context, const DenseLayout& layout,
                                const DenseData& data) {
   VoxelVolume volume;
-  const bool ids =
-      !is_float(layout.type) && (layout.type == NumberType::kBool || !context.integers_as_values);
+  const bool ids = context.colours || layout.type == NumberType::kBool ||
+                   (!is_float(layout.type) && !context.integers_as_values);
   if (ids) {
     Result<VoxelVolume> read = IdReader(context, layout, data).read();
     if (!read) return read;

@@ -68,6 +68,8 @@ Result<VoxelVolume> read_dense(ReadContext& context, const DenseLayout& layout,
 /// The set, kind and threshold of `volume` from its values. The kind stays if it is kFog,
 /// kDistances or kIds; kMask means that it is unknown.
 Result<void> settle_values(ReadContext& context, VoxelVolume& volume, const VoxelGrid& grid);
+/// Makes labels that are packed colours, as ReadContext::colours has them, numbers of a palette.
+void settle_colours(VoxelVolume& volume);
 /// Takes ids that are all 1, or all the largest value of their type, for a mask.
 void settle_ids(VoxelVolume& volume, std::uint32_t largest_of_type);
 

@@ -41,6 +41,8 @@ struct ReadContext {
   const Execution& execution;
   MemoryBudget& budget;
   bool integers_as_values = false;  ///< numbers, not ids
+  /// A reader sets it: a number of 32 bits is a colour, red + 2^8 green + 2^16 blue + 2^24 alpha.
+  bool colours = false;
   /// A reader sets it, and fails, when integers turn out not to be ids; it is called again.
   std::atomic<bool> wants_values{false};
 

@@ -89,6 +89,44 @@ void settle_ids(VoxelVolume& volume, std::uint32_t largest_of_type) {
   volume.kind = VoxelKind::kMask;
 }
 
+void settle_colours(VoxelVolume& volume) {
+  VoxelIntervals& set = volume.set;
+  std::vector<std::uint32_t> colours, of_tile;
+  const auto for_each_tile = [&](auto&& body) {
+    for (int tv = 0; tv < set.tiles_v(); ++tv) {
+      for (int tu = 0; tu < set.tiles_u(); ++tu) {
+        if (!set.tile_empty(tu, tv)) body(set.tile(tu, tv), tu, tv);
+      }
+    }
+  };
+  const auto sort_out = [](std::vector<std::uint32_t>& list) {
+    std::sort(list.begin(), list.end());
+    list.erase(std::unique(list.begin(), list.end()), list.end());
+  };
+  for_each_tile([&](const VoxelIntervals::TileView& view, int, int) {
+    of_tile.assign(view.labels.begin(), view.labels.end());
+    sort_out(of_tile);
+    colours.insert(colours.end(), of_tile.begin(), of_tile.end());
+  });
+  sort_out(colours);
+  for_each_tile([&](const VoxelIntervals::TileView& view, int tu, int tv) {
+    const std::vector<std::uint32_t> offsets(view.offsets.begin(), view.offsets.end());
+    const std::vector<Interval> items(view.items.begin(), view.items.end());
+    std::vector<std::uint32_t> labels(view.labels.begin(), view.labels.end());
+    for (std::uint32_t& label : labels) {
+      const auto found = std::lower_bound(colours.begin(), colours.end(), label);
+      label = static_cast<std::uint32_t>(found - colours.begin()) + 1;
+    }
+    set.set_tile(tu, tv, offsets, items, labels);
+  });
+  volume.colours.clear();
+  for (const std::uint32_t colour : colours) {
+    volume.colours.emplace_back(colour & 0xff, colour >> 8 & 0xff, colour >> 16 & 0xff,
+                                colour >> 24);
+  }
+  volume.kind = VoxelKind::kColours;
+}
+
 void set_threshold(VoxelVolume& volume, float threshold, const Execution& execution) {
   const VoxelGrid grid = volume.grid();
   const SolidRule rule =

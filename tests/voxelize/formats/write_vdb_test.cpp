@@ -308,6 +308,41 @@ TEST_F(WriteVdb, IdsOfSolidRootNodesAreTiles) {
   }
 }
 
+TEST_F(WriteVdb, ColoursAreVectorsOfLight) {
+  // Patches of one colour that fill leaves and tiles, and one that changes from voxel to voxel.
+  const IdOf colour = [](int i, int j, int k) -> std::uint32_t {
+    if (k >= 140) return 0;
+    if (i < 130) return j < 130 ? 0xffffffffu : 0xff0000bcu;
+    return 0xff000000u | static_cast<std::uint32_t>(i % 8 << 5 | j % 8 << 13 | k % 8 << 21);
+  };
+  VoxelWriterOptions options;
+  options.rgba = true;
+  const VoxelIntervals set = labelled(make_grid({150, 140, 150}), Axis::kZ, colour);
+  const std::string path = write(set, options);
+  const auto grid = read<openvdb::Vec3SGrid>(path, "Cd");
+  EXPECT_EQ(grid->activeVoxelCount(), 150u * 140u * 140u);
+  EXPECT_EQ(grid->background(), openvdb::Vec3f(0.0f));
+  EXPECT_EQ(testkit::bytes_of(path), testkit::bytes_of(write(set, options, 7, 1)));
+  const auto accessor = grid->getConstAccessor();
+  const auto light = [](std::uint32_t value) {
+    const double v = value / 255.0;
+    return v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
+  };
+  int wrong = 0;
+  for (int k = 0; k < 150; ++k) {
+    for (int j = 0; j < 140; ++j) {
+      for (int i = 0; i < 150; ++i) {
+        const std::uint32_t wanted = colour(i, j, k);
+        const openvdb::Coord at(i, j, k);
+        wrong += accessor.isValueOn(at) != (wanted != 0);
+        const openvdb::Vec3f got = accessor.getValue(at);
+        for (int c = 0; c < 3; ++c) wrong += std::abs(got[c] - light(wanted >> 8 * c & 255)) > 1e-6;
+      }
+    }
+  }
+  EXPECT_EQ(wrong, 0);
+}
+
 TEST_F(WriteVdb, FogIdsAndMaskTogetherAreRefused) {
   for (const int two : {1 | 2, 1 | 4, 2 | 4}) {
     VoxelWriterOptions options;
