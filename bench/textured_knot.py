@@ -82,8 +82,8 @@ def main():
                 v = [i * sides + j + 1, k * sides + j + 1, k * sides + l + 1, i * sides + l + 1]
                 t = [i * (sides + 1) + j + 1, (i + 1) * (sides + 1) + j + 1, (i + 1) * (sides + 1) + j + 2,
                      i * (sides + 1) + j + 2]
-                out.write("f %d/%d %d/%d %d/%d\n" % (v[0], t[0], v[2], t[2], v[1], t[1]))
-                out.write("f %d/%d %d/%d %d/%d\n" % (v[0], t[0], v[3], t[3], v[2], t[2]))
+                out.write("f %d/%d %d/%d %d/%d\n" % (v[0], t[0], v[1], t[1], v[2], t[2]))
+                out.write("f %d/%d %d/%d %d/%d\n" % (v[0], t[0], v[2], t[2], v[3], t[3]))
 
 
 main()

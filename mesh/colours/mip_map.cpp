@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "core/srgb.h"
 
 namespace strata {
 namespace {
+
+constexpr float kOne = 65535.0f;  // light, alpha
 
 std::size_t place(int value) { return static_cast<std::size_t>(value); }
 
@@ -29,32 +32,41 @@ Taps taps_of(int i, int from, int to) {
   return taps;
 }
 
-// A place along a side: from a multiple of the side to texels, and between which two it lies.
+// std::floor is a call where the machine's least common part has no instruction for it.
+double below(double value) {
+  const auto whole = static_cast<double>(static_cast<std::int64_t>(value));
+  return whole > value ? whole - 1.0 : whole;
+}
+
+// A place within the texture, from 0 to 1.
+double wrapped(double at, TextureWrap wrap) {
+  if (wrap == TextureWrap::kRepeat) return at - below(at);
+  if (wrap == TextureWrap::kClamp) return std::clamp(at, 0.0, 1.0);
+  at -= 2.0 * below(at / 2.0);
+  return at > 1.0 ? 2.0 - at : at;
+}
+
+// A place along a side, from 0 to 1: between which two texels it lies.
 struct Between {
   std::size_t first = 0, second = 0;
   float part = 0.0f;  // of the second
 };
-Between between(double at, int size, TextureWrap wrap) {
-  if (wrap == TextureWrap::kRepeat) {
-    at -= std::floor(at);
-  } else if (wrap == TextureWrap::kMirror) {
-    at -= 2.0 * std::floor(at / 2.0);
-    if (at > 1.0) at = 2.0 - at;
-  } else {
-    at = std::clamp(at, 0.0, 1.0);
-  }
-  const double x = at * size - 0.5, low = std::floor(x);
-  int first = static_cast<int>(low), second = first + 1;
-  if (wrap == TextureWrap::kRepeat) {
+Between between(double at, int size, bool repeats) {
+  const double x = at * size + 0.5;  // texel i has its middle at i + 1
+  int second = static_cast<int>(x);
+  const auto part = static_cast<float>(x - second);
+  int first = second - 1;
+  if (repeats) {
     if (first < 0) first += size;
-    if (first >= size) first -= size;
     if (second >= size) second -= size;
   } else {  // the mirror's border texel is its own neighbour
-    first = std::clamp(first, 0, size - 1);
-    second = std::clamp(second, 0, size - 1);
+    first = std::max(first, 0);
+    second = std::min(second, size - 1);
   }
-  return {place(first), place(second), static_cast<float>(x - low)};
+  return {place(first), place(second), part};
 }
+
+Float4 all(float value) { return Float4{value, value, value, value}; }
 
 }  // namespace
 
@@ -76,15 +88,17 @@ void MipMap::make_levels(const Execution& execution) {
   }
 }
 
-glm::vec4 MipMap::texel(std::size_t level, std::size_t index) const {
+Float4 MipMap::texel(std::size_t level, std::size_t index) const {
   if (level > 0) {
-    const Texel& t = levels_[level - 1].texels[index];
-    return glm::vec4(t[0], t[1], t[2], t[3]) * (1.0f / 65535.0f);
+    __extension__ typedef std::uint16_t Short4 __attribute__((vector_size(8)));
+    Short4 t;
+    std::memcpy(&t, levels_[level - 1].texels.data() + index, sizeof t);
+    return __builtin_convertvector(t, Float4);
   }
   const glm::u8vec4 t = texture_->texels[index];
   const std::array<float, 256>& light = linear_light();
-  const float alpha = static_cast<float>(t.w) * (1.0f / 255.0f);
-  return {light[t.x] * alpha, light[t.y] * alpha, light[t.z] * alpha, alpha};
+  const Float4 straight{light[t.x], light[t.y], light[t.z], 1.0f};
+  return straight * all(static_cast<float>(t.w) * (kOne / 255.0f));
 }
 
 void MipMap::make_row(std::size_t level, int y) {
@@ -94,42 +108,44 @@ void MipMap::make_row(std::size_t level, int y) {
   const Taps rows = taps_of(y, from_height, to.height);
   for (int x = 0; x < to.width; ++x) {
     const Taps columns = taps_of(x, from_width, to.width);
-    glm::vec4 sum(0.0f);
+    Float4 sum{};
     for (int j = 0; j < rows.count; ++j) {
-      glm::vec4 row(0.0f);
+      Float4 row{};
       const std::size_t start = place(rows.first + j) * place(from_width) + place(columns.first);
       for (int i = 0; i < columns.count; ++i) {
-        row += texel(level, start + place(i)) * columns.weights[place(i)];
+        row += texel(level, start + place(i)) * all(columns.weights[place(i)]);
       }
-      sum += row * rows.weights[place(j)];
+      sum += row * all(rows.weights[place(j)]);
     }
     Texel& out = to.texels[place(y) * place(to.width) + place(x)];
     for (int c = 0; c < 4; ++c) {
-      out[place(c)] = static_cast<std::uint16_t>(std::min(sum[c] * 65535.0f + 0.5f, 65535.0f));
+      out[place(c)] = static_cast<std::uint16_t>(std::min(sum[c] + 0.5f, kOne));
     }
   }
 }
 
-glm::vec4 MipMap::bilinear(const glm::dvec2& at, std::size_t level) const {
+Float4 MipMap::bilinear(const glm::dvec2& at, std::size_t level) const {
   const int width = level == 0 ? texture_->width : levels_[level - 1].width;
   const int height = level == 0 ? texture_->height : levels_[level - 1].height;
-  const Between x = between(at.x, width, texture_->wrap_u);
-  const Between y = between(at.y, height, texture_->wrap_v);
+  const Between x = between(at.x, width, texture_->wrap_u == TextureWrap::kRepeat);
+  const Between y = between(at.y, height, texture_->wrap_v == TextureWrap::kRepeat);
   const std::size_t first = y.first * place(width), second = y.second * place(width);
-  const glm::vec4 upper =
-      texel(level, first + x.first) * (1.0f - x.part) + texel(level, first + x.second) * x.part;
-  const glm::vec4 lower =
-      texel(level, second + x.first) * (1.0f - x.part) + texel(level, second + x.second) * x.part;
-  return upper * (1.0f - y.part) + lower * y.part;
+  const Float4 right = all(x.part), left = all(1.0f - x.part);
+  const Float4 upper =
+      texel(level, first + x.first) * left + texel(level, first + x.second) * right;
+  const Float4 lower =
+      texel(level, second + x.first) * left + texel(level, second + x.second) * right;
+  return upper * all(1.0f - y.part) + lower * all(y.part);
 }
 
-glm::vec4 MipMap::sample(const glm::dvec2& at, float level) const {
-  const auto last = static_cast<float>(levels_.size());
-  const float clamped = std::clamp(level, 0.0f, last);
+Float4 MipMap::sample(const glm::dvec2& at, float level) const {
+  const glm::dvec2 within(wrapped(at.x, texture_->wrap_u), wrapped(at.y, texture_->wrap_v));
+  const float clamped = std::clamp(level, 0.0f, static_cast<float>(levels_.size()));
   const auto low = static_cast<std::size_t>(clamped);
   const float part = clamped - static_cast<float>(low);
-  const glm::vec4 fine = bilinear(at, low);
-  return part == 0.0f ? fine : fine * (1.0f - part) + bilinear(at, low + 1) * part;
+  Float4 sum = bilinear(within, low);
+  if (part != 0.0f) sum = sum * all(1.0f - part) + bilinear(within, low + 1) * all(part);
+  return sum * all(1.0f / kOne);
 }
 
 std::uint64_t MipMap::memory_bytes() const {

@@ -3,7 +3,6 @@
 #include <array>
 #include <cstdint>
 #include <glm/vec2.hpp>
-#include <glm/vec4.hpp>
 #include <vector>
 
 #include "strata/core/execution.h"
@@ -17,6 +16,9 @@
 
 namespace strata {
 
+/// Four numbers that are added and multiplied at once: red, green, blue, alpha.
+__extension__ typedef float Float4 __attribute__((vector_size(16)));
+
 /// A texture and its halves: texels of each level are means of those of the level before, in linear
 /// light, weighted by alpha. A level has half as many texels as the last along each side, rounded
 /// down; where a side is odd the box of a texel cuts through texels.
@@ -28,7 +30,8 @@ class MipMap {
 
   /// Light and alpha, light times alpha, at a place of the texture: (0, 0) is its upper left
   /// corner, (1, 1) its lower right one. @param level 0 or more; between two levels both count
-  [[nodiscard]] glm::vec4 sample(const glm::dvec2& at, float level) const;
+  /// @pre |at.x| and |at.y| are below 2^31
+  [[nodiscard]] Float4 sample(const glm::dvec2& at, float level) const;
 
   [[nodiscard]] int width() const { return texture_->width; }
   [[nodiscard]] int height() const { return texture_->height; }
@@ -40,8 +43,8 @@ class MipMap {
     int width = 0, height = 0;
     std::vector<Texel> texels;
   };
-  [[nodiscard]] glm::vec4 texel(std::size_t level, std::size_t index) const;
-  [[nodiscard]] glm::vec4 bilinear(const glm::dvec2& at, std::size_t level) const;
+  [[nodiscard]] Float4 texel(std::size_t level, std::size_t index) const;
+  [[nodiscard]] Float4 bilinear(const glm::dvec2& at, std::size_t level) const;
   void make_row(std::size_t level, int y);
 
   const Texture* texture_;

@@ -86,7 +86,11 @@ Stretch stretch_of(const std::array<glm::dvec3, 3>& points,
   return result;
 }
 
-bool is_finite(const glm::vec2& at) { return std::isfinite(at.x) && std::isfinite(at.y); }
+// Far from 0 a float does not tell texels any more.
+bool is_place(const glm::vec2& at) {
+  constexpr float kFarthest = 1e8f;
+  return std::abs(at.x) <= kFarthest && std::abs(at.y) <= kFarthest;
+}
 
 }  // namespace
 
@@ -134,7 +138,7 @@ void SurfaceColours::Impl::set_texture(Look& look, const SurfaceMaterial& materi
   std::array<glm::dvec2, 3> texels;
   for (std::size_t i = 0; i < 3; ++i) {
     glm::dvec2 at(0.0);
-    if (is_finite(corners[i]->texture_at)) at = glm::dvec2(corners[i]->texture_at);
+    if (is_place(corners[i]->texture_at)) at = glm::dvec2(corners[i]->texture_at);
     look.at[i] = {at.x, 1.0 - at.y};
     texels[i] = look.at[i] * size;
     points[i] = mesh->positions[t[static_cast<int>(i)]] / options.footprint;
@@ -238,11 +242,11 @@ glm::u8vec4 SurfaceColours::Probe::colour(std::uint32_t triangle, const glm::dve
     const MipMap& map = cache_->impl->textures[look.texture];
     const glm::dvec2 middle =
         look.at[0] * weights.x + look.at[1] * weights.y + look.at[2] * weights.z;
-    glm::vec4 sum(0.0f);
+    Float4 sum{};
     for (int i = 0; i < look.probes; ++i) {
       sum += map.sample(middle + look.step * (i + 0.5 - 0.5 * look.probes), look.level);
     }
-    light *= sum * (1.0f / static_cast<float>(look.probes));
+    light *= glm::vec4(sum[0], sum[1], sum[2], sum[3]) * (1.0f / static_cast<float>(look.probes));
   }
   return colour_of(light);
 }
