@@ -95,7 +95,7 @@ struct VoxelColouring::Impl {
 
 /// Of a surface all voxels are near it; of a solid those are looked for.
 bool VoxelColouring::Impl::find_near(const VoxelIntervals::TileView& tile, const glm::ivec3& size,
-                                   Worker& worker) const {
+                                     Worker& worker) const {
   if (!options.solid) return worker.near.reset(tile.offsets, tile.items);
   worker.collector.clear();
   for (const NearTriangle& triangle : worker.triangles) {
@@ -153,7 +153,8 @@ void VoxelColouring::Impl::append(int first, int last, std::uint32_t label, Work
 }
 
 void VoxelColouring::Impl::colour_tile(const VoxelIntervals::TileView& tile,
-                                     std::span<const std::uint32_t> numbers, Worker& worker) const {
+                                       std::span<const std::uint32_t> numbers,
+                                       Worker& worker) const {
   const NearVoxels& near = worker.near;
   const std::uint32_t inside = packed_colour(options.inside);
   worker.offsets.assign(1, 0);
@@ -194,9 +195,9 @@ VoxelColouring& VoxelColouring::operator=(VoxelColouring&&) noexcept = default;
 VoxelColouring::~VoxelColouring() = default;
 
 Result<VoxelColouring> VoxelColouring::create(const TriangleSoup& mesh, const VoxelGrid& grid,
-                                          const SurfaceColours& colours,
-                                          const VoxelColourOptions& options,
-                                          const Execution& execution) {
+                                              const SurfaceColours& colours,
+                                              const VoxelColourOptions& options,
+                                              const Execution& execution) {
   auto lattice = snap_to_lattice(mesh, grid, execution);
   if (!lattice) return tl::unexpected(lattice.error());
   auto impl = std::make_unique<Impl>();
@@ -208,7 +209,7 @@ Result<VoxelColouring> VoxelColouring::create(const TriangleSoup& mesh, const Vo
 }
 
 Result<VoxelIntervals> VoxelColouring::colour(const VoxelIntervals& slab,
-                                            const Execution& execution) {
+                                              const Execution& execution) {
   try {
     const AxisFrame frame(slab.axis());
     VoxelIntervals result(slab.grid(), slab.axis(), slab.v_begin(), slab.v_end());

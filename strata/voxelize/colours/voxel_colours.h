@@ -45,9 +45,9 @@ class VoxelColouring {
   /// Snaps the mesh. Keeps references to `mesh` and `colours`, whose triangles have the same
   /// numbers. @return as snap_to_lattice()
   static Result<VoxelColouring> create(const TriangleSoup& mesh, const VoxelGrid& grid,
-                                     const SurfaceColours& colours,
-                                     const VoxelColourOptions& options = {},
-                                     const Execution& execution = {});
+                                       const SurfaceColours& colours,
+                                       const VoxelColourOptions& options = {},
+                                       const Execution& execution = {});
   VoxelColouring(VoxelColouring&&) noexcept;
   VoxelColouring& operator=(VoxelColouring&&) noexcept;
   ~VoxelColouring();
