@@ -341,9 +341,9 @@ csg::SceneInput input_options(const Words& words, bool pictures, Reader& reader)
   if (!input.scene_format) {
     reader.take(parse_choice("--input-format", words.input_format, kMeshFormatWords), input.format);
   }
-  reader.take(check_stream_format(input.files,
-                                  input.scene_format || input.format != MeshFormat::kAuto,
-                                  pictures ? "csg, obj, stl, ply or off" : "obj, stl, ply or off"));
+  reader.take(check_stream_format(
+      input.files, input.scene_format || input.format != MeshFormat::kAuto,
+      pictures ? "csg, obj, stl, ply, off or glb" : "obj, stl, ply, off or glb"));
   reader.take(read_scene_options(words.csg.scene, input));
   return input;
 }

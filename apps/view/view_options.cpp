@@ -137,7 +137,8 @@ Result<void> read(Words& words, ViewOptions& options) {
   if (!format) return tl::unexpected(format.error());
   command.input.format = *format;
   const bool given = command.input.scene_format || *format != MeshFormat::kAuto;
-  const auto stream = apps::check_stream_format(words.files, given, "csg, obj, stl, ply or off");
+  const auto stream =
+      apps::check_stream_format(words.files, given, "csg, obj, stl, ply, off or glb");
   if (!stream) return stream;
   auto rule = apps::parse_choice("--rule", words.rule, apps::kRuleWords);
   if (!rule) return tl::unexpected(rule.error());

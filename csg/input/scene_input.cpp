@@ -85,7 +85,7 @@ Result<Scene> load_one(const std::string& path, const SceneInput& input,
   }
   if (input.format == MeshFormat::kAuto && path == "-") {
     return fail(ErrorCode::kUsage,
-                "standard input: the format must be given: csg, obj, stl, ply or off");
+                "standard input: the format must be given: csg, obj, stl, ply, off or glb");
   }
   if (auto named = check_input_name(path, kind, true); !named) {
     return tl::unexpected(named.error());

@@ -176,7 +176,7 @@ Result<SolidInput> load_solids(const SceneInput& input, bool as_tree, const Inpu
                                const Execution& execution) {
   if (input.format == MeshFormat::kAuto && reads_standard_input(input)) {
     return fail(ErrorCode::kUsage,
-                "standard input: the format must be given: obj, stl, ply or off");
+                "standard input: the format must be given: obj, stl, ply, off or glb");
   }
   if (input.expression.empty() &&
       std::none_of(input.files.begin(), input.files.end(), is_scene_name)) {

@@ -89,6 +89,16 @@ Result<std::string> ZipArchive::read(const std::string& name, const Execution& e
                                  : std::min<std::uint64_t>(kMostBytes, execution.memory_limit);
   std::string bytes;
   char buffer[1 << 16];
+  zip_stat_t stat;
+  zip_stat_init(&stat);
+  constexpr zip_uint64_t kSizes = ZIP_STAT_SIZE | ZIP_STAT_COMP_SIZE;
+  if (zip_stat_index(archive, static_cast<zip_uint64_t>(at - names_.begin()), 0, &stat) == 0 &&
+      (stat.valid & kSizes) == kSizes) {
+    // The archive may claim any size, so the room is bounded: deflate packs at most 1032 to 1.
+    constexpr std::uint64_t kMostRatio = 1032, kMostClaim = std::uint64_t{1} << 28;
+    const std::uint64_t possible = std::min(stat.comp_size, kMostClaim) * kMostRatio;
+    bytes.reserve(std::min({stat.size, possible, kMostClaim, most}) + sizeof buffer);
+  }
   for (;;) {
     if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
     const zip_int64_t read = zip_fread(file.get(), buffer, sizeof buffer);

@@ -419,7 +419,7 @@ TEST_F(Voxelize, TheFormatOfAPipeIsNotThatOfFilesBesideIt) {
     }
     const RunResult untold = run({file, "-"});
     EXPECT_EQ(untold.exit_code, 2) << untold.err;
-    EXPECT_NE(untold.err.find("needs --input-format: obj, stl, ply or off"), std::string::npos)
+    EXPECT_NE(untold.err.find("needs --input-format: obj, stl, ply, off or glb"), std::string::npos)
         << untold.err;
   }
   // Without a pipe it is that of all files.
