@@ -424,7 +424,8 @@ void read_distances(const Words& words, VoxelizeCommand& command, Reader& reader
   }
   if (!command.sdf) return;
   // Otherwise the band would be cut off where the mesh reaches the sides of the grid.
-  if (words.padding.empty() && words.grid.empty() && words.bounds.empty() && words.origin.empty()) {
+  const bool sized = command.grid.resolution || command.grid.voxel_size;
+  if (sized && words.padding.empty() && words.bounds.empty() && words.origin.empty()) {
     command.grid.padding = static_cast<std::int64_t>(std::ceil(command.band));
   }
   const char* other = command.ids        ? "--ids"
