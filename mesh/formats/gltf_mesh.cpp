@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <utility>
 
 #include "mesh/formats/reader_common.h"
@@ -14,10 +16,20 @@ Result<MeshFile> read_gltf_mesh(const ReaderInput& input) {
   options.root = input.options.root;
   auto model = read_gltf(input.text, input.name, options, input.execution);
   if (!model) return tl::unexpected(model.error());
+  const GltfLosses& losses = model->losses;
+  const std::uint64_t dropped = losses.out_of_range + losses.non_finite;
+  if (dropped > 0) {
+    if (input.options.strict) return fail(ErrorCode::kInput, "{}", losses.first);
+    model->warnings.push_back(
+        fmt::format("{}; {} dropped", losses.first,
+                    dropped == 1 ? "1 face was" : fmt::format("{} faces were", dropped)));
+  }
   RawMesh raw;
   raw.soup = std::move(model->soup);
   raw.stats.format = is_glb(input.text) ? "glb" : "gltf";
-  raw.stats.faces = raw.soup.triangles.size();
+  raw.stats.faces = raw.soup.triangles.size() + dropped;
+  raw.stats.out_of_range = losses.out_of_range;
+  raw.stats.non_finite = losses.non_finite;
   raw.stats.ignored = model->ignored;
   raw.stats.warnings = std::move(model->warnings);
   raw.stats.unit_metres = 1.0;

@@ -105,19 +105,39 @@ class ShapeMaker {
       std::iota(vertices.begin(), vertices.end(), 0u);
     }
     if (vertices.size() < 3) return;
-    const auto [low, high] = std::minmax_element(vertices.begin(), vertices.end());
-    if (*high >= positions.count) {
-      refuse_gltf("{}: an index is {}, but there are {} vertices", where(), *high, positions.count);
-    }
+    const auto uses = static_cast<std::uint64_t>(vertices.size());
     Piece piece;
+    const std::uint32_t most = *std::max_element(vertices.begin(), vertices.end());
+    std::uint32_t low = *std::min_element(vertices.begin(), vertices.end()), high = most;
+    piece.triangles = triangles_of(from.mode, std::move(vertices));
+    if (most >= positions.count) {
+      drop_out_of_range(piece.triangles, positions.count, most);
+      if (piece.triangles.empty()) return;
+      low = most;
+      high = 0;
+      for (const glm::uvec3& t : piece.triangles) {
+        low = std::min({low, t.x, t.y, t.z});
+        high = std::max({high, t.x, t.y, t.z});
+      }
+    }
     piece.group = group_of(from);
     piece.material = from.material;
     VertexGroup& group = groups_[piece.group];
-    group.low = std::min(group.low, *low);
-    group.high = std::max(group.high, *high);
-    group.uses += vertices.size();
-    piece.triangles = triangles_of(from.mode, std::move(vertices));
+    group.low = std::min(group.low, low);
+    group.high = std::max(group.high, high);
+    group.uses += uses;
     pieces_.push_back(std::move(piece));
+  }
+
+  void drop_out_of_range(std::vector<glm::uvec3>& triangles, std::uint64_t count,
+                         std::uint32_t most) {
+    const std::uint64_t dropped = std::erase_if(triangles, [&](const glm::uvec3& t) {
+      return t.x >= count || t.y >= count || t.z >= count;
+    });
+    shape_.losses.out_of_range += dropped;
+    if (dropped == 0 || !shape_.losses.first.empty()) return;
+    shape_.losses.first =
+        fmt::format("{}: an index is {}, but there are {} vertices", where(), most, count);
   }
 
   /// Primitives may name the same bytes again and again.
@@ -188,10 +208,16 @@ class ShapeMaker {
       if (from.morphs[m] && weights_[m] != 0.0) morph(group, *from.morphs[m], weights_[m], count);
     }
     for (std::size_t v = first; v < first + count; ++v) {
-      const glm::dvec3& p = shape_.positions[v];
+      glm::dvec3& p = shape_.positions[v];
       if (p.x * 0.0 + p.y * 0.0 + p.z * 0.0 == 0.0) continue;
-      refuse_gltf("{}: meshes[{}] has a vertex at ({}, {}, {}), which is not finite", data_.name(),
-                  mesh_, p.x, p.y, p.z);
+      if (shape_.losses.first.empty()) {
+        shape_.losses.first =
+            fmt::format("{}: meshes[{}] has a vertex at ({}, {}, {}), which is not finite",
+                        data_.name(), mesh_, p.x, p.y, p.z);
+      }
+      not_finite_.resize(shape_.positions.size());
+      not_finite_[v] = true;
+      p = glm::dvec3(0.0);  // no triangle uses it
     }
     if (looks_ && from.colours) read_colours(group, *from.colours, count);
     if (group.texture_places) read_places(group, count);
@@ -279,6 +305,12 @@ class ShapeMaker {
     };
     shape_.runs.push_back({shape_.triangles.size(), piece.material});
     for (glm::uvec3& t : piece.triangles) t = {local(t.x), local(t.y), local(t.z)};
+    if (!not_finite_.empty()) {
+      not_finite_.resize(shape_.positions.size());
+      shape_.losses.non_finite += std::erase_if(piece.triangles, [&](const glm::uvec3& t) {
+        return not_finite_[t.x] || not_finite_[t.y] || not_finite_[t.z];
+      });
+    }
     if (shape_.triangles.empty()) {
       shape_.triangles = std::move(piece.triangles);
     } else {
@@ -294,7 +326,8 @@ class ShapeMaker {
   const std::span<const double> weights_;
   const bool looks_;
   std::uint64_t corners_ = 0;
-  std::size_t index_ = 0;  // of the primitive being read
+  std::vector<bool> not_finite_;  // of positions; empty: all are finite
+  std::size_t index_ = 0;         // of the primitive being read
   std::map<VertexKey, std::size_t> known_;
   std::vector<VertexGroup> groups_;
   std::vector<Piece> pieces_;

@@ -9,6 +9,7 @@
 
 #include "mesh/gltf/gltf_data.h"
 #include "mesh/gltf/gltf_document.h"
+#include "mesh/gltf/read_gltf.h"
 
 namespace strata::detail {
 
@@ -33,6 +34,7 @@ struct GltfShape {
   std::size_t pulls_each = 0;             ///< of a position; 0: no skin
   std::vector<GltfPull> pulls;
   std::uint64_t ignored = 0;  ///< points and lines
+  GltfLosses losses;
 };
 
 /// @param weights  of morph targets

@@ -179,6 +179,9 @@ class SceneWalk {
       shape = &place->second;
     }
     model_.ignored += shape->ignored;
+    model_.losses.out_of_range += shape->losses.out_of_range;
+    model_.losses.non_finite += shape->losses.non_finite;
+    if (model_.losses.first.empty()) model_.losses.first = shape->losses.first;
     if (shape->triangles.empty()) return;
     begin_part(index);
     if (node.skin && shape->pulls_each > 0) {
@@ -381,6 +384,9 @@ class SceneWalk {
 
   void finish() {
     const TriangleSoup& soup = model_.soup;
+    if (soup.triangles.empty() && !model_.losses.first.empty()) {
+      refuse_gltf("{}; no triangle can be used", model_.losses.first);
+    }
     if (soup.triangles.empty()) {
       refuse_gltf("{}: the scene has no triangles{}", data_.name(),
                   model_.ignored > 0 ? "; points and lines are not read" : "");

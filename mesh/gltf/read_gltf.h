@@ -22,11 +22,19 @@ struct GltfOptions {
   std::string root{};           ///< files that it names lie in this folder; empty: anywhere
 };
 
+/// Triangles that were dropped.
+struct GltfLosses {
+  std::uint64_t out_of_range = 0;  ///< an index is not that of a vertex
+  std::uint64_t non_finite = 0;    ///< a vertex has a coordinate that is not finite
+  std::string first;               ///< a sentence about one of them
+};
+
 /// The contents of a glTF file.
 struct GltfModel {
   TriangleSoup soup;  ///< triangle t is element t
   MeshAttributes attributes;
   std::uint64_t ignored = 0;  ///< points and lines
+  GltfLosses losses;
   std::vector<std::string> warnings;
   std::vector<FileIdentity> opened;  ///< other files: buffers and images
 };
@@ -39,6 +47,7 @@ struct GltfModel {
 /// meshes with skins are placed by their joints as the file holds them; animations are not played.
 /// A part is a node with a mesh.
 /// @param name  the file's path
+/// Triangles whose vertices are not there, or not finite, are dropped.
 /// @return kInput: damaged, a value that is not allowed, a required extension that is not read, no
 /// triangles; kLimit: 2^32 - 1 vertices or triangles, the memory limit; kCancelled; kUsage: a build
 /// without nlohmann-json

@@ -54,9 +54,8 @@ const std::map<std::string, std::string> kRefusedGltf = {
     {"glTF", "1"},  // glTF 1.0
     {"glTF/CesiumMilkTruck", "no asset.version"},
     {"glTF2/BoxTextured-glTF-techniqueWebGL", "it requires the extension KHR_technique_webgl"},
-    {"glTF2/BoxWithInfinites-glTF-Binary", "a vertex at (-inf, -0.5, 0.5), which is not finite"},
+    {"glTF2/BoxWithInfinites-glTF-Binary", "which is not finite; no triangle can be used"},
     {"glTF2/IndexOutOfRange/AllIndicesOutOfRange.gltf", "an index is 65535"},
-    {"glTF2/IndexOutOfRange/IndexOutOfRange.gltf", "an index is 255, but there are 24 vertices"},
     {"glTF2/MissingBin", "No such file"},
     {"glTF2/RecursiveNodes", "nodes[0] lies within a circle of children"},
     {"glTF2/SchemaFailures", "scene must be an index of scenes, which has 1 element"},

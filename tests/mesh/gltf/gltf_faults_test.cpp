@@ -104,8 +104,6 @@ TEST(GltfFaults, AccessorsBeyondTheirBytes) {
   expect_refused(with_accessors(with(kPositions, "VEC3", "VEC9"), kIndices), "got 'VEC9'");
   expect_refused(with_accessors(with(kPositions, "VEC3", "VEC2"), kIndices),
                  "accessors[0] has 2 numbers an element, where 3 are needed");
-  expect_refused(with_accessors(with(kPositions, ":24", ":23"), kIndices),
-                 "meshes[0].primitives[0]: an index is 23, but there are 23 vertices");
   expect_refused(with_accessors(kPositions, with(kIndices, "5123", "5122")),
                  "it must have scalars");
   expect_refused(
@@ -159,7 +157,30 @@ TEST(GltfFaults, NumbersThatAreNotFinite) {
   corners[4] = std::numeric_limits<float>::quiet_NaN();
   text.list(corners, 3);
   text.list(cube_indices<std::uint16_t>(), 1);
-  expect_refused(text.glb(kMesh), "meshes[0] has a vertex at");
+  const GltfModel model = read(text.glb(kMesh));
+  EXPECT_EQ(model.soup.triangles.size(), 11u);  // one triangle has corner 1
+  EXPECT_EQ(model.losses.non_finite, 1u);
+  EXPECT_EQ(model.losses.first,
+            "file.glb: meshes[0] has a vertex at (0, nan, 0), which is not finite");
+  for (const glm::dvec3& p : model.soup.positions) EXPECT_EQ(p.y - p.y, 0.0);
+}
+
+TEST(GltfFaults, TrianglesWithIndicesOutOfRangeAreDropped) {
+  GltfText text;
+  text.list(cube_corners(), 3);
+  std::vector<std::uint16_t> indices = cube_indices<std::uint16_t>();
+  indices[4] = 24;
+  indices[35] = 65535;
+  text.list(indices, 1);
+  const GltfModel model = read(text.glb(kMesh));
+  EXPECT_EQ(model.soup.triangles.size(), 10u);
+  EXPECT_EQ(model.losses.out_of_range, 2u);
+  EXPECT_EQ(model.losses.first,
+            "file.glb: meshes[0].primitives[0]: an index is 65535, but there are 24 vertices");
+  GltfText none;
+  none.list(cube_corners(), 3);
+  none.list(std::vector<std::uint16_t>{24, 25, 26}, 1);
+  expect_refused(none.glb(kMesh), "an index is 26, but there are 24 vertices; no triangle can be");
 }
 
 TEST(GltfFaults, ExtensionsThatAreRequiredAreNamed) {
