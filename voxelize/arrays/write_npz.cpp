@@ -25,82 +25,16 @@
 #include "voxelize/output/dense_rows.h"
 #include "voxelize/output/slab_writer.h"
 #include "voxelize/output/writers.h"
+#include "voxelize/output/zip_records.h"
 
 namespace strata {
 namespace {
-
-constexpr std::uint32_t kUnknown = 0xffffffff;  // the 64-bit field has the number
 
 template <class T>
 void put(std::string& to, T value) {
   static_assert(std::endian::native == std::endian::little);
   to.append(reinterpret_cast<const char*>(&value), sizeof value);
 }
-void put16(std::string& to, unsigned value) { put(to, static_cast<std::uint16_t>(value)); }
-void put32(std::string& to, std::uint64_t value) { put(to, static_cast<std::uint32_t>(value)); }
-
-struct Entry {
-  std::string name;
-  bool deflated = false;
-  bool follows = false;  // CRC and sizes stand after the data
-  bool wide = false;     // sizes of 64 bits
-  std::uint32_t crc = 0;
-  std::uint64_t bytes = 0, compressed = 0;
-  std::uint64_t offset = 0;  // of the local head; three small arrays: below 2^32
-
-  // What the local head and the directory share, from the version on.
-  void put_common(std::string& to) const {
-    put16(to, wide ? 45 : 20);  // version needed
-    put16(to, follows ? 1 << 3 : 0);
-    put16(to, deflated ? 8 : 0);
-    put16(to, 0);           // time
-    put16(to, 1 << 5 | 1);  // 1980-01-01: the same voxels give the same bytes
-    put32(to, crc);
-    put32(to, wide ? kUnknown : compressed);
-    put32(to, wide ? kUnknown : bytes);
-    put16(to, static_cast<unsigned>(name.size()));
-    put16(to, wide ? 20 : 0);
-  }
-  void put_extra(std::string& to) const {
-    to += name;
-    if (!wide) return;
-    put16(to, 1);
-    put16(to, 16);
-    put(to, bytes);
-    put(to, compressed);
-  }
-  [[nodiscard]] std::string local_head() const {
-    std::string head("PK\x03\x04", 4);
-    Entry shown = *this;
-    if (follows) shown.crc = 0, shown.bytes = shown.compressed = 0;
-    shown.put_common(head);
-    shown.put_extra(head);
-    return head;
-  }
-  [[nodiscard]] std::string descriptor() const {
-    std::string text("PK\x07\x08", 4);
-    put32(text, crc);
-    for (const std::uint64_t size : {compressed, bytes}) {
-      if (wide) {
-        put(text, size);
-      } else {
-        put32(text, size);
-      }
-    }
-    return text;
-  }
-  void put_in_directory(std::string& to) const {
-    to.append("PK\x01\x02", 4);
-    put16(to, wide ? 45 : 20);  // version made by
-    put_common(to);
-    put16(to, 0);  // comment
-    put16(to, 0);  // disk
-    put16(to, 0);  // attributes
-    put32(to, 0);
-    put32(to, offset);
-    put_extra(to);
-  }
-};
 
 class NpzWriter final : public SlabWriter {
  public:
@@ -116,7 +50,7 @@ class NpzWriter final : public SlabWriter {
          {std::pair{"origin.npy", grid().origin}, std::pair{"spacing.npy", grid().voxel_size}}) {
       std::string data = npy_head("<f8", false, "(3,)");
       for (int axis = 0; axis < 3; ++axis) put(data, vector[axis]);
-      Entry& entry = entries_.emplace_back();
+      ZipEntry& entry = entries_.emplace_back();
       entry.name = name;
       entry.crc = checksum(data);
       entry.bytes = entry.compressed = data.size();
@@ -124,7 +58,7 @@ class NpzWriter final : public SlabWriter {
       if (auto written = output_.append(entry.local_head() + data); !written) return written;
     }
     const std::string head = npy_head(values_, dims());
-    Entry& voxels = entries_.emplace_back();
+    ZipEntry& voxels = entries_.emplace_back();
     voxels.name = "voxels.npy";
     voxels.deflated = true;
     voxels.follows = output_.sequential();
@@ -155,7 +89,7 @@ class NpzWriter final : public SlabWriter {
   }
 
   Result<void> finish_output(const Execution&) override {
-    Entry& voxels = entries_.back();
+    ZipEntry& voxels = entries_.back();
     std::string end(DeflatedLayers::kEnd);
     voxels.compressed = output_.position() + end.size() - data_begin_;
     if (voxels.follows) {
@@ -165,37 +99,15 @@ class NpzWriter final : public SlabWriter {
       auto patched = output_.patch(voxels.offset, head.data(), head.size());
       if (!patched) return patched;
     }
-    const std::uint64_t begin = output_.position() + end.size();
-    std::string directory;
-    for (const Entry& entry : entries_) entry.put_in_directory(directory);
-    const std::uint64_t size = directory.size(), count = entries_.size();
-    if (voxels.wide) {
-      directory.append("PK\x06\x06", 4);
-      put(directory, std::uint64_t{44});  // bytes that follow
-      put16(directory, 45);
-      put16(directory, 45);
-      put(directory, std::uint64_t{0});  // disks
-      for (const std::uint64_t number : {count, count, size, begin}) put(directory, number);
-      directory.append("PK\x06\x07", 4);
-      put32(directory, 0);
-      put(directory, begin + size);  // of the record before
-      put32(directory, 1);           // disks
-    }
-    directory.append("PK\x05\x06", 4);
-    put32(directory, 0);  // disks
-    put16(directory, static_cast<unsigned>(count));
-    put16(directory, static_cast<unsigned>(count));
-    put32(directory, size);
-    put32(directory, voxels.wide ? kUnknown : begin);
-    put16(directory, 0);  // comment
-    if (auto written = output_.append(end + directory); !written) return written;
+    end += zip_directory(entries_, output_.position() + end.size());
+    if (auto written = output_.append(end); !written) return written;
     return output_.commit();
   }
 
   DenseValues values_;
   BlockOutput output_;
   DeflatedLayers layers_;
-  std::vector<Entry> entries_;  // the voxels last
+  std::vector<ZipEntry> entries_;  // the voxels last
   std::uint64_t data_begin_ = 0;
 };
 
