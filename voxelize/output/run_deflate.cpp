@@ -200,6 +200,13 @@ void RunDeflater::flush_run() {
 // by N a + sum of (N - k) x_k. Byte k of an element of m stands at k, k + m, .. of n elements,
 // which adds n (N - k) - m n (n - 1) / 2 times it.
 void RunDeflater::add_to_adler() {
+  if (element_ == 1 && length_ < kAdlerBase) {  // no product is near 2^64
+    const std::uint64_t n = length_, value = value_ & 0xff;
+    adler_b_ = static_cast<std::uint32_t>((adler_b_ + n * adler_a_ + n * (n + 1) / 2 * value) %
+                                          kAdlerBase);
+    adler_a_ = static_cast<std::uint32_t>((adler_a_ + n * value) % kAdlerBase);
+    return;
+  }
   const std::uint64_t bytes = length_ * element_, count = length_ % kAdlerBase;
   const std::uint64_t pairs = (length_ % 2 == 0 ? length_ / 2 : length_) % kAdlerBase *
                               ((length_ % 2 == 0 ? length_ - 1 : length_ / 2) % kAdlerBase) %
