@@ -19,11 +19,6 @@
 
 namespace strata {
 
-/// The label of a full voxel with `rays` x `rays` rays: lattice steps of the finer grid.
-[[nodiscard]] constexpr std::uint32_t full_coverage(int rays) {
-  return static_cast<std::uint32_t>(rays * rays * rays) << kLatticeBits;
-}
-
 /// The voxels of one tile of rays: kTileSide / rays squared columns, row by row.
 struct CoveragePiece {
   std::vector<std::uint32_t> ends;  ///< of the intervals of each column in `items`

@@ -199,6 +199,7 @@ void define_voxelize(CLI::App& app, Words& words) {
        "Write a fog volume to a .vdb: the filled fraction of each voxel, 0 to 1, from NxNxN "
        "samples; N is 1 to 16 (default: 4)",
        "[=N]");
+  add_coverage(app, words, output);
   flag(app, output, "--mask", words.mask,
        "Write a mask grid to a .vdb: smaller, but fewer programs read it");
   flag(app, output, "--ids", words.ids,
@@ -521,6 +522,7 @@ VoxelizeCommand voxelize_command(const Words& words, Reader& reader) {
   command.grid = grid_request(words, reader);
   command.default_size = words.resolution.empty() && words.voxel_size.empty() && words.grid.empty();
   read_values(words, command, reader);
+  read_coverage(words, command, reader);
   if (command.backend == Backend::kGl && !command.solid) {
     reader.fail_with(
         "--backend gl cannot be combined with --surface alone, which needs no depth lists");

@@ -29,6 +29,12 @@ struct VoxelWords {
   std::string style, slice, colours, threshold;
 };
 
+/// The options of `strata voxelize` for filled fractions and pictures of layers.
+struct CoverageWords {
+  std::string coverage, gamma, flip, slice_axis, display, exposure;
+  bool grey = false, floats = false;
+};
+
 /// The words of the command line before they are read as numbers and choices. Empty: not given.
 struct Words {
   std::vector<std::string> files;
@@ -48,6 +54,7 @@ struct Words {
   OitWords oit;
   MeshWords mesh;
   VoxelWords voxels;
+  CoverageWords coverage;
 };
 
 /// Reads one option's value into `target`; keeps the first error.
@@ -77,9 +84,14 @@ class Reader {
 void add_common(CLI::App& app, Words& words);
 void add_json(CLI::App& app, Words& words, const char* group);
 void add_backend(CLI::App& app, Words& words, const char* group);
+void add_coverage(CLI::App& app, Words& words, const char* group);
 CommonOptions common_options(const Words& words, Reader& reader);
 /// @param pictures  for strata csg, which reads scenes from standard input too
 csg::SceneInput input_options(const Words& words, bool pictures, Reader& reader);
+
+struct VoxelizeCommand;
+/// --coverage and what pictures of layers take. After the output and what else values are.
+void read_coverage(const Words& words, VoxelizeCommand& command, Reader& reader);
 
 /// Where no output is given: refuses a last input that does not exist and has the name of an
 /// output, `strata voxelize knot.obj knot.vdb`.

@@ -18,6 +18,7 @@
 #include "strata/raster/camera_file.h"
 #include "strata/transparency/techniques.h"
 #include "strata/voxelize/grid_fit.h"
+#include "strata/voxelize/output/voxel_output.h"
 #include "strata/voxelize/picture/voxel_picture.h"
 #include "strata/voxelize/readers/read_voxels.h"
 #include "strata/voxelize/voxelize.h"
@@ -42,6 +43,9 @@ struct VoxelizeCommand {
   std::string format;           ///< empty: by extension
   int fog = 0;                  ///< samples along a voxel's side of a fog volume; 0: none
   bool fog_by_default = false;  ///< of which no number was given
+  int coverage = 0;             ///< rays along a voxel's side for its filled fraction; 0: none
+  bool floats = false;          ///< fractions are floats in formats of arrays
+  LayerOptions layers;          ///< of pictures
   bool mask = false;
   bool ids = false;                        ///< values say which solid
   bool sdf = false;                        ///< values are signed distances

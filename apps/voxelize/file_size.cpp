@@ -124,7 +124,7 @@ class SizeBound {
     if (format == "vdb") return vdb();
     if (format == "binvox") return binvox();
     if (format == "vox") return vox();
-    if (format == "png") return png();
+    if (format == "png" || format == "sl1") return pictures();
     if (format == "zarr") return zarr();
     if (format == "tif") return layers(RunBytes::kIds, cells_) + 512.0 * grid_.dims.z;
     return layers(values_.codes, cells_);  // npz, nrrd, vti, nii.gz, mha
@@ -170,7 +170,7 @@ class SizeBound {
           BoxCount(grid_, 1, static_cast<int>(axis))(*factors_.mesh, execution_);
       count += closed_ ? crossings : 2 * crossings;  // a face without a partner is a thin sheet
     }
-    if (factors_.surface) count += 2 * touched();
+    if (factors_.surface || factors_.rays > 0) count += 2 * touched();
     return std::min(count, cells_);
   }
   [[nodiscard]] double touched() const { return BoxCount(grid_, 1, 3)(*factors_.mesh, execution_); }
@@ -186,12 +186,22 @@ class SizeBound {
     const double count = grid_.dims.z + 2;  // with what stands before and after
     return kHeads + 8 * count + deflated(kind, changes(Axis::kX) + count, elements, count);
   }
-  [[nodiscard]] double png() const {
+  /// Pictures of layers, in a folder or an archive.
+  [[nodiscard]] double pictures() const {
+    const LayerOptions& layers = file_.layers;
+    const int axis = static_cast<int>(layers.axis);
+    glm::ivec2 size(grid_.dims[axis == 0 ? 1 : 0], grid_.dims[axis == 2 ? 1 : 2]);
+    if (layers.display.x > 0) size = layers.display;
     const bool flags = values_.codes == RunBytes::kFlags;
-    constexpr double kChunks = 57 + 6;  // signature, heads, sums
-    const double row = flags ? 8 * parts(grid_.dims.x, 8) + 8 : grid_.dims.x + 1.0;
-    return kChunks * grid_.dims.z + (flags ? 0.0 : cells_ / grid_.dims.x * 4) +
-           layers(flags ? RunBytes::kBits : RunBytes::kIds, row * grid_.dims.y * grid_.dims.z);
+    constexpr double kChunks = 57 + 6;             // signature, heads, sums
+    constexpr double kEntry = 76 + 2 * (255 + 9);  // heads of an archive, and the longest names
+    const double count = grid_.dims[axis];
+    const double row = flags ? 8 * parts(size.x, 8) + 8 : size.x + 1.0;
+    const double runs = changes(axis == 0 ? Axis::kY : Axis::kX) + count;
+    return kHeads + (kChunks + 8 + (factors_.format == "sl1" ? kEntry : 0.0)) * count +
+           (flags ? 0.0 : size.y * count * 4) +
+           deflated(flags ? RunBytes::kBits : RunBytes::kIds, runs, row * size.y * count,
+                    count + 2);
   }
   [[nodiscard]] double zarr() const {
     constexpr int kSide = 64;

@@ -77,7 +77,10 @@ Result<std::optional<VoxelFormat>> output_format(const VoxelizeCommand& command)
                 "xyz"[static_cast<int>(*command.axis)], format -> name,
                 "xyz"[static_cast<int>(format->axis)]);
   }
-  return std::optional(*format);
+  std::optional<VoxelFormat> chosen = *format;
+  // Rows of pictures across x run along y.
+  if (command.layers.axis == Axis::kX) chosen->axis = Axis::kY;
+  return chosen;
 }
 
 /// What --open says of meshes that are not closed: refuses, or says who decides where no vote can.
@@ -93,6 +96,11 @@ Result<void> check_open(const VoxelizeCommand& command, const csg::SolidInput& i
   if (command.ids && command.open == OpenMode::kSurface) {
     return fail(ErrorCode::kUsage,
                 "--ids needs solids, but --open surface keeps only the surface: {}", file.open);
+  }
+  if (command.coverage != 0 && command.open == OpenMode::kSurface) {
+    return fail(ErrorCode::kUsage,
+                "--coverage needs a solid, but --open surface keeps only the surface: {}",
+                file.open);
   }
   if (command.ids && !input.has_scene()) {
     return fail(ErrorCode::kUsage,
@@ -156,8 +164,14 @@ Result<void> print_reports(const VoxelizeCommand& command, const VoxelizeOutcome
   return print_report(voxelize_json(command, outcome, session), "-", file_on_stdout);
 }
 
-Result<void> check_samples(int samples, const VoxelGrid& grid) {
+Result<void> check_samples(const VoxelizeCommand& command, int samples, const VoxelGrid& grid) {
   const int longest = std::max({grid.dims.x, grid.dims.y, grid.dims.z});
+  if (command.coverage * longest > kMaxGridSide) {
+    return fail(ErrorCode::kLimit,
+                "--coverage: {} rays per side on a grid of {} x {} x {} voxels exceed {}; give a "
+                "smaller --coverage=N",
+                command.coverage, grid.dims.x, grid.dims.y, grid.dims.z, kMaxGridSide);
+  }
   if (samples * longest <= kMaxGridSide) return {};
   return fail(ErrorCode::kLimit,
               "--fog: {} samples per side on a grid of {} x {} x {} voxels exceed {}; give a "
@@ -177,11 +191,12 @@ MemoryFactors memory_factors(const VoxelizeCommand& command, const VoxelizeOutco
   for (const csg::InputFacts& file : input.files) factors.open_edges += file.unbalanced_edges;
   factors.axis = outcome.axis;
   factors.samples = samples;
+  factors.rays = command.coverage;
   factors.solid = command.solid;
   factors.surface = command.surface;
   if (outcome.format) factors.format = outcome.format->name;
   factors.ids = command.ids;
-  factors.fog = command.fog != 0;
+  factors.fog = command.fog != 0 || command.coverage != 0;
   if (command.sdf) factors.band = command.band;
   factors.everywhere = command.band_all;
   factors.threads = session.threads();
@@ -240,7 +255,7 @@ Result<void> make_voxels(const VoxelizeCommand& command, Session& session) {
   outcome.grid = *grid;
   outcome.axis = choose_axis(command, outcome.format, outcome.grid);
   const int samples = fog_samples(command, outcome.input);
-  if (const auto valid = check_samples(samples, outcome.grid); !valid) return valid;
+  if (const auto valid = check_samples(command, samples, outcome.grid); !valid) return valid;
   outcome.estimate =
       estimate_memory(outcome.grid, memory_factors(command, outcome, samples, session));
   if (auto valid = check_memory(command, outcome, session); !valid) return valid;

@@ -112,6 +112,12 @@ void write_results(JsonWriter& json, const VoxelizeCommand& command,
   json.member("volume", static_cast<double>(report.solid_voxels) * voxel_volume(outcome.grid));
   json.member("area_estimate", outcome.area_estimate);
   json.member("intervals", report.intervals);
+  if (command.coverage != 0) {
+    json.key("coverage").begin_object();
+    json.member("rays", command.coverage);
+    json.member("volume", outcome.filled_volume);
+    json.end_object();
+  }
   if (command.checksum) json.member("checksum", fmt::format("{:016x}", report.checksum));
   json.end_object();
 
@@ -224,6 +230,10 @@ void tell_results(Lines& line, const VoxelizeCommand& command, const VoxelizeOut
     line("sdf",
          fmt::format("{} voxels{} of the {}, {:.6g} to {:.6g}", grouped(found.band_voxels), within,
                      outcome.exact_boundary ? "boundary" : "surface", found.least, found.greatest));
+  }
+  if (command.coverage != 0) {
+    line("coverage", fmt::format("{0} x {0} rays a voxel, filled volume {1:.9g}", command.coverage,
+                                 outcome.filled_volume));
   }
   if (command.checksum) line("checksum", fmt::format("{:016x}", report.checksum));
   line("lists", fmt::format("{} crossings, at most {} in a column", grouped(report.crossings),

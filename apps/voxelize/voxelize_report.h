@@ -33,6 +33,7 @@ struct VoxelizeOutcome {
   std::optional<std::uint64_t> output_bytes;
   std::optional<FileSize> file_size;     ///< of a dry run
   std::vector<std::uint64_t> id_voxels;  ///< of solid n of the scene, with --ids
+  double filled_volume = 0.0;            ///< by --coverage, cubic world units
   double write_ms = 0.0;
 };
 

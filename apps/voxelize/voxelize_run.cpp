@@ -162,6 +162,7 @@ VoxelizeOptions voxelize_options(const VoxelizeCommand& command, const VoxelizeO
 Result<void> check_voxels(const VoxelizeCommand& command, VoxelizeOutcome& outcome,
                           const Execution& execution, Session& session) {
   check_columns(command, outcome, session);
+  if (command.coverage != 0) return session.check_strict();  // no wall falls between rays and ends
   if (!command.surface && !is_surface_alone(command, outcome.input)) {
     if (auto done = check_thin(command, outcome, execution, session); !done) return done;
   } else if (outcome.report.solid_voxels == 0) {
@@ -183,9 +184,8 @@ class VoxelizeRun {
     if (auto done = open(); !done) return done;
     if (auto done = command_.sdf ? distances() : voxelize(); !done) return done;
     if (auto done = check_voxels(command_, outcome_, quiet_, session_); !done) return done;
-    if (!writer_) return {};
-    if (auto done = write_samples(); !done) return done;
-    return finish();
+    if (auto done = write_shares(); !done) return done;
+    return writer_ ? finish() : Result<void>();
   }
 
  private:
@@ -193,7 +193,7 @@ class VoxelizeRun {
   Result<void> open_source();
   Result<void> voxelize();
   Result<void> distances();
-  Result<void> write_samples();
+  Result<void> write_shares();
   Result<void> finish();
   template <class Add>
   Result<void> write(Add&& add);
@@ -204,6 +204,9 @@ class VoxelizeRun {
   const VoxelizeCommand& command_;
   VoxelizeOutcome& outcome_;
   Session& session_;
+  /// Values are fractions of voxels, which are made apart from what is reported.
+  [[nodiscard]] bool shares() const { return samples_ > 1 || command_.coverage != 0; }
+
   int samples_;  ///< along a voxel's side
   std::unique_ptr<VoxelWriter> writer_;
   std::unique_ptr<csg::Gpu> gpu_;
@@ -233,7 +236,7 @@ Result<void> VoxelizeRun::open() {
   if (command_.solid) {
     if (auto done = open_source(); !done) return done;
   }
-  execution_ = session_.execution("voxelizing", samples_ > 1 ? 0.2 : 1.0);
+  execution_ = session_.execution("voxelizing", shares() ? 0.2 : 1.0);
   // The mesh is there already; what the format holds is not the voxelizer's.
   const std::uint64_t taken = outcome_.estimate.mesh + outcome_.estimate.output;
   execution_.memory_limit = std::max<std::uint64_t>(
@@ -268,7 +271,7 @@ Result<void> VoxelizeRun::take(const VoxelIntervals& slab) {
   if (!options_.statistics) solid_voxels_ += slab.solid_voxels();
   if (boundary_) boundary_->add(slab, quiet_);
   if (command_.ids) count_ids(slab, outcome_.id_voxels);
-  if (samples_ > 1) return {};
+  if (shares()) return {};
   return write([&](VoxelWriter& writer) { return writer.add(slab, quiet_); });
 }
 
@@ -285,7 +288,8 @@ Result<void> VoxelizeRun::take_coloured(const VoxelIntervals& slab) {
 Result<void> VoxelizeRun::voxelize() {
   if (command_.stats || command_.json) boundary_.emplace(outcome_.grid, outcome_.axis);
   VoxelGrid finest = outcome_.grid;
-  finest.dims *= std::max(1, samples_), finest.voxel_size /= std::max(1, samples_);
+  const int fine = std::max({1, samples_, command_.coverage});
+  finest.dims *= fine, finest.voxel_size /= fine;
   if (command_.colours) {
     auto made = Colouring::create(command_, outcome_, quiet_, session_);
     if (!made) return tl::unexpected(made.error());
@@ -345,11 +349,11 @@ Result<void> VoxelizeRun::distances() {
   return {};
 }
 
-/// The numbers of the report are of the voxels whose centre is inside; a fog volume has the filled
-/// fraction.
-Result<void> VoxelizeRun::write_samples() {
-  if (samples_ <= 1) return {};
-  options_.samples = samples_;
+/// The numbers of the report are of the voxels whose centre is inside; fractions come apart.
+Result<void> VoxelizeRun::write_shares() {
+  if (!shares() || (!writer_ && command_.coverage == 0)) return {};
+  options_.samples = std::max(1, samples_);
+  options_.rays = command_.coverage;
   options_.statistics = false;
   Execution fine = session_.execution("sampling", 1.0);
   fine.memory_limit = execution_.memory_limit;
@@ -359,7 +363,14 @@ Result<void> VoxelizeRun::write_samples() {
       });
   if (!done) return tl::unexpected(done.error());
   if (session_.interrupted()) return fail(ErrorCode::kCancelled, "stopped");
-  return {};
+  if (command_.coverage == 0) return {};
+  const glm::dvec3 size = outcome_.grid.voxel_size;
+  outcome_.filled_volume = static_cast<double>(done->filled_steps) /
+                           full_coverage(command_.coverage) * size.x * size.y * size.z;
+  if (done->filled_steps == 0) {
+    session_.warn("empty", "no voxel is filled; the grid may not cover the mesh");
+  }
+  return session_.check_strict();
 }
 
 Result<void> VoxelizeRun::finish() {
@@ -385,7 +396,10 @@ int fog_samples(const VoxelizeCommand& command, const csg::SolidInput& input) {
 VoxelWriterOptions writer_options(const VoxelizeCommand& command, VoxelizeOutcome& outcome,
                                   int samples, Session& session) {
   VoxelWriterOptions file;
-  file.fog = static_cast<std::uint32_t>(samples * samples * samples);
+  file.fog = command.coverage != 0 ? full_coverage(command.coverage)
+                                   : static_cast<std::uint32_t>(samples * samples * samples);
+  file.fog_floats = command.floats || command.fog != 0;
+  file.layers = command.layers;
   file.mask = command.mask;
   if (command.sdf) {
     const double band = band_in_world(outcome.grid, command.band);

@@ -75,6 +75,11 @@ struct VoxelizeOptions {
   ListSource* source = nullptr;
 };
 
+/// The label of a full voxel with VoxelizeOptions::rays.
+[[nodiscard]] constexpr std::uint32_t full_coverage(int rays) {
+  return std::uint32_t{256} * static_cast<std::uint32_t>(rays * rays * rays);
+}
+
 /// Statistics of a voxelization.
 struct VoxelizeReport {
   std::uint64_t solid_voxels = 0;          ///< with `statistics`

@@ -54,18 +54,36 @@ double bin_bytes(const VoxelGrid& grid, const MemoryFactors& factors, double are
   return open + triangles * 8 + references * 4 + tiles * (4.0 + 8.0 * factors.threads);
 }
 
+constexpr double kWorkerBytes = 6e6;
+
+/// Fractions: offsets of columns, and intervals with labels, of a slab or all. A surface of area A
+/// meets about 1.5 A voxels, which are an interval each, held twice.
+double covered_bytes(const VoxelGrid& grid, const MemoryFactors& factors, double area) {
+  const double fine = std::max(factors.rays, 1);
+  const double columns_there = columns(grid, factors.axis) / (fine * fine);
+  const AxisFrame frame(factors.axis);
+  const double budget = factors.limit > 0
+                            ? std::min(512.0 * 1024 * 1024, static_cast<double>(factors.limit) / 8)
+                            : 512.0 * 1024 * 1024;
+  const double all = columns_there * 8 + 1.5 * area / (fine * fine) * 16;
+  const double rows = std::max(64.0, budget / (129.0 / (fine * fine) * fine * grid.dims[frame.u]));
+  const double part = std::min(1.0, 2 * rows * fine / grid.dims[frame.v]);
+  const double changes = 64.0 / fine * grid.dims[frame.w] / fine * 4;
+  return all * part + (kWorkerBytes + changes) * factors.threads;
+}
+
 /// Offsets and two intervals a column, with their copies; slabs keep to an eighth of the limit, but
 /// hold 64 rows at least (see voxelize_slabs).
-double slab_bytes(const VoxelGrid& grid, const MemoryFactors& factors) {
+double slab_bytes(const VoxelGrid& grid, const MemoryFactors& factors, double area) {
   constexpr double kColumnBytes = 16, kDefaultSlab = 512.0 * 1024 * 1024;
   const AxisFrame frame(factors.axis);
+  if (factors.rays > 0) return covered_bytes(grid, factors, area);
   const double least = 64.0 * std::max(factors.samples, 1) * grid.dims[frame.u] * kColumnBytes;
   const double budget = factors.limit > 0
                             ? std::min(kDefaultSlab, static_cast<double>(factors.limit) / 8)
                             : kDefaultSlab;
   double slab = std::min(columns(grid, factors.axis) * kColumnBytes, std::max(least, budget));
   if (factors.surface && factors.solid) slab *= 2;
-  constexpr double kWorkerBytes = 6e6;
   return slab + kWorkerBytes * factors.threads;
 }
 
@@ -109,7 +127,7 @@ double output_bytes(const VoxelGrid& voxels, const VoxelGrid& grid, const Memory
     const double leaf = factors.ids ? 144 : factors.fog ? 600 : 72;
     const double there = std::ceil(voxels.dims.x / 8.0) * std::ceil(voxels.dims.y / 8.0) *
                          std::ceil(voxels.dims.z / 8.0);
-    const int fine = std::max(factors.samples, 1);
+    const int fine = std::max({factors.samples, factors.rays, 1});
     return std::min(area / (fine * fine) * 1.5 / 64, there) * leaf;
   }
   if (factors.format == "binvox") {
@@ -117,13 +135,13 @@ double output_bytes(const VoxelGrid& voxels, const VoxelGrid& grid, const Memory
     return columns(grid, factors.axis) * 8 + longest * longest / 127 * factors.threads;
   }
   // Formats written piece by piece: a few layers of packed or compressed voxels.
-  return 16e6 + columns(grid, factors.axis);
+  return 16e6 + columns(factors.rays > 0 ? voxels : grid, factors.axis);
 }
 
 }  // namespace
 
 MemoryEstimate estimate_memory(const VoxelGrid& voxels, const MemoryFactors& factors) {
-  const int fine = std::max(factors.samples, 1);
+  const int fine = std::max({factors.samples, factors.rays, 1});
   VoxelGrid grid = voxels;  // that is walked: of the samples
   grid.dims *= fine;
   grid.voxel_size /= fine;
@@ -137,7 +155,7 @@ MemoryEstimate estimate_memory(const VoxelGrid& voxels, const MemoryFactors& fac
       rounded(static_cast<double>(factors.mesh->positions.size()) * (24 + 12) + triangles * 12 +
               static_cast<double>(factors.mesh->face_elements.size()) * 4 + owners);
   estimate.bins = rounded(bin_bytes(grid, factors, area) + distances.bins);
-  estimate.slabs = rounded(slab_bytes(grid, factors) + distances.layers);
+  estimate.slabs = rounded(slab_bytes(grid, factors, area) + distances.layers);
   double output = output_bytes(voxels, grid, factors, area);
   if (factors.band > 0) {
     // Other formats than .vdb take runs of a value and a label; of .zarr all are kept, twice.

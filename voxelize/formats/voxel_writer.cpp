@@ -47,6 +47,7 @@ VoxelWriterResult open_format(const std::string& path, const std::string& name,
                               const VoxelGrid& grid, const VoxelWriterOptions& options) {
   if (name == "vdb") return open_vdb_writer(path, grid, options);
   if (name == "png") return open_png_writer(path, grid, options);
+  if (name == "sl1") return open_sl1_writer(path, grid, options);
   if (name == "npy") return open_npy_writer(path, grid, options);
   if (name == "npz") return open_npz_writer(path, grid, options);
   if (name == "nrrd") return open_nrrd_writer(path, grid, options);

@@ -12,8 +12,8 @@ Result<void> VoxelWriter::add_distances(const ScalarField&, int, const Execution
   return fail(ErrorCode::kUsage, "the format holds no distances");
 }
 
-SlabWriter::SlabWriter(std::string path, const VoxelGrid& grid, Axis axis)
-    : path_(std::move(path)), grid_(grid), axis_(axis), given_axis_(axis) {}
+SlabWriter::SlabWriter(std::string path, const VoxelGrid& grid, Axis axis, bool whole)
+    : path_(std::move(path)), grid_(grid), axis_(axis), whole_(whole), given_axis_(axis) {}
 
 template <class Step>
 Result<void> SlabWriter::guarded(Step&& step) {
@@ -45,7 +45,7 @@ Result<void> SlabWriter::add(const VoxelIntervals& slab, const Execution& execut
     }
     next_row_ = slab.v_end();
     Result<void> result =
-        given_axis_ == axis_ ? add_slab(slab, execution) : add_turned(slab, execution);
+        given_axis_ == axis_ && !whole_ ? add_slab(slab, execution) : add_turned(slab, execution);
     // Skipped work leaves holes, whatever the format believes.
     if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "cancelled");
     return result;
@@ -54,7 +54,8 @@ Result<void> SlabWriter::add(const VoxelIntervals& slab, const Execution& execut
 
 Result<void> SlabWriter::add_turned(const VoxelIntervals& slab, const Execution& execution) {
   if (slab.v_begin() == 0 && slab.v_end() == rows()) {
-    return add_slab(transposed(slab, axis_, execution), execution);
+    return given_axis_ == axis_ ? add_slab(slab, execution)
+                                : add_slab(transposed(slab, axis_, execution), execution);
   }
   if (slab.v_begin() == 0) kept_ = VoxelIntervals(grid_, given_axis_);
   for (int tv = 0; tv < slab.tiles_v(); ++tv) {
@@ -66,7 +67,8 @@ Result<void> SlabWriter::add_turned(const VoxelIntervals& slab, const Execution&
     }
   }
   if (slab.v_end() < rows()) return {};
-  const VoxelIntervals turned = transposed(kept_, axis_, execution);
+  const VoxelIntervals turned =
+      given_axis_ == axis_ ? std::move(kept_) : transposed(kept_, axis_, execution);
   kept_ = {};
   return add_slab(turned, execution);
 }

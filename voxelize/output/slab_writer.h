@@ -18,7 +18,8 @@ class SlabWriter : public VoxelWriter {
  protected:
   /// @param path is only named in messages
   /// @param axis of the slabs that add_slab() takes
-  SlabWriter(std::string path, const VoxelGrid& grid, Axis axis);
+  /// @param whole  add_slab() takes the whole set at once
+  SlabWriter(std::string path, const VoxelGrid& grid, Axis axis, bool whole = false);
 
   virtual Result<void> add_slab(const VoxelIntervals& slab, const Execution& execution) = 0;
   /// Completes and commits the output; kCancelled, without committing, if work was skipped.
@@ -37,6 +38,7 @@ class SlabWriter : public VoxelWriter {
   std::string path_;
   VoxelGrid grid_;
   Axis axis_;
+  bool whole_;
   Axis given_axis_;      // of the slabs that come
   VoxelIntervals kept_;  // those of another axis, until all are there
   int next_row_ = 0;     // v of the slab that must come next

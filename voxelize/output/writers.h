@@ -23,6 +23,8 @@ VoxelWriterResult open_schem_writer(const std::string& path, const VoxelGrid& gr
                                     const VoxelWriterOptions& options);
 VoxelWriterResult open_png_writer(const std::string& path, const VoxelGrid& grid,
                                   const VoxelWriterOptions& options);
+VoxelWriterResult open_sl1_writer(const std::string& path, const VoxelGrid& grid,
+                                  const VoxelWriterOptions& options);
 VoxelWriterResult open_npy_writer(const std::string& path, const VoxelGrid& grid,
                                   const VoxelWriterOptions& options);
 VoxelWriterResult open_npz_writer(const std::string& path, const VoxelGrid& grid,

@@ -19,6 +19,7 @@ namespace {
 struct SliceFolder {
   VoxelGrid grid;
   bool descending = true;     // rows
+  bool mirrored = false;      // columns descend
   std::string before, after;  // of the number in a file's name
   int digits = 0;
 
@@ -51,6 +52,13 @@ Result<SliceFolder> read_description(const ReadContext& context) {
   }
   const JsonValue* order = json->find("row_order");
   folder.descending = order == nullptr || order->text != "ascending";
+  const JsonValue* columns = json->find("column_order");
+  folder.mirrored = columns != nullptr && columns->text == "descending";
+  const JsonValue* across = json->find("slice_axis");
+  if (across != nullptr && across->text != "z") {
+    return fail(ErrorCode::kInput, "{}: slice_axis must be z to be read, got '{}'", path,
+                across->text.substr(0, 20));
+  }
   const JsonValue* name = json->find("slices");
   const std::string pattern = name == nullptr ? "slice_%05d.png" : name->text;
   const std::size_t percent = pattern.find("%0");
@@ -116,10 +124,11 @@ class SlabOfSlices {
           pixels->data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(dims.x);
       TileRuns& tile = tiles_[static_cast<std::size_t>(y / kTileSide)];
       const auto local = static_cast<unsigned>(z % kTileSide * kTileSide + y % kTileSide);
+      const auto pixel = [&](int x) { return from[folder_.mirrored ? dims.x - 1 - x : x]; };
       for (int x = 0; x < dims.x;) {
         int past = x + 1;
-        while (past < dims.x && from[past] == from[x]) ++past;
-        if (from[x] != 0) tile.add(local, x, past - 1, from[x]);
+        while (past < dims.x && pixel(past) == pixel(x)) ++past;
+        if (pixel(x) != 0) tile.add(local, x, past - 1, pixel(x));
         x = past;
       }
     }

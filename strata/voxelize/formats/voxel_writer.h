@@ -18,7 +18,7 @@ namespace strata {
 /// One output format of `strata voxelize`.
 struct VoxelFormat {
   std::string name;  ///< what --format takes: "vdb", "npy", "npz", "nrrd", "vti", "binvox", "vox",
-                     ///< "png", "zarr"
+                     ///< "png", "sl1", "zarr"
   std::string extension;    ///< with the dot; that of a folder format ends with a slash
   std::string description;  ///< one line for --list-formats
   std::string also = {};    ///< another extension of the format; empty: none
@@ -31,6 +31,7 @@ struct VoxelFormat {
   bool shares = false;      ///< holds VoxelWriterOptions::fog
   bool rgba = false;        ///< holds VoxelWriterOptions::rgba
   bool distances = false;   ///< holds VoxelWriterOptions::band
+  bool pictures = false;    ///< layers are pictures: VoxelWriterOptions::layers
 };
 
 /// The formats this build can write.
@@ -81,6 +82,7 @@ struct MemoryFactors {
   // The voxels.
   Axis axis = Axis::kZ;  ///< of the intervals
   int samples = 0;       ///< of a fog volume, along a voxel's side; 0 or 1: the centre alone
+  int rays = 0;          ///< as VoxelizeOptions::rays
   bool solid = true;     ///< as VoxelizeOptions::solid
   bool surface = false;  ///< as VoxelizeOptions::surface
   // The file.

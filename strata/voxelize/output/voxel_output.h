@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <glm/vec2.hpp>
 #include <glm/vec4.hpp>
 #include <string>
 #include <vector>
@@ -12,6 +13,22 @@
 #include "strata/voxelize/scalar_field.h"
 
 namespace strata {
+
+/// How layers become pictures, in a folder of PNG slices or an .sl1.
+struct LayerOptions {
+  /// Across the pictures. Those of z show x to the right and y up, those of y (seen from the front)
+  /// x and z, those of x y and z. An .sl1 has layers of z.
+  Axis axis = Axis::kZ;
+  bool mirror_left_right = false;  ///< of each picture
+  bool mirror_up_down = false;     ///< of each picture
+  /// With shares: grey is 255 * share^gamma, rounded; 0: 255 from a half on, else 0.
+  double gamma = 1.0;
+  // Of an .sl1.
+  glm::ivec2 display{0};   ///< pixels of a picture, in whose middle the layer lies; 0: its own
+  double exposure = 10.0;  ///< seconds a layer
+  double first_exposure = 15.0;   ///< of the first layers
+  std::int64_t time = 315532800;  ///< seconds since 1970; the first of the year 1980
+};
 
 /// Settings of open_voxel_writer().
 struct VoxelWriterOptions {
@@ -38,7 +55,8 @@ struct VoxelWriterOptions {
   /// Label n has the colour colours[n - 1]: red, green, blue, alpha. Empty: one colour. Not with
   /// ids.
   std::vector<glm::u8vec4> colours{};
-  GridFrame frame{};  ///< of the grid in the world
+  GridFrame frame{};      ///< of the grid in the world
+  LayerOptions layers{};  ///< of pictures
 };
 
 /// Writes a voxel set slab by slab: every slab of one axis, in increasing v, then finish(). Any

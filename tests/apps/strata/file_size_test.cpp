@@ -80,7 +80,12 @@ TEST_F(FileSize, HoldsForEveryFormatAndKindOfSolid) {
     holds({input, "-r", "130", "--mask"}, "a.vdb");
     for (const char* output : {"a.vdb", "a.npy", "a.npz", "a.nrrd", "a.vti", "a.zarr"}) {
       holds({input, "-r", "37", "--sdf"}, output);
+      holds({input, "-r", "60", "--coverage=4"}, output);
+      holds({input, "-r", "30", "--coverage=2", "--floats"}, output);
     }
+    holds({input, "-r", "60"}, "a.sl1");
+    holds({input, "-r", "60", "--display", "90x130"}, "a.sl1");
+    holds({input, "-r", "60", "--grey", "--slice-axis", "x"}, "slices/");
     holds({input, "-r", "20", "--sdf", "--band", "all"}, "a.npz");
   }
 }

@@ -106,7 +106,7 @@ std::string format_name(const ::testing::TestParamInfo<VoxelFormat>& info) {
   return name;
 }
 TEST(Readers, ReadEveryFormatThatIsWritten) {
-  EXPECT_EQ(readable(false).size() + 3, voxel_formats().size()) << "but ply, xyz and schem";
+  EXPECT_EQ(readable(false).size() + 4, voxel_formats().size()) << "but sl1, ply, xyz and schem";
 }
 INSTANTIATE_TEST_SUITE_P(Formats, RoundTrip, ::testing::ValuesIn(readable(false)), format_name);
 class IdsRoundTrip : public RoundTrip {};
@@ -233,6 +233,30 @@ TEST_P(RoundTrip, AStopEndsTheWork) {
   const Result<VoxelVolume> read = read_voxels(path, {}, execution);
   ASSERT_FALSE(read);
   EXPECT_EQ(read.error().code, ErrorCode::kCancelled) << read.error().message;
+}
+
+TEST(SliceReader, ReadsMirroredSlicesAndRefusesThoseOfOtherAxes) {
+  const TemporaryFolder folder;
+  const VoxelGrid grid = make_grid({37, 20, 9});
+  const IdOf label = some_ids(200);
+  const VoxelIntervals set = labelled(grid, Axis::kX, label);
+  VoxelWriterOptions options;
+  options.ids = 200;
+  options.layers.mirror_left_right = options.layers.mirror_up_down = true;
+  const auto write = [&](const std::string& name) {
+    auto writer = open_voxel_writer(folder.file(name), "png", grid, options);
+    EXPECT_TRUE(writer && (*writer)->add(set, {}) && (*writer)->finish({}));
+    return read_voxels(folder.file(name));
+  };
+  const Result<VoxelVolume> read = write("mirrored");
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(to_dense_labels(read->set).value(), to_dense_labels(set).value());
+  options.layers.axis = Axis::kY;
+  const Result<VoxelVolume> refused = write("front");
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message.find("slice_axis must be z to be read, got 'y'"),
+            std::string::npos)
+      << refused.error().message;
 }
 
 }  // namespace
