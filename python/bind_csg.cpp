@@ -87,16 +87,25 @@ std::tuple<SolidPtr, Warnings, std::vector<std::string>> solid_of_scene(csg::Sce
   return {made, warnings, notes};
 }
 
-auto load_scene_file(const std::string& path, const std::vector<std::string>& defines,
-                     const std::string& root, const Limits& limits) {
-  csg::ReadSceneOptions options;
-  options.root_folder = root;
+/// A scene, or a mesh, of which each part may be a solid.
+std::tuple<SolidPtr, Warnings, std::vector<std::string>> load_scene_file(
+    const std::string& path, const std::vector<std::string>& defines, const std::string& root,
+    bool parts, const Limits& limits) {
+  csg::SceneInput input;
+  input.files = {path};
+  input.scene.root_folder = root;
+  input.split_parts = parts;
   for (const std::string& define : defines) {
-    options.openscad_options.insert(options.openscad_options.end(), {"-D", define});
+    input.scene.openscad_options.insert(input.scene.openscad_options.end(), {"-D", define});
   }
-  return solid_of_scene(run(limits, [&](const Execution& execution) {
-    return csg::read_scene(path, options, execution);
+  Warnings warnings;
+  std::vector<std::string> notes;
+  csg::InputMessages messages = collect(warnings);
+  messages.echo = [&notes](std::string_view line) { notes.emplace_back(line); };
+  auto made = solid_of_scene(run(limits, [&](const Execution& execution) {
+    return csg::load_scene(input, messages, execution);
   }));
+  return {std::get<0>(made), std::move(warnings), std::move(notes)};
 }
 
 auto parse_scene_text(const std::string& text, const std::string& folder, const Limits& limits) {
@@ -216,7 +225,7 @@ py::array solid_picture(const SolidData& solid, const std::optional<CameraChoice
   const csg::PictureOptions options = options_of(look);
   Picture picture;
   run(limits, [&](const Execution& execution) -> Result<void> {
-    const auto pixels = size_of(size[0], size[1]);
+    const auto pixels = size_of(size[0], size[1], execution);
     if (!pixels) return tl::unexpected(pixels.error());
     csg::Scene scene = solid.scene;
     const auto placed = placed_camera(scene, camera.value_or(CameraChoice{}), camera.has_value(),

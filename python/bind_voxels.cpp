@@ -125,7 +125,12 @@ VoxelsPtr read_voxel_file(const std::string& path, const std::string& grid,
 
 // --- read ----------------------------------------------------------------------------------------
 
-bool has_labels(const VoxelsData& voxels) { return voxels.volume.set.has_labels(); }
+/// Also where no voxel is solid.
+bool has_labels(const VoxelsData& voxels) {
+  const VoxelKind kind = voxels.volume.kind;
+  return voxels.volume.set.has_labels() || voxels.full != 0 || kind == VoxelKind::kIds ||
+         kind == VoxelKind::kColours;
+}
 
 std::uint32_t largest_label(const VoxelIntervals& set) {
   std::uint32_t most = 0;
@@ -401,7 +406,7 @@ Picture voxel_picture(const VoxelsPtr& voxels, std::optional<std::pair<int, std:
                       int samples, const Limits& limits) {
   if (slice) check_slice(voxels->volume.grid(), slice->first, slice->second);
   return run(limits, [&](const Execution& execution) -> Result<Picture> {
-    const auto pixels = size_of(size[0], size[1]);
+    const auto pixels = size_of(size[0], size[1], execution);
     if (!pixels) return tl::unexpected(pixels.error());
     auto [set, look] = shown(voxels, execution);
     auto drawer = VoxelPicture::create(std::move(set), std::move(look), execution);
@@ -527,10 +532,17 @@ py::array array_of_picture(Picture&& picture) {
   return array_of(std::move(picture.pixels), py::dtype::of<std::uint8_t>(), {height, width, 4});
 }
 
-Result<glm::ivec2> size_of(std::int64_t width, std::int64_t height) {
+Result<glm::ivec2> size_of(std::int64_t width, std::int64_t height, const Execution& execution) {
   if (width < 1 || height < 1 || width > kMaxPictureSide || height > kMaxPictureSide) {
     return fail(ErrorCode::kUsage, "size must be 1 to {} pixels along each side, got {} x {}",
                 kMaxPictureSide, width, height);
+  }
+  constexpr double kBytesOfPixel = 64;  // while it is drawn
+  const double bytes = kBytesOfPixel * static_cast<double>(width) * static_cast<double>(height);
+  if (bytes > static_cast<double>(execution.memory_limit)) {
+    return fail(ErrorCode::kLimit,
+                "a picture of {} x {} pixels takes {:.3g} bytes to draw, the limit is {}", width,
+                height, bytes, execution.memory_limit);
   }
   return glm::ivec2(static_cast<int>(width), static_cast<int>(height));
 }

@@ -75,7 +75,8 @@ struct CameraChoice {
 
 /// A picture as an array of height x width x 4 bytes.
 [[nodiscard]] py::array array_of_picture(Picture&& picture);
-/// Checks the sides of a picture, which may be of any type in Python.
-[[nodiscard]] Result<glm::ivec2> size_of(std::int64_t width, std::int64_t height);
+/// Checks the sides of a picture, and that it fits the memory.
+[[nodiscard]] Result<glm::ivec2> size_of(std::int64_t width, std::int64_t height,
+                                         const Execution& execution);
 
 }  // namespace strata::python

@@ -6,27 +6,7 @@
 #include "strata/voxelize/colours/voxel_colours.h"
 #include "strata/voxelize/distance/signed_distance.h"
 
-namespace strata {
-class VoxelColours;
-class VoxelColouring;
-}  // namespace strata
-
 namespace strata::python {
-namespace {
-
-/// The class that gives voxels their colours, by whichever of two names it has.
-template <class A, class B>
-struct FirstComplete {
-  using Type = B;
-};
-template <class A, class B>
-requires(sizeof(A) > 0) struct FirstComplete<A, B> {
-  using Type = A;
-};
-using Colouring = FirstComplete<VoxelColouring, VoxelColours>::Type;
-
-}  // namespace
-
 Result<void> colour_of_mesh(const MeshData& mesh, const TriangleSoup& soup, bool solid,
                             const std::optional<glm::u8vec3>& inside, VoxelsData& voxels,
                             const Execution& execution) {
@@ -38,7 +18,7 @@ Result<void> colour_of_mesh(const MeshData& mesh, const TriangleSoup& soup, bool
   VoxelColourOptions options;
   options.solid = solid;
   if (inside) options.inside = glm::u8vec4(*inside, 255);
-  auto colouring = Colouring::create(soup, grid, *surface, options, execution);
+  auto colouring = VoxelColouring::create(soup, grid, *surface, options, execution);
   if (!colouring) return tl::unexpected(colouring.error());
   auto coloured = colouring->colour(voxels.volume.set, execution);
   if (!coloured) return tl::unexpected(coloured.error());

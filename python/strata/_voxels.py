@@ -466,9 +466,10 @@ def voxelize(
     surface_kind : {"conservative", 26, 6}
         Every voxel that the surface touches; 26-separating; 6-separating, the thinnest.
     ids : bool
-        Solids only: the label of a voxel is the number of the solid that it belongs to, from 1.
+        Solids and files: the label of a voxel is the number of the solid, or of the part of the file, that it belongs to,
+        from 1.
     coverage : bool or {1, 2, 4, 8, 16}
-        Each voxel has the fraction of it that is filled, above 0: the mean over so many times so many rays, each of which
+        Each voxel has the fraction of it that is filled, above 0: the mean over so many times so many rays along z, each of which
         counts the length inside exactly. True: 8. `numpy` gives float32.
     colours : bool
         Each voxel has the colour of the nearest point of the surface, textures filtered, or of the solid that it belongs
@@ -510,12 +511,16 @@ def voxelize(
 
     limits = limits_of(threads, memory_limit)
     rays = 8 * coverage if isinstance(coverage, (bool, np.bool_)) else integer_of(coverage, "coverage")
+    if ids and isinstance(mesh, (str, os.PathLike)):
+        from .csg import load
+
+        mesh = load(mesh, threads=threads)
     if isinstance(mesh, Solid):
         shape, make = mesh, _strata.voxelize_solid
     else:
         shape, make = mesh_of(mesh, threads), _strata.voxelize_mesh
         if ids:
-            raise UsageError("ids are of solids: strata.csg.Solid has them, a mesh has none")
+            raise UsageError("ids are of solids: give strata.csg.load(path), which has the parts of a file, or another csg.Solid")
     grid = grid_of(
         shape.bounds,
         resolution=resolution,

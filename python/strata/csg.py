@@ -407,8 +407,15 @@ def intersection(solids: Iterable[Solid]) -> Solid:
 # --- scenes -----------------------------------------------------------------------------------------------------------
 
 
-def load(path: PathLike, *, defines: Optional[Dict[str, Any]] = None, root: PathLike = ".", threads: int = 0) -> Solid:
-    """Reads a scene: .csg, or .scad with the help of an installed `openscad`.
+def load(
+    path: PathLike,
+    *,
+    defines: Optional[Dict[str, Any]] = None,
+    root: PathLike = ".",
+    parts: bool = True,
+    threads: int = 0,
+) -> Solid:
+    """Reads a scene: .csg, or .scad with the help of an installed `openscad`; or a mesh file as a solid.
 
     Parameters
     ----------
@@ -418,6 +425,8 @@ def load(path: PathLike, *, defines: Optional[Dict[str, Any]] = None, root: Path
         Variables of a .scad program: numbers, texts, truth values, lists.
     root : str or os.PathLike
         With the default any file may be imported; else the scene may read files below this folder only.
+    parts : bool
+        Each part of a mesh file becomes a solid of its own, with its name, for ``voxelize(ids=True)``.
     threads : int
         0: one for each processor.
 
@@ -433,7 +442,7 @@ def load(path: PathLike, *, defines: Optional[Dict[str, Any]] = None, root: Path
     """
     words = [f"{name}={_scad(value)}" for name, value in (defines or {}).items()]
     folder = "" if root == "." else text_of_path(root)
-    native, told, notes = _strata.load_scene(text_of_path(path), words, folder, limits_of(threads, None))
+    native, told, notes = _strata.load_scene(text_of_path(path), words, folder, bool(parts), limits_of(threads, None))
     warn_of([*told, *notes])
     return Solid._of(native)
 

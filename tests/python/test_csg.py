@@ -89,6 +89,21 @@ def test_the_voxels_of_a_tree_are_those_of_the_tool():
     assert 1 < len(np.unique(ids.numpy())) <= 1 + len(plate.names)
 
 
+def test_parts_of_a_file_are_solids_and_have_ids(tmp_path):
+    lines = [f"v {x} {y} {z}" for x, y, z in CUBE_VERTICES] + [f"v {x + 2} {y} {z}" for x, y, z in CUBE_VERTICES]
+    for part in range(2):
+        lines += [f"o part{part}"] + [f"f {a + 1 + 8 * part} {b + 1 + 8 * part} {c + 1 + 8 * part}" for a, b, c in cube_triangles()]
+    path = tmp_path / "two.obj"
+    path.write_text("\n".join(lines))
+    assert csg.load(path).names == ("part0", "part1") and len(csg.load(path, parts=False).names) == 1
+    expected = tool("voxelize", path, "-r", 12, "--ids", "--checksum").strip()
+    voxels = strata.voxelize(path, resolution=12, ids=True)
+    assert f"{voxels.checksum():016x}" == expected
+    labels = voxels.numpy()
+    assert (labels[:4] == 1).all() and (labels[4:8] == 0).all() and (labels[8:] == 2).all()
+    assert strata.read_mesh(path, parts=["part1"]).bounds[0, 0] == 2
+
+
 def test_a_mesh_is_a_solid():
     box = csg.solid((CUBE_VERTICES, cube_triangles()))
     assert (box - csg.cube(0.5)).measure().volume == pytest.approx(1 - 0.125)
@@ -154,6 +169,26 @@ def test_cameras_and_colours_change_the_picture():
 def test_what_cannot_be_done_is_an_error(make, error, sentence):
     with pytest.raises(error, match=sentence):
         make()
+
+
+def test_the_empty_set_has_pictures_and_voxels_of_every_kind():
+    nothing = csg.union([])
+    assert nothing.picture(8).shape == (8, 8, 4) and len(nothing.mesh().faces) == 0
+    grid = strata.Grid((3, 4, 5))
+    with pytest.warns(strata.StrataWarning, match="no voxel is solid"):
+        assert nothing.voxelize(like=grid).numpy().dtype == np.bool_
+        assert nothing.voxelize(like=grid, ids=True).numpy().dtype == np.uint32
+        assert nothing.voxelize(like=grid, colours=True).numpy().shape == (3, 4, 5, 4)
+    assert nothing.voxelize(like=grid, coverage=True).numpy().dtype == np.float32
+    assert len(nothing.depth_lists(like=grid)) == 0
+    with pytest.raises(strata.GeometryError):
+        nothing.voxelize(resolution=8)
+
+
+@pytest.mark.parametrize("make", [lambda: csg.cube(1), lambda: csg.cube(1).voxelize(resolution=4)])
+def test_a_picture_that_does_not_fit_the_memory_is_refused(make):
+    with pytest.raises(strata.LimitError, match="a picture of 65536 x 65536 pixels takes"):
+        make().picture(65536)
 
 
 def test_warnings_of_a_scene_are_pythons():
