@@ -124,6 +124,8 @@ class SizeBound {
     if (format == "vdb") return vdb();
     if (format == "binvox") return binvox();
     if (format == "vox") return vox();
+    if (format == "ply") return kHeads + 28 * voxels();  // 3 doubles and a value
+    if (format == "xyz") return kHeads + 92 * voxels();
     if (format == "png" || format == "sl1") return pictures();
     if (format == "zarr") return zarr();
     if (format == "tif") return layers(RunBytes::kIds, cells_) + 512.0 * grid_.dims.z;
@@ -147,6 +149,7 @@ class SizeBound {
   /// Of the band of distances, in voxels.
   [[nodiscard]] glm::dvec3 reach() const {
     const glm::dvec3 s = grid_.voxel_size;
+    if (file_.rgba) return glm::dvec3(1.0);  // how far from the surface voxels have its colours
     return factors_.band * std::max({s.x, s.y, s.z}) / s;
   }
   [[nodiscard]] bool goes_beyond() const {
@@ -171,6 +174,8 @@ class SizeBound {
       count += closed_ ? crossings : 2 * crossings;  // a face without a partner is a thin sheet
     }
     if (factors_.surface || factors_.rays > 0) count += 2 * touched();
+    // Each voxel near the surface may have a colour of its own.
+    if (file_.rgba) count += 2 * BoxCount(grid_, 1, 3, reach())(*factors_.mesh, execution_);
     return std::min(count, cells_);
   }
   [[nodiscard]] double touched() const { return BoxCount(grid_, 1, 3)(*factors_.mesh, execution_); }
@@ -215,14 +220,17 @@ class SizeBound {
   }
   [[nodiscard]] double vdb() const {
     const bool level_set = factors_.band > 0;
-    const bool floats = file_.ids != 0 || file_.fog != 0 || level_set;
+    const bool floats = file_.ids != 0 || file_.fog != 0 || level_set || file_.rgba;
+    const double numbers = file_.rgba ? 3 : 1;  // of a value
     const double leaves = parts(grid_.dims.x, 8) * parts(grid_.dims.y, 8) * parts(grid_.dims.z, 8);
     const double lowers =
         parts(grid_.dims.x, 128) * parts(grid_.dims.y, 128) * parts(grid_.dims.z, 128);
     const double uppers =
         parts(grid_.dims.x, 4096) * parts(grid_.dims.y, 4096) * parts(grid_.dims.z, 4096);
-    const double value = floats ? 4 : 1, list = floats ? 8 : 0;
-    const double leaf = floats ? 64 + 64 + 1 + 64 + 2048 : file_.mask ? 64 + 76 : 64 + 140;
+    const double value = floats ? 4 * numbers : 1, list = floats ? 8 : 0;
+    const double leaf = floats       ? 64 + 64 + 1 + 64 + 2048 * numbers
+                        : file_.mask ? 64 + 76
+                                     : 64 + 140;
     const double masks = level_set ? 1.0 : 0.0;  // of what lies inside
     return kHeads + 3 * static_cast<double>(file_.name.size()) +
            uppers * (8205 + list + 17 + masks * 4096) +
@@ -236,8 +244,10 @@ class SizeBound {
   [[nodiscard]] double vox() const {
     const double models =
         parts(grid_.dims.x, 256) * parts(grid_.dims.y, 256) * parts(grid_.dims.z, 256);
-    const double voxels = factors_.solid ? cells_ : std::min(cells_, touched());
-    return kHeads + 4 * voxels + 160 * models;
+    return kHeads + 4 * voxels() + 160 * models;
+  }
+  [[nodiscard]] double voxels() const {
+    return factors_.solid ? cells_ : std::min(cells_, touched());
   }
 
   const VoxelGrid& grid_;

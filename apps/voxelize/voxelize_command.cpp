@@ -195,7 +195,7 @@ MemoryFactors memory_factors(const VoxelizeCommand& command, const VoxelizeOutco
   factors.solid = command.solid;
   factors.surface = command.surface;
   if (outcome.format) factors.format = outcome.format->name;
-  factors.ids = command.ids;
+  factors.ids = command.ids || command.colours;  // labels
   factors.fog = command.fog != 0 || command.coverage != 0;
   if (command.sdf) factors.band = command.band;
   factors.everywhere = command.band_all;

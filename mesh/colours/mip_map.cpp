@@ -66,6 +66,13 @@ Between between(double at, int size, bool repeats) {
   return {place(first), place(second), part};
 }
 
+Float4 numbers_of(const std::array<std::uint16_t, 4>& texel) {
+  __extension__ typedef std::uint16_t Short4 __attribute__((vector_size(8)));
+  Short4 t;
+  std::memcpy(&t, texel.data(), sizeof t);
+  return __builtin_convertvector(t, Float4);
+}
+
 Float4 all(float value) { return Float4{value, value, value, value}; }
 
 }  // namespace
@@ -90,10 +97,7 @@ void MipMap::make_levels(const Execution& execution) {
 
 Float4 MipMap::texel(std::size_t level, std::size_t index) const {
   if (level > 0) {
-    __extension__ typedef std::uint16_t Short4 __attribute__((vector_size(8)));
-    Short4 t;
-    std::memcpy(&t, levels_[level - 1].texels.data() + index, sizeof t);
-    return __builtin_convertvector(t, Float4);
+    return numbers_of(levels_[level - 1].texels[index]);
   }
   const glm::u8vec4 t = texture_->texels[index];
   const std::array<float, 256>& light = linear_light();
@@ -131,11 +135,14 @@ Float4 MipMap::bilinear(const glm::dvec2& at, std::size_t level) const {
   const Between y = between(at.y, height, texture_->wrap_v == TextureWrap::kRepeat);
   const std::size_t first = y.first * place(width), second = y.second * place(width);
   const Float4 right = all(x.part), left = all(1.0f - x.part);
-  const Float4 upper =
-      texel(level, first + x.first) * left + texel(level, first + x.second) * right;
-  const Float4 lower =
-      texel(level, second + x.first) * left + texel(level, second + x.second) * right;
-  return upper * all(1.0f - y.part) + lower * all(y.part);
+  const auto blend = [&](auto&& at_index) {
+    const Float4 upper = at_index(first + x.first) * left + at_index(first + x.second) * right;
+    const Float4 lower = at_index(second + x.first) * left + at_index(second + x.second) * right;
+    return upper * all(1.0f - y.part) + lower * all(y.part);
+  };
+  if (level == 0) return blend([&](std::size_t index) { return texel(0, index); });
+  const Texel* texels = levels_[level - 1].texels.data();
+  return blend([&](std::size_t index) { return numbers_of(texels[index]); });
 }
 
 Float4 MipMap::sample(const glm::dvec2& at, float level) const {
