@@ -72,6 +72,9 @@ Result<glm::dvec3> voxel_size_for(const Bounds& box, const GridRequest& request)
     }
     return glm::dvec3(longest / static_cast<double>(*request.resolution));
   }
+  if (request.cubic) {
+    return glm::dvec3(longest / static_cast<double>(*request.cubic - 2 * request.padding));
+  }
   glm::dvec3 size;
   double least = longest;  // of the sides that have a length: for those that have none
   for (int axis = 0; axis < 3; ++axis) {
@@ -86,14 +89,65 @@ Result<glm::dvec3> voxel_size_for(const Bounds& box, const GridRequest& request)
   return size;
 }
 
+Result<void> check_cubic(const GridRequest& request) {
+  const std::int64_t count = *request.cubic;
+  if (count < 1) {
+    return fail(ErrorCode::kUsage, "a cubic grid must have at least 1 voxel a side, got {}", count);
+  }
+  if (count > kMaxGridSide) {
+    return fail(ErrorCode::kLimit, "a cubic grid must have at most {} voxels a side, got {}",
+                kMaxGridSide, count);
+  }
+  if (count <= 2 * request.padding) {
+    return fail(ErrorCode::kUsage, "the {} voxels a side of the cubic grid are all padding", count);
+  }
+  if (request.align || request.origin) {
+    return fail(ErrorCode::kUsage,
+                "a cubic grid has the mesh in its middle; {} cannot be combined with it",
+                request.align ? "alignment" : "an origin");
+  }
+  return {};
+}
+
+/// The lattice must still tell its points apart where the grid lies.
+Result<void> check_resolved(const VoxelGrid& grid, int axis) {
+  const double s = grid.voxel_size[axis], step = s / kLatticeSteps;
+  const double far =
+      std::max(std::abs(grid.origin[axis]), std::abs(grid.origin[axis] + grid.dims[axis] * s));
+  if (std::isfinite(far) && step > 0.0 && far + step > far) return {};
+  return fail(ErrorCode::kGeometry,
+              "voxels of {} are too small for coordinates of {} along {}: double precision "
+              "cannot resolve them",
+              s, far, kAxisNames[axis]);
+}
+
+/// A cube of voxels with the box in its middle.
+Result<VoxelGrid> cubic_grid(const Bounds& box, const GridRequest& request, double size) {
+  VoxelGrid grid;
+  grid.dims = glm::ivec3(static_cast<int>(*request.cubic));
+  grid.voxel_size = glm::dvec3(size);
+  const glm::dvec3 extent = box.high - box.low;
+  const double longest = box.longest_side();
+  for (int axis = 0; axis < 3; ++axis) {
+    // Along the longest side the padding is left, and nothing is rounded.
+    const double before = extent[axis] == longest
+                              ? static_cast<double>(request.padding) * size
+                              : 0.5 * (static_cast<double>(grid.dims[axis]) * size - extent[axis]);
+    grid.origin[axis] = box.low[axis] - before;
+    if (auto fine = check_resolved(grid, axis); !fine) return tl::unexpected(fine.error());
+  }
+  return grid;
+}
+
 }  // namespace
 
 Result<void> check_grid_request(const GridRequest& request) {
   const int sizes = int{request.resolution.has_value()} + int{request.voxel_size.has_value()} +
-                    int{request.dims.has_value()};
+                    int{request.dims.has_value()} + int{request.cubic.has_value()};
   if (sizes != 1) {
     return fail(ErrorCode::kUsage,
-                "exactly one of resolution, voxel size and grid must be given, got {}", sizes);
+                "exactly one of resolution, voxel size, grid and cubic must be given, got {}",
+                sizes);
   }
   if (request.resolution && *request.resolution < 1) {
     return fail(ErrorCode::kUsage, "the resolution must be at least 1 voxel, got {}",
@@ -107,6 +161,9 @@ Result<void> check_grid_request(const GridRequest& request) {
     return fail(ErrorCode::kLimit,
                 "a padding of {} voxels is too large: a grid has at most {} along a side",
                 request.padding, kMaxGridSide);
+  }
+  if (request.cubic) {
+    if (auto valid = check_cubic(request); !valid) return valid;
   }
   for (int axis = 0; axis < 3; ++axis) {
     if (request.voxel_size && !((*request.voxel_size)[axis] > 0.0)) {
@@ -152,6 +209,7 @@ Result<VoxelGrid> fit_grid(const Bounds& mesh_bounds, const GridRequest& request
   const auto size = voxel_size_for(*box, request);
   if (!size) return tl::unexpected(size.error());
 
+  if (request.cubic) return cubic_grid(*box, request, size->x);
   VoxelGrid grid;
   grid.voxel_size = *size;
   const auto padding = static_cast<double>(request.padding);
@@ -175,16 +233,7 @@ Result<VoxelGrid> fit_grid(const Bounds& mesh_bounds, const GridRequest& request
     grid.origin[axis] = request.align ? (first - padding) * s : begin - padding * s;
     // A flat side would lie on the border of its voxels, where no centre is near it.
     if (!(high > low) && !request.align && !request.origin) grid.origin[axis] -= 0.5 * count * s;
-    // The lattice must still tell its points apart where the grid lies.
-    const double step = s / kLatticeSteps;
-    const double far =
-        std::max(std::abs(grid.origin[axis]), std::abs(grid.origin[axis] + total * s));
-    if (!std::isfinite(far) || !(step > 0.0) || !(far + step > far)) {
-      return fail(ErrorCode::kGeometry,
-                  "voxels of {} are too small for coordinates of {} along {}: double precision "
-                  "cannot resolve them",
-                  s, far, kAxisNames[axis]);
-    }
+    if (auto fine = check_resolved(grid, axis); !fine) return tl::unexpected(fine.error());
   }
   return grid;
 }

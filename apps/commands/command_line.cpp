@@ -152,14 +152,19 @@ void add_json(CLI::App& app, Words& words, const char* group) {
 
 namespace {
 
+constexpr const char* kGridGroup =
+    "Grid (one of -r, --voxel-size, --grid, --cubic; default: -r 256)";
+
 void add_grid(CLI::App& app, Words& words) {
-  const char* group = "Grid (one of -r, --voxel-size and --grid; default: -r 256)";
+  const char* group = kGridGroup;
   option(app, group, "-r,--resolution", words.resolution, "N",
          "Voxels along the longest side of the input, 1 to 65536");
   option(app, group, "--voxel-size", words.voxel_size, "S",
          "Side of a voxel in the input's units, or three sides: sx,sy,sz");
   option(app, group, "--grid", words.grid, "NX,NY,NZ",
          "Voxels along x, y and z, 1 to 65536 each, stretched to fit the input");
+  option(app, group, "--cubic", words.cubic, "N",
+         "N voxels along x, y and z, padding included; cubic voxels, the input in the middle");
   option(app, group, "--bounds", words.bounds, "BOX",
          "Box to cover, x0,y0,z0,x1,y1,z1 in the input's units (default: the input's box)");
   option(app, group, "--origin", words.origin, "X,Y,Z",
@@ -226,6 +231,9 @@ void define_voxelize(CLI::App& app, Words& words) {
   flag(app, output, "--dry-run", words.dry_run,
        "Print the grid and the memory that the command would take, and exit");
   add_grid(app, words);
+  option(app, kGridGroup, "--like", words.like, "FILE",
+         "Take size, spacing, origin and direction of the grid from a voxel file: .nrrd .nhdr .mha "
+         ".mhd .nii .nii.gz .vdb .vti .npz .zarr, .npy with a .npy.json");
   const char* solid = "Solid voxels";
   flag(app, solid, "--solid", words.solid, "Voxels whose centre is inside (default)");
   flag(app, solid, "--surface{conservative}", words.surface,
@@ -353,14 +361,34 @@ namespace {
 
 GridRequest grid_request(const Words& words, Reader& reader) {
   GridRequest grid;
-  const int sizes =
-      int{!words.resolution.empty()} + int{!words.voxel_size.empty()} + int{!words.grid.empty()};
-  if (sizes > 1) {
-    reader.fail_with(fmt::format("only one of -r, --voxel-size and --grid can be given, got {}",
-                                 sizes == 2 ? "two" : "all"));
+  std::string sizes;
+  int count = 0;
+  for (const auto& [name, word] :
+       {std::pair("-r", &words.resolution), std::pair("--voxel-size", &words.voxel_size),
+        std::pair("--grid", &words.grid), std::pair("--cubic", &words.cubic),
+        std::pair("--like", &words.like)}) {
+    if (word->empty()) continue;
+    sizes += fmt::format("{}{}", sizes.empty() ? "" : ", ", name);
+    ++count;
+  }
+  if (count > 1) {
+    reader.fail_with(fmt::format(
+        "only one of -r, --voxel-size, --grid, --cubic and --like can be given, got {}", sizes));
     return grid;
   }
-  if (sizes == 0) grid.resolution = kDefaultResolution;
+  if (!words.like.empty()) {
+    for (const auto& [name, given] :
+         {std::pair("--bounds", !words.bounds.empty()),
+          std::pair("--origin", !words.origin.empty()),
+          std::pair("--padding", !words.padding.empty()), std::pair("--align", words.align)}) {
+      if (!given) continue;
+      reader.fail_with(fmt::format(
+          "--like takes the whole grid from a file; {} cannot be combined with it", name));
+    }
+    return grid;
+  }
+  if (count == 0) grid.resolution = kDefaultResolution;
+  if (!words.cubic.empty()) reader.take(parse_integer("--cubic", words.cubic), grid.cubic);
   if (!words.resolution.empty()) {
     reader.take(parse_integer("--resolution", words.resolution), grid.resolution);
   }
@@ -520,7 +548,8 @@ VoxelizeCommand voxelize_command(const Words& words, Reader& reader) {
   if (!words.json.empty()) command.json = words.json;
   if (command.input.files.empty()) reader.fail_with("no input file is given");
   command.grid = grid_request(words, reader);
-  command.default_size = words.resolution.empty() && words.voxel_size.empty() && words.grid.empty();
+  command.like = words.like;
+  command.default_size = command.grid.resolution && words.resolution.empty();
   read_values(words, command, reader);
   read_coverage(words, command, reader);
   if (command.backend == Backend::kGl && !command.solid) {

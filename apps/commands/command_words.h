@@ -42,7 +42,7 @@ struct Words {
               progress = "auto";
   bool quiet = false, verbose = false, strict = false;
   std::string output, format, json;
-  std::string resolution, voxel_size, grid, bounds, origin, padding;
+  std::string resolution, voxel_size, grid, cubic, like, bounds, origin, padding;
   bool align = false, solid = false, mask = false, ids = false, sdf = false, voxel_colours = false,
        keep_orientation = false, samples = false;
   std::string fog, name, band, fill_colour;

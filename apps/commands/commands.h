@@ -55,6 +55,7 @@ struct VoxelizeCommand {
   std::optional<glm::u8vec3> fill_colour;  ///< of what is not near the surface; sRGB
   std::optional<std::string> name;         ///< of the grid in the file
   GridRequest grid;
+  std::string like;           ///< a file whose grid is taken instead; empty: none
   bool default_size = false;  ///< the grid has kDefaultResolution, since no size was given
   bool solid = true, surface = false;
   SurfaceKind surface_kind = SurfaceKind::kConservative;

@@ -5,6 +5,9 @@
 #include <iterator>
 
 #include "apps/commands/oit_options.h"
+#include "apps/session/file_conflicts.h"
+#include "core/letters.h"
+#include "core/printable.h"
 
 namespace strata::apps {
 namespace {
@@ -40,8 +43,21 @@ std::vector<FileUse> inputs_of(const OitCommand& command) {
   return uses;
 }
 
+std::vector<FileUse> inputs_of(const VoxelizeCommand& command) {
+  std::vector<FileUse> uses = inputs_of(command.input);
+  if (command.like.empty()) return uses;
+  uses.push_back({"--like", command.like});
+  if (has_extension(command.like, ".npy")) uses.push_back({"--like", command.like + ".json"});
+  return uses;
+}
+
 std::vector<FileUse> outputs_of(const VoxelizeCommand& command) {
-  return outputs({{"-o", command.output}, {"--json", command.json.value_or("")}});
+  const bool sidecar = !command.like.empty() && command.output != "-" &&
+                       (same_word(command.format, "npy") ||
+                        (command.format.empty() && has_extension(command.output, ".npy")));
+  return outputs({{"-o", command.output},
+                  {"the place of -o", sidecar ? command.output + ".json" : ""},
+                  {"--json", command.json.value_or("")}});
 }
 
 std::vector<FileUse> outputs_of(const MeshCommand& command) {

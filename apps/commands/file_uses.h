@@ -15,6 +15,7 @@ template <class AnyCommand>
 }
 [[nodiscard]] std::vector<FileUse> inputs_of(const CsgCommand& command);
 [[nodiscard]] std::vector<FileUse> inputs_of(const OitCommand& command);
+[[nodiscard]] std::vector<FileUse> inputs_of(const VoxelizeCommand& command);
 
 /// What a command writes.
 [[nodiscard]] std::vector<FileUse> outputs_of(const VoxelizeCommand& command);

@@ -3,11 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/matrix.hpp>
 #include <memory>
 #include <utility>
 
 #include "apps/commands/choice_words.h"
 #include "apps/commands/csg_options.h"
+#include "apps/session/process_memory.h"
 #include "apps/session/session.h"
 #include "apps/strata/allocation_failures.h"
 #include "apps/strata/library_session.h"
@@ -18,6 +20,7 @@
 #include "core/printable.h"
 #include "strata/csg/input/solid_input.h"
 #include "strata/voxelize/formats/voxel_writer.h"
+#include "strata/voxelize/readers/read_voxel_grid.h"
 
 namespace strata::apps {
 namespace {
@@ -122,10 +125,37 @@ Result<void> check_open(const VoxelizeCommand& command, const csg::SolidInput& i
 
 /// Where lengths were given, says which files may be in another unit. With -r units do not matter.
 void tell_units(const VoxelizeCommand& command, const csg::SolidInput& input, Session& session) {
-  if (!command.grid.voxel_size && !command.grid.bounds && !command.grid.origin) return;
+  const GridRequest& grid = command.grid;
+  if (!grid.voxel_size && !grid.bounds && !grid.origin && command.like.empty()) return;
   for (const csg::InputFacts& file : input.files) {
     if (!file.unit_doubt.empty()) session.tell(fmt::format("{}: {}", file.path, file.unit_doubt));
   }
+}
+
+/// With --like: the grid of a file. Meshes that say their unit are converted to the file's.
+Result<void> take_grid(const VoxelizeCommand& command, csg::SceneInput& placed,
+                       VoxelizeOutcome& outcome, Session& session) {
+  outcome.frame.unit_metres = csg::world_unit(placed);
+  if (command.like.empty()) return {};
+  const auto file = read_voxel_grid(command.like, session.execution("reading"));
+  if (!file) return fail(file.error().code, "--like {}", file.error().message);
+  if (outcome.format) {
+    if (auto held = check_frame(*outcome.format, file->frame); !held) {
+      return fail(held.error().code, "--like {}: {}", command.like, held.error().message);
+    }
+  }
+  const double given = placed.placement.unit_metres, states = file->frame.unit_metres;
+  if (given > 0.0 && states > 0.0 && std::abs(given - states) > 1e-9 * given) {
+    return fail(ErrorCode::kUsage,
+                "--unit {} contradicts --like {}, whose numbers are in {}; leave --unit out",
+                csg::unit_symbol(given), command.like, csg::unit_symbol(states));
+  }
+  if (states > 0.0) placed.placement.unit_metres = states;
+  outcome.grid = file->grid;
+  outcome.frame = file->frame;
+  outcome.frame.unit_metres = csg::world_unit(placed);
+  if (outcome.frame.turned()) placed.space_from_world = glm::inverse(outcome.frame.direction);
+  return {};
 }
 
 /// The axis the format is written from, or the one with the fewest columns.
@@ -221,7 +251,7 @@ Result<void> check_memory(const VoxelizeCommand& command, const VoxelizeOutcome&
   const glm::ivec3 dims = outcome.grid.dims;
   const std::uint64_t bytes = outcome.estimate.total();
   session.note(fmt::format("grid {} x {} x {}, about {} of memory", dims.x, dims.y, dims.z,
-                           readable_bytes(bytes)));
+                           readable_bytes(expected_memory(outcome))));
   if (session.memory_limit() == 0 || bytes <= session.memory_limit() || command.dry_run) return {};
   return fail(ErrorCode::kLimit,
               "a grid of {} x {} x {} voxels needs about {} for this mesh; the limit is {} "
@@ -240,24 +270,29 @@ Result<void> make_voxels(const VoxelizeCommand& command, Session& session) {
   if (!format) return tl::unexpected(format.error());
   outcome.format = *std::move(format);
 
-  auto input = csg::load_solids(command.input, command.ids, messages_of(session),
-                                session.execution("reading"));
+  csg::SceneInput placed = command.input;
+  if (auto taken = take_grid(command, placed, outcome, session); !taken) return taken;
+  auto input =
+      csg::load_solids(placed, command.ids, messages_of(session), session.execution("reading"));
   if (!input) return tl::unexpected(input.error());
   outcome.input = *std::move(input);
   tell_units(command, outcome.input, session);
   if (auto valid = check_open(command, outcome.input, session); !valid) return valid;
   if (auto strict = session.check_strict(); !strict) return strict;
 
-  auto grid = fit_grid(outcome.input.bounds, command.grid);
-  if (!grid) {
-    return fail(grid.error().code, "{}: {}", command.input.files.front(), grid.error().message);
+  if (command.like.empty()) {
+    auto grid = fit_grid(outcome.input.bounds, command.grid);
+    if (!grid) {
+      return fail(grid.error().code, "{}: {}", command.input.files.front(), grid.error().message);
+    }
+    outcome.grid = *grid;
   }
-  outcome.grid = *grid;
   outcome.axis = choose_axis(command, outcome.format, outcome.grid);
   const int samples = fog_samples(command, outcome.input);
   if (const auto valid = check_samples(command, samples, outcome.grid); !valid) return valid;
   outcome.estimate =
       estimate_memory(outcome.grid, memory_factors(command, outcome, samples, session));
+  outcome.read_peak = peak_memory_bytes();
   if (auto valid = check_memory(command, outcome, session); !valid) return valid;
   if (command.dry_run) {
     estimate_file(command, outcome, samples, session);

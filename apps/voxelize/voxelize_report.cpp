@@ -208,7 +208,13 @@ void tell_input(Lines& line, const VoxelizeCommand& command, const VoxelizeOutco
   line("grid",
        fmt::format("{}, origin {}, rays along {}", size_of(outcome.grid, 6),
                    triple(outcome.grid.origin), word_of(kAxisWords, outcome.axis)) +
-           (command.default_size ? fmt::format("; -r {} by default", kDefaultResolution) : ""));
+           (command.default_size ? fmt::format("; -r {} by default", kDefaultResolution) : "") +
+           (command.like.empty() ? "" : fmt::format("; as {}", printable(command.like))));
+  if (outcome.frame.turned()) {
+    const glm::dmat3& d = outcome.frame.direction;
+    line("turned", fmt::format("x of the grid runs along {}, y along {}, z along {}", triple(d[0]),
+                               triple(d[1]), triple(d[2])));
+  }
 }
 
 void tell_results(Lines& line, const VoxelizeCommand& command, const VoxelizeOutcome& outcome,
@@ -297,6 +303,11 @@ void write_output(JsonWriter& json, const VoxelizeCommand& command,
 
 }  // namespace
 
+std::uint64_t expected_memory(const VoxelizeOutcome& outcome) {
+  constexpr std::uint64_t kProgram = 10'000'000;  // of the program and its libraries
+  return std::max(outcome.read_peak, outcome.estimate.total() + kProgram);
+}
+
 std::string voxelize_text(const VoxelizeCommand& command, const VoxelizeOutcome& outcome,
                           const Session& session) {
   Lines line;
@@ -305,7 +316,7 @@ std::string voxelize_text(const VoxelizeCommand& command, const VoxelizeOutcome&
     tell_results(line, command, outcome, session);
   } else {
     line("memory", fmt::format("about {} would be needed; the limit is {}",
-                               readable_bytes(outcome.estimate.total()),
+                               readable_bytes(expected_memory(outcome)),
                                readable_bytes(session.memory_limit())));
   }
   if (outcome.file_size) {
@@ -339,6 +350,14 @@ std::string voxelize_json(const VoxelizeCommand& command, const VoxelizeOutcome&
   json.member("origin", outcome.grid.origin);
   json.member("voxel_size", outcome.grid.voxel_size);
   json.member("by_default", command.default_size);
+  json.key("direction").begin_array();
+  for (int row = 0; row < 3; ++row) {
+    const glm::dmat3& d = outcome.frame.direction;
+    json.value(glm::dvec3(d[0][row], d[1][row], d[2][row]));
+  }
+  json.end_array();
+  json.key("like");
+  command.like.empty() ? json.null() : json.value(command.like);
   json.end_object();
 
   write_options(json, command, outcome, session);
@@ -352,7 +371,7 @@ std::string voxelize_json(const VoxelizeCommand& command, const VoxelizeOutcome&
                  {"lists", outcome.report.lists_ms},
                  {"intervals", outcome.report.intervals_ms},
                  {"write", outcome.write_ms}});
-  write_memory(json, {{"estimated_bytes", outcome.estimate.total()},
+  write_memory(json, {{"estimated_bytes", expected_memory(outcome)},
                       {"limit_bytes", session.memory_limit()}});
   if (outcome.file_size) {
     json.key("file_size").begin_object();

@@ -21,8 +21,10 @@ namespace strata::apps {
 struct VoxelizeOutcome {
   csg::SolidInput input;
   VoxelGrid grid;
+  GridFrame frame;  ///< of the grid, with --like
   Axis axis = Axis::kZ;
   MemoryEstimate estimate;
+  std::uint64_t read_peak = 0;  ///< the largest memory until the estimate was made, bytes
   VoxelizeReport report;
   bool measured = false;  ///< the report's statistics are filled
   LostWalls lost_walls;
@@ -36,6 +38,9 @@ struct VoxelizeOutcome {
   double filled_volume = 0.0;            ///< by --coverage, cubic world units
   double write_ms = 0.0;
 };
+
+/// The largest memory that is expected: of reading, which is known, or of the rest.
+[[nodiscard]] std::uint64_t expected_memory(const VoxelizeOutcome& outcome);
 
 /// For people: a line a topic.
 [[nodiscard]] std::string voxelize_text(const VoxelizeCommand& command,

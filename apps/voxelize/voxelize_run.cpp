@@ -23,6 +23,18 @@
 namespace strata::apps {
 namespace {
 
+/// The box in the world around a box of the grid's space.
+Bounds world_box(const GridFrame& frame, const glm::dvec3& low, const glm::dvec3& high) {
+  Bounds box{low, high};
+  if (!frame.turned()) return box;
+  box = {};
+  for (int corner = 0; corner < 8; ++corner) {
+    box.include(frame.world({(corner & 1) != 0 ? high.x : low.x, (corner & 2) != 0 ? high.y : low.y,
+                             (corner & 4) != 0 ? high.z : low.z}));
+  }
+  return box;
+}
+
 /// Tells of walls that lie between voxel centres, or that nothing is solid.
 Result<void> check_thin(const VoxelizeCommand& command, VoxelizeOutcome& outcome,
                         const Execution& execution, Session& session) {
@@ -42,6 +54,10 @@ Result<void> check_thin(const VoxelizeCommand& command, VoxelizeOutcome& outcome
     auto found = find_lost_walls(input.soup, outcome.grid, options, execution);
     if (!found) return tl::unexpected(found.error());
     outcome.lost_walls = *std::move(found);
+    for (LostWall& wall : outcome.lost_walls.largest) {
+      const Bounds box = world_box(outcome.frame, wall.low, wall.high);
+      wall.low = box.low, wall.high = box.high;
+    }
   }
   const LostWalls& lost = outcome.lost_walls;
   if (lost.count > 0) {
@@ -401,6 +417,8 @@ VoxelWriterOptions writer_options(const VoxelizeCommand& command, VoxelizeOutcom
   file.fog_floats = command.floats || command.fog != 0;
   file.layers = command.layers;
   file.mask = command.mask;
+  file.frame = outcome.frame;
+  file.sidecar = !command.like.empty();
   if (command.sdf) {
     const double band = band_in_world(outcome.grid, command.band);
     file.band = command.band_all ? INFINITY : static_cast<float>(band);

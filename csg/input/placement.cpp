@@ -131,6 +131,17 @@ Result<void> place_mesh(const std::string& path, const MeshReadStats& stats,
   return {};
 }
 
+void turn_mesh(const glm::dmat3& turn, TriangleSoup& soup, const Execution& execution) {
+  if (turn == glm::dmat3(1.0)) return;
+  constexpr std::size_t kBlock = std::size_t{1} << 15;
+  const std::size_t count = soup.positions.size();
+  parallel_for(execution, (count + kBlock - 1) / kBlock, [&](std::size_t block, int) {
+    const std::size_t end = std::min(count, (block + 1) * kBlock);
+    for (std::size_t i = block * kBlock; i < end; ++i) soup.positions[i] = turn * soup.positions[i];
+  });
+  if (glm::determinant(turn) < 0.0) reverse_orientation(soup);
+}
+
 Result<void> place_scene(const std::string& path, const SceneInput& input, Scene& scene) {
   const MeshPlacement& placement = input.placement;
   const bool turned = turns(placement, false);

@@ -75,6 +75,7 @@ Result<SolidInput> load_apart(SceneInput input, const InputMessages& messages,
   input.split_parts = true;
   SolidInput all;
   all.unit_metres = world_unit(input);
+  all.turned = input.space_from_world != glm::dmat3(1.0);
   std::vector<Solid> apart;
   std::vector<std::string> files;  // of each that is a part
   for (std::size_t i = 0; i < input.files.size(); ++i) {
@@ -90,6 +91,7 @@ Result<SolidInput> load_apart(SceneInput input, const InputMessages& messages,
     (void)take_attributes(*facts);
     all.add(*std::move(facts));
     for (MeshSolid& one : solids) {
+      turn_mesh(input.space_from_world, one.soup, execution);
       apart.push_back(solid_of(std::move(one.soup), one.rule, one.name));
       files.push_back(one.is_part ? path : std::string());
     }
@@ -105,6 +107,7 @@ Result<SolidInput> load_meshes(const SceneInput& input, const InputMessages& mes
                                const Execution& execution) {
   SolidInput all;
   all.unit_metres = world_unit(input);
+  all.turned = input.space_from_world != glm::dmat3(1.0);
   all.rule = input.rule;     // solids of a tree have their own
   std::vector<Solid> apart;  // those with a rule of their own
   for (std::size_t i = 0; i < input.files.size(); ++i) {
@@ -116,6 +119,7 @@ Result<SolidInput> load_meshes(const SceneInput& input, const InputMessages& mes
                            detail::part_of(execution, i, input.files.size()), soup, &read_ms);
     if (!facts) return tl::unexpected(facts.error());
     all.read_ms += read_ms;
+    turn_mesh(input.space_from_world, soup, execution);
     const InsideRule rule = facts->rule;
     const std::uint64_t elements = facts->stats.faces;
     MeshAttributes attributes = take_attributes(*facts);
@@ -163,7 +167,8 @@ void SolidInput::set_tree(Tree made) {
 
 Result<void> SolidInput::fit(const VoxelGrid& grid, const Execution& execution) {
   if (tree) return tree->fit(grid, &soup, execution);
-  const auto done = fit_lattice(soup, bounds, grid, execution);
+  const Bounds box = turned ? strata::bounds(soup, execution) : bounds;
+  const auto done = fit_lattice(soup, box, grid, execution);
   if (!done) return tl::unexpected(done.error());
   return {};
 }
@@ -186,6 +191,7 @@ Result<SolidInput> load_solids(const SceneInput& input, bool as_tree, const Inpu
   const detail::Stopwatch watch;
   SolidInput all;
   all.unit_metres = world_unit(input);
+  all.turned = input.space_from_world != glm::dmat3(1.0);
   SceneInput apart = input;
   apart.split_parts = as_tree;
   auto scene = load_scene(apart, messages, execution, &all.files);
@@ -194,6 +200,9 @@ Result<SolidInput> load_solids(const SceneInput& input, bool as_tree, const Inpu
   if (all.bounds.empty()) {
     return fail(ErrorCode::kGeometry, "{}: the {} is empty", input.files.front(),
                 input.expression.empty() ? "scene" : "result of the expression");
+  }
+  if (all.turned) {
+    scene->tree = transform(glm::dmat4(input.space_from_world), std::move(scene->tree));
   }
   all.set_tree(std::move(scene->tree));
   for (const InputFacts& facts : all.files) all.closed = all.closed && facts.closed;

@@ -91,8 +91,10 @@ Result<MeshFile> read_archive(const std::string& path, const MeshReadOptions& op
 /// Reads text that ends in a readable zero byte. No exception (std::bad_alloc) leaves this
 /// function.
 /// @param path  of the file; empty where there is none
+/// @param file  whose bytes the text is; null: they come from elsewhere
 Result<MeshFile> read_text(std::string_view text, const std::string& name, const std::string& path,
-                           const MeshReadOptions& options, const Execution& execution) {
+                           const MeshReadOptions& options, const Execution& execution,
+                           const detail::InputBytes* file = nullptr) {
   if (text.empty()) return fail(ErrorCode::kInput, "{}: the file is empty", name);
   // The first 80 bytes of a binary STL file may be anything.
   const bool anything = (options.format == MeshFormat::kStl && detail::is_binary_stl(text)) ||
@@ -105,7 +107,7 @@ Result<MeshFile> read_text(std::string_view text, const std::string& name, const
   try {
     detail::DroppedVertices dropped;
     Result<MeshFile> result =
-        read_as({text, name, options, execution, size - text.size(), path, &dropped});
+        read_as({text, name, options, execution, size - text.size(), path, &dropped, file});
     if (result) result->stats.bytes = size;
     const MeshFormat looks_like = format_by_content(text);
     if (!result && result.error().code == ErrorCode::kInput && looks_like != MeshFormat::kAuto &&
@@ -198,7 +200,7 @@ Result<MeshFile> read_mesh(const std::string& path, const MeshReadOptions& optio
     const auto file = detail::InputBytes::open(path, execution.memory_limit, execution.stop);
     if (!file) return tl::unexpected(file.error());
     Result<MeshFile> result = read_text(file->view(), path == "-" ? "standard input" : path,
-                                        path == "-" ? "" : path, known, execution);
+                                        path == "-" ? "" : path, known, execution, &*file);
     if (file->changed()) {
       return fail(ErrorCode::kInput, "{}: the file changed while it was read", path);
     }

@@ -78,10 +78,18 @@ Result<void> read_facets(const ReaderInput& input, std::size_t count, TriangleSo
   soup.triangles.resize(count);
   static_assert(sizeof(glm::uvec3) == 3 * sizeof(std::uint32_t));
   auto* const index = &soup.triangles.front().x;  // corner c is component c % 3 of triangle c / 3
+  // Threads may need what another one gave back; then they read it again.
+  constexpr std::size_t kStep = std::size_t{1} << 16;  // corners between two calls
+  const auto forget = [&](std::size_t c) {
+    const std::size_t before = c < kStep ? 0 : (c - kStep) / 3;
+    input.forget(data + kHeaderBytes + before * kFacetBytes,
+                 data + kHeaderBytes + c / 3 * kFacetBytes);
+  };
   ReadWatch watch(input);
   const std::size_t different = weld_first<float>(
       input.execution, corners, [data](std::size_t c) { return binary_corner(data, c); }, index,
       [&](std::size_t c) {
+        forget(c);
         return watch.at(static_cast<double>(c) / static_cast<double>(corners));
       });
   if (input.execution.stop.stop_requested()) {
@@ -90,6 +98,7 @@ Result<void> read_facets(const ReaderInput& input, std::size_t count, TriangleSo
   reserve_large(soup.positions, different);
   // First occurrences become vertices in the order of the file; later corners refer back to them.
   for (std::size_t c = 0; c < corners; ++c) {
+    if (c % kStep == 0) forget(c);
     if (index[c] == c) {
       index[c] = static_cast<std::uint32_t>(soup.positions.size());
       soup.positions.emplace_back(WeldTable<float>::canonical(binary_corner(data, c)));

@@ -113,6 +113,16 @@ Result<InputBytes> InputBytes::read_all(int descriptor, const std::string& name,
   return file;
 }
 
+void InputBytes::forget(const char* begin, const char* end) const {
+  if (mapped_ == 0 || size_ <= kPopulateLimit) return;
+  const auto page = static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
+  const auto from = static_cast<std::size_t>(begin - data_),
+             to = static_cast<std::size_t>(end - data_);
+  const std::size_t first = (from + page - 1) / page * page, last = to / page * page;
+  if (last <= first) return;
+  ::madvise(const_cast<char*>(data_) + first, last - first, MADV_DONTNEED);
+}
+
 bool InputBytes::changed() const {
   struct stat status = {};
   return mapped_ != 0 &&

@@ -26,6 +26,9 @@ class InputBytes {
   ~InputBytes();
 
   [[nodiscard]] std::string_view view() const { return {data_, size_}; }
+  /// Gives back the memory of a range that has been read; it may be read again, from the file. Only
+  /// of large mapped files; else nothing happens. Any thread may call it.
+  void forget(const char* begin, const char* end) const;
   /// Whether the size of a mapped file has changed since it was opened.
   [[nodiscard]] bool changed() const;
 

@@ -7,6 +7,7 @@
 #include <thread>
 #include <vector>
 
+#include "mesh/text/input_bytes.h"
 #include "strata/core/execution.h"
 #include "strata/mesh/mesh_file.h"
 
@@ -46,7 +47,13 @@ struct ReaderInput {
   std::size_t skipped = 0;  ///< bytes before the text: a byte order mark
   std::string path{};       ///< of the file; empty where there is none
   DroppedVertices* dropped =
-      nullptr;  ///< finish_mesh() fills it; not null where attributes are read
+      nullptr;                       ///< finish_mesh() fills it; not null where attributes are read
+  const InputBytes* file = nullptr;  ///< whose bytes the text is; null: they come from elsewhere
+
+  /// A piece of the text has been read.
+  void forget(const char* begin, const char* end) const {
+    if (file != nullptr) file->forget(begin, end);
+  }
 };
 
 /// Reports a reader's progress and checks for a stop request. Any thread may call it, but only the

@@ -70,6 +70,7 @@ void read_chunks(const ReaderInput& input, std::span<const char* const> cuts, co
     }
     if (!chunk) chunk = std::make_unique<Chunk>();
     parse(cuts[index], cuts[index + 1], *chunk);
+    input.forget(cuts[index], cuts[index + 1]);
     const std::lock_guard lock(mutex);
     ready[index] = std::move(chunk);
     for (; next < ready.size() && ready[next] && !over; ++next) {

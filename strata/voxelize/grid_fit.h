@@ -11,7 +11,8 @@
 
 namespace strata {
 
-/// Size and place of the wanted grid. Exactly one of `resolution`, `voxel_size` and `dims` is set.
+/// Size and place of the wanted grid. Exactly one of `resolution`, `voxel_size`,
+/// `dims` and `cubic` is set.
 struct GridRequest {
   /// Voxels along the longest side of the box; cubic voxels. Padding is added to it.
   std::optional<std::int64_t> resolution{};
@@ -19,6 +20,9 @@ struct GridRequest {
   std::optional<glm::dvec3> voxel_size{};
   /// Voxels along x, y, z, padding included; voxels are stretched to fit the box.
   std::optional<std::array<std::int64_t, 3>> dims{};
+
+  /// Voxels along each side of a cube, padding included; cubic voxels. The box lies in its middle.
+  std::optional<std::int64_t> cubic{};
 
   /// The box to cover, instead of the mesh's box.
   std::optional<Bounds> bounds{};

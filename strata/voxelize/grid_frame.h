@@ -17,6 +17,12 @@ struct GridFrame {
 
   /// Whether the axes of the grid are not those of the world.
   [[nodiscard]] bool turned() const { return direction != glm::dmat3(1.0); }
+  /// A point of the grid's space, in the world.
+  [[nodiscard]] glm::dvec3 world(const glm::dvec3& p) const { return turned() ? direction * p : p; }
+  /// Columns: from a voxel to the next along x, y, z, in the world.
+  [[nodiscard]] glm::dmat3 steps(const glm::dvec3& voxel_size) const {
+    return {direction[0] * voxel_size.x, direction[1] * voxel_size.y, direction[2] * voxel_size.z};
+  }
 };
 
 /// The grid of a file, as the file states it: voxel (i, j, k) is the file's, and the world is the

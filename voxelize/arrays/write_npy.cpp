@@ -2,12 +2,16 @@
 // (i, j, k); fortran_order, so that x is fastest and the slabs follow one another: C order would
 // need the whole array, or seeking, which pipes cannot. numpy.load treats both alike. Colours are
 // a[c, i, j, k], c = 0 to 3: red, green, blue, alpha. The format
-// has no place for the world transform; .npz has (write_npz.cpp).
+// has no place for the world transform; .npz has (write_npz.cpp), and so has a file x.npy.json
+// beside it, which is written where asked.
+
+#include <fmt/core.h>
 
 #include <memory>
 #include <string>
 #include <utility>
 
+#include "core/atomic_file.h"
 #include "voxelize/arrays/npy_voxels.h"
 #include "voxelize/output/block_output.h"
 #include "voxelize/output/dense_rows.h"
@@ -21,7 +25,10 @@ class NpyWriter final : public SlabWriter {
  public:
   NpyWriter(const std::string& path, const VoxelGrid& grid, const VoxelWriterOptions& options,
             BlockOutput output)
-      : SlabWriter(path, grid, Axis::kX), values_(options), output_(std::move(output)) {}
+      : SlabWriter(path, grid, Axis::kX), values_(options), output_(std::move(output)) {
+    if (options.sidecar && path != "-") sidecar_ = path + ".json";
+    frame_ = options.frame;
+  }
 
   Result<void> begin() { return output_.append(npy_head(values_, dims())); }
 
@@ -32,9 +39,32 @@ class NpyWriter final : public SlabWriter {
         execution, blocks.count(),
         [&](std::size_t index, Bytes& out, int) { blocks.make(index, out); });
   }
-  Result<void> finish_output(const Execution&) override { return output_.commit(); }
+  Result<void> finish_output(const Execution&) override {
+    if (auto written = write_sidecar(); !written) return written;
+    return output_.commit();
+  }
+  /// Where the grid lies: centre = direction @ (origin + (index + 0.5) * spacing).
+  Result<void> write_sidecar() const {
+    if (sidecar_.empty()) return {};
+    const VoxelGrid& g = grid();
+    std::string text =
+        fmt::format("{{\n  \"origin\": [{}, {}, {}],\n  \"spacing\": [{}, {}, {}],\n", g.origin.x,
+                    g.origin.y, g.origin.z, g.voxel_size.x, g.voxel_size.y, g.voxel_size.z);
+    text += "  \"direction\": [";
+    for (int row = 0; row < 3; ++row) {
+      const glm::dmat3& d = frame_.direction;
+      text += fmt::format("{}[{}, {}, {}]", row == 0 ? "" : ", ", d[0][row], d[1][row], d[2][row]);
+    }
+    text += "]\n}\n";
+    Result<AtomicFile> file = AtomicFile::create(sidecar_);
+    if (!file) return tl::unexpected(file.error());
+    if (auto written = file->write(text.data(), text.size()); !written) return written;
+    return file->commit();
+  }
 
   DenseValues values_;
+  GridFrame frame_;
+  std::string sidecar_;  // path; empty: none
   BlockOutput output_;
 };
 

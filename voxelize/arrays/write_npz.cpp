@@ -1,6 +1,7 @@
-// NumPy's .npz (numpy.savez_compressed): a ZIP (PKWARE, APPNOTE.TXT 6.3) of three .npy arrays:
+// NumPy's .npz (numpy.savez_compressed): a ZIP (PKWARE, APPNOTE.TXT 6.3) of .npy arrays:
 //   origin   float64 (3,): lower corner of voxel (0, 0, 0) in world space
 //   spacing  float64 (3,): world length of a voxel along x, y, z
+//   direction  float64 (3, 3), where the grid is turned: a point p of the grid is at direction @ p
 //   voxels   as write_npy.cpp has it, shape (nx, ny, nz)
 // The voxels are one deflated entry, made of pieces that threads deflate apart from runs, a layer
 // each; libzip would want the bytes. What is known only at the end (CRC, compressed bytes) is
@@ -42,6 +43,7 @@ class NpzWriter final : public SlabWriter {
             BlockOutput output)
       : SlabWriter(path, grid, Axis::kX),
         values_(options),
+        frame_(options.frame),
         output_(std::move(output)),
         layers_(grid, values_) {}
 
@@ -50,12 +52,12 @@ class NpzWriter final : public SlabWriter {
          {std::pair{"origin.npy", grid().origin}, std::pair{"spacing.npy", grid().voxel_size}}) {
       std::string data = npy_head("<f8", false, "(3,)");
       for (int axis = 0; axis < 3; ++axis) put(data, vector[axis]);
-      ZipEntry& entry = entries_.emplace_back();
-      entry.name = name;
-      entry.crc = checksum(data);
-      entry.bytes = entry.compressed = data.size();
-      entry.offset = output_.position();
-      if (auto written = output_.append(entry.local_head() + data); !written) return written;
+      if (auto written = append(name, data); !written) return written;
+    }
+    if (frame_.turned()) {
+      std::string data = npy_head("<f8", false, "(3, 3)");
+      for (int i = 0; i < 9; ++i) put(data, frame_.direction[i % 3][i / 3]);
+      if (auto written = append("direction.npy", data); !written) return written;
     }
     const std::string head = npy_head(values_, dims());
     ZipEntry& voxels = entries_.emplace_back();
@@ -79,6 +81,15 @@ class NpzWriter final : public SlabWriter {
   }
 
  private:
+  /// A small array as it is.
+  Result<void> append(const char* name, const std::string& data) {
+    ZipEntry& entry = entries_.emplace_back();
+    entry.name = name;
+    entry.crc = checksum(data);
+    entry.bytes = entry.compressed = data.size();
+    entry.offset = output_.position();
+    return output_.append(entry.local_head() + data);
+  }
   static std::uint32_t checksum(const std::string& data) {
     return static_cast<std::uint32_t>(
         crc32_z(crc32_z(0, nullptr, 0), reinterpret_cast<const Bytef*>(data.data()), data.size()));
@@ -105,6 +116,7 @@ class NpzWriter final : public SlabWriter {
   }
 
   DenseValues values_;
+  GridFrame frame_;
   BlockOutput output_;
   DeflatedLayers layers_;
   std::vector<ZipEntry> entries_;  // the voxels last

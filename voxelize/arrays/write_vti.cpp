@@ -47,24 +47,28 @@ class VtiWriter final : public SlabWriter {
  public:
   VtiWriter(const std::string& path, const VoxelGrid& grid, const VoxelWriterOptions& options,
             BlockOutput output)
-      : SlabWriter(path, grid, Axis::kX), values_(options), output_(std::move(output)) {}
+      : SlabWriter(path, grid, Axis::kX),
+        values_(options),
+        frame_(options.frame),
+        output_(std::move(output)) {}
 
   Result<void> begin(const std::string& name) {
     const VoxelGrid& g = grid();
     const std::string extent = fmt::format("0 {} 0 {} 0 {}", g.dims.x, g.dims.y, g.dims.z);
     const std::string title = xml_text(name);
+    const glm::dvec3 corner = frame_.world(g.origin);
     const std::string header = fmt::format(
         "<?xml version=\"1.0\"?>\n"
         "<VTKFile type=\"ImageData\" version=\"1.0\" byte_order=\"LittleEndian\" "
         "header_type=\"UInt64\"{}>\n"
-        "  <ImageData WholeExtent=\"{}\" Origin=\"{} {} {}\" Spacing=\"{} {} {}\">\n"
+        "  <ImageData WholeExtent=\"{}\" Origin=\"{} {} {}\" Spacing=\"{} {} {}\"{}>\n"
         "    <Piece Extent=\"{}\">\n"
         "      <PointData/>\n"
         "      <CellData Scalars=\"{}\">\n"
         "        <DataArray type=\"{}{}\" Name=\"{}\"{} format=\"appended\" offset=\"0\"/>\n"
         "      </CellData>\n    </Piece>\n  </ImageData>\n  <AppendedData encoding=\"raw\">\n_",
-        compressed() ? " compressor=\"vtkZLibDataCompressor\"" : "", extent, g.origin.x, g.origin.y,
-        g.origin.z, g.voxel_size.x, g.voxel_size.y, g.voxel_size.z, extent, title,
+        compressed() ? " compressor=\"vtkZLibDataCompressor\"" : "", extent, corner.x, corner.y,
+        corner.z, g.voxel_size.x, g.voxel_size.y, g.voxel_size.z, direction(), extent, title,
         values_.is_float() ? "Float" : "UInt", values_.number_bits(), title,
         values_.components == 1 ? "" : " NumberOfComponents=\"4\"");
     if (Result<void> written = output_.append(header); !written) return written;
@@ -83,6 +87,15 @@ class VtiWriter final : public SlabWriter {
   }
 
  private:
+  /// Of VTK 9: rows of the matrix.
+  [[nodiscard]] std::string direction() const {
+    if (!frame_.turned()) return {};
+    std::string text = " Direction=\"";
+    for (int i = 0; i < 9; ++i) {
+      text += fmt::format("{}{}", i == 0 ? "" : " ", frame_.direction[i % 3][i / 3] + 0.0);
+    }
+    return text + "\"";
+  }
   [[nodiscard]] bool compressed() const { return !output_.sequential(); }
 
   Result<void> add_slab(const VoxelIntervals& slab, const Execution& execution) override {
@@ -119,6 +132,7 @@ class VtiWriter final : public SlabWriter {
   }
 
   DenseValues values_;
+  GridFrame frame_;
   BlockOutput output_;
   std::uint64_t table_position_ = 0;
   std::vector<std::uint64_t> table_;

@@ -65,6 +65,20 @@ std::string metadata(const VdbHeader& header, const std::string& compression) {
   return raw(count) + entries;
 }
 
+/// A matrix for row vectors: the steps along the axes, then the place of index (0, 0, 0).
+std::string affine_map(const VoxelGrid& grid, const GridFrame& frame) {
+  std::string bytes;
+  put_text(bytes, "AffineMap");
+  const glm::dmat3 steps = frame.steps(grid.voxel_size);
+  for (int row = 0; row < 3; ++row) {
+    put_vec(bytes, steps[row]);
+    put(bytes, 0.0);
+  }
+  put_vec(bytes, frame.world(grid.origin + 0.5 * grid.voxel_size));
+  put(bytes, 1.0);
+  return bytes;
+}
+
 std::string transform(const VoxelGrid& grid) {
   const glm::dvec3 size = grid.voxel_size;
   const bool uniform = size.x == size.y && size.y == size.z;
@@ -99,12 +113,11 @@ std::string vdb_header_bytes(const VdbHeader& header) {
                                                        : "Tree_vec3s_5_4_3");
   put_text(bytes, "");  // not an instance of another grid
 
-  const bool numbers =
-      header.values == VdbValues::kFloat || header.values == VdbValues::kColour;
+  const bool numbers = header.values == VdbValues::kFloat || header.values == VdbValues::kColour;
   const bool zip = numbers && !header.level_set;
   std::string grid = raw(kCompressActiveMask | (zip ? kCompressZip : 0));
   grid += metadata(header, zip ? "zip + active values" : "active values");
-  grid += transform(header.grid);
+  grid += header.frame.turned() ? affine_map(header.grid, header.frame) : transform(header.grid);
   const std::uint64_t grid_position = bytes.size() + 3 * sizeof(std::uint64_t);
   const std::uint64_t buffers_position = grid_position + grid.size() + header.topology_bytes;
   put(bytes, grid_position);

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "strata/core/grid.h"
+#include "strata/voxelize/grid_frame.h"
 
 namespace strata {
 
@@ -17,6 +18,7 @@ enum class VdbValues { kMask, kBool, kFloat, kColour };
 struct VdbHeader {
   std::string name;
   VoxelGrid grid;
+  GridFrame frame;
   VdbValues values = VdbValues::kBool;
   bool fog = false;               ///< the class of the grid is fog volume
   bool level_set = false;         ///< it is level set; the numbers are not compressed

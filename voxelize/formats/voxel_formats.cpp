@@ -22,7 +22,8 @@ VoxelFormat dense(std::string name, std::string extension, std::string descripti
           .ids = kAnyId,
           .shares = true,
           .rgba = true,
-          .distances = true};
+          .distances = true,
+          .turned = true};
 }
 VoxelFormat named(VoxelFormat format) {
   format.named = true;
@@ -39,7 +40,8 @@ std::vector<VoxelFormat> all_formats() {
        .named = true,
        .shares = true,
        .rgba = true,
-       .distances = true},
+       .distances = true,
+       .turned = true},
       dense("npy", ".npy", "NumPy: bool array indexed [x, y, z]; ids"),
       dense("npz", ".npz", "NumPy: arrays voxels (as .npy, deflated), origin, spacing; ids"),
       named(dense("nrrd", ".nrrd", "NRRD: uint8, gzip; world transform; ids")),

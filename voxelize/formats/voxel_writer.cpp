@@ -121,8 +121,16 @@ Result<void> check_ids(const VoxelFormat& format, std::uint32_t largest) {
               format.ids, largest, names);
 }
 
+Result<void> check_frame(const VoxelFormat& format, const GridFrame& frame) {
+  if (format.turned || !frame.turned()) return {};
+  return fail(ErrorCode::kUsage,
+              "format {} cannot store a grid that is turned in the world; {} can", format.name,
+              names_of_those_that([](const VoxelFormat& other) { return other.turned; }));
+}
+
 Result<void> check_values(const VoxelFormat& format, const VoxelWriterOptions& options) {
   if (Result<void> held = check_ids(format, options.ids); !held) return held;
+  if (Result<void> held = check_frame(format, options.frame); !held) return held;
   struct Values {
     bool asked, held;
     bool VoxelFormat::*member;

@@ -113,6 +113,7 @@ class LevelSetWriter final : public VoxelWriter {
         grid_(grid),
         band_(options.band),
         name_(options.name),
+        frame_(options.frame),
         output_(std::move(output)),
         lower_dims_((grid.dims + kLowerSide - 1) / kLowerSide),
         lowers_(count_of(lower_dims_.x) * count_of(lower_dims_.y) * count_of(lower_dims_.z)) {}
@@ -156,6 +157,7 @@ class LevelSetWriter final : public VoxelWriter {
   VoxelGrid grid_;
   float band_;
   std::string name_;
+  GridFrame frame_;
   BlockOutput output_;
   glm::ivec3 lower_dims_;                       // lower nodes along x, y, z
   std::vector<std::unique_ptr<Lower>> lowers_;  // null: all outside
@@ -473,6 +475,7 @@ Result<void> LevelSetWriter::write(const Execution& execution) {
   VdbHeader header;
   header.name = name_;
   header.grid = grid_;
+  header.frame = frame_;
   header.values = VdbValues::kFloat;
   header.level_set = true;
   header.voxels = totals.voxels;

@@ -147,6 +147,7 @@ class VdbWriter final : public SlabWriter {
                               : VdbValues::kBool),
         fog_(options.fog != 0),
         name_(options.rgba && options.name == "colours" ? "Cd" : options.name),
+        frame_(options.frame),
         output_(std::move(output)),
         tiles_x_(parts(grid.dims.x, kTileSide)),
         tiles_y_(parts(grid.dims.y, kTileSide)),
@@ -192,6 +193,7 @@ class VdbWriter final : public SlabWriter {
   VdbValues kind_;
   bool fog_;
   std::string name_;
+  GridFrame frame_;
   BlockOutput output_;
   int tiles_x_, tiles_y_;
   glm::ivec3 lowers_;  // lower nodes along x, y, z
@@ -475,6 +477,7 @@ VdbHeader VdbWriter::header(std::uint64_t topology_bytes) const {
   VdbHeader header;
   header.name = name_;
   header.grid = grid();
+  header.frame = frame_;
   header.values = kind_;
   header.fog = fog_;
   std::uint64_t value_bytes = 0;

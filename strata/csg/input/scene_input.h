@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 #include <span>
 #include <string>
@@ -50,10 +51,13 @@ struct SceneInput {
   InsideRule rule = InsideRule::kWinding;  ///< which winding numbers are inside a mesh
   bool keep_orientation = false;           ///< meshes that are inside out are not reversed
   MeshPlacement placement;                 ///< of meshes, and of scenes but for their unit
-  std::vector<std::string> parts;          ///< names of the parts of meshes to keep; empty: all
-  bool split_parts = false;                ///< parts of meshes become solids of their own, united
-  bool attributes = false;                 ///< read parts, materials and colours of meshes
-  bool textures = true;                    ///< with `attributes`: and their pictures
+  /// load_solids() turns the solids by it, after their facts were taken: from the world to the
+  /// space of a grid. Near to orthonormal; a reflection is allowed.
+  glm::dmat3 space_from_world{1.0};
+  std::vector<std::string> parts;  ///< names of the parts of meshes to keep; empty: all
+  bool split_parts = false;        ///< parts of meshes become solids of their own, united
+  bool attributes = false;         ///< read parts, materials and colours of meshes
+  bool textures = true;            ///< with `attributes`: and their pictures
   /// A Boolean expression over the files, such as "a - b"; empty: their union.
   std::string expression;
 };
@@ -130,6 +134,9 @@ Result<InputFacts> inspect_mesh(TriangleSoup& soup, MeshReadStats stats, const s
 Result<void> place_mesh(const std::string& path, const MeshReadStats& stats,
                         const SceneInput& input, TriangleSoup& soup,
                         const Execution& execution = {});
+
+/// Multiplies all positions by a matrix; a reflection reverses the triangles.
+void turn_mesh(const glm::dmat3& turn, TriangleSoup& soup, const Execution& execution = {});
 
 /// The same for a scene, whose numbers are in the world's unit.
 Result<void> place_scene(const std::string& path, const SceneInput& input, Scene& scene);

@@ -22,7 +22,8 @@ struct SolidInput {
   std::shared_ptr<SolidLists> tree;
   std::shared_ptr<const Tree> scene;  ///< the tree that `tree` was made from, without meshes
   std::vector<InputFacts> files;      ///< the facts of each input, in the order given
-  Bounds bounds;                      ///< of the soup
+  Bounds bounds;                      ///< of the inputs in the world
+  bool turned = false;  ///< the soup and the tree are turned by SceneInput::space_from_world
   /// With SceneInput::attributes, where there is no tree: of the soup, all files as one.
   MeshAttributes attributes;
   bool closed = true;                      ///< all files are closed

@@ -32,6 +32,7 @@ struct VoxelFormat {
   bool rgba = false;        ///< holds VoxelWriterOptions::rgba
   bool distances = false;   ///< holds VoxelWriterOptions::band
   bool pictures = false;    ///< layers are pictures: VoxelWriterOptions::layers
+  bool turned = false;      ///< holds GridFrame::direction
 };
 
 /// The formats this build can write.
@@ -60,6 +61,10 @@ Result<void> check_ids(const VoxelFormat& format, std::uint32_t largest);
 /// Checks that a format holds what `options` say the values are. @return kUsage naming the formats
 /// that do
 Result<void> check_values(const VoxelFormat& format, const VoxelWriterOptions& options);
+
+/// Checks that a format can hold a grid that is turned in the world. @return kUsage naming those
+/// that can
+Result<void> check_frame(const VoxelFormat& format, const GridFrame& frame);
 
 /// The largest memory that a job is expected to hold, in bytes.
 struct MemoryEstimate {

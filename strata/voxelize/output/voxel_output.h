@@ -57,6 +57,8 @@ struct VoxelWriterOptions {
   std::vector<glm::u8vec4> colours{};
   GridFrame frame{};      ///< of the grid in the world
   LayerOptions layers{};  ///< of pictures
+  /// .npy: a file beside it, `x.npy.json`, says where the grid lies.
+  bool sidecar = false;
 };
 
 /// Writes a voxel set slab by slab: every slab of one axis, in increasing v, then finish(). Any

@@ -542,5 +542,23 @@ TEST_F(OpenVdbBridge, RefusesPartsAndSizesThatOpenVdbDoesNotTake) {
   EXPECT_EQ(tiny.error().code, ErrorCode::kUsage);
 }
 
+TEST_F(WriteVdb, ATurnedGridHasAnAffineMapThatOpenVdbAgreesWith) {
+  VoxelGrid grid = make_grid({9, 10, 11}, {1, 2, 3}, {0.5, 0.25, 2});
+  VoxelWriterOptions options;
+  // A turn by 3-4-5, mirrored along z.
+  options.frame.direction = glm::dmat3(0.6, 0.8, 0, -0.8, 0.6, 0, 0, 0, -1);
+  const auto set = intervals_from_predicate(grid, Axis::kZ, [](int i, int, int) { return i > 4; });
+  const auto read_back = read<openvdb::BoolGrid>(write(set, options));
+  EXPECT_EQ(read_back->activeVoxelCount(), set.solid_voxels());
+  for (const glm::dvec3& index : {glm::dvec3(0), glm::dvec3(3, 0, 0), glm::dvec3(2, 5, 7)}) {
+    const glm::dvec3 expected =
+        options.frame.direction * (grid.origin + (index + 0.5) * grid.voxel_size);
+    const openvdb::Vec3d world = read_back->indexToWorld(openvdb::Vec3d(index.x, index.y, index.z));
+    for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(world[axis], expected[axis], 1e-12);
+    const openvdb::Vec3d back = read_back->worldToIndex(world);
+    for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(back[axis], index[axis], 1e-9);
+  }
+}
+
 }  // namespace
 }  // namespace strata::testing
