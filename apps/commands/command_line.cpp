@@ -224,6 +224,8 @@ void define_voxelize(CLI::App& app, Words& words) {
       "in a scene the colour of the solid)");
   option(app, output, "--name", words.name, "NAME",
          "Name of the grid in a .vdb, .nrrd or .vti (default: density, ids, surface or solid)");
+  option(app, output, "--levels", words.levels, "N",
+         "Resolutions in an .ome.zarr, each half of the one before (default: 1)");
   flag(app, output, "--stats", words.stats, "Print statistics");
   add_json(app, words, output);
   flag(app, output, "--checksum", words.checksum, "Print a hash of the solid voxels and the grid");
@@ -474,6 +476,16 @@ void read_values(const Words& words, VoxelizeCommand& command, Reader& reader) {
   constexpr std::int64_t kFogSamples = 4, kMostFogSamples = 16;
   command.ids = words.ids;
   command.mask = words.mask;
+  if (!words.levels.empty()) {
+    constexpr std::int64_t kMostLevels = 17;  // 65536 voxels to one
+    std::int64_t levels = 1;
+    reader.take(parse_integer("--levels", words.levels), levels);
+    if (levels < 1 || levels > kMostLevels) {
+      reader.fail_with(fmt::format("--levels must be 1 to {}, got {}", kMostLevels, levels));
+    }
+    command.levels = static_cast<int>(levels);
+    if (command.output.empty()) reader.fail_with("--levels needs -o");
+  }
   if (!words.name.empty()) command.name = words.name;
   if (std::any_of(words.name.begin(), words.name.end(),
                   [](unsigned char letter) { return letter < ' ' || letter == 0x7f; })) {

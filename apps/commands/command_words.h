@@ -45,7 +45,7 @@ struct Words {
   std::string resolution, voxel_size, grid, cubic, like, bounds, origin, padding;
   bool align = false, solid = false, mask = false, ids = false, sdf = false, voxel_colours = false,
        keep_orientation = false, samples = false;
-  std::string fog, name, band, fill_colour;
+  std::string fog, name, band, fill_colour, levels;
   std::string surface, rule = "winding", open = "vote", axis = "auto", store = "auto",
                        offsets = "plane-first", backend = "auto";
   bool stats = false, checksum = false, dry_run = false, show = false, list_formats = false,

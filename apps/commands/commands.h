@@ -42,6 +42,7 @@ struct VoxelizeCommand {
   std::string output;           ///< empty: none, "-": standard output
   std::string format;           ///< empty: by extension
   int fog = 0;                  ///< samples along a voxel's side of a fog volume; 0: none
+  int levels = 1;               ///< resolutions of the file
   bool fog_by_default = false;  ///< of which no number was given
   int coverage = 0;             ///< rays along a voxel's side for its filled fraction; 0: none
   bool floats = false;          ///< fractions are floats in formats of arrays

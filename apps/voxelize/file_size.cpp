@@ -128,6 +128,7 @@ class SizeBound {
     if (format == "xyz") return kHeads + 92 * voxels();
     if (format == "png" || format == "sl1") return pictures();
     if (format == "zarr") return zarr();
+    if (format == "ome.zarr") return (file_.levels > 1 ? 2.0 : 1.0) * (zarr() + kHeads);
     if (format == "tif") return layers(RunBytes::kIds, cells_) + 512.0 * grid_.dims.z;
     return layers(values_.codes, cells_);  // npz, nrrd, vti, nii.gz, mha
   }

@@ -50,6 +50,12 @@ Result<std::optional<VoxelFormat>> output_format(const VoxelizeCommand& command)
                 command.mask ? "--mask" : "--fog", format->name,
                 command.mask ? "mask" : "fog volume");
   }
+  if (command.levels != 1 && !format->levels) {
+    VoxelWriterOptions options;
+    options.levels = command.levels;
+    const auto held = check_values(*format, options);
+    return fail(ErrorCode::kUsage, "--levels: {}", held.error().message);
+  }
   if (command.name && !format->named) {
     return fail(ErrorCode::kUsage,
                 "--name needs a .vdb, .nrrd or .vti file; format {} cannot store a name",

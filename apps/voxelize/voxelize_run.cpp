@@ -425,6 +425,7 @@ VoxelWriterOptions writer_options(const VoxelizeCommand& command, VoxelizeOutcom
   }
   file.rgba = command.colours;
   if (!command.solid && samples == 0 && !command.colours) file.name = "surface";
+  file.levels = command.levels;
   if (command.name) file.name = *command.name;
   label_solids(command, outcome, file, session);
   return file;

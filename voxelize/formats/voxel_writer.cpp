@@ -59,6 +59,7 @@ VoxelWriterResult open_format(const std::string& path, const std::string& name,
   if (name == "nii") return open_nifti_writer(path, grid, options, false);
   if (name == "nii.gz") return open_nifti_writer(path, grid, options, true);
   if (name == "tif") return open_tiff_writer(path, grid, options);
+  if (name == "ome.zarr") return open_ome_zarr_writer(path, grid, options);
   if (name == "zarr") return open_zarr_writer(path, grid, options);
   if (name == "ply") return open_ply_writer(path, grid, options);
   if (name == "xyz") return open_xyz_writer(path, grid, options);
@@ -146,6 +147,14 @@ Result<void> check_values(const VoxelFormat& format, const VoxelWriterOptions& o
     if (!kind.asked || kind.held) continue;
     return fail(ErrorCode::kUsage, "format {} holds no {}; {} can", format.name, kind.name,
                 names_of_those_that([&](const VoxelFormat& other) { return other.*kind.member; }));
+  }
+  if (options.levels != 1 && !format.levels) {
+    return fail(ErrorCode::kUsage, "format {} holds one resolution, not {}; {} holds more",
+                format.name, options.levels,
+                names_of_those_that([](const VoxelFormat& other) { return other.levels; }));
+  }
+  if (options.levels != 1 && options.band != 0) {
+    return fail(ErrorCode::kUsage, "distances have one resolution, not {}", options.levels);
   }
   if (options.mask && format.name != "vdb") {
     return fail(ErrorCode::kUsage, "a mask needs format vdb, got {}", format.name);

@@ -1,6 +1,7 @@
 #include "voxelize/output/folder_output.h"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -35,6 +36,11 @@ Result<FolderOutput> FolderOutput::create(const std::string& path) {
   const int descriptor = open(folder->temporary_path().c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (descriptor < 0) return cannot_write(path, "", errno);
   return FolderOutput(std::move(*folder), descriptor);
+}
+
+Result<void> FolderOutput::make_folder(const std::string& name) const {
+  if (mkdirat(descriptor_, name.c_str(), S_IRWXU | S_IRWXG | S_IRWXO) == 0) return {};
+  return cannot_write(folder_.path(), name, errno);
 }
 
 Result<void> FolderOutput::write(const std::string& name, const void* data,

@@ -20,6 +20,8 @@ class FolderOutput {
   FolderOutput& operator=(FolderOutput&&) = delete;
   ~FolderOutput();
 
+  /// Makes a folder in it, in folders that are there. @return kOutput naming it
+  Result<void> make_folder(const std::string& name) const;
   /// Writes one file of the folder. Several threads may call it. @return kOutput naming the file
   Result<void> write(const std::string& name, const void* data, std::size_t bytes) const;
   /// Calls body for every index of [0, count) on several threads. @return the first failure met;

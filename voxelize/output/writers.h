@@ -45,6 +45,8 @@ VoxelWriterResult open_nifti_writer(const std::string& path, const VoxelGrid& gr
                                     const VoxelWriterOptions& options, bool packed);
 VoxelWriterResult open_tiff_writer(const std::string& path, const VoxelGrid& grid,
                                    const VoxelWriterOptions& options);
+VoxelWriterResult open_ome_zarr_writer(const std::string& path, const VoxelGrid& grid,
+                                       const VoxelWriterOptions& options);
 VoxelWriterResult open_zarr_writer(const std::string& path, const VoxelGrid& grid,
                                    const VoxelWriterOptions& options);
 

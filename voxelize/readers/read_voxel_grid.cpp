@@ -198,7 +198,11 @@ Result<VoxelFileGrid> ome_grid(const std::string& folder, const JsonValue& attri
   }
   if (found != 3) return fail(ErrorCode::kInput, "{}: no axes x, y and z", path);
   auto result = grid_of_axes(path, grid);
-  if (result) result->frame.unit_metres = unit;
+  if (!result) return result;
+  result->frame.unit_metres = unit;
+  const auto direction = direction_of(attributes, path);  // an attribute of ours
+  if (!direction) return tl::unexpected(direction.error());
+  result->frame.direction = *direction;
   return result;
 }
 

@@ -48,6 +48,7 @@ constexpr std::array kFormats = {
     Format{"binvox", ".binvox", read_binvox_voxels},
     Format{"vox", ".vox", read_vox_voxels},
     Format{"zarr", "", read_zarr_voxels, true, ".zarray"},
+    Format{"ome.zarr", "", read_ome_zarr_voxels, true, ".zgroup"},
     Format{"png", "", read_slice_voxels, true, "slices.json"},
     Format{"ldi", ".exr", read_exr},
 };

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "mesh/text/input_bytes.h"
+#include "strata/voxelize/readers/read_voxel_grid.h"
 #include "voxelize/readers/readers.h"
 #include "voxelize/readers/unblosc.h"
 #include "voxelize/volume/dense_array.h"
@@ -34,6 +35,11 @@ struct ZarrHead {
   Packing packing = Packing::kNone;
   double fill = 0.0;
   char separator = '.';
+  // Of OME-Zarr: the axes are z, y, x, which is the other order of storage, too, and the names of
+  // chunks begin with those of axes that have one index.
+  bool reversed = false;
+  std::string folder;
+  std::string before;
 
   [[nodiscard]] std::size_t chunk_bytes() const {
     return static_cast<std::size_t>(chunk.x) * static_cast<std::size_t>(chunk.y) *
@@ -82,13 +88,33 @@ Result<void> take_type(const JsonValue& json, const std::string& path, ZarrHead&
   return {};
 }
 
-Result<ZarrHead> read_head(const ReadContext& context) {
-  const std::string path = context.path + "/.zarray";
+/// The three axes of a shape or of chunks as x, y, z; of OME-Zarr the last three, of which those
+/// before have one index. Nothing if there are others.
+std::optional<std::vector<double>> three_axes(const JsonValue& json, std::string_view name,
+                                              bool ome) {
+  const JsonValue* list = json.find(name);
+  if (list == nullptr || list->items.size() < 3 || (!ome && list->items.size() != 3)) {
+    return std::nullopt;
+  }
+  auto numbers = json.numbers(name, list->items.size());
+  if (!numbers || !ome) return numbers;
+  for (; numbers->size() > 3; numbers->erase(numbers->begin())) {
+    if (numbers->front() != 1.0) return std::nullopt;
+  }
+  std::reverse(numbers->begin(), numbers->end());
+  return numbers;
+}
+
+/// @param folder  of the array; of OME-Zarr in that of the group
+Result<ZarrHead> read_head(const ReadContext& context, const std::string& folder, bool ome) {
+  const std::string path = folder + "/.zarray";
   const Result<JsonValue> json = read_json(context, path);
   if (!json) return tl::unexpected(json.error());
   ZarrHead head;
+  head.reversed = ome;
+  head.folder = folder;
   const JsonValue* version = json->find("zarr_format");
-  const auto shape = json->numbers("shape", 3), chunks = json->numbers("chunks", 3);
+  const auto shape = three_axes(*json, "shape", ome), chunks = three_axes(*json, "chunks", ome);
   if (version == nullptr || version->number != 2.0 || !shape || !chunks) {
     return fail(ErrorCode::kInput, "{}: zarr_format must be 2, shape and chunks 3 numbers each",
                 path);
@@ -106,6 +132,16 @@ Result<ZarrHead> read_head(const ReadContext& context) {
     head.chunks[axis] = (head.grid.dims[axis] + head.chunk[axis] - 1) / head.chunk[axis];
   }
   if (auto taken = take_type(*json, path, head); !taken) return tl::unexpected(taken.error());
+  if (ome) {
+    head.fortran = !head.fortran;
+    for (std::size_t i = 3; i < json->find("shape")->items.size(); ++i) {
+      head.before += std::string("0") + head.separator;
+    }
+    const auto place = read_voxel_grid(context.path, context.execution);
+    head.placed = place.has_value();
+    if (place) head.grid = place->grid;
+    return head;
+  }
   const std::string attributes = context.path + "/.zattrs";
   if (::access(attributes.c_str(), R_OK) == 0) {
     const Result<JsonValue> placed = read_json(context, attributes);
@@ -139,8 +175,9 @@ class ChunkReader {
 
   /// The numbers of a chunk in the order of the file; empty if there is no such file.
   Result<std::span<const std::byte>> read(const glm::ivec3& at) {
-    const std::string path = fmt::format("{}/{}{}{}{}{}", context_.path, at.x, head_.separator,
-                                         at.y, head_.separator, at.z);
+    const glm::ivec3 name = head_.reversed ? glm::ivec3(at.z, at.y, at.x) : at;
+    const std::string path = fmt::format("{}/{}{}{}{}{}{}", head_.folder, head_.before, name.x,
+                                         head_.separator, name.y, head_.separator, name.z);
     if (::access(path.c_str(), F_OK) != 0) return std::span<const std::byte>();
     const auto file = detail::InputBytes::open(path, context_.execution.memory_limit);
     if (!file) return tl::unexpected(file.error());
@@ -328,8 +365,10 @@ Result<ScalarField> read_field(ReadContext& context, const ZarrHead& head) {
 
 }  // namespace
 
-Result<VoxelVolume> read_zarr_voxels(ReadContext& context) {
-  const Result<ZarrHead> head = read_head(context);
+namespace {
+
+Result<VoxelVolume> read_array(ReadContext& context, const std::string& folder, bool ome) {
+  const Result<ZarrHead> head = read_head(context, folder, ome);
   if (!head) return tl::unexpected(head.error());
   if (!context.budget.take(head->chunk_bytes() * 2)) return context.too_large("a chunk");
   VoxelVolume volume;
@@ -354,6 +393,43 @@ Result<VoxelVolume> read_zarr_voxels(ReadContext& context) {
   }
   volume.placed = head->placed;
   volume.type = name_of(head->type);
+  return volume;
+}
+
+}  // namespace
+
+Result<VoxelVolume> read_zarr_voxels(ReadContext& context) {
+  return read_array(context, context.path, false);
+}
+
+// The finest level of the first image.
+Result<VoxelVolume> read_ome_zarr_voxels(ReadContext& context) {
+  const std::string path = context.path + "/.zattrs";
+  const Result<JsonValue> json = read_json(context, path);
+  if (!json) return tl::unexpected(json.error());
+  const JsonValue* scales = json->find("multiscales");
+  const JsonValue* sets =
+      scales == nullptr || scales->items.empty() ? nullptr : scales->items[0].find("datasets");
+  const JsonValue* name =
+      sets == nullptr || sets->items.empty() ? nullptr : sets->items[0].find("path");
+  if (name == nullptr || name->text.empty() || name->text.front() == '/' ||
+      name->text.find("..") != std::string::npos) {
+    return fail(ErrorCode::kInput, "{}: multiscales must name the folder of an array", path);
+  }
+  const JsonValue* axes = scales->items[0].find("axes");
+  std::string order;
+  for (std::size_t i = 0; axes != nullptr && i < axes->items.size(); ++i) {
+    const JsonValue* letter = axes->items[i].find("name");
+    order += letter == nullptr ? axes->items[i].text : letter->text;
+  }
+  if (!order.ends_with("zyx")) {
+    return fail(ErrorCode::kInput, "{}: axes '{}' are not read; those that end with z, y, x are",
+                path, order.substr(0, 40));
+  }
+  Result<VoxelVolume> volume = read_array(context, context.path + "/" + name->text, true);
+  if (volume && json->find("direction") != nullptr) {
+    volume->notes.push_back("the file turns the grid; it is shown along its own axes");
+  }
   return volume;
 }
 

@@ -17,8 +17,9 @@ Result<VoxelVolume> read_vdb_voxels(ReadContext& context);
 Result<VoxelVolume> read_vti_voxels(ReadContext& context);
 Result<VoxelVolume> read_binvox_voxels(ReadContext& context);
 Result<VoxelVolume> read_vox_voxels(ReadContext& context);
-Result<VoxelVolume> read_zarr_voxels(ReadContext& context);   ///< a folder
-Result<VoxelVolume> read_slice_voxels(ReadContext& context);  ///< a folder
+Result<VoxelVolume> read_zarr_voxels(ReadContext& context);      ///< a folder
+Result<VoxelVolume> read_ome_zarr_voxels(ReadContext& context);  ///< a folder
+Result<VoxelVolume> read_slice_voxels(ReadContext& context);     ///< a folder
 /// The voxels of depth lists: .npz or .exr, as `strata ldi` writes them.
 Result<VoxelVolume> read_list_voxels(ReadContext& context, bool exr);
 

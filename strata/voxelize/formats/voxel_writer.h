@@ -33,6 +33,7 @@ struct VoxelFormat {
   bool distances = false;   ///< holds VoxelWriterOptions::band
   bool pictures = false;    ///< layers are pictures: VoxelWriterOptions::layers
   bool turned = false;      ///< holds GridFrame::direction
+  bool levels = false;      ///< holds VoxelWriterOptions::levels
 };
 
 /// The formats this build can write.

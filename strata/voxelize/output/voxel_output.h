@@ -55,6 +55,10 @@ struct VoxelWriterOptions {
   /// Label n has the colour colours[n - 1]: red, green, blue, alpha. Empty: one colour. Not with
   /// ids.
   std::vector<glm::u8vec4> colours{};
+  /// .ome.zarr: arrays, each of half the resolution of the one before it, down to one voxel. A
+  /// voxel is solid if one of the eight is, has the label that most of the solid ones have, or the
+  /// mean of the shares.
+  int levels = 1;
   GridFrame frame{};      ///< of the grid in the world
   LayerOptions layers{};  ///< of pictures
   /// .npy: a file beside it, `x.npy.json`, says where the grid lies.

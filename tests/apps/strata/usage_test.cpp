@@ -174,7 +174,7 @@ TEST_F(Usage, FormatsAreListedWithoutAnInput) {
   const RunResult run = place.run({"voxelize", "--list-formats"});
   EXPECT_EQ(run.exit_code, 0) << run.err;
   for (const char* name : {"vdb", "npy", "npz", "nrrd", "vti", "nii", "nii.gz", "mha", "raw", "tif",
-                           "binvox", "vox", "png", "zarr", "ply", "xyz", "schem"}) {
+                           "binvox", "vox", "png", "ome.zarr", "zarr", "ply", "xyz", "schem"}) {
     EXPECT_NE(run.out.find(std::string(name) + " "), std::string::npos) << name;
   }
 }

@@ -148,6 +148,54 @@ def zarr_reads(zarr, folder, check):
         check.same(path, "spacing", array.attrs["voxel_size"], SIZE)
 
 
+def halved(array, kind):
+    """Half the resolution: any of flags, the label most of the solid ones have, the mean of shares."""
+    padded = np.pad(array, [(0, side % 2) for side in array.shape[:3]] + [(0, 0)] * (array.ndim - 3))
+    nx, ny, nz = (side // 2 for side in padded.shape[:3])
+    eight = padded.reshape((nx, 2, ny, 2, nz, 2) + array.shape[3:])
+    if kind == "flags":
+        return eight.max(axis=(1, 3, 5))
+    if kind in ("shares", "floats"):
+        return eight.mean(axis=(1, 3, 5))
+    packed = eight if kind != "colours" else (eight.astype(np.uint64) << np.array([0, 8, 16, 24], dtype=np.uint64)).sum(-1)
+    voxels = packed.transpose(0, 2, 4, 1, 3, 5).reshape(-1, 8)
+    result = np.zeros(len(voxels), dtype=packed.dtype)
+    for at in np.flatnonzero(voxels.any(axis=1)):
+        labels, counts = np.unique(voxels[at][voxels[at] != 0], return_counts=True)
+        result[at] = labels[counts.argmax()]
+    result = result.reshape(nx, ny, nz)
+    if kind != "colours":
+        return result
+    return np.stack([(result >> np.uint64(shift) & np.uint64(255)).astype(np.uint8) for shift in (0, 8, 16, 24)], axis=-1)
+
+
+def ome_zarr_reads(zarr, folder, check):
+    for path, kind, frame in files(folder, ".ome.zarr"):
+        group = zarr.open_group(path, mode="r")
+        scales = group.attrs["multiscales"][0]
+        check.equal(path, "version", scales["version"], "0.4")
+        names = "czyx" if kind == "colours" else "zyx"
+        check.equal(path, "axes", "".join(axis["name"] for axis in scales["axes"]), names)
+        unit = scales["axes"][-1].get("unit")
+        check.equal(path, "unit", unit, None if frame == "plain" else "millimeter")
+        check.equal(path, "levels", [level["path"] for level in scales["datasets"]], ["0", "1", "2"])
+        expected = part("floats" if kind == "shares" else kind)
+        for number, level in enumerate(scales["datasets"]):
+            found = np.asarray(group[level["path"]]).transpose((3, 2, 1, 0) if kind == "colours" else (2, 1, 0))
+            if number == 0:
+                check.values(path, kind, found)
+            else:
+                expected = halved(expected, kind)
+                exact = np.floor(255 * expected + 0.5) if kind == "shares" else expected
+                if found.shape != exact.shape or not np.array_equal(found, exact.astype(found.dtype)):
+                    check.faults.append(f"{path}: level {number} differs")
+            scale, shift = (step[step["type"]][-3:][::-1] for step in level["coordinateTransformations"])
+            check.same(path, "scale", scale, SIZE * 2**number)
+            check.same(path, "translation", shift, ORIGIN + SIZE * 2**number / 2)
+            if frame != "plain":
+                check.same(path, "direction", group.attrs["direction"], TURN)
+
+
 def pillow_reads(image_module, folder, check):
     for path, kind, frame in files(folder, "_slices"):
         with open(os.path.join(path, "slices.json")) as file:
@@ -236,7 +284,8 @@ def vtk_reads(_, folder, check):
 
 
 READERS = {"numpy": ("numpy", numpy_reads), "nibabel": ("nibabel", nibabel_reads),
-           "tifffile": ("tifffile", tifffile_reads), "zarr": ("zarr", zarr_reads), "pillow": ("PIL.Image", pillow_reads),
+           "tifffile": ("tifffile", tifffile_reads), "zarr": ("zarr", zarr_reads),
+           "ome_zarr": ("zarr", ome_zarr_reads), "pillow": ("PIL.Image", pillow_reads),
            "pyopenvdb": ("pyopenvdb", pyopenvdb_reads), "vtk": ("vtkmodules", vtk_reads)}
 
 

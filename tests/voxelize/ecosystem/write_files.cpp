@@ -77,6 +77,7 @@ int write_all(const std::string& folder) {
                                                     : labelled(grid, format.axis, label);
       for (const auto& [name, frame] : all_frames()) {
         values.options.frame = frame;
+        values.options.levels = format.levels ? 3 : 1;
         for (const std::string& extension : {format.extension, format.also}) {
           if (extension.empty()) continue;
           const std::string stem = folder + "/" + values.name + "_" + name;

@@ -50,7 +50,7 @@ VoxelWriterOptions distances() {
 std::vector<VoxelFormat> dense_formats() {
   std::vector<VoxelFormat> formats = voxel_formats();
   std::erase_if(formats, [](const VoxelFormat& f) {
-    return !f.shares || f.name == "vdb" || f.name == "sl1";
+    return !f.shares || f.name == "vdb" || f.name == "ome.zarr" || f.name == "sl1";
   });
   return formats;
 }
