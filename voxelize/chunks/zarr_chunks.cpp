@@ -1,4 +1,4 @@
-#include "voxelize/formats/zarr_chunks.h"
+#include "voxelize/chunks/zarr_chunks.h"
 
 #include <algorithm>
 #include <utility>

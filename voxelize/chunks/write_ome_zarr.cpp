@@ -13,8 +13,8 @@
 #include <utility>
 #include <vector>
 
-#include "voxelize/formats/half_resolution.h"
-#include "voxelize/formats/zarr_chunks.h"
+#include "voxelize/chunks/half_resolution.h"
+#include "voxelize/chunks/zarr_chunks.h"
 #include "voxelize/output/folder_output.h"
 #include "voxelize/output/grid_text.h"
 #include "voxelize/output/slab_writer.h"

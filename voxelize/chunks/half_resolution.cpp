@@ -1,4 +1,4 @@
-#include "voxelize/formats/half_resolution.h"
+#include "voxelize/chunks/half_resolution.h"
 
 #include <algorithm>
 #include <utility>

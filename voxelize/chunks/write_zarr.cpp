@@ -8,7 +8,7 @@
 #include <string>
 #include <utility>
 
-#include "voxelize/formats/zarr_chunks.h"
+#include "voxelize/chunks/zarr_chunks.h"
 #include "voxelize/output/folder_output.h"
 #include "voxelize/output/slab_writer.h"
 #include "voxelize/output/writers.h"
