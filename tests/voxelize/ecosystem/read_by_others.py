@@ -228,7 +228,7 @@ def pyopenvdb_reads(openvdb, folder, check):
         check.same(path, "steps", steps, world[:3, :3], 1e-9)
 
 
-VDB_TURNS = False
+VDB_TURNS = True
 
 
 def vtk_array(image, vtk_to_numpy, cells):
