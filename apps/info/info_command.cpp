@@ -45,7 +45,7 @@ std::string info_text(const FileInfo& info) {
     text += fmt::format("  {:<12} {}\n", topic, rest);
   };
   const auto triple = [](const glm::dvec3& v) {
-    return fmt::format("({:.9g}, {:.9g}, {:.9g})", v.x, v.y, v.z);
+    return fmt::format("({:.9g}, {:.9g}, {:.9g})", v.x + 0.0, v.y + 0.0, v.z + 0.0);  // no -0
   };
   line("format", fmt::format("{}, {} bytes", info.stats.format, info.stats.bytes));
   line("triangles", fmt::format("{} of {} faces", found.triangles, info.stats.faces));
@@ -175,7 +175,7 @@ std::string info_text(const SceneInfo& info) {
     text += fmt::format("  {:<12} {}\n", topic, rest);
   };
   const auto triple = [](const glm::dvec3& v) {
-    return fmt::format("({:.9g}, {:.9g}, {:.9g})", v.x, v.y, v.z);
+    return fmt::format("({:.9g}, {:.9g}, {:.9g})", v.x + 0.0, v.y + 0.0, v.z + 0.0);  // no -0
   };
   const csg::Measures& m = info.result;
   const auto check = [&] {

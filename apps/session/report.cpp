@@ -5,7 +5,7 @@
 namespace strata::apps {
 
 std::string triple(const glm::dvec3& v) {
-  return fmt::format("({:.6g}, {:.6g}, {:.6g})", v.x, v.y, v.z);
+  return fmt::format("({:.6g}, {:.6g}, {:.6g})", v.x + 0.0, v.y + 0.0, v.z + 0.0);  // no -0
 }
 
 void begin_report(JsonWriter& json, std::string_view command) {

@@ -30,7 +30,8 @@ VoxelFormat named(VoxelFormat format) {
   return format;
 }
 
-std::vector<VoxelFormat> all_formats() {
+/// OpenVDB and the arrays, in the order of --list-formats.
+std::vector<VoxelFormat> grids() {
   return {
       {.name = "vdb",
        .extension = ".vdb",
@@ -52,6 +53,12 @@ std::vector<VoxelFormat> all_formats() {
       named(dense("raw", ".raw", "uint8, and beside it a NRRD header, .nhdr; ids", ".nhdr")),
       dense("tif", ".tif", "TIFF: a page a layer of z, uint8, zlib; place for ImageJ; ids",
             ".tiff"),
+  };
+}
+
+/// All others, likewise.
+std::vector<VoxelFormat> scenes_and_layers() {
+  return {
       {.name = "binvox",
        .extension = ".binvox",
        .description = "binvox: run lengths; cubic voxels in a cube, world transform",
@@ -115,7 +122,11 @@ std::vector<VoxelFormat> all_formats() {
 }  // namespace
 
 const std::vector<VoxelFormat>& voxel_formats() {
-  static const std::vector<VoxelFormat> kFormats = all_formats();
+  static const std::vector<VoxelFormat> kFormats = [] {
+    std::vector<VoxelFormat> all = grids();
+    for (VoxelFormat& format : scenes_and_layers()) all.push_back(std::move(format));
+    return all;
+  }();
   return kFormats;
 }
 
