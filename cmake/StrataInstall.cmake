@@ -93,6 +93,7 @@ strata_depends(PkgConfig::webp "${pc_modules}(webp REQUIRED QUIET IMPORTED_TARGE
 strata_depends(PkgConfig::libzip "${pc_modules}(libzip REQUIRED QUIET IMPORTED_TARGET libzip)" libzip "")
 strata_depends(PkgConfig::epoxy "${pc_modules}(epoxy REQUIRED QUIET IMPORTED_TARGET epoxy)" epoxy "")
 strata_depends(PkgConfig::blosc "${pc_modules}(blosc REQUIRED QUIET IMPORTED_TARGET blosc)" blosc "")
+strata_depends(PkgConfig::hdf5 "${pc_modules}(hdf5 REQUIRED QUIET IMPORTED_TARGET hdf5)" hdf5 "")
 strata_depends(pugixml::pugixml "find_dependency(pugixml CONFIG)" pugixml "")
 strata_depends(OpenEXR::OpenEXR "find_dependency(OpenEXR CONFIG)" OpenEXR "")
 strata_depends(OpenMeshCore "find_dependency(OpenMesh CONFIG)" "" "-lOpenMeshCore")  # Debian has no module of it

@@ -235,7 +235,7 @@ void define_voxelize(CLI::App& app, Words& words) {
   add_grid(app, words);
   option(app, kGridGroup, "--like", words.like, "FILE",
          "Take size, spacing, origin and direction of the grid from a voxel file: .nrrd .nhdr .mha "
-         ".mhd .nii .nii.gz .vdb .vti .npz .zarr, .npy with a .npy.json");
+         ".mhd .nii .nii.gz .h5 .vdb .vti .npz .zarr, .npy with a .npy.json");
   const char* solid = "Solid voxels";
   flag(app, solid, "--solid", words.solid, "Voxels whose centre is inside (default)");
   flag(app, solid, "--surface{conservative}", words.surface,

@@ -130,6 +130,7 @@ class SizeBound {
     if (format == "zarr") return zarr();
     if (format == "ome.zarr") return (file_.levels > 1 ? 2.0 : 1.0) * (zarr() + kHeads);
     if (format == "tif") return layers(RunBytes::kIds, cells_) + 512.0 * grid_.dims.z;
+    if (format == "h5") return layers(values_.codes, cells_) + hdf5_index();
     return layers(values_.codes, cells_);  // npz, nrrd, vti, nii.gz, mha
   }
   [[nodiscard]] double dense() const { return cells_ * static_cast<double>(values_.bytes); }
@@ -191,6 +192,13 @@ class SizeBound {
   [[nodiscard]] double layers(RunBytes kind, double elements) const {
     const double count = grid_.dims.z + 2;  // with what stands before and after
     return kHeads + 8 * count + deflated(kind, changes(Axis::kX) + count, elements, count);
+  }
+  /// Chunks of 8 to 16 MB of a layer, and where they lie.
+  [[nodiscard]] double hdf5_index() const {
+    const double layer =
+        static_cast<double>(grid_.dims.x) * grid_.dims.y * static_cast<double>(values_.bytes);
+    const double chunks = grid_.dims.z * (1 + std::ceil(layer / (1 << 23)));
+    return 8 * kHeads + (128 + kBlockBytes) * chunks;
   }
   /// Pictures of layers, in a folder or an archive.
   [[nodiscard]] double pictures() const {

@@ -53,6 +53,10 @@ std::vector<VoxelFormat> grids() {
       named(dense("raw", ".raw", "uint8, and beside it a NRRD header, .nhdr; ids", ".nhdr")),
       dense("tif", ".tif", "TIFF: a page a layer of z, uint8, zlib; place for ImageJ; ids",
             ".tiff"),
+#ifdef STRATA_HAVE_HDF5
+      named(dense("h5", ".h5", "HDF5: data set voxels [z, y, x], uint8, deflate; place; ids",
+                  ".hdf5")),
+#endif
   };
 }
 

@@ -59,6 +59,9 @@ VoxelWriterResult open_format(const std::string& path, const std::string& name,
   if (name == "nii") return open_nifti_writer(path, grid, options, false);
   if (name == "nii.gz") return open_nifti_writer(path, grid, options, true);
   if (name == "tif") return open_tiff_writer(path, grid, options);
+#ifdef STRATA_HAVE_HDF5
+  if (name == "h5") return open_hdf5_writer(path, grid, options);
+#endif
   if (name == "ome.zarr") return open_ome_zarr_writer(path, grid, options);
   if (name == "zarr") return open_zarr_writer(path, grid, options);
   if (name == "ply") return open_ply_writer(path, grid, options);

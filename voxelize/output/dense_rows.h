@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
+#include <utility>
 
 #include "strata/voxelize/intervals.h"
 #include "voxelize/output/block_output.h"
@@ -61,11 +62,12 @@ class RowBlocks {
   std::size_t bytes_, length_, rows_, rows_a_block_;
 };
 
-/// Gives the values of layer z of a slab as runs: run(value, length), row by row.
+/// Gives the values of rows y_begin to y_end - 1 of layer z of a slab as runs: run(value, length).
 template <class Run>
-void emit_layer(const VoxelIntervals& slab, const DenseValues& values, int z, Run&& run) {
+void emit_rows(const VoxelIntervals& slab, const DenseValues& values, int z, int y_begin, int y_end,
+               Run&& run) {
   const int length = slab.grid().dims.x;
-  for (int y = 0; y < slab.columns(); ++y) {
+  for (int y = y_begin; y < y_end; ++y) {
     int done = 0;
     for_each_value(slab, values, y, z, [&](const Interval& interval, std::uint32_t value) {
       if (interval.begin() > done) run(std::uint32_t{0}, interval.begin() - done);
@@ -74,6 +76,12 @@ void emit_layer(const VoxelIntervals& slab, const DenseValues& values, int z, Ru
     });
     if (length > done) run(std::uint32_t{0}, length - done);
   }
+}
+
+/// The same of a whole layer.
+template <class Run>
+void emit_layer(const VoxelIntervals& slab, const DenseValues& values, int z, Run&& run) {
+  emit_rows(slab, values, z, 0, slab.columns(), std::forward<Run>(run));
 }
 
 }  // namespace strata

@@ -45,6 +45,9 @@ VoxelWriterResult open_nifti_writer(const std::string& path, const VoxelGrid& gr
                                     const VoxelWriterOptions& options, bool packed);
 VoxelWriterResult open_tiff_writer(const std::string& path, const VoxelGrid& grid,
                                    const VoxelWriterOptions& options);
+/// Needs STRATA_HAVE_HDF5.
+VoxelWriterResult open_hdf5_writer(const std::string& path, const VoxelGrid& grid,
+                                   const VoxelWriterOptions& options);
 VoxelWriterResult open_ome_zarr_writer(const std::string& path, const VoxelGrid& grid,
                                        const VoxelWriterOptions& options);
 VoxelWriterResult open_zarr_writer(const std::string& path, const VoxelGrid& grid,

@@ -263,6 +263,10 @@ GridReader reader_of(const std::string& path) {
                                                                   {".mhd", metaimage_file_grid},
                                                                   {".nii", nifti_file_grid},
                                                                   {".nii.gz", nifti_file_grid},
+#ifdef STRATA_HAVE_HDF5
+                                                                  {".h5", hdf5_grid},
+                                                                  {".hdf5", hdf5_grid},
+#endif
                                                                   {".vti", vti_grid},
                                                                   {".vdb", vdb_grid}};
   const std::string name = lower_case(path);

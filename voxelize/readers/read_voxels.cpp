@@ -44,6 +44,10 @@ constexpr std::array kFormats = {
     Format{"mha", ".mhd", read_metaimage_voxels},
     Format{"tif", ".tif", read_tiff_voxels},
     Format{"tif", ".tiff", read_tiff_voxels},
+#ifdef STRATA_HAVE_HDF5
+    Format{"h5", ".h5", read_hdf5_voxels},
+    Format{"h5", ".hdf5", read_hdf5_voxels},
+#endif
     Format{"vti", ".vti", read_vti_voxels},
     Format{"binvox", ".binvox", read_binvox_voxels},
     Format{"vox", ".vox", read_vox_voxels},

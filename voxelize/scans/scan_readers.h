@@ -16,10 +16,12 @@ Result<VoxelVolume> read_raw_voxels(ReadContext& context);  ///< by the .nhdr be
 Result<VoxelVolume> read_nifti_voxels(ReadContext& context);
 Result<VoxelVolume> read_metaimage_voxels(ReadContext& context);
 Result<VoxelVolume> read_tiff_voxels(ReadContext& context);
+Result<VoxelVolume> read_hdf5_voxels(ReadContext& context);  ///< of the file context.path
 
 /// Where the voxels of a file lie, from its head: see read_voxel_grid().
 Result<VoxelFileGrid> raw_grid(ReadContext& context);
 Result<VoxelFileGrid> tiff_grid(ReadContext& context);
+Result<VoxelFileGrid> hdf5_grid(ReadContext& context);
 
 /// A layout whose axes are those of the file. Axes that run along the world's in any order and sign
 /// are followed; others are shown along the grid's own axes, and `note` says so.

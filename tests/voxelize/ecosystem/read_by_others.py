@@ -140,6 +140,21 @@ def tifffile_reads(tifffile, folder, check):
             check.equal(path, "unit", imagej.get("unit"), None if frame == "plain" else "mm")
 
 
+def h5py_reads(h5py, folder, check):
+    for ending in (".h5", ".hdf5"):
+        for path, kind, frame in files(folder, ending):
+            with h5py.File(path, "r") as file:
+                array = file["voxels"]
+                check.values(path, kind, array[:].transpose((2, 1, 0, 3) if kind == "colours" else (2, 1, 0)))
+                if kind != "colours":
+                    check.equal(path, "type", array.dtype, np.dtype(TYPES[kind]))
+                check.same(path, "origin", array.attrs["origin"], ORIGIN)
+                check.same(path, "spacing", array.attrs["spacing"], SIZE)
+                check.same(path, "direction", array.attrs["direction"], DIRECTIONS[frame])
+                check.equal(path, "axes", array.attrs["axes"], "zyxc" if kind == "colours" else "zyx")
+                check.equal(path, "unit", array.attrs.get("unit"), None if frame == "plain" else "mm")
+
+
 def zarr_reads(zarr, folder, check):
     for path, kind, frame in files(folder, ".zarr"):
         array = zarr.open(path, mode="r")
@@ -284,7 +299,7 @@ def vtk_reads(_, folder, check):
 
 
 READERS = {"numpy": ("numpy", numpy_reads), "nibabel": ("nibabel", nibabel_reads),
-           "tifffile": ("tifffile", tifffile_reads), "zarr": ("zarr", zarr_reads),
+           "tifffile": ("tifffile", tifffile_reads), "h5py": ("h5py", h5py_reads), "zarr": ("zarr", zarr_reads),
            "ome_zarr": ("zarr", ome_zarr_reads), "pillow": ("PIL.Image", pillow_reads),
            "pyopenvdb": ("pyopenvdb", pyopenvdb_reads), "vtk": ("vtkmodules", vtk_reads)}
 

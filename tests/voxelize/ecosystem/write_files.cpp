@@ -76,6 +76,7 @@ int write_all(const std::string& folder) {
       const VoxelIntervals set = values.labels == 0 ? intervals_of(sample, format.axis)
                                                     : labelled(grid, format.axis, label);
       for (const auto& [name, frame] : all_frames()) {
+        if (!check_frame(format, frame)) continue;
         values.options.frame = frame;
         values.options.levels = format.levels ? 3 : 1;
         for (const std::string& extension : {format.extension, format.also}) {

@@ -20,6 +20,7 @@ ReadVoxels read(const std::string& path, const std::string& format, glm::ivec3 d
   if (format == "mha") return read_mha(path);
   if (format == "raw") return read_raw(path);
   if (format == "tif") return read_tif(path);
+  if (format == "h5") return read_h5(path);
   return read_zarr(path);
 }
 

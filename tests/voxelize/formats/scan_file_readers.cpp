@@ -1,7 +1,12 @@
 // Files that scanners and microscopes write too, as readers that know nothing of the writers see
 // them.
 
+#ifdef STRATA_HAVE_HDF5
+#include <hdf5.h>
+#endif
+
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <map>
 #include <sstream>
@@ -218,6 +223,39 @@ ReadVoxels read_tif(const std::string& path) {
   voxels.voxel_size = three(numbers(fields.at("strata_voxel_size")));
   demand(std::stoi(fields.at("slices")) == dims.z, "slices");
   return voxels;
+}
+
+ReadVoxels read_h5(const std::string& path) {
+#ifdef STRATA_HAVE_HDF5
+  const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
+  demand(file >= 0, "an HDF5 file");
+  const hid_t set = H5Dopen2(file, "voxels", H5P_DEFAULT), space = H5Dget_space(set);
+  const hid_t type = H5Dget_type(set);
+  std::array<hsize_t, 4> shape{0, 0, 0, 1};
+  const int rank = H5Sget_simple_extent_dims(space, shape.data(), nullptr);
+  demand(rank == 3 || (rank == 4 && shape[3] == 4), "shape");
+  const std::size_t bytes = H5Tget_size(type) * shape[3];
+  std::string values(shape[0] * shape[1] * shape[2] * bytes, '?');
+  demand(H5Dread(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) >= 0, "values");
+  ReadVoxels voxels = of_values(
+      {static_cast<int>(shape[2]), static_cast<int>(shape[1]), static_cast<int>(shape[0])}, values,
+      8 * static_cast<int>(bytes));
+  voxels.floats = H5Tget_class(type) == H5T_FLOAT;
+  demand(voxels.floats || H5Tget_sign(type) == H5T_SGN_NONE, "unsigned numbers");
+  const auto three_of = [&](const char* name) {
+    const hid_t attribute = H5Aopen(set, name, H5P_DEFAULT);
+    glm::dvec3 numbers(0.0);
+    demand(H5Aread(attribute, H5T_NATIVE_DOUBLE, &numbers.x) >= 0, name);
+    H5Aclose(attribute);
+    return numbers;
+  };
+  voxels.origin = three_of("origin");
+  voxels.voxel_size = three_of("spacing");
+  H5Tclose(type), H5Sclose(space), H5Dclose(set), H5Fclose(file);
+  return voxels;
+#else
+  throw std::runtime_error("no HDF5 for " + path);
+#endif
 }
 
 }  // namespace strata::testing

@@ -41,6 +41,7 @@ ReadVoxels read_nii(const std::string& path);  // or .nii.gz
 ReadVoxels read_mha(const std::string& path);
 ReadVoxels read_raw(const std::string& path);  // with the header path.nhdr
 ReadVoxels read_tif(const std::string& path);
+ReadVoxels read_h5(const std::string& path);  ///< by HDF5's library
 
 /// zlib's inflate: 15 for a zlib stream, 31 for gzip, -15 for bare deflate.
 std::string inflate_all(const std::string& data, int window_bits, std::size_t expected);
