@@ -5,6 +5,7 @@
 
 #include <mutex>
 #include <string>
+#include <string_view>
 #include <utility>
 
 namespace strata {
@@ -31,6 +32,12 @@ class Hdf5Session {
           return 1;  // the innermost says most
         },
         &text);
+    // Of a failed write the system's own words, not the numbers around them.
+    constexpr std::string_view kSystem = "error message = '";
+    if (const std::size_t at = text.find(kSystem); at != std::string::npos) {
+      const std::size_t from = at + kSystem.size();
+      text = text.substr(0, text.find(':') + 2) + text.substr(from, text.find('\'', from) - from);
+    }
     return "HDF5: " + (text.empty() ? std::string("unknown error") : text.substr(0, 200));
   }
 
