@@ -434,6 +434,8 @@ OutputGroup::~OutputGroup() {
   }
 }
 
+bool OutputGroup::lives() { return current_group != nullptr; }
+
 std::string OutputGroup::place_of(const std::string& path) const {
   for (const Waiting& output : waiting_) {
     if (output.path == path) return output.temporary;

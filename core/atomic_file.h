@@ -83,6 +83,8 @@ class OutputGroup {
   OutputGroup& operator=(const OutputGroup&) = delete;
   ~OutputGroup();
 
+  /// Whether one lives on this thread.
+  [[nodiscard]] static bool lives();
   /// Renames all that was completed since the last time. @return kOutput naming the one that failed
   Result<void> commit();
   /// Where the bytes of a completed output lie now: under a temporary name, or its own.

@@ -69,7 +69,7 @@ std::vector<VoxelFormat> scenes_and_layers() {
        .axis = Axis::kY},
       {.name = "vox",
        .extension = ".vox",
-       .description = "MagicaVoxel: up to 2000 voxels a side; 255 colours, ids",
+       .description = "MagicaVoxel: several files beyond 2000 voxels a side; 255 colours, ids",
        .colours = kVoxColours,
        .ids = kVoxColours,
        .rgba = true},

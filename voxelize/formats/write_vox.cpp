@@ -3,17 +3,23 @@
 // put in their places by a scene graph:
 //   nTRN 0 - nGRP 1 - for each model m: nTRN 2 + 2m (its translation) - nSHP 3 + 2m
 // A model stands on its centre, floor(size / 2). The grid's own centre is put at 0: the editor
-// shows places from -1000 to 999 and cuts off what lies beyond. The format lists voxels one by one,
-// and has no place for the world transform; z is up, as here.
+// shows places from -1000 to 999 and cuts off what lies beyond. Grids beyond that are several files
+// (vox_pieces.h), with one palette. The format lists voxels one by one, and has no place for the
+// world transform; z is up, as here.
+
+#include <sys/stat.h>
 
 #include <array>
 #include <cstring>
 #include <glm/common.hpp>
 #include <memory>
+#include <optional>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "core/atomic_file.h"
+#include "voxelize/formats/vox_pieces.h"
 #include "voxelize/output/block_output.h"
 #include "voxelize/output/palette.h"
 #include "voxelize/output/slab_writer.h"
@@ -24,7 +30,6 @@ namespace {
 
 constexpr int kModelSide = 256;
 constexpr int kTilesPerModel = kModelSide / VoxelIntervals::kTileSide;
-constexpr int kLargestSide = 2000;                  // of a MagicaVoxel 0.99 scene
 constexpr std::uint64_t kLargestFile = 0x7fffffff;  // sizes are signed 32-bit
 constexpr std::uint8_t kColour = 1;                 // white, in the palette of files without one
 constexpr std::int32_t kVersion = 150;
@@ -64,7 +69,9 @@ class VoxWriter final : public SlabWriter {
         output_(std::move(output)),
         rgba_(options.rgba),
         palette_(options.colours),
-        models_along_((grid.dims + kModelSide - 1) / kModelSide) {
+        pieces_(grid.dims),
+        models_along_((grid.dims + kModelSide - 1) / kModelSide),
+        piece_voxels_(static_cast<std::size_t>(pieces_.total())) {
     for (int y = 0; y < models_along_.y; ++y) {
       for (int x = 0; x < models_along_.x; ++x) {
         for (int z = 0; z < models_along_.z; ++z) {
@@ -74,6 +81,8 @@ class VoxWriter final : public SlabWriter {
       }
     }
   }
+
+  [[nodiscard]] std::vector<std::string> pieces() const override { return files_; }
 
  private:
   /// A tile of a slab that is gone.
@@ -89,6 +98,11 @@ class VoxWriter final : public SlabWriter {
     const int x = tile.u / kTilesPerModel, y = tile.v / kTilesPerModel;
     return models_[static_cast<std::size_t>((y * models_along_.x + x) * models_along_.z +
                                             z / kModelSide)];
+  }
+
+  [[nodiscard]] std::size_t piece_of(const Model& model) const {
+    const glm::ivec3 at = model.begin / pieces_.side;
+    return static_cast<std::size_t>((at.z * pieces_.count.y + at.y) * pieces_.count.x + at.x);
   }
 
   Result<void> add_slab(const VoxelIntervals& slab, const Execution& execution) override {
@@ -107,17 +121,20 @@ class VoxWriter final : public SlabWriter {
     });
     for (std::size_t i = before; i < tiles_.size(); ++i) {
       for (const Interval& interval : tiles_[i].items) {
-        total_ += static_cast<std::uint64_t>(interval.length());
         for (int z = interval.begin(); z < interval.end();) {
           const int end = std::min(interval.end(), (z / kModelSide + 1) * kModelSide);
-          model_of(tiles_[i], z).voxels += static_cast<std::uint64_t>(end - z);
+          Model& model = model_of(tiles_[i], z);
+          model.voxels += static_cast<std::uint64_t>(end - z);
+          piece_voxels_[piece_of(model)] += static_cast<std::uint64_t>(end - z);
           z = end;
         }
       }
     }
-    if (total_ * 4 > kLargestFile) {
-      return fail(ErrorCode::kLimit, "{}: {} or more solid voxels; .vox holds at most {}", path(),
-                  total_, kLargestFile / 4);
+    for (std::size_t piece = 0; piece < piece_voxels_.size(); ++piece) {
+      if (piece_voxels_[piece] * 4 <= kLargestFile) continue;
+      return fail(ErrorCode::kLimit, "{}: {} or more solid voxels; .vox holds at most {}",
+                  pieces_.path(path(), static_cast<int>(piece)), piece_voxels_[piece],
+                  kLargestFile / 4);
     }
     return {};
   }
@@ -158,35 +175,78 @@ class VoxWriter final : public SlabWriter {
   Result<void> finish_output(const Execution& execution) override {
     if (rgba_) choose_palette(execution);
     if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
-    const bool one = models_.size() == 1;
+    columns_.resize(static_cast<std::size_t>(models_along_.x * models_along_.y));
+    for (const Tile& tile : tiles_) columns_[column_of(tile.u, tile.v)].push_back(&tile);
+    if (pieces_.total() == 1) return write_piece(0, output_, execution);
+    return write_pieces(execution);
+  }
+
+  /// All files or none. Pieces without a voxel are none, but the first if there is no voxel at all.
+  Result<void> write_pieces(const Execution& execution) {
+    std::optional<OutputGroup> together;
+    if (!OutputGroup::lives()) together.emplace();
+    std::vector<std::string> files;
+    const bool empty = std::all_of(piece_voxels_.begin(), piece_voxels_.end(),
+                                   [](std::uint64_t voxels) { return voxels == 0; });
+    for (std::size_t piece = 0; piece < piece_voxels_.size(); ++piece) {
+      if (piece_voxels_[piece] == 0 && !(empty && piece == 0)) continue;
+      files.push_back(pieces_.path(path(), static_cast<int>(piece)));
+      std::optional<BlockOutput> next;
+      if (piece != 0) {
+        Result<BlockOutput> created = BlockOutput::create(files.back());
+        if (!created) return tl::unexpected(created.error());
+        next = std::move(*created);
+      }
+      Result<void> written = write_piece(piece, next ? *next : output_, execution);
+      if (!written) return written;
+    }
+    if (together) {
+      if (Result<void> named = together->commit(); !named) return named;
+    }
+    files_ = std::move(files);
+    return {};
+  }
+
+  Result<void> write_piece(std::size_t piece, BlockOutput& output, const Execution& execution) {
+    const glm::ivec3 begin = pieces_.place(static_cast<int>(piece)) * pieces_.side;
+    const glm::ivec3 size = glm::min(pieces_.side, dims() - begin);
+    const bool one = glm::max(size, glm::ivec3(kModelSide)) == glm::ivec3(kModelSide);
     std::vector<Model> kept;
+    const Model* first = nullptr;
     for (const Model& model : models_) {
+      if (piece_of(model) != piece) continue;
+      if (first == nullptr) first = &model;
       if (one || model.voxels != 0) kept.push_back(model);
     }
-    if (kept.empty()) kept.push_back(models_.front());  // a file has at least one
-    const Bytes graph = one ? Bytes() : scene_graph(kept, dims());
+    if (kept.empty()) kept.push_back(*first);  // a file has at least one
+    const Bytes graph = one ? Bytes() : scene_graph(kept, begin + size / 2);
     constexpr std::uint64_t kModelHeads = 12 + 12 + 12 + 4;  // SIZE, XYZI and its count
     const Bytes colours = palette_.empty() ? Bytes() : palette();
     const std::uint64_t children =
-        kept.size() * kModelHeads + total_ * 4 + graph.size() + colours.size();
+        kept.size() * kModelHeads + piece_voxels_[piece] * 4 + graph.size() + colours.size();
     if (children > kLargestFile) {
-      return fail(ErrorCode::kLimit, "{}: {} bytes; a .vox file holds at most {}", path(), children,
-                  kLargestFile);
+      return fail(ErrorCode::kLimit, "{}: {} bytes; a .vox file holds at most {}",
+                  pieces_.path(path(), static_cast<int>(piece)), children, kLargestFile);
     }
     Bytes head;
     put_text(head, "VOX ");
     put_int(head, kVersion);
     put_chunk_head(head, "MAIN", 0, children);
-    if (Result<void> written = output_.append(head.data(), head.size()); !written) return written;
+    if (Result<void> written = output.append(head.data(), head.size()); !written) return written;
     for (const Model& model : kept) {
-      if (Result<void> written = write_model(model, execution); !written) return written;
+      if (Result<void> written = write_model(model, output, execution); !written) return written;
     }
     for (const Bytes* chunks : {&graph, &colours}) {
-      if (Result<void> written = output_.append(chunks->data(), chunks->size()); !written) {
+      if (Result<void> written = output.append(chunks->data(), chunks->size()); !written) {
         return written;
       }
     }
-    return output_.commit();
+    return output.commit();
+  }
+
+  /// Of models above each other, by tile.
+  [[nodiscard]] std::size_t column_of(int u, int v) const {
+    return static_cast<std::size_t>(v / kTilesPerModel * models_along_.x + u / kTilesPerModel);
   }
 
   /// Colour i stands at i - 1.
@@ -200,21 +260,16 @@ class VoxWriter final : public SlabWriter {
     return chunk;
   }
 
-  Result<void> write_model(const Model& model, const Execution& execution) {
+  Result<void> write_model(const Model& model, BlockOutput& output, const Execution& execution) {
     Bytes head;
     put_chunk_head(head, "SIZE", 12, 0);
     for (int axis = 0; axis < 3; ++axis) put_int(head, model.size[axis]);
     put_chunk_head(head, "XYZI", 4 + 4 * model.voxels, 0);
     put_int(head, static_cast<std::int64_t>(model.voxels));
-    if (Result<void> written = output_.append(head.data(), head.size()); !written) return written;
-    std::vector<const Tile*> tiles;  // by rows of tiles, since slabs came so
-    for (const Tile& tile : tiles_) {
-      if (tile.u / kTilesPerModel == model.begin.x / kModelSide &&
-          tile.v / kTilesPerModel == model.begin.y / kModelSide) {
-        tiles.push_back(&tile);
-      }
-    }
-    return output_.append_blocks(execution, tiles.size(), [&](std::size_t index, Bytes& out, int) {
+    if (Result<void> written = output.append(head.data(), head.size()); !written) return written;
+    const std::vector<const Tile*>& tiles = columns_[column_of(
+        model.begin.x / VoxelIntervals::kTileSide, model.begin.y / VoxelIntervals::kTileSide)];
+    return output.append_blocks(execution, tiles.size(), [&](std::size_t index, Bytes& out, int) {
       make_voxels(*tiles[index], model, out);
     });
   }
@@ -246,7 +301,8 @@ class VoxWriter final : public SlabWriter {
     }
   }
 
-  static Bytes scene_graph(const std::vector<Model>& models, const glm::ivec3& dims) {
+  /// @param middle  the voxel at 0
+  static Bytes scene_graph(const std::vector<Model>& models, const glm::ivec3& middle) {
     constexpr int kNoDictionary = 0, kReserved = -1, kNoLayer = -1, kFrames = 1;
     Bytes graph, content;
     const auto put_transform = [&](int id, int child, int layer, const std::string& translation) {
@@ -269,7 +325,7 @@ class VoxWriter final : public SlabWriter {
     put_chunk(graph, "nGRP", content);
     for (int m = 0; m < count; ++m) {
       const Model& model = models[static_cast<std::size_t>(m)];
-      const glm::ivec3 centre = model.begin + model.size / 2 - dims / 2;
+      const glm::ivec3 centre = model.begin + model.size / 2 - middle;
       put_transform(2 + 2 * m, 3 + 2 * m, 0, fmt::format("{} {} {}", centre.x, centre.y, centre.z));
       content.clear();
       for (const int value : {3 + 2 * m, kNoDictionary, 1, m, kNoDictionary}) {
@@ -280,27 +336,46 @@ class VoxWriter final : public SlabWriter {
     return graph;
   }
 
-  BlockOutput output_;
+  BlockOutput output_;                // of the first piece
   bool rgba_;                         // labels are colours
   std::vector<ColourCounts> counts_;  // of them, by worker
   std::vector<glm::u8vec4> palette_;  // none: MagicaVoxel's
+  VoxPieces pieces_;
   glm::ivec3 models_along_;
   std::vector<Model> models_;
-  std::vector<Tile> tiles_;
-  std::uint64_t total_ = 0;
+  std::vector<std::uint64_t> piece_voxels_;
+  std::vector<Tile> tiles_;  // by rows of tiles, since slabs come so
+  std::vector<std::vector<const Tile*>> columns_;
+  std::vector<std::string> files_;  // of several pieces
 };
+
+/// A pipe, a device or an open file.
+bool is_one_stream(const std::string& path) {
+  struct stat status {};
+  return path == "-" || path.starts_with("/dev/") ||
+         (stat(path.c_str(), &status) == 0 && !S_ISREG(status.st_mode));
+}
 
 }  // namespace
 
 VoxelWriterResult open_vox_writer(const std::string& path, const VoxelGrid& grid,
                                   const VoxelWriterOptions& options) {
-  for (int axis = 0; axis < 3; ++axis) {
-    if (grid.dims[axis] > kLargestSide) {
-      return fail(ErrorCode::kUsage, "{}: {} voxels along {}; a .vox scene holds at most {}", path,
-                  grid.dims[axis], "xyz"[axis], kLargestSide);
-    }
+  const VoxPieces pieces(grid.dims);
+  if (pieces.total() > VoxPieces::kMost) {
+    return fail(ErrorCode::kUsage,
+                "{}: {} x {} x {} voxels would be {} .vox files of at most {} voxels a side; at "
+                "most {} are written",
+                path, grid.dims.x, grid.dims.y, grid.dims.z, pieces.total(), VoxPieces::kSide,
+                VoxPieces::kMost);
   }
-  Result<BlockOutput> output = BlockOutput::create(path);
+  if (pieces.total() > 1 && is_one_stream(path)) {
+    return fail(ErrorCode::kUsage,
+                "{}: {} x {} x {} voxels are {} .vox files, since one holds at most {} a side; "
+                "give a path that is no stream, or a coarser grid",
+                path == "-" ? "standard output" : path, grid.dims.x, grid.dims.y, grid.dims.z,
+                pieces.total(), VoxPieces::kLargestSide);
+  }
+  Result<BlockOutput> output = BlockOutput::create(pieces.path(path, 0));
   if (!output) return tl::unexpected(output.error());
   return std::make_unique<VoxWriter>(path, grid, options, std::move(*output));
 }

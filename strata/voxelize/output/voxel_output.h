@@ -81,6 +81,9 @@ class VoxelWriter {
                                      const Execution& execution);
   /// Completes the file. Call it once, after the last slab. @return kOutput, kLimit, kCancelled
   virtual Result<void> finish(const Execution& execution) = 0;
+  /// After finish(): the paths of the files, where the writer made other ones than that of its
+  /// path, as a .vox beyond 2000 voxels a side. Empty: it did not.
+  [[nodiscard]] virtual std::vector<std::string> pieces() const { return {}; }
 };
 
 }  // namespace strata

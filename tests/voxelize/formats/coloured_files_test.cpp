@@ -290,6 +290,19 @@ TEST(VoxPalette, OfUpTo255ColoursIsExact) {
   }
 }
 
+TEST(VoxPalette, IsCommonToAllPieces) {
+  const TemporaryFolder folder;
+  const auto label = [](int i, int, int) { return packed(i / 1792 * 200, 10, 5); };
+  write(labelled(make_grid({2001, 1, 1}), Axis::kZ, label), folder.file("a.vox"), colours());
+  const auto palette = [&](const char* name) {
+    const std::string file = bytes_of(folder.file(name));
+    return file.substr(file.find("RGBA"), 1036);
+  };
+  EXPECT_EQ(palette("a_0_0_0.vox"), palette("a_1_0_0.vox"));
+  EXPECT_EQ(vox_colours(folder.file("a_0_0_0.vox")).used, std::set{packed(0, 10, 5)});
+  EXPECT_EQ(vox_colours(folder.file("a_1_0_0.vox")).used, std::set{packed(200, 10, 5)});
+}
+
 TEST(VoxPalette, OfManyColoursIsNear) {
   const TemporaryFolder folder;
   const auto label = [](int i, int j, int k) {

@@ -7,6 +7,9 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <filesystem>
+#include <fstream>
+#include <set>
 #include <thread>
 
 #include "tests/voxelize/formats/voxel_readers.h"
@@ -482,12 +485,94 @@ TEST(BinvoxWriter, RefusesVoxelsThatAreNotCubes) {
   EXPECT_TRUE(folder.is_empty());
 }
 
-TEST(VoxWriter, RefusesGridsBeyondAScene) {
+/// Names of the files of a folder.
+std::set<std::string> names_in(const TemporaryFolder& folder) {
+  std::set<std::string> names;
+  const std::filesystem::path inside(folder.file("x"));
+  for (const auto& entry : std::filesystem::directory_iterator(inside.parent_path())) {
+    names.insert(entry.path().filename().string());
+  }
+  return names;
+}
+
+TEST(VoxWriter, AGridBeyondASceneIsSeveralFilesThatAreTheSetTogether) {
+  for (const glm::ivec3 dims :
+       {glm::ivec3(2001, 3, 2), glm::ivec3(3, 3600, 2), glm::ivec3(2, 1793, 2100)}) {
+    const TemporaryFolder folder;
+    const Sample sample{"long", make_grid(dims),
+                        [](int i, int j, int k) { return random_voxel(i, j, k, 40); }};
+    ASSERT_TRUE(write(folder.file("a.b.VOX"), "", intervals_of(sample, Axis::kZ)));
+    std::set<std::string> files;
+    int wrong = 0, solid = 0;
+    const auto side = [](int length) { return length > 2000 ? 1792 : length; };
+    for (int z = 0; z < dims.z; z += side(dims.z)) {
+      for (int y = 0; y < dims.y; y += side(dims.y)) {
+        for (int x = 0; x < dims.x; x += side(dims.x)) {
+          const glm::ivec3 begin(x, y, z);
+          const glm::ivec3 size =
+              glm::min(dims - begin, glm::ivec3(side(dims.x), side(dims.y), side(dims.z)));
+          const std::string name = fmt::format("a.b_{}_{}_{}.VOX", x / 1792, y / 1792, z / 1792);
+          files.insert(name);
+          const ReadVoxels voxels = read_vox(folder.file(name), size);
+          for (int k = 0; k < size.z; ++k) {
+            for (int j = 0; j < size.y; ++j) {
+              for (int i = 0; i < size.x; ++i) {
+                const bool there = voxels.solid[voxels.index(i, j, k)] != 0;
+                wrong += there != sample.solid(x + i, y + j, z + k) ? 1 : 0;
+                solid += there ? 1 : 0;
+              }
+            }
+          }
+        }
+      }
+    }
+    EXPECT_EQ(wrong, 0);
+    EXPECT_GT(solid, 400);
+    EXPECT_EQ(names_in(folder), files);
+  }
+}
+
+TEST(VoxWriter, PiecesWithoutVoxelsAreNoFiles) {
+  const TemporaryFolder folder;
+  const auto written = [&](int i, int begin) {
+    const Sample one{"one", make_grid({6000, 1, 2}),
+                     [=](int x, int, int) { return x >= begin && x % 2000 == i; }};
+    auto writer = open_voxel_writer(folder.file("a.vox"), "", one.grid);
+    EXPECT_TRUE(writer && (*writer)->add(intervals_of(one, Axis::kZ), {}) && (*writer)->finish({}));
+    return (*writer)->pieces();
+  };
+  // 10, 2010 and 4010 lie in the first, second and third of 4.
+  EXPECT_EQ(written(10, 2000),
+            (std::vector{folder.file("a_1_0_0.vox"), folder.file("a_2_0_0.vox")}));
+  EXPECT_EQ(names_in(folder), (std::set<std::string>{"a_1_0_0.vox", "a_2_0_0.vox"}));
+  EXPECT_EQ(written(0, 7000), std::vector{folder.file("a_0_0_0.vox")});  // an empty set
+}
+
+TEST(VoxWriter, PiecesAppearTogetherOrNotAtAll) {
+  const TemporaryFolder folder;
+  const Sample sample{"all", make_grid({4000, 1, 1}), [](int, int, int) { return true; }};
+  const VoxelIntervals set = intervals_of(sample, Axis::kZ);
+  std::filesystem::create_directory(folder.file("a_1_0_0.vox"));
+  std::ofstream(folder.file("a_1_0_0.vox/mine.txt")) << "keep";
+  std::ofstream(folder.file("a_0_0_0.vox")) << "old";
+  EXPECT_FALSE(write(folder.file("a.vox"), "", set));
+  EXPECT_EQ(names_in(folder), (std::set<std::string>{"a_0_0_0.vox", "a_1_0_0.vox"}));
+  EXPECT_EQ(testkit::bytes_of(folder.file("a_0_0_0.vox")), "old");
+  EXPECT_TRUE(std::filesystem::exists(folder.file("a_1_0_0.vox/mine.txt")));
+}
+
+TEST(VoxWriter, PiecesNeedAPathAndAreNotCountless) {
   const TemporaryFolder folder;
   EXPECT_TRUE(open_voxel_writer(folder.file("a.vox"), "", make_grid({2000, 1, 1})));
-  const auto writer = open_voxel_writer(folder.file("a.vox"), "", make_grid({1, 2001, 1}));
-  ASSERT_FALSE(writer);
-  EXPECT_EQ(writer.error().code, ErrorCode::kUsage);
+  const auto stream = open_voxel_writer("-", "vox", make_grid({1, 2001, 1}));
+  ASSERT_FALSE(stream);
+  EXPECT_EQ(stream.error().code, ErrorCode::kUsage);
+  EXPECT_NE(stream.error().message.find("1 x 2001 x 1 voxels are 2 .vox files"), std::string::npos)
+      << stream.error().message;
+  const auto many = open_voxel_writer(folder.file("a.vox"), "", make_grid({60000, 20000, 1}));
+  ASSERT_FALSE(many);
+  EXPECT_EQ(many.error().code, ErrorCode::kUsage);
+  EXPECT_TRUE(folder.is_empty());
 }
 
 TEST(VoxWriter, RefusesMoreVoxelsThanItsSizesCount) {
