@@ -73,6 +73,7 @@ Result<Colouring> Colouring::create(const VoxelizeCommand& command, VoxelizeOutc
   if (auto fits = check_fit(input, outcome.grid); !fits) return tl::unexpected(fits.error());
   made.solid_ = !is_surface_alone(command, input);
   const bool surface = command.surface || !made.solid_;
+  outcome.colours.emplace().of_solids = input.tree != nullptr;
   if (input.tree && !surface && !command.fill_colour) {
     const auto parts = csg::colour_labels(*input.scene, input.scene->root(), solid_colour());
     for (const glm::vec4& colour : parts.colours) {
@@ -94,6 +95,7 @@ Result<Colouring> Colouring::create(const VoxelizeCommand& command, VoxelizeOutc
   VoxelColourOptions options;
   options.solid = made.solid_;
   if (command.fill_colour) options.inside = glm::u8vec4(*command.fill_colour, 255);
+  if (made.solid_) outcome.colours->fill = options.inside;
   auto voxels =
       VoxelColouring::create(input.soup, outcome.grid, *made.surface_, options, execution);
   if (!voxels) return tl::unexpected(voxels.error());

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "voxelize/arrays/npy_voxels.h"
+#include "voxelize/formats/vox_pieces.h"
 
 namespace strata::apps {
 namespace {
@@ -253,7 +254,7 @@ class SizeBound {
   [[nodiscard]] double vox() const {
     const double models =
         parts(grid_.dims.x, 256) * parts(grid_.dims.y, 256) * parts(grid_.dims.z, 256);
-    return kHeads + 4 * voxels() + 160 * models;
+    return kHeads * VoxPieces(grid_.dims).total() + 4 * voxels() + 160 * models;
   }
   [[nodiscard]] double voxels() const {
     return factors_.solid ? cells_ : std::min(cells_, touched());

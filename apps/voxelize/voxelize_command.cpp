@@ -5,10 +5,13 @@
 #include <cmath>
 #include <glm/matrix.hpp>
 #include <memory>
+#include <span>
 #include <utility>
+#include <vector>
 
 #include "apps/commands/choice_words.h"
 #include "apps/commands/csg_options.h"
+#include "apps/commands/file_uses.h"
 #include "apps/session/process_memory.h"
 #include "apps/session/session.h"
 #include "apps/strata/allocation_failures.h"
@@ -21,6 +24,7 @@
 #include "strata/csg/input/solid_input.h"
 #include "strata/voxelize/formats/voxel_writer.h"
 #include "strata/voxelize/readers/read_voxel_grid.h"
+#include "voxelize/formats/vox_pieces.h"
 
 namespace strata::apps {
 namespace {
@@ -164,6 +168,34 @@ Result<void> take_grid(const VoxelizeCommand& command, csg::SceneInput& placed,
   return {};
 }
 
+/// Refuses .vox files of several pieces that would replace what is read.
+/// @param opened  by the scene or the meshes
+Result<void> check_pieces(const VoxelizeCommand& command, const VoxelizeOutcome& outcome,
+                          const std::vector<FileIdentity>& opened) {
+  if (!outcome.format || outcome.format->name != "vox") return {};
+  const VoxPieces pieces(outcome.grid.dims);
+  // The writer refuses streams, and more pieces than there may be.
+  if (pieces.total() == 1 || pieces.total() > VoxPieces::kMost || is_stream(command.output)) {
+    return {};
+  }
+  if (command.show) {
+    return fail(ErrorCode::kUsage,
+                "--show shows one file, but {} x {} x {} voxels are {} .vox files; another format "
+                "holds them in one",
+                outcome.grid.dims.x, outcome.grid.dims.y, outcome.grid.dims.z, pieces.total());
+  }
+  std::vector<FileUse> written;
+  for (int piece = 0; piece < pieces.total(); ++piece) {
+    written.push_back({"the piece of -o,", pieces.path(command.output, piece)});
+  }
+  if (command.json) written.push_back({"--json", *command.json});
+  if (auto kept = check_files(inputs_of(command), written); !kept) return kept;
+  for (const FileIdentity& file : opened) {
+    if (auto kept = check_opened(file, written); !kept) return kept;
+  }
+  return {};
+}
+
 /// The axis the format is written from, or the one with the fewest columns.
 Axis choose_axis(const VoxelizeCommand& command, const std::optional<VoxelFormat>& format,
                  const VoxelGrid& grid) {
@@ -278,8 +310,13 @@ Result<void> make_voxels(const VoxelizeCommand& command, Session& session) {
 
   csg::SceneInput placed = command.input;
   if (auto taken = take_grid(command, placed, outcome, session); !taken) return taken;
-  auto input =
-      csg::load_solids(placed, command.ids, messages_of(session), session.execution("reading"));
+  std::vector<FileIdentity> opened;
+  csg::InputMessages messages = messages_of(session);
+  messages.opened = [&](std::span<const FileIdentity> files) {
+    opened.insert(opened.end(), files.begin(), files.end());
+    return session.opened(files);
+  };
+  auto input = csg::load_solids(placed, command.ids, messages, session.execution("reading"));
   if (!input) return tl::unexpected(input.error());
   outcome.input = *std::move(input);
   tell_units(command, outcome.input, session);
@@ -293,6 +330,7 @@ Result<void> make_voxels(const VoxelizeCommand& command, Session& session) {
     }
     outcome.grid = *grid;
   }
+  if (auto kept = check_pieces(command, outcome, opened); !kept) return kept;
   outcome.axis = choose_axis(command, outcome.format, outcome.grid);
   const int samples = fog_samples(command, outcome.input);
   if (const auto valid = check_samples(command, samples, outcome.grid); !valid) return valid;

@@ -103,6 +103,19 @@ void write_distances(JsonWriter& json, const VoxelizeOutcome& outcome) {
   json.end_object();
 }
 
+std::string hexadecimal(const glm::u8vec4& colour) {
+  return fmt::format("#{:02x}{:02x}{:02x}", colour.x, colour.y, colour.z);
+}
+
+void write_colours(JsonWriter& json, const ColourReport& colours) {
+  json.key("colours").begin_object();
+  json.member("source", colours.of_solids ? "solids" : "mesh");
+  json.member("count", colours.count());
+  json.key("fill");
+  colours.fill ? json.value(hexadecimal(*colours.fill)) : json.null();
+  json.end_object();
+}
+
 void write_results(JsonWriter& json, const VoxelizeCommand& command,
                    const VoxelizeOutcome& outcome) {
   const VoxelizeReport& report = outcome.report;
@@ -122,6 +135,7 @@ void write_results(JsonWriter& json, const VoxelizeCommand& command,
   json.end_object();
 
   if (outcome.distances) write_distances(json, outcome);
+  if (outcome.colours) write_colours(json, *outcome.colours);
 
   json.key("lost_walls").begin_object();
   json.member("count", outcome.lost_walls.count);
@@ -241,6 +255,13 @@ void tell_results(Lines& line, const VoxelizeCommand& command, const VoxelizeOut
     line("coverage", fmt::format("{0} x {0} rays a voxel, filled volume {1:.9g}", command.coverage,
                                  outcome.filled_volume));
   }
+  if (outcome.colours) {
+    line("colours",
+         fmt::format("{} of the {}{}", grouped(outcome.colours->count()),
+                     outcome.colours->of_solids ? "solids" : "mesh",
+                     outcome.colours->fill ? ", " + hexadecimal(*outcome.colours->fill) + " inside"
+                                           : std::string()));
+  }
   if (command.checksum) line("checksum", fmt::format("{:016x}", report.checksum));
   line("lists", fmt::format("{} crossings, at most {} in a column", grouped(report.crossings),
                             report.max_depth_complexity));
@@ -261,6 +282,14 @@ void tell_results(Lines& line, const VoxelizeCommand& command, const VoxelizeOut
                            session.milliseconds(), outcome.input.read_ms, outcome.input.diagnose_ms,
                            report.lists_ms, report.intervals_ms, outcome.write_ms));
   line("memory", fmt::format("{} at most", readable_bytes(peak_memory_bytes())));
+}
+
+/// "knot.vox", or "knot_0_0_0.vox to knot_1_1_0.vox (4 files)".
+std::string output_name(const VoxelizeCommand& command, const VoxelizeOutcome& outcome) {
+  const std::vector<std::string>& files = outcome.output_files;
+  if (files.empty()) return command.output;
+  if (files.size() == 1) return files.front() + " (1 file)";
+  return fmt::format("{} to {} ({} files)", files.front(), files.back(), files.size());
 }
 
 void write_options(JsonWriter& json, const VoxelizeCommand& command, const VoxelizeOutcome& outcome,
@@ -291,6 +320,9 @@ void write_output(JsonWriter& json, const VoxelizeCommand& command,
     json.begin_object();
     json.member("path", command.output);
     json.member("format", outcome.format->name);
+    json.key("files").begin_array();
+    for (const std::string& file : outcome.output_files) json.value(file);
+    json.end_array();
     json.key("bytes");
     if (outcome.output_bytes) {
       json.value(*outcome.output_bytes);
@@ -302,6 +334,20 @@ void write_output(JsonWriter& json, const VoxelizeCommand& command,
 }
 
 }  // namespace
+
+void ColourReport::add(const VoxelIntervals& slab) {
+  constexpr std::uint32_t kColours = 1u << 24;
+  found.resize(kColours);
+  for (int tv = 0; tv < slab.tiles_v(); ++tv) {
+    for (int tu = 0; tu < slab.tiles_u(); ++tu) {
+      for (const std::uint32_t label : slab.tile(tu, tv).labels) found[label % kColours] = true;
+    }
+  }
+}
+
+std::uint64_t ColourReport::count() const {
+  return static_cast<std::uint64_t>(std::count(found.begin(), found.end(), true));
+}
 
 std::uint64_t expected_memory(const VoxelizeOutcome& outcome) {
   constexpr std::uint64_t kProgram = 10'000'000;  // of the program and its libraries
@@ -325,8 +371,8 @@ std::string voxelize_text(const VoxelizeCommand& command, const VoxelizeOutcome&
                                readable_bytes(outcome.file_size->bytes)));
   }
   if (outcome.output_bytes) {
-    line("output", fmt::format("{}: {}, {} bytes", command.output, outcome.format->name,
-                               grouped(*outcome.output_bytes)));
+    line("output", fmt::format("{}: {}, {} bytes", output_name(command, outcome),
+                               outcome.format->name, grouped(*outcome.output_bytes)));
   }
   return line.take();
 }
@@ -335,8 +381,9 @@ std::string made_line(const VoxelizeCommand& command, const VoxelizeOutcome& out
                       double seconds) {
   const std::string bytes =
       outcome.output_bytes ? ", " + readable_bytes(*outcome.output_bytes) : std::string();
-  return fmt::format("{}: {}, {} solid{}, {:.2f} s", command.output, size_of(outcome.grid, 3),
-                     grouped(outcome.report.solid_voxels), bytes, seconds);
+  return fmt::format("{}: {}, {} solid{}, {:.2f} s", output_name(command, outcome),
+                     size_of(outcome.grid, 3), grouped(outcome.report.solid_voxels), bytes,
+                     seconds);
 }
 
 std::string voxelize_json(const VoxelizeCommand& command, const VoxelizeOutcome& outcome,

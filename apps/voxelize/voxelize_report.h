@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <glm/vec4.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -16,6 +17,18 @@
 #include "voxelize/open/lost_walls.h"
 
 namespace strata::apps {
+
+/// What --colours made.
+struct ColourReport {
+  bool of_solids = false;           ///< of a tree; else those of a mesh
+  std::optional<glm::u8vec4> fill;  ///< of what lies within the surface; none: there is no such
+  std::vector<bool> found;          ///< by red + 2^8 green + 2^16 blue
+
+  /// Of a slab whose labels are packed colours.
+  void add(const VoxelIntervals& slab);
+  /// How many colours there are; alpha does not count.
+  [[nodiscard]] std::uint64_t count() const;
+};
 
 /// All that `strata voxelize` can tell of a run.
 struct VoxelizeOutcome {
@@ -33,9 +46,11 @@ struct VoxelizeOutcome {
   double area_estimate = 0.0;   ///< of the set's boundary, square world units
   std::optional<VoxelFormat> format;  ///< of the output; none without one
   std::optional<std::uint64_t> output_bytes;
-  std::optional<FileSize> file_size;     ///< of a dry run
-  std::vector<std::uint64_t> id_voxels;  ///< of solid n of the scene, with --ids
-  double filled_volume = 0.0;            ///< by --coverage, cubic world units
+  std::vector<std::string> output_files;  ///< where -o is cut into several; empty: it is not
+  std::optional<FileSize> file_size;      ///< of a dry run
+  std::vector<std::uint64_t> id_voxels;   ///< of solid n of the scene, with --ids
+  std::optional<ColourReport> colours;    ///< with --colours
+  double filled_volume = 0.0;             ///< by --coverage, cubic world units
   double write_ms = 0.0;
 };
 

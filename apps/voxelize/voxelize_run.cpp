@@ -294,6 +294,7 @@ Result<void> VoxelizeRun::take(const VoxelIntervals& slab) {
 Result<void> VoxelizeRun::take_coloured(const VoxelIntervals& slab) {
   const auto coloured = colouring_->colour(slab, quiet_);
   if (!coloured) return tl::unexpected(coloured.error());
+  if (command_.json || command_.stats) outcome_.colours->add(*coloured);
   if (!left_out_) return take(*coloured);
   left_out_->voxels += coloured->solid_voxels();
   left_out_->intervals += coloured->interval_count();
@@ -392,10 +393,16 @@ Result<void> VoxelizeRun::write_shares() {
 Result<void> VoxelizeRun::finish() {
   const double start = session_.milliseconds();
   if (auto done = writer_->finish(quiet_); !done) return done;
+  outcome_.output_files = writer_->pieces();
   writer_.reset();
   outcome_.write_ms = write_ms_ + session_.milliseconds() - start;
   if (session_.interrupted()) session_.note("the interrupt came too late: the output is complete");
   outcome_.output_bytes = size_of_file(session_.place_of(command_.output));
+  if (outcome_.output_files.empty()) return {};
+  outcome_.output_bytes = 0;
+  for (const std::string& file : outcome_.output_files) {
+    *outcome_.output_bytes += size_of_file(session_.place_of(file)).value_or(0);
+  }
   return {};
 }
 

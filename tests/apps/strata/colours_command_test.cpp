@@ -99,6 +99,22 @@ TEST_F(Colours, MeshesWithoutColoursAreGreyWithAWarning) {
   EXPECT_EQ(colour("p.npy", 0, 0, 0), glm::u8vec4(204, 204, 204, 255));
 }
 
+TEST_F(Colours, AreInTheReport) {
+  const nlohmann::json mesh = report({"box.obj", "-r", "8", "--colours", "-o", "a.npy"});
+  EXPECT_EQ(mesh["colours"],
+            (nlohmann::json{{"source", "mesh"}, {"count", 3}, {"fill", "#808080"}}));
+  const nlohmann::json lime =
+      report({"box.obj", "-r", "8", "--colours", "--fill-colour", "lime", "-o", "a.npy"});
+  EXPECT_EQ(lime["colours"]["fill"], "#00ff00");
+  const nlohmann::json surface =
+      report({"box.obj", "-r", "8", "--surface", "--colours", "-o", "a.npy"});
+  EXPECT_EQ(surface["colours"]["count"], 2);
+  place.write("red.csg", "color([1,0,0,1]) cube([4,4,4]);\n");
+  const nlohmann::json scene = report({"red.csg", "-r", "8", "--colours", "-o", "a.npy"});
+  EXPECT_EQ(scene["colours"],
+            (nlohmann::json{{"source", "solids"}, {"count", 1}, {"fill", nullptr}}));
+}
+
 TEST_F(Colours, AreRefusedWhereTheyMakeNoSense) {
   refuses({"box.obj", "-r", "8", "--colours", "-o", "a.binvox"}, "npy, npz, nrrd");
   refuses({"box.obj", "-r", "8", "--colours", "--ids", "-o", "a.npy"}, "--ids");

@@ -297,6 +297,9 @@ TEST(Json, TheDocumentationNamesExactlyWhatVoxelizePrints) {
            {"open.obj", "-o", "a.vdb", "--json=report.json"},
            {"plate.obj", "--json=report.json"},
            {"box.obj", "-o", "a.npy", "--ids", "--json=report.json"},
+           {"box.obj", "-o", "a.npy", "--coverage", "--json=report.json"},
+           {"box.obj", "-o", "a.npy", "--colours", "--json=report.json"},
+           {"box.obj", "-o", "a.npy", "--sdf", "--json=report.json"},
            {"box.obj", "-o", "a.npy", "--dry-run", "--json=report.json"}}) {
     std::vector<std::string> arguments = {"voxelize", "-r", "8", "--checksum"};
     arguments.insert(arguments.end(), more.begin(), more.end());

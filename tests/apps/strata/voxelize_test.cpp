@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "strata/mesh/shapes.h"
@@ -448,6 +449,57 @@ TEST_F(Voxelize, AGridThatMissesTheMeshIsReported) {
   put("box.obj", make_box({0, 0, 0}, {1, 1, 1}));
   EXPECT_EQ(codes(report({"box.obj", "-r", "8", "--bounds", "5,5,5,6,6,6"})),
             std::vector<std::string>{"empty"});
+}
+
+class VoxPieces : public testkit::VoxelizeFixture {
+ protected:
+  void SetUp() override { put("rod.obj", make_box({0, 0, 0}, {4500, 3, 2})); }
+  [[nodiscard]] bool is_there(const char* name) const {
+    return std::filesystem::exists(place.path(name));
+  }
+};
+
+TEST_F(VoxPieces, AreNamedByTheReportAndTheLine) {
+  const json found = report({"rod.obj", "--voxel-size", "1", "-o", "rod.vox"});
+  EXPECT_EQ(found["output"]["files"].size(), 3u);
+  EXPECT_EQ(found["output"]["files"][2], "rod_2_0_0.vox");
+  std::uint64_t bytes = 0;
+  for (const char* name : {"rod_0_0_0.vox", "rod_1_0_0.vox", "rod_2_0_0.vox"}) {
+    ASSERT_TRUE(is_there(name));
+    bytes += std::filesystem::file_size(place.path(name));
+  }
+  EXPECT_EQ(found["output"]["bytes"], bytes);
+  EXPECT_FALSE(is_there("rod.vox"));
+  const RunResult told =
+      place.run({"voxelize", "rod.obj", "--voxel-size", "1", "-o", "rod.vox", "--stats"});
+  EXPECT_NE(told.out.find("rod_0_0_0.vox to rod_2_0_0.vox (3 files): vox, "), std::string::npos)
+      << told.out;
+}
+
+TEST_F(VoxPieces, DoNotReplaceWhatIsRead) {
+  std::filesystem::rename(place.path("rod.obj"), place.path("rod_1_0_0.vox"));
+  const std::string before = place.read("rod_1_0_0.vox");
+  const auto refused = [&](const std::vector<std::string>& more, const std::string& message) {
+    std::vector<std::string> arguments = {"voxelize", "--voxel-size", "1", "-o", "rod.vox"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const auto run = place.run(arguments);
+    EXPECT_EQ(run.exit_code, 2) << run.err;
+    EXPECT_NE(run.err.find(message), std::string::npos) << run.err;
+    EXPECT_EQ(place.read("rod_1_0_0.vox"), before);
+    EXPECT_FALSE(is_there("rod_0_0_0.vox"));
+  };
+  std::filesystem::create_symlink("rod_1_0_0.vox", place.path("link.obj"));
+  refused({"link.obj"}, "would overwrite the input link.obj");
+  place.write("rod.csg", "import(file = \"link.obj\");\n");
+  refused({"rod.csg"}, "would overwrite a file of the scene");
+}
+
+TEST_F(VoxPieces, DoNotGoToAPipe) {
+  const auto run =
+      place.run({"voxelize", "rod.obj", "--voxel-size", "1", "-o", "-", "--format", "vox"});
+  EXPECT_EQ(run.exit_code, 2) << run.err;
+  EXPECT_NE(run.err.find("are 3 .vox files"), std::string::npos) << run.err;
+  EXPECT_TRUE(run.out.empty());
 }
 
 }  // namespace
