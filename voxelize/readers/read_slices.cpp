@@ -2,7 +2,9 @@
 // of z, rows along y in either order.
 
 #include <algorithm>
+#include <array>
 #include <atomic>
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -20,6 +22,8 @@ struct SliceFolder {
   VoxelGrid grid;
   bool descending = true;     // rows
   bool mirrored = false;      // columns descend
+  bool shares = false;        // greys are filled fractions
+  double gamma = 1.0;         // of them
   std::string before, after;  // of the number in a file's name
   int digits = 0;
 
@@ -54,6 +58,9 @@ Result<SliceFolder> read_description(const ReadContext& context) {
   folder.descending = order == nullptr || order->text != "ascending";
   const JsonValue* columns = json->find("column_order");
   folder.mirrored = columns != nullptr && columns->text == "descending";
+  folder.shares = json->find("full") != nullptr;
+  const JsonValue* gamma = json->find("gamma");
+  if (gamma != nullptr && gamma->number > 0.0) folder.gamma = gamma->number;
   const JsonValue* across = json->find("slice_axis");
   if (across != nullptr && across->text != "z") {
     return fail(ErrorCode::kInput, "{}: slice_axis must be z to be read, got '{}'", path,
@@ -166,6 +173,19 @@ Result<VoxelVolume> read_slice_voxels(ReadContext& context) {
   if (bits != 1) {
     volume.kind = VoxelKind::kIds;
     settle_ids(volume, bits == 8 ? 255 : 65535);
+  }
+  const bool asked = context.options.integers == IntegerVoxels::kValues;
+  const bool auto_shares = folder->shares && context.options.integers == IntegerVoxels::kAuto;
+  if (bits == 8 && volume.kind == VoxelKind::kIds &&
+      (asked || auto_shares || are_fractions(context, volume))) {
+    std::array<float, 256> values{};
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      values[i] =
+          static_cast<float>(255.0 * std::pow(static_cast<double>(i) / 255, 1 / folder->gamma));
+    }
+    if (auto done = labels_to_values(context, volume, values); !done) {
+      return tl::unexpected(done.error());
+    }
   }
   return volume;
 }

@@ -381,6 +381,10 @@ Result<VoxelVolume> read_array(ReadContext& context, const std::string& folder, 
     if (head->type != NumberType::kBool) {
       volume.kind = VoxelKind::kIds;
       settle_ids(volume, head->type == NumberType::kU8 ? 255 : 1);
+      if (head->type == NumberType::kU8 && !context.colours && are_fractions(context, volume)) {
+        context.wants_values = true;
+        return fail(ErrorCode::kInput, "{}: filled fractions are no ids", context.path);
+      }
     }
   } else {
     Result<ScalarField> field = read_field(context, *head);

@@ -189,6 +189,10 @@ Result<VoxelVolume> IdReader::read() {
   if (layout_.type != NumberType::kBool) {
     volume.kind = VoxelKind::kIds;
     settle_ids(volume, layout_.type == NumberType::kU8 ? 255 : 1);
+    if (layout_.type == NumberType::kU8 && !context_.colours && are_fractions(context_, volume)) {
+      context_.wants_values = true;
+      return fail(ErrorCode::kInput, "{}: filled fractions are no ids", context_.path);
+    }
   }
   return volume;
 }

@@ -72,5 +72,11 @@ Result<void> settle_values(ReadContext& context, VoxelVolume& volume, const Voxe
 void settle_colours(VoxelVolume& volume);
 /// Takes ids that are all 1, or all the largest value of their type, for a mask.
 void settle_ids(VoxelVolume& volume, std::uint32_t largest_of_type);
+/// Whether ids of 8 bits are rather filled fractions: 255 is more frequent than any other, and
+/// there are others. Not where the user said that they are ids.
+[[nodiscard]] bool are_fractions(const ReadContext& context, const VoxelVolume& volume);
+/// Makes labels of 8 bits the values of voxels, and settles these. @return kLimit, kCancelled
+Result<void> labels_to_values(ReadContext& context, VoxelVolume& volume,
+                              const std::array<float, 256>& value_of_label);
 
 }  // namespace strata

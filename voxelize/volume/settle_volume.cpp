@@ -1,9 +1,11 @@
 // What numbers mean: distances, densities or ids; and which voxels are solid.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "voxelize/volume/dense_array.h"
@@ -87,6 +89,63 @@ void settle_ids(VoxelVolume& volume, std::uint32_t largest_of_type) {
     }
   }
   volume.kind = VoxelKind::kMask;
+}
+
+bool are_fractions(const ReadContext& context, const VoxelVolume& volume) {
+  constexpr std::size_t kFull = 255;
+  if (volume.kind != VoxelKind::kIds || context.options.integers != IntegerVoxels::kAuto) {
+    return false;
+  }
+  std::array<std::uint64_t, kFull + 1> voxels{};
+  const VoxelIntervals& set = volume.set;
+  for (int tv = 0; tv < set.tiles_v(); ++tv) {
+    for (int tu = 0; tu < set.tiles_u(); ++tu) {
+      const VoxelIntervals::TileView view = set.tile(tu, tv);
+      for (std::size_t i = 0; i < view.items.size(); ++i) {
+        const std::uint32_t label = view.label(i);
+        if (label > kFull) return false;
+        voxels[label] += static_cast<std::uint64_t>(view.items[i].length());
+      }
+    }
+  }
+  const std::uint64_t most = *std::max_element(voxels.begin(), voxels.end() - 1);
+  return most > 0 && voxels[kFull] > most;
+}
+
+Result<void> labels_to_values(ReadContext& context, VoxelVolume& volume,
+                              const std::array<float, 256>& value_of_label) {
+  const VoxelGrid grid = volume.grid();
+  const Axis axis = volume.set.axis();
+  const AxisFrame frame(axis);
+  ScalarField field(grid.dims);
+  std::vector<float> row(static_cast<std::size_t>(grid.dims[frame.w]));
+  std::uint64_t held = 0;
+  glm::ivec3 at(0);
+  for (int& v = at[frame.v]; v < grid.dims[frame.v]; ++v) {
+    if (context.stopped()) return context.cancelled();
+    for (int& u = at[frame.u] = 0; u < grid.dims[frame.u]; ++u) {
+      if (volume.set.column(u, v).empty()) continue;
+      std::fill(row.begin(), row.end(), 0.0f);
+      for_each_labelled(volume.set, u, v, [&](const Interval& run, std::uint32_t label) {
+        std::fill(row.begin() + run.begin(), row.begin() + run.end(), value_of_label[label & 255]);
+      });
+      put_row(field, frame.w, row.data(), grid.dims[frame.w], at);
+    }
+    if (v % 8 != 7 && v + 1 != grid.dims[frame.v]) continue;
+    glm::ivec3 block(0);
+    block[frame.v] = v / 8;
+    for (int& bu = block[frame.u] = 0; bu < field.blocks()[frame.u]; ++bu) {
+      for (int& bw = block[frame.w] = 0; bw < field.blocks()[frame.w]; ++bw) {
+        field.settle_block(block.x, block.y, block.z);
+      }
+    }
+    const std::uint64_t now = field.memory_bytes();
+    if (now > held && !context.budget.take(now - held)) return context.too_large("the values");
+    held = std::max(held, now);
+  }
+  volume.values = std::move(field);
+  volume.kind = VoxelKind::kValues;
+  return settle_values(context, volume, grid);
 }
 
 void settle_colours(VoxelVolume& volume) {

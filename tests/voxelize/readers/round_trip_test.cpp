@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 
 #include "strata/voxelize/formats/voxel_writer.h"
@@ -144,6 +145,70 @@ TEST_P(IdsRoundTrip, GivesTheSameIds) {
     EXPECT_EQ(volume.kind, format().name == "vox" ? VoxelKind::kColours : VoxelKind::kIds);
     expect_grid(volume, grid);
   }
+}
+
+/// Eight bits of how much of a voxel a ball of radius 11 fills, roughly.
+std::uint32_t ball_fraction(int i, int j, int k) {
+  const double away =
+      std::sqrt((i - 14.3) * (i - 14.3) + (j - 15.1) * (j - 15.1) + (k - 13.8) * (k - 13.8));
+  return static_cast<std::uint32_t>(std::clamp((11.5 - away) * 255, 0.0, 255.0));
+}
+
+class FractionsRoundTrip : public RoundTrip {
+ protected:
+  void expect_ball(const VoxelVolume& volume, const VoxelGrid& grid, float tolerance) const {
+    EXPECT_EQ(volume.kind, VoxelKind::kValues);
+    EXPECT_NEAR(volume.threshold, 127.5f, 0.01f);
+    ASSERT_FALSE(volume.values.empty());
+    int count = 0, parts = 0;
+    for (int k = 0; k < grid.dims.z; ++k) {
+      for (int j = 0; j < grid.dims.y; ++j) {
+        for (int i = 0; i < grid.dims.x; ++i) {
+          const auto wanted = static_cast<float>(ball_fraction(i, j, k));
+          const float got = volume.values.value(i, j, k);
+          parts += wanted > 0.0f && wanted < 255.0f ? 1 : 0;
+          count += std::abs(got - wanted) > tolerance ? 1 : 0;
+          count += volume.set.contains(i, j, k) != (got > 127.5f) ? 1 : 0;
+        }
+      }
+    }
+    EXPECT_EQ(count, 0);
+    EXPECT_GT(parts, 1000);
+  }
+  static VoxelWriterOptions eight_bits() {
+    VoxelWriterOptions options;
+    options.fog = 255;
+    options.fog_floats = false;
+    return options;
+  }
+  VoxelGrid grid_ = make_grid({33, 30, 29});
+};
+
+std::vector<VoxelFormat> with_fractions_of_8_bits() {
+  std::vector<VoxelFormat> formats = readable(false);
+  std::erase_if(formats,
+                [](const VoxelFormat& format) { return !format.shares || format.name == "vdb"; });
+  return formats;
+}
+INSTANTIATE_TEST_SUITE_P(Formats, FractionsRoundTrip,
+                         ::testing::ValuesIn(with_fractions_of_8_bits()), format_name);
+
+TEST_P(FractionsRoundTrip, AreNoIds) {
+  const VoxelIntervals ball = labelled(grid_, format().axis, ball_fraction);
+  expect_ball(round_trip(ball, eight_bits()), grid_, 0.001f);
+  ReadVoxelsOptions ids;
+  ids.integers = IntegerVoxels::kIds;
+  const Result<VoxelVolume> as_ids = read_voxels(write(ball, eight_bits()), ids);
+  ASSERT_TRUE(as_ids);
+  EXPECT_EQ(as_ids->kind, VoxelKind::kIds);
+}
+
+TEST_P(FractionsRoundTrip, HaveTheirGammaTakenOff) {
+  if (format().name != "png") GTEST_SKIP() << "no gamma";
+  VoxelWriterOptions options = eight_bits();
+  options.layers.gamma = 0.5;
+  // Where few voxels are full the description of the slices tells.
+  expect_ball(round_trip(labelled(grid_, format().axis, ball_fraction), options), grid_, 1.1f);
 }
 
 class ColoursRoundTrip : public RoundTrip {};
