@@ -1,8 +1,13 @@
 #include "apps/commands/file_uses.h"
 
 #include <algorithm>
+#include <filesystem>
+#include <fstream>
 #include <initializer_list>
 #include <iterator>
+#include <string>
+#include <string_view>
+#include <utility>
 
 #include "apps/commands/oit_options.h"
 #include "apps/session/file_conflicts.h"
@@ -17,6 +22,39 @@ std::vector<FileUse> outputs(std::initializer_list<FileUse> uses) {
   std::copy_if(uses.begin(), uses.end(), std::back_inserter(result),
                [](const FileUse& use) { return !use.path.empty(); });
   return result;
+}
+
+/// Files that a format writes, or a reader looks for, beside the one that is named; they may not be
+/// there.
+std::vector<std::string> beside(const std::string& path, std::string_view format) {
+  const auto has = [&](const char* extension) {
+    return has_extension(path, extension) || same_word(format, extension + 1);
+  };
+  const std::size_t dot = path.rfind('.');
+  const std::string stem = path.substr(0, dot == std::string::npos ? path.size() : dot);
+  if (has(".mhd")) return {stem + ".zraw", stem + ".raw"};
+  if (has(".nhdr") || has(".raw")) return {stem + ".nhdr", stem + ".raw"};
+  return {};
+}
+
+/// The file that a .mhd or .nhdr names for its data; empty: none.
+std::string data_file_of(const std::string& head) {
+  if (!has_extension(head, ".mhd") && !has_extension(head, ".nhdr")) return {};
+  std::ifstream in(head, std::ios::binary);
+  std::string line;
+  for (int count = 0; count < 1000 && std::getline(in, line); ++count) {
+    const std::size_t mark = line.find_first_of("=:");
+    if (mark == std::string::npos) continue;
+    std::string word = lower_case(line.substr(0, mark));
+    while (!word.empty() && word.back() == ' ') word.pop_back();
+    if (word != "elementdatafile" && word != "data file" && word != "datafile") continue;
+    const std::size_t first = line.find_first_not_of("= \t:", mark);
+    if (first == std::string::npos) return {};
+    const std::size_t last = line.find_last_not_of(" \t\r");
+    return (std::filesystem::path(head).parent_path() / line.substr(first, last + 1 - first))
+        .string();
+  }
+  return {};
 }
 
 }  // namespace
@@ -48,6 +86,9 @@ std::vector<FileUse> inputs_of(const VoxelizeCommand& command) {
   if (command.like.empty()) return uses;
   uses.push_back({"--like", command.like});
   if (has_extension(command.like, ".npy")) uses.push_back({"--like", command.like + ".json"});
+  if (std::string data = data_file_of(command.like); !data.empty()) {
+    uses.push_back({"the data of --like", std::move(data)});
+  }
   return uses;
 }
 
@@ -55,9 +96,14 @@ std::vector<FileUse> outputs_of(const VoxelizeCommand& command) {
   const bool sidecar = !command.like.empty() && command.output != "-" &&
                        (same_word(command.format, "npy") ||
                         (command.format.empty() && has_extension(command.output, ".npy")));
-  return outputs({{"-o", command.output},
-                  {"the place of -o", sidecar ? command.output + ".json" : ""},
-                  {"--json", command.json.value_or("")}});
+  std::vector<FileUse> uses = outputs({{"-o", command.output},
+                                       {"the place of -o", sidecar ? command.output + ".json" : ""},
+                                       {"--json", command.json.value_or("")}});
+  if (command.output == "-") return uses;
+  for (const std::string& path : beside(command.output, command.format)) {
+    if (path != command.output) uses.push_back({"the other file of -o", path});
+  }
+  return uses;
 }
 
 std::vector<FileUse> outputs_of(const MeshCommand& command) {

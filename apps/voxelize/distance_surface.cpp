@@ -53,8 +53,9 @@ class InnerFaces final : public TileListFilter {
     bool pass(int& winding) {
       const int before = winding;
       for (const DepthItem& item : together_) winding += item.exit() ? -1 : 1;
-      const bool inner = faces_.is_inside(before) && faces_.is_inside(winding) &&
-                         (before != winding || coincide());
+      const bool inner = (faces_.is_inside(before) && faces_.is_inside(winding) &&
+                          (before != winding || coincide())) ||
+                         faces_.overlaps(winding);
       together_.clear();
       return inner;
     }
@@ -78,6 +79,11 @@ class InnerFaces final : public TileListFilter {
     if (rule_ == InsideRule::kParity) return winding % 2 != 0;
     return rule_ == InsideRule::kNonzero ? winding != 0 : winding > 0;
   }
+  /// Whether solids overlap behind crossings, also where all of them lie at one depth.
+  [[nodiscard]] bool overlaps(int winding) const {
+    if (rule_ == InsideRule::kParity) return false;
+    return rule_ == InsideRule::kNonzero ? winding > 1 || winding < -1 : winding > 1;
+  }
   [[nodiscard]] glm::dvec3 normal(std::uint32_t triangle) const {
     const glm::uvec3 t = mesh_.triangles[triangle];
     const glm::dvec3 a = mesh_.positions[t.x];
@@ -93,15 +99,19 @@ Result<bool> has_inner_faces(const VoxelizeOutcome& outcome, const VoxelizeOptio
                              Session& session) {
   const InnerFaces faces(outcome.input.soup, options.rule);
   VoxelizeOptions lists = options;
-  lists.axis = Axis::kX;
   lists.statistics = false;
   lists.source = nullptr;
   lists.filter = &faces;
   Execution execution = session.execution("distances");
   execution.progress = {};
-  const auto done = voxelize_slabs(outcome.input.soup, outcome.grid, lists, execution,
-                                   [](const VoxelIntervals&) { return Result<void>(); });
-  if (!done) return tl::unexpected(done.error());
+  // Faces along an axis are met by rays of the other two alone.
+  for (const Axis axis : {Axis::kX, Axis::kY, Axis::kZ}) {
+    lists.axis = axis;
+    const auto done = voxelize_slabs(outcome.input.soup, outcome.grid, lists, execution,
+                                     [](const VoxelIntervals&) { return Result<void>(); });
+    if (!done) return tl::unexpected(done.error());
+    if (faces.found()) break;
+  }
   return faces.found();
 }
 

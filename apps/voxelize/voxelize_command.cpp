@@ -1,4 +1,6 @@
 #include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/statvfs.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -298,6 +300,30 @@ Result<void> check_memory(const VoxelizeCommand& command, const VoxelizeOutcome&
               readable_bytes(session.memory_limit()));
 }
 
+/// Refuses a file of plain voxels that the disk surely has no room for.
+Result<void> check_disk(const VoxelizeCommand& command, const VoxelizeOutcome& outcome) {
+  const bool plain =
+      outcome.format && (outcome.format->name == "npy" || outcome.format->name == "nii" ||
+                         outcome.format->name == "raw");
+  if (!plain || command.output == "-") return {};
+  std::string folder = command.output.substr(0, command.output.rfind('/') + 1);
+  if (folder.empty()) folder = ".";
+  struct statvfs disk {};
+  struct stat file {};
+  const bool special = stat(command.output.c_str(), &file) == 0 && !S_ISREG(file.st_mode);
+  if (special || statvfs(folder.c_str(), &disk) != 0) return {};
+  const glm::ivec3 dims = outcome.grid.dims;
+  const double least = (command.sdf || command.floats || command.colours ? 4.0 : 1.0) * dims.x *
+                       dims.y * static_cast<double>(dims.z);
+  const double room = static_cast<double>(disk.f_bavail) * static_cast<double>(disk.f_frsize);
+  if (least <= room) return {};
+  return fail(ErrorCode::kLimit,
+              "{}: a file of {} x {} x {} voxels takes at least {}, but the disk has room for {}",
+              command.output, dims.x, dims.y, dims.z,
+              readable_bytes(static_cast<std::uint64_t>(least)),
+              readable_bytes(static_cast<std::uint64_t>(room)));
+}
+
 }  // namespace
 
 namespace {
@@ -342,6 +368,7 @@ Result<void> make_voxels(const VoxelizeCommand& command, Session& session) {
     estimate_file(command, outcome, samples, session);
     if (session.interrupted()) return fail(ErrorCode::kCancelled, "stopped");
   } else {
+    if (auto room = check_disk(command, outcome); !room) return room;
     if (auto done = make_voxel_file(command, outcome, session); !done) return done;
   }
   session.end_progress();

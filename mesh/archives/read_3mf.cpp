@@ -184,7 +184,7 @@ class Package {
     auto root = part(*name);
     if (!root) return tl::unexpected(root.error());
     const XmlMesh& file = (*root)->file;
-    model_.unit_metres = unit_of(file);
+    model_.unit_metres = unit_of(file, model_.warnings);
     for (const pugi::xml_node& item : child(file.root(), "build").children()) {
       if (local_name(item) != "item") continue;
       if (auto added = add(**root, item, glm::dmat4(1.0), 0, ""); !added) {

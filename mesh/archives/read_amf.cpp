@@ -55,7 +55,7 @@ class AmfReader {
   AmfReader(const XmlMesh& file, const ArchiveOptions& options) : file_(file), options_(options) {}
 
   Result<ArchiveModel> read() {
-    model_.unit_metres = unit_of(file_);
+    model_.unit_metres = unit_of(file_, model_.warnings);
     if (options_.attributes) read_materials();
     for (const pugi::xml_node& object : file_.root().children()) {
       if (local_name(object) != "object") continue;

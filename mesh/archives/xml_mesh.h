@@ -11,7 +11,9 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
+#include "core/printable.h"
 #include "strata/core/result.h"
 #include "strata/mesh/triangle_soup.h"
 
@@ -112,14 +114,19 @@ class XmlMesh {
   pugi::xml_document document_;
 };
 
-/// The unit of a document in metres, by default the millimetre.
-inline double unit_of(const XmlMesh& file) {
+/// The unit of a document in metres, by default the millimetre. One that is not known is a warning.
+inline double unit_of(const XmlMesh& file, std::vector<std::string>& warnings) {
   constexpr std::pair<std::string_view, double> kUnits[] = {
-      {"micron", 1e-6}, {"micrometer", 1e-6}, {"centimeter", 1e-2}, {"inch", 0.0254},
-      {"foot", 0.3048}, {"feet", 0.3048},     {"meter", 1.0}};
+      {"millimeter", 1e-3}, {"micron", 1e-6}, {"micrometer", 1e-6}, {"centimeter", 1e-2},
+      {"inch", 0.0254},     {"foot", 0.3048}, {"feet", 0.3048},     {"meter", 1.0}};
   const std::string_view unit = file.root().attribute("unit").value();
   for (const auto& [name, metres] : kUnits) {
     if (unit == name) return metres;
+  }
+  if (file.root().attribute("unit")) {
+    warnings.push_back(
+        fmt::format("{}: the unit '{}' is not known; numbers are taken as millimetres", file.path(),
+                    printable(unit)));
   }
   return 1e-3;
 }

@@ -36,7 +36,9 @@ TEST_F(CoverageCommand, SaysTheVolumeOfTheMeshAndTheVoxelsOfTheSolid) {
 
 TEST_F(CoverageCommand, OfASceneIsThatOfItsResult) {
   place.write("scene.csg",
-              "difference() { cube([4, 4, 4]); translate([1.1, -1, 1.3]) cube([1.5, 9, 1.25]); }");
+              "difference() { cube([4, 4, 4]); "
+              "multmatrix([[1, 0, 0, 1.1], [0, 1, 0, -1], [0, 0, 1, 1.3], [0, 0, 0, 1]]) "
+              "cube([1.5, 9, 1.25]); }");
   const json found = report({"scene.csg", "--voxel-size", "0.5", "--coverage=16", "-o", "a.npy"});
   // Walls across the rays, along x, are exact; the others are off by 1 / 32 of a voxel at most.
   EXPECT_NEAR(found["voxels"]["coverage"]["volume"].get<double>(), 64 - 1.5 * 4 * 1.25,

@@ -83,7 +83,8 @@ TEST(Script, MistakesNameFileAndLine) {
   EXPECT_NE(error_of("camera 1,2").find("drive.txt:1: "), std::string::npos);
   EXPECT_NE(error_of("scheme Mud").find("'Mud'"), std::string::npos);
   EXPECT_EQ(error_of("\npicture a.jpg"), "drive.txt:2: a.jpg: pictures are written as .png");
-  EXPECT_EQ(error_of("screenshot a.tif"), "drive.txt:1: a.tif: pictures are written as .png");
+  EXPECT_EQ(error_of("screenshot a.tif"),
+            "drive.txt:1: a.tif: pictures are written as .png; strata voxelize writes voxels");
   EXPECT_NE(error_of("projection fisheye").find("'fisheye'"), std::string::npos);
   for (const char* word : {"o", "p", "ortho", "orthographic", "perspective"}) {
     EXPECT_EQ(error_of(std::string("projection ") + word), "none");
