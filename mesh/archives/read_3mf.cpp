@@ -178,6 +178,23 @@ class Package {
   Package(ZipArchive archive, const ArchiveOptions& options, const Execution& execution)
       : archive_(std::move(archive)), options_(options), execution_(execution) {}
 
+  /// Extensions that the file requires, and that are not read.
+  void warn_of_extensions(const XmlMesh& file) {
+    std::string_view rest = file.root().attribute("requiredextensions").value();
+    while (!rest.empty()) {
+      const std::string prefix(rest.substr(0, rest.find(' ')));
+      rest.remove_prefix(std::min(rest.size(), prefix.size() + 1));
+      const std::string_view space = file.root().attribute(("xmlns:" + prefix).c_str()).value();
+      if (prefix.empty() || space.find("/production/") != std::string_view::npos ||
+          space.find("/material/") != std::string_view::npos) {
+        continue;
+      }
+      model_.warnings.push_back(fmt::format(
+          "{}: the file requires the extension '{}' ({}), which is not read; parts may be missing",
+          file.path(), printable(prefix), printable(space)));
+    }
+  }
+
   Result<ArchiveModel> assemble() {
     auto name = root_name();
     if (!name) return tl::unexpected(name.error());
@@ -185,6 +202,7 @@ class Package {
     if (!root) return tl::unexpected(root.error());
     const XmlMesh& file = (*root)->file;
     model_.unit_metres = unit_of(file, model_.warnings);
+    warn_of_extensions(file);
     for (const pugi::xml_node& item : child(file.root(), "build").children()) {
       if (local_name(item) != "item") continue;
       if (auto added = add(**root, item, glm::dmat4(1.0), 0, ""); !added) {
