@@ -2,6 +2,7 @@
 
 #include <H5Epublic.h>
 #include <H5Ipublic.h>
+#include <H5public.h>
 
 #include <mutex>
 #include <string>
@@ -15,6 +16,9 @@ namespace strata {
 class Hdf5Session {
  public:
   Hdf5Session() : lock_(mutex()) {
+    // At the end of a process 1.10 crashes over a file that could not be written to its end.
+    static const bool kept = H5dont_atexit() >= 0;
+    (void)kept;
     H5Eget_auto2(H5E_DEFAULT, &print_, &print_data_);
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
   }
