@@ -108,6 +108,25 @@ TEST_F(Distances, OfPartsThatOverlapAreThoseToTheirUnion) {
   EXPECT_EQ(report({"notch.obj", "-r", "200", "--sdf"})["distances"]["surface"], "mesh");
 }
 
+TEST_F(Distances, OfPartsThatTouchOrOverlapAlongAnAxisAreThoseToTheirUnion) {
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const double begin : {2.0, 1.5}) {  // they touch; they overlap
+      glm::dvec3 middle(4, 4, 4), start(0, 0, 0);
+      middle[axis] = 2.0, start[axis] = begin;
+      TriangleSoup both = make_box({0, 0, 0}, middle);
+      append(both, make_box(start, {4, 4, 4}));
+      put("both.obj", both);
+      const json found = report({"both.obj", "--voxel-size", "0.25", "--sdf", "-o", "a.vdb"});
+      EXPECT_EQ(found["distances"]["surface"], "boundary") << axis << ' ' << begin;
+      EXPECT_LT(worst(read("a.vdb"), 0.75,
+                      [](const glm::dvec3& p) {
+                        return to_box(p, {0, 0, 0}, {4, 4, 4});
+                      }),
+                1e-5);
+    }
+  }
+}
+
 TEST_F(Distances, OfAllVoxelsGoIntoArrays) {
   put("ball.obj", make_icosphere(10.0, 4));
   const json found = report({"ball.obj", "-r", "40", "--sdf", "--band", "all", "-o", "a.nrrd"});
