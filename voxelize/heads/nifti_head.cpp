@@ -95,7 +95,7 @@ void place_by_sform(const NiftiFields& fields, GridAxes& axes) {
 }
 
 void place(const NiftiFields& fields, NiftiHead& head) {
-  glm::dvec3 spacing;
+  glm::dvec3 spacing(1.0);
   for (int axis = 0; axis < 3; ++axis) {
     spacing[axis] = std::abs(fields.real(76, 104, 1 + static_cast<std::size_t>(axis)));
     if (spacing[axis] == 0.0) spacing[axis] = 1.0;
