@@ -132,6 +132,10 @@ Result<std::optional<TriangleSoup>> distance_surface(const VoxelizeCommand& comm
   // The voxels' input has no meshes any more; what there was to say of the files has been said.
   auto scene = csg::load_scene(command.input, {}, session.execution("reading"));
   if (!scene) return tl::unexpected(scene.error());
+  if (input.turned) {
+    scene->tree =
+        csg::transform(glm::dmat4(command.input.space_from_world), std::move(scene->tree));
+  }
   auto made =
       csg::boundary_mesh(scene->tree, scene->tree.root(), {}, session.execution("boundary"));
   if (!made) return tl::unexpected(made.error());

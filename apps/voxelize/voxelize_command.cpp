@@ -369,7 +369,9 @@ Result<void> make_voxels(const VoxelizeCommand& command, Session& session) {
     if (session.interrupted()) return fail(ErrorCode::kCancelled, "stopped");
   } else {
     if (auto room = check_disk(command, outcome); !room) return room;
-    if (auto done = make_voxel_file(command, outcome, session); !done) return done;
+    VoxelizeCommand with_place = command;
+    with_place.input = std::move(placed);  // distances read it again
+    if (auto done = make_voxel_file(with_place, outcome, session); !done) return done;
   }
   session.end_progress();
   return print_reports(command, outcome, session);

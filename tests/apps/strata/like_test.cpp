@@ -133,6 +133,29 @@ TEST_F(Like, ScenesExpressionsAndIdsGoAlong) {
   EXPECT_EQ(wrong(*read_voxels(place.path("b.npy")), steps_, first_), 0);
 }
 
+TEST_F(Like, DistancesToAnExactBoundaryAreOfTheTurnedGrid) {
+  place.write("bar.csg", "cube([4, 2, 1]);\n");
+  write_head("ref.nhdr", dims_, steps_, first_);
+  const json found =
+      report({"bar.csg", "--like", "ref.nhdr", "--sdf", "--band", "all", "-o", "a.npy"});
+  EXPECT_EQ(found["distances"]["surface"], "boundary");
+  const auto values = read_voxels(place.path("a.npy"));
+  ASSERT_TRUE(values.has_value()) << values.error().message;
+  double worst = 0;
+  for (int k = 0; k < dims_.z; ++k) {
+    for (int j = 0; j < dims_.y; ++j) {
+      for (int i = 0; i < dims_.x; ++i) {
+        const glm::dvec3 p = first_ + steps_ * glm::dvec3(i, j, k);
+        const glm::dvec3 out = glm::max(-p, p - glm::dvec3(4, 2, 1));
+        const double right =
+            glm::length(glm::max(out, 0.0)) + std::min(0.0, std::max({out.x, out.y, out.z}));
+        worst = std::max(worst, std::abs(values->values.value(i, j, k) - right));
+      }
+    }
+  }
+  EXPECT_LT(worst, 0.11 / 256);  // corners are rounded to the lattice
+}
+
 TEST_F(Like, APlainGridGivesTheBytesOfTheSameGrid) {
   report({"l.off", "-r", "50", "--padding", "2", "-o", "a.nrrd"});
   report({"l.off", "--like", "a.nrrd", "-o", "b.nrrd"});
