@@ -237,10 +237,6 @@ void drop_degenerate(RawMesh& mesh) {
   soup.face_elements.resize(kept);
 }
 
-std::string faces_text(std::uint64_t count) {
-  return count == 1 ? "1 face was dropped" : fmt::format("{} faces were dropped", count);
-}
-
 /// Adds a warning for each cause of dropped faces, naming the first face.
 /// @param vertices  number of vertices in the file
 void warn_of_dropped_faces(RawMesh& raw, const Losses& losses, std::size_t vertices,
@@ -269,6 +265,10 @@ void warn_of_dropped_faces(RawMesh& raw, const Losses& losses, std::size_t verti
 }
 
 }  // namespace
+
+std::string faces_text(std::uint64_t count) {
+  return count == 1 ? "1 face was dropped" : fmt::format("{} faces were dropped", count);
+}
 
 Result<MeshFile> finish_mesh(const ReaderInput& input, RawMesh&& raw, const LocateFace& locate) {
   MeshReadStats& stats = raw.stats;

@@ -20,16 +20,12 @@ Result<MeshFile> read_gltf_mesh(const ReaderInput& input) {
   const std::uint64_t dropped = losses.out_of_range + losses.non_finite;
   if (dropped > 0) {
     if (input.options.strict) return fail(ErrorCode::kInput, "{}", losses.first);
-    model->warnings.push_back(
-        fmt::format("{}; {} dropped", losses.first,
-                    dropped == 1 ? "1 face was" : fmt::format("{} faces were", dropped)));
+    model->warnings.push_back(fmt::format("{}; {}", losses.first, faces_text(dropped)));
   }
   RawMesh raw;
   raw.soup = std::move(model->soup);
   raw.stats.format = is_glb(input.text) ? "glb" : "gltf";
   raw.stats.faces = raw.soup.triangles.size() + dropped;
-  raw.stats.out_of_range = losses.out_of_range;
-  raw.stats.non_finite = losses.non_finite;
   raw.stats.ignored = model->ignored;
   raw.stats.warnings = std::move(model->warnings);
   raw.stats.unit_metres = 1.0;
@@ -38,6 +34,9 @@ Result<MeshFile> read_gltf_mesh(const ReaderInput& input) {
     return FacePlace{fmt::format("{}: triangle {}", input.name, triangle), ""};
   });
   if (!file) return file;
+  // What is dropped already has been told.
+  file->stats.out_of_range = losses.out_of_range;
+  file->stats.non_finite = losses.non_finite;
   file->attributes = std::move(model->attributes);
   file->opened = std::move(model->opened);
   return file;

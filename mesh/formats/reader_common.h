@@ -35,6 +35,9 @@ using LocateFace = std::function<FacePlace(std::uint32_t element)>;
 /// is set and something was dropped
 Result<MeshFile> finish_mesh(const ReaderInput& input, RawMesh&& raw, const LocateFace& locate);
 
+/// "2 faces were dropped".
+[[nodiscard]] std::string faces_text(std::uint64_t count);
+
 Result<MeshFile> read_obj(const ReaderInput& input);
 Result<MeshFile> read_stl(const ReaderInput& input);
 Result<MeshFile> read_ply(const ReaderInput& input);

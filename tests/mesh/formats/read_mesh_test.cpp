@@ -352,5 +352,30 @@ TEST_F(ReadMesh, EveryTruncationIsNoticed) {
   }
 }
 
+TEST_F(ReadMesh, AGltfTellsOnceOfAFaceThatIsDropped) {
+  // Four vertices, three good triangles, and one whose last vertex is 9.
+  const std::string text =
+      R"({"asset":{"version":"2.0"},"nodes":[{"mesh":0}],"meshes":[{"primitives":
+      [{"attributes":{"POSITION":0},"indices":1}]}],"accessors":[
+      {"bufferView":0,"componentType":5126,"count":4,"type":"VEC3"},
+      {"bufferView":1,"componentType":5123,"count":12,"type":"SCALAR"}],
+      "bufferViews":[{"buffer":0,"byteLength":48},{"buffer":0,"byteOffset":48,"byteLength":24}],
+      "buffers":[{"byteLength":72,"uri":"data:application/octet-stream;base64,)"
+      "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAAAAAAAAAAAAIA/"
+      "AAACAAEAAAABAAMAAAADAAIAAQACAAkA\"}]}";
+  MeshReadOptions options;
+  options.format = MeshFormat::kGltf;
+  const auto file = parse_mesh(text, "bad.gltf", options);
+  ASSERT_TRUE(file.has_value()) << file.error().message;
+  EXPECT_EQ(file->soup.triangles.size(), 3u);
+  EXPECT_EQ(file->stats.faces, 4u);
+  EXPECT_EQ(file->stats.out_of_range, 1u);
+  ASSERT_EQ(file->stats.warnings.size(), 1u) << file->stats.warnings.back();
+  EXPECT_EQ(
+      file->stats.warnings.front(),
+      "bad.gltf: meshes[0].primitives[0]: an index is 9, but there are 4 vertices; 1 face was "
+      "dropped");
+}
+
 }  // namespace
 }  // namespace strata
