@@ -5,10 +5,9 @@
 #endif
 
 #include <algorithm>
-#include <charconv>
-#include <new>
 
 #include "core/letters.h"
+#include "mesh/text/text_scanner.h"
 
 namespace strata {
 namespace {
@@ -29,19 +28,7 @@ std::optional<std::string> ZipArchive::find(std::string_view name) const {
   const std::string_view wanted = without_slash(name);
   auto found = look(wanted);
   if (found || wanted.find('%') == std::string_view::npos) return found;
-  std::string decoded;
-  for (std::size_t i = 0; i < wanted.size(); ++i) {
-    unsigned value = 0;
-    const char* const digits = wanted.data() + i + 1;
-    if (wanted[i] == '%' && i + 2 < wanted.size() &&
-        std::from_chars(digits, digits + 2, value, 16).ptr == digits + 2) {
-      decoded += static_cast<char>(value);
-      i += 2;
-    } else {
-      decoded += wanted[i];
-    }
-  }
-  return look(decoded);
+  return look(strata::detail::without_escapes(wanted));
 }
 
 #ifdef STRATA_HAVE_LIBZIP

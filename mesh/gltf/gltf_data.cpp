@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cstring>
 #include <filesystem>
 
 #include "core/printable.h"
+#include "mesh/text/text_scanner.h"
 
 namespace strata::detail {
 namespace {
@@ -64,23 +64,6 @@ void copy_values(const unsigned char* from, std::uint64_t stride, std::uint64_t 
   }
 }
 
-/// "%20" becomes a blank.
-std::string without_escapes(std::string_view uri) {
-  std::string text;
-  for (std::size_t i = 0; i < uri.size(); ++i) {
-    unsigned value = 0;
-    const char* const digits = uri.data() + i + 1;
-    if (uri[i] == '%' && i + 2 < uri.size() &&
-        std::from_chars(digits, digits + 2, value, 16).ptr == digits + 2) {
-      text += static_cast<char>(value);
-      i += 2;
-    } else {
-      text += uri[i];
-    }
-  }
-  return text;
-}
-
 constexpr std::array<std::int8_t, 256> kLetters = [] {
   std::array<std::int8_t, 256> all{};
   for (std::int8_t& one : all) one = -1;
@@ -91,8 +74,6 @@ constexpr std::array<std::int8_t, 256> kLetters = [] {
   }
   return all;
 }();
-
-bool is_data(std::string_view uri) { return uri.starts_with("data:"); }
 
 std::string decoded_data(std::string_view uri, const GltfUser& user) {
   const std::size_t comma = uri.find(',');
@@ -302,18 +283,13 @@ std::vector<std::uint32_t> GltfData::read_indices(std::uint32_t index) {
     return indices;
   }
   const unsigned char* at = all.first;
-  for (std::uint32_t& to : indices) {
-    if (from.type == GltfNumber::kUint8) {
-      to = *at;
-    } else if (from.type == GltfNumber::kUint16) {
-      std::uint16_t value = 0;
+  with_type(from.type, [&](auto value) {
+    for (std::uint32_t& to : indices) {
       std::memcpy(&value, at, sizeof value);
-      to = value;
-    } else {
-      std::memcpy(&to, at, sizeof to);
+      to = static_cast<std::uint32_t>(value);
+      at += all.stride;
     }
-    at += all.stride;
-  }
+  });
   return indices;
 }
 

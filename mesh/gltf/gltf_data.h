@@ -34,6 +34,9 @@ struct GltfUser {
   [[nodiscard]] std::string text() const;
 };
 
+/// Whether a URI holds the bytes themselves.
+inline bool is_data(std::string_view uri) { return uri.starts_with("data:"); }
+
 /// Text of base64 as bytes. @return false: a wrong letter, or a wrong end
 bool decode_base64(std::string_view text, std::string& bytes);
 

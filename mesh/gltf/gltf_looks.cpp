@@ -15,7 +15,7 @@ namespace {
 
 Result<Texture> decoded(const GltfDocument& document, GltfData& data, std::uint32_t image) {
   const std::optional<std::string>& uri = document.images[image].uri;
-  const bool named = uri && !uri->starts_with("data:");
+  const bool named = uri && !is_data(*uri);
   const std::string name = named ? printable(*uri, 80) : fmt::format("images[{}]", image);
   auto bytes = data.read_image(image);
   if (!bytes) return tl::unexpected(bytes.error());

@@ -173,7 +173,11 @@ class ShapeMaker {
   template <class Read>
   static void for_used(const VertexGroup& group, Read&& read) {
     if (group.used.empty()) return read(group.low, std::uint64_t{group.high} - group.low + 1, 0);
-    for (std::size_t i = 0; i < group.used.size(); ++i) read(group.used[i], 1, i);
+    const std::vector<std::uint32_t>& used = group.used;
+    for (std::size_t i = 0, end = 0; i < used.size(); i = end) {  // neighbours at once
+      for (end = i + 1; end < used.size() && used[end] == used[end - 1] + 1;) ++end;
+      read(used[i], end - i, i);
+    }
   }
 
   void find_used(VertexGroup& group) {

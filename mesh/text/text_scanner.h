@@ -130,6 +130,9 @@ inline const char* skip_token(const char* p) {
 inline constexpr std::string_view kWideText =
     "the file is UTF-16 text; save it as UTF-8 (iconv -f UTF-16 -t UTF-8)";
 
+/// The text of a URI: "%20" becomes a blank.
+[[nodiscard]] std::string without_escapes(std::string_view uri);
+
 /// Compares ASCII text, ignoring case. @pre `word` is in lower case
 [[nodiscard]] inline bool equals_no_case(std::string_view text, std::string_view word) {
   if (text.size() != word.size()) return false;
