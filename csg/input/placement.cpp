@@ -9,8 +9,6 @@
 
 #include <fmt/format.h>
 
-#include "core/letters.h"
-#include "core/printable.h"
 #include "csg/input/input_parts.h"
 #include "strata/csg/input/scene_input.h"
 #include "strata/mesh/soup_tools.h"
@@ -34,8 +32,23 @@ FormatUnit unit_of_format(const std::string& path, const SceneInput& input) {
   if (kind.is_scene) return FormatUnit::kNone;
   const MeshFormat format = kind.format != MeshFormat::kAuto ? kind.format : mesh_format_of(path);
   if (format == MeshFormat::k3mf || format == MeshFormat::kAmf) return FormatUnit::kMillimetres;
-  const bool gltf = std::string_view(mesh_format_name(format)) == "gltf";
-  return gltf ? FormatUnit::kMetres : FormatUnit::kNone;
+  return format == MeshFormat::kGltf ? FormatUnit::kMetres : FormatUnit::kNone;
+}
+
+/// What a length is called as a unit.
+struct UnitName {
+  double metres;
+  std::string_view symbol, name;
+};
+/// Null when it has no name.
+const UnitName* unit_named(double metres) {
+  static constexpr UnitName kNames[] = {{1e-6, "um", "micrometre"}, {1e-3, "mm", "millimetre"},
+                                        {1e-2, "cm", "centimetre"}, {1.0, "m", "metre"},
+                                        {0.0254, "in", "inch"},     {0.3048, "ft", "foot"}};
+  for (const UnitName& unit : kNames) {
+    if (std::abs(unit.metres - metres) <= 1e-9 * unit.metres) return &unit;
+  }
+  return nullptr;
 }
 
 /// Factor and divisor, one of them 1: so that a division by 1000 is one, and rounded once.
@@ -78,12 +91,8 @@ double unit_factor(double file_metres, double world_metres) {
 }
 
 std::string_view unit_symbol(double metres) {
-  constexpr std::pair<double, std::string_view> kSymbols[] = {
-      {1e-6, "um"}, {1e-3, "mm"}, {1e-2, "cm"}, {1.0, "m"}, {0.0254, "in"}, {0.3048, "ft"}};
-  for (const auto& [length, symbol] : kSymbols) {
-    if (std::abs(length - metres) <= 1e-9 * length) return symbol;
-  }
-  return "";
+  const UnitName* unit = unit_named(metres);
+  return unit != nullptr ? unit->symbol : "";
 }
 
 double world_unit(const SceneInput& input) {
@@ -186,14 +195,9 @@ std::string unit_doubt(const MeshReadStats& stats, const SceneInput& input, cons
 
 std::string describe_unit(double file_metres, double world_metres, const std::string& doubt) {
   if (!doubt.empty()) return "not known: " + doubt;
-  constexpr std::pair<double, std::string_view> kNames[] = {
-      {1e-6, "micrometre"}, {1e-3, "millimetre"}, {1e-2, "centimetre"},
-      {1.0, "metre"},       {0.0254, "inch"},     {0.3048, "foot"}};
-  const auto name = [&](double metres) {
-    for (const auto& [length, word] : kNames) {
-      if (std::abs(length - metres) <= 1e-9 * length) return "the " + std::string(word);
-    }
-    return fmt::format("{} m", metres);
+  const auto name = [](double metres) {
+    const UnitName* unit = unit_named(metres);
+    return unit != nullptr ? fmt::format("the {}", unit->name) : fmt::format("{} m", metres);
   };
   if (world_metres <= 0.0) return {};
   if (file_metres <= 0.0) return name(world_metres) + "; the file says nothing about units";

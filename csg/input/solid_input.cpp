@@ -69,13 +69,19 @@ void name_apart(std::vector<Solid>& solids, const std::vector<std::string>& file
   }
 }
 
+/// What the options say of the space of all inputs.
+SolidInput begun(const SceneInput& input) {
+  SolidInput all;
+  all.unit_metres = world_unit(input);
+  all.turned = input.space_from_world != glm::dmat3(1.0);
+  return all;
+}
+
 /// Meshes, or their parts, as solids of a tree.
 Result<SolidInput> load_apart(SceneInput input, const InputMessages& messages,
                               const Execution& execution) {
   input.split_parts = true;
-  SolidInput all;
-  all.unit_metres = world_unit(input);
-  all.turned = input.space_from_world != glm::dmat3(1.0);
+  SolidInput all = begun(input);
   std::vector<Solid> apart;
   std::vector<std::string> files;  // of each that is a part
   for (std::size_t i = 0; i < input.files.size(); ++i) {
@@ -105,9 +111,7 @@ Result<SolidInput> load_apart(SceneInput input, const InputMessages& messages,
 /// Meshes as one soup, or as a tree where they have several rules.
 Result<SolidInput> load_meshes(const SceneInput& input, const InputMessages& messages,
                                const Execution& execution) {
-  SolidInput all;
-  all.unit_metres = world_unit(input);
-  all.turned = input.space_from_world != glm::dmat3(1.0);
+  SolidInput all = begun(input);
   all.rule = input.rule;     // solids of a tree have their own
   std::vector<Solid> apart;  // those with a rule of their own
   for (std::size_t i = 0; i < input.files.size(); ++i) {
@@ -189,9 +193,7 @@ Result<SolidInput> load_solids(const SceneInput& input, bool as_tree, const Inpu
                    : load_meshes(input, messages, execution);
   }
   const detail::Stopwatch watch;
-  SolidInput all;
-  all.unit_metres = world_unit(input);
-  all.turned = input.space_from_world != glm::dmat3(1.0);
+  SolidInput all = begun(input);
   SceneInput apart = input;
   apart.split_parts = as_tree;
   auto scene = load_scene(apart, messages, execution, &all.files);

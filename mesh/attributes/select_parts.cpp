@@ -1,6 +1,5 @@
 #include "mesh/attributes/select_parts.h"
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <string_view>
@@ -9,6 +8,7 @@
 #include "core/did_you_mean.h"
 #include "core/printable.h"
 #include "mesh/no_vertex.h"
+#include "mesh/split_parts.h"
 
 namespace strata::detail {
 namespace {
@@ -76,18 +76,14 @@ void renumber_parts(MeshAttributes& all, const std::vector<bool>& kept) {
 
 /// Keeps the triangles whose face element has a part.
 void drop_triangles(TriangleSoup& soup, const MeshAttributes& all) {
+  const std::vector<std::uint32_t> parts = parts_of_triangles(soup, all);
   std::vector<std::uint32_t> elements;
   std::size_t count = 0;
-  std::uint32_t last = 0;
-  bool kept = all.part_of(0) != MeshAttributes::kNone;
   for (std::size_t t = 0; t < soup.triangles.size(); ++t) {
-    const std::uint32_t element =
-        soup.face_elements.empty() ? static_cast<std::uint32_t>(t) : soup.face_elements[t];
-    if (element != last) kept = all.part_of(element) != MeshAttributes::kNone;
-    last = element;
-    if (!kept) continue;
+    if (parts[t] == MeshAttributes::kNone) continue;
     soup.triangles[count++] = soup.triangles[t];
-    elements.push_back(element);
+    elements.push_back(soup.face_elements.empty() ? static_cast<std::uint32_t>(t)
+                                                  : soup.face_elements[t]);
   }
   if (count == soup.triangles.size()) return;
   soup.triangles.resize(count);

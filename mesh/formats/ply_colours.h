@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <optional>
 #include <stop_token>
 #include <string_view>
 #include <vector>
@@ -78,11 +77,11 @@ void each_colour(Source source, const Element& element, const ColourLayout& layo
   }
 }
 
-/// Puts the colours of an element into `colours` from `first` on. @return false after a stop
+/// Puts the colours of an element into `colours` from `first` on; not all of them after a stop.
 template <class Source>
-bool read_ply_colours(const Source& source, const Element& element, std::uint64_t first,
-                      const std::stop_token& stop, std::vector<glm::u8vec4>& colours) {
-  const ColourLayout layout = colours_of(element);
+void read_ply_colours(const Source& source, const Element& element, const ColourLayout& layout,
+                      std::uint64_t first, const std::stop_token& stop,
+                      std::vector<glm::u8vec4>& colours) {
   constexpr std::uint64_t kRarely = 0xffff;
   float scale = 1.0f;
   if (layout.floats) {
@@ -102,7 +101,6 @@ bool read_ply_colours(const Source& source, const Element& element, std::uint64_
     colours[first + e] = colour;
     return (e & kRarely) != kRarely || !stop.stop_requested();
   });
-  return !stop.stop_requested();
 }
 
 }  // namespace strata::detail::ply

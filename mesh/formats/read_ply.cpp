@@ -450,18 +450,21 @@ Result<void> PlyReader::read_colours(const std::optional<FaceSource<Source>>& ve
                                      std::span<const FaceSource<Source>> faces,
                                      MeshFile& file) const {
   const std::stop_token& stop = input_.execution.stop;
-  if (vertices && colours_of(*vertices->element).given()) {
+  const ColourLayout of_vertices = vertices ? colours_of(*vertices->element) : ColourLayout{};
+  if (of_vertices.given()) {
     std::vector<glm::u8vec4>& colours = file.attributes.vertex_colours;
     colours.resize(vertices->element->count, glm::u8vec4(255));
-    read_ply_colours(vertices->source, *vertices->element, 0, stop, colours);
+    read_ply_colours(vertices->source, *vertices->element, of_vertices, 0, stop, colours);
     input_.dropped->remove_from(colours);
   }
   std::uint64_t first = 0;
   for (const FaceSource<Source>& one : faces) {
     // Strips are several triangles each; nobody gives them colours.
-    if (one.kind == FaceKind::kPolygon && colours_of(*one.element).given()) {
+    const ColourLayout layout = colours_of(*one.element);
+    if (one.kind == FaceKind::kPolygon && layout.given()) {
       file.attributes.element_colours.resize(file.stats.faces, glm::u8vec4(255));
-      read_ply_colours(one.source, *one.element, first, stop, file.attributes.element_colours);
+      read_ply_colours(one.source, *one.element, layout, first, stop,
+                       file.attributes.element_colours);
     }
     first += one.faces;
   }
