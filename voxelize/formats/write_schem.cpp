@@ -96,8 +96,7 @@ class SchemWriter final : public SlabWriter {
     nbt.end();
     nbt.begin(Tag::kBytes, "BlockData");
     nbt.put(blocks(), 4);
-    // Magic, deflate, no flags, no time stamp, fastest, Unix (RFC 1952).
-    std::string head("\x1f\x8b\x08\x00\x00\x00\x00\x00\x04\x03", 10);
+    std::string head(DeflatedLayers::kGzipHead);
     append_stored(nbt.bytes(), head);
     return output_.append(head);
   }
@@ -167,10 +166,7 @@ class SchemWriter final : public SlabWriter {
     bytes_ += blocks();
     std::string end;
     append_stored(nbt.bytes(), end);
-    end += DeflatedLayers::kEnd;
-    for (const std::uint64_t value : {std::uint64_t{crc_}, bytes_}) {
-      for (int i = 0; i < 4; ++i) end += static_cast<char>(value >> (8 * i) & 0xff);
-    }
+    end += DeflatedLayers::gzip_end(crc_, bytes_);
     if (Result<void> written = output_.append(end); !written) return written;
     return output_.commit();
   }

@@ -7,6 +7,7 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -93,6 +94,18 @@ class DeflatedLayers {
  public:
   /// What ends the stream: an empty block of fixed codes, marked as the last.
   static constexpr std::string_view kEnd{"\x03\x00", 2};
+  /// What stands before the stream in gzip (RFC 1952): magic, deflate, no flags, no time stamp,
+  /// fastest, Unix.
+  static constexpr std::string_view kGzipHead{"\x1f\x8b\x08\x00\x00\x00\x00\x00\x04\x03", 10};
+  /// What ends the stream and the gzip around it.
+  /// @param crc, bytes  CRC-32 and number of all bytes before deflation
+  [[nodiscard]] static std::string gzip_end(std::uint32_t crc, std::uint64_t bytes) {
+    std::string end(kEnd);
+    for (const std::uint64_t value : {std::uint64_t{crc}, bytes}) {
+      for (int i = 0; i < 4; ++i) end += static_cast<char>(value >> (8 * i) & 0xff);
+    }
+    return end;
+  }
 
   DeflatedLayers(const VoxelGrid& grid, const DenseValues& values)
       : values_(values),

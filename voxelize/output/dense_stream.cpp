@@ -22,16 +22,11 @@ Result<void> DenseStream::begin(BlockOutput& output, std::string_view head) {
   head_bytes_ = head.size();
   if (packing_ == Packing::kNone) return output.append(head);
   const bool gzip = packing_ == Packing::kGzip;
-  // Magic, deflate, no flags, no time stamp, fastest, Unix.
-  std::string begin =
-      gzip ? std::string("\x1f\x8b\x08\x00\x00\x00\x00\x00\x04\x03", 10) : "\x78\x01";
+  const std::string_view begin = gzip ? DeflatedLayers::kGzipHead : "\x78\x01";
   const auto* bytes = reinterpret_cast<const Bytef*>(head.data());
   checksum_ = static_cast<std::uint32_t>(gzip ? crc32_z(crc32_z(0, nullptr, 0), bytes, head.size())
                                               : adler32_z(1, bytes, head.size()));
-  if (head.empty()) {
-    if (!gzip) checksum_ = 1;
-    return output.append(begin);
-  }
+  if (head.empty()) return output.append(begin);
   Bytes packed;
   RunDeflater deflater(RunBytes::kIds);
   deflater.begin(packed, false);
@@ -74,14 +69,11 @@ Result<void> DenseStream::append_zlib(const VoxelIntervals& slab, BlockOutput& o
 
 Result<void> DenseStream::end(BlockOutput& output) const {
   if (packing_ == Packing::kNone) return {};
-  std::string end(DeflatedLayers::kEnd);
   if (packing_ == Packing::kGzip) {
-    for (const std::uint64_t value : {std::uint64_t{checksum_}, head_bytes_ + dense_bytes()}) {
-      for (int i = 0; i < 4; ++i) end += static_cast<char>(value >> (8 * i) & 0xff);
-    }
-  } else {
-    for (const int shift : {24, 16, 8, 0}) end += static_cast<char>(checksum_ >> shift & 0xff);
+    return output.append(DeflatedLayers::gzip_end(checksum_, head_bytes_ + dense_bytes()));
   }
+  std::string end(DeflatedLayers::kEnd);
+  for (const int shift : {24, 16, 8, 0}) end += static_cast<char>(checksum_ >> shift & 0xff);
   return output.append(end);
 }
 
