@@ -244,9 +244,7 @@ VoxelWriterResult open_hdf5_writer(const std::string& path, const VoxelGrid& gri
                                    const VoxelWriterOptions& options) {
   Result<AtomicFile> output = AtomicFile::create(path);
   if (!output) return tl::unexpected(output.error());
-  auto writer = std::make_unique<Hdf5Writer>(path, grid, options, std::move(*output));
-  if (Result<void> begun = writer->begin(options); !begun) return tl::unexpected(begun.error());
-  return writer;
+  return begun(std::make_unique<Hdf5Writer>(path, grid, options, std::move(*output)), options);
 }
 
 }  // namespace strata

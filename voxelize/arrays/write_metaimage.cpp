@@ -114,12 +114,9 @@ VoxelWriterResult open_metaimage_writer(const std::string& path, const VoxelGrid
   }
   Result<BlockOutput> head = BlockOutput::create(head_path);
   if (!head) return tl::unexpected(head.error());
-  auto writer =
-      std::make_unique<MetaImageWriter>(path, grid, options, std::move(*head), std::move(data));
-  if (Result<void> begun = writer->begin(options.frame, data_file); !begun) {
-    return tl::unexpected(begun.error());
-  }
-  return writer;
+  return begun(
+      std::make_unique<MetaImageWriter>(path, grid, options, std::move(*head), std::move(data)),
+      options.frame, data_file);
 }
 
 }  // namespace strata

@@ -188,10 +188,10 @@ VoxelWriterResult open_nifti_writer(const std::string& path, const VoxelGrid& gr
                                     const VoxelWriterOptions& options, bool packed) {
   Result<BlockOutput> output = BlockOutput::create(path);
   if (!output) return tl::unexpected(output.error());
-  auto writer = std::make_unique<NiftiWriter>(
-      path, grid, options, packed || lower_case(path).ends_with(".gz"), std::move(*output));
-  if (Result<void> begun = writer->begin(options); !begun) return tl::unexpected(begun.error());
-  return writer;
+  return begun(
+      std::make_unique<NiftiWriter>(
+          path, grid, options, packed || lower_case(path).ends_with(".gz"), std::move(*output)),
+      options);
 }
 
 }  // namespace strata

@@ -129,9 +129,7 @@ VoxelWriterResult open_npz_writer(const std::string& path, const VoxelGrid& grid
                                   const VoxelWriterOptions& options) {
   Result<BlockOutput> output = BlockOutput::create(path);
   if (!output) return tl::unexpected(output.error());
-  auto writer = std::make_unique<NpzWriter>(path, grid, options, std::move(*output));
-  if (Result<void> begun = writer->begin(); !begun) return tl::unexpected(begun.error());
-  return writer;
+  return begun(std::make_unique<NpzWriter>(path, grid, options, std::move(*output)));
 }
 
 }  // namespace strata

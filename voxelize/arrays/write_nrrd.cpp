@@ -49,9 +49,7 @@ VoxelWriterResult open_nrrd_writer(const std::string& path, const VoxelGrid& gri
                                    const VoxelWriterOptions& options) {
   Result<BlockOutput> output = BlockOutput::create(path);
   if (!output) return tl::unexpected(output.error());
-  auto writer = std::make_unique<NrrdWriter>(path, grid, options, std::move(*output));
-  if (Result<void> begun = writer->begin(options); !begun) return tl::unexpected(begun.error());
-  return writer;
+  return begun(std::make_unique<NrrdWriter>(path, grid, options, std::move(*output)), options);
 }
 
 }  // namespace strata

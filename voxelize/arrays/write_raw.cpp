@@ -61,11 +61,8 @@ VoxelWriterResult open_raw_writer(const std::string& path, const VoxelGrid& grid
     if (!created) return tl::unexpected(created.error());
     head = std::move(*created);
   }
-  auto writer = std::make_unique<RawWriter>(path, grid, options, std::move(head), std::move(*data));
-  if (Result<void> begun = writer->begin(options, pair.data_name()); !begun) {
-    return tl::unexpected(begun.error());
-  }
-  return writer;
+  return begun(std::make_unique<RawWriter>(path, grid, options, std::move(head), std::move(*data)),
+               options, pair.data_name());
 }
 
 }  // namespace strata

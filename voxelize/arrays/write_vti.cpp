@@ -144,11 +144,7 @@ VoxelWriterResult open_vti_writer(const std::string& path, const VoxelGrid& grid
                                   const VoxelWriterOptions& options) {
   Result<BlockOutput> output = BlockOutput::create(path);
   if (!output) return tl::unexpected(output.error());
-  auto writer = std::make_unique<VtiWriter>(path, grid, options, std::move(*output));
-  if (Result<void> begun = writer->begin(options.name); !begun) {
-    return tl::unexpected(begun.error());
-  }
-  return writer;
+  return begun(std::make_unique<VtiWriter>(path, grid, options, std::move(*output)), options.name);
 }
 
 }  // namespace strata

@@ -194,9 +194,7 @@ VoxelWriterResult open_ome_zarr_writer(const std::string& path, const VoxelGrid&
                                        const VoxelWriterOptions& options) {
   Result<FolderOutput> folder = FolderOutput::create(path);
   if (!folder) return tl::unexpected(folder.error());
-  auto writer = std::make_unique<OmeZarrWriter>(path, grid, options, std::move(*folder));
-  if (Result<void> begun = writer->begin(); !begun) return tl::unexpected(begun.error());
-  return writer;
+  return begun(std::make_unique<OmeZarrWriter>(path, grid, options, std::move(*folder)));
 }
 
 }  // namespace strata

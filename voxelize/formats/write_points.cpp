@@ -147,9 +147,7 @@ VoxelWriterResult open_point_writer(const std::string& path, const VoxelGrid& gr
                                     const VoxelWriterOptions& options, bool text) {
   Result<BlockOutput> output = BlockOutput::create(path);
   if (!output) return tl::unexpected(output.error());
-  auto writer = std::make_unique<PointWriter>(path, grid, options, text, std::move(*output));
-  if (Result<void> begun = writer->begin(); !begun) return tl::unexpected(begun.error());
-  return writer;
+  return begun(std::make_unique<PointWriter>(path, grid, options, text, std::move(*output)));
 }
 
 }  // namespace

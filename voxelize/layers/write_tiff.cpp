@@ -293,9 +293,7 @@ VoxelWriterResult open_tiff_writer(const std::string& path, const VoxelGrid& gri
                                    const VoxelWriterOptions& options) {
   Result<BlockOutput> output = BlockOutput::create(path);
   if (!output) return tl::unexpected(output.error());
-  auto writer = std::make_unique<TiffWriter>(path, grid, options, std::move(*output));
-  if (Result<void> begun = writer->begin(); !begun) return tl::unexpected(begun.error());
-  return writer;
+  return begun(std::make_unique<TiffWriter>(path, grid, options, std::move(*output)));
 }
 
 }  // namespace strata

@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "strata/voxelize/output/voxel_output.h"
 
@@ -9,6 +10,14 @@ namespace strata {
 
 /// The writers behind open_voxel_writer, one a format (internal to voxelize/). The grid is valid.
 using VoxelWriterResult = Result<std::unique_ptr<VoxelWriter>>;
+
+/// The writer, after its begin(arguments...); or the error of that.
+template <class Writer, class... Arguments>
+VoxelWriterResult begun(std::unique_ptr<Writer> writer, Arguments&&... arguments) {
+  Result<void> written = writer->begin(std::forward<Arguments>(arguments)...);
+  if (!written) return tl::unexpected(written.error());
+  return writer;
+}
 
 /// Colours of a .vox palette; index 0 means no voxel.
 inline constexpr std::size_t kVoxColours = 255;
