@@ -14,9 +14,8 @@
 
 #include "core/letters.h"
 #include "voxelize/output/block_output.h"
-#include "voxelize/output/dense_stream.h"
+#include "voxelize/output/dense_writer.h"
 #include "voxelize/output/grid_text.h"
-#include "voxelize/output/slab_writer.h"
 #include "voxelize/output/writers.h"
 
 namespace strata {
@@ -153,45 +152,17 @@ class NiftiText {
   std::string bytes_;
 };
 
-class NiftiWriter final : public SlabWriter {
- public:
-  NiftiWriter(const std::string& path, const VoxelGrid& grid, const VoxelWriterOptions& options,
-              bool packed, BlockOutput output)
-      : SlabWriter(path, grid, Axis::kX),
-        values_(options),
-        output_(std::move(output)),
-        stream_(grid, values_, packed ? DenseStream::Packing::kGzip : DenseStream::Packing::kNone) {
-  }
-
-  Result<void> begin(const VoxelWriterOptions& options) {
-    return stream_.begin(output_, NiftiText(grid(), options, values_).text());
-  }
-
- private:
-  Result<void> add_slab(const VoxelIntervals& slab, const Execution& execution) override {
-    return stream_.append(slab, output_, execution);
-  }
-
-  Result<void> finish_output(const Execution&) override {
-    if (Result<void> written = stream_.end(output_); !written) return written;
-    return output_.commit();
-  }
-
-  DenseValues values_;
-  BlockOutput output_;
-  DenseStream stream_;
-};
-
 }  // namespace
 
 VoxelWriterResult open_nifti_writer(const std::string& path, const VoxelGrid& grid,
                                     const VoxelWriterOptions& options, bool packed) {
   Result<BlockOutput> output = BlockOutput::create(path);
   if (!output) return tl::unexpected(output.error());
-  return begun(
-      std::make_unique<NiftiWriter>(
-          path, grid, options, packed || lower_case(path).ends_with(".gz"), std::move(*output)),
-      options);
+  const bool gzip = packed || lower_case(path).ends_with(".gz");
+  const auto packing = gzip ? DenseStream::Packing::kGzip : DenseStream::Packing::kNone;
+  const DenseValues values(options);
+  return begun(std::make_unique<DenseWriter>(path, grid, options, packing, std::move(*output)), "",
+               NiftiText(grid, options, values).text());
 }
 
 }  // namespace strata
