@@ -14,7 +14,7 @@
 #include "core/atomic_file.h"
 #include "voxelize/arrays/npy_voxels.h"
 #include "voxelize/output/block_output.h"
-#include "voxelize/output/dense_rows.h"
+#include "voxelize/output/dense_stream.h"
 #include "voxelize/output/slab_writer.h"
 #include "voxelize/output/writers.h"
 
@@ -25,19 +25,19 @@ class NpyWriter final : public SlabWriter {
  public:
   NpyWriter(const std::string& path, const VoxelGrid& grid, const VoxelWriterOptions& options,
             BlockOutput output)
-      : SlabWriter(path, grid, Axis::kX), values_(options), output_(std::move(output)) {
+      : SlabWriter(path, grid, Axis::kX),
+        values_(options),
+        frame_(options.frame),
+        output_(std::move(output)),
+        stream_(grid, values_, DenseStream::Packing::kNone) {
     if (options.sidecar && path != "-") sidecar_ = path + ".json";
-    frame_ = options.frame;
   }
 
-  Result<void> begin() { return output_.append(npy_head(values_, dims())); }
+  Result<void> begin() { return stream_.begin(output_, npy_head(values_, dims())); }
 
  private:
   Result<void> add_slab(const VoxelIntervals& slab, const Execution& execution) override {
-    const RowBlocks blocks(slab, values_);
-    return output_.append_blocks(
-        execution, blocks.count(),
-        [&](std::size_t index, Bytes& out, int) { blocks.make(index, out); });
+    return stream_.append(slab, output_, execution);
   }
   Result<void> finish_output(const Execution&) override {
     if (auto written = write_sidecar(); !written) return written;
@@ -66,6 +66,7 @@ class NpyWriter final : public SlabWriter {
   GridFrame frame_;
   std::string sidecar_;  // path; empty: none
   BlockOutput output_;
+  DenseStream stream_;
 };
 
 }  // namespace

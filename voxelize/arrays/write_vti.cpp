@@ -13,6 +13,7 @@
 
 #include "voxelize/output/block_output.h"
 #include "voxelize/output/dense_rows.h"
+#include "voxelize/output/dense_stream.h"
 #include "voxelize/output/run_deflate.h"
 #include "voxelize/output/slab_writer.h"
 #include "voxelize/output/writers.h"
@@ -50,7 +51,8 @@ class VtiWriter final : public SlabWriter {
       : SlabWriter(path, grid, Axis::kX),
         values_(options),
         frame_(options.frame),
-        output_(std::move(output)) {}
+        output_(std::move(output)),
+        plain_(grid, values_, DenseStream::Packing::kNone) {}
 
   Result<void> begin(const std::string& name) {
     const VoxelGrid& g = grid();
@@ -73,15 +75,13 @@ class VtiWriter final : public SlabWriter {
         values_.components == 1 ? "" : " NumberOfComponents=\"4\"");
     if (Result<void> written = output_.append(header); !written) return written;
     table_position_ = output_.position();
-    const std::uint64_t layer =
-        static_cast<std::uint64_t>(g.dims.x) * static_cast<std::uint64_t>(g.dims.y) * values_.bytes;
     const auto layers = static_cast<std::uint64_t>(g.dims.z);
     if (compressed()) {
       // Blocks, bytes of a block, bytes of a shorter last one (none), compressed sizes.
-      table_ = {layers, layer, 0};
+      table_ = {layers, plain_.dense_bytes() / layers, 0};
       table_.resize(table_.size() + layers);
     } else {
-      table_ = {layers * layer};
+      table_ = {plain_.dense_bytes()};
     }
     return output_.append(table_.data(), table_.size() * sizeof(std::uint64_t));
   }
@@ -99,12 +99,7 @@ class VtiWriter final : public SlabWriter {
   [[nodiscard]] bool compressed() const { return !output_.sequential(); }
 
   Result<void> add_slab(const VoxelIntervals& slab, const Execution& execution) override {
-    if (!compressed()) {
-      const RowBlocks blocks(slab, values_);
-      return output_.append_blocks(
-          execution, blocks.count(),
-          [&](std::size_t index, Bytes& out, int) { blocks.make(index, out); });
-    }
+    if (!compressed()) return plain_.append(slab, output_, execution);
     const auto layers = static_cast<std::size_t>(slab.v_end() - slab.v_begin());
     return output_.append_blocks(execution, layers, [&](std::size_t index, Bytes& out, int) {
       const int z = slab.v_begin() + static_cast<int>(index);
@@ -134,6 +129,7 @@ class VtiWriter final : public SlabWriter {
   DenseValues values_;
   GridFrame frame_;
   BlockOutput output_;
+  DenseStream plain_;  // for a pipe
   std::uint64_t table_position_ = 0;
   std::vector<std::uint64_t> table_;
 };
