@@ -11,38 +11,17 @@
 #include <utility>
 #include <vector>
 
+#include "core/markup.h"
 #include "voxelize/output/block_output.h"
 #include "voxelize/output/dense_rows.h"
 #include "voxelize/output/dense_stream.h"
+#include "voxelize/output/grid_text.h"
 #include "voxelize/output/run_deflate.h"
 #include "voxelize/output/slab_writer.h"
 #include "voxelize/output/writers.h"
 
 namespace strata {
 namespace {
-
-std::string xml_text(const std::string& text) {
-  std::string escaped;
-  for (const char letter : text) {
-    switch (letter) {
-      case '&':
-        escaped += "&amp;";
-        break;
-      case '<':
-        escaped += "&lt;";
-        break;
-      case '>':
-        escaped += "&gt;";
-        break;
-      case '"':
-        escaped += "&quot;";
-        break;
-      default:
-        escaped += static_cast<unsigned char>(letter) < ' ' ? ' ' : letter;
-    }
-  }
-  return escaped;
-}
 
 class VtiWriter final : public SlabWriter {
  public:
@@ -57,7 +36,7 @@ class VtiWriter final : public SlabWriter {
   Result<void> begin(const std::string& name) {
     const VoxelGrid& g = grid();
     const std::string extent = fmt::format("0 {} 0 {} 0 {}", g.dims.x, g.dims.y, g.dims.z);
-    const std::string title = xml_text(name);
+    const std::string title = escape_markup(one_line(name));
     const glm::dvec3 corner = frame_.world(g.origin);
     const std::string header = fmt::format(
         "<?xml version=\"1.0\"?>\n"
