@@ -143,11 +143,10 @@ class OmeZarrWriter final : public SlabWriter {
     return fmt::format(
         "{{\n  \"chunks\": [{0}{1}, {1}, {1}],\n"
         "  \"compressor\": {{\"id\": \"zlib\", \"level\": 1}},\n"
-        "  \"dimension_separator\": \"/\",\n  \"dtype\": \"{2}{3}{4}\",\n  \"fill_value\": 0,\n"
-        "  \"filters\": null,\n  \"order\": \"C\",\n  \"shape\": [{5}{6}, {7}, {8}],\n"
+        "  \"dimension_separator\": \"/\",\n  \"dtype\": \"{2}\",\n  \"fill_value\": 0,\n"
+        "  \"filters\": null,\n  \"order\": \"C\",\n  \"shape\": [{3}{4}, {5}, {6}],\n"
         "  \"zarr_format\": 2\n}}\n",
-        colours ? "1, " : "", ZarrChunks::kSide, values.number_bits() == 8 ? '|' : '<',
-        values.is_float() ? 'f' : 'u', values.number_bits() / 8, colours ? "4, " : "",
+        colours ? "1, " : "", ZarrChunks::kSide, values.numpy_type(), colours ? "4, " : "",
         level.grid.dims.z, level.grid.dims.y, level.grid.dims.x);
   }
 

@@ -37,13 +37,12 @@ class ZarrWriter final : public SlabWriter {
     const VoxelGrid& g = grid();
     const glm::dvec3 size = g.voxel_size, centre = g.origin + 0.5 * size;
     const std::string array = fmt::format(
-        "{{\n  \"chunks\": [{0}, {0}, {0}{7}],\n  \"compressor\": {{\"id\": \"zlib\", \"level\": "
+        "{{\n  \"chunks\": [{0}, {0}, {0}{5}],\n  \"compressor\": {{\"id\": \"zlib\", \"level\": "
         "1}},\n"
-        "  \"dtype\": \"{4}{6}{5}\",\n  \"fill_value\": 0,\n  \"filters\": null,\n  \"order\": "
+        "  \"dtype\": \"{4}\",\n  \"fill_value\": 0,\n  \"filters\": null,\n  \"order\": "
         "\"C\",\n"
-        "  \"shape\": [{1}, {2}, {3}{7}],\n  \"zarr_format\": 2\n}}\n",
-        ZarrChunks::kSide, g.dims.x, g.dims.y, g.dims.z, values_.number_bits() == 8 ? '|' : '<',
-        values_.number_bits() / 8, values_.is_float() ? 'f' : 'u',
+        "  \"shape\": [{1}, {2}, {3}{5}],\n  \"zarr_format\": 2\n}}\n",
+        ZarrChunks::kSide, g.dims.x, g.dims.y, g.dims.z, values_.numpy_type(),
         values_.components == 1 ? "" : ", 4");
     const std::string attributes = fmt::format(
         "{{\n  \"axes\": [\"x\", \"y\", \"z\"{}],\n  \"origin\": [{}, {}, {}],\n"

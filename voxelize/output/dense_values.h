@@ -3,6 +3,7 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <string>
 
 #include "strata/voxelize/output/voxel_output.h"
 #include "voxelize/output/run_deflate.h"
@@ -41,12 +42,17 @@ class DenseValues {
     components = kind == Kind::kColours ? 4 : 1;
   }
 
-  /// Numbers that are whole.
+  /// Numbers that are not whole.
   [[nodiscard]] bool is_float() const {
     return kind == Kind::kFloatShares || kind == Kind::kDistances;
   }
   /// Bits of one number of a voxel.
   [[nodiscard]] std::size_t number_bits() const { return 8 * bytes / components; }
+  /// NumPy's name of the type of a number: "|u1", "<u2", "<u4" or "<f4".
+  [[nodiscard]] std::string numpy_type() const {
+    return {number_bits() == 8 ? '|' : '<', is_float() ? 'f' : 'u',
+            static_cast<char>('0' + number_bits() / 8)};
+  }
 
   /// The bits of a voxel of a label.
   [[nodiscard]] std::uint32_t bits_of(std::uint32_t label) const {
