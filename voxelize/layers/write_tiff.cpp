@@ -7,6 +7,8 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <memory>
 #include <string>
@@ -146,38 +148,34 @@ class TiffWriter final : public SlabWriter {
       const int z = slab.v_begin() + static_cast<int>(index / strips);
       const int first = static_cast<int>(index % strips) * rows_;
       const int last = std::min(first + rows_, dims().y);
-      out.clear();
       if (packed_) {
+        out.clear();
         RunDeflater deflater(values_.codes, values_.bytes);
         append_zlib_stream(deflater, out, [&](RunDeflater& to) {
-          emit_rows(slab, z, first, last, [&](std::uint32_t value, int length) {
+          emit_pixels(slab, z, first, last, [&](std::uint32_t value, int length) {
             to.run(value, static_cast<std::uint64_t>(length));
           });
         });
         sizes_[before + index] = out.size();
         return;
       }
-      emit_rows(slab, z, first, last, [&](std::uint32_t value, int length) {
-        for (int i = 0; i < length; ++i) {
-          out.insert(out.end(), reinterpret_cast<const std::byte*>(&value),
-                     reinterpret_cast<const std::byte*>(&value) + values_.bytes);
+      out.resize(static_cast<std::size_t>(last - first) * row_bytes_);
+      std::byte* to = out.data();
+      emit_pixels(slab, z, first, last, [&](std::uint32_t value, int length) {
+        for (int i = 0; i < length; ++i, to += values_.bytes) {
+          std::memcpy(to, &value, values_.bytes);
         }
       });
     });
   }
 
+  /// Flags are 0 and 255.
   template <class Run>
-  void emit_rows(const VoxelIntervals& slab, int z, int first, int last, Run&& run) const {
+  void emit_pixels(const VoxelIntervals& slab, int z, int first, int last, Run&& run) const {
     const bool flags = values_.kind == DenseValues::Kind::kFlags;
-    for (int y = first; y < last; ++y) {
-      int done = 0;
-      for_each_value(slab, values_, y, z, [&](const Interval& interval, std::uint32_t value) {
-        if (interval.begin() > done) run(std::uint32_t{0}, interval.begin() - done);
-        run(flags ? 255 : value, interval.length());
-        done = interval.end();
-      });
-      if (dims().x > done) run(std::uint32_t{0}, dims().x - done);
-    }
+    emit_rows(slab, values_, z, first, last, [&](std::uint32_t value, int length) {
+      run(flags && value != 0 ? std::uint32_t{255} : value, length);
+    });
   }
 
   Result<void> finish_output(const Execution&) override {
