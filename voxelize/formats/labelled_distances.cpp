@@ -10,7 +10,7 @@ namespace strata {
 namespace {
 
 constexpr int kTile = VoxelIntervals::kTileSide;
-constexpr int kSide = ScalarField::kBlockSide;
+constexpr int kBlock = ScalarField::kBlockSide;
 
 /// The runs of a tile of columns along x.
 struct TileRuns {
@@ -30,15 +30,15 @@ struct TileRuns {
       items.push_back({static_cast<std::uint16_t>(begin), static_cast<std::uint16_t>(end - 1)});
       labels.push_back(bits);
     };
-    for (int x = 0; x < width; x += kSide) {
-      const int end = std::min(x + kSide, width);
-      const ScalarField::Block block = layers.block(x / kSide, y / kSide, z / kSide);
+    for (int x = 0; x < width; x += kBlock) {
+      const int end = std::min(x + kBlock, width);
+      const ScalarField::Block block = layers.block(x / kBlock, y / kBlock, z / kBlock);
       if (block.values == nullptr) {
         add(x, end, block.constant);
         continue;
       }
       for (int i = x; i < end; ++i) {
-        add(i, i + 1, block.values[ScalarField::offset(i - x, y % kSide, z % kSide)]);
+        add(i, i + 1, block.values[ScalarField::offset(i - x, y % kBlock, z % kBlock)]);
       }
     }
   }

@@ -126,4 +126,20 @@ std::string vdb_header_bytes(const VdbHeader& header) {
   return bytes + grid;
 }
 
+Result<void> write_vdb_file(const std::string& path, const VdbHeader& header,
+                            const std::string& root, std::size_t blocks,
+                            const BlockOutput::MakeBlock& make, BlockOutput& output,
+                            const Execution& execution) {
+  if (auto written = output.append(vdb_header_bytes(header) + root); !written) return written;
+  const std::uint64_t tree_begin = output.position() - root.size();
+  if (auto written = output.append_blocks(execution, blocks, make); !written) return written;
+  const std::uint64_t bytes = output.position() - tree_begin;
+  const std::uint64_t announced = header.topology_bytes + header.buffers_bytes;
+  if (bytes != announced) {
+    return fail(ErrorCode::kInternal, "{}: the tree has {} bytes, {} were announced", path, bytes,
+                announced);
+  }
+  return output.commit();
+}
+
 }  // namespace strata

@@ -29,10 +29,6 @@ namespace strata {
 namespace {
 
 constexpr int kLeafSide = ScalarField::kBlockSide;
-constexpr int kLowerLeaves = 16;  // leaves a side of a lower node
-constexpr int kUpperLowers = 32;  // lower nodes a side of an upper node
-constexpr int kLowerSide = kLeafSide * kLowerLeaves;
-constexpr int kUpperSide = kLowerSide * kUpperLowers;
 constexpr std::size_t kLeafWords = 8, kLowerWords = 64, kUpperWords = 512;
 
 std::size_t count_of(int value) { return static_cast<std::size_t>(value); }
@@ -115,7 +111,7 @@ class LevelSetWriter final : public VoxelWriter {
         name_(options.name),
         frame_(options.frame),
         output_(std::move(output)),
-        lower_dims_((grid.dims + kLowerSide - 1) / kLowerSide),
+        lower_dims_((grid.dims + kLowerVoxels - 1) / kLowerVoxels),
         lowers_(count_of(lower_dims_.x) * count_of(lower_dims_.y) * count_of(lower_dims_.z)) {}
 
   Result<void> add(const VoxelIntervals&, const Execution&) override {
@@ -183,7 +179,7 @@ Result<void> LevelSetWriter::add_distances(const ScalarField& layers, int z_begi
                 z_begin, z_begin + dims.z - 1, next_layer_);
   }
   done_ = true;  // until it has succeeded
-  const int first = z_begin / kLowerSide, last = (z_begin + dims.z - 1) / kLowerSide;
+  const int first = z_begin / kLowerVoxels, last = (z_begin + dims.z - 1) / kLowerVoxels;
   const std::size_t columns = count_of(lower_dims_.x) * count_of(lower_dims_.y);
   totals_.resize(columns);
   try {
@@ -333,7 +329,7 @@ std::string LevelSetWriter::root() const {
   put(static_cast<std::uint32_t>(inside_uppers_.size()));
   put(static_cast<std::uint32_t>(uppers_.size()));
   for (const glm::ivec3& at : inside_uppers_) {
-    put(at * kUpperSide);
+    put(at * kUpperVoxels);
     put(-band_);
     put(std::uint8_t{0});  // not active
   }
@@ -400,7 +396,7 @@ Mask neither(const Mask& child, const Mask& inside) {
 }
 
 void LevelSetWriter::make_head(const Upper& upper, Bytes& out) {
-  const glm::ivec3 origin = upper.index * kUpperSide;
+  const glm::ivec3 origin = upper.index * kUpperVoxels;
   const SlotMask<kUpperWords> active;
   out.resize(sizeof origin + 2 * sizeof active + inactive_bytes(upper.inactive, active));
   std::byte* to = put_bytes(out.data(), &origin, sizeof origin);
@@ -483,24 +479,13 @@ Result<void> LevelSetWriter::write(const Execution& execution) {
   header.hash = totals.hash;
   header.topology_bytes = tree_head.size() + topology_bytes();
   header.buffers_bytes = buffers_bytes();
-  if (Result<void> written = output_.append(vdb_header_bytes(header) + tree_head); !written) {
-    return written;
-  }
-  const std::uint64_t tree_begin = output_.position() - tree_head.size();
-  Result<void> written =
-      output_.append_blocks(execution, pieces_.size(), [&](std::size_t index, Bytes& out, int) {
-        const Piece& piece = pieces_[index];
-        if (piece.kind == Piece::kHead) make_head(uppers_[piece.index], out);
-        if (piece.kind == Piece::kTopology) make_topology(*lowers_[piece.index], out);
-        if (piece.kind == Piece::kBuffers) make_buffers(*lowers_[piece.index], out);
-      });
-  if (!written) return written;
-  const std::uint64_t announced = header.topology_bytes + header.buffers_bytes;
-  if (output_.position() - tree_begin != announced) {
-    return fail(ErrorCode::kInternal, "{}: the tree has {} bytes, {} were announced", path_,
-                output_.position() - tree_begin, announced);
-  }
-  return output_.commit();
+  const auto make = [&](std::size_t index, Bytes& out, int) {
+    const Piece& piece = pieces_[index];
+    if (piece.kind == Piece::kHead) make_head(uppers_[piece.index], out);
+    if (piece.kind == Piece::kTopology) make_topology(*lowers_[piece.index], out);
+    if (piece.kind == Piece::kBuffers) make_buffers(*lowers_[piece.index], out);
+  };
+  return write_vdb_file(path_, header, tree_head, pieces_.size(), make, output_, execution);
 }
 
 Result<void> LevelSetWriter::finish(const Execution& execution) {

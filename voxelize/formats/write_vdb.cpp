@@ -31,15 +31,10 @@
 namespace strata {
 namespace {
 
-constexpr int kTileSide = VoxelIntervals::kTileSide;
-constexpr int kLowerSide = 16;  // leaves a side of a lower node
-constexpr int kUpperSide = 32;  // lower nodes a side of an upper node
-constexpr int kLowerVoxels = 8 * kLowerSide;
-constexpr int kUpperVoxels = kLowerVoxels * kUpperSide;
 constexpr std::size_t kLowerSlots = 4096;
 constexpr std::size_t kUpperSlots = 32768;
 constexpr std::size_t kLeafVoxels = 512;
-constexpr std::size_t kLeafColumns = std::size_t{kLowerSide} * kLowerSide;  // of a lower node
+constexpr std::size_t kLeafColumns = std::size_t{kLowerLeaves} * kLowerLeaves;  // of a lower node
 // Origin, two masks of the slots, and how the values are stored; the values follow.
 constexpr std::size_t kHeadBytes = sizeof(glm::ivec3) + 2 * kUpperSlots / 8 + 1;
 constexpr std::size_t kLowerBytes = 2 * kLowerSlots / 8 + 1;
@@ -87,7 +82,7 @@ struct RootTile {
 
 /// A piece of the file that one thread makes: the head of an upper node, or the topology or the
 /// buffers of its lower nodes at (x, y), which stand one after the other in both.
-struct Block {
+struct TreeBlock {
   enum Kind { kHead, kTopology, kBuffers } kind = kHead;
   std::size_t upper = 0;  // index in uppers_
   int x = 0, y = 0;       // in lower nodes of the whole grid
@@ -149,8 +144,8 @@ class VdbWriter final : public SlabWriter {
         name_(options.rgba && options.name == "colours" ? "Cd" : options.name),
         frame_(options.frame),
         output_(std::move(output)),
-        tiles_x_(parts(grid.dims.x, kTileSide)),
-        tiles_y_(parts(grid.dims.y, kTileSide)),
+        tiles_x_(parts(grid.dims.x, VoxelIntervals::kTileSide)),
+        tiles_y_(parts(grid.dims.y, VoxelIntervals::kTileSide)),
         lowers_(parts(grid.dims.x, kLowerVoxels), parts(grid.dims.y, kLowerVoxels),
                 parts(grid.dims.z, kLowerVoxels)),
         tiles_(size(tiles_x_) * size(tiles_y_)),
@@ -177,13 +172,15 @@ class VdbWriter final : public SlabWriter {
   [[nodiscard]] std::string root() const;
   [[nodiscard]] VdbHeader header(std::uint64_t topology_bytes) const;
   /// Lower nodes of an upper node: from its first along each axis to one past its last.
-  [[nodiscard]] glm::ivec3 first_lower(const glm::ivec3& upper) const { return upper * kUpperSide; }
-  [[nodiscard]] glm::ivec3 last_lower(const glm::ivec3& upper) const {
-    return glm::min(first_lower(upper) + kUpperSide, lowers_);
+  [[nodiscard]] glm::ivec3 first_lower(const glm::ivec3& upper) const {
+    return upper * kUpperLowers;
   }
-  void make_head(const Block& block, Bytes& out);
-  void make_topology(const Block& block, Bytes& out);
-  void make_buffers(const Block& block, Bytes& out);
+  [[nodiscard]] glm::ivec3 last_lower(const glm::ivec3& upper) const {
+    return glm::min(first_lower(upper) + kUpperLowers, lowers_);
+  }
+  void make_head(const TreeBlock& block, Bytes& out);
+  void make_topology(const TreeBlock& block, Bytes& out);
+  void make_buffers(const TreeBlock& block, Bytes& out);
   /// Of a leaf without numbers: mask, origin and, of bools, the mask as values.
   [[nodiscard]] std::size_t leaf_buffer_bytes() const {
     return sizeof(VdbLeaf) + sizeof(glm::ivec3) + (kind_ == VdbValues::kBool ? sizeof(VdbLeaf) : 0);
@@ -202,14 +199,14 @@ class VdbWriter final : public SlabWriter {
   std::vector<LowerNode> lower_nodes_;                     // z fastest, then y
   std::vector<Upper> uppers_;                              // stored nodes
   std::vector<RootTile> root_tiles_;
-  std::vector<Block> blocks_;
+  std::vector<TreeBlock> blocks_;
   TileValues values_;
   std::uint64_t leaves_ = 0;
 };
 
 Result<void> VdbWriter::add_slab(const VoxelIntervals& slab, const Execution& execution) {
   builders_.resize(std::max(builders_.size(), size(execution.thread_count())));
-  const std::size_t first = size(slab.v_begin() / kTileSide) * size(tiles_x_);
+  const std::size_t first = size(slab.v_begin() / VoxelIntervals::kTileSide) * size(tiles_x_);
   const std::size_t count = size(slab.tiles_u()) * size(slab.tiles_v());
   parallel_for(execution, count, [&](std::size_t index, int worker) {
     const int tu = static_cast<int>(index) % slab.tiles_u();
@@ -227,8 +224,9 @@ Result<void> VdbWriter::add_slab(const VoxelIntervals& slab, const Execution& ex
 
 VdbWriter::LeafColumnArray VdbWriter::leaf_columns(int x, int y, int first_z) const {
   LeafColumnArray columns;
-  for (int c = 0; c < kLowerSide * kLowerSide; ++c) {
-    const int leaf_x = x * kLowerSide + c / kLowerSide, leaf_y = y * kLowerSide + c % kLowerSide;
+  for (int c = 0; c < kLowerLeaves * kLowerLeaves; ++c) {
+    const int leaf_x = x * kLowerLeaves + c / kLowerLeaves,
+              leaf_y = y * kLowerLeaves + c % kLowerLeaves;
     const int tile_x = leaf_x / 8, tile_y = leaf_y / 8;
     if (tile_x >= tiles_x_ || tile_y >= tiles_y_) continue;
     const VdbLeafTile* tile = tiles_[size(tile_y) * size(tiles_x_) + size(tile_x)].get();
@@ -252,14 +250,14 @@ void VdbWriter::count(const Execution& execution) {
     LowerNode* nodes = lower_column(x, y);
     for (const LeafColumn& column : leaf_columns(x, y, 0)) {
       for (std::uint32_t i = column.leaf; i < column.leaf_end; ++i) {
-        ++nodes[column.tile->leaf_z[i] / kLowerSide].leaves;
+        ++nodes[column.tile->leaf_z[i] / kLowerLeaves].leaves;
       }
       for (std::uint32_t i = column.run; i < column.run_end; ++i) {
         const VdbLeafTile::Run run = column.tile->runs[i];
         for (int begin = run.begin; begin < run.end;) {
-          const int end = std::min<int>(run.end, (begin / kLowerSide + 1) * kLowerSide);
-          nodes[begin / kLowerSide].solid += static_cast<std::uint32_t>(end - begin);
-          nodes[begin / kLowerSide].value.add(column.tile->run_value(i));
+          const int end = std::min<int>(run.end, (begin / kLowerLeaves + 1) * kLowerLeaves);
+          nodes[begin / kLowerLeaves].solid += static_cast<std::uint32_t>(end - begin);
+          nodes[begin / kLowerLeaves].value.add(column.tile->run_value(i));
           begin = end;
         }
       }
@@ -279,9 +277,9 @@ void VdbWriter::lay_out() {
   // All topology stands before all buffers.
   const std::size_t topology_blocks = blocks_.size();
   for (std::size_t i = 0; i < topology_blocks; ++i) {
-    if (blocks_[i].kind != Block::kTopology) continue;
+    if (blocks_[i].kind != TreeBlock::kTopology) continue;
     blocks_.push_back(blocks_[i]);
-    blocks_.back().kind = Block::kBuffers;
+    blocks_.back().kind = TreeBlock::kBuffers;
   }
 }
 
@@ -290,7 +288,7 @@ void VdbWriter::lay_out_upper(const glm::ivec3& upper) {
   std::size_t solid = 0;
   OneValue value;
   const std::size_t blocks_before = blocks_.size();
-  blocks_.push_back({Block::kHead, uppers_.size(), 0, 0});
+  blocks_.push_back({TreeBlock::kHead, uppers_.size(), 0, 0});
   for (int x = first.x; x < last.x; ++x) {
     for (int y = first.y; y < last.y; ++y) {
       bool stored = false;
@@ -304,7 +302,7 @@ void VdbWriter::lay_out_upper(const glm::ivec3& upper) {
         stored = true;
         leaves_ += nodes[z].leaves;
       }
-      if (stored) blocks_.push_back({Block::kTopology, uppers_.size(), x, y});
+      if (stored) blocks_.push_back({TreeBlock::kTopology, uppers_.size(), x, y});
     }
   }
   const bool nothing = solid == 0 && blocks_.size() == blocks_before + 1;
@@ -341,7 +339,7 @@ std::string VdbWriter::root() const {
 }
 
 // The origin, two masks of its slots and the values of its tiles.
-void VdbWriter::make_head(const Block& block, Bytes& out) {
+void VdbWriter::make_head(const TreeBlock& block, Bytes& out) {
   const glm::ivec3 upper = uppers_[block.upper].index;
   const glm::ivec3 first = first_lower(upper), last = last_lower(upper);
   std::array<std::uint32_t, kUpperSlots / 32> child{}, active{};  // a word is a column along z
@@ -349,7 +347,7 @@ void VdbWriter::make_head(const Block& block, Bytes& out) {
   for (int x = first.x; x < last.x; ++x) {
     for (int y = first.y; y < last.y; ++y) {
       const LowerNode* nodes = lower_column(x, y);
-      const std::size_t word = size(x - first.x) * kUpperSide + size(y - first.y);
+      const std::size_t word = size(x - first.x) * kUpperLowers + size(y - first.y);
       for (int z = first.z; z < last.z; ++z) {
         const std::uint32_t bit = std::uint32_t{1} << (z - first.z);
         if (nodes[z].stored()) child[word] |= bit;
@@ -370,7 +368,7 @@ void VdbWriter::make_head(const Block& block, Bytes& out) {
   values_.copy(solid, to + 1, values);
 }
 
-void VdbWriter::make_topology(const Block& block, Bytes& out) {
+void VdbWriter::make_topology(const TreeBlock& block, Bytes& out) {
   const glm::ivec3 upper = uppers_[block.upper].index;
   const int z_begin = first_lower(upper).z, z_end = last_lower(upper).z;
   const LowerNode* nodes = lower_column(block.x, block.y);
@@ -385,10 +383,10 @@ void VdbWriter::make_topology(const Block& block, Bytes& out) {
   std::byte* to = out.data();
   const bool with_values = values_.numbers();
   std::vector<std::uint32_t> values;
-  LeafColumnArray columns = leaf_columns(block.x, block.y, z_begin * kLowerSide);
+  LeafColumnArray columns = leaf_columns(block.x, block.y, z_begin * kLowerLeaves);
   for (int z = z_begin; z < z_end; ++z) {
     const bool stored = nodes[z].stored();
-    const int begin = z * kLowerSide, end = begin + kLowerSide;
+    const int begin = z * kLowerLeaves, end = begin + kLowerLeaves;
     std::byte* head = to;
     if (stored) to += kLowerBytes + values_.bytes(nodes[z].solid);
     values.clear();
@@ -429,7 +427,7 @@ void VdbWriter::make_topology(const Block& block, Bytes& out) {
   }
 }
 
-void VdbWriter::make_buffers(const Block& block, Bytes& out) {
+void VdbWriter::make_buffers(const TreeBlock& block, Bytes& out) {
   const glm::ivec3 upper = uppers_[block.upper].index;
   const int z_begin = first_lower(upper).z, z_end = last_lower(upper).z;
   const LowerNode* nodes = lower_column(block.x, block.y);
@@ -440,14 +438,14 @@ void VdbWriter::make_buffers(const Block& block, Bytes& out) {
       values_.numbers() ? sizeof(VdbLeaf) + 1 + values_.bytes(kLeafVoxels) : leaf_buffer_bytes();
   out.resize(leaves * largest);
   std::byte* to = out.data();
-  LeafColumnArray columns = leaf_columns(block.x, block.y, z_begin * kLowerSide);
+  LeafColumnArray columns = leaf_columns(block.x, block.y, z_begin * kLowerLeaves);
   for (int z = z_begin; z < z_end; ++z) {
     if (nodes[z].leaves == 0) continue;
-    const int end = (z + 1) * kLowerSide;
+    const int end = (z + 1) * kLowerLeaves;
     for (std::size_t c = 0; c < kLeafColumns; ++c) {
       LeafColumn& column = columns[c];
-      origin.x = (block.x * kLowerSide + static_cast<int>(c) / kLowerSide) * 8;
-      origin.y = (block.y * kLowerSide + static_cast<int>(c) % kLowerSide) * 8;
+      origin.x = (block.x * kLowerLeaves + static_cast<int>(c) / kLowerLeaves) * 8;
+      origin.y = (block.y * kLowerLeaves + static_cast<int>(c) % kLowerLeaves) * 8;
       for (; column.leaf < column.leaf_end; ++column.leaf) {
         const int leaf_z = column.tile->leaf_z[column.leaf];
         if (leaf_z >= end) break;
@@ -511,23 +509,14 @@ Result<void> VdbWriter::finish_output(const Execution& execution) {
     if (!node.stored()) continue;
     topology_bytes += kLowerBytes + values_.bytes(node.solid) + node.leaves * sizeof(VdbLeaf);
   }
-  const VdbHeader head = header(topology_bytes);
-  const std::string head_bytes = vdb_header_bytes(head) + tree_head;
-  if (Result<void> written = output_.append(head_bytes); !written) return written;
-  const std::uint64_t tree_begin = output_.position() - tree_head.size();
-  Result<void> written =
-      output_.append_blocks(execution, blocks_.size(), [&](std::size_t index, Bytes& out, int) {
-        const Block& block = blocks_[index];
-        if (block.kind == Block::kHead) make_head(block, out);
-        if (block.kind == Block::kTopology) make_topology(block, out);
-        if (block.kind == Block::kBuffers) make_buffers(block, out);
-      });
-  if (!written) return written;
-  if (output_.position() - tree_begin != topology_bytes + head.buffers_bytes) {
-    return fail(ErrorCode::kInternal, "{}: the tree has {} bytes, {} were announced", path(),
-                output_.position() - tree_begin, topology_bytes + head.buffers_bytes);
-  }
-  return output_.commit();
+  const auto make = [&](std::size_t index, Bytes& out, int) {
+    const TreeBlock& block = blocks_[index];
+    if (block.kind == TreeBlock::kHead) make_head(block, out);
+    if (block.kind == TreeBlock::kTopology) make_topology(block, out);
+    if (block.kind == TreeBlock::kBuffers) make_buffers(block, out);
+  };
+  return write_vdb_file(path(), header(topology_bytes), tree_head, blocks_.size(), make, output_,
+                        execution);
 }
 
 }  // namespace
