@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 
 // Colours of 8 bits as sRGB has them (IEC 61966-2-1), and their light, 0 to 1. Means and products
@@ -10,14 +11,22 @@
 
 namespace strata {
 
+/// The light of a value, both 0 to 1.
+[[nodiscard]] inline double linear_of_srgb(double value) {
+  return value <= 0.04045 ? value / 12.92 : std::pow((value + 0.055) / 1.055, 2.4);
+}
+
+/// The value of light, both 0 to 1.
+[[nodiscard]] inline double srgb_of_linear(double light) {
+  return light <= 0.0031308 ? 12.92 * light : 1.055 * std::pow(light, 1.0 / 2.4) - 0.055;
+}
+
 /// The light of each value.
 [[nodiscard]] inline const std::array<float, 256>& linear_light() {
   static const std::array<float, 256> kLight = [] {
     std::array<float, 256> light{};
     for (std::size_t i = 0; i < 256; ++i) {
-      const double value = static_cast<double>(i) / 255.0;
-      light[i] = static_cast<float>(value <= 0.04045 ? value / 12.92
-                                                     : std::pow((value + 0.055) / 1.055, 2.4));
+      light[i] = static_cast<float>(linear_of_srgb(static_cast<double>(i) / 255.0));
     }
     return light;
   }();
@@ -28,17 +37,11 @@ namespace strata {
 class SrgbOfLight {
  public:
   SrgbOfLight() {
-    const auto value_of = [](double light) {
-      return 255.0 *
-             (light <= 0.0031308 ? 12.92 * light : 1.055 * std::pow(light, 1.0 / 2.4) - 0.055);
-    };
     for (std::size_t i = 0; i < 255; ++i) {  // from the middle between two values on
-      const double middle = (static_cast<double>(i) + 0.5) / 255.0;
-      begins_[i] = static_cast<float>(middle <= 0.04045 ? middle / 12.92
-                                                        : std::pow((middle + 0.055) / 1.055, 2.4));
+      begins_[i] = static_cast<float>(linear_of_srgb((static_cast<double>(i) + 0.5) / 255.0));
     }
     for (std::size_t i = 0; i <= kSteps; ++i) {
-      const double value = value_of(static_cast<double>(i) / kSteps);
+      const double value = 255.0 * srgb_of_linear(static_cast<double>(i) / kSteps);
       guess_[i] = static_cast<std::uint8_t>(std::clamp(std::floor(value - 0.5), 0.0, 255.0));
     }
   }

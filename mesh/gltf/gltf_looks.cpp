@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "core/printable.h"
+#include "core/srgb.h"
 #include "mesh/gltf/gltf_shape.h"
 #include "mesh/textures/read_texture.h"
 

@@ -8,6 +8,7 @@
 #include <tuple>
 #include <utility>
 
+#include "core/srgb.h"
 #include "strata/mesh/triangle_soup.h"
 
 namespace strata::detail {
@@ -339,10 +340,6 @@ class ShapeMaker {
 };
 
 }  // namespace
-
-double srgb_of_linear(double light) {
-  return light <= 0.0031308 ? 12.92 * light : 1.055 * std::pow(light, 1 / 2.4) - 0.055;
-}
 
 GltfShape make_shape(const GltfDocument& document, GltfData& data, std::uint32_t mesh,
                      std::span<const double> weights, bool looks) {

@@ -43,7 +43,4 @@ struct GltfShape {
 GltfShape make_shape(const GltfDocument& document, GltfData& data, std::uint32_t mesh,
                      std::span<const double> weights, bool looks);
 
-/// A share of linear light as sRGB, both in [0, 1].
-[[nodiscard]] double srgb_of_linear(double light);
-
 }  // namespace strata::detail

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <glm/vec3.hpp>
 
+#include "core/srgb.h"
+
 namespace strata {
 namespace {
 
@@ -25,9 +27,8 @@ Rgba from_oklch(double lightness, double chroma, double hue) {
                             -0.0041960863 * l - 0.7034186147 * m + 1.7076147010 * s};
   Rgba colour(0, 0, 0, 255);
   for (int i = 0; i < 3; ++i) {
-    const double x = std::clamp(linear[i], 0.0, 1.0);
-    const double y = x <= 0.0031308 ? 12.92 * x : 1.055 * std::pow(x, 1 / 2.4) - 0.055;
-    colour[i] = static_cast<std::uint8_t>(std::lround(y * 255));
+    const double value = srgb_of_linear(std::clamp(linear[i], 0.0, 1.0));
+    colour[i] = static_cast<std::uint8_t>(std::lround(value * 255));
   }
   return colour;
 }
