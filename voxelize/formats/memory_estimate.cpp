@@ -56,17 +56,22 @@ double bin_bytes(const VoxelGrid& grid, const MemoryFactors& factors, double are
 
 constexpr double kWorkerBytes = 6e6;
 
+/// What a slab is planned to take.
+double slab_budget(const MemoryFactors& factors) {
+  constexpr double kDefaultSlab = 512.0 * 1024 * 1024;
+  return factors.limit > 0 ? std::min(kDefaultSlab, static_cast<double>(factors.limit) / 8)
+                           : kDefaultSlab;
+}
+
 /// Fractions: offsets of columns, and intervals with labels, of a slab or all. A surface of area A
 /// meets about 1.5 A voxels, which are an interval each, held twice.
 double covered_bytes(const VoxelGrid& grid, const MemoryFactors& factors, double area) {
   const double fine = std::max(factors.rays, 1);
   const double columns_there = columns(grid, factors.axis) / (fine * fine);
   const AxisFrame frame(factors.axis);
-  const double budget = factors.limit > 0
-                            ? std::min(512.0 * 1024 * 1024, static_cast<double>(factors.limit) / 8)
-                            : 512.0 * 1024 * 1024;
   const double all = columns_there * 8 + 1.5 * area / (fine * fine) * 16;
-  const double rows = std::max(64.0, budget / (129.0 / (fine * fine) * fine * grid.dims[frame.u]));
+  const double rows =
+      std::max(64.0, slab_budget(factors) / (129.0 / (fine * fine) * fine * grid.dims[frame.u]));
   const double part = std::min(1.0, 2 * rows * fine / grid.dims[frame.v]);
   const double changes = 64.0 / fine * grid.dims[frame.w] / fine * 4;
   return all * part + (kWorkerBytes + changes) * factors.threads;
@@ -77,15 +82,12 @@ double covered_bytes(const VoxelGrid& grid, const MemoryFactors& factors, double
 /// surface. Slabs keep to an eighth of the limit by 16 bytes a column, but hold 64 rows at least
 /// (see voxelize_slabs).
 double slab_bytes(const VoxelGrid& grid, const MemoryFactors& factors, double area) {
-  constexpr double kPlannedBytes = 16, kDefaultSlab = 512.0 * 1024 * 1024;
+  constexpr double kPlannedBytes = 16;
   const AxisFrame frame(factors.axis);
   if (factors.rays > 0) return covered_bytes(grid, factors, area);
   const double planned = columns(grid, factors.axis) * kPlannedBytes;
   const double least = 64.0 * std::max(factors.samples, 1) * grid.dims[frame.u] * kPlannedBytes;
-  const double budget = factors.limit > 0
-                            ? std::min(kDefaultSlab, static_cast<double>(factors.limit) / 8)
-                            : kDefaultSlab;
-  const double share = std::min(1.0, std::max(least, budget) / planned);
+  const double share = std::min(1.0, std::max(least, slab_budget(factors)) / planned);
   const double runs = area * ((factors.solid ? 0.25 : 0.0) + (factors.surface ? 0.5 : 0.0));
   // Measured: 1.5 bytes a column, 5.5 a run.
   constexpr double kColumnBytes = 2, kRunBytes = 7, kLabelBytes = 4, kThreadBytes = 4e6;
