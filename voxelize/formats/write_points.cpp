@@ -73,7 +73,7 @@ class PointWriter final : public SlabWriter {
   }
 
   Result<void> add_slab(const VoxelIntervals& slab, const Execution& execution) override {
-    points_ += slab.solid_voxels();
+    if (!text_) points_ += slab.solid_voxels();
     const auto make = [&](std::size_t index, Bytes& out, int) {
       out.clear();
       const int z = slab.v_begin() + static_cast<int>(index);
@@ -139,8 +139,8 @@ class PointWriter final : public SlabWriter {
   glm::dmat3 direction_;
   bool doubles_ = false;
   BlockOutput output_;
-  std::uint64_t points_ = 0;
-  Bytes kept_;  // for a pipe
+  std::uint64_t points_ = 0;  // not of text
+  Bytes kept_;                // for a pipe
 };
 
 VoxelWriterResult open_point_writer(const std::string& path, const VoxelGrid& grid,

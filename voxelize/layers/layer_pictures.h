@@ -24,7 +24,6 @@ class LayerPictures {
   [[nodiscard]] bool needs_all() const { return layer_ != 2; }
   [[nodiscard]] int count() const { return dims_[layer_]; }
   [[nodiscard]] glm::ivec2 size() const { return size_; }
-  [[nodiscard]] const DenseValues& values() const { return values_; }
   /// Members of slices.json that say where a voxel is.
   [[nodiscard]] std::string description() const;
 

@@ -57,7 +57,6 @@ WorldAxes world_axes(const VoxelGrid& grid, const GridFrame& frame, std::string_
     axes.steps[axis] = axes.direction[axis] * grid.voxel_size[axis] + 0.0;  // no -0
   }
   axes.centre = axes.direction * (grid.origin + 0.5 * grid.voxel_size);
-  axes.corner = axes.direction * grid.origin;
   return axes;
 }
 

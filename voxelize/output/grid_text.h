@@ -13,7 +13,6 @@ struct WorldAxes {
   glm::dmat3 direction{1.0};  ///< columns: of length 1
   glm::dmat3 steps{1.0};      ///< columns: from a voxel to the next along x, y, z
   glm::dvec3 centre{0.0};     ///< of voxel (0, 0, 0)
-  glm::dvec3 corner{0.0};     ///< its lower corner
 };
 
 /// @param space  names of the format's own axes, such as "right-anterior-superior": the axes are

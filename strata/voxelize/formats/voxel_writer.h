@@ -17,8 +17,7 @@ namespace strata {
 
 /// One output format of `strata voxelize`.
 struct VoxelFormat {
-  std::string name;  ///< what --format takes: "vdb", "npy", "npz", "nrrd", "vti", "binvox", "vox",
-                     ///< "png", "sl1", "zarr"
+  std::string name;         ///< what --format takes, such as "vdb"
   std::string extension;    ///< with the dot; that of a folder format ends with a slash
   std::string description;  ///< one line for --list-formats
   std::string also = {};    ///< another extension of the format; empty: none
