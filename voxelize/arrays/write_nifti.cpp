@@ -3,6 +3,7 @@
 // place the grid; srow is the centre of the first voxel. Ids beyond 16 bits are int32, since many
 // programs do not know uint32.
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>

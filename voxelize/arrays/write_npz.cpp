@@ -10,12 +10,9 @@
 
 #include <zlib.h>
 
-#include <array>
 #include <bit>
-#include <cstring>
 #include <memory>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -23,7 +20,6 @@
 #include "voxelize/arrays/npy_voxels.h"
 #include "voxelize/output/block_output.h"
 #include "voxelize/output/deflated_layers.h"
-#include "voxelize/output/dense_rows.h"
 #include "voxelize/output/slab_writer.h"
 #include "voxelize/output/writers.h"
 #include "voxelize/output/zip_records.h"

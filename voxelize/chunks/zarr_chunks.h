@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "voxelize/output/dense_rows.h"
+#include "voxelize/output/dense_values.h"
 #include "voxelize/output/folder_output.h"
 
 namespace strata {

@@ -16,7 +16,6 @@
 #include <glm/common.hpp>
 #include <memory>
 #include <new>
-#include <span>
 #include <string>
 #include <utility>
 #include <vector>

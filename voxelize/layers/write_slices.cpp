@@ -2,6 +2,7 @@
 // is the greatest y, so that a picture shows the layer as seen from above (+z), upright and not
 // mirrored.
 
+#include <algorithm>
 #include <memory>
 #include <utility>
 

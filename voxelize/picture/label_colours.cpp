@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <glm/vec3.hpp>
 
 #include "core/srgb.h"
 
