@@ -326,15 +326,16 @@ Result<void> check_band(double band) {
 using FieldAt = std::function<std::pair<ScalarField*, int>(int z)>;
 using LayersDone = std::function<Result<void>(int z)>;
 
-/// False for an open mesh of which only the surface is to be kept.
-bool has_inside(const TriangleSoup& mesh, const VoxelizeOptions& options,
-                const Execution& execution) {
+/// False for an open mesh of which only the surface is to be kept. If that has to be found out,
+/// `options` say it from then on, so that voxelize_slabs() does not look again.
+bool has_inside(const TriangleSoup& mesh, VoxelizeOptions& options, const Execution& execution) {
   if (options.open != OpenMode::kSurface || options.filter != nullptr) return true;
-  if (options.closedness != Closedness::kCheck) {
-    return options.closedness == Closedness::kAssumeClosed;
+  if (options.closedness == Closedness::kCheck) {
+    const bool closed = is_closed(mesh, execution) ||
+                        (options.rule == InsideRule::kParity && diagnose(mesh, execution).even);
+    options.closedness = closed ? Closedness::kAssumeClosed : Closedness::kAssumeOpen;
   }
-  return is_closed(mesh, execution) ||
-         (options.rule == InsideRule::kParity && diagnose(mesh, execution).even);
+  return options.closedness == Closedness::kAssumeClosed;
 }
 
 /// As voxelize_slabs() where no voxel is solid.
