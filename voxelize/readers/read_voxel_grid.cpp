@@ -12,12 +12,8 @@
 #include "mesh/text/input_bytes.h"
 #include "strata/voxelize/readers/read_voxels.h"
 #include "voxelize/heads/grid_axes.h"
-#include "voxelize/heads/metaimage_head.h"
-#include "voxelize/heads/nifti_head.h"
-#include "voxelize/heads/nrrd_head.h"
 #include "voxelize/readers/readers.h"
 #include "voxelize/scans/scan_readers.h"
-#include "voxelize/volume/inflate_stream.h"
 #include "voxelize/volume/json_text.h"
 
 namespace strata {
@@ -93,40 +89,6 @@ Result<VoxelFileGrid> npy_file_grid(ReadContext& context) {
   const auto json = read_json_file(beside, context.execution);
   if (!json) return tl::unexpected(json.error());
   return grid_of_json(*json, *sizes, beside);
-}
-
-Result<VoxelFileGrid> nifti_file_grid(ReadContext& context) {
-  std::string head(context.bytes.substr(0, kNiftiHeadBytes));
-  if (head.starts_with("\x1f\x8b")) {
-    std::string unpacked(348, '\0');
-    InflateStream stream(context.bytes, InflateStream::kGzip, context.path);
-    const auto read = [&](std::size_t from) {
-      return stream.read(reinterpret_cast<std::byte*>(unpacked.data()) + from,
-                         unpacked.size() - from);
-    };
-    if (auto done = read(0); !done) return tl::unexpected(done.error());
-    const bool second = unpacked.compare(4, 3, "n+2") == 0 || unpacked.compare(4, 3, "ni2") == 0;
-    if (second) {
-      unpacked.resize(540);
-      if (auto done = read(348); !done) return tl::unexpected(done.error());
-    }
-    head = std::move(unpacked);
-  }
-  const auto parsed = parse_nifti_head(head, context.path);
-  if (!parsed) return tl::unexpected(parsed.error());
-  return nifti_grid(*parsed, context.path);
-}
-
-Result<VoxelFileGrid> metaimage_file_grid(ReadContext& context) {
-  const auto head = parse_metaimage_head(context.bytes, context.path);
-  if (!head) return tl::unexpected(head.error());
-  return metaimage_grid(*head, context.path);
-}
-
-Result<VoxelFileGrid> nrrd_file_grid(ReadContext& context) {
-  const auto head = parse_nrrd_head(context.bytes, context.path);
-  if (!head) return tl::unexpected(head.error());
-  return nrrd_grid(*head, context.path);
 }
 
 /// Scale and translation of OME-Zarr 0.4, of one axis after the other.

@@ -51,4 +51,10 @@ Result<VoxelVolume> read_metaimage_voxels(ReadContext& context) {
   return volume;
 }
 
+Result<VoxelFileGrid> metaimage_file_grid(ReadContext& context) {
+  const auto head = parse_metaimage_head(context.bytes, context.path);
+  if (!head) return tl::unexpected(head.error());
+  return metaimage_grid(*head, context.path);
+}
+
 }  // namespace strata

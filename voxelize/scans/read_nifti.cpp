@@ -118,4 +118,12 @@ Result<VoxelVolume> read_nifti_voxels(ReadContext& context) {
   return volume;
 }
 
+Result<VoxelFileGrid> nifti_file_grid(ReadContext& context) {
+  NiftiBytes bytes(context);
+  std::uint64_t read = 0;
+  const auto head = read_head(context, bytes, read);
+  if (!head) return tl::unexpected(head.error());
+  return nifti_grid(*head, context.path);
+}
+
 }  // namespace strata

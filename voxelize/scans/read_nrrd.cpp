@@ -250,12 +250,12 @@ Result<VoxelVolume> read_raw_voxels(ReadContext& context) {
   return with_head(context, read_nrrd_voxels);
 }
 
-Result<VoxelFileGrid> raw_grid(ReadContext& context) {
-  return with_head(context, [](ReadContext& beside) -> Result<VoxelFileGrid> {
-    const auto head = parse_nrrd_head(beside.bytes, beside.path);
-    if (!head) return tl::unexpected(head.error());
-    return nrrd_grid(*head, beside.path);
-  });
+Result<VoxelFileGrid> nrrd_file_grid(ReadContext& context) {
+  const auto head = parse_nrrd_head(context.bytes, context.path);
+  if (!head) return tl::unexpected(head.error());
+  return nrrd_grid(*head, context.path);
 }
+
+Result<VoxelFileGrid> raw_grid(ReadContext& context) { return with_head(context, nrrd_file_grid); }
 
 }  // namespace strata

@@ -19,7 +19,10 @@ Result<VoxelVolume> read_tiff_voxels(ReadContext& context);
 Result<VoxelVolume> read_hdf5_voxels(ReadContext& context);  ///< of the file context.path
 
 /// Where the voxels of a file lie, from its head: see read_voxel_grid().
+Result<VoxelFileGrid> nrrd_file_grid(ReadContext& context);
 Result<VoxelFileGrid> raw_grid(ReadContext& context);
+Result<VoxelFileGrid> nifti_file_grid(ReadContext& context);
+Result<VoxelFileGrid> metaimage_file_grid(ReadContext& context);
 Result<VoxelFileGrid> tiff_grid(ReadContext& context);
 Result<VoxelFileGrid> hdf5_grid(ReadContext& context);
 
