@@ -363,10 +363,6 @@ Result<ScalarField> read_field(ReadContext& context, const ZarrHead& head) {
   return field;
 }
 
-}  // namespace
-
-namespace {
-
 Result<VoxelVolume> read_array(ReadContext& context, const std::string& folder, bool ome) {
   const Result<ZarrHead> head = read_head(context, folder, ome);
   if (!head) return tl::unexpected(head.error());
@@ -378,13 +374,8 @@ Result<VoxelVolume> read_array(ReadContext& context, const std::string& folder, 
     Result<VoxelIntervals> set = read_runs(context, *head);
     if (!set) return tl::unexpected(set.error());
     volume.set = std::move(*set);
-    if (head->type != NumberType::kBool) {
-      volume.kind = VoxelKind::kIds;
-      settle_ids(volume, head->type == NumberType::kU8 ? 255 : 1);
-      if (head->type == NumberType::kU8 && !context.colours && are_fractions(context, volume)) {
-        context.wants_values = true;
-        return fail(ErrorCode::kInput, "{}: filled fractions are no ids", context.path);
-      }
+    if (auto settled = settle_integers(context, volume, head->type); !settled) {
+      return tl::unexpected(settled.error());
     }
   } else {
     Result<ScalarField> field = read_field(context, *head);

@@ -186,13 +186,8 @@ Result<VoxelVolume> IdReader::read() {
   if (context_.stopped()) return context_.cancelled();
   VoxelVolume volume;
   volume.set = std::move(set_);
-  if (layout_.type != NumberType::kBool) {
-    volume.kind = VoxelKind::kIds;
-    settle_ids(volume, layout_.type == NumberType::kU8 ? 255 : 1);
-    if (layout_.type == NumberType::kU8 && !context_.colours && are_fractions(context_, volume)) {
-      context_.wants_values = true;
-      return fail(ErrorCode::kInput, "{}: filled fractions are no ids", context_.path);
-    }
+  if (auto settled = settle_integers(context_, volume, layout_.type); !settled) {
+    return tl::unexpected(settled.error());
   }
   return volume;
 }

@@ -75,6 +75,9 @@ void settle_ids(VoxelVolume& volume, std::uint32_t largest_of_type);
 /// Whether ids of 8 bits are rather filled fractions: 255 is more frequent than any other, and
 /// there are others. Not where the user said that they are ids.
 [[nodiscard]] bool are_fractions(const ReadContext& context, const VoxelVolume& volume);
+/// The kind of a volume of ids or, with NumberType::kBool, of a mask. @return kInput, with
+/// ReadContext::wants_values, if they are rather filled fractions
+Result<void> settle_integers(ReadContext& context, VoxelVolume& volume, NumberType type);
 /// Makes labels of 8 bits the values of voxels, and settles these. @return kLimit, kCancelled
 Result<void> labels_to_values(ReadContext& context, VoxelVolume& volume,
                               const std::array<float, 256>& value_of_label);

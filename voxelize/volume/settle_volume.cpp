@@ -112,6 +112,15 @@ bool are_fractions(const ReadContext& context, const VoxelVolume& volume) {
   return most > 0 && voxels[kFull] > most;
 }
 
+Result<void> settle_integers(ReadContext& context, VoxelVolume& volume, NumberType type) {
+  if (type == NumberType::kBool) return {};
+  volume.kind = VoxelKind::kIds;
+  settle_ids(volume, type == NumberType::kU8 ? 255 : 1);
+  if (type != NumberType::kU8 || context.colours || !are_fractions(context, volume)) return {};
+  context.wants_values = true;
+  return fail(ErrorCode::kInput, "{}: filled fractions are no ids", context.path);
+}
+
 Result<void> labels_to_values(ReadContext& context, VoxelVolume& volume,
                               const std::array<float, 256>& value_of_label) {
   const VoxelGrid grid = volume.grid();
