@@ -13,6 +13,7 @@
 
 #include "voxelize/heads/grid_axes.h"
 #include "voxelize/readers/readers.h"
+#include "voxelize/scans/scan_readers.h"
 #include "voxelize/volume/dense_array.h"
 #include "voxelize/volume/inflate_stream.h"
 #include "voxelize/volume/zip_directory.h"
@@ -273,13 +274,9 @@ Result<VoxelVolume> read_npy_voxels(ReadContext& context) {
   if (!head) return tl::unexpected(head.error());
   const Result<DenseLayout> layout = layout_of(context, *head);
   if (!layout) return tl::unexpected(layout.error());
-  if (context.bytes.size() - head->bytes < layout->bytes()) {
-    return fail(ErrorCode::kInput, "{}: {} bytes of voxels; {} x {} x {} of type {} need {}",
-                context.path, context.bytes.size() - head->bytes, layout->grid.dims.x,
-                layout->grid.dims.y, layout->grid.dims.z, name_of(layout->type), layout->bytes());
-  }
-  Result<VoxelVolume> volume =
-      read_dense(context, *layout, {context.bytes.substr(head->bytes, layout->bytes()), {}});
+  const auto all = voxel_bytes(context, context.bytes, head->bytes, *layout);
+  if (!all) return tl::unexpected(all.error());
+  Result<VoxelVolume> volume = read_dense(context, *layout, {*all, {}});
   if (!volume) return volume;
   volume->placed = false;
   return volume;
