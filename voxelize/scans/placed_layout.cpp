@@ -38,6 +38,15 @@ Result<PlacedLayout> placed_layout(const ReadContext& context, const GridAxes& a
   return placed;
 }
 
+Result<VoxelVolume> read_placed(ReadContext& context, const PlacedLayout& placed,
+                                const DenseData& data, bool is_placed) {
+  Result<VoxelVolume> volume = read_dense(context, placed.layout, data);
+  if (!volume) return volume;
+  volume->placed = is_placed;
+  if (!placed.note.empty()) volume->notes.push_back(placed.note);
+  return volume;
+}
+
 Result<detail::InputBytes> open_data_file(const ReadContext& context, const std::string& name) {
   if (name.empty() || name.find('/') != std::string::npos || name == "..") {
     return fail(ErrorCode::kInput,

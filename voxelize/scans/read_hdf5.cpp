@@ -323,13 +323,9 @@ Result<VoxelVolume> read_hdf5_voxels(ReadContext& context) {
   context.colours = file.array.colours;
   Hdf5Layers layers(context, file.array);
   if (auto begun = layers.begin(); !begun) return tl::unexpected(begun.error());
-  Result<VoxelVolume> volume =
-      read_dense(context, placed->layout,
-                 {{}, [&](std::byte* to, std::size_t bytes) { return layers.read(to, bytes); }});
-  if (!volume) return volume;
-  volume->placed = place.placed;
-  if (!placed->note.empty()) volume->notes.push_back(placed->note);
-  return volume;
+  return read_placed(context, *placed,
+                     {{}, [&](std::byte* to, std::size_t bytes) { return layers.read(to, bytes); }},
+                     place.placed);
 }
 
 Result<VoxelFileGrid> hdf5_grid(ReadContext& context) {

@@ -31,24 +31,19 @@ Result<VoxelVolume> read_metaimage_voxels(ReadContext& context) {
     beside = std::move(*opened);
     data = beside->view();
   }
-  Result<VoxelVolume> volume = VoxelVolume{};
   if (head->compressed) {
     InflateStream stream(data, InflateStream::kZlib, context.path);
-    volume =
-        read_dense(context, layout,
-                   {{}, [&](std::byte* to, std::size_t bytes) { return stream.read(to, bytes); }});
-  } else {
-    const std::uint64_t at = head->skip >= 0                ? static_cast<std::uint64_t>(head->skip)
-                             : data.size() > layout.bytes() ? data.size() - layout.bytes()
-                                                            : 0;
-    const auto all = voxel_bytes(context, data, at, layout);
-    if (!all) return tl::unexpected(all.error());
-    volume = read_dense(context, layout, {*all, {}});
+    return read_placed(
+        context, *placed,
+        {{}, [&](std::byte* to, std::size_t bytes) { return stream.read(to, bytes); }},
+        head->placed);
   }
-  if (!volume) return volume;
-  volume->placed = head->placed;
-  if (!placed->note.empty()) volume->notes.push_back(placed->note);
-  return volume;
+  const std::uint64_t at = head->skip >= 0                ? static_cast<std::uint64_t>(head->skip)
+                           : data.size() > layout.bytes() ? data.size() - layout.bytes()
+                                                          : 0;
+  const auto all = voxel_bytes(context, data, at, layout);
+  if (!all) return tl::unexpected(all.error());
+  return read_placed(context, *placed, {*all, {}}, head->placed);
 }
 
 Result<VoxelFileGrid> metaimage_file_grid(ReadContext& context) {

@@ -111,11 +111,7 @@ Result<VoxelVolume> read_nifti_voxels(ReadContext& context) {
       return {};
     };
   }
-  Result<VoxelVolume> volume = read_dense(context, layout, data);
-  if (!volume) return volume;
-  volume->placed = head->placed;
-  if (!placed->note.empty()) volume->notes.push_back(placed->note);
-  return volume;
+  return read_placed(context, *placed, data, head->placed);
 }
 
 Result<VoxelFileGrid> nifti_file_grid(ReadContext& context) {

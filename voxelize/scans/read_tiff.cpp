@@ -65,13 +65,9 @@ Result<VoxelVolume> read_tiff_voxels(ReadContext& context) {
   placed->layout.type = file->type;
   placed->layout.big_endian = file->big_endian;
   StripBytes strips(context, *file);
-  Result<VoxelVolume> volume =
-      read_dense(context, placed->layout,
-                 {{}, [&](std::byte* to, std::size_t bytes) { return strips.read(to, bytes); }});
-  if (!volume) return volume;
-  volume->placed = file->placed;
-  if (!placed->note.empty()) volume->notes.push_back(placed->note);
-  return volume;
+  return read_placed(context, *placed,
+                     {{}, [&](std::byte* to, std::size_t bytes) { return strips.read(to, bytes); }},
+                     file->placed);
 }
 
 Result<VoxelFileGrid> tiff_grid(ReadContext& context) {

@@ -34,6 +34,10 @@ struct PlacedLayout {
 };
 Result<PlacedLayout> placed_layout(const ReadContext& context, const GridAxes& axes);
 
+/// read_dense(), with the note. @param is_placed  whether the file says where its voxels lie
+Result<VoxelVolume> read_placed(ReadContext& context, const PlacedLayout& placed,
+                                const DenseData& data, bool is_placed);
+
 /// A file of voxels that a head names. @return kInput: it is not in the folder of the head
 Result<detail::InputBytes> open_data_file(const ReadContext& context, const std::string& name);
 
