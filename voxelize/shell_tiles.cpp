@@ -14,14 +14,6 @@ struct Reference {
   std::uint32_t tile, triangle;
 };
 
-// The voxels along an axis that are no farther than `margin` lattice steps from the triangle's box.
-Range bounds_with(const Triangle& t, int axis, int margin) {
-  const auto index = static_cast<std::size_t>(axis);
-  const auto [low, high] = std::minmax({t[0][index], t[1][index], t[2][index]});
-  return {static_cast<std::int32_t>((low - 1 - margin) >> kLatticeBits),
-          static_cast<std::int32_t>((high + margin) >> kLatticeBits)};
-}
-
 // The tiles along u that the triangle meets in rows of tiles v0..v1.
 std::vector<Range> tile_rows(const Triangle& t, int v0, int v1, int margin) {
   const int more = margin > 0 ? 1 : 0;
@@ -39,8 +31,8 @@ std::vector<Range> tile_rows(const Triangle& t, int v0, int v1, int margin) {
 
 void bin_triangle(const Triangle& t, std::uint32_t index, const VoxelIntervals& slab, int depth,
                   int margin, std::vector<Reference>& out) {
-  const Range u = bounds_with(t, 0, margin), v = bounds_with(t, 1, margin);
-  const Range w = bounds_with(t, 2, margin);
+  const Range u = voxel_bounds(t, 0, margin), v = voxel_bounds(t, 1, margin);
+  const Range w = voxel_bounds(t, 2, margin);
   if (u.last < 0 || u.first >= slab.columns() || v.last < slab.v_begin() ||
       v.first >= slab.v_end() || w.last < 0 || w.first >= depth) {
     return;

@@ -93,11 +93,13 @@ void strip_ranges(const Triangle& triangle, int a, int b, int bits, int begin, i
   return cross(subtract(t[1], t[0]), subtract(t[2], t[0]));
 }
 
-/// The voxels touched along axis `axis` by the triangle's box; closed boxes touch.
-[[nodiscard]] inline Range voxel_bounds(const Triangle& t, int axis, int bits = kLatticeBits) {
+/// The voxels along axis `axis` that are no farther than `margin` lattice steps from the triangle's
+/// box; closed boxes touch.
+[[nodiscard]] inline Range voxel_bounds(const Triangle& t, int axis, int margin = 0) {
   const auto index = static_cast<std::size_t>(axis);
   const auto [low, high] = std::minmax({t[0][index], t[1][index], t[2][index]});
-  return {static_cast<std::int32_t>((low - 1) >> bits), static_cast<std::int32_t>(high >> bits)};
+  return {static_cast<std::int32_t>((low - 1 - margin) >> kLatticeBits),
+          static_cast<std::int32_t>((high + margin) >> kLatticeBits)};
 }
 
 /// Calls run(u, v, first, last) once for every column of the window in which the closed triangle
