@@ -6,6 +6,7 @@
 #include <glm/vec3.hpp>
 
 #include "core/srgb.h"
+#include "strata/voxelize/packed_colour.h"
 #include "voxelize/output/oklab.h"
 
 namespace strata {
@@ -122,10 +123,7 @@ Palette ColourCounts::palette(std::size_t most, const Execution& execution) cons
   Palette palette;
   if (exact_.size() <= most) {
     palette.exact_ = exact_;
-    for (const std::uint32_t colour : exact_) {
-      palette.colours_.emplace_back(colour & 0xff, colour >> 8 & 0xff, colour >> 16 & 0xff,
-                                    colour >> 24);
-    }
+    for (const std::uint32_t colour : exact_) palette.colours_.push_back(unpacked_colour(colour));
     return palette;
   }
   std::vector<Shade> shades;

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "strata/voxelize/packed_colour.h"
 #include "voxelize/volume/dense_array.h"
 
 namespace strata {
@@ -188,10 +189,7 @@ void settle_colours(VoxelVolume& volume) {
     set.set_tile(tu, tv, offsets, items, labels);
   });
   volume.colours.clear();
-  for (const std::uint32_t colour : colours) {
-    volume.colours.emplace_back(colour & 0xff, colour >> 8 & 0xff, colour >> 16 & 0xff,
-                                colour >> 24);
-  }
+  for (const std::uint32_t colour : colours) volume.colours.push_back(unpacked_colour(colour));
   volume.kind = VoxelKind::kColours;
 }
 
