@@ -28,6 +28,7 @@ struct Hdf5Array {
   std::size_t first = 0;  ///< of the axes z, y, x
   bool colours = false;   ///< another axis follows: red, green, blue, alpha
   NumberType type = NumberType::kU8;
+  hsize_t chunk_layers = 1;  ///< along the first axis; 1 where there are no chunks
 };
 
 /// The type of numbers in memory. @return false if they are not
@@ -91,8 +92,8 @@ struct Hdf5File {
   }
 };
 
-/// What would read other files, or take more memory than it may.
-Result<void> check_hdf5_storage(ReadContext& context, const Hdf5Array& array) {
+/// Refuses what would read other files, or take more memory than it may; sets chunk_layers.
+Result<void> check_hdf5_storage(ReadContext& context, Hdf5Array& array) {
   const Hdf5Handle properties(H5Dget_create_plist(*array.dataset), H5Pclose);
   const H5D_layout_t layout = H5Pget_layout(*properties);
   if (layout == H5D_VIRTUAL || H5Pget_external_count(*properties) > 0) {
@@ -119,6 +120,7 @@ Result<void> check_hdf5_storage(ReadContext& context, const Hdf5Array& array) {
   for (int axis = 0; axis < rank; ++axis) {
     bytes *= static_cast<double>(chunk[static_cast<std::size_t>(axis)]);
   }
+  array.chunk_layers = chunk[array.first];
   if (bytes > static_cast<double>(context.budget.limit()) ||
       !context.budget.take(static_cast<std::uint64_t>(bytes))) {
     return context.too_large("a chunk");
@@ -250,17 +252,7 @@ class Hdf5Layers {
 
   /// Memory for a few layers: those of a chunk, if it is not too much.
   Result<void> begin() {
-    hsize_t deep = 1;
-    {
-      const Hdf5Session session;
-      const Hdf5Handle properties(H5Dget_create_plist(*array_.dataset), H5Pclose);
-      std::array<hsize_t, kHdf5MostAxes> chunk{};
-      if (H5Pget_layout(*properties) == H5D_CHUNKED &&
-          H5Pget_chunk(*properties, kHdf5MostAxes, chunk.data()) > 0) {
-        deep = chunk[array_.first];
-      }
-    }
-    deep = std::clamp<hsize_t>(deep, 1, layers_);
+    const hsize_t deep = std::clamp<hsize_t>(array_.chunk_layers, 1, layers_);
     deep_ = std::clamp<hsize_t>(kHdf5BufferBytes / layer_, 1, deep);
     if (!context_.budget.take(deep_ * layer_)) return context_.too_large("a layer");
     buffer_.resize(deep_ * layer_);
