@@ -12,7 +12,6 @@
 #include "voxelize/readers/readers.h"
 #include "voxelize/volume/dense_array.h"
 #include "voxelize/volume/grey_png.h"
-#include "voxelize/volume/json_text.h"
 #include "voxelize/volume/tile_runs.h"
 
 namespace strata {
@@ -34,9 +33,7 @@ struct SliceFolder {
 
 Result<SliceFolder> read_description(const ReadContext& context) {
   const std::string path = context.path + "/slices.json";
-  const auto file = detail::InputBytes::open(path, context.execution.memory_limit);
-  if (!file) return tl::unexpected(file.error());
-  const Result<JsonValue> json = parse_json(file->view(), path);
+  const Result<JsonValue> json = read_json_file(path, context.execution);
   if (!json) return tl::unexpected(json.error());
   SliceFolder folder;
   const auto dims = json->numbers("dims", 3), origin = json->numbers("origin", 3);

@@ -1,6 +1,5 @@
 #include "strata/voxelize/readers/read_voxel_grid.h"
 
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -14,18 +13,11 @@
 #include "voxelize/heads/grid_axes.h"
 #include "voxelize/readers/readers.h"
 #include "voxelize/scans/scan_readers.h"
-#include "voxelize/volume/json_text.h"
 
 namespace strata {
 namespace {
 
 bool is_there(const std::string& path) { return ::access(path.c_str(), F_OK) == 0; }
-
-Result<JsonValue> read_json_file(const std::string& path, const Execution& execution) {
-  const auto file = detail::InputBytes::open(path, execution.memory_limit, execution.stop);
-  if (!file) return tl::unexpected(file.error());
-  return parse_json(file->view(), path);
-}
 
 /// Three numbers. @return kInput if the member is there and is not that
 Result<std::optional<glm::dvec3>> vector_of(const JsonValue& json, std::string_view name,
@@ -114,6 +106,17 @@ void add_transforms(const JsonValue* list, OmePlace& place) {
   }
 }
 
+/// `shape` of a .zarray, as far as it is one.
+Result<std::vector<double>> zarr_shape(const std::string& array, const Execution& execution) {
+  const auto json = read_json_file(array, execution);
+  if (!json) return tl::unexpected(json.error());
+  std::vector<double> shape;
+  if (const JsonValue* list = json->find("shape")) {
+    for (const JsonValue& item : list->items) shape.push_back(item.number);
+  }
+  return shape;
+}
+
 /// @param shape  of the array; empty: it is in the first data set of the group
 Result<VoxelFileGrid> ome_grid(const std::string& folder, const JsonValue& attributes,
                                std::vector<double> shape, const Execution& execution) {
@@ -131,12 +134,10 @@ Result<VoxelFileGrid> ome_grid(const std::string& folder, const JsonValue& attri
   const JsonValue& first = sets->items.front();
   if (shape.empty()) {
     const JsonValue* name = first.find("path");
-    const std::string array = folder + "/" + (name == nullptr ? "0" : name->text) + "/.zarray";
-    const auto json = read_json_file(array, execution);
-    if (!json) return tl::unexpected(json.error());
-    if (const JsonValue* list = json->find("shape")) {
-      for (const JsonValue& item : list->items) shape.push_back(item.number);
-    }
+    auto found =
+        zarr_shape(folder + "/" + (name == nullptr ? "0" : name->text) + "/.zarray", execution);
+    if (!found) return tl::unexpected(found.error());
+    shape = *std::move(found);
   }
   OmePlace place{std::vector<double>(axes->items.size(), 1.0),
                  std::vector<double>(axes->items.size(), 0.0)};
@@ -172,11 +173,9 @@ Result<VoxelFileGrid> zarr_file_grid(ReadContext& context) {
   const std::string attributes = context.path + "/.zattrs", array = context.path + "/.zarray";
   std::vector<double> shape;
   if (is_there(array)) {
-    const auto json = read_json_file(array, context.execution);
-    if (!json) return tl::unexpected(json.error());
-    if (const JsonValue* list = json->find("shape")) {
-      for (const JsonValue& item : list->items) shape.push_back(item.number);
-    }
+    auto found = zarr_shape(array, context.execution);
+    if (!found) return tl::unexpected(found.error());
+    shape = *std::move(found);
     if (shape.empty()) return fail(ErrorCode::kInput, "{}: shape is missing", array);
   }
   if (!is_there(attributes)) {
@@ -238,18 +237,13 @@ GridReader reader_of(const std::string& path) {
   return nullptr;
 }
 
-bool is_a_folder(const std::string& path) {
-  struct stat status = {};
-  return ::stat(path.c_str(), &status) == 0 && S_ISDIR(status.st_mode);
-}
-
 }  // namespace
 
 Result<VoxelFileGrid> read_voxel_grid(const std::string& path, const Execution& execution) {
   const ReadVoxelsOptions options;
   MemoryBudget budget(execution.memory_limit != 0 ? execution.memory_limit : ~std::uint64_t{0});
   try {
-    if (is_a_folder(path)) {
+    if (is_folder(path)) {
       ReadContext context{path, {}, options, execution, budget};
       if (is_there(path + "/slices.json")) return slices_grid(context);
       if (is_there(path + "/.zarray") || is_there(path + "/.zattrs")) {

@@ -62,11 +62,6 @@ constexpr std::array<std::string_view, kFormats.size()> kNames = [] {
   return names;
 }();
 
-bool is_folder(const std::string& path) {
-  struct stat status = {};
-  return ::stat(path.c_str(), &status) == 0 && S_ISDIR(status.st_mode);
-}
-
 const Format* format_of(const std::string& path, const std::string& name) {
   const bool folder = is_folder(path);
   const std::string file = lower_case(path);
@@ -129,6 +124,17 @@ std::string list_of_formats() {
 }
 
 }  // namespace
+
+bool is_folder(const std::string& path) {
+  struct stat status = {};
+  return ::stat(path.c_str(), &status) == 0 && S_ISDIR(status.st_mode);
+}
+
+Result<JsonValue> read_json_file(const std::string& path, const Execution& execution) {
+  const auto file = detail::InputBytes::open(path, execution.memory_limit, execution.stop);
+  if (!file) return tl::unexpected(file.error());
+  return parse_json(file->view(), path);
+}
 
 std::span<const std::string_view> readable_voxel_formats() { return kNames; }
 

@@ -19,7 +19,6 @@
 #include "voxelize/readers/unblosc.h"
 #include "voxelize/volume/dense_array.h"
 #include "voxelize/volume/inflate_stream.h"
-#include "voxelize/volume/json_text.h"
 #include "voxelize/volume/tile_runs.h"
 
 namespace strata {
@@ -46,12 +45,6 @@ struct ZarrHead {
            static_cast<std::size_t>(chunk.z) * bytes_of(type);
   }
 };
-
-Result<JsonValue> read_json(const ReadContext& context, const std::string& path) {
-  const auto file = detail::InputBytes::open(path, context.execution.memory_limit);
-  if (!file) return tl::unexpected(file.error());
-  return parse_json(file->view(), path);
-}
 
 Result<void> take_type(const JsonValue& json, const std::string& path, ZarrHead& head) {
   const JsonValue* type = json.find("dtype");
@@ -108,7 +101,7 @@ std::optional<std::vector<double>> three_axes(const JsonValue& json, std::string
 /// @param folder  of the array; of OME-Zarr in that of the group
 Result<ZarrHead> read_head(const ReadContext& context, const std::string& folder, bool ome) {
   const std::string path = folder + "/.zarray";
-  const Result<JsonValue> json = read_json(context, path);
+  const Result<JsonValue> json = read_json_file(path, context.execution);
   if (!json) return tl::unexpected(json.error());
   ZarrHead head;
   head.reversed = ome;
@@ -144,7 +137,7 @@ Result<ZarrHead> read_head(const ReadContext& context, const std::string& folder
   }
   const std::string attributes = context.path + "/.zattrs";
   if (::access(attributes.c_str(), R_OK) == 0) {
-    const Result<JsonValue> placed = read_json(context, attributes);
+    const Result<JsonValue> placed = read_json_file(attributes, context.execution);
     if (!placed) return tl::unexpected(placed.error());
     const auto origin = placed->numbers("origin", 3), size = placed->numbers("voxel_size", 3);
     head.placed = origin.has_value() && size.has_value();
@@ -400,7 +393,7 @@ Result<VoxelVolume> read_zarr_voxels(ReadContext& context) {
 // The finest level of the first image.
 Result<VoxelVolume> read_ome_zarr_voxels(ReadContext& context) {
   const std::string path = context.path + "/.zattrs";
-  const Result<JsonValue> json = read_json(context, path);
+  const Result<JsonValue> json = read_json_file(path, context.execution);
   if (!json) return tl::unexpected(json.error());
   const JsonValue* scales = json->find("multiscales");
   const JsonValue* sets =

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <array>
+#include <string>
 #include <string_view>
 
 #include "strata/voxelize/grid_frame.h"
+#include "voxelize/volume/json_text.h"
 #include "voxelize/volume/read_context.h"
 
 namespace strata {
@@ -29,6 +31,10 @@ Result<VoxelFileGrid> vti_grid(ReadContext& context);
 Result<VoxelFileGrid> vdb_grid(ReadContext& context);
 /// Voxels along x, y, z of a .npy.
 Result<std::array<double, 3>> npy_sizes(ReadContext& context);
+
+[[nodiscard]] bool is_folder(const std::string& path);
+/// A JSON file of a folder, or beside a file. @return kInput, kLimit, kCancelled
+Result<JsonValue> read_json_file(const std::string& path, const Execution& execution);
 
 /// Reads bytes as a file of a format that is one file, as read_voxels() does.
 Result<VoxelVolume> parse_voxels(std::string_view bytes, const std::string& format,
