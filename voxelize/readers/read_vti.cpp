@@ -136,6 +136,13 @@ struct VtiArray {
   bool points = false;
 };
 
+/// Attributes of the image and of its piece.
+struct VtiPlace {
+  std::array<std::int64_t, 6> extent;
+  std::array<double, 3> origin, spacing;
+  std::optional<std::array<double, 9>> direction;
+};
+
 class VtiReader {
  public:
   explicit VtiReader(ReadContext& context) : context_(context) {}
@@ -148,6 +155,7 @@ class VtiReader {
   }
   Result<void> read_head();
   Result<void> find_arrays();
+  [[nodiscard]] Result<VtiPlace> find_place() const;
   Result<void> place(const VtiArray& array);
   Result<std::string_view> array_bytes(const VtiArray& array);
   Result<std::string_view> decoded(std::string_view text);
@@ -216,29 +224,34 @@ Result<void> VtiReader::find_arrays() {
   return {};
 }
 
-Result<void> VtiReader::place(const VtiArray& array) {
+Result<VtiPlace> VtiReader::find_place() const {
   const auto extent = numbers<std::int64_t, 6>(piece_.get("Extent"));
   const auto origin = numbers<double, 3>(image_.get("Origin"));
   const auto spacing = numbers<double, 3>(image_.get("Spacing"));
   if (!extent || !origin || !spacing) {
     return fault("Extent must have 6 numbers, Origin and Spacing 3");
   }
+  return VtiPlace{*extent, *origin, *spacing, numbers<double, 9>(image_.get("Direction"))};
+}
+
+Result<void> VtiReader::place(const VtiArray& array) {
+  const auto found = find_place();
+  if (!found) return tl::unexpected(found.error());
+  const auto& [extent, origin, spacing, direction] = *found;
   std::int64_t dims[3];
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const auto i = static_cast<int>(axis);
-    const std::int64_t first = (*extent)[2 * axis], last = (*extent)[2 * axis + 1];
+    const std::int64_t first = extent[2 * axis], last = extent[2 * axis + 1];
     if (std::abs(first) > 1'000'000'000 || std::abs(last) > 1'000'000'000) {
       return fault("Extent must lie within a billion");
     }
     dims[i] = last - first + (array.points ? 1 : 0);
-    layout_.grid.voxel_size[i] = std::abs((*spacing)[axis]);
+    layout_.grid.voxel_size[i] = std::abs(spacing[axis]);
     layout_.grid.origin[i] =
-        (*origin)[axis] +
-        (static_cast<double>(first) - (array.points ? 0.5 : 0.0)) * (*spacing)[axis];
+        origin[axis] + (static_cast<double>(first) - (array.points ? 0.5 : 0.0)) * spacing[axis];
   }
   if (auto fits = check_dims(context_, dims[0], dims[1], dims[2]); !fits) return fits;
   layout_.grid.dims = glm::ivec3(dims[0], dims[1], dims[2]);
-  const auto direction = numbers<double, 9>(image_.get("Direction"));
   if (direction && *direction != std::array<double, 9>{1, 0, 0, 0, 1, 0, 0, 0, 1}) {
     note_ = "the direction turns the grid; it is shown along its own axes";
   }
@@ -350,23 +363,19 @@ Result<VoxelVolume> VtiReader::read() {
 Result<VoxelFileGrid> VtiReader::grid() {
   if (auto head = read_head(); !head) return tl::unexpected(head.error());
   const bool points = find_arrays().has_value() && arrays_.front().points;
-  const auto extent = numbers<std::int64_t, 6>(piece_.get("Extent"));
-  const auto origin = numbers<double, 3>(image_.get("Origin"));
-  const auto spacing = numbers<double, 3>(image_.get("Spacing"));
-  const auto direction = numbers<double, 9>(image_.get("Direction"));
-  if (!extent || !origin || !spacing) {
-    return fault("Extent must have 6 numbers, Origin and Spacing 3");
-  }
+  const auto found = find_place();
+  if (!found) return tl::unexpected(found.error());
+  const auto& [extent, origin, spacing, direction] = *found;
   GridAxes axes;
   axes.corner = !points;
-  axes.place = {(*origin)[0], (*origin)[1], (*origin)[2]};
+  axes.place = {origin[0], origin[1], origin[2]};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const auto a = static_cast<int>(axis);
-    const auto first = static_cast<double>((*extent)[2 * axis]);
-    axes.sizes[axis] = static_cast<double>((*extent)[2 * axis + 1]) - first + (points ? 1 : 0);
+    const auto first = static_cast<double>(extent[2 * axis]);
+    axes.sizes[axis] = static_cast<double>(extent[2 * axis + 1]) - first + (points ? 1 : 0);
     for (std::size_t row = 0; row < 3; ++row) {
       const double along = direction ? (*direction)[3 * row + axis] : row == axis ? 1.0 : 0.0;
-      axes.steps[a][static_cast<int>(row)] = along * (*spacing)[axis];
+      axes.steps[a][static_cast<int>(row)] = along * spacing[axis];
     }
     axes.place += first * axes.steps[a];
   }
