@@ -223,9 +223,9 @@ void CoverageWalker::emit(CoveragePiece& out) {
 }
 
 template <class Key>
-void CoverageWalker::walk_rows(const TileLists<Key>& lists, InsideRule rule, bool histogram,
-                               std::span<const WindingStep> steps, const TileIntervals& settled,
-                               TileCounts& counts, CoveragePiece& out) {
+void CoverageWalker::walk(const TileLists<Key>& lists, InsideRule rule, bool histogram,
+                          std::span<const WindingStep> steps, const TileIntervals& settled,
+                          TileCounts& counts, CoveragePiece& out) {
   counts.clear();
   std::size_t next = 0;
   for (int begin = 0; begin < kTileSide; begin += rays_) {
@@ -247,17 +247,12 @@ void CoverageWalker::walk_rows(const TileLists<Key>& lists, InsideRule rule, boo
   }
 }
 
-void CoverageWalker::walk(const TileLists<DepthKey>& lists, InsideRule rule, bool histogram,
-                          std::span<const WindingStep> steps, const TileIntervals& settled,
-                          TileCounts& counts, CoveragePiece& out) {
-  walk_rows(lists, rule, histogram, steps, settled, counts, out);
-}
-
-void CoverageWalker::walk(const TileLists<DepthItem>& lists, InsideRule rule, bool histogram,
-                          std::span<const WindingStep> steps, const TileIntervals& settled,
-                          TileCounts& counts, CoveragePiece& out) {
-  walk_rows(lists, rule, histogram, steps, settled, counts, out);
-}
+template void CoverageWalker::walk(const TileLists<DepthKey>&, InsideRule, bool,
+                                   std::span<const WindingStep>, const TileIntervals&, TileCounts&,
+                                   CoveragePiece&);
+template void CoverageWalker::walk(const TileLists<DepthItem>&, InsideRule, bool,
+                                   std::span<const WindingStep>, const TileIntervals&, TileCounts&,
+                                   CoveragePiece&);
 
 CoverageTiles::CoverageTiles(const VoxelGrid& voxels, Axis axis, int rays, int v_begin, int v_end)
     : rays_(rays), result_(voxels, axis, v_begin / rays, v_end / rays) {

@@ -36,10 +36,8 @@ class CoverageWalker {
   /// The voxels of a tile of rays. A solid that is entered and never left ends where it is entered.
   /// @param settled where winding numbers decide: what they made of the tile, which the columns of
   /// `steps` are taken from, so that those count whole voxels of the finer grid
-  void walk(const TileLists<DepthKey>& lists, InsideRule rule, bool histogram,
-            std::span<const WindingStep> steps, const TileIntervals& settled, TileCounts& counts,
-            CoveragePiece& out);
-  void walk(const TileLists<DepthItem>& lists, InsideRule rule, bool histogram,
+  template <class Key>  // DepthKey or DepthItem
+  void walk(const TileLists<Key>& lists, InsideRule rule, bool histogram,
             std::span<const WindingStep> steps, const TileIntervals& settled, TileCounts& counts,
             CoveragePiece& out);
 
@@ -70,10 +68,6 @@ class CoverageWalker {
   };
 
  private:
-  template <class Key>
-  void walk_rows(const TileLists<Key>& lists, InsideRule rule, bool histogram,
-                 std::span<const WindingStep> steps, const TileIntervals& settled,
-                 TileCounts& counts, CoveragePiece& out);
   void emit(CoveragePiece& out);
 
   int rays_;
@@ -88,8 +82,7 @@ class CoverageTiles {
 
   /// Where a tile of rays goes. Different ones may be used by different threads at once.
   CoveragePiece& piece(int tu, int tv) {
-    auto& stored = pieces_[static_cast<std::size_t>(tv) * static_cast<std::size_t>(tiles_u_) +
-                           static_cast<std::size_t>(tu)];
+    auto& stored = pieces_[index(tu, tv)];
     stored = std::make_unique<CoveragePiece>();
     return *stored;
   }
@@ -98,14 +91,14 @@ class CoverageTiles {
   VoxelIntervals merged(const Execution& execution, std::uint64_t& sum);
 
  private:
+  [[nodiscard]] std::size_t index(int tu, int tv) const {
+    return static_cast<std::size_t>(tv) * static_cast<std::size_t>(tiles_u_) +
+           static_cast<std::size_t>(tu);
+  }
   struct Worker;
   void merge_tile(int tu, int tv, Worker& worker);
   [[nodiscard]] const CoveragePiece* find(int tu, int tv) const {
-    return tu < tiles_u_ && tv < tiles_v_
-               ? pieces_[static_cast<std::size_t>(tv) * static_cast<std::size_t>(tiles_u_) +
-                         static_cast<std::size_t>(tu)]
-                     .get()
-               : nullptr;
+    return tu < tiles_u_ && tv < tiles_v_ ? pieces_[index(tu, tv)].get() : nullptr;
   }
 
   int rays_, tiles_u_, tiles_v_;  // tiles of rays
