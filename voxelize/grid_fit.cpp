@@ -53,7 +53,7 @@ Result<Bounds> covered_box(const Bounds& mesh_bounds, const GridRequest& request
 /// World length of a voxel. @pre the request has passed its check
 Result<glm::dvec3> voxel_size_for(const Bounds& box, const GridRequest& request) {
   const glm::dvec3 extent = box.high - box.low;
-  const double longest = std::max({extent.x, extent.y, extent.z});
+  const double longest = box.longest_side();
   if (!(longest > 0.0)) {
     return fail(ErrorCode::kGeometry, "the mesh has no extent: all of it lies at ({}, {}, {})",
                 box.low.x, box.low.y, box.low.z);
@@ -218,7 +218,6 @@ Result<VoxelGrid> fit_grid(const Bounds& mesh_bounds, const GridRequest& request
     const double low = box->low[axis], high = box->high[axis];
     // The lower corner in voxels from the world's origin; only multiples need it.
     const double first = request.align ? std::floor(low / s + kHalfStep) : 0.0;
-    const double begin = request.align ? first * s : low;
     const double reach = request.align ? high / s - first : (high - low) / s;
     double count = std::max(1.0, std::ceil(reach - kHalfStep));
     if (request.dims) {
@@ -230,7 +229,7 @@ Result<VoxelGrid> fit_grid(const Bounds& mesh_bounds, const GridRequest& request
                   s, total, kAxisNames[axis], kMaxGridSide);
     }
     grid.dims[axis] = static_cast<int>(total);
-    grid.origin[axis] = request.align ? (first - padding) * s : begin - padding * s;
+    grid.origin[axis] = request.align ? (first - padding) * s : low - padding * s;
     // A flat side would lie on the border of its voxels, where no centre is near it.
     if (!(high > low) && !request.align && !request.origin) grid.origin[axis] -= 0.5 * count * s;
     if (auto fine = check_resolved(grid, axis); !fine) return tl::unexpected(fine.error());

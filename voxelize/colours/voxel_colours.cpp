@@ -78,7 +78,6 @@ void append_common(std::span<const Interval> a, std::span<const Interval> b,
 }  // namespace
 
 struct VoxelColouring::Impl {
-  VoxelGrid grid;
   VoxelColourOptions options;
   LatticeMesh mesh;
   const SurfaceColours* colours = nullptr;
@@ -201,7 +200,6 @@ Result<VoxelColouring> VoxelColouring::create(const TriangleSoup& mesh, const Vo
   auto lattice = snap_to_lattice(mesh, grid, execution);
   if (!lattice) return tl::unexpected(lattice.error());
   auto impl = std::make_unique<Impl>();
-  impl->grid = grid;
   impl->options = options;
   impl->mesh = *std::move(lattice);
   impl->colours = &colours;

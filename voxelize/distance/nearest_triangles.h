@@ -20,9 +20,6 @@ class NearestTriangles {
   /// After a stop it is not complete.
   NearestTriangles(const LatticeMesh& mesh, const glm::dvec3& scale, const std::stop_token& stop);
 
-  /// True for a mesh without triangles.
-  [[nodiscard]] bool empty() const { return triangles_.empty(); }
-
   /// Lowers the squares of a tile's voxels from `band_square` on to the squares of their distances.
   /// @param squares  as add_triangles() takes them
   void lower(const DistanceTile& tile, float band_square, float* squares,

@@ -135,15 +135,15 @@ Result<NiftiHead> parse_nifti_head(std::string_view bytes, const std::string& pa
   const NiftiFields fields(bytes, second, swapped);
   NiftiHead head;
   head.big_endian = swapped;
-  head.dimensions = static_cast<int>(fields.size(0));
-  if (head.dimensions < 2 || head.dimensions > 7) {
-    return fail(ErrorCode::kInput, "{}: {} dimensions; voxels have 3", path, head.dimensions);
+  const auto dimensions = static_cast<int>(fields.size(0));
+  if (dimensions < 2 || dimensions > 7) {
+    return fail(ErrorCode::kInput, "{}: {} dimensions; voxels have 3", path, dimensions);
   }
-  for (std::size_t axis = 1; axis <= static_cast<std::size_t>(head.dimensions); ++axis) {
+  for (std::size_t axis = 1; axis <= static_cast<std::size_t>(dimensions); ++axis) {
     if (axis <= 3) head.axes.sizes[axis - 1] = fields.size(axis);
     if (axis > 3) head.volumes *= std::max(1.0, fields.size(axis));
   }
-  if (head.dimensions == 2) head.axes.sizes[2] = 1.0;
+  if (dimensions == 2) head.axes.sizes[2] = 1.0;
   const int code = second ? fields.get<std::int16_t>(12) : fields.get<std::int16_t>(70);
   const auto type = nifti_type(code);
   if (!type) {

@@ -15,7 +15,6 @@ struct NiftiHead {
   GridAxes axes;             ///< by sform, else qform, else pixdim alone; the world is NIfTI's: RAS
   double unit_metres = 0.0;  ///< of xyzt_units; 0: unknown
   bool placed = false;       ///< by sform or qform
-  int dimensions = 3;        ///< dim[0]
   double volumes = 1.0;      ///< product of the sizes of axes 4 to 7
   NumberType type = NumberType::kU8;  ///< of a voxel
   bool big_endian = false;
