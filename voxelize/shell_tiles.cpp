@@ -1,7 +1,5 @@
 #include "voxelize/shell_tiles.h"
 
-#include <utility>
-
 namespace strata::shell {
 namespace {
 

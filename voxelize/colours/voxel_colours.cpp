@@ -1,7 +1,6 @@
 #include "strata/voxelize/colours/voxel_colours.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <new>
 #include <span>

@@ -3,9 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cfloat>
-#include <cmath>
 #include <glm/common.hpp>
-#include <memory>
 #include <mutex>
 #include <utility>
 #include <vector>

@@ -1,7 +1,6 @@
 #include "voxelize/output/palette.h"
 
 #include <algorithm>
-#include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 

@@ -18,7 +18,6 @@
 #include <array>
 #include <cstdint>
 #include <cstdlib>
-#include <glm/vec3.hpp>
 #include <limits>
 
 #include "strata/raster/lattice_mesh.h"

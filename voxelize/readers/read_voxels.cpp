@@ -3,13 +3,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <array>
-#include <cmath>
 #include <new>
 #include <stdexcept>
 #include <string>
-#include <utility>
 
 #include "core/letters.h"
 #include "mesh/text/input_bytes.h"

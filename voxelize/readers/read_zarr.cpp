@@ -5,8 +5,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
-#include <cmath>
 #include <glm/common.hpp>
 #include <glm/vec2.hpp>
 #include <optional>

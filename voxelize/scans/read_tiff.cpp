@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <memory>
-#include <string>
 
 #include "voxelize/scans/scan_readers.h"
 #include "voxelize/scans/tiff_file.h"
