@@ -144,18 +144,19 @@ std::string place(const glm::dvec3& p) {
 }
 
 /// Tells of walls between voxel centres, as the tool does.
-Result<void> warn_of_walls(const TriangleSoup& soup, const VoxelGrid& grid,
+Result<void> warn_of_walls(const TriangleSoup& soup, const VoxelFileGrid& placed,
                            const LostWallOptions& search, const VoxelIntervals& set,
                            Warnings& warnings, const Execution& execution) {
-  const auto lost = find_lost_walls(soup, grid, search, execution);
+  const auto lost = find_lost_walls(soup, placed.grid, search, execution);
   if (!lost) return tl::unexpected(lost.error());
   if (lost->count > 0) {
     const LostWall& wall = lost->largest.front();
+    const Bounds box = placed.frame.world_box({wall.low, wall.high});
     warnings.push_back(fmt::format(
         "{} thinner than a voxel fell between voxel centres; {} {:.3g} voxels thick along {}, from "
         "{} to {}; surface=True keeps all of it",
         counted(lost->count, "wall"), lost->count == 1 ? "it is" : "the largest is", wall.thickness,
-        "xyz"[static_cast<int>(wall.axis)], place(wall.low), place(wall.high)));
+        "xyz"[static_cast<int>(wall.axis)], place(box.low), place(box.high)));
   } else if (set.solid_voxels() == 0) {
     warnings.push_back(
         "no voxel is solid: the mesh lies outside the grid, or is thinner than a voxel");
@@ -247,7 +248,8 @@ std::pair<VoxelsPtr, Warnings> voxelize_mesh(const MeshData& mesh, const VoxelFi
       LostWallOptions search;
       search.rule = input.rule;
       search.longest_edge = input.longest_edge;
-      auto told = warn_of_walls(seen.soup(), grid, search, voxels->volume.set, warnings, execution);
+      auto told =
+          warn_of_walls(seen.soup(), placed, search, voxels->volume.set, warnings, execution);
       if (!told) return told;
     }
     if (!choice.colours) return {};
@@ -308,7 +310,7 @@ std::pair<VoxelsPtr, Warnings> voxelize_solid(const SolidData& solid, const Voxe
       search.filter = &lists.unlabelled_filter();
       search.taken_away = [&](std::uint32_t t) { return lists.is_subtracted(t); };
       auto told =
-          warn_of_walls(lists.soup(), grid, search, voxels->volume.set, warnings, execution);
+          warn_of_walls(lists.soup(), placed, search, voxels->volume.set, warnings, execution);
       if (!told) return told;
     }
     return choice.colours ? colour_of_solids(colours.colours, *voxels, execution) : Result<void>();

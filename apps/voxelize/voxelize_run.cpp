@@ -23,18 +23,6 @@
 namespace strata::apps {
 namespace {
 
-/// The box in the world around a box of the grid's space.
-Bounds world_box(const GridFrame& frame, const glm::dvec3& low, const glm::dvec3& high) {
-  Bounds box{low, high};
-  if (!frame.turned()) return box;
-  box = {};
-  for (int corner = 0; corner < 8; ++corner) {
-    box.include(frame.world({(corner & 1) != 0 ? high.x : low.x, (corner & 2) != 0 ? high.y : low.y,
-                             (corner & 4) != 0 ? high.z : low.z}));
-  }
-  return box;
-}
-
 /// Tells of walls that lie between voxel centres, or that nothing is solid.
 Result<void> check_thin(const VoxelizeCommand& command, VoxelizeOutcome& outcome,
                         const Execution& execution, Session& session) {
@@ -55,7 +43,7 @@ Result<void> check_thin(const VoxelizeCommand& command, VoxelizeOutcome& outcome
     if (!found) return tl::unexpected(found.error());
     outcome.lost_walls = *std::move(found);
     for (LostWall& wall : outcome.lost_walls.largest) {
-      const Bounds box = world_box(outcome.frame, wall.low, wall.high);
+      const Bounds box = outcome.frame.world_box({wall.low, wall.high});
       wall.low = box.low, wall.high = box.high;
     }
   }

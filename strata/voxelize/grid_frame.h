@@ -4,6 +4,7 @@
 #include <string>
 
 #include "strata/core/grid.h"
+#include "strata/mesh/soup_tools.h"
 
 namespace strata {
 
@@ -19,6 +20,8 @@ struct GridFrame {
   [[nodiscard]] bool turned() const { return direction != glm::dmat3(1.0); }
   /// A point of the grid's space, in the world.
   [[nodiscard]] glm::dvec3 world(const glm::dvec3& p) const { return turned() ? direction * p : p; }
+  /// The box in the world around a box of the grid's space.
+  [[nodiscard]] Bounds world_box(const Bounds& box) const;
   /// Columns: from a voxel to the next along x, y, z, in the world.
   [[nodiscard]] glm::dmat3 steps(const glm::dvec3& voxel_size) const {
     return {direction[0] * voxel_size.x, direction[1] * voxel_size.y, direction[2] * voxel_size.z};

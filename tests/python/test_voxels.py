@@ -248,6 +248,15 @@ def test_a_wall_between_voxel_centres_is_a_warning():
         strata.voxelize((thin, cube_triangles()), like=strata.Grid((10, 10, 10)))
 
 
+def test_a_wall_on_a_turned_grid_is_told_of_where_it_lies_in_the_world():
+    thin = CUBE_VERTICES * (0.01, 4, 4) + (-2.8, 1, 1)
+    turned = strata.Grid((10, 10, 10), direction=((0, -1, 0), (1, 0, 0), (0, 0, 1)))
+    expected = r"1 voxels? thick along y|thick along y, from \(-2\.8, 1, 1\) to \(-2\.79, 5, 5\)"
+    for solid in (strata.Mesh(thin, cube_triangles()), strata.csg.solid((thin, cube_triangles()))):
+        with pytest.warns(strata.StrataWarning, match=expected):
+            strata.voxelize(solid, like=turned)
+
+
 def test_an_array_that_is_too_large_is_an_error_and_the_set_is_still_there(knot):
     voxels = strata.voxelize(knot, resolution=1024)
     with pytest.raises(strata.LimitError, match="needs"):
