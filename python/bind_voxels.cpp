@@ -354,19 +354,6 @@ py::array slice_values(const VoxelsData& voxels, int axis, int index) {
   return array_of(std::move(values), py::dtype::of<float>(), {dims[plane.u], dims[plane.v]});
 }
 
-/// The label of a voxel; 0: it is empty.
-std::uint32_t label_at(const VoxelIntervals& set, const glm::ivec3& at) {
-  const AxisFrame frame(set.axis());
-  std::uint32_t found = 0;
-  for_each_labelled(set, at[frame.u], at[frame.v],
-                    [&](const Interval& interval, std::uint32_t label) {
-                      if (interval.first <= at[frame.w] && at[frame.w] <= interval.last) {
-                        found = label;
-                      }
-                    });
-  return found;
-}
-
 /// The set as pictures take it, and its look. Colours become entries of a palette.
 std::pair<std::shared_ptr<const VoxelIntervals>, VoxelLook> shown(const VoxelsPtr& voxels,
                                                                   const Execution& execution) {
@@ -394,7 +381,7 @@ std::pair<std::shared_ptr<const VoxelIntervals>, VoxelLook> shown(const VoxelsPt
   } else if (voxels->full != 0) {
     look.source = VoxelColours::kPlain;
     look.value = [voxels](const glm::ivec3& at) {
-      return static_cast<float>(label_at(voxels->volume.set, at)) /
+      return static_cast<float>(voxels->volume.set.label(at.x, at.y, at.z).value_or(0)) /
              static_cast<float>(voxels->full);
     };
   }

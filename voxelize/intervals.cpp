@@ -75,15 +75,17 @@ std::uint64_t VoxelIntervals::memory_bytes() const {
   return bytes;
 }
 
-bool VoxelIntervals::contains(int i, int j, int k) const {
+std::optional<std::uint32_t> VoxelIntervals::label(int i, int j, int k) const {
   const glm::ivec3 at(i, j, k);
   const AxisFrame frame(axis_);
   const int u = at[frame.u], v = at[frame.v], w = at[frame.w];
-  if (u < 0 || u >= columns_ || v < v_begin_ || v >= v_end_) return false;
+  if (u < 0 || u >= columns_ || v < v_begin_ || v >= v_end_) return std::nullopt;
   const auto runs = column(u, v);
   const auto after = std::upper_bound(runs.begin(), runs.end(), w,
                                       [](int place, Interval run) { return place < run.begin(); });
-  return after != runs.begin() && w < std::prev(after)->end();
+  if (after == runs.begin() || w >= std::prev(after)->end()) return std::nullopt;
+  const auto labels = column_labels(u, v);
+  return labels.empty() ? 1 : labels[static_cast<std::size_t>(after - runs.begin()) - 1];
 }
 
 namespace {

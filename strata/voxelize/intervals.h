@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -68,7 +69,10 @@ class VoxelIntervals {
     return {tile.labels.get() + tile.offsets[local], tile.offsets[local + 1] - tile.offsets[local]};
   }
   /// Whether voxel (i, j, k) is solid; false outside the grid and the slab. O(log of the column).
-  [[nodiscard]] bool contains(int i, int j, int k) const;
+  [[nodiscard]] bool contains(int i, int j, int k) const { return label(i, j, k).has_value(); }
+  /// The label of voxel (i, j, k), 1 where none was given; none where contains() is false. O(log of
+  /// the column).
+  [[nodiscard]] std::optional<std::uint32_t> label(int i, int j, int k) const;
   /// True when no column of tile (tu, tv) of this slab is solid anywhere: lets writers skip it.
   [[nodiscard]] bool tile_empty(int tu, int tv) const {
     return !tiles_[static_cast<std::size_t>(tv) * static_cast<std::size_t>(tiles_u_) +

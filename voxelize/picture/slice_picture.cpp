@@ -15,19 +15,6 @@ namespace {
 /// The part of the grid without solid voxels.
 constexpr glm::vec3 kEmpty{0.955f, 0.955f, 0.96f};
 
-/// The label of a voxel, or RayHit::kNothing.
-std::uint32_t label_at(const VoxelIntervals& set, const glm::ivec3& voxel) {
-  const AxisFrame frame(set.axis());
-  const int u = voxel[frame.u], v = voxel[frame.v], w = voxel[frame.w];
-  if (v < set.v_begin() || v >= set.v_end()) return RayHit::kNothing;
-  const auto runs = set.column(u, v);
-  const auto run =
-      std::partition_point(runs.begin(), runs.end(), [w](Interval one) { return one.last < w; });
-  if (run == runs.end() || run->first > w) return RayHit::kNothing;
-  const auto labels = set.column_labels(u, v);
-  return labels.empty() ? 1 : labels[static_cast<std::size_t>(run - runs.begin())];
-}
-
 class SliceDrawing {
  public:
   SliceDrawing(const VoxelIntervals& set, const VoxelLook& look, const VoxelSlice& slice,
@@ -83,10 +70,10 @@ class SliceDrawing {
   }
   /// Of a place in the grid, 0 to 255.
   [[nodiscard]] glm::vec3 colour_at(const glm::dvec2& at) const {
-    const std::uint32_t label =
-        label_at(set_, place_.voxel(static_cast<int>(at.x), static_cast<int>(at.y)));
-    if (label == RayHit::kNothing) return kEmpty * 255.0f;
-    return glm::vec3(label_colour(look_, labels_, label));
+    const glm::ivec3 voxel = place_.voxel(static_cast<int>(at.x), static_cast<int>(at.y));
+    const auto label = set_.label(voxel.x, voxel.y, voxel.z);
+    if (!label) return kEmpty * 255.0f;
+    return glm::vec3(label_colour(look_, labels_, *label));
   }
 
   /// Values between the centres of voxels, or of the nearest voxel where voxels are large.

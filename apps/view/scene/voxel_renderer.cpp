@@ -26,17 +26,6 @@ VoxelPictureOptions options_of(const FrameRequest& request) {
   return options;
 }
 
-std::uint32_t label_at(const VoxelIntervals& set, const glm::ivec3& voxel) {
-  const AxisFrame frame(set.axis());
-  std::uint32_t found = 0;
-  for_each_labelled(set, voxel[frame.u], voxel[frame.v],
-                    [&](const Interval& run, std::uint32_t label) {
-                      const int at = voxel[frame.w];
-                      if (run.begin() <= at && at < run.end()) found = label;
-                    });
-  return found;
-}
-
 }  // namespace
 
 Result<void> VoxelRenderer::prepare(const FrameRequest& request, const Execution& execution) {
@@ -106,7 +95,7 @@ Result<Picked> VoxelRenderer::pick(const FrameRequest& request, const glm::ivec2
     const glm::ivec3 voxel = place.voxel(static_cast<int>(at.x), static_cast<int>(at.y));
     picked.hit = true;
     picked.where = grid.origin + (glm::dvec3(voxel) + 0.5) * grid.voxel_size;
-    const std::uint32_t label = label_at(picture_->set(), voxel);
+    const std::uint32_t label = picture_->set().label(voxel.x, voxel.y, voxel.z).value_or(0);
     picked.what = scene_->describe(voxel, label) + (label != 0 ? ", solid" : ", empty");
     return picked;
   }
