@@ -14,45 +14,15 @@
 #include "python/call.h"
 #include "python/data.h"
 #include "strata/voxelize/checksum.h"
+#include "strata/voxelize/colours/voxel_colours.h"
 #include "strata/voxelize/formats/voxel_writer.h"
 #include "strata/voxelize/picture/voxel_picture.h"
 #include "strata/voxelize/readers/read_voxels.h"
 
 namespace strata::python {
-
-VoxelIntervals relabelled(const VoxelIntervals& set,
-                          const std::function<std::uint32_t(std::uint32_t)>& label,
-                          const Execution& execution) {
-  VoxelIntervals made(set.grid(), set.axis());
-  const auto tiles_u = static_cast<std::size_t>(set.tiles_u());
-  const auto one = [&](std::size_t index, int) {
-    const int tu = static_cast<int>(index % tiles_u), tv = static_cast<int>(index / tiles_u);
-    const VoxelIntervals::TileView tile = set.tile(tu, tv);
-    if (tile.items.empty()) return;
-    std::vector<std::uint32_t> offsets{0}, labels;
-    std::vector<Interval> items;
-    for (std::size_t local = 0; local < VoxelIntervals::kTileColumns; ++local) {
-      for (std::uint32_t i = tile.offsets[local]; i < tile.offsets[local + 1]; ++i) {
-        const std::uint32_t given = label(tile.label(i));
-        if (items.size() > offsets.back() && labels.back() == given &&
-            items.back().end() == tile.items[i].begin()) {
-          items.back().last = tile.items[i].last;
-          continue;
-        }
-        items.push_back(tile.items[i]);
-        labels.push_back(given);
-      }
-      offsets.push_back(static_cast<std::uint32_t>(items.size()));
-    }
-    made.set_tile(tu, tv, offsets, items, labels);
-  };
-  parallel_for(execution, tiles_u * static_cast<std::size_t>(set.tiles_v()), one);
-  return made;
-}
+namespace {
 
 // --- made from arrays and files ------------------------------------------------------------------
-
-namespace {
 
 /// Runs of one tile of columns along z; a voxel is at (x * ny + y) * nz + z.
 template <class Value>
@@ -285,10 +255,6 @@ py::array contains(const VoxelsData& voxels, const Values<double>& points, const
 
 // --- slices and pictures -------------------------------------------------------------------------
 
-Rgba unpacked(std::uint32_t label) {
-  return {label & 255, label >> 8 & 255, label >> 16 & 255, label >> 24};
-}
-
 void check_slice(const VoxelGrid& grid, int axis, std::int64_t index) {
   if (index < 0 || index >= grid.dims[axis]) {
     refuse(ErrorCode::kUsage, fmt::format("index must be 0 to {} along {}, got {}",
@@ -365,7 +331,7 @@ std::pair<std::shared_ptr<const VoxelIntervals>, VoxelLook> shown(const VoxelsPt
       entries.try_emplace(label, 0);
     });
     for (auto& [colour, entry] : entries) {
-      look.colours.emplace_back(unpacked(colour));
+      look.colours.emplace_back(unpacked_colour(colour));
       entry = static_cast<std::uint32_t>(look.colours.size());
     }
     set = std::make_shared<const VoxelIntervals>(relabelled(

@@ -55,10 +55,6 @@ using VoxelsPtr = std::shared_ptr<VoxelsData>;
 
 /// Adds the tiles of a slab to a set of the same grid and axis.
 void add_slab(VoxelIntervals& set, const VoxelIntervals& slab);
-/// The labels of a set, made anew; runs that then touch and are alike become one.
-[[nodiscard]] VoxelIntervals relabelled(const VoxelIntervals& set,
-                                        const std::function<std::uint32_t(std::uint32_t)>& label,
-                                        const Execution& execution);
 
 /// A camera as Python gives it; what is not given is found from what is to be seen.
 struct CameraChoice {

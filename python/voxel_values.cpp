@@ -1,7 +1,5 @@
 #include "python/voxel_values.h"
 
-#include <glm/common.hpp>
-
 #include "strata/mesh/colours/surface_colours.h"
 #include "strata/voxelize/colours/voxel_colours.h"
 #include "strata/voxelize/distance/signed_distance.h"
@@ -32,9 +30,7 @@ Result<void> colour_of_solids(std::span<const glm::vec4> colours, VoxelsData& vo
                               const Execution& execution) {
   std::vector<std::uint32_t> packed;
   for (const glm::vec4& colour : colours) {
-    glm::u8vec4 bytes(glm::clamp(colour, 0.0f, 1.0f) * 255.0f + 0.5f);
-    bytes.w = std::max<std::uint8_t>(bytes.w, 1);  // a solid is there even where it is transparent
-    packed.push_back(packed_colour(bytes));
+    packed.push_back(packed_colour(solid_colour_bytes(colour)));
   }
   voxels.volume.set = relabelled(
       voxels.volume.set, [&](std::uint32_t label) { return packed[label - 1]; }, execution);

@@ -1,6 +1,5 @@
 #include "apps/voxelize/colouring.h"
 
-#include <algorithm>
 #include <glm/common.hpp>
 #include <utility>
 
@@ -12,14 +11,6 @@
 namespace strata::apps {
 namespace {
 
-constexpr std::size_t kSide = VoxelIntervals::kTileSide;
-
-glm::u8vec4 bytes_of(const glm::vec4& colour) {
-  glm::u8vec4 bytes(glm::clamp(colour, 0.0f, 1.0f) * 255.0f + 0.5f);
-  bytes.w = std::max<std::uint8_t>(bytes.w, 1);  // a solid is there even where it is transparent
-  return bytes;
-}
-
 /// Of solids that have none.
 glm::vec4 solid_colour() { return {glm::vec3(csg::colour_schemes().front().face) / 255.0f, 1.0f}; }
 
@@ -27,7 +18,7 @@ glm::vec4 solid_colour() { return {glm::vec3(csg::colour_schemes().front().face)
 std::vector<glm::u8vec4> triangle_colours(const csg::SolidInput& input) {
   std::vector<glm::u8vec4> of_solids, colours;
   for (const csg::Solid& solid : input.scene->solids()) {
-    of_solids.push_back(bytes_of(csg::colour_or(solid.colour, solid_colour())));
+    of_solids.push_back(solid_colour_bytes(csg::colour_or(solid.colour, solid_colour())));
   }
   colours.reserve(input.soup.triangles.size());
   for (std::uint32_t t = 0; t < input.soup.triangles.size(); ++t) {
@@ -77,7 +68,7 @@ Result<Colouring> Colouring::create(const VoxelizeCommand& command, VoxelizeOutc
   if (input.tree && !surface && !command.fill_colour) {
     const auto parts = csg::colour_labels(*input.scene, input.scene->root(), solid_colour());
     for (const glm::vec4& colour : parts.colours) {
-      made.colour_of_label_.push_back(packed_colour(bytes_of(colour)));
+      made.colour_of_label_.push_back(packed_colour(solid_colour_bytes(colour)));
     }
     if (!parts.colours.empty()) input.tree->set_labels(parts.labels);
     return made;
@@ -105,36 +96,8 @@ Result<Colouring> Colouring::create(const VoxelizeCommand& command, VoxelizeOutc
 
 Result<VoxelIntervals> Colouring::colour(const VoxelIntervals& slab, const Execution& execution) {
   if (voxels_) return voxels_->colour(slab, execution);
-  return of_labels(slab, execution);
-}
-
-VoxelIntervals Colouring::of_labels(const VoxelIntervals& slab, const Execution& execution) const {
-  VoxelIntervals result(slab.grid(), slab.axis(), slab.v_begin(), slab.v_end());
-  const auto tiles_u = static_cast<std::size_t>(slab.tiles_u());
-  parallel_for(
-      execution, tiles_u * static_cast<std::size_t>(slab.tiles_v()), [&](std::size_t index, int) {
-        const int tu = static_cast<int>(index % tiles_u), tv = static_cast<int>(index / tiles_u);
-        const VoxelIntervals::TileView tile = slab.tile(tu, tv);
-        if (tile.items.empty()) return;
-        std::vector<std::uint32_t> offsets{0}, labels;
-        std::vector<Interval> items;
-        for (std::size_t local = 0; local < kSide * kSide; ++local) {
-          for (std::uint32_t i = tile.offsets[local]; i < tile.offsets[local + 1]; ++i) {
-            const std::uint32_t colour = colour_of_label_[tile.label(i) - 1];
-            const bool joins = items.size() > offsets.back() && labels.back() == colour &&
-                               items.back().end() == tile.items[i].begin();
-            if (joins) {
-              items.back().last = tile.items[i].last;
-            } else {
-              items.push_back(tile.items[i]);
-              labels.push_back(colour);
-            }
-          }
-          offsets.push_back(static_cast<std::uint32_t>(items.size()));
-        }
-        result.set_tile(tu, tv, offsets, items, labels);
-      });
-  return result;
+  return relabelled(
+      slab, [this](std::uint32_t label) { return colour_of_label_[label - 1]; }, execution);
 }
 
 }  // namespace strata::apps

@@ -28,9 +28,6 @@ class Colouring {
   [[nodiscard]] bool leaves_out() const { return voxels_ && !solid_; }
 
  private:
-  [[nodiscard]] VoxelIntervals of_labels(const VoxelIntervals& slab,
-                                         const Execution& execution) const;
-
   bool solid_ = true;
   std::unique_ptr<SurfaceColours> surface_;
   std::optional<VoxelColouring> voxels_;

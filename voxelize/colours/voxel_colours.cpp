@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
 #include <new>
 #include <span>
 #include <utility>
@@ -75,6 +76,42 @@ void append_common(std::span<const Interval> a, std::span<const Interval> b,
 }
 
 }  // namespace
+
+glm::u8vec4 solid_colour_bytes(const glm::vec4& colour) {
+  glm::u8vec4 bytes(glm::clamp(colour, 0.0f, 1.0f) * 255.0f + 0.5f);
+  bytes.w = std::max<std::uint8_t>(bytes.w, 1);
+  return bytes;
+}
+
+VoxelIntervals relabelled(const VoxelIntervals& slab,
+                          const std::function<std::uint32_t(std::uint32_t)>& label,
+                          const Execution& execution) {
+  VoxelIntervals made(slab.grid(), slab.axis(), slab.v_begin(), slab.v_end());
+  const auto tiles_u = static_cast<std::size_t>(slab.tiles_u());
+  const auto one = [&](std::size_t index, int) {
+    const int tu = static_cast<int>(index % tiles_u), tv = static_cast<int>(index / tiles_u);
+    const VoxelIntervals::TileView tile = slab.tile(tu, tv);
+    if (tile.items.empty()) return;
+    std::vector<std::uint32_t> offsets{0}, labels;
+    std::vector<Interval> items;
+    for (std::size_t local = 0; local < VoxelIntervals::kTileColumns; ++local) {
+      for (std::uint32_t i = tile.offsets[local]; i < tile.offsets[local + 1]; ++i) {
+        const std::uint32_t given = label(tile.label(i));
+        if (items.size() > offsets.back() && labels.back() == given &&
+            items.back().end() == tile.items[i].begin()) {
+          items.back().last = tile.items[i].last;
+          continue;
+        }
+        items.push_back(tile.items[i]);
+        labels.push_back(given);
+      }
+      offsets.push_back(static_cast<std::uint32_t>(items.size()));
+    }
+    made.set_tile(tu, tv, offsets, items, labels);
+  };
+  parallel_for(execution, tiles_u * static_cast<std::size_t>(slab.tiles_v()), one);
+  return made;
+}
 
 struct VoxelColouring::Impl {
   VoxelColourOptions options;

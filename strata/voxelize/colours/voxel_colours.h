@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+#include <functional>
 #include <glm/vec4.hpp>
 #include <memory>
 
@@ -12,6 +14,16 @@
 #include "strata/voxelize/packed_colour.h"
 
 namespace strata {
+
+/// A colour of a solid, from 0 to 1, as bytes. Alpha is at least 1: a solid is there even where it
+/// is transparent.
+[[nodiscard]] glm::u8vec4 solid_colour_bytes(const glm::vec4& colour);
+
+/// A slab with label(n) in place of each label n, which is 1 where the slab has none. Runs that then
+/// touch and are alike become one. Several threads call `label` at once.
+[[nodiscard]] VoxelIntervals relabelled(const VoxelIntervals& slab,
+                                        const std::function<std::uint32_t(std::uint32_t)>& label,
+                                        const Execution& execution = {});
 
 /// Settings of VoxelColouring.
 struct VoxelColourOptions {
