@@ -285,12 +285,12 @@ std::pair<VoxelsPtr, Warnings> voxelize_solid(const SolidData& solid, const Voxe
   run(limits, [&](const Execution& execution) -> Result<void> {
     if (auto fits = check_rays(grid, options); !fits) return fits;
     csg::SolidLists lists(tree, tree.root());
-    const glm::vec4 none(glm::vec3(csg::colour_schemes().front().face) / 255.0f, 1.0f);
-    const csg::ColourLabels colours = csg::colour_labels(tree, tree.root(), none);
+    csg::ColourLabels colours;
     if (choice.ids) {
       lists.set_labels(csg::id_labels(tree));
       voxels->volume.kind = VoxelKind::kIds;
     } else if (choice.colours) {
+      colours = csg::colour_labels(tree, tree.root(), csg::plain_solid_colour());
       lists.set_labels(colours.labels);
     }
     if (auto done = lists.fit(finest_of(grid, options), nullptr, execution); !done) return done;

@@ -11,14 +11,12 @@
 namespace strata::apps {
 namespace {
 
-/// Of solids that have none.
-glm::vec4 solid_colour() { return {glm::vec3(csg::colour_schemes().front().face) / 255.0f, 1.0f}; }
-
 /// The colour of each triangle of a tree: that of its solid.
 std::vector<glm::u8vec4> triangle_colours(const csg::SolidInput& input) {
   std::vector<glm::u8vec4> of_solids, colours;
   for (const csg::Solid& solid : input.scene->solids()) {
-    of_solids.push_back(solid_colour_bytes(csg::colour_or(solid.colour, solid_colour())));
+    of_solids.push_back(
+        solid_colour_bytes(csg::colour_or(solid.colour, csg::plain_solid_colour())));
   }
   colours.reserve(input.soup.triangles.size());
   for (std::uint32_t t = 0; t < input.soup.triangles.size(); ++t) {
@@ -66,7 +64,8 @@ Result<Colouring> Colouring::create(const VoxelizeCommand& command, VoxelizeOutc
   const bool surface = command.surface || !made.solid_;
   outcome.colours.emplace().of_solids = input.tree != nullptr;
   if (input.tree && !surface && !command.fill_colour) {
-    const auto parts = csg::colour_labels(*input.scene, input.scene->root(), solid_colour());
+    const auto parts =
+        csg::colour_labels(*input.scene, input.scene->root(), csg::plain_solid_colour());
     for (const glm::vec4& colour : parts.colours) {
       made.colour_of_label_.push_back(packed_colour(solid_colour_bytes(colour)));
     }

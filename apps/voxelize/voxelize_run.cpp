@@ -116,8 +116,8 @@ void label_solids(const VoxelizeCommand& command, VoxelizeOutcome& outcome,
   if (command.output.empty() || surface || command.sdf) return;
   const std::size_t most = outcome.format->colours;
   if (most == 0) return;
-  const glm::vec4 none(glm::vec3(csg::colour_schemes().front().face) / 255.0f, 1.0f);
-  const csg::ColourLabels parts = csg::colour_labels(scene, scene.root(), none);
+  const csg::ColourLabels parts =
+      csg::colour_labels(scene, scene.root(), csg::plain_solid_colour());
   if (parts.colours.size() > most) {
     return session.warn(
         "colours",

@@ -37,4 +37,6 @@ const ColourScheme* find_colour_scheme(std::string_view name) {
 
 const ColourScheme& default_scheme() { return std::end(kSchemes)[-1]; }
 
+glm::vec4 plain_solid_colour() { return {glm::vec3(colour_schemes().front().face) / 255.0f, 1.0f}; }
+
 }  // namespace strata::csg

@@ -50,6 +50,8 @@ inline constexpr std::string_view kSectionName = "section ";
 
 /// The scheme of pictures for which none is chosen: "Neutral".
 [[nodiscard]] const ColourScheme& default_scheme();
+/// What solids without a colour have in files, which know no scheme: OpenSCAD's, "Cornfield".
+[[nodiscard]] glm::vec4 plain_solid_colour();
 
 /// A part of the tree that is also shown as a transparent ghost.
 struct Ghost {
