@@ -1,12 +1,10 @@
 #include <sys/resource.h>
-#include <sys/stat.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
 #include <glm/matrix.hpp>
-#include <memory>
 #include <span>
 #include <utility>
 #include <vector>
@@ -67,24 +65,15 @@ Result<std::optional<VoxelFormat>> output_format(const VoxelizeCommand& command)
                 "--name needs a .vdb, .nrrd or .vti file; format {} cannot store a name",
                 format->name);
   }
-  if (command.ids) {
-    if (auto held = check_ids(*format, 1); !held) return tl::unexpected(held.error());
-  }
-  if (command.colours) {
-    VoxelWriterOptions colours;
-    colours.rgba = true;
-    if (auto held = check_values(*format, colours); !held) return tl::unexpected(held.error());
-  }
-  if (command.sdf) {
-    VoxelWriterOptions distances;
-    distances.band = 1.0f;
-    if (auto held = check_values(*format, distances); !held) return tl::unexpected(held.error());
-    if (command.band_all && format->name == "vdb") {
-      return fail(
-          ErrorCode::kUsage,
-          "--band all: a level set in a .vdb has a band; write .npz, .nrrd, .vti or another "
-          "format of arrays, or give a number");
-    }
+  VoxelWriterOptions values;
+  values.ids = command.ids ? 1 : 0;
+  values.rgba = command.colours;
+  values.band = command.sdf ? 1.0f : 0.0f;
+  if (auto held = check_values(*format, values); !held) return tl::unexpected(held.error());
+  if (command.band_all && format->name == "vdb") {
+    return fail(ErrorCode::kUsage,
+                "--band all: a level set in a .vdb has a band; write .npz, .nrrd, .vti or another "
+                "format of arrays, or give a number");
   }
   if (command.axis && *command.axis != format->axis && !command.sdf) {
     return fail(ErrorCode::kUsage,
@@ -305,13 +294,11 @@ Result<void> check_disk(const VoxelizeCommand& command, const VoxelizeOutcome& o
   const bool plain =
       outcome.format && (outcome.format->name == "npy" || outcome.format->name == "nii" ||
                          outcome.format->name == "raw");
-  if (!plain || command.output == "-") return {};
+  if (!plain || is_stream(command.output)) return {};
   std::string folder = command.output.substr(0, command.output.rfind('/') + 1);
   if (folder.empty()) folder = ".";
   struct statvfs disk {};
-  struct stat file {};
-  const bool special = stat(command.output.c_str(), &file) == 0 && !S_ISREG(file.st_mode);
-  if (special || statvfs(folder.c_str(), &disk) != 0) return {};
+  if (statvfs(folder.c_str(), &disk) != 0) return {};
   const glm::ivec3 dims = outcome.grid.dims;
   const double least = (command.sdf || command.floats || command.colours ? 4.0 : 1.0) * dims.x *
                        dims.y * static_cast<double>(dims.z);
@@ -323,10 +310,6 @@ Result<void> check_disk(const VoxelizeCommand& command, const VoxelizeOutcome& o
               readable_bytes(static_cast<std::uint64_t>(least)),
               readable_bytes(static_cast<std::uint64_t>(room)));
 }
-
-}  // namespace
-
-namespace {
 
 Result<void> make_voxels(const VoxelizeCommand& command, Session& session) {
   VoxelizeOutcome outcome;

@@ -203,7 +203,7 @@ class VoxelizeRun {
   Result<void> write(Add&& add);
   Result<void> take(const VoxelIntervals& slab);
   Result<void> take_coloured(const VoxelIntervals& slab);
-  void tell(const VoxelizeReport& report, const std::optional<BoundaryArea>& boundary);
+  void tell(const VoxelizeReport& report);
 
   const VoxelizeCommand& command_;
   VoxelizeOutcome& outcome_;
@@ -247,6 +247,7 @@ Result<void> VoxelizeRun::open() {
       session_.memory_limit() > taken ? session_.memory_limit() - taken : 0, 1);
   quiet_ = execution_;
   quiet_.progress = {};
+  if (command_.stats || command_.json) boundary_.emplace(outcome_.grid, outcome_.axis);
   return {};
 }
 
@@ -291,7 +292,6 @@ Result<void> VoxelizeRun::take_coloured(const VoxelIntervals& slab) {
 }
 
 Result<void> VoxelizeRun::voxelize() {
-  if (command_.stats || command_.json) boundary_.emplace(outcome_.grid, outcome_.axis);
   VoxelGrid finest = outcome_.grid;
   const int fine = std::max({1, samples_, command_.coverage});
   finest.dims *= fine, finest.voxel_size /= fine;
@@ -313,14 +313,14 @@ Result<void> VoxelizeRun::voxelize() {
     report->intervals = left_out_->intervals;
     report->checksum = left_out_->checksum.value();
   }
-  tell(*report, boundary_);
+  tell(*report);
   return {};
 }
 
-void VoxelizeRun::tell(const VoxelizeReport& report, const std::optional<BoundaryArea>& boundary) {
+void VoxelizeRun::tell(const VoxelizeReport& report) {
   outcome_.report = report;
   outcome_.measured = true;
-  if (boundary) outcome_.area_estimate = boundary->estimate();
+  if (boundary_) outcome_.area_estimate = boundary_->estimate();
 }
 
 /// Of --sdf.
@@ -329,15 +329,13 @@ Result<void> VoxelizeRun::distances() {
   auto surface = distance_surface(command_, outcome_, options_, session_);
   if (!surface) return tl::unexpected(surface.error());
   outcome_.exact_boundary = surface->has_value();
-  std::optional<BoundaryArea> boundary;
-  if (command_.stats || command_.json) boundary.emplace(outcome_.grid, Axis::kX);
   DistanceOptions options;
   options.band = command_.band;
   options.everywhere = command_.band_all;
   options.solid = options_;
   if (*surface) options.surface = &**surface;
   options.inside = [&](const VoxelIntervals& slab) -> Result<void> {
-    if (boundary) boundary->add(slab, quiet_);
+    if (boundary_) boundary_->add(slab, quiet_);
     return {};
   };
   Execution execution = session_.execution("distances", 1.0);
@@ -350,7 +348,7 @@ Result<void> VoxelizeRun::distances() {
   if (!report) return tl::unexpected(report.error());
   if (session_.interrupted()) return fail(ErrorCode::kCancelled, "stopped");
   outcome_.distances = *report;
-  tell(report->solid, boundary);
+  tell(report->solid);
   return {};
 }
 
