@@ -12,7 +12,7 @@
 #include "apps/commands/oit_options.h"
 #include "apps/session/file_conflicts.h"
 #include "core/letters.h"
-#include "core/printable.h"
+#include "voxelize/output/file_pair.h"
 
 namespace strata::apps {
 namespace {
@@ -30,11 +30,12 @@ std::vector<std::string> beside(const std::string& path, std::string_view format
   const auto has = [&](const char* extension) {
     return has_extension(path, extension) || same_word(format, extension + 1);
   };
-  const std::size_t dot = path.rfind('.');
-  const std::string stem = path.substr(0, dot == std::string::npos ? path.size() : dot);
-  if (has(".mhd")) return {stem + ".zraw", stem + ".raw"};
-  if (has(".nhdr") || has(".raw")) return {stem + ".nhdr", stem + ".raw"};
-  return {};
+  if (has(".mhd")) {
+    return {FilePair(path, ".mhd", ".zraw").data, FilePair(path, ".mhd", ".raw").data};
+  }
+  if (!has(".nhdr") && !has(".raw")) return {};
+  const FilePair pair(path, ".nhdr", ".raw");
+  return {pair.head, pair.data};
 }
 
 /// The file that a .mhd or .nhdr names for its data; empty: none.

@@ -70,6 +70,13 @@ TEST_F(Files, InputsAreNotOverwritten) {
           {"-o ./part.stl would overwrite the input part.stl"});
   refuses({"voxelize", "scene.csg", "-r", "10", "-o", "part.stl", "--format", "npy"},
           {"-o part.stl would overwrite a file of the scene, part.stl"});
+  for (const auto& [output, other] :
+       {std::pair("x.raw", "x.nhdr"), std::pair("x.bin", "x.bin.nhdr"),
+        std::pair("x.nhdr", "x.raw")}) {
+    refuses({"voxelize", "part.stl", "-r", "10", "-o", output, "--format", "raw",
+             std::string("--json=") + other},
+            {std::string("the other file of -o ") + other});
+  }
   refuses({"info", "part.stl", "--json=" + place.path("part.stl")}, {"the input part.stl"});
   refuses({"ldi", "old.png", "--input-format", "stl", "-r", "8", "-o", "old.png"},
           {"-o old.png would overwrite the input old.png"});
