@@ -249,37 +249,31 @@ py::array solid_picture(const SolidData& solid, const std::optional<CameraChoice
 
 // --- sizes and meshes ----------------------------------------------------------------------------
 
-py::dict dict_of(const csg::ExactMeasures& exact) {
+/// @param inertia  of exact measures; else None
+py::dict dict_of(const auto& measures, bool exact, double volume_error, py::object inertia) {
   py::dict made;
-  made["exact"] = true;
-  made["empty"] = exact.empty;
-  made["volume"] = exact.volume;
-  made["volume_error"] = exact.volume_snap_error;
-  made["area"] = exact.area;
-  made["area_error"] = exact.area_error;
-  made["centre"] = tuple_of(exact.centre);
-  made["low"] = tuple_of(exact.low);
-  made["high"] = tuple_of(exact.high);
-  const auto& i = exact.inertia;
-  made["inertia"] =
-      py::make_tuple(py::make_tuple(i[0], i[5], i[4]), py::make_tuple(i[5], i[1], i[3]),
-                     py::make_tuple(i[4], i[3], i[2]));
-  return made;
-}
-
-py::dict dict_of(const csg::Measures& measures) {
-  py::dict made;
-  made["exact"] = false;
+  made["exact"] = exact;
   made["empty"] = measures.empty;
   made["volume"] = measures.volume;
-  made["volume_error"] = measures.volume_error;
+  made["volume_error"] = volume_error;
   made["area"] = measures.area;
   made["area_error"] = measures.area_error;
   made["centre"] = tuple_of(measures.centre);
   made["low"] = tuple_of(measures.low);
   made["high"] = tuple_of(measures.high);
-  made["inertia"] = py::none();
+  made["inertia"] = std::move(inertia);
   return made;
+}
+
+py::dict dict_of(const csg::ExactMeasures& exact) {
+  const auto& i = exact.inertia;
+  return dict_of(exact, true, exact.volume_snap_error,
+                 py::make_tuple(py::make_tuple(i[0], i[5], i[4]), py::make_tuple(i[5], i[1], i[3]),
+                                py::make_tuple(i[4], i[3], i[2])));
+}
+
+py::dict dict_of(const csg::Measures& measures) {
+  return dict_of(measures, false, measures.volume_error, py::none());
 }
 
 /// Exactly; by rays where a resolution is given, and where solids are open or too large.

@@ -534,7 +534,6 @@ void bind_voxels(py::module_& module) {
   module.def("voxels_of_labels", &voxels_of<std::uint32_t>);
   module.def("read_voxels", &read_voxel_file, py::arg("path"), py::arg("grid"),
              py::arg("threshold"), py::arg("integers"), py::arg("limits"));
-  module.def("is_voxel_file", &is_voxel_file, py::arg("path"));
   module.def("png", &png_of, py::arg("pixels"));
 }
 

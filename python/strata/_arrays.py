@@ -71,6 +71,13 @@ def numbers_of(value: Any, count: int, name: str) -> Tuple[float, ...]:
     return tuple(number_of(one, name) for one in values)
 
 
+def three_of(value: Any, name: str) -> Tuple[float, ...]:
+    """Three finite numbers, or one for all three."""
+    if np.ndim(value) == 0:
+        return (number_of(value, name),) * 3
+    return numbers_of(value, 3, name)
+
+
 def points_of(points: Any, name: str) -> np.ndarray:
     """An (n, 3) array of finite doubles, contiguous and in the byte order of this machine.
 

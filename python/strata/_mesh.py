@@ -8,7 +8,7 @@ from typing import Any, Dict, Optional, Sequence, Tuple
 import numpy as np
 
 from . import _strata
-from ._arrays import PathLike, check_corners, colours_of, limits_of, number_of, numbers_of, points_of, text_of_path, triangles_of, warn_of
+from ._arrays import PathLike, check_corners, colours_of, limits_of, numbers_of, points_of, text_of_path, three_of, triangles_of, warn_of
 from ._errors import InputError, UsageError
 
 _METRES = {"": 0.0, "um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254, "ft": 0.3048}
@@ -209,7 +209,7 @@ def read_mesh(
     names = [parts] if isinstance(parts, str) else [str(part) for part in parts]
     if unit not in _METRES:
         raise UsageError(f"unit must be one of {', '.join(repr(name) for name in _METRES)}, got {unit!r}")
-    factors = (number_of(scale, "scale"),) * 3 if np.ndim(scale) == 0 else numbers_of(scale, 3, "scale")
+    factors = three_of(scale, "scale")
     if 0 in factors:
         raise UsageError(f"scale must not be 0, got {scale}")
     place = _strata.Placement(_METRES[unit], str(up), factors, numbers_of(translate, 3, "translate"))

@@ -9,7 +9,7 @@ from typing import Any, Optional, Sequence, Tuple, Union
 import numpy as np
 
 from . import _strata
-from ._arrays import PathLike, axis_of, integer_of, limits_of, number_of, numbers_of, points_of, size_of, text_of_path, warn_of
+from ._arrays import PathLike, axis_of, integer_of, limits_of, number_of, numbers_of, points_of, size_of, text_of_path, three_of, warn_of
 from ._errors import InputError, UsageError
 from ._mesh import mesh_of
 from ._pictures import Camera, png_of
@@ -69,7 +69,7 @@ class Grid:
         if direction.shape != (3, 3) or not np.allclose(direction.T @ direction, np.eye(3), atol=1e-6):
             raise UsageError("direction must be 3 x 3 numbers with columns of length 1 and at right angles")
         rows = tuple(tuple(float(x) for x in row) for row in direction)
-        return _strata.Grid(_whole_three(self.dims, "dims"), numbers_of(self.origin, 3, "origin"), _three(self.spacing, "spacing"), rows)
+        return _strata.Grid(_whole_three(self.dims, "dims"), numbers_of(self.origin, 3, "origin"), three_of(self.spacing, "spacing"), rows)
 
     @classmethod
     def _of(cls, native: Any) -> "Grid":
@@ -105,7 +105,7 @@ class Voxels:
         values = np.asarray(array)
         if values.ndim != 3 or 0 in values.shape:
             raise InputError(f"voxels must have the shape (nx, ny, nz), each at least 1, got {values.shape}")
-        grid = _grid(values.shape, origin, spacing)
+        grid = Grid(values.shape, origin, spacing)._native()
         limits = limits_of(threads, None)
         if values.dtype.kind == "b":
             self._native = _strata.voxels_of_mask(np.ascontiguousarray(values), grid, limits)
@@ -604,7 +604,7 @@ def grid_of(
         low=tuple(box[0]),
         high=tuple(box[1]),
         resolution=None if resolution is None else integer_of(resolution, "resolution"),
-        voxel_size=None if voxel_size is None else _three(voxel_size, "voxel_size"),
+        voxel_size=None if voxel_size is None else three_of(voxel_size, "voxel_size"),
         dims=None if dims is None else _whole_three(dims, "dims"),
         bounds=None if bounds is None else tuple(numbers_of(corner, 3, "bounds") for corner in _two(bounds)),
         origin=None if origin is None else numbers_of(origin, 3, "origin"),
@@ -628,10 +628,9 @@ def _grid_like(like: Any) -> Any:
 def _fill(colour: Any) -> Optional[Tuple[int, int, int]]:
     if colour is None:
         return None
-    from .csg import colour_of
+    from .csg import bytes_of_colour
 
-    red, green, blue = (int(round(255 * part)) for part in colour_of(colour, None, None, 1.0)[:3])
-    return red, green, blue
+    return bytes_of_colour(colour)[:3]
 
 
 def _band(sdf: bool, band: Optional[float]) -> float:
@@ -650,19 +649,8 @@ def _two(bounds: Any) -> Tuple[Any, Any]:
     return corners  # type: ignore[return-value]
 
 
-def _three(value: Any, name: str) -> Tuple[float, ...]:
-    if np.ndim(value) == 0:
-        return (number_of(value, name),) * 3
-    return numbers_of(value, 3, name)
-
-
 def _whole_three(value: Any, name: str) -> Tuple[int, ...]:
     sides = tuple(value)
     if len(sides) != 3:
         raise UsageError(f"{name} must be 3 whole numbers, got {len(sides)}")
     return tuple(integer_of(side, name) for side in sides)
-
-
-def _grid(dims: Any, origin: Any, spacing: Any) -> Any:
-    straight = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-    return _strata.Grid(_whole_three(dims, "dims"), numbers_of(origin, 3, "origin"), _three(spacing, "spacing"), straight)

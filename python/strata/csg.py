@@ -14,7 +14,7 @@ from typing import Any, Dict, Iterable, Optional, Sequence, Tuple, Union
 import numpy as np
 
 from . import _strata
-from ._arrays import PathLike, axis_of, integer_of, limits_of, number_of, numbers_of, size_of, text_of_path, warn_of
+from ._arrays import PathLike, axis_of, integer_of, limits_of, number_of, numbers_of, size_of, text_of_path, three_of, warn_of
 from ._errors import InputError, UsageError
 from ._lists import DepthLists, depth_lists
 from ._mesh import Mesh, mesh_of
@@ -246,7 +246,7 @@ class Solid:
         if isinstance(background, str) and background == "transparent":
             behind = (0, 0, 0, 0)
         elif background is not None:
-            behind = tuple(int(round(255 * part)) for part in colour_of(background, None, None, 1.0))
+            behind = bytes_of_colour(background)
         look = _strata.Look(integer_of(samples, "samples"), bool(edges), bool(ground_shadow), str(scheme), behind)
         native = None if camera is None else camera._native()
         return _strata.solid_picture(self._native, native, size_of(size), look, limits_of(threads, memory_limit))
@@ -338,8 +338,7 @@ def cube(size: Any = 1.0, *, center: bool = False) -> Solid:
     center : bool
         Its middle is the origin.
     """
-    sides = (number_of(size, "size"),) * 3 if np.ndim(size) == 0 else numbers_of(size, 3, "size")
-    return Solid._of(_strata.cube(sides, bool(center)))
+    return Solid._of(_strata.cube(three_of(size, "size"), bool(center)))
 
 
 def sphere(r: Optional[float] = None, *, d: Optional[float] = None, fn: float = 0, fa: float = 12, fs: float = 2) -> Solid:
@@ -517,6 +516,12 @@ def colour_of(red: Any, green: Any, blue: Any, alpha: float) -> Tuple[float, ...
     if len(parts) != 4 or not all(0 <= one <= 1 for one in parts):
         raise UsageError(f"a colour must be three or four numbers from 0 to 1, got {parts}")
     return tuple(parts)
+
+
+def bytes_of_colour(colour: Any) -> Tuple[int, int, int, int]:
+    """Red, green, blue, alpha as bytes; without an alpha it is opaque."""
+    red, green, blue, alpha = (int(round(255 * part)) for part in colour_of(colour, None, None, 1.0))
+    return red, green, blue, alpha
 
 
 def _radius(radius: Any, diameter: Any, default: float, name: str, twice: str) -> float:
