@@ -259,13 +259,16 @@ Result<SceneInfo> look_at_scene(const std::string& path, const InfoCommand& comm
   return info;
 }
 
-/// Reads a mesh with its attributes. If these are wrong, a warning says so, and the mesh counts.
+/// Reads a mesh with its attributes. If these are wrong, a warning says so, and the mesh counts: a
+/// pipe, which cannot be read twice, is an error then.
 Result<MeshFile> read_with_attributes(const std::string& path, const csg::InputKind& kind,
                                       csg::SceneInput input, const Execution& execution,
                                       Session& session) {
   input.attributes = true;
   auto file = csg::read_mesh_input(path, kind, input, execution);
-  if (file || path == "-" || session.interrupted()) return file;
+  std::error_code unknown;
+  if (file || !std::filesystem::is_regular_file(path, unknown) || session.interrupted())
+    return file;
   input.attributes = false;
   auto plain = csg::read_mesh_input(path, kind, input, execution);
   if (plain) session.warn("reader", file.error().message);

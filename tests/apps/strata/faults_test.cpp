@@ -246,10 +246,32 @@ TEST_F(Faults, APipeWithoutAWriterHearsAStop) {
   };
   fails({"voxelize", "pipe.stl", "-r", "8", "--stats"}, 130, "interrupted", options);
   EXPECT_LT(seconds, 10.0);  // without end it was
-  options.while_running = [this](int) {
-    std::ofstream(place.path("pipe.stl")) << "solid a\nendsolid a\n";
+}
+
+TEST_F(Faults, CommandsReadAPipeOnce) {
+  ASSERT_EQ(mkfifo(place.path("pipe.stl").c_str(), 0600), 0);
+  ASSERT_EQ(mkfifo(place.path("pipe.obj").c_str(), 0600), 0);
+  before = place.names();
+  std::string text;
+  const auto writes = [&](const std::string& name) {
+    RunOptions options;
+    options.while_running = [&text, path = place.path(name)](int) { std::ofstream(path) << text; };
+    return options;
   };
-  fails({"info", "pipe.stl"}, 3, "pipe.stl", options);
+  const std::vector<std::vector<std::string>> commands = {
+      {"info"}, {"csg"}, {"voxelize", "-r", "8", "--stats"}, {"picture", "-o", "out.png"}};
+  for (std::vector<std::string> words : commands) {
+    SCOPED_TRACE(words.front());
+    words.insert(words.begin() + 1, "pipe.stl");
+    text = "solid a\nfacet\nendsolid a\n";
+    fails(words, 3, "pipe.stl", writes("pipe.stl"));
+    words[1] = "pipe.obj";
+    text =
+        "mtllib none.mtl\nusemtl red\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\n"
+        "f 2 3 4\nf 3 1 4\n";
+    const RunResult run = place.run(words, writes("pipe.obj"));
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+  }
 }
 
 TEST_F(Faults, ATimeLimitEndsTheCommand) {
