@@ -40,6 +40,14 @@ class PropertyReader {
         colours(node, group);
       } else if (kind == "texture2dgroup") {
         places(node, group);
+      } else if (kind == "compositematerials" || kind == "multiproperties") {
+        group.skipped = true;
+        warnings_.push_back(file_
+                                .refuse(node, fmt::format("<{}> is not read; faces that use it "
+                                                          "have no colour",
+                                                          kind))
+                                .value()
+                                .message);
       } else {
         continue;
       }

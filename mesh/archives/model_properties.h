@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <functional>
 #include <map>
 #include <optional>
@@ -18,6 +19,11 @@ struct PropertyGroup {
   std::vector<glm::u8vec4> colours;               ///< of a colour group
   std::vector<glm::vec2> places;                  ///< of a group of texture coordinates
   std::uint32_t texture = MeshAttributes::kNone;  ///< material of the places
+  bool skipped = false;                           ///< of a kind that is not read
+
+  [[nodiscard]] std::size_t size() const {
+    return std::max({materials.size(), colours.size(), places.size()});
+  }
 
   /// @param corners  indices into the list; what is not there has no look
   [[nodiscard]] TriangleLook look(const std::array<std::uint32_t, 3>& corners) const;

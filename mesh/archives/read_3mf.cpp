@@ -8,7 +8,10 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
 #include <glm/mat4x4.hpp>
+#include <glm/matrix.hpp>
 #include <memory>
 #include <new>
 #include <optional>
@@ -21,6 +24,7 @@
 #include "core/printable.h"
 #include "mesh/archives/model_looks.h"
 #include "mesh/archives/model_properties.h"
+#include "mesh/archives/slicer_settings.h"
 #include "mesh/archives/xml_mesh.h"
 #include "mesh/archives/zip_entry.h"
 #include "mesh/textures/read_texture.h"
@@ -36,13 +40,21 @@ using namespace detail;
 struct ObjectMesh {
   TriangleSoup soup;
   std::vector<TriangleLook> looks;
+  /// Triangles up to `end`, from the end of the volume before.
+  struct Volume {
+    std::string name;
+    std::size_t end = 0;
+  };
+  std::vector<Volume> volumes;  ///< as a slicer divides the mesh; empty: it does not
 };
 
 /// Finds the properties that triangles name.
 class LookFinder {
  public:
-  LookFinder(const pugi::xml_node& object, const PropertyGroups& groups) : groups_(groups) {
-    own_ = group_of(object.attribute("pid").value());
+  LookFinder(const pugi::xml_node& object, const PropertyGroups& groups)
+      : object_(object), groups_(groups) {
+    own_id_ = object.attribute("pid").value();
+    own_ = group_of(own_id_);
     own_index_ = index_of(object.attribute("pindex").value());
   }
   TriangleLook look(const pugi::xml_node& triangle) {
@@ -53,17 +65,51 @@ class LookFinder {
       last_id_ = pid;
       last_ = group;
     }
-    if (group == nullptr) return {};
-    if (p1.empty()) return group->look({own_index_, own_index_, own_index_});
-    const std::uint32_t first = index_of(p1);
+    const std::string_view id = pid.empty() ? own_id_ : pid;
+    if (group == nullptr) {
+      if (!id.empty()) miss(triangle, id, nullptr, 0);
+      return {};
+    }
+    const std::uint32_t first = p1.empty() ? own_index_ : index_of(p1);
     const auto or_first = [&](const char* name) {
       const std::string_view text = triangle.attribute(name).value();
       return text.empty() ? first : index_of(text);
     };
-    return group->look({first, or_first("p2"), or_first("p3")});
+    std::array<std::uint32_t, 3> corners{first, first, first};
+    if (!p1.empty()) corners = {first, or_first("p2"), or_first("p3")};
+    const std::uint32_t most = *std::max_element(corners.begin(), corners.end());
+    if (!group->skipped && most >= group->size()) miss(triangle, id, group, most);
+    return group->look(corners);
+  }
+  /// Tells of triangles whose property does not exist.
+  void warn(const XmlMesh& file, std::vector<std::string>& warnings) const {
+    if (missed_ == 0) return;
+    warnings.push_back(
+        file.refuse(first_missed_,
+                    fmt::format("object '{}': {}; {} no colour",
+                                printable(object_.attribute("id").value(), 40), what_missed_,
+                                missed_ == 1 ? "this triangle has"
+                                             : fmt::format("{} triangles have", missed_)))
+            .value()
+            .message);
   }
 
  private:
+  void miss(const pugi::xml_node& triangle, std::string_view id, const PropertyGroup* group,
+            std::uint32_t index) {
+    if (missed_++ > 0) return;
+    first_missed_ = triangle;
+    const std::string name = printable(id, 40);
+    what_missed_ =
+        group == nullptr ? fmt::format("there is no property group '{}' (pid)", name)
+        : index == MeshAttributes::kNone
+            ? fmt::format(
+                  "it names the property group '{}' (pid), but no property of it (pindex, "
+                  "p1)",
+                  name)
+            : fmt::format("there is no property {} in the group '{}', which has {}", index, name,
+                          group->size());
+  }
   [[nodiscard]] const PropertyGroup* group_of(std::string_view id) const {
     const auto found = groups_.find(id);
     return found == groups_.end() ? nullptr : &found->second;
@@ -74,17 +120,62 @@ class LookFinder {
                                                      : MeshAttributes::kNone;
   }
 
+  const pugi::xml_node object_;
   const PropertyGroups& groups_;
+  std::string_view own_id_;
   const PropertyGroup* own_ = nullptr;
   std::uint32_t own_index_ = MeshAttributes::kNone;
   std::string_view last_id_;
   const PropertyGroup* last_ = nullptr;
+  std::uint64_t missed_ = 0;
+  pugi::xml_node first_missed_;
+  std::string what_missed_;
 };
 
+/// Divides the triangles as a slicer does, and drops those of volumes that are no solids.
+/// @param elements  the number of each triangle in the file
+/// @param left_out  gets the volumes that were dropped
+void divide(const SlicerObject& object, const std::vector<std::uint32_t>& elements,
+            ObjectMesh& mesh, std::vector<std::string>& left_out) {
+  std::size_t kept = 0, t = 0;
+  const auto take = [&](std::uint64_t end) {  // up to a triangle of the file
+    for (; t < elements.size() && elements[t] < end; ++t, ++kept) {
+      mesh.soup.triangles[kept] = mesh.soup.triangles[t];
+      if (!mesh.looks.empty()) mesh.looks[kept] = mesh.looks[t];
+    }
+  };
+  const auto end_part = [&](const std::string& name) {
+    if (kept > (mesh.volumes.empty() ? 0 : mesh.volumes.back().end)) {
+      mesh.volumes.push_back({name, kept});
+    }
+  };
+  for (const SlicerPart& volume : object.volumes) {
+    take(volume.first);  // triangles of no volume
+    end_part(object.name);
+    if (volume.not_solid.empty()) {
+      take(volume.last + 1);
+      end_part(object.name_of(volume));
+      continue;
+    }
+    const std::size_t before = t;
+    while (t < elements.size() && elements[t] <= volume.last) ++t;
+    if (t > before) {
+      left_out.push_back(
+          fmt::format("'{}' ({})", printable(object.name_of(volume), 40), volume.not_solid));
+    }
+  }
+  take(std::uint64_t{1} << 32);
+  end_part(object.name);
+  mesh.soup.triangles.resize(kept);
+  if (!mesh.looks.empty()) mesh.looks.resize(kept);
+}
+
 /// @param finder  null: looks are not asked
+/// @param elements  gets the number of each triangle in the file
 Result<ObjectMesh> read_object_mesh(const XmlMesh& file, const pugi::xml_node& node,
-                                    LookFinder* finder) {
+                                    LookFinder* finder, std::vector<std::uint32_t>& elements) {
   ObjectMesh mesh;
+  std::uint32_t element = 0;
   for (const pugi::xml_node& vertex : child(node, "vertices").children()) {
     if (vertex.type() != pugi::node_element) continue;
     if (file.stopped()) return fail(ErrorCode::kCancelled, "stopped");
@@ -105,8 +196,21 @@ Result<ObjectMesh> read_object_mesh(const XmlMesh& file, const pugi::xml_node& n
     const auto added = file.add_triangle(mesh.soup, triangle, texts, 0);
     if (!added) return tl::unexpected(added.error());
     if (*added && finder) mesh.looks.push_back(finder->look(triangle));
+    if (*added) elements.push_back(element);
+    ++element;
   }
   return mesh;
+}
+
+/// Whether a matrix has no inverse, but for rounding.
+bool is_singular(glm::dmat3 matrix) {
+  for (int k = 0; k < 3; ++k) {
+    glm::dvec3& column = matrix[k];
+    const double most = std::max({std::abs(column.x), std::abs(column.y), std::abs(column.z)});
+    if (most == 0.0) return true;
+    column = glm::normalize(column / most);
+  }
+  return std::abs(glm::determinant(matrix)) < 1e-12;
 }
 
 /// Reads "m00 m01 m02 m10 ... m32", a matrix for row vectors. Its rows are the columns of ours.
@@ -125,6 +229,11 @@ Result<glm::dmat4> read_transform(const XmlMesh& file, const pugi::xml_node& nod
   }
   if (text.find_first_not_of(kSpace) != std::string_view::npos) {
     return file.refuse(node, "a transform must have 12 numbers, got more");
+  }
+  if (is_singular(glm::dmat3(matrix))) {
+    return file.refuse(node, fmt::format("the transform of object '{}' is singular: nothing with "
+                                         "a volume is left of it",
+                                         printable(node.attribute("objectid").value(), 40)));
   }
   return matrix;
 }
@@ -200,14 +309,24 @@ class Package {
     if (!name) return tl::unexpected(name.error());
     auto root = part(*name);
     if (!root) return tl::unexpected(root.error());
+    auto settings = read_slicer_settings(archive_, execution_, model_.warnings);
+    if (!settings) return tl::unexpected(settings.error());
+    settings_ = *std::move(settings);
+    root_ = *root;
     const XmlMesh& file = (*root)->file;
     model_.unit_metres = unit_of(file, model_.warnings);
     warn_of_extensions(file);
     for (const pugi::xml_node& item : child(file.root(), "build").children()) {
       if (local_name(item) != "item") continue;
-      if (auto added = add(**root, item, glm::dmat4(1.0), 0, ""); !added) {
+      if (auto added = add(**root, item, glm::dmat4(1.0), 0, "", nullptr); !added) {
         return tl::unexpected(added.error());
       }
+    }
+    if (!left_out_.empty()) {
+      model_.warnings.push_back(fmt::format("{}: {}", archive_.path(),
+                                            what_is_left_out("is left out, which is no solid",
+                                                             "are left out, which are no "
+                                                             "solids")));
     }
     return gather();
   }
@@ -276,9 +395,9 @@ class Package {
   }
 
   /// Adds the object that a build item or component names, at its place. @param name  of the object
-  /// around it
+  /// around it @param slicer  what a slicer says of the object around it; may be null
   Result<void> add(ModelPart& home, const pugi::xml_node& item, const glm::dmat4& around, int depth,
-                   const std::string& name) {
+                   const std::string& name, const SlicerObject* slicer) {
     if (execution_.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
     auto matrix = read_transform(home.file, item);
     if (!matrix) return tl::unexpected(matrix.error());
@@ -299,6 +418,11 @@ class Package {
                                                       any_attribute(item, "path")));
     }
     ModelObject& object = found->second;
+    const SlicerPart* const part = part_of(slicer, id);
+    std::string own = object.node.attribute("name").value();
+    if (part != nullptr && !part->name.empty()) own = slicer->name_of(*part);
+    if (own.empty()) own = name;
+    if (is_left_out(object, part, own)) return {};
     if (object.is_open) {
       return home.file.refuse(item, fmt::format("object '{}' is a component of itself", id));
     }
@@ -315,19 +439,70 @@ class Package {
           item, fmt::format("the model has more than {} objects at their places", kMostInstances),
           ErrorCode::kLimit);
     }
-    const std::string_view own = object.node.attribute("name").value();
-    return add_object(*where, object, world, depth, own.empty() ? name : std::string(own));
+    return add_object(*where, object, world, depth, own);
+  }
+
+  static const SlicerPart* part_of(const SlicerObject* slicer, std::string_view id) {
+    if (slicer == nullptr) return nullptr;
+    const auto found = slicer->parts.find(id);
+    return found == slicer->parts.end() ? nullptr : &found->second;
+  }
+  /// What a slicer says of an object of the root model.
+  const SlicerObject* slicer_object(const ModelPart& home, const ModelObject& object) const {
+    if (&home != root_) return nullptr;
+    const auto found = settings_.find(std::string_view(object.node.attribute("id").value()));
+    return found == settings_.end() ? nullptr : &found->second;
+  }
+  /// Whether an object is no solid. Remembers it then.
+  bool is_left_out(const ModelObject& object, const SlicerPart* part, const std::string& name) {
+    const std::string_view type = object.node.attribute("type").value();
+    std::string kind;
+    if (type == "support" || type == "solidsupport" || type == "other") kind = type;
+    if (part != nullptr && !part->not_solid.empty()) kind = part->not_solid;
+    if (kind.empty()) return false;
+    left_out_.push_back(fmt::format(
+        "'{}' ({})",
+        printable(
+            name.empty() ? fmt::format("object {}", object.node.attribute("id").value()) : name,
+            40),
+        kind));
+    return true;
+  }
+  /// "2 objects are ...: 'brim' (support), 'hole' (modifier)".
+  [[nodiscard]] std::string what_is_left_out(const char* one, const char* several) const {
+    constexpr std::size_t kMost = 5;
+    std::string text = fmt::format("{} {}: ", counted(left_out_.size(), "object"),
+                                   left_out_.size() == 1 ? one : several);
+    for (std::size_t i = 0; i < left_out_.size() && i < kMost; ++i) {
+      text += (i == 0 ? "" : ", ") + left_out_[i];
+    }
+    if (left_out_.size() > kMost) text += fmt::format(" and {} more", left_out_.size() - kMost);
+    return text;
+  }
+
+  Result<void> read_mesh_of(ModelPart& home, ModelObject& object, const pugi::xml_node& content) {
+    LookFinder finder(object.node, home.properties);
+    std::vector<std::uint32_t> elements;
+    auto read =
+        read_object_mesh(home.file, content, options_.attributes ? &finder : nullptr, elements);
+    if (!read) return tl::unexpected(read.error());
+    if (options_.attributes) finder.warn(home.file, model_.warnings);
+    object.mesh = *std::move(read);
+    const SlicerObject* const slicer = slicer_object(home, object);
+    if (slicer != nullptr && !slicer->volumes.empty()) {
+      divide(*slicer, elements, *object.mesh, left_out_);
+    }
+    return {};
   }
 
   Result<void> add_object(ModelPart& home, ModelObject& object, const glm::dmat4& world, int depth,
-                          const std::string& name) {
+                          std::string name) {
+    const SlicerObject* const slicer = slicer_object(home, object);
+    if (name.empty() && slicer != nullptr) name = slicer->name;
     for (const pugi::xml_node& content : object.node.children()) {
       if (local_name(content) == "mesh") {
         if (!object.mesh) {
-          LookFinder finder(object.node, home.properties);
-          auto read = read_object_mesh(home.file, content, options_.attributes ? &finder : nullptr);
-          if (!read) return tl::unexpected(read.error());
-          object.mesh = *std::move(read);
+          if (auto read = read_mesh_of(home, object, content); !read) return read;
         }
         instances_.push_back(
             {&*object.mesh, world,
@@ -336,7 +511,7 @@ class Package {
         object.is_open = true;
         for (const pugi::xml_node& component : content.children()) {
           if (local_name(component) != "component") continue;
-          if (auto added = add(home, component, world, depth + 1, name); !added) {
+          if (auto added = add(home, component, world, depth + 1, name, slicer); !added) {
             return added;
           }
         }
@@ -357,6 +532,10 @@ class Package {
       return fail(ErrorCode::kLimit,
                   "{}: the model has {} triangles and {} vertices in {} objects; the limit is {}",
                   archive_.path(), triangles, positions, instances_.size(), kMostTriangles);
+    }
+    if (triangles == 0 && !left_out_.empty()) {
+      return fail(ErrorCode::kInput, "{}: no build item is a solid: {}", archive_.path(),
+                  what_is_left_out("is no solid", "are no solids"));
     }
     if (triangles == 0) {
       return fail(ErrorCode::kInput, "{}: no build item has a triangle", archive_.path());
@@ -386,14 +565,24 @@ class Package {
   /// Says what the triangles look like that were added last.
   void add_looks(const Instance& instance) {
     if (!options_.attributes && !options_.parts) return;
-    looks_.begin_part(instance.name);
+    const std::vector<glm::uvec3>& before = instance.mesh->soup.triangles;
+    std::size_t begin = 0;
+    for (const ObjectMesh::Volume& volume : instance.mesh->volumes) {
+      looks_.begin_part(volume.name.empty() ? instance.name : volume.name);
+      add_looks(instance, begin, volume.end);
+      begin = volume.end;
+    }
+    if (begin < before.size()) looks_.begin_part(instance.name);
+    add_looks(instance, begin, before.size());
+  }
+  void add_looks(const Instance& instance, std::size_t begin, std::size_t end) {
     const std::vector<glm::uvec3>& before = instance.mesh->soup.triangles;
     const std::vector<glm::uvec3>& after = model_.soup.triangles;
-    if (!options_.attributes) return looks_.skip(before.size());
+    if (!options_.attributes) return looks_.skip(end - begin);
     const std::size_t first = after.size() - before.size();
     const auto base = static_cast<std::uint32_t>(model_.soup.positions.size() -
                                                  instance.mesh->soup.positions.size());
-    for (std::size_t t = 0; t < before.size(); ++t) {
+    for (std::size_t t = begin; t < end; ++t) {
       looks_.add(instance.mesh->looks[t], after[first + t],
                  after[first + t].y != before[t].y + base);
     }
@@ -407,6 +596,9 @@ class Package {
   std::unordered_map<std::string, std::unique_ptr<ModelPart>> parts_;
   std::unordered_set<std::pair<const ModelObject*, std::array<double, 12>>, PlaceHash> placed_;
   std::vector<Instance> instances_;
+  SlicerSettings settings_;
+  const ModelPart* root_ = nullptr;
+  std::vector<std::string> left_out_;  ///< objects that are no solids: "'brim' (support)"
 };
 
 }  // namespace

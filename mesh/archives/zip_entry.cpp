@@ -5,6 +5,9 @@
 #endif
 
 #include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <system_error>
 
 #include "core/letters.h"
 #include "mesh/text/text_scanner.h"
@@ -33,6 +36,28 @@ std::optional<std::string> ZipArchive::find(std::string_view name) const {
 
 #ifdef STRATA_HAVE_LIBZIP
 
+namespace {
+
+/// Why a file cannot be opened as an archive. @param text  libzip's words
+std::string what_is_no_archive(const std::string& path, const std::string& text) {
+  std::ifstream file(path, std::ios::binary);
+  char begin[4] = {};
+  file.read(begin, sizeof begin);
+  if (file.gcount() == 0) return "the file is empty";
+  std::error_code unknown;
+  const auto bytes = std::filesystem::file_size(path, unknown);
+  const std::string_view head(begin, static_cast<std::size_t>(file.gcount()));
+  if (!unknown && std::string_view("PK\3\4").starts_with(head)) {
+    return fmt::format(
+        "the file ends in the middle: {} bytes, and the archive's list of files, "
+        "which stands at its end, is missing ({})",
+        bytes, text);
+  }
+  return fmt::format("not a zip archive ({})", text);
+}
+
+}  // namespace
+
 Result<ZipArchive> ZipArchive::open(const std::string& path) {
   int reason = 0;
   zip_t* const opened = zip_open(path.c_str(), ZIP_RDONLY, &reason);
@@ -41,8 +66,11 @@ Result<ZipArchive> ZipArchive::open(const std::string& path) {
     zip_error_init_with_code(&error, reason);
     const std::string text = zip_error_strerror(&error);
     zip_error_fini(&error);
-    return fail(reason == ZIP_ER_MEMORY ? ErrorCode::kLimit : ErrorCode::kInput,
-                "{}: not a zip archive ({})", path, text);
+    if (reason == ZIP_ER_MEMORY) return fail(ErrorCode::kLimit, "{}: {}", path, text);
+    if (reason == ZIP_ER_NOENT || reason == ZIP_ER_OPEN || reason == ZIP_ER_READ) {
+      return fail(ErrorCode::kInput, "{}: {}", path, text);
+    }
+    return fail(ErrorCode::kInput, "{}: {}", path, what_is_no_archive(path, text));
   }
   ZipArchive archive;
   archive.archive_ =
