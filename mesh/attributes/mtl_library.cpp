@@ -117,6 +117,15 @@ void MtlLibrary::warn_of_unknown() {
   }
 }
 
+/// A picture that is damaged is told; its material has its colour.
+Result<void> MtlLibrary::pass_over(const Error& error) {
+  if (error.code != ErrorCode::kInput) return tl::unexpected(error);
+  if (damaged_++ < kMostSentences) {
+    file_.stats.warnings.push_back(error.message + "; the texture is not shown");
+  }
+  return {};
+}
+
 Result<void> MtlLibrary::read_picture(MtlMaterial& material, const std::string& beside) {
   const std::string path = find(material.picture, beside);
   const auto [found, is_new] = textures_.try_emplace(
@@ -138,7 +147,7 @@ Result<void> MtlLibrary::read_picture(MtlMaterial& material, const std::string& 
     }
     file_.opened.push_back(identify_file(path));
     const auto bytes = InputBytes::open(path, kMostFileBytes, input_.execution.stop);
-    if (!bytes) return tl::unexpected(bytes.error());
+    if (!bytes) return pass_over(bytes.error());
     Execution rest = input_.execution;  // what is left of the memory
     rest.progress = {};
     std::uint64_t taken = 0;
@@ -148,7 +157,7 @@ Result<void> MtlLibrary::read_picture(MtlMaterial& material, const std::string& 
           std::max<std::uint64_t>(rest.memory_limit > taken ? rest.memory_limit - taken : 0, 1);
     }
     auto texture = read_texture(path, bytes->view(), rest);
-    if (!texture) return tl::unexpected(texture.error());
+    if (!texture) return pass_over(texture.error());
     texture->wrap_u = texture->wrap_v = material.wrap;
     found->second = static_cast<std::uint32_t>(textures.size());
     textures.push_back(*std::move(texture));

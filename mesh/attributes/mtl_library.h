@@ -36,6 +36,7 @@ class MtlLibrary {
   Result<void> check_root(const std::string& path, const char* what) const;
   Result<void> read_file(const std::string& name);
   Result<void> read_picture(MtlMaterial& material, const std::string& beside);
+  Result<void> pass_over(const Error& error);
   void warn_of_unknown();
 
   const ReaderInput& input_;
@@ -45,6 +46,7 @@ class MtlLibrary {
   std::map<std::string, std::uint32_t, std::less<>> numbers_;
   std::map<std::string, std::uint32_t> textures_;  ///< by path and wrap
   std::set<std::string> unknown_, had_;
+  std::size_t damaged_ = 0;  ///< pictures
 };
 
 }  // namespace strata::detail

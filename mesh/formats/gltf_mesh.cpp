@@ -17,7 +17,7 @@ Result<MeshFile> read_gltf_mesh(const ReaderInput& input) {
   auto model = read_gltf(input.text, input.name, options, input.execution);
   if (!model) return tl::unexpected(model.error());
   const GltfLosses& losses = model->losses;
-  const std::uint64_t dropped = losses.out_of_range + losses.non_finite;
+  const std::uint64_t dropped = losses.too_few + losses.out_of_range + losses.non_finite;
   if (dropped > 0) {
     if (input.options.strict) return fail(ErrorCode::kInput, "{}", losses.first);
     model->warnings.push_back(fmt::format("{}; {}", losses.first, faces_text(dropped)));
@@ -28,6 +28,7 @@ Result<MeshFile> read_gltf_mesh(const ReaderInput& input) {
   raw.stats.faces = raw.soup.triangles.size() + dropped;
   raw.stats.ignored = model->ignored;
   raw.stats.warnings = std::move(model->warnings);
+  raw.stats.missing = std::move(model->missing);
   raw.stats.unit_metres = 1.0;
   raw.stats.y_up = true;
   auto file = finish_mesh(input, std::move(raw), [&](std::uint32_t triangle) {
@@ -35,6 +36,7 @@ Result<MeshFile> read_gltf_mesh(const ReaderInput& input) {
   });
   if (!file) return file;
   // What is dropped already has been told.
+  file->stats.too_few_vertices = losses.too_few;
   file->stats.out_of_range = losses.out_of_range;
   file->stats.non_finite = losses.non_finite;
   file->attributes = std::move(model->attributes);

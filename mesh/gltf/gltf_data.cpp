@@ -177,6 +177,10 @@ GltfData::Elements GltfData::elements(std::uint32_t view_index, std::uint64_t of
   const std::uint64_t stride = strided && document_.views[view_index].stride != 0
                                    ? document_.views[view_index].stride
                                    : bytes;
+  if (stride < bytes) {
+    refuse_gltf("{}: its elements have {} bytes, but bufferViews[{}].byteStride is {}", user.text(),
+                bytes, view_index, stride);
+  }
   const std::uint64_t room = offset <= all.size() ? all.size() - offset : 0;
   if (count > 0 && (bytes > room || count - 1 > (room - bytes) / stride)) {
     refuse_gltf("{}: its {} elements reach beyond the {} bytes of bufferViews[{}]", user.text(),

@@ -32,7 +32,11 @@ struct Place {
   std::string within{};  ///< ".primitives[3]"
 
   [[nodiscard]] std::string text() const {
-    return *list ? fmt::format("{}: {}[{}]{}", file, list, index, within) : file + ": the document";
+    return *list ? fmt::format("{}: {}[{}]{}", file, list, index, within) : file;
+  }
+  /// A member of it: "a.gltf: nodes[3].mesh", "a.gltf: scene".
+  [[nodiscard]] std::string at(const char* key) const {
+    return text() + (*list ? "." : ": ") + key;
   }
 };
 
@@ -58,8 +62,7 @@ std::uint64_t whole(const json& object, const char* key, const Place& place, std
       return static_cast<std::uint64_t>(number);
     }
   }
-  refuse_gltf("{}.{} must be a whole number of 0 to {}, got {}", place.text(), key, most,
-              shown(*value));
+  refuse_gltf("{} must be a whole number of 0 to {}, got {}", place.at(key), most, shown(*value));
 }
 
 std::uint64_t needed(const json& object, const char* key, const Place& place) {
@@ -69,7 +72,7 @@ std::uint64_t needed(const json& object, const char* key, const Place& place) {
 
 double number(const json& value, const char* key, const Place& place) {
   if (!value.is_number()) {
-    refuse_gltf("{}.{} must be a number, got {}", place.text(), key, shown(value));
+    refuse_gltf("{} must be a number, got {}", place.at(key), shown(value));
   }
   return value.get<double>();
 }
@@ -81,7 +84,7 @@ std::optional<std::array<double, count>> numbers(const json& object, const char*
   const json* const list = member(object, key);
   if (!list) return std::nullopt;
   if (!list->is_array() || list->size() != count) {
-    refuse_gltf("{}.{} must have {} numbers", place.text(), key, count);
+    refuse_gltf("{} must have {} numbers", place.at(key), count);
   }
   std::array<double, count> all{};
   for (std::size_t i = 0; i < count; ++i) all[i] = number((*list)[i], key, place);
@@ -185,7 +188,7 @@ class Reader {
     const std::size_t count = count_of(list);
     const double number = value.is_number() ? value.get<double>() : -1;
     if (!(number >= 0 && number < static_cast<double>(count)) || number != std::floor(number)) {
-      refuse_gltf("{}.{} must be an index of {}, which has {}, got {}", place.text(), key, list,
+      refuse_gltf("{} must be an index of {}, which has {}, got {}", place.at(key), list,
                   counted(count, "element"), shown(value));
     }
     return static_cast<std::uint32_t>(number);
@@ -200,7 +203,7 @@ class Reader {
     std::vector<std::uint32_t> all;
     const json* const values = member(object, key);
     if (!values) return all;
-    if (!values->is_array()) refuse_gltf("{}.{} must be a list", place.text(), key);
+    if (!values->is_array()) refuse_gltf("{} must be a list", place.at(key));
     for (const json& value : *values) all.push_back(index(value, key, place, list));
     return all;
   }
@@ -224,6 +227,11 @@ class Reader {
     to.offset = whole(from, "byteOffset", place, 0);
     to.bytes = needed(from, "byteLength", place);
     to.stride = whole(from, "byteStride", place, 0);
+    constexpr std::uint64_t kStep = 4;
+    if (member(from, "byteStride") && (to.stride < kStep || to.stride % kStep != 0)) {
+      refuse_gltf("{} must be a multiple of {}, and not 0, got {}", place.at("byteStride"), kStep,
+                  to.stride);
+    }
     to.packed = extension(from, "EXT_meshopt_compression") != nullptr;
     return to;
   }
@@ -325,8 +333,18 @@ class Reader {
     to.skin = reference(from, "skin", place, "skins");
     to.weights = any_numbers(from, "weights", place);
     if (const auto matrix = numbers<16>(from, "matrix", place)) {
+      for (const char* other : {"translation", "rotation", "scale"}) {
+        if (!member(from, other)) continue;
+        refuse_gltf("{} has both a matrix and a {}; only one of them is allowed", place.text(),
+                    other);
+      }
       for (int i = 0; i < 16; ++i) {
         to.parent_from_node[i / 4][i % 4] = (*matrix)[static_cast<std::size_t>(i)];
+      }
+      const std::array<double, 16>& m = *matrix;
+      if (m[3] != 0 || m[7] != 0 || m[11] != 0 || m[15] != 1) {
+        refuse_gltf("{} must be affine: its last row must be 0, 0, 0, 1, got {}, {}, {}, {}",
+                    place.at("matrix"), m[3], m[7], m[11], m[15]);
       }
     } else {
       to.parent_from_node = placed(from, place);

@@ -14,11 +14,14 @@
 namespace strata::detail {
 namespace {
 
-Result<Texture> decoded(const GltfDocument& document, GltfData& data, std::uint32_t image) {
+/// @param missing  becomes true where a file that is named cannot be read
+Result<Texture> decoded(const GltfDocument& document, GltfData& data, std::uint32_t image,
+                        bool& missing) {
   const std::optional<std::string>& uri = document.images[image].uri;
   const bool named = uri && !is_data(*uri);
   const std::string name = named ? printable(*uri, 80) : fmt::format("images[{}]", image);
   auto bytes = data.read_image(image);
+  missing = named && !bytes;
   if (!bytes) return tl::unexpected(bytes.error());
   return read_texture(data.name() + ": " + name, *bytes, data.execution());
 }
@@ -36,7 +39,7 @@ glm::vec2 texture_place(const GltfMaterial& material, const glm::vec2& in_file) 
 
 void add_materials(const GltfDocument& document, GltfData& data,
                    const std::vector<bool>& textures_wanted, MeshAttributes& to,
-                   std::vector<std::string>& warnings) {
+                   std::vector<std::string>& warnings, std::vector<std::string>& missing) {
   std::map<std::tuple<std::uint32_t, TextureWrap, TextureWrap, bool>, std::uint32_t> known;
   for (std::size_t i = 0; i < document.materials.size(); ++i) {
     const GltfMaterial& from = document.materials[i];
@@ -56,13 +59,15 @@ void add_materials(const GltfDocument& document, GltfData& data,
     const auto [place, fresh] = known.try_emplace(
         {*texture.image, texture.wrap_u, texture.wrap_v, from.opaque}, SurfaceMaterial::kNoTexture);
     if (fresh) {
-      auto picture = decoded(document, data, *texture.image);
+      bool is_missing = false;
+      auto picture = decoded(document, data, *texture.image, is_missing);
       if (!picture && (picture.error().code == ErrorCode::kLimit ||
                        picture.error().code == ErrorCode::kCancelled)) {
         throw GltfRefusal{picture.error()};
       }
       if (!picture) {
-        warnings.push_back(picture.error().message + "; the texture is not shown");
+        (is_missing ? missing : warnings)
+            .push_back(picture.error().message + "; the texture is not shown");
         continue;
       }
       picture->wrap_u = texture.wrap_u;

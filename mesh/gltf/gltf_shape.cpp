@@ -8,6 +8,7 @@
 #include <tuple>
 #include <utility>
 
+#include "core/printable.h"
 #include "core/srgb.h"
 #include "strata/mesh/triangle_soup.h"
 
@@ -105,6 +106,7 @@ class ShapeMaker {
       vertices.resize(count);
       std::iota(vertices.begin(), vertices.end(), 0u);
     }
+    drop_incomplete(from.mode, vertices.size());
     if (vertices.size() < 3) return;
     const auto uses = static_cast<std::uint64_t>(vertices.size());
     Piece piece;
@@ -128,6 +130,21 @@ class ShapeMaker {
     group.high = std::max(group.high, high);
     group.uses += uses;
     pieces_.push_back(std::move(piece));
+  }
+
+  /// A list of triangles ends with one or two corners too many, or a strip or fan has fewer than
+  /// three.
+  void drop_incomplete(int mode, std::size_t corners) {
+    const std::size_t rest = mode == 4 ? corners % 3 : corners < 3 ? corners : 0;
+    if (rest == 0) return;
+    ++shape_.losses.too_few;
+    if (!shape_.losses.first.empty()) return;
+    shape_.losses.first = mode == 4 ? fmt::format(
+                                          "{}: its triangles have {} corners, which is no "
+                                          "multiple of 3",
+                                          where(), corners)
+                                    : fmt::format("{}: it has {}, too few for a triangle", where(),
+                                                  counted(corners, "corner"));
   }
 
   void drop_out_of_range(std::vector<glm::uvec3>& triangles, std::uint64_t count,

@@ -179,6 +179,7 @@ class SceneWalk {
       shape = &place->second;
     }
     model_.ignored += shape->ignored;
+    model_.losses.too_few += shape->losses.too_few;
     model_.losses.out_of_range += shape->losses.out_of_range;
     model_.losses.non_finite += shape->losses.non_finite;
     if (model_.losses.first.empty()) model_.losses.first = shape->losses.first;
@@ -393,7 +394,7 @@ class SceneWalk {
     }
     MeshAttributes& to = model_.attributes;
     if (options_.attributes) {
-      add_materials(document_, data_, textures_wanted_, to, model_.warnings);
+      add_materials(document_, data_, textures_wanted_, to, model_.warnings, model_.missing);
       if (!to.vertex_colours.empty()) {
         to.vertex_colours.resize(soup.positions.size(), glm::u8vec4(255));
       }

@@ -25,6 +25,7 @@ struct GltfOptions {
 /// Triangles that were dropped.
 struct GltfLosses {
   std::uint64_t out_of_range = 0;  ///< an index is not that of a vertex
+  std::uint64_t too_few = 0;       ///< the last one of a list has no three corners
   std::uint64_t non_finite = 0;    ///< a vertex has a coordinate that is not finite
   std::string first;               ///< a sentence about one of them
 };
@@ -36,6 +37,7 @@ struct GltfModel {
   std::uint64_t ignored = 0;  ///< points and lines
   GltfLosses losses;
   std::vector<std::string> warnings;
+  std::vector<std::string> missing;  ///< sentences: pictures that are not there
   std::vector<FileIdentity> opened;  ///< other files: buffers and images
 };
 

@@ -215,9 +215,9 @@ TEST_F(ObjMaterials, PicturesAreShownByTheirCorners) {
   EXPECT_EQ(file.opened.size(), 1u);
 }
 
-TEST_F(ObjMaterials, MissingPicturesAreSaidAndDamagedOnesRefused) {
+TEST_F(ObjMaterials, MissingAndDamagedPicturesAreSaid) {
   folder_.write("a.mtl",
-                "newmtl a\nKd 0 1 0\nmap_Kd none.png\nnewmtl b\nmap_Kd a.obj\n"
+                "newmtl a\nKd 0 1 0\nmap_Kd none.png\nnewmtl b\nKd 0 0 1\nmap_Kd a.obj\n"
                 "newmtl unused\nmap_Kd also none.png\n");
   folder_.write("a.obj", "mtllib a.mtl\n" + kSquare + "usemtl a\nf 1 2 3\n");
   const MeshFile file = good("a.obj");
@@ -225,10 +225,14 @@ TEST_F(ObjMaterials, MissingPicturesAreSaidAndDamagedOnesRefused) {
   EXPECT_NE(file.stats.missing[0].find("none.png is not there"), std::string::npos);
   EXPECT_EQ(file.attributes.materials[0].colour, glm::vec4(0, 1, 0, 1));
   folder_.write("b.obj", "mtllib a.mtl\n" + kSquare + "usemtl b\nf 1 2 3\n");
-  const auto refused = read("b.obj");
-  ASSERT_FALSE(refused.has_value());
-  EXPECT_EQ(refused.error().code, ErrorCode::kInput);
-  EXPECT_NE(refused.error().message.find("a.obj"), std::string::npos);
+  const MeshFile damaged = good("b.obj");
+  ASSERT_EQ(damaged.stats.warnings.size(), 1u);
+  EXPECT_NE(damaged.stats.warnings[0].find("a.obj: the picture is neither PNG nor JPEG; the "
+                                           "texture is not shown"),
+            std::string::npos)
+      << damaged.stats.warnings[0];
+  EXPECT_EQ(damaged.attributes.materials[1].colour, glm::vec4(0, 0, 1, 1));
+  EXPECT_EQ(damaged.attributes.materials[1].texture, SurfaceMaterial::kNoTexture);
 }
 
 TEST_F(ObjMaterials, OnePictureOfSeveralMaterialsIsReadOnce) {

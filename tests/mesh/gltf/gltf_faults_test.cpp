@@ -183,6 +183,77 @@ TEST(GltfFaults, TrianglesWithIndicesOutOfRangeAreDropped) {
   expect_refused(none.glb(kMesh), "an index is 26, but there are 24 vertices; no triangle can be");
 }
 
+TEST(GltfFaults, StridesAreMultiplesOf4ThatHoldAnElement) {
+  const auto with_stride = [](const std::string& stride) {
+    GltfText text;
+    std::vector<float> corners;
+    const std::vector<float> cube = cube_corners();
+    for (std::size_t i = 0; i < cube.size(); ++i) {
+      corners.push_back(cube[i]);
+      if (i % 3 == 2) corners.push_back(99);
+    }
+    const int view = text.view(bytes_of(corners), ",\"byteStride\":" + stride);
+    text.accessor(fmt::format("\"bufferView\":{}", view), 5126, 24, "VEC3");
+    text.list(cube_indices<std::uint16_t>(), 1);
+    return text.glb(kMesh);
+  };
+  EXPECT_EQ(volume_of(read(with_stride("16")).soup), 1.0);
+  for (const char* stride : {"0", "2", "6", "15", "17"}) {
+    expect_refused(with_stride(stride),
+                   std::string("bufferViews[0].byteStride must be a multiple of 4, and not 0, "
+                               "got ") +
+                       stride);
+  }
+  for (const char* stride : {"4", "8"}) {
+    expect_refused(with_stride(stride), std::string("accessors[0]: its elements have 12 bytes, but "
+                                                    "bufferViews[0].byteStride is ") +
+                                            stride);
+  }
+}
+
+TEST(GltfFaults, CornersThatMakeNoTriangleAreTold) {
+  for (const int rest : {1, 2}) {
+    GltfText text;
+    text.list(cube_corners(), 3);
+    std::vector<std::uint16_t> indices = cube_indices<std::uint16_t>();
+    indices.resize(indices.size() - 3 + static_cast<std::size_t>(rest));
+    text.list(indices, 1);
+    const GltfModel model = read(text.glb(kMesh));
+    EXPECT_EQ(model.soup.triangles.size(), 11u);
+    EXPECT_EQ(model.losses.too_few, 1u);
+    EXPECT_EQ(model.losses.first,
+              fmt::format("file.glb: meshes[0].primitives[0]: its triangles have {} corners, which "
+                          "is no multiple of 3",
+                          33 + rest));
+  }
+  for (const int mode : {4, 5, 6}) {
+    GltfText text;
+    text.list(cube_corners(), 3);
+    text.list(std::vector<std::uint16_t>{0, 1}, 1);
+    std::string mesh = kMesh;
+    mesh.insert(mesh.find("\"indices\""), fmt::format("\"mode\":{},", mode));
+    expect_refused(text.glb(mesh), "meshes[0].primitives[0]");
+  }
+}
+
+TEST(GltfFaults, ANodeHasAMatrixOrAPlace) {
+  const std::string unit = "\"matrix\":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]";
+  for (const auto& [name, value] : std::vector<std::pair<std::string, std::string>>{
+           {"translation", "[1,0,0]"}, {"rotation", "[0,0,0,1]"}, {"scale", "[1,1,1]"}}) {
+    expect_refused(cube_glb("{\"mesh\":0," + unit + ",\"" + name + "\":" + value + "}"),
+                   "nodes[0] has both a matrix and a " + name);
+  }
+  expect_refused(
+      cube_glb("{\"mesh\":0,\"matrix\":[1,0,0,0,0,1,0,0,0,0,1,0.5,0,0,0,1]}"),
+      "nodes[0].matrix must be affine: its last row must be 0, 0, 0, 1, got 0, 0, 0.5, 1");
+  EXPECT_EQ(volume_of(read(cube_glb("{\"mesh\":0," + unit + "}")).soup), 1.0);
+}
+
+TEST(GltfFaults, MistakesOfTheWholeFileNameTheFile) {
+  expect_refused(cube_glb("{\"mesh\":0}", ",\"scene\":3"),
+                 "file.glb: scene must be an index of scenes, which has 0 elements, got 3");
+}
+
 TEST(GltfFaults, ExtensionsThatAreRequiredAreNamed) {
   const std::string cube = "{\"mesh\":0}";
   for (const char* name : {"KHR_draco_mesh_compression", "EXT_meshopt_compression"}) {
