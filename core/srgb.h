@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 
 // Colours of 8 bits as sRGB has them (IEC 61966-2-1), and their light, 0 to 1. Means and products
 // of colours are those of their light.
@@ -33,30 +34,35 @@ namespace strata {
   return kLight;
 }
 
-/// Light to the nearest value. Built once; a look-up is two or three steps.
+/// Light to the nearest value. Built once.
 class SrgbOfLight {
  public:
   SrgbOfLight() {
     for (std::size_t i = 0; i < 255; ++i) {  // from the middle between two values on
       begins_[i] = static_cast<float>(linear_of_srgb((static_cast<double>(i) + 0.5) / 255.0));
     }
+    std::size_t value = 0;
     for (std::size_t i = 0; i <= kSteps; ++i) {
-      const double value = 255.0 * srgb_of_linear(static_cast<double>(i) / kSteps);
-      guess_[i] = static_cast<std::uint8_t>(std::clamp(std::floor(value - 0.5), 0.0, 255.0));
+      while (static_cast<float>(i) / kSteps >= begins_[value]) ++value;
+      values_[i] = static_cast<std::uint8_t>(value);
     }
   }
   [[nodiscard]] std::uint8_t operator()(float light) const {
     if (!(light > 0.0f)) return 0;
     if (light >= 1.0f) return 255;
-    std::size_t value = guess_[static_cast<std::size_t>(light * kSteps)];
-    while (value < 255 && light >= begins_[value]) ++value;
-    return static_cast<std::uint8_t>(value);
+    const std::size_t value = values_[static_cast<std::size_t>(light * kSteps)];
+    return static_cast<std::uint8_t>(value + (light >= begins_[value] ? 1 : 0));
   }
 
  private:
+  // Values begin farther apart than a step: at most one begins within it.
   static constexpr std::size_t kSteps = 4096;
-  std::array<float, 255> begins_{};
-  std::array<std::uint8_t, kSteps + 1> guess_{};
+  std::array<float, 256> begins_ = [] {
+    std::array<float, 256> begins{};
+    begins.back() = std::numeric_limits<float>::infinity();
+    return begins;
+  }();
+  std::array<std::uint8_t, kSteps + 1> values_{};  // at the beginning of each step
 };
 
 /// The nearest value of light.

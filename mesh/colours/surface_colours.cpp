@@ -218,6 +218,9 @@ Look SurfaceColours::Impl::look(std::uint32_t triangle) const {
 struct SurfaceColours::Probe::Cache {
   explicit Cache(const Impl& impl_of) : impl(&impl_of), looks(kLooks) {}
 
+  const Look& look(std::uint32_t triangle);
+
+  static constexpr std::size_t kPoints = 64;   // at a time
   static constexpr std::size_t kLooks = 1024;  // a power of two
   const Impl* impl;
   std::vector<Look> looks;
@@ -228,27 +231,62 @@ SurfaceColours::Probe::Probe(Probe&&) noexcept = default;
 SurfaceColours::Probe& SurfaceColours::Probe::operator=(Probe&&) noexcept = default;
 SurfaceColours::Probe::~Probe() = default;
 
-glm::u8vec4 SurfaceColours::Probe::colour(std::uint32_t triangle, const glm::dvec3& weights) {
-  Look& look = cache_->looks[triangle & (Cache::kLooks - 1)];
-  if (look.triangle != triangle) look = cache_->impl->look(triangle);
+const Look& SurfaceColours::Probe::Cache::look(std::uint32_t triangle) {
+  Look& look = looks[triangle & (kLooks - 1)];
+  if (look.triangle != triangle) look = impl->look(triangle);
+  return look;
+}
+
+std::optional<glm::u8vec4> SurfaceColours::Probe::only_colour(std::uint32_t triangle) {
+  const Look& look = cache_->look(triangle);
   if (look.is_flat) return look.flat;
-  glm::vec4 light = look.factor;
-  if (look.has_blend) {
-    light = look.lights[0] * static_cast<float>(weights.x) +
-            look.lights[1] * static_cast<float>(weights.y) +
-            look.lights[2] * static_cast<float>(weights.z);
+  return std::nullopt;
+}
+
+void SurfaceColours::Probe::colours(std::uint32_t triangle, std::span<const glm::dvec3> weights,
+                                    std::span<glm::u8vec4> colours) {
+  const Look& look = cache_->look(triangle);
+  if (look.is_flat) {
+    std::fill_n(colours.begin(), weights.size(), look.flat);
+    return;
   }
+  std::array<glm::dvec2, Cache::kPoints> places;
+  std::array<Float4, Cache::kPoints> texels;
+  TextureSampling how;
+  const float share = 1.0f / static_cast<float>(look.probes);
   if (look.has_texture) {
-    const MipMap& map = cache_->impl->textures[look.texture];
-    const glm::dvec2 middle =
-        look.at[0] * weights.x + look.at[1] * weights.y + look.at[2] * weights.z;
-    Float4 sum{};
-    for (int i = 0; i < look.probes; ++i) {
-      sum += map.sample(middle + look.step * (i + 0.5 - 0.5 * look.probes), look.level);
-    }
-    light *= glm::vec4(sum[0], sum[1], sum[2], sum[3]) * (1.0f / static_cast<float>(look.probes));
+    how = cache_->impl->textures[look.texture].sampling(look.level);
+    how.probes = look.probes, how.step = look.step;
   }
-  return colour_of(light);
+  for (std::size_t begin = 0; begin < weights.size(); begin += Cache::kPoints) {
+    const std::size_t count = std::min(Cache::kPoints, weights.size() - begin);
+    const std::span<const glm::dvec3> points = weights.subspan(begin, count);
+    if (look.has_texture) {
+      for (std::size_t i = 0; i < count; ++i) {
+        places[i] = look.at[0] * points[i].x + look.at[1] * points[i].y + look.at[2] * points[i].z;
+      }
+      sample_texture(how, std::span(places).first(count), texels);
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      glm::vec4 light = look.factor;
+      if (look.has_blend) {
+        light = look.lights[0] * static_cast<float>(points[i].x) +
+                look.lights[1] * static_cast<float>(points[i].y) +
+                look.lights[2] * static_cast<float>(points[i].z);
+      }
+      if (look.has_texture) {
+        const Float4& sum = texels[i];
+        light *= glm::vec4(sum[0], sum[1], sum[2], sum[3]) * share;
+      }
+      colours[begin + i] = colour_of(light);
+    }
+  }
+}
+
+glm::u8vec4 SurfaceColours::Probe::colour(std::uint32_t triangle, const glm::dvec3& weights) {
+  glm::u8vec4 found;
+  colours(triangle, std::span(&weights, 1), std::span(&found, 1));
+  return found;
 }
 
 SurfaceColours::SurfaceColours(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}

@@ -34,41 +34,48 @@ NearTriangle::NearTriangle(const shell::Triangle& corners, const shell::Vector& 
   }
 }
 
-double NearTriangle::edge_distance2(const glm::dvec3& p) const {
-  double best = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < 3; ++i) {
-    const Edge& edge = edges_[i];
-    const double t = std::clamp(glm::dot(edge.along, p) - edge.start, 0.0, edge.length);
-    const glm::dvec3 away = p - (corners_[i] + edge.along * t);
-    best = std::min(best, glm::dot(away, away));
+/// A point p within reach has normal . p <= bound.
+void NearTriangle::Limits::add(const glm::dvec3& normal, double bound, double slack) {
+  constexpr double kSteep = 1e-6;
+  if (std::abs(normal.z) <= kSteep) {
+    flat[flat_count++] = {bound + slack, -normal.x, -normal.y};
+    return;
   }
-  return best;
+  // Divided by normal.z: bound has room for what that rounds.
+  const Bound made{bound / normal.z, -normal.x / normal.z, -normal.y / normal.z};
+  if (normal.z > 0.0) {
+    above[above_count++] = made;
+  } else {
+    below[below_count++] = made;
+  }
 }
 
-glm::dvec3 NearTriangle::nearest(const glm::dvec3& p) const {
-  double best = std::numeric_limits<double>::infinity();
-  glm::dvec3 weights(1.0, 0.0, 0.0), inner(0.0);
-  bool inside = has_area_;
-  for (int i = 0; i < 3; ++i) {
-    const Edge& edge = edges_[static_cast<std::size_t>(i)];
-    const double e = glm::dot(edge.outward, p) - edge.border;
-    if (has_area_ && e <= 0.0) {
-      inner[(i + 2) % 3] = -e * edge.length;
-      continue;
-    }
-    inside = false;
-    const double t = std::clamp(glm::dot(edge.along, p) - edge.start, 0.0, edge.length);
-    const glm::dvec3 away = p - (corners_[static_cast<std::size_t>(i)] + edge.along * t);
-    if (const double d = glm::dot(away, away); d < best) {
-      best = d;
-      const double part = edge.length > 0.0 ? t / edge.length : 0.0;
-      weights = glm::dvec3(0.0);
-      weights[i] = 1.0 - part;
-      weights[(i + 1) % 3] = part;
+/// Both sides of the plane, and three edges.
+NearTriangle::Limits NearTriangle::limits(double far) const {
+  Limits made;
+  if (!has_area_) return made;
+  const double slack = 1e-6 * (std::abs(low_.z) + std::abs(high_.z) + 2.0 * far + 1.0);
+  made.add(normal_, height_ + far, slack);
+  made.add(-normal_, far - height_, slack);
+  for (const Edge& edge : edges_) made.add(edge.outward, edge.border + far, slack);
+  return made;
+}
+
+void NearTriangle::clip_to_outline(double far, double y, double& u_low, double& u_high) const {
+  if (!has_area_ || std::abs(normal_.z) <= 1e-3) return;  // edge-on there is no outline
+  const double turn = normal_.z > 0.0 ? 1.0 : -1.0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const glm::dvec3 &a = corners_[i], &b = corners_[i == 2 ? 0 : i + 1];
+    const double across_u = turn * (b.y - a.y), across_v = turn * (a.x - b.x);
+    const double length = std::sqrt(across_u * across_u + across_v * across_v);
+    // across . p <= across . a + far length
+    const double rest = across_u * a.x + across_v * (a.y - y) + far * length;
+    if (across_u > 0.0) {
+      u_high = std::min(u_high, rest / across_u + kSlack);
+    } else if (across_u < 0.0) {
+      u_low = std::max(u_low, rest / across_u - kSlack);
     }
   }
-  const double sum = inner.x + inner.y + inner.z;
-  return inside && sum > 0.0 ? inner / sum : weights;
 }
 
 }  // namespace strata

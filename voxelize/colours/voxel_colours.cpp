@@ -1,6 +1,7 @@
 #include "strata/voxelize/colours/voxel_colours.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/common.hpp>
 #include <new>
@@ -10,6 +11,7 @@
 
 #include "strata/raster/lattice_mesh.h"
 #include "voxelize/colours/near_triangle.h"
+#include "voxelize/colours/nearest_points.h"
 #include "voxelize/shell_tiles.h"
 
 namespace strata {
@@ -25,7 +27,7 @@ struct NearVoxels {
   std::span<const std::uint32_t> offsets;  // of runs, by column
   std::span<const Interval> runs;
   std::vector<std::uint32_t> first;  // the first voxel of each run, and how many there are
-  /// [square of the distance:32 | place of the triangle in the tile:32]
+  /// [square of the distance:32 | place of the triangle in the tile:32]; then colours
   std::vector<std::uint64_t> keys;
 
   /// @return false if there are too many
@@ -44,21 +46,42 @@ struct NearVoxels {
   }
 };
 
+/// A voxel that takes its colour from a triangle.
+struct NearVoxel {
+  std::uint32_t key = 0;      // its place among the keys
+  std::uint8_t u = 0, v = 0;  // of the tile
+  std::uint16_t w = 0;
+};
+
+/// Centres of voxels near one triangle, and the keys that wait for them.
+struct Batch {
+  VoxelCentres centres;
+  std::array<std::uint64_t*, VoxelCentres::kMost> keys{};
+  std::array<double, VoxelCentres::kMost> squares{};
+  std::array<glm::dvec3, VoxelCentres::kMost> weights{};
+  std::array<glm::u8vec4, VoxelCentres::kMost> colours{};
+};
+
 struct Worker {
-  explicit Worker(SurfaceColours::Probe asks) : probe(std::move(asks)) {}
+  explicit Worker(SurfaceColours::Probe asks)
+      : probe(std::move(asks)), batch(std::make_unique<Batch>()) {}
 
   [[nodiscard]] std::uint64_t bytes() const {
     return triangles.capacity() * sizeof(NearTriangle) + collector.bytes() +
            near_items.capacity() * sizeof(Interval) + near.keys.capacity() * sizeof(std::uint64_t) +
+           near_voxels.capacity() * sizeof(NearVoxel) +
            items.capacity() * (sizeof(Interval) + sizeof(std::uint32_t));
   }
 
   SurfaceColours::Probe probe;
+  std::unique_ptr<Batch> batch;
   std::vector<NearTriangle> triangles;  // of a tile
   shell::RunCollector collector;
   std::vector<std::uint32_t> near_offsets;
   std::vector<Interval> near_items;
   NearVoxels near;
+  std::vector<std::uint32_t> near_ends;  // of the voxels of each triangle
+  std::vector<NearVoxel> near_voxels;    // by triangle
   // The result.
   std::vector<std::uint32_t> offsets, labels;
   std::vector<Interval> items;
@@ -123,8 +146,10 @@ struct VoxelColouring::Impl {
   bool find_near(const VoxelIntervals::TileView& tile, const glm::ivec3& size,
                  Worker& worker) const;
   void find_nearest(const glm::ivec3& size, Worker& worker) const;
-  void colour_tile(const VoxelIntervals::TileView& tile, std::span<const std::uint32_t> numbers,
-                   Worker& worker) const;
+  void lower_keys(std::size_t place, Worker& worker) const;
+  void sort_by_triangle(Worker& worker) const;
+  void find_colours(std::span<const std::uint32_t> numbers, Worker& worker) const;
+  void colour_tile(const VoxelIntervals::TileView& tile, Worker& worker) const;
   void append(int first, int last, std::uint32_t label, Worker& worker) const;
 };
 
@@ -154,12 +179,11 @@ bool VoxelColouring::Impl::find_near(const VoxelIntervals::TileView& tile, const
 }
 
 void VoxelColouring::Impl::find_nearest(const glm::ivec3& size, Worker& worker) const {
-  constexpr double kScale = 2147483648.0;  // the square of the farthest is 1
-  const double most = reach() * reach() + 1e-9;
   NearVoxels& near = worker.near;
-  for (std::size_t number = 0; number < worker.triangles.size(); ++number) {
-    const NearTriangle& triangle = worker.triangles[number];
-    triangle.columns_within(reach(), size, [&](int u, int v, int first, int last) {
+  Batch& batch = *worker.batch;
+  for (std::size_t place = 0; place < worker.triangles.size(); ++place) {
+    batch.centres.count = 0;
+    worker.triangles[place].columns_within(reach(), size, [&](int u, int v, int first, int last) {
       const auto local = static_cast<std::size_t>(v * kSide + u);
       for (std::uint32_t i = near.offsets[local]; i < near.offsets[local + 1]; ++i) {
         const Interval run = near.runs[i];
@@ -168,12 +192,81 @@ void VoxelColouring::Impl::find_nearest(const glm::ivec3& size, Worker& worker) 
         const int begin = std::max<int>(first, run.first), end = std::min<int>(last, run.last);
         std::uint64_t* key = near.keys.data() + near.first[i] + (begin - run.first);
         for (int w = begin; w <= end; ++w, ++key) {
-          const double d = triangle.distance2({u + 0.5, v + 0.5, w + 0.5});
-          if (d > most) continue;
-          *key = std::min(*key, static_cast<std::uint64_t>(d * kScale + 0.5) << 32 | number);
+          if (batch.centres.count == VoxelCentres::kMost) lower_keys(place, worker);
+          batch.keys[batch.centres.count] = key;
+          batch.centres.add(u, v, w);
         }
       }
     });
+    lower_keys(place, worker);
+  }
+}
+
+/// Keys of the voxels of the batch that are nearer to a triangle than to those before it.
+void VoxelColouring::Impl::lower_keys(std::size_t place, Worker& worker) const {
+  constexpr double kScale = 2147483648.0;  // the square of the farthest is 1
+  const double most = reach() * reach() + 1e-9;
+  Batch& batch = *worker.batch;
+  find_distances2(worker.triangles[place], batch.centres, batch.squares);
+  for (std::size_t i = 0; i < batch.centres.count; ++i) {
+    const double square = batch.squares[i];
+    const auto far = static_cast<std::int64_t>(std::min(square, 2.0) * kScale + 0.5);
+    const std::uint64_t key = static_cast<std::uint64_t>(far) << 32 | place;
+    *batch.keys[i] = std::min(*batch.keys[i], square > most ? kFar : key);
+  }
+  batch.centres.count = 0;
+}
+
+/// Lists the voxels of each triangle. Keys are 0 afterwards, the colour of none.
+void VoxelColouring::Impl::sort_by_triangle(Worker& worker) const {
+  NearVoxels& near = worker.near;
+  std::vector<std::uint32_t>& next = worker.near_ends;
+  next.assign(worker.triangles.size() + 1, 0);
+  for (const std::uint64_t key : near.keys) {
+    if (key != kFar) ++next[static_cast<std::uint32_t>(key) + 1];
+  }
+  for (std::size_t i = 1; i < next.size(); ++i) next[i] += next[i - 1];
+  worker.near_voxels.resize(next.back());
+  for (std::size_t local = 0; local < VoxelIntervals::kTileColumns; ++local) {
+    for (std::uint32_t run = near.offsets[local]; run < near.offsets[local + 1]; ++run) {
+      std::uint32_t at = near.first[run];
+      for (int w = near.runs[run].begin(); w < near.runs[run].end(); ++w, ++at) {
+        const std::uint64_t key = near.keys[at];
+        near.keys[at] = 0;
+        if (key == kFar) continue;
+        worker.near_voxels[next[static_cast<std::uint32_t>(key)]++] = {
+            at, static_cast<std::uint8_t>(local % kSide), static_cast<std::uint8_t>(local / kSide),
+            static_cast<std::uint16_t>(w)};
+      }
+    }
+  }
+}
+
+/// Puts colours in the place of keys.
+void VoxelColouring::Impl::find_colours(std::span<const std::uint32_t> numbers,
+                                        Worker& worker) const {
+  Batch& batch = *worker.batch;
+  std::uint32_t at = 0;
+  for (std::size_t place = 0; place < worker.triangles.size(); ++place) {
+    const std::uint32_t end = worker.near_ends[place];
+    if (at == end) continue;
+    if (const auto one = worker.probe.only_colour(numbers[place])) {
+      for (; at < end; ++at) worker.near.keys[worker.near_voxels[at].key] = packed_colour(*one);
+    }
+    while (at < end) {
+      const std::uint32_t begin = at;
+      batch.centres.count = 0;
+      for (; at < end && batch.centres.count < VoxelCentres::kMost; ++at) {
+        const NearVoxel& voxel = worker.near_voxels[at];
+        batch.centres.add(voxel.u, voxel.v, voxel.w);
+      }
+      find_nearest_points(worker.triangles[place], batch.centres, batch.weights);
+      worker.probe.colours(numbers[place], std::span(batch.weights).first(at - begin),
+                           batch.colours);
+      for (std::uint32_t i = begin; i < at; ++i) {
+        worker.near.keys[worker.near_voxels[i].key] = packed_colour(batch.colours[i - begin]);
+      }
+    }
   }
 }
 
@@ -187,17 +280,13 @@ void VoxelColouring::Impl::append(int first, int last, std::uint32_t label, Work
   worker.labels.push_back(label);
 }
 
-void VoxelColouring::Impl::colour_tile(const VoxelIntervals::TileView& tile,
-                                       std::span<const std::uint32_t> numbers,
-                                       Worker& worker) const {
+void VoxelColouring::Impl::colour_tile(const VoxelIntervals::TileView& tile, Worker& worker) const {
   const NearVoxels& near = worker.near;
   const std::uint32_t inside = packed_colour(options.inside);
   worker.offsets.assign(1, 0);
   worker.items.clear();
   worker.labels.clear();
   for (std::size_t local = 0; local < VoxelIntervals::kTileColumns; ++local) {
-    const double u = static_cast<double>(local % kSide) + 0.5;
-    const double v = static_cast<double>(local / kSide) + 0.5;
     std::uint32_t run = near.offsets[local];
     for (std::uint32_t i = tile.offsets[local]; i < tile.offsets[local + 1]; ++i) {
       const Interval interval = tile.items[i];
@@ -206,14 +295,9 @@ void VoxelColouring::Impl::colour_tile(const VoxelIntervals::TileView& tile,
         if (near.runs[run].begin() > at) {
           append(at, near.runs[run].begin() - 1, inside, worker);
         }
-        const std::uint64_t* key = near.keys.data() + near.first[run];
-        for (at = near.runs[run].begin(); at < near.runs[run].end(); ++at, ++key) {
-          std::uint32_t label = 0;
-          if (*key != kFar) {
-            const auto place = static_cast<std::uint32_t>(*key);
-            const glm::dvec3 weights = worker.triangles[place].nearest({u, v, at + 0.5});
-            label = packed_colour(worker.probe.colour(numbers[place], weights));
-          }
+        const std::uint64_t* colour = near.keys.data() + near.first[run];
+        for (at = near.runs[run].begin(); at < near.runs[run].end(); ++at, ++colour) {
+          auto label = static_cast<std::uint32_t>(*colour);
           if (label == 0 && options.solid) label = inside;
           if (label != 0) append(at, at, label, worker);
         }
@@ -275,7 +359,9 @@ Result<VoxelIntervals> VoxelColouring::colour(const VoxelIntervals& slab,
       const VoxelIntervals::TileView view = slab.tile(tu, tv);
       if (!impl_->find_near(view, size, worker)) return false;
       impl_->find_nearest(size, worker);
-      impl_->colour_tile(view, numbers, worker);
+      impl_->sort_by_triangle(worker);
+      impl_->find_colours(numbers, worker);
+      impl_->colour_tile(view, worker);
       if (!worker.items.empty()) {
         result.set_tile(tu, tv, worker.offsets, worker.items, worker.labels);
       }

@@ -92,12 +92,13 @@ class VoxWriter final : public SlabWriter {
     std::vector<Interval> items;
     std::vector<std::uint8_t> colours;  // of the items, or none
     std::vector<std::uint32_t> rgba;    // of the items, until there is a palette
+    std::vector<std::uint64_t> voxels;  // of each model along z
   };
 
-  [[nodiscard]] Model& model_of(const Tile& tile, int z) {
+  /// The lowest of the models that a tile meets; those above it follow.
+  [[nodiscard]] Model* models_of(const Tile& tile) {
     const int x = tile.u / kTilesPerModel, y = tile.v / kTilesPerModel;
-    return models_[static_cast<std::size_t>((y * models_along_.x + x) * models_along_.z +
-                                            z / kModelSide)];
+    return models_.data() + (y * models_along_.x + x) * models_along_.z;
   }
 
   [[nodiscard]] std::size_t piece_of(const Model& model) const {
@@ -111,7 +112,7 @@ class VoxWriter final : public SlabWriter {
     for (int tv = 0; tv < slab.tiles_v(); ++tv) {
       for (int tu = 0; tu < slab.tiles_u(); ++tu) {
         if (slab.tile_empty(tu, tv)) continue;
-        tiles_.push_back({tu, slab.v_begin() / VoxelIntervals::kTileSide + tv, {}, {}, {}, {}});
+        tiles_.push_back({tu, slab.v_begin() / VoxelIntervals::kTileSide + tv, {}, {}, {}, {}, {}});
       }
     }
     parallel_for(execution, tiles_.size() - before, [&](std::size_t index, int worker) {
@@ -120,14 +121,10 @@ class VoxWriter final : public SlabWriter {
            counts_[static_cast<std::size_t>(worker)]);
     });
     for (std::size_t i = before; i < tiles_.size(); ++i) {
-      for (const Interval& interval : tiles_[i].items) {
-        for (int z = interval.begin(); z < interval.end();) {
-          const int end = std::min(interval.end(), (z / kModelSide + 1) * kModelSide);
-          Model& model = model_of(tiles_[i], z);
-          model.voxels += static_cast<std::uint64_t>(end - z);
-          piece_voxels_[piece_of(model)] += static_cast<std::uint64_t>(end - z);
-          z = end;
-        }
+      Model* model = models_of(tiles_[i]);
+      for (const std::uint64_t voxels : tiles_[i].voxels) {
+        model->voxels += voxels;
+        piece_voxels_[piece_of(*model++)] += voxels;
       }
     }
     for (std::size_t piece = 0; piece < piece_voxels_.size(); ++piece) {
@@ -142,11 +139,10 @@ class VoxWriter final : public SlabWriter {
   void keep(const VoxelIntervals::TileView& view, Tile& tile, ColourCounts& counts) const {
     tile.offsets.assign(view.offsets.begin(), view.offsets.end());
     tile.items.assign(view.items.begin(), view.items.end());
+    count_voxels(tile);
     if (rgba_) {
       tile.rgba.assign(view.labels.begin(), view.labels.end());
-      for (std::size_t i = 0; i < tile.rgba.size(); ++i) {
-        counts.add(tile.rgba[i], static_cast<std::uint64_t>(tile.items[i].length()));
-      }
+      counts.add(tile.rgba, tile.items);
       return;
     }
     tile.colours.reserve(view.labels.size());
@@ -155,10 +151,22 @@ class VoxWriter final : public SlabWriter {
     }
   }
 
+  void count_voxels(Tile& tile) const {
+    tile.voxels.resize(static_cast<std::size_t>(models_along_.z));
+    for (const Interval& interval : tile.items) {
+      for (int z = interval.begin(); z < interval.end();) {
+        const int model = z / kModelSide;
+        const int end = std::min(interval.end(), (model + 1) * kModelSide);
+        tile.voxels[static_cast<std::size_t>(model)] += static_cast<std::uint64_t>(end - z);
+        z = end;
+      }
+    }
+  }
+
   /// Few colours for those of the voxels.
   void choose_palette(const Execution& execution) {
     ColourCounts all;
-    for (const ColourCounts& counts : counts_) all.add(counts);
+    for (ColourCounts& counts : counts_) all.add(std::move(counts));
     counts_.clear();
     const Palette chosen = all.palette(kVoxColours, execution);
     palette_ = chosen.colours();
@@ -292,10 +300,11 @@ class VoxWriter final : public SlabWriter {
            i < tile.offsets[static_cast<std::size_t>(local) + 1]; ++i) {
         const int begin = std::max(tile.items[i].begin() - model.begin.z, 0);
         const int end = std::min(tile.items[i].end() - model.begin.z, kModelSide);
-        const int colour = tile.colours.empty() ? kColour : tile.colours[i];
-        for (int z = begin; z < end; ++z) {
-          const int bytes[4] = {x, y, z, colour};
-          for (const int byte : bytes) *to++ = static_cast<std::byte>(byte);
+        const std::uint8_t colour = tile.colours.empty() ? kColour : tile.colours[i];
+        for (int z = begin; z < end; ++z, to += 4) {
+          const std::uint8_t voxel[4] = {static_cast<std::uint8_t>(x), static_cast<std::uint8_t>(y),
+                                         static_cast<std::uint8_t>(z), colour};
+          std::memcpy(to, voxel, sizeof voxel);
         }
       }
     }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
+#include <utility>
 
 #include "core/srgb.h"
 #include "strata/voxelize/packed_colour.h"
@@ -73,6 +74,18 @@ std::vector<ShadeBox> cut(std::vector<Shade>& shades, std::size_t most) {
   return boxes;
 }
 
+/// The light of each value, in whole parts of kOne.
+const std::array<std::uint64_t, 256>& whole_light() {
+  static const std::array<std::uint64_t, 256> kLight = [] {
+    std::array<std::uint64_t, 256> light{};
+    for (std::size_t i = 0; i < 256; ++i) {
+      light[i] = static_cast<std::uint64_t>(linear_light()[i] * static_cast<float>(kOne) + 0.5f);
+    }
+    return light;
+  }();
+  return kLight;
+}
+
 glm::u8vec4 colour_of_light(const glm::dvec4& light) {
   const SrgbOfLight& srgb = srgb_of_light();
   return {srgb(static_cast<float>(light.x)), srgb(static_cast<float>(light.y)),
@@ -94,28 +107,43 @@ void ColourCounts::add_exact(std::uint32_t colour) {
   if (at == exact_.end() || *at != colour) exact_.insert(at, colour);
 }
 
-void ColourCounts::add(std::uint32_t colour, std::uint64_t count) {
+void ColourCounts::add(std::span<const std::uint32_t> colours, std::span<const Interval> runs) {
+  constexpr std::size_t kAhead = 16;
   if (cells_.empty()) cells_.resize(kCells);
-  if (colour != last_) add_exact(colour);
-  last_ = colour;
-  const std::array<float, 256>& light = linear_light();
-  Cell& cell = cells_[cell_of(colour)];
-  cell.count += count;
-  for (std::size_t c = 0; c < 3; ++c) {
-    const float value = light[colour >> (8 * c) & 0xff] * static_cast<float>(kOne) + 0.5f;
-    cell.light[c] += count * static_cast<std::uint64_t>(value);
+  const std::array<std::uint64_t, 256>& light = whole_light();
+  for (std::size_t i = 0; i < colours.size(); ++i) {
+    // Cells lie far apart: they are fetched before they are needed.
+    if (i + kAhead < colours.size()) {
+      __builtin_prefetch(&cells_[cell_of(colours[i + kAhead])], 1);
+    }
+    const std::uint32_t colour = colours[i];
+    const auto count = static_cast<std::uint64_t>(runs[i].length());
+    if (colour != last_ && exact_.size() <= kMostExact) add_exact(colour);
+    last_ = colour;
+    Cell& cell = cells_[cell_of(colour)];
+    cell.count += count;
+    for (std::size_t c = 0; c < 3; ++c) cell.light[c] += count * light[colour >> (8 * c) & 0xff];
+    if (const std::uint64_t clear = 255 - (colour >> 24); clear != 0) {
+      if (clear_.empty()) clear_.resize(kCells);
+      clear_[cell_of(colour)] += count * clear;
+    }
   }
-  cell.light[3] += count * (colour >> 24);
 }
 
-void ColourCounts::add(const ColourCounts& other) {
+void ColourCounts::add(ColourCounts&& other) {
   if (other.cells_.empty()) return;
-  if (cells_.empty()) cells_.resize(kCells);
+  if (cells_.empty()) {
+    *this = std::move(other);
+    return;
+  }
   for (const std::uint32_t colour : other.exact_) add_exact(colour);
   for (std::size_t i = 0; i < kCells; ++i) {
     cells_[i].count += other.cells_[i].count;
-    for (std::size_t c = 0; c < 4; ++c) cells_[i].light[c] += other.cells_[i].light[c];
+    for (std::size_t c = 0; c < 3; ++c) cells_[i].light[c] += other.cells_[i].light[c];
   }
+  if (other.clear_.empty()) return;
+  clear_.resize(kCells);
+  for (std::size_t i = 0; i < kCells; ++i) clear_[i] += other.clear_[i];
 }
 
 Palette ColourCounts::palette(std::size_t most, const Execution& execution) const {
@@ -132,10 +160,11 @@ Palette ColourCounts::palette(std::size_t most, const Execution& execution) cons
     Shade shade;
     shade.cell = static_cast<std::uint32_t>(i);
     shade.count = static_cast<double>(cell.count);
-    for (std::size_t c = 0; c < 4; ++c) {
-      shade.light[static_cast<int>(c)] =
-          static_cast<double>(cell.light[c]) / (c < 3 ? kOne : 255.0) / shade.count;
+    for (std::size_t c = 0; c < 3; ++c) {
+      shade.light[static_cast<int>(c)] = static_cast<double>(cell.light[c]) / kOne / shade.count;
     }
+    const std::uint64_t alpha = 255 * cell.count - (clear_.empty() ? 0 : clear_[i]);
+    shade.light.w = static_cast<double>(alpha) / 255.0 / shade.count;
     shade.place = oklab(glm::dvec3(shade.light));
     shades.push_back(shade);
   }

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "strata/core/execution.h"
+#include "strata/voxelize/intervals.h"
 
 namespace strata {
 
@@ -38,9 +39,10 @@ class Palette {
 /// How often each colour is there; colours as VoxelWriterOptions::rgba packs them.
 class ColourCounts {
  public:
-  void add(std::uint32_t colour, std::uint64_t count);
+  /// Adds colours of runs of voxels.
+  void add(std::span<const std::uint32_t> colours, std::span<const Interval> runs);
   /// Adds another's counts. The result does not depend on the order.
-  void add(const ColourCounts& other);
+  void add(ColourCounts&& other);
   /// @param most 1 to 255
   [[nodiscard]] Palette palette(std::size_t most, const Execution& execution) const;
 
@@ -52,8 +54,8 @@ class ColourCounts {
  private:
   static constexpr std::size_t kMostExact = 255;
   static constexpr std::size_t kCells = std::size_t{1} << 18;
-  struct Cell {
-    std::array<std::uint64_t, 4> light{};  // sums: 65535 is 1; of alpha 255
+  struct alignas(32) Cell {                // in one line of the cache
+    std::array<std::uint64_t, 3> light{};  // sums: 65535 is 1
     std::uint64_t count = 0;
   };
   void add_exact(std::uint32_t colour);
@@ -61,6 +63,7 @@ class ColourCounts {
   std::uint32_t last_ = 0;            // the colour before; 0 is none
   std::vector<std::uint32_t> exact_;  // sorted; too many when there are more than kMostExact
   std::vector<Cell> cells_;
+  std::vector<std::uint64_t> clear_;  // sums of 255 - alpha; none: all is opaque
 };
 
 }  // namespace strata

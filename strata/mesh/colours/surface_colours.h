@@ -5,6 +5,7 @@
 #include <glm/vec4.hpp>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "strata/core/execution.h"
@@ -52,6 +53,11 @@ class SurfaceColours {
     /// The colour at a point of a triangle. @param weights of its corners; not negative, their sum
     /// is 1 @return sRGB, straight alpha; all 0 where alpha rounds to 0
     [[nodiscard]] glm::u8vec4 colour(std::uint32_t triangle, const glm::dvec3& weights);
+    /// The colours at many points of a triangle. @pre colours.size() >= weights.size()
+    void colours(std::uint32_t triangle, std::span<const glm::dvec3> weights,
+                 std::span<glm::u8vec4> colours);
+    /// The colour of all points of a triangle, if it has one.
+    [[nodiscard]] std::optional<glm::u8vec4> only_colour(std::uint32_t triangle);
 
    private:
     friend class SurfaceColours;

@@ -6,14 +6,17 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <map>
+#include <optional>
 #include <random>
 #include <set>
+#include <string>
 #include <tuple>
 
 #include "strata/mesh/shapes.h"
 #include "strata/raster/lattice_mesh.h"
 #include "strata/voxelize/grid_fit.h"
 #include "strata/voxelize/voxelize.h"
+#include "tests/support/simd_targets.h"
 
 namespace strata {
 namespace {
@@ -239,6 +242,58 @@ TEST(VoxelColouring, ThreadsSlabsAndAxesMakeNoDifference) {
       return Result<void>();
     }));
     EXPECT_EQ(slabs, one);
+  }
+}
+
+// A texture laid on a mesh along z, repeated along u and mirrored along v.
+MeshAttributes textured(const TriangleSoup& mesh, bool opaque) {
+  MeshAttributes made;
+  std::mt19937 random(5);
+  Texture texture{"made here", 37, 23, {}};
+  texture.wrap_v = TextureWrap::kMirror;
+  for (int i = 0; i < 37 * 23; ++i) {
+    texture.texels.push_back(unpacked_colour(static_cast<std::uint32_t>(random()) |
+                                             (opaque || i % 3 != 0 ? 0xff000000u : 0x01000000u)));
+  }
+  made.textures = {texture};
+  made.materials.resize(1);
+  made.materials[0].coloured = true;
+  made.materials[0].texture = 0;
+  made.material_ranges = {{0, 0}};
+  made.corner_offsets = {0};
+  for (const glm::uvec3& t : mesh.triangles) {
+    for (int i = 0; i < 3; ++i) {
+      const glm::dvec3& p = mesh.positions[t[i]];
+      made.corners.push_back({t[i], glm::vec2(3.1 * p.x, 0.7 * p.y), glm::u8vec4(255)});
+    }
+    made.corner_offsets.push_back(static_cast<std::uint32_t>(made.corners.size()));
+  }
+  return made;
+}
+
+TEST(VoxelColouring, EverySimdTargetGivesTheSameColours) {
+  Case c;
+  c.mesh = make_torus_knot(2, 3, 0.4, 60, 20);
+  c.mesh.positions.push_back({0, 0, 0});  // and a triangle without area
+  c.mesh.triangles.push_back({0, static_cast<std::uint32_t>(c.mesh.positions.size() - 1), 0});
+  c.grid = grid_of(c.mesh, 60);
+  c.how.solid = false, c.how.surface = true;
+  for (const bool opaque : {false, true}) {
+    const MeshAttributes attributes = textured(c.mesh, opaque);
+    SurfaceColourOptions options;
+    options.footprint = c.grid.voxel_size;
+    const auto colours = SurfaceColours::make(c.mesh, attributes, options);
+    ASSERT_TRUE(colours) << colours.error().message;
+    std::optional<Voxels> first;
+    const int targets = testkit::for_each_simd_target([&](const std::string& name) {
+      const Voxels voxels = voxels_of(coloured(c, *colours));
+      if (!first) first = voxels;
+      EXPECT_EQ(voxels, *first) << name;
+    });
+    EXPECT_GE(targets, 1);
+    std::set<std::uint32_t> labels;
+    for (const auto& [voxel, label] : *first) labels.insert(label);
+    EXPECT_GT(labels.size(), 1000u);
   }
 }
 

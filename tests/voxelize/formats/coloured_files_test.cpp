@@ -333,11 +333,13 @@ TEST(VoxPalette, OfManyColoursIsNear) {
 TEST(ColourCounts, DoNotDependOnTheOrder) {
   ColourCounts a, b, both;
   for (int i = 0; i < 3000; ++i) {
-    const std::uint32_t colour = packed(i * 7 % 256, i * 13 % 256, i * 31 % 256);
-    both.add(colour, static_cast<std::uint64_t>(i));
-    (i % 3 == 0 ? a : b).add(colour, static_cast<std::uint64_t>(i));
+    std::uint32_t colour = packed(i * 7 % 256, i * 13 % 256, i * 31 % 256);
+    if (i % 5 == 0) colour = (colour & 0xffffffu) | 0x40000000u;
+    const Interval run{7, static_cast<std::uint16_t>(7 + i)};
+    both.add({&colour, 1}, {&run, 1});
+    (i % 3 == 0 ? a : b).add({&colour, 1}, {&run, 1});
   }
-  b.add(a);
+  b.add(std::move(a));
   Execution two;
   two.threads = 2;
   const Palette one = both.palette(255, {}), other = b.palette(255, two);
