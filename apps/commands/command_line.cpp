@@ -11,6 +11,7 @@
 #include "apps/commands/choice_words.h"
 #include "apps/commands/command_words.h"
 #include "apps/commands/scene_options.h"
+#include "apps/commands/version_report.h"
 #include "apps/session/help.h"
 #include "apps/session/option_values.h"
 #include "core/did_you_mean.h"
@@ -59,7 +60,7 @@ std::string top_help() {
       "\nOptions:\n"
       "  -h, --help      Print this help and exit\n"
       "  --help-all      Print the help of every command with all options, and exit\n"
-      "  -V, --version   Print the version and exit\n"
+      "  -V, --version   Print the version; with --json, also how it was built\n"
       "\n`strata COMMAND --help` lists the options of a command.\n"
       "\nExit codes:\n";
   for (const auto& [code, what] : kExitCodes) text += fmt::format("  {:<5}{}\n", code, what);
@@ -659,6 +660,13 @@ ParseOutcome help_on(std::string_view name) {
   return {help_text(app, false), false, 0};
 }
 
+/// What stands behind --version.
+ParseOutcome version(const std::vector<std::string>& words) {
+  if (words.empty()) return {"strata " STRATA_VERSION "\n", false, 0};
+  if (words.size() == 1 && words.front() == "--json") return {version_report(), false, 0};
+  return usage_error("", fmt::format("--version takes nothing but --json, got {}", words.back()));
+}
+
 /// Whether a command line without a command is about a file of voxels.
 bool holds_voxels(const std::vector<std::string>& words) {
   return !words.front().starts_with('-') && is_voxel_file(words.front());
@@ -727,7 +735,7 @@ Command parse_command_line(int argc, const char* const* argv) {
     return ParseOutcome{std::move(text), false, 0};
   }
   if (name == "-V" || name == "--version" || name == "version") {
-    return ParseOutcome{"strata " STRATA_VERSION "\n", false, 0};
+    return version({argv + 2, argv + argc});
   }
   if (begins_with_a_file({argv + 1, argv + argc})) {
     if (const auto command = late_command({argv + 1, argv + argc})) {

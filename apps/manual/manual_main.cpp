@@ -37,13 +37,14 @@ ProgramText strata_text() {
   program.paragraphs = {
       "A file instead of a command is drawn as by \"strata csg\"; so a command line of\n"
       "openscad that writes a picture works with strata as well."};
-  apps::OptionGroup options{"General",
-                            {{{"-h", "--help"}, "", "Print a short help and exit"},
-                             {{"--help-all"},
-                              "",
-                              "Print the help of every command with "
-                              "all options, and exit"},
-                             {{"-V", "--version"}, "", "Print the version and exit"}}};
+  apps::OptionGroup options{
+      "General",
+      {{{"-h", "--help"}, "", "Print a short help and exit"},
+       {{"--help-all"},
+        "",
+        "Print the help of every command with "
+        "all options, and exit"},
+       {{"-V", "--version"}, "", "Print the version; with --json, also how it was built"}}};
   program.options.push_back(std::move(options));
   std::string commands;
   for (const auto& [name, what] : apps::kCommands) {

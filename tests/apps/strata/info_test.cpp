@@ -286,6 +286,26 @@ TEST(Json, TheDocumentationNamesExactlyWhatInfoPrints) {
   EXPECT_EQ(printed, of_gl);
 }
 
+TEST(Json, TheDocumentationNamesExactlyWhatVersionPrints) {
+  const RunResult run = Workplace().run({"--version", "--json"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  json report = json::parse(run.out);
+  EXPECT_EQ("strata " + report["strata"].get<std::string>() + "\n",
+            Workplace().run({"--version"}).out);
+  EXPECT_EQ(report["commit"].is_null(), report["modified"].is_null());
+  if (!report["commit"].is_null()) {
+    EXPECT_TRUE(std::regex_match(report["commit"].get<std::string>(), std::regex("[0-9a-f]{40}")));
+  }
+  EXPECT_GE(report["libraries"].size(), 10u);
+  for (const auto& [name, version] : report["libraries"].items()) {
+    EXPECT_TRUE(version.is_string()) << name << ": CMake did not tell its version";
+  }
+  report["libraries"] = {{"NAME", ""}};
+  std::set<std::string> names;
+  collect(report, "", names);
+  EXPECT_EQ(names, documented("`strata --version`"));
+}
+
 TEST(Json, TheDocumentationNamesExactlyWhatVoxelizePrints) {
   const Workplace place;
   put(place, "open.obj", open_box());

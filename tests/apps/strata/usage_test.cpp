@@ -168,6 +168,7 @@ TEST_F(Usage, VersionIsPrintedWithoutAnythingElse) {
   EXPECT_TRUE(run.out.starts_with("strata ")) << run.out;
   EXPECT_EQ(run.out.find('\n'), run.out.size() - 1);
   EXPECT_EQ(place.run({"-V"}).out, run.out);
+  refuses({"--version", "box.obj"}, "--version takes nothing but --json, got box.obj");
 }
 
 TEST_F(Usage, FormatsAreListedWithoutAnInput) {
