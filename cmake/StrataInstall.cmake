@@ -1,5 +1,6 @@
 # The umbrella target strata::strata, the target `product` (all that is installed), and install(): headers, libraries,
-# tools, the CMake package and strata.pc. It takes what strata_add_library and strata_add_tool have listed.
+# tools, the CMake package and strata.pc. It takes what strata_add_library and strata_add_tool have listed. Each tool is a
+# component of its own, named as the tool; what a user of the libraries needs is the component `dev`.
 get_property(strata_libraries GLOBAL PROPERTY STRATA_LIBRARIES)
 get_property(strata_bridges GLOBAL PROPERTY STRATA_BRIDGES)
 get_property(strata_tools GLOBAL PROPERTY STRATA_TOOLS)
@@ -20,6 +21,7 @@ endif()
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 set(strata_package_dir "${CMAKE_INSTALL_LIBDIR}/cmake/strata")
+set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME dev)
 
 # Public headers are those that the libraries list as HEADERS, and these right in strata/. Headers of a library that is not
 # built are not installed: one without its library, or without the package it includes, is a trap.
@@ -28,9 +30,9 @@ list(TRANSFORM strata_umbrella_headers PREPEND "${PROJECT_SOURCE_DIR}/")
 target_sources(strata_all INTERFACE
   FILE_SET HEADERS BASE_DIRS "${PROJECT_SOURCE_DIR}" FILES ${strata_umbrella_headers})
 install(TARGETS strata_all ${strata_libraries} EXPORT strata FILE_SET HEADERS DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
-if(strata_tools)
-  install(TARGETS ${strata_tools})
-endif()
+foreach(tool IN LISTS strata_tools)
+  install(TARGETS ${tool} COMPONENT ${tool})
+endforeach()
 install(EXPORT strata NAMESPACE strata:: FILE strataTargets.cmake DESTINATION "${strata_package_dir}")
 
 # --- the CMake package: whoever links the static libraries needs what they were built with -------------------------------
@@ -63,40 +65,42 @@ endforeach()
 list(REMOVE_DUPLICATES strata_links)
 list(JOIN strata_components " " strata_components)
 
-# strata_depends(TARGET LINE MODULE LIBRARY): what a link to TARGET asks of a user of the libraries.
-macro(strata_depends target line module library)
+# strata_depends(TARGET DEBIAN LINE MODULE LIBRARY): what a link to TARGET asks of a user of the libraries, first Debian's packages.
+set(strata_dev_packages "")
+macro(strata_depends target debian line module library)
   if("${target}" IN_LIST strata_links)
     list(REMOVE_ITEM strata_links "${target}")
+    list(APPEND strata_dev_packages ${debian})
     string(APPEND strata_find_dependencies "if(\"${target}\" IN_LIST strata_needs)\n  ${line}\nendif()\n")
     string(APPEND strata_pc_requires " ${module}")
     string(APPEND strata_pc_libraries " ${library}")
   endif()
 endmacro()
 set(pc_modules "find_dependency(PkgConfig)\n  pkg_check_modules")
-strata_depends(Threads::Threads "find_dependency(Threads)" "" "-pthread")
-strata_depends(fmt::fmt "find_dependency(fmt)" fmt "")
-strata_depends(glm::glm "find_dependency(glm)" "" "")
-strata_depends(tl::expected "find_dependency(tl-expected CONFIG)" "" "")
-strata_depends(TBB::tbb "find_dependency(TBB)" tbb "")
-strata_depends(ZLIB::ZLIB "find_dependency(ZLIB)" zlib "")
-strata_depends(PNG::PNG "find_dependency(PNG)" libpng "")
-strata_depends(PkgConfig::hwy "${pc_modules}(hwy REQUIRED QUIET IMPORTED_TARGET libhwy)" libhwy "")
-strata_depends(PkgConfig::libdeflate "${pc_modules}(libdeflate REQUIRED QUIET IMPORTED_TARGET libdeflate)" libdeflate "")
-strata_depends(PkgConfig::polyclipping
+strata_depends(Threads::Threads libc6-dev "find_dependency(Threads)" "" "-pthread")
+strata_depends(fmt::fmt libfmt-dev "find_dependency(fmt)" fmt "")
+strata_depends(glm::glm libglm-dev "find_dependency(glm)" "" "")
+strata_depends(tl::expected libexpected-dev "find_dependency(tl-expected CONFIG)" "" "")
+strata_depends(TBB::tbb libtbb-dev "find_dependency(TBB)" tbb "")
+strata_depends(ZLIB::ZLIB zlib1g-dev "find_dependency(ZLIB)" zlib "")
+strata_depends(PNG::PNG libpng-dev "find_dependency(PNG)" libpng "")
+strata_depends(PkgConfig::hwy libhwy-dev "${pc_modules}(hwy REQUIRED QUIET IMPORTED_TARGET libhwy)" libhwy "")
+strata_depends(PkgConfig::libdeflate libdeflate-dev "${pc_modules}(libdeflate REQUIRED QUIET IMPORTED_TARGET libdeflate)" libdeflate "")
+strata_depends(PkgConfig::polyclipping libpolyclipping-dev
   "${pc_modules}(polyclipping REQUIRED QUIET IMPORTED_TARGET polyclipping)" polyclipping "")
-strata_depends(PkgConfig::qhull_r "${pc_modules}(qhull_r REQUIRED QUIET IMPORTED_TARGET qhull_r)" qhull_r "")
-strata_depends(PkgConfig::text "${pc_modules}(text REQUIRED QUIET IMPORTED_TARGET freetype2 harfbuzz fontconfig)"
+strata_depends(PkgConfig::qhull_r libqhull-dev "${pc_modules}(qhull_r REQUIRED QUIET IMPORTED_TARGET qhull_r)" qhull_r "")
+strata_depends(PkgConfig::text "libfreetype-dev;libharfbuzz-dev;libfontconfig-dev" "${pc_modules}(text REQUIRED QUIET IMPORTED_TARGET freetype2 harfbuzz fontconfig)"
   "freetype2 harfbuzz fontconfig" "")
-strata_depends(PkgConfig::jpeg "${pc_modules}(jpeg REQUIRED QUIET IMPORTED_TARGET libjpeg)" libjpeg "")
-strata_depends(PkgConfig::gif "${pc_modules}(gif REQUIRED QUIET IMPORTED_TARGET libgif)" libgif "")
-strata_depends(PkgConfig::webp "${pc_modules}(webp REQUIRED QUIET IMPORTED_TARGET libwebp libwebpmux)" "libwebp libwebpmux" "")
-strata_depends(PkgConfig::libzip "${pc_modules}(libzip REQUIRED QUIET IMPORTED_TARGET libzip)" libzip "")
-strata_depends(PkgConfig::epoxy "${pc_modules}(epoxy REQUIRED QUIET IMPORTED_TARGET epoxy)" epoxy "")
-strata_depends(PkgConfig::blosc "${pc_modules}(blosc REQUIRED QUIET IMPORTED_TARGET blosc)" blosc "")
-strata_depends(PkgConfig::hdf5 "${pc_modules}(hdf5 REQUIRED QUIET IMPORTED_TARGET hdf5)" hdf5 "")
-strata_depends(pugixml::pugixml "find_dependency(pugixml CONFIG)" pugixml "")
-strata_depends(OpenEXR::OpenEXR "find_dependency(OpenEXR CONFIG)" OpenEXR "")
-strata_depends(OpenMeshCore "find_dependency(OpenMesh CONFIG)" "" "-lOpenMeshCore")  # Debian has no module of it
+strata_depends(PkgConfig::jpeg libjpeg62-turbo-dev "${pc_modules}(jpeg REQUIRED QUIET IMPORTED_TARGET libjpeg)" libjpeg "")
+strata_depends(PkgConfig::gif libgif-dev "${pc_modules}(gif REQUIRED QUIET IMPORTED_TARGET libgif)" libgif "")
+strata_depends(PkgConfig::webp libwebp-dev "${pc_modules}(webp REQUIRED QUIET IMPORTED_TARGET libwebp libwebpmux)" "libwebp libwebpmux" "")
+strata_depends(PkgConfig::libzip libzip-dev "${pc_modules}(libzip REQUIRED QUIET IMPORTED_TARGET libzip)" libzip "")
+strata_depends(PkgConfig::epoxy libepoxy-dev "${pc_modules}(epoxy REQUIRED QUIET IMPORTED_TARGET epoxy)" epoxy "")
+strata_depends(PkgConfig::blosc libblosc-dev "${pc_modules}(blosc REQUIRED QUIET IMPORTED_TARGET blosc)" blosc "")
+strata_depends(PkgConfig::hdf5 libhdf5-dev "${pc_modules}(hdf5 REQUIRED QUIET IMPORTED_TARGET hdf5)" hdf5 "")
+strata_depends(pugixml::pugixml libpugixml-dev "find_dependency(pugixml CONFIG)" pugixml "")
+strata_depends(OpenEXR::OpenEXR libopenexr-dev "find_dependency(OpenEXR CONFIG)" OpenEXR "")
+strata_depends(OpenMeshCore libopenmesh-dev "find_dependency(OpenMesh CONFIG)" "" "-lOpenMeshCore")  # Debian has no module of it
 if(strata_links)
   message(FATAL_ERROR "cmake/StrataInstall.cmake does not know what a user needs for: ${strata_links}")
 endif()
@@ -132,4 +136,4 @@ cmake_path(RELATIVE_PATH strata_pc_dir BASE_DIRECTORY "/" OUTPUT_VARIABLE strata
 string(REGEX REPLACE "[^/]+" ".." strata_pc_up "${strata_pc_up}")
 configure_file("${PROJECT_SOURCE_DIR}/cmake/strata.pc.in" "${PROJECT_BINARY_DIR}/strata.pc" @ONLY)
 install(FILES "${PROJECT_BINARY_DIR}/strata.pc" DESTINATION "${CMAKE_INSTALL_LIBDIR}/pkgconfig")
-install(FILES "${PROJECT_SOURCE_DIR}/LICENSE" DESTINATION "${CMAKE_INSTALL_DOCDIR}")
+install(FILES "${PROJECT_SOURCE_DIR}/LICENSE" DESTINATION "${CMAKE_INSTALL_DOCDIR}" COMPONENT license)
