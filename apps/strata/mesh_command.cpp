@@ -11,6 +11,7 @@
 #include "apps/session/session.h"
 #include "apps/strata/allocation_failures.h"
 #include "apps/strata/library_session.h"
+#include "apps/strata/mesh_parts.h"
 #include "apps/strata/mesh_report.h"
 #include "apps/strata/run_commands.h"
 #include "core/atomic_file.h"
@@ -120,8 +121,11 @@ class MeshRun {
 };
 
 Result<void> MeshRun::make_exact() {
-  auto scene =
-      csg::load_scene(command_.input, messages_of(session_), session_.execution("reading", 0.3));
+  csg::SceneInput input = command_.input;
+  input.attributes = command_.boundary.parts != csg::BoundaryParts::kOne;
+  std::vector<csg::InputFacts> facts;
+  auto scene = csg::load_scene(input, messages_of(session_), session_.execution("reading", 0.3),
+                               input.attributes ? &facts : nullptr);
   if (!scene) return tl::unexpected(scene.error());
   if (auto strict = session_.check_strict(); !strict) return strict;
   outcome_.read_ms = session_.milliseconds();
@@ -133,8 +137,13 @@ Result<void> MeshRun::make_exact() {
     outcome_.names.push_back(solid.name);
     if (solid.mesh) outcome_.triangles += solid.mesh->triangles.size();
   }
-  auto made =
-      csg::boundary_mesh(tree, tree.root(), command_.boundary, session_.execution("meshing", 0.8));
+  const auto faces =
+      face_parts(tree, facts, command_.boundary.parts, session_, session_.execution("colours"));
+  if (!faces) return tl::unexpected(faces.error());
+  facts = {};
+  if (auto strict = session_.check_strict(); !strict) return strict;
+  auto made = csg::boundary_mesh(tree, tree.root(), command_.boundary, *faces,
+                                 session_.execution("meshing", 0.8));
   if (!made) return tl::unexpected(made.error());
   outcome_.mesh = std::move(made->mesh);
   outcome_.boundary = std::move(made->report);

@@ -1,7 +1,9 @@
 #include "csg/arrangement/find_faces.h"
 
 #include <algorithm>
+#include <optional>
 #include <tuple>
+#include <unordered_map>
 
 #include "csg/arrangement/face_edges.h"
 #include "exact/determinants.h"
@@ -40,8 +42,16 @@ class FaceFinder {
   }
   std::uint32_t label(std::uint32_t piece) const {
     if (rules_.label_of_solid.empty()) return 0;
-    return rules_.label_of_solid[values_.solid_of_patch[lists_.patch_of[piece]]];
+    const std::uint32_t solid = values_.solid_of_patch[lists_.patch_of[piece]];
+    if (input_.solids.labels.empty()) return rules_.label_of_solid[solid];
+    if (const auto own = input_.solids.label(pieces_.triangle_of[piece], solid)) return *own;
+    const auto found = label_below_.find(piece);
+    return found != label_below_.end() ? found->second : rules_.label_of_solid[solid];
   }
+  bool melts_by_label(std::uint32_t s, std::uint32_t t) const {
+    return rules_.melt && (input_.solids.labels.empty() || label(s) == label(t));
+  }
+  void find_label_below(const RadialLists::Group& group, std::uint32_t piece);
   Normal normal(std::uint32_t piece) const {
     return input_.plane_of(pieces_.triangle_of[piece]).normal;
   }
@@ -65,6 +75,9 @@ class FaceFinder {
   detail::DisjointSets planes_;  // triangles with faces in one plane
   std::vector<bool> dropped_;    // pieces that lie where another piece is shown
   std::vector<bool> flat_;       // triangles that are no face by themselves
+  // Of pieces whose triangle is not of the solid that bounds the result: the label of the triangle
+  // of that solid in the same place.
+  std::unordered_map<std::uint32_t, std::uint32_t> label_below_;
 };
 
 // Where pieces of several triangles lie in one place, that of the least triangle is shown: the same
@@ -84,7 +97,18 @@ void FaceFinder::drop_repeated() {
       planes_.join(pieces_.triangle_of[sheet.piece], pieces_.triangle_of[piece]);
       if (sheet.piece != piece) dropped_[sheet.piece] = true;
     }
+    if (!input_.solids.labels.empty()) find_label_below(group, piece);
   }
+}
+
+void FaceFinder::find_label_below(const RadialLists::Group& group, std::uint32_t piece) {
+  const std::uint32_t solid = values_.solid_of_patch[lists_.patch_of[piece]];
+  std::optional<std::uint32_t> least;
+  for (const RadialLists::Sheet& sheet : lists_.sheets_of(group)) {
+    const auto found = input_.solids.label(pieces_.triangle_of[sheet.piece], solid);
+    if (found && (!least || *found < *least)) least = found;
+  }
+  if (least) label_below_[piece] = *least;
 }
 
 // An edge of a kept piece; from and to have the piece on the left as seen from its front.
@@ -121,6 +145,7 @@ void FaceFinder::add_unlisted(FaceEdges& out) {
     if (!rules_.melt || !kept(s)) continue;
     const auto& vertices = input_.vertices;
     if (exact::height(input_.plane_of(s), vertices[input_.corner(uses[1], 2)]) != 0) continue;
+    if (!melts_by_label(s, t)) continue;
     flat_[s] = flat_[t] = true;
     join_plane(out, s, t, input_.edge_from(edge), input_.edge_to(edge));
   }
@@ -141,9 +166,9 @@ void FaceFinder::add_triangle(FaceEdges& out, std::uint32_t t) {
     const auto uses = input_.edges.uses_of(edge);
     const std::uint32_t other = uses[0] / 3 == t ? uses[1] : uses[0];
     // The piece of t at this side is that of its patch: nothing cuts the edge.
-    const bool melted = rules_.melt && exact::height(input_.plane_of(t),
-                                                     input_.vertices[input_.corner(other, 2)]) == 0;
-    if (!melted && kept(t)) {
+    if (!kept(t)) continue;
+    const exact::LatticePoint& far = input_.vertices[input_.corner(other, 2)];
+    if (!melts_by_label(t, other / 3) || exact::height(input_.plane_of(t), far) != 0) {
       add(out, t, input_.corner(3 * t + side, 0), input_.corner(3 * t + side, 1), 0, edge);
     }
   }

@@ -65,6 +65,7 @@ class Weld {
       result_.counts.push_back({s, 1});
     }
     result_.first_count.push_back(solid_count);
+    result_.first_merged = solid_count;
   }
 
   void keep_areas() {
@@ -77,6 +78,7 @@ class Weld {
         if (n == exact::Normal(0)) continue;
         result_.triangles.push_back(t);
         result_.content_of.push_back(s);
+        if (!solids_.labels.empty()) result_.labels.push_back(solids_.labels[i]);
       }
     }
     solids_ = {};
@@ -85,6 +87,12 @@ class Weld {
   LatticeSolids solids_;
   const Execution& execution_;
   WeldedSolids result_;
+};
+
+// A count with the least label of its triangles.
+struct Counted {
+  SolidCount count;
+  std::uint32_t label;
 };
 
 // Gives equal triangles one content.
@@ -130,28 +138,33 @@ class Merge {
 
   // Gives the content of all to the first of them.
   void merge(std::span<const std::pair<Sorted, std::uint32_t>> equal, std::vector<bool>& gone) {
-    std::vector<SolidCount> sum;
+    const bool labels = !solids_.labels.empty();
+    std::vector<Counted> sum;
     const bool turned = equal.front().first.turned;
     for (const auto& [corners, triangle] : equal) {
       const std::uint32_t solid = solids_.content_of[triangle];
-      sum.push_back({solid, corners.turned == turned ? 1 : -1});
+      sum.push_back(
+          {{solid, corners.turned == turned ? 1 : -1}, labels ? solids_.labels[triangle] : 0});
       gone[triangle] = true;
     }
-    std::ranges::sort(sum, {}, &SolidCount::solid);
-    std::vector<SolidCount> content;
-    for (const SolidCount& one : sum) {
-      if (!content.empty() && content.back().solid == one.solid) {
-        content.back().count += one.count;
+    std::ranges::sort(sum, {}, [](const Counted& c) { return std::pair(c.count.solid, c.label); });
+    std::vector<Counted> content;
+    for (const Counted& one : sum) {
+      if (!content.empty() && content.back().count.solid == one.count.solid) {
+        content.back().count.count += one.count.count;
       } else {
         content.push_back(one);
       }
     }
-    std::erase_if(content, [](const SolidCount& c) { return c.count == 0; });
+    std::erase_if(content, [](const Counted& c) { return c.count.count == 0; });
     if (content.empty()) return;
     const std::uint32_t kept = equal.front().second;
     gone[kept] = false;
     solids_.content_of[kept] = static_cast<std::uint32_t>(solids_.first_count.size() - 1);
-    solids_.counts.insert(solids_.counts.end(), content.begin(), content.end());
+    for (const Counted& one : content) {
+      solids_.counts.push_back(one.count);
+      if (labels) solids_.count_labels.push_back(one.label);
+    }
     solids_.first_count.push_back(static_cast<std::uint32_t>(solids_.counts.size()));
   }
 
@@ -160,10 +173,12 @@ class Merge {
     for (std::size_t i = 0; i < gone.size(); ++i) {
       if (gone[i]) continue;
       solids_.triangles[kept] = solids_.triangles[i];
+      if (!solids_.labels.empty()) solids_.labels[kept] = std::uint32_t{solids_.labels[i]};
       solids_.content_of[kept++] = solids_.content_of[i];
     }
     solids_.triangles.resize(kept);
     solids_.content_of.resize(kept);
+    if (!solids_.labels.empty()) solids_.labels.resize(kept);
   }
 
   WeldedSolids& solids_;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -33,6 +34,21 @@ struct WeldedSolids {
   /// Content s for s < solid count is {s, 1}; others follow.
   std::vector<SolidCount> counts;
   std::vector<std::uint32_t> first_count;
+
+  std::vector<std::uint32_t> labels;        ///< of the triangles, or empty
+  std::vector<std::uint32_t> count_labels;  ///< of counts that several triangles were made one of
+
+  /// The label that a triangle has as a face of a solid; none where the solid does not have it.
+  /// @pre there are labels
+  std::optional<std::uint32_t> label(std::uint32_t triangle, std::uint32_t solid) const {
+    const std::uint32_t c = content_of[triangle];
+    for (std::uint32_t i = first_count[c]; i < first_count[c + 1]; ++i) {
+      if (counts[i].solid != solid) continue;
+      return i < first_merged ? labels[triangle] : count_labels[i - first_merged];
+    }
+    return std::nullopt;
+  }
+  std::uint32_t first_merged = 0;  ///< the count at which those of count_labels begin
 };
 
 /// Welds. @return kCancelled

@@ -327,6 +327,7 @@ class Closer {
       solids_.first_triangle[s + 1] = static_cast<std::uint32_t>(all.size());
       from = to;
     }
+    label_caps(all);
     solids_.triangles = std::move(all);
     return {};
   }
@@ -334,6 +335,27 @@ class Closer {
   std::vector<BoundaryCap> caps;
 
  private:
+  // Caps have the label of a triangle at their rim. @param all  triangles, of the new ranges
+  void label_caps(const std::vector<glm::uvec3>& all) {
+    if (solids_.labels.empty()) return;
+    std::vector<std::uint32_t> at_vertex(solids_.vertices.size(), 0);
+    for (std::size_t t = 0; t < solids_.triangles.size(); ++t) {
+      const glm::uvec3& v = solids_.triangles[t];
+      at_vertex[v.x] = at_vertex[v.y] = at_vertex[v.z] = solids_.labels[t];
+    }
+    std::vector<std::uint32_t> labels;
+    labels.reserve(all.size());
+    std::size_t old = 0;
+    for (std::size_t s = 0; s < solids_.solid_count(); ++s) {
+      const std::size_t end = solids_.first_triangle[s + 1] - added_[s].size();
+      while (labels.size() < end) labels.push_back(solids_.labels[old++]);
+      // The middle of a hole is its last vertex, and no triangle's.
+      for (const glm::uvec3& cap : added_[s]) {
+        labels.push_back(at_vertex[std::min({cap.x, cap.y, cap.z})]);
+      }
+    }
+    solids_.labels = std::move(labels);
+  }
   // @pre all caps are of one solid
   Result<void> refuse() const {
     const auto world = [this](Vertex v) {

@@ -35,6 +35,8 @@ struct LatticeSolids {
   /// Solid s has the triangles [first_triangle[s], first_triangle[s + 1]); none when it is not
   /// below the root.
   std::vector<std::uint32_t> first_triangle{0};
+  /// Of each triangle, what its faces are labelled with; empty: solids have labels.
+  std::vector<std::uint32_t> labels;
 
   std::size_t solid_count() const { return first_triangle.size() - 1; }
 };

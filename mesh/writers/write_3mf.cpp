@@ -36,10 +36,11 @@ constexpr const char* kRelationships =
 
 constexpr const char* kUnits[] = {"micron", "millimeter", "centimeter", "meter", "inch", "foot"};
 
-/// Which parts are closed by themselves: each edge is used as often in one direction as in the
-/// other. Edges are summed as numbers that a hash makes of them, added in one direction and
-/// subtracted in the other: an open part passes by chance once in 2^64.
-std::vector<bool> closed_parts(const SolidMesh& mesh) {
+/// For each part, 0 where it is closed by itself: each edge is used as often in one direction as in
+/// the other. Edges are summed as numbers that a hash makes of them, added in one direction and
+/// subtracted in the other: an open part passes by chance once in 2^64. The sum of parts that are
+/// closed together is 0.
+std::vector<std::uint64_t> edge_sums(const SolidMesh& mesh) {
   std::vector<std::uint64_t> sums(mesh.parts.size(), 0);
   const auto number = [](std::uint64_t edge) {  // the finalizer of splitmix64 (Steele et al. 2014)
     edge += 0x9e3779b97f4a7c15u;
@@ -54,9 +55,37 @@ std::vector<bool> closed_parts(const SolidMesh& mesh) {
       sum += a < b ? number(a << 32 | b) : 0 - number(b << 32 | a);
     }
   }
-  std::vector<bool> closed;
-  for (const std::uint64_t sum : sums) closed.push_back(sum == 0);
-  return closed;
+  return sums;
+}
+
+constexpr std::uint32_t kNoObject = std::numeric_limits<std::uint32_t>::max();
+
+/// For each part, the first of the parts that are an object with it; kNoObject where it is a part
+/// of what is left over. Parts that are not closed by themselves are an object where all of one
+/// name are closed together: the colours of one part of a file.
+std::vector<std::uint32_t> objects_of_parts(const SolidMesh& mesh) {
+  const std::vector<std::uint64_t> sums = edge_sums(mesh);
+  std::vector<std::uint32_t> objects(sums.size(), kNoObject);
+  struct Named {
+    std::uint64_t sum = 0;
+    std::uint32_t first = kNoObject;
+  };
+  std::unordered_map<std::string_view, Named> named;
+  for (std::uint32_t part = 0; part < sums.size(); ++part) {
+    if (sums[part] == 0) {
+      objects[part] = part;
+    } else if (!mesh.parts[part].name.empty()) {
+      Named& together = named[mesh.parts[part].name];
+      together.sum += sums[part];
+      together.first = std::min(together.first, part);
+    }
+  }
+  for (std::uint32_t part = 0; part < sums.size(); ++part) {
+    const auto together = named.find(mesh.parts[part].name);
+    if (objects[part] != kNoObject || together == named.end()) continue;
+    if (together->second.sum == 0) objects[part] = together->second.first;
+  }
+  return objects;
 }
 
 /// An <object> of the file: some triangles of the mesh, with the vertices they use.
@@ -69,27 +98,23 @@ struct Object {
   std::vector<glm::uvec3> triangles;    ///< the same, as indices into `vertices`
 };
 
-/// A closed part is an object. The other parts are one object together. Without their vertices.
+/// What is closed is an object. All else is one object together. Without their vertices.
 std::vector<Object> objects_of(const SolidMesh& mesh) {
-  constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
-  const std::vector<bool> closed = closed_parts(mesh);
+  const std::vector<std::uint32_t> groups = objects_of_parts(mesh);
   std::vector<Object> objects;
-  std::vector<std::uint32_t> object_of(mesh.parts.size(), kNone);
-  std::uint32_t rest = kNone;
+  std::vector<std::uint32_t> object_of(mesh.parts.size(), kNoObject);  // of the groups
+  std::uint32_t rest = kNoObject;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    const std::uint32_t part = part_of(mesh, t);
-    if (object_of[part] == kNone) {
-      const bool joins = !closed[part] && rest != kNone;
-      object_of[part] = joins ? rest : static_cast<std::uint32_t>(objects.size());
-      if (joins) {
-        objects[rest].mixed = true;
-        objects[rest].name.clear();
-      } else {
-        if (!closed[part]) rest = object_of[part];
-        objects.push_back({mesh.parts[part].name, part, false, {}, {}, {}});
-      }
+    const std::uint32_t part = part_of(mesh, t), group = groups[part];
+    std::uint32_t& place = group == kNoObject ? rest : object_of[group];
+    if (place == kNoObject) {
+      place = static_cast<std::uint32_t>(objects.size());
+      objects.push_back({mesh.parts[part].name, part, false, {}, {}, {}});
     }
-    objects[object_of[part]].sources.push_back(static_cast<std::uint32_t>(t));
+    Object& object = objects[place];
+    object.mixed = object.mixed || object.part != part;
+    if (object.mixed && group == kNoObject) object.name.clear();
+    object.sources.push_back(static_cast<std::uint32_t>(t));
   }
   return objects;
 }

@@ -5,7 +5,9 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <glm/geometric.hpp>
 #include <glm/mat4x4.hpp>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -158,6 +160,121 @@ TEST_F(MeshTool, ColoursAndIdsMakeParts) {
   EXPECT_TRUE(has(apart[0]["name"].get<std::string>(), "cube at apart.csg:1:"));
   EXPECT_FALSE(apart[0]["colour"].is_null()) << "parts without a colour get one";
   EXPECT_EQ(apart[1]["colour"], "#008000ff");
+}
+
+/// Two boxes that touch no other: the first with a red side, in an OBJ with a library of materials.
+void write_toys(const Workplace& place) {
+  place.write("toys.mtl", "newmtl red\nKd 1 0 0\nnewmtl blue\nKd 0 0 1\nnewmtl green\nKd 0 1 0\n");
+  std::string text = "mtllib toys.mtl\n";
+  for (const int x : {0, 5}) {
+    for (int corner = 0; corner < 8; ++corner) {
+      text += fmt::format("v {} {} {}\n", x + 2 * (corner & 1), corner & 2, (corner & 4) / 2);
+    }
+  }
+  const auto sides = [&](int base, int from, int to) {
+    const int quads[6][4] = {{1, 5, 7, 3}, {2, 4, 8, 6}, {1, 2, 6, 5},
+                             {3, 7, 8, 4}, {1, 3, 4, 2}, {5, 6, 8, 7}};
+    for (int side = from; side < to; ++side) {
+      text += 'f';
+      for (const int corner : quads[side]) text += fmt::format(" {}", corner + base);
+      text += '\n';
+    }
+  };
+  text += "o car\nusemtl red\n", sides(0, 0, 1);
+  text += "usemtl blue\n", sides(0, 1, 6);
+  text += "o ball\nusemtl green\n", sides(8, 0, 6);
+  place.write("toys.obj", text);
+}
+
+/// The area of each part and colour of a mesh file: "car #ff0000".
+std::map<std::string, double> coloured_areas(const std::string& path) {
+  const auto file = read_mesh(path, {.attributes = true});
+  EXPECT_TRUE(file.has_value()) << (file ? "" : file.error().message);
+  std::map<std::string, double> areas;
+  if (!file) return areas;
+  const MeshAttributes& all = file->attributes;
+  for (std::size_t t = 0; t < file->soup.triangles.size(); ++t) {
+    const std::uint64_t element =
+        file->soup.face_elements.empty() ? t : file->soup.face_elements[t];
+    const std::uint32_t part = all.part_of(element), material = all.material_of(element);
+    std::string name = part == MeshAttributes::kNone ? "-" : all.parts[part].name;
+    glm::vec3 colour(-1.0f);
+    if (material != MeshAttributes::kNone) colour = glm::vec3(all.materials[material].colour);
+    if (!all.element_colours.empty()) {
+      colour = glm::vec3(glm::u8vec3(all.element_colours[element])) / 255.0f;
+    }
+    if (colour.r >= 0) name += fmt::format(" {} {} {}", colour.r, colour.g, colour.b);
+    const glm::uvec3& c = file->soup.triangles[t];
+    const auto& p = file->soup.positions;
+    areas[name] += glm::length(glm::cross(p[c.y] - p[c.x], p[c.z] - p[c.x])) / 2;
+  }
+  for (auto& [name, area] : areas) area = std::round(area * 1e4) / 1e4;
+  return areas;
+}
+
+using Areas = std::map<std::string, double>;
+
+TEST_F(MeshTool, PartsAndColoursOfMeshFilesAreKept) {
+  write_toys(place);
+  const Areas parts = {{"car 1 0 0", 4}, {"car 0 0 1", 20}, {"ball 0 1 0", 24}};
+  const Areas colours = {{"- 1 0 0", 4}, {"- 0 0 1", 20}, {"- 0 1 0", 24}};
+  for (const char* name : {"a.3mf", "a.obj"}) {
+    const RunResult run = place.run({"mesh", "toys.obj", "--ids", "-o", name, "--json", "-q"});
+    ASSERT_EQ(run.exit_code, 0) << run.err;
+    EXPECT_EQ(run.err, "");
+    EXPECT_EQ(json::parse(run.out)["mesh"]["parts"].size(), 3u);
+    EXPECT_EQ(coloured_areas(place.path(name)), parts) << name;
+    // And once more, from what was written.
+    const std::string again = std::string("b") + (name + 1);
+    ASSERT_EQ(place.run({"mesh", name, "--ids", "-o", again, "-q"}).exit_code, 0);
+    EXPECT_EQ(coloured_areas(place.path(again)), parts) << again;
+    const RunResult one =
+        place.run({"mesh", name, "--part", "car", "--colours", "-o", "c.ply", "-q"});
+    ASSERT_EQ(one.exit_code, 0) << one.err;
+    EXPECT_EQ(coloured_areas(place.path("c.ply")), (Areas{{"- 1 0 0", 4}, {"- 0 0 1", 20}}));
+  }
+  for (const char* name : {"a.ply", "a.off"}) {
+    const RunResult run = place.run({"mesh", "toys.obj", "--colours", "-o", name, "-q"});
+    ASSERT_EQ(run.exit_code, 0) << run.err;
+    EXPECT_EQ(coloured_areas(place.path(name)), colours) << name;
+    const std::string again = std::string("b") + (name + 1);
+    ASSERT_EQ(place.run({"mesh", name, "--colours", "-o", again, "-q"}).exit_code, 0);
+    EXPECT_EQ(coloured_areas(place.path(again)), colours) << again;
+  }
+  // The set does not depend on parts.
+  ASSERT_EQ(place.run({"mesh", "toys.obj", "-o", "plain.stl", "-q"}).exit_code, 0);
+  EXPECT_NEAR(diagnose(read("plain.stl")).volume, diagnose(read("a.obj")).volume, 1e-6);
+}
+
+TEST_F(MeshTool, ExpressionsKeepThePartsOfTheirMeshes) {
+  write_toys(place);
+  ASSERT_TRUE(write_mesh(place.path("bar.off"), make_box({-1, 0.5, 0.5}, {10, 1.5, 1.5})));
+  const RunResult run = place.run({"mesh", "toys.obj", "bar.off", "--expr", "toys - bar", "--ids",
+                                   "-o", "a.obj", "--json", "-q"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  Areas areas = coloured_areas(place.path("a.obj"));
+  EXPECT_EQ(areas["toys.obj:car 1 0 0"], 3) << run.out;
+  EXPECT_EQ(areas["toys.obj:car 0 0 1"], 19);
+  EXPECT_EQ(areas["toys.obj:ball 0 1 0"], 22);
+  EXPECT_EQ(areas.size(), 4u) << "and the bar's hole, which is one colour";
+}
+
+TEST_F(MeshTool, ColoursOfVerticesBecomeThoseOfFacesWithAWarning) {
+  place.write("tetra.off",
+              "COFF\n4 4 0\n0 0 0 255 0 0 255\n1 0 0 255 0 0 255\n0 1 0 255 0 0 255\n0 0 1 255 0 0 "
+              "255\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n");
+  const RunResult run = place.run({"mesh", "tetra.off", "--colours", "-o", "a.ply"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_TRUE(has(run.err,
+                  "tetra.off: each face gets one colour, of its middle, in place of "
+                  "colours of vertices"))
+      << run.err;
+  const Areas areas = coloured_areas(place.path("a.ply"));
+  ASSERT_EQ(areas.size(), 1u);
+  EXPECT_EQ(areas.begin()->first, "- 1 0 0");
+  const RunResult none = place.run({"mesh", "box.obj", "--colours", "-o", "b.ply"});
+  EXPECT_EQ(none.exit_code, 0);
+  EXPECT_TRUE(has(none.err, "box.obj: no colours are given")) << none.err;
 }
 
 TEST_F(MeshTool, AContourIsClosedAndKeepsEdges) {

@@ -316,6 +316,25 @@ class ThreeMfWriter : public testing::Test {
   TemporaryFolder folder_;
 };
 
+TEST_F(ThreeMfWriter, ColoursOfOneNameThatAreClosedTogetherAreOneObject) {
+  SolidMesh mesh;
+  mesh.parts = {{"cup", glm::vec4(1, 0, 0, 1)},
+                {"cup", glm::vec4(0, 1, 0, 1)},
+                {"lid", glm::vec4(0, 0, 1, 1)},
+                {"lid", glm::vec4(0, 0, 1, 1)}};
+  append(mesh, make_box({0, 0, 0}, {1, 1, 1}), 0);
+  for (std::size_t t = 0; t < 12; t += 3) mesh.part_of[t] = 1;
+  append(mesh, make_box({2, 0, 0}, {3, 1, 1}), 2);
+  append(mesh, make_box({4, 0, 0}, {5, 1, 1}), 3);
+  const std::string text = model(mesh);
+  if (text.empty()) GTEST_SKIP() << "this build unpacks no 3MF";
+  EXPECT_EQ(count(text, "<mesh>"), 3u);
+  EXPECT_EQ(count(text, "name=\"cup\""), 1u);
+  EXPECT_EQ(count(text, "name=\"lid\""), 2u) << "closed by themselves";
+  EXPECT_EQ(count(text, " p1=\"0\""), 8u);
+  EXPECT_EQ(count(text, " p1=\"1\""), 4u);
+}
+
 TEST_F(ThreeMfWriter, AnObjectIsAClosedPartAndTheOtherPartsAreOne) {
   const std::string text = model(four_parts());
   if (text.empty()) GTEST_SKIP() << "this build unpacks no 3MF";
