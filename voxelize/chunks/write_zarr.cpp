@@ -6,10 +6,12 @@
 
 #include <memory>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "voxelize/chunks/zarr_chunks.h"
 #include "voxelize/output/folder_output.h"
+#include "voxelize/output/grid_text.h"
 #include "voxelize/output/slab_writer.h"
 #include "voxelize/output/writers.h"
 
@@ -22,6 +24,7 @@ class ZarrWriter final : public SlabWriter {
              FolderOutput folder)
       : SlabWriter(path, grid, Axis::kZ),
         values_(options),
+        unit_(unit_name(options.frame.unit_metres)),
         folder_(std::move(folder)),
         chunks_(values_, ZarrChunks::Order::kXyz, [this](const glm::ivec3& chunk, std::size_t) {
           return fmt::format("{}.{}.{}{}", chunk.x, chunk.y, chunk.z,
@@ -44,13 +47,15 @@ class ZarrWriter final : public SlabWriter {
         "  \"shape\": [{1}, {2}, {3}{5}],\n  \"zarr_format\": 2\n}}\n",
         ZarrChunks::kSide, g.dims.x, g.dims.y, g.dims.z, values_.numpy_type(),
         values_.components == 1 ? "" : ", 4");
+    const std::string unit = unit_.empty() ? "" : fmt::format("  \"unit\": \"{}\",\n", unit_);
     const std::string attributes = fmt::format(
         "{{\n  \"axes\": [\"x\", \"y\", \"z\"{}],\n  \"origin\": [{}, {}, {}],\n"
         "  \"voxel_size\": [{}, {}, {}],\n"
+        "{}"
         "  \"world_from_index\": [[{}, 0, 0, {}], [0, {}, 0, {}], [0, 0, {}, {}], [0, 0, 0, 1]]\n"
         "}}\n",
         values_.components == 1 ? "" : ", \"c\"", g.origin.x, g.origin.y, g.origin.z, size.x,
-        size.y, size.z, size.x, centre.x, size.y, centre.y, size.z, centre.z);
+        size.y, size.z, unit, size.x, centre.x, size.y, centre.y, size.z, centre.z);
     for (const auto& [name, text] : {std::pair{".zarray", &array}, {".zattrs", &attributes}}) {
       if (Result<void> written = folder_.write(name, text->data(), text->size()); !written) {
         return written;
@@ -60,6 +65,7 @@ class ZarrWriter final : public SlabWriter {
   }
 
   DenseValues values_;
+  std::string_view unit_;  // of the grid, or empty
   FolderOutput folder_;
   ZarrChunks chunks_;
 };

@@ -4,10 +4,13 @@
 
 #include <algorithm>
 #include <memory>
+#include <string>
+#include <string_view>
 #include <utility>
 
 #include "voxelize/layers/layer_pictures.h"
 #include "voxelize/output/folder_output.h"
+#include "voxelize/output/grid_text.h"
 #include "voxelize/output/slab_writer.h"
 #include "voxelize/output/writers.h"
 
@@ -16,10 +19,12 @@ namespace {
 
 class PngWriter final : public SlabWriter {
  public:
+  /// @param unit  of the grid, or empty
   PngWriter(const std::string& path, const VoxelGrid& grid, LayerPictures pictures,
-            FolderOutput folder)
+            std::string_view unit, FolderOutput folder)
       : SlabWriter(path, grid, pictures.runs(), pictures.needs_all()),
         pictures_(std::move(pictures)),
+        unit_(unit.empty() ? "" : fmt::format("  \"unit\": \"{}\",\n", unit)),
         folder_(std::move(folder)) {}
 
  private:
@@ -40,9 +45,9 @@ class PngWriter final : public SlabWriter {
     const VoxelGrid& g = grid();
     const std::string json = fmt::format(
         "{{\n  \"dims\": [{}, {}, {}],\n  \"origin\": [{}, {}, {}],\n"
-        "  \"voxel_size\": [{}, {}, {}],\n  \"slices\": \"slice_%05d.png\",\n{}}}\n",
+        "  \"voxel_size\": [{}, {}, {}],\n{}  \"slices\": \"slice_%05d.png\",\n{}}}\n",
         g.dims.x, g.dims.y, g.dims.z, g.origin.x, g.origin.y, g.origin.z, g.voxel_size.x,
-        g.voxel_size.y, g.voxel_size.z, pictures_.description());
+        g.voxel_size.y, g.voxel_size.z, unit_, pictures_.description());
     if (Result<void> written = folder_.write("slices.json", json.data(), json.size()); !written) {
       return written;
     }
@@ -50,6 +55,7 @@ class PngWriter final : public SlabWriter {
   }
 
   LayerPictures pictures_;
+  std::string unit_;  // a line of slices.json
   FolderOutput folder_;
   std::vector<Bytes> scratch_;  // by worker
 };
@@ -60,7 +66,8 @@ VoxelWriterResult open_png_writer(const std::string& path, const VoxelGrid& grid
                                   const VoxelWriterOptions& options) {
   Result<FolderOutput> folder = FolderOutput::create(path);
   if (!folder) return tl::unexpected(folder.error());
-  return std::make_unique<PngWriter>(path, grid, LayerPictures(grid, options), std::move(*folder));
+  return std::make_unique<PngWriter>(path, grid, LayerPictures(grid, options),
+                                     unit_name(options.frame.unit_metres), std::move(*folder));
 }
 
 }  // namespace strata
