@@ -80,11 +80,22 @@ class Reader {
   std::optional<Error> error_;
 };
 
+/// Defines an option with a value.
+void add_option(CLI::App& app, const char* group, const char* names, std::string& word,
+                const std::string& value, const char* what);
+/// Defines an option without one.
+void add_flag(CLI::App& app, const char* group, const char* names, bool& target, const char* what);
+/// Defines an option whose value may be left out: `--fog[=N]`.
+void add_flag(CLI::App& app, const char* group, const char* names, std::string& target,
+              const char* what, const std::string& value);
+
 // What several commands take: its definition, and its words read.
 void add_common(CLI::App& app, Words& words);
 void add_json(CLI::App& app, Words& words, const char* group);
 void add_backend(CLI::App& app, Words& words, const char* group);
 void add_coverage(CLI::App& app, Words& words, const char* group);
+void add_inputs(CLI::App& app, Words& words);
+void add_stores(CLI::App& app, Words& words);
 CommonOptions common_options(const Words& words, Reader& reader);
 /// @param pictures  for strata csg, which reads scenes from standard input too
 csg::SceneInput input_options(const Words& words, bool pictures, Reader& reader);
@@ -136,6 +147,12 @@ void define_picture_quality(CLI::App& app, CsgWords& csg);
 void define_picture_cuts(CLI::App& app, CsgWords& csg);
 /// Reads common options, inputs, output and report.
 void picture_request(const Words& words, Reader& reader, PictureRequest& request);
+
+// command_line_voxelize.cpp: `strata voxelize`
+void define_voxelize(CLI::App& app, Words& words);
+VoxelizeCommand voxelize_command(const Words& words, Reader& reader);
+void add_grid(CLI::App& app, Words& words);
+GridRequest grid_request(const Words& words, Reader& reader);
 
 // command_line_mesh.cpp: `strata mesh`
 void define_mesh(CLI::App& app, Words& words);

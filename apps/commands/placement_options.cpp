@@ -1,6 +1,7 @@
 #include "apps/commands/placement_options.h"
 
 #include <CLI/App.hpp>
+#include <cmath>
 #include <glm/vector_relational.hpp>
 
 #include "apps/commands/choice_words.h"
@@ -12,6 +13,10 @@ namespace {
 constexpr std::pair<std::string_view, csg::MeshPlacement::Up> kUpWords[] = {
     {"y", csg::MeshPlacement::Up::kY}, {"z", csg::MeshPlacement::Up::kZ}};
 
+/// Beyond, volumes and pictures leave what doubles hold; 10^15 micrometres are a million
+/// kilometres.
+constexpr double kMostScale = 1e15, kMostTranslation = 1e15;
+
 /// --scale S or sx,sy,sz
 Result<void> read_scale(const std::string& text, glm::dvec3& scale) {
   auto numbers = parse_numbers("--scale", text, 1, 3);
@@ -20,6 +25,11 @@ Result<void> read_scale(const std::string& text, glm::dvec3& scale) {
   scale = {(*numbers)[0], (*numbers)[1], (*numbers)[2]};
   if (glm::any(glm::equal(scale, glm::dvec3(0.0)))) {
     return fail(ErrorCode::kUsage, "--scale must not be 0, got {}", text);
+  }
+  for (const double factor : *numbers) {
+    if (std::abs(factor) <= kMostScale && std::abs(factor) >= 1 / kMostScale) continue;
+    return fail(ErrorCode::kUsage, "--scale must be {:g} to {:g}, or negative, got {}",
+                1 / kMostScale, kMostScale, text);
   }
   return {};
 }
@@ -67,6 +77,11 @@ Result<void> read_placement_options(const PlacementWords& words, csg::MeshPlacem
     const auto numbers = parse_numbers("--translate", words.translate, 3, 3);
     if (!numbers) return tl::unexpected(numbers.error());
     placement.translate = {(*numbers)[0], (*numbers)[1], (*numbers)[2]};
+    for (const double length : *numbers) {
+      if (std::abs(length) <= kMostTranslation) continue;
+      return fail(ErrorCode::kUsage, "--translate must be {:g} to {:g}, got {}", -kMostTranslation,
+                  kMostTranslation, words.translate);
+    }
   }
   return {};
 }

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <system_error>
 #include <utility>
@@ -297,6 +298,13 @@ Result<FileInfo> look_at(const std::string& path, const csg::InputKind& kind,
                 {},
                 {},
                 {}};
+  if (!std::isfinite(info.found.area) || !std::isfinite(info.found.volume)) {
+    return fail(
+        ErrorCode::kGeometry,
+        "{}: the mesh is {:.3g} long, and its area or volume is beyond the range of double; "
+        "a small --scale helps",
+        path, info.found.bounds.longest_side());
+  }
   info.unit_doubt = csg::unit_doubt(info.stats, one, info.found.bounds);
   info.attributes = look_at_attributes(*file, info.found.closed, execution);
   if (session.interrupted()) return fail(ErrorCode::kCancelled, "stopped");

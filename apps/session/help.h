@@ -70,7 +70,8 @@ inline constexpr ExitCode kExitCodes[] = {
     {5, "geometry refused: --strict, --open fail, no extent, coordinates too large"},
     {6, "limit exceeded: memory, size of the grid, --time-limit"},
     {7, "two results that should agree differ"},
-    {130, "interrupted"}};
+    {130, "interrupted"},
+    {141, "the reader of standard output went away: nothing is said"}};
 
 /// The values of a choice as they stand behind its option: `winding|nonzero|parity`.
 template <class T, std::size_t n>

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <utility>
 
 #include "core/did_you_mean.h"
 
@@ -102,6 +103,23 @@ std::string empty_value(std::span<const std::string> arguments) {
   return {};
 }
 
+namespace {
+
+/// What other programs call a choice.
+constexpr std::pair<std::string_view, std::string_view> kOtherWords[] = {
+    {"gpu", "gl"}, {"opengl", "gl"}, {"cuda", "gl"}, {"vulkan", "gl"}};
+
+std::string meant_choice(std::string_view text, std::span<const std::string_view> names) {
+  for (const auto& [other, word] : kOtherWords) {
+    if (text == other && std::find(names.begin(), names.end(), word) != names.end()) {
+      return fmt::format("; did you mean {}?", word);
+    }
+  }
+  return did_you_mean(text, names);
+}
+
+}  // namespace
+
 tl::unexpected<Error> no_such_choice(std::string_view option, std::string_view text,
                                      std::span<const std::string_view> names) {
   std::string list;
@@ -110,7 +128,7 @@ tl::unexpected<Error> no_such_choice(std::string_view option, std::string_view t
     list += names[i];
   }
   return fail(ErrorCode::kUsage, "{} must be {}, got '{}'{}", option, list, text,
-              did_you_mean(text, names));
+              meant_choice(text, names));
 }
 
 }  // namespace strata::apps

@@ -2,6 +2,7 @@
 // codes are those of ErrorCode.
 
 #include <cerrno>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
@@ -12,6 +13,7 @@
 #include <variant>
 
 #include <fcntl.h>
+#include <poll.h>
 #include <unistd.h>
 
 #include "apps/commands/file_uses.h"
@@ -62,8 +64,18 @@ bool is_refused_thread(const std::runtime_error& failure) {
   std::_Exit(code);
 }
 
+/// Whether standard output is a pipe that nobody reads any more: `strata ... -o - | head`.
+bool is_left_alone(const Error& error) {
+  if (error.code != ErrorCode::kOutput || !error.message.starts_with("standard output")) {
+    return false;
+  }
+  pollfd out{STDOUT_FILENO, POLLOUT, 0};
+  return poll(&out, 1, 0) > 0 && (out.revents & POLLERR) != 0;
+}
+
 int exit_code(const Result<void>& result, Session& session) {
   if (result) return 0;
+  if (is_left_alone(result.error())) return 128 + SIGPIPE;
   // Whatever an interrupted job ran into, the interrupt is why.
   const ErrorCode code = session.timed_out()     ? ErrorCode::kLimit
                          : session.interrupted() ? ErrorCode::kCancelled

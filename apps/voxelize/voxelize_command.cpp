@@ -49,6 +49,14 @@ Result<std::optional<VoxelFormat>> output_format(const VoxelizeCommand& command)
     return fail(error.code, "{}{}", error.message,
                 command.format.empty() ? other_writer(command.output) : "");
   }
+  if (!command.format.empty() && command.output != "-") {
+    const auto by_name = voxel_format_for(command.output, "");
+    const bool extension = by_name && by_name->extension.size() > 1;  // else it is any folder
+    if (extension && by_name->name != format->name) {
+      return fail(ErrorCode::kUsage, "-o {}: the name is that of the format {}, but --format is {}",
+                  command.output, by_name->name, format->name);
+    }
+  }
   if ((command.fog != 0 || command.mask) && format->name != "vdb") {
     return fail(ErrorCode::kUsage, "{} needs a .vdb file; format {} cannot store a {}",
                 command.mask ? "--mask" : "--fog", format->name,

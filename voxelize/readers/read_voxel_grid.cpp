@@ -200,6 +200,12 @@ Result<VoxelFileGrid> slices_grid(ReadContext& context) {
 
 /// Of formats whose head alone does not say it.
 Result<VoxelFileGrid> grid_of_voxels(const std::string& path, const Execution& execution) {
+  if (!is_voxel_file(path)) {
+    return fail(ErrorCode::kUsage,
+                "{}: a grid is read from .nrrd, .nhdr, .mha, .mhd, .nii, .nii.gz, .h5, .vdb, .vti, "
+                ".npz, .zarr, and from a .npy with a .npy.json",
+                path);
+  }
   const auto volume = read_voxels(path, {}, execution);
   if (!volume) return tl::unexpected(volume.error());
   if (!volume->placed) {

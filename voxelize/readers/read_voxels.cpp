@@ -115,8 +115,11 @@ Result<VoxelVolume> read_as(const Format& format, std::string_view bytes, const 
 std::string list_of_formats() {
   std::string list;
   for (const Format& format : kFormats) {
-    list += (list.empty() ? "" : ", ") + std::string(format.name);
+    const std::string name(format.name);
+    if ((list + ", ").find(" " + name + ",") != std::string::npos) continue;  // another extension
+    list += (list.empty() ? " " : ", ") + name;
   }
+  list.erase(0, 1);
   return list;
 }
 

@@ -168,6 +168,65 @@ TEST_F(Like, APlainGridGivesTheBytesOfTheSameGrid) {
   EXPECT_FALSE(std::filesystem::exists(place.path("d.npy.json")));  // only where it was asked for
 }
 
+TEST_F(Like, AFileWrittenLikeItselfIsTheSame) {
+  const std::vector<std::string> plain = {"a.mha",      "a.mhd", "a.nii", "a.nii.gz", "a.nrrd",
+                                          "a.nhdr",     "a.vti", "a.vdb", "a.npz",    "a.zarr",
+                                          "a.ome.zarr", "a.h5",  "a.tif", "a.raw"};
+  const auto expect_same = [&](const std::string& first) {
+    const std::string second = "b" + first.substr(1);
+    SCOPED_TRACE(first);
+    const RunResult run = place.run({"voxelize", "l.off", "--like", first, "-o", second});
+    ASSERT_EQ(run.exit_code, 0) << run.err;
+    const auto before = read_voxel_grid(place.path(first));
+    const auto after = read_voxel_grid(place.path(second));
+    ASSERT_TRUE(before.has_value() && after.has_value());
+    // Turned grids are rounded again: those of a NIfTI to floats.
+    const bool rounded = before->frame.turned();
+    EXPECT_EQ(before->grid.dims, after->grid.dims);
+    for (int axis = 0; axis < 3; ++axis) {
+      const double most = !rounded ? 0.0 : first == "a.nii" ? 1e-6 : 1e-14;
+      EXPECT_NEAR(before->grid.voxel_size[axis], after->grid.voxel_size[axis], most);
+      EXPECT_NEAR(before->grid.origin[axis], after->grid.origin[axis], 10 * most);
+      EXPECT_LE(glm::distance(before->frame.direction[axis], after->frame.direction[axis]), most);
+    }
+    EXPECT_EQ(before->frame.unit_metres, after->frame.unit_metres);
+    const auto one = read_voxels(place.path(first)), other = read_voxels(place.path(second));
+    ASSERT_TRUE(one.has_value() && other.has_value());
+    EXPECT_GT(one->set.solid_voxels(), 100u);
+    EXPECT_EQ(one->set.solid_voxels(), other->set.solid_voxels());
+    // Heads that name another file, and a .vdb, which is the box of its voxels, have other bytes.
+    const bool others =
+        rounded || first.ends_with(".mhd") || first.ends_with(".nhdr") || first.ends_with(".vdb");
+    if (!others && !std::filesystem::is_directory(place.path(first))) {
+      EXPECT_TRUE(place.read(first) == place.read(second));
+    }
+  };
+  const auto made = [&](const std::string& name, std::vector<std::string> how) {
+    how.insert(how.begin(), {"voxelize", "l.off", "-o", name});
+    const RunResult run = place.run(how);
+    const bool missing = run.exit_code == 2 && run.err.find("h5") != std::string::npos;
+    EXPECT_TRUE(run.exit_code == 0 || missing) << name << run.err;
+    return run.exit_code == 0;
+  };
+  const std::vector<std::string> sized = {"--voxel-size",   "0.21,0.13,0.17", "--origin",
+                                          "-0.3,-0.1,-0.7", "--unit",         "cm"};
+  for (const std::string& name : plain) {
+    if (made(name, sized)) expect_same(name);
+  }
+  // Turned and mirrored, as programs of medicine have it: in LPS, in RAS, in no named space.
+  for (const char* space : {"space: LPS\n", "space: RAS\n", ""}) {
+    write_head("ref.nhdr", dims_, steps_, first_, space);
+    for (const char* name : {"a.mha", "a.nii", "a.nrrd", "a.vti", "a.npz", "a.h5", "a.tif"}) {
+      // A NIfTI is in RAS, a MetaImage in LPS, and the mesh is not flipped.
+      const std::string other = std::string(name) == "a.nii"   ? "space: LPS\n"
+                                : std::string(name) == "a.mha" ? "space: RAS\n"
+                                                               : "none";
+      if (space == other) continue;
+      if (made(name, {"--like", "ref.nhdr"})) expect_same(name);
+    }
+  }
+}
+
 TEST_F(Like, FormatsThatCannotHoldATurnAreRefusedBeforeTheWork) {
   write_head("ref.nhdr", dims_, steps_, first_);
   for (const char* name : {"a.binvox", "a.vox", "slices/"}) {
@@ -196,6 +255,8 @@ TEST_F(Like, MistakesAreNamed) {
   refuses({"--like", "ref.nhdr", "--unit", "in"}, 2,
           "--unit in contradicts --like ref.nhdr, whose numbers are in mm");
   refuses({"--like", "none.nhdr"}, 3, "--like none.nhdr");
+  refuses({"--like", "x.ply"}, 2,
+          "--like x.ply: a grid is read from .nrrd, .nhdr, .mha, .mhd, .nii, .nii.gz, .h5, .vdb");
   refuses({"--like", "ref.nhdr", "-o", "ref.nhdr", "--format", "nrrd"}, 2, "ref.nhdr");
   refuses({"--cubic", "0"}, 2, "a cubic grid must have at least 1 voxel a side, got 0");
   refuses({"--cubic", "70000"}, 6, "at most 65536 voxels a side, got 70000");

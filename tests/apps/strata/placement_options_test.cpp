@@ -137,11 +137,27 @@ TEST_F(PlacementOptions, BadNumbersAreNamed) {
   refuses({"--translate", "1,2,inf"}, "--translate");
   refuses({"--up", "x"}, "--up must be");
   refuses({"--unit", "mile"}, "--unit must be");
-  const RunResult far = place.run({"voxelize", "l.off", "--stats", "--scale", "1e308"});
-  EXPECT_EQ(far.exit_code, 5);
-  EXPECT_NE(far.err.find("l.off: --scale, --translate or --unit moves it beyond"),
-            std::string::npos)
-      << far.err;
+  for (const char* scale : {"1e308", "1e120", "1e-200", "1,1,-1e16"}) {
+    refuses({"--scale", scale},
+            std::string("--scale must be 1e-15 to 1e+15, or negative, got ") + scale);
+  }
+  refuses({"--translate", "0,1e16,0"}, "--translate must be -1e+15 to 1e+15, got 0,1e16,0");
+  refuses({"--scale", "1,2"}, "--scale must be 1 or 3 numbers");
+}
+
+TEST_F(PlacementOptions, MeshesWhoseVolumeIsBeyondDoubleAreRefused) {
+  place.write("far.off",
+              "OFF\n4 4 0\n0 0 0\n1e120 0 0\n0 1e120 0\n0 0 1e120\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 "
+              "2 3\n");
+  for (const auto& command : {std::vector<std::string>{"info", "far.off"},
+                              std::vector<std::string>{"voxelize", "far.off", "-r", "8"},
+                              std::vector<std::string>{"mesh", "far.off", "-o", "a.ply"}}) {
+    const RunResult run = place.run(command);
+    EXPECT_EQ(run.exit_code, 5) << command[0] << run.err;
+    EXPECT_NE(run.err.find("far.off: the mesh is 1e+120 long"), std::string::npos) << run.err;
+  }
+  const RunResult small = place.run({"info", "far.off", "--scale", "1e-15"});
+  EXPECT_EQ(small.exit_code, 5) << "still too large";
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 // What the command line takes and refuses.
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -68,6 +69,38 @@ TEST_F(Usage, WordsThatAreNearlyRightAreNamed) {
           "did you mean dual-peeling?");
   refuses({"csg", "box.obj", "--expr", "bax - b"}, "no file is called bax; did you mean box?");
   refuses({"mesh", "box.obj", "-o", "a.3mf", "--unit", "milimeter"}, "did you mean millimeter?");
+  for (const char* other : {"gpu", "opengl", "cuda"}) {
+    refuses({"voxelize", "box.obj", "--backend", other}, "did you mean gl?");
+  }
+}
+
+TEST_F(Usage, AValueBehindAnOptionThatTakesItAfterAnEqualSignIsSaidToBe) {
+  for (const auto& [option, value] :
+       {std::pair("--coverage", "4"), std::pair("--fog", "2"), std::pair("--surface", "6")}) {
+    refuses({"voxelize", "box.obj", "-r", "4", "-o", "a.vdb", option, value},
+            fmt::format("{0}: there is no such file; a value of {1} is written {1}={0}", value,
+                        option));
+  }
+  place.write("4", place.read("box.obj"));
+  const RunResult run =
+      place.run({"voxelize", "--input-format", "obj", "-r", "4", "--surface", "4", "--stats"});
+  EXPECT_EQ(run.exit_code, 0) << run.err << ": it is a file";
+  std::filesystem::remove(place.path("4"));
+}
+
+TEST_F(Usage, AFormatThatContradictsTheNameIsRefused) {
+  refuses({"voxelize", "box.obj", "-r", "4", "-o", "x.zarr", "--format", "npy"},
+          "-o x.zarr: the name is that of the format zarr, but --format is npy");
+  refuses({"voxelize", "box.obj", "-r", "4", "-o", "x.nrrd", "--format", "vdb"}, "format nrrd");
+}
+
+TEST_F(Usage, ABoxWithoutAnExtentIsTheOptionsFault) {
+  for (const char* command : {"voxelize", "ldi"}) {
+    refuses({command, "box.obj", "-r", "4", "-o", "a.npz", "--bounds", "0,0,0,0,0,0"},
+            "--bounds must be a box with an extent, got 0,0,0,0,0,0");
+    refuses({command, "box.obj", "-r", "4", "-o", "a.npz", "--bounds", "0,0,0,1,-1,1"},
+            "--bounds must have its lower corner first, got 0 to -1 along y");
+  }
 }
 
 TEST_F(Usage, TheCommandComesFirstAndAnOutputBehindItsOption) {
@@ -112,7 +145,7 @@ TEST_F(Usage, HelpBeginsWithExamplesAndEndsWithTheExitCodes) {
   EXPECT_EQ(run.exit_code, 0);
   EXPECT_EQ(run.err, "");
   EXPECT_LT(run.out.find("strata voxelize knot.obj"), run.out.find("Commands:"));
-  for (const char* code : {"0 ", "1 ", "2 ", "3 ", "4 ", "5 ", "6 ", "7 ", "130 "}) {
+  for (const char* code : {"0 ", "1 ", "2 ", "3 ", "4 ", "5 ", "6 ", "7 ", "130 ", "141 "}) {
     EXPECT_NE(run.out.find(std::string("\n  ") + code, run.out.find("Exit codes")),
               std::string::npos)
         << code;
