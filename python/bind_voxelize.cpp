@@ -15,6 +15,7 @@
 #include "strata/csg/solid_lists.h"
 #include "strata/mesh/shapes.h"
 #include "strata/raster/lattice_mesh.h"
+#include "strata/voxelize/distance/inner_faces.h"
 #include "strata/voxelize/voxelize.h"
 #include "voxelize/open/lost_walls.h"
 
@@ -215,6 +216,31 @@ class SeenMesh {
   bool clamped_ = false;
 };
 
+/// The exact boundary of a tree, turned into the space of a grid.
+Result<TriangleSoup> boundary_of(const csg::Tree& tree, const Execution& execution) {
+  auto made = csg::boundary_mesh(tree, tree.root(), {}, execution);
+  if (!made) return tl::unexpected(made.error());
+  return TriangleSoup{std::move(made->mesh.positions), std::move(made->mesh.triangles), {}};
+}
+
+/// The boundary of a closed mesh that overlaps itself; nothing where its own faces are that.
+Result<std::optional<TriangleSoup>> outer_faces(const csg::SolidInput& input,
+                                                const TriangleSoup& seen, const VoxelGrid& grid,
+                                                const VoxelizeOptions& options,
+                                                const Execution& execution) {
+  if (!input.closed) return std::optional<TriangleSoup>();
+  const auto inner = has_inner_faces(seen, grid, options, execution);
+  if (!inner) return tl::unexpected(inner.error());
+  if (!*inner) return std::optional<TriangleSoup>();
+  csg::Solid solid;
+  solid.mesh = std::make_shared<const TriangleSoup>(seen);
+  solid.rule = input.rule;
+  solid.name = input.files.front().path;
+  auto made = boundary_of(csg::Tree(std::move(solid)), execution);
+  if (!made) return tl::unexpected(made.error());
+  return std::optional(*std::move(made));
+}
+
 std::pair<VoxelsPtr, Warnings> voxelize_mesh(const MeshData& mesh, const VoxelFileGrid& placed,
                                              const VoxelChoice& choice, const Limits& limits) {
   VoxelizeOptions options = options_of(choice);
@@ -238,7 +264,10 @@ std::pair<VoxelsPtr, Warnings> voxelize_mesh(const MeshData& mesh, const VoxelFi
       return done;
     }
     if (choice.sdf) {
-      return distances(seen.soup(), grid, options, nullptr, choice.band, *voxels, execution);
+      const auto surface = outer_faces(input, seen.soup(), grid, options, execution);
+      if (!surface) return tl::unexpected(surface.error());
+      return distances(seen.soup(), grid, options, *surface ? &**surface : nullptr, choice.band,
+                       *voxels, execution);
     }
     auto set = voxelize_all(seen.soup(), grid, options, execution);
     if (!set) return tl::unexpected(set.error());
@@ -262,13 +291,6 @@ std::pair<VoxelsPtr, Warnings> voxelize_mesh(const MeshData& mesh, const VoxelFi
     return colour_of_mesh(mesh, seen.soup(), solid, fill, *voxels, execution);
   });
   return {voxels, warnings};
-}
-
-/// The exact boundary of a tree, turned into the space of a grid.
-Result<TriangleSoup> boundary_of(const csg::Tree& tree, const Execution& execution) {
-  auto made = csg::boundary_mesh(tree, tree.root(), {}, execution);
-  if (!made) return tl::unexpected(made.error());
-  return TriangleSoup{std::move(made->mesh.positions), std::move(made->mesh.triangles), {}};
 }
 
 std::pair<VoxelsPtr, Warnings> voxelize_solid(const SolidData& solid, const VoxelFileGrid& placed,

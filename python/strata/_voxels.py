@@ -477,8 +477,8 @@ def voxelize(
     fill_colour : colour, optional
         With `colours`, of meshes: of the voxels deep inside, as `csg.Solid.colour` takes it. Default: grey.
     sdf : bool
-        Each voxel has its signed distance to the surface in world units, negative inside. `numpy` gives float32. Faces of a
-        mesh that lie inside of it count too; those of a solid do not.
+        Each voxel has its signed distance to the surface in world units, negative inside. `numpy` gives float32. Faces that
+        lie inside do not count, also where parts of a mesh overlap; those of a mesh that is not closed do.
     band : float or None
         With `sdf`: half the width of the band around the surface, in voxels; beyond it distances are plus or minus the
         band. None: all voxels have their distance.

@@ -398,6 +398,13 @@ def test_distances_are_those_to_the_box():
     assert np.allclose(narrow, np.clip(expected, -1, 1), atol=1e-6)
     solid = strata.csg.solid(box) | strata.csg.cube(2).translate(3, 3, 3)  # its faces lie inside
     assert np.allclose(solid.voxelize(like=grid, sdf=True, band=None).numpy(), expected, atol=1e-4)
+    # Parts of one mesh that overlap: no distance is that to a face within.
+    inner = CUBE_VERTICES * 2 + 3
+    both = (np.concatenate([box[0], inner]), np.concatenate([box[1], box[1] + len(box[0])]))
+    assert np.allclose(strata.voxelize(both, like=grid, sdf=True, band=None).numpy(), expected, atol=1e-4)
+    halves = CUBE_VERTICES * (2, 4, 4) + 2
+    touching = (np.concatenate([halves, halves + (2, 0, 0)]), np.concatenate([box[1], box[1] + len(halves)]))
+    assert np.allclose(strata.voxelize(touching, like=grid, sdf=True, band=None).numpy(), expected, atol=1e-4)
     with pytest.raises(strata.UsageError, match="band must be 0.5 to 1024 voxels, or None, got 0"):
         strata.voxelize(box, like=grid, sdf=True, band=0)
     with pytest.raises(strata.UsageError, match="a voxel holds one of"):
