@@ -145,10 +145,12 @@ Result<NiftiHead> parse_nifti_head(std::string_view bytes, const std::string& pa
   }
   if (dimensions == 2) head.axes.sizes[2] = 1.0;
   const int code = second ? fields.get<std::int16_t>(12) : fields.get<std::int16_t>(70);
-  const auto type = nifti_type(code);
+  constexpr int kRgba32 = 2304;
+  head.colours = code == kRgba32;
+  const std::optional<NumberType> type = head.colours ? NumberType::kU32 : nifti_type(code);
   if (!type) {
-    return fail(ErrorCode::kInput, "{}: data type {}; whole numbers, float and double are read",
-                path, code);
+    return fail(ErrorCode::kInput,
+                "{}: data type {}; whole numbers, float, double and RGBA are read", path, code);
   }
   head.type = *type;
   const double at = second ? static_cast<double>(fields.get<std::int64_t>(168))

@@ -17,6 +17,7 @@ struct NiftiHead {
   bool placed = false;       ///< by sform or qform
   double volumes = 1.0;      ///< product of the sizes of axes 4 to 7
   NumberType type = NumberType::kU8;  ///< of a voxel
+  bool colours = false;               ///< red, green, blue, alpha: `type` is that of all four
   bool big_endian = false;
   std::uint64_t data_at = 0;            ///< byte of the file where voxels begin, x fastest
   double slope = 0.0, intercept = 0.0;  ///< value = slope * number + intercept; slope 0: as it is

@@ -1,22 +1,43 @@
 // A folder of PNG slices with a slices.json, as write_slices.cpp makes it: a grey picture a layer
-// of z, rows along y in either order.
+// of z, rows along y in either order. An .sl1 of a resin printer, which is an archive of such
+// pictures with the settings of PrusaSlicer.
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
+#include <map>
+#include <optional>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "mesh/text/input_bytes.h"
 #include "voxelize/readers/readers.h"
 #include "voxelize/volume/dense_array.h"
 #include "voxelize/volume/grey_png.h"
+#include "voxelize/volume/inflate_stream.h"
 #include "voxelize/volume/tile_runs.h"
+#include "voxelize/volume/zip_directory.h"
 
 namespace strata {
 namespace {
 
+/// The bytes of a picture.
+struct PictureBytes {
+  std::optional<detail::InputBytes> file;
+  std::optional<std::string> unpacked;
+  std::string_view stored;  // in an archive
+
+  [[nodiscard]] std::string_view view() const {
+    return file ? file->view() : unpacked ? std::string_view(*unpacked) : stored;
+  }
+};
+
 struct SliceFolder {
+  std::string path;
+  std::vector<ZipMember> members;  // pictures in an archive; empty: files of a folder
   VoxelGrid grid;
   bool descending = true;     // rows
   bool mirrored = false;      // columns descend
@@ -26,7 +47,37 @@ struct SliceFolder {
   int digits = 0;
 
   [[nodiscard]] std::string file(int z) const {
+    if (!members.empty()) return path + ": " + members[static_cast<std::size_t>(z)].name;
     return before + fmt::format("{:0{}d}", z, digits) + after;
+  }
+  [[nodiscard]] Result<PictureBytes> bytes(int z, std::uint64_t memory_limit) const {
+    PictureBytes made;
+    if (members.empty()) {
+      auto file_bytes = detail::InputBytes::open(file(z), memory_limit);
+      if (!file_bytes) return tl::unexpected(file_bytes.error());
+      made.file = *std::move(file_bytes);
+      return made;
+    }
+    const ZipMember& member = members[static_cast<std::size_t>(z)];
+    made.stored = member.packed;
+    if (!member.deflated) return made;
+    auto unpacked = unpack(member, file(z));
+    if (!unpacked) return tl::unexpected(unpacked.error());
+    made.unpacked = *std::move(unpacked);
+    return made;
+  }
+  static Result<std::string> unpack(const ZipMember& member, const std::string& name) {
+    constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 30;
+    if (member.bytes > kMostBytes) {
+      return fail(ErrorCode::kLimit, "{}: {} bytes unpacked; at most {} are read", name,
+                  member.bytes, kMostBytes);
+    }
+    if (!member.deflated) return std::string(member.packed);
+    std::string bytes(member.bytes, '\0');
+    InflateStream stream(member.packed, InflateStream::kBare, name);
+    auto read = stream.read(reinterpret_cast<std::byte*>(bytes.data()), bytes.size());
+    if (!read) return tl::unexpected(read.error());
+    return bytes;
   }
 };
 
@@ -110,9 +161,9 @@ class SlabOfSlices {
  private:
   Result<void> read_layer(int z, int bits) {
     const std::string path = folder_.file(z);
-    const auto file = detail::InputBytes::open(path, context_.execution.memory_limit);
-    if (!file) return tl::unexpected(file.error());
-    const Result<GreyPng> png = GreyPng::open(file->view(), path);
+    const auto bytes = folder_.bytes(z, context_.execution.memory_limit);
+    if (!bytes) return tl::unexpected(bytes.error());
+    const Result<GreyPng> png = GreyPng::open(bytes->view(), path);
     if (!png) return tl::unexpected(png.error());
     const glm::ivec3 dims = folder_.grid.dims;
     if (png->width() != dims.x || png->height() != dims.y || png->bits() != bits) {
@@ -144,23 +195,23 @@ class SlabOfSlices {
   std::vector<TileRuns> tiles_;
 };
 
-}  // namespace
-
-Result<VoxelVolume> read_slice_voxels(ReadContext& context) {
-  const Result<SliceFolder> folder = read_description(context);
-  if (!folder) return tl::unexpected(folder.error());
-  const auto first = detail::InputBytes::open(folder->file(0), context.execution.memory_limit);
+Result<GreyPng> first_picture(const ReadContext& context, const SliceFolder& folder) {
+  const auto first = folder.bytes(0, context.execution.memory_limit);
   if (!first) return tl::unexpected(first.error());
-  const Result<GreyPng> png = GreyPng::open(first->view(), folder->file(0));
+  return GreyPng::open(first->view(), folder.file(0));
+}
+
+Result<VoxelVolume> read_pictures(ReadContext& context, const SliceFolder& folder) {
+  const Result<GreyPng> png = first_picture(context, folder);
   if (!png) return tl::unexpected(png.error());
   VoxelVolume volume;
-  volume.set = VoxelIntervals(folder->grid, Axis::kX);
+  volume.set = VoxelIntervals(folder.grid, Axis::kX);
   if (!context.budget.take(volume.set.memory_bytes())) return context.too_large("the grid");
   const int bits = png->bits();
   volume.type = bits == 1 ? "bool" : bits == 8 ? "uint8" : "uint16";
   std::vector<Result<void>> results(static_cast<std::size_t>(volume.set.tiles_v()));
   parallel_for(context.execution, results.size(), [&](std::size_t tv, int) {
-    results[tv] = SlabOfSlices(context, *folder, volume.set).read(static_cast<int>(tv), bits);
+    results[tv] = SlabOfSlices(context, folder, volume.set).read(static_cast<int>(tv), bits);
   });
   if (context.stopped()) return context.cancelled();
   for (const Result<void>& result : results) {
@@ -171,18 +222,114 @@ Result<VoxelVolume> read_slice_voxels(ReadContext& context) {
     settle_ids(volume, bits == 8 ? 255 : 65535);
   }
   const bool asked = context.options.integers == IntegerVoxels::kValues;
-  const bool auto_shares = folder->shares && context.options.integers == IntegerVoxels::kAuto;
+  const bool auto_shares = folder.shares && context.options.integers == IntegerVoxels::kAuto;
   if (bits == 8 && volume.kind == VoxelKind::kIds &&
       (asked || auto_shares || are_fractions(context, volume))) {
     std::array<float, 256> values{};
     for (std::size_t i = 0; i < values.size(); ++i) {
       values[i] =
-          static_cast<float>(255.0 * std::pow(static_cast<double>(i) / 255, 1 / folder->gamma));
+          static_cast<float>(255.0 * std::pow(static_cast<double>(i) / 255, 1 / folder.gamma));
     }
     if (auto done = labels_to_values(context, volume, values); !done) {
       return tl::unexpected(done.error());
     }
   }
+  return volume;
+}
+
+/// Lines `name = value` of the archive's text files.
+class Settings {
+ public:
+  Result<void> add(const ZipMember& member, const std::string& name) {
+    const auto text = SliceFolder::unpack(member, name);
+    if (!text) return tl::unexpected(text.error());
+    for (std::string_view rest = *text; !rest.empty();) {
+      const std::string_view line = rest.substr(0, rest.find_first_of("\r\n"));
+      rest.remove_prefix(std::min(line.size() + 1, rest.size()));
+      const std::size_t equal = line.find('=');
+      if (equal == std::string_view::npos) continue;
+      values_[std::string(trimmed(line.substr(0, equal)))] = trimmed(line.substr(equal + 1));
+    }
+    return {};
+  }
+  /// Above 0; else 0.
+  [[nodiscard]] double number(const char* name) const {
+    const auto found = values_.find(name);
+    double value = 0;
+    if (found == values_.end()) return 0;
+    const std::string& text = found->second;
+    const auto end = std::from_chars(text.data(), text.data() + text.size(), value).ptr;
+    return end != text.data() && std::isfinite(value) && value > 0 ? value : 0;
+  }
+
+ private:
+  static std::string_view trimmed(std::string_view text) {
+    while (text.starts_with(' ')) text.remove_prefix(1);
+    while (text.ends_with(' ')) text.remove_suffix(1);
+    return text;
+  }
+  std::map<std::string, std::string> values_;
+};
+
+/// The length of a pixel, where the settings say it; else 0.
+double pixel_size(const Settings& settings, const char* length, const char* pixels) {
+  const double count = settings.number(pixels);
+  return count > 0 ? settings.number(length) / count : 0;
+}
+
+Result<SliceFolder> read_archive(ReadContext& context) {
+  auto members = zip_members(context.bytes, context.path);
+  if (!members) return tl::unexpected(members.error());
+  SliceFolder folder;
+  folder.path = context.path;
+  Settings settings;
+  for (ZipMember& member : *members) {
+    const std::string name = context.path + ": " + member.name;
+    if (member.name == "config.ini" || member.name == "prusaslicer.ini") {
+      if (auto read = settings.add(member, name); !read) return tl::unexpected(read.error());
+    } else if (member.name.ends_with(".png") && member.name.find('/') == std::string::npos) {
+      folder.members.push_back(std::move(member));
+    }
+  }
+  if (folder.members.empty()) {
+    return fail(ErrorCode::kInput, "{}: the archive has no pictures of layers", context.path);
+  }
+  std::ranges::sort(folder.members, {}, &ZipMember::name);
+  const Result<GreyPng> png = first_picture(context, folder);
+  if (!png) return tl::unexpected(png.error());
+  if (folder.members.size() > static_cast<std::size_t>(kMaxGridSide) ||
+      png->width() > kMaxGridSide || png->height() > kMaxGridSide) {
+    return fail(ErrorCode::kLimit, "{}: {} layers of {} x {} pixels; a side has at most {}",
+                context.path, folder.members.size(), png->width(), png->height(), kMaxGridSide);
+  }
+  folder.grid.dims = {png->width(), png->height(), static_cast<int>(folder.members.size())};
+  double x = pixel_size(settings, "display_width", "display_pixels_x");
+  double y = pixel_size(settings, "display_height", "display_pixels_y");
+  // Pictures of a display that stands upright have its height along their rows.
+  if (settings.number("display_pixels_x") == png->height()) std::swap(x, y);
+  const double z = std::max(settings.number("layerHeight"), settings.number("layer_height"));
+  folder.grid.voxel_size = {x > 0 ? x : 1, y > 0 ? y : 1, z > 0 ? z : 1};
+  folder.mirrored = settings.number("display_mirror_x") == 1;
+  folder.descending = settings.number("display_mirror_y") != 1;
+  folder.shares = true;
+  if (const double gamma = settings.number("gamma_correction"); gamma > 0) folder.gamma = gamma;
+  if (auto place = check_place(context, folder.grid); !place) return tl::unexpected(place.error());
+  return folder;
+}
+
+}  // namespace
+
+Result<VoxelVolume> read_slice_voxels(ReadContext& context) {
+  const Result<SliceFolder> folder = read_description(context);
+  if (!folder) return tl::unexpected(folder.error());
+  return read_pictures(context, *folder);
+}
+
+Result<VoxelVolume> read_sl1_voxels(ReadContext& context) {
+  const Result<SliceFolder> folder = read_archive(context);
+  if (!folder) return tl::unexpected(folder.error());
+  auto volume = read_pictures(context, *folder);
+  if (volume) volume->placed = false;  // somewhere on the printer's display
   return volume;
 }
 

@@ -1,7 +1,7 @@
 // OpenVDB files, versions 222 to 224 (OpenVDB 3 and later): trees of branching 5, 4, 3 of bool,
-// mask, int32, int64, float and double, the last two also as halves; plain, packed by zlib or
-// Blosc, with or without inactive values. Not by libopenvdb: it trusts the file, takes 45 ms to
-// load, and
+// mask, int32, int64, float and double, the last two also as halves; of Vec3s, which are colours;
+// plain, packed by zlib or Blosc, with or without inactive values. Not by libopenvdb: it trusts the
+// file, takes 45 ms to load, and
 // ./dev demo builds without it. The tests compare with what OpenVDB reads and writes.
 //
 // Masks and bools become runs tile by tile, straight from the leaves. Numbers become blocks of a
@@ -16,6 +16,7 @@
 #include <string>
 #include <vector>
 
+#include "strata/voxelize/packed_colour.h"
 #include "voxelize/heads/grid_axes.h"
 #include "voxelize/readers/readers.h"
 #include "voxelize/readers/vdb_tree.h"
@@ -61,6 +62,7 @@ class VdbReader {
   void add_box(const VdbTile& box, const glm::ivec3& tile, TileRuns& runs) const;
   Result<ScalarField> make_field(const VoxelGrid& grid);
   Result<void> read_leaves(ScalarField& field);
+  Result<VoxelVolume> coloured(VoxelVolume volume, const VoxelGrid& grid);
   [[nodiscard]] VoxelKind kind() const;
 
   ReadContext& context_;
@@ -264,6 +266,21 @@ Result<ScalarField> VdbReader::make_field(const VoxelGrid& grid) {
   return field;
 }
 
+/// Labels from the values that VdbValueLists gives to colours, and a palette.
+Result<VoxelVolume> VdbReader::coloured(VoxelVolume volume, const VoxelGrid& grid) {
+  volume.kind = VoxelKind::kIds;
+  if (auto settled = settle_values(context_, volume, grid); !settled) {
+    return tl::unexpected(settled.error());
+  }
+  if (volume.kind != VoxelKind::kIds) return volume;  // all is black
+  settle_colours(volume);
+  for (glm::u8vec4& colour : volume.colours) {
+    const std::uint32_t packed = packed_colour(colour) - 1;
+    colour = unpacked_colour(packed | 0xff000000u);
+  }
+  return volume;
+}
+
 VoxelKind VdbReader::kind() const {
   const std::string grid_class = meta("class");
   const bool real = type_.type == VdbType::kFloat || type_.type == VdbType::kDouble;
@@ -302,6 +319,7 @@ Result<VoxelVolume> VdbReader::read(std::uint64_t tree_at) {
   Result<ScalarField> field = make_field(*grid);
   if (!field) return tl::unexpected(field.error());
   volume.values = std::move(*field);
+  if (lists_.colours()) return coloured(std::move(volume), *grid);
   volume.kind = kind();
   if (volume.kind == VoxelKind::kIds && volume.values.range().least < 0.0f) {
     volume.kind = VoxelKind::kValues;
@@ -322,8 +340,8 @@ Result<const VdbGridEntry*> choose(const ReadContext& context,
     if (wanted.empty() ? readable : entry.name == wanted) {
       if (readable) return &entry;
       return fail(ErrorCode::kInput,
-                  "{}: grid '{}' is a {}; trees of bool, mask, int32, int64, float and double of "
-                  "5_4_3 are read",
+                  "{}: grid '{}' is a {}; trees of bool, mask, int32, int64, float, double and "
+                  "vec3s of 5_4_3 are read",
                   context.path, entry.name, entry.tree_type);
     }
     list += (list.empty() ? "'" : ", '") + entry.name + "' (" + entry.tree_type + ")";
@@ -333,8 +351,8 @@ Result<const VdbGridEntry*> choose(const ReadContext& context,
                 list.empty() ? "none" : list);
   }
   return fail(ErrorCode::kInput,
-              "{}: no grid of bool, mask, int32, int64, float or double; it has {}", context.path,
-              list.empty() ? "none" : list);
+              "{}: no grid of bool, mask, int32, int64, float, double or vec3s; it has {}",
+              context.path, list.empty() ? "none" : list);
 }
 
 }  // namespace

@@ -51,6 +51,7 @@ constexpr std::array kFormats = {
     Format{"zarr", "", read_zarr_voxels, true, ".zarray"},
     Format{"ome.zarr", "", read_ome_zarr_voxels, true, ".zgroup"},
     Format{"png", "", read_slice_voxels, true, "slices.json"},
+    Format{"sl1", ".sl1", read_sl1_voxels},
     Format{"ldi", ".exr", read_exr},
 };
 constexpr std::array<std::string_view, kFormats.size()> kNames = [] {

@@ -133,6 +133,7 @@ struct VtiArray {
   Tag tag;
   std::string name, type, format;
   bool points = false;
+  bool colours = false;  // red, green, blue, alpha
 };
 
 /// Attributes of the image and of its piece.
@@ -213,13 +214,16 @@ Result<void> VtiReader::find_arrays() {
       from = tag->end;
       VtiArray array{*tag, tag->get("Name"), tag->get("type"), tag->get("format"), points};
       const std::string components = tag->get("NumberOfComponents");
-      if (!components.empty() && components != "1") continue;
+      array.colours = components == "4" && array.type == "UInt8";
+      if (!components.empty() && components != "1" && !array.colours) continue;
       const bool main = array.name == scalars && arrays_.size() > first;
       arrays_.insert(main ? arrays_.begin() + static_cast<std::ptrdiff_t>(first) : arrays_.end(),
                      std::move(array));
     }
   }
-  if (arrays_.empty()) return fault("no array of one number a cell or point");
+  if (arrays_.empty()) {
+    return fault("no array of one number a cell or point, or of red, green, blue and alpha");
+  }
   return {};
 }
 
@@ -337,7 +341,8 @@ Result<VoxelVolume> VtiReader::read() {
   }
   const std::optional<NumberType> type = vti_type(array->type);
   if (!type) return fault("array '" + array->name + "' is of type " + array->type.substr(0, 40));
-  layout_.type = *type;
+  layout_.type = array->colours ? NumberType::kU32 : *type;
+  context_.colours = array->colours;
   if (auto placed = place(*array); !placed) return tl::unexpected(placed.error());
   const Result<std::string_view> bytes = array_bytes(*array);
   if (!bytes) return tl::unexpected(bytes.error());

@@ -37,6 +37,8 @@ struct ZarrHead {
   bool reversed = false;
   std::string folder;
   std::string before;
+  std::string after;     // of the name of a chunk
+  bool colours = false;  // red, green, blue, alpha side by side: `type` is that of all four
 
   [[nodiscard]] std::size_t chunk_bytes() const {
     return static_cast<std::size_t>(chunk.x) * static_cast<std::size_t>(chunk.y) *
@@ -81,19 +83,33 @@ Result<void> take_type(const JsonValue& json, const std::string& path, ZarrHead&
 
 /// The three axes of a shape or of chunks as x, y, z; of OME-Zarr the last three, of which those
 /// before have one index. Nothing if there are others.
+/// @param colours  a further axis follows
 std::optional<std::vector<double>> three_axes(const JsonValue& json, std::string_view name,
-                                              bool ome) {
+                                              bool ome, bool colours) {
   const JsonValue* list = json.find(name);
-  if (list == nullptr || list->items.size() < 3 || (!ome && list->items.size() != 3)) {
+  const std::size_t axes = colours ? 4 : 3;
+  if (list == nullptr || list->items.size() < axes || (!ome && list->items.size() != axes)) {
     return std::nullopt;
   }
   auto numbers = json.numbers(name, list->items.size());
+  if (numbers && colours) numbers->pop_back();
   if (!numbers || !ome) return numbers;
   for (; numbers->size() > 3; numbers->erase(numbers->begin())) {
     if (numbers->front() != 1.0) return std::nullopt;
   }
   std::reverse(numbers->begin(), numbers->end());
   return numbers;
+}
+
+/// Whether the last of four axes or more is that of red, green, blue and alpha.
+bool has_colours(const JsonValue& json) {
+  const JsonValue *type = json.find("dtype"), *shape = json.find("shape");
+  const JsonValue *chunks = json.find("chunks"), *order = json.find("order");
+  const auto ends_with_4 = [](const JsonValue* list) {
+    return list != nullptr && list->items.size() > 3 && list->items.back().number == 4.0;
+  };
+  return type != nullptr && type->text == "|u1" && ends_with_4(shape) && ends_with_4(chunks) &&
+         (order == nullptr || order->text != "F");
 }
 
 /// @param folder  of the array; of OME-Zarr in that of the group
@@ -105,7 +121,9 @@ Result<ZarrHead> read_head(const ReadContext& context, const std::string& folder
   head.reversed = ome;
   head.folder = folder;
   const JsonValue* version = json->find("zarr_format");
-  const auto shape = three_axes(*json, "shape", ome), chunks = three_axes(*json, "chunks", ome);
+  head.colours = has_colours(*json);
+  const auto shape = three_axes(*json, "shape", ome, head.colours);
+  const auto chunks = three_axes(*json, "chunks", ome, head.colours);
   if (version == nullptr || version->number != 2.0 || !shape || !chunks) {
     return fail(ErrorCode::kInput, "{}: zarr_format must be 2, shape and chunks 3 numbers each",
                 path);
@@ -123,9 +141,13 @@ Result<ZarrHead> read_head(const ReadContext& context, const std::string& folder
     head.chunks[axis] = (head.grid.dims[axis] + head.chunk[axis] - 1) / head.chunk[axis];
   }
   if (auto taken = take_type(*json, path, head); !taken) return tl::unexpected(taken.error());
+  if (head.colours) {
+    head.type = NumberType::kU32;
+    head.after = std::string(1, head.separator) + "0";
+  }
   if (ome) {
     head.fortran = !head.fortran;
-    for (std::size_t i = 3; i < json->find("shape")->items.size(); ++i) {
+    for (std::size_t i = head.colours ? 4 : 3; i < json->find("shape")->items.size(); ++i) {
       head.before += std::string("0") + head.separator;
     }
     const auto place = read_voxel_grid(context.path, context.execution);
@@ -167,8 +189,9 @@ class ChunkReader {
   /// The numbers of a chunk in the order of the file; empty if there is no such file.
   Result<std::span<const std::byte>> read(const glm::ivec3& at) {
     const glm::ivec3 name = head_.reversed ? glm::ivec3(at.z, at.y, at.x) : at;
-    const std::string path = fmt::format("{}/{}{}{}{}{}{}", head_.folder, head_.before, name.x,
-                                         head_.separator, name.y, head_.separator, name.z);
+    const std::string path =
+        fmt::format("{}/{}{}{}{}{}{}{}", head_.folder, head_.before, name.x, head_.separator,
+                    name.y, head_.separator, name.z, head_.after);
     if (::access(path.c_str(), F_OK) != 0) return std::span<const std::byte>();
     const auto file = detail::InputBytes::open(path, context_.execution.memory_limit);
     if (!file) return tl::unexpected(file.error());
@@ -359,8 +382,10 @@ Result<VoxelVolume> read_array(ReadContext& context, const std::string& folder, 
   if (!head) return tl::unexpected(head.error());
   if (!context.budget.take(head->chunk_bytes() * 2)) return context.too_large("a chunk");
   VoxelVolume volume;
-  const bool ids = !is_float(head->type) && head->fill == 0.0 &&
-                   (head->type == NumberType::kBool || !context.integers_as_values);
+  context.colours = head->colours;
+  const bool ids =
+      !is_float(head->type) && head->fill == 0.0 &&
+      (head->type == NumberType::kBool || head->colours || !context.integers_as_values);
   if (ids) {
     Result<VoxelIntervals> set = read_runs(context, *head);
     if (!set) return tl::unexpected(set.error());

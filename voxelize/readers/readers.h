@@ -22,6 +22,7 @@ Result<VoxelVolume> read_vox_voxels(ReadContext& context);
 Result<VoxelVolume> read_zarr_voxels(ReadContext& context);      ///< a folder
 Result<VoxelVolume> read_ome_zarr_voxels(ReadContext& context);  ///< a folder
 Result<VoxelVolume> read_slice_voxels(ReadContext& context);     ///< a folder
+Result<VoxelVolume> read_sl1_voxels(ReadContext& context);
 /// The voxels of depth lists: .npz or .exr, as `strata ldi` writes them.
 Result<VoxelVolume> read_list_voxels(ReadContext& context, bool exr);
 

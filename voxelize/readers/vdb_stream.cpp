@@ -2,11 +2,13 @@
 
 #include <libdeflate.h>
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstring>
 #include <memory>
 
+#include "core/srgb.h"
 #include "voxelize/readers/unblosc.h"
 #include "voxelize/volume/half_float.h"
 
@@ -131,6 +133,8 @@ std::size_t bytes_of(VdbType type) {
     case VdbType::kInt32:
     case VdbType::kFloat:
       return 4;
+    case VdbType::kVec3s:
+      return 12;
     case VdbType::kInt64:
     case VdbType::kDouble:
       break;
@@ -139,7 +143,8 @@ std::size_t bytes_of(VdbType type) {
 }
 
 std::string_view name_of(VdbType type) {
-  constexpr std::string_view kNames[] = {"mask", "bool", "int32", "int64", "float", "double"};
+  constexpr std::string_view kNames[] = {"mask",  "bool",   "int32", "int64",
+                                         "float", "double", "vec3s"};
   return kNames[static_cast<std::size_t>(type)];
 }
 
@@ -153,10 +158,11 @@ VdbTreeType vdb_tree_type(std::string_view name) {
   if (!name.starts_with(kHead) || !name.ends_with(kTail)) return {};
   name = name.substr(kHead.size(), name.size() - kHead.size() - kTail.size());
   for (const VdbType type : {VdbType::kMask, VdbType::kBool, VdbType::kInt32, VdbType::kInt64,
-                             VdbType::kFloat, VdbType::kDouble}) {
+                             VdbType::kFloat, VdbType::kDouble, VdbType::kVec3s}) {
     if (name == name_of(type)) result.type = type, result.read = true;
   }
   const bool real = result.type == VdbType::kFloat || result.type == VdbType::kDouble;
+  if (result.type == VdbType::kVec3s && result.half) result.read = false;
   if (!real) result.half = false;
   return result;
 }
@@ -243,6 +249,16 @@ float VdbValueLists::number(const std::byte* from) const {
       return as(std::int64_t{});
     case VdbType::kFloat:
       return as(float{});
+    case VdbType::kVec3s: {
+      float light[3], packed = 1.0f, place = 1.0f;
+      std::memcpy(light, from, sizeof light);
+      for (const float each : light) {
+        const double share = srgb_of_linear(std::clamp(static_cast<double>(each), 0.0, 1.0));
+        packed += place * static_cast<float>(std::lround(255.0 * share));
+        place *= 256.0f;
+      }
+      return packed;
+    }
     case VdbType::kDouble:
       break;
   }
@@ -335,6 +351,9 @@ std::string VdbValueLists::read(ByteCursor& cursor, std::span<const std::uint64_
     const bool second = !list.selection.empty() &&
                         (static_cast<unsigned char>(list.selection[i / 8]) >> i % 8 & 1) != 0;
     values[i] = list.inactive[second ? 1 : 0];
+  }
+  for (std::size_t i = 0; colours() && i < mask.size() * 64; ++i) {
+    if ((mask[i / 64] >> i % 64 & 1) == 0) values[i] = 0.0f;
   }
   return "";
 }

@@ -19,7 +19,7 @@ namespace strata {
 /// io/GridDescriptor.cc, MetaMap.cc, math/Maps.h of OpenVDB 10. (Internal to voxelize/readers.)
 
 /// The type of a tree's values.
-enum class VdbType { kMask, kBool, kInt32, kInt64, kFloat, kDouble };
+enum class VdbType { kMask, kBool, kInt32, kInt64, kFloat, kDouble, kVec3s };
 /// Bytes of a value as inner nodes hold it.
 [[nodiscard]] std::size_t bytes_of(VdbType type);
 /// "mask", "bool", "int32", ...
@@ -54,7 +54,8 @@ struct VdbTreeType {
 };
 [[nodiscard]] VdbTreeType vdb_tree_type(std::string_view name);
 
-/// Compressed lists of values: io/Compression.h. Of a tree.
+/// Compressed lists of values: io/Compression.h. Of a tree. Three floats are light of red, green
+/// and blue: their value is 1 and the packed colour, where they are active, else 0.
 class VdbValueLists {
  public:
   VdbValueLists(VdbTreeType type, std::uint32_t compression)
@@ -67,6 +68,8 @@ class VdbValueLists {
   std::string read(ByteCursor& cursor, std::span<const std::uint64_t> mask, float* values) const;
   /// One value as it stands in a root.
   [[nodiscard]] float one(ByteCursor& cursor) const;
+
+  [[nodiscard]] bool colours() const { return type_.type == VdbType::kVec3s; }
 
  private:
   struct Head {

@@ -136,13 +136,15 @@ Result<VdbTree> TreeReader::read() {
   tree_.upper = glm::ivec3(INT_MIN);
   cursor_.get<std::uint32_t>();  // buffers of a leaf
   tree_.background = lists_.one(cursor_);
+  if (lists_.colours()) tree_.background = 0.0f;
   lists_.set_background(tree_.background);
   const auto tiles = cursor_.get<std::uint32_t>(), children = cursor_.get<std::uint32_t>();
   for (std::uint32_t i = 0; i < tiles; ++i) {
     const Result<glm::ivec3> at = origin(kUpperSide);
     if (!at) return tl::unexpected(at.error());
-    const float value = lists_.one(cursor_);
+    float value = lists_.one(cursor_);
     const bool active = cursor_.get<std::uint8_t>() != 0;
+    if (lists_.colours() && !active) value = 0.0f;
     if (auto added = add_tile(*at, kUpperSide, value, active); !added) {
       return tl::unexpected(added.error());
     }

@@ -13,15 +13,18 @@ namespace strata {
 Result<VoxelVolume> read_metaimage_voxels(ReadContext& context) {
   const auto head = parse_metaimage_head(context.bytes, context.path);
   if (!head) return tl::unexpected(head.error());
-  if (head->channels != 1) {
-    return fail(ErrorCode::kInput, "{}: {} numbers a voxel; one is read", context.path,
-                head->channels);
+  context.colours = head->channels == 4 && head->type == NumberType::kU8;
+  if (head->channels != 1 && !context.colours) {
+    return fail(ErrorCode::kInput,
+                "{}: {} numbers a voxel; one is read, or red, green, blue and "
+                "alpha of 8 bits",
+                context.path, head->channels);
   }
   auto placed = placed_layout(context, head->axes);
   if (!placed) return tl::unexpected(placed.error());
   DenseLayout& layout = placed->layout;
-  layout.type = head->type;
-  layout.big_endian = head->big_endian;
+  layout.type = context.colours ? NumberType::kU32 : head->type;
+  layout.big_endian = head->big_endian && !context.colours;
 
   std::string_view data = context.bytes.substr(head->data_at);
   std::optional<detail::InputBytes> beside;

@@ -79,8 +79,10 @@ Result<VoxelVolume> read_nifti_voxels(ReadContext& context) {
   if (!placed) return tl::unexpected(placed.error());
   DenseLayout& layout = placed->layout;
   layout.type = head->type;
-  layout.big_endian = head->big_endian;
-  const bool scaled = head->slope != 0.0 && !(head->slope == 1.0 && head->intercept == 0.0);
+  context.colours = head->colours;
+  layout.big_endian = head->big_endian && !head->colours;
+  const bool scaled =
+      !head->colours && head->slope != 0.0 && !(head->slope == 1.0 && head->intercept == 0.0);
   DenseData data;
   const RowConverter converter(layout);
   std::vector<std::byte> numbers;

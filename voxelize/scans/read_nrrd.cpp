@@ -69,15 +69,24 @@ std::optional<NumberType> nrrd_type(std::string_view name) {
 /// Spacing, origin, order and direction of the axes.
 class Placement {
  public:
-  Placement(const NrrdHead& head, const std::array<int, 3>& sizes, DenseLayout& layout)
-      : head_(head), sizes_(sizes), layout_(layout) {}
+  Placement(const NrrdHead& head, const std::array<int, 3>& sizes, bool colours,
+            DenseLayout& layout)
+      : head_(head), sizes_(sizes), colours_(colours), layout_(layout) {}
 
   /// @return a note where the axes are turned
   std::string place() {
-    const std::vector<double> d = numbers_of(head_.get("space directions"));
+    // Of four axes the first is that of colours, which lies nowhere: "none" is three numbers.
+    const auto in_space = [this](std::string_view text, std::size_t each) {
+      std::vector<double> list = numbers_of(text);
+      if (colours_ && list.size() > 3 * each) {
+        list.erase(list.begin(), list.end() - static_cast<std::ptrdiff_t>(3 * each));
+      }
+      return list;
+    };
+    const std::vector<double> d = in_space(head_.get("space directions"), 3);
     if (d.size() == 9) return by_directions(d);
-    const std::vector<double> spacing = numbers_of(head_.get("spacings"));
-    const std::vector<double> mins = numbers_of(head_.get("axis mins", "axismins"));
+    const std::vector<double> spacing = in_space(head_.get("spacings"), 1);
+    const std::vector<double> mins = in_space(head_.get("axis mins", "axismins"), 1);
     const std::vector<double> origin = numbers_of(head_.get("space origin"));
     const bool node = head_.get("centers", "centerings").find("node") != std::string_view::npos;
     for (int axis = 0; axis < 3; ++axis) {
@@ -133,6 +142,7 @@ class Placement {
 
   const NrrdHead& head_;
   const std::array<int, 3>& sizes_;
+  const bool colours_;
   DenseLayout& layout_;
   bool placed_ = false;
 };
@@ -160,8 +170,13 @@ Result<VoxelVolume> read_nrrd_voxels(ReadContext& context) {
   const Result<NrrdHead> head = parse_nrrd_head(context.bytes, context.path);
   if (!head) return tl::unexpected(head.error());
   DenseLayout layout;
-  const std::vector<double> sizes = numbers_of(head->get("sizes"));
-  if (sizes.size() != 3 || head->get("dimension") != "3") {
+  std::vector<double> sizes = numbers_of(head->get("sizes"));
+  const std::optional<NumberType> type = nrrd_type(lower_case(std::string(head->get("type"))));
+  // Red, green, blue and alpha side by side.
+  context.colours = sizes.size() == 4 && sizes[0] == 4.0 && type == NumberType::kU8 &&
+                    head->get("dimension") == "4";
+  if (context.colours) sizes.erase(sizes.begin());
+  if (sizes.size() != 3 || head->get("dimension") != (context.colours ? "4" : "3")) {
     return fail(ErrorCode::kInput, "{}: dimension is '{}' and sizes '{}'; voxels have 3",
                 context.path, head->get("dimension"), head->get("sizes").substr(0, 40));
   }
@@ -175,14 +190,13 @@ Result<VoxelVolume> read_nrrd_voxels(ReadContext& context) {
     }
     sides[a] = static_cast<int>(sizes[a]);
   }
-  const std::optional<NumberType> type = nrrd_type(lower_case(std::string(head->get("type"))));
   if (!type) {
     return fail(ErrorCode::kInput, "{}: type '{}' is not read; integers, float and double are",
                 context.path, head->get("type").substr(0, 40));
   }
-  layout.type = *type;
-  layout.big_endian = lower_case(std::string(head->get("endian"))) == "big";
-  Placement placement(*head, sides, layout);
+  layout.type = context.colours ? NumberType::kU32 : *type;
+  layout.big_endian = lower_case(std::string(head->get("endian"))) == "big" && !context.colours;
+  Placement placement(*head, sides, context.colours, layout);
   const std::string note = placement.place();
   if (auto place = check_place(context, layout.grid); !place) return tl::unexpected(place.error());
 
@@ -237,6 +251,7 @@ auto with_head(ReadContext& context, Read&& read) -> decltype(read(context)) {
     beside.integers_as_values = context.integers_as_values;
     auto result = read(beside);
     context.wants_values = beside.wants_values.load();
+    context.colours = beside.colours;
     return result;
   }
   return fail(ErrorCode::kInput,

@@ -62,7 +62,8 @@ Result<VoxelVolume> read_tiff_voxels(ReadContext& context) {
   auto placed = placed_layout(context, file->axes);
   if (!placed) return tl::unexpected(placed.error());
   placed->layout.type = file->type;
-  placed->layout.big_endian = file->big_endian;
+  context.colours = file->colours;
+  placed->layout.big_endian = file->big_endian && !file->colours;
   StripBytes strips(context, *file);
   return read_placed(context, *placed,
                      {{}, [&](std::byte* to, std::size_t bytes) { return strips.read(to, bytes); }},

@@ -24,6 +24,7 @@ enum Tag : std::uint16_t {
   kStripBytes = 279,
   kXResolution = 282,
   kYResolution = 283,
+  kPlanar = 284,
   kPredictor = 317,
   kTileWidth = 322,
   kSampleFormat = 339
@@ -94,9 +95,9 @@ void TiffParser::take_entry(std::uint64_t at, Directory& into) {
       into.description = bytes_.substr(at, count);
     return;
   }
-  constexpr Tag kKnown[] = {kWidth,        kLength,    kBits,         kCompression, kPhotometric,
-                            kStripOffsets, kSamples,   kRowsPerStrip, kStripBytes,  kXResolution,
-                            kYResolution,  kPredictor, kTileWidth,    kSampleFormat};
+  constexpr Tag kKnown[] = {kWidth,        kLength,  kBits,         kCompression, kPhotometric,
+                            kStripOffsets, kSamples, kRowsPerStrip, kStripBytes,  kXResolution,
+                            kYResolution,  kPlanar,  kPredictor,    kTileWidth,   kSampleFormat};
   if (std::find(std::begin(kKnown), std::end(kKnown), tag) == std::end(kKnown)) return;
   std::vector<double>& numbers = into.numbers[tag];
   for (std::uint64_t i = 0; i < count && !failed_; ++i) {
@@ -120,11 +121,17 @@ Result<Directory> TiffParser::directory(std::uint64_t at) {
 
 Result<void> TiffParser::take_first(const Directory& page) {
   if (page.numbers.contains(kTileWidth)) return refused("tiles are not read; strips are");
-  if (page.number(kSamples, 1) != 1) {
-    return refused(fmt::format("{} numbers a voxel; one is read", page.number(kSamples, 1)));
+  constexpr double kRgb = 2;
+  file_.colours = page.number(kSamples, 1) == 4 && page.number(kPhotometric, 1) == kRgb &&
+                  page.number(kBits, 1) == 8 && page.number(kPlanar, 1) == 1;
+  if (page.number(kSamples, 1) != 1 && !file_.colours) {
+    return refused(
+        fmt::format("{} numbers a voxel; one is read, or red, green, blue and alpha of "
+                    "8 bits, side by side",
+                    page.number(kSamples, 1)));
   }
-  if (page.number(kPhotometric, 1) != 1) {
-    return refused("pictures of colours, or whose 0 is white, are not read");
+  if (page.number(kPhotometric, 1) != 1 && !file_.colours) {
+    return refused("pictures of other colours, or whose 0 is white, are not read");
   }
   const double compression = page.number(kCompression, 1);
   if (compression != 1 && compression != 8 && compression != 32946) {
@@ -144,7 +151,7 @@ Result<void> TiffParser::take_first(const Directory& page) {
   if (!type || bits % 8 != 0 || bits > 64 || format > 3 || format < 1) {
     return refused(fmt::format("{} bits a voxel of kind {} are not read", bits, format));
   }
-  file_.type = *type;
+  file_.type = file_.colours ? kU32 : *type;
   file_.axes.sizes = {page.number(kWidth, 0), page.number(kLength, 0), 0.0};
   // A stack of ImageJ has one directory, and its pages follow one another.
   for (std::size_t begin = 0; begin < page.description.size();) {

@@ -22,6 +22,7 @@ struct TiffFile {
   double unit_metres = 0.0;  ///< 0: unknown
   bool placed = false;       ///< by an origin
   NumberType type = NumberType::kU8;
+  bool colours = false;                     ///< red, green, blue, alpha: `type` is that of all four
   bool big_endian = false, packed = false;  ///< packed: zlib
   std::vector<Strip> strips;                ///< of all pages, in their order
 };
