@@ -87,8 +87,12 @@ def main():
             subprocess.run([maker, "--mesh", name, "--write", path], check=True)
             files.append(path)
 
+        jobs.append(Job("-", "-", "--version", "strata", [strata, "--version"], None, options.budget))
         for path in files:
             mesh = os.path.splitext(os.path.basename(path))[0]
+            jobs.append(Job(mesh, 64, "OBJ to .npy", "strata",
+                            [strata, "voxelize", path, "-r", "64", "-o", output("a.npy")],
+                            output("a.npy"), options.budget))
             jobs.append(Job(mesh, 1024, "OBJ to .vdb mask", "strata",
                             [strata, "voxelize", path, "-r", "1024", "--mask", "-o", output("a.vdb")],
                             output("a.vdb"), options.budget))

@@ -113,6 +113,17 @@ strata_optional(blosc STRATA_HAVE_BLOSC Blosc "${blosc_VERSION}, .vdb files of o
 pkg_check_modules(hdf5 QUIET IMPORTED_TARGET hdf5)
 strata_optional(hdf5 STRATA_HAVE_HDF5 HDF5 "${hdf5_VERSION}, voxels as .h5"
   "libhdf5-dev is missing; no .h5")
+if(hdf5_FOUND)
+  # Debian keeps the link to HDF5 in a folder of its own. Programs of the build would look for all their libraries there, and
+  # then in the working folder, since CMake pads that path with a colon. The library itself lies beside the others.
+  set(strata_libraries "")
+  foreach(library IN LISTS hdf5_LINK_LIBRARIES)
+    file(REAL_PATH "${library}" library)
+    list(APPEND strata_libraries "${library}")
+  endforeach()
+  set(hdf5_LINK_LIBRARIES "${strata_libraries}")
+  set_target_properties(PkgConfig::hdf5 PROPERTIES INTERFACE_LINK_LIBRARIES "${strata_libraries}")
+endif()
 
 pkg_check_modules(text QUIET IMPORTED_TARGET freetype2 harfbuzz fontconfig)
 strata_optional(text STRATA_HAVE_TEXT text "FreeType, HarfBuzz, fontconfig: text() in scenes"

@@ -12,6 +12,7 @@ option(STRATA_WITH_OPENMESH "Build the OpenMesh bridge" ON)
 option(STRATA_WITH_GL "Build the OpenGL part: libepoxy, EGL; the window: GLFW, Dear ImGui" ON)
 option(STRATA_WITH_PYTHON "Build the Python package" ${STRATA_BUILD_TESTS})
 option(STRATA_JOIN_SOURCES "Compile several sources of a target as one: a whole build in half the time" OFF)
+option(STRATA_OPEN_ON_CALL "strata opens shared libraries when a job needs them (x86-64 Linux)" ON)
 option(STRATA_EXACT_NO_FILTERS "Take every exact sign from integers; no result may change" OFF)
 set(STRATA_SANITIZE "" CACHE STRING "Sanitizers, as for -fsanitize=")
 
@@ -38,3 +39,8 @@ endif()
 
 # Compiling CGAL or OpenVDB takes up to 2 GB: targets with JOB_POOL_COMPILE heavy do it one at a time.
 set_property(GLOBAL APPEND PROPERTY JOB_POOLS heavy=1)
+
+# Sanitizers want to see libraries loaded; the code is written for one processor.
+if(NOT CMAKE_SYSTEM_NAME STREQUAL "Linux" OR NOT CMAKE_SYSTEM_PROCESSOR STREQUAL "x86_64" OR STRATA_SANITIZE)
+  set(STRATA_OPEN_ON_CALL OFF)
+endif()

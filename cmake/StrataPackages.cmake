@@ -105,6 +105,19 @@ overlapping parts still gives a solid.
 This package contains the command-line tool. The package strata-view
 contains the window."
   libcli11-dev libexpected-dev libglm-dev nlohmann-json3-dev)
+# dpkg-shlibdeps finds what is loaded at the start; what calls open is asked for here.
+get_property(strata_opened GLOBAL PROPERTY STRATA_OPENED_LIBRARIES)
+set(strata_opened_packages "")
+foreach(library IN LISTS strata_opened)
+  file(REAL_PATH "${library}" library)
+  string(REGEX REPLACE "^/usr/lib/" "/lib/" other "${library}")  # dpkg knows a file by the path that its package gives
+  execute_process(COMMAND dpkg-query --search "${library}" "${other}" OUTPUT_VARIABLE found ERROR_QUIET)
+  if(found MATCHES "^([a-z0-9.+-]+)[:a-z0-9]*: ")
+    list(APPEND strata_opened_packages "${CMAKE_MATCH_1}")
+  endif()
+endforeach()
+list(REMOVE_DUPLICATES strata_opened_packages)
+list(JOIN strata_opened_packages ", " CPACK_DEBIAN_STRATA_PACKAGE_DEPENDS)
 set(CPACK_DEBIAN_STRATA_PACKAGE_RECOMMENDS "fonts-liberation, strata-view")
 set(CPACK_DEBIAN_STRATA_PACKAGE_SUGGESTS "openscad, libegl1, libegl-mesa0, libopengl0")
 

@@ -350,7 +350,7 @@ std::uint64_t ColourReport::count() const {
 }
 
 std::uint64_t expected_memory(const VoxelizeOutcome& outcome) {
-  constexpr std::uint64_t kProgram = 10'000'000;  // of the program and its libraries
+  constexpr std::uint64_t kProgram = 4'000'000;  // of the program and the libraries it starts with
   return std::max(outcome.read_peak, outcome.estimate.total() + kProgram);
 }
 
