@@ -55,23 +55,97 @@ void cancel(std::vector<EdgeSum>& edges) {
   edges.resize(kept);
 }
 
+/// A use of an edge: [lower vertex:32 | higher vertex:31 | direction:1], direction 1 from the
+/// higher. The opposite use differs in the last bit. No use is 0.
+using EdgeCode = std::uint64_t;
+
+EdgeCode code_of(std::uint32_t from, std::uint32_t to) {
+  const std::uint32_t low = std::min(from, to), high = std::max(from, to);
+  return EdgeCode{low} << 32 | EdgeCode{high} << 1 | static_cast<EdgeCode>(from > to);
+}
+
+/// Edges of neighbouring triangles lie close together in most files. Uses wait here for their
+/// opposite, in a table that fits the second-level cache; those that another one drives out are
+/// left over.
+class NearEdges {
+ public:
+  NearEdges() : waiting_(std::size_t{1} << kBits) {}
+
+  /// Adds the triangles up to the end, or until most of their edges are left over.
+  /// @return number of triangles that were added
+  std::size_t add(std::span<const glm::uvec3> triangles) {
+    for (std::size_t begin = 0; begin < triangles.size(); begin += kBlock) {
+      const std::size_t end = std::min(triangles.size(), begin + kBlock);
+      add_block(triangles.subspan(begin, end - begin));
+      // The first uses fill the table.
+      if (3 * end > 4 * waiting_.size() && left_.size() > 3 * end / 8) return end;
+    }
+    return triangles.size();
+  }
+  /// The uses that found no opposite.
+  std::vector<EdgeCode> take_left() {
+    for (const EdgeCode code : waiting_) {
+      if (code != 0) left_.push_back(code);
+    }
+    return std::move(left_);
+  }
+
+ private:
+  static constexpr unsigned kBits = 15;
+  static constexpr std::size_t kBlock = 4096;  // triangles
+
+  void add_block(std::span<const glm::uvec3> triangles) {
+    const std::size_t before = left_.size();
+    left_.resize(before + 3 * triangles.size());
+    EdgeCode* out = left_.data() + before;
+    EdgeCode* const waiting = waiting_.data();
+    // Without branches: whether an opposite waits is as hard to foretell as the mesh.
+    const auto use = [&](std::uint32_t from, std::uint32_t to) {
+      const EdgeCode code = code_of(from, to);
+      EdgeCode& slot = waiting[(code >> 1) * 0x9e3779b97f4a7c15u >> (64 - kBits)];
+      const EdgeCode there = slot;
+      const bool opposite = there == (code ^ 1u), real = from != to;
+      *out = there;
+      out += static_cast<std::size_t>(real && there != 0 && !opposite);
+      slot = real ? (opposite ? 0 : code) : there;
+    };
+    for (const glm::uvec3& t : triangles) {
+      use(t.x, t.y);
+      use(t.y, t.z);
+      use(t.z, t.x);
+    }
+    left_.resize(static_cast<std::size_t>(out - left_.data()));
+  }
+
+  std::vector<EdgeCode> waiting_, left_;
+};
+
+/// Uses that are left over, and triangles that no table has seen.
+struct Rest {
+  std::vector<EdgeCode> left;
+  std::span<const glm::uvec3> unseen;
+};
+
+EdgeSum sum_of(EdgeCode code) {
+  return {static_cast<std::uint32_t>(code >> 32), static_cast<std::uint32_t>(code) >> 1,
+          (code & 1u) == 0 ? 1 : -1};
+}
+
 /// The unbalanced edges whose lower vertex is in [begin, end).
-std::vector<EdgeSum> unbalanced_of_range(std::span<const glm::uvec3> triangles, std::uint32_t begin,
+std::vector<EdgeSum> unbalanced_of_range(std::span<const Rest> all, std::uint32_t begin,
                                          std::uint32_t end) {
   std::vector<Bucket> buckets;
   reserve_large(buckets, end - begin);
   buckets.resize(end - begin);
   std::vector<EdgeSum> rest;
   const std::uint32_t size = end - begin;
-  const auto use = [&](std::uint32_t from, std::uint32_t to) {
-    const std::uint32_t low = std::min(from, to), high = std::max(from, to);
+  const auto use = [&](std::uint32_t low, std::uint32_t code) {
     const std::uint32_t at = low - begin;
-    if (at >= size || from == to) return;
+    if (at >= size) return;
     Bucket& bucket = buckets[at];
-    const std::uint32_t code = high << 1 | static_cast<std::uint32_t>(from > to);
     const unsigned mask = match(bucket, code ^ 1u);
     if (mask == 0) {
-      rest.push_back({low, high, from < to ? 1 : -1});
+      rest.push_back(sum_of(EdgeCode{low} << 32 | code));
       return;
     }
     // An opposite use takes precedence over a free lane. Both are equally likely, so a branch would
@@ -79,14 +153,34 @@ std::vector<EdgeSum> unbalanced_of_range(std::span<const glm::uvec3> triangles, 
     const auto lane = static_cast<unsigned>(std::countr_zero(mask));
     bucket.lanes[lane & 3u] = lane < kLanes ? 0u : code;
   };
-  for (const glm::uvec3& t : triangles) {
-    use(t.x, t.y);
-    use(t.y, t.z);
-    use(t.z, t.x);
+  const auto use_edge = [&use](std::uint32_t from, std::uint32_t to) {
+    if (from == to) return;
+    use(std::min(from, to), std::max(from, to) << 1 | static_cast<std::uint32_t>(from > to));
+  };
+  constexpr std::size_t kAhead = 16;  // triangles whose buckets are on their way
+  const auto fetch = [&](std::uint32_t low) {
+    __builtin_prefetch(&buckets[low - begin < size ? low - begin : 0]);
+  };
+  for (const Rest& part : all) {
+    for (const EdgeCode edge : part.left) {
+      use(static_cast<std::uint32_t>(edge >> 32), static_cast<std::uint32_t>(edge));
+    }
+    for (std::size_t i = 0; i < part.unseen.size(); ++i) {
+      if (i + kAhead < part.unseen.size()) {
+        const glm::uvec3 next = part.unseen[i + kAhead];
+        fetch(std::min(next.x, next.y));
+        fetch(std::min(next.y, next.z));
+        fetch(std::min(next.z, next.x));
+      }
+      const glm::uvec3 t = part.unseen[i];
+      use_edge(t.x, t.y);
+      use_edge(t.y, t.z);
+      use_edge(t.z, t.x);
+    }
   }
   for (std::uint32_t i = 0; i < size; ++i) {
     for (const std::uint32_t code : buckets[i].lanes) {
-      if (code != 0) rest.push_back({begin + i, code >> 1, (code & 1u) == 0 ? 1 : -1});
+      if (code != 0) rest.push_back(sum_of(EdgeCode{begin + i} << 32 | code));
     }
   }
   cancel(rest);
@@ -114,18 +208,36 @@ std::vector<EdgeSum> unbalanced_by_index(std::span<const glm::uvec3> triangles,
   if (vertex_count >= std::size_t{1} << 31) return unbalanced_by_sorting(triangles);
   const std::size_t parts =
       triangles.size() < 50000 ? 1 : static_cast<std::size_t>(execution.thread_count());
-  std::vector<std::vector<EdgeSum>> found(parts);
   Execution all = execution;
   all.stop = {};
+  std::vector<Rest> rests(parts);
+  parallel_for(all, parts, [&](std::size_t part, int) {
+    const std::size_t begin = triangles.size() * part / parts,
+                      end = triangles.size() * (part + 1) / parts;
+    NearEdges near;
+    const std::size_t seen = near.add(triangles.subspan(begin, end - begin));
+    rests[part] = {near.take_left(), triangles.subspan(begin + seen, end - begin - seen)};
+  });
+  std::size_t left = 0, unseen = 0;
+  for (const Rest& rest : rests) {
+    left += rest.left.size();
+    unseen += rest.unseen.size();
+  }
+  std::vector<EdgeSum> result;
+  if (unseen == 0 && left < vertex_count / 16) {  // fewer than are worth a bucket for each vertex
+    for (const Rest& rest : rests) {
+      for (const EdgeCode code : rest.left) result.push_back(sum_of(code));
+    }
+    cancel(result);
+    return result;
+  }
+  std::vector<std::vector<EdgeSum>> found(parts);
   parallel_for(all, parts, [&](std::size_t part, int) {
     found[part] =
-        unbalanced_of_range(triangles, static_cast<std::uint32_t>(vertex_count * part / parts),
+        unbalanced_of_range(rests, static_cast<std::uint32_t>(vertex_count * part / parts),
                             static_cast<std::uint32_t>(vertex_count * (part + 1) / parts));
   });
-  std::vector<EdgeSum> result = std::move(found.front());
-  for (std::size_t part = 1; part < parts; ++part) {
-    result.insert(result.end(), found[part].begin(), found[part].end());
-  }
+  for (const std::vector<EdgeSum>& one : found) result.insert(result.end(), one.begin(), one.end());
   return result;
 }
 

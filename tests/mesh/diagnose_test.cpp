@@ -275,6 +275,50 @@ TEST(IsClosed, AgreesWithTheDefinitionOnRandomSoups) {
   EXPECT_LT(closed, 2900);
 }
 
+/// The unbalanced edges by the definition.
+std::vector<detail::EdgeSum> slowly_unbalanced(const std::vector<glm::uvec3>& triangles) {
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::int64_t> sums;
+  for (const glm::uvec3& t : triangles) {
+    for (int k = 0; k < 3; ++k) {
+      const std::uint32_t a = t[k], b = t[(k + 1) % 3];
+      if (a != b) sums[std::minmax(a, b)] += a < b ? 1 : -1;
+    }
+  }
+  std::vector<detail::EdgeSum> result;
+  for (const auto& [edge, sum] : sums) {
+    if (sum != 0) result.push_back({edge.first, edge.second, sum});
+  }
+  return result;
+}
+
+TEST(EdgeBalance, IsThatOfAMapInAnyOrderOfManyTriangles) {
+  // Above the sizes at which threads share the work, and at which neighbours are no longer sought.
+  const TriangleSoup torus = make_torus(2.0, 0.7, 400, 200);
+  std::mt19937 random(31);
+  const auto any = [&] { return static_cast<std::uint32_t>(random() % torus.positions.size()); };
+  for (const bool mixed : {false, true}) {
+    TriangleSoup mesh = mixed ? shuffled(torus, 8) : torus;
+    for (int round = 0; round < 3; ++round) {
+      const std::vector<detail::EdgeSum> expected = slowly_unbalanced(mesh.triangles);
+      EXPECT_EQ(expected.empty(), round == 0);
+      for (const int threads : {1, 2, 5}) {
+        Execution execution;
+        execution.threads = threads;
+        EXPECT_EQ(detail::unbalanced_by_index(mesh.triangles, mesh.positions.size(), execution),
+                  expected)
+            << mixed << round << threads;
+      }
+      // A few faults, then half of all.
+      for (std::size_t i = 0; i < (round == 0 ? 20u : 80000u); ++i) {
+        glm::uvec3& t = mesh.triangles[random() % mesh.triangles.size()];
+        if (random() % 2 == 0) std::swap(t.x, t.y);
+        if (random() % 2 == 0) t.z = any();
+        if (random() % 4 == 0) t = mesh.triangles[random() % mesh.triangles.size()];
+      }
+    }
+  }
+}
+
 TEST(IsClosed, EmptyMeshIsClosed) {
   EXPECT_TRUE(is_closed(TriangleSoup{}));
   EXPECT_TRUE(diagnose(TriangleSoup{}).closed);
