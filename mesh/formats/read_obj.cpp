@@ -4,6 +4,7 @@
 #include "mesh/attributes/obj_attributes.h"
 #include "mesh/formats/reader_common.h"
 #include "mesh/text/obj_lines.h"
+#include "mesh/text/plain_lines.h"
 #include "mesh/text/text_chunks.h"
 #include "mesh/text/text_scanner.h"
 
@@ -44,6 +45,7 @@ class ObjReader {
 
  private:
   void parse(const char* p, const char* end, Chunk& chunk) const;
+  static const char* parse_plain(const char* p, Chunk& chunk);
   const char* parse_vertex(const char* p, Chunk& chunk) const;
   const char* parse_face(const char* p, Chunk& chunk) const;
   const char* fail_at(const char* p, Chunk& chunk, std::string message) const;
@@ -65,6 +67,44 @@ const char* ObjReader::fail_at(const char* p, Chunk& chunk, std::string message)
   chunk.error_offset = static_cast<std::size_t>(p - begin_);
   chunk.error = std::move(message);
   return nullptr;
+}
+
+/// Reads the rest of the line of a triangle whose corners are `7/7`, `7//7` or `7/7/7`. @return the
+/// next line; null for all else
+const char* plain_corners(const char* p, glm::uvec3& corners) {
+  for (int i = 0; i < 3; ++i) {
+    while (*p == ' ') ++p;
+    p = scanner::plain_index(p, corners[i]);
+    if (p == nullptr) return nullptr;
+    while (*p == '/') {
+      std::uint32_t other = 0;
+      if (*++p == '/') continue;
+      p = scanner::plain_index(p, other);
+      if (p == nullptr) return nullptr;
+    }
+    if (i < 2 && *p != ' ') return nullptr;
+  }
+  return behind_line(p);
+}
+
+/// Reads a plain line, as most lines are. @return the next line; null, with nothing changed, for
+/// all else
+const char* ObjReader::parse_plain(const char* p, Chunk& chunk) {
+  if (p[0] == 'v' && p[1] == ' ') {
+    glm::dvec3 position;
+    const char* const next = plain_vertex(p + 2, position);
+    if (next != nullptr) chunk.positions.push_back(position);
+    return next;
+  }
+  if (p[0] != 'f' || p[1] != ' ') return nullptr;
+  if (!chunk.elements.empty() || chunk.triangles.size() != chunk.faces) return nullptr;
+  glm::uvec3 corners;
+  const char* next = plain_triangle(p + 2, corners);
+  if (next == nullptr) next = plain_corners(p + 2, corners);
+  if (next == nullptr || corners.x == 0 || corners.y == 0 || corners.z == 0) return nullptr;
+  chunk.triangles.push_back(corners - 1u);
+  ++chunk.faces;
+  return next;
 }
 
 const char* ObjReader::parse_vertex(const char* p, Chunk& chunk) const {
@@ -141,6 +181,10 @@ const char* ObjReader::parse_face(const char* p, Chunk& chunk) const {
 
 void ObjReader::parse(const char* p, const char* end, Chunk& chunk) const {
   while (p < end) {
+    if (const char* next = parse_plain(p, chunk); next != nullptr) {
+      p = next;
+      continue;
+    }
     p = skip_blanks(p);
     const bool short_word = *p != '\0' && (ends_token(p[1]) || p[1] == '\\');
     if (*p == 'v' && short_word) {

@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "mesh/attributes/colour_values.h"
+#include "mesh/formats/plain_body.h"
 #include "mesh/formats/reader_common.h"
 #include "mesh/text/text_scanner.h"
 
@@ -42,6 +43,7 @@ class OffReader {
   Result<void> attempt(const Attempt& attempt);
   Result<void> read_prefixes();
   Result<void> read_header();
+  Result<void> read_elements();
   Result<void> read_vertices();
   /// Reads faces from p_ on. visit(start, corners) returns false to stop.
   template <class Visit>
@@ -358,11 +360,15 @@ void OffReader::read_face_colours(MeshAttributes& attributes) {
   if (any) attributes.element_colours = bytes_of_colours(colours);
 }
 
-Result<void> OffReader::attempt(const Attempt& attempt) {
-  how_ = attempt;
-  mesh_ = {};
-  if (auto header = read_header(); !header) return tl::unexpected(header.error());
+/// The vertices, and the faces.
+Result<void> OffReader::read_elements() {
   vertices_begin_ = p_;
+  if (how_.layout == Layout::kLines && !homogeneous_ && !normals_ && !colours_ && !texture_) {
+    skip_gap();
+    faces_begin_ = read_plain_body(input_, p_, vertex_count_, face_count_, mesh_);
+    p_ = faces_begin_ != nullptr ? end_ : vertices_begin_;
+    if (faces_begin_ != nullptr) return {};
+  }
   if (auto vertices = read_vertices(); !vertices) return tl::unexpected(vertices.error());
   if (input_.execution.stop.stop_requested()) {
     return fail(ErrorCode::kCancelled, "{}: reading was stopped", input_.name);
@@ -376,7 +382,14 @@ Result<void> OffReader::attempt(const Attempt& attempt) {
     fans.add(corners.data(), corners.size());
     return watch.step(face++, place);
   });
-  if (!faces) return tl::unexpected(faces.error());
+  return faces;
+}
+
+Result<void> OffReader::attempt(const Attempt& attempt) {
+  how_ = attempt;
+  mesh_ = {};
+  if (auto header = read_header(); !header) return tl::unexpected(header.error());
+  if (auto elements = read_elements(); !elements) return tl::unexpected(elements.error());
   if (input_.execution.stop.stop_requested()) {
     return fail(ErrorCode::kCancelled, "{}: reading was stopped", input_.name);
   }

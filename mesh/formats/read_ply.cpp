@@ -5,6 +5,7 @@
 #include <span>
 #include <utility>
 
+#include "mesh/formats/plain_body.h"
 #include "mesh/formats/ply_colours.h"
 #include "mesh/formats/ply_source.h"
 #include "mesh/formats/reader_common.h"
@@ -47,6 +48,7 @@ class PlyReader {
   Result<void> read_element_line(std::string_view line);
   Result<void> read_property_line(std::string_view line);
   Result<MeshFile> read_ascii();
+  [[nodiscard]] bool may_be_plain() const;
   template <class Source>
   Result<MeshFile> read_body(Source source);
   template <class Source>
@@ -525,7 +527,37 @@ Result<MeshFile> PlyReader::read_body(Source source) {
   return file;
 }
 
+/// Whether the header declares vertices that have a position alone, and polygons.
+bool PlyReader::may_be_plain() const {
+  if (elements_.size() != 2 || elements_[0].name != "vertex" || elements_[1].name != "face") {
+    return false;
+  }
+  const std::vector<Property>& position = elements_[0].properties;
+  const std::vector<Property>& face = elements_[1].properties;
+  for (std::size_t i = 0; i < position.size(); ++i) {
+    if (position[i].list_type || position[i].name != std::string(1, static_cast<char>('x' + i))) {
+      return false;
+    }
+  }
+  return position.size() == 3 && face.size() == 1 && face[0].list_type &&
+         (face[0].name == "vertex_indices" || face[0].name == "vertex_index");
+}
+
 Result<MeshFile> PlyReader::read_ascii() {
+  if (may_be_plain()) {
+    AsciiSource body(p_, end_);
+    body.begin_element();
+    const std::uint64_t count = elements_[1].count;
+    const char* const begin =
+        read_plain_body(input_, body.position(), elements_[0].count, count, mesh_);
+    if (begin != nullptr) {
+      const FaceSource<AsciiSource> faces[] = {
+          {&elements_[1], AsciiSource(begin, end_), FaceKind::kPolygon, count}};
+      return finish_mesh(input_, std::move(mesh_), [&](std::uint32_t face) {
+        return locate(std::span<const FaceSource<AsciiSource>>(faces), face);
+      });
+    }
+  }
   const std::vector<std::string> warnings = mesh_.stats.warnings;
   Result<MeshFile> by_lines = read_body(AsciiSource(p_, end_));
   if (by_lines || by_lines.error().code != ErrorCode::kInput) return by_lines;
