@@ -4,6 +4,7 @@
 
 #include "mesh/attributes/stl_attributes.h"
 #include "mesh/formats/reader_common.h"
+#include "mesh/text/plain_lines.h"
 #include "mesh/text/text_chunks.h"
 #include "mesh/text/text_scanner.h"
 #include "mesh/weld.h"
@@ -138,9 +139,12 @@ Result<MeshFile> read_binary(const ReaderInput& input) {
   return file;
 }
 
-/// The facets of a piece of an ASCII file.
+/// The facets of a piece of an ASCII file. Equal corners within it are one.
 struct Chunk {
-  std::vector<glm::dvec3> corners;
+  WeldTable<double> table{1024};      ///< of `positions`
+  std::vector<glm::dvec3> positions;  ///< different ones
+  std::vector<std::uint64_t> hashes;  ///< of `positions`
+  std::vector<std::uint32_t> corners;
   std::vector<std::uint32_t> sizes;  ///< number of corners of each loop
   std::vector<StlSolid> solids;      ///< counted from the chunk's first loop
   std::size_t error_offset = ChunksEnd::kNone;
@@ -149,7 +153,20 @@ struct Chunk {
   std::uint64_t strange_lines = 0;
   std::size_t first_strange = 0;  ///< offset of the first strange line
 
+  void add(const glm::dvec3& corner) {
+    const glm::dvec3 key = WeldTable<double>::canonical(corner);
+    const std::uint64_t hash = WeldTable<double>::hash(key);
+    const auto next = static_cast<std::uint32_t>(positions.size());
+    const std::uint32_t at = table.find_or_insert(key, hash, next);
+    corners.push_back(at);
+    if (at != next) return;
+    positions.push_back(key);
+    hashes.push_back(hash);
+  }
   void clear() {
+    table.clear();
+    positions.clear();
+    hashes.clear();
     corners.clear();
     sizes.clear();
     solids.clear();
@@ -167,6 +184,7 @@ class AsciiReader {
  private:
   void cut();
   void parse(const char* p, const char* end, Chunk& chunk) const;
+  static const char* parse_plain_vertex(const char* p, Chunk& chunk);
   const char* parse_vertex(const char* p, Chunk& chunk) const;
   const char* parse_strange(const char* p, Chunk& chunk) const;
   void append(const Chunk& chunk);
@@ -179,6 +197,7 @@ class AsciiReader {
   RawMesh mesh_;
   FanBuilder fans_{mesh_};
   WeldTable<double> table_{1024};
+  std::vector<std::uint32_t> vertices_;  ///< of the positions of a chunk
   std::vector<std::uint32_t> loop_;
   std::vector<StlSolid> solids_;
   bool ended_ = false;
@@ -294,7 +313,31 @@ const char* AsciiReader::parse_vertex(const char* p, Chunk& chunk) const {
     }
     p = next;
   }
-  chunk.corners.push_back(corner);
+  chunk.add(corner);
+  return p;
+}
+
+/// The same for a plain line. @return the next line; null, with nothing changed, for all else
+const char* AsciiReader::parse_plain_vertex(const char* p, Chunk& chunk) {
+  if (!scanner::may_read(p, 8) || std::memcmp(p, "vertex ", 7) != 0) return nullptr;
+  glm::dvec3 corner;
+  const char* const next = plain_vertex(p + 7, corner);
+  if (next != nullptr) chunk.add(corner);
+  return next;
+}
+
+/// Skips the values of a normal. They are not used, so any count is accepted.
+const char* skip_numbers(const char* p) {
+  glm::dvec3 normal;
+  if (*p == ' ') {
+    if (const char* next = plain_vertex(p + 1, normal); next != nullptr) return next;
+  }
+  double unused = 0.0;
+  for (const char* q = p; q != nullptr;) {
+    p = q;
+    q = parse_double(skip_spaces(p), unused);
+    if (q != nullptr && !ends_token(*q)) q = nullptr;
+  }
   return p;
 }
 
@@ -306,6 +349,11 @@ void AsciiReader::parse(const char* p, const char* end, Chunk& chunk) const {
     chunk.error = std::move(message);
   };
   for (p = skip_spaces(p); p < end; p = skip_spaces(p)) {
+    const char* const next = in_loop ? parse_plain_vertex(p, chunk) : nullptr;
+    if (next != nullptr) {
+      p = next;
+      continue;
+    }
     const char* stop = p;
     const Word word = word_at(p, stop);
     const std::string_view text(p, static_cast<std::size_t>(stop - p));
@@ -318,13 +366,7 @@ void AsciiReader::parse(const char* p, const char* end, Chunk& chunk) const {
       chunk.ended = false;
       p = stop;
     } else if (word == Word::kNormal) {
-      p = stop;
-      double unused = 0.0;
-      for (const char* q = p; q != nullptr;) {  // the values are not used, so any count is accepted
-        p = q;
-        q = parse_double(skip_spaces(p), unused);
-        if (q != nullptr && !ends_token(*q)) q = nullptr;
-      }
+      p = skip_numbers(stop);
     } else if (word == Word::kLoop) {
       if (in_loop && text.size() == 5) return broken(p, "a loop inside a loop");
       if (!in_loop) loop_begin = chunk.corners.size();
@@ -371,15 +413,17 @@ void AsciiReader::append(const Chunk& chunk) {
   for (const StlSolid& solid : chunk.solids) {
     solids_.push_back({mesh_.stats.faces + solid.first, solid.name});
   }
+  constexpr std::size_t kAhead = 16;  // look-ups in flight, so that their cache misses overlap
+  vertices_.clear();
+  for (std::size_t i = 0; i < chunk.positions.size(); ++i) {
+    if (i + kAhead < chunk.hashes.size()) table_.prefetch(chunk.hashes[i + kAhead]);
+    const auto next = static_cast<std::uint32_t>(positions.size());
+    vertices_.push_back(table_.find_or_insert(chunk.positions[i], chunk.hashes[i], next));
+    if (vertices_.back() == next) positions.push_back(chunk.positions[i]);
+  }
   for (const std::uint32_t size : chunk.sizes) {
     loop_.clear();
-    for (std::uint32_t i = 0; i < size; ++i) {
-      const glm::dvec3 key = WeldTable<double>::canonical(chunk.corners[corner++]);
-      const std::uint32_t vertex = table_.find_or_insert(
-          key, WeldTable<double>::hash(key), static_cast<std::uint32_t>(positions.size()));
-      if (vertex == positions.size()) positions.push_back(key);
-      loop_.push_back(vertex);
-    }
+    for (std::uint32_t i = 0; i < size; ++i) loop_.push_back(vertices_[chunk.corners[corner++]]);
     fans_.add(loop_.data(), loop_.size());
   }
   chunks_end_.over_limit =

@@ -1,0 +1,74 @@
+#include "mesh/weld.h"
+
+#include <gtest/gtest.h>
+
+#include <map>
+#include <random>
+#include <tuple>
+
+namespace strata {
+namespace {
+
+/// Welds `count` points of `kinds` different ones by a map, and by weld_first().
+template <class Scalar>
+void compare(std::size_t count, std::uint32_t kinds, bool near) {
+  std::mt19937 random(41);
+  std::vector<glm::vec<3, Scalar>> points;
+  for (std::size_t i = 0; i < count; ++i) {
+    // Near: what was there lately comes again, as in the file of a mesh.
+    const auto kind =
+        static_cast<std::uint32_t>(near ? i / 6 - random() % (i / 6 + 1) % 500 : random());
+    const std::uint32_t k = kind % kinds;
+    points.emplace_back(Scalar(k % 64), Scalar(k / 64 % 64), Scalar(k / 4096));
+    if constexpr (std::is_floating_point_v<Scalar>) {
+      if (random() % 2 == 0) points.back() *= Scalar(1) - Scalar(2) * Scalar(k % 64 == 0);  // -0
+    }
+  }
+  std::map<std::tuple<Scalar, Scalar, Scalar>, std::uint32_t> firsts;
+  std::vector<std::uint32_t> expected;
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto& p = points[i];
+    expected.push_back(firsts
+                           .try_emplace({p.x + Scalar(0), p.y + Scalar(0), p.z + Scalar(0)},
+                                        static_cast<std::uint32_t>(i))
+                           .first->second);
+  }
+  for (const int threads : {1, 2, 3, 7}) {
+    Execution execution;
+    execution.threads = threads;
+    std::vector<std::uint32_t> first(count);
+    EXPECT_EQ(detail::weld_first<Scalar>(
+                  execution, count, [&](std::size_t i) { return points[i]; }, first.data()),
+              firsts.size());
+    EXPECT_EQ(first, expected) << threads;
+  }
+}
+
+TEST(Weld, FirstsAreThoseOfAMapForAnyThreads) {
+  for (const std::size_t count : {1, 100, 49999, 50000, 200000}) {
+    for (const std::uint32_t kinds : {1u, 40u, 30000u, 250000u}) {
+      for (const bool near : {false, true}) {
+        compare<float>(count, kinds, near);
+        compare<double>(count, kinds, near);
+        compare<std::int32_t>(count, kinds, near);
+      }
+    }
+  }
+}
+
+TEST(Weld, EndsWhereItIsTold) {
+  for (const int threads : {1, 2}) {
+    Execution execution;
+    execution.threads = threads;
+    std::vector<std::uint32_t> first(300000);
+    EXPECT_EQ(
+        detail::weld_first<std::int32_t>(
+            execution, first.size(), [](std::size_t i) { return glm::ivec3(static_cast<int>(i)); },
+            first.data(), [](std::size_t i) { return i < 70000; }),
+        0u);
+    EXPECT_EQ(first.back(), 0u);
+  }
+}
+
+}  // namespace
+}  // namespace strata
