@@ -141,6 +141,18 @@ void tell_units(const VoxelizeCommand& command, const csg::SolidInput& input, Se
   }
 }
 
+/// Refuses meshes whose sizes doubles cannot hold: memory is estimated by their area.
+Result<void> check_size(const csg::SolidInput& input) {
+  for (const csg::InputFacts& file : input.files) {
+    if (std::isfinite(file.area) && std::isfinite(file.volume)) continue;
+    return fail(ErrorCode::kGeometry,
+                "{}: the mesh is {:.3g} long, and its area or volume is beyond the range of "
+                "double; a small --scale helps",
+                file.path, file.bounds.longest_side());
+  }
+  return {};
+}
+
 /// With --like: the grid of a file. Meshes that say their unit are converted to the file's.
 Result<void> take_grid(const VoxelizeCommand& command, csg::SceneInput& placed,
                        VoxelizeOutcome& outcome, Session& session) {
@@ -336,6 +348,7 @@ Result<void> make_voxels(const VoxelizeCommand& command, Session& session) {
   auto input = csg::load_solids(placed, command.ids, messages, session.execution("reading"));
   if (!input) return tl::unexpected(input.error());
   outcome.input = *std::move(input);
+  if (auto valid = check_size(outcome.input); !valid) return valid;
   tell_units(command, outcome.input, session);
   if (auto valid = check_open(command, outcome.input, session); !valid) return valid;
   if (auto strict = session.check_strict(); !strict) return strict;

@@ -203,13 +203,6 @@ Result<InputFacts> inspect_mesh(TriangleSoup& soup, MeshReadStats stats, const s
     facts.longest_edge = std::sqrt(measures.longest_square);
   };
   take_measures();
-  if (!std::isfinite(facts.area) || !std::isfinite(facts.volume)) {
-    return fail(
-        ErrorCode::kGeometry,
-        "{}: the mesh is {:.3g} long, and its area or volume is beyond the range of double; "
-        "a small --scale helps",
-        path, facts.bounds.longest_side());
-  }
   const double volume_before = facts.volume;
   facts.orientation = orient_parts(
       soup, execution,
