@@ -228,8 +228,12 @@ Result<void> OffReader::read_faces(Visit&& visit) {
   const bool by_lines = how_.layout == Layout::kLines;
   for (std::uint64_t f = 0; f < face_count_; ++f) {
     std::int64_t count = 0;
-    if (!next_integer(count) || count < (by_lines ? 0 : 1)) {
+    if (!next_integer(count)) {
       return error(fmt::format("expected the size of face {} of {}, {}", f, face_count_, found()));
+    }
+    if (count < (by_lines ? 0 : 1)) {
+      return error(
+          fmt::format("face {} of {} must have corners, its size is {}", f, face_count_, count));
     }
     const char* const start = p_;
     corners.clear();

@@ -179,6 +179,8 @@ TEST(OffReader, MalformedTextIsNamed) {
   EXPECT_EQ(refusal(kOff, "OFF\nmany\n"), "file:2: expected the number of vertices, found 'many'");
   EXPECT_EQ(refusal(kOff, "OFF\n4 2 0\n0 0 0\n1 0\n1x 1 0\n" + kBody),
             "file:5: expected coordinate 2 of vertex 1 of 4, found '1x'");
+  EXPECT_EQ(refusal(kOff, "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n-3 0 1 2\n"),
+            "file:6: face 0 of 1 must have corners, its size is -3");
   EXPECT_EQ(refusal(kOff, "OFF\n0 0 0\n"), "file: no vertices");
 }
 
