@@ -87,13 +87,16 @@ class Frame {
         view_(view),
         size_(view.size),
         whole_length_(box.empty() ? 1.0 : glm::length(box.high - box.low)) {
-    const std::size_t count = static_cast<std::size_t>(size_.x) * static_cast<std::size_t>(size_.y);
-    seen_.resize(count);
-    plain_.resize(count);
-    picture_ = {size_.x, size_.y, std::vector<Rgba>(count)};
+    picture_.width = size_.x;
+    picture_.height = size_.y;
   }
 
   Result<Picture> draw(const Execution& execution) {
+    const std::size_t count = static_cast<std::size_t>(size_.x) * static_cast<std::size_t>(size_.y);
+    grow(seen_, count, execution);
+    grow(plain_, count, execution);
+    grow(picture_.pixels, count, execution);
+    if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
     const int across = (size_.x + kPatch - 1) / kPatch, down = (size_.y + kPatch - 1) / kPatch;
     const auto patches = static_cast<std::size_t>(across) * static_cast<std::size_t>(down);
     const auto for_patches = [&](auto&& body) {
@@ -109,6 +112,7 @@ class Frame {
     for_patches([&](VoxelRays& rays, int u, int v) {
       seen_[index(u, v)] = sample(rays, {u + 0.5, v + 0.5});
     });
+    if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
     if (options_.occlusion && style_ != VoxelStyle::kXray) {
       openness_ = SeenOpenness(view_, seen_, kReach * whole_length_, execution);
     }
@@ -129,6 +133,15 @@ class Frame {
   }
 
  private:
+  /// In pieces: the gigabytes of a large picture take seconds to come.
+  template <class T>
+  static void grow(std::vector<T>& all, std::size_t count, const Execution& execution) {
+    constexpr std::size_t kPiece = std::size_t{1} << 20;
+    all.reserve(count);
+    while (all.size() < count && !execution.stop.stop_requested()) {
+      all.resize(std::min(count, all.size() + kPiece));
+    }
+  }
   [[nodiscard]] std::size_t index(int u, int v) const {
     return static_cast<std::size_t>(v) * static_cast<std::size_t>(size_.x) +
            static_cast<std::size_t>(u);

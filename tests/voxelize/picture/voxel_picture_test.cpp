@@ -1,6 +1,7 @@
 #include "strata/voxelize/picture/voxel_picture.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <cmath>
@@ -252,6 +253,13 @@ TEST(VoxelPicture, RefusesWhatCannotBeDrawnWithTheNumber) {
   const auto stopped = picture.draw(Camera{}, {8, 8}, {}, execution);
   ASSERT_FALSE(stopped.has_value());
   EXPECT_EQ(stopped.error().code, ErrorCode::kCancelled);
+  // The 4 GB of a large picture are not taken first.
+  rusage before{}, after{};
+  getrusage(RUSAGE_SELF, &before);
+  const auto large_stopped = picture.draw(Camera{}, {8000, 8000}, {}, execution);
+  getrusage(RUSAGE_SELF, &after);
+  EXPECT_EQ(large_stopped.error().code, ErrorCode::kCancelled);
+  EXPECT_LT(after.ru_maxrss - before.ru_maxrss, 500'000) << "kilobytes";
 }
 
 }  // namespace
