@@ -39,10 +39,11 @@ Result<void> check_view_program(std::string_view asked_by) {
   }
   const std::string program = view_program();
   if (access(program.c_str(), X_OK) == 0) return {};
-  return fail(ErrorCode::kUsage,
-              "{} needs the program strata-view, but there is no {}; a build makes it when "
-              "libepoxy-dev, libglfw3-dev and libimgui-dev are installed",
-              asked_by, program);
+  return fail(
+      ErrorCode::kUsage,
+      "{} needs the program strata-view, but there is no {}; the package strata-view has it, "
+      "and a build makes it when libepoxy-dev, libglfw3-dev and libimgui-dev are installed",
+      asked_by, program);
 }
 
 int run_view_program(char** arguments) {
@@ -56,8 +57,9 @@ int run_view_program(char** arguments) {
   if (errno == ENOENT) {
     std::fprintf(stderr,
                  "strata: error: strata view needs the program strata-view next to strata, but "
-                 "there is no %s; a build makes it when libepoxy-dev, libglfw3-dev and "
-                 "libimgui-dev are installed. strata csg draws pictures without a window.\n",
+                 "there is no %s; the package strata-view has it, and a build makes it when "
+                 "libepoxy-dev, libglfw3-dev and libimgui-dev are installed. strata csg draws "
+                 "pictures without a window.\n",
                  program.c_str());
   } else {
     std::fprintf(stderr, "strata: error: %s: %s\n", program.c_str(), std::strerror(errno));

@@ -50,6 +50,8 @@ struct Words {
 };
 
 void define(CLI::App& app, Words& words, ViewOptions& options) {
+  app.set_version_flag("-V,--version", "strata-view " STRATA_VERSION, "Print the version and exit")
+      ->group("Help");
   apps::CsgWords& csg = words.csg;
   const auto option = [&app](const char* names, std::string& word, const char* what,
                              const std::string& value, const char* group) {
@@ -224,6 +226,8 @@ std::variant<apps::ParseOutcome, ViewOptions> parse_view_options(int argc,
   } catch (const CLI::CallForAllHelp&) {
     app.footer(footer());
     return apps::ParseOutcome{apps::help_text(app, true), false, 0};
+  } catch (const CLI::CallForVersion&) {
+    return apps::ParseOutcome{"strata-view " STRATA_VERSION "\n", false, 0};
   } catch (const CLI::ParseError& error) {
     return mistake(apps::parse_mistake(app, error));
   }

@@ -300,6 +300,9 @@ TEST(WithoutDisplay, HelpAndMistakesNeedNone) {
   for (const char* word : {"--watch", "ctrl+4", "section PLANE", "screenshot FILE.png"}) {
     EXPECT_NE(run.out.find(word), std::string::npos) << word;
   }
+  run = place.run({"view", "--version"}, options);
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(run.out, "strata-view" + place.run({"--version"}).out.substr(6));
   run = place.run({"view"}, options);
   EXPECT_EQ(run.exit_code, 2);
   for (const auto& [option, value] :
