@@ -22,6 +22,14 @@ def version():
         return re.search(r"project\(strata VERSION ([0-9.]+)", text.read()).group(1)
 
 
+def numpy():
+    """The NumPy that the native part works with: pybind11 before 2.12 does not know how NumPy 2 lays out its types."""
+    command = ["pkg-config", "--modversion", "pybind11"]
+    found = subprocess.run(command, capture_output=True, text=True).stdout if shutil.which("pkg-config") else ""
+    numbers = [int(number) for number in re.findall(r"\d+", found)[:2]]
+    return "numpy>=1.22" if numbers >= [2, 12] else "numpy>=1.22,<2"
+
+
 class BuildByCMake(build_ext):
     """The native part of the package, from the libraries' sources."""
 
@@ -62,6 +70,7 @@ class BuildByCMake(build_ext):
 
 setup(
     version=version(),
+    install_requires=[numpy()],
     packages=["strata"],
     package_dir={"": "python"},
     package_data={"strata": ["py.typed", "*.pyi"]},
