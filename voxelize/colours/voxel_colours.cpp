@@ -62,20 +62,53 @@ struct Batch {
   std::array<glm::u8vec4, VoxelCentres::kMost> colours{};
 };
 
+/// The triangles near a tile. They are kept, or made as they are needed where there are many.
+class TileTriangles {
+ public:
+  /// @param numbers, mesh, frame  must outlive the use of the triangles
+  void start(std::span<const std::uint32_t> numbers, const LatticeMesh& mesh,
+             const AxisFrame& frame, const shell::Vector& origin) {
+    numbers_ = numbers, mesh_ = &mesh, frame_ = &frame, origin_ = origin;
+    kept_.clear();
+    if (numbers.size() > kMostKept) return;
+    for (std::size_t place = 0; place < numbers.size(); ++place) kept_.push_back(make(place));
+  }
+  [[nodiscard]] std::size_t size() const { return numbers_.size(); }
+  [[nodiscard]] std::uint32_t number(std::size_t place) const { return numbers_[place]; }
+  template <class Use>
+  void with(std::size_t place, Use&& use) const {
+    kept_.empty() ? use(make(place)) : use(kept_[place]);
+  }
+  [[nodiscard]] std::uint64_t bytes() const { return kept_.capacity() * sizeof(NearTriangle); }
+
+ private:
+  static constexpr std::size_t kMostKept = 8192;
+
+  [[nodiscard]] NearTriangle make(std::size_t place) const {
+    return {shell::corners(*mesh_, numbers_[place], *frame_), origin_};
+  }
+
+  std::span<const std::uint32_t> numbers_;
+  const LatticeMesh* mesh_ = nullptr;
+  const AxisFrame* frame_ = nullptr;
+  shell::Vector origin_{};
+  std::vector<NearTriangle> kept_;
+};
+
 struct Worker {
   explicit Worker(SurfaceColours::Probe asks)
       : probe(std::move(asks)), batch(std::make_unique<Batch>()) {}
 
   [[nodiscard]] std::uint64_t bytes() const {
-    return triangles.capacity() * sizeof(NearTriangle) + collector.bytes() +
-           near_items.capacity() * sizeof(Interval) + near.keys.capacity() * sizeof(std::uint64_t) +
+    return triangles.bytes() + collector.bytes() + near_items.capacity() * sizeof(Interval) +
+           near.keys.capacity() * sizeof(std::uint64_t) +
            near_voxels.capacity() * sizeof(NearVoxel) +
            items.capacity() * (sizeof(Interval) + sizeof(std::uint32_t));
   }
 
   SurfaceColours::Probe probe;
   std::unique_ptr<Batch> batch;
-  std::vector<NearTriangle> triangles;  // of a tile
+  TileTriangles triangles;
   shell::RunCollector collector;
   std::vector<std::uint32_t> near_offsets;
   std::vector<Interval> near_items;
@@ -146,9 +179,11 @@ struct VoxelColouring::Impl {
   bool find_near(const VoxelIntervals::TileView& tile, const glm::ivec3& size,
                  Worker& worker) const;
   void find_nearest(const glm::ivec3& size, Worker& worker) const;
-  void lower_keys(std::size_t place, Worker& worker) const;
+  void lower_keys(const NearTriangle& triangle, std::size_t place, const glm::ivec3& size,
+                  Worker& worker) const;
+  void lower_batch(const NearTriangle& triangle, std::size_t place, Batch& batch) const;
   void sort_by_triangle(Worker& worker) const;
-  void find_colours(std::span<const std::uint32_t> numbers, Worker& worker) const;
+  void find_colours(Worker& worker) const;
   void colour_tile(const VoxelIntervals::TileView& tile, Worker& worker) const;
   void append(int first, int last, std::uint32_t label, Worker& worker) const;
 };
@@ -158,9 +193,11 @@ bool VoxelColouring::Impl::find_near(const VoxelIntervals::TileView& tile, const
                                      Worker& worker) const {
   if (!options.solid) return worker.near.reset(tile.offsets, tile.items);
   worker.collector.clear();
-  for (const NearTriangle& triangle : worker.triangles) {
-    triangle.columns_within(reach(), size, [&](int u, int v, int first, int last) {
-      worker.collector.add(v * kSide + u, first, last);
+  for (std::size_t place = 0; place < worker.triangles.size(); ++place) {
+    worker.triangles.with(place, [&](const NearTriangle& triangle) {
+      triangle.columns_within(reach(), size, [&](int u, int v, int first, int last) {
+        worker.collector.add(v * kSide + u, first, last);
+      });
     });
     worker.collector.compact_if_large();
   }
@@ -179,35 +216,42 @@ bool VoxelColouring::Impl::find_near(const VoxelIntervals::TileView& tile, const
 }
 
 void VoxelColouring::Impl::find_nearest(const glm::ivec3& size, Worker& worker) const {
-  NearVoxels& near = worker.near;
-  Batch& batch = *worker.batch;
   for (std::size_t place = 0; place < worker.triangles.size(); ++place) {
-    batch.centres.count = 0;
-    worker.triangles[place].columns_within(reach(), size, [&](int u, int v, int first, int last) {
-      const auto local = static_cast<std::size_t>(v * kSide + u);
-      for (std::uint32_t i = near.offsets[local]; i < near.offsets[local + 1]; ++i) {
-        const Interval run = near.runs[i];
-        if (run.last < first) continue;
-        if (run.first > last) break;
-        const int begin = std::max<int>(first, run.first), end = std::min<int>(last, run.last);
-        std::uint64_t* key = near.keys.data() + near.first[i] + (begin - run.first);
-        for (int w = begin; w <= end; ++w, ++key) {
-          if (batch.centres.count == VoxelCentres::kMost) lower_keys(place, worker);
-          batch.keys[batch.centres.count] = key;
-          batch.centres.add(u, v, w);
-        }
-      }
-    });
-    lower_keys(place, worker);
+    worker.triangles.with(
+        place, [&](const NearTriangle& triangle) { lower_keys(triangle, place, size, worker); });
   }
 }
 
-/// Keys of the voxels of the batch that are nearer to a triangle than to those before it.
-void VoxelColouring::Impl::lower_keys(std::size_t place, Worker& worker) const {
+/// Keys of all voxels that are nearer to a triangle than to those before it.
+void VoxelColouring::Impl::lower_keys(const NearTriangle& triangle, std::size_t place,
+                                      const glm::ivec3& size, Worker& worker) const {
+  NearVoxels& near = worker.near;
+  Batch& batch = *worker.batch;
+  batch.centres.count = 0;
+  triangle.columns_within(reach(), size, [&](int u, int v, int first, int last) {
+    const auto local = static_cast<std::size_t>(v * kSide + u);
+    for (std::uint32_t i = near.offsets[local]; i < near.offsets[local + 1]; ++i) {
+      const Interval run = near.runs[i];
+      if (run.last < first) continue;
+      if (run.first > last) break;
+      const int begin = std::max<int>(first, run.first), end = std::min<int>(last, run.last);
+      std::uint64_t* key = near.keys.data() + near.first[i] + (begin - run.first);
+      for (int w = begin; w <= end; ++w, ++key) {
+        if (batch.centres.count == VoxelCentres::kMost) lower_batch(triangle, place, batch);
+        batch.keys[batch.centres.count] = key;
+        batch.centres.add(u, v, w);
+      }
+    }
+  });
+  lower_batch(triangle, place, batch);
+}
+
+/// Keys of the voxels of a batch.
+void VoxelColouring::Impl::lower_batch(const NearTriangle& triangle, std::size_t place,
+                                       Batch& batch) const {
   constexpr double kScale = 2147483648.0;  // the square of the farthest is 1
   const double most = reach() * reach() + 1e-9;
-  Batch& batch = *worker.batch;
-  find_distances2(worker.triangles[place], batch.centres, batch.squares);
+  find_distances2(triangle, batch.centres, batch.squares);
   for (std::size_t i = 0; i < batch.centres.count; ++i) {
     const double square = batch.squares[i];
     const auto far = static_cast<std::int64_t>(std::min(square, 2.0) * kScale + 0.5);
@@ -243,14 +287,14 @@ void VoxelColouring::Impl::sort_by_triangle(Worker& worker) const {
 }
 
 /// Puts colours in the place of keys.
-void VoxelColouring::Impl::find_colours(std::span<const std::uint32_t> numbers,
-                                        Worker& worker) const {
+void VoxelColouring::Impl::find_colours(Worker& worker) const {
   Batch& batch = *worker.batch;
   std::uint32_t at = 0;
   for (std::size_t place = 0; place < worker.triangles.size(); ++place) {
     const std::uint32_t end = worker.near_ends[place];
     if (at == end) continue;
-    if (const auto one = worker.probe.only_colour(numbers[place])) {
+    const std::uint32_t number = worker.triangles.number(place);
+    if (const auto one = worker.probe.only_colour(number)) {
       for (; at < end; ++at) worker.near.keys[worker.near_voxels[at].key] = packed_colour(*one);
     }
     while (at < end) {
@@ -260,9 +304,10 @@ void VoxelColouring::Impl::find_colours(std::span<const std::uint32_t> numbers,
         const NearVoxel& voxel = worker.near_voxels[at];
         batch.centres.add(voxel.u, voxel.v, voxel.w);
       }
-      find_nearest_points(worker.triangles[place], batch.centres, batch.weights);
-      worker.probe.colours(numbers[place], std::span(batch.weights).first(at - begin),
-                           batch.colours);
+      worker.triangles.with(place, [&](const NearTriangle& triangle) {
+        find_nearest_points(triangle, batch.centres, batch.weights);
+      });
+      worker.probe.colours(number, std::span(batch.weights).first(at - begin), batch.colours);
       for (std::uint32_t i = begin; i < at; ++i) {
         worker.near.keys[worker.near_voxels[i].key] = packed_colour(batch.colours[i - begin]);
       }
@@ -351,16 +396,13 @@ Result<VoxelIntervals> VoxelColouring::colour(const VoxelIntervals& slab,
       const shell::Window window = shell::window_of(slab, tu, tv);
       const glm::ivec3 size(window.u_end - window.u_begin, window.v_end - window.v_begin,
                             window.w_end);
-      worker.triangles.clear();
-      for (const std::uint32_t number : numbers) {
-        worker.triangles.emplace_back(shell::corners(impl_->mesh, number, frame),
-                                      shell::Vector{window.u_begin, window.v_begin, 0});
-      }
+      worker.triangles.start(numbers, impl_->mesh, frame,
+                             shell::Vector{window.u_begin, window.v_begin, 0});
       const VoxelIntervals::TileView view = slab.tile(tu, tv);
       if (!impl_->find_near(view, size, worker)) return false;
       impl_->find_nearest(size, worker);
       impl_->sort_by_triangle(worker);
-      impl_->find_colours(numbers, worker);
+      impl_->find_colours(worker);
       impl_->colour_tile(view, worker);
       if (!worker.items.empty()) {
         result.set_tile(tu, tv, worker.offsets, worker.items, worker.labels);
