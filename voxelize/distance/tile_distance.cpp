@@ -60,16 +60,23 @@ struct TriangleForms {
   }
 };
 
+constexpr double kGreatestReach = 1 << 22;
+
+/// std::ceil is a call where the machine's least common part has no instruction for it.
+int next_whole(double value) {
+  const int whole = static_cast<int>(value);
+  return whole + (whole < value ? 1 : 0);
+}
+
 bool TriangleForms::set_box(const glm::ivec3* corners, const DistanceTile& tile) {
   for (int axis = 0; axis < 3; ++axis) {
     const int least = std::min({corners[0][axis], corners[1][axis], corners[2][axis]});
     const int greatest = std::max({corners[0][axis], corners[1][axis], corners[2][axis]});
-    const double reach = (tile.band + kMargin) / tile.scale[axis] - 0.5;
-    const double from = std::ceil(least / 256.0 - reach - 1.0) - tile.low[axis];
-    const double to = std::floor(greatest / 256.0 + reach) - tile.low[axis];
-    if (from > tile.size[axis] - 1 || to < 0.0) return false;
-    low[axis] = static_cast<int>(std::max(0.0, from));
-    high[axis] = static_cast<int>(std::min<double>(tile.size[axis] - 1, to));
+    // Grids are far smaller than the greatest reach.
+    const double reach = std::min((tile.band + kMargin) / tile.scale[axis] - 0.5, kGreatestReach);
+    low[axis] = std::max(0, next_whole(least / 256.0 - reach - 1.0) - tile.low[axis]);
+    high[axis] =
+        std::min(tile.size[axis] - 1, -next_whole(-(greatest / 256.0 + reach)) - tile.low[axis]);
     if (low[axis] > high[axis]) return false;
   }
   return true;
