@@ -283,6 +283,38 @@ MemoryFactors memory_factors(const VoxelizeCommand& command, const VoxelizeOutco
   return factors;
 }
 
+/// What colours of a surface of area A take: pictures and their halves, corners of faces, and the
+/// 1.5 A voxels, nearly each a run of its own where colours change from point to point.
+void add_colours(const VoxelizeCommand& command, const VoxelizeOutcome& outcome,
+                 const Session& session, MemoryEstimate& estimate) {
+  const csg::SolidInput& input = outcome.input;
+  if (!command.colours || input.tree) return;
+  const MeshAttributes& all = input.attributes;
+  const bool changing = !all.textures.empty() || !all.vertex_colours.empty() || all.corner_colours;
+  double pictures = 0;
+  for (const Texture& texture : all.textures) {
+    pictures += static_cast<double>(texture.texels.size()) * (4 + 8.0 / 3);
+  }
+  const double corners = static_cast<double>(all.corners.size()) * 20;
+  const glm::dvec3& s = outcome.grid.voxel_size;
+  const double runs = (changing ? 1.5 : 0.5) * input.area / std::pow(s.x * s.y * s.z, 2.0 / 3);
+  const std::string_view format = outcome.format ? outcome.format->name : "";
+  // Measured: bytes that a format holds for a run until the end, and the counts of its palette.
+  const double held = format == "vox" ? 12 : format == "vdb" ? (changing ? 14 : 18) : 0;
+  const double tables = (format == "vox" ? 7e6 : 0) + 3e6;
+  const auto whole = [](double bytes) {
+    return static_cast<std::uint64_t>(std::clamp(bytes, 0.0, 1e15));
+  };
+  estimate.mesh += whole(pictures + corners);
+  const double tiles = static_cast<double>(outcome.grid.dims.x) * outcome.grid.dims.y / 4096 + 1;
+  double slabs = runs * 9;
+  if (const std::uint64_t limit = session.memory_limit(); limit != 0) {
+    slabs = std::min(slabs, static_cast<double>(limit) / 8);  // they are cut to fit
+  }
+  estimate.slabs += whole(slabs + tables * std::min<double>(session.threads(), tiles));
+  estimate.output += whole(runs * held);
+}
+
 /// Of a file that will not be written.
 void estimate_file(const VoxelizeCommand& command, VoxelizeOutcome& outcome, int samples,
                    Session& session) {
@@ -366,6 +398,7 @@ Result<void> make_voxels(const VoxelizeCommand& command, Session& session) {
   if (const auto valid = check_samples(command, samples, outcome.grid); !valid) return valid;
   outcome.estimate =
       estimate_memory(outcome.grid, memory_factors(command, outcome, samples, session));
+  add_colours(command, outcome, session, outcome.estimate);
   outcome.read_peak = peak_memory_bytes();
   if (auto valid = check_memory(command, outcome, session); !valid) return valid;
   if (command.dry_run) {

@@ -19,8 +19,8 @@ namespace strata {
 /// is transparent.
 [[nodiscard]] glm::u8vec4 solid_colour_bytes(const glm::vec4& colour);
 
-/// A slab with label(n) in place of each label n, which is 1 where the slab has none. Runs that then
-/// touch and are alike become one. Several threads call `label` at once.
+/// A slab with label(n) in place of each label n, which is 1 where the slab has none. Runs that
+/// then touch and are alike become one. Several threads call `label` at once.
 [[nodiscard]] VoxelIntervals relabelled(const VoxelIntervals& slab,
                                         const std::function<std::uint32_t(std::uint32_t)>& label,
                                         const Execution& execution = {});

@@ -17,8 +17,13 @@ TEST_F(MemoryEstimates, ThePeakIsWithinAFactorOfTwo) {
   put("fine.stl", make_torus_knot(2, 3, 0.4, 2048, 128));  // half a million triangles
   for (const char* mesh : {"knot.obj", "fine.stl"}) {
     for (const char* side : {"64", "512", "1500"}) {
-      for (const std::vector<std::string>& way : std::vector<std::vector<std::string>>{
-               {"-o", "a.vdb"}, {"-o", "a.npz"}, {"--surface", "-o", "a.vdb"}, {"--stats"}}) {
+      for (const std::vector<std::string>& way :
+           std::vector<std::vector<std::string>>{{"-o", "a.vdb"},
+                                                 {"-o", "a.npz"},
+                                                 {"--surface", "-o", "a.vdb"},
+                                                 {"--surface", "--colours", "-o", "a.vdb"},
+                                                 {"--surface", "--colours", "-o", "a.vox"},
+                                                 {"--stats"}}) {
         std::vector<std::string> arguments = {mesh, "-r", side, "-j", "2"};
         arguments.insert(arguments.end(), way.begin(), way.end());
         const nlohmann::json memory = report(arguments)["memory"];
