@@ -79,6 +79,7 @@ class Goals:
         self.growth = load(folder, "growth")
         self.reading = load(folder, "reading")
         self.processes = load(folder, "whole_process")
+        self.distances = load(folder, "signed_distances")
         self.rows = []
 
     def add(self, what, bound, wall, cpu, at_most=False):
@@ -115,15 +116,22 @@ class Goals:
             (number(row[key]) for row in pick(self.voxelizers, contender="strata scan", threads=1)))]
             for key in ("wall ms", "cpu ms")}
         self.add("HA-buffer / count/scan, end to end, all rows", 1.25, store["wall ms"], store["cpu ms"], True)
+        self.add("signed distances, band 3, 1024 a side, OpenVDB / Strata", 25,
+                 [number(row["ratio"]) for row in self.distances],
+                 [number(row["cpu ratio"]) for row in self.distances])
         self.process_goals()
         self.reading_goals()
         self.growth_goals()
         return table(self.rows, {key: key for key in self.rows[0]})
 
     def process_goals(self):
-        rows = pick(self.processes, program="OpenVDB")
-        self.add("whole process, OBJ to .vdb mask, 1024 a side, OpenVDB / Strata", 25,
-                 [number(row["wall / strata"]) for row in rows], [number(row["cpu / strata"]) for row in rows])
+        for task, bound in (("OBJ to .vdb mask", 25), ("OBJ to .vdb level set", 10)):
+            rows = pick(self.processes, program="OpenVDB", task=task)
+            self.add(f"whole process, {task}, 1024 a side, OpenVDB / Strata", bound,
+                     [number(row["wall / strata"]) for row in rows], [number(row["cpu / strata"]) for row in rows])
+        rows = [row for row in self.processes if row["mesh"].startswith("textured")]
+        self.add("whole process, colours of 100k triangles with a texture, 1024 a side, ms", 200,
+                 [number(row["wall ms"]) for row in rows], None, True)
         layers = [row for row in self.processes if row["layers / s"] != "-"]
         self.add("PNG slices a second, whole process", 1000, [number(row["layers / s"]) for row in layers], None)
 
@@ -162,7 +170,7 @@ def sections(folder):
     if voxelizers:
         result["goals"] = Goals(folder).collect()
         result["voxelizers"] = voxelizers_section(voxelizers)
-    for name in ("growth", "reading", "whole_process", "csg_frames", "csg_laws", "csg_process", "boundary", "boundary_laws",
+    for name in ("signed_distances", "growth", "reading", "whole_process", "csg_frames", "csg_laws", "csg_process", "boundary", "boundary_laws",
                  "boundary_process"):
         rows = load(folder, name)
         if rows:

@@ -100,6 +100,16 @@ def main():
                 jobs.append(Job(mesh, 1024, "OBJ to .vdb mask", "OpenVDB",
                                 [openvdb, path, "-r", "1024", "-o", output("b.vdb")],
                                 output("b.vdb"), options.budget))
+            jobs.append(Job(mesh, 1024, "OBJ to .vdb level set", "strata",
+                            [strata, "voxelize", path, "-r", "1024", "--sdf", "-o", output("c.vdb")],
+                            output("c.vdb"), options.budget))
+            if os.path.exists(openvdb):
+                jobs.append(Job(mesh, 1024, "OBJ to .vdb level set", "OpenVDB",
+                                [openvdb, path, "-r", "1024", "--sdf", "-o", output("d.vdb")],
+                                output("d.vdb"), options.budget))
+            jobs.append(Job(mesh, 1024, "OBJ to .sl1, 64 rays a pixel", "strata",
+                            [strata, "voxelize", path, "-r", "1024", "--coverage=8", "-o", output("e.sl1")],
+                            output("e.sl1"), options.budget))
             jobs.append(Job(mesh, 1024, "OBJ to 1024 PNG slices of 1024 x 1024", "strata",
                             [strata, "voxelize", path, "--grid", "1024,1024,1024", "--format", "png",
                              "-o", output("slices")],
@@ -107,6 +117,13 @@ def main():
             jobs.append(Job(mesh, 1024, "OBJ to nothing, --stats", "strata",
                             [strata, "voxelize", path, "-r", "1024", "--stats"],
                             None, options.budget))
+        subprocess.run([sys.executable, os.path.join(os.path.dirname(os.path.abspath(__file__)), "textured_knot.py"),
+                        folder], check=True)
+        for format_ in ("vox", "vdb"):
+            made = output("f." + format_)
+            jobs.append(Job("textured knot-100k", 1024, f"OBJ and PNG of 2048 x 2048 to .{format_} of the surface",
+                            "strata", [strata, "voxelize", output("knot.obj"), "-r", "1024", "--surface", "--colours",
+                                       "-o", made], made, options.budget))
         for _ in range(options.rounds):
             for job in jobs:
                 job.run(log)
