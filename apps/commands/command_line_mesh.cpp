@@ -158,13 +158,16 @@ void define_mesh(CLI::App& app, Words& words) {
          "FILE", output);
   option("--format", words.format, "Format of the output (default: by the file's name)",
          choices(kSolidFormatWords), output);
-  app.add_flag("--colours,--colors", mesh.colours,
-               "Give each face the colour of the solid it comes from: not in STL; an OBJ gets a "
-               "second file, .mtl")
+  app.add_flag(
+         "--colours,--colors", mesh.colours,
+         "Give each face the colour of the solid or of the face of a mesh that it comes from: "
+         "not in STL; an OBJ gets a second file, .mtl")
       ->group(output);
-  app.add_flag("--ids", words.ids,
-               "Make a part for each solid: an object of a 3MF where it is closed by itself, a "
-               "group of an OBJ, a number in a PLY; with colours as --colours")
+  app.add_flag(
+         "--ids", words.ids,
+         "Make a part for each solid, or for each part of a mesh file: an object of a 3MF where "
+         "it is closed by itself, a group of an OBJ, a number in a PLY; with colours as "
+         "--colours")
       ->group(output);
   add_json(app, words, output);
   const char* surface = "Surface";
