@@ -7,6 +7,7 @@
 #include <system_error>
 #include <thread>
 
+#include "core/printable.h"
 #include "python/call.h"
 #include "python/data.h"
 
@@ -15,8 +16,9 @@ namespace strata::python {
 void raise(const Error& error) { refuse(error.code, error.message); }
 
 void refuse(ErrorCode code, const std::string& message) {
-  const py::object made =
-      py::module_::import("strata._errors").attr("error_of")(static_cast<int>(code), message);
+  // Names in it may come from files, and be no UTF-8.
+  const py::object made = py::module_::import("strata._errors")
+                              .attr("error_of")(static_cast<int>(code), printable_lines(message));
   PyErr_SetObject(py::type::handle_of(made).ptr(), made.ptr());
   throw py::error_already_set();
 }

@@ -411,6 +411,12 @@ def test_distances_are_those_to_the_box():
         strata.voxelize(box, like=grid, sdf=True, colours=True)
 
 
+def test_messages_show_names_that_are_no_utf8(tmp_path):
+    (tmp_path / "a.nrrd").write_bytes(b"NRRD0004\ntype: \xca\xfe\ndimension: 3\nsizes: 1 1 1\nencoding: raw\n\n0")
+    with pytest.raises(strata.InputError, match=r"type '\\xca\\xfe' is not read"):
+        strata.read_voxels(tmp_path / "a.nrrd")
+
+
 @pytest.mark.parametrize("name, band", [("d.vdb", 3), ("d.nrrd", None), ("d.npy", 3)])
 def test_distances_are_saved_and_read_again(tmp_path, knot, name, band):
     voxels = strata.voxelize(knot, resolution=40, padding=4, sdf=True, band=band)
