@@ -45,7 +45,7 @@ void compare(std::size_t count, std::uint32_t kinds, bool near) {
 }
 
 TEST(Weld, FirstsAreThoseOfAMapForAnyThreads) {
-  for (const std::size_t count : {1, 100, 49999, 50000, 200000}) {
+  for (const std::size_t count : std::vector<std::size_t>{1, 100, 49999, 50000, 200000}) {
     for (const std::uint32_t kinds : {1u, 40u, 30000u, 250000u}) {
       for (const bool near : {false, true}) {
         compare<float>(count, kinds, near);

@@ -99,7 +99,7 @@ TEST(PlainLines, AllElseIsLeftToTheCaller) {
        {"", "\n", "1 2\n", "1 2 3", "1 2 3 4\n", "1.5 2.5\n3.5\n", "1.5 2.5 3.5x\n",
         "1.5 2.5 3.5 1\n", "1.5 x 3.5\n", "1.5\t2.5\t3.5\n", "--1.5 2.5 3.5\n",
         "1.5 2.5 3.5 # end\n", "1.5 2.5 \\\n3.5\n", "1.5,2.5,3.5\n", "- 1.5 2.5\n"}) {
-    for (const std::size_t before : {0, 100}) {
+    for (const std::size_t before : {std::size_t{0}, std::size_t{100}}) {
       const TextAtTheEdge text(line, before);
       glm::dvec3 position;
       EXPECT_EQ(plain_vertex(text.begin(), position), nullptr) << line;
@@ -108,7 +108,7 @@ TEST(PlainLines, AllElseIsLeftToTheCaller) {
   for (const char* line :
        {"", "\n", "1 2\n", "1 2 3", "1 2 3 4\n", "1 2\n3\n", "1 2 3/4\n", "1 -2 3\n", "1 2.0 3\n",
         "1 2 10000000\n", "1\t2\t3\n", "1 2 3 # end\n"}) {
-    for (const std::size_t before : {0, 100}) {
+    for (const std::size_t before : {std::size_t{0}, std::size_t{100}}) {
       const TextAtTheEdge text(line, before);
       glm::uvec3 corners;
       EXPECT_EQ(plain_triangle(text.begin(), corners), nullptr) << line;
