@@ -15,15 +15,15 @@ struct TileRect {
 };
 
 TileRect tile_rect(const LatticeMesh& mesh, const glm::uvec3& triangle, const AxisFrame& frame,
-                   const RasterTarget& target) {
+                   const RasterTarget& target, const PixelRows& rows) {
   const glm::ivec3 &a = mesh.vertices[triangle.x], &b = mesh.vertices[triangle.y],
                    &c = mesh.vertices[triangle.z];
   const auto low = [&](int axis) { return std::min(std::min(a[axis], b[axis]), c[axis]); };
   const auto high = [&](int axis) { return std::max(std::max(a[axis], b[axis]), c[axis]); };
   const int u0 = std::max(0, first_pixel(low(frame.u)));
   const int u1 = std::min(target.width, end_pixel(high(frame.u)));
-  const int v0 = std::max(0, first_pixel(low(frame.v)));
-  const int v1 = std::min(target.height, end_pixel(high(frame.v)));
+  const int v0 = std::max(rows.begin, first_pixel(low(frame.v)));
+  const int v1 = std::min(rows.end, end_pixel(high(frame.v)));
   // No branch: small triangles miss all pixel centres too often and too irregularly to predict.
   const int covers = u0 < u1 && v0 < v1 ? 1 : 0;
   const auto tile = [covers](int pixel) {
@@ -51,10 +51,11 @@ std::uint64_t to_cursors(std::vector<std::uint64_t>& counts, std::size_t parts,
 }  // namespace
 
 Result<TileBins> bin_triangles(const LatticeMesh& mesh, const RasterTarget& target,
-                               const Execution& execution) {
+                               const PixelRows& rows, const Execution& execution) {
   TileBins bins;
   bins.tiles_u = (target.width + kTileSide - 1) / kTileSide;
-  bins.tiles_v = (target.height + kTileSide - 1) / kTileSide;
+  bins.first_v = rows.begin / kTileSide;
+  bins.tiles_v = (rows.end + kTileSide - 1) / kTileSide - bins.first_v;
   const std::size_t tiles =
       static_cast<std::size_t>(bins.tiles_u) * static_cast<std::size_t>(bins.tiles_v);
   const AxisFrame frame(target.axis);
@@ -69,17 +70,18 @@ Result<TileBins> bin_triangles(const LatticeMesh& mesh, const RasterTarget& targ
   std::vector<std::uint64_t> cursors(parts * stride, 0);
   const auto rects = std::make_unique_for_overwrite<TileRect[]>(count);
   const auto row = static_cast<std::size_t>(bins.tiles_u);
+  const std::size_t skipped = static_cast<std::size_t>(bins.first_v) * row;
   const auto for_each_tile = [&](const TileRect& rect, auto&& body) {
     const int width = rect.u1 - rect.u0, height = rect.v1 - rect.v0;
-    if (width * height <= 1) return body(width > 0 ? rect.v0 * row + rect.u0 : tiles);
+    if (width * height <= 1) return body(width > 0 ? rect.v0 * row + rect.u0 - skipped : tiles);
     for (std::size_t tv = rect.v0; tv < rect.v1; ++tv) {
-      for (std::size_t tu = rect.u0; tu < rect.u1; ++tu) body(tv * row + tu);
+      for (std::size_t tu = rect.u0; tu < rect.u1; ++tu) body(tv * row + tu - skipped);
     }
   };
   parallel_for(execution, parts, [&](std::size_t part, int) {
     std::uint64_t* counts = cursors.data() + part * stride;
     for (std::size_t i = count * part / parts; i < count * (part + 1) / parts; ++i) {
-      rects[i] = tile_rect(mesh, mesh.triangles[i], frame, target);
+      rects[i] = tile_rect(mesh, mesh.triangles[i], frame, target, rows);
       for_each_tile(rects[i], [counts](std::size_t tile) { ++counts[tile]; });
     }
   });

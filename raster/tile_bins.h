@@ -14,19 +14,32 @@ namespace strata {
 /// centre are in no tile.
 struct TileBins {
   int tiles_u = 0, tiles_v = 0;
+  int first_v = 0;                       ///< the first row of tiles
   std::vector<std::uint32_t> offsets;    ///< tiles_u * tiles_v + 1
   std::vector<std::uint32_t> triangles;  ///< indices into LatticeMesh::triangles, in no fixed order
 
   [[nodiscard]] std::span<const std::uint32_t> tile(int tu, int tv) const {
-    const std::size_t i = static_cast<std::size_t>(tv) * static_cast<std::size_t>(tiles_u) +
-                          static_cast<std::size_t>(tu);
+    const std::size_t i =
+        static_cast<std::size_t>(tv - first_v) * static_cast<std::size_t>(tiles_u) +
+        static_cast<std::size_t>(tu);
     return std::span(triangles).subspan(offsets[i], offsets[i + 1] - offsets[i]);
   }
 };
 
+/// Rows of pixels [begin, end).
+struct PixelRows {
+  int begin = 0, end = 0;
+};
+
 /// Sorts the triangles of `mesh` into the tiles of `target`.
+/// @param rows  those that tiles are wanted of; begin is a multiple of kTileSide
 /// @return kLimit when more than 2^32 - 1 references would be needed.
 Result<TileBins> bin_triangles(const LatticeMesh& mesh, const RasterTarget& target,
-                               const Execution& execution = {});
+                               const PixelRows& rows, const Execution& execution = {});
+/// The same of all rows.
+inline Result<TileBins> bin_triangles(const LatticeMesh& mesh, const RasterTarget& target,
+                                      const Execution& execution = {}) {
+  return bin_triangles(mesh, target, {0, target.height}, execution);
+}
 
 }  // namespace strata

@@ -1,7 +1,10 @@
 #include "strata/voxelize/checksum.h"
 
 #include <algorithm>
+#include <climits>
+#include <iterator>
 #include <span>
+#include <utility>
 
 namespace strata {
 namespace {
@@ -30,6 +33,26 @@ std::uint64_t difference(Column a, Column b) {
   return length(a) + length(b) - 2 * common;
 }
 
+/// Faces between two rows of voxels.
+std::uint64_t faces_between(std::span<const BoundaryArea::Seam::Run> a,
+                            std::span<const BoundaryArea::Seam::Run> b) {
+  std::uint64_t faces = 0;
+  std::vector<Interval> columns[2];
+  while (!a.empty() || !b.empty()) {
+    const int u =
+        std::min(a.empty() ? INT_MAX : int{a.front().u}, b.empty() ? INT_MAX : int{b.front().u});
+    for (auto* row : {&a, &b}) {
+      std::vector<Interval>& column = columns[row == &a ? 0 : 1];
+      column.clear();
+      for (; !row->empty() && row->front().u == u; *row = row->subspan(1)) {
+        column.push_back(row->front().interval);
+      }
+    }
+    faces += difference(columns[0], columns[1]);
+  }
+  return faces;
+}
+
 }  // namespace
 
 BoundaryArea::BoundaryArea(const VoxelGrid& grid, Axis axis)
@@ -39,6 +62,8 @@ BoundaryArea::BoundaryArea(const VoxelGrid& grid, Axis axis)
 
 void BoundaryArea::add(const VoxelIntervals& slab, const Execution& execution) {
   const int columns = slab.columns();
+  const bool follows = slab.v_begin() == next_v_;
+  if (!follows) end_part();
   const auto before_slab = [this](int u) {
     const auto i = static_cast<std::size_t>(u);
     return Column(last_items_).subspan(last_offsets_[i], last_offsets_[i + 1] - last_offsets_[i]);
@@ -58,7 +83,8 @@ void BoundaryArea::add(const VoxelIntervals& slab, const Execution& execution) {
         const Column above = v > slab.v_begin() ? slab.column(u, v - 1) : before_slab(u);
         sum.w += 2 * run_count(here);
         if (!here.empty() || !left.empty()) sum.u += difference(left, here);
-        if (!here.empty() || !above.empty()) sum.v += difference(above, here);
+        const bool counted = follows || v > slab.v_begin();
+        if (counted && (!here.empty() || !above.empty())) sum.v += difference(above, here);
         left = here;
       }
       sum.u += length(left);
@@ -70,6 +96,7 @@ void BoundaryArea::add(const VoxelIntervals& slab, const Execution& execution) {
     faces_[frame_.v] += part.v;
     faces_[frame_.w] += part.w;
   }
+  if (!follows) begin_part(slab);
   std::vector<Interval> items;
   const bool last = slab.v_end() == grid_.dims[frame_.v];
   for (int u = 0; u < columns; ++u) {
@@ -79,6 +106,53 @@ void BoundaryArea::add(const VoxelIntervals& slab, const Execution& execution) {
     last_offsets_[static_cast<std::size_t>(u) + 1] = static_cast<std::uint32_t>(items.size());
   }
   last_items_ = std::move(items);
+  next_v_ = slab.v_end();
+}
+
+/// The last row is that before a gap.
+void BoundaryArea::end_part() {
+  if (next_v_ == 0 || next_v_ == grid_.dims[frame_.v]) return;
+  Seam seam{next_v_ - 1, false, {}};
+  for (std::size_t u = 0; u + 1 < last_offsets_.size(); ++u) {
+    for (std::uint32_t i = last_offsets_[u]; i < last_offsets_[u + 1]; ++i) {
+      seam.runs.push_back({static_cast<std::uint16_t>(u), last_items_[i]});
+    }
+  }
+  seams_.push_back(std::move(seam));
+}
+
+void BoundaryArea::begin_part(const VoxelIntervals& slab) {
+  Seam seam{slab.v_begin(), true, {}};
+  for (int u = 0; u < slab.columns(); ++u) {
+    for (const Interval& interval : slab.column(u, slab.v_begin())) {
+      seam.runs.push_back({static_cast<std::uint16_t>(u), interval});
+    }
+  }
+  seams_.push_back(std::move(seam));
+}
+
+std::vector<BoundaryArea::Seam> BoundaryArea::take_seams() {
+  end_part();
+  next_v_ = grid_.dims[frame_.v];
+  return std::exchange(seams_, {});
+}
+
+void BoundaryArea::add(const std::uint64_t (&faces)[3], std::vector<Seam> seams) {
+  for (int axis = 0; axis < 3; ++axis) faces_[axis] += faces[axis];
+  std::move(seams.begin(), seams.end(), std::back_inserter(seams_));
+  std::sort(seams_.begin(), seams_.end(), [](const Seam& a, const Seam& b) {
+    return a.v != b.v ? a.v < b.v : a.first && !b.first;
+  });
+  std::vector<Seam> open;
+  for (Seam& seam : seams_) {
+    if (seam.first && !open.empty() && !open.back().first && open.back().v + 1 == seam.v) {
+      faces_[frame_.v] += faces_between(open.back().runs, seam.runs);
+      open.pop_back();
+    } else {
+      open.push_back(std::move(seam));
+    }
+  }
+  seams_ = std::move(open);
 }
 
 double BoundaryArea::estimate() const {

@@ -90,6 +90,8 @@ void SetChecksum::add(const VoxelIntervals& slab, const Execution& execution) {
   sum_ = std::accumulate(tile_sums.begin(), tile_sums.end(), sum_, add_modulo);
 }
 
+void SetChecksum::add_sum(std::uint64_t sum) { sum_ = add_modulo(sum_, sum % kPrime); }
+
 std::uint64_t SetChecksum::value() const {
   std::uint64_t hash = mix(sum_);
   for (int axis = 0; axis < 3; ++axis) {

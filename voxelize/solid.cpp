@@ -70,16 +70,20 @@ Result<SolidVoxelizer> SolidVoxelizer::create(const LatticeMesh& mesh, const Vox
   if (options.source != nullptr) {
     if (auto set = options.source->set_mesh(mesh); !set) return tl::unexpected(set.error());
     if (filter != nullptr && options.source->use_filter(*filter)) filter = nullptr;
-  } else {
-    auto bins = bin_triangles(mesh, result.target_, execution);
-    if (!bins) return tl::unexpected(bins.error());
-    result.bins_ = std::move(*bins);
   }
   const int length = grid.dims[AxisFrame(axis).w];
   for (int i = 0; i < execution.thread_count(); ++i) {
     result.workers_.push_back(std::make_shared<Worker>(options, filter, length));
   }
   return result;
+}
+
+Result<void> SolidVoxelizer::prepare(int v_begin, int v_end, const Execution& execution) {
+  if (options_.source != nullptr) return {};
+  auto bins = bin_triangles(*mesh_, target_, {v_begin, v_end}, execution);
+  if (!bins) return tl::unexpected(bins.error());
+  bins_ = std::move(*bins);
+  return {};
 }
 
 template <class Builder>

@@ -18,13 +18,17 @@ namespace strata {
 /// Turns a snapped mesh into intervals along one axis.
 class SolidVoxelizer {
  public:
-  /// Sorts the triangles into tiles. Keeps references to `mesh`, `grid` and `field`, whose numbers
-  /// are added to the mesh's winding numbers.
+  /// Keeps references to `mesh`, `grid` and `field`, whose numbers are added to the mesh's winding
+  /// numbers.
   static Result<SolidVoxelizer> create(const LatticeMesh& mesh, const VoxelGrid& grid, Axis axis,
                                        const VoxelizeOptions& options, const Execution& execution,
                                        const WindingField* field = nullptr);
 
-  /// The intervals of rows [v_begin, v_end). v_begin is a multiple of kTileSide. Adds to `report`.
+  /// Sorts the triangles of rows [v_begin, v_end) into tiles. v_begin is a multiple of kTileSide.
+  Result<void> prepare(int v_begin, int v_end, const Execution& execution);
+
+  /// The intervals of rows [v_begin, v_end), which were prepared, or of rows among them. v_begin is
+  /// a multiple of kTileSide. Adds to `report`.
   Result<VoxelIntervals> slab(int v_begin, int v_end, const Execution& execution,
                               VoxelizeReport& report);
   /// The filled part of voxels with options.rays x options.rays of the columns each, as labels.

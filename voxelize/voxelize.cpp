@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -115,6 +116,11 @@ class SolidSlabs {
     return result;
   }
 
+  Result<void> prepare(int v_begin, int v_end, const Execution& execution) {
+    if (auto done = solid_.prepare(v_begin, v_end, execution); !done || !open_) return done;
+    return open_->columns.prepare(v_begin, v_end, execution);
+  }
+
   /// @param voxels their grid, where options.rays are asked for
   Result<VoxelIntervals> slab(const VoxelGrid* voxels, int v_begin, int v_end,
                               const Execution& execution, VoxelizeReport& report) {
@@ -158,10 +164,39 @@ class SolidSlabs {
   SolidVoxelizer solid_;
 };
 
+/// The rows that are asked for, one range after another.
+class RowTurns {
+ public:
+  /// @param next  gives them; empty: `all` at once
+  RowTurns(const VoxelRows& all, const std::function<std::optional<VoxelRows>()>& next)
+      : all_(all), next_(next) {}
+  std::optional<VoxelRows> next() {
+    if (next_) return next_();
+    return std::exchange(all_, std::nullopt);
+  }
+
+ private:
+  std::optional<VoxelRows> all_;
+  const std::function<std::optional<VoxelRows>()>& next_;
+};
+
+/// Tiles are whole, but for the last row of them.
+Result<void> check_rows(const VoxelRows& rows, const VoxelRows& all) {
+  const bool whole =
+      rows.begin % kTileSide == 0 && (rows.end % kTileSide == 0 || rows.end == all.end);
+  if (whole && rows.begin >= all.begin && rows.begin < rows.end && rows.end <= all.end) return {};
+  return fail(ErrorCode::kUsage, "rows {} to {} of {} to {} are no rows of tiles of {}", rows.begin,
+              rows.end, all.begin, all.end, kTileSide);
+}
+
 /// Options that no mesh could be voxelized with.
 Result<void> check_options(const VoxelGrid& grid, const VoxelizeOptions& options) {
   if (auto valid = check_grid(grid); !valid) return valid;
   if (auto valid = check_samples(grid, options); !valid) return valid;
+  if (options.rows) {
+    const VoxelRows all{0, grid.dims[AxisFrame(options.axis).v]};
+    if (auto valid = check_rows(*options.rows, all); !valid) return valid;
+  }
   if (!options.solid && !options.surface) {
     return fail(ErrorCode::kUsage, "neither solid nor surface is requested");
   }
@@ -236,6 +271,11 @@ class Slabs {
     return result;
   }
 
+  /// Before slabs of rows [v_begin, v_end) are asked for.
+  Result<void> prepare(int v_begin, int v_end, const Execution& execution) {
+    return solid_ ? solid_->prepare(v_begin, v_end, execution) : Result<void>();
+  }
+
   Result<VoxelIntervals> slab(const VoxelGrid* voxels, int v_begin, int v_end,
                               const Execution& execution, VoxelizeReport& report) {
     auto solid = solid_ ? solid_->slab(voxels, v_begin, v_end, execution, report)
@@ -281,23 +321,38 @@ Result<VoxelizeReport> run(const TriangleSoup& mesh, const VoxelGrid& asked,
   if (!slabs) return tl::unexpected(slabs.error());
 
   SetChecksum checksum(asked);
-  const int rows = grid.dims[AxisFrame(options.axis).v];
+  const VoxelRows all = options.rows.value_or(VoxelRows{0, asked.dims[AxisFrame(options.axis).v]});
+  const int rows = grid.dims[AxisFrame(options.axis).v], columns_a_row = fine(options);
   const int step = in_slabs ? slab_rows(grid, options, execution) : rows;
-  for (int v = 0; v < rows; v += step) {
-    const int end = std::min(rows, v + step);
-    auto slab = slabs->slab(options.rays > 0 ? &asked : nullptr, v, end, quiet, report);
-    if (!slab) return tl::unexpected(slab.error());
-    if (options.samples > 1) *slab = count_samples(*slab, asked, options.samples, quiet);
-    if (options.statistics) {
-      report.solid_voxels += slab->solid_voxels();
-      report.intervals += slab->interval_count();
-      checksum.add(*slab, quiet);
+  RowTurns turns(all, options.next_rows);
+  while (const auto turn = turns.next()) {
+    if (auto valid = check_rows(*turn, all); !valid) return tl::unexpected(valid.error());
+    const int last = turn->end * columns_a_row;
+    if (auto done = slabs->prepare(turn->begin * columns_a_row, last, quiet); !done) {
+      return tl::unexpected(done.error());
     }
-    if (auto done = sink(std::move(*slab)); !done) return tl::unexpected(done.error());
-    if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
-    if (execution.progress) execution.progress(static_cast<double>(end) / rows);
+    for (int v = turn->begin * columns_a_row; v < last; v += step) {
+      const int end = std::min(last, v + step);
+      auto slab = slabs->slab(options.rays > 0 ? &asked : nullptr, v, end, quiet, report);
+      if (!slab) return tl::unexpected(slab.error());
+      if (options.samples > 1) *slab = count_samples(*slab, asked, options.samples, quiet);
+      if (options.statistics) {
+        report.solid_voxels += slab->solid_voxels();
+        report.intervals += slab->interval_count();
+        checksum.add(*slab, quiet);
+      }
+      if (auto done = sink(std::move(*slab)); !done) return tl::unexpected(done.error());
+      if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+      if (execution.progress) {
+        execution.progress(static_cast<double>(end - all.begin * columns_a_row) /
+                           ((all.end - all.begin) * columns_a_row));
+      }
+    }
   }
-  if (options.statistics) report.checksum = checksum.value();
+  if (options.statistics) {
+    report.checksum = checksum.value();
+    report.checksum_sum = checksum.sum();
+  }
   return report;
 }
 

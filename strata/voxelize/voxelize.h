@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <optional>
 
 #include "strata/core/execution.h"
 #include "strata/core/grid.h"
@@ -34,6 +35,14 @@ enum class SurfaceKind {
   kConservative,  ///< every voxel that the surface touches (closed boxes), exactly
   k26,            ///< 26-separating: no path of 26-neighbours crosses it
   k6              ///< 6-separating: no path of face neighbours crosses it; the thinnest
+};
+
+/// Rows [begin, end) of a grid: along y for rays along z, else along z (AxisFrame::v).
+struct VoxelRows {
+  int begin = 0;  ///< a multiple of VoxelIntervals::kTileSide
+  int end = 0;    ///< another one, or the end of the grid
+  /// Equal ends.
+  friend bool operator==(const VoxelRows&, const VoxelRows&) = default;
 };
 
 /// Settings of voxelize().
@@ -73,6 +82,12 @@ struct VoxelizeOptions {
   /// calling thread alone. `store` and `offsets` are ignored then, and surfaces are still found by
   /// the CPU.
   ListSource* source = nullptr;
+  /// Only these rows of the grid are made, and counted; voxelize() has no others then. Parts of a
+  /// grid that are made apart are the same voxels as one made whole. Empty: all rows.
+  std::optional<VoxelRows> rows = std::nullopt;
+  /// Of voxelize_slabs(): gives the rows that are made next, of `rows`, until there are no more; so
+  /// several processes can share a grid. They increase. Empty: all, one after another.
+  std::function<std::optional<VoxelRows>()> next_rows = {};
 };
 
 /// The label of a full voxel with VoxelizeOptions::rays.
@@ -93,10 +108,11 @@ struct VoxelizeReport {
   std::uint64_t negative_columns = 0;    ///< columns where the winding number falls below 0
   std::uint64_t rebuilt_tiles = 0;       ///< tiles built again with a larger table
   std::uint64_t checksum =
-      0;                    ///< see set_checksum in strata/voxelize/checksum.h; with `statistics`
-  bool closed = true;       ///< found or assumed to be closed; false: `open` decided
-  double lists_ms = 0;      ///< mean time per thread until the lists are sorted
-  double intervals_ms = 0;  ///< mean time per thread from lists to intervals
+      0;  ///< see set_checksum in strata/voxelize/checksum.h; with `statistics`
+  std::uint64_t checksum_sum = 0;  ///< SetChecksum::sum(), to be added to those of other rows
+  bool closed = true;              ///< found or assumed to be closed; false: `open` decided
+  double lists_ms = 0;             ///< mean time per thread until the lists are sorted
+  double intervals_ms = 0;         ///< mean time per thread from lists to intervals
 };
 
 /// Receives the slabs in increasing v.

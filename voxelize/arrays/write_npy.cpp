@@ -8,6 +8,7 @@
 #include <fmt/core.h>
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -25,22 +26,30 @@ class NpyWriter final : public SlabWriter {
  public:
   NpyWriter(const std::string& path, const VoxelGrid& grid, const VoxelWriterOptions& options,
             BlockOutput output)
-      : SlabWriter(path, grid, Axis::kX),
+      : SlabWriter(path, grid, Axis::kX, false, options.part.has_value()),
         values_(options),
+        part_(options.part),
         frame_(options.frame),
         output_(std::move(output)),
         stream_(grid, values_, DenseStream::Packing::kNone) {
     if (options.sidecar && path != "-") sidecar_ = path + ".json";
   }
 
-  Result<void> begin() { return stream_.begin(output_, npy_head(values_, dims())); }
+  Result<void> begin() {
+    const std::string head = npy_head(values_, dims());
+    head_bytes_ = head.size();
+    return part_ && !part_->head ? Result<void>() : stream_.begin(output_, head);
+  }
 
  private:
   Result<void> add_slab(const VoxelIntervals& slab, const Execution& execution) override {
+    if (part_) output_.seek(head_bytes_ + place_of_layer(dims(), values_, slab.v_begin()));
     return stream_.append(slab, output_, execution);
   }
   Result<void> finish_output(const Execution&) override {
-    if (auto written = write_sidecar(); !written) return written;
+    if (!part_ || part_->head) {
+      if (auto written = write_sidecar(); !written) return written;
+    }
     return output_.commit();
   }
   /// Where the grid lies: centre = direction @ (origin + (index + 0.5) * spacing).
@@ -63,6 +72,8 @@ class NpyWriter final : public SlabWriter {
   }
 
   DenseValues values_;
+  std::optional<VoxelPart> part_;
+  std::size_t head_bytes_ = 0;
   GridFrame frame_;
   std::string sidecar_;  // path; empty: none
   BlockOutput output_;
@@ -73,7 +84,9 @@ class NpyWriter final : public SlabWriter {
 
 VoxelWriterResult open_npy_writer(const std::string& path, const VoxelGrid& grid,
                                   const VoxelWriterOptions& options) {
-  Result<BlockOutput> output = BlockOutput::create(path);
+  Result<BlockOutput> output = options.part
+                                   ? Result<BlockOutput>(BlockOutput(options.part->write_at))
+                                   : BlockOutput::create(path);
   if (!output) return tl::unexpected(output.error());
   return begun(std::make_unique<NpyWriter>(path, grid, options, std::move(*output)));
 }

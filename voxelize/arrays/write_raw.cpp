@@ -9,6 +9,7 @@
 
 #include "voxelize/arrays/nrrd_text.h"
 #include "voxelize/output/block_output.h"
+#include "voxelize/output/dense_rows.h"
 #include "voxelize/output/dense_stream.h"
 #include "voxelize/output/file_pair.h"
 #include "voxelize/output/slab_writer.h"
@@ -21,7 +22,8 @@ class RawWriter final : public SlabWriter {
  public:
   RawWriter(const std::string& path, const VoxelGrid& grid, const VoxelWriterOptions& options,
             std::optional<BlockOutput> head, BlockOutput data)
-      : SlabWriter(path, grid, Axis::kX),
+      : SlabWriter(path, grid, Axis::kX, false, options.part.has_value()),
+        part_(options.part.has_value()),
         values_(options),
         head_(std::move(head)),
         data_(std::move(data)),
@@ -34,6 +36,7 @@ class RawWriter final : public SlabWriter {
 
  private:
   Result<void> add_slab(const VoxelIntervals& slab, const Execution& execution) override {
+    if (part_) data_.seek(place_of_layer(dims(), values_, slab.v_begin()));
     return stream_.append(slab, data_, execution);
   }
 
@@ -42,6 +45,7 @@ class RawWriter final : public SlabWriter {
     return head_ ? head_->commit() : Result<void>();
   }
 
+  bool part_;
   DenseValues values_;
   std::optional<BlockOutput> head_;  // not of a pipe
   BlockOutput data_;
@@ -53,10 +57,11 @@ class RawWriter final : public SlabWriter {
 VoxelWriterResult open_raw_writer(const std::string& path, const VoxelGrid& grid,
                                   const VoxelWriterOptions& options) {
   const FilePair pair(path, ".nhdr", ".raw");
-  Result<BlockOutput> data = BlockOutput::create(pair.data);
+  Result<BlockOutput> data = options.part ? Result<BlockOutput>(BlockOutput(options.part->write_at))
+                                          : BlockOutput::create(pair.data);
   if (!data) return tl::unexpected(data.error());
   std::optional<BlockOutput> head;
-  if (!data->sequential()) {
+  if (!data->sequential() && (!options.part || options.part->head)) {
     Result<BlockOutput> created = BlockOutput::create(pair.head);
     if (!created) return tl::unexpected(created.error());
     head = std::move(*created);

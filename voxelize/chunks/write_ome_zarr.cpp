@@ -46,7 +46,9 @@ class OmeZarrWriter final : public SlabWriter {
  public:
   OmeZarrWriter(const std::string& path, const VoxelGrid& grid, const VoxelWriterOptions& options,
                 FolderOutput folder)
-      : SlabWriter(path, grid, Axis::kX), options_(options), folder_(std::move(folder)) {
+      : SlabWriter(path, grid, Axis::kX, false, options.part.has_value()),
+        options_(options),
+        folder_(std::move(folder)) {
     levels_.push_back({grid, DenseValues(options)});
     VoxelWriterOptions coarse = options;
     for (int level = 1; level < options.levels; ++level) {
@@ -60,7 +62,8 @@ class OmeZarrWriter final : public SlabWriter {
 
   Result<void> begin() {
     for (std::size_t level = 0; level < levels_.size(); ++level) {
-      if (auto made = make_folders(level); !made) return made;
+      const int layers = (levels_[level].grid.dims.z + ZarrChunks::kSide - 1) / ZarrChunks::kSide;
+      if (auto made = make_folders(level, 0, options_.part ? 0 : layers); !made) return made;
       levels_[level].chunks.emplace(
           levels_[level].values, ZarrChunks::Order::kZyx,
           [level, colours = colours()](const glm::ivec3& chunk, std::size_t plane) {
@@ -88,15 +91,15 @@ class OmeZarrWriter final : public SlabWriter {
     return fog != 0 ? fog : colours() ? 0xffffffff : 1;
   }
 
-  /// All folders of chunks, whether or not there will be one.
-  Result<void> make_folders(std::size_t level) {
+  /// All folders of layers of chunks, whether or not there will be a chunk.
+  Result<void> make_folders(std::size_t level, int z_begin, int z_end) {
     const glm::ivec3 chunks =
         (levels_[level].grid.dims + ZarrChunks::kSide - 1) / ZarrChunks::kSide;
     std::vector<std::string> folders = {std::to_string(level)};
     for (std::size_t plane = 0; plane < (colours() ? 4 : 1); ++plane) {
       std::string at = std::to_string(level);
       if (colours()) folders.push_back(at += fmt::format("/{}", plane));
-      for (int z = 0; z < chunks.z; ++z) {
+      for (int z = z_begin; z < z_end; ++z) {
         folders.push_back(fmt::format("{}/{}", at, z));
         for (int y = 0; y < chunks.y; ++y) folders.push_back(fmt::format("{}/{}/{}", at, z, y));
       }
@@ -109,10 +112,15 @@ class OmeZarrWriter final : public SlabWriter {
 
   Result<void> add_slab(const VoxelIntervals& slab, const Execution& execution) override {
     if (half_) half_->add(slab);
+    if (options_.part) {
+      const int first = slab.v_begin() / ZarrChunks::kSide;
+      if (auto made = make_folders(0, first, first + slab.tiles_v()); !made) return made;
+    }
     return levels_[0].chunks->write(slab, folder_, execution);
   }
 
   Result<void> finish_output(const Execution& execution) override {
+    if (options_.part && !options_.part->head) return folder_.commit();
     std::uint32_t fog = options_.fog;
     for (std::size_t level = 1; level < levels_.size(); ++level) {
       auto written = levels_[level].chunks->write(half_->set(), folder_, execution);
@@ -189,7 +197,8 @@ class OmeZarrWriter final : public SlabWriter {
 
 VoxelWriterResult open_ome_zarr_writer(const std::string& path, const VoxelGrid& grid,
                                        const VoxelWriterOptions& options) {
-  Result<FolderOutput> folder = FolderOutput::create(path);
+  Result<FolderOutput> folder =
+      options.part ? FolderOutput::join(options.part->folder) : FolderOutput::create(path);
   if (!folder) return tl::unexpected(folder.error());
   return begun(std::make_unique<OmeZarrWriter>(path, grid, options, std::move(*folder)));
 }

@@ -22,7 +22,8 @@ class ZarrWriter final : public SlabWriter {
  public:
   ZarrWriter(const std::string& path, const VoxelGrid& grid, const VoxelWriterOptions& options,
              FolderOutput folder)
-      : SlabWriter(path, grid, Axis::kZ),
+      : SlabWriter(path, grid, Axis::kZ, false, options.part.has_value()),
+        head_(!options.part || options.part->head),
         values_(options),
         unit_(unit_name(options.frame.unit_metres)),
         folder_(std::move(folder)),
@@ -37,6 +38,7 @@ class ZarrWriter final : public SlabWriter {
   }
 
   Result<void> finish_output(const Execution&) override {
+    if (!head_) return folder_.commit();
     const VoxelGrid& g = grid();
     const glm::dvec3 size = g.voxel_size, centre = g.origin + 0.5 * size;
     const std::string array = fmt::format(
@@ -64,6 +66,7 @@ class ZarrWriter final : public SlabWriter {
     return folder_.commit();
   }
 
+  bool head_;
   DenseValues values_;
   std::string_view unit_;  // of the grid, or empty
   FolderOutput folder_;
@@ -74,7 +77,8 @@ class ZarrWriter final : public SlabWriter {
 
 VoxelWriterResult open_zarr_writer(const std::string& path, const VoxelGrid& grid,
                                    const VoxelWriterOptions& options) {
-  Result<FolderOutput> folder = FolderOutput::create(path);
+  Result<FolderOutput> folder =
+      options.part ? FolderOutput::join(options.part->folder) : FolderOutput::create(path);
   if (!folder) return tl::unexpected(folder.error());
   return std::make_unique<ZarrWriter>(path, grid, options, std::move(*folder));
 }

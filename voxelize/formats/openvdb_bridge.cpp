@@ -7,7 +7,7 @@
 #include <type_traits>
 
 #include "voxelize/formats/vdb_leaves.h"
-#include "voxelize/transposed.h"
+#include "voxelize/output/transposed.h"
 
 namespace strata {
 namespace {

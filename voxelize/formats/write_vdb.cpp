@@ -134,7 +134,7 @@ class VdbWriter final : public SlabWriter {
  public:
   VdbWriter(const std::string& path, const VoxelGrid& grid, const VoxelWriterOptions& options,
             BlockOutput output)
-      : SlabWriter(path, grid, Axis::kZ),
+      : SlabWriter(path, grid, Axis::kZ, false, options.part.has_value()),
         divisor_(options.ids != 0 || options.rgba ? 1 : options.fog),
         kind_(options.rgba    ? VdbValues::kColour
               : divisor_ != 0 ? VdbValues::kFloat

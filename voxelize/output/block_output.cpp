@@ -11,7 +11,7 @@ namespace strata {
 
 BlockOutput::BlockOutput(AtomicFile file) : file_(std::move(file)) {
   // AtomicFile writes directly only what it cannot rename: pipes and devices.
-  sequential_ = file_.temporary_path() == file_.path();
+  sequential_ = file_->temporary_path() == file_->path();
 }
 
 Result<BlockOutput> BlockOutput::create(const std::string& path) {
@@ -21,11 +21,15 @@ Result<BlockOutput> BlockOutput::create(const std::string& path) {
 
 Result<void> BlockOutput::append(const void* data, std::size_t bytes) {
   const std::uint64_t offset = std::exchange(position_, position_ + bytes);
-  return sequential_ ? file_.write(data, bytes) : file_.write_at(offset, data, bytes);
+  return sequential_ ? file_->write(data, bytes) : write_at(offset, data, bytes);
+}
+
+Result<void> BlockOutput::write_at(std::uint64_t offset, const void* data, std::size_t bytes) {
+  return file_ ? file_->write_at(offset, data, bytes) : write_at_(offset, data, bytes);
 }
 
 Result<void> BlockOutput::patch(std::uint64_t offset, const void* data, std::size_t bytes) {
-  return file_.write_at(offset, data, bytes);
+  return write_at(offset, data, bytes);
 }
 
 Result<void> BlockOutput::append_blocks(const Execution& execution, std::size_t count,
@@ -63,7 +67,7 @@ Result<void> BlockOutput::append_blocks(const Execution& execution, std::size_t 
     lock.unlock();
     turn_passed.notify_all();
     if (failure) std::rethrow_exception(failure);
-    if (write_beside) written = file_.write_at(offset, block.data(), block.size());
+    if (write_beside) written = write_at(offset, block.data(), block.size());
     if (!written) {
       failed = true;
       lock.lock();

@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <new>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -43,6 +44,9 @@ class BlockOutput {
  public:
   /// @return kOutput, kLimit as AtomicFile::create
   static Result<BlockOutput> create(const std::string& path);
+  /// A part of a file that another one creates and commits.
+  using WriteAt = std::function<Result<void>(std::uint64_t, const void*, std::size_t)>;
+  explicit BlockOutput(WriteAt write_at) : write_at_(std::move(write_at)) {}
 
   /// Makes the block of an index: sets the size and content of `out`, which arrives with the size
   /// and content that the same worker gave it before.
@@ -59,12 +63,16 @@ class BlockOutput {
   /// Standard output, a pipe or a device: what is written cannot be changed any more.
   [[nodiscard]] bool sequential() const { return sequential_; }
   [[nodiscard]] std::uint64_t position() const { return position_; }
-  Result<void> commit() { return file_.commit(); }
+  /// Goes on there. @pre !sequential()
+  void seek(std::uint64_t position) { position_ = position; }
+  Result<void> commit() { return file_ ? file_->commit() : Result<void>(); }
 
  private:
   explicit BlockOutput(AtomicFile file);
+  Result<void> write_at(std::uint64_t offset, const void* data, std::size_t bytes);
 
-  AtomicFile file_;
+  std::optional<AtomicFile> file_;
+  WriteAt write_at_;  // of a part
   bool sequential_ = false;
   std::uint64_t position_ = 0;
   std::vector<Bytes> scratch_;  // by worker; kept, since fresh pages are dear

@@ -11,6 +11,12 @@ namespace strata {
 /// Slabs of x intervals as one value a voxel, 0 outside, x fastest, then y, then z: the order of
 /// .npy, .nrrd and .vti. A layer is one z. (Internal to voxelize/.)
 
+/// Where the values of a layer begin, in bytes after those of layer 0.
+inline std::uint64_t place_of_layer(const glm::ivec3& dims, const DenseValues& values, int z) {
+  return static_cast<std::uint64_t>(dims.x) * static_cast<std::uint64_t>(dims.y) * values.bytes *
+         static_cast<std::uint64_t>(z);
+}
+
 /// Gives the values of rows y_begin to y_end - 1 of layer z of a slab as runs: run(value, length).
 template <class Run>
 void emit_rows(const VoxelIntervals& slab, const DenseValues& values, int z, int y_begin, int y_end,

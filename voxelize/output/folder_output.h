@@ -2,7 +2,9 @@
 
 #include <cstddef>
 #include <functional>
+#include <optional>
 #include <string>
+#include <utility>
 
 #include "core/atomic_file.h"
 #include "strata/core/execution.h"
@@ -16,11 +18,14 @@ class FolderOutput {
  public:
   /// @return kOutput, kLimit as AtomicFolder::create
   static Result<FolderOutput> create(const std::string& path);
+  /// A folder that is there, and that others write into too. @return kOutput
+  static Result<FolderOutput> join(const std::string& path);
   FolderOutput(FolderOutput&& other) noexcept;
   FolderOutput& operator=(FolderOutput&&) = delete;
   ~FolderOutput();
 
-  /// Makes a folder in it, in folders that are there. @return kOutput naming it
+  /// Makes a folder in it, in folders that are there; where others write too, it may be there.
+  /// @return kOutput naming it
   Result<void> make_folder(const std::string& name) const;
   /// Writes one file of the folder. Several threads may call it. @return kOutput naming the file
   Result<void> write(const std::string& name, const void* data, std::size_t bytes) const;
@@ -28,11 +33,15 @@ class FolderOutput {
   /// after one, the remaining indices are skipped; kCancelled when stopped before the last index.
   static Result<void> for_each(const Execution& execution, std::size_t count,
                                const std::function<Result<void>(std::size_t, int worker)>& body);
-  Result<void> commit() { return folder_.commit(); }
+  Result<void> commit() { return folder_ ? folder_->commit() : Result<void>(); }
 
  private:
-  FolderOutput(AtomicFolder folder, int descriptor);
-  AtomicFolder folder_;
+  FolderOutput(std::string path, std::optional<AtomicFolder> folder)
+      : path_(std::move(path)), folder_(std::move(folder)) {}
+  Result<void> open_folder(const std::string& path);
+
+  std::string path_;
+  std::optional<AtomicFolder> folder_;  // none: another one gives it its name
   int descriptor_ = -1;  // of the folder: opening relative to it is a fourth of the work
 };
 

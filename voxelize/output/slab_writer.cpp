@@ -4,7 +4,7 @@
 #include <new>
 #include <utility>
 
-#include "voxelize/transposed.h"
+#include "voxelize/output/transposed.h"
 
 namespace strata {
 
@@ -12,8 +12,13 @@ Result<void> VoxelWriter::add_distances(const ScalarField&, int, const Execution
   return fail(ErrorCode::kUsage, "the format holds no distances");
 }
 
-SlabWriter::SlabWriter(std::string path, const VoxelGrid& grid, Axis axis, bool whole)
-    : path_(std::move(path)), grid_(grid), axis_(axis), whole_(whole), given_axis_(axis) {}
+SlabWriter::SlabWriter(std::string path, const VoxelGrid& grid, Axis axis, bool whole, bool part)
+    : path_(std::move(path)),
+      grid_(grid),
+      axis_(axis),
+      whole_(whole),
+      part_(part),
+      given_axis_(axis) {}
 
 template <class Step>
 Result<void> SlabWriter::guarded(Step&& step) {
@@ -32,14 +37,14 @@ Result<void> SlabWriter::guarded(Step&& step) {
 
 Result<void> SlabWriter::add(const VoxelIntervals& slab, const Execution& execution) {
   return guarded([&]() -> Result<void> {
-    if (next_row_ == 0) given_axis_ = slab.axis();
+    if (next_row_ == 0 && !part_) given_axis_ = slab.axis();
     if (slab.axis() != given_axis_) {
       return fail(ErrorCode::kInternal, "{}: slab of axis {}, the slabs before it are of axis {}",
                   path_, "xyz"[static_cast<int>(slab.axis())],
                   "xyz"[static_cast<int>(given_axis_)]);
     }
     if (slab.grid() != grid_) return fail(ErrorCode::kInternal, "{}: slab of another grid", path_);
-    if (slab.v_begin() != next_row_) {
+    if (part_ ? slab.v_begin() < next_row_ : slab.v_begin() != next_row_) {
       return fail(ErrorCode::kInternal, "{}: slab begins at row {}, expected {}", path_,
                   slab.v_begin(), next_row_);
     }
@@ -75,7 +80,7 @@ Result<void> SlabWriter::add_turned(const VoxelIntervals& slab, const Execution&
 
 Result<void> SlabWriter::finish(const Execution& execution) {
   return guarded([&]() -> Result<void> {
-    if (next_row_ != rows()) {
+    if (next_row_ != rows() && !part_) {
       return fail(ErrorCode::kInternal, "{}: {} of {} rows were written", path_, next_row_, rows());
     }
     // Not asked after the commit: a file that stands is a success.

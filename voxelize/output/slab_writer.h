@@ -19,7 +19,9 @@ class SlabWriter : public VoxelWriter {
   /// @param path is only named in messages
   /// @param axis of the slabs that add_slab() takes
   /// @param whole  add_slab() takes the whole set at once
-  SlabWriter(std::string path, const VoxelGrid& grid, Axis axis, bool whole = false);
+  /// @param part  slabs are some rows of the grid, along `axis`
+  SlabWriter(std::string path, const VoxelGrid& grid, Axis axis, bool whole = false,
+             bool part = false);
 
   virtual Result<void> add_slab(const VoxelIntervals& slab, const Execution& execution) = 0;
   /// Completes and commits the output; kCancelled, without committing, if work was skipped.
@@ -38,10 +40,10 @@ class SlabWriter : public VoxelWriter {
   std::string path_;
   VoxelGrid grid_;
   Axis axis_;
-  bool whole_;
+  bool whole_, part_;
   Axis given_axis_;      // of the slabs that come
   VoxelIntervals kept_;  // those of another axis, until all are there
-  int next_row_ = 0;     // v of the slab that must come next
+  int next_row_ = 0;     // v of the slab that must come next, or after others in a part
   bool done_ = false;    // failed or finished
 };
 

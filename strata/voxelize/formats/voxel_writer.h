@@ -22,7 +22,7 @@ struct VoxelFormat {
   std::string description;  ///< one line for --list-formats
   std::string also = {};    ///< another extension of the format; empty: none
   /// Intervals along this axis are written as they come. Intervals along another axis are
-  /// transposed first (voxelize/transposed.h).
+  /// transposed first (voxelize/output/transposed.h).
   Axis axis = Axis::kZ;
   std::size_t colours = 0;  ///< most colours in a file, one per voxel; 0: none
   std::uint32_t ids = 0;    ///< the largest id that a voxel can have; 0: no ids

@@ -1,8 +1,11 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <glm/vec2.hpp>
 #include <glm/vec4.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -28,6 +31,17 @@ struct LayerOptions {
   double exposure = 10.0;  ///< seconds a layer
   double first_exposure = 15.0;   ///< of the first layers
   std::int64_t time = 315532800;  ///< seconds since 1970; the first of the year 1980
+};
+
+/// The part of one process in a file that several write together. Its slabs are some rows of the
+/// grid, along VoxelFormat::axis; finish() completes them, and gives nothing its name.
+struct VoxelPart {
+  /// .zarr, .ome.zarr: the folder that the processes write into.
+  std::string folder{};
+  /// .npy, .raw: writes bytes at their place in the file.
+  std::function<Result<void>(std::uint64_t offset, const void* data, std::size_t bytes)> write_at{};
+  /// This process writes what is there once: the head, the metadata.
+  bool head = false;
 };
 
 /// Settings of open_voxel_writer().
@@ -63,6 +77,9 @@ struct VoxelWriterOptions {
   LayerOptions layers{};  ///< of pictures
   /// .npy: a file beside it, `x.npy.json`, says where the grid lies.
   bool sidecar = false;
+  /// .zarr, .ome.zarr with one level, .npy, .raw, .vdb: this process writes a part. A .vdb is then
+  /// a file that holds these voxels alone. Other formats ignore it.
+  std::optional<VoxelPart> part{};
 };
 
 /// Writes a voxel set slab by slab: every slab of one axis, in increasing v, then finish(). Any

@@ -1,4 +1,4 @@
-#include "voxelize/transposed.h"
+#include "voxelize/output/transposed.h"
 
 #include <algorithm>
 #include <cstring>
