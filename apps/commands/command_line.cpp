@@ -196,6 +196,8 @@ bool define_command(std::string_view name, CLI::App& app, Words& words) {
   app.footer("`strata --help` lists the commands and the exit codes.");
   if (name == "voxelize") {
     define_voxelize(app, words);
+  } else if (name == "merge") {
+    define_merge(app, words);
   } else if (name == "mesh") {
     define_mesh(app, words);
   } else if (name == "info") {
@@ -302,11 +304,11 @@ ParseOutcome usage_error(std::string_view command, std::string_view message) {
 
 /// What other programs call what the commands do.
 constexpr std::pair<std::string_view, std::string_view> kOtherNames[] = {
-    {"check", "info"},     {"contour", "mesh"}, {"convert", "mesh"},   {"draw", "csg"},
-    {"export", "mesh"},    {"layers", "ldi"},   {"lists", "ldi"},      {"measure", "csg"},
-    {"open", "view"},      {"raster", "ldi"},   {"render", "csg"},     {"repair", "mesh"},
-    {"scene", "csg"},      {"show", "view"},    {"slice", "voxelize"}, {"stats", "info"},
-    {"transparent", "oit"}};
+    {"check", "info"},  {"contour", "mesh"},   {"convert", "mesh"}, {"draw", "csg"},
+    {"export", "mesh"}, {"join", "merge"},     {"layers", "ldi"},   {"lists", "ldi"},
+    {"measure", "csg"}, {"open", "view"},      {"raster", "ldi"},   {"render", "csg"},
+    {"repair", "mesh"}, {"scene", "csg"},      {"show", "view"},    {"slice", "voxelize"},
+    {"stats", "info"},  {"transparent", "oit"}};
 
 ParseOutcome no_such_command(std::string_view name) {
   if (name.starts_with('-')) {
@@ -471,13 +473,14 @@ Command parse_command_line(int argc, const char* const* argv) {
   refuse_bare_values(app, arguments, reader);
   Command command;
   if (name == "voxelize") command = voxelize_command(words, reader);
+  if (name == "merge") command = merge_command(words, reader);
   if (name == "mesh") command = mesh_command(words, reader);
   if (name == "info") command = info_command(words, reader);
   if (name == "ldi") command = ldi_command(words, reader);
   if (name == "csg") command = csg_command(words, reader);
   if (name == "picture") command = picture_command(words, reader);
   if (name == "oit") command = oit_command(words, reader);
-  if (name != "info" && name != "picture") refuse_voxels(words.files, reader);
+  if (name != "info" && name != "picture" && name != "merge") refuse_voxels(words.files, reader);
   if (reader.error()) return usage_error(name, reader.error()->message);
   if (auto* csg = std::get_if<CsgCommand>(&command)) csg->alone = alone;
   return command;

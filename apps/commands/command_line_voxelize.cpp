@@ -187,6 +187,9 @@ void define_voxelize(CLI::App& app, Words& words) {
   add_json(app, words, output);
   add_flag(app, output, "--checksum", words.checksum,
            "Print a hash of the solid voxels and the grid");
+  add_option(app, output, "--shard", words.shard, "I/N",
+             "Make the I-th of N parts of the grid, 1/N to N/N, in a folder FILE.shard-I-of-N; "
+             "strata merge joins them");
   add_flag(app, output, "--show", words.show, "Open the file in a window, as strata view does");
   add_flag(app, output, "--dry-run", words.dry_run,
            "Print the grid and the memory that the command would take, and exit");
@@ -350,6 +353,7 @@ VoxelizeCommand voxelize_command(const Words& words, Reader& reader) {
         "--backend gl cannot be combined with --surface alone, which needs no depth lists");
   }
   if (command.output.empty() && !words.format.empty()) reader.fail_with("--format needs -o");
+  read_shard(words, command, reader);
   if (command.show && (command.output.empty() || command.output == "-" || command.dry_run)) {
     reader.fail_with(command.dry_run ? "--show and --dry-run cannot be combined"
                                      : "--show needs -o FILE, which it opens");

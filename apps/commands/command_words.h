@@ -41,7 +41,7 @@ struct Words {
   std::string reader = "own", input_format = "auto", threads, memory_limit, time_limit,
               progress = "auto";
   bool quiet = false, verbose = false, strict = false;
-  std::string output, format, json;
+  std::string output, format, json, shard;
   std::string resolution, voxel_size, grid, cubic, like, bounds, origin, padding;
   bool align = false, solid = false, mask = false, ids = false, sdf = false, voxel_colours = false,
        keep_orientation = false, samples = false;
@@ -104,6 +104,12 @@ struct VoxelizeCommand;
 /// --coverage and what pictures of layers take. After the output and what else values are.
 void read_coverage(const Words& words, VoxelizeCommand& command, Reader& reader);
 
+// command_line_merge.cpp: `strata merge`, and what is common to jobs in parts.
+void define_merge(CLI::App& app, Words& words);
+MergeCommand merge_command(const Words& words, Reader& reader);
+/// --shard. After all other options.
+void read_shard(const Words& words, VoxelizeCommand& command, Reader& reader);
+
 /// Where no output is given: refuses a last input that does not exist and has the name of an
 /// output, `strata voxelize knot.obj knot.vdb`.
 /// @param writes whether the command writes files of this name
@@ -116,6 +122,7 @@ struct CommandSummary {
 };
 inline constexpr CommandSummary kCommands[] = {
     {"voxelize", "Turn meshes and scenes into a voxel file or statistics"},
+    {"merge", "Join the shards of `strata voxelize --shard` to one voxel file or report"},
     {"mesh", "Write the boundary of a scene or of meshes: 3MF, STL, OBJ, PLY, OFF"},
     {"info", "Report counts, bounds, area, volume and holes"},
     {"ldi", "Write the depth lists of meshes or a scene: a layered depth image"},

@@ -35,6 +35,12 @@ enum class Backend {
 /// Voxels along the longest side where no size is given.
 inline constexpr int kDefaultResolution = 256;
 
+/// One of the parts that a job is cut into.
+struct Shard {
+  int index = 1;  ///< from 1
+  int count = 1;
+};
+
 /// `strata voxelize`
 struct VoxelizeCommand {
   CommonOptions common;
@@ -67,6 +73,19 @@ struct VoxelizeCommand {
   Backend backend = Backend::kAuto;
   bool stats = false, checksum = false, dry_run = false, list_formats = false;
   bool show = false;                ///< the output, in a window
+  std::optional<Shard> shard;       ///< only this part is made
+  std::optional<std::string> json;  ///< "-": standard output
+};
+
+/// The folder of a part of `output`: grid.npy.shard-3-of-8
+[[nodiscard]] std::string shard_path(std::string output, const Shard& shard);
+
+/// `strata merge`
+struct MergeCommand {
+  CommonOptions common;
+  std::vector<std::string> shards;
+  std::string output, format;  ///< as those of VoxelizeCommand
+  bool stats = false, checksum = false;
   std::optional<std::string> json;  ///< "-": standard output
 };
 
@@ -179,7 +198,7 @@ struct OitCommand : PictureRequest {
 };
 
 using Command = std::variant<ParseOutcome, VoxelizeCommand, MeshCommand, InfoCommand, LdiCommand,
-                             CsgCommand, PictureCommand, OitCommand>;
+                             CsgCommand, PictureCommand, OitCommand, MergeCommand>;
 
 /// Reads the command line.
 Command parse_command_line(int argc, const char* const* argv);

@@ -93,13 +93,38 @@ std::vector<FileUse> inputs_of(const VoxelizeCommand& command) {
   return uses;
 }
 
+std::vector<FileUse> inputs_of(const MergeCommand& command) {
+  std::vector<FileUse> uses;
+  for (const std::string& path : command.shards) uses.push_back({"the shard", path});
+  return uses;
+}
+
+std::string shard_path(std::string output, const Shard& shard) {
+  while (output.size() > 1 && output.back() == '/') output.pop_back();
+  return fmt::format("{}.shard-{}-of-{}", output, shard.index, shard.count);
+}
+
 std::vector<FileUse> outputs_of(const VoxelizeCommand& command) {
+  if (command.shard && !command.output.empty()) {
+    return outputs({{"-o", shard_path(command.output, *command.shard)},
+                    {"--json", command.json.value_or("")}});
+  }
   const bool sidecar = !command.like.empty() && command.output != "-" &&
                        (same_word(command.format, "npy") ||
                         (command.format.empty() && has_extension(command.output, ".npy")));
   std::vector<FileUse> uses = outputs({{"-o", command.output},
                                        {"the place of -o", sidecar ? command.output + ".json" : ""},
                                        {"--json", command.json.value_or("")}});
+  if (command.output == "-") return uses;
+  for (const std::string& path : beside(command.output, command.format)) {
+    if (path != command.output) uses.push_back({"the other file of -o", path});
+  }
+  return uses;
+}
+
+std::vector<FileUse> outputs_of(const MergeCommand& command) {
+  std::vector<FileUse> uses =
+      outputs({{"-o", command.output}, {"--json", command.json.value_or("")}});
   if (command.output == "-") return uses;
   for (const std::string& path : beside(command.output, command.format)) {
     if (path != command.output) uses.push_back({"the other file of -o", path});

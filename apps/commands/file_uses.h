@@ -16,9 +16,11 @@ template <class AnyCommand>
 [[nodiscard]] std::vector<FileUse> inputs_of(const CsgCommand& command);
 [[nodiscard]] std::vector<FileUse> inputs_of(const OitCommand& command);
 [[nodiscard]] std::vector<FileUse> inputs_of(const VoxelizeCommand& command);
+[[nodiscard]] std::vector<FileUse> inputs_of(const MergeCommand& command);
 
 /// What a command writes.
 [[nodiscard]] std::vector<FileUse> outputs_of(const VoxelizeCommand& command);
+[[nodiscard]] std::vector<FileUse> outputs_of(const MergeCommand& command);
 [[nodiscard]] std::vector<FileUse> outputs_of(const MeshCommand& command);
 [[nodiscard]] std::vector<FileUse> outputs_of(const InfoCommand& command);
 [[nodiscard]] std::vector<FileUse> outputs_of(const LdiCommand& command);

@@ -87,6 +87,9 @@ int exit_code(const Result<void>& result, Session& session) {
 Result<void> run_command(const VoxelizeCommand& command, Session& session) {
   return run_voxelize(command, session);
 }
+Result<void> run_command(const MergeCommand& command, Session& session) {
+  return run_merge(command, session);
+}
 Result<void> run_command(const MeshCommand& command, Session& session) {
   return run_mesh(command, session);
 }
@@ -157,6 +160,8 @@ int strata_main(int argc, char** argv) {
   Result<void> result;
   if (const auto* voxelize = std::get_if<VoxelizeCommand>(&command)) {
     result = run(*voxelize, session);
+  } else if (const auto* merge = std::get_if<MergeCommand>(&command)) {
+    result = run(*merge, session);
   } else if (const auto* mesh = std::get_if<MeshCommand>(&command)) {
     result = run(*mesh, session);
   } else if (const auto* info = std::get_if<InfoCommand>(&command)) {

@@ -9,6 +9,7 @@
 namespace strata::apps {
 
 Result<void> run_voxelize(const VoxelizeCommand& command, Session& session);
+Result<void> run_merge(const MergeCommand& command, Session& session);
 Result<void> run_mesh(const MeshCommand& command, Session& session);
 Result<void> run_info(const InfoCommand& command, Session& session);
 Result<void> run_ldi(const LdiCommand& command, Session& session);

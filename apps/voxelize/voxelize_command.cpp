@@ -18,6 +18,7 @@
 #include "apps/strata/library_session.h"
 #include "apps/strata/run_commands.h"
 #include "apps/voxelize/file_size.h"
+#include "apps/voxelize/shard_part.h"
 #include "apps/voxelize/voxelize_report.h"
 #include "apps/voxelize/voxelize_run.h"
 #include "core/printable.h"
@@ -218,13 +219,15 @@ Axis choose_axis(const VoxelizeCommand& command, const std::optional<VoxelFormat
   return grid.dims.y >= grid.dims.x ? Axis::kY : Axis::kX;
 }
 
+}  // namespace
+
 Result<void> print_reports(const VoxelizeCommand& command, const VoxelizeOutcome& outcome,
-                           Session& session) {
+                           Session& session, std::string_view name) {
   const bool json_on_stdout = command.json == "-";
   const bool file_on_stdout = command.output == "-" && !command.dry_run;
   // All files are there before a reader of standard output goes on.
   if (command.json && !json_on_stdout) {
-    const std::string text = voxelize_json(command, outcome, session);
+    const std::string text = voxelize_json(command, outcome, session, name);
     if (auto done = print_report(text, *command.json, false); !done) return done;
   }
   if (auto done = commit_outputs(session); !done) return done;
@@ -240,8 +243,10 @@ Result<void> print_reports(const VoxelizeCommand& command, const VoxelizeOutcome
     if (auto done = print_report(text, "-", file_on_stdout || json_on_stdout); !done) return done;
   }
   if (!json_on_stdout) return {};
-  return print_report(voxelize_json(command, outcome, session), "-", file_on_stdout);
+  return print_report(voxelize_json(command, outcome, session, name), "-", file_on_stdout);
 }
+
+namespace {
 
 Result<void> check_samples(const VoxelizeCommand& command, int samples, const VoxelGrid& grid) {
   const int longest = std::max({grid.dims.x, grid.dims.y, grid.dims.z});
@@ -363,7 +368,7 @@ Result<void> check_disk(const VoxelizeCommand& command, const VoxelizeOutcome& o
               readable_bytes(static_cast<std::uint64_t>(room)));
 }
 
-Result<void> make_voxels(const VoxelizeCommand& command, Session& session) {
+Result<void> make_voxels(const VoxelizeCommand& command, JobPart* part, Session& session) {
   VoxelizeOutcome outcome;
   auto format = output_format(command);
   if (!format) return tl::unexpected(format.error());
@@ -394,6 +399,9 @@ Result<void> make_voxels(const VoxelizeCommand& command, Session& session) {
   }
   if (auto kept = check_pieces(command, outcome, opened); !kept) return kept;
   outcome.axis = choose_axis(command, outcome.format, outcome.grid);
+  if (part != nullptr) {
+    if (auto valid = part->check(command, outcome); !valid) return valid;
+  }
   const int samples = fog_samples(command, outcome.input);
   if (const auto valid = check_samples(command, samples, outcome.grid); !valid) return valid;
   outcome.estimate =
@@ -405,22 +413,33 @@ Result<void> make_voxels(const VoxelizeCommand& command, Session& session) {
     estimate_file(command, outcome, samples, session);
     if (session.interrupted()) return fail(ErrorCode::kCancelled, "stopped");
   } else {
-    if (auto room = check_disk(command, outcome); !room) return room;
+    if (!command.shard) {
+      if (auto room = check_disk(command, outcome); !room) return room;
+    }
     VoxelizeCommand with_place = command;
     with_place.input = std::move(placed);  // distances read it again
-    if (auto done = make_voxel_file(with_place, outcome, session); !done) return done;
+    if (auto done = make_voxel_file(with_place, outcome, part, session); !done) return done;
   }
   session.end_progress();
-  return print_reports(command, outcome, session);
+  return part == nullptr || part->reports() ? print_reports(command, outcome, session)
+                                            : Result<void>();
 }
 
 }  // namespace
 
+Result<void> run_voxelize_part(const VoxelizeCommand& command, JobPart& part, Session& session) {
+  return make_voxels(command, &part, session);
+}
+
 Result<void> run_voxelize(const VoxelizeCommand& command, Session& session) {
   if (command.list_formats) return print_report(format_list(), "-", false);
-  if (!command.show) return make_voxels(command, session);
+  if (command.shard) {
+    ShardPart part(*command.shard);
+    return run_voxelize_part(command, part, session);
+  }
+  if (!command.show) return make_voxels(command, nullptr, session);
   if (auto shown = check_view_program("--show"); !shown) return shown;
-  if (auto done = make_voxels(command, session); !done) return done;
+  if (auto done = make_voxels(command, nullptr, session); !done) return done;
   // The window has its own limits; this process's wall would be inherited.
   rlimit memory{};
   if (getrlimit(RLIMIT_DATA, &memory) == 0) {

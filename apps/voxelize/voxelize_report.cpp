@@ -1,11 +1,13 @@
 #include "apps/voxelize/voxelize_report.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 #include "apps/commands/choice_words.h"
 #include "apps/session/process_memory.h"
 #include "apps/session/report.h"
+#include "apps/voxelize/shard_report.h"
 #include "core/printable.h"
 
 namespace strata::apps {
@@ -42,6 +44,11 @@ std::string grouped(std::uint64_t number) {
   return text;
 }
 
+/// Those of the result of a scene are not known; a report that was read says so by NaN.
+bool knows_area(const csg::SolidInput& input) {
+  return input.tree == nullptr && !std::isnan(input.area);
+}
+
 void write_input(JsonWriter& json, const csg::SolidInput& input) {
   json.key("input").begin_object();
   std::uint64_t triangles = 0, vertices = 0;
@@ -52,7 +59,7 @@ void write_input(JsonWriter& json, const csg::SolidInput& input) {
   json.member("triangles", triangles);
   json.member("vertices", vertices);
   json.member("closed", input.closed);
-  if (!input.tree) {  // of the result of a scene they are not known
+  if (knows_area(input)) {
     json.member("area", input.area);
     json.member("volume", input.volume);
   }
@@ -213,11 +220,11 @@ void tell_input(Lines& line, const VoxelizeCommand& command, const VoxelizeOutco
   }
   const std::string bounds =
       fmt::format("{} to {}", triple(outcome.input.bounds.low), triple(outcome.input.bounds.high));
-  if (outcome.input.tree) {
-    line("scene", bounds);
-  } else {
+  if (knows_area(outcome.input)) {
     line("mesh", fmt::format("{}, area {:.6g}, volume {:.6g}", bounds, outcome.input.area,
                              outcome.input.volume));
+  } else {
+    line("scene", bounds);
   }
   line("grid",
        fmt::format("{}, origin {}, rays along {}", size_of(outcome.grid, 6),
@@ -387,9 +394,9 @@ std::string made_line(const VoxelizeCommand& command, const VoxelizeOutcome& out
 }
 
 std::string voxelize_json(const VoxelizeCommand& command, const VoxelizeOutcome& outcome,
-                          const Session& session) {
+                          const Session& session, std::string_view name) {
   JsonWriter json;
-  begin_report(json, "voxelize");
+  begin_report(json, name);
   write_input(json, outcome.input);
 
   json.key("grid").begin_object();
@@ -410,6 +417,7 @@ std::string voxelize_json(const VoxelizeCommand& command, const VoxelizeOutcome&
   write_options(json, command, outcome, session);
   write_results(json, command, outcome);
   if (command.ids && outcome.measured) write_ids(json, outcome);
+  if (command.shard && outcome.measured) write_shard(json, command, outcome);
 
   write_output(json, command, outcome);
   write_timings(json, session,

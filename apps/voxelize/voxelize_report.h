@@ -4,6 +4,7 @@
 #include <glm/vec4.hpp>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "apps/commands/commands.h"
@@ -11,6 +12,7 @@
 #include "apps/voxelize/file_size.h"
 #include "strata/core/grid.h"
 #include "strata/csg/input/solid_input.h"
+#include "strata/voxelize/checksum.h"
 #include "strata/voxelize/distance/signed_distance.h"
 #include "strata/voxelize/formats/voxel_writer.h"
 #include "strata/voxelize/voxelize.h"
@@ -28,6 +30,15 @@ struct ColourReport {
   void add(const VoxelIntervals& slab);
   /// How many colours there are; alpha does not count.
   [[nodiscard]] std::uint64_t count() const;
+};
+
+/// What is known of a part of the grid, so that others can be added to it.
+struct PartNumbers {
+  std::uint64_t input_hash = 0;            ///< of the triangles, and of the tree
+  std::uint64_t faces[3] = {0, 0, 0};      ///< of BoundaryArea
+  std::vector<BoundaryArea::Seam> seams;   ///< of BoundaryArea
+  std::uint64_t filled_steps = 0;          ///< by --coverage
+  std::optional<VoxelWriterOptions> file;  ///< what the voxels of the output are; no output
 };
 
 /// All that `strata voxelize` can tell of a run.
@@ -51,6 +62,7 @@ struct VoxelizeOutcome {
   std::vector<std::uint64_t> id_voxels;   ///< of solid n of the scene, with --ids
   std::optional<ColourReport> colours;    ///< with --colours
   double filled_volume = 0.0;             ///< by --coverage, cubic world units
+  PartNumbers part;                       ///< with --shard
   double write_ms = 0.0;
 };
 
@@ -67,7 +79,9 @@ struct VoxelizeOutcome {
                                     double seconds);
 
 /// For programs, as docs/json.md says.
+/// @param name  of the command
 [[nodiscard]] std::string voxelize_json(const VoxelizeCommand& command,
-                                        const VoxelizeOutcome& outcome, const Session& session);
+                                        const VoxelizeOutcome& outcome, const Session& session,
+                                        std::string_view name = "voxelize");
 
 }  // namespace strata::apps

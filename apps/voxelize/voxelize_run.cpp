@@ -23,10 +23,10 @@
 namespace strata::apps {
 namespace {
 
-/// Tells of walls that lie between voxel centres, or that nothing is solid.
-Result<void> check_thin(const VoxelizeCommand& command, VoxelizeOutcome& outcome,
-                        const Execution& execution, Session& session) {
+/// Looks for walls that lie between voxel centres.
+Result<void> find_walls(VoxelizeOutcome& outcome, const Execution& execution) {
   const csg::SolidInput& input = outcome.input;
+  if (!input.closed) return {};
   LostWallOptions options;
   options.rule = input.rule;
   if (!input.has_scene()) options.longest_edge = input.longest_edge;
@@ -34,19 +34,23 @@ Result<void> check_thin(const VoxelizeCommand& command, VoxelizeOutcome& outcome
     options.filter = &input.tree->unlabelled_filter();
     options.taken_away = [&](std::uint32_t t) { return input.tree->is_subtracted(t); };
   }
+  auto found = find_lost_walls(input.soup, outcome.grid, options, execution);
+  if (!found) return tl::unexpected(found.error());
+  outcome.lost_walls = *std::move(found);
+  for (LostWall& wall : outcome.lost_walls.largest) {
+    const Bounds box = outcome.frame.world_box({wall.low, wall.high});
+    wall.low = box.low, wall.high = box.high;
+  }
+  return {};
+}
+
+/// Tells of walls that lie between voxel centres, or that nothing is solid.
+void tell_thin(const VoxelizeCommand& command, const VoxelizeOutcome& outcome, Session& session) {
+  const csg::SolidInput& input = outcome.input;
   const std::uint64_t solid = outcome.report.solid_voxels;
   const char* remedy = command.sdf   ? "; smaller voxels keep more of it"
                        : command.ids ? "; --surface, without --ids, keeps all of it"
                                      : "; --surface keeps all of it";
-  if (input.closed) {
-    auto found = find_lost_walls(input.soup, outcome.grid, options, execution);
-    if (!found) return tl::unexpected(found.error());
-    outcome.lost_walls = *std::move(found);
-    for (LostWall& wall : outcome.lost_walls.largest) {
-      const Bounds box = outcome.frame.world_box({wall.low, wall.high});
-      wall.low = box.low, wall.high = box.high;
-    }
-  }
   const LostWalls& lost = outcome.lost_walls;
   if (lost.count > 0) {
     const LostWall& wall = lost.largest.front();
@@ -64,7 +68,6 @@ Result<void> check_thin(const VoxelizeCommand& command, VoxelizeOutcome& outcome
                                             "a voxel";
     session.warn("empty", fmt::format("no voxel is solid{}{}", why, remedy));
   }
-  return {};
 }
 
 void check_columns(const VoxelizeCommand& command, const VoxelizeOutcome& outcome,
@@ -162,39 +165,50 @@ VoxelizeOptions voxelize_options(const VoxelizeCommand& command, const VoxelizeO
   return options;
 }
 
+/// Whether walls of a solid may have fallen between voxel centres.
+bool may_lose_walls(const VoxelizeCommand& command, const VoxelizeOutcome& outcome) {
+  // No wall falls between rays and ends.
+  return command.coverage == 0 && !command.surface && !is_surface_alone(command, outcome.input);
+}
+
 /// Looks at the voxels that were made, and tells what users should know.
 Result<void> check_voxels(const VoxelizeCommand& command, VoxelizeOutcome& outcome,
-                          const Execution& execution, Session& session) {
-  check_columns(command, outcome, session);
-  if (command.coverage != 0) return session.check_strict();  // no wall falls between rays and ends
-  if (!command.surface && !is_surface_alone(command, outcome.input)) {
-    if (auto done = check_thin(command, outcome, execution, session); !done) return done;
-  } else if (outcome.report.solid_voxels == 0) {
-    session.warn("empty", "no voxel is solid; the grid may not cover the mesh");
+                          const JobPart* part, const Execution& execution, Session& session) {
+  if (may_lose_walls(command, outcome) && (part == nullptr || part->finds_walls())) {
+    if (auto found = find_walls(outcome, execution); !found) return found;
   }
+  if (part == nullptr || part->tells_all()) tell_voxels(command, outcome, session);
   return session.check_strict();
 }
 
 /// The work itself: lists, intervals, file.
 class VoxelizeRun {
  public:
-  VoxelizeRun(const VoxelizeCommand& command, VoxelizeOutcome& outcome, Session& session)
+  VoxelizeRun(const VoxelizeCommand& command, VoxelizeOutcome& outcome, JobPart* part,
+              Session& session)
       : command_(command),
         outcome_(outcome),
+        part_(part),
         session_(session),
         samples_(fog_samples(command, outcome.input)) {}
 
   Result<void> run() {
     if (auto done = open(); !done) return done;
-    if (auto done = command_.sdf ? distances() : voxelize(); !done) return done;
-    if (auto done = check_voxels(command_, outcome_, quiet_, session_); !done) return done;
+    const auto made = command_.sdf ? distances() : voxelize();
+    if (auto done = end_pass(made); !done) return done;
+    if (auto done = check_voxels(command_, outcome_, part_, quiet_, session_); !done) return done;
     if (auto done = write_shares(); !done) return done;
+    if (part_ != nullptr) {
+      const auto done = writer_ ? writer_->finish(quiet_) : Result<void>();
+      return part_->finish(command_, outcome_, session_, done);
+    }
     return writer_ ? finish() : Result<void>();
   }
 
  private:
   Result<void> open();
   Result<void> open_source();
+  Result<VoxelizeReport> pass(const Execution& execution, const SlabSink& sink);
   Result<void> voxelize();
   Result<void> distances();
   Result<void> write_shares();
@@ -204,9 +218,11 @@ class VoxelizeRun {
   Result<void> take(const VoxelIntervals& slab);
   Result<void> take_coloured(const VoxelIntervals& slab);
   void tell(const VoxelizeReport& report);
+  Result<void> end_pass(const Result<void>& done);
 
   const VoxelizeCommand& command_;
   VoxelizeOutcome& outcome_;
+  JobPart* part_;  ///< null: this process does all
   Session& session_;
   /// Values are fractions of voxels, which are made apart from what is reported.
   [[nodiscard]] bool shares() const { return samples_ > 1 || command_.coverage != 0; }
@@ -231,12 +247,16 @@ class VoxelizeRun {
 
 Result<void> VoxelizeRun::open() {
   const VoxelWriterOptions file = writer_options(command_, outcome_, samples_, session_);
+  outcome_.part.file = file;
   if (!command_.output.empty()) {
-    auto opened = open_voxel_writer(command_.output, outcome_.format->name, outcome_.grid, file);
+    auto opened = part_ != nullptr ? part_->open_writer(command_, outcome_, file)
+                                   : open_voxel_writer(command_.output, outcome_.format->name,
+                                                       outcome_.grid, file);
     if (!opened) return tl::unexpected(opened.error());
     writer_ = *std::move(opened);
   }
   options_ = voxelize_options(command_, outcome_);
+  if (part_ != nullptr) options_.statistics = true;
   if (command_.solid) {
     if (auto done = open_source(); !done) return done;
   }
@@ -247,7 +267,9 @@ Result<void> VoxelizeRun::open() {
       session_.memory_limit() > taken ? session_.memory_limit() - taken : 0, 1);
   quiet_ = execution_;
   quiet_.progress = {};
-  if (command_.stats || command_.json) boundary_.emplace(outcome_.grid, outcome_.axis);
+  if (command_.stats || command_.json || part_ != nullptr) {
+    boundary_.emplace(outcome_.grid, outcome_.axis);
+  }
   return {};
 }
 
@@ -291,6 +313,18 @@ Result<void> VoxelizeRun::take_coloured(const VoxelIntervals& slab) {
   return take(*coloured);
 }
 
+/// All rows of this process.
+Result<VoxelizeReport> VoxelizeRun::pass(const Execution& execution, const SlabSink& sink) {
+  if (part_ != nullptr) {
+    if (auto begun = part_->begin_pass(outcome_, options_); !begun) {
+      return tl::unexpected(begun.error());
+    }
+  }
+  auto report = voxelize_slabs(outcome_.input.soup, outcome_.grid, options_, execution, sink);
+  if (report && session_.interrupted()) return fail(ErrorCode::kCancelled, "stopped");
+  return report;
+}
+
 Result<void> VoxelizeRun::voxelize() {
   VoxelGrid finest = outcome_.grid;
   const int fine = std::max({1, samples_, command_.coverage});
@@ -302,11 +336,11 @@ Result<void> VoxelizeRun::voxelize() {
     if (options_.statistics && colouring_->leaves_out()) left_out_.emplace(outcome_.grid);
   }
   if (auto done = outcome_.input.fit(finest, quiet_); !done) return done;
-  auto report = voxelize_slabs(
-      outcome_.input.soup, outcome_.grid, options_, execution_,
-      [this](const VoxelIntervals& slab) { return colouring_ ? take_coloured(slab) : take(slab); });
+  const auto take_slab = [this](const VoxelIntervals& slab) {
+    return colouring_ ? take_coloured(slab) : take(slab);
+  };
+  auto report = pass(execution_, take_slab);
   if (!report) return tl::unexpected(report.error());
-  if (session_.interrupted()) return fail(ErrorCode::kCancelled, "stopped");
   if (!options_.statistics) report->solid_voxels = solid_voxels_;
   if (left_out_) {
     report->solid_voxels = left_out_->voxels;
@@ -321,6 +355,16 @@ void VoxelizeRun::tell(const VoxelizeReport& report) {
   outcome_.report = report;
   outcome_.measured = true;
   if (boundary_) outcome_.area_estimate = boundary_->estimate();
+}
+
+/// After a pass: what the whole job knows.
+Result<void> VoxelizeRun::end_pass(const Result<void>& done) {
+  if (part_ == nullptr) return done;
+  if (done && boundary_) {
+    outcome_.part.seams = boundary_->take_seams();
+    for (int axis = 0; axis < 3; ++axis) outcome_.part.faces[axis] = boundary_->faces()[axis];
+  }
+  return part_->end_pass(outcome_, done);
 }
 
 /// Of --sdf.
@@ -360,18 +404,14 @@ Result<void> VoxelizeRun::write_shares() {
   options_.statistics = false;
   Execution fine = session_.execution("sampling", 1.0);
   fine.memory_limit = execution_.memory_limit;
-  const auto done = voxelize_slabs(
-      outcome_.input.soup, outcome_.grid, options_, fine, [this](const VoxelIntervals& slab) {
-        return write([&](VoxelWriter& to) { return to.add(slab, quiet_); });
-      });
-  if (!done) return tl::unexpected(done.error());
-  if (session_.interrupted()) return fail(ErrorCode::kCancelled, "stopped");
-  if (command_.coverage == 0) return {};
-  const glm::dvec3 size = outcome_.grid.voxel_size;
-  outcome_.filled_volume = static_cast<double>(done->filled_steps) /
-                           full_coverage(command_.coverage) * size.x * size.y * size.z;
-  if (done->filled_steps == 0) {
-    session_.warn("empty", "no voxel is filled; the grid may not cover the mesh");
+  const auto done = pass(fine, [this](const VoxelIntervals& slab) {
+    return write([&](VoxelWriter& to) { return to.add(slab, quiet_); });
+  });
+  if (done) outcome_.part.filled_steps = done->filled_steps;
+  const Result<void> made = done ? Result<void>() : tl::unexpected(done.error());
+  if (auto all = part_ != nullptr ? part_->end_pass(outcome_, made) : made; !all) return all;
+  if (command_.coverage != 0 && (part_ == nullptr || part_->tells_all())) {
+    tell_filled(command_, outcome_, session_);
   }
   return session_.check_strict();
 }
@@ -402,6 +442,25 @@ int fog_samples(const VoxelizeCommand& command, const csg::SolidInput& input) {
   return command.fog_by_default && is_surface_alone(command, input) ? 1 : command.fog;
 }
 
+void tell_voxels(const VoxelizeCommand& command, const VoxelizeOutcome& outcome, Session& session) {
+  check_columns(command, outcome, session);
+  if (command.coverage != 0) return;
+  if (may_lose_walls(command, outcome)) {
+    tell_thin(command, outcome, session);
+  } else if (outcome.report.solid_voxels == 0) {
+    session.warn("empty", "no voxel is solid; the grid may not cover the mesh");
+  }
+}
+
+void tell_filled(const VoxelizeCommand& command, VoxelizeOutcome& outcome, Session& session) {
+  const glm::dvec3 size = outcome.grid.voxel_size;
+  outcome.filled_volume = static_cast<double>(outcome.part.filled_steps) /
+                          full_coverage(command.coverage) * size.x * size.y * size.z;
+  if (outcome.part.filled_steps == 0) {
+    session.warn("empty", "no voxel is filled; the grid may not cover the mesh");
+  }
+}
+
 VoxelWriterOptions writer_options(const VoxelizeCommand& command, VoxelizeOutcome& outcome,
                                   int samples, Session& session) {
   VoxelWriterOptions file;
@@ -425,8 +484,8 @@ VoxelWriterOptions writer_options(const VoxelizeCommand& command, VoxelizeOutcom
 }
 
 Result<void> make_voxel_file(const VoxelizeCommand& command, VoxelizeOutcome& outcome,
-                             Session& session) {
-  return VoxelizeRun(command, outcome, session).run();
+                             JobPart* part, Session& session) {
+  return VoxelizeRun(command, outcome, part, session).run();
 }
 
 }  // namespace strata::apps

@@ -47,7 +47,7 @@ RunResult Workplace::run(const std::vector<std::string>& arguments,
                          const RunOptions& options) const {
   const std::string in = talk_ / "in", out = talk_ / "out", err = talk_ / "err";
   std::ofstream(in, std::ios::binary) << options.input;
-  std::vector<std::string> words = {STRATA_TOOL};
+  std::vector<std::string> words = {options.program.empty() ? STRATA_TOOL : options.program};
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv;
   for (std::string& word : words) argv.push_back(word.data());

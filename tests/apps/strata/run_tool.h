@@ -22,6 +22,7 @@ struct RunResult {
 };
 
 struct RunOptions {
+  std::string program = {};        ///< its path; empty: strata
   std::string input = {};          ///< standard input
   bool closed_stdin = false;       ///< there is none
   bool silent_stdin_pipe = false;  ///< standard input is a pipe that nothing comes through

@@ -1,0 +1,307 @@
+// `strata voxelize --shard` and `strata merge`: many processes make what one makes.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+
+#include "strata/mesh/shapes.h"
+#include "tests/apps/strata/json_names.h"
+#include "tests/apps/strata/voxelize_fixture.h"
+
+namespace strata {
+namespace {
+
+using nlohmann::json;
+using testkit::RunResult;
+namespace fs = std::filesystem;
+
+class Shards : public testkit::VoxelizeFixture {
+ protected:
+  void SetUp() override {
+    put("knot.obj", make_torus_knot(2, 3, 0.4, 90, 14));
+    put("ball.stl", make_icosphere(1.3, 3));
+    TriangleSoup open = make_torus_knot(2, 3, 0.4, 60, 12);
+    open.triangles.resize(open.triangles.size() - 30);
+    put("open.off", open);
+    place.write("plate.csg",
+                "difference() { cube([30, 20, 9]); translate([8, 8, -1]) sphere(6); }\n");
+  }
+
+  /// Names and bytes of a file, of a folder and all that is in it, and of files beside it.
+  [[nodiscard]] std::map<std::string, std::string> bytes_of(const std::string& name) const {
+    std::map<std::string, std::string> files;
+    const fs::path path = place.path(name);
+    if (fs::is_regular_file(path)) files["itself"] = place.read(name);
+    if (fs::is_directory(path)) {
+      for (const auto& entry : fs::recursive_directory_iterator(path)) {
+        const std::string inside = entry.path().lexically_relative(path).string();
+        files[inside] = entry.is_regular_file() ? place.read(name + "/" + inside) : "folder";
+      }
+    }
+    fs::path head = path, sidecar = path;
+    head.replace_extension(".nhdr"), sidecar += ".json";
+    for (const fs::path& other : {head, sidecar}) {
+      if (other != path && fs::exists(other)) {
+        files[other.extension().string()] = testkit::bytes_of(other);
+      }
+    }
+    return files;
+  }
+
+  /// Makes the shards of a job. @return their folders, the last one first
+  std::vector<std::string> make_shards(std::vector<std::string> arguments,
+                                       const std::string& output, int count) const {
+    std::vector<std::string> folders;
+    arguments.insert(arguments.begin(), "voxelize");
+    arguments.insert(arguments.end(), {"-o", output, "--shard", ""});
+    for (int index = count; index > 0; --index) {
+      arguments.back() = fmt::format("{}/{}", index, count);
+      const RunResult run = place.run(arguments);
+      EXPECT_EQ(run.exit_code, 0) << run.err;
+      folders.push_back(fmt::format("{}.shard-{}-of-{}", output, index, count));
+      EXPECT_TRUE(place.has(folders.back()));
+      EXPECT_FALSE(place.has(output));
+    }
+    return folders;
+  }
+
+  RunResult merge(std::vector<std::string> arguments) const {
+    arguments.insert(arguments.begin(), "merge");
+    return place.run(arguments);
+  }
+  RunResult merge(const std::vector<std::string>& shards, std::vector<std::string> more) const {
+    more.insert(more.begin(), shards.begin(), shards.end());
+    return merge(std::move(more));
+  }
+
+  /// What reports of two runs of the same job have in common.
+  static json numbers_of(json report) {
+    for (const char* other : {"command", "output", "timings_ms", "memory", "shard"}) {
+      report.erase(other);
+    }
+    report["options"].erase("threads");
+    report["lists"].erase("rebuilt_tiles");  // depends on how many threads there are
+    return report;
+  }
+
+  /// One process, and several: the same bytes and the same numbers.
+  void expect_same(const std::vector<std::string>& arguments, const std::string& name,
+                   int count) const {
+    SCOPED_TRACE(fmt::format("{} {} shards: {}", name, count, arguments.back()));
+    std::vector<std::string> whole = arguments;
+    whole.insert(whole.end(), {"-o", "whole/" + name, "--checksum"});
+    fs::create_directory(place.path("whole"));
+    const json one = report(whole);
+    const std::vector<std::string> shards = make_shards(arguments, name, count);
+    const RunResult run = merge(shards, {"-o", name, "--json", "--checksum"});
+    ASSERT_EQ(run.exit_code, 0) << run.err;
+    EXPECT_EQ(numbers_of(json::parse(run.out)), numbers_of(one));
+    EXPECT_GT(one["voxels"]["solid"], 1000);
+    const auto expected = bytes_of("whole/" + name), got = bytes_of(name);
+    ASSERT_FALSE(expected.empty());
+    EXPECT_TRUE(got == expected) << got.size() << " files, expected " << expected.size();
+    for (const std::string& shard : shards) fs::remove_all(place.path(shard));
+    fs::remove_all(place.path("whole"));
+    for (const auto& entry : place.names()) {
+      if (entry.starts_with(name.substr(0, name.find('.')) + "."))
+        fs::remove_all(place.path(entry));
+    }
+  }
+
+  const std::vector<std::string> kKnot = {"knot.obj", "--grid", "200,210,220"};
+};
+
+TEST_F(Shards, MergeToTheBytesOfOneProcessInEveryFormat) {
+  for (const char* name : {"a.npy", "a.raw", "a.nhdr", "a.zarr", "a.ome.zarr", "a.vdb", "a.nrrd",
+                           "a.vti", "a.npz", "a.nii.gz", "a.binvox", "a.xyz"}) {
+    std::vector<std::string> arguments = kKnot;
+    if (std::string(name) == "a.binvox") arguments = {"knot.obj", "--cubic", "200"};
+    expect_same(arguments, name, 3);
+  }
+}
+
+TEST_F(Shards, MayBeOneOrAsManyAsThereAreRowsOfTiles) {
+  for (const int count : {1, 2, 4}) {
+    expect_same(kKnot, "a.npy", count);
+    expect_same(kKnot, "a.zarr", count);
+  }
+}
+
+TEST_F(Shards, HoldIdsSharesSurfacesAndScenesToo) {
+  const std::string grid = "200,210,220";
+  const std::vector<std::vector<std::string>> jobs = {
+      {"knot.obj", "ball.stl", "--grid", grid, "--ids"},
+      {"knot.obj", "--grid", grid, "--coverage=2"},
+      {"knot.obj", "--grid", grid, "--coverage=2", "--floats"},
+      {"knot.obj", "--grid", grid, "--surface"},
+      {"knot.obj", "--grid", grid, "--surface=6", "--solid"},
+      {"open.off", "--grid", grid},
+      {"open.off", "--grid", grid, "--open", "surface"},
+      {"plate.csg", "--grid", grid},
+      {"knot.obj", "--grid", grid, "--rule", "parity"}};
+  for (const std::vector<std::string>& job : jobs) {
+    expect_same(job, "a.ome.zarr", 3);
+    expect_same(job, "a.nrrd", 2);
+  }
+  expect_same({"knot.obj", "--grid", grid, "--fog=2"}, "a.vdb", 3);
+  expect_same({"knot.obj", "--grid", grid, "--mask", "--name", "it is"}, "a.vdb", 3);
+  expect_same({"knot.obj", "ball.stl", "--grid", grid, "--ids"}, "a.vdb", 4);
+}
+
+TEST_F(Shards, OfGridsOfAFileKeepItsPlace) {
+  ASSERT_EQ(place.run({"voxelize", "ball.stl", "--grid", "70,80,190", "-o", "like.nrrd"}).exit_code,
+            0);
+  expect_same({"knot.obj", "--like", "like.nrrd"}, "a.npy", 3);  // with a.npy.json
+  expect_same({"knot.obj", "--like", "like.nrrd"}, "a.nrrd", 2);
+}
+
+TEST_F(Shards, WithoutVoxelsMergeToTheReport) {
+  const json one = report({"knot.obj", "-r", "500", "--checksum"});
+  for (const char* index : {"1", "2", "3"}) {
+    ASSERT_EQ(place
+                  .run({"voxelize", "knot.obj", "-r", "500", "--shard", fmt::format("{}/3", index),
+                        fmt::format("--json={}.json", index)})
+                  .exit_code,
+              0);
+  }
+  const RunResult run = merge({"3.json", "1.json", "2.json", "--json", "--checksum"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(numbers_of(json::parse(run.out)), numbers_of(one));
+  const RunResult text = merge({"3.json", "1.json", "2.json"});
+  EXPECT_NE(text.out.find("columns by crossings"), std::string::npos) << text.out;
+  const RunResult file = merge({"3.json", "1.json", "2.json", "-o", "a.npy"});
+  EXPECT_EQ(file.exit_code, 2);
+  EXPECT_NE(file.err.find("holds no voxels"), std::string::npos) << file.err;
+}
+
+TEST_F(Shards, ReportsHaveTheNamesOfTheDocument) {
+  const auto shards = make_shards(kKnot, "a.npy", 2);
+  std::set<std::string> all, names;
+  testkit::collect(json::parse(place.read(shards[0] + "/shard.json")), "", all);
+  for (const std::string& name : all) {
+    if (name.starts_with("shard.")) names.insert(name);
+  }
+  EXPECT_EQ(names, testkit::documented("`strata voxelize --shard`"));
+}
+
+TEST_F(Shards, ThatAreMissingTwiceOrForeignAreNamed) {
+  const auto shards = make_shards(kKnot, "a.npy", 3);
+  const auto refuses = [&](const std::vector<std::string>& given, const std::string& what) {
+    const auto before = place.names();
+    const RunResult run = merge(given, {"-o", "b.npy"});
+    EXPECT_EQ(run.exit_code, 3) << what;
+    EXPECT_NE(run.err.find(what), std::string::npos) << run.err;
+    EXPECT_EQ(place.names(), before);
+  };
+  const std::string &three = shards[0], &two = shards[1], &one = shards[2];
+  refuses({one, three}, "shard 2 of 3 is missing");
+  refuses({two}, "shards 1, 3 of 3 are missing");
+  refuses({one, two, three, two}, two + " and " + two + " are both shard 2 of 3");
+  refuses({one, "ball.stl"}, "ball.stl");
+  refuses({one, "nothing"}, "nothing");
+  fs::create_directory(place.path("empty"));
+  refuses({one, "empty"}, "empty/shard.json");
+
+  struct Foreign {
+    std::vector<std::string> arguments;
+    std::string what;
+  };
+  for (const Foreign& foreign :
+       {Foreign{{"ball.stl", "--grid", "200,210,220"}, "it is of another input"},
+        Foreign{{"knot.obj", "--grid", "200,210,221"}, "its grid is 200 x 210 x 221 voxels"},
+        Foreign{{"knot.obj", "--grid", "200,210,220", "--surface"}, "its options are"},
+        Foreign{{"knot.obj", "--grid", "200,210,220", "--rule", "nonzero"}, "--rule nonzero"}}) {
+    const auto others = make_shards(foreign.arguments, "other.npy", 3);
+    refuses({one, others[1], three}, foreign.what);
+    refuses({one, others[1], three}, others[1] + " is no shard of the job of " + one);
+    for (const std::string& other : others) fs::remove_all(place.path(other));
+  }
+  refuses({one, make_shards(kKnot, "other.npy", 2)[0]}, "it is one of 2 shards, not of 3");
+  refuses({one, make_shards(kKnot, "other.vdb", 3)[0]}, "format");
+}
+
+TEST_F(Shards, ThatAreDamagedLeaveNothing) {
+  auto shards = make_shards(kKnot, "a.npy", 2);
+  const std::string runs = place.read(shards[1] + "/runs");
+  for (const std::size_t length :
+       {std::size_t{0}, std::size_t{20}, runs.size() / 2, runs.size() - 1}) {
+    place.write(shards[1] + "/runs", runs.substr(0, length));
+    const auto before = place.names();
+    const RunResult run = merge(shards, {"-o", "b.npy"});
+    EXPECT_EQ(run.exit_code, 3) << length;
+    EXPECT_NE(run.err.find(shards[1] + "/runs"), std::string::npos) << run.err;
+    EXPECT_EQ(place.names(), before);
+  }
+  place.write(shards[1] + "/runs", runs);
+  const std::string report = place.read(shards[1] + "/shard.json");
+  for (std::size_t length = 0; length < report.size(); length += report.size() / 40 + 1) {
+    place.write(shards[1] + "/shard.json", report.substr(0, length));
+    EXPECT_EQ(merge(shards, {"-o", "b.npy"}).exit_code, 3) << length;
+  }
+  json changed = json::parse(report);
+  for (const char* member :
+       {"grid", "input", "options", "voxels", "lists", "lost_walls", "shard"}) {
+    json without = changed;
+    without.erase(member);
+    place.write(shards[1] + "/shard.json", without.dump());
+    const RunResult run = merge(shards, {"-o", "b.npy"});
+    EXPECT_EQ(run.exit_code, 3) << member;
+    EXPECT_NE(run.err.find(member), std::string::npos) << run.err;
+  }
+  EXPECT_FALSE(place.has("b.npy"));
+}
+
+TEST_F(Shards, DoNotReplaceAFolderWithContent) {
+  const auto shards = make_shards(kKnot, "a.zarr", 2);
+  const auto again = place.run(
+      {"voxelize", "knot.obj", "--grid", "200,210,220", "-o", "a.zarr", "--shard", "1/2"});
+  EXPECT_EQ(again.exit_code, 4);
+  fs::create_directory(place.path("b.zarr"));
+  place.write("b.zarr/mine", "mine");
+  EXPECT_EQ(merge(shards, {"-o", "b.zarr"}).exit_code, 4);
+  EXPECT_EQ(place.read("b.zarr/mine"), "mine");
+  const RunResult other = merge(shards, {"-o", "c.npy"});
+  EXPECT_EQ(other.exit_code, 2);
+  EXPECT_NE(other.err.find("the shards are of format zarr, not npy"), std::string::npos);
+}
+
+TEST_F(Shards, AreRefusedWhereTheyCannotBe) {
+  const auto refuses = [&](std::vector<std::string> arguments, const std::string& what) {
+    arguments.insert(arguments.begin(), {"voxelize", "knot.obj", "-r", "100"});
+    const RunResult run = place.run(arguments);
+    EXPECT_EQ(run.exit_code, 2) << what;
+    EXPECT_NE(run.err.find(what), std::string::npos) << run.err;
+  };
+  const auto before = place.names();
+  refuses({"-o", "a.npy", "--shard", "0/3"}, "--shard must be 1/N to N/N");
+  refuses({"-o", "a.npy", "--shard", "4/3"}, "got 4/3");
+  refuses({"-o", "a.npy", "--shard", "3"}, "--shard must be I/N, like 1/8, got '3'");
+  refuses({"-o", "a.npy", "--shard", "1/x"}, "--shard");
+  refuses({"-o", "a.npy", "--shard", "1/2000"}, "1024");
+  refuses({"-o", "a.npy", "--shard", "1/3"}, "at most 1 shards of 64");
+  refuses({"-o", "a.npy", "--sdf", "--shard", "1/2"}, "--sdf");
+  refuses({"-o", "a.ome.zarr", "--levels", "3", "--shard", "1/2"}, "--levels");
+  refuses({"-o", "a.npy", "--colours", "--shard", "1/2"}, "--colours");
+  refuses({"-o", "a.npy", "--dry-run", "--shard", "1/2"}, "--dry-run");
+  refuses({"-o", "-", "--format", "npy", "--shard", "1/2"}, "-o -");
+  refuses({"--shard", "1/2"}, "--shard needs -o FILE or --json");
+  EXPECT_EQ(place.names(), before);
+  EXPECT_EQ(merge({"-o", "a.npy"}).exit_code, 2);
+}
+
+TEST_F(Shards, MergeTellsOfThinWallsOnce) {
+  put("sheet.obj", make_box({0, 0, 0}, {100, 100, 0.01}));
+  const json one = report({"sheet.obj", "--voxel-size", "0.5", "--padding", "2", "-o", "w.npy"});
+  const std::vector<std::string> job = {"sheet.obj", "--voxel-size", "0.5", "--padding", "2"};
+  EXPECT_FALSE(one["warnings"].empty());
+  const auto shards = make_shards(job, "a.zarr", 3);
+  const RunResult run = merge(shards, {"--json", "-o", "a.zarr"});
+  const json all = json::parse(run.out);
+  EXPECT_EQ(all["warnings"], one["warnings"]);
+  EXPECT_EQ(all["lost_walls"], one["lost_walls"]);
+}
+
+}  // namespace
+}  // namespace strata
