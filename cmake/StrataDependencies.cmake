@@ -231,6 +231,16 @@ else()
   endif()
 endif()
 
+set(STRATA_HAVE_MPI OFF)
+if(STRATA_WITH_MPI AND STRATA_BUILD_TOOLS)
+  set(MPI_CXX_SKIP_MPICXX TRUE)  # the interface for C++ is no part of MPI any more
+  find_package(MPI COMPONENTS CXX QUIET)
+  strata_optional(MPI STRATA_HAVE_MPI MPI "${MPI_CXX_LIBRARY_VERSION_STRING}, strata-mpi"
+    "libopenmpi-dev is missing; no strata-mpi")
+else()
+  strata_feature(MPI OFF "STRATA_WITH_MPI is off")
+endif()
+
 # --- tests, fuzz targets, benchmarks ------------------------------------------------------------------------------------
 if(STRATA_BUILD_TESTS)
   find_package(GTest QUIET)

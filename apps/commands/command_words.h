@@ -116,6 +116,22 @@ void read_shard(const Words& words, VoxelizeCommand& command, Reader& reader);
 void refuse_bare_outputs(const std::vector<std::string>& files, bool (*writes)(const std::string&),
                          Reader& reader);
 
+/// What `strata-mpi --help` prints.
+inline constexpr const char* kRanksHelp =
+    R"(Run strata voxelize by the ranks of an MPI job, on one machine or on many.
+
+  mpirun -n 64 strata-mpi voxelize part.stl -r 32768 -o part.zarr
+  srun -n 64 strata-mpi voxelize part.stl -r 65536 --stats --checksum
+
+The ranks take rows of tiles of the grid in turn. The result is that of one process, byte for byte:
+.zarr, .ome.zarr, .npy, .raw and .nhdr on a file system that all machines reach, and reports. A .vdb
+becomes a folder of one .vdb a rank and an index.json.
+
+Options are those of strata voxelize. --threads and --memory-limit are those of one rank; by default
+the ranks of a machine share its processors and memory. --sdf, --colours, --levels, --show, --dry-run
+and --shard are for one process.
+)";
+
 /// The commands of the tool, and what --help says of each.
 struct CommandSummary {
   std::string_view name, what;

@@ -1,7 +1,8 @@
 // Writes the manual pages and the completions of shells from the tables of options that --help is
 // written from. Part of the build, not installed.
 //
-// usage: strata-manual FOLDER [strata-view] [strata-verify]: the programs that there are besides
+// usage: strata-manual FOLDER [strata-view] [strata-verify] [strata-mpi]: the programs that there
+// are besides
 
 #include <CLI/App.hpp>
 #include <cstdio>
@@ -65,6 +66,14 @@ std::vector<ProgramText> all_programs(const std::set<std::string>& there) {
   if (there.count("strata-view") != 0) {
     view::visit_view_options([&](const CLI::App& app) { programs.push_back(program_text(app)); });
   }
+  if (there.count("strata-mpi") != 0) {
+    apps::Words words;
+    CLI::App app("", "strata-mpi");
+    apps::define_command("voxelize", app, words);
+    app.description(apps::kRanksHelp);
+    programs.push_back(program_text(app));
+    programs.back().usage = "mpirun -n N strata-mpi voxelize [OPTIONS] INPUT...";
+  }
 #ifdef STRATA_HAVE_VERIFY
   if (there.count("strata-verify") != 0) {
     apps::VerifyWords words;
@@ -87,7 +96,8 @@ bool write(const std::filesystem::path& path, const std::string& text) {
 
 int manual_main(int argc, char** argv) {
   if (argc < 2) {
-    std::fprintf(stderr, "usage: strata-manual FOLDER [strata-view] [strata-verify]\n");
+    std::fprintf(stderr,
+                 "usage: strata-manual FOLDER [strata-view] [strata-verify] [strata-mpi]\n");
     return 2;
   }
   const std::filesystem::path folder = argv[1];
