@@ -37,8 +37,10 @@ struct ZarrHead {
   bool reversed = false;
   std::string folder;
   std::string before;
-  std::string after;     // of the name of a chunk
-  bool colours = false;  // red, green, blue, alpha side by side: `type` is that of all four
+  std::string after;  // of the name of a chunk
+  // Red, green, blue, alpha, side by side, of OME-Zarr in chunks of their own: `type` is that of
+  // all four.
+  bool colours = false;
 
   [[nodiscard]] std::size_t chunk_bytes() const {
     return static_cast<std::size_t>(chunk.x) * static_cast<std::size_t>(chunk.y) *
@@ -83,7 +85,7 @@ Result<void> take_type(const JsonValue& json, const std::string& path, ZarrHead&
 
 /// The three axes of a shape or of chunks as x, y, z; of OME-Zarr the last three, of which those
 /// before have one index. Nothing if there are others.
-/// @param colours  a further axis follows
+/// @param colours  a further axis follows, of OME-Zarr one of channels comes before
 std::optional<std::vector<double>> three_axes(const JsonValue& json, std::string_view name,
                                               bool ome, bool colours) {
   const JsonValue* list = json.find(name);
@@ -92,8 +94,9 @@ std::optional<std::vector<double>> three_axes(const JsonValue& json, std::string
     return std::nullopt;
   }
   auto numbers = json.numbers(name, list->items.size());
-  if (numbers && colours) numbers->pop_back();
+  if (numbers && colours && !ome) numbers->pop_back();
   if (!numbers || !ome) return numbers;
+  if (colours) numbers->erase(numbers->end() - 4);
   for (; numbers->size() > 3; numbers->erase(numbers->begin())) {
     if (numbers->front() != 1.0) return std::nullopt;
   }
@@ -101,15 +104,18 @@ std::optional<std::vector<double>> three_axes(const JsonValue& json, std::string
   return numbers;
 }
 
-/// Whether the last of four axes or more is that of red, green, blue and alpha.
-bool has_colours(const JsonValue& json) {
+/// Whether the last of four axes, of OME-Zarr the one before z, y, x, is that of red, green, blue
+/// and alpha.
+bool has_colours(const JsonValue& json, bool ome) {
   const JsonValue *type = json.find("dtype"), *shape = json.find("shape");
   const JsonValue *chunks = json.find("chunks"), *order = json.find("order");
-  const auto ends_with_4 = [](const JsonValue* list) {
-    return list != nullptr && list->items.size() > 3 && list->items.back().number == 4.0;
+  const auto has = [ome](const JsonValue* list, double count) {
+    if (list == nullptr || list->items.size() < 4) return false;
+    const std::size_t axis = list->items.size() - (ome ? 4 : 1);
+    return list->items[axis].number == count;
   };
-  return type != nullptr && type->text == "|u1" && ends_with_4(shape) && ends_with_4(chunks) &&
-         (order == nullptr || order->text != "F");
+  return type != nullptr && type->text == "|u1" && has(shape, 4.0) &&
+         has(chunks, ome ? 1.0 : 4.0) && (order == nullptr || order->text != "F");
 }
 
 /// @param folder  of the array; of OME-Zarr in that of the group
@@ -121,7 +127,7 @@ Result<ZarrHead> read_head(const ReadContext& context, const std::string& folder
   head.reversed = ome;
   head.folder = folder;
   const JsonValue* version = json->find("zarr_format");
-  head.colours = has_colours(*json);
+  head.colours = has_colours(*json, ome);
   const auto shape = three_axes(*json, "shape", ome, head.colours);
   const auto chunks = three_axes(*json, "chunks", ome, head.colours);
   if (version == nullptr || version->number != 2.0 || !shape || !chunks) {
@@ -143,7 +149,7 @@ Result<ZarrHead> read_head(const ReadContext& context, const std::string& folder
   if (auto taken = take_type(*json, path, head); !taken) return tl::unexpected(taken.error());
   if (head.colours) {
     head.type = NumberType::kU32;
-    head.after = std::string(1, head.separator) + "0";
+    if (!ome) head.after = std::string(1, head.separator) + "0";
   }
   if (ome) {
     head.fortran = !head.fortran;
@@ -188,15 +194,31 @@ class ChunkReader {
 
   /// The numbers of a chunk in the order of the file; empty if there is no such file.
   Result<std::span<const std::byte>> read(const glm::ivec3& at) {
+    if (!head_.colours || !head_.reversed) return read_file(at, head_.before, head_.chunk_bytes());
+    colours_.assign(head_.chunk_bytes(), std::byte{0});
+    bool any = false;
+    for (std::size_t channel = 0; channel < 4; ++channel) {
+      const std::string before = head_.before + fmt::format("{}{}", channel, head_.separator);
+      const auto plane = read_file(at, before, colours_.size() / 4);
+      if (!plane) return plane;
+      any = any || !plane->empty();
+      for (std::size_t i = 0; i < plane->size(); ++i) colours_[4 * i + channel] = (*plane)[i];
+    }
+    return any ? std::span<const std::byte>(colours_) : std::span<const std::byte>();
+  }
+
+ private:
+  Result<std::span<const std::byte>> read_file(const glm::ivec3& at, const std::string& before,
+                                               std::size_t bytes) {
     const glm::ivec3 name = head_.reversed ? glm::ivec3(at.z, at.y, at.x) : at;
     const std::string path =
-        fmt::format("{}/{}{}{}{}{}{}{}", head_.folder, head_.before, name.x, head_.separator,
-                    name.y, head_.separator, name.z, head_.after);
+        fmt::format("{}/{}{}{}{}{}{}{}", head_.folder, before, name.x, head_.separator, name.y,
+                    head_.separator, name.z, head_.after);
     if (::access(path.c_str(), F_OK) != 0) return std::span<const std::byte>();
     const auto file = detail::InputBytes::open(path, context_.execution.memory_limit);
     if (!file) return tl::unexpected(file.error());
     const std::string_view packed = file->view();
-    bytes_.resize(head_.chunk_bytes());
+    bytes_.resize(bytes);
     if (head_.packing == Packing::kNone) {
       if (packed.size() != bytes_.size()) {
         return fail(ErrorCode::kInput, "{}: {} bytes; a chunk has {}", path, packed.size(),
@@ -219,10 +241,9 @@ class ChunkReader {
     return std::span<const std::byte>(bytes_);
   }
 
- private:
   ReadContext& context_;
   const ZarrHead& head_;
-  std::vector<std::byte> bytes_;
+  std::vector<std::byte> bytes_, colours_;
 };
 
 /// Ids and booleans: the tiles above which a column of chunks lies.
@@ -438,6 +459,9 @@ Result<VoxelVolume> read_ome_zarr_voxels(ReadContext& context) {
                 path, order.substr(0, 40));
   }
   Result<VoxelVolume> volume = read_array(context, context.path + "/" + name->text, true);
+  if (volume && context.colours) {
+    volume->notes.push_back("its four channels are shown as red, green, blue and alpha");
+  }
   if (volume && json->find("direction") != nullptr) {
     volume->notes.push_back("the file turns the grid; it is shown along its own axes");
   }
