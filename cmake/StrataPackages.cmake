@@ -133,6 +133,19 @@ It draws with the processor or with OpenGL 4.5; the pictures are the same."
   set(CPACK_DEBIAN_STRATA-VIEW_PACKAGE_SUGGESTS "openscad")
 endif()
 
+if(TARGET strata-mpi)
+  strata_package(strata-mpi strata-mpi science
+"voxels of meshes, made by the ranks of an MPI job
+Strata MPI makes the same files as strata voxelize, by many processes on one
+machine or on several: the ranks take parts of the grid from a counter, and
+each writes what it made.
+.
+It is started by mpirun or by a batch system."
+    libcli11-dev libexpected-dev libglm-dev nlohmann-json3-dev)
+  set(CPACK_DEBIAN_STRATA-MPI_PACKAGE_RECOMMENDS "openmpi-bin")
+  set(CPACK_DEBIAN_STRATA-MPI_PACKAGE_SUGGESTS "strata")
+endif()
+
 strata_package(dev libstrata-dev libdevel
 "C++ library of solids as sorted depth lists: headers and archives
 The library voxelizes meshes, evaluates Boolean trees, draws and measures
