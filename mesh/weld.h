@@ -220,9 +220,42 @@ bool weld_one_by_one(std::size_t count, Index&& index, Load&& load, Own&& own, G
   return true;
 }
 
+/// Welds the points of some indices on all threads; each has those whose hash falls to it.
+/// @param index  as for weld_one_by_one() @return number of different positions
+template <class Scalar, class Index, class Load, class GoOn>
+std::size_t weld_by_hash(const Execution& execution, std::size_t parts, std::size_t count,
+                         Index&& index, Load&& load, GoOn&& go_on, std::uint32_t* first,
+                         std::size_t expected) {
+  std::atomic<std::size_t> different = 0;
+  parallel_for(execution, parts, [&](std::size_t part, int) {
+    std::size_t own = 0;
+    (void)weld_one_by_one<Scalar>(
+        count, index, load, [&](std::uint64_t hash) { return (hash >> 48) * parts >> 16 == part; },
+        go_on, first, expected / parts, [&own](std::uint32_t) { ++own; });
+    different += own;
+  });
+  return different;
+}
+
+/// Whether most of the first points equal one of a few before them, as in the files of most meshes.
+template <class Scalar, class Load>
+bool neighbours_follow(std::size_t count, Load&& load) {
+  constexpr std::size_t kLooks = std::size_t{1} << 15;
+  RecentKeys<Scalar> recent;
+  const std::size_t looks = std::min(count, kLooks);
+  std::size_t met = 0;
+  for (std::size_t i = 0; i < looks; ++i) {
+    const WeldBits<Scalar> key(WeldTable<Scalar>::canonical(load(i)));
+    std::uint32_t known = 0;
+    met += recent.replace(key, key.hash(), static_cast<std::uint32_t>(i), known) ? 1 : 0;
+  }
+  return met > looks / 2;
+}
+
 /// Sets first[i], for every i in [0, count), to the least j whose position equals that of i. Each
 /// thread welds a range of its own. Then it owns, of the positions that are left, those whose hash
-/// falls to it. So the result does not depend on the number of threads.
+/// falls to it; at once, if points that are equal lie far apart. So the result does not depend on
+/// the number of threads.
 /// @param load  load(i) -> glm::vec<3, Scalar> @pre count < 2^32 - 1
 /// @param go_on  go_on(i) is called now and then by all threads; after it returns false, `first`
 /// stays incomplete
@@ -236,10 +269,15 @@ std::size_t weld_first(
   all.stop = {};  // a skipped block would leave its corners unset
   std::vector<std::vector<std::uint32_t>> firsts(parts);  // of each range
   std::vector<std::size_t> different(parts);
+  // A closed mesh has one vertex for six corners.
+  if (parts > 1 && !neighbours_follow<Scalar>(count, load)) {
+    return weld_by_hash<Scalar>(
+        all, parts, count, [](std::size_t k) { return static_cast<std::uint32_t>(k); }, load, go_on,
+        first, count / 5);
+  }
   std::atomic<bool> stopped = false;
   parallel_for(all, parts, [&](std::size_t part, int) {
     const std::size_t begin = count * part / parts, end = count * (part + 1) / parts;
-    // A closed mesh has one vertex for six corners.
     const std::size_t expected = (end - begin) / 5;
     if (parts > 1) reserve_large(firsts[part], expected);
     const bool done = weld_one_by_one<Scalar>(
@@ -259,14 +297,9 @@ std::size_t weld_first(
     left.insert(left.end(), of_range.begin(), of_range.end());
     of_range = {};
   }
-  parallel_for(all, parts, [&](std::size_t part, int) {
-    different[part] = 0;
-    (void)weld_one_by_one<Scalar>(
-        left.size(), [&](std::size_t k) { return left[k]; }, load,
-        [&](std::uint64_t hash) { return (hash >> 48) * parts >> 16 == part; },
-        [](std::size_t) { return true; }, first, left.size() / parts,
-        [&](std::uint32_t) { ++different[part]; });
-  });
+  const std::size_t total = weld_by_hash<Scalar>(
+      all, parts, left.size(), [&](std::size_t k) { return left[k]; }, load,
+      [](std::size_t) { return true; }, first, left.size());
   parallel_for(all, parts - 1, [&](std::size_t part, int) {
     const std::size_t begin = count * (part + 1) / parts, end = count * (part + 2) / parts;
     for (std::size_t i = begin; i < end; ++i) {
@@ -274,8 +307,6 @@ std::size_t weld_first(
       if (first[i] != least) first[i] = least;  // what other threads read stays untouched
     }
   });
-  std::size_t total = 0;
-  for (const std::size_t n : different) total += n;
   return total;
 }
 
