@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <vector>
 
 #include "strata/raster/raster_target.h"
 
@@ -96,11 +97,39 @@ double slab_bytes(const VoxelGrid& grid, const MemoryFactors& factors, double ar
   return all * share + kThreadBytes * factors.threads;
 }
 
+constexpr int kFieldLayers = 64;  // that signed_distance_slabs() holds at once
+
+/// The share of the area of a mesh in those kFieldLayers layers that have the most of it.
+double densest_share(const TriangleSoup& soup, const VoxelGrid& grid) {
+  constexpr std::size_t kMostLooked = 20'000;  // triangles
+  const std::size_t step = soup.triangles.size() / kMostLooked + 1;
+  std::vector<double> areas(static_cast<std::size_t>(grid.dims.z / kFieldLayers) + 1);
+  const auto place = [&](double z) {
+    const double at = (z - grid.origin.z) / (grid.voxel_size.z * kFieldLayers);
+    return static_cast<std::size_t>(std::clamp(at, 0.0, static_cast<double>(areas.size() - 1)));
+  };
+  double sum = 0;
+  for (std::size_t t = 0; t < soup.triangles.size(); t += step) {
+    const glm::uvec3& corners = soup.triangles[t];
+    const glm::dvec3 &a = soup.positions[corners.x], &b = soup.positions[corners.y],
+                     &c = soup.positions[corners.z];
+    const double area = glm::length(glm::cross(b - a, c - a));
+    const std::size_t first = place(std::min({a.z, b.z, c.z}));
+    const std::size_t last = place(std::max({a.z, b.z, c.z}));
+    for (std::size_t i = first; i <= last; ++i) {
+      areas[i] += area / static_cast<double>(last - first + 1);
+    }
+    sum += area;
+  }
+  return sum > 0 ? *std::max_element(areas.begin(), areas.end()) / sum : 1.0;
+}
+
 /// What the distances in a band of `band` voxels take.
 struct DistanceBytes {
   double voxels = 0;  ///< in the band
   double bins = 0;    ///< triangles of each row of tiles, and the mesh on the lattice again
-  double layers = 0;  ///< blocks of the layers that are held at once
+  double held = 0;    ///< the share of the voxels that is held at once
+  double layers = 0;  ///< blocks of these layers
   double output = 0;  ///< of a level set
 };
 
@@ -121,8 +150,11 @@ DistanceBytes distance_bytes(const VoxelGrid& grid, const MemoryFactors& factors
       factors.everywhere ? most : std::min(area * (2 * factors.band + 8) / 512, most);
   constexpr double kTreeBytes = 300;  // a triangle and its share of boxes
   if (factors.everywhere) bytes.bins += triangles * kTreeBytes;
-  const double held = std::min(1.0, (factors.everywhere ? 1.0 : 4.0) * 64 / grid.dims.z);
-  bytes.layers = blocks * held * 2100 + factors.threads * 1e6;
+  const double share = factors.everywhere ? static_cast<double>(kFieldLayers) / grid.dims.z
+                                          : densest_share(*factors.mesh, grid) *
+                                                (1 + (2 * factors.band + 8) / kFieldLayers);
+  bytes.held = std::min(1.0, share);
+  bytes.layers = blocks * bytes.held * 2100 + factors.threads * 1e6;
   bytes.output = blocks * 150 + bytes.voxels * 4;
   return bytes;
 }
@@ -171,10 +203,9 @@ MemoryEstimate estimate_memory(const VoxelGrid& voxels, const MemoryFactors& fac
   if (factors.band > 0) {
     // Other formats than .vdb take runs of a value and a label; of .zarr all are kept, twice.
     const double runs = distances.voxels * 8;
-    const double slab = std::min(1.0, (factors.everywhere ? 1.0 : 4.0) * 64 / grid.dims.z);
     output = factors.format == "vdb"    ? distances.output
              : factors.format == "zarr" ? output + 2 * runs
-                                        : output + runs * slab;
+                                        : output + runs * distances.held;
   }
   estimate.output = rounded(factors.format.empty() ? 0 : output);
   return estimate;
