@@ -36,15 +36,37 @@ TileKey<Record> make_key(std::uint32_t depth, bool exit, std::uint32_t triangle)
   }
 }
 
+/// DepthItems of a vector of depths and surfaces.
+template <class D64, class V32>
+HWY_INLINE hn::Vec<D64> pack_items(D64 d, V32 depth, V32 surface) {
+  return hn::Or(hn::ShiftLeft<32>(hn::PromoteTo(d, depth)), hn::PromoteTo(d, surface));
+}
+
+/// Fragments of small triangles on their way into a table, as records of age 1.
+template <class Record>
+struct WaitingRecords {
+  /// Fragments that a call of make_room() asks for, and a vector beyond them.
+  static constexpr std::size_t kMore = (SetupBatch::kLaneSide + 1) * kMaxLanes;
+  static constexpr std::size_t kRoom = 1024;
+  static_assert(kRoom > kMore);
+  std::uint32_t pixels[kRoom];
+  typename Record::Word records[kRoom];
+};
+
 /// Inserts covered pixels into the tile's HA-buffer.
 template <class Record>
 class TableSink {
  public:
   using Bits = typename Record::Word;
   static constexpr bool kKeys = Record::kPayloadBits == 0;
+  static constexpr bool kTakesLanes = true;
+  using Waiting = WaitingRecords<Record>;
 
-  TableSink(TileTable<Record>& table, const PixelRect& clip, BlockAges ages = {})
+  /// @param waiting  needed for put_lanes()
+  TableSink(TileTable<Record>& table, const PixelRect& clip, BlockAges ages = {},
+            Waiting* waiting = nullptr)
       : table_(&table),
+        waiting_(waiting),
         ages_(ages),
         cells_(table.cells.data()),
         planes_(std::min(table.planes, static_cast<int>(Record::kAgeMax))),
@@ -87,6 +109,29 @@ class TableSink {
     const Bits key = bits_of(make_key<Record>(depth, exit_, triangle_));
     table_->insert(pixel_at(u, v), (~key & kValueMask<Record>) | Record::kAgeUnit);
   }
+  HWY_INLINE void begin_lanes(int row_begin, int row_end) { result_.add_rows(row_begin, row_end); }
+  HWY_INLINE void make_room() {
+    if (waiting_count_ + Waiting::kMore > Waiting::kRoom) insert_waiting();
+  }
+  /// Keeps fragments, which insert_waiting() inserts word by word: short rows, inserted as vectors,
+  /// would wait for the words that the neighbouring triangle has just stored.
+  template <class D, class V = hn::Vec<D>>
+  HWY_INLINE void put_lanes(D d, V pixel, V depth, V surface, hn::Mask<D> covered) {
+    hn::StoreU(hn::Compress(pixel, covered), d, waiting_->pixels + waiting_count_);
+    if constexpr (kKeys) {
+      const auto nearest =
+          hn::Sub(hn::Set(d, Record::kAgeUnit + kValueMask<Record>), hn::ShiftRight<31>(surface));
+      hn::StoreU(hn::Compress(hn::Sub(nearest, hn::ShiftLeft<1>(depth)), covered), d,
+                 waiting_->records + waiting_count_);
+    } else {
+      const hn::RebindToUnsigned<LaneF64> d64;
+      const auto items =
+          pack_items(d64, hn::Compress(depth, covered), hn::Compress(surface, covered));
+      hn::StoreU(hn::Sub(hn::Set(d64, Record::kAgeUnit + kValueMask<Record>), items), d64,
+                 waiting_->records + waiting_count_);
+    }
+    waiting_count_ += hn::CountTrue(d, covered);
+  }
   /// Inserts fragments one by one, and neighbours that follow each other at once.
   void put_all(std::span<const std::uint32_t> pixels, std::span<const DepthItem> items) {
     const hn::ScalableTag<std::uint64_t> d;
@@ -116,6 +161,7 @@ class TableSink {
     }
   }
   TileRasterResult finish() {
+    if (waiting_count_ > 0) insert_waiting();
     // The first two planes are not watched: the bound may be 2 where the tile is one layer deep.
     const int first = result_.fragments > 0 ? std::min(planes_, 2) : 0;
     table_->oldest = std::max({table_->oldest, oldest_, first});
@@ -123,6 +169,48 @@ class TableSink {
   }
 
  private:
+  /// Inserts what put_lanes() kept.
+  HWY_INLINE void insert_waiting() {
+    result_.fragments += waiting_count_;
+    oldest_ = std::max(oldest_, insert_each(*table_, waiting_->pixels, waiting_->records,
+                                            waiting_count_, planes_));
+    waiting_count_ = 0;
+  }
+  /// @return the largest age beyond the second plane. Static, so that the sink's members may stay
+  /// in registers.
+  static HWY_NOINLINE int insert_each(TileTable<Record>& table, const std::uint32_t* pixels,
+                                      const Bits* records, std::size_t count, int planes) {
+    if (planes < 2) {
+      for (std::size_t i = 0; i < count; ++i) table.insert(pixels[i], records[i]);
+      return 0;
+    }
+    int oldest = 0;
+    Bits* const cells = table.cells.data();
+    const auto exchange = [](Bits& cell, Bits record) {  // see insert()
+      const Bits less = std::min(cell, record);
+      cell = std::max(cell, record);
+      return less != 0 ? less + Record::kAgeUnit : less;
+    };
+    for (std::size_t i = 0; i < count; ++i) {
+      Bits* cell = cells + pixels[i];
+      // Both are loaded before one is stored: their addresses agree in the bits by which a
+      // processor guesses that a load needs what a store writes.
+      Bits first = cell[0], second = cell[kTilePixels];
+      Bits carry = exchange(second, exchange(first, records[i]));
+      cell[0] = first;
+      cell[kTilePixels] = second;
+      if (HWY_LIKELY(carry == 0)) continue;
+      int age = 2;
+      while (carry != 0 && age < planes) {
+        cell += kTilePixels;
+        carry = exchange(cell[kTilePixels], carry);
+        ++age;
+      }
+      oldest = std::max(oldest, age);
+      if (carry != 0) overflow_one(table, pixels[i], carry, BlockAges{});
+    }
+    return oldest;
+  }
   /// Pixels that follow each other from the first on.
   static std::size_t run_length(const std::uint32_t* pixels, std::size_t most) {
     std::size_t run = 1;
@@ -193,17 +281,22 @@ class TableSink {
     alignas(64) Bits records[HWY_MAX_BYTES / sizeof(Bits)];
     hn::Store(carry, d, records);
     for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
-      if (records[i] == 0) continue;
-      // After plane 255 the age field has wrapped into nothing: such a record is lost and counted.
-      if (table.planes >= static_cast<int>(Record::kAgeMax)) {
-        ++table.failures;
-      } else {
-        table.insert(pixel + i, records[i], ages);
-      }
+      if (records[i] != 0) overflow_one(table, pixel + i, records[i], ages);
+    }
+  }
+  static void overflow_one(TileTable<Record>& table, std::size_t pixel, Bits record,
+                           BlockAges ages) {
+    // After plane 255 the age field has wrapped into nothing: such a record is lost and counted.
+    if (table.planes >= static_cast<int>(Record::kAgeMax)) {
+      ++table.failures;
+    } else {
+      table.insert(pixel, record, ages);
     }
   }
 
   TileTable<Record>* table_;
+  Waiting* waiting_;
+  std::size_t waiting_count_ = 0;
   BlockAges ages_;
   Bits* cells_;
   int planes_, oldest_ = 0;
@@ -218,17 +311,14 @@ class TableSink {
 template <class Record>
 class LogSink {
  public:
+  static constexpr bool kTakesLanes = true;
   LogSink(TileLog<Record>& log, const PixelRect& clip)
       : log_(&log), count_(log.count), clip_(clip) {}
   HWY_INLINE void begin(bool exit, std::uint32_t triangle, const PixelRect& box) {
     exit_ = exit;
     triangle_ = triangle;
     result_.add_rows(box.v0 - clip_.v0, box.v1 - clip_.v0);
-    log_->count = count_;
-    log_->reserve(static_cast<std::size_t>(box.u1 - box.u0) *
-                  static_cast<std::size_t>(box.v1 - box.v0));
-    pixels_ = log_->pixels.data();
-    keys_ = log_->keys.data();
+    reserve(static_cast<std::size_t>(box.u1 - box.u0) * static_cast<std::size_t>(box.v1 - box.v0));
   }
   template <class D, class V = hn::Vec<D>>
   HWY_INLINE V encode(D d, V depth, hn::Mask<D> covered) const {
@@ -242,6 +332,21 @@ class LogSink {
     pixels_[count_] = static_cast<std::uint32_t>((v - clip_.v0) * kTileSide + (u - clip_.u0));
     keys_[count_++] = make_key<Record>(depth, exit_, triangle_);
   }
+  HWY_INLINE void begin_lanes(int row_begin, int row_end) { result_.add_rows(row_begin, row_end); }
+  HWY_INLINE void make_room() { reserve(SetupBatch::kLaneSide * kMaxLanes); }
+  template <class D, class V = hn::Vec<D>>
+  HWY_INLINE void put_lanes(D d, V pixel, V depth, V surface, hn::Mask<D> covered) {
+    hn::StoreU(hn::Compress(pixel, covered), d, pixels_ + count_);
+    if constexpr (Record::kPayloadBits == 0) {
+      const auto key = hn::Or(hn::ShiftLeft<1>(depth), hn::ShiftRight<31>(surface));
+      hn::StoreU(hn::Compress(key, covered), d, keys_ + count_);
+    } else {
+      const hn::RebindToUnsigned<LaneF64> d64;
+      hn::StoreU(pack_items(d64, hn::Compress(depth, covered), hn::Compress(surface, covered)), d64,
+                 &keys_[count_].bits);
+    }
+    count_ += hn::CountTrue(d, covered);
+  }
   TileRasterResult finish() {
     log_->count = count_;
     result_.fragments = count_;
@@ -249,6 +354,12 @@ class LogSink {
   }
 
  private:
+  HWY_INLINE void reserve(std::size_t more) {
+    log_->count = count_;
+    log_->reserve(more);
+    pixels_ = log_->pixels.data();
+    keys_ = log_->keys.data();
+  }
   template <int columns>
   HWY_INLINE void put_row(int u, int v, const std::uint32_t* words) {
     const hn::CappedTag<std::uint32_t, columns> d;
@@ -296,7 +407,8 @@ class LogSink {
 
 template <class Record>
 TileRasterResult raster_table(const TileInput& input, TileTable<Record>& table) {
-  TableSink<Record> sink(table, input.clip);
+  WaitingRecords<Record> waiting;
+  TableSink<Record> sink(table, input.clip, {}, &waiting);
   rasterize_triangles(input.mesh, input.target, input.triangles, input.clip, sink);
   return sink.finish();
 }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <new>
 #include <span>
 #include <vector>
 
@@ -13,6 +14,21 @@
 
 namespace strata {
 
+/// Memory that begins with a cache line, so that vectors of cells do not straddle two.
+template <class T>
+struct LineAllocator {
+  using value_type = T;
+  static constexpr std::align_val_t kLine{64};
+  LineAllocator() = default;
+  template <class Other>
+  explicit LineAllocator(const LineAllocator<Other>&) {}
+  T* allocate(std::size_t count) {
+    return static_cast<T*>(::operator new(count * sizeof(T), kLine));
+  }
+  void deallocate(T* memory, std::size_t) { ::operator delete(memory, kLine); }
+  friend bool operator==(const LineAllocator&, const LineAllocator&) { return true; }
+};
+
 /// The HA-buffer of one tile, with plain stores; see strata/hashbuffer/table_law.h.
 template <class Record>
 struct TileTable {
@@ -20,7 +36,7 @@ struct TileTable {
   /// Cells behind the table that blocks of pixels may touch, without changing them.
   static constexpr std::size_t kPadding = 8 * kTileSide;
 
-  std::vector<Bits> cells;
+  std::vector<Bits, LineAllocator<Bits>> cells;
   std::size_t size = 0;                ///< cells of the table
   int planes = 0;                      ///< ages 1..planes have the offsets (age - 1) * kTilePixels
   std::vector<std::uint32_t> offsets;  ///< by age, for ages beyond the planes

@@ -99,23 +99,33 @@ class SetupBatch {
  public:
   enum class Kind : std::int32_t { kNothing = 0, kDirect = 1, kLarge = 2 };
 
-  /// Sets up the triangles `ids`, at most one a lane, of `mesh` in the pixels of `clip`.
-  HWY_INLINE void load(const LatticeMesh& mesh, std::span<const std::uint32_t> ids,
-                       const AxisFrame& frame, const PixelRect& clip, std::uint32_t depth_limit) {
-    const LaneF64 df;
-    const LaneI32 di;
-    const std::size_t count = ids.size();
-    alignas(64) std::int32_t corner[3][3][kMaxLanes];  // [vertex][u, v, w][lane]
-    for (std::size_t lane = 0; lane < count; ++lane) {
-      const glm::uvec3& triangle = mesh.triangles[ids[lane]];
-      for (int i = 0; i < 3; ++i) {
-        const glm::ivec3& p = mesh.vertices[triangle[i]];
-        corner[i][0][lane] = p[frame.u];
-        corner[i][1][lane] = p[frame.v];
-        corner[i][2][lane] = p[frame.w];
+  /// The corners of a vector of triangles.
+  struct Corners {
+    alignas(64) std::int32_t at[3][3][kMaxLanes] = {};  ///< [vertex][u, v, w][lane]
+
+    /// Collects those of the triangles `ids`, at most one a lane.
+    HWY_INLINE void gather(const LatticeMesh& mesh, std::span<const std::uint32_t> ids,
+                           const AxisFrame& frame) {
+      for (std::size_t lane = 0; lane < ids.size(); ++lane) {
+        const glm::uvec3& triangle = mesh.triangles[ids[lane]];
+        for (int i = 0; i < 3; ++i) {
+          const glm::ivec3& p = mesh.vertices[triangle[i]];
+          at[i][0][lane] = p[frame.u];
+          at[i][1][lane] = p[frame.v];
+          at[i][2][lane] = p[frame.w];
+        }
       }
     }
-    const auto get = [&](int i, int axis) { return hn::Load(di, corner[i][axis]); };
+  };
+
+  /// Sets up `count` triangles, at most one a lane, in the pixels of `clip`.
+  /// @tparam by_lanes  triangles are chosen for cover_lanes(), not for small()
+  template <bool by_lanes>
+  HWY_INLINE void load(const Corners& corners, std::size_t count, const AxisFrame& frame,
+                       const PixelRect& clip, std::uint32_t depth_limit) {
+    const LaneF64 df;
+    const LaneI32 di;
+    const auto get = [&](int i, int axis) { return hn::Load(di, corners.at[i][axis]); };
     const VecI32 u0 = get(0, 0), v0 = get(0, 1), w0 = get(0, 2);
     VecI32 iu1 = hn::Sub(get(1, 0), u0), iv1 = hn::Sub(get(1, 1), v0), iw1 = hn::Sub(get(1, 2), w0);
     VecI32 iu2 = hn::Sub(get(2, 0), u0), iv2 = hn::Sub(get(2, 1), v0), iw2 = hn::Sub(get(2, 2), w0);
@@ -139,10 +149,11 @@ class SetupBatch {
     const VecI32 box_u1 = hn::Min(hn::Set(di, clip.u1), end(hn::Add(u0, u_high)));
     const VecI32 box_v0 = hn::Max(hn::Set(di, clip.v0), first(hn::Add(v0, v_low)));
     const VecI32 box_v1 = hn::Min(hn::Set(di, clip.v1), end(hn::Add(v0, v_high)));
-    const auto covers = hn::And(hn::Lt(box_u0, box_u1), hn::Lt(box_v0, box_v1));
-    const VecI32 most = hn::Set(di, kSmallSide + 1);
-    const auto small =
-        hn::And(hn::Lt(hn::Sub(box_u1, box_u0), most), hn::Lt(hn::Sub(box_v1, box_v0), most));
+    const auto covers =
+        hn::And(hn::FirstN(di, count), hn::And(hn::Lt(box_u0, box_u1), hn::Lt(box_v0, box_v1)));
+    const VecI32 most = hn::Set(di, (by_lanes ? kLaneSide : kSmallSide) + 1);
+    const VecI32 width = hn::Sub(box_u1, box_u0), height = hn::Sub(box_v1, box_v0);
+    const auto small = hn::And(hn::Lt(width, most), hn::Lt(height, most));
     const VecI32 u_extent = hn::Sub(u_high, u_low), v_extent = hn::Sub(v_high, v_low),
                  w_extent = hn::Sub(w_high, w_low);
     const VecF64 volume = hn::Mul(hn::Mul(hn::PromoteTo(df, u_extent), hn::PromoteTo(df, v_extent)),
@@ -216,8 +227,11 @@ class SetupBatch {
         hn::DemoteTo(di, hn::IfThenElseZero(hn::Eq(area, zero_f), one_f));  // exact if direct
     const VecI32 kind = hn::IfThenElse(direct, hn::Sub(one, flat), hn::Set(di, 2));
     hn::Store(hn::IfThenElseZero(covers, kind), di, kind_);
-    // It pays for a few of the lanes no more than one by one.
-    if (hn::CountTrue(di, hn::And(hn::And(small, direct), covers)) * 2 < hn::Lanes(di)) {
+    if constexpr (by_lanes) {
+      choose_lanes(hn::And(hn::And(small, covers), hn::Eq(kind, one)), width, height,
+                   hn::IfThenElseZero(covers, kind));
+    } else if (hn::CountTrue(di, hn::And(hn::And(small, direct), covers)) * 2 < hn::Lanes(di)) {
+      // It pays for a few of the lanes no more than one by one.
       hn::Store(zero, di, small_);
     } else {
       cover_small(hn::And(hn::And(small, direct), covers), box_u1, box_v1, depth_limit);
@@ -238,6 +252,64 @@ class SetupBatch {
   static constexpr std::uint32_t kSmall = 1u << (kSmallSide * kSmallSide);
   [[nodiscard]] HWY_INLINE std::uint32_t small_depth(std::size_t lane, int pixel) const {
     return static_cast<std::uint32_t>(small_depth_[pixel][lane]);
+  }
+  /// Boxes up to this side may be covered by cover_lanes().
+  static constexpr int kLaneSide = 16;
+  /// Whether any triangle is left, besides those that cover_lanes() takes.
+  [[nodiscard]] HWY_INLINE bool any_left() const { return any_left_; }
+  /// Hands the fragments of the chosen triangles to `sink`: a pixel of each box at a time, so that
+  /// a triangle takes no branch. sink.begin_lanes(row_begin, row_end) comes first; sink.make_room()
+  /// announces at most kLaneSide calls of sink.put_lanes(pixel, depth, surface, covered), all
+  /// vectors of a lane a triangle. A pixel counts from that of `clip`, kTileSide a row; a surface
+  /// is DepthItem's.
+  template <class Sink>
+  HWY_INLINE void cover_lanes(std::span<const std::uint32_t> ids, const PixelRect& clip,
+                              std::uint32_t depth_limit, Sink& sink) {
+    if (lane_columns_ == 0) return;
+    const LaneF64 df;
+    const LaneI32 di;
+    const hn::RebindToUnsigned<LaneI32> du;
+    for (std::size_t lane = 0; lane < ids.size(); ++lane) surface_[lane] = ids[lane];
+    const VecI32 zero = hn::Zero(di);
+    const VecI32 width = hn::Load(di, lane_width_), height = hn::Load(di, lane_height_);
+    const VecI32 box_u0 = hn::Load(di, box_u0_), box_v0 = hn::Load(di, box_v0_);
+    const auto surface =
+        hn::Or(hn::Load(du, surface_), hn::ShiftLeft<31>(hn::BitCast(du, hn::Load(di, exit_))));
+    const VecI32 deepest = hn::Set(di, static_cast<std::int32_t>(depth_limit - 1));
+    const VecI32 base = hn::Load(di, quotient_);
+    const VecF64 inverse = hn::Load(df, inverse_), remainder_u = hn::Load(df, remainder_u_),
+                 remainder_v = hn::Load(df, remainder_v_);
+    VecI32 row_edge0 = hn::Load(di, edge_[0]), row_edge1 = hn::Load(di, edge_[1]),
+           row_edge2 = hn::Load(di, edge_[2]);
+    VecF64 row_remainder = hn::Load(df, remainder_);
+    VecI32 row_pixel = hn::Add(hn::ShiftLeft<6>(hn::Sub(box_v0, hn::Set(di, clip.v0))),
+                               hn::Sub(box_u0, hn::Set(di, clip.u0)));
+    static_assert(kTileSide == 1 << 6);
+    sink.begin_lanes(lane_row_begin_ - clip.v0, lane_row_end_ - clip.v0);
+    for (int y = 0; y < lane_rows_; ++y) {
+      sink.make_room();
+      const auto in_rows = hn::Lt(hn::Set(di, y), height);
+      VecI32 edge0 = row_edge0, edge1 = row_edge1, edge2 = row_edge2, pixel = row_pixel;
+      VecF64 remainder = row_remainder;
+      for (int x = 0; x < lane_columns_; ++x) {
+        const auto covered = hn::AndNot(hn::Lt(hn::Or3(edge0, edge1, edge2), zero),
+                                        hn::And(in_rows, hn::Lt(hn::Set(di, x), width)));
+        const VecI32 depth = hn::Add(base, hn::DemoteTo(di, hn::Mul(remainder, inverse)));
+        sink.put_lanes(du, hn::BitCast(du, pixel),
+                       hn::BitCast(du, hn::Min(hn::Max(depth, zero), deepest)), surface,
+                       hn::RebindMask(du, covered));
+        edge0 = hn::Add(edge0, hn::Load(di, edge_u_[0]));
+        edge1 = hn::Add(edge1, hn::Load(di, edge_u_[1]));
+        edge2 = hn::Add(edge2, hn::Load(di, edge_u_[2]));
+        remainder = hn::Add(remainder, remainder_u);
+        pixel = hn::Add(pixel, hn::Set(di, 1));
+      }
+      row_edge0 = hn::Add(row_edge0, hn::Load(di, edge_v_[0]));
+      row_edge1 = hn::Add(row_edge1, hn::Load(di, edge_v_[1]));
+      row_edge2 = hn::Add(row_edge2, hn::Load(di, edge_v_[2]));
+      row_remainder = hn::Add(row_remainder, remainder_v);
+      row_pixel = hn::Add(row_pixel, hn::Set(di, kTileSide));
+    }
   }
   [[nodiscard]] HWY_INLINE bool exit(std::size_t lane) const { return exit_[lane] != 0; }
   /// Depth steps that a lattice step along u and one along v make together, about.
@@ -295,8 +367,38 @@ class SetupBatch {
     hn::Store(hn::IfThenElseZero(chosen, bits), di, small_);
   }
 
+  /// Chooses the lanes of cover_lanes(), all of `small` or none; `kind` says which there are.
+  HWY_INLINE void choose_lanes(hn::Mask<LaneI32> small, VecI32 width, VecI32 height, VecI32 kind) {
+    const LaneI32 di;
+    const VecI32 lane_width = hn::IfThenElseZero(small, width),
+                 lane_height = hn::IfThenElseZero(small, height);
+    lane_columns_ = hn::GetLane(hn::MaxOfLanes(di, lane_width));
+    lane_rows_ = hn::GetLane(hn::MaxOfLanes(di, lane_height));
+    // A triangle by itself costs about as much as that many pixels of all lanes.
+    const auto chosen = static_cast<int>(hn::CountTrue(di, small));
+    if (lane_columns_ * lane_rows_ > kPixelsATriangle * chosen) {
+      lane_columns_ = 0;
+      any_left_ = true;
+      return;
+    }
+    hn::Store(lane_width, di, lane_width_);
+    hn::Store(lane_height, di, lane_height_);
+    const VecI32 v0 = hn::Load(di, box_v0_), v1 = hn::Load(di, box_v1_);
+    lane_row_begin_ = hn::GetLane(
+        hn::MinOfLanes(di, hn::IfThenElse(small, v0, hn::Set(di, std::int32_t{1} << 30))));
+    lane_row_end_ = hn::GetLane(hn::MaxOfLanes(di, hn::IfThenElseZero(small, v1)));
+    const VecI32 left = hn::IfThenZeroElse(small, kind);
+    hn::Store(left, di, kind_);
+    any_left_ = !hn::AllTrue(di, hn::Eq(left, hn::Zero(di)));
+  }
+
+  static constexpr int kPixelsATriangle = 16;
+  int lane_columns_ = 0, lane_rows_ = 0, lane_row_begin_ = 0, lane_row_end_ = 0;
+  bool any_left_ = true;
   template <class T>
   using Lanes = T[kMaxLanes];
+  alignas(64) Lanes<std::int32_t> lane_width_, lane_height_;
+  alignas(64) Lanes<std::uint32_t> surface_ = {};
   alignas(64) Lanes<double> remainder_, remainder_u_, remainder_v_, inverse_, steepness_;
   alignas(64) Lanes<std::int32_t> edge_[3], edge_u_[3], edge_v_[3], quotient_, kind_, exit_;
   alignas(64) Lanes<std::int32_t> small_, small_depth_[kSmallSide * kSmallSide];
@@ -388,6 +490,7 @@ HWY_INLINE void rasterize_box(const TileEquations& q, const PixelRect& box,
   const VecF64 remainder_v = hn::Set(df, q.remainder_v * rows);
   const VecF64 quotient_v = hn::Set(df, split ? q.quotient_v * rows : 0.0);
 
+  // Blocks begin at multiples of their width, so that what one stores another loads as it is.
   for (int u = box.u0; u < box.u1; u += columns) {
     const int step = u - box.u0;
     RowRange range{0, box.v1 - box.v0};
@@ -475,11 +578,24 @@ HWY_INLINE void rasterize_triangles(const LatticeMesh& mesh, const RasterTarget&
                                     Sink& sink) {
   const AxisFrame frame(target.axis);
   const std::size_t lanes = hn::Lanes(LaneF64());
+  constexpr bool kByLanes = requires { Sink::kTakesLanes; };
   SetupBatch batch;
   TileEquations equations;
-  for (std::size_t begin = 0; begin < ids.size(); begin += lanes) {
-    const auto part = ids.subspan(begin, std::min(lanes, ids.size() - begin));
-    batch.load(mesh, part, frame, clip, target.depth_limit);
+  const auto part_at = [&](std::size_t begin) {
+    return ids.subspan(begin, std::min(lanes, ids.size() - begin));
+  };
+  // Collected one vector ahead: what was just stored word by word cannot be loaded as a vector yet.
+  SetupBatch::Corners corners[2];
+  corners[0].gather(mesh, part_at(0), frame);
+  int turn = 0;
+  for (std::size_t begin = 0; begin < ids.size(); begin += lanes, turn ^= 1) {
+    const auto part = part_at(begin);
+    if (begin + lanes < ids.size()) corners[turn ^ 1].gather(mesh, part_at(begin + lanes), frame);
+    batch.load<kByLanes>(corners[turn], part.size(), frame, clip, target.depth_limit);
+    if constexpr (kByLanes) {
+      batch.cover_lanes(part, clip, target.depth_limit, sink);
+      if (!batch.any_left()) continue;
+    }
     for (std::size_t lane = 0; lane < part.size(); ++lane) {
       const auto kind = batch.kind(lane);
       if (kind == SetupBatch::Kind::kNothing) continue;
@@ -490,7 +606,7 @@ HWY_INLINE void rasterize_triangles(const LatticeMesh& mesh, const RasterTarget&
         if constexpr (kChooses) {
           if (!sink.wants(batch.exit(lane))) continue;
         }
-        const std::uint32_t small = batch.small(lane);
+        const std::uint32_t small = kByLanes ? 0 : batch.small(lane);
         if (small == SetupBatch::kSmall) continue;  // between the pixel centres
         if constexpr (kTellSteepness) sink.steepness(batch.steepness(lane));
         sink.begin(batch.exit(lane), part[lane], box);

@@ -347,6 +347,59 @@ TEST(TileLists, DoNotDependOnTheTilesBuiltBefore) {
   }
 }
 
+TEST(TileLists, AreExactForSmallTrianglesTakenTogether) {
+  // Vectors of triangles of up to `side` pixels and a few larger or empty ones among them: corners
+  // anywhere, on pixel centres, or all in a row.
+  Maker maker(8);
+  for (const int side : {1, 2, 3, 5, 9, 15, 17, 20}) {
+    for (const int step : {1, 64, 128}) {
+      for (const Axis axis : {Axis::kX, Axis::kY, Axis::kZ}) {
+        const RasterTarget target{axis, 90, 75, 1 << 16};
+        const AxisFrame frame(axis);
+        Scene scene;
+        const int count = maker.pick(1, 400);
+        for (int i = 0; i < count; ++i) {
+          const int largest = (maker.pick(0, 15) == 0 ? 40 : side) * 256;
+          const bool flat = maker.pick(0, 15) == 0;
+          glm::ivec3 p[3];
+          const int u = maker.pick(-300, 91 * 256), v = maker.pick(-300, 76 * 256);
+          const int w = maker.pick(-2000, 67'000);
+          for (glm::ivec3& corner : p) {
+            const int along = maker.pick(0, largest);
+            corner[frame.u] = (u + along) / step * step;
+            corner[frame.v] = (v + (flat ? along : maker.pick(0, largest))) / step * step;
+            corner[frame.w] = w + maker.pick(0, 3000) / step * step;
+          }
+          scene.add(p[0], p[1], p[2]);
+        }
+        SCOPED_TRACE(std::to_string(side) + ", " + std::to_string(step));
+        expect_exact<DepthKey>(scene, target, side == 3);
+        expect_exact<DepthItem>(scene, target, side == 3);
+        if (HasFailure()) return;
+      }
+    }
+  }
+}
+
+TEST(TileLists, AreExactForManyLayersOfSmallTriangles) {
+  // More than the planes of a table hold, and more than its ages count.
+  Maker maker(9);
+  const RasterTarget target{Axis::kZ, 64, 64, 1 << 16};
+  for (const int layers : {3, 9, 40, 70, 260}) {
+    Scene scene;
+    for (int i = 0; i < layers * 16; ++i) {
+      const int u = maker.pick(10, 14) * 256, v = maker.pick(20, 23) * 256;
+      const auto corner = [&] {
+        return glm::ivec3(u + maker.pick(0, 1500), v + maker.pick(0, 1500), maker.pick(0, 60'000));
+      };
+      scene.add(corner(), corner(), corner());
+    }
+    expect_exact<DepthKey>(scene, target, layers <= 9);
+    expect_exact<DepthItem>(scene, target, layers <= 9);
+    if (HasFailure()) return;
+  }
+}
+
 TEST(TileLists, DoNotDependOnTheOrderOfTriangles) {
   Maker maker(7);
   const RasterTarget target{Axis::kY, 66, 65, 1 << 14};
@@ -398,6 +451,44 @@ TEST(TileBins, HoldEachTriangleInEveryTileItCoversAPixelOf) {
       EXPECT_EQ(std::adjacent_find(sorted.begin(), sorted.end()), sorted.end()) << "listed twice";
       const auto& needed = expected[static_cast<std::size_t>(tile)];
       EXPECT_TRUE(std::includes(sorted.begin(), sorted.end(), needed.begin(), needed.end()));
+    }
+  }
+}
+
+TEST(TileBins, HoldTrianglesAtTheBordersOfTheLargestImages) {
+  Maker maker(10);
+  for (const int width : {kMaxGridSide - 1, kMaxGridSide}) {
+    const RasterTarget target{Axis::kZ, width, 70, 1 << 16};
+    const PixelRect image{0, 0, width, 70};
+    Scene scene;
+    for (int i = 0; i < 4000; ++i) {
+      const int u = (i % 2 == 0 ? 0 : width * 256) + maker.pick(-3000, 3000);
+      const int v = maker.pick(-600, 70 * 256 + 600);
+      const auto corner = [&] {
+        return glm::ivec3(u + maker.pick(0, 900), v + maker.pick(0, 900), maker.pick(0, 999));
+      };
+      scene.add(corner(), corner(), corner());
+    }
+    const LatticeMesh mesh = scene.lattice();
+    const auto bins = bin_triangles(mesh, target);
+    ASSERT_TRUE(bins.has_value());
+    std::vector<int> tiles_of(mesh.triangles.size());
+    for (const std::uint32_t triangle : bins->triangles) ++tiles_of[triangle];
+    const AxisFrame frame(target.axis);
+    for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
+      const glm::uvec3& t = mesh.triangles[i];
+      TriangleSetup setup;
+      if (!setup_triangle(mesh.vertices[t.x], mesh.vertices[t.y], mesh.vertices[t.z], frame,
+                          setup)) {
+        continue;
+      }
+      if (pixel_bounds(setup, image).empty() && width < kMaxGridSide) {
+        EXPECT_EQ(tiles_of[i], 0) << "covers no centre of the image";
+      }
+      rasterize_exact(setup, image, 1 << 16, [&](int u, int v, std::uint32_t) {
+        const auto found = bins->tile(u / kTileSide, v / kTileSide);
+        EXPECT_NE(std::find(found.begin(), found.end(), i), found.end()) << u << ", " << v;
+      });
     }
   }
 }
