@@ -68,25 +68,82 @@ HWY_INLINE int walk_columns(const std::uint32_t* cell, int ages, bool histogram,
   return age;
 }
 
+/// Room for `more` intervals behind the first `count`.
+HWY_INLINE std::uint32_t* room_for(std::size_t more, std::uint32_t count, TileIntervals& out) {
+  if (out.items.size() < count + more) out.items.resize((count + more) * 2);
+  return reinterpret_cast<std::uint32_t*>(out.items.data()) + count;
+}
+
+/// Hands out at most one interval a column, where `marked`. @return their number, with the `count`
+/// that were there
+HWY_INLINE std::uint32_t hand_out_ones(Vec packed, Mask marked, std::size_t pixel,
+                                       std::uint32_t count, TileIntervals& out) {
+  const Lane d;
+  const std::size_t lanes = hn::Lanes(d);
+  // A whole vector is stored: to store a compressed part takes some processors 100 cycles.
+  hn::StoreU(hn::Compress(packed, marked), d, room_for(lanes, count, out));
+  std::uint32_t* const offsets = out.offsets.data() + pixel;
+  if (hn::AllTrue(d, marked)) {
+    hn::StoreU(hn::Iota(d, count), d, offsets);
+    return count + static_cast<std::uint32_t>(lanes);
+  }
+  std::uint32_t marks[kMaxLanes];
+  hn::StoreU(hn::IfThenElseZero(marked, hn::Set(d, 1)), d, marks);
+  for (std::size_t lane = 0; lane < lanes; ++lane) {
+    offsets[lane] = count;
+    count += marks[lane];
+  }
+  return count;
+}
+
+/// The first voxel behind the crossing in a record.
+HWY_INLINE Vec voxel_of(Vec record) {
+  const Lane d;
+  const Vec key = hn::AndNot(record, hn::Set(d, 0xffffffu));
+  const Vec depth = hn::ShiftRight<1>(key);
+  return hn::ShiftRight<kLatticeBits>(hn::Add(depth, hn::Set(d, std::uint32_t{kLatticeSteps / 2})));
+}
+
+/// Walks columns none of which has more than one crossing that enters and then one that leaves, as
+/// most have. The inside rules agree on those. @return false, and nothing done, if there are others
+HWY_INLINE bool walk_pairs(const std::uint32_t* cell, int ages, bool histogram, std::size_t pixel,
+                           std::uint32_t& count, TileIntervals& out) {
+  const Lane d;
+  const Vec zero = hn::Zero(d), one = hn::Set(d, 1);
+  const Vec enter = hn::LoadU(d, cell);
+  const Mask present = hn::Ne(enter, zero);
+  if (hn::AllFalse(d, present)) {
+    hn::StoreU(hn::Set(d, count), d, out.offsets.data() + pixel);
+    return true;
+  }
+  if (ages < 2) return false;
+  const Vec leave = hn::LoadU(d, cell + kTilePixels);
+  const Vec third = ages > 2 ? hn::LoadU(d, cell + 2 * kTilePixels) : zero;
+  // Records are stored inverted: the lowest bit is set where a ray enters.
+  const Mask other = hn::Ne(hn::Or(third, hn::And(leave, one)), zero);
+  const Mask enters = hn::Ne(hn::And(enter, one), zero);
+  const Mask unpaired = hn::Or(hn::Xor(present, enters), hn::Xor(present, hn::Ne(leave, zero)));
+  if (!hn::AllFalse(d, hn::Or(other, unpaired))) return false;
+  const Vec begin = voxel_of(enter), end = voxel_of(leave);
+  // Absent records count as equally deep.
+  count = hand_out_ones(hn::Or(begin, hn::ShiftLeft<16>(hn::Sub(end, one))), hn::Gt(end, begin),
+                        pixel, count, out);
+  out.counts.max_depth = std::max<std::uint64_t>(out.counts.max_depth, 2);
+  if (histogram) out.counts.histogram[2] += hn::CountTrue(d, present);
+  return true;
+}
+
 /// Hands intervals out column by column. @return their number, with the `count` that were there
 HWY_INLINE std::uint32_t hand_out_columns(const Finished& finished, std::size_t pixel,
                                           std::uint32_t count, TileIntervals& out) {
   const Lane d;
   const std::size_t lanes = hn::Lanes(d);
-  if (out.items.size() < count + (finished.rounds + 1) * lanes) {
-    out.items.resize((count + (finished.rounds + 1) * lanes) * 2);
-  }
-  auto* items = reinterpret_cast<std::uint32_t*>(out.items.data());
   if (finished.rounds == 1) {
     const Vec marks = hn::LoadU(d, finished.marks[0]);
-    hn::CompressStore(hn::LoadU(d, finished.packed[0]), hn::Ne(marks, hn::Zero(d)), d,
-                      items + count);
-    for (std::size_t lane = 0; lane < lanes; ++lane) {
-      out.offsets[pixel + lane] = count;
-      count += finished.marks[0][lane];
-    }
-    return count;
+    return hand_out_ones(hn::LoadU(d, finished.packed[0]), hn::Ne(marks, hn::Zero(d)), pixel, count,
+                         out);
   }
+  std::uint32_t* items = room_for((finished.rounds + 1) * lanes, count, out);
   Vec sum = hn::Zero(d);
   for (std::size_t round = 0; round < finished.rounds; ++round) {
     sum = hn::Add(sum, hn::LoadU(d, finished.marks[round]));
@@ -97,7 +154,8 @@ HWY_INLINE std::uint32_t hand_out_columns(const Finished& finished, std::size_t 
     out.offsets[pixel + lane] = count;
     if (counts[lane] == 0) continue;
     for (std::size_t round = 0; round < finished.rounds; ++round) {
-      items[count] = finished.packed[round][lane];
+      *items = finished.packed[round][lane];
+      items += finished.marks[round][lane];
       count += finished.marks[round][lane];
     }
   }
@@ -112,16 +170,13 @@ void walk_planes(const TileLists<DepthKey>& lists, bool histogram, TileIntervals
   for (int row = lists.row_begin; row < lists.row_end; ++row) {
     for (std::size_t u = 0; u < kTileSide; u += lanes) {
       const std::size_t pixel = static_cast<std::size_t>(row) * kTileSide + u;
+      const std::uint32_t* const cell = lists.planes32 + pixel;
+      if (walk_pairs(cell, lists.ages, histogram, pixel, count, out)) continue;
       WindingWalk walk;
       finished.rounds = 0;
-      const int age =
-          walk_columns<rule>(lists.planes32 + pixel, lists.ages, histogram, finished, walk);
+      const int age = walk_columns<rule>(cell, lists.ages, histogram, finished, walk);
       out.counts.max_depth =
           std::max<std::uint64_t>(out.counts.max_depth, static_cast<std::uint64_t>(age));
-      if (age == 0) {
-        for (std::size_t lane = 0; lane < lanes; ++lane) out.offsets[pixel + lane] = count;
-        continue;
-      }
       walk.count(histogram, out.counts);
       count = hand_out_columns(finished, pixel, count, out);
     }
