@@ -1,6 +1,7 @@
 #include "raster/tile_bins.h"
 
 #include <algorithm>
+#include <bit>
 #include <limits>
 #include <memory>
 #include <utility>
@@ -8,30 +9,94 @@
 namespace strata {
 namespace {
 
-/// The tiles that a triangle's box of pixel centres meets, as a half-open box of tiles; empty where
-/// it meets none.
-struct TileRect {
-  std::uint16_t u0, v0, u1, v1;
-};
+/// A number for each vertex: the first pixel at or beyond it and the end of those before it, along
+/// u and v. [end v:16 | end u:16 | first v:16 | first u:16], with the ends inverted and all biased,
+/// so that the smallest signed numbers of three vertices are those of their triangle.
+using VertexPixels = std::int16_t __attribute__((vector_size(8)));
 
-TileRect tile_rect(const LatticeMesh& mesh, const glm::uvec3& triangle, const AxisFrame& frame,
-                   const RasterTarget& target, const PixelRows& rows) {
-  const glm::ivec3 &a = mesh.vertices[triangle.x], &b = mesh.vertices[triangle.y],
-                   &c = mesh.vertices[triangle.z];
-  const auto low = [&](int axis) { return std::min(std::min(a[axis], b[axis]), c[axis]); };
-  const auto high = [&](int axis) { return std::max(std::max(a[axis], b[axis]), c[axis]); };
-  const int u0 = std::max(0, first_pixel(low(frame.u)));
-  const int u1 = std::min(target.width, end_pixel(high(frame.u)));
-  const int v0 = std::max(rows.begin, first_pixel(low(frame.v)));
-  const int v1 = std::min(rows.end, end_pixel(high(frame.v)));
-  // No branch: small triangles miss all pixel centres too often and too irregularly to predict.
-  const int covers = u0 < u1 && v0 < v1 ? 1 : 0;
-  const auto tile = [covers](int pixel) {
-    return static_cast<std::uint16_t>(static_cast<unsigned>(pixel * covers) / kTileSide);
+constexpr std::uint64_t kBias = 0x7fff'7fff'8000'8000;
+
+/// The boxes of pixel centres of triangles, each in a few instructions: vertices are shared.
+class PixelBoxes {
+ public:
+  /// Pixels along u and v that may be covered; none where an end is not beyond its first.
+  struct Box {
+    std::uint32_t u0, v0, u1, v1;
+    [[nodiscard]] bool covers() const { return (u0 < u1) & (v0 < v1); }
   };
-  return {tile(u0), tile(v0), static_cast<std::uint16_t>(tile(u1 - 1) + covers),
-          static_cast<std::uint16_t>(tile(v1 - 1) + covers)};
-}
+
+  PixelBoxes(const LatticeMesh& mesh, const RasterTarget& target, const PixelRows& rows,
+             const Execution& execution)
+      : triangles_(mesh.triangles.data()),
+        beyond_{target.width > kMost ? 1u : 0u, rows.end > kMost ? 1u : 0u},
+        vertices_(std::make_unique_for_overwrite<std::uint64_t[]>(mesh.vertices.size())) {
+    constexpr std::size_t kChunk = 32768;
+    const std::size_t count = mesh.vertices.size();
+    const AxisFrame frame(target.axis);
+    parallel_for(execution, (count + kChunk - 1) / kChunk, [&](std::size_t chunk, int) {
+      const std::size_t end = std::min(count, (chunk + 1) * kChunk);
+      for (std::size_t i = chunk * kChunk; i < end; ++i) {
+        const glm::ivec3& p = mesh.vertices[i];
+        vertices_[i] = along(p[frame.u], {0, target.width}, beyond_[0]) |
+                       along(p[frame.v], rows, beyond_[1]) << 16;
+      }
+    });
+  }
+
+  [[nodiscard]] Box box(std::size_t triangle) const {
+    const glm::uvec3& t = triangles_[triangle];
+    const VertexPixels a = pixels(t.x), b = pixels(t.y), c = pixels(t.z);
+    const VertexPixels least = a < b ? a : b;
+    const auto bits = std::bit_cast<std::uint64_t>(least < c ? least : c) ^ kBias;
+    const auto part = [bits](int i) {
+      return static_cast<std::uint32_t>(bits >> i * 16) & 0xffffu;
+    };
+    return {part(0), part(1), part(2) + beyond_[0], part(3) + beyond_[1]};
+  }
+
+  /// Calls body(tile) for each tile that the triangle's box meets, body(number of tiles) if there
+  /// is none.
+  template <class Body>
+  void for_each_tile(std::size_t triangle, const TileBins& bins, Body&& body) const {
+    const Box box = this->box(triangle);
+    const auto row = static_cast<std::size_t>(bins.tiles_u);
+    const std::size_t skipped = static_cast<std::size_t>(bins.first_v) * row;
+    const std::size_t u0 = box.u0 / kTileSide, v0 = box.v0 / kTileSide;
+    const std::size_t u1 = (box.u1 - 1) / kTileSide, v1 = (box.v1 - 1) / kTileSide;
+    const bool covers = box.covers();
+    // One branch, for the few triangles in several tiles: which ones miss all pixel centres cannot
+    // be predicted.
+    if (covers & ((u0 != u1) | (v0 != v1))) {
+      for (std::size_t tv = v0; tv <= v1; ++tv) {
+        for (std::size_t tu = u0; tu <= u1; ++tu) body(tv * row + tu - skipped);
+      }
+    } else {
+      body(covers ? v0 * row + u0 - skipped : row * static_cast<std::size_t>(bins.tiles_v));
+    }
+  }
+
+ private:
+  /// The most pixels whose ends fit. The ends of one pixel more are stored one less, so that
+  /// triangles outside of the image count as at its border.
+  static constexpr int kMost = 65535;
+
+  static std::uint64_t along(std::int32_t at, const PixelRows& pixels, std::uint32_t beyond) {
+    const std::int32_t less = static_cast<std::int32_t>(beyond), most = pixels.end - less;
+    const std::int32_t first = (at + kLatticeSteps / 2 - 1) >> kLatticeBits;
+    const std::int32_t end = ((at + kLatticeSteps / 2) >> kLatticeBits) - less;
+    const auto stored = [&](std::int32_t pixel) {
+      return static_cast<std::uint64_t>(std::max(pixels.begin, std::min(pixel, most)));
+    };
+    return (stored(first) | stored(end) << 32) ^ (kBias & 0x0000'ffff'0000'ffff);
+  }
+  [[nodiscard]] VertexPixels pixels(std::uint32_t vertex) const {
+    return std::bit_cast<VertexPixels>(vertices_[vertex]);
+  }
+
+  const glm::uvec3* triangles_;
+  std::uint32_t beyond_[2];  ///< 1 where the image has more than kMost pixels
+  std::unique_ptr<std::uint64_t[]> vertices_;
+};
 
 /// Makes places of the counts of each part, by tile and then by part. The last count of a part is
 /// of no tile. @param offsets  of the tiles; the last one is left @return the sum of the counts
@@ -58,8 +123,9 @@ Result<TileBins> bin_triangles(const LatticeMesh& mesh, const RasterTarget& targ
   bins.tiles_v = (rows.end + kTileSide - 1) / kTileSide - bins.first_v;
   const std::size_t tiles =
       static_cast<std::size_t>(bins.tiles_u) * static_cast<std::size_t>(bins.tiles_v);
-  const AxisFrame frame(target.axis);
   const std::size_t count = mesh.triangles.size();
+  const PixelBoxes boxes(mesh, target, rows, execution);
+  if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
 
   // Counting sort: each part of the triangles counts by tile, the counts become cursors, each part
   // writes at its own cursors.
@@ -68,21 +134,13 @@ Result<TileBins> bin_triangles(const LatticeMesh& mesh, const RasterTarget& targ
   // The last cursor of a part is for triangles in no tile, so that they need no branch.
   const std::size_t stride = tiles + 1;
   std::vector<std::uint64_t> cursors(parts * stride, 0);
-  const auto rects = std::make_unique_for_overwrite<TileRect[]>(count);
-  const auto row = static_cast<std::size_t>(bins.tiles_u);
-  const std::size_t skipped = static_cast<std::size_t>(bins.first_v) * row;
-  const auto for_each_tile = [&](const TileRect& rect, auto&& body) {
-    const int width = rect.u1 - rect.u0, height = rect.v1 - rect.v0;
-    if (width * height <= 1) return body(width > 0 ? rect.v0 * row + rect.u0 - skipped : tiles);
-    for (std::size_t tv = rect.v0; tv < rect.v1; ++tv) {
-      for (std::size_t tu = rect.u0; tu < rect.u1; ++tu) body(tv * row + tu - skipped);
-    }
+  const auto for_each_tile = [&](std::size_t triangle, auto&& body) {
+    boxes.for_each_tile(triangle, bins, body);
   };
   parallel_for(execution, parts, [&](std::size_t part, int) {
     std::uint64_t* counts = cursors.data() + part * stride;
     for (std::size_t i = count * part / parts; i < count * (part + 1) / parts; ++i) {
-      rects[i] = tile_rect(mesh, mesh.triangles[i], frame, target, rows);
-      for_each_tile(rects[i], [counts](std::size_t tile) { ++counts[tile]; });
+      for_each_tile(i, [counts](std::size_t tile) { ++counts[tile]; });
     }
   });
   bins.offsets.resize(tiles + 1);
@@ -100,7 +158,7 @@ Result<TileBins> bin_triangles(const LatticeMesh& mesh, const RasterTarget& targ
     std::uint64_t* cursor = cursors.data() + part * stride;
     cursor[tiles] = sum + part;
     for (std::size_t i = count * part / parts; i < count * (part + 1) / parts; ++i) {
-      for_each_tile(rects[i], [&](std::size_t tile) {
+      for_each_tile(i, [&](std::size_t tile) {
         bins.triangles[cursor[tile]] = static_cast<std::uint32_t>(i);
         cursor[tile] += tile < tiles ? 1 : 0;
       });
