@@ -46,6 +46,25 @@ int rounded(double angle) {
   return static_cast<int>(w < 0 ? w - (0.5 - kHalf) : w + (0.5 - kHalf));
 }
 
+/// Values at the voxels of a cube of side kLeast from those at its corners, x fastest.
+void interpolate(const double (&corner)[8], double (&value)[WindingPoints::kMost]) {
+  const auto between = [](double a, double b, int at) {
+    const double share = static_cast<double>(at) / (kLeast - 1);
+    return a + share * (b - a);
+  };
+  for (int x = 0; x < kLeast; ++x) {
+    double along_x[4];
+    for (int k = 0; k < 4; ++k) along_x[k] = between(corner[2 * k], corner[2 * k + 1], x);
+    for (int y = 0; y < kLeast; ++y) {
+      const double low = between(along_x[0], along_x[1], y),
+                   high = between(along_x[2], along_x[3], y);
+      for (int z = 0; z < kLeast; ++z) {
+        value[x + kLeast * (y + kLeast * z)] = between(low, high, z);
+      }
+    }
+  }
+}
+
 double distance_to_segment(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b) {
   const glm::dvec3 along = b - a, to = p - a;
   const double length = glm::dot(along, along);
@@ -233,6 +252,21 @@ double WindingField::cap_distance(const WindingCap& cap, const glm::dvec3& from)
   return distance_to(t, cap.normal);
 }
 
+/// Whether the cap of a leaf is at most `distance` from a point. The ball around the cap, and the
+/// corner of it that is the nearest, mostly tell.
+bool WindingField::within(const WindingNode& leaf, const glm::dvec3& from, double distance) const {
+  constexpr double kSure = 1e-9;  // far more than roundings, and no more than that is undecided
+  const WindingCap& cap = caps_[leaf.first];
+  const double middle = glm::length((leaf.middle - from) * scale_);
+  if ((middle - leaf.radius) * (1 - kSure) > distance * (1 + kSure)) return false;
+  double nearest = middle;
+  for (const glm::dvec3& corner : cap.corners) {
+    nearest = std::min(nearest, glm::length((corner - from) * scale_));
+  }
+  if (nearest * (1 + kSure) < distance * (1 - kSure)) return true;
+  return cap_distance(cap, from) <= distance;
+}
+
 /// Every step-th voxel of the cube along all axes, x fastest.
 void WindingField::place(const Cube& cube, int step, WindingPoints& points) {
   points.count = 0;
@@ -286,9 +320,9 @@ void WindingField::visit_voxels(const Cube& cube, Scratch& scratch) const {
   // The angle of all but the caps close by is smooth, so that its corners tell about it.
   scratch.close.clear();
   scratch.rest.clear();
-  for (const std::uint32_t cap : all) {
-    const bool close = cap_distance(caps_[cap], here.farther.middle) <= kClose * here.radius;
-    (close ? scratch.close : scratch.rest).push_back(cap);
+  for (const std::uint32_t leaf : here.near) {
+    const bool close = within(nodes_[leaf], here.farther.middle, kClose * here.radius);
+    (close ? scratch.close : scratch.rest).push_back(nodes_[leaf].first);
   }
   WindingPoints& points = scratch.points;
   place(cube, kLeast - 1, points);
@@ -302,17 +336,11 @@ void WindingField::visit_voxels(const Cube& cube, Scratch& scratch) const {
   int number[WindingPoints::kMost];
   std::uint8_t open[WindingPoints::kMost];
   std::size_t count = 0;
+  double rest[WindingPoints::kMost];
+  interpolate(corner, rest);
   for (std::size_t i = 0; i < points.count; ++i) {
-    double rest[8];
-    std::copy_n(corner, 8, rest);
-    for (std::size_t axis = 0; axis < 3; ++axis) {  // x first
-      const double share = static_cast<double>(i >> 2 * axis & 3) / 3;
-      for (std::size_t k = 0; k < std::size_t{4} >> axis; ++k) {
-        rest[k] = rest[2 * k] + share * (rest[2 * k + 1] - rest[2 * k]);
-      }
-    }
-    number[i] = rounded(points.angle[i] + rest[0] - bulge);
-    if (rounded(points.angle[i] + rest[0] + bulge) == number[i]) continue;
+    number[i] = rounded(points.angle[i] + rest[i] - bulge);
+    if (rounded(points.angle[i] + rest[i] + bulge) == number[i]) continue;
     open[count] = static_cast<std::uint8_t>(i);
     points.x[count] = points.x[i], points.y[count] = points.y[i], points.z[count] = points.z[i];
     ++count;
@@ -322,18 +350,41 @@ void WindingField::visit_voxels(const Cube& cube, Scratch& scratch) const {
     solid_angles(caps_, nodes_, all, here.far, here.farther, scale_, points);
     for (std::size_t i = 0; i < count; ++i) number[open[i]] = rounded(points.angle[i]);
   }
-  for (std::size_t i = 0; i < WindingPoints::kMost; ++i) {
-    if (number[i] != 0) add_voxel(cube, static_cast<int>(i), number[i], scratch);
+  add_runs(cube, number, scratch);
+}
+
+/// Adds the numbers of the voxels of a cube of side kLeast, x fastest.
+void WindingField::add_runs(const Cube& cube, const int (&number)[WindingPoints::kMost],
+                            Scratch& scratch) const {
+  constexpr int kSteps[] = {1, kLeast, kLeast * kLeast};
+  const AxisFrame& frame = cube.frame;
+  const glm::ivec3 size = glm::min(glm::ivec3(kLeast), dims_ - cube.corner);
+  const int w0 = cube.corner[frame.w];
+  for (int v = 0; v < size[frame.v]; ++v) {
+    for (int u = 0; u < size[frame.u]; ++u) {
+      const int* const column = number + u * kSteps[frame.u] + v * kSteps[frame.v];
+      const int pixel = (cube.corner[frame.v] + v - cube.tile[frame.v]) * kTileSide +
+                        cube.corner[frame.u] + u - cube.tile[frame.u];
+      for (int w = 0; w < size[frame.w];) {
+        const int first = w, here = column[w * kSteps[frame.w]];
+        while (w < size[frame.w] && column[w * kSteps[frame.w]] == here) ++w;
+        if (here == 0) continue;
+        scratch.runs.push_back({static_cast<std::uint32_t>(pixel), w0 + first, w0 + w, here});
+      }
+    }
   }
 }
 
-void WindingField::add_voxel(const Cube& cube, int at, int number, Scratch& scratch) const {
-  const AxisFrame& frame = cube.frame;
-  const glm::ivec3 p =
-      cube.corner + glm::ivec3(at % kLeast, at / kLeast % kLeast, at / (kLeast * kLeast));
-  if (p.x >= dims_.x || p.y >= dims_.y || p.z >= dims_.z) return;
-  const int pixel = (p[frame.v] - cube.tile[frame.v]) * kTileSide + p[frame.u] - cube.tile[frame.u];
-  scratch.runs.push_back({static_cast<std::uint32_t>(pixel), p[frame.w], p[frame.w] + 1, number});
+/// The runs, sorted by pixel. Those of a pixel are there in order: cubes are visited like that.
+const std::vector<WindingField::Scratch::Run>& WindingField::sorted_runs(Scratch& scratch) {
+  auto& next = scratch.next;
+  next.assign(kTilePixels, 0);
+  for (const Scratch::Run& run : scratch.runs) ++next[run.pixel];
+  std::uint32_t sum = 0;
+  for (std::uint32_t& place : next) sum += std::exchange(place, sum);
+  scratch.sorted.resize(scratch.runs.size());
+  for (const Scratch::Run& run : scratch.runs) scratch.sorted[next[run.pixel]++] = run;
+  return scratch.sorted;
 }
 
 std::span<const WindingStep> WindingField::steps(Axis axis, int tu, int tv,
@@ -351,10 +402,7 @@ std::span<const WindingStep> WindingField::steps(Axis axis, int tu, int tv,
     if (stop.stop_requested()) return {};
     visit({frame, tile, corner, kLargest, 0}, scratch);
   }
-  auto& runs = scratch.runs;
-  std::sort(runs.begin(), runs.end(), [](const Scratch::Run& a, const Scratch::Run& b) {
-    return std::pair(a.pixel, a.begin) < std::pair(b.pixel, b.begin);
-  });
+  const auto& runs = sorted_runs(scratch);
   for (std::size_t i = 0; i < runs.size();) {
     const Scratch::Run first = runs[i];
     std::int32_t end = first.end;

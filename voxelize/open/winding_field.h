@@ -54,7 +54,8 @@ class WindingField {
     };
     std::vector<Level> levels;
     std::vector<std::uint32_t> stack, near, close, rest;
-    std::vector<Run> runs;
+    std::vector<Run> runs, sorted;
+    std::vector<std::uint32_t> next;
     std::vector<WindingStep> steps;
     WindingPoints points;
   };
@@ -82,7 +83,10 @@ class WindingField {
   void visit(const Cube& cube, Scratch& scratch) const;
   [[nodiscard]] bool fill(const Cube& cube, Scratch& scratch) const;
   void visit_voxels(const Cube& cube, Scratch& scratch) const;
-  void add_voxel(const Cube& cube, int at, int number, Scratch& scratch) const;
+  void add_runs(const Cube& cube, const int (&number)[WindingPoints::kMost],
+                Scratch& scratch) const;
+  static const std::vector<Scratch::Run>& sorted_runs(Scratch& scratch);
+  [[nodiscard]] bool within(const WindingNode& leaf, const glm::dvec3& from, double distance) const;
   static void place(const Cube& cube, int step, WindingPoints& points);
   [[nodiscard]] double cap_distance(const WindingCap& cap, const glm::dvec3& from) const;
   std::span<const std::uint32_t> caps_of(std::span<const std::uint32_t> leaves,
