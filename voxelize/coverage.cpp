@@ -16,7 +16,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-#include "voxelize/winding_walk-inl.h"
+#include "voxelize/open/winding_walk-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace strata {

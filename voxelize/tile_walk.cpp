@@ -10,7 +10,7 @@
 
 #include "strata/hashbuffer/tile_lists.h"
 #include "strata/raster/lattice_mesh.h"
-#include "voxelize/winding_walk-inl.h"
+#include "voxelize/open/winding_walk-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace strata {

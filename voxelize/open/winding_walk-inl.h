@@ -12,7 +12,8 @@
 
 #include <algorithm>
 
-#include "voxelize/tile_walk.h"
+#include "strata/core/inside_rule.h"
+#include "voxelize/open/tile_counts.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace strata {
