@@ -117,6 +117,17 @@ std::vector<std::uint64_t> Peers::sum(const std::vector<std::uint64_t>& numbers)
 }
 
 std::vector<std::string> Peers::gather(const std::string& text) const {
+  constexpr std::size_t kPiece = std::size_t{1} << 20;  // of all ranks together below 2^31
+  const std::uint64_t longest = largest(text.size());
+  std::vector<std::string> texts = gather_piece(text.substr(0, kPiece));
+  for (std::size_t at = kPiece; at < longest; at += kPiece) {
+    const auto more = gather_piece(at < text.size() ? text.substr(at, kPiece) : std::string());
+    for (std::size_t i = 0; i < more.size(); ++i) texts[i] += more[i];
+  }
+  return texts;
+}
+
+std::vector<std::string> Peers::gather_piece(const std::string& text) const {
   const auto ranks = static_cast<std::size_t>(job_->size);
   const int length = static_cast<int>(text.size());
   std::vector<int> lengths(ranks, 0), begins(ranks, 0);

@@ -40,7 +40,7 @@ class Peers {
   [[nodiscard]] std::uint64_t largest(std::uint64_t number) const;
   /// Sums, on rank 0. @pre all ranks give as many numbers
   [[nodiscard]] std::vector<std::uint64_t> sum(const std::vector<std::uint64_t>& numbers) const;
-  /// The texts of all, on rank 0. @pre 2 GB in all
+  /// The texts of all, on rank 0.
   [[nodiscard]] std::vector<std::string> gather(const std::string& text) const;
   /// The text of rank 0.
   [[nodiscard]] std::string broadcast(const std::string& text) const;
@@ -69,6 +69,7 @@ class Peers {
 
  private:
   struct Job;
+  [[nodiscard]] std::vector<std::string> gather_piece(const std::string& text) const;
   explicit Peers(std::unique_ptr<Job> job);
   std::unique_ptr<Job> job_;
 };
