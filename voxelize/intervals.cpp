@@ -1,10 +1,72 @@
 #include "strata/voxelize/intervals.h"
 
+#include <sys/mman.h>
+
 #include <algorithm>
+#include <cstring>
+#include <mutex>
 #include <new>
 #include <stdexcept>
 
 namespace strata {
+
+/// Memory of many tiles, in blocks: to touch small pages for the first time costs more than to fill
+/// them, so all blocks but the first are large pages where the system has them.
+class VoxelIntervals::Arena {
+ public:
+  Arena() = default;
+  Arena(const Arena&) = delete;
+  Arena& operator=(const Arena&) = delete;
+  ~Arena() {
+    for (const Block& block : blocks_) ::operator delete(block.memory, block.alignment);
+  }
+
+  /// A copy of `values`; null for none. May be called by several threads at once.
+  template <class T>
+  const T* copy(std::span<const T> values) {
+    if (values.empty()) return nullptr;
+    void* const memory = take(values.size_bytes());
+    std::memcpy(memory, values.data(), values.size_bytes());
+    return static_cast<const T*>(memory);
+  }
+
+ private:
+  static constexpr std::size_t kLine = 64, kFirst = std::size_t{256} << 10;
+  static constexpr std::size_t kLargePage = std::size_t{2} << 20;
+  struct Block {
+    void* memory;
+    std::align_val_t alignment;
+  };
+
+  void* take(std::size_t bytes) {
+    bytes = (bytes + kLine - 1) / kLine * kLine;
+    const std::lock_guard lock(mutex_);
+    if (bytes > left_) add_block(bytes);
+    left_ -= bytes;
+    return std::exchange(next_, next_ + bytes);
+  }
+  void add_block(std::size_t bytes) {
+    const std::size_t least = blocks_.empty() ? kFirst : kLargePage;
+    const std::size_t size = (bytes + least - 1) / least * least;
+    const auto alignment = std::align_val_t{blocks_.empty() ? kLine : kLargePage};
+    if (blocks_.size() == blocks_.capacity()) blocks_.reserve(2 * blocks_.size() + 8);
+    void* const memory = ::operator new(size, alignment);
+    if (!blocks_.empty()) ::madvise(memory, size, MADV_HUGEPAGE);  // a wish
+    blocks_.push_back({memory, alignment});
+    next_ = static_cast<std::byte*>(memory);
+    left_ = size;
+  }
+
+  std::mutex mutex_;
+  std::vector<Block> blocks_;
+  std::byte* next_ = nullptr;
+  std::size_t left_ = 0;
+};
+
+VoxelIntervals::VoxelIntervals() = default;
+VoxelIntervals::VoxelIntervals(VoxelIntervals&&) noexcept = default;
+VoxelIntervals& VoxelIntervals::operator=(VoxelIntervals&&) noexcept = default;
+VoxelIntervals::~VoxelIntervals() = default;
 
 VoxelIntervals::VoxelIntervals(const VoxelGrid& grid, Axis axis)
     : VoxelIntervals(grid, axis, 0, grid.dims[AxisFrame(axis).v]) {}
@@ -17,21 +79,17 @@ VoxelIntervals::VoxelIntervals(const VoxelGrid& grid, Axis axis, int v_begin, in
       v_end_(v_end),
       tiles_u_((columns_ + kTileSide - 1) / kTileSide),
       tiles_v_((v_end - v_begin + kTileSide - 1) / kTileSide),
-      tiles_(static_cast<std::size_t>(tiles_u_) * static_cast<std::size_t>(tiles_v_)) {}
+      tiles_(static_cast<std::size_t>(tiles_u_) * static_cast<std::size_t>(tiles_v_)),
+      arena_(std::make_unique<Arena>()) {}
 
 void VoxelIntervals::set_tile(int tu, int tv, std::span<const std::uint32_t> offsets,
                               std::span<const Interval> items,
                               std::span<const std::uint32_t> labels) {
   Tile& tile = tiles_[static_cast<std::size_t>(tv) * static_cast<std::size_t>(tiles_u_) +
                       static_cast<std::size_t>(tu)];
-  tile.offsets = std::make_unique_for_overwrite<std::uint32_t[]>(offsets.size());
-  tile.items = std::make_unique_for_overwrite<Interval[]>(items.size());
-  std::copy(offsets.begin(), offsets.end(), tile.offsets.get());
-  std::copy(items.begin(), items.end(), tile.items.get());
-  tile.labels.reset();
-  if (labels.empty()) return;
-  tile.labels = std::make_unique_for_overwrite<std::uint32_t[]>(labels.size());
-  std::copy(labels.begin(), labels.end(), tile.labels.get());
+  tile.offsets = arena_->copy(offsets);
+  tile.items = arena_->copy(items);
+  tile.labels = arena_->copy(labels);
 }
 
 std::uint64_t VoxelIntervals::interval_count() const {
@@ -42,7 +100,7 @@ std::uint64_t VoxelIntervals::interval_count() const {
     if (!tile.labels) continue;
     for (std::size_t local = 0; local < kTileColumns; ++local) {
       const std::uint32_t begin = tile.offsets[local], size = tile.offsets[local + 1] - begin;
-      count -= size - run_count({tile.items.get() + begin, size});
+      count -= size - run_count({tile.items + begin, size});
     }
   }
   return count;

@@ -40,7 +40,12 @@ class VoxelIntervals {
   /// Columns of a tile.
   static constexpr std::size_t kTileColumns = std::size_t{kTileSide} * kTileSide;
 
-  VoxelIntervals() = default;
+  VoxelIntervals();  ///< holds nothing
+  /// Moves the tiles; what is left holds nothing.
+  VoxelIntervals(VoxelIntervals&&) noexcept;
+  /// Moves the tiles; what is left holds nothing.
+  VoxelIntervals& operator=(VoxelIntervals&&) noexcept;
+  ~VoxelIntervals();  ///< frees the tiles
   /// An empty slab. @pre v_begin is a multiple of kTileSide, 0 <= v_begin < v_end <= rows of grid
   VoxelIntervals(const VoxelGrid& grid, Axis axis, int v_begin, int v_end);
   /// All rows of the grid, empty.
@@ -59,14 +64,14 @@ class VoxelIntervals {
     const Tile& tile = tile_of(u, v);
     if (!tile.offsets) return {};
     const std::size_t local = local_of(u, v);
-    return {tile.items.get() + tile.offsets[local], tile.offsets[local + 1] - tile.offsets[local]};
+    return {tile.items + tile.offsets[local], tile.offsets[local + 1] - tile.offsets[local]};
   }
   /// The labels of the intervals of column (u, v); empty if none were given.
   [[nodiscard]] std::span<const std::uint32_t> column_labels(int u, int v) const {
     const Tile& tile = tile_of(u, v);
     if (!tile.labels) return {};
     const std::size_t local = local_of(u, v);
-    return {tile.labels.get() + tile.offsets[local], tile.offsets[local + 1] - tile.offsets[local]};
+    return {tile.labels + tile.offsets[local], tile.offsets[local + 1] - tile.offsets[local]};
   }
   /// Whether voxel (i, j, k) is solid; false outside the grid and the slab. O(log of the column).
   [[nodiscard]] bool contains(int i, int j, int k) const { return label(i, j, k).has_value(); }
@@ -95,16 +100,17 @@ class VoxelIntervals {
   [[nodiscard]] TileView tile(int tu, int tv) const {
     const Tile& stored = tiles_[static_cast<std::size_t>(tv) * static_cast<std::size_t>(tiles_u_) +
                                 static_cast<std::size_t>(tu)];
-    if (!stored.offsets) return {};
+    if (stored.offsets == nullptr) return {};
     const std::size_t count = stored.offsets[kTileColumns];
-    return {{stored.offsets.get(), kTileColumns + 1},
-            {stored.items.get(), count},
-            {stored.labels.get(), stored.labels ? count : 0}};
+    return {{stored.offsets, kTileColumns + 1},
+            {stored.items, count},
+            {stored.labels, stored.labels ? count : 0}};
   }
 
   /// Stores tile (tu, tv): `offsets` has kTileColumns + 1 entries, row by row (columns outside the
   /// grid are empty), `items` is offsets.back() long, and so is `labels` unless it is empty.
-  /// Different tiles may be set by different threads at once.
+  /// Different tiles may be set by different threads at once. A tile that is set again keeps its
+  /// former memory until all is freed.
   void set_tile(int tu, int tv, std::span<const std::uint32_t> offsets,
                 std::span<const Interval> items, std::span<const std::uint32_t> labels = {});
 
@@ -115,10 +121,11 @@ class VoxelIntervals {
   [[nodiscard]] std::uint64_t memory_bytes() const;  ///< bytes held by the tiles
 
  private:
+  class Arena;  // memory of the tiles
   struct Tile {
-    std::unique_ptr<std::uint32_t[]> offsets;
-    std::unique_ptr<Interval[]> items;
-    std::unique_ptr<std::uint32_t[]> labels;
+    const std::uint32_t* offsets = nullptr;
+    const Interval* items = nullptr;
+    const std::uint32_t* labels = nullptr;
   };
   [[nodiscard]] const Tile& tile_of(int u, int v) const {
     return tiles_[static_cast<std::size_t>((v - v_begin_) / kTileSide) *
@@ -133,6 +140,7 @@ class VoxelIntervals {
   Axis axis_ = Axis::kZ;
   int columns_ = 0, v_begin_ = 0, v_end_ = 0, tiles_u_ = 0, tiles_v_ = 0;
   std::vector<Tile> tiles_;
+  std::unique_ptr<Arena> arena_;
 };
 
 /// Runs of solid voxels of a column: intervals that touch, of different labels, are one.
