@@ -68,7 +68,7 @@ Made make_rows(const TriangleSoup& mesh, const VoxelGrid& grid, const VoxelizeOp
   return made;
 }
 
-struct GridParts : testing::TestWithParam<GridPartsCase> {
+struct GridParts : ::testing::TestWithParam<GridPartsCase> {
   void SetUp() override {
     mesh = make_torus_knot(2, 3, 0.4, 60, 12);
     if (GetParam().open) mesh.triangles.resize(mesh.triangles.size() - 40);
@@ -141,7 +141,7 @@ TEST_P(GridParts, MayBeTakenInTurns) {
   expect_sum(grid, Axis::kX, whole, std::move(parts));
 }
 
-INSTANTIATE_TEST_SUITE_P(Options, GridParts, testing::ValuesIn(grid_parts_cases()),
+INSTANTIATE_TEST_SUITE_P(Options, GridParts, ::testing::ValuesIn(grid_parts_cases()),
                          [](const auto& info) { return info.param.name; });
 
 TEST(GridPartsRows, AreWholeTilesOfTheGrid) {

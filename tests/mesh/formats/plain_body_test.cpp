@@ -14,7 +14,7 @@ namespace {
 
 using testing_mesh::contains;
 
-const std::string kPly =
+const std::string kPlyHead =
     "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float "
     "z\n"
     "element face {}\nproperty list uchar int vertex_indices\nend_header\n";
@@ -40,7 +40,7 @@ std::string off_of(const TriangleSoup& mesh, const std::string& body) {
 }
 
 std::string ply_of(const TriangleSoup& mesh, const std::string& body) {
-  return fmt::format(fmt::runtime(kPly), mesh.positions.size(), mesh.triangles.size()) + body;
+  return fmt::format(fmt::runtime(kPlyHead), mesh.positions.size(), mesh.triangles.size()) + body;
 }
 
 Result<MeshFile> read(MeshFormat format, const std::string& text, std::size_t chunk_bytes,

@@ -29,7 +29,7 @@ VoxelIntervals random_runs(Axis axis, int begin, int end, bool labelled, std::mt
         while (u < set.columns() && v < end && w < kRunGrid.dims[frame.w] && random() % 3 != 0) {
           const int last = std::min(w + static_cast<int>(random() % 9), kRunGrid.dims[frame.w] - 1);
           items.push_back({static_cast<std::uint16_t>(w), static_cast<std::uint16_t>(last)});
-          if (labelled) labels.push_back(1 + random() % 1000000);
+          if (labelled) labels.push_back(static_cast<std::uint32_t>(1 + random() % 1000000));
           w = last + (labelled ? 1 : 2) + static_cast<int>(random() % 5);
         }
         offsets.push_back(static_cast<std::uint32_t>(items.size()));
@@ -52,7 +52,7 @@ std::vector<std::uint32_t> numbers_of(const VoxelIntervals& set) {
   return numbers;
 }
 
-struct RunFile : testing::Test {
+struct RunFile : ::testing::Test {
   testkit::TemporaryFolder place;
   std::string path = (place.path() / "runs").string();
   void write(Axis axis, const std::vector<const VoxelIntervals*>& slabs) const {
