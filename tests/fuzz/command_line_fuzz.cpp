@@ -40,6 +40,13 @@ void check(const MeshCommand& command) {
   must(command.boundary.bits >= 10 && command.boundary.bits <= 28, "bits are in range");
 }
 
+void check(const MergeCommand& command) {
+  check(command.common);
+  must(!command.shards.empty(), "there are shards");
+  must(!command.output.empty() || command.json || command.stats || command.checksum,
+       "something comes out");
+}
+
 void check(const InfoCommand& command) { check(command.common); }
 
 void check(const LdiCommand& command) {
