@@ -308,10 +308,11 @@ class TableSink {
 };
 
 /// Appends covered pixels to the tile's log.
-template <class Record>
+/// @tparam in_order  triangle by triangle
+template <class Record, bool in_order>
 class LogSink {
  public:
-  static constexpr bool kTakesLanes = true;
+  static constexpr bool kTakesLanes = !in_order;
   LogSink(TileLog<Record>& log, const PixelRect& clip)
       : log_(&log), count_(log.count), clip_(clip) {}
   HWY_INLINE void begin(bool exit, std::uint32_t triangle, const PixelRect& box) {
@@ -415,9 +416,12 @@ TileRasterResult raster_table(const TileInput& input, TileTable<Record>& table) 
 
 template <class Record>
 TileRasterResult raster_log(const TileInput& input, TileLog<Record>& log) {
-  LogSink<Record> sink(log, input.clip);
-  rasterize_triangles(input.mesh, input.target, input.triangles, input.clip, sink);
-  return sink.finish();
+  const auto raster = [&](auto sink) {
+    rasterize_triangles(input.mesh, input.target, input.triangles, input.clip, sink);
+    return sink.finish();
+  };
+  return input.in_order ? raster(LogSink<Record, true>(log, input.clip))
+                        : raster(LogSink<Record, false>(log, input.clip));
 }
 
 TileRasterResult raster_key_table(const TileInput& input, TileTable<Record32>& table) {

@@ -113,7 +113,8 @@ struct TileInput {
   const LatticeMesh& mesh;
   const RasterTarget& target;
   std::span<const std::uint32_t> triangles;
-  PixelRect clip;  ///< the tile's pixels within the target
+  PixelRect clip;         ///< the tile's pixels within the target
+  bool in_order = false;  ///< a log gets all fragments of a triangle before those of the next
 };
 
 TileRasterResult raster_into(const TileInput& input, TileTable<Record32>& table);

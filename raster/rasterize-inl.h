@@ -578,7 +578,7 @@ HWY_INLINE void rasterize_triangles(const LatticeMesh& mesh, const RasterTarget&
                                     Sink& sink) {
   const AxisFrame frame(target.axis);
   const std::size_t lanes = hn::Lanes(LaneF64());
-  constexpr bool kByLanes = requires { Sink::kTakesLanes; };
+  constexpr bool kByLanes = requires { requires Sink::kTakesLanes; };
   SetupBatch batch;
   TileEquations equations;
   const auto part_at = [&](std::size_t begin) {

@@ -5,8 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <random>
 
+#include "hashbuffer/tile_store.h"
 #include "raster/tile_bins.h"
 #include "tests/support/reference_lists.h"
 #include "tests/support/simd_targets.h"
@@ -398,6 +400,38 @@ TEST(TileLists, AreExactForManyLayersOfSmallTriangles) {
     expect_exact<DepthItem>(scene, target, layers <= 9);
     if (HasFailure()) return;
   }
+}
+
+TEST(TileLists, ALogInOrderHasTheFragmentsOfATriangleTogether) {
+  Maker maker(10);
+  const RasterTarget target{Axis::kZ, 64, 64, 1 << 16};
+  Scene scene;
+  for (int i = 0; i < 500; ++i) {
+    const int u = maker.pick(0, 60) * 256, v = maker.pick(0, 60) * 256;
+    const auto corner = [&] {
+      const int side = i % 20 == 0 ? 12'000 : 1500;
+      return glm::ivec3(u + maker.pick(0, side), v + maker.pick(0, side), maker.pick(0, 60'000));
+    };
+    scene.add(corner(), corner(), corner());
+  }
+  const LatticeMesh mesh = scene.lattice();
+  std::vector<std::uint32_t> ids(mesh.triangles.size());
+  std::iota(ids.begin(), ids.end(), 0u);
+  std::shuffle(ids.begin(), ids.end(), maker.engine());
+  std::vector<std::size_t> turn(ids.size());
+  for (std::size_t i = 0; i < ids.size(); ++i) turn[ids[i]] = i;
+  for_each_simd_target([&](const std::string& name) {
+    SCOPED_TRACE(name);
+    TileLog<Record64> any, log;
+    raster_into({mesh, target, ids, {0, 0, 64, 64}}, any);
+    raster_into({mesh, target, ids, {0, 0, 64, 64}, true}, log);
+    EXPECT_GT(log.count, 1000u);
+    EXPECT_EQ(log.count, any.count);
+    const auto end = log.keys.begin() + static_cast<std::ptrdiff_t>(log.count);
+    EXPECT_TRUE(std::is_sorted(log.keys.begin(), end, [&](DepthItem a, DepthItem b) {
+      return turn[a.triangle()] < turn[b.triangle()];
+    }));
+  });
 }
 
 TEST(TileLists, DoNotDependOnTheOrderOfTriangles) {

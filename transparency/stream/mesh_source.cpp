@@ -121,7 +121,7 @@ class MeshSource::TileWorker final : public Worker {
     const ViewPart& part = source_->part_;
     const RasterTarget target{Axis::kZ, source_->view_.size.x, source_->view_.size.y,
                               kPictureDepthLimit};
-    raster_into({part.mesh, target, triangles, clip}, log);
+    raster_into({part.mesh, target, triangles, clip, true}, log);
     if (!part.cut) return;
     for (std::size_t i = 0; i < log.count; ++i) {
       const DepthItem item = log.keys[i];

@@ -202,7 +202,7 @@ TEST_F(OpenVdbFiles, LevelSetsAreSolidBelowZero) {
 }
 
 TEST_F(OpenVdbFiles, AGridIsChosenByNameAndInstancesShareATree) {
-  const auto first = openvdb::Vec3SGrid::create();
+  const auto first = openvdb::Vec3DGrid::create();
   first->setName("velocity");
   const auto second = random_grid<openvdb::BoolGrid>(false);
   const auto third =
@@ -221,7 +221,7 @@ TEST_F(OpenVdbFiles, AGridIsChosenByNameAndInstancesShareATree) {
   options.grid = "velocity";
   const auto vectors = read_voxels(path, options);
   ASSERT_FALSE(vectors);
-  EXPECT_NE(vectors.error().message.find("Tree_vec3s_5_4_3"), std::string::npos);
+  EXPECT_NE(vectors.error().message.find("Tree_vec3d_5_4_3"), std::string::npos);
   options.grid = "none";
   const auto none = read_voxels(path, options);
   ASSERT_FALSE(none);
