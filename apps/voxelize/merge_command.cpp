@@ -6,7 +6,9 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <system_error>
 #include <utility>
@@ -67,24 +69,81 @@ Result<void> put_file(const fs::path& from, const fs::path& to) {
   return fail(ErrorCode::kOutput, "{}: cannot write: {}", to.string(), reason.message());
 }
 
+/// Whether a path lies in a folder, or is it.
+bool lies_in(const std::string& path, const std::string& folder) {
+  std::error_code ignored;
+  const fs::path from = fs::weakly_canonical(fs::absolute(folder, ignored), ignored);
+  const fs::path relative =
+      fs::weakly_canonical(fs::absolute(path, ignored), ignored).lexically_relative(from);
+  return !relative.empty() && *relative.begin() != "..";
+}
+
+/// Checks that no output would lie among what is read.
+Result<void> check_outputs(const MergeCommand& command) {
+  for (const std::string& shard : command.shards) {
+    std::error_code ignored;
+    if (!fs::is_directory(shard, ignored)) continue;
+    for (const std::string& output : {command.output, command.json.value_or("")}) {
+      if (output.empty() || output == "-" || !lies_in(output, shard)) continue;
+      return fail(ErrorCode::kUsage, "{} must not lie in the shard {}", output, shard);
+    }
+  }
+  return {};
+}
+
 /// All chunks of a shard. @param to  the folder of the store
-Result<void> put_chunks(const std::string& shard, const std::string& to,
+Result<void> put_chunks(const ShardReport& report, const std::string& to,
                         const Execution& execution) {
+  const std::string& shard = report.path;
   const fs::path from = fs::path(shard) / kShardChunks;
   std::error_code reason;
+  std::uint64_t bytes = 0;
   fs::recursive_directory_iterator entry(from, reason), end;
   for (; !reason && entry != end; entry.increment(reason)) {
     if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
     const fs::path place = fs::path(to) / entry->path().lexically_relative(from);
-    if (entry->is_directory(reason)) {
+    const fs::file_type type = entry->symlink_status(reason).type();
+    if (type == fs::file_type::directory) {
       fs::create_directory(place, reason);  // of several shards it may be there
       if (reason) break;
-    } else if (auto put = put_file(entry->path(), place); !put) {
-      return put;
+      continue;
     }
+    if (type != fs::file_type::regular) {
+      return fail(ErrorCode::kInput, "{}: it is no regular file", entry->path().string());
+    }
+    bytes += entry->file_size(reason);
+    if (reason) break;
+    if (auto put = put_file(entry->path(), place); !put) return put;
+  }
+  const std::uint64_t expected = report.outcome.output_bytes.value_or(0);
+  if (!reason && bytes != expected) {
+    return fail(ErrorCode::kInput, "{}: the chunks must have {} bytes in all, got {}", shard,
+                expected, bytes);
   }
   if (!reason) return {};
   return fail(ErrorCode::kInput, "{}: cannot read the chunks: {}", shard, reason.message());
+}
+
+/// The largest label of runs that are written so; 0: runs have none.
+std::uint32_t largest_label(const VoxelWriterOptions& file) {
+  if (file.rgba) return std::numeric_limits<std::uint32_t>::max();
+  return std::max({file.ids, file.fog, static_cast<std::uint32_t>(file.colours.size())});
+}
+
+/// Checks the labels of a slab, which writers rely on.
+Result<void> check_labels(const VoxelIntervals& slab, std::uint32_t most,
+                          const std::string& shard) {
+  if (!slab.has_labels()) return {};
+  for (int v = slab.v_begin(); v < slab.v_end(); ++v) {
+    for (int u = 0; u < slab.columns(); ++u) {
+      for (const std::uint32_t label : slab.column_labels(u, v)) {
+        if (label <= most) continue;
+        return fail(ErrorCode::kInput, "{}: a label must be at most {}, got {}", shard, most,
+                    label);
+      }
+    }
+  }
+  return {};
 }
 
 class Merge {
@@ -126,6 +185,7 @@ void Merge::add_up() {
   whole_.checksum = command_.checksum;
   whole_.json = command_.json;
   sum_ = shards_.front().outcome;
+  sum_.output_bytes.reset();
   for (std::size_t i = 1; i < shards_.size(); ++i) add_shard(shards_[i].outcome, sum_);
   finish_sum(shards_, sum_);
 }
@@ -174,7 +234,7 @@ Result<void> Merge::write_chunks(const VoxelWriterOptions& file, const Execution
   auto folder = AtomicFolder::create(command_.output);
   if (!folder) return tl::unexpected(folder.error());
   for (std::size_t i = 0; i < shards_.size(); ++i) {
-    auto put = put_chunks(shards_[i].path, folder->temporary_path(), execution);
+    auto put = put_chunks(shards_[i], folder->temporary_path(), execution);
     if (!put) return put;
     if (execution.progress) {
       execution.progress(static_cast<double>(i + 1) / static_cast<double>(shards_.size()));
@@ -201,14 +261,22 @@ Result<void> Merge::write_runs(const VoxelWriterOptions& file, const Execution& 
     auto runs = RunFileReader::open(shard.path + "/" + kShardRuns, sum_.grid, sum_.axis,
                                     rows->begin, rows->end);
     if (!runs) return tl::unexpected(runs.error());
+    std::uint64_t solid = 0;
     for (int v = rows->begin; v < rows->end; v += kRows) {
       const int end = std::min(rows->end, v + kRows);
       const auto slab = runs->read(end);
       if (!slab) return tl::unexpected(slab.error());
+      if (auto known = check_labels(*slab, largest_label(file), shard.path); !known) return known;
+      solid += slab->solid_voxels();
       if (auto added = (*writer)->add(*slab, quiet); !added) return added;
       if (execution.progress) execution.progress(static_cast<double>(end) / all);
     }
     if (auto done = runs->finish(); !done) return done;
+    // Of filled fractions the report counts those of a half and more.
+    if (file.fog == 0 && solid != shard.outcome.report.solid_voxels) {
+      return fail(ErrorCode::kInput, "{}: its runs must have {} solid voxels, got {}", shard.path,
+                  shard.outcome.report.solid_voxels, solid);
+    }
   }
   if (auto finished = (*writer)->finish(quiet); !finished) return finished;
   sum_.output_files = (*writer)->pieces();
@@ -237,6 +305,7 @@ Result<void> run_merge(const MergeCommand& command, Session& session) {
     if (session.interrupted()) return fail(ErrorCode::kCancelled, "stopped");
   }
   if (auto valid = check_shards(shards); !valid) return valid;
+  if (auto valid = check_outputs(command); !valid) return valid;
   return Merge(command, std::move(shards), session).run();
 }
 

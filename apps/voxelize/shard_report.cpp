@@ -409,6 +409,10 @@ Result<ShardReport> read_shard_report(const std::string& path) {
   std::error_code ignored;
   const bool folder = std::filesystem::is_directory(path, ignored);
   const std::string place = folder ? path + "/" + kShardReport : path;
+  if (std::filesystem::exists(place, ignored) &&
+      !std::filesystem::is_regular_file(place, ignored)) {
+    return fail(ErrorCode::kInput, "{}: it is no regular file", place);
+  }
   std::ifstream in(place, std::ios::binary);
   const std::string text{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
   if (!in) {
@@ -432,6 +436,9 @@ Result<ShardReport> read_shard_report(const std::string& path) {
     read_numbers(whole, report.command, report.outcome);
     if (report.command.ids) read_ids(whole, report.outcome);
     read_part(whole.object("shard"), report);
+    if (!report.format.empty()) {
+      report.outcome.output_bytes = whole.object("output").count("bytes");
+    }
     for (const JsonValue& value : whole.list("warnings")) {
       const Fields warning = whole.item(value, "warnings");
       report.warnings.push_back({warning.text("code"), warning.text("message")});

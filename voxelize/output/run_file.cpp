@@ -112,8 +112,11 @@ Result<RunFileReader> RunFileReader::open(const std::string& path, const VoxelGr
   reader.axis_ = axis;
   reader.next_ = begin;
   reader.end_ = end;
-  reader.file_.reset(std::fopen(path.c_str(), "rbe"));
   struct stat status {};
+  if (stat(path.c_str(), &status) == 0 && !S_ISREG(status.st_mode)) {
+    return fail(ErrorCode::kInput, "{}: it is no regular file", path);
+  }
+  reader.file_.reset(std::fopen(path.c_str(), "rbe"));
   if (!reader.file_ || fstat(fileno(reader.file_.get()), &status) != 0) {
     return fail(ErrorCode::kInput, "{}: cannot read: {}", path, std::strerror(errno));
   }

@@ -1,8 +1,10 @@
 // `strata voxelize --shard` and `strata merge`: many processes make what one makes.
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <map>
 
@@ -251,6 +253,57 @@ TEST_F(Shards, ThatAreDamagedLeaveNothing) {
     EXPECT_NE(run.err.find(member), std::string::npos) << run.err;
   }
   EXPECT_FALSE(place.has("b.npy"));
+}
+
+TEST_F(Shards, WhoseChunksOrRunsAreOthersAreRefused) {
+  const auto refuses = [&](const std::vector<std::string>& shards,
+                           const std::vector<std::string>& words, int code,
+                           const std::string& what) {
+    const auto before = place.names();
+    const RunResult run = merge(shards, words);
+    EXPECT_EQ(run.exit_code, code) << what << run.err;
+    EXPECT_NE(run.err.find(what), std::string::npos) << run.err;
+    EXPECT_EQ(place.names(), before);
+  };
+  const auto chunks = make_shards(kKnot, "a.zarr", 2);
+  const std::vector<std::string> to_zarr = {"-o", "b.zarr"};
+  fs::path chunk;
+  for (const auto& entry : fs::directory_iterator(place.path(chunks[1] + "/chunks"))) {
+    if (entry.is_regular_file() && entry.path().filename().string()[0] != '.') chunk = entry;
+  }
+  ASSERT_FALSE(chunk.empty());
+  const fs::path kept = place.path("kept");
+  fs::rename(chunk, kept);
+  refuses(chunks, to_zarr, 3, chunks[1] + ": the chunks must have ");
+  fs::create_symlink(kept, chunk);
+  refuses(chunks, to_zarr, 3, "no regular file");
+  fs::remove(chunk);
+  fs::rename(kept, chunk);
+  refuses(chunks, {"-o", chunks[1] + "/b.zarr"}, 2, "must not lie in the shard " + chunks[1]);
+  refuses(chunks, {"--json=" + chunks[1] + "/shard.json"}, 2, "must not lie in the shard");
+  EXPECT_EQ(merge(chunks, to_zarr).exit_code, 0);
+
+  std::vector<std::string> arguments = kKnot;
+  arguments.insert(arguments.begin() + 1, "ball.stl");
+  arguments.emplace_back("--ids");
+  const auto labelled = make_shards(arguments, "c.npy", 2);
+  for (const auto& [from, to, what] : std::vector<std::array<std::string, 3>>{
+           {"\"ids\": 2", "\"ids\": 1", "a label must be at most 1, got 2"},
+           {"\"solid\": ", "\"solid\": 1", "solid voxels, got"}}) {
+    std::map<std::string, std::string> reports;
+    for (const std::string& shard : labelled) {
+      const std::string report = reports[shard] = place.read(shard + "/shard.json");
+      const std::size_t at = report.find(from, report.find("\"voxels\": {"));
+      const std::size_t part = at == std::string::npos ? report.find(from) : at;
+      ASSERT_NE(part, std::string::npos) << report;
+      place.write(shard + "/shard.json", std::string(report).replace(part, from.size(), to));
+    }
+    refuses(labelled, {"-o", "d.nrrd"}, 3, what);
+    for (const auto& [shard, report] : reports) place.write(shard + "/shard.json", report);
+  }
+  EXPECT_EQ(merge(labelled, {"-o", "d.nrrd"}).exit_code, 0);
+  ASSERT_EQ(mkfifo(place.path("pipe").c_str(), 0600), 0);
+  refuses({"pipe"}, {"--stats"}, 3, "no regular file");
 }
 
 TEST_F(Shards, DoNotReplaceAFolderWithContent) {
