@@ -3,6 +3,8 @@
 #include <bit>
 #include <cstdint>
 
+#include "core/split_mix.h"
+
 // xoshiro256** and SplitMix64, after: Blackman, Vigna, "Scrambled Linear Pseudorandom Number
 // Generators", 2021. Own code, because the distributions of the standard library differ from
 // platform to platform, and offsets must not.
@@ -39,11 +41,9 @@ class Random {
 
  private:
   static constexpr std::uint64_t split_mix(std::uint64_t& seed) {
+    const std::uint64_t mixed = strata::split_mix(seed);
     seed += 0x9e3779b97f4a7c15u;
-    std::uint64_t mixed = seed;
-    mixed = (mixed ^ mixed >> 30) * 0xbf58476d1ce4e5b9u;
-    mixed = (mixed ^ mixed >> 27) * 0x94d049bb133111ebu;
-    return mixed ^ mixed >> 31;
+    return mixed;
   }
 
   std::uint64_t state_[4]{};

@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <numeric>
 
+#include "core/split_mix.h"
+
 namespace strata {
 namespace {
 
@@ -28,17 +30,9 @@ constexpr std::uint64_t reduce(Wide value) {
   return add_modulo(sum & kPrime, sum >> 61);
 }
 
-// splitmix64 (Steele, Lea, Flood, 2014)
-constexpr std::uint64_t mix(std::uint64_t value) {
-  value += 0x9e3779b97f4a7c15u;
-  value = (value ^ value >> 30) * 0xbf58476d1ce4e5b9u;
-  value = (value ^ value >> 27) * 0x94d049bb133111ebu;
-  return value ^ value >> 31;
-}
-
 // Never 0, so that no layer of voxels is overlooked.
 std::uint64_t factor(std::size_t axis, std::size_t index) {
-  return mix(mix(axis + 1) ^ index) % (kPrime - 1) + 1;
+  return split_mix(split_mix(axis + 1) ^ index) % (kPrime - 1) + 1;
 }
 
 }  // namespace
@@ -93,12 +87,12 @@ void SetChecksum::add(const VoxelIntervals& slab, const Execution& execution) {
 void SetChecksum::add_sum(std::uint64_t sum) { sum_ = add_modulo(sum_, sum % kPrime); }
 
 std::uint64_t SetChecksum::value() const {
-  std::uint64_t hash = mix(sum_);
+  std::uint64_t hash = split_mix(sum_);
   for (int axis = 0; axis < 3; ++axis) {
-    hash = mix(hash ^ static_cast<std::uint64_t>(grid_.dims[axis]));
+    hash = split_mix(hash ^ static_cast<std::uint64_t>(grid_.dims[axis]));
     // Adding 0 turns -0 into 0: equal grids must not differ here.
-    hash = mix(hash ^ std::bit_cast<std::uint64_t>(grid_.origin[axis] + 0.0));
-    hash = mix(hash ^ std::bit_cast<std::uint64_t>(grid_.voxel_size[axis]));
+    hash = split_mix(hash ^ std::bit_cast<std::uint64_t>(grid_.origin[axis] + 0.0));
+    hash = split_mix(hash ^ std::bit_cast<std::uint64_t>(grid_.voxel_size[axis]));
   }
   return hash;
 }

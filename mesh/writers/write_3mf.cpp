@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "core/markup.h"
+#include "core/split_mix.h"
 #include "mesh/writers/mesh_blocks.h"
 #include "mesh/writers/zip_output.h"
 
@@ -42,17 +43,11 @@ constexpr const char* kUnits[] = {"micron", "millimeter", "centimeter", "meter",
 /// closed together is 0.
 std::vector<std::uint64_t> edge_sums(const SolidMesh& mesh) {
   std::vector<std::uint64_t> sums(mesh.parts.size(), 0);
-  const auto number = [](std::uint64_t edge) {  // the finalizer of splitmix64 (Steele et al. 2014)
-    edge += 0x9e3779b97f4a7c15u;
-    edge = (edge ^ edge >> 30) * 0xbf58476d1ce4e5b9u;
-    edge = (edge ^ edge >> 27) * 0x94d049bb133111ebu;
-    return edge ^ edge >> 31;
-  };
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     std::uint64_t& sum = sums[part_of(mesh, t)];
     for (int k = 0; k < 3; ++k) {
       const std::uint64_t a = mesh.triangles[t][k], b = mesh.triangles[t][(k + 1) % 3];
-      sum += a < b ? number(a << 32 | b) : 0 - number(b << 32 | a);
+      sum += a < b ? split_mix(a << 32 | b) : 0 - split_mix(b << 32 | a);
     }
   }
   return sums;

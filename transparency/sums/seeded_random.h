@@ -3,6 +3,8 @@
 #include <cstdint>
 #include <initializer_list>
 
+#include "core/split_mix.h"
+
 namespace strata::transparency {
 
 /// Random numbers that depend on nothing but the numbers they are seeded with: a pixel and its
@@ -11,10 +13,10 @@ namespace strata::transparency {
 class SeededRandom {
  public:
   SeededRandom(std::initializer_list<std::uint64_t> seeds) {
-    for (const std::uint64_t seed : seeds) state_ = mix(state_ ^ seed);
+    for (const std::uint64_t seed : seeds) state_ = split_mix(state_ ^ seed);
   }
 
-  std::uint64_t next() { return mix(state_ += kStep); }
+  std::uint64_t next() { return split_mix(state_ += kStep); }
   /// In [0, 1).
   double unit() { return static_cast<double>(next() >> 32) * 0x1p-32; }
   /// In [0, end). @pre 0 < end < 2^16, so that the bias is below 2^-16
@@ -22,12 +24,6 @@ class SeededRandom {
 
  private:
   static constexpr std::uint64_t kStep = 0x9e3779b97f4a7c15u;
-  static std::uint64_t mix(std::uint64_t x) {
-    x += kStep;
-    x = (x ^ x >> 30) * 0xbf58476d1ce4e5b9u;
-    x = (x ^ x >> 27) * 0x94d049bb133111ebu;
-    return x ^ x >> 31;
-  }
 
   std::uint64_t state_ = 0;
 };
