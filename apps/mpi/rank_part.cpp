@@ -9,6 +9,7 @@
 
 #include "apps/session/file_conflicts.h"
 #include "apps/session/json_writer.h"
+#include "apps/session/session.h"
 #include "strata/voxelize/checksum.h"
 #include "voxelize/output/file_pair.h"
 
@@ -63,20 +64,6 @@ void unpack(const std::string& bytes, SetChecksum& checksum, BoundaryArea& area)
     seams.push_back(std::move(seam));
   }
   area.add({0, 0, 0}, std::move(seams));
-}
-
-/// The numbers that are sums, for all ranks in the same order.
-template <class Visit>
-void visit_sums(VoxelizeOutcome& outcome, Visit&& visit) {
-  VoxelizeReport& report = outcome.report;
-  for (std::uint64_t* number :
-       {&report.solid_voxels, &report.intervals, &report.crossings, &report.unbalanced_columns,
-        &report.negative_columns, &report.rebuilt_tiles}) {
-    visit(*number);
-  }
-  for (std::uint64_t& columns : report.depth_histogram) visit(columns);
-  for (std::uint64_t& faces : outcome.part.faces) visit(faces);
-  for (std::uint64_t& voxels : outcome.id_voxels) visit(voxels);
 }
 
 }  // namespace
@@ -246,11 +233,7 @@ Result<void> RankPart::complete(const VoxelizeCommand& command, VoxelizeOutcome&
   for (int rank = 0; rank < peers_->size(); ++rank) json.value(part_name(rank));
   json.end_array();
   json.end_object();
-  auto index = AtomicFile::create(place_ + "/" + kPartsIndex);
-  if (!index) return tl::unexpected(index.error());
-  const std::string text = json.take();
-  if (auto written = index->write(text.data(), text.size()); !written) return written;
-  if (auto there = index->commit(); !there) return there;
+  if (auto told = print_report(json.take(), place_ + "/" + kPartsIndex, false); !told) return told;
   return folder_->commit();
 }
 

@@ -8,6 +8,21 @@
 
 namespace strata::apps {
 
+/// Visits the numbers of a job's first pass that add up over its parts, always in the same order;
+/// those of solids come last. @tparam Outcome  VoxelizeOutcome, const or not
+template <class Outcome, class Visit>
+void visit_sums(Outcome& outcome, Visit&& visit) {
+  auto& report = outcome.report;
+  for (auto* number :
+       {&report.solid_voxels, &report.intervals, &report.crossings, &report.unbalanced_columns,
+        &report.negative_columns, &report.rebuilt_tiles}) {
+    visit(*number);
+  }
+  for (auto& columns : report.depth_histogram) visit(columns);
+  for (auto& faces : outcome.part.faces) visit(faces);
+  for (auto& voxels : outcome.id_voxels) visit(voxels);
+}
+
 /// The share of this process in a job that several do: which rows of the grid it makes, and where
 /// its voxels go.
 class JobPart {

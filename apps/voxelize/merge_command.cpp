@@ -69,22 +69,14 @@ Result<void> put_file(const fs::path& from, const fs::path& to) {
   return fail(ErrorCode::kOutput, "{}: cannot write: {}", to.string(), reason.message());
 }
 
-/// Whether a path lies in a folder, or is it.
-bool lies_in(const std::string& path, const std::string& folder) {
-  std::error_code ignored;
-  const fs::path from = fs::weakly_canonical(fs::absolute(folder, ignored), ignored);
-  const fs::path relative =
-      fs::weakly_canonical(fs::absolute(path, ignored), ignored).lexically_relative(from);
-  return !relative.empty() && *relative.begin() != "..";
-}
-
 /// Checks that no output would lie among what is read.
 Result<void> check_outputs(const MergeCommand& command) {
   for (const std::string& shard : command.shards) {
     std::error_code ignored;
     if (!fs::is_directory(shard, ignored)) continue;
     for (const std::string& output : {command.output, command.json.value_or("")}) {
-      if (output.empty() || output == "-" || !lies_in(output, shard)) continue;
+      if (output.empty() || output == "-") continue;
+      if (!lies_below(fs::absolute(output, ignored).string(), shard)) continue;
       return fail(ErrorCode::kUsage, "{} must not lie in the shard {}", output, shard);
     }
   }
@@ -128,22 +120,6 @@ Result<void> put_chunks(const ShardReport& report, const std::string& to,
 std::uint32_t largest_label(const VoxelWriterOptions& file) {
   if (file.rgba) return std::numeric_limits<std::uint32_t>::max();
   return std::max({file.ids, file.fog, static_cast<std::uint32_t>(file.colours.size())});
-}
-
-/// Checks the labels of a slab, which writers rely on.
-Result<void> check_labels(const VoxelIntervals& slab, std::uint32_t most,
-                          const std::string& shard) {
-  if (!slab.has_labels()) return {};
-  for (int v = slab.v_begin(); v < slab.v_end(); ++v) {
-    for (int u = 0; u < slab.columns(); ++u) {
-      for (const std::uint32_t label : slab.column_labels(u, v)) {
-        if (label <= most) continue;
-        return fail(ErrorCode::kInput, "{}: a label must be at most {}, got {}", shard, most,
-                    label);
-      }
-    }
-  }
-  return {};
 }
 
 class Merge {
@@ -258,15 +234,14 @@ Result<void> Merge::write_runs(const VoxelWriterOptions& file, const Execution& 
   for (const ShardReport& shard : shards_) {
     const auto rows = shard_rows(sum_.grid, sum_.axis, *shard.command.shard);
     if (!rows) return tl::unexpected(rows.error());
-    auto runs = RunFileReader::open(shard.path + "/" + kShardRuns, sum_.grid, sum_.axis,
-                                    rows->begin, rows->end);
+    auto runs = RunFileReader::open(shard.path + "/" + kShardRuns, sum_.grid, sum_.axis, *rows,
+                                    largest_label(file));
     if (!runs) return tl::unexpected(runs.error());
     std::uint64_t solid = 0;
     for (int v = rows->begin; v < rows->end; v += kRows) {
       const int end = std::min(rows->end, v + kRows);
       const auto slab = runs->read(end);
       if (!slab) return tl::unexpected(slab.error());
-      if (auto known = check_labels(*slab, largest_label(file), shard.path); !known) return known;
       solid += slab->solid_voxels();
       if (auto added = (*writer)->add(*slab, quiet); !added) return added;
       if (execution.progress) execution.progress(static_cast<double>(end) / all);

@@ -10,6 +10,8 @@
 #include <system_error>
 #include <utility>
 
+#include "apps/session/session.h"
+#include "core/split_mix.h"
 #include "strata/csg/tree.h"
 #include "voxelize/output/run_file.h"
 
@@ -19,14 +21,7 @@ namespace {
 /// Sum of words in their order.
 class WordHash {
  public:
-  void add(std::uint64_t word) {
-    // splitmix64 (Steele, Lea, Flood, 2014)
-    std::uint64_t value = hash_ ^ word;
-    value += 0x9e3779b97f4a7c15u;
-    value = (value ^ value >> 30) * 0xbf58476d1ce4e5b9u;
-    value = (value ^ value >> 27) * 0x94d049bb133111ebu;
-    hash_ = value ^ value >> 31;
-  }
+  void add(std::uint64_t word) { hash_ = split_mix(hash_ ^ word); }
   void add(double number) { add(std::bit_cast<std::uint64_t>(number)); }
   [[nodiscard]] std::uint64_t value() const { return hash_; }
 
@@ -130,11 +125,9 @@ Result<void> ShardPart::finish(const VoxelizeCommand& command, VoxelizeOutcome& 
   if (auto there = session.commit_outputs(); !there) return there;
   outcome.output_bytes = bytes_in(place);
   outcome.output_files = {folder_->path()};
-  auto report = AtomicFile::create(place + "/" + kShardReport);
-  if (!report) return tl::unexpected(report.error());
-  const std::string text = voxelize_json(command, outcome, session);
-  if (auto written = report->write(text.data(), text.size()); !written) return written;
-  if (auto there = report->commit(); !there) return there;
+  auto told =
+      print_report(voxelize_json(command, outcome, session), place + "/" + kShardReport, false);
+  if (!told) return told;
   if (auto there = session.commit_outputs(); !there) return there;
   return folder_->commit();
 }

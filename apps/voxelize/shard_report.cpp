@@ -454,24 +454,17 @@ Result<ShardReport> read_shard_report(const std::string& path) {
 }
 
 void add_shard(const VoxelizeOutcome& part, VoxelizeOutcome& sum) {
-  VoxelizeReport& to = sum.report;
-  const VoxelizeReport& from = part.report;
-  to.solid_voxels += from.solid_voxels;
-  to.intervals += from.intervals;
-  to.crossings += from.crossings;
-  to.max_depth_complexity = std::max(to.max_depth_complexity, from.max_depth_complexity);
-  to.unbalanced_columns += from.unbalanced_columns;
-  to.negative_columns += from.negative_columns;
-  to.rebuilt_tiles += from.rebuilt_tiles;
-  for (std::size_t n = 1; n < to.depth_histogram.size(); ++n) {
-    to.depth_histogram[n] += from.depth_histogram[n];
-  }
+  if (sum.id_voxels.size() < part.id_voxels.size()) sum.id_voxels.resize(part.id_voxels.size(), 0);
+  std::vector<std::uint64_t> numbers;
+  visit_sums(part, [&](std::uint64_t number) { numbers.push_back(number); });
+  std::size_t next = 0;
+  visit_sums(sum, [&](std::uint64_t& number) {
+    if (next < numbers.size()) number += numbers[next++];  // fewer solids than in other parts
+  });
+  sum.report.max_depth_complexity =
+      std::max(sum.report.max_depth_complexity, part.report.max_depth_complexity);
   sum.part.filled_steps += part.part.filled_steps;
   if (part.lost_walls.count > 0) sum.lost_walls = part.lost_walls;
-  if (sum.id_voxels.size() < part.id_voxels.size()) sum.id_voxels.resize(part.id_voxels.size(), 0);
-  for (std::size_t solid = 0; solid < part.id_voxels.size(); ++solid) {
-    sum.id_voxels[solid] += part.id_voxels[solid];
-  }
 }
 
 void finish_sum(const std::vector<ShardReport>& shards, VoxelizeOutcome& sum) {

@@ -105,13 +105,14 @@ tl::unexpected<Error> RunFileReader::damaged(std::string_view what) const {
 }
 
 Result<RunFileReader> RunFileReader::open(const std::string& path, const VoxelGrid& grid, Axis axis,
-                                          int begin, int end) {
+                                          const VoxelRows& rows, std::uint32_t largest_label) {
   RunFileReader reader;
   reader.path_ = path;
   reader.grid_ = grid;
   reader.axis_ = axis;
-  reader.next_ = begin;
-  reader.end_ = end;
+  reader.next_ = rows.begin;
+  reader.end_ = rows.end;
+  reader.largest_label_ = largest_label;
   struct stat status {};
   if (stat(path.c_str(), &status) == 0 && !S_ISREG(status.st_mode)) {
     return fail(ErrorCode::kInput, "{}: it is no regular file", path);
@@ -203,6 +204,10 @@ Result<void> RunFileReader::read_tile(VoxelIntervals& slab) {
       if (items[i].last < items[i].first || items[i].end() > grid_.dims[frame.w] || !after ||
           (!labels.empty() && labels[i] == 0)) {
         return damaged("a run is wrong");
+      }
+      if (!labels.empty() && labels[i] > largest_label_) {
+        return damaged(
+            fmt::format("a label must be at most {}, got {}", largest_label_, labels[i]));
       }
     }
     offsets.push_back(static_cast<std::uint32_t>(past));

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "strata/voxelize/voxelize.h"
 #include "voxelize/output/writers.h"
 
 namespace strata {
@@ -24,9 +25,11 @@ VoxelWriterResult open_run_writer(const std::string& path, const VoxelGrid& grid
 /// Reads it. The file may be cut or changed by anyone.
 class RunFileReader {
  public:
-  /// @param begin, end  the rows that it holds @return kInput naming the file
+  /// @param rows  those that it holds
+  /// @param largest_label  writers rely on it; 0: runs have no labels
+  /// @return kInput naming the file
   static Result<RunFileReader> open(const std::string& path, const VoxelGrid& grid, Axis axis,
-                                    int begin, int end);
+                                    const VoxelRows& rows, std::uint32_t largest_label);
   /// The next rows, up to `end`: a multiple of VoxelIntervals::kTileSide, or the end of all.
   /// @return kInput naming the file and the tile
   Result<VoxelIntervals> read(int end);
@@ -51,6 +54,7 @@ class RunFileReader {
   VoxelGrid grid_;
   Axis axis_ = Axis::kZ;
   int next_ = 0, end_ = 0;  // rows
+  std::uint32_t largest_label_ = 0;
   std::unique_ptr<std::FILE, Close> file_;
   std::uint64_t left_ = 0;  // bytes of the file
   Head head_;               // of the next tile

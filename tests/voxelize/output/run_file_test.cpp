@@ -67,7 +67,7 @@ struct RunFile : ::testing::Test {
   }
   /// Reads all of it. @return the numbers, or nothing
   [[nodiscard]] Result<std::vector<std::uint32_t>> read(Axis axis, int begin, int end) const {
-    auto reader = RunFileReader::open(path, kRunGrid, axis, begin, end);
+    auto reader = RunFileReader::open(path, kRunGrid, axis, {begin, end}, 1000000);
     if (!reader) return tl::unexpected(reader.error());
     std::vector<std::uint32_t> all;
     for (int v = begin; v < end; v += 64) {
