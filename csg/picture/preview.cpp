@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <atomic>
 #include <functional>
 #include <glm/geometric.hpp>
 #include <new>
@@ -24,8 +23,10 @@ class Frame {
   Frame(const Program& program, const Geometry& geometry, double world_error)
       : program_(&program), geometry_(&geometry), world_error_(world_error) {}
 
-  /// What is to be done with a tile's surfaces: pixels `rect` of the picture.
-  using OnTile = std::function<void(const SurfaceImage& tile, const PixelRect& rect)>;
+  /// What is to be done with a tile's surfaces: pixels `rect` of the picture. Null: nothing is
+  /// seen.
+  using OnTile =
+      std::function<void(const SurfaceImage* tile, const PixelRect& rect, std::size_t worker)>;
 
   /// Finds all surfaces. With `on_tile` they are handed to it, from any thread, and image() is not
   /// kept: memory is slower than the search.
@@ -100,17 +101,19 @@ class Frame {
       tile_images_.emplace_back().resize(kTileSide, kTileSide);
     }
     for (const auto& finder : finders_) finder->reset_counts();
-    parallel_for(execution, tiles.size(), [&](std::size_t i, int worker) {
+    parallel_for(execution, tiles.size(), [&](std::size_t i, int thread) {
+      const auto worker = static_cast<std::size_t>(thread);
       const auto tile = static_cast<int>(tiles[i]);
       const int tile_u = tile % tiles_.tiles_u, tile_v = tile / tiles_.tiles_u;
       const PixelRect rect{tile_u * kTileSide, tile_v * kTileSide,
                            std::min(tiles_.view.size.x, (tile_u + 1) * kTileSide),
                            std::min(tiles_.view.size.y, (tile_v + 1) * kTileSide)};
+      const auto solids = tiles_.solids.at(static_cast<std::size_t>(tile));
+      if (on_tile && solids.empty()) return on_tile(nullptr, rect, worker);
       SurfacePart part{&image_};
-      if (on_tile) part = {&tile_images_[static_cast<std::size_t>(worker)], rect.u0, rect.v0};
-      finders_[static_cast<std::size_t>(worker)]->find(
-          tile_u, tile_v, tiles_.solids.at(static_cast<std::size_t>(tile)), part, execution.stop);
-      if (on_tile) on_tile(*part.image, rect);
+      if (on_tile) part = {&tile_images_[worker], rect.u0, rect.v0};
+      finders_[worker]->find(tile_u, tile_v, solids, part, execution.stop);
+      if (on_tile) on_tile(part.image, rect, worker);
     });
     report_.fragments = report_.resolved = 0;
     for (const auto& finder : finders_) {
@@ -273,15 +276,18 @@ Result<void> Preview::Impl::lay_shadow(const View& whole, const Backdrop& backdr
 /// Shades the pixels of a band tile by tile, while the tiles are drawn.
 Result<void> Preview::Impl::shade_tiles(const Band& band, const Look& look,
                                         const Execution& execution, Work& work) {
-  std::atomic<std::uint64_t> covered{0};
   const SampleRows rows{look.samples.across, look.samples.down, look.ground(band.first)};
-  const auto on_tile = [&](const SurfaceImage& tile, const PixelRect& rect) {
-    covered += shade_tile(tile, rect, rows, look.shader, band.width, band.pixels);
+  std::vector<TileShader> shaders;  // by worker
+  for (int i = 0; i < execution.thread_count(); ++i) {
+    shaders.emplace_back(rows, look.shader, band.width, band.pixels);
+  }
+  const auto on_tile = [&](const SurfaceImage* tile, const PixelRect& rect, std::size_t worker) {
+    return tile != nullptr ? shaders[worker].shade(*tile, rect) : shaders[worker].leave(rect);
   };
   if (auto done = frame.draw(band.view, execution, on_tile); !done) return done;
   work.total.fragments += frame.report().fragments;
   work.total.resolved += frame.report().resolved;
-  work.total.covered += covered;
+  for (const TileShader& shader : shaders) work.total.covered += shader.covered();
   return {};
 }
 

@@ -6,8 +6,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
-
-#include "picture/average.h"
+#include <type_traits>
 
 #include "picture/average.h"
 
@@ -171,30 +170,39 @@ bool Shader::same_plane(std::uint32_t solid_a, std::uint32_t face_a, std::uint32
 
 namespace {
 
-/// Whether samples show one face, or nothing.
-struct Alike {
-  std::uint32_t solid, face;
-  std::uint32_t other = 0, present = 0, absent = 0;
+/// What samples show that are looked at together.
+enum class Seen { kNothing, kOneFace, kSeveral };
+/// So many of a row: most show one face, or nothing.
+constexpr std::size_t kAtOnce = 16;
 
-  Alike(const SurfaceImage& image, std::size_t at)
-      : solid(image.solid[at]), face(image.triangle[at]) {}
-  void add(const SurfaceImage& image, std::size_t begin, std::size_t count) {
-    const std::uint32_t* depths = image.depth.data() + begin;
-    const std::uint32_t* solids = image.solid.data() + begin;
-    const std::uint32_t* faces = image.triangle.data() + begin;
-    for (std::size_t i = 0; i < count; ++i) {
+/// Looks at some samples from `begin` on in each of some rows. @param columns  std::size_t, or
+/// Block, which is quick
+using Block = std::integral_constant<std::size_t, kAtOnce>;
+template <class Columns>
+Seen look_at(const SurfaceImage& image, std::size_t begin, Columns columns, int rows) {
+  const auto width = static_cast<std::size_t>(image.width);
+  const std::uint32_t* depths = image.depth.data() + begin;
+  if (*depths == SurfaceImage::kNone) {
+    std::uint32_t present = 0;
+    for (int y = 0; y < rows; ++y, depths += width) {
+      for (std::size_t i = 0; i < columns; ++i) present |= ~depths[i];
+    }
+    return present == 0 ? Seen::kNothing : Seen::kSeveral;
+  }
+  const std::uint32_t* solids = image.solid.data() + begin;
+  const std::uint32_t* faces = image.triangle.data() + begin;
+  const std::uint32_t solid = *solids, face = *faces;
+  std::uint32_t other = 0;
+  for (int y = 0; y < rows; ++y, depths += width, solids += width, faces += width) {
+    for (std::size_t i = 0; i < columns; ++i) {
       other |= (solids[i] ^ solid) | (faces[i] ^ face);
-      const std::uint32_t inverse = ~depths[i];  // 0: nothing
-      present |= inverse;
-      absent |= inverse == 0 ? 1u : 0u;
+      other |= depths[i] == SurfaceImage::kNone ? 1u : 0u;
     }
   }
-  [[nodiscard]] bool nothing() const { return present == 0; }
-  [[nodiscard]] bool one_face() const { return (other | absent) == 0; }
-};
+  return other == 0 ? Seen::kOneFace : Seen::kSeveral;
+}
 
-/// Samples that are looked at together: most show one face, or nothing.
-constexpr std::size_t kAtOnce = 16;
+}  // namespace
 
 /// Colours samples one after another.
 class SampleShader {
@@ -206,12 +214,13 @@ class SampleShader {
   void row(const SurfaceImage& image, std::size_t begin, std::size_t count, int across, int v,
            Rgba* colours) {
     for (std::size_t block = 0; block < count; block += kAtOnce) {
-      const std::size_t end = std::min(count, block + kAtOnce);
-      Alike alike(image, begin + block);
-      alike.add(image, begin + block, end - block);
-      if (alike.nothing()) {
+      const std::size_t end = std::min(count, block + kAtOnce), at_first = begin + block;
+      const Seen seen =
+          end - block == kAtOnce ? look_at(image, at_first, Block(), 1) : Seen::kSeveral;
+      if (seen == Seen::kNothing) {
         std::fill(colours + block, colours + end, Rgba(0));
-      } else if (alike.one_face() && uniform(alike.solid, alike.face)) {
+      } else if (seen == Seen::kOneFace &&
+                 uniform(image.solid[at_first], image.triangle[at_first])) {
         std::fill(colours + block, colours + end, last_->colour);
       } else {
         for (std::size_t i = block; i < end; ++i) {
@@ -243,7 +252,7 @@ class SampleShader {
 
  private:
   /// Faces met before that are kept.
-  static constexpr std::size_t kKept = 32;
+  static constexpr std::size_t kKept = 128;
   struct Kept {
     std::uint32_t solid = SurfaceImage::kNone, tagged = 0;
     Shader::Face face;
@@ -254,8 +263,6 @@ class SampleShader {
   const Shader::Face* last_ = nullptr;
   std::vector<Kept> kept_;
 };
-
-}  // namespace
 
 void shade(const SurfaceImage& image, const SampleRows& rows, const Shader& shader,
            const Execution& execution, std::span<Rgba> colours) {
@@ -270,88 +277,92 @@ void shade(const SurfaceImage& image, const SampleRows& rows, const Shader& shad
   });
 }
 
-namespace {
+TileShader::TileShader(const SampleRows& rows, const Shader& shader, int width,
+                       std::span<Rgba> pixels)
+    : rows_(rows),
+      width_(static_cast<std::size_t>(width)),
+      pixels_(pixels),
+      samples_(std::make_unique<SampleShader>(shader)) {}
 
-/// The pixels of a tile.
-class TileShader {
- public:
-  TileShader(const SurfaceImage& tile, const SampleRows& rows, const Shader& shader)
-      : tile_(&tile), rows_(rows), samples_(shader) {}
+TileShader::TileShader(TileShader&&) noexcept = default;
+TileShader::~TileShader() = default;
 
-  /// Colours pixels of row `v` of the picture from `u` on; their first sample is at `begin`.
-  void row(std::size_t begin, int u, int v, Rgba background, std::size_t count, Rgba* colours) {
-    background_ = background;
-    const auto across = static_cast<std::size_t>(rows_.across);
-    const std::size_t at_once = kAtOnce / across, width = static_cast<std::size_t>(tile_->width);
-    for (std::size_t block = 0; block < count; block += at_once) {
-      const std::size_t pixels = std::min(at_once, count - block), first = begin + block * across;
-      Alike alike(*tile_, first);
-      for (int y = 0; y < rows_.down; ++y) {
-        alike.add(*tile_, first + static_cast<std::size_t>(y) * width, pixels * across);
-      }
-      if (alike.nothing()) {
-        std::fill_n(colours + block, pixels, background_);
-      } else if (alike.one_face() && samples_.uniform(alike.solid, alike.face)) {
-        std::fill_n(colours + block, pixels, samples_.colour());
-        covered_ += pixels;
-      } else {
-        for (std::size_t i = 0; i < pixels; ++i) {
-          colours[block + i] = pixel(first + i * across, u + static_cast<int>(block + i), v);
-        }
-      }
-    }
-  }
-  [[nodiscard]] std::uint64_t covered() const { return covered_; }
-
- private:
-  /// Pixel (u, v) of the picture, whose first sample is at `begin`.
-  Rgba pixel(std::size_t begin, int u, int v) {
-    const auto across = static_cast<std::size_t>(rows_.across);
-    const auto width = static_cast<std::size_t>(tile_->width);
-    std::size_t last = begin;
-    Rgba colour(0), pixel;
-    auto sample = colours_.begin();
-    for (int y = 0; y < rows_.down; ++y) {
-      const std::size_t first = begin + static_cast<std::size_t>(y) * width;
-      for (std::size_t at = first; at < first + across; ++at, ++sample) {
-        *sample = Rgba(0);
-        if (tile_->depth[at] == SurfaceImage::kNone) continue;
-        if (colour.a == 0 || tile_->solid[at] != tile_->solid[last] ||
-            tile_->triangle[at] != tile_->triangle[last]) {
-          colour = samples_.at(tile_->solid[at], tile_->triangle[at], u, v);
-          last = at;
-        }
-        *sample = colour;
-      }
-    }
-    covered_ += average_row(colours_.data(), across, rows_.across, rows_.down, background_,
-                            std::span(&pixel, 1));
-    return pixel;
-  }
-
-  const SurfaceImage* tile_;
-  SampleRows rows_;
-  SampleShader samples_;
-  Rgba background_{0};
-  std::array<Rgba, 64> colours_;  ///< of the samples of a pixel
-  std::uint64_t covered_ = 0;
-};
-
-}  // namespace
-
-std::uint64_t shade_tile(const SurfaceImage& tile, const PixelRect& rect, const SampleRows& rows,
-                         const Shader& shader, int width, std::span<Rgba> pixels) {
-  TileShader shaded(tile, rows, shader);
-  const int left = rect.u0 / rows.across, right = rect.u1 / rows.across;
-  for (int v = rect.v0 / rows.down; v < rect.v1 / rows.down; ++v) {
-    const std::size_t row = static_cast<std::size_t>(v) * static_cast<std::size_t>(width);
+void TileShader::shade(const SurfaceImage& tile, const PixelRect& rect) {
+  const int left = rect.u0 / rows_.across, right = rect.u1 / rows_.across;
+  for (int v = rect.v0 / rows_.down; v < rect.v1 / rows_.down; ++v) {
     const std::size_t begin =
-        static_cast<std::size_t>(v * rows.down - rect.v0) * static_cast<std::size_t>(tile.width);
-    shaded.row(begin, left, rows.ground.first + v, rows.ground.at(v),
-               static_cast<std::size_t>(right - left),
-               pixels.data() + row + static_cast<std::size_t>(left));
+        static_cast<std::size_t>(v * rows_.down - rect.v0) * static_cast<std::size_t>(tile.width);
+    shade_row(tile, begin, left, v, static_cast<std::size_t>(right - left));
   }
-  return shaded.covered();
+}
+
+void TileShader::leave(const PixelRect& rect) {
+  const int left = rect.u0 / rows_.across, right = rect.u1 / rows_.across;
+  for (int v = rect.v0 / rows_.down; v < rect.v1 / rows_.down; ++v) {
+    std::fill_n(row_of(left, v), right - left, rows_.ground.at(v));
+  }
+}
+
+/// Colours pixels of row `v` from `u` on; their first sample is at `begin`.
+void TileShader::shade_row(const SurfaceImage& tile, std::size_t begin, int u, int v,
+                           std::size_t count) {
+  Rgba* const colours = row_of(u, v);
+  const Rgba background = rows_.ground.at(v);
+  const auto across = static_cast<std::size_t>(rows_.across);
+  const std::size_t at_once = kAtOnce / across;
+  for (std::size_t block = 0; block < count; block += at_once) {
+    const std::size_t pixels = std::min(at_once, count - block), first = begin + block * across;
+    const Seen seen =
+        pixels == at_once ? look_at(tile, first, Block(), rows_.down) : Seen::kSeveral;
+    if (seen == Seen::kNothing) {
+      std::fill_n(colours + block, pixels, background);
+      continue;
+    }
+    if (seen == Seen::kOneFace) {
+      covered_ += pixels;
+      if (samples_->uniform(tile.solid[first], tile.triangle[first])) {
+        std::fill_n(colours + block, pixels, samples_->colour());
+        continue;
+      }
+    }
+    for (std::size_t i = 0; i < pixels; ++i) {
+      const int column = u + static_cast<int>(block + i), row = rows_.ground.first + v;
+      colours[block + i] = seen == Seen::kOneFace
+                               ? samples_->at(tile.solid[first], tile.triangle[first], column, row)
+                               : pixel(tile, first + i * across, column, row, background);
+    }
+  }
+}
+
+/// Pixel (u, v) of the picture, whose first sample is at `begin`.
+Rgba TileShader::pixel(const SurfaceImage& tile, std::size_t begin, int u, int v, Rgba background) {
+  const auto across = static_cast<std::size_t>(rows_.across);
+  const auto width = static_cast<std::size_t>(tile.width);
+  const Seen seen = look_at(tile, begin, across, rows_.down);
+  if (seen == Seen::kNothing) return background;
+  if (seen == Seen::kOneFace) {
+    ++covered_;
+    return samples_->at(tile.solid[begin], tile.triangle[begin], u, v);
+  }
+  std::size_t last = begin;
+  Rgba colour(0), pixel;
+  auto sample = colours_.begin();
+  for (int y = 0; y < rows_.down; ++y) {
+    const std::size_t first = begin + static_cast<std::size_t>(y) * width;
+    for (std::size_t at = first; at < first + across; ++at, ++sample) {
+      *sample = Rgba(0);
+      if (tile.depth[at] == SurfaceImage::kNone) continue;
+      if (colour.a == 0 || tile.solid[at] != tile.solid[last] ||
+          tile.triangle[at] != tile.triangle[last]) {
+        colour = samples_->at(tile.solid[at], tile.triangle[at], u, v);
+        last = at;
+      }
+      *sample = colour;
+    }
+  }
+  covered_ += average_row(colours_.data(), across, rows_.across, rows_.down, background,
+                          std::span(&pixel, 1));
+  return pixel;
 }
 
 void draw_edges(const SurfaceImage& image, const Shader& shader, int step_u, int step_v,

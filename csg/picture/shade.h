@@ -5,6 +5,7 @@
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -104,11 +105,38 @@ struct SampleRows {
 void shade(const SurfaceImage& image, const SampleRows& rows, const Shader& shader,
            const Execution& execution, std::span<Rgba> colours);
 
-/// The same for the samples `rect` of an image; `tile` begins there. Averages them at once, as
-/// average() does. @param pixels  `width` wide, from the first row of rows.ground on
-/// @return how many pixels show something
-std::uint64_t shade_tile(const SurfaceImage& tile, const PixelRect& rect, const SampleRows& rows,
-                         const Shader& shader, int width, std::span<Rgba> pixels);
+class SampleShader;
+
+/// The same for a picture whose samples are found tile by tile; averages them at once, as average()
+/// does. A thread has one of its own, which keeps faces from tile to tile.
+class TileShader {
+ public:
+  /// @param pixels  `width` wide, from the first row of rows.ground on; borrowed as the shader is
+  TileShader(const SampleRows& rows, const Shader& shader, int width, std::span<Rgba> pixels);
+  TileShader(TileShader&&) noexcept;
+  ~TileShader();
+
+  /// Colours the pixels of the samples `rect`; `tile` begins there.
+  void shade(const SurfaceImage& tile, const PixelRect& rect);
+  /// The same where nothing is seen.
+  void leave(const PixelRect& rect);
+  /// How many pixels show something.
+  [[nodiscard]] std::uint64_t covered() const { return covered_; }
+
+ private:
+  [[nodiscard]] Rgba* row_of(int u, int v) const {
+    return pixels_.data() + static_cast<std::size_t>(v) * width_ + static_cast<std::size_t>(u);
+  }
+  void shade_row(const SurfaceImage& tile, std::size_t begin, int u, int v, std::size_t count);
+  Rgba pixel(const SurfaceImage& tile, std::size_t begin, int u, int v, Rgba background);
+
+  SampleRows rows_;
+  std::size_t width_;
+  std::span<Rgba> pixels_;
+  std::unique_ptr<SampleShader> samples_;
+  std::array<Rgba, 64> colours_;  ///< of the samples of a pixel
+  std::uint64_t covered_ = 0;
+};
 
 /// Darkens the colours where the faces of neighbours, `step_u` and `step_v` samples apart, differ.
 void draw_edges(const SurfaceImage& image, const Shader& shader, int step_u, int step_v,
