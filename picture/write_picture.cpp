@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cstring>
 #include <memory>
 #include <new>
 #include <optional>
@@ -45,52 +46,72 @@ class Palette {
 struct PngImage {
   /// PNG's numbers: 2 red, green, blue; 3 palette; 6 with alpha.
   std::uint8_t colour_type = 6;
-  std::uint8_t bits = 8;  ///< a channel
-  std::size_t row_bytes = 0;
-  std::vector<std::uint8_t> bytes;
+  std::uint8_t bits = 8;      ///< a channel
+  std::size_t row_bytes = 0;  ///< with the byte that says how the row is filtered: not at all
+  std::size_t size = 0;       ///< of all rows
+  std::unique_ptr<std::uint8_t[]> rows;
   std::vector<std::uint8_t> palette;  ///< red, green, blue, ...
   std::vector<std::uint8_t> alpha;    ///< of the palette, unless all of it is opaque
 };
 
-/// Puts indices of few colours 2, 4 or 8 a byte: the fewer bytes, the less to compress.
-void pack(PngImage& image, int width, std::size_t colours) {
-  const std::size_t bits = colours <= 2 ? 1 : colours <= 4 ? 2 : colours <= 16 ? 4 : 8;
-  if (bits == 8) return;
-  const std::size_t per_byte = 8 / bits, columns = static_cast<std::size_t>(width);
-  const std::size_t rows = image.bytes.size() / columns;
-  const std::size_t row_bytes = (columns + per_byte - 1) / per_byte;
-  std::uint8_t* to = image.bytes.data();  // never beyond what is read
-  for (std::size_t row = 0; row < rows; ++row) {
-    const std::uint8_t* from = image.bytes.data() + row * columns;
-    for (std::size_t begin = 0; begin < columns; begin += per_byte) {
-      unsigned byte = 0;
-      const std::size_t end = std::min(columns, begin + per_byte);
-      for (std::size_t i = begin; i < end; ++i) byte = byte << bits | from[i];
-      *to++ = static_cast<std::uint8_t>(byte << bits * (begin + per_byte - end));
-    }
+/// Makes room for rows of `row_bytes` bytes, and calls fill(row, bytes) for each. Nothing is
+/// filtered: faces are runs of one colour, which deflate finds as they are.
+template <class Fill>
+void make_rows(PngImage& image, int height, std::size_t row_bytes, std::size_t slack, Fill&& fill) {
+  image.row_bytes = row_bytes + 1;
+  image.size = image.row_bytes * static_cast<std::size_t>(height);
+  image.rows = std::make_unique_for_overwrite<std::uint8_t[]>(image.size + slack);
+  for (std::size_t row = 0; row < static_cast<std::size_t>(height); ++row) {
+    std::uint8_t* const to = image.rows.get() + row * image.row_bytes;
+    *to = 0;
+    fill(row, to + 1);
   }
-  image.bytes.resize(row_bytes * rows);
-  image.row_bytes = row_bytes;
-  image.bits = static_cast<std::uint8_t>(bits);
 }
 
-/// False when there are too many colours.
-bool to_palette(const Picture& picture, PngImage& image) {
-  Palette palette;
-  image.bytes.resize(picture.pixels.size());
+/// Calls use(index) for all pixels from `begin` to `end`.
+/// @return false when there are too many colours
+template <class Use>
+bool for_each_index(Palette& palette, const Rgba* begin, const Rgba* end, Use&& use) {
   std::uint32_t last = 0;
   std::optional<std::uint8_t> index;
-  for (std::size_t i = 0; i < picture.pixels.size(); ++i) {
-    const auto colour = std::bit_cast<std::uint32_t>(picture.pixels[i]);
+  for (const Rgba* pixel = begin; pixel != end; ++pixel) {
+    const auto colour = std::bit_cast<std::uint32_t>(*pixel);
     if (!index || colour != last) {
       index = palette.index(colour);
       if (!index) return false;
       last = colour;
     }
-    image.bytes[i] = *index;
+    use(*index);
   }
+  return true;
+}
+
+/// False when there are too many colours.
+bool to_palette(const Picture& picture, PngImage& image) {
+  Palette palette;
+  const Rgba* const pixels = picture.pixels.data();
+  if (!for_each_index(palette, pixels, pixels + picture.pixels.size(), [](std::uint8_t) {})) {
+    return false;
+  }
+  // Indices of few colours are put 2, 4 or 8 a byte: the fewer bytes, the less to compress.
+  const std::size_t colours = palette.colours().size();
+  const unsigned bits = colours <= 2 ? 1 : colours <= 4 ? 2 : colours <= 16 ? 4 : 8;
+  const auto columns = static_cast<std::size_t>(picture.width);
   image.colour_type = 3;
-  image.row_bytes = static_cast<std::size_t>(picture.width);
+  image.bits = static_cast<std::uint8_t>(bits);
+  make_rows(image, picture.height, (columns * bits + 7) / 8, 0,
+            [&](std::size_t row, std::uint8_t* to) {
+              unsigned byte = 0, filled = 0;
+              const Rgba* const begin = pixels + row * columns;
+              for_each_index(palette, begin, begin + columns, [&](std::uint8_t index) {
+                byte = byte << bits | index;
+                filled += bits;
+                if (filled < 8) return;
+                *to++ = static_cast<std::uint8_t>(byte);
+                filled = 0;
+              });
+              if (filled > 0) *to = static_cast<std::uint8_t>(byte << (8 - filled));
+            });
   bool opaque = true;
   for (const std::uint32_t colour : palette.colours()) {
     const auto rgba = std::bit_cast<Rgba>(colour);
@@ -99,49 +120,39 @@ bool to_palette(const Picture& picture, PngImage& image) {
     opaque = opaque && rgba.a == 255;
   }
   if (opaque) image.alpha.clear();
-  pack(image, picture.width, palette.colours().size());
   return true;
 }
 
 PngImage to_png_image(const Picture& picture) {
   PngImage image;
   if (to_palette(picture, image)) return image;
-  const bool opaque = std::all_of(picture.pixels.begin(), picture.pixels.end(),
-                                  [](const Rgba& pixel) { return pixel.a == 255; });
-  const std::size_t channels = opaque ? 3 : 4;
-  image.colour_type = opaque ? 2 : 6;
-  image.row_bytes = static_cast<std::size_t>(picture.width) * channels;
-  image.bytes.resize(picture.pixels.size() * channels);
-  std::uint8_t* to = image.bytes.data();
-  for (const Rgba& pixel : picture.pixels) {
-    to[0] = pixel.r;
-    to[1] = pixel.g;
-    to[2] = pixel.b;
-    if (!opaque) to[3] = pixel.a;
-    to += channels;
-  }
+  unsigned alpha = 255;
+  for (const Rgba& pixel : picture.pixels) alpha &= pixel.a;
+  const std::size_t channels = alpha == 255 ? 3 : 4;
+  const auto columns = static_cast<std::size_t>(picture.width);
+  image.colour_type = channels == 3 ? 2 : 6;
+  // Each pixel is stored with its alpha, which the next one overwrites.
+  make_rows(image, picture.height, columns * channels, 1, [&](std::size_t row, std::uint8_t* to) {
+    const Rgba* const pixels = picture.pixels.data() + row * columns;
+    for (std::size_t i = 0; i < columns; ++i) {
+      std::memcpy(to + i * channels, &pixels[i], sizeof(Rgba));
+    }
+  });
   return image;
 }
 
-/// All rows, each after the byte that says how it is filtered: not at all. Faces are runs of one
-/// colour, which deflate finds as they are.
-std::vector<std::uint8_t> compress(const PngImage& image, int height) {
-  std::vector<std::uint8_t> rows;
-  rows.reserve((image.row_bytes + 1) * static_cast<std::size_t>(height));
-  for (auto row = image.bytes.begin(); row != image.bytes.end();
-       row += static_cast<std::ptrdiff_t>(image.row_bytes)) {
-    rows.push_back(0);
-    rows.insert(rows.end(), row, row + static_cast<std::ptrdiff_t>(image.row_bytes));
-  }
+/// Appends a zlib stream of all rows.
+void compress(const PngImage& image, std::vector<std::uint8_t>& out) {
   struct Free {
     void operator()(libdeflate_compressor* c) const { libdeflate_free_compressor(c); }
   };
   const std::unique_ptr<libdeflate_compressor, Free> compressor(libdeflate_alloc_compressor(1));
   if (!compressor) throw std::bad_alloc();
-  std::vector<std::uint8_t> out(libdeflate_zlib_compress_bound(compressor.get(), rows.size()));
-  out.resize(
-      libdeflate_zlib_compress(compressor.get(), rows.data(), rows.size(), out.data(), out.size()));
-  return out;
+  const std::size_t bound = libdeflate_zlib_compress_bound(compressor.get(), image.size);
+  const auto room = std::make_unique_for_overwrite<std::uint8_t[]>(bound);
+  const std::size_t size =
+      libdeflate_zlib_compress(compressor.get(), image.rows.get(), image.size, room.get(), bound);
+  out.assign(room.get(), room.get() + size);
 }
 
 }  // namespace
@@ -161,7 +172,8 @@ std::vector<std::uint8_t> encode_png(const Picture& picture) {
   if (!image.alpha.empty()) add_chunk("tRNS", image.alpha);
   // A chunk's length has 31 bits.
   constexpr std::size_t kMostBytes = 0x7fffffff;
-  const std::vector<std::uint8_t> data = compress(image, picture.height);
+  std::vector<std::uint8_t> data;
+  compress(image, data);
   for (std::size_t at = 0; at < data.size(); at += kMostBytes) {
     add_chunk("IDAT", std::span(data).subspan(at, std::min(kMostBytes, data.size() - at)));
   }
