@@ -3,7 +3,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <optional>
 #include <span>
+#include <vector>
 
 // Solid angles of triangles seen from voxel centres, a vector of centres at a time. Private to
 // voxelize/.
@@ -14,6 +16,7 @@ namespace strata {
 struct WindingCap {
   glm::dvec3 corners[3], normal;  ///< the normal is scaled, and twice the area long
   glm::ivec3 lattice[3];          ///< the corners
+  glm::uvec3 vertices{0};         ///< their numbers: caps share corners
   double doubt = 0.0;  ///< the side of a point is in doubt below this, times its distance
 };
 
@@ -45,12 +48,54 @@ struct WindingPoints {
   alignas(64) double x[kMost], y[kMost], z[kMost], angle[kMost];
 };
 
-/// Writes the angle of `near` caps, of `far` nodes as dipoles, and of farther ones. Centres on a
-/// triangle's plane see the side that the perturbed sample sees (raster/triangle_setup.h). The same
-/// bits on any SIMD unit.
-void solid_angles(std::span<const WindingCap> caps, std::span<const WindingNode> nodes,
-                  std::span<const std::uint32_t> near, std::span<const std::uint32_t> far,
-                  const WindingSeries& farther, const glm::dvec3& scale, WindingPoints& points);
+/// Caps and groups of them, in lattice steps that are `scale` long.
+struct WindingCaps {
+  std::vector<WindingCap> caps;
+  std::vector<WindingNode> nodes;
+  glm::dvec3 scale{1.0};
+  std::uint32_t vertices = 0;  ///< above the numbers of their corners
+};
+
+/// A corner of caps as seen from a vector of points: scaled offsets and their lengths.
+struct alignas(64) WindingCorner {
+  double x[WindingPoints::kStep], y[WindingPoints::kStep], z[WindingPoints::kStep],
+      length[WindingPoints::kStep];
+};
+
+/// Caps near points, by their corners, each of which is there once.
+struct WindingNear {
+  const WindingCaps& all;
+  std::span<const std::uint32_t> caps;
+  std::span<const glm::uvec3> triangles;  ///< by number in `corners`
+  std::span<const glm::dvec3> corners;
+  WindingCorner* seen;
+};
+
+/// Sums the solid angles of caps at voxel centres. One for each thread.
+class WindingSum {
+ public:
+  enum class Way {
+    kExact,  ///< arc tangent by arc tangent: the angles that decide
+    kQuick   ///< one arc tangent for all near caps
+  };
+  /// Writes the angles of `near` caps, of `far` nodes as dipoles, and of farther ones. Centres on a
+  /// triangle's plane see the side that the perturbed sample sees (raster/triangle_setup.h). Exact
+  /// ones are the same bits on any SIMD unit.
+  /// @return what the angles may be off by from exact ones; empty: quick ones are not known
+  std::optional<double> write(Way way, const WindingCaps& caps, std::span<const std::uint32_t> near,
+                              std::span<const std::uint32_t> far, const WindingSeries& farther,
+                              WindingPoints& points);
+
+ private:
+  struct Place {
+    std::uint32_t turn = 0, corner = 0;
+  };
+  std::vector<Place> places_;  ///< where each vertex is among the corners, if its turn is this one
+  std::uint32_t turn_ = 0;
+  std::vector<glm::dvec3> corners_;    ///< of near caps, each once
+  std::vector<glm::uvec3> triangles_;  ///< near caps by corners
+  std::vector<WindingCorner> seen_;
+};
 
 /// 1 where the perturbed lattice point sees the cap's back, -1 where its front. Exact.
 int winding_side(const WindingCap& cap, const glm::ivec3& p);

@@ -72,17 +72,15 @@ double distance_to_segment(const glm::dvec3& p, const glm::dvec3& a, const glm::
   return glm::length(to - t * along);
 }
 
-/// Distance of a triangle from the origin.
-double distance_to(const glm::dvec3 (&t)[3], const glm::dvec3& normal) {
-  double nearest = 1e300;
+/// Whether a triangle is at most `distance` from the origin.
+bool meets_ball(const glm::dvec3 (&t)[3], const glm::dvec3& normal, double distance) {
   bool above = true;  // the origin lies above or below the triangle
   for (int i = 0; i < 3; ++i) {
     const glm::dvec3 &a = t[i], &b = t[(i + 1) % 3];
-    nearest = std::min(nearest, distance_to_segment(glm::dvec3(0), a, b));
+    if (distance_to_segment(glm::dvec3(0), a, b) <= distance) return true;
     above = above && glm::dot(glm::cross(b - a, -a), normal) >= 0;
   }
-  return above ? std::min(nearest, std::abs(glm::dot(t[0], normal)) / glm::length(normal))
-               : nearest;
+  return above && std::abs(glm::dot(t[0], normal)) / glm::length(normal) <= distance;
 }
 
 }  // namespace
@@ -98,33 +96,40 @@ void WindingField::Scratch::Level::add_far(std::uint32_t index, const WindingNod
 
 WindingField::WindingField(const LatticeMesh& mesh, std::span<const glm::uvec3> caps,
                            const VoxelGrid& grid, const std::stop_token& stop)
-    : dims_(grid.dims),
-      scale_(grid.voxel_size /
-             std::max({grid.voxel_size.x, grid.voxel_size.y, grid.voxel_size.z})) {
-  caps_.reserve(caps.size());
+    : dims_(grid.dims) {
+  all_.scale =
+      grid.voxel_size / std::max({grid.voxel_size.x, grid.voxel_size.y, grid.voxel_size.z});
+  all_.caps.reserve(caps.size());
+  std::vector<std::uint32_t> vertices;
+  for (const glm::uvec3& t : caps) vertices.insert(vertices.end(), {t.x, t.y, t.z});
+  std::sort(vertices.begin(), vertices.end());
+  vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+  all_.vertices = static_cast<std::uint32_t>(vertices.size());
   for (const glm::uvec3& t : caps) {
     WindingCap cap;
     for (int i = 0; i < 3; ++i) {
       cap.lattice[i] = mesh.vertices[t[i]];
       cap.corners[i] = cap.lattice[i];
+      cap.vertices[i] = static_cast<std::uint32_t>(
+          std::lower_bound(vertices.begin(), vertices.end(), t[i]) - vertices.begin());
     }
-    const glm::dvec3 e = (cap.corners[1] - cap.corners[0]) * scale_,
-                     f = (cap.corners[2] - cap.corners[0]) * scale_;
+    const glm::dvec3 e = (cap.corners[1] - cap.corners[0]) * all_.scale,
+                     f = (cap.corners[2] - cap.corners[0]) * all_.scale;
     cap.normal = glm::cross(e, f);
     // A dozen roundings of 2^-53, of differences of lattice positions, which are exact.
     cap.doubt = 4e-15 * glm::length(e) * glm::length(f);
-    if (glm::dot(cap.normal, cap.normal) > 0) caps_.push_back(cap);
+    if (glm::dot(cap.normal, cap.normal) > 0) all_.caps.push_back(cap);
   }
-  if (caps_.empty()) return;
-  nodes_.reserve(2 * caps_.size());
-  nodes_.emplace_back();
-  split(0, 0, static_cast<std::uint32_t>(caps_.size()), stop);
+  if (all_.caps.empty()) return;
+  all_.nodes.reserve(2 * all_.caps.size());
+  all_.nodes.emplace_back();
+  split(0, 0, static_cast<std::uint32_t>(all_.caps.size()), stop);
 }
 
 /// Makes the node of caps [first, first + count), and those below it.
 void WindingField::split(std::uint32_t node, std::uint32_t first, std::uint32_t count,
                          const std::stop_token& stop) {
-  const std::span<WindingCap> caps = std::span(caps_).subspan(first, count);
+  const std::span<WindingCap> caps = std::span(all_.caps).subspan(first, count);
   const auto middle_of = [](const WindingCap& cap) {
     return (cap.corners[0] + cap.corners[1] + cap.corners[2]) / 3.0;
   };
@@ -141,24 +146,24 @@ void WindingField::split(std::uint32_t node, std::uint32_t first, std::uint32_t 
   result.middle = sum / result.area;
   for (const WindingCap& cap : caps) {
     for (const glm::dvec3& corner : cap.corners) {
-      result.radius = std::max(result.radius, glm::length((corner - result.middle) * scale_));
+      result.radius = std::max(result.radius, glm::length((corner - result.middle) * all_.scale));
     }
   }
   if (count == 1 || (count > 4096 && stop.stop_requested())) {
     result.first = first;
     result.count = count;
-    nodes_[node] = result;
+    all_.nodes[node] = result;
     return;
   }
-  const glm::dvec3 extent = (high - low) * scale_;
+  const glm::dvec3 extent = (high - low) * all_.scale;
   const int axis = extent.x >= extent.y && extent.x >= extent.z ? 0 : extent.y >= extent.z ? 1 : 2;
   // A stable order, so that sums do not depend on how the library sorts.
   std::stable_sort(caps.begin(), caps.end(), [&](const WindingCap& a, const WindingCap& b) {
     return middle_of(a)[axis] < middle_of(b)[axis];
   });
-  result.first = static_cast<std::uint32_t>(nodes_.size());
-  nodes_[node] = result;
-  nodes_.resize(nodes_.size() + 2);
+  result.first = static_cast<std::uint32_t>(all_.nodes.size());
+  all_.nodes[node] = result;
+  all_.nodes.resize(all_.nodes.size() + 2);
   split(result.first, first, count / 2, stop);
   split(result.first + 1, first + count / 2, count - count / 2, stop);
 }
@@ -169,20 +174,20 @@ WindingField::Sight WindingField::look(const Cube& cube, Scratch& scratch) const
   Scratch::Level& here = scratch.levels[cube.level + 1];
   const Scratch::Level& around = scratch.levels[cube.level];
   const double half = cube.size * kLatticeSteps / 2.0;
-  here.radius = half * glm::length(scale_);
+  here.radius = half * glm::length(all_.scale);
   here.near.clear();
   here.far.clear();
   here.far_bound = around.far_bound;
   here.farther = around.farther;
-  here.farther.move(glm::dvec3(cube.corner) * double{kLatticeSteps} + half, scale_);
+  here.farther.move(glm::dvec3(cube.corner) * double{kLatticeSteps} + half, all_.scale);
   // The last cubes have too few voxels to be worth a series of their own.
   here.series = cube.size > kLeast ? kSeries * here.radius : 1e300;
   if (cube.size == kLeast) {
     here.far = around.far;
   } else {
     for (const std::uint32_t index : around.far) {
-      const glm::dvec3 to = (nodes_[index].middle - here.farther.middle) * scale_;
-      here.add_far(index, nodes_[index], to, glm::length(to));
+      const glm::dvec3 to = (all_.nodes[index].middle - here.farther.middle) * all_.scale;
+      here.add_far(index, all_.nodes[index], to, glm::length(to));
     }
   }
   scratch.stack.assign(around.near.rbegin(), around.near.rend());
@@ -202,9 +207,9 @@ WindingField::Sight WindingField::sort(Scratch::Level& here, bool single, Scratc
   double near_bound = 0;
   while (!scratch.stack.empty()) {
     const std::uint32_t index = scratch.stack.back();
-    const WindingNode& node = nodes_[index];
+    const WindingNode& node = all_.nodes[index];
     scratch.stack.pop_back();
-    const glm::dvec3 to = (node.middle - here.farther.middle) * scale_;
+    const glm::dvec3 to = (node.middle - here.farther.middle) * all_.scale;
     const double distance = glm::length(to), free = distance - here.radius - node.radius;
     if (distance - here.radius > (node.count == 0 ? kFar : kFarCap) * node.radius) {
       here.far_bound += node.area / (free * free);
@@ -212,16 +217,15 @@ WindingField::Sight WindingField::sort(Scratch::Level& here, bool single, Scratc
       continue;
     }
     if (node.count == 0 && (single || node.radius > here.radius / 2)) {
-      scratch.stack.insert(scratch.stack.end(), {node.first + 1, node.first});
+      scratch.stack.push_back(node.first + 1);
+      scratch.stack.push_back(node.first);
       continue;
     }
     here.near.push_back(index);
+    if (met) continue;
     near_bound += free > 0 ? std::min(kFull / 2, node.area / (free * free)) : kFull / 2;
-    if (met || free > 0) continue;
-    met = true;
-    if (node.count > 0) {
-      met = cap_distance(caps_[node.first], here.farther.middle) <= here.radius;
-    }
+    met =
+        free <= 0 && (node.count == 0 || within(node, here.farther.middle, distance, here.radius));
   }
   if (met) return Sight::kMet;
   return near_bound + here.far_bound < 0.9 * kFull / 2 ? Sight::kNothing : Sight::kSmooth;
@@ -245,26 +249,25 @@ void WindingField::visit(const Cube& cube, Scratch& scratch) const {
   }
 }
 
-/// Distance of a cap from a point.
-double WindingField::cap_distance(const WindingCap& cap, const glm::dvec3& from) const {
-  const glm::dvec3 t[3] = {(cap.corners[0] - from) * scale_, (cap.corners[1] - from) * scale_,
-                           (cap.corners[2] - from) * scale_};
-  return distance_to(t, cap.normal);
-}
-
-/// Whether the cap of a leaf is at most `distance` from a point. The ball around the cap, and the
-/// corner of it that is the nearest, mostly tell.
-bool WindingField::within(const WindingNode& leaf, const glm::dvec3& from, double distance) const {
+/// Whether the cap of a leaf is at most `distance` from a point, `middle` from which the leaf's is.
+/// The ball around the cap, the corner of it that is the nearest, and its plane mostly tell.
+bool WindingField::within(const WindingNode& leaf, const glm::dvec3& from, double middle,
+                          double distance) const {
   constexpr double kSure = 1e-9;  // far more than roundings, and no more than that is undecided
-  const WindingCap& cap = caps_[leaf.first];
-  const double middle = glm::length((leaf.middle - from) * scale_);
   if ((middle - leaf.radius) * (1 - kSure) > distance * (1 + kSure)) return false;
-  double nearest = middle;
-  for (const glm::dvec3& corner : cap.corners) {
-    nearest = std::min(nearest, glm::length((corner - from) * scale_));
+  if (middle * (1 + kSure) < distance * (1 - kSure)) return true;
+  const WindingCap& cap = all_.caps[leaf.first];
+  glm::dvec3 t[3];
+  double nearest = 1e300, farthest = 0;  // squares
+  for (int i = 0; i < 3; ++i) {
+    t[i] = (cap.corners[i] - from) * all_.scale;
+    const double square = glm::dot(t[i], t[i]);
+    nearest = std::min(nearest, square), farthest = std::max(farthest, square);
   }
-  if (nearest * (1 + kSure) < distance * (1 - kSure)) return true;
-  return cap_distance(cap, from) <= distance;
+  if (nearest * (1 + kSure) < distance * distance * (1 - kSure)) return true;
+  const double height = std::abs(glm::dot(t[0], cap.normal)), length = 2 * leaf.area;
+  if (height > (distance + kSure * (distance + std::sqrt(farthest))) * length) return false;
+  return meets_ball(t, cap.normal, distance);
 }
 
 /// Every step-th voxel of the cube along all axes, x fastest.
@@ -282,17 +285,31 @@ void WindingField::place(const Cube& cube, int step, WindingPoints& points) {
   }
 }
 
-/// Gives all voxels of a cube the same number. False where its corners do not tell.
-bool WindingField::fill(const Cube& cube, Scratch& scratch) const {
+/// Whether all voxels of a cube have the same number, by its corners. Empty where the angles are
+/// not exact enough to tell.
+std::optional<bool> WindingField::same_number(const Cube& cube, WindingSum::Way way,
+                                              Scratch& scratch, int& number) const {
   const Scratch::Level& here = scratch.levels[cube.level + 1];
   WindingPoints& points = scratch.points;
   place(cube, cube.size - 1, points);
-  solid_angles(caps_, nodes_, caps_of(here.near, scratch.near), here.far, here.farther, scale_,
-               points);
+  const auto written = scratch.sum.write(way, all_, scratch.near, here.far, here.farther, points);
+  if (!written) return std::nullopt;
+  const double off = (1 + 2 * kBulge) * *written;
   const auto [low, high] = std::minmax_element(points.angle, points.angle + points.count);
-  const double bulge = kBulge * (*high - *low);
-  const int number = rounded(*low - bulge);
-  if (rounded(*high + bulge) != number) return false;
+  const double bulge = kBulge * (*high - *low), least = *low - bulge, most = *high + bulge;
+  number = rounded(least - off);
+  if (rounded(most + off) == number) return true;
+  if (rounded(least + off) != rounded(most - off)) return false;
+  return std::nullopt;
+}
+
+/// Gives all voxels of a cube the same number. False where its corners do not tell.
+bool WindingField::fill(const Cube& cube, Scratch& scratch) const {
+  caps_of(scratch.levels[cube.level + 1].near, scratch.near);
+  int number = 0;
+  auto same = same_number(cube, WindingSum::Way::kQuick, scratch, number);
+  if (!same) same = same_number(cube, WindingSum::Way::kExact, scratch, number);
+  if (!*same) return false;
   if (number == 0) return true;
   const AxisFrame& frame = cube.frame;
   const glm::ivec3 end = glm::min(cube.corner + cube.size, dims_);
@@ -307,50 +324,82 @@ bool WindingField::fill(const Cube& cube, Scratch& scratch) const {
 }
 
 /// The caps of leaves.
-std::span<const std::uint32_t> WindingField::caps_of(std::span<const std::uint32_t> leaves,
-                                                     std::vector<std::uint32_t>& caps) const {
+void WindingField::caps_of(std::span<const std::uint32_t> leaves,
+                           std::vector<std::uint32_t>& caps) const {
   caps.clear();
-  for (const std::uint32_t leaf : leaves) caps.push_back(nodes_[leaf].first);
-  return caps;
+  for (const std::uint32_t leaf : leaves) caps.push_back(all_.nodes[leaf].first);
 }
 
 void WindingField::visit_voxels(const Cube& cube, Scratch& scratch) const {
   const Scratch::Level& here = scratch.levels[cube.level + 1];
-  const auto all = caps_of(here.near, scratch.near);
+  caps_of(here.near, scratch.near);
   // The angle of all but the caps close by is smooth, so that its corners tell about it.
   scratch.close.clear();
   scratch.rest.clear();
   for (const std::uint32_t leaf : here.near) {
-    const bool close = within(nodes_[leaf], here.farther.middle, kClose * here.radius);
-    (close ? scratch.close : scratch.rest).push_back(nodes_[leaf].first);
+    const WindingNode& node = all_.nodes[leaf];
+    const double middle = glm::length((node.middle - here.farther.middle) * all_.scale);
+    const bool close = within(node, here.farther.middle, middle, kClose * here.radius);
+    (close ? scratch.close : scratch.rest).push_back(node.first);
   }
+  int number[WindingPoints::kMost];
+  if (!find_numbers(cube, WindingSum::Way::kQuick, scratch, number)) {
+    static_cast<void>(find_numbers(cube, WindingSum::Way::kExact, scratch, number));
+  }
+  add_runs(cube, number, scratch);
+}
+
+/// The numbers of the voxels of a cube of side kLeast. @return false where the angles are not exact
+/// enough to tell
+bool WindingField::find_numbers(const Cube& cube, WindingSum::Way way, Scratch& scratch,
+                                int (&number)[WindingPoints::kMost]) const {
+  const Scratch::Level& here = scratch.levels[cube.level + 1];
   WindingPoints& points = scratch.points;
   place(cube, kLeast - 1, points);
-  solid_angles(caps_, nodes_, scratch.rest, here.far, here.farther, scale_, points);
+  const auto of_rest = scratch.sum.write(way, all_, scratch.rest, here.far, here.farther, points);
   double corner[8];
   std::copy_n(points.angle, 8, corner);
   const auto [low, high] = std::minmax_element(corner, corner + 8);
   const double bulge = kBulge * (*high - *low);
   place(cube, 1, points);
-  solid_angles(caps_, nodes_, scratch.close, {}, {}, scale_, points);
-  int number[WindingPoints::kMost];
-  std::uint8_t open[WindingPoints::kMost];
-  std::size_t count = 0;
+  const auto of_close = scratch.sum.write(way, all_, scratch.close, {}, {}, points);
+  if (!of_rest || !of_close) return false;
+  const double off = (1 + 2 * kBulge) * *of_rest + *of_close;
   double rest[WindingPoints::kMost];
   interpolate(corner, rest);
+  std::uint8_t apart[WindingPoints::kMost];
+  std::size_t count = 0;
   for (std::size_t i = 0; i < points.count; ++i) {
-    number[i] = rounded(points.angle[i] + rest[i] - bulge);
-    if (rounded(points.angle[i] + rest[i] + bulge) == number[i]) continue;
-    open[count] = static_cast<std::uint8_t>(i);
-    points.x[count] = points.x[i], points.y[count] = points.y[i], points.z[count] = points.z[i];
-    ++count;
+    const double least = points.angle[i] + rest[i] - bulge,
+                 most = points.angle[i] + rest[i] + bulge;
+    number[i] = rounded(least - off);
+    if (rounded(most + off) == number[i]) continue;
+    if (rounded(least + off) == rounded(most - off)) return false;
+    apart[count++] = static_cast<std::uint8_t>(i);
   }
-  if (count > 0) {
-    points.count = (count + WindingPoints::kStep - 1) / WindingPoints::kStep * WindingPoints::kStep;
-    solid_angles(caps_, nodes_, all, here.far, here.farther, scale_, points);
-    for (std::size_t i = 0; i < count; ++i) number[open[i]] = rounded(points.angle[i]);
+  return find_numbers_apart(cube, way, {apart, count}, scratch, number);
+}
+
+/// The numbers of some voxels, each by its own angle. @pre the points are those of the cube
+bool WindingField::find_numbers_apart(const Cube& cube, WindingSum::Way way,
+                                      std::span<const std::uint8_t> voxels, Scratch& scratch,
+                                      int (&number)[WindingPoints::kMost]) const {
+  if (voxels.empty()) return true;
+  const Scratch::Level& here = scratch.levels[cube.level + 1];
+  WindingPoints& points = scratch.points;
+  for (std::size_t k = 0; k < voxels.size(); ++k) {
+    const std::size_t i = voxels[k];
+    points.x[k] = points.x[i], points.y[k] = points.y[i], points.z[k] = points.z[i];
   }
-  add_runs(cube, number, scratch);
+  points.count =
+      (voxels.size() + WindingPoints::kStep - 1) / WindingPoints::kStep * WindingPoints::kStep;
+  const auto off = scratch.sum.write(way, all_, scratch.near, here.far, here.farther, points);
+  if (!off) return false;
+  for (std::size_t k = 0; k < voxels.size(); ++k) {
+    number[voxels[k]] = rounded(points.angle[k] - *off);
+    if (rounded(points.angle[k] + *off) != number[voxels[k]]) return false;
+  }
+  return true;
 }
 
 /// Adds the numbers of the voxels of a cube of side kLeast, x fastest.
@@ -392,7 +441,7 @@ std::span<const WindingStep> WindingField::steps(Axis axis, int tu, int tv,
                                                  Scratch& scratch) const {
   scratch.runs.clear();
   scratch.steps.clear();
-  if (caps_.empty()) return {};
+  if (all_.caps.empty()) return {};
   const AxisFrame frame(axis);
   scratch.levels.resize(kLevels + 1);
   scratch.levels[0].near.assign(1, 0);

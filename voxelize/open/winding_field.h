@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <optional>
 #include <span>
 #include <stop_token>
 #include <vector>
@@ -58,6 +59,7 @@ class WindingField {
     std::vector<std::uint32_t> next;
     std::vector<WindingStep> steps;
     WindingPoints points;
+    WindingSum sum;
   };
 
   /// The changes of k in tile (tu, tv) of rays along `axis`, sorted by pixel and voxel. The numbers
@@ -82,20 +84,24 @@ class WindingField {
   Sight sort(Scratch::Level& here, bool single, Scratch& scratch) const;
   void visit(const Cube& cube, Scratch& scratch) const;
   [[nodiscard]] bool fill(const Cube& cube, Scratch& scratch) const;
+  [[nodiscard]] std::optional<bool> same_number(const Cube& cube, WindingSum::Way way,
+                                                Scratch& scratch, int& number) const;
   void visit_voxels(const Cube& cube, Scratch& scratch) const;
+  [[nodiscard]] bool find_numbers(const Cube& cube, WindingSum::Way way, Scratch& scratch,
+                                  int (&number)[WindingPoints::kMost]) const;
+  [[nodiscard]] bool find_numbers_apart(const Cube& cube, WindingSum::Way way,
+                                        std::span<const std::uint8_t> voxels, Scratch& scratch,
+                                        int (&number)[WindingPoints::kMost]) const;
   void add_runs(const Cube& cube, const int (&number)[WindingPoints::kMost],
                 Scratch& scratch) const;
   static const std::vector<Scratch::Run>& sorted_runs(Scratch& scratch);
-  [[nodiscard]] bool within(const WindingNode& leaf, const glm::dvec3& from, double distance) const;
+  [[nodiscard]] bool within(const WindingNode& leaf, const glm::dvec3& from, double middle,
+                            double distance) const;
   static void place(const Cube& cube, int step, WindingPoints& points);
-  [[nodiscard]] double cap_distance(const WindingCap& cap, const glm::dvec3& from) const;
-  std::span<const std::uint32_t> caps_of(std::span<const std::uint32_t> leaves,
-                                         std::vector<std::uint32_t>& caps) const;
+  void caps_of(std::span<const std::uint32_t> leaves, std::vector<std::uint32_t>& caps) const;
 
   glm::ivec3 dims_;
-  glm::dvec3 scale_;  ///< lengths of lattice steps along the axes
-  std::vector<WindingCap> caps_;
-  std::vector<WindingNode> nodes_;
+  WindingCaps all_;
 };
 
 }  // namespace strata
