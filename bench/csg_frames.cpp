@@ -58,7 +58,9 @@ class Ours {
         preview_(scene.tree, {}, scene.relative_precision, execution_) {}
 
   [[nodiscard]] std::shared_ptr<void> frame() {
-    auto picture = preview_.picture(camera_, size_, {}, execution_);
+    csg::PictureOptions options;
+    options.scheme = csg::find_colour_scheme("Cornfield");  // plain light, as the peer has it
+    auto picture = preview_.picture(camera_, size_, options, execution_);
     if (!picture) {
       status_ = tl::unexpected(picture.error());
       return nullptr;
