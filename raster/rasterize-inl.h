@@ -31,6 +31,7 @@ using LaneI32 = hn::Rebind<std::int32_t, LaneF64>;
 using VecF64 = hn::Vec<LaneF64>;
 using VecI32 = hn::Vec<LaneI32>;
 inline constexpr std::size_t kMaxLanes = HWY_MAX_BYTES / sizeof(double);
+inline constexpr int kMaxBoxSide = 64;  ///< of boxes within a tile
 
 /// Extents (lattice steps) up to which all numerators stay below 2^51 as they are: across the
 /// image, along the ray, and the product of all three, since no numerator exceeds six times that.
@@ -433,39 +434,68 @@ HWY_INLINE hn::Vec<typename Block::I32> to_integers(const VecF64 (&parts)[2]) {
 #endif
 }
 
-/// The rows of a box, counted from its first, where the columns [step, step + columns) may be
-/// covered: elsewhere one edge is negative in all of them.
-struct RowRange {
-  int begin, end;
-};
-HWY_INLINE RowRange rows_of_strip(const TileEquations& q, int step, int columns, int rows) {
-  RowRange range{0, rows};
-  for (int i = 0; i < 3; ++i) {
-    const std::int64_t along = q.edge_u[i];
-    const std::int64_t best =
-        q.edge[i] + along * step + std::max<std::int64_t>(0, along * (columns - 1));
-    const std::int64_t down = q.edge_v[i];
-    if (down == 0) {
-      if (best < 0) range.end = 0;
-    } else if (down > 0) {  // best + down * row >= 0 from some row on
-      if (best < 0) {
-        const std::int64_t from = (-best + down - 1) / down;
-        range.begin = std::max(range.begin, static_cast<int>(std::min<std::int64_t>(from, rows)));
+/// The rows of a box, counted from its first, where the strips of `columns` columns of it may be
+/// covered: elsewhere one edge is negative in all of a strip.
+template <int columns>
+struct StripRows {
+  static constexpr int kMost = kMaxBoxSide / columns + 16;  ///< vectors reach beyond the last strip
+  alignas(64) std::int32_t begin[kMost], end[kMost];
+
+  /// A vector of strips at a time, and a row too many rather than one too few: a quotient of less
+  /// than 64 rows is off by less than kRounding.
+  HWY_INLINE void find(const TileEquations& q, int strips, int rows) {
+    constexpr float kRounding = 1.0f / 1024;
+    const hn::ScalableTag<std::int32_t> di;
+    const hn::RebindToFloat<decltype(di)> df;
+    const auto zero = hn::Zero(di), all = hn::Set(di, rows);
+    const auto most = hn::Set(df, static_cast<float>(rows));
+    const auto least = hn::Set(df, -1.0f);
+    for (int strip = 0; strip < strips; strip += static_cast<int>(hn::Lanes(di))) {
+      const auto step = hn::Mul(hn::Iota(di, strip), hn::Set(di, columns));
+      auto first = zero, last = all;
+      for (int i = 0; i < 3; ++i) {
+        const std::int32_t along = q.edge_u[i], down = q.edge_v[i];
+        const auto best = hn::Add(hn::Set(di, q.edge[i] + std::max(0, along * (columns - 1))),
+                                  hn::Mul(step, hn::Set(di, along)));
+        if (down == 0) {
+          last = hn::IfThenElse(hn::Lt(best, zero), zero, last);
+          continue;
+        }
+        const auto part =
+            hn::Mul(hn::ConvertTo(df, best), hn::Set(df, 1.0f / static_cast<float>(-down)));
+        if (down > 0) {  // best + down * row >= 0 from some row on
+          const auto from = hn::Min(hn::Max(part, hn::Zero(df)), most);
+          first = hn::Max(first, hn::ConvertTo(di, hn::Add(from, hn::Set(df, 1.0f - kRounding))));
+        } else {
+          const auto to = hn::Min(hn::Max(part, least), most);
+          last = hn::Min(last, hn::ConvertTo(di, hn::Add(to, hn::Set(df, 1.0f + kRounding))));
+        }
       }
-    } else {
-      const std::int64_t end = best < 0 ? 0 : best / -down + 1;
-      range.end = std::min(range.end, static_cast<int>(std::min<std::int64_t>(end, rows)));
+      hn::StoreU(first, di, begin + strip);
+      hn::StoreU(last, di, end + strip);
     }
   }
-  return range;
-}
+};
 
 /// Boxes with at least this many rows are searched for those that matter, strip by strip.
 inline constexpr int kTallBox = 12;
 
+/// Hands the depths of a block of pixels to `sink`.
+template <int columns, class Sink, class V, class M>
+HWY_INLINE void give_block(Sink& sink, int u, int v, int rows, V depth, M covered) {
+  const typename PixelBlock<columns>::U32 d;
+  if constexpr (requires { requires Sink::kTakesRows; }) {
+    if (rows == 1) return sink.put_row(d, u, v, depth, covered);
+  }
+  alignas(64) std::uint32_t words[HWY_MAX_BYTES / 4];
+  hn::Store(sink.encode(d, depth, covered), d, words);
+  sink.template put_block<columns>(u, v, words, rows);
+}
+
 /// Hands the pixels of `box`, which lies within one tile (at most 64 pixels a side), to `sink`: for
 /// each block sink.encode(depth, mask) gives a vector of 32-bit words, 0 where `mask` is not set,
-/// and sink.put_block<columns>(u, v, words, rows) takes them, row by row from pixel (u, v) on.
+/// and sink.put_block<columns>(u, v, words, rows) takes them, row by row from pixel (u, v) on. A
+/// sink that kTakesRows gets a block of one row by sink.put_row(d, u, v, depth, mask) instead.
 /// Depth is clamped to [0, depth_limit). Blocks may reach beyond the box (words 0).
 template <bool split, int columns, class Sink>
 HWY_INLINE void rasterize_box(const TileEquations& q, const PixelRect& box,
@@ -490,34 +520,54 @@ HWY_INLINE void rasterize_box(const TileEquations& q, const PixelRect& box,
   const VecF64 remainder_v = hn::Set(df, q.remainder_v * rows);
   const VecF64 quotient_v = hn::Set(df, split ? q.quotient_v * rows : 0.0);
 
+  const auto edge_lanes = [&](int i) {
+    return hn::Add(hn::Mul(column, hn::Set(di, q.edge_u[i])),
+                   hn::Mul(row, hn::Set(di, q.edge_v[i])));
+  };
+  const auto edge_lanes0 = edge_lanes(0), edge_lanes1 = edge_lanes(1), edge_lanes2 = edge_lanes(2);
+  VecF64 remainder_lanes[2], quotient_lanes[2];
+  for (int part = 0; part < kParts; ++part) {
+    const auto lane = hn::Iota(df, static_cast<double>(part * part_lanes));
+    const auto part_row = hn::Floor(hn::Mul(lane, hn::Set(df, 1.0 / columns)));
+    const auto part_column = hn::Sub(lane, hn::Mul(part_row, hn::Set(df, columns)));
+    const auto plane = [&](double along_u, double along_v) {
+      return hn::Add(hn::Mul(part_column, hn::Set(df, along_u)),
+                     hn::Mul(part_row, hn::Set(df, along_v)));
+    };
+    remainder_lanes[part] = plane(q.remainder_u, q.remainder_v);
+    if constexpr (split) quotient_lanes[part] = plane(q.quotient_u, q.quotient_v);
+  }
+  const int strips = (box.u1 - box.u0 + columns - 1) / columns;
+  const int height = box.v1 - box.v0;
+  StripRows<columns> ranges;
+  if (height >= kTallBox) ranges.find(q, strips, height);
+
   // Blocks begin at multiples of their width, so that what one stores another loads as it is.
-  for (int u = box.u0; u < box.u1; u += columns) {
-    const int step = u - box.u0;
-    RowRange range{0, box.v1 - box.v0};
-    if (range.end >= kTallBox) {
-      range = rows_of_strip(q, step, columns, range.end);
+  for (int strip = 0; strip < strips; ++strip) {
+    const int step = strip * columns, u = box.u0 + step;
+    struct {
+      int begin, end;
+    } range{0, height};
+    if (height >= kTallBox) {
+      range = {ranges.begin[strip], ranges.end[strip]};
       if (range.begin >= range.end) continue;
     }
     const auto in_box = hn::Lt(column, hn::Set(di, box.u1 - u));
     const auto edge_at = [&](int i) {
-      const auto along_u = hn::Mul(column, hn::Set(di, q.edge_u[i]));
-      const auto along_v = hn::Mul(row, hn::Set(di, q.edge_v[i]));
-      const std::int32_t at = q.edge[i] + q.edge_u[i] * step + q.edge_v[i] * range.begin;
-      return hn::Add(hn::Set(di, at), hn::Add(along_u, along_v));
+      return hn::Set(di, q.edge[i] + q.edge_u[i] * step + q.edge_v[i] * range.begin);
     };
-    auto edge0 = edge_at(0), edge1 = edge_at(1), edge2 = edge_at(2);
+    auto edge0 = hn::Add(edge_lanes0, edge_at(0)), edge1 = hn::Add(edge_lanes1, edge_at(1)),
+         edge2 = hn::Add(edge_lanes2, edge_at(2));
     VecF64 remainder[2], quotient[2];
     for (int part = 0; part < kParts; ++part) {
-      const auto lane = hn::Iota(df, static_cast<double>(part * part_lanes));
-      const auto part_row = hn::Floor(hn::Mul(lane, hn::Set(df, 1.0 / columns)));
-      const auto part_column = hn::Sub(lane, hn::Mul(part_row, hn::Set(df, columns)));
-      const auto plane = [&](double at, double along_u, double along_v) {
-        return hn::Add(hn::Set(df, at + along_u * step + along_v * range.begin),
-                       hn::Add(hn::Mul(part_column, hn::Set(df, along_u)),
-                               hn::Mul(part_row, hn::Set(df, along_v))));
-      };
-      remainder[part] = plane(q.remainder, q.remainder_u, q.remainder_v);
-      if constexpr (split) quotient[part] = plane(q.split_quotient, q.quotient_u, q.quotient_v);
+      remainder[part] =
+          hn::Add(remainder_lanes[part],
+                  hn::Set(df, q.remainder + q.remainder_u * step + q.remainder_v * range.begin));
+      if constexpr (split) {
+        quotient[part] = hn::Add(
+            quotient_lanes[part],
+            hn::Set(df, q.split_quotient + q.quotient_u * step + q.quotient_v * range.begin));
+      }
     }
     const int v_end = box.v0 + range.end;
     for (int v = box.v0 + range.begin; v < v_end; v += rows) {
@@ -537,9 +587,7 @@ HWY_INLINE void rasterize_box(const TileEquations& q, const PixelRect& box,
         // Numerators are positive wherever it counts, so that truncation is the floor.
         auto depth = to_integers<Block>(depth_f);
         if constexpr (!split) depth = hn::Min(hn::Max(hn::Add(base, depth), zero), deepest);
-        alignas(64) std::uint32_t words[HWY_MAX_BYTES / 4];
-        hn::Store(sink.encode(du, hn::BitCast(du, depth), hn::RebindMask(du, covered)), du, words);
-        sink.template put_block<columns>(u, v, words, rows);
+        give_block<columns>(sink, u, v, rows, hn::BitCast(du, depth), hn::RebindMask(du, covered));
       }
       edge0 = hn::Add(edge0, edge_v0);
       edge1 = hn::Add(edge1, edge_v1);

@@ -35,7 +35,13 @@ HWY_INLINE M no_lane(D d) { return hn::Ne(hn::Zero(d), hn::Zero(d)); }
 class LayerSink {
  public:
   LayerSink(LeafLayers& leaf, Arena& arena, double steep_from)
-      : leaf_(&leaf), arena_(&arena), steep_from_(steep_from) {}
+      : leaf_(&leaf),
+        arena_(&arena),
+        steep_from_(steep_from),
+        convex_(leaf.kind == LeafLayers::Kind::kConvex),
+        u0_(leaf.rect.u0),
+        v0_(leaf.rect.v0),
+        stride_(leaf.stride) {}
   HWY_INLINE void steepness(double steepness) {
     steep_ = steepness > steep_from_ ? LeafLayers::kSteep : 0;
     leaf_->steep = leaf_->steep || steep_ != 0;
@@ -46,6 +52,30 @@ class LayerSink {
   HWY_INLINE void begin(bool exit, std::uint32_t triangle, const PixelRect&) {
     exit_ = exit ? 1 : 0;
     triangle_ = triangle | steep_;
+    own_keys_ = nullptr;
+  }
+  static constexpr bool kTakesRows = true;
+  template <class D2, class V2 = hn::Vec<D2>>
+  HWY_INLINE void put_row(D2 d, int u, int v, V2 depth, hn::Mask<D2> covered) {
+    const V2 key = hn::Or(hn::ShiftLeft<1>(depth), hn::Set(d, exit_));
+    fragments_ += hn::CountTrue(d, covered);
+    const std::size_t at = pixel_at(u, v);
+    auto left = covered;
+    if (convex_) {  // as place() does
+      if (HWY_UNLIKELY(own_keys_ == nullptr)) find_own_layer();
+      std::uint32_t* HWY_RESTRICT keys = own_keys_ + at;
+      std::uint32_t* HWY_RESTRICT triangles = own_triangles_ + at;
+      const auto old_key = hn::LoadU(d, keys);
+      const auto take = hn::And(covered, hn::Eq(old_key, hn::Set(d, LeafLayers::kEmpty)));
+      hn::StoreU(hn::IfThenElse(take, key, old_key), d, keys);
+      hn::StoreU(hn::IfThenElse(take, hn::Set(d, triangle_), hn::LoadU(d, triangles)), d,
+                 triangles);
+      left = hn::AndNot(take, covered);
+    }
+    if (HWY_LIKELY(hn::AllFalse(d, left))) return;
+    alignas(64) std::uint32_t words[HWY_MAX_BYTES / 4];
+    hn::Store(hn::IfThenElseZero(left, hn::Add(key, hn::Set(d, 1u))), d, words);
+    insert(d, at, words);
   }
   /// key + 1, so that 0 is no crossing.
   template <class D2, class V2 = hn::Vec<D2>>
@@ -72,7 +102,12 @@ class LayerSink {
 
  private:
   [[nodiscard]] HWY_INLINE std::size_t pixel_at(int u, int v) const {
-    return static_cast<std::size_t>((v - leaf_->rect.v0) * leaf_->stride + (u - leaf_->rect.u0));
+    return static_cast<std::size_t>((v - v0_) * stride_ + (u - u0_));
+  }
+  HWY_NOINLINE void find_own_layer() {
+    while (exit_ >= leaf_->keys.size()) leaf_->add_layer(*arena_);
+    own_keys_ = leaf_->keys[exit_];
+    own_triangles_ = leaf_->triangles[exit_];
   }
   template <class D2>
   HWY_INLINE void insert(D2 d, std::size_t at, const std::uint32_t* words) {
@@ -129,6 +164,10 @@ class LayerSink {
   LeafLayers* leaf_;
   Arena* arena_;
   double steep_from_;
+  bool convex_;
+  int u0_, v0_, stride_;
+  std::uint32_t* own_keys_ = nullptr;  ///< of a convex solid: of the layer of such triangles
+  std::uint32_t* own_triangles_ = nullptr;
   std::uint32_t exit_ = 0, triangle_ = 0, steep_ = 0;
   std::uint64_t fragments_ = 0;
 };

@@ -34,26 +34,34 @@ class UnitedSink {
     fragments_ += hn::CountTrue(d, covered);
     return hn::IfThenElseZero(covered, hn::Add(depth, hn::Set(d, 1u)));
   }
+  static constexpr bool kTakesRows = true;
+  template <class D2, class V2 = hn::Vec<D2>>
+  HWY_INLINE void put_row(D2 d, int u, int v, V2 depth, hn::Mask<D2> covered) {
+    fragments_ += hn::CountTrue(d, covered);
+    insert(d, layers_->index(u, v),
+           hn::IfThenElse(covered, depth, hn::Set(d, UnitedLayers::kEmpty)));
+  }
   template <int columns>
   HWY_INLINE void put_block(int u, int v, const std::uint32_t* words, int rows) {
     const hn::CappedTag<std::uint32_t, columns> d;
     for (int row = 0; row < rows; ++row, words += columns) {
       const std::size_t at = layers_->index(u, v + row);
-      for (std::size_t i = 0; i < columns; i += hn::Lanes(d)) insert(d, at + i, words + i);
+      for (std::size_t i = 0; i < columns; i += hn::Lanes(d)) {
+        insert(d, at + i, hn::Sub(hn::LoadU(d, words + i), hn::Set(d, 1u)));
+      }
     }
   }
   HWY_INLINE void put_one(int u, int v, std::uint32_t depth) {
     ++fragments_;
     const hn::CappedTag<std::uint32_t, 1> d;
-    const std::uint32_t word[1] = {depth + 1};
-    insert(d, layers_->index(u, v), word);
+    insert(d, layers_->index(u, v), hn::Set(d, depth));
   }
   [[nodiscard]] std::uint64_t fragments() const { return fragments_; }
 
  private:
+  /// @param depth  kEmpty where not covered
   template <class D2>
-  HWY_INLINE void insert(D2 d, std::size_t at, const std::uint32_t* words) {
-    auto depth = hn::Sub(hn::LoadU(d, words), hn::Set(d, 1u));  // kEmpty where not covered
+  HWY_INLINE void insert(D2 d, std::size_t at, hn::Vec<D2> depth) {
     std::uint32_t* HWY_RESTRICT behind = layers_->bound_behind + at;
     const auto old_behind = hn::LoadU(d, behind);
     const auto empty = hn::Set(d, UnitedLayers::kEmpty);
