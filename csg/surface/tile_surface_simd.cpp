@@ -259,7 +259,11 @@ void NormalizeLayers(LeafLayers& leaf, bool all_special, TileFinder& finder) {
 /// The search in one vector of pixels.
 class Search {
  public:
-  Search(const SearchArea& area, TileFinder& finder) : area_(area), finder_(finder) {}
+  Search(const SearchArea& area, TileFinder& finder) : area_(area), finder_(finder) {
+    const TileProgram& program = *area.program;
+    const TileProgram::Node& root = program.nodes[program.root];
+    flat_ = program.root_inverted && program.depth == 1 && program.edges[root.first].inverted();
+  }
 
   void set_pixels(int u, int v) {
     u_ = u;
@@ -270,6 +274,7 @@ class Search {
   /// is.
   HWY_INLINE void find(V& depth, V& leaf_at) {
     const D d;
+    if (flat_ && find_flat(depth, leaf_at)) return;
     M value;
     const bool inverted = area_.program->root_inverted;
     // not(node) becomes true where the node, true at first, becomes false.
@@ -324,6 +329,64 @@ class Search {
   }
   HWY_INLINE std::size_t offset_in(const LeafLayers& leaf) const {
     return static_cast<std::size_t>((v_ - leaf.rect.v0) * leaf.stride + (u_ - leaf.rect.u0));
+  }
+
+  /// The one transition into a solid that is met at most once, and the one out of it.
+  /// @return false: it is met more often
+  HWY_INLINE bool interval(LeafLayers& leaf, V& enter, V& leave) {
+    const D d;
+    enter = leave = hn::Set(d, LeafLayers::kEmpty);
+    if (!holds(leaf)) return true;
+    const std::size_t layers = leaf.keys.size(), offset = offset_in(leaf);
+    if (layers > 2) return false;
+    if (layers > 0) enter = hn::Load(d, leaf.keys[0] + offset);
+    if (layers > 1) leave = hn::Load(d, leaf.keys[1] + offset);
+    return true;
+  }
+
+  /// find() in an intersection of solids minus others that are each met once: the ray is inside
+  /// from the last entry to the first exit of those intersected, and beyond the exit of each other
+  /// that it is in there. @return false: some solid is met more often
+  HWY_NOINLINE bool find_flat(V& depth, V& leaf_at) {
+    const D d;
+    const V none = hn::Set(d, LeafLayers::kEmpty);
+    const TileProgram::Node& node = area_.program->nodes[area_.program->root];
+    const Program::Edge* edges = area_.program->edges.data() + node.first;
+    const std::uint32_t* nearest = area_.program->nearest.data() + node.first;
+    V at = hn::Zero(d), leaf = at, end = none, enter, leave;
+    std::uint32_t i = 0;
+    for (; i < node.count && edges[i].inverted(); ++i) {
+      if (!interval(area_.leaves[edges[i].child()], enter, leave)) return false;
+      const M later = hn::Not(hn::Lt(enter, at));
+      at = hn::IfThenElse(later, enter, at);
+      leaf = hn::IfThenElse(later, hn::Set(d, edges[i].child()), leaf);
+      end = hn::Min(end, leave);
+      if (hn::AllFalse(d, hn::Lt(at, end))) break;
+    }
+    leaf_at = leaf;
+    M open = hn::Lt(at, end);
+    const std::uint32_t others = i;
+    bool moved = !hn::AllFalse(d, open);
+    while (moved) {
+      moved = false;
+      std::uint32_t last = hn::GetLane(hn::MaxOfLanes(d, hn::IfThenElseZero(open, at)));
+      for (i = others; i < node.count && nearest[i] <= last; ++i) {
+        LeafLayers& other = area_.leaves[edges[i].child()];
+        if (other.nearest > last) continue;
+        if (!interval(other, enter, leave)) return false;
+        const M inside = hn::And(open, hn::And(hn::Not(hn::Gt(enter, at)), hn::Gt(leave, at)));
+        if (hn::AllFalse(d, inside)) continue;
+        at = hn::IfThenElse(inside, leave, at);
+        leaf_at = hn::IfThenElse(inside, hn::Set(d, edges[i].child()), leaf_at);
+        open = hn::And(open, hn::Lt(at, end));
+        if (hn::AllFalse(d, open)) break;
+        last = hn::GetLane(hn::MaxOfLanes(d, hn::IfThenElseZero(open, at)));
+        moved = true;
+      }
+      moved = moved && !hn::AllFalse(d, open);
+    }
+    depth = hn::IfThenElse(open, at, none);
+    return true;
   }
 
   /// Whether a ray is inside a leaf after all transitions before `from`, and its next transition.
@@ -420,6 +483,7 @@ class Search {
   const SearchArea& area_;
   TileFinder& finder_;
   int u_ = 0, v_ = 0;
+  bool flat_;  ///< the program is an intersection of solids minus others
 };
 
 void SearchSurface(const SearchArea& area, TileFinder& finder) {
