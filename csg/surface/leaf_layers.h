@@ -55,7 +55,8 @@ struct LeafLayers {
   std::uint16_t areas = 0;
   /// Bounds of its depths; those of the tile once it is made.
   std::uint32_t nearest = 0, farthest = 0;
-  /// While rasterizing depth << 1 | exit, then depths of transitions. kEmpty where there is none.
+  /// While rasterizing depth << 1 | exit (of kConvex in layers 0 and 1 depths), then depths of
+  /// transitions. kEmpty where there is none.
   std::vector<std::uint32_t*> keys;
   std::vector<std::uint32_t*> triangles;  ///< [steep:1 | triangle:31]
   /// With more crossings a pixel than kMostLayers there are no layers: inserting into them takes

@@ -143,7 +143,11 @@ void TileFinder::normalize_pixel(LeafLayers& leaf, std::size_t at) {
     if (leaf.keys[k][at] == LeafLayers::kEmpty) continue;
     const std::uint32_t key = leaf.keys[k][at], triangle = leaf.triangles[k][at];
     steep = steep || (triangle & LeafLayers::kSteep) != 0;
-    crossings_.emplace_back(key >> 1, (key & 1) != 0, triangle & ~LeafLayers::kSteep);
+    if (leaf.kind == LeafLayers::Kind::kConvex && k < 2) {
+      crossings_.emplace_back(key, k == 1, triangle & ~LeafLayers::kSteep);
+    } else {
+      crossings_.emplace_back(key >> 1, (key & 1) != 0, triangle & ~LeafLayers::kSteep);
+    }
     leaf.keys[k][at] = LeafLayers::kEmpty;
   }
   // Layers of convex solids are not sorted, and others by marked triangles.

@@ -57,7 +57,6 @@ class LayerSink {
   static constexpr bool kTakesRows = true;
   template <class D2, class V2 = hn::Vec<D2>>
   HWY_INLINE void put_row(D2 d, int u, int v, V2 depth, hn::Mask<D2> covered) {
-    const V2 key = hn::Or(hn::ShiftLeft<1>(depth), hn::Set(d, exit_));
     fragments_ += hn::CountTrue(d, covered);
     const std::size_t at = pixel_at(u, v);
     auto left = covered;
@@ -67,13 +66,14 @@ class LayerSink {
       std::uint32_t* HWY_RESTRICT triangles = own_triangles_ + at;
       const auto old_key = hn::LoadU(d, keys);
       const auto take = hn::And(covered, hn::Eq(old_key, hn::Set(d, LeafLayers::kEmpty)));
-      hn::StoreU(hn::IfThenElse(take, key, old_key), d, keys);
+      hn::StoreU(hn::IfThenElse(take, depth, old_key), d, keys);
       hn::StoreU(hn::IfThenElse(take, hn::Set(d, triangle_), hn::LoadU(d, triangles)), d,
                  triangles);
       left = hn::AndNot(take, covered);
     }
     if (HWY_LIKELY(hn::AllFalse(d, left))) return;
     alignas(64) std::uint32_t words[HWY_MAX_BYTES / 4];
+    const V2 key = hn::Or(hn::ShiftLeft<1>(depth), hn::Set(d, exit_));
     hn::Store(hn::IfThenElseZero(left, hn::Add(key, hn::Set(d, 1u))), d, words);
     insert(d, at, words);
   }
@@ -144,7 +144,7 @@ class LayerSink {
     hn::StoreU(hn::Min(key, old_key), d, keys);
     hn::StoreU(hn::IfThenElse(less, triangle, old_triangle), d, triangles);
   }
-  /// Entries go to layer 0, exits to layer 1, unsorted.
+  /// Depths of entries go to layer 0 and of exits to layer 1, keys of what is left to others.
   template <class D2>
   HWY_INLINE void place(D2 d, std::size_t at, hn::Vec<D2> key, hn::Vec<D2> triangle) {
     const auto empty = hn::Set(d, LeafLayers::kEmpty);
@@ -154,7 +154,8 @@ class LayerSink {
       std::uint32_t* HWY_RESTRICT triangles = leaf_->triangles[k] + at;
       const auto old_key = hn::LoadU(d, keys);
       const auto take = hn::And(hn::Ne(key, empty), hn::Eq(old_key, empty));
-      hn::StoreU(hn::IfThenElse(take, key, old_key), d, keys);
+      const auto kept = k < 2 ? hn::ShiftRight<1>(key) : key;
+      hn::StoreU(hn::IfThenElse(take, kept, old_key), d, keys);
       hn::StoreU(hn::IfThenElse(take, triangle, hn::LoadU(d, triangles)), d, triangles);
       key = hn::IfThenElse(take, empty, key);
       if (hn::AllTrue(d, hn::Eq(key, empty))) return;
@@ -180,39 +181,70 @@ std::uint64_t RasterLayers(const LatticeMesh& mesh, const RasterTarget& target,
   return sink.fragments();
 }
 
-/// The pixels from `at` on where a leaf is not entered and left in turn.
-HWY_INLINE M SpecialPixels(const LeafLayers& leaf, std::size_t at, bool all_special) {
+/// A vector of pixels of a leaf.
+struct Normalized {
+  M any, special;       ///< something is met; the leaf is not entered and left in turn
+  V nearest, farthest;  ///< where it is
+};
+
+/// Of a convex solid: layers 0 and 1 are depths already.
+HWY_INLINE Normalized normalize_convex(const LeafLayers& leaf, std::size_t at, bool all_special) {
+  const D d;
+  const V empty = hn::Set(d, LeafLayers::kEmpty);
+  const std::size_t layers = leaf.keys.size();
+  const V enter = hn::Load(d, leaf.keys[0] + at);
+  const V leave = layers > 1 ? hn::Load(d, leaf.keys[1] + at) : empty;
+  V more = empty;
+  for (std::size_t k = 2; k < layers; ++k) more = hn::And(more, hn::Load(d, leaf.keys[k] + at));
+  const M some = hn::Ne(hn::And(hn::And(enter, leave), more), empty);
+  const M once = hn::And(hn::And(hn::Lt(enter, leave), hn::Ne(leave, empty)), hn::Eq(more, empty));
+  const M special = all_special ? some : hn::AndNot(once, some);
+  const M good = hn::AndNot(special, some);
+  return {some, special, hn::IfThenElse(good, enter, empty), hn::IfThenElseZero(good, leave)};
+}
+
+/// Of any solid, after which its layers are depths.
+HWY_INLINE Normalized normalize_sorted(LeafLayers& leaf, std::size_t at, bool all_special) {
   const D d;
   const V empty = hn::Set(d, LeafLayers::kEmpty), one = hn::Set(d, 1u), zero = hn::Zero(d);
   const std::size_t layers = leaf.keys.size();
-  M special = no_lane(d);
+  Normalized out{no_lane(d), no_lane(d), empty, zero};
   V before = zero;  // depth of the last exit, plus 1
-  for (std::size_t k = 0; k < layers; k += 2) {
-    const V enter = hn::Load(d, leaf.keys[k] + at);
-    const V leave = k + 1 < layers ? hn::Load(d, leaf.keys[k + 1] + at) : empty;
-    const M none = hn::And(hn::Eq(enter, empty), hn::Eq(leave, empty));
-    const V enter_depth = hn::ShiftRight<1>(enter), leave_depth = hn::ShiftRight<1>(leave);
-    const M facing = hn::And(hn::Eq(hn::And(enter, one), zero), hn::Ne(hn::And(leave, one), zero));
-    const M ordered =
-        hn::And(hn::Lt(enter_depth, leave_depth), hn::Not(hn::Lt(enter_depth, before)));
-    const M paired = hn::And(hn::And(facing, ordered), hn::Ne(leave, empty));
-    if (leaf.kind != LeafLayers::Kind::kFirstEntryOnly) {
-      special = hn::Or(special, hn::Not(hn::Or(none, paired)));
-    }
-    before = hn::Add(leave_depth, one);
-  }
-  if (all_special) {  // of a convex solid there may be an exit alone
-    for (std::size_t k = 0; k < std::min<std::size_t>(layers, 2); ++k) {
-      special = hn::Or(special, hn::Ne(hn::Load(d, leaf.keys[k] + at), empty));
+  if (leaf.kind != LeafLayers::Kind::kFirstEntryOnly) {
+    for (std::size_t k = 0; k < layers; k += 2) {
+      const V enter = hn::Load(d, leaf.keys[k] + at);
+      const V leave = k + 1 < layers ? hn::Load(d, leaf.keys[k + 1] + at) : empty;
+      const M none = hn::And(hn::Eq(enter, empty), hn::Eq(leave, empty));
+      const V enter_depth = hn::ShiftRight<1>(enter), leave_depth = hn::ShiftRight<1>(leave);
+      const M facing =
+          hn::And(hn::Eq(hn::And(enter, one), zero), hn::Ne(hn::And(leave, one), zero));
+      const M ordered =
+          hn::And(hn::Lt(enter_depth, leave_depth), hn::Not(hn::Lt(enter_depth, before)));
+      const M paired = hn::And(hn::And(facing, ordered), hn::Ne(leave, empty));
+      out.special = hn::Or(out.special, hn::Not(hn::Or(none, paired)));
+      before = hn::Add(leave_depth, one);
     }
   }
-  return special;
+  for (std::size_t k = 0; k < layers; ++k) {
+    const V key = hn::Load(d, leaf.keys[k] + at);
+    const M some = hn::Ne(key, empty);
+    if (all_special) out.special = hn::Or(out.special, some);
+    out.any = hn::Or(out.any, some);
+  }
+  for (std::size_t k = 0; k < layers; ++k) {
+    const V key = hn::Load(d, leaf.keys[k] + at);
+    const M present = hn::AndNot(out.special, hn::Ne(key, empty));
+    const V depth = hn::IfThenElse(present, hn::ShiftRight<1>(key), empty);
+    out.nearest = hn::Min(out.nearest, depth);
+    out.farthest = hn::Max(out.farthest, hn::IfThenElseZero(present, depth));
+    hn::Store(hn::IfThenElse(out.special, key, depth), d, leaf.keys[k] + at);
+  }
+  return out;
 }
 
 void NormalizeLayers(LeafLayers& leaf, bool all_special, TileFinder& finder) {
   const D d;
-  const V empty = hn::Set(d, LeafLayers::kEmpty), one = hn::Set(d, 1u), zero = hn::Zero(d);
-  const std::size_t layers = leaf.keys.size();
+  const bool convex = leaf.kind == LeafLayers::Kind::kConvex;
   const auto columns = static_cast<std::size_t>(leaf.stride);
   const std::size_t cells = static_cast<std::size_t>(leaf.rect.v1 - leaf.rect.v0) * columns;
   const std::size_t lanes = hn::Lanes(d);
@@ -222,7 +254,7 @@ void NormalizeLayers(LeafLayers& leaf, bool all_special, TileFinder& finder) {
   const std::size_t first_row = static_cast<std::size_t>(leaf.rect.v0 % kTileSide);
   leaf.areas = 0;
   alignas(64) std::uint32_t special_lanes[LeafLayers::kLanes];
-  V nearest = empty, farthest = zero;
+  V nearest = hn::Set(d, LeafLayers::kEmpty), farthest = hn::Zero(d);
   leaf.nearest = LeafLayers::kEmpty;
   leaf.farthest = 0;
   std::size_t row = first_row, column = 0;
@@ -232,22 +264,14 @@ void NormalizeLayers(LeafLayers& leaf, bool all_special, TileFinder& finder) {
       column = 0;
       area_row = 1u << (++row / kSide * (kTileSide / kSide));
     }
-    const M special = SpecialPixels(leaf, at, all_special);
-    M any = no_lane(d);
-    for (std::size_t k = 0; k < layers; ++k) {
-      const V key = hn::Load(d, leaf.keys[k] + at);
-      const M present = hn::AndNot(special, hn::Ne(key, empty));
-      const V depth = hn::IfThenElse(present, hn::ShiftRight<1>(key), empty);
-      nearest = hn::Min(nearest, depth);
-      farthest = hn::Max(farthest, hn::IfThenElseZero(present, depth));
-      any = hn::Or(any, hn::Ne(key, empty));
-      hn::Store(hn::IfThenElse(special, key, depth), d, leaf.keys[k] + at);
-    }
-    if (!hn::AllFalse(d, any)) {
-      leaf.areas |= static_cast<std::uint16_t>(area_row << (first_column + column / kSide));
-    }
-    if (hn::AllFalse(d, special)) continue;
-    hn::Store(hn::IfThenElseZero(special, one), d, special_lanes);
+    const Normalized found =
+        convex ? normalize_convex(leaf, at, all_special) : normalize_sorted(leaf, at, all_special);
+    if (hn::AllFalse(d, found.any)) continue;
+    leaf.areas |= static_cast<std::uint16_t>(area_row << (first_column + column / kSide));
+    nearest = hn::Min(nearest, found.nearest);
+    farthest = hn::Max(farthest, found.farthest);
+    if (hn::AllFalse(d, found.special)) continue;
+    hn::Store(hn::IfThenElseZero(found.special, hn::Set(d, 1u)), d, special_lanes);
     for (std::size_t i = 0; i < lanes; ++i) {
       if (special_lanes[i] != 0) finder.normalize_pixel(leaf, at + i);
     }
