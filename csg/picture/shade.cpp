@@ -325,11 +325,38 @@ void TileShader::shade_row(const SurfaceImage& tile, std::size_t begin, int u, i
         continue;
       }
     }
+    const int column = u + static_cast<int>(block), row = rows_.ground.first + v;
+    if (seen != Seen::kOneFace && rows_.across * rows_.down == 1) {
+      shade_runs(tile, first, column, row, background, std::span(colours + block, pixels));
+      continue;
+    }
     for (std::size_t i = 0; i < pixels; ++i) {
-      const int column = u + static_cast<int>(block + i), row = rows_.ground.first + v;
+      const int there = column + static_cast<int>(i);
       colours[block + i] = seen == Seen::kOneFace
-                               ? samples_->at(tile.solid[first], tile.triangle[first], column, row)
-                               : pixel(tile, first + i * across, column, row, background);
+                               ? samples_->at(tile.solid[first], tile.triangle[first], there, row)
+                               : pixel(tile, first + i * across, there, row, background);
+    }
+  }
+}
+
+/// Pixels of one sample each from (u, v) of the picture on, face by face; the first is at `begin`.
+void TileShader::shade_runs(const SurfaceImage& tile, std::size_t begin, int u, int v,
+                            Rgba background, std::span<Rgba> colours) {
+  const std::uint32_t* depths = tile.depth.data() + begin;
+  const std::uint32_t* solids = tile.solid.data() + begin;
+  const std::uint32_t* faces = tile.triangle.data() + begin;
+  for (std::size_t i = 0; i < colours.size();) {
+    if (depths[i] == SurfaceImage::kNone) {
+      colours[i++] = background;
+      continue;
+    }
+    const std::uint32_t solid = solids[i], face = faces[i];
+    const bool uniform = samples_->uniform(solid, face);
+    for (; i < colours.size() && depths[i] != SurfaceImage::kNone && solids[i] == solid &&
+           faces[i] == face;
+         ++i, ++covered_) {
+      colours[i] =
+          uniform ? samples_->colour() : samples_->at(solid, face, u + static_cast<int>(i), v);
     }
   }
 }

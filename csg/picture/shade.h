@@ -128,6 +128,8 @@ class TileShader {
     return pixels_.data() + static_cast<std::size_t>(v) * width_ + static_cast<std::size_t>(u);
   }
   void shade_row(const SurfaceImage& tile, std::size_t begin, int u, int v, std::size_t count);
+  void shade_runs(const SurfaceImage& tile, std::size_t begin, int u, int v, Rgba background,
+                  std::span<Rgba> colours);
   Rgba pixel(const SurfaceImage& tile, std::size_t begin, int u, int v, Rgba background);
 
   SampleRows rows_;
