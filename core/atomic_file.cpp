@@ -346,6 +346,13 @@ Result<void> AtomicFile::commit() {
   return {};
 }
 
+Result<void> write_file(const std::string& path, const void* data, std::size_t bytes) {
+  auto file = AtomicFile::create(path);
+  if (!file) return tl::unexpected(file.error());
+  if (auto written = file->write(data, bytes); !written) return written;
+  return file->commit();
+}
+
 // --- AtomicFolder -------------------------------------------------------------------------------
 
 Result<AtomicFolder> AtomicFolder::create(const std::string& path) {

@@ -51,6 +51,9 @@ class AtomicFile {
   std::atomic<bool> failed_{false};
 };
 
+/// Writes a whole file, which appears when it is complete. @return as AtomicFile
+Result<void> write_file(const std::string& path, const void* data, std::size_t bytes);
+
 /// The same for a folder of files: made beside its final name, renamed by commit(). An existing
 /// empty folder is replaced; an existing folder with content is kOutput.
 class AtomicFolder {

@@ -184,10 +184,7 @@ std::vector<std::uint8_t> encode_png(const Picture& picture) {
 Result<void> write_png(const Picture& picture, const std::string& path) {
   try {
     const std::vector<std::uint8_t> bytes = encode_png(picture);
-    auto file = AtomicFile::create(path);
-    if (!file) return tl::unexpected(file.error());
-    if (auto done = file->write(bytes.data(), bytes.size()); !done) return done;
-    return file->commit();
+    return write_file(path, bytes.data(), bytes.size());
   } catch (const std::bad_alloc&) {
     return fail(ErrorCode::kLimit, "{}: out of memory for a picture of {} x {} pixels", path,
                 picture.width, picture.height);

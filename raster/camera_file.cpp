@@ -150,10 +150,7 @@ Result<void> write_camera(const Camera& camera, const std::string& path) {
       camera.target.x, camera.target.y, camera.target.z, camera.rotation.x, camera.rotation.y,
       camera.rotation.z, camera.distance, camera.field_of_view,
       camera.projection == Projection::kPerspective ? "perspective" : "orthographic");
-  auto file = AtomicFile::create(path);
-  if (!file) return tl::unexpected(file.error());
-  if (auto done = file->write(text.data(), text.size()); !done) return done;
-  return file->commit();
+  return write_file(path, text.data(), text.size());
 }
 
 }  // namespace strata

@@ -189,12 +189,7 @@ Result<void> write_text(int descriptor, std::string_view text, const std::string
 }
 
 Result<void> print_report(std::string_view text, const std::string& where, bool stdout_is_taken) {
-  if (where != "-") {
-    auto file = AtomicFile::create(where);
-    if (!file) return tl::unexpected(file.error());
-    if (auto done = file->write(text.data(), text.size()); !done) return done;
-    return file->commit();
-  }
+  if (where != "-") return write_file(where, text.data(), text.size());
   if (stdout_is_taken) return write_text(STDERR_FILENO, text, "standard error");
   return write_text(STDOUT_FILENO, text, "standard output");
 }

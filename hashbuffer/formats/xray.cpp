@@ -63,10 +63,7 @@ Result<void> write_xray_png(const std::string& path, const LayeredDepthImage& im
     if (png_image_write_to_memory(&png, bytes.data(), &size, 0, grey.data(), 0, nullptr) == 0) {
       return fail(ErrorCode::kOutput, "{}: libpng: {}", path, png.message);
     }
-    auto file = AtomicFile::create(path);
-    if (!file) return tl::unexpected(file.error());
-    if (auto done = file->write(bytes.data(), size); !done) return done;
-    return file->commit();
+    return write_file(path, bytes.data(), size);
   } catch (const std::bad_alloc&) {
     return fail(ErrorCode::kLimit, "{}: out of memory for an image of {} x {} pixels", path,
                 image.width, image.height);

@@ -124,10 +124,7 @@ Result<void> write_mesh(const std::string& path, const TriangleSoup& mesh, MeshF
   }
   try {
     const std::string bytes = mesh_to_bytes(mesh, format);
-    auto file = AtomicFile::create(path);
-    if (!file) return tl::unexpected(file.error());
-    if (auto written = file->write(bytes.data(), bytes.size()); !written) return written;
-    return file->commit();
+    return write_file(path, bytes.data(), bytes.size());
   } catch (const std::bad_alloc&) {
     return fail(ErrorCode::kLimit, "{}: not enough memory to write {} triangles", path,
                 mesh.triangles.size());

@@ -55,6 +55,16 @@ TEST_F(AtomicFileTest, AppearsUnderItsNameOnlyAtCommit) {
   EXPECT_EQ(entries(), 1u);
 }
 
+TEST_F(AtomicFileTest, AWholeFileIsWrittenAtOnceOrNotAtAll) {
+  ASSERT_TRUE(write_file(at("a.bin"), "hello world", 11));
+  ASSERT_TRUE(write_file(at("a.bin"), "again", 5));
+  EXPECT_EQ(bytes_of(at("a.bin")), "again");
+  const auto failed = write_file(at("nowhere/a.bin"), "hello", 5);
+  ASSERT_FALSE(failed);
+  EXPECT_EQ(failed.error().code, ErrorCode::kOutput);
+  EXPECT_EQ(entries(), 1u);
+}
+
 TEST_F(AtomicFileTest, DestroyedUncommittedLeavesNothing) {
   {
     auto file = AtomicFile::create(at("a.bin"));

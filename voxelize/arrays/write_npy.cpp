@@ -65,10 +65,7 @@ class NpyWriter final : public SlabWriter {
       text += fmt::format("{}[{}, {}, {}]", row == 0 ? "" : ", ", d[0][row], d[1][row], d[2][row]);
     }
     text += "]\n}\n";
-    Result<AtomicFile> file = AtomicFile::create(sidecar_);
-    if (!file) return tl::unexpected(file.error());
-    if (auto written = file->write(text.data(), text.size()); !written) return written;
-    return file->commit();
+    return write_file(sidecar_, text.data(), text.size());
   }
 
   DenseValues values_;

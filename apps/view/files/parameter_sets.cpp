@@ -109,10 +109,7 @@ Result<void> write_parameter_set(const std::string& path, const std::string& nam
   }
   json[kSets][name] = std::move(set);
   const std::string text = json.dump(4, ' ', false, Json::error_handler_t::replace) + "\n";
-  auto file = AtomicFile::create(path);
-  if (!file) return tl::unexpected(file.error());
-  if (auto written = file->write(text.data(), text.size()); !written) return written;
-  return file->commit();
+  return write_file(path, text.data(), text.size());
 }
 
 #else

@@ -42,8 +42,7 @@ void write_lines(const std::string& folder, const char* name,
   fs::create_directories(folder, error);
   std::string text;
   for (const std::string& line : lines) text += line + "\n";
-  auto file = AtomicFile::create((fs::path(folder) / name).string());
-  if (file && file->write(text.data(), text.size())) (void)file->commit();
+  (void)write_file((fs::path(folder) / name).string(), text.data(), text.size());
 }
 
 }  // namespace
