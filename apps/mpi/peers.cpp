@@ -18,6 +18,8 @@
 namespace strata::apps {
 namespace {
 
+constexpr std::size_t kMostCounted = std::size_t{1} << 30;  // at a time: MPI counts by int
+
 std::string mpi_reason(int error) {
   char text[MPI_MAX_ERROR_STRING] = {};
   int length = 0;
@@ -117,11 +119,11 @@ std::vector<std::uint64_t> Peers::sum(const std::vector<std::uint64_t>& numbers)
 }
 
 std::vector<std::string> Peers::gather(const std::string& text) const {
-  constexpr std::size_t kPiece = std::size_t{1} << 20;  // of all ranks together below 2^31
+  const std::size_t piece = gathered_at_once(static_cast<std::size_t>(job_->size));
   const std::uint64_t longest = largest(text.size());
-  std::vector<std::string> texts = gather_piece(text.substr(0, kPiece));
-  for (std::size_t at = kPiece; at < longest; at += kPiece) {
-    const auto more = gather_piece(at < text.size() ? text.substr(at, kPiece) : std::string());
+  std::vector<std::string> texts = gather_piece(text.substr(0, piece));
+  for (std::size_t at = piece; at < longest; at += piece) {
+    const auto more = gather_piece(at < text.size() ? text.substr(at, piece) : std::string());
     for (std::size_t i = 0; i < more.size(); ++i) texts[i] += more[i];
   }
   return texts;
@@ -157,8 +159,11 @@ std::string Peers::broadcast(const std::string& text) const {
   MPI_Ibcast(&length, 1, MPI_UINT64_T, 0, MPI_COMM_WORLD, &request);
   job_->wait(request);
   std::string result = job_->rank == 0 ? text : std::string(length, '\0');
-  MPI_Ibcast(result.data(), static_cast<int>(length), MPI_CHAR, 0, MPI_COMM_WORLD, &request);
-  job_->wait(request);
+  for (std::size_t at = 0; at < length; at += kMostCounted) {
+    const int part = static_cast<int>(std::min(kMostCounted, length - at));
+    MPI_Ibcast(result.data() + at, part, MPI_CHAR, 0, MPI_COMM_WORLD, &request);
+    job_->wait(request);
+  }
   return result;
 }
 
@@ -183,10 +188,9 @@ Result<Peers::SharedFile> Peers::open(const std::string& path) const {
 
 Result<void> Peers::SharedFile::write_at(std::uint64_t offset, const void* data,
                                          std::size_t bytes) const {
-  constexpr std::size_t kMost = std::size_t{1} << 30;  // MPI counts by int
   const auto* from = static_cast<const char*>(data);
   while (bytes > 0) {
-    const std::size_t part = std::min(bytes, kMost);
+    const std::size_t part = std::min(bytes, kMostCounted);
     MPI_Status status;
     int written = 0;
     const std::lock_guard lock(*file_->mutex);

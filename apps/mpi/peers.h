@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -10,6 +11,12 @@
 #include "strata/core/result.h"
 
 namespace strata::apps {
+
+/// Bytes of a rank's text that are gathered at a time: those of all ranks are counted by int.
+[[nodiscard]] constexpr std::size_t gathered_at_once(std::size_t ranks) {
+  constexpr std::size_t kMost = std::size_t{1} << 20, kAll = std::numeric_limits<int>::max();
+  return ranks > kAll / kMost ? kAll / ranks : kMost;
+}
 
 /// The processes of an MPI job, the ranks. All calls of MPI are in peers.cpp. The functions that
 /// say so are collective: every rank calls them, in the same order. Waiting asks `stopped` and ends

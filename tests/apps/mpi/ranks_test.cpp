@@ -7,10 +7,12 @@
 #include <chrono>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <map>
 #include <sstream>
 #include <thread>
 
+#include "apps/mpi/peers.h"
 #include "strata/mesh/shapes.h"
 #include "tests/apps/strata/voxelize_fixture.h"
 
@@ -145,6 +147,14 @@ TEST_F(Ranks, WriteOneVdbEachWithAnIndex) {
   }
   EXPECT_EQ(index["files"].size(), 3u);
   EXPECT_EQ(solid, index["solid"].get<std::uint64_t>());
+}
+
+TEST(RanksOfLargeJobs, GatherWhatAnIntCanCount) {
+  constexpr std::size_t kMost = std::numeric_limits<int>::max();
+  for (const std::size_t ranks : {1u, 2u, 2047u, 2048u, 2049u, 4096u, 100'000u, 10'000'000u}) {
+    EXPECT_LE(ranks * apps::gathered_at_once(ranks), kMost) << ranks;
+    EXPECT_GT(ranks * apps::gathered_at_once(ranks), std::min(kMost / 2, ranks * 1'000'000));
+  }
 }
 
 TEST_F(Ranks, EndWithOneSentenceAndWithoutOutput) {
