@@ -10,11 +10,13 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <cerrno>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <mutex>
+#include <string_view>
 
 #include "core/atomic_file.h"
 #include "strata/core/result.h"
@@ -47,11 +49,20 @@ struct CopyRecord {
 };
 
 /// The caller expects a function of the library, and no error can be given to it.
-[[noreturn]] void give_up(const char* what) {
-  const bool memory = std::strstr(what, "memory") != nullptr;  // nothing else tells
-  std::fprintf(stderr, "strata: error: a library that this job needs cannot be opened: %s\n", what);
+[[noreturn]] void give_up(std::string_view what, bool memory) {
+  std::fprintf(stderr, "strata: error: a library that this job needs cannot be opened: %.*s\n",
+               static_cast<int>(what.size()), what.data());
   remove_temporary_files();
   std::_Exit(static_cast<int>(memory ? ErrorCode::kLimit : ErrorCode::kInternal));
+}
+
+/// For the reason that dlerror() tells: file, what failed, error of the system. Nothing else tells
+/// of memory that has run out.
+[[noreturn]] void give_up_opening() {
+  const char* const text = dlerror();
+  const std::string_view what = text == nullptr ? "no reason is known" : text;
+  give_up(what, what.ends_with(std::strerror(ENOMEM)) || what.ends_with("out of memory") ||
+                    what.ends_with("cannot allocate memory in static TLS block"));
 }
 
 /// Writes into memory that is read-only but for this moment.
@@ -60,7 +71,7 @@ void write_protected(char* target, const void* source, std::size_t size) {
   const auto first = reinterpret_cast<std::uintptr_t>(target) & ~(page - 1);
   const std::size_t length = reinterpret_cast<std::uintptr_t>(target) + size - first;
   if (mprotect(reinterpret_cast<void*>(first), length, PROT_READ | PROT_WRITE) != 0) {
-    give_up("memory cannot be made writable");
+    give_up("memory cannot be made writable", errno == ENOMEM);
   }
   if (size == sizeof(void*)) {  // other threads read slots
     void* value = nullptr;
@@ -74,7 +85,7 @@ void write_protected(char* target, const void* source, std::size_t size) {
 
 void* address_in(void* opened, const char* name) {
   void* address = dlsym(opened, name);
-  if (address == nullptr) give_up(dlerror());
+  if (address == nullptr) give_up_opening();
   return address;
 }
 
@@ -103,7 +114,7 @@ void* open_function(const CallRecord& call) {
   const std::lock_guard lock(mutex);
   const auto& library = *reinterpret_cast<const LibraryRecord*>(call.library.target());
   void* const opened = dlopen(library.soname(), RTLD_LAZY | RTLD_LOCAL);  // counted, never closed
-  if (opened == nullptr) give_up(dlerror());
+  if (opened == nullptr) give_up_opening();
   const auto known_end = known.begin() + static_cast<std::ptrdiff_t>(known_count);
   if (std::find(known.begin(), known_end, &library) == known_end) {
     copy_tables(library, opened);

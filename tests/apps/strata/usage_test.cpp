@@ -66,6 +66,16 @@ TEST_F(Usage, ALibraryThatCannotBeOpenedEndsTheJobThatNeedsIt) {
   EXPECT_EQ(place.names(), (std::vector<std::string>{"box.obj", "libdeflate.so.0"}));
   EXPECT_EQ(place.run({"voxelize", "box.obj", "-r", "8", "-o", "box.npy"}, here).exit_code, 0);
 }
+
+TEST_F(Usage, ALibraryWhosePathSpeaksOfMemoryIsNoLackOfIt) {
+  std::filesystem::create_directory(place.path("out of memory"));
+  place.write("out of memory/libdeflate.so.0", "not a library");
+  const RunResult run =
+      place.run({"csg", "box.obj", "-o", "box.png"},
+                {.environment = {"LD_LIBRARY_PATH=" + place.path("out of memory")}});
+  EXPECT_EQ(run.exit_code, 1);
+  EXPECT_NE(run.err.find("out of memory/libdeflate.so.0"), std::string::npos) << run.err;
+}
 #endif
 
 TEST_F(Usage, HelpTakesACommand) {
