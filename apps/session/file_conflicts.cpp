@@ -35,7 +35,7 @@ bool same_file(const std::string& a, const std::string& b) {
 /// place.
 bool holds(const std::string& folder, const std::string& file) {
   std::error_code error;
-  return fs::is_directory(folder, error) && lies_below(file, folder);
+  return fs::is_directory(folder, error) && lies_below(resolved(file).string(), folder);
 }
 
 tl::unexpected<Error> overwrites(const FileUse& out, std::string_view what,
@@ -63,6 +63,10 @@ Result<void> check_files(const std::vector<FileUse>& read, const std::vector<Fil
       if (is_stream(in.path)) continue;
       if (same_file(in.path, out.path) || holds(out.path, in.path)) {
         return overwrites(out, in.asked_by, in.path);
+      }
+      if (holds(in.path, out.path)) {
+        return fail(ErrorCode::kUsage, "{} {} must not lie in {} {}", out.asked_by, out.path,
+                    in.asked_by, in.path);
       }
     }
     for (std::size_t j = 0; j < i; ++j) {

@@ -17,8 +17,9 @@ struct FileUse {
 /// Whether bytes for this name go to a pipe, a device or an open file: "-", /dev/stdout, /dev/null.
 [[nodiscard]] bool is_stream(const std::string& path);
 
-/// Looks, before any work is done, whether a file would be written that is read too, or that is
-/// written twice: by whatever names, links followed. Streams may carry several things.
+/// Looks, before any work is done, whether a file would be written that is read too, that lies in a
+/// folder that is read, or that is written twice: by whatever names, links followed. Streams may
+/// carry several things.
 /// @return kUsage naming the two and the file
 Result<void> check_files(const std::vector<FileUse>& read, const std::vector<FileUse>& written);
 

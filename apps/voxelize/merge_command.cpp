@@ -69,20 +69,6 @@ Result<void> put_file(const fs::path& from, const fs::path& to) {
   return fail(ErrorCode::kOutput, "{}: cannot write: {}", to.string(), reason.message());
 }
 
-/// Checks that no output would lie among what is read.
-Result<void> check_outputs(const MergeCommand& command) {
-  for (const std::string& shard : command.shards) {
-    std::error_code ignored;
-    if (!fs::is_directory(shard, ignored)) continue;
-    for (const std::string& output : {command.output, command.json.value_or("")}) {
-      if (output.empty() || output == "-") continue;
-      if (!lies_below(fs::absolute(output, ignored).string(), shard)) continue;
-      return fail(ErrorCode::kUsage, "{} must not lie in the shard {}", output, shard);
-    }
-  }
-  return {};
-}
-
 /// All chunks of a shard. @param to  the folder of the store
 Result<void> put_chunks(const ShardReport& report, const std::string& to,
                         const Execution& execution) {
@@ -280,7 +266,6 @@ Result<void> run_merge(const MergeCommand& command, Session& session) {
     if (session.interrupted()) return fail(ErrorCode::kCancelled, "stopped");
   }
   if (auto valid = check_shards(shards); !valid) return valid;
-  if (auto valid = check_outputs(command); !valid) return valid;
   return Merge(command, std::move(shards), session).run();
 }
 

@@ -180,6 +180,16 @@ TEST_F(Files, AFolderThatHoldsAnInputIsNotReplaced) {
   }
 }
 
+TEST_F(Files, NothingIsPutIntoAFolderThatIsRead) {
+  const testkit::RunResult made = place.run({"voxelize", "part.stl", "-r", "4", "-o", "v.zarr"});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  refuses({"picture", "v.zarr", "-o", "v.zarr/a.png"},
+          {"-o v.zarr/a.png must not lie in the input v.zarr"});
+  refuses({"info", "v.zarr", "--json=./v.zarr/deep/../a.json"}, {"must not lie in the input"});
+  refuses({"voxelize", "part.stl", "--like", "v.zarr", "-o", "v.zarr/a.npy"},
+          {"-o v.zarr/a.npy must not lie in --like v.zarr"});
+}
+
 TEST_F(Files, OutputsAppearTogetherOrNotAtAll) {
   const auto fails = [&](const std::vector<std::string>& arguments) {
     const auto before = contents();
