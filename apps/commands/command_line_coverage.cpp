@@ -97,8 +97,8 @@ void read_layers(const CoverageWords& words, LayerOptions& layers, Reader& reade
   if (!words.gamma.empty()) {
     numbers.assign(1, 1.0);
     reader.take(parse_numbers("--gamma", words.gamma, 1, 1), numbers);
-    if (!(numbers[0] >= 0 && numbers[0] <= 10)) {
-      reader.fail_with(fmt::format("--gamma must be 0 to 10, got {}", numbers[0]));
+    if (!(numbers[0] >= 0 && numbers[0] <= kMostGamma)) {
+      reader.fail_with(fmt::format("--gamma must be 0 to {}, got {}", kMostGamma, numbers[0]));
     }
     layers.gamma = numbers[0];
   }
@@ -106,9 +106,9 @@ void read_layers(const CoverageWords& words, LayerOptions& layers, Reader& reade
     numbers.assign(1, 1.0);
     reader.take(parse_numbers("--exposure", words.exposure, 1, 2), numbers);
     for (const double seconds : numbers) {
-      if (!(seconds > 0 && seconds <= 1000)) {
-        reader.fail_with(
-            fmt::format("--exposure must be above 0, to 1000 seconds, got {}", seconds));
+      if (!(seconds > 0 && seconds <= kMostExposure)) {
+        reader.fail_with(fmt::format("--exposure must be above 0, to {} seconds, got {}",
+                                     kMostExposure, seconds));
       }
     }
     layers.exposure = numbers.front();

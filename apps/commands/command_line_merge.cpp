@@ -1,6 +1,11 @@
 // `strata merge`, and the option of `strata voxelize` that makes what it joins.
 
 #include <CLI/App.hpp>
+#include <algorithm>
+#include <charconv>
+#include <limits>
+#include <optional>
+#include <string_view>
 
 #include "apps/commands/command_words.h"
 #include "apps/session/option_values.h"
@@ -17,8 +22,6 @@ constexpr const char* kMergeExamples =
   strata merge 1.json 2.json --stats
 )";
 
-constexpr std::int64_t kMostShards = 1024;  // rows of tiles of the largest grid
-
 /// What a part of a grid cannot have, or nothing.
 const char* undivided_option(const VoxelizeCommand& command) {
   return command.sdf           ? "--sdf: distances reach into other parts"
@@ -29,24 +32,33 @@ const char* undivided_option(const VoxelizeCommand& command) {
                                : nullptr;
 }
 
+/// A number of digits alone; one that is too large is the largest.
+std::optional<int> digits_of(std::string_view text) {
+  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
+  if (text.empty() || !std::all_of(text.begin(), text.end(), is_digit)) return std::nullopt;
+  int number = 0;
+  const auto error = std::from_chars(text.data(), text.data() + text.size(), number).ec;
+  return error == std::errc() ? number : std::numeric_limits<int>::max();
+}
+
 }  // namespace
 
 void read_shard(const Words& words, VoxelizeCommand& command, Reader& reader) {
   if (words.shard.empty()) return;
-  const std::size_t slash = words.shard.find('/');
-  if (slash == std::string::npos) {
-    reader.fail_with(fmt::format("--shard must be I/N, like 1/8, got '{}'", words.shard));
+  const std::string_view shard = words.shard;
+  const std::size_t slash = std::min(shard.find('/'), shard.size());
+  const auto index = digits_of(shard.substr(0, slash));
+  const auto count = digits_of(shard.substr(std::min(slash + 1, shard.size())));
+  if (!index || !count) {
+    reader.fail_with(fmt::format("--shard must be I/N, like 1/8, got '{}'", shard));
     return;
   }
-  std::int64_t index = 0, count = 0;
-  reader.take(parse_integer("--shard", std::string_view(words.shard).substr(0, slash)), index);
-  reader.take(parse_integer("--shard", std::string_view(words.shard).substr(slash + 1)), count);
-  if (reader.error()) return;
-  if (count < 1 || count > kMostShards || index < 1 || index > count) {
-    reader.fail_with(fmt::format("--shard must be 1/N to N/N with N from 1 to {}, got {}",
-                                 kMostShards, words.shard));
+  if (*count < 1 || *count > kMostShards || *index < 1 || *index > *count) {
+    reader.fail_with(
+        fmt::format("--shard must be 1/N to N/N with N from 1 to {}, got {}", kMostShards, shard));
+    return;
   }
-  command.shard = Shard{static_cast<int>(index), static_cast<int>(count)};
+  command.shard = Shard{*index, *count};
   if (const char* other = undivided_option(command)) {
     reader.fail_with(fmt::format("--shard cannot be combined with {}", other));
   }

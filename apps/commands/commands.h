@@ -38,8 +38,14 @@ inline constexpr int kDefaultResolution = 256;
 /// One of the parts that a job is cut into.
 struct Shard {
   int index = 1;  ///< from 1
-  int count = 1;
+  int count = 1;  ///< at most kMostShards
 };
+inline constexpr int kMostShards = 1024;  ///< rows of tiles of the largest grid
+/// In the folder of a shard: what it is a part of.
+inline constexpr const char* kShardReport = "shard.json";
+
+inline constexpr double kMostGamma = 10;       ///< of --gamma
+inline constexpr double kMostExposure = 1000;  ///< of --exposure, seconds
 
 /// `strata voxelize`
 struct VoxelizeCommand {

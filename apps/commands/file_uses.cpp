@@ -7,6 +7,7 @@
 #include <iterator>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <utility>
 
 #include "apps/commands/oit_options.h"
@@ -97,6 +98,18 @@ std::vector<FileUse> inputs_of(const MergeCommand& command) {
   std::vector<FileUse> uses;
   for (const std::string& path : command.shards) uses.push_back({"the shard", path});
   return uses;
+}
+
+Result<void> check_no_shard(const std::vector<FileUse>& read) {
+  for (const FileUse& in : read) {
+    std::error_code ignored;
+    if (!std::filesystem::is_regular_file(in.path + "/" + kShardReport, ignored)) continue;
+    return fail(ErrorCode::kInput,
+                "{}: it is a shard of strata voxelize --shard; strata merge joins all shards of a "
+                "job",
+                in.path);
+  }
+  return {};
 }
 
 std::string shard_path(std::string output, const Shard& shard) {

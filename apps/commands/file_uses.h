@@ -18,6 +18,10 @@ template <class AnyCommand>
 [[nodiscard]] std::vector<FileUse> inputs_of(const VoxelizeCommand& command);
 [[nodiscard]] std::vector<FileUse> inputs_of(const MergeCommand& command);
 
+/// Holds what a command reads against the folders of shards, which strata merge alone reads.
+/// @return kInput naming the folder
+Result<void> check_no_shard(const std::vector<FileUse>& read);
+
 /// What a command writes.
 [[nodiscard]] std::vector<FileUse> outputs_of(const VoxelizeCommand& command);
 [[nodiscard]] std::vector<FileUse> outputs_of(const MergeCommand& command);

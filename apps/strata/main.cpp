@@ -10,6 +10,7 @@
 #include <stdexcept>
 #include <string_view>
 #include <system_error>
+#include <type_traits>
 #include <variant>
 
 #include <fcntl.h>
@@ -114,7 +115,11 @@ Result<void> run(const AnyCommand& command, Session& session) {
   try {
     session.configure(command.common);
     const std::vector<FileUse> written = outputs_of(command);
-    if (auto kept = check_files(inputs_of(command), written); !kept) return kept;
+    const std::vector<FileUse> read = inputs_of(command);
+    if (auto kept = check_files(read, written); !kept) return kept;
+    if constexpr (!std::is_same_v<AnyCommand, MergeCommand>) {
+      if (auto readable = check_no_shard(read); !readable) return readable;
+    }
     session.set_outputs(written, true);
     if (auto done = run_command(command, session); !done) return done;
     return commit_outputs(session);

@@ -39,7 +39,7 @@ Result<void> check_shards(std::vector<ShardReport>& shards) {
   std::stable_sort(shards.begin(), shards.end(), [](const ShardReport& a, const ShardReport& b) {
     return a.command.shard->index < b.command.shard->index;
   });
-  std::string missing;
+  std::vector<int> missing;
   int next = 1;
   for (std::size_t i = 0; i < shards.size(); ++i) {
     const int index = shards[i].command.shard->index;
@@ -47,13 +47,19 @@ Result<void> check_shards(std::vector<ShardReport>& shards) {
       return fail(ErrorCode::kInput, "{} and {} are both shard {} of {}", shards[i - 1].path,
                   shards[i].path, index, count);
     }
-    for (; next < index; ++next) missing += fmt::format("{}{}", missing.empty() ? "" : ", ", next);
+    for (; next < index; ++next) missing.push_back(next);
     next = index + 1;
   }
-  for (; next <= count; ++next) missing += fmt::format("{}{}", missing.empty() ? "" : ", ", next);
+  for (; next <= count; ++next) missing.push_back(next);
   if (missing.empty()) return {};
-  const bool several = missing.find(',') != std::string::npos;
-  return fail(ErrorCode::kInput, "shard{} {} of {} {} missing", several ? "s" : "", missing, count,
+  constexpr std::size_t kMostNamed = 10;
+  const std::size_t named = std::min(missing.size(), kMostNamed);
+  std::string list;
+  for (std::size_t i = 0; i < named; ++i)
+    list += fmt::format("{}{}", i == 0 ? "" : ", ", missing[i]);
+  if (missing.size() > named) list += fmt::format(" and {} more", missing.size() - named);
+  const bool several = missing.size() > 1;
+  return fail(ErrorCode::kInput, "shard{} {} of {} {} missing", several ? "s" : "", list, count,
               several ? "are" : "is");
 }
 
@@ -114,7 +120,7 @@ class Merge {
       : command_(command), shards_(std::move(shards)), session_(session) {}
 
   Result<void> run() {
-    add_up();
+    if (auto added = add_up(); !added) return added;
     if (auto told = tell(); !told) return told;
     if (!command_.output.empty()) {
       if (auto written = write(); !written) return written;
@@ -124,7 +130,7 @@ class Merge {
   }
 
  private:
-  void add_up();
+  Result<void> add_up();
   Result<void> tell();
   Result<void> check_format();
   Result<void> write();
@@ -139,7 +145,7 @@ class Merge {
   VoxelizeOutcome sum_;
 };
 
-void Merge::add_up() {
+Result<void> Merge::add_up() {
   whole_ = shards_.front().command;
   whole_.shard.reset();
   whole_.output = command_.output;
@@ -149,7 +155,7 @@ void Merge::add_up() {
   sum_ = shards_.front().outcome;
   sum_.output_bytes.reset();
   for (std::size_t i = 1; i < shards_.size(); ++i) add_shard(shards_[i].outcome, sum_);
-  finish_sum(shards_, sum_);
+  return finish_sum(shards_, session_.memory_limit(), sum_);
 }
 
 /// What the shards warned of, once, and what only all voxels tell.

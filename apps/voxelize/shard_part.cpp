@@ -47,11 +47,16 @@ Result<VoxelRows> shard_rows(const VoxelGrid& grid, Axis axis, const Shard& shar
   const int rows = grid.dims[AxisFrame(axis).v];
   const int tiles = (rows + kSide - 1) / kSide;
   if (shard.count > tiles) {
-    return fail(ErrorCode::kUsage,
-                "--shard {}/{}: the grid of {} x {} x {} voxels has {} rows along {}, which are at "
-                "most {} shards of {}",
-                shard.index, shard.count, grid.dims.x, grid.dims.y, grid.dims.z, rows,
-                "xyz"[AxisFrame(axis).v], tiles, kSide);
+    return fail(
+        ErrorCode::kUsage,
+        "--shard {}/{}: a shard has {} rows of voxels or more, and the grid of {} x {} x {} "
+        "has {} along {}: it makes {}; {} shards need {} rows, by a "
+        "higher -r or smaller voxels",
+        shard.index, shard.count, kSide, grid.dims.x, grid.dims.y, grid.dims.z, rows,
+        "xyz"[AxisFrame(axis).v],
+        tiles == 1 ? std::string("1 shard, which needs no --shard")
+                   : fmt::format("at most {} shards", tiles),
+        shard.count, (shard.count - 1) * kSide + 1);
   }
   const int begin = tiles * (shard.index - 1) / shard.count,
             end = tiles * shard.index / shard.count;

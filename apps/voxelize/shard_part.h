@@ -12,10 +12,9 @@ Result<VoxelRows> shard_rows(const VoxelGrid& grid, Axis axis, const Shard& shar
 /// A number that tells inputs apart: of the triangles, and of the tree.
 [[nodiscard]] std::uint64_t input_hash(const csg::SolidInput& input);
 
-/// Names in the folder of a shard.
-inline constexpr const char* kShardReport = "shard.json";  ///< what it is a part of
-inline constexpr const char* kShardRuns = "runs";          ///< its voxels, as RunFileReader
-inline constexpr const char* kShardChunks = "chunks";      ///< or its chunks, as they will lie
+/// Names in the folder of a shard, besides kShardReport.
+inline constexpr const char* kShardRuns = "runs";      ///< its voxels, as RunFileReader
+inline constexpr const char* kShardChunks = "chunks";  ///< or its chunks, as they will lie
 /// Whether shards of this format hold chunks.
 [[nodiscard]] bool has_chunks(std::string_view format);
 

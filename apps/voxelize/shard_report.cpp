@@ -1,10 +1,12 @@
 #include "apps/voxelize/shard_report.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <map>
 #include <utility>
 
@@ -76,6 +78,8 @@ void write_file(JsonWriter& json, const VoxelWriterOptions& file) {
 /// The members of an object of a report, which must be there.
 class Fields {
  public:
+  static constexpr double kMostCounted = 9e15;  // sums of all shards stay below 2^64
+
   /// @param wrong  the first member that is missing or of a wrong kind
   Fields(const JsonValue* object, std::string name, std::string& wrong)
       : object_(object), name_(std::move(name)), wrong_(wrong) {
@@ -114,30 +118,54 @@ class Fields {
     const JsonValue* value = find(name, JsonValue::kText);
     return value == nullptr ? std::string() : value->text;
   }
+  /// null, or no member: empty.
+  [[nodiscard]] std::string text_or_null(std::string_view name) const {
+    const JsonValue* value = object_ == nullptr ? nullptr : object_->find(name);
+    return value == nullptr || value->kind == JsonValue::kNull ? std::string() : text(name);
+  }
   /// null: NaN.
   [[nodiscard]] double number(std::string_view name) const {
     if (object_ != nullptr) {
       const JsonValue* value = object_->find(name);
       if (value != nullptr && value->kind == JsonValue::kNull) return NAN;
     }
-    const JsonValue* value = find(name, JsonValue::kNumber);
-    return value == nullptr ? 0.0 : value->number;
+    return number_in(name, std::numeric_limits<double>::lowest(),
+                     std::numeric_limits<double>::max());
   }
-  /// null: 0.
+  [[nodiscard]] double number_in(std::string_view name, double least, double most) const {
+    const JsonValue* value = find(name, JsonValue::kNumber);
+    if (value == nullptr) return 0.0;
+    if (value->number >= least && value->number <= most) return value->number;
+    refuse(name);
+    return 0.0;
+  }
+  /// 0 or more; null: 0.
   [[nodiscard]] double length(std::string_view name) const {
     const double value = number(name);
-    return std::isnan(value) ? 0.0 : value;
+    if (value < 0) refuse(name);
+    return value > 0 ? value : 0.0;
   }
   template <class T = std::uint64_t>
-  [[nodiscard]] T count(std::string_view name, double most = 9e15) const {
-    const double value = number(name);
-    if (value >= 0 && value <= most && value == std::floor(value)) return static_cast<T>(value);
-    refuse(name);
-    return 0;
+  [[nodiscard]] T count(std::string_view name, double most = kMostCounted) const {
+    const JsonValue* value = find(name, JsonValue::kNumber);
+    return value == nullptr ? T{0} : whole<T>(*value, name, most);
+  }
+  /// A list of whole numbers; empty if it has not as many.
+  template <class T = std::uint64_t>
+  [[nodiscard]] std::vector<T> counts(std::string_view name, std::size_t least, std::size_t count,
+                                      double most = kMostCounted) const {
+    std::vector<T> numbers;
+    const std::vector<JsonValue>& items = list(name);
+    if (items.size() < least || items.size() > count) return refuse(name), numbers;
+    for (const JsonValue& item : items) numbers.push_back(whole<T>(item, name, most));
+    return numbers;
   }
   [[nodiscard]] glm::dvec3 vector(std::string_view name) const {
     const auto numbers = object_ == nullptr ? std::nullopt : object_->numbers(name, 3);
     if (!numbers) return refuse(name), glm::dvec3(0);
+    for (const double number : *numbers) {
+      if (!std::isfinite(number)) refuse(name);
+    }
     return {(*numbers)[0], (*numbers)[1], (*numbers)[2]};
   }
   [[nodiscard]] std::uint64_t hash(std::string_view name) const {
@@ -166,6 +194,16 @@ class Fields {
   }
 
  private:
+  template <class T>
+  [[nodiscard]] T whole(const JsonValue& value, std::string_view name, double most) const {
+    const double number = value.number;
+    if (value.kind == JsonValue::kNumber && number >= 0 && number <= most &&
+        number == std::floor(number)) {
+      return static_cast<T>(number);
+    }
+    refuse(name);
+    return 0;
+  }
   [[nodiscard]] std::string name_of(std::string_view name) const {
     return name_.empty() || name.empty() ? name_ + std::string(name)
                                          : name_ + "." + std::string(name);
@@ -238,21 +276,25 @@ void read_walls(const Fields& in, LostWalls& walls) {
 }
 
 void read_grid(const Fields& in, VoxelizeCommand& command, VoxelizeOutcome& outcome) {
-  const glm::dvec3 dims = in.vector("dims");
-  for (int axis = 0; axis < 3; ++axis) {
-    if (!(dims[axis] >= 1 && dims[axis] <= kMaxGridSide)) return in.refuse("dims");
-    outcome.grid.dims[axis] = static_cast<int>(dims[axis]);
-  }
+  const std::vector<int> dims = in.counts<int>("dims", 3, 3, kMaxGridSide);
+  if (dims.empty()) return;
+  outcome.grid.dims = {dims[0], dims[1], dims[2]};
   outcome.grid.origin = in.vector("origin");
   outcome.grid.voxel_size = in.vector("voxel_size");
   command.default_size = in.flag("by_default");
+  command.like = in.text_or_null("like");
   const std::vector<JsonValue>& rows = in.list("direction");
   if (rows.size() != 3) return in.refuse("direction");
   for (int row = 0; row < 3; ++row) {
     const std::vector<JsonValue>& numbers = rows[static_cast<std::size_t>(row)].items;
     if (numbers.size() != 3) return in.refuse("direction");
     for (int column = 0; column < 3; ++column) {
-      outcome.frame.direction[column][row] = numbers[static_cast<std::size_t>(column)].number;
+      const JsonValue& number = numbers[static_cast<std::size_t>(column)];
+      // Rows are of length 1.
+      if (number.kind != JsonValue::kNumber || !(std::abs(number.number) <= 1 + 1e-6)) {
+        return in.refuse("direction");
+      }
+      outcome.frame.direction[column][row] = number.number;
     }
   }
 }
@@ -268,11 +310,8 @@ void read_numbers(const Fields& report, VoxelizeCommand& command, VoxelizeOutcom
   found.unbalanced_columns = lists.count("unbalanced_columns");
   found.negative_columns = lists.count("negative_columns");
   found.rebuilt_tiles = lists.count("rebuilt_tiles");
-  const std::vector<JsonValue>& histogram = lists.list("depth_histogram");
-  if (histogram.size() > found.depth_histogram.size()) lists.refuse("depth_histogram");
-  for (std::size_t n = 1; n < std::min(histogram.size(), found.depth_histogram.size()); ++n) {
-    found.depth_histogram[n] = static_cast<std::uint64_t>(std::max(0.0, histogram[n].number));
-  }
+  const auto histogram = lists.counts("depth_histogram", 0, found.depth_histogram.size());
+  for (std::size_t n = 1; n < histogram.size(); ++n) found.depth_histogram[n] = histogram[n];
   read_walls(report.object("lost_walls"), outcome.lost_walls);
   const Fields shard = report.object("shard");
   command.coverage = shard.count<int>("coverage", kMaxGridSide);
@@ -280,33 +319,38 @@ void read_numbers(const Fields& report, VoxelizeCommand& command, VoxelizeOutcom
   outcome.measured = true;
 }
 
-/// The names of solids with voxels, and how many: where those of other shards are added.
-void read_ids(const Fields& report, VoxelizeOutcome& outcome) {
-  constexpr double kMostSolids = 1e8;
-  csg::Tree names;
+/// The solids with voxels, which ascend.
+void read_ids(const Fields& report, std::vector<ShardReport::SolidVoxels>& ids) {
   for (const JsonValue& value : report.list("ids")) {
     const Fields fields = report.item(value, "ids");
-    const auto solid = fields.count<std::size_t>("solid", kMostSolids);
-    while (names.solids().size() <= solid) names.add_solid({});
-    names.solids()[solid].name = fields.text("name");
-    if (outcome.id_voxels.size() <= solid) outcome.id_voxels.resize(solid + 1, 0);
-    outcome.id_voxels[solid] = fields.count("voxels");
+    const auto solid = fields.count<std::uint32_t>("solid", std::numeric_limits<int>::max());
+    if (!ids.empty() && solid <= ids.back().solid) fields.refuse("solid");
+    ids.push_back({solid, fields.text("name"), fields.count("voxels")});
   }
-  outcome.input.scene = std::make_shared<csg::Tree>(std::move(names));
 }
 
-void read_seams(const Fields& in, std::vector<BoundaryArea::Seam>& seams) {
+/// @param outcome  its grid and axis are known
+void read_seams(const Fields& in, const VoxelizeOutcome& outcome,
+                std::vector<BoundaryArea::Seam>& seams) {
+  const AxisFrame frame(outcome.axis);
+  const glm::ivec3 dims = outcome.grid.dims;
   for (const JsonValue& value : in.list("seams")) {
     const Fields fields = in.item(value, "seams");
-    BoundaryArea::Seam seam{fields.count<int>("row", kMaxGridSide), fields.flag("first"), {}};
+    BoundaryArea::Seam seam{fields.count<int>("row", dims[frame.v] - 1), fields.flag("first"), {}};
     const std::string runs = fields.text("runs");
     if (runs.size() % 12 != 0) return in.refuse("seams");
+    std::pair<int, int> least = {0, 0};  // column, and where a run may begin
     for (std::size_t at = 0; at < runs.size(); at += 12) {
       const std::uint64_t run = fields.read_hex(std::string_view(runs).substr(at, 12), "runs");
-      seam.runs.push_back(
-          {static_cast<std::uint16_t>(run >> 32),
-           {static_cast<std::uint16_t>(run >> 16), static_cast<std::uint16_t>(run)}});
-      if (seam.runs.back().interval.last < seam.runs.back().interval.first) fields.refuse("runs");
+      const BoundaryArea::Seam::Run read = {
+          static_cast<std::uint16_t>(run >> 32),
+          {static_cast<std::uint16_t>(run >> 16), static_cast<std::uint16_t>(run)}};
+      if (std::pair(int{read.u}, read.interval.begin()) < least || read.u >= dims[frame.u] ||
+          read.interval.last < read.interval.first || read.interval.end() > dims[frame.w]) {
+        return fields.refuse("runs");
+      }
+      least = {read.u, read.interval.end()};
+      seam.runs.push_back(read);
     }
     seams.push_back(std::move(seam));
   }
@@ -321,28 +365,21 @@ VoxelWriterOptions read_file(const Fields& in) {
   file.ids = in.count<std::uint32_t>("ids", 4e9);
   file.sidecar = in.flag("sidecar");
   for (const JsonValue& value : in.list("colours")) {
+    if (value.text.size() != 8) in.refuse("colours");
     const std::uint64_t rgba = in.read_hex(value.text, "colours");
     file.colours.emplace_back(rgba >> 24 & 0xff, rgba >> 16 & 0xff, rgba >> 8 & 0xff, rgba & 0xff);
   }
   file.frame.space = in.text("space");
-  file.frame.unit_metres = in.number("unit_metres");
+  file.frame.unit_metres = in.length("unit_metres");
   const Fields layers = in.object("layers");
   file.layers.axis = layers.choice("axis", kAxisWords).value_or(Axis::kZ);
   file.layers.mirror_left_right = layers.flag("mirror_left_right");
   file.layers.mirror_up_down = layers.flag("mirror_up_down");
-  file.layers.gamma = layers.number("gamma");
-  const std::vector<JsonValue>& display = layers.list("display");
-  if (display.size() != 2) {
-    layers.refuse("display");
-  } else {
-    for (int i = 0; i < 2; ++i) {
-      const double pixels = display[static_cast<std::size_t>(i)].number;
-      if (!(pixels >= 0 && pixels <= kMaxGridSide)) layers.refuse("display");
-      file.layers.display[i] = pixels >= 0 && pixels <= kMaxGridSide ? static_cast<int>(pixels) : 0;
-    }
-  }
-  file.layers.exposure = layers.number("exposure");
-  file.layers.first_exposure = layers.number("first_exposure");
+  file.layers.gamma = layers.number_in("gamma", 0, kMostGamma);
+  const auto display = layers.counts<int>("display", 2, 2, kMaxGridSide);
+  if (!display.empty()) file.layers.display = {display[0], display[1]};
+  file.layers.exposure = layers.number_in("exposure", 0, kMostExposure);
+  file.layers.first_exposure = layers.number_in("first_exposure", 0, kMostExposure);
   file.layers.time = layers.count<std::int64_t>("time", 3e11);
   return file;
 }
@@ -359,10 +396,10 @@ void read_options(const Fields& in, VoxelizeCommand& command, VoxelizeOutcome& o
 }
 
 void read_part(const Fields& in, ShardReport& report) {
-  if (in.count<int>("version") != kShardVersion) in.refuse("version");
+  if (in.count("version") != kShardVersion) in.refuse("version");
   Shard shard;
-  shard.index = in.count<int>("index", 1e6);
-  shard.count = in.count<int>("count", 1e6);
+  shard.index = in.count<int>("index", kMostShards);
+  shard.count = in.count<int>("count", kMostShards);
   if (shard.index < 1 || shard.index > shard.count) in.refuse("index");
   report.command.shard = shard;
   PartNumbers& part = report.outcome.part;
@@ -370,16 +407,19 @@ void read_part(const Fields& in, ShardReport& report) {
   report.outcome.report.checksum_sum = in.hash("checksum_sum");
   if (report.outcome.report.checksum_sum >> 61 != 0) in.refuse("checksum_sum");
   part.filled_steps = in.count("filled_steps");
-  const glm::dvec3 faces = in.vector("faces");
-  for (int axis = 0; axis < 3; ++axis) {
-    if (!(faces[axis] >= 0 && faces[axis] < 9e15)) return in.refuse("faces");
-    part.faces[axis] = static_cast<std::uint64_t>(faces[axis]);
-  }
+  const auto faces = in.counts("faces", 3, 3);
+  if (faces.empty()) return;
+  std::copy(faces.begin(), faces.end(), part.faces);
   report.outcome.input.rule = in.choice("rule", kRuleWords);
-  read_seams(in, part.seams);
+  read_seams(in, report.outcome, part.seams);
   report.format = in.text("format");
-  if (!report.format.empty()) part.file = read_file(in.object("file"));
-  if (part.file) part.file->frame.direction = report.outcome.frame.direction;
+  if (report.format.empty()) return;
+  if (std::ranges::find(voxel_formats(), report.format, &VoxelFormat::name) ==
+      voxel_formats().end()) {
+    return in.refuse("format");
+  }
+  part.file = read_file(in.object("file"));
+  part.file->frame.direction = report.outcome.frame.direction;
 }
 
 }  // namespace
@@ -430,11 +470,10 @@ Result<ShardReport> read_shard_report(const std::string& path) {
   const Fields whole(&*json, "", wrong);
   read_grid(whole.object("grid"), report.command, report.outcome);
   if (wrong.empty()) {
-    if (const JsonValue* like = json->find("grid")->find("like")) report.command.like = like->text;
     read_input(whole.object("input"), report.outcome.input);
     read_options(whole.object("options"), report.command, report.outcome);
     read_numbers(whole, report.command, report.outcome);
-    if (report.command.ids) read_ids(whole, report.outcome);
+    if (report.command.ids) read_ids(whole, report.ids);
     read_part(whole.object("shard"), report);
     if (!report.format.empty()) {
       report.outcome.output_bytes = whole.object("output").count("bytes");
@@ -454,36 +493,45 @@ Result<ShardReport> read_shard_report(const std::string& path) {
 }
 
 void add_shard(const VoxelizeOutcome& part, VoxelizeOutcome& sum) {
-  if (sum.id_voxels.size() < part.id_voxels.size()) sum.id_voxels.resize(part.id_voxels.size(), 0);
   std::vector<std::uint64_t> numbers;
   visit_sums(part, [&](std::uint64_t number) { numbers.push_back(number); });
   std::size_t next = 0;
-  visit_sums(sum, [&](std::uint64_t& number) {
-    if (next < numbers.size()) number += numbers[next++];  // fewer solids than in other parts
-  });
+  visit_sums(sum, [&](std::uint64_t& number) { number += numbers[next++]; });
   sum.report.max_depth_complexity =
       std::max(sum.report.max_depth_complexity, part.report.max_depth_complexity);
   sum.part.filled_steps += part.part.filled_steps;
   if (part.lost_walls.count > 0) sum.lost_walls = part.lost_walls;
 }
 
-void finish_sum(const std::vector<ShardReport>& shards, VoxelizeOutcome& sum) {
+Result<void> finish_sum(const std::vector<ShardReport>& shards, std::uint64_t memory_limit,
+                        VoxelizeOutcome& sum) {
   SetChecksum checksum(sum.grid);
   BoundaryArea area(sum.grid, sum.axis);
-  csg::Tree names;
-  while (names.solids().size() < sum.id_voxels.size()) names.add_solid({});
+  std::uint64_t solids = 0;
   for (const ShardReport& shard : shards) {
     checksum.add_sum(shard.outcome.report.checksum_sum);
     area.add(shard.outcome.part.faces, shard.outcome.part.seams);
-    if (!shard.outcome.input.scene) continue;
-    const auto solids = shard.outcome.input.scene->solids();
-    for (std::size_t i = 0; i < solids.size(); ++i) {
-      if (!solids[i].name.empty()) names.solids()[i].name = solids[i].name;
+    if (!shard.ids.empty()) solids = std::max(solids, std::uint64_t{shard.ids.back().solid} + 1);
+    if (const std::uint64_t bytes = solids * (sizeof(csg::Solid) + sizeof(std::uint64_t));
+        bytes > memory_limit) {
+      return fail(ErrorCode::kLimit, "{}: {} solids take {} of memory, which may be {}", shard.path,
+                  solids, readable_bytes(bytes), readable_bytes(memory_limit));
     }
   }
   sum.report.checksum = checksum.value();
   sum.area_estimate = area.estimate();
-  if (!sum.id_voxels.empty()) sum.input.scene = std::make_shared<csg::Tree>(std::move(names));
+  if (!shards.front().command.ids) return {};
+  auto names = std::make_shared<csg::Tree>();
+  while (names->solids().size() < solids) names->add_solid({});
+  sum.id_voxels.assign(solids, 0);
+  for (const ShardReport& shard : shards) {
+    for (const auto& [solid, name, voxels] : shard.ids) {
+      names->solids()[solid].name = name;
+      sum.id_voxels[solid] += voxels;
+    }
+  }
+  sum.input.scene = std::move(names);
+  return {};
 }
 
 std::string difference(const ShardReport& a, const ShardReport& b) {

@@ -117,6 +117,10 @@ Result<void> check_ids(const VoxelFormat& format, std::uint32_t largest) {
   if (largest <= format.ids) return {};
   const std::string names =
       names_of_those_that([&](const VoxelFormat& other) { return other.ids >= largest; });
+  if (names.empty()) {
+    const VoxelFormat& widest = *std::ranges::max_element(voxel_formats(), {}, &VoxelFormat::ids);
+    return fail(ErrorCode::kUsage, "ids of voxels must be at most {}, got {}", widest.ids, largest);
+  }
   if (format.ids == 0) {
     return fail(ErrorCode::kUsage, "format {} cannot store ids; {} can", format.name, names);
   }

@@ -147,6 +147,7 @@ TEST_F(Shards, HoldIdsSharesSurfacesAndScenesToo) {
     expect_same(job, "a.ome.zarr", 3);
     expect_same(job, "a.nrrd", 2);
   }
+  expect_same({"knot.obj", "--grid", grid, "--coverage=2"}, "a.sl1", 3);
   expect_same({"knot.obj", "--grid", grid, "--fog=2"}, "a.vdb", 3);
   expect_same({"knot.obj", "--grid", grid, "--mask", "--name", "it is"}, "a.vdb", 3);
   expect_same({"knot.obj", "ball.stl", "--grid", grid, "--ids"}, "a.vdb", 4);
@@ -255,6 +256,125 @@ TEST_F(Shards, ThatAreDamagedLeaveNothing) {
   EXPECT_FALSE(place.has("b.npy"));
 }
 
+TEST_F(Shards, ThatAreManyAndMissingAreCounted) {
+  const auto shards = make_shards(kKnot, "a.npy", 3);
+  const std::string report = place.read(shards[2] + "/shard.json");
+  const auto with_count = [&](const std::string& count) {
+    json changed = json::parse(report);
+    changed["shard"]["count"] = json::parse(count);
+    place.write(shards[2] + "/shard.json", changed.dump());
+    const RunResult run = merge({shards[2], "-o", "b.npy"});
+    EXPECT_EQ(run.exit_code, 3) << run.err;
+    return run.err;
+  };
+  EXPECT_NE(with_count("1024").find("shards 2, 3, 4, 5, 6, 7, 8, 9, 10, 11 and 1013 more of 1024 "
+                                    "are missing\n"),
+            std::string::npos);
+  for (const char* count : {"1025", "1000000", "1e300", "0", "-1", "1.5"}) {
+    EXPECT_NE(with_count(count).find("shard."), std::string::npos) << count;
+  }
+}
+
+/// A number of a shard's report that cannot be, as a JSON pointer and text.
+struct WrongNumber {
+  const char *place, *text;
+};
+void PrintTo(const WrongNumber& wrong, std::ostream* out) {
+  *out << wrong.place << " " << wrong.text;
+}
+
+TEST_F(Shards, WhoseNumbersCannotBeAreRefused) {
+  std::vector<std::string> arguments = kKnot;
+  arguments.insert(arguments.begin() + 1, "ball.stl");
+  arguments.emplace_back("--ids");
+  const auto shards = make_shards(arguments, "a.npy", 2);
+  const std::string report = place.read(shards[1] + "/shard.json");
+  for (const WrongNumber& wrong :
+       std::vector<WrongNumber>{{"/grid/dims/0", "65537"},
+                                {"/grid/dims/1", "0"},
+                                {"/grid/dims/2", "100.5"},
+                                {"/grid/dims/2", "null"},
+                                {"/grid/origin/0", "nan"},
+                                {"/grid/voxel_size/1", "inf"},
+                                {"/grid/voxel_size/1", "-1"},
+                                {"/grid/direction/0/0", "\"x\""},
+                                {"/grid/direction/1/1", "1e300"},
+                                {"/grid/direction/2/0", "null"},
+                                {"/grid/direction/2", "[0, 1]"},
+                                {"/input/unit_metres", "-1"},
+                                {"/input/bounds/low/0", "nan"},
+                                {"/input/files/0/triangles", "1e300"},
+                                {"/voxels/solid", "-3"},
+                                {"/voxels/solid", "1e19"},
+                                {"/lists/crossings", "0.5"},
+                                {"/lists/depth_histogram/1", "1e300"},
+                                {"/lists/depth_histogram/1", "-1"},
+                                {"/lists/depth_histogram/1", "\"many\""},
+                                {"/lists/depth_histogram", "{}"},
+                                {"/lost_walls/count", "1e300"},
+                                {"/ids/0/solid", "100000000000"},
+                                {"/ids/1/solid", "100000000"},
+                                {"/ids/0/voxels", "1e300"},
+                                {"/ids", "7"},
+                                {"/shard/version", "2"},
+                                {"/shard/version", "1e300"},
+                                {"/shard/index", "3"},
+                                {"/shard/input", "\"12345678901234567\""},
+                                {"/shard/checksum_sum", "\"-1\""},
+                                {"/shard/coverage", "1e9"},
+                                {"/shard/filled_steps", "1e300"},
+                                {"/shard/faces/0", "1e300"},
+                                {"/shard/faces", "[1, 2]"},
+                                {"/shard/seams/0/row", "-1"},
+                                {"/shard/seams/0/row", "65536"},
+                                {"/shard/seams/0/runs", "\"00000000000z\""},
+                                {"/shard/format", "\"none\""},
+                                {"/shard/file/ids", "4000000000.5"},
+                                {"/shard/file/fog", "-1"},
+                                {"/shard/file/colours", "[\"fffffffff\"]"},
+                                {"/shard/file/colours", "[3]"},
+                                {"/shard/file/unit_metres", "-1"},
+                                {"/shard/file/unit_metres", "inf"},
+                                {"/shard/file/layers/gamma", "-1"},
+                                {"/shard/file/layers/gamma", "1e300"},
+                                {"/shard/file/layers/display/0", "1e300"},
+                                {"/shard/file/layers/display/1", "1.5"},
+                                {"/shard/file/layers/exposure", "nan"},
+                                {"/shard/file/layers/first_exposure", "-1"},
+                                {"/shard/file/layers/time", "1e18"}}) {
+    json changed = json::parse(report);
+    const json::json_pointer at(wrong.place);
+    ASSERT_TRUE(changed.contains(at)) << wrong.place;
+    changed[at] = "HERE";
+    std::string text = changed.dump();
+    text.replace(text.find("\"HERE\""), 6, wrong.text);
+    place.write(shards[1] + "/shard.json", text);
+    const auto before = place.names();
+    const RunResult run = merge(shards, {"-o", "b.npy", "--memory-limit", "2G"});
+    EXPECT_EQ(run.signal, 0) << testing::PrintToString(wrong);
+    EXPECT_EQ(run.exit_code, std::string(wrong.text) == "100000000" ? 6 : 3)
+        << testing::PrintToString(wrong) << run.err;
+    EXPECT_NE(run.err.find(shards[1]), std::string::npos)
+        << testing::PrintToString(wrong) << run.err;
+    EXPECT_EQ(place.names(), before);
+  }
+  place.write(shards[1] + "/shard.json", report);
+  EXPECT_EQ(merge(shards, {"-o", "b.npy"}).exit_code, 0);
+}
+
+TEST_F(Shards, AreNamedWhereTheyAreNoInput) {
+  const auto shards = make_shards(kKnot, "a.zarr", 1);
+  for (const char* command : {"info", "picture", "voxelize"}) {
+    std::vector<std::string> arguments = {command, shards[0]};
+    if (std::string(command) != "info") arguments.insert(arguments.end(), {"-o", "b.png"});
+    const RunResult run = place.run(arguments);
+    EXPECT_EQ(run.exit_code, 3) << run.err;
+    EXPECT_NE(run.err.find(shards[0] + ": it is a shard of strata voxelize --shard; strata merge"),
+              std::string::npos)
+        << run.err;
+  }
+}
+
 TEST_F(Shards, WhoseChunksOrRunsAreOthersAreRefused) {
   const auto refuses = [&](const std::vector<std::string>& shards,
                            const std::vector<std::string>& words, int code,
@@ -331,15 +451,24 @@ TEST_F(Shards, AreRefusedWhereTheyCannotBe) {
   refuses({"-o", "a.npy", "--shard", "0/3"}, "--shard must be 1/N to N/N");
   refuses({"-o", "a.npy", "--shard", "4/3"}, "got 4/3");
   refuses({"-o", "a.npy", "--shard", "3"}, "--shard must be I/N, like 1/8, got '3'");
-  refuses({"-o", "a.npy", "--shard", "1/x"}, "--shard");
+  for (const char* other : {"1/x", "1/", "/2", "/", "+1/2", "1/+2", " 1/2", "1/2/3", "-1/2"}) {
+    refuses({"-o", "a.npy", "--shard", other},
+            fmt::format("--shard must be I/N, like 1/8, got '{}'", other));
+  }
+  refuses({"-o", "a.npy", "--shard", "1/99999999999999999999"}, "N from 1 to 1024");
   refuses({"-o", "a.npy", "--shard", "1/2000"}, "1024");
-  refuses({"-o", "a.npy", "--shard", "1/3"}, "at most 1 shards of 64");
+  refuses({"-o", "a.npy", "--shard", "1/3"}, "it makes 1 shard, which needs no --shard");
+  refuses({"-o", "a.npy", "--shard", "1/3"}, "3 shards need 129 rows, by a higher -r");
   refuses({"-o", "a.npy", "--sdf", "--shard", "1/2"}, "--sdf");
   refuses({"-o", "a.ome.zarr", "--levels", "3", "--shard", "1/2"}, "--levels");
   refuses({"-o", "a.npy", "--colours", "--shard", "1/2"}, "--colours");
   refuses({"-o", "a.npy", "--dry-run", "--shard", "1/2"}, "--dry-run");
   refuses({"-o", "-", "--format", "npy", "--shard", "1/2"}, "-o -");
   refuses({"--shard", "1/2"}, "--shard needs -o FILE or --json");
+  const RunResult many = place.run(
+      {"voxelize", "knot.obj", "--grid", "200,210,220", "-o", "a.npy", "--shard", "1/30"});
+  EXPECT_NE(many.err.find("it makes at most 4 shards; 30 shards need 1857 rows"), std::string::npos)
+      << many.err;
   EXPECT_EQ(place.names(), before);
   EXPECT_EQ(merge({"-o", "a.npy"}).exit_code, 2);
 }
