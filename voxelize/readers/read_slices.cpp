@@ -8,6 +8,7 @@
 #include <cmath>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -26,6 +27,7 @@ namespace {
 
 /// The bytes of a picture.
 struct PictureBytes {
+  MemoryLoan memory;
   std::optional<detail::InputBytes> file;
   std::optional<std::string> unpacked;
   std::string_view stored;  // in an archive
@@ -50,28 +52,35 @@ struct SliceFolder {
     if (!members.empty()) return path + ": " + members[static_cast<std::size_t>(z)].name;
     return before + fmt::format("{:0{}d}", z, digits) + after;
   }
-  [[nodiscard]] Result<PictureBytes> bytes(int z, std::uint64_t memory_limit) const {
+  [[nodiscard]] Result<PictureBytes> bytes(int z, const ReadContext& context) const {
     PictureBytes made;
     if (members.empty()) {
-      auto file_bytes = detail::InputBytes::open(file(z), memory_limit);
+      auto file_bytes = detail::InputBytes::open(file(z), context.execution.memory_limit);
       if (!file_bytes) return tl::unexpected(file_bytes.error());
       made.file = *std::move(file_bytes);
-      return made;
+    } else {
+      const ZipMember& member = members[static_cast<std::size_t>(z)];
+      made.stored = member.packed;
+      if (member.deflated) {
+        auto unpacked = unpack(member, file(z), context, made.memory);
+        if (!unpacked) return tl::unexpected(unpacked.error());
+        made.unpacked = *std::move(unpacked);
+      }
     }
-    const ZipMember& member = members[static_cast<std::size_t>(z)];
-    made.stored = member.packed;
-    if (!member.deflated) return made;
-    auto unpacked = unpack(member, file(z));
-    if (!unpacked) return tl::unexpected(unpacked.error());
-    made.unpacked = *std::move(unpacked);
+    // GreyPng has a copy.
+    if (!made.memory.take(context.budget, made.view().size())) {
+      return context.too_large("a picture");
+    }
     return made;
   }
-  static Result<std::string> unpack(const ZipMember& member, const std::string& name) {
+  static Result<std::string> unpack(const ZipMember& member, const std::string& name,
+                                    const ReadContext& context, MemoryLoan& memory) {
     constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 30;
     if (member.bytes > kMostBytes) {
       return fail(ErrorCode::kLimit, "{}: {} bytes unpacked; at most {} are read", name,
                   member.bytes, kMostBytes);
     }
+    if (!memory.take(context.budget, member.bytes)) return context.too_large(member.name);
     if (!member.deflated) return std::string(member.packed);
     std::string bytes(member.bytes, '\0');
     InflateStream stream(member.packed, InflateStream::kBare, name);
@@ -161,7 +170,7 @@ class SlabOfSlices {
  private:
   Result<void> read_layer(int z, int bits) {
     const std::string path = folder_.file(z);
-    const auto bytes = folder_.bytes(z, context_.execution.memory_limit);
+    const auto bytes = folder_.bytes(z, context_);
     if (!bytes) return tl::unexpected(bytes.error());
     const Result<GreyPng> png = GreyPng::open(bytes->view(), path);
     if (!png) return tl::unexpected(png.error());
@@ -170,23 +179,20 @@ class SlabOfSlices {
       return fail(ErrorCode::kInput, "{}: {} x {} pixels of {} bits; {} x {} of {} are needed",
                   path, png->width(), png->height(), png->bits(), dims.x, dims.y, bits);
     }
-    const Result<std::vector<std::uint16_t>> pixels = png->pixels();
-    if (!pixels) return tl::unexpected(pixels.error());
-    for (int row = 0; row < dims.y; ++row) {
+    return png->rows([&](int row, std::span<const std::uint16_t> from) {
       const int y = folder_.descending ? dims.y - 1 - row : row;
-      const std::uint16_t* from =
-          pixels->data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(dims.x);
       TileRuns& tile = tiles_[static_cast<std::size_t>(y / kTileSide)];
       const auto local = static_cast<unsigned>(z % kTileSide * kTileSide + y % kTileSide);
-      const auto pixel = [&](int x) { return from[folder_.mirrored ? dims.x - 1 - x : x]; };
+      const auto pixel = [&](int x) {
+        return from[static_cast<std::size_t>(folder_.mirrored ? dims.x - 1 - x : x)];
+      };
       for (int x = 0; x < dims.x;) {
         int past = x + 1;
         while (past < dims.x && pixel(past) == pixel(x)) ++past;
         if (pixel(x) != 0) tile.add(local, x, past - 1, pixel(x));
         x = past;
       }
-    }
-    return {};
+    });
   }
 
   ReadContext& context_;
@@ -196,7 +202,7 @@ class SlabOfSlices {
 };
 
 Result<GreyPng> first_picture(const ReadContext& context, const SliceFolder& folder) {
-  const auto first = folder.bytes(0, context.execution.memory_limit);
+  const auto first = folder.bytes(0, context);
   if (!first) return tl::unexpected(first.error());
   return GreyPng::open(first->view(), folder.file(0));
 }
@@ -240,8 +246,9 @@ Result<VoxelVolume> read_pictures(ReadContext& context, const SliceFolder& folde
 /// Lines `name = value` of the archive's text files.
 class Settings {
  public:
-  Result<void> add(const ZipMember& member, const std::string& name) {
-    const auto text = SliceFolder::unpack(member, name);
+  Result<void> add(const ZipMember& member, const std::string& name, const ReadContext& context) {
+    MemoryLoan memory;
+    const auto text = SliceFolder::unpack(member, name, context, memory);
     if (!text) return tl::unexpected(text.error());
     for (std::string_view rest = *text; !rest.empty();) {
       const std::string_view line = rest.substr(0, rest.find_first_of("\r\n"));
@@ -252,14 +259,17 @@ class Settings {
     }
     return {};
   }
+  /// Empty where there is none.
+  [[nodiscard]] std::string text(const char* name) const {
+    const auto found = values_.find(name);
+    return found == values_.end() ? std::string() : found->second;
+  }
   /// Above 0; else 0.
   [[nodiscard]] double number(const char* name) const {
-    const auto found = values_.find(name);
+    const std::string digits = text(name);
     double value = 0;
-    if (found == values_.end()) return 0;
-    const std::string& text = found->second;
-    const auto end = std::from_chars(text.data(), text.data() + text.size(), value).ptr;
-    return end != text.data() && std::isfinite(value) && value > 0 ? value : 0;
+    const auto end = std::from_chars(digits.data(), digits.data() + digits.size(), value).ptr;
+    return end != digits.data() && std::isfinite(value) && value > 0 ? value : 0;
   }
 
  private:
@@ -286,7 +296,8 @@ Result<SliceFolder> read_archive(ReadContext& context) {
   for (ZipMember& member : *members) {
     const std::string name = context.path + ": " + member.name;
     if (member.name == "config.ini" || member.name == "prusaslicer.ini") {
-      if (auto read = settings.add(member, name); !read) return tl::unexpected(read.error());
+      if (auto read = settings.add(member, name, context); !read)
+        return tl::unexpected(read.error());
     } else if (member.name.ends_with(".png") && member.name.find('/') == std::string::npos) {
       folder.members.push_back(std::move(member));
     }
@@ -305,8 +316,12 @@ Result<SliceFolder> read_archive(ReadContext& context) {
   folder.grid.dims = {png->width(), png->height(), static_cast<int>(folder.members.size())};
   double x = pixel_size(settings, "display_width", "display_pixels_x");
   double y = pixel_size(settings, "display_height", "display_pixels_y");
-  // Pictures of a display that stands upright have its height along their rows.
-  if (settings.number("display_pixels_x") == png->height()) std::swap(x, y);
+  // Pictures of a display that stands upright have its height along their rows. Where that cannot
+  // be seen, since both sides have as many pixels, the settings say it.
+  const bool upright = png->width() == png->height()
+                           ? settings.text("display_orientation") == "portrait"
+                           : settings.number("display_pixels_x") == png->height();
+  if (upright) std::swap(x, y);
   const double z = std::max(settings.number("layerHeight"), settings.number("layer_height"));
   folder.grid.voxel_size = {x > 0 ? x : 1, y > 0 ? y : 1, z > 0 ? z : 1};
   folder.mirrored = settings.number("display_mirror_x") == 1;

@@ -4,6 +4,7 @@
 #include "voxelize/volume/grey_png.h"
 
 #include <cstdlib>
+#include <vector>
 
 #include "strata/core/grid.h"
 #include "voxelize/volume/inflate_stream.h"
@@ -85,30 +86,31 @@ Result<GreyPng> GreyPng::open(std::string_view bytes, const std::string& path) {
               bytes.size());
 }
 
-Result<std::vector<std::uint16_t>> GreyPng::pixels() const {
-  const auto width = static_cast<std::size_t>(width_), height = static_cast<std::size_t>(height_);
+Result<void> GreyPng::rows(
+    const std::function<void(int y, std::span<const std::uint16_t> values)>& take_row) const {
+  const auto width = static_cast<std::size_t>(width_);
   const std::size_t bytes = (width * static_cast<std::size_t>(bits_) + 7) / 8;
   const std::size_t step = bits_ == 16 ? 2 : 1;
-  std::vector<std::uint16_t> values(width * height);
+  std::vector<std::uint16_t> values(width);
   std::vector<std::uint8_t> row(bytes + 1), above(bytes, 0);
   InflateStream stream(packed_, InflateStream::kZlib, path_);
-  for (std::size_t y = 0; y < height; ++y) {
+  for (int y = 0; y < height_; ++y) {
     if (auto got = stream.read(reinterpret_cast<std::byte*>(row.data()), row.size()); !got) {
-      return tl::unexpected(got.error());
+      return got;
     }
     if (!unfilter(row[0], step, above, row.data() + 1, bytes)) {
       return fail(ErrorCode::kInput, "{}: row {} has filter {}; 0 to 4 exist", path_, y, row[0]);
     }
     const std::uint8_t* from = row.data() + 1;
-    std::uint16_t* to = values.data() + y * width;
     for (std::size_t x = 0; x < width; ++x) {
-      to[x] = bits_ == 1   ? from[x / 8] >> (7 - x % 8) & 1
-              : bits_ == 8 ? from[x]
-                           : static_cast<std::uint16_t>(from[2 * x] << 8 | from[2 * x + 1]);
+      values[x] = bits_ == 1   ? from[x / 8] >> (7 - x % 8) & 1
+                  : bits_ == 8 ? from[x]
+                               : static_cast<std::uint16_t>(from[2 * x] << 8 | from[2 * x + 1]);
     }
+    take_row(y, values);
     above.assign(row.begin() + 1, row.end());
   }
-  return values;
+  return {};
 }
 
 }  // namespace strata

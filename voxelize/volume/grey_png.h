@@ -1,16 +1,16 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <span>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "strata/core/result.h"
 
 namespace strata {
 
-/// Calls row(y, values, width) for the rows of a grey PNG of 1, 8 or 16 bits without interlacing,
-/// from the top. (Internal to voxelize/.)
+/// A grey PNG of 1, 8 or 16 bits without interlacing. (Internal to voxelize/.)
 class GreyPng {
  public:
   /// @return kInput naming the file and the place
@@ -18,8 +18,9 @@ class GreyPng {
   [[nodiscard]] int width() const { return width_; }
   [[nodiscard]] int height() const { return height_; }
   [[nodiscard]] int bits() const { return bits_; }
-  /// The values of all rows, from the top. @return kInput
-  Result<std::vector<std::uint16_t>> pixels() const;
+  /// Calls row(y, values) for all rows, from the top. @return kInput
+  Result<void> rows(
+      const std::function<void(int y, std::span<const std::uint16_t> values)>& row) const;
 
  private:
   int width_ = 0, height_ = 0, bits_ = 0;

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "strata/core/execution.h"
 #include "strata/core/result.h"
@@ -31,6 +32,36 @@ class MemoryBudget {
  private:
   std::uint64_t limit_;
   std::atomic<std::uint64_t> used_{0};
+};
+
+/// Memory that is taken from a budget while it lives.
+class MemoryLoan {
+ public:
+  MemoryLoan() = default;
+  MemoryLoan(const MemoryLoan&) = delete;
+  MemoryLoan& operator=(const MemoryLoan&) = delete;
+  MemoryLoan(MemoryLoan&& other) noexcept
+      : budget_(std::exchange(other.budget_, nullptr)), bytes_(std::exchange(other.bytes_, 0)) {}
+  MemoryLoan& operator=(MemoryLoan&& other) noexcept {
+    std::swap(budget_, other.budget_);
+    std::swap(bytes_, other.bytes_);
+    return *this;
+  }
+  ~MemoryLoan() {
+    if (budget_ != nullptr) budget_->give_back(bytes_);
+  }
+
+  /// Takes more. @return false if that is too much; @pre always of the same budget
+  [[nodiscard]] bool take(MemoryBudget& budget, std::uint64_t bytes) {
+    if (!budget.take(bytes)) return false;
+    budget_ = &budget;
+    bytes_ += bytes;
+    return true;
+  }
+
+ private:
+  MemoryBudget* budget_ = nullptr;
+  std::uint64_t bytes_ = 0;
 };
 
 /// What a reader is given.
