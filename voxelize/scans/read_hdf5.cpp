@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "core/hdf5_library.h"
+#include "voxelize/scans/hdf5_chunks.h"
 #include "voxelize/scans/scan_readers.h"
 
 namespace strata {
@@ -28,7 +29,7 @@ struct Hdf5Array {
   std::size_t first = 0;  ///< of the axes z, y, x
   bool colours = false;   ///< another axis follows: red, green, blue, alpha
   NumberType type = NumberType::kU8;
-  hsize_t chunk_layers = 1;  ///< along the first axis; 1 where there are no chunks
+  std::optional<Hdf5Chunks> chunks;  ///< none: the voxels are stored in one piece
 };
 
 /// The type of numbers in memory. @return false if they are not
@@ -86,13 +87,15 @@ struct Hdf5File {
   Hdf5Array array;
   ~Hdf5File() {
     const Hdf5Session session;
+    array.chunks.reset();
     array.dataset.close();
     array.memory_type.close();
     file.close();
   }
 };
 
-/// Refuses what would read other files, or take more memory than it may; sets chunk_layers.
+/// Refuses what would read other files, and voxels that are not where their number says; finds the
+/// chunks.
 Result<void> check_hdf5_storage(ReadContext& context, Hdf5Array& array) {
   const Hdf5Handle properties(H5Dget_create_plist(*array.dataset), H5Pclose);
   const H5D_layout_t layout = H5Pget_layout(*properties);
@@ -100,30 +103,19 @@ Result<void> check_hdf5_storage(ReadContext& context, Hdf5Array& array) {
     return fail(ErrorCode::kInput, "{}: its voxels are in other files, which are not read",
                 context.path);
   }
-  for (int i = 0; i < H5Pget_nfilters(*properties); ++i) {
-    unsigned flags = 0, config = 0;
-    std::size_t values = 0;
-    std::array<char, 80> name{};
-    const H5Z_filter_t filter = H5Pget_filter2(*properties, static_cast<unsigned>(i), &flags,
-                                               &values, nullptr, name.size(), name.data(), &config);
-    if (H5Zfilter_avail(filter) <= 0) {
-      return fail(ErrorCode::kInput,
-                  "{}: its voxels are packed by filter {}, which HDF5 lacks here", context.path,
-                  static_cast<int>(filter));
-    }
+  if (layout == H5D_CHUNKED) {
+    auto chunks = Hdf5Chunks::open(context, *array.dataset, *array.memory_type, array.shape);
+    if (!chunks) return tl::unexpected(chunks.error());
+    array.chunks.emplace(*std::move(chunks));
+    return {};
   }
-  if (layout != H5D_CHUNKED) return {};
-  std::array<hsize_t, kHdf5MostAxes> chunk{};
-  const int rank = H5Pget_chunk(*properties, kHdf5MostAxes, chunk.data());
-  // A number is at most 8 bytes long; HDF5 holds a chunk packed and unpacked.
-  double bytes = 2 * 8;
-  for (int axis = 0; axis < rank; ++axis) {
-    bytes *= static_cast<double>(chunk[static_cast<std::size_t>(axis)]);
-  }
-  array.chunk_layers = chunk[array.first];
-  if (bytes > static_cast<double>(context.budget.limit()) ||
-      !context.budget.take(static_cast<std::uint64_t>(bytes))) {
-    return context.too_large("a chunk");
+  const Hdf5Handle type(H5Dget_type(*array.dataset), H5Tclose);
+  double bytes = static_cast<double>(H5Tget_size(*type));
+  for (const hsize_t side : array.shape) bytes *= static_cast<double>(side);
+  const hsize_t held = H5Dget_storage_size(*array.dataset);  // 0: all have the fill value
+  if (held != 0 && static_cast<double>(held) != bytes) {
+    return fail(ErrorCode::kInput, "{}: its voxels must have {} bytes, got {}", context.path, bytes,
+                held);
   }
   return {};
 }
@@ -244,7 +236,7 @@ Hdf5Place hdf5_place(const Hdf5Array& array) {
 /// The numbers, some layers at a time.
 class Hdf5Layers {
  public:
-  Hdf5Layers(ReadContext& context, const Hdf5Array& array) : context_(context), array_(array) {
+  Hdf5Layers(ReadContext& context, Hdf5Array& array) : context_(context), array_(array) {
     number_ = array.colours ? 4 : bytes_of(array.type);
     layer_ = array.shape[array.first + 1] * array.shape[array.first + 2] * number_;
     layers_ = array.shape[array.first];
@@ -252,7 +244,8 @@ class Hdf5Layers {
 
   /// Memory for a few layers: those of a chunk, if it is not too much.
   Result<void> begin() {
-    const hsize_t deep = std::clamp<hsize_t>(array_.chunk_layers, 1, layers_);
+    const hsize_t deep =
+        array_.chunks ? std::clamp<hsize_t>(array_.chunks->sides()[array_.first], 1, layers_) : 1;
     deep_ = std::clamp<hsize_t>(kHdf5BufferBytes / layer_, 1, deep);
     if (!context_.budget.take(deep_ * layer_)) return context_.too_large("a layer");
     buffer_.resize(deep_ * layer_);
@@ -279,6 +272,14 @@ class Hdf5Layers {
     offset[array_.first] = next_;
     count[array_.first] = deep;
     const Hdf5Session session;
+    if (array_.chunks) {
+      if (auto read = array_.chunks->read(session, offset, count, buffer_.data()); !read)
+        return read;
+      next_ += deep;
+      at_ = 0;
+      there_ = deep * layer_;
+      return {};
+    }
     const Hdf5Handle file_space(H5Dget_space(*array_.dataset), H5Sclose);
     const Hdf5Handle memory_space(
         H5Screate_simple(static_cast<int>(count.size()), count.data(), nullptr), H5Sclose);
@@ -296,7 +297,7 @@ class Hdf5Layers {
   }
 
   ReadContext& context_;
-  const Hdf5Array& array_;
+  Hdf5Array& array_;
   std::size_t number_ = 1, layer_ = 1;  // bytes
   hsize_t layers_ = 0, deep_ = 1, next_ = 0;
   std::vector<std::byte> buffer_;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <hdf5.h>
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -123,6 +124,77 @@ TEST_F(Hdf5Files, ALargeChunkIsALimitError) {
   const Result<VoxelVolume> read = read_voxels(path_, {}, execution);
   ASSERT_FALSE(read);
   EXPECT_EQ(read.error().code, ErrorCode::kLimit) << read.error().message;
+}
+
+TEST_F(Hdf5Files, FiltersOfChunksAreUndone) {
+  const Shape shape = {5, 30, 70}, side = {2, 13, 64};  // chunks reach beyond the shape
+  const hid_t packed = chunks(side);
+  H5Pset_fletcher32(packed);
+  H5Pset_shuffle(packed);
+  H5Pset_deflate(packed, 6);
+  add("voxels", shape, packed);
+  close();
+  const Result<VoxelVolume> read = read_voxels(path_);
+  ASSERT_TRUE(read) << read.error().message;
+  const auto labels = to_dense_labels(read->set).value();
+  ASSERT_EQ(labels.size(), 5u * 30 * 70);
+  int wrong = 0;
+  for (std::size_t i = 0; i < labels.size(); ++i) wrong += labels[i] != i / 7 % 251;
+  EXPECT_EQ(wrong, 0);
+
+  // The checksum guards what zlib does not: with it alone, a changed number is an error.
+  std::string bytes = testkit::bytes_of(path_);
+  file_ = H5Fcreate(path_.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+  const hid_t summed = chunks(side);
+  H5Pset_fletcher32(summed);
+  add("voxels", shape, summed);
+  close();
+  ASSERT_TRUE(read_voxels(path_));
+  bytes = testkit::bytes_of(path_);
+  const std::size_t at = bytes.find(std::string("\0\x9\0\x9\0\x9", 6));
+  ASSERT_NE(at, std::string::npos);
+  bytes[at + 1] = 8;
+  folder_.write("other.h5", bytes);
+  expect_error(ErrorCode::kInput, "its checksum is wrong");
+}
+
+TEST_F(Hdf5Files, OtherFiltersAreRefused) {
+  const hid_t packed = chunks({2, 2, 2});
+  H5Pset_scaleoffset(packed, H5Z_SO_INT, 0);
+  add("voxels", {4, 4, 4}, packed);
+  expect_error(ErrorCode::kInput, "packed by filter 6; deflate, shuffle and fletcher32 are read");
+}
+
+TEST_F(Hdf5Files, ChunksThatAreNotThereHaveTheFillValue) {
+  const hid_t properties = chunks({2, 4, 4});
+  const std::uint16_t seven = 7;
+  H5Pset_fill_value(properties, H5T_NATIVE_UINT16, &seven);
+  add("voxels", {4, 4, 4}, properties, false);
+  close();
+  const Result<VoxelVolume> read = read_voxels(path_);
+  ASSERT_TRUE(read) << read.error().message;
+  const auto labels = to_dense_labels(read->set).value();
+  EXPECT_EQ(std::count(labels.begin(), labels.end(), 7u), 4 * 4 * 4);
+}
+
+TEST(Hdf5Damage, OfAnyByteEndsInAnOrderlyWay) {
+  const TemporaryFolder folder;
+  const Sample sample{"", make_grid({12, 11, 5}),
+                      [](int i, int j, int k) { return random_voxel(i, j, k, 300); }};
+  const std::string path = folder.file("a.h5");
+  ASSERT_TRUE(write_voxels(intervals_of(sample, Axis::kX), path));
+  const std::string bytes = testkit::bytes_of(path);
+  int refused = 0;
+  Execution execution;
+  execution.memory_limit = 1 << 28;
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    std::string changed = bytes;
+    changed[i] = static_cast<char>(i % 2 == 0 ? ~changed[i] : changed[i] + 1);
+    folder.write("a.h5", changed);
+    const Result<VoxelVolume> read = read_voxels(path, {}, execution);
+    refused += read ? 0 : 1;
+  }
+  EXPECT_GT(refused, 100);
 }
 
 TEST(Hdf5Grid, IsTheOneThatWasWritten) {
