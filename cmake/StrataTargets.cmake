@@ -47,6 +47,14 @@ function(strata_compile_alone)
   set_source_files_properties(${ARGN} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 endfunction()
 
+# strata_share_tables(FILES...): sources whose inner loops call functions of Highway that look into tables. GCC copies the
+#   local table of a function onto the stack, 1 KiB for each hn::Compress(), unless constants may share an address.
+function(strata_share_tables)
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+    set_property(SOURCE ${ARGN} APPEND PROPERTY COMPILE_OPTIONS -fmerge-all-constants)
+  endif()
+endfunction()
+
 # strata_optimize_sanitized(FILES...): sources that tests spend most of their time in. Builds with sanitizers optimize them,
 #   also those that compile all else without, to compile quickly (the preset `sanitized`).
 function(strata_optimize_sanitized)
