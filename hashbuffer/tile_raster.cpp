@@ -5,7 +5,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-#include "raster/rasterize-inl.h"
+#include "raster/spans-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace strata {
@@ -36,22 +36,17 @@ TileKey<Record> make_key(std::uint32_t depth, bool exit, std::uint32_t triangle)
   }
 }
 
-/// DepthItems of a vector of depths and surfaces.
-template <class D64, class V32>
-HWY_INLINE hn::Vec<D64> pack_items(D64 d, V32 depth, V32 surface) {
-  return hn::Or(hn::ShiftLeft<32>(hn::PromoteTo(d, depth)), hn::PromoteTo(d, surface));
+/// Calls body(lane, [depth:32 | surface:32]) for each lane.
+template <class Body>
+HWY_INLINE void for_each_surface(SpanVecI32 depths, SpanVecU32 surfaces, Body&& body) {
+  alignas(64) std::int32_t depth[kSpanLanes];
+  alignas(64) std::uint32_t surface[kSpanLanes];
+  hn::Store(depths, SpanI32(), depth);
+  hn::Store(surfaces, SpanU32(), surface);
+  for (std::size_t lane = 0; lane < kSpanLanes; ++lane) {
+    body(lane, std::uint64_t{static_cast<std::uint32_t>(depth[lane])} << 32 | surface[lane]);
+  }
 }
-
-/// Fragments of small triangles on their way into a table, as records of age 1.
-template <class Record>
-struct WaitingRecords {
-  /// Fragments that a call of make_room() asks for, and a vector beyond them.
-  static constexpr std::size_t kMore = (SetupBatch::kLaneSide + 1) * kMaxLanes;
-  static constexpr std::size_t kRoom = 1024;
-  static_assert(kRoom > kMore);
-  std::uint32_t pixels[kRoom];
-  typename Record::Word records[kRoom];
-};
 
 /// Inserts covered pixels into the tile's HA-buffer.
 template <class Record>
@@ -59,14 +54,9 @@ class TableSink {
  public:
   using Bits = typename Record::Word;
   static constexpr bool kKeys = Record::kPayloadBits == 0;
-  static constexpr bool kTakesLanes = true;
-  using Waiting = WaitingRecords<Record>;
 
-  /// @param waiting  needed for put_lanes()
-  TableSink(TileTable<Record>& table, const PixelRect& clip, BlockAges ages = {},
-            Waiting* waiting = nullptr)
+  TableSink(TileTable<Record>& table, const PixelRect& clip, BlockAges ages = {})
       : table_(&table),
-        waiting_(waiting),
         ages_(ages),
         cells_(table.cells.data()),
         planes_(std::min(table.planes, static_cast<int>(Record::kAgeMax))),
@@ -109,28 +99,38 @@ class TableSink {
     const Bits key = bits_of(make_key<Record>(depth, exit_, triangle_));
     table_->insert(pixel_at(u, v), (~key & kValueMask<Record>) | Record::kAgeUnit);
   }
-  HWY_INLINE void begin_lanes(int row_begin, int row_end) { result_.add_rows(row_begin, row_end); }
-  HWY_INLINE void make_room() {
-    if (waiting_count_ + Waiting::kMore > Waiting::kRoom) insert_waiting();
+  HWY_INLINE void begin_spans(int row_begin, int row_end, std::size_t pixels) {
+    result_.add_rows(row_begin, row_end);
+    result_.fragments += pixels;
   }
-  /// Keeps fragments, which insert_waiting() inserts word by word: short rows, inserted as vectors,
-  /// would wait for the words that the neighbouring triangle has just stored.
-  template <class D, class V = hn::Vec<D>>
-  HWY_INLINE void put_lanes(D d, V pixel, V depth, V surface, hn::Mask<D> covered) {
-    hn::StoreU(hn::Compress(pixel, covered), d, waiting_->pixels + waiting_count_);
+  /// A record of age 1 at the depth, from which further depth is subtracted.
+  using SpanBase = Bits;
+  static HWY_INLINE void make_bases(SpanVecI32 depths, SpanVecU32 surfaces, SpanBase* bases) {
+    const SpanU32 d;
     if constexpr (kKeys) {
-      const auto nearest =
-          hn::Sub(hn::Set(d, Record::kAgeUnit + kValueMask<Record>), hn::ShiftRight<31>(surface));
-      hn::StoreU(hn::Compress(hn::Sub(nearest, hn::ShiftLeft<1>(depth)), covered), d,
-                 waiting_->records + waiting_count_);
+      const auto keys =
+          hn::Add(hn::ShiftLeft<1>(hn::BitCast(d, depths)), hn::ShiftRight<31>(surfaces));
+      hn::StoreU(hn::Sub(hn::Set(d, Record::kAgeUnit + kValueMask<Record>), keys), d, bases);
     } else {
-      const hn::RebindToUnsigned<LaneF64> d64;
-      const auto items =
-          pack_items(d64, hn::Compress(depth, covered), hn::Compress(surface, covered));
-      hn::StoreU(hn::Sub(hn::Set(d64, Record::kAgeUnit + kValueMask<Record>), items), d64,
-                 waiting_->records + waiting_count_);
+      for_each_surface(depths, surfaces, [bases](std::size_t lane, std::uint64_t bits) {
+        bases[lane] = Record::kAgeUnit + kValueMask<Record> - bits;
+      });
     }
-    waiting_count_ += hn::CountTrue(d, covered);
+  }
+  template <class D, class V = hn::Vec<D>>
+  HWY_INLINE void put_span(D d, std::size_t pixel, V depth, hn::Mask<D> covered, SpanBase base) {
+    if constexpr (kKeys) {
+      const auto records = hn::Sub(hn::Set(d, base), hn::ShiftLeft<1>(depth));
+      insert(d, pixel, hn::IfThenElseZero(covered, records));
+    } else {
+      const hn::CappedTag<Bits, HWY_MAX_BYTES / 8> d64;
+      alignas(64) std::uint32_t words[HWY_MAX_BYTES / 4];
+      hn::Store(hn::IfThenElseZero(covered, hn::Add(depth, hn::Set(d, 1u))), d, words);
+      nearest_ = base;
+      for (std::size_t i = 0; i < hn::Lanes(d); i += hn::Lanes(d64)) {
+        insert(d64, pixel + i, decode(d64, words + i));
+      }
+    }
   }
   /// Inserts fragments one by one, and neighbours that follow each other at once.
   void put_all(std::span<const std::uint32_t> pixels, std::span<const DepthItem> items) {
@@ -161,7 +161,6 @@ class TableSink {
     }
   }
   TileRasterResult finish() {
-    if (waiting_count_ > 0) insert_waiting();
     // The first two planes are not watched: the bound may be 2 where the tile is one layer deep.
     const int first = result_.fragments > 0 ? std::min(planes_, 2) : 0;
     table_->oldest = std::max({table_->oldest, oldest_, first});
@@ -169,48 +168,6 @@ class TableSink {
   }
 
  private:
-  /// Inserts what put_lanes() kept.
-  HWY_INLINE void insert_waiting() {
-    result_.fragments += waiting_count_;
-    oldest_ = std::max(oldest_, insert_each(*table_, waiting_->pixels, waiting_->records,
-                                            waiting_count_, planes_));
-    waiting_count_ = 0;
-  }
-  /// @return the largest age beyond the second plane. Static, so that the sink's members may stay
-  /// in registers.
-  static HWY_NOINLINE int insert_each(TileTable<Record>& table, const std::uint32_t* pixels,
-                                      const Bits* records, std::size_t count, int planes) {
-    if (planes < 2) {
-      for (std::size_t i = 0; i < count; ++i) table.insert(pixels[i], records[i]);
-      return 0;
-    }
-    int oldest = 0;
-    Bits* const cells = table.cells.data();
-    const auto exchange = [](Bits& cell, Bits record) {  // see insert()
-      const Bits less = std::min(cell, record);
-      cell = std::max(cell, record);
-      return less != 0 ? less + Record::kAgeUnit : less;
-    };
-    for (std::size_t i = 0; i < count; ++i) {
-      Bits* cell = cells + pixels[i];
-      // Both are loaded before one is stored: their addresses agree in the bits by which a
-      // processor guesses that a load needs what a store writes.
-      Bits first = cell[0], second = cell[kTilePixels];
-      Bits carry = exchange(second, exchange(first, records[i]));
-      cell[0] = first;
-      cell[kTilePixels] = second;
-      if (HWY_LIKELY(carry == 0)) continue;
-      int age = 2;
-      while (carry != 0 && age < planes) {
-        cell += kTilePixels;
-        carry = exchange(cell[kTilePixels], carry);
-        ++age;
-      }
-      oldest = std::max(oldest, age);
-      if (carry != 0) overflow_one(table, pixels[i], carry, BlockAges{});
-    }
-    return oldest;
-  }
   /// Pixels that follow each other from the first on.
   static std::size_t run_length(const std::uint32_t* pixels, std::size_t most) {
     std::size_t run = 1;
@@ -245,29 +202,38 @@ class TableSink {
   template <class D, class V = hn::Vec<D>>
   HWY_INLINE int insert(D d, std::size_t pixel, V carry) {
     const auto step = hn::Set(d, Record::kAgeUnit);
+    const auto zero = hn::Zero(d);
     Bits* HWY_RESTRICT cell = cells_ + pixel;
-    const auto exchange = [&] {  // the larger stays, the smaller is one older
+    const auto exchange = [&] {  // the larger stays, the smaller goes on
       const auto old = hn::LoadU(d, cell);
       hn::StoreU(hn::Max(old, carry), d, cell);
-      const auto less = hn::Min(old, carry);
-      const auto left = hn::Ne(less, hn::Zero(d));
-      carry = hn::Add(less, hn::IfThenElseZero(left, step));
       cell += kTilePixels;
-      return left;
+      return hn::Min(old, carry);
+    };
+    const auto older = [&](V less) {
+      return hn::Add(less, hn::IfThenElseZero(hn::Ne(less, zero), step));
     };
     int age = 0;
-    if (planes_ >= 2) {
+    if (HWY_LIKELY(planes_ >= 2)) {
       // Which of the first two planes a row ends in cannot be predicted: both are always done.
-      exchange();
-      if (hn::AllFalse(d, exchange())) return 2;
+      const auto first = hn::LoadU(d, cell), second = hn::LoadU(d, cell + kTilePixels);
+      hn::StoreU(hn::Max(first, carry), d, cell);
+      carry = older(hn::Min(first, carry));
+      hn::StoreU(hn::Max(second, carry), d, cell + kTilePixels);
+      carry = hn::Min(second, carry);
+      cell += 2 * kTilePixels;
+      if (HWY_LIKELY(hn::AllTrue(d, hn::Eq(carry, zero)))) return 2;
+      carry = older(carry);
       age = 2;
     }
     while (age < planes_) {
       ++age;
-      if (hn::AllFalse(d, exchange())) {
+      carry = exchange();
+      if (hn::AllTrue(d, hn::Eq(carry, zero))) {
         oldest_ = std::max(oldest_, age);
         return age;
       }
+      carry = older(carry);
     }
     oldest_ = planes_;
     overflow(*table_, d, pixel, carry, ages_);
@@ -295,8 +261,6 @@ class TableSink {
   }
 
   TileTable<Record>* table_;
-  Waiting* waiting_;
-  std::size_t waiting_count_ = 0;
   BlockAges ages_;
   Bits* cells_;
   int planes_, oldest_ = 0;
@@ -308,11 +272,9 @@ class TableSink {
 };
 
 /// Appends covered pixels to the tile's log.
-/// @tparam in_order  triangle by triangle
-template <class Record, bool in_order>
+template <class Record>
 class LogSink {
  public:
-  static constexpr bool kTakesLanes = !in_order;
   LogSink(TileLog<Record>& log, const PixelRect& clip)
       : log_(&log), count_(log.count), clip_(clip) {}
   HWY_INLINE void begin(bool exit, std::uint32_t triangle, const PixelRect& box) {
@@ -333,20 +295,21 @@ class LogSink {
     pixels_[count_] = static_cast<std::uint32_t>((v - clip_.v0) * kTileSide + (u - clip_.u0));
     keys_[count_++] = make_key<Record>(depth, exit_, triangle_);
   }
-  HWY_INLINE void begin_lanes(int row_begin, int row_end) { result_.add_rows(row_begin, row_end); }
-  HWY_INLINE void make_room() { reserve(SetupBatch::kLaneSide * kMaxLanes); }
+  HWY_INLINE void begin_spans(int row_begin, int row_end, std::size_t pixels) {
+    result_.add_rows(row_begin, row_end);
+    reserve(pixels);
+  }
+  using SpanBase = std::uint64_t;  ///< [depth:32 | surface:32]
+  static HWY_INLINE void make_bases(SpanVecI32 depths, SpanVecU32 surfaces, SpanBase* bases) {
+    for_each_surface(depths, surfaces,
+                     [bases](std::size_t lane, std::uint64_t bits) { bases[lane] = bits; });
+  }
   template <class D, class V = hn::Vec<D>>
-  HWY_INLINE void put_lanes(D d, V pixel, V depth, V surface, hn::Mask<D> covered) {
-    hn::StoreU(hn::Compress(pixel, covered), d, pixels_ + count_);
-    if constexpr (Record::kPayloadBits == 0) {
-      const auto key = hn::Or(hn::ShiftLeft<1>(depth), hn::ShiftRight<31>(surface));
-      hn::StoreU(hn::Compress(key, covered), d, keys_ + count_);
-    } else {
-      const hn::RebindToUnsigned<LaneF64> d64;
-      hn::StoreU(pack_items(d64, hn::Compress(depth, covered), hn::Compress(surface, covered)), d64,
-                 &keys_[count_].bits);
-    }
-    count_ += hn::CountTrue(d, covered);
+  HWY_INLINE void put_span(D d, std::size_t pixel, V depth, hn::Mask<D> covered, SpanBase base) {
+    exit_ = (base >> 31 & 1) != 0;
+    triangle_ = static_cast<std::uint32_t>(base) & 0x7fffffffu;
+    const auto lift = hn::Set(d, static_cast<std::uint32_t>(base >> 32) + 1);
+    put_words(d, pixel, hn::IfThenElseZero(covered, hn::Add(depth, lift)));
   }
   TileRasterResult finish() {
     log_->count = count_;
@@ -364,23 +327,27 @@ class LogSink {
   template <int columns>
   HWY_INLINE void put_row(int u, int v, const std::uint32_t* words) {
     const hn::CappedTag<std::uint32_t, columns> d;
-    const auto pixel = static_cast<std::uint32_t>((v - clip_.v0) * kTileSide + (u - clip_.u0));
+    const auto pixel = static_cast<std::size_t>((v - clip_.v0) * kTileSide + (u - clip_.u0));
     for (std::size_t i = 0; i < columns; i += hn::Lanes(d)) {
-      const auto lifted = hn::Load(d, words + i);
-      const auto covered = hn::Ne(lifted, hn::Zero(d));
-      const std::size_t found = hn::CountTrue(d, covered);
-      // Whole vectors are stored: to store a compressed part takes some processors 100 cycles.
-      const auto pixels = hn::Iota(d, pixel + static_cast<std::uint32_t>(i));
-      hn::StoreU(hn::Compress(pixels, covered), d, pixels_ + count_);
-      const auto depth = hn::Compress(hn::Sub(lifted, hn::Set(d, 1u)), covered);
-      if constexpr (Record::kPayloadBits == 0) {
-        const auto key = hn::Or(hn::ShiftLeft<1>(depth), hn::Set(d, exit_ ? 1u : 0u));
-        hn::StoreU(key, d, keys_ + count_);
-      } else {
-        put_items(d, depth, found);
-      }
-      count_ += found;
+      put_words(d, pixel + i, hn::Load(d, words + i));
     }
+  }
+  /// Appends neighbours, encoded words.
+  template <class D>
+  HWY_INLINE void put_words(D d, std::size_t pixel, hn::Vec<D> lifted) {
+    const auto covered = hn::Ne(lifted, hn::Zero(d));
+    const std::size_t found = hn::CountTrue(d, covered);
+    // Whole vectors are stored: to store a compressed part takes some processors 100 cycles.
+    const auto pixels = hn::Iota(d, static_cast<std::uint32_t>(pixel));
+    hn::StoreU(hn::Compress(pixels, covered), d, pixels_ + count_);
+    const auto depth = hn::Compress(hn::Sub(lifted, hn::Set(d, 1u)), covered);
+    if constexpr (Record::kPayloadBits == 0) {
+      const auto key = hn::Or(hn::ShiftLeft<1>(depth), hn::Set(d, exit_ ? 1u : 0u));
+      hn::StoreU(key, d, keys_ + count_);
+    } else {
+      put_items(d, depth, found);
+    }
+    count_ += found;
   }
   /// The keys of the first `found` depths; beyond them something.
   template <class D>
@@ -408,20 +375,20 @@ class LogSink {
 
 template <class Record>
 TileRasterResult raster_table(const TileInput& input, TileTable<Record>& table) {
-  WaitingRecords<Record> waiting;
-  TableSink<Record> sink(table, input.clip, {}, &waiting);
-  rasterize_triangles(input.mesh, input.target, input.triangles, input.clip, sink);
+  TableSink<Record> sink(table, input.clip);
+  rasterize_spans(input.mesh, input.target, input.triangles, input.clip, sink);
   return sink.finish();
 }
 
 template <class Record>
 TileRasterResult raster_log(const TileInput& input, TileLog<Record>& log) {
-  const auto raster = [&](auto sink) {
+  LogSink<Record> sink(log, input.clip);
+  if (input.in_order) {
     rasterize_triangles(input.mesh, input.target, input.triangles, input.clip, sink);
-    return sink.finish();
-  };
-  return input.in_order ? raster(LogSink<Record, true>(log, input.clip))
-                        : raster(LogSink<Record, false>(log, input.clip));
+  } else {
+    rasterize_spans(input.mesh, input.target, input.triangles, input.clip, sink);
+  }
+  return sink.finish();
 }
 
 TileRasterResult raster_key_table(const TileInput& input, TileTable<Record32>& table) {

@@ -120,8 +120,6 @@ class SetupBatch {
   };
 
   /// Sets up `count` triangles, at most one a lane, in the pixels of `clip`.
-  /// @tparam by_lanes  triangles are chosen for cover_lanes(), not for small()
-  template <bool by_lanes>
   HWY_INLINE void load(const Corners& corners, std::size_t count, const AxisFrame& frame,
                        const PixelRect& clip, std::uint32_t depth_limit) {
     const LaneF64 df;
@@ -152,7 +150,7 @@ class SetupBatch {
     const VecI32 box_v1 = hn::Min(hn::Set(di, clip.v1), end(hn::Add(v0, v_high)));
     const auto covers =
         hn::And(hn::FirstN(di, count), hn::And(hn::Lt(box_u0, box_u1), hn::Lt(box_v0, box_v1)));
-    const VecI32 most = hn::Set(di, (by_lanes ? kLaneSide : kSmallSide) + 1);
+    const VecI32 most = hn::Set(di, kSmallSide + 1);
     const VecI32 width = hn::Sub(box_u1, box_u0), height = hn::Sub(box_v1, box_v0);
     const auto small = hn::And(hn::Lt(width, most), hn::Lt(height, most));
     const VecI32 u_extent = hn::Sub(u_high, u_low), v_extent = hn::Sub(v_high, v_low),
@@ -228,10 +226,7 @@ class SetupBatch {
         hn::DemoteTo(di, hn::IfThenElseZero(hn::Eq(area, zero_f), one_f));  // exact if direct
     const VecI32 kind = hn::IfThenElse(direct, hn::Sub(one, flat), hn::Set(di, 2));
     hn::Store(hn::IfThenElseZero(covers, kind), di, kind_);
-    if constexpr (by_lanes) {
-      choose_lanes(hn::And(hn::And(small, covers), hn::Eq(kind, one)), width, height,
-                   hn::IfThenElseZero(covers, kind));
-    } else if (hn::CountTrue(di, hn::And(hn::And(small, direct), covers)) * 2 < hn::Lanes(di)) {
+    if (hn::CountTrue(di, hn::And(hn::And(small, direct), covers)) * 2 < hn::Lanes(di)) {
       // It pays for a few of the lanes no more than one by one.
       hn::Store(zero, di, small_);
     } else {
@@ -253,64 +248,6 @@ class SetupBatch {
   static constexpr std::uint32_t kSmall = 1u << (kSmallSide * kSmallSide);
   [[nodiscard]] HWY_INLINE std::uint32_t small_depth(std::size_t lane, int pixel) const {
     return static_cast<std::uint32_t>(small_depth_[pixel][lane]);
-  }
-  /// Boxes up to this side may be covered by cover_lanes().
-  static constexpr int kLaneSide = 16;
-  /// Whether any triangle is left, besides those that cover_lanes() takes.
-  [[nodiscard]] HWY_INLINE bool any_left() const { return any_left_; }
-  /// Hands the fragments of the chosen triangles to `sink`: a pixel of each box at a time, so that
-  /// a triangle takes no branch. sink.begin_lanes(row_begin, row_end) comes first; sink.make_room()
-  /// announces at most kLaneSide calls of sink.put_lanes(pixel, depth, surface, covered), all
-  /// vectors of a lane a triangle. A pixel counts from that of `clip`, kTileSide a row; a surface
-  /// is DepthItem's.
-  template <class Sink>
-  HWY_INLINE void cover_lanes(std::span<const std::uint32_t> ids, const PixelRect& clip,
-                              std::uint32_t depth_limit, Sink& sink) {
-    if (lane_columns_ == 0) return;
-    const LaneF64 df;
-    const LaneI32 di;
-    const hn::RebindToUnsigned<LaneI32> du;
-    for (std::size_t lane = 0; lane < ids.size(); ++lane) surface_[lane] = ids[lane];
-    const VecI32 zero = hn::Zero(di);
-    const VecI32 width = hn::Load(di, lane_width_), height = hn::Load(di, lane_height_);
-    const VecI32 box_u0 = hn::Load(di, box_u0_), box_v0 = hn::Load(di, box_v0_);
-    const auto surface =
-        hn::Or(hn::Load(du, surface_), hn::ShiftLeft<31>(hn::BitCast(du, hn::Load(di, exit_))));
-    const VecI32 deepest = hn::Set(di, static_cast<std::int32_t>(depth_limit - 1));
-    const VecI32 base = hn::Load(di, quotient_);
-    const VecF64 inverse = hn::Load(df, inverse_), remainder_u = hn::Load(df, remainder_u_),
-                 remainder_v = hn::Load(df, remainder_v_);
-    VecI32 row_edge0 = hn::Load(di, edge_[0]), row_edge1 = hn::Load(di, edge_[1]),
-           row_edge2 = hn::Load(di, edge_[2]);
-    VecF64 row_remainder = hn::Load(df, remainder_);
-    VecI32 row_pixel = hn::Add(hn::ShiftLeft<6>(hn::Sub(box_v0, hn::Set(di, clip.v0))),
-                               hn::Sub(box_u0, hn::Set(di, clip.u0)));
-    static_assert(kTileSide == 1 << 6);
-    sink.begin_lanes(lane_row_begin_ - clip.v0, lane_row_end_ - clip.v0);
-    for (int y = 0; y < lane_rows_; ++y) {
-      sink.make_room();
-      const auto in_rows = hn::Lt(hn::Set(di, y), height);
-      VecI32 edge0 = row_edge0, edge1 = row_edge1, edge2 = row_edge2, pixel = row_pixel;
-      VecF64 remainder = row_remainder;
-      for (int x = 0; x < lane_columns_; ++x) {
-        const auto covered = hn::AndNot(hn::Lt(hn::Or3(edge0, edge1, edge2), zero),
-                                        hn::And(in_rows, hn::Lt(hn::Set(di, x), width)));
-        const VecI32 depth = hn::Add(base, hn::DemoteTo(di, hn::Mul(remainder, inverse)));
-        sink.put_lanes(du, hn::BitCast(du, pixel),
-                       hn::BitCast(du, hn::Min(hn::Max(depth, zero), deepest)), surface,
-                       hn::RebindMask(du, covered));
-        edge0 = hn::Add(edge0, hn::Load(di, edge_u_[0]));
-        edge1 = hn::Add(edge1, hn::Load(di, edge_u_[1]));
-        edge2 = hn::Add(edge2, hn::Load(di, edge_u_[2]));
-        remainder = hn::Add(remainder, remainder_u);
-        pixel = hn::Add(pixel, hn::Set(di, 1));
-      }
-      row_edge0 = hn::Add(row_edge0, hn::Load(di, edge_v_[0]));
-      row_edge1 = hn::Add(row_edge1, hn::Load(di, edge_v_[1]));
-      row_edge2 = hn::Add(row_edge2, hn::Load(di, edge_v_[2]));
-      row_remainder = hn::Add(row_remainder, remainder_v);
-      row_pixel = hn::Add(row_pixel, hn::Set(di, kTileSide));
-    }
   }
   [[nodiscard]] HWY_INLINE bool exit(std::size_t lane) const { return exit_[lane] != 0; }
   /// Depth steps that a lattice step along u and one along v make together, about.
@@ -368,38 +305,8 @@ class SetupBatch {
     hn::Store(hn::IfThenElseZero(chosen, bits), di, small_);
   }
 
-  /// Chooses the lanes of cover_lanes(), all of `small` or none; `kind` says which there are.
-  HWY_INLINE void choose_lanes(hn::Mask<LaneI32> small, VecI32 width, VecI32 height, VecI32 kind) {
-    const LaneI32 di;
-    const VecI32 lane_width = hn::IfThenElseZero(small, width),
-                 lane_height = hn::IfThenElseZero(small, height);
-    lane_columns_ = hn::GetLane(hn::MaxOfLanes(di, lane_width));
-    lane_rows_ = hn::GetLane(hn::MaxOfLanes(di, lane_height));
-    // A triangle by itself costs about as much as that many pixels of all lanes.
-    const auto chosen = static_cast<int>(hn::CountTrue(di, small));
-    if (lane_columns_ * lane_rows_ > kPixelsATriangle * chosen) {
-      lane_columns_ = 0;
-      any_left_ = true;
-      return;
-    }
-    hn::Store(lane_width, di, lane_width_);
-    hn::Store(lane_height, di, lane_height_);
-    const VecI32 v0 = hn::Load(di, box_v0_), v1 = hn::Load(di, box_v1_);
-    lane_row_begin_ = hn::GetLane(
-        hn::MinOfLanes(di, hn::IfThenElse(small, v0, hn::Set(di, std::int32_t{1} << 30))));
-    lane_row_end_ = hn::GetLane(hn::MaxOfLanes(di, hn::IfThenElseZero(small, v1)));
-    const VecI32 left = hn::IfThenZeroElse(small, kind);
-    hn::Store(left, di, kind_);
-    any_left_ = !hn::AllTrue(di, hn::Eq(left, hn::Zero(di)));
-  }
-
-  static constexpr int kPixelsATriangle = 16;
-  int lane_columns_ = 0, lane_rows_ = 0, lane_row_begin_ = 0, lane_row_end_ = 0;
-  bool any_left_ = true;
   template <class T>
   using Lanes = T[kMaxLanes];
-  alignas(64) Lanes<std::int32_t> lane_width_, lane_height_;
-  alignas(64) Lanes<std::uint32_t> surface_ = {};
   alignas(64) Lanes<double> remainder_, remainder_u_, remainder_v_, inverse_, steepness_;
   alignas(64) Lanes<std::int32_t> edge_[3], edge_u_[3], edge_v_[3], quotient_, kind_, exit_;
   alignas(64) Lanes<std::int32_t> small_, small_depth_[kSmallSide * kSmallSide];
@@ -626,7 +533,6 @@ HWY_INLINE void rasterize_triangles(const LatticeMesh& mesh, const RasterTarget&
                                     Sink& sink) {
   const AxisFrame frame(target.axis);
   const std::size_t lanes = hn::Lanes(LaneF64());
-  constexpr bool kByLanes = requires { requires Sink::kTakesLanes; };
   SetupBatch batch;
   TileEquations equations;
   const auto part_at = [&](std::size_t begin) {
@@ -639,11 +545,7 @@ HWY_INLINE void rasterize_triangles(const LatticeMesh& mesh, const RasterTarget&
   for (std::size_t begin = 0; begin < ids.size(); begin += lanes, turn ^= 1) {
     const auto part = part_at(begin);
     if (begin + lanes < ids.size()) corners[turn ^ 1].gather(mesh, part_at(begin + lanes), frame);
-    batch.load<kByLanes>(corners[turn], part.size(), frame, clip, target.depth_limit);
-    if constexpr (kByLanes) {
-      batch.cover_lanes(part, clip, target.depth_limit, sink);
-      if (!batch.any_left()) continue;
-    }
+    batch.load(corners[turn], part.size(), frame, clip, target.depth_limit);
     for (std::size_t lane = 0; lane < part.size(); ++lane) {
       const auto kind = batch.kind(lane);
       if (kind == SetupBatch::Kind::kNothing) continue;
@@ -654,7 +556,7 @@ HWY_INLINE void rasterize_triangles(const LatticeMesh& mesh, const RasterTarget&
         if constexpr (kChooses) {
           if (!sink.wants(batch.exit(lane))) continue;
         }
-        const std::uint32_t small = kByLanes ? 0 : batch.small(lane);
+        const std::uint32_t small = batch.small(lane);
         if (small == SetupBatch::kSmall) continue;  // between the pixel centres
         if constexpr (kTellSteepness) sink.steepness(batch.steepness(lane));
         sink.begin(batch.exit(lane), part[lane], box);

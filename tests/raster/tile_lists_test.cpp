@@ -124,11 +124,11 @@ TEST(TileLists, ScalarAndEveryVectorTargetAreTested) {
 
 TEST(TileLists, AreExactForTrianglesOfEverySize) {
   Maker maker(1);
-  // Around the limits of the rasterizer's arithmetic, 2^16 and 2^21 steps, and both ends.
-  constexpr std::int64_t kExtents[] = {1,       5,       100,       255,       256,
-                                       257,     3000,    40'000,    65'535,    65'536,
-                                       65'537,  200'000, 262'144,   1'000'000, (1 << 21) - 1,
-                                       1 << 21, 2097153, 5'000'000, 1 << 25,   1 << 28};
+  // Around the limits of the rasterizer's arithmetic, 2^13, 2^16 and 2^21 steps, and both ends.
+  constexpr std::int64_t kExtents[] = {
+      1,       5,       100,       255,     256,    257,     3000,    8'191,     8'192,
+      8'193,   40'000,  65'535,    65'536,  65'537, 200'000, 262'144, 1'000'000, (1 << 21) - 1,
+      1 << 21, 2097153, 5'000'000, 1 << 25, 1 << 28};
   constexpr glm::ivec2 kSizes[] = {{1, 1}, {7, 3}, {65, 67}};
   std::size_t crossings = 0;
   for (const auto& size : kSizes) {
@@ -353,7 +353,7 @@ TEST(TileLists, AreExactForSmallTrianglesTakenTogether) {
   // Vectors of triangles of up to `side` pixels and a few larger or empty ones among them: corners
   // anywhere, on pixel centres, or all in a row.
   Maker maker(8);
-  for (const int side : {1, 2, 3, 5, 9, 15, 17, 20}) {
+  for (const int side : {1, 2, 3, 5, 9, 15, 17, 20, 32}) {
     for (const int step : {1, 64, 128}) {
       for (const Axis axis : {Axis::kX, Axis::kY, Axis::kZ}) {
         const RasterTarget target{axis, 90, 75, 1 << 16};
@@ -363,6 +363,7 @@ TEST(TileLists, AreExactForSmallTrianglesTakenTogether) {
         for (int i = 0; i < count; ++i) {
           const int largest = (maker.pick(0, 15) == 0 ? 40 : side) * 256;
           const bool flat = maker.pick(0, 15) == 0;
+          const int deepest = maker.pick(0, 15) == 0 ? 70'000 : 3000;
           glm::ivec3 p[3];
           const int u = maker.pick(-300, 91 * 256), v = maker.pick(-300, 76 * 256);
           const int w = maker.pick(-2000, 67'000);
@@ -370,7 +371,7 @@ TEST(TileLists, AreExactForSmallTrianglesTakenTogether) {
             const int along = maker.pick(0, largest);
             corner[frame.u] = (u + along) / step * step;
             corner[frame.v] = (v + (flat ? along : maker.pick(0, largest))) / step * step;
-            corner[frame.w] = w + maker.pick(0, 3000) / step * step;
+            corner[frame.w] = w + maker.pick(0, deepest) / step * step;
           }
           scene.add(p[0], p[1], p[2]);
         }
