@@ -40,7 +40,7 @@ Result<LatticeMesh> snap_to_lattice(const TriangleSoup& mesh, const VoxelGrid& g
   LatticeMesh result;
   result.vertices.resize(mesh.positions.size());
   result.triangles = mesh.triangles;
-  constexpr std::size_t kChunk = 16384;
+  constexpr std::size_t kChunk = 4096;
   const std::size_t count = mesh.positions.size();
   std::atomic<std::size_t> bad{kNoVertex};
   parallel_for(execution, (count + kChunk - 1) / kChunk, [&](std::size_t chunk, int) {

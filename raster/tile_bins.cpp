@@ -30,7 +30,7 @@ class PixelBoxes {
       : triangles_(mesh.triangles.data()),
         beyond_{target.width > kMost ? 1u : 0u, rows.end > kMost ? 1u : 0u},
         vertices_(std::make_unique_for_overwrite<std::uint64_t[]>(mesh.vertices.size())) {
-    constexpr std::size_t kChunk = 32768;
+    constexpr std::size_t kChunk = 4096;
     const std::size_t count = mesh.vertices.size();
     const AxisFrame frame(target.axis);
     parallel_for(execution, (count + kChunk - 1) / kChunk, [&](std::size_t chunk, int) {
@@ -43,37 +43,34 @@ class PixelBoxes {
     });
   }
 
-  [[nodiscard]] Box box(std::size_t triangle) const {
-    const glm::uvec3& t = triangles_[triangle];
-    const VertexPixels a = pixels(t.x), b = pixels(t.y), c = pixels(t.z);
-    const VertexPixels least = a < b ? a : b;
-    const auto bits = std::bit_cast<std::uint64_t>(least < c ? least : c) ^ kBias;
-    const auto part = [bits](int i) {
-      return static_cast<std::uint32_t>(bits >> i * 16) & 0xffffu;
-    };
-    return {part(0), part(1), part(2) + beyond_[0], part(3) + beyond_[1]};
-  }
+  /// What box() needs.
+  struct View {
+    const glm::uvec3* triangles;
+    const std::uint64_t* vertices;
+    std::uint32_t beyond_u, beyond_v;  ///< 1 where the image has more than kMost pixels
 
-  /// Calls body(tile) for each tile that the triangle's box meets, body(number of tiles) if there
-  /// is none.
-  template <class Body>
-  void for_each_tile(std::size_t triangle, const TileBins& bins, Body&& body) const {
-    const Box box = this->box(triangle);
-    const auto row = static_cast<std::size_t>(bins.tiles_u);
-    const std::size_t skipped = static_cast<std::size_t>(bins.first_v) * row;
-    const std::size_t u0 = box.u0 / kTileSide, v0 = box.v0 / kTileSide;
-    const std::size_t u1 = (box.u1 - 1) / kTileSide, v1 = (box.v1 - 1) / kTileSide;
-    const bool covers = box.covers();
-    // One branch, for the few triangles in several tiles: which ones miss all pixel centres cannot
-    // be predicted.
-    if (covers & ((u0 != u1) | (v0 != v1))) {
-      for (std::size_t tv = v0; tv <= v1; ++tv) {
-        for (std::size_t tu = u0; tu <= u1; ++tu) body(tv * row + tu - skipped);
+    /// Around `count` triangles.
+    template <std::size_t count = 1>
+    [[nodiscard]] Box box(std::size_t first) const {
+      const auto pixels = [&](std::uint32_t vertex) {
+        return std::bit_cast<VertexPixels>(vertices[vertex]);
+      };
+      VertexPixels least = pixels(triangles[first].x);
+      for (std::size_t i = 0; i < count; ++i) {
+        const glm::uvec3& t = triangles[first + i];
+        const VertexPixels a = pixels(t.x), b = pixels(t.y), c = pixels(t.z);
+        const VertexPixels ab = a < b ? a : b;
+        const VertexPixels all = ab < c ? ab : c;
+        least = least < all ? least : all;
       }
-    } else {
-      body(covers ? v0 * row + u0 - skipped : row * static_cast<std::size_t>(bins.tiles_v));
+      const auto bits = std::bit_cast<std::uint64_t>(least) ^ kBias;
+      const auto part = [bits](int i) {
+        return static_cast<std::uint32_t>(bits >> i * 16) & 0xffffu;
+      };
+      return {part(0), part(1), part(2) + beyond_u, part(3) + beyond_v};
     }
-  }
+  };
+  [[nodiscard]] View view() const { return {triangles_, vertices_.get(), beyond_[0], beyond_[1]}; }
 
  private:
   /// The most pixels whose ends fit. The ends of one pixel more are stored one less, so that
@@ -89,13 +86,112 @@ class PixelBoxes {
     };
     return (stored(first) | stored(end) << 32) ^ (kBias & 0x0000'ffff'0000'ffff);
   }
-  [[nodiscard]] VertexPixels pixels(std::uint32_t vertex) const {
-    return std::bit_cast<VertexPixels>(vertices_[vertex]);
-  }
 
   const glm::uvec3* triangles_;
   std::uint32_t beyond_[2];  ///< 1 where the image has more than kMost pixels
   std::unique_ptr<std::uint64_t[]> vertices_;
+};
+
+/// The tiles of a range of triangles: which one has a triangle, and which triangles have several.
+class TilesOfRange {
+ public:
+  /// A triangle whose box meets no tile has the number behind the last tile.
+  TilesOfRange(const PixelBoxes& boxes, const TileBins& bins, std::size_t begin, std::size_t end)
+      : boxes_(&boxes),
+        begin_(begin),
+        row_(static_cast<std::uint32_t>(bins.tiles_u)),
+        skipped_(static_cast<std::uint32_t>(bins.first_v) * row_),
+        none_(row_ * static_cast<std::uint32_t>(bins.tiles_v)),
+        tiles_(std::make_unique_for_overwrite<std::uint32_t[]>(end - begin)),
+        several_(std::make_unique_for_overwrite<std::uint32_t[]>(end - begin)),
+        count_(end - begin) {}
+
+  /// Adds the triangles to `counts` of tiles.
+  void count(std::uint64_t* counts) {
+    const PixelBoxes::View boxes = boxes_->view();
+    const std::size_t end = count_, begin = begin_;
+    std::uint32_t* const tiles = tiles_.get();
+    std::uint32_t* several = several_.get();  // no member: another thread reads its neighbours
+    const auto count_one = [&](std::size_t at) {
+      // No branch: which triangles miss all pixel centres, or meet several tiles, cannot be
+      // predicted.
+      const Place of = place(boxes.box(begin + at));
+      tiles[at] = of.tile;
+      ++counts[of.tile];
+      *several = static_cast<std::uint32_t>(begin + at);
+      several += of.several ? 1 : 0;
+    };
+    std::size_t i = 0;
+    for (; i + kGroup <= end; i += kGroup) {
+      // Neighbours in the mesh mostly lie in one tile.
+      const Place all = place(boxes.box<kGroup>(begin + i));
+      if (all.several) {
+        for (std::size_t k = i; k < i + kGroup; ++k) count_one(k);
+      } else {
+        std::fill_n(tiles + i, kGroup, all.tile);
+        counts[all.tile] += kGroup;
+      }
+    }
+    for (; i < end; ++i) count_one(i);
+    several_count_ = static_cast<std::size_t>(several - several_.get());
+    for_each_of_several([counts](std::uint32_t tile, std::uint32_t) { ++counts[tile]; });
+  }
+  /// Writes the triangles to where the cursors of their tiles are.
+  void write(std::uint64_t* cursors, std::uint32_t* triangles) const {
+    const std::uint32_t none = none_;
+    const std::size_t end = count_, begin = begin_;
+    const std::uint32_t* const tiles = tiles_.get();
+    const auto write_some = [=](std::size_t first, std::size_t count) {
+      const std::uint32_t tile = tiles[first];
+      const std::uint64_t at = cursors[tile];
+      cursors[tile] = at + (tile < none ? count : 0);
+      for (std::size_t k = 0; k < count; ++k) {
+        triangles[at + k] = static_cast<std::uint32_t>(begin + first + k);
+      }
+    };
+    std::size_t i = 0;
+    for (; i + kGroup <= end; i += kGroup) {
+      if ((tiles[i] == tiles[i + 1]) & (tiles[i] == tiles[i + 2]) & (tiles[i] == tiles[i + 3])) {
+        write_some(i, kGroup);
+      } else {
+        for (std::size_t k = i; k < i + kGroup; ++k) write_some(k, 1);
+      }
+    }
+    for (; i < end; ++i) write_some(i, 1);
+    for_each_of_several(
+        [=](std::uint32_t tile, std::uint32_t triangle) { triangles[cursors[tile]++] = triangle; });
+  }
+  /// Triangles that are looked at together.
+  static constexpr std::size_t kGroup = 4;
+
+ private:
+  struct Place {
+    std::uint32_t tile;  ///< the only one, or none_
+    bool several;
+  };
+  [[nodiscard]] Place place(const PixelBoxes::Box& box) const {
+    const std::uint32_t u0 = box.u0 / kTileSide, v0 = box.v0 / kTileSide;
+    const std::uint32_t u1 = (box.u1 - 1) / kTileSide, v1 = (box.v1 - 1) / kTileSide;
+    const bool covers = box.covers(), one = (u0 == u1) & (v0 == v1);
+    return {covers & one ? v0 * row_ + u0 - skipped_ : none_, covers && !one};
+  }
+  template <class Body>
+  void for_each_of_several(Body&& body) const {
+    for (const std::uint32_t triangle : std::span(several_.get(), several_count_)) {
+      const PixelBoxes::Box box = boxes_->view().box(triangle);
+      for (std::uint32_t tv = box.v0 / kTileSide; tv <= (box.v1 - 1) / kTileSide; ++tv) {
+        for (std::uint32_t tu = box.u0 / kTileSide; tu <= (box.u1 - 1) / kTileSide; ++tu) {
+          body(tv * row_ + tu - skipped_, triangle);
+        }
+      }
+    }
+  }
+
+  const PixelBoxes* boxes_;
+  std::size_t begin_;
+  std::uint32_t row_, skipped_, none_;
+  std::unique_ptr<std::uint32_t[]> tiles_, several_;
+  std::size_t count_, several_count_ = 0;
 };
 
 /// Makes places of the counts of each part, by tile and then by part. The last count of a part is
@@ -134,15 +230,12 @@ Result<TileBins> bin_triangles(const LatticeMesh& mesh, const RasterTarget& targ
   // The last cursor of a part is for triangles in no tile, so that they need no branch.
   const std::size_t stride = tiles + 1;
   std::vector<std::uint64_t> cursors(parts * stride, 0);
-  const auto for_each_tile = [&](std::size_t triangle, auto&& body) {
-    boxes.for_each_tile(triangle, bins, body);
-  };
-  parallel_for(execution, parts, [&](std::size_t part, int) {
-    std::uint64_t* counts = cursors.data() + part * stride;
-    for (std::size_t i = count * part / parts; i < count * (part + 1) / parts; ++i) {
-      for_each_tile(i, [counts](std::size_t tile) { ++counts[tile]; });
-    }
-  });
+  std::vector<TilesOfRange> ranges;
+  for (std::size_t part = 0; part < parts; ++part) {
+    ranges.emplace_back(boxes, bins, count * part / parts, count * (part + 1) / parts);
+  }
+  parallel_for(execution, parts,
+               [&](std::size_t part, int) { ranges[part].count(cursors.data() + part * stride); });
   bins.offsets.resize(tiles + 1);
   const std::uint64_t sum = to_cursors(cursors, parts, bins.offsets);
   if (sum > std::numeric_limits<std::uint32_t>::max()) {
@@ -153,16 +246,12 @@ Result<TileBins> bin_triangles(const LatticeMesh& mesh, const RasterTarget& targ
         count, tiles, kTilePixels, sum);
   }
   bins.offsets[tiles] = static_cast<std::uint32_t>(sum);
-  bins.triangles.resize(sum + parts);  // each part's place for triangles in no tile, cut off below
+  // Each part has a place for triangles in no tile, cut off below.
+  bins.triangles.resize(sum + parts * TilesOfRange::kGroup);
   parallel_for(execution, parts, [&](std::size_t part, int) {
     std::uint64_t* cursor = cursors.data() + part * stride;
-    cursor[tiles] = sum + part;
-    for (std::size_t i = count * part / parts; i < count * (part + 1) / parts; ++i) {
-      for_each_tile(i, [&](std::size_t tile) {
-        bins.triangles[cursor[tile]] = static_cast<std::uint32_t>(i);
-        cursor[tile] += tile < tiles ? 1 : 0;
-      });
-    }
+    cursor[tiles] = sum + part * TilesOfRange::kGroup;
+    ranges[part].write(cursor, bins.triangles.data());
   });
   bins.triangles.resize(sum);
   if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");

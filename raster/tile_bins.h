@@ -10,9 +10,9 @@
 
 namespace strata {
 
-/// Which triangles may cover a pixel of which tile, by their boxes. Triangles whose boxes hold no
-/// pixel centre are in no tile; where an image has kMaxGridSide pixels a side, some outside of it
-/// are in tiles of its border.
+/// Which triangles may cover a pixel of which tile, by their boxes. Few triangles whose boxes hold
+/// no pixel centre are in a tile, with their neighbours in the mesh; where an image has
+/// kMaxGridSide pixels a side, some outside of it are in tiles of its border.
 struct TileBins {
   int tiles_u = 0, tiles_v = 0;
   int first_v = 0;                       ///< the first row of tiles
