@@ -133,6 +133,53 @@ HWY_INLINE bool walk_pairs(const std::uint32_t* cell, int ages, bool histogram, 
   return true;
 }
 
+/// Walks columns none of which has more than two pairs of crossings, one that enters and then one
+/// that leaves. @return false, and nothing done, if there are others, or intervals that touch
+HWY_INLINE bool walk_two_pairs(const std::uint32_t* cell, int ages, bool histogram,
+                               std::size_t pixel, std::uint32_t& count, TileIntervals& out) {
+  const Lane d;
+  const std::size_t lanes = hn::Lanes(d);
+  const Vec zero = hn::Zero(d), one = hn::Set(d, 1);
+  const auto plane = [&](int age) {
+    return age < ages ? hn::LoadU(d, cell + static_cast<std::size_t>(age) * kTilePixels) : zero;
+  };
+  const Vec enter = plane(0), leave = plane(1), enter2 = plane(2), leave2 = plane(3);
+  const auto any = [&](Vec bits) { return hn::Ne(bits, zero); };
+  const auto unpaired = [&](Vec in, Vec from) {
+    return hn::Or(hn::Xor(any(in), any(hn::And(in, one))), hn::Xor(any(in), any(from)));
+  };
+  const Mask other = any(hn::Or(plane(4), hn::And(hn::Or(leave, leave2), one)));
+  if (!hn::AllFalse(d, hn::Or(other, hn::Or(unpaired(enter, leave), unpaired(enter2, leave2))))) {
+    return false;
+  }
+  const Vec begin = voxel_of(enter), end = voxel_of(leave);
+  const Vec begin2 = voxel_of(enter2), end2 = voxel_of(leave2);
+  const Mask marked = hn::Gt(end, begin), marked2 = hn::Gt(end2, begin2);
+  if (!hn::AllFalse(d, hn::And(hn::And(marked, marked2), hn::Eq(end, begin2)))) return false;
+  std::uint32_t packed[2 * kMaxLanes], marks[2 * kMaxLanes];
+  hn::StoreInterleaved2(hn::Or(begin, hn::ShiftLeft<16>(hn::Sub(end, one))),
+                        hn::Or(begin2, hn::ShiftLeft<16>(hn::Sub(end2, one))), d, packed);
+  hn::StoreInterleaved2(hn::IfThenElseZero(marked, one), hn::IfThenElseZero(marked2, one), d,
+                        marks);
+  std::uint32_t* items = room_for(3 * lanes, count, out);
+  for (std::size_t half = 0; half < 2 * lanes; half += lanes) {
+    const Mask some = any(hn::LoadU(d, marks + half));
+    hn::StoreU(hn::Compress(hn::LoadU(d, packed + half), some), d, items);
+    items += hn::CountTrue(d, some);
+  }
+  for (std::size_t lane = 0; lane < lanes; ++lane) {
+    out.offsets[pixel + lane] = count;
+    count += marks[2 * lane] + marks[2 * lane + 1];
+  }
+  const std::size_t deep = hn::CountTrue(d, any(enter2));
+  out.counts.max_depth = std::max<std::uint64_t>(out.counts.max_depth, deep > 0 ? 4 : 2);
+  if (histogram) {
+    out.counts.histogram[4] += deep;
+    out.counts.histogram[2] += hn::CountTrue(d, any(enter)) - deep;
+  }
+  return true;
+}
+
 /// Hands intervals out column by column. @return their number, with the `count` that were there
 HWY_INLINE std::uint32_t hand_out_columns(const Finished& finished, std::size_t pixel,
                                           std::uint32_t count, TileIntervals& out) {
@@ -172,6 +219,7 @@ void walk_planes(const TileLists<DepthKey>& lists, bool histogram, TileIntervals
       const std::size_t pixel = static_cast<std::size_t>(row) * kTileSide + u;
       const std::uint32_t* const cell = lists.planes32 + pixel;
       if (walk_pairs(cell, lists.ages, histogram, pixel, count, out)) continue;
+      if (walk_two_pairs(cell, lists.ages, histogram, pixel, count, out)) continue;
       WindingWalk walk;
       finished.rounds = 0;
       const int age = walk_columns<rule>(cell, lists.ages, histogram, finished, walk);

@@ -93,28 +93,30 @@ TEST(TileWalk, GivesTheIntervalsOfAWalkColumnByColumn) {
   const auto pick = [&](int low, int high) {
     return std::uniform_int_distribution<int>(low, high)(random);
   };
-  // Columns that a ray enters and leaves once, with ever more of other lengths and orders, with
-  // crossings in one voxel, at one depth, and at both ends.
-  for (const int others : {0, 1, 5, 30, 100}) {
-    for (const int reach : {200, 3000, (1 << 23) - 1}) {
-      for (const int empty : {0, 40, 95}) {
-        std::vector<std::vector<DepthKey>> columns(kTilePixels);
-        for (auto& column : columns) {
-          if (pick(0, 99) < empty) continue;
-          const auto depth = [&] { return static_cast<DepthKey>(pick(0, reach)); };
-          if (pick(0, 99) >= others) {
-            const auto [low, high] = std::minmax({depth(), depth()});
-            column = {low << 1, high << 1 | 1};
-            continue;
+  // Columns that a ray enters and leaves up to so many times in turn, with ever more of other
+  // lengths and orders, with crossings in one voxel, at one depth, and at both ends.
+  for (const int pairs : {1, 2, 3}) {
+    for (const int others : {0, 1, 5, 30, 100}) {
+      for (const int reach : {200, 3000, (1 << 23) - 1}) {
+        for (const int empty : {0, 40, 95}) {
+          std::vector<std::vector<DepthKey>> columns(kTilePixels);
+          for (auto& column : columns) {
+            if (pick(0, 99) < empty) continue;
+            const bool other = pick(0, 99) < others;
+            const int length = other ? pick(1, 7) : 2 * pick(1, pairs);
+            for (int i = 0; i < length; ++i)
+              column.push_back(static_cast<DepthKey>(pick(0, reach)));
+            std::sort(column.begin(), column.end());
+            for (std::size_t i = 0; i < column.size(); ++i) {
+              const int exit = other ? pick(0, 1) : static_cast<int>(i % 2);
+              column[i] = column[i] << 1 | static_cast<DepthKey>(exit);
+            }
           }
-          const int length = pick(1, 7);
-          for (int i = 0; i < length; ++i) {
-            column.push_back(depth() << 1 | static_cast<DepthKey>(pick(0, 1)));
-          }
+          SCOPED_TRACE(std::to_string(pairs) + ", " + std::to_string(others) + ", " +
+                       std::to_string(reach));
+          expect_same(Lists(std::move(columns)));
+          if (HasFailure()) return;
         }
-        SCOPED_TRACE(std::to_string(others) + ", " + std::to_string(reach));
-        expect_same(Lists(std::move(columns)));
-        if (HasFailure()) return;
       }
     }
   }
