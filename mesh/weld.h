@@ -175,14 +175,16 @@ class RecentKeys {
   std::vector<Slot> slots_;
 };
 
-/// Sets first[i] of the given indices i, which increase, to the least of these indices j whose
-/// position equals that of i, if `own(hash)`; other indices are left alone.
+/// Sets value[i] of the given indices i, which increase, to fresh(j) of the least of these indices
+/// j whose position equals that of i, if `own(hash)`; other indices are left alone.
 /// @param index  index(k) -> the k-th index, for k in [0, count)
-/// @param found  found(i) is called for indices that are the first of their position, in order
+/// @param fresh  fresh(j) -> a value that no other position has
+/// @param found  found(j) is called for indices that are the first of their position, in order,
+/// before the next call of fresh
 /// @return whether go_on(i), which is called now and then, never returned false
-template <class Scalar, class Index, class Load, class Own, class GoOn, class Found>
+template <class Scalar, class Index, class Load, class Own, class GoOn, class Fresh, class Found>
 bool weld_one_by_one(std::size_t count, Index&& index, Load&& load, Own&& own, GoOn&& go_on,
-                     std::uint32_t* first, std::size_t expected, Found&& found) {
+                     std::uint32_t* value, std::size_t expected, Fresh&& fresh, Found&& found) {
   using Table = WeldTable<Scalar>;
   constexpr std::size_t kBatch = 128;  // look-ups in flight, so that their cache misses overlap
   constexpr std::size_t kLookUp = std::size_t{1} << 16;
@@ -201,7 +203,7 @@ bool weld_one_by_one(std::size_t count, Index&& index, Load&& load, Own&& own, G
       const std::uint64_t hash = key.hash();
       if (!own(hash)) continue;
       // One of equal keys, whose first may be found only below.
-      if (recent.replace(key, hash, i, first[i])) {
+      if (recent.replace(key, hash, i, value[i])) {
         known[met++] = i;
         continue;
       }
@@ -211,11 +213,12 @@ bool weld_one_by_one(std::size_t count, Index&& index, Load&& load, Own&& own, G
       table.prefetch(hash);
     }
     for (std::size_t k = 0; k < held; ++k) {
-      const std::uint32_t at = table.find_or_insert(keys[k], hashes[k], indices[k]);
-      first[indices[k]] = at;
-      if (at == indices[k]) found(at);
+      const std::uint32_t mine = fresh(indices[k]);
+      const std::uint32_t at = table.find_or_insert(keys[k], hashes[k], mine);
+      value[indices[k]] = at;
+      if (at == mine) found(indices[k]);
     }
-    for (std::size_t k = 0; k < met; ++k) first[known[k]] = first[first[known[k]]];
+    for (std::size_t k = 0; k < met; ++k) value[known[k]] = value[value[known[k]]];
   }
   return true;
 }
@@ -231,7 +234,8 @@ std::size_t weld_by_hash(const Execution& execution, std::size_t parts, std::siz
     std::size_t own = 0;
     (void)weld_one_by_one<Scalar>(
         count, index, load, [&](std::uint64_t hash) { return (hash >> 48) * parts >> 16 == part; },
-        go_on, first, expected / parts, [&own](std::uint32_t) { ++own; });
+        go_on, first, expected / parts, [](std::uint32_t i) { return i; },
+        [&own](std::uint32_t) { ++own; });
     different += own;
   });
   return different;
@@ -252,6 +256,28 @@ bool neighbours_follow(std::size_t count, Load&& load) {
   return met > looks / 2;
 }
 
+/// How many threads weld so many points.
+inline std::size_t weld_parts(const Execution& execution, std::size_t count) {
+  return count < 50000 ? 1 : static_cast<std::size_t>(execution.thread_count());
+}
+
+/// Numbers the different positions of the points [0, count) in the order of their first points, on
+/// one thread: number[i] is that of the position of i.
+/// @param load, go_on  as for weld_first() @param found  found(i) for the first point of each
+template <class Scalar, class Load, class GoOn, class Found>
+void weld_numbers(std::size_t count, Load&& load, std::uint32_t* number, GoOn&& go_on,
+                  Found&& found) {
+  std::uint32_t next = 0;
+  (void)weld_one_by_one<Scalar>(
+      count, [](std::size_t k) { return static_cast<std::uint32_t>(k); }, load,
+      [](std::uint64_t) { return true; }, go_on, number, count / 5,
+      [&next](std::uint32_t) { return next; },
+      [&](std::uint32_t i) {
+        ++next;
+        found(i);
+      });
+}
+
 /// Sets first[i], for every i in [0, count), to the least j whose position equals that of i. Each
 /// thread welds a range of its own. Then it owns, of the positions that are left, those whose hash
 /// falls to it; at once, if points that are equal lie far apart. So the result does not depend on
@@ -264,7 +290,7 @@ template <class Scalar, class Load, class GoOn = bool (*)(std::size_t)>
 std::size_t weld_first(
     const Execution& execution, std::size_t count, Load&& load, std::uint32_t* first,
     GoOn&& go_on = [](std::size_t) { return true; }) {
-  const std::size_t parts = count < 50000 ? 1 : static_cast<std::size_t>(execution.thread_count());
+  const std::size_t parts = weld_parts(execution, count);
   Execution all = execution;
   all.stop = {};  // a skipped block would leave its corners unset
   std::vector<std::vector<std::uint32_t>> firsts(parts);  // of each range
@@ -283,6 +309,7 @@ std::size_t weld_first(
     const bool done = weld_one_by_one<Scalar>(
         end - begin, [begin](std::size_t k) { return static_cast<std::uint32_t>(begin + k); }, load,
         [](std::uint64_t) { return true; }, go_on, first, expected,
+        [](std::uint32_t i) { return i; },
         [&](std::uint32_t i) {
           ++different[part];
           if (parts > 1) firsts[part].push_back(i);

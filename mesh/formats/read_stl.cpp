@@ -87,15 +87,24 @@ Result<void> read_facets(const ReaderInput& input, std::size_t count, TriangleSo
                  data + kHeaderBytes + c / 3 * kFacetBytes);
   };
   ReadWatch watch(input);
-  const std::size_t different = weld_first<float>(
-      input.execution, corners, [data](std::size_t c) { return binary_corner(data, c); }, index,
-      [&](std::size_t c) {
-        forget(c);
-        return watch.at(static_cast<double>(c) / static_cast<double>(corners));
-      });
-  if (input.execution.stop.stop_requested()) {
+  const auto load = [data](std::size_t c) { return binary_corner(data, c); };
+  const auto go_on = [&](std::size_t c) {
+    forget(c);
+    return watch.at(static_cast<double>(c) / static_cast<double>(corners));
+  };
+  const auto stopped = [&]() -> Result<void> {
+    if (!input.execution.stop.stop_requested()) return {};
     return fail(ErrorCode::kCancelled, "{}: reading was stopped", input.name);
+  };
+  if (weld_parts(input.execution, corners) == 1) {
+    reserve_large(soup.positions, count / 2 + 2);  // of a closed mesh
+    weld_numbers<float>(corners, load, index, go_on, [&](std::uint32_t c) {
+      soup.positions.emplace_back(WeldTable<float>::canonical(binary_corner(data, c)));
+    });
+    return stopped();
   }
+  const std::size_t different = weld_first<float>(input.execution, corners, load, index, go_on);
+  if (auto done = stopped(); !done) return done;
   reserve_large(soup.positions, different);
   // First occurrences become vertices in the order of the file; later corners refer back to them.
   for (std::size_t c = 0; c < corners; ++c) {
