@@ -350,6 +350,28 @@ const char* skip_numbers(const char* p) {
   return p;
 }
 
+/// Behind white space and a word in lower case; null if another one is there.
+template <std::size_t n>
+const char* behind_word(const char* p, const char (&word)[n]) {
+  p = skip_spaces(p);
+  const bool same = scanner::may_read(p, n) ? std::memcmp(p, word, n - 1) == 0
+                                            : std::strncmp(p, word, n - 1) == 0;
+  return same && ends_token(p[n - 1]) ? p + n - 1 : nullptr;
+}
+
+/// From the last vertex of a facet to the first one of the next, as most files have it: "endloop
+/// endfacet facet normal x y z outer loop". @return null for all else
+const char* next_plain_facet(const char* p, const char* end) {
+  if ((p = behind_word(p, "endloop")) == nullptr) return nullptr;
+  if ((p = behind_word(p, "endfacet")) == nullptr || p >= end) return nullptr;
+  if ((p = behind_word(p, "facet")) == nullptr) return nullptr;
+  if ((p = behind_word(p, "normal")) == nullptr || *p != ' ') return nullptr;
+  glm::dvec3 normal;
+  if ((p = plain_vertex(p + 1, normal)) == nullptr) return nullptr;
+  if ((p = behind_word(p, "outer")) == nullptr) return nullptr;
+  return behind_word(p, "loop");
+}
+
 void AsciiReader::parse(const char* p, const char* end, Chunk& chunk) const {
   bool in_loop = false;
   std::size_t loop_begin = 0;
@@ -358,8 +380,16 @@ void AsciiReader::parse(const char* p, const char* end, Chunk& chunk) const {
     chunk.error = std::move(message);
   };
   for (p = skip_spaces(p); p < end; p = skip_spaces(p)) {
-    const char* const next = in_loop ? parse_plain_vertex(p, chunk) : nullptr;
+    const char* next = in_loop ? parse_plain_vertex(p, chunk) : nullptr;
     if (next != nullptr) {
+      p = next;
+      continue;
+    }
+    next = in_loop ? next_plain_facet(p, end) : nullptr;
+    if (next != nullptr) {
+      chunk.sizes.push_back(static_cast<std::uint32_t>(chunk.corners.size() - loop_begin));
+      loop_begin = chunk.corners.size();
+      chunk.ended = false;
       p = next;
       continue;
     }

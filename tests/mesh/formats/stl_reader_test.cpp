@@ -135,6 +135,43 @@ TEST(StlReader, ReadsAsciiWithAnyLineEndAndLetterCase) {
   EXPECT_EQ(parsed(kStl, upper).soup.triangles.size(), 2u);
 }
 
+TEST(StlReader, FacetsThatAreNotPlainAreReadAsPlainOnes) {
+  const auto replaced = [](std::string text, const std::string& from, const std::string& to) {
+    for (std::size_t at = text.find(from); at != std::string::npos; at = text.find(from, at)) {
+      text.replace(at, from.size(), to);
+      at += to.size();
+    }
+    return text;
+  };
+  const std::string plain = kFacet + replaced(kFacet, "vertex 1 0 0", "vertex 1 0 5") + kFacet;
+  const MeshFile expected = parsed(kStl, "solid\n" + plain + "endsolid\n");
+  EXPECT_EQ(expected.soup.triangles.size(), 3u);
+  EXPECT_TRUE(expected.stats.warnings.empty());
+  for (const auto& [from, to] : std::vector<std::pair<std::string, std::string>>{
+           {"endloop", "ENDLOOP"},
+           {"endloop", "end loop"},
+           {"endfacet\n", "endfacet\nendsolid\nsolid b\n"},
+           {"endfacet", "end facet"},
+           {"facet normal", "facet  normal"},
+           {"normal 0 0 1", "normal 0 0 1 7"},
+           {"normal 0 0 1", "normal nan 0 1"},
+           {"normal 0 0 1", "normal"},
+           {"normal 0 0 1\n", ""},
+           {"normal 0 0 1\n", "normal 0 0 1 "},
+           {" outer loop", " loop"},
+           {" outer loop", " outer\tloop"}}) {
+    const MeshFile other = parsed(kStl, "solid\n" + replaced(plain, from, to) + "endsolid\n");
+    EXPECT_EQ(other.soup.triangles, expected.soup.triangles) << to;
+    EXPECT_EQ(other.soup.positions, expected.soup.positions) << to;
+    EXPECT_TRUE(other.stats.warnings.empty()) << to;
+  }
+  for (const char* glued : {"endloopx", "endfacetx", "outerx"}) {
+    const std::string word(glued, std::strlen(glued) - 1);
+    const auto read = parse(kStl, "solid\n" + replaced(plain, word, glued) + "endsolid\n");
+    EXPECT_TRUE(!read || !read->stats.warnings.empty()) << glued;
+  }
+}
+
 TEST(StlReader, AsciiSolidsFollowEachOther) {
   const std::string one = "solid a\n" + kFacet + "endsolid a\n";
   EXPECT_EQ(parsed(kStl, one + one).soup.triangles.size(), 2u);
