@@ -10,6 +10,7 @@
 #include <cstring>
 #include <numeric>
 #include <optional>
+#include <span>
 
 namespace strata {
 namespace {
@@ -156,11 +157,13 @@ struct Token {
 
 class Deflater {
  public:
-  Deflater(std::span<const std::uint8_t> all, std::size_t row_bytes, std::size_t pixel_bytes)
-      : data_(all.data()), row_(row_bytes), pixel_(pixel_bytes), places_(kSlots) {}
+  Deflater(std::size_t row_bytes, std::size_t pixel_bytes)
+      : row_(row_bytes), pixel_(pixel_bytes), places_(kSlots) {}
 
-  /// Appends the block of bytes [begin, end).
-  void deflate(std::size_t begin, std::size_t end, bool last, std::vector<std::uint8_t>& out) {
+  /// Appends the block of bytes [begin, end) of `data`; copies may come from before.
+  void deflate(const std::uint8_t* data, std::size_t begin, std::size_t end, bool last,
+               std::vector<std::uint8_t>& out) {
+    data_ = data;
     find_copies(begin, end);
     write(last, out);
   }
@@ -318,33 +321,61 @@ class Deflater {
     }
   }
 
-  const std::uint8_t* data_;
+  const std::uint8_t* data_ = nullptr;
   std::size_t row_, pixel_;
   std::vector<Places> places_;  ///< by hash
   std::vector<Token> tokens_;
 };
 
+/// Of bytes whose sum is `before`, followed by `count` whose sum is `behind` (RFC 1950).
+std::uint32_t joined_adler(std::uint32_t before, std::uint32_t behind, std::size_t count) {
+  constexpr std::uint64_t kBase = 65521;
+  const std::uint64_t a = before & 0xffff, more = behind & 0xffff;
+  const std::uint64_t sums = (before >> 16) + (behind >> 16) + count % kBase * (a + kBase - 1);
+  return static_cast<std::uint32_t>(sums % kBase << 16 | (a + more + kBase - 1) % kBase);
+}
+
 }  // namespace
 
-std::vector<std::uint8_t> deflate_rows(std::span<const std::uint8_t> rows, std::size_t row_bytes,
-                                       std::size_t pixel_bytes, const Execution& execution) {
-  const std::size_t count = rows.size() / row_bytes;
+std::vector<std::uint8_t> deflate_rows(std::size_t count, std::size_t row_bytes,
+                                       std::size_t pixel_bytes, const Execution& execution,
+                                       const MakeRow& make_row) {
+  struct Piece {
+    std::vector<std::uint8_t> bytes;
+    std::uint32_t adler = 1;
+    std::size_t size = 0;
+  };
+  struct Worker {
+    Deflater deflater;
+    std::vector<std::uint8_t> rows;
+  };
   const std::size_t rows_a_piece = std::max<std::size_t>(1, kPieceBytes / row_bytes);
-  std::vector<std::vector<std::uint8_t>> pieces((count + rows_a_piece - 1) / rows_a_piece);
+  std::vector<Piece> pieces((count + rows_a_piece - 1) / rows_a_piece);
   Execution whole;
   whole.threads = execution.threads;
-  std::vector<std::optional<Deflater>> deflaters(static_cast<std::size_t>(whole.thread_count()));
-  parallel_for(whole, pieces.size(), [&](std::size_t i, int worker) {
-    std::optional<Deflater>& deflater = deflaters[static_cast<std::size_t>(worker)];
-    if (!deflater) deflater.emplace(rows, row_bytes, pixel_bytes);
+  std::vector<std::optional<Worker>> workers(static_cast<std::size_t>(whole.thread_count()));
+  parallel_for(whole, pieces.size(), [&](std::size_t i, int thread) {
+    std::optional<Worker>& worker = workers[static_cast<std::size_t>(thread)];
+    if (!worker) worker.emplace(Worker{Deflater(row_bytes, pixel_bytes), {}});
+    // The row above is made again.
     const std::size_t begin = i * rows_a_piece, end = std::min(count, begin + rows_a_piece);
-    deflater->deflate(begin * row_bytes, end * row_bytes, i + 1 == pieces.size(), pieces[i]);
+    const std::size_t above = begin > 0 ? begin - 1 : 0;
+    worker->rows.resize((end - above) * row_bytes);
+    std::uint8_t* const rows = worker->rows.data();
+    for (std::size_t row = above; row < end; ++row) make_row(row, rows + (row - above) * row_bytes);
+    const std::size_t before = (begin - above) * row_bytes;
+    Piece& piece = pieces[i];
+    piece.size = (end - begin) * row_bytes;
+    piece.adler = libdeflate_adler32(1, rows + before, piece.size);
+    worker->deflater.deflate(rows, before, before + piece.size, i + 1 == pieces.size(),
+                             piece.bytes);
   });
   std::vector<std::uint8_t> out{0x78, 0x01};
-  for (const std::vector<std::uint8_t>& piece : pieces) {
-    out.insert(out.end(), piece.begin(), piece.end());
+  std::uint32_t adler = 1;
+  for (const Piece& piece : pieces) {
+    out.insert(out.end(), piece.bytes.begin(), piece.bytes.end());
+    adler = joined_adler(adler, piece.adler, piece.size);
   }
-  const std::uint32_t adler = libdeflate_adler32(1, rows.data(), rows.size());
   for (const int shift : {24, 16, 8, 0}) {
     out.push_back(static_cast<std::uint8_t>(adler >> shift & 0xff));
   }

@@ -47,28 +47,13 @@ class Palette {
 struct PngImage {
   /// PNG's numbers: 2 red, green, blue; 3 palette; 6 with alpha.
   std::uint8_t colour_type = 6;
-  std::uint8_t bits = 8;      ///< a channel
-  std::size_t row_bytes = 0;  ///< with the byte that says how the row is filtered: not at all
+  std::uint8_t bits = 8;  ///< a channel
+  std::size_t row_bytes = 0;
   std::size_t pixel_bytes = 1;
-  std::size_t size = 0;  ///< of all rows
-  std::unique_ptr<std::uint8_t[]> rows;
+  MakeRow make_row;                   ///< without the byte before it that says how it is filtered
   std::vector<std::uint8_t> palette;  ///< red, green, blue, ...
   std::vector<std::uint8_t> alpha;    ///< of the palette, unless all of it is opaque
 };
-
-/// Makes room for rows of `row_bytes` bytes, and calls fill(row, bytes) for each. Nothing is
-/// filtered: faces are runs of one colour, which are found as they are.
-template <class Fill>
-void make_rows(PngImage& image, int height, std::size_t row_bytes, Fill&& fill) {
-  image.row_bytes = row_bytes + 1;
-  image.size = image.row_bytes * static_cast<std::size_t>(height);
-  image.rows = std::make_unique_for_overwrite<std::uint8_t[]>(image.size);
-  for (std::size_t row = 0; row < static_cast<std::size_t>(height); ++row) {
-    std::uint8_t* const to = image.rows.get() + row * image.row_bytes;
-    *to = 0;
-    fill(row, to + 1);
-  }
-}
 
 /// Calls use(index, length) for the runs of one colour.
 /// @return false when there are too many colours
@@ -122,13 +107,15 @@ bool to_palette(const Picture& picture, PngImage& image) {
   const auto columns = static_cast<std::size_t>(picture.width);
   image.colour_type = 3;
   image.bits = static_cast<std::uint8_t>(bits);
-  make_rows(image, picture.height, (columns * bits + 7) / 8,
-            [&](std::size_t row, std::uint8_t* to) {
-              IndexPacker packer(bits, to);
-              for_each_run(palette, pixels.subspan(row * columns, columns),
-                           [&](std::uint8_t index, std::size_t n) { packer.run(index, n); });
-              packer.end();
-            });
+  image.row_bytes = (columns * bits + 7) / 8;
+  // A copy of the palette for each row, since looking for a colour may add it.
+  image.make_row = [palette, pixels, columns, bits](std::size_t row, std::uint8_t* to) {
+    Palette colours_of_row = palette;
+    IndexPacker packer(bits, to);
+    for_each_run(colours_of_row, pixels.subspan(row * columns, columns),
+                 [&](std::uint8_t index, std::size_t n) { packer.run(index, n); });
+    packer.end();
+  };
   bool opaque = true;
   for (const std::uint32_t colour : palette.colours()) {
     const auto rgba = std::bit_cast<Rgba>(colour);
@@ -149,14 +136,15 @@ PngImage to_png_image(const Picture& picture) {
   const auto columns = static_cast<std::size_t>(picture.width);
   image.colour_type = channels == 3 ? 2 : 6;
   image.pixel_bytes = channels;
-  make_rows(image, picture.height, columns * channels, [&](std::size_t row, std::uint8_t* to) {
+  image.row_bytes = columns * channels;
+  image.make_row = [&picture, columns, channels](std::size_t row, std::uint8_t* to) {
     const Rgba* const pixels = picture.pixels.data() + row * columns;
     // All but the last are stored with their alpha, which the next one overwrites.
     for (std::size_t i = 0; i + 1 < columns; ++i) {
       std::memcpy(to + i * channels, &pixels[i], sizeof(Rgba));
     }
     std::memcpy(to + (columns - 1) * channels, &pixels[columns - 1], channels);
-  });
+  };
   return image;
 }
 
@@ -177,8 +165,13 @@ std::vector<std::uint8_t> encode_png(const Picture& picture, const Execution& ex
   if (!image.alpha.empty()) add_chunk("tRNS", image.alpha);
   // A chunk's length has 31 bits.
   constexpr std::size_t kMostBytes = 0x7fffffff;
+  // Nothing is filtered: faces are runs of one colour, which are found as they are.
   const std::vector<std::uint8_t> data =
-      deflate_rows({image.rows.get(), image.size}, image.row_bytes, image.pixel_bytes, execution);
+      deflate_rows(static_cast<std::size_t>(picture.height), image.row_bytes + 1, image.pixel_bytes,
+                   execution, [&](std::size_t row, std::uint8_t* to) {
+                     *to = 0;
+                     image.make_row(row, to + 1);
+                   });
   for (std::size_t at = 0; at < data.size(); at += kMostBytes) {
     add_chunk("IDAT", std::span(data).subspan(at, std::min(kMostBytes, data.size() - at)));
   }

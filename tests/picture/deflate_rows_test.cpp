@@ -17,7 +17,10 @@ using Bytes = std::vector<std::uint8_t>;
 Bytes deflated(const Bytes& rows, std::size_t row_bytes, std::size_t pixel_bytes, int threads = 1) {
   Execution execution;
   execution.threads = threads;
-  return deflate_rows(rows, row_bytes, pixel_bytes, execution);
+  return deflate_rows(rows.size() / row_bytes, row_bytes, pixel_bytes, execution,
+                      [&](std::size_t row, std::uint8_t* bytes) {
+                        std::copy_n(rows.data() + row * row_bytes, row_bytes, bytes);
+                      });
 }
 
 /// By zlib.
