@@ -172,6 +172,10 @@ Result<void> check_input_name(const std::string& path, const InputKind& kind, bo
     return fail(ErrorCode::kInput, "{}: it is a folder, not a file", path);
   }
   if (mesh_format_of(path) != MeshFormat::kAuto) return {};
+  if (std::filesystem::exists(path, ignored) && !std::filesystem::is_regular_file(path, ignored)) {
+    return fail(ErrorCode::kInput, "{}: it is no regular file, so the input format must be given",
+                path);
+  }
   if (scenes) {
     return fail(
         ErrorCode::kInput,

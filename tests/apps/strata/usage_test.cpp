@@ -78,6 +78,14 @@ TEST_F(Usage, ALibraryWhosePathSpeaksOfMemoryIsNoLackOfIt) {
 }
 #endif
 
+TEST_F(Usage, DevicesNeedAFormat) {
+  const RunResult run = place.run({"info", "/dev/null"});
+  EXPECT_EQ(run.exit_code, 3);
+  EXPECT_NE(run.err.find("/dev/null: it is no regular file, so the input format must be given"),
+            std::string::npos)
+      << run.err;
+}
+
 TEST_F(Usage, HelpTakesACommand) {
   const RunResult run = place.run({"help", "voxelize"});
   EXPECT_EQ(run.exit_code, 0) << run.err;

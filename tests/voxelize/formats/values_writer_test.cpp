@@ -170,6 +170,16 @@ TEST(ValuesOfFormats, AreRefusedWhereAFormatHoldsThemNot) {
       << binvox.error().message;
 }
 
+TEST(ValuesOfFormats, IdsBeyondThoseOfAllFormatsNameTheLargest) {
+  VoxelWriterOptions options;
+  options.ids = 4'000'000'000;
+  for (const char* path : {"a.npy", "a.binvox"}) {
+    const Result<void> refused = check_values(*voxel_format_for(path, ""), options);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().message, "ids of voxels must be at most 2147483647, got 4000000000");
+  }
+}
+
 TEST(ValuesOfFormats, OfTwoKindsAreRefused) {
   VoxelWriterOptions options = shares(true);
   options.rgba = true;
