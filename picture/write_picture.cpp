@@ -13,7 +13,6 @@
 
 #include "core/atomic_file.h"
 #include "core/png_chunks.h"
-#include "picture/deflate_rows.h"
 #include "strata/picture/pixels.h"
 
 namespace strata {
@@ -46,75 +45,72 @@ class Palette {
 struct PngImage {
   /// PNG's numbers: 2 red, green, blue; 3 palette; 6 with alpha.
   std::uint8_t colour_type = 6;
-  std::uint8_t bits = 8;  ///< a channel
-  std::size_t row_bytes = 0;
-  std::size_t pixel_bytes = 1;
-  MakeRow make_row;                   ///< without the byte before it that says how it is filtered
+  std::uint8_t bits = 8;      ///< a channel
+  std::size_t row_bytes = 0;  ///< with the byte that says how the row is filtered: not at all
+  std::size_t size = 0;       ///< of all rows
+  std::unique_ptr<std::uint8_t[]> rows;
   std::vector<std::uint8_t> palette;  ///< red, green, blue, ...
   std::vector<std::uint8_t> alpha;    ///< of the palette, unless all of it is opaque
 };
 
-/// Calls use(index, length) for the runs of one colour.
+/// Makes room for rows of `row_bytes` bytes, and calls fill(row, bytes) for each. Nothing is
+/// filtered: faces are runs of one colour, which deflate finds as they are.
+template <class Fill>
+void make_rows(PngImage& image, int height, std::size_t row_bytes, std::size_t slack, Fill&& fill) {
+  image.row_bytes = row_bytes + 1;
+  image.size = image.row_bytes * static_cast<std::size_t>(height);
+  image.rows = std::make_unique_for_overwrite<std::uint8_t[]>(image.size + slack);
+  for (std::size_t row = 0; row < static_cast<std::size_t>(height); ++row) {
+    std::uint8_t* const to = image.rows.get() + row * image.row_bytes;
+    *to = 0;
+    fill(row, to + 1);
+  }
+}
+
+/// Calls use(index) for all pixels from `begin` to `end`.
 /// @return false when there are too many colours
 template <class Use>
-bool for_each_run(Palette& palette, std::span<const Rgba> pixels, Use&& use) {
-  for (std::size_t begin = 0; begin < pixels.size();) {
-    const auto colour = std::bit_cast<std::uint32_t>(pixels[begin]);
-    std::size_t end = begin + 1;
-    while (end < pixels.size() && std::bit_cast<std::uint32_t>(pixels[end]) == colour) ++end;
-    const std::optional<std::uint8_t> index = palette.index(colour);
-    if (!index) return false;
-    use(*index, end - begin);
-    begin = end;
+bool for_each_index(Palette& palette, const Rgba* begin, const Rgba* end, Use&& use) {
+  std::uint32_t last = 0;
+  std::optional<std::uint8_t> index;
+  for (const Rgba* pixel = begin; pixel != end; ++pixel) {
+    const auto colour = std::bit_cast<std::uint32_t>(*pixel);
+    if (!index || colour != last) {
+      index = palette.index(colour);
+      if (!index) return false;
+      last = colour;
+    }
+    use(*index);
   }
   return true;
 }
 
-/// Puts indices of few colours 2, 4 or 8 a byte: the fewer bytes, the less to compress.
-class IndexPacker {
- public:
-  IndexPacker(unsigned bits, std::uint8_t* to) : bits_(bits), to_(to) {}
-  void run(unsigned index, std::size_t length) {
-    for (; length > 0 && filled_ > 0; --length) add(index);
-    const std::size_t bytes = length * bits_ / 8;
-    to_ = std::fill_n(to_, bytes, static_cast<std::uint8_t>(index * (255 / ((1u << bits_) - 1))));
-    for (length -= bytes * 8 / bits_; length > 0; --length) add(index);
-  }
-  void end() {
-    if (filled_ > 0) *to_ = static_cast<std::uint8_t>(byte_ << (8 - filled_));
-  }
-
- private:
-  void add(unsigned index) {
-    byte_ = byte_ << bits_ | index;
-    filled_ += bits_;
-    if (filled_ < 8) return;
-    *to_++ = static_cast<std::uint8_t>(byte_);
-    filled_ = 0;
-  }
-  unsigned bits_, byte_ = 0, filled_ = 0;
-  std::uint8_t* to_;
-};
-
 /// False when there are too many colours.
 bool to_palette(const Picture& picture, PngImage& image) {
   Palette palette;
-  const std::span<const Rgba> pixels = picture.pixels;
-  if (!for_each_run(palette, pixels, [](std::uint8_t, std::size_t) {})) return false;
+  const Rgba* const pixels = picture.pixels.data();
+  if (!for_each_index(palette, pixels, pixels + picture.pixels.size(), [](std::uint8_t) {})) {
+    return false;
+  }
+  // Indices of few colours are put 2, 4 or 8 a byte: the fewer bytes, the less to compress.
   const std::size_t colours = palette.colours().size();
   const unsigned bits = colours <= 2 ? 1 : colours <= 4 ? 2 : colours <= 16 ? 4 : 8;
   const auto columns = static_cast<std::size_t>(picture.width);
   image.colour_type = 3;
   image.bits = static_cast<std::uint8_t>(bits);
-  image.row_bytes = (columns * bits + 7) / 8;
-  // A copy of the palette for each row, since looking for a colour may add it.
-  image.make_row = [palette, pixels, columns, bits](std::size_t row, std::uint8_t* to) {
-    Palette colours_of_row = palette;
-    IndexPacker packer(bits, to);
-    for_each_run(colours_of_row, pixels.subspan(row * columns, columns),
-                 [&](std::uint8_t index, std::size_t n) { packer.run(index, n); });
-    packer.end();
-  };
+  make_rows(image, picture.height, (columns * bits + 7) / 8, 0,
+            [&](std::size_t row, std::uint8_t* to) {
+              unsigned byte = 0, filled = 0;
+              const Rgba* const begin = pixels + row * columns;
+              for_each_index(palette, begin, begin + columns, [&](std::uint8_t index) {
+                byte = byte << bits | index;
+                filled += bits;
+                if (filled < 8) return;
+                *to++ = static_cast<std::uint8_t>(byte);
+                filled = 0;
+              });
+              if (filled > 0) *to = static_cast<std::uint8_t>(byte << (8 - filled));
+            });
   bool opaque = true;
   for (const std::uint32_t colour : palette.colours()) {
     const auto rgba = std::bit_cast<Rgba>(colour);
@@ -134,22 +130,33 @@ PngImage to_png_image(const Picture& picture) {
   const std::size_t channels = alpha == 255 ? 3 : 4;
   const auto columns = static_cast<std::size_t>(picture.width);
   image.colour_type = channels == 3 ? 2 : 6;
-  image.pixel_bytes = channels;
-  image.row_bytes = columns * channels;
-  image.make_row = [&picture, columns, channels](std::size_t row, std::uint8_t* to) {
+  // Each pixel is stored with its alpha, which the next one overwrites.
+  make_rows(image, picture.height, columns * channels, 1, [&](std::size_t row, std::uint8_t* to) {
     const Rgba* const pixels = picture.pixels.data() + row * columns;
-    // All but the last are stored with their alpha, which the next one overwrites.
-    for (std::size_t i = 0; i + 1 < columns; ++i) {
+    for (std::size_t i = 0; i < columns; ++i) {
       std::memcpy(to + i * channels, &pixels[i], sizeof(Rgba));
     }
-    std::memcpy(to + (columns - 1) * channels, &pixels[columns - 1], channels);
-  };
+  });
   return image;
+}
+
+/// Appends a zlib stream of all rows.
+void compress(const PngImage& image, std::vector<std::uint8_t>& out) {
+  struct Free {
+    void operator()(libdeflate_compressor* c) const { libdeflate_free_compressor(c); }
+  };
+  const std::unique_ptr<libdeflate_compressor, Free> compressor(libdeflate_alloc_compressor(1));
+  if (!compressor) throw std::bad_alloc();
+  const std::size_t bound = libdeflate_zlib_compress_bound(compressor.get(), image.size);
+  const auto room = std::make_unique_for_overwrite<std::uint8_t[]>(bound);
+  const std::size_t size =
+      libdeflate_zlib_compress(compressor.get(), image.rows.get(), image.size, room.get(), bound);
+  out.assign(room.get(), room.get() + size);
 }
 
 }  // namespace
 
-std::vector<std::uint8_t> encode_png(const Picture& picture, const Execution& execution) {
+std::vector<std::uint8_t> encode_png(const Picture& picture) {
   const PngImage image = to_png_image(picture);
   std::vector<std::uint8_t> bytes;
   PngChunks png(
@@ -164,13 +171,8 @@ std::vector<std::uint8_t> encode_png(const Picture& picture, const Execution& ex
   if (!image.alpha.empty()) add_chunk("tRNS", image.alpha);
   // A chunk's length has 31 bits.
   constexpr std::size_t kMostBytes = 0x7fffffff;
-  // Nothing is filtered: faces are runs of one colour, which are found as they are.
-  const std::vector<std::uint8_t> data =
-      deflate_rows(static_cast<std::size_t>(picture.height), image.row_bytes + 1, image.pixel_bytes,
-                   execution, [&](std::size_t row, std::uint8_t* to) {
-                     *to = 0;
-                     image.make_row(row, to + 1);
-                   });
+  std::vector<std::uint8_t> data;
+  compress(image, data);
   for (std::size_t at = 0; at < data.size(); at += kMostBytes) {
     add_chunk("IDAT", std::span(data).subspan(at, std::min(kMostBytes, data.size() - at)));
   }
@@ -179,13 +181,8 @@ std::vector<std::uint8_t> encode_png(const Picture& picture, const Execution& ex
 }
 
 Result<void> write_png(const Picture& picture, const std::string& path) {
-  return write_png(picture, path, {});
-}
-
-Result<void> write_png(const Picture& picture, const std::string& path,
-                       const Execution& execution) {
   try {
-    const std::vector<std::uint8_t> bytes = encode_png(picture, execution);
+    const std::vector<std::uint8_t> bytes = encode_png(picture);
     return write_file(path, bytes.data(), bytes.size());
   } catch (const std::bad_alloc&) {
     return fail(ErrorCode::kLimit, "{}: out of memory for a picture of {} x {} pixels", path,

@@ -12,7 +12,6 @@
 #include "apps/session/session.h"
 #include "apps/strata/run_commands.h"
 #include "apps/strata/scene_camera.h"
-#include "picture/encode_png.h"
 #include "strata/csg/input/scene_input.h"
 #include "strata/csg/picture/picture.h"
 #include "strata/picture/animation.h"
@@ -67,9 +66,7 @@ class VoxelRun {
     auto picture = command_.slice ? slice() : view(placed_camera());
     if (!picture) return tl::unexpected(picture.error());
     session_.end_progress();
-    Execution writing;
-    writing.threads = session_.threads();
-    return write_png(*picture, command_.output, writing);
+    return write_png(*picture, command_.output);
   }
 
  private:

@@ -16,7 +16,6 @@
 #include "apps/strata/run_commands.h"
 #include "apps/strata/scene_camera.h"
 #include "csg/measure/result_bounds.h"
-#include "picture/encode_png.h"
 #include "strata/csg/input/scene_input.h"
 #include "strata/csg/picture/picture.h"
 #include "strata/picture/animation.h"
@@ -386,8 +385,7 @@ Result<void> CsgRun::measure() {
 Result<void> CsgRun::write() {
   const double begin = session_.milliseconds();
   if (!command_.output.empty()) {
-    auto done =
-        film_ != nullptr ? film_->add(picture_) : write_png(picture_, command_.output, drawing_);
+    auto done = film_ != nullptr ? film_->add(picture_) : csg::write_png(picture_, command_.output);
     if (!done) return done;
   }
   if (!command_.depth.empty()) {
@@ -395,7 +393,7 @@ Result<void> CsgRun::write() {
   }
   if (!command_.ids.empty()) {
     const csg::Picture ids = picture_of_ids(*surfaces_, preview_->tree(), outcome_);
-    if (auto done = write_png(ids, command_.ids, drawing_); !done) return done;
+    if (auto done = csg::write_png(ids, command_.ids); !done) return done;
   }
   outcome_.write_ms += session_.milliseconds() - begin;
   return {};
