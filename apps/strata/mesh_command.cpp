@@ -263,15 +263,6 @@ Result<void> MeshRun::make_contour() {
   return input->closed ? warn_of_lost_walls(*input, options) : Result<void>();
 }
 
-/// The world's unit, which a 3MF states; the millimetre where it is not known.
-LengthUnit unit_of_output(const csg::SceneInput& input) {
-  const double metres = csg::world_unit(input);
-  for (const auto& [word, unit] : kLengthWords) {
-    if (metres_of(unit) == metres) return unit;
-  }
-  return LengthUnit::kMillimetre;
-}
-
 Result<void> MeshRun::write() {
   if (command_.output.empty()) return {};
   if (outcome_.mesh.triangles.empty()) {

@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "apps/commands/choice_words.h"
 #include "mesh/split_parts.h"
 #include "strata/mesh/colours/surface_colours.h"
 
@@ -130,6 +131,14 @@ Result<csg::FaceParts> face_parts(const csg::Tree& tree, std::span<const InputFa
     }
   }
   return result;
+}
+
+LengthUnit unit_of_output(const csg::SceneInput& input) {
+  const double metres = csg::world_unit(input);
+  for (const auto& [word, unit] : kLengthWords) {
+    if (metres_of(unit) == metres) return unit;
+  }
+  return LengthUnit::kMillimetre;
 }
 
 }  // namespace strata::apps

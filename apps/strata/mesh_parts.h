@@ -17,4 +17,7 @@ Result<csg::FaceParts> face_parts(const csg::Tree& tree, std::span<const csg::In
                                   csg::BoundaryParts parts, Session& session,
                                   const Execution& execution);
 
+/// The world's unit, which a 3MF states; the millimetre where it is not known.
+[[nodiscard]] LengthUnit unit_of_output(const csg::SceneInput& input);
+
 }  // namespace strata::apps

@@ -13,6 +13,7 @@
 #include "apps/commands/csg_options.h"
 #include "apps/session/option_values.h"
 #include "apps/view/scene/camera_control.h"
+#include "apps/view/scene/document.h"
 #include "apps/view/scene/exporter.h"
 #include "apps/view/scene/part_numbers.h"
 #include "core/did_you_mean.h"
@@ -105,7 +106,7 @@ constexpr Rule kRules[] = {
      "hide a solid, given by a part of its name, @index or all"},
     {"show", Action::kShow, Form::kWord, "SOLID", "show a hidden solid again, named as for hide"},
     {"colour", Action::kColour, Form::kColour, "SOLID COLOUR",
-     "colour a solid: #rgb, #rrggbb, #rrggbbaa or none"},
+     "colour a solid: red, #rgb, #rrggbb, #rrggbbaa ... or none"},
     {"pick", Action::kPick, Form::kTwoNumbers, "X Y", "print the solid, triangle and position"},
     {"reload", Action::kReload, Form::kNone, "", "load the files again, and wait"},
     {"cancel", Action::kCancel, Form::kNone, "", "stop loading"},
@@ -120,7 +121,8 @@ constexpr Rule kRules[] = {
      "write what is seen: a mesh, voxels (N along the longest side), folder/ of slices, a picture"},
     {"open", Action::kOpen, Form::kWord, "FILE", "open a file in a tab of its own, and wait"},
     {"tab", Action::kTab, Form::kWord, "WHICH", "show a tab: next, previous or 1, 2, ...; close"},
-    {"undo", Action::kUndo, Form::kNone, "", "undo the last change of camera, section or hiding"},
+    {"undo", Action::kUndo, Form::kNone, "",
+     "undo the last change of camera, section, slice or hiding"},
     {"redo", Action::kRedo, Form::kNone, "", "redo it"},
     {"parameter", Action::kParameter, Form::kParameter, "NAME VALUE",
      "set a parameter of a .scad, and wait"},
@@ -393,8 +395,9 @@ class Line {
   }
   Result<void> check_colour(const std::string& word) const {
     if (word == "none" || parse_colour(word)) return {};
-    return fail(ErrorCode::kUsage,
-                "{}: the colour must be #rgb, #rrggbb, #rrggbbaa or none, got '{}'", where_, word);
+    const auto colour = apps::parse_colour(
+        fmt::format("{}: the colour must be none, #rgb, #rrggbbaa or", where_), word);
+    return tl::unexpected(colour.error());
   }
 
   const Rule& rule_;
@@ -426,6 +429,7 @@ Result<std::vector<ScriptCommand>> parse_script(std::string_view text, const std
     }
     ScriptCommand command;
     command.line = number;
+    command.name = rule->name;
     command.action = rule->action;
     if (auto read = Line(*rule, where, *words).read(command); !read) {
       return tl::unexpected(read.error());

@@ -48,7 +48,7 @@ enum class Action {
   kScheme,     ///< word: a colour scheme
   kHide,       ///< word: which solids
   kShow,
-  kColour,  ///< word: which solids; value: #rrggbb, #rrggbbaa or none
+  kColour,  ///< word: which solids; value: a colour as parse_colour() has it, or none
   kPick,    ///< x y: prints what is there
   kReload,
   kCancel,  ///< the load that is under way
@@ -81,6 +81,7 @@ enum class Action {
 
 struct ScriptCommand {
   int line = 0;
+  std::string_view name;  ///< as scripts have it; lives as long as the program
   Action action = Action::kWait;
   std::vector<double> numbers;
   std::string word, value, more;

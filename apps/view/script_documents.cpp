@@ -8,10 +8,11 @@
 
 namespace strata::view {
 
-bool ScriptRunner::done_loading(const Viewer& viewer) {
+Result<bool> ScriptRunner::done_loading(const Viewer& viewer) {
   if (!viewer.loaded()) return false;
   loads_seen_ = viewer.loads();
-  return true;
+  if (loads_seen_ == loads_before_ || viewer.load_error().empty()) return true;
+  return fail(viewer.load_error_code(), "{}", viewer.load_error());
 }
 
 namespace {

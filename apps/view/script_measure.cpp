@@ -48,10 +48,6 @@ Result<bool> ScriptRunner::measure(const ScriptCommand& command, Viewer& viewer,
   const auto& n = command.numbers;
   const ToolFacts& facts = facts_of(tool_of(command.action));
   MeasureBoard& board = viewer.board();
-  if (viewer.model() != nullptr && viewer.model()->voxels != nullptr) {
-    return fail(ErrorCode::kUsage, "{} measures surfaces, but what is shown is a file of voxels",
-                facts.name);
-  }
   if (!begun_) {
     board.take_up(facts.tool);
     measured_ = board.completed();

@@ -39,6 +39,27 @@ bool looks_at_screen(const ScriptCommand& command) {
   }
 }
 
+/// Whether a command is of surfaces or solids, which voxels have none of.
+bool is_of_surfaces(const ScriptCommand& command) {
+  switch (command.action) {
+    case Action::kGhosts:
+    case Action::kEdges:
+    case Action::kMedia:
+      return command.on;
+    case Action::kHeat:
+    case Action::kOpacity:
+      return command.word != "off";
+    case Action::kHeatRange:
+    case Action::kTechnique:
+    case Action::kHide:
+    case Action::kShow:
+    case Action::kColour:
+      return true;
+    default:
+      return ScriptRunner::measures(command.action);
+  }
+}
+
 /// Whether a command may come while files are read.
 bool runs_while_loading(Action action) {
   return action == Action::kCancel || action == Action::kPrint || action == Action::kQuit ||
@@ -80,6 +101,7 @@ Result<void> ScriptRunner::step(Viewer& viewer, Stage& stage) {
     const ScriptCommand& command = commands_[next_];
     if (!runs_while_loading(command.action) && !viewer.loaded()) return {};
     if (looks_at_screen(command) && !begun_ && (acted_ || !viewer.settled())) return {};
+    if (!begun_) loads_before_ = viewer.loads();
     auto done = run(command, viewer, stage);
     if (!done) {
       Error error = std::move(done.error());
@@ -191,6 +213,11 @@ Result<bool> ScriptRunner::run(const ScriptCommand& command, Viewer& viewer, Sta
     if (!result) return tl::unexpected(result.error());
     return true;
   };
+  if (viewer.shows_voxels() && is_of_surfaces(command)) {
+    return fail(ErrorCode::kUsage,
+                "{} needs the surfaces of a mesh or scene, but what is shown is a file of voxels",
+                command.name);
+  }
   switch (command.action) {
     case Action::kDrag:
       return drag(command, viewer);
@@ -222,8 +249,9 @@ Result<bool> ScriptRunner::run(const ScriptCommand& command, Viewer& viewer, Sta
                               viewer.picked() ? viewer.describe(*viewer.picked()) : "nothing"));
       return true;
     case Action::kReload:
-      if (!begun_) viewer.reload();
-      return begun_ && done_loading(viewer);
+      if (begun_) return done_loading(viewer);
+      viewer.reload();
+      return false;
     case Action::kResize:
       if (!begun_) {
         stage.resize({static_cast<int>(n[0]), static_cast<int>(n[1])});

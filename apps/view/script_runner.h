@@ -50,8 +50,10 @@ class ScriptRunner {
   [[nodiscard]] static bool is_of_document(Action action);
   Result<bool> document(const ScriptCommand& command, Viewer& viewer, Stage& stage);
   Result<bool> export_file(const ScriptCommand& command, Viewer& viewer, Stage& stage);
-  /// @return whether what was to be read is; a change of its files from now on is new
-  bool done_loading(const Viewer& viewer);
+  /// @return whether what was to be read is; a change of its files from now on is new. Why it
+  /// cannot
+  ///   be read
+  Result<bool> done_loading(const Viewer& viewer);
   [[nodiscard]] static bool is_guide(Action action);
   Result<bool> measure(const ScriptCommand& command, Viewer& viewer, Stage& stage);
   Result<bool> guide(const ScriptCommand& command, Viewer& viewer, Stage& stage);
@@ -71,7 +73,8 @@ class ScriptRunner {
   int moves_ = 0;
   std::uint64_t measured_ = 0;  ///< before the command that measures
   Clock::time_point since_{};
-  std::uint64_t loads_seen_ = 1;  ///< loads that were waited for; the first one always is
+  std::uint64_t loads_seen_ = 1;    ///< loads that were waited for; the first one always is
+  std::uint64_t loads_before_ = 0;  ///< that had ended when the command began
 };
 
 /// The numbers of the part as one line of JSON. @pre they have been measured

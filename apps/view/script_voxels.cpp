@@ -9,8 +9,9 @@
 namespace strata::view {
 
 Result<void> ScriptRunner::voxels(const ScriptCommand& command, Viewer& viewer) {
-  if (viewer.model() == nullptr || viewer.model()->voxels == nullptr) {
-    return fail(ErrorCode::kUsage, "what is shown is no file of voxels");
+  if (!viewer.shows_voxels()) {
+    return fail(ErrorCode::kUsage, "{} needs a file of voxels, but what is shown is none",
+                command.name);
   }
   const VoxelScene& scene = *viewer.model()->voxels;
   Looks looks = viewer.looks();
@@ -33,6 +34,7 @@ Result<void> ScriptRunner::voxels(const ScriptCommand& command, Viewer& viewer) 
     if (!slice) return tl::unexpected(slice.error());
     looks.voxels.slice = *slice;
   }
+  viewer.rest();
   viewer.set_looks(std::move(looks));
   return {};
 }

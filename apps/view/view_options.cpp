@@ -83,6 +83,9 @@ void define(CLI::App& app, Words& words, ViewOptions& options) {
   option("--camera", csg.camera,
          "Target x,y,z, rotation rx,ry,rz in degrees and distance; or eye x,y,z and target x,y,z",
          "NUMBERS", look);
+  option("--camera-file", csg.camera_file,
+         "Camera as a file, such as the script's save-camera writes; of several the first", "FILE",
+         look);
   option("--projection", csg.projection, "Perspective or orthographic (default: p)", "p|o", look);
   option("--colorscheme", csg.scheme,
          "Neutral, or one of OpenSCAD's, with its lights (default: Neutral)", "SCHEME", look);
@@ -128,6 +131,21 @@ void define(CLI::App& app, Words& words, ViewOptions& options) {
 std::string footer() {
   return "Keys and mouse:\n" + key_help() + "\nCommands of a script:\n" + script_help() +
          "\n`strata --help` lists the exit codes.";
+}
+
+/// Refuses what voxels do not have.
+Result<void> check_voxel_looks(const Words& words, const ViewOptions& options) {
+  if (words.files.size() != 1 || !is_voxel_file(words.files.front())) return {};
+  for (const auto& [option, given] :
+       {std::pair("--edges", words.csg.edges), std::pair("--ghosts", options.ghosts),
+        std::pair("--heat", options.heat != Heat::kOff),
+        std::pair("--media", !options.media.empty()),
+        std::pair("--expr", !words.csg.expression.empty())}) {
+    if (!given) continue;
+    return fail(ErrorCode::kUsage, "{} needs meshes or scenes, but {} is a file of voxels", option,
+                words.files.front());
+  }
+  return {};
 }
 
 Result<void> read(Words& words, ViewOptions& options) {
@@ -185,6 +203,7 @@ Result<void> read(Words& words, ViewOptions& options) {
   if (empty) command.input.files = {"nothing.csg"};  // and for some input
   if (auto done = apps::read_scene_options(words.csg.scene, command.input); !done) return done;
   if (auto done = apps::read_csg_options(words.csg, command); !done) return done;
+  if (auto done = check_voxel_looks(words, options); !done) return done;
   command.output.clear();
   if (empty) command.input.files.clear();
   if (options.screenshot.empty()) return {};
@@ -259,7 +278,7 @@ Result<void> check_files(ViewOptions& options, const std::vector<ScriptCommand>&
     }
   }
   if (!options.screenshot.empty()) written.push_back({"--screenshot", options.screenshot});
-  std::vector<apps::FileUse> read = apps::inputs_of(options.command.input);
+  std::vector<apps::FileUse> read = apps::inputs_of(options.command);
   if (!options.script.empty()) read.push_back({"--script", options.script});
   if (!options.media.empty()) read.push_back({"--media", options.media});
   options.command.outputs = written;

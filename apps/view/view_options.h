@@ -28,8 +28,10 @@ struct ViewOptions {
   std::string editor;         ///< a command that opens a file at a line; empty: none
   std::string look;           ///< "dark", "light"; empty: the one that was chosen last
   bool default_size = false;  ///< the window's size was not given
-  std::string media;          ///< a file of media; empty: none
-  std::string script;         ///< a file, "-": standard input; empty: none
+  /// A hand will close the window: it opens as large as it was the last time.
+  [[nodiscard]] bool attended() const { return script.empty() && screenshot.empty(); }
+  std::string media;   ///< a file of media; empty: none
+  std::string script;  ///< a file, "-": standard input; empty: none
   std::string
       screenshot;  ///< taken when all is drawn and the script is done; then the window closes
 };

@@ -96,7 +96,8 @@ Result<void> Viewer::start_export(const std::string& path, int resolution) {
   Looks looks = looks_;
   looks.selected.reset();  // its tint is no colour of the scene
   looks.ghosts = false;
-  exporter_.start({arrange(*model_, looks), path, resolution}, options_.command.common.threads);
+  exporter_.start({arrange(*model_, looks), path, resolution, options_.command.input},
+                  options_.command.common.threads);
   exporting_ = true;
   return {};
 }
@@ -344,7 +345,12 @@ void Viewer::zoom_by(double steps, std::optional<glm::dvec2> at) {
 
 void Viewer::set_looks(Looks looks) {
   if (looks == looks_) return;
-  if (looks.hidden != looks_.hidden && camera_set_) history_.rest(state());
+  // A slider's changes are one: the hand rests before and after it.
+  const VoxelLooks &to = looks.voxels, &from = looks_.voxels;
+  const bool other_voxels = to.style != from.style ||
+                            to.slice.has_value() != from.slice.has_value() ||
+                            (to.slice && to.slice->axis != from.slice->axis);
+  if ((looks.hidden != looks_.hidden || other_voxels) && camera_set_) history_.rest(state());
   looks_ = std::move(looks);
   change(true);
 }
@@ -391,7 +397,8 @@ glm::dvec2 Viewer::section_range() const {
 }
 
 std::optional<Viewer::Handle> Viewer::section_handle() const {
-  if (!looks_.section || !model_ || model_->box.empty() || heat_ != Heat::kOff) return {};
+  const bool heated = heat_ != Heat::kOff && !shows_voxels();
+  if (!looks_.section || !model_ || model_->box.empty() || heated) return {};
   const glm::dvec3& n = looks_.section->normal;
   const glm::dvec3 centre = (model_->box.low + model_->box.high) * 0.5;
   const glm::dvec3 foot = centre + n * (looks_.section->offset - glm::dot(n, centre));

@@ -137,6 +137,10 @@ class Viewer {
   bool undo();
   bool redo();
   [[nodiscard]] const ViewHistory& history() const { return history_; }
+  /// The hand rests: undo comes back to what is shown now.
+  void rest() {
+    if (camera_set_) history_.rest(state());
+  }
 
   // Files. Each that is opened here has a tab of its own; those of the command line share one.
   /// Opens files one after the other. A folder becomes the one that the dialog shows.
@@ -200,6 +204,10 @@ class Viewer {
   bool wants_quit = false, wants_screenshot = false;  ///< by keys
   std::string wants_picture;                          ///< a file; empty: none
   [[nodiscard]] const Model* model() const { return model_.get(); }
+  /// A file of voxels is shown, which has no surfaces and no solids.
+  [[nodiscard]] bool shows_voxels() const { return model_ && model_->voxels; }
+  /// What the window is to tell for a moment; empty: nothing.
+  std::string wants_told;
   [[nodiscard]] const ViewOptions& options() const { return options_; }
   [[nodiscard]] const Statistics& statistics() const { return statistics_; }
   void reset_statistics();
@@ -249,7 +257,9 @@ class Viewer {
   void say_all();
   void tick_numbers();
   void first_parameters();
-  [[nodiscard]] ViewState state() const { return {camera_, looks_.section, looks_.hidden}; }
+  [[nodiscard]] ViewState state() const {
+    return {camera_, looks_.section, looks_.hidden, looks_.voxels};
+  }
   void take_state(const ViewState& state);
 
   ViewOptions options_;
@@ -284,6 +294,7 @@ class Viewer {
   bool quiet_cancel_ = false;  ///< of the load that is under way nothing is told
   bool numbers_due_ = false, numbers_wait_ = false;
   std::vector<std::uint8_t> measured_hidden_;
+  std::optional<float> measured_threshold_;
   std::optional<Result<PartNumbers>> numbers_;
   const Material* material_ = materials().data();
   std::optional<Clock::time_point> changed_at_;  ///< the first change not yet asked for

@@ -196,9 +196,11 @@ void Viewer::say_all() {
 
 void Viewer::take_state(const ViewState& state) {
   camera_ = state.camera;
-  const bool rearranged = !(Viewer::state() == ViewState{camera_, state.section, state.hidden});
+  const bool rearranged =
+      !(Viewer::state() == ViewState{camera_, state.section, state.hidden, state.voxels});
   looks_.section = state.section;
   looks_.hidden = state.hidden;
+  looks_.voxels = state.voxels;
   change(rearranged);
 }
 
@@ -302,12 +304,12 @@ Result<void> Viewer::save_parameters(const std::string& file, const std::string&
 // --- numbers and the editor
 // -----------------------------------------------------------------------
 
-/// Hidden solids do not count; a section only looks inside.
+/// Hidden solids do not count; a section only looks inside. Of voxels the threshold decides.
 void Viewer::measure_now() {
   if (!model_) return;
   Looks looks;
-  looks.hidden = looks_.hidden;
-  measured_hidden_ = looks_.hidden;
+  looks.hidden = measured_hidden_ = looks_.hidden;
+  looks.voxels.threshold = measured_threshold_ = looks_.voxels.threshold;
   numbers_due_ = numbers_wait_ = false;
   numbers_.reset();
   measurer_.start(arrange(*model_, looks));
@@ -315,7 +317,9 @@ void Viewer::measure_now() {
 
 void Viewer::tick_numbers() {
   if (auto done = measurer_.take()) numbers_ = *std::move(done);
-  if (model_ && !numbers_due_ && !same_hidden(looks_.hidden, measured_hidden_)) {
+  const bool same = same_hidden(looks_.hidden, measured_hidden_) &&
+                    looks_.voxels.threshold == measured_threshold_;
+  if (model_ && !numbers_due_ && !same) {
     measurer_.cancel();
     numbers_.reset();
     numbers_due_ = true;
@@ -323,6 +327,7 @@ void Viewer::tick_numbers() {
   if (!numbers_due_ || !model_ || !settled()) return;
   numbers_due_ = false;
   measured_hidden_ = looks_.hidden;
+  measured_threshold_ = looks_.voxels.threshold;
   numbers_wait_ = model_->triangles > kMeasuredAtOnce;
   if (!numbers_wait_) measure_now();
 }

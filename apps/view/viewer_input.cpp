@@ -22,6 +22,7 @@ struct Key {
   std::string_view name;
   void (*act)(Viewer&);
   std::string_view what;
+  std::string_view surfaces = {};  ///< what it is about that voxels do not have; empty: nothing
 };
 
 void toggle_heat(Viewer& viewer, Heat heat) {
@@ -106,8 +107,8 @@ constexpr Key kKeys[] = {
      },
      "perspective or orthographic"},
     {"ctrl+1", [](Viewer& v) { v.set_edges(!v.picture_options().edges); },
-     "edges on or off; also e"},
-    {"e", [](Viewer& v) { v.set_edges(!v.picture_options().edges); }, ""},
+     "edges on or off; also e", "edges"},
+    {"e", [](Viewer& v) { v.set_edges(!v.picture_options().edges); }, "", "edges"},
     {"ctrl+2", [](Viewer& v) { v.show_axes = !v.show_axes; }, "axes on or off"},
     {"g",
      [](Viewer& v) {
@@ -115,23 +116,28 @@ constexpr Key kKeys[] = {
        looks.ghosts = !looks.ghosts;
        v.set_looks(std::move(looks));
      },
-     "ghosts of subtracted solids on or off"},
+     "ghosts of subtracted solids on or off", "ghosts"},
     {"s", [](Viewer& v) { v.toggle_section(); }, "section on or off"},
     {"x", [](Viewer& v) { section_across(v, 0); }, "section across x; likewise y and z"},
     {"y", [](Viewer& v) { section_across(v, 1); }, ""},
     {"z", [](Viewer& v) { section_across(v, 2); }, ""},
     {"i", [](Viewer& v) { v.flip_section(); }, "flip the section"},
     {"t", [](Viewer& v) { toggle_heat(v, Heat::kWall); },
-     "heat map of the thickness along the normal"},
+     "heat map of the thickness along the normal", "heat maps"},
     {"shift+t", [](Viewer& v) { toggle_heat(v, Heat::kThickness); },
-     "heat map of the thickness along the ray"},
-    {"d", [](Viewer& v) { toggle_heat(v, Heat::kDepth); }, "heat map of the depth complexity"},
-    {"m", [](Viewer& v) { v.take_up(Tool::kDistance); }, "measure the distance of two picks"},
-    {"a", [](Viewer& v) { v.take_up(Tool::kAngle); }, "measure the angle of two faces"},
+     "heat map of the thickness along the ray", "heat maps"},
+    {"d", [](Viewer& v) { toggle_heat(v, Heat::kDepth); }, "heat map of the depth complexity",
+     "heat maps"},
+    {"m", [](Viewer& v) { v.take_up(Tool::kDistance); }, "measure the distance of two picks",
+     "measuring tools"},
+    {"a", [](Viewer& v) { v.take_up(Tool::kAngle); }, "measure the angle of two faces",
+     "measuring tools"},
     {"r", [](Viewer& v) { v.take_up(Tool::kRadius); },
-     "measure the radius of a cylinder, sphere or circle"},
-    {"w", [](Viewer& v) { v.take_up(Tool::kThickness); }, "measure the thickness of a wall"},
-    {"v", [](Viewer& v) { v.take_up(Tool::kSize); }, "measure size and volume of a solid"},
+     "measure the radius of a cylinder, sphere or circle", "measuring tools"},
+    {"w", [](Viewer& v) { v.take_up(Tool::kThickness); }, "measure the thickness of a wall",
+     "measuring tools"},
+    {"v", [](Viewer& v) { v.take_up(Tool::kSize); }, "measure size and volume of a solid",
+     "measuring tools"},
     {"b", [](Viewer& v) { v.board().box = !v.board().box; }, "box around the result on or off"},
     {"shift+g", [](Viewer& v) { v.board().grid = !v.board().grid; },
      "grid of the plane z = 0 on or off"},
@@ -143,18 +149,19 @@ constexpr Key kKeys[] = {
      [](Viewer& v) {
        if (v.looks().selected) v.set_hidden(*v.looks().selected, true);
      },
-     "hide the picked solid"},
+     "hide the picked solid", "hidden solids"},
     {"shift+h",
      [](Viewer& v) {
        Looks looks = v.looks();
        looks.hidden.clear();
        v.set_looks(std::move(looks));
      },
-     "show all solids"},
+     "show all solids", "hidden solids"},
     {"f5", [](Viewer& v) { v.reload(); }, "load the files again; also F4"},
     {"f4", [](Viewer& v) { v.reload(); }, ""},
     {"tab", [](Viewer& v) { v.show_panels = !v.show_panels; }, "panels on or off"},
-    {"ctrl+z", [](Viewer& v) { v.undo(); }, "undo the last change of camera, section or hiding"},
+    {"ctrl+z", [](Viewer& v) { v.undo(); },
+     "undo the last change of camera, section, slice or hiding"},
     {"ctrl+shift+z", [](Viewer& v) { v.redo(); }, "redo it; also ctrl+y"},
     {"ctrl+y", [](Viewer& v) { v.redo(); }, ""},
     {"ctrl+o",
@@ -270,7 +277,12 @@ void Viewer::scroll(const glm::dvec2& steps, const glm::dvec2& at, bool shift) {
 bool Viewer::key(std::string_view name) {
   for (const Key& key : kKeys) {
     if (key.name != name) continue;
-    key.act(*this);
+    if (shows_voxels() && !key.surfaces.empty()) {
+      wants_told =
+          fmt::format("{}: {} are for meshes and scenes, not for voxels", name, key.surfaces);
+    } else {
+      key.act(*this);
+    }
     return true;
   }
   return false;

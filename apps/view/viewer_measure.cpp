@@ -7,8 +7,7 @@
 namespace strata::view {
 
 void Viewer::take_up(Tool tool) {
-  const bool voxel_file = model_ != nullptr && model_->voxels != nullptr;  // it has no surfaces
-  board_.take_up(voxel_file || board_.tool() == tool ? Tool::kNone : tool);
+  board_.take_up(shows_voxels() || board_.tool() == tool ? Tool::kNone : tool);
 }
 
 void Viewer::measure_at(const glm::ivec2& pixel) {

@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 
 #include "core/atomic_file.h"
 
@@ -14,6 +15,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* kRecent = "recent-files";
 constexpr const char* kLook = "window-look";
+constexpr const char* kSize = "window-size";
 constexpr std::size_t kMostLines = 100;  // of a file that another program has spoilt
 
 std::string folder(const char* variable, const char* below_home) {
@@ -79,6 +81,21 @@ std::string remembered_look(const UserFolders& folders) {
 
 void remember_look(const UserFolders& folders, std::string_view look) {
   write_lines(folders.config, kLook, {std::string(look)});
+}
+
+std::optional<glm::ivec2> remembered_size(const UserFolders& folders) {
+  constexpr int kLeast = 100, kMost = 16384;
+  const auto lines = lines_of(folders.state, kSize);
+  if (lines.empty()) return {};
+  std::istringstream words(lines.front());
+  glm::ivec2 size(0);
+  words >> size.x >> size.y;
+  if (!words || std::min(size.x, size.y) < kLeast || std::max(size.x, size.y) > kMost) return {};
+  return size;
+}
+
+void remember_size(const UserFolders& folders, const glm::ivec2& size) {
+  write_lines(folders.state, kSize, {std::to_string(size.x) + " " + std::to_string(size.y)});
 }
 
 }  // namespace strata::view

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <glm/vec2.hpp>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -28,5 +29,10 @@ void remember_file(const UserFolders& folders, const std::string& path);
 /// The look that was chosen last, a line of a file; empty: none.
 [[nodiscard]] std::string remembered_look(const UserFolders& folders);
 void remember_look(const UserFolders& folders, std::string_view look);
+
+/// The size that the window had when it was closed last, in the window system's units; none: it
+/// was never closed, or the file says no size of a window.
+[[nodiscard]] std::optional<glm::ivec2> remembered_size(const UserFolders& folders);
+void remember_size(const UserFolders& folders, const glm::ivec2& size);
 
 }  // namespace strata::view

@@ -96,11 +96,12 @@ void Panels::keys(Viewer& viewer, const glm::ivec2& window) const {
   ImGui::Begin("Mouse and keys", &stays,
                ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoMove |
                    ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoSavedSettings |
-                   ImGuiWindowFlags_NoFocusOnAppearing);
+                   ImGuiWindowFlags_NoFocusOnAppearing | ImGuiWindowFlags_HorizontalScrollbar);
   const float line = ImGui::GetTextLineHeightWithSpacing();
   const auto fit = static_cast<std::size_t>(std::max(8.0f, screen.y * 0.84f / line));
-  const std::size_t most = screen.x > 1000 * scale_ ? 2 : 1;
-  const std::size_t columns = std::clamp<std::size_t>((all.size() + fit - 1) / fit, most, 3);
+  const auto most = static_cast<std::size_t>(std::clamp(screen.x / (420 * scale_), 1.0f, 3.0f));
+  const std::size_t least = std::min<std::size_t>(screen.x > 1000 * scale_ ? 2 : 1, most);
+  const std::size_t columns = std::clamp((all.size() + fit - 1) / fit, least, most);
   const std::size_t rows = (all.size() + columns - 1) / columns;
   if (ImGui::BeginTable("keys", static_cast<int>(columns) * 2, ImGuiTableFlags_SizingFixedFit)) {
     for (std::size_t r = 0; r < rows; ++r) {

@@ -51,7 +51,8 @@ void Panels::files(Viewer& viewer) {
     hint(what);
     ImGui::SameLine();
   };
-  step("Undo", viewer.history().can_undo(), "ctrl+z", "camera, section and hidden solids; ctrl+z");
+  step("Undo", viewer.history().can_undo(), "ctrl+z",
+       "camera, section, slice and hidden solids; ctrl+z");
   step("Redo", viewer.history().can_redo(), "ctrl+shift+z", "ctrl+shift+z");
   const std::size_t lines = viewer.console().size();
   const std::string label =

@@ -33,7 +33,6 @@ void Panels::status(const Viewer& viewer, const glm::ivec2& window) {
     left += fmt::format("     rotation {:.0f}, {:.0f}, {:.0f}   distance {:.4g}", c.rotation.x,
                         c.rotation.y, c.rotation.z, c.distance);
   }
-  text(left);
   const bool whole = viewer.frame() != nullptr && viewer.frame()->divisor == 1;
   const std::string state = viewer.loading()    ? "loading"
                             : !viewer.settled() ? (whole ? "drawing" : "coarse")
@@ -42,6 +41,8 @@ void Panels::status(const Viewer& viewer, const glm::ivec2& window) {
       viewer.drawn_by().empty() ? std::string() : fmt::format("drawn by {}, ", viewer.drawn_by());
   const std::string right =
       fmt::format("{}{}{}shown by {}", state, state.empty() ? "" : "   ", drawn, gl_renderer_);
+  if (side_width(window) == 0) left = "The panels need a wider window.     " + left;
+  text(left);
   const float width = ImGui::CalcTextSize(right.c_str()).x;
   const float left_end = ImGui::CalcTextSize(left.c_str()).x + 24 * scale_;
   const float begin = static_cast<float>(window.x) - width - 10 * scale_;

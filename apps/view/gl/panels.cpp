@@ -11,6 +11,8 @@ namespace strata::view {
 namespace {
 
 constexpr float kSideWidth = 300;
+/// What is narrower would cut words of buttons: a small window has no side panel.
+constexpr float kLeastSideWidth = 220;
 
 }  // namespace
 
@@ -39,7 +41,8 @@ int Panels::console_height(const Viewer& viewer) const {
 }
 
 float Panels::side_width(const glm::ivec2& window) const {
-  return std::min(kSideWidth * scale_, static_cast<float>(window.x / 2));
+  const float half = static_cast<float>(window.x / 2);
+  return half < kLeastSideWidth * scale_ ? 0 : std::min(kSideWidth * scale_, half);
 }
 
 void Panels::tell(std::string words) {
@@ -60,7 +63,7 @@ void Panels::draw(Viewer& viewer, const glm::ivec2& window, const Area& area) {
     legend(viewer, area);
   }
   if (viewer.show_panels) {
-    side(viewer, window);
+    if (side_width(window) > 0) side(viewer, window);
     status(viewer, window);
     tab_bar(viewer, area);
     console(viewer, area);
@@ -87,7 +90,7 @@ void Panels::side(Viewer& viewer, const glm::ivec2& window) {
   if (!viewer.parameters().empty() && ImGui::CollapsingHeader("Parameters", open)) {
     parameters(viewer);
   }
-  const bool voxel_file = viewer.model() != nullptr && viewer.model()->voxels != nullptr;
+  const bool voxel_file = viewer.shows_voxels();
   if (voxel_file) {
     if (ImGui::CollapsingHeader("Voxels", open)) voxels(viewer);
   } else if (ImGui::CollapsingHeader("Part", open)) {

@@ -62,6 +62,7 @@ class Program final : public Stage {
   Result<void> run() {
     start();
     auto result = loop();
+    keep_size();
     ImGui_ImplOpenGL3_Shutdown();
     ImGui_ImplGlfw_Shutdown();
     ImGui::DestroyContext();
@@ -74,6 +75,19 @@ class Program final : public Stage {
       return tl::unexpected(Error{viewer_->load_error_code(), viewer_->load_error()});
     }
     return {};
+  }
+
+  /// The next window is as large as this one.
+  void keep_size() const {
+    if (!options_.attended()) return;
+    GLFWwindow* glfw = window_->glfw();
+    if (glfwGetWindowAttrib(glfw, GLFW_MAXIMIZED) != 0 ||
+        glfwGetWindowAttrib(glfw, GLFW_ICONIFIED) != 0) {
+      return;
+    }
+    glm::ivec2 size(0);
+    glfwGetWindowSize(glfw, &size.x, &size.y);
+    remember_size(viewer_->folders(), size);
   }
 
   /// A load that does not stop in time is left to the system; it has nothing to put in order.
@@ -163,7 +177,6 @@ class Program final : public Stage {
       lay_out();
       viewer_->tick();
       name_window();
-      tell_load_error();
       if (draw_due()) {
         const auto begin = Clock::now();
         draw(false);
@@ -177,6 +190,7 @@ class Program final : public Stage {
       tell_export();
       const std::size_t before = script_.position();
       if (auto done = script_.step(*viewer_, *this); !done) return done;
+      tell_load_error();
       if (script_.position() != before) touch();
       if (script_.quit()) return {};
       if (finishing() && viewer_->settled() && ++settled_turns_ > 2) {
@@ -205,6 +219,10 @@ class Program final : public Stage {
 
   /// Writes a picture that the panel asked for, and says how an export ended.
   void tell_export() {
+    if (std::string words = std::exchange(viewer_->wants_told, ""); !words.empty()) {
+      panels_->tell(std::move(words));
+      touch();
+    }
     const std::string path = std::exchange(viewer_->wants_picture, "");
     if (!path.empty() && viewer_->frame() != nullptr) {
       const auto done = screenshot(path, true);
@@ -352,6 +370,12 @@ Result<void> run(ViewOptions options) {
   wish.title = title_of("");
   wish.scale_to_monitor = options.default_size;
   wish.width = options.command.size.x, wish.height = options.command.size.y;
+  const auto last =
+      options.default_size && options.attended() ? remembered_size(user_folders()) : std::nullopt;
+  if (last) {
+    wish.scale_to_monitor = false;  // it was scaled then
+    wish.width = last->x, wish.height = last->y;
+  }
   auto window = gl::Window::open(wish);
   if (!window) {
     Error error = std::move(window.error());

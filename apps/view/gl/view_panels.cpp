@@ -43,8 +43,7 @@ void Panels::camera(Viewer& viewer) {
 
 void Panels::look(Viewer& viewer) {
   const float third = share(3);
-  const bool voxel_file = viewer.model() != nullptr && viewer.model()->voxels != nullptr;
-  if (!voxel_file) surfaces(viewer);
+  if (!viewer.shows_voxels()) surfaces(viewer);
   if (toggle("Axes", viewer.show_axes, third)) viewer.show_axes = !viewer.show_axes;
   hint("ctrl+2");
   ImGui::SameLine();

@@ -7,6 +7,7 @@
 #include <map>
 #include <utility>
 
+#include "apps/commands/csg_options.h"
 #include "apps/session/session.h"
 #include "apps/strata/library_session.h"
 #include "csg/measure/result_bounds.h"
@@ -278,26 +279,16 @@ Looks carry_over(const Looks& looks, const Model& before, const Model& after) {
 }
 
 std::optional<glm::vec4> parse_colour(std::string_view text) {
-  if (text.size() == 4 && text[0] == '#') {
-    const std::string twice = {'#', text[1], text[1], text[2], text[2], text[3], text[3]};
-    return parse_colour(twice);
+  int alpha = 255;
+  if (text.size() == 9 && text[0] == '#') {
+    const auto last = apps::parse_colour("", fmt::format("#0000{}", text.substr(7)));
+    if (!last) return {};
+    alpha = last->b;
+    text = text.substr(0, 7);
   }
-  if ((text.size() != 7 && text.size() != 9) || text[0] != '#') return {};
-  glm::vec4 colour(1.0f);
-  for (std::size_t i = 1; i < text.size(); i += 2) {
-    unsigned value = 0;
-    for (std::size_t j = i; j < i + 2; ++j) {
-      const char c = text[j];
-      const int digit = c >= '0' && c <= '9'   ? c - '0'
-                        : c >= 'a' && c <= 'f' ? c - 'a' + 10
-                        : c >= 'A' && c <= 'F' ? c - 'A' + 10
-                                               : -1;
-      if (digit < 0) return {};
-      value = value * 16 + static_cast<unsigned>(digit);
-    }
-    colour[static_cast<int>(i / 2)] = static_cast<float>(value) / 255.0f;
-  }
-  return colour;
+  const auto colour = apps::parse_colour("", text);
+  if (!colour) return {};
+  return glm::vec4(glm::vec3(*colour), alpha) / 255.0f;
 }
 
 }  // namespace strata::view

@@ -74,7 +74,7 @@ Result<std::vector<std::uint32_t>> find_solids(const Model& model, std::string_v
 /// occur more than once by their order. What is not there any more is forgotten.
 [[nodiscard]] Looks carry_over(const Looks& looks, const Model& before, const Model& after);
 
-/// `#rgb`, `#rrggbb` or `#rrggbbaa`.
+/// `#rgb`, `#rrggbb`, `#rrggbbaa` or a name, as apps::parse_colour() has them.
 [[nodiscard]] std::optional<glm::vec4> parse_colour(std::string_view text);
 
 }  // namespace strata::view

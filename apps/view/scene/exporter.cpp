@@ -5,11 +5,16 @@
 #include <filesystem>
 #include <new>
 #include <utility>
+#include <vector>
 
+#include "apps/session/session.h"
+#include "apps/strata/mesh_parts.h"
 #include "core/printable.h"
 #include "csg/measure/result_bounds.h"
 #include "strata/core/file_identity.h"
 #include "strata/csg/boundary/boundary_mesh.h"
+#include "strata/csg/boundary/face_parts.h"
+#include "strata/csg/input/scene_input.h"
 #include "strata/csg/solid_lists.h"
 #include "strata/mesh/writers/write_solid.h"
 #include "strata/voxelize/formats/voxel_writer.h"
@@ -23,6 +28,58 @@ std::string materials_of(const std::string& path) {
   return std::filesystem::path(path).replace_extension(".mtl").string();
 }
 
+/// The input's mesh files alone, to be read with their parts and colours.
+csg::SceneInput mesh_files_of(const csg::SceneInput& input) {
+  csg::SceneInput meshes = input;
+  meshes.attributes = true;
+  meshes.expression.clear();
+  std::erase_if(meshes.files, [&](const std::string& path) {
+    return path == "-" || csg::kind_of(path, input).is_scene;
+  });
+  return meshes;
+}
+
+/// Refuses a file that no longer holds the mesh that is shown.
+Result<void> check_unchanged(const csg::Tree& read, const csg::Tree& shown) {
+  for (const csg::Solid& now : read.solids()) {
+    for (const csg::Solid& then : shown.solids()) {
+      if (!then.mesh || then.name != now.name || then.mesh == now.mesh) continue;
+      if (then.mesh->triangles == now.mesh->triangles &&
+          then.mesh->positions == now.mesh->positions) {
+        continue;
+      }
+      return fail(ErrorCode::kInput, "{}: the file has changed since it was read; load it again",
+                  now.name);
+    }
+  }
+  return {};
+}
+
+/// Parts and colours of the faces that mesh files give, and how the result is divided.
+Result<csg::FaceParts> parts_of_files(const ExportRequest& request, csg::BoundaryOptions& options,
+                                      apps::Session& session, const Execution& execution) {
+  const csg::SceneInput input = mesh_files_of(request.input);
+  if (input.files.empty()) return csg::FaceParts();
+  std::vector<csg::InputFacts> facts;
+  const auto read = csg::load_scene(input, {}, execution, &facts);
+  if (!read) return tl::unexpected(read.error());
+  const csg::Tree& tree = request.what->tree;
+  if (auto same = check_unchanged(read->tree, tree); !same) return tl::unexpected(same.error());
+  const auto any = [&](auto&& is) { return std::any_of(facts.begin(), facts.end(), is); };
+  if (any([](const csg::InputFacts& file) { return file.attributes.parts.size() > 1; })) {
+    options.parts = csg::BoundaryParts::kSolids;
+  } else if (any([](const csg::InputFacts& file) { return file.attributes.coloured(); })) {
+    options.parts = csg::BoundaryParts::kColours;
+  }
+  auto faces = apps::face_parts(tree, facts, options.parts, session, execution);
+  if (!faces) return faces;
+  // A colour that was given here is that of the whole solid.
+  for (std::size_t s = 0; s < faces->of_triangles.size(); ++s) {
+    if (tree.solids()[s].colour) faces->of_triangles[s].clear();
+  }
+  return faces;
+}
+
 Result<std::string> export_mesh(const ExportRequest& request, const Execution& execution) {
   const csg::Tree& tree = request.what->tree;
   const SolidFormat format = solid_format_of(request.path);
@@ -32,23 +89,37 @@ Result<std::string> export_mesh(const ExportRequest& request, const Execution& e
       std::any_of(tree.solids().begin(), tree.solids().end(),
                   [](const csg::Solid& solid) { return solid.colour.has_value(); });
   if (coloured && format != SolidFormat::kStl) options.parts = csg::BoundaryParts::kColours;
-  auto made = csg::boundary_mesh(tree, tree.root(), options, execution);
+  Execution quiet = execution;
+  quiet.progress = {};
+  apps::Session session(apps::Session::Clock::now(), quiet);
+  csg::FaceParts faces;
+  if (format != SolidFormat::kStl) {
+    auto of_files = parts_of_files(request, options, session, quiet);
+    if (!of_files) return tl::unexpected(of_files.error());
+    faces = *std::move(of_files);
+  }
+  auto made = csg::boundary_mesh(tree, tree.root(), options, faces, execution);
   if (!made) return tl::unexpected(made.error());
   if (made->mesh.triangles.empty()) {
     return fail(ErrorCode::kGeometry, "{}: nothing is left to write", request.path);
   }
   SolidWriteOptions writing;
   writing.format = format;
-  if (coloured && format == SolidFormat::kObj) writing.materials = materials_of(request.path);
-  Execution quiet = execution;
-  quiet.progress = {};
+  writing.unit = apps::unit_of_output(request.input);
+  const bool in_colours = std::any_of(made->mesh.parts.begin(), made->mesh.parts.end(),
+                                      [](const MeshPart& part) { return part.colour.has_value(); });
+  if (in_colours && format == SolidFormat::kObj) writing.materials = materials_of(request.path);
   auto written = write_solid(request.path, made->mesh, writing, quiet);
   if (!written) return tl::unexpected(written.error());
   std::string told =
       fmt::format("{}: {}", request.path, counted(made->mesh.triangles.size(), "triangle"));
+  if (options.parts == csg::BoundaryParts::kSolids) {
+    told += ", " + counted(made->mesh.parts.size(), "part");
+  }
   if (!made->report.caps.empty()) {
     told += fmt::format(", {} closed", counted(made->report.caps.size(), "hole"));
   }
+  for (const apps::Warning& warning : session.warnings()) told += "; " + warning.message;
   return told;
 }
 

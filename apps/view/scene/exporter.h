@@ -34,11 +34,14 @@ struct ExportRequest {
   std::shared_ptr<const Arrangement> what;
   std::string path;
   int resolution = kExportVoxels;  ///< of voxels
+  /// What was read: its mesh files are read again for their parts and colours. No files: none.
+  csg::SceneInput input = {};
 };
 
 /// Writes the result of the arrangement's tree, without ghosts: its exact boundary with the
-/// solids' colours, or its voxels. @return a sentence: "part.3mf: 32 triangles"; kUsage (a
-/// picture), and as boundary_mesh(), voxelize() and the writers
+/// solids' colours and the parts of mesh files, or its voxels. @return a sentence: "part.3mf: 32
+/// triangles"; kUsage (a picture); kInput: a mesh file has changed; and as boundary_mesh(),
+/// voxelize() and the writers
 Result<std::string> export_what_is_seen(const ExportRequest& request, const Execution& execution);
 
 /// Exports on a thread of its own, one file at a time.

@@ -40,7 +40,8 @@ Result<PartNumbers> measure_part(const Arrangement& what, const Execution& execu
     numbers.voxels = set->solid_voxels();
     numbers.empty = numbers.voxels == 0;
     numbers.volume = static_cast<double>(numbers.voxels) * side.x * side.y * side.z;
-    if (!numbers.empty) numbers.size = what.voxels->box().high - what.voxels->box().low;
+    const Bounds box = solid_box(*set);
+    if (!numbers.empty) numbers.size = box.high - box.low;
     return numbers;
   }
   const auto measured = csg::exact_measures(what.tree, what.tree.root(), {}, execution);

@@ -5,16 +5,19 @@
 #include <utility>
 #include <vector>
 
+#include "apps/view/voxels/voxel_scene.h"
 #include "strata/csg/input/scene_input.h"
 #include "strata/raster/view.h"
 
 namespace strata::view {
 
-/// What undo brings back: from where a scene is seen, its section, and what is hidden.
+/// What undo brings back: from where a scene is seen, its section, what is hidden, and how voxels
+/// are looked at.
 struct ViewState {
   Camera camera;
   std::optional<csg::SectionPlane> section;
   std::vector<std::uint8_t> hidden;
+  VoxelLooks voxels = {};
   friend bool operator==(const ViewState& a, const ViewState& b) {
     const auto same_section = [&] {
       if (!a.section || !b.section) return a.section.has_value() == b.section.has_value();
@@ -22,7 +25,7 @@ struct ViewState {
     };
     return a.camera.target == b.camera.target && a.camera.rotation == b.camera.rotation &&
            a.camera.distance == b.camera.distance && a.camera.projection == b.camera.projection &&
-           a.hidden == b.hidden && same_section();
+           a.hidden == b.hidden && a.voxels == b.voxels && same_section();
   }
 };
 

@@ -49,6 +49,7 @@ Result<void> VoxelRenderer::prepare(const FrameRequest& request, const Execution
   auto made = VoxelPicture::create(scene_->solid(threshold, whole), std::move(look), whole);
   if (!made) return tl::unexpected(made.error());
   picture_.emplace(*std::move(made));
+  box_ = solid_box(picture_->set());
   return {};
 }
 
@@ -59,10 +60,10 @@ Result<Frame> VoxelRenderer::draw(const FrameRequest& request, const Execution& 
   frame.wanted = request.size;
   frame.samples = request.look.samples;
   frame.drawn_by = "CPU, voxels";
-  frame.box = scene_ == request.what->voxels ? scene_->box() : request.what->voxels->box();
   const auto begin = Clock::now();
   if (auto done = prepare(request, execution); !done) return tl::unexpected(done.error());
   frame.prepare_ms = ms_since(begin);
+  frame.box = box_;
   const auto prepared = Clock::now();
   const auto& slice = request.what->voxel_looks.slice;
   auto picture = slice

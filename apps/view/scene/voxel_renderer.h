@@ -21,6 +21,7 @@ class VoxelRenderer {
   std::shared_ptr<const VoxelScene> scene_;
   std::optional<float> threshold_;
   std::optional<VoxelPicture> picture_;
+  Bounds box_;  ///< of the solid voxels
 };
 
 }  // namespace strata::view

@@ -8,9 +8,7 @@
 #include "voxelize/volume/voxel_facts.h"
 
 namespace strata::view {
-namespace {
-
-Bounds box_of(const VoxelIntervals& set) {
+Bounds solid_box(const VoxelIntervals& set) {
   Bounds box;
   const VoxelGrid& grid = set.grid();
   for_each_run(set, [&](const glm::ivec3& first, const glm::ivec3& last, std::uint32_t) {
@@ -22,8 +20,6 @@ Bounds box_of(const VoxelIntervals& set) {
   box.include(grid.origin + glm::dvec3(grid.dims) * grid.voxel_size);
   return box;
 }
-
-}  // namespace
 
 std::optional<VoxelStyle> find_voxel_style(std::string_view name) {
   constexpr std::pair<std::string_view, VoxelStyle> kStyles[] = {{"auto", VoxelStyle::kAuto},
@@ -43,7 +39,7 @@ Result<std::shared_ptr<const VoxelScene>> VoxelScene::load(const std::string& pa
   auto scene = std::make_shared<VoxelScene>();
   if (!volume->values.empty()) scene->range_ = volume->values.range();
   scene->facts_ = voxel_facts(*volume);
-  scene->box_ = box_of(volume->set);
+  scene->box_ = solid_box(volume->set);
   scene->volume_ = std::make_shared<const VoxelVolume>(*std::move(volume));
   return scene;
 }

@@ -34,6 +34,9 @@ struct VoxelLooks {
 /// `auto`, `blocks`, `smooth`, `xray`.
 [[nodiscard]] std::optional<VoxelStyle> find_voxel_style(std::string_view name);
 
+/// Around the solid voxels; around the grid if there are none.
+[[nodiscard]] Bounds solid_box(const VoxelIntervals& set);
+
 /// A file of voxels as it was read. Does not change; any thread may look at it.
 class VoxelScene {
  public:

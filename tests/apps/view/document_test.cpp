@@ -153,10 +153,13 @@ TEST(CarryOver, LooksStayWithTheirSolids) {
   EXPECT_FALSE(forgotten.selected);
 }
 
-TEST(Colours, OnlyHexadecimalOnesAreRead) {
+TEST(Colours, HexadecimalOnesAndNamesAreRead) {
+  EXPECT_EQ(*parse_colour("#f00"), glm::vec4(1, 0, 0, 1));
+  EXPECT_EQ(*parse_colour("red"), glm::vec4(1, 0, 0, 1));
   EXPECT_EQ(*parse_colour("#000000"), glm::vec4(0, 0, 0, 1));
   EXPECT_EQ(*parse_colour("#FFffFF00"), glm::vec4(1, 1, 1, 0));
-  for (const char* bad : {"", "#", "red", "#12345", "#1234567", "#gg0000"}) {
+  for (const char* bad :
+       {"", "#", "reddish", "#1234567z", "#1234567890", "#12345", "#1234567", "#gg0000"}) {
     EXPECT_FALSE(parse_colour(bad)) << bad;
   }
 }

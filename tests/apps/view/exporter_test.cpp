@@ -59,6 +59,46 @@ TEST_F(Export, AMeshIsTheSceneWithoutHiddenSolidsAndCutByTheSection) {
   EXPECT_NE(folder_.read("low.mtl").find("newmtl "), std::string::npos);
 }
 
+/// Two boxes, parts of an OBJ, one of them red.
+constexpr const char* kParts =
+    "mtllib two.mtl\n"
+    "v 0 0 0\nv 2 0 0\nv 0 2 0\nv 0 0 2\nv 9 0 0\nv 11 0 0\nv 9 2 0\nv 9 0 2\n"
+    "o left\nusemtl red\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
+    "o right\nf 5 7 6\nf 5 6 8\nf 6 7 8\nf 5 8 7\n";
+
+TEST_F(Export, MeshFilesKeepTheirPartsAndColours) {
+  const std::string path = folder_.write("two.obj", kParts);
+  folder_.write("two.mtl", "newmtl red\nKd 1 0 0\n");
+  csg::SceneInput input;
+  input.files = {path};
+  auto scene = csg::load_scene(input);
+  ASSERT_TRUE(scene) << scene.error().message;
+  model_ = {};
+  model_.scene = *std::move(scene);
+  ExportRequest request{arrange(model_, {}), folder_.file("out.obj"), 16, input};
+  const auto told = export_what_is_seen(request, {});
+  ASSERT_TRUE(told) << told.error().message;
+  EXPECT_EQ(told->find(folder_.file("out.obj") + ": 8 triangles, 2 parts"), 0u) << *told;
+  const std::string obj = folder_.read("out.obj");
+  EXPECT_NE(obj.find("left\n"), std::string::npos) << obj;
+  EXPECT_NE(obj.find("right\n"), std::string::npos) << obj;
+  EXPECT_NE(folder_.read("out.mtl").find("Kd 1 0 0"), std::string::npos);
+  // A colour that was given in the window is that of the whole solid.
+  Looks looks;
+  looks.colours.emplace(0, glm::vec4(0, 0, 1, 1));
+  request.what = arrange(model_, looks);
+  ASSERT_TRUE(export_what_is_seen(request, {}));
+  EXPECT_EQ(folder_.read("out.mtl").find("Kd 1 0 0"), std::string::npos);
+  EXPECT_NE(folder_.read("out.mtl").find("Kd 0 0 1"), std::string::npos);
+  // The file is another one by now.
+  folder_.write("two.obj", std::string(kParts) + "v 0 0 3\n");
+  request.what = arrange(model_, {});
+  const auto changed = export_what_is_seen(request, {});
+  ASSERT_FALSE(changed);
+  EXPECT_EQ(changed.error().code, ErrorCode::kInput);
+  EXPECT_NE(changed.error().message.find("has changed since it was read"), std::string::npos);
+}
+
 TEST_F(Export, VoxelsAreThoseOfTheGridAroundTheResult) {
   Looks looks;
   looks.hidden = {0, 0, 1};

@@ -75,8 +75,14 @@ TEST(Script, MistakesNameFileAndLine) {
   EXPECT_EQ(error_of("zoom 1 2"), "drive.txt:1: usage: zoom STEPS [X Y]");
   EXPECT_EQ(error_of("resize 0 5"),
             "drive.txt:1: the window must be 1 to 16384 pixels wide and high, got 0 x 5");
-  EXPECT_EQ(error_of("colour @1 red"),
-            "drive.txt:1: the colour must be #rgb, #rrggbb, #rrggbbaa or none, got 'red'");
+  for (const char* colour : {"#f00", "red", "#ff0000", "#ff000080", "none"}) {
+    EXPECT_EQ(error_of(std::string("colour solid ") + colour), "none") << colour;
+  }
+  EXPECT_EQ(error_of("colour @1 reddish")
+                .find("drive.txt:1: the colour must be none, #rgb, #rrggbbaa or a colour, got "
+                      "'reddish'; a colour is #rrggbb or one of black"),
+            0u)
+      << error_of("colour @1 reddish");
   EXPECT_NE(error_of("view sideways").find("drive.txt:1: unknown view 'sideways'"),
             std::string::npos);
   EXPECT_NE(error_of("section q=1").find("drive.txt:1: "), std::string::npos);

@@ -134,6 +134,19 @@ TEST_F(UserFilesTest, TheLastTenFilesThatAreThereAreRecent) {
   EXPECT_EQ(recent.size(), 9u);  // each once, and none that is gone
 }
 
+TEST_F(UserFilesTest, TheSizeOfTheWindowIsRemembered) {
+  EXPECT_FALSE(remembered_size(folders_));
+  remember_size(folders_, {900, 700});
+  remember_size(folders_, {1500, 900});
+  EXPECT_EQ(remembered_size(folders_), glm::ivec2(1500, 900));
+  remember_size({}, {900, 700});
+  EXPECT_FALSE(remembered_size({}));
+  for (const char* spoilt : {"", "1500", "0 900", "wide 900", "99999 900"}) {
+    std::ofstream(folders_.state + "/window-size") << spoilt;
+    EXPECT_FALSE(remembered_size(folders_)) << spoilt;
+  }
+}
+
 TEST_F(UserFilesTest, TheLookIsRemembered) {
   EXPECT_EQ(remembered_look(folders_), "");
   remember_look(folders_, "light");

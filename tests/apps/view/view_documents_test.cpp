@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -86,26 +87,52 @@ TEST_F(Documents, FilesAreOpenedAsTabsThatKeepTheirViews) {
   EXPECT_EQ(empty("open part.csg\ntab 3\n").exit_code, 2);
 }
 
-TEST_F(Documents, ABadFileLeavesTheLastOneShown) {
+TEST_F(Documents, ABadFileEndsTheScriptThatOpensIt) {
   place_.write("bad.csg", "cube(size = [1, 1);\n");
+  place_.write("broken.vdb", "no vdb");
+  for (const auto& [name, why] :
+       {std::pair("bad.csg", "bad.csg:1:"), std::pair("broken.vdb", "broken.vdb: byte 0"),
+        std::pair("none.stl", "none.stl: ")}) {
+    const RunResult run = view(std::string("open ") + name + "\nprint still here\nquit\n",
+                               {"--no-panels", "--size", "400,300"});
+    EXPECT_EQ(run.exit_code, 3) << name;
+    EXPECT_EQ(run.out, "") << name;
+    const std::size_t first = run.err.find(why);
+    EXPECT_NE(run.err.find(std::string("drive.txt:1: ") + why), std::string::npos) << run.err;
+    EXPECT_EQ(run.err.find(why, first + 1), std::string::npos) << run.err;  // once
+  }
+  const RunResult run = view("print ready\nwait 0.5\nreload\nprint still here\n",
+                             {"--no-panels", "--size", "400,300"},
+                             [this](int) { place_.write("part.csg", "cube(size = [1, 1);\n"); });
+  EXPECT_EQ(run.exit_code, 3) << run.err;
+  EXPECT_EQ(run.out.find("still here"), std::string::npos) << run.out;
+}
+
+TEST_F(Documents, TheCameraComesFromAFile) {
+  place_.write("eye.txt", "target 1 2 0\nrotation 70 0 200\ndistance 60\n");
   const RunResult run = view(
-      "axes off\npicture before.png\nopen bad.csg\npicture after.png\nscreenshot error.png\n"
-      "messages\nstats\nexport kept.npy 10\nopen part.csg\nstats\nquit\n",
-      {"--no-panels", "--size", "400,300"});
+      "axes off\npicture from.png\ncamera 1,2,0,70,0,200,60\npicture set.png\n"
+      "quit\n",
+      {"--no-panels", "--size", "400,300", "--camera-file", "eye.txt"});
   ASSERT_EQ(run.exit_code, 0) << run.err;
-  const Image before = image_of(place_, "before.png");
-  EXPECT_EQ(before, image_of(place_, "after.png"));
-  EXPECT_GT(different(before, image_of(place_, "error.png"), 400, 300), 500);
-  EXPECT_EQ(run.out.find("bad.csg:1:"), 0u) << run.out;
-  EXPECT_NE(member(run.out, "error"), "\"\"");
-  EXPECT_EQ(member(run.out, "error", run.out.rfind("renderer")), "\"\"");
-  EXPECT_NE(run.err.find("bad.csg:1:"), std::string::npos);
+  EXPECT_EQ(image_of(place_, "from.png"), image_of(place_, "set.png"));
+  EXPECT_EQ(image_of(place_, "from.png"), csg({"--size", "400,300", "--camera-file=eye.txt"}));
+  EXPECT_EQ(view("quit\n", {"--camera-file", "none.txt"}).exit_code, 2);
+}
+
+TEST_F(Documents, UnattendedWindowsHaveTheirOwnSize) {
+  std::filesystem::create_directories(place_.path("state/strata"));
+  place_.write("state/strata/window-size", "700 500\n");
+  const RunResult run = view("screenshot all.png\nquit\n");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(image_of(place_, "all.png").width, 1280);
+  EXPECT_EQ(place_.read("state/strata/window-size"), "700 500\n");
 }
 
 TEST_F(Documents, RecentFilesAreRemembered) {
   place_.write("other.csg", "sphere($fn = 40, r = 7);\n");
-  ASSERT_EQ(empty("open part.csg\nopen other.csg\nopen no.csg\nopen part.csg\nquit\n").exit_code,
-            0);
+  ASSERT_EQ(empty("open part.csg\nopen other.csg\nopen part.csg\nquit\n").exit_code, 0);
+  ASSERT_EQ(empty("open no.csg\n").exit_code, 3);
   const std::string list = place_.read("state/strata/recent-files");
   const std::size_t other = list.find("other.csg"), part = list.find("part.csg");
   ASSERT_NE(other, std::string::npos) << list;

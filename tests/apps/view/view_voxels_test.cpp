@@ -65,16 +65,78 @@ TEST_F(Voxels, MistakesSayWhatMustBe) {
   EXPECT_EQ(run.exit_code, 2);
   EXPECT_NE(run.err.find("these voxels have no values, but are mask"), std::string::npos)
       << run.err;
-  run = window("l.vdb", "distance 300 300 310 310\n");
-  EXPECT_EQ(run.exit_code, 2);
-  EXPECT_NE(run.err.find("distance measures surfaces"), std::string::npos) << run.err;
   run = window("part.csg", "slice k=1\n");
   EXPECT_EQ(run.exit_code, 2);
-  EXPECT_NE(run.err.find("no file of voxels"), std::string::npos) << run.err;
+  EXPECT_NE(run.err.find("drive.txt:1: slice needs a file of voxels"), std::string::npos)
+      << run.err;
   place_.write("broken.vdb", "no vdb");
   run = window("broken.vdb", "picture a.png\n");
   EXPECT_NE(run.exit_code, 0);
   EXPECT_NE(run.err.find("broken.vdb: byte 0"), std::string::npos) << run.err;
+}
+
+TEST_F(Voxels, WhatNeedsSurfacesIsRefused) {
+  for (const std::string command : {"distance 300 300 310 310", "size 300 300", "edges on",
+                                    "heat wall", "opacity 0.5", "colour all red"}) {
+    const RunResult run = window("l.vdb", command + "\n");
+    EXPECT_EQ(run.exit_code, 2) << command;
+    const std::string name = command.substr(0, command.find(' '));
+    EXPECT_NE(run.err.find("drive.txt:1: " + name +
+                           " needs the surfaces of a mesh or scene, but "
+                           "what is shown is a file of voxels"),
+              std::string::npos)
+        << run.err;
+  }
+  // Keys tell, and what is off may be turned off.
+  const RunResult told = window("l.vdb",
+                                "edges off\nghosts off\nheat off\nopacity off\naxes off\n"
+                                "screenshot quiet.png\nkey t\nwait 0.3\nscreenshot told.png\n");
+  ASSERT_EQ(told.exit_code, 0) << told.err;
+  EXPECT_GT(different(image_of(place_, "quiet.png"), image_of(place_, "told.png"), 600, 600), 500);
+  for (const char* option : {"--edges", "--ghosts", "--heat=wall"}) {
+    const RunResult run = place_.run({"view", "l.vdb", option, "--screenshot", "a.png"}, options());
+    EXPECT_EQ(run.exit_code, 2) << option;
+    EXPECT_NE(run.err.find("needs meshes or scenes, but l.vdb is a file of voxels"),
+              std::string::npos)
+        << run.err;
+  }
+}
+
+TEST_F(Voxels, SlicesAreUndone) {
+  const RunResult run =
+      window("l.vdb",
+             "axes off\npicture a.png\nslice k=5\npicture b.png\nslice k=15\npicture c.png\n"
+             "voxels xray\npicture d.png\nundo\npicture c2.png\nundo\npicture b2.png\nundo\n"
+             "picture a2.png\nredo\nredo\nredo\npicture d2.png\n");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  for (const std::string one : {"a", "b", "c", "d"}) {
+    EXPECT_EQ(image_of(place_, one + ".png"), image_of(place_, one + "2.png")) << one;
+  }
+  EXPECT_NE(image_of(place_, "b.png"), image_of(place_, "c.png"));
+}
+
+TEST_F(Voxels, NumbersAreThoseOfTheThreshold) {
+  RunResult run = window("l.vdb", "numbers\n");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_NE(run.out.find("\"size_x\": 20"), std::string::npos) << run.out;
+  EXPECT_NE(run.out.find("\"volume\": 2500"), std::string::npos) << run.out;
+  EXPECT_NE(run.out.find("\"voxels\": 2500"), std::string::npos) << run.out;
+  // Values 0.25 to 3.25 along x: as many columns of 2 x 2 voxels are above a threshold.
+  std::string bytes;
+  for (int i = 0; i < 16; ++i) {
+    const float value = static_cast<float>(i % 4) + 0.25f;
+    bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
+  }
+  place_.write("v.nrrd",
+               "NRRD0004\ntype: float\nendian: little\ndimension: 3\nsizes: 4 2 2\n"
+               "encoding: raw\n\n" +
+                   bytes);
+  run = window("v.nrrd", "threshold 0.5\nnumbers\nthreshold 2.5\nbox on\nnumbers\n");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_NE(run.out.find("\"voxels\": 12"), std::string::npos) << run.out;
+  EXPECT_NE(run.out.find("\"voxels\": 4"), std::string::npos) << run.out;
+  EXPECT_NE(run.out.find("\"size_x\": 1,"), std::string::npos) << run.out;
+  EXPECT_NE(run.out.find("box: 1 x 2 x 2"), std::string::npos) << run.out;
 }
 
 TEST_F(Voxels, AreExportedInAnotherFormatAndThresholdsDecide) {

@@ -187,6 +187,18 @@ TEST_F(Window, ResizesAndClosesOnScreenshot) {
   EXPECT_EQ(last.height, 444);
 }
 
+TEST_F(Window, ASmallWindowShowsThePictureInPlaceOfCutPanels) {
+  const RunResult run = view(
+      "axes off\nresize 900 500\npicture large.png\nresize 300 200\npicture small.png\n"
+      "screenshot all.png\nresize 460 300\npicture half.png\nquit\n",
+      {"--size", "300,200"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(image_of(place_, "large.png").width, 600);  // beside the panel
+  EXPECT_EQ(image_of(place_, "small.png").width, 300);
+  EXPECT_EQ(image_of(place_, "all.png").width, 300);
+  EXPECT_EQ(image_of(place_, "half.png").width, 230);
+}
+
 TEST_F(Window, WatchesFilesAndKeepsTheCamera) {
   const RunResult run = view(
       "axes off\ncamera 1,2,0,70,0,200,60\npicture before.png\n"
