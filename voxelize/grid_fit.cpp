@@ -64,12 +64,6 @@ Result<glm::dvec3> voxel_size_for(const Bounds& box, const GridRequest& request)
                 longest);
   }
   if (request.resolution) {
-    if (*request.resolution + 2 * request.padding > kMaxGridSide) {
-      return fail(
-          ErrorCode::kLimit,
-          "a resolution of {} voxels with a padding of {} exceeds the limit of {} along a side",
-          *request.resolution, request.padding, kMaxGridSide);
-    }
     return glm::dvec3(longest / static_cast<double>(*request.resolution));
   }
   if (request.cubic) {
@@ -161,6 +155,12 @@ Result<void> check_grid_request(const GridRequest& request) {
     return fail(ErrorCode::kLimit,
                 "a padding of {} voxels is too large: a grid has at most {} along a side",
                 request.padding, kMaxGridSide);
+  }
+  if (request.resolution && *request.resolution > kMaxGridSide - 2 * request.padding) {
+    return fail(
+        ErrorCode::kLimit,
+        "a resolution of {} voxels with a padding of {} exceeds the limit of {} along a side",
+        *request.resolution, request.padding, kMaxGridSide);
   }
   if (request.cubic) {
     if (auto valid = check_cubic(request); !valid) return valid;

@@ -132,13 +132,15 @@ void read_contour(const Words& words, MeshCommand& command, Reader& reader) {
     return;
   }
   if (!words.resolution.empty()) {
-    return reader.take(parse_integer("--resolution", words.resolution), command.grid.resolution);
+    reader.take(parse_integer("--resolution", words.resolution), command.grid.resolution);
+    return refuse_impossible(command.grid, reader);
   }
   std::vector<double> numbers;
   reader.take(parse_numbers("--voxel-size", words.voxel_size, 1, 3), numbers);
   if (reader.error()) return;
   numbers.resize(3, numbers[0]);
   command.grid.voxel_size = glm::dvec3(numbers[0], numbers[1], numbers[2]);
+  refuse_impossible(command.grid, reader);
 }
 
 }  // namespace

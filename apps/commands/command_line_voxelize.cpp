@@ -140,10 +140,13 @@ GridRequest grid_request(const Words& words, Reader& reader) {
     reader.take(parse_integer("--padding", words.padding), grid.padding);
   }
   grid.align = words.align;
-  // Limits are no mistakes of the command line, and have another exit code.
+  refuse_impossible(grid, reader);
+  return grid;
+}
+
+void refuse_impossible(const GridRequest& grid, Reader& reader) {
   const auto valid = check_grid_request(grid);
   if (!valid && valid.error().code == ErrorCode::kUsage) reader.fail_with(valid.error().message);
-  return grid;
 }
 
 void define_voxelize(CLI::App& app, Words& words) {

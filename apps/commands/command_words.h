@@ -176,6 +176,9 @@ void define_voxelize(CLI::App& app, Words& words);
 VoxelizeCommand voxelize_command(const Words& words, Reader& reader);
 void add_grid(CLI::App& app, Words& words);
 GridRequest grid_request(const Words& words, Reader& reader);
+/// Refuses what no grid can be. Limits are no mistakes of the command line, and have another exit
+/// code: fit_input_grid() tells them.
+void refuse_impossible(const GridRequest& grid, Reader& reader);
 
 // command_line_mesh.cpp: `strata mesh`
 void define_mesh(CLI::App& app, Words& words);

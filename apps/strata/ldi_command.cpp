@@ -27,10 +27,8 @@ Result<void> run_ldi(const LdiCommand& command, Session& session) {
       csg::load_solids(command.input, false, messages_of(session), session.execution("reading"));
   if (!input) return tl::unexpected(input.error());
   if (auto strict = session.check_strict(); !strict) return strict;
-  const auto grid = fit_grid(input->bounds, command.grid);
-  if (!grid) {
-    return fail(grid.error().code, "{}: {}", command.input.files.front(), grid.error().message);
-  }
+  const auto grid = fit_input_grid(input->bounds, command.grid, command.input.files.front());
+  if (!grid) return tl::unexpected(grid.error());
 
   const Execution execution = session.execution("depth lists", 0.8);
   if (auto done = input->fit(*grid, execution); !done) return done;

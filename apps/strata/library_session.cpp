@@ -33,4 +33,12 @@ Result<std::unique_ptr<csg::Gpu>> open_gpu(Backend backend, Session& session) {
 #endif
 }
 
+Result<VoxelGrid> fit_input_grid(const Bounds& box, const GridRequest& request,
+                                 const std::string& file) {
+  if (auto valid = check_grid_request(request); !valid) return tl::unexpected(valid.error());
+  auto grid = fit_grid(box, request);
+  if (!grid) return fail(grid.error().code, "{}: {}", file, grid.error().message);
+  return grid;
+}
+
 }  // namespace strata::apps

@@ -236,10 +236,8 @@ Result<void> MeshRun::make_contour() {
   outcome_.triangles = input->soup.triangles.size();
   outcome_.solids = input->scene ? input->scene->solids().size() : input->files.size();
   outcome_.nodes = input->scene ? input->scene->nodes().size() : outcome_.solids;
-  const auto grid = fit_grid(input->bounds, command_.grid);
-  if (!grid) {
-    return fail(grid.error().code, "{}: {}", command_.input.files.front(), grid.error().message);
-  }
+  const auto grid = fit_input_grid(input->bounds, command_.grid, command_.input.files.front());
+  if (!grid) return tl::unexpected(grid.error());
   outcome_.grid = *grid;
   if (auto fitted = input->fit(*grid, session_.execution("fitting", 0.1)); !fitted) return fitted;
   ContourOptions options;

@@ -34,7 +34,7 @@ class BoxCount {
         along_(along),
         reach_(reach),
         boxes_((grid.dims + side - 1) / side) {
-    constexpr double kMostMarks = 1 << 27;  // 16 MiB
+    constexpr double kMostMarks = 1 << 29;  // 64 MiB
     const double all = static_cast<double>(boxes_.x) * boxes_.y * boxes_.z;
     if (along == 3 && all <= kMostMarks) marks_.resize(static_cast<std::size_t>(all));
   }
@@ -52,6 +52,22 @@ class BoxCount {
                    place(soup.positions[t.z]), cuts);
     }
     return boxes;
+  }
+
+  /// How many groups of neighbours along an axis the boxes are, at most. @pre they are counted
+  [[nodiscard]] double groups(Axis axis, double counted) const {
+    if (marks_.empty()) return counted;
+    const auto a = static_cast<int>(axis);
+    const std::size_t step =
+        a == 0   ? 1
+        : a == 1 ? static_cast<std::size_t>(boxes_.x)
+                 : static_cast<std::size_t>(boxes_.x) * static_cast<std::size_t>(boxes_.y);
+    const auto side = static_cast<std::size_t>(boxes_[a]);
+    double count = 0;
+    for (std::size_t i = 0; i < marks_.size(); ++i) {
+      if (marks_[i] && (i / step % side == 0 || !marks_[i - step])) ++count;
+    }
+    return count;
   }
 
  private:
@@ -87,7 +103,10 @@ class BoxCount {
     for (int z = first.z; z <= last.z; ++z) {
       for (int y = first.y; y <= last.y; ++y) {
         for (int x = first.x; x <= last.x; ++x) {
-          const auto at = static_cast<std::size_t>((z * boxes_.y + y) * boxes_.x + x);
+          const std::size_t at = (static_cast<std::size_t>(z) * static_cast<std::size_t>(boxes_.y) +
+                                  static_cast<std::size_t>(y)) *
+                                     static_cast<std::size_t>(boxes_.x) +
+                                 static_cast<std::size_t>(x);
           if (marks_[at]) continue;
           marks_[at] = true;
           ++count;
@@ -170,24 +189,36 @@ class SizeBound {
     if (factors_.band > 0) {  // all voxels of blocks that the band meets, and what lies between
       return std::min(cells_, mixed(ScalarField::kBlockSide) * (ScalarField::kBlockVoxels + 64));
     }
+    if (factors_.rays > 0) return std::min(shares(axis), cells_);
     double count = 0;
     if (factors_.solid) {
       const double crossings =
           BoxCount(grid_, 1, static_cast<int>(axis))(*factors_.mesh, execution_);
       count += closed_ ? crossings : 2 * crossings;  // a face without a partner is a thin sheet
     }
-    if (factors_.surface || factors_.rays > 0) count += 2 * touched();
+    if (factors_.surface) count += 2 * touched();
     // Each voxel near the surface may have a colour of its own.
     if (file_.rgba) count += 2 * BoxCount(grid_, 1, 3, reach())(*factors_.mesh, execution_);
     return std::min(count, cells_);
   }
+  /// The runs that filled fractions take as much room as: each voxel at the surface may have a
+  /// fraction of its own, which is a literal without copies, and between groups of them is one run.
+  [[nodiscard]] double shares(Axis axis) const {
+    BoxCount count(grid_, 1, 3);
+    const double at_surface = count(*factors_.mesh, execution_);
+    const double literals = at_surface * literal_bits();
+    return literals / run_bits() + count.groups(axis, at_surface);
+  }
+  [[nodiscard]] double literal_bits() const { return 10 * static_cast<double>(values_.bytes); }
+  /// Of RunBytes::kIds: a literal, and the copy of what is left after the longest ones.
+  [[nodiscard]] double run_bits() const { return literal_bits() + 20; }
   [[nodiscard]] double touched() const { return BoxCount(grid_, 1, 3)(*factors_.mesh, execution_); }
   /// Of runs of elements that RunDeflater writes as blocks. The bits are those of its codes.
   [[nodiscard]] double deflated(RunBytes kind, double runs, double elements, double blocks) const {
     const auto e = static_cast<double>(values_.bytes);
     const double bits = kind == RunBytes::kFlags  ? 14 * runs + 3 * elements / 258
                         : kind == RunBytes::kBits ? 28 * runs + 5 * elements / 8 / 258
-                                                  : (10 * e + 20) * runs + 5 * elements * e / 258;
+                                                  : run_bits() * runs + 5 * elements * e / 258;
     return bits / 8 + kBlockBytes * blocks;
   }
   [[nodiscard]] double layers(RunBytes kind, double elements) const {

@@ -1,5 +1,4 @@
 #include <sys/resource.h>
-#include <sys/statvfs.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -346,28 +345,6 @@ Result<void> check_memory(const VoxelizeCommand& command, const VoxelizeOutcome&
               readable_bytes(session.memory_limit()));
 }
 
-/// Refuses a file of plain voxels that the disk surely has no room for.
-Result<void> check_disk(const VoxelizeCommand& command, const VoxelizeOutcome& outcome) {
-  const bool plain =
-      outcome.format && (outcome.format->name == "npy" || outcome.format->name == "nii" ||
-                         outcome.format->name == "raw");
-  if (!plain || is_stream(command.output)) return {};
-  std::string folder = command.output.substr(0, command.output.rfind('/') + 1);
-  if (folder.empty()) folder = ".";
-  struct statvfs disk {};
-  if (statvfs(folder.c_str(), &disk) != 0) return {};
-  const glm::ivec3 dims = outcome.grid.dims;
-  const double least = (command.sdf || command.floats || command.colours ? 4.0 : 1.0) * dims.x *
-                       dims.y * static_cast<double>(dims.z);
-  const double room = static_cast<double>(disk.f_bavail) * static_cast<double>(disk.f_frsize);
-  if (least <= room) return {};
-  return fail(ErrorCode::kLimit,
-              "{}: a file of {} x {} x {} voxels takes at least {}, but the disk has room for {}",
-              command.output, dims.x, dims.y, dims.z,
-              readable_bytes(static_cast<std::uint64_t>(least)),
-              readable_bytes(static_cast<std::uint64_t>(room)));
-}
-
 Result<void> make_voxels(const VoxelizeCommand& command, JobPart* part, Session& session) {
   VoxelizeOutcome outcome;
   auto format = output_format(command);
@@ -391,10 +368,9 @@ Result<void> make_voxels(const VoxelizeCommand& command, JobPart* part, Session&
   if (auto strict = session.check_strict(); !strict) return strict;
 
   if (command.like.empty()) {
-    auto grid = fit_grid(outcome.input.bounds, command.grid);
-    if (!grid) {
-      return fail(grid.error().code, "{}: {}", command.input.files.front(), grid.error().message);
-    }
+    const auto grid =
+        fit_input_grid(outcome.input.bounds, command.grid, command.input.files.front());
+    if (!grid) return tl::unexpected(grid.error());
     outcome.grid = *grid;
   }
   if (auto kept = check_pieces(command, outcome, opened); !kept) return kept;
@@ -413,9 +389,6 @@ Result<void> make_voxels(const VoxelizeCommand& command, JobPart* part, Session&
     estimate_file(command, outcome, samples, session);
     if (session.interrupted()) return fail(ErrorCode::kCancelled, "stopped");
   } else {
-    if (!command.shard) {
-      if (auto room = check_disk(command, outcome); !room) return room;
-    }
     VoxelizeCommand with_place = command;
     with_place.input = std::move(placed);  // distances read it again
     if (auto done = make_voxel_file(with_place, outcome, part, session); !done) return done;

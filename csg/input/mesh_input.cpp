@@ -162,16 +162,19 @@ InputKind kind_of(const std::string& path, const SceneInput& input) {
   if (!beside_stream || (!mesh_name && !is_scene_name(path))) kind.format = input.format;
   kind.is_scene = input.scene_format ? !beside_stream || !mesh_name
                                      : kind.format == MeshFormat::kAuto && is_scene_name(path);
+  // A name that says nothing: the content does.
+  if (kind.format == MeshFormat::kAuto && !kind.is_scene && path != "-") {
+    kind.format = mesh_format_of_file(path);
+  }
   return kind;
 }
 
 Result<void> check_input_name(const std::string& path, const InputKind& kind, bool scenes) {
-  if (kind.format != MeshFormat::kAuto || path == "-") return {};
   std::error_code ignored;
-  if (std::filesystem::is_directory(path, ignored)) {
+  if (path != "-" && std::filesystem::is_directory(path, ignored)) {
     return fail(ErrorCode::kInput, "{}: it is a folder, not a file", path);
   }
-  if (mesh_format_of(path) != MeshFormat::kAuto) return {};
+  if (kind.format != MeshFormat::kAuto || path == "-") return {};
   if (std::filesystem::exists(path, ignored) && !std::filesystem::is_regular_file(path, ignored)) {
     return fail(ErrorCode::kInput, "{}: it is no regular file, so the input format must be given",
                 path);
@@ -180,12 +183,12 @@ Result<void> check_input_name(const std::string& path, const InputKind& kind, bo
     return fail(
         ErrorCode::kInput,
         "{}: the file name must end in .csg, .scad, .obj, .stl, .ply, .off, .3mf, .amf, .gltf or "
-        ".glb, or the input format must be given",
+        ".glb, or the input format must be given; the content looks like no mesh",
         path);
   }
   return fail(ErrorCode::kInput,
               "{}: the file name must end in .obj, .stl, .ply, .off, .3mf, .amf, .gltf or .glb, or "
-              "the input format must be given",
+              "the input format must be given; the content looks like no mesh",
               path);
 }
 

@@ -30,7 +30,7 @@ enum class FormatUnit { kNone, kMillimetres, kMetres };
 FormatUnit unit_of_format(const std::string& path, const SceneInput& input) {
   const InputKind kind = kind_of(path, input);
   if (kind.is_scene) return FormatUnit::kNone;
-  const MeshFormat format = kind.format != MeshFormat::kAuto ? kind.format : mesh_format_of(path);
+  const MeshFormat format = kind.format;
   if (format == MeshFormat::k3mf || format == MeshFormat::kAmf) return FormatUnit::kMillimetres;
   return format == MeshFormat::kGltf ? FormatUnit::kMetres : FormatUnit::kNone;
 }

@@ -7,6 +7,7 @@
 
 #include "mesh/archives/read_3mf_amf.h"
 #include "mesh/attributes/select_parts.h"
+#include "mesh/formats/format_of_content.h"
 #include "mesh/formats/reader_common.h"
 #include "mesh/gltf/read_gltf.h"
 #include "mesh/text/input_bytes.h"
@@ -28,18 +29,6 @@ constexpr NamedFormat kFormats[] = {{MeshFormat::kObj, "obj"},   {MeshFormat::kS
                                     {MeshFormat::kPly, "ply"},   {MeshFormat::kOff, "off"},
                                     {MeshFormat::k3mf, "3mf"},   {MeshFormat::kAmf, "amf"},
                                     {MeshFormat::kGltf, "gltf"}, {MeshFormat::kGltf, "glb"}};
-
-/// The format that the first bytes indicate, for a hint when reading by the extension failed.
-MeshFormat format_by_content(std::string_view text) {
-  if (is_glb(text)) return MeshFormat::kGltf;
-  if (text.starts_with("ply\n") || text.starts_with("ply\r")) return MeshFormat::kPly;
-  if (text.starts_with("solid ") || text.starts_with("solid\n")) return MeshFormat::kStl;
-  if (text.starts_with("OFF\n") || text.starts_with("OFF\r") || text.starts_with("OFF ") ||
-      text.starts_with("COFF")) {
-    return MeshFormat::kOff;
-  }
-  return MeshFormat::kAuto;
-}
 
 Result<MeshFile> read_as(const detail::ReaderInput& input) {
   switch (input.options.format) {
@@ -109,9 +98,9 @@ Result<MeshFile> read_text(std::string_view text, const std::string& name, const
     Result<MeshFile> result =
         read_as({text, name, options, execution, size - text.size(), path, &dropped, file});
     if (result) result->stats.bytes = size;
-    const MeshFormat looks_like = format_by_content(text);
-    if (!result && result.error().code == ErrorCode::kInput && looks_like != MeshFormat::kAuto &&
-        looks_like != options.format) {
+    if (result || result.error().code != ErrorCode::kInput) return result;
+    const MeshFormat looks_like = detail::format_of_content(text);
+    if (looks_like != MeshFormat::kAuto && looks_like != options.format) {
       result.error().message +=
           fmt::format(" (read as {}, but it looks like {})", mesh_format_name(options.format),
                       mesh_format_name(looks_like));
@@ -150,6 +139,14 @@ MeshFormat mesh_format_of(std::string_view path) {
   return mesh_format_named(path.substr(dot + 1));
 }
 
+MeshFormat mesh_format_of_file(const std::string& path) {
+  const MeshFormat named = mesh_format_of(path);
+  std::error_code ignored;  // a pipe can be read once
+  if (named != MeshFormat::kAuto || !std::filesystem::is_regular_file(path, ignored)) return named;
+  const auto file = detail::InputBytes::open(path, 0);
+  return file ? detail::format_of_content(file->view()) : MeshFormat::kAuto;
+}
+
 const char* mesh_format_name(MeshFormat format) {
   for (const NamedFormat& known : kFormats) {
     if (known.format == format) return known.name;
@@ -174,12 +171,12 @@ Result<MeshFile> read_mesh(const std::string& path, const MeshReadOptions& optio
     if (path == "-") {
       return fail(ErrorCode::kUsage, "standard input needs a format: obj, stl, ply, off or glb");
     }
-    known.format = mesh_format_of(path);
+    known.format = mesh_format_of_file(path);
     if (known.format == MeshFormat::kAuto) {
       return fail(
           ErrorCode::kInput,
           "{}: the file name must end in .obj, .stl, .ply, .off, .3mf, .amf, .gltf or .glb, or "
-          "the format must be given",
+          "the format must be given; the content looks like none of them",
           path);
     }
   }

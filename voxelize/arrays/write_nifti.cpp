@@ -15,6 +15,7 @@
 
 #include "core/letters.h"
 #include "voxelize/output/block_output.h"
+#include "voxelize/output/dense_room.h"
 #include "voxelize/output/dense_writer.h"
 #include "voxelize/output/grid_text.h"
 #include "voxelize/output/writers.h"
@@ -157,13 +158,18 @@ class NiftiText {
 
 VoxelWriterResult open_nifti_writer(const std::string& path, const VoxelGrid& grid,
                                     const VoxelWriterOptions& options, bool packed) {
-  Result<BlockOutput> output = BlockOutput::create(path);
-  if (!output) return tl::unexpected(output.error());
   const bool gzip = packed || lower_case(path).ends_with(".gz");
   const auto packing = gzip ? DenseStream::Packing::kGzip : DenseStream::Packing::kNone;
   const DenseValues values(options);
+  const std::string head = NiftiText(grid, options, values).text();
+  if (!gzip) {
+    const auto room = check_dense_room(path, grid.dims, values, head.size());
+    if (!room) return tl::unexpected(room.error());
+  }
+  Result<BlockOutput> output = BlockOutput::create(path);
+  if (!output) return tl::unexpected(output.error());
   return begun(std::make_unique<DenseWriter>(path, grid, options, packing, std::move(*output)), "",
-               NiftiText(grid, options, values).text());
+               head);
 }
 
 }  // namespace strata

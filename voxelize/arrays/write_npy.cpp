@@ -15,6 +15,7 @@
 #include "core/atomic_file.h"
 #include "voxelize/arrays/npy_voxels.h"
 #include "voxelize/output/block_output.h"
+#include "voxelize/output/dense_room.h"
 #include "voxelize/output/dense_stream.h"
 #include "voxelize/output/slab_writer.h"
 #include "voxelize/output/writers.h"
@@ -81,6 +82,10 @@ class NpyWriter final : public SlabWriter {
 
 VoxelWriterResult open_npy_writer(const std::string& path, const VoxelGrid& grid,
                                   const VoxelWriterOptions& options) {
+  const DenseValues values(options);
+  const std::size_t head = npy_head(values, grid.dims).size();
+  const auto room = check_dense_room(path, grid.dims, values, head);
+  if (!room) return tl::unexpected(room.error());
   Result<BlockOutput> output = options.part
                                    ? Result<BlockOutput>(BlockOutput(options.part->write_at))
                                    : BlockOutput::create(path);

@@ -9,6 +9,7 @@
 
 #include "voxelize/arrays/nrrd_text.h"
 #include "voxelize/output/block_output.h"
+#include "voxelize/output/dense_room.h"
 #include "voxelize/output/dense_rows.h"
 #include "voxelize/output/dense_stream.h"
 #include "voxelize/output/file_pair.h"
@@ -57,6 +58,8 @@ class RawWriter final : public SlabWriter {
 VoxelWriterResult open_raw_writer(const std::string& path, const VoxelGrid& grid,
                                   const VoxelWriterOptions& options) {
   const FilePair pair(path, ".nhdr", ".raw");
+  const auto room = check_dense_room(pair.data, grid.dims, DenseValues(options));
+  if (!room) return tl::unexpected(room.error());
   Result<BlockOutput> data = options.part ? Result<BlockOutput>(BlockOutput(options.part->write_at))
                                           : BlockOutput::create(pair.data);
   if (!data) return tl::unexpected(data.error());

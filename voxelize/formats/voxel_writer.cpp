@@ -73,7 +73,13 @@ VoxelWriterResult open_format(const std::string& path, const std::string& name,
 }  // namespace
 
 Result<VoxelFormat> voxel_format_for(const std::string& path, const std::string& format) {
+  const bool picture = lower_case(path).ends_with(".png");
   const auto checked = [&](const VoxelFormat& found) -> Result<VoxelFormat> {
+    if (picture && is_folder(found)) {
+      return fail(ErrorCode::kUsage,
+                  "{}: format {} is a folder of files; its name must end with /, as {}/", path,
+                  found.name, path.substr(0, path.size() - 4));
+    }
     if (path == "-" && is_folder(found)) {
       return fail(ErrorCode::kUsage, "format {} is a folder and cannot go to standard output",
                   found.name);
@@ -107,6 +113,12 @@ Result<VoxelFormat> voxel_format_for(const std::string& path, const std::string&
     }
   }
   if (slash && plain_folder != nullptr) return checked(*plain_folder);
+  if (picture) {
+    return fail(
+        ErrorCode::kUsage,
+        "{}: voxels are written as a folder of PNG slices; its name must end with /, as {}/", path,
+        path.substr(0, path.size() - 4));
+  }
   return fail(
       ErrorCode::kUsage,
       "{}: the extension must be that of a voxel format: {} (a folder's name ends with /){}", path,

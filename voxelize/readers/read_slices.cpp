@@ -1,6 +1,6 @@
-// A folder of PNG slices with a slices.json, as write_slices.cpp makes it: a grey picture a layer
-// of z, rows along y in either order. An .sl1 of a resin printer, which is an archive of such
-// pictures with the settings of PrusaSlicer.
+// A folder of PNG slices with a slices.json, as write_slices.cpp makes it: a picture a layer of z,
+// grey or coloured, rows along y in either order. An .sl1 of a resin printer, which is an archive
+// of such pictures with the settings of PrusaSlicer.
 
 #include <algorithm>
 #include <array>
@@ -17,8 +17,8 @@
 #include "mesh/text/input_bytes.h"
 #include "voxelize/readers/readers.h"
 #include "voxelize/volume/dense_array.h"
-#include "voxelize/volume/grey_png.h"
 #include "voxelize/volume/inflate_stream.h"
+#include "voxelize/volume/slice_png.h"
 #include "voxelize/volume/tile_runs.h"
 #include "voxelize/volume/zip_directory.h"
 
@@ -67,7 +67,7 @@ struct SliceFolder {
         made.unpacked = *std::move(unpacked);
       }
     }
-    // GreyPng has a copy.
+    // SlicePng has a copy.
     if (!made.memory.take(context.budget, made.view().size())) {
       return context.too_large("a picture");
     }
@@ -148,12 +148,13 @@ class SlabOfSlices {
         set_(set),
         tiles_(static_cast<std::size_t>(set.tiles_u())) {}
 
-  /// @param bits  of the first picture
-  Result<void> read(int tv, int bits) {
+  /// @param first  the first picture, which the others are alike
+  Result<void> read(int tv, const SlicePng& first) {
+    const int bits = first.bits();
     const glm::ivec3 dims = folder_.grid.dims;
     for (int z = tv * kTileSide; z < std::min((tv + 1) * kTileSide, dims.z); ++z) {
       if (context_.stopped()) return context_.cancelled();
-      if (auto read = read_layer(z, bits); !read) return read;
+      if (auto read = read_layer(z, first); !read) return read;
     }
     for (std::size_t tu = 0; tu < tiles_.size(); ++tu) {
       if (tiles_[tu].empty()) continue;
@@ -168,18 +169,21 @@ class SlabOfSlices {
   }
 
  private:
-  Result<void> read_layer(int z, int bits) {
+  Result<void> read_layer(int z, const SlicePng& first) {
     const std::string path = folder_.file(z);
     const auto bytes = folder_.bytes(z, context_);
     if (!bytes) return tl::unexpected(bytes.error());
-    const Result<GreyPng> png = GreyPng::open(bytes->view(), path);
+    const Result<SlicePng> png = SlicePng::open(bytes->view(), path);
     if (!png) return tl::unexpected(png.error());
     const glm::ivec3 dims = folder_.grid.dims;
-    if (png->width() != dims.x || png->height() != dims.y || png->bits() != bits) {
-      return fail(ErrorCode::kInput, "{}: {} x {} pixels of {} bits; {} x {} of {} are needed",
-                  path, png->width(), png->height(), png->bits(), dims.x, dims.y, bits);
+    const auto kind = [](const SlicePng& one) {
+      return fmt::format("{} bits{}", one.bits(), one.colours() ? " a colour" : "");
+    };
+    if (png->width() != dims.x || png->height() != dims.y || kind(*png) != kind(first)) {
+      return fail(ErrorCode::kInput, "{}: {} x {} pixels of {}; {} x {} of {} are needed", path,
+                  png->width(), png->height(), kind(*png), dims.x, dims.y, kind(first));
     }
-    return png->rows([&](int row, std::span<const std::uint16_t> from) {
+    return png->rows([&](int row, std::span<const std::uint32_t> from) {
       const int y = folder_.descending ? dims.y - 1 - row : row;
       TileRuns& tile = tiles_[static_cast<std::size_t>(y / kTileSide)];
       const auto local = static_cast<unsigned>(z % kTileSide * kTileSide + y % kTileSide);
@@ -201,14 +205,14 @@ class SlabOfSlices {
   std::vector<TileRuns> tiles_;
 };
 
-Result<GreyPng> first_picture(const ReadContext& context, const SliceFolder& folder) {
+Result<SlicePng> first_picture(const ReadContext& context, const SliceFolder& folder) {
   const auto first = folder.bytes(0, context);
   if (!first) return tl::unexpected(first.error());
-  return GreyPng::open(first->view(), folder.file(0));
+  return SlicePng::open(first->view(), folder.file(0));
 }
 
 Result<VoxelVolume> read_pictures(ReadContext& context, const SliceFolder& folder) {
-  const Result<GreyPng> png = first_picture(context, folder);
+  const Result<SlicePng> png = first_picture(context, folder);
   if (!png) return tl::unexpected(png.error());
   VoxelVolume volume;
   volume.set = VoxelIntervals(folder.grid, Axis::kX);
@@ -217,11 +221,15 @@ Result<VoxelVolume> read_pictures(ReadContext& context, const SliceFolder& folde
   volume.type = bits == 1 ? "bool" : bits == 8 ? "uint8" : "uint16";
   std::vector<Result<void>> results(static_cast<std::size_t>(volume.set.tiles_v()));
   parallel_for(context.execution, results.size(), [&](std::size_t tv, int) {
-    results[tv] = SlabOfSlices(context, folder, volume.set).read(static_cast<int>(tv), bits);
+    results[tv] = SlabOfSlices(context, folder, volume.set).read(static_cast<int>(tv), *png);
   });
   if (context.stopped()) return context.cancelled();
   for (const Result<void>& result : results) {
     if (!result) return tl::unexpected(result.error());
+  }
+  if (png->colours()) {
+    context.colours = true;
+    return volume;
   }
   if (bits != 1) {
     volume.kind = VoxelKind::kIds;
@@ -306,7 +314,7 @@ Result<SliceFolder> read_archive(ReadContext& context) {
     return fail(ErrorCode::kInput, "{}: the archive has no pictures of layers", context.path);
   }
   std::ranges::sort(folder.members, {}, &ZipMember::name);
-  const Result<GreyPng> png = first_picture(context, folder);
+  const Result<SlicePng> png = first_picture(context, folder);
   if (!png) return tl::unexpected(png.error());
   if (folder.members.size() > static_cast<std::size_t>(kMaxGridSide) ||
       png->width() > kMaxGridSide || png->height() > kMaxGridSide) {

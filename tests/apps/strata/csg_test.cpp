@@ -414,6 +414,12 @@ TEST_F(Csg, FilesThatAreNoScenesAreSaidToBeWhatTheyAre) {
   place.write("scene.txt", kCube);
   EXPECT_TRUE(has(refused({".", "-o", "out.png"}, 3), ".: it is a folder"));
   EXPECT_TRUE(has(refused({"scene.txt", "-o", "out.png"}, 3), "must end in .csg, .scad, .obj"));
+  // A mesh is known by its content.
+  place.write("box", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n");
+  for (const char* command : {"info", "voxelize"}) {
+    EXPECT_EQ(place.run({command, "box"}).exit_code, 0) << command;
+  }
+  EXPECT_EQ(place.run({"csg", "box", "-o", "box.png", "--size=9,9"}).exit_code, 0);
   EXPECT_TRUE(has(refused({"-", "-o", "out.png"}, 2), "--input-format: csg, obj"));
   const RunResult info = place.run({"info", "scene.csg"});
   EXPECT_EQ(info.exit_code, 0) << info.err;

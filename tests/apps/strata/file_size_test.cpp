@@ -116,6 +116,9 @@ TEST_F(FileSize, IsNearWhereTheSurfaceDecides) {
   EXPECT_LT(holds(arguments, "a.vti"), 6);
   EXPECT_LT(holds(arguments, "a.binvox"), 6);
   EXPECT_EQ(holds(arguments, "a.npy"), 1);
+  EXPECT_LT(holds(arguments, "a.sl1"), 3);
+  EXPECT_LT(holds({"ball.obj", "-r", "256", "--display", "400x300"}, "a.sl1"), 3);
+  EXPECT_LT(holds({"ball.obj", "-r", "256", "--coverage"}, "a.nrrd"), 4);
 }
 
 TEST_F(FileSize, IsInTheTextOfADryRun) {

@@ -179,8 +179,39 @@ TEST_F(Usage, ANameThatAnotherCommandWritesIsSaidToBe) {
   refuses({"csg", "box.obj", "-o", "a.vdb"}, "; strata voxelize writes voxels");
   refuses({"voxelize", "box.obj", "-o", "a.stl"}, "; strata mesh writes meshes");
   refuses({"voxelize", "box.obj", "-o", "a.png"}, "; strata csg writes pictures");
+  refuses({"voxelize", "box.obj", "-o", "a.png"},
+          "a.png: voxels are written as a folder of PNG slices; its name must end with /, as a/");
+  refuses({"voxelize", "box.obj", "-o", "a.png", "--format", "png"},
+          "a.png: format png is a folder of files; its name must end with /, as a/");
   refuses({"mesh", "box.obj", "-o", "a.png"}, "; strata csg writes pictures");
   refuses({"mesh", "box.obj", "-o", "a.npy"}, "; strata voxelize writes voxels");
+}
+
+TEST_F(Usage, AGridThatCannotBeIsNoFaultOfTheFile) {
+  for (const char* command : {"voxelize", "mesh", "ldi"}) {
+    std::vector<std::string> words = {command, "box.obj"};
+    if (words[0] == "mesh") words.insert(words.end(), {"--method", "contour"});
+    words.insert(words.end(), {"-o", words[0] == "ldi" ? "a.npz" : "a.ply"});
+    const auto with = [&](const char* option, const char* value) {
+      std::vector<std::string> all = words;
+      all.insert(all.end(), {option, value});
+      return all;
+    };
+    refuses(with("-r", "-5"), "strata: error: the resolution must be at least 1 voxel, got -5");
+    refuses(with("--voxel-size", "-1"), "strata: error: the voxel size along x must be above 0");
+    const RunResult large = place.run(with("-r", "70000"));
+    EXPECT_EQ(large.exit_code, 6) << command;
+    EXPECT_EQ(large.err.find("strata: error: a resolution of 70000 voxels"), 0u) << large.err;
+  }
+}
+
+TEST_F(Usage, AFileThatTheDiskHasNoRoomForIsNotBegun) {
+  for (const char* name : {"a.npy", "a.raw", "a.nii"}) {
+    const RunResult run = place.run({"voxelize", "box.obj", "-r", "65536", "-o", name, "-q"});
+    EXPECT_EQ(run.exit_code, 6) << name;
+    EXPECT_NE(run.err.find(std::string(name) + ": the file takes 281."), std::string::npos)
+        << run.err;
+  }
 }
 
 TEST_F(Usage, HelpBeginsWithExamplesAndEndsWithTheExitCodes) {

@@ -110,7 +110,7 @@ TEST_F(SceneInputs, AnExpressionOfMeshesDecidesTheSolidsToo) {
 }
 
 TEST_F(SceneInputs, ErrorsDoNotNameOptionsOfTheTool) {
-  write("plain.txt", box(0, false));
+  write("plain.txt", "a poem\n");
   for (const auto& [name, expression] :
        {std::pair("a.off", "a - nobody"), std::pair("-", ""), std::pair("plain.txt", "")}) {
     SceneInput given = input({name}, expression);
@@ -177,7 +177,7 @@ TEST_F(SceneInputs, ANameTellsTheKindUnlessAFormatIsGiven) {
   EXPECT_FALSE(kind_of("x.csg", files).is_scene);
   EXPECT_EQ(kind_of("x.off", files).format, MeshFormat::kStl);
   files.files.emplace_back("-");  // then the format is of standard input
-  EXPECT_EQ(kind_of("x.off", files).format, MeshFormat::kAuto);
+  EXPECT_EQ(kind_of("x.off", files).format, MeshFormat::kOff);
   EXPECT_EQ(kind_of("-", files).format, MeshFormat::kStl);
 }
 

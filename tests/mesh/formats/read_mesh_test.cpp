@@ -143,10 +143,50 @@ TEST_F(ReadMesh, WideTextIsNamed) {
   EXPECT_TRUE(read_mesh(write("wide.stl", bytes)).has_value());
 }
 
+TEST_F(ReadMesh, ANameThatSaysNothingLeavesItToTheContent) {
+  for (const MeshFormat format :
+       {MeshFormat::kObj, MeshFormat::kStl, MeshFormat::kPly, MeshFormat::kOff}) {
+    for (const char* name : {"plain", "mesh.dat"}) {
+      const auto file = read_mesh(write(name, mesh_to_bytes(ball(), format)));
+      ASSERT_TRUE(file.has_value()) << file.error().message;
+      EXPECT_TRUE(file->stats.format.starts_with(mesh_format_name(format))) << file->stats.format;
+      EXPECT_EQ(file->soup.triangles.size(), ball().triangles.size());
+    }
+  }
+  struct Case {
+    std::string_view bytes;
+    MeshFormat format;
+  };
+  const Case cases[] = {{"# by hand\n\nmtllib a.mtl\no part\n  v -1 0 0\n", MeshFormat::kObj},
+                        {"\xef\xbb\xbfv .5 0 0\r\n", MeshFormat::kObj},
+                        {"v = 3\n", MeshFormat::kAuto},
+                        {"a poem\nv 1 2 3\n", MeshFormat::kAuto},
+                        {"# nothing but talk\n", MeshFormat::kAuto},
+                        {"solid part\nfacet normal 0 0 1\n", MeshFormat::kStl},
+                        {"solidly built", MeshFormat::kAuto},
+                        {"COFF\n3 1 0\n", MeshFormat::kOff},
+                        {"OFFICE", MeshFormat::kAuto},
+                        {"{ \"asset\": {\"version\": \"2.0\"} }", MeshFormat::kGltf},
+                        {"{ \"name\": 1 }", MeshFormat::kAuto},
+                        {"<?xml version=\"1.0\"?>\n<amf unit=\"mm\">", MeshFormat::kAmf},
+                        {"<html>", MeshFormat::kAuto},
+                        {std::string_view("PK\3\4 3D/3dmodel.model"), MeshFormat::k3mf},
+                        {std::string_view("PK\3\4 part.AMF"), MeshFormat::kAmf},
+                        {std::string_view("PK\3\4 letter.xml"), MeshFormat::kAuto},
+                        {"", MeshFormat::kAuto}};
+  for (const Case& one : cases) {
+    EXPECT_EQ(mesh_format_of_file(write("plain", one.bytes)), one.format) << one.bytes;
+  }
+  EXPECT_EQ(mesh_format_of_file(folder_.string()), MeshFormat::kAuto);
+  EXPECT_EQ(mesh_format_of_file("no/such/file"), MeshFormat::kAuto);
+  EXPECT_EQ(mesh_format_of_file("no/such/file.ply"), MeshFormat::kPly);
+  const auto none = read_mesh(write("plain", "a poem\n"));
+  ASSERT_FALSE(none.has_value());
+  EXPECT_CONTAINS(none.error().message, "the content looks like none of them");
+}
+
 TEST_F(ReadMesh, FormatMayBeNamed) {
   const std::string path = write("mesh.dat", mesh_to_bytes(ball(), MeshFormat::kOff));
-  EXPECT_FALSE(read_mesh(path).has_value());
-  EXPECT_CONTAINS(read_mesh(path).error().message, "the format must be given");
   MeshReadOptions options;
   options.format = MeshFormat::kOff;
   EXPECT_TRUE(read_mesh(path, options).has_value());

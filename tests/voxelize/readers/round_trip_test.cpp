@@ -257,8 +257,8 @@ class ColoursRoundTrip : public RoundTrip {};
 std::vector<VoxelFormat> readable_colours() {
   std::vector<VoxelFormat> formats = readable(false);
   std::erase_if(formats, [](const VoxelFormat& format) {
-    const auto holds = {"npy", "npz", "vox", "h5",     "nrrd", "raw", "mha",
-                        "nii", "tif", "vti", "nii.gz", "zarr", "vdb", "ome.zarr"};
+    const auto holds = {"npy", "npz", "vox",    "h5",   "nrrd", "raw",      "mha", "nii",
+                        "tif", "vti", "nii.gz", "zarr", "vdb",  "ome.zarr", "png"};
     return std::find(holds.begin(), holds.end(), format.name) == holds.end();
   });
   return formats;

@@ -1,9 +1,12 @@
-// PNG, second edition (ISO/IEC 15948:2004): grey pictures as write_slices.cpp and scanners make
-// them. Not by libpng, whose errors jump over C++'s destructors.
+// PNG, second edition (ISO/IEC 15948:2004): pictures as write_slices.cpp and scanners make them.
+// Not by libpng, whose errors jump over C++'s destructors.
 
-#include "voxelize/volume/grey_png.h"
+#include "voxelize/volume/slice_png.h"
 
+#include <algorithm>
+#include <bit>
 #include <cstdlib>
+#include <cstring>
 #include <vector>
 
 #include "strata/core/grid.h"
@@ -12,6 +15,8 @@
 
 namespace strata {
 namespace {
+
+static_assert(std::endian::native == std::endian::little, "bytes of colours are copied");
 
 std::uint32_t big_endian(ByteCursor& cursor) {
   const auto value = cursor.get<std::uint32_t>();
@@ -42,12 +47,12 @@ bool unfilter(unsigned filter, std::size_t step, const std::vector<std::uint8_t>
 
 }  // namespace
 
-Result<GreyPng> GreyPng::open(std::string_view bytes, const std::string& path) {
+Result<SlicePng> SlicePng::open(std::string_view bytes, const std::string& path) {
   ByteCursor cursor(bytes);
   if (cursor.take(8) != "\x89PNG\r\n\x1a\n") {
     return fail(ErrorCode::kInput, "{}: byte 0: no PNG file", path);
   }
-  GreyPng png;
+  SlicePng png;
   png.path_ = path;
   while (!cursor.failed()) {
     const std::uint64_t at = cursor.at();
@@ -65,12 +70,14 @@ Result<GreyPng> GreyPng::open(std::string_view bytes, const std::string& path) {
       const int interlace = head.get<std::uint8_t>();
       const bool fits =
           width >= 1 && height >= 1 && width <= kMaxGridSide && height <= kMaxGridSide;
-      if (!fits || colour != 0 || interlace != 0 ||
-          (png.bits_ != 1 && png.bits_ != 8 && png.bits_ != 16)) {
+      constexpr int kGrey = 0, kRgba = 6;
+      png.colours_ = colour == kRgba && png.bits_ == 8;
+      const bool grey = colour == kGrey && (png.bits_ == 1 || png.bits_ == 8 || png.bits_ == 16);
+      if (!fits || interlace != 0 || !(grey || png.colours_)) {
         return fail(
             ErrorCode::kInput,
-            "{}: byte {}: {} x {} pixels, {} bits, colour type {}, interlace {}; grey of 1, "
-            "8 or 16 bits up to {} a side is read",
+            "{}: byte {}: {} x {} pixels, {} bits, colour type {}, interlace {}; grey of 1, 8 or "
+            "16 bits and colours with alpha of 8 bits up to {} a side are read",
             path, at, width, height, png.bits_, colour, interlace, kMaxGridSide);
       }
       png.width_ = static_cast<int>(width);
@@ -86,12 +93,13 @@ Result<GreyPng> GreyPng::open(std::string_view bytes, const std::string& path) {
               bytes.size());
 }
 
-Result<void> GreyPng::rows(
-    const std::function<void(int y, std::span<const std::uint16_t> values)>& take_row) const {
+Result<void> SlicePng::rows(
+    const std::function<void(int y, std::span<const std::uint32_t> values)>& take_row) const {
   const auto width = static_cast<std::size_t>(width_);
-  const std::size_t bytes = (width * static_cast<std::size_t>(bits_) + 7) / 8;
-  const std::size_t step = bits_ == 16 ? 2 : 1;
-  std::vector<std::uint16_t> values(width);
+  const std::size_t bits = static_cast<std::size_t>(bits_) * (colours_ ? 4 : 1);
+  const std::size_t bytes = (width * bits + 7) / 8;
+  const std::size_t step = std::max<std::size_t>(1, bits / 8);
+  std::vector<std::uint32_t> values(width);
   std::vector<std::uint8_t> row(bytes + 1), above(bytes, 0);
   InflateStream stream(packed_, InflateStream::kZlib, path_);
   for (int y = 0; y < height_; ++y) {
@@ -103,9 +111,13 @@ Result<void> GreyPng::rows(
     }
     const std::uint8_t* from = row.data() + 1;
     for (std::size_t x = 0; x < width; ++x) {
-      values[x] = bits_ == 1   ? from[x / 8] >> (7 - x % 8) & 1
-                  : bits_ == 8 ? from[x]
-                               : static_cast<std::uint16_t>(from[2 * x] << 8 | from[2 * x + 1]);
+      if (bits == 1) {
+        values[x] = from[x / 8] >> (7 - x % 8) & 1;
+      } else if (bits == 32) {
+        std::memcpy(&values[x], from + 4 * x, 4);  // red is the lowest byte
+      } else {
+        values[x] = bits == 8 ? from[x] : std::uint32_t{from[2 * x]} << 8 | from[2 * x + 1];
+      }
     }
     take_row(y, values);
     above.assign(row.begin() + 1, row.end());
