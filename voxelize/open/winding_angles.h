@@ -46,6 +46,7 @@ struct WindingPoints {
   static constexpr std::size_t kMost = 64, kStep = 8;
   std::size_t count = 0;  ///< a multiple of kStep
   alignas(64) double x[kMost], y[kMost], z[kMost], angle[kMost];
+  double off[kMost];  ///< what the angles may be off by from exact ones; above 1: not known
 };
 
 /// Caps and groups of them, in lattice steps that are `scale` long.
@@ -56,45 +57,61 @@ struct WindingCaps {
   std::uint32_t vertices = 0;  ///< above the numbers of their corners
 };
 
-/// A corner of caps as seen from a vector of points: scaled offsets and their lengths.
-struct alignas(64) WindingCorner {
-  double x[WindingPoints::kStep], y[WindingPoints::kStep], z[WindingPoints::kStep],
-      length[WindingPoints::kStep];
+/// What is seen from the points of a ball.
+struct WindingView {
+  glm::dvec3 middle;
+  double radius;
+  std::span<const std::uint32_t> near;      ///< caps
+  std::span<const std::uint32_t> far = {};  ///< nodes, as dipoles
+  WindingSeries farther = {};               ///< around the middle
+  double far_bound = 0.0;                   ///< on the angle of far and farther nodes
 };
 
-/// Caps near points, by their corners, each of which is there once.
-struct WindingNear {
-  const WindingCaps& all;
-  std::span<const std::uint32_t> caps;
-  std::span<const glm::uvec3> triangles;  ///< by number in `corners`
-  std::span<const glm::dvec3> corners;
-  WindingCorner* seen;
+/// Corners of near caps, far nodes and points, scaled, from the middle of the ball.
+struct WindingFloats {
+  struct Corner {
+    float x, y, z;
+  };
+  struct Far {
+    float x, y, z, dipole_x, dipole_y, dipole_z;
+  };
+  /// A corner as seen from a vector of points.
+  struct alignas(32) Seen {
+    float x[WindingPoints::kStep], y[WindingPoints::kStep], z[WindingPoints::kStep],
+        length[WindingPoints::kStep];
+  };
+  std::vector<Corner> corners;
+  std::vector<glm::uvec3> triangles;  ///< the caps, by corner
+  std::vector<Far> far;
+  std::vector<Seen> seen;
+  float series[10];  ///< the angle of farther nodes, its gradient, halves of xx, yy, zz; yz, zx, xy
+  alignas(64) float x[WindingPoints::kMost], y[WindingPoints::kMost], z[WindingPoints::kMost];
+  float base_off = 0.0F;     ///< what angles are off by, but for the caps' complex numbers
+  float number_off = 0.0F;   ///< what those are off by
+  float nearest_off = 0.0F;  ///< and over the distance of the nearest corner
 };
 
 /// Sums the solid angles of caps at voxel centres. One for each thread.
 class WindingSum {
  public:
   enum class Way {
-    kExact,  ///< arc tangent by arc tangent: the angles that decide
-    kQuick   ///< one arc tangent for all near caps
+    kExact,  ///< arc tangent by arc tangent, in double: the angles that decide
+    kQuick   ///< one arc tangent for all near caps, in float
   };
-  /// Writes the angles of `near` caps, of `far` nodes as dipoles, and of farther ones. Centres on a
-  /// triangle's plane see the side that the perturbed sample sees (raster/triangle_setup.h). Exact
-  /// ones are the same bits on any SIMD unit.
-  /// @return what the angles may be off by from exact ones; empty: quick ones are not known
-  std::optional<double> write(Way way, const WindingCaps& caps, std::span<const std::uint32_t> near,
-                              std::span<const std::uint32_t> far, const WindingSeries& farther,
-                              WindingPoints& points);
+  /// Writes angles. Centres on a triangle's plane see the side that the perturbed sample sees
+  /// (raster/triangle_setup.h). Exact angles are the same bits on any SIMD unit.
+  void write(Way way, const WindingCaps& caps, const WindingView& view, WindingPoints& points);
 
  private:
   struct Place {
     std::uint32_t turn = 0, corner = 0;
   };
+  void set_corners(const WindingCaps& caps, const WindingView& view);
+  void set_rest(const WindingCaps& caps, const WindingView& view, const WindingPoints& points);
+
   std::vector<Place> places_;  ///< where each vertex is among the corners, if its turn is this one
   std::uint32_t turn_ = 0;
-  std::vector<glm::dvec3> corners_;    ///< of near caps, each once
-  std::vector<glm::uvec3> triangles_;  ///< near caps by corners
-  std::vector<WindingCorner> seen_;
+  WindingFloats floats_;
 };
 
 /// 1 where the perturbed lattice point sees the cap's back, -1 where its front. Exact.

@@ -285,16 +285,23 @@ void WindingField::place(const Cube& cube, int step, WindingPoints& points) {
   }
 }
 
+/// What is seen from a cube, but the near caps.
+WindingView WindingField::view_of(const Cube& cube, const Scratch& scratch) {
+  const Scratch::Level& here = scratch.levels[cube.level + 1];
+  return {here.farther.middle, here.radius, {}, here.far, here.farther, here.far_bound};
+}
+
 /// Whether all voxels of a cube have the same number, by its corners. Empty where the angles are
 /// not exact enough to tell.
 std::optional<bool> WindingField::same_number(const Cube& cube, WindingSum::Way way,
                                               Scratch& scratch, int& number) const {
-  const Scratch::Level& here = scratch.levels[cube.level + 1];
   WindingPoints& points = scratch.points;
   place(cube, cube.size - 1, points);
-  const auto written = scratch.sum.write(way, all_, scratch.near, here.far, here.farther, points);
-  if (!written) return std::nullopt;
-  const double off = (1 + 2 * kBulge) * *written;
+  WindingView view = view_of(cube, scratch);
+  view.near = scratch.near;
+  scratch.sum.write(way, all_, view, points);
+  const double off = (1 + 2 * kBulge) * *std::max_element(points.off, points.off + points.count);
+  if (!(off <= 1)) return std::nullopt;
   const auto [low, high] = std::minmax_element(points.angle, points.angle + points.count);
   const double bulge = kBulge * (*high - *low), least = *low - bulge, most = *high + bulge;
   number = rounded(least - off);
@@ -343,63 +350,89 @@ void WindingField::visit_voxels(const Cube& cube, Scratch& scratch) const {
     (close ? scratch.close : scratch.rest).push_back(node.first);
   }
   int number[WindingPoints::kMost];
-  if (!find_numbers(cube, WindingSum::Way::kQuick, scratch, number)) {
-    static_cast<void>(find_numbers(cube, WindingSum::Way::kExact, scratch, number));
+  Voxels left, apart;
+  for (; left.count < WindingPoints::kMost; ++left.count) {
+    left.at[left.count] = static_cast<std::uint8_t>(left.count);
+  }
+  for (const auto way : {WindingSum::Way::kQuick, WindingSum::Way::kExact}) {
+    if (left.count > 0) left = find_numbers(cube, way, left, apart, scratch, number);
+  }
+  for (const auto way : {WindingSum::Way::kQuick, WindingSum::Way::kExact}) {
+    if (apart.count > 0) apart = find_numbers_apart(cube, way, apart, scratch, number);
   }
   add_runs(cube, number, scratch);
 }
 
-/// The numbers of the voxels of a cube of side kLeast. @return false where the angles are not exact
-/// enough to tell
-bool WindingField::find_numbers(const Cube& cube, WindingSum::Way way, Scratch& scratch,
-                                int (&number)[WindingPoints::kMost]) const {
-  const Scratch::Level& here = scratch.levels[cube.level + 1];
+/// Some voxels of a cube of side kLeast, and some more to fill a vector.
+void WindingField::place(const Cube& cube, const Voxels& voxels, WindingPoints& points) {
+  constexpr std::size_t kStep = WindingPoints::kStep;
+  points.count = (voxels.count + kStep - 1) / kStep * kStep;
+  for (std::size_t k = 0; k < points.count; ++k) {
+    const int i = voxels.at[std::min(k, voxels.count - 1)];
+    const auto centre = [&](int axis, int at) {
+      return (cube.corner[axis] + at) * kLatticeSteps + kLatticeSteps / 2;
+    };
+    points.x[k] = centre(0, i % kLeast);
+    points.y[k] = centre(1, i / kLeast % kLeast);
+    points.z[k] = centre(2, i / (kLeast * kLeast));
+  }
+}
+
+/// The numbers of voxels of a cube of side kLeast, where the caps close by and the rest at the
+/// cube's corners tell. Adds others to `apart`. @return those whose angles are not exact enough
+WindingField::Voxels WindingField::find_numbers(const Cube& cube, WindingSum::Way way,
+                                                const Voxels& voxels, Voxels& apart,
+                                                Scratch& scratch,
+                                                int (&number)[WindingPoints::kMost]) const {
   WindingPoints& points = scratch.points;
   place(cube, kLeast - 1, points);
-  const auto of_rest = scratch.sum.write(way, all_, scratch.rest, here.far, here.farther, points);
+  WindingView view = view_of(cube, scratch);
+  view.near = scratch.rest;
+  scratch.sum.write(way, all_, view, points);
+  const double off = (1 + 2 * kBulge) * *std::max_element(points.off, points.off + 8);
+  if (!(off <= 1)) return voxels;
   double corner[8];
   std::copy_n(points.angle, 8, corner);
   const auto [low, high] = std::minmax_element(corner, corner + 8);
   const double bulge = kBulge * (*high - *low);
-  place(cube, 1, points);
-  const auto of_close = scratch.sum.write(way, all_, scratch.close, {}, {}, points);
-  if (!of_rest || !of_close) return false;
-  const double off = (1 + 2 * kBulge) * *of_rest + *of_close;
+  place(cube, voxels, points);
+  scratch.sum.write(way, all_, {view.middle, view.radius, scratch.close}, points);
   double rest[WindingPoints::kMost];
   interpolate(corner, rest);
-  std::uint8_t apart[WindingPoints::kMost];
-  std::size_t count = 0;
-  for (std::size_t i = 0; i < points.count; ++i) {
-    const double least = points.angle[i] + rest[i] - bulge,
-                 most = points.angle[i] + rest[i] + bulge;
-    number[i] = rounded(least - off);
-    if (rounded(most + off) == number[i]) continue;
-    if (rounded(least + off) == rounded(most - off)) return false;
-    apart[count++] = static_cast<std::uint8_t>(i);
+  Voxels left;
+  for (std::size_t k = 0; k < voxels.count; ++k) {
+    const std::uint8_t i = voxels.at[k];
+    const double both = off + points.off[k];
+    if (!(both <= 1)) {
+      left.add(i);
+      continue;
+    }
+    const double least = points.angle[k] + rest[i] - bulge,
+                 most = points.angle[k] + rest[i] + bulge;
+    number[i] = rounded(least - both);
+    if (rounded(most + both) == number[i]) continue;
+    (rounded(least + both) == rounded(most - both) ? left : apart).add(i);
   }
-  return find_numbers_apart(cube, way, {apart, count}, scratch, number);
+  return left;
 }
 
-/// The numbers of some voxels, each by its own angle. @pre the points are those of the cube
-bool WindingField::find_numbers_apart(const Cube& cube, WindingSum::Way way,
-                                      std::span<const std::uint8_t> voxels, Scratch& scratch,
-                                      int (&number)[WindingPoints::kMost]) const {
-  if (voxels.empty()) return true;
-  const Scratch::Level& here = scratch.levels[cube.level + 1];
+/// The numbers of voxels, each by its own angle. @return those whose angles are not exact enough
+WindingField::Voxels WindingField::find_numbers_apart(const Cube& cube, WindingSum::Way way,
+                                                      const Voxels& voxels, Scratch& scratch,
+                                                      int (&number)[WindingPoints::kMost]) const {
   WindingPoints& points = scratch.points;
-  for (std::size_t k = 0; k < voxels.size(); ++k) {
-    const std::size_t i = voxels[k];
-    points.x[k] = points.x[i], points.y[k] = points.y[i], points.z[k] = points.z[i];
+  place(cube, voxels, points);
+  WindingView view = view_of(cube, scratch);
+  view.near = scratch.near;
+  scratch.sum.write(way, all_, view, points);
+  Voxels left;
+  for (std::size_t k = 0; k < voxels.count; ++k) {
+    const double angle = points.angle[k], off = points.off[k];
+    const bool known = off <= 1 && rounded(angle - off) == rounded(angle + off);
+    if (!known) left.add(voxels.at[k]);
+    if (known) number[voxels.at[k]] = rounded(angle);
   }
-  points.count =
-      (voxels.size() + WindingPoints::kStep - 1) / WindingPoints::kStep * WindingPoints::kStep;
-  const auto off = scratch.sum.write(way, all_, scratch.near, here.far, here.farther, points);
-  if (!off) return false;
-  for (std::size_t k = 0; k < voxels.size(); ++k) {
-    number[voxels[k]] = rounded(points.angle[k] - *off);
-    if (rounded(points.angle[k] + *off) != number[voxels[k]]) return false;
-  }
-  return true;
+  return left;
 }
 
 /// Adds the numbers of the voxels of a cube of side kLeast, x fastest.

@@ -76,6 +76,12 @@ class WindingField {
     int size;
     std::size_t level;  ///< how often the tile's cubes were cut
   };
+  /// Voxels of a cube of side 4, x fastest.
+  struct Voxels {
+    std::size_t count = 0;
+    std::uint8_t at[WindingPoints::kMost];
+    void add(std::uint8_t voxel) { at[count++] = voxel; }
+  };
   enum class Sight { kNothing, kSmooth, kMet };
 
   void split(std::uint32_t node, std::uint32_t first, std::uint32_t count,
@@ -83,21 +89,24 @@ class WindingField {
   Sight look(const Cube& cube, Scratch& scratch) const;
   Sight sort(Scratch::Level& here, bool single, Scratch& scratch) const;
   void visit(const Cube& cube, Scratch& scratch) const;
+  static WindingView view_of(const Cube& cube, const Scratch& scratch);
   [[nodiscard]] bool fill(const Cube& cube, Scratch& scratch) const;
   [[nodiscard]] std::optional<bool> same_number(const Cube& cube, WindingSum::Way way,
                                                 Scratch& scratch, int& number) const;
   void visit_voxels(const Cube& cube, Scratch& scratch) const;
-  [[nodiscard]] bool find_numbers(const Cube& cube, WindingSum::Way way, Scratch& scratch,
-                                  int (&number)[WindingPoints::kMost]) const;
-  [[nodiscard]] bool find_numbers_apart(const Cube& cube, WindingSum::Way way,
-                                        std::span<const std::uint8_t> voxels, Scratch& scratch,
-                                        int (&number)[WindingPoints::kMost]) const;
+  [[nodiscard]] Voxels find_numbers(const Cube& cube, WindingSum::Way way, const Voxels& voxels,
+                                    Voxels& apart, Scratch& scratch,
+                                    int (&number)[WindingPoints::kMost]) const;
+  [[nodiscard]] Voxels find_numbers_apart(const Cube& cube, WindingSum::Way way,
+                                          const Voxels& voxels, Scratch& scratch,
+                                          int (&number)[WindingPoints::kMost]) const;
   void add_runs(const Cube& cube, const int (&number)[WindingPoints::kMost],
                 Scratch& scratch) const;
   static const std::vector<Scratch::Run>& sorted_runs(Scratch& scratch);
   [[nodiscard]] bool within(const WindingNode& leaf, const glm::dvec3& from, double middle,
                             double distance) const;
   static void place(const Cube& cube, int step, WindingPoints& points);
+  static void place(const Cube& cube, const Voxels& voxels, WindingPoints& points);
   void caps_of(std::span<const std::uint32_t> leaves, std::vector<std::uint32_t>& caps) const;
 
   glm::ivec3 dims_;
