@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "mesh/edge_balance.h"
 #include "strata/hashbuffer/tile_lists.h"
 #include "strata/mesh/diagnose.h"
 #include "strata/raster/lattice_mesh.h"
@@ -84,18 +85,46 @@ Result<void> check_samples(const VoxelGrid& grid, const VoxelizeOptions& options
   return check_rays(longest, options);
 }
 
+/// Whether a mesh counts as closed.
+struct MeshClosedness {
+  bool closed = true;
+  /// Its edges that are unbalanced by index, if they were found and are few.
+  std::optional<std::vector<detail::EdgeSum>> seams = std::nullopt;
+};
+
+/// What is assumed of the mesh, or found out where it matters.
+MeshClosedness closedness_of(const TriangleSoup& mesh, const VoxelizeOptions& options,
+                             const Execution& execution) {
+  const bool matters = options.solid || options.open == OpenMode::kFail;
+  if (options.closedness != Closedness::kCheck || options.filter != nullptr || !matters) {
+    return {options.closedness != Closedness::kAssumeOpen};
+  }
+  MeshClosedness result;
+  auto seams = detail::unbalanced_by_index(mesh.triangles, mesh.positions.size(), execution);
+  if (seams.size() <= mesh.triangles.size() / 4) result.seams = seams;
+  result.closed =
+      detail::unbalanced_by_position<double>(std::move(seams), mesh.positions).empty() ||
+      (options.rule == InsideRule::kParity && diagnose(mesh, execution).even);
+  return result;
+}
+
 /// The solid of a mesh, slab by slab along options.axis. An open mesh is closed by caps, and what
 /// its winding numbers are other than those of the closed one is added
 /// (voxelize/open/winding_field.h).
 class SolidSlabs {
  public:
   /// Keeps references to all arguments but `execution`.
-  static Result<SolidSlabs> create(const LatticeMesh& mesh, const VoxelGrid& grid, bool closed,
-                                   const VoxelizeOptions& options, const Execution& execution) {
+  static Result<SolidSlabs> create(const LatticeMesh& mesh, const VoxelGrid& grid,
+                                   const MeshClosedness& found, const VoxelizeOptions& options,
+                                   const Execution& execution) {
     SolidSlabs result;
     const LatticeMesh* whole = &mesh;
-    if (!closed) {
-      if (auto caps = boundary_caps(mesh, execution); !caps.triangles.empty()) {
+    if (!found.closed) {
+      auto caps = boundary_caps(
+          mesh, found.seams
+                    ? *found.seams
+                    : detail::unbalanced_by_index(mesh.triangles, mesh.vertices.size(), execution));
+      if (!caps.triangles.empty()) {
         result.open_ = std::make_unique<Open>(mesh, std::move(caps), grid, execution.stop);
         if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
         whole = &result.open_->whole;
@@ -210,17 +239,6 @@ Result<void> check_options(const VoxelGrid& grid, const VoxelizeOptions& options
   return {};
 }
 
-/// What is assumed of the mesh, or found out where it matters.
-bool counts_as_closed(const TriangleSoup& mesh, const VoxelizeOptions& options,
-                      const Execution& execution) {
-  const bool matters = options.solid || options.open == OpenMode::kFail;
-  if (options.closedness != Closedness::kCheck || options.filter != nullptr || !matters) {
-    return options.closedness != Closedness::kAssumeOpen;
-  }
-  if (is_closed(mesh, execution)) return true;
-  return options.rule == InsideRule::kParity && diagnose(mesh, execution).even;
-}
-
 /// The surface of a mesh or of a tree, slab by slab.
 class ShellSlabs {
  public:
@@ -254,17 +272,18 @@ class ShellSlabs {
 class Slabs {
  public:
   /// Keeps references to all arguments but `execution`.
-  static Result<Slabs> create(const LatticeMesh& mesh, const VoxelGrid& grid, bool closed,
-                              const VoxelizeOptions& options, const Execution& execution) {
+  static Result<Slabs> create(const LatticeMesh& mesh, const VoxelGrid& grid,
+                              const MeshClosedness& found, const VoxelizeOptions& options,
+                              const Execution& execution) {
     Slabs result(grid, options.axis);
-    const bool open_surface = !closed && options.open == OpenMode::kSurface;
+    const bool open_surface = !found.closed && options.open == OpenMode::kSurface;
     if (options.surface || open_surface) {
       auto made = ShellSlabs::create(mesh, grid, options, execution);
       if (!made) return tl::unexpected(made.error());
       result.shell_ = *std::move(made);
     }
     if (options.solid && !open_surface) {
-      auto made = SolidSlabs::create(mesh, grid, closed, options, execution);
+      auto made = SolidSlabs::create(mesh, grid, found, options, execution);
       if (!made) return tl::unexpected(made.error());
       result.solid_ = *std::move(made);
     }
@@ -309,7 +328,8 @@ Result<VoxelizeReport> run(const TriangleSoup& mesh, const VoxelGrid& asked,
   Execution quiet = execution;  // inner phases do not report progress of their own
   quiet.progress = {};
   VoxelizeReport report;
-  report.closed = counts_as_closed(mesh, options, quiet);
+  const MeshClosedness found = closedness_of(mesh, options, quiet);
+  report.closed = found.closed;
   if (!report.closed && options.open == OpenMode::kFail) {
     return fail(ErrorCode::kGeometry, "the mesh is not closed");
   }
@@ -317,7 +337,7 @@ Result<VoxelizeReport> run(const TriangleSoup& mesh, const VoxelGrid& asked,
     return fail(ErrorCode::kGeometry,
                 "the mesh is not closed, and its surface alone has no filled fraction");
   }
-  auto slabs = Slabs::create(*lattice, grid, report.closed, options, quiet);
+  auto slabs = Slabs::create(*lattice, grid, found, options, quiet);
   if (!slabs) return tl::unexpected(slabs.error());
 
   SetChecksum checksum(asked);

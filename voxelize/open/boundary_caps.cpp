@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "mesh/disjoint_sets.h"
-#include "mesh/edge_balance.h"
 #include "raster/triangle_setup.h"
 
 namespace strata {
@@ -122,18 +121,24 @@ class Pieces {
         connected_.join(ends[i - 1], ends[i]);
       }
     }
-    for (const glm::uvec3& t : mesh.triangles) area_[connected_.find(t.x)].mesh += area_of(mesh, t);
   }
   void add_cap(const glm::uvec3& t) { area_[connected_.find(t.x)].caps += area_of(mesh_, t); }
+  /// Adds up the mesh's area, until pieces are known to be large. @pre all caps are added
+  void add_mesh() {
+    for (const glm::uvec3& t : mesh_.triangles) {
+      Area& area = area_[connected_.find(t.x)];
+      if (area.mostly_open()) area.mesh += area_of(mesh_, t);
+    }
+  }
   /// Whether the caps of the piece at a vertex are nearly as large as it is.
   [[nodiscard]] bool mostly_open(std::uint32_t vertex) {
-    const Area& area = area_[connected_.find(vertex)];
-    return 3 * area.caps >= 2 * area.mesh;
+    return area_[connected_.find(vertex)].mostly_open();
   }
 
  private:
   struct Area {
     Int128 mesh = 0, caps = 0;
+    [[nodiscard]] bool mostly_open() const { return 3 * caps >= 2 * mesh; }
   };
   const LatticeMesh& mesh_;
   detail::DisjointSets connected_;  ///< vertices
@@ -161,8 +166,7 @@ bool is_flat(const LatticeMesh& mesh, std::span<const glm::uvec3> caps) {
 
 }  // namespace
 
-BoundaryCaps boundary_caps(const LatticeMesh& mesh, const Execution& execution) {
-  const auto seams = detail::unbalanced_by_index(mesh.triangles, mesh.vertices.size(), execution);
+BoundaryCaps boundary_caps(const LatticeMesh& mesh, const std::vector<detail::EdgeSum>& seams) {
   BoundaryCaps result;
   if (seams.empty()) return result;
   const Boundary boundary = boundary_of(mesh, seams);
@@ -187,6 +191,7 @@ BoundaryCaps boundary_caps(const LatticeMesh& mesh, const Execution& execution) 
     }
     loops.push_back(caps.size());
   });
+  pieces.add_mesh();
   std::vector<glm::uvec3> sure;
   for (std::size_t i = 0; i + 1 < loops.size(); ++i) {
     const auto loop = std::span(caps).subspan(loops[i], loops[i + 1] - loops[i]);

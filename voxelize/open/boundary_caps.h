@@ -4,7 +4,7 @@
 #include <glm/vec3.hpp>
 #include <vector>
 
-#include "strata/core/execution.h"
+#include "mesh/edge_balance.h"
 #include "strata/raster/lattice_mesh.h"
 
 // Triangles that close an open mesh. Private to voxelize/.
@@ -22,6 +22,8 @@ struct BoundaryCaps {
 
 /// No triangles when the snapped mesh is closed. The same ones, up to vertices of equal positions,
 /// for any order of the mesh's.
-[[nodiscard]] BoundaryCaps boundary_caps(const LatticeMesh& mesh, const Execution& execution);
+/// @param seams  detail::unbalanced_by_index() of the mesh
+[[nodiscard]] BoundaryCaps boundary_caps(const LatticeMesh& mesh,
+                                         const std::vector<detail::EdgeSum>& seams);
 
 }  // namespace strata
