@@ -198,9 +198,7 @@ Result<ContourMesh> run(const TriangleSoup& mesh, const VoxelGrid& grid,
   }
   std::unique_ptr<Capped> capped;
   if (!closed) {
-    const auto seams =
-        detail::unbalanced_by_index(lattice->triangles, lattice->vertices.size(), quiet);
-    if (auto caps = boundary_caps(*lattice, seams); !caps.triangles.empty()) {
+    if (auto caps = boundary_caps(*lattice, {}, quiet); !caps.triangles.empty()) {
       capped = std::make_unique<Capped>(*lattice, std::move(caps), grid, execution.stop);
     }
   }

@@ -9,9 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "mesh/edge_balance.h"
 #include "strata/hashbuffer/tile_lists.h"
-#include "strata/mesh/diagnose.h"
 #include "strata/raster/lattice_mesh.h"
 #include "strata/voxelize/checksum.h"
 #include "strata/voxelize/grid_fit.h"
@@ -85,13 +83,6 @@ Result<void> check_samples(const VoxelGrid& grid, const VoxelizeOptions& options
   return check_rays(longest, options);
 }
 
-/// Whether a mesh counts as closed.
-struct MeshClosedness {
-  bool closed = true;
-  /// Its edges that are unbalanced by index, if they were found and are few.
-  std::optional<std::vector<detail::EdgeSum>> seams = std::nullopt;
-};
-
 /// What is assumed of the mesh, or found out where it matters.
 MeshClosedness closedness_of(const TriangleSoup& mesh, const VoxelizeOptions& options,
                              const Execution& execution) {
@@ -99,13 +90,7 @@ MeshClosedness closedness_of(const TriangleSoup& mesh, const VoxelizeOptions& op
   if (options.closedness != Closedness::kCheck || options.filter != nullptr || !matters) {
     return {options.closedness != Closedness::kAssumeOpen};
   }
-  MeshClosedness result;
-  auto seams = detail::unbalanced_by_index(mesh.triangles, mesh.positions.size(), execution);
-  if (seams.size() <= mesh.triangles.size() / 4) result.seams = seams;
-  result.closed =
-      detail::unbalanced_by_position<double>(std::move(seams), mesh.positions).empty() ||
-      (options.rule == InsideRule::kParity && diagnose(mesh, execution).even);
-  return result;
+  return find_closedness(mesh, options.rule == InsideRule::kParity, execution);
 }
 
 /// The solid of a mesh, slab by slab along options.axis. An open mesh is closed by caps, and what
@@ -120,11 +105,7 @@ class SolidSlabs {
     SolidSlabs result;
     const LatticeMesh* whole = &mesh;
     if (!found.closed) {
-      auto caps = boundary_caps(
-          mesh, found.seams
-                    ? *found.seams
-                    : detail::unbalanced_by_index(mesh.triangles, mesh.vertices.size(), execution));
-      if (!caps.triangles.empty()) {
+      if (auto caps = boundary_caps(mesh, found, execution); !caps.triangles.empty()) {
         result.open_ = std::make_unique<Open>(mesh, std::move(caps), grid, execution.stop);
         if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
         whole = &result.open_->whole;

@@ -9,6 +9,7 @@
 
 #include "mesh/disjoint_sets.h"
 #include "raster/triangle_setup.h"
+#include "strata/mesh/diagnose.h"
 
 namespace strata {
 namespace {
@@ -166,7 +167,22 @@ bool is_flat(const LatticeMesh& mesh, std::span<const glm::uvec3> caps) {
 
 }  // namespace
 
-BoundaryCaps boundary_caps(const LatticeMesh& mesh, const std::vector<detail::EdgeSum>& seams) {
+MeshClosedness find_closedness(const TriangleSoup& mesh, bool even_is_closed,
+                               const Execution& execution) {
+  MeshClosedness result;
+  auto seams = detail::unbalanced_by_index(mesh.triangles, mesh.positions.size(), execution);
+  if (seams.size() <= mesh.triangles.size() / 4) result.seams = seams;
+  result.closed =
+      detail::unbalanced_by_position<double>(std::move(seams), mesh.positions).empty() ||
+      (even_is_closed && diagnose(mesh, execution).even);
+  return result;
+}
+
+BoundaryCaps boundary_caps(const LatticeMesh& mesh, const MeshClosedness& found,
+                           const Execution& execution) {
+  const auto seams =
+      found.seams ? *found.seams
+                  : detail::unbalanced_by_index(mesh.triangles, mesh.vertices.size(), execution);
   BoundaryCaps result;
   if (seams.empty()) return result;
   const Boundary boundary = boundary_of(mesh, seams);
