@@ -28,6 +28,8 @@ struct EyeSurfaces {
   /// Relative to a point on the view axis, so that floats suffice. kNowhere: nothing is seen.
   std::vector<glm::vec3> positions;
   std::vector<glm::vec3> normals;  ///< of the faces, of length 1, towards the eye
+  /// Points of curved surfaces are not 0: their facets are none to be seen. Empty: there are none.
+  std::vector<std::uint8_t> curved;
 
   static constexpr glm::vec3 kNowhere{0.0f, 0.0f, -3e18f};
   void resize(int columns, int rows);

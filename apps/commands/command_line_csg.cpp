@@ -95,8 +95,7 @@ void define_films(CLI::App& app, CsgWords& csg) {
 
 void define_picture_quality(CLI::App& app, CsgWords& csg) {
   app.add_option("--colorscheme", csg.scheme,
-                 "Neutral, or one of OpenSCAD's, with its lights and facets (default: Neutral; of "
-                 "strata oit Cornfield)")
+                 "Neutral, or one of OpenSCAD's, with its lights and facets (default: Neutral)")
       ->type_name("SCHEME")
       ->group(kLookGroup);
   app.add_option("--quality", csg.quality, "Samples per pixel: 1, 8 or 16 (default: normal)")

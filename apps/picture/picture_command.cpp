@@ -25,9 +25,6 @@
 namespace strata::apps {
 namespace {
 
-/// The colour of the usual backdrop.
-constexpr glm::u8vec3 kGround{0xf4, 0xf5, 0xf7};
-
 /// The plane of voxels that --slice means. Indices are those of the file.
 Result<VoxelSlice> slice_of(const PictureCommand::Slice& asked, const VoxelGrid& grid,
                             const glm::ivec3& first_index, const std::string& file) {
@@ -99,7 +96,8 @@ class VoxelRun {
   [[nodiscard]] Result<Picture> on_backdrop(Result<Picture> picture) const {
     if (!picture) return picture;
     const csg::ColourScheme* scheme = command_.picture.scheme;
-    const Backdrop usual = gradient_backdrop(scheme != nullptr ? scheme->background : kGround);
+    const Backdrop usual =
+        plain_backdrop((scheme != nullptr ? *scheme : csg::default_scheme()).background);
     lay_over(*picture, command_.picture.backdrop.value_or(usual));
     return picture;
   }

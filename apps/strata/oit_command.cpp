@@ -160,7 +160,7 @@ Result<void> OitRun::load() {
 
 transparency::FrameOptions OitRun::frame_options() const {
   const csg::ColourScheme& scheme =
-      command_.picture.scheme != nullptr ? *command_.picture.scheme : csg::colour_schemes().front();
+      command_.picture.scheme != nullptr ? *command_.picture.scheme : csg::default_scheme();
   transparency::FrameOptions options;
   options.size = command_.size;
   options.samples = command_.picture.samples;

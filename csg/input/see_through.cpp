@@ -222,8 +222,7 @@ Result<SeeThrough> SeeThrough::make(Scene scene, const SeeThroughOptions& option
   if (options.opacity && !(*options.opacity >= 0.0f && *options.opacity <= 1.0f)) {
     return fail(ErrorCode::kUsage, "the opacity must be 0 to 1, got {}", *options.opacity);
   }
-  const ColourScheme& scheme =
-      options.scheme != nullptr ? *options.scheme : colour_schemes().front();
+  const ColourScheme& scheme = options.scheme != nullptr ? *options.scheme : default_scheme();
   SeeThrough result;
   result.parts_ = std::make_shared<Parts>();
   result.parts_->opacity = opacity_of(scene, options);

@@ -252,7 +252,7 @@ Result<void> Preview::Impl::look_around(const View& whole, const ColourScheme& s
     }
     normals.make(seen, crease, quiet);
   }
-  openness = ViewOpenness(whole, image, geometry, quiet);
+  openness = ViewOpenness(whole, image, geometry, normals, quiet);
   if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
   return {};
 }

@@ -5,6 +5,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
+#include <iterator>
 
 namespace strata::csg {
 namespace {
@@ -78,7 +79,7 @@ View ViewOpenness::reduced(const View& whole) {
 }
 
 ViewOpenness::ViewOpenness(const View& whole, const SurfaceImage& image, const Geometry& geometry,
-                           const Execution& execution)
+                           const SolidNormals& normals, const Execution& execution)
     : step_(static_cast<float>(step_of(whole.size))) {
   const View view = reduced(whole);
   const glm::dmat4 image_from_eye = view.image_from_world * glm::inverse(view.eye_from_world);
@@ -90,6 +91,7 @@ ViewOpenness::ViewOpenness(const View& whole, const SurfaceImage& image, const G
   const auto nearest = std::min_element(image.depth.begin(), image.depth.end());
   surfaces_.origin_distance = nearest != image.depth.end() ? view.distance(*nearest) : view.near;
   surfaces_.resize(image.width, image.height);
+  if (!normals.empty()) surfaces_.curved.assign(surfaces_.positions.size(), 0);
   const auto width = static_cast<std::size_t>(image.width);
   const glm::dmat3 eye_from_world(view.eye_from_world);
   const FaceDistance face_distance(view);
@@ -97,6 +99,7 @@ ViewOpenness::ViewOpenness(const View& whole, const SurfaceImage& image, const G
     std::uint32_t solid = SurfaceImage::kNone, face = 0;
     glm::dvec3 normal(0.0, 0.0, 1.0);
     double offset = 0.0;  // of the face's plane
+    bool curved = false;
     for (std::size_t u = 0; u < width; ++u) {
       const std::size_t i = v * width + u;
       surfaces_.positions[i] = EyeSurfaces::kNowhere;
@@ -112,6 +115,8 @@ ViewOpenness::ViewOpenness(const View& whole, const SurfaceImage& image, const G
         const double length = glm::length(across);
         normal = length > 0 ? across / length : glm::dvec3(0, 0, 1);
         offset = glm::dot(normal, glm::dvec3(view.eye_from_world * glm::dvec4(a, 1.0)));
+        const CornerNormals* of = normals.of(solid);
+        curved = of != nullptr && !of->flat(face & ~SurfaceImage::kExit);
       }
       const double x = (static_cast<double>(u) + 0.5 - surfaces_.centre.x) / surfaces_.scale;
       const double y = (surfaces_.centre.y - static_cast<double>(v) - 0.5) / surfaces_.scale;
@@ -119,8 +124,12 @@ ViewOpenness::ViewOpenness(const View& whole, const SurfaceImage& image, const G
       const double wide = view.perspective ? distance : 1.0;
       surfaces_.positions[i] = {x * wide, y * wide, surfaces_.origin_distance - distance};
       surfaces_.normals[i] = normal;
+      if (curved) surfaces_.curved[i] = 1;
     }
   });
+  if (std::ranges::count(surfaces_.curved, 0) == std::ssize(surfaces_.curved)) {
+    surfaces_.curved.clear();
+  }
   const double reach = kReach * extent(surfaces_, execution);
   if (reach > 0) open_ = openness(surfaces_, reach, execution);
 }

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "csg/geometry.h"
+#include "csg/picture/solid_normals.h"
 #include "picture/occlusion.h"
 #include "strata/core/execution.h"
 #include "strata/csg/surface/surface_image.h"
@@ -19,9 +20,10 @@ class ViewOpenness {
   /// The view that occlusion looks at: half of the picture's resolution, all of it for small
   /// pictures, at most 1024 pixels along a side.
   static View reduced(const View& whole);
-  /// @param image  the surfaces of reduced(whole)
+  /// @param image    the surfaces of reduced(whole)
+  /// @param normals  of curved solids
   ViewOpenness(const View& whole, const SurfaceImage& image, const Geometry& geometry,
-               const Execution& execution);
+               const SolidNormals& normals, const Execution& execution);
 
   [[nodiscard]] bool all_open() const { return open_.empty(); }
   /// Where the plane of a face is, for `at`.

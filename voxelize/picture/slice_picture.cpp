@@ -14,6 +14,8 @@ namespace {
 
 /// The part of the grid without solid voxels.
 constexpr glm::vec3 kEmpty{0.955f, 0.955f, 0.96f};
+/// What goes around the grid.
+constexpr Rgba kFrame{150, 152, 156, 255};
 
 class SliceDrawing {
  public:
@@ -35,6 +37,7 @@ class SliceDrawing {
     } else {
       for_rows(execution, [&](int u, int v) { return solids(u, v); });
     }
+    frame();
     return std::move(picture_);
   }
 
@@ -45,6 +48,19 @@ class SliceDrawing {
       Rgba* pixels = picture_.pixels.data() + row * static_cast<std::size_t>(picture_.width);
       for (int u = 0; u < picture_.width; ++u) pixels[u] = colour(u, static_cast<int>(row));
     });
+  }
+
+  /// A line around the grid: empty voxels may be as light as what is no voxel.
+  void frame() {
+    const glm::ivec2 begin = glm::ivec2(glm::floor(place_.begin())) - 1;
+    const glm::ivec2 end = glm::ivec2(glm::ceil(place_.end()));
+    const auto put = [&](int u, int v) {
+      if (u < 0 || v < 0 || u >= picture_.width || v >= picture_.height) return;
+      picture_.pixels[static_cast<std::size_t>(v) * static_cast<std::size_t>(picture_.width) +
+                      static_cast<std::size_t>(u)] = kFrame;
+    };
+    for (int u = begin.x; u <= end.x; ++u) put(u, begin.y), put(u, end.y);
+    for (int v = begin.y; v <= end.y; ++v) put(begin.x, v), put(end.x, v);
   }
 
   /// The mean of a pixel's samples: colours of labels.

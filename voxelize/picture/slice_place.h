@@ -41,6 +41,9 @@ class SlicePlace {
     at[frame_.w] = slice_.index;
     return at;
   }
+  /// The corners of the slice in pixels, the upper left one and the lower right one.
+  [[nodiscard]] const glm::dvec2& begin() const { return corner_; }
+  [[nodiscard]] glm::dvec2 end() const { return corner_ + pixels_ * glm::dvec2(columns_, rows_); }
   /// Pixels a voxel.
   [[nodiscard]] const glm::dvec2& pixels() const { return pixels_; }
 

@@ -21,7 +21,7 @@ struct SeeThroughOptions {
   /// Opacity, in [0, 1], of all solids that are not transparent by an alpha below 1. Empty: 1 if
   /// the scene has such an alpha or a ghost, else 0.5.
   std::optional<float> opacity;
-  const ColourScheme* scheme = nullptr;  ///< null: Cornfield
+  const ColourScheme* scheme = nullptr;  ///< null: default_scheme()
   /// The solids are meshes, just united: every face is seen, also within others, and also of meshes
   /// that are not closed. False: what is seen are the surfaces of the operands of the unions at the
   /// top, as the pictures of Preview show them.

@@ -192,7 +192,8 @@ TEST_F(Oit, TransparentScenesLookAsStrataCsgDrawsThem) {
       " cylinder(h = 40, r1 = 4, r2 = 4, center = true, $fn = 16);\n}\n"
       "multmatrix([[1,0,0,-4],[0,1,0,6],[0,0,1,-9],[0,0,0,1]]) cube(size = [14, 10, 6]);\n"
       "%multmatrix([[1,0,0,0],[0,1,0,-10],[0,0,1,0],[0,0,0,1]]) sphere(r = 4, $fn = 12);\n");
-  run({"scene.csg", "-o", "oit.png", "--size=60,60"});
+  // Whose facets are plain, and whose corners are not dark.
+  run({"scene.csg", "-o", "oit.png", "--size=60,60", "--colorscheme=Cornfield"});
   ASSERT_EQ(
       place.run({"csg", "scene.csg", "-o", "csg.png", "--size=60,60", "--colorscheme=Cornfield"})
           .exit_code,
