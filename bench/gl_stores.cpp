@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "bench/gl_transparency.h"
+#include "bench/support.h"
 #include "hashbuffer/gl/hash_store.h"
 #include "hashbuffer/gl/scan_store.h"
 #include "raster/gl/compute.h"
@@ -44,10 +45,6 @@ template <class T>
 T need(Result<T> result) {
   if (!result) give_up(result.error());
   if constexpr (!std::is_void_v<T>) return std::move(*result);
-}
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
 // --- the scene ----------------------------------------------------------------------------------

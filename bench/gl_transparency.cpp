@@ -4,6 +4,7 @@
 // are compared with the CPU's before they are timed.
 
 #include "bench/gl_transparency.h"
+#include "bench/support.h"
 
 #include <fmt/format.h>
 #include <algorithm>
@@ -27,10 +28,6 @@ namespace {
 namespace oit = strata::transparency;
 using Clock = std::chrono::steady_clock;
 constexpr int kSide = 1024;
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 /// Frames a second that were published for a technique, for the mesh; 0: none.
 double published(std::string_view name) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -47,6 +48,11 @@ void run_interleaved(std::vector<Participant>& participants, int rounds, double 
 
 /// The times of a single run.
 Sample time_once(const std::function<std::shared_ptr<void>()>& run);
+
+/// Wall time.
+[[nodiscard]] inline double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
 
 [[nodiscard]] double median(std::vector<double> values);
 [[nodiscard]] Sample median(const std::vector<Sample>& samples);

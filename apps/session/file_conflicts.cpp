@@ -38,6 +38,13 @@ bool holds(const std::string& folder, const std::string& file) {
   return fs::is_directory(folder, error) && lies_below(resolved(file).string(), folder);
 }
 
+/// Whether one works in a folder or below it: files are written there without a thought.
+bool is_worked_in(const std::string& folder) {
+  std::error_code error;
+  const fs::path here = fs::current_path(error);
+  return fs::equivalent(folder, here, error) || lies_below(here.string(), folder);
+}
+
 tl::unexpected<Error> overwrites(const FileUse& out, std::string_view what,
                                  const std::string& path) {
   return fail(ErrorCode::kUsage, "{} {} would overwrite {} {}", out.asked_by, out.path, what, path);
@@ -64,7 +71,7 @@ Result<void> check_files(const std::vector<FileUse>& read, const std::vector<Fil
       if (same_file(in.path, out.path) || holds(out.path, in.path)) {
         return overwrites(out, in.asked_by, in.path);
       }
-      if (holds(in.path, out.path)) {
+      if (holds(in.path, out.path) && !is_worked_in(in.path)) {
         return fail(ErrorCode::kUsage, "{} {} must not lie in {} {}", out.asked_by, out.path,
                     in.asked_by, in.path);
       }

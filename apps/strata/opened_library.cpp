@@ -62,7 +62,8 @@ struct CopyRecord {
   const char* const text = dlerror();
   const std::string_view what = text == nullptr ? "no reason is known" : text;
   give_up(what, what.ends_with(std::strerror(ENOMEM)) || what.ends_with("out of memory") ||
-                    what.ends_with("cannot allocate memory in static TLS block"));
+                    what.ends_with("cannot allocate memory in static TLS block") ||
+                    what.ends_with("failed to map segment from shared object"));
 }
 
 /// Writes into memory that is read-only but for this moment.

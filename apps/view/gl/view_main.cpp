@@ -189,7 +189,13 @@ class Program final : public Stage {
       if (std::exchange(viewer_->wants_screenshot, false)) keep_screenshot();
       tell_export();
       const std::size_t before = script_.position();
-      if (auto done = script_.step(*viewer_, *this); !done) return done;
+      if (auto done = script_.step(*viewer_, *this); !done) {
+        // Why a command finds nothing, unless that is what it says.
+        if (done.error().message.find(viewer_->load_error()) == std::string::npos) {
+          tell_load_error();
+        }
+        return done;
+      }
       tell_load_error();
       if (script_.position() != before) touch();
       if (script_.quit()) return {};

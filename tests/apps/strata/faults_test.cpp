@@ -70,7 +70,7 @@ TEST_F(Faults, FilesThatCannotBeReadAreCode3) {
   fails(to_vdb("empty.obj"), 3, "empty.obj");
   put("words.obj", "this is no mesh\n");
   fails(to_vdb("words.obj"), 3, "words.obj");
-  put("mesh.unknown", kTetrahedron);
+  put("mesh.unknown", "neither name nor content\n");
   fails(to_vdb("mesh.unknown"), 3, "mesh.unknown");
   put("points.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n");
   fails(to_vdb("points.obj"), 3, "points.obj");

@@ -92,6 +92,42 @@ TEST(VisibleSurface, IsTheOneOfTheFullListsForAnyTree) {
   }
 }
 
+// Solids that a ray meets once are searched by their intervals where the tree is an intersection
+// of them minus others (csg/surface/tile_surface_simd.cpp).
+TEST(VisibleSurface, OfAnIntersectionMinusOthersIsTheOneOfTheFullLists) {
+  std::size_t seen = 0;
+  for (int seed = 0; seed < 120; ++seed) {
+    RandomTree random(static_cast<std::uint64_t>(seed) + 1300);
+    Tree tree;
+    const bool on_grid = seed % 3 == 0;
+    std::vector<Tree::NodeId> common, operands;
+    for (int i = random.pick(1, 4); i > 0; --i) {
+      const glm::dvec3 low(random.pick(-6, -3), random.pick(-6, -3), random.pick(-6, -3));
+      const glm::dvec3 high(random.pick(3, 6), random.pick(3, 6), random.pick(3, 6));
+      Solid solid{std::make_shared<TriangleSoup>(i % 2 == 1 ? make_box(low, high)
+                                                            : make_icosphere(high.x + 1, 3))};
+      if (!on_grid) {
+        solid.world_from_mesh = glm::rotate(glm::dmat4(1), random.real(0, 1), glm::dvec3(1, 2, 3));
+      }
+      common.push_back(tree.add_solid(std::move(solid)));
+    }
+    operands.push_back(tree.add(Operation::kIntersection, common));
+    for (int i = random.pick(0, 20); i > 0; --i) {
+      operands.push_back(tree.add_solid(random.solid(on_grid)));
+    }
+    tree.set_root(tree.add(Operation::kDifference, operands));
+    Preview preview(tree, {}, 0.0);
+    const Camera camera = random_camera(random, preview.box());
+    expect_same(tree, camera, {120, 100}, "seed " + std::to_string(seed));
+    if (HasFailure()) return;
+    const auto image = preview.draw(make_view(camera, {120, 100}, preview.box()).value());
+    ASSERT_TRUE(image.has_value());
+    seen += static_cast<std::size_t>(std::ranges::count_if(
+        (*image)->depth, [](std::uint32_t depth) { return depth != SurfaceImage::kNone; }));
+  }
+  EXPECT_GT(seen, 120000u);
+}
+
 TEST(VisibleSurface, IsTheOneOfTheFullListsWithTheEyeInTheScene) {
   for (int seed = 0; seed < 60; ++seed) {
     RandomTree random(static_cast<std::uint64_t>(seed) + 500);
