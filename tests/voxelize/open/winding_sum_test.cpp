@@ -48,7 +48,9 @@ struct Told {
   std::vector<double> exact;
 };
 
-Told tell(const WindingCaps& caps, const WindingView& view, WindingPoints points, WindingSum& sum) {
+Told tell(const WindingCaps& caps, const WindingView& view, const WindingPoints& centres,
+          WindingSum& sum) {
+  WindingPoints points = centres;
   Told result;
   sum.write(Way::kExact, caps, view, points);
   result.exact.assign(points.angle, points.angle + points.count);
