@@ -4,7 +4,9 @@
 #include <sys/stat.h>
 #include <sys/statvfs.h>
 
+#include <filesystem>
 #include <string>
+#include <system_error>
 
 namespace strata {
 namespace {
@@ -21,10 +23,13 @@ Result<void> check_room(const std::string& path, std::uint64_t bytes) {
   struct stat there {};
   const bool exists = stat(path.c_str(), &there) == 0;
   if (path == "-" || (exists && !S_ISREG(there.st_mode) && !S_ISDIR(there.st_mode))) return {};
-  std::string folder = path.substr(0, path.rfind('/') + 1);
+  std::error_code unresolved;  // a link is followed, as AtomicFile does
+  const std::string target = exists ? std::filesystem::canonical(path, unresolved).string() : path;
+  std::string folder = target.substr(0, target.rfind('/') + 1);
   if (folder.empty()) folder = ".";
   struct statvfs disk {};
   if (statvfs(folder.c_str(), &disk) != 0) return {};  // whoever creates the file says why
+  if (disk.f_blocks == 0) return {};                   // the file system does not say
   const std::uint64_t room = std::uint64_t{disk.f_bavail} * std::uint64_t{disk.f_frsize};
   if (bytes <= room) return {};
   return fail(ErrorCode::kLimit, "{}: the file takes {}, but the disk has room for {}", path,

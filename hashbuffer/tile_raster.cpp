@@ -1,5 +1,8 @@
 #include "hashbuffer/tile_store.h"
 
+#include <algorithm>
+#include <vector>
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "hashbuffer/tile_raster.cpp"
 #include <hwy/foreach_target.h>
@@ -384,7 +387,10 @@ template <class Record>
 TileRasterResult raster_log(const TileInput& input, TileLog<Record>& log) {
   LogSink<Record> sink(log, input.clip);
   if (input.in_order) {
-    rasterize_triangles(input.mesh, input.target, input.triangles, input.clip, sink);
+    // A tile's triangles come in an order that the number of threads decides.
+    std::vector<std::uint32_t> triangles(input.triangles.begin(), input.triangles.end());
+    std::sort(triangles.begin(), triangles.end());
+    rasterize_triangles(input.mesh, input.target, triangles, input.clip, sink);
   } else {
     rasterize_spans(input.mesh, input.target, input.triangles, input.clip, sink);
   }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstring>
 #include <string_view>
 #include <utility>
 
@@ -93,10 +94,16 @@ Result<Hdf5Chunks> Hdf5Chunks::open(ReadContext& context, hid_t dataset, hid_t m
   // nothing else tells.
   const Hdf5Handle space(H5Dget_space(dataset), H5Sclose);
   hsize_t there = 0;
-  if (chunks.filters_.empty() && (H5Dget_num_chunks(dataset, *space, &there) < 0 ||
-                                  H5Dget_storage_size(dataset) != there * chunks.bytes_)) {
-    return fail(ErrorCode::kInput, "{}: its chunks have not the size that they should",
-                context.path);
+  if (chunks.filters_.empty()) {
+    if (H5Dget_num_chunks(dataset, *space, &there) < 0 ||
+        H5Dget_storage_size(dataset) != there * chunks.bytes_) {
+      return fail(ErrorCode::kInput, "{}: its chunks have not the size that they should",
+                  context.path);
+    }
+    // One chunk may be too large and another too small by as much. Pages that are not written cost
+    // nothing.
+    chunks.plain_ = std::make_unique_for_overwrite<std::byte[]>(
+        std::max<std::size_t>(there * chunks.bytes_, chunks.bytes_));
   }
   return chunks;
 }
@@ -176,9 +183,18 @@ Result<void> Hdf5Chunks::load(const Hdf5Session& session, const std::vector<hsiz
   if (size > bytes_ + bytes_ / 64 + 1024) return damaged("it is larger than a chunk");
   packed_.resize(size);
   std::uint32_t left_out = 0;
-  if (H5Dread_chunk(dataset_, H5P_DEFAULT, begin.data(), &left_out, packed_.data()) < 0) {
-    return damaged("it cannot be read");
+  std::byte* const to = plain_ ? plain_.get() : packed_.data();
+  // A chunk without filters that is too small leaves the mark at its end, whatever it is.
+  constexpr std::byte kMarks[] = {std::byte{0x5a}, std::byte{0xa5}};
+  for (const std::byte mark : kMarks) {
+    if (plain_) to[bytes_ - 1] = mark;
+    if (H5Dread_chunk(dataset_, H5P_DEFAULT, begin.data(), &left_out, to) < 0) {
+      return damaged("it cannot be read");
+    }
+    if (!plain_ || to[bytes_ - 1] != mark) break;
+    if (mark == kMarks[1]) return damaged("it is smaller than a chunk");
   }
+  if (plain_) std::memcpy(packed_.data(), to, std::min<std::size_t>(size, bytes_));
   for (std::size_t axis = 0; edges_are_plain_ && axis < shape_.size(); ++axis) {
     if (begin[axis] + sides_[axis] > shape_[axis]) left_out = ~std::uint32_t{0};
   }

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -54,6 +55,8 @@ class Hdf5Chunks {
   std::vector<std::byte> fill_;  ///< a number where there is no chunk
   std::vector<hsize_t> at_;      ///< of the chunk that is being read
   std::vector<std::byte> packed_, chunk_;
+  /// Room for all chunks, where they have no filters: the index says how much is read into it.
+  std::unique_ptr<std::byte[]> plain_;
 };
 
 }  // namespace strata

@@ -4,6 +4,7 @@
 #include <exception>
 #include <filesystem>
 #include <new>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -28,13 +29,16 @@ std::string materials_of(const std::string& path) {
   return std::filesystem::path(path).replace_extension(".mtl").string();
 }
 
-/// The input's mesh files alone, to be read with their parts and colours.
+/// The input's mesh files alone, to be read with their parts and colours. A pipe has nothing left,
+/// and of a file that is gone the mesh that is shown is all there is.
 csg::SceneInput mesh_files_of(const csg::SceneInput& input) {
   csg::SceneInput meshes = input;
   meshes.attributes = true;
   meshes.expression.clear();
   std::erase_if(meshes.files, [&](const std::string& path) {
-    return path == "-" || csg::kind_of(path, input).is_scene;
+    std::error_code gone;
+    return path == "-" || !std::filesystem::is_regular_file(path, gone) ||
+           csg::kind_of(path, input).is_scene;
   });
   return meshes;
 }

@@ -4,6 +4,7 @@
 #include <hdf5.h>
 
 #include <algorithm>
+#include <cstring>
 #include <string>
 #include <vector>
 
@@ -175,6 +176,25 @@ TEST_F(Hdf5Files, ChunksThatAreNotThereHaveTheFillValue) {
   ASSERT_TRUE(read) << read.error().message;
   const auto labels = to_dense_labels(read->set).value();
   EXPECT_EQ(std::count(labels.begin(), labels.end(), 7u), 4 * 4 * 4);
+}
+
+TEST_F(Hdf5Files, ChunksOfWrongSizesThatCancelAreDamaged) {
+  constexpr std::uint32_t kBytes = 64 * 64 * 64 * 2;
+  add("voxels", {128, 64, 64}, chunks({64, 64, 64}));
+  close();
+  std::string bytes = testkit::bytes_of(path_);
+  const std::size_t tree = bytes.find("TREE\x01");  // a node of chunks; its keys begin 24 bytes on
+  ASSERT_NE(tree, std::string::npos);
+  constexpr std::size_t kKeys = 24, kStride = 48;
+  for (const std::uint32_t size : {2 * kBytes - 1, 1u}) {
+    const std::size_t at = tree + kKeys + (size == 1 ? kStride : 0);
+    std::uint32_t before = 0;
+    std::memcpy(&before, bytes.data() + at, sizeof before);
+    ASSERT_EQ(before, kBytes);
+    std::memcpy(bytes.data() + at, &size, sizeof size);
+  }
+  folder_.write("other.h5", bytes);
+  expect_error(ErrorCode::kInput, "smaller than a chunk");
 }
 
 TEST(Hdf5Damage, OfAnyByteEndsInAnOrderlyWay) {
