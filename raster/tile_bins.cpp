@@ -173,7 +173,7 @@ class TilesOfRange {
     const std::uint32_t u0 = box.u0 / kTileSide, v0 = box.v0 / kTileSide;
     const std::uint32_t u1 = (box.u1 - 1) / kTileSide, v1 = (box.v1 - 1) / kTileSide;
     const bool covers = box.covers(), one = (u0 == u1) & (v0 == v1);
-    return {covers & one ? v0 * row_ + u0 - skipped_ : none_, covers && !one};
+    return {(covers & one) ? v0 * row_ + u0 - skipped_ : none_, covers && !one};
   }
   template <class Body>
   void for_each_of_several(Body&& body) const {
