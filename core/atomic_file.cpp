@@ -191,6 +191,13 @@ void remove_temporary_files() noexcept {
 
 // --- AtomicFile ---------------------------------------------------------------------------------
 
+std::string follow_link(const std::string& path) {
+  std::error_code error;
+  if (!std::filesystem::is_symlink(path, error)) return path;
+  const std::filesystem::path target = std::filesystem::canonical(path, error);
+  return error ? path : target.string();
+}
+
 Result<AtomicFile> AtomicFile::create(const std::string& path) {
   AtomicFile file;
   file.path_ = path;
@@ -212,12 +219,7 @@ Result<AtomicFile> AtomicFile::create(const std::string& path) {
     return file;
   }
 
-  file.target_ = path;
-  std::error_code ignored;
-  if (exists && std::filesystem::is_symlink(path, ignored)) {
-    const std::filesystem::path resolved = std::filesystem::canonical(path, ignored);
-    if (!ignored) file.target_ = resolved.string();
-  }
+  file.target_ = follow_link(path);
   const auto made =
       make_temporary(path, file.target_, false, file.temporary_, file.slot_, [&](const char* name) {
         file.descriptor_ = open(name, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC,
@@ -376,10 +378,7 @@ Result<AtomicFolder> AtomicFolder::create(const std::string& path) {
     const bool empty = std::filesystem::is_empty(name, reason);
     if (reason) return cannot_create(path, reason.value());
     if (!empty) return cannot_create(path, ENOTEMPTY);
-    if (std::filesystem::is_symlink(name, reason)) {
-      const std::filesystem::path resolved = std::filesystem::canonical(name, reason);
-      if (!reason) folder.target_ = resolved.string();
-    }
+    folder.target_ = follow_link(folder.target_);
   }
   const auto made =
       make_temporary(path, folder.target_, true, folder.temporary_, folder.slot_,

@@ -10,6 +10,10 @@
 
 namespace strata {
 
+/// The file or folder that a symbolic link leads to; the path itself where it is no link, or one to
+/// nothing.
+[[nodiscard]] std::string follow_link(const std::string& path);
+
 /// A file that appears under its name only when complete: bytes go to a temporary file beside it,
 /// which commit() renames. Destroyed uncommitted, or on SIGINT/SIGTERM (remove_temporary_files), it
 /// leaves nothing. Two kinds of target are written directly, since nothing can be renamed onto

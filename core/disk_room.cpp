@@ -4,9 +4,9 @@
 #include <sys/stat.h>
 #include <sys/statvfs.h>
 
-#include <filesystem>
 #include <string>
-#include <system_error>
+
+#include "core/atomic_file.h"
 
 namespace strata {
 namespace {
@@ -23,8 +23,7 @@ Result<void> check_room(const std::string& path, std::uint64_t bytes) {
   struct stat there {};
   const bool exists = stat(path.c_str(), &there) == 0;
   if (path == "-" || (exists && !S_ISREG(there.st_mode) && !S_ISDIR(there.st_mode))) return {};
-  std::error_code unresolved;  // a link is followed, as AtomicFile does
-  const std::string target = exists ? std::filesystem::canonical(path, unresolved).string() : path;
+  const std::string target = follow_link(path);  // as AtomicFile writes it
   std::string folder = target.substr(0, target.rfind('/') + 1);
   if (folder.empty()) folder = ".";
   struct statvfs disk {};
