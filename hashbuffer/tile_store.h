@@ -114,7 +114,7 @@ struct TileInput {
   const RasterTarget& target;
   std::span<const std::uint32_t> triangles;
   PixelRect clip;         ///< the tile's pixels within the target
-  bool in_order = false;  ///< a log gets all fragments of a triangle before those of the next
+  bool in_order = false;  ///< a log gets fragments by the number of their triangle
 };
 
 TileRasterResult raster_into(const TileInput& input, TileTable<Record32>& table);
