@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Markdown tables from the csv files of bench/run, and what of the goals they reach.
+"""Markdown tables from the files of bench/run, and what of the goals they reach.
 
   tables.py RESULTS                    prints all sections
   tables.py RESULTS --into FILE.md     puts each between its lines <!-- begin NAME --> and <!-- end NAME -->
@@ -9,6 +9,7 @@ import argparse
 import csv
 import os
 import re
+import statistics
 
 
 def load(folder, name):
@@ -80,6 +81,8 @@ class Goals:
         self.reading = load(folder, "reading")
         self.processes = load(folder, "whole_process")
         self.distances = load(folder, "signed_distances")
+        self.frames = load(folder, "csg_frames")
+        self.scenes = load(folder, "csg_process")
         self.rows = []
 
     def add(self, what, bound, wall, cpu, at_most=False):
@@ -94,10 +97,10 @@ class Goals:
             "by wall time": short(value), "by CPU time": short(worst(cpu)) if cpu is not None else "",
             "reached": "-" if value != value else "yes" if reached else "**no**"})
 
-    def ratio(self, contender, side, threads, key):
-        """Values of a ratio column, over the generated meshes."""
+    def ratio(self, contender, side, threads, key, mesh="bumps"):
+        """Values of a ratio column, over the generated meshes, or one of them."""
         return [number(row[key]) for row in pick(self.voxelizers, contender=contender, side=side, threads=threads)
-                if row["mesh"].startswith("bumps")]
+                if row["mesh"].startswith(mesh)]
 
     def collect(self):
         for side, bound in ((1024, 100), (2048, 150)):
@@ -105,12 +108,17 @@ class Goals:
                      self.ratio("OpenVDB", side, 2, "wall / strata"), self.ratio("OpenVDB", side, 2, "cpu / strata"))
         self.add("OpenVDB / Strata, peak memory, 1024 a side", 10,
                  self.ratio("OpenVDB", 1024, 2, "peak / strata"), None)
-        self.add("Embree / Strata, 1024 a side, 1 thread", 10,
-                 self.ratio("Embree", 1024, 1, "wall / strata"), self.ratio("Embree", 1024, 1, "cpu / strata"))
-        for side, bound in ((1024, 4), (2048, 8)):
-            for name in ("bit grid XOR", "bit grid XOR, slabs"):
-                self.add(f"{name} / Strata, {side} a side, 1 thread", bound,
-                         self.ratio(name, side, 1, "wall / strata"), self.ratio(name, side, 1, "cpu / strata"))
+        for contender, side, mesh, bound in (
+                ("Embree", 1024, "bumps-82k", 17), ("Embree", 1024, "bumps-328k", 12),
+                ("bit grid XOR, slabs", 1024, "bumps-82k", 7), ("bit grid XOR, slabs", 1024, "bumps-328k", 6),
+                ("bit grid XOR, slabs", 2048, "bumps-82k", 25), ("bit grid XOR, slabs", 2048, "bumps-328k", 25)):
+            self.add(f"{contender} / Strata, {mesh}, {side} a side, 1 thread", bound,
+                     self.ratio(contender, side, 1, "wall / strata", mesh),
+                     self.ratio(contender, side, 1, "cpu / strata", mesh))
+        self.add("first call of a process / a later one, 1024 a side, 1 thread", 2,
+                 [number(row["first run ms"]) / number(row["wall ms"])
+                  for row in pick(self.voxelizers, contender="strata", side=1024, threads=1)
+                  if row["mesh"].startswith("bumps")], None, True)
         store = {key: [a / b for a, b in zip(
             (number(row[key]) for row in pick(self.voxelizers, contender="strata ha", threads=1)),
             (number(row[key]) for row in pick(self.voxelizers, contender="strata scan", threads=1)))]
@@ -122,6 +130,7 @@ class Goals:
         self.process_goals()
         self.reading_goals()
         self.growth_goals()
+        self.frame_goals()
         return table(self.rows, {key: key for key in self.rows[0]})
 
     def process_goals(self):
@@ -129,6 +138,12 @@ class Goals:
             rows = pick(self.processes, program="OpenVDB", task=task)
             self.add(f"whole process, {task}, 1024 a side, OpenVDB / Strata", bound,
                      [number(row["wall / strata"]) for row in rows], [number(row["cpu / strata"]) for row in rows])
+        rows = pick(self.processes, mesh="bumps-82k", task="OBJ to .vdb mask", program="strata")
+        self.add("whole process, OBJ of 82k triangles to .vdb mask, 1024 a side, ms", 30,
+                 [number(row["wall ms"]) for row in rows], [number(row["cpu ms"]) for row in rows], True)
+        if self.scenes:
+            self.add("whole process, .csg to PNG of 1024 x 1024, median of the scenes, ms", 35,
+                     [statistics.median(number(row["strata ms"]) for row in self.scenes)], None, True)
         rows = [row for row in self.processes if row["mesh"].startswith("textured")]
         self.add("whole process, colours of 100k triangles with a texture, 1024 a side, ms", 200,
                  [number(row["wall ms"]) for row in rows], None, True)
@@ -141,6 +156,13 @@ class Goals:
             self.add(f"reading {file}, OpenMesh / Strata", 10,
                      [number(row["wall / strata with 2 threads"]) for row in rows],
                      [number(row["cpu / strata with 1 thread"]) for row in rows])
+        for reader, bound in (("strata, 1 thread", 763), ("strata, 2 threads", 1430)):
+            self.add(f"reading OBJ, {reader}, MiB a second", bound,
+                     [number(row["MiB / s"]) for row in pick(self.reading, file="OBJ", reader=reader)], None)
+        rows = [row for row in pick(self.reading, file="binary STL") if row["reader"].startswith("strata")]
+        if rows:
+            self.add("reading binary STL, the faster of 1 and 2 threads, ms", 40,
+                     [min(number(row["wall ms"]) for row in rows)], [min(number(row["cpu ms"]) for row in rows)], True)
 
     def growth_goals(self):
         def times(side, threads, key):
@@ -153,10 +175,19 @@ class Goals:
                 values[key] = [high[mesh] / low[mesh] for mesh in high if mesh in low]
             self.add(f"time(4096) / time(1024), {threads} thread{'s' if threads > 1 else ''}", 20,
                      values["wall ms"], values["cpu ms"], True)
-        self.add("speed-up from 1 to 2 threads at 2048", 1.7,
-                 [number(row["speed-up"]) for row in pick(self.growth, side=2048, threads=2)], None)
-        self.add("statistics at 16384 a side, peak MiB", 2048,
-                 [number(row["peak MiB"]) for row in pick(self.growth, side=16384)], None, True)
+        for side in (1024, 2048):
+            self.add(f"speed-up from 1 to 2 threads at {side}", 1.8,
+                     [number(row["speed-up"]) for row in pick(self.growth, side=side, threads=2)], None)
+        for key, bound in (("wall ms", 1000), ("peak MiB", 200)):
+            self.add(f"statistics at 16384 a side, 2 threads, {key}", bound,
+                     [number(row[key]) for row in pick(self.growth, side=16384, threads=2)], None, True)
+
+    def frame_goals(self):
+        for what, bound, rows in (
+                ("geometric mean", 13, pick(self.frames, scene="geometric mean")),
+                ("the least", 2.5, [row for row in self.frames if row["scene"] != "geometric mean"])):
+            self.add(f"frames of trees, OpenCSG / Strata, {what}", bound,
+                     [number(row["ratio"]) for row in rows], [number(row["cpu ratio"]) for row in rows])
 
 
 def sections(folder):
@@ -166,6 +197,11 @@ def sections(folder):
         if os.path.exists(path):
             with open(path) as file:
                 result[name] = re.sub("^## ", "### ", file.read().strip(), flags=re.M)
+    for name in ("contouring", "voxel_pictures", "media"):
+        path = os.path.join(folder, name + ".txt")
+        if os.path.exists(path):
+            with open(path) as file:
+                result[name] = f"```text\n{file.read().rstrip()}\n```"
     voxelizers = load(folder, "voxelizers")
     if voxelizers:
         result["goals"] = Goals(folder).collect()
