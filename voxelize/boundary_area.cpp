@@ -1,46 +1,48 @@
 #include "strata/voxelize/checksum.h"
 
 #include <algorithm>
-#include <climits>
+#include <bit>
 #include <iterator>
+#include <numeric>
 #include <span>
 #include <utility>
+
+#include "strata/raster/raster_target.h"
+#include "voxelize/overlap/shared_voxels.h"
 
 namespace strata {
 namespace {
 
-using Column = std::span<const Interval>;
+using Run = BoundaryArea::Seam::Run;
 
-std::uint64_t length(Column column) {
+/// [last:16 | first:16] each.
+std::span<const std::uint32_t> interval_words(std::span<const Interval> intervals) {
+  static_assert(std::endian::native == std::endian::little && sizeof(Interval) == 4);
+  return {reinterpret_cast<const std::uint32_t*>(intervals.data()), intervals.size()};
+}
+
+std::vector<Run> runs_of_row(const VoxelIntervals& slab, int v) {
+  std::vector<Run> runs;
+  for (int u = 0; u < slab.columns(); ++u) {
+    for (const Interval& interval : slab.column(u, v)) {
+      runs.push_back({static_cast<std::uint16_t>(u), interval});
+    }
+  }
+  return runs;
+}
+
+std::uint64_t count_voxels(std::span<const Run> row) {
   std::uint64_t sum = 0;
-  for (const Interval& interval : column) sum += static_cast<std::uint64_t>(interval.length());
+  for (const Run& run : row) sum += static_cast<std::uint64_t>(run.interval.length());
   return sum;
 }
 
-/// Voxels that are in one column and not in the other.
-std::uint64_t difference(Column a, Column b) {
-  std::uint64_t common = 0;
-  for (std::size_t i = 0, j = 0; i < a.size() && j < b.size();) {
-    const int begin = std::max(a[i].begin(), b[j].begin());
-    const int end = std::min(a[i].end(), b[j].end());
-    if (end > begin) common += static_cast<std::uint64_t>(end - begin);
-    if (a[i].last < b[j].last) {
-      ++i;
-    } else {
-      ++j;
-    }
-  }
-  return length(a) + length(b) - 2 * common;
-}
-
 /// Faces between two rows of voxels.
-std::uint64_t faces_between(std::span<const BoundaryArea::Seam::Run> a,
-                            std::span<const BoundaryArea::Seam::Run> b) {
-  std::uint64_t faces = 0;
+std::uint64_t faces_between(std::span<const Run> a, std::span<const Run> b) {
+  std::uint64_t faces = count_voxels(a) + count_voxels(b);
   std::vector<Interval> columns[2];
-  while (!a.empty() || !b.empty()) {
-    const int u =
-        std::min(a.empty() ? INT_MAX : int{a.front().u}, b.empty() ? INT_MAX : int{b.front().u});
+  while (!a.empty() && !b.empty()) {
+    const int u = std::min(a.front().u, b.front().u);
     for (auto* row : {&a, &b}) {
       std::vector<Interval>& column = columns[row == &a ? 0 : 1];
       column.clear();
@@ -48,87 +50,80 @@ std::uint64_t faces_between(std::span<const BoundaryArea::Seam::Run> a,
         column.push_back(row->front().interval);
       }
     }
-    faces += difference(columns[0], columns[1]);
+    faces -= 2 * shared_voxels(interval_words(columns[0]), interval_words(columns[1]));
   }
   return faces;
 }
 
 }  // namespace
 
-BoundaryArea::BoundaryArea(const VoxelGrid& grid, Axis axis)
-    : grid_(grid),
-      frame_(axis),
-      last_offsets_(static_cast<std::size_t>(grid.dims[frame_.u]) + 1, 0) {}
+BoundaryArea::BoundaryArea(const VoxelGrid& grid, Axis axis) : grid_(grid), frame_(axis) {}
 
+// Between neighbours lie the voxels of both, less twice those that they share. Each voxel is in two
+// pairs of neighbours, those outside of the grid among them.
 void BoundaryArea::add(const VoxelIntervals& slab, const Execution& execution) {
-  const int columns = slab.columns();
-  const bool follows = slab.v_begin() == next_v_;
-  if (!follows) end_part();
-  const auto before_slab = [this](int u) {
-    const auto i = static_cast<std::size_t>(u);
-    return Column(last_items_).subspan(last_offsets_[i], last_offsets_[i + 1] - last_offsets_[i]);
+  if (slab.v_begin() == next_v_) {
+    faces_[frame_.v] += count_voxels(last_row_);
+  } else {
+    end_part();
+    seams_.push_back({slab.v_begin(), true, runs_of_row(slab, slab.v_begin())});
+    faces_[frame_.v] -= count_voxels(seams_.back().runs);
+    last_row_.clear();
+  }
+  // The row before the slab, as that of tiles.
+  std::vector<Interval> last_items;
+  std::vector<std::uint32_t> last_offsets(static_cast<std::size_t>(slab.tiles_u()) * kTileSide + 1);
+  for (const Run& run : last_row_) {
+    last_items.push_back(run.interval);
+    ++last_offsets[run.u + 1u];
+  }
+  std::partial_sum(last_offsets.begin(), last_offsets.end(), last_offsets.begin());
+  const auto row_above = [&](int tu, int tv) -> ColumnRow {
+    if (tv == 0) return {last_offsets.data() + tu * kTileSide, interval_words(last_items).data()};
+    const VoxelIntervals::TileView tile = slab.tile(tu, tv - 1);
+    if (tile.offsets.empty()) return {};
+    return {tile.offsets.data() + kTilePixels - kTileSide, interval_words(tile.items).data()};
   };
-  struct Faces {
-    std::uint64_t u = 0, v = 0, w = 0;
+  struct Part {
+    std::uint64_t voxels = 0;
+    NeighbourVoxels shared;
   };
-  constexpr int kSide = VoxelIntervals::kTileSide;
-  std::vector<Faces> parts(static_cast<std::size_t>(slab.tiles_v()));
+  std::vector<Part> parts(static_cast<std::size_t>(slab.tiles_v()));
   parallel_for(execution, parts.size(), [&](std::size_t tile_row, int) {
-    Faces sum;
-    const int first = slab.v_begin() + static_cast<int>(tile_row) * kSide;
-    for (int v = first; v < std::min(first + kSide, slab.v_end()); ++v) {
-      Column left;
-      for (int u = 0; u < columns; ++u) {
-        const Column here = slab.column(u, v);
-        const Column above = v > slab.v_begin() ? slab.column(u, v - 1) : before_slab(u);
-        sum.w += 2 * run_count(here);
-        if (!here.empty() || !left.empty()) sum.u += difference(left, here);
-        const bool counted = follows || v > slab.v_begin();
-        if (counted && (!here.empty() || !above.empty())) sum.v += difference(above, here);
-        left = here;
+    const int tv = static_cast<int>(tile_row), first = slab.v_begin() + tv * kTileSide;
+    Part sum;
+    for (int tu = 0; tu < slab.tiles_u(); ++tu) {
+      const VoxelIntervals::TileView tile = slab.tile(tu, tv);
+      if (tile.items.empty()) continue;
+      for (const Interval& item : tile.items) {
+        sum.voxels += static_cast<std::uint64_t>(item.length());
       }
-      sum.u += length(left);
+      const NeighbourVoxels inner = neighbour_voxels(
+          {tile.offsets.data(), interval_words(tile.items).data()}, row_above(tu, tv));
+      sum.shared.u += inner.u;
+      sum.shared.v += inner.v;
+      if (tu == 0 || slab.tile_empty(tu - 1, tv)) continue;
+      for (int v = first; v < std::min(first + kTileSide, slab.v_end()); ++v) {
+        sum.shared.u += shared_voxels(interval_words(slab.column(tu * kTileSide - 1, v)),
+                                      interval_words(slab.column(tu * kTileSide, v)));
+      }
     }
     parts[tile_row] = sum;
   });
-  for (const Faces& part : parts) {
-    faces_[frame_.u] += part.u;
-    faces_[frame_.v] += part.v;
-    faces_[frame_.w] += part.w;
+  for (const Part& part : parts) {
+    faces_[frame_.u] += 2 * (part.voxels - part.shared.u);
+    faces_[frame_.v] += 2 * (part.voxels - part.shared.v);
   }
-  if (!follows) begin_part(slab);
-  std::vector<Interval> items;
-  const bool last = slab.v_end() == grid_.dims[frame_.v];
-  for (int u = 0; u < columns; ++u) {
-    const Column here = slab.column(u, slab.v_end() - 1);
-    if (last) faces_[frame_.v] += length(here);
-    items.insert(items.end(), here.begin(), here.end());
-    last_offsets_[static_cast<std::size_t>(u) + 1] = static_cast<std::uint32_t>(items.size());
-  }
-  last_items_ = std::move(items);
+  faces_[frame_.w] += 2 * slab.interval_count();
+  last_row_ = runs_of_row(slab, slab.v_end() - 1);
   next_v_ = slab.v_end();
+  if (next_v_ < grid_.dims[frame_.v]) faces_[frame_.v] -= count_voxels(last_row_);
 }
 
 /// The last row is that before a gap.
 void BoundaryArea::end_part() {
   if (next_v_ == 0 || next_v_ == grid_.dims[frame_.v]) return;
-  Seam seam{next_v_ - 1, false, {}};
-  for (std::size_t u = 0; u + 1 < last_offsets_.size(); ++u) {
-    for (std::uint32_t i = last_offsets_[u]; i < last_offsets_[u + 1]; ++i) {
-      seam.runs.push_back({static_cast<std::uint16_t>(u), last_items_[i]});
-    }
-  }
-  seams_.push_back(std::move(seam));
-}
-
-void BoundaryArea::begin_part(const VoxelIntervals& slab) {
-  Seam seam{slab.v_begin(), true, {}};
-  for (int u = 0; u < slab.columns(); ++u) {
-    for (const Interval& interval : slab.column(u, slab.v_begin())) {
-      seam.runs.push_back({static_cast<std::uint16_t>(u), interval});
-    }
-  }
-  seams_.push_back(std::move(seam));
+  seams_.push_back({next_v_ - 1, false, std::move(last_row_)});
 }
 
 std::vector<BoundaryArea::Seam> BoundaryArea::take_seams() {

@@ -20,7 +20,8 @@ constexpr std::uint64_t add_modulo(std::uint64_t a, std::uint64_t b) {
   return sum >= kPrime ? sum - kPrime : sum;
 }
 constexpr std::uint64_t subtract_modulo(std::uint64_t a, std::uint64_t b) {
-  return a >= b ? a - b : a + kPrime - b;
+  const std::uint64_t difference = a - b;
+  return difference + (kPrime & -(difference >> 63));  // no branch: which is larger is random
 }
 // 2^61 is 1 here: groups of 61 bits are added.
 constexpr std::uint64_t reduce(Wide value) {
@@ -50,7 +51,10 @@ SetChecksum::SetChecksum(const VoxelGrid& grid) : grid_(grid) {
 void SetChecksum::add(const VoxelIntervals& slab, const Execution& execution) {
   const AxisFrame frame(slab.axis());
   const auto axis_u = static_cast<std::size_t>(frame.u), axis_v = static_cast<std::size_t>(frame.v);
-  const std::vector<std::uint64_t>& prefix = prefix_[static_cast<std::size_t>(frame.w)];
+  const std::uint64_t* const prefix = prefix_[static_cast<std::size_t>(frame.w)].data();
+  const auto factors_of = [prefix](const Interval& item) {
+    return subtract_modulo(prefix[std::size_t{item.last} + 1], prefix[item.first]);
+  };
   const auto count =
       static_cast<std::size_t>(slab.tiles_u()) * static_cast<std::size_t>(slab.tiles_v());
   std::vector<std::uint64_t> tile_sums(count, 0);
@@ -68,12 +72,12 @@ void SetChecksum::add(const VoxelIntervals& slab, const Execution& execution) {
       const std::uint32_t* offsets = tile.offsets.data() + row * kSide;
       if (offsets[0] == offsets[kSide]) continue;
       Wide row_sum = 0;  // 64 products of less than 2^122
+      const Interval* item = tile.items.data() + offsets[0];
       for (std::size_t column = 0; column < kSide; ++column) {
-        std::uint64_t sum = 0;
-        for (std::uint32_t i = offsets[column]; i < offsets[column + 1]; ++i) {
-          sum = add_modulo(sum, subtract_modulo(prefix[std::size_t{tile.items[i].last} + 1],
-                                                prefix[tile.items[i].first]));
-        }
+        const Interval* const end = tile.items.data() + offsets[column + 1];
+        if (item == end) continue;
+        std::uint64_t sum = factors_of(*item);
+        while (++item != end) sum = add_modulo(sum, factors_of(*item));
         row_sum += Wide{sum} * factor_u[column];
       }
       const auto v = static_cast<std::size_t>(slab.v_begin() + tv * kSide + row);

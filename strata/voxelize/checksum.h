@@ -80,7 +80,6 @@ class BoundaryArea {
   [[nodiscard]] double estimate() const;
 
  private:
-  void begin_part(const VoxelIntervals& slab);
   void end_part();
 
   VoxelGrid grid_;
@@ -88,9 +87,7 @@ class BoundaryArea {
   std::uint64_t faces_[3] = {0, 0, 0};
   int next_v_ = 0;  ///< the row after the last one
   std::vector<Seam> seams_;
-  // The last row of the previous slab, to compare with: the intervals of its columns in order.
-  std::vector<std::uint32_t> last_offsets_;
-  std::vector<Interval> last_items_;
+  std::vector<Seam::Run> last_row_;  ///< of the previous slab
 };
 
 }  // namespace strata
