@@ -30,7 +30,7 @@ class Geometry {
     /// How far its faces may be off, as part of Geometry::world_error(): less than 1 for solids
     /// that are small and near the origin beside what is vast.
     double error_share = 1.0;
-    bool convex = false;  ///< known to be; a hint that only speed depends on
+    bool convex = false;  ///< known to be, but for rounding
 
     [[nodiscard]] PlacedMesh placed() const { return {positions, triangles, box}; }
     /// Along the normal of a triangle, outwards; twice as long as its area is large.

@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "csg/surface/area_bounds.h"
 #include "csg/transition.h"
 #include "raster/tile_bins.h"
 
@@ -51,6 +52,12 @@ struct LeafLayers {
     kFirstEntryOnly  ///< only the nearest entry, as a depth: of convex union operands
   } kind = Kind::kSorted;
   std::uint32_t solid = 0;
+  /// There are bounds for each area, and layers of one area at a time: `rect` is its rectangle.
+  bool by_area = false;
+  /// Crossings of a convex solid that are not rasterized: exits behind all that counts, or entries
+  /// before it of a solid that all rays are in. Those count as entered at depth 0, by no triangle.
+  enum class LeftOut : std::uint8_t { kNothing, kExits, kEntries } left_out = LeftOut::kNothing;
+  AreaBounds bounds;
   /// Once made: which areas of kLanes x kLanes pixels of the tile it meets, row by row.
   std::uint16_t areas = 0;
   /// Bounds of its depths; those of the tile once it is made.

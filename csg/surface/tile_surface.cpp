@@ -57,6 +57,12 @@ namespace {
 /// Deeper nesting is walked pixel by pixel: asking nodes again for each answer would multiply.
 constexpr int kMaxSearchDepth = 3;
 constexpr int kAreaSide = LeafLayers::kLanes;
+static_assert(kAreaSide == AreaBounds::kSide);
+
+/// The area of a tile that begins at its pixel (u, v).
+std::size_t area_of(int u, int v) {
+  return static_cast<std::size_t>(v / kAreaSide * AreaBounds::kAcross + u / kAreaSide);
+}
 
 }  // namespace
 
@@ -89,24 +95,56 @@ TileFinder::Input TileFinder::input_of(std::uint32_t solid) {
   return input;
 }
 
+TileFinder::Input TileFinder::input_of(const LeafLayers& leaf) {
+  Input input = input_of(leaf.solid);
+  if (!leaf.by_area) return input;
+  const std::size_t area = area_of(leaf.rect.u0 - tile_.u0, leaf.rect.v0 - tile_.v0);
+  area_triangles_.clear();
+  const bool entries = leaf.left_out != LeafLayers::LeftOut::kEntries;
+  const bool exits = leaf.left_out != LeafLayers::LeftOut::kExits &&
+                     leaf.kind != LeafLayers::Kind::kFirstEntryOnly;
+  for (const AreaBounds::Face& face : leaf.bounds.faces) {
+    if ((face.areas >> area & 1) != 0 && (face.exit ? exits : entries)) {
+      area_triangles_.push_back(face.triangle);
+    }
+  }
+  input.clip.u0 = std::max(input.clip.u0, leaf.rect.u0);
+  input.clip.v0 = std::max(input.clip.v0, leaf.rect.v0);
+  input.clip.u1 = std::min(input.clip.u1, leaf.rect.u1);
+  input.clip.v1 = std::min(input.clip.v1, leaf.rect.v1);
+  input.triangles = area_triangles_;
+  return input;
+}
+
 void TileFinder::make(LeafLayers& leaf) {
   leaf.made = true;
   leaf.areas = 0;
   const ViewPart& part = view_parts_[leaf.solid];
   const RasterTarget target{Axis::kZ, view_->size.x, view_->size.y, kPictureDepthLimit};
-  const Input input = input_of(leaf.solid);
+  const Input input = input_of(leaf);
+  Arena& arena = leaf.by_area ? area_arena_ : arena_;
   constexpr std::size_t kTrianglesAtOnce = 256;  // lists may be very long
   std::uint64_t fragments = 0;
   for (std::size_t i = 0; i < input.triangles.size() && !stop_.stop_requested();
        i += kTrianglesAtOnce) {
     const auto some =
         input.triangles.subspan(i, std::min(kTrianglesAtOnce, input.triangles.size() - i));
-    fragments += raster_layers(part.mesh, target, some, input.clip, coincidence_->steep_from(),
-                               leaf, arena_);
+    fragments +=
+        raster_layers(part.mesh, target, some, input.clip, coincidence_->steep_from(), leaf, arena);
     if (leaf.keys.size() > LeafLayers::kMostLayers) return make_deep(leaf, input);
   }
+  constexpr std::size_t kMost[] = {~std::size_t{0}, 1, 2};
+  if (leaf.keys.size() > kMost[static_cast<std::size_t>(leaf.left_out)]) {
+    leaf.left_out = LeafLayers::LeftOut::kNothing;  // met twice: all that happens counts
+    leaf.keys.clear();
+    leaf.triangles.clear();
+    return make(leaf);
+  }
   fragments_ += fragments;
+  const std::uint32_t nearest = leaf.nearest;
   if (!leaf.keys.empty()) normalize_layers(leaf, part.cut, *this);
+  // A steep face may stand for a place before its crossing.
+  if (leaf.by_area) leaf.nearest = nearest;
 }
 
 void TileFinder::make_deep(LeafLayers& leaf, const Input& input) {
@@ -155,7 +193,9 @@ void TileFinder::normalize_pixel(LeafLayers& leaf, std::size_t at) {
   leaf_transitions_.clear();
   transitions_of(crossings_, leaf.solid, parts_[leaf.solid].rule, view_parts_[leaf.solid].cut,
                  leaf_transitions_);
-  while (leaf.keys.size() < leaf_transitions_.size()) leaf.add_layer(arena_);
+  while (leaf.keys.size() < leaf_transitions_.size()) {
+    leaf.add_layer(leaf.by_area ? area_arena_ : arena_);
+  }
   for (std::size_t k = 0; k < leaf_transitions_.size(); ++k) {
     leaf.keys[k][at] = leaf_transitions_[k].depth;
     leaf.triangles[k][at] = leaf_transitions_[k].triangle | (steep ? LeafLayers::kSteep : 0);
@@ -181,6 +221,9 @@ void TileFinder::resolve(const TileProgram& program, std::uint64_t pixel) {
   const int u = part_.u0 + static_cast<int>(pixel % width);
   const int v = part_.v0 + static_cast<int>(pixel / width);
   transitions_.clear();
+  for (const std::uint32_t solid : around_) {
+    transitions_.push_back({0, solid, Surface::kNone, false});
+  }
   for (const std::uint32_t slot : program.leaves) {
     LeafLayers& leaf = leaves_[slot];
     if (v < leaf.rect.v0 || v >= leaf.rect.v1 || u < leaf.rect.u0 || u >= leaf.rect.u1) continue;
@@ -197,6 +240,7 @@ void TileFinder::resolve(const TileProgram& program, std::uint64_t pixel) {
     for (std::size_t k = 0; k < leaf.keys.size(); ++k) {
       if (leaf.keys[k][at] == LeafLayers::kEmpty) break;
       std::uint32_t triangle = leaf.triangles[k][at];
+      if (k == 0 && leaf.left_out == LeafLayers::LeftOut::kEntries) triangle = Surface::kNone;
       if (triangle != Surface::kNone) triangle &= ~LeafLayers::kSteep;
       transitions_.push_back({leaf.keys[k][at], leaf.solid, triangle, (k & 1) != 0});
     }
@@ -221,7 +265,22 @@ bool TileFinder::place(LeafLayers& leaf, std::uint32_t solid) const {
                down(std::min(tile_.u1, part.rect.u1) + kAreaSide - 1),
                std::min(tile_.v1, part.rect.v1)};
   leaf.stride = leaf.rect.u1 - leaf.rect.u0;
+  leaf.by_area = false;
+  leaf.left_out = LeafLayers::LeftOut::kNothing;
   return !leaf.rect.empty();
+}
+
+void TileFinder::find_bounds(LeafLayers& leaf) {
+  // Of concave solids so few triangles that their layers are few.
+  constexpr std::size_t kMostTriangles = 512, kMostOfConcave = LeafLayers::kMostLayers / 2;
+  const ViewPart& part = view_parts_[leaf.solid];
+  const Input input = input_of(leaf.solid);
+  const bool concave = leaf.kind == LeafLayers::Kind::kSorted;
+  if (part.cut || input.triangles.size() > (concave ? kMostOfConcave : kMostTriangles)) return;
+  leaf.by_area = true;
+  find_area_bounds(part.mesh, input.triangles, {tile_.u0, tile_.v0}, coincidence_->steep_from(),
+                   leaf.bounds);
+  if (concave) leaf.bounds.covered = 0;
 }
 
 void TileFinder::find(int tile_u, int tile_v, std::span<const std::uint32_t> solids,
@@ -242,7 +301,9 @@ void TileFinder::find(int tile_u, int tile_v, std::span<const std::uint32_t> sol
     cut = cut || view_parts_[solid].cut;
     united = united && leaf.kind == LeafLayers::Kind::kFirstEntryOnly;
   }
+  around_.clear();
   if (count > 0 && united) return find_united(std::span(leaves_).first(count));
+  for (std::size_t i = 0; i < count && !cut; ++i) find_bounds(leaves_[i]);
   for (int v = tile_.v0; v < tile_.v1; ++v) {
     const std::size_t row = part.index(tile_.u0, v);
     std::fill_n(part.image->depth.data() + row, tile_.u1 - tile_.u0, Surface::kNone);
@@ -270,11 +331,23 @@ void TileFinder::find(int tile_u, int tile_v, std::span<const std::uint32_t> sol
 
 void TileFinder::list_present(const SearchArea& area) {
   const int u = area.rect.u0, v = area.rect.v0;
-  const int area_index =
-      (v - tile_.v0) / kAreaSide * (kTileSide / kAreaSide) + (u - tile_.u0) / kAreaSide;
+  const std::size_t area_index = area_of(u - tile_.u0, v - tile_.v0);
   present_.clear();
+  area_arena_.clear();
   for (std::uint32_t slot = 0; slot < area.leaves.size(); ++slot) {
-    const LeafLayers& leaf = area.leaves[slot];
+    LeafLayers& leaf = area.leaves[slot];
+    if (leaf.by_area) {
+      leaf.made = leaf.deep = leaf.steep = false;
+      leaf.left_out = LeafLayers::LeftOut::kNothing;
+      leaf.keys.clear();
+      leaf.triangles.clear();
+      leaf.rect = {u, v, u + kAreaSide, area.rect.v1};
+      leaf.stride = kAreaSide;
+      leaf.nearest = leaf.bounds.nearest(area_index);
+      leaf.farthest = leaf.bounds.farthest(area_index);
+      if (leaf.nearest != AreaBounds::kNever) present_.push_back(slot);
+      continue;
+    }
     if (leaf.made && (leaf.areas >> area_index & 1) == 0) continue;
     const PixelRect& rect = leaf.rect;
     if (rect.u0 <= u && u < rect.u1 && rect.v0 < area.rect.v1 && v < rect.v1) {
@@ -285,8 +358,10 @@ void TileFinder::list_present(const SearchArea& area) {
 
 void TileFinder::find_area(const SearchArea& area, bool cut) {
   list_present(area);
+  around_.clear();
   simplifier_.simplify(area.leaves, present_, tile_program_);
   if (tile_program_.constant) return;
+  if (!cut && !narrow(area_of(area.rect.u0 - tile_.u0, area.rect.v0 - tile_.v0))) return;
   doubtful_.clear();
   const auto is_deep = [&] {
     return std::any_of(tile_program_.leaves.begin(), tile_program_.leaves.end(),

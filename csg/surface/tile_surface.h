@@ -98,10 +98,15 @@ class TileFinder {
  private:
   /// Prepares a leaf for a solid in the tile. @return whether it may be met there
   [[nodiscard]] bool place(LeafLayers& leaf, std::uint32_t solid) const;
+  /// Makes a leaf one of bounds for each area, if it has few triangles in the tile.
+  void find_bounds(LeafLayers& leaf);
   /// Fills the pixels of one area. @param cut  the near plane may cut solids of the tile
   void find_area(const SearchArea& area, bool cut);
-  /// present_ becomes the leaves that may be met in an area.
+  /// present_ becomes the leaves that may be met in an area, prepared for it.
   void list_present(const SearchArea& area);
+  /// Leaves out of tile_program_ what cannot matter in an area, where it is an intersection of
+  /// solids minus others (csg/surface/narrow_program.cpp). @return false: nothing is seen there
+  [[nodiscard]] bool narrow(std::size_t area);
   /// Finds what a pixel shows from all transitions of the program's leaves.
   void resolve(const TileProgram& program, std::uint64_t pixel);
   /// The same from transitions_.
@@ -119,6 +124,8 @@ class TileFinder {
     std::span<const std::uint32_t> triangles;
   };
   [[nodiscard]] Input input_of(std::uint32_t solid);
+  /// The same of a leaf, in its rectangle.
+  [[nodiscard]] Input input_of(const LeafLayers& leaf);
   /// Makes the transitions of a leaf that has too many crossings for layers.
   void make_deep(LeafLayers& leaf, const Input& input);
 
@@ -127,13 +134,14 @@ class TileFinder {
   const std::vector<Geometry::Part>& parts_;
   const View* view_;
   const Coincidence* coincidence_;
-  Arena arena_;
+  Arena arena_, area_arena_;
   std::vector<LeafLayers> leaves_;
   Simplifier simplifier_;
   TileProgram tile_program_;
   UnitedLayers united_;
   FirstHit first_hit_;
-  std::vector<std::uint32_t> present_, all_triangles_;
+  std::vector<std::uint32_t> present_, all_triangles_, area_triangles_;
+  std::vector<std::uint32_t> around_;  ///< solids that all rays of an area are in where it counts
   std::vector<std::uint64_t> doubtful_;
   std::vector<std::uint32_t> slot_solids_;
   std::vector<Transition> transitions_, leaf_transitions_;
@@ -146,6 +154,10 @@ class TileFinder {
 };
 
 // The kernels, compiled once for each SIMD target (csg/surface/tile_surface_simd.cpp).
+
+/// How far apart two faces may be at least without coinciding, whatever their depth; those that are
+/// steep count from their nearest to their farthest corner.
+[[nodiscard]] std::uint32_t farthest_reach(const Coincidence::Range& range);
 
 /// Inserts the crossings of `triangles` of `mesh` within `clip` into the layers of `leaf`. Gives
 /// their number.

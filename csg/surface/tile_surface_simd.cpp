@@ -47,7 +47,9 @@ class LayerSink {
     leaf_->steep = leaf_->steep || steep_ != 0;
   }
   [[nodiscard]] HWY_INLINE bool wants(bool exit) const {
-    return !exit || leaf_->kind != LeafLayers::Kind::kFirstEntryOnly;
+    if (leaf_->left_out == LeafLayers::LeftOut::kEntries) return exit;
+    return !exit || (leaf_->kind != LeafLayers::Kind::kFirstEntryOnly &&
+                     leaf_->left_out == LeafLayers::LeftOut::kNothing);
   }
   HWY_INLINE void begin(bool exit, std::uint32_t triangle, const PixelRect&) {
     exit_ = exit ? 1 : 0;
@@ -188,16 +190,22 @@ struct Normalized {
 };
 
 /// Of a convex solid: layers 0 and 1 are depths already.
-HWY_INLINE Normalized normalize_convex(const LeafLayers& leaf, std::size_t at, bool all_special) {
+HWY_INLINE Normalized normalize_convex(LeafLayers& leaf, std::size_t at, bool all_special) {
   const D d;
   const V empty = hn::Set(d, LeafLayers::kEmpty);
   const std::size_t layers = leaf.keys.size();
-  const V enter = hn::Load(d, leaf.keys[0] + at);
+  V enter = hn::Load(d, leaf.keys[0] + at);
   const V leave = layers > 1 ? hn::Load(d, leaf.keys[1] + at) : empty;
+  if (leaf.left_out == LeafLayers::LeftOut::kEntries) {
+    enter = hn::IfThenElseZero(hn::Eq(leave, empty), empty);
+    hn::Store(enter, d, leaf.keys[0] + at);
+    hn::Store(hn::Zero(d), d, leaf.triangles[0] + at);
+  }
   V more = empty;
   for (std::size_t k = 2; k < layers; ++k) more = hn::And(more, hn::Load(d, leaf.keys[k] + at));
   const M some = hn::Ne(hn::And(hn::And(enter, leave), more), empty);
-  const M once = hn::And(hn::And(hn::Lt(enter, leave), hn::Ne(leave, empty)), hn::Eq(more, empty));
+  M once = hn::And(hn::Lt(enter, leave), hn::Eq(more, empty));
+  if (leaf.left_out != LeafLayers::LeftOut::kExits) once = hn::And(once, hn::Ne(leave, empty));
   const M special = all_special ? some : hn::AndNot(once, some);
   const M good = hn::AndNot(special, some);
   return {some, special, hn::IfThenElse(good, enter, empty), hn::IfThenElseZero(good, leave)};

@@ -92,11 +92,12 @@ TEST(VisibleSurface, IsTheOneOfTheFullListsForAnyTree) {
   }
 }
 
-// Solids that a ray meets once are searched by their intervals where the tree is an intersection
-// of them minus others (csg/surface/tile_surface_simd.cpp).
+// Where the tree is an intersection of solids, or of unions of them, minus others, what lies before
+// or behind the surface is left out area by area (csg/surface/narrow_program.cpp), and solids that a
+// ray meets once are searched by their intervals (csg/surface/tile_surface_simd.cpp).
 TEST(VisibleSurface, OfAnIntersectionMinusOthersIsTheOneOfTheFullLists) {
   std::size_t seen = 0;
-  for (int seed = 0; seed < 120; ++seed) {
+  for (int seed = 0; seed < 240; ++seed) {
     RandomTree random(static_cast<std::uint64_t>(seed) + 1300);
     Tree tree;
     const bool on_grid = seed % 3 == 0;
@@ -110,6 +111,12 @@ TEST(VisibleSurface, OfAnIntersectionMinusOthersIsTheOneOfTheFullLists) {
         solid.world_from_mesh = glm::rotate(glm::dmat4(1), random.real(0, 1), glm::dvec3(1, 2, 3));
       }
       common.push_back(tree.add_solid(std::move(solid)));
+      if (seed < 120) continue;
+      std::vector<Tree::NodeId> united{common.back()};
+      for (int k = random.pick(1, 9); k > 0; --k) {
+        united.push_back(tree.add_solid(random.solid(on_grid)));
+      }
+      common.back() = tree.add(Operation::kUnion, united);
     }
     operands.push_back(tree.add(Operation::kIntersection, common));
     for (int i = random.pick(0, 20); i > 0; --i) {
@@ -125,7 +132,7 @@ TEST(VisibleSurface, OfAnIntersectionMinusOthersIsTheOneOfTheFullLists) {
     seen += static_cast<std::size_t>(std::ranges::count_if(
         (*image)->depth, [](std::uint32_t depth) { return depth != SurfaceImage::kNone; }));
   }
-  EXPECT_GT(seen, 120000u);
+  EXPECT_GT(seen, 240000u);
 }
 
 TEST(VisibleSurface, IsTheOneOfTheFullListsWithTheEyeInTheScene) {

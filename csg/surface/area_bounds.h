@@ -1,0 +1,54 @@
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <glm/vec2.hpp>
+#include <span>
+#include <vector>
+
+#include "raster/triangle_setup.h"
+
+// Where the crossings of a solid may be in the areas of a tile. Private to csg/.
+
+namespace strata::csg {
+
+/// Bounds of the crossings of one solid in each area of a tile, found from its triangles: without
+/// their pixels. A steep triangle (Coincidence::steep_from()) counts from its nearest to its
+/// farthest corner.
+struct AreaBounds {
+  static constexpr int kSide = 16;  ///< pixels of an area
+  static constexpr int kAcross = kTileSide / kSide, kAreas = kAcross * kAcross;
+  static constexpr std::uint32_t kNever = 0xffffffffu;
+
+  /// Depths of entries or of exits, by area, row by row. The nearest is kNever where there is none.
+  struct Range {
+    alignas(64) std::uint32_t nearest[kAreas], farthest[kAreas];
+  };
+  struct Face {
+    std::uint32_t triangle;
+    std::uint16_t areas;  ///< that it may meet, a bit each
+    bool exit;
+  };
+  Range entries, exits;
+  /// Areas whose four corners are covered by entries. A ray through any pixel of them meets the
+  /// solid if that is convex: its outline is convex but for what the snap has moved, half a lattice
+  /// step, and the corners are half a pixel away from all centres.
+  std::uint16_t covered = 0;
+  std::uint16_t steep_areas = 0;  ///< that a steep triangle may meet
+  std::uint32_t steep_depth = 0;  ///< the most that a steep triangle is deep
+  std::vector<Face> faces;
+
+  [[nodiscard]] std::uint32_t nearest(std::size_t area) const {
+    return std::min(entries.nearest[area], exits.nearest[area]);
+  }
+  [[nodiscard]] std::uint32_t farthest(std::size_t area) const {
+    return std::max(entries.farthest[area], exits.farthest[area]);
+  }
+};
+
+/// Bounds for `triangles` of `mesh` in the tile that begins at pixel `tile`.
+/// (csg/surface/area_bounds_simd.cpp)
+void find_area_bounds(const LatticeMesh& mesh, std::span<const std::uint32_t> triangles,
+                      const glm::ivec2& tile, double steep_from, AreaBounds& bounds);
+
+}  // namespace strata::csg

@@ -1,0 +1,243 @@
+#include <algorithm>
+
+#include "csg/surface/tile_surface.h"
+
+// What cannot matter in an area is left out, where the tree is an intersection of solids, or of
+// unions of them, minus others there: the bounds of their crossings tell between which depths the
+// surface lies. A solid that ends before or begins behind is nothing, and one that all rays are in
+// is everything.
+
+namespace strata::csg {
+namespace {
+
+/// What is known of the crossings of a leaf, or of a union of leaves, in an area.
+struct Reach {
+  std::uint32_t nearest, farthest;  ///< of all crossings
+  /// A ray that meets it is in it between these, at least.
+  std::uint32_t last_entry, first_exit;
+  bool covers;  ///< each ray meets it
+};
+
+/// Narrows the program of an area.
+class Narrower {
+ public:
+  Narrower(std::span<LeafLayers> leaves, TileProgram& program, std::size_t area,
+           std::vector<std::uint32_t>& around)
+      : leaves_(leaves), program_(program), area_(area), around_(around) {}
+
+  /// Whether the program is of the kind that is narrowed.
+  bool fits();
+  /// @param reach  of faces that coincide @return false: nothing is seen
+  bool find_window(std::uint64_t reach);
+  /// Leaves out what is not in the window.
+  void filter();
+
+ private:
+  [[nodiscard]] LeafLayers& leaf_of(Program::Edge edge) { return leaves_[edge.child()]; }
+  [[nodiscard]] TileProgram::Node& root() { return program_.nodes[program_.root]; }
+  [[nodiscard]] std::span<Program::Edge> edges_of(const TileProgram::Node& node) {
+    return std::span(program_.edges).subspan(node.first, node.count);
+  }
+  [[nodiscard]] Reach reach_of(const LeafLayers& leaf) const;
+  [[nodiscard]] Reach reach_of(Program::Edge edge);
+  [[nodiscard]] bool outside_of_window(const Reach& of) const {
+    return of.nearest > end_ + reach_ || of.farthest + reach_ < begin_;
+  }
+  /// Keeps what of a union is in the window. @return the edge that is left of it
+  Program::Edge filter_union(Program::Edge edge);
+  void leave_out_exits(LeafLayers& leaf);
+  void set_edges(TileProgram::Node& node, std::span<const Program::Edge> edges);
+
+  std::span<LeafLayers> leaves_;
+  TileProgram& program_;
+  std::size_t area_;
+  std::vector<std::uint32_t>& around_;
+  std::uint32_t common_ = 0;  ///< edges of the root that are common to the result
+  std::uint64_t reach_ = 0;   ///< how far apart faces are that coincide, whatever they are
+  std::uint64_t begin_ = 0, end_ = AreaBounds::kNever;  ///< of the window
+  Program::Edge last_;                                  ///< the common edge that begins last
+  Program::Edge cover_;  ///< the other that all rays are in just before the window, if there is one
+  std::vector<Program::Edge> kept_;
+};
+
+Reach Narrower::reach_of(const LeafLayers& leaf) const {
+  if (!leaf.by_area) return {leaf.nearest, leaf.farthest, leaf.farthest, leaf.nearest, false};
+  const AreaBounds& of = leaf.bounds;
+  const std::uint32_t nearest = of.nearest(area_), farthest = of.farthest(area_);
+  if (leaf.kind == LeafLayers::Kind::kSorted) {
+    return {nearest, farthest, farthest, nearest, false};
+  }
+  return {nearest, farthest, of.entries.farthest[area_], of.exits.nearest[area_],
+          (of.covered >> area_ & 1) != 0};
+}
+
+Reach Narrower::reach_of(Program::Edge edge) {
+  if (edge.leaf()) return reach_of(leaf_of(edge));
+  Reach all{AreaBounds::kNever, 0, AreaBounds::kNever, 0, false};
+  for (const Program::Edge operand : edges_of(program_.nodes[edge.child()])) {
+    const Reach of = reach_of(leaf_of(operand));
+    all.nearest = std::min(all.nearest, of.nearest);
+    all.farthest = std::max(all.farthest, of.farthest);
+    if (of.covers && of.last_entry < all.last_entry) {
+      all.last_entry = of.last_entry;
+      all.first_exit = of.first_exit;
+      all.covers = true;
+    }
+  }
+  if (!all.covers) all.last_entry = all.farthest, all.first_exit = all.nearest;
+  return all;
+}
+
+bool Narrower::fits() {
+  if (program_.depth > 2) return false;
+  Program::Edge& first = program_.edges[root().first];
+  if (!program_.root_inverted) {  // a solid alone is an intersection, too
+    if (root().count > 1 || !first.leaf() || first.inverted() ||
+        leaf_of(first).kind == LeafLayers::Kind::kFirstEntryOnly) {
+      return false;
+    }
+    program_.root_inverted = true;
+    first = Program::Edge(first.child(), true, true);
+    program_.nearest[root().first] = 0;
+  }
+  const std::span<Program::Edge> edges = edges_of(root());
+  const auto is_plain = [](Program::Edge edge) { return edge.leaf() && !edge.inverted(); };
+  for (const Program::Edge edge : edges) {
+    if (edge.leaf()) continue;
+    if (!edge.inverted() ||
+        !std::ranges::all_of(edges_of(program_.nodes[edge.child()]), is_plain)) {
+      return false;
+    }
+  }
+  const auto others = std::stable_partition(edges.begin(), edges.end(),
+                                            [](Program::Edge edge) { return edge.inverted(); });
+  common_ = static_cast<std::uint32_t>(others - edges.begin());
+  return common_ > 0;
+}
+
+bool Narrower::find_window(std::uint64_t reach) {
+  // What is settled with the beginning of an interval reaches farther behind steep faces.
+  std::uint64_t steep = 0;
+  for (const std::uint32_t slot : program_.leaves) {
+    const LeafLayers& leaf = leaves_[slot];
+    if (!leaf.by_area) {
+      if (program_.depth > 1) return true;
+    } else if ((leaf.bounds.steep_areas >> area_ & 1) != 0) {
+      steep = std::max<std::uint64_t>(steep, leaf.bounds.steep_depth);
+    }
+  }
+  reach_ = reach + (program_.depth > 1 ? 2 * steep : 0);
+  const std::span<Program::Edge> edges = edges_of(root());
+  std::uint64_t last_entry = 0, first_exit = AreaBounds::kNever;
+  for (const Program::Edge edge : edges.first(common_)) {
+    const Reach of = reach_of(edge);
+    if (of.nearest >= begin_) last_ = edge;
+    begin_ = std::max<std::uint64_t>(begin_, of.nearest);
+    end_ = std::min<std::uint64_t>(end_, of.farthest);
+    last_entry = std::max<std::uint64_t>(last_entry, of.last_entry);
+    first_exit = std::min<std::uint64_t>(first_exit, of.first_exit);
+  }
+  // Where all rays are in one of the others there, the surface is behind it.
+  for (bool moved = true; moved;) {
+    moved = false;
+    for (const Program::Edge edge : edges.subspan(common_)) {
+      const Reach of = reach_of(edge);
+      if (of.covers && of.last_entry + reach_ < begin_ && of.first_exit > begin_) {
+        begin_ = of.first_exit;
+        cover_ = edge;
+        moved = true;
+      }
+      if (of.nearest <= last_entry + reach_ && of.farthest > last_entry) {
+        last_entry = of.farthest;
+        moved = true;
+      }
+    }
+  }
+  if (last_entry + reach_ < first_exit) end_ = std::min(end_, last_entry);
+  return begin_ <= end_;
+}
+
+void Narrower::leave_out_exits(LeafLayers& leaf) {
+  if (!leaf.by_area || leaf.kind != LeafLayers::Kind::kConvex) return;
+  if (reach_of(leaf).first_exit > end_ + reach_) leaf.left_out = LeafLayers::LeftOut::kExits;
+}
+
+void Narrower::set_edges(TileProgram::Node& node, std::span<const Program::Edge> edges) {
+  std::copy(edges.begin(), edges.end(), program_.edges.begin() + node.first);
+  node.count = static_cast<std::uint32_t>(edges.size());
+  for (std::uint32_t i = 0; i < node.count; ++i) {
+    const Program::Edge edge = edges[i];
+    program_.nearest[node.first + i] = edge.inverted() ? 0 : leaf_of(edge).nearest;
+    if (edge.leaf()) program_.leaves.push_back(edge.child());
+  }
+}
+
+Program::Edge Narrower::filter_union(Program::Edge edge) {
+  TileProgram::Node& node = program_.nodes[edge.child()];
+  std::vector<Program::Edge>& kept = kept_;
+  kept.clear();
+  for (const Program::Edge operand : edges_of(node)) {
+    if (outside_of_window(reach_of(leaf_of(operand)))) continue;
+    leave_out_exits(leaf_of(operand));
+    kept.push_back(operand);
+  }
+  if (kept.size() == 1) return Program::Edge(kept.front().child(), true, true);
+  set_edges(node, kept);
+  return edge;
+}
+
+void Narrower::filter() {
+  const std::span<Program::Edge> edges = edges_of(root());
+  program_.leaves.clear();
+  program_.depth = 1;
+  std::uint32_t count = 0;
+  for (Program::Edge edge : edges.first(common_)) {
+    if (!edge.leaf()) {
+      edge = filter_union(edge);
+      if (!edge.leaf()) program_.depth = 2;
+    } else {
+      LeafLayers& leaf = leaf_of(edge);
+      leave_out_exits(leaf);
+      const Reach of = reach_of(leaf);
+      if (of.covers && of.first_exit > end_ + reach_ && of.last_entry + reach_ < begin_ &&
+          edge.bits != last_.bits) {
+        around_.push_back(leaf.solid);
+        continue;
+      }
+    }
+    edges[count++] = edge;
+  }
+  const std::uint32_t common = count;
+  for (const Program::Edge edge : edges.subspan(common_)) {
+    LeafLayers& leaf = leaf_of(edge);
+    if (outside_of_window(reach_of(leaf))) continue;
+    if (edge.bits == cover_.bits) {
+      leaf.left_out = LeafLayers::LeftOut::kEntries;
+      leaf.nearest = 0;
+    }
+    edges[count++] = edge;
+  }
+  std::sort(edges.begin() + common, edges.begin() + count, [&](Program::Edge a, Program::Edge b) {
+    const std::uint32_t at_a = leaf_of(a).nearest, at_b = leaf_of(b).nearest;
+    return at_a != at_b ? at_a < at_b : a.bits < b.bits;
+  });
+  set_edges(root(), edges.first(count));
+}
+
+}  // namespace
+
+std::uint32_t farthest_reach(const Coincidence::Range& range) {
+  const double nearness = range.intercept;
+  const double reach = range.constant + range.quadratic * nearness * nearness + 4.0;
+  return static_cast<std::uint32_t>(std::min(reach, static_cast<double>(kPictureDepthLimit)));
+}
+
+bool TileFinder::narrow(std::size_t area) {
+  Narrower narrower(leaves_, tile_program_, area, around_);
+  if (!narrower.fits()) return true;
+  if (!narrower.find_window(farthest_reach(coincidence_->range()))) return false;
+  narrower.filter();
+  return true;
+}
+
+}  // namespace strata::csg
