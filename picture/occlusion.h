@@ -26,6 +26,7 @@ struct EyeSurfaces {
   glm::dvec2 centre{0.0};      ///< where the view axis meets the picture, in pixels
   double origin_distance = 0;  ///< of the origin of `positions`, along the view axis
   /// Relative to a point on the view axis, so that floats suffice. kNowhere: nothing is seen.
+  /// One more than there are pixels, as of normals.
   std::vector<glm::vec3> positions;
   std::vector<glm::vec3> normals;  ///< of the faces, of length 1, towards the eye
   /// Points of curved surfaces are not 0: their facets are none to be seen. Empty: there are none.

@@ -91,7 +91,7 @@ ViewOpenness::ViewOpenness(const View& whole, const SurfaceImage& image, const G
   const auto nearest = std::min_element(image.depth.begin(), image.depth.end());
   surfaces_.origin_distance = nearest != image.depth.end() ? view.distance(*nearest) : view.near;
   surfaces_.resize(image.width, image.height);
-  if (!normals.empty()) surfaces_.curved.assign(surfaces_.positions.size(), 0);
+  if (!normals.empty()) surfaces_.curved.assign(image.depth.size(), 0);
   const auto width = static_cast<std::size_t>(image.width);
   const glm::dmat3 eye_from_world(view.eye_from_world);
   const FaceDistance face_distance(view);

@@ -12,6 +12,8 @@
 #include <utility>
 #include <vector>
 
+#include "tests/support/simd_targets.h"
+
 namespace strata {
 namespace {
 
@@ -142,6 +144,25 @@ TEST(Openness, OfWhatLiesFarBehindIsNotDarkenedAroundAnOutline) {
     return Hit{{from.x, from.y, front ? 3.0 : 0.0}, {0, 0, 1}};
   });
   for (const std::uint8_t open : openness(image, radius)) ASSERT_EQ(open, 255);
+}
+
+TEST(Openness, IsTheSameForEverySimdTarget) {
+  for (const bool perspective : {false, true}) {
+    // No whole number of vectors is as wide; one vector is wider than the last.
+    for (const int width : {93, 64, 3}) {
+      auto image = seen(width, 57, 12, perspective, corner);
+      for (const bool curved : {false, true}) {
+        if (curved) {
+          image.curved.resize(static_cast<std::size_t>(width) * 57);
+          for (std::size_t i = 0; i < image.curved.size(); ++i) image.curved[i] = i % 7 < 4 ? 1 : 0;
+        }
+        const auto best = openness(image, 1.5);
+        ASSERT_NE(*std::min_element(best.begin(), best.end()), 255);
+        testkit::for_each_simd_target(
+            [&](const std::string& target) { EXPECT_EQ(openness(image, 1.5), best) << target; });
+      }
+    }
+  }
 }
 
 TEST(Openness, IsTheSameForAnyNumberOfThreadsAndEmptyPictures) {
