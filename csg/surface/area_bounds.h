@@ -47,8 +47,9 @@ struct AreaBounds {
 };
 
 /// Bounds for `triangles` of `mesh` in the tile that begins at pixel `tile`.
-/// (csg/surface/area_bounds_simd.cpp)
+/// (csg/surface/area_bounds_simd.cpp) @param with_exits  false: as if there were none
 void find_area_bounds(const LatticeMesh& mesh, std::span<const std::uint32_t> triangles,
-                      const glm::ivec2& tile, double steep_from, AreaBounds& bounds);
+                      const glm::ivec2& tile, double steep_from, bool with_exits,
+                      AreaBounds& bounds);
 
 }  // namespace strata::csg

@@ -47,8 +47,8 @@ constexpr float kShare = 0x1p-20F;
 
 class AreaBounder {
  public:
-  AreaBounder(const glm::ivec2& tile, double steep_from, AreaBounds& bounds)
-      : tile_(tile), steep_from_(steep_from), bounds_(&bounds) {}
+  AreaBounder(const glm::ivec2& tile, double steep_from, bool with_exits, AreaBounds& bounds)
+      : tile_(tile), steep_from_(steep_from), with_exits_(with_exits), bounds_(&bounds) {}
 
   HWY_INLINE void add(const glm::ivec3& p0, glm::ivec3 p1, glm::ivec3 p2, std::uint32_t triangle) {
     constexpr float kTile = kTileSide;
@@ -57,6 +57,7 @@ class AreaBounder {
         std::int64_t{p1.x - p0.x} * (p2.y - p0.y) - std::int64_t{p2.x - p0.x} * (p1.y - p0.y);
     if (area == 0) return;
     const bool exit = area > 0;
+    if (exit && !with_exits_) return;
     if (!exit) std::swap(p1, p2);
 
     // The edges at the tile's first corner, and their steps by a pixel.
@@ -191,12 +192,14 @@ class AreaBounder {
 
   glm::ivec2 tile_;
   double steep_from_;
+  bool with_exits_;
   AreaBounds* bounds_;
   std::uint32_t covered_corners_ = 0;
 };
 
 void FindAreaBounds(const LatticeMesh& mesh, std::span<const std::uint32_t> triangles,
-                    const glm::ivec2& tile, double steep_from, AreaBounds& bounds) {
+                    const glm::ivec2& tile, double steep_from, bool with_exits,
+                    AreaBounds& bounds) {
   for (AreaBounds::Range* range : {&bounds.entries, &bounds.exits}) {
     std::fill(std::begin(range->nearest), std::end(range->nearest), AreaBounds::kNever);
     std::fill(std::begin(range->farthest), std::end(range->farthest), 0u);
@@ -206,7 +209,7 @@ void FindAreaBounds(const LatticeMesh& mesh, std::span<const std::uint32_t> tria
   bounds.faces.clear();
   const int u0 = tile.x * kLatticeSteps, u1 = u0 + kTileSide * kLatticeSteps;
   const int v0 = tile.y * kLatticeSteps, v1 = v0 + kTileSide * kLatticeSteps;
-  AreaBounder bounder(tile, steep_from, bounds);
+  AreaBounder bounder(tile, steep_from, with_exits, bounds);
   for (const std::uint32_t triangle : triangles) {
     const glm::uvec3& t = mesh.triangles[triangle];
     const glm::ivec3 &p = mesh.vertices[t.x], &q = mesh.vertices[t.y], &r = mesh.vertices[t.z];
@@ -236,8 +239,9 @@ namespace strata::csg {
 HWY_EXPORT(FindAreaBounds);
 
 void find_area_bounds(const LatticeMesh& mesh, std::span<const std::uint32_t> triangles,
-                      const glm::ivec2& tile, double steep_from, AreaBounds& bounds) {
-  HWY_DYNAMIC_DISPATCH(FindAreaBounds)(mesh, triangles, tile, steep_from, bounds);
+                      const glm::ivec2& tile, double steep_from, bool with_exits,
+                      AreaBounds& bounds) {
+  HWY_DYNAMIC_DISPATCH(FindAreaBounds)(mesh, triangles, tile, steep_from, with_exits, bounds);
 }
 
 }  // namespace strata::csg

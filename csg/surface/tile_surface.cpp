@@ -1,6 +1,7 @@
 #include "csg/surface/tile_surface.h"
 
 #include <algorithm>
+#include <array>
 #include <new>
 #include <numeric>
 
@@ -59,11 +60,6 @@ constexpr int kMaxSearchDepth = 3;
 constexpr int kAreaSide = LeafLayers::kLanes;
 static_assert(kAreaSide == AreaBounds::kSide);
 
-/// The area of a tile that begins at its pixel (u, v).
-std::size_t area_of(int u, int v) {
-  return static_cast<std::size_t>(v / kAreaSide * AreaBounds::kAcross + u / kAreaSide);
-}
-
 }  // namespace
 
 TileFinder::TileFinder(const Program& program, const std::vector<ViewPart>& view_parts,
@@ -98,7 +94,9 @@ TileFinder::Input TileFinder::input_of(std::uint32_t solid) {
 TileFinder::Input TileFinder::input_of(const LeafLayers& leaf) {
   Input input = input_of(leaf.solid);
   if (!leaf.by_area) return input;
-  const std::size_t area = area_of(leaf.rect.u0 - tile_.u0, leaf.rect.v0 - tile_.v0);
+  SearchArea of;
+  of.rect = leaf.rect;
+  const std::size_t area = of.index();
   area_triangles_.clear();
   const bool entries = leaf.left_out != LeafLayers::LeftOut::kEntries;
   const bool exits = leaf.left_out != LeafLayers::LeftOut::kExits &&
@@ -272,15 +270,50 @@ bool TileFinder::place(LeafLayers& leaf, std::uint32_t solid) const {
 
 void TileFinder::find_bounds(LeafLayers& leaf) {
   // Of concave solids so few triangles that their layers are few.
-  constexpr std::size_t kMostTriangles = 512, kMostOfConcave = LeafLayers::kMostLayers / 2;
+  constexpr std::size_t kMostOfConcave = LeafLayers::kMostLayers / 2;
   const ViewPart& part = view_parts_[leaf.solid];
   const Input input = input_of(leaf.solid);
   const bool concave = leaf.kind == LeafLayers::Kind::kSorted;
-  if (part.cut || input.triangles.size() > (concave ? kMostOfConcave : kMostTriangles)) return;
+  if (concave && input.triangles.size() > kMostOfConcave) return;
   leaf.by_area = true;
   find_area_bounds(part.mesh, input.triangles, {tile_.u0, tile_.v0}, coincidence_->steep_from(),
-                   leaf.bounds);
+                   leaf.kind != LeafLayers::Kind::kFirstEntryOnly, leaf.bounds);
   if (concave) leaf.bounds.covered = 0;
+}
+
+void TileFinder::find_all_bounds(std::span<LeafLayers> leaves) {
+  const bool united = std::ranges::all_of(leaves, [](const LeafLayers& leaf) {
+    return leaf.kind == LeafLayers::Kind::kFirstEntryOnly;
+  });
+  if (!united) {
+    for (LeafLayers& leaf : leaves) find_bounds(leaf);
+    return;
+  }
+  drawn_.resize(leaves.size());
+  std::iota(drawn_.begin(), drawn_.end(), 0u);
+  std::sort(drawn_.begin(), drawn_.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return leaves[a].nearest != leaves[b].nearest ? leaves[a].nearest < leaves[b].nearest : a < b;
+  });
+  std::array<std::uint32_t, AreaBounds::kAreas> last;  // where each area is covered
+  last.fill(AreaBounds::kNever);
+  const std::uint64_t reach = farthest_reach(coincidence_->range());
+  for (const std::uint32_t slot : drawn_) {
+    LeafLayers& leaf = leaves[slot];
+    leaf.by_area = true;
+    if (leaf.nearest > *std::ranges::max_element(last) + reach) {
+      hidden_.push_back(slot);
+      std::fill(std::begin(leaf.bounds.entries.nearest), std::end(leaf.bounds.entries.nearest),
+                AreaBounds::kNever);
+      std::fill(std::begin(leaf.bounds.exits.nearest), std::end(leaf.bounds.exits.nearest),
+                AreaBounds::kNever);
+      continue;
+    }
+    find_bounds(leaf);
+    for (std::size_t area = 0; area < last.size(); ++area) {
+      if ((leaf.bounds.covered >> area & 1) == 0) continue;
+      last[area] = std::min(last[area], leaf.bounds.entries.farthest[area]);
+    }
+  }
 }
 
 void TileFinder::find(int tile_u, int tile_v, std::span<const std::uint32_t> solids,
@@ -293,17 +326,15 @@ void TileFinder::find(int tile_u, int tile_v, std::span<const std::uint32_t> sol
   arena_.clear();
   if (leaves_.size() < solids.size()) leaves_.resize(solids.size());
   std::size_t count = 0;
-  bool cut = false, united = true;
+  bool cut = false;
   for (const std::uint32_t solid : solids) {
     LeafLayers& leaf = leaves_[count];
     if (!place(leaf, solid)) continue;
     ++count;
     cut = cut || view_parts_[solid].cut;
-    united = united && leaf.kind == LeafLayers::Kind::kFirstEntryOnly;
   }
-  around_.clear();
-  if (count > 0 && united) return find_united(std::span(leaves_).first(count));
-  for (std::size_t i = 0; i < count && !cut; ++i) find_bounds(leaves_[i]);
+  hidden_.clear();
+  if (!cut) find_all_bounds(std::span(leaves_).first(count));
   for (int v = tile_.v0; v < tile_.v1; ++v) {
     const std::size_t row = part.index(tile_.u0, v);
     std::fill_n(part.image->depth.data() + row, tile_.u1 - tile_.u0, Surface::kNone);
@@ -329,23 +360,28 @@ void TileFinder::find(int tile_u, int tile_v, std::span<const std::uint32_t> sol
   if (cut) number_sources();
 }
 
+void TileFinder::enter_area(LeafLayers& leaf, const SearchArea& area, std::size_t index) const {
+  leaf.made = leaf.deep = leaf.steep = false;
+  leaf.left_out = LeafLayers::LeftOut::kNothing;
+  leaf.keys.clear();
+  leaf.triangles.clear();
+  leaf.rect = area.rect;
+  leaf.stride = kAreaSide;
+  leaf.nearest = leaf.bounds.nearest(index);
+  leaf.farthest = leaf.bounds.farthest(index);
+}
+
 void TileFinder::list_present(const SearchArea& area) {
   const int u = area.rect.u0, v = area.rect.v0;
-  const std::size_t area_index = area_of(u - tile_.u0, v - tile_.v0);
+  const std::size_t area_index = area.index();
   present_.clear();
   area_arena_.clear();
   for (std::uint32_t slot = 0; slot < area.leaves.size(); ++slot) {
     LeafLayers& leaf = area.leaves[slot];
     if (leaf.by_area) {
-      leaf.made = leaf.deep = leaf.steep = false;
-      leaf.left_out = LeafLayers::LeftOut::kNothing;
-      leaf.keys.clear();
-      leaf.triangles.clear();
-      leaf.rect = {u, v, u + kAreaSide, area.rect.v1};
-      leaf.stride = kAreaSide;
-      leaf.nearest = leaf.bounds.nearest(area_index);
-      leaf.farthest = leaf.bounds.farthest(area_index);
-      if (leaf.nearest != AreaBounds::kNever) present_.push_back(slot);
+      if (leaf.bounds.nearest(area_index) == AreaBounds::kNever) continue;
+      enter_area(leaf, area, area_index);
+      present_.push_back(slot);
       continue;
     }
     if (leaf.made && (leaf.areas >> area_index & 1) == 0) continue;
@@ -359,10 +395,20 @@ void TileFinder::list_present(const SearchArea& area) {
 void TileFinder::find_area(const SearchArea& area, bool cut) {
   list_present(area);
   around_.clear();
+  doubtful_.clear();
+  if (present_.empty()) return;
+  if (!cut && std::ranges::all_of(present_, [&](std::uint32_t slot) {
+        return leaves_[slot].kind == LeafLayers::Kind::kFirstEntryOnly;
+      })) {
+    return find_united(area);
+  }
   simplifier_.simplify(area.leaves, present_, tile_program_);
   if (tile_program_.constant) return;
-  if (!cut && !narrow(area_of(area.rect.u0 - tile_.u0, area.rect.v0 - tile_.v0))) return;
-  doubtful_.clear();
+  if (!cut && !narrow(area.index())) return;
+  if (tile_program_.leaves.size() == 1 && around_.empty()) {
+    LeafLayers& leaf = leaves_[tile_program_.leaves.front()];
+    if (leaf.left_out == LeafLayers::LeftOut::kExits && show_alone(area, leaf)) return;
+  }
   const auto is_deep = [&] {
     return std::any_of(tile_program_.leaves.begin(), tile_program_.leaves.end(),
                        [&](std::uint32_t slot) { return leaves_[slot].deep; });
@@ -384,6 +430,42 @@ void TileFinder::find_area(const SearchArea& area, bool cut) {
     if (stop_.stop_requested()) return;  // lists may be very long
     resolve(tile_program_, pixel);
   }
+}
+
+bool TileFinder::show_alone(const SearchArea& area, LeafLayers& leaf) {
+  const std::size_t index = area.index();
+  if ((leaf.bounds.covered >> index & 1) == 0 || (leaf.bounds.steep_areas >> index & 1) != 0) {
+    return false;
+  }
+  const LeafLayers::Kind kind = leaf.kind;
+  const LeafLayers::LeftOut left_out = leaf.left_out;
+  leaf.kind = LeafLayers::Kind::kConvex;
+  leaf.left_out = LeafLayers::LeftOut::kExits;
+  const RasterTarget target{Axis::kZ, view_->size.x, view_->size.y, kPictureDepthLimit};
+  const Input input = input_of(leaf);
+  const PixelRect& clip = input.clip;
+  const std::uint64_t fragments =
+      raster_layers(view_parts_[leaf.solid].mesh, target, input.triangles, clip,
+                    coincidence_->steep_from(), leaf, area_arena_);
+  leaf.kind = kind;
+  leaf.left_out = left_out;
+  const int width = std::min(tile_.u1, area.rect.u1) - area.rect.u0;
+  const int height = area.rect.v1 - area.rect.v0;
+  if (leaf.keys.size() != 1 || leaf.steep ||
+      fragments != static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height)) {
+    enter_area(leaf, area, index);
+    leaf.left_out = left_out;
+    return false;
+  }
+  fragments_ += fragments;
+  for (int row = 0; row < height; ++row) {
+    const auto from = static_cast<std::size_t>(row * leaf.stride);
+    const std::size_t to = part_.index(area.rect.u0, area.rect.v0 + row);
+    std::copy_n(leaf.keys[0] + from, width, part_.image->depth.data() + to);
+    std::copy_n(leaf.triangles[0] + from, width, part_.image->triangle.data() + to);
+    std::fill_n(part_.image->solid.data() + to, width, leaf.solid);
+  }
+  return true;
 }
 
 void TileFinder::number_sources() {

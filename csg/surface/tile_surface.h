@@ -17,46 +17,30 @@
 
 namespace strata::csg {
 
-/// The nearest entries of each pixel of a tile whose solids are all of
+/// The nearest entries of each pixel of an area whose solids are all of
 /// LeafLayers::Kind::kFirstEntryOnly.
 struct UnitedLayers {
   static constexpr std::uint32_t kEmpty = LeafLayers::kEmpty, kSteep = LeafLayers::kSteep;
-  static constexpr int kKept = 3;
-  int u0 = 0, v0 = 0;                 ///< of the tile
+  static constexpr int kKept = 3, kSide = LeafLayers::kLanes;
+  int u0 = 0, v0 = 0;                 ///< of the area
   std::uint32_t* depths[kKept] = {};  ///< sorted
   std::uint32_t* faces[kKept] = {};   ///< [steep:1 | index:31]; nothing where there is no entry
   /// Lower bound of the depths of all entries that were not kept; of steep faces minus their
   /// extra_steps.
   std::uint32_t* bound_behind = nullptr;
-  static constexpr int kAreasAcross = kTileSide / LeafLayers::kLanes;
-  static constexpr int kAreas = kAreasAcross * kAreasAcross;
-  /// For each area of LeafLayers::kLanes x kLanes pixels, row by row: the depth beyond which a face
-  /// is hidden and coincides with nothing that is seen.
-  std::uint32_t hidden_beyond[kAreas];
-  /// For each area: lower bound of the depths of the solids that were skipped as hidden.
-  std::uint32_t skipped_from[kAreas];
+  /// The depth beyond which a face is hidden and coincides with nothing that is seen.
+  std::uint32_t hidden_beyond = kEmpty;
+  /// Lower bound of the depths of the solids that were skipped as hidden.
+  std::uint32_t skipped_from = kEmpty;
   /// For each face that was rasterized: its solid, its triangle, and how many depth steps more than
   /// Coincidence::range() it may be off (0 unless it is steep).
   std::vector<std::uint32_t> face_solids, face_triangles, extra_steps;
 
-  void clear(Arena& arena, const PixelRect& tile);
+  void clear(Arena& arena, int u, int v);
   std::uint32_t add_face(const LatticeMesh& mesh, std::uint32_t solid, std::uint32_t triangle,
                          bool steep);
-  /// Whether all of a solid that begins at depth `nearest` is hidden in `clip`; then it counts as
-  /// skipped.
-  bool hides(const PixelRect& clip, std::uint32_t nearest);
-  /// Calls body(area) for the areas that `clip` meets.
-  template <class Body>
-  void for_each_area(const PixelRect& clip, Body&& body) const {
-    constexpr int kSide = LeafLayers::kLanes;
-    for (int v = (clip.v0 - v0) / kSide; v <= (clip.v1 - 1 - v0) / kSide; ++v) {
-      for (int u = (clip.u0 - u0) / kSide; u <= (clip.u1 - 1 - u0) / kSide; ++u) {
-        body(static_cast<std::size_t>(v * kAreasAcross + u));
-      }
-    }
-  }
   [[nodiscard]] std::size_t index(int u, int v) const {
-    return static_cast<std::size_t>((v - v0) * kTileSide + (u - u0));
+    return static_cast<std::size_t>((v - v0) * kSide + (u - u0));
   }
 };
 
@@ -100,6 +84,9 @@ class TileFinder {
   [[nodiscard]] bool place(LeafLayers& leaf, std::uint32_t solid) const;
   /// Makes a leaf one of bounds for each area, if it has few triangles in the tile.
   void find_bounds(LeafLayers& leaf);
+  /// The same for all leaves of a tile, except that where all are just united, hidden_ becomes
+  /// those that begin behind others that cover the tile.
+  void find_all_bounds(std::span<LeafLayers> leaves);
   /// Fills the pixels of one area. @param cut  the near plane may cut solids of the tile
   void find_area(const SearchArea& area, bool cut);
   /// present_ becomes the leaves that may be met in an area, prepared for it.
@@ -111,8 +98,13 @@ class TileFinder {
   void resolve(const TileProgram& program, std::uint64_t pixel);
   /// The same from transitions_.
   void show(std::uint64_t pixel);
-  /// Fills the tile where all solids are convex and just united.
-  void find_united(std::span<LeafLayers> leaves);
+  /// Prepares a leaf of bounds for an area.
+  void enter_area(LeafLayers& leaf, const SearchArea& area, std::size_t index) const;
+  /// Fills an area where all solids are convex and just united.
+  void find_united(const SearchArea& area);
+  /// Fills an area that shows just the entries of a convex solid, if they cover each pixel once.
+  /// @pre what is behind them does not matter
+  [[nodiscard]] bool show_alone(const SearchArea& area, LeafLayers& leaf);
   /// Decides a doubtful pixel of united_ by the entries kept. @return false: more of them matter
   bool show_united(std::uint64_t pixel);
   /// Triangles of the tile's pixels become those of the meshes: those of a solid that the near
@@ -140,7 +132,7 @@ class TileFinder {
   TileProgram tile_program_;
   UnitedLayers united_;
   FirstHit first_hit_;
-  std::vector<std::uint32_t> present_, all_triangles_, area_triangles_;
+  std::vector<std::uint32_t> present_, drawn_, hidden_, all_triangles_, area_triangles_;
   std::vector<std::uint32_t> around_;  ///< solids that all rays of an area are in where it counts
   std::vector<std::uint64_t> doubtful_;
   std::vector<std::uint32_t> slot_solids_;
@@ -170,6 +162,12 @@ void normalize_layers(LeafLayers& leaf, bool all_pixels_special, TileFinder& fin
 
 /// A part of a tile, LeafLayers::kLanes columns wide.
 struct SearchArea {
+  /// Which of the tile's it is, row by row.
+  [[nodiscard]] std::size_t index() const {
+    constexpr int kSide = AreaBounds::kSide;
+    return static_cast<std::size_t>(rect.v0 % kTileSide / kSide * AreaBounds::kAcross +
+                                    rect.u0 % kTileSide / kSide);
+  }
   std::span<LeafLayers> leaves;
   const std::uint32_t* solids = nullptr;  ///< of the leaves
   const TileProgram* program = nullptr;
@@ -187,10 +185,10 @@ void search_surface(const SearchArea& area, TileFinder& finder);
 std::uint64_t raster_united(const LatticeMesh& mesh, const RasterTarget& target,
                             std::span<const std::uint32_t> triangles, const PixelRect& clip,
                             double steep_from, std::uint32_t solid, UnitedLayers& layers);
-/// Updates layers.hidden_beyond in `clip`.
-void find_hidden(const PixelRect& clip, const Coincidence::Range& range, UnitedLayers& layers);
-/// Shows the nearest entry of each pixel of `tile`. `doubtful` gets pixels where another is close.
-void find_united(const UnitedLayers& layers, const PixelRect& tile, const Coincidence::Range& range,
+/// Updates layers.hidden_beyond.
+void find_hidden(const Coincidence::Range& range, UnitedLayers& layers);
+/// Shows the nearest entry of each pixel of `area`. `doubtful` gets pixels where another is close.
+void find_united(const UnitedLayers& layers, const PixelRect& area, const Coincidence::Range& range,
                  const SurfacePart& part, std::vector<std::uint64_t>& doubtful);
 
 /// How the crossings of a part are kept: what lies behind the first entry of a convex solid that is

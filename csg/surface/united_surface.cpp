@@ -1,16 +1,15 @@
 #include <algorithm>
-#include <numeric>
 
 #include "csg/surface/tile_surface.h"
 
-// Tiles of convex solids that are just united; see csg/surface/united_surface_simd.cpp.
+// Areas of convex solids that are just united; see csg/surface/united_surface_simd.cpp.
 
 namespace strata::csg {
 
-void UnitedLayers::clear(Arena& arena, const PixelRect& tile) {
-  // Blocks of pixels may reach beyond the tile.
-  constexpr std::size_t kWords = static_cast<std::size_t>(kTilePixels + 4 * kTileSide);
-  u0 = tile.u0, v0 = tile.v0;
+void UnitedLayers::clear(Arena& arena, int u, int v) {
+  // Blocks of pixels may reach beyond the area.
+  constexpr auto kWords = static_cast<std::size_t>(kSide * (kSide + 4) + 2 * kSide);
+  u0 = u, v0 = v;
   for (std::uint32_t*& words : depths) {
     words = arena.words(kWords);
     std::fill_n(words, kWords, kEmpty);
@@ -18,20 +17,10 @@ void UnitedLayers::clear(Arena& arena, const PixelRect& tile) {
   for (std::uint32_t*& words : faces) words = arena.words(kWords);
   bound_behind = arena.words(kWords);
   std::fill_n(bound_behind, kWords, kEmpty);
-  std::fill(std::begin(hidden_beyond), std::end(hidden_beyond), kEmpty);
-  std::fill(std::begin(skipped_from), std::end(skipped_from), kEmpty);
+  hidden_beyond = skipped_from = kEmpty;
   face_solids.clear();
   face_triangles.clear();
   extra_steps.clear();
-}
-
-bool UnitedLayers::hides(const PixelRect& clip, std::uint32_t nearest) {
-  bool all = true;
-  for_each_area(clip, [&](std::size_t area) { all = all && hidden_beyond[area] < nearest; });
-  if (!all) return false;
-  for_each_area(
-      clip, [&](std::size_t area) { skipped_from[area] = std::min(skipped_from[area], nearest); });
-  return true;
 }
 
 std::uint32_t UnitedLayers::add_face(const LatticeMesh& mesh, std::uint32_t solid,
@@ -77,37 +66,68 @@ bool TileFinder::show_united(std::uint64_t pixel) {
     }
     transitions_.push_back({depth, solid, united_.face_triangles[face], false});
   }
-  constexpr std::size_t kSide = LeafLayers::kLanes;
-  const std::size_t area =
-      at / kTileSide / kSide * UnitedLayers::kAreasAcross + at % kTileSide / kSide;
-  if (std::min(united_.bound_behind[at], united_.skipped_from[area]) <= last) return false;
+  if (std::min(united_.bound_behind[at], united_.skipped_from) <= last) return false;
   if (transitions_.size() > 1) show(pixel);
   return true;
 }
 
-void TileFinder::find_united(std::span<LeafLayers> leaves) {
+void TileFinder::find_united(const SearchArea& area) {
   const RasterTarget target{Axis::kZ, view_->size.x, view_->size.y, kPictureDepthLimit};
-  united_.clear(arena_, tile_);
-  present_.resize(leaves.size());
-  std::iota(present_.begin(), present_.end(), 0u);
-  std::sort(present_.begin(), present_.end(), [&](std::uint32_t a, std::uint32_t b) {
-    return leaves[a].nearest != leaves[b].nearest ? leaves[a].nearest < leaves[b].nearest : a < b;
-  });
+  const std::size_t index = area.index();
+  // What begins behind a solid that covers the area is hidden.
+  const std::uint64_t reach = farthest_reach(area.range);
+  std::uint64_t last = UnitedLayers::kEmpty;
   for (const std::uint32_t slot : present_) {
-    const LeafLayers& leaf = leaves[slot];
-    const Input input = input_of(leaf.solid);
-    if (united_.hides(input.clip, leaf.nearest)) continue;
+    const AreaBounds& bounds = leaves_[slot].bounds;
+    if ((bounds.covered >> index & 1) != 0) {
+      last = std::min(last, bounds.entries.farthest[index] + reach);
+    }
+  }
+  united_.clear(area_arena_, area.rect.u0, area.rect.v0);
+  drawn_.clear();
+  for (const std::uint32_t slot : hidden_) {
+    united_.skipped_from = std::min(united_.skipped_from, view_parts_[leaves_[slot].solid].nearest);
+  }
+  for (const std::uint32_t slot : present_) {
+    const std::uint32_t nearest = leaves_[slot].nearest;
+    if (nearest <= last) {
+      drawn_.push_back(slot);
+    } else {
+      united_.skipped_from = std::min(united_.skipped_from, nearest);
+    }
+  }
+  if (drawn_.size() == 1 && show_alone(area, leaves_[drawn_.front()])) return;
+  std::sort(drawn_.begin(), drawn_.end(), [&](std::uint32_t a, std::uint32_t b) {
+    const std::uint32_t at_a = leaves_[a].nearest, at_b = leaves_[b].nearest;
+    return at_a != at_b ? at_a < at_b : a < b;
+  });
+  for (const std::uint32_t slot : drawn_) {
+    const LeafLayers& leaf = leaves_[slot];
+    if (united_.hidden_beyond < leaf.nearest) {
+      united_.skipped_from = std::min(united_.skipped_from, leaf.nearest);
+      break;
+    }
+    const Input input = input_of(leaf);
     fragments_ += raster_united(view_parts_[leaf.solid].mesh, target, input.triangles, input.clip,
                                 coincidence_->steep_from(), leaf.solid, united_);
-    find_hidden(input.clip, coincidence_->range(), united_);
+    find_hidden(area.range, united_);
   }
-  doubtful_.clear();
-  csg::find_united(united_, tile_, coincidence_->range(), part_, doubtful_);
+  const PixelRect rect{area.rect.u0, area.rect.v0, std::min(tile_.u1, area.rect.u1), area.rect.v1};
+  csg::find_united(united_, rect, area.range, part_, doubtful_);
   bool simplified = false;
   for (const std::uint64_t pixel : doubtful_) {
     if (show_united(pixel)) continue;
     if (!simplified) {
-      simplifier_.simplify(leaves, present_, tile_program_);
+      for (const std::uint32_t slot : hidden_) {
+        LeafLayers& leaf = leaves_[slot];
+        find_bounds(leaf);
+        if (leaf.bounds.nearest(index) == AreaBounds::kNever) continue;
+        enter_area(leaf, area, index);
+        present_.push_back(slot);
+      }
+      hidden_.clear();
+      std::sort(present_.begin(), present_.end());
+      simplifier_.simplify(area.leaves, present_, tile_program_);
       simplified = true;
     }
     resolve(tile_program_, pixel);

@@ -8,9 +8,9 @@
 #include "csg/surface/coincidence_reach-inl.h"
 #include "raster/rasterize-inl.h"
 
-// Where all solids of a tile are convex and just united with the rest, the nearest entry of a pixel
-// is what it shows, and the next two tell whether another is near enough to coincide with it: one
-// pass over the triangles, no layers of single solids.
+// Where all solids of an area are convex and just united with the rest, the nearest entry of a
+// pixel is what it shows, and the next two tell whether another is near enough to coincide with it:
+// one pass over the triangles, no layers of single solids.
 
 HWY_BEFORE_NAMESPACE();
 namespace strata::csg {
@@ -113,32 +113,24 @@ std::uint64_t RasterUnited(const LatticeMesh& mesh, const RasterTarget& target,
   return sink.fragments();
 }
 
-void FindHidden(const PixelRect& clip, const Coincidence::Range& range, UnitedLayers& layers) {
-  using D = hn::CappedTag<std::uint32_t, LeafLayers::kLanes>;
+void FindHidden(const Coincidence::Range& range, UnitedLayers& layers) {
+  using D = hn::CappedTag<std::uint32_t, UnitedLayers::kSide>;
   const D d;
-  constexpr int kSide = LeafLayers::kLanes;
+  constexpr auto kWords = static_cast<std::size_t>(UnitedLayers::kSide * UnitedLayers::kSide);
   const auto steep = hn::Set(d, UnitedLayers::kSteep), empty = hn::Set(d, UnitedLayers::kEmpty);
-  const auto lanes = static_cast<int>(hn::Lanes(d));
-  layers.for_each_area(clip, [&](std::size_t area) {
-    const int area_u = static_cast<int>(area) % UnitedLayers::kAreasAcross * kSide;
-    const int area_v = static_cast<int>(area) / UnitedLayers::kAreasAcross * kSide;
-    auto farthest = hn::Zero(d);
-    for (int v = area_v; v < area_v + kSide; ++v) {
-      for (int u = area_u; u < area_u + kSide; u += lanes) {
-        const std::size_t at = layers.index(layers.u0 + u, layers.v0 + v);
-        const auto depth = hn::Load(d, layers.depths[0] + at);
-        const auto face = hn::Load(d, layers.faces[0] + at);
-        const auto open = hn::Or(hn::Eq(depth, empty), hn::Ne(hn::And(face, steep), hn::Zero(d)));
-        farthest = hn::Max(farthest, hn::IfThenElse(open, empty, depth));
-      }
-      if (hn::GetLane(hn::MaxOfLanes(d, farthest)) == UnitedLayers::kEmpty) return;
-    }
-    const auto last = hn::MaxOfLanes(d, farthest);
-    layers.hidden_beyond[area] = hn::GetLane(hn::Add(last, coincidence_reach(d, range, last))) + 1;
-  });
+  auto farthest = hn::Zero(d);
+  for (std::size_t at = 0; at < kWords; at += hn::Lanes(d)) {
+    const auto depth = hn::Load(d, layers.depths[0] + at);
+    const auto face = hn::Load(d, layers.faces[0] + at);
+    const auto open = hn::Or(hn::Eq(depth, empty), hn::Ne(hn::And(face, steep), hn::Zero(d)));
+    if (!hn::AllFalse(d, open)) return;
+    farthest = hn::Max(farthest, depth);
+  }
+  const auto last = hn::MaxOfLanes(d, farthest);
+  layers.hidden_beyond = hn::GetLane(hn::Add(last, coincidence_reach(d, range, last))) + 1;
 }
 
-void FindUnited(const UnitedLayers& layers, const PixelRect& tile, const Coincidence::Range& range,
+void FindUnited(const UnitedLayers& layers, const PixelRect& area, const Coincidence::Range& range,
                 const SurfacePart& part, std::vector<std::uint64_t>& doubtful) {
   using D = hn::CappedTag<std::uint32_t, LeafLayers::kLanes>;
   const D d;
@@ -149,11 +141,11 @@ void FindUnited(const UnitedLayers& layers, const PixelRect& tile, const Coincid
   SurfaceImage& image = *part.image;
   alignas(64) std::uint32_t depths[LeafLayers::kLanes], solids[LeafLayers::kLanes],
       triangles[LeafLayers::kLanes], doubts[LeafLayers::kLanes];
-  for (int v = tile.v0; v < tile.v1; ++v) {
-    for (int u = tile.u0; u < tile.u1; u += lanes) {
+  for (int v = area.v0; v < area.v1; ++v) {
+    for (int u = area.u0; u < area.u1; u += lanes) {
       const std::size_t at = layers.index(u, v);
       const std::size_t pixel = part.index(u, v);
-      const int count = std::min(lanes, tile.u1 - u);
+      const int count = std::min(lanes, area.u1 - u);
       const auto depth = hn::Load(d, layers.depths[0] + at);
       const auto hit = hn::Ne(depth, empty);
       const auto marked = hn::IfThenElseZero(hit, hn::Load(d, layers.faces[0] + at));
@@ -220,12 +212,12 @@ std::uint64_t raster_united(const LatticeMesh& mesh, const RasterTarget& target,
   return HWY_DYNAMIC_DISPATCH(RasterUnited)(mesh, target, triangles, clip, steep_from, solid,
                                             layers);
 }
-void find_hidden(const PixelRect& clip, const Coincidence::Range& range, UnitedLayers& layers) {
-  HWY_DYNAMIC_DISPATCH(FindHidden)(clip, range, layers);
+void find_hidden(const Coincidence::Range& range, UnitedLayers& layers) {
+  HWY_DYNAMIC_DISPATCH(FindHidden)(range, layers);
 }
-void find_united(const UnitedLayers& layers, const PixelRect& tile, const Coincidence::Range& range,
+void find_united(const UnitedLayers& layers, const PixelRect& area, const Coincidence::Range& range,
                  const SurfacePart& part, std::vector<std::uint64_t>& doubtful) {
-  HWY_DYNAMIC_DISPATCH(FindUnited)(layers, tile, range, part, doubtful);
+  HWY_DYNAMIC_DISPATCH(FindUnited)(layers, area, range, part, doubtful);
 }
 
 }  // namespace strata::csg

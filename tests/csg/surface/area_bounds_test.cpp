@@ -27,7 +27,7 @@ struct Soup {
     std::vector<std::uint32_t> all(triangles.size());
     std::iota(all.begin(), all.end(), 0u);
     AreaBounds bounds;
-    find_area_bounds(mesh, all, kTile, steep_from, bounds);
+    find_area_bounds(mesh, all, kTile, steep_from, true, bounds);
     return bounds;
   }
   /// Calls body(triangle, exit, area, depth) for all crossings of the tile.
