@@ -101,6 +101,13 @@ HWY_INLINE Vec3 points_at(const std::vector<glm::vec3>& points, const Places& pl
 #endif
 }
 
+/// Bytes at some places, as floats.
+HWY_INLINE Vec bytes_at(const std::uint8_t* from, const Places& places) {
+  HWY_ALIGN std::uint8_t bytes[kLanes];
+  for (int lane = 0; lane < kLanes; ++lane) bytes[lane] = from[places.at[lane]];
+  return hn::ConvertTo(Lane(), hn::PromoteTo(LaneInt(), hn::Load(LaneByte(), bytes)));
+}
+
 /// `count` pixels from x on of a row that begins at `begin`, the last one again for further lanes.
 HWY_INLINE Places row_places(int begin, int x, int count) {
   Places places;
@@ -394,21 +401,15 @@ class Means {
     return true;
   }
 
-  [[nodiscard]] HWY_INLINE Vec values_at(const std::uint8_t* from, const Places& places) const {
-    HWY_ALIGN std::uint8_t bytes[kLanes];
-    for (int lane = 0; lane < kLanes; ++lane) bytes[lane] = from[places.at[lane]];
-    return hn::ConvertTo(Lane(), hn::PromoteTo(LaneInt(), hn::Load(LaneByte(), bytes)));
-  }
-
   [[nodiscard]] Vec means(int x, int y, int count, const std::uint8_t* from) const {
     const Lane d;
     const Places middle = row_places(y * seen_->width, x, count);
-    const Vec value = values_at(from, middle);
+    const Vec value = bytes_at(from, middle);
     const Vec3 here = points_at(seen_->positions, middle);
     const Vec3 normal = points_at(seen_->normals, middle);
     Mask counts = is_somewhere(here);
     if (stride_ > 1) {
-      counts = hn::And(counts, hn::Ne(values_at(seen_->curved.data(), middle), hn::Zero(d)));
+      counts = hn::And(counts, hn::Ne(bytes_at(seen_->curved.data(), middle), hn::Zero(d)));
       if (hn::AllFalse(d, counts)) return value;
     }
     const auto pixel = [&](double away) { return away / seen_->scale; };
@@ -433,10 +434,10 @@ class Means {
       Vec weight = hn::Mul(hn::Load(d, shares), hn::Max(hn::Zero(d), hn::Sub(set(1.0f), away)));
       weight = hn::Mul(weight, hn::Max(hn::Zero(d), hn::Sub(hn::Mul(set(4.0f), same), set(3.0f))));
       if (stride_ > 1) {
-        const Vec curved = values_at(seen_->curved.data(), places);
+        const Vec curved = bytes_at(seen_->curved.data(), places);
         weight = hn::IfThenZeroElse(hn::Eq(curved, hn::Zero(d)), weight);
       }
-      sum = hn::Add(sum, hn::Mul(weight, values_at(from, places)));
+      sum = hn::Add(sum, hn::Mul(weight, bytes_at(from, places)));
       weights = hn::Add(weights, weight);
     }
     return hn::IfThenElse(counts, hn::Add(hn::Div(sum, weights), set(0.5f)), value);
@@ -452,6 +453,105 @@ void smooth(const EyeSurfaces& seen, int y, int step_x, int step_y, int stride,
   Means(seen, step_x, step_y, stride).find(y, from, to);
 }
 
+/// Means of the four pixels around places in a row.
+class Between {
+ public:
+  Between(const EyeSurfaces& seen, const std::uint8_t* open, const PixelRow& row,
+          const SeenPlane& plane)
+      : seen_(&seen), open_(open), offset_(set(plane.offset)) {
+    normal_ = {set(plane.normal.x), set(plane.normal.y), set(plane.normal.z)};
+    first_ = static_cast<float>(row.u);
+    step_ = row.step;
+    const float y = (static_cast<float>(row.v) + 0.5f) * row.step - 0.5f;
+    top_ = std::clamp(static_cast<int>(y), 0, seen.height - 1);
+    bottom_ = std::min(top_ + 1, seen.height - 1);
+    down_ = set(std::clamp(y - static_cast<float>(top_), 0.0f, 1.0f));
+  }
+
+  /// Of `count` pixels from the `from`th of the row on.
+  [[nodiscard]] Vec find(int from, int count) const {
+    const Lane d;
+    const LaneInt di;
+    const Vec one = set(1.0f);
+    const Vec iota = hn::Min(hn::Iota(d, 0.0f), set(static_cast<float>(count - 1)));
+    const Vec u = hn::Add(iota, set(first_ + static_cast<float>(from)));
+    const Vec x = hn::Sub(hn::Mul(hn::Add(u, set(0.5f)), set(step_)), set(0.5f));
+    const VecInt last = hn::Set(di, seen_->width - 1);
+    const VecInt left = hn::Min(hn::Max(hn::ConvertTo(di, x), hn::Zero(di)), last);
+    const VecInt right = hn::Min(hn::Add(left, hn::Set(di, 1)), last);
+    const Vec to_right = hn::Min(hn::Max(hn::Sub(x, hn::ConvertTo(d, left)), hn::Zero(d)), one);
+    const Vec to_left = hn::Sub(one, to_right), up = hn::Sub(one, down_);
+    Corner corners[] = {corner(left, top_, hn::Mul(to_left, up)),
+                        corner(right, top_, hn::Mul(to_right, up)),
+                        corner(left, bottom_, hn::Mul(to_left, down_)),
+                        corner(right, bottom_, hn::Mul(to_right, down_))};
+    Mask all_open = hn::Eq(one, one);
+    for (const Corner& one_of_four : corners) {
+      all_open = hn::And(all_open, hn::Eq(one_of_four.open, set(255.0f)));
+    }
+    if (hn::AllTrue(d, all_open)) return one;
+    Vec open = hn::Zero(d), weights = hn::Zero(d);
+    for (const Corner& one_of_four : corners) {
+      const Vec weight = weight_of(one_of_four);
+      open = hn::Add(open, hn::Mul(weight, one_of_four.open));
+      weights = hn::Add(weights, weight);
+    }
+    const Mask known = hn::AndNot(all_open, hn::Gt(weights, hn::Zero(d)));
+    return hn::IfThenElse(known, hn::Div(open, hn::Mul(set(255.0f), weights)), one);
+  }
+
+ private:
+  /// One of the four pixels around each place.
+  struct Corner {
+    Places places;
+    Vec open, share;
+  };
+
+  [[nodiscard]] HWY_INLINE Corner corner(VecInt column, int row, Vec share) const {
+    Corner result;
+    const LaneInt di;
+    hn::Store(hn::Add(column, hn::Set(di, row * seen_->width)), di, result.places.at);
+    result.open = bytes_at(open_, result.places);
+    result.share = share;
+    return result;
+  }
+
+  [[nodiscard]] HWY_INLINE Vec weight_of(const Corner& corner) const {
+    const Lane d;
+    const Vec3 there = points_at(seen_->positions, corner.places);
+    Vec pixel = set(1.0f);
+    if (seen_->perspective) pixel = of_distances(*seen_, there, [](double away) { return away; });
+    pixel = hn::Div(pixel, set(static_cast<float>(seen_->scale)));
+    const Vec away =
+        hn::Div(hn::Abs(hn::Sub(dot(normal_, there), offset_)), hn::Mul(set(2.0f), pixel));
+    const Vec same = dot(normal_, points_at(seen_->normals, corner.places));
+    const Vec like = hn::Mul(hn::Max(hn::Zero(d), hn::Sub(set(1.0f), away)),
+                             hn::Max(hn::Zero(d), hn::Sub(hn::Mul(set(4.0f), same), set(3.0f))));
+    // Others count a little, for where there is no point of the face.
+    const Vec weight = hn::Mul(hn::Add(corner.share, set(0.02f)), hn::Add(like, set(0.002f)));
+    return hn::IfThenElseZero(is_somewhere(there), weight);
+  }
+
+  const EyeSurfaces* seen_;
+  const std::uint8_t* open_;
+  Vec3 normal_;
+  Vec offset_, down_;
+  float first_ = 0.0f, step_ = 1.0f;
+  int top_ = 0, bottom_ = 0;
+};
+
+void find_between(const EyeSurfaces& seen, const std::uint8_t* open, const PixelRow& row,
+                  const SeenPlane& plane, std::span<float> values) {
+  const Between between(seen, open, row, plane);
+  const int count = static_cast<int>(values.size());
+  for (int i = 0; i < count; i += kLanes) {
+    const int some = std::min(kLanes, count - i);
+    HWY_ALIGN float found[kLanes];
+    hn::Store(between.find(i, some), Lane(), found);
+    std::copy_n(found, some, values.begin() + i);
+  }
+}
+
 }  // namespace
 }  // namespace HWY_NAMESPACE
 }  // namespace strata
@@ -463,6 +563,7 @@ namespace {
 
 HWY_EXPORT(find_horizons);
 HWY_EXPORT(smooth);
+HWY_EXPORT(find_between);
 
 /// The directions of all planes of a square: half a circle, by pi / 32.
 std::array<glm::vec2, 32> make_directions() {
@@ -504,6 +605,11 @@ std::vector<std::uint8_t> openness(const EyeSurfaces& surfaces, double radius,
     });
   }
   return open;
+}
+
+void openness_along(const EyeSurfaces& surfaces, std::span<const std::uint8_t> open,
+                    const PixelRow& row, const SeenPlane& plane, std::span<float> values) {
+  HWY_DYNAMIC_DISPATCH(find_between)(surfaces, open.data(), row, plane, values);
 }
 
 }  // namespace strata

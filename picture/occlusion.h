@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <glm/geometric.hpp>
@@ -51,8 +50,9 @@ template <class Away>
 [[nodiscard]] float openness_between(const EyeSurfaces& surfaces,
                                      std::span<const std::uint8_t> open, const glm::dvec2& place,
                                      const glm::vec3& normal, Away&& away) {
-  const int left = std::clamp(static_cast<int>(std::floor(place.x)), 0, surfaces.width - 1);
-  const int top = std::clamp(static_cast<int>(std::floor(place.y)), 0, surfaces.height - 1);
+  // Cut to whole numbers, which floors them where it matters.
+  const int left = std::clamp(static_cast<int>(place.x), 0, surfaces.width - 1);
+  const int top = std::clamp(static_cast<int>(place.y), 0, surfaces.height - 1);
   const int right = std::min(left + 1, surfaces.width - 1);
   const int bottom = std::min(top + 1, surfaces.height - 1);
   const auto index = [&](int column, int row) {
@@ -79,6 +79,23 @@ template <class Away>
   }
   return weights > 0.0f ? sum / (255.0f * weights) : 1.0f;
 }
+
+/// Pixels in a row of a picture that has 1 / step pixels where EyeSurfaces has one.
+struct PixelRow {
+  int u = 0, v = 0;  ///< the first
+  float step = 1.0f;
+};
+
+/// The plane of a face, where EyeSurfaces has positions.
+struct SeenPlane {
+  glm::vec3 normal{0.0f};  ///< of length 1, towards the eye
+  float offset = 0.0f;     ///< along the normal
+};
+
+/// openness_between() for the middles of pixels that show one face, a value each: of no use is
+/// what lies two pixels from its plane.
+void openness_along(const EyeSurfaces& surfaces, std::span<const std::uint8_t> open,
+                    const PixelRow& row, const SeenPlane& plane, std::span<float> values);
 
 /// Directions, each turned from the last by an angle that is given by its cosine and sine: the same
 /// on every machine. The first is (1, 0).

@@ -130,9 +130,20 @@ Shader::Face Shader::face(std::uint32_t solid, std::uint32_t tagged) const {
   return face;
 }
 
-Rgba Shader::colour(const Face& face, int u, int v) const {
+void Shader::colours(const Face& face, int u, int v, std::span<Rgba> pixels) const {
+  constexpr std::size_t kPixels = 64;
+  std::array<float, kPixels> open;
+  open.fill(1.0f);
+  while (!pixels.empty()) {
+    const std::size_t count = std::min(kPixels, pixels.size());
+    if (!face.open) look_.openness->along(u, v, face.plane, std::span(open).first(count));
+    for (std::size_t i = 0; i < count; ++i, ++u) pixels[i] = colour(face, u, v, open[i]);
+    pixels = pixels.subspan(count);
+  }
+}
+
+Rgba Shader::colour(const Face& face, int u, int v, float open) const {
   if (face.hatched) return to_bytes(glm::vec4(face.base * hatch(u, v), 1.0f));
-  const float open = face.open ? 1.0f : look_.openness->at(u, v, face.plane);
   if (!face.curved) {
     if (open == 1.0f) return face.colour;
     return to_bytes(glm::vec4(in_light(face.base, face.light, open), 1.0f));
@@ -235,7 +246,17 @@ class SampleShader {
   }
   /// The colour of a face at pixel (u, v).
   Rgba at(std::uint32_t solid, std::uint32_t face, int u, int v) {
-    return uniform(solid, face) ? last_->colour : shader_->colour(*last_, u, v);
+    Rgba colour;
+    along(solid, face, u, v, std::span(&colour, 1));
+    return colour;
+  }
+  /// The same for pixels from (u, v) on.
+  void along(std::uint32_t solid, std::uint32_t face, int u, int v, std::span<Rgba> pixels) {
+    if (uniform(solid, face)) {
+      std::fill(pixels.begin(), pixels.end(), last_->colour);
+    } else {
+      shader_->colours(*last_, u, v, pixels);
+    }
   }
   /// Whether a face has one colour, colour() then.
   bool uniform(std::uint32_t solid, std::uint32_t face) {
@@ -247,6 +268,10 @@ class SampleShader {
       last_ = &kept.face;
     }
     return last_->uniform;
+  }
+  /// The same for `count` pixels from (u, v) on.
+  bool uniform_along(std::uint32_t solid, std::uint32_t face, int u, int v, int count) {
+    return uniform(solid, face) || shader_->uniform_along(*last_, u, v, count);
   }
   [[nodiscard]] Rgba colour() const { return last_->colour; }
 
@@ -318,23 +343,33 @@ void TileShader::shade_row(const SurfaceImage& tile, std::size_t begin, int u, i
       std::fill_n(colours + block, pixels, background);
       continue;
     }
-    if (seen == Seen::kOneFace) {
-      covered_ += pixels;
-      if (samples_->uniform(tile.solid[first], tile.triangle[first])) {
-        std::fill_n(colours + block, pixels, samples_->colour());
-        continue;
-      }
-    }
     const int column = u + static_cast<int>(block), row = rows_.ground.first + v;
-    if (seen != Seen::kOneFace && rows_.across * rows_.down == 1) {
+    if (seen == Seen::kOneFace) {
+      const std::uint32_t solid = tile.solid[first], face = tile.triangle[first];
+      std::size_t run = pixels;
+      if (samples_->uniform_along(solid, face, column, row, static_cast<int>(pixels))) {
+        std::fill_n(colours + block, pixels, samples_->colour());
+      } else {
+        const auto goes_on = [&] {
+          const std::size_t next = first + run * across;
+          return block + run + at_once <= count && tile.solid[next] == solid &&
+                 tile.triangle[next] == face &&
+                 look_at(tile, next, Block(), rows_.down) == Seen::kOneFace;
+        };
+        while (goes_on()) run += at_once;
+        samples_->along(solid, face, column, row, std::span(colours + block, run));
+        block += run - pixels;
+      }
+      covered_ += run;
+      continue;
+    }
+    if (rows_.across * rows_.down == 1) {
       shade_runs(tile, first, column, row, background, std::span(colours + block, pixels));
       continue;
     }
     for (std::size_t i = 0; i < pixels; ++i) {
-      const int there = column + static_cast<int>(i);
-      colours[block + i] = seen == Seen::kOneFace
-                               ? samples_->at(tile.solid[first], tile.triangle[first], there, row)
-                               : pixel(tile, first + i * across, there, row, background);
+      colours[block + i] =
+          pixel(tile, first + i * across, column + static_cast<int>(i), row, background);
     }
   }
 }
@@ -351,13 +386,14 @@ void TileShader::shade_runs(const SurfaceImage& tile, std::size_t begin, int u, 
       continue;
     }
     const std::uint32_t solid = solids[i], face = faces[i];
-    const bool uniform = samples_->uniform(solid, face);
-    for (; i < colours.size() && depths[i] != SurfaceImage::kNone && solids[i] == solid &&
-           faces[i] == face;
-         ++i, ++covered_) {
-      colours[i] =
-          uniform ? samples_->colour() : samples_->at(solid, face, u + static_cast<int>(i), v);
+    const std::size_t begin_of_run = i;
+    while (i < colours.size() && depths[i] != SurfaceImage::kNone && solids[i] == solid &&
+           faces[i] == face) {
+      ++i;
     }
+    covered_ += i - begin_of_run;
+    samples_->along(solid, face, u + static_cast<int>(begin_of_run), v,
+                    colours.subspan(begin_of_run, i - begin_of_run));
   }
 }
 

@@ -52,14 +52,19 @@ class Shader {
     Rgba colour{0};        ///< where all is open
     glm::vec3 base{0.0f};  ///< before light
     Lit light;             ///< where it is flat
-    ViewOpenness::Plane plane;
+    SeenPlane plane;
     /// Share of a corner at (u, v, 1), not scaled; its normal in eye space.
     std::array<glm::dvec3, 3> shares, normals;
   };
   /// @param face  [exit:1 | triangle:31]
   [[nodiscard]] Face face(std::uint32_t solid, std::uint32_t face) const;
-  /// The colour of a face at pixel (u, v) of the picture.
-  [[nodiscard]] Rgba colour(const Face& face, int u, int v) const;
+  /// The colours of a face at pixels of the picture from (u, v) on.
+  void colours(const Face& face, int u, int v, std::span<Rgba> pixels) const;
+  /// Whether `count` pixels of a face from (u, v) on have face.colour.
+  [[nodiscard]] bool uniform_along(const Face& face, int u, int v, int count) const {
+    return face.uniform ||
+           (!face.curved && !face.hatched && look_.openness->open_along(u, v, count));
+  }
 
  private:
   /// In world space, not of length 1.
@@ -69,6 +74,8 @@ class Shader {
   /// @param normal  in eye space, of length 1
   [[nodiscard]] Lit light_on(const glm::dvec3& normal) const;
   [[nodiscard]] glm::vec3 in_light(const glm::vec3& base, const Lit& light, float open) const;
+  /// @param open  at the pixel
+  [[nodiscard]] Rgba colour(const Face& face, int u, int v, float open) const;
   void set_corners(Face& face, std::uint32_t solid, std::uint32_t triangle, bool exit) const;
 
   const Tree* tree_;

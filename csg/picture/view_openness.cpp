@@ -134,22 +134,40 @@ ViewOpenness::ViewOpenness(const View& whole, const SurfaceImage& image, const G
   if (reach > 0) open_ = openness(surfaces_, reach, execution);
 }
 
-ViewOpenness::Plane ViewOpenness::plane(const glm::dvec3& normal, const glm::dvec3& point) const {
+SeenPlane ViewOpenness::plane(const glm::dvec3& normal, const glm::dvec3& point) const {
   const glm::dvec3 from_origin = point + glm::dvec3(0, 0, surfaces_.origin_distance);
   return {glm::vec3(normal), static_cast<float>(glm::dot(normal, from_origin))};
 }
 
-float ViewOpenness::at(int u, int v, const Plane& plane) const {
-  if (open_.empty()) return 1.0f;
-  const float x = (static_cast<float>(u) + 0.5f) * step_ - 0.5f;
-  const float y = (static_cast<float>(v) + 0.5f) * step_ - 0.5f;
-  return openness_between(surfaces_, open_, {x, y}, plane.normal, [&](const glm::vec3& there) {
+void ViewOpenness::along(int u, int v, const SeenPlane& plane, std::span<float> values) const {
+  // Pixels at edges come alone, and a vector costs as much as these.
+  constexpr std::size_t kFew = 2;
+  if (values.size() > kFew) return openness_along(surfaces_, open_, {u, v, step_}, plane, values);
+  const auto away = [&](const glm::vec3& there) {
     const auto distance =
         static_cast<float>(surfaces_.origin_distance - static_cast<double>(there.z));
     const float pixel =
         (surfaces_.perspective ? distance : 1.0f) / static_cast<float>(surfaces_.scale);
     return std::abs(glm::dot(plane.normal, there) - plane.offset) / (2.0f * pixel);
-  });
+  };
+  for (float& value : values) {
+    const glm::dvec2 between(place(u++), place(v));
+    value = openness_between(surfaces_, open_, between, plane.normal, away);
+  }
+}
+
+bool ViewOpenness::open_along(int u, int v, int count) const {
+  // What along() looks at.
+  const auto first = [&](int pixel, int end) {
+    return std::clamp(static_cast<int>(place(pixel)), 0, end - 1);
+  };
+  const int left = first(u, surfaces_.width), top = first(v, surfaces_.height);
+  const int right = std::min(first(u + count - 1, surfaces_.width) + 1, surfaces_.width - 1);
+  const int bottom = std::min(top + 1, surfaces_.height - 1);
+  const auto row = [&](int y) { return open_.data() + std::ptrdiff_t{y} * surfaces_.width; };
+  int all = 255;
+  for (int x = left; x <= right; ++x) all &= row(top)[x] & row(bottom)[x];
+  return all == 255;
 }
 
 }  // namespace strata::csg

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "csg/geometry.h"
@@ -26,17 +27,20 @@ class ViewOpenness {
                const SolidNormals& normals, const Execution& execution);
 
   [[nodiscard]] bool all_open() const { return open_.empty(); }
-  /// Where the plane of a face is, for `at`.
-  struct Plane {
-    glm::vec3 normal{0.0f};  ///< in eye space, of length 1, towards the eye
-    float offset = 0.0f;     ///< of the plane along the normal, as EyeSurfaces has positions
-  };
+  /// Where the plane of a face is.
   /// @param point  of the plane, in eye space
-  [[nodiscard]] Plane plane(const glm::dvec3& normal, const glm::dvec3& point) const;
-  /// How open the face in a plane is at pixel (u, v) of the picture, in [0, 1].
-  [[nodiscard]] float at(int u, int v, const Plane& plane) const;
+  [[nodiscard]] SeenPlane plane(const glm::dvec3& normal, const glm::dvec3& point) const;
+  /// How open the face in a plane is at pixels of the picture from (u, v) on, in [0, 1].
+  void along(int u, int v, const SeenPlane& plane, std::span<float> values) const;
+  /// Whether along() gives 1 for `count` pixels from (u, v) on, whatever their plane.
+  [[nodiscard]] bool open_along(int u, int v, int count) const;
 
  private:
+  /// Of a pixel's middle among those of open_.
+  [[nodiscard]] float place(int pixel) const {
+    return (static_cast<float>(pixel) + 0.5f) * step_ - 0.5f;
+  }
+
   EyeSurfaces surfaces_;
   std::vector<std::uint8_t> open_;
   float step_ = 1.0f;  ///< pixels of open_ a pixel of the picture

@@ -165,6 +165,38 @@ TEST(Openness, IsTheSameForEverySimdTarget) {
   }
 }
 
+TEST(Openness, AlongARowIsThatOfEachPixel) {
+  for (const bool perspective : {false, true}) {
+    const auto image = seen(93, 57, 12, perspective, corner);
+    const auto open = openness(image, 1.5);
+    for (const float step : {1.0f, 0.5f, 0.37f}) {
+      for (const int v : {0, 20, 41, static_cast<int>(57 / step) - 1}) {
+        for (const glm::dvec3& wall : kWalls) {
+          const SeenPlane plane{glm::vec3(wall), 0.01f};
+          const auto away = [&](const glm::vec3& there) {
+            const float distance =
+                perspective ? static_cast<float>(kDistance - double{there.z}) : 1;
+            return std::abs(glm::dot(plane.normal, there) - plane.offset) /
+                   (2.0f * (distance / static_cast<float>(image.scale)));
+          };
+          const auto row = static_cast<std::size_t>(93 / step);
+          std::vector<float> each;
+          for (std::size_t u = 0; u < row; ++u) {
+            const glm::dvec2 place((static_cast<float>(u) + 0.5f) * step - 0.5f,
+                                   (static_cast<float>(v) + 0.5f) * step - 0.5f);
+            each.push_back(openness_between(image, open, place, plane.normal, away));
+          }
+          testkit::for_each_simd_target([&](const std::string& target) {
+            std::vector<float> along(row);
+            openness_along(image, open, {0, v, step}, plane, along);
+            EXPECT_EQ(along, each) << target;
+          });
+        }
+      }
+    }
+  }
+}
+
 TEST(Openness, IsTheSameForAnyNumberOfThreadsAndEmptyPictures) {
   const auto image = seen(97, 61, 12, true, corner);
   Execution one, three;
