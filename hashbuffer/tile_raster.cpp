@@ -121,14 +121,14 @@ class TableSink {
     }
   }
   template <class D, class V = hn::Vec<D>>
-  HWY_INLINE void put_span(D d, std::size_t pixel, V depth, hn::Mask<D> covered, SpanBase base) {
+  HWY_INLINE void put_span(D d, std::size_t pixel, V depth, V covered, SpanBase base) {
     if constexpr (kKeys) {
       const auto records = hn::Sub(hn::Set(d, base), hn::ShiftLeft<1>(depth));
-      insert(d, pixel, hn::IfThenElseZero(covered, records));
+      insert(d, pixel, hn::And(covered, records));
     } else {
       const hn::CappedTag<Bits, HWY_MAX_BYTES / 8> d64;
       alignas(64) std::uint32_t words[HWY_MAX_BYTES / 4];
-      hn::Store(hn::IfThenElseZero(covered, hn::Add(depth, hn::Set(d, 1u))), d, words);
+      hn::Store(hn::And(covered, hn::Add(depth, hn::Set(d, 1u))), d, words);
       nearest_ = base;
       for (std::size_t i = 0; i < hn::Lanes(d); i += hn::Lanes(d64)) {
         insert(d64, pixel + i, decode(d64, words + i));
@@ -308,11 +308,11 @@ class LogSink {
                      [bases](std::size_t lane, std::uint64_t bits) { bases[lane] = bits; });
   }
   template <class D, class V = hn::Vec<D>>
-  HWY_INLINE void put_span(D d, std::size_t pixel, V depth, hn::Mask<D> covered, SpanBase base) {
+  HWY_INLINE void put_span(D d, std::size_t pixel, V depth, V covered, SpanBase base) {
     exit_ = (base >> 31 & 1) != 0;
     triangle_ = static_cast<std::uint32_t>(base) & 0x7fffffffu;
     const auto lift = hn::Set(d, static_cast<std::uint32_t>(base >> 32) + 1);
-    put_words(d, pixel, hn::IfThenElseZero(covered, hn::Add(depth, lift)));
+    put_words(d, pixel, hn::And(covered, hn::Add(depth, lift)));
   }
   TileRasterResult finish() {
     log_->count = count_;

@@ -12,7 +12,9 @@
 //
 // Depth is the floor of (n + 1/2) / area, as in raster/rasterize-inl.h, with n below 2^47 all over
 // the tile: what the roundings of 1 / area and of the sum of three products move is below
-// 2^-53 2^49 / area = 1 / 16 area, and it keeps 1 / 2 area from whole numbers.
+// 2^-53 2^49 / area = 1 / 16 area, and it keeps 1 / 2 area from whole numbers. 1.5 2^20 is added to
+// it, so that the upper word of the double ends with its whole part, which has less than 20 bits;
+// that moves it by at most 2^-30, not more than 1 / 16 area.
 
 #if defined(STRATA_SPANS_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef STRATA_SPANS_INL_H
@@ -23,7 +25,10 @@
 
 #include <hwy/highway.h>
 
+#include <cstring>
+
 #include "raster/rasterize-inl.h"
+#include "raster/span_masks.h"
 #include "strata/core/depth_list.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -59,16 +64,17 @@ HWY_INLINE SpanVecF64 span_part(SpanVecI32 values, int part) {
 #endif
 }
 
-/// A double plus this holds the nearest whole number in its low bits.
-inline constexpr double kRoundsToWhole = 0x1.8p52;
-/// The low bits of each.
-HWY_INLINE SpanVecU32 low_words(const SpanVecF64 (&parts)[2]) {
+/// A double plus this holds its floor in the upper word, plus kFloorBias.
+inline constexpr double kFloorsInUpper = 0x1.8p20;
+inline constexpr std::int32_t kFloorBias = 0x41380000;
+/// The upper words of the even columns, which come first, and the odd ones.
+HWY_INLINE SpanVecU32 upper_words(const SpanVecF64 (&parts)[2]) {
   const SpanU32 du;
 #if HWY_TARGET == HWY_SCALAR
   const auto bits = hn::BitCast(hn::RebindToUnsigned<SpanF64>(), parts[0]);
-  return hn::Set(du, static_cast<std::uint32_t>(hn::GetLane(bits)));
+  return hn::Set(du, static_cast<std::uint32_t>(hn::GetLane(bits) >> 32));
 #else
-  return hn::ConcatEven(du, hn::BitCast(du, parts[1]), hn::BitCast(du, parts[0]));
+  return hn::OddEven(hn::BitCast(du, parts[1]), hn::DupOdd(hn::BitCast(du, parts[0])));
 #endif
 }
 
@@ -123,7 +129,11 @@ class SpanBatch {
 
   SpanBatch(const AxisFrame& frame, const PixelRect& clip, std::uint32_t depth_limit)
       : frame_(frame), clip_(clip), deepest_(static_cast<std::int32_t>(depth_limit - 1)) {
-    for (int i = 0; i < kTileSide; ++i) columns_[i] = i;
+    for (int i = 0; i < kTileSide; ++i) {
+      const int in_block = i % kSpanLanes;  // even columns first
+      columns_[i - in_block + in_block / kSpanParts +
+               in_block % kSpanParts * (kSpanLanes / kSpanParts)] = i;
+    }
   }
 
   /// Collects the blocks of the small triangles among `ids`.
@@ -202,13 +212,11 @@ class SpanBatch {
       const auto level = hn::And(hn::Eq(slope_u, zero), hn::Lt(slope_v, one));
       tie_down = hn::IfThenElseZero(hn::Or(hn::Lt(slope_u, zero), level), one);
     }
-    // Depth counts from just below the lowest vertex, so that no numerator is negative.
-    const SpanVecI32 base = hn::IfThenElseZero(small, hn::Sub(w_low, one));
-    set_plane(area, slope_u, slope_v, tie_down, base,
+    set_plane(area, slope_u, slope_v, tie_down,
               hn::IfThenElseZero(small, hn::Sub(centre(hn::Set(di, clip_.u0)), u0)), dv);
-    base_ = hn::Add(w0, base);
+    base_ = hn::Sub(w0, hn::Set(di, kFloorBias));
     const auto beyond =
-        hn::Or(hn::Lt(base_, zero), hn::Gt(hn::Add(w0, w_high), hn::Set(di, deepest_)));
+        hn::Or(hn::Lt(hn::Add(w0, w_low), one), hn::Gt(hn::Add(w0, w_high), hn::Set(di, deepest_)));
     clamps_ = !hn::AllFalse(di, hn::And(chosen, beyond));
     const auto exits = hn::VecFromMask(di, frame_.w == 1 ? clockwise : hn::Not(clockwise));
     set_surfaces(ids, hn::ShiftLeft<31>(hn::BitCast(SpanU32(), exits)));
@@ -238,36 +246,42 @@ class SpanBatch {
       static_cast<std::size_t>(kRows * kSpanLanes * (kRows / kSpanLanes + 1) + kSpanLanes);
   static_assert(kTilePixels == 1 << 12 && kRows * kSpanLanes <= 1 << 8);
 
+  /// A function of its own has the registers that it needs.
   template <bool clamps, class Sink>
-  HWY_INLINE void cover_blocks(std::size_t count, Sink& sink) {
+  HWY_NOINLINE void cover_blocks(std::size_t count, Sink& covered_sink) {
     const SpanU32 d;
     const SpanI32 di;
     const SpanF64 df;
+    Sink sink = covered_sink;  // no address of it is taken
     typename Sink::SpanBase bases[kSpanLanes];
     alignas(64) std::int32_t depths[kSpanLanes];
     hn::Store(base_, di, depths);
     sink.make_bases(clamps ? hn::Zero(di) : base_, surface_, bases);
-    const auto bit = hn::Shl(hn::Set(d, 1u << 20), hn::Iota(d, 0));
-    const auto rounding = hn::Set(df, kRoundsToWhole);
     for (std::size_t i = 0; i < count; ++i) {
-      const std::uint32_t block = blocks_[i];
-      const std::uint32_t row = block >> 12 & 0xff, lane = row % kSpanLanes;
-      const std::uint32_t pixel = block % kTilePixels, column = pixel % kTileSide;
+      // Loaded apart, which takes less than to take a word apart.
+      std::uint16_t pixel;
+      std::uint8_t row, pixels;
+      const auto* const block = reinterpret_cast<const char*>(blocks_ + i);
+      std::memcpy(&pixel, block, sizeof pixel);
+      std::memcpy(&row, block + 2, sizeof row);
+      std::memcpy(&pixels, block + 3, sizeof pixels);
+      const std::size_t lane = row % kSpanLanes, column = pixel % kTileSide;
       const SpanVecF64 begin = hn::Set(df, row_planes_[row]);
       const SpanVecF64 step = hn::Set(df, plane_u_[lane]);
       SpanVecF64 parts[2];
       for (int part = 0; part < kSpanParts; ++part) {
         const std::size_t at = column + static_cast<std::size_t>(part) * hn::Lanes(df);
-        parts[part] = hn::Add(hn::MulAdd(hn::LoadU(df, columns_ + at), step, begin), rounding);
+        parts[part] = hn::MulAdd(hn::Load(df, columns_ + at), step, begin);
       }
-      SpanVecI32 depth = hn::BitCast(di, low_words(parts));
+      SpanVecI32 depth = hn::BitCast(di, upper_words(parts));
       if constexpr (clamps) {
         depth = hn::Max(hn::Add(depth, hn::Set(di, depths[lane])), hn::Zero(di));
         depth = hn::Min(depth, hn::Set(di, deepest_));
       }
-      sink.put_span(d, pixel, hn::BitCast(d, depth), hn::TestBit(hn::Set(d, block), bit),
-                    bases[lane]);
+      const auto covered = hn::Load(d, kSpanMasks.lanes[pixels]);
+      sink.put_span(d, pixel, hn::BitCast(d, depth), covered, bases[lane]);
     }
+    covered_sink = sink;
   }
 
   /// An edge bounds rows on one side: there it has `at` and `step`, on the other they do nothing.
@@ -295,20 +309,18 @@ class SpanBatch {
   }
 
   HWY_INLINE void set_plane(SpanVecI32 area, SpanVecI32 slope_u, SpanVecI32 slope_v,
-                            SpanVecI32 tie_down, SpanVecI32 base, SpanVecI32 du, SpanVecI32 dv) {
+                            SpanVecI32 tie_down, SpanVecI32 du, SpanVecI32 dv) {
     const SpanF64 df;
-    const SpanVecF64 half = hn::Set(df, 0.5);
+    const SpanVecF64 half = hn::Set(df, 0.5), upper = hn::Set(df, kFloorsInUpper);
     for (int part = 0; part < kSpanParts; ++part) {
       const SpanVecF64 su = span_part(slope_u, part), sv = span_part(slope_v, part),
                        whole = span_part(area, part);
       const SpanVecF64 inverse = hn::Div(hn::Set(df, 1.0), whole);
-      const SpanVecF64 numerator = hn::Sub(
+      const SpanVecF64 numerator =
           hn::Sub(hn::Add(hn::Mul(su, span_part(du, part)), hn::Mul(sv, span_part(dv, part))),
-                  span_part(tie_down, part)),
-          hn::Mul(span_part(base, part), whole));
+                  span_part(tie_down, part));
       const SpanVecF64 step = hn::Mul(inverse, hn::Set(df, static_cast<double>(kLatticeSteps)));
-      // Less 1/2 and then rounded is the floor.
-      plane_[part] = hn::Sub(hn::Mul(hn::Add(numerator, half), inverse), half);
+      plane_[part] = hn::Add(hn::Mul(hn::Add(numerator, half), inverse), upper);
       plane_v_[part] = hn::Mul(sv, step);
       hn::Store(hn::Mul(su, step), df, plane_u_ + static_cast<std::size_t>(part) * hn::Lanes(df));
     }
@@ -326,20 +338,23 @@ class SpanBatch {
   HWY_INLINE std::size_t collect_blocks() {
     const SpanI32 di;
     const SpanF32 df;
-    const SpanVecI32 zero = hn::Zero(di), one = hn::Set(di, 1), lanes = hn::Set(di, kSpanLanes);
+    const SpanVecI32 zero = hn::Zero(di), one = hn::Set(di, 1 << 24),
+                     lanes = hn::Set(di, kSpanLanes);
     constexpr float kRound = 0x1.8p23F;
     const auto rounding = hn::Set(df, kRound);
     const SpanVecI32 column = hn::Sub(column_, hn::BitCast(di, rounding));
-    SpanVecI32 place = hn::Or(hn::ShiftLeft<12>(hn::Iota(di, 0)), hn::ShiftLeft<6>(row_));
-    SpanVecI32 pixels = zero;
+    // Blocks but for their columns and what is covered of them.
+    SpanVecI32 place = hn::Or(hn::ShiftLeft<16>(hn::Iota(di, 0)), hn::ShiftLeft<6>(row_));
+    SpanVecI32 pixels = zero, y = zero;
+    auto fy = hn::Zero(df);
     std::size_t count = 0;
     const SpanF64 dd;
-    for (int y = 0; y < rows_; ++y) {
-      for (int part = 0; part < kSpanParts; ++part) {
-        hn::Store(hn::MulAdd(hn::Set(dd, static_cast<double>(y)), plane_v_[part], plane_[part]), dd,
-                  row_planes_ + y * kSpanLanes + part * static_cast<int>(hn::Lanes(dd)));
+    SpanVecF64 dy = hn::Zero(dd);
+    double* row_planes = row_planes_;
+    for (int row = 0; row < rows_; ++row) {
+      for (int part = 0; part < kSpanParts; ++part, row_planes += hn::Lanes(dd)) {
+        hn::Store(hn::MulAdd(dy, plane_v_[part], plane_[part]), dd, row_planes);
       }
-      const auto fy = hn::Set(df, static_cast<float>(y));
       const auto begin_at = [&](int i) { return hn::MulAdd(fy, begin_step_[i], begin_[i]); };
       const auto end_at = [&](int i) { return hn::MulAdd(fy, end_step_[i], end_[i]); };
       const auto from = hn::Min(hn::Max(begin_at(0), hn::Max(begin_at(1), begin_at(2))),
@@ -347,24 +362,29 @@ class SpanBatch {
       const auto to = hn::Min(end_at(0), hn::Min(end_at(1), end_at(2)));
       const SpanVecI32 begin = hn::Add(hn::BitCast(di, hn::Add(from, rounding)), column);
       const SpanVecI32 end = hn::Add(hn::BitCast(di, hn::Add(to, rounding)), column);
-      auto valid = hn::And(hn::Lt(begin, end), hn::Lt(hn::Set(di, y), height_));
+      auto valid = hn::And(hn::Lt(begin, end), hn::Lt(y, height_));
       pixels = hn::Add(pixels, hn::IfThenElseZero(valid, hn::Sub(end, begin)));
       SpanVecI32 block = hn::And(begin, hn::Neg(lanes));
       SpanVecI32 first = hn::Shl(one, hn::Sub(begin, block));
+      SpanVecI32 left = hn::Sub(end, block);
+      block = hn::Add(block, place);
       for (int turn = 0;; ++turn) {
-        SpanVecI32 length = hn::Min(hn::Sub(end, block), lanes);
+        SpanVecI32 length = hn::Min(left, lanes);
         if constexpr (kSpanLanes == 1) length = hn::Max(length, zero);
-        const SpanVecI32 last = hn::Shl(one, length);
-        const SpanVecI32 word =
-            hn::Or(hn::ShiftLeft<20>(hn::Sub(last, first)), hn::Or(place, block));
+        // Where all lanes are covered the last bit is beyond the word, and the rest still right.
+        const SpanVecI32 word = hn::Add(hn::Sub(hn::Shl(one, length), first), block);
         hn::StoreU(hn::Compress(word, valid), di, reinterpret_cast<std::int32_t*>(blocks_ + count));
         count += hn::CountTrue(di, valid);
-        block = hn::Add(block, lanes);
-        valid = hn::And(valid, hn::Lt(block, end));
+        left = hn::Sub(left, lanes);
+        valid = hn::And(valid, hn::Gt(left, zero));
         if (turn > 0 && hn::AllFalse(di, valid)) break;
+        block = hn::Add(block, lanes);
         first = one;
       }
-      place = hn::Add(place, hn::Set(di, kTileSide + (kSpanLanes << 12)));
+      place = hn::Add(place, hn::Set(di, kTileSide + (kSpanLanes << 16)));
+      y = hn::Add(y, hn::Set(di, 1));
+      fy = hn::Add(fy, hn::Set(df, 1.0F));
+      dy = hn::Add(dy, hn::Set(dd, 1.0));
     }
     pixels_ = static_cast<std::size_t>(hn::GetLane(hn::SumOfLanes(di, pixels)));
     return count;
@@ -383,8 +403,8 @@ class SpanBatch {
       plane_v_[2];  ///< at the first column of the tile and the first row of a box
   alignas(64) double plane_u_[kSpanLanes];
   alignas(64) double row_planes_[kRows * kSpanLanes];  ///< by row of a box, and lane
-  alignas(64) double columns_[kTileSide];              ///< their numbers
-  /// [covered:8 | row of the box:5 | lane:3 | first pixel:12], or with fewer bits for lanes
+  alignas(64) double columns_[kTileSide];              ///< their numbers, as upper_words() asks
+  /// [covered:8 | row of the box:5 | lane:3 | first pixel:16], or with fewer bits for lanes
   std::uint32_t blocks_[kBlocks];
 };
 
