@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstring>
 
+#include "core/reserve_large.h"
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "picture/occlusion.cpp"
 #include <hwy/foreach_target.h>
@@ -576,8 +578,10 @@ void EyeSurfaces::resize(int columns, int rows) {
   width = columns, height = rows;
   // Vectors read four floats from each point on.
   const std::size_t count = static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows) + 1;
-  positions.resize(count);
-  normals.resize(count);
+  for (auto* values : {&positions, &normals}) {
+    detail::reserve_large(*values, count);
+    values->resize(count);
+  }
 }
 
 std::vector<std::uint8_t> openness(const EyeSurfaces& surfaces, double radius,

@@ -14,6 +14,7 @@
 
 #include "core/atomic_file.h"
 #include "core/png_chunks.h"
+#include "core/reserve_large.h"
 #include "strata/picture/pixels.h"
 
 namespace strata {
@@ -61,6 +62,7 @@ void make_rows(PngImage& image, int height, std::size_t row_bytes, std::size_t s
   image.row_bytes = row_bytes + 1;
   image.size = image.row_bytes * static_cast<std::size_t>(height);
   image.rows = std::make_unique_for_overwrite<std::uint8_t[]>(image.size + slack);
+  detail::ask_for_large_pages(image.rows.get(), image.size);
   for (std::size_t row = 0; row < static_cast<std::size_t>(height); ++row) {
     std::uint8_t* const to = image.rows.get() + row * image.row_bytes;
     *to = 0;

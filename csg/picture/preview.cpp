@@ -4,6 +4,7 @@
 #include <new>
 #include <numeric>
 
+#include "core/reserve_large.h"
 #include "csg/picture/ghosts.h"
 #include "csg/picture/ground_shadow.h"
 #include "csg/picture/shade.h"
@@ -339,6 +340,7 @@ Result<Picture> Preview::Impl::picture(const Camera& camera, const glm::ivec2& s
                   size.y};
   Picture result{size.x, size.y, {}};
   const auto width = static_cast<std::size_t>(size.x);
+  detail::reserve_large(result.pixels, width * static_cast<std::size_t>(size.y));
   result.pixels.resize(width * static_cast<std::size_t>(size.y));
   // One row of tiles at least.
   const std::int64_t samples_a_row = std::int64_t{size.x} * across * down;
