@@ -19,6 +19,7 @@
 #include "strata/contour/contour.h"
 #include "strata/mesh/formats/read_mesh.h"
 #include "strata/mesh/soup_tools.h"
+#include "strata/voxelize/area/boundary_area.h"
 #include "strata/voxelize/checksum.h"
 #include "strata/voxelize/distance/signed_distance.h"
 #include "strata/voxelize/formats/voxel_writer.h"

@@ -10,6 +10,7 @@
 #include "apps/session/file_conflicts.h"
 #include "apps/session/json_writer.h"
 #include "apps/session/session.h"
+#include "strata/voxelize/area/boundary_area.h"
 #include "strata/voxelize/checksum.h"
 #include "voxelize/output/file_pair.h"
 

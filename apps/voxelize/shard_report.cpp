@@ -14,6 +14,7 @@
 #include "apps/session/report.h"
 #include "apps/voxelize/shard_part.h"
 #include "strata/csg/tree.h"
+#include "strata/voxelize/checksum.h"
 #include "strata/voxelize/grid_fit.h"
 #include "voxelize/volume/json_text.h"
 

@@ -12,7 +12,7 @@
 #include "apps/voxelize/file_size.h"
 #include "strata/core/grid.h"
 #include "strata/csg/input/solid_input.h"
-#include "strata/voxelize/checksum.h"
+#include "strata/voxelize/area/boundary_area.h"
 #include "strata/voxelize/distance/signed_distance.h"
 #include "strata/voxelize/formats/voxel_writer.h"
 #include "strata/voxelize/voxelize.h"

@@ -16,6 +16,7 @@
 #include "strata/csg/input/solid_input.h"
 #include "strata/csg/picture/picture.h"
 #include "strata/csg/solid_lists.h"
+#include "strata/voxelize/area/boundary_area.h"
 #include "strata/voxelize/checksum.h"
 #include "strata/voxelize/distance/signed_distance.h"
 #include "voxelize/open/lost_walls.h"

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "strata/mesh/shapes.h"
+#include "strata/voxelize/area/boundary_area.h"
 #include "strata/voxelize/checksum.h"
 #include "strata/voxelize/voxelize.h"
 

@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <span>
 
-// Which voxels columns have in common. Private to voxelize/. Intervals of a column are disjoint and
-// increase: [last:16 | first:16].
+// Which voxels columns have in common. Private to voxelize/area. Intervals of a column are disjoint
+// and increase: [last:16 | first:16].
 
 namespace strata {
 

@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "strata/voxelize/checksum.h"
+#include "strata/voxelize/area/boundary_area.h"
 
 namespace strata {
 namespace {

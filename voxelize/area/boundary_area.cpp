@@ -1,4 +1,4 @@
-#include "strata/voxelize/checksum.h"
+#include "strata/voxelize/area/boundary_area.h"
 
 #include <algorithm>
 #include <bit>
@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "strata/raster/raster_target.h"
-#include "voxelize/overlap/shared_voxels.h"
+#include "voxelize/area/shared_voxels.h"
 
 namespace strata {
 namespace {

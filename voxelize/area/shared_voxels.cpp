@@ -1,10 +1,10 @@
-#include "voxelize/overlap/shared_voxels.h"
+#include "voxelize/area/shared_voxels.h"
 
 #include <algorithm>
 #include <cstddef>
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "voxelize/overlap/shared_voxels.cpp"
+#define HWY_TARGET_INCLUDE "voxelize/area/shared_voxels.cpp"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
