@@ -52,9 +52,6 @@ void SetChecksum::add(const VoxelIntervals& slab, const Execution& execution) {
   const AxisFrame frame(slab.axis());
   const auto axis_u = static_cast<std::size_t>(frame.u), axis_v = static_cast<std::size_t>(frame.v);
   const std::uint64_t* const prefix = prefix_[static_cast<std::size_t>(frame.w)].data();
-  const auto factors_of = [prefix](const Interval& item) {
-    return subtract_modulo(prefix[std::size_t{item.last} + 1], prefix[item.first]);
-  };
   const auto count =
       static_cast<std::size_t>(slab.tiles_u()) * static_cast<std::size_t>(slab.tiles_v());
   std::vector<std::uint64_t> tile_sums(count, 0);
@@ -63,6 +60,9 @@ void SetChecksum::add(const VoxelIntervals& slab, const Execution& execution) {
     const int tv = static_cast<int>(index) / slab.tiles_u();
     const VoxelIntervals::TileView tile = slab.tile(tu, tv);
     if (tile.items.empty()) return;
+    const auto factors_of = [sums = prefix](const Interval& item) {
+      return subtract_modulo(sums[std::size_t{item.last} + 1], sums[item.first]);
+    };
     std::array<std::uint64_t, kSide> factor_u;
     for (std::size_t i = 0; i < kSide; ++i) {
       factor_u[i] = factor(axis_u, static_cast<std::size_t>(tu) * kSide + i);

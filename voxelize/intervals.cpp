@@ -21,6 +21,11 @@ class VoxelIntervals::Arena {
     for (const Block& block : blocks_) ::operator delete(block.memory, block.alignment);
   }
 
+  /// Its blocks are filled again.
+  void forget() {
+    used_ = 0;
+    left_ = 0;
+  }
   /// A copy of `values`; null for none. May be called by several threads at once.
   template <class T>
   const T* copy(std::span<const T> values) {
@@ -36,14 +41,20 @@ class VoxelIntervals::Arena {
   struct Block {
     void* memory;
     std::align_val_t alignment;
+    std::size_t size;
   };
 
   void* take(std::size_t bytes) {
     bytes = (bytes + kLine - 1) / kLine * kLine;
     const std::lock_guard lock(mutex_);
-    if (bytes > left_) add_block(bytes);
+    while (bytes > left_) next_block(bytes);
     left_ -= bytes;
     return std::exchange(next_, next_ + bytes);
+  }
+  void next_block(std::size_t bytes) {
+    if (used_ == blocks_.size()) add_block(bytes);
+    next_ = static_cast<std::byte*>(blocks_[used_].memory);
+    left_ = blocks_[used_++].size;
   }
   void add_block(std::size_t bytes) {
     const std::size_t least = blocks_.empty() ? kFirst : kLargePage;
@@ -52,13 +63,12 @@ class VoxelIntervals::Arena {
     if (blocks_.size() == blocks_.capacity()) blocks_.reserve(2 * blocks_.size() + 8);
     void* const memory = ::operator new(size, alignment);
     if (!blocks_.empty()) ::madvise(memory, size, MADV_HUGEPAGE);  // a wish
-    blocks_.push_back({memory, alignment});
-    next_ = static_cast<std::byte*>(memory);
-    left_ = size;
+    blocks_.push_back({memory, alignment, size});
   }
 
   std::mutex mutex_;
   std::vector<Block> blocks_;
+  std::size_t used_ = 0;  ///< blocks
   std::byte* next_ = nullptr;
   std::size_t left_ = 0;
 };
@@ -81,6 +91,15 @@ VoxelIntervals::VoxelIntervals(const VoxelGrid& grid, Axis axis, int v_begin, in
       tiles_v_((v_end - v_begin + kTileSide - 1) / kTileSide),
       tiles_(static_cast<std::size_t>(tiles_u_) * static_cast<std::size_t>(tiles_v_)),
       arena_(std::make_unique<Arena>()) {}
+
+VoxelIntervals::VoxelIntervals(const VoxelGrid& grid, Axis axis, int v_begin, int v_end,
+                               VoxelIntervals&& spent)
+    : VoxelIntervals(grid, axis, v_begin, v_end) {
+  if (!spent.arena_) return;
+  arena_ = std::move(spent.arena_);
+  arena_->forget();
+  spent = {};
+}
 
 void VoxelIntervals::set_tile(int tu, int tv, std::span<const std::uint32_t> offsets,
                               std::span<const Interval> items,

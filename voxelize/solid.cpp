@@ -186,7 +186,7 @@ Result<void> SolidVoxelizer::run_source(const Execution& execution, Output& out)
 
 Result<VoxelIntervals> SolidVoxelizer::slab(int v_begin, int v_end, const Execution& execution,
                                             VoxelizeReport& report) {
-  VoxelIntervals result(*grid_, target_.axis, v_begin, v_end);
+  VoxelIntervals result(*grid_, target_.axis, v_begin, v_end, std::move(spent_));
   Output out{v_begin, v_end, &result, nullptr};
   if (auto done = run(out, execution, report); !done) return tl::unexpected(done.error());
   return result;

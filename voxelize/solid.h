@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "raster/tile_bins.h"
@@ -31,6 +32,8 @@ class SolidVoxelizer {
   /// a multiple of kTileSide. Adds to `report`.
   Result<VoxelIntervals> slab(int v_begin, int v_end, const Execution& execution,
                               VoxelizeReport& report);
+  /// Takes a slab back: the next one of slab() is made in its memory.
+  void reuse(VoxelIntervals&& slab) { spent_ = std::move(slab); }
   /// The filled part of voxels with options.rays x options.rays of the columns each, as labels.
   /// @param voxels their grid @param v_begin of columns, as v_end; a multiple of kTileSide * rays
   Result<VoxelIntervals> covered_slab(const VoxelGrid& voxels, int v_begin, int v_end,
@@ -56,6 +59,7 @@ class SolidVoxelizer {
   VoxelizeOptions options_;
   RasterTarget target_;
   TileBins bins_;
+  VoxelIntervals spent_;
   std::vector<std::shared_ptr<Worker>> workers_;  ///< scratch, kept from slab to slab
 };
 

@@ -26,7 +26,8 @@ namespace {
 /// Columns walked along the side of a voxel.
 int fine(const VoxelizeOptions& options) { return std::max(options.samples, options.rays); }
 
-/// Rows of a slab whose intervals are expected to stay within an eighth of the memory limit.
+/// Rows of a slab whose intervals are expected to stay within kMostSlabBytes, and within an eighth
+/// of the memory limit.
 /// With several columns a voxel, whole tiles of voxels.
 int slab_rows(const VoxelGrid& grid, const VoxelizeOptions& options, const Execution& execution) {
   const AxisFrame frame(options.axis);
@@ -35,10 +36,9 @@ int slab_rows(const VoxelGrid& grid, const VoxelizeOptions& options, const Execu
   // are made.
   const std::uint64_t bytes_a_column =
       options.rays > 0 ? 1 + 128 / static_cast<std::uint64_t>(samples * samples) : 16;
-  constexpr std::uint64_t kDefaultSlabBytes = std::uint64_t{512} << 20;
   const std::uint64_t budget = execution.memory_limit > 0
-                                   ? std::min(kDefaultSlabBytes, execution.memory_limit / 8)
-                                   : kDefaultSlabBytes;
+                                   ? std::min(kMostSlabBytes, execution.memory_limit / 8)
+                                   : kMostSlabBytes;
   const std::uint64_t rows =
       budget / (bytes_a_column * static_cast<std::uint64_t>(grid.dims[frame.u]));
   const auto unit = static_cast<std::uint64_t>(kTileSide) * static_cast<std::uint64_t>(samples);
@@ -130,6 +130,9 @@ class SolidSlabs {
     if (auto done = solid_.prepare(v_begin, v_end, execution); !done || !open_) return done;
     return open_->columns.prepare(v_begin, v_end, execution);
   }
+
+  /// Takes a slab back: the next one is made in its memory.
+  void reuse(VoxelIntervals&& slab) { solid_.reuse(std::move(slab)); }
 
   /// @param voxels their grid, where options.rays are asked for
   Result<VoxelIntervals> slab(const VoxelGrid* voxels, int v_begin, int v_end,
@@ -276,6 +279,11 @@ class Slabs {
     return solid_ ? solid_->prepare(v_begin, v_end, execution) : Result<void>();
   }
 
+  /// See SolidSlabs.
+  void reuse(VoxelIntervals&& slab) {
+    if (solid_) solid_->reuse(std::move(slab));
+  }
+
   Result<VoxelIntervals> slab(const VoxelGrid* voxels, int v_begin, int v_end,
                               const Execution& execution, VoxelizeReport& report) {
     auto solid = solid_ ? solid_->slab(voxels, v_begin, v_end, execution, report)
@@ -343,6 +351,7 @@ Result<VoxelizeReport> run(const TriangleSoup& mesh, const VoxelGrid& asked,
         checksum.add(*slab, quiet);
       }
       if (auto done = sink(std::move(*slab)); !done) return tl::unexpected(done.error());
+      slabs->reuse(*std::move(slab));
       if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
       if (execution.progress) {
         execution.progress(static_cast<double>(end - all.begin * columns_a_row) /

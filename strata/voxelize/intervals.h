@@ -48,6 +48,8 @@ class VoxelIntervals {
   ~VoxelIntervals();  ///< frees the tiles
   /// An empty slab. @pre v_begin is a multiple of kTileSide, 0 <= v_begin < v_end <= rows of grid
   VoxelIntervals(const VoxelGrid& grid, Axis axis, int v_begin, int v_end);
+  /// The same in the memory of another one, of any grid, whose voxels are no longer needed.
+  VoxelIntervals(const VoxelGrid& grid, Axis axis, int v_begin, int v_end, VoxelIntervals&& spent);
   /// All rows of the grid, empty.
   VoxelIntervals(const VoxelGrid& grid, Axis axis);
 

@@ -115,6 +115,10 @@ struct VoxelizeReport {
   double intervals_ms = 0;         ///< mean time per thread from lists to intervals
 };
 
+/// Bytes that the intervals of a slab are planned to take at most: larger ones leave the caches and
+/// gain nothing.
+inline constexpr std::uint64_t kMostSlabBytes = std::uint64_t{64} << 20;
+
 /// Receives the slabs in increasing v.
 using SlabSink = std::function<Result<void>(const VoxelIntervals&)>;
 

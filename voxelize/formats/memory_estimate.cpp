@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <glm/geometric.hpp>
 #include <vector>
 
 #include "strata/raster/raster_target.h"
+#include "strata/voxelize/voxelize.h"
 
 namespace strata {
 namespace {
@@ -59,9 +61,8 @@ constexpr double kWorkerBytes = 6e6;
 
 /// What a slab is planned to take.
 double slab_budget(const MemoryFactors& factors) {
-  constexpr double kDefaultSlab = 512.0 * 1024 * 1024;
-  return factors.limit > 0 ? std::min(kDefaultSlab, static_cast<double>(factors.limit) / 8)
-                           : kDefaultSlab;
+  const std::uint64_t limit = factors.limit > 0 ? factors.limit / 8 : kMostSlabBytes;
+  return static_cast<double>(std::min(kMostSlabBytes, limit));
 }
 
 /// Fractions: offsets of columns, and intervals with labels, of a slab or all. A surface of area A
