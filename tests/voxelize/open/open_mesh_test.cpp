@@ -5,6 +5,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <numbers>
+#include <optional>
 #include <random>
 #include <string>
 
@@ -80,35 +81,45 @@ TriangleSoup sheet(const glm::dvec3& corner, const glm::dvec3& u, const glm::dve
   return result;
 }
 
-/// The winding number at a voxel's centre, triangle by triangle with the library's arc tangent.
-double winding_number(const TriangleSoup& mesh, const VoxelGrid& grid, const glm::ivec3& voxel) {
+/// The winding number at a voxel's centre, triangle by triangle with the library's arc tangent;
+/// none where it lies on a triangle.
+std::optional<double> winding_number(const TriangleSoup& mesh, const VoxelGrid& grid,
+                                     const glm::ivec3& voxel) {
   const glm::dvec3 p = grid.origin + (glm::dvec3(voxel) + 0.5) * grid.voxel_size;
   double angle = 0;
   for (const glm::uvec3& t : mesh.triangles) {
     const glm::dvec3 a = mesh.positions[t.x] - p, b = mesh.positions[t.y] - p,
                      c = mesh.positions[t.z] - p;
     const double la = glm::length(a), lb = glm::length(b), lc = glm::length(c);
-    angle += 2 * std::atan2(glm::dot(a, glm::cross(b, c)), la * lb * lc + glm::dot(a, b) * lc +
-                                                               glm::dot(b, c) * la +
-                                                               glm::dot(c, a) * lb);
+    const double volume = glm::dot(a, glm::cross(b, c));
+    const double rest =
+        la * lb * lc + glm::dot(a, b) * lc + glm::dot(b, c) * la + glm::dot(c, a) * lb;
+    if (std::abs(volume) < 1e-9 && rest <= 0) return std::nullopt;
+    angle += 2 * std::atan2(volume, rest);
   }
   return angle / (4 * std::numbers::pi);
 }
 
 /// Expects what the winding numbers of all voxels say, but where they are within `slack` of a half.
+/// @param faces  flat ones that are missing, which count as if they were there
 /// @return voxels compared that are solid
-std::int64_t expect_winding_numbers(TriangleSoup mesh, const VoxelGrid& grid, double slack) {
-  for (auto& p : mesh.positions) {  // to the lattice, as the law says
-    const glm::dvec3 steps = glm::floor((p - grid.origin) / grid.voxel_size * 256.0 + 0.5);
-    p = grid.origin + steps / 256.0 * grid.voxel_size;
+std::int64_t expect_winding_numbers(TriangleSoup mesh, const VoxelGrid& grid, double slack,
+                                    const TriangleSoup& faces = {}) {
+  TriangleSoup whole = mesh;
+  append(whole, faces);
+  for (TriangleSoup* each : {&mesh, &whole}) {
+    for (auto& p : each->positions) {  // to the lattice, as the law says
+      const glm::dvec3 steps = glm::floor((p - grid.origin) / grid.voxel_size * 256.0 + 0.5);
+      p = grid.origin + steps / 256.0 * grid.voxel_size;
+    }
   }
   const VoxelSet solid = voted(mesh, grid), nonzero = voted(mesh, grid, InsideRule::kNonzero),
                  odd = voted(mesh, grid, InsideRule::kParity);
   std::int64_t wrong = 0, close = 0, inside = 0;
   solid.for_each([&](const glm::ivec3& p) {
-    const double w = winding_number(mesh, grid, p);
-    const double number = std::floor(w + 0.5);
-    if (std::abs(w - number) > 0.5 - slack) {
+    const std::optional<double> w = winding_number(whole, grid, p);
+    const double number = std::floor(w.value_or(0) + 0.5);
+    if (!w || std::abs(*w - number) > 0.5 - slack) {
       ++close;
       return;
     }
@@ -117,7 +128,7 @@ std::int64_t expect_winding_numbers(TriangleSoup mesh, const VoxelGrid& grid, do
                          odd.solid(p) != (std::fmod(std::abs(number), 2) == 1);
     wrong += differs;
     if (differs && wrong == 1)
-      ADD_FAILURE() << "voxel " << p.x << " " << p.y << " " << p.z << ": " << w;
+      ADD_FAILURE() << "voxel " << p.x << " " << p.y << " " << p.z << ": " << *w;
   });
   EXPECT_EQ(wrong, 0);
   EXPECT_LT(close, static_cast<std::int64_t>(solid.values().size()) / 10);
@@ -279,6 +290,73 @@ TEST(WindingNumbers, DecideOnWhatIsHardlyClosed) {
   });
   inside += expect_winding_numbers(bowl, grid, 0.02);
   EXPECT_GT(inside, 500);
+}
+
+/// A box without one of its faces, which may be inside out.
+struct OpenBox {
+  TriangleSoup mesh, missing;
+};
+OpenBox open_box(std::mt19937_64& random, double side) {
+  std::uniform_real_distribution<double> low(1, side / 2), size(3, side / 2 - 1);
+  const glm::dvec3 from(low(random), low(random), low(random));
+  OpenBox box{make_box(from, from + glm::dvec3(size(random), size(random), size(random))), {}};
+  if (random() % 3 == 0) {
+    for (auto& t : box.mesh.triangles) std::swap(t.y, t.z);
+  }
+  const int axis = static_cast<int>(random() % 3);
+  const double plane = box.mesh.positions[random() % 8][axis];
+  box.missing.positions = box.mesh.positions;
+  std::erase_if(box.mesh.triangles, [&](const glm::uvec3& t) {
+    for (int i = 0; i < 3; ++i) {
+      if (box.mesh.positions[t[i]][axis] != plane) return false;
+    }
+    box.missing.triangles.push_back(t);
+    return true;
+  });
+  return box;
+}
+
+TEST(WindingNumbers, DecideOnRandomMixturesOfOpenMeshes) {
+  std::int64_t inside = 0;
+  for (unsigned seed = 0; seed < 12; ++seed) {
+    SCOPED_TRACE(seed);
+    std::mt19937_64 random(seed);
+    constexpr double kSide = 18;
+    VoxelGrid grid = unit_grid({18, 18, 18});
+    if (seed % 2 == 1) {
+      grid = unit_grid({15, 18, 12});
+      grid.voxel_size = {1.2, 1.0, 1.5};
+    }
+    std::uniform_real_distribution<double> in(3, kSide - 3), size(3, 7), wave(1, 3);
+    TriangleSoup mesh, missing;
+    for (int i = static_cast<int>(random() % 3); i >= 0; --i) {
+      const OpenBox box = open_box(random, kSide);
+      append(mesh, box.mesh);
+      append(missing, box.missing);
+    }
+    for (int i = static_cast<int>(random() % 3); i > 0; --i) {  // bowls with a bent rim
+      TriangleSoup bowl = make_icosphere(size(random), 2);
+      const double high = wave(random);
+      std::erase_if(bowl.triangles, [&](const glm::uvec3& t) {
+        const glm::dvec3 p = bowl.positions[t.x];
+        return p.z > high * std::sin(p.x);
+      });
+      append(mesh, moved(bowl, {in(random), in(random), in(random)}));
+    }
+    for (int i = static_cast<int>(random() % 30); i > 0; --i) {  // loose triangles
+      const glm::dvec3 middle(in(random), in(random), in(random));
+      const auto first = static_cast<std::uint32_t>(mesh.positions.size());
+      for (int k = 0; k < 3; ++k) {
+        mesh.positions.push_back(middle + glm::dvec3(wave(random), wave(random), wave(random)));
+      }
+      mesh.triangles.emplace_back(first, first + 1, first + 2);
+    }
+    if (random() % 2 == 0) {
+      append(mesh, sheet({1, 1, in(random)}, {15, 0, 3}, {0, 15, 1}, {0, 0, wave(random)}, 5));
+    }
+    inside += expect_winding_numbers(mesh, grid, 0.03, missing);
+  }
+  EXPECT_GT(inside, 2000);
 }
 
 TEST(WindingNumbers, OfTurnedTrianglesAreMended) {
