@@ -143,7 +143,7 @@ TEST_P(GridParts, MayBeTakenInTurns) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Options, GridParts, ::testing::ValuesIn(grid_parts_cases()),
-                         [](const auto& info) { return info.param.name; });
+                         [](const auto& each) { return each.param.name; });
 
 TEST(GridPartsRows, AreWholeTilesOfTheGrid) {
   const TriangleSoup box = make_box({0, 0, 0}, {1, 1, 1});
