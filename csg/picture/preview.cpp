@@ -26,8 +26,8 @@ class Frame {
 
   /// What is to be done with a tile's surfaces: pixels `rect` of the picture. Null: nothing is
   /// seen.
-  using OnTile =
-      std::function<void(const SurfaceImage* tile, const PixelRect& rect, std::size_t worker)>;
+  using OnTile = std::function<void(const SurfaceImage* tile, const AreaFaces& faces,
+                                    const PixelRect& rect, std::size_t worker)>;
 
   /// Finds all surfaces. With `on_tile` they are handed to it, from any thread, and image() is not
   /// kept: memory is slower than the search.
@@ -100,6 +100,7 @@ class Frame {
       finders_.push_back(std::make_unique<TileFinder>(
           *program_, tiles_.view_parts, geometry_->parts(), tiles_.view, tiles_.coincidence));
       tile_images_.emplace_back().resize(kTileSide, kTileSide);
+      tile_faces_.emplace_back();
     }
     for (const auto& finder : finders_) finder->reset_counts();
     parallel_for(execution, tiles.size(), [&](std::size_t i, int thread) {
@@ -110,11 +111,12 @@ class Frame {
                            std::min(tiles_.view.size.x, (tile_u + 1) * kTileSide),
                            std::min(tiles_.view.size.y, (tile_v + 1) * kTileSide)};
       const auto solids = tiles_.solids.at(static_cast<std::size_t>(tile));
-      if (on_tile && solids.empty()) return on_tile(nullptr, rect, worker);
+      AreaFaces& faces = tile_faces_[worker];
+      if (on_tile && solids.empty()) return on_tile(nullptr, faces, rect, worker);
       SurfacePart part{&image_};
-      if (on_tile) part = {&tile_images_[worker], rect.u0, rect.v0};
+      if (on_tile) part = {&tile_images_[worker], rect.u0, rect.v0, &faces};
       finders_[worker]->find(tile_u, tile_v, solids, part, execution.stop);
-      if (on_tile) on_tile(part.image, rect, worker);
+      if (on_tile) on_tile(part.image, faces, rect, worker);
     });
     report_.fragments = report_.resolved = 0;
     for (const auto& finder : finders_) {
@@ -131,7 +133,8 @@ class Frame {
   SurfaceTiles tiles_;
   std::vector<std::unique_ptr<TileFinder>> finders_;
   std::vector<SurfaceImage> tile_images_;  ///< of each worker
-  bool whole_ = false;                     ///< image_ shows all of tiles_.view
+  std::vector<AreaFaces> tile_faces_;
+  bool whole_ = false;  ///< image_ shows all of tiles_.view
   SurfaceSource* source_ = nullptr;
   SurfaceImage image_;
   DrawReport report_;
@@ -282,8 +285,10 @@ Result<void> Preview::Impl::shade_tiles(const Band& band, const Look& look,
   for (int i = 0; i < execution.thread_count(); ++i) {
     shaders.emplace_back(rows, look.shader, band.width, band.pixels);
   }
-  const auto on_tile = [&](const SurfaceImage* tile, const PixelRect& rect, std::size_t worker) {
-    return tile != nullptr ? shaders[worker].shade(*tile, rect) : shaders[worker].leave(rect);
+  const auto on_tile = [&](const SurfaceImage* tile, const AreaFaces& faces, const PixelRect& rect,
+                           std::size_t worker) {
+    return tile != nullptr ? shaders[worker].shade(*tile, faces, rect)
+                           : shaders[worker].leave(rect);
   };
   if (auto done = frame.draw(band.view, execution, on_tile); !done) return done;
   work.total.fragments += frame.report().fragments;

@@ -312,12 +312,14 @@ TileShader::TileShader(const SampleRows& rows, const Shader& shader, int width,
 TileShader::TileShader(TileShader&&) noexcept = default;
 TileShader::~TileShader() = default;
 
-void TileShader::shade(const SurfaceImage& tile, const PixelRect& rect) {
+void TileShader::shade(const SurfaceImage& tile, const AreaFaces& faces, const PixelRect& rect) {
   const int left = rect.u0 / rows_.across, right = rect.u1 / rows_.across;
   for (int v = rect.v0 / rows_.down; v < rect.v1 / rows_.down; ++v) {
     const std::size_t begin =
         static_cast<std::size_t>(v * rows_.down - rect.v0) * static_cast<std::size_t>(tile.width);
-    shade_row(tile, begin, left, v, static_cast<std::size_t>(right - left));
+    const int areas = (v * rows_.down - rect.v0) / AreaBounds::kSide * AreaBounds::kAcross;
+    shade_row(tile, faces.of.data() + areas, begin, left, v,
+              static_cast<std::size_t>(right - left));
   }
 }
 
@@ -328,36 +330,46 @@ void TileShader::leave(const PixelRect& rect) {
   }
 }
 
-/// Colours pixels of row `v` from `u` on; their first sample is at `begin`.
-void TileShader::shade_row(const SurfaceImage& tile, std::size_t begin, int u, int v,
-                           std::size_t count) {
+/// Colours pixels of row `v` from `u` on; their first sample is at `begin`. `faces`: of the row's
+/// areas.
+void TileShader::shade_row(const SurfaceImage& tile, const AreaFaces::Face* faces,
+                           std::size_t begin, int u, int v, std::size_t count) {
+  static_assert(kAtOnce == AreaBounds::kSide);
   Rgba* const colours = row_of(u, v);
   const Rgba background = rows_.ground.at(v);
   const auto across = static_cast<std::size_t>(rows_.across);
   const std::size_t at_once = kAtOnce / across;
+  struct Sight {
+    Seen seen;
+    AreaFaces::Face face;
+  };
+  const auto look = [&](std::size_t block) -> Sight {
+    const AreaFaces::Face& area = faces[block / at_once];
+    if (area.solid != SurfaceImage::kNone) return {Seen::kOneFace, area};
+    if (count - block < at_once) return {Seen::kSeveral, {}};
+    const std::size_t first = begin + block * across;
+    return {look_at(tile, first, Block(), rows_.down), {tile.solid[first], tile.triangle[first]}};
+  };
   for (std::size_t block = 0; block < count; block += at_once) {
     const std::size_t pixels = std::min(at_once, count - block), first = begin + block * across;
-    const Seen seen =
-        pixels == at_once ? look_at(tile, first, Block(), rows_.down) : Seen::kSeveral;
+    const auto [seen, face] = look(block);
     if (seen == Seen::kNothing) {
       std::fill_n(colours + block, pixels, background);
       continue;
     }
     const int column = u + static_cast<int>(block), row = rows_.ground.first + v;
     if (seen == Seen::kOneFace) {
-      const std::uint32_t solid = tile.solid[first], face = tile.triangle[first];
       std::size_t run = pixels;
-      if (samples_->uniform_along(solid, face, column, row, static_cast<int>(pixels))) {
+      if (samples_->uniform_along(face.solid, face.triangle, column, row,
+                                  static_cast<int>(pixels))) {
         std::fill_n(colours + block, pixels, samples_->colour());
       } else {
-        const auto goes_on = [&] {
-          const std::size_t next = first + run * across;
-          return block + run + at_once <= count && tile.solid[next] == solid &&
-                 tile.triangle[next] == face &&
-                 look_at(tile, next, Block(), rows_.down) == Seen::kOneFace;
-        };
-        while (goes_on()) run += at_once;
-        samples_->along(solid, face, column, row, std::span(colours + block, run));
+        while (block + run + at_once <= count) {
+          const Sight next = look(block + run);
+          if (next.seen != Seen::kOneFace || next.face != face) break;
+          run += at_once;
+        }
+        samples_->along(face.solid, face.triangle, column, row, std::span(colours + block, run));
         block += run - pixels;
       }
       covered_ += run;

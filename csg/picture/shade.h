@@ -12,6 +12,7 @@
 #include "csg/geometry.h"
 #include "csg/picture/solid_normals.h"
 #include "csg/picture/view_openness.h"
+#include "csg/surface/tile_surface.h"
 #include "picture/studio_lights.h"
 #include "strata/core/execution.h"
 #include "strata/csg/picture/picture.h"
@@ -123,8 +124,9 @@ class TileShader {
   TileShader(TileShader&&) noexcept;
   ~TileShader();
 
-  /// Colours the pixels of the samples `rect`; `tile` begins there.
-  void shade(const SurfaceImage& tile, const PixelRect& rect);
+  /// Colours the pixels of the samples `rect`; `tile` begins there. @param faces  of its areas:
+  /// they come before what `tile` has there @pre an area is whole pixels wide and high
+  void shade(const SurfaceImage& tile, const AreaFaces& faces, const PixelRect& rect);
   /// The same where nothing is seen.
   void leave(const PixelRect& rect);
   /// How many pixels show something.
@@ -134,7 +136,8 @@ class TileShader {
   [[nodiscard]] Rgba* row_of(int u, int v) const {
     return pixels_.data() + static_cast<std::size_t>(v) * width_ + static_cast<std::size_t>(u);
   }
-  void shade_row(const SurfaceImage& tile, std::size_t begin, int u, int v, std::size_t count);
+  void shade_row(const SurfaceImage& tile, const AreaFaces::Face* faces, std::size_t begin, int u,
+                 int v, std::size_t count);
   void shade_runs(const SurfaceImage& tile, std::size_t begin, int u, int v, Rgba background,
                   std::span<Rgba> colours);
   Rgba pixel(const SurfaceImage& tile, std::size_t begin, int u, int v, Rgba background);

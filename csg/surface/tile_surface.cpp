@@ -334,6 +334,7 @@ void TileFinder::find(int tile_u, int tile_v, std::span<const std::uint32_t> sol
     cut = cut || view_parts_[solid].cut;
   }
   hidden_.clear();
+  if (part.faces != nullptr) *part.faces = {};
   if (!cut) find_all_bounds(std::span(leaves_).first(count));
   for (int v = tile_.v0; v < tile_.v1; ++v) {
     const std::size_t row = part.index(tile_.u0, v);
@@ -444,15 +445,20 @@ bool TileFinder::show_alone(const SearchArea& area, LeafLayers& leaf) {
   const RasterTarget target{Axis::kZ, view_->size.x, view_->size.y, kPictureDepthLimit};
   const Input input = input_of(leaf);
   const PixelRect& clip = input.clip;
+  const int width = std::min(tile_.u1, area.rect.u1) - area.rect.u0;
+  const int height = area.rect.v1 - area.rect.v0;
+  const auto pixels = static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height);
+  if (part_.faces != nullptr && input.triangles.size() == 1) {
+    leaf.kind = kind;
+    part_.faces->of[index] = {leaf.solid, input.triangles.front()};
+    return true;
+  }
   const std::uint64_t fragments =
       raster_layers(view_parts_[leaf.solid].mesh, target, input.triangles, clip,
                     coincidence_->steep_from(), leaf, area_arena_);
   leaf.kind = kind;
   leaf.left_out = left_out;
-  const int width = std::min(tile_.u1, area.rect.u1) - area.rect.u0;
-  const int height = area.rect.v1 - area.rect.v0;
-  if (leaf.keys.size() != 1 || leaf.steep ||
-      fragments != static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height)) {
+  if (leaf.keys.size() != 1 || leaf.steep || fragments != pixels) {
     enter_area(leaf, area, index);
     leaf.left_out = left_out;
     return false;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <stop_token>
@@ -44,10 +45,22 @@ struct UnitedLayers {
   }
 };
 
+/// The faces of those areas of a tile that show one face in all of their pixels.
+struct AreaFaces {
+  struct Face {
+    std::uint32_t solid = Surface::kNone;     ///< kNone: nothing, or more than one
+    std::uint32_t triangle = Surface::kNone;  ///< as SurfaceImage has it
+    friend bool operator==(const Face&, const Face&) = default;
+  };
+  std::array<Face, AreaBounds::kAreas> of;  ///< row by row
+};
+
 /// An image of a part of the picture that begins at its pixel (u0, v0).
 struct SurfacePart {
   SurfaceImage* image = nullptr;
   int u0 = 0, v0 = 0;
+  /// If not null: gets the faces of areas, whose pixels of the image are left undefined.
+  AreaFaces* faces = nullptr;
   [[nodiscard]] std::size_t index(int u, int v) const {
     return static_cast<std::size_t>(v - v0) * static_cast<std::size_t>(image->width) +
            static_cast<std::size_t>(u - u0);
