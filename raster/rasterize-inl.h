@@ -53,6 +53,13 @@ struct TileEquations {
 
 HWY_INLINE void split_fraction(Int128 numerator, std::int64_t area, double& quotient,
                                double& remainder) {
+  const auto narrow = static_cast<std::int64_t>(numerator);
+  if (HWY_LIKELY(narrow == numerator)) {
+    const std::int64_t whole = narrow / area - (narrow % area < 0 ? 1 : 0);
+    quotient = static_cast<double>(whole);
+    remainder = static_cast<double>(narrow - whole * area);
+    return;
+  }
   const Int128 q = floor_div(numerator, area);
   quotient = static_cast<double>(q);
   remainder = static_cast<double>(numerator - q * area);
