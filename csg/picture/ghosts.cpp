@@ -13,7 +13,7 @@ class PixelPainter {
  public:
   PixelPainter(const TranslucentTrees& trees, const TranslucentView& seen, const View& view,
                const Shader& shader)
-      : trees_(&trees), seen_(&seen), shader_(&shader), walk_(trees, seen, view) {}
+      : trees_(&trees), seen_(&seen), shader_(&shader), walk_(trees, seen, view), kept_(kKept) {}
 
   /// @param opaque depth of the opaque surface, or kNone
   void paint(std::span<const DepthItem> items, std::uint32_t opaque, Rgba& colour) {
@@ -22,9 +22,7 @@ class PixelPainter {
     bool painted = false;
     for (const TranslucentWalk::Fragment& fragment : walk_.surfaces(items)) {
       if (opaque != SurfaceImage::kNone && fragment.depth > opaque + walk_.slack(opaque)) break;
-      const std::uint32_t slot = seen_->slot_of[fragment.triangle];
-      const glm::vec4 face = translucent_colour(*trees_, slot, seen_->source(fragment.triangle),
-                                                fragment.exit, *shader_);
+      const glm::vec4& face = colour_of(fragment.triangle, fragment.exit);
       light += left * face.a * glm::vec3(face);
       left *= 1.0f - face.a;
       painted = true;
@@ -35,10 +33,29 @@ class PixelPainter {
   }
 
  private:
+  /// Faces met before that are kept.
+  static constexpr std::size_t kKept = 256;
+  struct Kept {
+    std::uint32_t triangle = SurfaceImage::kNone;
+    bool exit = false;
+    glm::vec4 colour{0.0f};
+  };
+
+  const glm::vec4& colour_of(std::uint32_t triangle, bool exit) {
+    Kept& kept = kept_[(triangle * 2 + (exit ? 1 : 0)) % kKept];
+    if (kept.triangle != triangle || kept.exit != exit) {
+      kept = {triangle, exit,
+              translucent_colour(*trees_, seen_->slot_of[triangle], seen_->source(triangle), exit,
+                                 *shader_)};
+    }
+    return kept.colour;
+  }
+
   const TranslucentTrees* trees_;
   const TranslucentView* seen_;
   const Shader* shader_;
   TranslucentWalk walk_;
+  std::vector<Kept> kept_;
 };
 
 }  // namespace

@@ -236,10 +236,17 @@ class SampleShader {
       } else {
         for (std::size_t i = block; i < end; ++i) {
           const std::size_t from = begin + i;
-          colours[i] =
-              image.depth[from] == SurfaceImage::kNone
-                  ? Rgba(0)
-                  : at(image.solid[from], image.triangle[from], static_cast<int>(i) / across, v);
+          const std::uint32_t solid = image.solid[from], face = image.triangle[from];
+          const int u = static_cast<int>(i) / across;
+          if (image.depth[from] == SurfaceImage::kNone) {
+            colours[i] = Rgba(0);
+          } else if (i > block && static_cast<int>(i - 1) / across == u &&
+                     image.depth[from - 1] != SurfaceImage::kNone &&
+                     image.solid[from - 1] == solid && image.triangle[from - 1] == face) {
+            colours[i] = colours[i - 1];
+          } else {
+            colours[i] = at(solid, face, u, v);
+          }
         }
       }
     }
