@@ -8,6 +8,18 @@
 namespace strata::csg {
 namespace {
 
+/// std::stable_sort() without the memory that it asks for at each call: rays cross few faces, and
+/// most lists are in order.
+template <class T, class Less>
+void sort_few(std::vector<T>& items, Less&& less) {
+  constexpr std::size_t kFew = 32;
+  if (std::is_sorted(items.begin(), items.end(), less)) return;
+  if (items.size() > kFew) return std::stable_sort(items.begin(), items.end(), less);
+  for (auto item = items.begin(); item != items.end(); ++item) {
+    std::rotate(std::upper_bound(items.begin(), item, *item, less), item, item + 1);
+  }
+}
+
 /// Whether all solids below each node have an alpha below 1 (false for none). What is taken away
 /// does not count: its faces have their own colours.
 std::vector<std::uint8_t> translucent_nodes(const Tree& tree) {
@@ -172,8 +184,7 @@ std::span<const TranslucentWalk::Fragment> TranslucentWalk::surfaces(
     std::span<const DepthItem> items) {
   fragments_.clear();
   sorted_.assign(items.begin(), items.end());
-  std::stable_sort(sorted_.begin(), sorted_.end(),
-                   [this](DepthItem a, DepthItem b) { return seen_->slot(a) < seen_->slot(b); });
+  sort_few(sorted_, [this](DepthItem a, DepthItem b) { return seen_->slot(a) < seen_->slot(b); });
   const auto slots = trees_->slots();
   for (std::size_t i = 0; i < sorted_.size();) {
     const std::uint32_t part = slots[seen_->slot(sorted_[i])].part;
@@ -187,16 +198,15 @@ std::span<const TranslucentWalk::Fragment> TranslucentWalk::surfaces(
     }
     walk(part);
   }
-  std::stable_sort(fragments_.begin(), fragments_.end(),
-                   [](const Fragment& a, const Fragment& b) { return a.depth < b.depth; });
+  sort_few(fragments_, [](const Fragment& a, const Fragment& b) { return a.depth < b.depth; });
   std::erase_if(fragments_, [](const Fragment& f) { return f.triangle == Transition::kNone; });
   return fragments_;
 }
 
 /// The surfaces of one tree, from its transitions.
 void TranslucentWalk::walk(std::uint32_t part) {
-  std::stable_sort(transitions_.begin(), transitions_.end(),
-                   [](const Transition& a, const Transition& b) { return a.depth < b.depth; });
+  sort_few(transitions_,
+           [](const Transition& a, const Transition& b) { return a.depth < b.depth; });
   const Program& program = trees_->parts()[part].program;
   if (!states_[part]) states_[part] = std::make_unique<ProgramState>(program);
   ProgramState& state = *states_[part];
