@@ -275,6 +275,10 @@ void TileFinder::find_bounds(LeafLayers& leaf) {
   const Input input = input_of(leaf.solid);
   const bool concave = leaf.kind == LeafLayers::Kind::kSorted;
   if (concave && input.triangles.size() > kMostOfConcave) return;
+  // In an area or two there is little to leave out.
+  const bool small =
+      part.rect.u1 - part.rect.u0 <= kAreaSide && part.rect.v1 - part.rect.v0 <= kAreaSide;
+  if (small && leaf.kind != LeafLayers::Kind::kFirstEntryOnly) return;
   leaf.by_area = true;
   find_area_bounds(part.mesh, input.triangles, {tile_.u0, tile_.v0}, coincidence_->steep_from(),
                    leaf.kind != LeafLayers::Kind::kFirstEntryOnly, leaf.bounds);
