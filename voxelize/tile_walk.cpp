@@ -84,7 +84,7 @@ HWY_INLINE std::uint32_t hand_out_ones(Vec packed, Mask marked, std::size_t pixe
   hn::StoreU(hn::Compress(packed, marked), d, room_for(lanes, count, out));
   std::uint32_t* const offsets = out.offsets.data() + pixel;
   if (hn::AllTrue(d, marked)) {
-    hn::StoreU(hn::Iota(d, count), d, offsets);
+    hn::StoreU(hn::Add(hn::Iota(d, 0), hn::Set(d, count)), d, offsets);
     return count + static_cast<std::uint32_t>(lanes);
   }
   std::uint32_t marks[kMaxLanes];
