@@ -80,13 +80,15 @@ HWY_INLINE std::uint32_t hand_out_ones(Vec packed, Mask marked, std::size_t pixe
                                        std::uint32_t count, TileIntervals& out) {
   const Lane d;
   const std::size_t lanes = hn::Lanes(d);
-  // A whole vector is stored: to store a compressed part takes some processors 100 cycles.
-  hn::StoreU(hn::Compress(packed, marked), d, room_for(lanes, count, out));
+  std::uint32_t* const items = room_for(lanes, count, out);
   std::uint32_t* const offsets = out.offsets.data() + pixel;
   if (hn::AllTrue(d, marked)) {
+    hn::StoreU(packed, d, items);
     hn::StoreU(hn::Add(hn::Iota(d, 0), hn::Set(d, count)), d, offsets);
     return count + static_cast<std::uint32_t>(lanes);
   }
+  // A whole vector is stored: to store a compressed part takes some processors 100 cycles.
+  hn::StoreU(hn::Compress(packed, marked), d, items);
   std::uint32_t marks[kMaxLanes];
   hn::StoreU(hn::IfThenElseZero(marked, hn::Set(d, 1)), d, marks);
   for (std::size_t lane = 0; lane < lanes; ++lane) {
