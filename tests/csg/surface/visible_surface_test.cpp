@@ -93,8 +93,8 @@ TEST(VisibleSurface, IsTheOneOfTheFullListsForAnyTree) {
 }
 
 // Where the tree is an intersection of solids, or of unions of them, minus others, what lies before
-// or behind the surface is left out area by area (csg/surface/narrow_program.cpp), and solids that a
-// ray meets once are searched by their intervals (csg/surface/tile_surface_simd.cpp).
+// or behind the surface is left out area by area (csg/surface/narrow_program.cpp), and solids that
+// a ray meets once are searched by their intervals (csg/surface/tile_surface_simd.cpp).
 TEST(VisibleSurface, OfAnIntersectionMinusOthersIsTheOneOfTheFullLists) {
   std::size_t seen = 0;
   for (int seed = 0; seed < 240; ++seed) {
