@@ -97,8 +97,10 @@ class TileFinder {
   [[nodiscard]] bool place(LeafLayers& leaf, std::uint32_t solid) const;
   /// Makes a leaf one of bounds for each area, if it has few triangles in the tile.
   void find_bounds(LeafLayers& leaf);
-  /// The same for all leaves of a tile, except that where all are just united, hidden_ becomes
-  /// those that begin behind others that cover the tile.
+  /// Whether bounds of the leaves of a tile may save more time than they take.
+  [[nodiscard]] bool bounds_pay(std::span<const LeafLayers> leaves);
+  /// The same as find_bounds() for all leaves of a tile where that pays, except that where all are
+  /// just united, hidden_ becomes those that begin behind others that cover the tile.
   void find_all_bounds(std::span<LeafLayers> leaves);
   /// Fills the pixels of one area. @param cut  the near plane may cut solids of the tile
   void find_area(const SearchArea& area, bool cut);
