@@ -82,7 +82,10 @@ Geometry::Geometry(const Tree& tree, const Execution& execution) {
     }
     place(static_cast<std::uint32_t>(i));
   });
-  for (std::size_t i = 0; i < parts_.size(); ++i) parts_[i].convex = convex[first_with[i]] != 0;
+  // Where faces lie twice, the parity of what they enclose is even: then the solid is empty.
+  for (std::size_t i = 0; i < parts_.size(); ++i) {
+    parts_[i].convex = convex[first_with[i]] != 0 && parts_[i].rule != InsideRule::kParity;
+  }
   any_cut_off_ = cut_off_vast(tree);
   measure();
   share_error(tree);

@@ -19,7 +19,7 @@ namespace strata {
 /// The visible points of a picture in eye space: x right, y up, z towards the eye.
 struct EyeSurfaces {
   int width = 0;   ///< pixels
-  int height = 0;  ///< pixels
+  int height = 0;  ///< pixels; width times height must be below 2^31
   bool perspective = true;
   double scale = 1.0;          ///< pixels a world unit; of a perspective view, at distance 1
   glm::dvec2 centre{0.0};      ///< where the view axis meets the picture, in pixels

@@ -55,9 +55,9 @@ HWY_INLINE void split_fraction(Int128 numerator, std::int64_t area, double& quot
                                double& remainder) {
   const auto narrow = static_cast<std::int64_t>(numerator);
   if (HWY_LIKELY(narrow == numerator)) {
-    const std::int64_t whole = narrow / area - (narrow % area < 0 ? 1 : 0);
-    quotient = static_cast<double>(whole);
-    remainder = static_cast<double>(narrow - whole * area);
+    const std::int64_t rest = narrow % area;
+    quotient = static_cast<double>(narrow / area - (rest < 0 ? 1 : 0));
+    remainder = static_cast<double>(rest < 0 ? rest + area : rest);
     return;
   }
   const Int128 q = floor_div(numerator, area);

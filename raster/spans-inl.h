@@ -25,6 +25,7 @@
 
 #include <hwy/highway.h>
 
+#include <bit>
 #include <cstring>
 
 #include "raster/rasterize-inl.h"
@@ -245,6 +246,7 @@ class SpanBatch {
   static constexpr std::size_t kBlocks =
       static_cast<std::size_t>(kRows * kSpanLanes * (kRows / kSpanLanes + 1) + kSpanLanes);
   static_assert(kTilePixels == 1 << 12 && kRows * kSpanLanes <= 1 << 8);
+  static_assert(std::endian::native == std::endian::little);  // cover_blocks() loads parts of words
 
   /// A function of its own has the registers that it needs.
   template <bool clamps, class Sink>

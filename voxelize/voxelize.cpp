@@ -351,7 +351,7 @@ Result<VoxelizeReport> run(const TriangleSoup& mesh, const VoxelGrid& asked,
         checksum.add(*slab, quiet);
       }
       if (auto done = sink(std::move(*slab)); !done) return tl::unexpected(done.error());
-      slabs->reuse(*std::move(slab));
+      if (options.rays == 0) slabs->reuse(*std::move(slab));  // others are made in their own
       if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
       if (execution.progress) {
         execution.progress(static_cast<double>(end - all.begin * columns_a_row) /

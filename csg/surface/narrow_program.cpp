@@ -11,7 +11,7 @@ namespace strata::csg {
 namespace {
 
 /// What is known of the crossings of a leaf, or of a union of leaves, in an area.
-struct Reach {
+struct Extent {
   std::uint32_t nearest, farthest;  ///< of all crossings
   /// A ray that meets it is in it between these, at least.
   std::uint32_t last_entry, first_exit;
@@ -21,9 +21,9 @@ struct Reach {
 /// Narrows the program of an area.
 class Narrower {
  public:
-  Narrower(std::span<LeafLayers> leaves, TileProgram& program, std::size_t area,
-           std::vector<std::uint32_t>& around)
-      : leaves_(leaves), program_(program), area_(area), around_(around) {}
+  Narrower(std::span<LeafLayers> leaves, std::span<const ViewPart> parts, TileProgram& program,
+           std::size_t area, std::vector<std::uint32_t>& around)
+      : leaves_(leaves), parts_(parts), program_(program), area_(area), around_(around) {}
 
   /// Whether the program is of the kind that is narrowed.
   bool fits();
@@ -38,10 +38,10 @@ class Narrower {
   [[nodiscard]] std::span<Program::Edge> edges_of(const TileProgram::Node& node) {
     return std::span(program_.edges).subspan(node.first, node.count);
   }
-  [[nodiscard]] Reach reach_of(const LeafLayers& leaf) const;
-  [[nodiscard]] Reach reach_of(Program::Edge edge);
-  [[nodiscard]] bool outside_of_window(const Reach& of) const {
-    return of.nearest > end_ + reach_ || of.farthest + reach_ < begin_;
+  [[nodiscard]] Extent extent_of(const LeafLayers& leaf) const;
+  [[nodiscard]] Extent extent_of(Program::Edge edge);
+  [[nodiscard]] bool outside_of_window(const Extent& of) const {
+    return of.nearest > end_ + margin_ || of.farthest + margin_ < begin_;
   }
   /// Keeps what of a union is in the window. @return the edge that is left of it
   Program::Edge filter_union(Program::Edge edge);
@@ -49,18 +49,20 @@ class Narrower {
   void set_edges(TileProgram::Node& node, std::span<const Program::Edge> edges);
 
   std::span<LeafLayers> leaves_;
+  std::span<const ViewPart> parts_;  ///< of the solids
   TileProgram& program_;
   std::size_t area_;
   std::vector<std::uint32_t>& around_;
   std::uint32_t common_ = 0;  ///< edges of the root that are common to the result
-  std::uint64_t reach_ = 0;   ///< how far apart faces are that coincide, whatever they are
-  std::uint64_t begin_ = 0, end_ = AreaBounds::kNever;  ///< of the window
-  Program::Edge last_;                                  ///< the common edge that begins last
+  std::uint64_t margin_ = 0;  ///< how far apart faces are that coincide, whatever they are
+  /// Of the window: the surface lies between these depths.
+  std::uint64_t begin_ = 0, end_ = AreaBounds::kNever;
+  Program::Edge last_;   ///< the common edge that begins last
   Program::Edge cover_;  ///< the other that all rays are in just before the window, if there is one
   std::vector<Program::Edge> kept_;
 };
 
-Reach Narrower::reach_of(const LeafLayers& leaf) const {
+Extent Narrower::extent_of(const LeafLayers& leaf) const {
   if (!leaf.by_area) return {leaf.nearest, leaf.farthest, leaf.farthest, leaf.nearest, false};
   const AreaBounds& of = leaf.bounds;
   const std::uint32_t nearest = of.nearest(area_), farthest = of.farthest(area_);
@@ -71,11 +73,11 @@ Reach Narrower::reach_of(const LeafLayers& leaf) const {
           (of.covered >> area_ & 1) != 0};
 }
 
-Reach Narrower::reach_of(Program::Edge edge) {
-  if (edge.leaf()) return reach_of(leaf_of(edge));
-  Reach all{AreaBounds::kNever, 0, AreaBounds::kNever, 0, false};
+Extent Narrower::extent_of(Program::Edge edge) {
+  if (edge.leaf()) return extent_of(leaf_of(edge));
+  Extent all{AreaBounds::kNever, 0, AreaBounds::kNever, 0, false};
   for (const Program::Edge operand : edges_of(program_.nodes[edge.child()])) {
-    const Reach of = reach_of(leaf_of(operand));
+    const Extent of = extent_of(leaf_of(operand));
     all.nearest = std::min(all.nearest, of.nearest);
     all.farthest = std::max(all.farthest, of.farthest);
     if (of.covers && of.last_entry < all.last_entry) {
@@ -116,21 +118,24 @@ bool Narrower::fits() {
 }
 
 bool Narrower::find_window(std::uint64_t reach) {
-  // What is settled with the beginning of an interval reaches farther behind steep faces.
+  // A steep face may stand for any depth of its triangle, whatever its crossing, and coincides
+  // with what is as far before or behind.
   std::uint64_t steep = 0;
   for (const std::uint32_t slot : program_.leaves) {
     const LeafLayers& leaf = leaves_[slot];
     if (!leaf.by_area) {
       if (program_.depth > 1) return true;
+      const ViewPart& part = parts_[leaf.solid];
+      steep = std::max<std::uint64_t>(steep, part.farthest - part.nearest);
     } else if ((leaf.bounds.steep_areas >> area_ & 1) != 0) {
       steep = std::max<std::uint64_t>(steep, leaf.bounds.steep_depth);
     }
   }
-  reach_ = reach + (program_.depth > 1 ? 2 * steep : 0);
+  margin_ = reach + 2 * steep;
   const std::span<Program::Edge> edges = edges_of(root());
   std::uint64_t last_entry = 0, first_exit = AreaBounds::kNever;
   for (const Program::Edge edge : edges.first(common_)) {
-    const Reach of = reach_of(edge);
+    const Extent of = extent_of(edge);
     if (of.nearest >= begin_) last_ = edge;
     begin_ = std::max<std::uint64_t>(begin_, of.nearest);
     end_ = std::min<std::uint64_t>(end_, of.farthest);
@@ -141,25 +146,25 @@ bool Narrower::find_window(std::uint64_t reach) {
   for (bool moved = true; moved;) {
     moved = false;
     for (const Program::Edge edge : edges.subspan(common_)) {
-      const Reach of = reach_of(edge);
-      if (of.covers && of.last_entry + reach_ < begin_ && of.first_exit > begin_) {
+      const Extent of = extent_of(edge);
+      if (of.covers && of.last_entry + margin_ < begin_ && of.first_exit > begin_) {
         begin_ = of.first_exit;
         cover_ = edge;
         moved = true;
       }
-      if (of.nearest <= last_entry + reach_ && of.farthest > last_entry) {
+      if (of.nearest <= last_entry + margin_ && of.farthest > last_entry) {
         last_entry = of.farthest;
         moved = true;
       }
     }
   }
-  if (last_entry + reach_ < first_exit) end_ = std::min(end_, last_entry);
+  if (last_entry + margin_ < first_exit) end_ = std::min(end_, last_entry);
   return begin_ <= end_;
 }
 
 void Narrower::leave_out_exits(LeafLayers& leaf) {
   if (!leaf.by_area || leaf.kind != LeafLayers::Kind::kConvex) return;
-  if (reach_of(leaf).first_exit > end_ + reach_) leaf.left_out = LeafLayers::LeftOut::kExits;
+  if (extent_of(leaf).first_exit > end_ + margin_) leaf.left_out = LeafLayers::LeftOut::kExits;
 }
 
 void Narrower::set_edges(TileProgram::Node& node, std::span<const Program::Edge> edges) {
@@ -177,7 +182,7 @@ Program::Edge Narrower::filter_union(Program::Edge edge) {
   std::vector<Program::Edge>& kept = kept_;
   kept.clear();
   for (const Program::Edge operand : edges_of(node)) {
-    if (outside_of_window(reach_of(leaf_of(operand)))) continue;
+    if (outside_of_window(extent_of(leaf_of(operand)))) continue;
     leave_out_exits(leaf_of(operand));
     kept.push_back(operand);
   }
@@ -198,8 +203,8 @@ void Narrower::filter() {
     } else {
       LeafLayers& leaf = leaf_of(edge);
       leave_out_exits(leaf);
-      const Reach of = reach_of(leaf);
-      if (of.covers && of.first_exit > end_ + reach_ && of.last_entry + reach_ < begin_ &&
+      const Extent of = extent_of(leaf);
+      if (of.covers && of.first_exit > end_ + margin_ && of.last_entry + margin_ < begin_ &&
           edge.bits != last_.bits) {
         around_.push_back(leaf.solid);
         continue;
@@ -210,7 +215,7 @@ void Narrower::filter() {
   const std::uint32_t common = count;
   for (const Program::Edge edge : edges.subspan(common_)) {
     LeafLayers& leaf = leaf_of(edge);
-    if (outside_of_window(reach_of(leaf))) continue;
+    if (outside_of_window(extent_of(leaf))) continue;
     if (edge.bits == cover_.bits) {
       leaf.left_out = LeafLayers::LeftOut::kEntries;
       leaf.nearest = 0;
@@ -233,7 +238,7 @@ std::uint32_t farthest_reach(const Coincidence::Range& range) {
 }
 
 bool TileFinder::narrow(std::size_t area) {
-  Narrower narrower(leaves_, tile_program_, area, around_);
+  Narrower narrower(leaves_, view_parts_, tile_program_, area, around_);
   if (!narrower.fits()) return true;
   if (!narrower.find_window(farthest_reach(coincidence_->range()))) return false;
   narrower.filter();

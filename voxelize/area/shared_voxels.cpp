@@ -34,9 +34,9 @@ class PlaneRow {
     for (int u = 0; u < kTileSide; u += static_cast<int>(hn::Lanes(d))) {
       const std::uint32_t first = row.offsets[u];
       const auto ends = hn::LoadU(du, row.offsets + u + 1);
-      if (hn::AllTrue(du,
-                      hn::Eq(ends, hn::Add(hn::Iota(du, 0),
-                                           hn::Set(du, first + 1))))) {  // most have one interval
+      // Most columns have one interval.
+      const auto ones = hn::Add(hn::Iota(du, 0), hn::Set(du, first + 1));
+      if (hn::AllTrue(du, hn::Eq(ends, ones))) {
         const auto words = hn::LoadU(du, row.intervals + first);
         hn::Store(hn::BitCast(d, hn::And(words, hn::Set(du, 0xffff))), d, begin_[0] + u);
         hn::Store(hn::BitCast(d, hn::Add(hn::ShiftRight<16>(words), hn::Set(du, 1))), d,

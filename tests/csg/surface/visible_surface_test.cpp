@@ -135,6 +135,75 @@ TEST(VisibleSurface, OfAnIntersectionMinusOthersIsTheOneOfTheFullLists) {
   EXPECT_GT(seen, 240000u);
 }
 
+// A wall seen along its plane is as deep in a pixel as the wall is long, so it may coincide with
+// what lies far before or behind its crossing.
+TEST(VisibleSurface, WithWallsAlongTheViewIsTheOneOfTheFullLists) {
+  for (int seed = 0; seed < 200; ++seed) {
+    RandomTree random(static_cast<std::uint64_t>(seed) + 9000);
+    Tree tree;
+    const auto box = [&](const glm::dvec3& low, const glm::dvec3& high) {
+      return tree.add_solid({std::make_shared<TriangleSoup>(make_box(low, high))});
+    };
+    const double gap = random.real(0.03, 1.0);
+    std::vector<Tree::NodeId> operands{box({-20, -20, -25}, {20, 20, 10})};
+    if (seed % 2 == 0) {
+      const Tree::NodeId other = box({-21, -21, -20}, {21, 21, 10 - gap});
+      operands = {tree.add(Operation::kIntersection, {operands.front(), other})};
+    } else {
+      operands.push_back(box({-22, -22, 0}, {22, 22, 12}));
+    }
+    for (int i = 0; i < 4; ++i) {
+      const glm::dvec3 at(random.real(-15, 10), random.real(-15, 10), -30);
+      operands.push_back(box(at, at + glm::dvec3(random.real(3, 8), random.real(3, 8), 60)));
+    }
+    if (seed % 2 != 0) operands.push_back(box({-23, -23, -gap}, {23, 23, 13}));
+    tree.set_root(tree.add(Operation::kDifference, operands));
+    Camera camera;
+    camera.projection = seed % 3 == 0 ? Projection::kPerspective : Projection::kOrthographic;
+    const Preview preview(tree, {}, 0.0);
+    centre_camera(camera, preview.box());
+    fit_camera(camera, preview.box());
+    const double tilt = random.pick(0, 1) == 0 ? 0.0 : random.real(0, 0.05);
+    const double turn = random.pick(0, 1) == 0 ? 0.0 : random.real(0, 90);
+    camera.rotation = {tilt, random.pick(0, 1) == 0 ? 0.0 : tilt, turn};
+    camera.target += glm::dvec3(random.real(-1, 1), random.real(-1, 1), 0);
+    expect_same(tree, camera, {200, 200}, "seed " + std::to_string(seed));
+    if (HasFailure()) return;
+  }
+}
+
+TriangleSoup copies(const TriangleSoup& mesh, int count) {
+  TriangleSoup all = mesh;
+  for (int i = 1; i < count; ++i) {
+    all.triangles.insert(all.triangles.end(), mesh.triangles.begin(), mesh.triangles.end());
+  }
+  return all;
+}
+
+// Each face of a convex solid lies there many times.
+TEST(VisibleSurface, OfRepeatedFacesIsTheOneOfTheFullLists) {
+  const TriangleSoup box = make_box({-20, -20, -20}, {20, 20, 10});
+  for (const int count : {2, 3, 190, 200, 300}) {
+    for (const InsideRule rule :
+         {InsideRule::kWinding, InsideRule::kNonzero, InsideRule::kParity}) {
+      for (const Operation operation : {Operation::kDifference, Operation::kIntersection}) {
+        Tree tree;
+        Solid solid{std::make_shared<TriangleSoup>(copies(box, count))};
+        solid.rule = rule;
+        const auto low = glm::dvec3(operation == Operation::kDifference ? 0 : -5);
+        const Tree::NodeId other =
+            tree.add_solid({std::make_shared<TriangleSoup>(make_box(low, {5, 5, 15}))});
+        tree.set_root(tree.add(operation, {tree.add_solid(solid), other}));
+        RandomTree random(static_cast<std::uint64_t>(count));
+        Preview preview(tree, {}, 0.0);
+        expect_same(
+            tree, random_camera(random, preview.box()), {90, 70},
+            std::to_string(count) + " copies, rule " + std::to_string(static_cast<int>(rule)));
+      }
+    }
+  }
+}
+
 TEST(VisibleSurface, IsTheOneOfTheFullListsWithTheEyeInTheScene) {
   for (int seed = 0; seed < 60; ++seed) {
     RandomTree random(static_cast<std::uint64_t>(seed) + 500);
