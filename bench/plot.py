@@ -62,7 +62,8 @@ def main():
     curves(left, rows, "wall ms", "2")
     decorate(left, f"mesh in memory to voxels, {int(rows[0]['triangles']):,} triangles", "ms, 2 threads (bit grid: 1)",
              sides)
-    left.legend(fontsize=7)
+    left.set_ylim(top=left.get_ylim()[1] * 100)  # room for the legend above the lines
+    left.legend(fontsize=7, loc="upper left")
     curves(middle, rows, "peak MiB", "2")
     decorate(middle, "peak memory beyond the mesh", "MiB", sides)
     growth = [row for row in load(folder, "growth") if row["mesh"] == mesh]
