@@ -48,9 +48,10 @@ function(strata_compile_alone)
 endfunction()
 
 # strata_share_tables(FILES...): sources whose inner loops call functions of Highway that look into tables. GCC copies the
-#   local table of a function onto the stack, 1 KiB for each hn::Compress(), unless constants may share an address.
+#   local table of a function onto the stack, 1 KiB for each hn::Compress(), unless constants may share an address. Then
+#   AddressSanitizer takes the table for a variable that is gone.
 function(strata_share_tables)
-  if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND NOT STRATA_SANITIZE)
     set_property(SOURCE ${ARGN} APPEND PROPERTY COMPILE_OPTIONS -fmerge-all-constants)
   endif()
 endfunction()
