@@ -213,9 +213,9 @@ void FindAreaBounds(const LatticeMesh& mesh, std::span<const std::uint32_t> tria
   for (const std::uint32_t triangle : triangles) {
     const glm::uvec3& t = mesh.triangles[triangle];
     const glm::ivec3 &p = mesh.vertices[t.x], &q = mesh.vertices[t.y], &r = mesh.vertices[t.z];
-    const bool beside = (std::min({p.x, q.x, r.x}) > u1) | (std::max({p.x, q.x, r.x}) < u0) |
-                        (std::min({p.y, q.y, r.y}) > v1) | (std::max({p.y, q.y, r.y}) < v0);
-    if (!beside) bounder.add(p, q, r, triangle);
+    const int beside = int{std::min({p.x, q.x, r.x}) > u1} | int{std::max({p.x, q.x, r.x}) < u0} |
+                       int{std::min({p.y, q.y, r.y}) > v1} | int{std::max({p.y, q.y, r.y}) < v0};
+    if (beside == 0) bounder.add(p, q, r, triangle);
   }
   const std::uint32_t corners = bounder.covered_corners();
   bounds.covered = 0;
