@@ -63,14 +63,12 @@ class Narrower {
 };
 
 Extent Narrower::extent_of(const LeafLayers& leaf) const {
-  if (!leaf.by_area) return {leaf.nearest, leaf.farthest, leaf.farthest, leaf.nearest, false};
-  const AreaBounds& of = leaf.bounds;
-  const std::uint32_t nearest = of.nearest(area_), farthest = of.farthest(area_);
-  if (leaf.kind == LeafLayers::Kind::kSorted) {
-    return {nearest, farthest, farthest, nearest, false};
+  if (!leaf.by_area || leaf.kind == LeafLayers::Kind::kSorted) {
+    return {leaf.nearest, leaf.farthest, leaf.farthest, leaf.nearest, false};
   }
-  return {nearest, farthest, of.entries.farthest[area_], of.exits.nearest[area_],
-          (of.covered >> area_ & 1) != 0};
+  const AreaBounds& of = leaf.bounds;
+  return {of.nearest(area_), of.farthest(area_), of.entries.farthest[area_],
+          of.exits.nearest[area_], (of.covered >> area_ & 1) != 0};
 }
 
 Extent Narrower::extent_of(Program::Edge edge) {
@@ -179,15 +177,14 @@ void Narrower::set_edges(TileProgram::Node& node, std::span<const Program::Edge>
 
 Program::Edge Narrower::filter_union(Program::Edge edge) {
   TileProgram::Node& node = program_.nodes[edge.child()];
-  std::vector<Program::Edge>& kept = kept_;
-  kept.clear();
+  kept_.clear();
   for (const Program::Edge operand : edges_of(node)) {
     if (outside_of_window(extent_of(leaf_of(operand)))) continue;
     leave_out_exits(leaf_of(operand));
-    kept.push_back(operand);
+    kept_.push_back(operand);
   }
-  if (kept.size() == 1) return Program::Edge(kept.front().child(), true, true);
-  set_edges(node, kept);
+  if (kept_.size() == 1) return Program::Edge(kept_.front().child(), true, true);
+  set_edges(node, kept_);
   return edge;
 }
 

@@ -475,17 +475,18 @@ bool TileFinder::show_alone(const SearchArea& area, LeafLayers& leaf) {
   const int width = std::min(tile_.u1, area.rect.u1) - area.rect.u0;
   const int height = area.rect.v1 - area.rect.v0;
   const auto pixels = static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height);
-  if (part_.faces != nullptr && input.triangles.size() == 1) {
-    leaf.kind = kind;
-    leaf.left_out = left_out;
+  const bool one_face = part_.faces != nullptr && input.triangles.size() == 1;
+  std::uint64_t fragments = 0;
+  if (!one_face) {
+    fragments = raster_layers(view_parts_[leaf.solid].mesh, target, input.triangles, clip,
+                              coincidence_->steep_from(), leaf, area_arena_);
+  }
+  leaf.kind = kind;
+  leaf.left_out = left_out;
+  if (one_face) {
     part_.faces->of[index] = {leaf.solid, input.triangles.front()};
     return true;
   }
-  const std::uint64_t fragments =
-      raster_layers(view_parts_[leaf.solid].mesh, target, input.triangles, clip,
-                    coincidence_->steep_from(), leaf, area_arena_);
-  leaf.kind = kind;
-  leaf.left_out = left_out;
   if (leaf.keys.size() != 1 || leaf.steep || fragments != pixels) {
     enter_area(leaf, area, index);
     leaf.left_out = left_out;
