@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <glm/vec4.hpp>
+#include <memory>
 #include <span>
 
 #include "csg/picture/shade.h"
@@ -19,25 +20,37 @@ namespace strata::csg {
 [[nodiscard]] glm::vec4 translucent_colour(const TranslucentTrees& trees, std::uint32_t slot,
                                            std::uint32_t source, bool exit, const Shader& shader);
 
-/// Draws translucent trees over opaque surfaces.
+/// Draws translucent trees over opaque surfaces, tile by tile.
 class GhostPainter {
  public:
   /// Borrows `geometry`. @param world_error  as Coincidence has it
   GhostPainter(const Tree& tree, std::span<const Translucent> ghosts, const Geometry& geometry,
-               double world_error)
-      : trees_(tree, ghosts, geometry, world_error) {}
+               double world_error);
+  ~GhostPainter();
 
   [[nodiscard]] bool empty() const { return trees_.empty(); }
 
-  /// Blends all surfaces that lie before those of `opaque` into `colours`, which are
-  /// premultiplied. @return kGeometry, kLimit, kCancelled
-  Result<void> paint(const View& view, const SurfaceImage& opaque, const Shader& shader,
-                     const Execution& execution, std::span<Rgba> colours);
+  /// Prepares for the tiles of a view. Keeps a reference to `shader`.
+  /// @return kGeometry, kLimit, kCancelled
+  Result<void> begin(const View& view, const Shader& shader, const Execution& execution);
+  /// Whether surfaces may lie in a tile. @param tile  its pixels
+  [[nodiscard]] bool meets(const PixelRect& tile) const;
+  /// Blends all surfaces of a tile that lie before the opaque ones into its colours, which are
+  /// premultiplied. @param opaque  depths of the opaque surfaces from the tile's first pixel on,
+  /// rows `stride` apart as those of `colours`; null: there are none @param worker  of the thread
+  void paint(const PixelRect& tile, const std::uint32_t* opaque, Rgba* colours, std::size_t stride,
+             std::size_t worker);
+  /// What begin() prepared is given back. @return kLimit: some tile was not painted
+  Result<void> end();
 
+  /// Crossings of the last view.
   [[nodiscard]] std::uint64_t fragments() const { return fragments_; }
 
  private:
+  struct Prepared;
+
   TranslucentTrees trees_;
+  std::unique_ptr<Prepared> prepared_;
   std::uint64_t fragments_ = 0;
 };
 

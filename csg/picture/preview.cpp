@@ -24,10 +24,16 @@ class Frame {
   Frame(const Program& program, const Geometry& geometry, double world_error)
       : program_(&program), geometry_(&geometry), world_error_(world_error) {}
 
-  /// What is to be done with a tile's surfaces: pixels `rect` of the picture. Null: nothing is
-  /// seen.
-  using OnTile = std::function<void(const SurfaceImage* tile, const AreaFaces& faces,
-                                    const PixelRect& rect, std::size_t worker)>;
+  /// What is to be done with the surfaces of tiles. None: they stay in image().
+  struct OnTile {
+    /// Pixels `rect` of the picture; a null tile shows nothing.
+    std::function<void(const SurfaceImage* tile, const AreaFaces& faces, const PixelRect& rect,
+                       std::size_t worker)>
+        take;
+    /// Whether `faces` must not stand for pixels of `tile`.
+    std::function<bool(const PixelRect& rect)> needs_pixels;
+    explicit operator bool() const { return take != nullptr; }
+  };
 
   /// Finds all surfaces. With `on_tile` they are handed to it, from any thread, and image() is not
   /// kept: memory is slower than the search.
@@ -112,11 +118,14 @@ class Frame {
                            std::min(tiles_.view.size.y, (tile_v + 1) * kTileSide)};
       const auto solids = tiles_.solids.at(static_cast<std::size_t>(tile));
       AreaFaces& faces = tile_faces_[worker];
-      if (on_tile && solids.empty()) return on_tile(nullptr, faces, rect, worker);
+      if (on_tile && solids.empty()) return on_tile.take(nullptr, faces, rect, worker);
       SurfacePart part{&image_};
-      if (on_tile) part = {&tile_images_[worker], rect.u0, rect.v0, &faces};
+      if (on_tile) {
+        part = {&tile_images_[worker], rect.u0, rect.v0,
+                on_tile.needs_pixels(rect) ? nullptr : &faces};
+      }
       finders_[worker]->find(tile_u, tile_v, solids, part, execution.stop);
-      if (on_tile) on_tile(part.image, faces, rect, worker);
+      if (on_tile) on_tile.take(part.image, faces, rect, worker);
     });
     report_.fragments = report_.resolved = 0;
     for (const auto& finder : finders_) {
@@ -209,6 +218,10 @@ struct Preview::Impl {
                            const PictureOptions& options, const Execution& execution);
   Result<void> lay_shadow(const View& whole, const Backdrop& backdrop, const Execution& execution,
                           Picture& picture);
+  Result<void> begin_ghosts(const Band& band, const Look& look, const Execution& execution);
+  Result<void> end_ghosts(Work& work);
+  Result<void> paint_ghosts(const Band& band, const SurfaceImage& image, const Look& look,
+                            const Execution& execution, Work& work);
   Result<void> shade_tiles(const Band& band, const Look& look, const Execution& execution,
                            Work& work);
   Result<void> shade_samples(const Band& band, const Look& look, Execution execution, Work& work);
@@ -277,7 +290,41 @@ Result<void> Preview::Impl::lay_shadow(const View& whole, const Backdrop& backdr
   return {};
 }
 
-/// Shades the pixels of a band tile by tile, while the tiles are drawn.
+Result<void> Preview::Impl::begin_ghosts(const Band& band, const Look& look,
+                                         const Execution& execution) {
+  if (painter.empty()) return {};
+  return painter.begin(band.view, look.shader, execution);
+}
+
+Result<void> Preview::Impl::end_ghosts(Work& work) {
+  if (painter.empty()) return {};
+  const auto done = painter.end();
+  work.total.fragments += painter.fragments();
+  return done;
+}
+
+/// Paints the ghosts of a band over all of its samples.
+Result<void> Preview::Impl::paint_ghosts(const Band& band, const SurfaceImage& image,
+                                         const Look& look, const Execution& execution, Work& work) {
+  if (painter.empty()) return {};
+  if (auto done = begin_ghosts(band, look, execution); !done) return done;
+  const auto tiles_u = static_cast<std::size_t>((image.width + kTileSide - 1) / kTileSide);
+  const auto tiles_v = static_cast<std::size_t>((image.height + kTileSide - 1) / kTileSide);
+  parallel_for(execution, tiles_u * tiles_v, [&](std::size_t tile, int worker) {
+    const int u = static_cast<int>(tile % tiles_u) * kTileSide;
+    const int v = static_cast<int>(tile / tiles_u) * kTileSide;
+    const auto width = static_cast<std::size_t>(image.width);
+    const std::size_t first = static_cast<std::size_t>(v) * width + static_cast<std::size_t>(u);
+    const PixelRect rect{u, v, std::min(image.width, u + kTileSide),
+                         std::min(image.height, v + kTileSide)};
+    painter.paint(rect, image.depth.data() + first, work.samples.data() + first, width,
+                  static_cast<std::size_t>(worker));
+  });
+  if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
+  return end_ghosts(work);
+}
+
+/// Shades the pixels of a band tile by tile, while the tiles are drawn, and ghosts over them.
 Result<void> Preview::Impl::shade_tiles(const Band& band, const Look& look,
                                         const Execution& execution, Work& work) {
   const SampleRows rows{look.samples.across, look.samples.down, look.ground(band.first)};
@@ -285,12 +332,23 @@ Result<void> Preview::Impl::shade_tiles(const Band& band, const Look& look,
   for (int i = 0; i < execution.thread_count(); ++i) {
     shaders.emplace_back(rows, look.shader, band.width, band.pixels);
   }
-  const auto on_tile = [&](const SurfaceImage* tile, const AreaFaces& faces, const PixelRect& rect,
-                           std::size_t worker) {
-    return tile != nullptr ? shaders[worker].shade(*tile, faces, rect)
-                           : shaders[worker].leave(rect);
+  if (auto done = begin_ghosts(band, look, execution); !done) return done;
+  const auto has_ghosts = [&](const PixelRect& rect) {
+    return !painter.empty() && painter.meets(rect);
   };
-  if (auto done = frame.draw(band.view, execution, on_tile); !done) return done;
+  const auto take = [&](const SurfaceImage* tile, const AreaFaces& faces, const PixelRect& rect,
+                        std::size_t worker) {
+    TileShader& shader = shaders[worker];
+    if (has_ghosts(rect)) {
+      Rgba* const samples = shader.samples(tile, rect);
+      painter.paint(rect, tile != nullptr ? tile->depth.data() : nullptr, samples, kTileSide,
+                    worker);
+      return shader.average_samples(rect);
+    }
+    return tile != nullptr ? shader.shade(*tile, faces, rect) : shader.leave(rect);
+  };
+  if (auto done = frame.draw(band.view, execution, {take, has_ghosts}); !done) return done;
+  if (auto done = end_ghosts(work); !done) return done;
   work.total.fragments += frame.report().fragments;
   work.total.resolved += frame.report().resolved;
   for (const TileShader& shader : shaders) work.total.covered += shader.covered();
@@ -309,13 +367,7 @@ Result<void> Preview::Impl::shade_samples(const Band& band, const Look& look, Ex
   work.samples.resize((*image)->depth.size());
   shade(**image, {across, down, look.ground(band.first)}, look.shader, execution, work.samples);
   if (look.options.edges) draw_edges(**image, look.shader, across, down, execution, work.samples);
-  if (!painter.empty()) {
-    if (auto done = painter.paint(band.view, **image, look.shader, execution, work.samples);
-        !done) {
-      return done;
-    }
-    work.total.fragments += painter.fragments();
-  }
+  if (auto done = paint_ghosts(band, **image, look, execution, work); !done) return done;
   work.total.covered += average(work.samples, across, down, look.ground(band.first), execution,
                                 band.width, band.pixels);
   return {};
@@ -349,7 +401,7 @@ Result<Picture> Preview::Impl::picture(const Camera& camera, const glm::ivec2& s
   result.pixels.resize(width * static_cast<std::size_t>(size.y));
   // One row of tiles at least.
   const std::int64_t samples_a_row = std::int64_t{size.x} * across * down;
-  const bool direct = painter.empty() && !options.edges && !frame.has_source();
+  const bool direct = !options.edges && !frame.has_source();
   const std::int64_t most = direct ? kDirectSamplesAtOnce : kSamplesAtOnce;
   const int rows_at_once = static_cast<int>(
       std::min<std::int64_t>(std::max<std::int64_t>(most / samples_a_row, kTileSide / down),

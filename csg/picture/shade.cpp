@@ -220,10 +220,10 @@ class SampleShader {
  public:
   explicit SampleShader(const Shader& shader) : shader_(&shader), kept_(kKept) {}
 
-  /// Colours `count` samples from `begin` on, which are those of row `v` of the picture from its
-  /// left border on, `across` a pixel.
-  void row(const SurfaceImage& image, std::size_t begin, std::size_t count, int across, int v,
-           Rgba* colours) {
+  /// Colours `count` samples from `begin` on, `across` a pixel: those of the picture from pixel
+  /// (first, v) on.
+  void row(const SurfaceImage& image, std::size_t begin, std::size_t count, int across, int first,
+           int v, Rgba* colours) {
     for (std::size_t block = 0; block < count; block += kAtOnce) {
       const std::size_t end = std::min(count, block + kAtOnce), at_first = begin + block;
       const Seen seen =
@@ -237,10 +237,10 @@ class SampleShader {
         for (std::size_t i = block; i < end; ++i) {
           const std::size_t from = begin + i;
           const std::uint32_t solid = image.solid[from], face = image.triangle[from];
-          const int u = static_cast<int>(i) / across;
+          const int u = first + static_cast<int>(i) / across;
           if (image.depth[from] == SurfaceImage::kNone) {
             colours[i] = Rgba(0);
-          } else if (i > block && static_cast<int>(i - 1) / across == u &&
+          } else if (i > block && first + static_cast<int>(i - 1) / across == u &&
                      image.depth[from - 1] != SurfaceImage::kNone &&
                      image.solid[from - 1] == solid && image.triangle[from - 1] == face) {
             colours[i] = colours[i - 1];
@@ -303,7 +303,7 @@ void shade(const SurfaceImage& image, const SampleRows& rows, const Shader& shad
     SampleShader samples(shader);
     for (int row = first; row < end; ++row) {
       const std::size_t begin = static_cast<std::size_t>(row) * width;
-      samples.row(image, begin, width, rows.across, rows.ground.first + row / rows.down,
+      samples.row(image, begin, width, rows.across, 0, rows.ground.first + row / rows.down,
                   colours.data() + begin);
     }
   });
@@ -334,6 +334,29 @@ void TileShader::leave(const PixelRect& rect) {
   const int left = rect.u0 / rows_.across, right = rect.u1 / rows_.across;
   for (int v = rect.v0 / rows_.down; v < rect.v1 / rows_.down; ++v) {
     std::fill_n(row_of(left, v), right - left, rows_.ground.at(v));
+  }
+}
+
+Rgba* TileShader::samples(const SurfaceImage* tile, const PixelRect& rect) {
+  tile_.assign(kTilePixels, Rgba(0));
+  if (tile == nullptr) return tile_.data();
+  const auto count = static_cast<std::size_t>(rect.u1 - rect.u0);
+  for (int row = rect.v0; row < rect.v1; ++row) {
+    const auto down = static_cast<std::size_t>(row - rect.v0);
+    samples_->row(*tile, down * static_cast<std::size_t>(tile->width), count, rows_.across,
+                  rect.u0 / rows_.across, rows_.ground.first + row / rows_.down,
+                  tile_.data() + down * kTileSide);
+  }
+  return tile_.data();
+}
+
+void TileShader::average_samples(const PixelRect& rect) {
+  const int left = rect.u0 / rows_.across, right = rect.u1 / rows_.across;
+  for (int v = rect.v0 / rows_.down; v < rect.v1 / rows_.down; ++v) {
+    const auto row = static_cast<std::size_t>(v * rows_.down - rect.v0);
+    covered_ +=
+        average_row(tile_.data() + row * kTileSide, kTileSide, rows_.across, rows_.down,
+                    rows_.ground.at(v), {row_of(left, v), static_cast<std::size_t>(right - left)});
   }
 }
 

@@ -129,6 +129,10 @@ class TileShader {
   void shade(const SurfaceImage& tile, const AreaFaces& faces, const PixelRect& rect);
   /// The same where nothing is seen.
   void leave(const PixelRect& rect);
+  /// The same in two steps, between which others may blend into the colours of the samples: those
+  /// of `rect`, kTileSide a row, as csg::shade() gives them. @param tile  null: nothing is seen
+  [[nodiscard]] Rgba* samples(const SurfaceImage* tile, const PixelRect& rect);
+  void average_samples(const PixelRect& rect);
   /// How many pixels show something.
   [[nodiscard]] std::uint64_t covered() const { return covered_; }
 
@@ -147,6 +151,7 @@ class TileShader {
   std::span<Rgba> pixels_;
   std::unique_ptr<SampleShader> samples_;
   std::array<Rgba, 64> colours_;  ///< of the samples of a pixel
+  std::vector<Rgba> tile_;        ///< of the samples of a tile
   std::uint64_t covered_ = 0;
 };
 
