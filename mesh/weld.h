@@ -6,10 +6,12 @@
 #include <atomic>
 #include <bit>
 #include <cstdint>
+#include <numeric>
 #include <type_traits>
 #include <vector>
 
 #include "core/reserve_large.h"
+#include "mesh/no_vertex.h"
 #include "strata/core/execution.h"
 
 /// Finds equal positions; private.
@@ -27,6 +29,9 @@ struct WeldBits {
         y(std::bit_cast<std::uint64_t>(key.y)),
         z(std::bit_cast<std::uint64_t>(key.z)) {}
 
+  [[nodiscard]] glm::vec<3, Scalar> position() const {
+    return {std::bit_cast<Scalar>(x), std::bit_cast<Scalar>(y), std::bit_cast<Scalar>(z)};
+  }
   [[nodiscard]] std::uint64_t hash() const {
     std::uint64_t h = x * 0x9e3779b97f4a7c15u;
     h = (std::rotl(h, 29) ^ y) * 0xbf58476d1ce4e5b9u;
@@ -50,6 +55,10 @@ requires(sizeof(Scalar) ==
                                                      << 32),
         z(std::bit_cast<std::uint32_t>(key.z)) {}
 
+  [[nodiscard]] glm::vec<3, Scalar> position() const {
+    return {std::bit_cast<Scalar>(static_cast<std::uint32_t>(xy)),
+            std::bit_cast<Scalar>(static_cast<std::uint32_t>(xy >> 32)), std::bit_cast<Scalar>(z)};
+  }
   [[nodiscard]] std::uint64_t hash() const {
     std::uint64_t h = xy * 0x9e3779b97f4a7c15u;
     h = (h ^ h >> 32 ^ std::uint64_t{z} << 32) * 0x94d049bb133111ebu;
@@ -68,6 +77,7 @@ class WeldTable {
  public:
   using Key = glm::vec<3, Scalar>;
 
+  WeldTable() = default;  ///< holds nothing, and must be assigned first
   explicit WeldTable(std::size_t expected) { allocate(std::bit_ceil(expected * 8 / 5 + 16)); }
 
   /// Replaces -0 by +0, so that both are one position.
@@ -97,6 +107,22 @@ class WeldTable {
         return value;
       }
       if (slot.key == key) return slot.value_plus_1 - 1;
+    }
+  }
+
+  /// The value stored for a canonical key, or kNoVertex.
+  [[nodiscard]] std::uint32_t find(const WeldBits<Scalar>& key, std::uint64_t hash) const {
+    for (std::size_t at = hash & mask_;; at = (at + 1) & mask_) {
+      const Slot& slot = slots_[at];
+      if (slot.value_plus_1 == 0 || slot.key == key) return slot.value_plus_1 - 1;
+    }
+  }
+  /// Calls visit(key, value) for the slots of piece `piece` of `pieces`.
+  template <class Visit>
+  void for_slots(std::size_t piece, std::size_t pieces, Visit&& visit) const {
+    const std::size_t end = slots_.size() * (piece + 1) / pieces;
+    for (std::size_t at = slots_.size() * piece / pieces; at < end; ++at) {
+      if (slots_[at].value_plus_1 != 0) visit(slots_[at].key, slots_[at].value_plus_1 - 1);
     }
   }
 
@@ -175,35 +201,33 @@ class RecentKeys {
   std::vector<Slot> slots_;
 };
 
-/// Sets value[i] of the given indices i, which increase, to fresh(j) of the least of these indices
-/// j whose position equals that of i, if `own(hash)`; other indices are left alone.
-/// @param index  index(k) -> the k-th index, for k in [0, count)
-/// @param fresh  fresh(j) -> a value that no other position has
-/// @param found  found(j) is called for indices that are the first of their position, in order,
-/// before the next call of fresh
-/// @return whether go_on(i), which is called now and then, never returned false
-template <class Scalar, class Index, class Load, class Own, class GoOn, class Fresh, class Found>
-bool weld_one_by_one(std::size_t count, Index&& index, Load&& load, Own&& own, GoOn&& go_on,
-                     std::uint32_t* value, std::size_t expected, Fresh&& fresh, Found&& found) {
-  using Table = WeldTable<Scalar>;
+/// Sets value[i] of each point i of [begin, end) to fresh(j) of the least of them, j, that has its
+/// position.
+/// @param table  empty; then maps each position to its value
+/// @param go_on  go_on(i) is called now and then @param fresh  fresh(j) -> a value that no other
+/// position has
+/// @param found  found(j, position) is called for points that are the first of their position, in
+/// order, before the next call of fresh
+/// @return whether go_on never returned false
+template <class Scalar, class Load, class GoOn, class Fresh, class Found>
+bool weld_range(WeldTable<Scalar>& table, std::size_t begin, std::size_t end, Load&& load,
+                GoOn&& go_on, std::uint32_t* value, Fresh&& fresh, Found&& found) {
   constexpr std::size_t kBatch = 128;  // look-ups in flight, so that their cache misses overlap
   constexpr std::size_t kLookUp = std::size_t{1} << 16;
-  Table table(expected);
   RecentKeys<Scalar> recent;
   WeldBits<Scalar> keys[kBatch];
   std::uint64_t hashes[kBatch];
   std::uint32_t indices[kBatch], known[kBatch];
-  for (std::size_t begin = 0; begin < count; begin += kBatch) {
-    if (begin % kLookUp == 0 && !go_on(index(begin))) return false;
-    const std::size_t end = std::min(count, begin + kBatch);
+  for (std::size_t at = begin; at < end; at += kBatch) {
+    if ((at - begin) % kLookUp == 0 && !go_on(at)) return false;
+    const std::size_t stop = std::min(end, at + kBatch);
     std::size_t held = 0, met = 0;
-    for (std::size_t k = begin; k < end; ++k) {
-      const std::uint32_t i = index(k);
-      const WeldBits<Scalar> key(Table::canonical(load(i)));
+    for (std::size_t k = at; k < stop; ++k) {
+      const auto i = static_cast<std::uint32_t>(k);
+      const WeldBits<Scalar> key(WeldTable<Scalar>::canonical(load(k)));
       const std::uint64_t hash = key.hash();
-      if (!own(hash)) continue;
       // One of equal keys, whose first may be found only below.
-      if (recent.replace(key, hash, i, value[i])) {
+      if (recent.replace(key, hash, i, value[k])) {
         known[met++] = i;
         continue;
       }
@@ -214,74 +238,137 @@ bool weld_one_by_one(std::size_t count, Index&& index, Load&& load, Own&& own, G
     }
     for (std::size_t k = 0; k < held; ++k) {
       const std::uint32_t mine = fresh(indices[k]);
-      const std::uint32_t at = table.find_or_insert(keys[k], hashes[k], mine);
-      value[indices[k]] = at;
-      if (at == mine) found(indices[k]);
+      const std::uint32_t there = table.find_or_insert(keys[k], hashes[k], mine);
+      value[indices[k]] = there;
+      if (there == mine) found(indices[k], keys[k].position());
     }
     for (std::size_t k = 0; k < met; ++k) value[known[k]] = value[value[known[k]]];
   }
   return true;
 }
 
-/// Welds the points of some indices on all threads; each has those whose hash falls to it.
-/// @param index  as for weld_one_by_one() @return number of different positions
-template <class Scalar, class Index, class Load, class GoOn>
-std::size_t weld_by_hash(const Execution& execution, std::size_t parts, std::size_t count,
-                         Index&& index, Load&& load, GoOn&& go_on, std::uint32_t* first,
-                         std::size_t expected) {
-  std::atomic<std::size_t> different = 0;
-  parallel_for(execution, parts, [&](std::size_t part, int) {
-    std::size_t own = 0;
-    (void)weld_one_by_one<Scalar>(
-        count, index, load, [&](std::uint64_t hash) { return (hash >> 48) * parts >> 16 == part; },
-        go_on, first, expected / parts, [](std::uint32_t i) { return i; },
-        [&own](std::uint32_t) { ++own; });
-    different += own;
-  });
-  return different;
-}
+/// Ranges of points, one for each thread, that are welded apart.
+template <class Scalar>
+struct WeldRanges {
+  Execution all;  ///< all threads, never stopped: a range that is skipped would stay unset
+  std::vector<std::size_t> ends;  ///< of the ranges
+  std::vector<WeldTable<Scalar>> tables;
 
-/// Whether most of the first points equal one of a few before them, as in the files of most meshes.
-template <class Scalar, class Load>
-bool neighbours_follow(std::size_t count, Load&& load) {
-  constexpr std::size_t kLooks = std::size_t{1} << 15;
-  RecentKeys<Scalar> recent;
-  const std::size_t looks = std::min(count, kLooks);
-  std::size_t met = 0;
-  for (std::size_t i = 0; i < looks; ++i) {
-    const WeldBits<Scalar> key(WeldTable<Scalar>::canonical(load(i)));
-    std::uint32_t known = 0;
-    met += recent.replace(key, key.hash(), static_cast<std::uint32_t>(i), known) ? 1 : 0;
+  /// @param share  one position in so many points is expected
+  WeldRanges(const Execution& execution, std::size_t count, std::size_t share) : all(execution) {
+    all.stop = {};
+    const std::size_t parts =
+        count < 50000 ? 1 : static_cast<std::size_t>(execution.thread_count());
+    for (std::size_t part = 0; part < parts; ++part) ends.push_back(count * (part + 1) / parts);
+    tables.resize(parts);
+    share_ = share;
   }
-  return met > looks / 2;
-}
+  [[nodiscard]] std::size_t parts() const { return ends.size(); }
+  [[nodiscard]] std::size_t begin(std::size_t part) const { return part == 0 ? 0 : ends[part - 1]; }
 
-/// How many threads weld so many points.
-inline std::size_t weld_parts(const Execution& execution, std::size_t count) {
-  return count < 50000 ? 1 : static_cast<std::size_t>(execution.thread_count());
-}
+  /// Welds each range. fresh(part, i) and found(part, i, position) are those of weld_range().
+  template <class Load, class GoOn, class Fresh, class Found>
+  bool weld(Load&& load, GoOn&& go_on, std::uint32_t* value, Fresh&& fresh, Found&& found) {
+    std::atomic<bool> stopped = false;
+    parallel_for(all, parts(), [&](std::size_t part, int) {
+      const std::size_t first = begin(part), end = ends[part];
+      tables[part] = WeldTable<Scalar>((end - first) / share_);
+      const bool done = weld_range<Scalar>(
+          tables[part], first, end, load, go_on, value,
+          [&fresh, part](std::uint32_t i) { return fresh(part, i); },
+          [&found, part](std::uint32_t i, const auto& position) { found(part, i, position); });
+      if (!done) stopped = true;
+    });
+    return !stopped;
+  }
 
-/// Numbers the different positions of the points [0, count) in the order of their first points, on
-/// one thread: number[i] is that of the position of i.
-/// @param load, go_on  as for weld_first() @param found  found(i) for the first point of each
-template <class Scalar, class Load, class GoOn, class Found>
-void weld_numbers(std::size_t count, Load&& load, std::uint32_t* number, GoOn&& go_on,
-                  Found&& found) {
-  std::uint32_t next = 0;
-  (void)weld_one_by_one<Scalar>(
-      count, [](std::size_t k) { return static_cast<std::uint32_t>(k); }, load,
-      [](std::uint64_t) { return true; }, go_on, number, count / 5,
-      [&next](std::uint32_t) { return next; },
-      [&](std::uint32_t i) {
-        ++next;
-        found(i);
+  /// Calls meet(part, value, earlier part, value there) for each position of a range that an
+  /// earlier range has, too; of these the earliest. Several threads call it. Tables are read in the
+  /// order of the hashes, so almost in step.
+  template <class Meet>
+  void meet_earlier(Meet&& meet) const {
+    constexpr std::size_t kPieces = 16;
+    parallel_for(all, kPieces * (parts() - 1), [&](std::size_t task, int) {
+      const std::size_t part = task / kPieces + 1, piece = task % kPieces;
+      tables[part].for_slots(piece, kPieces, [&](const WeldBits<Scalar>& key, std::uint32_t value) {
+        const std::uint64_t hash = key.hash();
+        for (std::size_t earlier = 0; earlier < part; ++earlier) {
+          const std::uint32_t there = tables[earlier].find(key, hash);
+          if (there == kNoVertex) continue;
+          meet(part, value, earlier, there);
+          return;
+        }
       });
+    });
+  }
+
+  /// Calls body(part, begin, end) for pieces of all ranges but the first, on all threads.
+  template <class Body>
+  void for_later_points(Body&& body) const {
+    constexpr std::size_t kPieces = 8;
+    parallel_for(all, kPieces * (parts() - 1), [&](std::size_t task, int) {
+      const std::size_t part = task / kPieces + 1, piece = task % kPieces;
+      const std::size_t first = begin(part), size = ends[part] - first;
+      body(part, first + size * piece / kPieces, first + size * (piece + 1) / kPieces);
+    });
+  }
+
+ private:
+  std::size_t share_;
+};
+
+/// Numbers the different positions of the points [0, count) in the order of their first points:
+/// number[i] is that of the position of i. Appends the positions, -0 replaced by +0, to
+/// `positions`, which is empty. The result does not depend on the number of threads.
+/// @param load, go_on  as for weld_first() @return false after go_on returned false
+template <class Scalar, class Load, class GoOn>
+bool weld_numbers(const Execution& execution, std::size_t count, Load&& load, std::uint32_t* number,
+                  GoOn&& go_on, std::vector<glm::dvec3>& positions) {
+  WeldRanges<Scalar> ranges(execution, count, 5);  // a closed mesh has one vertex for six corners
+  const std::size_t parts = ranges.parts();
+  std::vector<std::vector<glm::vec<3, Scalar>>> later(parts);  // of ranges after the first
+  std::vector<std::uint32_t> next(parts);
+  const bool done = ranges.weld(
+      load, go_on, number, [&](std::size_t part, std::uint32_t) { return next[part]; },
+      [&](std::size_t part, std::uint32_t, const glm::vec<3, Scalar>& position) {
+        ++next[part];
+        if (part == 0) {
+          positions.emplace_back(position);
+        } else {
+          later[part].push_back(position);
+        }
+      });
+  if (!done || parts == 1) return done;
+  // The numbers of all ranges one after another; equal positions share that of the first range.
+  std::vector<std::size_t> base(parts + 1);
+  for (std::size_t part = 0; part < parts; ++part) base[part + 1] = base[part] + next[part];
+  std::vector<std::uint32_t> joined(base[parts]);
+  std::iota(joined.begin(), joined.end(), 0u);
+  ranges.meet_earlier(
+      [&](std::size_t part, std::uint32_t own, std::size_t earlier, std::uint32_t there) {
+        joined[base[part] + own] = static_cast<std::uint32_t>(base[earlier] + there);
+      });
+  for (std::size_t part = 1; part < parts; ++part) {
+    for (std::size_t own = 0; own < later[part].size(); ++own) {
+      std::uint32_t& to = joined[base[part] + own];
+      if (to != base[part] + own) {
+        to = joined[to];
+      } else {
+        to = static_cast<std::uint32_t>(positions.size());
+        positions.emplace_back(later[part][own]);
+      }
+    }
+  }
+  ranges.for_later_points([&](std::size_t part, std::size_t begin, std::size_t end) {
+    const std::uint32_t* const to = joined.data() + base[part];
+    for (std::size_t i = begin; i < end; ++i) number[i] = to[number[i]];
+  });
+  return true;
 }
 
 /// Sets first[i], for every i in [0, count), to the least j whose position equals that of i. Each
-/// thread welds a range of its own. Then it owns, of the positions that are left, those whose hash
-/// falls to it; at once, if points that are equal lie far apart. So the result does not depend on
-/// the number of threads.
+/// thread welds a range of its own; then each range looks its positions up in the earlier ones. So
+/// the result does not depend on the number of threads. Most positions are expected to differ.
 /// @param load  load(i) -> glm::vec<3, Scalar> @pre count < 2^32 - 1
 /// @param go_on  go_on(i) is called now and then by all threads; after it returns false, `first`
 /// stays incomplete
@@ -290,51 +377,27 @@ template <class Scalar, class Load, class GoOn = bool (*)(std::size_t)>
 std::size_t weld_first(
     const Execution& execution, std::size_t count, Load&& load, std::uint32_t* first,
     GoOn&& go_on = [](std::size_t) { return true; }) {
-  const std::size_t parts = weld_parts(execution, count);
-  Execution all = execution;
-  all.stop = {};  // a skipped block would leave its corners unset
-  std::vector<std::vector<std::uint32_t>> firsts(parts);  // of each range
-  std::vector<std::size_t> different(parts);
-  // A closed mesh has one vertex for six corners.
-  if (parts > 1 && !neighbours_follow<Scalar>(count, load)) {
-    return weld_by_hash<Scalar>(
-        all, parts, count, [](std::size_t k) { return static_cast<std::uint32_t>(k); }, load, go_on,
-        first, count / 5);
+  WeldRanges<Scalar> ranges(execution, count, 1);
+  if (!ranges.weld(
+          load, go_on, first, [](std::size_t, std::uint32_t i) { return i; },
+          [](std::size_t, std::uint32_t, const auto&) {})) {
+    return 0;
   }
-  std::atomic<bool> stopped = false;
-  parallel_for(all, parts, [&](std::size_t part, int) {
-    const std::size_t begin = count * part / parts, end = count * (part + 1) / parts;
-    const std::size_t expected = (end - begin) / 5;
-    if (parts > 1) reserve_large(firsts[part], expected);
-    const bool done = weld_one_by_one<Scalar>(
-        end - begin, [begin](std::size_t k) { return static_cast<std::uint32_t>(begin + k); }, load,
-        [](std::uint64_t) { return true; }, go_on, first, expected,
-        [](std::uint32_t i) { return i; },
-        [&](std::uint32_t i) {
-          ++different[part];
-          if (parts > 1) firsts[part].push_back(i);
-        });
-    if (!done) stopped = true;
+  std::size_t different = 0;
+  for (const WeldTable<Scalar>& table : ranges.tables) different += table.size();
+  std::atomic<std::size_t> again = 0;
+  ranges.meet_earlier([&](std::size_t, std::uint32_t own, std::size_t, std::uint32_t there) {
+    first[own] = there;
+    again.fetch_add(1, std::memory_order_relaxed);
   });
-  if (stopped) return 0;
-  if (parts == 1) return different[0];
-
-  std::vector<std::uint32_t> left;
-  for (std::vector<std::uint32_t>& of_range : firsts) {
-    left.insert(left.end(), of_range.begin(), of_range.end());
-    of_range = {};
-  }
-  const std::size_t total = weld_by_hash<Scalar>(
-      all, parts, left.size(), [&](std::size_t k) { return left[k]; }, load,
-      [](std::size_t) { return true; }, first, left.size());
-  parallel_for(all, parts - 1, [&](std::size_t part, int) {
-    const std::size_t begin = count * (part + 1) / parts, end = count * (part + 2) / parts;
+  if (again == 0) return different;
+  ranges.for_later_points([&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const std::uint32_t least = first[first[i]];
       if (first[i] != least) first[i] = least;  // what other threads read stays untouched
     }
   });
-  return total;
+  return different - again;
 }
 
 }  // namespace strata::detail

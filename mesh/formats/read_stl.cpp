@@ -92,31 +92,11 @@ Result<void> read_facets(const ReaderInput& input, std::size_t count, TriangleSo
     forget(c);
     return watch.at(static_cast<double>(c) / static_cast<double>(corners));
   };
-  const auto stopped = [&]() -> Result<void> {
-    if (watch.at(1.0)) return {};  // the calling thread may have welded nothing
-    return fail(ErrorCode::kCancelled, "{}: reading was stopped", input.name);
-  };
-  if (weld_parts(input.execution, corners) == 1) {
-    reserve_large(soup.positions, count / 2 + 2);  // of a closed mesh
-    weld_numbers<float>(corners, load, index, go_on, [&](std::uint32_t c) {
-      soup.positions.emplace_back(WeldTable<float>::canonical(binary_corner(data, c)));
-    });
-    return stopped();
-  }
-  const std::size_t different = weld_first<float>(input.execution, corners, load, index, go_on);
-  if (auto done = stopped(); !done) return done;
-  reserve_large(soup.positions, different);
-  // First occurrences become vertices in the order of the file; later corners refer back to them.
-  for (std::size_t c = 0; c < corners; ++c) {
-    if (c % kStep == 0) forget(c);
-    if (index[c] == c) {
-      index[c] = static_cast<std::uint32_t>(soup.positions.size());
-      soup.positions.emplace_back(WeldTable<float>::canonical(binary_corner(data, c)));
-    } else {
-      index[c] = index[index[c]];
-    }
-  }
-  return {};
+  reserve_large(soup.positions, count / 2 + 2);  // of a closed mesh
+  const bool done =
+      weld_numbers<float>(input.execution, corners, load, index, go_on, soup.positions);
+  if (done && watch.at(1.0)) return {};  // the calling thread may have welded nothing
+  return fail(ErrorCode::kCancelled, "{}: reading was stopped", input.name);
 }
 
 Result<MeshFile> read_binary(const ReaderInput& input) {

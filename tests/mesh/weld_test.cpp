@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <map>
 #include <random>
 #include <tuple>
@@ -9,7 +11,7 @@
 namespace strata {
 namespace {
 
-/// Welds `count` points of `kinds` different ones by a map, and by weld_first().
+/// Welds `count` points of `kinds` different ones by a map, by weld_first() and by weld_numbers().
 template <class Scalar>
 void compare(std::size_t count, std::uint32_t kinds, bool near) {
   std::mt19937 random(41);
@@ -25,13 +27,21 @@ void compare(std::size_t count, std::uint32_t kinds, bool near) {
     }
   }
   std::map<std::tuple<Scalar, Scalar, Scalar>, std::uint32_t> firsts;
-  std::vector<std::uint32_t> expected;
+  std::vector<std::uint32_t> expected, expected_numbers;
+  std::vector<glm::dvec3> expected_positions;
   for (std::size_t i = 0; i < count; ++i) {
     const auto& p = points[i];
     expected.push_back(firsts
                            .try_emplace({p.x + Scalar(0), p.y + Scalar(0), p.z + Scalar(0)},
                                         static_cast<std::uint32_t>(i))
                            .first->second);
+    const std::uint32_t first = expected.back();
+    if (first == i) {
+      expected_numbers.push_back(static_cast<std::uint32_t>(expected_positions.size()));
+      expected_positions.emplace_back(p);
+    } else {
+      expected_numbers.push_back(expected_numbers[first]);
+    }
   }
   for (const int threads : {1, 2, 3, 7}) {
     Execution execution;
@@ -41,10 +51,20 @@ void compare(std::size_t count, std::uint32_t kinds, bool near) {
                   execution, count, [&](std::size_t i) { return points[i]; }, first.data()),
               firsts.size());
     EXPECT_EQ(first, expected) << threads;
+    std::vector<std::uint32_t> numbers(count);
+    std::vector<glm::dvec3> positions;
+    EXPECT_TRUE(detail::weld_numbers<Scalar>(
+        execution, count, [&](std::size_t i) { return points[i]; }, numbers.data(),
+        [](std::size_t) { return true; }, positions));
+    EXPECT_EQ(numbers, expected_numbers) << threads;
+    EXPECT_EQ(positions, expected_positions) << threads;
+    EXPECT_TRUE(std::none_of(positions.begin(), positions.end(), [](const glm::dvec3& p) {
+      return std::signbit(p.x) && p.x == 0;  // -0 is +0
+    }));
   }
 }
 
-TEST(Weld, FirstsAreThoseOfAMapForAnyThreads) {
+TEST(Weld, FirstsAndNumbersAreThoseOfAMapForAnyThreads) {
   for (const std::size_t count : std::vector<std::size_t>{1, 100, 49999, 50000, 200000}) {
     for (const std::uint32_t kinds : {1u, 40u, 30000u, 250000u}) {
       for (const bool near : {false, true}) {
@@ -65,6 +85,10 @@ TEST(Weld, EndsWhereItIsTold) {
         execution, first.size(), [](std::size_t i) { return glm::ivec3(static_cast<int>(i)); },
         first.data(), [](std::size_t i) { return i < 70000; });
     EXPECT_EQ(first.back(), 0u);
+    std::vector<glm::dvec3> positions;
+    EXPECT_FALSE(detail::weld_numbers<std::int32_t>(
+        execution, first.size(), [](std::size_t i) { return glm::ivec3(static_cast<int>(i)); },
+        first.data(), [](std::size_t i) { return i < 70000; }, positions));
   }
 }
 
