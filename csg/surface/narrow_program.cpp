@@ -31,6 +31,9 @@ class Narrower {
   bool find_window(std::uint64_t reach);
   /// Leaves out what is not in the window.
   void filter();
+  /// After that, the leaf whose entries, or whose exits, are all that is seen; kNoLeaf if there is
+  /// none.
+  [[nodiscard]] std::uint32_t alone() const { return alone_; }
 
  private:
   [[nodiscard]] LeafLayers& leaf_of(Program::Edge edge) { return leaves_[edge.child()]; }
@@ -46,6 +49,8 @@ class Narrower {
   /// Keeps what of a union is in the window. @return the edge that is left of it
   Program::Edge filter_union(Program::Edge edge);
   void leave_out_exits(LeafLayers& leaf);
+  /// The same for entries of a solid that is subtracted.
+  void leave_out_entries(LeafLayers& leaf);
   void set_edges(TileProgram::Node& node, std::span<const Program::Edge> edges);
 
   std::span<LeafLayers> leaves_;
@@ -60,6 +65,7 @@ class Narrower {
   Program::Edge last_;   ///< the common edge that begins last
   Program::Edge cover_;  ///< the other that all rays are in just before the window, if there is one
   std::vector<Program::Edge> kept_;
+  std::uint32_t alone_ = TileFinder::kNoLeaf;
 };
 
 Extent Narrower::extent_of(const LeafLayers& leaf) const {
@@ -165,6 +171,13 @@ void Narrower::leave_out_exits(LeafLayers& leaf) {
   if (extent_of(leaf).first_exit > end_ + margin_) leaf.left_out = LeafLayers::LeftOut::kExits;
 }
 
+void Narrower::leave_out_entries(LeafLayers& leaf) {
+  if (!leaf.by_area || leaf.kind != LeafLayers::Kind::kConvex) return;
+  if (extent_of(leaf).last_entry + margin_ >= begin_) return;
+  leaf.left_out = LeafLayers::LeftOut::kEntries;
+  leaf.nearest = 0;
+}
+
 void Narrower::set_edges(TileProgram::Node& node, std::span<const Program::Edge> edges) {
   std::copy(edges.begin(), edges.end(), program_.edges.begin() + node.first);
   node.count = static_cast<std::uint32_t>(edges.size());
@@ -193,6 +206,7 @@ void Narrower::filter() {
   program_.leaves.clear();
   program_.depth = 1;
   std::uint32_t count = 0;
+  bool last_is_around = false;
   for (Program::Edge edge : edges.first(common_)) {
     if (!edge.leaf()) {
       edge = filter_union(edge);
@@ -201,10 +215,12 @@ void Narrower::filter() {
       LeafLayers& leaf = leaf_of(edge);
       leave_out_exits(leaf);
       const Extent of = extent_of(leaf);
-      if (of.covers && of.first_exit > end_ + margin_ && of.last_entry + margin_ < begin_ &&
-          edge.bits != last_.bits) {
-        around_.push_back(leaf.solid);
-        continue;
+      if (of.covers && of.first_exit > end_ + margin_ && of.last_entry + margin_ < begin_) {
+        if (edge.bits != last_.bits) {
+          around_.push_back(leaf.solid);
+          continue;
+        }
+        last_is_around = true;  // kept: the tree must not be true before the window
       }
     }
     edges[count++] = edge;
@@ -213,10 +229,8 @@ void Narrower::filter() {
   for (const Program::Edge edge : edges.subspan(common_)) {
     LeafLayers& leaf = leaf_of(edge);
     if (outside_of_window(extent_of(leaf))) continue;
-    if (edge.bits == cover_.bits) {
-      leaf.left_out = LeafLayers::LeftOut::kEntries;
-      leaf.nearest = 0;
-    }
+    leave_out_exits(leaf);
+    leave_out_entries(leaf);
     edges[count++] = edge;
   }
   std::sort(edges.begin() + common, edges.begin() + count, [&](Program::Edge a, Program::Edge b) {
@@ -224,6 +238,11 @@ void Narrower::filter() {
     return at_a != at_b ? at_a < at_b : a.bits < b.bits;
   });
   set_edges(root(), edges.first(count));
+  if (common == 1 && edges.front().leaf()) {
+    const LeafLayers& first = leaf_of(edges.front());
+    if (count == 1 && first.left_out == LeafLayers::LeftOut::kExits) alone_ = edges.front().child();
+    if (count == 2 && last_is_around && edges[1].bits == cover_.bits) alone_ = edges[1].child();
+  }
 }
 
 }  // namespace
@@ -239,6 +258,7 @@ bool TileFinder::narrow(std::size_t area) {
   if (!narrower.fits()) return true;
   if (!narrower.find_window(farthest_reach(coincidence_->range()))) return false;
   narrower.filter();
+  alone_ = narrower.alone();
   return true;
 }
 

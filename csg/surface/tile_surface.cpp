@@ -423,6 +423,7 @@ void TileFinder::list_present(const SearchArea& area) {
 void TileFinder::find_area(const SearchArea& area, bool cut) {
   list_present(area);
   around_.clear();
+  alone_ = kNoLeaf;
   doubtful_.clear();
   if (present_.empty()) return;
   if (!cut && std::ranges::all_of(present_, [&](std::uint32_t slot) {
@@ -433,10 +434,7 @@ void TileFinder::find_area(const SearchArea& area, bool cut) {
   simplifier_.simplify(area.leaves, present_, tile_program_);
   if (tile_program_.constant) return;
   if (!cut && !narrow(area.index())) return;
-  if (tile_program_.leaves.size() == 1 && around_.empty()) {
-    LeafLayers& leaf = leaves_[tile_program_.leaves.front()];
-    if (leaf.left_out == LeafLayers::LeftOut::kExits && show_alone(area, leaf)) return;
-  }
+  if (alone_ != kNoLeaf && show_alone(area, leaves_[alone_])) return;
   const auto is_deep = [&] {
     return std::any_of(tile_program_.leaves.begin(), tile_program_.leaves.end(),
                        [&](std::uint32_t slot) { return leaves_[slot].deep; });
@@ -467,8 +465,10 @@ bool TileFinder::show_alone(const SearchArea& area, LeafLayers& leaf) {
   }
   const LeafLayers::Kind kind = leaf.kind;
   const LeafLayers::LeftOut left_out = leaf.left_out;
+  const std::size_t layer = left_out == LeafLayers::LeftOut::kEntries ? 1 : 0;
+  const std::uint32_t nearest = leaf.nearest, tag = layer == 1 ? SurfaceImage::kExit : 0u;
   leaf.kind = LeafLayers::Kind::kConvex;
-  leaf.left_out = LeafLayers::LeftOut::kExits;
+  if (layer == 0) leaf.left_out = LeafLayers::LeftOut::kExits;
   const RasterTarget target{Axis::kZ, view_->size.x, view_->size.y, kPictureDepthLimit};
   const Input input = input_of(leaf);
   const PixelRect& clip = input.clip;
@@ -484,20 +484,23 @@ bool TileFinder::show_alone(const SearchArea& area, LeafLayers& leaf) {
   leaf.kind = kind;
   leaf.left_out = left_out;
   if (one_face) {
-    part_.faces->of[index] = {leaf.solid, input.triangles.front()};
+    part_.faces->of[index] = {leaf.solid, input.triangles.front() | tag};
     return true;
   }
-  if (leaf.keys.size() != 1 || leaf.steep || fragments != pixels) {
+  if (leaf.keys.size() != layer + 1 || leaf.steep || fragments != pixels) {
     enter_area(leaf, area, index);
     leaf.left_out = left_out;
+    leaf.nearest = nearest;
     return false;
   }
   fragments_ += fragments;
   for (int row = 0; row < height; ++row) {
     const auto from = static_cast<std::size_t>(row * leaf.stride);
     const std::size_t to = part_.index(area.rect.u0, area.rect.v0 + row);
-    std::copy_n(leaf.keys[0] + from, width, part_.image->depth.data() + to);
-    std::copy_n(leaf.triangles[0] + from, width, part_.image->triangle.data() + to);
+    std::copy_n(leaf.keys[layer] + from, width, part_.image->depth.data() + to);
+    std::transform(leaf.triangles[layer] + from, leaf.triangles[layer] + from + width,
+                   part_.image->triangle.data() + to,
+                   [tag](std::uint32_t triangle) { return triangle | tag; });
     std::fill_n(part_.image->solid.data() + to, width, leaf.solid);
   }
   return true;

@@ -72,6 +72,7 @@ struct SearchArea;
 /// Scratch of one thread.
 class TileFinder {
  public:
+  static constexpr std::uint32_t kNoLeaf = 0xffffffffu;
   /// Keeps references to all of them, whatever view they are of.
   TileFinder(const Program& program, const std::vector<ViewPart>& view_parts,
              const std::vector<Geometry::Part>& parts, const View& view,
@@ -107,7 +108,8 @@ class TileFinder {
   /// present_ becomes the leaves that may be met in an area, prepared for it.
   void list_present(const SearchArea& area);
   /// Leaves out of tile_program_ what cannot matter in an area, where it is an intersection of
-  /// solids minus others (csg/surface/narrow_program.cpp). @return false: nothing is seen there
+  /// solids minus others, and finds alone_ (csg/surface/narrow_program.cpp).
+  /// @return false: nothing is seen there
   [[nodiscard]] bool narrow(std::size_t area);
   /// Finds what a pixel shows from all transitions of the program's leaves.
   void resolve(const TileProgram& program, std::uint64_t pixel);
@@ -117,8 +119,8 @@ class TileFinder {
   void enter_area(LeafLayers& leaf, const SearchArea& area, std::size_t index) const;
   /// Fills an area where all solids are convex and just united.
   void find_united(const SearchArea& area);
-  /// Fills an area that shows just the entries of a convex solid, if they cover each pixel once.
-  /// @pre what is behind them does not matter
+  /// Fills an area that shows just the entries of a convex solid, or its exits where entries are
+  /// left out, if they cover each pixel once. @pre nothing else matters
   [[nodiscard]] bool show_alone(const SearchArea& area, LeafLayers& leaf);
   /// Decides a doubtful pixel of united_ by the entries kept. @return false: more of them matter
   bool show_united(std::uint64_t pixel);
@@ -149,6 +151,7 @@ class TileFinder {
   FirstHit first_hit_;
   std::vector<std::uint32_t> present_, drawn_, hidden_, all_triangles_, area_triangles_;
   std::vector<std::uint32_t> around_;  ///< solids that all rays of an area are in where it counts
+  std::uint32_t alone_ = kNoLeaf;  ///< of an area: nothing but its entries, or exits, can be seen
   std::vector<std::uint64_t> doubtful_;
   std::vector<std::uint32_t> slot_solids_;
   std::vector<Transition> transitions_, leaf_transitions_;
