@@ -320,6 +320,7 @@ TileShader::TileShader(TileShader&&) noexcept = default;
 TileShader::~TileShader() = default;
 
 void TileShader::shade(const SurfaceImage& tile, const AreaFaces& faces, const PixelRect& rect) {
+  if (rows_.across * rows_.down == 1) return shade_areas(tile, faces, rect);
   const int left = rect.u0 / rows_.across, right = rect.u1 / rows_.across;
   for (int v = rect.v0 / rows_.down; v < rect.v1 / rows_.down; ++v) {
     const std::size_t begin =
@@ -327,6 +328,33 @@ void TileShader::shade(const SurfaceImage& tile, const AreaFaces& faces, const P
     const int areas = (v * rows_.down - rect.v0) / AreaBounds::kSide * AreaBounds::kAcross;
     shade_row(tile, faces.of.data() + areas, begin, left, v,
               static_cast<std::size_t>(right - left));
+  }
+}
+
+/// The same for one sample a pixel.
+void TileShader::shade_areas(const SurfaceImage& tile, const AreaFaces& faces,
+                             const PixelRect& rect) {
+  constexpr int kSide = AreaBounds::kSide;
+  std::size_t area = 0;
+  for (int v = rect.v0; v < rect.v1; v += kSide) {
+    const int end = std::min(rect.v1, v + kSide);
+    for (int u = rect.u0, i = 0; i < AreaBounds::kAcross; ++i, ++area, u += kSide) {
+      if (u >= rect.u1) continue;
+      const int width = std::min(kSide, rect.u1 - u);
+      const auto columns = static_cast<std::size_t>(width);
+      const AreaFaces::Face& face = faces.of[area];
+      std::size_t begin = static_cast<std::size_t>((v - rect.v0) * tile.width + u - rect.u0);
+      for (int y = v; y < end; ++y, begin += static_cast<std::size_t>(tile.width)) {
+        const std::span<Rgba> colours(row_of(u, y), columns);
+        const int row = rows_.ground.first + y;
+        if (face.solid != SurfaceImage::kNone) {
+          covered_ += columns;
+          samples_->along(face.solid, face.triangle, u, row, colours);
+        } else if (width < kSide || !shade_block(tile, begin, u, row, colours)) {
+          shade_runs(tile, begin, u, row, rows_.ground.at(y), colours);
+        }
+      }
+    }
   }
 }
 
@@ -405,15 +433,63 @@ void TileShader::shade_row(const SurfaceImage& tile, const AreaFaces::Face* face
       covered_ += run;
       continue;
     }
-    if (rows_.across * rows_.down == 1) {
-      shade_runs(tile, first, column, row, background, std::span(colours + block, pixels));
-      continue;
-    }
     for (std::size_t i = 0; i < pixels; ++i) {
       colours[block + i] =
           pixel(tile, first + i * across, column + static_cast<int>(i), row, background);
     }
   }
+}
+
+/// A block of pixels of one sample each from (u, v) of the picture on, where it shows nothing but
+/// the face, or the background, of its first pixel and that of its last, each of one colour. The
+/// first is at `begin`. @return false: it shows something else
+bool TileShader::shade_block(const SurfaceImage& tile, std::size_t begin, int u, int v,
+                             std::span<Rgba> colours) {
+  const std::uint32_t* depths = tile.depth.data() + begin;
+  const std::uint32_t* solids = tile.solid.data() + begin;
+  const std::uint32_t* faces = tile.triangle.data() + begin;
+  struct End {
+    std::uint32_t empty, solid, face;
+  };
+  const auto end_at = [&](std::size_t i) -> End {
+    if (depths[i] == SurfaceImage::kNone) return {~0u, 0, 0};
+    return {0, solids[i], faces[i]};
+  };
+  const auto unlike = [&](std::size_t i, const End& end) {
+    const std::uint32_t empty = depths[i] == SurfaceImage::kNone ? ~0u : 0u;
+    return (((solids[i] ^ end.solid) | (faces[i] ^ end.face)) & ~empty) | (empty ^ end.empty);
+  };
+  const auto colour_of = [&](const End& end, Rgba& colour) {
+    if (end.empty != 0) {
+      colour = rows_.ground.at(v - rows_.ground.first);
+      return true;
+    }
+    if (!samples_->uniform_along(end.solid, end.face, u, v, kAtOnce)) return false;
+    colour = samples_->colour();
+    return true;
+  };
+  const End first = end_at(0);
+  std::uint32_t differ = 0;
+  for (std::size_t i = 0; i < kAtOnce; ++i) differ |= unlike(i, first);
+  Rgba from, to;
+  if (differ == 0) {
+    if (!colour_of(first, from)) return false;
+    std::fill(colours.begin(), colours.end(), from);
+    covered_ += first.empty != 0 ? 0 : kAtOnce;
+    return true;
+  }
+  const End last = end_at(kAtOnce - 1);
+  std::array<std::uint32_t, kAtOnce> differs;  // from the first
+  std::uint32_t others = 0, covered = 0;
+  for (std::size_t i = 0; i < kAtOnce; ++i) {
+    differs[i] = unlike(i, first);
+    others |= differs[i] != 0 ? unlike(i, last) : 0u;
+    covered += depths[i] != SurfaceImage::kNone ? 1u : 0u;
+  }
+  if (others != 0 || !colour_of(first, from) || !colour_of(last, to)) return false;
+  for (std::size_t i = 0; i < kAtOnce; ++i) colours[i] = differs[i] != 0 ? to : from;
+  covered_ += covered;
+  return true;
 }
 
 /// Pixels of one sample each from (u, v) of the picture on, face by face; the first is at `begin`.

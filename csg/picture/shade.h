@@ -142,6 +142,9 @@ class TileShader {
   }
   void shade_row(const SurfaceImage& tile, const AreaFaces::Face* faces, std::size_t begin, int u,
                  int v, std::size_t count);
+  void shade_areas(const SurfaceImage& tile, const AreaFaces& faces, const PixelRect& rect);
+  bool shade_block(const SurfaceImage& tile, std::size_t begin, int u, int v,
+                   std::span<Rgba> colours);
   void shade_runs(const SurfaceImage& tile, std::size_t begin, int u, int v, Rgba background,
                   std::span<Rgba> colours);
   Rgba pixel(const SurfaceImage& tile, std::size_t begin, int u, int v, Rgba background);

@@ -13,7 +13,9 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <memory>
+#include <random>
 #include <stop_token>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -88,6 +90,44 @@ TEST(Picture, AFaceTowardsTheEyeHasTheSchemesColourInItsLight) {
   EXPECT_EQ(at(picture, 20, 20), lit(kYellow));
   EXPECT_EQ(at(picture, 1, 1), kBackground);
   EXPECT_EQ(preview.report().covered, 400u);
+}
+
+TEST(Picture, EachPixelHasTheColourOfTheHighestBoxThere) {
+  // Of 1 to 30 boxes, so that neighbours show one box, two, or many.
+  std::mt19937 random(1);
+  const auto number = [&](int low, int high) {
+    return std::uniform_int_distribution(low, high)(random);
+  };
+  constexpr int kWidth = 90, kHeight = 50;
+  for (int round = 0; round < 100; ++round) {
+    SCOPED_TRACE("round " + std::to_string(round));
+    std::vector<Rgba> expected(kWidth * kHeight, kBackground);
+    std::vector<NodeId> boxes;
+    Tree tree;
+    const int count = number(1, 30);
+    std::uint64_t covered = 0;
+    for (int i = 0; i < count; ++i) {
+      const glm::ivec2 low(number(-5, kWidth), number(-5, kHeight));
+      const glm::ivec2 high = glm::min(low + glm::ivec2(number(1, 40), number(1, 40)),
+                                       glm::ivec2(kWidth + 5, kHeight + 5));
+      const glm::vec4 colour(
+          glm::vec3(glm::ivec3(number(0, 15), number(0, 15), number(0, 15))) / 15.0f, 1.0f);
+      const glm::dvec3 middle(kWidth / 2, kHeight / 2, 0);
+      boxes.push_back(tree.add_solid(box(glm::dvec3(low.x, kHeight - high.y, -1) - middle,
+                                         glm::dvec3(high.x, kHeight - low.y, i) - middle, colour)));
+      for (int v = std::max(low.y, 0); v < std::min(high.y, kHeight); ++v) {
+        for (int u = std::max(low.x, 0); u < std::min(high.x, kWidth); ++u) {
+          expected[static_cast<std::size_t>(v * kWidth + u)] = lit(glm::vec3(colour));
+        }
+      }
+    }
+    for (const Rgba& pixel : expected) covered += pixel != kBackground ? 1 : 0;
+    tree.set_root(tree.add(Operation::kUnion, boxes));
+    Preview preview(std::move(tree), {}, 0);
+    const Picture picture = draw(preview, from_above(1, kHeight), {kWidth, kHeight});
+    EXPECT_EQ(picture.pixels, expected);
+    EXPECT_EQ(preview.report().covered, covered);
+  }
 }
 
 TEST(Picture, ACutFaceHasTheCuttersColourOrTheSchemes) {
