@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
+#include <functional>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <glm/vector_relational.hpp>
@@ -31,29 +33,99 @@ bool holds(const Bounds& box, const Bounds& other) {
          glm::all(glm::lessThanEqual(other.high, box.high));
 }
 
+/// The vertices of a mesh in a tree of boxes, to find those that lie outside of a plane.
+class VertexTree {
+ public:
+  explicit VertexTree(std::span<const glm::dvec3> points)
+      : points_(points.begin(), points.end()),
+        boxes_(2 * std::bit_ceil(points_.size() / kFew + 1)) {
+    split(0, 0, points_.size());
+  }
+  /// Whether dot(`across`, p) is more than `most` for a vertex p, and how many boxes and vertices
+  /// were looked at, added to `tests`.
+  [[nodiscard]] bool any_beyond(const glm::dvec3& across, double most, std::size_t& tests) const {
+    return any_beyond(0, 0, points_.size(), across, most, tests);
+  }
+
+ private:
+  static constexpr std::size_t kFew = 8;  ///< vertices that are not split
+
+  void split(std::size_t node, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) boxes_[node].include(points_[i]);
+    if (end - begin <= kFew) return;
+    const glm::dvec3 sides = boxes_[node].high - boxes_[node].low;
+    const int axis = sides.x >= sides.y && sides.x >= sides.z ? 0 : sides.y >= sides.z ? 1 : 2;
+    const auto at = [&](std::size_t i) { return points_.begin() + static_cast<std::ptrdiff_t>(i); };
+    const std::size_t middle = begin + (end - begin) / 2;
+    std::nth_element(
+        at(begin), at(middle), at(end),
+        [axis](const glm::dvec3& a, const glm::dvec3& b) { return a[axis] < b[axis]; });
+    split(2 * node + 1, begin, middle);
+    split(2 * node + 2, middle, end);
+  }
+  [[nodiscard]] bool any_beyond(std::size_t node, std::size_t begin, std::size_t end,
+                                const glm::dvec3& across, double most, std::size_t& tests) const {
+    // Sums in the order of dot(), so that the corner rounds to no less than any vertex.
+    const glm::dvec3 low = across * boxes_[node].low, high = across * boxes_[node].high;
+    ++tests;
+    if (!(glm::dot(glm::max(low, high), glm::dvec3(1.0)) > most)) return false;
+    if (end - begin <= kFew) {
+      tests += end - begin;
+      return std::any_of(points_.begin() + static_cast<std::ptrdiff_t>(begin),
+                         points_.begin() + static_cast<std::ptrdiff_t>(end),
+                         [&](const glm::dvec3& p) { return glm::dot(across, p) > most; });
+    }
+    const std::size_t middle = begin + (end - begin) / 2;
+    return any_beyond(2 * node + 1, begin, middle, across, most, tests) ||
+           any_beyond(2 * node + 2, middle, end, across, most, tests);
+  }
+
+  std::vector<glm::dvec3> points_;
+  std::vector<Bounds> boxes_;  ///< children of node n: 2 n + 1 and 2 n + 2
+};
+
 /// Whether the mesh is closed, has a volume, and no vertex lies outside of any face; meshes too
 /// large to try are taken for not convex.
 bool is_convex(const TriangleSoup& mesh) {
-  constexpr std::size_t kMostTests = std::size_t{1} << 21;
-  if (mesh.triangles.empty() || mesh.triangles.size() * mesh.positions.size() > kMostTests) {
-    return false;
-  }
+  constexpr std::size_t kMostTriangles = std::size_t{1} << 16, kMostTests = std::size_t{1} << 22;
+  if (mesh.triangles.empty() || mesh.triangles.size() > kMostTriangles) return false;
   const Bounds box = bounds(mesh);
   const double size = glm::length(box.high - box.low);
   constexpr double kMostSize = 1e75;  // of which the fourth power is a number
   if (!(size < kMostSize)) return false;
-  for (const glm::uvec3& t : mesh.triangles) {
+  struct Plane {
+    glm::dvec3 across;
+    double at, little;
+  };
+  const auto plane_of = [&](const glm::uvec3& t) -> Plane {
     const glm::dvec3& a = mesh.positions[t.x];
     const glm::dvec3 across = glm::cross(mesh.positions[t.y] - a, mesh.positions[t.z] - a);
-    const double at = glm::dot(across, a), little = 1e-9 * size * glm::length(across);
-    double lowest = at;
-    for (const glm::dvec3& p : mesh.positions) {
-      const double height = glm::dot(across, p);
-      if (height > at + little) return false;
-      lowest = std::min(lowest, height);
+    return {across, glm::dot(across, a), 1e-9 * size * glm::length(across)};
+  };
+  // Most that are not convex show it at one of a few triangles.
+  constexpr std::size_t kFewTriangles = 16;
+  const std::size_t step = mesh.triangles.size() / kFewTriangles + 1;
+  for (std::size_t i = 0; i < mesh.triangles.size(); i += step) {
+    const Plane plane = plane_of(mesh.triangles[i]);
+    if (std::ranges::any_of(mesh.positions, [&](const glm::dvec3& p) {
+          return glm::dot(plane.across, p) > plane.at + plane.little;
+        })) {
+      return false;
     }
+  }
+  const VertexTree vertices(mesh.positions);
+  std::size_t tests = 0;
+  glm::dvec3 below = mesh.positions.front();  // a vertex well below the last face
+  for (const glm::uvec3& t : mesh.triangles) {
+    const auto [across, at, little] = plane_of(t);
+    if (tests > kMostTests || vertices.any_beyond(across, at + little, tests)) return false;
     // Flat: a ray leaves it where it enters it, and that is nothing.
-    if (little > 0 && lowest >= at - little) return false;
+    const double least = at - little;
+    if (!(little > 0) || glm::dot(across, below) < least) continue;
+    below = *std::ranges::min_element(mesh.positions, std::less<>(),
+                                      [&, n = across](const auto& p) { return glm::dot(n, p); });
+    tests += mesh.positions.size();
+    if (glm::dot(across, below) >= least) return false;
   }
   return is_closed(mesh);
 }
