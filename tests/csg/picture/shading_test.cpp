@@ -15,6 +15,7 @@
 #include "strata/csg/input/scene_input.h"
 #include "strata/csg/picture/picture.h"
 #include "strata/mesh/shapes.h"
+#include "tests/csg/random_tree.h"
 
 namespace strata::csg {
 namespace {
@@ -230,6 +231,35 @@ TEST(Shading, AfterAMoveIsThatOfAFreshPicture) {
   tree.solids()[2].world_from_mesh = place;
   Preview fresh(std::move(tree));
   EXPECT_EQ(after.pixels, draw(fresh, camera, {200, 200}, options).pixels);
+}
+
+// A picture is shaded while its tiles are found, and areas of one face are not even found pixel by
+// pixel. With a ghost, all samples are found first; this one is empty.
+TEST(Shading, TileByTileIsThatOfAllSamplesAtOnce) {
+  constexpr int kSamples[] = {1, 2, 4, 8, 16, 64};
+  std::size_t seen = 0;
+  for (int seed = 0; seed < 90; ++seed) {
+    RandomTree random(static_cast<std::uint64_t>(seed) + 700);
+    Tree tree = seed == 0 ? some_part() : Tree{};
+    if (seed != 0) tree.set_root(random.grow(tree, random.pick(1, 12), seed % 3 == 0));
+    const NodeId low = tree.add_solid(solid_of(make_box({-1, -1, -1}, {0, 0, 0})));
+    const NodeId high = tree.add_solid(solid_of(make_box({1, 1, 1}, {2, 2, 2})));
+    const NodeId nothing = tree.add(Operation::kIntersection, {low, high});
+    Preview tiles(tree), samples(tree, {{nothing, kBackgroundGhost}});
+    Camera camera = fitted(tiles);
+    camera.distance *= random.real(0.2, 1.0);  // large faces
+    PictureOptions options;
+    options.samples = kSamples[seed % std::size(kSamples)];
+    if (seed % 2 == 0) options.scheme = find_colour_scheme("Cornfield");
+    options.crease = seed % 4 < 2 ? 30 : 0;
+    const int side = options.samples == 64 ? 40 : 160;
+    const glm::ivec2 size(random.pick(side / 2, side), random.pick(side / 2, side));
+    const Picture found = draw(tiles, camera, size, options);
+    EXPECT_EQ(found.pixels, draw(samples, camera, size, options).pixels)
+        << "seed " << seed << ", " << options.samples << " samples";
+    seen += tiles.report().covered;
+  }
+  EXPECT_GT(seen, 200000u);
 }
 
 TEST(Shading, WithEdgesDiffersOnEdgesOnly) {

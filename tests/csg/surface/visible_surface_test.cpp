@@ -172,6 +172,53 @@ TEST(VisibleSurface, WithWallsAlongTheViewIsTheOneOfTheFullLists) {
   }
 }
 
+// Solids that are united or cut are left out where others are known to be in front. Seen along
+// their walls, little is known of them.
+TEST(VisibleSurface, OfUnitedSolidsSeenAlongTheirWallsIsTheOneOfTheFullLists) {
+  std::size_t seen = 0;
+  for (int seed = 0; seed < 200; ++seed) {
+    RandomTree random(static_cast<std::uint64_t>(seed) + 9500);
+    Tree tree;
+    std::vector<Tree::NodeId> operands;
+    const double layer = random.real(0.01, 1.0);
+    for (int i = random.pick(3, 24); i > 0; --i) {
+      // Tops and floors of a few heights: many lie in a plane, others a hair apart.
+      const glm::dvec3 low(random.real(-20, 15), random.real(-20, 15), -layer * random.pick(0, 6));
+      const glm::dvec3 size(random.real(0.5, 25), random.real(0.5, 25), layer * random.pick(1, 9));
+      TriangleSoup mesh = make_box(low, low + size);
+      if (random.pick(0, 2) == 0) {
+        mesh = make_cylinder(size.x / 2, size.z, random.pick(3, 30));
+        for (glm::dvec3& p : mesh.positions) p += low;
+      }
+      const Tree::NodeId solid = tree.add_solid({std::make_shared<TriangleSoup>(std::move(mesh))});
+      operands.push_back(solid);
+    }
+    const Operation operation = seed % 4 == 3 ? Operation::kDifference : Operation::kUnion;
+    Tree::NodeId root = tree.add(operation, operands);
+    if (seed % 5 == 4) {
+      const auto cutter = std::make_shared<TriangleSoup>(
+          make_box({-30, -30, -layer * random.pick(0, 2)}, {random.real(-5, 30), 30, 30}));
+      root = tree.add(Operation::kDifference, {root, tree.add_solid({cutter})});
+    }
+    tree.set_root(root);
+    Camera camera;
+    camera.projection = seed % 3 == 0 ? Projection::kPerspective : Projection::kOrthographic;
+    Preview preview(tree, {}, 0.0);
+    centre_camera(camera, preview.box());
+    fit_camera(camera, preview.box());
+    const double tilt = random.pick(0, 1) == 0 ? 0.0 : random.real(0, 0.05);
+    const double turn = random.pick(0, 1) == 0 ? 0.0 : random.real(0, 90);
+    camera.rotation = {seed % 2 == 0 ? tilt : 90 - tilt, 0, turn};
+    expect_same(tree, camera, {200, 200}, "seed " + std::to_string(seed));
+    if (HasFailure()) return;
+    const auto image = preview.draw(make_view(camera, {200, 200}, preview.box()).value());
+    ASSERT_TRUE(image.has_value());
+    seen += static_cast<std::size_t>(std::ranges::count_if(
+        (*image)->depth, [](std::uint32_t depth) { return depth != SurfaceImage::kNone; }));
+  }
+  EXPECT_GT(seen, 1000000u);
+}
+
 TriangleSoup copies(const TriangleSoup& mesh, int count) {
   TriangleSoup all = mesh;
   for (int i = 1; i < count; ++i) {
