@@ -1,10 +1,9 @@
-// The laws of boundary meshes on a lattice so small that everything coincides. STRATA_LONG_TESTS=N
-// runs N times as many trees, from other seeds.
+// The laws of boundary meshes: what holds of the result of any tree. measure_laws_test.cpp and
+// live_zone_laws_test.cpp have those of measures and of dead space.
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <glm/ext/matrix_transform.hpp>
 #include <glm/geometric.hpp>
 #include <map>
@@ -16,115 +15,15 @@
 #include "csg/arrangement/cell_values.h"
 #include "csg/boundary/boundary_arrangement.h"
 #include "csg/boundary/open_edges.h"
-#include "csg/boundary/triangulate_boundary.h"
 #include "csg/lattice/live_zone.h"
-#include "strata/csg/boundary/boundary_mesh.h"
 #include "strata/csg/solid_lists.h"
 #include "strata/hashbuffer/build_ldi.h"
+#include "tests/csg/boundary/boundary_laws.h"
 #include "tests/csg/boundary/brute_meeting.h"
-#include "tests/csg/boundary/convex_volume.h"
-#include "tests/csg/boundary/tiny_trees.h"
-#include "tests/csg/random_tree.h"
 #include "tests/support/voxelized.h"
 
 namespace strata::csg {
 namespace {
-
-using exact::Fraction;
-constexpr BoundaryOptions kTiny{.bits = 10};
-
-int rounds(int usual) {
-  const char* const text = std::getenv("STRATA_LONG_TESTS");
-  return usual * (text != nullptr ? std::max(1, std::atoi(text)) : 1);
-}
-
-SolidMesh mesh_of(const Tree& tree, const BoundaryOptions& options = kTiny,
-                  const Execution& execution = {}) {
-  auto made = boundary_mesh(tree, tree.root(), options, execution);
-  EXPECT_TRUE(made.has_value()) << made.error().message;
-  return made ? std::move(made->mesh) : SolidMesh{};
-}
-
-SolidMesh framed(const Tree& tree) { return mesh_of(tree | tiny_frame()); }
-
-ExactMeasures measures_of(const Tree& tree) {
-  const auto made = exact_measures(tree, tree.root(), kTiny);
-  EXPECT_TRUE(made.has_value()) << made.error().message;
-  return made.value_or(ExactMeasures{});
-}
-
-bool same_bytes(const SolidMesh& a, const SolidMesh& b) {
-  return a.positions == b.positions && a.triangles == b.triangles && a.part_of == b.part_of;
-}
-
-std::string size_of(const SolidMesh& mesh) {
-  return std::to_string(mesh.positions.size()) + " vertices, " +
-         std::to_string(mesh.triangles.size()) + " triangles";
-}
-
-// Law L1, by index: each directed edge once and its opposite once, one fan around each vertex, an
-// even Euler characteristic of each shell. @return what is wrong
-std::string broken(const SolidMesh& mesh) {
-  std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> across;  // edge -> third corner
-  for (const glm::uvec3& t : mesh.triangles) {
-    for (int k = 0; k < 3; ++k) {
-      if (t[k] >= mesh.positions.size()) return "index out of range";
-      if (t[k] == t[(k + 1) % 3]) return "two equal corners";
-      if (!across.try_emplace({t[k], t[(k + 1) % 3]}, t[(k + 2) % 3]).second) return "edge twice";
-    }
-  }
-  std::vector<std::uint32_t> degree(mesh.positions.size(), 0), shell(mesh.positions.size());
-  std::iota(shell.begin(), shell.end(), 0u);
-  const auto find = [&](std::uint32_t v) {
-    while (shell[v] != v) v = shell[v] = shell[shell[v]];
-    return v;
-  };
-  for (const auto& [edge, corner] : across) {
-    if (!across.contains({edge.second, edge.first})) return "edge without its opposite";
-    ++degree[edge.first];
-    shell[find(edge.first)] = find(edge.second);
-  }
-  for (const auto& [edge, corner] : across) {  // around edge.first
-    std::uint32_t steps = 0, at = edge.second;
-    do {
-      at = across.at({edge.first, at});
-    } while (++steps <= degree[edge.first] && at != edge.second);
-    if (steps != degree[edge.first]) return "a vertex of several fans";
-  }
-  std::map<std::uint32_t, int> euler;
-  for (std::uint32_t v = 0; v < mesh.positions.size(); ++v) {
-    if (degree[v] == 0) return "a vertex without triangles";
-    euler[find(v)] += 2 - static_cast<int>(degree[v]);
-  }
-  for (const glm::uvec3& t : mesh.triangles) euler[find(t.x)] += 2;
-  for (const auto& [root, twice] : euler) {
-    if (twice % 4 != 0) return "an odd Euler characteristic";
-  }
-  return "";
-}
-
-// The tree's value at a point by the windings of its solids; nothing where one cannot tell.
-class TreeOracle {
- public:
-  explicit TreeOracle(const Tree& tree) : tree_(tree) {
-    for (const Solid& solid : tree.solids()) {
-      solids_.emplace_back(transform(*solid.mesh, solid.world_from_mesh));
-    }
-  }
-  std::optional<bool> at(const glm::dvec3& point) const {
-    std::vector<char> inside;
-    for (std::size_t s = 0; s < solids_.size(); ++s) {
-      const auto winding = solids_[s].at(point);
-      if (!winding) return std::nullopt;
-      inside.push_back(is_inside(tree_.solids()[s].rule, *winding));
-    }
-    return evaluate(tree_, tree_.root(), [&](std::uint32_t s) { return inside[s] != 0; });
-  }
-
- private:
-  const Tree& tree_;
-  std::vector<ExactWinding> solids_;
-};
 
 // The same solids, with triangles, vertices, operands and solids in another order.
 class Shuffler {
@@ -173,20 +72,6 @@ class Shuffler {
   const Tree& from_;
   std::mt19937_64& random_;
 };
-
-// Random trees of all kinds and depths, by seed.
-template <class Check>
-void for_random_trees(int first_seed, int count, int depth, TinyKind kind, const Check& check) {
-  for (int i = 0; i < rounds(count); ++i) {
-    const int seed = first_seed + i;
-    TinyTrees trees(static_cast<std::uint64_t>(seed));
-    const Tree tree = trees.tree(trees.pick(0, depth), kind);
-    SCOPED_TRACE("seed " + std::to_string(seed) + ", depth " + std::to_string(depth) + ", kind " +
-                 std::to_string(static_cast<int>(kind)));
-    check(tree, trees);
-    if (testing::Test::HasFailure()) return;
-  }
-}
 
 // Laws L1, L9.
 
@@ -525,124 +410,6 @@ TEST(BoundaryLaws, SolidsWithoutEffectChangeNothing) {
   });
 }
 
-// Dead space may be left out.
-
-struct Arranged {
-  TriangulatedBoundary mesh;
-  BoundaryReport report;
-};
-
-// With the finest zone, or with all space.
-Arranged arranged(const Tree& tree, const BoundaryOptions& options, bool zone) {
-  const Geometry geometry(tree);
-  auto solids = snap_solids(tree, tree.root(), geometry, options.bits);
-  EXPECT_TRUE(solids.has_value());
-  EXPECT_TRUE(close_solids(*solids, OpenSolids::kCap, tree).has_value());
-  const Lattice lattice = solids->lattice;
-  std::vector<InsideRule> rules;
-  for (const auto& part : geometry.parts()) rules.push_back(part.rule);
-  Arranged result;
-  const auto faces = arrange_solids(std::move(*solids), tree, tree.root(), rules, options,
-                                    {.threads = 1}, result.report, zone ? ~std::uint64_t{0} : 0);
-  EXPECT_TRUE(faces.has_value()) << faces.error().message;
-  if (!faces) return result;
-  auto mesh = triangulate_boundary(*faces, lattice, options.float_positions);
-  EXPECT_TRUE(mesh.has_value()) << mesh.error().message;
-  if (mesh) result.mesh = std::move(*mesh);
-  return result;
-}
-
-bool same_bytes(const TriangulatedBoundary& a, const TriangulatedBoundary& b) {
-  return a.positions == b.positions && a.triangles == b.triangles && a.labels == b.labels;
-}
-
-TEST(BoundaryLaws, TheZoneChangesNothing) {
-  std::uint64_t with = 0, without = 0;
-  const auto check = [&](const Tree& tree, BoundaryOptions options, int kind) {
-    options.parts = kind % 2 == 0 ? BoundaryParts::kOne : BoundaryParts::kSolids;
-    options.faces = kind % 3 == 0 ? BoundaryFaceKind::kInput : BoundaryFaceKind::kCanonical;
-    const Arranged zone = arranged(tree, options, true), all = arranged(tree, options, false);
-    ASSERT_TRUE(same_bytes(zone.mesh, all.mesh))
-        << zone.mesh.triangles.size() << " " << all.mesh.triangles.size();
-    with += zone.report.pairs;
-    without += all.report.pairs;
-  };
-  for (const TinyKind kind : {TinyKind::kBoxes, TinyKind::kConvex, TinyKind::kAny}) {
-    for_random_trees(110000, 60, 5, kind, [&](const Tree& tree, TinyTrees& trees) {
-      check(tree | tiny_frame(), kTiny, trees.pick(0, 5));
-      check(tree, {.bits = trees.pick(10, 20)}, trees.pick(0, 5));
-    });
-  }
-  EXPECT_LT(static_cast<double>(with), 0.9 * static_cast<double>(without));
-  for (int i = 0; i < rounds(60); ++i) {
-    SCOPED_TRACE("seed " + std::to_string(i));
-    RandomTree trees(static_cast<std::uint64_t>(i));
-    Tree tree;
-    tree.set_root(trees.grow(tree, trees.pick(1, 30), i % 4 == 3));
-    check(tree, {.bits = trees.pick(12, 26)}, i);
-    if (HasFailure()) return;
-  }
-}
-
-// The zone holds all faces of the result.
-TEST(BoundaryLaws, FacesLieInTheZone) {
-  int edges = 0, dead = 0;
-  for_random_trees(120000, 60, 4, TinyKind::kAny, [&](const Tree& tree, TinyTrees& trees) {
-    const Geometry geometry(tree);
-    const auto solids = snap_solids(tree, tree.root(), geometry, 12);
-    ASSERT_TRUE(solids.has_value());
-    std::vector<InsideRule> rules;
-    for (const auto& part : geometry.parts()) rules.push_back(part.rule);
-    const LiveZone zone =
-        LiveZone::find(*solids, tree, tree.root(), rules, ~std::uint64_t{0}, {.threads = 1});
-    const SolidMesh mesh = mesh_of(tree, {.bits = 12});
-    const auto file_point = [&](const glm::dvec3& p) {
-      return exact::FilePoint(
-          glm::round((p - solids->lattice.origin) / solids->lattice.step * 0x1p24));
-    };
-    for (const glm::uvec3& t : mesh.triangles) {
-      const exact::FilePoint a = file_point(mesh.positions[t.x]),
-                             b = file_point(mesh.positions[t.y]);
-      ASSERT_TRUE(zone.contains(a, b));
-      ASSERT_TRUE(zone.touches(box_around(a, b)));
-      ++edges;
-    }
-    for (int i = 0; i < 20 && !zone.everywhere(); ++i) {
-      const exact::FilePoint p = file_point(trees.point() + 0.375);
-      dead += !zone.contains(p, p);
-    }
-  });
-  EXPECT_GT(edges, 2000);
-  EXPECT_GT(dead, 100);
-}
-
-// Holes that reach out of a plate, many balls that overlap, a small box in a large torus.
-TEST(BoundaryLaws, TheZoneSavesWork) {
-  Tree plate(make_box({0, 0, 0}, {8, 8, 1})), balls(make_icosphere(4, 2)),
-      corner(make_box({3.8, 0, 0}, {4.5, 0.5, 0.5}));
-  for (int i = 0; i < 16; ++i) {
-    plate -= transform(
-        glm::translate(glm::dmat4(1), {i % 4 * 2 + 1, i / 4 * 2 + 1, -20}),
-        Tree(make_cylinder(0.5, 40, 16)) | transform(glm::translate(glm::dmat4(1), {0, 0, 39.5}),
-                                                     Tree(make_torus(0.5, 0.2, 30, 20))));
-    const glm::dvec3 shift(0.2 * (i % 4), 0.5 * (i % 5), 0.7 * (i % 3));
-    balls &= transform(glm::translate(glm::dmat4(1), shift), Tree(make_icosphere(4, 2)));
-    if (i % 4 != 0) continue;
-    corner -=
-        transform(glm::translate(glm::dmat4(1), 0.01 * shift), Tree(make_torus(3, 1, 60, 20)));
-  }
-  const auto saves = [](const Tree& tree, double most, const char* what) {
-    const Arranged zone = arranged(tree, {}, true), all = arranged(tree, {}, false);
-    EXPECT_TRUE(same_bytes(zone.mesh, all.mesh)) << what;
-    EXPECT_FALSE(zone.mesh.triangles.empty()) << what;
-    EXPECT_LT(static_cast<double>(zone.report.pairs), most * static_cast<double>(all.report.pairs))
-        << what << ": " << zone.report.pairs << " of " << all.report.pairs;
-  };
-  saves(plate, 0.6, "plate");
-  saves(balls, 0.6, "balls");
-  saves(corner, 0.1, "corner");
-}
-
 // Laws L4.
 
 TEST(BoundaryLaws, EqualSetsHaveEqualBytes) {
@@ -723,83 +490,6 @@ TEST(BoundaryLaws, ABoxIsItsEighthsHoweverTriangulated) {
   glm::dmat4 turn(0);
   turn[0][1] = turn[1][2] = turn[2][0] = turn[3][3] = 1;
   EXPECT_TRUE(same_bytes(framed(cube), framed(cube | transform(turn, cube))));
-}
-
-// Laws L5, L6.
-
-// From the low corner of a cell to a point of it that lies on no diagonal of a side of a tiny box.
-const glm::dvec3 kOffCentre(0.5, 433.0 / 1024, 359.0 / 1024);
-
-TEST(BoundaryLaws, TheOraclesOfVolumesAgree) {
-  for_random_trees(600000, 20, 2, TinyKind::kBoxes, [&](const Tree& tree, TinyTrees&) {
-    if (tree.solids().size() > 6) return;
-    const TreeOracle oracle(tree);
-    int cells = 0;
-    for (int i = 0; i < 512; ++i) {
-      const auto inside = oracle.at(glm::dvec3(i % 8, i / 8 % 8, i / 64) + kOffCentre);
-      ASSERT_TRUE(inside.has_value());
-      cells += *inside;
-    }
-    ASSERT_EQ(convex_volume(tree), cells);
-  });
-}
-
-TEST(BoundaryLaws, VolumesAreExact) {
-  int volumes = 0, fractions = 0;
-  for_random_trees(610000, 80, 3, TinyKind::kConvex, [&](const Tree& tree, TinyTrees&) {
-    if (tree.solids().size() > 6) return;
-    const Fraction volume = convex_volume(tree);
-    const ExactMeasures measures = measures_of(tree | tiny_frame());
-    ASSERT_TRUE(exact::is_nearest(measures.volume, Fraction(volume + 2)))
-        << measures.volume - 2 << " is not " << volume;
-    ++volumes;
-    fractions += denominator(volume) > 6;
-  });
-  EXPECT_GT(volumes, 50);
-  EXPECT_GT(fractions, 8);
-}
-
-TEST(BoundaryLaws, VolumesOfBoxesAreCounts) {
-  for_random_trees(620000, 100, 6, TinyKind::kBoxes, [&](const Tree& tree, TinyTrees&) {
-    const TreeOracle oracle(tree);
-    int cells = 0;
-    for (int i = 0; i < 512; ++i) {
-      cells += *oracle.at(glm::dvec3(i % 8, i / 8 % 8, i / 64) + kOffCentre);
-    }
-    ASSERT_EQ(measures_of(tree | tiny_frame()).volume, cells + 2);
-  });
-}
-
-TEST(BoundaryLaws, MeasuresAddUpAndAreThoseOfTheMesh) {
-  for (int i = 0; i < rounds(50); ++i) {
-    TinyTrees trees(static_cast<std::uint64_t>(630000 + i));
-    SCOPED_TRACE("seed " + std::to_string(630000 + i));
-    const Tree a = trees.tree(2, TinyKind::kAny), b = trees.tree(2, TinyKind::kAny);
-    const auto volume = [](const Tree& tree) {
-      return measures_of(tree | tiny_frame()).volume - 2;
-    };
-    ASSERT_NEAR(volume(a) + volume(b), volume(a | b) + volume(a & b), 1e-11);
-    ASSERT_NEAR(volume(a), volume(a - b) + volume(a & b), 1e-11);
-    const Tree all = a | b | tiny_frame();
-    const SolidMesh mesh = mesh_of(all);
-    const ExactMeasures measures = measures_of(all);
-    double six = 0, area = 0;
-    Bounds box;
-    glm::dvec3 moment(0);
-    for (const glm::uvec3& t : mesh.triangles) {
-      const glm::dvec3 &p = mesh.positions[t.x], &q = mesh.positions[t.y], &r = mesh.positions[t.z];
-      const double d = glm::dot(p, glm::cross(q, r));
-      six += d;
-      moment += d / 24 * (p + q + r);
-      area += glm::length(glm::cross(q - p, r - p)) / 2;
-      for (const glm::dvec3& v : {p, q, r}) box.include(v);
-    }
-    ASSERT_NEAR(measures.volume, six / 6, 1e-6);
-    ASSERT_NEAR(measures.area, area, 1e-6);
-    ASSERT_LT(glm::length(measures.centre - moment / (six / 6)), 1e-6);
-    ASSERT_LT(glm::length(measures.low - box.low) + glm::length(measures.high - box.high), 1e-8);
-    ASSERT_FALSE(measures.empty);
-  }
 }
 
 // Laws L7.
