@@ -116,7 +116,7 @@ TEST(Verify, NestedDifferences) {
   std::mt19937_64 random(3);
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);
   std::vector<Tree::NodeId> boxes;
-  for (int i = 0; i < 8; ++i) {
+  for (int i = 0; i < 6; ++i) {
     glm::dmat4 place = glm::translate(
         glm::dmat4(1.0), 0.4 * glm::dvec3(uniform(random), uniform(random), uniform(random)));
     place = glm::rotate(place, 3.0 * uniform(random),
