@@ -15,25 +15,8 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "VdbLeaf counts bytes from the low end");
 
 constexpr int kSide = VoxelIntervals::kTileSide;
-constexpr std::uint64_t kAllColumns = ~std::uint64_t{0};
-
-// Byte b is 0xff where bit b of the index is set.
-constexpr std::array<std::uint64_t, 256> make_spread() {
-  std::array<std::uint64_t, 256> table{};
-  for (std::size_t bits = 0; bits < 256; ++bits) {
-    for (std::size_t b = 0; b < 8; ++b) {
-      if (bits >> b & 1) table[bits] |= std::uint64_t{0xff} << (8 * b);
-    }
-  }
-  return table;
-}
-constexpr std::array<std::uint64_t, 256> kSpread = make_spread();
-
-VdbLeaf spread(std::uint64_t columns) {
-  VdbLeaf leaf;
-  for (std::size_t x = 0; x < 8; ++x) leaf.words[x] = kSpread[columns >> (8 * x) & 0xff];
-  return leaf;
-}
+constexpr std::uint64_t kAll = ~std::uint64_t{0};
+constexpr VdbLeaf kWhole{{kAll, kAll, kAll, kAll, kAll, kAll, kAll, kAll}};
 
 // The finisher of splitmix64 (Steele, Lea, Flood, 2014).
 constexpr std::uint64_t mix(std::uint64_t value) {
@@ -61,8 +44,8 @@ VdbLeafBuilder::VdbLeafBuilder(int depth, std::uint32_t divisor, bool colours)
       divisor_(divisor),
       colours_(colours),
       // One more than leaves: an interval may cease at the very end.
-      events_(static_cast<std::size_t>(leaves_z_) + 1),
-      has_event_((events_.size() + 7) / 8 * 8) {}
+      flips_(static_cast<std::size_t>(leaves_z_) + 1),
+      has_flip_((flips_.size() + 7) / 8 * 8) {}
 
 std::unique_ptr<VdbLeafTile> VdbLeafBuilder::build(const VoxelIntervals& slab, int tile_u,
                                                    int tile_v) {
@@ -77,6 +60,7 @@ std::unique_ptr<VdbLeafTile> VdbLeafBuilder::build(const VoxelIntervals& slab, i
   hash_ = 0;
 
   auto tile = std::make_unique<VdbLeafTile>();
+  set_bounds(view_, *tile);  // first, since it reads the items in order, so that they are near
   const int first_x = tile_u * (kSide / 8);
   const int first_y = slab.v_begin() / 8 + tile_v * (kSide / 8);
   for (int column = 0; column < VdbLeafTile::kLeafColumns; ++column) {
@@ -103,7 +87,6 @@ std::unique_ptr<VdbLeafTile> VdbLeafBuilder::build(const VoxelIntervals& slab, i
     tile->first_value = exact_copy(first_value_);
   }
   tile->hash = hash_;
-  set_bounds(view_, *tile);
   tile->lower += glm::ivec3(first_x * 8, first_y * 8, 0);
   tile->upper += glm::ivec3(first_x * 8, first_y * 8, 0);
   return tile;
@@ -132,72 +115,60 @@ void VdbLeafBuilder::set_bounds(const VoxelIntervals::TileView& view, VdbLeafTil
   }
 }
 
-// Enters the interval ends of 8 x 8 columns: the bits of the byte where an interval begins and of
-// the one where it ends, and between them, where its bytes become whole and cease to be.
+// Enters the interval ends of 8 x 8 columns: at each end all voxels of its column from there on
+// flip, which flips_ has for the leaf that the end lies in.
 void VdbLeafBuilder::collect_leaf_column(int leaf_x, int leaf_y) {
+  const Interval* const items = view_.items.data();
+  VdbLeaf* const flips = flips_.data();
+  std::uint8_t* const has_flip = has_flip_.data();
   for (int y = 0; y < 8; ++y) {
     const std::uint32_t* offsets = view_.offsets.data() + (leaf_y * 8 + y) * kSide + leaf_x * 8;
     for (int x = 0; x < 8; ++x) {
-      const int column = x * 8 + y;
-      columns_[static_cast<std::size_t>(column)] = {offsets[x], offsets[x + 1]};
-      const std::uint64_t bit = std::uint64_t{1} << column;
-      const auto partial = [&](std::size_t z) -> std::uint64_t& {
-        return events_[z].partial.words[static_cast<std::size_t>(x)];
+      const std::uint32_t begin = offsets[x], end = offsets[x + 1];
+      if (divisor_ != 0) columns_[static_cast<std::size_t>(x * 8 + y)] = {begin, end};
+      const auto flip_from = [&](int z) {
+        const auto leaf = static_cast<std::size_t>(z) / 8;
+        const std::uint64_t rest = 0xffu << z % 8 & 0xffu;
+        flips[leaf].words[static_cast<std::size_t>(x)] ^= rest << (8 * y);
+        has_flip[leaf] = 1;
       };
-      for (std::uint32_t i = offsets[x]; i < offsets[x + 1]; ++i) {
-        const auto begin = static_cast<std::size_t>(view_.items[i].begin());
-        const auto end = static_cast<std::size_t>(view_.items[i].end());
-        const std::size_t first = begin / 8, last = end / 8;
-        const std::uint64_t head = 0xffu << begin % 8 & 0xffu;
-        const std::uint64_t tail = (1u << end % 8) - 1;
-        has_event_[first] = 1;
-        if (first == last) {
-          partial(first) |= (head & tail) << (8 * y);
-          continue;
-        }
-        partial(first) |= head << (8 * y);
-        partial(last) |= tail << (8 * y);
-        events_[first + 1].toggles ^= bit;
-        events_[last].toggles ^= bit;
-        has_event_[first + 1] = 1;
-        has_event_[last] = 1;
+      for (std::uint32_t i = begin; i < end; ++i) {
+        flip_from(items[i].begin());
+        flip_from(items[i].end());
       }
     }
   }
 }
 
-// Walks up the events of a leaf column; between two of them all leaves are alike.
+// Walks up the flips of a leaf column; between two of them all leaves are alike.
 void VdbLeafBuilder::sweep_leaf_column(std::uint64_t place) {
-  std::uint64_t solid = 0;  // bit c: the bytes of column c are 0xff from here on
+  VdbLeaf solid;  // each byte is 0 or 0xff: what its column is from here on
+  bool any = false, all = false;
   int done = 0;
-  for (std::size_t group = 0; group < has_event_.size(); group += 8) {
+  for (std::size_t group = 0; group < has_flip_.size(); group += 8) {
     std::uint64_t marks;
-    std::memcpy(&marks, has_event_.data() + group, sizeof marks);
+    std::memcpy(&marks, has_flip_.data() + group, sizeof marks);
     if (marks == 0) continue;
-    std::memset(has_event_.data() + group, 0, sizeof marks);
+    std::memset(has_flip_.data() + group, 0, sizeof marks);
     for (; marks != 0; marks &= marks - 1) {
       const int z = static_cast<int>(group) + std::countr_zero(marks) / 8;
-      if (solid == kAllColumns) {
+      if (all) {
         put_whole(done, z, place);
-      } else if (solid != 0) {
-        const VdbLeaf between = spread(solid);
-        for (; done < z; ++done) put_leaf(done, between, place);
+      } else if (any) {
+        for (; done < z; ++done) put_leaf(done, solid, place);
       }
-      Event& event = events_[static_cast<std::size_t>(z)];
-      solid ^= event.toggles;
-      VdbLeaf leaf = spread(solid);
-      std::uint64_t any = 0, all = kAllColumns;
+      VdbLeaf leaf = std::exchange(flips_[static_cast<std::size_t>(z)], {});
       for (std::size_t i = 0; i < 8; ++i) {
-        leaf.words[i] |= event.partial.words[i];
-        any |= leaf.words[i];
-        all &= leaf.words[i];
+        leaf.words[i] ^= solid.words[i];
+        solid.words[i] = (leaf.words[i] >> 7 & 0x0101010101010101u) * 0xff;  // the last voxel's bit
       }
-      event = {};
-      if (all == kAllColumns) {
+      if (leaf == kWhole) {
         put_whole(z, z + 1, place);
-      } else if (any != 0) {
+      } else if (leaf != VdbLeaf{}) {
         put_leaf(z, leaf, place);
       }
+      any = solid != VdbLeaf{};
+      all = solid == kWhole;
       done = z + 1;
     }
   }
@@ -214,7 +185,7 @@ void VdbLeafBuilder::put_whole(int begin, int end, std::uint64_t place) {
     alike = alike && value == first;
   });
   if (alike) return put_run(begin, end, first);
-  for (int z = begin; z < end; ++z) put_leaf(z, spread(kAllColumns), place);
+  for (int z = begin; z < end; ++z) put_leaf(z, kWhole, place);
 }
 
 void VdbLeafBuilder::put_run(int begin, int end, std::uint32_t value) {

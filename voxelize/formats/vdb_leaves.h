@@ -18,6 +18,7 @@ namespace strata {
 struct alignas(64) VdbLeaf {
   std::array<std::uint64_t, 8> words{};
 
+  friend bool operator==(const VdbLeaf&, const VdbLeaf&) = default;
   /// Solid voxels.
   [[nodiscard]] int count() const {
     // Bits are added up within bytes, which hold up to 64 of them; plain x86-64 has no popcount.
@@ -83,12 +84,6 @@ class VdbLeafBuilder {
   std::unique_ptr<VdbLeafTile> build(const VoxelIntervals& slab, int tile_u, int tile_v);
 
  private:
-  /// What happens in the leaves of a leaf column at one z / 8.
-  struct Event {
-    VdbLeaf partial;            // bytes in which an interval begins or ends
-    std::uint64_t toggles = 0;  // bit c: from here on column c is solid, or empty again
-  };
-
   void collect_leaf_column(int leaf_x, int leaf_y);
   void sweep_leaf_column(std::uint64_t place);
   void put_whole(int begin, int end, std::uint64_t place);
@@ -115,8 +110,8 @@ class VdbLeafBuilder {
   std::uint32_t divisor_;
   bool colours_;
   // Of the leaf column in work, by z / 8. All zero between two leaf columns.
-  std::vector<Event> events_;
-  std::vector<std::uint8_t> has_event_;  // a multiple of 8 long
+  std::vector<VdbLeaf> flips_;  // voxels that differ from those below, for each end below them
+  std::vector<std::uint8_t> has_flip_;  // a multiple of 8 long
   // Of the tile in work.
   std::vector<VdbLeaf> leaves_;
   std::vector<std::uint16_t> leaf_z_;
