@@ -35,15 +35,17 @@ constexpr std::size_t kBlock = 1u << 14;   // triangles a task
 /// Bits of a cell: along axis a, faces that are entered are 1 << 2 a, those that are left 2 << 2 a.
 using Sides = std::uint8_t;
 
+using Corners = std::array<glm::dvec3, 3>;
+
 /// A triangle in cells.
 struct Face {
-  std::array<glm::dvec3, 3> corners;
+  Corners corners;
   glm::dvec3 normal;  ///< of any length
   double square;      ///< of that length
 
   /// Whether it looks along an axis, or against it.
   [[nodiscard]] bool faces(int axis) const {
-    return normal[axis] * normal[axis] >= kFacing * kFacing * square && square > 0.0;
+    return (normal[axis] * normal[axis] >= kFacing * kFacing * square) & (square > 0.0);
   }
 };
 
@@ -98,26 +100,40 @@ class WallSearch {
     std::uint32_t wall = 0;
   };
 
+  /// The cells of a box.
+  struct CellBox {
+    glm::ivec3 first, last;
+    /// At most 8 cells; a triangle within the box is taken to pass through all of them.
+    [[nodiscard]] bool small() const {
+      const glm::ivec3 size = last - first;
+      return size.x <= 1 && size.y <= 1 && size.z <= 1;
+    }
+  };
+
   [[nodiscard]] bool stopped() const { return execution_.stop.stop_requested(); }
   [[nodiscard]] bool taken_away(std::size_t t) const {
     return options_.taken_away && options_.taken_away(static_cast<std::uint32_t>(t));
   }
-  [[nodiscard]] Face face(std::size_t t) const {
-    Face result;
+  [[nodiscard]] Corners corners_of(std::size_t t) const {
     const glm::uvec3 corners = mesh_.triangles[t];
-    result.corners = {mesh_.positions[corners.x] * scale_ + shift_,
-                      mesh_.positions[corners.y] * scale_ + shift_,
-                      mesh_.positions[corners.z] * scale_ + shift_};
-    const auto& [a, b, c] = result.corners;
+    return {mesh_.positions[corners.x] * scale_ + shift_,
+            mesh_.positions[corners.y] * scale_ + shift_,
+            mesh_.positions[corners.z] * scale_ + shift_};
+  }
+  [[nodiscard]] Face face(std::size_t t) const { return face_of(corners_of(t)); }
+  [[nodiscard]] static Face face_of(const Corners& corners) {
+    Face result;
+    result.corners = corners;
+    const auto& [a, b, c] = corners;
     result.normal = glm::cross(b - a, c - a);
     result.square = glm::dot(result.normal, result.normal);
     return result;
   }
   [[nodiscard]] static Sides sides_of(const Face& face, bool away) {
-    unsigned sides = 0;
+    unsigned sides = 0;  // without branches, which are hard to foretell
     for (int axis = 0; axis < 3; ++axis) {
-      const unsigned side = (face.normal[axis] > 0.0) != away ? 2u : 1u;
-      sides |= (face.faces(axis) ? side : 0u) << (2 * axis);
+      const unsigned side = 1u + static_cast<unsigned>((face.normal[axis] > 0.0) != away);
+      sides |= side * static_cast<unsigned>(face.faces(axis)) << (2 * axis);
     }
     return static_cast<Sides>(sides);
   }
@@ -129,26 +145,37 @@ class WallSearch {
            static_cast<std::size_t>(at.x);
   }
 
-  /// Calls visit(cell) for the cells that a face may pass through.
-  template <class Visit>
-  void for_cells(const Face& face, Visit&& visit) const {
-    const auto& [a, b, c] = face.corners;
+  /// The cells of the box of a triangle. @return false outside of the grid
+  [[nodiscard]] bool find_box(const Corners& corners, CellBox& box) const {
+    const auto& [a, b, c] = corners;
     const glm::dvec3 low = glm::min(a, glm::min(b, c)), high = glm::max(a, glm::max(b, c));
     const glm::dvec3 most(cells_);
     if (!(high.x >= 0 && high.y >= 0 && high.z >= 0) || low.x >= most.x || low.y >= most.y ||
         low.z >= most.z) {
-      return;
+      return false;
     }
-    const glm::ivec3 first(glm::max(low, 0.0)), last(glm::min(high, most - 1.0));
-    const glm::ivec3 size = last - first;
-    if (size.x <= 1 && size.y <= 1 && size.z <= 1) {
-      for (int z = first.z; z <= last.z; ++z) {
-        for (int y = first.y; y <= last.y; ++y) {
-          for (int x = first.x; x <= last.x; ++x) visit(cell({x, y, z}));
-        }
-      }
-      return;
+    box = {glm::ivec3(glm::max(low, 0.0)), glm::ivec3(glm::min(high, most - 1.0))};
+    return true;
+  }
+  /// Calls visit(cell) for the cells of a small box, for some several times, without a branch:
+  /// whether a box is one cell wide or two is hard to foretell.
+  template <class Visit>
+  void for_small_box(const CellBox& box, Visit&& visit) const {
+    const std::size_t first = cell(box.first), row = cell({box.first.x, box.last.y, box.first.z}),
+                      layer = cell({box.first.x, box.first.y, box.last.z}) - first;
+    const auto wide = static_cast<std::size_t>(box.last.x - box.first.x);
+    for (const std::size_t at : {first, row, first + layer, row + layer}) {
+      visit(at);
+      visit(at + wide);
     }
+  }
+  /// Calls visit(cell) for the cells of the box of a face that it may pass through.
+  template <class Visit>
+  void for_cells(const Face& face, const CellBox& box, Visit&& visit) const {
+    if (box.small()) return for_small_box(box, visit);
+    const auto& [first, last] = box;
+    const glm::dvec3& a = face.corners[0];
+    const glm::dvec3 most(cells_);
     const glm::dvec3 n = glm::abs(face.normal);
     const int w = n.x >= n.y && n.x >= n.z ? 0 : n.y >= n.z ? 1 : 2;
     const AxisFrame frame(static_cast<Axis>(w));
@@ -191,8 +218,9 @@ class WallSearch {
         if (((corners.x + corners.y + corners.z) & skip) != 0) continue;
         const Face triangle = face(t);
         const Sides sides = sides_of(triangle, taken_away(t));
-        if (sides == 0) continue;
-        for_cells(triangle, [&](std::size_t at) {
+        CellBox box;
+        if (sides == 0 || !find_box(triangle.corners, box)) continue;
+        for_cells(triangle, box, [&](std::size_t at) {
           std::atomic_ref<Sides> place(sides_[at]);
           if ((place.load(std::memory_order_relaxed) & sides) == sides) return;
           place.fetch_or(sides, std::memory_order_relaxed);
@@ -246,11 +274,19 @@ class WallSearch {
         (mesh_.triangles.size() + kBlock - 1) / kBlock);
     for_triangles([&](std::size_t block, std::size_t begin, std::size_t end) {
       for (std::size_t t = begin; t < end; ++t) {
-        const Face triangle = face(t);
+        const Corners corners = corners_of(t);
+        CellBox box;
         unsigned axes = 0, cells = 0;
+        const auto add_cell = [&](std::size_t at) { cells |= sides_[at]; };
+        if (!find_box(corners, box)) continue;
+        if (box.small()) {
+          for_small_box(box, add_cell);
+          if (cells == 0) continue;  // most
+        }
+        const Face triangle = face_of(corners);
         for (int axis = 0; axis < 3; ++axis) axes |= (triangle.faces(axis) ? 1u : 0u) << axis;
         if (axes == 0) continue;
-        for_cells(triangle, [&](std::size_t at) { cells |= sides_[at]; });
+        if (!box.small()) for_cells(triangle, box, add_cell);
         if ((axes & cells) == 0) continue;
         parts[block].emplace_back(static_cast<std::uint32_t>(t), static_cast<Sides>(axes & cells));
       }
