@@ -70,20 +70,31 @@ void make_rows(PngImage& image, int height, std::size_t row_bytes, std::size_t s
   }
 }
 
-/// Calls use(index) for all pixels from `begin` to `end`.
+/// The end of the run of pixels of one colour that starts at `begin`. @pre begin != end
+const Rgba* end_of_run(const Rgba* begin, const Rgba* end) {
+  constexpr std::ptrdiff_t kAtOnce = 16;
+  const Rgba colour = *begin;
+  const auto differs = [&](const Rgba& pixel) {
+    return std::bit_cast<std::uint32_t>(pixel) ^ std::bit_cast<std::uint32_t>(colour);
+  };
+  for (; end - begin >= kAtOnce; begin += kAtOnce) {
+    std::uint32_t other = 0;
+    for (std::ptrdiff_t i = 0; i < kAtOnce; ++i) other |= differs(begin[i]);
+    if (other != 0) break;
+  }
+  return std::find_if(begin, end, differs);
+}
+
+/// Calls use(index, count) for the runs of one colour from `begin` to `end`.
 /// @return false when there are too many colours
 template <class Use>
-bool for_each_index(Palette& palette, const Rgba* begin, const Rgba* end, Use&& use) {
-  std::uint32_t last = 0;
-  std::optional<std::uint8_t> index;
-  for (const Rgba* pixel = begin; pixel != end; ++pixel) {
-    const auto colour = std::bit_cast<std::uint32_t>(*pixel);
-    if (!index || colour != last) {
-      index = palette.index(colour);
-      if (!index) return false;
-      last = colour;
-    }
-    use(*index);
+bool for_each_run(Palette& palette, const Rgba* begin, const Rgba* end, Use&& use) {
+  while (begin != end) {
+    const auto index = palette.index(std::bit_cast<std::uint32_t>(*begin));
+    if (!index) return false;
+    const Rgba* const next = end_of_run(begin, end);
+    use(*index, static_cast<std::size_t>(next - begin));
+    begin = next;
   }
   return true;
 }
@@ -92,7 +103,8 @@ bool for_each_index(Palette& palette, const Rgba* begin, const Rgba* end, Use&& 
 bool to_palette(const Picture& picture, PngImage& image) {
   Palette palette;
   const Rgba* const pixels = picture.pixels.data();
-  if (!for_each_index(palette, pixels, pixels + picture.pixels.size(), [](std::uint8_t) {})) {
+  if (!for_each_run(palette, pixels, pixels + picture.pixels.size(),
+                    [](std::uint8_t, std::size_t) {})) {
     return false;
   }
   // Indices of few colours are put 2, 4 or 8 a byte: the fewer bytes, the less to compress.
@@ -101,19 +113,27 @@ bool to_palette(const Picture& picture, PngImage& image) {
   const auto columns = static_cast<std::size_t>(picture.width);
   image.colour_type = 3;
   image.bits = static_cast<std::uint8_t>(bits);
-  make_rows(image, picture.height, (columns * bits + 7) / 8, 0,
-            [&](std::size_t row, std::uint8_t* to) {
-              unsigned byte = 0, filled = 0;
-              const Rgba* const begin = pixels + row * columns;
-              for_each_index(palette, begin, begin + columns, [&](std::uint8_t index) {
-                byte = byte << bits | index;
-                filled += bits;
-                if (filled < 8) return;
-                *to++ = static_cast<std::uint8_t>(byte);
-                filled = 0;
-              });
-              if (filled > 0) *to = static_cast<std::uint8_t>(byte << (8 - filled));
-            });
+  make_rows(
+      image, picture.height, (columns * bits + 7) / 8, 0, [&](std::size_t row, std::uint8_t* to) {
+        unsigned byte = 0, filled = 0;
+        const auto add = [&](std::uint8_t index) {
+          byte = byte << bits | index;
+          filled += bits;
+          if (filled < 8) return;
+          *to++ = static_cast<std::uint8_t>(byte);
+          filled = 0;
+        };
+        const Rgba* const begin = pixels + row * columns;
+        for_each_run(palette, begin, begin + columns, [&](std::uint8_t index, std::size_t count) {
+          for (; count > 0 && filled > 0; --count) add(index);
+          const std::size_t bytes = count * bits / 8;
+          // The index in each of a byte's places.
+          to = std::fill_n(to, bytes,
+                           static_cast<std::uint8_t>(index * (255u / ((1u << bits) - 1))));
+          for (count -= bytes * 8 / bits; count > 0; --count) add(index);
+        });
+        if (filled > 0) *to = static_cast<std::uint8_t>(byte << (8 - filled));
+      });
   bool opaque = true;
   for (const std::uint32_t colour : palette.colours()) {
     const auto rgba = std::bit_cast<Rgba>(colour);
@@ -128,17 +148,23 @@ bool to_palette(const Picture& picture, PngImage& image) {
 PngImage to_png_image(const Picture& picture) {
   PngImage image;
   if (to_palette(picture, image)) return image;
-  unsigned alpha = 255;
-  for (const Rgba& pixel : picture.pixels) alpha &= pixel.a;
-  const std::size_t channels = alpha == 255 ? 3 : 4;
   const auto columns = static_cast<std::size_t>(picture.width);
-  image.colour_type = channels == 3 ? 2 : 6;
-  // Each pixel is stored with its alpha, which the next one overwrites.
-  make_rows(image, picture.height, columns * channels, 1, [&](std::size_t row, std::uint8_t* to) {
-    const Rgba* const pixels = picture.pixels.data() + row * columns;
+  const auto row_at = [&](std::size_t row) { return picture.pixels.data() + row * columns; };
+  // Most pictures are opaque. Each pixel is stored with its alpha, which the next one overwrites.
+  image.colour_type = 2;
+  unsigned alpha = 255;
+  make_rows(image, picture.height, columns * 3, 1, [&](std::size_t row, std::uint8_t* to) {
+    const Rgba* const pixels = row_at(row);
     for (std::size_t i = 0; i < columns; ++i) {
-      std::memcpy(to + i * channels, &pixels[i], sizeof(Rgba));
+      std::memcpy(to + i * 3, &pixels[i], sizeof(Rgba));
+      alpha &= pixels[i].a;
     }
+  });
+  if (alpha == 255) return image;
+  image.colour_type = 6;
+  image.rows.reset();
+  make_rows(image, picture.height, columns * 4, 0, [&](std::size_t row, std::uint8_t* to) {
+    std::memcpy(to, row_at(row), columns * sizeof(Rgba));
   });
   return image;
 }

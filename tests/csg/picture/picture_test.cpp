@@ -552,20 +552,25 @@ std::vector<Rgba> written_and_read(const Picture& picture, unsigned& kind) {
 }
 
 TEST(WritePng, KeepsEveryColourInEveryForm) {
-  // 1, 2, 4 and 8 bits an index, then colours as they are; widths that do not fill bytes.
+  // 1, 2, 4 and 8 bits an index, then colours as they are; widths that do not fill bytes; runs of
+  // one colour that end inside bytes, and in the next row.
   for (const unsigned colours : {1u, 2u, 3u, 4u, 5u, 16u, 17u, 256u, 257u, 5000u}) {
     for (const int width : {1, 7, 64, 131}) {
-      for (const bool opaque : {true, false}) {
-        Picture picture{width, 61, {}};
-        for (unsigned i = 0; i < static_cast<unsigned>(width) * 61; ++i) {
-          const unsigned c = i * i / 3 % colours;
-          picture.pixels.emplace_back(c % 256, c / 256, 255 - c % 256,
-                                      opaque || c % 3 != 0 ? 255 : 100);
+      for (const unsigned run : {1u, 5u, 37u}) {
+        for (const bool opaque : {true, false}) {
+          Picture picture{width, 61, {}};
+          for (unsigned i = 0; i < static_cast<unsigned>(width) * 61; ++i) {
+            const unsigned at = i % 100 < 50 ? i : i / run;
+            const unsigned c = at * at / 3 % colours;
+            picture.pixels.emplace_back(c % 256, c / 256, 255 - c % 256,
+                                        opaque || c % 3 != 0 ? 255 : 100);
+          }
+          unsigned kind = 0;
+          EXPECT_EQ(written_and_read(picture, kind), picture.pixels)
+              << colours << " colours, width " << width << ", runs of " << run
+              << (opaque ? ", opaque" : "");
+          EXPECT_TRUE(colours > 256 || (kind & PNG_FORMAT_FLAG_COLORMAP) != 0);
         }
-        unsigned kind = 0;
-        EXPECT_EQ(written_and_read(picture, kind), picture.pixels)
-            << colours << " colours, width " << width << (opaque ? ", opaque" : "");
-        EXPECT_TRUE(colours > 256 || (kind & PNG_FORMAT_FLAG_COLORMAP) != 0);
       }
     }
   }
