@@ -11,6 +11,25 @@
 
 namespace strata {
 
+/// What the lights are made of.
+namespace studio {
+
+struct Light {
+  glm::vec3 towards;  ///< the light
+  float power;
+};
+extern const Light kKey, kFill, kRim;
+/// Half way between the key light and the eye.
+extern const glm::vec3 kMirror;
+constexpr float kGloss = 0.10f;
+constexpr int kGlossDoublings = 5;  ///< of the power of the cosine to the mirror: 32
+constexpr float kSky = 0.30f;       ///< light from everywhere, on a face that looks sideways
+constexpr float kFromUp = 0.12f;    ///< how much more comes from above, and less from below
+/// The part of the three lights that corners keep from a face.
+constexpr float kDirectShade = 0.50f;
+
+}  // namespace studio
+
 /// The light that falls on a face.
 struct Lit {
   float direct = 0;   ///< of the three lights
@@ -26,6 +45,7 @@ class StudioLights {
 
   /// @param normal  of a face towards the side that is seen, of length 1
   [[nodiscard]] Lit on(const glm::vec3& normal) const;
+  [[nodiscard]] const glm::vec3& up() const { return up_; }
 
  private:
   glm::vec3 up_;

@@ -88,13 +88,13 @@ void Shader::set_corners(Face& face, std::uint32_t solid, std::uint32_t triangle
     const glm::dvec4 h = image_from_world_ * glm::dvec4(p, 1.0);
     corners[at] = {h.x, h.y, h.w};
     const glm::dvec3 normal = glm::dmat3(eye_from_world_) * normals->at(triangle, c);
-    face.normals[at] = exit ? -normal : normal;
+    face.corners.normals[at] = exit ? -normal : normal;
   }
   // Homogeneous coordinates of the picture: shares are linear, and right in perspective (M. Olano
   // and T. Greer, "Triangle scan conversion using 2D homogeneous coordinates", 1997).
   const double area = glm::dot(corners[0], glm::cross(corners[1], corners[2]));
   for (std::size_t c = 0; c < 3; ++c) {
-    face.shares[c] =
+    face.corners.shares[c] =
         glm::cross(corners[(c + 1) % 3], corners[(c + 2) % 3]) * (area < 0 ? -1.0 : 1.0);
   }
 }
@@ -131,13 +131,19 @@ Shader::Face Shader::face(std::uint32_t solid, std::uint32_t tagged) const {
 }
 
 void Shader::colours(const Face& face, int u, int v, std::span<Rgba> pixels) const {
-  constexpr std::size_t kPixels = 64;
-  std::array<float, kPixels> open;
+  std::array<float, kCurvedPixels> open;
   open.fill(1.0f);
   while (!pixels.empty()) {
-    const std::size_t count = std::min(kPixels, pixels.size());
+    const std::size_t count = std::min(open.size(), pixels.size());
     if (!face.open) look_.openness->along(u, v, face.plane, std::span(open).first(count));
-    for (std::size_t i = 0; i < count; ++i, ++u) pixels[i] = colour(face, u, v, open[i]);
+    constexpr std::size_t kFew = 3;  // a vector costs as much as these
+    if (!face.curved || !studio_ || count <= kFew ||
+        !curved_colours(face.corners, face.base, lights_, u, v, open, pixels.first(count))) {
+      for (std::size_t i = 0; i < count; ++i) {
+        pixels[i] = colour(face, u + static_cast<int>(i), v, open[i]);
+      }
+    }
+    u += static_cast<int>(count);
     pixels = pixels.subspan(count);
   }
 }
@@ -152,7 +158,7 @@ Rgba Shader::colour(const Face& face, int u, int v, float open) const {
   const glm::dvec3 at(u + 0.5, v + 0.5, 1.0);
   glm::dvec3 normal(0.0);
   for (std::size_t c = 0; c < 3; ++c) {
-    normal += std::max(0.0, glm::dot(face.shares[c], at)) * face.normals[c];
+    normal += std::max(0.0, glm::dot(face.corners.shares[c], at)) * face.corners.normals[c];
   }
   const double length = glm::length(normal);
   const Lit light = length > 0 ? light_on(normal / length) : face.light;
@@ -259,7 +265,7 @@ class SampleShader {
   }
   /// The same for pixels from (u, v) on.
   void along(std::uint32_t solid, std::uint32_t face, int u, int v, std::span<Rgba> pixels) {
-    if (uniform(solid, face)) {
+    if (uniform_along(solid, face, u, v, static_cast<int>(pixels.size()))) {
       std::fill(pixels.begin(), pixels.end(), last_->colour);
     } else {
       shader_->colours(*last_, u, v, pixels);
@@ -408,36 +414,50 @@ void TileShader::shade_row(const SurfaceImage& tile, const AreaFaces::Face* face
     const std::size_t first = begin + block * across;
     return {look_at(tile, first, Block(), rows_.down), {tile.solid[first], tile.triangle[first]}};
   };
+  const int row = rows_.ground.first + v;
+  // Neighbours that show the same face are coloured at once.
+  struct Run {
+    AreaFaces::Face face;
+    std::size_t begin = 0, count = 0;
+  } run;
+  const auto end_run = [&] {
+    if (run.count == 0) return;
+    samples_->along(run.face.solid, run.face.triangle, u + static_cast<int>(run.begin), row,
+                    std::span(colours + run.begin, run.count));
+    covered_ += run.count;
+    run.count = 0;
+  };
+  const auto show = [&](const AreaFaces::Face& face, std::size_t at, std::size_t pixels) {
+    if (run.face != face || run.begin + run.count != at) {
+      end_run();
+      run = {face, at, 0};
+    }
+    run.count += pixels;
+  };
   for (std::size_t block = 0; block < count; block += at_once) {
-    const std::size_t pixels = std::min(at_once, count - block), first = begin + block * across;
+    const std::size_t pixels = std::min(at_once, count - block);
     const auto [seen, face] = look(block);
     if (seen == Seen::kNothing) {
       std::fill_n(colours + block, pixels, background);
       continue;
     }
-    const int column = u + static_cast<int>(block), row = rows_.ground.first + v;
     if (seen == Seen::kOneFace) {
-      std::size_t run = pixels;
-      if (samples_->uniform_along(face.solid, face.triangle, column, row,
-                                  static_cast<int>(pixels))) {
-        std::fill_n(colours + block, pixels, samples_->colour());
-      } else {
-        while (block + run + at_once <= count) {
-          const Sight next = look(block + run);
-          if (next.seen != Seen::kOneFace || next.face != face) break;
-          run += at_once;
-        }
-        samples_->along(face.solid, face.triangle, column, row, std::span(colours + block, run));
-        block += run - pixels;
-      }
-      covered_ += run;
+      show(face, block, pixels);
       continue;
     }
-    for (std::size_t i = 0; i < pixels; ++i) {
-      colours[block + i] =
-          pixel(tile, first + i * across, column + static_cast<int>(i), row, background);
+    for (std::size_t i = block; i < block + pixels; ++i) {
+      const std::size_t first = begin + i * across;
+      const Seen pixel = look_at(tile, first, across, rows_.down);
+      if (pixel == Seen::kNothing) {
+        colours[i] = background;
+      } else if (pixel == Seen::kOneFace) {
+        show({tile.solid[first], tile.triangle[first]}, i, 1);
+      } else {
+        colours[i] = mixed_pixel(tile, first, u + static_cast<int>(i), row, background);
+      }
     }
   }
+  end_run();
 }
 
 /// A block of pixels of one sample each from (u, v) of the picture on, where it shows nothing but
@@ -515,16 +535,11 @@ void TileShader::shade_runs(const SurfaceImage& tile, std::size_t begin, int u, 
   }
 }
 
-/// Pixel (u, v) of the picture, whose first sample is at `begin`.
-Rgba TileShader::pixel(const SurfaceImage& tile, std::size_t begin, int u, int v, Rgba background) {
+/// Pixel (u, v) of the picture, whose samples differ; the first is at `begin`.
+Rgba TileShader::mixed_pixel(const SurfaceImage& tile, std::size_t begin, int u, int v,
+                             Rgba background) {
   const auto across = static_cast<std::size_t>(rows_.across);
   const auto width = static_cast<std::size_t>(tile.width);
-  const Seen seen = look_at(tile, begin, across, rows_.down);
-  if (seen == Seen::kNothing) return background;
-  if (seen == Seen::kOneFace) {
-    ++covered_;
-    return samples_->at(tile.solid[begin], tile.triangle[begin], u, v);
-  }
   std::size_t last = begin;
   Rgba colour(0), pixel;
   auto sample = colours_.begin();

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "csg/geometry.h"
+#include "csg/picture/curved_colours.h"
 #include "csg/picture/solid_normals.h"
 #include "csg/picture/view_openness.h"
 #include "csg/surface/tile_surface.h"
@@ -54,8 +55,7 @@ class Shader {
     glm::vec3 base{0.0f};  ///< before light
     Lit light;             ///< where it is flat
     SeenPlane plane;
-    /// Share of a corner at (u, v, 1), not scaled; its normal in eye space.
-    std::array<glm::dvec3, 3> shares, normals;
+    CurvedFace corners;  ///< where it is curved
   };
   /// @param face  [exit:1 | triangle:31]
   [[nodiscard]] Face face(std::uint32_t solid, std::uint32_t face) const;
@@ -147,7 +147,7 @@ class TileShader {
                    std::span<Rgba> colours);
   void shade_runs(const SurfaceImage& tile, std::size_t begin, int u, int v, Rgba background,
                   std::span<Rgba> colours);
-  Rgba pixel(const SurfaceImage& tile, std::size_t begin, int u, int v, Rgba background);
+  Rgba mixed_pixel(const SurfaceImage& tile, std::size_t begin, int u, int v, Rgba background);
 
   SampleRows rows_;
   std::size_t width_;
