@@ -1,10 +1,12 @@
 #pragma once
 
 #include <bit>
+#include <cfloat>
 #include <charconv>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <iterator>
 #include <limits>
 #include <string>
 #include <string_view>
@@ -28,6 +30,8 @@ inline constexpr double kPowers[23] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6, 
                                        1e8,  1e9,  1e10, 1e11, 1e12, 1e13, 1e14, 1e15,
                                        1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
 
+/// Whole numbers up to this are exact doubles.
+inline constexpr std::uint64_t kExactWholes = std::uint64_t{1} << 53;
 inline constexpr std::uint64_t kWholePowers[9] = {1,      10,      100,      1000,     10000,
                                                   100000, 1000000, 10000000, 100000000};
 
@@ -83,17 +87,40 @@ struct Digits {
 /// is right for up to 19 in all
 inline std::ptrdiff_t append_digits(const char*& p, std::uint64_t& number) {
   const char* const begin = p;
-  if (may_read(p, 8)) {
-    const Digits first(p);
-    number = number * kWholePowers[first.count] + first.value;
-    p += first.count;
-    if (first.count < 8) return p - begin;
+  while (may_read(p, 8)) {
+    const Digits next(p);
+    number = number * kWholePowers[next.count] + next.value;
+    p += next.count;
+    if (next.count < 8) return p - begin;
   }
   for (; is_digit(*p); ++p) number = number * 10 + static_cast<std::uint64_t>(*p - '0');
   return p - begin;
 }
 
-/// Reads the numbers that the fast path cannot: long mantissas, large exponents, nan, inf, 1.#IND.
+/// Divides by a power of ten, correctly rounded. @return false if it cannot
+inline bool divide_by_power(std::uint64_t mantissa, std::size_t power, double& quotient) {
+  if (power >= std::size(kPowers)) return false;
+  // Clinger's fast path (How to Read Floating Point Numbers Accurately, PLDI 1990). The mantissa
+  // and the power are exact doubles, so their quotient is rounded only once, and correctly.
+  if (mantissa <= kExactWholes) {
+    quotient = static_cast<double>(mantissa) / kPowers[power];
+    return true;
+  }
+#if defined(__x86_64__) && LDBL_MANT_DIG == 64
+  // Any mantissa is an exact long double. Their quotient, of 64 bits, is rounded to the 53 of a
+  // double as the exact one is, unless it lies half way between two doubles.
+  const long double longer = static_cast<long double>(mantissa) / kPowers[power];
+  std::uint64_t bits = 0;
+  std::memcpy(&bits, &longer, sizeof bits);
+  quotient = static_cast<double>(longer);
+  return (bits & 0x7ffu) != 0x400u;
+#else
+  return false;
+#endif
+}
+
+/// Reads the numbers that the fast path cannot: longer mantissas, large exponents, nan,
+/// inf, 1.#IND.
 const char* parse_double_slowly(const char* text, double& value);
 }  // namespace scanner
 
@@ -115,9 +142,6 @@ inline const char* parse_double(const char* text, double& value) {
     exponent = -behind;
     count += behind;
   }
-  // Clinger's fast path (How to Read Floating Point Numbers Accurately, PLDI 1990). The mantissa
-  // and the power are exact doubles, so their product or quotient is rounded only once, and
-  // correctly.
   if (count == 0 || count > 19 || (*p == '#' && p[-1] == '.'))
     return scanner::parse_double_slowly(text, value);
   if ((*p | 0x20) == 'e') {
@@ -131,12 +155,17 @@ inline const char* parse_double(const char* text, double& value) {
       p = q;
     }
   }
-  if (mantissa > (std::uint64_t{1} << 53) || exponent < -22 || exponent > 22) {
-    return scanner::parse_double_slowly(text, value);
+  double size = 0.0;
+  if (exponent <= 0) {
+    if (!scanner::divide_by_power(mantissa, static_cast<std::size_t>(-exponent), size)) {
+      return scanner::parse_double_slowly(text, value);
+    }
+  } else {
+    if (mantissa > scanner::kExactWholes || exponent > 22) {
+      return scanner::parse_double_slowly(text, value);
+    }
+    size = static_cast<double>(mantissa) * scanner::kPowers[exponent];  // of exact doubles
   }
-  const auto whole = static_cast<double>(mantissa);
-  const double size =
-      exponent < 0 ? whole / scanner::kPowers[-exponent] : whole * scanner::kPowers[exponent];
   value = negative ? -size : size;
   return p;
 }

@@ -2,9 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
+#include <iterator>
 #include <random>
 #include <string>
 
@@ -86,6 +88,28 @@ TEST(TextScanner, HalfWayCasesAndEdgesOfTheFastPath) {
                            "1e+5"}) {
     EXPECT_EQ(std::bit_cast<std::uint64_t>(scanned(text)),
               std::bit_cast<std::uint64_t>(std::strtod(text, nullptr)))
+        << text;
+  }
+}
+
+TEST(TextScanner, LongMantissasAreCorrectlyRoundedHalfWayToo) {
+  std::mt19937_64 random(13);
+  for (int i = 0; i < 200000; ++i) {
+    std::string text;
+    if (i % 2 == 0) {  // 16 to 19 digits, the point anywhere
+      text = std::to_string(1 + random() % 9);
+      for (std::uint64_t n = 15 + random() % 4; n != 0; --n) {
+        text += static_cast<char>('0' + random() % 10);
+      }
+      text.insert(random() % (text.size() + 1), 1, '.');
+    } else {  // half way between two doubles, or a little beside it
+      const std::uint64_t low = std::uint64_t{1} << (51 + random() % 3);
+      const std::uint64_t whole = low + random() % low;
+      const char* const quarters[] = {"0", "25", "5", "75", "26", "24", "51", "49", "01", "99"};
+      text = std::to_string(whole) + '.' + quarters[random() % std::size(quarters)];
+    }
+    ASSERT_EQ(std::bit_cast<std::uint64_t>(scanned(text)),
+              std::bit_cast<std::uint64_t>(std::strtod(text.c_str(), nullptr)))
         << text;
   }
 }
