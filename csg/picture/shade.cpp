@@ -540,20 +540,30 @@ Rgba TileShader::mixed_pixel(const SurfaceImage& tile, std::size_t begin, int u,
                              Rgba background) {
   const auto across = static_cast<std::size_t>(rows_.across);
   const auto width = static_cast<std::size_t>(tile.width);
-  std::size_t last = begin;
-  Rgba colour(0), pixel;
+  // Faces of the pixel: in each row of samples they come again.
+  struct Known {
+    AreaFaces::Face face;
+    Rgba colour;
+  };
+  std::array<Known, 4> known;
+  std::size_t count = 0;
+  const auto colour_of = [&](const AreaFaces::Face& face) {
+    for (std::size_t i = 0; i < count; ++i) {
+      if (known[i].face == face) return known[i].colour;
+    }
+    Known& one = known[std::min(count, known.size() - 1)];
+    one = {face, samples_->at(face.solid, face.triangle, u, v)};
+    count = std::min(count + 1, known.size());
+    return one.colour;
+  };
+  Rgba pixel;
   auto sample = colours_.begin();
   for (int y = 0; y < rows_.down; ++y) {
     const std::size_t first = begin + static_cast<std::size_t>(y) * width;
     for (std::size_t at = first; at < first + across; ++at, ++sample) {
-      *sample = Rgba(0);
-      if (tile.depth[at] == SurfaceImage::kNone) continue;
-      if (colour.a == 0 || tile.solid[at] != tile.solid[last] ||
-          tile.triangle[at] != tile.triangle[last]) {
-        colour = samples_->at(tile.solid[at], tile.triangle[at], u, v);
-        last = at;
-      }
-      *sample = colour;
+      *sample = tile.depth[at] == SurfaceImage::kNone
+                    ? Rgba(0)
+                    : colour_of({tile.solid[at], tile.triangle[at]});
     }
   }
   covered_ += average_row(colours_.data(), across, rows_.across, rows_.down, background,
