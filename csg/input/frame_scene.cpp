@@ -117,11 +117,15 @@ FrameReach SceneReach::of(const Solid& solid) {
     // Normals in the mesh's own space: no point is moved.
     const glm::dmat3 turn(place);
     const glm::dvec3 moved(place[3]);
-    for (std::size_t side = 0; side < reach.size(); ++side) {
-      const glm::dvec3 normal = fit_->normals()[side], own = normal * turn;
-      double most = -std::numeric_limits<double>::infinity();
-      for (const glm::dvec3& p : positions) most = std::max(most, glm::dot(own, p));
-      reach[side] = most + glm::dot(normal, moved);
+    std::array<glm::dvec3, 4> own;
+    for (std::size_t side = 0; side < own.size(); ++side) own[side] = fit_->normals()[side] * turn;
+    for (const glm::dvec3& p : positions) {
+      for (std::size_t side = 0; side < own.size(); ++side) {
+        reach[side] = std::max(reach[side], glm::dot(own[side], p));
+      }
+    }
+    for (std::size_t side = 0; side < own.size(); ++side) {
+      reach[side] += glm::dot(fit_->normals()[side], moved);
     }
     return reach;
   }

@@ -39,8 +39,11 @@ Reach reach_of(const Solid& solid) {
     return (i < 3 ? p[static_cast<int>(i)] : -p[static_cast<int>(i) - 3]) == side(reach.box, i);
   };
   const glm::dmat4& place = solid.world_from_mesh;
+  std::vector<bool> seen(solid.mesh->positions.size(), false);
   for (const glm::uvec3& triangle : solid.mesh->triangles) {
     for (int k = 0; k < 3; ++k) {
+      if (seen[triangle[k]]) continue;
+      seen[triangle[k]] = true;
       const glm::dvec3 p(place * glm::dvec4(solid.mesh->positions[triangle[k]], 1.0));
       for (std::size_t i = 0; i < 6; ++i) {
         if (!reaches(i, p)) continue;
