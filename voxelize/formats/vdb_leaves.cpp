@@ -25,13 +25,6 @@ constexpr std::uint64_t mix(std::uint64_t value) {
   return value ^ value >> 31;
 }
 
-template <class T>
-std::unique_ptr<T[]> exact_copy(const std::vector<T>& items) {
-  auto copy = std::make_unique_for_overwrite<T[]>(items.size());
-  std::copy(items.begin(), items.end(), copy.get());
-  return copy;
-}
-
 }  // namespace
 
 std::array<float, 3> VdbLeafBuilder::light_of(std::uint32_t value) {
@@ -78,13 +71,14 @@ std::unique_ptr<VdbLeafTile> VdbLeafBuilder::build(const VoxelIntervals& slab, i
     tile->first_leaf[next] = static_cast<std::uint32_t>(leaves_.size());
     tile->first_run[next] = static_cast<std::uint32_t>(runs_.size());
   }
-  tile->leaves = exact_copy(leaves_);
-  tile->leaf_z = exact_copy(leaf_z_);
-  tile->runs = exact_copy(runs_);
+  // Copies, which take no more room than they need.
+  tile->leaves = leaves_;
+  tile->leaf_z = leaf_z_;
+  tile->runs = runs_;
   if (divisor_ != 0) {
-    tile->run_values = exact_copy(run_values_);
+    tile->run_values = run_values_;
     tile->values.assign(values_.begin(), values_.end());
-    tile->first_value = exact_copy(first_value_);
+    tile->first_value = first_value_;
   }
   tile->hash = hash_;
   tile->lower += glm::ivec3(first_x * 8, first_y * 8, 0);

@@ -47,18 +47,18 @@ struct VdbLeafTile {
 
   std::array<std::uint32_t, kLeafColumns + 1> first_leaf{};  ///< into leaves, leaf_z
   std::array<std::uint32_t, kLeafColumns + 1> first_run{};   ///< into runs
-  std::unique_ptr<VdbLeaf[]> leaves;
-  std::unique_ptr<std::uint16_t[]> leaf_z;  ///< z / 8 of a leaf; increasing within a leaf column
-  std::unique_ptr<Run[]> runs;              ///< increasing within a leaf column
+  std::vector<VdbLeaf> leaves;
+  std::vector<std::uint16_t> leaf_z;  ///< z / 8 of a leaf; increasing within a leaf column
+  std::vector<Run> runs;              ///< increasing within a leaf column
   // With values only:
-  std::unique_ptr<std::uint32_t[]> run_values;  ///< the bits of a float, one a run
+  std::vector<std::uint32_t> run_values;  ///< the bits of a float, one a run
   Bytes
       values;  ///< of the leaves, one after the other, those of the solid voxels: see put_values()
-  std::unique_ptr<std::uint32_t[]> first_value;  ///< into values; one a leaf and the end
+  std::vector<std::uint32_t> first_value;  ///< into values; one a leaf and the end
 
   /// 1 without values.
   [[nodiscard]] std::uint32_t run_value(std::uint32_t run) const {
-    return run_values ? run_values[run] : 1;
+    return run_values.empty() ? 1 : run_values[run];
   }
   [[nodiscard]] std::span<const std::byte> leaf_values(std::uint32_t leaf) const {
     return std::span(values).subspan(first_value[leaf], first_value[leaf + 1] - first_value[leaf]);

@@ -235,7 +235,8 @@ VdbWriter::LeafColumnArray VdbWriter::leaf_columns(int x, int y, int first_z) co
     LeafColumn& column = columns[size(c)];
     column = {tile, tile->first_leaf[i], tile->first_leaf[i + 1], tile->first_run[i],
               tile->first_run[i + 1]};
-    const std::uint16_t* leaf_z = tile->leaf_z.get();
+    if (first_z == 0) continue;
+    const std::uint16_t* leaf_z = tile->leaf_z.data();
     column.leaf = static_cast<std::uint32_t>(
         std::lower_bound(leaf_z + column.leaf, leaf_z + column.leaf_end, first_z) - leaf_z);
     while (column.run < column.run_end && tile->runs[column.run].end <= first_z) ++column.run;
@@ -413,7 +414,7 @@ void VdbWriter::make_topology(const TreeBlock& block, Bytes& out) {
       }
       if (column.leaf > first) {
         const std::size_t length = (column.leaf - first) * sizeof(VdbLeaf);
-        std::memcpy(to, column.tile->leaves.get() + first, length);
+        std::memcpy(to, column.tile->leaves.data() + first, length);
         to += length;
       }
       child[c] = static_cast<std::uint16_t>(child_bits);

@@ -242,11 +242,12 @@ class WallSearch {
         if ((here >> (2 * axis) & 1u) == 0) continue;
         const unsigned left = 2u << (2 * axis);
         const auto length = static_cast<std::size_t>(cells_[static_cast<int>(axis)]);
-        const bool last = at / strides[axis] % length + 1 == length;
-        const bool next = !last && (sides_[at + strides[axis]] & left) != 0;
+        const std::size_t beyond = at + strides[axis];  // another row, where `at` is the last
+        const bool next = beyond < count_ && (sides_[beyond] & left) != 0 &&
+                          at / strides[axis] % length + 1 != length;
         const auto bit = static_cast<Sides>(1u << axis);
         if (next || (here & left) != 0) near.emplace_back(at, bit);
-        if (next) near.emplace_back(at + strides[axis], bit);
+        if (next) near.emplace_back(beyond, bit);
       }
     };
     std::size_t at = 0;
