@@ -11,10 +11,10 @@
 // at most 2^-24 (3 |n0 + 1/2| + 4 |b y| + |n + 1/2|) / |a| < 0.3 / |a|.
 //
 // Depth is the floor of (n + 1/2) / area, as in raster/rasterize-inl.h, with n below 2^47 all over
-// the tile: what the roundings of 1 / area and of the sum of three products move is below
-// 2^-53 2^49 / area = 1 / 16 area, and it keeps 1 / 2 area from whole numbers. 1.5 2^20 is added to
-// it, so that the upper word of the double ends with its whole part, which has less than 20 bits;
-// that moves it by at most 2^-30, not more than 1 / 16 area.
+// the tile, since slopes are below 2^30: what the roundings of 1 / area and of the sum of three
+// products move is below 2^-53 2^49 / area = 1 / 16 area, and it keeps 1 / 2 area from whole
+// numbers. 1.5 2^20 is added to it, so that the upper word of the double ends with its whole part,
+// which has less than 20 bits; that moves it by at most 2^-30, not more than 1 / 16 area.
 
 #if defined(STRATA_SPANS_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef STRATA_SPANS_INL_H
@@ -37,9 +37,10 @@ namespace strata {
 namespace HWY_NAMESPACE {
 
 /// Triangles become spans where they extend over fewer lattice steps across the image, and along
-/// the ray.
+/// the ray, and where the product of both is less than the last: then slopes fit 31 bits.
 inline constexpr std::int32_t kSpanExtent = std::int32_t{1} << 13;
-inline constexpr std::int32_t kSpanDepthExtent = std::int32_t{1} << 16;
+inline constexpr std::int32_t kSpanDepthExtent = std::int32_t{1} << 18;
+inline constexpr float kSpanProduct = 0x1p29F;
 
 /// A lane a triangle, and then a lane a pixel.
 using SpanI32 = hn::CappedTag<std::int32_t, 8>;
@@ -137,10 +138,13 @@ class SpanBatch {
     }
   }
 
-  /// Collects the blocks of the small triangles among `ids`.
+  /// Collects the blocks of the small triangles among `ids` that `sink` wants.
   /// @return lanes of triangles that may cover pixels and are not small
-  HWY_INLINE hn::Mask<SpanI32> load(const Corners& corners, std::span<const std::uint32_t> ids) {
+  template <class Sink>
+  HWY_INLINE hn::Mask<SpanI32> load(const Corners& corners, std::span<const std::uint32_t> ids,
+                                    const Sink& sink) {
     const SpanI32 di;
+    const SpanF32 df;
     const auto get = [&](int i, int axis) { return hn::Load(di, corners.at[i][axis]); };
     const SpanVecI32 zero = hn::Zero(di), one = hn::Set(di, 1);
     const SpanVecI32 half = hn::Set(di, kLatticeSteps / 2);
@@ -165,9 +169,12 @@ class SpanBatch {
     const auto covers = hn::And(hn::FirstN(di, ids.size()),
                                 hn::And(hn::Lt(box_u0, box_u1), hn::Lt(box_v0, box_v1)));
     const SpanVecI32 across = hn::Max(hn::Sub(u_high, u_low), hn::Sub(v_high, v_low));
+    const SpanVecI32 along = hn::Sub(w_high, w_low);
+    const auto product = hn::Mul(hn::ConvertTo(df, across), hn::ConvertTo(df, along));
+    const auto fits = hn::RebindMask(di, hn::Lt(product, hn::Set(df, kSpanProduct)));
     const auto small =
-        hn::And(covers, hn::And(hn::Lt(across, hn::Set(di, kSpanExtent)),
-                                hn::Lt(hn::Sub(w_high, w_low), hn::Set(di, kSpanDepthExtent))));
+        hn::And(hn::And(covers, fits), hn::And(hn::Lt(across, hn::Set(di, kSpanExtent)),
+                                               hn::Lt(along, hn::Set(di, kSpanDepthExtent))));
     // Beyond those extents products would not fit.
     const auto keep = [&](SpanVecI32& value) { value = hn::IfThenElseZero(small, value); };
     keep(u1), keep(v1), keep(w1), keep(u2), keep(v2), keep(w2);
@@ -184,7 +191,13 @@ class SpanBatch {
     };
     swap(u1, u2), swap(v1, v2), swap(w1, w2);
     area = hn::Abs(area);
-    const auto chosen = hn::And(small, hn::Gt(area, zero));
+    auto chosen = hn::And(small, hn::Gt(area, zero));
+    const auto exits = hn::VecFromMask(di, frame_.w == 1 ? clockwise : hn::Not(clockwise));
+    if constexpr (requires { sink.wants(true); }) {
+      const auto wanted = [&](bool exit) { return hn::Set(di, sink.wants(exit) ? -1 : 0); };
+      chosen = hn::And(chosen, hn::MaskFromVec(hn::Or(hn::And(exits, wanted(true)),
+                                                      hn::AndNot(exits, wanted(false)))));
+    }
     height_ = hn::IfThenElseZero(chosen, hn::Sub(box_v1, box_v0));
     rows_ = hn::GetLane(hn::MaxOfLanes(di, height_));
     row_begin_ =
@@ -219,7 +232,6 @@ class SpanBatch {
     const auto beyond =
         hn::Or(hn::Lt(hn::Add(w0, w_low), one), hn::Gt(hn::Add(w0, w_high), hn::Set(di, deepest_)));
     clamps_ = !hn::AllFalse(di, hn::And(chosen, beyond));
-    const auto exits = hn::VecFromMask(di, frame_.w == 1 ? clockwise : hn::Not(clockwise));
     set_surfaces(ids, hn::ShiftLeft<31>(hn::BitCast(SpanU32(), exits)));
     return hn::AndNot(small, covers);
   }
@@ -228,7 +240,8 @@ class SpanBatch {
   /// pixels), then sink.make_bases(depths, surfaces, bases): what the sink makes of the depth that
   /// those of a triangle count from, and of its surface, which is DepthItem's. Then
   /// sink.put_span(first pixel, depths, covered, base) for each block of kSpanLanes pixels that
-  /// follow each other. A pixel counts from that of the tile, kTileSide a row.
+  /// follow each other. A pixel counts from that of the tile, kTileSide a row. A sink that has
+  /// steepness() gets the steepness of each triangle before its bases.
   template <class Sink>
   HWY_INLINE void cover(Sink& sink) {
     if (rows_ <= 0) return;
@@ -258,7 +271,12 @@ class SpanBatch {
     typename Sink::SpanBase bases[kSpanLanes];
     alignas(64) std::int32_t depths[kSpanLanes];
     hn::Store(base_, di, depths);
-    sink.make_bases(clamps ? hn::Zero(di) : base_, surface_, bases);
+    const SpanVecI32 lifts = clamps ? hn::Zero(di) : base_;
+    if constexpr (requires { sink.steepness(0.0); }) {
+      sink.make_bases(lifts, surface_, steepness_, bases);
+    } else {
+      sink.make_bases(lifts, surface_, bases);
+    }
     for (std::size_t i = 0; i < count; ++i) {
       // Loaded apart, which takes less than to take a word apart.
       std::uint16_t pixel;
@@ -324,7 +342,9 @@ class SpanBatch {
       const SpanVecF64 step = hn::Mul(inverse, hn::Set(df, static_cast<double>(kLatticeSteps)));
       plane_[part] = hn::Add(hn::Mul(hn::Add(numerator, half), inverse), upper);
       plane_v_[part] = hn::Mul(sv, step);
-      hn::Store(hn::Mul(su, step), df, plane_u_ + static_cast<std::size_t>(part) * hn::Lanes(df));
+      const std::size_t first = static_cast<std::size_t>(part) * hn::Lanes(df);
+      hn::Store(hn::Mul(su, step), df, plane_u_ + first);
+      hn::Store(hn::Mul(hn::Add(hn::Abs(su), hn::Abs(sv)), inverse), df, steepness_ + first);
     }
   }
 
@@ -404,6 +424,7 @@ class SpanBatch {
   SpanVecF64 plane_[2],
       plane_v_[2];  ///< at the first column of the tile and the first row of a box
   alignas(64) double plane_u_[kSpanLanes];
+  alignas(64) double steepness_[kSpanLanes];           ///< SetupBatch::steepness()
   alignas(64) double row_planes_[kRows * kSpanLanes];  ///< by row of a box, and lane
   alignas(64) double columns_[kTileSide];              ///< their numbers, as upper_words() asks
   /// [covered:8 | row of the box:5 | lane:3 | first pixel:16], or with fewer bits for lanes
@@ -439,7 +460,7 @@ HWY_INLINE void rasterize_spans(const LatticeMesh& mesh, const RasterTarget& tar
   for (std::size_t begin = 0; begin < ids.size(); begin += kLanes, turn ^= 1) {
     const auto part = part_at(begin);
     if (begin + kLanes < ids.size()) corners[turn ^ 1].gather(mesh, part_at(begin + kLanes), frame);
-    const auto large = batch.load(corners[turn], part);
+    const auto large = batch.load(corners[turn], part, sink);
     if (!hn::AllFalse(SpanI32(), large)) {
       if (left_count + kLanes > std::size(left)) rasterize_left();
       alignas(64) std::int32_t marks[kSpanLanes];

@@ -7,6 +7,7 @@
 
 #include "csg/surface/coincidence_reach-inl.h"
 #include "raster/rasterize-inl.h"
+#include "raster/spans-inl.h"
 
 // Visible surfaces without lists: each solid keeps its own sorted layers, and a vector of pixels
 // asks the tree where it is met first. A node answers with its value at a depth and the next depth
@@ -34,14 +35,16 @@ HWY_INLINE M no_lane(D d) { return hn::Ne(hn::Zero(d), hn::Zero(d)); }
 /// Inserts crossings into a leaf's layers, sorted by key, then triangle.
 class LayerSink {
  public:
-  LayerSink(LeafLayers& leaf, Arena& arena, double steep_from)
+  /// @param clip  spans count from its first pixel
+  LayerSink(LeafLayers& leaf, Arena& arena, double steep_from, const PixelRect& clip)
       : leaf_(&leaf),
         arena_(&arena),
         steep_from_(steep_from),
         convex_(leaf.kind == LeafLayers::Kind::kConvex),
         u0_(leaf.rect.u0),
         v0_(leaf.rect.v0),
-        stride_(leaf.stride) {}
+        stride_(leaf.stride),
+        spans_at_(pixel_at(clip.u0, clip.v0)) {}
   HWY_INLINE void steepness(double steepness) {
     steep_ = steepness > steep_from_ ? LeafLayers::kSteep : 0;
     leaf_->steep = leaf_->steep || steep_ != 0;
@@ -60,24 +63,33 @@ class LayerSink {
   template <class D2, class V2 = hn::Vec<D2>>
   HWY_INLINE void put_row(D2 d, int u, int v, V2 depth, hn::Mask<D2> covered) {
     fragments_ += hn::CountTrue(d, covered);
-    const std::size_t at = pixel_at(u, v);
-    auto left = covered;
-    if (convex_) {  // as place() does
-      if (HWY_UNLIKELY(own_keys_ == nullptr)) find_own_layer();
-      std::uint32_t* HWY_RESTRICT keys = own_keys_ + at;
-      std::uint32_t* HWY_RESTRICT triangles = own_triangles_ + at;
-      const auto old_key = hn::LoadU(d, keys);
-      const auto take = hn::And(covered, hn::Eq(old_key, hn::Set(d, LeafLayers::kEmpty)));
-      hn::StoreU(hn::IfThenElse(take, depth, old_key), d, keys);
-      hn::StoreU(hn::IfThenElse(take, hn::Set(d, triangle_), hn::LoadU(d, triangles)), d,
-                 triangles);
-      left = hn::AndNot(take, covered);
+    put(d, pixel_at(u, v), depth, covered);
+  }
+  void begin_spans(int, int, std::size_t pixels) { fragments_ += pixels; }
+  struct SpanBase {
+    std::uint32_t depth, exit, triangle;
+  };
+  HWY_INLINE void make_bases(simd::SpanVecI32 depths, simd::SpanVecU32 surfaces,
+                             const double* steepness, SpanBase* bases) const {
+    alignas(64) std::int32_t from[simd::kSpanLanes];
+    alignas(64) std::uint32_t surface[simd::kSpanLanes];
+    hn::Store(depths, simd::SpanI32(), from);
+    hn::Store(surfaces, simd::SpanU32(), surface);
+    for (int i = 0; i < simd::kSpanLanes; ++i) {
+      const std::uint32_t steep = steepness[i] > steep_from_ ? LeafLayers::kSteep : 0;
+      bases[i] = {static_cast<std::uint32_t>(from[i]), surface[i] >> 31,
+                  (surface[i] & 0x7fffffffu) | steep};
     }
-    if (HWY_LIKELY(hn::AllFalse(d, left))) return;
-    alignas(64) std::uint32_t words[HWY_MAX_BYTES / 4];
-    const V2 key = hn::Or(hn::ShiftLeft<1>(depth), hn::Set(d, exit_));
-    hn::Store(hn::IfThenElseZero(left, hn::Add(key, hn::Set(d, 1u))), d, words);
-    insert(d, at, words);
+  }
+  template <class D2, class V2 = hn::Vec<D2>>
+  HWY_INLINE void put_span(D2 d, std::size_t pixel, V2 depth, V2 covered, const SpanBase& base) {
+    const std::size_t at =
+        spans_at_ + pixel / kTileSide * static_cast<std::size_t>(stride_) + pixel % kTileSide;
+    if (convex_ && exit_ != base.exit) own_keys_ = nullptr;
+    exit_ = base.exit;
+    triangle_ = base.triangle;
+    marks_ |= base.triangle;
+    put(d, at, hn::Add(depth, hn::Set(d, base.depth)), hn::MaskFromVec(covered));
   }
   /// key + 1, so that 0 is no crossing.
   template <class D2, class V2 = hn::Vec<D2>>
@@ -100,7 +112,11 @@ class LayerSink {
     const std::uint32_t word[1] = {(depth << 1 | exit_) + 1};
     insert(d, pixel_at(u, v), word);
   }
-  [[nodiscard]] std::uint64_t fragments() const { return fragments_; }
+  /// Gives the number of crossings.
+  std::uint64_t finish() {
+    leaf_->steep = leaf_->steep || (marks_ & LeafLayers::kSteep) != 0;
+    return fragments_;
+  }
 
  private:
   [[nodiscard]] HWY_INLINE std::size_t pixel_at(int u, int v) const {
@@ -111,10 +127,31 @@ class LayerSink {
     own_keys_ = leaf_->keys[exit_];
     own_triangles_ = leaf_->triangles[exit_];
   }
+  template <class D2, class V2 = hn::Vec<D2>>
+  HWY_INLINE void put(D2 d, std::size_t at, V2 depth, hn::Mask<D2> covered) {
+    auto left = covered;
+    if (convex_) {  // as place() does
+      if (HWY_UNLIKELY(own_keys_ == nullptr)) find_own_layer();
+      std::uint32_t* HWY_RESTRICT keys = own_keys_ + at;
+      std::uint32_t* HWY_RESTRICT triangles = own_triangles_ + at;
+      const auto old_key = hn::LoadU(d, keys);
+      const auto take = hn::And(covered, hn::Eq(old_key, hn::Set(d, LeafLayers::kEmpty)));
+      hn::StoreU(hn::IfThenElse(take, depth, old_key), d, keys);
+      hn::StoreU(hn::IfThenElse(take, hn::Set(d, triangle_), hn::LoadU(d, triangles)), d,
+                 triangles);
+      left = hn::AndNot(take, covered);
+    }
+    if (HWY_LIKELY(hn::AllFalse(d, left))) return;
+    const V2 key = hn::Or(hn::ShiftLeft<1>(depth), hn::Set(d, exit_));
+    insert_key(d, at, hn::IfThenElse(left, key, hn::Set(d, LeafLayers::kEmpty)));
+  }
   template <class D2>
   HWY_INLINE void insert(D2 d, std::size_t at, const std::uint32_t* words) {
+    insert_key(d, at, hn::Sub(hn::LoadU(d, words), hn::Set(d, 1u)));
+  }
+  template <class D2>
+  HWY_INLINE void insert_key(D2 d, std::size_t at, hn::Vec<D2> key) {
     const auto empty = hn::Set(d, LeafLayers::kEmpty);
-    auto key = hn::Sub(hn::LoadU(d, words), hn::Set(d, 1u));
     auto triangle = hn::Set(d, triangle_);
     if (hn::AllTrue(d, hn::Eq(key, empty))) return;
     if (leaf_->kind == LeafLayers::Kind::kFirstEntryOnly) return keep_first(d, at, key, triangle);
@@ -169,18 +206,25 @@ class LayerSink {
   double steep_from_;
   bool convex_;
   int u0_, v0_, stride_;
+  std::size_t spans_at_;
   std::uint32_t* own_keys_ = nullptr;  ///< of a convex solid: of the layer of such triangles
   std::uint32_t* own_triangles_ = nullptr;
   std::uint32_t exit_ = 0, triangle_ = 0, steep_ = 0;
+  std::uint32_t marks_ = 0;  ///< of the triangles of all spans
   std::uint64_t fragments_ = 0;
 };
 
 std::uint64_t RasterLayers(const LatticeMesh& mesh, const RasterTarget& target,
                            std::span<const std::uint32_t> triangles, const PixelRect& clip,
                            double steep_from, LeafLayers& leaf, Arena& arena) {
-  LayerSink sink(leaf, arena, steep_from);
-  simd::rasterize_triangles(mesh, target, triangles, clip, sink);
-  return sink.fragments();
+  constexpr std::size_t kManyTriangles = 32;
+  LayerSink sink(leaf, arena, steep_from, clip);
+  if (triangles.size() >= kManyTriangles) {
+    simd::rasterize_spans(mesh, target, triangles, clip, sink);
+  } else {
+    simd::rasterize_triangles(mesh, target, triangles, clip, sink);
+  }
+  return sink.finish();
 }
 
 /// A vector of pixels of a leaf.
