@@ -83,20 +83,22 @@ void TileFinder::find_united(const SearchArea& area) {
       last = std::min(last, bounds.entries.farthest[index] + reach);
     }
   }
-  united_.clear(area_arena_, area.rect.u0, area.rect.v0);
   drawn_.clear();
+  std::uint32_t skipped_from = UnitedLayers::kEmpty;
   for (const std::uint32_t slot : hidden_) {
-    united_.skipped_from = std::min(united_.skipped_from, view_parts_[leaves_[slot].solid].nearest);
+    skipped_from = std::min(skipped_from, view_parts_[leaves_[slot].solid].nearest);
   }
   for (const std::uint32_t slot : present_) {
     const std::uint32_t nearest = leaves_[slot].nearest;
     if (nearest <= last) {
       drawn_.push_back(slot);
     } else {
-      united_.skipped_from = std::min(united_.skipped_from, nearest);
+      skipped_from = std::min(skipped_from, nearest);
     }
   }
   if (drawn_.size() == 1 && show_alone(area, leaves_[drawn_.front()])) return;
+  united_.clear(area_arena_, area.rect.u0, area.rect.v0);
+  united_.skipped_from = skipped_from;
   std::sort(drawn_.begin(), drawn_.end(), [&](std::uint32_t a, std::uint32_t b) {
     const std::uint32_t at_a = leaves_[a].nearest, at_b = leaves_[b].nearest;
     return at_a != at_b ? at_a < at_b : a < b;
