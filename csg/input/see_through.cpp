@@ -8,7 +8,7 @@
 #include "csg/input/tree_fragments.h"
 #include "csg/picture/shade.h"
 #include "csg/surface/surface_tiles.h"
-#include "csg/surface/translucent.h"
+#include "csg/translucent/translucent.h"
 #include "strata/mesh/soup_tools.h"
 
 namespace strata::csg {

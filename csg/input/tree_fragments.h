@@ -4,7 +4,7 @@
 
 #include "csg/picture/shade.h"
 #include "csg/program.h"
-#include "csg/surface/translucent.h"
+#include "csg/translucent/translucent.h"
 #include "strata/core/execution.h"
 #include "strata/core/result.h"
 #include "strata/raster/view.h"

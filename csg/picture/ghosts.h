@@ -6,7 +6,7 @@
 #include <span>
 
 #include "csg/picture/shade.h"
-#include "csg/surface/translucent.h"
+#include "csg/translucent/translucent.h"
 #include "strata/core/execution.h"
 #include "strata/core/result.h"
 #include "strata/csg/picture/picture.h"

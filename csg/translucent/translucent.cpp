@@ -1,4 +1,4 @@
-#include "csg/surface/translucent.h"
+#include "csg/translucent/translucent.h"
 
 #include <algorithm>
 #include <cmath>
