@@ -205,6 +205,13 @@ void TileFinder::normalize_pixel(LeafLayers& leaf, std::size_t at) {
   }
 }
 
+const Cluster& TileFinder::cluster_of(std::vector<std::uint32_t>& inside,
+                                      std::span<const Transition> members) {
+  inside.insert(inside.end(), around_.begin(), around_.end());
+  return clusters_.find(inside, members, first_hit_,
+                        TransitionFaces(parts_, view_parts_, *coincidence_));
+}
+
 void TileFinder::show(std::uint64_t pixel) {
   ++resolved_;
   const Surface surface =
@@ -361,6 +368,7 @@ void TileFinder::find(int tile_u, int tile_v, std::span<const std::uint32_t> sol
     cut = cut || view_parts_[solid].cut;
   }
   hidden_.clear();
+  clusters_.clear();
   if (part.faces != nullptr) *part.faces = {};
   if (!cut) find_all_bounds(std::span(leaves_).first(count));
   for (int v = tile_.v0; v < tile_.v1; ++v) {

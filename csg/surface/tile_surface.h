@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "csg/geometry.h"
+#include "csg/surface/clusters.h"
 #include "csg/surface/leaf_layers.h"
 #include "csg/surface/tile_program.h"
 #include "csg/surface/visible_surface.h"
@@ -90,6 +91,11 @@ class TileFinder {
 
   /// Rasterizes and normalizes a leaf that is needed after all.
   void make(LeafLayers& leaf);
+  /// What rays show that meet some close transitions. @param inside  solids of leaves that they are
+  /// in before, to which those are added that all rays are in
+  const Cluster& cluster_of(std::vector<std::uint32_t>& inside,
+                            std::span<const Transition> members);
+  [[nodiscard]] const Coincidence& coincidence() const { return *coincidence_; }
   /// Flips of one pixel in place of crossings, for pixels that are not entered and left in turn.
   void normalize_pixel(LeafLayers& leaf, std::size_t at);
 
@@ -149,6 +155,7 @@ class TileFinder {
   TileProgram tile_program_;
   UnitedLayers united_;
   FirstHit first_hit_;
+  Clusters clusters_;
   std::vector<std::uint32_t> present_, drawn_, hidden_, all_triangles_, area_triangles_;
   std::vector<std::uint32_t> around_;  ///< solids that all rays of an area are in where it counts
   std::uint32_t alone_ = kNoLeaf;  ///< of an area: nothing but its entries, or exits, can be seen

@@ -351,13 +351,7 @@ class Search {
   HWY_INLINE void find(V& depth, V& leaf_at) {
     const D d;
     if (flat_ && find_flat(depth, leaf_at)) return;
-    M value;
-    const bool inverted = area_.program->root_inverted;
-    // not(node) becomes true where the node, true at first, becomes false.
-    probe(area_.program->root, hn::Zero(d), hn::Not(no_lane(d)), inverted, !inverted, value, depth,
-          leaf_at);
-    const M waits = inverted ? value : hn::Not(value);
-    depth = hn::IfThenElse(waits, depth, hn::Set(d, LeafLayers::kEmpty));
+    find_from(hn::Zero(d), hn::Not(no_lane(d)), depth, leaf_at);
   }
 
   /// Whether there is another transition near `depth` or a steep one anywhere, and the triangle of
@@ -394,7 +388,153 @@ class Search {
     return hn::And(hit, doubt);
   }
 
+  /// Decides lanes that are in doubt where in many of them faces of the same solids coincide, as
+  /// Cluster has it. @return the lanes that stay in doubt
+  HWY_NOINLINE M settle(M open, V& depth, V& solid, V& triangle) {
+    constexpr int kMostClusters = 6;
+    const D d;
+    M left = no_lane(d);
+    for (int i = 0; i < kMostClusters && !hn::AllFalse(d, open); ++i) {
+      const std::size_t lane = hn::FindKnownFirstTrue(d, open);
+      const M first = hn::AndNot(hn::FirstN(d, lane), hn::FirstN(d, lane + 1));
+      const V reach = coincidence_reach(d, area_.range, hn::IfThenElseZero(open, depth));
+      const Cluster* cluster = gather(open, lane, depth, reach);
+      M alike = no_lane(d), good = no_lane(d);
+      V beyond = hn::Zero(d);
+      if (cluster != nullptr) compare(*cluster, open, depth, reach, alike, good, beyond);
+      left = hn::Or(left, hn::AndNot(good, hn::Or(first, alike)));
+      open = hn::AndNot(hn::Or(first, alike), open);
+      if (hn::AllFalse(d, good)) continue;
+      if (cluster->outcome == Cluster::Outcome::kShown) {
+        const Surface& shown = cluster->surface;
+        solid = hn::IfThenElse(good, hn::Set(d, shown.solid), solid);
+        triangle = hn::IfThenElse(
+            good, hn::Set(d, shown.triangle | (shown.exit ? SurfaceImage::kExit : 0)), triangle);
+        continue;
+      }
+      V next, next_leaf, next_triangle;
+      find_from(beyond, good, next, next_leaf);
+      open = hn::Or(open, judge(next, next_leaf, next_triangle));
+      depth = hn::IfThenElse(good, next, depth);
+      solid = hn::IfThenElse(good, solid_at(next_leaf), solid);
+      triangle = hn::IfThenElse(good, next_triangle, triangle);
+    }
+    return hn::Or(left, open);
+  }
+
+  /// The solids of leaves.
+  HWY_INLINE V solid_at(V leaf_at) {
+    const D d;
+    return hn::GatherIndex(d, area_.solids, hn::BitCast(hn::RebindToSigned<D>(), leaf_at));
+  }
+
  private:
+  /// A leaf that is met near a cluster or before it.
+  struct Met {
+    const LeafLayers* leaf;
+    std::size_t offset;
+    std::size_t layer;  ///< of the transition in the cluster; kNoLayer: there is none
+    bool inside;        ///< the ray is in it before the cluster
+  };
+  static constexpr std::size_t kNoLayer = ~std::size_t{0};
+
+  /// met_ become the leaves that are met by one lane near `depth`, or by any of `open` before that.
+  /// @return the cluster there; null: it is none that is decided
+  HWY_NOINLINE const Cluster* gather(M open, std::size_t lane, V depth, V reach) {
+    const D d;
+    alignas(64) std::uint32_t depths[LeafLayers::kLanes], reaches[LeafLayers::kLanes];
+    hn::Store(depth, d, depths);
+    hn::Store(reach, d, reaches);
+    const std::uint32_t at = depths[lane], near = reaches[lane];
+    const std::uint32_t latest =
+        hn::GetLane(hn::MaxOfLanes(d, hn::IfThenElseZero(open, hn::Add(depth, reach))));
+    met_.clear();
+    members_.clear();
+    inside_.clear();
+    for (const std::uint32_t slot : area_.program->leaves) {
+      LeafLayers& leaf = area_.leaves[slot];
+      if (leaf.nearest > latest || !holds(leaf) || leaf.nearest > latest) continue;
+      Met met{&leaf, offset_in(leaf), kNoLayer, false};
+      for (std::size_t k = 0; k < leaf.keys.size(); ++k) {
+        const std::uint32_t transition = leaf.keys[k][met.offset + lane];
+        if (std::max(transition, at) - std::min(transition, at) > near) {
+          met.inside = met.inside != (transition < at);
+          continue;
+        }
+        if (met.layer != kNoLayer || members_.size() == Clusters::kMostMembers) return nullptr;
+        met.layer = k;
+        const std::uint32_t triangle = leaf.triangles[k][met.offset + lane];
+        members_.push_back({0, leaf.solid, triangle & ~LeafLayers::kSteep, (k & 1) != 0});
+      }
+      if (met.inside) inside_.push_back(leaf.solid);
+      met_.push_back(met);
+    }
+    return &finder_.cluster_of(inside_, members_);
+  }
+
+  /// `alike` become the lanes that meet a cluster as the lane of met_ does, and `good` those of
+  /// them in which its outcome does not depend on order. `beyond` is where it ends.
+  HWY_NOINLINE void compare(const Cluster& cluster, M open, V depth, V reach, M& alike, M& good,
+                            V& beyond) {
+    const D d;
+    const V zero = hn::Zero(d), empty = hn::Set(d, LeafLayers::kEmpty);
+    V low = depth, high = depth;
+    M late = no_lane(d);  // out of the tree after the first depth
+    alike = open;
+    std::size_t member = 0;
+    for (const Met& met : met_) {
+      const LeafLayers& leaf = *met.leaf;
+      M inside = no_lane(d);
+      for (std::size_t k = 0; k < leaf.keys.size(); ++k) {
+        const V transition = hn::Load(d, leaf.keys[k] + met.offset);
+        const V gap = hn::Sub(hn::Max(transition, depth), hn::Min(transition, depth));
+        const M far = hn::Gt(gap, reach);
+        inside = hn::Xor(inside, hn::And(far, hn::Lt(transition, depth)));
+        const V face = hn::Load(d, leaf.triangles[k] + met.offset);
+        if (leaf.steep) {
+          const M marked = hn::Ne(hn::And(face, hn::Set(d, LeafLayers::kSteep)), zero);
+          alike = hn::AndNot(hn::And(marked, hn::Ne(transition, empty)), alike);
+        }
+        if (k != met.layer) {
+          alike = hn::And(alike, far);
+          continue;
+        }
+        const Transition& own = cluster.members[member];
+        alike = hn::AndNot(hn::Or(far, hn::Ne(face, hn::Set(d, own.triangle))), alike);
+        low = hn::Min(low, transition);
+        high = hn::Max(high, transition);
+        if ((cluster.outward >> member & 1) != 0) late = hn::Or(late, hn::Gt(transition, depth));
+      }
+      alike = met.inside ? hn::And(alike, inside) : hn::AndNot(inside, alike);
+      if (met.layer != kNoLayer) ++member;
+    }
+    beyond = hn::Add(high, hn::Set(d, 1u));
+    good = no_lane(d);
+    if (hn::AllFalse(d, alike) || cluster.outcome == Cluster::Outcome::kByOrder) return;
+    const V width =
+        hn::Set(d, cluster.width(finder_.coincidence(),
+                                 hn::GetLane(hn::MinOfLanes(d, hn::IfThenElse(alike, low, empty))),
+                                 hn::GetLane(hn::MaxOfLanes(d, hn::IfThenElseZero(alike, high)))));
+    good = hn::And(alike, hn::Gt(low, zero));  // at 0 the ray begins
+    if (cluster.outcome == Cluster::Outcome::kShown) {
+      const V most = hn::Max(hn::Sub(high, depth), hn::Sub(depth, low));
+      good = hn::AndNot(hn::Or(late, hn::Gt(most, width)), good);
+    } else {
+      good = hn::AndNot(hn::Gt(hn::Sub(high, low), width), good);
+    }
+  }
+
+  /// find() from a depth on, in some lanes; kEmpty in all others. @pre the tree is false there
+  HWY_INLINE void find_from(V from, M lanes, V& depth, V& leaf_at) {
+    const D d;
+    M value;
+    const bool inverted = area_.program->root_inverted;
+    // not(node) becomes true where the node, true at first, becomes false.
+    probe(area_.program->root, from, lanes, inverted, !inverted, value, depth, leaf_at);
+    const M waits = hn::And(lanes, inverted ? value : hn::Not(value));
+    depth = hn::IfThenElse(waits, depth, hn::Set(d, LeafLayers::kEmpty));
+  }
+
   /// Whether the pixels lie in the leaf's rectangle; then its layers are there.
   HWY_INLINE bool holds(LeafLayers& leaf) {
     if (v_ < leaf.rect.v0 || v_ >= leaf.rect.v1 || u_ < leaf.rect.u0 || u_ >= leaf.rect.u1) {
@@ -560,6 +700,9 @@ class Search {
   TileFinder& finder_;
   int u_ = 0, v_ = 0;
   bool flat_;  ///< the program is an intersection of solids minus others
+  std::vector<Met> met_;
+  std::vector<Transition> members_;  ///< of the cluster of met_
+  std::vector<std::uint32_t> inside_;
 };
 
 void SearchSurface(const SearchArea& area, TileFinder& finder) {
@@ -582,14 +725,20 @@ void SearchSurface(const SearchArea& area, TileFinder& finder) {
         std::copy(depths, depths + count, image.depth.begin() + static_cast<long>(at));
         continue;
       }
-      const M doubt = search.judge(depth, leaf_at, triangle);
-      const V solid =
-          hn::GatherIndex(d, area.solids, hn::BitCast(hn::RebindToSigned<D>(), leaf_at));
+      M doubt = search.judge(depth, leaf_at, triangle);
+      V solid = search.solid_at(leaf_at);
+      if (!hn::AllFalse(d, doubt)) {
+        doubt = hn::And(doubt, hn::FirstN(d, static_cast<std::size_t>(count)));
+        if (hn::CountTrue(d, doubt) > hn::Lanes(d) / 2) {
+          doubt = search.settle(doubt, depth, solid, triangle);
+        }
+      }
       if (count == lanes) {
         hn::StoreU(depth, d, image.depth.data() + at);
         hn::StoreU(solid, d, image.solid.data() + at);
         hn::StoreU(triangle, d, image.triangle.data() + at);
       } else {
+        hn::Store(depth, d, depths);
         hn::Store(solid, d, slots);
         hn::Store(triangle, d, triangles);
         for (int i = 0; i < count; ++i) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
@@ -52,17 +53,13 @@ Coincidence::Coincidence(const View& view, double world_error) : world_error_(wo
   }
 }
 
-Coincidence::Bound Coincidence::bound(const LatticeMesh& mesh, std::uint32_t triangle,
-                                      std::uint32_t depth, double share) const {
+Coincidence::Face Coincidence::face(const LatticeMesh& mesh, std::uint32_t triangle) {
   const glm::uvec3& t = mesh.triangles[triangle];
   const glm::ivec3 &p = mesh.vertices[t.x], &q = mesh.vertices[t.y], &r = mesh.vertices[t.z];
   TriangleSetup setup;
   if (!setup_triangle(p, q, r, AxisFrame(Axis::kZ), setup)) return {};
-  const double slopes = 0.5 * setup.steepness();
   const auto [low, high] = std::minmax({p.z, q.z, r.z});
-  const double least = flat(depth, share), at = depth;
-  return {least + std::min(slopes, std::max(0.0, at - low)),
-          least + std::min(slopes, std::max(0.0, high - at))};
+  return {0.5 * setup.steepness(), static_cast<double>(low), static_cast<double>(high), true};
 }
 
 Coincidence::Range Coincidence::range() const {
@@ -223,6 +220,46 @@ Surface FirstHit::find(std::vector<Transition>& transitions, const TransitionFac
     toggle_all(transitions, 0, at);
   }
   return found;
+}
+
+std::uint32_t FirstHit::find_outward(std::span<const Transition> transitions) {
+  const std::size_t count = transitions.size(), sets = std::size_t{1} << count;
+  values_.resize(sets);
+  std::size_t set = 0;
+  for (std::size_t i = 1; i <= sets; ++i) {  // by a Gray code: one transition from set to set
+    values_[set] = state_.value() ? 1 : 0;
+    const std::size_t next = i < sets ? static_cast<std::size_t>(std::countr_zero(i)) : count - 1;
+    set ^= std::size_t{1} << next;
+    state_.toggle(transitions[next].solid);
+  }
+  std::uint32_t outward = 0;
+  for (set = 0; set < sets; ++set) {
+    for (std::size_t i = 0; i < count; ++i) {
+      if (values_[set] > values_[set | std::size_t{1} << i]) outward |= 1u << i;
+    }
+  }
+  return outward;
+}
+
+FirstHit::Verdict FirstHit::judge(std::span<const std::uint32_t> inside,
+                                  std::span<const Transition> coincident,
+                                  const TransitionFaces& faces) {
+  for (const std::uint32_t solid : inside) state_.toggle(solid);
+  Verdict verdict;
+  verdict.outward = find_outward(coincident);
+  for (const Transition& transition : coincident) state_.toggle(transition.solid);
+  verdict.inside = state_.value();
+  if (verdict.inside) {
+    candidates_.clear();
+    for (const Transition& transition : coincident) {
+      if (!state_.supports(transition.solid)) continue;
+      candidates_.push_back({&transition, state_.decides(transition.solid)});
+    }
+    if (!candidates_.empty()) verdict.surface = surface_of(choose(faces), 0);
+  }
+  for (const Transition& transition : coincident) state_.toggle(transition.solid);
+  for (const std::uint32_t solid : inside) state_.toggle(solid);
+  return verdict;
 }
 
 void FirstHit::sort(std::vector<Transition>& transitions) {

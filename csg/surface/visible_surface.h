@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "csg/geometry.h"
@@ -44,9 +45,25 @@ class Coincidence {
   struct Bound {
     double nearer = 0, farther = 0;
   };
+  /// What the bounds of a triangle's crossings have in common.
+  struct Face {
+    double slopes = 0;                 ///< (|slope_u| + |slope_v|) / 2
+    double nearest = 0, farthest = 0;  ///< of its corners
+    bool seen = false;                 ///< false: no ray crosses it
+  };
+  [[nodiscard]] static Face face(const LatticeMesh& mesh, std::uint32_t triangle);
   /// @param share  of the world error, Geometry::Part::error_share
-  [[nodiscard]] Bound bound(const LatticeMesh& mesh, std::uint32_t triangle, std::uint32_t depth,
-                            double share = 1.0) const;
+  [[nodiscard]] Bound bound(const Face& face, std::uint32_t depth, double share = 1.0) const {
+    return bound(face, depth, depth, share);
+  }
+  /// At least that of each crossing between two depths.
+  [[nodiscard]] Bound bound(const Face& face, std::uint32_t from, std::uint32_t to,
+                            double share) const {
+    if (!face.seen) return {};
+    const double least = flat(to, share);
+    return {least + std::min(face.slopes, std::max(0.0, from - face.nearest)),
+            least + std::min(face.slopes, std::max(0.0, face.farthest - to))};
+  }
 
   /// Steepness (see TriangleSetup) from which a triangle's bound is more than a tenth of a pixel:
   /// there are few such pixels, and each is looked at by itself.
@@ -80,8 +97,15 @@ class TransitionFaces {
 
   [[nodiscard]] Coincidence::Bound bound(const Transition& transition) const {
     if (transition.triangle == Surface::kNone) return {};
-    return coincidence_->bound((*view_parts_)[transition.solid].mesh, transition.triangle,
-                               transition.depth, (*parts_)[transition.solid].error_share);
+    return coincidence_->bound(face(transition), transition.depth, share(transition));
+  }
+  /// @pre transition.triangle is one
+  [[nodiscard]] Coincidence::Face face(const Transition& transition) const {
+    return Coincidence::face((*view_parts_)[transition.solid].mesh, transition.triangle);
+  }
+  /// Of the world error, that counts for the solid.
+  [[nodiscard]] double share(const Transition& transition) const {
+    return (*parts_)[transition.solid].error_share;
   }
   /// Whether the face of `below` lies beneath the plane of `above`, but not the other way around:
   /// it begins at that plane, and `above` may go on where it does so.
@@ -119,6 +143,19 @@ class FirstHit {
 
   /// Sorts `transitions`.
   Surface find(std::vector<Transition>& transitions, const TransitionFaces& faces);
+
+  /// What comes of transitions whose faces all coincide, whatever their order.
+  struct Verdict {
+    bool inside = false;  ///< the ray is in the tree behind them
+    Surface surface;      ///< then: what is shown, without its depth; no solid if the order decides
+    /// Of the transitions, a bit each: it leads out of the tree after some of the others.
+    std::uint32_t outward = 0;
+  };
+  static constexpr std::size_t kMostJudged = 8;
+  /// @param inside  the solids that the ray is in before @pre no two of at most kMostJudged are of
+  /// one solid
+  Verdict judge(std::span<const std::uint32_t> inside, std::span<const Transition> coincident,
+                const TransitionFaces& faces);
 
  private:
   [[nodiscard]] static Surface surface_of(const Transition& transition, std::uint32_t depth) {
@@ -174,6 +211,8 @@ class FirstHit {
     if (a.transition->exit != b.transition->exit) return b.transition->exit;
     return a.transition->solid < b.transition->solid;
   }
+  /// Those of `transitions`, a bit each, that may lead out of the tree.
+  [[nodiscard]] std::uint32_t find_outward(std::span<const Transition> transitions);
   /// The one that is shown. @pre there are candidates
   [[nodiscard]] const Transition& choose(const TransitionFaces& faces) const;
 
@@ -187,6 +226,7 @@ class FirstHit {
   std::vector<std::uint32_t> toggled_;
   std::vector<std::size_t> last_;  ///< of each solid: one of its transitions
   std::vector<Candidate> candidates_;
+  std::vector<std::uint8_t> values_;  ///< of the tree, for each set of transitions
 };
 
 }  // namespace strata::csg

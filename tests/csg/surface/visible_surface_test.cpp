@@ -135,6 +135,56 @@ TEST(VisibleSurface, OfAnIntersectionMinusOthersIsTheOneOfTheFullLists) {
   EXPECT_GT(seen, 240000u);
 }
 
+// Faces of several solids that coincide come in another order from pixel to pixel. Rows of pixels
+// that meet the same ones are decided together (csg/surface/clusters.h).
+TEST(VisibleSurface, OfSolidsThatShareFacesIsTheOneOfTheFullLists) {
+  std::size_t covered = 0, resolved = 0;
+  for (int seed = 0; seed < 300; ++seed) {
+    RandomTree random(static_cast<std::uint64_t>(seed) + 7700);
+    Tree tree;
+    // Boxes and prisms that begin and end at few places, turned together.
+    const glm::dmat4 turned =
+        glm::rotate(glm::dmat4(1), random.real(0, 6), glm::dvec3(1, random.real(-1, 1), 2));
+    const auto add = [&](int least) {
+      const auto place = [&] { return random.pick(0, 1) * 2.0 - 3.0; };
+      const auto length = [&] { return random.pick(least, least + 1) * 2.0; };
+      const glm::dvec3 low(place(), place(), place());
+      const glm::dvec3 size(length(), length(), length());
+      const bool box = random.pick(0, 3) > 0;
+      Solid solid{std::make_shared<TriangleSoup>(
+          box ? make_box(low, low + size) : make_cylinder(1.5, size.z, random.pick(3, 12)))};
+      solid.world_from_mesh =
+          box ? turned : glm::translate(turned, low + glm::dvec3(1, 1, size.z / 2));
+      return tree.add_solid(std::move(solid));
+    };
+    std::vector<Tree::NodeId> united;
+    for (int k = random.pick(1, 2); k > 0; --k) {
+      std::vector<Tree::NodeId> common, operands;
+      for (int i = random.pick(1, 3); i > 0; --i) common.push_back(add(2));
+      operands.push_back(tree.add(Operation::kIntersection, common));
+      for (int i = random.pick(0, 3); i > 0; --i) {
+        operands.push_back(add(1));
+        if (random.pick(0, 2) == 0) {
+          operands.back() = tree.add(Operation::kDifference, std::vector{operands.back(), add(1)});
+        }
+      }
+      united.push_back(tree.add(Operation::kDifference, operands));
+    }
+    tree.set_root(tree.add(Operation::kUnion, united));
+    Preview preview(tree, {}, 0.0);
+    if (preview.box().empty()) continue;
+    const Camera camera = random_camera(random, preview.box());
+    expect_same(tree, camera, {130, 110}, "seed " + std::to_string(seed));
+    if (HasFailure()) return;
+    const auto image = preview.draw(make_view(camera, {130, 110}, preview.box()).value());
+    ASSERT_TRUE(image.has_value());
+    covered += preview.report().covered;
+    resolved += preview.report().resolved;
+  }
+  EXPECT_GT(covered, 250000u);
+  EXPECT_LT(resolved, covered / 10);
+}
+
 // A wall seen along its plane is as deep in a pixel as the wall is long, so it may coincide with
 // what lies far before or behind its crossing.
 TEST(VisibleSurface, WithWallsAlongTheViewIsTheOneOfTheFullLists) {
