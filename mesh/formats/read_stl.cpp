@@ -28,7 +28,7 @@ std::uint32_t little_endian_32(const char* p) {
 
 /// Corner `c` of a binary file; a facet has three.
 glm::vec3 binary_corner(const char* data, std::size_t c) {
-  const char* p = data + kHeaderBytes + c / 3 * kFacetBytes + 12 + c % 3 * 12;
+  const char* p = data + kHeaderBytes + 12 + c * 12 + c / 3 * (kFacetBytes - 36);
   return {std::bit_cast<float>(little_endian_32(p)), std::bit_cast<float>(little_endian_32(p + 4)),
           std::bit_cast<float>(little_endian_32(p + 8))};
 }
