@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <numeric>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "core/reserve_large.h"
@@ -272,11 +273,12 @@ struct WeldRanges {
     std::atomic<bool> stopped = false;
     parallel_for(all, parts(), [&](std::size_t part, int) {
       const std::size_t first = begin(part), end = ends[part];
-      tables[part] = WeldTable<Scalar>((end - first) / share_);
+      WeldTable<Scalar> table((end - first) / share_);  // apart from those of other threads
       const bool done = weld_range<Scalar>(
-          tables[part], first, end, load, go_on, value,
+          table, first, end, load, go_on, value,
           [&fresh, part](std::uint32_t i) { return fresh(part, i); },
           [&found, part](std::uint32_t i, const auto& position) { found(part, i, position); });
+      tables[part] = std::move(table);
       if (!done) stopped = true;
     });
     return !stopped;
@@ -326,36 +328,39 @@ bool weld_numbers(const Execution& execution, std::size_t count, Load&& load, st
                   GoOn&& go_on, std::vector<glm::dvec3>& positions) {
   WeldRanges<Scalar> ranges(execution, count, 5);  // a closed mesh has one vertex for six corners
   const std::size_t parts = ranges.parts();
-  std::vector<std::vector<glm::vec<3, Scalar>>> later(parts);  // of ranges after the first
-  std::vector<std::uint32_t> next(parts);
+  struct alignas(64) Own {                       // of a range, in cache lines of its own
+    std::vector<glm::vec<3, Scalar>> positions;  // but of the first range
+    std::uint32_t count = 0;
+  };
+  std::vector<Own> own(parts);
   const bool done = ranges.weld(
-      load, go_on, number, [&](std::size_t part, std::uint32_t) { return next[part]; },
+      load, go_on, number, [&](std::size_t part, std::uint32_t) { return own[part].count; },
       [&](std::size_t part, std::uint32_t, const glm::vec<3, Scalar>& position) {
-        ++next[part];
+        ++own[part].count;
         if (part == 0) {
           positions.emplace_back(position);
         } else {
-          later[part].push_back(position);
+          own[part].positions.push_back(position);
         }
       });
   if (!done || parts == 1) return done;
   // The numbers of all ranges one after another; equal positions share that of the first range.
   std::vector<std::size_t> base(parts + 1);
-  for (std::size_t part = 0; part < parts; ++part) base[part + 1] = base[part] + next[part];
+  for (std::size_t part = 0; part < parts; ++part) base[part + 1] = base[part] + own[part].count;
   std::vector<std::uint32_t> joined(base[parts]);
   std::iota(joined.begin(), joined.end(), 0u);
   ranges.meet_earlier(
-      [&](std::size_t part, std::uint32_t own, std::size_t earlier, std::uint32_t there) {
-        joined[base[part] + own] = static_cast<std::uint32_t>(base[earlier] + there);
+      [&](std::size_t part, std::uint32_t value, std::size_t earlier, std::uint32_t there) {
+        joined[base[part] + value] = static_cast<std::uint32_t>(base[earlier] + there);
       });
   for (std::size_t part = 1; part < parts; ++part) {
-    for (std::size_t own = 0; own < later[part].size(); ++own) {
-      std::uint32_t& to = joined[base[part] + own];
-      if (to != base[part] + own) {
+    for (std::uint32_t i = 0; i < own[part].count; ++i) {
+      std::uint32_t& to = joined[base[part] + i];
+      if (to != base[part] + i) {
         to = joined[to];
       } else {
         to = static_cast<std::uint32_t>(positions.size());
-        positions.emplace_back(later[part][own]);
+        positions.emplace_back(own[part].positions[i]);
       }
     }
   }
