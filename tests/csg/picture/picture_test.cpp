@@ -13,6 +13,7 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <memory>
+#include <optional>
 #include <random>
 #include <stop_token>
 #include <string>
@@ -127,6 +128,68 @@ TEST(Picture, EachPixelHasTheColourOfTheHighestBoxThere) {
     const Picture picture = draw(preview, from_above(1, kHeight), {kWidth, kHeight});
     EXPECT_EQ(picture.pixels, expected);
     EXPECT_EQ(preview.report().covered, covered);
+  }
+}
+
+TEST(Picture, EachPixelHasTheColourOfTheDeepestPocketThere) {
+  // Of 0 to 12 pockets in what 1 to 4 blocks have in common: the lowest top is seen beside them.
+  std::mt19937 random(2);
+  const auto number = [&](int low, int high) {
+    return std::uniform_int_distribution(low, high)(random);
+  };
+  const auto any_colour = [&] {
+    return glm::vec4(glm::vec3(glm::ivec3(number(0, 15), number(0, 15), number(0, 15))) / 15.0f,
+                     1.0f);
+  };
+  constexpr int kWidth = 150, kHeight = 90;
+  const glm::dvec3 middle(kWidth / 2, kHeight / 2, 0);
+  for (int round = 0; round < 100; ++round) {
+    SCOPED_TRACE("round " + std::to_string(round));
+    Tree tree;
+    std::vector<NodeId> blocks, operands;
+    const int count = number(1, 4), lowest = number(0, count - 1);
+    glm::ivec2 low(0), high(kWidth, kHeight);
+    Rgba top;
+    for (int i = 0; i < count; ++i) {
+      const glm::ivec2 from(number(-9, 20), number(-9, 20));
+      const glm::ivec2 to(number(kWidth - 20, kWidth + 9), number(kHeight - 20, kHeight + 9));
+      low = glm::max(low, from), high = glm::min(high, to);
+      const glm::vec4 colour = any_colour();
+      if (i == lowest) top = lit(glm::vec3(colour));
+      const double height = i == lowest ? 0 : 5 + 5 * i;
+      blocks.push_back(
+          tree.add_solid(box(glm::dvec3(from.x, kHeight - to.y, -40 - i) - middle,
+                             glm::dvec3(to.x, kHeight - from.y, height) - middle, colour)));
+    }
+    operands.push_back(count == 1 ? blocks.front() : tree.add(Operation::kIntersection, blocks));
+    std::vector<Rgba> expected(kWidth * kHeight, kBackground);
+    std::vector<int> depths(kWidth * kHeight, 0);
+    for (int v = low.y; v < high.y; ++v) {
+      std::fill_n(expected.begin() + v * kWidth + low.x, high.x - low.x, top);
+    }
+    const int pockets = number(0, 12);
+    for (int i = 0; i < pockets; ++i) {
+      const glm::ivec2 from(number(0, kWidth - 20), number(0, kHeight - 20));
+      const glm::ivec2 to = from + glm::ivec2(number(1, 90), number(1, 60));
+      const int depth = number(0, 4) == 0 ? 60 + i : 1 + 2 * i;  // through all, or not
+      const auto colour = number(0, 1) == 0 ? std::optional(any_colour()) : std::nullopt;
+      operands.push_back(
+          tree.add_solid(box(glm::dvec3(from.x, kHeight - to.y, -depth) - middle,
+                             glm::dvec3(to.x, kHeight - from.y, number(1, 40)) - middle, colour)));
+      for (int v = std::max(low.y, from.y); v < std::min(high.y, to.y); ++v) {
+        for (int u = std::max(low.x, from.x); u < std::min(high.x, to.x); ++u) {
+          const auto at = static_cast<std::size_t>(v * kWidth + u);
+          if (depth <= depths[at]) continue;
+          depths[at] = depth;
+          expected[at] = depth >= 60 ? kBackground : lit(colour ? glm::vec3(*colour) : kGreen);
+        }
+      }
+    }
+    tree.set_root(operands.size() == 1 ? operands.front()
+                                       : tree.add(Operation::kDifference, operands));
+    Preview preview(std::move(tree), {}, 0);
+    const Picture picture = draw(preview, from_above(1, kHeight), {kWidth, kHeight});
+    EXPECT_EQ(picture.pixels, expected);
   }
 }
 
