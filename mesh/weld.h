@@ -286,22 +286,27 @@ struct WeldRanges {
 
   /// Calls meet(part, value, earlier part, value there) for each position of a range that an
   /// earlier range has, too; of these the earliest. Several threads call it. Tables are read in the
-  /// order of the hashes, so almost in step.
+  /// order of the hashes, so almost in step. @return number of calls
   template <class Meet>
-  void meet_earlier(Meet&& meet) const {
+  std::size_t meet_earlier(Meet&& meet) const {
     constexpr std::size_t kPieces = 16;
+    std::atomic<std::size_t> all_calls = 0;
     parallel_for(all, kPieces * (parts() - 1), [&](std::size_t task, int) {
       const std::size_t part = task / kPieces + 1, piece = task % kPieces;
+      std::size_t calls = 0;
       tables[part].for_slots(piece, kPieces, [&](const WeldBits<Scalar>& key, std::uint32_t value) {
         const std::uint64_t hash = key.hash();
         for (std::size_t earlier = 0; earlier < part; ++earlier) {
           const std::uint32_t there = tables[earlier].find(key, hash);
           if (there == kNoVertex) continue;
           meet(part, value, earlier, there);
+          ++calls;
           return;
         }
       });
+      all_calls += calls;
     });
+    return all_calls;
   }
 
   /// Calls body(part, begin, end) for pieces of all ranges but the first, on all threads.
@@ -390,11 +395,9 @@ std::size_t weld_first(
   }
   std::size_t different = 0;
   for (const WeldTable<Scalar>& table : ranges.tables) different += table.size();
-  std::atomic<std::size_t> again = 0;
-  ranges.meet_earlier([&](std::size_t, std::uint32_t own, std::size_t, std::uint32_t there) {
-    first[own] = there;
-    again.fetch_add(1, std::memory_order_relaxed);
-  });
+  const std::size_t again =
+      ranges.meet_earlier([first](std::size_t, std::uint32_t own, std::size_t,
+                                  std::uint32_t there) { first[own] = there; });
   if (again == 0) return different;
   ranges.for_later_points([&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
