@@ -208,14 +208,12 @@ void TileFinder::normalize_pixel(LeafLayers& leaf, std::size_t at) {
 const Cluster& TileFinder::cluster_of(std::vector<std::uint32_t>& inside,
                                       std::span<const Transition> members) {
   inside.insert(inside.end(), around_.begin(), around_.end());
-  return clusters_.find(inside, members, first_hit_,
-                        TransitionFaces(parts_, view_parts_, *coincidence_));
+  return clusters_.find(inside, members, first_hit_, faces());
 }
 
 void TileFinder::show(std::uint64_t pixel) {
   ++resolved_;
-  const Surface surface =
-      first_hit_.find(transitions_, TransitionFaces(parts_, view_parts_, *coincidence_));
+  const Surface surface = first_hit_.find(transitions_, faces());
   part_.image->depth[pixel] = surface.depth;
   part_.image->solid[pixel] = surface.solid;
   part_.image->triangle[pixel] = surface.triangle | (surface.exit ? SurfaceImage::kExit : 0u);
@@ -369,6 +367,7 @@ void TileFinder::find(int tile_u, int tile_v, std::span<const std::uint32_t> sol
   }
   hidden_.clear();
   clusters_.clear();
+  kept_faces_.clear();
   if (part.faces != nullptr) *part.faces = {};
   if (!cut) find_all_bounds(std::span(leaves_).first(count));
   for (int v = tile_.v0; v < tile_.v1; ++v) {

@@ -96,6 +96,9 @@ class TileFinder {
   const Cluster& cluster_of(std::vector<std::uint32_t>& inside,
                             std::span<const Transition> members);
   [[nodiscard]] const Coincidence& coincidence() const { return *coincidence_; }
+  [[nodiscard]] TransitionFaces faces() {
+    return TransitionFaces(parts_, view_parts_, *coincidence_, &kept_faces_);
+  }
   /// Flips of one pixel in place of crossings, for pixels that are not entered and left in turn.
   void normalize_pixel(LeafLayers& leaf, std::size_t at);
 
@@ -156,6 +159,7 @@ class TileFinder {
   UnitedLayers united_;
   FirstHit first_hit_;
   Clusters clusters_;
+  KeptFaces kept_faces_;
   std::vector<std::uint32_t> present_, drawn_, hidden_, all_triangles_, area_triangles_;
   std::vector<std::uint32_t> around_;  ///< solids that all rays of an area are in where it counts
   std::uint32_t alone_ = kNoLeaf;  ///< of an area: nothing but its entries, or exits, can be seen

@@ -354,8 +354,8 @@ class Search {
     find_from(hn::Zero(d), hn::Not(no_lane(d)), depth, leaf_at);
   }
 
-  /// Whether there is another transition near `depth` or a steep one anywhere, and the triangle of
-  /// the transition at `depth`.
+  /// Whether there is another transition near `depth`, or a steep one that may coincide with it,
+  /// and the triangle of the transition at `depth`.
   HWY_INLINE M judge(V depth, V leaf_at, V& triangle) {
     const D d;
     const M hit = hn::Ne(depth, hn::Set(d, LeafLayers::kEmpty));
@@ -363,7 +363,7 @@ class Search {
     const V last = hn::IfThenElseZero(hit, hn::Add(depth, reach));
     M doubt = no_lane(d);
     M exits = no_lane(d);
-    const V zero = hn::Zero(d), empty = hn::Set(d, LeafLayers::kEmpty);
+    const V zero = hn::Zero(d);
     triangle = zero;
     const std::uint32_t latest = hn::GetLane(hn::MaxOfLanes(d, last));
     for (const std::uint32_t slot : area_.program->leaves) {
@@ -378,8 +378,9 @@ class Search {
         doubt = hn::Or(doubt, hn::AndNot(same, hn::Not(hn::Gt(gap, reach))));
         if (!leaf.steep && hn::AllFalse(d, same)) continue;
         const V found_triangle = hn::Load(d, leaf.triangles[k] + offset);
-        const V marked = hn::And(found_triangle, hn::Set(d, LeafLayers::kSteep));
-        doubt = hn::Or(doubt, hn::And(hn::Ne(marked, zero), hn::Ne(transition, empty)));
+        const M steep = is_steep(found_triangle, transition);
+        doubt = hn::Or(doubt, may_coincide(leaf, hn::And(hit, steep), found_triangle, transition,
+                                           depth, reach));
         triangle = hn::IfThenElse(same, found_triangle, triangle);
         if ((k & 1) != 0) exits = hn::Or(exits, same);
       }
@@ -492,8 +493,8 @@ class Search {
         inside = hn::Xor(inside, hn::And(far, hn::Lt(transition, depth)));
         const V face = hn::Load(d, leaf.triangles[k] + met.offset);
         if (leaf.steep) {
-          const M marked = hn::Ne(hn::And(face, hn::Set(d, LeafLayers::kSteep)), zero);
-          alike = hn::AndNot(hn::And(marked, hn::Ne(transition, empty)), alike);
+          const M steep = hn::And(alike, is_steep(face, transition));
+          alike = hn::AndNot(may_coincide(leaf, steep, face, transition, depth, reach), alike);
         }
         if (k != met.layer) {
           alike = hn::And(alike, far);
@@ -533,6 +534,41 @@ class Search {
     probe(area_.program->root, from, lanes, inverted, !inverted, value, depth, leaf_at);
     const M waits = hn::And(lanes, inverted ? value : hn::Not(value));
     depth = hn::IfThenElse(waits, depth, hn::Set(d, LeafLayers::kEmpty));
+  }
+
+  HWY_INLINE M is_steep(V face, V transition) {
+    const D d;
+    const M marked = hn::Ne(hn::And(face, hn::Set(d, LeafLayers::kSteep)), hn::Zero(d));
+    return hn::And(marked, hn::Ne(transition, hn::Set(d, LeafLayers::kEmpty)));
+  }
+  /// In which of some lanes a steep face may coincide with one at `depth` that is not: it reaches
+  /// to its own bound, which no vector has.
+  HWY_INLINE M may_coincide(const LeafLayers& leaf, M lanes, V face, V transition, V depth,
+                            V reach) {
+    const D d;
+    if (HWY_LIKELY(hn::AllFalse(d, lanes))) return lanes;
+    return may_coincide_one_by_one(leaf, lanes, face, transition, depth, reach);
+  }
+  HWY_NOINLINE M may_coincide_one_by_one(const LeafLayers& leaf, M lanes, V face, V transition,
+                                         V depth, V reach) {
+    const D d;
+    alignas(64) std::uint32_t faces[LeafLayers::kLanes], transitions[LeafLayers::kLanes],
+        depths[LeafLayers::kLanes], reaches[LeafLayers::kLanes], may[LeafLayers::kLanes];
+    hn::Store(face, d, faces);
+    hn::Store(transition, d, transitions);
+    hn::Store(depth, d, depths);
+    hn::Store(reach, d, reaches);
+    hn::Store(hn::VecFromMask(d, lanes), d, may);
+    const TransitionFaces of = finder_.faces();
+    for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
+      if (may[i] == 0) continue;
+      const std::uint32_t at = transitions[i];
+      const Coincidence::Bound bound = of.bound({at, leaf.solid, faces[i] & ~LeafLayers::kSteep});
+      const bool behind = at > depths[i];
+      const double gap = behind ? at - depths[i] : depths[i] - at;
+      if (gap > reaches[i] + (behind ? bound.nearer : bound.farther)) may[i] = 0;
+    }
+    return hn::Ne(hn::Load(d, may), hn::Zero(d));
   }
 
   /// Whether the pixels lie in the leaf's rectangle; then its layers are there.

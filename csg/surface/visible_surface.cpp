@@ -12,8 +12,14 @@
 namespace strata::csg {
 namespace {
 
+/// Lists up to this length are sorted by insertion: parts of them are in order.
+constexpr std::size_t kShort = 24;
 /// Lists from this length on are sorted in time that grows with it, byte by byte.
 constexpr std::size_t kFewTransitions = 64;
+
+bool goes_after(const Transition& a, const Transition& b) {
+  return a.depth != b.depth ? a.depth > b.depth : a.solid > b.solid;
+}
 
 /// Sorts by the upper half, a byte at a time; what is equal stays in order.
 void sort_by_bytes(std::vector<std::uint64_t>& keys, std::vector<std::uint64_t>& scratch) {
@@ -263,6 +269,15 @@ FirstHit::Verdict FirstHit::judge(std::span<const std::uint32_t> inside,
 }
 
 void FirstHit::sort(std::vector<Transition>& transitions) {
+  if (transitions.size() <= kShort) {
+    for (auto next = transitions.begin(); next != transitions.end(); ++next) {
+      const Transition moved = *next;
+      auto to = next;
+      for (; to != transitions.begin() && goes_after(to[-1], moved); --to) *to = to[-1];
+      *to = moved;
+    }
+    return;
+  }
   order_.clear();
   for (const Transition& transition : transitions) {
     order_.push_back(std::uint64_t{transition.depth} << 32 | order_.size());

@@ -87,13 +87,36 @@ class Coincidence {
   double steep_from_ = 0;
 };
 
+/// Faces that were met before, of one view. Scratch of one thread.
+class KeptFaces {
+ public:
+  void clear() {
+    for (Kept& kept : kept_) kept.triangle = Surface::kNone;
+  }
+  [[nodiscard]] const Coincidence::Face& find(const LatticeMesh& mesh, std::uint32_t solid,
+                                              std::uint32_t triangle) {
+    Kept& kept = kept_[(solid * 5 + triangle) % kept_.size()];
+    if (kept.solid != solid || kept.triangle != triangle) {
+      kept = {solid, triangle, Coincidence::face(mesh, triangle)};
+    }
+    return kept.face;
+  }
+
+ private:
+  struct Kept {
+    std::uint32_t solid = Surface::kNone, triangle = Surface::kNone;
+    Coincidence::Face face;
+  };
+  std::vector<Kept> kept_ = std::vector<Kept>(256);
+};
+
 /// The faces behind transitions, as FirstHit asks about them.
 class TransitionFaces {
  public:
-  /// Keeps references to all of them.
+  /// Keeps references to all of them. @param kept  null: no face is kept
   TransitionFaces(const std::vector<Geometry::Part>& parts, const std::vector<ViewPart>& view_parts,
-                  const Coincidence& coincidence)
-      : parts_(&parts), view_parts_(&view_parts), coincidence_(&coincidence) {}
+                  const Coincidence& coincidence, KeptFaces* kept = nullptr)
+      : parts_(&parts), view_parts_(&view_parts), coincidence_(&coincidence), kept_(kept) {}
 
   [[nodiscard]] Coincidence::Bound bound(const Transition& transition) const {
     if (transition.triangle == Surface::kNone) return {};
@@ -101,7 +124,9 @@ class TransitionFaces {
   }
   /// @pre transition.triangle is one
   [[nodiscard]] Coincidence::Face face(const Transition& transition) const {
-    return Coincidence::face((*view_parts_)[transition.solid].mesh, transition.triangle);
+    const LatticeMesh& mesh = (*view_parts_)[transition.solid].mesh;
+    if (kept_ == nullptr) return Coincidence::face(mesh, transition.triangle);
+    return kept_->find(mesh, transition.solid, transition.triangle);
   }
   /// Of the world error, that counts for the solid.
   [[nodiscard]] double share(const Transition& transition) const {
@@ -119,6 +144,7 @@ class TransitionFaces {
   const std::vector<Geometry::Part>* parts_;
   const std::vector<ViewPart>* view_parts_;
   const Coincidence* coincidence_;
+  KeptFaces* kept_;
 };
 
 /// Finds the visible surface among all transitions of one ray: image-based CSG, as J. Goldfeather,
