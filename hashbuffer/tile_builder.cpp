@@ -14,8 +14,9 @@ template <class Record>
 struct TileBuilder<Record>::Impl {
   using Bits = typename Record::Word;
   /// At most this many planes are laid out side by side: deeper pixels are rare enough to scatter.
-  static constexpr int kMaxPlanes = 64;
-  static constexpr int kFirstPlanes = 8;
+  static constexpr int kMaxPlanes = 64 / kSides<Key>;
+  static constexpr int kFirstPlanes = 8 / kSides<Key>;
+  static constexpr std::size_t kLists = TileTable<Record>::kLists;
   /// Layers of a tile, in the mean over its pixels, from which the count/scan store is faster: each
   /// insertion passes the records before it.
   static constexpr std::uint64_t kDeepLayers = 8;
@@ -30,8 +31,8 @@ struct TileBuilder<Record>::Impl {
   int dirty_begin = 0, dirty_end = 0;  ///< rows of the table that hold records
 
   void resize_table(int planes) {
-    table.cells.assign(static_cast<std::size_t>(planes) * kTilePixels + table.kPadding, 0);
-    table.size = static_cast<std::size_t>(planes) * kTilePixels;
+    table.size = static_cast<std::size_t>(planes) * kLists;
+    table.cells.assign(table.size + table.kPadding, 0);
     table.planes = options.offsets == OffsetKind::kPlaneFirst ? std::min(planes, kMaxPlanes) : 0;
     table.oldest = 0;
     table.mixed = false;
@@ -40,7 +41,7 @@ struct TileBuilder<Record>::Impl {
   }
 
   std::vector<std::uint32_t> probe_offsets(std::size_t size) const {
-    const auto offsets64 = make_offsets(options.offsets, {.pixels = kTilePixels,
+    const auto offsets64 = make_offsets(options.offsets, {.pixels = kLists,
                                                           .cells = size,
                                                           .width = kTileSide,
                                                           .ages = Record::kAgeMax,
@@ -55,9 +56,9 @@ struct TileBuilder<Record>::Impl {
       const std::size_t begin = static_cast<std::size_t>(dirty_begin) * kTileSide;
       const std::size_t length =
           static_cast<std::size_t>(std::max(0, dirty_end - dirty_begin)) * kTileSide;
-      for (int age = 0; age < table.oldest; ++age) {
-        std::fill_n(table.cells.begin() + static_cast<std::ptrdiff_t>(
-                                              static_cast<std::size_t>(age) * kTilePixels + begin),
+      const std::size_t planes = static_cast<std::size_t>(table.oldest) * kSides<Key>;
+      for (std::size_t plane = 0; plane < planes; ++plane) {
+        std::fill_n(table.cells.begin() + static_cast<std::ptrdiff_t>(plane * kTilePixels + begin),
                     length, Bits{0});
       }
     }
@@ -69,7 +70,18 @@ struct TileBuilder<Record>::Impl {
   static bool is_deep(std::uint64_t fragments) { return fragments > kDeepLayers * kTilePixels; }
 
   static int planes_for(std::uint64_t cells) {
-    return static_cast<int>((cells + kTilePixels - 1) / kTilePixels);
+    return static_cast<int>((cells + kLists - 1) / kLists);
+  }
+
+  void append_list(std::size_t list) {
+    for (int age = 1; age <= table.oldest; ++age) {
+      std::size_t cell = list + table.offset(age);
+      if (cell >= table.size) cell -= table.size;
+      const Bits record = table.cells[cell];
+      const int found = static_cast<int>(Record::age(record));
+      if (found == age) keys.push_back(tile_key<Record>(record));
+      if (found < age) break;  // a younger record here would have been displaced
+    }
   }
 
   /// Collects the lists of a table in which fragments of different pixels are mixed.
@@ -77,14 +89,14 @@ struct TileBuilder<Record>::Impl {
     offsets.resize(kTilePixels + 1);
     keys.clear();
     for (std::size_t pixel = 0; pixel < kTilePixels; ++pixel) {
-      offsets[pixel] = static_cast<std::uint32_t>(keys.size());
-      for (int age = 1; age <= table.oldest; ++age) {
-        std::size_t cell = pixel + table.offset(age);
-        if (cell >= table.size) cell -= table.size;
-        const Bits record = table.cells[cell];
-        const int found = static_cast<int>(Record::age(record));
-        if (found == age) keys.push_back(tile_key<Record>(record));
-        if (found < age) break;  // a younger record here would have been displaced
+      const std::size_t begin = keys.size();
+      offsets[pixel] = static_cast<std::uint32_t>(begin);
+      append_list(pixel);
+      if constexpr (kSides<Key> == 2) {
+        const auto middle = static_cast<std::ptrdiff_t>(keys.size());
+        append_list(pixel + kTilePixels);
+        std::inplace_merge(keys.begin() + static_cast<std::ptrdiff_t>(begin), keys.begin() + middle,
+                           keys.end());
       }
     }
     offsets[kTilePixels] = static_cast<std::uint32_t>(keys.size());

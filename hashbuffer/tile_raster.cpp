@@ -57,6 +57,8 @@ class TableSink {
  public:
   using Bits = typename Record::Word;
   static constexpr bool kKeys = Record::kPayloadBits == 0;
+  static constexpr bool kApart = kKeys;  ///< where rays enter, and where they leave
+  static constexpr std::size_t kPlane = TileTable<Record>::kLists;
 
   TableSink(TileTable<Record>& table, const PixelRect& clip, BlockAges ages = {})
       : table_(&table),
@@ -67,6 +69,7 @@ class TableSink {
         v0_(clip.v0) {}
   HWY_INLINE void begin(bool exit, std::uint32_t triangle, const PixelRect& box) {
     exit_ = exit;
+    side_ = kApart && exit ? kTilePixels : 0;
     triangle_ = triangle;
     // A record of age 1 at depth 0, from which depths are subtracted.
     if constexpr (kKeys) {
@@ -165,8 +168,8 @@ class TableSink {
     }
   }
   TileRasterResult finish() {
-    // The first two planes are not watched: the bound may be 2 where the tile is one layer deep.
-    const int first = result_.fragments > 0 ? std::min(planes_, 2) : 0;
+    // The first planes are not watched: the bound may be 2 where the tile is one layer deep.
+    const int first = result_.fragments > 0 ? std::min(planes_, kApart ? 1 : 2) : 0;
     table_->oldest = std::max({table_->oldest, oldest_, first});
     return result_;
   }
@@ -184,7 +187,7 @@ class TableSink {
   static std::uint32_t bits_of(DepthKey key) { return key; }
   static std::uint64_t bits_of(DepthItem item) { return item.bits; }
   [[nodiscard]] HWY_INLINE std::size_t pixel_at(int u, int v) const {
-    return static_cast<std::size_t>((v - v0_) * kTileSide + (u - u0_));
+    return static_cast<std::size_t>((v - v0_) * kTileSide + (u - u0_)) + side_;
   }
 
   /// Records of age 1 from encoded words.
@@ -211,21 +214,28 @@ class TableSink {
     const auto exchange = [&] {  // the larger stays, the smaller goes on
       const auto old = hn::LoadU(d, cell);
       hn::StoreU(hn::Max(old, carry), d, cell);
-      cell += kTilePixels;
+      cell += kPlane;
       return hn::Min(old, carry);
     };
     const auto older = [&](V less) {
       return hn::Add(less, hn::IfThenElseZero(hn::Ne(less, zero), step));
     };
     int age = 0;
-    if (HWY_LIKELY(planes_ >= 2)) {
+    if constexpr (kApart) {
+      if (HWY_LIKELY(planes_ > 0)) {
+        carry = exchange();
+        if (HWY_LIKELY(hn::AllTrue(d, hn::Eq(carry, zero)))) return 1;
+        carry = older(carry);
+        age = 1;
+      }
+    } else if (HWY_LIKELY(planes_ >= 2)) {
       // Which of the first two planes a row ends in cannot be predicted: both are always done.
-      const auto first = hn::LoadU(d, cell), second = hn::LoadU(d, cell + kTilePixels);
+      const auto first = hn::LoadU(d, cell), second = hn::LoadU(d, cell + kPlane);
       hn::StoreU(hn::Max(first, carry), d, cell);
       carry = older(hn::Min(first, carry));
-      hn::StoreU(hn::Max(second, carry), d, cell + kTilePixels);
+      hn::StoreU(hn::Max(second, carry), d, cell + kPlane);
       carry = hn::Min(second, carry);
-      cell += 2 * kTilePixels;
+      cell += 2 * kPlane;
       if (HWY_LIKELY(hn::AllTrue(d, hn::Eq(carry, zero)))) return 2;
       carry = older(carry);
       age = 2;
@@ -269,6 +279,7 @@ class TableSink {
   Bits* cells_;
   int planes_, oldest_ = 0;
   int u0_, v0_;
+  std::size_t side_ = 0;
   Bits nearest_ = 0;
   std::uint32_t triangle_ = 0;
   bool exit_ = false;
@@ -279,6 +290,7 @@ class TableSink {
 template <class Record>
 class LogSink {
  public:
+  static constexpr bool kApart = false;
   LogSink(TileLog<Record>& log, const PixelRect& clip)
       : log_(&log), count_(log.count), clip_(clip) {}
   HWY_INLINE void begin(bool exit, std::uint32_t triangle, const PixelRect& box) {

@@ -14,7 +14,7 @@
 
 namespace strata {
 
-/// Memory that begins with a cache line, so that vectors of cells do not straddle two.
+/// Memory that begins with a cache line, so that few vectors of cells straddle two.
 template <class T>
 struct LineAllocator {
   using value_type = T;
@@ -36,9 +36,13 @@ struct TileTable {
   /// Cells behind the table that blocks of pixels may touch, without changing them.
   static constexpr std::size_t kPadding = 8 * kTileSide;
 
+  /// Lists of a tile: of keys there are two a pixel, where rays enter and then where they leave, so
+  /// that the first crossings of both kinds find their cells at once.
+  static constexpr std::size_t kLists = kSides<TileKey<Record>> * kTilePixels;
+
   std::vector<Bits, LineAllocator<Bits>> cells;
   std::size_t size = 0;                ///< cells of the table
-  int planes = 0;                      ///< ages 1..planes have the offsets (age - 1) * kTilePixels
+  int planes = 0;                      ///< ages 1..planes have the offsets (age - 1) * kLists
   std::vector<std::uint32_t> offsets;  ///< by age, for ages beyond the planes
   int oldest = 0;                      ///< largest age stored since the last clear
   bool mixed = false;                  ///< a record went beyond the planes
@@ -46,7 +50,7 @@ struct TileTable {
   unsigned age_limit = Record::kAgeMax;  ///< ages that have offsets
 
   [[nodiscard]] std::size_t offset(int age) const {
-    return age <= planes ? static_cast<std::size_t>(age - 1) * kTilePixels
+    return age <= planes ? static_cast<std::size_t>(age - 1) * kLists
                          : offsets[static_cast<std::size_t>(age)];
   }
 
@@ -54,7 +58,7 @@ struct TileTable {
     void operator()(std::uint64_t, unsigned) const {}
   };
 
-  /// Inserts a record, whose age is the first to be tried, into the list of `pixel`.
+  /// Inserts a record, whose age is the first to be tried, into the list `pixel`.
   /// @tparam Concurrency  the kind of maximum @param stored  called with the pixel and the age of
   /// each record that a cell takes, evicted ones included
   template <class Concurrency = Exclusive, class Stored = Ignore>

@@ -240,12 +240,13 @@ class SpanBatch {
   /// pixels), then sink.make_bases(depths, surfaces, bases): what the sink makes of the depth that
   /// those of a triangle count from, and of its surface, which is DepthItem's. Then
   /// sink.put_span(first pixel, depths, covered, base) for each block of kSpanLanes pixels that
-  /// follow each other. A pixel counts from that of the tile, kTileSide a row. A sink that has
-  /// steepness() gets the steepness of each triangle before its bases.
+  /// follow each other. A pixel counts from that of the tile, kTileSide a row, and kTilePixels
+  /// further where a ray leaves, if the sink keeps those pixels apart. A sink that has steepness()
+  /// gets the steepness of each triangle before its bases.
   template <class Sink>
   HWY_INLINE void cover(Sink& sink) {
     if (rows_ <= 0) return;
-    const std::size_t count = collect_blocks();
+    const std::size_t count = collect_blocks<Sink::kApart>();
     sink.begin_spans(row_begin_, row_end_, pixels_);
     if (clamps_) {
       cover_blocks<true>(count, sink);
@@ -357,6 +358,7 @@ class SpanBatch {
   }
 
   /// Fills blocks_. @return their number
+  template <bool apart>
   HWY_INLINE std::size_t collect_blocks() {
     const SpanI32 di;
     const SpanF32 df;
@@ -367,6 +369,9 @@ class SpanBatch {
     const SpanVecI32 column = hn::Sub(column_, hn::BitCast(di, rounding));
     // Blocks but for their columns and what is covered of them.
     SpanVecI32 place = hn::Or(hn::ShiftLeft<16>(hn::Iota(di, 0)), hn::ShiftLeft<6>(row_));
+    if constexpr (apart) {
+      place = hn::Or(place, hn::BitCast(di, hn::ShiftLeft<12>(hn::ShiftRight<31>(surface_))));
+    }
     SpanVecI32 pixels = zero, y = zero;
     auto fy = hn::Zero(df);
     std::size_t count = 0;
@@ -427,7 +432,7 @@ class SpanBatch {
   alignas(64) double steepness_[kSpanLanes];           ///< SetupBatch::steepness()
   alignas(64) double row_planes_[kRows * kSpanLanes];  ///< by row of a box, and lane
   alignas(64) double columns_[kTileSide];              ///< their numbers, as upper_words() asks
-  /// [covered:8 | row of the box:5 | lane:3 | first pixel:16], or with fewer bits for lanes
+  /// [covered:8 | row of the box:5 | lane:3 | exit:4 | first pixel:12], or fewer bits for lanes
   std::uint32_t blocks_[kBlocks];
 };
 

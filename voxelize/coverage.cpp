@@ -47,9 +47,9 @@ HWY_INLINE void add_changes(Vec depth, VecInt sign, std::size_t u, CoverageWalke
   }
 }
 
-/// A vector of rays, the first of which is that of `cell` and of column u.
+/// A vector of rays, the first of which is of column u.
 template <InsideRule rule>
-HWY_INLINE void cover_columns(const std::uint32_t* cell, int ages, std::size_t u, bool histogram,
+HWY_INLINE void cover_columns(const MergedLists& lists, std::size_t u, bool histogram,
                               CoverageWalker::Row& row, TileCounts& counts) {
   const Lane d;
   const LaneInt di;
@@ -57,8 +57,8 @@ HWY_INLINE void cover_columns(const std::uint32_t* cell, int ages, std::size_t u
   Vec begin = hn::Zero(d);
   Vec least = hn::Set(d, row.least), most = hn::Set(d, row.most);
   int age = 0;
-  for (; age < ages; ++age, cell += kTilePixels) {
-    const Vec record = hn::LoadU(d, cell);
+  for (; age < lists.ages; ++age) {
+    const Vec record = hn::LoadU(d, lists.records[age]);
     const Mask present = hn::Ne(record, hn::Zero(d));
     if (hn::AllFalse(d, present)) break;
     Vec depth = walk.cross<rule>(record, present, histogram);
@@ -89,10 +89,11 @@ template <InsideRule rule>
 void cover_rows(const TileLists<DepthKey>& lists, int row_begin, int row_end, bool histogram,
                 CoverageWalker::Row& row, TileCounts& counts) {
   const std::size_t lanes = hn::Lanes(Lane());
+  MergedLists merged;
   for (int v = std::max(row_begin, lists.row_begin); v < std::min(row_end, lists.row_end); ++v) {
     for (std::size_t u = 0; u < kTileSide; u += lanes) {
-      cover_columns<rule>(lists.planes32 + static_cast<std::size_t>(v) * kTileSide + u, lists.ages,
-                          u, histogram, row, counts);
+      merged.merge(lists.planes32 + static_cast<std::size_t>(v) * kTileSide + u, lists.ages);
+      cover_columns<rule>(merged, u, histogram, row, counts);
     }
   }
 }

@@ -31,18 +31,17 @@ struct Finished {
   }
 };
 
-/// Walks the lists of a vector of columns, the first of which is that of `cell`. @return the length
-/// of the longest list
+/// Walks the lists of a vector of columns. @return the length of the longest list
 template <InsideRule rule>
-HWY_INLINE int walk_columns(const std::uint32_t* cell, int ages, bool histogram, Finished& finished,
+HWY_INLINE int walk_columns(const MergedLists& lists, bool histogram, Finished& finished,
                             WindingWalk& walk) {
   const Lane d;
   Vec begin = hn::Zero(d);  // of the interval being walked
   Vec pending_begin = hn::Zero(d),
       pending_end = hn::Zero(d);  // the last one, not yet handed out
   int age = 0;
-  for (; age < ages; ++age, cell += kTilePixels) {
-    const Vec record = hn::LoadU(d, cell);
+  for (; age < lists.ages; ++age) {
+    const Vec record = hn::LoadU(d, lists.records[age]);
     const Mask present = hn::Ne(record, hn::Zero(d));
     if (hn::AllFalse(d, present)) break;
     const Vec voxel =
@@ -106,26 +105,29 @@ HWY_INLINE Vec voxel_of(Vec record) {
   return hn::ShiftRight<kLatticeBits>(hn::Add(depth, hn::Set(d, std::uint32_t{kLatticeSteps / 2})));
 }
 
+/// Where a record is behind the next one, both of one age. Records of the planes that walk_pairs()
+/// and walk_two_pairs() look at, and those of no age, are positive numbers.
+HWY_INLINE Mask not_in_turn(Vec record, Vec next) {
+  const LaneInt di;
+  return hn::RebindMask(Lane(), hn::Gt(hn::BitCast(di, next), hn::BitCast(di, record)));
+}
+
 /// Walks columns none of which has more than one crossing that enters and then one that leaves, as
 /// most have. The inside rules agree on those. @return false, and nothing done, if there are others
 HWY_INLINE bool walk_pairs(const std::uint32_t* cell, int ages, bool histogram, std::size_t pixel,
                            std::uint32_t& count, TileIntervals& out) {
   const Lane d;
   const Vec zero = hn::Zero(d), one = hn::Set(d, 1);
-  const Vec enter = hn::LoadU(d, cell);
+  const auto plane = [&](std::size_t i) { return hn::LoadU(d, cell + i * kTilePixels); };
+  const Vec enter = plane(0), leave = plane(1);
+  const Vec further = ages > 1 ? hn::Or(plane(2), plane(3)) : zero;
   const Mask present = hn::Ne(enter, zero);
-  if (hn::AllFalse(d, present)) {
+  if (hn::AllFalse(d, hn::Ne(hn::Or(enter, leave), zero))) {
     hn::StoreU(hn::Set(d, count), d, out.offsets.data() + pixel);
     return true;
   }
-  if (ages < 2) return false;
-  const Vec leave = hn::LoadU(d, cell + kTilePixels);
-  const Vec third = ages > 2 ? hn::LoadU(d, cell + 2 * kTilePixels) : zero;
-  // Records are stored inverted: the lowest bit is set where a ray enters.
-  const Mask other = hn::Ne(hn::Or(third, hn::And(leave, one)), zero);
-  const Mask enters = hn::Ne(hn::And(enter, one), zero);
-  const Mask unpaired = hn::Or(hn::Xor(present, enters), hn::Xor(present, hn::Ne(leave, zero)));
-  if (!hn::AllFalse(d, hn::Or(other, unpaired))) return false;
+  const Mask unpaired = hn::Or(not_in_turn(enter, leave), hn::Xor(present, hn::Ne(leave, zero)));
+  if (!hn::AllFalse(d, hn::Or(hn::Ne(further, zero), unpaired))) return false;
   const Vec begin = voxel_of(enter), end = voxel_of(leave);
   // Absent records count as equally deep.
   count = hand_out_ones(hn::Or(begin, hn::ShiftLeft<16>(hn::Sub(end, one))), hn::Gt(end, begin),
@@ -142,15 +144,17 @@ HWY_INLINE bool walk_two_pairs(const std::uint32_t* cell, int ages, bool histogr
   const Lane d;
   const std::size_t lanes = hn::Lanes(d);
   const Vec zero = hn::Zero(d), one = hn::Set(d, 1);
-  const auto plane = [&](int age) {
-    return age < ages ? hn::LoadU(d, cell + static_cast<std::size_t>(age) * kTilePixels) : zero;
-  };
+  if (ages < 2) return false;
+  const auto plane = [&](std::size_t i) { return hn::LoadU(d, cell + i * kTilePixels); };
   const Vec enter = plane(0), leave = plane(1), enter2 = plane(2), leave2 = plane(3);
+  const Vec further = ages > 2 ? hn::Or(plane(4), plane(5)) : zero;
   const auto any = [&](Vec bits) { return hn::Ne(bits, zero); };
   const auto unpaired = [&](Vec in, Vec from) {
-    return hn::Or(hn::Xor(any(in), any(hn::And(in, one))), hn::Xor(any(in), any(from)));
+    return hn::Or(not_in_turn(in, from), hn::Xor(any(in), any(from)));
   };
-  const Mask other = any(hn::Or(plane(4), hn::And(hn::Or(leave, leave2), one)));
+  // Where there is no second one, it becomes negative, and is in turn.
+  const Mask meets = not_in_turn(leave, hn::Sub(enter2, hn::Set(d, Record32::kAgeUnit)));
+  const Mask other = hn::Or(any(further), meets);
   if (!hn::AllFalse(d, hn::Or(other, hn::Or(unpaired(enter, leave), unpaired(enter2, leave2))))) {
     return false;
   }
@@ -216,6 +220,7 @@ void walk_planes(const TileLists<DepthKey>& lists, bool histogram, TileIntervals
   const std::size_t lanes = hn::Lanes(Lane());
   std::uint32_t count = 0;
   Finished finished;
+  MergedLists merged;
   for (int row = lists.row_begin; row < lists.row_end; ++row) {
     for (std::size_t u = 0; u < kTileSide; u += lanes) {
       const std::size_t pixel = static_cast<std::size_t>(row) * kTileSide + u;
@@ -224,7 +229,8 @@ void walk_planes(const TileLists<DepthKey>& lists, bool histogram, TileIntervals
       if (walk_two_pairs(cell, lists.ages, histogram, pixel, count, out)) continue;
       WindingWalk walk;
       finished.rounds = 0;
-      const int age = walk_columns<rule>(cell, lists.ages, histogram, finished, walk);
+      merged.merge(cell, lists.ages);
+      const int age = walk_columns<rule>(merged, histogram, finished, walk);
       out.counts.max_depth =
           std::max<std::uint64_t>(out.counts.max_depth, static_cast<std::uint64_t>(age));
       walk.count(histogram, out.counts);

@@ -40,10 +40,19 @@ void for_each_key(const TileLists<Key>& lists, std::size_t pixel, Body&& body) {
   } else {
     const int row = static_cast<int>(pixel) / kTileSide;
     if (row < lists.row_begin || row >= lists.row_end) return;
-    for (std::size_t age = 0; age < static_cast<std::size_t>(lists.ages); ++age) {
-      const std::uint32_t record = lists.planes32[age * kTilePixels + pixel];
-      if (record == 0) return;
-      body(tile_key<Record32>(record));
+    const std::uint32_t* enter = lists.planes32 + pixel;
+    const std::uint32_t* leave = enter + kTilePixels;
+    constexpr std::size_t kStep = kSides<Key> * kTilePixels;
+    const std::uint32_t* const end =
+        lists.planes32 + static_cast<std::size_t>(lists.ages) * kStep;  // of both
+    const auto key_in = [end](const std::uint32_t* cell) {
+      return cell < end && *cell != 0 ? tile_key<Record32>(*cell) : ~DepthKey{0};
+    };
+    for (;;) {
+      const DepthKey in = key_in(enter), out = key_in(leave);
+      if (std::min(in, out) == ~DepthKey{0}) return;
+      body(std::min(in, out));
+      (in < out ? enter : leave) += kStep;
     }
   }
 }

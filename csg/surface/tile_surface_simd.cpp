@@ -35,6 +35,7 @@ HWY_INLINE M no_lane(D d) { return hn::Ne(hn::Zero(d), hn::Zero(d)); }
 /// Inserts crossings into a leaf's layers, sorted by key, then triangle.
 class LayerSink {
  public:
+  static constexpr bool kApart = false;
   /// @param clip  spans count from its first pixel
   LayerSink(LeafLayers& leaf, Arena& arena, double steep_from, const PixelRect& clip)
       : leaf_(&leaf),

@@ -23,6 +23,10 @@ using DepthKey = std::uint32_t;
 /// Largest depth limit that DepthKey serves.
 inline constexpr std::uint32_t kMaxDepthKeyLimit = std::uint32_t{1} << 23;
 
+/// Lists of a pixel in the planar form: those of keys are apart by where rays enter and leave.
+template <class Key>
+inline constexpr std::size_t kSides = std::is_same_v<Key, DepthKey> ? 2 : 1;
+
 /// The sorted depth lists of one tile, in one of two forms. `Key` is DepthKey or DepthItem. The
 /// memory belongs to the builder and is valid until its next tile.
 template <class Key>
@@ -33,11 +37,13 @@ struct TileLists {
   std::uint64_t fragments = 0;  ///< in all lists of the tile
 
   /// Planar form (when `planes` is set): the fragment of age a = 1..ages of pixel p is the record
-  /// planes[(a - 1) * kTilePixels + p], present when its age field says a, absent when it is 0.
-  /// Rows outside [row_begin, row_end) are undefined. Record: see TileRecord<Key>.
+  /// planes[(a - 1) * kSides * kTilePixels + p], present when its age field says a, absent when it
+  /// is 0. Of keys these are the crossings where rays enter; those where they leave have ages of
+  /// their own, and lie kTilePixels behind. Rows outside [row_begin, row_end) are undefined.
+  /// Record: see tile_key().
   const std::uint32_t* planes32 = nullptr;
   const std::uint64_t* planes64 = nullptr;  ///< the same for 64-bit records
-  int ages = 0;                             ///< planes; the longest list
+  int ages = 0;                             ///< the longest list
 
   /// Compressed rows (when `offsets` is set): kTilePixels + 1 offsets into `keys`.
   const std::uint32_t* offsets = nullptr;

@@ -73,17 +73,26 @@ std::vector<Key> read_list(const TileLists<Key>& lists, std::size_t pixel) {
   }
   const int row = static_cast<int>(pixel / kTileSide);
   if (row < lists.row_begin || row >= lists.row_end) return list;
-  bool ended = false;
-  for (int age = 1; age <= lists.ages; ++age) {
-    const auto record = planes[static_cast<std::size_t>(age - 1) * kTilePixels + pixel];
-    if (record == 0) {
-      ended = true;
-      continue;
+  for (std::size_t side = 0; side < kSides<Key>; ++side) {
+    bool ended = false;
+    const auto read = static_cast<std::ptrdiff_t>(list.size());
+    for (int age = 1; age <= lists.ages; ++age) {
+      const std::size_t plane = static_cast<std::size_t>(age - 1) * kSides<Key> + side;
+      const auto record = planes[plane * kTilePixels + pixel];
+      if (record == 0) {
+        ended = true;
+        continue;
+      }
+      EXPECT_FALSE(ended) << "a gap in the planes of pixel " << pixel;
+      EXPECT_EQ(static_cast<int>(record >> kValueBits), age);
+      list.push_back(Key(~record & ((std::remove_const_t<decltype(record)>{1} << kValueBits) - 1)));
+      if constexpr (kSides<Key> == 2) {
+        EXPECT_EQ(list.back() & 1, side);
+      }
     }
-    EXPECT_FALSE(ended) << "a gap in the planes of pixel " << pixel;
-    EXPECT_EQ(static_cast<int>(record >> kValueBits), age);
-    list.push_back(Key(~record & ((std::remove_const_t<decltype(record)>{1} << kValueBits) - 1)));
+    EXPECT_TRUE(std::is_sorted(list.begin() + read, list.end()));
   }
+  std::sort(list.begin(), list.end());
   return list;
 }
 

@@ -30,13 +30,16 @@ class Lists {
       std::sort(column.begin(), column.end());
       keys_.insert(keys_.end(), column.begin(), column.end());
       offsets_.push_back(static_cast<std::uint32_t>(keys_.size()));
-      longest = std::max(longest, column.size());
+      const auto exits = static_cast<std::size_t>(
+          std::count_if(column.begin(), column.end(), [](DepthKey key) { return (key & 1) != 0; }));
+      longest = std::max({longest, exits, column.size() - exits});
     }
-    planes_.assign(longest * kTilePixels, 0);
+    planes_.assign(longest * 2 * kTilePixels, 0);
     for (std::size_t pixel = 0; pixel < kTilePixels; ++pixel) {
-      for (std::size_t age = 1; age <= columns[pixel].size(); ++age) {
-        const std::uint32_t nearness = 0xffffffu - columns[pixel][age - 1];
-        planes_[(age - 1) * kTilePixels + pixel] = static_cast<std::uint32_t>(age) << 24 | nearness;
+      std::uint32_t ages[2] = {0, 0};  // of entering and of leaving
+      for (const DepthKey key : columns[pixel]) {
+        const std::uint32_t side = key & 1, age = ++ages[side];
+        planes_[((age - 1) * 2 + side) * kTilePixels + pixel] = age << 24 | (0xffffffu - key);
       }
     }
     ages_ = static_cast<int>(longest);

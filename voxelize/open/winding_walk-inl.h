@@ -13,6 +13,7 @@
 #include <algorithm>
 
 #include "strata/core/inside_rule.h"
+#include "strata/raster/raster_target.h"
 #include "voxelize/open/tile_counts.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -34,6 +35,41 @@ HWY_INLINE hn::Mask<LaneInt> inside(VecInt winding) {
   if constexpr (rule == InsideRule::kNonzero) return hn::Ne(winding, hn::Zero(di));
   return hn::TestBit(winding, hn::Set(di, 1));
 }
+
+/// Most crossings of a ray in planes: each side has an age field of 8 bits.
+constexpr int kMostPlanes = 2 * 255;
+
+/// The lists of a vector of rays, the first of which is that of `cell` in planes of keys, as one:
+/// the crossings where rays enter and those where they leave. Ages are left out.
+struct MergedLists {
+  std::uint32_t records[kMostPlanes][kMaxLanes];
+  int ages = 0;  ///< no list is longer
+
+  HWY_INLINE void merge(const std::uint32_t* cell, int most) {
+    const Lane d;
+    const Vec zero = hn::Zero(d);
+    ages = 0;
+    const auto for_each = [&](std::size_t side, const auto& body) {
+      for (int age = 0; age < most; ++age) {
+        const Vec record =
+            hn::LoadU(d, cell + side + static_cast<std::size_t>(age) * 2 * kTilePixels);
+        const Mask present = hn::Ne(record, zero);
+        if (hn::AllFalse(d, present)) return;
+        const Vec value = hn::Or(hn::And(record, hn::Set(d, 0xffffffu)), hn::Set(d, 1u << 24));
+        body(hn::IfThenElseZero(present, value));
+      }
+    };
+    for_each(0, [&](Vec record) { hn::StoreU(record, d, records[ages++]); });
+    for_each(kTilePixels, [&](Vec carry) {
+      for (int age = 0; age < ages; ++age) {  // the larger stays, the smaller goes on
+        const Vec old = hn::LoadU(d, records[age]);
+        hn::StoreU(hn::Max(old, carry), d, records[age]);
+        carry = hn::Min(old, carry);
+      }
+      hn::StoreU(carry, d, records[ages++]);
+    });
+  }
+};
 
 /// The state of a vector of rays behind their crossings so far.
 struct WindingWalk {
