@@ -4,13 +4,13 @@
 
 namespace strata {
 
-/// For each set of 8 lanes, or of the first 4 of them, a vector with all bits of those set: to load
-/// it takes less than to compare.
+/// For each number up to 8 a vector with all bits of so many first lanes set: to load it takes less
+/// than to compare.
 struct SpanMasks {
-  alignas(64) std::uint32_t lanes[256][8] = {};
+  alignas(64) std::uint32_t lanes[9][8] = {};
   constexpr SpanMasks() {
-    for (std::uint32_t set = 0; set < 256; ++set) {
-      for (std::uint32_t lane = 0; lane < 8; ++lane) lanes[set][lane] = 0u - (set >> lane & 1u);
+    for (std::uint32_t count = 0; count <= 8; ++count) {
+      for (std::uint32_t lane = 0; lane < count; ++lane) lanes[count][lane] = ~0u;
     }
   }
 };

@@ -80,6 +80,20 @@ HWY_INLINE SpanVecU32 upper_words(const SpanVecF64 (&parts)[2]) {
 #endif
 }
 
+/// For each column of a tile the numbers of a vector of columns from there on, in the order that
+/// upper_words() asks for.
+struct SpanColumns {
+  alignas(64) double from[kTileSide][kSpanLanes] = {};
+  constexpr SpanColumns() {
+    for (int first = 0; first < kTileSide; ++first) {
+      for (int i = 0; i < kSpanLanes; ++i) {
+        from[first][i / kSpanParts + i % kSpanParts * (kSpanLanes / kSpanParts)] = first + i;
+      }
+    }
+  }
+};
+inline constexpr SpanColumns kSpanColumns;
+
 /// The spans of a vector of triangles.
 class SpanBatch {
  public:
@@ -130,13 +144,7 @@ class SpanBatch {
   };
 
   SpanBatch(const AxisFrame& frame, const PixelRect& clip, std::uint32_t depth_limit)
-      : frame_(frame), clip_(clip), deepest_(static_cast<std::int32_t>(depth_limit - 1)) {
-    for (int i = 0; i < kTileSide; ++i) {
-      const int in_block = i % kSpanLanes;  // even columns first
-      columns_[i - in_block + in_block / kSpanParts +
-               in_block % kSpanParts * (kSpanLanes / kSpanParts)] = i;
-    }
-  }
+      : frame_(frame), clip_(clip), deepest_(static_cast<std::int32_t>(depth_limit - 1)) {}
 
   /// Collects the blocks of the small triangles among `ids` that `sink` wants.
   /// @return lanes of triangles that may cover pixels and are not small
@@ -257,8 +265,7 @@ class SpanBatch {
 
  private:
   static constexpr int kRows = kSpanExtent / kLatticeSteps;
-  static constexpr std::size_t kBlocks =
-      static_cast<std::size_t>(kRows * kSpanLanes * (kRows / kSpanLanes + 1) + kSpanLanes);
+  static constexpr std::size_t kBlocks = static_cast<std::size_t>(kRows * kRows + kSpanLanes);
   static_assert(kTilePixels == 1 << 12 && kRows * kSpanLanes <= 1 << 8);
   static_assert(std::endian::native == std::endian::little);  // cover_blocks() loads parts of words
 
@@ -291,8 +298,8 @@ class SpanBatch {
       const SpanVecF64 step = hn::Set(df, plane_u_[lane]);
       SpanVecF64 parts[2];
       for (int part = 0; part < kSpanParts; ++part) {
-        const std::size_t at = column + static_cast<std::size_t>(part) * hn::Lanes(df);
-        parts[part] = hn::MulAdd(hn::Load(df, columns_ + at), step, begin);
+        const std::size_t at = static_cast<std::size_t>(part) * hn::Lanes(df);
+        parts[part] = hn::MulAdd(hn::Load(df, kSpanColumns.from[column] + at), step, begin);
       }
       SpanVecI32 depth = hn::BitCast(di, upper_words(parts));
       if constexpr (clamps) {
@@ -362,8 +369,7 @@ class SpanBatch {
   HWY_INLINE std::size_t collect_blocks() {
     const SpanI32 di;
     const SpanF32 df;
-    const SpanVecI32 zero = hn::Zero(di), one = hn::Set(di, 1 << 24),
-                     lanes = hn::Set(di, kSpanLanes);
+    const SpanVecI32 zero = hn::Zero(di), lanes = hn::Set(di, kSpanLanes);
     constexpr float kRound = 0x1.8p23F;
     const auto rounding = hn::Set(df, kRound);
     const SpanVecI32 column = hn::Sub(column_, hn::BitCast(di, rounding));
@@ -391,22 +397,18 @@ class SpanBatch {
       const SpanVecI32 end = hn::Add(hn::BitCast(di, hn::Add(to, rounding)), column);
       auto valid = hn::And(hn::Lt(begin, end), hn::Lt(y, height_));
       pixels = hn::Add(pixels, hn::IfThenElseZero(valid, hn::Sub(end, begin)));
-      SpanVecI32 block = hn::And(begin, hn::Neg(lanes));
-      SpanVecI32 first = hn::Shl(one, hn::Sub(begin, block));
-      SpanVecI32 left = hn::Sub(end, block);
-      block = hn::Add(block, place);
-      for (int turn = 0;; ++turn) {
+      SpanVecI32 left = hn::Sub(end, begin);
+      SpanVecI32 block = hn::Add(begin, place);
+      for (;;) {
         SpanVecI32 length = hn::Min(left, lanes);
         if constexpr (kSpanLanes == 1) length = hn::Max(length, zero);
-        // Where all lanes are covered the last bit is beyond the word, and the rest still right.
-        const SpanVecI32 word = hn::Add(hn::Sub(hn::Shl(one, length), first), block);
+        const SpanVecI32 word = hn::Add(hn::ShiftLeft<24>(length), block);
         hn::StoreU(hn::Compress(word, valid), di, reinterpret_cast<std::int32_t*>(blocks_ + count));
         count += hn::CountTrue(di, valid);
         left = hn::Sub(left, lanes);
         valid = hn::And(valid, hn::Gt(left, zero));
-        if (turn > 0 && hn::AllFalse(di, valid)) break;
+        if (hn::AllFalse(di, valid)) break;
         block = hn::Add(block, lanes);
-        first = one;
       }
       place = hn::Add(place, hn::Set(di, kTileSide + (kSpanLanes << 16)));
       y = hn::Add(y, hn::Set(di, 1));
@@ -431,8 +433,7 @@ class SpanBatch {
   alignas(64) double plane_u_[kSpanLanes];
   alignas(64) double steepness_[kSpanLanes];           ///< SetupBatch::steepness()
   alignas(64) double row_planes_[kRows * kSpanLanes];  ///< by row of a box, and lane
-  alignas(64) double columns_[kTileSide];              ///< their numbers, as upper_words() asks
-  /// [covered:8 | row of the box:5 | lane:3 | exit:4 | first pixel:12], or fewer bits for lanes
+  /// [pixels:8 | row of the box:5 | lane:3 | exit:4 | first pixel:12], or with fewer bits for lanes
   std::uint32_t blocks_[kBlocks];
 };
 
