@@ -103,7 +103,7 @@ class TilesOfRange {
         skipped_(static_cast<std::uint32_t>(bins.first_v) * row_),
         none_(row_ * static_cast<std::uint32_t>(bins.tiles_v)),
         tiles_(std::make_unique_for_overwrite<std::uint32_t[]>(end - begin)),
-        several_(std::make_unique_for_overwrite<std::uint32_t[]>(end - begin)),
+        several_(std::make_unique_for_overwrite<Several[]>(end - begin)),
         count_(end - begin) {}
 
   /// Adds the triangles to `counts` of tiles.
@@ -111,14 +111,14 @@ class TilesOfRange {
     const PixelBoxes::View boxes = boxes_->view();
     const std::size_t end = count_, begin = begin_;
     std::uint32_t* const tiles = tiles_.get();
-    std::uint32_t* several = several_.get();  // no member: another thread reads its neighbours
+    Several* several = several_.get();  // no member: another thread reads its neighbours
     const auto count_one = [&](std::size_t at) {
       // No branch: which triangles miss all pixel centres, or meet several tiles, cannot be
       // predicted.
       const Place of = place(boxes.box(begin + at));
       tiles[at] = of.tile;
       ++counts[of.tile];
-      *several = static_cast<std::uint32_t>(begin + at);
+      *several = {static_cast<std::uint32_t>(begin + at), of.first};
       several += of.several ? 1 : 0;
     };
     std::size_t i = 0;
@@ -158,26 +158,52 @@ class TilesOfRange {
       }
     }
     for (; i < end; ++i) write_some(i, 1);
-    for_each_of_several(
-        [=](std::uint32_t tile, std::uint32_t triangle) { triangles[cursors[tile]++] = triangle; });
+    for_each_of_several([=](std::uint32_t tile, std::uint32_t triangle) {
+      const std::uint64_t at = cursors[tile];
+      triangles[at] = triangle;
+      cursors[tile] = at + (tile < none ? 1 : 0);
+    });
   }
   /// Triangles that are looked at together.
   static constexpr std::size_t kGroup = 4;
 
  private:
   struct Place {
-    std::uint32_t tile;  ///< the only one, or none_
+    std::uint32_t tile;   ///< the only one, or none_
+    std::uint32_t first;  ///< of several, as Several has it
     bool several;
   };
+  /// A triangle in several tiles.
+  struct Several {
+    std::uint32_t triangle;
+    std::uint32_t first;  ///< [more than two along a side:1 | two along v:1 | along u:1 | tile:29]
+  };
+  static constexpr std::uint32_t kAlongU = std::uint32_t{1} << 29, kAlongV = kAlongU << 1,
+                                 kMore = kAlongV << 1;
   [[nodiscard]] Place place(const PixelBoxes::Box& box) const {
     const std::uint32_t u0 = box.u0 / kTileSide, v0 = box.v0 / kTileSide;
     const std::uint32_t u1 = (box.u1 - 1) / kTileSide, v1 = (box.v1 - 1) / kTileSide;
     const bool covers = box.covers(), one = (u0 == u1) & (v0 == v1);
-    return {(covers & one) ? v0 * row_ + u0 - skipped_ : none_, covers && !one};
+    const std::uint32_t first = v0 * row_ + u0 - skipped_;
+    const std::uint32_t sides = (u0 != u1 ? kAlongU : 0) | (v0 != v1 ? kAlongV : 0) |
+                                ((u1 - u0 > 1) | (v1 - v0 > 1) ? kMore : 0);
+    return {(covers & one) ? first : none_, first | sides, covers && !one};
   }
+  /// Calls body(tile, triangle) for the tiles of those triangles, and some of them with none_.
   template <class Body>
   void for_each_of_several(Body&& body) const {
-    for (const std::uint32_t triangle : std::span(several_.get(), several_count_)) {
+    for (const Several& several : std::span(several_.get(), several_count_)) {
+      const std::uint32_t triangle = several.triangle;
+      if (several.first < kMore) {
+        // No branch: which of the four it meets cannot be predicted.
+        const bool u = (several.first & kAlongU) != 0, v = (several.first & kAlongV) != 0;
+        const std::uint32_t tile = several.first & (kAlongU - 1);
+        body(tile, triangle);
+        body(u ? tile + 1 : none_, triangle);
+        body(v ? tile + row_ : none_, triangle);
+        body(u & v ? tile + row_ + 1 : none_, triangle);
+        continue;
+      }
       const PixelBoxes::Box box = boxes_->view().box(triangle);
       for (std::uint32_t tv = box.v0 / kTileSide; tv <= (box.v1 - 1) / kTileSide; ++tv) {
         for (std::uint32_t tu = box.u0 / kTileSide; tu <= (box.u1 - 1) / kTileSide; ++tu) {
@@ -190,7 +216,8 @@ class TilesOfRange {
   const PixelBoxes* boxes_;
   std::size_t begin_;
   std::uint32_t row_, skipped_, none_;
-  std::unique_ptr<std::uint32_t[]> tiles_, several_;
+  std::unique_ptr<std::uint32_t[]> tiles_;
+  std::unique_ptr<Several[]> several_;
   std::size_t count_, several_count_ = 0;
 };
 
