@@ -8,6 +8,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include "core/lanes-inl.h"
 #include "raster/spans-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -149,8 +150,7 @@ class TableSink {
       std::size_t run = std::min(lanes, count - i);
       auto carry = hn::Zero(d);
       if (run == lanes) {
-        const auto next = hn::Eq(hn::LoadU(d32, pixels.data() + i),
-                                 hn::Add(hn::Iota(d32, 0), hn::Set(d32, pixel)));
+        const auto next = hn::Eq(hn::LoadU(d32, pixels.data() + i), count_from(d32, pixel));
         carry = hn::Sub(oldest, hn::LoadU(d, &items[i].bits));
         if (!hn::AllTrue(d32, next)) {
           run = run_length(pixels.data() + i, lanes);
@@ -354,8 +354,7 @@ class LogSink {
     const auto covered = hn::Ne(lifted, hn::Zero(d));
     const std::size_t found = hn::CountTrue(d, covered);
     // Whole vectors are stored: to store a compressed part takes some processors 100 cycles.
-    // Iota() of a variable is stored word by word, and then loaded.
-    const auto pixels = hn::Add(hn::Iota(d, 0), hn::Set(d, static_cast<std::uint32_t>(pixel)));
+    const auto pixels = count_from(d, static_cast<std::uint32_t>(pixel));
     hn::StoreU(hn::Compress(pixels, covered), d, pixels_ + count_);
     const auto depth = hn::Compress(hn::Sub(lifted, hn::Set(d, 1u)), covered);
     if constexpr (Record::kPayloadBits == 0) {

@@ -12,6 +12,8 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include "core/lanes-inl.h"
+
 // Horizons in a depth image, as J. Jimenez, X. Wu, A. Pesce and A. Jarabo, "Practical real-time
 // strategies for accurate indirect occlusion" (2016): planes through the ray of the eye, and in
 // each of them the cosine-weighted light between two horizons, in closed form. We differ:
@@ -256,7 +258,7 @@ class Horizons {
   [[nodiscard]] Vec openness(int x, const Vec3& here, Mask somewhere, const Places& places) const {
     const Lane d;
     Points points{somewhere, here, points_at(seen_->normals, places), {}, {}, {}, {}};
-    points.columns = hn::Add(hn::Add(hn::Iota(d, 0.0f), set(static_cast<float>(x))), set(0.5f));
+    points.columns = hn::Add(count_from(d, static_cast<float>(x)), set(0.5f));
     points.rows = hn::Add(set(static_cast<float>(y_)), set(0.5f));
     Vec scale = set(static_cast<float>(seen_->scale));  // pixels a world unit
     points.to_eye = {hn::Zero(d), hn::Zero(d), set(1.0f)};

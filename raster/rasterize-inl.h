@@ -19,6 +19,7 @@
 #include <hwy/highway.h>
 #include <bit>
 
+#include "core/lanes-inl.h"
 #include "raster/triangle_setup.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -365,7 +366,7 @@ struct StripRows {
     const auto most = hn::Set(df, static_cast<float>(rows));
     const auto least = hn::Set(df, -1.0f);
     for (int strip = 0; strip < strips; strip += static_cast<int>(hn::Lanes(di))) {
-      const auto step = hn::Mul(hn::Add(hn::Iota(di, 0), hn::Set(di, strip)), hn::Set(di, columns));
+      const auto step = hn::Mul(count_from(di, strip), hn::Set(di, columns));
       auto first = zero, last = all;
       for (int i = 0; i < 3; ++i) {
         const std::int32_t along = q.edge_u[i], down = q.edge_v[i];

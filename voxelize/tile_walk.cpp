@@ -8,6 +8,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include "core/lanes-inl.h"
 #include "strata/hashbuffer/tile_lists.h"
 #include "strata/raster/lattice_mesh.h"
 #include "voxelize/open/winding_walk-inl.h"
@@ -83,7 +84,7 @@ HWY_INLINE std::uint32_t hand_out_ones(Vec packed, Mask marked, std::size_t pixe
   std::uint32_t* const offsets = out.offsets.data() + pixel;
   if (hn::AllTrue(d, marked)) {
     hn::StoreU(packed, d, items);
-    hn::StoreU(hn::Add(hn::Iota(d, 0), hn::Set(d, count)), d, offsets);
+    hn::StoreU(count_from(d, count), d, offsets);
     return count + static_cast<std::uint32_t>(lanes);
   }
   // A whole vector is stored: to store a compressed part takes some processors 100 cycles.

@@ -8,6 +8,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include "core/lanes-inl.h"
 #include "strata/raster/raster_target.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -35,7 +36,7 @@ class PlaneRow {
       const std::uint32_t first = row.offsets[u];
       const auto ends = hn::LoadU(du, row.offsets + u + 1);
       // Most columns have one interval.
-      const auto ones = hn::Add(hn::Iota(du, 0), hn::Set(du, first + 1));
+      const auto ones = count_from(du, first + 1);
       if (hn::AllTrue(du, hn::Eq(ends, ones))) {
         const auto words = hn::LoadU(du, row.intervals + first);
         hn::Store(hn::BitCast(d, hn::And(words, hn::Set(du, 0xffff))), d, begin_[0] + u);

@@ -13,6 +13,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include "core/lanes-inl.h"
 #include "voxelize/distance/triangle_frame.h"
 
 // The distance of a point to a triangle is found from forms that are affine in the point: its
@@ -156,7 +157,7 @@ HWY_INLINE void lower_row(const TriangleForms& forms, const Rows& rows, std::siz
   const Vec zero = hn::Zero(d);
   const int step = static_cast<int>(hn::Lanes(d));
   for (int z = rows.begin[r]; z <= rows.last[r]; z += step) {
-    const Vec at = hn::Add(hn::Iota(d, 0), hn::Set(d, static_cast<float>(z - kMiddle)));
+    const Vec at = count_from(d, static_cast<float>(z - kMiddle));
     const auto form = [&](int k) {
       return hn::Add(hn::Mul(hn::Set(d, forms.slope[2][k]), at), hn::Set(d, rows.forms[k][r]));
     };
@@ -187,8 +188,7 @@ HWY_INLINE unsigned clip_rows(const TriangleForms& forms, const float* at_x, int
   const LaneInt di;
   unsigned left = 0;
   for (std::size_t r = 0; r < kRows; r += hn::Lanes(d)) {
-    const Vec at =
-        hn::Add(hn::Iota(d, 0), hn::Set(d, static_cast<float>(y + static_cast<int>(r) - kMiddle)));
+    const Vec at = count_from(d, static_cast<float>(y + static_cast<int>(r) - kMiddle));
     for (int k = 0; k < kForms; ++k) {
       hn::Store(hn::Add(hn::Mul(hn::Set(d, forms.slope[1][k]), at), hn::Set(d, at_x[k])), d,
                 rows.forms[k] + r);
