@@ -25,7 +25,7 @@ Result<void> check_room(const std::string& path, std::uint64_t bytes) {
   if (path == "-" || (exists && !S_ISREG(there.st_mode) && !S_ISDIR(there.st_mode))) return {};
   const std::string target = follow_link(path);  // as AtomicFile writes it
   std::string folder = target.substr(0, target.rfind('/') + 1);
-  if (folder.empty()) folder = ".";
+  if (folder.empty()) folder.push_back('.');
   struct statvfs disk {};
   if (statvfs(folder.c_str(), &disk) != 0) return {};  // whoever creates the file says why
   if (disk.f_blocks == 0) return {};                   // the file system does not say
