@@ -84,11 +84,30 @@ class VertexTree {
   std::vector<Bounds> boxes_;  ///< children of node n: 2 n + 1 and 2 n + 2
 };
 
+/// The vertices that triangles name; none if one of those is not finite.
+std::vector<glm::dvec3> corners_of(const TriangleSoup& mesh) {
+  std::vector<std::uint8_t> named(mesh.positions.size(), 0);
+  for (const glm::uvec3& t : mesh.triangles) named[t.x] = named[t.y] = named[t.z] = 1;
+  std::vector<glm::dvec3> corners;
+  for (std::size_t v = 0; v < named.size(); ++v) {
+    if (named[v] == 0) continue;
+    const glm::dvec3& p = mesh.positions[v];
+    if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) return {};
+    corners.push_back(p);
+  }
+  return corners;
+}
+
 /// Whether the mesh is closed, has a volume, and no vertex lies outside of any face; meshes too
 /// large to try are taken for not convex.
 bool is_convex(const TriangleSoup& mesh) {
   constexpr std::size_t kMostTriangles = std::size_t{1} << 16, kMostTests = std::size_t{1} << 22;
-  if (mesh.triangles.empty() || mesh.triangles.size() > kMostTriangles) return false;
+  if (mesh.triangles.empty() || mesh.triangles.size() > kMostTriangles ||
+      mesh.positions.size() > 3 * kMostTriangles) {
+    return false;
+  }
+  const std::vector<glm::dvec3> corners = corners_of(mesh);
+  if (corners.empty()) return false;
   const Bounds box = bounds(mesh);
   const double size = glm::length(box.high - box.low);
   constexpr double kMostSize = 1e75;  // of which the fourth power is a number
@@ -107,24 +126,24 @@ bool is_convex(const TriangleSoup& mesh) {
   const std::size_t step = mesh.triangles.size() / kFewTriangles + 1;
   for (std::size_t i = 0; i < mesh.triangles.size(); i += step) {
     const Plane plane = plane_of(mesh.triangles[i]);
-    if (std::ranges::any_of(mesh.positions, [&](const glm::dvec3& p) {
+    if (std::ranges::any_of(corners, [&](const glm::dvec3& p) {
           return glm::dot(plane.across, p) > plane.at + plane.little;
         })) {
       return false;
     }
   }
-  const VertexTree vertices(mesh.positions);
+  const VertexTree vertices(corners);
   std::size_t tests = 0;
-  glm::dvec3 below = mesh.positions.front();  // a vertex well below the last face
+  glm::dvec3 below = corners.front();  // a vertex well below the last face
   for (const glm::uvec3& t : mesh.triangles) {
     const auto [across, at, little] = plane_of(t);
     if (tests > kMostTests || vertices.any_beyond(across, at + little, tests)) return false;
     // Flat: a ray leaves it where it enters it, and that is nothing.
     const double least = at - little;
     if (!(little > 0) || glm::dot(across, below) < least) continue;
-    below = *std::ranges::min_element(mesh.positions, std::less<>(),
+    below = *std::ranges::min_element(corners, std::less<>(),
                                       [&, n = across](const auto& p) { return glm::dot(n, p); });
-    tests += mesh.positions.size();
+    tests += corners.size();
     if (glm::dot(across, below) >= least) return false;
   }
   return is_closed(mesh);

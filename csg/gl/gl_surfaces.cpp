@@ -106,8 +106,8 @@ class PixelJudge {
         crossings_.push_back(items_[i].item);
       }
       const Geometry::Part& part = frame_->parts[solid];
-      const ViewPart& view_part = frame_->view_parts[solid];
-      if (kind_of(frame_->program, solid, part, view_part) == LeafLayers::Kind::kFirstEntryOnly) {
+      // Tiles with solids that are cut are left to the CPU (TilePrograms).
+      if (kind_of(frame_->program, solid, part, false) == LeafLayers::Kind::kFirstEntryOnly) {
         first_entry_of(crossings_, solid, transitions_);
       } else {
         transitions_of(crossings_, solid, part.rule, false, transitions_);

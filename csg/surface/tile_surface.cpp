@@ -37,10 +37,10 @@ void LeafLayers::add_layer(Arena& arena) {
 }
 
 LeafLayers::Kind kind_of(const Program& program, std::uint32_t solid, const Geometry::Part& part,
-                         const ViewPart& view_part) {
+                         bool cut) {
   if (!part.convex) return LeafLayers::Kind::kSorted;
-  return program.is_union_operand(solid) && !view_part.cut ? LeafLayers::Kind::kFirstEntryOnly
-                                                           : LeafLayers::Kind::kConvex;
+  return program.is_union_operand(solid) && !cut ? LeafLayers::Kind::kFirstEntryOnly
+                                                 : LeafLayers::Kind::kConvex;
 }
 
 void first_entry_of(std::span<const DepthItem> crossings, std::uint32_t solid,
@@ -251,13 +251,15 @@ void TileFinder::resolve(const TileProgram& program, std::uint64_t pixel) {
   show(pixel);
 }
 
-bool TileFinder::place(LeafLayers& leaf, std::uint32_t solid) const {
+bool TileFinder::meets_tile(const ViewPart& part) const {
+  return !part.binned || !part.bins.tile(tile_.u0 / kTileSide, tile_.v0 / kTileSide).empty();
+}
+
+bool TileFinder::place(LeafLayers& leaf, std::uint32_t solid, bool cut) const {
   const ViewPart& part = view_parts_[solid];
-  if (part.binned && part.bins.tile(tile_.u0 / kTileSide, tile_.v0 / kTileSide).empty()) {
-    return false;
-  }
+  if (!meets_tile(part)) return false;
   leaf.made = leaf.deep = leaf.steep = false;
-  leaf.kind = kind_of(*program_, solid, parts_[solid], part);
+  leaf.kind = kind_of(*program_, solid, parts_[solid], cut);
   leaf.solid = solid;
   leaf.nearest = part.cut ? 0 : part.nearest;
   leaf.farthest = part.farthest;
@@ -358,12 +360,11 @@ void TileFinder::find(int tile_u, int tile_v, std::span<const std::uint32_t> sol
   arena_.clear();
   if (leaves_.size() < solids.size()) leaves_.resize(solids.size());
   std::size_t count = 0;
-  bool cut = false;
+  const bool cut = std::ranges::any_of(solids, [&](std::uint32_t solid) {
+    return view_parts_[solid].cut && meets_tile(view_parts_[solid]);
+  });
   for (const std::uint32_t solid : solids) {
-    LeafLayers& leaf = leaves_[count];
-    if (!place(leaf, solid)) continue;
-    ++count;
-    cut = cut || view_parts_[solid].cut;
+    if (place(leaves_[count], solid, cut)) ++count;
   }
   hidden_.clear();
   clusters_.clear();

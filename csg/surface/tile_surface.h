@@ -103,8 +103,10 @@ class TileFinder {
   void normalize_pixel(LeafLayers& leaf, std::size_t at);
 
  private:
-  /// Prepares a leaf for a solid in the tile. @return whether it may be met there
-  [[nodiscard]] bool place(LeafLayers& leaf, std::uint32_t solid) const;
+  [[nodiscard]] bool meets_tile(const ViewPart& part) const;
+  /// Prepares a leaf for a solid in the tile. @param cut  as kind_of() has it @return whether it
+  /// may be met there
+  [[nodiscard]] bool place(LeafLayers& leaf, std::uint32_t solid, bool cut) const;
   /// Makes a leaf one of bounds for each area, if it has few triangles in the tile.
   void find_bounds(LeafLayers& leaf);
   /// Whether bounds of the leaves of a tile may save more time than they take.
@@ -221,9 +223,10 @@ void find_united(const UnitedLayers& layers, const PixelRect& area, const Coinci
                  const SurfacePart& part, std::vector<std::uint64_t>& doubtful);
 
 /// How the crossings of a part are kept: what lies behind the first entry of a convex solid that is
-/// an operand of the union at the top is not asked for.
+/// an operand of the union at the top is not asked for, unless rays may begin inside the tree.
+/// @param cut  the near plane may cut this solid or another of the tile
 [[nodiscard]] LeafLayers::Kind kind_of(const Program& program, std::uint32_t solid,
-                                       const Geometry::Part& part, const ViewPart& view_part);
+                                       const Geometry::Part& part, bool cut);
 /// The only transition of a LeafLayers::Kind::kFirstEntryOnly, if there is one.
 void first_entry_of(std::span<const DepthItem> crossings, std::uint32_t solid,
                     std::vector<Transition>& transitions);

@@ -194,17 +194,17 @@ Surface FirstHit::find(std::vector<Transition>& transitions, const TransitionFac
     // On to where the interval ends. What lies within the bound of its beginning is settled with
     // it; that must not depend on transitions that do not matter.
     const Interval interval = walk_inside(transitions, begin, at, depth + 2.0 * bound.farther);
-    if (!state_.value()) {
-      const bool eye_inside = depth == 0 && transitions[begin].triangle == Surface::kNone;
-      if (eye_inside) {
-        for (std::size_t i = interval.exit_begin; i < interval.exit_end; ++i) {
-          if (!state_.supports(transitions[i].solid)) continue;
-          found = surface_of(transitions[i], transitions[i].depth);
-          break;
-        }
-        at = interval.exit_end;
+    const bool eye_inside = depth == 0 && transitions[begin].triangle == Surface::kNone;
+    if (eye_inside) {  // the far side shows, if there is one
+      for (std::size_t i = interval.exit_begin; !state_.value() && i < interval.exit_end; ++i) {
+        if (!state_.supports(transitions[i].solid)) continue;
+        found = surface_of(transitions[i], transitions[i].depth);
         break;
       }
+      at = interval.exit_end;
+      break;
+    }
+    if (!state_.value()) {
       if (!interval.union_operand &&
           transitions[interval.exit_begin].depth - depth <=
               bound.farther +

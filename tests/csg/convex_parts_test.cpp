@@ -13,6 +13,7 @@
 #include "csg/geometry.h"
 #include "strata/csg/tree.h"
 #include "strata/mesh/shapes.h"
+#include "strata/mesh/soup_tools.h"
 
 namespace strata::csg {
 namespace {
@@ -92,6 +93,31 @@ TEST(ConvexParts, AreClosedAndHaveAVolume) {
   for (glm::dvec3& p : flat.positions) p.z = 0;
   EXPECT_FALSE(counts_as_convex(flat));
   EXPECT_FALSE(counts_as_convex(make_torus(3, 1, 12, 12)));
+}
+
+TEST(ConvexParts, AreNotNestedNorSideBySide) {
+  TriangleSoup both = make_icosphere(1, 2);
+  const auto with = [&](const glm::dvec3& shift, double size) {
+    TriangleSoup result = both;
+    const auto first = static_cast<std::uint32_t>(both.positions.size());
+    for (const glm::dvec3& p : both.positions) result.positions.push_back(size * p + shift);
+    for (const glm::uvec3& t : both.triangles) result.triangles.push_back(t + first);
+    return result;
+  };
+  EXPECT_FALSE(counts_as_convex(with({}, 0.5)));
+  EXPECT_FALSE(counts_as_convex(with({3, 0, 0}, 1)));
+  reverse_orientation(both);
+  EXPECT_FALSE(counts_as_convex(both));
+}
+
+TEST(ConvexParts, MayHaveVerticesThatNoTriangleNames) {
+  for (const double odd : {0.0, 7.0, std::nan(""), HUGE_VAL}) {
+    TriangleSoup sphere = make_icosphere(1, 2);
+    sphere.positions.emplace_back(odd, odd, -odd);
+    EXPECT_TRUE(counts_as_convex(sphere)) << odd;
+    sphere.triangles.front().x = static_cast<std::uint32_t>(sphere.positions.size() - 1);
+    EXPECT_FALSE(counts_as_convex(sphere)) << odd;
+  }
 }
 
 }  // namespace

@@ -137,7 +137,8 @@ class RayOracle {
     }
   }
 
-  /// The distance where the tree is true first for longer than `least`.
+  /// The distance where the tree is true first for longer than `least`; where it is true from the
+  /// beginning of the ray, the distance where that ends.
   [[nodiscard]] std::optional<double> first_inside(const glm::dvec3& from, const glm::dvec3& along,
                                                    double least) const {
     std::vector<Crossing> met;
@@ -152,6 +153,7 @@ class RayOracle {
           evaluate(tree_, tree_.root(), [&](std::uint32_t s) { return windings[s] > 0; });
       if (inside && !begin) begin = one.distance;
       if (inside || !begin) continue;
+      if (*begin < 0 && one.distance > 0) return one.distance;
       if (one.distance - *begin > least) return begin;
       begin.reset();
     }

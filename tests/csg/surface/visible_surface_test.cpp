@@ -35,6 +35,7 @@ SurfaceImage by_full_lists(const Tree& tree, const View& view, double relative_p
   EXPECT_TRUE(lists.has_value());
 
   const Program program = compile(tree, tree.root());
+  const bool cut = std::ranges::any_of(parts, &ViewPart::cut);
   FirstHit finder(program);
   const Coincidence coincidence(view, geometry.world_error(tree, relative_precision));
   SurfaceImage result;
@@ -49,7 +50,7 @@ SurfaceImage by_full_lists(const Tree& tree, const View& view, double relative_p
       }
       for (std::uint32_t solid = 0; solid < parts.size(); ++solid) {
         const Geometry::Part& part = geometry.parts()[solid];
-        if (kind_of(program, solid, part, parts[solid]) == LeafLayers::Kind::kFirstEntryOnly) {
+        if (kind_of(program, solid, part, cut) == LeafLayers::Kind::kFirstEntryOnly) {
           first_entry_of(of_solid[solid], solid, transitions);
         } else {
           transitions_of(of_solid[solid], solid, part.rule, parts[solid].cut, transitions);
