@@ -30,15 +30,15 @@ struct LineAllocator {
 };
 
 /// The HA-buffer of one tile, with plain stores; see strata/hashbuffer/table_law.h.
-template <class Record>
+/// @tparam sides  lists a pixel: of keys there are two, where rays enter and then where they leave,
+/// so that the first crossings of both kinds find their cells at once
+template <class Record, std::size_t sides = kSides<TileKey<Record>>>
 struct TileTable {
   using Bits = typename Record::Word;
   /// Cells behind the table that blocks of pixels may touch, without changing them.
   static constexpr std::size_t kPadding = 8 * kTileSide;
 
-  /// Lists of a tile: of keys there are two a pixel, where rays enter and then where they leave, so
-  /// that the first crossings of both kinds find their cells at once.
-  static constexpr std::size_t kLists = kSides<TileKey<Record>> * kTilePixels;
+  static constexpr std::size_t kLists = sides * kTilePixels;
 
   std::vector<Bits, LineAllocator<Bits>> cells;
   std::size_t size = 0;                ///< cells of the table

@@ -176,7 +176,7 @@ class TileHash {
     std::vector<std::uint32_t> offsets;
   };
 
-  TileTable<Record> table_;
+  TileTable<Record, 1> table_;
   std::vector<Points> points_;
   std::array<std::uint16_t, kTilePixels / 64> max_ages_{};
   std::uint32_t width_ = 0, height_ = 0;

@@ -153,8 +153,10 @@ class RayOracle {
           evaluate(tree_, tree_.root(), [&](std::uint32_t s) { return windings[s] > 0; });
       if (inside && !begin) begin = one.distance;
       if (inside || !begin) continue;
-      if (*begin < 0 && one.distance > 0) return one.distance;
-      if (one.distance - *begin > least) return begin;
+      if (one.distance > 0) {
+        if (*begin < 0) return one.distance;
+        if (one.distance - *begin > least) return begin;
+      }
       begin.reset();
     }
     return std::nullopt;
