@@ -35,7 +35,9 @@ set(CMAKE_RUNTIME_OUTPUT_DIRECTORY "${CMAKE_BINARY_DIR}/bin")
 find_program(STRATA_CCACHE ccache)
 mark_as_advanced(STRATA_CCACHE)
 if(STRATA_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
-  set(CMAKE_CXX_COMPILER_LAUNCHER "${STRATA_CCACHE}")
+  # Without these ccache keeps nothing that was compiled with precompiled headers (STRATA_JOIN_SOURCES).
+  set(CMAKE_CXX_COMPILER_LAUNCHER
+    "${CMAKE_COMMAND}" -E env CCACHE_SLOPPINESS=pch_defines,time_macros "${STRATA_CCACHE}")
 endif()
 
 # Compiling CGAL or OpenVDB takes up to 2 GB: targets with JOB_POOL_COMPILE heavy do it one at a time.

@@ -249,8 +249,8 @@ class SpanBatch {
   /// those of a triangle count from, and of its surface, which is DepthItem's. Then
   /// sink.put_span(first pixel, depths, covered, base) for each block of kSpanLanes pixels that
   /// follow each other. A pixel counts from that of the tile, kTileSide a row, and kTilePixels
-  /// further where a ray leaves, if the sink keeps those pixels apart. A sink that has steepness()
-  /// gets the steepness of each triangle before its bases.
+  /// further where a ray leaves, if the sink keeps those pixels apart. Where the sink
+  /// has steepness(), the steepness of the triangles stands before `bases`.
   template <class Sink>
   HWY_INLINE void cover(Sink& sink) {
     if (rows_ <= 0) return;

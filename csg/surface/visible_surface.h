@@ -178,8 +178,8 @@ class FirstHit {
     std::uint32_t outward = 0;
   };
   static constexpr std::size_t kMostJudged = 8;
-  /// @param inside  the solids that the ray is in before @pre no two of at most kMostJudged are of
-  /// one solid
+  /// @param inside  the solids that the ray is in before
+  /// @param coincident  at most kMostJudged, each of another solid
   Verdict judge(std::span<const std::uint32_t> inside, std::span<const Transition> coincident,
                 const TransitionFaces& faces);
 
