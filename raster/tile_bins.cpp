@@ -186,7 +186,7 @@ class TilesOfRange {
     const bool covers = box.covers(), one = (u0 == u1) & (v0 == v1);
     const std::uint32_t first = v0 * row_ + u0 - skipped_;
     const std::uint32_t sides = (u0 != u1 ? kAlongU : 0) | (v0 != v1 ? kAlongV : 0) |
-                                ((u1 - u0 > 1) | (v1 - v0 > 1) ? kMore : 0);
+                                (((u1 - u0 > 1) | (v1 - v0 > 1)) ? kMore : 0);
     return {(covers & one) ? first : none_, first | sides, covers && !one};
   }
   /// Calls body(tile, triangle) for the tiles of those triangles, and some of them with none_.
@@ -201,7 +201,7 @@ class TilesOfRange {
         body(tile, triangle);
         body(u ? tile + 1 : none_, triangle);
         body(v ? tile + row_ : none_, triangle);
-        body(u & v ? tile + row_ + 1 : none_, triangle);
+        body((u & v) ? tile + row_ + 1 : none_, triangle);
         continue;
       }
       const PixelBoxes::Box box = boxes_->view().box(triangle);
