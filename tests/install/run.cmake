@@ -1,5 +1,5 @@
 # What the scripts of this folder share. Their arguments: BUILD_DIR, SOURCE_DIR, PREFIX (the installed tree), WORK_DIR,
-# COMPILER, LAUNCHER (ccache or nothing), SANITIZE, VERSION, OPENMESH.
+# COMPILER, LAUNCHER (a command with ccache, or nothing), SANITIZE, VERSION, OPENMESH.
 cmake_minimum_required(VERSION 3.25)
 
 # run(COMMAND...): ends the test if it fails; `output` is what it printed.
@@ -20,12 +20,13 @@ function(run_consumer program)
   endif()
 endfunction()
 
+set(ENV{CMAKE_CXX_COMPILER_LAUNCHER} "${LAUNCHER}")  # a list, which an argument of run() would not stay
 set(flags "-Wall -Wextra -Werror")  # what Strata's headers must not disturb
 if(SANITIZE)
   string(APPEND flags " -fsanitize=${SANITIZE}")
 endif()
 set(configure -G Ninja "-DCMAKE_PREFIX_PATH=${PREFIX}" "-DCMAKE_CXX_COMPILER=${COMPILER}"
-  "-DCMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER}" "-DCMAKE_CXX_FLAGS=${flags}"
+  "-DCMAKE_CXX_FLAGS=${flags}"
   -DCMAKE_NO_SYSTEM_FROM_IMPORTED=ON)  # or the compiler keeps quiet about our headers
 set(consumer_dir "${SOURCE_DIR}/tests/install/consumer")
 file(REMOVE_RECURSE "${WORK_DIR}")
