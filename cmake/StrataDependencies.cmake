@@ -235,7 +235,7 @@ set(STRATA_HAVE_MPI OFF)
 if(STRATA_WITH_MPI AND STRATA_BUILD_TOOLS)
   set(MPI_CXX_SKIP_MPICXX TRUE)  # the interface for C++ is no part of MPI any more
   find_package(MPI COMPONENTS CXX QUIET)
-  strata_optional(MPI STRATA_HAVE_MPI MPI "${MPI_CXX_LIBRARY_VERSION_STRING}, strata-mpi"
+  strata_optional(MPI STRATA_HAVE_MPI MPI "MPI ${MPI_CXX_VERSION}, strata-mpi"
     "libopenmpi-dev is missing; no strata-mpi")
 else()
   strata_feature(MPI OFF "STRATA_WITH_MPI is off")
