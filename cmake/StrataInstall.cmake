@@ -86,6 +86,7 @@ strata_depends(ZLIB::ZLIB zlib1g-dev "find_dependency(ZLIB)" zlib "")
 strata_depends(PNG::PNG libpng-dev "find_dependency(PNG)" libpng "")
 strata_depends(PkgConfig::hwy libhwy-dev "${pc_modules}(hwy REQUIRED QUIET IMPORTED_TARGET libhwy)" libhwy "")
 strata_depends(PkgConfig::libdeflate libdeflate-dev "${pc_modules}(libdeflate REQUIRED QUIET IMPORTED_TARGET libdeflate)" libdeflate "")
+strata_depends(PkgConfig::isal libisal-dev "${pc_modules}(isal REQUIRED QUIET IMPORTED_TARGET libisal)" libisal "")
 strata_depends(PkgConfig::polyclipping libpolyclipping-dev
   "${pc_modules}(polyclipping REQUIRED QUIET IMPORTED_TARGET polyclipping)" polyclipping "")
 strata_depends(PkgConfig::qhull_r libqhull-dev "${pc_modules}(qhull_r REQUIRED QUIET IMPORTED_TARGET qhull_r)" qhull_r "")

@@ -63,7 +63,7 @@ class VoxelRun {
     auto picture = command_.slice ? slice() : view(placed_camera());
     if (!picture) return tl::unexpected(picture.error());
     session_.end_progress();
-    return write_png(*picture, command_.output);
+    return write_png(*picture, command_.output, {.threads = session_.threads()});
   }
 
  private:

@@ -385,7 +385,8 @@ Result<void> CsgRun::measure() {
 Result<void> CsgRun::write() {
   const double begin = session_.milliseconds();
   if (!command_.output.empty()) {
-    auto done = film_ != nullptr ? film_->add(picture_) : csg::write_png(picture_, command_.output);
+    auto done = film_ != nullptr ? film_->add(picture_)
+                                 : csg::write_png(picture_, command_.output, drawing_);
     if (!done) return done;
   }
   if (!command_.depth.empty()) {
@@ -393,7 +394,7 @@ Result<void> CsgRun::write() {
   }
   if (!command_.ids.empty()) {
     const csg::Picture ids = picture_of_ids(*surfaces_, preview_->tree(), outcome_);
-    if (auto done = csg::write_png(ids, command_.ids); !done) return done;
+    if (auto done = csg::write_png(ids, command_.ids, drawing_); !done) return done;
   }
   outcome_.write_ms += session_.milliseconds() - begin;
   return {};

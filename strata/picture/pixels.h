@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "strata/core/execution.h"
 #include "strata/core/result.h"
 
 namespace strata {
@@ -19,7 +20,9 @@ struct Picture {
   std::vector<Rgba> pixels;  ///< width * height, row by row
 };
 
-/// Writes a PNG file, or to standard output for "-". @return kOutput naming the file
-Result<void> write_png(const Picture& picture, const std::string& path);
+/// Writes a PNG file, or to standard output for "-". It is not stopped half way, and reports no
+/// progress. @return kOutput naming the file
+Result<void> write_png(const Picture& picture, const std::string& path,
+                       const Execution& execution = {});
 
 }  // namespace strata

@@ -49,32 +49,33 @@ TEST_F(Usage, LibrariesThatFewJobsNeedAreNotLoadedAtTheStart) {
   const RunResult run = place.run({"--version"}, {.environment = {"LD_TRACE_LOADED_OBJECTS=1"}});
   ASSERT_NE(run.out.find("libc.so"), std::string::npos) << run.err;
   for (const char* library :
-       {"hdf5",    "OpenEXR", "Imath",        "epoxy",  "fontconfig", "freetype", "harfbuzz",
-        "libzip",  "libpng",  "libjpeg",      "libgif", "libwebp",    "blosc",    "libz.",
-        "deflate", "pugixml", "polyclipping", "qhull",  "OpenMesh",   "libtbb",   "libhwy"}) {
+       {"hdf5",     "OpenEXR",  "Imath",   "epoxy",   "fontconfig", "freetype",
+        "harfbuzz", "libzip",   "libpng",  "libjpeg", "libgif",     "libwebp",
+        "blosc",    "libz.",    "deflate", "libisal", "pugixml",    "polyclipping",
+        "qhull",    "OpenMesh", "libtbb",  "libhwy"}) {
     EXPECT_EQ(run.out.find(library), std::string::npos) << run.out;
   }
 }
 
 TEST_F(Usage, ALibraryThatCannotBeOpenedEndsTheJobThatNeedsIt) {
-  place.write("libdeflate.so.0", "not a library");
+  place.write("libisal.so.2", "not a library");
   const testkit::RunOptions here = {.environment = {"LD_LIBRARY_PATH=" + place.path("")}};
   const RunResult run = place.run({"csg", "box.obj", "-o", "box.png"}, here);
   EXPECT_EQ(run.exit_code, 1);
   EXPECT_NE(run.err.find("a library that this job needs cannot be opened: "), std::string::npos);
-  EXPECT_NE(run.err.find("libdeflate.so.0"), std::string::npos) << run.err;
-  EXPECT_EQ(place.names(), (std::vector<std::string>{"box.obj", "libdeflate.so.0"}));
+  EXPECT_NE(run.err.find("libisal.so.2"), std::string::npos) << run.err;
+  EXPECT_EQ(place.names(), (std::vector<std::string>{"box.obj", "libisal.so.2"}));
   EXPECT_EQ(place.run({"voxelize", "box.obj", "-r", "8", "-o", "box.npy"}, here).exit_code, 0);
 }
 
 TEST_F(Usage, ALibraryWhosePathSpeaksOfMemoryIsNoLackOfIt) {
   std::filesystem::create_directory(place.path("out of memory"));
-  place.write("out of memory/libdeflate.so.0", "not a library");
+  place.write("out of memory/libisal.so.2", "not a library");
   const RunResult run =
       place.run({"csg", "box.obj", "-o", "box.png"},
                 {.environment = {"LD_LIBRARY_PATH=" + place.path("out of memory")}});
   EXPECT_EQ(run.exit_code, 1);
-  EXPECT_NE(run.err.find("out of memory/libdeflate.so.0"), std::string::npos) << run.err;
+  EXPECT_NE(run.err.find("out of memory/libisal.so.2"), std::string::npos) << run.err;
 }
 #endif
 
