@@ -139,10 +139,30 @@ void ProgramState::toggle_all(std::span<const std::uint32_t> solids) {
   }
 }
 
+void ProgramState::vary(std::span<const std::uint32_t> solids) {
+  ++known_stamp_;
+  for (const std::uint32_t solid : solids) {
+    bool value = inside_[solid] != 0;
+    Program::Up up = program_->leaves[solid];
+    while (up.parent != Program::kNone) {  // to the first node that does not begin to vary
+      Known& known = known_[up.parent];
+      const bool varied = known.touched == known_stamp_ && known.steady == 0;
+      if (known.touched != known_stamp_) {
+        known.touched = known_stamp_;
+        known.steady = counts_[up.parent];
+      }
+      if (value != up.inverted) --known.steady;
+      if (varied || known.steady > 0) break;
+      value = counts_[up.parent] > 0;
+      up = program_->nodes[up.parent].up;
+    }
+  }
+}
+
 ProgramState::Weight ProgramState::above(std::uint32_t solid) {
   Weight weight;
   Program::Up up = program_->leaves[solid];
-  if (up.parent == Program::kNone) return {true, false};
+  if (up.parent == Program::kNone) return {false, false};
   climbed_.clear();
   while (up.parent != Program::kNone) {
     const Known& known = known_[up.parent];
@@ -156,7 +176,9 @@ ProgramState::Weight ProgramState::above(std::uint32_t solid) {
   // How the tree's value rests on an edge whose value is `edge`, given how it rests on its node.
   const auto through = [&](Weight node, std::uint32_t index, bool edge) {
     const std::uint32_t count = counts_[index];
-    return Weight{node.supports && (edge || count == 0), node.decides && count == (edge ? 1u : 0u)};
+    const bool varies = known_[index].touched == known_stamp_ && known_[index].steady == 0;
+    return Weight{node.contributes && varies && (edge || count == 0),
+                  node.decides && count == (edge ? 1u : 0u)};
   };
   for (std::size_t i = climbed_.size(); i-- > 0;) {
     const std::uint32_t node = climbed_[i];
@@ -164,7 +186,8 @@ ProgramState::Weight ProgramState::above(std::uint32_t solid) {
     if (to.parent != Program::kNone) {
       weight = through(weight, to.parent, (counts_[node] > 0) != to.inverted);
     }
-    known_[node] = {known_stamp_, weight};
+    known_[node].stamp = known_stamp_;
+    known_[node].weight = weight;
   }
   up = program_->leaves[solid];
   return through(known_[up.parent].weight, up.parent, inside(solid) != up.inverted);

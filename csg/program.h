@@ -102,23 +102,29 @@ class ProgramState {
   [[nodiscard]] bool inside(std::uint32_t solid) const { return inside_[solid] != 0; }
   [[nodiscard]] bool value() const { return value_; }  ///< of the whole tree
   [[nodiscard]] const Program& program() const { return *program_; }
-  /// Whether the tree has its value also because of this solid's: on the way up, no node that is
-  /// true stands on other edges alone. Asked for all solids between two transitions it is O(nodes).
-  [[nodiscard]] bool supports(std::uint32_t solid) { return above(solid).supports; }
+  /// From now on until the next toggle, rays may be inside or outside of each of these solids, as
+  /// contributes() has it. @param solids  each once
+  void vary(std::span<const std::uint32_t> solids);
+  /// Whether the tree has its value also because of this solid's, one of those that vary: on the
+  /// way up, no node that is true stands on other edges alone, and none is true whatever the solids
+  /// that vary. So a solid without effect does not contribute, such as a cutter of a solid that the
+  /// ray is outside of. Asked for all solids between two transitions it is O(nodes).
+  [[nodiscard]] bool contributes(std::uint32_t solid) { return above(solid).contributes; }
   /// Whether the tree has its value because of this solid's alone: a transition of that solid would
-  /// change it. As quick as supports().
+  /// change it. As quick as contributes().
   [[nodiscard]] bool decides(std::uint32_t solid) { return above(solid).decides; }
 
  private:
   /// How the tree's value rests on one of its nodes or solids.
   struct Weight {
-    bool supports = true, decides = true;
+    bool contributes = true, decides = true;
   };
   struct Known {
     std::uint64_t stamp = 0;
     Weight weight;
-    std::uint64_t touched = 0;  ///< toggle_all(): a stamp, and its value before
-    bool before = false;
+    std::uint64_t touched = 0;  ///< a stamp: what follows is meant
+    bool before = false;        ///< toggle_all(): the node's value before
+    std::uint32_t steady = 0;   ///< vary(): edges that are true in any case
   };
   [[nodiscard]] Weight above(std::uint32_t solid);
 

@@ -119,16 +119,25 @@ const Transition& FirstHit::choose(const TransitionFaces& faces) const {
   return *best->transition;
 }
 
-Coincidence::Bound FirstHit::bound_of(const std::vector<Transition>& transitions, std::size_t begin,
-                                      std::size_t end, const TransitionFaces& faces) {
-  Coincidence::Bound largest;
-  for (std::size_t i = begin; i < end; ++i) {
-    if (!state_.supports(transitions[i].solid)) continue;
-    const Coincidence::Bound one = faces.bound(transitions[i]);
-    largest.nearer = std::max(largest.nearer, one.nearer);
-    largest.farther = std::max(largest.farther, one.farther);
+FirstHit::Change FirstHit::find_change(const std::vector<Transition>& transitions,
+                                       std::size_t begin, std::size_t end,
+                                       const TransitionFaces& faces) {
+  if (end - begin == 1) return {faces.bound(transitions[begin]), begin};
+  toggled_.clear();
+  for (std::size_t i = begin; i < end; ++i) {  // a solid that is cut may be entered and left there
+    const std::uint32_t solid = transitions[i].solid;
+    if (i == begin || solid != toggled_.back()) toggled_.push_back(solid);
   }
-  return largest;
+  state_.vary(toggled_);
+  Change change{{}, end};
+  for (std::size_t i = begin; i < end; ++i) {
+    if (!state_.contributes(transitions[i].solid)) continue;
+    const Coincidence::Bound one = faces.bound(transitions[i]);
+    change.bound.nearer = std::max(change.bound.nearer, one.nearer);
+    change.bound.farther = std::max(change.bound.farther, one.farther);
+    change.first = std::min(change.first, i);
+  }
+  return change;
 }
 
 FirstHit::Interval FirstHit::walk_inside(const std::vector<Transition>& transitions,
@@ -176,8 +185,20 @@ void FirstHit::list_candidates(const std::vector<Transition>& transitions, const
       }
       if (last_[transition.solid] != i) continue;
     }
-    if (!state_.supports(transition.solid)) continue;  // last: it climbs the tree
-    candidates_.push_back({&transition, state_.decides(transition.solid)});
+    candidates_.push_back({&transition, false});
+  }
+  keep_contributing();
+}
+
+void FirstHit::keep_contributing() {
+  toggled_.clear();
+  for (const Candidate& candidate : candidates_) toggled_.push_back(candidate.transition->solid);
+  state_.vary(toggled_);
+  std::erase_if(candidates_, [this](const Candidate& candidate) {
+    return !state_.contributes(candidate.transition->solid);
+  });
+  for (Candidate& candidate : candidates_) {
+    candidate.alone = state_.decides(candidate.transition->solid);
   }
 }
 
@@ -190,32 +211,28 @@ Surface FirstHit::find(std::vector<Transition>& transitions, const TransitionFac
     at = apply(transitions, at);
     if (!state_.value()) continue;
     const std::uint32_t depth = transitions[begin].depth;
-    const Coincidence::Bound bound = bound_of(transitions, begin, at, faces);
+    const auto [bound, first] = find_change(transitions, begin, at, faces);
     // On to where the interval ends. What lies within the bound of its beginning is settled with
     // it; that must not depend on transitions that do not matter.
     const Interval interval = walk_inside(transitions, begin, at, depth + 2.0 * bound.farther);
-    const bool eye_inside = depth == 0 && transitions[begin].triangle == Surface::kNone;
-    if (eye_inside) {  // the far side shows, if there is one
-      for (std::size_t i = interval.exit_begin; !state_.value() && i < interval.exit_end; ++i) {
-        if (!state_.supports(transitions[i].solid)) continue;
-        found = surface_of(transitions[i], transitions[i].depth);
-        break;
-      }
-      at = interval.exit_end;
-      break;
-    }
+    const bool eye_inside = depth == 0 && transitions[first].triangle == Surface::kNone;
     if (!state_.value()) {
-      if (!interval.union_operand &&
-          transitions[interval.exit_begin].depth - depth <=
-              bound.farther +
-                  bound_of(transitions, interval.exit_begin, interval.exit_end, faces).nearer) {
+      const Change exit = find_change(transitions, interval.exit_begin, interval.exit_end, faces);
+      const Transition& leaves = transitions[exit.first];
+      if (eye_inside) found = surface_of(leaves, leaves.depth);
+      if (!eye_inside && !interval.union_operand &&
+          leaves.depth - depth <= bound.farther + exit.bound.nearer) {
         at = interval.exit_end;
         continue;
       }
     }
+    if (eye_inside) {  // the far side shows, if there is one
+      at = interval.exit_end;
+      break;
+    }
     toggle_all(transitions, interval.settled, interval.exit_end);
     list_candidates(transitions, interval, bound, faces);
-    found = surface_of(candidates_.empty() ? transitions[begin] : choose(faces), depth);
+    found = surface_of(candidates_.empty() ? transitions[first] : choose(faces), depth);
     at = interval.settled;
     break;
   }
@@ -257,10 +274,8 @@ FirstHit::Verdict FirstHit::judge(std::span<const std::uint32_t> inside,
   verdict.inside = state_.value();
   if (verdict.inside) {
     candidates_.clear();
-    for (const Transition& transition : coincident) {
-      if (!state_.supports(transition.solid)) continue;
-      candidates_.push_back({&transition, state_.decides(transition.solid)});
-    }
+    for (const Transition& transition : coincident) candidates_.push_back({&transition, false});
+    keep_contributing();
     if (!candidates_.empty()) verdict.surface = surface_of(choose(faces), 0);
   }
   for (const Transition& transition : coincident) state_.toggle(transition.solid);

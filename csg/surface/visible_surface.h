@@ -161,7 +161,9 @@ class TransitionFaces {
 ///   one without which it would not be there (a hidden face that ends in it has no part in it),
 ///   then one that the ray enters rather than one that it leaves, then the first of the tree; but
 ///   a face that ends at the plane of another gives way to it: the slope of a solid whose top lies
-///   in the top of another one, where the snap has put it in front.
+///   in the top of another one, where the snap has put it in front. A solid whose state changes
+///   nothing there does not contribute (ProgramState::contributes()), so solids that a tile's
+///   program leaves out change nothing.
 /// A ray that begins inside the tree (the eye is in the material) shows where it leaves it.
 class FirstHit {
  public:
@@ -218,10 +220,13 @@ class FirstHit {
   /// @param settles  depth up to which transitions are settled with the beginning
   Interval walk_inside(const std::vector<Transition>& transitions, std::size_t begin,
                        std::size_t at, double settles);
-  /// The largest bounds of those transitions that the tree's value rests on.
-  [[nodiscard]] Coincidence::Bound bound_of(const std::vector<Transition>& transitions,
-                                            std::size_t begin, std::size_t end,
-                                            const TransitionFaces& faces);
+  /// What the tree's value rests on among transitions of one depth, at which it has changed.
+  struct Change {
+    Coincidence::Bound bound;  ///< the largest of their bounds
+    std::size_t first = 0;     ///< the first of them
+  };
+  [[nodiscard]] Change find_change(const std::vector<Transition>& transitions, std::size_t begin,
+                                   std::size_t end, const TransitionFaces& faces);
   /// candidates_ become the transitions whose faces coincide with the surface at an interval's
   /// beginning and contribute to it.
   void list_candidates(const std::vector<Transition>& transitions, const Interval& interval,
@@ -237,6 +242,8 @@ class FirstHit {
     if (a.transition->exit != b.transition->exit) return b.transition->exit;
     return a.transition->solid < b.transition->solid;
   }
+  /// Takes away the candidates that do not contribute, where all other solids stay as they are.
+  void keep_contributing();
   /// Those of `transitions`, a bit each, that may lead out of the tree.
   [[nodiscard]] std::uint32_t find_outward(std::span<const Transition> transitions);
   /// The one that is shown. @pre there are candidates

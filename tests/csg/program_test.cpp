@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <numeric>
 
 #include "tests/csg/random_tree.h"
@@ -54,8 +55,9 @@ TEST(Program, AgreesWithRecursionAfterEachFlip) {
   }
 }
 
-TEST(Program, ASupportIsASolidThatTheValueRestsOn) {
-  // If no support is turned, turning all others together cannot change the value.
+// Some solids vary, all others stay as they are. All choices of those that vary are tried.
+TEST(Program, ASolidContributesIfTheValueRestsOnIt) {
+  std::size_t contributing = 0, idle = 0;
   for (int seed = 0; seed < 300; ++seed) {
     RandomTree random(static_cast<std::uint64_t>(seed) + 1000);
     const int solids = random.pick(2, 12);
@@ -64,16 +66,39 @@ TEST(Program, ASupportIsASolidThatTheValueRestsOn) {
     ProgramState state(program);
     for (int step = 0; step < 20; ++step) {
       state.toggle(static_cast<std::uint32_t>(random.pick(0, solids - 1)));
-      const bool value = state.value();
-      std::vector<std::uint32_t> others;
+      std::vector<std::uint32_t> varying;
       for (std::uint32_t solid = 0; solid < static_cast<std::uint32_t>(solids); ++solid) {
-        if (!state.supports(solid)) others.push_back(solid);
+        if (varying.size() < 6 && random.pick(0, 1) == 0) varying.push_back(solid);
       }
-      for (const std::uint32_t solid : others) state.toggle(solid);
-      ASSERT_EQ(state.value(), value) << "seed " << seed << ", step " << step;
-      for (const std::uint32_t solid : others) state.toggle(solid);
+      state.vary(varying);
+      std::uint32_t contribute = 0;
+      for (std::size_t i = 0; i < varying.size(); ++i) {
+        contribute |= state.contributes(varying[i]) ? 1u << i : 0u;
+      }
+      std::vector<bool> values;
+      for (std::uint32_t turned = 0; turned < 1u << varying.size(); ++turned) {
+        values.push_back(evaluate(tree, tree.root(), [&](std::uint32_t solid) {
+          const auto at = std::find(varying.begin(), varying.end(), solid) - varying.begin();
+          return state.inside(solid) != ((turned >> at & 1) != 0);
+        }));
+      }
+      for (std::uint32_t turned = 0; turned < values.size(); ++turned) {
+        if ((turned & contribute) != 0) continue;
+        ASSERT_EQ(values[turned], state.value()) << "seed " << seed << ", step " << step;
+      }
+      for (std::size_t i = 0; i < varying.size(); ++i) {
+        bool matters = false;
+        for (std::uint32_t turned = 0; turned < values.size(); ++turned) {
+          matters = matters || values[turned] != values[turned ^ 1u << i];
+        }
+        const bool contributes = (contribute >> i & 1) != 0;
+        ASSERT_TRUE(matters || !contributes) << "seed " << seed << ", step " << step;
+        (contributes ? contributing : idle) += 1;
+      }
     }
   }
+  EXPECT_GT(contributing, 3000u);
+  EXPECT_GT(idle, 3000u);
 }
 
 TEST(Program, ASolidThatDecidesTurnsTheValue) {
@@ -110,9 +135,12 @@ TEST(Program, FlipsTogetherAreThoseOneAfterAnother) {
         single.toggle(solid);
       }
       together.toggle_all(turned);
+      std::vector<std::uint32_t> all(static_cast<std::size_t>(solids));
+      std::iota(all.begin(), all.end(), 0u);
+      together.vary(all), single.vary(all);
       for (std::uint32_t solid = 0; solid < static_cast<std::uint32_t>(solids); ++solid) {
         ASSERT_EQ(together.inside(solid), single.inside(solid));
-        ASSERT_EQ(together.supports(solid), single.supports(solid));
+        ASSERT_EQ(together.contributes(solid), single.contributes(solid));
       }
       ASSERT_EQ(together.value(), single.value()) << "seed " << seed << ", step " << step;
       if (step == 10) together.reset(), single.reset();
