@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "csg/surface/area_bounds.h"
+#include "csg/bounds/area_bounds.h"
 #include "csg/transition.h"
 #include "raster/tile_bins.h"
 

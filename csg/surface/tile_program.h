@@ -30,6 +30,15 @@ struct TileProgram {
   int depth = 0;  ///< nodes on the longest way from the root to a leaf, 255 at most
 };
 
+/// Between which depths the surface of an area or a tile lies.
+struct SurfaceWindow {
+  std::uint64_t begin = 0, end = 0xffffffffu;
+  /// How far apart faces are that coincide, whatever they are.
+  std::uint64_t margin = std::uint64_t{1} << 32;
+  /// A solid that is subtracted and that all rays are in just before the window, if there is one.
+  Program::Edge cover;
+};
+
 /// Simplifies a program for the leaves at hand: nodes that no leaf reaches are constant, and nodes
 /// of one edge vanish. Pruning a tree to a part of space goes back to J. R. Woodwark and K. M.
 /// Quinlan, "Reducing the effect of complexity on volume model evaluation" (1982). We differ: work

@@ -275,21 +275,34 @@ bool TileFinder::place(LeafLayers& leaf, std::uint32_t solid, bool cut) const {
   return !leaf.rect.empty();
 }
 
-void TileFinder::find_bounds(LeafLayers& leaf) {
+bool TileFinder::wants_bounds(const LeafLayers& leaf) {
   // Of concave solids so few triangles that their layers are few.
   constexpr std::size_t kMostOfConcave = LeafLayers::kMostLayers / 2;
-  const ViewPart& part = view_parts_[leaf.solid];
-  const Input input = input_of(leaf.solid);
-  const bool concave = leaf.kind == LeafLayers::Kind::kSorted;
-  if (concave && input.triangles.size() > kMostOfConcave) return;
+  if (leaf.kind == LeafLayers::Kind::kFirstEntryOnly) return true;
+  if (leaf.kind == LeafLayers::Kind::kSorted &&
+      input_of(leaf.solid).triangles.size() > kMostOfConcave) {
+    return false;
+  }
   // In an area or two there is little to leave out.
-  const bool small =
-      part.rect.u1 - part.rect.u0 <= kAreaSide && part.rect.v1 - part.rect.v0 <= kAreaSide;
-  if (small && leaf.kind != LeafLayers::Kind::kFirstEntryOnly) return;
-  leaf.by_area = true;
-  find_area_bounds(part.mesh, input.triangles, {tile_.u0, tile_.v0}, coincidence_->steep_from(),
-                   leaf.kind != LeafLayers::Kind::kFirstEntryOnly, leaf.bounds);
-  if (concave) leaf.bounds.covered = 0;
+  const PixelRect& rect = view_parts_[leaf.solid].rect;
+  return rect.u1 - rect.u0 > kAreaSide || rect.v1 - rect.v0 > kAreaSide;
+}
+
+void TileFinder::find_tile_bounds(LeafLayers& leaf) {
+  const Input input = input_of(leaf.solid);
+  csg::find_tile_bounds(view_parts_[leaf.solid].mesh, input.triangles, {tile_.u0, tile_.v0},
+                        coincidence_->steep_from(), leaf.kind != LeafLayers::Kind::kFirstEntryOnly,
+                        leaf.bounds);
+  if (leaf.kind == LeafLayers::Kind::kSorted) leaf.bounds.covered = 0;
+}
+
+void TileFinder::find_bounds(LeafLayers& leaf, bool bounds_of_tile) {
+  const std::span<const std::uint32_t> triangles =
+      bounds_of_tile ? leaf.bounds.triangles : input_of(leaf.solid).triangles;
+  find_area_bounds(view_parts_[leaf.solid].mesh, triangles, {tile_.u0, tile_.v0},
+                   coincidence_->steep_from(), leaf.kind != LeafLayers::Kind::kFirstEntryOnly,
+                   bounds_of_tile, leaf.bounds);
+  if (leaf.kind == LeafLayers::Kind::kSorted) leaf.bounds.covered = 0;
 }
 
 bool TileFinder::bounds_pay(std::span<const LeafLayers> leaves) {
@@ -316,38 +329,46 @@ void TileFinder::find_all_bounds(std::span<LeafLayers> leaves) {
   const bool united = std::ranges::all_of(leaves, [](const LeafLayers& leaf) {
     return leaf.kind == LeafLayers::Kind::kFirstEntryOnly;
   });
-  if (!united) {
-    const bool pays = bounds_pay(leaves);
-    for (LeafLayers& leaf : leaves) {  // find_united() needs those of united solids
-      if (pays || leaf.kind == LeafLayers::Kind::kFirstEntryOnly) find_bounds(leaf);
-    }
-    return;
+  if (united) return find_united_bounds(leaves);
+  const bool pays = bounds_pay(leaves);
+  for (LeafLayers& leaf : leaves) {  // find_united() needs those of united solids
+    leaf.by_area = leaf.kind == LeafLayers::Kind::kFirstEntryOnly || (pays && wants_bounds(leaf));
   }
-  drawn_.resize(leaves.size());
-  std::iota(drawn_.begin(), drawn_.end(), 0u);
+  // Where few solids meet a tile, few of them are hidden in all of it.
+  constexpr std::size_t kManySolids = 8;
+  const bool many = pays && leaves.size() >= kManySolids;
+  if (many) narrow_tile(leaves);
+  for (const std::uint32_t slot : in_tile_) {
+    if (leaves[slot].by_area) find_bounds(leaves[slot], many);
+  }
+}
+
+void TileFinder::find_united_bounds(std::span<LeafLayers> leaves) {
+  drawn_ = in_tile_;
   std::sort(drawn_.begin(), drawn_.end(), [&](std::uint32_t a, std::uint32_t b) {
     return leaves[a].nearest != leaves[b].nearest ? leaves[a].nearest < leaves[b].nearest : a < b;
   });
   std::array<std::uint32_t, AreaBounds::kAreas> last;  // where each area is covered
   last.fill(AreaBounds::kNever);
   const std::uint64_t reach = farthest_reach(coincidence_->range());
+  std::uint64_t hidden_from = last.front() + reach;
+  in_tile_.clear();
   for (const std::uint32_t slot : drawn_) {
     LeafLayers& leaf = leaves[slot];
     leaf.by_area = true;
-    if (leaf.nearest > *std::ranges::max_element(last) + reach) {
+    if (leaf.nearest > hidden_from) {
       hidden_.push_back(slot);
-      std::fill(std::begin(leaf.bounds.entries.nearest), std::end(leaf.bounds.entries.nearest),
-                AreaBounds::kNever);
-      std::fill(std::begin(leaf.bounds.exits.nearest), std::end(leaf.bounds.exits.nearest),
-                AreaBounds::kNever);
       continue;
     }
     find_bounds(leaf);
+    in_tile_.push_back(slot);
     for (std::size_t area = 0; area < last.size(); ++area) {
       if ((leaf.bounds.covered >> area & 1) == 0) continue;
       last[area] = std::min(last[area], leaf.bounds.entries.farthest[area]);
     }
+    hidden_from = *std::ranges::max_element(last) + reach;
   }
+  std::ranges::sort(in_tile_);
 }
 
 void TileFinder::find(int tile_u, int tile_v, std::span<const std::uint32_t> solids,
@@ -366,6 +387,11 @@ void TileFinder::find(int tile_u, int tile_v, std::span<const std::uint32_t> sol
   for (const std::uint32_t solid : solids) {
     if (place(leaves_[count], solid, cut)) ++count;
   }
+  in_tile_.resize(count);
+  std::iota(in_tile_.begin(), in_tile_.end(), 0u);
+  narrowed_ = false;
+  window_ = {};
+  around_.clear();
   hidden_.clear();
   clusters_.clear();
   kept_faces_.clear();
@@ -412,7 +438,7 @@ void TileFinder::list_present(const SearchArea& area) {
   const std::size_t area_index = area.index();
   present_.clear();
   area_arena_.clear();
-  for (std::uint32_t slot = 0; slot < area.leaves.size(); ++slot) {
+  for (const std::uint32_t slot : in_tile_) {
     LeafLayers& leaf = area.leaves[slot];
     if (leaf.by_area) {
       if (leaf.bounds.nearest(area_index) == AreaBounds::kNever) continue;
@@ -439,8 +465,12 @@ void TileFinder::find_area(const SearchArea& area, bool cut) {
       })) {
     return find_united(area);
   }
-  simplifier_.simplify(area.leaves, present_, tile_program_);
-  if (tile_program_.constant) return;
+  if (narrowed_) {
+    if (!take_narrowed_program()) return;
+  } else {
+    simplifier_.simplify(area.leaves, present_, tile_program_);
+    if (tile_program_.constant) return;
+  }
   if (!cut && !narrow(area.index())) return;
   if (alone_ != kNoLeaf && show_alone(area, leaves_[alone_])) return;
   const auto is_deep = [&] {

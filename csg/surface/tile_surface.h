@@ -107,13 +107,24 @@ class TileFinder {
   /// Prepares a leaf for a solid in the tile. @param cut  as kind_of() has it @return whether it
   /// may be met there
   [[nodiscard]] bool place(LeafLayers& leaf, std::uint32_t solid, bool cut) const;
-  /// Makes a leaf one of bounds for each area, if it has few triangles in the tile.
-  void find_bounds(LeafLayers& leaf);
+  /// Whether bounds of a leaf by area may save time.
+  [[nodiscard]] bool wants_bounds(const LeafLayers& leaf);
+  /// Finds bounds of a leaf in the tile, in its areas alone, or in those after the tile.
+  void find_tile_bounds(LeafLayers& leaf);
+  void find_bounds(LeafLayers& leaf, bool bounds_of_tile = false);
   /// Whether bounds of the leaves of a tile may save more time than they take.
   [[nodiscard]] bool bounds_pay(std::span<const LeafLayers> leaves);
-  /// The same as find_bounds() for all leaves of a tile where that pays, except that where all are
-  /// just united, hidden_ becomes those that begin behind others that cover the tile.
+  /// Finds all bounds that pay. in_tile_ become the leaves that may matter in the tile.
   void find_all_bounds(std::span<LeafLayers> leaves);
+  /// The same where all leaves are just united: hidden_ become those that begin behind others that
+  /// cover the tile.
+  void find_united_bounds(std::span<LeafLayers> leaves);
+  /// Leaves out of in_tile_ what cannot matter in the tile: as narrow(), and narrowed_program_ is
+  /// then what is left. Finds bounds in the tile. (csg/surface/narrow_program.cpp)
+  void narrow_tile(std::span<LeafLayers> leaves);
+  /// tile_program_ and around_ become those of an area of a tile that is narrowed_.
+  /// @return false: nothing is seen there
+  [[nodiscard]] bool take_narrowed_program();
   /// Fills the pixels of one area. @param cut  the near plane may cut solids of the tile
   void find_area(const SearchArea& area, bool cut);
   /// present_ becomes the leaves that may be met in an area, prepared for it.
@@ -162,7 +173,12 @@ class TileFinder {
   FirstHit first_hit_;
   Clusters clusters_;
   KeptFaces kept_faces_;
-  std::vector<std::uint32_t> present_, drawn_, hidden_, all_triangles_, area_triangles_;
+  bool narrowed_ = false;  ///< narrowed_program_ is what is left in the tile
+  TileProgram narrowed_program_;
+  SurfaceWindow window_;                    ///< of the tile
+  std::vector<std::uint32_t> tile_around_;  ///< as around_, of the tile
+  std::vector<std::uint32_t> in_tile_, present_, drawn_, hidden_, all_triangles_, area_triangles_;
+  std::vector<std::uint8_t> is_present_;
   std::vector<std::uint32_t> around_;  ///< solids that all rays of an area are in where it counts
   std::uint32_t alone_ = kNoLeaf;  ///< of an area: nothing but its entries, or exits, can be seen
   std::vector<std::uint64_t> doubtful_;

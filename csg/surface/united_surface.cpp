@@ -123,6 +123,7 @@ void TileFinder::find_united(const SearchArea& area) {
       for (const std::uint32_t slot : hidden_) {
         LeafLayers& leaf = leaves_[slot];
         find_bounds(leaf);
+        in_tile_.push_back(slot);
         if (leaf.bounds.nearest(index) == AreaBounds::kNever) continue;
         enter_area(leaf, area, index);
         present_.push_back(slot);

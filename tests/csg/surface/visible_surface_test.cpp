@@ -222,8 +222,42 @@ TEST(VisibleSurface, WithWallsAlongTheViewIsTheOneOfTheFullLists) {
   }
 }
 
-// Solids that are united or cut are left out where others are known to be in front. Seen along
-// their walls, little is known of them.
+// Solids that are wider than a tile: what cannot matter in all of it is left out of its areas, such
+// as cutters that end where others begin.
+TEST(VisibleSurface, OfSolidsBoredByWideCuttersIsTheOneOfTheFullLists) {
+  std::size_t seen = 0;
+  for (int seed = 0; seed < 40; ++seed) {
+    RandomTree random(static_cast<std::uint64_t>(seed) + 40000);
+    Tree tree;
+    std::vector<Tree::NodeId> operands;
+    const auto add = [&](TriangleSoup mesh, const glm::dmat4& place) {
+      return tree.add_solid({std::make_shared<TriangleSoup>(std::move(mesh)), place});
+    };
+    const auto somewhere = [&](double off) {
+      const glm::dvec3 axis(random.real(-1, 1), random.real(-1, 1), random.real(0.1, 1));
+      const glm::dvec3 to(random.real(-off, off), random.real(-off, off), random.real(-off, off));
+      return glm::rotate(glm::translate(glm::dmat4(1), to), random.real(0, 3), axis);
+    };
+    std::vector<Tree::NodeId> united{add(make_icosphere(10, 2), somewhere(1))};
+    for (int i = seed % 2 * random.pick(1, 9); i > 0; --i) {
+      united.push_back(add(make_icosphere(random.real(2, 6), 2), somewhere(9)));
+    }
+    operands.push_back(tree.add(Operation::kUnion, united));
+    for (int i = random.pick(8, 14); i > 0; --i) {
+      const double wide = random.real(1, 5);
+      operands.push_back(add(random.pick(0, 1) == 0
+                                 ? make_icosphere(wide, 2)
+                                 : make_box({-wide, -wide, -15}, {wide, wide, 15}),
+                             somewhere(3)));
+    }
+    tree.set_root(tree.add(Operation::kDifference, operands));
+    const Camera camera = random_camera(random, {glm::dvec3(-3), glm::dvec3(3)});
+    seen += expect_same(tree, camera, {400, 320}, "seed " + std::to_string(seed));
+    if (HasFailure()) return;
+  }
+  EXPECT_GT(seen, 2000000u);
+}
+
 TEST(VisibleSurface, OfUnitedSolidsSeenAlongTheirWallsIsTheOneOfTheFullLists) {
   std::size_t seen = 0;
   for (int seed = 0; seed < 200; ++seed) {

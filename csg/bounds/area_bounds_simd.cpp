@@ -1,7 +1,7 @@
-#include "csg/surface/area_bounds.h"
+#include "csg/bounds/area_bounds.h"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "csg/surface/area_bounds_simd.cpp"
+#define HWY_TARGET_INCLUDE "csg/bounds/area_bounds_simd.cpp"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
@@ -100,7 +100,7 @@ class AreaBounder {
     const std::uint32_t met =
         bound(edge, along_u, along_v, off, plane, exit ? bounds_->exits : bounds_->entries);
     if (met != 0 && plane.steep) {
-      bounds_->steep_areas = static_cast<std::uint16_t>(bounds_->steep_areas | met);
+      bounds_->steep_areas |= met;
       const auto deep = static_cast<std::uint32_t>(high - low) + 1;
       bounds_->steep_depth = std::max(bounds_->steep_depth, deep);
     }
@@ -198,11 +198,16 @@ class AreaBounder {
 };
 
 void FindAreaBounds(const LatticeMesh& mesh, std::span<const std::uint32_t> triangles,
-                    const glm::ivec2& tile, double steep_from, bool with_exits,
+                    const glm::ivec2& tile, double steep_from, bool with_exits, bool bounds_of_tile,
                     AreaBounds& bounds) {
   for (AreaBounds::Range* range : {&bounds.entries, &bounds.exits}) {
-    std::fill(std::begin(range->nearest), std::end(range->nearest), AreaBounds::kNever);
-    std::fill(std::begin(range->farthest), std::end(range->farthest), 0u);
+    std::fill_n(range->nearest, AreaBounds::kAreas, AreaBounds::kNever);
+    std::fill_n(range->farthest, AreaBounds::kAreas, 0u);
+  }
+  if (!bounds_of_tile) {
+    bounds.covered = 0;
+    bounds.entries.farthest[AreaBounds::kTile] = AreaBounds::kNever;
+    bounds.exits.nearest[AreaBounds::kTile] = 0;
   }
   bounds.steep_areas = 0;
   bounds.steep_depth = 0;
@@ -218,14 +223,11 @@ void FindAreaBounds(const LatticeMesh& mesh, std::span<const std::uint32_t> tria
     if (beside == 0) bounder.add(p, q, r, triangle);
   }
   const std::uint32_t corners = bounder.covered_corners();
-  bounds.covered = 0;
   for (int area = 0; area < AreaBounds::kAreas; ++area) {
     const int first =
         area / AreaBounds::kAcross * AreaPlaces::kCornersAcross + area % AreaBounds::kAcross;
     const std::uint32_t four = 3u << first | 3u << (first + AreaPlaces::kCornersAcross);
-    if ((corners & four) == four) {
-      bounds.covered = static_cast<std::uint16_t>(bounds.covered | 1u << area);
-    }
+    if ((corners & four) == four) bounds.covered |= 1u << area;
   }
 }
 
@@ -240,8 +242,9 @@ HWY_EXPORT(FindAreaBounds);
 
 void find_area_bounds(const LatticeMesh& mesh, std::span<const std::uint32_t> triangles,
                       const glm::ivec2& tile, double steep_from, bool with_exits,
-                      AreaBounds& bounds) {
-  HWY_DYNAMIC_DISPATCH(FindAreaBounds)(mesh, triangles, tile, steep_from, with_exits, bounds);
+                      bool bounds_of_tile, AreaBounds& bounds) {
+  HWY_DYNAMIC_DISPATCH(FindAreaBounds)
+  (mesh, triangles, tile, steep_from, with_exits, bounds_of_tile, bounds);
 }
 
 }  // namespace strata::csg

@@ -1,4 +1,4 @@
-#include "csg/surface/area_bounds.h"
+#include "csg/bounds/area_bounds.h"
 
 #include <gtest/gtest.h>
 
@@ -28,7 +28,8 @@ struct Soup {
     std::vector<std::uint32_t> all(triangles.size());
     std::iota(all.begin(), all.end(), 0u);
     AreaBounds bounds;
-    find_area_bounds(mesh, all, kTile, steep_from, true, bounds);
+    find_tile_bounds(mesh, all, kTile, steep_from, true, bounds);
+    find_area_bounds(mesh, bounds.triangles, kTile, steep_from, true, true, bounds);
     return bounds;
   }
   /// Calls body(triangle, exit, area, depth) for all crossings of the tile.
@@ -68,12 +69,17 @@ void expect_crossings_held() {
     const AreaBounds bounds = soup.bounds(pick(0, 3) == 0 ? 0.5 : 4000.0);
     std::vector<std::uint32_t> areas(soup.triangles.size(), 0);
     for (const AreaBounds::Face& face : bounds.faces) areas[face.triangle] = face.areas;
+    std::vector<std::uint8_t> in_tile(soup.triangles.size(), 0);
+    for (const std::uint32_t triangle : bounds.triangles) in_tile[triangle] = 1;
     soup.for_each_crossing(
         [&](std::uint32_t triangle, bool exit, std::size_t area, std::uint32_t at, int, int) {
           const AreaBounds::Range& range = exit ? bounds.exits : bounds.entries;
           ASSERT_LE(range.nearest[area], at) << "round " << round;
           ASSERT_GE(range.farthest[area], at) << "round " << round;
           ASSERT_NE(areas[triangle] >> area & 1, 0u) << "round " << round;
+          ASSERT_LE(range.nearest[AreaBounds::kTile], at) << "round " << round;
+          ASSERT_GE(range.farthest[AreaBounds::kTile], at) << "round " << round;
+          ASSERT_NE(in_tile[triangle], 0) << "round " << round;
           ++crossings;
         });
   }
@@ -113,12 +119,12 @@ TEST(AreaBounds, TellWhichAreasAConvexSolidCovers) {
   const auto real = [&](double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(random);
   };
-  std::size_t covered = 0, open = 0;
+  std::size_t covered = 0, open = 0, covered_tiles = 0;
   for (int round = 0; round < 200; ++round) {
     const TriangleSoup mesh =
         round % 2 == 0 ? make_box(glm::dvec3(-1), glm::dvec3(1)) : make_icosphere(1.0, round % 4);
     const glm::dmat4 turn = glm::rotate(glm::dmat4(1.0), real(0, 3), glm::dvec3(1, real(0, 1), 2));
-    const double size = real(1000, 20000);
+    const double size = real(1000, 40000);
     Soup soup;
     soup.triangles = mesh.triangles;
     const glm::dvec2 at(real(0, 16384), real(0, 16384));
@@ -133,6 +139,10 @@ TEST(AreaBounds, TellWhichAreasAConvexSolidCovers) {
     soup.for_each_crossing([&](std::uint32_t, bool exit, std::size_t, std::uint32_t, int u, int v) {
       if (!exit) ++entries[static_cast<std::size_t>((v - kTile.y) * kTileSide + u - kTile.x)];
     });
+    if ((bounds.covered >> AreaBounds::kTile & 1) != 0) {
+      ++covered_tiles;
+      for (const int count : entries) ASSERT_GT(count, 0) << "round " << round;
+    }
     for (int pixel = 0; pixel < kTilePixels; ++pixel) {
       const int area = pixel / kTileSide / AreaBounds::kSide * AreaBounds::kAcross +
                        pixel % kTileSide / AreaBounds::kSide;
@@ -145,6 +155,7 @@ TEST(AreaBounds, TellWhichAreasAConvexSolidCovers) {
   }
   EXPECT_GT(covered, 100000u);
   EXPECT_GT(open, 100000u);
+  EXPECT_GT(covered_tiles, 20u);
 }
 
 }  // namespace
