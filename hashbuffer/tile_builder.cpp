@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 #include <new>
+#include <optional>
 #include <utility>
 
 #include "hashbuffer/tile_store.h"
@@ -13,9 +14,8 @@ namespace strata {
 template <class Record>
 struct TileBuilder<Record>::Impl {
   using Bits = typename Record::Word;
-  /// At most this many planes are laid out side by side: deeper pixels are rare enough to scatter.
-  static constexpr int kMaxPlanes = 64 / kSides<Key>;
-  static constexpr int kFirstPlanes = 8 / kSides<Key>;
+  /// Of each list.
+  static constexpr int kMostPlanes = kMaxPlanes / kSides<Key>, kFirstPlanes = 8 / kSides<Key>;
   static constexpr std::size_t kLists = TileTable<Record>::kLists;
   /// Layers of a tile, in the mean over its pixels, from which the count/scan store is faster: each
   /// insertion passes the records before it.
@@ -27,13 +27,13 @@ struct TileBuilder<Record>::Impl {
   std::vector<std::uint32_t> offsets;  ///< compressed rows
   std::vector<Key> keys;
   std::uint64_t rebuilt = 0;
-  bool deep = true;                    ///< the last tile was; unknown at first
+  std::optional<bool> deep;            ///< the last tile was; unknown at first
   int dirty_begin = 0, dirty_end = 0;  ///< rows of the table that hold records
 
   void resize_table(int planes) {
     table.size = static_cast<std::size_t>(planes) * kLists;
     table.cells.assign(table.size + table.kPadding, 0);
-    table.planes = options.offsets == OffsetKind::kPlaneFirst ? std::min(planes, kMaxPlanes) : 0;
+    table.planes = options.offsets == OffsetKind::kPlaneFirst ? std::min(planes, kMostPlanes) : 0;
     table.oldest = 0;
     table.mixed = false;
     dirty_begin = dirty_end = 0;
@@ -68,6 +68,28 @@ struct TileBuilder<Record>::Impl {
   }
 
   static bool is_deep(std::uint64_t fragments) { return fragments > kDeepLayers * kTilePixels; }
+
+  /// About how many fragments a tile has: each triangle covers half of its box.
+  static std::uint64_t expected_fragments(const TileInput& input) {
+    constexpr std::size_t kSamples = 1024;
+    const AxisFrame frame(input.target.axis);
+    const std::size_t step = input.triangles.size() / kSamples + 1;
+    std::uint64_t pixels = 0;
+    for (std::size_t i = 0; i < input.triangles.size(); i += step) {
+      const glm::uvec3& t = input.mesh.triangles[input.triangles[i]];
+      const auto side = [&](int axis, int begin, int end) {
+        const auto [low, high] =
+            std::minmax({input.mesh.vertices[t.x][axis], input.mesh.vertices[t.y][axis],
+                         input.mesh.vertices[t.z][axis]});
+        const std::int32_t first = low >> kLatticeBits, last = high >> kLatticeBits;
+        return static_cast<std::uint64_t>(
+            std::max(0, std::min(last, end) - std::max(first, begin)));
+      };
+      pixels +=
+          side(frame.u, input.clip.u0, input.clip.u1) * side(frame.v, input.clip.v0, input.clip.v1);
+    }
+    return pixels * step / 2;
+  }
 
   static int planes_for(std::uint64_t cells) {
     return static_cast<int>((cells + kLists - 1) / kLists);
@@ -138,7 +160,8 @@ struct TileBuilder<Record>::Impl {
     if (options.store == StoreKind::kCountScan) return scan(input);
     // Neighbouring tiles are about equally deep.
     const bool choose = options.store == StoreKind::kAuto;
-    if (deep && choose) {
+    if (choose && !deep) deep = is_deep(expected_fragments(input));
+    if (choose && *deep) {
       const TileLists<Key> lists = scan(input);
       deep = is_deep(lists.fragments);
       return lists;
@@ -157,7 +180,7 @@ struct TileBuilder<Record>::Impl {
         if (raster.fragments < table.size / 2) return scan(input);
         resize_table(planes_for(rebuilt_cells(raster.fragments, table.size)));
         deep = is_deep(raster.fragments);
-        if (deep && choose) return scan(input);
+        if (choose && *deep) return scan(input);
         continue;
       }
       deep = is_deep(raster.fragments);
@@ -168,8 +191,8 @@ struct TileBuilder<Record>::Impl {
         const int grown = planes_for(grown_cells(table.size));
         if (is_too_full(raster.fragments, table.size)) {
           resize_table(grown);
-        } else if (table.planes > 0 && table.planes < kMaxPlanes) {
-          resize_table(std::min(kMaxPlanes, std::max(grown, table.oldest)));
+        } else if (table.planes > 0 && table.planes < kMostPlanes) {
+          resize_table(std::min(kMostPlanes, std::max(grown, table.oldest)));
         }
         return lists;
       }

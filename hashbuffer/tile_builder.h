@@ -10,6 +10,10 @@
 
 namespace strata {
 
+/// Planes of a tile's table, at most: deeper pixels are rare enough to scatter. No list of a tile
+/// in the planar form is longer, those of keys that enter and that leave together.
+inline constexpr int kMaxPlanes = 64;
+
 /// Rasterizes the triangles of one tile after another into a tile-private store and hands out the
 /// sorted lists. One builder serves one thread and keeps its memory from tile to tile.
 ///

@@ -18,10 +18,11 @@ namespace strata {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// Finished intervals of a vector of columns, in the order in which the walk meets them.
+/// Finished intervals of a vector of columns, in the order in which the walk meets them; there is
+/// none at the first crossing, and at most one at each other and behind the last.
 struct Finished {
-  std::uint32_t packed[64][kMaxLanes];  // [last:16 | first:16], an Interval's bytes
-  std::uint32_t marks[64][kMaxLanes];   // 1 where packed holds an interval
+  std::uint32_t packed[kMaxPlanes][kMaxLanes];  // [last:16 | first:16], an Interval's bytes
+  std::uint32_t marks[kMaxPlanes][kMaxLanes];   // 1 where packed holds an interval
   std::size_t rounds = 0;
 
   HWY_INLINE void add(Mask where, Vec begin, Vec end) {

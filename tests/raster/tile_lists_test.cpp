@@ -317,6 +317,30 @@ TEST(TileLists, AreExactForAFullTileOfManyLayers) {
   }
 }
 
+TEST(TileLists, AreBuiltInTheStoreThatSuitsTheFirstTile) {
+  const RasterTarget target{Axis::kZ, 64, 64, 1 << 16};
+  for (const int layers : {1, 6, 12, 300}) {
+    SCOPED_TRACE(layers);
+    Scene scene;
+    for (int i = 0; i < layers; ++i) {  // each layer fills the tile, and goes on outside of it
+      const int near = 100 * i, low = -5000, high = 64 * 256 + 5000;
+      const glm::ivec3 b(high, low, near), d(low, high, near);
+      for (const glm::ivec3& a : {glm::ivec3(low, low, near), glm::ivec3(high, high, near)}) {
+        const bool enters = (i % 2 == 0) == (a.x == low);
+        scene.add(a, enters ? b : d, enters ? d : b);
+      }
+    }
+    const LatticeMesh mesh = scene.lattice();
+    const auto bins = bin_triangles(mesh, target);
+    ASSERT_TRUE(bins);
+    BuilderOf<DepthKey> keys({.store = StoreKind::kAuto});
+    const auto lists = keys.build(mesh, target, bins->tile(0, 0), 0, 0);
+    ASSERT_TRUE(lists);
+    EXPECT_EQ(lists->fragments, static_cast<std::uint64_t>(layers) * kTilePixels);
+    EXPECT_EQ(lists->planes32 != nullptr, layers <= 8);
+  }
+}
+
 TEST(TileLists, DoNotDependOnTheTilesBuiltBefore) {
   // One builder meets deep, empty, shallow and overflowing tiles in turn: nothing of one may show
   // in the next.
@@ -506,7 +530,7 @@ TEST(TileBins, HoldTrianglesAtTheBordersOfTheLargestImages) {
     const auto bins = bin_triangles(mesh, target);
     ASSERT_TRUE(bins.has_value());
     std::vector<int> tiles_of(mesh.triangles.size());
-    for (const std::uint32_t triangle : bins->triangles) ++tiles_of[triangle];
+    for (std::uint32_t i = 0; i < bins->offsets.back(); ++i) ++tiles_of[bins->triangles[i]];
     const AxisFrame frame(target.axis);
     for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
       const glm::uvec3& t = mesh.triangles[i];

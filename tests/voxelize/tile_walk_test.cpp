@@ -125,5 +125,17 @@ TEST(TileWalk, GivesTheIntervalsOfAWalkColumnByColumn) {
   }
 }
 
+TEST(TileWalk, TakesTheDeepestListsOfPlanes) {
+  // Every second column begins with a crossing that leaves, so that intervals of a vector of
+  // columns end at every crossing.
+  std::vector<std::vector<DepthKey>> columns(kTilePixels);
+  for (std::size_t pixel = 0; pixel < kTilePixels; ++pixel) {
+    for (std::uint32_t i = 0; i < kMaxPlanes; ++i) {
+      columns[pixel].push_back((i * 1000 + 300) << 1 | (i + pixel) % 2);
+    }
+  }
+  expect_same(Lists(std::move(columns)));
+}
+
 }  // namespace
 }  // namespace strata

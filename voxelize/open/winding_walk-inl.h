@@ -12,6 +12,7 @@
 
 #include <algorithm>
 
+#include "hashbuffer/tile_builder.h"
 #include "strata/core/inside_rule.h"
 #include "strata/raster/raster_target.h"
 #include "voxelize/open/tile_counts.h"
@@ -36,13 +37,10 @@ HWY_INLINE hn::Mask<LaneInt> inside(VecInt winding) {
   return hn::TestBit(winding, hn::Set(di, 1));
 }
 
-/// Most crossings of a ray in planes: each side has an age field of 8 bits.
-constexpr int kMostPlanes = 2 * 255;
-
 /// The lists of a vector of rays, the first of which is that of `cell` in planes of keys, as one:
 /// the crossings where rays enter and those where they leave. Ages are left out.
 struct MergedLists {
-  std::uint32_t records[kMostPlanes][kMaxLanes];
+  std::uint32_t records[kMaxPlanes][kMaxLanes];
   int ages = 0;  ///< no list is longer
 
   HWY_INLINE void merge(const std::uint32_t* cell, int most) {
