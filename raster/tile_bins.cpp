@@ -273,14 +273,14 @@ Result<TileBins> bin_triangles(const LatticeMesh& mesh, const RasterTarget& targ
         count, tiles, kTilePixels, sum);
   }
   bins.offsets[tiles] = static_cast<std::uint32_t>(sum);
-  // Each part has a place for triangles in no tile, cut off below.
-  bins.triangles.resize(sum + parts * TilesOfRange::kGroup);
+  // Each part has a place behind the others for triangles in no tile.
+  bins.triangles =
+      std::make_unique_for_overwrite<std::uint32_t[]>(sum + parts * TilesOfRange::kGroup);
   parallel_for(execution, parts, [&](std::size_t part, int) {
     std::uint64_t* cursor = cursors.data() + part * stride;
     cursor[tiles] = sum + part * TilesOfRange::kGroup;
-    ranges[part].write(cursor, bins.triangles.data());
+    ranges[part].write(cursor, bins.triangles.get());
   });
-  bins.triangles.resize(sum);
   if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
   return bins;
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -15,15 +16,16 @@ namespace strata {
 /// kMaxGridSide pixels a side, some outside of it are in tiles of its border.
 struct TileBins {
   int tiles_u = 0, tiles_v = 0;
-  int first_v = 0;                       ///< the first row of tiles
-  std::vector<std::uint32_t> offsets;    ///< tiles_u * tiles_v + 1
-  std::vector<std::uint32_t> triangles;  ///< indices into LatticeMesh::triangles, in no fixed order
+  int first_v = 0;                     ///< the first row of tiles
+  std::vector<std::uint32_t> offsets;  ///< tiles_u * tiles_v + 1
+  /// Indices into LatticeMesh::triangles, offsets.back() of them, in no fixed order.
+  std::unique_ptr<std::uint32_t[]> triangles;
 
   [[nodiscard]] std::span<const std::uint32_t> tile(int tu, int tv) const {
     const std::size_t i =
         static_cast<std::size_t>(tv - first_v) * static_cast<std::size_t>(tiles_u) +
         static_cast<std::size_t>(tu);
-    return std::span(triangles).subspan(offsets[i], offsets[i + 1] - offsets[i]);
+    return {triangles.get() + offsets[i], offsets[i + 1] - offsets[i]};
   }
 };
 
