@@ -3,12 +3,24 @@
 #include <sys/mman.h>
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <mutex>
 #include <new>
+#include <numeric>
 #include <stdexcept>
 
 namespace strata {
+namespace {
+
+/// The offsets that tiles share whose columns have one interval each, as most tiles of large grids.
+constexpr auto kOneEach = [] {
+  std::array<std::uint32_t, VoxelIntervals::kTileColumns + 1> offsets{};
+  std::iota(offsets.begin(), offsets.end(), 0u);
+  return offsets;
+}();
+
+}  // namespace
 
 /// Memory of many tiles, in blocks: to touch small pages for the first time costs more than to fill
 /// them, so all blocks but the first are large pages where the system has them.
@@ -46,10 +58,19 @@ class VoxelIntervals::Arena {
 
   void* take(std::size_t bytes) {
     bytes = (bytes + kLine - 1) / kLine * kLine;
-    const std::lock_guard lock(mutex_);
+    std::unique_lock lock(mutex_);
     while (bytes > left_) next_block(bytes);
     left_ -= bytes;
-    return std::exchange(next_, next_ + bytes);
+    void* const taken = std::exchange(next_, next_ + bytes);
+    if (used_ == blocks_.size() && left_ < blocks_.back().size / 8) {
+      // Threads that touch a new page at once would all clear it: one has the next ready before it
+      // is needed.
+      add_block(0);
+      const Block next = blocks_.back();
+      lock.unlock();
+      ::madvise(next.memory, next.size, MADV_POPULATE_WRITE);  // a wish
+    }
+    return taken;
   }
   void next_block(std::size_t bytes) {
     if (used_ == blocks_.size()) add_block(bytes);
@@ -58,7 +79,7 @@ class VoxelIntervals::Arena {
   }
   void add_block(std::size_t bytes) {
     const std::size_t least = blocks_.empty() ? kFirst : kLargePage;
-    const std::size_t size = (bytes + least - 1) / least * least;
+    const std::size_t size = std::max(least, (bytes + least - 1) / least * least);
     const auto alignment = std::align_val_t{blocks_.empty() ? kLine : kLargePage};
     if (blocks_.size() == blocks_.capacity()) blocks_.reserve(2 * blocks_.size() + 8);
     void* const memory = ::operator new(size, alignment);
@@ -106,7 +127,9 @@ void VoxelIntervals::set_tile(int tu, int tv, std::span<const std::uint32_t> off
                               std::span<const std::uint32_t> labels) {
   Tile& tile = tiles_[static_cast<std::size_t>(tv) * static_cast<std::size_t>(tiles_u_) +
                       static_cast<std::size_t>(tu)];
-  tile.offsets = arena_->copy(offsets);
+  const bool one_each = !offsets.empty() && offsets.back() == kTileColumns &&
+                        std::equal(offsets.begin(), offsets.end(), kOneEach.begin());
+  tile.offsets = one_each ? kOneEach.data() : arena_->copy(offsets);
   tile.items = arena_->copy(items);
   tile.labels = arena_->copy(labels);
 }
@@ -144,10 +167,10 @@ bool VoxelIntervals::has_labels() const {
 std::uint64_t VoxelIntervals::memory_bytes() const {
   std::uint64_t bytes = tiles_.size() * sizeof(Tile);
   for (const Tile& tile : tiles_) {
-    if (tile.offsets)
-      bytes += (kTileColumns + 1) * sizeof(std::uint32_t) +
-               tile.offsets[kTileColumns] *
-                   (sizeof(Interval) + (tile.labels ? sizeof(std::uint32_t) : 0));
+    if (!tile.offsets) continue;
+    if (tile.offsets != kOneEach.data()) bytes += sizeof kOneEach;
+    bytes +=
+        tile.offsets[kTileColumns] * (sizeof(Interval) + (tile.labels ? sizeof(std::uint32_t) : 0));
   }
   return bytes;
 }

@@ -100,6 +100,35 @@ TEST(VoxelIntervals, DenseLabelsAreTheLabels) {
   }
 }
 
+TEST(VoxelIntervals, ATileHoldsTheOffsetsThatItIsGiven) {
+  constexpr std::size_t kColumns = VoxelIntervals::kTileColumns;
+  const VoxelGrid grid = make_grid({64, 64, 9});
+  std::vector<Interval> items(kColumns);
+  for (std::size_t i = 0; i < kColumns; ++i) items[i].last = static_cast<std::uint16_t>(i % 9);
+  std::vector<std::uint32_t> one_each(kColumns + 1);
+  for (std::size_t i = 0; i <= kColumns; ++i) one_each[i] = static_cast<std::uint32_t>(i);
+  // As many intervals, but none in one column and two in another.
+  std::vector<std::uint32_t> others = one_each;
+  for (std::size_t i = 7; i < kColumns; ++i) ++others[i];
+  std::uint64_t bytes[2];
+  for (const auto* offsets : {&one_each, &others}) {
+    VoxelIntervals set(grid, Axis::kZ);
+    set.set_tile(0, 0, *offsets, items);
+    const VoxelIntervals::TileView tile = set.tile(0, 0);
+    EXPECT_TRUE(
+        std::equal(tile.offsets.begin(), tile.offsets.end(), offsets->begin(), offsets->end()));
+    for (std::size_t i = 0; i < kColumns; ++i) {
+      const auto column = set.column(static_cast<int>(i % 64), static_cast<int>(i / 64));
+      ASSERT_EQ(column.size(), (*offsets)[i + 1] - (*offsets)[i]) << i;
+      if (column.empty()) continue;
+      ASSERT_EQ(column.data(), tile.items.data() + (*offsets)[i]) << i;
+    }
+    EXPECT_EQ(set.interval_count(), kColumns);
+    bytes[offsets == &others] = set.memory_bytes();
+  }
+  EXPECT_EQ(bytes[1] - bytes[0], (kColumns + 1) * sizeof(std::uint32_t));  // shared by such tiles
+}
+
 TEST(VoxelIntervals, ADenseArrayKeepsTheMemoryLimit) {
   const VoxelIntervals set(make_grid({100, 100, 100}), Axis::kY);
   EXPECT_TRUE(to_dense(set, {.memory_limit = 1'000'000}));
