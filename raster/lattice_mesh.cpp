@@ -51,6 +51,8 @@ Result<LatticeMesh> snap_to_lattice(const TriangleSoup& mesh, const VoxelGrid& g
     while (found < seen && !bad.compare_exchange_weak(seen, found)) {
     }
   });
+  // Vertices have no value where the work was not begun.
+  if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
   if (bad != kNoVertex) {
     const glm::dvec3 p = mesh.positions[bad];
     return fail(ErrorCode::kGeometry,

@@ -141,6 +141,8 @@ Result<ViewPart> view_part(const PlacedMesh& part, const View& view, const Execu
         if (!snap(glm::dvec3(p) / p.w, out.vertices[i])) bad[chunk] = 1;
       }
     });
+    // Vertices have no value where the work was not begun.
+    if (execution.stop.stop_requested()) return fail(ErrorCode::kCancelled, "stopped");
     // A strong zoom: what lies far beside the picture is cut off.
     out.cut = std::find(bad.begin(), bad.end(), 1) != bad.end();
     out.mesh.triangles = part.triangles;

@@ -25,7 +25,7 @@ struct PlacedMesh {
 /// A solid as a view sees it: vertices snapped to the image lattice, cut at the near plane where
 /// that is needed, triangles sorted into tiles where they are many.
 struct ViewPart {
-  std::vector<glm::ivec3> vertices;
+  LatticeVertices vertices;
   std::vector<glm::uvec3> cut_triangles;    ///< instead of the part's, when it was cut
   std::vector<std::uint32_t> cut_sources;   ///< the part's triangle of each of those
   LatticeMesh mesh;                         ///< its vertices are moved out of `vertices`

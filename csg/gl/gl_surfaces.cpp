@@ -29,7 +29,7 @@ enum Binding : unsigned { kTriangles = 0, kSurfaces = 4, kDoubts = 5 };
 
 /// All solids that the walk looks at, as one mesh.
 struct AllSolids {
-  std::vector<glm::ivec3> vertices;
+  LatticeVertices vertices;
   std::vector<glm::uvec3> triangles;
   std::vector<std::uint32_t> first_of;  ///< first triangle of each part
   std::vector<glm::uvec2> facts;        ///< of each triangle: solid, and extra depth steps of a

@@ -2,6 +2,8 @@
 
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <memory>
+#include <new>
 #include <span>
 #include <vector>
 
@@ -20,17 +22,34 @@ inline constexpr int kLatticeSteps = 1 << kLatticeBits;
 /// Coordinates beyond this many lattice steps (2^20 voxels) are refused.
 inline constexpr std::int32_t kMaxLatticeCoordinate = 1 << 28;
 
+/// Leaves new elements of a vector as its memory is, for threads to fill: what one thread fills
+/// with zeros, others then have to fetch from it.
+template <class T>
+struct UnfilledAllocator : std::allocator<T> {
+  UnfilledAllocator() = default;
+  /// All are alike.
+  template <class Other>
+  UnfilledAllocator(const UnfilledAllocator<Other>& /*other*/) noexcept {}
+  /// An element without a value.
+  template <class Element>
+  void construct(Element* at) noexcept {
+    ::new (static_cast<void*>(at)) Element;
+  }
+};
+/// Vertices of a mesh on a lattice; resize() gives new ones no value.
+using LatticeVertices = std::vector<glm::ivec3, UnfilledAllocator<glm::ivec3>>;
+
 /// A mesh whose vertices were snapped, once and in 3D, to the lattice of a grid: the only geometry
 /// that the rasterizer, the surface voxelizer and the oracles see (law 3). Lattice point (x, y, z)
 /// lies at world grid.origin + (x, y, z) / 256 * grid.voxel_size; voxel centres are at 256 i + 128.
 struct LatticeMesh {
-  std::vector<glm::ivec3> vertices;       ///< |coordinate| <= kMaxLatticeCoordinate
+  LatticeVertices vertices;               ///< |coordinate| <= kMaxLatticeCoordinate
   std::span<const glm::uvec3> triangles;  ///< borrowed from the soup it was made of
 };
 
 /// Snaps to nearest, ties up: floor((p - origin) / voxel_size * 256 + 0.5).
 /// @return kGeometry naming the vertex and its coordinate when it is not finite or farther than
-/// kMaxLatticeCoordinate.
+/// kMaxLatticeCoordinate; kCancelled
 Result<LatticeMesh> snap_to_lattice(const TriangleSoup& mesh, const VoxelGrid& grid,
                                     const Execution& execution = {});
 

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numeric>
 #include <random>
+#include <stop_token>
 
 #include "hashbuffer/tile_store.h"
 #include "raster/tile_bins.h"
@@ -23,7 +24,7 @@ constexpr OffsetKind kAllOffsets[] = {OffsetKind::kRandom, OffsetKind::kFarthest
                                       OffsetKind::kPlaneFirst};
 
 struct Scene {
-  std::vector<glm::ivec3> vertices;
+  LatticeVertices vertices;
   std::vector<glm::uvec3> triangles;
 
   void add(const glm::ivec3& a, const glm::ivec3& b, const glm::ivec3& c) {
@@ -548,6 +549,21 @@ TEST(TileBins, HoldTrianglesAtTheBordersOfTheLargestImages) {
       });
     }
   }
+}
+
+TEST(LatticeMesh, IsRefusedWhereTheWorkWasStopped) {
+  // Vertices that were not begun have no value.
+  TriangleSoup soup;
+  soup.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  soup.triangles = {{0, 1, 2}};
+  VoxelGrid grid;
+  grid.dims = {4, 4, 4};
+  EXPECT_TRUE(snap_to_lattice(soup, grid));
+  std::stop_source stop;
+  stop.request_stop();
+  const auto stopped = snap_to_lattice(soup, grid, {.stop = stop.get_token()});
+  ASSERT_FALSE(stopped);
+  EXPECT_EQ(stopped.error().code, ErrorCode::kCancelled);
 }
 
 }  // namespace

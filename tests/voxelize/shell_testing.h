@@ -20,7 +20,7 @@ inline constexpr std::array kAllKinds = {SurfaceKind::kConservative, SurfaceKind
                                          SurfaceKind::k6};
 
 struct Mesh {
-  std::vector<glm::ivec3> vertices;
+  LatticeVertices vertices;
   std::vector<glm::uvec3> triangles;
 
   void add(glm::ivec3 a, glm::ivec3 b, glm::ivec3 c) {

@@ -18,7 +18,7 @@ constexpr glm::ivec2 kTile(128, 64);
 
 /// Triangles on the lattice.
 struct Soup {
-  std::vector<glm::ivec3> vertices;
+  LatticeVertices vertices;
   std::vector<glm::uvec3> triangles;
 
   [[nodiscard]] AreaBounds bounds(double steep_from) const {

@@ -70,7 +70,7 @@ class ComputeRasterizerTest : public test::GlTest {
 };
 
 struct Triangles {
-  std::vector<glm::ivec3> vertices;
+  LatticeVertices vertices;
   std::vector<glm::uvec3> triangles;
   void add(const glm::ivec3& a, const glm::ivec3& b, const glm::ivec3& c) {
     const auto i = static_cast<unsigned>(vertices.size());

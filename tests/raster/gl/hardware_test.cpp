@@ -132,7 +132,7 @@ TEST_F(GlHardware, WhereNoCentreLiesOnAnEdgeTheListsAreTheCpus) {
   ASSERT_TRUE(rasterizer) << rasterizer.error().message;
   // Vertices off the lattice of pixel centres, edges of odd slope: a thousand random triangles.
   Random random(3);
-  std::vector<glm::ivec3> vertices;
+  LatticeVertices vertices;
   std::vector<glm::uvec3> triangles;
   const auto coordinate = [&](std::uint64_t side) {
     return static_cast<std::int32_t>(random.below(side * 256)) | 1;
