@@ -32,6 +32,10 @@ class Frame {
         take;
     /// Whether `faces` must not stand for pixels of `tile`.
     std::function<bool(const PixelRect& rect)> needs_pixels;
+    /// As SurfacePart has it.
+    std::function<bool(std::uint32_t solid, std::span<const std::uint32_t> triangles,
+                       std::uint32_t exit, std::size_t worker)>
+        alike;
     explicit operator bool() const { return take != nullptr; }
   };
 
@@ -122,7 +126,11 @@ class Frame {
       SurfacePart part{&image_};
       if (on_tile) {
         part = {&tile_images_[worker], rect.u0, rect.v0,
-                on_tile.needs_pixels(rect) ? nullptr : &faces};
+                on_tile.needs_pixels(rect) ? nullptr : &faces,
+                [&on_tile, worker](std::uint32_t solid, std::span<const std::uint32_t> triangles,
+                                   std::uint32_t exit) {
+                  return on_tile.alike(solid, triangles, exit, worker);
+                }};
       }
       finders_[worker]->find(tile_u, tile_v, solids, part, execution.stop);
       if (on_tile) on_tile.take(part.image, faces, rect, worker);
@@ -347,7 +355,11 @@ Result<void> Preview::Impl::shade_tiles(const Band& band, const Look& look,
     }
     return tile != nullptr ? shader.shade(*tile, faces, rect) : shader.leave(rect);
   };
-  if (auto done = frame.draw(band.view, execution, {take, has_ghosts}); !done) return done;
+  const auto alike = [&](std::uint32_t solid, std::span<const std::uint32_t> triangles,
+                         std::uint32_t exit, std::size_t worker) {
+    return shaders[worker].alike(solid, triangles, exit);
+  };
+  if (auto done = frame.draw(band.view, execution, {take, has_ghosts, alike}); !done) return done;
   if (auto done = end_ghosts(work); !done) return done;
   work.total.fragments += frame.report().fragments;
   work.total.resolved += frame.report().resolved;

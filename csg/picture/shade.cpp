@@ -364,6 +364,15 @@ void TileShader::shade_areas(const SurfaceImage& tile, const AreaFaces& faces,
   }
 }
 
+bool TileShader::alike(std::uint32_t solid, std::span<const std::uint32_t> triangles,
+                       std::uint32_t exit) {
+  if (!samples_->uniform(solid, triangles.front() | exit)) return false;
+  const Rgba colour = samples_->colour();
+  return std::ranges::all_of(triangles.subspan(1), [&](std::uint32_t triangle) {
+    return samples_->uniform(solid, triangle | exit) && samples_->colour() == colour;
+  });
+}
+
 void TileShader::leave(const PixelRect& rect) {
   const int left = rect.u0 / rows_.across, right = rect.u1 / rows_.across;
   for (int v = rect.v0 / rows_.down; v < rect.v1 / rows_.down; ++v) {

@@ -129,6 +129,10 @@ class TileShader {
   void shade(const SurfaceImage& tile, const AreaFaces& faces, const PixelRect& rect);
   /// The same where nothing is seen.
   void leave(const PixelRect& rect);
+  /// Whether faces, [exit:1 | triangle:31] with `exit`, have the same colour at all of their
+  /// pixels.
+  [[nodiscard]] bool alike(std::uint32_t solid, std::span<const std::uint32_t> triangles,
+                           std::uint32_t exit);
   /// The same in two steps, between which others may blend into the colours of the samples: those
   /// of `rect`, kTileSide a row, as csg::shade() gives them. @param tile  null: nothing is seen
   [[nodiscard]] Rgba* samples(const SurfaceImage* tile, const PixelRect& rect);

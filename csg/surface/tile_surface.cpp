@@ -513,7 +513,10 @@ bool TileFinder::show_alone(const SearchArea& area, LeafLayers& leaf) {
   const int width = std::min(tile_.u1, area.rect.u1) - area.rect.u0;
   const int height = area.rect.v1 - area.rect.v0;
   const auto pixels = static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height);
-  const bool one_face = part_.faces != nullptr && input.triangles.size() == 1;
+  const bool one_face =
+      part_.faces != nullptr &&
+      (input.triangles.size() == 1 ||
+       (part_.alike && !input.triangles.empty() && part_.alike(leaf.solid, input.triangles, tag)));
   std::uint64_t fragments = 0;
   if (!one_face) {
     fragments = raster_layers(view_parts_[leaf.solid].mesh, target, input.triangles, clip,

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <stop_token>
 #include <vector>
@@ -46,7 +47,8 @@ struct UnitedLayers {
   }
 };
 
-/// The faces of those areas of a tile that show one face in all of their pixels.
+/// The faces of those areas of a tile that show one face in all of their pixels, or faces that look
+/// the same.
 struct AreaFaces {
   struct Face {
     std::uint32_t solid = Surface::kNone;     ///< kNone: nothing, or more than one
@@ -62,6 +64,11 @@ struct SurfacePart {
   int u0 = 0, v0 = 0;
   /// If not null: gets the faces of areas, whose pixels of the image are left undefined.
   AreaFaces* faces = nullptr;
+  /// Whether faces of a solid, as SurfaceImage has them but for `exit`, look the same: then one may
+  /// stand for all of them in `faces`. None: they do not.
+  std::function<bool(std::uint32_t solid, std::span<const std::uint32_t> triangles,
+                     std::uint32_t exit)>
+      alike = nullptr;
   [[nodiscard]] std::size_t index(int u, int v) const {
     return static_cast<std::size_t>(v - v0) * static_cast<std::size_t>(image->width) +
            static_cast<std::size_t>(u - u0);
