@@ -369,7 +369,7 @@ class Search {
     const std::uint32_t latest = hn::GetLane(hn::MaxOfLanes(d, last));
     for (const std::uint32_t slot : area_.program->leaves) {
       LeafLayers& leaf = area_.leaves[slot];
-      if (leaf.nearest > latest || !holds(leaf) || leaf.nearest > latest) continue;
+      if (is_behind(leaf, latest) || !holds(leaf) || is_behind(leaf, latest)) continue;
       const std::size_t offset = offset_in(leaf);
       const M own = hn::Eq(leaf_at, hn::Set(d, slot));
       for (std::size_t k = 0; k < leaf.keys.size(); ++k) {
@@ -455,7 +455,7 @@ class Search {
     inside_.clear();
     for (const std::uint32_t slot : area_.program->leaves) {
       LeafLayers& leaf = area_.leaves[slot];
-      if (leaf.nearest > latest || !holds(leaf) || leaf.nearest > latest) continue;
+      if (is_behind(leaf, latest) || !holds(leaf) || is_behind(leaf, latest)) continue;
       Met met{&leaf, offset_in(leaf), kNoLayer, false};
       for (std::size_t k = 0; k < leaf.keys.size(); ++k) {
         const std::uint32_t transition = leaf.keys[k][met.offset + lane];
@@ -572,6 +572,11 @@ class Search {
     return hn::Ne(hn::Load(d, may), hn::Zero(d));
   }
 
+  /// Whether all faces of a leaf lie behind a depth. A steep one may stand for a place before its
+  /// crossing, which is not in `nearest` of a leaf that is made, but for that of areas.
+  [[nodiscard]] static bool is_behind(const LeafLayers& leaf, std::uint32_t depth) {
+    return leaf.nearest > depth && (leaf.by_area || !leaf.steep);
+  }
   /// Whether the pixels lie in the leaf's rectangle; then its layers are there.
   HWY_INLINE bool holds(LeafLayers& leaf) {
     if (v_ < leaf.rect.v0 || v_ >= leaf.rect.v1 || u_ < leaf.rect.u0 || u_ >= leaf.rect.u1) {
