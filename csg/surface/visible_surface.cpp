@@ -12,10 +12,9 @@
 namespace strata::csg {
 namespace {
 
-/// Lists up to this length are sorted by insertion: parts of them are in order.
-constexpr std::size_t kShort = 24;
-/// Lists from this length on are sorted in time that grows with it, byte by byte.
-constexpr std::size_t kFewTransitions = 64;
+/// Lists up to this length are sorted by insertion: parts of them are in order. Longer ones are
+/// sorted in time that grows with their length, byte by byte.
+constexpr std::size_t kShort = 40;
 
 bool goes_after(const Transition& a, const Transition& b) {
   return a.depth != b.depth ? a.depth > b.depth : a.solid > b.solid;
@@ -297,11 +296,7 @@ void FirstHit::sort(std::vector<Transition>& transitions) {
   for (const Transition& transition : transitions) {
     order_.push_back(std::uint64_t{transition.depth} << 32 | order_.size());
   }
-  if (order_.size() < kFewTransitions) {
-    std::sort(order_.begin(), order_.end());
-  } else {
-    sort_by_bytes(order_, other_order_);
-  }
+  sort_by_bytes(order_, other_order_);
   sorted_.clear();
   for (const std::uint64_t key : order_)
     sorted_.push_back(transitions[static_cast<std::uint32_t>(key)]);
