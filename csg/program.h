@@ -108,7 +108,8 @@ class ProgramState {
   /// Whether the tree has its value also because of this solid's, one of those that vary: on the
   /// way up, no node that is true stands on other edges alone, and none is true whatever the solids
   /// that vary. So a solid without effect does not contribute, such as a cutter of a solid that the
-  /// ray is outside of. Asked for all solids between two transitions it is O(nodes).
+  /// ray is outside of, or a solid that the root does not reach. Asked for all solids between two
+  /// transitions it is O(nodes).
   [[nodiscard]] bool contributes(std::uint32_t solid) { return above(solid).contributes; }
   /// Whether the tree has its value because of this solid's alone: a transition of that solid would
   /// change it. As quick as contributes().
@@ -120,9 +121,9 @@ class ProgramState {
     bool contributes = true, decides = true;
   };
   struct Known {
-    std::uint64_t stamp = 0;
+    std::uint64_t stamp = 0;  ///< known_stamp_ when `weight` was found
     Weight weight;
-    std::uint64_t touched = 0;  ///< a stamp: what follows is meant
+    std::uint64_t touched = 0;  ///< known_stamp_ when `before` or `steady` was found
     bool before = false;        ///< toggle_all(): the node's value before
     std::uint32_t steady = 0;   ///< vary(): edges that are true in any case
   };

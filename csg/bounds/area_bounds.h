@@ -56,7 +56,8 @@ void find_tile_bounds(const LatticeMesh& mesh, std::span<const std::uint32_t> tr
                       const glm::ivec2& tile, double steep_from, bool with_exits,
                       AreaBounds& bounds);
 /// The same in its areas. (csg/bounds/area_bounds_simd.cpp) @param bounds_of_tile  `bounds` has
-/// those of the tile, which hold for its areas as well; false: nothing is known of the whole tile
+/// those of the tile, which hold for its areas as well, and `triangles` are those that it names;
+/// false: nothing is known of the whole tile
 void find_area_bounds(const LatticeMesh& mesh, std::span<const std::uint32_t> triangles,
                       const glm::ivec2& tile, double steep_from, bool with_exits,
                       bool bounds_of_tile, AreaBounds& bounds);

@@ -130,7 +130,7 @@ class TileShader {
   /// The same where nothing is seen.
   void leave(const PixelRect& rect);
   /// Whether faces, [exit:1 | triangle:31] with `exit`, have the same colour at all of their
-  /// pixels.
+  /// pixels. @pre `triangles` is not empty
   [[nodiscard]] bool alike(std::uint32_t solid, std::span<const std::uint32_t> triangles,
                            std::uint32_t exit);
   /// The same in two steps, between which others may blend into the colours of the samples: those

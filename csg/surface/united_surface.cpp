@@ -44,21 +44,23 @@ bool TileFinder::show_united(std::uint64_t pixel) {
   const auto width = static_cast<std::uint64_t>(part_.image->width);
   const std::size_t at = united_.index(part_.u0 + static_cast<int>(pixel % width),
                                        part_.v0 + static_cast<int>(pixel / width));
-  const double first = united_.depths[0][at];
+  const std::uint32_t nearest = united_.depths[0][at];
+  const double first = nearest;
   const Coincidence::Range range = coincidence_->range();
   const double nearness = range.intercept - static_cast<double>(range.slope) * first;
   transitions_.clear();
-  double last = first + range.constant + range.quadratic * nearness * nearness + 1;
+  double reach = 0;  // the largest of all faces of the first depth
+  for (int k = 0; k < UnitedLayers::kKept && united_.depths[k][at] == nearest; ++k) {
+    const std::uint32_t face = united_.faces[k][at] & ~UnitedLayers::kSteep;
+    reach = std::max<double>(reach, united_.extra_steps[face]);
+  }
+  const double last =
+      first + range.constant + range.quadratic * nearness * nearness + 1 + 2 * reach;
   for (int k = 0; k < UnitedLayers::kKept; ++k) {
     const std::uint32_t depth = united_.depths[k][at];
     if (depth == UnitedLayers::kEmpty) break;
     const std::uint32_t face = united_.faces[k][at] & ~UnitedLayers::kSteep;
-    const double extra = united_.extra_steps[face];
-    if (k == 0) {
-      last += 2 * extra;
-    } else if (depth - extra > last) {
-      continue;
-    }
+    if (depth - static_cast<double>(united_.extra_steps[face]) > last) continue;
     const std::uint32_t solid = united_.face_solids[face];
     // A ray enters a convex solid once, or nearly so.
     for (const Transition& transition : transitions_) {

@@ -170,9 +170,13 @@ void FirstHit::list_candidates(const std::vector<Transition>& transitions, const
     last_[transitions[i].solid] = i;
   }
   candidates_.clear();
+  toggled_.clear();
   for (std::size_t i = 0; i < interval.settled; ++i) {
     const Transition& transition = transitions[i];
     if (transition.triangle == Surface::kNone) continue;
+    // What begins just behind the surface varies too: at the surface the ray is not in it yet.
+    const bool settled = i >= interval.begin && last_[transition.solid] == i;
+    if (settled) toggled_.push_back(transition.solid);
     if (state_.inside(transition.solid) == transition.exit) continue;
     const bool in_group = i >= interval.begin && i < interval.group_end;
     if (!in_group) {
@@ -185,13 +189,12 @@ void FirstHit::list_candidates(const std::vector<Transition>& transitions, const
       if (last_[transition.solid] != i) continue;
     }
     candidates_.push_back({&transition, false});
+    if (!settled && !in_group) toggled_.push_back(transition.solid);
   }
   keep_contributing();
 }
 
 void FirstHit::keep_contributing() {
-  toggled_.clear();
-  for (const Candidate& candidate : candidates_) toggled_.push_back(candidate.transition->solid);
   state_.vary(toggled_);
   std::erase_if(candidates_, [this](const Candidate& candidate) {
     return !state_.contributes(candidate.transition->solid);
@@ -273,7 +276,11 @@ FirstHit::Verdict FirstHit::judge(std::span<const std::uint32_t> inside,
   verdict.inside = state_.value();
   if (verdict.inside) {
     candidates_.clear();
-    for (const Transition& transition : coincident) candidates_.push_back({&transition, false});
+    toggled_.clear();
+    for (const Transition& transition : coincident) {
+      candidates_.push_back({&transition, false});
+      toggled_.push_back(transition.solid);
+    }
     keep_contributing();
     if (!candidates_.empty()) verdict.surface = surface_of(choose(faces), 0);
   }
@@ -305,8 +312,8 @@ void FirstHit::sort(std::vector<Transition>& transitions) {
     auto end = begin + 1;
     while (end != transitions.end() && end->depth == begin->depth) ++end;
     if (end - begin > 1) {
-      std::sort(begin, end,
-                [](const Transition& a, const Transition& b) { return a.solid < b.solid; });
+      std::stable_sort(begin, end,
+                       [](const Transition& a, const Transition& b) { return a.solid < b.solid; });
     }
     begin = end;
   }

@@ -242,7 +242,8 @@ class FirstHit {
     if (a.transition->exit != b.transition->exit) return b.transition->exit;
     return a.transition->solid < b.transition->solid;
   }
-  /// Takes away the candidates that do not contribute, where all other solids stay as they are.
+  /// Takes away the candidates that do not contribute, where those of toggled_ vary and all other
+  /// solids stay as they are.
   void keep_contributing();
   /// Those of `transitions`, a bit each, that may lead out of the tree.
   [[nodiscard]] std::uint32_t find_outward(std::span<const Transition> transitions);
