@@ -23,17 +23,21 @@ bool ends_in(std::string_view text, std::string_view extension) {
 /// A folder of 0000.png, 0001.png, ...
 class PngFolder final : public AnimationWriter {
  public:
-  PngFolder(AtomicFolder folder, int frames) : folder_(std::move(folder)) {
-    digits_ = std::max<int>(4, static_cast<int>(fmt::formatted_size("{}", frames - 1)));
+  PngFolder(AtomicFolder folder, const AnimationOptions& options)
+      : folder_(std::move(folder)), execution_{options.threads} {
+    const std::size_t digits = fmt::formatted_size("{}", options.frames - 1);
+    digits_ = std::max(4, static_cast<int>(digits));
   }
   Result<void> add(const Picture& picture) override {
     return write_png(picture,
-                     fmt::format("{}/{:0{}}.png", folder_.temporary_path(), next_++, digits_));
+                     fmt::format("{}/{:0{}}.png", folder_.temporary_path(), next_++, digits_),
+                     execution_);
   }
   Result<void> finish() override { return folder_.commit(); }
 
  private:
   AtomicFolder folder_;
+  Execution execution_;
   int digits_, next_ = 0;
 };
 
@@ -43,7 +47,7 @@ Result<std::unique_ptr<AnimationWriter>> create_png_folder(const std::string& pa
                                                            const AnimationOptions& options) {
   auto folder = AtomicFolder::create(path);
   if (!folder) return tl::unexpected(folder.error());
-  return std::make_unique<PngFolder>(*std::move(folder), options.frames);
+  return std::make_unique<PngFolder>(*std::move(folder), options);
 }
 
 PictureBox changed_box(const Picture& before, const Picture& after) {

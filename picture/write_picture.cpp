@@ -241,13 +241,14 @@ class BandEncoder {
       std::swap(row_, above_);
     }
   }
-  /// Huffman codes for what rows in the middle of the band hold.
+  /// Huffman codes for what some rows all over the band hold.
   void make_codes(std::size_t count) {
     constexpr std::size_t kOneOf = 8;
-    const std::size_t row = form_->row_bytes + 1, sample = std::max<std::size_t>(count / kOneOf, 1);
+    const std::size_t row = form_->row_bytes + 1;
     state_->seen = {};
-    isal_update_histogram(rows_.data() + (count - sample) / 2 * row, static_cast<int>(sample * row),
-                          &state_->seen);
+    for (std::size_t v = std::min(count - 1, kOneOf / 2); v < count; v += kOneOf) {
+      isal_update_histogram(rows_.data() + v * row, static_cast<int>(row), &state_->seen);
+    }
     isal_create_hufftables(&state_->codes, &state_->seen);
   }
   void put_row(std::size_t v, std::uint8_t* to) {
@@ -334,6 +335,11 @@ std::vector<std::uint8_t> encode_png(const Picture& picture, int threads) {
 
 Result<void> write_png(const Picture& picture, const std::string& path,
                        const Execution& execution) {
+  constexpr int kWidest = 1 << 28;  // what ISA-L counts in 32 bits
+  if (picture.width > kWidest) {
+    return fail(ErrorCode::kLimit, "{}: a picture must be 1 to {} pixels wide, got {}", path,
+                kWidest, picture.width);
+  }
   try {
     const std::vector<std::uint8_t> bytes = encode_png(picture, execution.threads);
     return write_file(path, bytes.data(), bytes.size());

@@ -62,13 +62,17 @@ class VoxelIntervals::Arena {
     while (bytes > left_) next_block(bytes);
     left_ -= bytes;
     void* const taken = std::exchange(next_, next_ + bytes);
-    if (used_ == blocks_.size() && left_ < blocks_.back().size / 8) {
+    if (used_ == blocks_.size() && left_ < blocks_.back().size / 8 && bytes <= kFirst) {
       // Threads that touch a new page at once would all clear it: one has the next ready before it
-      // is needed.
-      add_block(0);
+      // is needed. Both are wishes. Tiles larger than kFirst would seldom fit.
+      try {
+        add_block(0);
+      } catch (const std::bad_alloc&) {
+        return taken;
+      }
       const Block next = blocks_.back();
       lock.unlock();
-      ::madvise(next.memory, next.size, MADV_POPULATE_WRITE);  // a wish
+      ::madvise(next.memory, next.size, MADV_POPULATE_WRITE);
     }
     return taken;
   }

@@ -148,8 +148,9 @@ class VoxelRun {
   Result<void> film() {
     const int count = command_.turntable + command_.path_frames;
     const auto& backdrop = command_.picture.backdrop;
-    auto film = create_animation(command_.output,
-                                 {count, command_.fps, backdrop && backdrop->transparent()});
+    auto film = create_animation(
+        command_.output,
+        {count, command_.fps, backdrop && backdrop->transparent(), session_.threads()});
     if (!film) return tl::unexpected(film.error());
     const Camera first = placed_camera();
     for (int shot = 0; shot < count; ++shot) {

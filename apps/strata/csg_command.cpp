@@ -440,8 +440,8 @@ CsgCommand at_time(const CsgCommand& command, int frame) {
 Result<void> run_film(const CsgCommand& command, Session& session) {
   const int count = command.frames + command.turntable + command.path_frames;
   const auto& backdrop = command.picture.backdrop;
-  auto film =
-      create_animation(command.output, {count, command.fps, backdrop && backdrop->transparent()});
+  auto film = create_animation(
+      command.output, {count, command.fps, backdrop && backdrop->transparent(), session.threads()});
   if (!film) return tl::unexpected(film.error());
   if (command.frames == 0) {
     if (auto done = CsgRun(command, session, film->get()).run(); !done) return done;

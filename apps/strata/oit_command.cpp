@@ -32,8 +32,8 @@ bool only_meshes(const OitCommand& command) {
                       [&](const std::string& file) { return csg::kind_of(file, input).is_scene; });
 }
 
-std::vector<std::uint8_t> png_of(const transparency::Image& image) {
-  return encode_png({image.width, image.height, transparency::to_bytes(image)});
+std::vector<std::uint8_t> png_of(const transparency::Image& image, int threads) {
+  return encode_png({image.width, image.height, transparency::to_bytes(image)}, threads);
 }
 
 /// Writes index.html into a folder, which is made if it is not there.
@@ -215,7 +215,7 @@ Result<void> OitRun::draw_reference() {
   auto drawn = frame_->render(**found, {}, rendering("the reference"));
   if (!drawn) return with_limit(std::move(drawn.error()));
   reference_ = std::move(drawn->image);
-  if (!command_.report.empty()) outcome_.reference_picture = png_of(reference_);
+  if (!command_.report.empty()) outcome_.reference_picture = png_of(reference_, session_.threads());
   return {};
 }
 
@@ -256,8 +256,8 @@ Result<void> OitRun::draw(const OitChoice& choice) {
   result.technique_seconds = drawn->technique_seconds;
   if (!command_.report.empty()) {
     if (auto timed = time_again(choice, result); !timed) return with_limit(timed.error());
-    result.picture = png_of(drawn->image);
-    result.heat = encode_png(heat_map(drawn->image, reference_));
+    result.picture = png_of(drawn->image, session_.threads());
+    result.heat = encode_png(heat_map(drawn->image, reference_), session_.threads());
   }
   if (compares()) result.difference = transparency::difference(drawn->image, reference_);
   outcome_.draw_ms += session_.milliseconds() - begin;
@@ -286,7 +286,8 @@ Result<void> OitRun::write(const transparency::Image& image, const std::string& 
   if (has_extension(place, ".exr")) {
     done = transparency::write_exr(seen, place);
   } else {
-    done = csg::write_png({seen.width, seen.height, transparency::to_bytes(seen)}, place);
+    done = csg::write_png({seen.width, seen.height, transparency::to_bytes(seen)}, place,
+                          {.threads = session_.threads()});
   }
   outcome_.write_ms += session_.milliseconds() - begin;
   return done;

@@ -13,6 +13,7 @@ struct AnimationOptions {
   int frames = 1;            ///< pictures that will be added, at least 1
   double fps = 25;           ///< pictures a second, 0.1 to 100; of a .gif up to 50
   bool transparent = false;  ///< the pictures have alpha; a .gif keeps it where it is above a half
+  int threads = 0;           ///< as Execution::threads; a folder of PNG files is compressed by them
 };
 
 /// Writes pictures of one size one by one, as a file that repeats for ever or as a folder of PNG

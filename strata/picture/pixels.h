@@ -21,7 +21,8 @@ struct Picture {
 };
 
 /// Writes a PNG file, or to standard output for "-". It is not stopped half way, and reports no
-/// progress. @return kOutput naming the file
+/// progress. @return kOutput naming the file, kLimit (wider than 2^28 pixels, out of memory)
+/// @param execution  its number of threads counts
 Result<void> write_png(const Picture& picture, const std::string& path,
                        const Execution& execution = {});
 

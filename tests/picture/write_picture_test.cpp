@@ -67,7 +67,8 @@ constexpr Form kForms[] = {{1, true, 1, 3},    {2, true, 1, 3},   {3, false, 2, 
 TEST(WritePicture, LibpngReadsTheSamePixelsInEveryForm) {
   unsigned seed = 1;
   for (const Form& form : kForms) {
-    for (const auto& [width, height] : {std::pair(131, 97), {64, 200}, {1027, 703}}) {
+    for (const auto& [width, height] :
+         {std::pair(131, 97), {64, 200}, {1027, 703}, {1, 1}, {300000, 3}}) {
       const Picture picture = random_runs(width, height, form.colours, form.opaque, ++seed);
       const Read read = read_by_libpng(encode_png(picture));
       EXPECT_EQ(read.bits, form.bits) << form.colours;
