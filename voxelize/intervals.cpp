@@ -62,9 +62,10 @@ class VoxelIntervals::Arena {
     while (bytes > left_) next_block(bytes);
     left_ -= bytes;
     void* const taken = std::exchange(next_, next_ + bytes);
-    if (used_ == blocks_.size() && left_ < blocks_.back().size / 8 && bytes <= kFirst) {
+    const std::size_t size = blocks_[used_ - 1].size;
+    if (used_ == blocks_.size() && size <= kLargePage && left_ < size / 8 && bytes <= kFirst) {
       // Threads that touch a new page at once would all clear it: one has the next ready before it
-      // is needed. Both are wishes. Tiles larger than kFirst would seldom fit.
+      // is needed. Both are wishes. Where tiles are large, they would seldom fit.
       try {
         add_block(0);
       } catch (const std::bad_alloc&) {

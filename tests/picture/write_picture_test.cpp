@@ -67,8 +67,7 @@ constexpr Form kForms[] = {{1, true, 1, 3},    {2, true, 1, 3},   {3, false, 2, 
 TEST(WritePicture, LibpngReadsTheSamePixelsInEveryForm) {
   unsigned seed = 1;
   for (const Form& form : kForms) {
-    for (const auto& [width, height] :
-         {std::pair(131, 97), {64, 200}, {1027, 703}, {1, 1}, {300000, 3}}) {
+    for (const auto& [width, height] : {std::pair(131, 97), {64, 200}, {1027, 703}}) {
       const Picture picture = random_runs(width, height, form.colours, form.opaque, ++seed);
       const Read read = read_by_libpng(encode_png(picture));
       EXPECT_EQ(read.bits, form.bits) << form.colours;
@@ -82,6 +81,15 @@ TEST(WritePicture, RowsOfAnyWidthAreReadBack) {
   for (int width = 1; width <= 70; ++width) {
     for (const Form& form : kForms) {
       const Picture picture = random_runs(width, 5, form.colours, form.opaque, 7);
+      EXPECT_TRUE(read_by_libpng(encode_png(picture)).pixels == picture.pixels) << width;
+    }
+  }
+}
+
+TEST(WritePicture, OnePixelAndRowsLongerThanABandAreReadBack) {
+  for (const Form& form : kForms) {
+    for (const auto& [width, height] : {std::pair(1, 1), {300000, 3}}) {
+      const Picture picture = random_runs(width, height, form.colours, form.opaque, 7);
       EXPECT_TRUE(read_by_libpng(encode_png(picture)).pixels == picture.pixels) << width;
     }
   }
