@@ -327,8 +327,8 @@ bool TileFinder::take_narrowed_program() {
     if (!edge.leaf()) {
       TileProgram::Node& node = tile_program_.nodes[edge.child()];
       const auto edges = std::span(tile_program_.edges).subspan(node.first, node.count);
-      node.count =
-          static_cast<std::uint32_t>(std::ranges::remove_if(edges, absent).begin() - edges.begin());
+      node.count = static_cast<std::uint32_t>(std::remove_if(edges.begin(), edges.end(), absent) -
+                                              edges.begin());
       if (node.count == 0) return false;
       if (node.count == 1) {
         edge = Program::Edge(edges.front().child(), true, true);
