@@ -31,13 +31,15 @@ struct TileBuilder<Record>::Impl {
   int dirty_begin = 0, dirty_end = 0;  ///< rows of the table that hold records
 
   void resize_table(int planes) {
-    table.size = static_cast<std::size_t>(planes) * kLists;
-    table.cells.assign(table.size + table.kPadding, 0);
+    table.size = 0;  // a thread whose memory was refused here may be given another tile
+    const std::size_t size = static_cast<std::size_t>(planes) * kLists;
+    table.cells.assign(size + table.kPadding, 0);
+    table.offsets = probe_offsets(size);
     table.planes = options.offsets == OffsetKind::kPlaneFirst ? std::min(planes, kMostPlanes) : 0;
     table.oldest = 0;
     table.mixed = false;
     dirty_begin = dirty_end = 0;
-    table.offsets = probe_offsets(table.size);
+    table.size = size;
   }
 
   std::vector<std::uint32_t> probe_offsets(std::size_t size) const {
