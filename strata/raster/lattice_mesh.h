@@ -2,14 +2,13 @@
 
 #include <cstdint>
 #include <glm/vec3.hpp>
-#include <memory>
-#include <new>
 #include <span>
 #include <vector>
 
 #include "strata/core/execution.h"
 #include "strata/core/grid.h"
 #include "strata/core/result.h"
+#include "strata/core/unfilled_allocator.h"
 #include "strata/mesh/soup_tools.h"
 #include "strata/mesh/triangle_soup.h"
 
@@ -22,20 +21,6 @@ inline constexpr int kLatticeSteps = 1 << kLatticeBits;
 /// Coordinates beyond this many lattice steps (2^20 voxels) are refused.
 inline constexpr std::int32_t kMaxLatticeCoordinate = 1 << 28;
 
-/// Leaves new elements of a vector as its memory is, for threads to fill: what one thread fills
-/// with zeros, others then have to fetch from it.
-template <class T>
-struct UnfilledAllocator : std::allocator<T> {
-  UnfilledAllocator() = default;
-  /// All are alike.
-  template <class Other>
-  UnfilledAllocator(const UnfilledAllocator<Other>& /*other*/) noexcept {}
-  /// An element without a value.
-  template <class Element>
-  void construct(Element* at) noexcept {
-    ::new (static_cast<void*>(at)) Element;
-  }
-};
 /// Vertices of a mesh on a lattice; resize() gives new ones no value.
 using LatticeVertices = std::vector<glm::ivec3, UnfilledAllocator<glm::ivec3>>;
 

@@ -3,8 +3,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <memory>
-#include <new>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -14,28 +12,12 @@
 #include "core/atomic_file.h"
 #include "strata/core/execution.h"
 #include "strata/core/result.h"
+#include "strata/core/unfilled_allocator.h"
 
 namespace strata {
 
-/// Leaves new bytes unset: blocks are written in full, and clearing them first costs as much again.
-template <class T>
-struct UnsetAllocator : std::allocator<T> {
-  template <class U>
-  struct rebind {
-    using other = UnsetAllocator<U>;
-  };
-  template <class U>
-  void construct(U* at) noexcept {
-    ::new (static_cast<void*>(at)) U;
-  }
-  template <class U, class... Args>
-  void construct(U* at, Args&&... args) {
-    std::construct_at(at, std::forward<Args>(args)...);
-  }
-};
-
 /// The bytes of a file under construction. resize() does not clear.
-using Bytes = std::vector<std::byte, UnsetAllocator<std::byte>>;
+using Bytes = std::vector<std::byte, UnfilledAllocator<std::byte>>;
 
 /// A single-file output that is made of blocks by several threads (internal to voxelize/). The
 /// bytes are the same on a file, where blocks are written side by side, and on a pipe, where they
